@@ -1,5 +1,6 @@
 #include "daemon/system/hot_cpu.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <string>
@@ -37,13 +38,15 @@ cpu_set_t set_of(int cpu) {
 }  // namespace
 
 bool SharingRule::share(double load, std::int64_t now_ns) noexcept {
-  if (load > kRoomy || busy_ns_ == kNoTime_ns) busy_ns_ = now_ns;
-  if (load > kFull) {
-    shared_ = false;
-  } else if (now_ns - busy_ns_ >= kRoomyFor_ns) {
-    shared_ = true;
+  if (since_ns_ == kNoTime_ns) since_ns_ = now_ns;
+  const std::int64_t passed_ns = now_ns - since_ns_;
+  if (shared_ ? load <= kFull : load >= 1.0 || passed_ns < try_after_ns_) return shared_;
+  if (shared_) {
+    const bool lasted = passed_ns >= kFirstTry_ns;
+    try_after_ns_ = lasted ? kFirstTry_ns : std::min(2 * try_after_ns_, kRarest_ns);
   }
-  return shared_;
+  since_ns_ = now_ns;
+  return shared_ = !shared_;
 }
 
 std::optional<int> quickest_cpu(const cpu_set_t& allowed, const std::string& sys) {
@@ -123,7 +126,7 @@ void HotCpu::watch() {
     shared_ = share;
     move(share ? set_of(cpu_) : allowed_);
     if (share) {
-      spdlog::info("reader, pipeline and publisher have room on CPU {} again and share it", cpu_);
+      spdlog::info("reader, pipeline and publisher share CPU {} again", cpu_);
     } else {
       spdlog::info("reader, pipeline and publisher need {:.0f} % of CPU {}: they use all CPUs now",
                    100.0 * load, cpu_);

@@ -21,19 +21,22 @@
 
 namespace posed::system {
 
-// Whether the threads share a CPU. The load is a parameter, so tests can choose it.
+// Whether the threads share a CPU. The load is a parameter, so tests can choose it. On several CPUs
+// the same work takes more time, because each hand-over wakes one; so whether it fits one CPU is
+// seen only by trying, more and more rarely while it does not.
 class SharingRule {
  public:
-  static constexpr double kFull = 0.75;  // more than this of the CPU: from now on they use all
-  static constexpr double kRoomy = 0.5;  // less than this for so long: they share it again
-  static constexpr std::int64_t kRoomyFor_ns = 10 * kNanosPerSecond;
+  static constexpr double kFull = 0.8;  // more than this of the CPU: from now on they use all
+  static constexpr std::int64_t kFirstTry_ns = 10 * kNanosPerSecond;  // after so long apart
+  static constexpr std::int64_t kRarest_ns = 64 * kFirstTry_ns;
 
   // `load`: what the threads together have run since the last look, in shares of one CPU.
   [[nodiscard]] bool share(double load, std::int64_t now_ns) noexcept;
 
  private:
   bool shared_ = true;
-  std::int64_t busy_ns_ = kNoTime_ns;  // when the load was last above kRoomy
+  std::int64_t since_ns_ = kNoTime_ns;  // of sharing or not
+  std::int64_t try_after_ns_ = kFirstTry_ns / 2;
 };
 
 // Of the CPUs `allowed` the one with the highest capacity; of several the last, because the first

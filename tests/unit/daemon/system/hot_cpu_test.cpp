@@ -28,7 +28,7 @@ void say(const test::TempFolder& sys, int cpu, const std::string& file, int valu
 
 }  // namespace
 
-TEST_CASE("threads share a CPU until it is nearly full, and again after it had room for long") {
+TEST_CASE("threads share a CPU until it is nearly full, and try again more and more rarely") {
   SharingRule rule;
   std::int64_t now_ns = 0;
   const auto looks = [&](double load, double for_s) {
@@ -38,14 +38,22 @@ TEST_CASE("threads share a CPU until it is nearly full, and again after it had r
     }
     return shared;
   };
-  CHECK(looks(0.3, 1.0));
-  CHECK(looks(0.7, 60.0));  // full enough, but not too full
-  CHECK_FALSE(looks(0.8, 0.1));
-  CHECK_FALSE(looks(0.6, 60.0));  // less than before, but it would soon be full again
-  CHECK_FALSE(looks(0.4, 9.0));
-  CHECK_FALSE(looks(0.55, 0.1));
-  CHECK_FALSE(looks(0.4, 9.8));
-  CHECK(looks(0.4, 0.3));
+  CHECK(looks(0.7, 60.0));
+  CHECK_FALSE(looks(0.9, 0.1));
+  CHECK_FALSE(looks(0.9, 9.9));
+  CHECK(looks(0.9, 0.1));  // apart they may need more than together
+  CHECK_FALSE(looks(0.9, 0.1));
+  CHECK_FALSE(looks(0.9, 19.9));
+  CHECK(looks(0.9, 0.1));
+  CHECK(looks(0.7, 10.0));
+  CHECK_FALSE(looks(0.9, 0.1));
+  CHECK_FALSE(looks(1.3, 60.0));  // this cannot fit
+  CHECK(looks(0.9, 0.1));
+  int tries = 0;
+  for (int look = 0; look < 36'000; ++look) tries += looks(0.9, 0.1) ? 1 : 0;
+  CHECK(tries >= 8);
+  CHECK(tries <= 12);  // in an hour
+  CHECK(looks(0.7, 650.0));
 }
 
 TEST_CASE("the shared CPU is the last of the quickest that may be used") {
