@@ -2,7 +2,6 @@
 
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <string_view>
 #include <system_error>
 
@@ -25,7 +24,8 @@ bool waits_for_disk(const std::string& thread) {
   for (std::filesystem::directory_iterator task("/proc/self/task", gone), end; !gone && task != end;
        task.increment(gone)) {
     std::ifstream file(task->path() / "stat");
-    const std::string stat{std::istreambuf_iterator<char>(file), {}};
+    std::string stat;
+    std::getline(file, stat);
     if (waits(stat, name)) return true;
   }
   return false;
