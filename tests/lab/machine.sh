@@ -57,6 +57,6 @@ run_machine() {
   shift 3
   [ -z "${POSED_LAB_SMP:-}" ] || clock="-smp $POSED_LAB_SMP"
   timeout "$seconds" qemu-system-x86_64 $clock -nographic -no-reboot \
-    -kernel "$kernel/unpacked/boot/vmlinuz-$kernel_version" -initrd "$initramfs" "$@" </dev/null | tr -d '\r' |
+    -kernel "$kernel/unpacked/boot/vmlinuz-$kernel_version" -initrd "$initramfs" "$@" </dev/null | sed -u 's/\r//g' |
     tee "$console" | grep --line-buffered -aE '^(ok|FAIL|LAB)' || true
 }
