@@ -7,13 +7,14 @@
 #include <systemd/sd-daemon.h>
 
 #include "daemon/system/clock.hpp"
+#include "daemon/system/thread_state.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::service {
 namespace {
 
-// A thread may sleep that long, and needs as long again on a busy machine.
-constexpr std::int64_t kLeastWithin_ns = 4 * system::kLongestSleep_ns;
+// Between two looks a thread may sleep that long, and needs as long again on a busy machine.
+constexpr std::int64_t kLeastWithin_ns = 2 * Watchdog::kLooks * system::kLongestSleep_ns;
 
 }  // namespace
 
@@ -26,7 +27,7 @@ Service::Service(std::vector<system::ThreadPulse> threads)
     spdlog::warn("WatchdogSec is too short for signs of life in time; set it to {} s or more",
                  kLeastWithin_ns / kNanosPerSecond);
   }
-  watchdog_.emplace(std::move(threads), within_ns);
+  watchdog_.emplace(std::move(threads), within_ns, system::waits_for_disk);
 }
 
 void Service::tell(const std::string& words) {
@@ -57,6 +58,10 @@ void Service::turn(std::int64_t now_ns) {
     spdlog::error(
         "the thread {} is stuck; systemd gets no more signs of life and will start posed again",
         thread);
+  }
+  for (const std::string& thread : found.waiting) {
+    spdlog::warn("the thread {} waits for the disk; posed goes on, a new start would not help",
+                 thread);
   }
   for (const std::string& thread : found.again) spdlog::warn("the thread {} goes on", thread);
   if (found.alive) tell("WATCHDOG=1");

@@ -28,7 +28,8 @@ class Service {
   // A sentence for `systemctl status`. Sent only if it is another one than before.
   void status(const std::string& sentence);
   // Sends the sign of life when it is due. A thread that is stuck is named in the log, and there
-  // are no more signs until it goes on. Call several times a second.
+  // are no more signs until it goes on; one that waits for a disk is named only. Call several times
+  // a second.
   void turn(std::int64_t now_ns);
 
  private:

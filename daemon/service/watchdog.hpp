@@ -1,8 +1,10 @@
-// Watchdog: whether every thread has made progress lately. The time is a parameter, so a test can
-// choose it. Takes no lock that a watched thread could hold. One thread; cold.
+// Watchdog: whether every thread has made progress lately. The time and the state of a thread are
+// parameters, so a test can choose them. Takes no lock that a watched thread could hold. One
+// thread; cold.
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -12,26 +14,40 @@ namespace posed::service {
 
 class Watchdog {
  public:
-  // The service manager wants a sign of life every `within_ns`; one is due twice as often. That
-  // has to be longer than system::kLongestSleep_ns.
-  Watchdog(std::vector<system::ThreadPulse> threads, std::int64_t within_ns);
+  // Looks within the time in which the service manager wants a sign of life: one look that finds a
+  // thread without progress is not yet an alarm, and a thread that stops is found soon.
+  static constexpr std::int64_t kLooks = 4;
+  // Says of a thread's name whether the kernel lets that thread wait for a disk
+  // (system::waits_for_disk). Asked only of threads without progress.
+  using WaitsForDisk = std::function<bool(const std::string&)>;
 
+  // The service manager wants a sign of life every `within_ns`. A kLooks-th of it has to be longer
+  // than system::kLongestSleep_ns.
+  Watchdog(std::vector<system::ThreadPulse> threads, std::int64_t within_ns,
+           WaitsForDisk waits_for_disk);
+
+  // Names of threads are those whose state is another one than at the last look.
   struct Finding {
-    bool alive = false;  // a look was due, and every thread made progress since the last
-    std::vector<std::string> stuck;  // threads that have just been found without progress
-    std::vector<std::string> again;  // threads that go on after they were found so
+    bool alive = false;                // a look was due, and no thread is stuck
+    std::vector<std::string> stuck;    // no progress since the last look
+    std::vector<std::string> waiting;  // none, because the disk keeps them waiting
+    std::vector<std::string> again;    // progress, after one of the two
   };
-  // Call several times within half of that time.
+  // Call several times within a kLooks-th of that time.
   [[nodiscard]] Finding look(std::int64_t now_ns);
 
  private:
+  enum class State : std::uint8_t { kGoesOn, kStuck, kWaits };
   struct Watched {
     system::ThreadPulse thread;
     std::uint64_t seen = 0;  // beats at the last look
-    bool stuck = false;
+    State state = State::kGoesOn;
   };
+  [[nodiscard]] State state_of(Watched& watched) const;
+
   std::vector<Watched> watched_;
   std::int64_t every_ns_;
+  WaitsForDisk waits_for_disk_;
   std::int64_t looked_ns_ = kNoTime_ns;
 };
 

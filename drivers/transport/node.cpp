@@ -47,8 +47,11 @@ std::string group_of(const std::string& path) {
   struct stat info{};
   if (::stat(path.c_str(), &info) != 0) return "dialout";
   const group* found = ::getgrgid(info.st_gid);
-  // A node in root's own group needs the udev rule; nobody should join that group.
-  return found == nullptr || info.st_gid == 0 ? "" : found->gr_name;
+  // A node in root's own group needs the udev rule; nobody should join that group. A service with
+  // PrivateUsers= sees the other groups as the one that stands for unknown ones.
+  constexpr gid_t kUnknown = 65534;
+  const bool joinable = found != nullptr && info.st_gid != 0 && info.st_gid != kUnknown;
+  return joinable ? found->gr_name : "";
 }
 
 }  // namespace
@@ -60,8 +63,10 @@ std::string node_open_error(const std::string& path, int error) {
     case ENXIO:
     case EIO:
       return path + " is not there; plug the glove in, or see `posed devices` for what is";
-    case EACCES:
-    case EPERM: {
+    case EPERM:  // not the node's mode, which gives EACCES, but the rules around this process
+      return "this service or container may not open " + path +
+             "; allow it there (systemd: DeviceAllow=" + path + " rw)";
+    case EACCES: {
       const std::string group = group_of(path);
       return "no permission for " + path +
              "; install config/udev/70-posed.rules and plug the glove in again" +

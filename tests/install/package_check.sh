@@ -7,55 +7,13 @@ packages=$(realpath "$1")
 root=$packages/bare
 [ "$(id -u)" -eq 0 ] || { echo "the check of packages makes a bare Debian, which needs root" >&2; exit 1; }
 
-fail() {
-  echo "package check: $*" >&2
-  exit 1
-}
-
-unmount() {
-  local folder
-  for folder in "$root"/{proc,sys,dev}; do
-    ! mountpoint -q "$folder" || umount -R -l "$folder"
-  done
-}
+. "$(dirname "$0")/bare.sh"
 trap unmount EXIT
 
-# Debian as debootstrap makes it, with this machine's way to the packages.
-make_bare() {
-  unmount
-  ! grep -q " $root/" /proc/self/mounts || fail "$root still has mounts; unmount them first"
-  rm -rf "$root"
-  debootstrap --variant=minbase --include=ca-certificates bookworm "$root" >"$packages/debootstrap.log" 2>&1 ||
-    { tail "$packages/debootstrap.log" >&2; fail "debootstrap failed"; }
-  local folder
-  for folder in proc sys dev; do
-    mount --rbind "/$folder" "$root/$folder"
-    mount --make-rslave "$root/$folder"
-  done
-  cp /etc/resolv.conf /etc/hosts "$root/etc/"
-  cp /etc/ssl/certs/ca-certificates.crt "$root/etc/ssl/certs/"
-  rm -f "$root/etc/apt/sources.list"
-  cp -r /etc/apt/apt.conf.d /etc/apt/sources.list.d "$root/etc/apt/"
-  [ ! -f /etc/apt/sources.list ] || cp /etc/apt/sources.list "$root/etc/apt/"
-  inside apt-get update -qq
-}
-
-# inside COMMAND...: in the bare Debian, with an empty home.
-inside() {
-  chroot "$root" env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LC_ALL=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
-    http_proxy="${http_proxy:-}" https_proxy="${https_proxy:-}" "$@"
-}
-
-# The same without this machine's network, so that its ports are free.
+# Like `inside`, without this machine's network, so that its ports are free.
 alone() {
   unshare --net sh -c 'ip link set lo up && exec "$@"' sh \
     chroot "$root" env -i PATH=/usr/bin:/bin HOME=/root LC_ALL=C.UTF-8 "$@"
-}
-
-install_packages() {
-  local name
-  for name in "$@"; do cp "$name" "$root/tmp/"; done
-  inside apt-get install -y -qq "${@/#*\//\/tmp/}" >"$packages/apt.log" 2>&1 || { tail "$packages/apt.log" >&2; fail "apt cannot install $*"; }
 }
 
 # A new user's first styled frame: all of the demo but the three seconds that it shows.

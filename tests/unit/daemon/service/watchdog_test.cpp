@@ -6,12 +6,19 @@ namespace posed::service {
 namespace {
 
 constexpr std::int64_t kWithin_ns = 2 * kNanosPerSecond;
-constexpr std::int64_t kHalf_ns = kWithin_ns / 2;
+constexpr std::int64_t kLook_ns = kWithin_ns / Watchdog::kLooks;
 
 struct TwoThreads {
   system::Pulse reader, writer;
+  std::string disk_waiter;               // the thread of which the kernel says so
+  std::vector<std::string> asked_about;  // whose state the kernel was asked
   Watchdog watchdog{
-      {{.thread = "reader", .pulse = &reader}, {.thread = "writer", .pulse = &writer}}, kWithin_ns};
+      {{.thread = "reader", .pulse = &reader}, {.thread = "writer", .pulse = &writer}},
+      kWithin_ns,
+      [this](const std::string& thread) {
+        asked_about.push_back(thread);
+        return thread == disk_waiter;
+      }};
   std::int64_t now_ns = 17 * kNanosPerSecond;
 
   // The next look, after `ns`.
@@ -21,7 +28,7 @@ struct TwoThreads {
   }
 };
 
-TEST_CASE("watchdog: a sign of life twice within the time, while all threads go on") {
+TEST_CASE("watchdog: a sign of life at each look, while all threads go on") {
   TwoThreads two;
   int signs = 0;
   static_cast<void>(two.after(0));
@@ -32,34 +39,67 @@ TEST_CASE("watchdog: a sign of life twice within the time, while all threads go 
     CHECK(found.stuck.empty());
     signs += found.alive ? 1 : 0;
   }
-  CHECK(signs == 5);
+  CHECK(signs == 10);
+  CHECK(two.asked_about.empty());
 }
 
 TEST_CASE("watchdog: one thread without progress ends the signs and is named once") {
   TwoThreads two;
   static_cast<void>(two.after(0));
   two.reader.beat();
-  const auto stuck = two.after(kHalf_ns);
+  const auto stuck = two.after(kLook_ns);
   CHECK_FALSE(stuck.alive);
   CHECK(stuck.stuck == std::vector<std::string>{"writer"});
   two.reader.beat();
-  const auto still = two.after(kHalf_ns);
+  const auto still = two.after(kLook_ns);
   CHECK_FALSE(still.alive);
   CHECK(still.stuck.empty());
   two.reader.beat();
   two.writer.beat();
-  const auto again = two.after(kHalf_ns);
+  const auto again = two.after(kLook_ns);
   CHECK(again.alive);
   CHECK(again.again == std::vector<std::string>{"writer"});
   two.writer.beat();
-  CHECK(two.after(kHalf_ns).stuck == std::vector<std::string>{"reader"});
+  CHECK(two.after(kLook_ns).stuck == std::vector<std::string>{"reader"});
+}
+
+TEST_CASE("watchdog: a thread that waits for the disk is named once, and the signs go on") {
+  TwoThreads two;
+  static_cast<void>(two.after(0));
+  two.disk_waiter = "writer";
+  two.reader.beat();
+  const auto waits = two.after(kLook_ns);
+  CHECK(waits.alive);
+  CHECK(waits.waiting == std::vector<std::string>{"writer"});
+  CHECK(two.asked_about == std::vector<std::string>{"writer"});
+  two.reader.beat();
+  const auto still = two.after(kLook_ns);
+  CHECK(still.alive);
+  CHECK(still.waiting.empty());
+  SECTION("it goes on") {
+    two.reader.beat();
+    two.writer.beat();
+    CHECK(two.after(kLook_ns).again == std::vector<std::string>{"writer"});
+  }
+  SECTION("another one is stuck meanwhile") {
+    const auto stuck = two.after(kLook_ns);
+    CHECK_FALSE(stuck.alive);
+    CHECK(stuck.stuck == std::vector<std::string>{"reader"});
+  }
+  SECTION("the disk answers, and it is stuck nevertheless") {
+    two.disk_waiter.clear();
+    two.reader.beat();
+    const auto stuck = two.after(kLook_ns);
+    CHECK_FALSE(stuck.alive);
+    CHECK(stuck.stuck == std::vector<std::string>{"writer"});
+  }
 }
 
 TEST_CASE("watchdog: nothing is found between two looks, however often it is called") {
   TwoThreads two;
   static_cast<void>(two.after(0));
   for (int i = 0; i < 9; ++i) {
-    const auto found = two.after(kHalf_ns / 10);
+    const auto found = two.after(kLook_ns / 10);
     CHECK_FALSE(found.alive);
     CHECK(found.stuck.empty());
   }
