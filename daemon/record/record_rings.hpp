@@ -16,10 +16,9 @@
 #include <span>
 #include <vector>
 
-#include <boost/lockfree/spsc_queue.hpp>
-
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/record_sink.hpp"
+#include "daemon/pipeline/ring.hpp"
 #include "daemon/record/record_ring.hpp"
 #include "daemon/record/recorded_stream.hpp"
 #include "daemon/record/ring_sizes.hpp"
@@ -131,10 +130,11 @@ class RecordRings final : public pipeline::RecordSink {
   }
   template <typename Each>
   void drain_decisions(Each&& each) {
-    DecisionRecord record;
-    for (auto n = decisions_.read_available(); n > 0 && decisions_.pop(record); --n) {
+    const auto take = [&](const DecisionRecord& record) {
       give_back(slots_[pipeline::slot_of(record.decision.stream)].decisions, 1);
       each(record);
+    };
+    while (decisions_.consume(take)) {
     }
   }
   [[nodiscard]] std::vector<std::vector<std::byte>> take_models();
@@ -183,7 +183,7 @@ class RecordRings final : public pipeline::RecordSink {
 
   RecordRing<ChunkHeader> chunks_;
   RecordRing<FrameHeader> frames_;
-  boost::lockfree::spsc_queue<DecisionRecord> decisions_;
+  pipeline::Ring<DecisionRecord> decisions_;
   bool wants_published_ = false;
   std::deque<Source> sources_;                       // by number
   std::deque<Slot> slots_;                           // by slot
