@@ -12,12 +12,11 @@ HotThreads::HotThreads(bool realtime, bool share_cpu)
 }
 
 std::thread HotThreads::start(const char* name, int priority, std::function<void()> run) {
-  std::thread thread([name, priority = realtime_ ? priority : 0, run = std::move(run)] {
+  return std::thread([cpu = cpu_, name, priority = realtime_ ? priority : 0, run = std::move(run)] {
     system::enter_hot_thread(name, priority);
+    if (cpu) cpu->join(priority);
     run();
   });
-  if (cpu_) cpu_->add(thread.native_handle());
-  return thread;
 }
 
 }  // namespace posed::assembly

@@ -18,12 +18,14 @@ class HotThreads {
 
   // Runs `run` in a thread of that name and, with real-time rights, of that priority.
   [[nodiscard]] std::thread start(const char* name, int priority, std::function<void()> run);
-  // Before the first of these threads is joined.
-  void ending() noexcept { cpu_.reset(); }
+  // Before the first of these threads ends.
+  void ending() {
+    if (cpu_) cpu_->stop();
+  }
 
  private:
   bool realtime_;
-  std::unique_ptr<system::HotCpu> cpu_;  // null: not wanted, or not possible
+  std::shared_ptr<system::HotCpu> cpu_;  // null: not wanted, or not possible
 };
 
 }  // namespace posed::assembly

@@ -4,9 +4,10 @@
 #include <chrono>
 #include <fstream>
 #include <string>
+#include <utility>
 
 #include <spdlog/spdlog.h>
-#include <time.h>
+#include <unistd.h>
 
 #include "daemon/system/clock.hpp"
 #include "daemon/system/realtime.hpp"
@@ -35,18 +36,40 @@ cpu_set_t set_of(int cpu) {
   return set;
 }
 
+// proc_pid_schedstat: the time on a CPU, then that on a run queue [ns].
+ThreadTime time_of(pid_t thread, int priority) {
+  ThreadTime time{.priority = priority};
+  std::ifstream("/proc/self/task/" + std::to_string(thread) + "/schedstat") >> time.run_ns >>
+      time.wait_ns;
+  return time;
+}
+
 }  // namespace
 
-bool SharingRule::share(double load, std::int64_t now_ns) noexcept {
+bool SharingRule::share(const Seen& seen, std::int64_t now_ns) noexcept {
   if (since_ns_ == kNoTime_ns) since_ns_ = now_ns;
   const std::int64_t passed_ns = now_ns - since_ns_;
-  if (shared_ ? load <= kFull : load >= 1.0 || passed_ns < try_after_ns_) return shared_;
+  const bool fits = seen.load <= kFull && seen.held_up <= kHeldUp;
+  const bool may_try = seen.load < 1.0 && passed_ns >= try_after_ns_;
+  if (shared_ ? fits : !may_try) return shared_;
   if (shared_) {
     const bool lasted = passed_ns >= kFirstTry_ns;
     try_after_ns_ = lasted ? kFirstTry_ns : std::min(2 * try_after_ns_, kRarest_ns);
   }
   since_ns_ = now_ns;
   return shared_ = !shared_;
+}
+
+std::int64_t held_up_ns(std::span<const ThreadTime> threads) noexcept {
+  std::int64_t sum_ns = 0;
+  for (const ThreadTime& thread : threads) {
+    std::int64_t lost_ns = thread.wait_ns;
+    for (const ThreadTime& other : threads) {
+      if (other.priority > thread.priority) lost_ns -= other.run_ns;
+    }
+    sum_ns += std::max<std::int64_t>(lost_ns, 0);
+  }
+  return sum_ns;
 }
 
 std::optional<int> quickest_cpu(const cpu_set_t& allowed, const std::string& sys) {
@@ -78,60 +101,63 @@ HotCpu::HotCpu(const cpu_set_t& allowed, int cpu) : allowed_(allowed), cpu_(cpu)
   });
 }
 
-HotCpu::~HotCpu() {
+HotCpu::~HotCpu() { stop(); }
+
+void HotCpu::stop() {
   {
     const std::lock_guard lock(mutex_);
     end_ = true;
   }
   ended_.notify_one();
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
 }
 
-void HotCpu::add(pthread_t thread) {
+void HotCpu::join(int priority) {
   const std::lock_guard lock(mutex_);
-  members_.push_back(thread);
+  members_.push_back({.thread = gettid(), .time = {.priority = priority}});
+  members_.back().time = time_of(members_.back().thread, priority);
   move(shared_ ? set_of(cpu_) : allowed_);
-}
-
-std::int64_t HotCpu::run_ns() const {
-  std::int64_t sum_ns = 0;
-  for (const pthread_t member : members_) {
-    clockid_t clock{};
-    timespec time{};
-    if (pthread_getcpuclockid(member, &clock) != 0 || clock_gettime(clock, &time) != 0) continue;
-    sum_ns += std::int64_t{time.tv_sec} * kNanosPerSecond + time.tv_nsec;
-  }
-  return sum_ns;
 }
 
 // A refusal (a service without this system call, a CPU that was taken from it) leaves the thread
 // where it may run.
 void HotCpu::move(const cpu_set_t& where) {
-  for (const pthread_t member : members_) {
-    static_cast<void>(pthread_setaffinity_np(member, sizeof where, &where));
+  for (const Member& member : members_) {
+    static_cast<void>(sched_setaffinity(member.thread, sizeof where, &where));
   }
 }
 
 void HotCpu::watch() {
-  SharingRule rule;
   std::unique_lock lock(mutex_);
-  std::int64_t before_ns = monotonic_ns(), run_before_ns = run_ns();
+  std::int64_t before_ns = monotonic_ns();
   while (!ended_.wait_for(lock, kLookEvery, [this] { return end_; })) {
-    const std::int64_t now_ns = monotonic_ns(), run_now_ns = run_ns();
-    const double load = seconds(run_now_ns - run_before_ns) / seconds(now_ns - before_ns);
-    before_ns = now_ns;
-    run_before_ns = run_now_ns;
-    const bool share = rule.share(load, now_ns);
-    if (share == shared_) continue;
-    shared_ = share;
-    move(share ? set_of(cpu_) : allowed_);
-    if (share) {
-      spdlog::info("reader, pipeline and publisher share CPU {} again", cpu_);
-    } else {
-      spdlog::info("reader, pipeline and publisher need {:.0f} % of CPU {}: they use all CPUs now",
-                   100.0 * load, cpu_);
-    }
+    const std::int64_t now_ns = monotonic_ns();
+    look(now_ns - std::exchange(before_ns, now_ns), now_ns);
   }
+}
+
+void HotCpu::look(std::int64_t passed_ns, std::int64_t now_ns) {
+  std::vector<ThreadTime> since;
+  std::int64_t run_ns = 0;
+  for (Member& member : members_) {
+    const ThreadTime time = time_of(member.thread, member.time.priority);
+    const ThreadTime before = std::exchange(member.time, time);
+    since.push_back({.priority = time.priority,
+                     .run_ns = time.run_ns - before.run_ns,
+                     .wait_ns = time.wait_ns - before.wait_ns});
+    run_ns += since.back().run_ns;
+  }
+  const SharingRule::Seen seen{.load = seconds(run_ns) / seconds(passed_ns),
+                               .held_up = seconds(held_up_ns(since)) / seconds(passed_ns)};
+  const bool share = rule_.share(seen, now_ns);
+  if (share == shared_) return;
+  shared_ = share;
+  move(share ? set_of(cpu_) : allowed_);
+  if (share) return spdlog::info("reader, pipeline and publisher share CPU {} again", cpu_);
+  spdlog::info(
+      "reader, pipeline and publisher use all CPUs now: of CPU {} they needed {:.0f} %, and others "
+      "held them up for {:.0f} % of the time",
+      cpu_, 100.0 * seen.load, 100.0 * seen.held_up);
 }
 
 }  // namespace posed::system

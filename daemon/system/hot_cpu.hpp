@@ -10,34 +10,51 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include <pthread.h>
 #include <sched.h>
+#include <sys/types.h>
 
 #include "proto/frame/time.hpp"
 
 namespace posed::system {
 
-// Whether the threads share a CPU. The load is a parameter, so tests can choose it. On several CPUs
-// the same work takes more time, because each hand-over wakes one; so whether it fits one CPU is
-// seen only by trying, more and more rarely while it does not.
+// Whether the threads share a CPU. What they did is a parameter, so tests can choose it. On several
+// CPUs the same work takes more time, because each hand-over wakes one; so whether it fits one CPU
+// is seen only by trying, more and more rarely while it does not.
 class SharingRule {
  public:
-  static constexpr double kFull = 0.8;  // more than this of the CPU: from now on they use all
+  // More than one of these: from now on they use all CPUs.
+  static constexpr double kFull = 0.8, kHeldUp = 0.1;
   static constexpr std::int64_t kFirstTry_ns = 10 * kNanosPerSecond;  // after so long apart
   static constexpr std::int64_t kRarest_ns = 64 * kFirstTry_ns;
 
-  // `load`: what the threads together have run since the last look, in shares of one CPU.
-  [[nodiscard]] bool share(double load, std::int64_t now_ns) noexcept;
+  // Since the last look, in shares of that time: what the threads together have run, and for how
+  // long others held them up.
+  struct Seen {
+    double load = 0.0;
+    double held_up = 0.0;
+  };
+  [[nodiscard]] bool share(const Seen& seen, std::int64_t now_ns) noexcept;
 
  private:
   bool shared_ = true;
   std::int64_t since_ns_ = kNoTime_ns;  // of sharing or not
   std::int64_t try_after_ns_ = kFirstTry_ns / 2;
 };
+
+// How long a thread ran, and how long it was ready to run while others had the CPU.
+struct ThreadTime {
+  int priority = 0;
+  std::int64_t run_ns = 0, wait_ns = 0;
+};
+
+// What all of the threads waited for others than themselves. A thread with a higher priority is the
+// one that should run, so the time that it ran is no time lost.
+[[nodiscard]] std::int64_t held_up_ns(std::span<const ThreadTime> threads) noexcept;
 
 // Of the CPUs `allowed` the one with the highest capacity; of several the last, because the first
 // handles interrupts. Empty if there are not two. `sys`: the folder /sys.
@@ -51,23 +68,29 @@ class HotCpu {
   HotCpu(const HotCpu&) = delete;
   HotCpu& operator=(const HotCpu&) = delete;
 
-  // The thread becomes one of those that share the CPU. It must not be joined before this object
-  // ends.
-  void add(pthread_t thread);
+  // The calling thread, of this priority, becomes one of those that share the CPU.
+  void join(int priority);
+  // From now on they stay where they are. Before the first of them ends.
+  void stop();
 
  private:
   HotCpu(const cpu_set_t& allowed, int cpu);
+  struct Member {
+    pid_t thread = 0;
+    ThreadTime time{};  // at the last look
+  };
   void watch();
+  void look(std::int64_t passed_ns, std::int64_t now_ns);
   void move(const cpu_set_t& where);
-  [[nodiscard]] std::int64_t run_ns() const;
 
   const cpu_set_t allowed_;
   const int cpu_;
   std::mutex mutex_;
   std::condition_variable ended_;
   bool end_ = false;
+  SharingRule rule_;
   bool shared_ = true;
-  std::vector<pthread_t> members_;
+  std::vector<Member> members_;
   std::thread thread_;
 };
 

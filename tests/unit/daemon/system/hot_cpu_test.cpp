@@ -1,9 +1,10 @@
 #include "daemon/system/hot_cpu.hpp"
 
 #include <fstream>
-#include <future>
 #include <initializer_list>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include <catch2/catch.hpp>
 
@@ -31,10 +32,10 @@ void say(const test::TempFolder& sys, int cpu, const std::string& file, int valu
 TEST_CASE("threads share a CPU until it is nearly full, and try again more and more rarely") {
   SharingRule rule;
   std::int64_t now_ns = 0;
-  const auto looks = [&](double load, double for_s) {
+  const auto looks = [&](double load, double for_s, double held_up = 0.05) {
     bool shared = false;
     for (const std::int64_t end_ns = now_ns + nanoseconds(for_s); now_ns < end_ns;) {
-      shared = rule.share(load, now_ns += kNanosPerSecond / 10);
+      shared = rule.share({.load = load, .held_up = held_up}, now_ns += kNanosPerSecond / 10);
     }
     return shared;
   };
@@ -54,6 +55,17 @@ TEST_CASE("threads share a CPU until it is nearly full, and try again more and m
   CHECK(tries >= 8);
   CHECK(tries <= 12);  // in an hour
   CHECK(looks(0.7, 650.0));
+  CHECK_FALSE(looks(0.2, 0.1, 0.3));  // another program has the CPU
+  CHECK(looks(0.2, 10.0, 0.3));
+  CHECK_FALSE(looks(0.2, 0.1, 0.3));
+}
+
+TEST_CASE("threads are held up by what others run, not by what is more urgent of their own") {
+  using Threads = std::vector<ThreadTime>;
+  CHECK(held_up_ns(Threads{}) == 0);
+  CHECK(held_up_ns(Threads{{12, 30, 0}, {11, 40, 30}, {10, 20, 70}}) == 0);
+  CHECK(held_up_ns(Threads{{10, 20, 75}, {12, 30, 2}, {11, 40, 33}}) == 2 + 3 + 5);
+  CHECK(held_up_ns(Threads{{12, 30, 0}, {11, 40, 0}}) == 0);
 }
 
 TEST_CASE("the shared CPU is the last of the quickest that may be used") {
@@ -79,15 +91,15 @@ TEST_CASE("a thread that is added runs on one CPU alone") {
     WARN("skipped: this process may use only one CPU");
     return;
   }
-  std::promise<void> end;
-  std::thread thread([ended = end.get_future()]() mutable { ended.wait(); });
-  shared->add(thread.native_handle());
   cpu_set_t where;
-  REQUIRE(pthread_getaffinity_np(thread.native_handle(), sizeof where, &where) == 0);
+  int found = 1;
+  std::thread([&] {
+    shared->join(11);
+    found = sched_getaffinity(0, sizeof where, &where);
+    shared->stop();
+  }).join();
+  REQUIRE(found == 0);
   CHECK(CPU_COUNT(&where) == 1);
-  shared.reset();
-  end.set_value();
-  thread.join();
 }
 
 }  // namespace posed::system
