@@ -62,7 +62,8 @@ struct ThreadTime {
 
 class HotCpu {
  public:
-  // One of those that the calling thread may use; null if there are not two.
+  // One of those that the calling thread may use; null if there are not two, or if the kernel does
+  // not tell what threads run.
   [[nodiscard]] static std::unique_ptr<HotCpu> open();
   ~HotCpu();
   HotCpu(const HotCpu&) = delete;
