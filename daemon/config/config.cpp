@@ -17,6 +17,7 @@
 #include "proto/text/toml.hpp"
 #include "proto/text/toml_table.hpp"
 #include "proto/zmq/keys.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::config {
 namespace {
@@ -36,6 +37,10 @@ void read_endpoint(TableReader& table, const char* name, std::string& endpoint, 
     table.add_error("endpoint",
                     fmt::format("{} is not an endpoint; it looks like tcp://127.0.0.1:5570,"
                                 " or ipc:///run/posed.sock",
+                                in_quotes(endpoint)));
+  } else if (!net::has_possible_port(endpoint)) {
+    table.add_error("endpoint",
+                    fmt::format("{} names a port that does not exist; give one from 1 to 65535",
                                 in_quotes(endpoint)));
   } else if (!net::is_loopback(endpoint) && !secured && !insecure) {
     table.add_error(

@@ -10,6 +10,7 @@
 #include "daemon/cli/models/eval_natural.hpp"
 #include "daemon/cli/models/eval_style_report.hpp"
 #include "daemon/cli/models/root_option.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "models/style/apply.hpp"
@@ -227,7 +228,7 @@ void add_eval(CLI::App& app, int& exit_code) {
   style->add_option("--weights", options->weights, "Mixes the model's styles: A=0.6,B=0.4")
       ->type_name("WEIGHTS");
   style->add_option("--alpha", options->alpha, "How much style")
-      ->check(CLI::Range(-2.0, 2.0))
+      ->check(in_range(-2.0, 2.0))
       ->capture_default_str();
   add_root_option(*style, options->feet);
   add_report_file(*style, options->report);

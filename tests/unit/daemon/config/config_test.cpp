@@ -227,6 +227,9 @@ TEST_CASE("each mistake is one sentence with file and line") {
   CHECK(complaint("[stream]\n").find("not TOML") != std::string::npos);
   CHECK(complaint("[control]\nendpoint = \"127.0.0.1:5\"\n")
             .find(":8: '127.0.0.1:5' is not an endpoint") != std::string::npos);
+  CHECK(complaint("[control]\nendpoint = \"tcp://127.0.0.1:99999\"\n")
+            .find(":8: 'tcp://127.0.0.1:99999' names a port that does not exist") !=
+        std::string::npos);
   CHECK(complaint("[control]\nendpoint = \"tcp://127.0.0.1:5570\"\n").find("cannot share") !=
         std::string::npos);
 }
