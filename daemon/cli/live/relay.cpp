@@ -72,6 +72,11 @@ Result<std::vector<relay::UpstreamSettings>> upstreams_of(const RelayCommand& co
   for (std::size_t i = 0; i < command.from.size(); ++i) {
     relay::UpstreamSettings& upstream = upstreams.emplace_back();
     upstream.endpoint = command.from[i];
+    if (upstream.endpoint == command.bind) {
+      return misuse(upstream.endpoint +
+                    " is both --from and --bind, so the relay would hear itself"
+                    " alone; bind it to another port");
+    }
     upstream.key = command.key;
     if (keys > 0) upstream.server_key = command.server_keys[keys == 1 ? 0 : i];
   }

@@ -82,6 +82,7 @@ Result<Experiment> clips_of(const TrainStyleOptions& options) {
   }
   Experiment experiment;
   const std::string motion = options.motion.value_or("walk");
+  if (motion.empty()) return misuse("--motion is empty; name what the clips show, as in walk");
   for (const std::string& file : options.from) {
     experiment.clips.push_back(named_clip(file, "from", motion));
   }
