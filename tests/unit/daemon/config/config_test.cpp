@@ -227,30 +227,7 @@ TEST_CASE("each mistake is one sentence with file and line") {
   CHECK(complaint("[stream]\n").find("not TOML") != std::string::npos);
   CHECK(complaint("[control]\nendpoint = \"127.0.0.1:5\"\n")
             .find(":8: '127.0.0.1:5' is not an endpoint") != std::string::npos);
-  CHECK(complaint("[control]\nendpoint = \"tcp://127.0.0.1:99999\"\n")
-            .find(":8: 'tcp://127.0.0.1:99999' names a port that does not exist") !=
-        std::string::npos);
   CHECK(complaint("[control]\nendpoint = \"tcp://127.0.0.1:5570\"\n").find("cannot share") !=
-        std::string::npos);
-  CHECK(complaint("[metrics]\nlisten = \"127.0.0.1:5570\"\n")
-            .find("publish and metrics cannot share the endpoint 127.0.0.1:5570") !=
-        std::string::npos);
-}
-
-TEST_CASE("a glove's port serves one stream") {
-  const auto errors_of = [](const std::string& second) {
-    return read_config(
-               "[[stream]]\nname = \"a\"\ndriver = \"cyberglove\"\nport = \"/dev/g\"\n"
-               "[[stream]]\nname = \"b\"\ndriver = \"cyberglove\"\n" +
-                   second,
-               "posed.toml", drivers::registry())
-        .errors;
-  };
-  CHECK(errors_of("port = \"/dev/h\"\n").empty());
-  CHECK(errors_of("").empty());
-  const auto errors = errors_of("port = \"/dev/g\"\n");
-  REQUIRE(errors.size() == 1);
-  CHECK(errors.front().message.find("'a' and 'b' have the same port '/dev/g'") !=
         std::string::npos);
 }
 
