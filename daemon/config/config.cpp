@@ -7,6 +7,7 @@
 
 #include "daemon/config/config_file.hpp"
 #include "daemon/config/output_tables.hpp"
+#include "daemon/config/port_check.hpp"
 #include "daemon/config/stream_tables.hpp"
 #include "daemon/config/take_tables.hpp"
 #include "drivers/transport/address.hpp"
@@ -17,6 +18,7 @@
 #include "proto/text/toml.hpp"
 #include "proto/text/toml_table.hpp"
 #include "proto/zmq/keys.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::config {
 namespace {
@@ -36,6 +38,10 @@ void read_endpoint(TableReader& table, const char* name, std::string& endpoint, 
     table.add_error("endpoint",
                     fmt::format("{} is not an endpoint; it looks like tcp://127.0.0.1:5570,"
                                 " or ipc:///run/posed.sock",
+                                in_quotes(endpoint)));
+  } else if (!net::has_possible_port(endpoint)) {
+    table.add_error("endpoint",
+                    fmt::format("{} names a port that does not exist; give one from 1 to 65535",
                                 in_quotes(endpoint)));
   } else if (!net::is_loopback(endpoint) && !secured && !insecure) {
     table.add_error(
@@ -139,16 +145,12 @@ void read_tables(const toml::table& root_table, const ConfigFile& file, DaemonCo
   const bool secured = !config.security.server_key.empty();
   if (auto table = root.table("publish")) read_publish(*table, secured, config);
   if (auto table = root.table("control")) read_control(*table, file, secured, config);
-  if (config.publish_endpoint == config.control_endpoint &&
-      !config.publish_endpoint.ends_with(":*")) {
-    root.add_error("control", "publish and control cannot share the endpoint " +
-                                  config.control_endpoint + "; give control another port");
-  }
   read_streams(root, file, config);
   read_outputs(root, file, config);
   read_record(root, file, config);
   read_trigger(root, config);
   read_metrics(root, config);
+  for (const PortClash& clash : port_clashes(config)) root.add_error(clash.key, clash.message);
   root.finish();
 }
 

@@ -1,6 +1,7 @@
 #include "daemon/config/take_tables.hpp"
 
 #include <array>
+#include <filesystem>
 #include <string>
 #include <string_view>
 
@@ -40,6 +41,17 @@ void read_trigger(TableReader& root, DaemonConfig& config) {
   }
   const auto address = drivers::listen_address(trigger.listen, trigger.peers, "the senders'");
   if (!address) table->add_error("listen", address.error().message);
+}
+
+Result<> check_folder(const RecordConfig& record) {
+  std::error_code ignored;
+  std::filesystem::path there = std::filesystem::absolute(record.folder, ignored);
+  while (there.has_relative_path() && !std::filesystem::exists(there, ignored)) {
+    there = there.parent_path();
+  }
+  if (std::filesystem::is_directory(there, ignored)) return {};
+  return fail("is a file, so it cannot be a folder for recordings; name another [record] folder",
+              there.string());
 }
 
 }  // namespace posed::config

@@ -44,7 +44,8 @@ Result<> open_calibration(const std::filesystem::path& path, OpenSource& source)
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored)) {
     return fail("there is no such calibration; make one with `posed calibrate --driver " +
-                    std::string(source.driver->name) + " --out " + path.filename().string() +
+                    std::string(source.driver->name) + " --user NAME --out " +
+                    path.filename().string() +
                     "`, or leave out `calibration` and use the glove's defaults",
                 path.string());
   }

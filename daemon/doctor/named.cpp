@@ -7,6 +7,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "daemon/config/take_tables.hpp"
 #include "daemon/doctor/doctor.hpp"
 #include "daemon/doctor/wanted.hpp"
 #include "proto/log/open_whole.hpp"
@@ -77,6 +78,9 @@ Check check_disk(const Machine& machine, Config config) {
   const std::string name = "disk";
   if (config == nullptr) return right(name, kNoConfig);
   if (!config->record) return right(name, "not needed: the config has no [record]");
+  if (const auto fine = config::check_folder(*config->record); !fine) {
+    return wrong(name, fine.error().text(), "set [record] folder to a name that no file has");
+  }
   const fs::path folder = existing(config->record->folder);
   if (!machine.may_write(folder)) {
     return wrong(name, "no permission to write to " + shown(folder),

@@ -134,6 +134,7 @@ Result<> Expectation::compare(std::uint32_t id, bool raw, const v1::Frame& repla
   Channel& channel = *stream.channels[raw];
   const std::uint64_t sequence = replayed.sequence();
   if (broken_at && sequence >= *broken_at) {
+    ++channel.after_gap;
     ++counts_.after_gap;
     return {};
   }
@@ -170,11 +171,16 @@ Result<> Expectation::finish(std::uint32_t id, std::optional<std::uint64_t> brok
   Stream& stream = streams_[id];
   for (const bool raw : {false, true}) {
     Channel& channel = *stream.channels[raw];
+    std::uint64_t counted = channel.after_gap;  // a live frame and its replayed one are one frame
     while (channel.live) {
       if (!broken_at || channel.live->sequence() < *broken_at) {
         return differs(stream, raw, channel.live->sequence(), how_it_lacks(channel));
       }
-      ++counts_.after_gap;
+      if (counted > 0) {
+        --counted;
+      } else {
+        ++counts_.after_gap;
+      }
       if (auto done = advance(channel); !done) return done;
     }
   }

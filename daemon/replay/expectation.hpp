@@ -52,6 +52,7 @@ class Expectation {
     log::Reader::Frames frames;
     std::optional<v1::Frame> live;  // the next one; empty after the last
     std::string difference;         // between `live` and a replayed frame of the same sequence
+    std::uint64_t after_gap = 0;    // replayed ones
   };
   struct Stream {
     std::string name;

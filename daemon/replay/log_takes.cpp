@@ -1,6 +1,8 @@
 #include "daemon/replay/log_takes.hpp"
 
 #include <algorithm>
+#include <cstdint>
+#include <map>
 #include <utility>
 
 #include "daemon/pipeline/take.hpp"
@@ -24,6 +26,44 @@ std::string list_of(const std::vector<log::TakeRow>& takes) {
   }
   return list;
 }
+
+// Finds between which items the chunks came that a log lacks, and marks the takes that were running
+// then. A gap lies between two chunks of one source; the items in between are other sources'.
+class GapMarker {
+ public:
+  GapMarker(const std::vector<log::GapRow>& gaps, std::vector<LoggedTake>& takes) : takes_(takes) {
+    for (const log::GapRow& gap : gaps) {
+      if (gap.kind != log::GapRow::Kind::kChunks) continue;
+      if (gap.after_chunk == 0) {
+        open_[gap.owner] = 0;
+      } else {
+        after_[gap.after_chunk] = gap.owner;
+      }
+    }
+  }
+  // In the order of the log.
+  void on_chunk(const log::ChunkRow& row) {
+    if (const auto open = open_.find(row.source); open != open_.end()) {
+      mark(open->second, row.first_item);
+      open_.erase(open);
+    }
+    if (after_.contains(row.id)) open_[row.source] = row.first_item;
+  }
+  void on_end() {
+    for (const auto& [source, item] : open_) mark(item, log::kToTheEnd);
+  }
+
+ private:
+  void mark(std::uint64_t before, std::uint64_t after) {
+    for (LoggedTake& take : takes_) {
+      const bool overlaps = take.row.first_item < after && take.row.last_item > before;
+      if (overlaps) take.has_gaps = true;
+    }
+  }
+  std::vector<LoggedTake>& takes_;
+  std::map<std::int64_t, std::uint32_t> after_;  // chunk before a gap -> its source
+  std::map<std::uint32_t, std::uint64_t> open_;  // source -> the last item before its gap
+};
 
 }  // namespace
 
@@ -54,10 +94,14 @@ Result<std::vector<LoggedTake>> logged_takes(log::Reader& reader) {
   const auto extent = reader.extent();
   if (!extent) return std::unexpected(extent.error());
   if (takes.empty() || !*extent) return takes;
+  const auto gaps = reader.gaps();
+  if (!gaps) return std::unexpected(gaps.error());
+  GapMarker gap_marker(*gaps, takes);
   for (auto chunk = reader.next_chunk();; chunk = reader.next_chunk()) {
     if (!chunk) return std::unexpected(chunk.error());
-    if (!chunk->has_value()) return takes;
+    if (!chunk->has_value()) break;
     const log::ChunkRow& row = **chunk;
+    gap_marker.on_chunk(row);
     if (row.direction != 0) continue;  // the others have no time of their own
     const double time_s = seconds(row.arrival_ns - (*extent)->first_ns);
     for (LoggedTake& take : takes) {
@@ -66,6 +110,8 @@ Result<std::vector<LoggedTake>> logged_takes(log::Reader& reader) {
       take.end_s = time_s;
     }
   }
+  gap_marker.on_end();
+  return takes;
 }
 
 }  // namespace posed::replay

@@ -17,6 +17,7 @@ struct LoggedTake {
   // Arrival of its first and its last chunk, after that of the log's first; empty: it has none.
   std::optional<double> begin_s{};
   std::optional<double> end_s{};
+  bool has_gaps = false;  // the log lacks chunks that came during the take
 };
 
 // Reads through all chunks of the log.

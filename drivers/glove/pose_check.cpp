@@ -103,15 +103,18 @@ std::vector<Pose> PoseCheck::failed() const {
 
 std::string PoseCheck::verdict() const {
   std::string text;
+  std::vector<std::string> restless;
   double unrest = 0.0;
   for (const PoseFinding& finding : poses) {
     unrest = std::max(unrest, finding.unrest);
+    std::ranges::copy(finding.moved, std::back_inserter(restless));
     if (finding.failed()) text += (text.empty() ? "" : "; ") + finding.sentence();
   }
   if (!text.empty()) return text;
   return "good: the hand was still in every pose (to " +
          std::to_string(std::lround(100.0 * unrest)) + " % of the sensors' way), " +
-         std::to_string(sensors) + " sensors moved between them";
+         std::to_string(sensors) + " sensors moved between them" +
+         (restless.empty() ? "" : "; less still: " + named(restless));
 }
 
 Result<PoseCheck> check_poses(const Model& model, const Recorded& recorded) {

@@ -7,7 +7,13 @@
 namespace posed::net {
 namespace {
 
+constexpr std::size_t kHighestPort = 65535;
+
 std::string last_error() { return zmq_strerror(zmq_errno()); }
+
+std::string no_such_port(const std::string& endpoint) {
+  return "'" + endpoint + "' names a port that does not exist: give one from 1 to 65535";
+}
 
 }  // namespace
 
@@ -34,12 +40,28 @@ Result<> set_option(void* socket, int option, std::string_view value) {
   return fail("ZeroMQ refuses socket option " + std::to_string(option) + ": " + last_error());
 }
 
+bool has_possible_port(std::string_view endpoint) noexcept {
+  if (!endpoint.starts_with("tcp://")) return true;
+  std::size_t port = 0;
+  for (const char letter : endpoint.substr(endpoint.rfind(':') + 1)) {
+    if (letter < '0' || letter > '9') return true;  // "*", or what libzmq itself refuses
+    port = port * 10 + static_cast<std::size_t>(letter - '0');
+    if (port > kHighestPort) return false;
+  }
+  return true;
+}
+
 Result<std::string> bind_socket(void* socket, const std::string& endpoint) {
+  if (!has_possible_port(endpoint)) return misuse(no_such_port(endpoint));
   if (zmq_bind(socket, endpoint.c_str()) != 0) {
     if (zmq_errno() == EADDRINUSE) {
       return fail(endpoint +
                   " is in use: another posed may be running; stop it or choose another"
                   " endpoint");
+    }
+    if (zmq_errno() == EADDRNOTAVAIL) {
+      return fail("cannot listen on '" + endpoint +
+                  "': this machine has no such address; give one that `ip address` lists");
     }
     return fail("cannot listen on '" + endpoint + "': " + last_error() +
                 "; an endpoint reads like tcp://127.0.0.1:5570");
@@ -51,6 +73,7 @@ Result<std::string> bind_socket(void* socket, const std::string& endpoint) {
 }
 
 Result<> connect_socket(void* socket, const std::string& endpoint) {
+  if (!has_possible_port(endpoint)) return misuse(no_such_port(endpoint));
   // A daemon that loses its power or its network says nothing: TCP finds that out in five seconds.
   for (const auto& [option, value] : {std::pair{ZMQ_TCP_KEEPALIVE, 1},
                                       {ZMQ_TCP_KEEPALIVE_IDLE, 2},

@@ -69,6 +69,10 @@ class Message {
 [[nodiscard]] Result<> set_option(void* socket, int option, int value);
 [[nodiscard]] Result<> set_option(void* socket, int option, std::string_view value);
 
+// False for tcp://HOST:99999: libzmq takes the port modulo 65536, and would use another one without
+// a word.
+[[nodiscard]] bool has_possible_port(std::string_view endpoint) noexcept;
+
 // Binds and returns the endpoint that is really bound ("tcp://127.0.0.1:*" picks a free port). If
 // the port is busy, the error says so in one sentence.
 [[nodiscard]] Result<std::string> bind_socket(void* socket, const std::string& endpoint);

@@ -108,6 +108,8 @@ TEST_CASE("replays of alpha and model changes and a forced shed give one FRAMES.
     REQUIRE(replay.code == 0);
     const json counts = json::parse(replay.out);
     CHECK(counts.at("compared") == counts.at("frames"));
+    CHECK(counts.at("raw_frames") > 0);
+    CHECK(counts.at("raw_frames") < counts.at("frames"));
     // The number depends on how much a busy machine sheds; a recording of seconds has hundreds.
     CHECK(counts.at("compared") > 100);
   }

@@ -172,6 +172,8 @@ TEST_CASE("a relay refuses what it cannot do, in one sentence") {
   CHECK(with({"--bind", "nonsense://x", "--insecure"}).code == 1);
   CHECK(has(with({"--bind", "tcp://127.0.0.1:*", "--insecure"}).err, "--insecure has no effect"));
   CHECK(with({"--key", "a.key", "--server-key", "a.pub", "--server-key", "b.pub"}).code == 2);
+  CHECK(has(with({"--bind", "tcp://127.0.0.1:6999", "--from", "tcp://127.0.0.1:6999"}).err,
+            "is both --from and --bind"));
   CHECK(with({"--security", "/nonexistent.toml"}).code != 0);
   TempFolder folder;
   folder.write("none.toml", "[security]\n");

@@ -230,6 +230,16 @@ TEST_CASE("train, apply and eval end in a verdict; all degrees rms are one figur
   CHECK(worse.code == 1);
   CHECK(json::parse(worse.out)["helps"] == false);
   CHECK(has(worse.err, "worse than nothing"));
+
+  // So little style that the verdict would say 0 %: the exit code agrees.
+  const auto nothing = posed({"eval", "style", "--model", studio.path("m.style"), "--source",
+                              studio.path("march_1.bvh"), "--target", studio.path("sway_1.bvh"),
+                              "--alpha", "0.002", "--json"});
+  CHECK(nothing.code == 1);
+  const auto figures = json::parse(nothing.out);
+  CHECK(figures["cycle_ratio"] < 1.0);
+  CHECK(figures["helps"] == false);
+  CHECK(has(nothing.err, "no better than nothing"));
 }
 
 TEST_CASE("apply --gate stands anywhere, alone or with on or off", "[apply]") {

@@ -22,6 +22,7 @@
 #include "daemon/cli/bench/child_process.hpp"
 #include "daemon/cli/bench/hop_subscriber.hpp"
 #include "daemon/cli/cli.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/emulate/emulated_device.hpp"
 #include "daemon/emulate/emulated_port.hpp"
 #include "daemon/system/clock.hpp"
@@ -319,7 +320,7 @@ void add_bench_stage(CLI::App& bench, int& exit_code) {
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   command->add_option("--rate", options->rate_hz, "Frames per second of each")
-      ->check(CLI::Range(10.0, 1000.0))
+      ->check(in_range(10.0, 1000.0))
       ->capture_default_str();
   command->add_option("--seconds", options->seconds, "How long it is measured")
       ->check(CLI::Range(1, 86400))

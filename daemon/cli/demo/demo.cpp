@@ -26,6 +26,7 @@
 #include "daemon/cli/models/gesture_data.hpp"
 #include "daemon/cli/models/train_gesture.hpp"
 #include "daemon/cli/models/train_style.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/paint.hpp"
 #include "daemon/config/config.hpp"
@@ -264,7 +265,7 @@ void add_demo(CLI::App& app, int& exit_code) {
       ->type_name("DIR");
   add_overwrite_option(*command, options->overwrite);
   command->add_option("--seconds", options->seconds, "End so long after the first frame")
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   command->add_flag("--no-browser", options->no_browser,
                     "Print the page's address, open no browser");
   command->footer(R"(Examples:

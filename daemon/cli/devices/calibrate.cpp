@@ -17,6 +17,7 @@
 #include "daemon/cli/devices/driver_options.hpp"
 #include "daemon/cli/devices/good_poses.hpp"
 #include "daemon/cli/hand_option.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/device_info.hpp"
@@ -262,11 +263,11 @@ void add_calibrate(CLI::App& app, int& exit_code) {
       ->type_name("FILE");
   command
       ->add_option("--seconds", options->seconds, "Hold each pose this long; it begins by itself")
-      ->check(CLI::Range(0.1, kMaxSeconds));
+      ->check(in_range(0.1, kMaxSeconds));
   auto* ready =
       command->add_option("--ready", options->ready_s, "With --seconds: the time from pose to pose")
           ->capture_default_str()
-          ->check(CLI::Range(0.0, kMaxSeconds));
+          ->check(in_range(0.0, kMaxSeconds));
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--force", options->force, "Write the calibration even if poses failed");
   command->add_option("--pose", options->poses, "How long one pose is held; 0 leaves it out")

@@ -15,6 +15,7 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/devices/driver_options.hpp"
 #include "daemon/cli/live/client.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/emulate/clip_motion.hpp"
 #include "daemon/emulate/emulated_device.hpp"
 #include "daemon/emulate/log_emulator.hpp"
@@ -217,7 +218,7 @@ void add_emulate(CLI::App& app, int& exit_code) {
       ->excludes(publish);
   command->add_option("--speed", options->speed, "Times the device's own pace, 0.01 to 1000")
       ->capture_default_str()
-      ->check(CLI::Range(0.01, 1000.0));
+      ->check(in_range(0.01, 1000.0));
   command
       ->add_option("--clip", options->clip,
                    "The motion: a hand CSV for a glove (default: synthetic gestures), a BVH or AMC "
@@ -235,7 +236,7 @@ void add_emulate(CLI::App& app, int& exit_code) {
   command->add_option("--stream", options->stream, "Which stream of the log")->type_name("NAME");
   command->add_option("--seconds", options->seconds, "End after so many seconds")
       ->type_name("SECONDS")
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   command->footer(R"(Prints one JSON line {"port": ...} when it can be opened. Examples:
   posed emulate cyberglove --link /tmp/glove   # and a stream with port = "/tmp/glove"
   posed emulate lucidgloves --tcp 127.0.0.1:65432

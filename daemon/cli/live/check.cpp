@@ -10,6 +10,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/config/take_tables.hpp"
 #include "daemon/devices/about_stream.hpp"
 #include "daemon/devices/open_stream.hpp"
 #include "proto/text/clean.hpp"
@@ -219,6 +220,9 @@ int check(const CheckOptions& options) {
       const auto opened = devices::open_source(source, models);
       if (!opened) reading.errors.push_back(opened.error());
       sources.push_back(summary_of(source));
+    }
+    if (const auto& record = reading.config.record) {
+      if (auto fine = config::check_folder(*record); !fine) reading.errors.push_back(fine.error());
     }
   }
   ordered_json outputs = ordered_json::array();

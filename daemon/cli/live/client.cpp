@@ -6,6 +6,7 @@
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 
+#include "daemon/cli/number_range.hpp"
 #include "daemon/net/refusal_words.hpp"
 #include "daemon/system/clock.hpp"
 #include "proto/zmq/keys.hpp"
@@ -139,7 +140,7 @@ void add_timeout_option(CLI::App& command, double& timeout_s) {
                   "End with exit code 1 when the daemon has not answered for so many seconds;"
                   " without it, wait")
       ->type_name("SECONDS")
-      ->check(CLI::Range(2.0, 1e6));
+      ->check(in_range(2.0, 1e6));
 }
 
 Interrupt::Interrupt() {

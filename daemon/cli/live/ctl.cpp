@@ -21,6 +21,7 @@
 #include "daemon/cli/json.hpp"
 #include "daemon/cli/live/client.hpp"
 #include "daemon/cli/live/live_view.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/control/uploads.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "drivers/glove/calibration_file.hpp"
@@ -467,7 +468,7 @@ void add_ctl(CLI::App& app, int& exit_code) {
   add_client_options(*command, options->client, "tcp://127.0.0.1:5571");
   command->add_option("--timeout", options->timeout_s, "Seconds to wait for the answer")
       ->type_name("SECONDS")
-      ->check(CLI::Range(0.1, 3600.0))
+      ->check(in_range(0.1, 3600.0))
       ->capture_default_str();
   command->add_flag("--json", options->json, "The answer as proto3 JSON (posed.v1.ControlReply)");
   command->footer(kExamples);

@@ -14,6 +14,7 @@
 #include "daemon/cli/live/client.hpp"
 #include "daemon/cli/live/clock_time.hpp"
 #include "daemon/cli/live/monitor_line.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/text/clean.hpp"
 #include "proto/text/stream_name.hpp"
@@ -183,7 +184,7 @@ void add_monitor(CLI::App& app, int& exit_code) {
       ->capture_default_str();
   command->add_option("--count", options->count, "End after so many messages")
       ->type_name("N")
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   add_timeout_option(*command, options->timeout_s);
   command->add_flag("--json", options->json, "One proto3 JSON object a line");
   command->footer(R"(Examples:

@@ -15,6 +15,7 @@
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/live/serve.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/logging/log_output.hpp"
 #include "daemon/net/peer_guard.hpp"
@@ -71,6 +72,11 @@ Result<std::vector<relay::UpstreamSettings>> upstreams_of(const RelayCommand& co
   for (std::size_t i = 0; i < command.from.size(); ++i) {
     relay::UpstreamSettings& upstream = upstreams.emplace_back();
     upstream.endpoint = command.from[i];
+    if (upstream.endpoint == command.bind) {
+      return misuse(upstream.endpoint +
+                    " is both --from and --bind, so the relay would hear itself"
+                    " alone; bind it to another port");
+    }
     upstream.key = command.key;
     if (keys > 0) upstream.server_key = command.server_keys[keys == 1 ? 0 : i];
   }
@@ -218,7 +224,7 @@ void add_relay(CLI::App& app, int& exit_code) {
   command->add_flag("--insecure", options->insecure, "Let other machines subscribe without a key");
   command->add_option("--seconds", options->seconds, "End after so many seconds")
       ->type_name("SECONDS")
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   command->add_flag("--json", options->json, "One JSON object of counters a second on stdout");
   command->footer(
       R"(Once ready it prints one line of JSON on stdout with the endpoint really bound. Examples:

@@ -16,6 +16,7 @@
 #include "daemon/cli/live/clock_time.hpp"
 #include "daemon/cli/live/line_file.hpp"
 #include "daemon/cli/live/live_view.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/paint.hpp"
 #include "posed/v1/posed.pb.h"
@@ -179,7 +180,7 @@ void add_top(CLI::App& app, int& exit_code) {
   add_client_options(*command, options->client, kOwnPublish);
   command->add_option("--count", options->count, "End after so many updates (one a second)")
       ->type_name("N")
-      ->check(CLI::PositiveNumber);
+      ->check(above_zero());
   auto* const control =
       command->add_option("--control", options->control,
                           std::string("The daemon's control endpoint, to change alpha (default: ") +

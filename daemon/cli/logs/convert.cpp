@@ -15,6 +15,7 @@
 #include "daemon/cli/logs/convert_mcap.hpp"
 #include "daemon/cli/logs/list_takes.hpp"
 #include "daemon/cli/models/waiting.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/replay/log_clip.hpp"
 #include "daemon/replay/log_upgrade.hpp"
@@ -208,7 +209,7 @@ void add_convert(CLI::App& app, int& exit_code) {
   command
       ->add_option("--metres-per-unit", convert->metres_per_unit,
                    "Unit of a BVH (default: the profile's, else by the figure's height)")
-      ->check(CLI::Range(1e-6, 1e6));
+      ->check(in_range(1e-6, 1e6));
   command->add_option("--profile", convert->read.profile,
                       "Skeleton profile (default: found by the joints' names)");
   auto* stream = command->add_option(

@@ -1,6 +1,7 @@
 #include "daemon/cli/logs/list_takes.hpp"
 
 #include <cstdio>
+#include <string>
 #include <vector>
 
 #include <nlohmann/json.hpp>
@@ -14,15 +15,18 @@
 namespace posed::cli {
 namespace {
 
-// "2  walk  from 3.20 s, 10.05 s long", a line each.
+// "2  walk  from 3.20 s, 10.05 s long", a line each. Of a take with gaps only what is left has a
+// time, so that it may seem shorter than it was.
 void print_takes(const std::vector<replay::LoggedTake>& takes) {
   for (const replay::LoggedTake& take : takes) {
-    const char* end = take.row.last_item == log::kToTheEnd ? ", to the end of the recording" : "";
+    std::string end = take.row.last_item == log::kToTheEnd ? ", to the end of the recording" : "";
+    if (take.has_gaps) end += "; the log lacks a part of it (`posed replay` says which)";
     std::printf("%lld  %s  ", static_cast<long long>(take.row.id), clean(take.row.name).c_str());
     if (take.begin_s) {
-      std::printf("from %.2f s, %.2f s long%s\n", *take.begin_s, *take.end_s - *take.begin_s, end);
+      std::printf("from %.2f s, %.2f s long%s\n", *take.begin_s, *take.end_s - *take.begin_s,
+                  end.c_str());
     } else {
-      std::printf("nothing came%s\n", end);
+      std::printf("nothing came%s\n", end.c_str());
     }
   }
 }
@@ -34,7 +38,8 @@ void print_takes_json(const std::vector<replay::LoggedTake>& takes) {
         list.emplace_back(nlohmann::ordered_json{{"take", take.row.id},
                                                  {"name", take.row.name},
                                                  {"first_item", take.row.first_item},
-                                                 {"ended", take.row.last_item != log::kToTheEnd}});
+                                                 {"ended", take.row.last_item != log::kToTheEnd},
+                                                 {"gaps", take.has_gaps}});
     if (one["ended"]) one["last_item"] = take.row.last_item;
     if (!take.begin_s) continue;
     one["begin_s"] = *take.begin_s;

@@ -130,8 +130,10 @@ std::vector<std::string> stream_names(const log::Reader& reader) {
 }
 
 void print_summary(const ReplayOptions& options, const ReplayOutputs& outputs, double took_s) {
-  nlohmann::ordered_json line{
-      {"frames", outputs.frames}, {"isa", gp::isa_name()}, {"took_s", took_s}};
+  nlohmann::ordered_json line{{"frames", outputs.frames},
+                              {"raw_frames", outputs.raw_frames},
+                              {"isa", gp::isa_name()},
+                              {"took_s", took_s}};
   if (outputs.expectation) {
     const auto& counts = outputs.expectation->counts();
     line["compared"] = counts.compared;
@@ -146,7 +148,13 @@ void print_summary(const ReplayOptions& options, const ReplayOutputs& outputs, d
   if (options.json) {
     std::printf("%s\n", json_text(line).c_str());
   } else {
-    spdlog::info("{} frames replayed in {:.1f} s on {}", outputs.frames, took_s, gp::isa_name());
+    const std::string raw =
+        outputs.raw_frames == 0
+            ? ""
+            : fmt::format(" ({} and {} raw ones)", outputs.frames - outputs.raw_frames,
+                          outputs.raw_frames);
+    spdlog::info("{} frames{} replayed in {:.1f} s on {}", outputs.frames, raw, took_s,
+                 gp::isa_name());
   }
 }
 

@@ -17,6 +17,7 @@ void ReplayOutputs::take(const pipeline::Item& item) {
   const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
   if (!raw && item.kind != pipeline::Item::Kind::kFrame) return;
   ++frames;
+  if (raw) ++raw_frames;
   const std::uint32_t stream = item.frame.header.stream;
   const v1::Frame& frame = encoders_[stream][raw].encode(item.frame);
   if (file) file->add(frame);

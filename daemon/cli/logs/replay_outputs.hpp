@@ -33,6 +33,7 @@ class ReplayOutputs {
   std::unique_ptr<replay::Broadcast> broadcast;
   std::optional<Error> difference;
   std::uint64_t frames = 0;
+  std::uint64_t raw_frames = 0;  // of them: the input before styling, which `record` does not count
 
  private:
   const replay::Replay& replay_;

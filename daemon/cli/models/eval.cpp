@@ -10,6 +10,7 @@
 #include "daemon/cli/models/eval_natural.hpp"
 #include "daemon/cli/models/eval_style_report.hpp"
 #include "daemon/cli/models/root_option.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "models/style/apply.hpp"
@@ -44,9 +45,10 @@ gate_mean: how far the model knows the motion, 1 all of it, 0 nothing, which is 
 slide_cm_s: speed over the ground of ankles and toes that stand (slower than 10 cm/s in the
 unstyled walk; of the target: in itself); sink_cm: how far the lowest styled toe is below the
 lowest unstyled one; root_speed_m_s: of the root over the ground, median over a stride's time.
-The last line is the verdict; the exit code is 1 when the model is worse than nothing.)";
+The last line is the verdict; the exit code is 1 when the model is no better than nothing.)";
 
 constexpr double kCentimetres = 100.0;  // of a metre
+constexpr double kShown = 0.005;        // a smaller share of the way reads as 0 %
 constexpr double kRough = 1.5;          // a jerk_ratio above this is visible
 
 struct EvalOptions {
@@ -70,7 +72,8 @@ struct Evaluation {
   style::WalkerFit fit;
   std::optional<EvaluatedClips> clips{};  // for the report
 
-  [[nodiscard]] bool helps() const { return score.cycle_ratio < 1.0; }
+  // By what the verdict shows: one that closes 0 % is no better than nothing.
+  [[nodiscard]] bool helps() const { return score.cycle_ratio < 1.0 - kShown; }
 };
 
 std::string verdict(const Evaluation& e) {
@@ -79,7 +82,7 @@ std::string verdict(const Evaluation& e) {
   std::string text = style::closing_text(closes);
   if (e.helps()) {
     text += " of the way to the target";
-  } else if (closes > -0.005) {
+  } else if (closes > -kShown) {
     text = "no better than nothing: the styled walk is as far from the target as the source";
   } else {
     text = "worse than nothing: " + text + " from the target";
@@ -227,7 +230,7 @@ void add_eval(CLI::App& app, int& exit_code) {
   style->add_option("--weights", options->weights, "Mixes the model's styles: A=0.6,B=0.4")
       ->type_name("WEIGHTS");
   style->add_option("--alpha", options->alpha, "How much style")
-      ->check(CLI::Range(-2.0, 2.0))
+      ->check(in_range(-2.0, 2.0))
       ->capture_default_str();
   add_root_option(*style, options->feet);
   add_report_file(*style, options->report);

@@ -13,6 +13,7 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/models/natural_clips.hpp"
 #include "daemon/cli/models/thread_tasks.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "models/natural/compare.hpp"
@@ -145,7 +146,7 @@ void add_eval_natural(CLI::App& eval, int& exit_code) {
   command->add_option("--skeleton", options->skeleton,
                       "NN.asf of an AMC clip, and of those of the corpus without one beside them");
   command->add_option("--rate", options->rate_hz, "Frames per second at which to compare")
-      ->check(CLI::Range(10.0, 1000.0))
+      ->check(in_range(10.0, 1000.0))
       ->capture_default_str();
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {

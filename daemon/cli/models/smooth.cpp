@@ -12,6 +12,7 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/degrees.hpp"
 #include "daemon/cli/hand_option.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "models/gesture/model_file.hpp"
@@ -180,7 +181,7 @@ void add_smooth(CLI::App& app, int& exit_code) {
   command
       ->add_option("--noise-deg", options->noise_deg,
                    "Sensor noise, standard deviation (default: estimated from IN)")
-      ->check(CLI::Range(0.01, 30.0));
+      ->check(in_range(0.01, 30.0));
   command
       ->add_option("--model", options->model,
                    "Gesture model, to recognise gestures and bridge gaps")

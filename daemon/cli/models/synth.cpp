@@ -11,6 +11,7 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/hand_option.hpp"
 #include "daemon/cli/models/waiting.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "models/gesture/model_file.hpp"
 #include "models/perform/body_performance.hpp"
@@ -188,7 +189,7 @@ void add_synth(CLI::App& app, int& exit_code) {
   command->add_option("--model", options->model, "Model from `posed train gesture`")->required();
   command->add_option("--labels", options->labels, "Labels with blanks between")->required();
   command->add_option("--tempo", options->tempo, "2 is twice as fast")
-      ->check(CLI::Range(perform::kMinTempo, perform::kMaxTempo))
+      ->check(in_range(perform::kMinTempo, perform::kMaxTempo))
       ->capture_default_str();
   command
       ->add_option("--lookahead", options->lookahead, "Frames that are known in advance, or full")

@@ -14,6 +14,7 @@
 #include "daemon/cli/models/gesture_figures.hpp"
 #include "daemon/cli/models/gesture_report.hpp"
 #include "daemon/cli/models/tree_options.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "models/fixed_products.hpp"
@@ -258,7 +259,7 @@ void add_train_gesture(CLI::App& train_command, int& exit_code,
   command->add_option("--show", options->shows,
                       "NAME=POSE.csv: a gesture not recorded, classes from the nearest poses");
   command->add_option("--rate", options->rate_hz, "Frames per second to learn at")
-      ->check(CLI::Range(10.0, 1000.0))
+      ->check(in_range(10.0, 1000.0))
       ->capture_default_str();
   command
       ->add_option("--embedded-rounds", options->embedded_rounds,

@@ -11,6 +11,7 @@
 #include "daemon/cli/models/experiment.hpp"
 #include "daemon/cli/models/style_report.hpp"
 #include "daemon/cli/models/train_style.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "models/fixed_products.hpp"
@@ -81,6 +82,7 @@ Result<Experiment> clips_of(const TrainStyleOptions& options) {
   }
   Experiment experiment;
   const std::string motion = options.motion.value_or("walk");
+  if (motion.empty()) return misuse("--motion is empty; name what the clips show, as in walk");
   for (const std::string& file : options.from) {
     experiment.clips.push_back(named_clip(file, "from", motion));
   }
@@ -260,7 +262,7 @@ void add_train_style(CLI::App& train_command, int& exit_code, const std::shared_
   style
       ->add_option("--rate", options->rate_hz,
                    "Frames per second to learn at (default: the experiment's, else 30)")
-      ->check(CLI::Range(10.0, 1000.0));
+      ->check(in_range(10.0, 1000.0));
   style->add_option("--mode", options->mode,
                     "default, or paper: the paper end to end (default: the experiment's)");
   style->add_option("--seed", options->seed, "Of the random starts")->capture_default_str();

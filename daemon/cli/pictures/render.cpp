@@ -16,6 +16,7 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/hand_option.hpp"
 #include "daemon/cli/models/waiting.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "daemon/picture/picture_file.hpp"
@@ -299,9 +300,8 @@ void add_render(CLI::App& app, int& exit_code) {
   command->add_option("--height", options->row_px, "Height of a strip's poses [px]")
       ->check(CLI::Range(40, 4000))
       ->capture_default_str();
-  command->add_option("--from", options->from_s, "Begin at this time [s]")
-      ->check(CLI::NonNegativeNumber);
-  command->add_option("--to", options->to_s, "End at this time [s]")->check(CLI::NonNegativeNumber);
+  command->add_option("--from", options->from_s, "Begin at this time [s]")->check(zero_or_more());
+  command->add_option("--to", options->to_s, "End at this time [s]")->check(zero_or_more());
   command->add_flag("--raw-beside", options->raw_beside,
                     "The unstyled motion of a log, too, in grey");
   command->add_option("--stream", options->stream,

@@ -55,6 +55,21 @@ TEST_CASE("poses held still are good, and the verdict says how still") {
   CHECK(check.verdict().starts_with("good: the hand was still in every pose"));
 }
 
+TEST_CASE("the verdict on good poses names a sensor that was less still") {
+  const Model model = cyberglove();
+  Recorded recorded = held(model);
+  const auto fist = static_cast<std::size_t>(Pose::kFist);
+  const Recorded restless = held(model, 60.0);
+  const auto sensors = poses_of_sensors(model, recorded).value();
+  const auto one = std::ranges::find(sensors, Pose::kFist, &SensorPoses::pose);
+  REQUIRE(one != sensors.end());
+  recorded[fist][one->sensor] = restless[fist][one->sensor];
+  const auto check = check_poses(model, recorded).value();
+  INFO(check.verdict());
+  CHECK(check.usable());
+  CHECK(check.verdict().ends_with("; less still: " + model.sensors[one->sensor].name));
+}
+
 TEST_CASE("a hand that moved in every pose fails every pose") {
   const Model model = cyberglove();
   const auto check = check_poses(model, held(model, 60.0)).value();

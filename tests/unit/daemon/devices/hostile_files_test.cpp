@@ -61,8 +61,9 @@ TEST_CASE("a model or calibration that is not a regular file is refused at once"
 TEST_CASE("the error for a missing calibration says how to make one", "[hostile]") {
   auto config = stream_of("lucidgloves", {{"port", std::string("/dev/none")}});
   config.calibration = "/nowhere/ann.toml";
-  CHECK_THAT(refusal(config), Catch::Contains("there is no such calibration; make one with `posed "
-                                              "calibrate --driver lucidgloves --out ann.toml`"));
+  CHECK_THAT(refusal(config),
+             Catch::Contains("there is no such calibration; make one with `posed "
+                             "calibrate --driver lucidgloves --user NAME --out ann.toml`"));
 }
 
 TEST_CASE("a calibration that is nested too deep is refused from control, config and log",

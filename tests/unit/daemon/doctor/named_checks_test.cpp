@@ -44,6 +44,14 @@ TEST_CASE("doctor: a recording needs an hour of disk") {
   CHECK(has(check_disk(sound.machine, &config).found, "no [record]"));
   config.record = {.folder = sound.folder.path() / "takes" / "new"};
   CHECK(check_disk(sound.machine, &config).ok);
+  std::ofstream(sound.folder.path() / "file") << "x";
+  for (const char* taken : {"file", "file/takes"}) {
+    config.record->folder = sound.folder.path() / taken;
+    const Check in_the_way = check_disk(sound.machine, &config);
+    CHECK_FALSE(in_the_way.ok);
+    CHECK(has(in_the_way.found, "file: is a file, so it cannot be a folder for recordings"));
+  }
+  config.record->folder = sound.folder.path() / "takes" / "new";
   const double an_hour = recorded_bytes_per_s(config) * 3600.0;
   CHECK(an_hour > 0.0);
   sound.machine.free_bytes = [&](const std::filesystem::path& folder) {

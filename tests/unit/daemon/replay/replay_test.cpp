@@ -6,6 +6,7 @@
 #include <set>
 
 #include "daemon/replay/frame_file.hpp"
+#include "daemon/replay/log_takes.hpp"
 #include "daemon/replay/replay.hpp"
 #include "posed/v1/log.pb.h"
 #include "tests/support/has.hpp"
@@ -136,6 +137,38 @@ TEST_CASE("what is missing in a log is counted, and nothing after it is compared
   CHECK(result.counts.lost == 1);
   CHECK(result.counts.after_gap > 0);
   CHECK(result.counts.past_end == 0);
+  // Each frame counts once, though both the log and the replay have it. Only the log has the three
+  // of the missing chunks, styled and raw.
+  const auto& counts = result.counts;
+  CHECK(counts.compared + counts.lost + counts.after_gap == result.frames.size() + 2 * 3);
+}
+
+TEST_CASE("a take during which the log lacks chunks is said to have gaps", "[replay]") {
+  const TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  write_staged_log(path, 60);
+  const std::string frame = "substr(sequences, 5, 1)";  // the lowest byte of next_frame
+  const auto item_at = [&](const std::string& byte) {
+    return "(SELECT min(first_item) FROM chunk WHERE source=0 AND " + frame + "=x'" + byte + "')";
+  };
+  const auto take = [&](int id, const std::string& first, const std::string& last) {
+    return "INSERT INTO take(id,name,first_item,last_item,crc) SELECT " + std::to_string(id) +
+           ",'walk'," + first + "," + last + ",0;";
+  };
+  forge(path, take(1, item_at("02"), item_at("10")) + take(2, item_at("12"), item_at("1a")) +
+                  take(3, item_at("1c"), item_at("20")) +
+                  "INSERT INTO gap(kind,owner,after_chunk,lost,time_ns,crc)"
+                  " SELECT 0, 0, max(id), 3, 0, 0 FROM chunk WHERE source=0 AND " +
+                  frame + "=x'14';DELETE FROM chunk WHERE source=0 AND " + frame +
+                  " IN (x'15', x'16', x'17');");
+  auto reader = log::Reader::open(path);
+  REQUIRE(reader);
+  const auto takes = replay::logged_takes(*reader);
+  REQUIRE(takes);
+  REQUIRE(takes->size() == 3);
+  CHECK(!(*takes)[0].has_gaps);
+  CHECK((*takes)[1].has_gaps);
+  CHECK(!(*takes)[2].has_gaps);
 }
 
 // tests/golden/replay/staged.plog: 30 frames of the staged run, recorded with --frames by a version

@@ -1,0 +1,59 @@
+#include "daemon/config/port_check.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "daemon/config/config.hpp"
+
+namespace posed::config {
+namespace {
+
+TEST_CASE("what listens over TCP has a port of its own") {
+  DaemonConfig config;
+  CHECK(port_clashes(config).empty());
+  config.metrics.emplace();
+  OutputConfig& output = config.outputs.emplace_back();
+  output.name = "bvh-a";
+  output.kind = OutputKind::kBvh;
+  CHECK(port_clashes(config).empty());
+  config.metrics->listen = "127.0.0.1:5570";
+  output.listen = "127.0.0.1:5571";
+  const auto clashes = port_clashes(config);
+  REQUIRE(clashes.size() == 2);
+  CHECK(clashes[0].key == "output");
+  CHECK(clashes[0].message.starts_with("control and output 'bvh-a' cannot share the endpoint"));
+  CHECK(clashes[1].key == "metrics");
+  CHECK(clashes[1].message ==
+        "publish and metrics cannot share the endpoint 127.0.0.1:5570; give"
+        " metrics another port");
+  output.kind = OutputKind::kVmc;          // sends, and does not listen
+  config.metrics->listen = "127.0.0.1:0";  // any free one
+  CHECK(port_clashes(config).empty());
+}
+
+TEST_CASE("a port that does not exist is no endpoint") {
+  const auto reading = read_config("[control]\nendpoint = \"tcp://127.0.0.1:99999\"\n",
+                                   "posed.toml", drivers::registry());
+  REQUIRE(!reading.errors.empty());
+  CHECK(reading.errors.back().message.find("'tcp://127.0.0.1:99999' names a port that does not"
+                                           " exist") != std::string::npos);
+}
+
+TEST_CASE("a glove's port serves one stream") {
+  const auto errors_of = [](const std::string& second) {
+    return read_config(
+               "[[stream]]\nname = \"a\"\ndriver = \"cyberglove\"\nport = \"/dev/g\"\n"
+               "[[stream]]\nname = \"b\"\ndriver = \"cyberglove\"\n" +
+                   second,
+               "posed.toml", drivers::registry())
+        .errors;
+  };
+  CHECK(errors_of("port = \"/dev/h\"\n").empty());
+  CHECK(errors_of("").empty());
+  const auto errors = errors_of("port = \"/dev/g\"\n");
+  REQUIRE(errors.size() == 1);
+  CHECK(errors.front().message.find("'a' and 'b' have the same port '/dev/g'") !=
+        std::string::npos);
+}
+
+}  // namespace
+}  // namespace posed::config
