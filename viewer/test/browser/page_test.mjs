@@ -363,7 +363,7 @@ test(
     const bridge = await started(context);
     const page = await opened(context, bridge.url);
     await drawn(page);
-    bridge.say({ type: 'daemon', alive: false, sentence: 'the daemon does not answer' });
+    bridge.silence();
     await page.locator('.link[data-tone="bad"]', { hasText: 'does not answer' }).waitFor(PATIENCE);
     await page.locator('.stream .state', { hasText: 'unknown' }).first().waitFor(PATIENCE);
     const { port } = bridge;

@@ -83,6 +83,7 @@ export class FakeBridge {
   requests = [];
   #tabs = new Set();
   #timers = [];
+  silent = false;
 
   constructor(
     daemon,
@@ -156,11 +157,17 @@ export class FakeBridge {
         }
       }, 2),
     );
-    this.#timers.push(setInterval(() => this.publishStats(), 1000));
+    this.#timers.push(setInterval(() => this.silent || this.publishStats(), 1000));
   }
 
   say(object) {
     for (const tab of this.#tabs) tab.say(object);
+  }
+
+  // From now on the daemon does not answer, so no statistics come either.
+  silence() {
+    this.silent = true;
+    this.say({ type: 'daemon', alive: false, sentence: 'the daemon does not answer' });
   }
 
   async stop() {
