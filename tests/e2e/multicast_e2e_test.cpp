@@ -9,9 +9,9 @@
 
 #include <atomic>
 #include <chrono>
-#include <cstring>
 #include <csignal>
 #include <cstdlib>
+#include <cstring>
 #include <set>
 #include <thread>
 
