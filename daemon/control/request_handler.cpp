@@ -128,6 +128,7 @@ Reply RequestHandler::mark_take(const v1::ControlRequest& request, Requester req
   v1::ControlReply reply;
   reply.set_ok(true);
   *reply.mutable_take() = pipeline::stats_of(*take);
+  reply.set_recorder_trouble(take->trouble);
   return make_reply(std::move(requester), reply);
 }
 

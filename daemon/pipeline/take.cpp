@@ -27,6 +27,7 @@ v1::TakeStats stats_of(const Take& take) {
   stats.set_name(take.name);
   stats.set_start_ns(take.start_ns);
   stats.set_timecode(take.timecode);
+  stats.set_lost_chunks(take.lost_chunks);
   return stats;
 }
 

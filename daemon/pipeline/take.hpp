@@ -27,6 +27,8 @@ struct Take {
   std::string name{};
   std::int64_t start_ns = 0;
   std::string timecode{};
+  std::uint64_t lost_chunks = 0;  // that the recording lost while it ran, so far
+  std::string trouble{};          // why the recording cannot be written at present; empty: it can
 };
 
 // An error unless the name has at most kMaxTakeName bytes of printable UTF-8.

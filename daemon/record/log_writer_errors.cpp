@@ -30,6 +30,7 @@ void LogWriterLoop::count_lost(Tally& tally, std::uint64_t count) {
 void LogWriterLoop::fail(const Error& error, std::int64_t now_ns) {
   writer_->rollback();
   writer_.reset();
+  trouble_ = error.text();
   ++errors_;
   error_ns_ = now_ns;
   // An almost full disk accepts a little now and then, so try again less and less often.
@@ -69,6 +70,7 @@ void LogWriterLoop::resume(std::int64_t now_ns) {
     error_ns_ = now_ns;
     return;
   }
+  trouble_.clear();
   resumed_ns_ = now_ns;
   spdlog::warn("recording continues: {}", path_.string());
   each_tally([&](Tally& tally) {

@@ -39,6 +39,7 @@ void LogWriterLoop::turn(std::int64_t now_ns) {
   if (writer_ && now_ns - last_commit_ns_ >= kCommitEvery_ns) {
     if (auto done = commit(now_ns); !done) fail(done.error(), now_ns);
   }
+  rings_.set_state({.trouble = trouble_, .lost_chunks = lost_chunks()});
 }
 
 // Empties the rings against the direction of the data: frames first, chunks last. So whenever the

@@ -123,6 +123,7 @@ class LogWriterLoop {
 
   RecordRings& rings_;
   std::optional<log::Writer> writer_;  // empty while writing fails
+  std::string trouble_;                // why writing fails
   std::filesystem::path path_;
   std::function<void(const RecorderEvent&)> report_;
   std::vector<SourceState> sources_;              // by number

@@ -107,6 +107,7 @@ class RecordRings final : public pipeline::RecordSink {
   // its end, with all their items. So two takes in a row have each item once.
   [[nodiscard]] Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) override;
   [[nodiscard]] std::optional<pipeline::Take> running_take() const { return takes_.running(); }
+  [[nodiscard]] RecorderState state() const { return takes_.state(); }
 
   // Called by the recorder thread for what is there now: each(header, positions, bytes),
   // each(header, bytes) or each(record).
@@ -140,6 +141,7 @@ class RecordRings final : public pipeline::RecordSink {
   [[nodiscard]] std::vector<std::vector<std::byte>> take_models();
   [[nodiscard]] std::vector<RecordedStream> take_streams();
   [[nodiscard]] std::vector<TakeChange> take_changes() { return takes_.take_changes(); }
+  void set_state(RecorderState state) { takes_.set_state(std::move(state)); }
 
   [[nodiscard]] std::size_t sources() const noexcept { return sources_.size(); }
   // Any thread.

@@ -63,6 +63,8 @@ class Recorder {
   // Any thread.
   [[nodiscard]] const system::Pulse& pulse() const noexcept { return pulse_; }
   [[nodiscard]] std::optional<pipeline::Take> running_take() const { return rings_.running_take(); }
+  // Why the log cannot be written at present; empty: it can.
+  [[nodiscard]] std::string trouble() const { return rings_.state().trouble; }
   [[nodiscard]] std::uint64_t lost_chunks() const noexcept { return log_writer_.lost_chunks(); }
   [[nodiscard]] std::uint64_t lost_frames() const noexcept { return log_writer_.lost_frames(); }
   [[nodiscard]] std::uint64_t errors() const noexcept { return log_writer_.errors(); }

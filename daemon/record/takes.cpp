@@ -22,19 +22,33 @@ Result<pipeline::Take> Takes::mark(const pipeline::TakeMark& mark, std::uint64_t
     return fail("this recording has " + std::to_string(kMaxTakes) +
                 " takes already; begin another recording");
   }
-  std::optional<pipeline::Take> marked = running_;
-  if (running_) end(mark, next_item);
+  std::optional<pipeline::Take> marked;
+  if (running_) {
+    marked = as_of_now();
+    end(mark, next_item);
+  }
   if (mark.start) {
     begin(mark, next_item);
-    marked = running_;
+    marked = as_of_now();
   }
   return *marked;
 }
 
+pipeline::Take Takes::as_of_now() const {
+  pipeline::Take take = *running_;
+  take.lost_chunks = state_.lost_chunks - lost_before_;
+  take.trouble = state_.trouble;
+  return take;
+}
+
 void Takes::end(const pipeline::TakeMark& mark, std::uint64_t next_item) {
-  const pipeline::Take take = *std::exchange(running_, std::nullopt);
+  const pipeline::Take take = as_of_now();
+  running_.reset();
   std::string sentence = fmt::format("{} has ended after {:.1f} s", pipeline::words_of(take),
                                      seconds(mark.time_ns - take.start_ns));
+  if (take.lost_chunks > 0) {
+    sentence += fmt::format("; meanwhile the log lost {} chunks", take.lost_chunks);
+  }
   if (!mark.start) sentence = with_remark(sentence, mark.remark);
   changes_.push_back({.row = {.id = take.number,
                               .name = take.name,
@@ -50,6 +64,7 @@ void Takes::begin(const pipeline::TakeMark& mark, std::uint64_t next_item) {
               .start_ns = mark.time_ns,
               .timecode = mark.timecode};
   first_item_ = next_item;
+  lost_before_ = state_.lost_chunks;
   changes_.push_back({.row = {.id = last_number_,
                               .name = mark.name,
                               .first_item = next_item,
@@ -60,7 +75,18 @@ void Takes::begin(const pipeline::TakeMark& mark, std::uint64_t next_item) {
 
 std::optional<pipeline::Take> Takes::running() const {
   const std::scoped_lock lock(mutex_);
-  return running_;
+  if (!running_) return std::nullopt;
+  return as_of_now();
+}
+
+void Takes::set_state(RecorderState state) {
+  const std::scoped_lock lock(mutex_);
+  state_ = std::move(state);
+}
+
+RecorderState Takes::state() const {
+  const std::scoped_lock lock(mutex_);
+  return state_;
 }
 
 std::vector<TakeChange> Takes::take_changes() {

@@ -23,6 +23,12 @@ struct TakeChange {
   std::string text{};  // a sentence about it
 };
 
+// How the recorder gets on.
+struct RecorderState {
+  std::string trouble{};          // why the log cannot be written at present; empty: it can
+  std::uint64_t lost_chunks = 0;  // that the log lacks
+};
+
 class Takes {
  public:
   // `next_item`: the first item behind the mark. Returns the take that began or ended. Fails when
@@ -30,10 +36,15 @@ class Takes {
   [[nodiscard]] Result<pipeline::Take> mark(const pipeline::TakeMark& mark,
                                             std::uint64_t next_item);
   [[nodiscard]] std::optional<pipeline::Take> running() const;
+  // Told by the recorder thread; the takes carry it on.
+  void set_state(RecorderState state);
+  [[nodiscard]] RecorderState state() const;
   // What has changed since the last call, in order.
   [[nodiscard]] std::vector<TakeChange> take_changes();
 
  private:
+  // The take that runs, as things are now.
+  [[nodiscard]] pipeline::Take as_of_now() const;
   void end(const pipeline::TakeMark& mark, std::uint64_t next_item);
   void begin(const pipeline::TakeMark& mark, std::uint64_t next_item);
 
@@ -41,6 +52,8 @@ class Takes {
   std::uint32_t last_number_ = 0;
   std::uint64_t first_item_ = 0;  // of the take that runs
   std::optional<pipeline::Take> running_;
+  RecorderState state_;
+  std::uint64_t lost_before_ = 0;  // chunks, when the take that runs began
   std::vector<TakeChange> changes_;
 };
 

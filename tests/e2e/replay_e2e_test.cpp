@@ -151,6 +151,10 @@ TEST_CASE("a full disk stops the recording and not the stream, and is counted an
   }
   CHECK(errors > 0);
   CHECK(has(served.daemon->errors(), "recording stopped, streaming continues"));
+  const ProgramOutcome take = posed({"ctl", "--connect", control, "take", "start", "walk"});
+  CHECK(take.code == 0);
+  CHECK(has(take.out, "take 1 'walk' begins"));
+  CHECK(has(take.out, "nothing can be written to the log now: "));
   const ProgramOutcome seen = posed({"monitor", "--connect", publish, "--json", "--count", "30"});
   INFO(seen.err);
   CHECK(seen.code == 0);

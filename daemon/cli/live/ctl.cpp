@@ -294,6 +294,14 @@ int mark_take(const CtlOptions& options, bool start) {
   return ask_and_print(options, request, [&](const v1::ControlReply& reply) {
     const pipeline::Take take{.number = reply.take().number(), .name = reply.take().name()};
     std::printf("%s %s\n", pipeline::words_of(take).c_str(), start ? "begins" : "has ended");
+    if (reply.take().lost_chunks() > 0) {
+      std::printf("meanwhile the log lost %llu chunks\n",
+                  static_cast<unsigned long long>(reply.take().lost_chunks()));
+    }
+    if (!reply.recorder_trouble().empty()) {
+      std::printf("nothing can be written to the log now: %s\n",
+                  clean(reply.recorder_trouble()).c_str());
+    }
   });
 }
 

@@ -225,6 +225,9 @@ std::vector<std::string> rows_below(const v1::Stats& stats, const LiveViewOption
     for (std::string& line : broken(text, options, colour, 2)) rows.push_back(std::move(line));
   };
   if (!stats.replay_file().empty()) add("", replay_words(stats));
+  if (!stats.recorder_trouble().empty()) {
+    add(kRed, "nothing can be written to the log: " + clean(stats.recorder_trouble()));
+  }
   for (const v1::SourceStats& source : stats.source()) {
     const std::string text = source_row(source);
     if (!text.empty()) add(kYellow, clean_name(source.name()) + ": " + text);

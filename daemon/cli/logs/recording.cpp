@@ -188,6 +188,7 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
     stats.set_recorder_lost_chunks((*recorder)->lost_chunks());
     stats.set_recorder_errors((*recorder)->errors());
     stats.set_recorder_file((*recorder)->file().string());
+    stats.set_recorder_trouble((*recorder)->trouble());
     if (const auto take = (*recorder)->running_take()) {
       *stats.mutable_take() = pipeline::stats_of(*take);
     }

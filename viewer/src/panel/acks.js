@@ -25,6 +25,8 @@ export function controlWith(requests, acks) {
     const reply = await requests.ask(request);
     const took = `${Math.max(1, Math.round(performance.now() - began_ms))} ms`;
     if (!reply.ok) acks.say(`${what}: refused: ${reply.error}`, 'bad');
+    else if (reply.recorder_trouble)
+      acks.say(`${what}, but nothing can be written to the log: ${reply.recorder_trouble}`, 'bad');
     else if (reply.sequence > 0)
       acks.say(`${what}: applied at frame ${reply.sequence} (${took})`, 'good');
     else acks.say(`${what}: done (${took})`, 'good');

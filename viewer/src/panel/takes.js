@@ -60,7 +60,7 @@ export class Takes {
     this.fields.disabled = readOnlyReason !== '';
     this.fields.title = readOnlyReason;
     write(this.words, this.#words(stats));
-    this.words.title = stats.recorder_file;
+    this.words.title = stats.recorder_trouble || stats.recorder_file;
   }
 
   #run(running) {
@@ -70,9 +70,10 @@ export class Takes {
     this.form.dataset.running = running;
   }
 
-  #words({ take, recorder_lost_chunks: lost, recorder_errors: errors }) {
-    const trouble = errors > 0 || lost > 0 ? `, ${errors} errors, ${lost} chunks lost` : '';
-    if (!take) return `recording${trouble}`;
-    return `take ${take.number}${take.name ? ` “${take.name}”` : ''}${trouble}`;
+  #words({ take, recorder_lost_chunks: lost, recorder_errors: errors, recorder_trouble: trouble }) {
+    const now = trouble ? ', NOTHING IS WRITTEN' : '';
+    const missing = errors > 0 || lost > 0 ? `, ${errors} errors, ${lost} chunks lost` : '';
+    const name = take?.name ? ` “${take.name}”` : '';
+    return `${take ? `take ${take.number}${name}` : 'recording'}${now}${missing}`;
   }
 }

@@ -80,6 +80,7 @@ export const TakeStats = {
   1: ['number', 'uint'],
   2: ['name', 'string'],
   3: ['start_ns', 'int'],
+  5: ['lost_chunks', 'uint'],
 };
 
 export const Stats = {
@@ -92,6 +93,7 @@ export const Stats = {
   8: ['recorder_file', 'string'],
   9: ['replay_file', 'string'],
   15: ['take', TakeStats, '?'],
+  16: ['recorder_trouble', 'string'],
 };
 
 const SetParameter = {
@@ -143,6 +145,7 @@ export const ControlReply = {
   5: ['status', Stats, '?'],
   6: ['take', TakeStats, '?'],
   7: ['model', KnownModel, '*'],
+  8: ['recorder_trouble', 'string'],
 };
 
 // posed.v1.Event.Kind, by number.

@@ -228,6 +228,13 @@ pageTest(
   },
 );
 
+pageTest('who starts a take while the disk is full is told so', {}, async (page, bridge) => {
+  bridge.daemon.recorder_trouble = 'take1.plog: the disk is full';
+  await page.getByRole('button', { name: 'Start take' }).click();
+  await acknowledged(page, 'nothing can be written to the log: take1.plog: the disk is full');
+  await page.locator('.recording', { hasText: 'take 1, NOTHING IS WRITTEN' }).waitFor(PATIENCE);
+});
+
 pageTest('a held key or two quick presses make one take', {}, async (page, bridge) => {
   bridge.publishStats = () => {}; // the answers alone say whether a take runs
   const takes = () => bridge.requests.flatMap(({ take }) => (take ? [Boolean(take.start)] : []));

@@ -26,6 +26,7 @@ export class FakeDaemon {
     this.replay_file = replay_file;
     this.rate_hz = rate_hz;
     this.recording = recording;
+    this.recorder_trouble = ''; // why the log cannot be written
     this.missing = missing;
     this.began = process.hrtime.bigint();
     const names = (word, count) =>
@@ -197,6 +198,7 @@ export class FakeDaemon {
       rss_bytes: 29900000,
       replay_file: this.replay_file,
       recorder_file: this.recording ? 'take1.plog' : '',
+      recorder_trouble: this.recorder_trouble,
       ...(this.take ? { take: this.take } : {}),
     };
   }
@@ -263,6 +265,6 @@ export class FakeDaemon {
       ? { number: this.takes, name, start_ns: String(this.now_ns()) }
       : this.take;
     this.take = start ? marked : null;
-    return { ok: true, take: marked };
+    return { ok: true, take: marked, recorder_trouble: this.recorder_trouble };
   }
 }

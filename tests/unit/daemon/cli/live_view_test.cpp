@@ -70,6 +70,10 @@ TEST_CASE("the live view names the daemon, and leaves out what does not fit") {
   stats.set_recorder_lost_chunks(2);
   options.width = 0;
   CHECK(live_view(stats, options)[0].contains("rec a.plog lost 2   2 streams   cpu 12.3 %   45.6"));
+  stats.set_recorder_trouble("/rec/a.plog: the disk is full");
+  const auto lines = live_view(stats, options);
+  CHECK(std::ranges::count(
+            lines, "  nothing can be written to the log: /rec/a.plog: the disk is full") == 1);
 }
 
 TEST_CASE("the live view shows unplugged gloves, since when, and how a glove's clock runs") {

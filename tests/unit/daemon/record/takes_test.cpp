@@ -100,23 +100,46 @@ TEST_CASE("a take that runs is in the log, to its end, before it has ended") {
   CHECK(ended[0].last_item == 8);
 }
 
-TEST_CASE("a full disk costs no take") {
+TEST_CASE("a full disk costs no take, and who marks a take is told of it") {
   TakesRecording recording;
+  std::uint64_t item = 1;
+  for (; item < 20; ++item) recording.chunk(item);
+  recording.commit();
+  recording.chunk(item);
+  const auto walk = recording.mark(true, "walk");
+  REQUIRE(walk);
+  CHECK(walk->trouble.empty());
   {
-    const test::FileLimit full(60'000);
-    for (std::uint64_t item = 1; item < 200; ++item) {
-      recording.chunk(item);
-      if (item == 20) REQUIRE(recording.mark(true, "walk"));
+    const test::FileLimit full(4096);
+    for (; item < 200; ++item) {
+      recording.chunk(item + 1);
       recording.turn();
     }
     CHECK(recording.log_writer.errors() > 0);
+    const auto running = recording.rings.running_take();
+    REQUIRE(running);
+    CHECK(running->lost_chunks > 50);
+    CHECK(running->lost_chunks == recording.log_writer.lost_chunks());
+    CHECK(running->trouble.contains(recording.path.string()));
   }
+  recording.now_ns += 100 * kNanosPerSecond;  // the next try
+  recording.turn();
+  const auto ended = recording.mark(false);
+  REQUIRE(ended);
+  CHECK(ended->trouble.empty());  // the disk has room again
+  CHECK(ended->lost_chunks > 50);
+  const auto after = recording.mark(true);
+  REQUIRE(after);
+  CHECK(after->lost_chunks == 0);
   REQUIRE(recording.mark(false));
-  REQUIRE(recording.log_writer.finish(recording.now_ns + 100 * kNanosPerSecond));
+  recording.turn();
+  CHECK(recording.events.back().text == "take 2 has ended after 0.0 s");
+  CHECK(recording.events[recording.events.size() - 3].text.contains("; meanwhile the log lost "));
+  REQUIRE(recording.log_writer.finish(recording.now_ns));
   const auto rows = takes_in(recording.path);
-  REQUIRE(rows.size() == 1);
+  REQUIRE(rows.size() == 2);
   CHECK(rows[0].first_item == 20);
-  CHECK(rows[0].last_item == 198);
+  CHECK(rows[0].last_item == 199);
 }
 
 TEST_CASE("a recording has a limited number of takes") {
