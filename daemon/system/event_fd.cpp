@@ -49,7 +49,15 @@ void rest(std::int64_t time_ns) noexcept {
 Result<std::unique_ptr<Poller>> Poller::open() {
   const int fd = epoll_create1(EPOLL_CLOEXEC);
   if (fd < 0) return system_error("cannot make an epoll set");
-  return std::unique_ptr<Poller>(new Poller(fd));
+  std::unique_ptr<Poller> poller(new Poller(fd));
+  // Where the kernel or a container refuses this call, each wait would return at once, for ever.
+  epoll_event none;
+  const timespec at_once{};
+  if (epoll_pwait2(fd, &none, 1, &at_once, nullptr) < 0) {
+    return fail("cannot wait for devices: epoll_pwait2: " + errno_text() +
+                "; posed needs Linux 5.11 or newer, and a container that lets it make this call");
+  }
+  return poller;
 }
 
 Poller::~Poller() { close(fd_); }

@@ -1,6 +1,5 @@
 #include "daemon/system/hot_cpu.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <fstream>
 #include <string>
@@ -36,41 +35,7 @@ cpu_set_t set_of(int cpu) {
   return set;
 }
 
-// proc_pid_schedstat: the time on a CPU, then that on a run queue [ns].
-ThreadTime time_of(pid_t thread, int priority) {
-  ThreadTime time{.priority = priority};
-  std::ifstream("/proc/self/task/" + std::to_string(thread) + "/schedstat") >> time.run_ns >>
-      time.wait_ns;
-  return time;
-}
-
 }  // namespace
-
-bool SharingRule::share(const Seen& seen, std::int64_t now_ns) noexcept {
-  if (since_ns_ == kNoTime_ns) since_ns_ = now_ns;
-  const std::int64_t passed_ns = now_ns - since_ns_;
-  const bool fits = seen.load <= kFull && seen.held_up <= kHeldUp;
-  const bool may_try = seen.load < 1.0 && passed_ns >= try_after_ns_;
-  if (shared_ ? fits : !may_try) return shared_;
-  if (shared_) {
-    const bool lasted = passed_ns >= kFirstTry_ns;
-    try_after_ns_ = lasted ? kFirstTry_ns : std::min(2 * try_after_ns_, kRarest_ns);
-  }
-  since_ns_ = now_ns;
-  return shared_ = !shared_;
-}
-
-std::int64_t held_up_ns(std::span<const ThreadTime> threads) noexcept {
-  std::int64_t sum_ns = 0;
-  for (const ThreadTime& thread : threads) {
-    std::int64_t lost_ns = thread.wait_ns;
-    for (const ThreadTime& other : threads) {
-      if (other.priority > thread.priority) lost_ns -= other.run_ns;
-    }
-    sum_ns += std::max<std::int64_t>(lost_ns, 0);
-  }
-  return sum_ns;
-}
 
 std::optional<int> quickest_cpu(const cpu_set_t& allowed, const std::string& sys) {
   std::optional<int> quickest;
@@ -89,7 +54,7 @@ std::optional<int> quickest_cpu(const cpu_set_t& allowed, const std::string& sys
 std::unique_ptr<HotCpu> HotCpu::open() {
   cpu_set_t allowed;
   if (sched_getaffinity(0, sizeof allowed, &allowed) != 0) return nullptr;
-  if (time_of(gettid(), 0).run_ns == 0) return nullptr;  // nothing would tell that the CPU is full
+  if (!time_of_thread(gettid())) return nullptr;  // nothing would tell that the CPU is full
   const auto cpu = quickest_cpu(allowed, "/sys");
   if (!cpu) return nullptr;
   return std::unique_ptr<HotCpu>(new HotCpu(allowed, *cpu));
@@ -115,8 +80,8 @@ void HotCpu::stop() {
 
 void HotCpu::join(int priority) {
   const std::lock_guard lock(mutex_);
-  members_.push_back({.thread = gettid(), .time = {.priority = priority}});
-  members_.back().time = time_of(members_.back().thread, priority);
+  const pid_t self = gettid();
+  members_.push_back({self, priority, time_of_thread(self).value_or(ThreadTime{})});
   move(shared_ ? set_of(cpu_) : allowed_);
 }
 
@@ -138,17 +103,14 @@ void HotCpu::watch() {
 }
 
 void HotCpu::look(std::int64_t passed_ns, std::int64_t now_ns) {
-  std::vector<ThreadTime> since;
-  std::int64_t run_ns = 0;
+  std::vector<ThreadShare> since;
+  std::int64_t ran_ns = 0;
   for (Member& member : members_) {
-    const ThreadTime time = time_of(member.thread, member.time.priority);
-    const ThreadTime before = std::exchange(member.time, time);
-    since.push_back({.priority = time.priority,
-                     .run_ns = time.run_ns - before.run_ns,
-                     .wait_ns = time.wait_ns - before.wait_ns});
-    run_ns += since.back().run_ns;
+    const ThreadTime time = time_of_thread(member.thread).value_or(member.time);
+    since.push_back({member.priority, time - std::exchange(member.time, time)});
+    ran_ns += since.back().time.ran_ns;
   }
-  const SharingRule::Seen seen{.load = seconds(run_ns) / seconds(passed_ns),
+  const SharingRule::Seen seen{.load = seconds(ran_ns) / seconds(passed_ns),
                                .held_up = seconds(held_up_ns(since)) / seconds(passed_ns)};
   const bool share = rule_.share(seen, now_ns);
   if (share == shared_) return;

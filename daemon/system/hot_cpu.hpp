@@ -10,7 +10,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <span>
 #include <string>
 #include <thread>
 #include <vector>
@@ -18,43 +17,10 @@
 #include <sched.h>
 #include <sys/types.h>
 
-#include "proto/frame/time.hpp"
+#include "daemon/system/sharing_rule.hpp"
+#include "daemon/system/thread_time.hpp"
 
 namespace posed::system {
-
-// Whether the threads share a CPU. What they did is a parameter, so tests can choose it. On several
-// CPUs the same work takes more time, because each hand-over wakes one; so whether it fits one CPU
-// is seen only by trying, more and more rarely while it does not.
-class SharingRule {
- public:
-  // More than one of these: from now on they use all CPUs.
-  static constexpr double kFull = 0.8, kHeldUp = 0.1;
-  static constexpr std::int64_t kFirstTry_ns = 10 * kNanosPerSecond;  // after so long apart
-  static constexpr std::int64_t kRarest_ns = 64 * kFirstTry_ns;
-
-  // Since the last look, in shares of that time: what the threads together have run, and for how
-  // long others held them up.
-  struct Seen {
-    double load = 0.0;
-    double held_up = 0.0;
-  };
-  [[nodiscard]] bool share(const Seen& seen, std::int64_t now_ns) noexcept;
-
- private:
-  bool shared_ = true;
-  std::int64_t since_ns_ = kNoTime_ns;  // of sharing or not
-  std::int64_t try_after_ns_ = kFirstTry_ns / 2;
-};
-
-// How long a thread ran, and how long it was ready to run while others had the CPU.
-struct ThreadTime {
-  int priority = 0;
-  std::int64_t run_ns = 0, wait_ns = 0;
-};
-
-// What all of the threads waited for others than themselves. A thread with a higher priority is the
-// one that should run, so the time that it ran is no time lost.
-[[nodiscard]] std::int64_t held_up_ns(std::span<const ThreadTime> threads) noexcept;
 
 // Of the CPUs `allowed` the one with the highest capacity; of several the last, because the first
 // handles interrupts. Empty if there are not two. `sys`: the folder /sys.
@@ -78,6 +44,7 @@ class HotCpu {
   HotCpu(const cpu_set_t& allowed, int cpu);
   struct Member {
     pid_t thread = 0;
+    int priority = 0;
     ThreadTime time{};  // at the last look
   };
   void watch();
