@@ -76,7 +76,7 @@ Result<> try_model(const fs::path& path) {
 
 Check check_disk(const Machine& machine, Config config) {
   const std::string name = "disk";
-  if (config == nullptr) return right(name, kNoConfig);
+  if (config == nullptr) return needs_config(name);
   if (!config->record) return right(name, "not needed: the config has no [record]");
   if (const auto fine = config::check_folder(*config->record); !fine) {
     return wrong(name, fine.error().text(), "set [record] folder to a name that no file has");
@@ -99,7 +99,7 @@ Check check_disk(const Machine& machine, Config config) {
 
 Check check_ports(const Machine& machine, Config config) {
   const std::string name = "ports";
-  if (config == nullptr) return right(name, kNoConfig);
+  if (config == nullptr) return needs_config(name);
   std::string bad;
   const auto listeners = listeners_of(*config);
   for (const Listener& listener : listeners) {
@@ -116,7 +116,7 @@ Check check_ports(const Machine& machine, Config config) {
 
 Check check_keys(Config config) {
   const std::string name = "keys";
-  if (config == nullptr) return right(name, kNoConfig);
+  if (config == nullptr) return needs_config(name);
   const auto files = key_files(*config);
   if (files.empty()) return right(name, "not needed: the config names no secret key");
   for (const fs::path& file : files) {
@@ -135,7 +135,7 @@ Check check_keys(Config config) {
 
 Check check_models(Config config) {
   const std::string name = "models";
-  if (config == nullptr) return right(name, kNoConfig);
+  if (config == nullptr) return needs_config(name);
   const auto files = model_files(*config);
   if (files.empty()) return right(name, "not needed: the config names no model");
   for (const fs::path& file : files) {
@@ -149,7 +149,7 @@ Check check_models(Config config) {
 
 Check check_logs(Config config) {
   const std::string name = "logs";
-  if (config == nullptr) return right(name, kNoConfig);
+  if (config == nullptr) return needs_config(name);
   if (!config->record) return right(name, "not needed: the config has no [record]");
   int count = 0;
   std::error_code failed;

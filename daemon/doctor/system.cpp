@@ -125,7 +125,7 @@ Check check_clock_sync(const Machine& machine) {
 
 Check check_socket_buffers(const Machine& machine, Config config) {
   const std::string name = "socket buffers";
-  if (config == nullptr) return right(name, kNoConfig);
+  if (config == nullptr) return needs_config(name);
   if (!has_datagrams(*config)) return right(name, "not needed: no source of the config uses UDP");
   const std::string most = line_of(machine, "proc/sys/net/core/rmem_max");
   if (most.empty()) return right(name, "this system does not tell");

@@ -10,9 +10,6 @@
 
 namespace posed::doctor {
 
-// Found for every check that needs a config when there is none.
-inline constexpr const char* kNoConfig = "not looked at: give --config FILE";
-
 // The text of an option; empty if the driver has no such option.
 [[nodiscard]] std::string text_option(const drivers::Options& options, std::string_view name);
 

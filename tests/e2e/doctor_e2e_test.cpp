@@ -42,6 +42,8 @@ TEST_CASE("doctor's exit code agrees with its checks, and each that fails has a 
   CHECK(people.code == doctor.code);
   CHECK(has(people.out, "clock source"));
   CHECK_FALSE(has(people.out, "\x1b["));  // no terminal, no colours
+  CHECK(has(people.out, "-      disk                    not looked at: give --config FILE\n"));
+  CHECK_FALSE(has(people.out, "of 15 "));
 }
 
 TEST_CASE("doctor finds the ports of a config in use while a daemon runs, and free afterwards") {

@@ -43,16 +43,18 @@ void print_as_json(const std::vector<doctor::Check>& checks, bool ok) {
 void print_for_people(const std::vector<doctor::Check>& checks) {
   const bool coloured = isatty(STDOUT_FILENO) == 1;
   for (const doctor::Check& check : checks) {
-    const std::string mark =
-        check.ok ? paint(coloured, kGreen, "ok   ") : paint(coloured, kRed, "WRONG");
+    std::string mark = check.ok ? paint(coloured, kGreen, "ok   ") : paint(coloured, kRed, "WRONG");
+    if (!check.looked) mark = "-    ";
     std::printf("%s  %-22s  %s\n", mark.c_str(), check.name.c_str(), check.found.c_str());
     if (!check.ok) std::printf("       %s\n", paint(coloured, kBold, check.fix).c_str());
   }
   const auto bad = std::ranges::count(checks, false, &doctor::Check::ok);
+  const auto looked = std::ranges::count(checks, true, &doctor::Check::looked);
   if (bad == 0) {
-    std::puts("everything is right");
+    std::printf("all %td that were looked at are right\n", looked);
   } else {
-    std::printf("%td of %zu need mending: the line below each says how\n", bad, checks.size());
+    std::printf("%td of %td need%s mending: the line below each says how\n", bad, looked,
+                bad == 1 ? "s" : "");
   }
 }
 
@@ -88,8 +90,9 @@ and logs. It changes nothing, and opens no device. Examples:
   posed doctor                                   this computer alone
   posed doctor --config mine.toml                before the show, while posed does not run
   posed doctor --json | jq '.checks[] | select(.ok | not)'
-What does not apply is ok and says why. Run it as the user that runs posed. Exit code 0: all is
-right. 1: something needs mending. 2: the config is wrong (`posed check` says more).)");
+What does not apply is ok and says why; what was not looked at has a dash. Run it as the user
+that runs posed. Exit code 0: all is right. 1: something needs mending. 2: the config is wrong
+(`posed check` says more).)");
   command->callback([options, &exit_code] { exit_code = examine_this_machine(*options); });
 }
 
