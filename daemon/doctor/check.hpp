@@ -10,7 +10,9 @@ struct Check {
   std::string name;   // "usb latency"; the same in every run, for scripts
   bool ok = true;     // also when it does not apply to this machine or config
   std::string found;  // what is there, or why it does not apply
-  std::string fix{};  // the line that mends it; empty if ok
+  // The line that mends it; empty if ok. A command can be pasted into a shell: words about it come
+  // behind a #.
+  std::string fix{};
 };
 
 [[nodiscard]] inline Check right(std::string name, std::string found) {
