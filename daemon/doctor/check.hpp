@@ -7,10 +7,11 @@
 namespace posed::doctor {
 
 struct Check {
-  std::string name;    // "usb latency"; the same in every run, for scripts
-  bool ok = true;      // also when it does not apply to this machine or config
-  std::string found;   // what is there, or why it does not apply
-  std::string fix{};   // the line that mends it; empty if ok
+  bool ok = true;     // also when it does not apply to this machine or config
+  std::string found;  // what is there, or why it does not apply
+  // The line that mends it; empty if ok. A command can be pasted into a shell: words about it come
+  // behind a #.
+  std::string fix{};
   bool looked = true;  // false: it needs a config, and there is none; then it counts as ok
 };
 

@@ -73,7 +73,7 @@ Check check_groups(const Machine& machine, Config config) {
     if (joins && !groups.contains(node.group)) groups += (groups.empty() ? "" : ",") + node.group;
   }
   const std::string join = "sudo usermod -aG " + (groups.empty() ? "dialout,plugdev" : groups) +
-                           " " + machine.user + ", then log in again";
+                           " " + machine.user + "  # then log in again";
   if (!closed.empty()) {
     return wrong(name, closed + " cannot be opened by " + machine.user,
                  groups.empty() ? kInstallRules : join);
@@ -113,8 +113,8 @@ Check check_usb_latency(const Machine& machine) {
   if (ports.empty()) return right(name, "no USB adapter with a latency timer is here");
   if (slow.empty()) return right(name, ports + " deliver at once (1 ms)");
   return wrong(name, "the adapter collects bytes for " + slow,
-               "echo 1 | sudo tee /sys/bus/usb-serial/devices/*/latency_timer (the udev rules do"
-               " it for good)");
+               "echo 1 | sudo tee /sys/bus/usb-serial/devices/*/latency_timer  # the udev rules do"
+               " it for good");
 }
 
 Check check_modem_manager(const Machine& machine, Config config) {

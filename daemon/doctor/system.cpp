@@ -23,7 +23,7 @@ constexpr std::uint64_t kLeastLocked_bytes = std::uint64_t{2} << 30;
 // The line that gives this user a right at the next login; a service has it in its unit.
 std::string limit_line(const Machine& machine, const char* what) {
   return "echo '" + machine.user + " - " + what +
-         "' | sudo tee -a /etc/security/limits.d/70-posed.conf, then log in again";
+         "' | sudo tee -a /etc/security/limits.d/70-posed.conf  # then log in again";
 }
 
 bool without_realtime(Config config) { return config != nullptr && !config->realtime; }
@@ -120,7 +120,7 @@ Check check_clock_sync(const Machine& machine) {
       break;
   }
   return wrong(name, "the clock follows no time server: takes of several machines do not align",
-               "sudo timedatectl set-ntp true (Debian: sudo apt install systemd-timesyncd)");
+               "sudo timedatectl set-ntp true  # Debian: after sudo apt install systemd-timesyncd");
 }
 
 Check check_socket_buffers(const Machine& machine, Config config) {

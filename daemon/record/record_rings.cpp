@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <numeric>
+#include <string>
 #include <utility>
+
+#include "proto/log/digest.hpp"
 
 namespace posed::record {
 namespace {
@@ -117,8 +120,9 @@ void RecordRings::unpublished(std::uint32_t id) noexcept {
 }
 
 void RecordRings::keep_model(std::span<const std::byte> bytes) {
+  std::string hash = log::sha256_hex(bytes);
   const std::lock_guard lock(added_mutex_);
-  models_.emplace_back(bytes.begin(), bytes.end());
+  if (kept_.insert(std::move(hash)).second) models_.emplace_back(bytes.begin(), bytes.end());
 }
 
 Result<pipeline::Take> RecordRings::mark_take(const pipeline::TakeMark& mark) {

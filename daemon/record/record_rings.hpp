@@ -13,7 +13,9 @@
 #include <limits>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "daemon/pipeline/counters.hpp"
@@ -194,6 +196,9 @@ class RecordRings final : public pipeline::RecordSink {
   Takes takes_;
   std::mutex added_mutex_;  // of the following, and of adding to a slot
   std::vector<std::vector<std::byte>> models_;
+  // The SHA-256 of all models so far: one that comes again and again, while the disk is full, takes
+  // memory once.
+  std::set<std::string> kept_;
   std::vector<RecordedStream> streams_;
 };
 

@@ -31,9 +31,11 @@ bool ask_for_realtime() {
   const bool fifo = may_be_fifo();
   if (!locked || !fifo) {
     spdlog::warn(
-        "no real-time rights ({}): frames may be late when the machine is busy; grant "
-        "LimitRTPRIO and LimitMEMLOCK, or set realtime = false",
-        locked ? "SCHED_FIFO refused" : "memory cannot be locked");
+        "no real-time rights ({}): frames may be late when the machine is busy; `posed doctor` "
+        "says what to grant, or set realtime = false",
+        fifo     ? "memory cannot be locked"
+        : locked ? "SCHED_FIFO is refused"
+                 : "SCHED_FIFO is refused, memory cannot be locked");
   }
   return fifo;
 }

@@ -1,12 +1,16 @@
 #include "drivers/transport/connection.hpp"
 
 #include <poll.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <future>
+#include <system_error>
+#include <thread>
 #include <utility>
 
 namespace posed::drivers {
@@ -18,6 +22,7 @@ using std::chrono::milliseconds;
 constexpr std::size_t kRead = 4096;  // bytes; enough for a HID report or a terminal's buffer
 constexpr milliseconds kWritePatience{1000};
 constexpr milliseconds kDrainPatience{1000};
+constexpr milliseconds kClosePatience{50};
 constexpr int kMaxWaiting = 256;  // reads; hidraw keeps 64 reports
 
 bool not_now(int error) noexcept {
@@ -29,6 +34,12 @@ ssize_t write_some(int fd, std::span<const std::byte> bytes) noexcept {
   const ssize_t sent = ::send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
   if (sent >= 0 || errno != ENOTSOCK) return sent;
   return ::write(fd, bytes.data(), bytes.size());
+}
+
+// Of a serial port: bytes that were written and are not sent yet. 0 for any other descriptor.
+int unsent_bytes(int fd) noexcept {
+  int count = 0;
+  return ::isatty(fd) == 1 && ::ioctl(fd, TIOCOUTQ, &count) == 0 ? count : 0;
 }
 
 milliseconds left_until(Clock::time_point deadline) {
@@ -106,8 +117,29 @@ bool LinkTransport::send(std::span<const std::byte> bytes, std::uint8_t /*socket
 Connection::Connection(int fd, std::string name, std::string identity) noexcept
     : fd_(fd), name_(std::move(name)), identity_(std::move(identity)) {}
 
-Connection::~Connection() {
-  if (fd_ >= 0) ::close(fd_);
+Connection::~Connection() { close(); }
+
+// Linux closes a serial port only when what was written is sent, or after 30 s (closing_wait, which
+// only root may change), and a glove that hangs takes nothing. Discarding the bytes (TCOFLUSH) does
+// not help: Linux 6.1 cannot discard those of a ttyACM. So another thread closes it, and this one
+// does not wait for that when posed stops: where a process ends, Linux interrupts its other
+// threads.
+void Connection::close() noexcept {
+  const int fd = std::exchange(fd_, -1);
+  if (fd < 0) return;
+  if (unsent_bytes(fd) == 0) {
+    ::close(fd);
+    return;
+  }
+  try {
+    std::packaged_task<void()> task([fd] { ::close(fd); });
+    const auto closed = task.get_future();
+    std::thread(std::move(task)).detach();
+    while (closed.wait_for(kClosePatience) != std::future_status::ready && !cancelled()) {
+    }
+  } catch (const std::system_error&) {  // no more threads
+    ::close(fd);
+  }
 }
 
 Connection::Connection(Connection&& other) noexcept
@@ -118,7 +150,7 @@ Connection::Connection(Connection&& other) noexcept
 
 Connection& Connection::operator=(Connection&& other) noexcept {
   if (this == &other) return *this;
-  if (fd_ >= 0) ::close(fd_);
+  close();
   fd_ = std::exchange(other.fd_, -1);
   name_ = std::move(other.name_);
   identity_ = std::move(other.identity_);

@@ -152,6 +152,8 @@ std::unique_ptr<LabDevice> serial_device() {
   bench->gadget.add_serial();
   auto device = device_of(bench, "ttyacm");
   device->serial = true;
+  // The kernel's gadget takes bytes only while a program has its side open.
+  device->plug_hung = [bench] { bench->gadget.plug(); };
   device->there_since = looks_for(drivers::list_serial_ports, ids);
   device->open = [ids]() -> Result<std::unique_ptr<drivers::Transport>> {
     auto link = TransportFactory().serial({.id = ids.serial});

@@ -20,6 +20,7 @@ struct LabDevice {
   std::string name;
   bool serial = false;  // a stream of bytes instead of reports
   std::function<void()> plug, unplug;
+  std::function<void()> plug_hung;  // plugged in, and takes no bytes and sends none (serial only)
   // Sends from the device; false when the host did not take it.
   std::function<bool(std::span<const std::byte>)> say;
   std::function<Result<std::unique_ptr<drivers::Transport>>()> open;

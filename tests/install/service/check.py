@@ -231,13 +231,14 @@ def reload(pid):
 
 
 def plug_glove():
-    """A serial glove is plugged in for the first time since the machine began."""
+    """A serial glove is plugged in for the first time since the machine began; the process that plays it."""
     run("modprobe", "dummy_hcd")
     # LucidGloves on a CP210x; cdc_acm drives it nevertheless, as it says that it is a modem.
     plugged = run("modprobe", "g_serial", "idVendor=0x10c4", "idProduct=0xea60")
     check(comes(lambda: os.path.exists("/dev/ttyACM0"), 10),
           f"a serial glove is plugged in{plugged.stderr}")
-    if os.fork() == 0:
+    child = os.fork()
+    if child == 0:
         port = os.open("/dev/ttyGS0", os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         tty.setraw(port, termios.TCSANOW)
         while True:
@@ -245,13 +246,14 @@ def plug_glove():
                 os.write(port, b"A100B200C300D400E500F2047G2047\n")
                 os.read(port, 4096)
             time.sleep(0.03)
+    return child
 
 
 def device(pid):
     known = pathlib.Path("/proc/devices").read_text().split()
     kinds = {"ttyUSB", "ttyACM", "hidraw", "usb_device"}
     check(kinds <= set(known), "the kernel knows all kinds of gloves before one is plugged in")
-    plug_glove()
+    glove = plug_glove()
     viewer = Viewer("glove")
     if not check(viewer.flows(10), "posed opens the glove, the first that is plugged in, after it began"):
         print("\n".join(line["MESSAGE"] for line in journal("-u", UNIT)[-10:]))
@@ -259,6 +261,21 @@ def device(pid):
     check("ID_MM_DEVICE_IGNORE=1" in facts and "uaccess" in facts, "the udev rules know the glove")
     check(not open_in_unit(pid, "/dev/pmem0"), "the unit cannot open another device (a disk)")
     viewer.client.close()
+    return glove
+
+
+def glove_that_hangs(viewer, glove):
+    """From now on it takes no bytes, so Linux would keep closing its port for 30 s."""
+    os.kill(glove, signal.SIGKILL)
+    os.waitpid(glove, 0)
+    silent, since_s = "the glove sends nothing", time.time()
+    if not check(comes(lambda: any(silent in line["MESSAGE"] for line in
+                                   journal("-u", UNIT, f"--since=@{since_s:.3f}")), 60),
+                 "the glove hangs: posed has asked it, and it does not answer"):
+        return
+    restarts("a thread, while a glove hangs", viewer,
+             lambda pid: stop_thread(threads(pid)["posed-control"]),
+             "the thread posed-control is stuck")
 
 
 def open_in_unit(pid, path):
@@ -309,7 +326,7 @@ def stop(log):
     begin = time.monotonic()
     run("systemctl", "stop", UNIT)
     took = time.monotonic() - begin
-    check(shown("Result") == "success" and shown("ExecMainStatus") == "0" and took < 120,
+    check(shown("Result") == "success" and shown("ExecMainStatus") == "0" and took < 2,
           f"systemctl stop ends it with 0 after {took:.2f} s")
     left = glob.glob(f"{TAKES}/*-wal") + glob.glob(f"{TAKES}/*-journal")
     check(log + "-wal" not in left, "its log is closed")
@@ -340,9 +357,10 @@ def service():
     check(viewer.flows(), "frames come")
     rights(pid)
     reload(pid)
-    device(pid)
+    glove = device(pid)
     fields()
     each_thread_stopped(viewer)
+    glove_that_hangs(viewer, glove)
     log = disk_that_waits(viewer)
     stop(log)
     failures()

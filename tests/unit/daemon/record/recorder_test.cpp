@@ -203,6 +203,16 @@ TEST_CASE(
   CHECK(reader->blob(log::sha256_hex(bytes_of(model))));
 }
 
+TEST_CASE("a model that comes again is kept once, so a full disk does not fill the memory") {
+  RecordRings rings(ring_sizes_of(1, 1 << 12, {}));
+  rings.keep_model(bytes_of("model"));
+  rings.keep_model(bytes_of("another"));
+  rings.keep_model(bytes_of("model"));
+  CHECK(rings.take_models().size() == 2);
+  rings.keep_model(bytes_of("another"));
+  CHECK(rings.take_models().empty());
+}
+
 TEST_CASE("the recorder's thread writes by its own timer and leaves one file") {
   const TempFolder dir;
   const auto path = dir.path() / "a.plog";
