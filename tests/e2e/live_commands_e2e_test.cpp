@@ -2,6 +2,7 @@
 // of a replay, of the file that was written, and of what they wait for.
 #include <catch2/catch.hpp>
 
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -248,6 +249,24 @@ TEST_CASE("each command explains its own options, and refuses those without an e
   CHECK(posed({"emulate", "lucidgloves", "--stream", "right"}).code == 2);
   CHECK(posed({"emulate", "lucidgloves", "--seed", "3", "--seconds", "1"}).code == 2);
   CHECK(posed({"run", "--config", "none.toml", "--seconds", "-1"}).code == 2);
+  for (const auto& [device, way, advice] :
+       {std::array{"cyberglove", "--udp", "give --link PATH or --tcp HOST:PORT"},
+        std::array{"natnet", "--tcp", "give --udp IP:PORT"},
+        std::array{"posed", "--udp", "give --publish ENDPOINT"}}) {
+    const auto unheard = posed({"emulate", device, way, "127.0.0.1:9", "--seconds", "0.1"});
+    CHECK(unheard.code == 2);
+    CHECK(has(unheard.err, std::string("posed does not listen for ") + device + " over " + way));
+    CHECK(has(unheard.err, advice));
+  }
+  const auto mistyped = [](std::vector<std::string> words, const std::string& sentence) {
+    const auto refused = posed(std::move(words));
+    INFO(refused.err);
+    return refused.code == 2 && has(refused.err, sentence);
+  };
+  CHECK(mistyped({"monito"}, "there is no command 'monito'; the nearest is monitor"));
+  CHECK(mistyped({"ctl", "--connect", kNobody, "sett"}, "the nearest is set"));
+  CHECK(
+      mistyped({"train", "style", "--form", "a.bvh"}, "no option '--form'; the nearest is --from"));
   const TempFolder folder;
   const auto mine = folder.write("mine", "precious");
   const auto link = folder.path() / "link";
