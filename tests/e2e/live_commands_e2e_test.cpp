@@ -87,6 +87,18 @@ TEST_CASE("a daemon that is gone is not shown as live") {
   }
 }
 
+TEST_CASE("monitor gives up a stream that does not come") {
+  Served served("[[stream]]\nname = \"right\"\ndriver = \"cyberglove\"\nport = \"/dev/none\"\n");
+  served.start();
+  const auto late =
+      posed({"monitor", "--connect", served.publish, "--stream", "right", "--timeout", "2"});
+  CHECK(late.code == 1);
+  CHECK(has(late.err, "nothing of pose/right came in 2 s (--timeout)"));
+  const auto there = posed({"monitor", "--connect", served.publish, "--stream", "walker", "--count",
+                            "300", "--timeout", "2"});
+  CHECK(there.code == 0);
+}
+
 TEST_CASE("commands that wait for a daemon report what they wait for") {
   for (const char* command : {"top", "monitor"}) {
     Process waits({command, "--connect", kNobody, "--json"});
@@ -263,6 +275,15 @@ TEST_CASE("each command explains its own options, and refuses those without an e
     INFO(refused.err);
     return refused.code == 2 && has(refused.err, sentence);
   };
+  CHECK(
+      mistyped({"view", "--port", "99999"}, "--port: '99999' should be a number from 0 to 65535"));
+  CHECK(mistyped({"emulate", "cyberglove", "--fault", "drop:0.1", "--seed", "-1"},
+                 "--seed: '-1' should be a whole number of 0 or more"));
+  CHECK(mistyped({"calibrate", "--driver", "cyberglove", "--user", "", "--out", "c.toml"},
+                 "--user is empty; name whose hand it is"));
+  const auto missing = posed({"convert", "nope"});
+  CHECK(missing.code == 1);
+  CHECK(has(missing.err, "nope: is not there; check the path"));
   CHECK(mistyped({"monito"}, "there is no command 'monito'; the nearest is monitor"));
   CHECK(mistyped({"ctl", "--connect", kNobody, "sett"}, "the nearest is set"));
   CHECK(

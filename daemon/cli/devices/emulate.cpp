@@ -277,6 +277,7 @@ void add_emulate(CLI::App& app, int& exit_code) {
                     ->type_name("KIND:RATE");
   command->add_option("--seed", options->seed, "Of the faults: the same seed gives the same faults")
       ->needs(fault)
+      ->check(whole_number())
       ->capture_default_str();
   command->add_option("--stream", options->stream, "Which stream of the log")->type_name("NAME");
   command->add_option("--seconds", options->seconds, "End after so many seconds")

@@ -267,7 +267,9 @@ void add_train_style(CLI::App& train_command, int& exit_code, const std::shared_
       ->check(in_range(10.0, 1000.0));
   style->add_option("--mode", options->mode,
                     "default, or paper: the paper end to end (default: the experiment's)");
-  style->add_option("--seed", options->seed, "Of the random starts")->capture_default_str();
+  style->add_option("--seed", options->seed, "Of the random starts")
+      ->check(whole_number())
+      ->capture_default_str();
   style->add_option("--out", options->out, "Where to write the model")
       ->required()
       ->type_name("OUT.style");
