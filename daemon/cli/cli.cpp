@@ -2,6 +2,10 @@
 
 #include <array>
 #include <cstdio>
+#include <set>
+#include <span>
+#include <string>
+#include <utility>
 
 #include <google/protobuf/stubs/logging.h>
 #include <poll.h>
@@ -9,9 +13,12 @@
 
 #include <cerrno>
 
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 
 #include "daemon/logging/log_output.hpp"
+#include "proto/text/clean.hpp"
+#include "proto/text/nearest_word.hpp"
 
 namespace posed::cli {
 namespace {
@@ -52,6 +59,48 @@ int with_stdout_written(int exit_code) {
       fail("the output cannot be written to stdout" + why + "; it is not complete").error());
 }
 
+// The subcommand of `app` that bears this name; null if there is none.
+CLI::App* subcommand(CLI::App& app, const std::string& name) {
+  const auto all = app.get_subcommands([&](CLI::App* one) { return one->get_name() == name; });
+  return all.empty() ? nullptr : all.front();
+}
+
+void add_options(const CLI::App& command, std::set<std::string>& known) {
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) known.insert("--" + name);
+  }
+}
+
+// A sentence on the first word that is no command where one stands, or on an option that none of
+// the commands before it has, with the word that it most likely means; empty if there is none.
+std::string unknown_word(CLI::App& app, std::span<char* const> arguments) {
+  CLI::App* command = &app;
+  std::set<std::string> options;
+  add_options(app, options);
+  bool after_option = false;  // then the word may be its value
+  for (const std::string word : arguments) {
+    const bool is_option = word.starts_with("-");
+    const bool is_value = std::exchange(after_option, is_option) && !is_option;
+    if (is_value) continue;
+    if (CLI::App* next = subcommand(*command, word)) {
+      command = next;
+      add_options(*command, options);
+      continue;
+    }
+    std::set<std::string> commands;
+    for (const CLI::App* one : command->get_subcommands(nullptr)) commands.insert(one->get_name());
+    const std::string name = word.substr(0, word.find('='));
+    const auto& known = is_option ? options : commands;
+    const std::string near = known.contains(name) ? "" : nearest(name, known);
+    if (!near.empty()) {
+      return fmt::format("there is no {} {}; the nearest is {}", is_option ? "option" : "command",
+                         in_quotes(name), near);
+    }
+    if (!is_option && !known.empty()) return fmt::format("there is no command {}", in_quotes(name));
+  }
+  return {};
+}
+
 // `exit_code` is what the command stores.
 int parse_and_run(int argc, char** argv, CLI::App& app, const int& exit_code) {
   // Untrusted bytes are refused with posed's own messages; protobuf would print a line for each.
@@ -61,6 +110,11 @@ int parse_and_run(int argc, char** argv, CLI::App& app, const int& exit_code) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
+    const std::string unknown =
+        error.get_exit_code() == 0
+            ? ""
+            : unknown_word(app, std::span(argv, static_cast<std::size_t>(argc)).subspan(1));
+    if (!unknown.empty()) return report(misuse(unknown + " (--help tells more)").error());
     const bool asked_for_help = app.exit(error) == 0;
     return static_cast<int>(asked_for_help ? ExitCode::kDone : ExitCode::kWrongUse);
   }

@@ -2,6 +2,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <string_view>
@@ -52,6 +53,19 @@ inline CLI::Validator above_zero() {
 inline CLI::Validator zero_or_more() {
   return detail::number_check("of 0 or more", "NONNEGATIVE",
                               [](double value) { return value >= 0.0; });
+}
+
+// A seed: digits alone, because the library would take -1 for 2^64 - 1.
+inline CLI::Validator whole_number() {
+  return {[](const std::string& text) {
+            std::uint64_t value = 0;
+            const char* const end = text.data() + text.size();
+            const auto [stop, error] = std::from_chars(text.data(), end, value);
+            return error == std::errc() && stop == end
+                       ? std::string()
+                       : fmt::format("'{}' should be a whole number of 0 or more", text);
+          },
+          "NONNEGATIVE"};
 }
 
 }  // namespace posed::cli

@@ -150,7 +150,10 @@ void read_tables(const toml::table& root_table, const ConfigFile& file, DaemonCo
   read_record(root, file, config);
   read_trigger(root, config);
   read_metrics(root, config);
-  for (const PortClash& clash : port_clashes(config)) root.add_error(clash.key, clash.message);
+  for (const PortClash& clash : port_clashes(config)) {
+    const int line = clash.line > 0 ? clash.line : root.line_of(clash.key);
+    file.findings.add_error(line, clash.message);
+  }
   root.finish();
 }
 

@@ -38,6 +38,7 @@ struct StreamConfig {
   std::vector<StageConfig> stages;
   bool default_stages = true;         // false: the list is complete
   std::vector<const StageType*> off;  // stages whose table says enabled = false
+  int line = 0;                       // of its table, for errors; 0: nowhere
 };
 
 // A device with several bodies (Driver::make_layout). Its bodies become streams as they come.
@@ -57,6 +58,7 @@ struct SourceConfig {
   // what is common to them: a stream without name, driver, options and calibration.
   bool all = false;
   StreamConfig every;
+  int line = 0;  // of its table, for errors; 0: nowhere
 };
 
 enum class OutputKind : std::uint8_t { kVmc, kBvh };
@@ -80,6 +82,7 @@ struct OutputConfig {
   std::string listen = "127.0.0.1:7002";  // address and port that clients connect to
   std::vector<std::string> peers;         // addresses that may connect; empty: this machine
   bool header = false;                    // clients get a BVH's HIERARCHY first
+  int line = 0;                           // of its table, for errors; 0: nowhere
 };
 
 // `posed run` records from its start.
@@ -87,6 +90,7 @@ struct RecordConfig {
   std::filesystem::path folder = "takes";  // of the logs, which are named after their time
   bool frames = false;                     // keep the published frames, too
   bool clips = false;                      // each take of each stream as a BVH, when it ends
+  int line = 0;                            // of the folder, for errors; 0: nowhere
 };
 
 // Where capture systems say that a recording begins or ends.

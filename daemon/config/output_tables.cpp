@@ -14,6 +14,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "daemon/config/listeners.hpp"
 #include "drivers/transport/address.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/nearest_word.hpp"
@@ -43,6 +44,7 @@ class OutputReader {
   void read_bvh(TableReader& table, OutputConfig& output) const;
   void read_streams(TableReader& table, OutputConfig& output) const;
   void check_stream(TableReader& table, const char* key, const std::string& name) const;
+  void check_hand(TableReader& table, const char* key, const std::string& name) const;
   void refuse_keys(TableReader& table, std::string_view kind,
                    std::span<const std::string_view> keys) const;
   void name_it(TableReader& table, OutputConfig& output);
@@ -81,6 +83,18 @@ void OutputReader::check_stream(TableReader& table, const char* key,
                                                 : "the nearest is " + in_quotes(near)));
 }
 
+// A glove that says which hand it is. Others are told apart by their skeletons while they stream.
+void OutputReader::check_hand(TableReader& table, const char* key, const std::string& name) const {
+  const auto stream = std::ranges::find(config_.streams, name, &StreamConfig::name);
+  if (stream == config_.streams.end()) return;
+  const std::string hand = text_option(stream->options, "hand");
+  if (hand.empty() || hand + "_hand" == key) return;
+  if (hand != "left" && hand != "right") return;  // the driver refuses it
+  table.add_error(key, fmt::format("{0} is a {1} hand; name it as {1}_hand, or set hand = \"{2}\""
+                                   " in its [[stream]] table",
+                                   in_quotes(name), hand, hand == "left" ? "right" : "left"));
+}
+
 void OutputReader::read_streams(TableReader& table, OutputConfig& output) const {
   const std::array<std::pair<const char*, std::string*>, 3> parts{
       {{"body", &output.body},
@@ -94,6 +108,7 @@ void OutputReader::read_streams(TableReader& table, OutputConfig& output) const 
     // A value that is no text has its error already.
     any = any || !name->empty() || (table.has(key) && !table.has_text(key));
     check_stream(table, key, *name);
+    if (key != parts[0].first) check_hand(table, key, *name);
     if (name->empty() || taken.insert(*name).second) continue;
     table.add_error(key, fmt::format("{} is another part of this avatar already; each part has a"
                                      " stream of its own",
@@ -186,6 +201,7 @@ void OutputReader::name_it(TableReader& table, OutputConfig& output) {
 
 void OutputReader::read(TableReader& table) {
   OutputConfig& output = config_.outputs.emplace_back();
+  output.line = table.line();
   const std::size_t errors = file_.findings.errors.size();
   const bool there = table.need("kind", "write kind = \"vmc\" or \"bvh\"");
   output.kind = static_cast<OutputKind>(table.choice("kind", kKindWords));

@@ -1,4 +1,4 @@
-// What only one user can have: a TCP port to listen on, a glove's port. Cold.
+// What only one user can have: a port to listen on, a glove's port. Cold.
 #pragma once
 
 #include <string>
@@ -10,8 +10,9 @@
 namespace posed::config {
 
 struct PortClash {
-  std::string_view key;  // the table that comes second
-  std::string message;
+  std::string_view key{};  // of the table that comes second
+  int line = 0;            // of that table, where the key has several; 0: unknown
+  std::string message{};
 };
 
 // Ports that the config gives away twice, so that one of the two would never work.

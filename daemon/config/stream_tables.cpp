@@ -52,6 +52,7 @@ void StreamReader::read(TableReader& root) {
   std::vector<TableReader> sources = root.tables("source", kMaxSources);
   for (TableReader& table : sources) {
     SourceConfig& source = config_.sources.emplace_back();
+    source.line = table.line();
     read_source(table, file_, source);
     names_.push_back({.name = source.name, .line = table.line(), .is_source = true});
   }
@@ -83,6 +84,7 @@ void StreamReader::read(TableReader& root) {
 
 void StreamReader::read_stream(TableReader& table) {
   StreamConfig stream;
+  stream.line = table.line();
   table.require("name", stream.name);
   const bool of_source = table.has("source") || (table.has("body") && !table.has("driver"));
   if (!of_source) table.require("driver", stream.driver);

@@ -1,11 +1,14 @@
 #include "daemon/config/take_tables.hpp"
 
+#include <stdlib.h>
+
 #include <array>
 #include <filesystem>
 #include <string>
 #include <string_view>
 
 #include "drivers/transport/address.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::config {
 namespace {
@@ -20,6 +23,7 @@ void read_record(TableReader& root, const ConfigFile& file, DaemonConfig& config
   RecordConfig& record = config.record.emplace();
   std::string folder = record.folder.string();
   table->read("folder", folder);
+  record.line = table->line_of("folder");
   if (folder.empty()) table->add_error("folder", "name a folder, like folder = \"takes\"");
   record.folder = file.resolve(folder);
   table->read("frames", record.frames);
@@ -49,9 +53,21 @@ Result<> check_folder(const RecordConfig& record) {
   while (there.has_relative_path() && !std::filesystem::exists(there, ignored)) {
     there = there.parent_path();
   }
-  if (std::filesystem::is_directory(there, ignored)) return {};
-  return fail("is a file, so it cannot be a folder for recordings; name another [record] folder",
-              there.string());
+  const std::string shown = clean(there.string());
+  if (!std::filesystem::is_directory(there, ignored)) {
+    return fail(shown +
+                " is a file, so it cannot be a folder for recordings; name another"
+                " [record] folder");
+  }
+  // Only the attempt tells: root may write into /proc, where nothing can be made.
+  std::string attempt = (there / ".posed-XXXXXX").string();
+  if (::mkdtemp(attempt.data()) == nullptr) {
+    return fail("nothing can be made in " + shown + " (" + errno_text() +
+                "), where recordings"
+                " would go; name another [record] folder");
+  }
+  std::filesystem::remove(attempt, ignored);
+  return {};
 }
 
 }  // namespace posed::config

@@ -10,7 +10,8 @@ namespace posed::config {
 void read_record(TableReader& root, const ConfigFile& file, DaemonConfig& config);
 void read_trigger(TableReader& root, DaemonConfig& config);
 
-// Fails where the folder of recordings can never be made, because a file is in its way.
+// Fails where a folder or file of recordings cannot be made: a file is in the way, the file system
+// takes none, or the permission is missing. Makes a folder there for a moment.
 [[nodiscard]] Result<> check_folder(const RecordConfig& record);
 
 }  // namespace posed::config

@@ -7,6 +7,7 @@
 namespace posed::doctor {
 
 struct Check {
+  std::string name;   // "usb latency"; the same in every run, for scripts
   bool ok = true;     // also when it does not apply to this machine or config
   std::string found;  // what is there, or why it does not apply
   // The line that mends it; empty if ok. A command can be pasted into a shell: words about it come

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "daemon/config/listeners.hpp"
 #include "drivers/transport/enumerate.hpp"
 #include "proto/frame/result.hpp"
 
@@ -24,13 +25,7 @@ struct Node {
   std::string group{};  // that owns the node; empty: root's own, or unknown
 };
 
-// A socket that the daemon binds.
-struct Listener {
-  std::string who;       // "publish", "stream right"
-  bool udp = false;      // else TCP
-  std::string endpoint;  // "127.0.0.1:5570", numbers only
-  bool shared = false;   // a multicast group, which several programs receive
-};
+using config::Listener;
 
 enum class ClockState : std::uint8_t { kSynchronised, kFree, kUnknown };
 

@@ -39,7 +39,8 @@ std::vector<fs::path> key_files(const config::DaemonConfig& config) {
   std::vector<fs::path> files;
   if (!config.security.server_key.empty()) files.push_back(config.security.server_key);
   const auto add = [&](const drivers::Options& options) {
-    if (const std::string key = text_option(options, "key"); !key.empty()) files.emplace_back(key);
+    if (const std::string key = config::text_option(options, "key"); !key.empty())
+      files.emplace_back(key);
   };
   for (const config::StreamConfig& stream : config.streams) add(stream.options);
   for (const config::SourceConfig& source : config.sources) add(source.options);
@@ -78,13 +79,13 @@ Check check_disk(const Machine& machine, Config config) {
   const std::string name = "disk";
   if (config == nullptr) return needs_config(name);
   if (!config->record) return right(name, "not needed: the config has no [record]");
-  if (const auto fine = config::check_folder(*config->record); !fine) {
-    return wrong(name, fine.error().text(), "set [record] folder to a name that no file has");
-  }
   const fs::path folder = existing(config->record->folder);
   if (!machine.may_write(folder)) {
     return wrong(name, "no permission to write to " + shown(folder),
                  "sudo chown " + machine.user + " " + shown(folder));
+  }
+  if (const auto fine = config::check_folder(*config->record); !fine) {
+    return wrong(name, fine.error().text(), "set [record] folder to one where files can be made");
   }
   const auto free = machine.free_bytes(folder);
   if (!free) return right(name, "the free space of " + shown(folder) + " cannot be told");

@@ -17,37 +17,10 @@ const drivers::Driver* driver_of(const std::string& name) { return drivers::find
 // Whether it is a glove on a port of this machine; an emulated one has its port elsewhere.
 bool is_glove(const config::StreamConfig& stream) {
   const drivers::Driver* driver = driver_of(stream.driver);
-  const std::string port = text_option(stream.options, "port");
+  const std::string port = config::text_option(stream.options, "port");
   return driver != nullptr && driver->glove != nullptr &&
-         text_option(stream.options, "link") != "tcp" &&
+         config::text_option(stream.options, "link") != "tcp" &&
          (port.empty() || port.starts_with("/dev/"));
-}
-
-// The address behind "tcp://", with numbers for every address of this machine ("*"). Empty if the
-// system chooses the port, or the endpoint is none of TCP.
-std::string tcp_address(std::string_view endpoint) {
-  constexpr std::string_view kTcp = "tcp://";
-  if (!endpoint.starts_with(kTcp) || endpoint.ends_with(":*") || endpoint.ends_with(":0")) {
-    return {};
-  }
-  std::string address(endpoint.substr(kTcp.size()));
-  if (address.starts_with("*:")) address.replace(0, 1, "0.0.0.0");
-  if (address.starts_with("localhost:")) address.replace(0, 9, "127.0.0.1");
-  return address;
-}
-
-// Empty where the options name no address to listen on. Those of mocap systems over TCP connect.
-Listener listener_of(const std::string& who, const drivers::Options& options) {
-  const std::string link = text_option(options, "link");
-  const bool connects = options.contains("connect") && link == "tcp";
-  const bool other_link = !link.empty() && link != "tcp" && link != "udp";
-  // A described glove may be on a serial port: then its description says so, and not its options.
-  const bool unknown_link = link.empty() && options.contains("port");
-  if (connects || other_link || unknown_link) return {};
-  return {.who = who,
-          .udp = link != "tcp",
-          .endpoint = text_option(options, "listen"),
-          .shared = !text_option(options, "group").empty()};
 }
 
 double bytes_per_s(double rate_hz, std::size_t bodies, bool frames) {
@@ -57,37 +30,8 @@ double bytes_per_s(double rate_hz, std::size_t bodies, bool frames) {
 
 }  // namespace
 
-std::string text_option(const drivers::Options& options, std::string_view name) {
-  const auto found = options.find(std::string(name));
-  if (found == options.end() || !std::holds_alternative<std::string>(found->second)) return {};
-  return std::get<std::string>(found->second);
-}
-
 bool wants_gloves(const config::DaemonConfig& config) {
   return std::ranges::any_of(config.streams, is_glove);
-}
-
-std::vector<Listener> listeners_of(const config::DaemonConfig& config) {
-  std::vector<Listener> all{{.who = "publish", .endpoint = tcp_address(config.publish_endpoint)},
-                            {.who = "control", .endpoint = tcp_address(config.control_endpoint)}};
-  if (config.trigger) {
-    all.push_back({.who = "trigger", .udp = true, .endpoint = config.trigger->listen});
-  }
-  if (config.metrics) all.push_back({.who = "metrics", .endpoint = config.metrics->listen});
-  for (const config::OutputConfig& output : config.outputs) {
-    if (output.kind != config::OutputKind::kBvh) continue;
-    all.push_back({.who = "output " + output.name, .endpoint = output.listen});
-  }
-  for (const config::StreamConfig& stream : config.streams) {
-    all.push_back(listener_of("stream " + stream.name, stream.options));
-  }
-  for (const config::SourceConfig& source : config.sources) {
-    all.push_back(listener_of("source " + source.name, source.options));
-  }
-  std::erase_if(all, [](const Listener& one) {
-    return one.endpoint.empty() || one.endpoint.ends_with(":0");
-  });
-  return all;
 }
 
 double recorded_bytes_per_s(const config::DaemonConfig& config) {

@@ -15,6 +15,12 @@ std::string refusal_words(Refusal refusal, Domain domain, const std::filesystem:
       return "hangs up: --server-key " + server_key.string() + " is not its key, or it just ended";
     case Refusal::kWantsKey:
       return "wants a key; give --key NAME.key --server-key SERVER.pub";
+    case Refusal::kHangsUpKeyless:
+      return std::string(
+                 "hangs up: it wants a key (--key NAME.key --server-key SERVER.pub), or this"
+                 " is not its ") +
+             (domain == Domain::kPublish ? "publish" : "control") +
+             " endpoint (by default 5570 publishes, 5571 takes control)";
   }
   return {};
 }

@@ -17,6 +17,12 @@ bool is_v4(const Host& host) noexcept {
   return std::equal(kMapped.begin(), kMapped.begin() + kMappedBytes, host.begin());
 }
 
+std::uint16_t port_of(const Address& address) noexcept {
+  std::uint16_t port = 0;  // at the same place for IPv4 and IPv6
+  std::memcpy(&port, reinterpret_cast<const char*>(&address.storage) + 2, sizeof port);
+  return ntohs(port);
+}
+
 std::optional<Address> parse_numbers(const std::string& host, const char* port) {
   addrinfo wish{};
   wish.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV | AI_PASSIVE;
@@ -57,6 +63,17 @@ bool is_multicast(const Host& host) noexcept {
   return is_v4(host) ? host[kMappedBytes] >> 4 == 14 : host[0] == 0xFF;
 }
 
+// On Linux the socket of [::] has IPv4's addresses, too.
+bool overlap(const Address& a, const Address& b) {
+  const Host host_a = host_of(a);
+  const Host host_b = host_of(b);
+  const auto covers = [](const Host& all, const Host& one) {
+    return all == Host{} || (all == kMapped && is_v4(one));
+  };
+  return port_of(a) == port_of(b) &&
+         (host_a == host_b || covers(host_a, host_b) || covers(host_b, host_a));
+}
+
 std::string host_text(const Address& address) {
   std::array<char, NI_MAXHOST> host{};
   const int failed = ::getnameinfo(address.get(), address.size, host.data(), host.size(), nullptr,
@@ -68,11 +85,9 @@ std::string host_text(const Address& address) {
 }
 
 std::string endpoint_text(const Address& address) {
-  std::uint16_t port = 0;  // at the same place for IPv4 and IPv6
-  std::memcpy(&port, reinterpret_cast<const char*>(&address.storage) + 2, sizeof port);
   const std::string host = host_text(address);
   const bool v6 = host.contains(':');
-  return (v6 ? "[" + host + "]" : host) + ":" + std::to_string(ntohs(port));
+  return (v6 ? "[" + host + "]" : host) + ":" + std::to_string(port_of(address));
 }
 
 Result<Address> parse_endpoint(const std::string& endpoint) {

@@ -35,6 +35,9 @@ using Host = std::array<std::uint8_t, 16>;
 [[nodiscard]] Host host_of(const Address& address) noexcept;  // RT-safe
 [[nodiscard]] bool is_loopback(const Host& host) noexcept;    // RT-safe
 [[nodiscard]] bool is_multicast(const Host& host) noexcept;
+// Whether a socket bound to one address keeps others from the other: the same port, and the same
+// host or one that stands for every address of the machine. Cold.
+[[nodiscard]] bool overlap(const Address& a, const Address& b);
 [[nodiscard]] std::string host_text(const Address& address);  // "192.168.1.20"
 [[nodiscard]] std::string endpoint_text(
     const Address& address);  // "192.168.1.20:1511", "[::1]:1511"

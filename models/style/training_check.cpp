@@ -5,9 +5,12 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <set>
+#include <string_view>
 
 #include "models/style/harmonics.hpp"
 #include "proto/frame/degree.hpp"
+#include "proto/text/nearest_word.hpp"
 
 namespace posed::style {
 namespace {
@@ -17,6 +20,9 @@ using Eigen::VectorXd;
 
 // README.md, "Verdicts", says what was measured.
 constexpr double kLeastSwing_deg = 6.0;
+
+// What a motion of strides is called, or begins with.
+constexpr std::array<std::string_view, 5> kGaits{"walk", "run", "jog", "march", "gait"};
 
 // The file name alone, for use within a sentence.
 std::string name_of(const std::string& file) {
@@ -107,6 +113,20 @@ void check_strides(const Dataset& dataset, TrainingCheck& check) {
   }
 }
 
+// A misspelt gait would pass as another motion, of which no strides are asked.
+void check_motions(const Dataset& dataset, TrainingCheck& check) {
+  std::set<std::string> motions;
+  for (const AlignedClip& clip : dataset.clips) motions.insert(clip.motion);
+  for (const std::string& motion : motions) {
+    const std::string gait = nearest(motion, {kGaits.begin(), kGaits.end()});
+    if (is_gait(motion) || gait.empty()) continue;
+    check.warnings.push_back("motion '" + motion +
+                             "' is taken for no gait, so its clips need show"
+                             " no strides; if it is one, name it '" +
+                             gait + "'");
+  }
+}
+
 void check_closing(const std::string& target, TrainingCheck& check) {
   // Two takes of one style by one actor are 1.2 to 4.4 deg rms apart, styles 9.5 and more (dataset
   // 1 and 2; the table is in README.md, "Verdicts").
@@ -146,7 +166,6 @@ double cycle_residual_deg(const Dataset& dataset, const AlignedClip& clip) {
 bool shows_strides(const AlignedClip& clip) { return clip.has_legs && no_strides(clip).empty(); }
 
 bool is_gait(std::string_view motion) {
-  constexpr std::array<std::string_view, 5> kGaits{"walk", "run", "jog", "march", "gait"};
   return std::ranges::any_of(kGaits,
                              [&](std::string_view gait) { return motion.starts_with(gait); });
 }
@@ -171,6 +190,7 @@ TrainingCheck check_training(const Dataset& dataset, const std::string& target, 
   check.way = way;
   check.closing_by = closing_by;
   measure_cycles(dataset, target, check);
+  check_motions(dataset, check);
   check_strides(dataset, check);
   check_closing(target, check);
   return check;

@@ -21,6 +21,7 @@ Result<ClipFiles> load_files(const std::filesystem::path& path, const ReadOption
   } else if (extension == ".csv") {
     files.kind = ClipKind::kHandCsv;
   } else if (extension != ".bvh") {
+    if (!std::filesystem::exists(path)) return fail("is not there; check the path", files.name);
     return fail("is no clip posed can read; a clip ends in .bvh, .amc or .csv", files.name);
   }
   auto text = load_file(path, kClip);

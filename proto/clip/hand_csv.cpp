@@ -14,6 +14,7 @@ namespace posed::clip {
 namespace {
 
 constexpr double kSameTime_s = 1e-6;  // times closer than this count as the same
+constexpr double kSlowest_hz = 1.0;   // slower times are counted in another unit
 constexpr double kEven = 0.01;        // relative difference below which steps count as equal
 
 // Column names without the time column: thumb1_x_rad ... little3_z_rad.
@@ -148,6 +149,13 @@ Result<> settle_times(const Draft& draft, const std::string& name, std::vector<d
                        " frames have no time of their own; " +
                        (steps_s.empty() ? "played at " + number_text(rate_hz) + " Hz"
                                         : std::string("placed between the others")));
+  }
+  if (rate_hz < kSlowest_hz) {
+    return fail("its times are " + number_text(1.0 / rate_hz) +
+                    " s apart, which is no recording"
+                    " of a hand; time_s counts seconds, so divide the times by 1000 if they are"
+                    " milliseconds",
+                name, draft.frames.front().line);
   }
   interpolate(time_s, 1.0 / rate_hz);
   return {};

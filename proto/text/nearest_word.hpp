@@ -8,7 +8,8 @@
 namespace posed {
 
 // Returns the entry of `known` that `word` most likely means: the nearest by edit distance, if at
-// most one letter plus a quarter of its letters differ; otherwise empty.
+// most one letter plus a quarter of its letters differ; otherwise empty. Two swapped letters count
+// as one.
 [[nodiscard]] std::string nearest(std::string_view word, const std::set<std::string>& known);
 
 // All words of a range with `separator` between them.

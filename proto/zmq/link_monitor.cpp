@@ -8,9 +8,9 @@ namespace posed::net {
 namespace {
 
 // A secured daemon may close the connection to a client without a key before the client has read
-// the ZMTP greeting; libzmq then reports no reason. So the client concludes that it was refused
-// only after it was closed on this many times in a row; a daemon that is merely ending is not there
-// for a second try.
+// the ZMTP greeting, and whoever has a socket of another kind closes it as well; libzmq then
+// reports no reason. So the client concludes that it was refused only after it was closed on this
+// many times in a row; a daemon that is merely ending is not there for a second try.
 constexpr int kHangUps = 3;
 
 constexpr int kEvents = ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH |
@@ -62,7 +62,7 @@ Refusal LinkMonitor::take_news() {
         return with_key_ ? Refusal::kTalksNoKeys : Refusal::kWantsKey;
       case ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL:
         if (with_key_) return Refusal::kHangsUp;
-        if (++hang_ups_ == kHangUps) return Refusal::kWantsKey;
+        if (++hang_ups_ == kHangUps) return Refusal::kHangsUpKeyless;
         break;
       default:
         break;

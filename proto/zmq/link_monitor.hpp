@@ -12,10 +12,11 @@ namespace posed::net {
 // Why a daemon admits a client never, as far as the connection shows.
 enum class Refusal : std::uint8_t {
   kNone,
-  kKeyNotAllowed,  // the key is not on the daemon's list, or lacks the right
-  kTalksNoKeys,    // the daemon uses no keys, or is something else
-  kHangsUp,        // the server's key is not the daemon's, or the daemon just ended
-  kWantsKey,       // the daemon uses keys, and this client none
+  kKeyNotAllowed,   // the key is not on the daemon's list, or lacks the right
+  kTalksNoKeys,     // the daemon uses no keys, or is something else
+  kHangsUp,         // the server's key is not the daemon's, or the daemon just ended
+  kWantsKey,        // the daemon uses keys, and this client none
+  kHangsUpKeyless,  // the same, or the socket is of another kind, as that of control is
 };
 
 class LinkMonitor {

@@ -145,6 +145,18 @@ TEST_CASE("check reports what a config would run, or everything that is wrong wi
   CHECK(has(gone.err, "one.style"));
 }
 
+TEST_CASE("check refuses a folder in which no recording can be made") {
+  const Served served;
+  const auto config = served.path("posed.toml");
+  std::ifstream file(config);
+  const auto lines = std::count(std::istreambuf_iterator<char>(file), {}, '\n');
+  std::ofstream(config, std::ios::app) << "[record]\nfolder = \"/proc/takes\"\n";
+  const auto refused = posed({"check", "--config", config});
+  CHECK(refused.code == 1);
+  CHECK(has(refused.err, config + ":" + std::to_string(lines + 2) +
+                             ": nothing can be made in /proc (No such file or directory)"));
+}
+
 TEST_CASE("check tells where the daemon would record and who may trigger takes") {
   const Served served;
   const auto config = served.path("posed.toml");

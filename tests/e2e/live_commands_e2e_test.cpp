@@ -2,6 +2,7 @@
 // of a replay, of the file that was written, and of what they wait for.
 #include <catch2/catch.hpp>
 
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <filesystem>
@@ -84,6 +85,18 @@ TEST_CASE("a daemon that is gone is not shown as live") {
     one->send(SIGTERM);
     CHECK(one->exit_code() == 0);
   }
+}
+
+TEST_CASE("monitor gives up a stream that does not come") {
+  Served served("[[stream]]\nname = \"right\"\ndriver = \"cyberglove\"\nport = \"/dev/none\"\n");
+  served.start();
+  const auto late =
+      posed({"monitor", "--connect", served.publish, "--stream", "right", "--timeout", "2"});
+  CHECK(late.code == 1);
+  CHECK(has(late.err, "nothing of pose/right came in 2 s (--timeout)"));
+  const auto there = posed({"monitor", "--connect", served.publish, "--stream", "walker", "--count",
+                            "300", "--timeout", "2"});
+  CHECK(there.code == 0);
 }
 
 TEST_CASE("commands that wait for a daemon report what they wait for") {
@@ -248,6 +261,33 @@ TEST_CASE("each command explains its own options, and refuses those without an e
   CHECK(posed({"emulate", "lucidgloves", "--stream", "right"}).code == 2);
   CHECK(posed({"emulate", "lucidgloves", "--seed", "3", "--seconds", "1"}).code == 2);
   CHECK(posed({"run", "--config", "none.toml", "--seconds", "-1"}).code == 2);
+  for (const auto& [device, way, advice] :
+       {std::array{"cyberglove", "--udp", "give --link PATH or --tcp HOST:PORT"},
+        std::array{"natnet", "--tcp", "give --udp IP:PORT"},
+        std::array{"posed", "--udp", "give --publish ENDPOINT"}}) {
+    const auto unheard = posed({"emulate", device, way, "127.0.0.1:9", "--seconds", "0.1"});
+    CHECK(unheard.code == 2);
+    CHECK(has(unheard.err, std::string("posed does not listen for ") + device + " over " + way));
+    CHECK(has(unheard.err, advice));
+  }
+  const auto mistyped = [](std::vector<std::string> words, const std::string& sentence) {
+    const auto refused = posed(std::move(words));
+    INFO(refused.err);
+    return refused.code == 2 && has(refused.err, sentence);
+  };
+  CHECK(
+      mistyped({"view", "--port", "99999"}, "--port: '99999' should be a number from 0 to 65535"));
+  CHECK(mistyped({"emulate", "cyberglove", "--fault", "drop:0.1", "--seed", "-1"},
+                 "--seed: '-1' should be a whole number of 0 or more"));
+  CHECK(mistyped({"calibrate", "--driver", "cyberglove", "--user", "", "--out", "c.toml"},
+                 "--user is empty; name whose hand it is"));
+  const auto missing = posed({"convert", "nope"});
+  CHECK(missing.code == 1);
+  CHECK(has(missing.err, "nope: is not there; check the path"));
+  CHECK(mistyped({"monito"}, "there is no command 'monito'; the nearest is monitor"));
+  CHECK(mistyped({"ctl", "--connect", kNobody, "sett"}, "the nearest is set"));
+  CHECK(
+      mistyped({"train", "style", "--form", "a.bvh"}, "no option '--form'; the nearest is --from"));
   const TempFolder folder;
   const auto mine = folder.write("mine", "precious");
   const auto link = folder.path() / "link";

@@ -59,7 +59,7 @@ TEST_CASE("render draws a clip as a strip, as a pose and refuses what it cannot 
   refused("no.mp4", {}, "add --video");
   refused("no.svg", {"--video"}, "a video is an .mp4");
   refused("no.svg", {"--raw-beside"}, "is a clip");
-  refused("no.svg", {"--from", "7"}, "has no frame from 7");
+  refused("no.svg", {"--from", "7"}, "has no frame from 7 s on; it lasts ");
   refused("strip.svg", {}, "--overwrite");
 }
 

@@ -71,6 +71,8 @@ TEST_CASE("several logs are compared at once, each as it is alone", "[farm]") {
     if (alone[i].is_null()) continue;
     CHECK(found[i]["frames"] == alone[i]["frames"]);
     CHECK(found[i]["compared"] == alone[i]["compared"]);
+    for (const auto& [key, value] : alone[i].items()) CHECK(found[i].contains(key));
+    CHECK(found[i].size() == alone[i].size());
   }
 }
 

@@ -242,6 +242,25 @@ TEST_CASE("train, apply and eval end in a verdict; all degrees rms are one figur
   CHECK(has(nothing.err, "no better than nothing"));
 }
 
+TEST_CASE("apply says that it changed nothing, and eval mixes styles as apply tells", "[apply]") {
+  const WalkerStudio studio;
+  REQUIRE(studio.march_to_sway().code == 0);
+  const auto apply = [&](const std::string& alpha) {
+    return posed({"apply", "--model", studio.path("m.style"), "--alpha", alpha, "--overwrite",
+                  studio.path("march_2.bvh"), "--out", studio.path("out.bvh"), "--json"});
+  };
+  const auto none = apply("0");
+  CHECK(none.code == 0);
+  CHECK(has(none.err, "warning: no joint was changed, because --alpha is 0"));
+  CHECK(json::parse(none.out)["unchanged"] == "no joint was changed, because --alpha is 0");
+  const auto some = apply("1");
+  CHECK_FALSE(has(some.err, "no joint was changed"));
+  CHECK(json::parse(some.out)["unchanged"].is_null());
+  const auto judged = studio.eval("march_2.bvh", "sway_2.bvh");
+  CHECK(json::parse(judged.out)["weights"] == json::parse(some.out)["weights"]);
+  CHECK(json::parse(judged.out)["weights"].is_object());
+}
+
 TEST_CASE("apply --gate stands anywhere, alone or with on or off", "[apply]") {
   const WalkerStudio studio;
   REQUIRE(studio.march_to_sway().code == 0);

@@ -205,6 +205,9 @@ Result<CalibrationFile> from_file(const CalibrateOptions& options) {
 
 // Checked before the user goes through the poses. An option that would have no effect is refused.
 Result<> check_options(const CalibrateOptions& options) {
+  if (options.user.empty()) {
+    return misuse("--user is empty; name whose hand it is, as in --user ann");
+  }
   if (!options.live && !options.stream.empty()) return misuse("--stream also needs --connect");
   const bool timed = options.seconds > 0.0;
   if (!options.import.empty() && (timed || !options.poses.empty())) {

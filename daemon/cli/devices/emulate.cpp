@@ -1,5 +1,6 @@
 // `posed emulate`: emulates a device for any program that expects one.
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cstdio>
 #include <filesystem>
@@ -42,13 +43,18 @@ struct EmulateOptions {
   std::optional<double> seconds;
 };
 
+// What is emulated, and the driver that hears it.
+struct Emulated {
+  std::unique_ptr<drivers::Emulator> emulator;
+  const drivers::Driver* driver = nullptr;
+};
+
 // The motion of an emulated hand: a clip, or gestures of a synthetic person. Bodies perform a clip
 // or move by themselves.
-Result<emulate::Motion> motion(const EmulateOptions& options, const drivers::Emulator& emulator) {
-  const drivers::Driver* driver = drivers::find_driver(options.what);
-  if (driver != nullptr && driver->glove == nullptr) {
+Result<emulate::Motion> motion(const EmulateOptions& options, const Emulated& emulated) {
+  if (emulated.driver == nullptr || emulated.driver->glove == nullptr) {
     if (options.clip.empty()) return emulate::Motion();
-    return emulate::clip_motion(options.clip, emulator);
+    return emulate::clip_motion(options.clip, *emulated.emulator);
   }
   auto clip = std::make_shared<clip::HandClip>();
   if (!options.clip.empty()) {
@@ -80,20 +86,22 @@ Result<std::unique_ptr<drivers::Emulator>> make_emulator(const std::string& name
   return driver->emulate(*options);
 }
 
-Result<std::unique_ptr<drivers::Emulator>> open_emulator(const EmulateOptions& options) {
+Result<Emulated> open_emulator(const EmulateOptions& options) {
   if (!std::filesystem::is_regular_file(options.what)) {
     if (!options.stream.empty()) {
       return misuse("--stream chooses from a log's streams; '" + options.what + "' is not a log");
     }
-    return make_emulator(options.what, options.set);
+    auto made = make_emulator(options.what, options.set);
+    if (!made) return std::unexpected(made.error());
+    return Emulated{.emulator = std::move(*made), .driver = drivers::find_driver(options.what)};
   }
   if (!options.clip.empty()) return misuse("a log has its own motion: leave out --clip");
   const std::size_t addresses = std::max<std::size_t>(options.udp.size(), 1);
   auto device = emulate::read_logged_device(options.what, options.stream, addresses);
   if (!device) return std::unexpected(device.error());
   std::unique_ptr<drivers::Emulator> speaker;
-  if (const auto* driver = drivers::find_driver(device->driver);
-      driver != nullptr && driver->emulate != nullptr) {
+  const drivers::Driver* driver = drivers::find_driver(device->driver);
+  if (driver != nullptr && driver->emulate != nullptr) {
     auto made = make_emulator(device->driver, options.set);
     if (!made) return std::unexpected(made.error());
     speaker = std::move(*made);
@@ -101,18 +109,55 @@ Result<std::unique_ptr<drivers::Emulator>> open_emulator(const EmulateOptions& o
     return misuse("the log's device (driver '" + device->driver +
                   "') takes no options: leave out --set");
   }
-  return std::make_unique<emulate::LogEmulator>(std::move(device->recording), std::move(speaker));
+  return Emulated{.emulator = std::make_unique<emulate::LogEmulator>(std::move(device->recording),
+                                                                     std::move(speaker)),
+                  .driver = driver};
 }
 
 // The address that a device over UDP sends to when --udp does not say: where posed listens.
-std::optional<std::string> default_udp(const EmulateOptions& options) {
-  const drivers::Driver* driver = drivers::find_driver(options.what);
-  if (driver == nullptr) return std::nullopt;
+std::optional<std::string> default_udp(const EmulateOptions& options,
+                                       const drivers::Driver* driver) {
+  if (driver == nullptr || driver->make_layout == nullptr) return std::nullopt;
   const auto set = parse_driver_options(*driver, options.set);
   if (!set) return std::nullopt;
   const auto listen = set->find("listen");
-  if (listen == set->end() || set->contains("port")) return std::nullopt;
+  if (listen == set->end()) return std::nullopt;
   return std::get<std::string>(listen->second);
+}
+
+// Refuses a way on which the driver would never hear the device. A device with one body is on a
+// port, or connects where its driver has a socket to listen on; one with several sends datagrams,
+// or a stream of bytes where its driver has the option `link`; another posed publishes.
+Result<> check_way(const EmulateOptions& options, const drivers::Driver* driver) {
+  if (driver == nullptr || driver->emulate == nullptr) return {};  // a log of another version
+  const auto has = [&](std::string_view option) {
+    return std::ranges::find(driver->options, option, &drivers::OptionSpec::name) !=
+           driver->options.end();
+  };
+  const bool bodies = driver->make_layout != nullptr;
+  struct Way {
+    std::string_view words;
+    bool chosen, heard;
+  };
+  const std::array ways{
+      Way{"--link PATH", options.pty || !options.link.empty(), !bodies},
+      Way{"--tcp HOST:PORT", !options.tcp.empty(), has("listen") && (!bodies || has("link"))},
+      Way{"--listen IP:PORT", !options.listen.empty(), has("link") && has("connect")},
+      Way{"--udp IP:PORT", !options.udp.empty(), bodies && has("listen")},
+      Way{"--publish ENDPOINT", !options.publish.empty(), bodies && !has("listen")}};
+  std::string heard;
+  for (const Way& way : ways) {
+    if (way.heard) heard += (heard.empty() ? "" : " or ") + std::string(way.words);
+  }
+  for (const Way& way : ways) {
+    if (!way.chosen || way.heard) continue;
+    return misuse(fmt::format("posed does not listen for {} over {}; give {}", driver->name,
+                              way.words.substr(0, way.words.find(' ')), heard));
+  }
+  const bool publishes = ways.back().heard && options.publish.empty();
+  if (publishes)
+    return misuse(fmt::format("{} is heard over ZeroMQ; give {}", driver->name, heard));
+  return {};
 }
 
 // What other machines can reach needs --insecure, and only that may have it.
@@ -132,9 +177,8 @@ Result<> check_reach(const EmulateOptions& options) {
                 ", or say --insecure");
 }
 
-Result<emulate::EmulatedPort> open_port(const EmulateOptions& options,
-                                        const drivers::Emulator& emulator) {
-  const auto ports = emulator.ports();
+Result<emulate::EmulatedPort> open_port(const EmulateOptions& options, const Emulated& emulated) {
+  const auto ports = emulated.emulator->ports();
   if (ports.size() > std::max<std::size_t>(options.udp.size(), 1)) {
     return misuse("this device sends to " + std::to_string(ports.size()) +
                   " sockets of the host; name one address for each with --udp, in their order");
@@ -143,7 +187,7 @@ Result<emulate::EmulatedPort> open_port(const EmulateOptions& options,
   if (!options.tcp.empty()) return emulate::EmulatedPort::connect_tcp(options.tcp);
   if (!options.listen.empty()) return emulate::EmulatedPort::listen_tcp(options.listen);
   if (!options.publish.empty()) return emulate::EmulatedPort::publish(options.publish);
-  if (const auto to = default_udp(options); to && !options.pty && options.link.empty()) {
+  if (const auto to = default_udp(options, emulated.driver); to) {
     return emulate::EmulatedPort::open_udp({*to});
   }
   return emulate::EmulatedPort::open_pty(options.link);
@@ -152,21 +196,22 @@ Result<emulate::EmulatedPort> open_port(const EmulateOptions& options,
 Result<> emulate(const EmulateOptions& options) {
   const Interrupt interrupt;
   if (const auto ok = check_reach(options); !ok) return ok;
-  auto emulator = open_emulator(options);
-  if (!emulator) return std::unexpected(emulator.error());
+  auto emulated = open_emulator(options);
+  if (!emulated) return std::unexpected(emulated.error());
+  if (const auto ok = check_way(options, emulated->driver); !ok) return ok;
   emulate::EmulatedDevice::Settings settings{.speed = options.speed};
   for (const std::string& word : options.faults) {
     const auto fault = drivers::emulate::parse_fault(word);
     if (!fault) return std::unexpected(fault.error());
     settings.faults.emplace_back(*fault, options.seed + settings.faults.size());
   }
-  auto moves = motion(options, **emulator);
+  auto moves = motion(options, *emulated);
   if (!moves) return std::unexpected(moves.error());
-  auto port = open_port(options, **emulator);
+  auto port = open_port(options, *emulated);
   if (!port) return std::unexpected(port.error());
   const nlohmann::ordered_json ready{
       {"port", options.link.empty() ? port->name() : options.link.string()}};
-  emulate::EmulatedDevice device(std::move(*emulator), std::move(*port), std::move(*moves),
+  emulate::EmulatedDevice device(std::move(emulated->emulator), std::move(*port), std::move(*moves),
                                  std::move(settings));
   std::printf("%s\n", json_text(ready).c_str());
   std::fflush(stdout);
@@ -232,6 +277,7 @@ void add_emulate(CLI::App& app, int& exit_code) {
                     ->type_name("KIND:RATE");
   command->add_option("--seed", options->seed, "Of the faults: the same seed gives the same faults")
       ->needs(fault)
+      ->check(whole_number())
       ->capture_default_str();
   command->add_option("--stream", options->stream, "Which stream of the log")->type_name("NAME");
   command->add_option("--seconds", options->seconds, "End after so many seconds")

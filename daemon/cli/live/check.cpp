@@ -222,7 +222,11 @@ int check(const CheckOptions& options) {
       sources.push_back(summary_of(source));
     }
     if (const auto& record = reading.config.record) {
-      if (auto fine = config::check_folder(*record); !fine) reading.errors.push_back(fine.error());
+      if (auto fine = config::check_folder(*record); !fine) {
+        reading.errors.push_back({.message = fine.error().message,
+                                  .file = options.config.string(),
+                                  .line = record->line});
+      }
     }
   }
   ordered_json outputs = ordered_json::array();

@@ -83,6 +83,10 @@ class Monitor {
     while (!Interrupt::came() && !finished_) {
       if (auto refused = connection_.refusal()) return std::unexpected(*refused);
       if (auto given_up = watch_.report()) return std::unexpected(*given_up);
+      if (stream_is_late()) {
+        return fail(fmt::format("{} answers, but nothing of {} came in {} s (--timeout)",
+                                options_.client.endpoint, asked_.front(), options_.timeout_s));
+      }
       if (connection_.wait(kLookAround)) {
         if (auto taken = take(); !taken) return taken;
       } else {
@@ -143,6 +147,14 @@ class Monitor {
     return {};
   }
 
+  // A stream that was named and has not sent anything yet. Events may be rare for good.
+  [[nodiscard]] bool stream_is_late() const {
+    return options_.timeout_s > 0.0 && !options_.stream.empty() && options_.topic != "event" &&
+           looked_ && shown_ == 0 &&
+           std::chrono::steady_clock::now() - start_ >=
+               std::chrono::duration<double>(options_.timeout_s);
+  }
+
   void report_quiet_topic() {
     if (quiet_topic_reported_ || shown_ > 0 || !looked_) return;
     if (std::chrono::steady_clock::now() - start_ < kPatience) return;
@@ -196,7 +208,8 @@ The quality is measured, predicted (computed for a moment without a measurement)
 measurement again), stale (the source is silent) or performed (made from labels). The latency runs
 from arrival in the daemon to its publishing; a replay as fast as possible has none. A reader too
 slow for the stream misses frames; it never sees old ones. A daemon that falls silent is reported on
-stderr. With --count the exit code is 1 unless so many came.)");
+stderr. With --count the exit code is 1 unless so many came. --timeout looks at the daemon, and at
+the stream named with --stream until it first comes.)");
   command->callback([options, &exit_code] {
     if (auto done = watch(*options); !done) exit_code = report(done.error());
   });

@@ -1,6 +1,8 @@
 // `posed view`: serves the page that shows a running daemon in a browser.
 
+#include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <string>
 
@@ -14,6 +16,7 @@
 #include "daemon/cli/live/client.hpp"
 #include "daemon/cli/live/page.hpp"
 #include "daemon/cli/live/serve.hpp"
+#include "daemon/cli/number_range.hpp"
 #include "daemon/logging/log_output.hpp"
 #include "daemon/view/bridge.hpp"
 #include "proto/text/clean.hpp"
@@ -112,7 +115,8 @@ void add_view(CLI::App& app, int& exit_code) {
                    fmt::format("TCP port of the page; 0: any free one (default: {}, or any free"
                                " one if that is in use)",
                                view::kUsualPort))
-      ->type_name("PORT");
+      ->type_name("PORT")
+      ->check(in_range(0, std::numeric_limits<std::uint16_t>::max()));
   command
       ->add_option("--bind", options->address,
                    "Address of the page; others than 127.0.0.1 let"

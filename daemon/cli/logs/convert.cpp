@@ -154,6 +154,9 @@ int run(Convert& convert) {
     if (is_log(convert.in)) return list_takes(convert.in, convert.json);
     return report(misuse("is not a device log (.plog), so it has no takes", convert.in).error());
   }
+  if (!std::filesystem::exists(convert.in)) {
+    return report(fail("is not there; check the path", convert.in).error());
+  }
   if (convert.out.empty()) {
     return report(misuse("say what to write: --out OUT.bvh", convert.in).error());
   }

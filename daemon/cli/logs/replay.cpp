@@ -19,6 +19,7 @@
 #include "daemon/cli/live/client.hpp"
 #include "daemon/cli/logs/missing_from_log.hpp"
 #include "daemon/cli/logs/replay_farm.hpp"
+#include "daemon/cli/logs/replay_outcome.hpp"
 #include "daemon/cli/logs/replay_outputs.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
@@ -129,33 +130,32 @@ std::vector<std::string> stream_names(const log::Reader& reader) {
   return names;
 }
 
-void print_summary(const ReplayOptions& options, const ReplayOutputs& outputs, double took_s) {
-  nlohmann::ordered_json line{{"frames", outputs.frames},
-                              {"raw_frames", outputs.raw_frames},
-                              {"isa", gp::isa_name()},
-                              {"took_s", took_s}};
-  if (outputs.expectation) {
-    const auto& counts = outputs.expectation->counts();
-    line["compared"] = counts.compared;
-    line["lost"] = counts.lost;
-    line["after_gap"] = counts.after_gap;
-    line["past_end"] = counts.past_end;
-    if (const std::string rest = counts.not_compared(); !rest.empty()) {
+void print_summary(const ReplayOptions& options, const ReplayOutcome& outcome) {
+  if (options.expect) {
+    if (const std::string rest = outcome.counts.not_compared(); !rest.empty()) {
       spdlog::warn("not compared: {}", rest);
     }
-    spdlog::info("{} frames are as published, bit for bit", counts.compared);
+    spdlog::info("{} frames are as published, bit for bit", outcome.counts.compared);
   }
-  if (options.json) {
-    std::printf("%s\n", json_text(line).c_str());
-  } else {
-    const std::string raw =
-        outputs.raw_frames == 0
-            ? ""
-            : fmt::format(" ({} and {} raw ones)", outputs.frames - outputs.raw_frames,
-                          outputs.raw_frames);
-    spdlog::info("{} frames{} replayed in {:.1f} s on {}", outputs.frames, raw, took_s,
-                 gp::isa_name());
-  }
+  if (options.json) return;
+  const std::string raw = outcome.raw_frames == 0 ? ""
+                                                  : fmt::format(" ({} and {} raw ones)",
+                                                                outcome.frames - outcome.raw_frames,
+                                                                outcome.raw_frames);
+  spdlog::info("{} frames{} replayed in {:.1f} s on {}", outcome.frames, raw, outcome.took_s,
+               outcome.isa);
+}
+
+// A log that was compared has the same keys as one of several, also where it differs.
+void print_json(const ReplayOptions& options, const std::string& recorded,
+                const ReplayOutcome& outcome) {
+  nlohmann::ordered_json line{{"frames", outcome.frames},
+                              {"raw_frames", outcome.raw_frames},
+                              {"isa", outcome.isa},
+                              {"took_s", outcome.took_s}};
+  if (options.expect) line = json_of(options.log, recorded, outcome);
+  std::printf("%s\n", json_text(line).c_str());
+  std::fflush(stdout);
 }
 
 Result<> open_outputs(const ReplayOptions& options, double speed, const log::Reader& reader,
@@ -217,7 +217,8 @@ Result<> replay(const ReplayOptions& options) {
   auto opened = replay::Replay::open(*reader);
   if (!opened) return std::unexpected(opened.error());
   replay::Replay& replay = **opened;
-  for (const std::string& missing : missing_from(*reader, replay)) spdlog::warn("{}", missing);
+  ReplayOutcome outcome{.missing = missing_from(*reader, replay)};
+  for (const std::string& missing : outcome.missing) spdlog::warn("{}", missing);
   ReplayOutputs outputs(replay);
   if (auto done = open_outputs(options, *speed, *reader, replay, outputs); !done) return done;
   const auto extent = reader->extent();
@@ -235,10 +236,16 @@ Result<> replay(const ReplayOptions& options) {
     return true;
   };
   auto done = replay.run([&](const pipeline::Item& item) { outputs.take(item); }, pace);
-  if (!done) return done;
-  if (Interrupt::came()) return ended_early(options, outputs);
-  done = outputs.finish();
-  if (done) print_summary(options, outputs, progress.elapsed_s());
+  if (done && Interrupt::came()) return ended_early(options, outputs);
+  if (done) done = outputs.finish();
+  outcome.frames = outputs.frames;
+  outcome.raw_frames = outputs.raw_frames;
+  if (outputs.expectation) outcome.counts = outputs.expectation->counts();
+  outcome.isa = gp::isa_name();
+  if (!done) outcome.problem = done.error().text();
+  outcome.took_s = progress.elapsed_s();
+  if (options.json && (done || options.expect)) print_json(options, recorded_isa(*reader), outcome);
+  if (done) print_summary(options, outcome);
   return done;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <cstdio>
 #include <map>
@@ -10,10 +11,10 @@
 
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
-#include <nlohmann/json.hpp>
 
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/logs/missing_from_log.hpp"
+#include "daemon/cli/logs/replay_outcome.hpp"
 #include "daemon/cli/logs/replay_outputs.hpp"
 #include "daemon/cli/models/thread_tasks.hpp"
 #include "daemon/cli/progress.hpp"
@@ -30,15 +31,6 @@ namespace {
 struct FarmLog {
   std::string path, recorded_isa = "auto";
   std::int64_t first_ns = 0, length_ns = 0;
-};
-
-// What became of it.
-struct Outcome {
-  std::uint64_t frames = 0;
-  replay::Expectation::Counts counts;
-  std::string isa;      // on which it was replayed
-  std::string problem;  // empty: all as published
-  std::vector<std::string> missing;
 };
 
 // The whole farm's progress, and whether to go on; shared by the threads.
@@ -61,7 +53,7 @@ FarmLog look_at(const std::string& path) {
 }
 
 // Compares until `together` asks to stop.
-Result<> compare(const FarmLog& log, Together& together, Outcome& outcome) {
+Result<> compare(const FarmLog& log, Together& together, ReplayOutcome& outcome) {
   auto reader = log::Reader::open(log.path);
   if (!reader) return std::unexpected(reader.error());
   auto opened = replay::Replay::open(*reader);
@@ -85,31 +77,36 @@ Result<> compare(const FarmLog& log, Together& together, Outcome& outcome) {
   if (done) done = outputs.finish();
   together.replayed_ns += log.length_ns - told_ns;
   outcome.frames = outputs.frames;
+  outcome.raw_frames = outputs.raw_frames;
   outcome.counts = outputs.expectation->counts();
   return done;
 }
 
 // An outcome as a task's numbers, and back.
-TaskResult numbers_of(const Outcome& outcome) {
+TaskResult numbers_of(const ReplayOutcome& outcome) {
   NumberWriter numbers;
-  for (const auto count : {outcome.frames, outcome.counts.compared, outcome.counts.lost,
-                           outcome.counts.after_gap, outcome.counts.past_end}) {
+  for (const auto count :
+       {outcome.frames, outcome.raw_frames, outcome.counts.compared, outcome.counts.lost,
+        outcome.counts.after_gap, outcome.counts.past_end}) {
     numbers.add(static_cast<double>(count));
   }
+  numbers.add(outcome.took_s);
   numbers.add(outcome.problem);
   for (const std::string& missing : outcome.missing) numbers.add(missing);
   return numbers.take();
 }
 
-Outcome outcome_of(const TaskResult& numbers) {
+ReplayOutcome outcome_of(const TaskResult& numbers) {
   NumberReader reader(numbers);
   const auto count = [&] { return static_cast<std::uint64_t>(reader.number()); };
-  Outcome outcome;
+  ReplayOutcome outcome;
   outcome.frames = count();
+  outcome.raw_frames = count();
   outcome.counts.compared = count();
   outcome.counts.lost = count();
   outcome.counts.after_gap = count();
   outcome.counts.past_end = count();
+  outcome.took_s = reader.number();
   outcome.problem = reader.text();
   while (!reader.at_end()) outcome.missing.push_back(reader.text());
   outcome.isa = gp::isa_name();
@@ -126,19 +123,23 @@ std::map<std::string, std::vector<std::size_t>> groups_of(const std::vector<Farm
   return groups;
 }
 
-Result<std::vector<Outcome>> replay_all(const std::vector<FarmLog>& logs, const std::string& isa) {
+Result<std::vector<ReplayOutcome>> replay_all(const std::vector<FarmLog>& logs,
+                                              const std::string& isa) {
   ProgressBar bar(kQuietFor_s);
   ThreadTasks tasks;
   Together together;
   std::int64_t length_ns = 1;  // never 0
   for (const FarmLog& log : logs) length_ns += log.length_ns;
-  std::vector<Outcome> outcomes(logs.size());
+  std::vector<ReplayOutcome> outcomes(logs.size());
   std::size_t before = 0;  // logs of the groups that are done
   for (const auto& [recorded, members] : groups_of(logs, isa)) {
     if (auto set = set_isa_or(isa, recorded); !set) return std::unexpected(set.error());
     const Task task = [&](std::size_t i) {
-      Outcome outcome;
+      ReplayOutcome outcome;
+      const auto start = std::chrono::steady_clock::now();
       const auto done = compare(logs[members[i]], together, outcome);
+      outcome.took_s =
+          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       if (!done) outcome.problem = done.error().text();
       return numbers_of(outcome);
     };
@@ -156,7 +157,7 @@ Result<std::vector<Outcome>> replay_all(const std::vector<FarmLog>& logs, const 
   return outcomes;
 }
 
-std::string what_happened(const FarmLog& log, const Outcome& outcome) {
+std::string what_happened(const FarmLog& log, const ReplayOutcome& outcome) {
   std::string text = outcome.problem;
   if (text.empty()) {
     text = fmt::format("{}: {} frames are as published", log.path, outcome.counts.compared);
@@ -170,21 +171,6 @@ std::string what_happened(const FarmLog& log, const Outcome& outcome) {
   return text;
 }
 
-nlohmann::ordered_json json_of(const FarmLog& log, const Outcome& outcome) {
-  nlohmann::ordered_json line{{"log", log.path},
-                              {"same", outcome.problem.empty()},
-                              {"frames", outcome.frames},
-                              {"compared", outcome.counts.compared},
-                              {"lost", outcome.counts.lost},
-                              {"after_gap", outcome.counts.after_gap},
-                              {"past_end", outcome.counts.past_end},
-                              {"isa", outcome.isa},
-                              {"recorded_isa", log.recorded_isa},
-                              {"missing", outcome.missing}};
-  if (!outcome.problem.empty()) line["problem"] = outcome.problem;
-  return line;
-}
-
 }  // namespace
 
 int replay_farm(const FarmOptions& options) {
@@ -196,14 +182,15 @@ int replay_farm(const FarmOptions& options) {
   std::size_t differ = 0;
   replay::Expectation::Counts all;
   for (std::size_t i = 0; i < logs.size(); ++i) {
-    const Outcome& outcome = (*outcomes)[i];
+    const ReplayOutcome& outcome = (*outcomes)[i];
     differ += outcome.problem.empty() ? 0 : 1;
     all += outcome.counts;
     for (const std::string& missing : outcome.missing) {
       if (!options.json) spdlog::warn("{}: {}", logs[i].path, missing);
     }
-    const std::string line =
-        options.json ? json_text(json_of(logs[i], outcome)) : what_happened(logs[i], outcome);
+    const std::string line = options.json
+                                 ? json_text(json_of(logs[i].path, logs[i].recorded_isa, outcome))
+                                 : what_happened(logs[i], outcome);
     std::printf("%s\n", line.c_str());
   }
   std::fflush(stdout);

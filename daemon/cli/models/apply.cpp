@@ -15,6 +15,7 @@
 #include "daemon/cli/cli.hpp"
 #include "daemon/cli/degrees.hpp"
 #include "daemon/cli/models/root_option.hpp"
+#include "daemon/cli/models/shares_json.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "models/style/apply.hpp"
@@ -83,12 +84,22 @@ double training_difference_deg(const style::StyleModel& model) {
   return report.is_object() ? report.value("difference_deg", 0.0) : 0.0;
 }
 
-// {"feminine": 0.6, "elderly": 0.4}
-nlohmann::json shares_json(const style::StyleModel& model, const style::Shares& shares) {
-  nlohmann::json json = nlohmann::json::object();
-  const std::vector<std::string> names = model.names();
-  for (std::size_t s = 0; s < names.size(); ++s) json[names[s]] = shares.of[s];
-  return json;
+// Why the clip came out as it went in; empty where it did not.
+std::string unchanged(const ApplyArguments& options, const style::Applied& applied) {
+  constexpr double kClosed = 0.01;  // of the gate, on average
+  if (applied.joints_changed > 0) return {};
+  const style::FilterOptions& filter = options.apply.filter;
+  std::string why;
+  if (!filter.auto_alpha && filter.alpha == 0.0) {
+    why = ", because --alpha is 0";
+  } else if (applied.gate_mean.value_or(1.0) < kClosed) {
+    why = ", because the model does not know this motion; --gate off styles it all the same";
+  } else if (filter.auto_alpha) {
+    why = ", because the walker shows the style already";
+  } else if (!options.mask.empty()) {
+    why = ", because --mask leaves nothing of the style";
+  }
+  return "no joint was changed" + why;
 }
 
 std::string verdict(const style::WalkerFit& fit, double rms_deg, double training_deg) {
@@ -121,7 +132,7 @@ nlohmann::json report_of(const ApplyArguments& options, const style::StyleModel&
           {"rate_hz", clip.frame_rate_hz},
           {"from", model.from},
           {"to", model.to},
-          {"weights", shares_json(model, shares)},
+          {"weights", shares_json(model.names(), shares)},
           {"mask", options.mask},
           {"alpha", options.apply.filter.alpha},
           {"auto_alpha", options.apply.filter.auto_alpha},
@@ -200,17 +211,20 @@ Result<> run(ApplyArguments options) {
   const double rms_deg = applied->rms_change_rad * kDegrees;
   const double max_deg = applied->max_change_rad * kDegrees;
   const std::string sentence = verdict(*fit, rms_deg, training_difference_deg(*model));
+  const std::string nothing = unchanged(options, *applied);
   if (options.json) {
     nlohmann::json report = report_of(options, *model, *shares, *clip, *applied);
     report["distance_deg"] = fit->distance_deg;
     report["far_from_training"] = fit->is_far();
     report["verdict"] = sentence;
+    report["unchanged"] = nothing.empty() ? nlohmann::json() : nlohmann::json(nothing);
     std::printf("%s\n", json_text(report, 2).c_str());
   } else {
     std::printf("%s: %d frames, %d joints changed by %.1f deg rms, %.1f deg at most\n",
                 options.out.c_str(), clip->frames(), applied->joints_changed, rms_deg, max_deg);
   }
   std::fflush(stdout);
+  if (!nothing.empty()) std::fprintf(stderr, "posed: warning: %s\n", nothing.c_str());
   std::fprintf(stderr, "posed: %s%s\n", fit->is_far() ? "warning: " : "", sentence.c_str());
   return {};
 }

@@ -10,6 +10,7 @@
 #include "daemon/cli/models/eval_natural.hpp"
 #include "daemon/cli/models/eval_style_report.hpp"
 #include "daemon/cli/models/root_option.hpp"
+#include "daemon/cli/models/shares_json.hpp"
 #include "daemon/cli/number_range.hpp"
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
@@ -70,6 +71,7 @@ struct Evaluation {
   double moved_rms_deg = 0.0;
   std::optional<double> gate_mean{};
   style::WalkerFit fit;
+  json weights{};                         // of the styles
   std::optional<EvaluatedClips> clips{};  // for the report
 
   // By what the verdict shows: one that closes 0 % is no better than nothing.
@@ -130,7 +132,7 @@ json report_of(const Evaluation& e, const EvalOptions& options) {
               {"root_speed_m_s", of_clips(score.root_speed_m_s, 1.0)},
               {"root", root_text(options.feet)},
               {"alpha", options.alpha},
-              {"weights", options.weights},
+              {"weights", e.weights},
               {"helps", e.helps()},
               {"verdict", verdict(e)}};
 }
@@ -160,7 +162,8 @@ Result<Evaluation> evaluate(const EvalOptions& options) {
   if (!fit) return std::unexpected(fit.error());
   const style::StyleModel constant = style::with_constant_change(mixture, fit->mean_change);
   ProgressBar bar(kQuietFor_s);
-  Evaluation evaluation{.score = {}, .constant = {}, .fit = *fit};
+  Evaluation evaluation{
+      .score = {}, .constant = {}, .fit = *fit, .weights = shares_json(model->names(), *shares)};
   for (const bool full : {false, true}) {
     style::ApplyOptions apply;
     apply.filter.alpha = options.alpha;

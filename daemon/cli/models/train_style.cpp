@@ -253,7 +253,9 @@ void add_train_style(CLI::App& train_command, int& exit_code, const std::shared_
   const auto options = std::make_shared<TrainStyleOptions>();
   style->add_option("--from", options->from, "Clips of the style to change: [PERSON:]FILE");
   style->add_option("--to", options->to, "Clips of the style to give: [NAME=][PERSON:]FILE");
-  style->add_option("--motion", options->motion, "What all clips show (default: walk)");
+  style->add_option(
+      "--motion", options->motion,
+      "What all clips show (default: walk); walk, run, jog, march and gait need strides");
   style->add_option("--experiment", options->experiment,
                     "TOML file that lists the clips and may set mode, rate_hz and pose_space");
   style->add_option("--skeleton", options->skeleton, "NN.asf of AMC clips, if not beside them");
@@ -265,7 +267,9 @@ void add_train_style(CLI::App& train_command, int& exit_code, const std::shared_
       ->check(in_range(10.0, 1000.0));
   style->add_option("--mode", options->mode,
                     "default, or paper: the paper end to end (default: the experiment's)");
-  style->add_option("--seed", options->seed, "Of the random starts")->capture_default_str();
+  style->add_option("--seed", options->seed, "Of the random starts")
+      ->check(whole_number())
+      ->capture_default_str();
   style->add_option("--out", options->out, "Where to write the model")
       ->required()
       ->type_name("OUT.style");

@@ -119,10 +119,11 @@ Result<Drawn> drawn_of(const RenderArguments& options, const clip::Clip& clip, s
     drawn.time_s.push_back(time_s);
   }
   if (drawn.motion.frames.empty()) {
-    return misuse(fmt::format("has no frame from {:g} to {:g} s; it lasts {:.2f} s",
-                              options.from_s.value_or(0.0), options.to_s.value_or(INFINITY),
-                              clip.frames() / clip.frame_rate_hz),
-                  options.in);
+    const std::string until = options.to_s ? fmt::format(" to {:g} s", *options.to_s) : " s on";
+    return misuse(
+        fmt::format("has no frame from {:g}{}; it lasts {:.2f} s", options.from_s.value_or(0.0),
+                    until, clip.frames() / clip.frame_rate_hz),
+        options.in);
   }
   drawn.shape = std::make_unique<picture::FigureShape>(drawn.motion.skeleton);
   return drawn;

@@ -175,4 +175,21 @@ header = true
         "posed.toml:12: the output names no stream; add body = \"STREAM\"");
 }
 
+TEST_CASE("the stream of a right hand is no left hand") {
+  const auto errors_of = [](const std::string& stream, const std::string& hands) {
+    return read_config("[[stream]]\nname = \"glove\"\ndriver = \"cyberglove\"\n" + stream +
+                           "[[output]]\nkind = \"vmc\"\n" + hands + kTo,
+                       "posed.toml", drivers::registry())
+        .errors;
+  };
+  CHECK(errors_of("hand = \"left\"\n", "left_hand = \"glove\"\n").empty());
+  CHECK(errors_of("", "right_hand = \"glove\"\n").empty());  // a glove is right by default
+  const auto errors = errors_of("", "left_hand = \"glove\"\n");
+  REQUIRE(errors.size() == 1);
+  CHECK(errors[0].text() ==
+        "posed.toml:6: 'glove' is a right hand; name it as right_hand, or set hand = \"left\" in"
+        " its [[stream]] table");
+  CHECK(errors_of("hand = \"left\"\n", "right_hand = \"glove\"\n").size() == 1);
+}
+
 }  // namespace posed::config

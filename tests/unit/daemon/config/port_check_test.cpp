@@ -20,10 +20,10 @@ TEST_CASE("what listens over TCP has a port of its own") {
   const auto clashes = port_clashes(config);
   REQUIRE(clashes.size() == 2);
   CHECK(clashes[0].key == "output");
-  CHECK(clashes[0].message.starts_with("control and output 'bvh-a' cannot share the endpoint"));
+  CHECK(clashes[0].message.starts_with("control and output 'bvh-a' cannot share the TCP endpoint"));
   CHECK(clashes[1].key == "metrics");
   CHECK(clashes[1].message ==
-        "publish and metrics cannot share the endpoint 127.0.0.1:5570; give"
+        "publish and metrics cannot share the TCP endpoint 127.0.0.1:5570; give"
         " metrics another port");
   output.kind = OutputKind::kVmc;          // sends, and does not listen
   config.metrics->listen = "127.0.0.1:0";  // any free one
@@ -36,6 +36,43 @@ TEST_CASE("a port that does not exist is no endpoint") {
   REQUIRE(!reading.errors.empty());
   CHECK(reading.errors.back().message.find("'tcp://127.0.0.1:99999' names a port that does not"
                                            " exist") != std::string::npos);
+}
+
+TEST_CASE("two devices do not receive on one UDP port") {
+  const auto errors_of = [](const std::string& first, const std::string& second) {
+    return read_config("[[source]]\nname = \"a\"\nstreams = \"all\"\n" + first +
+                           "\n[[source]]\nname = \"b\"\nstreams = \"all\"\n" + second,
+                       "posed.toml", drivers::registry())
+        .errors;
+  };
+  const std::string mvn = "driver = \"mvn\"";
+  const auto errors = errors_of(mvn, mvn);
+  REQUIRE(errors.size() == 1);
+  CHECK(errors.front().text() ==
+        "posed.toml:5: source 'a' and source 'b' cannot share the UDP endpoint 127.0.0.1:9763; give"
+        " source 'b' another port");
+  const std::string own = "[source.mvn]\n";
+  CHECK(errors_of(mvn, mvn + "\n" + own + "listen = \"127.0.0.1:9764\"").empty());
+  CHECK(errors_of(mvn, mvn + "\n" + own + "link = \"tcp\"").empty());
+  const std::string every = own + "listen = \"0.0.0.0:9763\"\npeers = \"192.168.1.20\"";
+  CHECK(errors_of(mvn, mvn + "\n" + every).size() == 1);
+  // The sockets of a multicast group share its port, and each takes its own server's frames.
+  const std::string natnet = "driver = \"natnet\"";
+  CHECK(errors_of(natnet, natnet).empty());
+  CHECK(errors_of(natnet, natnet + "\n[source.natnet]\nunicast = true").size() == 1);
+  const std::string vmc = "driver = \"vmc\"\n[source.vmc]\nlisten = \"127.0.0.1:9763\"";
+  CHECK(errors_of(mvn, vmc).size() == 1);
+  CHECK(errors_of(mvn, "driver = \"vmc\"\n[trigger]\nlisten = \"127.0.0.1:9763\"").size() == 1);
+}
+
+TEST_CASE("publish and control need two endpoints, whatever their kind") {
+  DaemonConfig config;
+  for (const char* endpoint : {"ipc:///tmp/posed", "tcp://eth0:5570", "tcp://*:5570"}) {
+    config.publish_endpoint = config.control_endpoint = endpoint;
+    CHECK(port_clashes(config).size() == 1);
+  }
+  config.publish_endpoint = config.control_endpoint = "tcp://127.0.0.1:*";
+  CHECK(port_clashes(config).empty());
 }
 
 TEST_CASE("a glove's port serves one stream") {
@@ -51,6 +88,7 @@ TEST_CASE("a glove's port serves one stream") {
   CHECK(errors_of("").empty());
   const auto errors = errors_of("port = \"/dev/g\"\n");
   REQUIRE(errors.size() == 1);
+  CHECK(errors.front().line == 5);
   CHECK(errors.front().message.find("'a' and 'b' have the same port '/dev/g'") !=
         std::string::npos);
 }

@@ -50,7 +50,7 @@ TEST_CASE("doctor: a recording needs an hour of disk") {
     config.record->folder = sound.folder.path() / taken;
     const Check in_the_way = check_disk(sound.machine, &config);
     CHECK_FALSE(in_the_way.ok);
-    CHECK(has(in_the_way.found, "file: is a file, so it cannot be a folder for recordings"));
+    CHECK(has(in_the_way.found, "file is a file, so it cannot be a folder for recordings"));
   }
   config.record->folder = sound.folder.path() / "takes" / "new";
   const double an_hour = recorded_bytes_per_s(config) * 3600.0;
@@ -99,8 +99,8 @@ TEST_CASE("doctor: the ports of a config are those that run binds") {
   const auto listeners = listeners_of(config);
   REQUIRE(listeners.size() == 4);
   CHECK(listeners[0].endpoint == "0.0.0.0:5570");
-  CHECK(listeners[1].who == "output axis");
-  CHECK(listeners[2].who == "stream right");
+  CHECK(listeners[1].who == "output 'axis'");
+  CHECK(listeners[2].who == "stream 'right'");
   CHECK_FALSE(listeners[2].udp);
   CHECK(listeners[3].udp);
   CHECK(listeners[3].shared);

@@ -126,6 +126,18 @@ TEST_CASE("gaits are walks and runs of all kinds", "[style][check]") {
   for (const char* other : {"wave", "jump", "crosswalk", ""}) CHECK_FALSE(style::is_gait(other));
 }
 
+TEST_CASE("a misspelt gait is pointed out", "[style][check]") {
+  const auto warnings_of = [](const std::string& motion) {
+    return report_of({lesson(walker_file(WalkerFamily::kMarch, 1), "from", motion),
+                      lesson(walker_file(WalkerFamily::kSway, 2), "to", motion)})["warnings"]
+        .dump();
+  };
+  CHECK(warnings_of("wlak").contains("motion 'wlak' is taken for no gait"));
+  CHECK(warnings_of("wlak").contains("name it 'walk'"));
+  CHECK_FALSE(warnings_of("walk").contains("gait"));
+  CHECK_FALSE(warnings_of("dance").contains("gait"));
+}
+
 TEST_CASE("a walker with another posture is far from the training", "[style][check]") {
   const auto model = trained({lesson(walker_file(WalkerFamily::kMarch, 1), "from"),
                               lesson(walker_file(WalkerFamily::kSway, 1), "to")})

@@ -99,6 +99,13 @@ TEST_CASE("times may be uneven, missing or repeated; they may not run back") {
         "h.csv:4: frame 3: its time 1 lies before the 2 of a frame above it");
 }
 
+TEST_CASE("times that count milliseconds are refused, with how to convert them") {
+  CHECK(error_of(header() + row("0", 0) + row("33.3", 0) + row("66.6", 0)) ==
+        "h.csv:2: its times are 33.3 s apart, which is no recording of a hand; time_s counts"
+        " seconds, so divide the times by 1000 if they are milliseconds");
+  CHECK(read(header() + row("0", 0) + row("1", 0)).rate_hz == Approx(1.0));
+}
+
 TEST_CASE("stamps that are only rounded give the clock's own rate") {
   std::string text = header();
   for (int i = 0; i < 300; ++i) text += row(std::to_string(i / 30.0), 0);
