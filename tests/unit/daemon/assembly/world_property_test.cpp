@@ -48,7 +48,10 @@ VirtualOptions random_trouble(Dice& dice, const std::filesystem::path& log) {
     options.asleep.clear();
   }
   options.bodies = 12;
-  options.record_slot.frame_bytes = 1 << 20;
+  // Less than all that the run records, so that the shares have to be given back, and enough for
+  // the longest time that the recorder is held up.
+  options.chunk_bytes = 96 << 10;
+  options.record_slot = {.frame_bytes = 192 << 10, .decisions = 192};
   return options;
 }
 
