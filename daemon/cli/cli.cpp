@@ -1,5 +1,6 @@
 #include "daemon/cli/cli.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
 #include <set>
@@ -67,7 +68,7 @@ CLI::App* subcommand(CLI::App& app, const std::string& name) {
 
 void add_options(const CLI::App& command, std::set<std::string>& known) {
   for (const CLI::Option* option : command.get_options()) {
-    for (const std::string& name : option->get_lnames()) known.insert("--" + name);
+    for (const std::string& name : option->get_lnames()) known.insert(name);
   }
 }
 
@@ -89,12 +90,14 @@ std::string unknown_word(CLI::App& app, std::span<char* const> arguments) {
     }
     std::set<std::string> commands;
     for (const CLI::App* one : command->get_subcommands(nullptr)) commands.insert(one->get_name());
-    const std::string name = word.substr(0, word.find('='));
+    const std::string dashes = is_option ? "--" : "";  // which are no letters to be mistyped
+    const std::string whole = word.substr(0, word.find('='));
+    const std::string name = whole.substr(std::min(whole.find_first_not_of('-'), whole.size()));
     const auto& known = is_option ? options : commands;
     const std::string near = known.contains(name) ? "" : nearest(name, known);
     if (!near.empty()) {
       return fmt::format("there is no {} {}; the nearest is {}", is_option ? "option" : "command",
-                         in_quotes(name), near);
+                         in_quotes(whole), dashes + near);
     }
     if (!is_option && !known.empty()) return fmt::format("there is no command {}", in_quotes(name));
   }

@@ -151,10 +151,10 @@ Result<> settle_times(const Draft& draft, const std::string& name, std::vector<d
                                         : std::string("placed between the others")));
   }
   if (rate_hz < kSlowest_hz) {
-    return fail("its times are " + number_text(1.0 / rate_hz) +
-                    " s apart, which is no recording"
-                    " of a hand; time_s counts seconds, so divide the times by 1000 if they are"
-                    " milliseconds",
+    return fail("its times are " + number_text(std::round(1000.0 / rate_hz) / 1000.0) +
+                    " s apart, which is no"
+                    " recording of a hand; time_s counts seconds, so divide the times by 1000 if"
+                    " they are milliseconds",
                 name, draft.frames.front().line);
   }
   interpolate(time_s, 1.0 / rate_hz);

@@ -284,6 +284,7 @@ TEST_CASE("each command explains its own options, and refuses those without an e
   const auto missing = posed({"convert", "nope"});
   CHECK(missing.code == 1);
   CHECK(has(missing.err, "nope: is not there; check the path"));
+  CHECK(has(posed({"emulate", "nope.plog"}).err, "nope.plog: is not there; check the path"));
   CHECK(mistyped({"monito"}, "there is no command 'monito'; the nearest is monitor"));
   CHECK(mistyped({"ctl", "--connect", kNobody, "sett"}, "the nearest is set"));
   CHECK(

@@ -78,6 +78,7 @@ Result<std::unique_ptr<drivers::Emulator>> make_emulator(const std::string& name
     for (const drivers::Driver& other : drivers::registry()) {
       if (other.emulate != nullptr) known += (known.empty() ? "" : ", ") + std::string(other.name);
     }
+    if (name.ends_with(".plog")) return fail("is not there; check the path", name);
     return misuse("'" + name +
                   "' is neither a log nor a device that can be emulated; there is: " + known);
   }

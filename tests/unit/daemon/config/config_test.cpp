@@ -343,7 +343,7 @@ TEST_CASE("without keys nothing listens beyond this machine, unless the config s
   CHECK(complaint("[publish]\nendpoint = \"tcp://0.0.0.0:5570\"\n")
             .find("insecure = true in"
                   " [publish]") != std::string::npos);
-  CHECK(complaint("[control]\nendpoint = \"tcp://*:5570\"\n").find("[control]") !=
+  CHECK(complaint("[control]\nendpoint = \"tcp://*:5571\"\n").find("[control]") !=
         std::string::npos);
   CHECK(read(kWalker + std::string("[control]\nendpoint = \"tcp://*:5\"\ninsecure = true\n"))
             .errors.empty());
