@@ -95,7 +95,7 @@ TEST_CASE("monitor gives up a stream that does not come") {
   CHECK(late.code == 1);
   CHECK(has(late.err, "nothing of pose/right came in 2 s (--timeout)"));
   const auto there = posed({"monitor", "--connect", served.publish, "--stream", "walker", "--count",
-                            "300", "--timeout", "2"});
+                            "700", "--timeout", "5"});  // longer than that
   CHECK(there.code == 0);
 }
 
