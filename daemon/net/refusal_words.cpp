@@ -1,6 +1,14 @@
 #include "daemon/net/refusal_words.hpp"
 
 namespace posed::net {
+namespace {
+
+std::string other_socket(Domain domain) {
+  return std::string("this is not its ") + (domain == Domain::kPublish ? "publish" : "control") +
+         " endpoint (by default 5570 publishes, 5571 takes control)";
+}
+
+}  // namespace
 
 std::string refusal_words(Refusal refusal, Domain domain, const std::filesystem::path& server_key) {
   switch (refusal) {
@@ -15,12 +23,11 @@ std::string refusal_words(Refusal refusal, Domain domain, const std::filesystem:
       return "hangs up: --server-key " + server_key.string() + " is not its key, or it just ended";
     case Refusal::kWantsKey:
       return "wants a key; give --key NAME.key --server-key SERVER.pub";
+    case Refusal::kOtherSocket:
+      return "hangs up: " + other_socket(domain);
     case Refusal::kHangsUpKeyless:
-      return std::string(
-                 "hangs up: it wants a key (--key NAME.key --server-key SERVER.pub), or this"
-                 " is not its ") +
-             (domain == Domain::kPublish ? "publish" : "control") +
-             " endpoint (by default 5570 publishes, 5571 takes control)";
+      return "hangs up: it wants a key (--key NAME.key --server-key SERVER.pub), or " +
+             other_socket(domain);
   }
   return {};
 }

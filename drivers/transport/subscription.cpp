@@ -46,6 +46,8 @@ Error refusal_error(net::Refusal refusal, const SubscriptionSettings& settings) 
     case net::Refusal::kWantsKey:
       return fail(daemon + " wants a key; set key = \"NAME.key\" and server_key = \"SERVER.pub\"")
           .error();
+    case net::Refusal::kOtherSocket:
+      return fail(daemon + " hangs up: this is not its publish endpoint").error();
     case net::Refusal::kHangsUpKeyless:
       return fail(daemon +
                   " hangs up: it wants a key (key = \"NAME.key\" and server_key ="

@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstring>
 #include <string>
+#include <utility>
 
 namespace posed::net {
 namespace {
@@ -52,15 +53,22 @@ Refusal LinkMonitor::take_news() {
         established_ = true;
         hang_ups_ = 0;
         break;
-      case ZMQ_EVENT_DISCONNECTED:
-        if (established_) ++ends_;
-        established_ = false;
+      case ZMQ_EVENT_DISCONNECTED: {
+        const bool told = std::exchange(failure_told_, false);
+        const bool was_established = std::exchange(established_, false);
+        if (was_established) ++ends_;
+        // This side was the first to see that the sockets do not match; libzmq tries no more.
+        if (!was_established && !told) return Refusal::kOtherSocket;
         break;
+      }
       case ZMQ_EVENT_HANDSHAKE_FAILED_AUTH:
+        failure_told_ = true;
         return Refusal::kKeyNotAllowed;
       case ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL:
+        failure_told_ = true;
         return with_key_ ? Refusal::kTalksNoKeys : Refusal::kWantsKey;
       case ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL:
+        failure_told_ = true;
         if (with_key_) return Refusal::kHangsUp;
         if (++hang_ups_ == kHangUps) return Refusal::kHangsUpKeyless;
         break;

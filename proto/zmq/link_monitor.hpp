@@ -16,7 +16,8 @@ enum class Refusal : std::uint8_t {
   kTalksNoKeys,     // the daemon uses no keys, or is something else
   kHangsUp,         // the server's key is not the daemon's, or the daemon just ended
   kWantsKey,        // the daemon uses keys, and this client none
-  kHangsUpKeyless,  // the same, or the socket is of another kind, as that of control is
+  kOtherSocket,     // the socket there is of another kind, such as control's for a subscriber
+  kHangsUpKeyless,  // one of the last two
 };
 
 class LinkMonitor {
@@ -40,7 +41,8 @@ class LinkMonitor {
   bool with_key_;
   bool established_ = false;
   std::uint64_t ends_ = 0;
-  int hang_ups_ = 0;  // in a row, before the handshake
+  int hang_ups_ = 0;           // in a row, before the handshake
+  bool failure_told_ = false;  // libzmq has told why the handshake of this connection failed
 };
 
 }  // namespace posed::net
