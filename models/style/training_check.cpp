@@ -120,10 +120,9 @@ void check_motions(const Dataset& dataset, TrainingCheck& check) {
   for (const std::string& motion : motions) {
     const std::string gait = nearest(motion, {kGaits.begin(), kGaits.end()});
     if (is_gait(motion) || gait.empty()) continue;
-    check.warnings.push_back("motion '" + motion +
-                             "' is taken for no gait, so its clips need show"
-                             " no strides; if it is one, name it '" +
-                             gait + "'");
+    std::string& warning = check.warnings.emplace_back("motion '" + motion);
+    warning += "' is taken for no gait, so its clips need show no strides; if it is one, name it '";
+    warning += gait + "'";
   }
 }
 
