@@ -136,6 +136,11 @@ TEST_CASE("top draws the chosen stream on a terminal, and arrow keys choose it a
   top.press(kLeftInApplicationMode);
   top.press(kLeftInApplicationMode);
   CHECK(top.comes_to_show(" -> 0.9 "));
+  top.press("\x1b");  // the bytes of a key that a network delivers apart
+  top.press("[");
+  std::this_thread::sleep_for(300ms);
+  top.press("C");
+  CHECK(top.comes_to_show(" -> 1 "));
   top.press("x");     // does nothing
   top.press(kUpKey);  // there is only one stream
   top.press("q");

@@ -1,5 +1,6 @@
 #include <cstdio>
 #include <cstdlib>
+#include <utility>
 
 #include <poll.h>
 #include <sys/ioctl.h>
@@ -16,6 +17,23 @@ termios keyboard_before;  // global, because a process has one terminal
 void put_on_screen(const std::string& text) {
   std::fwrite(text.data(), 1, text.size(), stdout);
   std::fflush(stdout);
+}
+
+Key other_key(char byte) { return byte == 'q' || byte == 'Q' ? Key::kQuit : Key::kOther; }
+
+Key arrow(char last_byte) {
+  switch (last_byte) {
+    case 'A':
+      return Key::kUp;
+    case 'B':
+      return Key::kDown;
+    case 'C':
+      return Key::kRight;
+    case 'D':
+      return Key::kLeft;
+    default:
+      return Key::kOther;
+  }
 }
 
 }  // namespace
@@ -70,26 +88,20 @@ char LiveScreen::key_pressed() const {
   return key;
 }
 
-Key LiveScreen::next_key() const {
-  const char first = key_pressed();
-  if (first == 0) return Key::kNone;
-  if (first == 'q' || first == 'Q') return Key::kQuit;
-  if (first != '\x1b') return Key::kOther;
-  // An arrow is ESC [ A to D, or ESC O A to D where the terminal is in application mode.
-  const char second = key_pressed();
-  if (second != '[' && second != 'O') return Key::kOther;
-  switch (key_pressed()) {
-    case 'A':
-      return Key::kUp;
-    case 'B':
-      return Key::kDown;
-    case 'C':
-      return Key::kRight;
-    case 'D':
-      return Key::kLeft;
-    default:
-      return Key::kOther;
+// An arrow is ESC [ A to D, or ESC O A to D where the terminal is in application mode. A network
+// may deliver its bytes apart, so the first of them are kept until the others come.
+Key LiveScreen::next_key() {
+  while (const char byte = key_pressed()) {
+    const std::size_t before = std::exchange(arrow_bytes_, 0);
+    if (byte == '\x1b') {
+      arrow_bytes_ = 1;
+    } else if (before == 1 && (byte == '[' || byte == 'O')) {
+      arrow_bytes_ = 2;
+    } else {
+      return before == 2 ? arrow(byte) : other_key(byte);
+    }
   }
+  return Key::kNone;
 }
 
 }  // namespace posed::cli

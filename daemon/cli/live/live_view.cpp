@@ -20,7 +20,7 @@ namespace posed::cli {
 namespace {
 
 constexpr int kMinWidth = 20;
-constexpr int kNoteRows = 3;  // that a panel leaves to the notes
+constexpr int kNoteRows = 3;  // that the table and the panel leave to the notes
 
 // The daemon in one line. What no longer fits is left out: the processor and the memory first.
 std::string head(const v1::Stats& stats, const LiveViewOptions& options) {
@@ -245,15 +245,25 @@ std::vector<std::string> rows_below(const v1::Stats& stats, const LiveViewOption
   return rows;
 }
 
-// The newest notes that fit into `rows` lines, oldest first.
+// The newest notes that fit into `rows` lines, oldest first; of the newest at least its beginning.
 std::vector<std::string> newest_notes(const LiveViewOptions& options, std::size_t rows) {
   std::vector<std::string> lines;
   for (std::size_t i = options.notes.size(); i > 0; --i) {
-    const auto note = broken(options.notes[i - 1], options, "", 0);
+    auto note = broken(options.notes[i - 1], options, "", 0);
+    if (lines.empty() && note.size() > rows) note.resize(rows);
     if (lines.size() + note.size() > rows) break;
     lines.insert(lines.begin(), note.begin(), note.end());
   }
   return lines;
+}
+
+// The lines kept for the notes: a note may be the only answer to a key, so a long table or a high
+// panel does not push out the newest.
+int rows_of_notes(const LiveViewOptions& options) {
+  if (options.notes.empty()) return 0;
+  const int newest = static_cast<int>(broken(options.notes.back(), options, "", 0).size());
+  const int most = std::min(std::max(newest, kNoteRows), options.height / 4);
+  return static_cast<int>(newest_notes(options, static_cast<std::size_t>(most)).size());
 }
 
 }  // namespace
@@ -281,22 +291,23 @@ std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions
     return limited ? std::max(0, options.height - static_cast<int>(lines)) : 1'000'000;
   };
   std::vector<std::string> lines;
-  const auto add = [&](const std::vector<std::string>& more) {
-    const auto count = std::min(more.size(), static_cast<std::size_t>(left(lines.size())));
+  const auto add = [&](const std::vector<std::string>& more, int kept = 0) {
+    const int room = std::max(0, left(lines.size()) - kept);
+    const auto count = std::min(more.size(), static_cast<std::size_t>(room));
     lines.insert(lines.end(), more.begin(), more.begin() + static_cast<std::ptrdiff_t>(count));
   };
+  const int notes = rows_of_notes(options);
   const std::string first = head(stats, options);
   // If the daemon is silent, the first line says so, because everything below it is old.
   if (silent) add(broken(options.silence, options, kRed, 0));
   add({paint(options.colour, kBold, options.width == 0 ? first : cut(first, options.width))});
   add(live_table(stats, {.width = options.width,
-                         .rows = limited ? std::max(1, left(lines.size())) : 0,
+                         .rows = limited ? std::max(1, left(lines.size()) - notes) : 0,
                          .colour = options.colour,
                          .silent = silent,
                          .chosen = options.chosen}));
-  if (!silent) add(rows_below(stats, options));
+  if (!silent) add(rows_below(stats, options), notes);
   if (options.panel && !silent) {
-    const int notes = std::min(static_cast<int>(options.notes.size()), kNoteRows);
     add(options.panel(left(lines.size()) - notes));
   }
   add(newest_notes(options, static_cast<std::size_t>(left(lines.size()))));

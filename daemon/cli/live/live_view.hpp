@@ -2,6 +2,7 @@
 // redrawn. Used by `top` and `demo`.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -55,11 +56,12 @@ class LiveScreen {
   void measure(LiveViewOptions& options) const;
   void draw(const std::vector<std::string>& lines) const;
   [[nodiscard]] char key_pressed() const;  // the next byte of a key; 0: none. Never waits
-  [[nodiscard]] Key next_key() const;      // kNone: none is waiting. Never waits
+  [[nodiscard]] Key next_key();            // kNone: no whole key is waiting. Never waits
 
  private:
   bool terminal_ = false;
-  bool keyboard_ = false;  // stdin is a terminal, too
+  bool keyboard_ = false;        // stdin is a terminal, too
+  std::size_t arrow_bytes_ = 0;  // that came of an arrow's three
 };
 
 }  // namespace posed::cli

@@ -78,7 +78,7 @@ class Top {
 
  private:
   // Obeys the keys that wait.
-  bool quits(const LiveScreen& screen) {
+  bool quits(LiveScreen& screen) {
     for (Key key = screen.next_key(); key != Key::kNone; key = screen.next_key()) {
       if (key == Key::kQuit) return true;
       chosen_.obey(key, stats_);

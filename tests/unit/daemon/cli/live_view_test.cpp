@@ -298,6 +298,27 @@ TEST_CASE("the live view leaves the panel its room and fills the rest with the n
   CHECK(drawn.back() == "new");
 }
 
+TEST_CASE("a note is an answer, so neither streams nor what is wrong nor the panel push it out") {
+  v1::Stats stats = stats_of(32);
+  for (auto& stream : *stats.mutable_stream()) stream.set_shed(7);
+  LiveViewOptions options{.title = "posed", .height = 24};
+  options.notes = {"old", "alpha stays: " + std::string(60, 'a') + " " + std::string(60, 'b')};
+  options.panel = [](int rows) {
+    return std::vector<std::string>(static_cast<std::size_t>(std::max(rows, 0)), "figure");
+  };
+  for (const int streams : {1, 2, 17, 32}) {
+    v1::Stats some = stats;
+    some.mutable_stream()->DeleteSubrange(streams, 32 - streams);
+    const auto lines = live_view(some, options);
+    INFO(streams);
+    REQUIRE(lines.size() == 24);
+    CHECK(lines[22].starts_with("alpha stays: aaa"));
+    CHECK(lines[23].starts_with("  bbb"));
+  }
+  options.height = 4;  // room for its beginning
+  CHECK(live_view(stats, options).back().starts_with("alpha stays: aaa"));
+}
+
 TEST_CASE("JSON is canonical proto3, with every plain field") {
   v1::Frame frame;
   frame.set_stream("walker");
