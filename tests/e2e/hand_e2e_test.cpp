@@ -202,22 +202,26 @@ enabled = false
   auto reader = log::Reader::open(served.path("a.plog"));
   REQUIRE(reader);
   auto frames = reader->frames(0, false).value();
-  std::size_t count = 0, compared = 0;
+  std::size_t last = 0, count = 0, compared = 0;
   for (auto row = frames.next().value(); row; row = frames.next().value(), ++count) {
     v1::Frame frame;
     REQUIRE(frame.ParseFromArray(row->bytes.data(), static_cast<int>(row->bytes.size())));
-    REQUIRE(frame.sequence() == count + 1);
+    // On a busy machine the log lacks published frames that a replay makes again.
+    REQUIRE(frame.sequence() > last);
+    REQUIRE(frame.sequence() <= offline->angles.size());
+    last = frame.sequence();
     // Frames that a busy machine emitted early have less lag, and the last frames have none.
     if (frame.lag_frames() != 2) continue;
     ++compared;
     double most = 0.0;
     for (int c = 0; c < frame.angle_rad_size(); ++c) {
       const std::size_t angle = kAngleOfChannel[static_cast<std::size_t>(c)];
-      most = std::max(most, std::abs(frame.angle_rad(c) - offline->angles[count][angle]));
+      most = std::max(most, std::abs(frame.angle_rad(c) - offline->angles[last - 1][angle]));
     }
     CHECK(most < 1e-5);
   }
-  CHECK(count == offline->angles.size());
+  CHECK(last == offline->angles.size());
+  CHECK(count > last * 8 / 10);
   CHECK(compared > count * 9 / 10);
 }
 
