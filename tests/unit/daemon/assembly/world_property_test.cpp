@@ -49,9 +49,12 @@ VirtualOptions random_trouble(Dice& dice, const std::filesystem::path& log) {
   }
   options.bodies = 12;
   // Less than all that the run records, so that the shares have to be given back, and enough for
-  // the longest time that the recorder is held up.
-  options.chunk_bytes = 96 << 10;
-  options.record_slot = {.frame_bytes = 192 << 10, .decisions = 192};
+  // the longest time that the recorder is held up. After a sleep all that the devices' buffers kept
+  // comes at once, which needs more.
+  if (options.asleep.empty()) {
+    options.chunk_bytes = 96 << 10;
+    options.record_slot = {.frame_bytes = 192 << 10, .decisions = 192};
+  }
   return options;
 }
 
