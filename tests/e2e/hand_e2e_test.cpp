@@ -222,6 +222,9 @@ enabled = false
   }
   CHECK(last == offline->angles.size());
   CHECK(count > last * 8 / 10);
+  // Every frame that the log lacks is told.
+  const std::string missing = "; " + std::to_string(last - count) + " published frame";
+  CHECK((count == last || has(recorded.err, missing)));
   CHECK(compared > count * 9 / 10);
 }
 
