@@ -7,7 +7,7 @@
 #include "proto/clip/asf_parts.hpp"
 #include "proto/text/clean.hpp"
 
-namespace posed::clip {
+namespace posed::toolsp {
 namespace {
 
 class AsfReader {
@@ -273,4 +273,4 @@ Result<Acclaim> parse_asf(std::string_view text, const std::string& name) {
   return AsfReader(text, name).read();
 }
 
-}  // namespace posed::clip
+}  // namespace posed::toolsp

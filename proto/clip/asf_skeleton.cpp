@@ -4,7 +4,7 @@
 #include "proto/frame/degree.hpp"
 #include "proto/text/clean.hpp"
 
-namespace posed::clip {
+namespace posed::toolsp {
 namespace {
 
 constexpr double kInch_m = 0.0254;
@@ -76,4 +76,4 @@ Result<Acclaim> acclaim_of(const AsfFile& file, const std::string& name) {
   return out;
 }
 
-}  // namespace posed::clip
+}  // namespace posed::toolsp

@@ -15,7 +15,7 @@
 #include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
 
-namespace posed::clip {
+namespace posed::toolsp {
 namespace {
 
 constexpr std::size_t kMaxBytes = std::numeric_limits<std::uint32_t>::max() / 2;
@@ -223,4 +223,4 @@ Result<> write_gltf(const GltfMotion& motion, GltfKind kind, const std::filesyst
   });
 }
 
-}  // namespace posed::clip
+}  // namespace posed::toolsp

@@ -7,8 +7,8 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "daemon/cli/cli.hpp"
-#include "daemon/cli/progress.hpp"
+#include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/progress.hpp"
 #include "models/gesture/model_file.hpp"
 #include "models/gesture/synthetic_signer.hpp"
 #include "models/gesture/train.hpp"
@@ -60,7 +60,7 @@ Result<json> bench_strings(const trajectory::StateInformation& information, int 
   const auto letters = static_cast<int>(alphabet->size());
   const int all = static_cast<int>(std::pow(letters, kLength));
   const int asked = count < 0 ? all : std::min(count, all);
-  cli::ProgressBar bar;
+  tools::ProgressBar bar;
   double smallest_m = INFINITY;
   double before_m = INFINITY;
   double changed_rad = 0.0;
@@ -167,7 +167,7 @@ void add_bench_generate(CLI::App& bench_app, int& exit_code) {
   command->callback([options, &exit_code] {
     const auto made = bench(*options);
     if (!made) {
-      exit_code = cli::report(made.error());
+      exit_code = tools::report(made.error());
       return;
     }
     if (options->json) {

@@ -13,9 +13,9 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "daemon/cli/bench/percentiles.hpp"
-#include "daemon/cli/cli.hpp"
-#include "daemon/cli/degrees.hpp"
+#include "daemon/tools/bench/percentiles.hpp"
+#include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/degrees.hpp"
 #include "models/gesture/synthetic_signer.hpp"
 #include "models/smooth/adaptive_window.hpp"
 #include "models/smooth/live_smoother.hpp"
@@ -60,7 +60,7 @@ Result<std::vector<Truth>> truths_of(const BenchSmoothOptions& options) {
     for (std::size_t t = 0; t < hand.angles.size(); ++t) {
       for (std::size_t c = 0; c < kHandChannels; ++c) {
         angles(static_cast<Eigen::Index>(t), static_cast<Eigen::Index>(c)) =
-            hand.angles[t][c] * cli::kDegrees;
+            hand.angles[t][c] * tools::kDegrees;
       }
     }
     truths.push_back({std::move(angles), hand.rate_hz});
@@ -104,13 +104,13 @@ ChannelMatrix live(const Trial& trial, int lag, double noise_deg) {
   std::vector<double> row(static_cast<std::size_t>(channels));
   for (Eigen::Index t = 0; t < made.rows(); ++t) {
     for (int c = 0; c < channels; ++c) {
-      row[static_cast<std::size_t>(c)] = trial.measured(t, c) / cli::kDegrees;
+      row[static_cast<std::size_t>(c)] = trial.measured(t, c) / tools::kDegrees;
     }
-    window.push(static_cast<double>(t) / trial.rate_hz, row, noise_deg / cli::kDegrees);
+    window.push(static_cast<double>(t) / trial.rate_hz, row, noise_deg / tools::kDegrees);
     window.solve(1.0 / trial.rate_hz);
     if (t < lag) continue;
     made.row(t - lag) =
-        Eigen::Map<const Eigen::RowVectorXd>(window.x(lag), channels) * cli::kDegrees;
+        Eigen::Map<const Eigen::RowVectorXd>(window.x(lag), channels) * tools::kDegrees;
   }
   return made;
 }
@@ -186,7 +186,7 @@ json cost(unsigned seed) {
   constexpr int kFrames = 4000;
   const Skeleton skeleton = hand_skeleton(Side::kRight);
   smooth::AdaptiveWindow window(kHandChannels);
-  smooth::LiveSmoother stage(skeleton, {.lag = {}, .noise_rad = 1.0 / cli::kDegrees});
+  smooth::LiveSmoother stage(skeleton, {.lag = {}, .noise_rad = 1.0 / tools::kDegrees});
   struct Last final : StageOut {
     void frame(const StageFrame& made) noexcept override {
       const Frame& frame = made.frame;
@@ -202,7 +202,7 @@ json cost(unsigned seed) {
                      .count());
   };
   std::mt19937_64 random(seed);
-  std::normal_distribution<double> noise(0.0, 1.0 / cli::kDegrees);
+  std::normal_distribution<double> noise(0.0, 1.0 / tools::kDegrees);
   for (int t = 0; t < kFrames; ++t) {
     const double now_s = t / 60.0;
     HandAngles angles{};
@@ -212,14 +212,14 @@ json cost(unsigned seed) {
     Frame frame;
     set_hand_angles(skeleton, angles, frame);
     frame.header.device_ns = nanoseconds(now_s);
-    window.push(now_s, angles, 1.0 / cli::kDegrees);
+    window.push(now_s, angles, 1.0 / tools::kDegrees);
     timed(bare_us, [&] { window.solve_once(1.0 / 60.0); });
     timed(solve_us, [&] { window.solve(1.0 / 60.0); });
     timed(stage_us, [&] { stage.process({.frame = frame}, last); });
   }
-  json report{{"bare_solve", cli::percentiles(bare_us)},
-              {"live_solve", cli::percentiles(solve_us)},
-              {"stage", cli::percentiles(stage_us)}};
+  json report{{"bare_solve", tools::percentiles(bare_us)},
+              {"live_solve", tools::percentiles(solve_us)},
+              {"stage", tools::percentiles(stage_us)}};
   for (const char* name : {"live_solve", "stage"}) {
     report[name]["p50_over_bare"] =
         report[name]["p50_us"].get<double>() / report["bare_solve"]["p50_us"].get<double>();
@@ -284,7 +284,7 @@ void add_bench_smooth(CLI::App& bench, int& exit_code) {
   command->add_flag("--cost", options->cost, "Only the cost of a frame");
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {
-    if (auto done = bench_smooth(*options); !done) exit_code = cli::report(done.error());
+    if (auto done = bench_smooth(*options); !done) exit_code = tools::report(done.error());
   });
 }
 

@@ -1,5 +1,5 @@
 #include "tests/bench/bench_trajectory.hpp"
-#include "daemon/cli/degrees.hpp"
+#include "daemon/tools/command/degrees.hpp"
 
 #include <unistd.h>
 
@@ -133,8 +133,8 @@ Streamed stream(const InformationForm& information, const trajectory::SlidingWin
       squares += std::pow(out.row(t, Row::kPosition)[c] - full.x(t)[c], 2);
     }
   }
-  result.error_deg =
-      cli::kDegrees * std::sqrt(squares / (information.frames() - delay) / information.channels());
+  result.error_deg = tools::kDegrees *
+                     std::sqrt(squares / (information.frames() - delay) / information.channels());
   solver = trajectory::FixedLag(information.channels(), delay);
   feed([&](auto&& work) {
     const auto begin = Steady::now();
@@ -153,7 +153,7 @@ double sptk_error_deg(const SptkRun& run, const trajectory::SlidingWindow& full,
           std::pow(run.trajectory[static_cast<std::size_t>(t * channels + c)] - full.x(t)[c], 2);
     }
   }
-  return cli::kDegrees * std::sqrt(squares / (frames - delay) / channels);
+  return tools::kDegrees * std::sqrt(squares / (frames - delay) / channels);
 }
 
 }  // namespace
@@ -225,7 +225,7 @@ json bench_batch(const trajectory::StateInformation& model, int samples) {
     }
     report["dpbsv"] = quantiles(theirs);
     report["times_faster"] = quantile(theirs, 0.5) / quantile(ours, 0.5);
-    report["max_difference_deg"] = worst_rad * cli::kDegrees;
+    report["max_difference_deg"] = worst_rad * tools::kDegrees;
   } else {
     report["missing"].push_back(lapack.error().text());
   }

@@ -2,7 +2,7 @@
 // machine are in `posed bench`.
 #include <CLI/CLI.hpp>
 
-#include "daemon/cli/cli.hpp"
+#include "daemon/tools/command/command.hpp"
 #include "tests/bench/bench.hpp"
 
 int main(int argc, char** argv) {

@@ -10,7 +10,7 @@
 #include <memory>
 #include <thread>
 
-#include "daemon/emulate/emulated_device.hpp"
+#include "daemon/tools/emulate/emulated_device.hpp"
 #include "drivers/driver.hpp"
 #include "proto/frame/time.hpp"
 #include "tests/e2e/logged_frames.hpp"

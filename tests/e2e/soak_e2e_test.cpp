@@ -18,8 +18,8 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/emulate/emulated_device.hpp"
-#include "daemon/emulate/emulated_port.hpp"
+#include "daemon/tools/emulate/emulated_device.hpp"
+#include "daemon/tools/emulate/emulated_port.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/options.hpp"
 #include "tests/e2e/served.hpp"

@@ -10,9 +10,9 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
-#include "daemon/cli/models/experiment.hpp"
-#include "daemon/cli/models/question_file.hpp"
 #include "daemon/config/config.hpp"
+#include "daemon/tools/gesture/question_file.hpp"
+#include "daemon/tools/style/experiment.hpp"
 #include "drivers/described/device_file.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "proto/frame/hand_shape.hpp"
@@ -116,10 +116,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       check_result(posed::parse_hand_shape(text, "fuzz.toml"));
       break;
     case 6:
-      check_result(posed::cli::read_experiment(MemoryFile(text).path()));
+      check_result(posed::tools::read_experiment(MemoryFile(text).path()));
       break;
     default:
-      check_result(posed::cli::read_questions(MemoryFile(text).path()));
+      check_result(posed::tools::read_questions(MemoryFile(text).path()));
       break;
   }
   return 0;

@@ -12,8 +12,8 @@
 #include <unistd.h>
 
 #include "daemon/http/session.hpp"
-#include "daemon/view/hub.hpp"
-#include "daemon/view/request_rules.hpp"
+#include "daemon/tools/view/hub.hpp"
+#include "daemon/tools/view/request_rules.hpp"
 
 namespace {
 

@@ -10,8 +10,8 @@
 #include <mutex>
 #include <thread>
 
-#include "daemon/emulate/emulated_device.hpp"
 #include "daemon/system/clock.hpp"
+#include "daemon/tools/emulate/emulated_device.hpp"
 #include "drivers/glove/traits.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/transport_factory.hpp"

@@ -6,7 +6,7 @@
 #include <thread>
 #include <utility>
 
-#include "daemon/emulate/emulated_device.hpp"
+#include "daemon/tools/emulate/emulated_device.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/glove/fit.hpp"
 

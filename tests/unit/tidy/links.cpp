@@ -72,7 +72,7 @@ std::vector<Target> targets_from_text(const std::string& text, const std::string
 
 std::vector<Target> read_targets(const std::filesystem::path& root) {
   std::vector<Target> targets;
-  for (const char* module_name : {"proto", "models", "drivers", "daemon"}) {
+  for (const char* module_name : {"proto", "models", "drivers", "daemon", "daemon/tools"}) {
     std::ifstream stream(root / module_name / "CMakeLists.txt");
     const std::string text{std::istreambuf_iterator<char>(stream), {}};
     for (Target& target : targets_from_text(text)) targets.push_back(std::move(target));

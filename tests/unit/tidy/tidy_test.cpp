@@ -77,6 +77,13 @@ TEST_CASE("a folder includes only what its target links, and no targets form a c
             [&](const SourceFile& file) { return posed::tidy::check_links(file, targets); }) == "");
 }
 
+TEST_CASE("the daemon does without its commands", "[tidy]") {
+  const auto targets = posed::tidy::read_targets(posed::test::source_dir());
+  const auto bad = posed::tidy::source_from_text("daemon/assembly/x.cpp",
+                                                 "#include \"daemon/tools/command/command.hpp\"\n");
+  CHECK(listed(posed::tidy::check_links(bad, targets)).find("daemon/assembly/x.cpp:1") == 0);
+}
+
 TEST_CASE("files of a target can be joined: names in anonymous namespaces are unique", "[tidy]") {
   const auto a = posed::tidy::source_from_text(
       "daemon/a/a.cpp",

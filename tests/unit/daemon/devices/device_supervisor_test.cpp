@@ -8,8 +8,8 @@
 
 #include "daemon/devices/device_supervisor.hpp"
 #include "daemon/devices/open_stream.hpp"
-#include "daemon/emulate/emulated_device.hpp"
 #include "daemon/system/clock.hpp"
+#include "daemon/tools/emulate/emulated_device.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/traits.hpp"
 #include "drivers/options.hpp"

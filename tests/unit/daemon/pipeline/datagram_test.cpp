@@ -5,9 +5,9 @@
 
 #include <catch2/catch.hpp>
 
-#include "daemon/emulate/emulated_device.hpp"
 #include "daemon/pipeline/reader.hpp"
 #include "daemon/system/clock.hpp"
+#include "daemon/tools/emulate/emulated_device.hpp"
 #include "drivers/transport/transport_factory.hpp"
 #include "tests/support/free_port.hpp"
 #include "tests/support/quiet_record_sink.hpp"

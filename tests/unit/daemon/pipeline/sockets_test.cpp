@@ -4,8 +4,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "daemon/emulate/log_emulator.hpp"
 #include "daemon/pipeline/reader.hpp"
+#include "daemon/tools/emulate/log_emulator.hpp"
 #include "proto/log/writer.hpp"
 #include "tests/support/quiet_record_sink.hpp"
 #include "tests/support/temp_folder.hpp"

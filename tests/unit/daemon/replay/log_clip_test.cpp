@@ -5,8 +5,8 @@
 #include <cmath>
 #include <fstream>
 
-#include "daemon/replay/log_clip.hpp"
 #include "daemon/replay/replay.hpp"
+#include "daemon/tools/export/log_clip.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/log/writer.hpp"
 #include "tests/unit/daemon/replay/staged_run.hpp"

@@ -8,8 +8,8 @@
 #include <google/protobuf/descriptor.pb.h>
 #include <google/protobuf/dynamic_message.h>
 
-#include "daemon/replay/log_mcap.hpp"
-#include "daemon/replay/mcap_writer.hpp"
+#include "daemon/tools/export/log_mcap.hpp"
+#include "daemon/tools/export/mcap_writer.hpp"
 #include "proto/log/reader.hpp"
 #include "tests/support/file_text.hpp"
 #include "tests/support/has.hpp"

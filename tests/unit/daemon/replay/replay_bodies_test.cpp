@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <map>
 
-#include "daemon/replay/log_clip.hpp"
 #include "daemon/replay/replay.hpp"
+#include "daemon/tools/export/log_clip.hpp"
 #include "posed/v1/posed.pb.h"
 #include "tests/support/log_surgery.hpp"
 #include "tests/support/replayed.hpp"

@@ -5,9 +5,9 @@
 #include <cstdlib>
 #include <set>
 
-#include "daemon/replay/frame_file.hpp"
-#include "daemon/replay/log_takes.hpp"
 #include "daemon/replay/replay.hpp"
+#include "daemon/tools/export/frame_file.hpp"
+#include "daemon/tools/export/log_takes.hpp"
 #include "posed/v1/log.pb.h"
 #include "tests/support/has.hpp"
 #include "tests/support/log_surgery.hpp"

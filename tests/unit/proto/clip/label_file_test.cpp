@@ -5,7 +5,7 @@
 #include "tests/support/temp_folder.hpp"
 
 using namespace posed;
-using namespace posed::clip;
+using namespace posed::toolsp;
 
 namespace {
 

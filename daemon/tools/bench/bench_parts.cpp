@@ -1,0 +1,108 @@
+#include "daemon/tools/bench/bench_parts.hpp"
+
+#include <unistd.h>
+
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+
+#include <nlohmann/json.hpp>
+
+#include "daemon/system/clock.hpp"
+#include "daemon/system/process.hpp"
+#include "models/gp/synthetic.hpp"
+#include "models/motion/synthetic_walker.hpp"
+#include "models/style/style_model.hpp"
+#include "models/style/style_type.hpp"
+
+namespace posed::tools {
+
+double cpu_pressure(const std::string& field) {
+  std::ifstream file("/proc/pressure/cpu");
+  std::string word;
+  while (file >> word) {
+    if (word.starts_with(field)) return std::atof(word.c_str() + field.size());
+  }
+  return -1.0;
+}
+
+CpuShare::CpuShare() : cpu_ns_(system::cpu_time_ns()), begun_ns_(system::monotonic_ns()) {}
+
+double CpuShare::percent() const {
+  return 100.0 * static_cast<double>(system::cpu_time_ns() - cpu_ns_) /
+         static_cast<double>(system::monotonic_ns() - begun_ns_);
+}
+
+WorkFolder::WorkFolder()
+    : path_(std::filesystem::temp_directory_path() / ("posed_bench_" + std::to_string(getpid()))) {
+  std::filesystem::create_directories(path_);
+}
+
+WorkFolder::~WorkFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+Result<> write_synthetic_model(motion::Space kind, const Skeleton& skeleton, int points,
+                               const std::filesystem::path& path) {
+  style::StyleModel model;
+  auto spec = motion::describe_space(kind, skeleton);
+  if (!spec) return std::unexpected(spec.error());
+  model.space = std::move(*spec);
+  const auto space = motion::PoseSpace::bind(model.space, skeleton);
+  if (!space) return std::unexpected(space.error());
+  const int dims = space->dims();
+  model.process = gp::synthetic(points, dims).process;
+  model.limit_rad = Eigen::VectorXd::Constant(dims, 0.5);
+  model.gate = {.neutral = Eigen::VectorXd::Zero(dims), .swing_rad = 0.1, .fastest_stride_s = 1.0};
+  model.from = "walker";
+  model.to = "other";
+  return style::save_model(model, path);
+}
+
+Result<config::DaemonConfig> walkers_config(const Walkers& walkers, const WorkFolder& folder) {
+  const auto clip = motion::make_walker({.rate_hz = kWalkers_hz});
+  if (!clip) return std::unexpected(clip.error());
+  if (auto written = clip::write_bvh(*clip, folder / "walker.bvh"); !written) {
+    return std::unexpected(written.error());
+  }
+  if (auto written = write_synthetic_model(motion::Space::kNative, *clip->skeleton, walkers.points,
+                                           folder / "model.style");
+      !written) {
+    return std::unexpected(written.error());
+  }
+  const StageType& type = style::style_type();
+  config::DaemonConfig config;
+  config.publish_endpoint = config.control_endpoint = "tcp://127.0.0.1:*";
+  config.realtime = false;
+  for (int i = 0; i < walkers.streams; ++i) {
+    config::StreamConfig stream;
+    stream.name = "walker" + std::to_string(i);
+    stream.driver = "file";
+    stream.options = {{"path", (folder / "walker.bvh").string()}};
+    stream.stages.push_back(
+        {.type = &type,
+         .parameters = *complete_parameters(type.parameters, {{"gate", walkers.gate}}),
+         .model = folder / "model.style"});
+    config.streams.push_back(std::move(stream));
+  }
+  return config;
+}
+
+nlohmann::ordered_json to_json(const HopFigures& figures) {
+  return {{"p50_us", figures.p50_us},
+          {"p99_us", figures.p99_us},
+          {"p999_us", figures.p999_us},
+          {"max_us", figures.max_us},
+          {"messages", figures.messages}};
+}
+
+void print_figures(const std::vector<std::pair<const char*, HopFigures>>& rows) {
+  std::printf("%-10s %9s %9s %9s %9s %9s\n", "us", "p50", "p99", "p99.9", "max", "messages");
+  for (const auto& [name, figures] : rows) {
+    std::printf("%-10s %9.1f %9.1f %9.1f %9.1f %9llu\n", name, figures.p50_us, figures.p99_us,
+                figures.p999_us, figures.max_us, static_cast<unsigned long long>(figures.messages));
+  }
+}
+
+}  // namespace posed::tools

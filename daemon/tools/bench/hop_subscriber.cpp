@@ -1,0 +1,110 @@
+#include "daemon/tools/bench/hop_subscriber.hpp"
+
+#include <array>
+#include <cstring>
+#include <map>
+
+#include "daemon/system/clock.hpp"
+#include "posed/v1/posed.pb.h"
+#include "proto/zmq/zmq_handle.hpp"
+
+namespace posed::tools {
+namespace {
+
+constexpr int kPoll_ms = 50;
+constexpr std::size_t kReserved = 1 << 20;  // number of messages for which memory is reserved
+
+// Runs in the child process.
+class Noter {
+ public:
+  Noter() { noted_.messages.reserve(kReserved); }
+
+  // Receives one message if there is one.
+  bool take(void* socket) {
+    net::Message topic;
+    if (!topic.receive(socket)) return false;
+    net::Message body;
+    if (!body.receive(socket, 0)) return false;
+    const std::int64_t came_ns = system::monotonic_ns();
+    if (topic.text().starts_with("bare/")) {
+      std::int64_t arrival_ns = 0;
+      std::memcpy(&arrival_ns, body.bytes().data(), sizeof arrival_ns);
+      noted_.messages.push_back(
+          {.arrival_ns = arrival_ns, .age_ns = came_ns - arrival_ns, .bare = true});
+    } else if (frame_.ParseFromArray(body.bytes().data(), static_cast<int>(body.bytes().size()))) {
+      // The last pose of a silent source is published again with its old times.
+      if (frame_.quality() == v1::QUALITY_STALE) return true;
+      const std::int64_t arrival_ns = frame_.arrival_ns();
+      double stages_us = 0.0;
+      for (const float stage_us : frame_.stage_us()) stages_us += static_cast<double>(stage_us);
+      noted_.messages.push_back({.arrival_ns = arrival_ns,
+                                 .decoded_ns = frame_.decoded_ns() - arrival_ns,
+                                 .stages_ns = nanoseconds(stages_us * 1e-6),
+                                 .sent_ns = frame_.published_ns() - arrival_ns,
+                                 .age_ns = came_ns - arrival_ns});
+      std::uint64_t& last = last_[frame_.stream()];
+      if (last != 0 && frame_.sequence() > last + 1) noted_.gaps += frame_.sequence() - last - 1;
+      last = frame_.sequence();
+    }
+    return true;
+  }
+
+  [[nodiscard]] const ReceivedMessages& noted() const { return noted_; }
+
+ private:
+  ReceivedMessages noted_;
+  v1::Frame frame_;
+  std::map<std::string, std::uint64_t> last_;  // sequence by stream
+};
+
+int note_until_stopped(PipePair& parent) {
+  auto context = net::open_context();
+  if (!context) return 1;
+  auto socket = net::open_socket(context->get(), ZMQ_SUB);
+  if (!socket) return 1;
+  for (const char* topic : {"pose/", "bare/"}) {
+    if (!net::set_option(socket->get(), ZMQ_SUBSCRIBE, std::string_view(topic))) return 1;
+  }
+  for (std::string endpoint; !(endpoint = parent.read_line()).empty();) {
+    if (!net::connect_socket(socket->get(), endpoint)) return 1;
+  }
+  Noter noter;
+  std::array<zmq_pollitem_t, 2> wait{
+      {{socket->get(), 0, ZMQ_POLLIN, 0}, {nullptr, parent.from(), ZMQ_POLLIN, 0}}};
+  while ((wait[1].revents & (ZMQ_POLLIN | ZMQ_POLLERR)) == 0) {
+    zmq_poll(wait.data(), static_cast<int>(wait.size()), kPoll_ms);
+    while (noter.take(socket->get())) {
+    }
+  }
+  const ReceivedMessages& noted = noter.noted();
+  const bool sent = parent.write(&noted.gaps, sizeof noted.gaps) &&
+                    parent.write(noted.messages.data(), noted.messages.size() * sizeof(Arrival));
+  return sent ? 0 : 1;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<HopSubscriber>> HopSubscriber::fork(bool gives_way) {
+  auto process = ChildProcess::fork(note_until_stopped, gives_way);
+  if (!process) return std::unexpected(process.error());
+  return std::unique_ptr<HopSubscriber>(new HopSubscriber(std::move(*process)));
+}
+
+void HopSubscriber::begin(const std::vector<std::string>& endpoints) {
+  for (const std::string& endpoint : endpoints) process_.pipes().write_line(endpoint);
+  process_.pipes().write_line("");
+}
+
+Result<ReceivedMessages> HopSubscriber::finish() {
+  process_.pipes().close_to();
+  ReceivedMessages received;
+  if (!process_.pipes().read(&received.gaps, sizeof received.gaps)) {
+    return fail("the subscriber's process ended early");
+  }
+  for (Arrival arrival; process_.pipes().read(&arrival, sizeof arrival);) {
+    received.messages.push_back(arrival);
+  }
+  return received;
+}
+
+}  // namespace posed::tools

@@ -1,0 +1,156 @@
+#include "daemon/tools/command/client.hpp"
+
+#include <csignal>
+#include <cstdio>
+
+#include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
+
+#include "daemon/net/refusal_words.hpp"
+#include "daemon/system/clock.hpp"
+#include "daemon/tools/command/number_range.hpp"
+#include "proto/zmq/keys.hpp"
+
+namespace posed::tools {
+namespace {
+
+using net::Domain;
+
+// A client must never show old poses, so only few messages may wait anywhere.
+constexpr int kMessagesWaiting = 16;
+constexpr int kReceiveBuffer = 8 * 1024;  // bytes
+
+volatile std::sig_atomic_t interrupt_came = 0;
+
+}  // namespace
+
+void add_client_options(CLI::App& command, ClientOptions& options, const char* endpoint) {
+  options.endpoint = endpoint;
+  command.add_option("--connect", options.endpoint, "The daemon's endpoint")
+      ->capture_default_str()
+      ->type_name("ENDPOINT");
+  auto* key = command.add_option("--key", options.key, "Own secret key (NAME.key)");
+  auto* server =
+      command.add_option("--server-key", options.server_key, "The daemon's public key (NAME.pub)");
+  key->type_name("FILE")->needs(server);
+  server->type_name("FILE")->needs(key);
+}
+
+Result<Connection> Connection::open(const ClientOptions& options, int type) {
+  auto context = net::open_context();
+  if (!context) return std::unexpected(context.error());
+  auto socket = net::open_socket(context->get(), type);
+  if (!socket) return std::unexpected(socket.error());
+  if (!options.key.empty()) {
+    auto secured = net::secure_client(socket->get(), options.key, options.server_key);
+    if (!secured) return std::unexpected(secured.error());
+  }
+  if (type == ZMQ_SUB) {
+    for (const auto& set : {net::set_option(socket->get(), ZMQ_RCVHWM, kMessagesWaiting),
+                            net::set_option(socket->get(), ZMQ_RCVBUF, kReceiveBuffer)}) {
+      if (!set) return std::unexpected(set.error());
+    }
+  }
+  auto monitor = net::LinkMonitor::open(context->get(), socket->get(), !options.key.empty());
+  if (!monitor) return std::unexpected(monitor.error());
+  if (auto done = net::connect_socket(socket->get(), options.endpoint); !done) {
+    return std::unexpected(done.error());
+  }
+  return Connection(options, type == ZMQ_SUB ? Domain::kPublish : Domain::kControl,
+                    std::move(*context), std::move(*socket), std::move(*monitor));
+}
+
+Connection::Connection(ClientOptions options, Domain domain, net::Context context,
+                       net::Socket socket, net::LinkMonitor monitor)
+    : options_(std::move(options)),
+      domain_(domain),
+      context_(std::move(context)),
+      socket_(std::move(socket)),
+      monitor_(std::move(monitor)) {}
+
+bool Connection::wait(std::chrono::milliseconds timeout) {
+  zmq_pollitem_t item{socket_.get(), 0, ZMQ_POLLIN, 0};
+  return zmq_poll(&item, 1, timeout.count()) > 0;
+}
+
+std::optional<Error> Connection::refusal() {
+  const std::string why = net::refusal_words(monitor_.take_news(), domain_, options_.server_key);
+  if (why.empty()) return std::nullopt;
+  return fail("the daemon at " + options_.endpoint + " " + why).error();
+}
+
+Error Connection::no_answer() const {
+  if (established()) {
+    return fail("the daemon at " + options_.endpoint + " does not answer; is this its " +
+                (domain_ == Domain::kControl ? "control" : "publish") + " endpoint?")
+        .error();
+  }
+  const char* const hint = domain_ == Domain::kControl
+                               ? " (a replay publishes, but takes no control)"
+                               : " (by default 5570 publishes, 5571 takes control)";
+  return fail("nothing answers at " + options_.endpoint +
+              "; is `posed run` going, and is this its endpoint?" + hint)
+      .error();
+}
+
+std::string Connection::silence(double silence_s) const {
+  return fmt::format("no answer for {:.0f} s: {}", silence_s,
+                     established() ? "the connection stands, but the daemon is stopped or stuck"
+                                   : "the daemon has ended, or cannot be reached");
+}
+
+SilenceWatch::SilenceWatch(const Connection& connection, double timeout_s)
+    : connection_(connection), timeout_s_(timeout_s), heart_(system::monotonic_ns()) {}
+
+void SilenceWatch::heard() { heart_.heard(system::monotonic_ns()); }
+
+std::string SilenceWatch::sentence(double silence_s) const {
+  if (!heart_.ever_heard()) return connection_.no_answer().message;
+  return connection_.endpoint() + ": " + connection_.silence(silence_s);
+}
+
+std::optional<std::string> SilenceWatch::silence() const {
+  const auto silence_s = heart_.silent_s(system::monotonic_ns());
+  if (!silence_s) return std::nullopt;
+  return heart_.ever_heard() ? connection_.silence(*silence_s) : connection_.no_answer().message;
+}
+
+std::optional<Error> SilenceWatch::report() {
+  const std::int64_t now_ns = system::monotonic_ns();
+  const auto silence_s = heart_.silent_s(now_ns);
+  if (timeout_s_ > 0.0 && silence_s && *silence_s >= timeout_s_) {
+    return fail(fmt::format("{}; gave up after {} s (--timeout)", sentence(*silence_s), timeout_s_))
+        .error();
+  }
+  const auto news_s = heart_.silence_to_report(now_ns);
+  if (news_s && prints_) {
+    std::fprintf(stderr, "posed: %s%s\n",
+                 heart_.ever_heard() ? "" : "waiting: ", sentence(*news_s).c_str());
+  }
+  if (const auto back_s = heart_.return_to_report(); back_s && prints_) {
+    std::fprintf(stderr, "posed: %s answers again, after %.0f s\n", connection_.endpoint().c_str(),
+                 *back_s);
+  }
+  return std::nullopt;
+}
+
+void add_timeout_option(CLI::App& command, double& timeout_s) {
+  command
+      .add_option("--timeout", timeout_s,
+                  "End with exit code 1 when the daemon has not answered for so many seconds;"
+                  " without it, wait")
+      ->type_name("SECONDS")
+      ->check(in_range(2.0, 1e6));
+}
+
+Interrupt::Interrupt() {
+  struct sigaction action{};
+  // no SA_RESTART, so that the signal ends a wait
+  action.sa_handler = [](int) { interrupt_came = 1; };
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+bool Interrupt::came() { return interrupt_came != 0 || std::ferror(stdout) != 0; }
+
+}  // namespace posed::tools

@@ -1,0 +1,105 @@
+// Shared by all commands that talk to a running daemon: their options, a connection that reports
+// why it cannot be established, and Ctrl-C.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "daemon/net/security.hpp"
+#include "daemon/tools/command/heartbeat.hpp"
+#include "proto/frame/result.hpp"
+#include "proto/zmq/link_monitor.hpp"
+#include "proto/zmq/zmq_handle.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace posed::tools {
+
+// Where a daemon listens by default.
+inline constexpr const char* kOwnPublish = "tcp://127.0.0.1:5570";
+inline constexpr const char* kOwnControl = "tcp://127.0.0.1:5571";
+
+struct ClientOptions {
+  std::string endpoint;
+  std::filesystem::path key;         // the client's own NAME.key; empty: no CURVE
+  std::filesystem::path server_key;  // the daemon's NAME.pub
+};
+
+// Adds --connect (default `endpoint`), --key and --server-key.
+void add_client_options(CLI::App& command, ClientOptions& options, const char* endpoint);
+
+// A connected socket that monitors its own connection.
+class Connection {
+ public:
+  // `type` is ZMQ_SUB or ZMQ_DEALER. Returns at once; libzmq connects in the background, and
+  // reconnects when necessary.
+  [[nodiscard]] static Result<Connection> open(const ClientOptions& options, int type);
+
+  [[nodiscard]] const std::string& endpoint() const { return options_.endpoint; }
+  [[nodiscard]] void* socket() const { return socket_.get(); }
+  // Waits for a message; returns false on timeout or a signal.
+  [[nodiscard]] bool wait(std::chrono::milliseconds timeout);
+
+  // Why the daemon refuses this client, in one sentence, once that is known. Call from time to
+  // time.
+  [[nodiscard]] std::optional<Error> refusal();
+  // Whether the connection is established, as of the last call of refusal().
+  [[nodiscard]] bool established() const { return monitor_.established(); }
+  [[nodiscard]] Error no_answer() const;  // the error if nothing answers at the endpoint
+  // The sentence for a daemon that has answered before but has been silent for `silence_s`.
+  [[nodiscard]] std::string silence(double silence_s) const;
+
+ private:
+  Connection(ClientOptions options, net::Domain domain, net::Context context, net::Socket socket,
+             net::LinkMonitor monitor);
+
+  ClientOptions options_;
+  net::Domain domain_;
+  net::Context context_;
+  net::Socket socket_;
+  net::LinkMonitor monitor_;
+};
+
+// Watches the daemon's heartbeat, its stats, and prints on stderr when it falls silent and when it
+// is back.
+class SilenceWatch {
+ public:
+  // `connection` outlives it. `timeout_s`: give up after this much silence; 0: never.
+  SilenceWatch(const Connection& connection, double timeout_s);
+
+  void heard();  // call for every message
+  // Call from time to time: prints what is new. Returns an error when it is time to give up.
+  [[nodiscard]] std::optional<Error> report();
+  // The sentence to show while the daemon is silent; empty while it answers.
+  [[nodiscard]] std::optional<std::string> silence() const;
+  // Whether report() prints; a full-screen view shows silence() instead.
+  void print(bool yes) { prints_ = yes; }
+
+ private:
+  [[nodiscard]] std::string sentence(double silence_s) const;
+
+  const Connection& connection_;
+  double timeout_s_;
+  bool prints_ = true;
+  Heartbeat heart_;
+};
+
+// Adds --timeout: how long to wait for a daemon that does not answer; 0, the default: for ever.
+void add_timeout_option(CLI::App& command, double& timeout_s);
+
+// How often a waiting client checks keys, signals and refusals.
+inline constexpr std::chrono::milliseconds kLookAround{100};
+
+// While one exists, SIGINT and SIGTERM only set a flag. A reader of stdout that has gone (`posed
+// monitor | head`) counts as an interrupt, too.
+class Interrupt {
+ public:
+  Interrupt();
+  [[nodiscard]] static bool came();
+};
+
+}  // namespace posed::tools

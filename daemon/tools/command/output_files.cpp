@@ -1,0 +1,129 @@
+#include "daemon/tools/command/output_files.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+
+#include <CLI/CLI.hpp>
+
+#include "proto/clip/file_names.hpp"
+
+namespace posed::tools {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Extensions of formats that posed or other programs recognise.
+constexpr std::array<std::string_view, 24> kFormats{
+    ".bvh",  ".amc", ".asf",  ".csv",  ".style", ".gesture", ".toml", ".lab",
+    ".plog", ".svg", ".dot",  ".gv",   ".txt",   ".json",    ".bin",  ".key",
+    ".pub",  ".glb", ".vrma", ".mcap", ".png",   ".mp4",     ".html", ".jsonl"};
+
+std::string listed(const std::vector<std::string_view>& extensions) {
+  std::string text;
+  for (std::size_t i = 0; i < extensions.size(); ++i) {
+    if (i > 0) text += i + 1 == extensions.size() ? " or " : ", ";
+    text += extensions[i];
+  }
+  return text;
+}
+
+// Whether both names are the same file, whether or not it exists already.
+bool same_file(const fs::path& a, const fs::path& b) {
+  std::error_code error;
+  if (fs::equivalent(a, b, error)) return true;
+  const fs::path whole_a = fs::weakly_canonical(fs::absolute(a, error), error);
+  const fs::path whole_b = fs::weakly_canonical(fs::absolute(b, error), error);
+  return !error && whole_a == whole_b;
+}
+
+Result<> check_place(const fs::path& path) {
+  std::error_code error;
+  if (fs::is_directory(path, error)) return misuse("is a folder; name a file in it", path.string());
+  if (fs::exists(path, error) && !fs::is_regular_file(path, error)) {
+    return misuse("is not a regular file; name another one to write to", path.string());
+  }
+  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+  if (!fs::is_directory(folder, error)) {
+    return misuse("its folder is not there; make it, or name another file", path.string());
+  }
+  if (::access(folder.c_str(), W_OK) != 0) {
+    return misuse("its folder cannot be written to; name a file elsewhere", path.string());
+  }
+  return {};
+}
+
+}  // namespace
+
+bool is_amc(const fs::path& path) { return clip::extension_of(path) == ".amc"; }
+
+CLI::Option* add_overwrite_option(CLI::App& command, bool& overwrite) {
+  return command.add_flag("--overwrite", overwrite, "Replace files that are there already");
+}
+
+CLI::Option* add_report_option(CLI::App& command, std::string& path) {
+  return command.add_option("--report", path, "Figures and tables, too, as one HTML page")
+      ->type_name("OUT.html");
+}
+
+void add_report_file(CLI::App& command, ReportFile& file) {
+  auto* report = add_report_option(command, file.path);
+  add_overwrite_option(command, file.overwrite)->needs(report);
+}
+
+Result<> ReportFile::check() const {
+  return OutputFiles(overwrite).writes(path, {".html"}).check();
+}
+
+OutputFiles& OutputFiles::reads(const fs::path& path) {
+  if (!path.empty()) inputs_.push_back(path);
+  return *this;
+}
+
+OutputFiles& OutputFiles::writes(const fs::path& path, std::vector<std::string_view> extensions) {
+  if (!path.empty()) outputs_.push_back({path, std::move(extensions), true});
+  return *this;
+}
+
+OutputFiles& OutputFiles::writes_any_but_other(const fs::path& path,
+                                               std::vector<std::string_view> extensions) {
+  if (!path.empty()) outputs_.push_back({path, std::move(extensions), false});
+  return *this;
+}
+
+Result<> OutputFiles::check() const {
+  for (auto output = outputs_.begin(); output != outputs_.end(); ++output) {
+    if (auto ok = check(*output); !ok) return ok;
+    const auto twice = std::any_of(outputs_.begin(), output, [&](const Output& other) {
+      return same_file(other.path, output->path);
+    });
+    if (twice) return misuse("would be written twice; name two files", output->path.string());
+  }
+  return {};
+}
+
+Result<> OutputFiles::check(const Output& output) const {
+  const std::string extension = clip::extension_of(output.path);
+  const bool right = std::ranges::find(output.extensions, extension) != output.extensions.end();
+  const bool other = std::ranges::find(kFormats, extension) != kFormats.end();
+  if (!right && (output.strict || other)) {
+    return misuse("does not end in " + listed(output.extensions) + "; choose such a name",
+                  output.path.string());
+  }
+  for (const fs::path& input : inputs_) {
+    if (same_file(input, output.path)) {
+      return misuse("is read by this command; name another file, so that nothing is lost",
+                    output.path.string());
+    }
+  }
+  if (auto ok = check_place(output.path); !ok) return ok;
+  std::error_code error;
+  if (!overwrite_ && fs::exists(output.path, error)) {
+    return misuse("exists already; name another file, or add --overwrite to replace it",
+                  output.path.string());
+  }
+  return {};
+}
+
+}  // namespace posed::tools

@@ -1,0 +1,282 @@
+// The demo: makes two families of synthetic walkers and a signer's glove recording, trains a style
+// model from the families and a gesture model from the glove, streams a walker that is not in the
+// training data through the daemon and watches it over ZeroMQ, as any client would.
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <spdlog/fmt/fmt.h>
+#include <zmq.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/assembly/daemon.hpp"
+#include "daemon/config/config.hpp"
+#include "daemon/logging/log_output.hpp"
+#include "daemon/tools/command/client.hpp"
+#include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/output_files.hpp"
+#include "daemon/tools/command/paint.hpp"
+#include "daemon/tools/demo/demo_clips.hpp"
+#include "daemon/tools/demo/demo_folder.hpp"
+#include "daemon/tools/demo/demo_hand.hpp"
+#include "daemon/tools/demo/demo_screen.hpp"
+#include "daemon/tools/demo/demo_watcher.hpp"
+#include "daemon/tools/emulate/synthetic_signer.hpp"
+#include "daemon/tools/gesture/gesture_data.hpp"
+#include "daemon/tools/gesture/train_gesture.hpp"
+#include "daemon/tools/live/live_table.hpp"
+#include "daemon/tools/live/page.hpp"
+#include "daemon/tools/style/train_style.hpp"
+#include "daemon/tools/view/bridge.hpp"
+
+namespace posed::tools {
+namespace {
+
+using SteadyClock = std::chrono::steady_clock;
+constexpr double kFirstFrameWithin_s = 10.0;
+constexpr double kHandRate_hz = 30.0;
+
+struct DemoOptions {
+  std::filesystem::path config;   // empty: the demo's own
+  std::filesystem::path folder;   // of clips and models; empty: the user's cache
+  std::filesystem::path prepare;  // only make clips and models in this folder
+  std::optional<double> seconds;
+  bool overwrite = false;
+  bool no_browser = false;
+};
+
+// Makes the demo's files, unless this program has made them before.
+Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
+  const DemoFolder kept(folder);
+  if (auto own = kept.check_is_own(demo_file_names(), overwrite); !own) return own;
+  if (kept.is_up_to_date()) {
+    std::fprintf(stderr, "1-3/4 using what was made and learnt before, in %s\n", folder.c_str());
+    return {};
+  }
+  std::fprintf(stderr, "1/4 making synthetic walkers and a synthetic signer in %s\n",
+               folder.c_str());
+  if (auto begun = kept.begin(); !begun) return begun;
+  const auto clips = make_demo_clips(folder);
+  if (!clips) return std::unexpected(clips.error());
+  std::fprintf(stderr, "2/4 learning the style march -> sway from %zu clips\n",
+               clips->from.size() + clips->to.size());
+  Experiment experiment;
+  experiment.targets = {"sway"};
+  // The same number is the same person in both families.
+  for (std::size_t i = 0; i < clips->from.size(); ++i) {
+    const std::string person = std::to_string(i + 1);
+    experiment.clips.push_back({clips->from[i], "march", person, "walk", 0});
+    experiment.clips.push_back({clips->to[i], "sway", person, "walk", 0});
+  }
+  OneRank alone;
+  const auto report = train_and_save(experiment, 0, {.model = folder / kDemoModel}, alone);
+  if (!report) return std::unexpected(report.error());
+  const std::string verdict = (*report)["verdict"].get<std::string>();
+  if (!(*report)["written"].get<bool>()) return fail("the demo's own model is " + verdict);
+  std::fprintf(stderr, "    %s\n", verdict.c_str());
+  std::fprintf(stderr, "3/4 learning the gestures g, c and p from a labelled glove recording\n");
+  const auto recording = load_recording(clips->glove, clips->labels, kHandRate_hz);
+  if (!recording) return std::unexpected(recording.error());
+  const auto hand = train_gesture_and_save({*recording}, {}, folder / kDemoHand, alone);
+  if (!hand) return std::unexpected(hand.error());
+  return kept.finish();
+}
+
+// Receives every message that waits.
+void drain(Connection& connection, Watcher& watcher, DemoScreen& screen) {
+  net::Message topic, body;
+  while (topic.receive(connection.socket()) && topic.more() &&
+         body.receive(connection.socket(), 0)) {
+    screen.take(topic.text(), body.bytes());
+    if (!topic.text().starts_with("pose/")) continue;
+    watcher.take(std::string(topic.text()), body.bytes().data(), body.bytes().size());
+  }
+}
+
+double seconds_since(SteadyClock::time_point then) {
+  return std::chrono::duration<double>(SteadyClock::now() - then).count();
+}
+
+// Serves the page for the browser. Null if it cannot be, which a line says: the terminal shows the
+// streams, too.
+std::unique_ptr<view::Bridge> serve_page_of(const assembly::Daemon& daemon,
+                                            const DemoOptions& options) {
+  const auto why_not = [](const Error& error) {
+    logging::say("posed: no page beside this terminal: " + error.text());
+    return nullptr;
+  };
+  const auto page = find_page({});
+  if (!page) return why_not(page.error());
+  auto bridge = view::Bridge::start(
+      {.link = {.connect = daemon.publish_endpoint(), .control = daemon.control_endpoint()},
+       .page = *page,
+       .or_any_port = true});
+  if (!bridge) return why_not(bridge.error());
+  std::fprintf(stderr, "see it: %s\n", (*bridge)->url().c_str());
+  if (!options.no_browser) open_browser((*bridge)->url());
+  return std::move(*bridge);
+}
+
+// Shows the running daemon until Ctrl-C or until `seconds` after the first frame. `url`: the page's
+// address; empty: there is none.
+Result<> watch(const assembly::Daemon& daemon, const DemoOptions& options, const std::string& url,
+               Watcher& watcher, DemoHand& hand) {
+  ClientOptions client;
+  client.endpoint = daemon.publish_endpoint();
+  auto connection = Connection::open(client, ZMQ_SUB);
+  if (!connection) return std::unexpected(connection.error());
+  if (auto set = net::set_option(connection->socket(), ZMQ_SUBSCRIBE, "pose/"); !set) return set;
+  DemoScreen screen(daemon, *connection, url);
+  const auto start = SteadyClock::now();
+  std::optional<SteadyClock::time_point> first_frame;
+  while (!Interrupt::came() && !screen.quits() && !daemon.asked_to_stop()) {
+    if (connection->wait(kLookAround)) drain(*connection, watcher, screen);
+    if (!first_frame && watcher.styled() > 0) first_frame = SteadyClock::now();
+    if (first_frame && options.seconds && seconds_since(*first_frame) >= *options.seconds) break;
+    if (first_frame) {
+      if (auto tended = hand.tend(seconds_since(*first_frame)); !tended) return tended;
+    }
+    if (!first_frame && seconds_since(start) > kFirstFrameWithin_s) {
+      return fail("no styled frame arrived within 10 s; the log above says why");
+    }
+    screen.show(watcher, hand);
+  }
+  return {};
+}
+
+// Starts a synthetic signer for every stream whose device is not set in the config.
+using Signers = std::vector<std::unique_ptr<emulate::SyntheticSigner>>;
+Result<Signers> put_on_gloves(config::DaemonConfig& config, const std::filesystem::path& clip) {
+  Signers signers;
+  for (config::StreamConfig& stream : config.streams) {
+    const auto port = stream.options.find("port");
+    if (port == stream.options.end() || !std::get<std::string>(port->second).empty()) continue;
+    auto signer = emulate::SyntheticSigner::start(stream.driver, clip);
+    if (!signer) return std::unexpected(signer.error());
+    port->second = (*signer)->port();
+    signers.push_back(std::move(*signer));
+  }
+  return signers;
+}
+
+// What was seen, for a terminal of 80 columns.
+void print_summary(const Watcher& watcher, const DemoHand& hand, const v1::Stats& stats) {
+  const auto print = [](const std::string& text) {
+    for (const std::string& line : wrapped(text, 80, "  ")) std::puts(line.c_str());
+  };
+  print(fmt::format(
+      "received {} styled frames over ZeroMQ, {} missing; {:.1f} deg rms from the raw poses",
+      watcher.styled(), watcher.gaps(), watcher.change_deg()));
+  if (const std::string summary = hand.summary(); !summary.empty()) print(summary);
+  for (const v1::StreamStats& s : stats.stream()) {
+    print(
+        fmt::format("{}: {:.1f} frames/s, arrival to ZeroMQ {} (99 %: {}), dropped {}, skipped {}",
+                    s.stream(), s.rate_hz(), people_duration(s.publish().p50_us()),
+                    people_duration(s.publish().p99_us()), s.dropped(), s.shed()));
+  }
+}
+
+Result<> stream(const DemoOptions& options, const std::filesystem::path& folder) {
+  const auto own = folder / kDemoConfig;
+  auto config =
+      config::load_config(options.config.empty() ? own : options.config, drivers::registry());
+  if (!config) return std::unexpected(config.error());
+  logging::sum_up_repeats();
+  const Interrupt interrupt;
+  const auto signers = put_on_gloves(*config, folder / kDemoSigner);
+  if (!signers) return std::unexpected(signers.error());
+  auto daemon = assembly::Daemon::open(*config);
+  if (!daemon) return std::unexpected(daemon.error());
+  if (auto started = (*daemon)->start(); !started) return started;
+  const auto bridge = serve_page_of(**daemon, options);
+  std::fprintf(stderr, "4/4 streaming %s (not learnt from) on %s\n", kDemoWalker,
+               (*daemon)->publish_endpoint().c_str());
+  auto hand = DemoHand::open((*daemon)->control_endpoint());
+  if (!hand) return std::unexpected(hand.error());
+  Watcher watcher(*hand);
+  const std::string url = bridge ? bridge->url() : "";
+  const auto watched = watch(**daemon, options, url, watcher, *hand);
+  const v1::Stats stats = (*daemon)->stats();
+  (*daemon)->stop();
+  if (!watched) return watched;
+  std::puts("");
+  print_summary(watcher, *hand, stats);
+  return {};
+}
+
+// The folder for clips and models, in which the config looks for them.
+Result<std::filesystem::path> folder_of(const DemoOptions& options) {
+  if (!options.folder.empty()) return std::filesystem::absolute(options.folder);
+  if (options.config.empty()) return demo_cache_folder();
+  const auto config = config::load_config(options.config, drivers::registry());
+  if (!config) return std::unexpected(config.error());
+  for (const config::StreamConfig& stream : config->streams) {
+    for (const config::StageConfig& stage : stream.stages) {
+      if (stage.model.filename() != kDemoModel) continue;
+      return std::filesystem::absolute(stage.model).lexically_normal().parent_path();
+    }
+  }
+  return misuse("no stream has the demo's model, " + std::string(kDemoModel) +
+                    "; `posed run --config` streams any other config",
+                options.config.string());
+}
+
+Result<> check_options(const DemoOptions& options) {
+  if (!options.prepare.empty() && (!options.config.empty() || !options.folder.empty() ||
+                                   options.seconds || options.no_browser)) {
+    return misuse(
+        "--prepare streams nothing; leave out --config, --folder, --seconds and --no-browser");
+  }
+  if (!options.config.empty() && !options.folder.empty()) {
+    return misuse("--config says where its files are; leave out --folder");
+  }
+  return {};
+}
+
+Result<> demo(const DemoOptions& options) {
+  if (auto ok = check_options(options); !ok) return ok;
+  if (!options.prepare.empty()) return prepare(options.prepare, options.overwrite);
+  const auto folder = folder_of(options);
+  if (!folder) return std::unexpected(folder.error());
+  if (auto prepared = prepare(*folder, options.overwrite); !prepared) return prepared;
+  return stream(options, *folder);
+}
+
+}  // namespace
+
+void add_demo(CLI::App& app, int& exit_code) {
+  auto* command =
+      app.add_subcommand("demo", "Learn a style from synthetic walkers and stream a new one");
+  const auto options = std::make_shared<DemoOptions>();
+  command->add_option("--config", options->config, "What to stream (default: the demo's own)")
+      ->type_name("FILE.toml");
+  command
+      ->add_option("--folder", options->folder,
+                   "Where clips and models are kept (default: ~/.cache/posed/demo)")
+      ->type_name("DIR");
+  command
+      ->add_option("--prepare", options->prepare,
+                   "Only make the clips and the models in this folder")
+      ->type_name("DIR");
+  add_overwrite_option(*command, options->overwrite);
+  command->add_option("--seconds", options->seconds, "End so long after the first frame")
+      ->check(above_zero());
+  command->add_flag("--no-browser", options->no_browser,
+                    "Print the page's address, open no browser");
+  command->footer(R"(Examples:
+  posed demo                      # from anywhere; its first line is the page for your browser
+  posed demo --seconds 10
+  posed demo --prepare build/demo # what ./run build does
+Clips and models are kept in $XDG_CACHE_HOME/posed/demo (~/.cache/posed/demo), with a demo.toml that
+`posed run --config` streams, too; another build of posed makes them again.)");
+  command->callback([options, &exit_code] {
+    if (auto done = demo(*options); !done) exit_code = report(done.error());
+  });
+}
+
+}  // namespace posed::tools

@@ -1,0 +1,89 @@
+#include "daemon/tools/demo/demo_screen.hpp"
+
+#include <algorithm>
+#include <cerrno>  // program_invocation_name
+
+#include <spdlog/fmt/fmt.h>
+
+#include "daemon/assembly/daemon.hpp"
+
+namespace posed::tools {
+namespace {
+
+using namespace std::chrono_literals;
+
+// The figure moves often; numbers that change often cannot be read.
+constexpr auto kDrawEvery = 100ms, kLookEvery = 500ms, kPlainLinesEvery = 5000ms;
+constexpr auto kStatsEvery = 1000ms;  // a bar of the latency
+
+// How this program was called, for the commands that it suggests.
+std::string own_name() {
+  const std::string name = program_invocation_name;
+  return name.contains('/') ? name : "posed";
+}
+
+// Whether that time has passed since the last time; the first time it has.
+bool is_due(std::optional<std::chrono::steady_clock::time_point>& last,
+            std::chrono::milliseconds every) {
+  const auto now = std::chrono::steady_clock::now();
+  if (last && now - *last < every) return false;
+  last = now;
+  return true;
+}
+
+}  // namespace
+
+DemoScreen::DemoScreen(const assembly::Daemon& daemon, const Connection& connection,
+                       const std::string& url)
+    : daemon_(daemon),
+      first_line_(url.empty() ? "" : "see it: " + url),
+      chosen_(connection, {.endpoint = daemon.control_endpoint(), .key = {}, .server_key = {}}),
+      view_{.title = "posed demo " + daemon.publish_endpoint()} {
+  if (!screen_.is_terminal()) return;
+  view_.panel = [this](int rows) { return chosen_.lines(stats_, view_.width, rows); };
+}
+
+bool DemoScreen::quits() {
+  for (Key key = screen_.next_key(); key != Key::kNone; key = screen_.next_key()) {
+    if (key == Key::kQuit) return true;
+    answer_.reset();
+    chosen_.obey(key, stats_);
+  }
+  if (auto note = chosen_.note()) answer_ = std::move(note);
+  return false;
+}
+
+// Renews the numbers.
+void DemoScreen::look(Watcher& watcher, const DemoHand& hand) {
+  const bool first = stats_.time_ns() == 0;
+  stats_ = daemon_.stats();
+  if (screen_.is_terminal() && is_due(taken_, kStatsEvery)) chosen_.take(stats_);
+  view_.notes.clear();
+  if (screen_.is_terminal() || first) {
+    view_.notes.push_back(fmt::format(
+        "in another terminal: {0} monitor, or: {0} ctl play hand \"p 4 3 1 g\"", own_name()));
+  }
+  if (!screen_.is_terminal() && first) view_.notes.push_back("Ctrl-C ends the demo");
+  view_.notes.push_back(
+      fmt::format("received {} styled frames, {} missing; {:.1f} deg rms from the raw pose",
+                  watcher.styled(), watcher.gaps(), watcher.change_lately_deg()));
+  view_.notes.push_back(hand.note());
+  if (answer_) view_.notes.push_back(*answer_);
+}
+
+void DemoScreen::show(Watcher& watcher, const DemoHand& hand) {
+  if (!is_due(drawn_, screen_.is_terminal() ? kDrawEvery : kPlainLinesEvery)) return;
+  if (!screen_.is_terminal() || is_due(looked_, kLookEvery)) look(watcher, hand);
+  screen_.measure(view_);
+  view_.chosen = screen_.is_terminal() ? chosen_.name() : "";
+  // Elsewhere than on a terminal the address was printed once, before the first of many views.
+  const bool headed = screen_.is_terminal() && !first_line_.empty();
+  // A terminal that is too narrow for it shows the address on two lines.
+  const int columns = static_cast<int>(first_line_.size());
+  if (headed) view_.height -= (columns + view_.width - 1) / std::max(view_.width, 1);
+  std::vector<std::string> lines = live_view(stats_, view_);
+  if (headed) lines.insert(lines.begin(), first_line_);
+  screen_.draw(lines);
+}
+
+}  // namespace posed::tools

@@ -1,0 +1,296 @@
+// `posed calibrate`: calibrates a user's glove from a few poses, or from another program's file.
+#include <unistd.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/hand_option.hpp"
+#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/output_files.hpp"
+#include "daemon/tools/devices/calibrate_poses.hpp"
+#include "daemon/tools/devices/calibrated_hand.hpp"
+#include "daemon/tools/devices/driver_options.hpp"
+#include "daemon/tools/devices/good_poses.hpp"
+#include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/device_info.hpp"
+#include "drivers/glove/import.hpp"
+#include "drivers/glove/traits.hpp"
+#include "proto/clip/text.hpp"
+
+namespace posed::tools {
+namespace {
+
+using drivers::glove::CalibrationFile;
+using drivers::glove::kPoseNames;
+
+constexpr double kMaxSeconds = 60.0;
+constexpr int kHandColumns = 60, kHandRows = 10;  // of the picture of the calibrated hand
+
+struct CalibrateOptions {
+  std::string driver, port, id, stream, user;
+  std::string hand;  // empty: right, or with --connect the stream's
+  std::filesystem::path import, out;
+  std::vector<std::string> set;    // KEY=VALUE
+  std::vector<std::string> poses;  // POSE=SECONDS
+  double seconds = 0.0;            // 0: the user starts each pose with Enter
+  double ready_s = 3.0;            // time to change from pose to pose without a key
+  ClientOptions client;
+  bool live = false;
+  bool ready_given = false;
+  bool overwrite = false;
+  bool force = false;  // write the file although the check calls it unusable
+};
+
+Result<const drivers::Driver*> named_driver(const std::string& name) {
+  const drivers::Driver* driver = drivers::find_driver(name);
+  if (driver != nullptr && driver->glove != nullptr) return driver;
+  std::string known;
+  for (const drivers::Driver& other : drivers::registry()) {
+    if (other.glove != nullptr) known += (known.empty() ? "" : ", ") + std::string(other.name);
+  }
+  return misuse("--driver names the glove's driver, one of " + known);
+}
+
+Result<drivers::Options> driver_options(const drivers::Driver& driver,
+                                        const CalibrateOptions& options) {
+  std::vector<std::string> words = options.set;
+  words.push_back("hand=" + (options.hand.empty() ? "right" : options.hand));
+  if (!options.port.empty()) words.push_back("port=" + options.port);
+  if (!options.id.empty()) words.push_back("id=" + options.id);
+  return parse_driver_options(driver, words);
+}
+
+Result<PosePlan> plan_of(const CalibrateOptions& options) {
+  PosePlan plan;
+  if (options.seconds > 0.0) {
+    plan.seconds.fill(options.seconds);
+    plan.ready_s = options.ready_s;
+  }
+  for (const std::string& word : options.poses) {
+    const auto equals = word.find('=');
+    const auto name = std::ranges::find(kPoseNames, std::string_view(word).substr(0, equals));
+    double seconds = -1.0;
+    if (equals != std::string::npos) {
+      const char* const end = word.data() + word.size();
+      const auto [stop, error] = std::from_chars(word.data() + equals + 1, end, seconds);
+      if (error != std::errc() || stop != end) seconds = -1.0;
+    }
+    if (name == kPoseNames.end() || !(seconds >= 0.0 && seconds <= kMaxSeconds)) {
+      return misuse("'" + word + "': --pose is flat, fist, thumb or spread =SECONDS, 0 to 60");
+    }
+    plan.seconds[static_cast<std::size_t>(name - kPoseNames.begin())] = seconds;
+  }
+  if (plan.seconds[0] <= 0.0) return misuse("the flat hand cannot be left out");
+  return plan;
+}
+
+// The glove of a running stream is already set up; options that would change it are an error.
+Result<std::unique_ptr<GloveSource>> connect(const CalibrateOptions& options) {
+  if (options.stream.empty()) return misuse("--connect also needs --stream");
+  auto source = GloveSource::connect(options.client, options.stream);
+  if (!source) return source;
+  const std::string& driver = (*source)->model().driver;
+  const std::string_view hand = drivers::glove::side_name((*source)->hand());
+  if (!options.driver.empty() && options.driver != driver) {
+    return misuse("stream '" + options.stream + "' is of driver '" + driver +
+                  "': leave out --driver");
+  }
+  if (!options.hand.empty() && options.hand != hand) {
+    return misuse("stream '" + options.stream + "' is of a " + std::string(hand) +
+                  " hand: name the other hand's stream, or leave out --hand");
+  }
+  return source;
+}
+
+// A glove that a daemon uses can be calibrated through that daemon, without ending it; the error
+// says so.
+Error with_way_through(Error error) {
+  if (error.message.contains(" is in use")) {
+    error.message +=
+        "; or, if a posed daemon has it, go through that: posed calibrate --connect "
+        "tcp://127.0.0.1:5570 --stream NAME (`posed top` shows the names)";
+  }
+  return error;
+}
+
+Result<std::unique_ptr<GloveSource>> open_glove(const CalibrateOptions& options) {
+  if (options.live) return connect(options);
+  const auto driver = named_driver(options.driver);
+  if (!driver) return std::unexpected(driver.error());
+  const auto completed = driver_options(**driver, options);
+  if (!completed) return std::unexpected(completed.error());
+  auto source = GloveSource::open(**driver, *completed);
+  if (!source) return std::unexpected(with_way_through(source.error()));
+  return source;
+}
+
+// The glove that a calibration is for. A port's path does not identify it, because the same glove
+// may be plugged in elsewhere tomorrow.
+CalibrationFile blank_file(const GloveSource& source) {
+  const std::string& identity = source.identity();
+  return {.driver = source.model().driver,
+          .glove = identity.starts_with('/') ? std::string() : identity,
+          .user = {},
+          .hand = source.hand(),
+          .parameters = {},
+          .sensors = {}};
+}
+
+// Draws the calibrated hand for a user at a terminal. An error says that the file is none that a
+// driver would take.
+Result<> show_hand(const GloveSource& source, const CalibrationFile& file,
+                   const drivers::glove::Recorded& recorded) {
+  const auto calibration =
+      drivers::glove::make_calibration(source.model(), file, source.hand(), source.identity());
+  if (!calibration) return std::unexpected(calibration.error());
+  if (::isatty(STDERR_FILENO) == 0) return {};
+  std::fputs("the calibrated hand, in the poses as they were held:\n", stderr);
+  for (const std::string& line : calibrated_hand(source.model(), **calibration, source.hand(),
+                                                 recorded, kHandColumns, kHandRows)) {
+    std::fprintf(stderr, "%s\n", line.c_str());
+  }
+  return {};
+}
+
+Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
+  const auto plan = plan_of(options);
+  if (!plan) return std::unexpected(plan.error());
+  const auto source = open_glove(options);
+  if (!source) return std::unexpected(source.error());
+  const auto recorded = good_poses(**source, *plan, options.user, options.force);
+  if (!recorded) return std::unexpected(recorded.error());
+  auto fitted = drivers::glove::fit_poses((*source)->model(), *recorded);
+  if (!fitted) return std::unexpected(fitted.error());
+  for (const std::string& warning : fitted->warnings) {
+    std::fprintf(stderr, "posed: warning: %s\n", warning.c_str());
+  }
+  CalibrationFile file = blank_file(**source);
+  file.sensors = std::move(fitted->sensors);
+  if (auto shown = show_hand(**source, file, *recorded); !shown) {
+    return std::unexpected(shown.error());
+  }
+  return file;
+}
+
+// Without a device only the driver and the hand are known; through a daemon the glove is known,
+// too.
+Result<CalibrationFile> from_file(const CalibrateOptions& options) {
+  if (options.live) {
+    const auto source = connect(options);
+    if (!source) return std::unexpected(source.error());
+    auto file =
+        drivers::glove::import_calibration(options.import, (*source)->model(), (*source)->hand());
+    if (file) file->glove = blank_file(**source).glove;
+    return file;
+  }
+  const auto driver = named_driver(options.driver.empty() ? "cyberglove" : options.driver);
+  if (!driver) return std::unexpected(driver.error());
+  const auto completed = driver_options(**driver, options);
+  if (!completed) return std::unexpected(completed.error());
+  const auto description = (*driver)->expect(*completed);
+  if (!description) return std::unexpected(description.error());
+  const auto model = (*driver)->glove->glove_model(*description);
+  if (!model) return std::unexpected(model.error());
+  const Side hand = side_named(options.hand);
+  return drivers::glove::import_calibration(options.import, *model, hand);
+}
+
+// Checked before the user goes through the poses. An option that would have no effect is refused.
+Result<> check_options(const CalibrateOptions& options) {
+  if (options.user.empty()) {
+    return misuse("--user is empty; name whose hand it is, as in --user ann");
+  }
+  if (!options.live && !options.stream.empty()) return misuse("--stream also needs --connect");
+  const bool timed = options.seconds > 0.0;
+  if (!options.import.empty() && (timed || !options.poses.empty())) {
+    return misuse("--import goes through no poses; leave out --seconds and --pose");
+  }
+  if (!timed && options.ready_given) {
+    return misuse("--ready is the time between poses that begin by themselves; add --seconds");
+  }
+  return OutputFiles(options.overwrite)
+      .reads(options.import)
+      .writes_any_but_other(options.out, {".toml"})
+      .check();
+}
+
+Result<> calibrate(const CalibrateOptions& options) {
+  const Interrupt interrupt;
+  if (auto ok = check_options(options); !ok) return ok;
+  auto file = options.import.empty() ? from_poses(options) : from_file(options);
+  if (!file) return std::unexpected(file.error());
+  file->user = options.user;
+  const std::string text = drivers::glove::format_calibration(*file);
+  auto written = clip::write_text(options.out, [&](std::ostream& out) { out << text; });
+  if (!written) return written;
+  const std::string out = options.out.string();
+  std::fprintf(stderr, "%zu sensors calibrated: %s\n", file->sensors.size(), out.c_str());
+  if (options.live) {
+    std::fprintf(stderr, "use it now:     posed ctl calibrate %s %s\n", options.stream.c_str(),
+                 out.c_str());
+  }
+  std::fprintf(stderr, "use it always:  calibration = \"%s\" in the stream's table\n", out.c_str());
+  return {};
+}
+
+}  // namespace
+
+void add_calibrate(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("calibrate", "Fit a glove to its user, by a few poses");
+  auto options = std::make_shared<CalibrateOptions>();
+  add_client_options(*command, options->client, "tcp://127.0.0.1:5570");
+  auto* connect = command->get_option("--connect");
+  command->add_option("--stream", options->stream, "The glove's stream in the daemon")
+      ->type_name("NAME");
+  command->add_option("--driver", options->driver, "The glove's driver")->type_name("NAME");
+  auto* port = command->add_option("--port", options->port, "Its port, such as /dev/ttyUSB0");
+  port->type_name("PORT")->excludes(connect);
+  command->add_option("--id", options->id, "Its id, as posed devices lists it")
+      ->type_name("ID")
+      ->excludes(connect);
+  command->add_option("--set", options->set, "An option of the driver, like baud=38400")
+      ->type_name("KEY=VALUE");
+  command->add_option("--user", options->user, "Whose hand it is")->required();
+  command->add_option("--hand", options->hand, "right or left; with --connect the stream's")
+      ->default_str("right")
+      ->check(CLI::IsMember({"right", "left"}));
+  command->add_option("--import", options->import, "Another program's calibration, no poses")
+      ->type_name("FILE");
+  command
+      ->add_option("--seconds", options->seconds, "Hold each pose this long; it begins by itself")
+      ->check(in_range(0.1, kMaxSeconds));
+  auto* ready =
+      command->add_option("--ready", options->ready_s, "With --seconds: the time from pose to pose")
+          ->capture_default_str()
+          ->check(in_range(0.0, kMaxSeconds));
+  add_overwrite_option(*command, options->overwrite);
+  command->add_flag("--force", options->force, "Write the calibration even if poses failed");
+  command->add_option("--pose", options->poses, "How long one pose is held; 0 leaves it out")
+      ->type_name("POSE=SECONDS");
+  command->add_option("--out", options->out, "The calibration to write")
+      ->type_name("C.toml")
+      ->required();
+  command->footer(
+      R"(Poses: flat, fist, thumb, spread. On a terminal a screen shows what to do; elsewhere
+a line on stdout names each pose and a line on stdin begins it, or --seconds does. A pose in which
+the hand moved, or whose sensors hardly moved from the flat hand, fails: the screen asks for it
+again, a script gets exit code 1 and no file. Examples:
+  posed calibrate --driver cyberglove --port /dev/ttyUSB0 --user ann --out ann.toml
+  posed calibrate --connect tcp://127.0.0.1:5570 --stream right --user ann --out ann.toml
+  posed calibrate --driver cyberglove --import old.cal --user ann --out ann.toml)");
+  command->callback([options, connect, ready, &exit_code] {
+    options->live = connect->count() > 0;
+    options->ready_given = ready->count() > 0;
+    if (auto done = calibrate(*options); !done) exit_code = report(done.error());
+  });
+}
+
+}  // namespace posed::tools

@@ -1,0 +1,35 @@
+// SyntheticSigner: an emulated glove with a clip as its hand motion, on its own thread; the live
+// hand of the demo. It goes from labels through angles to the glove's bytes on a pseudo-terminal;
+// everything behind that is the same as for a real glove.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "daemon/tools/emulate/emulated_device.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::emulate {
+
+class SyntheticSigner {
+ public:
+  // Starts a glove of this driver, with its default options.
+  [[nodiscard]] static Result<std::unique_ptr<SyntheticSigner>> start(
+      const std::string& driver, const std::filesystem::path& clip);
+  SyntheticSigner(const SyntheticSigner&) = delete;
+  SyntheticSigner& operator=(const SyntheticSigner&) = delete;
+
+  [[nodiscard]] const std::string& port() const noexcept { return glove_.port(); }
+
+ private:
+  SyntheticSigner(std::unique_ptr<drivers::Emulator> emulator, EmulatedPort port,
+                  clip::HandClip clip);
+
+  clip::HandClip clip_;
+  EmulatedDevice glove_;
+  std::jthread thread_;
+};
+
+}  // namespace posed::emulate

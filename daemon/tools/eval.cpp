@@ -1,0 +1,247 @@
+#include <cstdio>
+#include <memory>
+
+#include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/degrees.hpp"
+#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/output_files.hpp"
+#include "daemon/tools/command/progress.hpp"
+#include "daemon/tools/command/shares_json.hpp"
+#include "daemon/tools/style/eval_natural.hpp"
+#include "daemon/tools/style/eval_style_report.hpp"
+#include "daemon/tools/style/root_option.hpp"
+#include "models/style/apply.hpp"
+#include "models/style/evaluate.hpp"
+#include "models/style/style_model.hpp"
+#include "models/style/training_check.hpp"
+#include "models/style/walker_fit.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::tools {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kEvalFooter = R"(Examples:
+  posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh
+  posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --json
+  posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --report proud.html
+  posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --root stride
+  posed eval style --model two.style --weights sad=1 --source plain_3.bvh --target sad_3.bvh
+
+The source goes through the same stage as live, and is compared in the model's pose space.
+cycle_ratio: how far the styled walk's average cycle
+is from the target's, over how far the unstyled one was (0 is the target, 1 is no change);
+constant_cycle_ratio: the same for the model's average change alone, added to every frame; ratio:
+cycle_ratio frame by frame; jerk_ratio: roughness of the styled walk over the unstyled one's;
+moved_rms_deg: the angle between the rotations before and after, rms over frames and changed joints,
+as `apply` reports it; component_rms_deg: the same change per component of the rotation vectors,
+source_component_rms_deg: what 1.0 of cycle_ratio is, in the same measure;
+gate_mean: how far the model knows the motion, 1 all of it, 0 nothing, which is not styled;
+slide_cm_s: speed over the ground of ankles and toes that stand (slower than 10 cm/s in the
+unstyled walk; of the target: in itself); sink_cm: how far the lowest styled toe is below the
+lowest unstyled one; root_speed_m_s: of the root over the ground, median over a stride's time.
+The last line is the verdict; the exit code is 1 when the model is no better than nothing.)";
+
+constexpr double kCentimetres = 100.0;  // of a metre
+constexpr double kShown = 0.005;        // a smaller share of the way reads as 0 %
+constexpr double kRough = 1.5;          // a jerk_ratio above this is visible
+
+struct EvalOptions {
+  std::string model, source, target, skeleton, weights;
+  double alpha = 1.0;
+  std::optional<feet::RootOptions> feet;
+  ReportFile report;
+  bool json = false;
+};
+
+Result<clip::Clip> read(const std::string& path, const std::string& skeleton) {
+  clip::ReadOptions options;
+  if (is_amc(path)) options.asf = skeleton;
+  return clip::read_clip(path, options);
+}
+
+struct Evaluation {
+  style::StyleScore score, constant;
+  double moved_rms_deg = 0.0;
+  std::optional<double> gate_mean{};
+  style::WalkerFit fit;
+  json weights{};                         // of the styles
+  std::optional<EvaluatedClips> clips{};  // for the report
+
+  // By what the verdict shows: one that closes 0 % is no better than nothing.
+  [[nodiscard]] bool helps() const { return score.cycle_ratio < 1.0 - kShown; }
+};
+
+std::string verdict(const Evaluation& e) {
+  const double closes = 1.0 - e.score.cycle_ratio;
+  const double constant = 1.0 - e.constant.cycle_ratio;
+  std::string text = style::closing_text(closes);
+  if (e.helps()) {
+    text += " of the way to the target";
+  } else if (closes > -kShown) {
+    text = "no better than nothing: the styled walk is as far from the target as the source";
+  } else {
+    text = "worse than nothing: " + text + " from the target";
+  }
+  text += "; a constant offset " + style::closing_text(constant);
+  if (e.helps() && constant > closes) text += ", which is better";
+  if (e.score.jerk_ratio > kRough) {
+    text +=
+        fmt::format("; the styled walk is {:.1f} times as rough as the source", e.score.jerk_ratio);
+  }
+  if (e.fit.is_far()) {
+    text +=
+        fmt::format("; this walker is far from the training ({:.1f} deg rms)", e.fit.distance_deg);
+  }
+  return text;
+}
+
+// Null where it is not defined.
+json scaled(const std::optional<double>& value, double scale) {
+  return value ? json(*value * scale) : json();
+}
+
+json of_clips(const style::StyleScore::Clips& clips, double scale) {
+  return {{"source", scaled(clips.source, scale)},
+          {"styled", scaled(clips.styled, scale)},
+          {"target", scaled(clips.target, scale)}};
+}
+
+json report_of(const Evaluation& e, const EvalOptions& options) {
+  const style::StyleScore& score = e.score;
+  return json{{"cycle_ratio", score.cycle_ratio},
+              {"constant_cycle_ratio", e.constant.cycle_ratio},
+              {"ratio", score.ratio},
+              {"jerk_ratio", score.jerk_ratio},
+              {"moved_rms_deg", e.moved_rms_deg},
+              {"component_rms_deg", score.component_rms_deg},
+              {"source_component_rms_deg", score.source_component_rms_deg},
+              {"source_period_s", score.source_period_s},
+              {"target_period_s", score.target_period_s},
+              {"distance_deg", e.fit.distance_deg},
+              {"far_from_training", e.fit.is_far()},
+              {"gate_mean", scaled(e.gate_mean, 1.0)},
+              {"slide_cm_s", of_clips(score.slide_m_s, kCentimetres)},
+              {"sink_cm", scaled(score.sink_m, kCentimetres)},
+              {"root_speed_m_s", of_clips(score.root_speed_m_s, 1.0)},
+              {"root", root_text(options.feet)},
+              {"alpha", options.alpha},
+              {"weights", e.weights},
+              {"helps", e.helps()},
+              {"verdict", verdict(e)}};
+}
+
+Result<> check_files(const EvalOptions& options) {
+  return OutputFiles(options.report.overwrite)
+      .reads_all(std::vector{options.model, options.source, options.target, options.skeleton})
+      .writes(options.report.path, {".html"})
+      .check();
+}
+
+Result<Evaluation> evaluate(const EvalOptions& options) {
+  if (auto checked = check_files(options); !checked) return std::unexpected(checked.error());
+  if (!options.skeleton.empty() && !is_amc(options.source) && !is_amc(options.target)) {
+    return misuse("--skeleton is only for AMC clips; leave it out");
+  }
+  const auto model = style::load_model(options.model);
+  if (!model) return std::unexpected(model.error());
+  const auto source = read(options.source, options.skeleton);
+  if (!source) return std::unexpected(source.error());
+  const auto target = read(options.target, options.skeleton);
+  if (!target) return std::unexpected(target.error());
+  const auto shares = style::shares_of(options.weights, model->names());
+  if (!shares) return std::unexpected(shares.error());
+  const style::StyleModel mixture = style::mixture_of(*model, shares->all());
+  const auto fit = style::fit_of_walker(mixture, options.model, *source);
+  if (!fit) return std::unexpected(fit.error());
+  const style::StyleModel constant = style::with_constant_change(mixture, fit->mean_change);
+  ProgressBar bar(kQuietFor_s);
+  Evaluation evaluation{
+      .score = {}, .constant = {}, .fit = *fit, .weights = shares_json(model->names(), *shares)};
+  for (const bool full : {false, true}) {
+    style::ApplyOptions apply;
+    apply.filter.alpha = options.alpha;
+    if (full) apply.filter.weights = options.weights;
+    apply.feet = options.feet;
+    apply.progress = [&](int done, int total) {
+      return bar.show("styling", 0.5 * full + 0.5 * done / total);
+    };
+    const auto styled =
+        style::apply_to_clip(full ? *model : constant, options.model, *source, apply);
+    if (!styled) return std::unexpected(styled.error());
+    const auto score = style::evaluate_style(*source, styled->clip, *target, model->space);
+    if (!score) return std::unexpected(score.error());
+    (full ? evaluation.score : evaluation.constant) = *score;
+    evaluation.gate_mean = styled->gate_mean;
+    evaluation.moved_rms_deg = styled->rms_change_rad * kDegrees;
+    if (full && options.report.wanted()) {
+      evaluation.clips = {.source = *source,
+                          .styled = styled->clip,
+                          .target = *target,
+                          .space = model->space.space,
+                          .rate_hz = model->rate_hz};
+    }
+  }
+  return evaluation;
+}
+
+// "NAME  1.234", a line for each number; those of an object have its name before theirs.
+void print_numbers(const std::string& prefix, const json& figures) {
+  for (const auto& [name, value] : figures.items()) {
+    if (value.is_object()) print_numbers(prefix + name + ".", value);
+    if (!value.is_number()) continue;
+    std::printf("%-24s %8.3f\n", (prefix + name).c_str(), value.get<double>());
+  }
+}
+
+int finish(const Evaluation& evaluation, const EvalOptions& options) {
+  const json figures = report_of(evaluation, options);
+  if (options.json) {
+    std::printf("%s\n", json_text(figures, 2).c_str());
+  } else {
+    print_numbers("", figures);
+  }
+  std::fflush(stdout);
+  std::fprintf(stderr, "posed: %s\n", verdict(evaluation).c_str());
+  if (evaluation.clips) {
+    const auto written = write_eval_style_report(figures, *evaluation.clips, options.report.path);
+    if (!written) return report(written.error());
+  }
+  return static_cast<int>(evaluation.helps() ? ExitCode::kDone : ExitCode::kFailed);
+}
+
+}  // namespace
+
+void add_eval(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("eval", "Judge a model, or a clip");
+  command->require_subcommand(1);
+  add_eval_gesture(*command, exit_code);
+  add_eval_natural(*command, exit_code);
+  CLI::App* style = command->add_subcommand("style", "How near a styled clip comes to the target");
+  style->footer(kEvalFooter);
+  const auto options = std::make_shared<EvalOptions>();
+  style->add_option("--model", options->model, "Model from `posed train style`")->required();
+  style->add_option("--source", options->source, "Clip to be styled")->required();
+  style->add_option("--target", options->target, "Clip in the target style")->required();
+  style->add_option("--skeleton", options->skeleton, "NN.asf of AMC clips, if not beside them");
+  style->add_option("--weights", options->weights, "Mixes the model's styles: A=0.6,B=0.4")
+      ->type_name("WEIGHTS");
+  style->add_option("--alpha", options->alpha, "How much style")
+      ->check(in_range(-2.0, 2.0))
+      ->capture_default_str();
+  add_root_option(*style, options->feet);
+  add_report_file(*style, options->report);
+  style->add_flag("--json", options->json, "One JSON object on stdout");
+  style->callback([options, &exit_code] {
+    const auto evaluation = evaluate(*options);
+    exit_code = evaluation ? finish(*evaluation, *options) : report(evaluation.error());
+  });
+}
+
+}  // namespace posed::tools

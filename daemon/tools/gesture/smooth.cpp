@@ -1,0 +1,204 @@
+// `posed smooth`: runs a recorded hand through the live smoother, as a stream would have been.
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/degrees.hpp"
+#include "daemon/tools/command/hand_option.hpp"
+#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/output_files.hpp"
+#include "daemon/tools/command/progress.hpp"
+#include "models/gesture/model_file.hpp"
+#include "models/smooth/live_smoother.hpp"
+#include "proto/clip/hand_clip.hpp"
+#include "proto/frame/hand_skeleton.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::tools {
+namespace {
+
+using nlohmann::json;
+
+constexpr std::size_t kProgressEvery = 1000;  // frames
+
+struct SmoothOptions {
+  std::string in, out, model, lag = "1", hand;
+  double noise_deg = 0.0;
+  bool overwrite = false, json = false;
+};
+
+// Writes the smoother's output to the clip's rows, and counts.
+class Rows final : public StageOut {
+ public:
+  explicit Rows(clip::HandClip& clip) : clip_(clip) {}
+
+  void frame(const StageFrame& made) noexcept override {
+    const Frame& frame = made.frame;
+    HandAngles& row = clip_.angles[next_++];
+    const HandAngles angles = hand_angles(frame);
+    for (std::size_t c = 0; c < row.size(); ++c) {
+      if (!std::isfinite(row[c]) && std::isfinite(angles[c])) ++bridged_values;
+      row[c] = angles[c];
+    }
+    labels.emplace_back(frame.label.data());
+    probability.push_back(static_cast<double>(frame.label_probability));
+  }
+
+  long bridged_values = 0;
+  std::vector<std::string> labels;
+  std::vector<double> probability;
+
+ private:
+  clip::HandClip& clip_;
+  std::size_t next_ = 0;
+};
+
+// The recognised gestures, one entry for each run of frames.
+json recognised(const Rows& rows, const clip::HandClip& clip) {
+  json runs = json::array();
+  double sum = 0.0;
+  for (std::size_t t = 0; t < rows.labels.size(); ++t) {
+    if (t == 0 || rows.labels[t] != rows.labels[t - 1]) {
+      runs.push_back({{"label", rows.labels[t]}, {"start_s", clip.time_s[t]}, {"frames", 0}});
+      sum = 0.0;
+    }
+    json& run = runs.back();
+    sum += rows.probability[t];
+    const int frames = run["frames"].get<int>() + 1;
+    run["frames"] = frames;
+    run["mean_probability"] = sum / frames;
+  }
+  return runs;
+}
+
+Result<std::unique_ptr<const smooth::LiveModel>> load(const std::string& path,
+                                                      const Skeleton& skeleton) {
+  const auto model = gesture::load_model(path);
+  if (!model) return std::unexpected(model.error());
+  return smooth::bind_live_model(*model, skeleton, path);
+}
+
+Result<smooth::LiveOptions> live_options(const SmoothOptions& options, double rate_hz) {
+  const auto lag = smooth::parse_lag(options.lag);
+  if (!lag) return std::unexpected(lag.error());
+  const int frames = smooth::lag_frames(*lag, 1.0 / rate_hz);
+  if (lag->seconds == 0.0 && frames < lag->frames) {
+    return misuse("a lag of " + options.lag + " frames is too long at " +
+                  std::to_string(std::lround(rate_hz)) + " Hz; give at most " +
+                  std::to_string(frames));
+  }
+  return smooth::LiveOptions{.lag = *lag, .noise_rad = options.noise_deg / kDegrees};
+}
+
+Result<> smooth(const SmoothOptions& options) {
+  const auto files = OutputFiles(options.overwrite)
+                         .reads(options.in)
+                         .reads(options.model)
+                         .writes(options.out, {".csv"})
+                         .check();
+  if (!files) return files;
+  clip::ReadOptions read;
+  if (!options.hand.empty()) read.hand = side_named(options.hand);
+  auto clip = clip::read_hand_clip(options.in, read);
+  if (!clip) return std::unexpected(clip.error());
+  for (const std::string& warning : clip->warnings) {
+    std::fprintf(stderr, "posed: %s: %s\n", options.in.c_str(), warning.c_str());
+  }
+  const auto live = live_options(options, clip->rate_hz);
+  if (!live) return std::unexpected(live.error());
+  const Skeleton skeleton = hand_skeleton(clip->side);
+  std::unique_ptr<const smooth::LiveModel> model;
+  if (!options.model.empty()) {
+    auto loaded = load(options.model, skeleton);
+    if (!loaded) return std::unexpected(loaded.error());
+    model = std::move(*loaded);
+  }
+
+  smooth::LiveSmoother smoother(skeleton, *live, model.get());
+  const std::vector<HandAngles> measured = clip->angles;
+  Rows rows(*clip);
+  ProgressBar bar(kQuietFor_s);
+  for (std::size_t t = 0; t < measured.size(); ++t) {
+    const bool shows = t % kProgressEvery == 0;
+    if (shows &&
+        !bar.show("smoothing", static_cast<double>(t) / static_cast<double>(measured.size()))) {
+      return fail("stopped; nothing was written", options.in);
+    }
+    Frame frame;
+    set_hand_angles(skeleton, measured[t], frame);
+    frame.header.sequence = t + 1;
+    frame.header.device_ns = nanoseconds(clip->time_s[t] - clip->time_s[0]);
+    smoother.process({.frame = frame}, rows);
+  }
+  smoother.flush(rows);
+  if (auto written = clip::write_hand_csv(*clip, options.out); !written) return written;
+  bar.finish();
+
+  const int lag_frames = smooth::lag_frames(live->lag, 1.0 / clip->rate_hz);
+  const double lag_ms = 1e3 * lag_frames / clip->rate_hz;
+  const double noise_deg = smoother.noise_rad() * kDegrees;
+  if (!options.json) {
+    std::printf(
+        "%s: %zu frames, %d behind (%.0f ms at %g Hz), sensor noise %.2f deg (standard "
+        "deviation of an angle%s), %ld missing values bridged\n",
+        options.out.c_str(), measured.size(), lag_frames, lag_ms, clip->rate_hz, noise_deg,
+        options.noise_deg > 0.0 ? "" : ", estimated", rows.bridged_values);
+    return {};
+  }
+  json report{{"out", options.out},
+              {"frames", measured.size()},
+              {"rate_hz", clip->rate_hz},
+              {"lag_frames", lag_frames},
+              {"lag_ms", lag_ms},
+              {"noise_deg", noise_deg},
+              {"noise_given", options.noise_deg > 0.0},
+              {"bridged_values", rows.bridged_values}};
+  if (model) report["labels"] = recognised(rows, *clip);
+  std::printf("%s\n", json_text(report, 2).c_str());
+  return {};
+}
+
+}  // namespace
+
+void add_smooth(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("smooth", "Smooth a recorded hand as the live stage would");
+  auto options = std::make_shared<SmoothOptions>();
+  command->add_option("in", options->in, "The hand: .csv, or a .bvh with finger joints")
+      ->required()
+      ->type_name("IN");
+  command->add_option("--out", options->out, "The hand CSV to write")
+      ->required()
+      ->type_name("OUT.csv");
+  command->add_option("--lag", options->lag, "Delay of the output, in frames or time: 1 or 33ms")
+      ->capture_default_str();
+  command
+      ->add_option("--noise-deg", options->noise_deg,
+                   "Sensor noise, standard deviation (default: estimated from IN)")
+      ->check(in_range(0.01, 30.0));
+  command
+      ->add_option("--model", options->model,
+                   "Gesture model, to recognise gestures and bridge gaps")
+      ->type_name("H.gesture");
+  command->add_option("--hand", options->hand, "The hand of a hand CSV, or which hand to take")
+      ->check(CLI::IsMember({"left", "right"}));
+  add_overwrite_option(*command, options->overwrite);
+  command->add_flag("--json", options->json, "Summary as one JSON object on stdout");
+  command->footer(R"(Examples:
+  posed smooth glove.csv --out smooth.csv                     # lag 1 frame, noise estimated
+  posed smooth --lag 33ms --noise-deg 1 glove.csv --out smooth.csv
+  posed smooth --model H.gesture glove.csv --out smooth.csv --json   # recognises gestures, too
+The code is the live stream's: a row is estimated from what came up to the lag after it. An empty
+field is a missing value and is bridged; rows keep their times, even or not.)");
+  command->callback([options, &exit_code] {
+    if (auto done = smooth(*options); !done) exit_code = report(done.error());
+  });
+}
+
+}  // namespace posed::tools

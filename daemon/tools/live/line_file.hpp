@@ -1,0 +1,34 @@
+// LineFile: a text file that grows by whole lines, whenever its writer ends. Cold.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include "proto/frame/result.hpp"
+
+namespace posed::tools {
+
+class LineFile {
+ public:
+  // The file is made, or an old one emptied, by the first line.
+  explicit LineFile(std::filesystem::path path) : path_(std::move(path)) {}
+  ~LineFile();
+  LineFile(const LineFile&) = delete;
+  LineFile& operator=(const LineFile&) = delete;
+
+  // Writes the line and its end in one piece. After an error (a full disk) the lines before it stay
+  // and nothing of this one.
+  [[nodiscard]] Result<> add(std::string_view line);
+
+ private:
+  [[nodiscard]] Result<> open();
+
+  std::filesystem::path path_;
+  int fd_ = -1;
+  std::uint64_t size_ = 0;  // bytes of whole lines
+};
+
+}  // namespace posed::tools

@@ -1,0 +1,317 @@
+#include "daemon/tools/live/live_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "daemon/tools/command/paint.hpp"
+#include "daemon/tools/live/live_table.hpp"
+#include "daemon/tools/live/monitor_line.hpp"
+#include "models/stages/registry.hpp"
+#include "posed/v1/posed.pb.h"
+#include "proto/frame/sink.hpp"
+#include "proto/frame/time.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::tools {
+namespace {
+
+constexpr int kMinWidth = 20;
+constexpr int kNoteRows = 3;  // that the table and the panel leave to the notes
+
+// The daemon in one line. What no longer fits is left out: the processor and the memory first.
+std::string head(const v1::Stats& stats, const LiveViewOptions& options) {
+  std::vector<std::string> parts;
+  if (stats.has_take()) {
+    parts.push_back(fmt::format("take {}", stats.take().number()));
+    if (!stats.take().name().empty()) parts.back() += " " + in_quotes(stats.take().name());
+  }
+  if (!stats.recorder_file().empty()) {
+    parts.push_back("rec " + clean_name(stats.recorder_file()));
+    const auto add = [&](const char* what, std::uint64_t count) {
+      if (count > 0) parts.back() += fmt::format(" {} {}", what, count);
+    };
+    add("lost", stats.recorder_lost_chunks());
+    add("errors", stats.recorder_errors());
+  }
+  const int streams = stats.stream_size();
+  parts.push_back(fmt::format("{} stream{}", streams, streams == 1 ? "" : "s"));
+  if (options.silence.empty()) {
+    parts.push_back(fmt::format("cpu {:.1f} %", stats.cpu_percent()));
+    parts.push_back(fmt::format("{:.1f} MB", static_cast<double>(stats.rss_bytes()) / 1e6));
+  }
+  std::string line = options.title;
+  for (const std::string& part : parts) {
+    const int columns = static_cast<int>(line.size() + part.size()) + 3;
+    if (options.width == 0 || columns <= options.width) line += "   " + part;
+  }
+  return line;
+}
+
+// As the config writes it; empty for the default. Texts, such as the weights of styles, are empty
+// by default.
+std::string unusual_value(const ParameterSpec& spec, const v1::ParameterStats& parameter) {
+  if (!has_number(spec)) return clean_name(parameter.text());
+  const double usual = number_of(spec, spec.default_value) * spec.people_scale;
+  if (parameter.value() == usual) return {};
+  return people_text(spec, parameter.value() / spec.people_scale);
+}
+
+// A line below the stream's row about its stages; empty if there is nothing to report.
+std::string stages_row(const v1::StreamStats& stream) {
+  std::string text = label_words(stream);
+  const auto add = [&](const std::string& words) { text += (text.empty() ? "" : ", ") + words; };
+  for (const v1::StageStats& one : stream.stage()) {
+    if (one.time().p99_us() == 0.0F) continue;  // it processed no frame in this second
+    add(clean_name(one.name()) + " " + people_duration(one.time().p99_us()));
+  }
+  if (stream.lag_frames() > 0) {
+    add(fmt::format("lag {} frame{} ({:.1f} ms)", stream.lag_frames(),
+                    stream.lag_frames() == 1 ? "" : "s", stream.lag_ms()));
+  }
+  // Parameters that differ from their defaults; alpha has its own column.
+  for (const v1::StageStats& one : stream.stage()) {
+    const StageType* type = find_stage_type(one.name());
+    for (const v1::ParameterStats& parameter : one.parameter()) {
+      const ParameterSpec* spec =
+          type == nullptr ? nullptr : find_parameter(type->parameters, parameter.name());
+      if (spec == nullptr || !spec->live || parameter.name() == "alpha") continue;
+      const std::string value = unusual_value(*spec, parameter);
+      if (value.empty()) continue;
+      add(fmt::format("{}.{} {}", clean_name(one.name()), parameter.name(), value));
+    }
+  }
+  if (stream.has_style_gate()) add(fmt::format("gate {:.2f}", stream.style_gate()));
+  if (stream.has_style_estimate()) add(fmt::format("style {:.2f}", stream.style_estimate()));
+  // As far as the column shows, alpha has reached its target.
+  if (std::abs(stream.alpha_target() - stream.alpha()) >= 0.005F) {
+    add(fmt::format("alpha slides to {:.2f}", stream.alpha_target()));
+  }
+  return text;
+}
+
+// "8 s", "5 min", "2.5 h"
+std::string for_people(double time_s) {
+  if (time_s < 120.0) return fmt::format("{:.0f} s", std::max(time_s, 0.0));
+  if (time_s < 7200.0) return fmt::format("{:.0f} min", time_s / 60.0);
+  return fmt::format("{:.1f} h", time_s / 3600.0);
+}
+
+// What the kernel dropped of a device's datagrams; empty if it dropped none.
+std::string kernel_words(std::uint64_t dropped) {
+  if (dropped == 0) return {};
+  return fmt::format("the kernel dropped {} datagrams (machine too slow)", dropped);
+}
+
+// Whether a glove is connected, how its clock runs and what the kernel dropped; empty for a stream
+// without any of it. The drops of a body's device are in the row of its source.
+std::string device_row(const v1::StreamStats& stream, std::int64_t now_ns) {
+  const std::string since = for_people(seconds(now_ns - stream.link_ns()));
+  const std::uint64_t links = stream.connections();
+  if (stream.away()) {
+    if (links == 0) return "not there yet; posed has looked for it for " + since;
+    return fmt::format("away for {}; connected {} before", since,
+                       links == 1 ? "once" : fmt::format("{} times", links));
+  }
+  std::string text;
+  const auto add = [&](const std::string& words) { text += (text.empty() ? "" : ", ") + words; };
+  if (links > 1) {
+    add(fmt::format("back for {}, reconnected {}", since,
+                    links == 2 ? "once" : fmt::format("{} times", links - 1)));
+  }
+  if (stream.has_clock_offset_ns()) {
+    // avoids -0.0
+    const float drift_ppm = std::round(stream.clock_drift_ppm() * 10.0F) / 10.0F + 0.0F;
+    add(fmt::format("clock drift {:+.1f} ppm", drift_ppm));
+  }
+  if (!stream.device_info().empty()) add(clean(stream.identity()));
+  const std::uint64_t dropped = stream.source_name().empty() ? stream.kernel_dropped() : 0;
+  if (dropped > 0) add(kernel_words(dropped));
+  return text;
+}
+
+// Which body of which source the stream is, and why posed cannot serve it; empty if it is no body.
+std::string body_row(const v1::StreamStats& stream) {
+  std::string text;
+  if (!stream.source_name().empty()) {
+    text = fmt::format("body {} of {}", in_quotes(stream.body()), clean_name(stream.source_name()));
+  }
+  if (stream.refusal().empty()) return text;
+  return text + (text.empty() ? "" : ": ") + clean(stream.refusal());
+}
+
+// Why nothing comes of a device with several bodies.
+std::string without_body(const v1::SourceStats& source) {
+  if (source.away()) return "the device is away";
+  std::string text = "no body is streamed";
+  const auto count = [&](Outcome outcome) {
+    const int i = static_cast<int>(outcome);
+    return i < source.outcome_size() ? source.outcome(i) : 0;
+  };
+  const std::uint64_t heard = count(Outcome::kOk), foreign = count(Outcome::kForeign);
+  const std::uint64_t damaged =
+      count(Outcome::kShort) + count(Outcome::kBadChecksum) + count(Outcome::kOutOfRange);
+  if (heard + foreign + damaged == 0) return text + ": nothing came from the device yet";
+  return text + fmt::format(": {} packets were right, {} damaged, {} of another device or sender",
+                            heard, damaged, foreign);
+}
+
+// A line below the streams' rows about a device with several bodies; empty if there is nothing to
+// report.
+std::string source_row(const v1::SourceStats& source) {
+  std::string text = source.streams() == 0 ? without_body(source) : "";
+  const std::string dropped = kernel_words(source.kernel_dropped());
+  if (!text.empty() && !dropped.empty()) text += ", ";
+  return text + dropped;
+}
+
+// What of the stream did not come out; empty if everything did.
+std::string lost_row(const v1::StreamStats& stream) {
+  if (!has_lost(stream)) return {};
+  std::string text;
+  if (stream.dropped() > 0) {
+    text = fmt::format("{} dropped because a queue was full, ", stream.dropped());
+  }
+  if (stream.shed() > 0) text += fmt::format("{} skipped for newer ones, ", stream.shed());
+  return "frames: " + text + "so far (machine too slow)";
+}
+
+// "vmc output, 3 receivers, 1200 frames, 3600 sent"
+std::string output_row(const v1::OutputStats& output) {
+  std::string text = fmt::format(
+      "{} output, {} receiver{}, {} frames, {} sent", clean_name(output.kind()), output.receivers(),
+      output.receivers() == 1 ? "" : "s", output.frames(), output.sent());
+  if (output.dropped() > 0) text += fmt::format(", {} dropped", output.dropped());
+  if (output.failures() > 0) text += fmt::format(", {} failed", output.failures());
+  return text;
+}
+
+// The details of a stream, or of the chosen one: the colour of each and its text.
+struct Detail {
+  const char* colour;
+  std::string text;
+};
+
+// What is wrong first.
+std::vector<Detail> details_of(const v1::StreamStats& stream, std::int64_t now_ns,
+                               bool only_wrong) {
+  const bool refused = !stream.refusal().empty();
+  std::vector<Detail> details{{kRed, lost_row(stream)}};
+  if (refused || !only_wrong) details.push_back({refused ? kRed : "", body_row(stream)});
+  if (stream.away() || !only_wrong) {
+    details.push_back({stream.away() ? kYellow : "", device_row(stream, now_ns)});
+  }
+  if (!refused && !only_wrong) details.push_back({"", stages_row(stream)});
+  return details;
+}
+
+// As many lines as the text needs.
+std::vector<std::string> broken(const std::string& text, const LiveViewOptions& options,
+                                const char* colour, int indent) {
+  const std::string blanks(static_cast<std::size_t>(indent), ' ');
+  std::vector<std::string> lines{text};
+  if (options.width > 0) lines = wrapped(text, options.width - indent, "  ");
+  for (std::string& line : lines) line = paint(options.colour, colour, line).insert(0, blanks);
+  return lines;
+}
+
+// The lines below the table.
+std::vector<std::string> rows_below(const v1::Stats& stats, const LiveViewOptions& options) {
+  std::vector<std::string> rows;
+  const auto add = [&](const char* colour, const std::string& text) {
+    for (std::string& line : broken(text, options, colour, 2)) rows.push_back(std::move(line));
+  };
+  if (!stats.replay_file().empty()) add("", replay_words(stats));
+  if (!stats.recorder_trouble().empty()) {
+    add(kRed, "nothing can be written to the log: " + clean(stats.recorder_trouble()));
+  }
+  for (const v1::SourceStats& source : stats.source()) {
+    const std::string text = source_row(source);
+    if (!text.empty()) add(kYellow, clean_name(source.name()) + ": " + text);
+  }
+  for (const v1::StreamStats& stream : stats.stream()) {
+    const bool only_wrong = !options.chosen.empty() && stream.stream() != options.chosen;
+    for (const auto& [colour, text] : details_of(stream, stats.time_ns(), only_wrong)) {
+      if (!text.empty()) add(colour, clean_name(stream.stream()) + ": " + text);
+    }
+  }
+  for (const v1::OutputStats& output : stats.output()) {
+    const bool wrong = output.dropped() > 0 || output.failures() > 0;
+    add(wrong ? kYellow : "", clean_name(output.name()) + ": " + output_row(output));
+  }
+  return rows;
+}
+
+// The newest notes that fit into `rows` lines, oldest first; of the newest at least its beginning.
+std::vector<std::string> newest_notes(const LiveViewOptions& options, std::size_t rows) {
+  std::vector<std::string> lines;
+  for (std::size_t i = options.notes.size(); i > 0; --i) {
+    auto note = broken(options.notes[i - 1], options, "", 0);
+    if (lines.empty() && note.size() > rows) note.resize(rows);
+    if (lines.size() + note.size() > rows) break;
+    lines.insert(lines.begin(), note.begin(), note.end());
+  }
+  return lines;
+}
+
+// The lines kept for the notes: a note may be the only answer to a key, so a long table or a high
+// panel does not push out the newest.
+int rows_of_notes(const LiveViewOptions& options) {
+  if (options.notes.empty()) return 0;
+  const int newest = static_cast<int>(broken(options.notes.back(), options, "", 0).size());
+  const int most = std::min(std::max(newest, kNoteRows), options.height / 4);
+  return static_cast<int>(newest_notes(options, static_cast<std::size_t>(most)).size());
+}
+
+}  // namespace
+
+const char* const kColumnsHelp = R"(Columns, one row a stream; one that no stream needs is left out:
+  STATE    live, lossy (frames were dropped or skipped: the machine is too slow), waiting (nothing
+           came yet), stale (fell silent), away (device unplugged), ended, refused (a stage cannot
+           serve this body)
+  HZ       frames published in the last second
+  LATENCY  from arrival to handed out, lag included: half of the frames of the last second took at
+           most this, and 99 % at most the column behind it
+  ALPHA    how much style, -2 to 2; below the table its target, while it moves
+  MODEL    the style model in use, or the gesture model
+Below the table are what is wrong, the time of each stage (99 % of the frames took at most this), a
+hand's label, the lag, and settings that are not the usual ones. Of a style: gate, 1 where the model
+knows the motion to 0 where it is passed through; style, what the input shows of it already, 0 like
+its source to 1 like its target. --json has every figure, in microseconds)";
+
+std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions& wanted) {
+  LiveViewOptions options = wanted;
+  if (options.width > 0) options.width = std::max(options.width, kMinWidth);
+  const bool silent = !options.silence.empty();
+  const bool limited = options.height > 0;
+  const auto left = [&](std::size_t lines) {
+    return limited ? std::max(0, options.height - static_cast<int>(lines)) : 1'000'000;
+  };
+  std::vector<std::string> lines;
+  const auto add = [&](const std::vector<std::string>& more, int kept = 0) {
+    const int room = std::max(0, left(lines.size()) - kept);
+    const auto count = std::min(more.size(), static_cast<std::size_t>(room));
+    lines.insert(lines.end(), more.begin(), more.begin() + static_cast<std::ptrdiff_t>(count));
+  };
+  const int notes = rows_of_notes(options);
+  const std::string first = head(stats, options);
+  // If the daemon is silent, the first line says so, because everything below it is old.
+  if (silent) add(broken(options.silence, options, kRed, 0));
+  add({paint(options.colour, kBold, options.width == 0 ? first : cut(first, options.width))});
+  add(live_table(stats, {.width = options.width,
+                         .rows = limited ? std::max(1, left(lines.size()) - notes) : 0,
+                         .colour = options.colour,
+                         .silent = silent,
+                         .chosen = options.chosen}));
+  if (!silent) add(rows_below(stats, options), notes);
+  if (options.panel && !silent) {
+    add(options.panel(left(lines.size()) - notes));
+  }
+  add(newest_notes(options, static_cast<std::size_t>(left(lines.size()))));
+  return lines;
+}
+
+}  // namespace posed::tools

@@ -1,0 +1,265 @@
+// `posed convert`: converts a clip to another format, a stream of a device log to a clip, a whole
+// log to MCAP, or a log of an older format to today's.
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/replay/log_upgrade.hpp"
+#include "daemon/tools/command/client.hpp"
+#include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/hand_option.hpp"
+#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/output_files.hpp"
+#include "daemon/tools/command/waiting.hpp"
+#include "daemon/tools/export/log_clip.hpp"
+#include "daemon/tools/logs/convert_mcap.hpp"
+#include "daemon/tools/logs/list_takes.hpp"
+#include "models/motion/vrm_animation.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/clip/file_names.hpp"
+#include "proto/clip/frames_clip.hpp"
+#include "proto/clip/gltf.hpp"
+#include "proto/clip/hand_clip.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::tools {
+namespace {
+
+constexpr const char* kUneven = "frames are not evenly spaced, but a BVH's are: its clock differs";
+
+struct Convert {
+  std::string in;
+  std::string out;
+  clip::ReadOptions read;
+  double metres_per_unit = 0.0;  // 0: not given
+  std::string hand;              // "left", "right" or not given
+  std::string stream;            // of a log; empty: the only one
+  std::string take;              // of a log, a number or a name; empty: all
+  bool takes = false;            // list those of a log
+  bool overwrite = false, json = false;
+  bool rate_given = false, shape_given = false;
+};
+
+bool ends_in(const std::string& path, const std::string& extension) {
+  return clip::extension_of(path) == extension;
+}
+
+bool is_hand_csv(const std::string& path) { return ends_in(path, ".csv"); }
+bool is_log(const std::string& path) { return ends_in(path, ".plog"); }
+bool is_mcap(const std::string& path) { return ends_in(path, ".mcap"); }
+
+// An option that would have no effect for this input or output is an error.
+Result<> check_options(const Convert& convert) {
+  const auto useless = [&](bool given, bool means_something, const char* what) -> Result<> {
+    if (!given || means_something) return {};
+    return misuse(what, convert.in);
+  };
+  const bool csv_in = is_hand_csv(convert.in);
+  const bool bvh_in = ends_in(convert.in, ".bvh");
+  const bool to_csv = is_hand_csv(convert.out);
+  for (const auto& checked :
+       {useless(!convert.stream.empty(), is_log(convert.in),
+                "is not a device log (.plog), so --stream has no effect"),
+        useless(!convert.take.empty(), is_log(convert.in),
+                "is not a device log (.plog), so --take has no effect"),
+        useless(!convert.stream.empty() || !convert.take.empty(),
+                !is_mcap(convert.out) && !is_log(convert.out),
+                "is written as a whole log, so --stream and --take have no effect"),
+        useless(is_mcap(convert.out) || is_log(convert.out), is_log(convert.in),
+                "is not a device log (.plog), and only a log becomes a .mcap or a newer .plog; "
+                "name a .glb"),
+        useless(!convert.read.asf.empty(), is_amc(convert.in),
+                "is not an AMC, so --skeleton has no effect"),
+        useless(convert.rate_given, is_amc(convert.in), "is not an AMC, so --rate has no effect"),
+        useless(convert.metres_per_unit != 0.0, bvh_in,
+                "is not a BVH, so --metres-per-unit has no effect"),
+        useless(!convert.read.profile.empty(), bvh_in || is_amc(convert.in),
+                "is neither a BVH nor an AMC, so --profile has no effect"),
+        useless(!convert.hand.empty(), csv_in || to_csv,
+                "neither IN nor OUT is a hand CSV, so --hand has no effect"),
+        useless(convert.shape_given, csv_in && !to_csv,
+                "--hand-shape is for a hand CSV that becomes a figure, and has no effect here")}) {
+    if (!checked) return checked;
+  }
+  return OutputFiles(convert.overwrite)
+      .reads(convert.in)
+      .reads(convert.read.asf)
+      .writes(convert.out, {".bvh", ".csv", ".glb", ".vrma", ".mcap", ".plog"})
+      .check();
+}
+
+bool has_even_clock(const std::string& path) { return ends_in(path, ".bvh"); }
+
+// Only a hand CSV can store gaps, and a BVH no uneven clock.
+Result<clip::Clip> read_log(const Convert& convert) {
+  auto clip = replay::clip_of_log(convert.in, convert.stream, convert.take);
+  if (!clip || is_hand_csv(convert.out)) return clip;
+  clip::hold_missing(*clip);
+  if (has_even_clock(convert.out) && clip::has_uneven_times(clip->time_s, clip->frame_rate_hz))
+    clip->warnings.emplace_back(kUneven);
+  return clip;
+}
+
+// A hand CSV cannot store a body.
+Result<clip::Clip> read(const Convert& convert) {
+  if (is_log(convert.in)) return read_log(convert);
+  auto clip = clip::read_clip(convert.in, convert.read);
+  if (!clip || !is_hand_csv(convert.in) || is_hand_csv(convert.out)) return clip;
+  auto hand = clip::hand_of(*clip, convert.read);
+  if (!hand) return std::unexpected(hand.error());
+  clip::fill_gaps(*hand);
+  if (has_even_clock(convert.out) && clip::has_uneven_times(hand->time_s, hand->rate_hz))
+    hand->warnings.emplace_back(kUneven);
+  return clip::clip_of_hand(*hand, convert.read.hand_shape);
+}
+
+Result<> write(const Convert& convert, const clip::Clip& clip) {
+  if (ends_in(convert.out, ".glb")) return clip::write_glb(clip, convert.out);
+  if (ends_in(convert.out, ".vrma")) return motion::write_vrm_animation(clip, convert.out);
+  if (!is_hand_csv(convert.out)) return clip::write_bvh(clip, convert.out);
+  const auto hand = clip::hand_of(clip, convert.read);
+  if (!hand) return std::unexpected(hand.error());
+  return clip::write_hand_csv(*hand, convert.out);
+}
+
+int upgrade(const Convert& convert) {
+  const auto summary = [&] {
+    const Waiting waiting("writing " + convert.out);
+    const Interrupt interrupt;
+    return replay::upgrade_log(convert.in, convert.out, Interrupt::came);
+  }();
+  if (!summary) return report(summary.error());
+  if (convert.json) {
+    const nlohmann::json figures{{"in", convert.in},
+                                 {"out", convert.out},
+                                 {"chunks", summary->chunks},
+                                 {"decisions", summary->decisions},
+                                 {"frames", summary->frames}};
+    std::printf("%s\n", json_text(figures).c_str());
+  } else {
+    std::fprintf(stderr, "posed: wrote %s in today's format: %llu chunks, %llu decisions\n",
+                 convert.out.c_str(), static_cast<unsigned long long>(summary->chunks),
+                 static_cast<unsigned long long>(summary->decisions));
+  }
+  return static_cast<int>(ExitCode::kDone);
+}
+
+int run(Convert& convert) {
+  if (convert.takes) {
+    if (is_log(convert.in)) return list_takes(convert.in, convert.json);
+    return report(misuse("is not a device log (.plog), so it has no takes", convert.in).error());
+  }
+  if (!std::filesystem::exists(convert.in)) {
+    return report(fail("is not there; check the path", convert.in).error());
+  }
+  if (convert.out.empty()) {
+    return report(misuse("say what to write: --out OUT.bvh", convert.in).error());
+  }
+  if (auto ok = check_options(convert); !ok) return report(ok.error());
+  if (is_mcap(convert.out)) return convert_to_mcap(convert.in, convert.out, convert.json);
+  if (is_log(convert.out)) return upgrade(convert);
+  if (convert.metres_per_unit != 0.0) convert.read.metres_per_unit = convert.metres_per_unit;
+  if (!convert.hand.empty()) {
+    convert.read.hand = side_named(convert.hand);
+  }
+  const auto clip = [&] {
+    const Waiting waiting("reading " + convert.in);
+    return read(convert);
+  }();
+  if (!clip) return report(clip.error());
+  for (const std::string& warning : clip->warnings) {
+    std::fprintf(stderr, "posed: %s: %s\n", convert.in.c_str(), warning.c_str());
+  }
+  if (auto ok = write(convert, *clip); !ok) return report(ok.error());
+  if (!convert.json) {
+    std::fprintf(stderr, "posed: wrote %s: %d frames at %g Hz, %zu joints\n", convert.out.c_str(),
+                 clip->frames(), clip->frame_rate_hz, clip->skeleton->joints.size());
+    return static_cast<int>(ExitCode::kDone);
+  }
+  const nlohmann::json summary{{"in", convert.in},
+                               {"out", convert.out},
+                               {"frames", clip->frames()},
+                               {"rate_hz", clip->frame_rate_hz},
+                               {"joints", clip->skeleton->joints.size()},
+                               {"metres_per_unit", clip->metres_per_unit},
+                               {"warnings", clip->warnings}};
+  // Names may hold any bytes; invalid UTF-8 is replaced, because otherwise the JSON library throws.
+  std::printf("%s\n", json_text(summary).c_str());
+  return static_cast<int>(ExitCode::kDone);
+}
+
+}  // namespace
+
+void add_convert(CLI::App& app, int& exit_code) {
+  CLI::App* command =
+      app.add_subcommand("convert", "Write a clip, a log's stream or a log in another format");
+  auto convert = std::make_shared<Convert>();
+  command->add_option("IN", convert->in, "To read: .bvh, .amc, a hand as .csv, or a log (.plog)")
+      ->required();
+  auto* out = command->add_option(
+      "--out", convert->out,
+      "To write: .bvh, .csv of a hand, .glb, .vrma; of a whole log .mcap or .plog");
+  command->add_option("--skeleton", convert->read.asf,
+                      "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
+  auto* rate =
+      command->add_option("--rate", convert->read.amc_rate_hz, "Frames per second of an AMC");
+  rate->capture_default_str();
+  command
+      ->add_option("--metres-per-unit", convert->metres_per_unit,
+                   "Unit of a BVH (default: the profile's, else by the figure's height)")
+      ->check(in_range(1e-6, 1e6));
+  command->add_option("--profile", convert->read.profile,
+                      "Skeleton profile (default: found by the joints' names)");
+  auto* stream = command->add_option(
+      "--stream", convert->stream,
+      "Which of a log's streams (default: the only one); NAME#2: its second part, "
+      "NAME-raw: its unstyled motion");
+  auto* take =
+      command->add_option("--take", convert->take,
+                          "Only this take of a log: its number, or its name if that is unique");
+  command->add_flag("--takes", convert->takes, "List the takes of a log instead")
+      ->excludes(out)
+      ->excludes(stream)
+      ->excludes(take);
+  command->add_option("--hand", convert->hand, "The hand of a hand CSV, or which hand to take")
+      ->check(CLI::IsMember({"left", "right"}));
+  auto* shape = command->add_option("--hand-shape", convert->read.hand_shape,
+                                    "Bones of a hand CSV that becomes a figure");
+  shape->capture_default_str();
+  add_overwrite_option(*command, convert->overwrite);
+  command->add_flag("--json", convert->json, "Print a summary as JSON on stdout");
+  command->footer(
+      "A BVH keeps its names, hierarchy, channel order and unit. An AMC becomes a BVH in\n"
+      "centimetres with Z, Y, X rotations on every joint. A hand CSV\n"
+      "holds 45 angles a frame; any BVH with the fifteen finger joints of a hand can become "
+      "one.\n"
+      "A log gives the frames that were published, styled as they were; its BVH is in "
+      "centimetres.\n"
+      "A .glb is glTF: the figure as an armature, for Blender and game engines. A .vrma moves any\n"
+      "VRM avatar and needs a person's bones. Both keep the clip's times. A .mcap has pose/,\n"
+      "skeleton/ and sensor/ of all streams of a log, with the protobuf schema, in UTC. A .plog "
+      "of\n"
+      "an older posed becomes one of this posed's format, and replays with the same bits.\n\n"
+      "Examples:\n"
+      "  posed convert 07_01.amc --out walk.bvh\n"
+      "  posed convert take.amc --skeleton actor.asf --rate 60 --out take.bvh\n"
+      "  posed convert glove.csv --hand left --out glove.bvh\n"
+      "  posed convert take1.plog --stream walker --out walker.bvh\n"
+      "  posed convert take1.plog --takes\n"
+      "  posed convert take1.plog --take 2 --stream walker --out walker-2.bvh\n"
+      "  posed convert walk.bvh --out walk.vrma\n"
+      "  posed convert take1.plog --out take1.mcap\n"
+      "  posed convert old.plog --out new.plog");
+  command->callback([convert, rate, shape, &exit_code] {
+    convert->rate_given = rate->count() > 0;
+    convert->shape_given = shape->count() > 0;
+    exit_code = run(*convert);
+  });
+}
+
+}  // namespace posed::tools

@@ -1,0 +1,336 @@
+// `posed render`: draws a clip or a stream of a log as a strip of poses, as one pose or as a video.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/hand_option.hpp"
+#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/output_files.hpp"
+#include "daemon/tools/command/progress.hpp"
+#include "daemon/tools/command/waiting.hpp"
+#include "daemon/tools/export/log_clip.hpp"
+#include "daemon/tools/picture/picture_file.hpp"
+#include "daemon/tools/picture/strip.hpp"
+#include "models/motion/motion.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/clip/file_names.hpp"
+#include "proto/clip/frames_clip.hpp"
+#include "proto/clip/hand_clip.hpp"
+#include "proto/frame/hand_skeleton.hpp"
+#include "proto/text/json_text.hpp"
+#include "proto/text/stream_name.hpp"
+
+namespace posed::tools {
+namespace {
+
+constexpr double kPose_px = 480.0;  // height of a single pose and of a video's
+constexpr double kMaxVideoRate_hz = 30.0;
+
+struct RenderArguments {
+  std::string in;
+  std::filesystem::path out;
+  clip::ReadOptions read;
+  std::string hand, stream, take, view = "three-quarter";
+  bool strip = false, video = false, raw_beside = false, overwrite = false, json = false;
+  std::optional<int> frame;
+  int count = 8;
+  double row_px = 260.0;
+  std::optional<double> from_s, to_s;
+};
+
+// A motion ready to be drawn; a hand's gaps are filled.
+struct Drawn {
+  std::string name;
+  motion::Motion motion;
+  std::vector<double> time_s;  // [frame]
+  std::unique_ptr<picture::FigureShape> shape;
+};
+
+bool reads_log(const RenderArguments& options) { return clip::extension_of(options.in) == ".plog"; }
+
+Result<> check_render(const RenderArguments& options) {
+  const bool log = reads_log(options);
+  if (!log && (!options.stream.empty() || !options.take.empty())) {
+    return misuse("is not a device log (.plog), so --stream and --take have no effect", options.in);
+  }
+  if (!log && options.raw_beside) {
+    return misuse(
+        "is a clip, which has one motion only; --raw-beside draws a log (.plog) that was "
+        "recorded with `publish_raw = true`",
+        options.in);
+  }
+  const bool moves = clip::extension_of(options.out) == ".mp4";
+  if (moves != options.video) {
+    return misuse(
+        moves ? "a .mp4 is a video: add --video" : "a video is an .mp4: name one by --out",
+        options.out.string());
+  }
+  return OutputFiles(options.overwrite)
+      .reads(options.in)
+      .reads(options.read.asf)
+      .writes(options.out, {".svg", ".png", ".mp4"})
+      .check();
+}
+
+// A clip of fingers without a body (a BVH of `posed synth`) as a hand of ours, which is drawn as
+// one.
+Result<clip::Clip> as_hand(const clip::Clip& clip, const clip::ReadOptions& read) {
+  auto hand = clip::hand_of(clip, read);
+  if (!hand) return std::unexpected(hand.error());
+  return clip::clip_of_hand(*hand, read.hand_shape);
+}
+
+Result<clip::Clip> read_motion(const RenderArguments& options, const std::string& stream) {
+  const Waiting waiting("reading " + options.in);
+  auto clip = reads_log(options) ? replay::clip_of_log(options.in, stream, options.take)
+                                 : clip::read_clip(options.in, options.read);
+  if (clip && clip->skeleton->joint_of(Bone::kHips) < 0 && !hand_side(*clip->skeleton)) {
+    if (auto hand = as_hand(*clip, options.read)) clip = std::move(hand);
+  }
+  if (clip) clip::hold_missing(*clip);
+  return clip;
+}
+
+// The frames between --from and --to.
+Result<Drawn> drawn_of(const RenderArguments& options, const clip::Clip& clip, std::string name) {
+  auto motion = motion::motion_of(clip);
+  if (!motion) return std::unexpected(motion.error());
+  Drawn drawn;
+  drawn.name = std::move(name);
+  drawn.motion.skeleton = motion->skeleton;
+  drawn.motion.rate_hz = motion->rate_hz;
+  for (int i = 0; i < motion->size(); ++i) {
+    const double time_s =
+        clip.time_s.empty() ? i / clip.frame_rate_hz : clip.time_s[static_cast<std::size_t>(i)];
+    if (time_s < options.from_s.value_or(0.0)) continue;
+    if (options.to_s && time_s > *options.to_s) break;
+    drawn.motion.frames.push_back(motion->frames[static_cast<std::size_t>(i)]);
+    drawn.time_s.push_back(time_s);
+  }
+  if (drawn.motion.frames.empty()) {
+    const std::string until = options.to_s ? fmt::format(" to {:g} s", *options.to_s) : " s on";
+    return misuse(
+        fmt::format("has no frame from {:g}{}; it lasts {:.2f} s", options.from_s.value_or(0.0),
+                    until, clip.frames() / clip.frame_rate_hz),
+        options.in);
+  }
+  drawn.shape = std::make_unique<picture::FigureShape>(drawn.motion.skeleton);
+  return drawn;
+}
+
+// The motions to draw: with --raw-beside the unstyled one first.
+Result<std::vector<Drawn>> read_all(const RenderArguments& options) {
+  std::vector<Drawn> all;
+  const auto add = [&](const std::string& stream, const std::string& name) -> Result<> {
+    const auto clip = read_motion(options, stream);
+    if (!clip) return std::unexpected(clip.error());
+    for (const std::string& warning : clip->warnings) {
+      std::fprintf(stderr, "posed: %s: %s\n", options.in.c_str(), warning.c_str());
+    }
+    auto drawn = drawn_of(options, *clip, name);
+    if (!drawn) return std::unexpected(drawn.error());
+    all.push_back(std::move(*drawn));
+    return {};
+  };
+  if (options.raw_beside) {
+    if (auto done = add(raw_name(options.stream), "as it came in"); !done) {
+      return std::unexpected(done.error());
+    }
+  }
+  if (auto done = add(options.stream, options.raw_beside ? "as posed published it" : ""); !done) {
+    return std::unexpected(done.error());
+  }
+  return all;
+}
+
+picture::Camera camera_of(const Drawn& drawn, picture::View view) {
+  return {view, drawn.shape->facing(motion::walk_heading_rad(drawn.motion))};
+}
+
+picture::StripPose pose_at(const Drawn& drawn, std::size_t frame, std::string caption) {
+  return {.figure = drawn.shape->pose(drawn.motion.frames[frame]), .caption = std::move(caption)};
+}
+
+std::string title_of(const RenderArguments& options) {
+  const std::string file = std::filesystem::path(options.in).filename().string();
+  return options.stream.empty() ? file : file + ", " + options.stream;
+}
+
+std::string time_words(double time_s) { return fmt::format("{:.2f} s", time_s); }
+
+// `count` poses of each motion at even distances, or the one pose of --frame.
+Result<std::string> still(const RenderArguments& options, const std::vector<Drawn>& all,
+                          picture::View view) {
+  const Drawn& last = all.back();
+  if (options.frame && (*options.frame < 0 || *options.frame >= last.motion.size())) {
+    return misuse(
+        fmt::format("has the frames 0 to {}, not {}", last.motion.size() - 1, *options.frame),
+        options.in);
+  }
+  const int poses = options.frame ? 1 : std::min(options.count, last.motion.size());
+  std::vector<picture::StripRow> rows;
+  for (const Drawn& drawn : all) {
+    picture::StripRow row{.title = drawn.name, .pale = all.size() > 1 && rows.empty(), .poses = {}};
+    const int end = drawn.motion.size() - 1;
+    for (int i = 0; i < poses; ++i) {
+      const double part = poses > 1 ? static_cast<double>(i) / (poses - 1) : 0.0;
+      const int frame =
+          std::min(end, options.frame.value_or(static_cast<int>(std::lround(part * end))));
+      const auto at = static_cast<std::size_t>(frame);
+      row.poses.push_back(pose_at(drawn, at, time_words(drawn.time_s[at])));
+    }
+    rows.push_back(std::move(row));
+  }
+  const picture::Camera camera = camera_of(last, view);
+  const bool ground = !last.shape->is_hand();
+  const auto layout =
+      picture::layout_of(rows, camera, options.frame ? kPose_px : options.row_px, ground);
+  return picture::strip_svg(
+      rows, camera, layout,
+      {.title = title_of(options),
+       .sentence = fmt::format("{} pose{} seen {}; {}{}.", poses, poses == 1 ? "" : "s",
+                               picture::view_words(view), last.shape->legend(),
+                               ground ? "; the ground is marked each 0.5 m" : "")});
+}
+
+Result<> render_video(const RenderArguments& options, const std::vector<Drawn>& all,
+                      picture::View view) {
+  const Drawn& last = all.back();
+  const picture::Camera camera = camera_of(last, view);
+  const double duration_s = last.time_s.back() - last.time_s.front();
+  const double rate_hz = std::min(kMaxVideoRate_hz, last.motion.rate_hz);
+  const int frames = static_cast<int>(duration_s * rate_hz) + 1;
+  // The motions side by side, each at the frame of that time.
+  const auto row_at = [&](int frame) {
+    const double time_s = last.time_s.front() + frame / rate_hz;
+    picture::StripRow row;
+    for (const Drawn& drawn : all) {
+      const auto next = std::ranges::upper_bound(drawn.time_s, time_s + 1e-6);
+      const auto at =
+          static_cast<std::size_t>(std::max(next - drawn.time_s.begin() - 1, std::ptrdiff_t{0}));
+      const std::string words = time_words(time_s);
+      row.poses.push_back(
+          pose_at(drawn, at, drawn.name.empty() ? words : drawn.name + ", " + words));
+    }
+    return row;
+  };
+  std::vector<picture::StripRow> every;
+  every.reserve(static_cast<std::size_t>(frames));
+  for (int frame = 0; frame < frames; ++frame) every.push_back(row_at(frame));
+  const auto layout = picture::layout_of(every, camera, kPose_px, !last.shape->is_hand());
+  ProgressBar bar(kQuietFor_s);
+  const picture::StripText text{
+      .title = title_of(options),
+      .sentence = fmt::format("Seen {}; {}.", picture::view_words(view), last.shape->legend())};
+  const auto done = picture::write_video(
+      {.frames = frames,
+       .rate_hz = rate_hz,
+       .draw =
+           [&](int frame) {
+             const auto at = static_cast<std::size_t>(frame);
+             return picture::strip_svg({every[at]}, camera, layout, text);
+           },
+       .progress = [&](int drawn) { return bar.show("drawing", 1.0 * drawn / frames); }},
+      options.out);
+  bar.finish();
+  return done;
+}
+
+Result<> run_render(const RenderArguments& options) {
+  if (auto ok = check_render(options); !ok) return ok;
+  const auto view = picture::view_from_name(options.view);
+  if (!view) return std::unexpected(view.error());
+  const auto all = read_all(options);
+  if (!all) return std::unexpected(all.error());
+  if (options.video) {
+    if (auto done = render_video(options, *all, *view); !done) return done;
+  } else {
+    const auto svg = still(options, *all, *view);
+    if (!svg) return std::unexpected(svg.error());
+    if (auto done = picture::write_picture(*svg, options.out); !done) return done;
+  }
+  const Drawn& last = all->back();
+  if (options.json) {
+    const nlohmann::json summary{{"in", options.in},
+                                 {"out", options.out.string()},
+                                 {"view", options.view},
+                                 {"frames", last.motion.size()},
+                                 {"from_s", last.time_s.front()},
+                                 {"to_s", last.time_s.back()}};
+    std::printf("%s\n", json_text(summary).c_str());
+  } else {
+    std::fprintf(stderr, "posed: wrote %s\n", options.out.c_str());
+  }
+  return {};
+}
+
+}  // namespace
+
+void add_render(CLI::App& app, int& exit_code) {
+  CLI::App* command = app.add_subcommand("render", "Draw a clip or a log's stream: strip or video");
+  auto options = std::make_shared<RenderArguments>();
+  command->add_option("IN", options->in, "To draw: .bvh, .amc, a hand as .csv, or a log (.plog)")
+      ->required();
+  command->add_option("--out", options->out, "To write: .svg or .png; .mp4 with --video")
+      ->required();
+  auto* strip = command->add_flag("--strip", options->strip, "Poses side by side (the default)");
+  auto* frame = command->add_option("--frame", options->frame, "One pose: this frame, from 0")
+                    ->excludes(strip);
+  auto* video = command->add_flag("--video", options->video, "The motion as an .mp4 (needs ffmpeg)")
+                    ->excludes(strip)
+                    ->excludes(frame);
+  command->add_option("--view", options->view, "From where the figure is seen")
+      ->check(CLI::IsMember({"front", "side", "three-quarter"}))
+      ->capture_default_str();
+  command->add_option("--count", options->count, "Poses of a strip")
+      ->check(CLI::Range(1, 100))
+      ->excludes(frame)
+      ->excludes(video)
+      ->capture_default_str();
+  command->add_option("--height", options->row_px, "Height of a strip's poses [px]")
+      ->check(CLI::Range(40, 4000))
+      ->capture_default_str();
+  command->add_option("--from", options->from_s, "Begin at this time [s]")->check(zero_or_more());
+  command->add_option("--to", options->to_s, "End at this time [s]")->check(zero_or_more());
+  command->add_flag("--raw-beside", options->raw_beside,
+                    "The unstyled motion of a log, too, in grey");
+  command->add_option("--stream", options->stream,
+                      "Which of a log's streams (default: the only one)");
+  command->add_option("--take", options->take, "Only this take of a log: its number or its name");
+  command->add_option("--skeleton", options->read.asf,
+                      "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
+  command->add_option("--profile", options->read.profile,
+                      "Skeleton profile (default: found by the joints' names)");
+  command->add_option("--hand", options->hand, "The hand of a hand CSV")
+      ->check(CLI::IsMember({"left", "right"}));
+  add_overwrite_option(*command, options->overwrite);
+  command->add_flag("--json", options->json, "Print a summary as JSON on stdout");
+  command->footer(
+      "The camera looks at a walker along its way; the pictures are without perspective, so poses\n"
+      "can be compared. No display is needed.\n\n"
+      "Examples:\n"
+      "  posed render walk.bvh --out walk.png\n"
+      "  posed render walk.bvh --view side --from 1 --to 2.2 --count 6 --out stride.svg\n"
+      "  posed render glove.csv --hand left --frame 40 --out sign.png\n"
+      "  posed render take1.plog --stream walker --raw-beside --video --out walker.mp4");
+  command->callback([options, &exit_code] {
+    if (!options->hand.empty()) {
+      options->read.hand = side_named(options->hand);
+    }
+    const auto done = run_render(*options);
+    exit_code = done ? static_cast<int>(ExitCode::kDone) : report(done.error());
+  });
+}
+
+}  // namespace posed::tools

@@ -1,0 +1,311 @@
+// `posed replay`: repeats the run in a log, from the log alone.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <unistd.h>
+
+#include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/replay/broadcast.hpp"
+#include "daemon/replay/pace.hpp"
+#include "daemon/replay/replay.hpp"
+#include "daemon/tools/command/client.hpp"
+#include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/output_files.hpp"
+#include "daemon/tools/command/progress.hpp"
+#include "daemon/tools/logs/missing_from_log.hpp"
+#include "daemon/tools/logs/replay_farm.hpp"
+#include "daemon/tools/logs/replay_outcome.hpp"
+#include "daemon/tools/logs/replay_outputs.hpp"
+#include "models/gp/isa.hpp"
+#include "proto/log/reader.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::tools {
+namespace {
+
+struct ReplayOptions {
+  std::vector<std::string> logs;  // several: replay_farm
+  std::string log;                // the first
+  std::string speed = "1";
+  std::string out;
+  std::string endpoint;
+  std::string isa;
+  bool publish = false;
+  bool expect = false;
+  bool overwrite = false;
+  bool json = false;
+};
+
+// Waits until a chunk is due; returns false if the user wants to stop.
+class Pacer {
+ public:
+  Pacer(std::string log, double speed)  // 0: as fast as possible
+      : log_(std::move(log)), speed_(speed), pace_(speed) {}
+
+  bool operator()(const log::ChunkRow& chunk) {
+    if (speed_ == 0.0) return !Interrupt::came();
+    const auto step = pace_.step(chunk);
+    if (step.skipped_ns > 0) {
+      spdlog::warn("{}: nothing came for {:.0f} s before chunk {}; that silence is skipped", log_,
+                   seconds(step.skipped_ns), chunk.id);
+    }
+    const auto due = start_ + std::chrono::nanoseconds(step.due_ns);
+    while (!Interrupt::came() && Steady::now() < due) {
+      std::this_thread::sleep_until(
+          std::min<Steady::time_point>(due, Steady::now() + std::chrono::milliseconds(50)));
+    }
+    return !Interrupt::came();
+  }
+
+ private:
+  using Steady = std::chrono::steady_clock;
+  std::string log_;
+  double speed_;
+  replay::Pace pace_;
+  Steady::time_point start_ = Steady::now();
+};
+
+// Shows the progress of the replay once it takes long.
+class ReplayProgress {
+ public:
+  explicit ReplayProgress(const std::optional<log::Reader::Extent>& extent) : extent_(extent) {}
+
+  [[nodiscard]] double elapsed_s() const { return bar_.elapsed_s(); }
+
+  void show(std::int64_t arrival_ns) {
+    const auto now = std::chrono::steady_clock::now();
+    if (!extent_ || now - shown_ < every_ || now - start_ < kQuiet) return;
+    shown_ = now;
+    const double whole_s = seconds(extent_->last_ns - extent_->first_ns);
+    const double done_s = seconds(arrival_ns - extent_->first_ns);
+    bar_.show(fmt::format("replayed {:.0f} of {:.0f} s", std::clamp(done_s, 0.0, whole_s), whole_s),
+              whole_s > 0.0 ? done_s / whole_s : 1.0);
+  }
+
+ private:
+  static constexpr std::chrono::milliseconds kQuiet{1000};
+  const std::chrono::milliseconds every_{isatty(STDERR_FILENO) == 1 ? 200 : 5000};
+  std::optional<log::Reader::Extent> extent_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+  std::chrono::steady_clock::time_point shown_{};
+  ProgressBar bar_;
+};
+
+Result<double> speed_of(const std::string& text) {
+  if (text == "max") return 0.0;
+  char* end = nullptr;
+  const double speed = std::strtod(text.c_str(), &end);
+  if (*end == '\0' && speed > 0.0 && speed <= 1000.0) return speed;
+  return misuse("--speed is a factor above 0 and up to 1000 such as 1 or 0.5, or max, not '" +
+                text + "'");
+}
+
+// Equal bits are guaranteed for one instruction set only: by default that of the log.
+Result<> choose_isa(const ReplayOptions& options, const log::Reader& reader) {
+  const std::string recorded = recorded_isa(reader);
+  if (auto set = set_isa_or(options.isa, recorded); !set) return set;
+  if (recorded != "auto" && recorded != gp::isa_name()) {
+    spdlog::warn("recorded on {}, replayed on {}: the last bits may differ", recorded,
+                 gp::isa_name());
+  }
+  return {};
+}
+
+// Each once: a body that comes back is another stream of the same name.
+std::vector<std::string> stream_names(const log::Reader& reader) {
+  std::vector<std::string> names;
+  for (const log::StreamRow& row : reader.streams()) {
+    if (std::ranges::find(names, row.name) == names.end()) names.push_back(row.name);
+  }
+  return names;
+}
+
+void print_summary(const ReplayOptions& options, const ReplayOutcome& outcome) {
+  if (options.expect) {
+    if (const std::string rest = outcome.counts.not_compared(); !rest.empty()) {
+      spdlog::warn("not compared: {}", rest);
+    }
+    spdlog::info("{} frames are as published, bit for bit", outcome.counts.compared);
+  }
+  if (options.json) return;
+  const std::string raw = outcome.raw_frames == 0 ? ""
+                                                  : fmt::format(" ({} and {} raw ones)",
+                                                                outcome.frames - outcome.raw_frames,
+                                                                outcome.raw_frames);
+  spdlog::info("{} frames{} replayed in {:.1f} s on {}", outcome.frames, raw, outcome.took_s,
+               outcome.isa);
+}
+
+// A log that was compared has the same keys as one of several, also where it differs.
+void print_json(const ReplayOptions& options, const std::string& recorded,
+                const ReplayOutcome& outcome) {
+  nlohmann::ordered_json line{{"frames", outcome.frames},
+                              {"raw_frames", outcome.raw_frames},
+                              {"isa", outcome.isa},
+                              {"took_s", outcome.took_s}};
+  if (options.expect) line = json_of(options.log, recorded, outcome);
+  std::printf("%s\n", json_text(line).c_str());
+  std::fflush(stdout);
+}
+
+Result<> open_outputs(const ReplayOptions& options, double speed, const log::Reader& reader,
+                      const replay::Replay& replay, ReplayOutputs& outputs) {
+  if (options.expect) {
+    auto expectation = replay::Expectation::open(reader);
+    if (!expectation) return std::unexpected(expectation.error());
+    outputs.expectation = std::move(*expectation);
+  }
+  if (!options.out.empty()) {
+    auto file = replay::FrameFile::create(options.out);
+    if (!file) return std::unexpected(file.error());
+    outputs.file = std::move(*file);
+  }
+  if (!options.publish) return {};
+  const auto meta = reader.meta().find("publish_endpoint");
+  std::string endpoint = meta == reader.meta().end() ? "" : meta->second;
+  if (!options.endpoint.empty()) endpoint = options.endpoint;
+  const auto extent = reader.extent();
+  if (!extent) return std::unexpected(extent.error());
+  auto broadcast =
+      replay::Broadcast::open({.endpoint = endpoint,
+                               .log = std::filesystem::path(options.log).filename().string(),
+                               .speed = speed,
+                               .begin_ns = *extent ? (*extent)->first_ns : 0},
+                              replay);
+  if (!broadcast) return std::unexpected(broadcast.error());
+  outputs.broadcast = std::move(*broadcast);
+  nlohmann::ordered_json ready{{"ready", true},
+                               {"publish", outputs.broadcast->endpoint()},
+                               {"replay", options.log},
+                               {"streams", nlohmann::json::array()}};
+  for (const std::string& name : stream_names(reader)) ready["streams"].push_back(name);
+  std::printf("%s\n", json_text(ready).c_str());
+  std::fflush(stdout);
+  return {};
+}
+
+// A replay that only publishes may end at any time; an incomplete file or comparison is a failure.
+Result<> ended_early(const ReplayOptions& options, const ReplayOutputs& outputs) {
+  const std::string what = fmt::format("interrupted after {} frames", outputs.frames);
+  if (options.expect) return fail(what + ": those after them were not compared");
+  if (!options.out.empty()) return fail(what + ": " + options.out + " holds only those");
+  spdlog::info("{}", what);
+  return {};
+}
+
+Result<> replay(const ReplayOptions& options) {
+  const auto speed = speed_of(options.speed);
+  if (!speed) return std::unexpected(speed.error());
+  const auto files = OutputFiles(options.overwrite)
+                         .reads(options.log)
+                         .writes_any_but_other(options.out, {".bin"})
+                         .check();
+  if (!files) return files;
+  auto reader = log::Reader::open(options.log);
+  if (!reader) return std::unexpected(reader.error());
+  if (auto chosen = choose_isa(options, *reader); !chosen) return chosen;
+  auto opened = replay::Replay::open(*reader);
+  if (!opened) return std::unexpected(opened.error());
+  replay::Replay& replay = **opened;
+  ReplayOutcome outcome{.missing = missing_from(*reader, replay)};
+  for (const std::string& missing : outcome.missing) spdlog::warn("{}", missing);
+  ReplayOutputs outputs(replay);
+  if (auto done = open_outputs(options, *speed, *reader, replay, outputs); !done) return done;
+  const auto extent = reader->extent();
+  if (!extent) return std::unexpected(extent.error());
+  ReplayProgress progress(*extent);
+  const Interrupt interrupt;  // after the progress bar, because it takes over Ctrl-C
+  Pacer pacer(options.log, *speed);
+  const auto pace = [&](const log::ChunkRow& chunk) {
+    if (!pacer(chunk)) return false;
+    if (static_cast<pipeline::Direction>(chunk.direction) != pipeline::Direction::kFromDevice) {
+      return true;  // only chunks from a device have a time of their own
+    }
+    progress.show(chunk.arrival_ns);
+    if (outputs.broadcast) outputs.broadcast->clock().reached(chunk.arrival_ns);
+    return true;
+  };
+  auto done = replay.run([&](const pipeline::Item& item) { outputs.take(item); }, pace);
+  if (done && Interrupt::came()) return ended_early(options, outputs);
+  if (done) done = outputs.finish();
+  outcome.frames = outputs.frames;
+  outcome.raw_frames = outputs.raw_frames;
+  if (outputs.expectation) outcome.counts = outputs.expectation->counts();
+  outcome.isa = gp::isa_name();
+  if (!done) outcome.problem = done.error().text();
+  outcome.took_s = progress.elapsed_s();
+  if (options.json && (done || options.expect)) print_json(options, recorded_isa(*reader), outcome);
+  if (done) print_summary(options, outcome);
+  return done;
+}
+
+// Several logs are only compared.
+int replay_several(const ReplayOptions& options, bool speed_given) {
+  if (!options.expect) {
+    return report(
+        misuse("several logs are replayed at once to compare them: add --expect").error());
+  }
+  if (options.publish || !options.out.empty()) {
+    return report(misuse("--publish and --out are for one log; leave them out").error());
+  }
+  if (speed_given && options.speed != "max") {
+    return report(
+        misuse("several logs are replayed as fast as possible; leave out --speed").error());
+  }
+  return replay_farm({options.logs, options.isa, options.json});
+}
+
+}  // namespace
+
+void add_replay(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("replay", "Compute a device log's frames again");
+  auto options = std::make_shared<ReplayOptions>();
+  command->add_option("log", options->logs, "The device log, or several with --expect")->required();
+  auto* speed =
+      command
+          ->add_option("--speed", options->speed,
+                       "Times the recording's pace: 1 as it came; max: as fast as possible")
+          ->capture_default_str();
+  auto* publish =
+      command->add_flag("--publish", options->publish, "Publish where the recorded run did");
+  command->add_option("--endpoint", options->endpoint, "With --publish: publish there instead")
+      ->type_name("ENDPOINT")
+      ->needs(publish);
+  command->add_option("--out", options->out, "Write FRAMES.bin: {u32 length, posed.v1.Frame}...")
+      ->type_name("FILE");
+  add_overwrite_option(*command, options->overwrite);
+  command->add_flag("--expect", options->expect, "Compare with the frames in the log, bit for bit");
+  command->add_option("--isa", options->isa, "portable, avx2 or avx512; default: the log's own");
+  command->add_flag("--json", options->json, "Print the counts as JSON");
+  command->footer(
+      R"(Nothing but the log is needed: it holds what the devices sent, the models, the settings
+and every decision. On one instruction set the same log gives the same bits. --expect ends
+with 1 and names stream, sequence and field of the first difference; also where nothing could
+be compared, as after a gap at the log's start. A published replay says in its stats that it is
+one; its times are the recording's, on the recording's clock. Nobody can control it. Examples:
+  posed replay take1.plog --speed max --expect
+  posed replay --expect takes/*.plog --json   # all at once, on all cores; 1 if one differs
+  posed replay take1.plog --speed max --out FRAMES.bin
+  posed replay take1.plog --publish     # and watch it: posed top)");
+  command->callback([options, speed, &exit_code] {
+    if (options->logs.size() > 1) {
+      exit_code = replay_several(*options, speed->count() > 0);
+      return;
+    }
+    options->log = options->logs.front();
+    const auto done = replay(*options);
+    exit_code = done ? 0 : report(done.error());
+  });
+}
+
+}  // namespace posed::tools

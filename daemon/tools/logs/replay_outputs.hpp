@@ -1,0 +1,50 @@
+// The outputs for the frames of a replay: the file, the comparison, the network. And the
+// instruction set on which a log is replayed. Cold.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "daemon/pipeline/messages.hpp"
+#include "daemon/replay/broadcast.hpp"
+#include "daemon/replay/expectation.hpp"
+#include "daemon/replay/replay.hpp"
+#include "daemon/tools/export/frame_file.hpp"
+#include "proto/frame/result.hpp"
+#include "proto/message/frame_message.hpp"
+
+namespace posed::tools {
+
+class ReplayOutputs {
+ public:
+  explicit ReplayOutputs(const replay::Replay& replay);
+
+  void take(const pipeline::Item& item);
+
+  // Call after the last frame.
+  [[nodiscard]] Result<> finish();
+
+  std::optional<replay::FrameFile> file;
+  std::optional<replay::Expectation> expectation;
+  std::unique_ptr<replay::Broadcast> broadcast;
+  std::optional<Error> difference;
+  std::uint64_t frames = 0;
+  std::uint64_t raw_frames = 0;  // of them: the input before styling, which `record` does not count
+
+ private:
+  const replay::Replay& replay_;
+  std::vector<std::array<message::FrameEncoder, 2>> encoders_;  // styled, raw
+};
+
+// What the log says that it was recorded on; "auto" if it says nothing.
+[[nodiscard]] std::string recorded_isa(const log::Reader& reader);
+
+// Uses `wanted`; if it is empty, `recorded`, or the CPU's best where the CPU lacks that. For the
+// whole process.
+[[nodiscard]] Result<> set_isa_or(const std::string& wanted, const std::string& recorded);
+
+}  // namespace posed::tools

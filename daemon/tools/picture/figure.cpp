@@ -1,0 +1,146 @@
+#include "daemon/tools/picture/figure.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "models/motion/kinematics.hpp"
+#include "proto/frame/hand_skeleton.hpp"
+
+namespace posed::picture {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr std::string_view kLeft = "#0072b2", kRight = "#d55e00", kMiddle = "#4d4d4d";
+// Thumb to little.
+constexpr std::array<std::string_view, kFingers> kFingerColours{"#d55e00", "#e69f00", "#009e73",
+                                                                "#0072b2", "#cc79a7"};
+// Widths of sticks, as a part of the figure's reach.
+constexpr double kTrunkWidth = 0.05, kLimbWidth = 0.038, kFingerWidth = 0.012;
+constexpr double kHeadRadius = 0.085;
+// Widths of a hand's capsules [m], from the palm outwards.
+constexpr double kPalmWidth_m = 0.022;
+constexpr std::array<double, kFingerJoints> kCapsuleWidth_m{0.02, 0.017, 0.015};
+
+bool is_finger(Bone bone) { return bone >= Bone::kLeftThumbMetacarpal; }
+
+std::string_view side_colour(std::optional<Bone> bone, std::string_view otherwise) {
+  if (!bone) return otherwise;
+  const std::string_view name = bone_name(*bone);
+  if (name.starts_with("left")) return kLeft;
+  return name.starts_with("right") ? kRight : kMiddle;
+}
+
+// The colour of what begins at a joint: a joint without a canonical bone belongs to its parent.
+std::string_view colour_of(const Skeleton& skeleton, int joint) {
+  const Joint& at = skeleton.joints[static_cast<std::size_t>(joint)];
+  return side_colour(at.bone, at.parent < 0 ? kMiddle : colour_of(skeleton, at.parent));
+}
+
+double reach_m(const Skeleton& skeleton) {
+  std::vector<double> way_m(skeleton.joints.size(), 0.0);
+  double longest_m = 0.0;
+  for (std::size_t j = 0; j < skeleton.joints.size(); ++j) {
+    const Joint& joint = skeleton.joints[j];
+    const bool below_root = joint.parent >= 0 && static_cast<int>(j) != skeleton.root_joint;
+    if (below_root) {
+      way_m[j] = way_m[static_cast<std::size_t>(joint.parent)] + joint.offset_m.norm();
+    }
+    longest_m = std::max(longest_m, way_m[j] + joint.end_site_m.value_or(Vector3d::Zero()).norm());
+  }
+  return longest_m;
+}
+
+// Joints above the root joint are places in the room, not parts of the body.
+bool is_part_of_body(const Skeleton& skeleton, int joint) {
+  for (; joint >= 0; joint = skeleton.joints[static_cast<std::size_t>(joint)].parent) {
+    if (joint == skeleton.root_joint) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+FigureShape::FigureShape(std::shared_ptr<const Skeleton> skeleton)
+    : skeleton_(std::move(skeleton)),
+      hand_(hand_side(*skeleton_)),
+      reach_m_(std::max(reach_m(*skeleton_), 1e-6)) {
+  for (int j = 0; j < static_cast<int>(skeleton_->joints.size()); ++j) {
+    if (!is_part_of_body(*skeleton_, j)) continue;
+    if (j != skeleton_->root_joint) add_limb(j, false);
+    if (skeleton_->joints[static_cast<std::size_t>(j)].end_site_m) add_limb(j, true);
+  }
+}
+
+void FigureShape::add_limb(int joint, bool tip) {
+  const Joint& at = skeleton_->joints[static_cast<std::size_t>(joint)];
+  // The bone that turns with the joint where the limb begins.
+  const int begin = tip ? joint : at.parent;
+  Limb limb{.joint = joint, .tip = tip, .width_m = kLimbWidth * reach_m_, .colour = kMiddle};
+  if (hand_) {
+    const int place = begin - 1;  // of the finger joints, 15 in all; -1: the wrist
+    limb.width_m =
+        place < 0 ? kPalmWidth_m : kCapsuleWidth_m[static_cast<std::size_t>(place % kFingerJoints)];
+    if (place >= 0) limb.colour = kFingerColours[static_cast<std::size_t>(place / kFingerJoints)];
+  } else {
+    limb.colour = colour_of(*skeleton_, begin);
+    const auto& bone = skeleton_->joints[static_cast<std::size_t>(begin)].bone;
+    if (limb.colour == kMiddle) limb.width_m = kTrunkWidth * reach_m_;
+    if ((bone && is_finger(*bone)) || (at.bone && is_finger(*at.bone))) {
+      limb.width_m = kFingerWidth * reach_m_;
+    }
+    if (tip && bone == Bone::kHead) return;  // the head is drawn there
+  }
+  limbs_.push_back(limb);
+}
+
+Figure FigureShape::pose(const Frame& frame) const {
+  const motion::WorldPose world = motion::world_pose(*skeleton_, frame);
+  const auto tip_m = [&](std::size_t j) -> Vector3d {
+    const Vector3d local_m = skeleton_->joints[j].end_site_m.value_or(Vector3d::Zero());
+    return world.position_m[j] + world.rotation[j] * local_m;
+  };
+  Figure figure;
+  figure.place_m = world.position_m[static_cast<std::size_t>(skeleton_->root_joint)];
+  figure.place_m.y() = 0.0;
+  for (const Limb& limb : limbs_) {
+    const auto j = static_cast<std::size_t>(limb.joint);
+    const auto parent = static_cast<std::size_t>(std::max(0, skeleton_->joints[j].parent));
+    figure.sticks.push_back({.from_m = world.position_m[limb.tip ? j : parent],
+                             .to_m = limb.tip ? tip_m(j) : world.position_m[j],
+                             .width_m = limb.width_m,
+                             .colour = limb.colour});
+  }
+  const int head = hand_ ? -1 : skeleton_->joint_of(Bone::kHead);
+  if (head >= 0) {
+    const auto j = static_cast<std::size_t>(head);
+    const double radius_m = kHeadRadius * reach_m_;
+    // Without a tip the head continues the neck.
+    const Vector3d local_m =
+        skeleton_->joints[j].end_site_m.value_or(skeleton_->joints[j].offset_m).normalized();
+    figure.head = {.centre_m = world.position_m[j] + world.rotation[j] * (radius_m * local_m),
+                   .radius_m = radius_m};
+  }
+  return figure;
+}
+
+Facing FigureShape::facing(double heading_rad) const {
+  if (hand_) {
+    // Zero angles are a hand with the palm down and the fingers along +Z; a right thumb is at +X.
+    return {.up = Vector3d::UnitZ(),
+            .forward = -Vector3d::UnitY(),
+            .side = *hand_ == Side::kRight ? Vector3d(Vector3d::UnitX()) : -Vector3d::UnitX()};
+  }
+  const Vector3d forward(std::sin(heading_rad), 0.0, std::cos(heading_rad));
+  return {.up = Vector3d::UnitY(), .forward = forward, .side = forward.cross(Vector3d::UnitY())};
+}
+
+std::string_view FigureShape::legend() const {
+  return hand_ ? "thumb dark orange, index light orange, middle green, ring blue, little pink"
+               : "left limbs are blue, right ones orange";
+}
+
+}  // namespace posed::picture

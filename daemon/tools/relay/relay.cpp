@@ -1,0 +1,223 @@
+#include "daemon/tools/relay/relay.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include <spdlog/spdlog.h>
+
+#include "daemon/net/peer_guard.hpp"
+#include "daemon/net/security.hpp"
+#include "daemon/net/zap_authenticator.hpp"
+#include "daemon/system/event_fd.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::relay {
+namespace {
+
+constexpr int kMessagesATurn = 256;
+// Messages a second that the first queue is made for; most relays pass on more.
+constexpr double kFirstRate_hz = 256.0;
+// Half of what a daemon allows one subscriber, so that it never cuts the relay because the relay's
+// own subscribers come and go.
+constexpr double kMaxChangesAtOnce = publish::kMaxAtOnce / 2.0;
+constexpr double kMaxChangesPerSecond = publish::kMaxPerSecond / 2.0;
+// The relay always hears these: skeletons for those who come later, stats to see its upstreams.
+constexpr std::array<const char*, 2> kOwn{"skeleton/", "stats"};
+// An upstream sees the relay as one subscriber.
+constexpr std::size_t kMaxPassed = publish::kMaxWantedOfPeer - kOwn.size();
+
+// Whether a daemon publishes under this topic, whatever the stream.
+bool is_whole_topic(std::string_view topic) {
+  return publish::could_become_topic(topic) && !stream_of_topic(topic).empty();
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Relay>> Relay::open(const RelayOptions& options) {
+  if (options.from.empty() || options.from.size() > kMaxUpstreams) {
+    return misuse("a relay has 1 to " + std::to_string(kMaxUpstreams) + " upstreams");
+  }
+  auto socket = publish::PublishSocket::open({.context = options.context,
+                                              .endpoint = options.endpoint,
+                                              .authenticator = options.authenticator,
+                                              .secret_z85 = options.secret_z85,
+                                              .messages_per_s = kFirstRate_hz});
+  if (!socket) return std::unexpected(socket.error());
+  std::vector<Upstream> upstreams;
+  for (const UpstreamSettings& settings : options.from) {
+    auto upstream = Upstream::open(options.context, settings);
+    if (!upstream) return std::unexpected(upstream.error());
+    upstreams.push_back(std::move(*upstream));
+  }
+  return std::unique_ptr<Relay>(new Relay(options, std::move(*socket), std::move(upstreams)));
+}
+
+Relay::Relay(const RelayOptions& options, publish::PublishSocket socket, std::vector<Upstream> from)
+    : authenticator_(options.authenticator),
+      socket_(std::move(socket)),
+      upstreams_(std::move(from)),
+      subscriptions_([](std::string_view) { return false; },
+                     [this](const std::string& prefix, bool wanted) {
+                       if (wanted) {
+                         wanted_.insert(prefix);
+                       } else {
+                         wanted_.erase(prefix);
+                       }
+                       changed_.insert(prefix);
+                     }),
+      budget_(kMaxChangesAtOnce),
+      stats_(upstreams_.size()),
+      queue_(publish::send_high_water_mark(kFirstRate_hz)) {
+  for (Upstream& upstream : upstreams_) {
+    for (const char* topic : kOwn) static_cast<void>(upstream.subscribe(topic, true));
+  }
+}
+
+std::int64_t Relay::turn(std::int64_t now_ns) {
+  bool all_heard = socket_.hear(
+      subscriptions_, now_ns, [this](std::string_view prefix) { streams_.want_skeletons(prefix); });
+  pass_subscriptions(now_ns);
+  for (std::size_t i = 0; i < upstreams_.size(); ++i) {
+    upstreams_[i].take_news();
+    all_heard = drain(i, now_ns) && all_heard;
+  }
+  const std::int64_t skeleton_ns =
+      streams_.send_due(now_ns, [this](std::string_view topic, std::string_view bytes) {
+        send(topic, bytes);
+        ++counts_.late_skeletons;
+      });
+  every_second(now_ns);
+  if (!all_heard) return now_ns;
+  const std::int64_t change_ns =
+      changed_.empty() ? system::kForever_ns : now_ns + kNanosPerSecond / 20;
+  return std::min({skeleton_ns, change_ns, second_ns_ + kNanosPerSecond});
+}
+
+void Relay::wait(std::int64_t timeout_ns) {
+  std::array<zmq_pollitem_t, 1 + 2 * kMaxUpstreams> items{};
+  int count = 0;
+  items[count++] = {socket_.get(), 0, ZMQ_POLLIN, 0};
+  for (const Upstream& upstream : upstreams_) {
+    items[count++] = {upstream.socket(), 0, ZMQ_POLLIN, 0};
+    items[count++] = {upstream.news(), 0, ZMQ_POLLIN, 0};
+  }
+  constexpr std::int64_t kMilli_ns = 1'000'000;
+  zmq_poll(items.data(), count,
+           (std::max<std::int64_t>(timeout_ns, 0) + kMilli_ns - 1) / kMilli_ns);
+}
+
+bool Relay::drain(std::size_t upstream, std::int64_t now_ns) {
+  net::Message topic;
+  net::Message body;
+  bool sound = false;
+  for (int i = 0; i < kMessagesATurn; ++i) {
+    if (!upstreams_[upstream].receive(topic, body, sound)) return true;
+    if (sound) {
+      pass_on(upstream, topic.text(), body, now_ns);
+    } else {
+      ++counts_.foreign;
+    }
+  }
+  return false;
+}
+
+void Relay::pass_on(std::size_t upstream, std::string_view topic, net::Message& body,
+                    std::int64_t now_ns) {
+  if (topic == "stats") {
+    bool sound = false;
+    const auto stats = stats_.take(upstream, body.text(), now_ns, sound);
+    if (!sound) ++counts_.foreign;
+    if (stats) send(topic, *stats);
+    return;
+  }
+  if (!is_whole_topic(topic)) {
+    ++counts_.foreign;
+    return;
+  }
+  const std::string_view stream = stream_of_topic(topic);
+  if (!streams_.admit(stream, upstream, now_ns)) {
+    if (++counts_.clashes == 1) {
+      spdlog::warn(
+          "{} sends the stream {} as well as another upstream, or there are too many"
+          " streams: its messages are left out",
+          upstreams_[upstream].endpoint(), clean(stream));
+    }
+    return;
+  }
+  if (topic.starts_with("skeleton/")) streams_.keep_skeleton(stream, body.text(), now_ns);
+  send(topic, body.text());
+}
+
+void Relay::send(std::string_view topic, std::string_view bytes) {
+  if (!net::send_part(socket_.get(), topic, true)) return;
+  static_cast<void>(net::send_part(socket_.get(), bytes, false));
+  ++counts_.messages;
+  counts_.bytes += topic.size() + bytes.size();
+}
+
+void Relay::pass_subscriptions(std::int64_t now_ns) {
+  const double earned = seconds(std::max<std::int64_t>(now_ns - budgeted_ns_, 0));
+  budget_ = std::min(budget_ + earned * kMaxChangesPerSecond, kMaxChangesAtOnce);
+  budgeted_ns_ = now_ns;
+  for (auto change = changed_.begin(); change != changed_.end() && budget_ >= 1.0;) {
+    const std::string& prefix = *change;
+    const bool wanted = wanted_.contains(prefix);
+    // What the upstreams do not allow one subscriber waits until others have ended.
+    if (wanted && passed_.size() >= kMaxPassed) {
+      ++change;
+      continue;
+    }
+    if (wanted != passed_.contains(prefix)) {
+      budget_ -= 1.0;
+      // An upstream that cannot take it now is one that has been stuck for long: it learns of it
+      // when it connects anew, because libzmq then repeats all subscriptions.
+      for (Upstream& upstream : upstreams_) {
+        static_cast<void>(upstream.subscribe(prefix, wanted));
+      }
+      if (wanted) {
+        passed_.insert(prefix);
+      } else {
+        passed_.erase(prefix);
+      }
+    }
+    change = changed_.erase(change);
+  }
+}
+
+void Relay::every_second(std::int64_t now_ns) {
+  if (second_ns_ == kNoTime_ns) second_ns_ = now_ns;
+  const std::int64_t passed_ns = now_ns - second_ns_;
+  if (passed_ns < kNanosPerSecond) return;
+  const double rate_hz =
+      static_cast<double>(counts_.messages - passed_before_) / seconds(passed_ns);
+  second_ns_ = now_ns;
+  passed_before_ = counts_.messages;
+  // All skeletons may come together, so they have room beside the poses.
+  const int queue = publish::send_high_water_mark(rate_hz) + static_cast<int>(streams_.streams());
+  // A queue that becomes shorter can stop a connection for good: libzmq's receiving side reports
+  // what it took every half queue, and while it still counts by the old, longer one, the sending
+  // side finds the new one full.
+  if (queue <= queue_) return;
+  queue_ = queue;
+  static_cast<void>(net::set_option(socket_.get(), ZMQ_SNDHWM, queue));
+}
+
+RelayCounts Relay::counts() const {
+  RelayCounts counts = counts_;
+  counts.upstreams = static_cast<std::size_t>(
+      std::ranges::count_if(upstreams_, [](const Upstream& one) { return one.established(); }));
+  counts.subscribers = socket_.guard().peers();
+  counts.subscriptions = passed_.size();
+  counts.streams = streams_.streams();
+  return counts;
+}
+
+void Relay::check_subscribers() {
+  if (authenticator_ == nullptr) return;
+  socket_.guard().cut_unless([this](std::string_view user) {
+    return authenticator_->allows(user, net::Domain::kPublish);
+  });
+}
+
+}  // namespace posed::relay

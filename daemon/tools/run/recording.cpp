@@ -1,0 +1,221 @@
+#include "daemon/tools/run/recording.hpp"
+
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <memory>
+#include <set>
+#include <thread>
+#include <variant>
+
+#include <spdlog/fmt/chrono.h>
+#include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
+#include <nlohmann/json.hpp>
+
+#include "daemon/assembly/daemon.hpp"
+#include "daemon/record/recorder.hpp"
+#include "daemon/system/clock.hpp"
+#include "daemon/tools/command/output_files.hpp"
+#include "daemon/tools/run/no_body.hpp"
+#include "daemon/tools/run/set_aside.hpp"
+#include "daemon/tools/run/take_clips.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::tools {
+namespace {
+
+// Publishes what the recorder reports on event/<stream> of the streams that it concerns.
+void post(assembly::Daemon& daemon, const record::RecorderEvent& event) {
+  constexpr std::array<v1::Event::Kind, 3> kKinds{
+      v1::Event::KIND_RECORDING_GAP, v1::Event::KIND_RECORDING_ERROR, v1::Event::KIND_TAKE};
+  const auto kind = kKinds[static_cast<std::size_t>(event.kind)];
+  for (const std::uint32_t stream : event.streams) daemon.post_event(stream, kind, event.text);
+}
+
+// Datagrams that never came to posed. Those of a body's device count once, with its source.
+std::uint64_t kernel_dropped(const v1::Stats& stats) {
+  std::uint64_t dropped = 0;
+  for (const v1::SourceStats& source : stats.source()) dropped += source.kernel_dropped();
+  for (const v1::StreamStats& stream : stats.stream()) {
+    if (stream.source_name().empty()) dropped += stream.kernel_dropped();
+  }
+  return dropped;
+}
+
+metrics::RecorderFigures figures_of(const record::Recorder& recorder) {
+  return {.file = recorder.file(),
+          .lost_chunks = recorder.lost_chunks(),
+          .lost_frames = recorder.lost_frames(),
+          .errors = recorder.errors(),
+          .error_ns = recorder.error_ns()};
+}
+
+std::string missing_words(const record::Recorder& recorder, std::uint64_t dropped) {
+  const std::uint64_t lost = recorder.lost_chunks(), errors = recorder.errors();
+  std::string words;
+  if (lost + errors > 0) {
+    words = fmt::format("{} chunks are missing after {} write errors; `posed replay` says where",
+                        lost, errors);
+  }
+  if (recorder.lost_frames() > 0) {
+    words += fmt::format("{}{} published frames are missing, which `posed replay` makes again",
+                         words.empty() ? "" : "; ", recorder.lost_frames());
+  }
+  if (dropped > 0) {
+    words += fmt::format("{}the kernel dropped {} datagrams before posed could read them",
+                         words.empty() ? "" : "; ", dropped);
+  }
+  return words.empty() ? "nothing is missing" : words;
+}
+
+// Prints a summary. Gaps were already reported when they happened.
+void print_result(const RecordingPlan& options, const v1::Stats& stats,
+                  const record::Recorder& recorder, double took_s) {
+  std::error_code gone;  // somebody deleted the log meanwhile
+  const auto size = std::filesystem::file_size(options.out, gone);
+  const std::uintmax_t bytes = gone ? 0 : size;
+  std::uint64_t frames = stats.left_frames(), samples = stats.left_samples();
+  const bool some_left = frames + samples > 0;
+  nlohmann::ordered_json streams = nlohmann::ordered_json::array();
+  for (const v1::StreamStats& stream : stats.stream()) {
+    frames += stream.frames();
+    samples += stream.samples();
+    streams.push_back(
+        {{"stream", stream.stream()}, {"frames", stream.frames()}, {"samples", stream.samples()}});
+  }
+  const std::uint64_t lost = recorder.lost_chunks() + recorder.lost_frames();
+  const std::uint64_t dropped = kernel_dropped(stats);
+  if (options.json) {
+    const nlohmann::ordered_json line{{"file", options.out},
+                                      {"seconds", took_s},
+                                      {"bytes", bytes},
+                                      {"frames", frames},
+                                      {"samples", samples},
+                                      {"streams", streams},
+                                      {"left_frames", stats.left_frames()},
+                                      {"left_samples", stats.left_samples()},
+                                      {"missing_chunks", recorder.lost_chunks()},
+                                      {"missing_frames", recorder.lost_frames()},
+                                      {"kernel_dropped", dropped},
+                                      {"write_errors", recorder.errors()}};
+    std::printf("%s\n", json_text(line).c_str());
+    std::fflush(stdout);
+  }
+  spdlog::log(lost + recorder.errors() + dropped > 0 ? spdlog::level::warn : spdlog::level::info,
+              "{}: {:.1f} s of {} stream{}{}, {} frames and {} samples published, {:.1f} MB; {}",
+              options.out, took_s, stats.stream_size(), stats.stream_size() == 1 ? "" : "s",
+              some_left ? " and those that have left" : "", frames, samples,
+              static_cast<double>(bytes) / 1e6, missing_words(recorder, dropped));
+}
+
+void add_models(OutputFiles& files, const config::StreamConfig& stream) {
+  for (const config::StageConfig& stage : stream.stages) files.reads(stage.model);
+}
+
+void add_clip(OutputFiles& files, const drivers::Options& options) {
+  const auto path = options.find("path");
+  if (path == options.end()) return;
+  if (const auto* clip = std::get_if<std::string>(&path->second)) files.reads(*clip);
+}
+
+// The log must not be one of the files that the daemon reads.
+Result<> check_out(const RecordingPlan& options, const config::DaemonConfig& config) {
+  OutputFiles files(options.overwrite);
+  files.reads(options.serve.config).writes_any_but_other(options.out, {".plog"});
+  for (const config::StreamConfig& stream : config.streams) {
+    files.reads(stream.calibration);
+    add_models(files, stream);
+    add_clip(files, stream.options);
+  }
+  for (const config::SourceConfig& source : config.sources) {
+    add_models(files, source.every);
+    for (const auto& named : source.named) add_models(files, named.stream);
+    add_clip(files, source.options);
+  }
+  return files.check();
+}
+
+}  // namespace
+
+Result<std::string> new_log(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) {
+    return fail("this folder for recordings cannot be made: " + error.message(), folder.string());
+  }
+  while (true) {
+    const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
+    const auto path = folder / fmt::format("{:%Y%m%dT%H%M%SZ}.plog",
+                                           fmt::gmtime(std::chrono::system_clock::to_time_t(now)));
+    if (!std::filesystem::exists(path, error)) return path.string();
+    std::this_thread::sleep_until(now + std::chrono::seconds(1));  // another daemon's
+  }
+}
+
+Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig& config) {
+  if (auto fine = check_out(plan, config); !fine) return fine;
+  auto opened = assembly::Daemon::open(config);
+  if (!opened) return std::unexpected(opened.error());
+  assembly::Daemon& daemon = **opened;
+  if (auto sound = check_end(daemon, plan.serve); !sound) return sound;
+  auto started = std::make_shared<std::atomic<bool>>(false);
+  record::RecorderOptions recorder_options{
+      .file = plan.out,
+      .overwrite = plan.overwrite,
+      .frames = plan.frames,
+      .config_text = config.text,
+      .publish_endpoint = config.publish_endpoint,
+      .clock = system::monotonic_ns,
+      .report = [&daemon, started](const record::RecorderEvent& event) {
+        if (*started) post(daemon, event);
+      }};
+  auto replaced = SetAside::move(plan.out);
+  if (!replaced) return std::unexpected(replaced.error());
+  std::set<std::string> with_body;
+  auto recorder = record::Recorder::open(
+      std::move(recorder_options),
+      record::recorded_setup(daemon.streams(), daemon.sources(), daemon.slots_to_come()));
+  if (!recorder) return std::unexpected(recorder.error());
+  assembly::DaemonHooks hooks;
+  hooks.record_sink = &(*recorder)->record_sink();
+  hooks.record_stream = [&recorder, &with_body](const devices::NewStream& stream) {
+    with_body.insert(stream.source.config.name);
+    (*recorder)->add_stream(record::recorded_stream(stream));
+  };
+  hooks.more_stats = [&recorder](v1::Stats& stats) {
+    stats.set_recorder_lost_chunks((*recorder)->lost_chunks());
+    stats.set_recorder_errors((*recorder)->errors());
+    stats.set_recorder_file((*recorder)->file().string());
+    stats.set_recorder_trouble((*recorder)->trouble());
+    if (const auto take = (*recorder)->running_take()) {
+      *stats.mutable_take() = pipeline::stats_of(*take);
+    }
+  };
+  hooks.recorder_figures = [&recorder] { return figures_of(**recorder); };
+  if (auto done = daemon.start(std::move(hooks)); !done) {
+    daemon.stop();
+    // What failed at the start is told, not what follows from it.
+    [[maybe_unused]] const auto closed = (*recorder)->finish();
+    std::error_code ignored;
+    std::filesystem::remove(plan.out, ignored);  // nothing was recorded
+    return done;
+  }
+  replaced->let_go();
+  *started = true;
+  print_ready(daemon);
+  const std::int64_t start_ns = system::monotonic_ns();
+  serve(daemon, plan.serve,
+        {{.thread = record::Recorder::kThreadName, .pulse = &(*recorder)->pulse()}});
+  const double took_s = seconds(system::monotonic_ns() - start_ns);
+  auto finished = (*recorder)->finish();
+  for (const auto& source : daemon.sources()) {
+    if (!with_body.contains(source->config.name)) warn_of_no_body(source->config.name);
+  }
+  print_result(plan, daemon.stats(), **recorder, took_s);
+  if (finished && plan.clips) return write_take_clips(plan.out);
+  return finished;
+}
+
+}  // namespace posed::tools

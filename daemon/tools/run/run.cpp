@@ -1,0 +1,57 @@
+#include <memory>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+
+#include "daemon/assembly/daemon.hpp"
+#include "daemon/config/config.hpp"
+#include "daemon/tools/command/command.hpp"
+#include "daemon/tools/run/recording.hpp"
+#include "daemon/tools/run/serve.hpp"
+
+namespace posed::tools {
+namespace {
+
+Result<> run(const ServeOptions& options) {
+  prepare_to_serve();
+  auto config = config::load_config(options.config, drivers::registry());
+  if (!config) return std::unexpected(config.error());
+  if (config->record) {
+    auto log = new_log(config->record->folder);
+    if (!log) return std::unexpected(log.error());
+    return stream_and_record({.out = std::move(*log),
+                              .frames = config->record->frames,
+                              .clips = config->record->clips,
+                              .serve = options},
+                             *config);
+  }
+  auto daemon = assembly::Daemon::open(*config);
+  if (!daemon) return std::unexpected(daemon.error());
+  if (auto sound = check_end(**daemon, options); !sound) return sound;
+  if (auto started = (*daemon)->start(); !started) return started;
+  print_ready(**daemon);
+  serve(**daemon, options);
+  return {};
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("run", "Stream as set in a config, until stopped");
+  auto options = std::make_shared<ServeOptions>();
+  add_serve_options(*command, *options);
+  command->footer(
+      "Once ready it prints one line of JSON on stdout with the endpoints really bound. SIGINT "
+      "and\n"
+      "SIGTERM end it cleanly. Examples:\n"
+      "  posed run --config config/demo.toml\n"
+      "  posed run --config mine.toml --until-end     # for clips with loop = false\n"
+      "  posed run --config mine.toml                 # with a [record] table it records, too\n"
+      "  posed monitor --count 10                     # in another terminal: see the poses");
+  command->callback([options, &exit_code] {
+    const auto done = run(*options);
+    exit_code = done ? 0 : report(done.error());
+  });
+}
+
+}  // namespace posed::tools

@@ -1,0 +1,286 @@
+// `posed apply`: sends a clip through the style stage and writes a BVH file.
+#include <charconv>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/degrees.hpp"
+#include "daemon/tools/command/output_files.hpp"
+#include "daemon/tools/command/progress.hpp"
+#include "daemon/tools/command/shares_json.hpp"
+#include "daemon/tools/style/root_option.hpp"
+#include "models/style/apply.hpp"
+#include "models/style/walker_fit.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/text/clean.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::tools {
+namespace {
+
+struct ApplyArguments {
+  std::filesystem::path model, in, out;
+  clip::ReadOptions read;
+  style::ApplyOptions apply;
+  std::string mask;
+  std::filesystem::path neutral;
+  std::string alpha = "1", gate = "on";
+  bool overwrite = false, json = false;
+};
+
+// A number, or "auto": as much as the walker does not show already.
+Result<> take_alpha(ApplyArguments& options) {
+  style::FilterOptions& filter = options.apply.filter;
+  filter.auto_alpha = options.alpha == "auto";
+  if (filter.auto_alpha) return {};
+  const char* const end = options.alpha.data() + options.alpha.size();
+  const auto read = std::from_chars(options.alpha.data(), end, filter.alpha);
+  const bool number = read.ec == std::errc() && read.ptr == end;
+  if (number && std::abs(filter.alpha) <= style::kMaxAlpha) return {};
+  return misuse("--alpha takes a number from -2 to 2, or auto, not " + in_quotes(options.alpha));
+}
+
+// `--gate` alone is `--gate on`, and `--gate IN` is `--gate on IN`: the library takes the next word
+// for the option's.
+Result<> take_gate(ApplyArguments& options) {
+  if (options.gate.empty()) options.gate = "on";
+  if (options.gate != "on" && options.gate != "off") {
+    if (!options.in.empty()) {
+      return misuse("--gate takes on or off, not " + in_quotes(options.gate));
+    }
+    options.in = std::exchange(options.gate, "on");
+  }
+  options.apply.filter.gate = options.gate == "on";
+  if (!options.in.empty()) return {};
+  return misuse("no clip to style: posed apply --model FILE.style IN --out OUT.bvh");
+}
+
+Result<> check_files(const ApplyArguments& options) {
+  if (!options.read.asf.empty() && !is_amc(options.in)) {
+    return misuse("--skeleton is only for an AMC; leave it out", options.in.string());
+  }
+  return OutputFiles(options.overwrite)
+      .reads(options.model)
+      .reads(options.in)
+      .reads(options.read.asf)
+      .reads(options.neutral)
+      .writes(options.out, {".bvh"})
+      .check();
+}
+
+// How far training changed the poses of its own walkers [deg rms]; 0 if the model does not say,
+// as where it has several styles.
+double training_difference_deg(const style::StyleModel& model) {
+  const auto report = nlohmann::json::parse(model.report_json, nullptr, false);
+  return report.is_object() ? report.value("difference_deg", 0.0) : 0.0;
+}
+
+// Why the clip came out as it went in; empty where it did not.
+std::string unchanged(const ApplyArguments& options, const style::Applied& applied) {
+  constexpr double kClosed = 0.01;  // of the gate, on average
+  if (applied.joints_changed > 0) return {};
+  const style::FilterOptions& filter = options.apply.filter;
+  std::string why;
+  if (!filter.auto_alpha && filter.alpha == 0.0) {
+    why = ", because --alpha is 0";
+  } else if (applied.gate_mean.value_or(1.0) < kClosed) {
+    why = ", because the model does not know this motion; --gate off styles it all the same";
+  } else if (filter.auto_alpha) {
+    why = ", because the walker shows the style already";
+  } else if (!options.mask.empty()) {
+    why = ", because --mask leaves nothing of the style";
+  }
+  return "no joint was changed" + why;
+}
+
+std::string verdict(const style::WalkerFit& fit, double rms_deg, double training_deg) {
+  if (!fit.is_far()) {
+    return fmt::format(
+        "this walker is like those of the training ({:.1f} deg rms from the nearest "
+        "pose it learnt from)",
+        fit.distance_deg);
+  }
+  std::string text = fmt::format(
+      "this walker is far from the training ({:.1f} deg rms from the nearest pose it "
+      "learnt from; its own walkers are within {:.0f}): the change is a guess",
+      fit.distance_deg, style::WalkerFit::kFar_deg);
+  if (training_deg > 0.0) {
+    text += fmt::format(", {:.1f} deg rms where its training had {:.1f}", rms_deg, training_deg);
+  }
+  return text;
+}
+
+nlohmann::json or_null(const std::optional<double>& value) {
+  return value ? nlohmann::json(*value) : nlohmann::json();
+}
+
+// What was done, without the verdict.
+nlohmann::json report_of(const ApplyArguments& options, const style::StyleModel& model,
+                         const style::Shares& shares, const clip::Clip& clip,
+                         const style::Applied& applied) {
+  return {{"out", options.out.string()},
+          {"frames", clip.frames()},
+          {"rate_hz", clip.frame_rate_hz},
+          {"from", model.from},
+          {"to", model.to},
+          {"weights", shares_json(model.names(), shares)},
+          {"mask", options.mask},
+          {"alpha", options.apply.filter.alpha},
+          {"auto_alpha", options.apply.filter.auto_alpha},
+          {"style_estimate", or_null(applied.estimate_mean)},
+          {"cold", options.apply.cold},
+          {"root", root_text(options.apply.feet)},
+          {"max_root_offset_cm", applied.max_root_offset_m * 100.0},
+          {"gate_mean", or_null(applied.gate_mean)},
+          {"joints_changed", applied.joints_changed},
+          {"rms_change_deg", applied.rms_change_rad * kDegrees},
+          {"max_change_deg", applied.max_change_rad * kDegrees}};
+}
+
+// Measures how the walker of --neutral usually walks. A script that says --calibrate goes on
+// without, because that was good for any clip and model.
+Result<> take_walker(const style::StyleModel& model, bool calibrates, ApplyArguments& options) {
+  if (options.neutral.empty()) return {};
+  const auto neutral = clip::read_clip(options.neutral, options.read);
+  if (!neutral) return std::unexpected(neutral.error());
+  const auto walker = style::measure_walker(model, options.model.string(), *neutral);
+  if (!walker && !calibrates) return std::unexpected(walker.error());
+  if (walker) {
+    options.apply.walker = *walker;
+  } else {
+    std::fprintf(stderr, "posed: %s; --calibrate does nothing\n", walker.error().text().c_str());
+  }
+  return {};
+}
+
+Result<> run(ApplyArguments options) {
+  if (auto ok = take_gate(options); !ok) return ok;
+  if (auto ok = take_alpha(options); !ok) return ok;
+  bool calibrates = std::exchange(options.apply.filter.calibrate, false);
+  if (calibrates) {
+    std::fprintf(stderr, "posed: --calibrate is the older name of --neutral IN\n");
+    calibrates = options.neutral.empty();
+    if (calibrates) options.neutral = options.in;
+  }
+  if (auto ok = check_files(options); !ok) return ok;
+  const auto model = style::load_model(options.model);
+  if (!model) return std::unexpected(model.error());
+  if (options.apply.filter.auto_alpha && !model->axis.present()) {
+    return misuse(
+        "the model has no style axis, so --alpha auto cannot tell how much is missing: "
+        "give a number, or train a model of one style with this version of posed",
+        options.model.string());
+  }
+  const auto shares = style::shares_of(options.apply.filter.weights, model->names());
+  if (!shares) return std::unexpected(shares.error());
+  const auto mask = style::mask_of(options.mask);
+  if (!mask) return std::unexpected(mask.error());
+  options.apply.filter.mask = *mask;
+  const auto clip = clip::read_clip(options.in, options.read);
+  if (!clip) return std::unexpected(clip.error());
+  for (const std::string& warning : clip->warnings) {
+    std::fprintf(stderr, "posed: %s: %s\n", options.in.c_str(), warning.c_str());
+  }
+  if (auto ok = take_walker(*model, calibrates, options); !ok) return ok;
+  if (options.apply.filter.gate && !model->gate.present()) {
+    std::fprintf(stderr,
+                 "posed: %s: has no data for the gate, so any motion is styled; train it "
+                 "again, or use --gate off\n",
+                 options.model.c_str());
+  }
+  ProgressBar bar(kQuietFor_s);
+  options.apply.progress = [&bar](int done, int total) {
+    return bar.show("styling", static_cast<double>(done) / total);
+  };
+  const auto applied = style::apply_to_clip(*model, options.model.string(), *clip, options.apply);
+  if (!applied) return std::unexpected(applied.error());
+  const auto fit = style::fit_of_walker(*model, options.model.string(), *clip);
+  if (!fit) return std::unexpected(fit.error());
+  if (auto written = clip::write_bvh(applied->clip, options.out); !written) return written;
+  bar.finish();
+
+  const double rms_deg = applied->rms_change_rad * kDegrees;
+  const double max_deg = applied->max_change_rad * kDegrees;
+  const std::string sentence = verdict(*fit, rms_deg, training_difference_deg(*model));
+  const std::string nothing = unchanged(options, *applied);
+  if (options.json) {
+    nlohmann::json report = report_of(options, *model, *shares, *clip, *applied);
+    report["distance_deg"] = fit->distance_deg;
+    report["far_from_training"] = fit->is_far();
+    report["verdict"] = sentence;
+    report["unchanged"] = nothing.empty() ? nlohmann::json() : nlohmann::json(nothing);
+    std::printf("%s\n", json_text(report, 2).c_str());
+  } else {
+    std::printf("%s: %d frames, %d joints changed by %.1f deg rms, %.1f deg at most\n",
+                options.out.c_str(), clip->frames(), applied->joints_changed, rms_deg, max_deg);
+  }
+  std::fflush(stdout);
+  if (!nothing.empty()) std::fprintf(stderr, "posed: warning: %s\n", nothing.c_str());
+  std::fprintf(stderr, "posed: %s%s\n", fit->is_far() ? "warning: " : "", sentence.c_str());
+  return {};
+}
+
+}  // namespace
+
+void add_apply(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand("apply", "Style a recorded clip: the code of the live filter");
+  auto options = std::make_shared<ApplyArguments>();
+  style::FilterOptions& filter = options->apply.filter;
+  command->add_option("--model", options->model, "What `posed train style` wrote")
+      ->required()
+      ->type_name("FILE.style");
+  command->add_option("in", options->in, "The clip: .bvh or .amc")->type_name("IN");
+  command->add_option("--out", options->out, "The BVH to write")->required()->type_name("OUT.bvh");
+  command
+      ->add_option("--alpha", options->alpha,
+                   "How much: 0 none, 1 the target, negative away; auto: as much as is missing")
+      ->type_name("A|auto")
+      ->capture_default_str();
+  command->add_option("--weights", filter.weights, "Mixes the model's styles: A=0.6,B=0.4")
+      ->type_name("WEIGHTS");
+  command->add_option("--mask", options->mask, "Styles parts of the body less: arms=0.5,head=0")
+      ->type_name("MASK");
+  add_root_option(*command, options->apply.feet);
+  command->add_option("--skeleton", options->read.asf, "NN.asf of an AMC (default: beside it)")
+      ->type_name("NN.asf");
+  command->add_flag("--cold", options->apply.cold, "Start as a live stream starts");
+  command
+      ->add_option("--gate", options->gate,
+                   "on (the default) or off: fade out where the model does not know the motion")
+      ->type_name("[on|off]")
+      ->expected(0, 1);
+  command->add_option("--neutral", options->neutral, "How this walker usually walks: .bvh or .amc")
+      ->type_name("N.bvh");
+  command->add_flag("--calibrate", filter.calibrate, "The older name of --neutral IN");
+  add_overwrite_option(*command, options->overwrite);
+  command->add_flag("--json", options->json, "Summary as one JSON object on stdout");
+  command->footer(R"(Examples:
+  posed apply --model walk.style walk_03.bvh --out styled.bvh
+  posed apply --model walk.style --root stride walk_03.bvh --out styled.bvh   # feet stand
+  posed apply --model walk.style --alpha 0.5 07_01.amc --skeleton 07.asf --out half.bvh
+  posed apply --model walk.style --neutral bob_1.bvh bob_2.bvh --out bob.bvh   # a new walker
+  posed apply --model walk.style --cold walk_03.bvh --out live.bvh   # as the daemon would have
+  posed apply --model two.style --weights feminine=0.6,elderly=0.4 --mask arms=0.5 \
+      walk_03.bvh --out mixed.bvh
+Weights count as shares of their sum; without them the model's first style has all. A mask leaves
+parts that it does not name at 1; it has arms, legs, trunk, head and left-arm, right-arm, left-leg,
+right-leg.
+OUT keeps the input's joints, channels, frame count and rate; an AMC becomes a BVH with Z, Y, X
+rotations. Without --cold the style has its full strength from the first frame. The last line says
+how far the walker is from those in the training data. "deg rms" is the angle between the
+rotations before and after, over frames and changed joints.)");
+  command->callback([options, &exit_code] {
+    if (auto done = run(*options); !done) exit_code = report(done.error());
+  });
+}
+
+}  // namespace posed::tools

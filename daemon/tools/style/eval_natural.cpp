@@ -1,0 +1,158 @@
+#include "daemon/tools/style/eval_natural.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <string>
+
+#include <spdlog/fmt/fmt.h>
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/output_files.hpp"
+#include "daemon/tools/command/progress.hpp"
+#include "daemon/tools/command/thread_tasks.hpp"
+#include "daemon/tools/style/natural_clips.hpp"
+#include "models/natural/compare.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::tools {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kEvalNaturalFooter = R"(Examples:
+  posed eval natural styled.bvh --corpus walks
+  posed eval natural hand.csv --corpus recordings --json
+  posed eval natural take.bvh --corpus takes --hand right    # the fingers of bodies
+
+Each figure of the clip stands beside the same figure of the corpus' clips: median, 5th and 95th
+percentile, and the share of them that is below. Each of these is measured against the others, the
+clip against all. A natural clip of one person may lie outside for one figure by chance; what is
+further out than the percentiles are apart is called unnatural, and the exit code is 1.
+
+All clips are brought to one rate; what is faster than a third of it does not count.
+jerk: rms third difference of the angles [deg/frame^3]; sparc: spectral arc length of their speed,
+closer to 0 is smoother; frechet_deg2: distance of the Gaussians of windows of 30 frames (each
+angle's mean and mean change); beyond_deg: how far an angle goes beyond its range in the others, at
+most; of bodies also slide_cm_s: speed over the ground of ankles and toes slower than 10 cm/s;
+sink_cm: how far the lowest toe is below the height at which toes stand. Angles are the components
+of the joints' rotation vectors about the clip's mean pose; of hands, the 45 angles.
+
+Clips without the joints of this one, and clips shorter than 49 frames, are left out and listed.)";
+
+struct EvalNaturalOptions : NaturalOptions {
+  bool json = false;
+};
+
+std::string natural_verdict(const natural::Comparison& comparison, std::size_t clips) {
+  std::string out;
+  for (const natural::Placed& placed : comparison.figures) {
+    if (placed.natural) continue;
+    const std::string value = std::isfinite(placed.value)
+                                  ? fmt::format("is {:.3g}", placed.value)
+                                  : "cannot be measured (feet that never stand, or a still figure)";
+    out += fmt::format("{}{} {}, the corpus has {:.3g} to {:.3g}",
+                       out.empty() ? "not natural: " : "; ", placed.name, value, placed.p5,
+                       placed.p95);
+  }
+  if (!out.empty()) return out;
+  return fmt::format("natural by all {} figures, beside {} clips", comparison.figures.size(),
+                     clips);
+}
+
+json report_of(const EvalNaturalOptions& options, const NaturalClips& clips,
+               const natural::Comparison& comparison) {
+  json figures = json::object();
+  for (const natural::Placed& placed : comparison.figures) {
+    figures[placed.name] = {{"value", placed.value},   {"p5", placed.p5},
+                            {"median", placed.median}, {"p95", placed.p95},
+                            {"below", placed.below},   {"natural", placed.natural}};
+  }
+  json left_out = json::array();
+  for (const LeftOut& file : clips.left_out) {
+    left_out.push_back({{"file", file.file}, {"why", file.why}});
+  }
+  return {{"clip", options.clip.string()},
+          {"corpus", options.corpus.string()},
+          {"clips", clips.corpus.size()},
+          {"left_out", left_out},
+          {"rate_hz", options.rate_hz},
+          {"dimensions", comparison.dimensions},
+          {"figures", figures},
+          {"natural", std::ranges::all_of(comparison.figures, &natural::Placed::natural)},
+          {"verdict", natural_verdict(comparison, clips.corpus.size())}};
+}
+
+void print_table(const natural::Comparison& comparison) {
+  std::printf("%-14s %10s   %10s %10s %10s %8s\n", "figure", "clip", "p5", "median", "p95",
+              "below");
+  for (const natural::Placed& placed : comparison.figures) {
+    std::printf("%-14s %10.4g   %10.4g %10.4g %10.4g %6.0f %%%s\n", placed.name.c_str(),
+                placed.value, placed.p5, placed.median, placed.p95, 100.0 * placed.below,
+                placed.natural ? "" : "  unnatural");
+  }
+}
+
+Result<json> evaluate_natural(const EvalNaturalOptions& options) {
+  if (!options.skeleton.empty() && !is_amc(options.clip)) {
+    return misuse("--skeleton is only for AMC clips; leave it out");
+  }
+  ProgressBar bar(kQuietFor_s);
+  ThreadTasks tasks;
+  constexpr double kReading = 0.9;  // of the progress
+  const auto clips = read_natural_clips(options, tasks, [&bar](double fraction) {
+    return bar.show("reading the corpus", kReading * fraction);
+  });
+  if (!clips) return std::unexpected(clips.error());
+  const auto comparison =
+      natural::compare(clips->clip, clips->corpus, tasks, [&bar](double fraction) {
+        return bar.show("comparing", kReading + (1.0 - kReading) * fraction);
+      });
+  if (!comparison) return fail("stopped");
+  bar.finish();
+  if (!options.json) print_table(*comparison);
+  return report_of(options, *clips, *comparison);
+}
+
+int finish_natural(const json& report, bool as_json) {
+  if (as_json) std::printf("%s\n", json_text(report, 2).c_str());
+  std::fflush(stdout);
+  if (!as_json && !report["left_out"].empty()) {
+    const json& first = report["left_out"].front();
+    std::fprintf(stderr, "posed: warning: %zu clips left out: %s (%s)%s\n",
+                 report["left_out"].size(), first["file"].get<std::string>().c_str(),
+                 first["why"].get<std::string>().c_str(),
+                 report["left_out"].size() > 1 ? ", ...; --json lists them" : "");
+  }
+  std::fprintf(stderr, "posed: %s\n", report["verdict"].get<std::string>().c_str());
+  return static_cast<int>(report["natural"].get<bool>() ? ExitCode::kDone : ExitCode::kFailed);
+}
+
+}  // namespace
+
+void add_eval_natural(CLI::App& eval, int& exit_code) {
+  CLI::App* command = eval.add_subcommand("natural", "Whether people move as a clip does");
+  command->footer(kEvalNaturalFooter);
+  const auto options = std::make_shared<EvalNaturalOptions>();
+  command->add_option("clip", options->clip, "The clip to judge: .bvh, .amc or a hand's .csv")
+      ->required();
+  command->add_option("--corpus", options->corpus, "Folder of clips of people")->required();
+  command->add_option("--hand", options->hand, "left or right: judge this hand of clips of bodies")
+      ->check(CLI::IsMember({"left", "right"}));
+  command->add_option("--skeleton", options->skeleton,
+                      "NN.asf of an AMC clip, and of those of the corpus without one beside them");
+  command->add_option("--rate", options->rate_hz, "Frames per second at which to compare")
+      ->check(in_range(10.0, 1000.0))
+      ->capture_default_str();
+  command->add_flag("--json", options->json, "One JSON object on stdout");
+  command->callback([options, &exit_code] {
+    const auto made = evaluate_natural(*options);
+    exit_code = made ? finish_natural(*made, options->json) : report(made.error());
+  });
+}
+
+}  // namespace posed::tools

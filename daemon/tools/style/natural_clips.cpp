@@ -1,0 +1,202 @@
+#include "daemon/tools/style/natural_clips.hpp"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "daemon/tools/command/hand_option.hpp"
+#include "daemon/tools/command/output_files.hpp"
+#include "models/gesture/recording.hpp"
+#include "models/motion/motion.hpp"
+#include "models/natural/compare.hpp"
+#include "models/task_numbers.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/clip/file_names.hpp"
+#include "proto/clip/hand_clip.hpp"
+#include "proto/frame/degree.hpp"
+
+namespace posed::tools {
+namespace {
+
+using Path = std::filesystem::path;
+
+// A body's numbers are half a megabyte and stand twice while a task's result is taken over.
+constexpr std::size_t kBatch = 32;
+
+// Measures the files of one comparison.
+class Measure {
+ public:
+  // Bodies are measured about the mean pose of the clip in question.
+  static Result<Measure> of(const NaturalOptions& options) {
+    Measure measure(options);
+    if (measure.of_hands()) return measure;
+    const auto motion = measure.body(options.clip);
+    if (!motion) return std::unexpected(motion.error());
+    auto spec = motion::describe_space(motion::Space::kNative, *motion->skeleton);
+    if (!spec) return std::unexpected(spec.error());
+    const std::array<const motion::Motion*, 1> one{&*motion};
+    if (auto set = motion::set_mean_rotations(one, *spec); !set) {
+      return std::unexpected(set.error());
+    }
+    measure.spec_ = std::move(*spec);
+    return measure;
+  }
+
+  [[nodiscard]] bool of_hands() const {
+    return !options_.hand.empty() || clip::extension_of(options_.clip) == ".csv";
+  }
+  [[nodiscard]] bool may_be_clip(const Path& path) const {
+    const std::string extension = clip::extension_of(path);
+    if (extension == ".csv") return of_hands();
+    // A body holds two hands, so only --hand says which.
+    return (extension == ".bvh" || extension == ".amc") && (!of_hands() || !options_.hand.empty());
+  }
+
+  [[nodiscard]] Result<natural::Figures> operator()(const Path& path) const {
+    auto figures = of_hands() ? hand_figures(path) : body_figures(path);
+    if (!figures && figures.error().file.empty()) figures.error().file = path.string();
+    return figures;
+  }
+
+ private:
+  explicit Measure(const NaturalOptions& options) : options_(options) {}
+
+  // A subject's clips have bones of their own, so a skeleton beside a clip of the corpus is right
+  // for it and the named one is not.
+  [[nodiscard]] clip::ReadOptions how(const Path& path) const {
+    clip::ReadOptions read;
+    std::error_code ignored;
+    const bool other = path != options_.clip && exists(clip::skeleton_beside(path), ignored);
+    if (is_amc(path) && !other) read.asf = options_.skeleton;
+    if (!options_.hand.empty()) read.hand = side_named(options_.hand);
+    return read;
+  }
+  [[nodiscard]] Result<motion::Motion> body(const Path& path) const {
+    const auto read = clip::read_clip(path, how(path));
+    if (!read) return std::unexpected(read.error());
+    auto motion = motion::motion_of(*read);
+    if (!motion) return motion;
+    if (motion::begins_with_added_pose(*motion)) motion::drop_first_frame(*motion);
+    return motion::resample(*motion, options_.rate_hz);
+  }
+  [[nodiscard]] Result<natural::Figures> body_figures(const Path& path) const {
+    const auto motion = body(path);
+    if (!motion) return std::unexpected(motion.error());
+    return natural::figures_of(*motion, spec_);
+  }
+  [[nodiscard]] Result<natural::Figures> hand_figures(const Path& path) const {
+    auto hand = clip::read_hand_clip(path, how(path));
+    if (!hand) return std::unexpected(hand.error());
+    clip::fill_gaps(*hand);
+    const auto recording = gesture::recording_of(*hand, options_.rate_hz);
+    if (!recording) return std::unexpected(recording.error());
+    return natural::figures_of(recording->angles_rad / kDegree, options_.rate_hz);
+  }
+
+  NaturalOptions options_;
+  motion::PoseSpaceSpec spec_;  // of bodies
+};
+
+Result<std::vector<Path>> files_of(const Path& folder, const Measure& measure) {
+  std::error_code error;
+  std::filesystem::recursive_directory_iterator at(folder, error);
+  if (error) {
+    return misuse("is no folder that can be read: " + error.message(), folder.string());
+  }
+  std::vector<Path> files;
+  Path last;  // where a folder cannot be entered, the iterator has ended
+  std::error_code ignored;
+  for (; at != std::filesystem::recursive_directory_iterator(); at.increment(error)) {
+    last = at->path();
+    if (at->is_regular_file(ignored) && measure.may_be_clip(last)) files.push_back(last);
+  }
+  if (error) {
+    return fail("cannot be read: " + error.message() +
+                    "; a part of a corpus has another spread, so make it readable or take it away",
+                last.string());
+  }
+  std::ranges::sort(files);
+  if (files.empty()) {
+    return fail(measure.of_hands()
+                    ? "the corpus holds no hand recording (.csv; --hand left or right takes hands "
+                      "from bodies)"
+                    : "the corpus holds no clip (.bvh or .amc)",
+                folder.string());
+  }
+  return files;
+}
+
+Result<> check_enough(const NaturalClips& clips, const Path& corpus) {
+  if (clips.corpus.size() >= natural::kLeastClips) return {};
+  const std::size_t count = clips.corpus.size();
+  std::string why = (count == 0   ? "no clip"
+                     : count == 1 ? "one clip"
+                                  : "two clips") +
+                    std::string(" can be compared with, and a spread needs ") +
+                    std::to_string(natural::kLeastClips);
+  if (!clips.left_out.empty()) {
+    why += "; left out: " + clips.left_out.front().file + " (" + clips.left_out.front().why + ")";
+    const std::size_t more = clips.left_out.size() - 1;
+    if (more > 0) why += " and " + std::to_string(more) + " more";
+  }
+  return fail(why, corpus.string());
+}
+
+// A text, empty where the figures follow.
+TaskResult numbers_of(const Path& file, const Path& own, const Measure& measure) {
+  NumberWriter numbers;
+  std::error_code ignored;
+  if (std::filesystem::equivalent(file, own, ignored)) {
+    return numbers.add("it is the clip itself").take();
+  }
+  const auto figures = measure(file);
+  if (!figures) return numbers.add(figures.error().message).take();
+  natural::write(*figures, numbers.add(""));
+  return numbers.take();
+}
+
+void add_clip(const Path& file, const TaskResult& numbers, NaturalClips& clips) {
+  NumberReader reader(numbers);
+  std::string why = reader.text();
+  if (why.empty()) {
+    clips.corpus.push_back(natural::figures_from(reader));
+  } else {
+    clips.left_out.push_back({file.string(), std::move(why)});
+  }
+}
+
+}  // namespace
+
+Result<NaturalClips> read_natural_clips(const NaturalOptions& options, TaskRunner& tasks,
+                                        const ReadProgress& progress) {
+  const auto measure = Measure::of(options);
+  if (!measure) return std::unexpected(measure.error());
+  NaturalClips clips;
+  auto own = (*measure)(options.clip);
+  if (!own) return std::unexpected(own.error());
+  clips.clip = std::move(*own);
+  const auto files = files_of(options.corpus, *measure);
+  if (!files) return std::unexpected(files.error());
+  for (std::size_t first = 0; first < files->size(); first += kBatch) {
+    const auto task = [&](std::size_t i) {
+      return numbers_of((*files)[first + i], options.clip, *measure);
+    };
+    const auto found =
+        tasks.run(std::min(kBatch, files->size() - first), task, [&](std::size_t done) {
+          const auto share = static_cast<double>(first + done) / static_cast<double>(files->size());
+          return !progress || progress(share);
+        });
+    if (!found) return fail("stopped");
+    for (std::size_t i = 0; i < found->size(); ++i) {
+      add_clip((*files)[first + i], (*found)[i], clips);
+    }
+  }
+  if (auto enough = check_enough(clips, options.corpus); !enough) {
+    return std::unexpected(enough.error());
+  }
+  return clips;
+}
+
+}  // namespace posed::tools

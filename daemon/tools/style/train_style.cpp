@@ -1,0 +1,286 @@
+#include <algorithm>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
+
+#include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/output_files.hpp"
+#include "daemon/tools/command/progress.hpp"
+#include "daemon/tools/style/experiment.hpp"
+#include "daemon/tools/style/style_report.hpp"
+#include "daemon/tools/style/train_style.hpp"
+#include "models/fixed_products.hpp"
+#include "models/style/train.hpp"
+#include "proto/clip/file_names.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::tools {
+namespace {
+
+using nlohmann::json;
+
+constexpr const char* kTrainStyleFooter = R"(Examples:
+  posed train style --from plain_1.bvh plain_2.bvh --to proud_1.bvh proud_2.bvh --out proud.style
+  posed train style --from ann:a.bvh ann:b.bvh bob:c.bvh --to ann:d.bvh --out two.style
+  posed train style --motion walk --from 02_02.amc 35_01.amc --to 08_01.amc --pose-space cmu43 \
+      --out eight.style
+  posed train style --experiment styles.toml --out styles.style --report styles.html
+
+Several styles in one model, mixed live by weights: NAME= begins the clips of each.
+  posed train style --from plain_1.bvh plain_2.bvh --to feminine=f_1.bvh f_2.bvh \
+      elderly=e_1.bvh e_2.bvh --out two.style
+  posed apply --model two.style --weights feminine=0.6,elderly=0.4 plain_3.bvh --out mixed.bvh
+
+Several files are takes of one person, unless PERSON: before a name tells them apart. Differences
+are learnt within people who show both styles; who shows one adds walks to start from only.
+
+An experiment file lists clips with their group, subject and motion; several sources and motions
+make one model:
+  target = "proud"           # or several: ["proud", "sad"]
+  mode = "default"           # or "paper"; --mode overrides it
+  rate_hz = 30               # --rate overrides it
+  pose_space = "native"      # or "cmu43", "humanoid"; --pose-space overrides it
+  skeleton = "02.asf"        # of AMC clips, if not beside them; --skeleton overrides it
+  [[clip]]
+  file = "plain_1.bvh"       # relative to the experiment file
+  group = "plain"            # every group that is no target is a source
+  subject = "ann"            # who it is, in any group; without it, one person shows all
+  motion = "walk"
+
+The last line says how much of the way to the target the model closes on clips that were held out,
+and how much a constant offset would. An unusable model (the groups do not differ, a clip is not a
+walk, a held-out walker becomes worse) is not written, and the exit code is 1.)";
+
+// Options that are not given keep the value of the experiment file, or the default.
+struct TrainStyleOptions {
+  std::vector<std::string> from, to;
+  std::string experiment, skeleton, out, report;
+  std::optional<std::string> motion, pose_space, mode;
+  std::optional<double> rate_hz;
+  std::uint64_t seed = 0;
+  bool overwrite = false, force = false, json = false;
+};
+
+// The clips: from the experiment file, or from --from and --to.
+Result<Experiment> clips_of(const TrainStyleOptions& options) {
+  if (!options.experiment.empty()) {
+    if (!options.from.empty() || !options.to.empty()) {
+      return misuse("--experiment names the clips itself; leave out --from and --to");
+    }
+    if (options.motion) {
+      return misuse("--experiment names each clip's motion itself; leave out --motion");
+    }
+    return read_experiment(options.experiment);
+  }
+  if (options.from.empty() || options.to.empty()) {
+    return misuse("name the clips: --from A.bvh ... --to B.bvh ..., or --experiment FILE.toml");
+  }
+  Experiment experiment;
+  const std::string motion = options.motion.value_or("walk");
+  if (motion.empty()) return misuse("--motion is empty; name what the clips show, as in walk");
+  for (const std::string& file : options.from) {
+    experiment.clips.push_back(named_clip(file, "from", motion));
+  }
+  if (auto added = add_target_clips(options.to, motion, experiment); !added) {
+    return std::unexpected(added.error());
+  }
+  return experiment;
+}
+
+// The command line overrides the file; a wrong value is refused in either.
+Result<Experiment> experiment_of(const TrainStyleOptions& options) {
+  std::optional<motion::Space> space;
+  if (options.pose_space) {
+    const auto named = motion::space_from_name(*options.pose_space);
+    if (!named) return std::unexpected(named.error());
+    space = *named;
+  }
+  std::optional<style::TrainMode> mode;
+  if (options.mode) {
+    const auto named = style::mode_from_name(*options.mode);
+    if (!named) return std::unexpected(named.error());
+    mode = *named;
+  }
+  auto experiment = clips_of(options);
+  if (!experiment) return experiment;
+  experiment->space = space.value_or(experiment->space);
+  experiment->mode = mode.value_or(experiment->mode);
+  experiment->rate_hz = options.rate_hz.value_or(experiment->rate_hz);
+  if (options.skeleton.empty()) return experiment;
+  if (std::ranges::none_of(experiment->clips, is_amc, &ExperimentClip::file)) {
+    return misuse("--skeleton is only for AMC clips; leave it out");
+  }
+  experiment->asf = options.skeleton;
+  return experiment;
+}
+
+// Every file that is read.
+std::vector<std::filesystem::path> inputs_of(const TrainStyleOptions& options,
+                                             const Experiment& experiment) {
+  std::vector<std::filesystem::path> inputs;
+  for (const auto& named : {std::filesystem::path(options.experiment), experiment.asf}) {
+    if (!named.empty()) inputs.push_back(named);
+  }
+  for (const ExperimentClip& clip : experiment.clips) {
+    inputs.push_back(clip.file);
+    if (is_amc(clip.file) && experiment.asf.empty()) {
+      inputs.push_back(clip::skeleton_beside(clip.file));
+    }
+  }
+  return inputs;
+}
+
+void print_style_summary(const json& report, const std::string& out) {
+  std::printf("%-12s %-10s %-28s %8s %8s\n", "group", "motion", "clip", "period", "theta0");
+  for (const json& clip : report["clips"]) {
+    if (clip["dropped_first_frame"].get<bool>()) {
+      std::fprintf(stderr, "%s: left out the first frame, a rest pose without motion\n",
+                   clip["file"].get<std::string>().c_str());
+    }
+    const auto stem = std::filesystem::path(clip["file"].get<std::string>()).stem().string();
+    std::printf("%-12s %-10s %-28s %8.2f %8.3f\n", clip["group"].get<std::string>().c_str(),
+                clip["motion"].get<std::string>().c_str(), stem.c_str(),
+                clip["period_frames"].get<double>(), clip["theta0"].get<double>());
+  }
+  std::printf("%d dimensions, %d training poses, kernel length %.1f degrees, noise %.3g\n",
+              report["dims"].get<int>(), report["training_points"].get<int>(),
+              report["kernel"]["length_deg"].get<double>(), report["noise"].get<double>());
+  if (!report["written"].get<bool>()) return;
+  std::printf("%s written after %.2f s; try: posed apply --model %s IN.bvh --out OUT.bvh\n",
+              out.c_str(), report["seconds"].get<double>(), out.c_str());
+}
+
+// Maps the progress of one training step to that of the whole training, for a single bar.
+double overall(std::string_view step, double fraction) {
+  if (step == "reading poses") return 0.05 * fraction;
+  if (step == "following strides") return 0.05 + 0.15 * fraction;
+  if (step == "aligning phases") return 0.2 + 0.1 * fraction;
+  return 0.3 + 0.7 * fraction;
+}
+
+Result<json> train_style(const TrainStyleOptions& options, Ranks& ranks) {
+  auto experiment = experiment_of(options);
+  if (!experiment) return std::unexpected(experiment.error());
+  const auto inputs = inputs_of(options, *experiment);
+  if (ranks.leads()) {
+    const auto ok = OutputFiles(options.overwrite)
+                        .reads_all(inputs)
+                        .writes_any_but_other(options.out, {".style"})
+                        .writes(options.report, {".html"})
+                        .check();
+    if (!ok) return std::unexpected(ok.error());
+  }
+  if (auto same = ranks.check_same(inputs); !same) return std::unexpected(same.error());
+  return train_and_save(*experiment, options.seed,
+                        {.model = options.out, .force = options.force, .report = options.report},
+                        ranks);
+}
+
+// Prints warnings and, last, the verdict on stderr.
+int finish(const json& report, const TrainStyleOptions& options) {
+  if (options.json) {
+    std::printf("%s\n", json_text(report, 2).c_str());
+  } else {
+    print_style_summary(report, options.out);
+  }
+  std::fflush(stdout);
+  for (const json& warning : report["warnings"]) {
+    std::fprintf(stderr, "posed: warning: %s\n", warning.get<std::string>().c_str());
+  }
+  for (std::size_t i = 1; i < report["problems"].size(); ++i) {
+    std::fprintf(stderr, "posed: %s\n", report["problems"][i].get<std::string>().c_str());
+  }
+  const bool usable = report["usable"].get<bool>();
+  const bool written = report["written"].get<bool>();
+  std::fprintf(stderr, "posed: %s%s\n", report["verdict"].get<std::string>().c_str(),
+               usable    ? ""
+               : written ? "; written, because of --force"
+                         : "; no model was written (--force writes it all the same)");
+  return static_cast<int>(written ? ExitCode::kDone : ExitCode::kFailed);
+}
+
+}  // namespace
+
+Result<json> train_and_save(const Experiment& experiment, std::uint64_t seed,
+                            const StyleFiles& files, Ranks& ranks) {
+  const FixedProducts fixed;
+  ProgressBar bar;
+  if (!bar.show("reading clips", 0.0)) return fail("stopped");
+  auto clips = load_clips(experiment);
+  if (!clips) return std::unexpected(clips.error());
+  style::TrainOptions options;
+  options.target = experiment.targets.front();
+  options.more_targets.assign(experiment.targets.begin() + 1, experiment.targets.end());
+  options.mode = experiment.mode;
+  options.dataset.space = experiment.space;
+  options.dataset.rate_hz = experiment.rate_hz;
+  options.dataset.seed = seed;
+  options.dataset.tasks = &ranks.tasks();
+  options.dataset.progress = [&bar](std::string_view step, double fraction) {
+    return bar.show(step, overall(step, fraction));
+  };
+  StyleReport page(*clips);
+  const bool reports = !files.report.empty() && ranks.leads();
+  if (reports) options.look = [&page](const style::Findings& findings) { page.look(findings); };
+  auto model = style::train_style(*clips, options);
+  if (!model) return std::unexpected(model.error());
+  json report = json::parse(model->report_json);
+  const bool written = report["usable"].get<bool>() || files.force;
+  const auto saved = written
+                         ? ranks.write_model([&] { return style::save_model(*model, files.model); })
+                         : Result<>{};
+  if (!saved) return std::unexpected(saved.error());
+  report["mode"] = experiment.mode == style::TrainMode::kPaper ? "paper" : "default";
+  report["written"] = written;
+  report["seconds"] = bar.elapsed_s();
+  report["out"] = files.model.string();
+  if (reports) {
+    if (auto drawn = page.write(report, files.report); !drawn) {
+      return std::unexpected(drawn.error());
+    }
+  }
+  return report;
+}
+
+void add_train_style(CLI::App& train_command, int& exit_code, const std::shared_ptr<Ranks>& ranks) {
+  CLI::App* style = train_command.add_subcommand("style", "Learn what makes one style another");
+  style->footer(kTrainStyleFooter);
+  const auto options = std::make_shared<TrainStyleOptions>();
+  style->add_option("--from", options->from, "Clips of the style to change: [PERSON:]FILE");
+  style->add_option("--to", options->to, "Clips of the style to give: [NAME=][PERSON:]FILE");
+  style->add_option(
+      "--motion", options->motion,
+      "What all clips show (default: walk); walk, run, jog, march and gait need strides");
+  style->add_option("--experiment", options->experiment,
+                    "TOML file that lists the clips and may set mode, rate_hz and pose_space");
+  style->add_option("--skeleton", options->skeleton, "NN.asf of AMC clips, if not beside them");
+  style->add_option("--pose-space", options->pose_space,
+                    "native, cmu43 or humanoid (default: the experiment's, else native)");
+  style
+      ->add_option("--rate", options->rate_hz,
+                   "Frames per second to learn at (default: the experiment's, else 30)")
+      ->check(in_range(10.0, 1000.0));
+  style->add_option("--mode", options->mode,
+                    "default, or paper: the paper end to end (default: the experiment's)");
+  style->add_option("--seed", options->seed, "Of the random starts")
+      ->check(whole_number())
+      ->capture_default_str();
+  style->add_option("--out", options->out, "Where to write the model")
+      ->required()
+      ->type_name("OUT.style");
+  add_report_option(*style, options->report);
+  add_overwrite_option(*style, options->overwrite);
+  style->add_flag("--force", options->force, "Write the model even if it is unusable");
+  style->add_flag("--json", options->json, "One JSON object on stdout");
+  style->callback([options, ranks, &exit_code] {
+    const auto trained = train_style(*options, *ranks);
+    exit_code = trained ? finish(*trained, *options) : report(trained.error());
+  });
+}
+
+}  // namespace posed::tools

@@ -1,0 +1,141 @@
+#include "daemon/tools/view/bridge.hpp"
+
+#include <chrono>
+#include <csignal>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include <pthread.h>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/address.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/steady_timer.hpp>
+
+#include "daemon/http/server.hpp"
+#include "daemon/net/security.hpp"
+#include "daemon/system/clock.hpp"
+#include "daemon/tools/view/hub.hpp"
+#include "daemon/tools/view/web_room.hpp"
+#include "proto/text/clean.hpp"
+#include "proto/zmq/zmq_handle.hpp"
+
+namespace posed::view {
+namespace {
+
+constexpr std::chrono::milliseconds kTurnEvery{50};
+
+Result<boost::asio::ip::address> address_of(const std::string& text) {
+  boost::system::error_code error;
+  auto address = boost::asio::ip::make_address(text == "localhost" ? "127.0.0.1" : text, error);
+  if (!error) return address;
+  return misuse(in_quotes(text) + " is not an address: --bind takes one such as 127.0.0.1");
+}
+
+}  // namespace
+
+Result<bool> is_loopback_address(const std::string& address) {
+  const auto parsed = address_of(address);
+  if (!parsed) return std::unexpected(parsed.error());
+  return parsed->is_loopback();
+}
+
+// In the order in which they need each other: connections of pages live in the io_context's
+// handlers and use hub and room.
+class Bridge::Parts {
+ public:
+  static Result<std::unique_ptr<Parts>> open(const BridgeOptions& options) {
+    auto page = PageFiles::load(options.page);
+    if (!page) return std::unexpected(page.error());
+    auto context = net::open_context();
+    if (!context) return std::unexpected(context.error());
+    std::unique_ptr<Parts> parts(
+        new Parts(std::move(*context), {.files = std::move(*page), .token = random_token()},
+                  {.version = POSED_VERSION,
+                   .connect = options.link.connect,
+                   .same_machine = net::is_loopback(options.link.connect)}));
+    auto link = DaemonLink::open(parts->io_, parts->context_.get(), options.link, parts->hub_);
+    if (!link) return std::unexpected(link.error());
+    parts->link_ = std::move(*link);
+    const auto address = address_of(options.address);
+    if (!address) return std::unexpected(address.error());
+    auto server = http::Server::open(parts->io_, parts->connections_,
+                                     {.at = {*address, options.port},
+                                      .or_any = options.or_any_port,
+                                      .advice = "choose another port (--port 0: any free one)"});
+    if (!server) return std::unexpected(server.error());
+    parts->server_ = std::move(*server);
+    parts->room_.site.hosts = parts->server_->hosts();
+    parts->url_ = parts->server_->url() + "?token=" + parts->room_.site.token;
+    return parts;
+  }
+  ~Parts() {
+    if (!thread_.joinable()) return;
+    io_.stop();
+    thread_.join();
+  }
+  Parts(const Parts&) = delete;
+  Parts& operator=(const Parts&) = delete;
+
+  void start() {
+    turn();
+    // Signals are for the command's own thread.
+    sigset_t all;
+    sigset_t before;
+    sigfillset(&all);
+    pthread_sigmask(SIG_SETMASK, &all, &before);
+    thread_ = std::thread([this] { io_.run(); });
+    pthread_sigmask(SIG_SETMASK, &before, nullptr);
+    pthread_setname_np(thread_.native_handle(), "posed-view");
+  }
+  [[nodiscard]] const std::string& url() const noexcept { return url_; }
+  [[nodiscard]] std::uint16_t port() const noexcept { return server_->port(); }
+
+ private:
+  Parts(net::Context context, Site site, Greeting greeting)
+      : context_(std::move(context)),
+        hub_(std::move(greeting),
+             [this](std::uint64_t ticket, std::string_view request) {
+               return link_->ask(ticket, request);
+             }),
+        room_(std::move(site), hub_),
+        timer_(io_) {}
+
+  void turn() {
+    const std::int64_t now_ns = system::monotonic_ns();
+    link_->want_streams(hub_.tabs() > 0);
+    link_->turn(now_ns);
+    hub_.expire(now_ns);
+    room_.turn(now_ns);
+    timer_.expires_after(kTurnEvery);
+    timer_.async_wait([this](const boost::system::error_code& error) {
+      if (!error) turn();
+    });
+  }
+
+  net::Context context_;
+  Hub hub_;
+  WebRoom room_;
+  http::Room connections_{.service = room_};
+  boost::asio::io_context io_{1};
+  boost::asio::steady_timer timer_;
+  std::unique_ptr<DaemonLink> link_;
+  std::unique_ptr<http::Server> server_;
+  std::string url_;
+  std::thread thread_;
+};
+
+Result<std::unique_ptr<Bridge>> Bridge::start(const BridgeOptions& options) {
+  auto parts = Parts::open(options);
+  if (!parts) return std::unexpected(parts.error());
+  (*parts)->start();
+  return std::unique_ptr<Bridge>(new Bridge(std::move(*parts)));
+}
+
+Bridge::Bridge(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
+Bridge::~Bridge() = default;
+
+const std::string& Bridge::url() const noexcept { return parts_->url(); }
+std::uint16_t Bridge::port() const noexcept { return parts_->port(); }
+
+}  // namespace posed::view

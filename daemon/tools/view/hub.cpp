@@ -1,0 +1,209 @@
+#include "daemon/tools/view/hub.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "proto/frame/time.hpp"
+
+namespace posed::view {
+namespace {
+
+constexpr std::int64_t kReplyWithin_ns = 5 * kNanosPerSecond;
+constexpr std::int64_t kGone_ns = 10 * kNanosPerSecond;  // a stream without any message
+// Since the skeleton came last: the daemon repeats those of all streams each second.
+constexpr std::int64_t kStayed_ns = 3 * kNanosPerSecond / 2;
+constexpr std::int64_t kUpload_ns = 10 * kNanosPerSecond;  // between two pieces, as in the daemon
+constexpr std::size_t kMaxTopic = 128;
+constexpr const char* kSkeleton = "skeleton/";
+constexpr std::array kThinned{"pose/", "sensor/"};
+
+std::string topic_of(const char* kind, std::string_view stream) {
+  return std::string(kind).append(stream);
+}
+
+}  // namespace
+
+void Hub::join(Tab& tab) {
+  tabs_.insert(&tab);
+  tab.outbox.put_answer(hello_word(greeting_, right_));
+  tab.outbox.put_answer(daemon_word(daemon_));
+  if (stats_) tab.outbox.put_newest("stats", stats_);
+  for (const auto& [name, stream] : streams_) {
+    if (stream.skeleton) tab.outbox.put_newest(topic_of(kSkeleton, name), stream.skeleton);
+  }
+  tab.wake();
+}
+
+void Hub::leave(Tab& tab) {
+  tabs_.erase(&tab);
+  if (uploader_ == &tab) uploader_ = nullptr;
+  std::erase_if(under_way_, [&](const auto& entry) { return entry.second.tab == &tab; });
+}
+
+void Hub::take(Tab& tab, std::string_view bytes, bool text, std::int64_t now_ns) {
+  if (text) {
+    const PageWord word = read_word(bytes);
+    if (std::holds_alternative<ReadyWord>(word)) tab.outbox.ready();
+    if (const auto* clock = std::get_if<ClockWord>(&word)) {
+      tab.outbox.put_answer(clock_word(clock->t0, now_ns));
+    }
+  } else if (const auto asked = read_request(bytes)) {
+    ask(tab, *asked, now_ns);
+  }
+  tab.wake();
+}
+
+std::string Hub::reason_against(const Tab& tab, const PageRequest& asked,
+                                std::int64_t now_ns) const {
+  if (!right_.may) return right_.reason;
+  if (!asked.refusal.empty()) return asked.refusal;
+  if (tab.under_way >= kMaxUnderWay) {
+    return "too many requests at once: wait for the answers to those before";
+  }
+  const bool others_upload =
+      uploader_ != nullptr && uploader_ != &tab && now_ns - upload_ns_ < kUpload_ns;
+  if (asked.request.has_model_part() && others_upload) {
+    return "another page is sending a model; try again in some seconds";
+  }
+  return {};
+}
+
+void Hub::note_upload(Tab& tab, const v1::ControlRequest& request, std::int64_t now_ns) {
+  if (!request.has_model_part()) return;
+  const auto& part = request.model_part();
+  const bool last = part.bytes().size() >= part.total() - std::min(part.offset(), part.total());
+  uploader_ = last ? nullptr : &tab;
+  upload_ns_ = now_ns;
+}
+
+void Hub::ask(Tab& tab, const PageRequest& asked, std::int64_t now_ns) {
+  std::string reason = reason_against(tab, asked, now_ns);
+  if (reason.empty()) {
+    if (ask_(++last_ticket_, asked.request.SerializeAsString())) {
+      note_upload(tab, asked.request, now_ns);
+      under_way_[last_ticket_] = {&tab, asked.number, now_ns + kReplyWithin_ns};
+      ++tab.under_way;
+      ++counts_.passed;
+      return;
+    }
+    reason = "the daemon cannot be reached now, so nothing was changed";
+  }
+  ++counts_.refused;
+  tab.outbox.put_answer(refusal_reply(asked.number, reason));
+}
+
+void Hub::replied(std::uint64_t ticket, std::string_view reply) {
+  const auto found = under_way_.find(ticket);
+  if (found == under_way_.end()) return;  // too late, or the page has been closed
+  const UnderWay asked = found->second;
+  under_way_.erase(found);
+  --asked.tab->under_way;
+  asked.tab->outbox.put_answer({.bytes = with_topic(reply_topic(asked.number), reply)});
+  asked.tab->wake();
+}
+
+void Hub::heard(std::string_view topic, std::string_view body, std::int64_t now_ns) {
+  if (topic.size() > kMaxTopic) {
+    ++counts_.foreign;
+  } else if (topic == "stats") {
+    stats_ = with_topic(topic, body);
+    for (Tab* tab : tabs_) tab->outbox.put_newest(topic, stats_);
+  } else {
+    hear_stream(topic, body, now_ns);
+  }
+}
+
+void Hub::hear_stream(std::string_view topic, std::string_view body, std::int64_t now_ns) {
+  const auto slash = topic.find('/');
+  const bool skeleton = topic.starts_with(kSkeleton);
+  const bool event = topic.starts_with("event/");
+  const bool thinned =
+      std::ranges::any_of(kThinned, [&](const char* kind) { return topic.starts_with(kind); });
+  if (!skeleton && !event && !thinned) {
+    ++counts_.foreign;
+    return;
+  }
+  const std::string_view name = topic.substr(slash + 1);
+  auto known = streams_.find(name);
+  if (known == streams_.end()) {
+    if (streams_.size() == kMaxViewStreams) {
+      ++counts_.foreign;
+      return;
+    }
+    known = streams_.emplace(std::string(name), Stream{}).first;
+  }
+  known->second.heard_ns = now_ns;
+  if (tabs_.empty() && !skeleton) return;
+  Bytes bytes = with_topic(topic, body);
+  if (skeleton) {
+    // The daemon repeats it every second, for clients that come later. After a pause the stream had
+    // left, and pages have forgotten its skeleton.
+    Stream& stream = known->second;
+    const bool stayed = now_ns - std::exchange(stream.skeleton_ns, now_ns) < kStayed_ns;
+    if (stream.skeleton && *stream.skeleton == *bytes && stayed) return;
+    stream.skeleton = bytes;
+  }
+  for (Tab* tab : tabs_) {
+    if (skeleton) tab->outbox.put_newest(topic, bytes);
+    if (event) tab->outbox.put_event(bytes);
+    if (thinned) tab->outbox.put_thinned(topic, bytes);
+  }
+}
+
+void Hub::flush() {
+  for (Tab* tab : tabs_) tab->wake();
+}
+
+void Hub::daemon_is(DaemonState state) {
+  if (state == daemon_) return;
+  if (!state.alive && daemon_.alive) {
+    // What the next one has may differ, and poses of this one would be old.
+    streams_.clear();
+    stats_ = nullptr;
+    for (Tab* tab : tabs_) tab->outbox.forget_all();
+  }
+  daemon_ = std::move(state);
+  tell(daemon_word(daemon_));
+}
+
+void Hub::control_is(ControlRight right) {
+  if (right == right_) return;
+  right_ = std::move(right);
+  tell(control_word(right_));
+}
+
+void Hub::tell(const Parcel& parcel) {
+  for (Tab* tab : tabs_) {
+    tab->outbox.put_answer(parcel);
+    tab->wake();
+  }
+}
+
+void Hub::forget(std::string_view stream) {
+  for (Tab* tab : tabs_) {
+    tab->outbox.forget(topic_of(kSkeleton, stream));
+    for (const char* kind : kThinned) tab->outbox.forget(topic_of(kind, stream));
+  }
+}
+
+void Hub::expire(std::int64_t now_ns) {
+  while (!under_way_.empty()) {
+    const auto oldest = under_way_.begin();  // tickets count up
+    if (now_ns < oldest->second.due_ns) break;
+    const UnderWay asked = oldest->second;
+    under_way_.erase(oldest);
+    --asked.tab->under_way;
+    ++counts_.no_reply;
+    asked.tab->outbox.put_answer(no_reply_word(
+        asked.number, "the daemon has not answered for 5 s; the change may still take effect"));
+    asked.tab->wake();
+  }
+  std::erase_if(streams_, [&](const auto& entry) {
+    if (now_ns - entry.second.heard_ns < kGone_ns) return false;
+    forget(entry.first);
+    return true;
+  });
+}
+
+}  // namespace posed::view

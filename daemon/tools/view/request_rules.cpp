@@ -1,0 +1,105 @@
+#include "daemon/tools/view/request_rules.hpp"
+
+#include <array>
+#include <cstdlib>
+
+#include <sodium.h>
+
+namespace posed::view {
+namespace {
+
+constexpr std::size_t kTokenBytes = 16;
+
+constexpr std::string_view kWithoutToken = R"(<!doctype html>
+<html lang="en"><meta charset="utf-8"><title>posed: no access</title>
+<h1>This page needs its whole address</h1>
+<p>posed prints it in the terminal: <code>http://.../?token=...</code>. Open that one; each start
+of posed has a new token.</p></html>
+)";
+
+// In a time that does not depend on where the two differ.
+bool same_secret(std::string_view a, std::string_view b) {
+  return a.size() == b.size() && sodium_memcmp(a.data(), b.data(), a.size()) == 0;
+}
+
+// "token" of "/?a=b&token=T"; empty without one.
+std::string_view token_of(std::string_view target) {
+  constexpr std::string_view kName = "token=";
+  auto at = target.find('?');
+  while (at != std::string_view::npos) {
+    target.remove_prefix(at + 1);
+    at = target.find('&');
+    const std::string_view part = target.substr(0, at);
+    if (part.starts_with(kName)) return part.substr(kName.size());
+  }
+  return {};
+}
+
+// A browser says in `Origin` which page opens a WebSocket, and no page can change that.
+bool is_own_origin(const http::Request& request) {
+  constexpr std::string_view kScheme = "http://";
+  return request.origin.starts_with(kScheme) &&
+         request.origin.substr(kScheme.size()) == request.host;
+}
+
+http::Answer answer_to_upgrade(const http::Request& request, const Site& site,
+                               std::string_view path) {
+  if (path != "/ws") return http::refuse(404, "the WebSocket is /ws\n");
+  if (!is_own_origin(request))
+    return http::refuse(403, "another page may not open this WebSocket\n");
+  if (!same_secret(token_of(request.target), site.token)) {
+    return http::refuse(403, "the token is wrong: open the URL that posed printed\n");
+  }
+  return {.status = 101};
+}
+
+}  // namespace
+
+http::Answer answer_to(const http::Request& request, const Site& site) {
+  if (!http::is_own_host(request.host, site.hosts)) {
+    return http::refuse(403, "this name is not the bridge's: open the URL that posed printed\n");
+  }
+  const std::string_view path = request.target.substr(0, request.target.find('?'));
+  if (request.upgrade) return answer_to_upgrade(request, site, path);
+  if (request.method != "GET" && request.method != "HEAD") {
+    return http::refuse(405, "only GET and HEAD\n");
+  }
+  const PageFile* const file = site.files.find(path);
+  if (file == nullptr) return http::refuse(404, "there is no such file\n");
+  const bool is_page = file == site.files.find("/");
+  if (is_page && !same_secret(token_of(request.target), site.token)) {
+    return {.status = 403, .body = kWithoutToken, .type = type_of_name(".html")};
+  }
+  if (request.if_none_match == file->etag) {
+    return {.status = 304, .type = file->type, .etag = file->etag};
+  }
+  return {.body = file->bytes, .type = file->type, .etag = file->etag};
+}
+
+std::vector<http::Header> safety_headers(std::string_view host) {
+  // three.js reads the textures of a model from blob: addresses, which the page makes itself. Older
+  // browsers do not count the WebSocket as 'self'.
+  const std::string socket = http::is_host(host) ? " ws://" + std::string(host) : "";
+  return {{"Content-Security-Policy",
+           "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
+           "connect-src 'self' blob: data:" +
+               socket + "; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"},
+          {"X-Content-Type-Options", "nosniff"},
+          {"X-Frame-Options", "DENY"},
+          // The token is part of the page's URL.
+          {"Referrer-Policy", "no-referrer"},
+          {"Cross-Origin-Resource-Policy", "same-origin"},
+          {"Cross-Origin-Opener-Policy", "same-origin"}};
+}
+
+std::string random_token() {
+  if (sodium_init() < 0) std::abort();  // the system has no random numbers
+  std::array<unsigned char, kTokenBytes> bits{};
+  randombytes_buf(bits.data(), bits.size());
+  constexpr int kUrl = sodium_base64_VARIANT_URLSAFE_NO_PADDING;
+  std::array<char, sodium_base64_ENCODED_LEN(kTokenBytes, kUrl)> text{};
+  sodium_bin2base64(text.data(), text.size(), bits.data(), bits.size(), kUrl);
+  return text.data();
+}
+
+}  // namespace posed::view

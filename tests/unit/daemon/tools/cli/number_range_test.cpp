@@ -1,0 +1,44 @@
+#include "daemon/tools/command/number_range.hpp"
+
+#include <catch2/catch.hpp>
+
+namespace posed::tools {
+namespace {
+
+// What the command line says to `--amount TEXT`; empty: it takes it.
+std::string refusal(const CLI::Validator& check, const std::string& text) {
+  CLI::App app;
+  double amount = 0.0;
+  app.add_option("--amount", amount)->check(check);
+  try {
+    app.parse("--amount=" + text);
+  } catch (const CLI::ParseError& error) {
+    return error.what();
+  }
+  return {};
+}
+
+TEST_CASE("an option that takes a number takes no NaN and no infinity") {
+  for (const char* text : {"nan", "-nan", "NAN", "inf", "-inf", "1e999", "x", "1x"}) {
+    CAPTURE(text);
+    CHECK(refusal(in_range(0.25, 4.0), text) ==
+          "--amount: '" + std::string(text) + "' should be a number from 0.25 to 4");
+    CHECK(refusal(above_zero(), text) ==
+          "--amount: '" + std::string(text) + "' should be a number above 0");
+    CHECK(refusal(zero_or_more(), text) ==
+          "--amount: '" + std::string(text) + "' should be a number of 0 or more");
+  }
+}
+
+TEST_CASE("an option that takes a number takes its bounds, and nothing beyond") {
+  for (const char* text : {"0.25", "4", "+1", "1e0"})
+    CHECK(refusal(in_range(0.25, 4.0), text).empty());
+  for (const char* text : {"0.24", "4.01", "-1"})
+    CHECK(!refusal(in_range(0.25, 4.0), text).empty());
+  CHECK(!refusal(above_zero(), "0").empty());
+  CHECK(refusal(zero_or_more(), "0").empty());
+  CHECK(!refusal(zero_or_more(), "-0.1").empty());
+}
+
+}  // namespace
+}  // namespace posed::tools

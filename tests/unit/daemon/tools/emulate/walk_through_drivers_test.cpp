@@ -1,0 +1,187 @@
+// A walk goes out of the emulator of each mocap system and in through its driver: every bone that
+// the format carries comes back as it was, and is styled as the same walk from a file.
+#include <catch2/catch.hpp>
+
+#include <array>
+#include <bitset>
+#include <cmath>
+#include <vector>
+
+#include "models/motion/kinematics.hpp"
+#include "models/motion/synthetic_walker.hpp"
+#include "models/style/style_filter.hpp"
+#include "models/style/train.hpp"
+#include "proto/frame/degree.hpp"
+#include "proto/frame/rotation.hpp"
+#include "tests/support/shared.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/daemon/tools/emulate/heard_walk.hpp"
+
+namespace posed::emulate {
+namespace {
+
+using motion::WalkerFamily;
+using test::HeardPose;
+
+constexpr double kWithin_rad = 0.1 * kDegree;
+constexpr std::int64_t kLength_ns = 2 * kNanosPerSecond;
+
+// Rotation of each bone in the world relative to its T-pose.
+struct Turns {
+  Turns(const Skeleton& skeleton, const Frame& frame) {
+    const motion::WorldPose pose = motion::world_pose(skeleton, frame);
+    for (std::size_t j = 0; j < skeleton.joints.size(); ++j) {
+      const Joint& joint = skeleton.joints[j];
+      if (!joint.bone) continue;
+      const auto bone = static_cast<std::size_t>(*joint.bone);
+      turn[bone] = pose.rotation[j] * joint.T_world_joint.conjugate();
+      there[bone] = frame.valid[j];
+    }
+  }
+  std::array<Eigen::Quaterniond, kBones> turn;
+  std::bitset<kBones> there;
+};
+
+// Of the bones that both have.
+struct Difference {
+  void add(const Turns& a, const Turns& b) {
+    for (std::size_t bone = 0; bone < kBones; ++bone) {
+      if (!a.there[bone] || !b.there[bone]) continue;
+      const double off_rad = angle_between_rad(a.turn[bone], b.turn[bone]);
+      most_rad = std::max(most_rad, off_rad);
+      squares += off_rad * off_rad;
+      ++count;
+    }
+  }
+  [[nodiscard]] double rms_rad() const { return std::sqrt(squares / count); }
+  double most_rad = 0.0, squares = 0.0;
+  int count = 0;
+};
+
+// A walk in a file of its own, and the walker that the drivers deliver.
+class Walk {
+ public:
+  explicit Walk(const clip::Clip& walk) {
+    REQUIRE(clip::write_bvh(walk, path()));
+    clip_ = clip::read_clip(path()).value();
+  }
+
+  // The frames of the first person, with a time for the filter.
+  [[nodiscard]] std::vector<HeardPose> through(const drivers::Driver& driver) const {
+    std::vector<HeardPose> all = test::hear_walk(driver, path(), kLength_ns);
+    std::erase_if(all, [](const HeardPose& heard) {  // props
+      return Turns(*heard.skeleton, heard.frame).there.count() < 5;
+    });
+    const std::string first = all.empty() ? "" : all[0].body;
+    std::erase_if(all, [&](const HeardPose& heard) { return heard.body != first; });
+    for (HeardPose& heard : all) {
+      heard.frame.header.device_ns = kNoTime_ns;
+      heard.frame.header.arrival_ns = heard.posed_ns;
+    }
+    return all;
+  }
+  // The same frames from the file: as the emulator was posed last, or before that.
+  [[nodiscard]] std::vector<HeardPose> from_file(const std::vector<HeardPose>& walker) const {
+    std::vector<HeardPose> same;
+    for (const HeardPose& heard : walker) {
+      const auto at = [&](std::int64_t time_ns) {
+        HeardPose pose = heard;
+        pose.frame = test::pose_at(clip_, time_ns);
+        pose.frame.header = heard.frame.header;
+        pose.skeleton = clip_.skeleton;
+        return pose;
+      };
+      const HeardPose last = at(heard.posed_ns), before = at(heard.posed_before_ns);
+      const bool is_last =
+          difference({heard}, {last}).rms_rad() < difference({heard}, {before}).rms_rad();
+      same.push_back(is_last ? last : before);
+    }
+    return same;
+  }
+  [[nodiscard]] static Difference difference(const std::vector<HeardPose>& a,
+                                             const std::vector<HeardPose>& b) {
+    Difference all;
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      all.add(Turns(*a[i].skeleton, a[i].frame), Turns(*b[i].skeleton, b[i].frame));
+    }
+    return all;
+  }
+
+ private:
+  [[nodiscard]] std::filesystem::path path() const { return folder_.path() / "walk.bvh"; }
+
+  test::TempFolder folder_;
+  clip::Clip clip_;
+};
+
+style::StyleModel humanoid_model() {
+  const auto lesson = [](WalkerFamily family, std::uint32_t person, const std::string& group) {
+    auto clip = motion::make_walker({.family = family, .person = person}).value();
+    clip.path = "walker_" + std::to_string(person);
+    const std::string subject = clip.path;
+    return style::TrainingClip{std::move(clip), group, subject, "walk"};
+  };
+  style::TrainOptions options;
+  options.target = "sway";
+  options.dataset.space = motion::Space::kHumanoid;
+  return style::train_style(
+             {lesson(WalkerFamily::kMarch, 1, "march"), lesson(WalkerFamily::kMarch, 2, "march"),
+              lesson(WalkerFamily::kSway, 3, "sway")},
+             options)
+      .value();
+}
+
+// As the live stage and `apply --cold` do it; empty if the skeleton lacks bones of the model.
+std::vector<HeardPose> styled(const style::StyleModel& model, std::vector<HeardPose> walker) {
+  struct Last final : StageOut {
+    void frame(const StageFrame& styled) noexcept override { now = styled.frame; }
+    Frame now;
+  } last;
+  const style::FilterOptions options;
+  const auto bound = style::bind_model(model, *walker[0].skeleton, "sway");
+  if (!bound) return {};
+  style::StyleFilter filter(bound->get(), options);
+  for (HeardPose& heard : walker) {
+    filter.process({.frame = heard.frame}, last);
+    heard.frame = last.now;
+  }
+  return walker;
+}
+
+void check(const Walk& walk) {
+  const style::StyleModel model = humanoid_model();
+  std::vector<std::string_view> without_style;
+  for (const drivers::Driver& driver : drivers::registry()) {
+    if (driver.make_layout == nullptr || driver.emulate == nullptr) continue;
+    INFO(driver.name);
+    const auto walker = walk.through(driver);
+    REQUIRE(walker.size() > 100);
+    const auto file = walk.from_file(walker);
+    CHECK(Walk::difference(walker, file).most_rad < kWithin_rad);
+    const auto styled_walker = styled(model, walker);
+    if (styled_walker.empty()) {
+      without_style.push_back(driver.name);
+      continue;
+    }
+    CHECK(Walk::difference(styled_walker, walker).rms_rad() > 5 * kDegree);
+    const Difference off = Walk::difference(styled_walker, styled(model, file));
+    INFO(off.rms_rad() / kDegree << " deg rms, at most " << off.most_rad / kDegree);
+    CHECK(off.rms_rad() < kWithin_rad);
+  }
+  // Their figures have no legs.
+  CHECK(without_style == std::vector<std::string_view>{"posed", "template_mocap"});
+}
+
+}  // namespace
+
+TEST_CASE("a walk passes through every mocap system as it was, and takes the same style") {
+  check(Walk(motion::make_walker({.seconds = 3.0, .rate_hz = 120.0, .noise_deg = 0.0}).value()));
+}
+
+TEST_CASE("a recorded walk passes through every mocap system as it was, and takes the same style") {
+  const auto recording = test::shared("data/cmu/07_01.amc");
+  if (!recording) SKIP_WITHOUT_SHARED();
+  check(Walk(clip::read_clip(*recording).value()));
+}
+
+}  // namespace posed::emulate
