@@ -113,7 +113,7 @@ bool ControlServer::take_request() {
   }
   if (envelope.size() > kMaxEnvelope) return true;  // not a client of this protocol: no reply
   ++requests_;
-  (void)guard_->take_gone();  // this socket keeps no state for a connection
+  (void)guard_->drain_ended();  // this socket keeps no state for a connection
   if (const int client = net::source_of(part); guard_->knows(client)) guard_->heard(client, {});
   if (ports_.authenticator != nullptr &&
       !ports_.authenticator->allows(part.property("User-Id"), net::Domain::kControl)) {
