@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/feet/approach.hpp"
+#include "models/feet/smoothing.hpp"
 
 namespace posed::feet {
 namespace {

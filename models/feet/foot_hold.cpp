@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/feet/approach.hpp"
+#include "models/feet/smoothing.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::feet {

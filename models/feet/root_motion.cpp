@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "models/feet/approach.hpp"
+#include "models/feet/smoothing.hpp"
 
 namespace posed::feet {
 namespace {

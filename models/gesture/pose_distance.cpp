@@ -1,4 +1,4 @@
-#include "models/gesture/apart.hpp"
+#include "models/gesture/pose_distance.hpp"
 
 #include <cmath>
 

@@ -9,7 +9,7 @@
 #include "models/hand/constrain_type.hpp"
 #include "models/merge/merge_type.hpp"
 #include "models/retarget/retarget_type.hpp"
-#include "models/style/style_type.hpp"
+#include "models/style/live/style_type.hpp"
 
 namespace posed {
 

@@ -13,8 +13,8 @@
 #include "models/generate/generate_type.hpp"
 #include "models/gesture/play_order.hpp"
 #include "models/hand/constrain_type.hpp"
-#include "models/style/style_filter.hpp"
-#include "models/style/style_type.hpp"
+#include "models/style/live/style_filter.hpp"
+#include "models/style/live/style_type.hpp"
 
 namespace posed::test {
 

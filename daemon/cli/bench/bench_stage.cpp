@@ -28,7 +28,7 @@
 #include "daemon/system/clock.hpp"
 #include "daemon/system/process.hpp"
 #include "models/motion/synthetic_walker.hpp"
-#include "models/style/style_type.hpp"
+#include "models/style/live/style_type.hpp"
 
 namespace posed::cli {
 namespace {

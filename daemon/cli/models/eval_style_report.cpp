@@ -10,8 +10,8 @@
 #include "daemon/cli/json_numbers.hpp"
 #include "daemon/cli/models/style_cycles.hpp"
 #include "daemon/report/bench_sections.hpp"
-#include "models/style/dataset.hpp"
-#include "models/style/training_pairs.hpp"
+#include "models/style/train/dataset.hpp"
+#include "models/style/train/training_pairs.hpp"
 
 namespace posed::cli {
 namespace {

@@ -14,8 +14,8 @@
 #include "daemon/cli/models/style_cycles.hpp"
 #include "daemon/report/style_sections.hpp"
 #include "models/gp/regression.hpp"
-#include "models/style/training_check.hpp"
-#include "models/style/training_pairs.hpp"
+#include "models/style/train/training_check.hpp"
+#include "models/style/train/training_pairs.hpp"
 
 namespace posed::cli {
 namespace {

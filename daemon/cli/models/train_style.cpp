@@ -15,7 +15,7 @@
 #include "daemon/cli/output_files.hpp"
 #include "daemon/cli/progress.hpp"
 #include "models/fixed_products.hpp"
-#include "models/style/train.hpp"
+#include "models/style/train/train.hpp"
 #include "proto/clip/file_names.hpp"
 #include "proto/text/json_text.hpp"
 

@@ -1,4 +1,4 @@
-#include "models/style/evaluate.hpp"
+#include "models/style/judge/evaluate.hpp"
 
 #include <cmath>
 #include <numbers>
@@ -8,8 +8,8 @@
 
 #include "models/feet/foot_score.hpp"
 #include "models/motion/motion.hpp"
-#include "models/style/difference.hpp"
-#include "models/style/harmonics.hpp"
+#include "models/style/train/difference_process.hpp"
+#include "models/style/train/harmonics.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 

@@ -1,4 +1,4 @@
-#include "models/style/walker_fit.hpp"
+#include "models/style/judge/walker_fit.hpp"
 
 #include <algorithm>
 #include <cmath>

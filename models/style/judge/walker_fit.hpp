@@ -6,7 +6,7 @@
 
 #include <Eigen/Core>
 
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/frame/result.hpp"
 

@@ -1,4 +1,4 @@
-#include "models/style/apply.hpp"
+#include "models/style/live/apply.hpp"
 
 #include <algorithm>
 #include <array>

@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "models/feet/root_motion.hpp"
-#include "models/style/style_filter.hpp"
-#include "models/style/style_model.hpp"
+#include "models/style/live/style_filter.hpp"
+#include "models/style/model/style_model.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/frame/result.hpp"
 

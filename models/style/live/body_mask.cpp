@@ -1,10 +1,10 @@
-#include "models/style/body_mask.hpp"
+#include "models/style/live/body_mask.hpp"
 
 #include <algorithm>
 #include <charconv>
 #include <string>
 
-#include "models/style/named_numbers.hpp"
+#include "models/style/live/named_numbers.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::style {

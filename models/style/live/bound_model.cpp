@@ -1,4 +1,4 @@
-#include "models/style/bound_model.hpp"
+#include "models/style/live/bound_model.hpp"
 
 #include <algorithm>
 

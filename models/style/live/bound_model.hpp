@@ -11,9 +11,9 @@
 #include "models/gp/predictor.hpp"
 #include "models/motion/pose_space.hpp"
 #include "models/stage.hpp"
-#include "models/style/body_mask.hpp"
-#include "models/style/known_motion.hpp"
-#include "models/style/style_model.hpp"
+#include "models/style/live/body_mask.hpp"
+#include "models/style/live/trained_motion.hpp"
+#include "models/style/model/style_model.hpp"
 
 namespace posed::style {
 

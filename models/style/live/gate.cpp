@@ -1,4 +1,4 @@
-#include "models/style/gate.hpp"
+#include "models/style/live/gate.hpp"
 
 #include <algorithm>
 #include <cmath>

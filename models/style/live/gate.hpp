@@ -7,11 +7,11 @@
 #include <optional>
 #include <span>
 
-#include "models/style/known_motion.hpp"
-#include "models/style/live_gait.hpp"
-#include "models/style/live_stride.hpp"
-#include "models/style/pose_speed.hpp"
-#include "models/style/warm_up.hpp"
+#include "models/style/live/live_gait.hpp"
+#include "models/style/live/live_stride.hpp"
+#include "models/style/live/pose_speed.hpp"
+#include "models/style/live/trained_motion.hpp"
+#include "models/style/live/warm_up.hpp"
 #include "proto/frame/frame.hpp"
 
 namespace posed::style {

@@ -1,4 +1,4 @@
-#include "models/style/live_gait.hpp"
+#include "models/style/live/live_gait.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "models/style/live_stride.hpp"
+#include "models/style/live/live_stride.hpp"
 
 #include <algorithm>
 #include <cmath>

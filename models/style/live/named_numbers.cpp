@@ -1,4 +1,4 @@
-#include "models/style/named_numbers.hpp"
+#include "models/style/live/named_numbers.hpp"
 
 #include <algorithm>
 #include <charconv>

@@ -1,4 +1,4 @@
-#include "models/style/pose_speed.hpp"
+#include "models/style/live/pose_speed.hpp"
 
 #include <cmath>
 

@@ -9,7 +9,7 @@
 #include <span>
 
 #include "models/motion/pose_space.hpp"
-#include "models/style/known_motion.hpp"
+#include "models/style/live/trained_motion.hpp"
 
 namespace posed::style {
 

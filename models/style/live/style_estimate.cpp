@@ -1,4 +1,4 @@
-#include "models/style/style_estimate.hpp"
+#include "models/style/live/style_estimate.hpp"
 
 #include <limits>
 

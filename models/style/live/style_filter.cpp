@@ -1,4 +1,4 @@
-#include "models/style/style_filter.hpp"
+#include "models/style/live/style_filter.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <span>
 #include <utility>
 
-#include "models/style/walker_command.hpp"
+#include "models/style/live/walker_command.hpp"
 #include "proto/frame/rotation.hpp"
 #include "proto/frame/skeleton.hpp"
 

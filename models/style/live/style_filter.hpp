@@ -32,10 +32,10 @@
 #include "models/motion/heading.hpp"
 #include "models/motion/pose_space.hpp"
 #include "models/stage.hpp"
-#include "models/style/body_mask.hpp"
-#include "models/style/bound_model.hpp"
-#include "models/style/style_weights.hpp"
-#include "models/style/walker_watch.hpp"
+#include "models/style/live/body_mask.hpp"
+#include "models/style/live/bound_model.hpp"
+#include "models/style/live/style_weights.hpp"
+#include "models/style/live/walker_tracker.hpp"
 
 namespace posed::style {
 

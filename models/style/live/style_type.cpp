@@ -1,13 +1,13 @@
-#include "models/style/style_type.hpp"
+#include "models/style/live/style_type.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 
-#include "models/style/apply.hpp"
-#include "models/style/style_filter.hpp"
-#include "models/style/style_model.hpp"
-#include "models/style/walker_command.hpp"
+#include "models/style/live/apply.hpp"
+#include "models/style/live/style_filter.hpp"
+#include "models/style/live/walker_command.hpp"
+#include "models/style/model/style_model.hpp"
 #include "posed/v1/log.pb.h"
 #include "posed/v1/model.pb.h"
 #include "proto/clip/clip.hpp"

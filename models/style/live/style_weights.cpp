@@ -1,11 +1,11 @@
-#include "models/style/style_weights.hpp"
+#include "models/style/live/style_weights.hpp"
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <numeric>
 
-#include "models/style/named_numbers.hpp"
+#include "models/style/live/named_numbers.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::style {

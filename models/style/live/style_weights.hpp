@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/text/short_text.hpp"
 

@@ -1,4 +1,4 @@
-#include "models/style/known_motion.hpp"
+#include "models/style/live/trained_motion.hpp"
 
 #include <algorithm>
 #include <cmath>

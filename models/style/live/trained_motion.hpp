@@ -9,7 +9,7 @@
 #include <Eigen/Core>
 
 #include "models/motion/leg_signal.hpp"
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
 
 namespace posed::style {
 

@@ -1,4 +1,4 @@
-#include "models/style/walker_command.hpp"
+#include "models/style/live/walker_command.hpp"
 
 #include <algorithm>
 #include <array>

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "models/stage.hpp"
-#include "models/style/warm_up.hpp"
+#include "models/style/live/warm_up.hpp"
 
 namespace posed::v1 {
 class DecisionValue;

@@ -1,4 +1,4 @@
-#include "models/style/walker_watch.hpp"
+#include "models/style/live/walker_tracker.hpp"
 
 #include <algorithm>
 #include <bit>

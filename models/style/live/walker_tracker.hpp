@@ -9,10 +9,10 @@
 #include <span>
 
 #include "models/stage.hpp"
-#include "models/style/bound_model.hpp"
-#include "models/style/gate.hpp"
-#include "models/style/style_estimate.hpp"
-#include "models/style/warm_up.hpp"
+#include "models/style/live/bound_model.hpp"
+#include "models/style/live/gate.hpp"
+#include "models/style/live/style_estimate.hpp"
+#include "models/style/live/warm_up.hpp"
 
 namespace posed::style {
 

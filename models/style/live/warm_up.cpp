@@ -1,4 +1,4 @@
-#include "models/style/warm_up.hpp"
+#include "models/style/live/warm_up.hpp"
 
 #include <cmath>
 

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
 #include "proto/model/model_file.hpp"
 #include "proto/model/validator.hpp"
 

@@ -1,4 +1,4 @@
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
 
 namespace posed::style {
 

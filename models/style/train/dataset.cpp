@@ -1,4 +1,4 @@
-#include "models/style/dataset.hpp"
+#include "models/style/train/dataset.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,8 +7,8 @@
 
 #include "models/motion/motion.hpp"
 #include "models/motion/symmetric_eigen.hpp"
-#include "models/style/harmonics.hpp"
-#include "models/style/stride_phase.hpp"
+#include "models/style/train/harmonics.hpp"
+#include "models/style/train/stride_phase.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::style {

@@ -1,10 +1,10 @@
-#include "models/style/difference.hpp"
+#include "models/style/train/difference_process.hpp"
 
 #include <cmath>
 #include <limits>
 
 #include "models/gp/inducing.hpp"
-#include "models/style/harmonics.hpp"
+#include "models/style/train/harmonics.hpp"
 #include "proto/frame/degree.hpp"
 
 namespace posed::style {

@@ -1,4 +1,4 @@
-#include "models/style/walker_data.hpp"
+#include "models/style/train/gate_data.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,11 +10,11 @@
 
 #include <Eigen/Cholesky>
 
-#include "models/style/lessons.hpp"
-#include "models/style/live_gait.hpp"
-#include "models/style/live_stride.hpp"
-#include "models/style/training_check.hpp"
-#include "models/style/training_pairs.hpp"
+#include "models/style/live/live_gait.hpp"
+#include "models/style/live/live_stride.hpp"
+#include "models/style/train/target_training.hpp"
+#include "models/style/train/training_check.hpp"
+#include "models/style/train/training_pairs.hpp"
 
 namespace posed::style {
 namespace {

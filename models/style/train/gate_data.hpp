@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "models/style/dataset.hpp"
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
+#include "models/style/train/dataset.hpp"
 
 namespace posed::style {
 

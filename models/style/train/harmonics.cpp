@@ -1,4 +1,4 @@
-#include "models/style/harmonics.hpp"
+#include "models/style/train/harmonics.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "models/style/leave_out.hpp"
+#include "models/style/train/kernel_choice.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +9,7 @@
 #include <Eigen/Cholesky>
 
 #include "models/gp/inducing.hpp"
-#include "models/style/harmonics.hpp"
+#include "models/style/train/harmonics.hpp"
 #include "proto/frame/degree.hpp"
 
 namespace posed::style {

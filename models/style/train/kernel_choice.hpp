@@ -12,7 +12,7 @@
 
 #include <Eigen/Core>
 
-#include "models/style/difference.hpp"
+#include "models/style/train/difference_process.hpp"
 #include "models/tasks.hpp"
 
 namespace posed::style {

@@ -1,4 +1,4 @@
-#include "models/style/mgpm.hpp"
+#include "models/style/train/mgpm.hpp"
 
 #include <algorithm>
 #include <cmath>

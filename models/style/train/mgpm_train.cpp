@@ -1,4 +1,4 @@
-#include "models/style/mgpm_train.hpp"
+#include "models/style/train/mgpm_train.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 
 #include "models/gp/lbfgs.hpp"
 #include "models/motion/symmetric_eigen.hpp"
-#include "models/style/harmonics.hpp"
+#include "models/style/train/harmonics.hpp"
 #include "models/task_numbers.hpp"
 
 namespace posed::style {

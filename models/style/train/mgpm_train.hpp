@@ -6,7 +6,7 @@
 #include <functional>
 #include <vector>
 
-#include "models/style/mgpm.hpp"
+#include "models/style/train/mgpm.hpp"
 #include "models/tasks.hpp"
 #include "proto/frame/result.hpp"
 

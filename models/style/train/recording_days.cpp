@@ -1,4 +1,4 @@
-#include "models/style/days.hpp"
+#include "models/style/train/recording_days.hpp"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,7 @@
 #include <map>
 #include <tuple>
 
-#include "models/style/harmonics.hpp"
+#include "models/style/train/harmonics.hpp"
 
 namespace posed::style {
 namespace {

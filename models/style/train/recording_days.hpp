@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "models/style/training_pairs.hpp"
+#include "models/style/train/training_pairs.hpp"
 
 namespace posed::style {
 

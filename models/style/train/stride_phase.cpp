@@ -1,4 +1,4 @@
-#include "models/style/stride_phase.hpp"
+#include "models/style/train/stride_phase.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "models/style/harmonics.hpp"
+#include "models/style/train/harmonics.hpp"
 
 namespace posed::style {
 namespace {

@@ -1,4 +1,4 @@
-#include "models/style/lessons.hpp"
+#include "models/style/train/target_training.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 #include <set>
 #include <utility>
 
-#include "models/style/harmonics.hpp"
-#include "models/style/training_pairs.hpp"
+#include "models/style/train/harmonics.hpp"
+#include "models/style/train/training_pairs.hpp"
 
 namespace posed::style {
 namespace {

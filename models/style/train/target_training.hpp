@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "models/style/dataset.hpp"
-#include "models/style/difference.hpp"
-#include "models/style/leave_out.hpp"
+#include "models/style/train/dataset.hpp"
+#include "models/style/train/difference_process.hpp"
+#include "models/style/train/kernel_choice.hpp"
 
 namespace posed::style {
 

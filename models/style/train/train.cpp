@@ -1,14 +1,14 @@
-#include "models/style/train.hpp"
+#include "models/style/train/train.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <set>
 #include <utility>
 
-#include "models/style/lessons.hpp"
-#include "models/style/train_report.hpp"
-#include "models/style/training_check.hpp"
-#include "models/style/walker_data.hpp"
+#include "models/style/train/gate_data.hpp"
+#include "models/style/train/target_training.hpp"
+#include "models/style/train/train_report.hpp"
+#include "models/style/train/training_check.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 

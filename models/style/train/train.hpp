@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "models/style/dataset.hpp"
-#include "models/style/lessons.hpp"
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
+#include "models/style/train/dataset.hpp"
+#include "models/style/train/target_training.hpp"
 
 namespace posed::style {
 

@@ -1,12 +1,12 @@
-#include "models/style/train_report.hpp"
+#include "models/style/train/train_report.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
 
-#include "models/style/training_check.hpp"
-#include "models/style/training_pairs.hpp"
+#include "models/style/train/training_check.hpp"
+#include "models/style/train/training_pairs.hpp"
 #include "proto/frame/degree.hpp"
 
 namespace posed::style {

@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "models/style/lessons.hpp"
+#include "models/style/train/target_training.hpp"
 
 namespace posed::style {
 

@@ -1,4 +1,4 @@
-#include "models/style/training_check.hpp"
+#include "models/style/train/training_check.hpp"
 
 #include <algorithm>
 #include <array>
@@ -8,7 +8,7 @@
 #include <set>
 #include <string_view>
 
-#include "models/style/harmonics.hpp"
+#include "models/style/train/harmonics.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/text/nearest_word.hpp"
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "models/style/dataset.hpp"
-#include "models/style/training_pairs.hpp"
+#include "models/style/train/dataset.hpp"
+#include "models/style/train/training_pairs.hpp"
 
 namespace posed::style {
 

@@ -1,4 +1,4 @@
-#include "models/style/training_pairs.hpp"
+#include "models/style/train/training_pairs.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,8 +6,8 @@
 #include <numbers>
 #include <utility>
 
-#include "models/style/days.hpp"
-#include "models/style/harmonics.hpp"
+#include "models/style/train/harmonics.hpp"
+#include "models/style/train/recording_days.hpp"
 
 namespace posed::style {
 namespace {

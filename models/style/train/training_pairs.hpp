@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "models/style/dataset.hpp"
-#include "models/style/leave_out.hpp"
+#include "models/style/train/dataset.hpp"
+#include "models/style/train/kernel_choice.hpp"
 
 namespace posed::style {
 

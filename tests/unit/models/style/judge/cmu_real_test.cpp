@@ -10,10 +10,10 @@
 #include <string>
 #include <vector>
 
-#include "models/style/dataset.hpp"
-#include "models/style/difference.hpp"
-#include "models/style/harmonics.hpp"
-#include "models/style/training_pairs.hpp"
+#include "models/style/train/dataset.hpp"
+#include "models/style/train/difference_process.hpp"
+#include "models/style/train/harmonics.hpp"
+#include "models/style/train/training_pairs.hpp"
 #include "tests/support/shared.hpp"
 
 using namespace posed;

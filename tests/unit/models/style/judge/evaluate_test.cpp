@@ -1,5 +1,5 @@
 // The score of a styled walk in cases where it is known in advance, and where none is defined.
-#include "models/style/evaluate.hpp"
+#include "models/style/judge/evaluate.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "models/motion/motion.hpp"
-#include "models/style/apply.hpp"
-#include "models/style/evaluate.hpp"
-#include "models/style/train.hpp"
+#include "models/style/judge/evaluate.hpp"
+#include "models/style/live/apply.hpp"
+#include "models/style/train/train.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/last_frame.hpp"
 #include "tests/support/shared.hpp"

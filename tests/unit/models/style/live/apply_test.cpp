@@ -1,5 +1,5 @@
 // A clip through the style stage: settled start, cold start, and values that must not change.
-#include "models/style/apply.hpp"
+#include "models/style/live/apply.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "models/motion/motion.hpp"
-#include "models/style/apply.hpp"
-#include "models/style/bound_model.hpp"
-#include "models/style/style_filter.hpp"
-#include "models/style/train.hpp"
+#include "models/style/live/apply.hpp"
+#include "models/style/live/bound_model.hpp"
+#include "models/style/live/style_filter.hpp"
+#include "models/style/train/train.hpp"
 #include "proto/frame/degree.hpp"
 #include "tests/support/shared.hpp"
 

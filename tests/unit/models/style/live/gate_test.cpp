@@ -1,5 +1,5 @@
 // The gate: what counts as known, how fast and how smoothly it opens and closes.
-#include "models/style/gate.hpp"
+#include "models/style/live/gate.hpp"
 
 #include <cmath>
 #include <limits>
@@ -11,9 +11,9 @@
 
 #include "models/motion/leg_signal.hpp"
 #include "models/motion/synthetic_walker.hpp"
-#include "models/style/live_gait.hpp"
-#include "models/style/live_stride.hpp"
-#include "models/style/pose_speed.hpp"
+#include "models/style/live/live_gait.hpp"
+#include "models/style/live/live_stride.hpp"
+#include "models/style/live/pose_speed.hpp"
 #include "proto/frame/degree.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 

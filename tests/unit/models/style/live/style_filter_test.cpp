@@ -1,5 +1,5 @@
 // The style stage on a toy body: what it adds, what it does not change, and the continuity bound.
-#include "models/style/style_filter.hpp"
+#include "models/style/live/style_filter.hpp"
 
 #include <cstring>
 #include <random>

@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-#include "models/style/style_filter.hpp"
+#include "models/style/live/style_filter.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/support/has.hpp"
 #include "tests/support/last_frame.hpp"

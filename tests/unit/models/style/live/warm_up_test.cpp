@@ -1,5 +1,5 @@
 // The warm-up: what it measures, what the kernel then sees, and what ends it badly.
-#include "models/style/warm_up.hpp"
+#include "models/style/live/warm_up.hpp"
 
 #include <cmath>
 #include <span>
@@ -8,10 +8,10 @@
 
 #include <catch2/catch.hpp>
 
-#include "models/style/style_estimate.hpp"
-#include "models/style/style_filter.hpp"
-#include "models/style/style_type.hpp"
-#include "models/style/walker_command.hpp"
+#include "models/style/live/style_estimate.hpp"
+#include "models/style/live/style_filter.hpp"
+#include "models/style/live/style_type.hpp"
+#include "models/style/live/walker_command.hpp"
 #include "posed/v1/log.pb.h"
 #include "tests/support/last_frame.hpp"
 #include "tests/support/temp_folder.hpp"

@@ -5,7 +5,7 @@
 #include <fstream>
 #include <limits>
 
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
 #include "proto/model/model_file.hpp"
 
 using namespace posed;

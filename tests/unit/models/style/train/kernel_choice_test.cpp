@@ -1,11 +1,11 @@
 // The choice of the kernel: folds in several tasks, and progress when lengths are added.
-#include "models/style/leave_out.hpp"
+#include "models/style/train/kernel_choice.hpp"
 
 #include <catch2/catch.hpp>
 
 #include <random>
 
-#include "models/style/harmonics.hpp"
+#include "models/style/train/harmonics.hpp"
 
 using namespace posed;
 

@@ -1,5 +1,5 @@
 // Days are followed only where held-out takes confirm them, whatever the numbers of takes.
-#include "models/style/days.hpp"
+#include "models/style/train/recording_days.hpp"
 
 #include <catch2/catch.hpp>
 

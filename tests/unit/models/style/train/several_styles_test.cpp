@@ -10,9 +10,9 @@
 
 #include "models/gp/regression.hpp"
 #include "models/motion/synthetic_walker.hpp"
-#include "models/style/apply.hpp"
-#include "models/style/evaluate.hpp"
-#include "models/style/train.hpp"
+#include "models/style/judge/evaluate.hpp"
+#include "models/style/live/apply.hpp"
+#include "models/style/train/train.hpp"
 #include "tests/support/has.hpp"
 #include "tests/support/shared.hpp"
 

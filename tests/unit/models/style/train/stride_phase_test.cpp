@@ -1,5 +1,5 @@
 // The phase of walks whose cadence changes, and the score that tells strides from other motion.
-#include "models/style/stride_phase.hpp"
+#include "models/style/train/stride_phase.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "models/style/harmonics.hpp"
+#include "models/style/train/harmonics.hpp"
 
 using namespace posed::style;
 using Eigen::VectorXd;

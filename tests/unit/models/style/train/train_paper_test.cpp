@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "models/motion/synthetic_walker.hpp"
-#include "models/style/apply.hpp"
-#include "models/style/evaluate.hpp"
-#include "models/style/train.hpp"
-#include "models/style/training_pairs.hpp"
+#include "models/style/judge/evaluate.hpp"
+#include "models/style/live/apply.hpp"
+#include "models/style/train/train.hpp"
+#include "models/style/train/training_pairs.hpp"
 #include "models/tasks.hpp"
 
 using namespace posed;

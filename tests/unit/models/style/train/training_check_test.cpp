@@ -1,5 +1,5 @@
 // The checks of a training's clips, on synthetic walkers and, where present, on real recordings.
-#include "models/style/training_check.hpp"
+#include "models/style/train/training_check.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "models/motion/synthetic_walker.hpp"
-#include "models/style/train.hpp"
-#include "models/style/walker_fit.hpp"
+#include "models/style/judge/walker_fit.hpp"
+#include "models/style/train/train.hpp"
 #include "tests/support/shared.hpp"
 
 using namespace posed;
