@@ -20,7 +20,7 @@
 #include "models/perform/standing.hpp"
 #include "models/smooth/live_options.hpp"
 #include "models/smooth/live_smoother.hpp"
-#include "models/stage.hpp"
+#include "models/stage_type.hpp"
 #include "proto/frame/skeleton.hpp"
 
 namespace posed::generate {
@@ -91,5 +91,8 @@ class GenerateStage final : public Stage {
   std::size_t channels_ = 0;         // of the last emitted frame
   std::array<double, kMaxChannels> variance_rad2_{};
 };
+
+// The entry in the list of stages (models/stages/registry.cpp).
+[[nodiscard]] const StageType& generate_type();
 
 }  // namespace posed::generate

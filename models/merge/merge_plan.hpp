@@ -7,14 +7,26 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
 #include "models/merge/hand_map.hpp"
 #include "models/merge/merged_skeleton.hpp"
+#include "models/parameter_table.hpp"
 #include "models/stage_type.hpp"
 
 namespace posed::merge {
+
+// The parameters of the merge stage.
+struct MergeOptions {
+  std::array<std::string, 2> gloves{};  // names of their streams: left, right; empty: none
+  double wait_s = 0.015;
+  std::string wrist = "auto";
+  double hold_s = 1.0;
+
+  [[nodiscard]] static const ParameterTable<MergeOptions, Stage>& table();
+};
 
 struct MergePlan {
   struct Hand {

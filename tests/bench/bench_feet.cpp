@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/cli/bench/percentiles.hpp"
-#include "models/feet/feet_type.hpp"
+#include "models/feet/feet_stage.hpp"
 #include "models/gp/synthetic.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/live/style_filter.hpp"

@@ -6,7 +6,7 @@
 
 #include "drivers/options.hpp"
 #include "drivers/template_mocap/protocol.hpp"
-#include "models/generate/generate_type.hpp"
+#include "models/generate/generate_stage.hpp"
 #include "models/style/live/style_type.hpp"
 #include "models/style/model/style_model.hpp"
 #include "tests/support/dice.hpp"

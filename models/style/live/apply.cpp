@@ -80,10 +80,7 @@ class ThroughFeet final : public StageOut {
 
 Result<std::unique_ptr<Stage>> feet_stage(const clip::Clip& clip, const ApplyOptions& options) {
   if (!options.feet) return nullptr;
-  auto legs = feet::Legs::find(*clip.skeleton);
-  if (!legs) return fail(legs.error().message, clip.path);
-  return std::make_unique<feet::FeetStage>(clip.skeleton, std::move(*legs), clip.frame_rate_hz,
-                                           *options.feet);
+  return feet::make_feet_stage(clip.skeleton, clip.frame_rate_hz, *options.feet);
 }
 
 // Moves the root of a clip by its position channels.

@@ -41,7 +41,7 @@ StyleFilter::StyleFilter(const BoundModel* model, const FilterOptions& options) 
     : model_(model), options_(options) {
   options_.alpha_slew_per_s = std::clamp(options.alpha_slew_per_s, 1e-3, 1e6);
   set_alpha(static_cast<float>(options.alpha));
-  set_auto_alpha(options.auto_alpha);
+  watch_.set_auto_alpha(options.auto_alpha);
   missing_ = options.auto_alpha ? 0.0 : 1.0;
   watch_.set_gate(options.gate);
   if (options.calibrate) watch_.tell(WalkerWatch::kOldKey);
@@ -82,47 +82,67 @@ const BoundModel* StyleFilter::set_model(const BoundModel* model) noexcept {
   return before;
 }
 
-// RT-safe
-void StyleFilter::set(std::size_t parameter, double value) noexcept {
-  switch (parameter) {
-    case kAlpha:
-      return set_alpha(static_cast<float>(value));
-    case kAlphaSlew:
-      options_.alpha_slew_per_s = value;
-      return;
-    case kGate:
-      options_.gate = value != 0.0;
-      return watch_.set_gate(options_.gate);
-    case kGateFallback:
-      discontinuity_ = discontinuity_ || value != options_.gate_fallback;
-      options_.gate_fallback = value;
-      return;
-    case kCalibrate:
-      return set_calibrate(value != 0.0);
-    case kAutoAlpha:
-      return set_auto_alpha(value != 0.0);
-    default:
-      return;
-  }
-}
-
-// RT-safe
-ParameterState StyleFilter::state(std::size_t parameter) const noexcept {
-  const auto settled = [](double value) { return ParameterState{value, value}; };
-  switch (parameter) {
-    case kAlpha:
-      return {alpha_, wanted_alpha()};
-    case kAlphaSlew:
-      return settled(options_.alpha_slew_per_s);
-    case kGateFallback:
-      return settled(options_.gate_fallback);
-    case kCalibrate:
-      return settled(options_.calibrate ? 1.0 : 0.0);
-    case kAutoAlpha:
-      return settled(options_.auto_alpha ? 1.0 : 0.0);
-    default:
-      return settled(options_.gate ? 1.0 : 0.0);
-  }
+const StyleFilter::Table& StyleFilter::table() {
+  static const Table table({
+      Table::row<&FilterOptions::alpha>(
+          {.name = "alpha",
+           .help = "how much style: 0 none, 1 as trained, 2 twice as much, -1 the opposite",
+           .min = -kMaxAlpha,
+           .max = kMaxAlpha,
+           .live = true},
+          {.set = &StyleFilter::set_alpha_number, .state = &StyleFilter::alpha_state}),
+      Table::row<&FilterOptions::alpha_slew_per_s>({.name = "alpha_slew_per_s",
+                                                    .help = "how fast alpha moves to a new value",
+                                                    .min = 0.01,
+                                                    .max = 1000.0,
+                                                    .live = true}),
+      Table::row<&FilterOptions::gate>(
+          {.name = "gate",
+           .help = "fade the style out where the model does not know the motion",
+           .live = true},
+          {.set = &StyleFilter::set_gate}),
+      Table::row<&FilterOptions::gate_fallback>(
+          {.name = "gate_fallback",
+           .help = "what the gate fades to: 0 the input, 1 the model's constant part",
+           .min = 0.0,
+           .max = 1.0,
+           .live = true},
+          {.set = &StyleFilter::set_gate_fallback}),
+      Table::row<&FilterOptions::calibrate>(
+          {.name = "calibrate", .help = "the older name of warm_up_s = 10", .live = true},
+          {.set = &StyleFilter::set_calibrate}),
+      Table::row<&FilterOptions::auto_alpha>(
+          {.name = "auto_alpha",
+           .help = "less style for a walker who shows it already",
+           .live = true},
+          {.set = &StyleFilter::set_auto_alpha}),
+      // The first command of the stage comes from these two (style_type()).
+      {.spec = {.name = "warm_up_s",
+                .default_value = 0.0,
+                .help = "measure the walker's own neutral pose so long at the start; 0: do not",
+                .min = 0.0,
+                .max = kLongestWarmUp_s}},
+      {.spec = {.name = "neutral",
+                .default_value = std::string(),
+                .is_path = true,
+                .help =
+                    "a clip of the walker's usual walk, in the place of a warm-up: .bvh or .amc"}},
+      Table::row<&FilterOptions::weights>(
+          {.name = "weights",
+           .help = "how much of each style of the model: \"feminine=0.6,elderly=0.4\"; empty: the"
+                   " first alone",
+           .live = true}),
+      {.spec = {.name = "mask",
+                .default_value = std::string(),
+                .help =
+                    "how much of the style parts of the body get: \"arms=0.5,head=0\"; the rest 1",
+                .live = true},
+       .read =
+           [](FilterOptions& options, const std::string& text) {
+             options.mask = mask_of(text).value_or(whole_body());
+           }},
+  });
+  return table;
 }
 
 // RT-safe
@@ -142,10 +162,9 @@ void StyleFilter::describe(std::size_t index, const StageCommand& command,
 float StyleFilter::alpha() const noexcept { return static_cast<float>(alpha_); }
 
 // Off: the walker is forgotten. RT-safe
-void StyleFilter::set_calibrate(bool on) noexcept {
+void StyleFilter::set_calibrate(double on) noexcept {
   watch_.tell(WalkerWatch::kOldKey);
-  options_.calibrate = on;
-  if (on) {
+  if (on != 0.0) {
     static_cast<void>(watch_.warm_up(model_, kUsualWarmUp_s));
   } else if (watch_.walker()) {
     watch_.set_walker({});
@@ -172,10 +191,9 @@ bool StyleFilter::command(std::size_t index, const StageCommand& command) noexce
   }
 }
 
-// RT-safe
-void StyleFilter::set_auto_alpha(bool on) noexcept {
-  options_.auto_alpha = on;
-  watch_.set_auto_alpha(on);
+// The constant part of the model jumps with the fallback. RT-safe
+void StyleFilter::set_gate_fallback(double value) noexcept {
+  discontinuity_ = discontinuity_ || value != options_.gate_fallback;
 }
 
 // Who shows the style already gets the rest of it. RT-safe

@@ -31,6 +31,7 @@
 #include "models/elapsed.hpp"
 #include "models/motion/heading.hpp"
 #include "models/motion/pose_space.hpp"
+#include "models/parameter_table.hpp"
 #include "models/stage.hpp"
 #include "models/style/live/body_mask.hpp"
 #include "models/style/live/bound_model.hpp"
@@ -98,10 +99,15 @@ class StyleFilter final : public Stage {
   [[nodiscard]] bool command(std::size_t index, const StageCommand& command) noexcept override;
   void flush(StageOut& /*out*/) noexcept override { watch_.interrupt(); }
 
-  // The parameters, as style_type() numbers them. RT-safe.
-  enum Parameter : std::size_t { kAlpha, kAlphaSlew, kGate, kGateFallback, kCalibrate, kAutoAlpha };
-  void set(std::size_t parameter, double value) noexcept override;
-  [[nodiscard]] ParameterState state(std::size_t parameter) const noexcept override;
+  // The parameters, as style_type() numbers them. set() and state() are RT-safe.
+  using Table = ParameterTable<FilterOptions, StyleFilter>;
+  static const Table& table();
+  void set(std::size_t parameter, double value) noexcept override {
+    table_.set(*this, options_, parameter, value);
+  }
+  [[nodiscard]] ParameterState state(std::size_t parameter) const noexcept override {
+    return table_.state(*this, options_, parameter);
+  }
   void use(const StageModel& model) noexcept override;
   [[nodiscard]] const BoundModel* model() const noexcept override { return model_; }
 
@@ -129,13 +135,18 @@ class StyleFilter final : public Stage {
   void mix_limits() noexcept;
   bool read_pose(const Frame& frame, double dt_s, Pose& pose) noexcept;
   void answer(const Pose& pose, Dims& delta) noexcept;
-  void set_auto_alpha(bool on) noexcept;
+  void set_alpha_number(double value) noexcept { set_alpha(static_cast<float>(value)); }
+  [[nodiscard]] ParameterState alpha_state() const noexcept { return {alpha_, wanted_alpha()}; }
+  void set_gate(double on) noexcept { watch_.set_gate(on != 0.0); }
+  void set_gate_fallback(double value) noexcept;
+  void set_auto_alpha(double on) noexcept { watch_.set_auto_alpha(on != 0.0); }
   void find_missing() noexcept;
   [[nodiscard]] double wanted_alpha() const noexcept;
-  void set_calibrate(bool on) noexcept;
+  void set_calibrate(double on) noexcept;
   void begin_blend(const Rotations& in, const Frame& styled, double dt_s) noexcept;
   void blend(Frame& styled) const noexcept;
 
+  const Table& table_ = table();
   const BoundModel* model_;
   FilterOptions options_;
   double alpha_ = 0.0;

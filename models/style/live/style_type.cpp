@@ -15,17 +15,6 @@
 namespace posed::style {
 namespace {
 
-FilterOptions options_of(const Parameters& parameters) {
-  return {.alpha = parameter<double>(parameters, "alpha"),
-          .alpha_slew_per_s = parameter<double>(parameters, "alpha_slew_per_s"),
-          .gate = parameter<bool>(parameters, "gate"),
-          .gate_fallback = parameter<double>(parameters, "gate_fallback"),
-          .calibrate = parameter<bool>(parameters, "calibrate"),
-          .auto_alpha = parameter<bool>(parameters, "auto_alpha"),
-          .weights = parameter<std::string>(parameters, "weights"),
-          .mask = mask_of(parameter<std::string>(parameters, "mask")).value_or(whole_body())};
-}
-
 const BoundModel* style_of(const StageModel* model) {
   return static_cast<const BoundModel*>(model);
 }
@@ -50,7 +39,7 @@ std::optional<ParameterFault> check(const Parameters& parameters, bool /*has_mod
 }
 
 Result<std::unique_ptr<Stage>> make(const StageContext& context, const StageModel* model) {
-  FilterOptions options = options_of(context.parameters);
+  const FilterOptions options = StyleFilter::table().options(context.parameters);
   if (model != nullptr) {
     const auto shares = shares_of(options.weights, style_of(model)->styles());
     if (!shares) return fail(shares.error().message, model->name);
@@ -129,59 +118,6 @@ std::optional<StageCommand> mask_from_log(const v1::DecisionValue& value) {
   Mask mask{};
   std::ranges::copy(numbers, mask.begin());
   return StageCommand::of(mask);
-}
-
-// In the order of StyleFilter::Parameter.
-std::vector<ParameterSpec> parameters() {
-  const FilterOptions defaults;
-  return {{.name = "alpha",
-           .default_value = defaults.alpha,
-           .help = "how much style: 0 none, 1 as trained, 2 twice as much, -1 the opposite",
-           .min = -kMaxAlpha,
-           .max = kMaxAlpha,
-           .live = true},
-          {.name = "alpha_slew_per_s",
-           .default_value = defaults.alpha_slew_per_s,
-           .help = "how fast alpha moves to a new value",
-           .min = 0.01,
-           .max = 1000.0,
-           .live = true},
-          {.name = "gate",
-           .default_value = defaults.gate,
-           .help = "fade the style out where the model does not know the motion",
-           .live = true},
-          {.name = "gate_fallback",
-           .default_value = defaults.gate_fallback,
-           .help = "what the gate fades to: 0 the input, 1 the model's constant part",
-           .min = 0.0,
-           .max = 1.0,
-           .live = true},
-          {.name = "calibrate",
-           .default_value = defaults.calibrate,
-           .help = "the older name of warm_up_s = 10",
-           .live = true},
-          {.name = "auto_alpha",
-           .default_value = defaults.auto_alpha,
-           .help = "less style for a walker who shows it already",
-           .live = true},
-          {.name = "warm_up_s",
-           .default_value = 0.0,
-           .help = "measure the walker's own neutral pose so long at the start; 0: do not",
-           .min = 0.0,
-           .max = kLongestWarmUp_s},
-          {.name = "neutral",
-           .default_value = std::string(),
-           .is_path = true,
-           .help = "a clip of the walker's usual walk, in the place of a warm-up: .bvh or .amc"},
-          {.name = "weights",
-           .default_value = std::string(),
-           .help = "how much of each style of the model: \"feminine=0.6,elderly=0.4\"; empty: the"
-                   " first alone",
-           .live = true},
-          {.name = "mask",
-           .default_value = std::string(),
-           .help = "how much of the style parts of the body get: \"arms=0.5,head=0\"; the rest 1",
-           .live = true}};
 }
 
 // In the order of StyleFilter::Reading.
@@ -301,7 +237,7 @@ Result<std::optional<StageType::FirstCommand>> first_command(const Parameters& p
 const StageType& style_type() {
   static const StageType type{.name = "style",
                               .summary = "changes the style of every pose, as a trained model says",
-                              .parameters = parameters(),
+                              .parameters = StyleFilter::table().specs(),
                               .check = check,
                               .make = make,
                               .model_required = true,

@@ -4,7 +4,7 @@
 #include "models/motion/canonical_skeleton.hpp"
 #include "models/motion/kinematics.hpp"
 #include "models/motion/synthetic_walker.hpp"
-#include "models/retarget/retarget_type.hpp"
+#include "models/retarget/retarget_stage.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/last_frame.hpp"

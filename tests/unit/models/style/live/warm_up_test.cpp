@@ -14,6 +14,7 @@
 #include "models/style/live/walker_command.hpp"
 #include "posed/v1/log.pb.h"
 #include "tests/support/last_frame.hpp"
+#include "tests/support/parameter_index.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
@@ -227,7 +228,7 @@ TEST_CASE("alpha acts while auto-alpha does not know how much the walker shows",
   WarmedToy toy(ready.get());
   toy.walk(90);
   REQUIRE(toy.filter.alpha() == 1.0F);
-  toy.filter.set(style::StyleFilter::kAutoAlpha, 1.0);
+  toy.filter.set(test::parameter_index(style::style_type(), "auto_alpha"), 1.0);
   const auto next = warm_bound(gated_toy_model(2));
   toy.filter.use(*next);  // forgets the estimate
   REQUIRE(std::isnan(toy.filter.reading(style::StyleFilter::kStyleEstimate)));
@@ -266,11 +267,11 @@ TEST_CASE("a walker stays known when a model with other mean rotations is swappe
 TEST_CASE("calibrate is a warm-up by an older name", "[style]") {
   const auto ready = warm_bound(gated_toy_model(1));
   WarmedToy toy(ready.get());
-  toy.filter.set(style::StyleFilter::kCalibrate, 1.0);
+  toy.filter.set(test::parameter_index(style::style_type(), "calibrate"), 1.0);
   toy.walk(60 * 11);
   REQUIRE(toy.filter.walker());
   CHECK(toy.notices() == std::vector<std::size_t>{WalkerWatch::kWarmedUp, WalkerWatch::kOldKey});
-  toy.filter.set(style::StyleFilter::kCalibrate, 0.0);
+  toy.filter.set(test::parameter_index(style::style_type(), "calibrate"), 0.0);
   CHECK_FALSE(toy.filter.walker());
 }
 

@@ -1,4 +1,4 @@
-#include "models/retarget/retarget_type.hpp"
+#include "models/retarget/retarget_stage.hpp"
 
 #include <string>
 #include <string_view>
@@ -6,13 +6,27 @@
 
 #include "models/motion/canonical_skeleton.hpp"
 #include "models/motion/retarget.hpp"
-#include "models/retarget/retarget_stage.hpp"
 #include "proto/clip/text_clip.hpp"
 
 namespace posed::retarget {
 namespace {
 
 constexpr std::string_view kHumanoid = "humanoid";
+
+class RetargetStage final : public Stage {
+ public:
+  explicit RetargetStage(motion::Retarget retarget) : retarget_(std::move(retarget)) {}
+
+  // The variance of the pose is not carried over: it belongs to the source's channels. RT-safe.
+  void process(const StageFrame& in, StageOut& out) noexcept override {
+    retarget_.apply(in.frame, frame_);
+    out.frame({.frame = frame_, .variance_rad2 = {}, .input = in.input});
+  }
+
+ private:
+  motion::Retarget retarget_;
+  Frame frame_;  // the last one: the next one's angles stay near to it
+};
 
 Result<std::shared_ptr<const Skeleton>> target(const StageContext& context) {
   const auto& to = parameter<std::string>(context.parameters, "to");
