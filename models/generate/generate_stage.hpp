@@ -66,7 +66,7 @@ class GenerateStage final : public Stage {
   [[nodiscard]] std::span<double> used(std::vector<double>& values) const noexcept {
     return std::span(values).first(static_cast<std::size_t>(pose_channels_->count()));
   }
-  // Of the frame that goes out.
+  // Variances of the frame that goes out.
   [[nodiscard]] std::span<const double> variance_rad2() const noexcept {
     return std::span(variance_rad2_).first(channels_);
   }
@@ -79,8 +79,8 @@ class GenerateStage final : public Stage {
   const BoundModel* model_;
   const gesture::PoseChannels* pose_channels_ = nullptr;  // null: a body without a model
   Elapsed elapsed_;
-  motion::LiveHeading heading_;  // of a body
-  std::int64_t period_ns_;       // of a performance that goes on in silence
+  motion::LiveHeading heading_;  // used for a body
+  std::int64_t period_ns_;       // between frames performed in silence
   std::int64_t last_heard_ns_ = kNoTime_ns;
   std::int64_t last_tick_ns_ = kNoTime_ns;  // in this silence
   int entered_ = 0;                         // frames that wait in the smoother

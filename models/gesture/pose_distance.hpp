@@ -8,7 +8,7 @@
 
 namespace posed::gesture {
 
-// Squared differences, and how many they are.
+// A sum of squared differences, and the number of its terms.
 struct Apart {
   double squares_rad2 = 0.0;
   int count = 0;
@@ -20,11 +20,11 @@ struct Apart {
   [[nodiscard]] double rms_rad() const;  // 0 without any
 };
 
-// In one group: of a hand the difference of each angle, of a body the angle between each joint's
-// two rotations. Poses are [channel], rad.
+// The distance in one group: for a hand the differences of its angles, for a body the angles
+// between each joint's two rotations. Poses are [channel], rad.
 [[nodiscard]] Apart apart(const Vocabulary& vocabulary, const ChannelGroup& group,
                           std::span<const double> a, std::span<const double> b);
-// In all groups.
+// The distance in all groups together.
 [[nodiscard]] Apart apart(const Vocabulary& vocabulary, std::span<const double> a,
                           std::span<const double> b);
 

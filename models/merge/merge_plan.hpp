@@ -35,7 +35,7 @@ struct MergePlan {
     HandMap map;
   };
 
-  // The angles of a joint of the hands, in Frame::angle_rad.
+  // Where the angles of a joint of the hands are in Frame::angle_rad.
   struct JointAngles {
     std::size_t joint = 0, first = 0, count = 0;
   };
@@ -57,7 +57,7 @@ struct MergePlan {
   void remove_unknown_angles(Frame& frame) const noexcept;
 };
 
-// Of the parameter `wrist`; empty for an unknown word.
+// The value of the parameter `wrist`; empty for an unknown word.
 [[nodiscard]] std::optional<Wrist> wrist_from_name(std::string_view name);
 
 }  // namespace posed::merge

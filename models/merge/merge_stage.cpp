@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -60,6 +61,7 @@ void MergeStage::process(const StageFrame& in, StageOut& out) noexcept {
     if (track) track->begin(now_ns);
   }
   if (count_ == kMaxWaiting) release(now_ns, out);
+  assert(count_ < kMaxWaiting);
   waiting_[(first_ + count_) % kMaxWaiting] = in.frame;
   ++count_;
   release_ready(now_ns, out);
@@ -109,6 +111,7 @@ void MergeStage::release_ready(std::int64_t now_ns, StageOut& out) noexcept {
 
 // The oldest frame goes out with what is known of the hands at its time. RT-safe.
 void MergeStage::release(std::int64_t now_ns, StageOut& out) noexcept {
+  assert(count_ > 0);
   const Frame& body = waiting_[first_];
   plan_.expand(body, merged_);
   const std::int64_t time_ns = time_of(body.header);

@@ -22,7 +22,8 @@ struct StyleScore {
   double component_rms_deg = 0.0;
   double source_component_rms_deg = 0.0;
   double source_period_s = 0.0, target_period_s = 0.0;
-  // Of the feet (models/feet/foot_score.hpp). Empty where nothing stands or there are no legs.
+  // Scores of the feet (models/feet/foot_score.hpp); empty where nothing stands or there are no
+  // legs.
   struct Clips {
     std::optional<double> source{}, styled{}, target{};
   };

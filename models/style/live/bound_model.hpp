@@ -28,10 +28,10 @@ struct BoundModel final : StageModel {
   // Mutable, because it keeps the mixture of styles ready that the filter asks for. With several
   // styles a model therefore serves one filter at a time at its full speed.
   mutable gp::Predictor predictor;
-  Eigen::VectorXf limit_rad;         // [dims]
-  Eigen::VectorXf neutral;           // [dims]; empty: a model without gate data
-  std::optional<KnownMotion> known;  // the same
-  Eigen::VectorXf axis;              // [dims]; empty: a model without a style axis
+  Eigen::VectorXf limit_rad;           // [dims]
+  Eigen::VectorXf neutral;             // [dims]; empty: a model without gate data
+  std::optional<TrainedMotion> known;  // the same
+  Eigen::VectorXf axis;                // [dims]; empty: a model without a style axis
   double axis_offset = 0.0;
   std::vector<Eigen::VectorXf> more_limits_rad;  // of the others
   std::vector<BodyPart> parts;                   // [dims]

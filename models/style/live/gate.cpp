@@ -31,7 +31,7 @@ double rise(double value, double low, double high) noexcept {
 }  // namespace
 
 // RT-safe
-void Gate::update(const KnownMotion* known, bool on, const Frame& frame, std::span<const float> q,
+void Gate::update(const TrainedMotion* known, bool on, const Frame& frame, std::span<const float> q,
                   std::span<const std::uint8_t> available, const std::optional<Walker>& walker,
                   double dt_s) noexcept {
   wanted_ = 1.0;
@@ -46,7 +46,7 @@ void Gate::update(const KnownMotion* known, bool on, const Frame& frame, std::sp
 }
 
 // RT-safe
-void Gate::see_pose(const KnownMotion& known, std::span<const float> q,
+void Gate::see_pose(const TrainedMotion& known, std::span<const float> q,
                     std::span<const std::uint8_t> available, bool is_own, double dt_s) noexcept {
   speed_.update(known, q, available, dt_s);
   const double distance_deg = known.distance_deg(q, available);
@@ -57,7 +57,7 @@ void Gate::see_pose(const KnownMotion& known, std::span<const float> q,
 }
 
 // How far the legs stride as in training; all the way where that cannot be told. RT-safe
-void Gate::see_legs(const KnownMotion& known, const Frame& frame,
+void Gate::see_legs(const TrainedMotion& known, const Frame& frame,
                     const std::optional<Walker>& walker, double dt_s) noexcept {
   if (!known.legs()) of_legs_ = 1.0;
   if (!known.legs() || !known.legs()->measured(frame)) return;
@@ -88,7 +88,7 @@ void Gate::see_legs(const KnownMotion& known, const Frame& frame,
 }
 
 // 1 where legs or body rest. RT-safe
-double Gate::of_rest(const KnownMotion& known) const noexcept {
+double Gate::of_rest(const TrainedMotion& known) const noexcept {
   const double swing =
       rise(stride_.swing_rad(), kRest * known.swing_rad(), kSwing * known.swing_rad());
   const double speed_deg_s = speed_.value_deg_s();
@@ -99,7 +99,7 @@ double Gate::of_rest(const KnownMotion& known) const noexcept {
 // 1 where the legs run and did not in training: they are quicker, or the pelvis is higher while
 // they are apart. `cadence` is in shares of a usual one. The very poses of training are none of a
 // run. RT-safe
-double Gate::of_run(const KnownMotion& known, double cadence) const noexcept {
+double Gate::of_run(const TrainedMotion& known, double cadence) const noexcept {
   const double taught = known.gait_correlation();
   const double higher = gait_.correlation() - std::max(taught, kWalk);
   if (!std::isnan(taught) && !std::isnan(higher)) cadence += kOfGait * higher;

@@ -20,7 +20,8 @@ class StyleEstimate {
   struct Part {
     double sum_s = 0.0, time_s = 0.0;
   };
-  // Of the last second, in a ring; whole frames, so that slow streams have a second, too.
+  // The parts of the last second, in a ring; each holds whole frames, so that slow streams have a
+  // second, too.
   std::array<Part, 64> parts_{};
   std::size_t oldest_ = 0, count_ = 0;
   Part all_;

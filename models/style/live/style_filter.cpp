@@ -1,12 +1,13 @@
 #include "models/style/live/style_filter.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <span>
 #include <utility>
 
-#include "models/style/live/walker_command.hpp"
+#include "models/style/live/warm_up.hpp"
 #include "proto/frame/rotation.hpp"
 #include "proto/frame/skeleton.hpp"
 
@@ -41,10 +42,10 @@ StyleFilter::StyleFilter(const BoundModel* model, const FilterOptions& options) 
     : model_(model), options_(options) {
   options_.alpha_slew_per_s = std::clamp(options.alpha_slew_per_s, 1e-3, 1e6);
   set_alpha(static_cast<float>(options.alpha));
-  watch_.set_auto_alpha(options.auto_alpha);
+  tracker_.set_auto_alpha(options.auto_alpha);
   missing_ = options.auto_alpha ? 0.0 : 1.0;
-  watch_.set_gate(options.gate);
-  if (options.calibrate) watch_.tell(WalkerWatch::kOldKey);
+  tracker_.set_gate(options.gate);
+  if (options.calibrate) tracker_.tell(WalkerTracker::kOldKey);
   mask_.begin(options.mask);
   if (model == nullptr) return;
   weights_.begin(
@@ -70,8 +71,9 @@ bool StyleFilter::set_shares(const Shares& shares) noexcept {
 
 // RT-safe
 const BoundModel* StyleFilter::set_model(const BoundModel* model) noexcept {
+  assert(model != nullptr);
   discontinuity_ = true;
-  watch_.exchange(model_, *model);
+  tracker_.exchange(model_, *model);
   if (model_ == nullptr) {
     weights_.begin(first_alone(model->styles().size()));
   } else {
@@ -163,11 +165,11 @@ float StyleFilter::alpha() const noexcept { return static_cast<float>(alpha_); }
 
 // Off: the walker is forgotten. RT-safe
 void StyleFilter::set_calibrate(double on) noexcept {
-  watch_.tell(WalkerWatch::kOldKey);
+  tracker_.tell(WalkerTracker::kOldKey);
   if (on != 0.0) {
-    static_cast<void>(watch_.warm_up(model_, kUsualWarmUp_s));
-  } else if (watch_.walker()) {
-    watch_.set_walker({});
+    static_cast<void>(tracker_.warm_up(model_, kUsualWarmUp_s));
+  } else if (tracker_.walker()) {
+    tracker_.set_walker({});
     discontinuity_ = true;
   }
 }
@@ -176,14 +178,14 @@ void StyleFilter::set_calibrate(double on) noexcept {
 bool StyleFilter::command(std::size_t index, const StageCommand& command) noexcept {
   switch (index) {
     case kWarmUp:
-      return watch_.warm_up(model_, command.as<double>());
+      return tracker_.warm_up(model_, command.as<double>());
     case kWeights:
       return set_shares(command.as<Shares>());
     case kMask:
       set_mask(command.as<Mask>());
       return true;
     case kNeutral:
-      if (!watch_.know(model_, walker_of(command))) return false;
+      if (!tracker_.know(model_, walker_of(command))) return false;
       discontinuity_ = true;
       return true;
     default:
@@ -202,14 +204,14 @@ double StyleFilter::wanted_alpha() const noexcept { return alpha_target_ * missi
 // While nothing is known of how much the walker shows, it stays as it was. RT-safe
 void StyleFilter::find_missing() noexcept {
   const bool told = options_.auto_alpha && model_ != nullptr && model_->axis.size() > 0;
-  const double shown = told ? watch_.estimate() : 0.0;
+  const double shown = told ? tracker_.estimate() : 0.0;
   if (!std::isnan(shown)) missing_ = std::clamp(1.0 - shown, 0.0, 1.0);
 }
 
 // RT-safe
 double StyleFilter::gate() const noexcept {
   const bool gated = options_.gate && model_ != nullptr && model_->known;
-  return gated ? static_cast<double>(watch_.open()) : kUnknownReading;
+  return gated ? static_cast<double>(tracker_.open()) : kUnknownReading;
 }
 
 // RT-safe
@@ -218,7 +220,7 @@ double StyleFilter::reading(std::size_t reading) const noexcept {
 }
 
 void StyleFilter::settle(const Frame& frame, double heading_rad) noexcept {
-  watch_.settle();
+  tracker_.settle();
   find_missing();
   alpha_ = wanted_alpha();
   const bool has_heading = model_ != nullptr && model_->space.has_heading(frame);
@@ -263,8 +265,8 @@ bool StyleFilter::read_pose(const Frame& frame, double dt_s, Pose& pose) noexcep
   const auto dims = static_cast<std::size_t>(model_->space.dims());
   model_->space.to_vector(frame, heading_.value_rad(), {pose.q.data(), dims},
                           {pose.available.data(), dims});
-  return watch_.see(*model_, frame, {pose.q.data(), dims}, {pose.available.data(), dims}, gap_s_,
-                    dt_s, {pose.input.data(), dims});
+  return tracker_.see(*model_, frame, {pose.q.data(), dims}, {pose.available.data(), dims}, gap_s_,
+                      dt_s, {pose.input.data(), dims});
 }
 
 // RT-safe
@@ -314,7 +316,7 @@ void StyleFilter::answer(const Pose& pose, Dims& delta) noexcept {
   const auto dims = static_cast<std::size_t>(predictor.inputs());
   predictor.mean({pose.input.data(), dims}, {pose.available.data(), dims}, {delta.data(), dims},
                  shares_to_ask());
-  const float open = watch_.open();
+  const float open = tracker_.open();
   if (open < 1.0F) {
     const float rest = (1.0F - open) * static_cast<float>(options_.gate_fallback);
     Dims constant;

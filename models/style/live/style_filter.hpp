@@ -84,20 +84,20 @@ class StyleFilter final : public Stage {
   // How much the gate passes, 0 to 1; NaN while it is off or the model has no data for it. RT-safe.
   [[nodiscard]] double gate() const noexcept;
   // How much of the style the walker shows already; NaN: unknown. RT-safe.
-  [[nodiscard]] double estimate() const noexcept { return watch_.estimate(); }
+  [[nodiscard]] double estimate() const noexcept { return tracker_.estimate(); }
   // Offline: the walker is known from elsewhere; what a warm-up has found.
-  void set_walker(const Walker& walker) noexcept { watch_.set_walker(walker); }
-  [[nodiscard]] const std::optional<Walker>& walker() const noexcept { return watch_.walker(); }
+  void set_walker(const Walker& walker) noexcept { tracker_.set_walker(walker); }
+  [[nodiscard]] const std::optional<Walker>& walker() const noexcept { return tracker_.walker(); }
 
-  // Readings, notices and commands, as style_type() numbers them (notices: WalkerWatch). RT-safe.
+  // Readings, notices and commands, as style_type() numbers them (notices: WalkerTracker). RT-safe.
   enum Reading : std::size_t { kStyleEstimate, kStyleGate };
   [[nodiscard]] double reading(std::size_t reading) const noexcept override;
   [[nodiscard]] std::optional<StageNotice> take_notice() noexcept override {
-    return watch_.take_notice();
+    return tracker_.take_notice();
   }
   enum Command : std::size_t { kWarmUp, kWeights, kMask, kNeutral };
   [[nodiscard]] bool command(std::size_t index, const StageCommand& command) noexcept override;
-  void flush(StageOut& /*out*/) noexcept override { watch_.interrupt(); }
+  void flush(StageOut& /*out*/) noexcept override { tracker_.interrupt(); }
 
   // The parameters, as style_type() numbers them. set() and state() are RT-safe.
   using Table = ParameterTable<FilterOptions, StyleFilter>;
@@ -137,9 +137,9 @@ class StyleFilter final : public Stage {
   void answer(const Pose& pose, Dims& delta) noexcept;
   void set_alpha_number(double value) noexcept { set_alpha(static_cast<float>(value)); }
   [[nodiscard]] ParameterState alpha_state() const noexcept { return {alpha_, wanted_alpha()}; }
-  void set_gate(double on) noexcept { watch_.set_gate(on != 0.0); }
+  void set_gate(double on) noexcept { tracker_.set_gate(on != 0.0); }
   void set_gate_fallback(double value) noexcept;
-  void set_auto_alpha(double on) noexcept { watch_.set_auto_alpha(on != 0.0); }
+  void set_auto_alpha(double on) noexcept { tracker_.set_auto_alpha(on != 0.0); }
   void find_missing() noexcept;
   [[nodiscard]] double wanted_alpha() const noexcept;
   void set_calibrate(double on) noexcept;
@@ -159,7 +159,7 @@ class StyleFilter final : public Stage {
   Elapsed elapsed_;
   motion::LiveHeading heading_;
   double gap_s_ = 0.0;  // between the last two frames
-  WalkerWatch watch_;
+  WalkerTracker tracker_;
 
   // The blend: R_out = R_styled exp(weight c) per joint.
   bool discontinuity_ = false;  // the next frame begins a blend

@@ -6,7 +6,7 @@
 
 #include "models/style/live/apply.hpp"
 #include "models/style/live/style_filter.hpp"
-#include "models/style/live/walker_command.hpp"
+#include "models/style/live/warm_up.hpp"
 #include "models/style/model/style_model.hpp"
 #include "posed/v1/log.pb.h"
 #include "posed/v1/model.pb.h"
@@ -126,7 +126,7 @@ std::vector<StageReadingType> readings() {
           {.name = "style_gate", .help = "1 where the model knows the motion, 0 passed through"}};
 }
 
-// In the order of WalkerWatch::Notice.
+// In the order of WalkerTracker::Notice.
 std::vector<StageNoticeType> notices() {
   return {
       {.sentence = "the model has no data for gate, warm-up and auto-alpha, so any motion is "

@@ -35,7 +35,7 @@ struct Shares {
 // Whether it can be right for any model: what does not need the styles' names. Cold.
 [[nodiscard]] Result<> check_weights(std::string_view weights);
 
-// The same as text: "feminine=0.6,elderly=0.4". RT-safe.
+// Writes shares as text: "feminine=0.6,elderly=0.4". RT-safe.
 void describe_shares(const Shares& shares, std::span<const std::string> styles,
                      ShortText& text) noexcept;
 

@@ -20,7 +20,7 @@ Eigen::MatrixXd kept_poses(const gp::Trained& process, int limit) {
 
 }  // namespace
 
-KnownMotion::KnownMotion(const StyleModel& model, const Skeleton& skeleton)
+TrainedMotion::TrainedMotion(const StyleModel& model, const Skeleton& skeleton)
     : joints_(static_cast<double>(model.space.joints.size())),
       swing_rad_(model.gate.swing_rad),
       cadence_rad_s_(model.gate.strides() ? 2.0 * std::numbers::pi / model.gate.fastest_stride_s
@@ -40,8 +40,8 @@ KnownMotion::KnownMotion(const StyleModel& model, const Skeleton& skeleton)
 }
 
 // Of the squares' sum over the available dimensions. RT-safe
-double KnownMotion::rms_deg(float sum_rad2,
-                            std::span<const std::uint8_t> available) const noexcept {
+double TrainedMotion::rms_deg(float sum_rad2,
+                              std::span<const std::uint8_t> available) const noexcept {
   double there = 0.0;
   for (const std::uint8_t one : available) there += one != 0 ? 1.0 : 0.0;
   if (there == 0.0) return std::numeric_limits<double>::quiet_NaN();
@@ -51,8 +51,8 @@ double KnownMotion::rms_deg(float sum_rad2,
 }
 
 // RT-safe
-double KnownMotion::distance_deg(std::span<const float> q,
-                                 std::span<const std::uint8_t> available) const noexcept {
+double TrainedMotion::distance_deg(std::span<const float> q,
+                                   std::span<const std::uint8_t> available) const noexcept {
   const auto dims = static_cast<Eigen::Index>(q.size());
   Block nearest = Block::Constant(std::numeric_limits<float>::infinity());
   for (Eigen::Index first = 0; first < poses_.cols(); first += dims) {
@@ -67,8 +67,8 @@ double KnownMotion::distance_deg(std::span<const float> q,
 }
 
 // RT-safe
-double KnownMotion::turn_deg(std::span<const float> from, std::span<const float> to,
-                             std::span<const std::uint8_t> available) const noexcept {
+double TrainedMotion::turn_deg(std::span<const float> from, std::span<const float> to,
+                               std::span<const std::uint8_t> available) const noexcept {
   float sum = 0.0F;
   for (std::size_t d = 0; d < from.size(); ++d) {
     if (available[d] != 0) sum += (to[d] - from[d]) * (to[d] - from[d]);
@@ -77,7 +77,7 @@ double KnownMotion::turn_deg(std::span<const float> from, std::span<const float>
 }
 
 // RT-safe
-double KnownMotion::height_m(const Frame& frame) const noexcept {
+double TrainedMotion::height_m(const Frame& frame) const noexcept {
   return frame.valid[root_joint_] ? static_cast<double>(frame.root_position_m[1])
                                   : std::numeric_limits<double>::quiet_NaN();
 }

@@ -1,5 +1,6 @@
-// KnownMotion: what a model knows of motion, bound to one skeleton: how far a pose is from the
-// nearest one of training, and how the legs strode there (README.md, "Gate"). Const and shareable.
+// TrainedMotion: the motion that a model was trained on, bound to one skeleton: how far a pose is
+// from the nearest one of training, and how the legs strode there (README.md, "Gate"). Const and
+// shareable.
 #pragma once
 
 #include <cstdint>
@@ -13,10 +14,10 @@
 
 namespace posed::style {
 
-class KnownMotion {
+class TrainedMotion {
  public:
   // For a model with gate data (GateData::present()) whose parts fit each other. Cold.
-  KnownMotion(const StyleModel& model, const Skeleton& skeleton);
+  TrainedMotion(const StyleModel& model, const Skeleton& skeleton);
 
   // From q [dims] to the nearest of the kept training poses: the rotation, rms over joints [deg].
   // Missing dimensions count as those that are there; NaN where none is. RT-safe.

@@ -13,11 +13,11 @@ constexpr double kInterruption_s = 1.0;  // of the frames
 }  // namespace
 
 // RT-safe
-bool WalkerWatch::see(const BoundModel& model, const Frame& frame, std::span<const float> q,
-                      std::span<const std::uint8_t> available, double gap_s, double dt_s,
-                      std::span<float> input) noexcept {
+bool WalkerTracker::see(const BoundModel& model, const Frame& frame, std::span<const float> q,
+                        std::span<const std::uint8_t> available, double gap_s, double dt_s,
+                        std::span<float> input) noexcept {
   tell_what_is_missing(model);
-  const KnownMotion* const known = model.known ? &*model.known : nullptr;
+  const TrainedMotion* const known = model.known ? &*model.known : nullptr;
   relate(model, q, input);
   gate_.update(known, gate_on_, frame, input, available, walker_, dt_s);
   const bool jumped = measure(model, q, available, gap_s, dt_s);
@@ -26,15 +26,15 @@ bool WalkerWatch::see(const BoundModel& model, const Frame& frame, std::span<con
 }
 
 // Once a model. RT-safe
-void WalkerWatch::tell_what_is_missing(const BoundModel& model) noexcept {
+void WalkerTracker::tell_what_is_missing(const BoundModel& model) noexcept {
   if (gate_on_ && !model.known && !std::exchange(told_no_gate_, true)) tell(kNoGateData);
   const bool no_axis = model.axis.size() == 0;
   if (auto_alpha_ && no_axis && !std::exchange(told_no_axis_, true)) tell(kNoAxis);
 }
 
 // RT-safe
-void WalkerWatch::relate(const BoundModel& model, std::span<const float> q,
-                         std::span<float> input) const noexcept {
+void WalkerTracker::relate(const BoundModel& model, std::span<const float> q,
+                           std::span<float> input) const noexcept {
   for (std::size_t d = 0; d < q.size(); ++d) {
     input[d] = q[d];
     if (!walker_ || walker_->measured[d] == 0 || model.neutral.size() == 0) continue;
@@ -43,9 +43,9 @@ void WalkerWatch::relate(const BoundModel& model, std::span<const float> q,
 }
 
 // The warm-up and the estimate. Returns whether a warm-up has ended well. RT-safe
-bool WalkerWatch::measure(const BoundModel& model, std::span<const float> q,
-                          std::span<const std::uint8_t> available, double gap_s,
-                          double dt_s) noexcept {
+bool WalkerTracker::measure(const BoundModel& model, std::span<const float> q,
+                            std::span<const std::uint8_t> available, double gap_s,
+                            double dt_s) noexcept {
   const bool walks = gate_.strides();
   const bool all = std::ranges::all_of(available, [](std::uint8_t one) { return one != 0; });
   if (model.axis.size() > 0 && walks && all) {
@@ -71,7 +71,7 @@ bool WalkerWatch::measure(const BoundModel& model, std::span<const float> q,
 }
 
 // Whether a walker can be known with this model. RT-safe
-bool WalkerWatch::serves(const BoundModel* model) noexcept {
+bool WalkerTracker::serves(const BoundModel* model) noexcept {
   if (model == nullptr) return false;
   // Nobody hears the answer to what the config asks for.
   if (!model->known && !std::exchange(told_no_gate_, true)) tell(kNoGateData);
@@ -79,14 +79,14 @@ bool WalkerWatch::serves(const BoundModel* model) noexcept {
 }
 
 // RT-safe
-bool WalkerWatch::warm_up(const BoundModel* model, double seconds) noexcept {
+bool WalkerTracker::warm_up(const BoundModel* model, double seconds) noexcept {
   if (!serves(model)) return false;
   warm_up_.begin(seconds);
   return true;
 }
 
 // RT-safe
-bool WalkerWatch::know(const BoundModel* model, const Walker& walker) noexcept {
+bool WalkerTracker::know(const BoundModel* model, const Walker& walker) noexcept {
   if (!serves(model)) return false;
   warm_up_.stop();
   walker_ = walker;
@@ -94,13 +94,13 @@ bool WalkerWatch::know(const BoundModel* model, const Walker& walker) noexcept {
 }
 
 // RT-safe
-void WalkerWatch::interrupt() noexcept {
+void WalkerTracker::interrupt() noexcept {
   if (warm_up_.running()) tell(kInterrupted);
   warm_up_.stop();
 }
 
 // RT-safe
-void WalkerWatch::exchange(const BoundModel* from, const BoundModel& to) noexcept {
+void WalkerTracker::exchange(const BoundModel* from, const BoundModel& to) noexcept {
   interrupt();
   estimate_.forget();
   told_no_gate_ = false;
@@ -117,7 +117,7 @@ void WalkerWatch::exchange(const BoundModel* from, const BoundModel& to) noexcep
 }
 
 // RT-safe
-std::optional<StageNotice> WalkerWatch::take_notice() noexcept {
+std::optional<StageNotice> WalkerTracker::take_notice() noexcept {
   if (untold_ == 0) return std::nullopt;
   const auto next = static_cast<std::size_t>(std::countr_zero(untold_));
   untold_ &= untold_ - 1;

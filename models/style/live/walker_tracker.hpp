@@ -1,6 +1,6 @@
-// WalkerWatch: what the style stage finds out about its walker: whether the model knows the motion
-// (gate), the walker's own neutral pose (warm-up), and how much of the style it shows already.
-// README.md has a section on each. State of one stream. RT-safe.
+// WalkerTracker: what the style stage measures of its walker: whether the model knows the
+// motion (gate), the walker's own neutral pose (warm-up), and how much of the style it shows
+// already. README.md has a section on each. State of one stream. RT-safe.
 #pragma once
 
 #include <array>
@@ -16,9 +16,9 @@
 
 namespace posed::style {
 
-class WalkerWatch {
+class WalkerTracker {
  public:
-  // What people are told, as style_type() numbers it.
+  // The notices, in the order of style_type().
   enum Notice : std::size_t {
     kNoGateData,
     kWarmedUp,
@@ -29,7 +29,7 @@ class WalkerWatch {
     kNoAxis
   };
 
-  // Takes a frame's q, `gap_s` after the last one, of which `dt_s` count, and writes what the
+  // Advances by a frame's q, `gap_s` after the last one, of which `dt_s` count, and writes what the
   // kernel shall see of it: q as if the walker's neutral pose were the training's. Returns whether
   // that has changed suddenly.
   bool see(const BoundModel& model, const Frame& frame, std::span<const float> q,

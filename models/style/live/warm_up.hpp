@@ -5,13 +5,19 @@
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 
 #include "models/motion/pose_space.hpp"
+#include "models/stage.hpp"
+
+namespace posed::v1 {
+class DecisionValue;
+}  // namespace posed::v1
 
 namespace posed::style {
 
-// What a warm-up has found, in the pose space of a model.
+// How somebody walks, as a warm-up measures it, in the pose space of a model.
 struct Walker {
   std::array<float, motion::kMaxPoseDims> neutral{};          // mean of q [dims]
   std::array<std::uint8_t, motion::kMaxPoseDims> measured{};  // 0: this joint was never measured
@@ -41,5 +47,16 @@ class WarmUp {
   double turned_rad_ = 0.0, turned_s_ = 0.0;
   Sums sum_{}, time_s_{};
 };
+
+// A walker as a command of the style stage, and as the device log keeps that command: so a walker
+// that is known from a clip (parameter `neutral`) replays like one that was warmed up live.
+// Rounds angles to 1e-4 rad, because a command is small. Angles are those of q, within +-pi. Cold.
+[[nodiscard]] StageCommand command_of(const Walker& walker) noexcept;
+// RT-safe.
+[[nodiscard]] Walker walker_of(const StageCommand& command) noexcept;
+
+void walker_to_log(const StageCommand& command, v1::DecisionValue& value);
+// Empty for a value that walker_to_log() cannot have written.
+[[nodiscard]] std::optional<StageCommand> walker_from_log(const v1::DecisionValue& value);
 
 }  // namespace posed::style

@@ -27,7 +27,8 @@ struct MoreStyle {
   Eigen::VectorXd limit_rad;
 };
 
-// What tells a motion that the model knows from another: README.md, "Gate" and "Warm-up".
+// Data by which the gate and the warm-up recognise a motion that the model knows (README.md, "Gate"
+// and "Warm-up").
 struct GateData {
   Eigen::VectorXd neutral{};  // mean pose of the source's neutral walk [dims]; empty: no gate data
   // LiveStride's, the least mean of a training clip, and the period of the fastest clip. Both are
@@ -69,8 +70,8 @@ struct StyleModel {
 [[nodiscard]] StyleModel mixture_of(const StyleModel& model, std::span<const double> shares);
 
 [[nodiscard]] Result<StyleModel> load_model(const std::filesystem::path& path);
-// The same from bytes (control message, device log). `name` is only for error messages. Any bytes
-// give a model or an Error, never a crash.
+// Reads a model as load_model() does, from bytes (control message, device log). `name` is only for
+// error messages. Any bytes give a model or an Error, never a crash.
 [[nodiscard]] Result<StyleModel> parse_model(std::span<const std::byte> bytes,
                                              const std::string& name);
 [[nodiscard]] std::string serialize_model(const StyleModel& model);

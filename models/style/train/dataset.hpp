@@ -10,7 +10,7 @@
 #include <Eigen/Core>
 
 #include "models/motion/pose_space.hpp"
-#include "models/style/train/mgpm_train.hpp"
+#include "models/style/train/mgpm.hpp"
 #include "models/tasks.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/frame/result.hpp"

@@ -88,8 +88,8 @@ Result<std::vector<gp::Trained>> fit_differences(std::span<const StylePairs> sty
   std::size_t poses = 0;
   for (const StylePairs& style : styles) {
     gp::FunctionData& function = functions.emplace_back();
-    for (const int take : style.takes) {
-      for (int i = 0; i < kGridFrames; ++i) function.rows.push_back(take * kGridFrames + i);
+    for (const int clip : style.clips) {
+      for (int i = 0; i < kGridFrames; ++i) function.rows.push_back(clip * kGridFrames + i);
     }
     function.Y = grid_outputs(style.pairs.outputs);
     function.offset = style.pairs.outputs.offset.transpose();

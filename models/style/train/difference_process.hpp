@@ -33,11 +33,11 @@ struct Outputs {
   Eigen::RowVectorXd offset;  // [D] the process's prior mean, which it gives far from all poses
 };
 
-// What a process learns from.
+// The data that a process is trained on.
 struct TrainingPairs {
   std::vector<Eigen::MatrixXd> inputs;  // cycles
   Outputs outputs;
-  bool follows_days = false;  // some outputs are those of a take's own day (days.hpp)
+  bool follows_days = false;  // some outputs are those of a clip's own day (recording_days.hpp)
 };
 
 // Length of the kernel [rad] and noise over signal variance.
@@ -73,14 +73,14 @@ struct Way {
 // noise relative to the signal variance; at most kMostPoses poses.
 [[nodiscard]] Result<gp::Trained> fit_difference(const TrainingPairs& pairs, const Kernel& kernel);
 
-// What one of several styles in one model is learnt from.
+// The training data of one of several styles in one model.
 struct StylePairs {
   TrainingPairs pairs;
-  std::vector<int> takes;  // whose cycles are its inputs, among all takes
+  std::vector<int> clips;  // whose cycles are its inputs, among all clips
 };
 
-// The same for several styles that share kernel and poses: each is learnt from its own pairs. The
-// poses are chosen among the `cycles` of all takes, as many as the largest style alone would have.
+// Fits several styles that share kernel and poses: each is trained on its own pairs. The
+// poses are chosen among the `cycles` of all clips, as many as the largest style alone would have.
 [[nodiscard]] Result<std::vector<gp::Trained>> fit_differences(
     std::span<const StylePairs> styles, const std::vector<Eigen::MatrixXd>& cycles,
     const Kernel& kernel);

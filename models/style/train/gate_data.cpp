@@ -10,8 +10,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "models/style/live/live_gait.hpp"
-#include "models/style/live/live_stride.hpp"
+#include "models/style/live/live_motion.hpp"
 #include "models/style/train/target_training.hpp"
 #include "models/style/train/training_check.hpp"
 #include "models/style/train/training_pairs.hpp"
@@ -41,12 +40,12 @@ std::vector<std::string> sources_of(const Dataset& dataset,
 
 // The mean pose of the source in the first motion that has it.
 VectorXd neutral_of(const Dataset& dataset, const std::vector<std::string>& targets) {
-  const auto takes = take_cycles(dataset);
+  const auto cycles = clip_cycles(dataset);
   VectorXd sum = VectorXd::Zero(dataset.dims());
   int count = 0;
   for (const std::string& group : sources_of(dataset, targets)) {
     for (const std::string& motion : dataset.motions) {
-      const MatrixXd cycle = group_cycle(dataset, takes, group, motion);
+      const MatrixXd cycle = group_cycle(dataset, cycles, group, motion);
       if (cycle.size() == 0) continue;
       sum += cycle.row(0).transpose();
       ++count;

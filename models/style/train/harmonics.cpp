@@ -1,6 +1,7 @@
 #include "models/style/train/harmonics.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -66,6 +67,7 @@ bool has_stride(int frames, double rate_hz) { return frames >= kShortestStride_s
 
 Stride find_stride(const VectorXd& signal, double rate_hz) {
   const auto frames = static_cast<int>(signal.size());
+  assert(has_stride(frames, rate_hz));
   const double longest = std::min(kLongestStride_s * rate_hz, static_cast<double>(frames));
   const double slowest = kTurn / longest;
   const double fastest = kTurn / (kShortestStride_s * rate_hz);

@@ -1,5 +1,5 @@
-// The choice of the kernel by what held-out walkers say: each fold asks a process that was learnt
-// without some takes for the difference on a take's own frames. The folds of one task, up
+// The choice of the kernel by its error on held-out walkers: each fold asks a process that was
+// trained without some clips for the difference on a clip's own frames. The folds of one task, up
 // to 8 of one length, share the kernel's factor (README.md, "Choice of the kernel"). Cold;
 // thread-safe.
 #pragma once
@@ -26,10 +26,10 @@ struct Fold {
   Eigen::MatrixXd goal{};     // the cycle that they should reach; empty: Way is not measured
 };
 
-// Who a fold asks, for people.
+// The walker that a fold asks, for the report.
 struct HeldOut {
   std::string file, person;
-  int takes = 0;  // that are not learnt from
+  int clips = 0;  // that are not learnt from
 };
 
 struct LeaveOut {
@@ -54,7 +54,7 @@ struct ChosenKernel {
   std::vector<std::vector<Way>> folds{};  // [style][fold]: of each walker held out
   std::vector<TriedKernel> tried{};       // all, in the order in which they were tried
 
-  // Of all walkers that were held out to learn one style.
+  // The distance summed over all walkers that were held out for one style.
   [[nodiscard]] Way way(std::size_t style) const;
 };
 

@@ -10,9 +10,14 @@
 // finite number of harmonics. Cold, double precision, no I/O, thread-safe (no shared state).
 #pragma once
 
+#include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <Eigen/Core>
+
+#include "models/tasks.hpp"
+#include "proto/frame/result.hpp"
 
 namespace posed::style {
 
@@ -68,5 +73,36 @@ struct CircularKernel {
 [[nodiscard]] Eigen::MatrixXd mgpm_cycle(const MgpmData& data, const MgpmParams& params,
                                          const Eigen::VectorXd& xi, const Eigen::VectorXd& theta,
                                          int harmonics);
+
+// Receives the fraction done, 0 to 1; returning false stops the training soon.
+using Progress = std::function<bool(double fraction)>;
+
+enum class MgpmStart : std::uint8_t { kSvd, kRandom };  // where the style points begin
+
+struct MgpmOptions {
+  int style_dims = 3;  // q; at most the number of subjects is used
+  std::vector<MgpmStart> starts{MgpmStart::kSvd, MgpmStart::kRandom};
+  std::uint64_t seed = 0;
+  TaskRunner* tasks = nullptr;  // each start is a task; not owned; null: one after another
+  Progress progress;            // may be empty
+};
+
+struct MgpmFit {
+  MgpmParams params;
+  MgpmPrior prior;
+  double nlp = 0.0;
+  Eigen::VectorXd scale;  // w
+  int harmonics = 10;     // that the kernel's series needs at this gamma
+  int evaluations = 0;
+};
+
+// Trains an MGPM from several starts, each optimised in two stages (README.md, "Optimisation").
+// Returns the fits of all starts, the best first; they depend on the data and the seed alone. The
+// common turn of all phases, which the likelihood leaves undetermined, is fixed by holding the
+// first clip's phase. The only error is that `progress` asked to stop.
+[[nodiscard]] Result<std::vector<MgpmFit>> mgpm_train(const MgpmData& data,
+                                                      const Eigen::VectorXd& theta0,
+                                                      const Eigen::VectorXd& dtheta,
+                                                      const MgpmOptions& options);
 
 }  // namespace posed::style

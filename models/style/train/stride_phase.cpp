@@ -1,6 +1,7 @@
 #include "models/style/train/stride_phase.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -170,6 +171,7 @@ VectorXd between(const std::vector<double>& at_places, Eigen::Index hop, Eigen::
 
 StridePhase follow_strides(const VectorXd& signal, double rate_hz) {
   const Eigen::Index frames = signal.size();
+  assert(has_stride(static_cast<int>(frames), rate_hz));
   const auto hop = std::max<Eigen::Index>(1, std::lround(kHop_s * rate_hz));
   const Chain chain(candidates_for(frames, rate_hz), signal, hop);
   const std::vector<double> places = chain.phases();

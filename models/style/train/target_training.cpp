@@ -26,10 +26,10 @@ Result<std::vector<gp::Trained>> fit_styles(const Dataset& all, const std::vecto
   std::vector<StylePairs> styles;
   styles.reserve(lessons.size());
   for (std::size_t i = 0; i < lessons.size(); ++i) {
-    styles.push_back({std::move(pairs[i]), lessons[i].takes});
+    styles.push_back({std::move(pairs[i]), lessons[i].clips});
   }
   std::vector<MatrixXd> cycles;
-  for (TakeCycle& take : take_cycles(all)) cycles.push_back(std::move(take.coefficients));
+  for (ClipCycle& clip : clip_cycles(all)) cycles.push_back(std::move(clip.coefficients));
   return fit_differences(styles, cycles, kernel);
 }
 
@@ -81,7 +81,7 @@ std::vector<Lesson> lessons_of(const Dataset& all, const std::vector<std::string
     for (int c = 0; c < std::ssize(all.clips); ++c) {
       const AlignedClip& clip = all.clips[c];
       if (clip.group != lesson.target && is_in(targets, clip.group)) continue;
-      lesson.takes.push_back(c);
+      lesson.clips.push_back(c);
       lesson.own.clips.push_back(clip);
     }
   }
@@ -94,7 +94,7 @@ Result<std::vector<Learnt>> learn_default(const Dataset& all, const std::vector<
   std::vector<LeaveOut> leave_outs;
   bool held_out = false;
   for (const Lesson& lesson : lessons) {
-    pairs.push_back(make_training_pairs(*lesson.data, take_cycles(*lesson.data), lesson.target));
+    pairs.push_back(make_training_pairs(*lesson.data, clip_cycles(*lesson.data), lesson.target));
     leave_outs.push_back(make_folds(*lesson.data, lesson.target));
     held_out = held_out || leave_outs.back().folds > 0;
     if (leave_outs.back().folds == 0) leave_outs.back().pairs = pairs.back();

@@ -1,5 +1,5 @@
-// The lessons of a training, one a target, and what is learnt from them: processes that share
-// kernel and poses (README.md, "Several styles"). Cold.
+// The data of a training by target, and the processes that are trained on them, which share kernel
+// and poses (README.md, "Several styles"). Cold.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@ namespace posed::style {
 
 [[nodiscard]] bool is_in(const std::vector<std::string>& names, const std::string& name);
 
-// Of one motion: the mean length of a stride.
+// The mean length of a stride of one motion.
 [[nodiscard]] int cycle_frames(const Dataset& dataset, const std::string& motion);
 
 // One of the styles of a model: its target, and the data without the clips of other targets.
@@ -21,7 +21,7 @@ struct Lesson {
   std::string target;
   Dataset own;                    // where there are other targets
   const Dataset* data = nullptr;  // `own`, or all
-  std::vector<int> takes;         // which clips of all are in it, where there are other targets
+  std::vector<int> clips;         // which clips of all are in it, where there are other targets
 };
 
 // The result borrows `all`.
@@ -34,8 +34,8 @@ struct Learnt {
   Eigen::MatrixXd differences;   // all differences in the training pairs [N x D]
   std::string length_chosen_by;  // "leave-out", "default" or "evidence"
   bool follows_days = false;
-  Way way{};  // of walkers held out; not measured where none could be held out
-  // The same, one by one, and all kernels that were tried on them; empty where none was held out.
+  Way way{};  // error on held-out walkers; unset if none could be held out
+  // That error for each walker, and all kernels that were tried; empty where none was held out.
   std::vector<HeldOut> held_out{};
   std::vector<Way> ways{};  // [held_out]
   std::vector<TriedKernel> tried{};

@@ -34,10 +34,10 @@ struct TrainOptions {
   std::function<void(const Findings&)> look{};  // called once, when all is learnt
 };
 
-// Several styles share the sources, the kernel and the poses; each is otherwise learnt as alone.
-// Clips that cannot be learnt from give an error of one sentence that names the clip. The report
-// (what `train --json` prints, without the seconds) is in the model; its `usable`, `problems`,
-// `warnings` and `verdict` state whether the model is fit for use (training_check.hpp).
+// Several styles share the sources, the kernel and the poses; otherwise each is trained
+// independently. Clips that cannot be learnt from give an error of one sentence that names the
+// clip. The report (what `train --json` prints, without the seconds) is in the model; its `usable`,
+// `problems`, `warnings` and `verdict` state whether the model is fit for use (training_check.hpp).
 [[nodiscard]] Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
                                              const TrainOptions& options);
 

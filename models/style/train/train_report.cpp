@@ -17,13 +17,13 @@ using nlohmann::json;
 
 // How much of the distance to the target the process closes on its own training clips.
 Way way_on_training(const Dataset& dataset, const Learnt& learnt, const std::string& target) {
-  const auto takes = take_cycles(dataset);
-  const auto differences = differences_of(dataset, takes, target);
+  const auto cycles = clip_cycles(dataset);
+  const auto differences = differences_of(dataset, cycles, target);
   Way way;
   for (const AlignedClip& clip : dataset.clips) {
     for (const Difference& d : differences) {
       if (d.group != clip.group || d.motion != clip.motion) continue;
-      const MatrixXd goal = goal_of(dataset, takes, clip, d, target);
+      const MatrixXd goal = goal_of(dataset, cycles, clip, d, target);
       way.add(way_of(clip.q, clip.phase(), goal, gp::posterior_mean(learnt.process, clip.q),
                      d.delta.row(0)));
     }

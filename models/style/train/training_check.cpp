@@ -50,20 +50,21 @@ double degrees_rms(double squares_sum, int count) {
 }
 
 void measure_cycles(const Dataset& dataset, const std::string& target, TrainingCheck& check) {
-  const auto takes = take_cycles(dataset);
+  const auto cycles = clip_cycles(dataset);
   double apart = 0.0;
   double scatter = 0.0;
   int companions = 0;
-  for (const TakeCycle& take : takes) {
-    const AlignedClip& clip = dataset.clips[static_cast<std::size_t>(take.clip)];
+  for (const ClipCycle& cycle : cycles) {
+    const AlignedClip& clip = dataset.clips[static_cast<std::size_t>(cycle.clip)];
     const std::string& person = dataset.subjects[static_cast<std::size_t>(clip.subject)].name;
     const double from_own = difference_squares(
-        dataset, take.coefficients - group_cycle(dataset, takes, clip.group, clip.motion, person));
-    if (from_own == 0.0) continue;  // the person's only take
+        dataset,
+        cycle.coefficients - group_cycle(dataset, cycles, clip.group, clip.motion, person));
+    if (from_own == 0.0) continue;  // the person's only clip
     scatter += from_own;
     ++companions;
   }
-  const auto differences = differences_of(dataset, takes, target);
+  const auto differences = differences_of(dataset, cycles, target);
   for (const Difference& d : differences) {
     apart += difference_squares(dataset, d.delta);
     if (d.people == 0) {
@@ -113,7 +114,7 @@ void check_strides(const Dataset& dataset, TrainingCheck& check) {
   }
 }
 
-// A misspelt gait would pass as another motion, of which no strides are asked.
+// A misspelt gait would count as a non-gait motion and skip the stride check.
 void check_motions(const Dataset& dataset, TrainingCheck& check) {
   std::set<std::string> motions;
   for (const AlignedClip& clip : dataset.clips) motions.insert(clip.motion);
@@ -127,7 +128,7 @@ void check_motions(const Dataset& dataset, TrainingCheck& check) {
 }
 
 void check_closing(const std::string& target, TrainingCheck& check) {
-  // Two takes of one style by one actor are 1.2 to 4.4 deg rms apart, styles 9.5 and more (dataset
+  // Two clips of one style by one actor are 1.2 to 4.4 deg rms apart, styles 9.5 and more (dataset
   // 1 and 2; the table is in README.md, "Verdicts").
   constexpr double kLeastDifference_deg = 5.0;
   if (check.difference_deg < kLeastDifference_deg) {

@@ -23,7 +23,7 @@ enum class ClosingBy {
 
 struct TrainingCheck {
   double difference_deg = 0.0;  // of the groups' mean cycles: rms over joints and phases
-  double scatter_deg = 0.0;     // of a take's cycle from its person's in its group; 0 with one each
+  double scatter_deg = 0.0;     // of a clip's cycle from its person's in its group; 0 with one each
   Way way;
   ClosingBy closing_by = ClosingBy::kTraining;
   std::vector<std::string> problems;  // each says why the model is unusable, and what to do

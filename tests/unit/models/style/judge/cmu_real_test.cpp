@@ -63,7 +63,7 @@ std::vector<int> people_without(int people, const std::vector<int>& without) {
 // Training pairs of these people: `delta` at the poses of each one's own cycle, and a fold for
 // each.
 style::LeaveOut lesson_of(const style::Dataset& dataset,
-                          const std::vector<style::TakeCycle>& cycles,
+                          const std::vector<style::ClipCycle>& cycles,
                           const std::vector<int>& people, const MatrixXd& delta) {
   style::LeaveOut lesson;
   style::Outputs& outputs = lesson.pairs.outputs;
@@ -107,7 +107,7 @@ gp::Trained paper_process(const style::TrainingPairs& pairs) {
 
 // Person a's cycle minus person b's, trained on the others without `asked`, and evaluated on
 // `asked`. The kernel is chosen by leaving out each training person in turn.
-void ask(const style::Dataset& dataset, const std::vector<style::TakeCycle>& cycles, int a, int b,
+void ask(const style::Dataset& dataset, const std::vector<style::ClipCycle>& cycles, int a, int b,
          int asked, Errors& errors) {
   const MatrixXd delta = cycles[static_cast<std::size_t>(a)].coefficients -
                          cycles[static_cast<std::size_t>(b)].coefficients;
@@ -129,7 +129,7 @@ void ask(const style::Dataset& dataset, const std::vector<style::TakeCycle>& cyc
 
 // For every ordered pair of people and every third person held out.
 Errors left_out_errors(const style::Dataset& dataset) {
-  const auto cycles = style::take_cycles(dataset);
+  const auto cycles = style::clip_cycles(dataset);
   const int people = static_cast<int>(std::ssize(cycles));
   Errors errors;
   for (int a = 0; a < people; ++a) {

@@ -11,9 +11,7 @@
 
 #include "models/motion/leg_signal.hpp"
 #include "models/motion/synthetic_walker.hpp"
-#include "models/style/live/live_gait.hpp"
-#include "models/style/live/live_stride.hpp"
-#include "models/style/live/pose_speed.hpp"
+#include "models/style/live/live_motion.hpp"
 #include "proto/frame/degree.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
@@ -38,7 +36,7 @@ class ToyGate {
     return gate.open();
   }
   style::StyleModel model = gated_toy_model(1);
-  style::KnownMotion known{model, toy_skeleton()};
+  style::TrainedMotion known{model, toy_skeleton()};
   style::Gate gate;
 };
 
@@ -90,7 +88,7 @@ class WalkingGate {
     in.root_position_m[1] = static_cast<float>(1.0 + how.rise_m_rad * apart_rad);
     gate.update(&*known_, on, in, q_, available_, walker, kStep_s);
   }
-  [[nodiscard]] const style::KnownMotion& known() const { return *known_; }
+  [[nodiscard]] const style::TrainedMotion& known() const { return *known_; }
 
  private:
   // From one greatest lead of the right leg to the next.
@@ -109,7 +107,7 @@ class WalkingGate {
 
   clip::Clip clip_;
   std::optional<motion::PoseSpace> space_;
-  std::optional<style::KnownMotion> known_;
+  std::optional<style::TrainedMotion> known_;
   std::vector<float> q_;
   std::vector<std::uint8_t> available_;
 };
@@ -187,7 +185,7 @@ TEST_CASE("the correlation of height and legs is low in a walk, high in a run", 
 }
 
 TEST_CASE("the speed of a pose is the rms over its joints, also with missing ones", "[style]") {
-  const style::KnownMotion known(gated_toy_model(1), toy_skeleton());  // 5 joints
+  const style::TrainedMotion known(gated_toy_model(1), toy_skeleton());  // 5 joints
   std::vector<float> q(15);
   std::vector<std::uint8_t> available(15, 1);
   style::PoseSpeed speed;
@@ -210,7 +208,7 @@ TEST_CASE("the speed of a pose is the rms over its joints, also with missing one
 
 TEST_CASE("the nearest training pose is found, also with missing joints", "[style]") {
   const auto model = gated_toy_model(1);
-  const style::KnownMotion known(model, toy_skeleton());
+  const style::TrainedMotion known(model, toy_skeleton());
   std::vector<float> q(15);
   std::vector<std::uint8_t> all(15, 1);
   for (std::size_t d = 0; d < 15; ++d)

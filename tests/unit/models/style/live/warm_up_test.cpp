@@ -11,7 +11,6 @@
 #include "models/style/live/style_estimate.hpp"
 #include "models/style/live/style_filter.hpp"
 #include "models/style/live/style_type.hpp"
-#include "models/style/live/walker_command.hpp"
 #include "posed/v1/log.pb.h"
 #include "tests/support/last_frame.hpp"
 #include "tests/support/parameter_index.hpp"
@@ -20,7 +19,7 @@
 
 using namespace posed;
 using namespace posed::test;
-using style::WalkerWatch;
+using style::WalkerTracker;
 using style::WarmUp;
 
 namespace {
@@ -98,7 +97,7 @@ TEST_CASE("after a warm-up the kernel sees the walker as if its neutral pose wer
   REQUIRE(warmed.warm_up(4.0));
   const Frame wanted = plain.walk(600);
   const Frame got = warmed.walk(600, 0.15);
-  CHECK(warmed.notices() == std::vector<std::size_t>{WalkerWatch::kWarmedUp});
+  CHECK(warmed.notices() == std::vector<std::size_t>{WalkerTracker::kWarmedUp});
   REQUIRE(warmed.filter.walker());
   WarmedToy unwarmed(ready.get());
   const Frame without = unwarmed.walk(600, 0.15);
@@ -126,12 +125,12 @@ TEST_CASE("an interrupted warm-up leaves what was known", "[style]") {
   toy.walk(60, 0.2);
   toy.walk(120, 0.2, 2'000'000'000);  // a gap of two seconds
   CHECK(toy.notices() ==
-        std::vector<std::size_t>{WalkerWatch::kWarmedUp, WalkerWatch::kInterrupted});
+        std::vector<std::size_t>{WalkerTracker::kWarmedUp, WalkerTracker::kInterrupted});
   REQUIRE(toy.filter.walker());
   CHECK(toy.filter.walker()->neutral == before);
   REQUIRE(toy.warm_up(2.0));
   toy.filter.flush(toy.last);
-  CHECK(toy.notices() == std::vector<std::size_t>{WalkerWatch::kInterrupted});
+  CHECK(toy.notices() == std::vector<std::size_t>{WalkerTracker::kInterrupted});
 }
 
 TEST_CASE("a model of an older posed has neither gate nor warm-up, and says so once", "[style]") {
@@ -139,16 +138,16 @@ TEST_CASE("a model of an older posed has neither gate nor warm-up, and says so o
   WarmedToy toy(old.get());
   CHECK_FALSE(toy.warm_up(2.0));
   const Frame out = toy.walk(90);
-  CHECK(toy.notices() == std::vector<std::size_t>{WalkerWatch::kNoGateData});
+  CHECK(toy.notices() == std::vector<std::size_t>{WalkerTracker::kNoGateData});
   CHECK(std::isnan(toy.filter.reading(style::StyleFilter::kStyleGate)));
   WarmedToy ungated(old.get(), {.gate = false});
   CHECK(delta_of(ungated.walk(90), out, 2).angularDistance(Eigen::Quaterniond::Identity()) < 1e-6);
   CHECK(ungated.notices().empty());
   WarmedToy unheard(old.get(), {.gate = false, .auto_alpha = true});
   unheard.walk(90);
-  CHECK(unheard.notices() == std::vector<std::size_t>{WalkerWatch::kNoAxis});
+  CHECK(unheard.notices() == std::vector<std::size_t>{WalkerTracker::kNoAxis});
   CHECK_FALSE(unheard.warm_up(2.0));
-  CHECK(unheard.notices() == std::vector<std::size_t>{WalkerWatch::kNoGateData});
+  CHECK(unheard.notices() == std::vector<std::size_t>{WalkerTracker::kNoGateData});
 }
 
 TEST_CASE("a walker goes into a command, into the log and back within half of 1e-4 rad",
@@ -261,7 +260,7 @@ TEST_CASE("a walker stays known when a model with other mean rotations is swappe
   toy.filter.use(*old);
   toy.walk(1);
   CHECK_FALSE(toy.filter.walker());
-  CHECK(toy.notices() == std::vector<std::size_t>{WalkerWatch::kNoGateData});
+  CHECK(toy.notices() == std::vector<std::size_t>{WalkerTracker::kNoGateData});
 }
 
 TEST_CASE("calibrate is a warm-up by an older name", "[style]") {
@@ -270,7 +269,8 @@ TEST_CASE("calibrate is a warm-up by an older name", "[style]") {
   toy.filter.set(test::parameter_index(style::style_type(), "calibrate"), 1.0);
   toy.walk(60 * 11);
   REQUIRE(toy.filter.walker());
-  CHECK(toy.notices() == std::vector<std::size_t>{WalkerWatch::kWarmedUp, WalkerWatch::kOldKey});
+  CHECK(toy.notices() ==
+        std::vector<std::size_t>{WalkerTracker::kWarmedUp, WalkerTracker::kOldKey});
   toy.filter.set(test::parameter_index(style::style_type(), "calibrate"), 0.0);
   CHECK_FALSE(toy.filter.walker());
 }

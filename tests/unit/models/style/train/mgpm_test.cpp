@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "models/gp/lbfgs.hpp"
-#include "models/style/train/mgpm_train.hpp"
+#include "models/style/train/mgpm.hpp"
 #include "tests/support/shared.hpp"
 
 namespace {

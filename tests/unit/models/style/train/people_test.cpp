@@ -34,7 +34,7 @@ style::Dataset dataset_of(const std::vector<style::TrainingClip>& clips) {
 }
 
 style::Difference only_difference(const style::Dataset& dataset) {
-  const auto found = style::differences_of(dataset, style::take_cycles(dataset), "sway");
+  const auto found = style::differences_of(dataset, style::clip_cycles(dataset), "sway");
   REQUIRE(found.size() == 1);
   return found.front();
 }
@@ -71,12 +71,12 @@ TEST_CASE("who shows one style only does not move the difference, but adds input
   more.push_back(walk_of(2, WalkerFamily::kMarch));
   more.push_back(walk_of(3, WalkerFamily::kSway));
   const style::Dataset dataset = dataset_of(more);
-  const auto pairs = style::make_training_pairs(dataset, style::take_cycles(dataset), "sway");
+  const auto pairs = style::make_training_pairs(dataset, style::clip_cycles(dataset), "sway");
   CHECK(pairs.inputs.size() == 4);
   CHECK(pairs.outputs.of_input == std::vector{0, style::kNoDifference, 0, style::kNoDifference});
   const auto difference = only_difference(dataset);
   CHECK(difference.people == 1);
-  const auto takes = style::take_cycles(dataset);
+  const auto takes = style::clip_cycles(dataset);
   CHECK(difference.delta.isApprox(takes[1].coefficients - takes[0].coefficients));
 }
 
@@ -85,7 +85,7 @@ TEST_CASE("people count alike, whatever the number of their takes", "[people]") 
       dataset_of({walk_of(1, WalkerFamily::kMarch), walk_of(1, WalkerFamily::kMarch, 7.0),
                   walk_of(1, WalkerFamily::kSway), walk_of(2, WalkerFamily::kMarch),
                   walk_of(2, WalkerFamily::kSway)});
-  const auto takes = style::take_cycles(dataset);
+  const auto takes = style::clip_cycles(dataset);
   const auto cycle = [&](std::size_t i) { return takes[i].coefficients; };
   const Eigen::MatrixXd first = cycle(2) - 0.5 * (cycle(0) + cycle(1));
   const Eigen::MatrixXd second = cycle(4) - cycle(3);

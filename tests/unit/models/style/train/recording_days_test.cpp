@@ -10,7 +10,7 @@ namespace {
 // One person's takes; each cycle is a constant pose in three dimensions.
 struct OnePerson {
   style::Dataset dataset;
-  std::vector<style::TakeCycle> takes;
+  std::vector<style::ClipCycle> takes;
 
   OnePerson() { dataset.subjects.push_back({"ann", "from", "walk", {}}); }
 
