@@ -6,7 +6,7 @@
 #include <string_view>
 #include <variant>
 
-#include "models/live_text.hpp"
+#include "models/stage_type.hpp"
 #include "models/stages/registry.hpp"
 #include "posed/v1/log.pb.h"
 #include "proto/log/reader.hpp"

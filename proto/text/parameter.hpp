@@ -19,8 +19,8 @@ using ParameterValue = std::variant<bool, std::int64_t, double, std::string>;
 using Parameters = std::map<std::string, ParameterValue>;  // by ParameterSpec::name
 
 struct ParameterSpec {
-  std::string_view name;         // its unit last: "lag_s"
-  ParameterValue default_value;  // also fixes the type
+  std::string_view name;           // its unit last: "lag_s"
+  ParameterValue default_value{};  // also fixes the type
   bool required = false;
   bool is_path = false;  // relative to the config file; the default is none
   std::string_view help;

@@ -16,7 +16,7 @@
 #include "daemon/replay/replay.hpp"
 #include "drivers/template_mocap/protocol.hpp"
 #include "models/gesture/model_file.hpp"
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
 #include "posed/v1/log.pb.h"
 #include "proto/log/digest.hpp"
 #include "proto/log/reader.hpp"

@@ -11,7 +11,7 @@
 #include "drivers/glove/glove_emulator.hpp"
 #include "drivers/options.hpp"
 #include "models/gesture/model_file.hpp"
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/text_clip.hpp"
 #include "tests/support/stage_commands.hpp"

@@ -28,7 +28,7 @@
 #include "daemon/tools/emulate/emulated_device.hpp"
 #include "daemon/tools/emulate/emulated_port.hpp"
 #include "models/motion/synthetic_walker.hpp"
-#include "models/style/style_type.hpp"
+#include "models/style/live/style_type.hpp"
 
 namespace posed::tools {
 namespace {

@@ -6,7 +6,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "models/style/style_weights.hpp"
+#include "models/style/live/style_weights.hpp"
 
 namespace posed::tools {
 

@@ -8,7 +8,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/tools/command/degrees.hpp"
-#include "models/gesture/apart.hpp"
+#include "models/gesture/pose_distance.hpp"
 #include "models/perform/constrain.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 

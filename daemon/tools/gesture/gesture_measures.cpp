@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/tools/command/degrees.hpp"
-#include "models/gesture/apart.hpp"
+#include "models/gesture/pose_distance.hpp"
 #include "models/gesture/train.hpp"
 #include "models/motion/naturalness.hpp"
 #include "models/perform/constrain.hpp"

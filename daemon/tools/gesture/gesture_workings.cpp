@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "daemon/tools/gesture/gesture_figures.hpp"
-#include "models/gesture/drawn_tree.hpp"
+#include "models/gesture/tree_drawing.hpp"
 
 namespace posed::tools {
 namespace {

@@ -9,7 +9,7 @@
 #include "daemon/tools/command/paint.hpp"
 #include "daemon/tools/live/live_table.hpp"
 #include "daemon/tools/live/sparkline.hpp"
-#include "models/style/style_filter.hpp"
+#include "models/style/live/style_filter.hpp"
 #include "posed/v1/control.pb.h"
 #include "posed/v1/posed.pb.h"
 #include "proto/text/clean.hpp"

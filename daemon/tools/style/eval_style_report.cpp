@@ -10,8 +10,8 @@
 #include "daemon/tools/command/json_numbers.hpp"
 #include "daemon/tools/report/bench_sections.hpp"
 #include "daemon/tools/style/style_cycles.hpp"
-#include "models/style/dataset.hpp"
-#include "models/style/training_pairs.hpp"
+#include "models/style/train/dataset.hpp"
+#include "models/style/train/training_pairs.hpp"
 
 namespace posed::tools {
 namespace {
@@ -35,7 +35,7 @@ Result<std::pair<motion::PoseSpaceSpec, StyleCycles>> cycles_of(const EvaluatedC
   if (auto aligned = style::align(*dataset, how); !aligned) {
     return std::unexpected(aligned.error());
   }
-  const auto takes = style::take_cycles(*dataset);
+  const auto takes = style::clip_cycles(*dataset);
   StyleCycles cycles{.source_name = file_of(clips.source),
                      .target_name = file_of(clips.target),
                      .source = cycle_points(takes[0].coefficients),

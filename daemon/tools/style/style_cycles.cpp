@@ -12,8 +12,8 @@
 #include "daemon/tools/report/style_sections.hpp"
 #include "models/motion/motion.hpp"
 #include "models/motion/symmetric_eigen.hpp"
-#include "models/style/difference.hpp"
-#include "models/style/harmonics.hpp"
+#include "models/style/train/difference_process.hpp"
+#include "models/style/train/harmonics.hpp"
 
 namespace posed::tools {
 namespace {

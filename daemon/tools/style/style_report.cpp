@@ -14,8 +14,8 @@
 #include "daemon/tools/report/style_sections.hpp"
 #include "daemon/tools/style/style_cycles.hpp"
 #include "models/gp/regression.hpp"
-#include "models/style/training_check.hpp"
-#include "models/style/training_pairs.hpp"
+#include "models/style/train/training_check.hpp"
+#include "models/style/train/training_pairs.hpp"
 
 namespace posed::tools {
 namespace {
@@ -64,7 +64,7 @@ report::StyleMap map_of_style_points(const style::Dataset& dataset, const std::s
 
 // Without style points: the clips' own mean cycles.
 report::StyleMap map_of_cycles(const style::Dataset& dataset, const std::string& motion) {
-  const auto takes = style::take_cycles(dataset);
+  const auto takes = style::clip_cycles(dataset);
   std::vector<std::size_t> clips;
   for (std::size_t c = 0; c < dataset.clips.size(); ++c) {
     if (dataset.clips[c].motion == motion) clips.push_back(c);
@@ -155,7 +155,7 @@ void StyleReport::add_cycles(const style::Findings& findings) {
   std::size_t pairs = 0;
   for (std::size_t l = 0; l < findings.lessons.size(); ++l) {
     const style::Dataset& data = *findings.lessons[l].data;
-    const auto takes = style::take_cycles(data);
+    const auto takes = style::clip_cycles(data);
     for (const auto& found : style::differences_of(data, takes, findings.lessons[l].target)) {
       StyleCycles cycles{
           .motion = found.motion,
@@ -199,7 +199,7 @@ void StyleReport::add_kernel(const style::Findings& findings) {
     for (std::size_t f = 0; f < learnt.ways.size(); ++f) {
       if (!learnt.ways[f].measured()) continue;
       walkers.push_back({stem_of(learnt.held_out[f].file), learnt.held_out[f].person,
-                         learnt.held_out[f].takes, learnt.ways[f].closes(),
+                         learnt.held_out[f].clips, learnt.ways[f].closes(),
                          learnt.ways[f].constant_closes()});
     }
     if (walkers.empty()) continue;

@@ -8,7 +8,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "daemon/tools/report/page.hpp"
-#include "models/style/train.hpp"
+#include "models/style/train/train.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::tools {

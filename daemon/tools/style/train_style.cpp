@@ -15,7 +15,7 @@
 #include "daemon/tools/style/style_report.hpp"
 #include "daemon/tools/style/train_style.hpp"
 #include "models/fixed_products.hpp"
-#include "models/style/train.hpp"
+#include "models/style/train/train.hpp"
 #include "proto/clip/file_names.hpp"
 #include "proto/text/json_text.hpp"
 
