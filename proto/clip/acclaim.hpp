@@ -12,7 +12,7 @@
 
 #include "proto/clip/clip.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 
 // Maps the values of one bone in an AMC to channels.
 struct AcclaimBone {
@@ -35,4 +35,4 @@ struct Acclaim {
                                      std::string_view asf, const std::string& asf_name,
                                      const ReadOptions& options = {});
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

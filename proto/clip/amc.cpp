@@ -5,7 +5,7 @@
 #include "proto/clip/text.hpp"
 #include "proto/text/clean.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 bool is_frame_number(std::string_view line) {
@@ -75,4 +75,4 @@ Result<Clip> parse_amc(std::string_view amc, const std::string& amc_name, std::s
   return clip_of(std::move(*draft), amc_name);
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

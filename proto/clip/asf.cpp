@@ -7,7 +7,7 @@
 #include "proto/clip/asf_parts.hpp"
 #include "proto/text/clean.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 class AsfReader {
@@ -273,4 +273,4 @@ Result<Acclaim> parse_asf(std::string_view text, const std::string& name) {
   return AsfReader(text, name).read();
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

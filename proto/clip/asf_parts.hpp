@@ -9,7 +9,7 @@
 #include "proto/clip/acclaim.hpp"
 #include "proto/clip/text.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 
 // Splits an ASF into words. `#` begins a comment; commas and parentheses count as white space.
 class Words {
@@ -81,4 +81,4 @@ struct AsfFile {
 // `name` is used in error messages.
 [[nodiscard]] Result<Acclaim> acclaim_of(const AsfFile& file, const std::string& name);
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

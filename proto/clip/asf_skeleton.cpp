@@ -4,7 +4,7 @@
 #include "proto/frame/degree.hpp"
 #include "proto/text/clean.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 constexpr double kInch_m = 0.0254;
@@ -76,4 +76,4 @@ Result<Acclaim> acclaim_of(const AsfFile& file, const std::string& name) {
   return out;
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

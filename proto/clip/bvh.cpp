@@ -5,7 +5,7 @@
 #include "proto/clip/units.hpp"
 #include "proto/text/clean.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 double unit_of(const Skeleton& skeleton, const ReadOptions& options, const Profile* profile,
@@ -59,4 +59,4 @@ Result<Clip> parse_bvh(std::string_view text, const std::string& name, const Rea
   return clip_of(std::move(*draft), name);
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -13,7 +13,7 @@
 
 #include "proto/clip/clip.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 
 // Everything before the motion lines. Offsets are still in the file's units.
 struct BvhHeader {
@@ -35,4 +35,4 @@ struct BvhHeader {
 // Acclaim skeleton it would be wrong: convert that first (with_zyx_channels in clip.hpp).
 [[nodiscard]] std::string bvh_hierarchy(const Skeleton& skeleton, double metres_per_unit);
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -5,7 +5,7 @@
 #include "proto/clip/text.hpp"
 #include "proto/text/clean.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 constexpr int kMaxDepth = 96;
@@ -237,4 +237,4 @@ Result<BvhHeader> parse_bvh_header(std::string_view text, const std::string& nam
   return HeaderReader(text, name).read();
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -9,7 +9,7 @@
 #include "proto/clip/text.hpp"
 #include "proto/frame/degree.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 constexpr double kDegreesPerRad = 1.0 / kDegree;
@@ -125,4 +125,4 @@ Result<> write_bvh(const Clip& clip, const std::filesystem::path& path) {
   });
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

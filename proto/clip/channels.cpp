@@ -3,7 +3,7 @@
 
 #include "proto/clip/clip.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 constexpr std::array kZyx{Axis::kZ, Axis::kY, Axis::kX};
@@ -62,4 +62,4 @@ Clip with_zyx_channels(const Clip& clip) {
   return out;
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

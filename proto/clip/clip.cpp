@@ -4,7 +4,7 @@
 
 #include "proto/clip/files.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 
 Frame Clip::frame(int index) const {
   Frame frame;
@@ -33,4 +33,4 @@ Result<Clip> read_clip(const std::filesystem::path& path, const ReadOptions& opt
   return clip_of(std::move(*draft), files->name);
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -13,7 +13,7 @@
 #include "proto/frame/result.hpp"
 #include "proto/frame/skeleton.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 
 using ChannelMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
@@ -63,4 +63,4 @@ struct ReadOptions {
 // rate. An Acclaim skeleton becomes a BVH with ZYX rotation channels on every joint.
 [[nodiscard]] Result<> write_bvh(const Clip& clip, const std::filesystem::path& path);
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -6,7 +6,7 @@
 
 #include "proto/clip/text.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 
 // In small letters, with its dot: ".bvh". Empty where there is none.
 [[nodiscard]] inline std::string extension_of(const std::filesystem::path& path) {
@@ -19,4 +19,4 @@ namespace posed::toolsp {
   return amc.parent_path() / (stem.substr(0, stem.find('_')) + ".asf");
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -4,7 +4,7 @@
 #include "proto/clip/text.hpp"
 #include "proto/text/load_file.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 constexpr FileRule kClip{.what = "clip", .max_bytes = 2'000'000'000};
@@ -53,4 +53,4 @@ Result<Draft> draft_of(const ClipFiles& files, const ReadOptions& options) {
   return draft_bvh(files.text, files.name, options);
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

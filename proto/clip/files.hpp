@@ -7,7 +7,7 @@
 
 #include "proto/clip/reader.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 
 enum class ClipKind : std::uint8_t { kBvh, kAmc, kHandCsv };
 
@@ -26,4 +26,4 @@ struct ClipFiles {
 // Views in the result point into `files`.
 [[nodiscard]] Result<Draft> draft_of(const ClipFiles& files, const ReadOptions& options);
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -11,7 +11,7 @@
 #include "proto/frame/plausible.hpp"
 #include "proto/text/clean.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 std::string counted(std::size_t count) {
@@ -221,4 +221,4 @@ FrameOutcome FrameParser::parse_block(std::string_view text,
   return outcome;
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -14,7 +14,7 @@
 #include "proto/clip/acclaim.hpp"
 #include "proto/frame/skeleton.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 
 enum class FrameFault : std::uint8_t {
   kNone,
@@ -88,4 +88,4 @@ class FrameParser {
   bool timed_ = false;
 };
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

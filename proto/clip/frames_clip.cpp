@@ -8,7 +8,7 @@
 
 #include "proto/frame/rotation.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
@@ -173,4 +173,4 @@ void hold_missing(Clip& clip) {
                           " values are missing; each holds the one before it");
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

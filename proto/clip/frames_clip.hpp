@@ -10,7 +10,7 @@
 #include "proto/clip/clip.hpp"
 #include "proto/frame/frame.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 
 class FramesClip {
  public:
@@ -39,4 +39,4 @@ class FramesClip {
 // Reports the number in `warnings`. For formats that cannot hold missing values.
 void hold_missing(Clip& clip);
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -7,7 +7,7 @@
 #include "proto/clip/gltf.hpp"
 #include "proto/frame/joint_channels.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 GltfNode end_site_of(const Joint& joint, int parent) {
@@ -49,4 +49,4 @@ Result<> write_glb(const Clip& clip, const std::filesystem::path& path) {
   return write_gltf(motion, GltfKind::kSkin, path);
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

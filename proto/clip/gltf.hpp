@@ -14,7 +14,7 @@
 #include "proto/frame/humanoid.hpp"
 #include "proto/frame/result.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 
 struct GltfNode {
   std::string name;
@@ -56,4 +56,4 @@ void add_position(GltfNode& node, const Eigen::Vector3d& position_m);
 // rest, and their motion at the clip's own times.
 [[nodiscard]] Result<> write_glb(const Clip& clip, const std::filesystem::path& path);
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

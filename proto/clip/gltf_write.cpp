@@ -15,7 +15,7 @@
 #include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 constexpr std::size_t kMaxBytes = std::numeric_limits<std::uint32_t>::max() / 2;
@@ -223,4 +223,4 @@ Result<> write_gltf(const GltfMotion& motion, GltfKind kind, const std::filesyst
   });
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -7,7 +7,7 @@
 #include "proto/clip/text.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 using JointsOfHand = std::array<int, kHandJoints>;  // joint index in the clip's skeleton
@@ -166,4 +166,4 @@ void fill_gaps(HandClip& clip) {
   }
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

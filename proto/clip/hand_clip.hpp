@@ -14,7 +14,7 @@
 #include "proto/clip/clip.hpp"
 #include "proto/frame/hand.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 
 struct HandClip {
   std::string path;
@@ -48,4 +48,4 @@ void fill_gaps(HandClip& clip);
 // Writes the hand CSV; a value that is not finite becomes an empty field.
 [[nodiscard]] Result<> write_hand_csv(const HandClip& clip, const std::filesystem::path& path);
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -10,7 +10,7 @@
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/text/clean.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 constexpr double kSameTime_s = 1e-6;  // times closer than this count as the same
@@ -175,4 +175,4 @@ Result<> write_hand_csv(const HandClip& clip, const std::filesystem::path& path)
   });
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -10,7 +10,7 @@
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 constexpr double kHtkUnit_s = 1e-7;
@@ -132,4 +132,4 @@ Result<> write_labels(const std::vector<LabelSegment>& segments,
   return write_text(path, [&](std::ostream& out) { out << labels_text(segments); });
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

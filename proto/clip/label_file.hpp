@@ -11,7 +11,7 @@
 
 #include "proto/frame/result.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 
 struct LabelSegment {
   double start_s = 0.0, end_s = 0.0;
@@ -34,4 +34,4 @@ struct LabelSegment {
 [[nodiscard]] Result<> write_labels(const std::vector<LabelSegment>& segments,
                                     const std::filesystem::path& path);
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

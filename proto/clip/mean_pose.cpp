@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 // The line from the right to the left upper leg in the hips' frame; zero when either is unknown.
@@ -44,4 +44,4 @@ std::vector<Eigen::Quaterniond> mean_rotations(const Clip& clip) {
   return global;
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -9,7 +9,7 @@
 #include "proto/frame/plausible.hpp"
 #include "proto/text/clean.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 constexpr double kSameLength_m = 0.001;
@@ -137,4 +137,4 @@ Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints) {
   return clip;
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

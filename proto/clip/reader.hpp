@@ -10,7 +10,7 @@
 #include "proto/clip/frame_text.hpp"
 #include "proto/frame/profile.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 
 // The text of one frame in the file.
 struct FrameSpan {
@@ -56,4 +56,4 @@ struct Hints {
 // Reads the frames and completes the skeleton.
 [[nodiscard]] Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints = {});
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -11,7 +11,7 @@
 
 #include "proto/frame/whole_file.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 // from_chars returns no value for a number outside double's range; one too small counts as zero.
@@ -125,4 +125,4 @@ std::string_view without_bom(std::string_view text) noexcept {
   return text;
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -12,7 +12,7 @@
 
 #include "proto/frame/result.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 
 // Parses a finite number of at most kMaxValue in size, with or without an exponent. A leading '+'
 // is allowed; a number too small for a double becomes 0. RT-safe.
@@ -67,4 +67,4 @@ class Cursor {
 // `text` without a UTF-8 byte order mark.
 [[nodiscard]] std::string_view without_bom(std::string_view text) noexcept;
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -7,7 +7,7 @@
 #include "proto/clip/files.hpp"
 #include "proto/clip/text.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 // The first line of a description, "posed-clip bvh key=value ...", holds what the header's text
@@ -129,4 +129,4 @@ Result<ClipFormat> parse_description(std::string_view description, const std::st
   return format;
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -11,7 +11,7 @@
 #include "proto/clip/clip.hpp"
 #include "proto/clip/frame_text.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 
 // Everything needed to decode the frames of a clip.
 struct ClipFormat {
@@ -37,4 +37,4 @@ struct TextClip {
 [[nodiscard]] Result<ClipFormat> parse_description(std::string_view description,
                                                    const std::string& name);
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

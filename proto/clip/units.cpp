@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 constexpr double kHeight_m = 1.7;
@@ -83,4 +83,4 @@ void scale_lengths(Skeleton& skeleton, double metres_per_unit) {
   }
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -6,7 +6,7 @@
 
 #include "proto/frame/skeleton.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 
 inline constexpr double kCmuUnit_m = 0.0254 / 0.45;  // an Acclaim file's `length 0.45`: inch / 0.45
 
@@ -22,4 +22,4 @@ inline constexpr double kCmuUnit_m = 0.0254 / 0.45;  // an Acclaim file's `lengt
 // Multiplies offsets and end sites by `metres_per_unit`.
 void scale_lengths(Skeleton& skeleton, double metres_per_unit);
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

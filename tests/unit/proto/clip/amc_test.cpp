@@ -12,7 +12,7 @@
 #include "tests/support/replaced.hpp"
 #include "tests/support/shared.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 using test::replaced;
@@ -199,4 +199,4 @@ TEST_CASE("a text clip decodes frame by frame to what the clip reader gives") {
   }
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -10,7 +10,7 @@
 #include "tests/support/replaced.hpp"
 #include "tests/support/shared.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 using test::replaced;
@@ -164,4 +164,4 @@ TEST_CASE("the real recordings are read") {
   CHECK(acted->frame(0).root_position_m[1] == Approx(0.895634));
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

@@ -8,7 +8,7 @@
 #include "proto/frame/hand_skeleton.hpp"
 #include "tests/support/temp_folder.hpp"
 
-namespace posed::toolsp {
+namespace posed::clip {
 namespace {
 
 std::string header() {
@@ -207,4 +207,4 @@ TEST_CASE("gaps are filled linearly and reported") {
   CHECK(clip.warnings.at(0) == "94 missing values were filled from their neighbours in time");
 }
 
-}  // namespace posed::toolsp
+}  // namespace posed::clip

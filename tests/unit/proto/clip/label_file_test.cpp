@@ -5,7 +5,7 @@
 #include "tests/support/temp_folder.hpp"
 
 using namespace posed;
-using namespace posed::toolsp;
+using namespace posed::clip;
 
 namespace {
 
