@@ -2,7 +2,8 @@
 
 #include <cmath>
 
-#include "proto/clip/files.hpp"
+#include "proto/clip/draft.hpp"
+#include "proto/clip/format.hpp"
 
 namespace posed::clip {
 
@@ -26,11 +27,32 @@ bool has_uneven_times(const std::vector<double>& time_s, double rate_hz) {
 }
 
 Result<Clip> read_clip(const std::filesystem::path& path, const ReadOptions& options) {
-  const auto files = load_files(path, options);
-  if (!files) return std::unexpected(files.error());
-  auto draft = draft_of(*files, options);
+  const auto loaded = load_clip(path, options);
+  if (!loaded) return std::unexpected(loaded.error());
+  auto draft = loaded->format->read(loaded->file, options);
   if (!draft) return std::unexpected(draft.error());
-  return clip_of(std::move(*draft), files->name);
+  return clip_of(std::move(*draft), loaded->file.name);
+}
+
+Result<Clip> parse_clip(const ClipFile& file, const ReadOptions& options) {
+  const Format* format = format_of(file.name);
+  if (format == nullptr || format->read == nullptr) {
+    return fail("is no clip posed can read; a clip is " + listed(Use::kRead), file.name);
+  }
+  if (auto ok = check_options(*format, options, file.name); !ok) {
+    return std::unexpected(ok.error());
+  }
+  auto draft = format->read(file, options);
+  if (!draft) return std::unexpected(draft.error());
+  return clip_of(std::move(*draft), file.name);
+}
+
+Result<> write_clip(const Clip& clip, const std::filesystem::path& path) {
+  const Format* format = format_of(path);
+  if (format == nullptr || format->write == nullptr) {
+    return misuse("is no clip posed can write; a clip is " + listed(Use::kWrite), path.string());
+  }
+  return format->write(clip, path);
 }
 
 }  // namespace posed::clip

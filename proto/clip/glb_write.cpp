@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "proto/clip/formats.hpp"
 #include "proto/clip/gltf.hpp"
 #include "proto/frame/joint_channels.hpp"
 
@@ -48,5 +49,7 @@ Result<> write_glb(const Clip& clip, const std::filesystem::path& path) {
   }
   return write_gltf(motion, GltfKind::kSkin, path);
 }
+
+Format glb_format() { return {.name = "GLB", .extensions = {".glb"}, .write = write_glb}; }
 
 }  // namespace posed::clip

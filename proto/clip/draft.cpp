@@ -1,6 +1,7 @@
-#include "proto/clip/reader.hpp"
+#include "proto/clip/draft.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
 #include "proto/clip/mean_pose.hpp"
@@ -13,33 +14,6 @@ namespace posed::clip {
 namespace {
 
 constexpr double kSameLength_m = 0.001;
-
-// Returns [frames x channels]. The memory grows with the frames actually read, not with the count
-// in the header. Fills `time_s` where frames carry times.
-Result<std::vector<double>> read_rows(const Draft& draft, const std::string& name,
-                                      std::vector<double>& time_s) {
-  std::vector<double> values;
-  std::vector<double> row(draft.parser.channels());
-  std::optional<std::int64_t> before;
-  for (std::size_t i = 0; i < draft.frames.size(); ++i) {
-    const FrameSpan& span = draft.frames[i];
-    const FrameOutcome outcome = draft.parser.parse(span.text, row);
-    if (!outcome.ok()) {
-      const auto lines = std::ranges::count(span.text.substr(0, outcome.offset), '\n');
-      return fail("frame " + std::to_string(i + 1) + ": " + outcome.sentence(), name,
-                  span.line + static_cast<int>(lines));
-    }
-    if (draft.parser.numbered() && before && outcome.number != *before + 1) {
-      return fail("frame " + std::to_string(outcome.number) + " follows frame " +
-                      std::to_string(*before) + "; frames are missing or out of order",
-                  name, span.line);
-    }
-    before = outcome.number;
-    if (draft.parser.timed()) time_s.push_back(outcome.time_s);
-    values.insert(values.end(), row.begin(), row.end());
-  }
-  return values;
-}
 
 bool varies(const ChannelMatrix& channels, std::size_t c) {
   const auto column = channels.col(static_cast<Eigen::Index>(c));
@@ -57,7 +31,7 @@ int find_root_joint(const Skeleton& skeleton, const ChannelMatrix& channels) {
 // Position channels of a joint below the root joint replace its OFFSET. Bones keep their length, so
 // these channels should be constant; their value becomes the offset. Warns when one moves.
 void settle_offsets(Clip& clip, Skeleton& skeleton) {
-  int told = -1;
+  int warned = -1;
   for (std::size_t c = 0; c < skeleton.channels.size(); ++c) {
     const Channel& channel = skeleton.channels[c];
     if (!channel.translation || channel.joint <= skeleton.root_joint) continue;
@@ -65,8 +39,8 @@ void settle_offsets(Clip& clip, Skeleton& skeleton) {
     const double first_m = clip.channels(0, static_cast<Eigen::Index>(c));
     double& offset_m = joint.offset_m[static_cast<int>(channel.axis)];
     if (std::abs(first_m - offset_m) > 0.1 * kSameLength_m) offset_m = first_m;
-    if (channel.joint != told && varies(clip.channels, c)) {
-      told = channel.joint;
+    if (channel.joint != warned && varies(clip.channels, c)) {
+      warned = channel.joint;
       clip.warnings.push_back("joint " + in_quotes(joint.name) +
                               " changes its distance from its parent; posed keeps that of the "
                               "first frame");
@@ -112,25 +86,48 @@ Result<> complete(Clip& clip, Skeleton& skeleton, const Profile* profile, const 
 
 }  // namespace
 
+// The memory grows with the frames actually read, not with the count in a header.
+Result<> read_frames(const TextFrames& text, const std::string& name, std::vector<double>& values,
+                     std::vector<double>& time_s) {
+  std::vector<double> row(text.parser.channels());
+  std::optional<std::int64_t> before;
+  for (std::size_t i = 0; i < text.frames.size(); ++i) {
+    const FrameSpan& span = text.frames[i];
+    const FrameOutcome outcome = text.parser.parse(span.text, row);
+    if (!outcome.ok()) {
+      const auto lines = std::ranges::count(span.text.substr(0, outcome.offset), '\n');
+      return fail("frame " + std::to_string(i + 1) + ": " + outcome.sentence(), name,
+                  span.line + static_cast<int>(lines));
+    }
+    if (text.parser.numbered() && before && outcome.number != *before + 1) {
+      return fail("frame " + std::to_string(outcome.number) + " follows frame " +
+                      std::to_string(*before) + "; frames are missing or out of order",
+                  name, span.line);
+    }
+    before = outcome.number;
+    if (text.parser.timed()) time_s.push_back(outcome.time_s);
+    values.insert(values.end(), row.begin(), row.end());
+  }
+  return {};
+}
+
 Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints) {
-  if (draft.frames.empty()) return fail("has no frames, so there is nothing to play", name);
+  if (draft.values.empty()) return fail("has no frames, so there is nothing to play", name);
+  const std::size_t channels = draft.skeleton.channels.size();
+  assert(draft.values.size() % channels == 0);
   Clip clip;
-  const auto values = read_rows(draft, name, clip.time_s);
-  if (!values) return std::unexpected(values.error());
   clip.path = name;
   clip.frame_rate_hz = draft.frame_rate_hz;
   clip.metres_per_unit = draft.metres_per_unit;
   clip.warnings = std::move(draft.warnings);
+  clip.time_s = std::move(draft.time_s);
   clip.channels = Eigen::Map<const ChannelMatrix>(
-      values->data(), std::ssize(draft.frames), static_cast<Eigen::Index>(draft.parser.channels()));
-
+      draft.values.data(), static_cast<Eigen::Index>(draft.values.size() / channels),
+      static_cast<Eigen::Index>(channels));
+  assert(clip.time_s.empty() || std::ssize(clip.time_s) == clip.frames());
   auto skeleton = std::make_shared<Skeleton>(std::move(draft.skeleton));
   clip.skeleton = skeleton;
-  if (draft.parser.timed()) {  // a hand: posed supplies the skeleton
-    const auto ok = settle_times(draft, name, clip.time_s, clip.frame_rate_hz, clip.warnings);
-    if (!ok) return std::unexpected(ok.error());
-    return clip;
-  }
+  if (draft.skeleton_is_known) return clip;
   if (auto ok = complete(clip, *skeleton, draft.profile, hints); !ok) {
     return fail(ok.error().message, name);
   }
