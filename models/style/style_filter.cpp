@@ -44,7 +44,6 @@ StyleFilter::StyleFilter(const BoundModel* model, const FilterOptions& options) 
   set_auto_alpha(options.auto_alpha);
   missing_ = options.auto_alpha ? 0.0 : 1.0;
   watch_.set_gate(options.gate);
-  if (options.calibrate) watch_.tell(WalkerWatch::kOldKey);
   mask_.begin(options.mask);
   if (model == nullptr) return;
   weights_.begin(
@@ -97,8 +96,6 @@ void StyleFilter::set(std::size_t parameter, double value) noexcept {
       discontinuity_ = discontinuity_ || value != options_.gate_fallback;
       options_.gate_fallback = value;
       return;
-    case kCalibrate:
-      return set_calibrate(value != 0.0);
     case kAutoAlpha:
       return set_auto_alpha(value != 0.0);
     default:
@@ -116,8 +113,6 @@ ParameterState StyleFilter::state(std::size_t parameter) const noexcept {
       return settled(options_.alpha_slew_per_s);
     case kGateFallback:
       return settled(options_.gate_fallback);
-    case kCalibrate:
-      return settled(options_.calibrate ? 1.0 : 0.0);
     case kAutoAlpha:
       return settled(options_.auto_alpha ? 1.0 : 0.0);
     default:
@@ -140,18 +135,6 @@ void StyleFilter::describe(std::size_t index, const StageCommand& command,
 }
 
 float StyleFilter::alpha() const noexcept { return static_cast<float>(alpha_); }
-
-// Off: the walker is forgotten. RT-safe
-void StyleFilter::set_calibrate(bool on) noexcept {
-  watch_.tell(WalkerWatch::kOldKey);
-  options_.calibrate = on;
-  if (on) {
-    static_cast<void>(watch_.warm_up(model_, kUsualWarmUp_s));
-  } else if (watch_.walker()) {
-    watch_.set_walker({});
-    discontinuity_ = true;
-  }
-}
 
 // RT-safe
 bool StyleFilter::command(std::size_t index, const StageCommand& command) noexcept {

@@ -44,7 +44,6 @@ struct FilterOptions {
   double alpha_slew_per_s = 2.0;
   bool gate = true;            // fade out where the model does not know the motion
   double gate_fallback = 0.0;  // how much of the model's constant part is left there
-  bool calibrate = false;      // the older name of a warm-up at the start
   bool auto_alpha = false;     // less style for who shows it already (README.md, "Auto-alpha")
   std::string weights{};       // of the styles (shares_of()); empty: the first one alone
   Mask mask = whole_body();    // of the parts of the body
@@ -99,7 +98,7 @@ class StyleFilter final : public Stage {
   void flush(StageOut& /*out*/) noexcept override { watch_.interrupt(); }
 
   // The parameters, as style_type() numbers them. RT-safe.
-  enum Parameter : std::size_t { kAlpha, kAlphaSlew, kGate, kGateFallback, kCalibrate, kAutoAlpha };
+  enum Parameter : std::size_t { kAlpha, kAlphaSlew, kGate, kGateFallback, kAutoAlpha };
   void set(std::size_t parameter, double value) noexcept override;
   [[nodiscard]] ParameterState state(std::size_t parameter) const noexcept override;
   void use(const StageModel& model) noexcept override;
@@ -132,7 +131,6 @@ class StyleFilter final : public Stage {
   void set_auto_alpha(bool on) noexcept;
   void find_missing() noexcept;
   [[nodiscard]] double wanted_alpha() const noexcept;
-  void set_calibrate(bool on) noexcept;
   void begin_blend(const Rotations& in, const Frame& styled, double dt_s) noexcept;
   void blend(Frame& styled) const noexcept;
 

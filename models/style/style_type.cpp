@@ -20,7 +20,6 @@ FilterOptions options_of(const Parameters& parameters) {
           .alpha_slew_per_s = parameter<double>(parameters, "alpha_slew_per_s"),
           .gate = parameter<bool>(parameters, "gate"),
           .gate_fallback = parameter<double>(parameters, "gate_fallback"),
-          .calibrate = parameter<bool>(parameters, "calibrate"),
           .auto_alpha = parameter<bool>(parameters, "auto_alpha"),
           .weights = parameter<std::string>(parameters, "weights"),
           .mask = mask_of(parameter<std::string>(parameters, "mask")).value_or(whole_body())};
@@ -37,8 +36,7 @@ std::optional<ParameterFault> check(const Parameters& parameters, bool /*has_mod
     return ParameterFault{
         "warm_up_s", "warm_up_s is too short to measure a walk: give at least 2, or 0 for none"};
   }
-  const bool warms_up = seconds != 0.0 || parameter<bool>(parameters, "calibrate");
-  if (warms_up && !parameter<std::string>(parameters, "neutral").empty()) {
+  if (seconds != 0.0 && !parameter<std::string>(parameters, "neutral").empty()) {
     return ParameterFault{
         "neutral", "neutral and a warm-up at the start both tell how the walker walks: give one"};
   }
@@ -156,10 +154,6 @@ std::vector<ParameterSpec> parameters() {
            .min = 0.0,
            .max = 1.0,
            .live = true},
-          {.name = "calibrate",
-           .default_value = defaults.calibrate,
-           .help = "the older name of warm_up_s = 10",
-           .live = true},
           {.name = "auto_alpha",
            .default_value = defaults.auto_alpha,
            .help = "less style for a walker who shows it already",
@@ -172,7 +166,7 @@ std::vector<ParameterSpec> parameters() {
           {.name = "neutral",
            .default_value = std::string(),
            .is_path = true,
-           .help = "a clip of the walker's usual walk, in the place of a warm-up: .bvh or .amc"},
+           .help = "a clip of the walker's usual walk, in the place of a warm-up"},
           {.name = "weights",
            .default_value = std::string(),
            .help = "how much of each style of the model: \"feminine=0.6,elderly=0.4\"; empty: the"
@@ -203,8 +197,6 @@ std::vector<StageNoticeType> notices() {
       {.sentence = "the warm-up was interrupted, so all stays as it was: start it again"},
       {.sentence = "the new model sees other joints, so what is known of the walker does not "
                    "serve it: start a warm-up"},
-      {.sentence = "calibrate is the older name of a warm-up: use warm_up_s = 10, or `posed ctl "
-                   "warm-up STREAM`"},
       {.sentence = "the model has no style axis, so auto_alpha does nothing: train a model of one "
                    "style with this version of posed, or set auto_alpha = false"}};
 }
@@ -290,8 +282,7 @@ Result<std::optional<StageType::FirstCommand>> first_command(const Parameters& p
     if (!command) return std::unexpected(command.error());
     return StageType::FirstCommand{StyleFilter::kNeutral, *command};
   }
-  double seconds = parameter<double>(parameters, "warm_up_s");
-  if (seconds == 0.0 && parameter<bool>(parameters, "calibrate")) seconds = kUsualWarmUp_s;
+  const double seconds = parameter<double>(parameters, "warm_up_s");
   if (seconds == 0.0) return std::nullopt;
   return StageType::FirstCommand{StyleFilter::kWarmUp, StageCommand::of(seconds)};
 }

@@ -19,15 +19,7 @@ namespace posed::style {
 class WalkerWatch {
  public:
   // What people are told, as style_type() numbers it.
-  enum Notice : std::size_t {
-    kNoGateData,
-    kWarmedUp,
-    kStood,
-    kInterrupted,
-    kOtherJoints,
-    kOldKey,
-    kNoAxis
-  };
+  enum Notice : std::size_t { kNoGateData, kWarmedUp, kStood, kInterrupted, kOtherJoints, kNoAxis };
 
   // Takes a frame's q, `gap_s` after the last one, of which `dt_s` count, and writes what the
   // kernel shall see of it: q as if the walker's neutral pose were the training's. Returns whether

@@ -1,10 +1,9 @@
-// The rows of a device log, one struct per table, as in format 3. Ids give the order of rows within
+// The rows of a device log, one struct per table. Ids give the order of rows within
 // a table. All times are the recording host's CLOCK_MONOTONIC [ns]. The ids of sources and streams
 // are names, not indices: they need not be consecutive.
 //
 // An item is a frame, a sample or a stream event on its way from the reader to the pipeline. Items
-// are counted from 1 over all streams, including dropped ones. Formats 1 and 2 did not count them:
-// there, the numbers of items, and of samples, are 0.
+// are counted from 1 over all streams, including dropped ones.
 #pragma once
 
 #include <cstddef>
@@ -70,9 +69,6 @@ struct DecisionRow {
   std::string name;
   std::string value;  // serialized
   std::int64_t now_ns = 0;
-  // Used only by formats 1 and 2, which did not count items: the decision takes effect just before
-  // this frame of its stream.
-  std::uint64_t before_frame = 0;
 };
 
 // Table frame, only if recording frames was requested: a posed.v1.Frame without stage stamps.

@@ -8,7 +8,7 @@ namespace posed::log {
 
 inline constexpr std::int32_t kApplicationId = 0x504F5345;  // "POSE" in the SQLite header
 inline constexpr std::int32_t kFormatVersion = 3;  // user_version; increases when the tables change
-inline constexpr std::int32_t kLastOldVersion = 2;  // read through old_format.hpp
+inline constexpr std::int32_t kMinFormatVersion = 3;  // the oldest that is read
 
 // STRICT: SQLite rejects values of the wrong type, so a reader need not check each row.
 inline constexpr const char* kSchema = R"sql(
