@@ -18,6 +18,8 @@ namespace posed::clip {
 
 using ChannelMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+struct ClipFile;  // proto/clip/format.hpp
+
 struct Clip {
   std::string path;
   std::shared_ptr<const Skeleton> skeleton;
@@ -34,19 +36,19 @@ struct Clip {
   [[nodiscard]] Frame frame(int index) const;
 };
 
-// What a user may say about how a file is read. Which of them a format accepts stands in the table
-// (format.hpp); another one that is given is refused.
+// Facts that a file may lack and a user can supply. The table (format.hpp) says which of them a
+// format accepts; any other that is given is refused.
 struct ReadOptions {
   // The file of the skeleton, for a format that keeps it apart; empty: NN.asf beside NN_MM.amc.
   std::filesystem::path skeleton{};
-  std::optional<double>
-      rate_hz{};  // of a format that does not state its rate; empty: its usual one
+  // Rate of a format that does not state it; empty: its usual one.
+  std::optional<double> rate_hz{};
   // Unit of length of a format that does not state it; empty: the profile's, otherwise guessed from
   // the figure's height.
   std::optional<double> metres_per_unit{};
   std::string profile{};       // name of a skeleton profile; empty: found by joint names
-  std::optional<Side> hand{};  // side of a file that does not state it; empty: right
-  std::string hand_shape{kDefaultHandShape};  // of a format that holds angles only
+  std::optional<Side> hand{};  // side of a hand that does not state it; empty: right
+  std::string hand_shape{kDefaultHandShape};  // bones of a hand of which a file has only the angles
 };
 
 // Reads a clip of any format of the table (format.hpp), with all its frames. Errors name file and
@@ -54,8 +56,7 @@ struct ReadOptions {
 [[nodiscard]] Result<Clip> read_clip(const std::filesystem::path& path,
                                      const ReadOptions& options = {});
 
-// Reads a clip from memory; its name says the format.
-struct ClipFile;
+// Reads a clip from memory. The extension of its name says the format.
 [[nodiscard]] Result<Clip> parse_clip(const ClipFile& file, const ReadOptions& options = {});
 
 // Writes a clip in the format that the extension of `path` says. An error leaves no file.

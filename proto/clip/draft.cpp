@@ -4,7 +4,6 @@
 #include <cassert>
 #include <cmath>
 
-#include "proto/clip/mean_pose.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/frame/bone_names.hpp"
 #include "proto/frame/plausible.hpp"
@@ -48,6 +47,23 @@ void settle_offsets(Clip& clip, Skeleton& skeleton) {
   }
 }
 
+// Refuses values that no pose can have. A reader of text has refused them before, with their line.
+Result<> check_values(const Clip& clip) {
+  for (int i = 0; i < clip.frames(); ++i) {
+    for (std::size_t c = 0; c < clip.skeleton->channels.size(); ++c) {
+      const Channel& channel = clip.skeleton->channels[c];
+      const double value = clip.channels(i, static_cast<Eigen::Index>(c));
+      const double max = channel.translation ? kMaxPosition_m : kMaxAngle_rad;
+      if (!(std::abs(value) > max)) continue;  // a missing value is NaN
+      return fail("frame " + std::to_string(i + 1) + ": joint " +
+                      in_quotes(clip.skeleton->joints[channel.joint].name) +
+                      " has a value beyond what a pose can have; is the unit right?",
+                  clip.path);
+    }
+  }
+  return {};
+}
+
 // Sets bones, root joint, offsets and T frames in this order, because each step needs the one
 // before.
 Result<> complete(Clip& clip, Skeleton& skeleton, const Profile* profile, const Hints& hints) {
@@ -82,6 +98,14 @@ Result<> complete(Clip& clip, Skeleton& skeleton, const Profile* profile, const 
                 " lies more than 1 km from its parent; is the unit of length right?");
   }
   return skeleton.finish();
+}
+
+// The line from the right to the left upper leg in the hips' frame; zero when either is unknown.
+Eigen::Vector3d hip_line(const Skeleton& skeleton) {
+  const int left = skeleton.joint_of(Bone::kLeftUpperLeg);
+  const int right = skeleton.joint_of(Bone::kRightUpperLeg);
+  if (left < 0 || right < 0) return Eigen::Vector3d::Zero();
+  return skeleton.joints[left].offset_m - skeleton.joints[right].offset_m;
 }
 
 }  // namespace
@@ -127,11 +151,41 @@ Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints) {
   assert(clip.time_s.empty() || std::ssize(clip.time_s) == clip.frames());
   auto skeleton = std::make_shared<Skeleton>(std::move(draft.skeleton));
   clip.skeleton = skeleton;
+  if (auto ok = check_values(clip); !ok) return std::unexpected(ok.error());
   if (draft.skeleton_is_known) return clip;
   if (auto ok = complete(clip, *skeleton, draft.profile, hints); !ok) {
     return fail(ok.error().message, name);
   }
   return clip;
+}
+
+std::vector<Eigen::Quaterniond> mean_rotations(const Clip& clip) {
+  const Skeleton& skeleton = *clip.skeleton;
+  const Eigen::Vector3d line = hip_line(skeleton);
+  const int hips = std::max(skeleton.joint_of(Bone::kHips), 0);
+  std::vector<Eigen::Quaterniond> global(skeleton.joints.size());
+  std::vector<Eigen::Vector4d> sum(skeleton.joints.size(), Eigen::Vector4d::Zero());
+  for (int i = 0; i < clip.frames(); ++i) {
+    const auto row = clip.channels.row(i);
+    const std::span<const double> values(row.data(), static_cast<std::size_t>(row.size()));
+    for (int j = 0; j < std::ssize(skeleton.joints); ++j) {
+      const int parent = skeleton.joints[j].parent;
+      const Eigen::Quaterniond local = local_rotation(skeleton, j, values);
+      global[j] = parent < 0 ? local : global[parent] * local;
+    }
+    // Left is +X when the figure faces +Z.
+    const Eigen::Vector3d left = global[hips] * line;
+    const Eigen::Quaterniond back = axis_rotation(Axis::kY, std::atan2(left.z(), left.x()));
+    for (std::size_t j = 0; j < global.size(); ++j) {
+      const Eigen::Vector4d q = (back * global[j]).coeffs();
+      sum[j] += q.dot(sum[j]) < 0 ? Eigen::Vector4d(-q) : q;
+    }
+  }
+  for (std::size_t j = 0; j < global.size(); ++j) {
+    global[j] = sum[j].norm() > 1e-9 ? Eigen::Quaterniond(sum[j].normalized())
+                                     : Eigen::Quaterniond::Identity();
+  }
+  return global;
 }
 
 }  // namespace posed::clip

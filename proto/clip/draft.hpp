@@ -26,8 +26,8 @@ struct TextFrames {
   std::vector<FrameSpan> frames;
 };
 
-// What the reader of a format makes of a file: all its frames as numbers. clip_of() finds what only
-// the whole clip shows.
+// The result of a format's reader: all frames of a file as numbers. clip_of() adds what only the
+// whole clip shows.
 struct Draft {
   Skeleton skeleton;               // metres; unfinished, unless skeleton_is_known
   bool skeleton_is_known = false;  // posed's own: it has bones, root joint and T frames
@@ -45,7 +45,7 @@ struct Draft {
 [[nodiscard]] Result<> read_frames(const TextFrames& text, const std::string& name,
                                    std::vector<double>& values, std::vector<double>& time_s);
 
-// Facts that take all frames to find, supplied when only the first is available (the device
+// Facts that only all frames show, supplied when only the first frame is available (the device
 // description in a log).
 struct Hints {
   std::optional<int> root_joint;
@@ -55,5 +55,10 @@ struct Hints {
 // Completes the skeleton: bones, root joint, offsets and T frames, as far as the draft does not
 // know them. A draft without frames is an error.
 [[nodiscard]] Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints = {});
+
+// Mean global rotation of each joint [joint], with the heading of each frame (from the line between
+// the upper legs) removed. Input of t_frames_from_mean_pose(), when the figure walks or stands in
+// the clip.
+[[nodiscard]] std::vector<Eigen::Quaterniond> mean_rotations(const Clip& clip);
 
 }  // namespace posed::clip

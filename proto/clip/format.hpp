@@ -24,7 +24,7 @@ enum class ReadOption : std::uint8_t { kSkeleton, kRate, kUnit, kProfile, kHand,
 struct ClipFile {
   std::string name;             // path, for messages and to recognise the format by its extension
   std::string bytes;            // content
-  std::string skeleton_name{};  // of a format whose skeleton is a file of its own
+  std::string skeleton_name{};  // path of the skeleton, where that is a file of its own
   std::string skeleton{};       // content of that file
 };
 
@@ -38,11 +38,12 @@ struct Format {
   // A stream of the file driver carries the file's own lines, because the logs of posed 0.1 do. The
   // frames of all other formats travel as numbers (device_clip.hpp), so a new format leaves it off.
   bool sends_text = false;
-  std::string_view
-      skeleton_extension{};           // of the file that has the skeleton; empty: the clip has it
-  std::vector<ReadOption> options{};  // that reading accepts; all others are refused
+  // Extension of the file that has the skeleton; empty: the clip itself has it.
+  std::string_view skeleton_extension{};
+  std::vector<ReadOption> options{};  // reading accepts these and refuses all others
 
-  // Whether a file that begins with these bytes (some KB) is of this format. Null: never.
+  // Returns whether a file that begins with these bytes (some KB) is of this format. Null: nothing
+  // is recognised by its content.
   bool (*sniff)(std::string_view begin) = nullptr;
   // Reads the whole clip, which is untrusted. Errors name file and line. Null: posed cannot read
   // it.
@@ -66,7 +67,7 @@ void add_format(Format format);
 // The format that recognises the first bytes of a file; null if none does.
 [[nodiscard]] const Format* format_of_bytes(std::string_view begin);
 
-// What a list of formats is for: whether they are read or written, and of what.
+// Selects the formats of a list: those that are read or written, all or only those of bodies.
 enum class Use : std::uint8_t { kRead, kReadBody, kWrite, kWriteBody };
 
 // "a .bvh, an .amc or a hand's .csv", for help texts and errors.
@@ -74,7 +75,7 @@ enum class Use : std::uint8_t { kRead, kReadBody, kWrite, kWriteBody };
 // All extensions of these formats.
 [[nodiscard]] std::vector<std::string_view> extensions(Use use);
 
-// Whether files of this name accept the option; false for a name of no format.
+// Returns whether files of this name accept the option; false for a name of no format.
 [[nodiscard]] bool accepts(const std::filesystem::path& path, ReadOption option);
 // The options without those that files of this name do not accept, for commands that read several
 // clips by the same options.

@@ -1,5 +1,5 @@
 // HandClip: the motion of one hand as hand45 angles. It is read from and written to the hand CSV,
-// or taken from any clip that has the fifteen finger joints of a hand (a BVH with fingers).
+// or extracted from any clip that has the fifteen finger joints of a hand (a BVH with fingers).
 //
 // The hand CSV: a header `time_s,thumb1_x_rad,thumb1_y_rad,thumb1_z_rad,thumb2_x_rad, ...,
 // little3_z_rad`, then one line per frame. An empty field is a missing value. Times may be unevenly

@@ -1,5 +1,5 @@
-// Tools to read text from people and other programs: words with their line numbers, and numbers
-// independent of the locale.
+// Tools to read text that users and other programs wrote: words with their line numbers, and
+// numbers independent of the locale.
 #pragma once
 
 #include <cstddef>
@@ -33,7 +33,7 @@ inline constexpr double kMaxValue = 1e9;
 // RT-safe.
 [[nodiscard]] std::string_view next_line(std::string_view& text) noexcept;
 
-// Whether a line of `text` begins with `start`, after blanks.
+// Returns whether a line of `text` begins with `start`, after blanks.
 [[nodiscard]] bool has_line(std::string_view text, std::string_view start) noexcept;
 
 // Walks through a text word by word and tracks the line number. Braces are words of their own.

@@ -14,7 +14,7 @@
 
 namespace posed::log {
 
-// Of one log. Bodies that come and go all the time make many, two a second at most of each.
+// Streams of one log. Bodies that come and go all the time make many: each at most two a second.
 inline constexpr std::size_t kMaxStreams = 65536;
 
 // Table source: a device that was open when recording began, with everything needed to decode its
@@ -109,10 +109,10 @@ inline constexpr const char* kShedSamples = "shed-samples";  // a range of sampl
 inline constexpr const char* kTick = "tick";                 // at now_ns
 inline constexpr const char* kEnd = "end";                   // the stream has ended, at now_ns
 inline constexpr const char* kStyle = "style";
-inline constexpr const char* kAlpha = "alpha";  // of style: a number
-inline constexpr const char* kModel = "model";  // of style and generate: a sha256
+inline constexpr const char* kAlpha = "alpha";  // a parameter of style: a number
+inline constexpr const char* kModel = "model";  // a new model of style or generate: its SHA-256
 inline constexpr const char* kGenerate = "generate";
-inline constexpr const char* kPlay = "play";  // of generate: a play order
+inline constexpr const char* kPlay = "play";  // a command of generate: a play order
 inline constexpr const char* kStopPlaying = "stop-playing";
 inline constexpr const char* kConstrain = "constrain";
 }  // namespace words

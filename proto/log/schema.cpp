@@ -1,4 +1,4 @@
-#include "proto/log/positions.hpp"
+#include "proto/log/schema.hpp"
 
 #include <cstdint>
 
