@@ -137,7 +137,7 @@ bool ControlServer::take_ack() {
 // A ROUTER socket drops a reply that a slow or disconnected client does not accept.
 void ControlServer::send(const Reply& reply) {
   if (reply.refused) ++refusals_;
-  net::hear_peers(router_.get());
+  net::update_peers(router_.get());
   for (const std::string& part : reply.to) {
     if (!net::send_part(router_.get(), part, true)) return;
   }

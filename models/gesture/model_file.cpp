@@ -189,10 +189,10 @@ void read_nodes(const v1::GestureTree& from, int questions, Tree<Gaussian>& tree
   check.want(count >= 1 && count < 2 * most, "the number of nodes of a tree");
   check.want(from.yes_size() == count && from.no_size() == count && from.leaf_size() == count,
              "the node arrays of a tree, which differ in length");
-  if (!check.sound()) return;
+  if (!check.valid()) return;
   std::vector<int> parents(static_cast<std::size_t>(count));
   int leaves = 0;
-  for (int i = 0; i < count && check.sound(); ++i) {
+  for (int i = 0; i < count && check.valid(); ++i) {
     const TreeNode node{from.question(i), from.yes(i), from.no(i), from.leaf(i)};
     const bool is_leaf = node.question < 0;
     if (is_leaf) {
@@ -203,12 +203,12 @@ void read_nodes(const v1::GestureTree& from, int questions, Tree<Gaussian>& tree
       check.want(node.question < questions && node.leaf == -1, "a question of a tree");
       for (const int child : {node.yes, node.no}) {
         check.want(child > i && child < count, "a child of a tree's node");
-        if (check.sound()) ++parents[child];
+        if (check.valid()) ++parents[child];
       }
     }
     tree.nodes.push_back(node);
   }
-  for (int i = 1; i < count && check.sound(); ++i) {
+  for (int i = 1; i < count && check.valid(); ++i) {
     check.want(parents[i] == 1, "a tree's node, which is not the child of one node");
   }
   tree.leaves.resize(static_cast<std::size_t>(leaves));
@@ -218,7 +218,7 @@ template <typename Gaussian>
 Tree<Gaussian> read_tree(const v1::GestureTree& from, const TreeShape& shape, Validator& check) {
   Tree<Gaussian> tree;
   read_nodes(from, shape.questions, tree, check);
-  if (!check.sound()) return {};
+  if (!check.valid()) return {};
   const int leaves = static_cast<int>(tree.leaves.size());
   const int dims = shape.dims;
   check.want(from.mean_size() == leaves * dims && from.variance_size() == leaves * dims &&
@@ -227,7 +227,7 @@ Tree<Gaussian> read_tree(const v1::GestureTree& from, const TreeShape& shape, Va
   check.numbers(from.mean(), -kMaxNumber, kMaxNumber, "a mean");
   check.numbers(from.variance(), kMinVariance, kMaxNumber, "a variance");
   check.numbers(from.occupancy(), 0.0, kMaxNumber, "an occupancy");
-  if (!check.sound()) return {};
+  if (!check.valid()) return {};
   for (int i = 0; i < leaves; ++i) {
     take_row(from.mean().data() + i * dims, dims, tree.leaves[i].mean);
     take_row(from.variance().data() + i * dims, dims, tree.leaves[i].variance);
@@ -240,7 +240,7 @@ void read_range(const v1::GestureModel& from, GestureModel& model, Validator& ch
   const int channels = model.channels();
   check.want(from.low_rad_size() == channels && from.high_rad_size() == channels,
              "the range of the angles");
-  if (!check.sound()) return;
+  if (!check.valid()) return;
   for (int c = 0; c < channels; ++c) {
     model.low.push_back(check.number(from.low_rad(c), -1e3, 1e3, "the range of an angle"));
     model.high.push_back(
@@ -252,10 +252,10 @@ GestureModel read_model(const v1::GestureModel& from, Validator& check) {
   GestureModel model;
   model.rate_hz = check.number(from.rate_hz(), 1.0, 10'000.0, "the frame rate");
   read_vocabulary(from, model, check);
-  if (!check.sound()) return model;
+  if (!check.valid()) return model;
   const auto groups = static_cast<int>(model.groups.size());
   check.want(from.tree_size() == kStates * groups, "the number of trees");
-  if (!check.sound()) return model;
+  if (!check.valid()) return model;
   for (int i = 0; i < kStates * groups; ++i) {
     const TreeShape shape = shape_of(model, i % groups);
     model.trees[i / groups].push_back(read_tree<GroupGaussian>(from.tree(i), shape, check));

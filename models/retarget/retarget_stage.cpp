@@ -6,7 +6,7 @@
 
 #include "models/motion/canonical_skeleton.hpp"
 #include "models/motion/retarget.hpp"
-#include "proto/clip/text_clip.hpp"
+#include "proto/clip/device_clip.hpp"
 
 namespace posed::retarget {
 namespace {
@@ -31,9 +31,9 @@ class RetargetStage final : public Stage {
 Result<std::shared_ptr<const Skeleton>> target(const StageContext& context) {
   const auto& to = parameter<std::string>(context.parameters, "to");
   if (to == kHumanoid) return motion::canonical_skeleton(*context.skeleton);
-  auto format = clip::parse_description(to, "the skeleton to retarget to");
-  if (!format) return std::unexpected(format.error());
-  return std::move(format->skeleton);
+  auto coding = clip::parse_description(to, "the skeleton to retarget to");
+  if (!coding) return std::unexpected(coding.error());
+  return std::move(coding->skeleton);
 }
 
 Result<std::unique_ptr<Stage>> make(const StageContext& context, const StageModel* /*model*/) {
@@ -48,9 +48,9 @@ Result<std::unique_ptr<Stage>> make(const StageContext& context, const StageMode
 Result<> read_target(Parameters& parameters) {
   auto& to = std::get<std::string>(parameters.at("to"));
   if (to == kHumanoid) return {};
-  const auto clip = clip::open_text_clip(to);
+  const auto clip = clip::open_device_clip(to);
   if (!clip) return std::unexpected(clip.error());
-  to = (*clip)->description;
+  to = clip->description;
   return {};
 }
 

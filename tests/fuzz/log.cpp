@@ -103,7 +103,7 @@ class FuzzedLog {
     if (input_.ConsumeBool()) {
       add(R"({"stage":"style","model":")" + hash() + R"(","parameters":{"alpha":)" + number() +
           R"(,"alpha_slew_per_s":)" + number() + R"(,"gate":true,"gate_fallback":)" + number() +
-          R"(,"calibrate":true}})");
+          "}}");
     }
     if (input_.ConsumeBool()) {
       add(R"({"stage":"generate","model":")" + hash() + R"(","parameters":{"lag_frames":)" +

@@ -74,7 +74,7 @@ bool Connection::wait(std::chrono::milliseconds timeout) {
 }
 
 std::optional<Error> Connection::refusal() {
-  const std::string why = net::refusal_words(monitor_.take_news(), domain_, options_.server_key);
+  const std::string why = net::refusal_words(monitor_.next_refusal(), domain_, options_.server_key);
   if (why.empty()) return std::nullopt;
   return fail("the daemon at " + options_.endpoint + " " + why).error();
 }

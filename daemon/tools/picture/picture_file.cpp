@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "daemon/tools/picture/program.hpp"
-#include "proto/clip/file_names.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/text/load_file.hpp"
 

@@ -58,7 +58,7 @@ bool Upstream::receive(net::Message& topic, net::Message& body, bool& sound) {
 
 void Upstream::take_news() {
   const bool before = monitor_.established();
-  const net::Refusal refusal = monitor_.take_news();
+  const net::Refusal refusal = monitor_.next_refusal();
   if (refusal != net::Refusal::kNone) {
     spdlog::error("the daemon at {} {}", endpoint(),
                   net::refusal_words(refusal, net::Domain::kPublish, settings_.server_key));

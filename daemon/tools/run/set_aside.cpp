@@ -3,7 +3,7 @@
 #include <system_error>
 #include <utility>
 
-#include "proto/log/files.hpp"
+#include "proto/log/schema.hpp"
 
 namespace posed::tools {
 

@@ -221,7 +221,7 @@ bool DaemonLink::hear_replies() {
 void DaemonLink::take_news(std::int64_t now_ns) {
   net::LinkMonitor& monitor = publish_->monitor();
   const std::string why =
-      net::refusal_words(monitor.take_news(), net::Domain::kPublish, options_.server_key);
+      net::refusal_words(monitor.next_refusal(), net::Domain::kPublish, options_.server_key);
   const std::string daemon = "the daemon at " + options_.connect;
   if (monitor.ends() != publish_ends_) {
     publish_ends_ = monitor.ends();
@@ -238,7 +238,7 @@ void DaemonLink::take_news(std::int64_t now_ns) {
 void DaemonLink::check_control(std::int64_t now_ns) {
   net::LinkMonitor& monitor = control_->monitor();
   const std::string why =
-      net::refusal_words(monitor.take_news(), net::Domain::kControl, options_.server_key);
+      net::refusal_words(monitor.next_refusal(), net::Domain::kControl, options_.server_key);
   const std::string daemon = "the daemon at " + options_.control;
   if (!why.empty()) {
     hub_.control_is({.may = false, .reason = daemon + " " + why});

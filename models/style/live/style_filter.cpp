@@ -45,7 +45,6 @@ StyleFilter::StyleFilter(const BoundModel* model, const FilterOptions& options) 
   tracker_.set_auto_alpha(options.auto_alpha);
   missing_ = options.auto_alpha ? 0.0 : 1.0;
   tracker_.set_gate(options.gate);
-  if (options.calibrate) tracker_.tell(WalkerTracker::kOldKey);
   mask_.begin(options.mask);
   if (model == nullptr) return;
   weights_.begin(
@@ -110,9 +109,6 @@ const StyleFilter::Table& StyleFilter::table() {
            .max = 1.0,
            .live = true},
           {.set = &StyleFilter::set_gate_fallback}),
-      Table::row<&FilterOptions::calibrate>(
-          {.name = "calibrate", .help = "the older name of warm_up_s = 10", .live = true},
-          {.set = &StyleFilter::set_calibrate}),
       Table::row<&FilterOptions::auto_alpha>(
           {.name = "auto_alpha",
            .help = "less style for a walker who shows it already",
@@ -127,8 +123,7 @@ const StyleFilter::Table& StyleFilter::table() {
       {.spec = {.name = "neutral",
                 .default_value = std::string(),
                 .is_path = true,
-                .help =
-                    "a clip of the walker's usual walk, in the place of a warm-up: .bvh or .amc"}},
+                .help = "a clip of the walker's usual walk, in the place of a warm-up"}},
       Table::row<&FilterOptions::weights>(
           {.name = "weights",
            .help = "how much of each style of the model: \"feminine=0.6,elderly=0.4\"; empty: the"
@@ -162,17 +157,6 @@ void StyleFilter::describe(std::size_t index, const StageCommand& command,
 }
 
 float StyleFilter::alpha() const noexcept { return static_cast<float>(alpha_); }
-
-// Off: the walker is forgotten. RT-safe
-void StyleFilter::set_calibrate(double on) noexcept {
-  tracker_.tell(WalkerTracker::kOldKey);
-  if (on != 0.0) {
-    static_cast<void>(tracker_.warm_up(model_, kUsualWarmUp_s));
-  } else if (tracker_.walker()) {
-    tracker_.set_walker({});
-    discontinuity_ = true;
-  }
-}
 
 // RT-safe
 bool StyleFilter::command(std::size_t index, const StageCommand& command) noexcept {

@@ -45,7 +45,6 @@ struct FilterOptions {
   double alpha_slew_per_s = 2.0;
   bool gate = true;            // fade out where the model does not know the motion
   double gate_fallback = 0.0;  // how much of the model's constant part is left there
-  bool calibrate = false;      // the older name of a warm-up at the start
   bool auto_alpha = false;     // less style for who shows it already (README.md, "Auto-alpha")
   std::string weights{};       // of the styles (shares_of()); empty: the first one alone
   Mask mask = whole_body();    // of the parts of the body
@@ -142,7 +141,6 @@ class StyleFilter final : public Stage {
   void set_auto_alpha(double on) noexcept { tracker_.set_auto_alpha(on != 0.0); }
   void find_missing() noexcept;
   [[nodiscard]] double wanted_alpha() const noexcept;
-  void set_calibrate(double on) noexcept;
   void begin_blend(const Rotations& in, const Frame& styled, double dt_s) noexcept;
   void blend(Frame& styled) const noexcept;
 

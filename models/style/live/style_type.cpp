@@ -26,8 +26,7 @@ std::optional<ParameterFault> check(const Parameters& parameters, bool /*has_mod
     return ParameterFault{
         "warm_up_s", "warm_up_s is too short to measure a walk: give at least 2, or 0 for none"};
   }
-  const bool warms_up = seconds != 0.0 || parameter<bool>(parameters, "calibrate");
-  if (warms_up && !parameter<std::string>(parameters, "neutral").empty()) {
+  if (seconds != 0.0 && !parameter<std::string>(parameters, "neutral").empty()) {
     return ParameterFault{
         "neutral", "neutral and a warm-up at the start both tell how the walker walks: give one"};
   }
@@ -139,8 +138,6 @@ std::vector<StageNoticeType> notices() {
       {.sentence = "the warm-up was interrupted, so all stays as it was: start it again"},
       {.sentence = "the new model sees other joints, so what is known of the walker does not "
                    "serve it: start a warm-up"},
-      {.sentence = "calibrate is the older name of a warm-up: use warm_up_s = 10, or `posed ctl "
-                   "warm-up STREAM`"},
       {.sentence = "the model has no style axis, so auto_alpha does nothing: train a model of one "
                    "style with this version of posed, or set auto_alpha = false"}};
 }
@@ -226,8 +223,7 @@ Result<std::optional<StageType::FirstCommand>> first_command(const Parameters& p
     if (!command) return std::unexpected(command.error());
     return StageType::FirstCommand{StyleFilter::kNeutral, *command};
   }
-  double seconds = parameter<double>(parameters, "warm_up_s");
-  if (seconds == 0.0 && parameter<bool>(parameters, "calibrate")) seconds = kUsualWarmUp_s;
+  const double seconds = parameter<double>(parameters, "warm_up_s");
   if (seconds == 0.0) return std::nullopt;
   return StageType::FirstCommand{StyleFilter::kWarmUp, StageCommand::of(seconds)};
 }

@@ -25,7 +25,6 @@ class WalkerTracker {
     kStood,
     kInterrupted,
     kOtherJoints,
-    kOldKey,
     kNoAxis
   };
 

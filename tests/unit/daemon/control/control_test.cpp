@@ -219,18 +219,18 @@ TEST_CASE("any live parameter of any stage can be set, by its name or with the s
   const auto flag = [](auto& wanted) { wanted.set_flag(true); };
   const auto text = [](auto& wanted) { wanted.set_text("much"); };
   CHECK_FALSE(fixture.ask(ask("style.alpha", number(0.5))));
-  CHECK_FALSE(fixture.ask(ask("style.calibrate", flag)));
+  CHECK_FALSE(fixture.ask(ask("style.auto_alpha", flag)));
   CHECK(fixture.daemon_control.sent[0].change.index ==
         test::parameter_index(style::style_type(), "alpha"));
   CHECK(fixture.daemon_control.sent[1].change.index ==
-        test::parameter_index(style::style_type(), "calibrate"));
+        test::parameter_index(style::style_type(), "auto_alpha"));
   CHECK(fixture.daemon_control.sent[1].change.value == 1.0);
   fixture.daemon_control.sent.clear();
   CHECK(has(fixture.refused(ask("alpha", number(2.5))),
             "alpha = 2.5 is out of range: it takes a number from -2 to 2"));
   CHECK(has(fixture.refused(ask("alpha", flag)), "alpha must be a number, not true or false"));
   CHECK(has(fixture.refused(ask("alpha", text)), "alpha must be a number, not text"));
-  CHECK(has(fixture.refused(ask("calibrate", number(1.0))), "calibrate must be true or false"));
+  CHECK(has(fixture.refused(ask("auto_alpha", number(1.0))), "auto_alpha must be true or false"));
   CHECK(has(fixture.refused(ask("warm_up_s", number(10.0))),
             "warm_up_s cannot change while the daemon runs"));
   CHECK(has(fixture.refused(ask("lag_ms", number(1.0))), "[stream.generate] table"));

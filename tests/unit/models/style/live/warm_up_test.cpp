@@ -263,18 +263,6 @@ TEST_CASE("a walker stays known when a model with other mean rotations is swappe
   CHECK(toy.notices() == std::vector<std::size_t>{WalkerTracker::kNoGateData});
 }
 
-TEST_CASE("calibrate is a warm-up by an older name", "[style]") {
-  const auto ready = warm_bound(gated_toy_model(1));
-  WarmedToy toy(ready.get());
-  toy.filter.set(test::parameter_index(style::style_type(), "calibrate"), 1.0);
-  toy.walk(60 * 11);
-  REQUIRE(toy.filter.walker());
-  CHECK(toy.notices() ==
-        std::vector<std::size_t>{WalkerTracker::kWarmedUp, WalkerTracker::kOldKey});
-  toy.filter.set(test::parameter_index(style::style_type(), "calibrate"), 0.0);
-  CHECK_FALSE(toy.filter.walker());
-}
-
 TEST_CASE("the warm-up command goes into the log and back; what it cannot be is refused",
           "[style]") {
   const StageCommandType& type = style::style_type().commands[style::StyleFilter::kWarmUp];

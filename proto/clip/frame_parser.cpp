@@ -1,9 +1,11 @@
-#include "proto/clip/frame_text.hpp"
+#include "proto/clip/frame_parser.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <bitset>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 
 #include "proto/clip/text.hpp"
 #include "proto/frame/degree.hpp"
@@ -13,6 +15,8 @@
 
 namespace posed::clip {
 namespace {
+
+static_assert(std::endian::native == std::endian::little, "frames of numbers are little-endian");
 
 std::string counted(std::size_t count) {
   return std::to_string(count) + (count == 1 ? " value" : " values");
@@ -95,6 +99,15 @@ FrameParser FrameParser::hand_csv() {
   return parser;
 }
 
+FrameParser FrameParser::numbers(const Skeleton& skeleton, bool timed) {
+  FrameParser parser;
+  parser.scale_ = scales(skeleton, 1.0, 1.0);
+  parser.limit_ = limits(skeleton);
+  parser.timed_ = timed;
+  parser.is_text_ = false;
+  return parser;
+}
+
 bool FrameParser::keep(double value, std::size_t channel, std::span<double> values) const noexcept {
   values[channel] = value * scale_[channel];
   // NaN marks a missing value and is accepted.
@@ -102,6 +115,7 @@ bool FrameParser::keep(double value, std::size_t channel, std::span<double> valu
 }
 
 FrameOutcome FrameParser::parse(std::string_view text, std::span<double> values) const noexcept {
+  if (!is_text_) return parse_numbers(text, values);
   if (timed_) return parse_fields(text, values);
   return bones_.empty() ? parse_line(text, values) : parse_block(text, values);
 }
@@ -164,6 +178,33 @@ FrameOutcome FrameParser::parse_fields(std::string_view text,
   return outcome.found < outcome.expected ? add_error(FrameFault::kTooFew, {}) : outcome;
 }
 
+FrameOutcome FrameParser::parse_numbers(std::string_view bytes,
+                                        std::span<double> values) const noexcept {
+  FrameOutcome outcome;
+  outcome.expected = channels();
+  if (bytes.size() != frame_bytes() || values.size() < channels()) {
+    outcome.fault = bytes.size() < frame_bytes() ? FrameFault::kTooFew : FrameFault::kTooMany;
+    return outcome;
+  }
+  const auto next = [&bytes] {
+    double value = 0.0;
+    std::memcpy(&value, bytes.data(), sizeof value);
+    bytes.remove_prefix(sizeof value);
+    return value;
+  };
+  if (timed_) outcome.time_s = next();
+  if (std::isinf(outcome.time_s) || std::abs(outcome.time_s) > kMaxValue) {
+    outcome.fault = FrameFault::kImplausible;
+    return outcome;
+  }
+  for (; outcome.found < outcome.expected; ++outcome.found) {
+    if (keep(next(), outcome.found, values)) continue;
+    outcome.fault = FrameFault::kImplausible;
+    return outcome;
+  }
+  return outcome;
+}
+
 int FrameParser::find_bone(std::string_view name) const noexcept {
   const auto at = std::ranges::lower_bound(
       bones_, name, {}, [](const AcclaimBone& bone) { return std::string_view(bone.name); });
@@ -219,6 +260,16 @@ FrameOutcome FrameParser::parse_block(std::string_view text,
     }
   }
   return outcome;
+}
+
+std::string frame_bytes(std::optional<double> time_s, std::span<const double> values) {
+  std::string bytes;
+  const auto add = [&bytes](double value) {
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  if (time_s) add(*time_s);
+  for (const double value : values) add(value);
+  return bytes;
 }
 
 }  // namespace posed::clip

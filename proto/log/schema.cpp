@@ -1,4 +1,4 @@
-#include "proto/log/places.hpp"
+#include "proto/log/schema.hpp"
 
 #include <cstdint>
 
@@ -15,7 +15,7 @@ void put(Int value, std::vector<std::byte>& out) {
 }
 
 template <typename Int>
-Int take(std::span<const std::byte>& bytes) {
+Int next(std::span<const std::byte>& bytes) {
   Int value = 0;
   for (std::size_t i = 0; i < sizeof(Int); ++i) value |= static_cast<Int>(bytes[i]) << (8 * i);
   bytes = bytes.subspan(sizeof(Int));
@@ -38,9 +38,9 @@ bool unpack_positions(std::span<const std::byte> bytes, std::vector<StreamPositi
   if (bytes.size() % kPlaceBytes != 0) return false;
   while (!bytes.empty()) {
     StreamPosition place;
-    place.stream = take<std::uint32_t>(bytes);
-    place.next_frame = take<std::uint64_t>(bytes);
-    place.next_sample = take<std::uint64_t>(bytes);
+    place.stream = next<std::uint32_t>(bytes);
+    place.next_frame = next<std::uint64_t>(bytes);
+    place.next_sample = next<std::uint64_t>(bytes);
     out.push_back(place);
   }
   return true;
