@@ -45,7 +45,7 @@ StyleFilter::StyleFilter(const BoundModel* model, const FilterOptions& options) 
   tracker_.set_auto_alpha(options.auto_alpha);
   missing_ = options.auto_alpha ? 0.0 : 1.0;
   tracker_.set_gate(options.gate);
-  if (options.calibrate) tracker_.tell(WalkerTracker::kOldKey);
+  if (options.calibrate) tracker_.report(WalkerTracker::kOldKey);
   mask_.begin(options.mask);
   if (model == nullptr) return;
   weights_.begin(
@@ -165,7 +165,7 @@ float StyleFilter::alpha() const noexcept { return static_cast<float>(alpha_); }
 
 // Off: the walker is forgotten. RT-safe
 void StyleFilter::set_calibrate(double on) noexcept {
-  tracker_.tell(WalkerTracker::kOldKey);
+  tracker_.report(WalkerTracker::kOldKey);
   if (on != 0.0) {
     static_cast<void>(tracker_.warm_up(model_, kUsualWarmUp_s));
   } else if (tracker_.walker()) {
