@@ -40,11 +40,11 @@ GenerateStage::GenerateStage(std::shared_ptr<const Skeleton> skeleton,
     standing_.emplace(*skeleton_);
   }
   player_.set_model(model);
-  take_channels();
+  use_channels();
 }
 
 // RT-safe.
-void GenerateStage::take_channels() noexcept {
+void GenerateStage::use_channels() noexcept {
   if (hand_) {
     pose_channels_ = &*hand_;
   } else {
@@ -57,7 +57,7 @@ void GenerateStage::use(const StageModel& model) noexcept {
   model_ = static_cast<const BoundModel*>(&model);
   static_cast<void>(smoother_.set_model(model_->live.get()));
   player_.set_model(model_);
-  take_channels();
+  use_channels();
   if (hand_ || !has_last_) return;
   // The channels of a body are those of its model.
   std::ranges::fill(live_, 0.0);
@@ -169,7 +169,7 @@ void GenerateStage::rest(const StageFrame& in, StageOut& out) noexcept {
   show(last_, {}, out);
 }
 
-// Takes the live pose from a frame; what it did not measure stays. RT-safe.
+// Reads the live pose from a frame; what it did not measure stays. RT-safe.
 void GenerateStage::follow(const Frame& frame) noexcept {
   const double dt_s = std::min(elapsed_.next_s(frame.header), kMaxStep_s);
   if (pose_channels_->has_heading(frame)) {

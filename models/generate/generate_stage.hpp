@@ -62,7 +62,7 @@ class GenerateStage final : public Stage {
   void follow(const Frame& frame) noexcept;
   void show(Frame& frame, std::span<const double> live, StageOut& out) noexcept;
   void pose(const GesturePlayer::Pose& shown, Frame& frame) noexcept;
-  void take_channels() noexcept;
+  void use_channels() noexcept;
   [[nodiscard]] std::span<double> used(std::vector<double>& values) const noexcept {
     return std::span(values).first(static_cast<std::size_t>(pose_channels_->count()));
   }

@@ -6,6 +6,16 @@
 #include <utility>
 
 namespace posed::generate {
+namespace {
+
+constexpr double kWayBack_s = 0.8;
+// Look-ahead into the label sequence: with 20 frames at 30 Hz the jerk of a streamed trajectory is
+// within 3 % of the full solution's (models/trajectory/README.md, "Look-ahead").
+constexpr double kLookAhead_s = 20.0 / 30.0;
+// Labels of a loop that are planned ahead: those within the look-ahead, and one neighbour.
+constexpr int kLoopAhead = 3;
+
+}  // namespace
 
 // RT-safe.
 void QuinticOffset::start(std::span<const double> offset, std::span<const double> velocity,
@@ -29,17 +39,6 @@ void QuinticOffset::add_next(std::span<double> pose) noexcept {
     pose[c] += of_position * offset_[c] + of_velocity * velocity_[c];
   }
 }
-
-namespace {
-
-constexpr double kWayBack_s = 0.8;
-// Look-ahead into the label sequence: with 20 frames at 30 Hz the jerk of a streamed trajectory is
-// within 3 % of the full solution's (models/trajectory/README.md, "Look-ahead").
-constexpr double kLookAhead_s = 20.0 / 30.0;
-// Labels of a loop that are planned ahead: those within the look-ahead, and one neighbour.
-constexpr int kLoopAhead = 3;
-
-}  // namespace
 
 GesturePlayer::GesturePlayer(double rate_hz, int channels)
     : rate_hz_(rate_hz),

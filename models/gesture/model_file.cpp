@@ -149,13 +149,13 @@ constexpr int kMostDeep = 12;           // more questions make no larger tree th
 constexpr double kMinVariance = 1e-20;  // its inverse can still be summed without overflow
 
 // Copies the file's row, from `row` on, into a leaf's values.
-void take_row(const double* row, int dims, std::array<std::vector<double>, kDeltaWindows>& to) {
+void read_row(const double* row, int dims, std::array<std::vector<double>, kDeltaWindows>& to) {
   const int channels = dims / kDeltaWindows;
   for (int w = 0; w < kDeltaWindows; ++w) {
     to[w].assign(row + w * channels, row + (w + 1) * channels);
   }
 }
-void take_row(const double* row, int dims, std::array<double, kStates>& to) {
+void read_row(const double* row, int dims, std::array<double, kStates>& to) {
   std::copy_n(row, dims, to.begin());
 }
 
@@ -229,8 +229,8 @@ Tree<Gaussian> read_tree(const v1::GestureTree& from, const TreeShape& shape, Va
   check.numbers(from.occupancy(), 0.0, kMaxNumber, "an occupancy");
   if (!check.valid()) return {};
   for (int i = 0; i < leaves; ++i) {
-    take_row(from.mean().data() + i * dims, dims, tree.leaves[i].mean);
-    take_row(from.variance().data() + i * dims, dims, tree.leaves[i].variance);
+    read_row(from.mean().data() + i * dims, dims, tree.leaves[i].mean);
+    read_row(from.variance().data() + i * dims, dims, tree.leaves[i].variance);
   }
   tree.occupancy.assign(from.occupancy().begin(), from.occupancy().end());
   return tree;

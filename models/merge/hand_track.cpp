@@ -36,8 +36,8 @@ std::int64_t HandTrack::silent_after_ns() const noexcept {
 }
 
 // RT-safe.
-void HandTrack::hear(const TimedPose& pose, std::int64_t now_ns) noexcept {
-  heard_ns_ = std::max(heard_ns_, now_ns);
+void HandTrack::receive(const TimedPose& pose, std::int64_t now_ns) noexcept {
+  received_ns_ = std::max(received_ns_, now_ns);
   if (!history_.empty()) {
     const std::int64_t step_ns = pose.time_ns - history_.newest().time_ns;
     if (step_ns <= 0 && step_ns > -kJumpBack_ns) return;

@@ -76,17 +76,17 @@ class HandTrack {
 
   // The body has begun at `now_ns`; from now on the glove is expected. RT-safe.
   void begin(std::int64_t now_ns) noexcept {
-    if (heard_ns_ == kNoTime_ns) heard_ns_ = now_ns;
+    if (received_ns_ == kNoTime_ns) received_ns_ = now_ns;
   }
   // The glove's next pose, which came at `now_ns`. A pose that is not later than the newest one is
   // ignored, unless the glove's time has jumped back. RT-safe.
-  void hear(const TimedPose& pose, std::int64_t now_ns) noexcept;
+  void receive(const TimedPose& pose, std::int64_t now_ns) noexcept;
 
   // Whether a body's frame of this time is better with the glove's next pose, and the glove has not
   // been silent for so long that none is likely to come. RT-safe.
   [[nodiscard]] bool awaited(std::int64_t time_ns, std::int64_t now_ns) const noexcept {
     const bool here = !history_.empty() && history_.newest().time_ns >= time_ns;
-    return !here && heard_ns_ != kNoTime_ns && now_ns - heard_ns_ < silent_after_ns();
+    return !here && received_ns_ != kNoTime_ns && now_ns - received_ns_ < silent_after_ns();
   }
   // The pose for a body's frame; empty as long as the glove has not measured any. Times do not
   // decrease. RT-safe.
@@ -101,9 +101,9 @@ class HandTrack {
   HandHistory history_;
   HandPose relaxed_;
   std::int64_t hold_ns_;
-  std::int64_t interval_ns_;            // between two of the glove's frames, smoothed
-  std::int64_t heard_ns_ = kNoTime_ns;  // when the last of them came
-  std::int64_t used_ns_ = kNoTime_ns;   // time of the measurement that the last frame got
+  std::int64_t interval_ns_;               // between two of the glove's frames, smoothed
+  std::int64_t received_ns_ = kNoTime_ns;  // when the last of them came
+  std::int64_t used_ns_ = kNoTime_ns;      // time of the measurement that the last frame got
   // What the last frame got, and what the hand eases back from.
   bool has_shown_ = false, returns_ = false;
   std::int64_t shown_ns_ = 0, left_ns_ = 0;

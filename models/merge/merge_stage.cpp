@@ -77,7 +77,7 @@ void MergeStage::partner(std::size_t partner, const StageFrame& in, StageOut& ou
   if (!fits || frame.quality == Quality::kStale) return;
   const double lag_s = std::clamp(static_cast<double>(frame.lag_ms) * 1e-3, 0.0, 1.0);
   const std::int64_t now_ns = frame.header.arrival_ns + nanoseconds(lag_s);
-  tracks_[partner]->hear(
+  tracks_[partner]->receive(
       {.time_ns = time_of(frame.header), .quality = frame.quality, .pose = hand.map.read(frame)},
       now_ns);
   release_ready(now_ns, out);

@@ -148,7 +148,7 @@ void WindowSums::add(const WindowSums& other) {
   second += other.second;
 }
 
-void WindowSums::take_away(const WindowSums& other) {
+void WindowSums::subtract(const WindowSums& other) {
   count -= other.count;
   first -= other.first;
   second -= other.second;

@@ -51,7 +51,7 @@ struct WindowSums {
   Eigen::MatrixXd second;  // sum of their products
 
   void add(const WindowSums& other);
-  void take_away(const WindowSums& other);
+  void subtract(const WindowSums& other);
 };
 [[nodiscard]] WindowSums window_sums(const Rows& rows);
 

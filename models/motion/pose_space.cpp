@@ -234,8 +234,8 @@ void PoseSpace::to_vector(const Frame& frame, double heading_rad, std::span<floa
 }
 
 // RT-safe
-bool PoseSpace::take_over(const PoseSpace& from, std::span<const float> from_q,
-                          std::span<float> q) const noexcept {
+bool PoseSpace::convert(const PoseSpace& from, std::span<const float> from_q,
+                        std::span<float> q) const noexcept {
   const auto same = [](const Item& a, const Item& b) {
     return a.joint == b.joint && a.axes == b.axes && a.before.coeffs() == b.before.coeffs();
   };

@@ -75,8 +75,8 @@ class PoseSpace {
 
   // The q of this space for the pose that is `from_q` in another; both have `kMaxPoseDims` values.
   // False, and nothing is written, where the two do not describe the same joints. RT-safe.
-  [[nodiscard]] bool take_over(const PoseSpace& from, std::span<const float> from_q,
-                               std::span<float> q) const noexcept;
+  [[nodiscard]] bool convert(const PoseSpace& from, std::span<const float> from_q,
+                             std::span<float> q) const noexcept;
 
   // Replaces the pose of `frame` by q + delta in the space's own sense, channel angles included;
   // joints that are not available and joints outside the space are unchanged; a zero delta leaves

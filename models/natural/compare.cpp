@@ -94,7 +94,7 @@ std::optional<std::vector<TaskResult>> leave_one_out(const std::vector<Figures>&
                                                      const CompareProgress& progress) {
   const Task task = [&](std::size_t i) -> TaskResult {
     motion::WindowSums others = all;
-    others.take_away(corpus[i].windows);
+    others.subtract(corpus[i].windows);
     Range range;
     for (std::size_t k = 0; k < corpus.size(); ++k) {
       if (k != i) range.add(corpus[k]);

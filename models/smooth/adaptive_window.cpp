@@ -110,7 +110,7 @@ void AdaptiveWindow::push(double time_s, std::span<const double> measured_rad,
     position[c] = measured ? precision / (repeats ? kRepeats : 1.0) : kNothing;
     mean[c] = position[c] * held_rad_[c];
   }
-  take_sensed(at);
+  copy_sensed(at);
   ++pushed_;
   steady_.push(
       time_s, measured_rad,
@@ -118,7 +118,7 @@ void AdaptiveWindow::push(double time_s, std::span<const double> measured_rad,
 }
 
 // RT-safe.
-void AdaptiveWindow::take_sensed(int slot) noexcept {
+void AdaptiveWindow::copy_sensed(int slot) noexcept {
   std::copy_n(sensed(slot), stride(), information_.row(slot, trajectory::kPosition));
   std::copy_n(sensed(slot) + stride(), stride(), information_.row(slot, trajectory::kPositionMean));
 }
@@ -130,7 +130,7 @@ void AdaptiveWindow::adopt(std::size_t channel, double value_rad) noexcept {
   for (long i = from; i < pushed_; ++i) {
     const int at = static_cast<int>(i % kMaxWindow);
     sensed_[static_cast<std::size_t>((2 * at + 1) * stride()) + channel] = kNothing * value_rad;
-    take_sensed(at);
+    copy_sensed(at);
   }
 }
 
@@ -164,7 +164,7 @@ void AdaptiveWindow::begin(double period_s) noexcept {
 void AdaptiveWindow::forget_extra() noexcept {
   if (!std::exchange(extra_, false)) return;
   for (int i = 0; i < frames_; ++i) {
-    take_sensed(slot(i));
+    copy_sensed(slot(i));
     std::fill_n(information_.row(slot(i), trajectory::kDeltaMean), stride(), 0.0);
     std::fill_n(information_.row(slot(i), trajectory::kDeltaDeltaMean), stride(), 0.0);
   }
@@ -229,7 +229,7 @@ void AdaptiveWindow::run(const trajectory::Carry& carry) noexcept {
 void AdaptiveWindow::solve_once(double period_s) noexcept {
   begin(period_s);
   loose_prior();
-  run(past_.taken());
+  run(past_.incoming());
 }
 
 // RT-safe.
@@ -243,7 +243,7 @@ void AdaptiveWindow::solve(double period_s, InformationSource* extra) noexcept {
       extra->add(*this);
       extra_ = true;
     }
-    run(pass + 1 < kPasses ? past_.taken() : past_.taken_and_left());
+    run(pass + 1 < kPasses ? past_.incoming() : past_.incoming_and_outgoing());
   }
   forget_extra();
 }

@@ -85,7 +85,7 @@ class AdaptiveWindow {
   [[nodiscard]] const double* sensed(int slot) const noexcept {
     return sensed_.data() + static_cast<std::ptrdiff_t>(2 * slot) * stride();
   }
-  void take_sensed(int slot) noexcept;
+  void copy_sensed(int slot) noexcept;
   void forget_extra() noexcept;
   void adopt(std::size_t channel, double value_rad) noexcept;
   void begin(double period_s) noexcept;

@@ -245,8 +245,8 @@ struct LiveSmoother::State {
 
   [[nodiscard]] bool serves(const Frame& frame) const noexcept;
   void lay_out(const LiveModel* model) noexcept;
-  void take(const Frame& frame, double step_s) noexcept;
-  void take_body(const Frame& frame, double step_s) noexcept;
+  void receive(const Frame& frame, double step_s) noexcept;
+  void receive_body(const Frame& frame, double step_s) noexcept;
   void emit_until(long last, StageOut& out) noexcept;
   void rebuild(Frame& frame, int back) noexcept;
   void turn_joints(Frame& frame) noexcept;
@@ -282,7 +282,7 @@ struct LiveSmoother::State {
   std::vector<Frame> pending;            // ring of the last frames
   std::vector<double> heading_rad;       // of these
   long ready = 0;                        // frames before it wait, but are not solved for any more
-  long taken = 0;                        // number of frames received
+  long received = 0;                     // number of frames received
   long emitted = 0;                      // number of frames emitted
   double last_s = 0.0;
 };
@@ -310,10 +310,11 @@ void LiveSmoother::State::lay_out(const LiveModel* model) noexcept {
 void LiveSmoother::State::use(const LiveModel* model) noexcept {
   const bool changes = body != nullptr || (model != nullptr && model->body);
   if (changes) {
-    for (long i = std::max(emitted, ready); i < taken; ++i) {
-      rebuild(pending[static_cast<std::size_t>(i % kMaxPending)], static_cast<int>(taken - 1 - i));
+    for (long i = std::max(emitted, ready); i < received; ++i) {
+      rebuild(pending[static_cast<std::size_t>(i % kMaxPending)],
+              static_cast<int>(received - 1 - i));
     }
-    ready = taken;
+    ready = received;
     forget();
     noise.reset();
     lay_out(model);
@@ -330,10 +331,10 @@ bool LiveSmoother::State::serves(const Frame& frame) const noexcept {
 // Stores the frame and extracts its channels, unwrapped. Channels that were not measured become NaN
 // in both: all channels of a joint that is not valid, except those that the source does provide
 // beside missing ones. RT-safe.
-void LiveSmoother::State::take(const Frame& frame, double step_s) noexcept {
-  Frame& kept = pending[static_cast<std::size_t>(taken % kMaxPending)];
+void LiveSmoother::State::receive(const Frame& frame, double step_s) noexcept {
+  Frame& kept = pending[static_cast<std::size_t>(received % kMaxPending)];
   kept = frame;
-  ++taken;
+  ++received;
   std::size_t first = 0;
   for (const int joint : turning) {
     std::size_t end = first;
@@ -350,16 +351,16 @@ void LiveSmoother::State::take(const Frame& frame, double step_s) noexcept {
   }
   unwrap.apply(angle);
   for (std::size_t i = 0; i < free_angles; ++i) measured[body_columns + i] = angle[free_angle[i]];
-  if (body != nullptr) take_body(frame, step_s);
+  if (body != nullptr) receive_body(frame, step_s);
 }
 
 // The columns of a body's model, as the frame stored last has them. RT-safe.
-void LiveSmoother::State::take_body(const Frame& frame, double step_s) noexcept {
+void LiveSmoother::State::receive_body(const Frame& frame, double step_s) noexcept {
   if (body->has_heading(frame)) {
     const double dt_s = std::min(step_s, kHeadingStep_s);
     static_cast<void>(heading.update(body->heading_rad(frame), dt_s));
   }
-  heading_rad[static_cast<std::size_t>((taken - 1) % kMaxPending)] = heading.value_rad();
+  heading_rad[static_cast<std::size_t>((received - 1) % kMaxPending)] = heading.value_rad();
   const std::span<double> values_rad = std::span(measured).first(body_columns);
   body->read(frame, heading.value_rad(), values_rad);
   body->unwrap(std::span(posed).first(body_columns), values_rad);
@@ -392,8 +393,8 @@ void LiveSmoother::process(const StageFrame& in, StageOut& out) noexcept {
     s.forget();
   }
   const double period_s = s.clock.period_s();
-  if (s.taken - s.emitted >= window_frames(period_s)) flush(out);  // the beat became much slower
-  s.take(in.frame, step_s);
+  if (s.received - s.emitted >= window_frames(period_s)) flush(out);  // the beat became much slower
+  s.receive(in.frame, step_s);
   const bool even = step_s < kEvenStep * period_s;
   if (s.options.noise_rad <= 0.0) s.noise.push(s.measured, even);
   s.window.push(now_s, s.measured, noise_rad());
@@ -406,15 +407,15 @@ void LiveSmoother::process(const StageFrame& in, StageOut& out) noexcept {
   // Until the period is known, a lag in time cannot be converted into frames, so the first frames
   // wait.
   const bool in_time = s.options.lag.seconds > 0.0;
-  if (in_time && !s.clock.settled() && s.taken - s.emitted < kMaxWaiting) return;
-  s.emit_until(s.taken - 1 - lag_frames(s.options.lag, period_s), out);
+  if (in_time && !s.clock.settled() && s.received - s.emitted < kMaxWaiting) return;
+  s.emit_until(s.received - 1 - lag_frames(s.options.lag, period_s), out);
 }
 
 // RT-safe.
 void LiveSmoother::tick(std::int64_t /*now_ns*/, StageOut& out) noexcept { flush(out); }
 
 // RT-safe.
-void LiveSmoother::flush(StageOut& out) noexcept { state_->emit_until(state_->taken - 1, out); }
+void LiveSmoother::flush(StageOut& out) noexcept { state_->emit_until(state_->received - 1, out); }
 
 // RT-safe.
 void LiveSmoother::reset() noexcept {
@@ -422,7 +423,7 @@ void LiveSmoother::reset() noexcept {
   s.forget();
   s.noise.reset();
   s.clock = FrameClock();
-  s.emitted = s.taken = s.ready = 0;
+  s.emitted = s.received = s.ready = 0;
   s.last_s = 0.0;
 }
 
@@ -444,7 +445,7 @@ void LiveSmoother::State::emit_until(long last, StageOut& out) noexcept {
   for (; emitted <= last; ++emitted) {
     Frame frame = pending[static_cast<std::size_t>(emitted % kMaxPending)];
     if (emitted >= ready) {
-      rebuild(frame, static_cast<int>(taken - 1 - emitted));
+      rebuild(frame, static_cast<int>(received - 1 - emitted));
     } else {
       std::ranges::fill(variance, kUnknown);
     }
@@ -474,7 +475,7 @@ void LiveSmoother::State::rebuild(Frame& frame, int back) noexcept {
   }
   turn_joints(frame);
   if (body != nullptr) {
-    const long number = taken - 1 - back;
+    const long number = received - 1 - back;
     pose_body(frame, heading_rad[static_cast<std::size_t>(number % kMaxPending)], x);
   }
   if (filter.model() != nullptr) name_gesture(frame, back);

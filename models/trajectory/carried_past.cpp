@@ -18,14 +18,14 @@ void CarriedPast::begin(long first) noexcept {
 }
 
 // RT-safe.
-Carry CarriedPast::taken() const noexcept {
+Carry CarriedPast::incoming() const noexcept {
   return {.in = from_ == kNone ? nullptr : now_.get(), .out = nullptr};
 }
 
 // RT-safe.
-Carry CarriedPast::taken_and_left() noexcept {
+Carry CarriedPast::incoming_and_outgoing() noexcept {
   left_ = first_ + 1;
-  return {.in = taken().in, .out = next_.get()};
+  return {.in = incoming().in, .out = next_.get()};
 }
 
 // RT-safe.

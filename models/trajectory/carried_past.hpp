@@ -18,8 +18,8 @@ class CarriedPast {
   void begin(long first) noexcept;
 
   // For a solve whose result is not final, and for the window's last solve (three frames or more).
-  [[nodiscard]] Carry taken() const noexcept;
-  [[nodiscard]] Carry taken_and_left() noexcept;
+  [[nodiscard]] Carry incoming() const noexcept;
+  [[nodiscard]] Carry incoming_and_outgoing() noexcept;
 
   void forget() noexcept;
 

@@ -13,7 +13,7 @@ class StyleEstimate {
   void update(double place, double dt_s) noexcept;
   void forget() noexcept { *this = {}; }
 
-  // 0 the source's style, 1 the target's; NaN until half a second is known.
+  // 0: none of it, 1: all of it; NaN until half a second is known.
   [[nodiscard]] double value() const noexcept;
 
  private:

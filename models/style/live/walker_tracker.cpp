@@ -16,7 +16,7 @@ constexpr double kInterruption_s = 1.0;  // of the frames
 bool WalkerTracker::see(const BoundModel& model, const Frame& frame, std::span<const float> q,
                         std::span<const std::uint8_t> available, double gap_s, double dt_s,
                         std::span<float> input) noexcept {
-  tell_what_is_missing(model);
+  report_missing_data(model);
   const TrainedMotion* const known = model.known ? &*model.known : nullptr;
   relate(model, q, input);
   gate_.update(known, gate_on_, frame, input, available, walker_, dt_s);
@@ -26,10 +26,10 @@ bool WalkerTracker::see(const BoundModel& model, const Frame& frame, std::span<c
 }
 
 // Once a model. RT-safe
-void WalkerTracker::tell_what_is_missing(const BoundModel& model) noexcept {
-  if (gate_on_ && !model.known && !std::exchange(told_no_gate_, true)) tell(kNoGateData);
+void WalkerTracker::report_missing_data(const BoundModel& model) noexcept {
+  if (gate_on_ && !model.known && !std::exchange(reported_no_gate_, true)) report(kNoGateData);
   const bool no_axis = model.axis.size() == 0;
-  if (auto_alpha_ && no_axis && !std::exchange(told_no_axis_, true)) tell(kNoAxis);
+  if (auto_alpha_ && no_axis && !std::exchange(reported_no_axis_, true)) report(kNoAxis);
 }
 
 // RT-safe
@@ -60,21 +60,21 @@ bool WalkerTracker::measure(const BoundModel& model, std::span<const float> q,
     case WarmUp::Outcome::kNone:
       return false;
     case WarmUp::Outcome::kStood:
-      tell(kStood);
+      report(kStood);
       return false;
     case WarmUp::Outcome::kDone:
       break;
   }
   walker_ = warm_up_.walker();
-  tell(kWarmedUp);
+  report(kWarmedUp);
   return true;
 }
 
 // Whether a walker can be known with this model. RT-safe
 bool WalkerTracker::serves(const BoundModel* model) noexcept {
   if (model == nullptr) return false;
-  // Nobody hears the answer to what the config asks for.
-  if (!model->known && !std::exchange(told_no_gate_, true)) tell(kNoGateData);
+  // No reply reaches whoever wrote the config, so it is a notice.
+  if (!model->known && !std::exchange(reported_no_gate_, true)) report(kNoGateData);
   return model->known.has_value();
 }
 
@@ -95,7 +95,7 @@ bool WalkerTracker::know(const BoundModel* model, const Walker& walker) noexcept
 
 // RT-safe
 void WalkerTracker::interrupt() noexcept {
-  if (warm_up_.running()) tell(kInterrupted);
+  if (warm_up_.running()) report(kInterrupted);
   warm_up_.stop();
 }
 
@@ -103,24 +103,24 @@ void WalkerTracker::interrupt() noexcept {
 void WalkerTracker::exchange(const BoundModel* from, const BoundModel& to) noexcept {
   interrupt();
   estimate_.forget();
-  told_no_gate_ = false;
-  told_no_axis_ = false;
+  reported_no_gate_ = false;
+  reported_no_axis_ = false;
   if (!walker_ || from == nullptr) return;
   if (!serves(&to)) return walker_.reset();
   Walker moved = *walker_;
-  if (to.space.take_over(from->space, walker_->neutral, moved.neutral)) {
+  if (to.space.convert(from->space, walker_->neutral, moved.neutral)) {
     walker_ = moved;
   } else {
     walker_.reset();
-    tell(kOtherJoints);
+    report(kOtherJoints);
   }
 }
 
 // RT-safe
 std::optional<StageNotice> WalkerTracker::take_notice() noexcept {
-  if (untold_ == 0) return std::nullopt;
-  const auto next = static_cast<std::size_t>(std::countr_zero(untold_));
-  untold_ &= untold_ - 1;
+  if (pending_ == 0) return std::nullopt;
+  const auto next = static_cast<std::size_t>(std::countr_zero(pending_));
+  pending_ &= pending_ - 1;
   return StageNotice{.index = next};
 }
 

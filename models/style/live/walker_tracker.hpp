@@ -41,7 +41,7 @@ class WalkerTracker {
   // See Gate::settle().
   void settle() noexcept { gate_.settle(); }
 
-  // 0 the source's style, 1 the target's; NaN: unknown.
+  // 0: none of it, 1: all of it; NaN: unknown.
   [[nodiscard]] double estimate() const noexcept { return estimate_.value(); }
 
   // Starts a warm-up of so many seconds, in the place of one that runs. False for a model that has
@@ -58,12 +58,12 @@ class WalkerTracker {
   // The model is exchanged. What is known of the walker is kept where both see the same joints.
   void exchange(const BoundModel* from, const BoundModel& to) noexcept;
 
-  void tell(Notice notice) noexcept { untold_ |= 1U << notice; }
+  void report(Notice notice) noexcept { pending_ |= 1U << notice; }
   [[nodiscard]] std::optional<StageNotice> take_notice() noexcept;
 
  private:
   [[nodiscard]] bool serves(const BoundModel* model) noexcept;
-  void tell_what_is_missing(const BoundModel& model) noexcept;
+  void report_missing_data(const BoundModel& model) noexcept;
   void relate(const BoundModel& model, std::span<const float> q,
               std::span<float> input) const noexcept;
   bool measure(const BoundModel& model, std::span<const float> q,
@@ -74,8 +74,8 @@ class WalkerTracker {
   WarmUp warm_up_;
   std::optional<Walker> walker_;
   StyleEstimate estimate_;
-  std::uint32_t untold_ = 0;
-  bool told_no_gate_ = false, told_no_axis_ = false;
+  std::uint32_t pending_ = 0;
+  bool reported_no_gate_ = false, reported_no_axis_ = false;
 };
 
 }  // namespace posed::style

@@ -1,5 +1,4 @@
 #include "models/style/live/warm_up.hpp"
-#include "posed/v1/log.pb.h"
 
 #include <algorithm>
 #include <array>
@@ -7,8 +6,12 @@
 #include <cstdint>
 #include <limits>
 
+#include "posed/v1/log.pb.h"
+
 namespace posed::style {
 namespace {
+
+constexpr double kLeastWalked = 0.5;  // of the time
 
 constexpr double kStep_rad = 1e-4;
 constexpr std::size_t kDims = motion::kMaxPoseDims;
@@ -84,12 +87,6 @@ std::optional<StageCommand> walker_from_log(const v1::DecisionValue& value) {
   }
   return StageCommand::of(packed);
 }
-
-namespace {
-
-constexpr double kLeastWalked = 0.5;  // of the time
-
-}  // namespace
 
 // RT-safe
 void WarmUp::begin(double seconds) noexcept {

@@ -1,3 +1,5 @@
+#include "models/style/model/style_model.hpp"
+
 #include <cmath>
 #include <cstdint>
 #include <set>
@@ -5,7 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "models/style/model/style_model.hpp"
 #include "proto/model/model_file.hpp"
 #include "proto/model/validator.hpp"
 

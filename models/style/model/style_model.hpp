@@ -30,7 +30,8 @@ struct MoreStyle {
 // Data by which the gate and the warm-up recognise a motion that the model knows (README.md, "Gate"
 // and "Warm-up").
 struct GateData {
-  Eigen::VectorXd neutral{};  // mean pose of the source's neutral walk [dims]; empty: no gate data
+  Eigen::VectorXd
+      neutral{};  // mean pose of the neutral walk in training [dims]; empty: no gate data
   // LiveStride's, the least mean of a training clip, and the period of the fastest clip. Both are
   // 0 where the training shows no strides.
   double swing_rad = 0.0;
@@ -42,7 +43,7 @@ struct GateData {
   [[nodiscard]] bool strides() const { return swing_rad > 0.0; }
 };
 
-// How much of the style a mean pose shows, direction . q + offset: 0 the source's, 1 the target's
+// How much of the style a mean pose shows, direction . q + offset: 0 none, 1 all
 // (README.md, "Auto-alpha").
 struct StyleAxis {
   Eigen::VectorXd direction{};  // [dims]; empty: not known

@@ -21,14 +21,14 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// Groups of these names are taken for people's own way to walk.
+// Groups of these names are assumed to be people's own way to walk.
 constexpr std::array<std::string_view, 2> kNeutralNames{"normal", "neutral"};
 constexpr double kSettled_s = 0.3;  // of LiveStride
 constexpr double kWindow_s = 1.0, kStep_s = 1.0 / 3.0;
 constexpr double kShrink = 0.9;  // of the scatter within groups, towards a sphere
 
-std::vector<std::string> sources_of(const Dataset& dataset,
-                                    const std::vector<std::string>& targets) {
+std::vector<std::string> reference_groups(const Dataset& dataset,
+                                          const std::vector<std::string>& targets) {
   std::vector<std::string> groups;
   for (const AlignedClip& clip : dataset.clips) {
     if (!is_in(targets, clip.group) && !is_in(groups, clip.group)) groups.push_back(clip.group);
@@ -38,12 +38,12 @@ std::vector<std::string> sources_of(const Dataset& dataset,
   return groups;
 }
 
-// The mean pose of the source in the first motion that has it.
+// The mean pose of the reference groups in the first motion that has them.
 VectorXd neutral_of(const Dataset& dataset, const std::vector<std::string>& targets) {
   const auto cycles = clip_cycles(dataset);
   VectorXd sum = VectorXd::Zero(dataset.dims());
   int count = 0;
-  for (const std::string& group : sources_of(dataset, targets)) {
+  for (const std::string& group : reference_groups(dataset, targets)) {
     for (const std::string& motion : dataset.motions) {
       const MatrixXd cycle = group_cycle(dataset, cycles, group, motion);
       if (cycle.size() == 0) continue;
@@ -68,7 +68,7 @@ double mean_swing_rad(const AlignedClip& clip, double rate_hz) {
   return sum / std::max(count, 1);
 }
 
-// NaN where the clip does not tell.
+// NaN where the clip gives none.
 double mean_gait_correlation(const AlignedClip& clip, double rate_hz) {
   LiveGait gait;
   double sum = 0.0;

@@ -269,9 +269,6 @@ MatrixXd mgpm_cycle(const MgpmData& data, const MgpmParams& p, const VectorXd& x
 
 namespace {
 
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
 constexpr int kStageOneRounds = 2;
 constexpr int kStageOneIterations = 60;
 constexpr int kStageTwoRounds = 12;

@@ -83,8 +83,8 @@ double median_distance(const MatrixXd& distances) {
   return *middle;
 }
 
-// 1 where source clip k may tell of source clip i: not itself, and no other that lies beside the
-// same target clip, whose partner is the answer or a part of it.
+// 1 where source clip k may predict the partner of source clip i: not itself, and no other that
+// lies beside the same target clip, whose partner is the answer or a part of it.
 MatrixXd may_tell(const MatrixXd& places) {
   constexpr double kRounding = 1e-9;
   return ((places * places.transpose()).array() < kRounding).cast<double>();

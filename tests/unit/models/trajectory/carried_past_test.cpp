@@ -57,9 +57,10 @@ TEST_CASE("a window that carries its past forgets nothing", "[generate]") {
     const std::size_t first = end > kWide ? end - kWide : 0;
     const auto recent = std::span(frames).subspan(first, end - first);
     past.begin(static_cast<long>(first));
-    window.solve(recent, Boundary::kDrop, nullptr, past.taken());  // leaves nothing
+    window.solve(recent, Boundary::kDrop, nullptr, past.incoming());  // leaves nothing
     past.begin(static_cast<long>(first));
-    window.solve(recent, Boundary::kDrop, nullptr, end < 3 ? past.taken() : past.taken_and_left());
+    window.solve(recent, Boundary::kDrop, nullptr,
+                 end < 3 ? past.incoming() : past.incoming_and_outgoing());
     all.solve(std::span(frames).first(end));
     CHECK(worst(window, static_cast<int>(first), static_cast<int>(end), all, 0) < 1e-9);
   }
@@ -73,13 +74,14 @@ TEST_CASE("a window that begins elsewhere carries nothing", "[generate]") {
   SlidingWindow alone(kCarriedChannels, kAllFrames);
   trajectory::CarriedPast past(window.stride());
   past.begin(0);
-  window.solve(std::span(frames).first(kWide), Boundary::kDrop, nullptr, past.taken_and_left());
+  window.solve(std::span(frames).first(kWide), Boundary::kDrop, nullptr,
+               past.incoming_and_outgoing());
   const std::size_t first = GENERATE(0, 1, 2);
   const bool forgotten = GENERATE(false, true);
   if (forgotten) past.forget();
   const auto later = std::span(frames).subspan(first, kWide);
   past.begin(static_cast<long>(first));
-  window.solve(later, Boundary::kDrop, nullptr, past.taken());
+  window.solve(later, Boundary::kDrop, nullptr, past.incoming());
   alone.solve(later);
   const auto from = static_cast<int>(first);
   const double off = worst(window, from, from + static_cast<int>(kWide), alone, from);
