@@ -337,7 +337,7 @@ TEST_CASE("no command destroys a file: wrong names, inputs and files that exist 
                 "is read by this command"));
   CHECK(refused(
       posed({"convert", studio.path("march_1.bvh"), "--rate", "60", "--out", studio.path("c.bvh")}),
-      "--rate has no effect"));
+      "only AMC accepts a rate"));
   CHECK(studio.bytes("m.style") == model);
   CHECK(studio.bytes("march_1.bvh") == walk);
 }
