@@ -10,6 +10,7 @@
 
 #include "proto/log/checksum.hpp"
 #include "tests/e2e/served.hpp"
+#include "tests/support/emulated_glove.hpp"
 #include "tests/support/toml_bombs.hpp"
 
 namespace posed::test {
@@ -86,10 +87,7 @@ TEST_CASE("TOML nested 31,000 deep gives one error message, whichever file conta
 
 TEST_CASE("a calibration nested 31,000 deep leaves the daemon running, and its log readable") {
   Served stage;
-  std::optional<Process> glove;
-  glove.emplace(std::vector<std::string>{"emulate", "lucidgloves", "--link", stage.path("glove"),
-                                         "--set", "hand=right"});
-  REQUIRE(glove->line());
+  const EmulatedGlove glove(stage.path("glove"), {"--set", "hand=right"});
   stage.folder.write("posed.toml", stream_with("driver = \"lucidgloves\"\nport = \"" +
                                                stage.path("glove") + "\"\nhand = \"right\"\n"));
   stage.record();

@@ -13,6 +13,7 @@
 
 #include "tests/e2e/outcome.hpp"
 #include "tests/e2e/served.hpp"
+#include "tests/support/emulated_glove.hpp"
 #include "tests/support/shared.hpp"
 
 namespace posed::test {
@@ -47,14 +48,10 @@ TEST_CASE("monitor prints a glove's loss and return, and continues") {
                                        stage.path("right") + "\"\nhand = \"right\"\n");
   stage.launch("run");
   Process monitor({"monitor", "--connect", stage.publish, "--topic", "event"});
-  std::optional<Process> glove;
   for (int i = 0; i < 2; ++i) {
-    glove.emplace(std::vector<std::string>{"emulate", "lucidgloves", "--link", stage.path("right"),
-                                           "--set", "hand=right"});
-    REQUIRE(glove->line());
+    EmulatedGlove glove(stage.path("right"), {"--set", "hand=right"});
     CHECK(has(line_with(monitor, " found "), "right"));
-    glove->send(SIGKILL);
-    CHECK(glove->exit_code());
+    glove.pull();
     CHECK(has(line_with(monitor, " lost "), "right"));
   }
   monitor.send(SIGINT);
@@ -184,17 +181,16 @@ TEST_CASE("a published replay is marked as one, and its times are consistent") {
   CHECK(unheard.code == 2);
   CHECK(has(unheard.err, "--publish"));
   Process cut({"replay", log, "--speed", "0.05", "--out", (folder.path() / "cut").string()});
-  std::this_thread::sleep_for(2500ms);
+  CHECK(cut.comes_to_say("replayed 0 of "));  // its progress
   cut.send(SIGINT);
   CHECK(cut.exit_code() == 1);
   CHECK(has(cut.errors(), "holds only those"));
-  CHECK(has(cut.errors(), "replayed 0 of "));  // the interrupted replay reported its progress
 }
 
 TEST_CASE("a recording ends with what was written") {
   Served served;
   served.launch("record", {"--out", served.path("take.plog"), "--json"});
-  std::this_thread::sleep_for(700ms);
+  served.await_frames("walker", 80);
   served.daemon->send(SIGTERM);
   CHECK(served.daemon->exit_code() == 0);
   const auto line = served.daemon->line();

@@ -60,7 +60,7 @@ TEST_CASE("a performer is known from a clip of another day, also in a replay wit
   CHECK(has(missing.err + missing.out, "nobody.bvh"));
   served.folder.write("posed.toml", config("ann.bvh"));
   served.record();
-  std::this_thread::sleep_for(500ms);
+  served.await_frames("walker", 60);
   CHECK(served.ctl({"set", "walker", "alpha", "0.6"}).code == 0);
   served.daemon->send(SIGTERM);
   REQUIRE(served.daemon->exit_code() == 0);

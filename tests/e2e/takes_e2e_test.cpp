@@ -66,9 +66,9 @@ class ClipTakes : public Takes {
     folder.write("posed.toml", text);
     start();
     take({"start", "walk"});
-    std::this_thread::sleep_for(200ms);
+    await_frames("walker", 200);
     take({"start", "run"});
-    std::this_thread::sleep_for(2500ms);
+    await_frames("walker", 2400);  // 2.5 s
   }
   // The recording's files whose names end so, without the folder.
   [[nodiscard]] std::vector<std::string> files(const std::string& end) const {
@@ -110,13 +110,13 @@ TEST_CASE("takes marked by ctl are intervals of the whole clip, and replay is as
   wait_for(events, "KIND_TAKE");
   const ProgramOutcome status = stage.ctl({"--json", "status"});
   CHECK(json::parse(status.out).at("status").at("take").at("name") == "walk");
-  std::this_thread::sleep_for(400ms);
+  stage.await_frames("walker", 40);
   stage.take({"start"});  // ends the first
-  std::this_thread::sleep_for(300ms);
+  stage.await_frames("walker", 40);
   stage.take({"stop"});
   CHECK_FALSE(json::parse(stage.ctl({"--json", "status"}).out).at("status").contains("take"));
   CHECK(stage.ctl({"take", "start", std::string(129, 'x')}).code == 1);
-  std::this_thread::sleep_for(200ms);
+  stage.await_frames("walker", 20);
   stage.daemon->send(SIGTERM);
   CHECK(stage.daemon->exit_code() == 0);
 
@@ -144,12 +144,16 @@ TEST_CASE("takes marked by ctl are intervals of the whole clip, and replay is as
 TEST_CASE("a daemon killed during a take leaves a log whose take can be cut") {
   Takes stage;
   stage.record();
-  std::this_thread::sleep_for(300ms);
+  stage.await_frames("walker", 40);
   stage.take({"start", "walk"});
-  std::this_thread::sleep_for(1200ms);  // commits take at most 0.5 s
+  const std::string log = stage.path("take.plog");
+  // What is read while the daemon writes is committed: frames of the take are, so it may die.
+  const auto committed = [&] {
+    return !takes_of(log).empty() && stage.frames_of(log, "walk").size() > 1000;
+  };
+  for (int i = 0; i < 100 && !committed(); ++i) std::this_thread::sleep_for(100ms);
   stage.daemon->send(SIGKILL);
   CHECK(stage.daemon->exit_code() == 128 + SIGKILL);
-  const std::string log = stage.path("take.plog");
   const json takes = takes_of(log);
   REQUIRE(takes.size() == 1);
   CHECK(takes[0].at("ended") == false);
@@ -171,10 +175,10 @@ TEST_CASE("a [record] table makes `run` record into a folder, and without one ta
   stage.write_config("[record]\nclips = \"bvh\"\n");
   stage.start();
   stage.take({"start", "walk"});
-  std::this_thread::sleep_for(300ms);
+  stage.await_frames("walker", 30);
   stage.take({"stop"});
   stage.take({"start", "run"});
-  std::this_thread::sleep_for(300ms);
+  stage.await_frames("walker", 30);
   stage.daemon->send(SIGTERM);
   CHECK(stage.daemon->exit_code() == 0);
   std::string log;
@@ -239,7 +243,7 @@ TEST_CASE("datagrams of a capture system mark takes, once each, and rubbish mark
   CHECK(take.at("number") == 1);
   CHECK(take.at("name") == "walk");
   CHECK(take.at("timecode") == "10:20:30:05");
-  std::this_thread::sleep_for(300ms);
+  stage.await_frames("walker", 30);
   send(
       "<CaptureStop RESULT=\"CANCEL\"><Name VALUE=\"walk\"/><PacketID VALUE=\"8\"/>"
       "</CaptureStop>");
