@@ -87,8 +87,7 @@ TEST_CASE("a live calibration and haptics reach the glove, and the log repeats t
   GloveStage stage;
   std::optional<EmulatedGlove> right;
   stage.record();
-  CHECK(has(stage.ctl({"haptics", "right", "--force", "1"}).err,
-            "the glove of stream right is away"));
+  CHECK(has(stage.ctl({"haptics", "right", "--force", "1"}).err, "right is away"));
   stage.plug_in("right", right);
   CHECK(posed({"monitor", "--connect", stage.publish, "--stream", "right", "--count", "1"}).code ==
         0);
@@ -110,7 +109,7 @@ TEST_CASE("a live calibration and haptics reach the glove, and the log repeats t
   CHECK(has(other_hand.err, "hand"));
   const ProgramOutcome no_glove = stage.ctl({"calibrate", "walker", calibration.string()});
   CHECK(no_glove.code == 1);
-  CHECK(has(no_glove.err, "no sensors that can be calibrated"));
+  CHECK(has(no_glove.err, "no sensors"));
   const auto half = stage.folder.write("half.toml", "format = 1\ndriver = \"lucidgl");
   CHECK(has(stage.ctl({"calibrate", "right", half.string()}).err, "half.toml:2"));
   CHECK(has(stage.ctl({"haptics", "walker", "--force", "1"}).err, "has no haptics"));

@@ -174,7 +174,8 @@ TEST_CASE("a service whose thread stands still gives no sign of life, names it, 
       const StoppedThread stopped(thread);
       CHECK(stage.daemon->comes_to_say("the thread " + std::string(name) + " is stuck"));
       stage.socket.forget();  // what it said before it noticed
-      // For the first thread as long as systemd waits, for the others longer than between two looks.
+      // For the first thread as long as systemd waits, for the others longer than between two
+      // looks.
       CHECK_FALSE(stage.socket.comes("WATCHDOG=1", first ? kWithin : 700ms));
       first = false;
     }
