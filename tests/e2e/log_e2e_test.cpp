@@ -55,10 +55,10 @@ int flood_size() {
 
 // Watches `count` frames of the walker in a separate process and determines whether any is missing.
 struct Watched {
-  explicit Watched(const std::string& publish, int count)
-      : count(count),
+  explicit Watched(const std::string& publish, int frames)
+      : count(frames),
         monitor({"monitor", "--connect", publish, "--stream", "walker", "--json", "--count",
-                 std::to_string(count)}) {
+                 std::to_string(frames)}) {
     first = sequence_of(monitor.line());
   }
   static std::uint64_t sequence_of(const std::optional<std::string>& line) {
