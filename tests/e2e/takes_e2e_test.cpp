@@ -32,17 +32,23 @@ class Takes : public Served {
     INFO(outcome.err);
     CHECK(outcome.code == 0);
   }
-  // The lines of a clip's frames.
-  [[nodiscard]] std::string frames_of(const std::string& log, const std::string& take) const {
-    const std::string out = path("cut.bvh");
-    std::vector<std::string> arguments{"convert", log, "--stream",   "walker",
-                                       "--out",   out, "--overwrite"};
+  // Cuts the walker's take from the log as cut.bvh; without a take, all of it.
+  [[nodiscard]] ProgramOutcome cut(const std::string& log, const std::string& take) const {
+    std::vector<std::string> arguments{"convert",     log,     "--stream",     "walker",
+                                       "--overwrite", "--out", path("cut.bvh")};
     if (!take.empty()) arguments.insert(arguments.end(), {"--take", take});
-    const ProgramOutcome outcome = posed(std::move(arguments));
+    return posed(std::move(arguments));
+  }
+  // The lines of its frames.
+  [[nodiscard]] std::string frames_cut() const {
+    const std::string text = file_text(path("cut.bvh"));
+    return text.substr(text.find('\n', text.find("Frame Time")) + 1);
+  }
+  [[nodiscard]] std::string frames_of(const std::string& log, const std::string& take) const {
+    const ProgramOutcome outcome = cut(log, take);
     INFO(outcome.err);
     REQUIRE(outcome.code == 0);
-    const std::string text = file_text(out);
-    return text.substr(text.find('\n', text.find("Frame Time")) + 1);
+    return frames_cut();
   }
 };
 
@@ -149,7 +155,8 @@ TEST_CASE("a daemon killed during a take leaves a log whose take can be cut") {
   const std::string log = stage.path("take.plog");
   // What is read while the daemon writes is committed: frames of the take are, so it may die.
   const auto committed = [&] {
-    return !takes_of(log).empty() && stage.frames_of(log, "walk").size() > 1000;
+    const ProgramOutcome cut = stage.cut(log, "walk");
+    return cut.code == 0 && stage.frames_cut().size() > 1000;
   };
   for (int i = 0; i < 100 && !committed(); ++i) std::this_thread::sleep_for(100ms);
   stage.daemon->send(SIGKILL);
