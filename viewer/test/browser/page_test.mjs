@@ -423,30 +423,10 @@ pageTests(
 );
 
 pageTests(
-  'a page of a replay',
-  { replay_file: 'take1.plog' },
+  'a page of a hand of another machine, in the dark',
+  { dark: true, bodies: 0, same_machine: false },
   {
     'instruments: all but the times of the page': withoutTimes,
-  },
-);
-
-pageTests(
-  'a page of a daemon on another machine, that predicts a body without an arm',
-  { same_machine: false, missing: [5, 6, 7, 8] },
-  {
-    'instruments: all but the times of the page': withoutTimes,
-    'the pose is said to be predicted, and what has no value': async (page) => {
-      const words = /predicted\s· no value: left arm/;
-      await page.locator('.name-tag[data-kind="styled"]', { hasText: words }).waitFor(PATIENCE);
-      await page.locator('.legend li[data-key="no-value"]').waitFor(PATIENCE);
-    },
-  },
-);
-
-pageTests(
-  'a page of a hand alone, in the dark',
-  { dark: true, bodies: 0 },
-  {
     'a line of gestures is performed, an unknown one refused; chips write the line': async (
       page,
       bridge,
@@ -471,9 +451,10 @@ pageTests(
 );
 
 pageTests(
-  'a page of a body alone',
-  { hands: 0 },
+  'a page of a body in a replay',
+  { hands: 0, replay_file: 'take1.plog' },
   {
+    'instruments: all but the times of the page': withoutTimes,
     'a body may wear the mannequin': async (page) => {
       await page.getByLabel('Figure').selectOption('mannequin');
       await page.waitForFunction(
@@ -506,9 +487,14 @@ pageTests(
 );
 
 pageTests(
-  'a page on a phone',
-  { dark: true, missing: [5], width: 390, height: 844 },
+  'a page on a phone, of a predicted body without an arm',
+  { dark: true, missing: [5, 6, 7, 8], width: 390, height: 844 },
   {
+    'the pose is said to be predicted, and what has no value': async (page) => {
+      const words = /predicted\s· no value: left arm/;
+      await page.locator('.name-tag[data-kind="styled"]', { hasText: words }).waitFor(PATIENCE);
+      await page.locator('.legend li[data-key="no-value"]').waitFor(PATIENCE);
+    },
     'on a phone nothing is wider than the screen': async (page) => {
       assert.equal(await page.evaluate(() => document.documentElement.scrollWidth), 390);
     },
