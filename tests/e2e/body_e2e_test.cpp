@@ -183,7 +183,7 @@ TEST_CASE("a model of a body is refused where there is none", "[body]") {
     return posed({"check", "--config", served.path("posed.toml")});
   };
   CHECK(one_sentence(check("driver = \"labels\"\n[stream.generate]\nmodel = \"arms.gesture\"\n"), 1,
-                     "the model is of a body"));
+                     "of a body"));
   CHECK(one_sentence(check("driver = \"labels\"\n[stream.labels]\nbody = \"none.bvh\"\n"), 1,
                      "none.bvh"));
 }

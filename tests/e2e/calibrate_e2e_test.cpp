@@ -108,7 +108,7 @@ TEST_CASE("a glove is calibrated through the daemon, and the file is for this gl
   stage.record();
   const ProgramOutcome away = stage.calibrate({"--stream", "right"});
   CHECK(away.code == 1);
-  CHECK(has(away.err, "the glove of stream 'right' is away: plug it in"));
+  CHECK(has(away.err, "'right' is away"));
   stage.put_on();
   stage.wait_for_frame();
 
@@ -134,9 +134,7 @@ TEST_CASE("a glove is calibrated through the daemon, and the file is for this gl
   const auto other = stage.folder.write("other.toml", of_another_glove(mine));
   const ProgramOutcome refused = stage.ctl({"calibrate", "right", other.string()});
   CHECK(refused.code == 1);
-  CHECK(has(refused.err,
-            "this calibration is for glove 'tcp 10.0.0.7', this one is"
-            " 'tcp 127.0.0.1': calibrate this glove"));
+  CHECK(has(refused.err, "glove 'tcp 10.0.0.7' ... 'tcp 127.0.0.1'"));
   CHECK(stage.value_of("index_joint1") == Approx(1.0).margin(0.01));
 
   stage.daemon->send(SIGTERM);
@@ -164,7 +162,7 @@ TEST_CASE("a hand that moved, or never took a pose, gives no calibration") {
     const ProgramOutcome moved = stage.calibrate(quick);
     CHECK(moved.code == 1);
     CHECK(has(moved.err, "fist failed: "));
-    CHECK(has(moved.err, "moved while it was held"));
+    CHECK(has(moved.err, "moved"));
     CHECK(has(moved.err, "hold it again"));
   }
   CHECK_FALSE(std::filesystem::exists(stage.path("ann.toml")));
@@ -178,7 +176,7 @@ TEST_CASE("a hand that moved, or never took a pose, gives no calibration") {
     });
     const ProgramOutcome flat = stage.calibrate(quick);
     CHECK(flat.code == 1);
-    CHECK(has(flat.err, "hardly moved from the flat hand"));
+    CHECK(has(flat.err, "hardly moved ... flat"));
   }
   CHECK_FALSE(std::filesystem::exists(stage.path("ann.toml")));
 
@@ -202,13 +200,13 @@ TEST_CASE("calibrate --connect reports what is wrong with a request") {
     CHECK(done.code == 2);
     CHECK(has(done.err, sentence));
   };
-  refused({"--stream", "nobody"}, "there is no stream 'nobody'; there is: walker, right");
-  refused({"--stream", "walker"}, "no sensors that can be calibrated");
-  refused({}, "--connect also needs --stream");
+  refused({"--stream", "nobody"}, "'nobody' ... walker, right");
+  refused({"--stream", "walker"}, "no sensors");
+  refused({}, "--connect ... --stream");
   stage.put_on();
   stage.wait_for_frame();
   refused({"--stream", "right", "--hand", "left"}, "is of a right hand");
-  refused({"--stream", "right", "--driver", "cyberglove"}, "is of driver 'lucidgloves'");
+  refused({"--stream", "right", "--driver", "cyberglove"}, "'lucidgloves'");
   CHECK_FALSE(std::filesystem::exists(stage.path("ann.toml")));
 }
 
@@ -238,7 +236,7 @@ TEST_CASE(
   for (int i = 0; i < 10 && !refusal_seen; ++i) {
     stage.put_on();  // posed hangs up; the glove reconnects
     for (std::optional<std::string> line; !refusal_seen && (line = events.line(2s));) {
-      refusal_seen = line->contains("this calibration is for glove 'tcp 10.0.0.7'");
+      refusal_seen = line->contains("glove 'tcp 10.0.0.7'");
     }
   }
   CHECK(refusal_seen);

@@ -97,7 +97,7 @@ TEST_CASE("completion is generated from the existing commands") {
 TEST_CASE("an absent daemon gives one error message") {
   const auto ctl = posed({"ctl", "--connect", "tcp://127.0.0.1:9", "--timeout", "0.3", "status"});
   CHECK(ctl.code == 1);
-  CHECK(has(ctl.err, "posed: nothing answers at tcp://127.0.0.1:9"));
+  CHECK(has(ctl.err, "posed: ... tcp://127.0.0.1:9"));
   const auto wrong = posed({"ctl", "--connect", "nonsense", "status"});
   CHECK(wrong.code == 2);
   CHECK(has(wrong.err, "an endpoint reads like"));
@@ -132,8 +132,8 @@ TEST_CASE("check reports what a config would run, or everything that is wrong wi
   const auto bad = served.folder.write("bad.toml", "strem = 1\nrealtime = 2\n");
   const auto all = posed({"check", "--config", bad.string()});
   CHECK(all.code == 2);
-  CHECK(has(all.err, "bad.toml:1: unknown key 'strem'; the nearest known one here is 'stream'"));
-  CHECK(has(all.err, "bad.toml:2: realtime must be true or false"));
+  CHECK(has(all.err, "bad.toml:1: ... 'strem' ... 'stream'"));
+  CHECK(has(all.err, "bad.toml:2: ... realtime ... true or false"));
   const auto as_json = posed({"check", "--config", bad.string(), "--json"});
   CHECK(json::parse(as_json.out).at("errors").size() ==
         3);  // the third error is that there is no stream
@@ -154,7 +154,7 @@ TEST_CASE("check refuses a folder in which no recording can be made") {
   const auto refused = posed({"check", "--config", config});
   CHECK(refused.code == 1);
   CHECK(has(refused.err, config + ":" + std::to_string(lines + 2) +
-                             ": nothing can be made in /proc (No such file or directory)"));
+                             ": ... /proc ... No such file or directory"));
 }
 
 TEST_CASE("check tells where the daemon would record and who may trigger takes") {
@@ -173,7 +173,7 @@ listen = "127.0.0.1:1599"
   const auto shown = posed({"check", "--config", config});
   INFO(shown.err);
   CHECK(has(shown.out, "records to " + served.path("monday") + ", each take as BVH\n"));
-  CHECK(has(shown.out, "takes are triggered at 127.0.0.1:1599 by this machine\n"));
+  CHECK(has(shown.out, "takes ... 127.0.0.1:1599"));
   const auto told = json::parse(posed({"check", "--config", config, "--json"}).out);
   CHECK(told.at("record").at("folder") == served.path("monday"));
   CHECK(told.at("record").at("frames") == false);
@@ -207,7 +207,7 @@ TEST_CASE("unknown clients get no access, and a withdrawn key is cut off") {
 
   const auto reaching = posed(as("viewer", {"ctl", "status"}));
   CHECK(reaching.code == 1);
-  CHECK(has(reaching.err, "refuses this key: it is not on its list, or may not control"));
+  CHECK(has(reaching.err, "refuses this key"));
   const auto unlisted = posed(as("unlisted", {"monitor", "--count", "1"}));
   CHECK(unlisted.code == 1);
   CHECK(has(unlisted.err, "refuses this key"));
@@ -234,7 +234,7 @@ TEST_CASE("unknown clients get no access, and a withdrawn key is cut off") {
   served.write_config("");
   served.daemon->send(SIGHUP);
   CHECK_FALSE(served.daemon->exit_code(std::chrono::milliseconds(500)));
-  CHECK(has(served.daemon->errors(), "no [security] server_key any more"));
+  CHECK(has(served.daemon->errors(), "[security] server_key"));
   CHECK(posed({"monitor", "--connect", served.publish, "--count", "1"}).code == 1);
   CHECK(posed(as("director", {"ctl", "status"})).code == 0);
   served.daemon->send(SIGTERM);

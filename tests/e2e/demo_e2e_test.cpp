@@ -41,7 +41,7 @@ TEST_CASE("the demo streams from any folder and trains only once", "[demo]") {
   const auto prepare = [&] { return posed({"demo", "--prepare", kept.string()}); };
   const ProgramOutcome again = prepare();
   CHECK(again.code == 0);
-  CHECK(again.err.contains("using what was made and learnt before"));
+  CHECK(has(again.err, "made ... before"));
   CHECK_FALSE(again.err.contains("learning the style"));
 
   const auto config = kept / "free.toml";
@@ -86,7 +86,7 @@ TEST_CASE("the demo does not touch a folder that is not its own", "[demo]") {
                                   "[stream.file]\npath = \"march_1.bvh\"\n");
   const ProgramOutcome not_demo = posed({"demo", "--config", other.string()});
   CHECK(not_demo.code == 2);
-  CHECK(not_demo.err.contains("no stream has the demo's model"));
+  CHECK(has(not_demo.err, "no stream ... demo"));
 }
 
 }  // namespace posed::test

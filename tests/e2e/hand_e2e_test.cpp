@@ -123,8 +123,7 @@ TEST_CASE("an impossible play gives one error message and an exit code") {
     CHECK(outcome.code == 1);
     return outcome.err;
   };
-  CHECK(
-      has(refusal({"play", "hand", "g x"}), "does not know the label 'x'; it knows: g c p 1 3 4"));
+  CHECK(has(refusal({"play", "hand", "g x"}), "label 'x' ... g c p 1 3 4"));
   CHECK(has(refusal({"play", "hand", " "}), "no label"));
   CHECK(has(refusal({"play", "hand", "g", "--tempo", "3"}), "0.5 to 2"));
   CHECK(has(refusal({"play", "hand", std::string(600, 'g')}),
@@ -132,12 +131,11 @@ TEST_CASE("an impossible play gives one error message and an exit code") {
   std::string many;
   for (int i = 0; i < 257; ++i) many += "g ";
   CHECK(has(refusal({"play", "hand", many}), "at most 256"));
-  CHECK(has(refusal({"play", "nobody", "g"}), "there is no stream 'nobody'"));
+  CHECK(has(refusal({"play", "nobody", "g"}), "'nobody'"));
   CHECK(has(refusal({"play", "walker", "g"}), "[stream.generate]"));
   CHECK(has(refusal({"play", "bare", "g"}), "no gesture model"));
   CHECK(has(refusal({"stop-playing", "walker"}), "[stream.generate]"));
-  CHECK(has(refusal({"model", "walker", served.path("toy.gesture")}),
-            "is a model for stage generate"));
+  CHECK(has(refusal({"model", "walker", served.path("toy.gesture")}), "for stage generate"));
   CHECK(has(refusal({"model", "hand", served.path("one.style")}), "[stream.style]"));
   const auto model =
       posed({"ctl", "--connect", served.control, "model", "bare", served.path("toy.gesture")});
@@ -161,7 +159,7 @@ TEST_CASE("a config that cannot be performed is refused with the stream's name")
   const auto label =
       check("driver = \"labels\"\n[stream.generate]\nmodel = \"toy.gesture\"\nlabels = \"g x\"\n");
   CHECK(label.code == 2);
-  CHECK(has(label.err, "does not know the label 'x'"));
+  CHECK(has(label.err, "label 'x'"));
   const auto fine =
       check("driver = \"labels\"\n[stream.generate]\nmodel = \"toy.gesture\"\nlabels = \"g p\"\n");
   INFO(fine.err);

@@ -13,6 +13,7 @@
 
 #include "tests/e2e/outcome.hpp"
 #include "tests/e2e/served.hpp"
+#include "tests/support/emulated_glove.hpp"
 #include "tests/support/shared.hpp"
 
 namespace posed::test {
@@ -47,14 +48,10 @@ TEST_CASE("monitor prints a glove's loss and return, and continues") {
                                        stage.path("right") + "\"\nhand = \"right\"\n");
   stage.launch("run");
   Process monitor({"monitor", "--connect", stage.publish, "--topic", "event"});
-  std::optional<Process> glove;
   for (int i = 0; i < 2; ++i) {
-    glove.emplace(std::vector<std::string>{"emulate", "lucidgloves", "--link", stage.path("right"),
-                                           "--set", "hand=right"});
-    REQUIRE(glove->line());
+    EmulatedGlove glove(stage.path("right"), {"--set", "hand=right"});
     CHECK(has(line_with(monitor, " found "), "right"));
-    glove->send(SIGKILL);
-    CHECK(glove->exit_code());
+    glove.pull();
     CHECK(has(line_with(monitor, " lost "), "right"));
   }
   monitor.send(SIGINT);
@@ -70,16 +67,16 @@ TEST_CASE("a daemon that is gone is not shown as live") {
   REQUIRE(top.line());
   REQUIRE(monitor.line());
   served.daemon->send(SIGSTOP);
-  CHECK(monitor.comes_to_say("s: the connection stands, but the daemon is stopped or stuck"));
+  CHECK(monitor.comes_to_say("stopped or stuck"));
   CHECK(waiting.exit_code() == 1);
-  CHECK(has(waiting.errors(), "gave up after 4 s (--timeout)"));
+  CHECK(has(waiting.errors(), "after 4 s (--timeout)"));
   served.daemon->send(SIGCONT);
   CHECK(monitor.comes_to_say("answers again, after "));
   served.daemon->send(SIGKILL);
   for (const Process* one : {&top, &monitor}) {
     INFO(one->errors());
     CHECK(one->comes_to_say("posed: " + served.publish + ": no answer for "));
-    CHECK(one->comes_to_say("the daemon has ended, or cannot be reached"));
+    CHECK(one->comes_to_say("ended, or cannot be reached"));
   }
   for (Process* one : {&top, &monitor}) {
     one->send(SIGTERM);
@@ -93,7 +90,7 @@ TEST_CASE("monitor gives up a stream that does not come") {
   const auto late =
       posed({"monitor", "--connect", served.publish, "--stream", "right", "--timeout", "2"});
   CHECK(late.code == 1);
-  CHECK(has(late.err, "nothing of pose/right came in 2 s (--timeout)"));
+  CHECK(has(late.err, "pose/right ... 2 s (--timeout)"));
   const auto there = posed({"monitor", "--connect", served.publish, "--stream", "walker", "--count",
                             "700", "--timeout", "5"});  // longer than that
   CHECK(there.code == 0);
@@ -102,7 +99,7 @@ TEST_CASE("monitor gives up a stream that does not come") {
 TEST_CASE("commands that wait for a daemon report what they wait for") {
   for (const char* command : {"top", "monitor"}) {
     Process waits({command, "--connect", kNobody, "--json"});
-    CHECK(waits.comes_to_say("posed: waiting: nothing answers at tcp://127.0.0.1:9"));
+    CHECK(waits.comes_to_say("posed: waiting ... tcp://127.0.0.1:9"));
     waits.send(SIGINT);
     CHECK(waits.exit_code() == 0);
     const ProgramOutcome gives_up =
@@ -113,7 +110,7 @@ TEST_CASE("commands that wait for a daemon report what they wait for") {
   const ProgramOutcome ctl = posed({"ctl", "--connect", kNobody, "--timeout", "0.3", "status"});
   CHECK(ctl.code == 1);
   CHECK(has(ctl.err, "waited 0.3 s"));
-  CHECK(has(ctl.err, "a replay publishes, but takes no control"));
+  CHECK(has(ctl.err, "a replay ... no control"));
 }
 
 TEST_CASE("a status is as new as the acknowledgement before it, and events say what changed") {
@@ -174,8 +171,7 @@ TEST_CASE("a published replay is marked as one, and its times are consistent") {
     if (live) break;
   }
   CHECK(live);
-  const std::string words =
-      "a replay of staged.plog, 0.1 x its pace; all times are the recording's";
+  const std::string words = "staged.plog, 0.1 x ... recording's";
   CHECK(stats.comes_to_say(words));
   replay.send(SIGINT);
   CHECK(replay.exit_code() == 0);
@@ -184,17 +180,16 @@ TEST_CASE("a published replay is marked as one, and its times are consistent") {
   CHECK(unheard.code == 2);
   CHECK(has(unheard.err, "--publish"));
   Process cut({"replay", log, "--speed", "0.05", "--out", (folder.path() / "cut").string()});
-  std::this_thread::sleep_for(2500ms);
+  CHECK(cut.comes_to_say("replayed 0 of "));  // its progress
   cut.send(SIGINT);
   CHECK(cut.exit_code() == 1);
   CHECK(has(cut.errors(), "holds only those"));
-  CHECK(has(cut.errors(), "replayed 0 of "));  // the interrupted replay reported its progress
 }
 
 TEST_CASE("a recording ends with what was written") {
   Served served;
   served.launch("record", {"--out", served.path("take.plog"), "--json"});
-  std::this_thread::sleep_for(700ms);
+  served.await_frames("walker", 80);
   served.daemon->send(SIGTERM);
   CHECK(served.daemon->exit_code() == 0);
   const auto line = served.daemon->line();
@@ -220,14 +215,10 @@ TEST_CASE("ctl checks a file before it sends it") {
                           "index_joint1 = [[0, 0.0], [2000, 1.0]]\n");
   const ProgramOutcome style = served.ctl({"calibrate", "walker", served.path("one.style")});
   CHECK(style.code == 1);
-  CHECK(has(style.err,
-            "one.style: is a model, not a glove's calibration; send it with `posed ctl "
-            "model walker "));
+  CHECK(has(style.err, "one.style: ... not a glove's calibration ... `posed ctl model walker "));
   const ProgramOutcome toml = served.ctl({"model", "walker", fit.string()});
   CHECK(toml.code == 1);
-  CHECK(has(toml.err,
-            "ann.toml: is a glove's calibration, not a model; send it with `posed ctl "
-            "calibrate walker "));
+  CHECK(has(toml.err, "ann.toml: ... not a model ... `posed ctl calibrate walker "));
   CHECK(has(served.ctl({"model", "walker", served.path("walk.bvh")}).err, "is a clip"));
   const ProgramOutcome broken = served.ctl(
       {"calibrate", "walker", served.folder.write("half.toml", "format = 1\ndriver = ").string()});
@@ -267,7 +258,7 @@ TEST_CASE("each command explains its own options, and refuses those without an e
         std::array{"posed", "--udp", "give --publish ENDPOINT"}}) {
     const auto unheard = posed({"emulate", device, way, "127.0.0.1:9", "--seconds", "0.1"});
     CHECK(unheard.code == 2);
-    CHECK(has(unheard.err, std::string("posed does not listen for ") + device + " over " + way));
+    CHECK(has(unheard.err, std::string("posed does not listen for ") + device + " ... " + way));
     CHECK(has(unheard.err, advice));
   }
   const auto mistyped = [](std::vector<std::string> words, const std::string& sentence) {
@@ -275,27 +266,25 @@ TEST_CASE("each command explains its own options, and refuses those without an e
     INFO(refused.err);
     return refused.code == 2 && has(refused.err, sentence);
   };
-  CHECK(
-      mistyped({"view", "--port", "99999"}, "--port: '99999' should be a number from 0 to 65535"));
+  CHECK(mistyped({"view", "--port", "99999"}, "--port: '99999' ... 0 to 65535"));
   CHECK(mistyped({"emulate", "cyberglove", "--fault", "drop:0.1", "--seed", "-1"},
-                 "--seed: '-1' should be a whole number of 0 or more"));
+                 "--seed: '-1' ... 0 or more"));
   CHECK(mistyped({"calibrate", "--driver", "cyberglove", "--user", "", "--out", "c.toml"},
-                 "--user is empty; name whose hand it is"));
+                 "--user ... empty"));
   const auto missing = posed({"convert", "nope"});
   CHECK(missing.code == 1);
-  CHECK(has(missing.err, "nope: is not there; check the path"));
-  CHECK(has(posed({"emulate", "nope.plog"}).err, "nope.plog: is not there; check the path"));
-  CHECK(mistyped({"monito"}, "there is no command 'monito'; the nearest is monitor"));
+  CHECK(has(missing.err, "nope: is not there"));
+  CHECK(has(posed({"emulate", "nope.plog"}).err, "nope.plog: is not there"));
+  CHECK(mistyped({"monito"}, "'monito' ... monitor"));
   CHECK(mistyped({"ctl", "--connect", kNobody, "sett"}, "the nearest is set"));
-  CHECK(
-      mistyped({"train", "style", "--form", "a.bvh"}, "no option '--form'; the nearest is --from"));
+  CHECK(mistyped({"train", "style", "--form", "a.bvh"}, "'--form' ... --from"));
   const TempFolder folder;
   const auto mine = folder.write("mine", "precious");
   const auto link = folder.path() / "link";
   std::filesystem::create_symlink(mine, link);
   const ProgramOutcome taken = posed({"emulate", "lucidgloves", "--link", link.string()});
   CHECK(taken.code == 2);
-  CHECK(has(taken.err, "choose another name for --link"));
+  CHECK(has(taken.err, "another name ... --link"));
   CHECK(std::filesystem::read_symlink(link) == mine);
 
   Served served;
@@ -303,7 +292,7 @@ TEST_CASE("each command explains its own options, and refuses those without an e
   const ProgramOutcome misnamed =
       posed({"monitor", "--connect", served.publish, "--stream", "walkr"});
   CHECK(misnamed.code == 1);
-  CHECK(has(misnamed.err, "has no stream 'walkr'; it has: walker"));
+  CHECK(has(misnamed.err, "'walkr' ... walker"));
   Process counting({"monitor", "--connect", served.publish, "--count", "100000"});
   REQUIRE(counting.line());
   counting.send(SIGINT);

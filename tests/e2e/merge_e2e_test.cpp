@@ -11,16 +11,16 @@
 #include "proto/clip/clip.hpp"
 #include "tests/e2e/logged_frames.hpp"
 #include "tests/e2e/stage.hpp"
+#include "tests/support/emulated_glove.hpp"
 
 namespace posed::test {
 namespace {
 
 constexpr std::size_t kMergedJoints = 2 * 15;  // of the hands
 
-void plug_in_hand(const Stage& stage, const std::string& hand, std::optional<Process>& glove) {
-  glove.emplace(std::vector<std::string>{"emulate", "lucidgloves", "--link", stage.path(hand),
-                                         "--set", "hand=" + hand});
-  REQUIRE(glove->line());
+void plug_in_hand(const Stage& stage, const std::string& hand,
+                  std::optional<EmulatedGlove>& glove) {
+  glove.emplace(stage.path(hand), std::vector<std::string>{"--set", "hand=" + hand});
 }
 
 // The next frames of the body, as JSON.
@@ -48,14 +48,12 @@ TEST_CASE("a walker gets the hands of two gloves, and keeps walking when one is 
               stage.path(hand) + "\"\nhand = \"" + hand + "\"\n";
   }
   stage.folder.write("posed.toml", config);
-  std::optional<Process> left, right;
+  std::optional<EmulatedGlove> left, right;
   plug_in_hand(stage, "left", left);
   plug_in_hand(stage, "right", right);
   stage.record();
   CHECK(next_bodies(stage, 60).size() == 60);
-  right->send(SIGTERM);
-  CHECK(right->exit_code() == 0);
-  right.reset();
+  right->end();
   CHECK(next_bodies(stage, 90).size() == 90);
   plug_in_hand(stage, "right", right);
   const auto bodies = next_bodies(stage, 60);

@@ -232,15 +232,15 @@ TEST_CASE("ranks that read different files say which one and write nothing", "[m
   std::ofstream(other.path() / "sway_1.bvh", std::ios::app) << "\n";
   const auto changed = differ();
   CHECK(changed.code == 1);
-  CHECK(has(changed.err, "has another sway_1.bvh than rank 0"));
+  CHECK(has(changed.err, "another sway_1.bvh ... rank 0"));
   std::filesystem::remove(other.path() / "sway_1.bvh");
   const auto missing = differ();
   CHECK(missing.code == 1);
-  CHECK(has(missing.err, "cannot read sway_1.bvh, which rank 0 reads"));
+  CHECK(has(missing.err, "cannot read sway_1.bvh ... rank 0 reads"));
   std::filesystem::rename(studio.path("sway_1.bvh"), other.path() / "sway_1.bvh");
   const auto reversed = differ();
   CHECK(reversed.code == 1);
-  CHECK(has(reversed.err, "reads sway_1.bvh, which rank 0 cannot read"));
+  CHECK(has(reversed.err, "reads sway_1.bvh ... rank 0 cannot"));
   // What nobody can read is posed's own error.
   std::filesystem::remove(other.path() / "sway_1.bvh");
   CHECK(has(differ().err, "posed: sway_1.bvh: cannot read"));
@@ -266,7 +266,7 @@ TEST_CASE("a rank that dies ends the run, which says so and writes nothing", "[m
   kill(ranks.back(), SIGKILL);
   const auto done = finished(training.mpirun);
   CHECK(done.code != 0);
-  CHECK(has(done.err, "ended by mpirun, because a rank has died"));
+  CHECK(has(done.err, "mpirun ... rank has died"));
   CHECK(training.studio.nothing_written("long.style"));
 }
 
@@ -306,8 +306,8 @@ TEST_CASE("a rank that dies when the model is there is not said to have prevente
   kill(follower_of(mpirun.pid()), SIGKILL);
   const auto done = finished(mpirun);
   CHECK(done.code != 0);
-  CHECK(has(done.err, "ended by mpirun, because a rank has died"));
-  CHECK(has(done.err, "the model had been written before"));
+  CHECK(has(done.err, "mpirun ... rank has died"));
+  CHECK(has(done.err, "written before"));
   CHECK_FALSE(has(done.err, "no model was written"));
   CHECK(std::filesystem::file_size(studio.path("kept.style")) > 0);
 }

@@ -7,6 +7,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "tests/support/has.hpp"
 #include "tests/support/process.hpp"
 
 namespace posed::test {
@@ -27,7 +28,7 @@ inline ProgramOutcome posed(std::vector<std::string> arguments) {
 // Whether it ended with this code and said `what` on stderr and nothing on stdout.
 inline bool one_sentence(const ProgramOutcome& outcome, int code, const std::string& what) {
   UNSCOPED_INFO(outcome.code << ": " << outcome.err);
-  return outcome.code == code && outcome.out.empty() && outcome.err.find(what) != std::string::npos;
+  return outcome.code == code && outcome.out.empty() && in_order(outcome.err, what);
 }
 
 }  // namespace posed::test

@@ -14,6 +14,7 @@
 #include "models/style/model/style_model.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/log/reader.hpp"
+#include "tests/e2e/logged_frames.hpp"
 #include "tests/e2e/stage.hpp"
 #include "tests/support/file_text.hpp"
 #include "tests/support/free_port.hpp"
@@ -117,14 +118,13 @@ TEST_CASE("replays of alpha and model changes and a forced shed give one FRAMES.
   CHECK(file_text(stage.path("one.bin")) == file_text(stage.path("two.bin")));
 }
 
-TEST_CASE("kill -9 costs at most the last half second, and the log replays") {
-  std::vector<double> lost_s;
+// How much is missing is judged on the virtual clock: world_property_test.
+TEST_CASE("kill -9 leaves a log that has what was committed and replays") {
   for (const auto life : {900ms, 1050ms, 1200ms}) {
     Walkers stage;
     stage.record();
+    await_commit(stage.path("take.plog"));
     std::this_thread::sleep_for(life);
-    timespec now{};
-    clock_gettime(CLOCK_MONOTONIC, &now);
     stage.daemon->send(SIGKILL);
     CHECK(stage.daemon->exit_code() == 128 + SIGKILL);
     const ProgramOutcome replay =
@@ -132,17 +132,7 @@ TEST_CASE("kill -9 costs at most the last half second, and the log replays") {
     INFO(replay.err);
     REQUIRE(replay.code == 0);
     CHECK(json::parse(replay.out).at("compared") > 20);
-    auto reader = log::Reader::open(stage.path("take.plog"));
-    REQUIRE(reader);
-    std::int64_t last_ns = 0;
-    for (auto chunk = reader->next_chunk(); chunk && *chunk; chunk = reader->next_chunk()) {
-      last_ns = (*chunk)->arrival_ns;
-    }
-    lost_s.push_back(seconds(now.tv_sec * kNanosPerSecond + now.tv_nsec - last_ns));
   }
-  // The median, because a busy machine may delay one of the three.
-  std::sort(lost_s.begin(), lost_s.end());
-  CHECK(lost_s[1] <= 0.5);
 }
 
 TEST_CASE("record and replay refuse wrong use with one error message") {

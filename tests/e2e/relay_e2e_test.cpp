@@ -121,7 +121,7 @@ TEST_CASE("a relay and its subscribers use keys on both sides") {
   Served open;
   open.start();
   RelayProcess mistaken({"--from", open.control});
-  CHECK(mistaken.process->comes_to_say("this is not its publish endpoint"));
+  CHECK(mistaken.process->comes_to_say("not its publish endpoint"));
 }
 
 TEST_CASE("a relay finds a daemon that comes back") {
@@ -137,7 +137,7 @@ TEST_CASE("a relay finds a daemon that comes back") {
   }
   launch_at(stage, endpoint, "bend");
   CHECK(monitor.line());
-  CHECK(has(relay.process->errors(), "connection lost; it is tried again"));
+  CHECK(has(relay.process->errors(), "lost ... again"));
 }
 
 TEST_CASE("a relay of two daemons has the streams of both, and their stats as one") {
@@ -172,7 +172,7 @@ TEST_CASE("a relay refuses what it cannot do, in one sentence") {
   };
   const auto open = with({"--bind", "tcp://0.0.0.0:*"});
   CHECK(open.code == 2);
-  CHECK(has(open.err, "can be reached from other machines by anyone"));
+  CHECK(has(open.err, "other machines ... --insecure"));
   CHECK(with({"--bind", "tcp://0.0.0.0:*", "--insecure", "--seconds", "0.1"}).code == 0);
   CHECK(with({"--bind", "nonsense://x", "--insecure"}).code == 1);
   CHECK(has(with({"--bind", "tcp://127.0.0.1:*", "--insecure"}).err, "--insecure has no effect"));

@@ -55,11 +55,11 @@ TEST_CASE("render draws a clip as a strip, as a pose and refuses what it cannot 
     CHECK(outcome.code == 2);
     CHECK(has(outcome.err, sentence));
   };
-  refused("no.svg", {"--frame", "120"}, "has the frames 0 to 119, not 120");
+  refused("no.svg", {"--frame", "120"}, "0 to 119, not 120");
   refused("no.mp4", {}, "add --video");
   refused("no.svg", {"--video"}, "a video is an .mp4");
   refused("no.svg", {"--raw-beside"}, "is a clip");
-  refused("no.svg", {"--from", "7"}, "has no frame from 7 s on; it lasts ");
+  refused("no.svg", {"--from", "7"}, "7 s ... lasts ");
   refused("strip.svg", {}, "--overwrite");
 }
 

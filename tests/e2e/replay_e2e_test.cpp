@@ -79,7 +79,7 @@ TEST_CASE("one wrong time in a log does not stop a timed replay: it is skipped a
       posed({"replay", log, "--out", (folder.path() / "paced.bin").string()});
   INFO(paced.err);
   CHECK(paced.code == 0);
-  CHECK(has(paced.err, "staged.plog: nothing came for 86400 s before chunk 20"));
+  CHECK(has(paced.err, "staged.plog: ... 86400 s ... chunk 20"));
   const ProgramOutcome fast =
       posed({"replay", log, "--speed", "max", "--out", (folder.path() / "fast.bin").string()});
   CHECK(fast.code == 0);
@@ -95,7 +95,7 @@ TEST_CASE("a row that does not match its checksum ends a replay, with log, table
   run_sql(log, "UPDATE chunk SET arrival_ns = arrival_ns + 1 WHERE id = 20");
   const ProgramOutcome replay = posed({"replay", log.string(), "--speed", "max"});
   CHECK(replay.code == 1);
-  CHECK(has(replay.err, "staged.plog: the log is damaged: row 20 of table chunk does not match"));
+  CHECK(has(replay.err, "staged.plog: ... damaged ... row 20 ... chunk"));
 }
 
 TEST_CASE("a replay on another instruction set differs in the last bits at most") {
@@ -150,11 +150,11 @@ TEST_CASE("a full disk stops the recording and not the stream, and is counted an
     errors = std::stoull(stats.value("recorderErrors", "0"));
   }
   CHECK(errors > 0);
-  CHECK(has(served.daemon->errors(), "recording stopped, streaming continues"));
+  CHECK(has(served.daemon->errors(), "recording stopped"));
   const ProgramOutcome take = posed({"ctl", "--connect", control, "take", "start", "walk"});
   CHECK(take.code == 0);
   CHECK(has(take.out, "take 1 'walk' begins"));
-  CHECK(has(take.out, "nothing can be written to the log now: "));
+  CHECK(has(take.out, "nothing can be written"));
   const ProgramOutcome seen = posed({"monitor", "--connect", publish, "--json", "--count", "30"});
   INFO(seen.err);
   CHECK(seen.code == 0);

@@ -88,7 +88,7 @@ TEST_CASE("a log that cannot be replayed fails the farm, the others are compared
   CHECK(has(found[1]["problem"].get<std::string>(), "bad.plog"));
   CHECK(found[0]["frames"] > 0);
   CHECK(found[2]["frames"] > 0);
-  CHECK(has(done.err, "of 3 logs do not give what was published"));
+  CHECK(has(done.err, "of 3 logs"));
 }
 
 TEST_CASE("each log is replayed on its own instruction set, or all on one", "[farm]") {
@@ -117,7 +117,7 @@ TEST_CASE("each log is replayed on its own instruction set, or all on one", "[fa
   if (own[1]["isa"] != "avx2") WARN("this CPU has no AVX2");
   for (const json& line : check_as_alone({"--isa", "portable"})) CHECK(line["isa"] == "portable");
   const auto told = farm(kept.good, {"--expect", "--isa", "portable"});
-  CHECK(has(told.out, "(recorded on avx2, replayed on portable: the last bits may differ)"));
+  CHECK(has(told.out, "avx2 ... portable ... last bits"));
 }
 
 TEST_CASE("what the logs lack is told, and nothing compared is a failure", "[farm]") {
@@ -134,10 +134,10 @@ TEST_CASE("what the logs lack is told, and nothing compared is a failure", "[far
   CHECK(has(alone.err, none));
   const auto lacks = farm({last, last}, {"--expect"});
   if (lacks.code == 0) {  // the last bits may differ
-    CHECK(has(lacks.out, "not compared: 2 frames that the log lacks, 0 after a gap, 0 past"));
-    CHECK(has(lacks.err, "bit for bit; not compared: 4 frames that the log lacks, 0 after"));
+    CHECK(has(lacks.out, "not compared: 2 ... 0 after a gap, 0 past"));
+    CHECK(has(lacks.err, "bit for bit ... not compared: 4 ... 0 after"));
   }
-  CHECK(has(lacks.err, last + ": stream a: the log lacks 2 published frames after chunk 0"));
+  CHECK(has(lacks.err, last + ": stream a: ... 2 published frames ... chunk 0"));
 
   const auto done = farm(kept.good, {"--expect"});
   CHECK(done.code == 1);
@@ -147,7 +147,7 @@ TEST_CASE("what the logs lack is told, and nothing compared is a failure", "[far
   CHECK(found[0].at("missing").empty());
   CHECK(found[1]["same"] == false);
   CHECK(found[1]["compared"] == 0);
-  CHECK(has(found[1].at("missing").dump(), "the log lacks 5 decisions after chunk 0"));
+  CHECK(has(found[1].at("missing").dump(), "5 decisions ... chunk 0"));
 }
 
 TEST_CASE("Ctrl-C ends the farm, which says that not all was compared", "[farm]") {
@@ -162,7 +162,7 @@ TEST_CASE("Ctrl-C ends the farm, which says that not all was compared", "[farm]"
   farm.send(SIGINT);
   CHECK(farm.rest().empty());
   CHECK(farm.exit_code() == 1);
-  CHECK(has(farm.errors(), "interrupted: not all logs were compared"));
+  CHECK(has(farm.errors(), "interrupted"));
 }
 
 TEST_CASE("options that make no sense for several logs are refused", "[farm]") {

@@ -23,6 +23,7 @@
 #include "drivers/driver.hpp"
 #include "drivers/options.hpp"
 #include "tests/e2e/served.hpp"
+#include "tests/support/emulated_glove.hpp"
 #include "tests/support/free_port.hpp"
 #include "tests/support/raw_peer.hpp"
 #include "tests/support/udp_proxy.hpp"
@@ -64,8 +65,7 @@ class Soaked : public Served {
 
   void plug(bool in) {
     if (!in) return glove_.reset();
-    glove_.emplace(std::vector<std::string>{"emulate", "lucidgloves", "--link", path("glove")});
-    REQUIRE(glove_->line());
+    glove_.emplace(path("glove"));
   }
   [[nodiscard]] bool plugged() const { return glove_.has_value(); }
 
@@ -90,7 +90,7 @@ class Soaked : public Served {
   std::unique_ptr<UdpProxy> proxy_;
   std::unique_ptr<emulate::EmulatedDevice> people_;
   std::jthread thread_;
-  std::optional<Process> glove_;
+  std::optional<EmulatedGlove> glove_;
 };
 
 // Something happens, each second another thing.

@@ -53,6 +53,14 @@ class Stage {
     return posed(std::move(what));
   }
 
+  // Waits until so many further frames of the stream have come, however long a busy machine needs.
+  void await_frames(const std::string& stream, int count) const {
+    const ProgramOutcome seen = posed(
+        {"monitor", "--connect", publish, "--stream", stream, "--count", std::to_string(count)});
+    INFO(seen.err);
+    REQUIRE(seen.code == 0);
+  }
+
   TempFolder folder;
   int most_files = 0;  // limit of open files of the daemon; 0: that of this process
   std::optional<Process> daemon;

@@ -137,9 +137,9 @@ TEST_CASE("several targets make one model, whose styles weights mix and a mask t
     CHECK(has(tried.err, why));
     return tried.code == 2 && !studio.there("x.bvh");
   };
-  CHECK(refused({"--weights", "sad=1"}, "the model has no style 'sad'; it has: sway, other"));
+  CHECK(refused({"--weights", "sad=1"}, "'sad' ... sway, other"));
   CHECK(refused({"--weights", "sway=0"}, "all are 0"));
-  CHECK(refused({"--mask", "tail=1"}, "the body has no part 'tail'; it has: arms, legs"));
+  CHECK(refused({"--mask", "tail=1"}, "'tail' ... arms, legs"));
   const auto early = studio.train({"--from", studio.path("march_1.bvh"), "--to",
                                    studio.path("sway_1.bvh"), "sway=" + studio.path("sway_2.bvh")},
                                   "x.style");
@@ -171,7 +171,7 @@ TEST_CASE("files are takes of one person unless a name before a colon tells them
   CHECK(two == std::vector<std::string>{"ann", "bob", "ann"});
   CHECK(still_silent == "[]");
   const auto [apart, warning] = subjects({"ann:" + march}, "bob:" + sway);
-  CHECK(has(warning, "nobody shows both 'from' and 'to' in motion walk"));
+  CHECK(has(warning, "'from' ... 'to' ... walk"));
   // A file whose own name has a colon is that file.
   studio.write("eve:1", WalkerFamily::kMarch, 2);
   const auto [whole, none] = subjects({studio.path("eve:1.bvh")}, sway);
@@ -185,17 +185,17 @@ TEST_CASE("no model is trained from useless data", "[train_style]") {
         studio.train({"--from", studio.path(from), "--to", studio.path(to)}, "x.style");
     return done.code == 1 && has(done.err, why) && !studio.there("x.style");
   };
-  CHECK(refused("march_1.bvh", "march_1.bvh", "is the same recording as march_1.bvh"));
+  CHECK(refused("march_1.bvh", "march_1.bvh", "the same ... march_1.bvh"));
   const auto longer =
       motion::make_walker({.family = WalkerFamily::kMarch, .person = 1, .seconds = 7.0});
   REQUIRE(clip::write_bvh(*longer, studio.folder.path() / "again.bvh"));
-  CHECK(refused("march_1.bvh", "again.bvh", "there is no difference to learn"));
+  CHECK(refused("march_1.bvh", "again.bvh", "no difference"));
   // --force writes the model all the same and reports that.
   const auto forced = studio.train(
       {"--from", studio.path("march_1.bvh"), "--to", studio.path("again.bvh"), "--force"},
       "x.style");
   CHECK(forced.code == 0);
-  CHECK(has(forced.err, "written, because of --force"));
+  CHECK(has(forced.err, "--force"));
   CHECK(studio.there("x.style"));
 }
 
@@ -214,7 +214,7 @@ TEST_CASE("train, apply and eval end in a verdict; all degrees rms are one figur
   REQUIRE(applied.code == 0);
   const auto change = json::parse(applied.out);
   CHECK(change["far_from_training"] == false);
-  CHECK(has(applied.err, "this walker is like those of the training"));
+  CHECK(has(applied.err, "like those of the training"));
 
   const auto judged = studio.eval("march_1.bvh", "sway_1.bvh");
   REQUIRE(judged.code == 0);
@@ -223,7 +223,7 @@ TEST_CASE("train, apply and eval end in a verdict; all degrees rms are one figur
         Approx(change["rms_change_deg"].get<double>()).epsilon(1e-9));
   CHECK(score["component_rms_deg"] < score["moved_rms_deg"]);
   CHECK(score["constant_cycle_ratio"] > score["cycle_ratio"]);
-  CHECK(has(judged.err, "of the way to the target; a constant offset"));
+  CHECK(has(judged.err, "of the way ... constant offset"));
 
   // Compared with another march, the sway style only increases the distance.
   const auto worse = studio.eval("march_1.bvh", "march_2.bvh");
@@ -251,7 +251,7 @@ TEST_CASE("apply says that it changed nothing, and eval mixes styles as apply te
   };
   const auto none = apply("0");
   CHECK(none.code == 0);
-  CHECK(has(none.err, "warning: no joint was changed, because --alpha is 0"));
+  CHECK(has(none.err, "warning: ... --alpha is 0"));
   CHECK(json::parse(none.out)["unchanged"] == "no joint was changed, because --alpha is 0");
   const auto some = apply("1");
   CHECK_FALSE(has(some.err, "no joint was changed"));
@@ -308,7 +308,7 @@ TEST_CASE("apply says that a walker is far from the training", "[apply]") {
                               "--out", studio.path("out.bvh"), "--json"});
   CHECK(applied.code == 0);
   CHECK(json::parse(applied.out)["far_from_training"] == true);
-  CHECK(has(applied.err, "warning: this walker is far from the training ("));
+  CHECK(has(applied.err, "warning: ... far from the training"));
 }
 
 TEST_CASE("no command destroys a file: wrong names, inputs and files that exist are refused",

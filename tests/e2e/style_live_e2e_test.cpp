@@ -23,18 +23,18 @@ TEST_CASE("a warm-up, the gate and auto-alpha are told of and replayed") {
                                         "[stream.style]\nmodel = \"gated.style\"\n"
                                         "warm_up_s = 2.0\nauto_alpha = true\n");
   served.record();
-  CHECK(served.daemon->comes_to_say("walker: the warm-up is over"));
+  CHECK(served.daemon->comes_to_say("walker: ... warm-up is over"));
   CHECK(served.ctl({"set", "walker", "alpha", "0.6"}).code == 0);
   CHECK(served.ctl({"set", "walker", "gate", "false"}).code == 0);
   CHECK(served.ctl({"warm-up", "walker", "--seconds", "2"}).code == 0);
   CHECK(served.ctl({"set", "walker", "auto_alpha", "false"}).code == 0);
   CHECK(served.ctl({"set", "walker", "gate", "true"}).code == 0);
   CHECK(served.ctl({"model", "walker", served.path("other.style")}).code == 0);
-  CHECK(served.daemon->comes_to_say("walker: the warm-up was interrupted"));
+  CHECK(served.daemon->comes_to_say("walker: ... interrupted"));
   CHECK(served.ctl({"warm-up", "walker", "--seconds", "0.5"}).code == 1);
   // A model without gate data: what is asked of it in vain is told.
   CHECK(served.ctl({"model", "walker", served.path("one.style")}).code == 0);
-  CHECK(served.daemon->comes_to_say("the model has no data for gate, warm-up and auto-alpha"));
+  CHECK(served.daemon->comes_to_say("no data ... gate, warm-up and auto-alpha"));
   const auto refused = served.ctl({"warm-up", "walker"});
   CHECK(refused.code == 1);
   CHECK(has(refused.err, "train it again"));
@@ -60,7 +60,7 @@ TEST_CASE("a performer is known from a clip of another day, also in a replay wit
   CHECK(has(missing.err + missing.out, "nobody.bvh"));
   served.folder.write("posed.toml", config("ann.bvh"));
   served.record();
-  std::this_thread::sleep_for(500ms);
+  served.await_frames("walker", 60);
   CHECK(served.ctl({"set", "walker", "alpha", "0.6"}).code == 0);
   served.daemon->send(SIGTERM);
   REQUIRE(served.daemon->exit_code() == 0);
@@ -79,7 +79,7 @@ TEST_CASE("ctl lists the daemon's own models and uses one by name; stats tell we
   CHECK(has(served.ctl({"models"}).out, "style      both.style"));
   const auto refused = served.ctl({"use-model", "walker", "../one.style"});
   CHECK(refused.code == 1);
-  CHECK(has(refused.err, "there is no model '../one.style' in the daemon's list"));
+  CHECK(has(refused.err, "'../one.style'"));
   CHECK(served.ctl({"use-model", "walker", "both.style"}).code == 0);
   CHECK(served.ctl({"set", "walker", "weights", "s1=0.25,s2=0.75"}).code == 0);
   CHECK(served.ctl({"set", "walker", "mask", "arms=0.5"}).code == 0);

@@ -143,7 +143,7 @@ TEST_CASE("Raised arms are learnt, and both are raised", "[train_body]") {
   CHECK(one_sentence(eval({"--report", takes.file("y.html")}), 2, "add --reference TAKE.bvh"));
   CHECK(one_sentence(eval({"--reference", both, "--reference-labels",
                            takes.folder.write("x.lab", "0 1 jump\n").string()}),
-                     2, "none of the reference's labels"));
+                     2, "none of ... labels"));
 }
 
 TEST_CASE("A body's training draws its report", "[train_body]") {
@@ -187,11 +187,10 @@ TEST_CASE("What no body can be learnt from is refused", "[train_body]") {
                                "--clip", takes.clips[0]});
     return posed(std::move(more));
   };
-  CHECK(one_sentence(label({"--body"}), 2, "names a take's one movement"));
+  CHECK(one_sentence(label({"--body"}), 2, "one movement"));
   CHECK(one_sentence(label({"--movement", "raise", "--labels", takes.labels[0]}), 2, "--movement"));
   const auto sample = (source_dir() / "config/gestures/raise-arms.toml").string();
-  CHECK(one_sentence(takes.train("x.gesture", {"--questions", sample}), 1,
-                     "the skeleton has no leftToes"));
+  CHECK(one_sentence(takes.train("x.gesture", {"--questions", sample}), 1, "leftToes"));
   CHECK(one_sentence(takes.train("x.gesture", {"--body", "--tree-text", "-", "--trees", "thumb"}),
                      2, "names no tree"));
   CHECK(one_sentence(takes.train("x.gesture", {"--movement", "raise"}), 2, "add --auto-label"));
@@ -215,7 +214,7 @@ TEST_CASE("What no body can be learnt from is refused", "[train_body]") {
     CHECK(one_sentence(
         posed({"train", "gesture", "--body", "--clip", first ? other : sound, first ? sound : other,
                "--labels", takes.labels[0], takes.labels[1], "--out", takes.file("x.gesture")}),
-        1, "the skeleton has no leftFoot"));
+        1, "leftFoot"));
   }
   CHECK_FALSE(std::filesystem::exists(takes.file("x.gesture")));
 }

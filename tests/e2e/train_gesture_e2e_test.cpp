@@ -139,7 +139,7 @@ TEST_CASE("Ctrl-C ends the training and writes nothing", "[train_gesture]") {
   training.send(SIGINT);
   CHECK(training.rest().empty());
   CHECK(training.exit_code() == 1);
-  CHECK(has(training.errors(), "posed: the training was stopped; nothing was written"));
+  CHECK(has(training.errors(), "stopped ... nothing was written"));
   CHECK_FALSE(std::filesystem::exists(glove.file("x.gesture")));
 }
 
@@ -149,16 +149,16 @@ TEST_CASE("What cannot be trained from is refused", "[train_gesture]") {
   const auto with = [&](const std::string& text) {
     return glove.train("x.gesture", {}, folder.write("bad.lab", text).string());
   };
-  CHECK(one_sentence(with("0 1 g\n0.5 2 c\n"), 1, "bad.lab:2: the segment overlaps"));
-  CHECK(one_sentence(with("0 1 g\n5 4 c\n"), 1, "bad.lab:2: the segment ends where it starts"));
-  CHECK(one_sentence(with("0 1 g\n1 1000 c\n"), 1, "bad.lab:2: the segment ends at 1000"));
-  CHECK(one_sentence(with("0 0.1 g\n"), 1, "bad.lab:1: the segment has 3 frames"));
-  CHECK(one_sentence(with("0 1 wave\n1 2 g\n"), 1, "label 'wave' is in no class"));
+  CHECK(one_sentence(with("0 1 g\n0.5 2 c\n"), 1, "bad.lab:2: ... overlaps"));
+  CHECK(one_sentence(with("0 1 g\n5 4 c\n"), 1, "bad.lab:2: ... ends where it starts"));
+  CHECK(one_sentence(with("0 1 g\n1 1000 c\n"), 1, "bad.lab:2: ... 1000"));
+  CHECK(one_sentence(with("0 0.1 g\n"), 1, "bad.lab:1: ... 3 frames"));
+  CHECK(one_sentence(with("0 1 wave\n1 2 g\n"), 1, "'wave' ... class"));
   CHECK(one_sentence(glove.train("x.gesture", {"--questions", "none.toml"}), 2, "none.toml"));
   CHECK(one_sentence(glove.train("x.gesture", {"--trees", "toe"}), 2, "names no tree"));
   CHECK(one_sentence(glove.train("x.gesture", {"--trees", "middle"}), 2, "add --tree-text"));
   CHECK(one_sentence(glove.train("x.lab", {"--auto-label", "--questions", "q.toml"}), 2,
-                     "--auto-label only proposes labels"));
+                     "--auto-label"));
   CHECK(one_sentence(glove.train("take.csv"), 2, "does not end in .gesture"));
   CHECK(one_sentence(glove.train("take.lab", {"--auto-label", "--overwrite"}), 2,
                      "is read by this command"));
@@ -166,7 +166,7 @@ TEST_CASE("What cannot be trained from is refused", "[train_gesture]") {
   CHECK(one_sentence(glove.train("x.gesture", {"--clip", "b.csv"}), 2, "one label file"));
   CHECK(
       one_sentence(posed({"apply", "--model", glove.file("x.gesture"), "a.bvh", "--out", "b.bvh"}),
-                   1, "cannot read the model: No such file"));
+                   1, "model ... No such file"));
   CHECK_FALSE(std::filesystem::exists(glove.file("x.gesture")));
   REQUIRE(glove.train("h.gesture").code == 0);
   CHECK(

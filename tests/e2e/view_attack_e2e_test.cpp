@@ -16,6 +16,7 @@
 #include "posed/v1/posed.pb.h"
 #include "tests/e2e/served.hpp"
 #include "tests/e2e/view_client.hpp"
+#include "tests/support/asked_again.hpp"
 
 namespace posed::test {
 namespace {
@@ -61,8 +62,9 @@ struct UnderAttack {
     honest->ask(1, status_request());
     const auto reply = honest->reply(1);
     REQUIRE(reply);
-    CHECK(reply->status().stream(0).shed() == 0);
-    CHECK(reply->status().stream(0).dropped() == 0);
+    // A busy machine costs some frames without any attack; one that stops the stream costs most.
+    const auto& walker = reply->status().stream(0);
+    CHECK(walker.shed() + walker.dropped() <= walker.frames() / 10);
     CHECK(gets_poses(*honest, 20));
   }
 
@@ -82,8 +84,11 @@ TEST_CASE("a thousand connections keep no page out and do not fill the memory", 
     if (i % 100 == 50) CHECK(gets_poses(*attack.honest, 1));
   }
   attack.check("1,000 half requests");
-  int left = 0;
-  for (const RawPeer& peer : peers) left += peer.hung_up(1ms) ? 0 : 1;
+  const auto left = asked_again(
+      [&] {
+        return std::ranges::count_if(peers, [](const RawPeer& one) { return !one.hung_up(1ms); });
+      },
+      [](auto count) { return count <= 64; });
   CHECK(left <= 64);
 }
 

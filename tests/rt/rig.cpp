@@ -84,7 +84,7 @@ void Rig::start() {
 
 int Rig::take_frames(int frames) {
   int came = 0;
-  const std::int64_t until_ns = system::monotonic_ns() + 10 * kNanosPerSecond;
+  const std::int64_t until_ns = system::monotonic_ns() + 60 * kNanosPerSecond;
   while (came < frames && system::monotonic_ns() < until_ns) {
     const bool any = finished_.consume([&](const pipeline::Item& item) {
       if (item.kind == pipeline::Item::Kind::kFrame) ++came;

@@ -19,6 +19,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/support/has.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -141,10 +142,10 @@ class Process {
     return exit_code_;
   }
 
-  // Waits until stderr contains this text; false after half a minute.
-  [[nodiscard]] bool comes_to_say(const std::string& part) const {
+  // Waits until stderr has these words, as has() reads them; false after half a minute.
+  [[nodiscard]] bool comes_to_say(const std::string& words) const {
     const auto end = std::chrono::steady_clock::now() + kPatience;
-    while (!errors().contains(part)) {
+    while (!in_order(errors(), words)) {
       if (std::chrono::steady_clock::now() > end) return false;
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }

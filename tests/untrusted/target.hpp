@@ -24,7 +24,7 @@ namespace posed::test {
 // Limits for an attack: memory growth in MB, and the longest pause of an innocent subscriber's
 // stream.
 inline constexpr double kMaxGrowth_MB = 64.0;
-inline constexpr double kLongestWait_s = 0.3;
+inline constexpr double kMaxWait_s = 0.3;
 
 class Target : public Stage {
  public:

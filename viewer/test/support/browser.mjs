@@ -20,12 +20,23 @@ const FLAGS = [
 export const launch = (flags = FLAGS) =>
   chromium.launch({ executablePath: CHROMIUM, args: ['--no-sandbox', ...flags] });
 
+// Long enough for a machine that does much else; what never comes still fails.
+export const PATIENCE = { timeout: 120000 };
+
+// For what such a machine can spoil: the first answer that is good, or the fourth.
+export async function askedAgain(ask, good) {
+  let answer = await ask();
+  for (let i = 0; i < 3 && !good(answer); i += 1) answer = await ask();
+  return answer;
+}
+
 // A page that keeps the errors that it says on the console.
 export async function openPage(browser, url, { width = 1440, height = 900, dark = false } = {}) {
   const context = await browser.newContext({
     viewport: { width, height },
     colorScheme: dark ? 'dark' : 'light',
   });
+  context.setDefaultTimeout(PATIENCE.timeout);
   const page = await context.newPage();
   page.errors = [];
   page.on('console', (message) => {

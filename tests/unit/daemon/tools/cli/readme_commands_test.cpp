@@ -1,6 +1,5 @@
 // Every command line of posed in a README names a command that exists, with options that it has.
 #include <algorithm>
-#include <cctype>
 #include <cstddef>
 #include <fstream>
 #include <optional>
@@ -21,30 +20,10 @@ namespace {
 
 using Words = std::vector<std::string>;
 
-// The words of a shell's line; what is in quotes is one word, and a comment ends it.
+// The words of a shell's line, without its comment; what is in quotes is one word.
 Words words_of(const std::string& line) {
-  Words words;
-  std::string word;
-  char quote = 0;
-  bool any = false;
-  for (const char sign : line) {
-    if (quote == 0 && !any && sign == '#') break;
-    const bool opens = quote == 0 && (sign == '"' || sign == '\'');
-    const bool closes = quote != 0 && sign == quote;
-    if (opens || closes) {
-      quote = opens ? sign : '\0';
-      any = true;
-    } else if (quote == 0 && std::isspace(static_cast<unsigned char>(sign)) != 0) {
-      if (any) words.push_back(word);
-      word.clear();
-      any = false;
-    } else {
-      word += sign;
-      any = true;
-    }
-  }
-  if (any) words.push_back(word);
-  return words;
+  if (line.starts_with('#')) return {};
+  return CLI::detail::split_up(line.substr(0, line.find(" #")));
 }
 
 // Those behind `posed`, for each time that it is started in the line.
