@@ -13,7 +13,7 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "daemon/tools/bench/percentiles.hpp"
+#include "tests/bench/percentiles.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/degrees.hpp"
 #include "models/gesture/synthetic_signer.hpp"
@@ -217,9 +217,9 @@ json cost(unsigned seed) {
     timed(solve_us, [&] { window.solve(1.0 / 60.0); });
     timed(stage_us, [&] { stage.process({.frame = frame}, last); });
   }
-  json report{{"bare_solve", tools::percentiles(bare_us)},
-              {"live_solve", tools::percentiles(solve_us)},
-              {"stage", tools::percentiles(stage_us)}};
+  json report{{"bare_solve", percentiles(bare_us)},
+              {"live_solve", percentiles(solve_us)},
+              {"stage", percentiles(stage_us)}};
   for (const char* name : {"live_solve", "stage"}) {
     report[name]["p50_over_bare"] =
         report[name]["p50_us"].get<double>() / report["bare_solve"]["p50_us"].get<double>();

@@ -6,7 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "daemon/tools/report/look.hpp"
+#include "daemon/tools/report/plot.hpp"
 #include "daemon/tools/report/style_sheet.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/text/svg.hpp"

@@ -1,8 +1,8 @@
 #include <array>
 #include <utility>
 
-#include "daemon/tools/report/bars.hpp"
 #include "daemon/tools/report/bench_sections.hpp"
+#include "daemon/tools/report/plot.hpp"
 
 namespace posed::report {
 

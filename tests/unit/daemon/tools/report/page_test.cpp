@@ -9,10 +9,8 @@
 
 #include <pugixml.hpp>
 
-#include "daemon/tools/report/bars.hpp"
 #include "daemon/tools/report/bench_sections.hpp"
 #include "daemon/tools/report/gesture_sections.hpp"
-#include "daemon/tools/report/look.hpp"
 #include "daemon/tools/report/plot.hpp"
 #include "daemon/tools/report/style_sections.hpp"
 #include "tests/support/file_text.hpp"

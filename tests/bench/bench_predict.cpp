@@ -1,4 +1,4 @@
-// `posed bench predict`: the cost of one call of the style filter's Gaussian process, compared with
+// `posed_bench predict`: the cost of one call of the style filter's Gaussian process, compared with
 // just reading the same bytes.
 #include <unistd.h>
 
@@ -17,10 +17,9 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "daemon/tools/bench/bench_report.hpp"
-#include "daemon/tools/bench/percentiles.hpp"
-#include "daemon/tools/bench/stream_sum.hpp"
-#include "daemon/tools/command/command.hpp"
+#include "tests/bench/bench.hpp"
+#include "tests/bench/percentiles.hpp"
+#include "tests/bench/stream_sum.hpp"
 #include "daemon/tools/command/degrees.hpp"
 #include "models/gp/isa.hpp"
 #include "models/gp/predictor.hpp"
@@ -28,7 +27,7 @@
 #include "models/gp/synthetic.hpp"
 #include "proto/text/json_text.hpp"
 
-namespace posed::tools {
+namespace posed::bench {
 namespace {
 
 using nlohmann::json;
@@ -44,8 +43,8 @@ frames of a 120 Hz stream. The reference sums as many floats as the process logi
 styles in one model, with weights that rest, that move at every call and that have just come to
 rest. Variants take turns, so that they run under the same conditions.
 
-  posed bench predict
-  posed bench predict --samples 500 --json)";
+  posed_bench predict
+  posed_bench predict --samples 500 --json)";
 
 // One variant to time: a call for query i. It returns a float, so that no call is optimised away.
 struct Variant {
@@ -105,8 +104,6 @@ Floats ones(int count) {
 int to_yardstick(int floats) { return (floats + 127) / 128 * 128; }
 
 constexpr std::array kVariants{"sum", "mean", "four_at_rest", "four_moving", "four_settling"};
-constexpr std::array kVariantWords{"reading alone", "one style", "four styles at rest",
-                                   "four styles moving", "four styles settling"};
 
 constexpr int kStyles = 4;  // of the mixture
 
@@ -185,7 +182,7 @@ json accuracy(const Subject& subject) {
       }
       bits.insert(bits.end(), subject.out.begin(), subject.out.end());
     }
-    report["max_mean_error_deg"] = mean_rad * kDegrees;
+    report["max_mean_error_deg"] = mean_rad * tools::kDegrees;
   }
   report["avx2_avx512_same_bits"] = all.size() == 2 ? json(all[0] == all[1]) : json(nullptr);
   if (const auto back = gp::set_isa(isa_before); !back) report["error"] = back.error().message;
@@ -248,42 +245,11 @@ void print_case(const json& report) {
 
 struct PredictBench {
   int samples = 2000;
-  ReportFile report;
   bool json = false;
 };
 
-BenchPage page_of_cases(const json& cases) {
-  BenchPage page{.command = "posed bench predict", .verdict = {}, .good = true, .figures = {}};
-  double most = 0.0;
-  for (const json& one : cases) {
-    most = std::max(most, one["mean"]["hot"]["ratio"].get<double>());
-    for (const auto* heat : {"hot", "cold"}) {
-      std::vector<report::Measured> peers;
-      peers.reserve(kVariants.size());
-      for (std::size_t v = 0; v < kVariants.size(); ++v) {
-        peers.push_back({kVariantWords[v], percentiles_of(one[kVariants[v]][heat])});
-      }
-      report::Figure figure = report::percentile_bars(
-          {.title = fmt::format("{} poses, {} dimensions, {}", one["poses"].get<int>(),
-                                one["dims"].get<int>(), heat),
-           .sentence =
-               "The first bar of each group is what it takes only to read the model's "
-               "numbers, the second one call of one style; the others are four styles in one "
-               "model. Equal distances are equal factors.",
-           .quantity = "one call",
-           .peers = std::move(peers)});
-      figure.folded = page.figures.size() > 1;
-      page.figures.push_back(std::move(figure));
-    }
-  }
-  page.verdict = fmt::format(
-      "one call takes at most {:.2f} times as long as reading its numbers (hot, median)", most);
-  return page;
-}
-
-// Whether the instruction sets agree.
-Result<bool> bench_predict(const PredictBench& bench) {
-  if (auto checked = bench.report.check(); !checked) return std::unexpected(checked.error());
+// Returns whether the instruction sets agree.
+bool bench_predict(const PredictBench& bench) {
   const Evictor evictor;
   json cases = json::array();
   if (!bench.json) std::printf("instruction set: %s\n", std::string(gp::isa_name()).c_str());
@@ -300,9 +266,6 @@ Result<bool> bench_predict(const PredictBench& bench) {
                      {"samples", bench.samples},
                      {"cases", cases}};
   if (bench.json) std::printf("%s\n", json_text(figures, 2).c_str());
-  if (auto written = write_bench_page(page_of_cases(cases), figures, bench.report); !written) {
-    return std::unexpected(written.error());
-  }
   return same;
 }
 
@@ -315,13 +278,10 @@ void add_bench_predict(CLI::App& bench, int& exit_code) {
   command->add_option("--samples", options->samples, "Timed samples for each variant")
       ->check(CLI::Range(10, 1'000'000))
       ->capture_default_str();
-  add_report_file(*command, options->report);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {
-    const auto same = bench_predict(*options);
-    exit_code =
-        same ? static_cast<int>(*same ? ExitCode::kDone : ExitCode::kFailed) : report(same.error());
+    exit_code = static_cast<int>(bench_predict(*options) ? ExitCode::kDone : ExitCode::kFailed);
   });
 }
 
-}  // namespace posed::tools
+}  // namespace posed::bench

@@ -5,9 +5,9 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-namespace posed::tools {
+namespace posed::bench {
 
 // {"p50_us", "p99_us", "p99_9_us", "max_us"}; needs at least one value.
 [[nodiscard]] nlohmann::json percentiles(std::vector<double> values_us);
 
-}  // namespace posed::tools
+}  // namespace posed::bench

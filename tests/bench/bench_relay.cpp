@@ -1,4 +1,4 @@
-// `posed bench relay`: what many subscribers behind a relay cost the daemon, against one that
+// `posed_bench relay`: what many subscribers behind a relay cost the daemon, against one that
 // connects to it directly.
 #include <cstdio>
 #include <memory>
@@ -14,14 +14,13 @@
 #include "daemon/assembly/daemon.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/tools/bench/bench_parts.hpp"
-#include "daemon/tools/bench/bench_report.hpp"
 #include "daemon/tools/bench/child_process.hpp"
 #include "daemon/tools/bench/hop_subscriber.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/relay/relay.hpp"
 #include "proto/zmq/zmq_handle.hpp"
 
-namespace posed::tools {
+namespace posed::bench {
 namespace {
 
 constexpr const char* kBenchRelayFooter =
@@ -30,8 +29,8 @@ a relay with --subscribers. Relay and subscribers are processes of their own tha
 daemon, as on other machines. CPU is the daemon's process alone; `send` is the time from a frame's
 arrival to its hand-over to ZeroMQ. At the end subscribers that come late ask for a skeleton.
 
-  posed bench relay
-  posed bench relay --subscribers 50 --seconds 5 --json)";
+  posed_bench relay
+  posed_bench relay --subscribers 50 --seconds 5 --json)";
 
 constexpr int kLateJoiners = 20;
 constexpr std::chrono::seconds kConnect{2};
@@ -41,7 +40,6 @@ struct RelayBench {
   int streams = 1;
   int seconds = 10;
   int turns = 3;
-  ReportFile report;
   bool json = false;
 };
 
@@ -210,50 +208,11 @@ void print(const RelayBench& bench, const RelayFigures& figures) {
               static_cast<unsigned long long>(figures.relayed.gaps));
 }
 
-BenchPage page_of(const RelayBench& bench, const RelayFigures& figures) {
-  const double ratio = figures.relayed.cpu_percent / figures.direct.cpu_percent;
-  const std::string direct = "1 direct subscriber";
-  const std::string relayed = fmt::format("{} behind a relay", bench.subscribers);
-  return {
-      .command = "posed bench relay",
-      .verdict = fmt::format("{} subscribers behind a relay cost the daemon {:.2f} times the CPU "
-                             "of one, and {} frames were lost",
-                             bench.subscribers, ratio, figures.relayed.gaps),
-      .good = figures.relayed.gaps == 0,
-      .figures = {
-          report::percentile_bars(
-              {.title = "How long a frame is in the daemon",
-               .sentence = "Pairs of equal length say that the daemon does not notice how many "
-                           "listen behind the relay. Equal distances are equal factors.",
-               .quantity = "from the arrival to the hand-over",
-               .peers = {{direct, percentiles_of(figures_of(figures.direct.send_us))},
-                         {relayed, percentiles_of(figures_of(figures.relayed.send_us))}}}),
-          report::paired_bars({.title = "What it costs the daemon",
-                               .sentence =
-                                   "Bars of equal length say that who listens behind the relay "
-                                   "costs the daemon nothing.",
-                               .quantity = "CPU time of the daemon",
-                               .unit = "% of a core",
-                               .series = {"CPU"},
-                               .rows = {{direct, {figures.direct.cpu_percent}},
-                                        {relayed, {figures.relayed.cpu_percent}}},
-                               .digits = 2}),
-          report::percentile_bars(
-              {.title = "Who comes late",
-               .sentence =
-                   "How long a new subscriber waits for its skeleton from the relay: nobody "
-                   "notices a tenth of a second, 100000 us.",
-               .quantity = "from the subscription to the skeleton",
-               .peers = {{"late joiner", percentiles_of(figures_of(figures.late_us))}}})}};
-}
-
 Result<> bench_relay(const RelayBench& bench) {
-  if (auto checked = bench.report.check(); !checked) return checked;
   const auto measured = measure(bench);
   if (!measured) return std::unexpected(measured.error());
-  return show_bench(
-      bench.json, to_json(bench, *measured), [&] { print(bench, *measured); },
-      page_of(bench, *measured), bench.report);
+  tools::show(findings_of(bench, *measured), bench.json);
+  return {};
 }
 
 }  // namespace
@@ -274,12 +233,11 @@ void add_bench_relay(CLI::App& bench, int& exit_code) {
   command->add_option("--turns", options->turns, "How often both are measured")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
-  add_report_file(*command, options->report);
   command->add_flag("--json", options->json, "JSON on stdout");
   command->footer(kBenchRelayFooter);
   command->callback([options, &exit_code] {
-    if (auto done = bench_relay(*options); !done) exit_code = report(done.error());
+    if (auto done = bench_relay(*options); !done) exit_code = tools::report(done.error());
   });
 }
 
-}  // namespace posed::tools
+}  // namespace posed::bench

@@ -1,8 +1,8 @@
-#include "daemon/tools/bench/stream_sum.hpp"
+#include "tests/bench/stream_sum.hpp"
 
 #define HWY_DISABLED_TARGETS (HWY_SSSE3 | HWY_AVX3_DL)
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "daemon/tools/bench/stream_sum.cpp"
+#define HWY_TARGET_INCLUDE "tests/bench/stream_sum.cpp"
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wsign-conversion"
 #include <hwy/foreach_target.h>
@@ -10,7 +10,7 @@
 #pragma GCC diagnostic pop
 
 HWY_BEFORE_NAMESPACE();
-namespace posed::tools::HWY_NAMESPACE {
+namespace posed::bench::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 float stream_sum(const float* HWY_RESTRICT data, int count) {
@@ -25,16 +25,16 @@ float stream_sum(const float* HWY_RESTRICT data, int count) {
   return hn::GetLane(hn::SumOfLanes(d, sum[0]));
 }
 
-}  // namespace posed::tools::HWY_NAMESPACE
+}  // namespace posed::bench::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
-namespace posed::tools {
+namespace posed::bench {
 
 HWY_EXPORT(stream_sum);
 float stream_sum(const float* data, int count) {
   return HWY_DYNAMIC_DISPATCH(stream_sum)(data, count);
 }
 
-}  // namespace posed::tools
+}  // namespace posed::bench
 #endif  // HWY_ONCE

@@ -1,10 +1,10 @@
-#include "daemon/tools/bench/percentiles.hpp"
+#include "tests/bench/percentiles.hpp"
 
 #include <algorithm>
 
 #include <nlohmann/json.hpp>
 
-namespace posed::tools {
+namespace posed::bench {
 
 nlohmann::json percentiles(std::vector<double> values_us) {
   std::ranges::sort(values_us);
@@ -14,4 +14,4 @@ nlohmann::json percentiles(std::vector<double> values_us) {
   return {{"p50_us", at(0.5)}, {"p99_us", at(0.99)}, {"p99_9_us", at(0.999)}, {"max_us", at(1.0)}};
 }
 
-}  // namespace posed::tools
+}  // namespace posed::bench

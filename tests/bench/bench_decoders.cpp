@@ -1,4 +1,4 @@
-// `posed bench decoders`: how many packets a second each glove's decoder handles on one core, and
+// `posed_bench decoders`: how many packets a second each glove's decoder handles on one core, and
 // what it adds to a bare read() of the same pseudo-terminal.
 #include <poll.h>
 #include <unistd.h>
@@ -8,9 +8,11 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <ctime>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <thread>
 #include <vector>
@@ -21,20 +23,124 @@
 
 #include "daemon/pipeline/ring.hpp"
 #include "daemon/system/clock.hpp"
-#include "daemon/tools/bench/bench_gloves.hpp"
-#include "daemon/tools/bench/bench_report.hpp"
-#include "daemon/tools/bench/percentiles.hpp"
 #include "daemon/tools/command/command.hpp"
+#include "daemon/tools/emulate/emulated_device.hpp"
 #include "daemon/tools/emulate/emulated_port.hpp"
+#include "drivers/described/device_file.hpp"
+#include "drivers/driver.hpp"
+#include "drivers/glove/glove_emulator.hpp"
 #include "drivers/transport/transport_factory.hpp"
+#include "proto/frame/result.hpp"
 #include "proto/text/json_text.hpp"
+#include "tests/bench/bench.hpp"
+#include "tests/bench/percentiles.hpp"
 
-namespace posed::tools {
+namespace posed::bench {
+
 namespace {
 
 using nlohmann::json;
 using system::monotonic_ns;
 using Bytes = std::vector<std::byte>;
+
+struct BenchGlove {
+  std::string name;                             // "described vmg30"
+  std::unique_ptr<drivers::Emulator> emulator;  // already streaming
+  std::unique_ptr<drivers::Decoder> decoder;
+};
+
+using drivers::Driver;
+using drivers::Emulator;
+using drivers::Options;
+
+// Lends an emulator to code that wants to own one.
+class LentEmulator final : public Emulator {
+ public:
+  explicit LentEmulator(Emulator& emulator) : emulator_(emulator) {}
+  void pose(std::size_t body, const Frame& frame) override { emulator_.pose(body, frame); }
+  void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override {
+    emulator_.receive(bytes, now_ns, answer);
+  }
+  [[nodiscard]] std::int64_t next_due_ns() const override { return emulator_.next_due_ns(); }
+  void emit(std::int64_t now_ns, Bytes& out) override { emulator_.emit(now_ns, out); }
+
+ private:
+  Emulator& emulator_;
+};
+
+// The driver opens the emulator as it would open the glove; afterwards the emulator streams.
+Result<std::unique_ptr<drivers::Decoder>> opened_decoder(const Driver& driver, Options options,
+                                                         Emulator& emulator) {
+  auto port = emulate::EmulatedPort::open_pty();
+  if (!port) return std::unexpected(port.error());
+  options["port"] = port->name();
+  emulate::EmulatedDevice glove(std::make_unique<LentEmulator>(emulator), std::move(*port), {}, {});
+  const std::jthread thread([&](const std::stop_token& stop) { glove.run(stop); });
+  drivers::TransportFactory ports;
+  auto device = driver.open(options, ports);
+  if (!device) return std::unexpected(device.error());
+  return std::move(device->decoder);
+}
+
+Result<std::unique_ptr<drivers::Decoder>> expected_decoder(const Driver& driver,
+                                                           const Options& options) {
+  const auto description = driver.expect(options);
+  if (!description) return std::unexpected(description.error());
+  return driver.make_decoder(*description);
+}
+
+Result<BenchGlove> make_bench_glove(const Driver& driver, const std::string& name,
+                                    const Options& options) {
+  auto emulator = driver.emulate(options);
+  if (!emulator) return std::unexpected(emulator.error());
+  auto decoder = (*emulator)->next_due_ns() == kNoTime_ns
+                     ? opened_decoder(driver, options, **emulator)
+                     : expected_decoder(driver, options);
+  if (!decoder) return std::unexpected(decoder.error());
+  return BenchGlove{name, std::move(*emulator), std::move(*decoder)};
+}
+
+// The variants of a driver's gloves that differ in their bytes.
+std::vector<std::pair<std::string, Options>> glove_kinds(const Driver& driver) {
+  const std::string name(driver.name);
+  std::vector<std::pair<std::string, Options>> found;
+  if (name != "described") found.push_back({name, {}});
+  if (name == "cyberglove") found.push_back({name + " 16bit", {{"form", std::string("16bit")}}});
+  if (name == "fivedt") found.push_back({name + " 16", {{"model", std::string("16")}}});
+  if (name == "lucidgloves") {
+    found.push_back({name + " legacy", {{"encoding", std::string("legacy")}}});
+  }
+  if (name != "described") return found;
+  for (const std::string& device : drivers::described::shipped_devices()) {
+    found.push_back({fmt::format("{} {}", name, device), {{"device", device}}});
+  }
+  return found;
+}
+
+// One of every driver that can be emulated, and one of every table-driven device. If a glove
+// streams only on command, its driver has sent that command through a pseudo-terminal.
+Result<std::vector<BenchGlove>> bench_gloves() {
+  std::vector<BenchGlove> gloves;
+  for (const Driver& driver : drivers::registry()) {
+    if (driver.glove == nullptr || driver.emulate == nullptr) continue;
+    for (const auto& [name, options] : glove_kinds(driver)) {
+      auto glove = make_bench_glove(driver, name, options);
+      if (!glove) return std::unexpected(glove.error());
+      gloves.push_back(std::move(*glove));
+    }
+  }
+  return gloves;
+}
+
+// Adds the glove's next record to `out`, for a hand that closes and opens every 64 records.
+void next_record(BenchGlove& glove, std::size_t index, std::vector<std::byte>& out) {
+  constexpr double kRecordsATurn = 64.0;
+  HandAngles angles{};
+  const double turn = 2.0 * std::numbers::pi * static_cast<double>(index) / kRecordsATurn;
+  for (std::size_t i = 0; i < angles.size(); i += 3) angles[i] = 0.5 - 0.5 * std::cos(turn);
+  glove.emulator->pose(0, drivers::glove::hand_frame(angles));
+  glove.emulator->emit(glove.emulator->next_due_ns(), out);
+}
 
 constexpr std::size_t kLoopRecords = 512;  // of the data that is decoded repeatedly
 constexpr std::size_t kReadBytes = 4096;   // most bytes of a read
@@ -45,8 +151,8 @@ packets/s: decoded, calibrated, posed and put into a ring, by CPU time of one th
 latency: from before the write of a whole packet into a pseudo-terminal to its read() (bare) or to
 its frame in a ring (decoded); packets take turns between the two, one a millisecond.
 
-  posed bench decoders
-  posed bench decoders --glove cyberglove --samples 500 --json)";
+  posed_bench decoders
+  posed_bench decoders --glove cyberglove --samples 500 --json)";
 
 // Does what a reader's sink does: puts items into a ring.
 class RingSink final : public Sink {
@@ -183,62 +289,10 @@ void print_glove(const json& glove) {
 struct DecoderBench {
   std::string glove;
   int samples = 2000;
-  ReportFile report;
   bool json = false;
 };
 
-BenchPage page_of_gloves(const json& gloves) {
-  report::PairedBars late{.title = "What decoding adds to a read",
-                          .sentence =
-                              "99 of 100 packets are there within this time: where both "
-                              "bars are equally long, decoding costs nothing beside the "
-                              "read itself.",
-                          .quantity = "from the write of a packet, p99",
-                          .unit = "us",
-                          .series = {"bare read", "decoded"},
-                          .rows = {}};
-  report::PairedBars fast{.title = "How much one core decodes",
-                          .sentence =
-                              "Packets decoded, calibrated and posed by one thread; a "
-                              "glove sends a hundred or so a second.",
-                          .quantity = "packets",
-                          .unit = "millions a second",
-                          .series = {"packets"},
-                          .rows = {},
-                          .digits = 2};
-  double worst = 0.0;
-  for (const json& glove : gloves) {
-    const auto name = glove["glove"].get<std::string>();
-    const json& latency = glove["latency"];
-    late.rows.push_back({name,
-                         {latency["bare_read"]["p99_us"].get<double>(),
-                          latency["decoded"]["p99_us"].get<double>()}});
-    fast.rows.push_back({name, {glove["throughput"]["packets_per_s"].get<double>() * 1e-6}});
-    worst = std::max(worst, latency["p99_ratio"].get<double>());
-  }
-  BenchPage page{
-      .command = "posed bench decoders",
-      .verdict = fmt::format("at most {:.2f} times the time of a bare read (p99) over {} "
-                             "gloves",
-                             worst, gloves.size()),
-      .good = true,
-      .figures = {report::paired_bars(late), report::paired_bars(fast)}};
-  for (const json& glove : gloves) {
-    report::Figure figure = report::percentile_bars(
-        {.title = glove["glove"].get<std::string>(),
-         .sentence = "The same for this glove, with all percentiles; equal distances are "
-                     "equal factors.",
-         .quantity = "from the write of a packet",
-         .peers = {{"bare read", percentiles_of(glove["latency"]["bare_read"])},
-                   {"decoded", percentiles_of(glove["latency"]["decoded"])}}});
-    figure.folded = true;
-    page.figures.push_back(std::move(figure));
-  }
-  return page;
-}
-
 Result<> bench_decoders(const DecoderBench& bench) {
-  if (auto checked = bench.report.check(); !checked) return checked;
   json report = json::array();
   if (!bench.json) std::printf("latency in us: p50, p99, p99.9, max\n");
   auto gloves = bench_gloves();
@@ -255,7 +309,7 @@ Result<> bench_decoders(const DecoderBench& bench) {
   if (report.empty())
     return misuse("there is no glove '" + bench.glove + "'; leave --glove out to see them");
   if (bench.json) std::printf("%s\n", json_text(report, 2).c_str());
-  return write_bench_page(page_of_gloves(report), report, bench.report);
+  return {};
 }
 
 }  // namespace
@@ -268,13 +322,12 @@ void add_bench_decoders(CLI::App& bench, int& exit_code) {
   command->add_option("--samples", options->samples, "Timed packets for each glove and way")
       ->check(CLI::Range(10, 1'000'000))
       ->capture_default_str();
-  add_report_file(*command, options->report);
   command->add_flag("--json", options->json, "One JSON array on stdout");
   command->callback([options, &exit_code] {
     if (auto done = bench_decoders(*options); !done) {
-      exit_code = report(done.error());
+      exit_code = tools::report(done.error());
     }
   });
 }
 
-}  // namespace posed::tools
+}  // namespace posed::bench

@@ -1,4 +1,4 @@
-// `posed bench stage`: performers whose poses come over UDP, each styled, published over ZeroMQ and
+// `posed_bench stage`: performers whose poses come over UDP, each styled, published over ZeroMQ and
 // sent to an avatar.
 #include <sys/socket.h>
 #include <unistd.h>
@@ -20,7 +20,6 @@
 #include "daemon/system/clock.hpp"
 #include "daemon/system/process.hpp"
 #include "daemon/tools/bench/bench_parts.hpp"
-#include "daemon/tools/bench/bench_report.hpp"
 #include "daemon/tools/bench/child_process.hpp"
 #include "daemon/tools/bench/hop_subscriber.hpp"
 #include "daemon/tools/command/command.hpp"
@@ -30,7 +29,7 @@
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/style_type.hpp"
 
-namespace posed::tools {
+namespace posed::bench {
 namespace {
 
 constexpr const char* kBenchStageFooter =
@@ -39,8 +38,8 @@ of --points poses, publishes it and sends it to a VMC avatar. Emulators, subscri
 processes of their own; CPU is the daemon's process alone. `send` is the time from the kernel's
 receive stamp to the hand-over to ZeroMQ.
 
-  posed bench stage
-  posed bench stage --performers 64 --no-vmc --seconds 20)";
+  posed_bench stage
+  posed_bench stage --performers 64 --no-vmc --seconds 20)";
 
 constexpr std::chrono::seconds kSettle{3};
 
@@ -51,7 +50,6 @@ struct StageBench {
   int seconds = 60;
   bool no_vmc = false;
   bool realtime = false;
-  ReportFile report;
   bool json = false;
 };
 
@@ -281,30 +279,11 @@ void print(const StageBench& bench, const StageFigures& figures) {
               figures.pressure_percent);
 }
 
-BenchPage page_of(const StageBench& bench, const StageFigures& figures) {
-  return {
-      .command = "posed bench stage",
-      .verdict = fmt::format("{} performers cost {:.0f} % of a core, {} of {} frames were lost{}",
-                             bench.performers, figures.cpu_percent,
-                             figures.dropped + figures.shed + figures.kernel_dropped,
-                             figures.frames, pressure_words(figures.pressure_percent)),
-      .good = figures.dropped + figures.shed + figures.kernel_dropped == 0,
-      .figures = {report::percentile_bars(
-          {.title = fmt::format("{} performers at {:g} Hz", bench.performers, bench.rate_hz),
-           .sentence = "How long a frame is in the daemon, from the kernel's receive stamp "
-                       "until ZeroMQ has it: all bars should end far left of the time between "
-                       "two frames. Equal distances are equal factors.",
-           .quantity = "from receipt to the hand-over",
-           .peers = {{"posed", percentiles_of(figures.send)}}})}};
-}
-
 Result<> bench_stage(const StageBench& bench) {
-  if (auto checked = bench.report.check(); !checked) return checked;
   const auto measured = measure(bench);
   if (!measured) return std::unexpected(measured.error());
-  return show_bench(
-      bench.json, to_json(bench, *measured), [&] { print(bench, *measured); },
-      page_of(bench, *measured), bench.report);
+  tools::show(findings_of(bench, *measured), bench.json);
+  return {};
 }
 
 }  // namespace
@@ -327,12 +306,11 @@ void add_bench_stage(CLI::App& bench, int& exit_code) {
       ->capture_default_str();
   command->add_flag("--no-vmc", options->no_vmc, "Without avatars");
   command->add_flag("--realtime", options->realtime, "Ask for real-time rights, as `run` does");
-  add_report_file(*command, options->report);
   command->add_flag("--json", options->json, "JSON on stdout");
   command->footer(kBenchStageFooter);
   command->callback([options, &exit_code] {
-    if (auto done = bench_stage(*options); !done) exit_code = report(done.error());
+    if (auto done = bench_stage(*options); !done) exit_code = tools::report(done.error());
   });
 }
 
-}  // namespace posed::tools
+}  // namespace posed::bench
