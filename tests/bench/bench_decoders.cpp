@@ -25,7 +25,6 @@
 #include "daemon/system/clock.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/emulate/emulated_device.hpp"
-#include "daemon/tools/emulate/emulated_port.hpp"
 #include "drivers/described/device_file.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/glove/glove_emulator.hpp"

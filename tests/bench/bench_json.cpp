@@ -9,11 +9,11 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "tests/bench/percentiles.hpp"
 #include "drivers/rokoko/decoder.hpp"
 #include "drivers/rokoko/emulator.hpp"
 #include "tests/bench/bench.hpp"
 #include "tests/bench/cpu_time.hpp"
+#include "tests/bench/percentiles.hpp"
 
 namespace posed::bench {
 namespace {

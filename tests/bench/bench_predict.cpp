@@ -17,15 +17,15 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "tests/bench/bench.hpp"
-#include "tests/bench/percentiles.hpp"
-#include "tests/bench/stream_sum.hpp"
-#include "daemon/tools/command/degrees.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "models/gp/isa.hpp"
 #include "models/gp/predictor.hpp"
 #include "models/gp/regression.hpp"
 #include "models/gp/synthetic.hpp"
 #include "proto/text/json_text.hpp"
+#include "tests/bench/bench.hpp"
+#include "tests/bench/percentiles.hpp"
+#include "tests/bench/stream_sum.hpp"
 
 namespace posed::bench {
 namespace {

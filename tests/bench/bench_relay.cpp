@@ -9,7 +9,6 @@
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/assembly/daemon.hpp"
 #include "daemon/system/clock.hpp"
@@ -17,14 +16,16 @@
 #include "daemon/tools/bench/child_process.hpp"
 #include "daemon/tools/bench/hop_subscriber.hpp"
 #include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/relay/relay.hpp"
 #include "proto/zmq/zmq_handle.hpp"
+#include "tests/bench/bench.hpp"
 
 namespace posed::bench {
 namespace {
 
 constexpr const char* kBenchRelayFooter =
-    R"(Synthetic walkers at 120 Hz through the real daemon, heard in turn by one subscriber and by
+    R"(Synthetic walkers at 120 Hz through the real daemon, received in turn by one subscriber and by
 a relay with --subscribers. Relay and subscribers are processes of their own that give way to the
 daemon, as on other machines. CPU is the daemon's process alone; `send` is the time from a frame's
 arrival to its hand-over to ZeroMQ. At the end subscribers that come late ask for a skeleton.
@@ -45,23 +46,23 @@ struct RelayBench {
 
 // The processes of one turn, which wait until it comes.
 struct Turn {
-  std::unique_ptr<HopSubscriber> direct;
-  ChildProcess relay;
-  std::vector<std::unique_ptr<HopSubscriber>> behind;
+  std::unique_ptr<tools::HopSubscriber> direct;
+  tools::ChildProcess relay;
+  std::vector<std::unique_ptr<tools::HopSubscriber>> behind;
 };
 
-struct HeardFrames {
+struct ReceivedFrames {
   double cpu_percent = 0.0;  // of one core, mean of the turns
   std::vector<double> send_us{};
   std::uint64_t gaps = 0;
 };
 
 struct RelayFigures {
-  HeardFrames direct, relayed;
+  ReceivedFrames direct, relayed;
   std::vector<double> late_us;
 };
 
-int relay_until_stopped(PipePair& parent) {
+int relay_until_stopped(tools::PipePair& parent) {
   spdlog::set_level(spdlog::level::err);
   auto context = net::open_context();
   if (!context) return 1;
@@ -83,13 +84,13 @@ int relay_until_stopped(PipePair& parent) {
 Result<std::vector<Turn>> fork_turns(const RelayBench& bench) {
   std::vector<Turn> turns;
   for (int i = 0; i < bench.turns; ++i) {
-    auto direct = HopSubscriber::fork(true);
+    auto direct = tools::HopSubscriber::fork(true);
     if (!direct) return std::unexpected(direct.error());
-    auto relay = ChildProcess::fork(relay_until_stopped, true);
+    auto relay = tools::ChildProcess::fork(relay_until_stopped, true);
     if (!relay) return std::unexpected(relay.error());
     Turn turn{std::move(*direct), std::move(*relay), {}};
     for (int s = 0; s < bench.subscribers; ++s) {
-      auto behind = HopSubscriber::fork(true);
+      auto behind = tools::HopSubscriber::fork(true);
       if (!behind) return std::unexpected(behind.error());
       turn.behind.push_back(std::move(*behind));
     }
@@ -101,18 +102,18 @@ Result<std::vector<Turn>> fork_turns(const RelayBench& bench) {
 // Measures the daemon while all subscribers are there.
 double cpu_percent_during(int seconds) {
   std::this_thread::sleep_for(kConnect);
-  const CpuShare cpu;
+  const tools::CpuShare cpu;
   std::this_thread::sleep_for(std::chrono::seconds(seconds));
   return cpu.percent();
 }
 
-Result<> take(HopSubscriber& subscriber, HeardFrames& heard, bool ages) {
+Result<> collect(tools::HopSubscriber& subscriber, ReceivedFrames& frames, bool ages) {
   auto received = subscriber.finish();
   if (!received) return std::unexpected(received.error());
-  heard.gaps += received->gaps;
+  frames.gaps += received->gaps;
   if (!ages) return {};
-  const std::vector<double> ages_us = send_ages_us(received->messages);
-  heard.send_us.insert(heard.send_us.end(), ages_us.begin(), ages_us.end());
+  const std::vector<double> ages_us = tools::send_ages_us(received->messages);
+  frames.send_us.insert(frames.send_us.end(), ages_us.begin(), ages_us.end());
   return {};
 }
 
@@ -137,7 +138,7 @@ Result<> measure_turn(const RelayBench& bench, const std::string& daemon, Turn& 
                       RelayFigures& figures) {
   turn.direct->begin({daemon});
   figures.direct.cpu_percent += cpu_percent_during(bench.seconds) / bench.turns;
-  if (auto taken = take(*turn.direct, figures.direct, true); !taken) return taken;
+  if (auto taken = collect(*turn.direct, figures.direct, true); !taken) return taken;
   turn.relay.pipes().write_line(daemon);
   const std::string relay = turn.relay.pipes().read_line();
   if (relay.empty()) return fail("the relay's process ended early");
@@ -152,7 +153,7 @@ Result<> measure_turn(const RelayBench& bench, const std::string& daemon, Turn& 
   }
   for (const auto& subscriber : turn.behind) {
     const bool first = subscriber == turn.behind.front();  // all hear the same stamps
-    if (auto taken = take(*subscriber, figures.relayed, first); !taken) return taken;
+    if (auto taken = collect(*subscriber, figures.relayed, first); !taken) return taken;
   }
   turn.relay.pipes().close_to();
   return {};
@@ -162,8 +163,8 @@ Result<RelayFigures> measure(const RelayBench& bench) {
   spdlog::set_level(spdlog::level::err);  // only the figures are to be printed
   auto turns = fork_turns(bench);
   if (!turns) return std::unexpected(turns.error());
-  const WorkFolder folder;
-  const auto config = walkers_config({.streams = bench.streams}, folder);
+  const tools::WorkFolder folder;
+  const auto config = tools::walkers_config({.streams = bench.streams}, folder);
   if (!config) return std::unexpected(config.error());
   auto daemon = assembly::Daemon::open(*config);
   if (!daemon) return std::unexpected(daemon.error());
@@ -177,41 +178,43 @@ Result<RelayFigures> measure(const RelayBench& bench) {
   return figures;
 }
 
-nlohmann::ordered_json to_json(const RelayBench& bench, const RelayFigures& figures) {
-  const auto heard = [](const HeardFrames& one) {
-    return nlohmann::ordered_json{{"cpu_percent", one.cpu_percent},
-                                  {"send", to_json(figures_of(one.send_us))},
-                                  {"sequence_gaps", one.gaps}};
-  };
-  return {{"subscribers", bench.subscribers},
-          {"streams", bench.streams},
-          {"seconds", bench.seconds},
-          {"turns", bench.turns},
-          {"direct", heard(figures.direct)},
-          {"relay", heard(figures.relayed)},
-          {"cpu_ratio", figures.relayed.cpu_percent / figures.direct.cpu_percent},
-          {"late_joiner", to_json(figures_of(figures.late_us))}};
+tools::Findings findings_of(const ReceivedFrames& frames, const std::string& name) {
+  return tools::Findings()
+      .add("cpu_percent", frames.cpu_percent)
+      .add("send", tools::findings_of(tools::figures_of(frames.send_us), name))
+      .add("sequence_gaps", frames.gaps);
 }
 
-void print(const RelayBench& bench, const RelayFigures& figures) {
-  const HopFigures direct = figures_of(figures.direct.send_us);
-  const HopFigures relayed = figures_of(figures.relayed.send_us);
-  std::printf("%d stream(s) x %.0f Hz, %d turns of %d s: 1 direct subscriber, then %d by a relay\n",
-              bench.streams, kWalkers_hz, bench.turns, bench.seconds, bench.subscribers);
-  print_figures({{"direct", direct}, {"relay", relayed}, {"late", figures_of(figures.late_us)}});
-  std::printf("daemon: CPU %.2f %% and %.2f %% of a core, ratio %.2f; send p50 %.2f, p99 %.2f\n",
-              figures.direct.cpu_percent, figures.relayed.cpu_percent,
-              figures.relayed.cpu_percent / figures.direct.cpu_percent,
-              relayed.p50_us / direct.p50_us, relayed.p99_us / direct.p99_us);
-  std::printf("sequence gaps: direct %llu, behind the relay %llu\n",
-              static_cast<unsigned long long>(figures.direct.gaps),
-              static_cast<unsigned long long>(figures.relayed.gaps));
+tools::Findings findings_of(const RelayBench& bench, const RelayFigures& figures) {
+  const tools::HopFigures direct = tools::figures_of(figures.direct.send_us);
+  const tools::HopFigures relayed = tools::figures_of(figures.relayed.send_us);
+  const double cpu_ratio = figures.relayed.cpu_percent / figures.direct.cpu_percent;
+  return tools::Findings()
+      .add("subscribers", bench.subscribers)
+      .add("streams", bench.streams)
+      .add("seconds", bench.seconds)
+      .add("turns", bench.turns)
+      .say(fmt::format(
+          "{} stream(s) x {:.0f} Hz, {} turns of {} s: 1 direct subscriber, then {} by a relay",
+          bench.streams, tools::kWalkers_hz, bench.turns, bench.seconds, bench.subscribers))
+      .say(tools::hop_heading())
+      .add("direct", findings_of(figures.direct, "direct"))
+      .add("relay", findings_of(figures.relayed, "relay"))
+      .add("late_joiner", tools::findings_of(tools::figures_of(figures.late_us), "late"))
+      .add("cpu_ratio", cpu_ratio)
+      .say(
+          fmt::format("daemon: CPU {:.2f} % and {:.2f} % of a core, ratio {:.2f}; send p50 {:.2f}, "
+                      "p99 {:.2f}",
+                      figures.direct.cpu_percent, figures.relayed.cpu_percent, cpu_ratio,
+                      relayed.p50_us / direct.p50_us, relayed.p99_us / direct.p99_us))
+      .say(fmt::format("sequence gaps: direct {}, behind the relay {}", figures.direct.gaps,
+                       figures.relayed.gaps));
 }
 
 Result<> bench_relay(const RelayBench& bench) {
   const auto measured = measure(bench);
   if (!measured) return std::unexpected(measured.error());
-  tools::show(findings_of(bench, *measured), bench.json);
+  findings_of(bench, *measured).show(bench.json);
   return {};
 }
 

@@ -13,9 +13,8 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "tests/bench/percentiles.hpp"
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/degrees.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "models/gesture/synthetic_signer.hpp"
 #include "models/smooth/adaptive_window.hpp"
 #include "models/smooth/live_smoother.hpp"
@@ -23,6 +22,7 @@
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/text/json_text.hpp"
 #include "tests/bench/baselines.hpp"
+#include "tests/bench/percentiles.hpp"
 
 namespace posed::bench {
 namespace {

@@ -14,7 +14,6 @@
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/assembly/daemon.hpp"
 #include "daemon/system/clock.hpp"
@@ -23,11 +22,12 @@
 #include "daemon/tools/bench/child_process.hpp"
 #include "daemon/tools/bench/hop_subscriber.hpp"
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/findings.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/emulate/emulated_device.hpp"
-#include "daemon/tools/emulate/emulated_port.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/style_type.hpp"
+#include "tests/bench/bench.hpp"
 
 namespace posed::bench {
 namespace {
@@ -55,9 +55,9 @@ struct StageBench {
 
 struct StageFigures {
   double cpu_percent = 0.0;  // of one core
-  HopFigures send;
+  tools::HopFigures send;
   std::uint64_t frames = 0, gaps = 0, dropped = 0, shed = 0, kernel_dropped = 0;
-  std::uint64_t sent_to_avatars = 0, avatars_heard = 0, output_dropped = 0;
+  std::uint64_t sent_to_avatars = 0, avatars_received = 0, output_dropped = 0;
   std::uint64_t rss_bytes = 0;
   double pressure_percent = 0.0;
 };
@@ -95,7 +95,7 @@ Result<std::vector<int>> free_ports(int count) {
 }
 
 // The child that performs: a thread for each performer, to the ports that the parent names.
-int perform_until_stopped(PipePair& parent, double rate_hz) {
+int perform_until_stopped(tools::PipePair& parent, double rate_hz) {
   std::vector<std::unique_ptr<emulate::EmulatedDevice>> devices;
   for (std::string port; !(port = parent.read_line()).empty();) {
     auto emulator = drivers::find_driver("vmc")->emulate({{"rate_hz", rate_hz}});
@@ -117,30 +117,31 @@ int perform_until_stopped(PipePair& parent, double rate_hz) {
 }
 
 // The child that hears all avatars at one port, which it tells first, and counts what comes.
-int hear_avatars(PipePair& parent) {
+int receive_of_avatars(tools::PipePair& parent) {
   int port = 0;
   const auto fd = open_udp(port);
   if (!fd || !parent.write_line(std::to_string(port))) return 1;
-  std::atomic<std::uint64_t> heard{0};
-  std::jthread ear([&heard, fd = *fd](const std::stop_token& stop) {
+  std::atomic<std::uint64_t> received{0};
+  std::jthread receiver([&received, fd = *fd](const std::stop_token& stop) {
     const timeval patience{.tv_sec = 0, .tv_usec = 100'000};
     setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
     std::array<char, 65536> bytes{};
     while (!stop.stop_requested()) {
-      if (recv(fd, bytes.data(), bytes.size(), 0) > 0) ++heard;
+      if (recv(fd, bytes.data(), bytes.size(), 0) > 0) ++received;
     }
   });
   static_cast<void>(parent.read_line());  // until the parent closes
-  const std::uint64_t count = heard;
+  const std::uint64_t count = received;
   return parent.write(&count, sizeof count) ? 0 : 1;
 }
 
 Result<config::DaemonConfig> stage_config(const StageBench& bench, const std::vector<int>& ports,
-                                          const std::string& avatars, const WorkFolder& folder) {
+                                          const std::string& avatars,
+                                          const tools::WorkFolder& folder) {
   const auto walker = motion::make_walker({});
   if (!walker) return std::unexpected(walker.error());
-  auto written = write_synthetic_model(motion::Space::kHumanoid, *walker->skeleton, bench.points,
-                                       folder / "model.style");
+  auto written = tools::write_synthetic_model(motion::Space::kHumanoid, *walker->skeleton,
+                                              bench.points, folder / "model.style");
   if (!written) return std::unexpected(written.error());
   config::DaemonConfig config;
   config.publish_endpoint = config.control_endpoint = "tcp://127.0.0.1:*";
@@ -193,26 +194,26 @@ void count(const v1::Stats& stats, StageFigures& figures) {
 // Sleeps while the performers perform.
 void watch(int seconds_, StageFigures& figures) {
   std::this_thread::sleep_for(kSettle);
-  const CpuShare cpu;
+  const tools::CpuShare cpu;
   const std::int64_t begun_ns = system::monotonic_ns();
-  const double pressure_us = cpu_pressure("total=");
+  const double pressure_us = tools::cpu_pressure("total=");
   std::this_thread::sleep_for(std::chrono::seconds(seconds_));
   figures.cpu_percent = cpu.percent();
-  figures.pressure_percent =
-      (cpu_pressure("total=") - pressure_us) / (seconds(system::monotonic_ns() - begun_ns) * 1e4);
+  figures.pressure_percent = (tools::cpu_pressure("total=") - pressure_us) /
+                             (seconds(system::monotonic_ns() - begun_ns) * 1e4);
   figures.rss_bytes = system::resident_bytes();
 }
 
 Result<StageFigures> measure(const StageBench& bench) {
   spdlog::set_level(spdlog::level::err);  // only the figures are to be printed
-  auto subscriber = HopSubscriber::fork();
+  auto subscriber = tools::HopSubscriber::fork();
   if (!subscriber) return std::unexpected(subscriber.error());
-  auto performers = ChildProcess::fork(
-      [&bench](PipePair& parent) { return perform_until_stopped(parent, bench.rate_hz); });
+  auto performers = tools::ChildProcess::fork(
+      [&bench](tools::PipePair& parent) { return perform_until_stopped(parent, bench.rate_hz); });
   if (!performers) return std::unexpected(performers.error());
-  auto avatars = ChildProcess::fork(hear_avatars);
+  auto avatars = tools::ChildProcess::fork(receive_of_avatars);
   if (!avatars) return std::unexpected(avatars.error());
-  const WorkFolder folder;
+  const tools::WorkFolder folder;
   const auto ports = free_ports(bench.performers);
   if (!ports) return std::unexpected(ports.error());
   const std::string avatar_port = avatars->pipes().read_line();
@@ -233,56 +234,53 @@ Result<StageFigures> measure(const StageBench& bench) {
   auto received = (*subscriber)->finish();
   if (!received) return std::unexpected(received.error());
   figures.gaps = received->gaps;
-  figures.send = figures_of(send_ages_us(received->messages));
+  figures.send = tools::figures_of(tools::send_ages_us(received->messages));
   avatars->pipes().close_to();
-  if (!avatars->pipes().read(&figures.avatars_heard, sizeof figures.avatars_heard)) {
+  if (!avatars->pipes().read(&figures.avatars_received, sizeof figures.avatars_received)) {
     return fail("the avatars' process ended early");
   }
   return figures;
 }
 
-nlohmann::ordered_json to_json(const StageBench& bench, const StageFigures& figures) {
-  return {{"performers", bench.performers},
-          {"points", bench.points},
-          {"rate_hz", bench.rate_hz},
-          {"seconds", bench.seconds},
-          {"vmc", !bench.no_vmc},
-          {"send", to_json(figures.send)},
-          {"frames", figures.frames},
-          {"dropped", figures.dropped},
-          {"shed", figures.shed},
-          {"kernel_dropped", figures.kernel_dropped},
-          {"sequence_gaps", figures.gaps},
-          {"vmc_sent", figures.sent_to_avatars},
-          {"vmc_heard", figures.avatars_heard},
-          {"vmc_dropped", figures.output_dropped},
-          {"cpu_percent", figures.cpu_percent},
-          {"rss_bytes", figures.rss_bytes},
-          {"psi_cpu_some_percent", figures.pressure_percent}};
-}
-
-void print(const StageBench& bench, const StageFigures& figures) {
-  const auto number = [](std::uint64_t value) { return static_cast<unsigned long long>(value); };
-  std::printf("%d performers x %.0f Hz over UDP x GP of %d poses, %d s\n", bench.performers,
-              bench.rate_hz, bench.points, bench.seconds);
-  print_figures({{"send", figures.send}});
-  std::printf("published %llu frames; dropped %llu, shed %llu, by the kernel %llu, gaps %llu\n",
-              number(figures.frames), number(figures.dropped), number(figures.shed),
-              number(figures.kernel_dropped), number(figures.gaps));
+tools::Findings findings_of(const StageBench& bench, const StageFigures& figures) {
+  tools::Findings findings;
+  findings.add("performers", bench.performers)
+      .add("points", bench.points)
+      .add("rate_hz", bench.rate_hz)
+      .add("seconds", bench.seconds)
+      .add("vmc", !bench.no_vmc)
+      .say(fmt::format("{} performers x {:.0f} Hz over UDP x GP of {} poses, {} s",
+                       bench.performers, bench.rate_hz, bench.points, bench.seconds))
+      .say(tools::hop_heading())
+      .add("send", tools::findings_of(figures.send, "send"))
+      .add("frames", figures.frames)
+      .add("dropped", figures.dropped)
+      .add("shed", figures.shed)
+      .add("kernel_dropped", figures.kernel_dropped)
+      .add("sequence_gaps", figures.gaps)
+      .say(fmt::format("published {} frames; dropped {}, shed {}, by the kernel {}, gaps {}",
+                       figures.frames, figures.dropped, figures.shed, figures.kernel_dropped,
+                       figures.gaps))
+      .add("vmc_sent", figures.sent_to_avatars)
+      .add("vmc_heard", figures.avatars_received)
+      .add("vmc_dropped", figures.output_dropped);
   if (!bench.no_vmc) {
-    std::printf("avatars: %llu datagrams sent, %llu heard, %llu frames dropped\n",
-                number(figures.sent_to_avatars), number(figures.avatars_heard),
-                number(figures.output_dropped));
+    findings.say(fmt::format("avatars: {} datagrams sent, {} received, {} frames dropped",
+                             figures.sent_to_avatars, figures.avatars_received,
+                             figures.output_dropped));
   }
-  std::printf("CPU %.1f %% of a core, RSS %.1f MB; CPU pressure (PSI some) %.1f %%\n",
-              figures.cpu_percent, static_cast<double>(figures.rss_bytes) * 1e-6,
-              figures.pressure_percent);
+  return findings.add("cpu_percent", figures.cpu_percent)
+      .add("rss_bytes", figures.rss_bytes)
+      .add("psi_cpu_some_percent", figures.pressure_percent)
+      .say(fmt::format("CPU {:.1f} % of a core, RSS {:.1f} MB; CPU pressure (PSI some) {:.1f} %",
+                       figures.cpu_percent, static_cast<double>(figures.rss_bytes) * 1e-6,
+                       figures.pressure_percent));
 }
 
 Result<> bench_stage(const StageBench& bench) {
   const auto measured = measure(bench);
   if (!measured) return std::unexpected(measured.error());
-  tools::show(findings_of(bench, *measured), bench.json);
+  findings_of(bench, *measured).show(bench.json);
   return {};
 }
 
@@ -299,7 +297,7 @@ void add_bench_stage(CLI::App& bench, int& exit_code) {
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
   command->add_option("--rate", options->rate_hz, "Frames per second of each")
-      ->check(in_range(10.0, 1000.0))
+      ->check(tools::in_range(10.0, 1000.0))
       ->capture_default_str();
   command->add_option("--seconds", options->seconds, "How long it is measured")
       ->check(CLI::Range(1, 86400))

@@ -6,7 +6,8 @@
 #include "tests/bench/bench.hpp"
 
 int main(int argc, char** argv) {
-  CLI::App app{"Times posed and its parts, beside other programs and methods in the same run", "posed_bench"};
+  CLI::App app{"Times posed and its parts, beside other programs and methods in the same run",
+               "posed_bench"};
   app.require_subcommand(1);
   int exit_code = 0;
   posed::bench::add_bench_decoders(app, exit_code);

@@ -1,11 +1,14 @@
 #include "daemon/tools/bench/hop_subscriber.hpp"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <map>
 
 #include "daemon/system/clock.hpp"
 #include "posed/v1/posed.pb.h"
+#include "proto/frame/time.hpp"
 #include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::tools {
@@ -20,7 +23,7 @@ class Noter {
   Noter() { noted_.messages.reserve(kReserved); }
 
   // Receives one message if there is one.
-  bool take(void* socket) {
+  bool receive_one(void* socket) {
     net::Message topic;
     if (!topic.receive(socket)) return false;
     net::Message body;
@@ -73,7 +76,7 @@ int note_until_stopped(PipePair& parent) {
       {{socket->get(), 0, ZMQ_POLLIN, 0}, {nullptr, parent.from(), ZMQ_POLLIN, 0}}};
   while ((wait[1].revents & (ZMQ_POLLIN | ZMQ_POLLERR)) == 0) {
     zmq_poll(wait.data(), static_cast<int>(wait.size()), kPoll_ms);
-    while (noter.take(socket->get())) {
+    while (noter.receive_one(socket->get())) {
     }
   }
   const ReceivedMessages& noted = noter.noted();
@@ -105,6 +108,60 @@ Result<ReceivedMessages> HopSubscriber::finish() {
     received.messages.push_back(arrival);
   }
   return received;
+}
+
+namespace {
+
+using Ages = std::vector<double>;  // us
+
+double quantile(const Ages& sorted, double p) {
+  if (sorted.empty()) return 0.0;
+  const auto last = static_cast<double>(sorted.size() - 1);
+  return sorted[static_cast<std::size_t>(std::lround(p * last))];
+}
+
+double median(Ages values) {
+  std::ranges::sort(values);
+  return quantile(values, 0.5);
+}
+
+}  // namespace
+
+HopFigures figures_of(Ages ages_us) {
+  std::ranges::sort(ages_us);
+  return {quantile(ages_us, 0.5), quantile(ages_us, 0.99), quantile(ages_us, 0.999),
+          ages_us.empty() ? 0.0 : ages_us.back(), ages_us.size()};
+}
+
+std::vector<double> send_ages_us(std::span<const Arrival> arrivals) {
+  std::vector<double> ages_us;
+  for (const Arrival& arrival : arrivals) {
+    ages_us.push_back(static_cast<double>(arrival.sent_ns) * 1e-3);
+  }
+  return ages_us;
+}
+
+HopReport report_hops(std::span<const Arrival> arrivals, std::int64_t start_ns,
+                      std::int64_t end_ns) {
+  std::map<std::int64_t, std::array<Ages, 2>> pairs;  // pipeline, bare
+  std::array<Ages, 2> all;
+  for (const Arrival& arrival : arrivals) {
+    const std::int64_t pair = (arrival.arrival_ns - start_ns) / (2 * kNanosPerSecond);
+    if (pair < 1 || arrival.arrival_ns >= end_ns) continue;
+    const double age_us = static_cast<double>(arrival.age_ns) * 1e-3;
+    pairs[pair][arrival.bare ? 1 : 0].push_back(age_us);
+    all[arrival.bare ? 1 : 0].push_back(age_us);
+  }
+  Ages p50_ratios;
+  Ages p99_ratios;
+  for (const auto& [pair, ages] : pairs) {
+    if (ages[0].empty() || ages[1].empty()) continue;
+    const HopFigures pipeline = figures_of(ages[0]);
+    const HopFigures bare = figures_of(ages[1]);
+    p50_ratios.push_back(pipeline.p50_us / bare.p50_us);
+    p99_ratios.push_back(pipeline.p99_us / bare.p99_us);
+  }
+  return {figures_of(all[1]), figures_of(all[0]), median(p50_ratios), median(p99_ratios)};
 }
 
 }  // namespace posed::tools

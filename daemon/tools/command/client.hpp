@@ -1,14 +1,14 @@
-// Shared by all commands that talk to a running daemon: their options, a connection that reports
-// why it cannot be established, and Ctrl-C.
+// Heartbeat: whether a daemon that sends stats every second still does. The time is a parameter, so
+// a test can choose it.
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 
 #include "daemon/net/security.hpp"
-#include "daemon/tools/command/heartbeat.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/zmq/link_monitor.hpp"
 #include "proto/zmq/zmq_handle.hpp"
@@ -17,7 +17,37 @@ namespace CLI {
 class App;
 }
 
+namespace google::protobuf {
+class Message;
+}
+
 namespace posed::tools {
+
+class Heartbeat {
+ public:
+  explicit Heartbeat(std::int64_t now_ns) : last_ns_(now_ns) {}
+
+  void heard(std::int64_t now_ns);
+  // How long the daemon has been silent [s], if that is longer than normal; empty while it answers.
+  // Before the first message a shorter silence counts, because a user is waiting.
+  [[nodiscard]] std::optional<double> silent_s(std::int64_t now_ns) const;
+  [[nodiscard]] bool ever_heard() const { return ever_heard_; }
+
+  // For output as lines: the silence, whenever a line about it is due (at once, then after twice,
+  // four times, ... the time).
+  [[nodiscard]] std::optional<double> silence_to_report(std::int64_t now_ns);
+  // How long the daemon was silent [s], returned once after a silence that was reported.
+  [[nodiscard]] std::optional<double> return_to_report();
+
+ private:
+  std::int64_t last_ns_;
+  bool ever_heard_ = false;
+  double reported_s_ = 0.0;         // the last silence that was reported; 0: none
+  std::optional<double> returned_;  // not reported yet
+};
+
+// Shared by all commands that talk to a running daemon: their options, a connection that reports
+// why it cannot be established, and Ctrl-C.
 
 // Where a daemon listens by default.
 inline constexpr const char* kOwnPublish = "tcp://127.0.0.1:5570";
@@ -101,5 +131,12 @@ class Interrupt {
   Interrupt();
   [[nodiscard]] static bool came();
 };
+
+// Messages as canonical proto3 JSON (lowerCamelCase names, 64-bit integers as text). Every plain
+// field is written even if it has its default, so that a script always finds it.
+[[nodiscard]] std::string to_json(const google::protobuf::Message& message);
+
+// Prints one line on stdout and flushes it. Returns false if the reader of stdout has gone.
+bool print_json(const google::protobuf::Message& message);
 
 }  // namespace posed::tools

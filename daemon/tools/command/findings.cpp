@@ -185,14 +185,15 @@ std::optional<double> Findings::number(std::string_view name) const {
   return std::nullopt;
 }
 
+std::string Finding::json() const { return json_text(json_of(*this)); }
+
 std::string Findings::json(int indent) const { return json_text(json_of(*this), indent); }
 
 std::vector<std::vector<std::string>> Findings::numbers() const {
   std::vector<std::vector<std::string>> rows;
   for_each_number(*this, "", [&](const std::string& name, const Finding& finding) {
     const auto* const real = std::get_if<double>(&finding.value);
-    rows.push_back(
-        {name, real != nullptr ? fmt::format("{:.5g}", *real) : json_text(json_of(finding))});
+    rows.push_back({name, real != nullptr ? fmt::format("{:.5g}", *real) : finding.json()});
   });
   return rows;
 }

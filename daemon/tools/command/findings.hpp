@@ -106,6 +106,8 @@ struct Finding {
   std::string text{};  // a value's name, or the sentence
   Findings::Scalar value{};
   std::vector<Findings> parts{};  // of an object the one, of a list its items
+
+  [[nodiscard]] std::string json() const;  // the value on one line
 };
 
 // Adds a table of every number, where there are some, with a sentence that says what they are.

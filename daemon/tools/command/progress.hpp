@@ -1,14 +1,39 @@
-// Progress of long work on stderr: a bar with the time left on a terminal, plain lines elsewhere,
-// one each 10 % or 5 s.
-// While one is alive, the first Ctrl-C asks the work to stop instead of ending the process.
+// Shows work of unknown duration: after a second stderr says what is being done and for how long;
+// on a terminal in one line that is rewritten, elsewhere a line from time to time. Ctrl-C ends the
+// process as usual.
 #pragma once
 
 #include <chrono>
+#include <condition_variable>
 #include <csignal>
+#include <mutex>
 #include <string>
 #include <string_view>
+#include <thread>
 
 namespace posed::tools {
+
+class Waiting {
+ public:
+  // `what` as in "reading take.plog".
+  explicit Waiting(std::string what);
+  Waiting(const Waiting&) = delete;
+  Waiting& operator=(const Waiting&) = delete;
+  ~Waiting();
+
+ private:
+  void show(const std::stop_token& stop);
+
+  std::string what_;
+  bool terminal_;
+  std::mutex mutex_;
+  std::condition_variable_any ended_;
+  std::jthread thread_;  // last, because it uses all of the above
+};
+
+// Progress of long work on stderr: a bar with the time left on a terminal, plain lines elsewhere,
+// one each 10 % or 5 s.
+// While one is alive, the first Ctrl-C asks the work to stop instead of ending the process.
 
 inline constexpr double kQuietFor_s = 1.0;  // a longer wait needs a sign of progress
 

@@ -1,15 +1,21 @@
 // The demo: makes two families of synthetic walkers and a signer's glove recording, trains a style
 // model from the families and a gesture model from the glove, streams a walker that is not in the
 // training data through the daemon and watches it over ZeroMQ, as any client would.
+#include <zmq.h>
+
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <optional>
+#include <ostream>
+#include <span>
 #include <string>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
-#include <zmq.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
@@ -18,21 +24,24 @@
 #include "daemon/logging/log_output.hpp"
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/paint.hpp"
 #include "daemon/tools/demo/demo_clips.hpp"
-#include "daemon/tools/demo/demo_folder.hpp"
-#include "daemon/tools/demo/demo_hand.hpp"
 #include "daemon/tools/demo/demo_screen.hpp"
-#include "daemon/tools/demo/demo_watcher.hpp"
-#include "daemon/tools/emulate/synthetic_signer.hpp"
+#include "daemon/tools/emulate/motions.hpp"
 #include "daemon/tools/gesture/gesture_data.hpp"
 #include "daemon/tools/gesture/train_gesture.hpp"
-#include "daemon/tools/live/live_table.hpp"
+#include "daemon/tools/live/live_view.hpp"
 #include "daemon/tools/live/page.hpp"
 #include "daemon/tools/style/train_style.hpp"
 #include "daemon/tools/view/bridge.hpp"
+#include "proto/clip/text.hpp"
+#include "proto/frame/profile_texts.hpp"
+#include "proto/frame/result.hpp"
+#include "proto/log/digest.hpp"
+#include "proto/text/json_text.hpp"
+#include "proto/text/load_file.hpp"
 
 namespace posed::tools {
 namespace {
@@ -40,6 +49,141 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 constexpr double kFirstFrameWithin_s = 10.0;
 constexpr double kHandRate_hz = 30.0;
+
+// The folder for the demo's clips and models, and the check whether they are what this program
+// would make again.
+
+// The demo's config in its folder: config/demo.toml, which is part of the binary, with the paths of
+// that folder.
+constexpr const char* kDemoConfig = "demo.toml";
+
+class DemoFolder {
+ public:
+  explicit DemoFolder(std::filesystem::path path) : path_(std::move(path)) {}
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+  // Whether every file is there as this program wrote it; false after another build of posed wrote
+  // them, or after a file was changed.
+  [[nodiscard]] bool is_up_to_date() const;
+
+  // Refuses a folder with files of these names that no demo wrote; `overwrite` allows it.
+  [[nodiscard]] Result<> check_is_own(const std::vector<std::string>& names, bool overwrite) const;
+
+  // Marks the folder as the demo's before its files come: one that was interrupted is made anew.
+  [[nodiscard]] Result<> begin() const;
+
+  // Writes the config, and the stamp that is_up_to_date() reads, with a hash of every file in the
+  // folder.
+  [[nodiscard]] Result<> finish() const;
+
+ private:
+  std::filesystem::path path_;
+};
+
+std::span<const ProfileText> config_texts();  // config/*.toml, written by daemon/CMakeLists.txt
+
+namespace tools {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr const char* kStamp = "demo.json";
+constexpr std::uintmax_t kMaxStamp = 64 * 1024;      // bytes of the stamp file
+constexpr std::uintmax_t kMaxBytes = 1'000'000'000;  // of the program, or of a file that it wrote
+
+// Empty if the file cannot be read.
+std::string digest_of(const fs::path& file) {
+  const auto bytes = load_file(file, {.what = "file", .max_bytes = kMaxBytes});
+  return bytes ? log::sha256_hex(std::as_bytes(std::span(*bytes))) : std::string();
+}
+
+// A hash of the whole program, because another build may train other models.
+std::string program_digest() { return digest_of("/proc/self/exe"); }
+
+json digests_of_files(const fs::path& folder) {
+  json digests = json::object();
+  for (const std::string& name : demo_file_names()) digests[name] = digest_of(folder / name);
+  digests[kDemoConfig] = digest_of(folder / kDemoConfig);
+  return digests;
+}
+
+Result<> write_stamp(const fs::path& folder, const json& stamp) {
+  return clip::write_text(folder / kStamp,
+                          [&](std::ostream& out) { out << json_text(stamp, 2) << "\n"; });
+}
+
+std::string config_text() {
+  for (const ProfileText& text : config_texts()) {
+    if (text.file != kDemoConfig) continue;
+    std::string toml =
+        "# `posed demo` writes this file, and again when it makes new models: copy it "
+        "before you change it.\n" +
+        std::string(text.toml);
+    constexpr std::string_view kInSourceTree = "../build/demo/";
+    for (auto at = toml.find(kInSourceTree); at != std::string::npos;
+         at = toml.find(kInSourceTree)) {
+      toml.erase(at, kInSourceTree.size());
+    }
+    return toml;
+  }
+  return {};
+}
+
+// $XDG_CACHE_HOME/posed/demo, or ~/.cache/posed/demo.
+Result<fs::path> demo_cache_folder() {
+  const auto absolute = [](const char* name) -> fs::path {
+    const char* value = std::getenv(name);
+    const fs::path path = value == nullptr ? fs::path() : fs::path(value);
+    return path.is_absolute() ? path : fs::path();
+  };
+  fs::path cache = absolute("XDG_CACHE_HOME");
+  if (cache.empty() && !absolute("HOME").empty()) cache = absolute("HOME") / ".cache";
+  if (cache.empty()) {
+    return misuse("neither XDG_CACHE_HOME nor HOME names a folder; give --folder DIR");
+  }
+  return cache / "posed" / "demo";
+}
+
+bool DemoFolder::is_up_to_date() const {
+  const auto text = load_file(path_ / kStamp, {.what = "stamp", .max_bytes = kMaxStamp});
+  if (!text) return false;
+  const json stamp = json::parse(*text, nullptr, false);
+  if (!stamp.is_object() || !stamp.contains("files") || !stamp["files"].is_object()) return false;
+  if (stamp.value("program", "") != program_digest()) return false;
+  return std::ranges::all_of(stamp["files"].items(), [&](const auto& file) {
+    return file.value().is_string() &&
+           digest_of(path_ / file.key()) == file.value().template get<std::string>();
+  });
+}
+
+Result<> DemoFolder::check_is_own(const std::vector<std::string>& names, bool overwrite) const {
+  std::error_code error;
+  if (overwrite || fs::exists(path_ / kStamp, error)) return {};
+  // of a version of the demo that wrote no stamp
+  if (fs::exists(path_ / kDemoModel, error)) return {};
+  for (const std::string& name : names) {
+    if (!fs::exists(path_ / name, error)) continue;
+    return misuse("exists already, and no demo wrote it; name another folder, or add --overwrite",
+                  (path_ / name).string());
+  }
+  return {};
+}
+
+Result<> DemoFolder::begin() const {
+  std::error_code error;
+  fs::create_directories(path_, error);  // writing says what failed
+  return write_stamp(path_, json::object());
+}
+
+Result<> DemoFolder::finish() const {
+  const std::string config = config_text();
+  auto written = clip::write_text(path_ / kDemoConfig, [&](std::ostream& out) { out << config; });
+  if (!written) return written;
+  return write_stamp(path_, {{"program", program_digest()}, {"files", digests_of_files(path_)}});
+}
+
+}  // namespace tools
 
 struct DemoOptions {
   std::filesystem::path config;   // empty: the demo's own
@@ -74,10 +218,10 @@ Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
     experiment.clips.push_back({clips->to[i], "sway", person, "walk", 0});
   }
   OneRank alone;
-  const auto report = train_and_save(experiment, 0, {.model = folder / kDemoModel}, alone);
-  if (!report) return std::unexpected(report.error());
-  const std::string verdict = (*report)["verdict"].get<std::string>();
-  if (!(*report)["written"].get<bool>()) return fail("the demo's own model is " + verdict);
+  const auto trained = train_and_save(experiment, 0, {.model = folder / kDemoModel}, alone);
+  if (!trained) return std::unexpected(trained.error());
+  const std::string& verdict = trained->verdict.sentence;
+  if (!trained->written) return fail("the demo's own model is " + verdict);
   std::fprintf(stderr, "    %s\n", verdict.c_str());
   std::fprintf(stderr, "3/4 learning the gestures g, c and p from a labelled glove recording\n");
   const auto recording = load_recording(clips->glove, clips->labels, kHandRate_hz);

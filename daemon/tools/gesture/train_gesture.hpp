@@ -5,8 +5,6 @@
 #include <string>
 #include <vector>
 
-#include <nlohmann/json_fwd.hpp>
-
 #include "daemon/tools/command/ranks.hpp"
 #include "models/gesture/gesture_model.hpp"
 #include "models/gesture/train.hpp"
@@ -16,6 +14,7 @@ namespace posed::tools {
 
 struct GestureTraining {
   gesture::GestureModel model;
+  gesture::TrainFindings findings;
   double seconds = 0.0;  // of the training itself
 };
 

@@ -11,9 +11,7 @@
 
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/json.hpp"
-#include "daemon/tools/command/number_range.hpp"
-#include "daemon/tools/live/clock_time.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/live/monitor_line.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/text/clean.hpp"

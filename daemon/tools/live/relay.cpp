@@ -20,7 +20,7 @@
 #include "daemon/net/zap_authenticator.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/run/serve.hpp"
 #include "proto/text/json_text.hpp"
 #include "proto/zmq/keys.hpp"

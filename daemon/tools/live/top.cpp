@@ -11,14 +11,13 @@
 
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/json.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/paint.hpp"
 #include "daemon/tools/live/chosen_stream.hpp"
-#include "daemon/tools/live/clock_time.hpp"
 #include "daemon/tools/live/line_file.hpp"
 #include "daemon/tools/live/live_view.hpp"
+#include "daemon/tools/live/monitor_line.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/text/clean.hpp"
 

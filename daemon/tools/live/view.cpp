@@ -15,7 +15,7 @@
 #include "daemon/logging/log_output.hpp"
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/live/page.hpp"
 #include "daemon/tools/run/serve.hpp"
 #include "daemon/tools/view/bridge.hpp"

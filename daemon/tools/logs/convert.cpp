@@ -12,23 +12,102 @@
 #include "daemon/replay/log_upgrade.hpp"
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/hand_option.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
-#include "daemon/tools/command/waiting.hpp"
+#include "daemon/tools/command/progress.hpp"
 #include "daemon/tools/export/log_clip.hpp"
-#include "daemon/tools/logs/convert_mcap.hpp"
-#include "daemon/tools/logs/list_takes.hpp"
+#include "daemon/tools/export/log_mcap.hpp"
 #include "models/motion/vrm_animation.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/file_names.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/clip/gltf.hpp"
 #include "proto/clip/hand_clip.hpp"
+#include "proto/log/reader.hpp"
+#include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::tools {
 namespace {
+
+// The part of `posed convert` that lists the takes of a log.
+
+// "2  walk  from 3.20 s, 10.05 s long", a line each. Of a take with gaps only what is left has a
+// time, so that it may seem shorter than it was.
+void print_takes(const std::vector<replay::LoggedTake>& takes) {
+  for (const replay::LoggedTake& take : takes) {
+    std::string end = take.row.last_item == log::kToTheEnd ? ", to the end of the recording" : "";
+    if (take.has_gaps) end += "; the log lacks a part of it (`posed replay` says which)";
+    std::printf("%lld  %s  ", static_cast<long long>(take.row.id), clean(take.row.name).c_str());
+    if (take.begin_s) {
+      std::printf("from %.2f s, %.2f s long%s\n", *take.begin_s, *take.end_s - *take.begin_s,
+                  end.c_str());
+    } else {
+      std::printf("nothing came%s\n", end.c_str());
+    }
+  }
+}
+
+void print_takes_json(const std::vector<replay::LoggedTake>& takes) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const replay::LoggedTake& take : takes) {
+    nlohmann::ordered_json& one =
+        list.emplace_back(nlohmann::ordered_json{{"take", take.row.id},
+                                                 {"name", take.row.name},
+                                                 {"first_item", take.row.first_item},
+                                                 {"ended", take.row.last_item != log::kToTheEnd},
+                                                 {"gaps", take.has_gaps}});
+    if (one["ended"]) one["last_item"] = take.row.last_item;
+    if (!take.begin_s) continue;
+    one["begin_s"] = *take.begin_s;
+    one["length_s"] = *take.end_s - *take.begin_s;
+  }
+  std::printf("%s\n", json_text(list).c_str());
+}
+
+// Prints those of the log at `path`, a line each, or as JSON. Returns the exit code.
+int list_takes(const std::string& path, bool json) {
+  auto reader = log::Reader::open(path);
+  if (!reader) return report(reader.error());
+  const auto takes = replay::logged_takes(*reader);
+  if (!takes) return report(takes.error());
+  if (json) {
+    print_takes_json(*takes);
+  } else if (takes->empty()) {
+    std::fprintf(stderr, "posed: %s: has no takes\n", path.c_str());
+  } else {
+    print_takes(*takes);
+  }
+  return static_cast<int>(ExitCode::kDone);
+}
+
+// The part of `posed convert` that writes a whole log as MCAP.
+
+// Returns the exit code. Ctrl-C leaves no file.
+int convert_to_mcap(const std::string& log, const std::string& out, bool json) {
+  const auto summary = [&] {
+    // A file is written with signals blocked, so the thread that shows the wait receives Ctrl-C.
+    const Waiting waiting("writing " + out);
+    const Interrupt interrupt;
+    return replay::write_mcap(log, out, Interrupt::came);
+  }();
+  if (!summary) return report(summary.error());
+  for (const std::string& warning : summary->warnings) {
+    std::fprintf(stderr, "posed: %s: %s\n", log.c_str(), warning.c_str());
+  }
+  if (!json) {
+    std::fprintf(stderr, "posed: wrote %s: %llu messages in %zu topics\n", out.c_str(),
+                 static_cast<unsigned long long>(summary->messages), summary->topics);
+    return static_cast<int>(ExitCode::kDone);
+  }
+  const nlohmann::json line{{"in", log},
+                            {"out", out},
+                            {"messages", summary->messages},
+                            {"topics", summary->topics},
+                            {"warnings", summary->warnings}};
+  std::printf("%s\n", json_text(line).c_str());
+  return static_cast<int>(ExitCode::kDone);
+}
 
 constexpr const char* kUneven = "frames are not evenly spaced, but a BVH's are: its clock differs";
 

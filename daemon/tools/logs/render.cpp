@@ -14,11 +14,9 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/hand_option.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
-#include "daemon/tools/command/waiting.hpp"
 #include "daemon/tools/export/log_clip.hpp"
 #include "daemon/tools/picture/picture_file.hpp"
 #include "daemon/tools/picture/strip.hpp"

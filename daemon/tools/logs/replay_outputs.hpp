@@ -1,5 +1,4 @@
-// The outputs for the frames of a replay: the file, the comparison, the network. And the
-// instruction set on which a log is replayed. Cold.
+// What became of a log that was replayed and compared, as one JSON object. Cold.
 #pragma once
 
 #include <array>
@@ -9,16 +8,35 @@
 #include <string>
 #include <vector>
 
+#include <nlohmann/json.hpp>
+
 #include "daemon/pipeline/messages.hpp"
 #include "daemon/replay/broadcast.hpp"
 #include "daemon/replay/expectation.hpp"
 #include "daemon/replay/replay.hpp"
 #include "daemon/tools/export/frame_file.hpp"
 #include "proto/frame/result.hpp"
+#include "proto/log/reader.hpp"
 #include "proto/message/frame_message.hpp"
 
 namespace posed::tools {
 
+struct ReplayOutcome {
+  std::uint64_t frames = 0, raw_frames = 0;
+  replay::Expectation::Counts counts{};
+  std::string isa{};      // on which it was replayed
+  std::string problem{};  // empty: all as published
+  std::vector<std::string> missing{};
+  double took_s = 0.0;
+};
+
+// The same keys for one log as for several.
+[[nodiscard]] nlohmann::ordered_json json_of(const std::string& log,
+                                             const std::string& recorded_isa,
+                                             const ReplayOutcome& outcome);
+
+// The outputs for the frames of a replay: the file, the comparison, the network. And the
+// instruction set on which a log is replayed.
 class ReplayOutputs {
  public:
   explicit ReplayOutputs(const replay::Replay& replay);
@@ -46,5 +64,12 @@ class ReplayOutputs {
 // Uses `wanted`; if it is empty, `recorded`, or the CPU's best where the CPU lacks that. For the
 // whole process.
 [[nodiscard]] Result<> set_isa_or(const std::string& wanted, const std::string& recorded);
+
+// What a replay cannot repeat, because the log does not hold it.
+
+// One sentence for each gap, for each body without a description and for each source without a
+// stream.
+[[nodiscard]] std::vector<std::string> missing_from(const log::Reader& reader,
+                                                    const replay::Replay& replay);
 
 }  // namespace posed::tools

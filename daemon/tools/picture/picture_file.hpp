@@ -1,14 +1,23 @@
-// Writes pictures and videos. posed draws SVG itself; rsvg-convert (librsvg) makes a PNG of it and
-// ffmpeg a video. None of them needs a display. Cold.
+// Runs another program and waits for it. Cold.
 #pragma once
 
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "proto/frame/result.hpp"
 
 namespace posed::picture {
+
+// Runs `arguments`, of which the first is the program's name, found in PATH. Its input is empty and
+// its output is discarded. `package`: of Debian, for the sentence that is returned if the program
+// is not installed. Ctrl-C reaches the program too; then the error says that it was interrupted.
+[[nodiscard]] Result<> run_program(const std::vector<std::string>& arguments,
+                                   const std::string& package);
+
+// Writes pictures and videos. posed draws SVG itself; rsvg-convert (librsvg) makes a PNG of it and
+// ffmpeg a video. None of them needs a display.
 
 // `path` ends in .svg or .png.
 [[nodiscard]] Result<> write_picture(const std::string& svg, const std::filesystem::path& path);

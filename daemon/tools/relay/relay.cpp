@@ -2,17 +2,198 @@
 
 #include <algorithm>
 #include <array>
+#include <string_view>
 #include <utility>
 
 #include <spdlog/spdlog.h>
 
 #include "daemon/net/peer_guard.hpp"
+#include "daemon/net/refusal_words.hpp"
 #include "daemon/net/security.hpp"
 #include "daemon/net/zap_authenticator.hpp"
+#include "daemon/publish/subscriptions.hpp"
 #include "daemon/system/event_fd.hpp"
+#include "proto/frame/time.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/zmq/keys.hpp"
 
 namespace posed::relay {
+namespace {
+
+// Messages that wait in this process: the skeletons of many streams come together.
+constexpr int kMessagesWaiting = 64;
+constexpr int kReceiveBuffer = 16 * 1024;  // bytes
+// One part: the stats of 256 streams have about 200 KB.
+constexpr std::int64_t kMaxPart = 1024 * 1024;  // bytes
+// All subscriptions that there may be, and as many changes of them.
+constexpr int kSubscriptionsWaiting = static_cast<int>(2 * publish::kMaxWanted);
+
+}  // namespace
+
+Result<Upstream> Upstream::open(void* context, const UpstreamSettings& settings) {
+  auto socket = net::open_socket(context, ZMQ_XSUB);
+  if (!socket) return std::unexpected(socket.error());
+  if (!settings.key.empty()) {
+    auto secured = net::secure_client(socket->get(), settings.key, settings.server_key);
+    if (!secured) return std::unexpected(secured.error());
+  }
+  const std::string_view largest(reinterpret_cast<const char*>(&kMaxPart), sizeof kMaxPart);
+  for (const Result<>& set : {net::set_option(socket->get(), ZMQ_MAXMSGSIZE, largest),
+                              net::set_option(socket->get(), ZMQ_RCVHWM, kMessagesWaiting),
+                              net::set_option(socket->get(), ZMQ_RCVBUF, kReceiveBuffer),
+                              net::set_option(socket->get(), ZMQ_SNDHWM, kSubscriptionsWaiting)}) {
+    if (!set) return std::unexpected(set.error());
+  }
+  auto monitor = net::LinkMonitor::open(context, socket->get(), !settings.key.empty());
+  if (!monitor) return std::unexpected(monitor.error());
+  if (auto done = net::connect_socket(socket->get(), settings.endpoint); !done) {
+    return std::unexpected(done.error());
+  }
+  return Upstream(settings, std::move(*socket), std::move(*monitor));
+}
+
+bool Upstream::subscribe(const std::string& prefix, bool on) {
+  return net::send_part(socket_.get(), (on ? '\1' : '\0') + prefix, false);
+}
+
+bool Upstream::receive(net::Message& topic, net::Message& body, bool& sound) {
+  if (!topic.receive(socket_.get())) return false;
+  sound = topic.more() && body.receive(socket_.get()) && !body.more();
+  if (sound || !topic.more()) return true;
+  while (body.more() && body.receive(socket_.get())) {
+  }
+  return true;
+}
+
+void Upstream::take_news() {
+  const bool before = monitor_.established();
+  const net::Refusal refusal = monitor_.take_news();
+  if (refusal != net::Refusal::kNone) {
+    spdlog::error("the daemon at {} {}", endpoint(),
+                  net::refusal_words(refusal, net::Domain::kPublish, settings_.server_key));
+  } else if (established() != before) {
+    spdlog::log(before ? spdlog::level::warn : spdlog::level::info, "{}: {}", endpoint(),
+                before ? "connection lost; it is tried again" : "connected");
+  }
+}
+
+namespace {
+
+constexpr std::int64_t kNoStats_ns = 3 * kNanosPerSecond;  // three stats are missing
+
+}  // namespace
+
+std::optional<std::string> MergedStats::take(std::size_t upstream, std::string_view bytes,
+                                             std::int64_t now_ns, bool& sound) {
+  Heard& heard = heard_[upstream];
+  sound = heard.stats.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+  if (!sound) {
+    heard.ever = false;
+    return std::nullopt;
+  }
+  heard.ever = true;
+  heard.at_ns = now_ns;
+  if (heard_.size() == 1) return std::string(bytes);
+  for (v1::StreamStats& stream : *heard.stats.mutable_stream()) {
+    // What is set already comes from a relay before this one.
+    if (stream.has_monotonic_to_utc_ns()) continue;
+    stream.set_monotonic_to_utc_ns(heard.stats.monotonic_to_utc_ns());
+  }
+  const auto answers = [&](const Heard& one) {
+    return one.ever && now_ns - one.at_ns < kNoStats_ns;
+  };
+  for (std::size_t i = 0; i < upstream; ++i) {
+    if (answers(heard_[i])) return std::nullopt;  // an earlier one gives the beat
+  }
+  v1::Stats merged = heard.stats;
+  for (std::size_t i = upstream + 1; i < heard_.size(); ++i) {
+    if (!answers(heard_[i])) continue;
+    merged.mutable_stream()->MergeFrom(heard_[i].stats.stream());
+    merged.mutable_source()->MergeFrom(heard_[i].stats.source());
+  }
+  return merged.SerializeAsString();
+}
+
+namespace {
+
+constexpr std::string_view kSkeleton = "skeleton/";
+constexpr std::int64_t kSkeletonPause_ns = kNanosPerSecond / 20;
+// A daemon sends each skeleton every second. After this silence another upstream may have the name.
+constexpr std::int64_t kSilent_ns = 3 * kNanosPerSecond;
+// After this one the stream has gone.
+constexpr std::int64_t kGone_ns = 10 * kNanosPerSecond;
+
+}  // namespace
+
+std::string_view stream_of_topic(std::string_view topic) {
+  const auto slash = topic.find('/');
+  return slash == std::string_view::npos ? std::string_view() : topic.substr(slash + 1);
+}
+
+bool RelayedStreams::admit(std::string_view stream, std::size_t upstream, std::int64_t now_ns) {
+  forget_old(now_ns);
+  auto found = streams_.find(stream);
+  if (found == streams_.end()) {
+    if (streams_.size() == kMaxStreams) return false;
+    Stream fresh{.upstream = upstream};
+    fresh.due_ns = system::kForever_ns;
+    found = streams_.emplace(std::string(stream), std::move(fresh)).first;
+  } else if (found->second.upstream != upstream) {
+    if (now_ns - found->second.heard_ns < kSilent_ns) return false;
+    found->second.upstream = upstream;
+  }
+  found->second.heard_ns = now_ns;
+  return true;
+}
+
+void RelayedStreams::keep_skeleton(std::string_view stream, std::string_view bytes,
+                                   std::int64_t now_ns) {
+  const auto found = streams_.find(stream);
+  if (found == streams_.end()) return;
+  Stream& kept = found->second;
+  skeleton_bytes_ -= kept.skeleton.size();
+  kept.skeleton.clear();
+  kept.due_ns = system::kForever_ns;
+  if (skeleton_bytes_ + bytes.size() > kMaxSkeletonBytes) return;
+  kept.skeleton_topic = std::string(kSkeleton) + found->first;
+  kept.skeleton = bytes;
+  kept.sent_ns = now_ns;
+  skeleton_bytes_ += bytes.size();
+}
+
+void RelayedStreams::want_skeletons(std::string_view prefix) {
+  for (auto& [name, stream] : streams_) {
+    if (stream.skeleton.empty() || !stream.skeleton_topic.starts_with(prefix)) continue;
+    stream.due_ns = std::min(stream.due_ns, stream.sent_ns + kSkeletonPause_ns);
+  }
+}
+
+std::int64_t RelayedStreams::send_due(
+    std::int64_t now_ns,
+    const std::function<void(std::string_view topic, std::string_view bytes)>& send) {
+  std::int64_t next_ns = system::kForever_ns;
+  for (auto& [name, stream] : streams_) {
+    if (now_ns >= stream.due_ns) {
+      send(stream.skeleton_topic, stream.skeleton);
+      stream.sent_ns = now_ns;
+      stream.due_ns = system::kForever_ns;
+    }
+    next_ns = std::min(next_ns, stream.due_ns);
+  }
+  return next_ns;
+}
+
+void RelayedStreams::forget_old(std::int64_t now_ns) {
+  if (now_ns < forgot_ns_ + kNanosPerSecond) return;
+  forgot_ns_ = now_ns;
+  std::erase_if(streams_, [&](const auto& entry) {
+    const Stream& stream = entry.second;
+    if (now_ns - stream.heard_ns < kGone_ns) return false;
+    skeleton_bytes_ -= stream.skeleton.size();
+    return true;
+  });
+}
+
 namespace {
 
 constexpr int kMessagesATurn = 256;

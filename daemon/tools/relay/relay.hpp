@@ -1,23 +1,138 @@
+// Upstream: a relay's one connection to a daemon, or to another relay. It connects in the
+// background and again whenever the connection is lost; libzmq then repeats the subscriptions. Only
+// few messages wait, so what comes after a stall is new. One thread uses it. Cold.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "daemon/publish/publish_socket.hpp"
+#include "posed/v1/posed.pb.h"
+#include "proto/frame/result.hpp"
+#include "proto/frame/time.hpp"
+#include "proto/zmq/link_monitor.hpp"
+#include "proto/zmq/zmq_handle.hpp"
+
+namespace posed::relay {
+
+struct UpstreamSettings {
+  std::string endpoint;
+  std::filesystem::path key{};         // the relay's own NAME.key; empty: no CURVE
+  std::filesystem::path server_key{};  // the daemon's NAME.pub
+};
+
+class Upstream {
+ public:
+  // `context` outlives it.
+  [[nodiscard]] static Result<Upstream> open(void* context, const UpstreamSettings& settings);
+
+  [[nodiscard]] void* socket() const noexcept { return socket_.get(); }
+  [[nodiscard]] void* news() const noexcept { return monitor_.socket(); }  // readable: take_news()
+  [[nodiscard]] const std::string& endpoint() const noexcept { return settings_.endpoint; }
+
+  // Returns false if the connection cannot take more subscriptions now.
+  [[nodiscard]] bool subscribe(const std::string& prefix, bool on);
+
+  // The next message, if one waits. `sound` is false for one that is not a topic and a body, which
+  // is skipped.
+  [[nodiscard]] bool receive(net::Message& topic, net::Message& body, bool& sound);
+
+  // Takes what happened to the connection, and logs when it was made, lost or refused.
+  void take_news();
+  [[nodiscard]] bool established() const noexcept { return monitor_.established(); }
+
+ private:
+  Upstream(UpstreamSettings settings, net::Socket socket, net::LinkMonitor monitor)
+      : settings_(std::move(settings)), socket_(std::move(socket)), monitor_(std::move(monitor)) {}
+
+  UpstreamSettings settings_;
+  net::Socket socket_;
+  net::LinkMonitor monitor_;
+};
+
+// MergedStats: the stats of several daemons as those of one, so that `posed top` and `posed
+// monitor` see all streams of a relay.
+class MergedStats {
+ public:
+  explicit MergedStats(std::size_t upstreams) : heard_(upstreams) {}
+
+  // Stats came from an upstream. Returns what to publish: of one upstream its own bytes; of several
+  // the streams and sources of all that are not silent, each stream with the clock of its own
+  // machine, and everything else as the first of them says it, whenever that one sends its stats.
+  // Empty: nothing now. `sound` is false for bytes that are no stats.
+  [[nodiscard]] std::optional<std::string> take(std::size_t upstream, std::string_view bytes,
+                                                std::int64_t now_ns, bool& sound);
+
+ private:
+  struct Heard {
+    v1::Stats stats{};
+    std::int64_t at_ns = 0;
+    bool ever = false;
+  };
+  std::vector<Heard> heard_;  // [upstream]
+};
+
+// RelayedStreams: what a relay knows of the streams that pass it. Each stream belongs to the
+// upstream that sends it; a second one that sends a stream of the same name is not mixed in. The
+// last skeleton of each stream is kept for subscribers that come later. No socket, no clock of its
+// own, one thread. Cold: allocates.
+
+inline constexpr std::size_t kMaxStreams = 1024;
+inline constexpr std::size_t kMaxSkeletonBytes = 16 * 1024 * 1024;  // of all streams together
+
+// The stream of a topic such as "pose/walker"; empty for other topics.
+[[nodiscard]] std::string_view stream_of_topic(std::string_view topic);
+
+class RelayedStreams {
+ public:
+  // A message of the stream came from an upstream (its index). Returns false if it may not pass: if
+  // another upstream sends a stream of this name, or if there are kMaxStreams others.
+  [[nodiscard]] bool admit(std::string_view stream, std::size_t upstream, std::int64_t now_ns);
+
+  // The skeleton of an admitted stream has just been passed on. One beyond kMaxSkeletonBytes is not
+  // kept.
+  void keep_skeleton(std::string_view stream, std::string_view bytes, std::int64_t now_ns);
+
+  // Somebody has subscribed to the topics that begin with `prefix`: their skeletons become due, at
+  // once or 50 ms after they were last sent, because all their subscribers get them again.
+  void want_skeletons(std::string_view prefix);
+
+  // Gives the skeletons that are due to `send`; returns when the next one is.
+  [[nodiscard]] std::int64_t send_due(
+      std::int64_t now_ns,
+      const std::function<void(std::string_view topic, std::string_view bytes)>& send);
+
+  [[nodiscard]] std::size_t streams() const noexcept { return streams_.size(); }
+  [[nodiscard]] std::size_t skeleton_bytes() const noexcept { return skeleton_bytes_; }
+
+ private:
+  struct Stream {
+    std::size_t upstream = 0;
+    std::int64_t heard_ns = 0;
+    std::string skeleton_topic{}, skeleton{};  // empty: none is kept
+    std::int64_t sent_ns = 0, due_ns = 0;      // of the skeleton
+  };
+  // Forgets streams that have not been heard for a while; at most once a second.
+  void forget_old(std::int64_t now_ns);
+
+  std::map<std::string, Stream, std::less<>> streams_;
+  std::size_t skeleton_bytes_ = 0;
+  std::int64_t forgot_ns_ = 0;
+};
+
 // Relay: passes on what one or several daemons publish, so that hundreds of subscribers cost the
 // capture machine one connection. Messages pass unchanged; subscriptions travel the other way. A
 // subscriber that comes later gets the skeletons of its streams at once. Newest data wins: every
 // queue is short, and a slow subscriber loses messages for itself alone.
-#pragma once
-
-#include <cstdint>
-#include <memory>
-#include <set>
-#include <string>
-#include <vector>
-
-#include "daemon/publish/publish_socket.hpp"
-#include "daemon/tools/relay/merged_stats.hpp"
-#include "daemon/tools/relay/relayed_streams.hpp"
-#include "daemon/tools/relay/upstream.hpp"
-#include "proto/frame/result.hpp"
-#include "proto/frame/time.hpp"
-
-namespace posed::relay {
 
 inline constexpr std::size_t kMaxUpstreams = 16;
 

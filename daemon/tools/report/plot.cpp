@@ -474,4 +474,11 @@ Drawing draw_bars(const Bars& bars) {
   return {.width_px = kBarsWidth_px, .height_px = bottom + kBelow_px, .elements = std::move(out)};
 }
 
+Figure bars_figure(std::string title, std::string sentence, const Bars& bars) {
+  return {.title = std::move(title),
+          .sentence = std::move(sentence),
+          .drawings = {draw_bars(bars)},
+          .tables = {}};
+}
+
 }  // namespace posed::report

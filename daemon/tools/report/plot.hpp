@@ -144,6 +144,8 @@ struct Bars {
 };
 
 [[nodiscard]] Drawing draw_bars(const Bars& bars);
+// A figure of bars alone.
+[[nodiscard]] Figure bars_figure(std::string title, std::string sentence, const Bars& bars);
 
 inline constexpr std::size_t kSeries = 7;
 

@@ -6,7 +6,7 @@
 #include <system_error>
 #include <utility>
 
-#include "daemon/tools/command/hand_option.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "models/gesture/recording.hpp"
 #include "models/motion/motion.hpp"

@@ -9,7 +9,6 @@
 #include <google/protobuf/dynamic_message.h>
 
 #include "daemon/tools/export/log_mcap.hpp"
-#include "daemon/tools/export/mcap_writer.hpp"
 #include "proto/log/reader.hpp"
 #include "tests/support/file_text.hpp"
 #include "tests/support/has.hpp"

@@ -7,7 +7,7 @@
 
 #include "daemon/replay/replay.hpp"
 #include "daemon/tools/export/frame_file.hpp"
-#include "daemon/tools/export/log_takes.hpp"
+#include "daemon/tools/export/log_clip.hpp"
 #include "posed/v1/log.pb.h"
 #include "tests/support/has.hpp"
 #include "tests/support/log_surgery.hpp"

@@ -1,4 +1,4 @@
-#include "daemon/tools/command/heartbeat.hpp"
+#include "daemon/tools/command/client.hpp"
 
 #include <catch2/catch.hpp>
 

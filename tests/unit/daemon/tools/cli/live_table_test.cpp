@@ -1,4 +1,4 @@
-#include "daemon/tools/live/live_table.hpp"
+#include "daemon/tools/live/live_view.hpp"
 
 #include <catch2/catch.hpp>
 

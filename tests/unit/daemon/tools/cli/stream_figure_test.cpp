@@ -1,5 +1,5 @@
 // The figure of a stream, made of what a daemon sends: whole, of another stream, or damaged.
-#include "daemon/tools/live/stream_figure.hpp"
+#include "daemon/tools/live/chosen_stream.hpp"
 
 #include <cmath>
 #include <limits>

@@ -4,8 +4,7 @@
 #include <vector>
 
 #include "daemon/system/event_fd.hpp"
-#include "daemon/tools/relay/merged_stats.hpp"
-#include "daemon/tools/relay/relayed_streams.hpp"
+#include "daemon/tools/relay/relay.hpp"
 #include "proto/frame/time.hpp"
 
 namespace posed::relay {

@@ -1,4 +1,4 @@
-#include "daemon/tools/command/thread_tasks.hpp"
+#include "daemon/tools/command/ranks.hpp"
 
 #include <algorithm>
 #include <chrono>

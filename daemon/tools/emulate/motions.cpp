@@ -1,4 +1,4 @@
-#include "daemon/tools/emulate/clip_motion.hpp"
+#include "daemon/tools/emulate/motions.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "drivers/driver.hpp"
+#include "drivers/options.hpp"
 #include "models/motion/interpolate.hpp"
 #include "models/motion/retarget.hpp"
 #include "proto/clip/clip.hpp"
@@ -65,5 +67,30 @@ Result<Motion> clip_motion(const std::filesystem::path& path, const drivers::Emu
     pose_bodies(*performance, time_s, moved);
   });
 }
+
+Result<std::unique_ptr<SyntheticSigner>> SyntheticSigner::start(const std::string& name,
+                                                                const std::filesystem::path& clip) {
+  const drivers::Driver* driver = drivers::find_driver(name);
+  if (driver == nullptr || driver->emulate == nullptr) {
+    return misuse("driver '" + name + "' has no emulator, so it cannot be used here");
+  }
+  auto motion = clip::read_hand_clip(clip);
+  if (!motion) return std::unexpected(motion.error());
+  const auto options = drivers::complete_options(*driver, {});
+  if (!options) return std::unexpected(options.error());
+  auto emulator = driver->emulate(*options);
+  if (!emulator) return std::unexpected(emulator.error());
+  auto port = EmulatedPort::open_pty();
+  if (!port) return std::unexpected(port.error());
+  return std::unique_ptr<SyntheticSigner>(
+      new SyntheticSigner(std::move(*emulator), std::move(*port), std::move(*motion)));
+}
+
+SyntheticSigner::SyntheticSigner(std::unique_ptr<drivers::Emulator> emulator, EmulatedPort port,
+                                 clip::HandClip clip)
+    : clip_(std::move(clip)),
+      glove_(std::move(emulator), std::move(port),
+             hand_motion([this](double time_s) { return pose_at(clip_, time_s); }), {}),
+      thread_([this](const std::stop_token& stop) { glove_.run(stop); }) {}
 
 }  // namespace posed::emulate

@@ -10,8 +10,12 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "proto/frame/degree.hpp"
+#include "proto/frame/hand.hpp"
+
 // Checks of options that take a number. CLI11's own ones compare only, so `nan` passes them and a
 // command computes with it.
+
 namespace posed::tools {
 
 namespace detail {
@@ -66,6 +70,17 @@ inline CLI::Validator whole_number() {
                        : fmt::format("'{}' should be a whole number of 0 or more", text);
           },
           "NONNEGATIVE"};
+}
+
+// The program computes in radians; the user interface shows degrees.
+
+inline constexpr double kDegrees = 1.0 / kDegree;  // degrees in a radian
+
+// The word of --hand.
+
+// `word` is "left" or "right"; CLI11 has refused all others.
+[[nodiscard]] constexpr Side side_named(std::string_view word) noexcept {
+  return word == "left" ? Side::kLeft : Side::kRight;
 }
 
 }  // namespace posed::tools

@@ -1,31 +1,26 @@
-#include <cstdio>
+// `posed eval style`: how near a styled clip comes to the target.
+#include <cmath>
 #include <memory>
 
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/degrees.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/findings.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
-#include "daemon/tools/command/shares_json.hpp"
-#include "daemon/tools/style/eval_natural.hpp"
-#include "daemon/tools/style/eval_style_report.hpp"
-#include "daemon/tools/style/root_option.hpp"
+#include "daemon/tools/style/style_options.hpp"
+#include "daemon/tools/style/style_report.hpp"
 #include "models/style/apply.hpp"
 #include "models/style/evaluate.hpp"
 #include "models/style/style_model.hpp"
 #include "models/style/training_check.hpp"
 #include "models/style/walker_fit.hpp"
 #include "proto/clip/clip.hpp"
-#include "proto/text/json_text.hpp"
 
 namespace posed::tools {
 namespace {
-
-using nlohmann::json;
 
 constexpr const char* kEvalFooter = R"(Examples:
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh
@@ -71,7 +66,7 @@ struct Evaluation {
   double moved_rms_deg = 0.0;
   std::optional<double> gate_mean{};
   style::WalkerFit fit;
-  json weights{};                         // of the styles
+  Findings weights{};                     // of the styles
   std::optional<EvaluatedClips> clips{};  // for the report
 
   // By what the verdict shows: one that closes 0 % is no better than nothing.
@@ -102,39 +97,48 @@ std::string verdict(const Evaluation& e) {
   return text;
 }
 
-// Null where it is not defined.
-json scaled(const std::optional<double>& value, double scale) {
-  return value ? json(*value * scale) : json();
+std::optional<double> scaled(const std::optional<double>& value, double scale) {
+  return value ? std::optional(*value * scale) : std::nullopt;
 }
 
-json of_clips(const style::StyleScore::Clips& clips, double scale) {
-  return {{"source", scaled(clips.source, scale)},
-          {"styled", scaled(clips.styled, scale)},
-          {"target", scaled(clips.target, scale)}};
+// NaN where it is not defined.
+double slide_cm_s(const std::optional<double>& slide_m_s) {
+  return slide_m_s ? *slide_m_s * kCentimetres : std::nan("");
 }
 
-json report_of(const Evaluation& e, const EvalOptions& options) {
+Findings of_clips(const style::StyleScore::Clips& clips, double scale) {
+  return Findings()
+      .add("source", scaled(clips.source, scale))
+      .add("styled", scaled(clips.styled, scale))
+      .add("target", scaled(clips.target, scale));
+}
+
+Findings findings_of(const Evaluation& e, const EvalOptions& options) {
   const style::StyleScore& score = e.score;
-  return json{{"cycle_ratio", score.cycle_ratio},
-              {"constant_cycle_ratio", e.constant.cycle_ratio},
-              {"ratio", score.ratio},
-              {"jerk_ratio", score.jerk_ratio},
-              {"moved_rms_deg", e.moved_rms_deg},
-              {"component_rms_deg", score.component_rms_deg},
-              {"source_component_rms_deg", score.source_component_rms_deg},
-              {"source_period_s", score.source_period_s},
-              {"target_period_s", score.target_period_s},
-              {"distance_deg", e.fit.distance_deg},
-              {"far_from_training", e.fit.is_far()},
-              {"gate_mean", scaled(e.gate_mean, 1.0)},
-              {"slide_cm_s", of_clips(score.slide_m_s, kCentimetres)},
-              {"sink_cm", scaled(score.sink_m, kCentimetres)},
-              {"root_speed_m_s", of_clips(score.root_speed_m_s, 1.0)},
-              {"root", root_text(options.feet)},
-              {"alpha", options.alpha},
-              {"weights", e.weights},
-              {"helps", e.helps()},
-              {"verdict", verdict(e)}};
+  const std::string judged = verdict(e);
+  return Findings()
+      .add("alpha", options.alpha)
+      .add("component_rms_deg", score.component_rms_deg)
+      .add("constant_cycle_ratio", e.constant.cycle_ratio)
+      .add("cycle_ratio", score.cycle_ratio)
+      .add("distance_deg", e.fit.distance_deg)
+      .add("far_from_training", e.fit.is_far())
+      .add("gate_mean", e.gate_mean)
+      .add("helps", e.helps())
+      .add("jerk_ratio", score.jerk_ratio)
+      .add("moved_rms_deg", e.moved_rms_deg)
+      .add("ratio", score.ratio)
+      .add("root", root_text(options.feet))
+      .add("root_speed_m_s", of_clips(score.root_speed_m_s, 1.0))
+      .add("sink_cm", scaled(score.sink_m, kCentimetres))
+      .add("slide_cm_s", of_clips(score.slide_m_s, kCentimetres))
+      .add("source_component_rms_deg", score.source_component_rms_deg)
+      .add("source_period_s", score.source_period_s)
+      .add("target_period_s", score.target_period_s)
+      .add("weights", e.weights)
+      .say_numbers()
+      .add("verdict", judged)
+      .verdict(judged, e.helps());
 }
 
 Result<> check_files(const EvalOptions& options) {
@@ -162,8 +166,10 @@ Result<Evaluation> evaluate(const EvalOptions& options) {
   if (!fit) return std::unexpected(fit.error());
   const style::StyleModel constant = style::with_constant_change(mixture, fit->mean_change);
   ProgressBar bar(kQuietFor_s);
-  Evaluation evaluation{
-      .score = {}, .constant = {}, .fit = *fit, .weights = shares_json(model->names(), *shares)};
+  Evaluation evaluation{.score = {},
+                        .constant = {},
+                        .fit = *fit,
+                        .weights = mixture_findings(model->names(), *shares)};
   for (const bool full : {false, true}) {
     style::ApplyOptions apply;
     apply.filter.alpha = options.alpha;
@@ -191,39 +197,32 @@ Result<Evaluation> evaluate(const EvalOptions& options) {
   return evaluation;
 }
 
-// "NAME  1.234", a line for each number; those of an object have its name before theirs.
-void print_numbers(const std::string& prefix, const json& figures) {
-  for (const auto& [name, value] : figures.items()) {
-    if (value.is_object()) print_numbers(prefix + name + ".", value);
-    if (!value.is_number()) continue;
-    std::printf("%-24s %8.3f\n", (prefix + name).c_str(), value.get<double>());
-  }
-}
-
 int finish(const Evaluation& evaluation, const EvalOptions& options) {
-  const json figures = report_of(evaluation, options);
-  if (options.json) {
-    std::printf("%s\n", json_text(figures, 2).c_str());
-  } else {
-    print_numbers("", figures);
-  }
-  std::fflush(stdout);
-  std::fprintf(stderr, "posed: %s\n", verdict(evaluation).c_str());
+  const Findings findings = findings_of(evaluation, options);
+  const int exit_code = findings.show(options.json);
   if (evaluation.clips) {
-    const auto written = write_eval_style_report(figures, *evaluation.clips, options.report.path);
+    const auto& score = evaluation.score;
+    const auto written =
+        write_eval_style_report({.findings = findings,
+                                 .verdict = verdict(evaluation),
+                                 .helps = evaluation.helps(),
+                                 .distances = {{"unstyled", 1.0},
+                                               {"constant offset", evaluation.constant.cycle_ratio},
+                                               {"styled", score.cycle_ratio},
+                                               {"styled, frame by frame", score.ratio}},
+                                 .slides_cm_s = {{"source", slide_cm_s(score.slide_m_s.source)},
+                                                 {"styled", slide_cm_s(score.slide_m_s.styled)},
+                                                 {"target", slide_cm_s(score.slide_m_s.target)}}},
+                                *evaluation.clips, options.report.path);
     if (!written) return report(written.error());
   }
-  return static_cast<int>(evaluation.helps() ? ExitCode::kDone : ExitCode::kFailed);
+  return exit_code;
 }
 
 }  // namespace
 
-void add_eval(CLI::App& app, int& exit_code) {
-  CLI::App* command = app.add_subcommand("eval", "Judge a model, or a clip");
-  command->require_subcommand(1);
-  add_eval_gesture(*command, exit_code);
-  add_eval_natural(*command, exit_code);
-  CLI::App* style = command->add_subcommand("style", "How near a styled clip comes to the target");
+void add_eval_style(CLI::App& eval, int& exit_code) {
+  CLI::App* style = eval.add_subcommand("style", "How near a styled clip comes to the target");
   style->footer(kEvalFooter);
   const auto options = std::make_shared<EvalOptions>();
   style->add_option("--model", options->model, "Model from `posed train style`")->required();
