@@ -116,7 +116,8 @@ int perform_until_stopped(tools::PipePair& parent, double rate_hz) {
   return 0;
 }
 
-// The child that hears all avatars at one port, which it tells first, and counts what comes.
+// The child that receives for all avatars at one port, which it writes first, and counts what
+// comes.
 int receive_of_avatars(tools::PipePair& parent) {
   int port = 0;
   const auto fd = open_udp(port);

@@ -18,9 +18,9 @@ constexpr int kPoll_ms = 50;
 constexpr std::size_t kReserved = 1 << 20;  // number of messages for which memory is reserved
 
 // Runs in the child process.
-class Noter {
+class MessageRecord {
  public:
-  Noter() { noted_.messages.reserve(kReserved); }
+  MessageRecord() { received_.messages.reserve(kReserved); }
 
   // Receives one message if there is one.
   bool receive_one(void* socket) {
@@ -32,7 +32,7 @@ class Noter {
     if (topic.text().starts_with("bare/")) {
       std::int64_t arrival_ns = 0;
       std::memcpy(&arrival_ns, body.bytes().data(), sizeof arrival_ns);
-      noted_.messages.push_back(
+      received_.messages.push_back(
           {.arrival_ns = arrival_ns, .age_ns = came_ns - arrival_ns, .bare = true});
     } else if (frame_.ParseFromArray(body.bytes().data(), static_cast<int>(body.bytes().size()))) {
       // The last pose of a silent source is published again with its old times.
@@ -40,27 +40,27 @@ class Noter {
       const std::int64_t arrival_ns = frame_.arrival_ns();
       double stages_us = 0.0;
       for (const float stage_us : frame_.stage_us()) stages_us += static_cast<double>(stage_us);
-      noted_.messages.push_back({.arrival_ns = arrival_ns,
-                                 .decoded_ns = frame_.decoded_ns() - arrival_ns,
-                                 .stages_ns = nanoseconds(stages_us * 1e-6),
-                                 .sent_ns = frame_.published_ns() - arrival_ns,
-                                 .age_ns = came_ns - arrival_ns});
+      received_.messages.push_back({.arrival_ns = arrival_ns,
+                                    .decoded_ns = frame_.decoded_ns() - arrival_ns,
+                                    .stages_ns = nanoseconds(stages_us * 1e-6),
+                                    .sent_ns = frame_.published_ns() - arrival_ns,
+                                    .age_ns = came_ns - arrival_ns});
       std::uint64_t& last = last_[frame_.stream()];
-      if (last != 0 && frame_.sequence() > last + 1) noted_.gaps += frame_.sequence() - last - 1;
+      if (last != 0 && frame_.sequence() > last + 1) received_.gaps += frame_.sequence() - last - 1;
       last = frame_.sequence();
     }
     return true;
   }
 
-  [[nodiscard]] const ReceivedMessages& noted() const { return noted_; }
+  [[nodiscard]] const ReceivedMessages& received() const { return received_; }
 
  private:
-  ReceivedMessages noted_;
+  ReceivedMessages received_;
   v1::Frame frame_;
   std::map<std::string, std::uint64_t> last_;  // sequence by stream
 };
 
-int note_until_stopped(PipePair& parent) {
+int record_until_stopped(PipePair& parent) {
   auto context = net::open_context();
   if (!context) return 1;
   auto socket = net::open_socket(context->get(), ZMQ_SUB);
@@ -71,24 +71,25 @@ int note_until_stopped(PipePair& parent) {
   for (std::string endpoint; !(endpoint = parent.read_line()).empty();) {
     if (!net::connect_socket(socket->get(), endpoint)) return 1;
   }
-  Noter noter;
+  MessageRecord record;
   std::array<zmq_pollitem_t, 2> wait{
       {{socket->get(), 0, ZMQ_POLLIN, 0}, {nullptr, parent.from(), ZMQ_POLLIN, 0}}};
   while ((wait[1].revents & (ZMQ_POLLIN | ZMQ_POLLERR)) == 0) {
     zmq_poll(wait.data(), static_cast<int>(wait.size()), kPoll_ms);
-    while (noter.receive_one(socket->get())) {
+    while (record.receive_one(socket->get())) {
     }
   }
-  const ReceivedMessages& noted = noter.noted();
-  const bool sent = parent.write(&noted.gaps, sizeof noted.gaps) &&
-                    parent.write(noted.messages.data(), noted.messages.size() * sizeof(Arrival));
+  const ReceivedMessages& received = record.received();
+  const bool sent =
+      parent.write(&received.gaps, sizeof received.gaps) &&
+      parent.write(received.messages.data(), received.messages.size() * sizeof(Arrival));
   return sent ? 0 : 1;
 }
 
 }  // namespace
 
 Result<std::unique_ptr<HopSubscriber>> HopSubscriber::fork(bool gives_way) {
-  auto process = ChildProcess::fork(note_until_stopped, gives_way);
+  auto process = ChildProcess::fork(record_until_stopped, gives_way);
   if (!process) return std::unexpected(process.error());
   return std::unique_ptr<HopSubscriber>(new HopSubscriber(std::move(*process)));
 }

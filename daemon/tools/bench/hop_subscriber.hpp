@@ -13,9 +13,6 @@
 
 namespace posed::tools {
 
-// The receiver of the benchmarks: a subscriber in its own process that records how old each message
-// is when it arrives.
-
 // A received message. Its topic says which kind it is: bare/... or pose/...
 struct Arrival {
   std::int64_t arrival_ns = 0;  // stamped in the reader
@@ -45,7 +42,7 @@ class HopSubscriber {
   ChildProcess process_;
 };
 
-// Evaluates the message ages that the benchmarks' subscribers have recorded.
+// The ages of messages at their receipt.
 struct HopFigures {
   double p50_us = 0.0, p99_us = 0.0, p999_us = 0.0, max_us = 0.0;
   std::uint64_t messages = 0;

@@ -1,3 +1,4 @@
+// What options of several commands share: checks of numbers, the word of --hand, and degrees. Cold.
 #pragma once
 
 #include <charconv>
@@ -73,12 +74,9 @@ inline CLI::Validator whole_number() {
 }
 
 // The program computes in radians; the user interface shows degrees.
-
 inline constexpr double kDegrees = 1.0 / kDegree;  // degrees in a radian
 
-// The word of --hand.
-
-// `word` is "left" or "right"; CLI11 has refused all others.
+// The side that --hand names. `word` is "left" or "right"; CLI11 has refused all others.
 [[nodiscard]] constexpr Side side_named(std::string_view word) noexcept {
   return word == "left" ? Side::kLeft : Side::kRight;
 }

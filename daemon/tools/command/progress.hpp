@@ -1,6 +1,5 @@
-// Shows work of unknown duration: after a second stderr says what is being done and for how long;
-// on a terminal in one line that is rewritten, elsewhere a line from time to time. Ctrl-C ends the
-// process as usual.
+// Signs of progress on stderr: Waiting for work of unknown duration, ProgressBar for work that
+// knows how much of it is done. Cold.
 #pragma once
 
 #include <chrono>
@@ -13,6 +12,9 @@
 
 namespace posed::tools {
 
+// Shows work of unknown duration: after a second stderr says what is being done and for how long;
+// on a terminal in one line that is rewritten, elsewhere a line from time to time. Ctrl-C ends the
+// process as usual.
 class Waiting {
  public:
   // `what` as in "reading take.plog".

@@ -10,7 +10,8 @@
 namespace posed::tools {
 namespace {
 
-constexpr std::chrono::milliseconds kLook{100};  // how often progress is told while no task ends
+constexpr std::chrono::milliseconds kLook{
+    100};  // how often progress is reported while no task ends
 
 // What the workers share. Everything but the results themselves is guarded by the mutex.
 struct Work {
@@ -21,8 +22,8 @@ struct Work {
   std::exception_ptr failure;
   std::vector<TaskResult> results;
 
-  // The next task's index; the number of tasks where there is none left.
-  std::size_t take() {
+  // Gives the next task's index to a worker; the number of tasks where there is none left.
+  std::size_t claim() {
     const std::scoped_lock lock(mutex);
     return stop ? results.size() : std::min(next++, results.size());
   }
@@ -38,7 +39,7 @@ struct Work {
 };
 
 void run_tasks(Work& work, const Task& task) {
-  for (std::size_t i = work.take(); i < work.results.size(); i = work.take()) {
+  for (std::size_t i = work.claim(); i < work.results.size(); i = work.claim()) {
     std::exception_ptr thrown;
     try {
       work.results[i] = task(i);
@@ -49,7 +50,7 @@ void run_tasks(Work& work, const Task& task) {
   }
 }
 
-// Tells progress until all tasks are done, one failed or the caller asked to stop.
+// Reports progress until all tasks are done, one failed or the caller asked to stop.
 void watch(Work& work, const TaskProgress& progress, std::atomic<bool>& stopping) {
   std::unique_lock lock(work.mutex);
   while (work.done < work.results.size() && !work.stop) {

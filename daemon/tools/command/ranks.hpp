@@ -1,4 +1,4 @@
-// ThreadTasks: runs a training's tasks on the machine's cores.
+// Who computes a training: the threads of this process, and the processes of `posed-mpi`. Cold.
 #pragma once
 
 #include <atomic>
@@ -13,6 +13,7 @@
 
 namespace posed::tools {
 
+// ThreadTasks: runs a training's tasks on the machine's cores.
 class ThreadTasks final : public TaskRunner {
  public:
   // 0 threads: one for each core.

@@ -10,20 +10,19 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
-#include <ostream>
 #include <span>
 #include <string>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/assembly/daemon.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/logging/log_output.hpp"
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/paint.hpp"
@@ -36,11 +35,10 @@
 #include "daemon/tools/live/page.hpp"
 #include "daemon/tools/style/train_style.hpp"
 #include "daemon/tools/view/bridge.hpp"
-#include "proto/clip/text.hpp"
 #include "proto/frame/profile_texts.hpp"
 #include "proto/frame/result.hpp"
+#include "proto/frame/whole_file.hpp"
 #include "proto/log/digest.hpp"
-#include "proto/text/json_text.hpp"
 #include "proto/text/load_file.hpp"
 
 namespace posed::tools {
@@ -83,11 +81,7 @@ class DemoFolder {
 
 std::span<const ProfileText> config_texts();  // config/*.toml, written by daemon/CMakeLists.txt
 
-namespace tools {
-
 namespace fs = std::filesystem;
-using nlohmann::json;
-
 constexpr const char* kStamp = "demo.json";
 constexpr std::uintmax_t kMaxStamp = 64 * 1024;      // bytes of the stamp file
 constexpr std::uintmax_t kMaxBytes = 1'000'000'000;  // of the program, or of a file that it wrote
@@ -101,16 +95,12 @@ std::string digest_of(const fs::path& file) {
 // A hash of the whole program, because another build may train other models.
 std::string program_digest() { return digest_of("/proc/self/exe"); }
 
-json digests_of_files(const fs::path& folder) {
-  json digests = json::object();
-  for (const std::string& name : demo_file_names()) digests[name] = digest_of(folder / name);
-  digests[kDemoConfig] = digest_of(folder / kDemoConfig);
-  return digests;
-}
-
-Result<> write_stamp(const fs::path& folder, const json& stamp) {
-  return clip::write_text(folder / kStamp,
-                          [&](std::ostream& out) { out << json_text(stamp, 2) << "\n"; });
+// What the folder's stamp says while its files are those that this program wrote.
+std::string stamp_of(const fs::path& folder) {
+  Findings files;
+  for (const std::string& name : demo_file_names()) files.add(name, digest_of(folder / name));
+  files.add(kDemoConfig, digest_of(folder / kDemoConfig));
+  return Findings().add("program", program_digest()).add("files", files).json(2) + "\n";
 }
 
 std::string config_text() {
@@ -147,14 +137,7 @@ Result<fs::path> demo_cache_folder() {
 
 bool DemoFolder::is_up_to_date() const {
   const auto text = load_file(path_ / kStamp, {.what = "stamp", .max_bytes = kMaxStamp});
-  if (!text) return false;
-  const json stamp = json::parse(*text, nullptr, false);
-  if (!stamp.is_object() || !stamp.contains("files") || !stamp["files"].is_object()) return false;
-  if (stamp.value("program", "") != program_digest()) return false;
-  return std::ranges::all_of(stamp["files"].items(), [&](const auto& file) {
-    return file.value().is_string() &&
-           digest_of(path_ / file.key()) == file.value().template get<std::string>();
-  });
+  return text && *text == stamp_of(path_);
 }
 
 Result<> DemoFolder::check_is_own(const std::vector<std::string>& names, bool overwrite) const {
@@ -173,17 +156,13 @@ Result<> DemoFolder::check_is_own(const std::vector<std::string>& names, bool ov
 Result<> DemoFolder::begin() const {
   std::error_code error;
   fs::create_directories(path_, error);  // writing says what failed
-  return write_stamp(path_, json::object());
+  return write_whole_file(path_ / kStamp, "{}\n");
 }
 
 Result<> DemoFolder::finish() const {
-  const std::string config = config_text();
-  auto written = clip::write_text(path_ / kDemoConfig, [&](std::ostream& out) { out << config; });
-  if (!written) return written;
-  return write_stamp(path_, {{"program", program_digest()}, {"files", digests_of_files(path_)}});
+  if (auto written = write_whole_file(path_ / kDemoConfig, config_text()); !written) return written;
+  return write_whole_file(path_ / kStamp, stamp_of(path_));
 }
-
-}  // namespace tools
 
 struct DemoOptions {
   std::filesystem::path config;   // empty: the demo's own
@@ -236,9 +215,9 @@ void drain(Connection& connection, Watcher& watcher, DemoScreen& screen) {
   net::Message topic, body;
   while (topic.receive(connection.socket()) && topic.more() &&
          body.receive(connection.socket(), 0)) {
-    screen.take(topic.text(), body.bytes());
+    screen.handle(topic.text(), body.bytes());
     if (!topic.text().starts_with("pose/")) continue;
-    watcher.take(std::string(topic.text()), body.bytes().data(), body.bytes().size());
+    watcher.handle(std::string(topic.text()), body.bytes().data(), body.bytes().size());
   }
 }
 
@@ -256,10 +235,10 @@ std::unique_ptr<view::Bridge> serve_page_of(const assembly::Daemon& daemon,
   };
   const auto page = find_page({});
   if (!page) return why_not(page.error());
-  auto bridge = view::Bridge::start(
-      {.link = {.connect = daemon.publish_endpoint(), .control = daemon.control_endpoint()},
-       .page = *page,
-       .or_any_port = true});
+  auto bridge = view::Bridge::start({.link = {.publish = {.endpoint = daemon.publish_endpoint()},
+                                              .control = daemon.control_endpoint()},
+                                     .page = *page,
+                                     .or_any_port = true});
   if (!bridge) return why_not(bridge.error());
   std::fprintf(stderr, "see it: %s\n", (*bridge)->url().c_str());
   if (!options.no_browser) open_browser((*bridge)->url());
@@ -320,8 +299,8 @@ void print_summary(const Watcher& watcher, const DemoHand& hand, const v1::Stats
   for (const v1::StreamStats& s : stats.stream()) {
     print(
         fmt::format("{}: {:.1f} frames/s, arrival to ZeroMQ {} (99 %: {}), dropped {}, skipped {}",
-                    s.stream(), s.rate_hz(), people_duration(s.publish().p50_us()),
-                    people_duration(s.publish().p99_us()), s.dropped(), s.shed()));
+                    s.stream(), s.rate_hz(), display_duration(s.publish().p50_us() * 1e-6),
+                    display_duration(s.publish().p99_us() * 1e-6), s.dropped(), s.shed()));
   }
 }
 

@@ -40,7 +40,7 @@ Result<DemoHand> DemoHand::open(const std::string& control) {
   return DemoHand(std::move(*connection));
 }
 
-void DemoHand::take(const v1::Frame& frame) {
+void DemoHand::handle(const v1::Frame& frame) {
   ++frames_;
   if (is_performed(frame)) {
     if (!is_performed(last_)) performed_.clear();
@@ -143,7 +143,7 @@ bool DemoScreen::quits() {
 void DemoScreen::look(Watcher& watcher, const DemoHand& hand) {
   const bool first = stats_.time_ns() == 0;
   stats_ = daemon_.stats();
-  if (screen_.is_terminal() && is_due(taken_, kStatsEvery)) chosen_.take(stats_);
+  if (screen_.is_terminal() && is_due(taken_, kStatsEvery)) chosen_.update(stats_);
   view_.notes.clear();
   if (screen_.is_terminal() || first) {
     view_.notes.push_back(fmt::format(

@@ -1,5 +1,4 @@
-// The demo as a client of its own daemon: counts styled frames and compares each with the raw frame
-// of the same instant.
+// The demo as a client of its own daemon: what it counts, its hand, and its screen. Cold.
 #pragma once
 
 #include <chrono>
@@ -27,14 +26,17 @@ class Daemon;
 
 namespace posed::tools {
 
+// The demo as a client of its own daemon: counts styled frames and compares each with the raw frame
+// of the same instant.
+
 // Receives raw and styled frames, and compares those of the same instant.
 class Watcher {
  public:
   explicit Watcher(DemoHand& hand) : hand_(hand) {}
 
-  void take(const std::string& topic, const void* body, std::size_t size) {
+  void handle(const std::string& topic, const void* body, std::size_t size) {
     if (!frame_.ParseFromArray(body, static_cast<int>(size))) return;
-    if (frame_.stream() == kDemoHandStream) return hand_.take(frame_);
+    if (frame_.stream() == kDemoHandStream) return hand_.handle(frame_);
     if (topic.ends_with(kRawSuffix)) {
       raw_[frame_.sequence()].assign(frame_.rotation_xyzw().begin(), frame_.rotation_xyzw().end());
       while (raw_.size() > kKept) raw_.erase(raw_.begin());
@@ -92,7 +94,7 @@ class DemoHand {
   [[nodiscard]] static Result<DemoHand> open(const std::string& control);
 
   // Call with each frame of the stream kDemoHandStream.
-  void take(const v1::Frame& frame);
+  void handle(const v1::Frame& frame);
   // Sends the labels when it is time, and reads the reply; `seconds` since the start.
   [[nodiscard]] Result<> tend(double seconds);
 
@@ -121,7 +123,9 @@ class DemoScreen {
   DemoScreen(const assembly::Daemon& daemon, const Connection& connection, const std::string& url);
 
   // Takes a message of the daemon.
-  void take(std::string_view topic, std::span<const std::byte> body) { chosen_.take(topic, body); }
+  void handle(std::string_view topic, std::span<const std::byte> body) {
+    chosen_.handle(topic, body);
+  }
   // Obeys the keys that wait; returns whether the user wants to end.
   [[nodiscard]] bool quits();
   // Draws, if it is time.

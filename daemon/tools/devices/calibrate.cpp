@@ -24,7 +24,7 @@
 #include "drivers/glove/import.hpp"
 #include "drivers/glove/pose_check.hpp"
 #include "drivers/glove/traits.hpp"
-#include "proto/clip/text.hpp"
+#include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::tools {
@@ -432,7 +432,7 @@ Result<> calibrate(const CalibrateOptions& options) {
   if (!file) return std::unexpected(file.error());
   file->user = options.user;
   const std::string text = drivers::glove::format_calibration(*file);
-  auto written = clip::write_text(options.out, [&](std::ostream& out) { out << text; });
+  auto written = write_whole_file(options.out, text);
   if (!written) return written;
   const std::string out = options.out.string();
   std::fprintf(stderr, "%zu sensors calibrated: %s\n", file->sensors.size(), out.c_str());

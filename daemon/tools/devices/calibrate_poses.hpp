@@ -1,5 +1,5 @@
-// The screen of `posed calibrate` as lines of text: which pose to take, what to do now, and a bar
-// for each sensor. Pure, so that it can be tested without a terminal.
+// The part of `posed calibrate` that records pose after pose, with its screen as lines of text and
+// the hand that results. Cold.
 #pragma once
 
 #include <array>
@@ -15,6 +15,8 @@
 
 namespace posed::tools {
 
+// The screen of `posed calibrate` as lines of text: which pose to take, what to do now, and a bar
+// for each sensor. Pure, so that it can be tested without a terminal.
 struct SensorView {
   std::string name;
   double least = 0.0, most = 255.0;  // the range that the device can send

@@ -283,7 +283,7 @@ Check check_disk(const Machine& machine, Config config) {
     return wrong(name, fine.error().text(), "set [record] folder to one where files can be made");
   }
   const auto free = machine.free_bytes(folder);
-  if (!free) return right(name, "the free space of " + shown(folder) + " cannot be told");
+  if (!free) return right(name, "the free space of " + shown(folder) + " is unknown");
   const double rate = recorded_bytes_per_s(*config);
   const double hours = rate > 0.0 ? static_cast<double>(*free) / rate / 3600.0 : 1e9;
   const std::string found =
@@ -451,7 +451,7 @@ Check check_clock_source(const Machine& machine) {
   const std::string name = "clock source";
   const fs::path folder = "sys/devices/system/clocksource/clocksource0";
   const std::string source = line_of(machine, folder / "current_clocksource");
-  if (source.empty()) return right(name, "this system does not tell");
+  if (source.empty()) return right(name, "this system does not say");
   if (is_quick_clock(source)) return right(name, clean_name(source));
   const std::string available = " " + line_of(machine, folder / "available_clocksource") + " ";
   const bool has_tsc = available.contains(" tsc ");
@@ -466,7 +466,7 @@ Check check_clock_sync(const Machine& machine) {
     case ClockState::kSynchronised:
       return right(name, "this machine follows a time server");
     case ClockState::kUnknown:
-      return right(name, "this system does not tell");
+      return right(name, "this system does not say");
     case ClockState::kFree:
       break;
   }
@@ -479,7 +479,7 @@ Check check_socket_buffers(const Machine& machine, Config config) {
   if (config == nullptr) return needs_config(name);
   if (!has_datagrams(*config)) return right(name, "not needed: no source of the config uses UDP");
   const std::string most = line_of(machine, "proc/sys/net/core/rmem_max");
-  if (most.empty()) return right(name, "this system does not tell");
+  if (most.empty()) return right(name, "this system does not say");
   std::uint64_t bytes = 0;
   std::from_chars(most.data(), most.data() + most.size(), bytes);
   const std::string wanted = std::to_string(drivers::kUdpBuffer_bytes);

@@ -1,4 +1,5 @@
-// One finding of `posed doctor`.
+// `posed doctor`: looks at this computer, and at what a config wants of it. Each check is a pure
+// function of its arguments, except that it reads files. Cold.
 #pragma once
 
 #include <string>
@@ -10,6 +11,7 @@
 
 namespace posed::doctor {
 
+// One finding of `posed doctor`.
 struct Check {
   std::string name;   // "usb latency"; the same in every run, for scripts
   bool ok = true;     // also when it does not apply to this machine or config
@@ -42,9 +44,6 @@ inline void add_word(std::string& list, const std::string& word) {
 
 // About how much of the disk recording needs. Bodies that come later count as four a source.
 [[nodiscard]] double recorded_bytes_per_s(const config::DaemonConfig& config);
-
-// `posed doctor`: looks at this computer, and at what a config wants of it. Each check is a pure
-// function of its arguments, except that it reads files.
 
 // `config` is null where the user gave none; a check that needs one says so.
 using Config = const config::DaemonConfig*;

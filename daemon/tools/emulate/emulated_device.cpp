@@ -178,33 +178,33 @@ void EmulatedPort::accept() noexcept {
   fds_.assign(1, fd);
 }
 
-std::optional<EmulatedPort::Heard> EmulatedPort::receive(std::chrono::nanoseconds patience) {
+std::optional<EmulatedPort::Received> EmulatedPort::receive(std::chrono::nanoseconds patience) {
   std::vector<pollfd> wait;
   wait.reserve(fds_.size() + 1);
   for (const int fd : fds_) wait.push_back({.fd = fd, .events = POLLIN, .revents = 0});
   if (listener_ >= 0) wait.push_back({.fd = listener_, .events = POLLIN, .revents = 0});
   const auto whole_s = std::chrono::duration_cast<std::chrono::seconds>(patience);
   const timespec timeout{.tv_sec = whole_s.count(), .tv_nsec = (patience - whole_s).count()};
-  if (ppoll(wait.data(), wait.size(), &timeout, nullptr) <= 0) return Heard{};
+  if (ppoll(wait.data(), wait.size(), &timeout, nullptr) <= 0) return Received{};
   const auto ready = std::ranges::find_if(wait, [](const pollfd& fd) { return fd.revents != 0; });
   if (ready->fd == listener_) {
     accept();
-    return Heard{};
+    return Received{};
   }
-  Heard heard{.socket = static_cast<std::uint8_t>(ready - wait.begin()),
-              .bytes = std::vector<std::byte>(drivers::kMaxChunk)};
-  const ssize_t size = ::read(ready->fd, heard.bytes.data(), heard.bytes.size());
+  Received received{.socket = static_cast<std::uint8_t>(ready - wait.begin()),
+                    .bytes = std::vector<std::byte>(drivers::kMaxChunk)};
+  const ssize_t size = ::read(ready->fd, received.bytes.data(), received.bytes.size());
   // A UDP host that is not there yet answers with an error.
   const bool later = kind_ == Kind::kUdp || errno == EAGAIN || errno == EINTR;
-  if (size < 0 && later) return Heard{};
+  if (size < 0 && later) return Received{};
   if (size <= 0 && kind_ == Kind::kTcpServer) {  // the next host may come
     ::close(ready->fd);
     fds_.clear();
-    return Heard{};
+    return Received{};
   }
   if (size <= 0 && kind_ != Kind::kUdp) return std::nullopt;
-  heard.bytes.resize(static_cast<std::size_t>(size));
-  return heard;
+  received.bytes.resize(static_cast<std::size_t>(size));
+  return received;
 }
 
 void EmulatedPort::send(std::uint8_t socket, std::span<const std::byte> bytes) noexcept {
@@ -280,14 +280,14 @@ void EmulatedDevice::run(const std::stop_token& stop) {
           static_cast<double>(due_ns - device_time_ns()) / std::max(settings_.speed, 1e-3));
       wait_ns = std::clamp<std::int64_t>(until_ns, 0, kLookEvery_ns);
     }
-    const auto heard = port_.receive(std::chrono::nanoseconds(wait_ns));
-    if (!heard) return;
+    const auto received = port_.receive(std::chrono::nanoseconds(wait_ns));
+    if (!received) return;
     const std::int64_t now_ns = device_time_ns();
     if (motion_) motion_(seconds(now_ns), *emulator_);
-    if (!heard->bytes.empty()) {
+    if (!received->bytes.empty()) {
       Bytes answer;
-      emulator_->receive_socket(heard->socket, heard->bytes, now_ns, answer);
-      port_.send(heard->socket, answer);
+      emulator_->receive_socket(received->socket, received->bytes, now_ns, answer);
+      port_.send(received->socket, answer);
     }
     emit(now_ns);
   }

@@ -1,6 +1,5 @@
-// EmulatedPort connects an emulator with a program that expects a device: through a pseudo-terminal
-// for serial gloves, through a TCP connection to the host or from it, through UDP, or through
-// ZeroMQ. Cold.
+// Emulated devices: EmulatedDevice runs an emulator with a motion, behind an EmulatedPort that a
+// driver opens as it would open the device. Cold.
 #pragma once
 
 #include <atomic>
@@ -24,6 +23,9 @@
 
 namespace posed::emulate {
 
+// EmulatedPort connects an emulator with a program that expects a device: through a pseudo-terminal
+// for serial gloves, through a TCP connection to the host or from it, through UDP, or through
+// ZeroMQ.
 class EmulatedPort {
  public:
   // A pseudo-terminal in raw mode. With `link`, a symbolic link at that path points to it while it
@@ -54,13 +56,13 @@ class EmulatedPort {
   // What the host opens: "/dev/pts/3", "127.0.0.1:5200".
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
 
-  struct Heard {
+  struct Received {
     std::uint8_t socket = 0;  // of the host
     std::vector<std::byte> bytes{};
   };
   // What the host sent. Waits for at most `patience`; empty if nothing came, nullopt if the host
   // has closed the connection for good.
-  [[nodiscard]] std::optional<Heard> receive(std::chrono::nanoseconds patience);
+  [[nodiscard]] std::optional<Received> receive(std::chrono::nanoseconds patience);
   // Sends what fits: a host that does not read loses bytes, as with a real device.
   void send(std::uint8_t socket, std::span<const std::byte> bytes) noexcept;
 

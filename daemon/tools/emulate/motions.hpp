@@ -1,4 +1,4 @@
-// The motion of emulated bodies from a clip of a person.
+// Who moves an emulated device: a clip of a person, or a synthetic signer. Cold.
 #pragma once
 
 #include <filesystem>
@@ -11,6 +11,8 @@
 #include "proto/frame/result.hpp"
 
 namespace posed::emulate {
+
+// The motion of emulated bodies from a clip of a person.
 
 // Every person of `emulator` performs the clip, retargeted to its skeleton, interpolated
 // between frames and repeated in a loop; bodies that share no bone with the clip, such as props,

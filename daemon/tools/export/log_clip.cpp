@@ -17,7 +17,7 @@
 #include "proto/text/clean.hpp"
 #include "proto/text/stream_name.hpp"
 
-namespace posed::replay {
+namespace posed::tools {
 namespace {
 
 constexpr std::size_t kMostListed = 20;  // takes in a sentence
@@ -128,10 +128,10 @@ namespace {
 using Parts = std::vector<std::uint32_t>;
 
 // Only streams with a skeleton, because others have no pose.
-std::map<std::string, Parts> parts_by_name(const Replay& replay) {
+std::map<std::string, Parts> parts_by_name(const replay::Replay& replay) {
   std::map<std::string, Parts> parts;
   for (std::uint32_t id = 0; id < replay.streams(); ++id) {
-    const ReplayStream& stream = replay.stream(id);
+    const replay::ReplayStream& stream = replay.stream(id);
     if (stream.published != nullptr) parts[stream.name].push_back(id);
   }
   const auto first_item = [&](std::uint32_t id) { return replay.stream(id).first_item; };
@@ -140,8 +140,9 @@ std::map<std::string, Parts> parts_by_name(const Replay& replay) {
 }
 
 // Of the frames that the stream published, or of its unstyled ones.
-std::shared_ptr<const Skeleton> skeleton_of(const Replay& replay, std::uint32_t id, bool raw) {
-  const ReplayStream& stream = replay.stream(id);
+std::shared_ptr<const Skeleton> skeleton_of(const replay::Replay& replay, std::uint32_t id,
+                                            bool raw) {
+  const replay::ReplayStream& stream = replay.stream(id);
   return raw ? stream.description.skeleton : stream.published;
 }
 
@@ -156,8 +157,8 @@ Parts part_named(const std::map<std::string, Parts>& parts, const std::string& w
 }
 
 // A clip has one skeleton.
-Result<> check_same_skeleton(const Replay& replay, const std::string& name, const Parts& ids,
-                             const std::string& path, bool raw = false) {
+Result<> check_same_skeleton(const replay::Replay& replay, const std::string& name,
+                             const Parts& ids, const std::string& path, bool raw = false) {
   const auto id_of = [&](std::uint32_t id) { return skeleton_of(replay, id, raw)->id; };
   const auto differs = [&](std::uint32_t id) { return id_of(id) != id_of(ids.front()); };
   if (std::ranges::none_of(ids, differs)) return {};
@@ -179,7 +180,8 @@ struct Chosen {
   bool raw = false;  // the unstyled frames of them
 };
 
-Result<Chosen> choose(const Replay& replay, const std::string& wanted, const std::string& path) {
+Result<Chosen> choose(const replay::Replay& replay, const std::string& wanted,
+                      const std::string& path) {
   const auto parts = parts_by_name(replay);
   if (parts.empty()) return fail("has no stream with a skeleton", path);
   std::string names;
@@ -213,7 +215,7 @@ class Collector {
  public:
   explicit Collector(const std::shared_ptr<const Skeleton>& skeleton) : clip_(skeleton) {}
 
-  void take(const Frame& frame) {
+  void add(const Frame& frame) {
     const Header& header = frame.header;
     if (part_ != header.stream) {
       if (last_ != 0) ++returns_;
@@ -264,7 +266,7 @@ class Collector {
 };
 
 // By stream, the name of its clip: that of the stream, or "walker#2" if its skeleton changes.
-std::map<std::uint32_t, std::string> clip_names(const Replay& replay) {
+std::map<std::uint32_t, std::string> clip_names(const replay::Replay& replay) {
   std::map<std::uint32_t, std::string> names;
   for (const auto& [name, ids] : parts_by_name(replay)) {
     const bool one = check_same_skeleton(replay, name, ids, {}).has_value();
@@ -278,7 +280,7 @@ std::map<std::uint32_t, std::string> clip_names(const Replay& replay) {
 // Collects one take after the other.
 class TakeCollector {
  public:
-  TakeCollector(const Replay& replay, std::vector<log::TakeRow> takes, std::string file,
+  TakeCollector(const replay::Replay& replay, std::vector<log::TakeRow> takes, std::string file,
                 const EachTakeClip& each)
       : replay_(replay),
         takes_(std::move(takes)),
@@ -286,13 +288,13 @@ class TakeCollector {
         each_(each),
         names_(clip_names(replay)) {}
 
-  void take(const pipeline::Item& item) {
+  void add(const pipeline::Item& item) {
     while (next_ < takes_.size() && replay_.position() > takes_[next_].last_item) end_take();
     const auto name = names_.find(item.frame.header.stream);
     if (item.kind != pipeline::Item::Kind::kFrame || name == names_.end()) return;
     if (next_ == takes_.size() || !holds(takes_[next_], replay_.position())) return;
     collectors_.try_emplace(name->second, replay_.stream(name->first).published)
-        .first->second.take(item.frame);
+        .first->second.add(item.frame);
     rate_hz_[name->second] = replay_.stream(name->first).description.rate_hz;
   }
   void finish() {
@@ -309,7 +311,7 @@ class TakeCollector {
     ++next_;
   }
 
-  const Replay& replay_;
+  const replay::Replay& replay_;
   std::vector<log::TakeRow> takes_;  // in their order; they do not overlap
   std::string file_;
   const EachTakeClip& each_;
@@ -331,18 +333,18 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
     if (!found) return std::unexpected(found.error());
     interval = std::move(*found);
   }
-  auto opened = Replay::open(*reader);
+  auto opened = replay::Replay::open(*reader);
   if (!opened) return std::unexpected(opened.error());
-  Replay& replay = **opened;
+  replay::Replay& replay = **opened;
   const auto chosen = choose(replay, stream, path.string());
   if (!chosen) return std::unexpected(chosen.error());
-  const ReplayStream& first = replay.stream(chosen->ids.front());
+  const replay::ReplayStream& first = replay.stream(chosen->ids.front());
   Collector collector(skeleton_of(replay, chosen->ids.front(), chosen->raw));
   const auto kind = chosen->raw ? pipeline::Item::Kind::kRawFrame : pipeline::Item::Kind::kFrame;
   const auto take = [&](const pipeline::Item& item) {
     if (item.kind == kind && holds(interval, replay.position()) &&
         std::ranges::find(chosen->ids, item.frame.header.stream) != chosen->ids.end()) {
-      collector.take(item.frame);
+      collector.add(item.frame);
     }
   };
   const auto done = replay.run(
@@ -373,12 +375,12 @@ Result<> each_take_clip(const std::filesystem::path& path, const EachTakeClip& e
   auto takes = reader->takes();
   if (!takes) return std::unexpected(takes.error());
   if (takes->empty()) return {};
-  auto opened = Replay::open(*reader);
+  auto opened = replay::Replay::open(*reader);
   if (!opened) return std::unexpected(opened.error());
   TakeCollector collector(**opened, std::move(*takes), path.string(), each);
   bool stopped = false;
   const auto done =
-      (*opened)->run([&](const pipeline::Item& item) { collector.take(item); },
+      (*opened)->run([&](const pipeline::Item& item) { collector.add(item); },
                      [&](const log::ChunkRow&) { return !(stopped = stopped || !goes_on()); });
   if (!done) return done;
   if (stopped) return fail("interrupted: the log is complete, but not all of its takes are clips");
@@ -386,4 +388,4 @@ Result<> each_take_clip(const std::filesystem::path& path, const EachTakeClip& e
   return {};
 }
 
-}  // namespace posed::replay
+}  // namespace posed::tools

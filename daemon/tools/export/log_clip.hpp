@@ -1,4 +1,4 @@
-// The takes of a device log: which one a person means, and when each was. Cold.
+// Clips and takes of a device log: replays the frames that the run published. Cold.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,7 @@
 #include "proto/log/reader.hpp"
 #include "proto/log/rows.hpp"
 
-namespace posed::replay {
+namespace posed::tools {
 
 struct LoggedTake {
   log::TakeRow row{};
@@ -33,8 +33,6 @@ struct LoggedTake {
 [[nodiscard]] constexpr bool holds(const log::TakeRow& take, std::uint64_t item) noexcept {
   return item >= take.first_item && item <= take.last_item;
 }
-
-// Turns a stream of a device log into a clip: replays the frames that the run published.
 
 // The stream named `stream`; the only one if that is empty. A body that came several times has
 // several parts, which become one clip; "walker#2" is the second part alone, for a body that
@@ -56,4 +54,4 @@ using EachTakeClip =
 [[nodiscard]] Result<> each_take_clip(const std::filesystem::path& path, const EachTakeClip& each,
                                       const std::function<bool()>& goes_on);
 
-}  // namespace posed::replay
+}  // namespace posed::tools

@@ -24,7 +24,7 @@
 #include "proto/text/clean.hpp"
 #include "proto/text/stream_name.hpp"
 
-namespace posed::replay {
+namespace posed::tools {
 namespace {
 
 constexpr std::string_view kMagic("\x89MCAP0\r\n", 8);
@@ -288,7 +288,7 @@ std::optional<std::int64_t> utc_offset_ns(const log::Reader& reader) {
 // Writes the items of a replay.
 class LogToMcap {
  public:
-  LogToMcap(const Replay& replay, std::int64_t offset_ns, std::ostream& out)
+  LogToMcap(const replay::Replay& replay, std::int64_t offset_ns, std::ostream& out)
       : replay_(replay),
         offset_ns_(offset_ns),
         writer_(out, "posed"),
@@ -298,7 +298,7 @@ class LogToMcap {
         event_schema_(add_schema(*v1::Event::descriptor())),
         parts_(replay.streams()) {}
 
-  void take(const pipeline::Item& item) {
+  void add(const pipeline::Item& item) {
     switch (item.kind) {
       case pipeline::Item::Kind::kFrame:
       case pipeline::Item::Kind::kRawFrame:
@@ -338,9 +338,9 @@ class LogToMcap {
   Named& named(std::uint32_t id, bool raw) {
     auto& place = raw ? parts_[id].raw : parts_[id].styled;
     if (place == nullptr) {
-      const ReplayStream& stream = replay_.stream(id);
+      const replay::ReplayStream& stream = replay_.stream(id);
       place = std::make_unique<Named>(raw ? raw_name(stream.name) : stream.name,
-                                      stream_info(id, stream), raw);
+                                      replay::stream_info(id, stream), raw);
     }
     return *place;
   }
@@ -356,7 +356,8 @@ class LogToMcap {
       found = topics_.emplace(topic, writer_.add_channel(schema, topic)).first;
     }
     message.SerializeToString(&bytes_);
-    const std::int64_t utc_ns = is_possible_time(time_ns) ? time_ns + offset_ns_ : offset_ns_;
+    const std::int64_t utc_ns =
+        replay::is_possible_time(time_ns) ? time_ns + offset_ns_ : offset_ns_;
     writer_.add(found->second, static_cast<std::uint32_t>(sequence),
                 static_cast<std::uint64_t>(utc_ns), bytes_);
   }
@@ -384,7 +385,7 @@ class LogToMcap {
   }
 
   void take_event(const pipeline::StreamEvent& event) {
-    const ReplayStream& stream = replay_.stream(event.stream);
+    const replay::ReplayStream& stream = replay_.stream(event.stream);
     const auto kind = static_cast<v1::Event::Kind>(event.kind);
     std::string text = publish::sentence(event);
     if (kind == v1::Event::KIND_SHED) {
@@ -399,7 +400,7 @@ class LogToMcap {
         publish::event_message(stream.name, kind, event.time_ns, event.sequence, text));
   }
 
-  const Replay& replay_;
+  const replay::Replay& replay_;
   std::int64_t offset_ns_;
   McapWriter writer_;
   std::uint16_t frame_schema_, skeleton_schema_, sample_schema_, event_schema_;
@@ -409,7 +410,7 @@ class LogToMcap {
   std::uint64_t left_out_ = 0;
 };
 
-void warn_of_gaps(const Replay& replay, std::vector<std::string>& warnings) {
+void warn_of_gaps(const replay::Replay& replay, std::vector<std::string>& warnings) {
   for (std::uint32_t id = 0; id < replay.streams(); ++id) {
     const auto broken = replay.broken_at(id);
     if (!broken) continue;
@@ -425,9 +426,9 @@ Result<McapSummary> write_mcap(const std::filesystem::path& log, const std::file
                                const std::function<bool()>& stop) {
   auto reader = log::Reader::open(log);
   if (!reader) return std::unexpected(reader.error());
-  auto opened = Replay::open(*reader);
+  auto opened = replay::Replay::open(*reader);
   if (!opened) return std::unexpected(opened.error());
-  Replay& replay = **opened;
+  replay::Replay& replay = **opened;
   McapSummary summary;
   const auto offset_ns = utc_offset_ns(*reader);
   if (!offset_ns) {
@@ -438,7 +439,7 @@ Result<McapSummary> write_mcap(const std::filesystem::path& log, const std::file
   const auto written = write_whole_file(path, [&](std::ostream& file) {
     LogToMcap to(replay, offset_ns.value_or(0), file);
     bool stopped = false;
-    replayed = replay.run([&](const pipeline::Item& item) { to.take(item); },
+    replayed = replay.run([&](const pipeline::Item& item) { to.add(item); },
                           [&](const log::ChunkRow&) {
                             stopped = stopped || stop();
                             return !stopped && file.good();
@@ -460,4 +461,4 @@ Result<McapSummary> write_mcap(const std::filesystem::path& log, const std::file
   return summary;
 }
 
-}  // namespace posed::replay
+}  // namespace posed::tools

@@ -1,9 +1,4 @@
-// McapWriter: writes MCAP (https://mcap.dev/spec), the container of messages that robotics viewers
-// open. Messages are collected into chunks with indexes, so that a viewer reads only the part of
-// the time that it shows. Chunks are not compressed: every reader can read them, and poses of
-// floats hardly shrink. Cold.
-//
-// Memory: one chunk, and some 100 bytes for each chunk written.
+// Turns a whole device log into an MCAP file: replays it and writes what the run published. Cold.
 #pragma once
 
 #include <cstddef>
@@ -21,7 +16,14 @@
 #include "drivers/byte_writer.hpp"
 #include "proto/frame/result.hpp"
 
-namespace posed::replay {
+namespace posed::tools {
+
+// McapWriter: writes MCAP (https://mcap.dev/spec), the container of messages that robotics viewers
+// open. Messages are collected into chunks with indexes, so that a viewer reads only the part of
+// the time that it shows. Chunks are not compressed: every reader can read them, and poses of
+// floats hardly shrink. Cold.
+//
+// Memory: one chunk, and some 100 bytes for each chunk written.
 
 // One thread. Errors of writing stay in the stream.
 class McapWriter {
@@ -80,7 +82,6 @@ class McapWriter {
   std::vector<ChunkIndex> chunks_;
 };
 
-// Turns a whole device log into an MCAP file: replays it and writes what the run published.
 struct McapSummary {
   std::uint64_t messages = 0;
   std::size_t topics = 0;
@@ -98,4 +99,4 @@ struct McapSummary {
                                              const std::filesystem::path& path,
                                              const std::function<bool()>& stop);
 
-}  // namespace posed::replay
+}  // namespace posed::tools

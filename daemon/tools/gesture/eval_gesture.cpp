@@ -5,7 +5,6 @@
 #include <iterator>
 #include <memory>
 #include <optional>
-#include <ostream>
 #include <span>
 #include <string>
 #include <utility>
@@ -509,8 +508,7 @@ Result<Findings> evaluate_gesture(const EvalGestureOptions& options) {
   Findings findings = findings_of(evaluation, *model);
   if (!options.svg.empty()) {
     const auto figure = report::lag_error(evaluation.curve, model->rate_hz);
-    const std::string drawing = report::svg_file(figure.drawings);
-    const auto written = write_whole_file(options.svg, [&](std::ostream& out) { out << drawing; });
+    const auto written = write_whole_file(options.svg, report::svg_file(figure.drawings));
     if (!written) return std::unexpected(written.error());
     findings.add("svg", options.svg);
   }

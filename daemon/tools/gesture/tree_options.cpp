@@ -2,7 +2,6 @@
 
 #include <cstdio>
 #include <functional>
-#include <ostream>
 
 #include <CLI/CLI.hpp>
 
@@ -18,7 +17,7 @@ Result<> put(const std::string& text, const std::string& file) {
     std::fwrite(text.data(), 1, text.size(), stdout);
     return {};
   }
-  return write_whole_file(file, [&](std::ostream& out) { out << text; });
+  return write_whole_file(file, text);
 }
 
 }  // namespace

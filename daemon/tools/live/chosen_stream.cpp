@@ -54,7 +54,7 @@ std::optional<Frame> frame_from(const v1::Frame& message, const Skeleton& skelet
 
 }  // namespace
 
-void StreamFigure::take(std::string_view topic, std::span<const std::byte> body) {
+void StreamFigure::handle(std::string_view topic, std::span<const std::byte> body) {
   if (topic == "skeleton/" + stream_) take_skeleton(body);
   if (topic == "pose/" + stream_) take_pose(body);
 }
@@ -145,7 +145,7 @@ void ChosenStream::follow(const std::string& stream) {
   figure_.emplace(stream);
 }
 
-void ChosenStream::take(const v1::Stats& stats) {
+void ChosenStream::update(const v1::Stats& stats) {
   for (const v1::StreamStats& stream : stats.stream()) {
     auto& history = latency_us_[stream.stream()];
     history.push_back(stream.publish().p99_us());
@@ -162,8 +162,8 @@ void ChosenStream::take(const v1::Stats& stats) {
   asked_alpha_.reset();
 }
 
-void ChosenStream::take(std::string_view topic, std::span<const std::byte> body) {
-  if (figure_) figure_->take(topic, body);
+void ChosenStream::handle(std::string_view topic, std::span<const std::byte> body) {
+  if (figure_) figure_->handle(topic, body);
 }
 
 void ChosenStream::obey(Key key, const v1::Stats& stats) {
@@ -233,9 +233,9 @@ void ChosenStream::read_answer() {
     asked_at_.reset();
     v1::ControlReply reply;
     const auto bytes = message.bytes();
-    const bool sound = reply.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
-    if (!sound || !reply.ok()) {
-      note_ = "alpha stays: " + (sound ? clean(reply.error()) : "the answer cannot be read");
+    const bool valid = reply.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+    if (!valid || !reply.ok()) {
+      note_ = "alpha stays: " + (valid ? clean(reply.error()) : "the answer cannot be read");
       asked_alpha_.reset();
     }
     return;
@@ -261,8 +261,8 @@ std::string ChosenStream::latency_line(const std::string& stream, int columns) c
   const auto& kept = found->second;
   const double most_us = kept.empty() ? 0.0 : *std::ranges::max_element(kept);
   if (!(most_us > 0.0)) return {};
-  const std::string words =
-      fmt::format("{}: latency 99 %, at most {} ", clean_name(stream), people_duration(most_us));
+  const std::string words = fmt::format("{}: latency 99 %, at most {} ", clean_name(stream),
+                                        display_duration(most_us * 1e-6));
   const int room = columns - static_cast<int>(words.size());
   const auto count = std::min(kept.size(), static_cast<std::size_t>(std::max(room, 0)));
   const auto first = kept.end() - static_cast<std::ptrdiff_t>(count);

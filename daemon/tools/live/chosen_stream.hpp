@@ -1,4 +1,5 @@
-// StreamFigure: the pose of one stream of a daemon as a small figure of text, for `posed top`.
+// What `posed top` and `posed demo` show of one stream: its figure, its latency over the last
+// minute and its alpha. Cold.
 #pragma once
 
 #include <algorithm>
@@ -27,6 +28,7 @@ class StreamStats;
 
 namespace posed::tools {
 
+// StreamFigure: the pose of one stream of a daemon as a small figure of text, for `posed top`.
 class StreamFigure {
  public:
   explicit StreamFigure(std::string stream) : stream_(std::move(stream)) {}
@@ -35,7 +37,7 @@ class StreamFigure {
 
   // Takes a message of the daemon; those of other topics than skeleton/ and pose/ of the stream,
   // and what cannot be parsed, change nothing.
-  void take(std::string_view topic, std::span<const std::byte> body);
+  void handle(std::string_view topic, std::span<const std::byte> body);
 
   // The last pose, seen in three-quarter view as it stood when the first pose came; empty before.
   // Call it at the rate of the screen: what the poses need as room grows at once and shrinks
@@ -86,9 +88,9 @@ class ChosenStream {
 
   // Takes the stats of another second: the choice stays, or becomes the first stream if the chosen
   // one has gone.
-  void take(const v1::Stats& stats);
+  void update(const v1::Stats& stats);
   // Takes any other message of the daemon.
-  void take(std::string_view topic, std::span<const std::byte> body);
+  void handle(std::string_view topic, std::span<const std::byte> body);
 
   // Up and down choose another stream, left and right ask the daemon for another alpha; other keys
   // do nothing. A stream without alpha gives a note that says so.

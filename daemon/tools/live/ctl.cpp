@@ -163,8 +163,8 @@ Result<> check_parameter(const std::string& name, const ParameterValue& value) {
 
 int set_parameter(const CtlOptions& options) {
   const ParameterValue value = value_of_text(options.value);
-  if (const auto sound = check_parameter(options.parameter, value); !sound) {
-    return report(sound.error());
+  if (const auto valid = check_parameter(options.parameter, value); !valid) {
+    return report(valid.error());
   }
   v1::ControlRequest request;
   auto& wanted = *request.mutable_set_parameter();
@@ -397,7 +397,7 @@ void add_style_actions(Actions& actions, CtlOptions& options) {
   CLI::App* warm =
       actions.add_for_stream("warm-up", "Measure how a new walker usually walks", warm_up,
                              R"(Example:
-  posed ctl warm-up walker --seconds 10   # it walks as usual meanwhile; an event tells the end)");
+  posed ctl warm-up walker --seconds 10   # it walks as usual meanwhile; an event reports the end)");
   const ParameterSpec& seconds = warm_up_seconds();
   options.seconds = std::get<double>(seconds.default_value);
   warm->add_option("--seconds", options.seconds,

@@ -28,9 +28,9 @@ namespace posed::tools {
 namespace {
 
 constexpr int kNameWidth = 11;  // that a name has before the model's is cut
-constexpr int kLeastName = 6;   // the heading
-constexpr int kLeastModel = 5;  // a model's name that is cut further is no help
-constexpr float kMostHz = 9999.9F;
+constexpr int kMinName = 6;     // the heading
+constexpr int kMinModel = 5;    // a model's name that is cut further is no help
+constexpr float kMaxShown_hz = 9999.9F;
 
 struct Health {
   std::string word;
@@ -88,7 +88,7 @@ std::vector<Column> numbers(const v1::Stats& stats, bool silent) {
        .colour = [silent](const auto& stream) { return health_of(stream, silent).colour; }});
   if (!silent) {
     columns.push_back({.title = "HZ", .width = 6, .right = true, .text = [](const auto& stream) {
-                         return fmt::format("{:.1f}", std::min(stream.rate_hz(), kMostHz));
+                         return fmt::format("{:.1f}", std::min(stream.rate_hz(), kMaxShown_hz));
                        }});
   }
   if (!silent && any(stats, [](const auto& stream) { return has_times(stream.publish()); })) {
@@ -96,7 +96,7 @@ std::vector<Column> numbers(const v1::Stats& stats, bool silent) {
       columns.push_back(
           {.title = title, .width = 8, .right = true, .text = [time](const auto& stream) {
              const v1::Percentiles& times = stream.publish();
-             return has_times(times) ? people_duration((times.*time)()) : std::string("-");
+             return has_times(times) ? display_duration((times.*time)() * 1e-6) : std::string("-");
            }});
     };
     add("LATENCY", &v1::Percentiles::p50_us);
@@ -115,20 +115,20 @@ std::vector<Column> columns_of(const v1::Stats& stats, const LiveTableOptions& o
   std::vector<Column> columns = numbers(stats, options.silent);
   Column name{.title = "STREAM", .text = name_of};
   Column model{.title = "MODEL", .text = model_of};
-  const int names = std::max(longest(stats, name_of), kLeastName);
-  const int models = std::max(longest(stats, model_of), kLeastModel);
+  const int names = std::max(longest(stats, name_of), kMinName);
+  const int models = std::max(longest(stats, model_of), kMinModel);
   bool has_model = longest(stats, model_of) > 0;
   name.width = names;
   if (options.width > 0) {
     int room = options.width - (options.chosen.empty() ? 0 : 2);
     for (const Column& column : columns) room -= column.width + 1;
-    for (; room < kLeastName && columns.size() > 1; columns.pop_back()) {
+    for (; room < kMinName && columns.size() > 1; columns.pop_back()) {
       room += columns.back().width + 1;
     }
     const int for_models = has_model ? models + 1 : 0;
     name.width = std::max(std::min({names, room, std::max(kNameWidth, room - for_models)}), 1);
     model.width = room - name.width - 1;
-    has_model = has_model && model.width >= kLeastModel;
+    has_model = has_model && model.width >= kMinModel;
   }
   columns.insert(columns.begin(), std::move(name));
   if (has_model) columns.push_back(std::move(model));
@@ -162,10 +162,12 @@ bool has_alpha(const v1::StreamStats& stream) {
 
 bool has_lost(const v1::StreamStats& stream) { return stream.dropped() > 0 || stream.shed() > 0; }
 
-std::string people_duration(double microseconds) {
-  const double ms = microseconds * 1e-3;
-  if (ms < 999.95) return fmt::format("{:.1f} ms", ms);
-  return fmt::format("{:.1f} s", std::min(ms * 1e-3, 9999.9));
+std::string display_duration(double time_s) {
+  if (time_s < 0.99995) return fmt::format("{:.1f} ms", std::max(time_s, 0.0) * 1e3);
+  if (time_s < 9.95) return fmt::format("{:.1f} s", time_s);
+  if (time_s < 120.0) return fmt::format("{:.0f} s", time_s);
+  if (time_s < 7200.0) return fmt::format("{:.0f} min", time_s / 60.0);
+  return fmt::format("{:.1f} h", std::min(time_s / 3600.0, 9999.9));
 }
 
 std::vector<std::string> live_table(const v1::Stats& stats, const LiveTableOptions& options) {
@@ -239,7 +241,7 @@ std::string stages_row(const v1::StreamStats& stream) {
   const auto add = [&](const std::string& words) { text += (text.empty() ? "" : ", ") + words; };
   for (const v1::StageStats& one : stream.stage()) {
     if (one.time().p99_us() == 0.0F) continue;  // it processed no frame in this second
-    add(clean_name(one.name()) + " " + people_duration(one.time().p99_us()));
+    add(clean_name(one.name()) + " " + display_duration(one.time().p99_us() * 1e-6));
   }
   if (stream.lag_frames() > 0) {
     add(fmt::format("lag {} frame{} ({:.1f} ms)", stream.lag_frames(),
@@ -266,13 +268,6 @@ std::string stages_row(const v1::StreamStats& stream) {
   return text;
 }
 
-// "8 s", "5 min", "2.5 h"
-std::string for_people(double time_s) {
-  if (time_s < 120.0) return fmt::format("{:.0f} s", std::max(time_s, 0.0));
-  if (time_s < 7200.0) return fmt::format("{:.0f} min", time_s / 60.0);
-  return fmt::format("{:.1f} h", time_s / 3600.0);
-}
-
 // What the kernel dropped of a device's datagrams; empty if it dropped none.
 std::string kernel_words(std::uint64_t dropped) {
   if (dropped == 0) return {};
@@ -282,7 +277,7 @@ std::string kernel_words(std::uint64_t dropped) {
 // Whether a glove is connected, how its clock runs and what the kernel dropped; empty for a stream
 // without any of it. The drops of a body's device are in the row of its source.
 std::string device_row(const v1::StreamStats& stream, std::int64_t now_ns) {
-  const std::string since = for_people(seconds(now_ns - stream.link_ns()));
+  const std::string since = display_duration(seconds(now_ns - stream.link_ns()));
   const std::uint64_t links = stream.connections();
   if (stream.away()) {
     if (links == 0) return "not there yet; posed has looked for it for " + since;
@@ -324,12 +319,12 @@ std::string without_body(const v1::SourceStats& source) {
     const int i = static_cast<int>(outcome);
     return i < source.outcome_size() ? source.outcome(i) : 0;
   };
-  const std::uint64_t heard = count(Outcome::kOk), foreign = count(Outcome::kForeign);
+  const std::uint64_t valid = count(Outcome::kOk), foreign = count(Outcome::kForeign);
   const std::uint64_t damaged =
       count(Outcome::kShort) + count(Outcome::kBadChecksum) + count(Outcome::kOutOfRange);
-  if (heard + foreign + damaged == 0) return text + ": nothing came from the device yet";
+  if (valid + foreign + damaged == 0) return text + ": nothing came from the device yet";
   return text + fmt::format(": {} packets were right, {} damaged, {} of another device or sender",
-                            heard, damaged, foreign);
+                            valid, damaged, foreign);
 }
 
 // A line below the streams' rows about a device with several bodies; empty if there is nothing to

@@ -1,5 +1,5 @@
-// The table of streams of the live view: one row a stream, with its health by word and colour. A
-// column that no stream has a value for is left out. Pure.
+// The live view of a daemon: its stats as a table and lines of text, and the terminal on which they
+// are redrawn. Cold.
 #pragma once
 
 #include <cstddef>
@@ -19,6 +19,8 @@ class Stats;
 
 namespace posed::tools {
 
+// The table of streams of the live view: one row a stream, with its health by word and colour. A
+// column that no stream has a value for is left out. Pure.
 struct LiveTableOptions {
   int width = 80;        // of a row [columns]; 0: names are not cut, rows are not padded
   int rows = 0;          // most rows with the heading; 0: no limit
@@ -37,8 +39,8 @@ struct LiveTableOptions {
 // Whether frames of the stream were dropped or skipped so far.
 [[nodiscard]] bool has_lost(const v1::StreamStats& stream);
 
-// A duration as people read it: "0.2 ms", "12.5 ms", "2.5 s"; at most 8 characters.
-[[nodiscard]] std::string people_duration(double microseconds);
+// A duration as people read it: "0.2 ms", "2.5 s", "12 s", "5 min", "2.5 h"; at most 8 characters.
+[[nodiscard]] std::string display_duration(double time_s);
 
 // The live view of a daemon: its stats as lines of text, and the terminal on which they are
 // redrawn. Used by `top` and `demo`.

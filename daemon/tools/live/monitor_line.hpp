@@ -1,4 +1,4 @@
-// The time of day, to print beside an event.
+// The lines of `posed monitor`, and the time of day beside an event. Cold.
 #pragma once
 
 #include <chrono>
@@ -28,10 +28,8 @@ inline std::string clock_time() {
   return fmt::format("{:02}:{:02}:{:02}.{:03}", local.tm_hour, local.tm_min, local.tm_sec, ms);
 }
 
-// One human-readable line for each kind of message, as printed by `posed monitor`.
-
-// Without the time of day at the start of the line. Control characters are removed from untrusted
-// text.
+// A line for people of each kind of message, without the time of day at the start of the line.
+// Control characters are removed from untrusted text.
 [[nodiscard]] std::string monitor_line(const v1::Frame& frame);
 [[nodiscard]] std::string monitor_line(const v1::Sample& sample);
 [[nodiscard]] std::string monitor_line(const v1::Event& event);

@@ -1,17 +1,17 @@
 // `posed convert`: converts a clip to another format, a stream of a device log to a clip, a whole
 // log to MCAP, or a log of an older format to today's.
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/replay/log_upgrade.hpp"
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
@@ -25,60 +25,46 @@
 #include "proto/clip/hand_clip.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
-#include "proto/text/json_text.hpp"
 
 namespace posed::tools {
 namespace {
 
 // The part of `posed convert` that lists the takes of a log.
 
-// "2  walk  from 3.20 s, 10.05 s long", a line each. Of a take with gaps only what is left has a
-// time, so that it may seem shorter than it was.
-void print_takes(const std::vector<replay::LoggedTake>& takes) {
-  for (const replay::LoggedTake& take : takes) {
-    std::string end = take.row.last_item == log::kToTheEnd ? ", to the end of the recording" : "";
-    if (take.has_gaps) end += "; the log lacks a part of it (`posed replay` says which)";
-    std::printf("%lld  %s  ", static_cast<long long>(take.row.id), clean(take.row.name).c_str());
-    if (take.begin_s) {
-      std::printf("from %.2f s, %.2f s long%s\n", *take.begin_s, *take.end_s - *take.begin_s,
-                  end.c_str());
-    } else {
-      std::printf("nothing came%s\n", end.c_str());
-    }
+// The line is like "2  walk  from 3.20 s, 10.05 s long". Of a take with gaps only what is left has
+// a time, so that it may seem shorter than it was.
+Findings findings_of(const LoggedTake& take) {
+  const bool ended = take.row.last_item != log::kToTheEnd;
+  std::string end = ended ? "" : ", to the end of the recording";
+  if (take.has_gaps) end += "; the log lacks a part of it (`posed replay` says which)";
+  Findings findings;
+  findings.add("take", take.row.id)
+      .add("name", take.row.name)
+      .add("first_item", take.row.first_item)
+      .add("ended", ended)
+      .add("gaps", take.has_gaps);
+  if (ended) findings.add("last_item", take.row.last_item);
+  std::string time = "nothing came";
+  if (take.begin_s) {
+    const double length_s = *take.end_s - *take.begin_s;
+    findings.add("begin_s", *take.begin_s).add("length_s", length_s);
+    time = fmt::format("from {:.2f} s, {:.2f} s long", *take.begin_s, length_s);
   }
-}
-
-void print_takes_json(const std::vector<replay::LoggedTake>& takes) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const replay::LoggedTake& take : takes) {
-    nlohmann::ordered_json& one =
-        list.emplace_back(nlohmann::ordered_json{{"take", take.row.id},
-                                                 {"name", take.row.name},
-                                                 {"first_item", take.row.first_item},
-                                                 {"ended", take.row.last_item != log::kToTheEnd},
-                                                 {"gaps", take.has_gaps}});
-    if (one["ended"]) one["last_item"] = take.row.last_item;
-    if (!take.begin_s) continue;
-    one["begin_s"] = *take.begin_s;
-    one["length_s"] = *take.end_s - *take.begin_s;
-  }
-  std::printf("%s\n", json_text(list).c_str());
+  return findings.say(fmt::format("{}  {}  {}{}", take.row.id, clean(take.row.name), time, end));
 }
 
 // Prints those of the log at `path`, a line each, or as JSON. Returns the exit code.
 int list_takes(const std::string& path, bool json) {
   auto reader = log::Reader::open(path);
   if (!reader) return report(reader.error());
-  const auto takes = replay::logged_takes(*reader);
+  const auto takes = logged_takes(*reader);
   if (!takes) return report(takes.error());
-  if (json) {
-    print_takes_json(*takes);
-  } else if (takes->empty()) {
-    std::fprintf(stderr, "posed: %s: has no takes\n", path.c_str());
-  } else {
-    print_takes(*takes);
-  }
-  return static_cast<int>(ExitCode::kDone);
+  std::vector<Findings> list;
+  for (const LoggedTake& take : *takes) list.push_back(findings_of(take));
+  Findings findings;
+  findings.add({}, list);
+  if (list.empty()) findings.note(path + ": has no takes");
+  return findings.show(json, -1);
 }
 
 // The part of `posed convert` that writes a whole log as MCAP.
@@ -89,24 +75,19 @@ int convert_to_mcap(const std::string& log, const std::string& out, bool json) {
     // A file is written with signals blocked, so the thread that shows the wait receives Ctrl-C.
     const Waiting waiting("writing " + out);
     const Interrupt interrupt;
-    return replay::write_mcap(log, out, Interrupt::came);
+    return write_mcap(log, out, Interrupt::came);
   }();
   if (!summary) return report(summary.error());
-  for (const std::string& warning : summary->warnings) {
-    std::fprintf(stderr, "posed: %s: %s\n", log.c_str(), warning.c_str());
-  }
-  if (!json) {
-    std::fprintf(stderr, "posed: wrote %s: %llu messages in %zu topics\n", out.c_str(),
-                 static_cast<unsigned long long>(summary->messages), summary->topics);
-    return static_cast<int>(ExitCode::kDone);
-  }
-  const nlohmann::json line{{"in", log},
-                            {"out", out},
-                            {"messages", summary->messages},
-                            {"topics", summary->topics},
-                            {"warnings", summary->warnings}};
-  std::printf("%s\n", json_text(line).c_str());
-  return static_cast<int>(ExitCode::kDone);
+  Findings findings;
+  for (const std::string& warning : summary->warnings) findings.remark(log + ": " + warning);
+  return findings.add("in", log)
+      .add("out", out)
+      .add("messages", summary->messages)
+      .add("topics", summary->topics)
+      .add("warnings", summary->warnings)
+      .note(fmt::format("wrote {}: {} messages in {} topics", out, summary->messages,
+                        summary->topics))
+      .show(json, -1);
 }
 
 constexpr const char* kUneven = "frames are not evenly spaced, but a BVH's are: its clock differs";
@@ -176,7 +157,7 @@ bool has_even_clock(const std::string& path) { return ends_in(path, ".bvh"); }
 
 // Only a hand CSV can store gaps, and a BVH no uneven clock.
 Result<clip::Clip> read_log(const Convert& convert) {
-  auto clip = replay::clip_of_log(convert.in, convert.stream, convert.take);
+  auto clip = clip_of_log(convert.in, convert.stream, convert.take);
   if (!clip || is_hand_csv(convert.out)) return clip;
   clip::hold_missing(*clip);
   if (has_even_clock(convert.out) && clip::has_uneven_times(clip->time_s, clip->frame_rate_hz))
@@ -213,19 +194,15 @@ int upgrade(const Convert& convert) {
     return replay::upgrade_log(convert.in, convert.out, Interrupt::came);
   }();
   if (!summary) return report(summary.error());
-  if (convert.json) {
-    const nlohmann::json figures{{"in", convert.in},
-                                 {"out", convert.out},
-                                 {"chunks", summary->chunks},
-                                 {"decisions", summary->decisions},
-                                 {"frames", summary->frames}};
-    std::printf("%s\n", json_text(figures).c_str());
-  } else {
-    std::fprintf(stderr, "posed: wrote %s in today's format: %llu chunks, %llu decisions\n",
-                 convert.out.c_str(), static_cast<unsigned long long>(summary->chunks),
-                 static_cast<unsigned long long>(summary->decisions));
-  }
-  return static_cast<int>(ExitCode::kDone);
+  return Findings()
+      .add("in", convert.in)
+      .add("out", convert.out)
+      .add("chunks", summary->chunks)
+      .add("decisions", summary->decisions)
+      .add("frames", summary->frames)
+      .note(fmt::format("wrote {} in today's format: {} chunks, {} decisions", convert.out,
+                        summary->chunks, summary->decisions))
+      .show(convert.json, -1);
 }
 
 int run(Convert& convert) {
@@ -251,25 +228,19 @@ int run(Convert& convert) {
     return read(convert);
   }();
   if (!clip) return report(clip.error());
-  for (const std::string& warning : clip->warnings) {
-    std::fprintf(stderr, "posed: %s: %s\n", convert.in.c_str(), warning.c_str());
-  }
+  Findings findings;
+  for (const std::string& warning : clip->warnings) findings.remark(convert.in + ": " + warning);
   if (auto ok = write(convert, *clip); !ok) return report(ok.error());
-  if (!convert.json) {
-    std::fprintf(stderr, "posed: wrote %s: %d frames at %g Hz, %zu joints\n", convert.out.c_str(),
-                 clip->frames(), clip->frame_rate_hz, clip->skeleton->joints.size());
-    return static_cast<int>(ExitCode::kDone);
-  }
-  const nlohmann::json summary{{"in", convert.in},
-                               {"out", convert.out},
-                               {"frames", clip->frames()},
-                               {"rate_hz", clip->frame_rate_hz},
-                               {"joints", clip->skeleton->joints.size()},
-                               {"metres_per_unit", clip->metres_per_unit},
-                               {"warnings", clip->warnings}};
-  // Names may hold any bytes; invalid UTF-8 is replaced, because otherwise the JSON library throws.
-  std::printf("%s\n", json_text(summary).c_str());
-  return static_cast<int>(ExitCode::kDone);
+  return findings.add("in", convert.in)
+      .add("out", convert.out)
+      .add("frames", clip->frames())
+      .add("rate_hz", clip->frame_rate_hz)
+      .add("joints", clip->skeleton->joints.size())
+      .add("metres_per_unit", clip->metres_per_unit)
+      .add("warnings", clip->warnings)
+      .note(fmt::format("wrote {}: {} frames at {:g} Hz, {} joints", convert.out, clip->frames(),
+                        clip->frame_rate_hz, clip->skeleton->joints.size()))
+      .show(convert.json, -1);
 }
 
 }  // namespace

@@ -18,7 +18,6 @@
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/logging/log_output.hpp"
 #include "daemon/replay/broadcast.hpp"
@@ -26,6 +25,7 @@
 #include "daemon/replay/replay.hpp"
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
 #include "daemon/tools/command/ranks.hpp"
@@ -33,7 +33,6 @@
 #include "models/gp/isa.hpp"
 #include "models/task_numbers.hpp"
 #include "proto/log/reader.hpp"
-#include "proto/text/json_text.hpp"
 
 namespace posed::tools {
 namespace {
@@ -92,7 +91,7 @@ Result<> compare(const FarmLog& log, Together& together, ReplayOutcome& outcome)
     }
     return !together.stop && !outputs.difference;
   };
-  auto done = (*opened)->run([&](const pipeline::Item& item) { outputs.take(item); }, pace);
+  auto done = (*opened)->run([&](const pipeline::Item& item) { outputs.add(item); }, pace);
   if (done) done = outputs.finish();
   together.replayed_ns += log.length_ns - told_ns;
   outcome.frames = outputs.frames;
@@ -209,7 +208,7 @@ int replay_farm(const FarmOptions& options) {
       if (!options.json) spdlog::warn("{}: {}", logs[i].path, missing);
     }
     const std::string line = options.json
-                                 ? json_text(json_of(logs[i].path, logs[i].recorded_isa, outcome))
+                                 ? findings_of(logs[i].path, logs[i].recorded_isa, outcome).json()
                                  : what_happened(logs[i], outcome);
     std::printf("%s\n", line.c_str());
   }
@@ -342,13 +341,13 @@ void print_summary(const ReplayOptions& options, const ReplayOutcome& outcome) {
 // A log that was compared has the same keys as one of several, also where it differs.
 void print_json(const ReplayOptions& options, const std::string& recorded,
                 const ReplayOutcome& outcome) {
-  nlohmann::ordered_json line{{"frames", outcome.frames},
-                              {"raw_frames", outcome.raw_frames},
-                              {"isa", outcome.isa},
-                              {"took_s", outcome.took_s}};
-  if (options.expect) line = json_of(options.log, recorded, outcome);
-  std::printf("%s\n", json_text(line).c_str());
-  std::fflush(stdout);
+  Findings findings;
+  findings.add("frames", outcome.frames)
+      .add("raw_frames", outcome.raw_frames)
+      .add("isa", outcome.isa)
+      .add("took_s", outcome.took_s);
+  if (options.expect) findings = findings_of(options.log, recorded, outcome);
+  findings.show(true, -1);
 }
 
 Result<> open_outputs(const ReplayOptions& options, double speed, const log::Reader& reader,
@@ -359,7 +358,7 @@ Result<> open_outputs(const ReplayOptions& options, double speed, const log::Rea
     outputs.expectation = std::move(*expectation);
   }
   if (!options.out.empty()) {
-    auto file = replay::FrameFile::create(options.out);
+    auto file = FrameFile::create(options.out);
     if (!file) return std::unexpected(file.error());
     outputs.file = std::move(*file);
   }
@@ -377,13 +376,12 @@ Result<> open_outputs(const ReplayOptions& options, double speed, const log::Rea
                               replay);
   if (!broadcast) return std::unexpected(broadcast.error());
   outputs.broadcast = std::move(*broadcast);
-  nlohmann::ordered_json ready{{"ready", true},
-                               {"publish", outputs.broadcast->endpoint()},
-                               {"replay", options.log},
-                               {"streams", nlohmann::json::array()}};
-  for (const std::string& name : stream_names(reader)) ready["streams"].push_back(name);
-  std::printf("%s\n", json_text(ready).c_str());
-  std::fflush(stdout);
+  Findings()
+      .add("ready", true)
+      .add("publish", outputs.broadcast->endpoint())
+      .add("replay", options.log)
+      .add("streams", stream_names(reader))
+      .show(true, -1);
   return {};
 }
 
@@ -428,7 +426,7 @@ Result<> replay(const ReplayOptions& options) {
     if (outputs.broadcast) outputs.broadcast->clock().reached(chunk.arrival_ns);
     return true;
   };
-  auto done = replay.run([&](const pipeline::Item& item) { outputs.take(item); }, pace);
+  auto done = replay.run([&](const pipeline::Item& item) { outputs.add(item); }, pace);
   if (done && Interrupt::came()) return ended_early(options, outputs);
   if (done) done = outputs.finish();
   outcome.frames = outputs.frames;

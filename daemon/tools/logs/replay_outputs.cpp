@@ -13,22 +13,22 @@
 
 namespace posed::tools {
 
-nlohmann::ordered_json json_of(const std::string& log, const std::string& recorded_isa,
-                               const ReplayOutcome& outcome) {
-  nlohmann::ordered_json line{{"log", log},
-                              {"same", outcome.problem.empty()},
-                              {"frames", outcome.frames},
-                              {"raw_frames", outcome.raw_frames},
-                              {"compared", outcome.counts.compared},
-                              {"lost", outcome.counts.lost},
-                              {"after_gap", outcome.counts.after_gap},
-                              {"past_end", outcome.counts.past_end},
-                              {"isa", outcome.isa},
-                              {"recorded_isa", recorded_isa},
-                              {"missing", outcome.missing},
-                              {"took_s", outcome.took_s}};
-  if (!outcome.problem.empty()) line["problem"] = outcome.problem;
-  return line;
+Findings findings_of(const std::string& log, const std::string& recorded_isa,
+                     const ReplayOutcome& outcome) {
+  Findings findings;
+  findings.add("log", log)
+      .add("same", outcome.problem.empty())
+      .add("frames", outcome.frames)
+      .add("raw_frames", outcome.raw_frames)
+      .add("compared", outcome.counts.compared)
+      .add("lost", outcome.counts.lost)
+      .add("after_gap", outcome.counts.after_gap)
+      .add("past_end", outcome.counts.past_end)
+      .add("isa", outcome.isa)
+      .add("recorded_isa", recorded_isa)
+      .add("missing", outcome.missing)
+      .add("took_s", outcome.took_s);
+  return outcome.problem.empty() ? findings : findings.add("problem", outcome.problem);
 }
 
 ReplayOutputs::ReplayOutputs(const replay::Replay& replay) : replay_(replay) {
@@ -38,7 +38,7 @@ ReplayOutputs::ReplayOutputs(const replay::Replay& replay) : replay_(replay) {
   }
 }
 
-void ReplayOutputs::take(const pipeline::Item& item) {
+void ReplayOutputs::add(const pipeline::Item& item) {
   if (broadcast) broadcast->add(item);
   const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
   if (!raw && item.kind != pipeline::Item::Kind::kFrame) return;

@@ -80,7 +80,7 @@ namespace {
 
 constexpr int kLeaderRank = 0;
 constexpr std::chrono::milliseconds kPause{1};
-constexpr int kPausesPerTelling = 100;  // progress is for people
+constexpr int kPausesPerReport = 100;  // progress is for people
 
 std::unexpected<Error> ended() { return fail("the ranks have ended"); }
 
@@ -201,16 +201,16 @@ std::optional<std::vector<TaskResult>> Leader::run(std::size_t count, const Task
                                                    const TaskProgress& progress) {
   if (stopped_) return std::nullopt;
   std::ranges::fill(done_, 0U);
-  const TaskProgress tell = [&](std::size_t done) {
+  const TaskProgress report_progress = [&](std::size_t done) {
     done_.front() = done;
     if (!listen()) return false;
     const auto all = std::accumulate(done_.begin(), done_.end(), std::size_t{0});
     return !progress || progress(all);
   };
-  auto own = run_share(count, task, tell);
+  auto own = run_share(count, task, report_progress);
   for (int look = 1; own && answers(Kind::kResults) + 1 < done_.size(); ++look) {
     std::this_thread::sleep_for(kPause);
-    const bool go_on = look % kPausesPerTelling == 0 ? tell(done_.front()) : listen();
+    const bool go_on = look % kPausesPerReport == 0 ? report_progress(done_.front()) : listen();
     if (!go_on) own.reset();
   }
   if (!own) {
@@ -252,10 +252,10 @@ std::optional<Message> Follower::order() {
 std::optional<std::vector<TaskResult>> Follower::run(std::size_t count, const Task& task,
                                                      const TaskProgress& /*progress*/) {
   if (stopped_) return std::nullopt;
-  std::size_t told = 0;
+  std::size_t reported = 0;
   const auto own = run_share(count, task, [&](std::size_t done) {
-    if (done != told) link().send(kLeaderRank, Kind::kDone, std::to_string(done));
-    told = done;
+    if (done != reported) link().send(kLeaderRank, Kind::kDone, std::to_string(done));
+    reported = done;
     // While tasks run, the leader says nothing but to stop.
     stopped_ = stopped_ || link().poll().has_value();
     return !stopped_;

@@ -1,5 +1,4 @@
-// Link: the messages between the ranks of one `mpirun`. Each is a kind and bytes, those of one
-// sender come in its order, and waiting costs no CPU. One thread uses it. Cold.
+// The ranks of `posed-mpi` and the messages between them. Cold.
 #pragma once
 
 #include <csignal>
@@ -17,6 +16,8 @@
 
 namespace posed::mpi {
 
+// Link: the messages between the ranks of one `mpirun`. Each is a kind and bytes, those of one
+// sender come in its order, and waiting costs no CPU. One thread uses it.
 enum class Kind : std::uint8_t {
   kInputs,    // leader: what it was started with and reads
   kCompared,  // answer: what differs here; empty if nothing does

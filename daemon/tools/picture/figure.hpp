@@ -1,5 +1,4 @@
-// Camera: how a figure is seen in a picture. It projects without perspective, so that poses beside
-// each other have one scale. Cold.
+// How a pose looks in a picture: FigureShape makes sticks of it, a Camera projects them. Cold.
 #pragma once
 
 #include <cstdint>
@@ -17,6 +16,8 @@
 
 namespace posed::picture {
 
+// Camera: how a figure is seen in a picture. It projects without perspective, so that poses beside
+// each other have one scale.
 enum class View : std::uint8_t {
   kFront,         // the figure looks at the camera; a hand shows its palm
   kSide,          // a walker goes to the right; a hand shows its thumb

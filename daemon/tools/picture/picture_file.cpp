@@ -11,7 +11,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <memory>
-#include <ostream>
 #include <system_error>
 #include <utility>
 
@@ -98,15 +97,11 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-Result<> write_text(const std::string& text, const std::filesystem::path& path) {
-  return write_whole_file(path, [&](std::ostream& out) { out << text; });
-}
-
 // So that the file at `to` appears only when it is whole.
 Result<> copy_whole(const std::string& from, const std::filesystem::path& to) {
   const auto bytes = load_file(from, {.what = "picture", .max_bytes = 1U << 30});
   if (!bytes) return std::unexpected(bytes.error());
-  return write_text(*bytes, to);
+  return write_whole_file(to, *bytes);
 }
 
 std::string frame_name(int frame) {
@@ -118,12 +113,12 @@ std::string frame_name(int frame) {
 }  // namespace
 
 Result<> write_picture(const std::string& svg, const std::filesystem::path& path) {
-  if (clip::extension_of(path) == ".svg") return write_text(svg, path);
+  if (clip::extension_of(path) == ".svg") return write_whole_file(path, svg);
   const auto folder = TemporaryFolder::make();
   if (!folder) return std::unexpected(folder.error());
   const std::string drawing = (*folder)->file("picture.svg");
   const std::string pixels = (*folder)->file("picture.png");
-  if (auto done = write_text(svg, drawing); !done) return done;
+  if (auto done = write_whole_file(drawing, svg); !done) return done;
   const auto made =
       run_program({"rsvg-convert", "--format=png", "--output=" + pixels, drawing}, "librsvg2-bin");
   if (!made) return fail("a PNG " + made.error().message + "; or write an .svg", path.string());
@@ -136,7 +131,7 @@ Result<> write_video(const Video& video, const std::filesystem::path& path) {
   for (int frame = 0; frame < video.frames; ++frame) {
     if (!video.progress(frame)) return fail("interrupted; nothing was written", path.string());
     const std::string name = (*folder)->file(frame_name(frame));
-    if (auto done = write_text(video.draw(frame), name); !done) return done;
+    if (auto done = write_whole_file(name, video.draw(frame)); !done) return done;
   }
   const std::string encoded = (*folder)->file("video.mp4");
   // H.264 with half as many colour samples, which every player shows, needs an even width and

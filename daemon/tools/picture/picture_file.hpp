@@ -1,4 +1,5 @@
-// Runs another program and waits for it. Cold.
+// Writes pictures and videos. posed draws SVG itself; rsvg-convert (librsvg) makes a PNG of it and
+// ffmpeg a video. None of them needs a display. Cold.
 #pragma once
 
 #include <filesystem>
@@ -15,9 +16,6 @@ namespace posed::picture {
 // is not installed. Ctrl-C reaches the program too; then the error says that it was interrupted.
 [[nodiscard]] Result<> run_program(const std::vector<std::string>& arguments,
                                    const std::string& package);
-
-// Writes pictures and videos. posed draws SVG itself; rsvg-convert (librsvg) makes a PNG of it and
-// ffmpeg a video. None of them needs a display.
 
 // `path` ends in .svg or .png.
 [[nodiscard]] Result<> write_picture(const std::string& svg, const std::filesystem::path& path);

@@ -8,8 +8,6 @@
 #include <spdlog/spdlog.h>
 
 #include "daemon/net/peer_guard.hpp"
-#include "daemon/net/refusal_words.hpp"
-#include "daemon/net/security.hpp"
 #include "daemon/net/zap_authenticator.hpp"
 #include "daemon/publish/subscriptions.hpp"
 #include "daemon/system/event_fd.hpp"
@@ -20,57 +18,26 @@
 namespace posed::relay {
 namespace {
 
-// Messages that wait in this process: the skeletons of many streams come together.
-constexpr int kMessagesWaiting = 64;
-constexpr int kReceiveBuffer = 16 * 1024;  // bytes
-// One part: the stats of 256 streams have about 200 KB.
-constexpr std::int64_t kMaxPart = 1024 * 1024;  // bytes
 // All subscriptions that there may be, and as many changes of them.
 constexpr int kSubscriptionsWaiting = static_cast<int>(2 * publish::kMaxWanted);
 
 }  // namespace
 
-Result<Upstream> Upstream::open(void* context, const UpstreamSettings& settings) {
-  auto socket = net::open_socket(context, ZMQ_XSUB);
+Result<Upstream> Upstream::open(void* context, const link::Peer& peer) {
+  auto socket =
+      link::DaemonSocket::open(context, ZMQ_XSUB, peer, {.requests = kSubscriptionsWaiting});
   if (!socket) return std::unexpected(socket.error());
-  if (!settings.key.empty()) {
-    auto secured = net::secure_client(socket->get(), settings.key, settings.server_key);
-    if (!secured) return std::unexpected(secured.error());
-  }
-  const std::string_view largest(reinterpret_cast<const char*>(&kMaxPart), sizeof kMaxPart);
-  for (const Result<>& set : {net::set_option(socket->get(), ZMQ_MAXMSGSIZE, largest),
-                              net::set_option(socket->get(), ZMQ_RCVHWM, kMessagesWaiting),
-                              net::set_option(socket->get(), ZMQ_RCVBUF, kReceiveBuffer),
-                              net::set_option(socket->get(), ZMQ_SNDHWM, kSubscriptionsWaiting)}) {
-    if (!set) return std::unexpected(set.error());
-  }
-  auto monitor = net::LinkMonitor::open(context, socket->get(), !settings.key.empty());
-  if (!monitor) return std::unexpected(monitor.error());
-  if (auto done = net::connect_socket(socket->get(), settings.endpoint); !done) {
-    return std::unexpected(done.error());
-  }
-  return Upstream(settings, std::move(*socket), std::move(*monitor));
+  return Upstream(std::move(*socket));
 }
 
 bool Upstream::subscribe(const std::string& prefix, bool on) {
   return net::send_part(socket_.get(), (on ? '\1' : '\0') + prefix, false);
 }
 
-bool Upstream::receive(net::Message& topic, net::Message& body, bool& sound) {
-  if (!topic.receive(socket_.get())) return false;
-  sound = topic.more() && body.receive(socket_.get()) && !body.more();
-  if (sound || !topic.more()) return true;
-  while (body.more() && body.receive(socket_.get())) {
-  }
-  return true;
-}
-
-void Upstream::take_news() {
-  const bool before = monitor_.established();
-  const net::Refusal refusal = monitor_.take_news();
-  if (refusal != net::Refusal::kNone) {
-    spdlog::error("the daemon at {} {}", endpoint(),
-                  net::refusal_words(refusal, net::Domain::kPublish, settings_.server_key));
+void Upstream::log_news() {
+  const bool before = established();
+  if (const std::string why = socket_.refusal(); !why.empty()) {
+    spdlog::error("the daemon at {} {}", endpoint(), why);
   } else if (established() != before) {
     spdlog::log(before ? spdlog::level::warn : spdlog::level::info, "{}: {}", endpoint(),
                 before ? "connection lost; it is tried again" : "connected");
@@ -83,33 +50,33 @@ constexpr std::int64_t kNoStats_ns = 3 * kNanosPerSecond;  // three stats are mi
 
 }  // namespace
 
-std::optional<std::string> MergedStats::take(std::size_t upstream, std::string_view bytes,
-                                             std::int64_t now_ns, bool& sound) {
-  Heard& heard = heard_[upstream];
-  sound = heard.stats.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
-  if (!sound) {
-    heard.ever = false;
+std::optional<std::string> MergedStats::accept(std::size_t upstream, std::string_view bytes,
+                                               std::int64_t now_ns, bool& valid) {
+  Latest& latest = latest_[upstream];
+  valid = latest.stats.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+  if (!valid) {
+    latest.ever = false;
     return std::nullopt;
   }
-  heard.ever = true;
-  heard.at_ns = now_ns;
-  if (heard_.size() == 1) return std::string(bytes);
-  for (v1::StreamStats& stream : *heard.stats.mutable_stream()) {
+  latest.ever = true;
+  latest.at_ns = now_ns;
+  if (latest_.size() == 1) return std::string(bytes);
+  for (v1::StreamStats& stream : *latest.stats.mutable_stream()) {
     // What is set already comes from a relay before this one.
     if (stream.has_monotonic_to_utc_ns()) continue;
-    stream.set_monotonic_to_utc_ns(heard.stats.monotonic_to_utc_ns());
+    stream.set_monotonic_to_utc_ns(latest.stats.monotonic_to_utc_ns());
   }
-  const auto answers = [&](const Heard& one) {
+  const auto answers = [&](const Latest& one) {
     return one.ever && now_ns - one.at_ns < kNoStats_ns;
   };
   for (std::size_t i = 0; i < upstream; ++i) {
-    if (answers(heard_[i])) return std::nullopt;  // an earlier one gives the beat
+    if (answers(latest_[i])) return std::nullopt;  // an earlier one gives the beat
   }
-  v1::Stats merged = heard.stats;
-  for (std::size_t i = upstream + 1; i < heard_.size(); ++i) {
-    if (!answers(heard_[i])) continue;
-    merged.mutable_stream()->MergeFrom(heard_[i].stats.stream());
-    merged.mutable_source()->MergeFrom(heard_[i].stats.source());
+  v1::Stats merged = latest.stats;
+  for (std::size_t i = upstream + 1; i < latest_.size(); ++i) {
+    if (!answers(latest_[i])) continue;
+    merged.mutable_stream()->MergeFrom(latest_[i].stats.stream());
+    merged.mutable_source()->MergeFrom(latest_[i].stats.source());
   }
   return merged.SerializeAsString();
 }
@@ -139,10 +106,10 @@ bool RelayedStreams::admit(std::string_view stream, std::size_t upstream, std::i
     fresh.due_ns = system::kForever_ns;
     found = streams_.emplace(std::string(stream), std::move(fresh)).first;
   } else if (found->second.upstream != upstream) {
-    if (now_ns - found->second.heard_ns < kSilent_ns) return false;
+    if (now_ns - found->second.received_ns < kSilent_ns) return false;
     found->second.upstream = upstream;
   }
-  found->second.heard_ns = now_ns;
+  found->second.received_ns = now_ns;
   return true;
 }
 
@@ -188,7 +155,7 @@ void RelayedStreams::forget_old(std::int64_t now_ns) {
   forgot_ns_ = now_ns;
   std::erase_if(streams_, [&](const auto& entry) {
     const Stream& stream = entry.second;
-    if (now_ns - stream.heard_ns < kGone_ns) return false;
+    if (now_ns - stream.received_ns < kGone_ns) return false;
     skeleton_bytes_ -= stream.skeleton.size();
     return true;
   });
@@ -226,7 +193,7 @@ Result<std::unique_ptr<Relay>> Relay::open(const RelayOptions& options) {
                                               .messages_per_s = kFirstRate_hz});
   if (!socket) return std::unexpected(socket.error());
   std::vector<Upstream> upstreams;
-  for (const UpstreamSettings& settings : options.from) {
+  for (const link::Peer& settings : options.from) {
     auto upstream = Upstream::open(options.context, settings);
     if (!upstream) return std::unexpected(upstream.error());
     upstreams.push_back(std::move(*upstream));
@@ -256,12 +223,12 @@ Relay::Relay(const RelayOptions& options, publish::PublishSocket socket, std::ve
 }
 
 std::int64_t Relay::turn(std::int64_t now_ns) {
-  bool all_heard = socket_.hear(
+  bool all_received = socket_.hear(
       subscriptions_, now_ns, [this](std::string_view prefix) { streams_.want_skeletons(prefix); });
   pass_subscriptions(now_ns);
   for (std::size_t i = 0; i < upstreams_.size(); ++i) {
-    upstreams_[i].take_news();
-    all_heard = drain(i, now_ns) && all_heard;
+    upstreams_[i].log_news();
+    all_received = drain(i, now_ns) && all_received;
   }
   const std::int64_t skeleton_ns =
       streams_.send_due(now_ns, [this](std::string_view topic, std::string_view bytes) {
@@ -269,7 +236,7 @@ std::int64_t Relay::turn(std::int64_t now_ns) {
         ++counts_.late_skeletons;
       });
   every_second(now_ns);
-  if (!all_heard) return now_ns;
+  if (!all_received) return now_ns;
   const std::int64_t change_ns =
       changed_.empty() ? system::kForever_ns : now_ns + kNanosPerSecond / 20;
   return std::min({skeleton_ns, change_ns, second_ns_ + kNanosPerSecond});
@@ -291,10 +258,10 @@ void Relay::wait(std::int64_t timeout_ns) {
 bool Relay::drain(std::size_t upstream, std::int64_t now_ns) {
   net::Message topic;
   net::Message body;
-  bool sound = false;
   for (int i = 0; i < kMessagesATurn; ++i) {
-    if (!upstreams_[upstream].receive(topic, body, sound)) return true;
-    if (sound) {
+    const link::Received received = upstreams_[upstream].receive(topic, body);
+    if (received == link::Received::kNothing) return true;
+    if (received == link::Received::kMessage) {
       pass_on(upstream, topic.text(), body, now_ns);
     } else {
       ++counts_.foreign;
@@ -306,9 +273,9 @@ bool Relay::drain(std::size_t upstream, std::int64_t now_ns) {
 void Relay::pass_on(std::size_t upstream, std::string_view topic, net::Message& body,
                     std::int64_t now_ns) {
   if (topic == "stats") {
-    bool sound = false;
-    const auto stats = stats_.take(upstream, body.text(), now_ns, sound);
-    if (!sound) ++counts_.foreign;
+    bool valid = false;
+    const auto stats = stats_.accept(upstream, body.text(), now_ns, valid);
+    if (!valid) ++counts_.foreign;
     if (stats) send(topic, *stats);
     return;
   }

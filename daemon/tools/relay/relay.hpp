@@ -16,69 +16,60 @@
 #include <vector>
 
 #include "daemon/publish/publish_socket.hpp"
+#include "daemon/tools/link/daemon_socket.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/result.hpp"
 #include "proto/frame/time.hpp"
-#include "proto/zmq/link_monitor.hpp"
 #include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::relay {
 
-struct UpstreamSettings {
-  std::string endpoint;
-  std::filesystem::path key{};         // the relay's own NAME.key; empty: no CURVE
-  std::filesystem::path server_key{};  // the daemon's NAME.pub
-};
-
 class Upstream {
  public:
   // `context` outlives it.
-  [[nodiscard]] static Result<Upstream> open(void* context, const UpstreamSettings& settings);
+  [[nodiscard]] static Result<Upstream> open(void* context, const link::Peer& peer);
 
   [[nodiscard]] void* socket() const noexcept { return socket_.get(); }
-  [[nodiscard]] void* news() const noexcept { return monitor_.socket(); }  // readable: take_news()
-  [[nodiscard]] const std::string& endpoint() const noexcept { return settings_.endpoint; }
+  [[nodiscard]] void* news() const noexcept { return socket_.news(); }  // readable: log_news()
+  [[nodiscard]] const std::string& endpoint() const noexcept { return socket_.peer().endpoint; }
 
   // Returns false if the connection cannot take more subscriptions now.
   [[nodiscard]] bool subscribe(const std::string& prefix, bool on);
 
-  // The next message, if one waits. `sound` is false for one that is not a topic and a body, which
-  // is skipped.
-  [[nodiscard]] bool receive(net::Message& topic, net::Message& body, bool& sound);
+  [[nodiscard]] link::Received receive(net::Message& topic, net::Message& body) noexcept {
+    return socket_.receive(topic, body);
+  }
 
-  // Takes what happened to the connection, and logs when it was made, lost or refused.
-  void take_news();
-  [[nodiscard]] bool established() const noexcept { return monitor_.established(); }
+  // Reads what happened to the connection, and logs when it was made, lost or refused.
+  void log_news();
+  [[nodiscard]] bool established() const noexcept { return socket_.established(); }
 
  private:
-  Upstream(UpstreamSettings settings, net::Socket socket, net::LinkMonitor monitor)
-      : settings_(std::move(settings)), socket_(std::move(socket)), monitor_(std::move(monitor)) {}
+  explicit Upstream(link::DaemonSocket socket) : socket_(std::move(socket)) {}
 
-  UpstreamSettings settings_;
-  net::Socket socket_;
-  net::LinkMonitor monitor_;
+  link::DaemonSocket socket_;
 };
 
 // MergedStats: the stats of several daemons as those of one, so that `posed top` and `posed
 // monitor` see all streams of a relay.
 class MergedStats {
  public:
-  explicit MergedStats(std::size_t upstreams) : heard_(upstreams) {}
+  explicit MergedStats(std::size_t upstreams) : latest_(upstreams) {}
 
   // Stats came from an upstream. Returns what to publish: of one upstream its own bytes; of several
   // the streams and sources of all that are not silent, each stream with the clock of its own
   // machine, and everything else as the first of them says it, whenever that one sends its stats.
-  // Empty: nothing now. `sound` is false for bytes that are no stats.
-  [[nodiscard]] std::optional<std::string> take(std::size_t upstream, std::string_view bytes,
-                                                std::int64_t now_ns, bool& sound);
+  // Empty: nothing now. `valid` is false for bytes that are no stats.
+  [[nodiscard]] std::optional<std::string> accept(std::size_t upstream, std::string_view bytes,
+                                                  std::int64_t now_ns, bool& valid);
 
  private:
-  struct Heard {
+  struct Latest {
     v1::Stats stats{};
     std::int64_t at_ns = 0;
     bool ever = false;
   };
-  std::vector<Heard> heard_;  // [upstream]
+  std::vector<Latest> latest_;  // [upstream]
 };
 
 // RelayedStreams: what a relay knows of the streams that pass it. Each stream belongs to the
@@ -117,11 +108,11 @@ class RelayedStreams {
  private:
   struct Stream {
     std::size_t upstream = 0;
-    std::int64_t heard_ns = 0;
+    std::int64_t received_ns = 0;
     std::string skeleton_topic{}, skeleton{};  // empty: none is kept
     std::int64_t sent_ns = 0, due_ns = 0;      // of the skeleton
   };
-  // Forgets streams that have not been heard for a while; at most once a second.
+  // Forgets streams that have sent nothing for a while; at most once a second.
   void forget_old(std::int64_t now_ns);
 
   std::map<std::string, Stream, std::less<>> streams_;
@@ -138,7 +129,7 @@ inline constexpr std::size_t kMaxUpstreams = 16;
 
 struct RelayOptions {
   void* context = nullptr;  // the ZeroMQ context; outlives the relay
-  std::vector<UpstreamSettings> from{};
+  std::vector<link::Peer> from{};
   std::string endpoint{};
   // Checks every subscriber; null (in tests): all are admitted.
   net::ZapAuthenticator* authenticator = nullptr;

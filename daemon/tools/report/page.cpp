@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ostream>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -199,7 +198,7 @@ std::string svg_file(const std::vector<Drawing>& drawings) {
 }
 
 Result<> write_page(const Page& page, const std::filesystem::path& path) {
-  return write_whole_file(path, [&](std::ostream& out) { out << page.html(); });
+  return write_whole_file(path, page.html());
 }
 
 }  // namespace posed::report

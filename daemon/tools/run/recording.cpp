@@ -62,8 +62,7 @@ Result<> write_take_clips(const std::filesystem::path& log) {
   };
   const sigset_t signals = end_signals();
   constexpr timespec kAtOnce{};
-  return replay::each_take_clip(log, write,
-                                [&] { return sigtimedwait(&signals, nullptr, &kAtOnce) <= 0; });
+  return each_take_clip(log, write, [&] { return sigtimedwait(&signals, nullptr, &kAtOnce) <= 0; });
 }
 
 // SetAside keeps a device log that is about to be replaced under another name until the new log has
@@ -266,7 +265,7 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
   auto opened = assembly::Daemon::open(config);
   if (!opened) return std::unexpected(opened.error());
   assembly::Daemon& daemon = **opened;
-  if (auto sound = check_end(daemon, plan.serve); !sound) return sound;
+  if (auto ends = check_end(daemon, plan.serve); !ends) return ends;
   auto started = std::make_shared<std::atomic<bool>>(false);
   record::RecorderOptions recorder_options{
       .file = plan.out,
@@ -303,7 +302,7 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
   hooks.recorder_figures = [&recorder] { return figures_of(**recorder); };
   if (auto done = daemon.start(std::move(hooks)); !done) {
     daemon.stop();
-    // What failed at the start is told, not what follows from it.
+    // The error is what failed at the start, not what follows from it.
     [[maybe_unused]] const auto closed = (*recorder)->finish();
     std::error_code ignored;
     std::filesystem::remove(plan.out, ignored);  // nothing was recorded

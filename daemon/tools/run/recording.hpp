@@ -1,4 +1,5 @@
-// What `record` and `replay` say of a source that has no stream in the log.
+// Streaming with a device log: what `posed record`, and `posed run` with a [record] table, do.
+// Cold.
 #pragma once
 
 #include <filesystem>
@@ -13,14 +14,14 @@
 
 namespace posed::tools {
 
-// It may have named some that nobody wanted or that were refused.
+// What `record` and `replay` report of a source without a stream in the log. It may have named
+// bodies that nobody wanted or that were refused.
 [[nodiscard]] inline std::string no_body_of(const std::string& source) {
   return "source " + in_quotes(source) + " named no body that became a stream";
 }
 
 inline void warn_of_no_body(const std::string& source) { spdlog::warn("{}", no_body_of(source)); }
 
-// Streaming with a device log: what `posed record`, and `posed run` with a [record] table, do.
 struct RecordingPlan {
   std::string out;         // the log
   bool frames = false;     // keep the published frames, too

@@ -86,7 +86,7 @@ void TabSession::read() {
         if (error) return self->close();
         const auto data = self->buffer_.cdata();
         const std::string_view bytes(static_cast<const char*>(data.data()), data.size());
-        self->room_.hub.take(self->tab_, bytes, self->socket_.got_text(), system::monotonic_ns());
+        self->room_.hub.handle(self->tab_, bytes, self->socket_.got_text(), system::monotonic_ns());
         self->buffer_.clear();
         self->read();
       });

@@ -1,5 +1,4 @@
-// WebRoom: what `posed view` serves over HTTP: the page by its rules (request_rules), and a tab of
-// the Hub for each WebSocket. One thread: the one that runs the io_context. Cold.
+// Bridge: what `posed view` runs, with the HTTP service and the WebSockets of its pages. Cold.
 #pragma once
 
 #include <cstddef>
@@ -25,6 +24,8 @@
 
 namespace posed::view {
 
+// WebRoom: what `posed view` serves over HTTP: the page by its rules (request_rules), and a tab of
+// the Hub for each WebSocket. One thread: the one that runs the io_context.
 inline constexpr std::size_t kMaxTabs = 32;  // of http::kMaxConnections
 
 class TabSession;

@@ -151,7 +151,7 @@ void Hub::leave(Tab& tab) {
   std::erase_if(under_way_, [&](const auto& entry) { return entry.second.tab == &tab; });
 }
 
-void Hub::take(Tab& tab, std::string_view bytes, bool text, std::int64_t now_ns) {
+void Hub::handle(Tab& tab, std::string_view bytes, bool text, std::int64_t now_ns) {
   if (text) {
     const PageWord word = read_word(bytes);
     if (std::holds_alternative<ReadyWord>(word)) tab.outbox.ready();
@@ -213,7 +213,7 @@ void Hub::replied(std::uint64_t ticket, std::string_view reply) {
   asked.tab->wake();
 }
 
-void Hub::heard(std::string_view topic, std::string_view body, std::int64_t now_ns) {
+void Hub::receive(std::string_view topic, std::string_view body, std::int64_t now_ns) {
   if (topic.size() > kMaxTopic) {
     ++counts_.foreign;
   } else if (topic == "stats") {
@@ -274,16 +274,16 @@ void Hub::daemon_is(DaemonState state) {
     for (Tab* tab : tabs_) tab->outbox.forget_all();
   }
   daemon_ = std::move(state);
-  tell(daemon_word(daemon_));
+  send_to_all(daemon_word(daemon_));
 }
 
 void Hub::control_is(ControlRight right) {
   if (right == right_) return;
   right_ = std::move(right);
-  tell(control_word(right_));
+  send_to_all(control_word(right_));
 }
 
-void Hub::tell(const Parcel& parcel) {
+void Hub::send_to_all(const Parcel& parcel) {
   for (Tab* tab : tabs_) {
     tab->outbox.put_answer(parcel);
     tab->wake();

@@ -1,7 +1,5 @@
-// The messages between the bridge and a page. From the page: a word in JSON (text), or a numbered
-// request to the daemon (binary). To the page: what the daemon published behind its topic (binary),
-// and the bridge's own words in JSON (text). The page's are untrusted. No socket; pure functions.
-// Cold.
+// Hub: what the bridge knows, and who gets what; and the messages between the bridge and a page.
+// The page's are untrusted. No socket and no clock of its own; one thread. Cold.
 #pragma once
 
 #include <cstddef>
@@ -18,6 +16,11 @@
 #include "proto/frame/result.hpp"
 
 namespace posed::view {
+
+// The messages between the bridge and a page. From the page: a word in JSON (text), or a numbered
+// request to the daemon (binary). To the page: what the daemon published behind its topic (binary),
+// and the bridge's own words in JSON (text). The page's are untrusted. No socket; pure functions.
+//
 
 // Bytes of a message of the page: a request of the largest size that a daemon takes, numbered.
 inline constexpr std::size_t kMaxPageMessage = 64 * 1024 + 4;
@@ -73,9 +76,8 @@ struct Greeting {
 [[nodiscard]] Parcel clock_word(double t0, std::int64_t monotonic_ns);
 [[nodiscard]] Parcel no_reply_word(std::uint32_t number, const std::string& sentence);
 
-// Hub: what the bridge knows, and who gets what. The daemon's messages go to every open page, the
-// pages' requests to the daemon, and each reply back to the page that asked. No socket and no clock
-// of its own; one thread.
+// The daemon's messages go to every open page, the pages' requests to the daemon, and each reply
+// back to the page that asked.
 
 inline constexpr std::size_t kMaxViewStreams = 1024;  // more are not shown
 inline constexpr std::size_t kMaxUnderWay = 8;        // requests of one page at once
@@ -109,15 +111,15 @@ class Hub {
   [[nodiscard]] std::size_t tabs() const noexcept { return tabs_.size(); }
 
   // A message of the page; `text`: not binary.
-  void take(Tab& tab, std::string_view bytes, bool text, std::int64_t now_ns);
+  void handle(Tab& tab, std::string_view bytes, bool text, std::int64_t now_ns);
 
   // A message of the daemon's publish socket. Call flush() after the last one that waited.
-  void heard(std::string_view topic, std::string_view body, std::int64_t now_ns);
+  void receive(std::string_view topic, std::string_view body, std::int64_t now_ns);
   void flush();
   // A reply of the daemon's control socket.
   void replied(std::uint64_t ticket, std::string_view reply);
 
-  // What is known about the daemon; every page is told of a change.
+  // What is known about the daemon; every page is sent a change.
   void daemon_is(DaemonState state);
   void control_is(ControlRight right);
   [[nodiscard]] const DaemonState& daemon() const noexcept { return daemon_; }
@@ -144,7 +146,7 @@ class Hub {
                                            std::int64_t now_ns) const;
   void note_upload(Tab& tab, const v1::ControlRequest& request, std::int64_t now_ns);
   void hear_stream(std::string_view topic, std::string_view body, std::int64_t now_ns);
-  void tell(const Parcel& parcel);
+  void send_to_all(const Parcel& parcel);
   void forget(std::string_view stream);
 
   Greeting greeting_;

@@ -1,5 +1,6 @@
-// PageFiles: the files of the page, read into memory at the start. What the network names is only
-// looked up in this list and never becomes a path. Does not change afterwards. Cold.
+// What the bridge answers to an HTTP request: which files there are, who gets the page, who may
+// open the WebSocket, and what is refused. No socket; pure functions, so that tests and a fuzz
+// target can try every request. Cold.
 #pragma once
 
 #include <cstddef>
@@ -15,6 +16,8 @@
 
 namespace posed::view {
 
+// PageFiles: the files of the page, read into memory at the start. What the network names is only
+// looked up in this list and never becomes a path. Does not change afterwards.
 inline constexpr std::size_t kMaxPageFiles = 256;
 inline constexpr std::size_t kMaxPageBytes = 64 * 1024 * 1024;  // of all files together
 
@@ -27,7 +30,7 @@ struct PageFile {
 class PageFiles {
  public:
   // Reads all regular files below `folder` whose names do not begin with a dot; links are not
-  // followed. An Error tells a folder without index.html from one with too much in it.
+  // followed. An Error says whether index.html is missing or there is too much in the folder.
   [[nodiscard]] static Result<PageFiles> load(const std::filesystem::path& folder);
 
   // The file of a target without its query, such as "/page.js"; "/" is index.html. Null: there is
@@ -40,10 +43,6 @@ class PageFiles {
 
 // The MIME type that browsers expect of a file of this name.
 [[nodiscard]] std::string_view type_of_name(std::string_view name);
-
-// What the bridge answers to an HTTP request: who gets the page, who may open the WebSocket, and
-// what is refused. No socket; pure functions, so that tests and a fuzz target can try every
-// request.
 
 // What is served, and to whom.
 struct Site {

@@ -163,7 +163,7 @@ TEST_CASE("a take during which the log lacks chunks is said to have gaps", "[rep
                   " IN (x'15', x'16', x'17');");
   auto reader = log::Reader::open(path);
   REQUIRE(reader);
-  const auto takes = replay::logged_takes(*reader);
+  const auto takes = tools::logged_takes(*reader);
   REQUIRE(takes);
   REQUIRE(takes->size() == 3);
   CHECK(!(*takes)[0].has_gaps);

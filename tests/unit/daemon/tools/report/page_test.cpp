@@ -9,7 +9,6 @@
 
 #include <pugixml.hpp>
 
-#include "daemon/tools/report/bench_sections.hpp"
 #include "daemon/tools/report/gesture_sections.hpp"
 #include "daemon/tools/report/plot.hpp"
 #include "daemon/tools/report/style_sections.hpp"
@@ -87,7 +86,11 @@ std::vector<Figure> other_figures(double value, const std::string& words, std::s
   std::vector<LagError> lags;
   Confusion confusion{.labels = {}, .given = {}, .share = {}, .frames = {}, .measured_on = words};
   std::vector<QuestionTree> trees;
-  PercentileBars bars{.title = words, .sentence = words, .quantity = words, .peers = {}};
+  Bars bars{.quantity = words,
+            .unit = words,
+            .series = {words, words},
+            .groups = {},
+            .logarithmic = true};
   for (std::size_t i = 0; i < count; ++i) {
     durations.push_back({words, false, {value, value}, {value, value}});
     angles.push_back({words, {{value, value}}, {{value, 1.0}}, {{1.0, value}}, {{1.0, value}}});
@@ -98,7 +101,7 @@ std::vector<Figure> other_figures(double value, const std::string& words, std::s
     confusion.share.emplace_back(count, std::isfinite(value) ? 0.5 : 0.0);
     confusion.frames.push_back(1);
     trees.push_back({words, {{words, words, 1, 2}, {words, words}, {words, words}}});
-    bars.peers.push_back({words, {value, value, value, value}});
+    bars.groups.push_back({words, {value, value}});
   }
   trees.push_back({words, {}});
   return {state_durations(durations),
@@ -106,8 +109,7 @@ std::vector<Figure> other_figures(double value, const std::string& words, std::s
           lag_error(lags, 30.0),
           label_confusion(confusion),
           decision_trees(words, trees, true),
-          percentile_bars(bars),
-          all_numbers(words, words, {{words, words}})};
+          bars_figure(words, words, bars)};
 }
 
 }  // namespace
