@@ -1,6 +1,6 @@
 // Labels of a take that holds one movement: rest, the way up, a hold, the way down. The movement's
 // segment lasts from its onset until the way down begins, where that of the rest begins; what comes
-// before the movement has no label (models/gesture/README.md, "One movement a take"). Cold.
+// before the movement has no label (models/gesture/README.md, "One movement a clip"). Cold.
 #pragma once
 
 #include <cstdint>
