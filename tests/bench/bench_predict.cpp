@@ -13,7 +13,6 @@
 #include <vector>
 
 #include <hwy/aligned_allocator.h>
-#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 

@@ -1,10 +1,8 @@
 // posed_bench smooth: the cost of the live smoother and its error, beside baselines that are tuned
 // on the very motion on which they are evaluated.
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <functional>
 #include <memory>
 #include <random>
 #include <string>

@@ -2,7 +2,6 @@
 // `posed bench pipeline`.
 #include <CLI/CLI.hpp>
 
-#include "daemon/tools/command/command.hpp"
 #include "tests/bench/bench.hpp"
 
 int main(int argc, char** argv) {

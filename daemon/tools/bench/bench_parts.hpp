@@ -4,8 +4,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "daemon/config/daemon_config.hpp"
 #include "daemon/tools/bench/hop_subscriber.hpp"

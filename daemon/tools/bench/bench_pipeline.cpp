@@ -36,8 +36,6 @@
 namespace posed::tools {
 namespace {
 
-// The time of all threads of this process, by name, for `posed bench`.
-
 // By the threads' names; threads of one name are summed up. Empty where the kernel does not count.
 using TimesByThread = std::map<std::string, system::ThreadTime>;
 
@@ -60,9 +58,6 @@ void add_passed(const TimesByThread& before, const TimesByThread& after, TimesBy
   }
 }
 
-// Where the time between the arrival of a pose and its receipt by a subscriber goes: the parts of
-// the way, and the daemon's threads (daemon/HOP.md).
-
 // What the threads did for each frame.
 struct ThreadShare {
   std::string name;
@@ -70,6 +65,8 @@ struct ThreadShare {
   double turns = 0.0;                    // how often it was put on a core
 };
 
+// Where the time between the arrival of a pose and its receipt by a subscriber goes: the parts of
+// the way, and the daemon's threads (daemon/HOP.md).
 struct HopParts {
   HopFigures decode;     // in the reader, from its arrival stamp on
   HopFigures stages;     // in the pipeline

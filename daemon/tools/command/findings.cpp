@@ -1,6 +1,7 @@
 #include "daemon/tools/command/findings.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cstdio>
 
 #include <spdlog/fmt/fmt.h>
@@ -20,6 +21,7 @@ bool has_value(const Finding& finding) { return finding.kind <= Kind::kList; }
 ordered_json json_of(const Findings& findings);
 
 ordered_json json_of(const Finding& finding) {
+  assert(finding.kind != Kind::kObject || finding.parts.size() == 1);
   if (finding.kind == Kind::kObject) return json_of(finding.parts.front());
   if (finding.kind == Kind::kList) {
     ordered_json list = ordered_json::array();

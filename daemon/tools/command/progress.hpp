@@ -33,12 +33,11 @@ class Waiting {
   std::jthread thread_;  // last, because it uses all of the above
 };
 
+inline constexpr double kQuietFor_s = 1.0;  // a longer wait needs a sign of progress
+
 // Progress of long work on stderr: a bar with the time left on a terminal, plain lines elsewhere,
 // one each 10 % or 5 s.
 // While one is alive, the first Ctrl-C asks the work to stop instead of ending the process.
-
-inline constexpr double kQuietFor_s = 1.0;  // a longer wait needs a sign of progress
-
 class ProgressBar {
  public:
   // Draws nothing until the work has taken `quiet_for_s`, because short work needs no bar.

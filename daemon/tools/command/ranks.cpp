@@ -1,6 +1,7 @@
 #include "daemon/tools/command/ranks.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <chrono>
 #include <condition_variable>
 #include <exception>
@@ -29,6 +30,7 @@ struct Work {
   }
   void finish(std::exception_ptr thrown) {
     const std::scoped_lock lock(mutex);
+    assert(done < results.size());
     ++done;
     if (thrown) {
       stop = true;

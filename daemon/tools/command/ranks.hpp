@@ -3,8 +3,6 @@
 
 #include <atomic>
 #include <filesystem>
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "models/tasks.hpp"

@@ -3,7 +3,6 @@
 // training data through the daemon and watches it over ZeroMQ, as any client would.
 #include <zmq.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -41,6 +40,10 @@
 #include "proto/log/digest.hpp"
 #include "proto/text/load_file.hpp"
 
+namespace posed {
+std::span<const ProfileText> config_texts();  // config/*.toml, which CMake writes
+}
+
 namespace posed::tools {
 namespace {
 
@@ -48,13 +51,12 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr double kFirstFrameWithin_s = 10.0;
 constexpr double kHandRate_hz = 30.0;
 
-// The folder for the demo's clips and models, and the check whether they are what this program
-// would make again.
-
 // The demo's config in its folder: config/demo.toml, which is part of the binary, with the paths of
 // that folder.
 constexpr const char* kDemoConfig = "demo.toml";
 
+// The folder for the demo's clips and models, and the check whether they are what this program
+// would make again.
 class DemoFolder {
  public:
   explicit DemoFolder(std::filesystem::path path) : path_(std::move(path)) {}
@@ -78,8 +80,6 @@ class DemoFolder {
  private:
   std::filesystem::path path_;
 };
-
-std::span<const ProfileText> config_texts();  // config/*.toml, written by daemon/CMakeLists.txt
 
 namespace fs = std::filesystem;
 constexpr const char* kStamp = "demo.json";

@@ -26,8 +26,33 @@ class Daemon;
 
 namespace posed::tools {
 
-// The demo as a client of its own daemon: counts styled frames and compares each with the raw frame
-// of the same instant.
+inline constexpr const char* kDemoHandStream = "hand";
+
+// The hand of the demo, watched and controlled as by any client: a signer performs g, c and p, and
+// from time to time the daemon performs labels in an order that was not in the training data.
+class DemoHand {
+ public:
+  // `control` is the daemon's control endpoint.
+  [[nodiscard]] static Result<DemoHand> open(const std::string& control);
+
+  // Call with each frame of the stream kDemoHandStream.
+  void handle(const v1::Frame& frame);
+  // Sends the labels when it is time, and reads the reply; `seconds` since the start.
+  [[nodiscard]] Result<> tend(double seconds);
+
+  [[nodiscard]] std::string note() const;     // what the hand does now, one line
+  [[nodiscard]] std::string summary() const;  // what it has done; empty if no hand was seen
+
+ private:
+  explicit DemoHand(Connection connection) : connection_(std::move(connection)) {}
+
+  Connection connection_;
+  double next_play_s_ = 3.0;
+  std::uint64_t frames_ = 0;
+  v1::Frame last_;
+  std::vector<std::string> performed_;  // the labels of the last performance, as they came
+  std::uint64_t performed_frames_ = 0;
+};
 
 // Receives raw and styled frames, and compares those of the same instant.
 class Watcher {
@@ -85,34 +110,6 @@ class Watcher {
   std::uint64_t styled_ = 0, gaps_ = 0, last_ = 0;
   motion::TurnSum all_, lately_;
 };
-
-// The hand of the demo, watched and controlled as by any client: a signer performs g, c and p, and
-// from time to time the daemon performs labels in an order that was not in the training data.
-class DemoHand {
- public:
-  // `control` is the daemon's control endpoint.
-  [[nodiscard]] static Result<DemoHand> open(const std::string& control);
-
-  // Call with each frame of the stream kDemoHandStream.
-  void handle(const v1::Frame& frame);
-  // Sends the labels when it is time, and reads the reply; `seconds` since the start.
-  [[nodiscard]] Result<> tend(double seconds);
-
-  [[nodiscard]] std::string note() const;     // what the hand does now, one line
-  [[nodiscard]] std::string summary() const;  // what it has done; empty if no hand was seen
-
- private:
-  explicit DemoHand(Connection connection) : connection_(std::move(connection)) {}
-
-  Connection connection_;
-  double next_play_s_ = 3.0;
-  std::uint64_t frames_ = 0;
-  v1::Frame last_;
-  std::vector<std::string> performed_;  // the labels of the last performance, as they came
-  std::uint64_t performed_frames_ = 0;
-};
-
-inline constexpr const char* kDemoHandStream = "hand";
 
 // The screen of `posed demo`: the live view of its daemon, with a figure and keys as in `posed
 // top`, and what the demo itself sees.

@@ -33,9 +33,6 @@ namespace {
 using drivers::glove::CalibrationFile;
 using drivers::glove::kPoseNames;
 
-// Leads a user from pose to pose: with a bar for each sensor on a terminal, with lines of text
-// elsewhere.
-
 // On the terminal, which is restored by the destructor.
 class PoseScreen final : public PoseGuide {
  public:
@@ -73,8 +70,6 @@ class PoseLines final : public PoseGuide {
  private:
   bool waits_;
 };
-
-// Records the poses for `posed calibrate` until they are good enough for a calibration.
 
 using drivers::glove::kPoseHints;
 using drivers::glove::kPoseNames;

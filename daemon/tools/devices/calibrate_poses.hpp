@@ -94,9 +94,6 @@ class PoseGuide {
 [[nodiscard]] Result<drivers::glove::Recorded> record_poses(GloveSource& source,
                                                             const PosePlan& plan, PoseGuide& guide);
 
-// The hand that a new calibration makes of the poses that it was fitted to, drawn as text, so that
-// its user sees at once whether the hand does what theirs did.
-
 // The recorded poses beside each other with their names below, at one scale: `rows` lines of UTF-8
 // of at most `columns` characters. A joint that no sensor measures is straight.
 [[nodiscard]] std::vector<std::string> calibrated_hand(

@@ -5,8 +5,6 @@
 #include <bitset>
 #include <functional>
 #include <memory>
-#include <optional>
-#include <span>
 #include <string>
 
 #include "daemon/tools/command/client.hpp"

@@ -7,7 +7,6 @@
 #include <charconv>
 #include <map>
 #include <span>
-#include <string>
 
 #include <spdlog/fmt/fmt.h>
 

@@ -37,8 +37,6 @@ inline void add_word(std::string& list, const std::string& word) {
   list += (list.empty() ? "" : ", ") + word;
 }
 
-// What a config wants of the machine.
-
 // Whether it has a glove on a serial, HID or USB port.
 [[nodiscard]] bool wants_gloves(const config::DaemonConfig& config);
 

@@ -86,9 +86,6 @@ class EmulatedPort {
   net::Socket publisher_;
 };
 
-// EmulatedDevice runs an emulator: it connects a motion, a port and the host's clock. `posed
-// emulate` runs one until it ends, the demo runs one on a thread.
-
 // The pose of a recorded hand, interpolated between frames and repeated in a loop; missing values
 // are zero.
 [[nodiscard]] HandAngles pose_at(const clip::HandClip& clip, double time_s);
@@ -99,6 +96,8 @@ using Motion = std::function<void(double time_s, drivers::Emulator& emulator)>;
 // The motion of a glove whose hand has these angles.
 [[nodiscard]] Motion hand_motion(std::function<HandAngles(double time_s)> angles_at);
 
+// EmulatedDevice runs an emulator: it connects a motion, a port and the host's clock. `posed
+// emulate` runs one until it ends, the demo runs one on a thread.
 class EmulatedDevice {
  public:
   using Bytes = drivers::Emulator::Bytes;

@@ -12,8 +12,6 @@
 
 namespace posed::emulate {
 
-// The motion of emulated bodies from a clip of a person.
-
 // Every person of `emulator` performs the clip, retargeted to its skeleton, interpolated
 // between frames and repeated in a loop; bodies that share no bone with the clip, such as props,
 // move as before. Without any person it is an error. Cold.

@@ -1,19 +1,14 @@
 #include "daemon/tools/export/log_clip.hpp"
 
 #include <algorithm>
-#include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <utility>
-#include <vector>
 
 #include "daemon/pipeline/take.hpp"
 #include "daemon/replay/replay.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/frame/time.hpp"
-#include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/stream_name.hpp"
 

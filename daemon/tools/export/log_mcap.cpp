@@ -5,12 +5,10 @@
 #include <algorithm>
 #include <charconv>
 #include <limits>
-#include <map>
 #include <memory>
 #include <optional>
 #include <ostream>
 #include <set>
-#include <utility>
 
 #include <google/protobuf/descriptor.h>
 #include <google/protobuf/descriptor.pb.h>

@@ -22,10 +22,8 @@ namespace posed::tools {
 // open. Messages are collected into chunks with indexes, so that a viewer reads only the part of
 // the time that it shows. Chunks are not compressed: every reader can read them, and poses of
 // floats hardly shrink. Cold.
-//
-// Memory: one chunk, and some 100 bytes for each chunk written.
-
-// One thread. Errors of writing stay in the stream.
+// One thread. Memory: one chunk, and some 100 bytes for each chunk written.
+//  Errors of writing stay in the stream.
 class McapWriter {
  public:
   static constexpr std::size_t kMaxChannels = 65535;  // a channel's number has 16 bits

@@ -1,22 +1,19 @@
 #include "daemon/tools/gesture/gesture_report.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <iterator>
 #include <map>
 #include <numeric>
 #include <optional>
-#include <span>
-#include <string>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/picture/figure.hpp"
-#include "daemon/tools/report/gesture_sections.hpp"
 #include "models/gesture/apart.hpp"
-#include "models/gesture/drawn_tree.hpp"
 #include "models/gesture/pose_channels.hpp"
 #include "models/gesture/train.hpp"
 #include "models/motion/naturalness.hpp"
@@ -460,6 +457,7 @@ void add_comparison(const GestureReport& report, const GestureFigures& figures,
 
 std::vector<report::LagError> lag_curve(const trajectory::StateInformation& information,
                                         std::span<const int> labels) {
+  assert(!labels.empty());
   const auto rows_of = [&](const perform::PerformOptions& options) {
     return perform::recording_of(information.model(),
                                  perform::perform(information, labels, options))

@@ -1,7 +1,6 @@
 // `posed smooth`: runs a recorded hand through the live smoother, as a stream would have been.
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>

@@ -1,7 +1,6 @@
 // `posed synth`: performs a sequence of labels with a hand or a body and writes a file.
 #include <charconv>
 #include <cmath>
-#include <filesystem>
 #include <memory>
 
 #include <spdlog/fmt/fmt.h>

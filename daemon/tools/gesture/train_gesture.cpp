@@ -1,6 +1,5 @@
 #include "daemon/tools/gesture/train_gesture.hpp"
 
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <utility>
@@ -26,9 +25,6 @@
 namespace posed::tools {
 namespace {
 
-// `posed train gesture --auto-label`: proposes labels for a recording of which few parts are
-// labelled, or which is a single movement.
-
 constexpr const char* kDefaultRest = "rest";
 
 struct AutoLabelOptions {
@@ -41,7 +37,9 @@ struct AutoLabelOptions {
   bool json;
 };
 
-// Returns the exit code; prints results on stdout and errors on stderr.
+// `posed train gesture --auto-label`: proposes labels for a recording of which few parts are
+// labelled, or which is a single movement. Returns the exit code; prints results on stdout and
+// errors on stderr.
 int auto_label(const AutoLabelOptions& options) {
   const bool one_movement = !options.movement.empty();
   const auto recording =

@@ -1,14 +1,10 @@
 #include "daemon/tools/live/chosen_stream.hpp"
 
-#include <algorithm>
-#include <cmath>
-#include <cstddef>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/tools/command/paint.hpp"
-#include "daemon/tools/live/live_view.hpp"
 #include "daemon/tools/picture/braille.hpp"
 #include "models/motion/motion.hpp"
 #include "models/style/style_filter.hpp"

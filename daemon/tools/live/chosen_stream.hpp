@@ -58,10 +58,8 @@ class StreamFigure {
   std::optional<picture::StripLayout> room_{};
 };
 
-// A row of bars from a list of numbers, one character each, for a terminal.
-
-// The tallest of the eight bars is the largest value. What is not above 0, or not finite, is the
-// lowest bar.
+// A row of bars from a list of numbers, one character each, for a terminal. The tallest of the
+// eight bars is the largest value. What is not above 0, or not finite, is the lowest bar.
 [[nodiscard]] inline std::string sparkline(const std::vector<double>& values) {
   const auto height = [](double value) {
     return std::isfinite(value) ? std::max(value, 0.0) : 0.0;

@@ -7,11 +7,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <functional>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>

@@ -13,10 +13,6 @@ class Stats;
 class StreamStats;
 }  // namespace posed::v1
 
-namespace posed::v1 {
-class Stats;
-}
-
 namespace posed::tools {
 
 // The table of streams of the live view: one row a stream, with its health by word and colour. A

@@ -29,8 +29,6 @@
 namespace posed::tools {
 namespace {
 
-// The part of `posed convert` that lists the takes of a log.
-
 // The line is like "2  walk  from 3.20 s, 10.05 s long". Of a take with gaps only what is left has
 // a time, so that it may seem shorter than it was.
 Findings findings_of(const LoggedTake& take) {
@@ -53,7 +51,7 @@ Findings findings_of(const LoggedTake& take) {
   return findings.say(fmt::format("{}  {}  {}{}", take.row.id, clean(take.row.name), time, end));
 }
 
-// Prints those of the log at `path`, a line each, or as JSON. Returns the exit code.
+// Prints the takes of the log at `path`, a line each, or as JSON. Returns the exit code.
 int list_takes(const std::string& path, bool json) {
   auto reader = log::Reader::open(path);
   if (!reader) return report(reader.error());
@@ -67,9 +65,7 @@ int list_takes(const std::string& path, bool json) {
   return findings.show(json, -1);
 }
 
-// The part of `posed convert` that writes a whole log as MCAP.
-
-// Returns the exit code. Ctrl-C leaves no file.
+// Writes a whole log as MCAP. Returns the exit code. Ctrl-C leaves no file.
 int convert_to_mcap(const std::string& log, const std::string& out, bool json) {
   const auto summary = [&] {
     // A file is written with signals blocked, so the thread that shows the wait receives Ctrl-C.

@@ -11,7 +11,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <thread>
 #include <vector>
 
@@ -81,19 +80,19 @@ Result<> compare(const FarmLog& log, Together& together, ReplayOutcome& outcome)
   outcome.missing = missing_from(*reader, **opened);
   ReplayOutputs outputs(**opened);
   outputs.expectation = std::move(*expectation);
-  std::int64_t told_ns = 0;
+  std::int64_t reported_ns = 0;
   const auto pace = [&](const log::ChunkRow& chunk) {
     if (static_cast<pipeline::Direction>(chunk.direction) == pipeline::Direction::kFromDevice) {
-      const auto at_ns = std::clamp<std::int64_t>(chunk.arrival_ns - log.first_ns, told_ns,
-                                                  std::max(told_ns, log.length_ns));
-      together.replayed_ns += at_ns - told_ns;
-      told_ns = at_ns;
+      const auto at_ns = std::clamp<std::int64_t>(chunk.arrival_ns - log.first_ns, reported_ns,
+                                                  std::max(reported_ns, log.length_ns));
+      together.replayed_ns += at_ns - reported_ns;
+      reported_ns = at_ns;
     }
     return !together.stop && !outputs.difference;
   };
   auto done = (*opened)->run([&](const pipeline::Item& item) { outputs.add(item); }, pace);
   if (done) done = outputs.finish();
-  together.replayed_ns += log.length_ns - told_ns;
+  together.replayed_ns += log.length_ns - reported_ns;
   outcome.frames = outputs.frames;
   outcome.raw_frames = outputs.raw_frames;
   outcome.counts = outputs.expectation->counts();

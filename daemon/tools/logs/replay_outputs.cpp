@@ -1,8 +1,6 @@
 #include "daemon/tools/logs/replay_outputs.hpp"
 
 #include <algorithm>
-#include <array>
-#include <cstdint>
 
 #include <spdlog/fmt/fmt.h>
 

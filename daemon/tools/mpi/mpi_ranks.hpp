@@ -68,9 +68,8 @@ class Link {
   std::vector<std::string> hosts_;  // [rank]
 };
 
-// The numbers of a list of tasks as the bytes of one message.
-
-// Of each result its length, then its numbers; all as doubles, so that their bits are kept.
+// The numbers of a list of tasks as one message: of each result its length, then its numbers; all
+// as doubles, so that their bits are kept.
 [[nodiscard]] inline std::vector<double> packed(std::span<const TaskResult> results) {
   std::vector<double> numbers;
   for (const TaskResult& result : results) {
@@ -92,10 +91,6 @@ class Link {
   return results;
 }
 
-// The ranks of `posed-mpi`. All run one command in step; rank 0 leads: it alone asks the caller
-// whether to go on, prints and writes. Task i is computed by rank i modulo their number; the
-// results go through the leader to all, so every rank goes on with the same bits.
-
 // How many threads compute in each rank: its share of the machine's cores, but not more than mpirun
 // has bound it to.
 [[nodiscard]] unsigned threads_here(const Link& link);
@@ -103,6 +98,9 @@ class Link {
 // Whether the leader has written the model; for a signal handler.
 extern volatile std::sig_atomic_t g_model_is_there;
 
+// The ranks of `posed-mpi`. All run one command in step; rank 0 leads: it alone asks the caller
+// whether to go on, prints and writes. Task i is computed by rank i modulo their number; the
+// results go through the leader to all, so every rank goes on with the same bits.
 class MpiRanks : public tools::Ranks, protected TaskRunner {
  public:
   // `command_line` must be the same in all ranks. The link outlives this.

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <string_view>
+#include <cassert>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -11,7 +11,6 @@
 #include "daemon/net/zap_authenticator.hpp"
 #include "daemon/publish/subscriptions.hpp"
 #include "daemon/system/event_fd.hpp"
-#include "proto/frame/time.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/zmq/keys.hpp"
 
@@ -52,6 +51,7 @@ constexpr std::int64_t kNoStats_ns = 3 * kNanosPerSecond;  // three stats are mi
 
 std::optional<std::string> MergedStats::accept(std::size_t upstream, std::string_view bytes,
                                                std::int64_t now_ns, bool& valid) {
+  assert(upstream < latest_.size());
   Latest& latest = latest_[upstream];
   valid = latest.stats.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
   if (!valid) {

@@ -5,7 +5,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -72,17 +71,16 @@ class MergedStats {
   std::vector<Latest> latest_;  // [upstream]
 };
 
-// RelayedStreams: what a relay knows of the streams that pass it. Each stream belongs to the
-// upstream that sends it; a second one that sends a stream of the same name is not mixed in. The
-// last skeleton of each stream is kept for subscribers that come later. No socket, no clock of its
-// own, one thread. Cold: allocates.
-
 inline constexpr std::size_t kMaxStreams = 1024;
 inline constexpr std::size_t kMaxSkeletonBytes = 16 * 1024 * 1024;  // of all streams together
 
 // The stream of a topic such as "pose/walker"; empty for other topics.
 [[nodiscard]] std::string_view stream_of_topic(std::string_view topic);
 
+// RelayedStreams: what a relay knows of the streams that pass it. Each stream belongs to the
+// upstream that sends it; a second one that sends a stream of the same name is not mixed in. The
+// last skeleton of each stream is kept for subscribers that come later. No socket, no clock of its
+// own, one thread. Cold: allocates.
 class RelayedStreams {
  public:
   // A message of the stream came from an upstream (its index). Returns false if it may not pass: if
@@ -120,11 +118,6 @@ class RelayedStreams {
   std::int64_t forgot_ns_ = 0;
 };
 
-// Relay: passes on what one or several daemons publish, so that hundreds of subscribers cost the
-// capture machine one connection. Messages pass unchanged; subscriptions travel the other way. A
-// subscriber that comes later gets the skeletons of its streams at once. Newest data wins: every
-// queue is short, and a slow subscriber loses messages for itself alone.
-
 inline constexpr std::size_t kMaxUpstreams = 16;
 
 struct RelayOptions {
@@ -148,6 +141,10 @@ struct RelayCounts {
   std::size_t streams = 0;
 };
 
+// Relay: passes on what one or several daemons publish, so that hundreds of subscribers cost the
+// capture machine one connection. Messages pass unchanged; subscriptions travel the other way. A
+// subscriber that comes later gets the skeletons of its streams at once. Newest data wins: every
+// queue is short, and a slow subscriber loses messages for itself alone.
 class Relay {
  public:
   // Binds, and connects in the background.

@@ -1,11 +1,11 @@
 #include "daemon/tools/report/gesture_sections.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "daemon/tools/report/plot.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::report {
@@ -200,6 +200,8 @@ std::string cell_at(double x, double y, double share, bool agrees) {
 }  // namespace
 
 Figure label_confusion(const Confusion& confusion) {
+  assert(confusion.share.size() == confusion.given.size());
+  assert(confusion.frames.size() == confusion.given.size());
   std::string out = fmt::format(
       "<text class=\"quiet\"{} y=\"16\">{}</text>\n"
       "<text class=\"quiet end\"{}{}>given label</text>\n",

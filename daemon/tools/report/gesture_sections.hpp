@@ -2,7 +2,6 @@
 // et al.; models/gesture/README.md, "References"). Cold.
 #pragma once
 
-#include <array>
 #include <string>
 #include <vector>
 

@@ -6,16 +6,14 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "daemon/tools/report/plot.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/text/svg.hpp"
 
 namespace posed::report {
 namespace {
 
-// The style sheet of every report. The poses are drawn by daemon/picture for white paper; the rules
-// of `.strip` turn its greys and its white outlines to the page's own.
-
+// The style sheet of every report. The poses are drawn by daemon/tools/picture for white paper; the
+// rules of `.strip` turn its greys and its white outlines to the page's own.
 constexpr const char* kStyleSheet = R"(
 :root{color-scheme:light dark;--paper:#fff;--ink:#1b1f24;--soft:#57606a;--line:#d0d7de;
 --card:#f6f8fa;--good:#00664d;--bad:#b03a00;--s0:#0072b2;--s1:#d55e00;--s2:#009e73;--s3:#cc79a7;

@@ -1,6 +1,7 @@
 #include "daemon/tools/report/plot.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <utility>
 
@@ -259,6 +260,7 @@ void Plot::word(const Point& beside, std::string_view text) {
 
 int Plot::name_points(std::span<const Point> points, std::span<const std::string> names) {
   constexpr double kLine_px = 13.0;
+  assert(points.size() == names.size());
   std::vector<Box> taken;
   for (const Point& point : points) {
     if (shows(point)) taken.push_back(Box::around(x_.px(point.x), y_.px(point.y), kMark_px));

@@ -5,7 +5,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "daemon/tools/report/plot.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::report {

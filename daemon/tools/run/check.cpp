@@ -144,7 +144,7 @@ Findings findings_of(const config::OutputConfig& output) {
   }
   if (output.rate_hz > 0.0) {
     findings.add("rate_hz", output.rate_hz);
-    line += fmt::format(", at most {} Hz", output.rate_hz);
+    line += ", at most " + findings.all().back().json() + " Hz";
   }
   return findings.say(clean(line));
 }

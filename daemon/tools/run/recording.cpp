@@ -5,10 +5,8 @@
 #include <chrono>
 #include <csignal>
 #include <ctime>
-#include <filesystem>
 #include <memory>
 #include <set>
-#include <string>
 #include <system_error>
 #include <thread>
 #include <utility>
@@ -16,7 +14,6 @@
 
 #include <spdlog/fmt/chrono.h>
 #include <spdlog/fmt/fmt.h>
-#include <spdlog/spdlog.h>
 
 #include "daemon/assembly/daemon.hpp"
 #include "daemon/record/recorder.hpp"
@@ -24,16 +21,12 @@
 #include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/export/log_clip.hpp"
-#include "daemon/tools/run/serve.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/frames_clip.hpp"
-#include "proto/frame/result.hpp"
 #include "proto/log/files.hpp"
 
 namespace posed::tools {
 namespace {
-
-// The takes of a finished log as files.
 
 Result<> write_clip(Result<clip::Clip> clip, const std::filesystem::path& path) {
   if (!clip) return std::unexpected(clip.error());

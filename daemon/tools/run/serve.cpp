@@ -1,10 +1,8 @@
 #include "daemon/tools/run/serve.hpp"
 
 #include <algorithm>
-#include <csignal>
 #include <cstdlib>
 #include <iterator>
-#include <string>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>

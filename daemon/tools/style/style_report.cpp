@@ -4,10 +4,6 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 #include <Eigen/Core>

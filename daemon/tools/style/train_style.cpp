@@ -3,7 +3,6 @@
 #include <memory>
 #include <numbers>
 #include <optional>
-#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
@@ -12,7 +11,6 @@
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
-#include "daemon/tools/style/experiment.hpp"
 #include "daemon/tools/style/style_report.hpp"
 #include "daemon/tools/style/train_style.hpp"
 #include "models/fixed_products.hpp"

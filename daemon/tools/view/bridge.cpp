@@ -4,11 +4,7 @@
 
 #include <chrono>
 #include <csignal>
-#include <memory>
-#include <optional>
-#include <string_view>
 #include <thread>
-#include <utility>
 
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/io_context.hpp>
@@ -19,7 +15,6 @@
 #include "daemon/http/server.hpp"
 #include "daemon/net/security.hpp"
 #include "daemon/system/clock.hpp"
-#include "daemon/tools/view/hub.hpp"
 #include "proto/frame/time.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/zmq/zmq_handle.hpp"

@@ -79,10 +79,6 @@ class TabSession : public std::enable_shared_from_this<TabSession> {
   bool open_ = false, reading_ = false, is_sending_ = false;
 };
 
-// Bridge: what `posed view` runs. A thread of its own serves the page over HTTP, passes on what a
-// daemon publishes to every open page at that page's pace, and the pages' requests to the daemon.
-// For the daemon it is one client like any other.
-
 inline constexpr std::uint16_t kUsualPort = 5580;
 
 struct BridgeOptions {
@@ -96,6 +92,9 @@ struct BridgeOptions {
 // Whether an address is this machine's own, which no other machine reaches.
 [[nodiscard]] Result<bool> is_loopback_address(const std::string& address);
 
+// Bridge: what `posed view` runs. A thread of its own serves the page over HTTP, passes on what a
+// daemon publishes to every open page at that page's pace, and the pages' requests to the daemon.
+// For the daemon it is one client like any other.
 class Bridge {
  public:
   // Reads the page, listens and connects in the background.

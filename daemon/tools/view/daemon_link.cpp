@@ -4,7 +4,6 @@
 #include <cstring>
 #include <utility>
 
-#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 #include <boost/asio/post.hpp>
 

@@ -76,9 +76,6 @@ struct Greeting {
 [[nodiscard]] Parcel clock_word(double t0, std::int64_t monotonic_ns);
 [[nodiscard]] Parcel no_reply_word(std::uint32_t number, const std::string& sentence);
 
-// The daemon's messages go to every open page, the pages' requests to the daemon, and each reply
-// back to the page that asked.
-
 inline constexpr std::size_t kMaxViewStreams = 1024;  // more are not shown
 inline constexpr std::size_t kMaxUnderWay = 8;        // requests of one page at once
 
@@ -97,6 +94,8 @@ struct HubCounts {
   std::uint64_t no_reply = 0;  // requests that the daemon did not answer in time
 };
 
+// The daemon's messages go to every open page, the pages' requests to the daemon, and each reply
+// back to the page that asked.
 class Hub {
  public:
   // Sends a request to the daemon's control socket under a ticket; returns false if it cannot be
