@@ -98,12 +98,12 @@ struct FingerGap {
 
 struct GestureEvaluation {
   std::string labels;
-  Smoothness performed;
-  std::vector<report::LagError> curve;
-  std::optional<FingerGap> gap;
-  std::optional<double> feet_off_m;
-  std::optional<Beside> beside;
-  std::optional<Holds> holds;
+  Smoothness performed{};
+  std::vector<report::LagError> curve{};
+  std::optional<FingerGap> gap{};
+  std::optional<double> feet_off_m{};
+  std::optional<Beside> beside{};
+  std::optional<Holds> holds{};
 
   // Whether the performance is good enough to be shown: fingers do not overlap; the held poses of a
   // body are nearer to real ones than the mean pose of the training recordings is, where those are
