@@ -22,13 +22,14 @@ namespace posed {
 // Stages a stream may have, and so the length of Frame::stage_us.
 inline constexpr std::size_t kMaxStages = std::tuple_size_v<decltype(Frame::stage_us)>;
 
-// What goes from stage to stage. It borrows: everything is valid during the call that hands it on.
+// A frame on its way from stage to stage. It borrows: everything is valid during the call that
+// passes it on.
 struct StageFrame {
   const Frame& frame;
   // Posterior variance of the pose, one a rotation channel in the order of Frame::angle_rad
   // [rad^2]; infinite where nothing is known. Empty: no stage so far estimates it.
   std::span<const double> variance_rad2{};
-  // The same frame before its style was changed: as the source gave it, or as merge joined it. Null
+  // This frame before its style was changed: as the source gave it, or as merge joined it. Null
   // behind a stage that holds frames back or makes its own: the source's frame is gone by then.
   const Frame* input = nullptr;
 };
@@ -63,7 +64,7 @@ struct ParameterState {
   double target = 0.0;  // differs from `now` while the stage changes it gradually
 };
 
-// Something that a stage tells people by itself, once. RT-safe.
+// A sentence that a stage reports by itself, once.
 struct StageNotice {
   std::size_t index = 0;  // in StageType::notices
 };
@@ -80,7 +81,7 @@ struct StageCommand {
     std::memcpy(command.bytes.data(), &value, sizeof(T));
     return command;
   }
-  // What of() has put in. RT-safe.
+  // The value that of() has stored; a default one for another type. RT-safe.
   template <typename T>
   [[nodiscard]] T as() const noexcept {
     T value{};
@@ -106,8 +107,7 @@ class Stage {
   virtual void partner(std::size_t /*partner*/, const StageFrame& /*in*/,
                        StageOut& /*out*/) noexcept {}
 
-  // Something of the stream arrived, a frame or a sample: it is not silent. Called before
-  // process().
+  // A frame or a sample of the stream arrived, so it is not silent. Called before process().
   virtual void heard(std::int64_t /*arrival_ns*/) noexcept {}
   // When tick() is wanted if nothing arrives until then; kNoTime_ns: it is not.
   [[nodiscard]] virtual std::int64_t next_due_ns() const noexcept { return kNoTime_ns; }
@@ -129,7 +129,7 @@ class Stage {
   [[nodiscard]] virtual double reading(std::size_t /*reading*/) const noexcept {
     return std::numeric_limits<double>::quiet_NaN();
   }
-  // The oldest thing that it has to tell and has not told yet; asked after each call above.
+  // The oldest notice that has not been reported yet; called after each call above.
   [[nodiscard]] virtual std::optional<StageNotice> take_notice() noexcept { return std::nullopt; }
   // `model` is one that the StageType bound; it outlives its use. The one before is no longer read.
   virtual void use(const StageModel& /*model*/) noexcept {}
@@ -139,7 +139,7 @@ class Stage {
                                      const StageCommand& /*command*/) noexcept {
     return false;
   }
-  // What the command does, for people: "g 1 c".
+  // Describes the command for the event of its stream: "g 1 c".
   virtual void describe(std::size_t /*index*/, const StageCommand& /*command*/,
                         ShortText& /*text*/) const noexcept {}
 };

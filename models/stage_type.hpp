@@ -4,6 +4,8 @@
 // constants.
 #pragma once
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -30,7 +32,7 @@ struct StagePartner {
   double rate_hz = 0.0;                        // nominal; 0: unknown
 };
 
-// What a stage is made for.
+// The stream that a stage is made for.
 struct StageContext {
   std::shared_ptr<const Skeleton> skeleton{};  // of the frames that enter; never null
   double rate_hz = 0.0;                        // nominal, of the stream; 0: unknown
@@ -44,7 +46,7 @@ struct ParameterFault {
   std::string sentence;
 };
 
-// Something that a stage does on request, once: "play". Control sends it, the device log keeps it.
+// An action of a stage on request, once: "play". Control sends it, the device log keeps it.
 struct StageCommandType {
   std::string_view name;
   std::string_view help;
@@ -68,7 +70,7 @@ struct StageReadingType {
   std::string_view help;
 };
 
-// Something that a stage tells people by itself, as an event of its stream.
+// A sentence that a stage reports by itself, as an event of its stream.
 struct StageNoticeType {
   std::string_view sentence;  // without a full stop
   bool is_warning = true;     // else a calibration that took effect
@@ -95,7 +97,7 @@ struct StageType {
   // Whether a stream without a table for this stage has it all the same; null: never.
   bool (*is_default)(const Skeleton& skeleton) = nullptr;
   // Checks what the range of a single parameter cannot, before the stage is made; live parameters
-  // must be sound in any combination. Null: nothing.
+  // must be valid in any combination. Null: nothing.
   std::optional<ParameterFault> (*check)(const Parameters& parameters, bool has_model) = nullptr;
   // Replaces the names of files by what the stage needs of them, so that the device log holds all
   // that a replay needs. Null: no parameter names a file.
@@ -129,5 +131,24 @@ struct StageType {
 
   [[nodiscard]] bool has_model() const noexcept { return bind_model != nullptr; }
 };
+
+// Live parameters that are text of no fixed words, such as the weights of styles: what they mean
+// may depend on the stage's model, and the stage gets it in a form of its own. So the stage's type
+// has a command of the same name, whose only word is the text; control, device log and replay
+// handle the parameter as that command. This is its index in StageType::commands; empty for a
+// parameter that is no such text.
+[[nodiscard]] inline std::optional<std::size_t> text_command(const StageType& type,
+                                                             const ParameterSpec& spec) noexcept {
+  if (!spec.live || has_number(spec)) return std::nullopt;
+  const auto found = std::ranges::find(type.commands, spec.name, &StageCommandType::name);
+  if (found == type.commands.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - type.commands.begin());
+}
+
+// Whether this command is the one of a live text.
+[[nodiscard]] inline bool is_live_text(const StageType& type, std::string_view command) noexcept {
+  const ParameterSpec* const spec = find_parameter(type.parameters, command);
+  return spec != nullptr && text_command(type, *spec).has_value();
+}
 
 }  // namespace posed

@@ -1,6 +1,7 @@
 // Values as the plain numbers of a task's result, and back in the same order. Cold.
 #pragma once
 
+#include <cassert>
 #include <string>
 #include <string_view>
 
@@ -40,7 +41,7 @@ class NumberReader {
 
   [[nodiscard]] bool at_end() const { return left_ == 0; }
   [[nodiscard]] double number() {
-    eigen_assert(left_ > 0);
+    assert(left_ > 0);
     --left_;
     return *next_++;
   }
@@ -49,7 +50,7 @@ class NumberReader {
     const Eigen::Index rows = index();
     const Eigen::Index cols = index();
     const auto size = static_cast<std::size_t>(rows * cols);
-    eigen_assert(left_ >= size);
+    assert(left_ >= size);
     const double* const values = next_;
     next_ += size;
     left_ -= size;

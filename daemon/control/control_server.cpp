@@ -113,7 +113,7 @@ bool ControlServer::take_request() {
   }
   if (envelope.size() > kMaxEnvelope) return true;  // not a client of this protocol: no reply
   ++requests_;
-  (void)guard_->take_gone();  // this socket keeps no state for a connection
+  (void)guard_->drain_ended();  // this socket keeps no state for a connection
   if (const int client = net::source_of(part); guard_->knows(client)) guard_->heard(client, {});
   if (ports_.authenticator != nullptr &&
       !ports_.authenticator->allows(part.property("User-Id"), net::Domain::kControl)) {
@@ -137,7 +137,7 @@ bool ControlServer::take_ack() {
 // A ROUTER socket drops a reply that a slow or disconnected client does not accept.
 void ControlServer::send(const Reply& reply) {
   if (reply.refused) ++refusals_;
-  net::hear_peers(router_.get());
+  net::update_peers(router_.get());
   for (const std::string& part : reply.to) {
     if (!net::send_part(router_.get(), part, true)) return;
   }

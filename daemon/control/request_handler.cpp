@@ -10,7 +10,7 @@
 
 #include "daemon/control/stage_requests.hpp"
 #include "daemon/devices/about_stream.hpp"
-#include "models/live_text.hpp"
+#include "models/stage_type.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
 #include "proto/text/clean.hpp"

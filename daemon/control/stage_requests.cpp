@@ -9,7 +9,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "models/live_text.hpp"
+#include "models/stage_type.hpp"
 #include "models/stages/registry.hpp"
 #include "proto/model/model_file.hpp"
 #include "proto/text/clean.hpp"

@@ -65,14 +65,14 @@ Result<> listen(Tcp::acceptor& acceptor, const Tcp::endpoint& at, const std::str
 
 }  // namespace
 
-Result<std::unique_ptr<Server>> Server::open(asio::io_context& io, Room& room,
+Result<std::unique_ptr<Server>> Server::open(asio::io_context& io, Connections& connections,
                                              const Options& options) {
   Tcp::acceptor acceptor(io);
   const asio::ip::address address = options.at.address();
   auto listens = listen(acceptor, options.at, options.advice);
   if (!listens && options.or_any) listens = listen(acceptor, {address, 0}, options.advice);
   if (!listens) return std::unexpected(listens.error());
-  std::unique_ptr<Server> server(new Server(io, room, std::move(acceptor)));
+  std::unique_ptr<Server> server(new Server(io, connections, std::move(acceptor)));
   const std::uint16_t port = server->acceptor_.local_endpoint().port();
   const auto shown = address.is_unspecified() ? asio::ip::make_address("127.0.0.1") : address;
   server->port_ = port;
@@ -82,8 +82,8 @@ Result<std::unique_ptr<Server>> Server::open(asio::io_context& io, Room& room,
   return server;
 }
 
-Server::Server(asio::io_context& io, Room& room, Tcp::acceptor acceptor)
-    : room_(room), acceptor_(std::move(acceptor)), pause_(io) {}
+Server::Server(asio::io_context& io, Connections& connections, Tcp::acceptor acceptor)
+    : connections_(connections), acceptor_(std::move(acceptor)), pause_(io) {}
 
 void Server::accept() {
   acceptor_.async_accept([this](const ErrorCode& error, Tcp::socket socket) {
@@ -102,13 +102,13 @@ void Server::accept() {
 
 // Strangers cannot keep others out by holding connections: the oldest makes room.
 void Server::admit(Tcp::socket socket) {
-  if (room_.sessions.size() + room_.service.upgraded() >= kMaxConnections) {
-    if (room_.sessions.empty()) return;
-    room_.sessions.front()->close();
+  if (connections_.sessions.size() + connections_.service.upgraded() >= kMaxConnections) {
+    if (connections_.sessions.empty()) return;
+    connections_.sessions.front()->close();
   }
   ErrorCode ignored;
   socket.set_option(Tcp::no_delay(true), ignored);
-  std::make_shared<Session>(std::move(socket), room_)->read();
+  std::make_shared<Session>(std::move(socket), connections_)->read();
 }
 
 }  // namespace posed::http

@@ -1,5 +1,5 @@
-// Server: a small HTTP server, by Boost.Beast. It accepts connections and asks a service what to
-// answer. Every connection has limits of its own in bytes and time, and there is a limit for all
+// Server: a small HTTP server on top of Boost.Beast. It accepts connections and asks a service what
+// to answer. Every connection has limits of its own in bytes and time, and there is a limit for all
 // together, so strangers can neither fill the memory nor keep the server's users out for good. One
 // thread: the one that runs the io_context. Cold.
 #pragma once
@@ -19,32 +19,34 @@
 
 namespace posed::http {
 
-inline constexpr std::size_t kMaxConnections = 64;  // at once; one more ends the oldest
+inline constexpr std::size_t kMaxConnections = 64;  // one more ends the oldest
 
 class Server {
  public:
   // Where to listen.
   struct Options {
-    boost::asio::ip::tcp::endpoint at{};  // port 0: any free one
-    bool or_any = false;                  // if the port is in use, any free one
-    std::string advice{};                 // what to do if none can be had; ends the error
+    boost::asio::ip::tcp::endpoint at{};  // port 0: the system chooses one
+    bool or_any = false;                  // if the port is in use, the system chooses another one
+    std::string advice{};                 // the end of the error: what to do if no port is free
   };
-  // `io` and `room` outlive the server.
-  [[nodiscard]] static Result<std::unique_ptr<Server>> open(boost::asio::io_context& io, Room& room,
+  // `io` and `connections` outlive the server.
+  [[nodiscard]] static Result<std::unique_ptr<Server>> open(boost::asio::io_context& io,
+                                                            Connections& connections,
                                                             const Options& options);
 
   [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
-  // "http://127.0.0.1:5580/". Where it listens on all addresses, that of this machine for itself.
+  // "http://127.0.0.1:5580/". A server that listens on all addresses gives the loopback address.
   [[nodiscard]] const std::string& url() const noexcept { return url_; }
-  // The Host headers of its own addresses, for is_own_host().
+  // Lists the Host headers of its own addresses, for is_own_host().
   [[nodiscard]] const std::vector<std::string>& hosts() const noexcept { return hosts_; }
 
  private:
-  Server(boost::asio::io_context& io, Room& room, boost::asio::ip::tcp::acceptor acceptor);
+  Server(boost::asio::io_context& io, Connections& connections,
+         boost::asio::ip::tcp::acceptor acceptor);
   void accept();
   void admit(boost::asio::ip::tcp::socket socket);
 
-  Room& room_;
+  Connections& connections_;
   boost::asio::ip::tcp::acceptor acceptor_;
   boost::asio::steady_timer pause_;
   std::uint16_t port_ = 0;

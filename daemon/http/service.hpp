@@ -1,5 +1,5 @@
-// Service: what an HTTP server serves. All calls come from the thread that runs the io_context.
-// Cold.
+// Service: answers the requests of an HTTP server. All calls come from the thread that runs the
+// io_context. Cold.
 #pragma once
 
 #include <cstddef>
@@ -25,24 +25,24 @@ class Service {
   virtual ~Service() = default;
 
   [[nodiscard]] virtual Answer answer(const Request& request) = 0;
-  // What each answer says beside its own headers.
+  // Returns the headers that every answer carries besides its own.
   [[nodiscard]] virtual std::vector<Header> headers(std::string_view host) const {
     static_cast<void>(host);
     return {{"X-Content-Type-Options", "nosniff"}};
   }
-  // Takes the connection of a request that was answered by 101.
+  // Becomes the owner of the connection of a request that was answered with status 101.
   virtual void upgrade(boost::beast::tcp_stream stream, const Message& request) {
     static_cast<void>(request);
     stream.close();
   }
-  // Connections that were taken so and still stand; they count with the others.
+  // Counts the open connections that were upgraded; they count towards kMaxConnections.
   [[nodiscard]] virtual std::size_t upgraded() const { return 0; }
 };
 
 class Session;
 
-// The service and its connections, the oldest first. Outlives them and the io_context.
-struct Room {
+// The service and its open connections, the oldest first. It outlives them and the io_context.
+struct Connections {
   Service& service;
   std::list<Session*> sessions{};
 };

@@ -36,16 +36,16 @@ Request parts_of(const Message& message) {
           .upgrade = beast::websocket::is_upgrade(message)};
 }
 
-Session::Session(boost::asio::ip::tcp::socket socket, Room& room)
-    : room_(room),
-      place_(room.sessions.insert(room.sessions.end(), this)),
+Session::Session(boost::asio::ip::tcp::socket socket, Connections& connections)
+    : connections_(connections),
+      place_(connections.sessions.insert(connections.sessions.end(), this)),
       stream_(std::move(socket)),
       buffer_(2 * kMaxHeader) {}
 
 Session::~Session() { close(); }
 
 void Session::close() {
-  if (place_) room_.sessions.erase(*place_);
+  if (place_) connections_.sessions.erase(*place_);
   place_.reset();
   stream_.close();
 }
@@ -63,7 +63,7 @@ void Session::read() {
 }
 
 void Session::obey() {
-  const Answer answer = room_.service.answer(parts_of(parser_->get()));
+  const Answer answer = connections_.service.answer(parts_of(parser_->get()));
   if (!answer.upgrades()) return send(answer);
   upgrade();
 }
@@ -72,7 +72,7 @@ void Session::upgrade() {
   // A browser sends nothing before the answer to its handshake.
   if (buffer_.size() > 0) return close();
   stream_.expires_never();  // what the connection becomes has limits of its own
-  room_.service.upgrade(std::move(stream_), parser_->get());
+  connections_.service.upgrade(std::move(stream_), parser_->get());
 }
 
 void Session::send(const Answer& answer) {
@@ -97,7 +97,7 @@ void Session::send_message(const Answer& answer, typename Body::value_type body)
   set("Cache-Control", answer.etag.empty() ? "no-store" : "no-cache");
   if (!answer.etag.empty()) set("ETag", answer.etag);
   if (answer.status == 405) set("Allow", "GET, HEAD");
-  for (const Header& header : room_.service.headers(text(request[protocol::field::host]))) {
+  for (const Header& header : connections_.service.headers(text(request[protocol::field::host]))) {
     set(beast::string_view(header.name.data(), header.name.size()), header.value);
   }
   // A body is never read, so nothing can follow one.

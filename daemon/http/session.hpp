@@ -18,18 +18,18 @@
 
 namespace posed::http {
 
-// What services look at; valid as long as the message.
+// Returns the parts of a message that services use. They are valid as long as the message.
 [[nodiscard]] Request parts_of(const Message& message);
 
 class Session : public std::enable_shared_from_this<Session> {
  public:
-  Session(boost::asio::ip::tcp::socket socket, Room& room);
+  Session(boost::asio::ip::tcp::socket socket, Connections& connections);
   ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
   void read();
-  // Its place in the room is free at once.
+  // Removes the session from the connections at once.
   void close();
 
  private:
@@ -40,11 +40,11 @@ class Session : public std::enable_shared_from_this<Session> {
   template <typename Body>
   void send_message(const Answer& answer, typename Body::value_type body);
 
-  Room& room_;
+  Connections& connections_;
   std::optional<std::list<Session*>::iterator> place_;  // empty once closed
   boost::beast::tcp_stream stream_;
   boost::beast::flat_buffer buffer_;
-  std::optional<Parser> parser_;  // of the request that is read or answered
+  std::optional<Parser> parser_;  // parses the request that is read or answered
 };
 
 }  // namespace posed::http

@@ -81,7 +81,7 @@ bool LineLimiter::admit(std::int64_t now_ns, int level, std::string_view text) {
   return true;
 }
 
-std::optional<LineLimiter::Line> LineLimiter::take_due(std::int64_t now_ns, bool at_end) {
+std::optional<LineLimiter::Line> LineLimiter::next_summary(std::int64_t now_ns, bool at_end) {
   const auto due = [&](const Cause& cause) {
     return cause.held > 0 && (at_end || now_ns - cause.written_ns >= kPeriod_ns);
   };

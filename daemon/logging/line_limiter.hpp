@@ -23,18 +23,19 @@ class LineLimiter {
   struct Line {
     int level = 0;
     std::string text;
-    std::string cause{};      // of take_due(): of the lines that it stands for
-    std::uint64_t count = 1;  // of take_due(): how many
+    std::string cause{};      // cause_of() the lines that a summary replaces; empty otherwise
+    std::uint64_t count = 1;  // how many lines a summary replaces
   };
 
-  // Whether to write the line now. A line that is held back is counted, and take_due() returns it.
+  // Whether to write the line now. A line that is held back is counted, and next_summary() returns
+  // it.
   [[nodiscard]] bool admit(std::int64_t now_ns, int level, std::string_view text);
 
   // The next summary of lines that were held back, if its second is over; with `at_end`, without
   // waiting. Call it until it returns nothing.
-  [[nodiscard]] std::optional<Line> take_due(std::int64_t now_ns, bool at_end = false);
+  [[nodiscard]] std::optional<Line> next_summary(std::int64_t now_ns, bool at_end = false);
 
-  // When take_due() next has something; kNoTime_ns if no line is held back.
+  // When next_summary() next has something; kNoTime_ns if no line is held back.
   [[nodiscard]] std::int64_t next_due_ns() const;
 
  private:

@@ -143,7 +143,7 @@ class LogOutput::Queue final : public spdlog::sinks::sink {
   }
 
   void sum_up() {
-    while (const auto line = limiter_.take_due(now_ns(), ending_)) {
+    while (const auto line = limiter_.next_summary(now_ns(), ending_)) {
       push({.line = format_text(static_cast<spdlog::level::level_enum>(line->level), line->text),
             .fields = fields_of(*line)});
     }

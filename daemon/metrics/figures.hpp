@@ -1,5 +1,4 @@
-// Figures: everything that the metrics tell, of one moment. Plain values; who has them fills them.
-// Cold.
+// Figures: all values of the metrics at one moment, which their owners fill in. Plain values. Cold.
 #pragma once
 
 #include <cstddef>
@@ -21,13 +20,13 @@ struct RecorderFigures {
   std::filesystem::path file;
   std::uint64_t lost_chunks = 0, lost_frames = 0;
   std::uint64_t errors = 0;            // failed attempts to write
-  std::int64_t error_ns = kNoTime_ns;  // when the last of them was
+  std::int64_t error_ns = kNoTime_ns;  // when the last attempt failed
 };
 
 // The connections of a socket.
 struct SocketFigures {
   std::size_t peers = 0;   // now
-  std::uint64_t cuts = 0;  // that posed has ended because of what they sent, or because of a limit
+  std::uint64_t cuts = 0;  // connections that posed ended, because of their bytes or of a limit
 };
 
 struct Figures {
@@ -35,11 +34,11 @@ struct Figures {
   std::vector<publish::StreamFigures> streams{};
   SocketFigures publish{}, control{};
   control::ControlCounts requests{};
-  std::optional<RecorderFigures> recorder{};  // empty: nothing is recorded
+  std::optional<RecorderFigures> recorder{};  // empty while nothing is recorded
 };
 
-// All of them as Prometheus reads them, with what the system says of the process and of the
-// recording's disk.
+// Writes all figures in the text format of Prometheus, with those that the system has of the
+// process and of the recording's disk.
 [[nodiscard]] std::string metrics_text(const Figures& figures);
 
 }  // namespace posed::metrics

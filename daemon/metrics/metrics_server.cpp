@@ -31,7 +31,7 @@ boost::asio::ip::tcp::endpoint endpoint_of(const drivers::Address& address) {
 }  // namespace
 
 // In the order in which they need each other: connections live in the io_context's handlers and use
-// service and room.
+// service and connections.
 class MetricsServer::Parts {
  public:
   explicit Parts(std::function<Figures()> collect)
@@ -50,7 +50,7 @@ class MetricsServer::Parts {
     const auto address = drivers::parse_endpoint(listen);
     if (!address) return std::unexpected(address.error());
     auto server = http::Server::open(
-        io_, room_,
+        io_, connections_,
         {.at = endpoint_of(*address),
          .advice = "end the program that has this port, or choose another in [metrics]"});
     if (!server) return std::unexpected(server.error());
@@ -79,7 +79,7 @@ class MetricsServer::Parts {
 
   system::Pulse pulse_;
   MetricsService service_;
-  http::Room room_{.service = service_};
+  http::Connections connections_{.service = service_};
   boost::asio::io_context io_{1};
   boost::asio::steady_timer timer_;
   std::unique_ptr<http::Server> server_;

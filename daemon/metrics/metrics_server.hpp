@@ -1,5 +1,5 @@
-// MetricsServer: GET /metrics for Prometheus over HTTP, on loopback, with a cold thread of its own.
-// Whatever comes to its port costs nothing but this thread's time.
+// MetricsServer: serves GET /metrics to Prometheus over HTTP, on loopback, with a cold thread of
+// its own. Requests to its port cost nothing but this thread's time.
 #pragma once
 
 #include <functional>
@@ -16,11 +16,12 @@ class MetricsServer {
  public:
   static constexpr const char* kThreadName = "posed-metrics";
 
-  // `listen`: address and port; port 0: any free one. Starts the thread, which calls `collect`, at
-  // most ten times a second. What that uses outlives the server.
+  // Starts the thread, which calls `collect` at most ten times a second. `listen` is an address and
+  // a port; for port 0 the system chooses one. Everything that `collect` uses must outlive the
+  // server.
   [[nodiscard]] static Result<std::unique_ptr<MetricsServer>> start(
       const std::string& listen, std::function<Figures()> collect);
-  ~MetricsServer();  // ends the thread
+  ~MetricsServer();  // joins the thread
   MetricsServer(const MetricsServer&) = delete;
   MetricsServer& operator=(const MetricsServer&) = delete;
 

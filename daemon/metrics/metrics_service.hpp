@@ -1,5 +1,5 @@
-// MetricsService: what the metrics' HTTP server answers. No socket and no clock of its own; one
-// thread. Cold.
+// MetricsService: answers the requests for metrics. It has neither a socket nor a clock of its own.
+// One thread. Cold.
 #pragma once
 
 #include <cstdint>
@@ -18,13 +18,13 @@ namespace posed::metrics {
 
 class MetricsService final : public http::Service {
  public:
-  // `make` makes the text; it is asked at most once in kKeep_ns, whoever asks how often.
+  // `make` makes the text; it is called at most once per kKeep_ns, however many clients ask.
   static constexpr std::int64_t kKeep_ns = kNanosPerSecond / 10;
   MetricsService(std::function<std::string()> make, Clock clock)
       : make_(std::move(make)), clock_(clock) {}
 
   [[nodiscard]] http::Answer answer(const http::Request& request) override;
-  // The server's own; without them every name may be asked for.
+  // Sets the server's own Host headers; without them every Host header is answered.
   void set_hosts(std::vector<std::string> hosts) { hosts_ = std::move(hosts); }
 
  private:

@@ -20,19 +20,19 @@ using Labels = std::initializer_list<Label>;
 
 class TextFormat {
  public:
-  // Begins the next family. Those of `counter` only grow and their names end in _total; samples of
-  // a `gauge` go up and down.
+  // Each of these begins the next family. Samples of a `counter` only grow, and its name ends in
+  // _total; samples of a `gauge` go up and down; a `histogram` counts durations [s].
   void counter(std::string_view name, std::string_view help) { family(name, "counter", help); }
   void gauge(std::string_view name, std::string_view help) { family(name, "gauge", help); }
-  // Of durations [s].
   void histogram(std::string_view name, std::string_view help) { family(name, "histogram", help); }
 
-  // Samples of the family that was begun last.
+  // Each of these adds a sample to the family that was begun last.
   void sample(Labels labels, std::uint64_t value);
   void sample(Labels labels, double value);
   void sample(Labels labels, const publish::DurationBuckets::Counts& counts);
 
-  [[nodiscard]] std::string take() { return std::move(text_); }
+  // Returns the whole text; the object is empty afterwards.
+  [[nodiscard]] std::string finish() { return std::move(text_); }
 
  private:
   void family(std::string_view name, std::string_view type, std::string_view help);

@@ -211,7 +211,7 @@ void PeerGuard::heard(int fd, std::string_view user) {
   peer.spoke = true;
 }
 
-std::vector<int> PeerGuard::take_gone() {
+std::vector<int> PeerGuard::drain_ended() {
   const std::scoped_lock lock(mutex_);
   return std::exchange(gone_, {});
 }

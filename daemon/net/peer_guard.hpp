@@ -37,15 +37,16 @@ namespace posed::net {
 // before bind.
 [[nodiscard]] Result<> set_receive_limits(void* socket, std::int64_t part_bytes, int messages,
                                           int buffer_bytes);
-// The descriptor of the connection through which a message came; -1 if there is none.
+// Returns the descriptor of the connection through which `message` came; -1 if there is none.
 [[nodiscard]] int source_of(const Message& message);
 
 class ZapAuthenticator;
 
 struct PeerLimits {
-  const char* name = "";      // of the socket, for the log
+  const char* name = "";      // the socket's name in log lines
   std::size_t max_peers = 0;  // further connections are cut at once
-  // Bytes that have not yet become a whole message: of one peer, and of all peers together.
+  // Limits of the bytes that have not yet become a whole message: of one peer, and of all peers
+  // together.
   std::uint64_t max_unheard = 0;
   std::uint64_t max_unheard_of_all = 0;
   ZapAuthenticator* authenticator = nullptr;  // slowed down when a peer is cut for what it sent
@@ -72,7 +73,7 @@ class PeerGuard {
   // Whether `fd` is a connection of this socket at the moment.
   [[nodiscard]] bool knows(int fd);
   // The descriptors of the connections that have ended since the last call.
-  [[nodiscard]] std::vector<int> take_gone();
+  [[nodiscard]] std::vector<int> drain_ended();
   [[nodiscard]] std::size_t peers() const;
   [[nodiscard]] std::uint64_t cuts() const;
 
@@ -87,7 +88,7 @@ class PeerGuard {
   PeerGuard(void* socket, Socket monitor, std::unique_ptr<system::EventFd> wake,
             std::unique_ptr<system::Poller> poller, const PeerLimits& limits);
   void serve();
-  // All below: call with mutex_ held.
+  // Each function below must be called with mutex_ held.
   [[nodiscard]] std::int64_t turn(std::int64_t now_ns);  // returns when the next turn is due
   void hear_monitor();
   void admit(int fd);

@@ -1,4 +1,5 @@
-// Why a daemon does not admit a client, in words, for everything that connects to one. Cold.
+// Explains to a user why a daemon did not admit his client. Every program that connects uses it.
+// Cold.
 #pragma once
 
 #include <filesystem>
@@ -9,8 +10,8 @@
 
 namespace posed::net {
 
-// What follows "the daemon at ENDPOINT ..."; empty for Refusal::kNone. `domain`: what the client
-// wanted; `server_key`: the NAME.pub that it was given.
+// Returns the words that follow "the daemon at ENDPOINT ..."; empty for Refusal::kNone. `domain` is
+// the socket that the client wanted, `server_key` the NAME.pub that it was given.
 [[nodiscard]] std::string refusal_words(Refusal refusal, Domain domain,
                                         const std::filesystem::path& server_key);
 

@@ -13,10 +13,10 @@ struct ZapRequest {
   std::string id;                // returned in the reply
   std::string mechanism;         // "NULL", "CURVE", ...
   std::string key_z85;           // the client's public key; empty without CURVE
-  std::optional<Domain> domain;  // of which socket; empty: none of the daemon's
+  std::optional<Domain> domain;  // the socket that it is for; empty: none of the daemon's
 };
 
-// Empty if the parts are not a request of version 1.0.
+// Parses the parts; empty if they are not a request of version 1.0.
 [[nodiscard]] std::optional<ZapRequest> read_zap_request(std::span<const std::string> parts);
 
 }  // namespace posed::net

@@ -21,25 +21,25 @@ namespace posed::output {
 // One thread.
 class Avatar {
  public:
-  // `hands_only`: of the body only wrists and fingers are written, as an assistant does.
+  // With `hands_only` only the body's wrists and fingers are written, as VMC's role "assistant"
+  // does.
   explicit Avatar(bool hands_only) : hands_only_(hands_only) {}
 
-  // The stream of a part has come, or has left (null). Without an error the part has no pose until
-  // the next take(); an error says why the skeleton cannot move this part, and then it gets none.
-  // Cold.
+  // Sets the skeleton of a part whose stream has come; null when the stream has left. The part has
+  // no pose until the next set_pose(). An error says why the skeleton cannot move this part. Cold.
   [[nodiscard]] Result<> set_skeleton(Part part, std::shared_ptr<const Skeleton> skeleton);
 
-  // A frame of the part's skeleton. Returns false, and does nothing, for a part without one.
-  bool take(Part part, const Frame& frame) noexcept;
+  // Sets the pose of a part. Returns false, and does nothing, for a part without a skeleton.
+  bool set_pose(Part part, const Frame& frame) noexcept;
 
-  // Writes the root, if there is a whole body, and all bones that have a pose, parents first. Other
-  // positions than that of the hips are those of the T-pose.
+  // Writes the root, if there is a whole body, and all bones that have a pose, parents first. All
+  // positions but that of the hips are those of the T-pose.
   void write(drivers::vmc::DatagramWriter& writer) const noexcept;
 
  private:
   struct Moved {
-    std::size_t joint = 0;  // of the canonical skeleton
-    std::size_t bone = 0;   // of the protocol
+    std::size_t joint = 0;  // index in the canonical skeleton
+    std::size_t bone = 0;   // index in the protocol
     Vec3f offset_m{};
   };
   struct Source {

@@ -21,16 +21,17 @@ namespace posed::output {
 // One thread.
 class AxisFigure {
  public:
-  // The figure has the legs of `skeleton`, so that its feet stand where the person's do, and for
-  // the rest the proportions of an average person. Fails if it has no bone of a person. Cold.
+  // Makes a figure that has the legs of `skeleton`, so that its feet stand where the person's do,
+  // and otherwise the proportions of an average person. Fails if the skeleton has no bone of a
+  // person. Cold.
   [[nodiscard]] static Result<AxisFigure> make(std::shared_ptr<const Skeleton> skeleton,
                                                std::string_view name);
 
-  // "0 ann 0.000000 92.1... ||\n", a frame of the skeleton; valid until the next call. A joint that
-  // was not measured stays with its parent as in the T-pose.
+  // Returns a frame of the skeleton as "0 ann 0.000000 92.1... ||\n", valid until the next call. A
+  // joint that was not measured keeps its rotation of the T-pose relative to its parent.
   [[nodiscard]] std::string_view line(const Frame& frame) noexcept;
 
-  // The HIERARCHY of a BVH whose channels are the values of a line.
+  // Returns the HIERARCHY of a BVH whose channels are the values of a line.
   [[nodiscard]] std::string hierarchy() const;
 
  private:

@@ -1,5 +1,5 @@
-// BlendShapes: the values of a face among the samples of a stream, under the names that VRM models
-// of version 0 or 1 have for them.
+// BlendShapes: finds the values of a face among the samples of a stream and writes them under the
+// names that VRM models of version 0 or 1 have for them.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +16,8 @@ namespace posed::output {
 
 enum class VrmNames : std::uint8_t { kVrm0, kVrm1 };
 
-// "Joy" and "happy" are one preset; a name that is no preset stays as it is.
+// Returns the preset's name in the wanted version ("Joy" and "happy" are one preset); a name that
+// is no preset stays as it is.
 [[nodiscard]] std::string_view preset_name(std::string_view name, VrmNames wanted) noexcept;
 
 // One thread.
@@ -24,20 +25,20 @@ class BlendShapes {
  public:
   explicit BlendShapes(VrmNames names) : names_(names) {}
 
-  // The samples of the stream that comes. Values without unit whose name has no '/' are blend
-  // shapes; those beyond what a frame of the protocol has room for are left out. Returns how many
-  // those are. Cold.
+  // Sets the layout of the stream's samples. Values without unit whose name has no '/' are blend
+  // shapes; those for which a frame of the protocol has no room are left out. Returns how many were
+  // left out. Cold.
   std::size_t set_layout(const drivers::SampleLayout& samples);
 
-  void take(const Sample& sample) noexcept;
+  void update(const Sample& sample) noexcept;
 
-  // Writes the values that were measured, and that they are complete; nothing if there are none.
+  // Writes the values that were measured and the message that ends them; nothing if there are none.
   void write(drivers::vmc::DatagramWriter& writer) const noexcept;
 
  private:
   struct Shape {
-    std::size_t index = 0;  // of the sample's value
-    std::string name;       // as it is sent
+    std::size_t index = 0;  // the place of its value in a sample
+    std::string name;       // the name that is sent
     float value = 0.0F;
     bool known = false;
   };

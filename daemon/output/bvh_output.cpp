@@ -23,7 +23,7 @@ BvhOutput::BvhOutput(const config::OutputConfig& config, std::unique_ptr<system:
 
 std::int64_t BvhOutput::turn(std::int64_t now_ns) {
   const Delivery& delivery = receive();
-  take_stream(delivery.streams[index_of(Part::kBody)]);
+  update_stream(delivery.streams[index_of(Part::kBody)]);
   if (look_ns_ == kNoTime_ns || now_ns >= look_ns_) {
     for (const std::string& news : clients_.look(now_ns)) tell(news);
     look_ns_ = now_ns + LineClients::kLook_ns;
@@ -43,7 +43,7 @@ void BvhOutput::send(const Frame& frame, std::int64_t now_ns) {
   count(clients_.send(figure_->line(frame), now_ns));
 }
 
-void BvhOutput::take_stream(const std::shared_ptr<const PartStream>& stream) {
+void BvhOutput::update_stream(const std::shared_ptr<const PartStream>& stream) {
   if (known_ == stream) return;
   known_ = stream;
   figure_.reset();

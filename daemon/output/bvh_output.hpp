@@ -1,5 +1,5 @@
 // BvhOutput: sends one person over TCP to every program that connects, as the text stream of Axis
-// Neuron, of which each line is the line of a BVH.
+// Neuron, in which each line is a frame of a BVH.
 #pragma once
 
 #include <cstdint>
@@ -24,14 +24,14 @@ class BvhOutput final : public Output {
   [[nodiscard]] const std::string& endpoint() const noexcept { return clients_.endpoint(); }
 
  private:
-  void take_stream(const std::shared_ptr<const PartStream>& stream);
+  void update_stream(const std::shared_ptr<const PartStream>& stream);
   void send(const Frame& frame, std::int64_t now_ns);
 
   bool header_;
   RateLimit limit_;
   LineClients clients_;
   std::shared_ptr<const PartStream> known_;
-  std::unique_ptr<AxisFigure> figure_;  // null: no stream, or one that is no person
+  std::unique_ptr<AxisFigure> figure_;  // null without a stream, or if its skeleton is no person
   std::int64_t look_ns_ = kNoTime_ns;   // when to look for clients next
 };
 

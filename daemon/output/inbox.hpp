@@ -1,7 +1,7 @@
-// Inbox: between the publisher's thread, which puts frames in, and the output's own thread, which
-// takes them out. It is bounded: if the output is slow, the newest frames replace the oldest, which
-// are counted. The publisher is a real-time thread: the lock is one that inherits its priority, it
-// is held for copies of frames only, and nothing is freed and nobody woken under it.
+// Inbox: a bounded queue between the publisher's thread, which puts frames in, and the output's own
+// thread, which drains it. If the output is slow, the newest frames replace the oldest, which are
+// counted. The publisher is a real-time thread: the lock inherits its priority and is held only
+// while frames are copied; nothing is freed and no thread is woken under it.
 #pragma once
 
 #include <array>
@@ -23,16 +23,16 @@
 
 namespace posed::output {
 
-// A stream that is there. Const; both threads share it.
+// A live stream. It is constant, and both threads share it.
 struct PartStream {
   std::uint32_t id = 0;
   std::string name{};
-  std::shared_ptr<const Skeleton> skeleton{};  // null: it has samples only
+  std::shared_ptr<const Skeleton> skeleton{};  // null if it has samples only
   drivers::SampleLayout samples{};
 };
-using PartStreams = std::array<std::shared_ptr<const PartStream>, kParts>;  // null: not there
+using PartStreams = std::array<std::shared_ptr<const PartStream>, kParts>;  // null: absent
 
-// What was in an inbox at one moment.
+// The content of an inbox at one moment.
 class Delivery {
  public:
   static constexpr std::size_t kDepth = 16;  // frames
@@ -40,7 +40,7 @@ class Delivery {
   Delivery() : frames_(kDepth) {}
 
   PartStreams streams{};
-  std::optional<Sample> sample{};  // the newest of the body
+  std::optional<Sample> sample{};  // the newest sample of the body
 
   // Calls use(part, frame) for each frame, the oldest first.
   template <typename Use>
@@ -69,28 +69,28 @@ class Delivery {
 
 class Inbox {
  public:
-  // `names`: the streams of the parts; empty: none. `wake` is notified of everything new and
-  // outlives the inbox.
+  // `names` are the streams of the parts; an empty name means none. `wake` is notified of
+  // everything new and outlives the inbox.
   Inbox(std::array<std::string, kParts> names, system::EventFd& wake)
       : names_(std::move(names)), wake_(wake) {}
 
   [[nodiscard]] bool wants(std::string_view stream) const noexcept;
 
-  // The publisher's thread, as in publish::FrameOutput.
+  // The publisher's thread calls these, as described in publish::FrameOutput.
   void stream_comes(const publish::StreamInfo& stream);
   void frame(const Frame& frame) noexcept;
   void sample(const Sample& sample) noexcept;
   void stream_leaves(std::uint32_t stream) noexcept;
 
-  // The output's thread: replaces `into` by what is there, and is empty afterwards.
-  void take(Delivery& into);
+  // The output's thread calls it. It moves everything into `into`, whose old content is lost.
+  void drain(Delivery& into);
 
   // Any thread.
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_.load(); }
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(); }
 
  private:
-  // The part whose stream is there with this id. Under mutex_.
+  // Returns the part whose live stream has this id. Call it with mutex_ held.
   [[nodiscard]] std::optional<Part> part_of(std::uint32_t stream) const noexcept;
 
   std::array<std::string, kParts> names_;  // [part]

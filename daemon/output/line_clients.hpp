@@ -1,6 +1,6 @@
-// LineClients: programs that connect over TCP to get lines of text. Each gets whole lines only: one
-// that does not read fast enough misses whole lines, and one that has taken nothing for two seconds
-// is disconnected. What clients send is discarded.
+// LineClients: programs that connect over TCP to read lines of text. Each gets whole lines only: a
+// client that does not read fast enough misses whole lines, and one that has read nothing for two
+// seconds is disconnected. Bytes from clients are discarded.
 #pragma once
 
 #include <cstdint>
@@ -20,8 +20,8 @@ class LineClients {
  public:
   static constexpr std::size_t kMostClients = 16;
 
-  // Listens on "127.0.0.1:7002"; port 0: any. Beyond loopback `peers` must name who may connect.
-  // Cold.
+  // Listens on an address such as "127.0.0.1:7002"; for port 0 the system chooses one. Beyond
+  // loopback `peers` must name the addresses that may connect. Cold.
   [[nodiscard]] static Result<LineClients> open(const std::string& listen,
                                                 std::vector<std::string> peers);
   ~LineClients();
@@ -33,14 +33,14 @@ class LineClients {
   [[nodiscard]] const std::string& endpoint() const noexcept { return endpoint_; }  // the bound one
   [[nodiscard]] std::size_t size() const noexcept { return clients_.size(); }
 
-  // What each client gets before its first line; empty: nothing. Clients that got another one are
-  // disconnected, because they could not make sense of what follows.
+  // Sets the text that each client gets before its first line. Clients that got another greeting
+  // are disconnected, because they would misread the lines that follow.
   void set_greeting(std::string greeting);
 
   [[nodiscard]] SendOutcome send(std::string_view line, std::int64_t now_ns);
 
-  // Lets clients in, looks which have gone, and disconnects those that take nothing. Returns what
-  // people should know, one sentence each. Call it every kLook_ns.
+  // Admits clients, removes those that have gone, and disconnects those that read nothing. Returns
+  // news for users, one sentence each. Call it every kLook_ns.
   [[nodiscard]] std::vector<std::string> look(std::int64_t now_ns);
   static constexpr std::int64_t kLook_ns = kNanosPerSecond / 20;
 
@@ -48,19 +48,19 @@ class LineClients {
   struct Client {
     int fd = -1;
     std::string from{};  // its address
-    std::string rest{};  // of the line that it has taken a part of
+    std::string rest{};  // the part of its last line that it has not read yet
     bool greeted = false;
     bool gone = false;
-    std::int64_t stuck_ns = kNoTime_ns;  // since when it has taken nothing of what it should
+    std::int64_t stuck_ns = kNoTime_ns;  // since when it has read nothing although bytes wait
   };
   LineClients() = default;
   void let_in(std::int64_t now_ns, std::vector<std::string>& news);
   void refuse(const drivers::Address& peer, const std::string& why, std::int64_t now_ns,
               std::vector<std::string>& news);
-  // Returns whether nothing of the client's last line waits any more.
+  // Writes the rest of the client's last line. Returns whether all of it is written.
   static bool write_rest(Client& client);
-  // Writes as much of the text as the client takes; the rest of it goes out before anything else.
-  // Returns false if it takes nothing.
+  // Writes as much of the text as the socket accepts; the rest is sent before anything else.
+  // Returns false if the socket accepts nothing.
   static bool write(Client& client, std::string_view text);
   void remove_gone();
 

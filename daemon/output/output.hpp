@@ -1,5 +1,5 @@
-// Output: what all outputs have in common: an inbox with the frames of the streams that they want,
-// counters, and a way to tell people what is wrong. assembly runs each one on a thread of its own.
+// Output: the base of all outputs. It has an inbox with the frames of the wanted streams, counters,
+// and a way to report problems to users. assembly runs each output on a thread of its own.
 #pragma once
 
 #include <atomic>
@@ -28,11 +28,11 @@ class Output : public publish::FrameOutput {
   Output(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake);
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
-  // Before the first turn.
+  // Call it before the first turn.
   void set_tell(Tell tell) { tell_ = std::move(tell); }
 
-  // The output's thread: does everything that is due at `now_ns` and never waits. Returns the
-  // latest time of the next call; call earlier if wake() is notified.
+  // The output's thread calls it. It does everything that is due at `now_ns` and never waits.
+  // Returns the latest time of the next call; call it earlier if wake() is notified.
   [[nodiscard]] virtual std::int64_t turn(std::int64_t now_ns) = 0;
   [[nodiscard]] system::EventFd& wake() noexcept { return *wake_; }
 
@@ -47,12 +47,12 @@ class Output : public publish::FrameOutput {
   void fill(v1::OutputStats& stats) const override;
 
  protected:
-  // What has come since the last call.
+  // Returns everything that has come since the last call.
   [[nodiscard]] const Delivery& receive();
   // The streams as of the last receive().
   [[nodiscard]] const PartStreams& streams() const noexcept { return delivery_.streams; }
   void tell(const std::string& text) const;
-  // For fill().
+  // These two set the values that fill() reports.
   void count(const SendOutcome& outcome) noexcept;
   void set_receivers(std::size_t count) noexcept {
     receivers_now_ = static_cast<std::uint32_t>(count);

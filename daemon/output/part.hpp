@@ -16,7 +16,7 @@ inline constexpr std::array<Part, kParts> kAllParts{Part::kBody, Part::kLeftHand
   return static_cast<std::size_t>(part);
 }
 
-// As in the config.
+// The name of the part in the config.
 [[nodiscard]] constexpr std::string_view words_for(Part part) noexcept {
   constexpr std::array<std::string_view, kParts> kWords{"body", "left hand", "right hand"};
   return kWords[index_of(part)];

@@ -1,6 +1,6 @@
-// RateLimit: lets through at most so many frames a second, evenly. A frame that comes a quarter of
-// a period early still goes, so that a stream of just that rate loses none to the jitter of its
-// times. Of frames that come together at most one goes, and that should be the newest.
+// RateLimit: admits at most a given number of frames a second, evenly. A frame that comes a quarter
+// of a period early is still admitted, so that a stream of exactly that rate loses none to jitter.
+// Of frames that come together at most one is admitted; offer the newest.
 #pragma once
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace posed::output {
 
 class RateLimit {
  public:
-  // Frames a second; 0: no limit.
+  // With `rate_hz` 0 there is no limit.
   explicit RateLimit(double rate_hz) noexcept
       : period_ns_(rate_hz > 0.0 ? nanoseconds(1.0 / rate_hz) : 0) {}
 
@@ -28,7 +28,7 @@ class RateLimit {
 
  private:
   std::int64_t period_ns_;
-  std::int64_t due_ns_ = kNoTime_ns;  // of the next frame
+  std::int64_t due_ns_ = kNoTime_ns;  // when the next frame is due
 };
 
 }  // namespace posed::output

@@ -104,7 +104,7 @@ SendOutcome UdpReceivers::send(std::span<const std::byte> datagram, std::int64_t
   return outcome;
 }
 
-std::vector<std::string> UdpReceivers::take_news(std::int64_t now_ns) {
+std::vector<std::string> UdpReceivers::drain_news(std::int64_t now_ns) {
   std::vector<std::string> news;
   for (Receiver& receiver : receivers_) {
     if (receiver.failing && !receiver.told) {

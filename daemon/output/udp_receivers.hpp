@@ -1,6 +1,6 @@
 // UdpReceivers: sends datagrams to any number of addresses, each through a socket of its own. A
-// receiver that is not there, or is unreachable, affects no other one: what fails is counted, and
-// told when it begins and when it ends.
+// receiver that is absent or unreachable affects no other one: failures are counted, and their
+// beginning and end are reported.
 #pragma once
 
 #include <cstddef>
@@ -19,8 +19,8 @@ namespace posed::output {
 // One thread.
 class UdpReceivers {
  public:
-  // "127.0.0.1:39539", numbers only. Fails if an address is none, or without a descriptor; an
-  // address that cannot be reached now is tried again once a second. Cold.
+  // Takes addresses such as "127.0.0.1:39539", numbers only. Fails if one is malformed or if no
+  // socket can be opened; an address that cannot be reached now is tried again once a second. Cold.
   [[nodiscard]] static Result<UdpReceivers> open(const std::vector<std::string>& endpoints);
   ~UdpReceivers();
   UdpReceivers(UdpReceivers&& other) noexcept : receivers_(std::move(other.receivers_)) {}
@@ -28,13 +28,13 @@ class UdpReceivers {
   UdpReceivers(const UdpReceivers&) = delete;
   UdpReceivers& operator=(const UdpReceivers&) = delete;
 
-  // To all of them. Never waits. To an address that cannot be reached the datagrams of the second
-  // until the next try fail, too.
+  // Sends the datagram to all receivers and never waits. While an address cannot be reached, all
+  // datagrams to it fail until the next try, a second later.
   [[nodiscard]] SendOutcome send(std::span<const std::byte> datagram, std::int64_t now_ns) noexcept;
 
-  // What has changed since the last call, one sentence each. A receiver counts as failing from the
-  // first failure until it has taken everything for two seconds.
-  [[nodiscard]] std::vector<std::string> take_news(std::int64_t now_ns);
+  // Returns what has changed since the last call, one sentence each. A receiver counts as failing
+  // from its first failure until all datagrams have reached it for two seconds.
+  [[nodiscard]] std::vector<std::string> drain_news(std::int64_t now_ns);
 
   [[nodiscard]] std::size_t size() const noexcept { return receivers_.size(); }
 

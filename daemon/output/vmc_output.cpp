@@ -38,20 +38,20 @@ VmcOutput::VmcOutput(const config::OutputConfig& config, std::unique_ptr<system:
 std::int64_t VmcOutput::turn(std::int64_t now_ns) {
   if (begin_ns_ == kNoTime_ns) begin_ns_ = now_ns;
   const Delivery& delivery = receive();
-  take_streams(delivery.streams);
-  if (delivery.sample && !assistant_) shapes_.take(*delivery.sample);
+  update_streams(delivery.streams);
+  if (delivery.sample && !assistant_) shapes_.update(*delivery.sample);
   const Frame* newest = nullptr;
   delivery.for_each([&](Part part, const Frame& frame) {
-    if (!take(part, frame, now_ns)) return;
+    if (!accept(part, frame, now_ns)) return;
     newest = &frame;
     if (!limit_.limits()) send(frame, now_ns);
   });
   if (limit_.limits() && newest != nullptr && limit_.admit(now_ns)) send(*newest, now_ns);
-  for (const std::string& news : receivers_.take_news(now_ns)) tell(news);
+  for (const std::string& news : receivers_.drain_news(now_ns)) tell(news);
   return system::kForever_ns;
 }
 
-void VmcOutput::take_streams(const PartStreams& streams) {
+void VmcOutput::update_streams(const PartStreams& streams) {
   for (const Part part : kAllParts) {
     const auto& stream = streams[index_of(part)];
     if (known_[index_of(part)] == stream) continue;
@@ -81,8 +81,8 @@ bool VmcOutput::leads(Part part, std::int64_t now_ns) const noexcept {
   return true;
 }
 
-bool VmcOutput::take(Part part, const Frame& frame, std::int64_t now_ns) {
-  if (!avatar_.take(part, frame)) return false;
+bool VmcOutput::accept(Part part, const Frame& frame, std::int64_t now_ns) {
+  if (!avatar_.set_pose(part, frame)) return false;
   if (frame.quality != Quality::kStale) measured_ns_[index_of(part)] = now_ns;
   return leads(part, now_ns);
 }

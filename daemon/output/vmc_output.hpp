@@ -1,5 +1,5 @@
-// VmcOutput: sends one avatar to programs of the VMC protocol, as OSC over UDP: of each frame root,
-// bones, blend shapes, status and time, in bundles that fit a network packet.
+// VmcOutput: sends one avatar to programs of the VMC protocol, as OSC over UDP. Each frame has
+// root, bones, blend shapes, status and time, in bundles that fit a network packet.
 #pragma once
 
 #include <array>
@@ -25,11 +25,11 @@ class VmcOutput final : public Output {
   [[nodiscard]] std::int64_t turn(std::int64_t now_ns) override;
 
  private:
-  void take_streams(const PartStreams& streams);
-  // Puts the frame into the avatar. Returns whether it is one of those that are sent.
-  [[nodiscard]] bool take(Part part, const Frame& frame, std::int64_t now_ns);
-  // Whether the frames of this part are the ones that are sent: those of the body, or, while it has
-  // none, those of the left hand, then of the right one.
+  void update_streams(const PartStreams& streams);
+  // Puts the frame into the avatar. Returns whether the avatar is to be sent now.
+  [[nodiscard]] bool accept(Part part, const Frame& frame, std::int64_t now_ns);
+  // Whether frames of this part trigger sending. Those of the body do; while it has none, those of
+  // the left hand do, then those of the right hand.
   [[nodiscard]] bool leads(Part part, std::int64_t now_ns) const noexcept;
   void send(const Frame& frame, std::int64_t now_ns);
 
@@ -39,9 +39,9 @@ class VmcOutput final : public Output {
   RateLimit limit_;
   UdpReceivers receivers_;
   std::unique_ptr<drivers::vmc::DatagramWriter> writer_;
-  PartStreams known_;                             // that the avatar has
+  PartStreams known_;                             // the streams that the avatar has
   std::array<std::int64_t, kParts> measured_ns_;  // [part] when its last measured frame came
-  std::int64_t begin_ns_ = kNoTime_ns;            // of the time that is sent
+  std::int64_t begin_ns_ = kNoTime_ns;            // the zero of the time that is sent
 };
 
 }  // namespace posed::output

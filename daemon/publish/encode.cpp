@@ -1,6 +1,6 @@
 #include "daemon/publish/encode.hpp"
 
-#include "proto/message/assign.hpp"
+#include "proto/message/frame_message.hpp"
 
 namespace posed::publish {
 

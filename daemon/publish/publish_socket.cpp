@@ -80,7 +80,7 @@ PublishSocket::PublishSocket(PublishSocket&&) noexcept = default;
 // A subscription message is one byte (1: subscribe, 0: unsubscribe), then the beginning of a topic.
 bool PublishSocket::hear(Subscriptions& subscriptions, std::int64_t now_ns,
                          const std::function<void(std::string_view prefix)>& subscribed) {
-  for (const int peer : guard_->take_gone()) subscriptions.forget(peer);
+  for (const int peer : guard_->drain_ended()) subscriptions.forget(peer);
   net::Message message;
   for (int i = 0; i < kSubscriptionsATurn; ++i) {
     if (!message.receive(socket_.get())) return true;

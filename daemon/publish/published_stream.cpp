@@ -6,7 +6,7 @@
 #include <mutex>
 
 #include "daemon/publish/frame_output.hpp"
-#include "models/live_text.hpp"
+#include "models/stage_type.hpp"
 #include "proto/message/skeleton_message.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/parameter.hpp"

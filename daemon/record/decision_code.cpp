@@ -6,7 +6,7 @@
 #include <string_view>
 #include <variant>
 
-#include "models/live_text.hpp"
+#include "models/stage_type.hpp"
 #include "models/stages/registry.hpp"
 #include "posed/v1/log.pb.h"
 #include "proto/log/reader.hpp"
@@ -151,8 +151,7 @@ log::DecisionRow row_of(const Decision& decision) {
 }
 
 Result<Decision> decision_of(const log::DecisionRow& row, const std::string& file) {
-  Decision decision{
-      .stream = row.stream, .item = row.item, .sequence = row.before_frame, .now_ns = row.now_ns};
+  Decision decision{.stream = row.stream, .item = row.item, .now_ns = row.now_ns};
   Value value;
   bool sound = value.ParseFromString(row.value);
   if (sound && row.stage == words::kEngine) {

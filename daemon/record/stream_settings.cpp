@@ -47,6 +47,8 @@ std::optional<StageSettings> stage_of(const Json& json) {
   if (type == nullptr) return std::nullopt;
   Parameters given;
   for (const auto& [name, value] : json.at("parameters").items()) {
+    // Development versions wrote flags that have gone since; one that was off changes nothing.
+    if (find_parameter(type->parameters, name) == nullptr && value == false) continue;
     given.emplace(name, from_json_value(value));
   }
   auto parameters = complete_parameters(type->parameters, given);

@@ -11,7 +11,7 @@
 #include "daemon/replay/pace.hpp"
 #include "daemon/replay/stream_info.hpp"
 #include "daemon/system/clock.hpp"
-#include "models/live_text.hpp"
+#include "models/stage_type.hpp"
 
 namespace posed::replay {
 namespace {

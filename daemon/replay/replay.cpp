@@ -8,8 +8,7 @@
 #include "proto/text/clean.hpp"
 
 namespace posed::replay {
-Replay::Replay(log::Reader& reader)
-    : reader_(reader), models_(reader), schedule_(reader.streams().size(), reader.counts_items()) {}
+Replay::Replay(log::Reader& reader) : reader_(reader), models_(reader) {}
 
 Result<std::unique_ptr<Replay>> Replay::open(log::Reader& reader) {
   std::unique_ptr<Replay> replay(new Replay(reader));
@@ -127,7 +126,7 @@ std::optional<std::uint64_t> Replay::broken_at(std::uint32_t stream) const {
 }
 
 void Replay::before(const pipeline::Item& item, std::uint32_t index) noexcept {
-  while (const Schedule::Entry* entry = schedule_.due(item, index)) {
+  while (const Schedule::Entry* entry = schedule_.due(item.number)) {
     apply(*entry, item.number);
   }
   position_ = item.number;
@@ -169,11 +168,7 @@ Result<> Replay::run(const Out& out, const Pace& pace) {
   }
   apply_gaps(std::numeric_limits<std::int64_t>::max());
   while (const Schedule::Entry* entry = schedule_.rest()) apply(*entry, next_item());
-  for (std::size_t i = 0; i < contexts_.size(); ++i) {
-    std::optional<std::int64_t> end_ns;
-    if (!reader_.counts_items()) end_ns = source_of(reader_.streams()[i].source)->arrival_ns();
-    contexts_[i]->finish(end_ns);
-  }
+  for (const auto& context : contexts_) context->finish();
   if (error_) return std::unexpected(*error_);
   return {};
 }

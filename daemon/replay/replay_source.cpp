@@ -157,7 +157,6 @@ void ReplaySource::set_gap(std::int64_t after_chunk) {
   gap_after_ = std::min(gap_after_.value_or(after_chunk), after_chunk);
 }
 
-// Formats 1 and 2 number only frames; the other numbers continue by counting.
 StreamPosition ReplaySource::position(const ReplayStreamContext& stream,
                                       const log::StreamPosition& place) const {
   StreamPosition position{.stream = stream.index(), .frame = place.next_frame};

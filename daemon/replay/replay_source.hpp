@@ -38,9 +38,6 @@ class ReplaySource final : private pipeline::IntakeOut {
 
   [[nodiscard]] Result<> feed(const log::ChunkRow& chunk);
 
-  [[nodiscard]] std::int64_t arrival_ns() const noexcept {
-    return arrival_ns_;
-  }  // of the last chunk
   // The number that the next sample of the stream with this index will get; 0 if it has none now.
   [[nodiscard]] std::uint64_t next_sample(std::uint32_t stream) const noexcept;
 

@@ -225,9 +225,8 @@ void ReplayStreamContext::leave(std::int64_t now_ns) noexcept {
   set_aside();
 }
 
-void ReplayStreamContext::finish(std::optional<std::int64_t> end_ns) noexcept {
+void ReplayStreamContext::finish() noexcept {
   if (!engine_ || ended_) return;
-  if (end_ns) return end(*end_ns);
   engine_->close_gaps(last_frame_, last_sample_, *this);
   engine_->flush(*this);
 }

@@ -104,9 +104,8 @@ class ReplayStreamContext final : private pipeline::EngineOut {
   void apply(const pipeline::Decision& decision) noexcept;
   // Its body is no longer among those of the source, at this time: frees the engine for good.
   void leave(std::int64_t now_ns) noexcept;
-  // Call after the last chunk and decision. `end_ns`: the log has an old format that does not
-  // record whether the stream ended; it ended then.
-  void finish(std::optional<std::int64_t> end_ns) noexcept;
+  // Call after the last chunk and decision.
+  void finish() noexcept;
 
   // Whether its stages name this stream as a partner.
   [[nodiscard]] bool needs(std::uint32_t partner) const noexcept;

@@ -1,6 +1,6 @@
-// Service: what a daemon tells systemd that started it as a service (Type=notify): ready, its
-// state, ending, and a sign of life while all of its threads make progress. Without systemd
-// (NOTIFY_SOCKET is not set) it does nothing. One thread; cold.
+// Service: reports to systemd, which started the daemon as a service (Type=notify), that it is
+// ready, its state, that it ends, and a sign of life while all of its threads make progress.
+// Without systemd (NOTIFY_SOCKET is not set) it does nothing. One thread; cold.
 #pragma once
 
 #include <cstdint>
@@ -22,14 +22,15 @@ class Service {
   // Whether systemd listens. A service has no terminal that could be closed.
   [[nodiscard]] bool present() const noexcept { return present_; }
 
-  void ready();      // clients may come; also after reloading()
-  void reloading();  // the config is read again
+  void ready();      // clients may connect; call it again after reloading()
+  void reloading();  // the config is being read again
   void stopping();
-  // A sentence for `systemctl status`. Sent only if it is another one than before.
+  // Sets the sentence that `systemctl status` shows. It is sent only if it differs from the last
+  // one.
   void status(const std::string& sentence);
-  // Sends the sign of life when it is due. A thread that is stuck is named in the log, and there
-  // are no more signs until it goes on; one that waits for a disk is named only. Call several times
-  // a second.
+  // Sends the sign of life when it is due. A stuck thread is named in the log, and no sign of life
+  // is sent until it goes on; a thread that waits for a disk is only named. Call it several times a
+  // second.
   void turn(std::int64_t now_ns);
 
  private:

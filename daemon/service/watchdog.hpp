@@ -1,5 +1,5 @@
-// Watchdog: whether every thread has made progress lately. The time and the state of a thread are
-// parameters, so a test can choose them. Takes no lock that a watched thread could hold. One
+// Watchdog: finds the threads that have made no progress lately. The time and the state of a thread
+// are parameters, so a test can choose them. Takes no lock that a watched thread could hold. One
 // thread; cold.
 #pragma once
 
@@ -14,11 +14,12 @@ namespace posed::service {
 
 class Watchdog {
  public:
-  // Looks within the time in which the service manager wants a sign of life: one look that finds a
-  // thread without progress is not yet an alarm, and a thread that stops is found soon.
+  // The watchdog looks this often within the time in which the service manager wants a sign of
+  // life. So one look that finds a thread without progress is no alarm yet, and a stuck thread is
+  // found soon.
   static constexpr std::int64_t kLooks = 4;
-  // Says of a thread's name whether the kernel lets that thread wait for a disk
-  // (system::waits_for_disk). Asked only of threads without progress.
+  // Returns for a thread's name whether the kernel lets that thread wait for a disk
+  // (system::waits_for_disk). It is called only for threads without progress.
   using WaitsForDisk = std::function<bool(const std::string&)>;
 
   // The service manager wants a sign of life every `within_ns`. A kLooks-th of it has to be longer
@@ -26,14 +27,14 @@ class Watchdog {
   Watchdog(std::vector<system::ThreadPulse> threads, std::int64_t within_ns,
            WaitsForDisk waits_for_disk);
 
-  // Names of threads are those whose state is another one than at the last look.
+  // The lists name the threads whose state has changed since the last look.
   struct Finding {
     bool alive = false;                // a look was due, and no thread is stuck
-    std::vector<std::string> stuck;    // no progress since the last look
-    std::vector<std::string> waiting;  // none, because the disk keeps them waiting
-    std::vector<std::string> again;    // progress, after one of the two
+    std::vector<std::string> stuck;    // they made no progress since the last look
+    std::vector<std::string> waiting;  // they made none because they wait for a disk
+    std::vector<std::string> again;    // they make progress again after one of the two
   };
-  // Call several times within a kLooks-th of that time.
+  // Call it several times within each kLooks-th part of `within_ns`.
   [[nodiscard]] Finding look(std::int64_t now_ns);
 
  private:

@@ -23,13 +23,14 @@ class EventFd {
   EventFd(const EventFd&) = delete;
   EventFd& operator=(const EventFd&) = delete;
 
-  // Any thread, after it has put something where the consumer looks. Writes to the eventfd only if
-  // the consumer sleeps. RT-safe except for that one write.
+  // Any thread calls it after it has put something where the consumer looks. It writes to the
+  // eventfd only if the consumer sleeps. RT-safe except for that one write.
   void notify() noexcept;
 
-  // Consumer, before its last look at its rings: from now on notify() writes to the eventfd.
+  // The consumer calls it before its last look at its rings; from then on notify() writes to the
+  // eventfd.
   void going_to_sleep() noexcept { asleep_.exchange(true, std::memory_order_acq_rel); }
-  // Consumer, after its wait.
+  // The consumer calls it after its wait.
   void awake() noexcept { asleep_.exchange(false, std::memory_order_acq_rel); }
 
   [[nodiscard]] int fd() const noexcept { return fd_; }
@@ -57,7 +58,7 @@ inline constexpr std::int64_t kForever_ns = std::numeric_limits<std::int64_t>::m
   return std::clamp<std::int64_t>(due_ns - clock(), 0, kLongestSleep_ns);
 }
 
-// Sleeps for so long, whatever happens; returns at once if that is 0. One system call; RT-safe
+// Sleeps for `time_ns`, whatever happens; returns at once if that is 0. One system call; RT-safe
 // except for it.
 void rest(std::int64_t time_ns) noexcept;
 
@@ -68,11 +69,11 @@ class Poller {
   Poller(const Poller&) = delete;
   Poller& operator=(const Poller&) = delete;
 
-  // An EventFd: edge-triggered, so that it never needs to be read.
+  // Adds an EventFd; it is edge-triggered, so that it never needs to be read.
   [[nodiscard]] Result<> add(const EventFd& wake);
-  // A device's descriptor: level-triggered; wait() returns its `key`.
+  // Adds a device's descriptor; it is level-triggered, and wait() returns its `key`.
   [[nodiscard]] Result<> add(int fd, std::uint32_t key);
-  // For a device that has ended: its descriptor would stay readable for ever.
+  // Removes the descriptor of a device that has ended; it would stay readable for ever.
   void remove(int fd) noexcept;
 
   // Sleeps until something is ready or `timeout_ns` has passed; returns the keys of the ready

@@ -22,22 +22,23 @@
 
 namespace posed::system {
 
-// Of the CPUs `allowed` the one with the highest capacity; of several the last, because the first
-// handles interrupts. Empty if there are not two. `sys`: the folder /sys.
+// Returns the CPU among `allowed` that has the highest capacity; if several have it the last one,
+// because the first handles interrupts. Empty if fewer than two are allowed. `sys` is the folder
+// /sys.
 [[nodiscard]] std::optional<int> quickest_cpu(const cpu_set_t& allowed, const std::string& sys);
 
 class HotCpu {
  public:
-  // One of those that the calling thread may use; null if there are not two, or if the kernel does
-  // not tell what threads run.
+  // Chooses among the CPUs that the calling thread may use; null if it may use only one, or if the
+  // kernel does not count how long threads run.
   [[nodiscard]] static std::unique_ptr<HotCpu> open();
   ~HotCpu();
   HotCpu(const HotCpu&) = delete;
   HotCpu& operator=(const HotCpu&) = delete;
 
-  // The calling thread, of this priority, becomes one of those that share the CPU.
+  // Adds the calling thread, which has this priority, to the threads that share the CPU.
   void join(int priority);
-  // From now on they stay where they are. Before the first of them ends.
+  // Leaves the threads where they are from now on. Call it before the first of them ends.
   void stop();
 
  private:
@@ -45,7 +46,7 @@ class HotCpu {
   struct Member {
     pid_t thread = 0;
     int priority = 0;
-    ThreadTime time{};  // at the last look
+    ThreadTime time{};  // its value at the last look
   };
   void watch();
   void look(std::int64_t passed_ns, std::int64_t now_ns);

@@ -16,7 +16,8 @@ class Moderation {
   static constexpr std::int64_t kRest_ns = 200'000;
   static constexpr std::int64_t kWindow_ns = 16'000'000;
 
-  // How long to rest after this turn. `handled`: elements since the start that nothing waits for.
+  // Returns how long to rest after this turn. `handled` counts the elements since the start for
+  // which no other thread waits.
   [[nodiscard]] std::int64_t rest_ns(std::uint64_t handled, std::int64_t now_ns) noexcept {
     const std::int64_t window_ns = now_ns - begin_ns_;
     if (window_ns >= kWindow_ns) {

@@ -14,11 +14,11 @@ inline constexpr std::int64_t kLongestSleep_ns = kNanosPerSecond / 4;
 
 class Pulse {
  public:
-  // The thread's own; only that thread. RT-safe.
+  // Only the watched thread itself calls it. RT-safe.
   void beat() noexcept {
     beats_.store(beats_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   }
-  // How many so far. Any thread.
+  // Counts the calls of beat(). Any thread.
   [[nodiscard]] std::uint64_t beats() const noexcept {
     return beats_.load(std::memory_order_relaxed);
   }
@@ -29,7 +29,7 @@ class Pulse {
 
 // A thread that is watched. The pulse outlives the watching.
 struct ThreadPulse {
-  std::string thread;  // its name
+  std::string thread;  // the thread's name
   const Pulse* pulse;
 };
 

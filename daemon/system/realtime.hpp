@@ -1,5 +1,5 @@
-// Asks the operating system for what threads need that must wake on time. Cold. A refusal is not an
-// error.
+// Asks the operating system for the rights that threads need which must wake on time. A refusal is
+// no error. Cold.
 #pragma once
 
 #include <string>

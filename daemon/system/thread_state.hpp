@@ -1,4 +1,4 @@
-// What the kernel says of one of this process's threads. Cold.
+// The state of one of this process's threads, as the kernel reports it. Cold.
 #pragma once
 
 #include <string>

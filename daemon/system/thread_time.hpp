@@ -1,5 +1,5 @@
-// What the kernel's scheduler counts of a thread of this process (/proc/self/task/TID/schedstat).
-// Cold.
+// The times that the kernel's scheduler counts for a thread of this process
+// (/proc/self/task/TID/schedstat). Cold.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@ namespace posed::system {
 
 struct ThreadTime {
   std::int64_t ran_ns = 0;
-  std::int64_t waited_ns = 0;  // was ready to run while others had the CPU
+  std::int64_t waited_ns = 0;  // it was ready to run while others had the CPU
   std::int64_t turns = 0;      // how often it was put on a CPU
 
   ThreadTime& operator+=(const ThreadTime& other) noexcept;
@@ -19,7 +19,7 @@ struct ThreadTime {
 
 [[nodiscard]] ThreadTime operator-(const ThreadTime& later, const ThreadTime& earlier) noexcept;
 
-// Since the thread began. Empty if it has ended, or if the kernel does not count.
+// Returns the times since the thread began; empty if it has ended, or if the kernel does not count.
 [[nodiscard]] std::optional<ThreadTime> time_of_thread(pid_t thread);
 
 }  // namespace posed::system

@@ -20,6 +20,8 @@
 #include "daemon/logging/log_output.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/ranks.hpp"
+#include "models/motion/vrm_animation.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/nearest_word.hpp"
 
@@ -148,6 +150,7 @@ int parse_and_run(int argc, char** argv, CLI::App& app, const int& exit_code) {
 }  // namespace
 
 void add_commands(CLI::App& app, int& exit_code) {
+  clip::add_format(motion::vrm_animation_format());
   for (const AddCommand add : kCommands) add(app, exit_code);
 }
 

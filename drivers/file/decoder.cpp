@@ -1,6 +1,7 @@
 #include "drivers/file/decoder.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -41,12 +42,18 @@ bool is_frame_number(std::string_view line) noexcept {
 
 }  // namespace
 
-ClipDecoder::ClipDecoder(clip::ClipFormat format)
-    : format_(std::move(format)), values_(format_.parser.channels()), text_(kMaxChunk) {}
+ClipDecoder::ClipDecoder(clip::FrameCoding coding)
+    : coding_(std::move(coding)), values_(coding_.parser.channels()), text_(kMaxChunk) {
+  assert(coding_.parser.frame_bytes() <= text_.size());
+}
 
 // RT-safe.
 void ClipDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
                        Sink& sink) noexcept {
+  if (coding_.parser.frame_bytes() > 0) {
+    feed_numbers(bytes, sink);
+    return;
+  }
   for (const std::byte byte : bytes) {
     const char c = static_cast<char>(byte);
     if (c == '\n' || c == '\r') {
@@ -60,6 +67,14 @@ void ClipDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_
   }
 }
 
+// Frames of numbers have no mark between them; all have the same length. RT-safe.
+void ClipDecoder::feed_numbers(std::span<const std::byte> bytes, Sink& sink) noexcept {
+  for (const std::byte byte : bytes) {
+    text_[size_++] = static_cast<char>(byte);
+    if (size_ == coding_.parser.frame_bytes()) finish_frame(sink);
+  }
+}
+
 // RT-safe.
 void ClipDecoder::end_line(Sink& sink) noexcept {
   const std::string_view line = clip::trim({text_.data() + line_begin_, size_ - line_begin_});
@@ -69,7 +84,7 @@ void ClipDecoder::end_line(Sink& sink) noexcept {
     return;
   }
   text_[size_++] = '\n';
-  if (!format_.parser.numbered()) {
+  if (!coding_.parser.numbered()) {
     finish_frame(sink);
     return;
   }
@@ -85,7 +100,7 @@ void ClipDecoder::end_line(Sink& sink) noexcept {
   line_begin_ = size_;
   // A block has no end mark. It is complete once every bone is present, so that a frame need not
   // wait for the start of the next.
-  if (++lines_ >= format_.parser.lines()) finish_frame(sink);
+  if (++lines_ >= coding_.parser.lines()) finish_frame(sink);
 }
 
 // RT-safe.
@@ -101,10 +116,10 @@ void ClipDecoder::begin_block(std::string_view line, Sink& sink) noexcept {
 
 // RT-safe.
 void ClipDecoder::finish_frame(Sink& sink) noexcept {
-  const clip::FrameOutcome parsed = format_.parser.parse({text_.data(), size_}, values_);
+  const clip::FrameOutcome parsed = coding_.parser.parse({text_.data(), size_}, values_);
   const Outcome outcome = outcome_of(parsed);
   // A bone may span two lines; the limit keeps garbage from being collected without end.
-  if (outcome == Outcome::kShort && lines_ > 0 && lines_ < 2 * format_.parser.lines()) return;
+  if (outcome == Outcome::kShort && lines_ > 0 && lines_ < 2 * coding_.parser.lines()) return;
   if (outcome != Outcome::kOk) {
     drop_frame(outcome, sink);
     return;
@@ -112,7 +127,7 @@ void ClipDecoder::finish_frame(Sink& sink) noexcept {
   Frame frame;
   frame.header.device_ns = next_time_ns(parsed.time_s);
   frame.source = Source::kFile;
-  pose_from_channels(*format_.skeleton, values_, frame);
+  pose_from_channels(*coding_.skeleton, values_, frame);
   size_ = line_begin_ = lines_ = 0;
   sink.outcome(Outcome::kOk);
   sink.frame(frame);
@@ -127,13 +142,13 @@ void ClipDecoder::drop_frame(Outcome outcome, Sink& sink) noexcept {
 
 // RT-safe.
 std::int64_t ClipDecoder::next_time_ns(double given_s) noexcept {
-  if (format_.parser.timed()) return next_given_time_ns(given_s);
-  return nanoseconds(static_cast<double>(frames_++) / format_.frame_rate_hz);
+  if (coding_.parser.timed()) return next_given_time_ns(given_s);
+  return nanoseconds(static_cast<double>(frames_++) / coding_.frame_rate_hz);
 }
 
 // RT-safe.
 std::int64_t ClipDecoder::next_given_time_ns(double given_s) noexcept {
-  const std::int64_t step_ns = std::max<std::int64_t>(1, nanoseconds(1 / format_.frame_rate_hz));
+  const std::int64_t step_ns = std::max<std::int64_t>(1, nanoseconds(1 / coding_.frame_rate_hz));
   const bool is_first = last_ns_ == kNoTime_ns;
   const std::int64_t following_ns = is_first ? 0 : last_ns_ + step_ns;
   if (std::isnan(given_s)) {

@@ -1,5 +1,5 @@
-// Decodes the text of a clip into frames, one by one: the motion lines of a BVH, the lines of a
-// hand CSV, or the blocks of lines of an AMC.
+// Decodes the bytes of a clip into frames, one by one: the motion lines of a BVH, the lines of a hand
+// CSV, the blocks of lines of an AMC, or the numbers of any other format (proto/clip/device_clip).
 #pragma once
 
 #include <cstddef>
@@ -8,22 +8,23 @@
 #include <vector>
 
 #include "drivers/driver.hpp"
-#include "proto/clip/text_clip.hpp"
+#include "proto/clip/device_clip.hpp"
 
 namespace posed::drivers {
 
 // Device time is the clip's time: frame n, counted over all loops and including unreadable frames,
-// is at n / rate. The frames of a hand CSV carry their times: a frame without one comes one step
-// after the frame before; a time earlier than the times before it begins the next loop.
+// is at n / rate. Where frames carry their times, a frame without one comes one step after the frame
+// before it, and a time earlier than the times before it begins the next loop.
 class ClipDecoder final : public Decoder {
  public:
-  explicit ClipDecoder(clip::ClipFormat format);
+  explicit ClipDecoder(clip::FrameCoding coding);
 
   // RT-safe.
   void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
             Sink& sink) noexcept override;
 
  private:
+  void feed_numbers(std::span<const std::byte> bytes, Sink& sink) noexcept;
   void end_line(Sink& sink) noexcept;
   void begin_block(std::string_view line, Sink& sink) noexcept;
   void finish_frame(Sink& sink) noexcept;
@@ -31,9 +32,9 @@ class ClipDecoder final : public Decoder {
   [[nodiscard]] std::int64_t next_time_ns(double given_s) noexcept;
   [[nodiscard]] std::int64_t next_given_time_ns(double given_s) noexcept;
 
-  clip::ClipFormat format_;
+  clip::FrameCoding coding_;
   std::vector<double> values_;  // [channels]
-  std::vector<char> text_;      // of fixed size: the frame being collected, line by line
+  std::vector<char> text_;      // of fixed size: the bytes of the frame being collected
   std::size_t size_ = 0;        // of text_ in use
   std::size_t line_begin_ = 0;  // start of the unfinished line in text_
   std::size_t lines_ = 0;       // complete lines in text_

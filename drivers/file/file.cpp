@@ -4,8 +4,8 @@
 #include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/file.hpp"
-#include "proto/clip/text.hpp"
-#include "proto/clip/text_clip.hpp"
+#include "proto/clip/device_clip.hpp"
+#include "proto/clip/format.hpp"
 
 namespace posed::drivers {
 namespace file {
@@ -14,53 +14,41 @@ namespace {
 constexpr std::string_view kDefaultHand = "right";
 
 Result<Description> describe(const std::string& text, const std::string& identity) {
-  auto format = clip::parse_description(text, identity);
-  if (!format) return std::unexpected(format.error());
+  auto coding = clip::parse_description(text, identity);
+  if (!coding) return std::unexpected(coding.error());
   return Description{.driver = "file",
                      .text = text,
                      .identity = identity,
-                     .skeleton = std::move(format->skeleton),
+                     .skeleton = std::move(coding->skeleton),
                      .samples = {},
-                     .rate_hz = format->frame_rate_hz};
+                     .rate_hz = coding->frame_rate_hz};
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
-  auto format = clip::parse_description(description.text, description.identity);
-  if (!format) return std::unexpected(format.error());
-  return std::make_unique<ClipDecoder>(std::move(*format));
+  auto coding = clip::parse_description(description.text, description.identity);
+  if (!coding) return std::unexpected(coding.error());
+  return std::make_unique<ClipDecoder>(std::move(*coding));
 }
 
-// One chunk per frame, with a line end so that the decoder knows that it is complete.
-Chunks frames_of(const clip::TextClip& clip) {
+// One chunk per frame.
+Chunks chunks_of(const clip::DeviceClip& clip) {
   Chunks chunks;
-  for (const std::string_view frame : clip.frames) {
-    chunks.add(frame.ends_with('\n') ? std::string(frame) : std::string(frame) + '\n');
-  }
+  for (const std::string& frame : clip.frames) chunks.add(frame);
   return chunks;
 }
 
-// Rejects an option that does not apply to this kind of clip, instead of silently ignoring it.
-Result<> check_options(const std::filesystem::path& path, const Options& options) {
-  const std::string kind = clip::lower(path.extension().string());
-  const auto others = [&path](const char* name, const char* of, const char* instead) {
-    return misuse(std::string(name) + " is an option of " + of + "; " + instead, path.string());
-  };
-  if (kind != ".amc" && option<double>(options, "rate_hz") != 0.0) {
-    return others("rate_hz", "an .amc", "this clip says its own rate, and `pace` plays it faster");
+// A value that is the option's default counts as not given. Whether the clip's format accepts the
+// others, the table of formats says.
+clip::ReadOptions read_options(const Options& options) {
+  clip::ReadOptions read;
+  read.skeleton = option<std::string>(options, "skeleton");
+  if (const auto rate_hz = option<double>(options, "rate_hz"); rate_hz != 0.0) {
+    read.rate_hz = rate_hz;
   }
-  if (kind != ".amc" && !option<std::string>(options, "skeleton").empty()) {
-    return others("skeleton", "an .amc", "leave it out");
-  }
-  if (kind != ".csv" && option<std::string>(options, "hand") != kDefaultHand) {
-    return others("hand", "a .csv", "leave it out");
-  }
-  if (kind != ".csv" && option<std::string>(options, "hand_shape") != kDefaultHandShape) {
-    return others("hand_shape", "a .csv", "leave it out");
-  }
-  if (kind == ".csv" && !option<std::string>(options, "profile").empty()) {
-    return others("profile", "a .bvh or an .amc", "leave it out");
-  }
-  return {};
+  read.profile = option<std::string>(options, "profile");
+  if (option<std::string>(options, "hand") != kDefaultHand) read.hand = Side::kLeft;
+  read.hand_shape = option<std::string>(options, "hand_shape");
+  return read;
 }
 
 Result<Device> open(const Options& given, TransportFactory& /*ports*/) {
@@ -69,44 +57,37 @@ Result<Device> open(const Options& given, TransportFactory& /*ports*/) {
   const std::string path = option<std::string>(*options, "path");
   const std::string hand = option<std::string>(*options, "hand");
   if (hand != "left" && hand != "right") return misuse("hand is left or right");
-  if (auto ok = check_options(path, *options); !ok) return std::unexpected(ok.error());
-  const double rate_hz = option<double>(*options, "rate_hz");
-  const clip::ReadOptions read{
-      .asf = option<std::string>(*options, "skeleton"),
-      .amc_rate_hz = rate_hz == 0.0 ? clip::ReadOptions{}.amc_rate_hz : rate_hz,
-      .metres_per_unit = std::nullopt,
-      .profile = option<std::string>(*options, "profile"),
-      .hand = hand == "left" ? Side::kLeft : Side::kRight,
-      .hand_shape = option<std::string>(*options, "hand_shape")};
-  const auto clip = clip::open_text_clip(path, read);
+  const auto clip = clip::open_device_clip(path, read_options(*options));
   if (!clip) return std::unexpected(clip.error());
-  auto device = make_device(file_driver(), (*clip)->description, path);
+  auto device = make_device(file_driver(), clip->description, path);
   if (!device) return device;
-  auto transport = FileTransport::open(frames_of(**clip), {.rate_hz = device->description.rate_hz,
+  auto transport = FileTransport::open(chunks_of(*clip), {.rate_hz = device->description.rate_hz,
                                                            .pace = option<double>(*options, "pace"),
                                                            .loop = option<bool>(*options, "loop"),
-                                                           .time_s = (*clip)->time_s});
+                                                           .time_s = clip->time_s});
   if (!transport) {
     Error error = transport.error();
     error.file = path;
     return std::unexpected(std::move(error));
   }
   device->transport = std::move(*transport);
-  device->warnings = (*clip)->warnings;
+  device->warnings = clip->warnings;
   return device;
 }
 
 std::vector<OptionSpec> options() {
+  // OptionSpec::help is a view, so the text lives as long as the driver.
+  static const std::string what = "the clip: " + clip::listed(clip::Use::kRead);
   return {
       {.name = "path",
        .default_value = std::string(),
        .required = true,
        .is_path = true,
-       .help = "the clip: a .bvh, an .amc or a hand as .csv"},
+       .help = what},
       {.name = "skeleton",
        .default_value = std::string(),
        .is_path = true,
-       .help = "the .asf of an .amc; left out, NN.asf beside NN_MM.amc"},
+       .help = "the skeleton of an .amc, an .asf; left out, NN.asf beside NN_MM.amc"},
       {.name = "loop", .default_value = true, .help = "begin again after the last frame"},
       {.name = "pace",
        .default_value = 1.0,
@@ -131,7 +112,7 @@ std::vector<OptionSpec> options() {
 
 const Driver& file_driver() {
   static const Driver driver{.name = "file",
-                             .summary = "a BVH or AMC clip or a hand CSV, played by its own clock",
+                             .summary = "a clip of a body or a hand, played by its own clock",
                              .options = file::options(),
                              .open = file::open,
                              .make_decoder = file::make_decoder,

@@ -1,4 +1,4 @@
-// The file driver: a BVH or ASF/AMC clip or a hand CSV played as if it were a device.
+// The file driver: a clip of any format that posed reads, played as if it were a device.
 #pragma once
 
 #include "drivers/driver.hpp"

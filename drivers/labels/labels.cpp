@@ -12,7 +12,7 @@
 #include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/file.hpp"
-#include "proto/clip/text_clip.hpp"
+#include "proto/clip/device_clip.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::drivers {
@@ -44,8 +44,8 @@ std::string hand_text(const std::string& side, double rate_hz) {
   return side + " " + std::to_string(rate_hz);
 }
 
-std::string body_text(const clip::TextClip& clip, double rate_hz) {
-  const std::string rest = std::string(clip.frames.front()) + "\n";
+std::string body_text(const clip::DeviceClip& clip, double rate_hz) {
+  const std::string& rest = clip.frames.front();
   return "body " + std::to_string(rate_hz) + " " + std::to_string(rest.size()) + "\n" + rest +
          clip.description;
 }
@@ -60,13 +60,13 @@ Error damaged(const std::string& identity) {
 // The body of a clip, as it stands in that frame.
 Result<Performer> body_of(std::string_view frame, std::string_view description, double rate_hz,
                           const std::string& identity) {
-  auto format = clip::parse_description(description, identity);
-  if (!format) return std::unexpected(format.error());
-  Performer body{.skeleton = format->skeleton, .rest = {}, .rate_hz = rate_hz};
+  auto coding = clip::parse_description(description, identity);
+  if (!coding) return std::unexpected(coding.error());
+  Performer body{.skeleton = coding->skeleton, .rest = {}, .rate_hz = rate_hz};
   if (body.skeleton->joint_of(Bone::kHips) < 0) {
     return fail("is no clip of a body, because no joint of it is the hips", identity);
   }
-  ClipDecoder decoder(std::move(*format));
+  ClipDecoder decoder(std::move(*coding));
   RestSink sink;
   decoder.feed(std::as_bytes(std::span(frame)), 0, sink);
   if (!sink.rest) return std::unexpected(damaged(identity));
@@ -81,8 +81,8 @@ Result<Performer> parse_text(const std::string& text, const std::string& identit
   double rate_hz = 0.0;
   std::size_t bytes = 0;
   words >> who >> rate_hz;
-  const bool sound = words && rate_hz >= 1.0 && rate_hz <= kMaxRate_hz;
-  if (!sound) return std::unexpected(damaged(identity));
+  const bool valid = words && rate_hz >= 1.0 && rate_hz <= kMaxRate_hz;
+  if (!valid) return std::unexpected(damaged(identity));
   if (who == "body") {
     const bool cut = !(words >> bytes) || words >> more || bytes > text.size() - end;
     if (cut || end == text.size()) return std::unexpected(damaged(identity));
@@ -118,10 +118,10 @@ Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
 }
 
 Result<Device> make_body(const std::string& path, double rate_hz) {
-  const auto clip = clip::open_text_clip(path);
+  const auto clip = clip::open_device_clip(path);
   if (!clip) return std::unexpected(clip.error());
-  auto device = make_device(labels_driver(), body_text(**clip, rate_hz), path);
-  if (device) device->warnings = (*clip)->warnings;
+  auto device = make_device(labels_driver(), body_text(*clip, rate_hz), path);
+  if (device) device->warnings = clip->warnings;
   return device;
 }
 

@@ -141,7 +141,7 @@ Result<> SubscriptionTransport::await_link(const Cancel& cancel) {
   std::array<zmq_pollitem_t, 2> items{
       {{monitor_->socket(), 0, ZMQ_POLLIN, 0}, {nullptr, cancel.fd(), ZMQ_POLLIN, 0}}};
   while (!cancel.fired()) {
-    const net::Refusal refusal = monitor_->take_news();
+    const net::Refusal refusal = monitor_->next_refusal();
     if (refusal != net::Refusal::kNone) return std::unexpected(refusal_error(refusal, settings_));
     if (monitor_->established()) return {};
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
@@ -160,7 +160,7 @@ void SubscriptionTransport::receive_all() {
   std::array<zmq_pollitem_t, 3> items{{{socket_.get(), 0, ZMQ_POLLIN, 0},
                                        {monitor_->socket(), 0, ZMQ_POLLIN, 0},
                                        {nullptr, stop_, ZMQ_POLLIN, 0}}};
-  while (monitor_->take_news() == net::Refusal::kNone && monitor_->ends() == 0) {
+  while (monitor_->next_refusal() == net::Refusal::kNone && monitor_->ends() == 0) {
     zmq_poll(items.data(), items.size(), -1);
     if ((items[2].revents & ZMQ_POLLIN) != 0) return;
     if ((items[0].revents & ZMQ_POLLIN) != 0) take_message();

@@ -1,9 +1,10 @@
 #include "models/feet/contacts.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
-#include "models/feet/approach.hpp"
+#include "models/feet/smoothing.hpp"
 
 namespace posed::feet {
 namespace {
@@ -54,6 +55,7 @@ void Contacts::judge(const Track& track, std::size_t point, PointContact& contac
 
 // RT-safe.
 void Contacts::update(const LegPose& pose, const Eigen::Vector3d& root_m, double dt_s) noexcept {
+  assert(dt_s > 0.0);
   for (std::size_t leg = 0; leg < kLegs; ++leg) {
     for (std::size_t p = 0; p < kPoints; ++p) {
       Track& track = track_[leg][p];

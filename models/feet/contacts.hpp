@@ -19,14 +19,14 @@ struct PointContact {
 
 class Contacts {
  public:
-  // All lengths and speeds scale with the legs, which outlive it.
+  // All lengths and speeds scale with `legs`, which must outlive this object.
   explicit Contacts(const Legs& legs) noexcept;
 
-  // Takes the performer's pose, `dt_s` > 0 after the last one. RT-safe.
+  // Judges the performer's next pose, `dt_s` > 0 after the last one. RT-safe.
   void update(const LegPose& pose, const Eigen::Vector3d& root_m, double dt_s) noexcept;
   // The next pose does not continue the last one; the ground stays. RT-safe.
   void restart() noexcept { started_ = false; }
-  // And the ground is not known any more. RT-safe.
+  // As restart(), and the height of the ground is forgotten, too. RT-safe.
   void forget() noexcept;
 
   [[nodiscard]] const PointContact& point(std::size_t leg, std::size_t point) const noexcept {
@@ -39,8 +39,8 @@ class Contacts {
   struct Track {
     Eigen::Vector3d at_m = Eigen::Vector3d::Zero();
     Eigen::Vector3d velocity_m_s = Eigen::Vector3d::Zero();
-    double slow_s = 0.0;  // how long it has been slow
-    bool seen = false;    // in the frame before
+    double slow_s = 0.0;  // how long the point has been slow
+    bool seen = false;    // the frame before measured it
   };
 
   void follow(Track& track, const Eigen::Vector3d& at_m, double dt_s) noexcept;

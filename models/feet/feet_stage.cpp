@@ -1,11 +1,18 @@
 #include "models/feet/feet_stage.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <utility>
 
+#include "models/elapsed.hpp"
+#include "models/feet/contacts.hpp"
+#include "models/feet/foot_hold.hpp"
 #include "models/feet/leg_reach.hpp"
+#include "models/feet/legs.hpp"
+#include "models/parameter_table.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::feet {
@@ -41,10 +48,77 @@ HoldOptions hold_of(RootMode mode) {
                                   : HoldOptions{.share = 0.5, .ahead = false};
 }
 
-}  // namespace
+struct FeetOptions {
+  RootOptions root;
+};
+
+class FeetStage final : public Stage {
+ public:
+  using Table = ParameterTable<FeetOptions, FeetStage>;
+  static const Table& table();
+
+  // `rate_hz`: nominal, for frames without times; 0: unknown.
+  FeetStage(std::shared_ptr<const Skeleton> skeleton, Legs legs, double rate_hz,
+            const FeetOptions& options) noexcept;
+
+  // Emits one frame for each frame in. Frames of another skeleton, and frames whose unstyled
+  // original is not known, pass through. RT-safe.
+  void process(const StageFrame& in, StageOut& out) noexcept override;
+  void set(std::size_t parameter, double value) noexcept override {
+    table_.set(*this, options_, parameter, value);
+  }
+  [[nodiscard]] ParameterState state(std::size_t parameter) const noexcept override {
+    return table_.state(*this, options_, parameter);
+  }
+
+ private:
+  [[nodiscard]] bool serves(const StageFrame& in) const noexcept;
+  [[nodiscard]] double step_s(const Frame& frame, const Eigen::Vector3d& root_m) noexcept;
+  [[nodiscard]] double gone(double dt_s) noexcept;
+  void restart() noexcept;
+  void forget() noexcept;
+  [[nodiscard]] double lowest_sole_m(const Eigen::Vector3d& root_m) const noexcept;
+  void hold(std::size_t leg, const Eigen::Vector3d& root_m, const Eigen::Vector3d& offset_m,
+            double gone, double dt_s, Frame& frame) noexcept;
+
+  const Table& table_ = table();
+  std::shared_ptr<const Skeleton> skeleton_;
+  Legs legs_;
+  double nominal_s_;
+  double least_s_;  // 0 where the rate is not known
+  FeetOptions options_;
+  Elapsed elapsed_;
+  LegPose performer_, avatar_;
+  Contacts contacts_;
+  RootMotion root_;
+  std::array<FootHold, kLegs> holds_{};
+  Eigen::Vector3d last_root_m_ = Eigen::Vector3d::Zero();
+  bool seen_ = false;      // last_root_m_ is of the frame before
+  double change_m_ = 0.0;  // how far the style moves a foot, with a slow fall
+};
+
+const FeetStage::Table& FeetStage::table() {
+  static const Table table({
+      Table::row<[](auto& options) -> auto& { return options.root.mode; }>(
+          {.name = "root",
+           .help = "stride: it walks as far as its own legs do; actor: it stays on the performer,"
+                   " and its legs reach for the ground; off: feet slide",
+           .live = true,
+           .words = kRootModes}),
+      Table::row<[](auto& options) -> auto& { return options.root.limit_m; }>(
+          {.name = "limit_m",
+           .help = "actor: how far the root may be from the performer's",
+           .min = 0.0,
+           .max = 0.5,
+           .live = true,
+           .people_name = "limit_cm",
+           .people_scale = 100.0}),
+  });
+  return table;
+}
 
 FeetStage::FeetStage(std::shared_ptr<const Skeleton> skeleton, Legs legs, double rate_hz,
-                     const RootOptions& options) noexcept
+                     const FeetOptions& options) noexcept
     : skeleton_(std::move(skeleton)),
       legs_(std::move(legs)),
       nominal_s_(1.0 / (rate_hz > 0.0 ? rate_hz : kUnknownRate_hz)),
@@ -52,18 +126,6 @@ FeetStage::FeetStage(std::shared_ptr<const Skeleton> skeleton, Legs legs, double
       options_(options),
       contacts_(legs_),
       root_(legs_) {}
-
-// RT-safe.
-void FeetStage::set(std::size_t parameter, double value) noexcept {
-  if (parameter == kRoot) options_.mode = static_cast<RootMode>(static_cast<int>(value));
-  if (parameter == kLimit) options_.limit_m = value;
-}
-
-// RT-safe.
-ParameterState FeetStage::state(std::size_t parameter) const noexcept {
-  const double value = parameter == kRoot ? static_cast<double>(options_.mode) : options_.limit_m;
-  return {value, value};
-}
 
 // RT-safe.
 bool FeetStage::serves(const StageFrame& in) const noexcept {
@@ -150,7 +212,8 @@ void FeetStage::hold(std::size_t leg, const Eigen::Vector3d& root_m,
     pair.avatar.point_m[p] = root_m + offset_m + avatar_.point_from_root_m[leg][p];
     contact[p] = contacts_.point(leg, p);
   }
-  const FootHold::Change change = hold.update(pair, contact, hold_of(options_.mode), gone, dt_s);
+  const FootHold::Change change =
+      hold.update(pair, contact, hold_of(options_.root.mode), gone, dt_s);
   const Eigen::Quaterniond turn(rotation_exp(change.turn_rad));
   const std::array<Eigen::Vector3d, kPoints>& avatar_m = pair.avatar.point_m;
   double sunk_m = 0.0;
@@ -190,12 +253,38 @@ void FeetStage::process(const StageFrame& in, StageOut& out) noexcept {
   const double gone_now = gone(dt_s);
   contacts_.update(performer_, root_m, dt_s);
   const PosePair pair{.performer = performer_, .avatar = avatar_, .root_m = root_m};
-  const Eigen::Vector3d offset_m = root_.update(pair, contacts_, gone_now, dt_s, options_);
+  const Eigen::Vector3d offset_m = root_.update(pair, contacts_, gone_now, dt_s, options_.root);
   Frame frame = in.frame;
   move_root(root_m, offset_m, frame);
-  const double let_go = options_.mode == RootMode::kOff ? 1.0 : gone_now;
+  const double let_go = options_.root.mode == RootMode::kOff ? 1.0 : gone_now;
   for (std::size_t leg = 0; leg < kLegs; ++leg) hold(leg, root_m, offset_m, let_go, dt_s, frame);
   out.frame({.frame = frame, .variance_rad2 = in.variance_rad2, .input = in.input});
+}
+
+Result<std::unique_ptr<Stage>> make_stage(std::shared_ptr<const Skeleton> skeleton, double rate_hz,
+                                          const FeetOptions& options) {
+  auto legs = Legs::find(*skeleton);
+  if (!legs) return std::unexpected(legs.error());
+  return std::make_unique<FeetStage>(std::move(skeleton), std::move(*legs), rate_hz, options);
+}
+
+}  // namespace
+
+const StageType& feet_type() {
+  static const StageType type{.name = "feet",
+                              .summary = "makes the feet of a styled body stand",
+                              .parameters = FeetStage::table().specs(),
+                              .needs_input = true,
+                              .make = [](const StageContext& context, const StageModel* /*model*/) {
+                                return make_stage(context.skeleton, context.rate_hz,
+                                                  FeetStage::table().options(context.parameters));
+                              }};
+  return type;
+}
+
+Result<std::unique_ptr<Stage>> make_feet_stage(std::shared_ptr<const Skeleton> skeleton,
+                                               double rate_hz, const RootOptions& root) {
+  return make_stage(std::move(skeleton), rate_hz, {.root = root});
 }
 
 }  // namespace posed::feet

@@ -1,9 +1,10 @@
 #include "models/feet/foot_hold.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 
-#include "models/feet/approach.hpp"
+#include "models/feet/smoothing.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::feet {
@@ -53,6 +54,7 @@ const FootHold::Change& FootHold::update(const FootPair& pair,
                                          const std::array<PointContact, kPoints>& contact,
                                          const HoldOptions& options, double gone,
                                          double dt_s) noexcept {
+  assert(dt_s > 0.0);
   const double most = std::max(contact[kAnkle].weight, contact[kToe].weight);
   const double hold = options.share * std::min(1.0, kGain * most) * (1.0 - gone);
   const bool held = hold >= kHeld * options.share;

@@ -7,9 +7,9 @@
 
 namespace posed::feet {
 
-// Speed [m/s] of those ankles and toes over the ground that stand: that of `moved` in the frames in
-// which `source`, the same motion before it was changed, moves them slower than 0.1 m/s. The mean
-// over these points and frames; empty where nothing stands or the skeleton has no legs.
+// The speed of standing ankles and toes over the ground [m/s]: the mean speed that they have in
+// `moved` in the frames in which `source`, this motion before it was changed, moves them slower
+// than 0.1 m/s. Empty where nothing stands or the skeleton has no legs.
 [[nodiscard]] std::optional<double> slide_m_s(const motion::Motion& source,
                                               const motion::Motion& moved);
 

@@ -18,10 +18,10 @@ namespace posed::feet {
 inline constexpr std::size_t kLegs = 2;          // left, right
 inline constexpr double kReferenceLeg_m = 0.83;  // an adult's
 
-// What of a foot can touch the ground. A skeleton may lack the toe or its tip.
+// The points of a foot that can touch the ground. A skeleton may lack the toe or its tip.
 enum Point : std::size_t { kAnkle, kToe, kTip, kPoints };
 
-// Something of each point of each leg.
+// A value for each point of each leg.
 template <typename T>
 using OfPoints = std::array<std::array<T, kPoints>, kLegs>;
 
@@ -61,7 +61,7 @@ class Legs {
   [[nodiscard]] const Leg& leg(std::size_t index) const noexcept { return legs_[index]; }
   // Thigh and shin of the longer leg [m].
   [[nodiscard]] double length_m() const noexcept { return length_m_; }
-  // The same as a share of kReferenceLeg_m; speeds and lengths scale with it.
+  // That length over kReferenceLeg_m; speeds and lengths scale with it.
   [[nodiscard]] double scale() const noexcept { return length_m_ / kReferenceLeg_m; }
 
  private:

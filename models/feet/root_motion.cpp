@@ -1,10 +1,11 @@
 #include "models/feet/root_motion.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 
-#include "models/feet/approach.hpp"
+#include "models/feet/smoothing.hpp"
 
 namespace posed::feet {
 namespace {
@@ -137,6 +138,7 @@ bool RootMotion::same_points(const OfPoints<Placed>& now) const noexcept {
 // RT-safe.
 Eigen::Vector3d RootMotion::update(const PosePair& pair, const Contacts& contacts, double gone,
                                    double dt_s, const RootOptions& options) noexcept {
+  assert(dt_s > 0.0);
   const OfPoints<Placed> now = placed(pair);
   const bool off = options.mode == RootMode::kOff;
   if (off) {

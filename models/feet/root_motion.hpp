@@ -27,7 +27,7 @@ inline constexpr std::array<std::string_view, 3> kRootModes{"off", "stride", "ac
 [[nodiscard]] constexpr std::string_view root_name(RootMode mode) noexcept {
   return kRootModes[static_cast<std::size_t>(mode)];
 }
-// Empty for another word.
+// The mode of this name; empty for another word.
 [[nodiscard]] constexpr std::optional<RootMode> root_mode(std::string_view name) noexcept {
   for (std::size_t i = 0; i < kRootModes.size(); ++i) {
     if (kRootModes[i] == name) return static_cast<RootMode>(i);
@@ -37,7 +37,7 @@ inline constexpr std::array<std::string_view, 3> kRootModes{"off", "stride", "ac
 
 struct RootOptions {
   RootMode mode = RootMode::kStride;
-  double limit_m = 0.08;  // of kActor: how far it may be from the performer's
+  double limit_m = 0.08;  // kActor only: how far the root may be from the performer's
 };
 
 // One frame of the performer and of the avatar: the same instant before and after the style.
@@ -59,7 +59,7 @@ class RootMotion {
   [[nodiscard]] const Eigen::Vector3d& offset_m() const noexcept { return emitted_m_; }
   // The next frame does not continue the last one. The offset stays. RT-safe.
   void restart() noexcept { started_ = false; }
-  // The avatar is where the performer is. RT-safe.
+  // Restarts with the avatar where the performer is. RT-safe.
   void forget() noexcept;
 
  private:
@@ -81,12 +81,13 @@ class RootMotion {
   const Legs* legs_;
   double scale_;
   OfPoints<Placed> before_{};
-  RootOptions last_{.mode = RootMode::kOff};             // of the frame before
-  bool started_ = false;                                 // before_ is of the frame before
-  bool fresh_ = true;                                    // there was no frame
-  Eigen::Vector3d offset_m_ = Eigen::Vector3d::Zero();   // that the mode asks for
-  Eigen::Vector3d pending_m_ = Eigen::Vector3d::Zero();  // of its steps, still to be made
-  Eigen::Vector3d drift_m_s_ = Eigen::Vector3d::Zero();  // of the offset while feet stood
+  RootOptions last_{.mode = RootMode::kOff};            // of the frame before
+  bool started_ = false;                                // before_ is of the frame before
+  bool fresh_ = true;                                   // there was no frame
+  Eigen::Vector3d offset_m_ = Eigen::Vector3d::Zero();  // the offset that the mode asks for
+  Eigen::Vector3d pending_m_ =
+      Eigen::Vector3d::Zero();  // the part of offset_m_'s steps still to be made
+  Eigen::Vector3d drift_m_s_ = Eigen::Vector3d::Zero();  // speed of the offset while feet stood
   // What is left of a jump of offset_m_, by another mode or limit or other joints: it is added,
   // and returns to 0 like the offset.
   Eigen::Vector3d rest_m_ = Eigen::Vector3d::Zero();

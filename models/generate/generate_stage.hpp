@@ -20,7 +20,7 @@
 #include "models/perform/standing.hpp"
 #include "models/smooth/live_options.hpp"
 #include "models/smooth/live_smoother.hpp"
-#include "models/stage.hpp"
+#include "models/stage_type.hpp"
 #include "proto/frame/skeleton.hpp"
 
 namespace posed::generate {
@@ -66,7 +66,7 @@ class GenerateStage final : public Stage {
   [[nodiscard]] std::span<double> used(std::vector<double>& values) const noexcept {
     return std::span(values).first(static_cast<std::size_t>(pose_channels_->count()));
   }
-  // Of the frame that goes out.
+  // Variances of the frame that goes out.
   [[nodiscard]] std::span<const double> variance_rad2() const noexcept {
     return std::span(variance_rad2_).first(channels_);
   }
@@ -79,8 +79,8 @@ class GenerateStage final : public Stage {
   const BoundModel* model_;
   const gesture::PoseChannels* pose_channels_ = nullptr;  // null: a body without a model
   Elapsed elapsed_;
-  motion::LiveHeading heading_;  // of a body
-  std::int64_t period_ns_;       // of a performance that goes on in silence
+  motion::LiveHeading heading_;  // used for a body
+  std::int64_t period_ns_;       // between frames performed in silence
   std::int64_t last_heard_ns_ = kNoTime_ns;
   std::int64_t last_tick_ns_ = kNoTime_ns;  // in this silence
   int entered_ = 0;                         // frames that wait in the smoother
@@ -91,5 +91,8 @@ class GenerateStage final : public Stage {
   std::size_t channels_ = 0;         // of the last emitted frame
   std::array<double, kMaxChannels> variance_rad2_{};
 };
+
+// The entry in the list of stages (models/stages/registry.cpp).
+[[nodiscard]] const StageType& generate_type();
 
 }  // namespace posed::generate

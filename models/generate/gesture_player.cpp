@@ -1,10 +1,35 @@
 #include "models/generate/gesture_player.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <utility>
 
 namespace posed::generate {
+
+// RT-safe.
+void QuinticOffset::start(std::span<const double> offset, std::span<const double> velocity,
+                          int frames) noexcept {
+  assert(frames > 0 && offset.size() <= offset_.size() && velocity.size() <= velocity_.size());
+  std::ranges::copy(offset, offset_.begin());
+  std::ranges::copy(velocity, velocity_.begin());
+  frame_ = 0;
+  frames_ = frames;
+}
+
+// RT-safe.
+void QuinticOffset::add_next(std::span<double> pose) noexcept {
+  if (done()) return;
+  ++frame_;
+  const double t = static_cast<double>(frame_) / frames_;
+  const double t3 = t * t * t;
+  const double of_position = 1.0 - t3 * (10.0 - t * (15.0 - 6.0 * t));
+  const double of_velocity = frames_ * (t - t3 * (6.0 - t * (8.0 - 3.0 * t)));
+  for (std::size_t c = 0; c < pose.size(); ++c) {
+    pose[c] += of_position * offset_[c] + of_velocity * velocity_[c];
+  }
+}
+
 namespace {
 
 constexpr double kWayBack_s = 0.8;

@@ -13,11 +13,34 @@
 #include <vector>
 
 #include "models/generate/bound_model.hpp"
-#include "models/generate/quintic_offset.hpp"
 #include "models/gesture/play_order.hpp"
 #include "models/perform/label_sequence_player.hpp"
 
 namespace posed::generate {
+
+// The return from a performance to the live hand (README.md, "Return to the live hand"). It is an
+// offset that decays from an initial position and velocity to zero along a polynomial of fifth
+// degree, which starts without acceleration and ends at rest. Added to the live pose, it leads back
+// to it. RT-safe except for construction.
+class QuinticOffset {
+ public:
+  // Allocates for poses of at most `channels` channels.
+  explicit QuinticOffset(int channels)
+      : offset_(static_cast<std::size_t>(channels)),
+        velocity_(static_cast<std::size_t>(channels)) {}
+
+  // [channel]; `velocity` is in radians per frame; the offset is zero after `frames` frames.
+  void start(std::span<const double> offset, std::span<const double> velocity, int frames) noexcept;
+
+  // Adds the next frame's offset to a pose, the first call that of a frame after the start; zero
+  // when done().
+  void add_next(std::span<double> pose) noexcept;
+  [[nodiscard]] bool done() const noexcept { return frame_ >= frames_; }
+
+ private:
+  std::vector<double> offset_, velocity_;
+  int frame_ = 0, frames_ = 0;
+};
 
 // One thread.
 class GesturePlayer {
@@ -39,8 +62,8 @@ class GesturePlayer {
   // Leads back to the live pose at once, from the present one.
   void stop() noexcept;
 
-  // One frame. `live` is the pose at this frame, finite; empty: there is no live one. Returns the
-  // pose to show, valid until the next call, and its kind.
+  // Advances by a frame. `live` is the pose at this frame, finite; empty: there is no live one.
+  // Returns the pose to show, valid until the next call, and its kind.
   enum class What : std::uint8_t { kLive, kHeld, kPerformed, kLeadingBack };
   struct Pose {
     What what = What::kLive;

@@ -34,7 +34,7 @@ struct JointGroup {
                                                              double rate_hz,
                                                              Vocabulary& vocabulary);
 
-// One more clip, about the vocabulary's mean rotations as they are.
+// Reads one more clip, about the mean rotations that the vocabulary already has.
 [[nodiscard]] Result<Recording> body_recording(const clip::Clip& clip, double rate_hz,
                                                const Vocabulary& vocabulary);
 

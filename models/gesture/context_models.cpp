@@ -2,16 +2,123 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <optional>
 #include <tuple>
+#include <vector>
 
-#include "models/gesture/embedded.hpp"
+#include "models/gesture/estimate.hpp"
+#include "models/gesture/gesture_model.hpp"
+#include "models/gesture/recording.hpp"
 #include "models/task_numbers.hpp"
 #include "proto/frame/degree.hpp"
 
 namespace posed::gesture {
 namespace {
+
+// Receives the first of the frames that one segment was aligned with, the state probabilities of
+// each of them, and the expected stays.
+using PartFunction =
+    std::function<void(std::size_t segment, Eigen::Index first_frame, const Eigen::MatrixXd& gamma,
+                       const Eigen::VectorXd& stays)>;
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+// Segments [first, last) that touch one another, with all their frames.
+class Chain {
+ public:
+  Chain(const FeatureMatrix& features, const std::vector<Segment>& segments,
+        const std::vector<const StateModel*>& models, std::size_t first, std::size_t last,
+        int slack)
+      : features_(features), segments_(segments), models_(models), first_(first), last_(last) {
+    begin_ = segments[first].begin;
+    frames_ = segments[last - 1].end - begin_;
+    set_band(slack);
+  }
+
+  double align(const PartFunction& accept) const {
+    const auto count = static_cast<Index>(last_ - first_);
+    MatrixXd density(frames_, band_.width);
+    VectorXd stay(count * kStates);
+    for (Index s = 0; s < count; ++s) {
+      const StateModel& model = *models_[first_ + s];
+      stay.segment(s * kStates, kStates) = model.stay;
+      const auto [from, to] = reach(s);
+      const MatrixXd part = log_density(rows(from, to), model);
+      for (int t = from; t < to; ++t) {
+        density.row(t).segment(column(s, t), kStates) = part.row(t - from);
+      }
+    }
+    const Posterior posterior = forward_backward(density, stay, band_);
+    for (Index s = 0; s < count; ++s) {
+      const auto [from, to] = reach(s);
+      MatrixXd gamma(to - from, kStates);
+      for (int t = from; t < to; ++t) {
+        gamma.row(t - from) = posterior.gamma.row(t).segment(column(s, t), kStates);
+      }
+      accept(first_ + s, begin_ + from, gamma, posterior.stays.segment(s * kStates, kStates));
+    }
+    return posterior.log_likelihood;
+  }
+
+ private:
+  // Frame t, counted from the chain's start, may be in any segment at most `slack` frames away.
+  void set_band(int slack) {
+    const auto count = static_cast<int>(last_ - first_);
+    std::vector<int> lowest;
+    for (int t = 0, low = 0, high = 0; t < frames_; ++t) {
+      while (low + 1 < count && segments_[first_ + low].end - begin_ + slack <= t) ++low;
+      while (high + 1 < count && segments_[first_ + high + 1].begin - begin_ - slack <= t) ++high;
+      lowest.push_back(low);
+      band_.width = std::max(band_.width, (high - low + 1) * kStates);
+    }
+    const int last_start = count * kStates - band_.width;
+    for (const int low : lowest) band_.first.push_back(std::min(low * kStates, last_start));
+  }
+
+  // The frames [from, to) whose band holds segment s.
+  [[nodiscard]] std::pair<int, int> reach(Index s) const {
+    const auto lowest = static_cast<int>(s * kStates) + kStates - band_.width;
+    const auto from = std::ranges::lower_bound(band_.first, lowest);
+    const auto to = std::ranges::upper_bound(band_.first, static_cast<int>(s * kStates));
+    return {static_cast<int>(from - band_.first.begin()),
+            static_cast<int>(to - band_.first.begin())};
+  }
+
+  [[nodiscard]] Index column(Index s, int t) const { return s * kStates - band_.first[t]; }
+
+  [[nodiscard]] Frames rows(int from, int to) const {
+    return features_.middleRows(begin_ + from, to - from);
+  }
+
+  const FeatureMatrix& features_;
+  const std::vector<Segment>& segments_;
+  const std::vector<const StateModel*>& models_;
+  std::size_t first_, last_;
+  int begin_ = 0, frames_ = 0;
+  Band band_;
+};
+
+// One round of alignment over a whole recording: the models of successive labels are chained and
+// aligned with all frames that the labels cover, so that the labels' borders are only hints
+// (README.md, "Embedded rounds"). `models` has one model per segment; a border moves by at most
+// `slack` frames. Segments that do not touch are aligned separately. Returns the log likelihood of
+// the whole recording.
+double align_embedded(const FeatureMatrix& features, const std::vector<Segment>& segments,
+                      const std::vector<const StateModel*>& models, int slack,
+                      const PartFunction& accept) {
+  double log_likelihood = 0.0;
+  for (std::size_t first = 0; first < segments.size();) {
+    std::size_t last = first + 1;
+    while (last < segments.size() && segments[last].begin == segments[last - 1].end) ++last;
+    log_likelihood += Chain(features, segments, models, first, last, slack).align(accept);
+    first = last;
+  }
+  return log_likelihood;
+}
 
 using Eigen::Index;
 using Eigen::MatrixXd;
@@ -249,7 +356,7 @@ class Trainer {
     return own.stay.size() > 0 ? own : label_models_[out_.contexts[context].current];
   }
 
-  // Where each segment of a recording lies: the log likelihood, then the arguments of TakePart.
+  // Where each segment of a recording lies: the log likelihood, then the arguments of PartFunction.
   [[nodiscard]] TaskResult embedded_task(std::size_t r) const {
     const Recording& recording = recordings_[r];
     std::vector<const StateModel*> models;

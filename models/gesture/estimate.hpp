@@ -27,12 +27,12 @@ struct Statistics {
   void add(const Frames& frames, const Eigen::MatrixXd& gamma, const Eigen::VectorXd& stays);
 };
 
-// Means and variances, these at least `floor` [dimension]; stay within 0.001 and 0.999. A state
-// without any frames keeps the values of `before`.
+// Means, variances (floored at `floor` [dimension]) and self-transition probabilities, clamped to
+// 0.001..0.999. A state without any frames keeps the values of `before`.
 [[nodiscard]] StateModel estimate(const Statistics& sums, const Eigen::VectorXd& floor,
                                   const StateModel& before);
 
-// Every example cut into equal parts, frame t of T in state t * states / T.
+// Cuts every example into equal parts: frame t of T is in state t * states / T.
 [[nodiscard]] Statistics flat_start(const std::vector<Frames>& examples, int states);
 // Aligns every example along its best path through the model.
 [[nodiscard]] Statistics align_hard(const std::vector<Frames>& examples, const StateModel& model);

@@ -12,7 +12,7 @@
 
 namespace posed::gesture {
 
-// Statistics of the contexts, one row each.
+// Statistics of the contexts, a row for each context.
 struct ContextSums {
   Eigen::VectorXd occupancy;      // frames (durations: gestures)
   Eigen::VectorXd examples;       // gestures

@@ -2,14 +2,145 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <set>
+#include <string>
+#include <utility>
 #include <vector>
 
-#include "models/gesture/vocabulary_file.hpp"
+#include "models/gesture/vocabulary.hpp"
+#include "posed/v1/model.pb.h"
+#include "proto/frame/humanoid.hpp"
+#include "proto/frame/label.hpp"
 #include "proto/model/model_file.hpp"
 #include "proto/model/validator.hpp"
 
 namespace posed::gesture {
 namespace {
+
+using model_file::Validator;
+
+constexpr int kMaxModelLabels = 1'000;
+
+motion::PoseSpaceSpec read_joints(const v1::PoseSpace& from, Validator& check) {
+  motion::PoseSpaceSpec body;
+  body.space = motion::Space::kHumanoid;
+  check.want(from.name() == motion::space_name(body.space), "the pose space, which is no body's");
+  body.joints.assign(from.joint().begin(), from.joint().end());
+  check.want(!body.joints.empty() && body.joints.size() <= kBones, "the number of joints");
+  check.want(
+      std::set<std::string>(body.joints.begin(), body.joints.end()).size() == body.joints.size(),
+      "a joint, which stands twice");
+  for (const std::string& joint : body.joints) {
+    check.want(bone_from_name(joint).has_value(), "a joint, which is no bone of the humanoid");
+  }
+  check.want(from.root() < body.joints.size(), "the root joint");
+  check.want(from.mean_xyzw_size() == 4 * from.joint_size(), "the number of mean rotations");
+  for (int j = 0; j < from.joint_size() && check.sound(); ++j) {
+    const auto at = [&](int i) { return from.mean_xyzw(4 * j + i); };
+    body.mean.emplace_back(at(3), at(0), at(1), at(2));
+    check.want(std::abs(body.mean.back().norm() - 1.0) < 1e-6, "a mean rotation's length");
+  }
+  body.root = static_cast<int>(from.root());
+  return body;
+}
+
+std::vector<ChannelGroup> read_groups(const v1::GestureModel& from, Validator& check) {
+  std::vector<ChannelGroup> groups;
+  std::set<std::string> names;
+  check.want(from.group_size() >= 1 && from.group_size() <= kMaxGroups, "the number of groups");
+  int first = 0;
+  for (const v1::GestureGroup& group : from.group()) {
+    check.want(is_label_name(group.name()), "a group's name");
+    check.want(names.insert(group.name()).second, "a group's name, which stands twice");
+    check.want(group.joints() >= 1 && group.joints() <= kBones, "the number of a group's joints");
+    check.want(group.classes() >= 1 && group.classes() <= kMaxClasses, "a group's classes");
+    if (!check.sound()) return groups;
+    const int channels = 3 * static_cast<int>(group.joints());
+    groups.push_back({group.name(), first, channels, static_cast<int>(group.classes())});
+    first += channels;
+  }
+  check.want(first == 3 * from.space().joint_size(), "the groups, which do not share the joints");
+  return groups;
+}
+
+std::vector<Label> read_labels(const v1::GestureModel& from,
+                               const std::vector<ChannelGroup>& groups, Validator& check) {
+  const auto count = static_cast<int>(groups.size());
+  std::vector<Label> labels;
+  std::set<std::string> names;
+  check.want(from.label_size() >= 1 && from.label_size() <= kMaxModelLabels,
+             "the number of labels");
+  if (!check.sound()) return labels;
+  for (const v1::GestureLabel& label : from.label()) {
+    Label read{.name = label.name(), .group_class = {}, .trained = label.trained()};
+    check.want(is_label_name(read.name), "a label's name");
+    check.want(names.insert(read.name).second, "a label's name, which stands twice");
+    check.want(label.finger_class_size() == count, "a label's classes, not one a finger or group");
+    for (int g = 0; g < count && check.sound(); ++g) {
+      check.want(label.finger_class(g) < static_cast<unsigned>(groups[g].classes),
+                 "a label's class");
+      read.group_class.push_back(static_cast<int>(label.finger_class(g)));
+    }
+    labels.push_back(std::move(read));
+  }
+  return labels;
+}
+
+std::vector<int> read_named(const v1::GestureModel& from, Validator& check) {
+  std::set<std::uint32_t> named;
+  for (const std::uint32_t label : from.named()) {
+    check.want(label < static_cast<unsigned>(from.label_size()), "a label that questions name");
+    check.want(named.insert(label).second, "a label that questions name, which stands twice");
+  }
+  return {from.named().begin(), from.named().end()};
+}
+
+void write_body(const Vocabulary& vocabulary, v1::GestureModel& out) {
+  const motion::PoseSpaceSpec& body = *vocabulary.body;
+  v1::PoseSpace& space = *out.mutable_space();
+  space.set_name(std::string(motion::space_name(body.space)));
+  for (const std::string& joint : body.joints) space.add_joint(joint);
+  for (const Eigen::Quaterniond& mean : body.mean) {
+    for (const double value : {mean.x(), mean.y(), mean.z(), mean.w()}) space.add_mean_xyzw(value);
+  }
+  space.set_root(static_cast<std::uint32_t>(body.root));
+  for (const ChannelGroup& group : vocabulary.groups) {
+    v1::GestureGroup& part = *out.add_group();
+    part.set_name(group.name);
+    part.set_joints(static_cast<std::uint32_t>(group.channels / 3));
+    part.set_classes(static_cast<std::uint32_t>(group.classes));
+  }
+}
+
+// Reads the labels with their classes, and the joints and groups of a body (proto/README.md). What
+// is wrong goes to `check`; `vocabulary` may be used only if that stays valid.
+void read_vocabulary(const v1::GestureModel& from, Vocabulary& vocabulary, Validator& check) {
+  if (from.has_space()) {
+    vocabulary.body = read_joints(from.space(), check);
+    vocabulary.groups = read_groups(from, check);
+  } else {
+    check.want(from.group_size() == 0, "the groups, which a hand does not have");
+  }
+  if (!check.sound()) return;
+  vocabulary.labels = read_labels(from, vocabulary.groups, check);
+  vocabulary.named = read_named(from, check);
+  vocabulary.tells_none = from.tells_none();
+}
+
+void write_vocabulary(const Vocabulary& vocabulary, v1::GestureModel& out) {
+  for (const Label& label : vocabulary.labels) {
+    v1::GestureLabel& written = *out.add_label();
+    written.set_name(label.name);
+    for (const int group_class : label.group_class) {
+      written.add_finger_class(static_cast<std::uint32_t>(group_class));
+    }
+    written.set_trained(label.trained);
+  }
+  if (vocabulary.body) write_body(vocabulary, out);
+  for (const int label : vocabulary.named) out.add_named(static_cast<std::uint32_t>(label));
+  if (vocabulary.tells_none) out.set_tells_none(true);
+}
 
 using model_file::kMaxNumber;
 using model_file::Validator;
@@ -58,10 +189,10 @@ void read_nodes(const v1::GestureTree& from, int questions, Tree<Gaussian>& tree
   check.want(count >= 1 && count < 2 * most, "the number of nodes of a tree");
   check.want(from.yes_size() == count && from.no_size() == count && from.leaf_size() == count,
              "the node arrays of a tree, which differ in length");
-  if (!check.sound()) return;
+  if (!check.valid()) return;
   std::vector<int> parents(static_cast<std::size_t>(count));
   int leaves = 0;
-  for (int i = 0; i < count && check.sound(); ++i) {
+  for (int i = 0; i < count && check.valid(); ++i) {
     const TreeNode node{from.question(i), from.yes(i), from.no(i), from.leaf(i)};
     const bool is_leaf = node.question < 0;
     if (is_leaf) {
@@ -72,12 +203,12 @@ void read_nodes(const v1::GestureTree& from, int questions, Tree<Gaussian>& tree
       check.want(node.question < questions && node.leaf == -1, "a question of a tree");
       for (const int child : {node.yes, node.no}) {
         check.want(child > i && child < count, "a child of a tree's node");
-        if (check.sound()) ++parents[child];
+        if (check.valid()) ++parents[child];
       }
     }
     tree.nodes.push_back(node);
   }
-  for (int i = 1; i < count && check.sound(); ++i) {
+  for (int i = 1; i < count && check.valid(); ++i) {
     check.want(parents[i] == 1, "a tree's node, which is not the child of one node");
   }
   tree.leaves.resize(static_cast<std::size_t>(leaves));
@@ -87,7 +218,7 @@ template <typename Gaussian>
 Tree<Gaussian> read_tree(const v1::GestureTree& from, const TreeShape& shape, Validator& check) {
   Tree<Gaussian> tree;
   read_nodes(from, shape.questions, tree, check);
-  if (!check.sound()) return {};
+  if (!check.valid()) return {};
   const int leaves = static_cast<int>(tree.leaves.size());
   const int dims = shape.dims;
   check.want(from.mean_size() == leaves * dims && from.variance_size() == leaves * dims &&
@@ -96,7 +227,7 @@ Tree<Gaussian> read_tree(const v1::GestureTree& from, const TreeShape& shape, Va
   check.numbers(from.mean(), -kMaxNumber, kMaxNumber, "a mean");
   check.numbers(from.variance(), kMinVariance, kMaxNumber, "a variance");
   check.numbers(from.occupancy(), 0.0, kMaxNumber, "an occupancy");
-  if (!check.sound()) return {};
+  if (!check.valid()) return {};
   for (int i = 0; i < leaves; ++i) {
     take_row(from.mean().data() + i * dims, dims, tree.leaves[i].mean);
     take_row(from.variance().data() + i * dims, dims, tree.leaves[i].variance);
@@ -109,7 +240,7 @@ void read_range(const v1::GestureModel& from, GestureModel& model, Validator& ch
   const int channels = model.channels();
   check.want(from.low_rad_size() == channels && from.high_rad_size() == channels,
              "the range of the angles");
-  if (!check.sound()) return;
+  if (!check.valid()) return;
   for (int c = 0; c < channels; ++c) {
     model.low.push_back(check.number(from.low_rad(c), -1e3, 1e3, "the range of an angle"));
     model.high.push_back(
@@ -121,10 +252,10 @@ GestureModel read_model(const v1::GestureModel& from, Validator& check) {
   GestureModel model;
   model.rate_hz = check.number(from.rate_hz(), 1.0, 10'000.0, "the frame rate");
   read_vocabulary(from, model, check);
-  if (!check.sound()) return model;
+  if (!check.valid()) return model;
   const auto groups = static_cast<int>(model.groups.size());
   check.want(from.tree_size() == kStates * groups, "the number of trees");
-  if (!check.sound()) return model;
+  if (!check.valid()) return model;
   for (int i = 0; i < kStates * groups; ++i) {
     const TreeShape shape = shape_of(model, i % groups);
     model.trees[i / groups].push_back(read_tree<GroupGaussian>(from.tree(i), shape, check));

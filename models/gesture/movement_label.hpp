@@ -30,7 +30,7 @@ struct Oscillation {
   std::vector<int> cycles;     // frames at which a cycle begins
   bool steady = false;         // it has cycles of nearly equal length, and is no tremor
 };
-// In the frames [from, to).
+// Measures the oscillation in the frames [from, to).
 [[nodiscard]] Oscillation oscillation_in(const Recording& recording, int from, int to);
 
 }  // namespace posed::gesture

@@ -29,13 +29,13 @@ class PoseChannels {
   // that lacks joints of it. Cold.
   [[nodiscard]] static Result<PoseChannels> bind(const Vocabulary& vocabulary,
                                                  const Skeleton& skeleton);
-  // Those of a hand, which need no vocabulary. `skeleton` is one. Cold.
+  // The channels of a hand, which need no vocabulary. `skeleton` is a hand. Cold.
   [[nodiscard]] static PoseChannels of_hand(const Skeleton& skeleton);
 
   [[nodiscard]] int count() const noexcept { return count_; }
   [[nodiscard]] bool is_hand() const noexcept { return !space_; }
 
-  // Of a body: where the pelvis points, and whether the frame measured it.
+  // For a body: where the pelvis points, and whether the frame measured that.
   [[nodiscard]] bool has_heading(const Frame& frame) const noexcept {
     return space_ && space_->has_heading(frame);
   }

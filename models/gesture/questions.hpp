@@ -39,9 +39,9 @@ struct LabelPose {
 // with three centres, named A to C from the most closed to the most open. Deterministic.
 [[nodiscard]] std::vector<Label> propose_labels(const std::vector<LabelPose>& poses);
 
-// The same for a body, as `vocabulary` has its groups: in each, poses of one class are alike,
-// within 15 degrees rms over the group's joints; A is the class of the pose that is nearest to all
-// others. Sets the groups' numbers of classes, too.
+// Proposes classes for a body's labels, in the groups of `vocabulary`: poses of one class are
+// alike, within 15 degrees rms over the group's joints; A is the class of the pose that is nearest
+// to all others. Sets the groups' numbers of classes, too.
 void propose_body_labels(const std::vector<LabelPose>& poses, Vocabulary& vocabulary);
 
 // Classes of a new label whose pose was shown once: each group takes the class of the trained label

@@ -29,16 +29,16 @@ struct Recording {
   double rate_hz = 0.0;
   FeatureMatrix angles_rad;  // [frame][group][joint][x, y, z]
   std::vector<Segment> segments;
-  // It ends where it began, so its first gesture may follow its last one.
+  // True: the recording ends where it began, so its first gesture may follow its last one.
   bool closed = false;
 };
 
 // Time from the first frame to the end of the last frame [s].
 [[nodiscard]] double duration_s(const clip::HandClip& clip);
 
-// The clip at `rate_hz`, interpolated linearly unless its times already have that rate. Errors:
-// fewer frames than a gesture has states, missing values (`posed smooth` fills gaps), times that do
-// not increase.
+// Reads the clip at `rate_hz`, interpolated linearly unless its times already have that rate.
+// Errors: fewer frames than a gesture has states, missing values (`posed smooth` fills gaps), times
+// that do not increase.
 [[nodiscard]] Result<Recording> recording_of(const clip::HandClip& clip, double rate_hz);
 
 // Cuts the recording at the labels; `file` is the label file's name for errors. Returns an error

@@ -20,6 +20,23 @@ struct TreeChoice {
 [[nodiscard]] Result<TreeChoice> tree_choice(
     std::string_view text, const std::vector<ChannelGroup>& groups = finger_groups());
 
+// A tree with the texts that all its drawings share, those below and those of a report.
+struct DrawnNode {
+  std::string words;      // the question, or the leaf's number and frames
+  std::string reach;      // the contexts that reach this node: {g,1}-c-*
+  int yes = -1, no = -1;  // -1: a leaf
+  int depth = 0;
+};
+
+struct DrawnTree {
+  std::string title;
+  std::vector<DrawnNode> nodes;  // as in the model: node 0 is the root
+};
+
+// The trees in the order of groups, then of states.
+[[nodiscard]] std::vector<DrawnTree> draw_trees(const GestureModel& model,
+                                                const TreeChoice& choice);
+
 [[nodiscard]] std::string trees_text(const GestureModel& model, const TreeChoice& choice);
 [[nodiscard]] std::string trees_dot(const GestureModel& model, const TreeChoice& choice);
 [[nodiscard]] std::string trees_svg(const GestureModel& model, const TreeChoice& choice);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "models/gesture/drawn_tree.hpp"
 #include "models/gesture/tree_drawing.hpp"
 #include "proto/text/svg.hpp"
 

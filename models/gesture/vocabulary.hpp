@@ -45,7 +45,8 @@ struct Vocabulary {
   std::vector<ChannelGroup> groups = finger_groups();
   std::vector<Label> labels;
   std::vector<int> named;  // labels that questions may name, so that equal classes stay apart
-  // A live hand that makes none of the gestures is told so; a body always is.
+  // Whether the live smoother may say that a hand makes none of the gestures; for a body it always
+  // may.
   bool tells_none = false;
 
   [[nodiscard]] bool is_hand() const noexcept { return !body; }

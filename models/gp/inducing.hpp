@@ -28,20 +28,20 @@ struct Inducing {
 [[nodiscard]] Inducing choose_inducing(const Eigen::MatrixXd& X, double mu, int limit,
                                        const std::function<bool(double)>& enough);
 
-// As fit() (regression.hpp) with b = 0, but with at most `limit` poses, fitted to all pairs by
-// least squares with the noise as ridge (subset of regressors).
+// Fits as fit() (regression.hpp) does with b = 0, but with at most `limit` poses, fitted to all
+// pairs by least squares with the noise as ridge (subset of regressors).
 [[nodiscard]] Result<Trained> fit_inducing(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
                                            const Eigen::VectorXd& offset, const Hyper& hyper,
                                            int limit);
 
-// What one of several functions that share their poses is learnt from.
+// The training data of one of several functions that share their poses.
 struct FunctionData {
   std::vector<int> rows;   // of X
   Eigen::MatrixXd Y;       // outputs at these rows
   Eigen::VectorXd offset;  // prior mean
 };
 
-// As fit_inducing(), for several functions on the same poses, which are chosen among all of X.
+// Fits several functions as fit_inducing() does, on common poses that are chosen among all of X.
 [[nodiscard]] Result<std::vector<Trained>> fit_functions(const Eigen::MatrixXd& X,
                                                          std::span<const FunctionData> functions,
                                                          const Hyper& hyper, int limit);

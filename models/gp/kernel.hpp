@@ -50,8 +50,8 @@ struct Blocks {
 // sum_i k_i A_i into out [outputs_padded], where k_i = exp2(exponent * |q - x_i|^2).
 void weighted_sum(const Tiles& tiles, const Query& query, float* out) noexcept;
 
-// The same with sum_s shares_s A_s for A; blocks without a share are not read. One block of share 1
-// gives the bits of weighted_sum() with these weights. RT-safe.
+// weighted_sum() with sum_s shares_s A_s for A; blocks without a share are not read. One block of
+// share 1 gives the bits of weighted_sum() with these weights. RT-safe.
 void blended_sum(const Tiles& tiles, const Blocks& blocks, const Query& query, float* out) noexcept;
 
 // out = 2^x for x <= 0, exactly 0 below -125. count: a multiple of 16. For tests.

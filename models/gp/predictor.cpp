@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -233,6 +234,7 @@ bool Predictor::settle(std::span<const float> shares) noexcept {
 void Predictor::mean(std::span<const float> q, std::span<const std::uint8_t> available,
                      std::span<float> out, std::span<const float> shares) const noexcept {
   const Parts& p = *parts_;
+  assert(q.size() >= static_cast<std::size_t>(p.dims));
   std::array<std::uint16_t, kMaxDims> present;
   kernel::Query query{q.data(), nullptr, p.dims, p.exponent};
   if (!available.empty()) {

@@ -41,7 +41,7 @@ class Predictor {
 
   // The limit of f far from all training poses: offset + b sum w [D_out]. RT-safe.
   [[nodiscard]] std::span<const float> constant() const noexcept;
-  // The same for other shares [functions] into out [D_out]. RT-safe.
+  // Writes that limit for other shares [functions] into out [D_out]. RT-safe.
   void constant(std::span<const float> shares, std::span<float> out) const noexcept;
 
   // Works towards the mixture of these shares [functions] and returns whether mean() without shares

@@ -15,7 +15,7 @@ struct SyntheticProcess {
       queries;  // [256 x dims]: frames of a walker who is not among the training poses, rad
 };
 
-// The same arguments give the same numbers everywhere.
+// Equal arguments give equal numbers on every system.
 [[nodiscard]] SyntheticProcess synthetic(int poses, int dims);
 
 }  // namespace posed::gp

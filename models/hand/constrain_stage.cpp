@@ -1,8 +1,10 @@
 #include "models/hand/constrain_stage.hpp"
 
+#include <memory>
 #include <string>
 #include <utility>
 
+#include "models/hand/constraint_solver.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::hand {
@@ -22,7 +24,19 @@ bool differ(const HandAngles& a, const HandAngles& b) noexcept {
   return false;
 }
 
-}  // namespace
+class ConstrainStage final : public Stage {
+ public:
+  // `skeleton` is a hand (hand_side() recognises it); its name selects the hand shape.
+  explicit ConstrainStage(std::shared_ptr<const Skeleton> skeleton);
+
+  // Moves the frame's angles to the nearest that are allowed; an angle that is known well moves
+  // less. A hand that lacks an angle is left alone. RT-safe.
+  void process(const StageFrame& in, StageOut& out) noexcept override;
+
+ private:
+  std::shared_ptr<const Skeleton> skeleton_;
+  ConstraintSolver solver_;
+};
 
 ConstrainStage::ConstrainStage(std::shared_ptr<const Skeleton> skeleton)
     : skeleton_(std::move(skeleton)), solver_(shape_of(*skeleton_)) {}
@@ -47,6 +61,26 @@ void ConstrainStage::process(const StageFrame& in, StageOut& out) noexcept {
   frame.valid = in.frame.valid;
   frame.root_position_m = in.frame.root_position_m;
   out.frame({.frame = frame, .variance_rad2 = in.variance_rad2, .input = in.input});
+}
+
+bool is_hand(const Skeleton& skeleton) { return hand_side(skeleton).has_value(); }
+
+Result<std::unique_ptr<Stage>> make(const StageContext& context, const StageModel* /*model*/) {
+  if (!is_hand(*context.skeleton)) {
+    return misuse("only hands (hand45) can be constrained; leave out its [stream.constrain] table");
+  }
+  return std::make_unique<ConstrainStage>(context.skeleton);
+}
+
+}  // namespace
+
+const StageType& constrain_type() {
+  static const StageType type{
+      .name = "constrain",
+      .summary = "keeps the fingers of a hand apart and its joints within their limits",
+      .is_default = is_hand,
+      .make = make};
+  return type;
 }
 
 }  // namespace posed::hand

@@ -39,7 +39,7 @@ struct HandPose {
 
 // Applies R = Rz(twist) Rx(flexion) Ry(spread) at each joint, from base to tip. RT-safe.
 void place(const HandGeometry& geometry, const HandAngles& angles, HandPose& pose) noexcept;
-// The same for one finger; the others stay as they are. RT-safe.
+// Places one finger as place_hand() does; the others stay as they are. RT-safe.
 void place_finger(const HandGeometry& geometry, int finger, const HandAngles& angles,
                   HandPose& pose) noexcept;
 

@@ -38,19 +38,43 @@ std::optional<Wrist> wrist_from_name(std::string_view name) {
   return std::nullopt;
 }
 
+const ParameterTable<MergeOptions, Stage>& MergeOptions::table() {
+  using Table = ParameterTable<MergeOptions, Stage>;
+  static const Table table({
+      Table::row<[](auto& options) -> auto& { return options.gloves[0]; }>(
+          {.name = "left", .help = "stream of the left glove"}),
+      Table::row<[](auto& options) -> auto& { return options.gloves[1]; }>(
+          {.name = "right", .help = "stream of the right glove"}),
+      Table::row<&MergeOptions::wait_s>({.name = "wait_s",
+                                         .help = "how long a frame waits for the gloves at most",
+                                         .min = 0.0,
+                                         .max = 0.1,
+                                         .people_name = "wait_ms",
+                                         .people_scale = 1000.0}),
+      Table::row<&MergeOptions::wrist>(
+          {.name = "wrist",
+           .help = "who turns the wrist: body, glove, or auto: the glove if it measures it"}),
+      Table::row<&MergeOptions::hold_s>(
+          {.name = "hold_s",
+           .help = "how long the hand of a silent glove stays, before it relaxes",
+           .min = 0.0,
+           .max = 60.0}),
+  });
+  return table;
+}
+
 Result<MergePlan> MergePlan::make(const StageContext& context) {
-  constexpr std::array kNames{"left", "right"};
+  const MergeOptions options = MergeOptions::table().options(context.parameters);
   MergePlan plan;
   plan.body = context.skeleton;
-  plan.wait_ns = nanoseconds(parameter<double>(context.parameters, "wait_s"));
-  plan.hold_ns = nanoseconds(parameter<double>(context.parameters, "hold_s"));
-  const auto wrist = wrist_from_name(parameter<std::string>(context.parameters, "wrist"));
+  plan.wait_ns = nanoseconds(options.wait_s);
+  plan.hold_ns = nanoseconds(options.hold_s);
+  const auto wrist = wrist_from_name(options.wrist);
   std::array<const Skeleton*, 2> gloves{};
   for (std::size_t i = 0; i < gloves.size() && i < context.partners.size(); ++i) {
     gloves[i] = context.partners[i].skeleton.get();
     if (gloves[i] == nullptr) continue;
-    const auto& stream = parameter<std::string>(context.parameters, kNames[i]);
-    if (auto fits = HandMap::check(stream, static_cast<Side>(i), *gloves[i]); !fits) {
+    if (auto fits = HandMap::check(options.gloves[i], static_cast<Side>(i), *gloves[i]); !fits) {
       return std::unexpected(fits.error());
     }
   }
@@ -66,9 +90,8 @@ Result<MergePlan> MergePlan::make(const StageContext& context) {
   plan.angles = static_cast<std::uint16_t>(std::ranges::count_if(skeleton.channels, is_rotation));
   for (std::size_t i = 0; i < gloves.size(); ++i) {
     if (gloves[i] == nullptr) continue;
-    auto map =
-        HandMap::bind(parameter<std::string>(context.parameters, kNames[i]), static_cast<Side>(i),
-                      *gloves[i], skeleton, wrist.value_or(Wrist::kAuto));
+    auto map = HandMap::bind(options.gloves[i], static_cast<Side>(i), *gloves[i], skeleton,
+                             wrist.value_or(Wrist::kAuto));
     if (!map) return std::unexpected(map.error());
     plan.hands[i] = Hand{.glove = context.partners[i].skeleton,
                          .rate_hz = context.partners[i].rate_hz,

@@ -7,14 +7,26 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
 #include "models/merge/hand_map.hpp"
 #include "models/merge/merged_skeleton.hpp"
+#include "models/parameter_table.hpp"
 #include "models/stage_type.hpp"
 
 namespace posed::merge {
+
+// The parameters of the merge stage.
+struct MergeOptions {
+  std::array<std::string, 2> gloves{};  // names of their streams: left, right; empty: none
+  double wait_s = 0.015;
+  std::string wrist = "auto";
+  double hold_s = 1.0;
+
+  [[nodiscard]] static const ParameterTable<MergeOptions, Stage>& table();
+};
 
 struct MergePlan {
   struct Hand {
@@ -23,7 +35,7 @@ struct MergePlan {
     HandMap map;
   };
 
-  // The angles of a joint of the hands, in Frame::angle_rad.
+  // Where the angles of a joint of the hands are in Frame::angle_rad.
   struct JointAngles {
     std::size_t joint = 0, first = 0, count = 0;
   };
@@ -45,7 +57,7 @@ struct MergePlan {
   void remove_unknown_angles(Frame& frame) const noexcept;
 };
 
-// Of the parameter `wrist`; empty for an unknown word.
+// The value of the parameter `wrist`; empty for an unknown word.
 [[nodiscard]] std::optional<Wrist> wrist_from_name(std::string_view name);
 
 }  // namespace posed::merge

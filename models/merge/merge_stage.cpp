@@ -1,14 +1,46 @@
 #include "models/merge/merge_stage.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cassert>
 #include <cmath>
+#include <cstdint>
+#include <optional>
+#include <string>
 #include <utility>
 
+#include "models/merge/hand_track.hpp"
+#include "models/merge/merge_plan.hpp"
 #include "proto/frame/device_time.hpp"
 
 namespace posed::merge {
+namespace {
 
-// A frame cannot have been measured after it arrived. RT-safe.
+class MergeStage final : public Stage {
+ public:
+  explicit MergeStage(MergePlan plan);
+
+  void process(const StageFrame& in, StageOut& out) noexcept override;
+  // Number 0 is the left glove, 1 the right one.
+  void partner(std::size_t partner, const StageFrame& in, StageOut& out) noexcept override;
+  [[nodiscard]] std::int64_t next_due_ns() const noexcept override;
+  void tick(std::int64_t now_ns, StageOut& out) noexcept override;
+  void flush(StageOut& out) noexcept override;
+
+ private:
+  [[nodiscard]] bool ready(const Frame& frame, std::int64_t now_ns) const noexcept;
+  void release_ready(std::int64_t now_ns, StageOut& out) noexcept;
+  void release(std::int64_t now_ns, StageOut& out) noexcept;
+
+  MergePlan plan_;
+  std::array<std::optional<HandTrack>, 2> tracks_{};
+  std::array<Frame, kMaxWaiting> waiting_{};  // a ring; the oldest is at `first_`
+  std::size_t first_ = 0, count_ = 0;
+  Frame merged_;  // the last one: the next one's angles stay near to it
+};
+
+// When the frame was measured, on the host's clock: by the device's clock, if it has one. A frame
+// cannot have been measured after it arrived. RT-safe.
 std::int64_t time_of(const Header& header) noexcept {
   if (!header.clock.valid || header.device_ns == kNoTime_ns) return header.arrival_ns;
   return std::min(to_host_ns(header.clock, header.device_ns), header.arrival_ns);
@@ -28,8 +60,9 @@ void MergeStage::process(const StageFrame& in, StageOut& out) noexcept {
   for (auto& track : tracks_) {
     if (track) track->begin(now_ns);
   }
-  if (count_ == kWaiting) release(now_ns, out);
-  waiting_[(first_ + count_) % kWaiting] = in.frame;
+  if (count_ == kMaxWaiting) release(now_ns, out);
+  assert(count_ < kMaxWaiting);
+  waiting_[(first_ + count_) % kMaxWaiting] = in.frame;
   ++count_;
   release_ready(now_ns, out);
 }
@@ -78,6 +111,7 @@ void MergeStage::release_ready(std::int64_t now_ns, StageOut& out) noexcept {
 
 // The oldest frame goes out with what is known of the hands at its time. RT-safe.
 void MergeStage::release(std::int64_t now_ns, StageOut& out) noexcept {
+  assert(count_ > 0);
   const Frame& body = waiting_[first_];
   plan_.expand(body, merged_);
   const std::int64_t time_ns = time_of(body.header);
@@ -90,11 +124,44 @@ void MergeStage::release(std::int64_t now_ns, StageOut& out) noexcept {
   }
   const std::int64_t waited_ns = std::max<std::int64_t>(now_ns - body.header.arrival_ns, 0);
   merged_.lag_ms += static_cast<float>(static_cast<double>(waited_ns) * 1e-6);
-  first_ = (first_ + 1) % kWaiting;
+  first_ = (first_ + 1) % kMaxWaiting;
   --count_;
   merged_.lag_frames = static_cast<std::uint16_t>(merged_.lag_frames + count_);
   plan_.remove_unknown_angles(merged_);
   out.frame({.frame = merged_, .input = &merged_});
+}
+
+std::optional<ParameterFault> check(const Parameters& parameters, bool /*has_model*/) {
+  if (!wrist_from_name(parameter<std::string>(parameters, "wrist"))) {
+    return ParameterFault{"wrist", R"(wrist takes "auto", "body" or "glove")"};
+  }
+  return std::nullopt;
+}
+
+Result<std::shared_ptr<const Skeleton>> leaves(const StageContext& context) {
+  auto plan = MergePlan::make(context);
+  if (!plan) return std::unexpected(plan.error());
+  return plan->merged.skeleton;
+}
+
+Result<std::unique_ptr<Stage>> make(const StageContext& context, const StageModel* /*model*/) {
+  auto plan = MergePlan::make(context);
+  if (!plan) return std::unexpected(plan.error());
+  return std::make_unique<MergeStage>(std::move(*plan));
+}
+
+}  // namespace
+
+const StageType& merge_type() {
+  static const StageType type{.name = "merge",
+                              .summary = "puts the hands of gloves on the body",
+                              .parameters = MergeOptions::table().specs(),
+                              .partners = {"left", "right"},
+                              .input = StageInput::kRenews,
+                              .check = check,
+                              .leaves = leaves,
+                              .make = make};
+  return type;
 }
 
 }  // namespace posed::merge

@@ -16,8 +16,8 @@ class LiveHeading {
   // A turn of the pelvis within one frame that no body can make: the source has jumped.
   static constexpr double kJump_rad = std::numbers::pi / 4;
 
-  // Takes the direction measured `dt_s` after the last one. Returns true when the source has jumped
-  // and the low-pass restarts.
+  // Advances by the direction measured `dt_s` after the last one. Returns true when the source has
+  // jumped and the low-pass restarts.
   bool update(double measured_rad, double dt_s) noexcept {
     const double moved = posed::unwrap_near(measured_rad - last_measured_rad_, 0.0);
     const double behind = posed::unwrap_near(measured_rad - value_rad_, 0.0);

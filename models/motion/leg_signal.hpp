@@ -11,7 +11,7 @@
 
 namespace posed::motion {
 
-// Of one skeleton. Const and shareable after find().
+// The signal on one skeleton. Const and shareable after find().
 class LegSignal {
  public:
   // Empty for a skeleton that names no upper legs. Cold.

@@ -33,8 +33,8 @@ struct Motion {
 [[nodiscard]] bool begins_with_added_pose(const Motion& motion);
 void drop_first_frame(Motion& motion);
 
-// The same motion at another rate. To a lower rate: a zero-phase low-pass at a third of the new
-// rate (10 Hz at 30), then slerp. To a higher rate: slerp alone. The same rate returns the motion
+// The motion resampled. To a lower rate: a zero-phase low-pass at a third of the new
+// rate (10 Hz at 30), then slerp. To a higher rate: slerp alone. An equal rate returns the motion
 // unchanged.
 [[nodiscard]] Motion resample(const Motion& motion, double rate_hz);
 

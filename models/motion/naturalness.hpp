@@ -42,8 +42,8 @@ struct Gaussian {
 // |m1 - m2|^2 + tr(S1 + S2 - 2 (S1 S2)^(1/2)), at least 0.
 [[nodiscard]] double frechet_distance(const Gaussian& a, const Gaussian& b);
 
-// Sums over the features of a motion, from which those of several motions are added up or taken
-// away. Features are taken over windows of 30 frames, one at every second frame: each channel's
+// Sums over the features of a motion; sums of several motions can be added and subtracted. Features
+// are computed over windows of 30 frames, one at every second frame: each channel's
 // mean, and the mean size of its change per frame.
 struct WindowSums {
   double count = 0.0;      // windows

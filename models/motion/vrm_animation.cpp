@@ -85,4 +85,8 @@ Result<> write_vrm_animation(const clip::Clip& clip, const std::filesystem::path
   return clip::write_gltf(motion, clip::GltfKind::kVrmAnimation, path);
 }
 
+clip::Format vrm_animation_format() {
+  return {.name = "VRM animation", .extensions = {".vrma"}, .write = write_vrm_animation};
+}
+
 }  // namespace posed::motion

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "proto/clip/clip.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::motion {
@@ -14,5 +14,8 @@ namespace posed::motion {
 // and names those that are missing.
 [[nodiscard]] Result<> write_vrm_animation(const clip::Clip& clip,
                                            const std::filesystem::path& path);
+
+// Its row of the table of clip formats, which the program adds when it starts (clip::add_format).
+[[nodiscard]] clip::Format vrm_animation_format();
 
 }  // namespace posed::motion

@@ -1,6 +1,7 @@
 #include "models/natural/compare.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -110,6 +111,7 @@ std::optional<std::vector<TaskResult>> leave_one_out(const std::vector<Figures>&
 
 std::optional<Comparison> compare(const Figures& clip, const std::vector<Figures>& corpus,
                                   TaskRunner& tasks, const CompareProgress& progress) {
+  assert(corpus.size() >= kLeastClips);
   Comparison comparison;
   comparison.dimensions = shared_dimensions(clip, corpus);
   motion::WindowSums all;

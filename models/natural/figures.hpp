@@ -14,7 +14,7 @@
 
 namespace posed::natural {
 
-// Of clips at one rate, with the same channels in the same order.
+// The figures of a clip. Clips to compare have one rate and equal channels in equal order.
 struct Figures {
   double jerk = 0.0;   // rms third difference of the angles, deg/frame^3
   double sparc = 0.0;  // spectral arc length of their speed; NaN if nothing moves
@@ -23,15 +23,15 @@ struct Figures {
   std::optional<double> slide_cm_s, sink_cm;  // of bodies whose feet stand
 };
 
-// Of angles [frames x channels], deg. An error where they are too short for features.
+// Measures angles [frames x channels], deg. Returns an error where they are too short for features.
 [[nodiscard]] Result<Figures> figures_of(const motion::Rows& angles_deg, double rate_hz);
 
-// Of a body at one rate: rotation vectors of the joints about the means of `spec`. An error for a
-// skeleton that lacks joints of `spec`.
+// Measures a body at one rate by the rotation vectors of its joints about the means of `spec`.
+// Returns an error for a skeleton that lacks joints of `spec`.
 [[nodiscard]] Result<Figures> figures_of(const motion::Motion& motion,
                                          const motion::PoseSpaceSpec& spec);
 
-// As a task's numbers, behind those that `numbers` has, and back from where the reader is.
+// Packs the figures as a task's numbers, behind those that `numbers` has, and reads them back.
 void write(const Figures& figures, NumberWriter& numbers);
 [[nodiscard]] Figures figures_from(NumberReader& numbers);
 

@@ -9,7 +9,7 @@ namespace posed::perform {
 
 struct ConstrainReport {
   double min_gap_m = 0.0;    // smallest gap between bones over all frames, afterwards
-  double before_m = 0.0;     // the same beforehand; below zero: fingers overlapped
+  double before_m = 0.0;     // the smallest gap beforehand; below zero: fingers overlapped
   double changed_rad = 0.0;  // largest change of an angle
 };
 

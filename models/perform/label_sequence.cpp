@@ -1,6 +1,7 @@
 #include "models/perform/label_sequence.hpp"
 
 #include <algorithm>
+#include <cassert>
 
 #include "models/perform/state_duration.hpp"
 
@@ -43,6 +44,7 @@ bool LabelSequence::has_next(long position) const noexcept {
 
 // RT-safe.
 long LabelSequence::next(long position) const noexcept {
+  assert(has_next(position));
   return position + 1 < end_ ? position + 1 : first_;
 }
 

@@ -51,7 +51,7 @@ struct Cursor {
   double carried = 0.0;  // frames lost to rounding so far
 };
 
-// At the first state of `position`. RT-safe.
+// Moves to the first state of `position`. RT-safe.
 [[nodiscard]] Cursor enter(const LabelSequence& script,
                            const trajectory::StateInformation& information, long position,
                            double tempo) noexcept;

@@ -1,6 +1,7 @@
 #include "models/perform/label_sequence_player.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <utility>
 
@@ -107,6 +108,7 @@ void LabelSequencePlayer::clear() noexcept {
 
 // RT-safe.
 void LabelSequencePlayer::start() noexcept {
+  assert(script_.empty() || information_ != nullptr);
   started_ = !script_.empty();
   carries_ = false;
   lead_left_ = shown_ = 0;

@@ -1,16 +1,55 @@
 #include "models/perform/perform.hpp"
 
 #include <algorithm>
+#include <cassert>
+#include <cmath>
 #include <set>
 #include <sstream>
 
-#include "models/perform/global_variance.hpp"
 #include "models/perform/label_sequence.hpp"
 #include "models/trajectory/fixed_lag.hpp"
 #include "models/trajectory/sliding_window.hpp"
 
 namespace posed::perform {
 namespace {
+
+constexpr double kMaxVarianceGain = 1.3;
+
+struct Moments {
+  double sum = 0.0, squares = 0.0, count = 0.0;
+
+  void add(double value, double weight) {
+    sum += weight * value;
+    squares += weight * value * value;
+    count += weight;
+  }
+  [[nodiscard]] double mean() const { return sum / count; }
+  [[nodiscard]] double variance() const { return squares / count - mean() * mean(); }
+};
+
+// The most likely trajectory stays closer to its mean than the gestures it was learnt from. This
+// restores the range: it scales each channel about its mean over the sequence, by 1 to
+// kMaxVarianceGain, so that its variance over time approaches that of the means of the performed
+// states (README.md, "Global variance").
+void restore_variance(const gesture::GestureModel& model, Performance& performance) {
+  constexpr double kStill_rad2 = 1e-8;  // a channel that does not move has no range to restore
+  for (std::size_t g = 0; g < model.groups.size(); ++g) {
+    const gesture::ChannelGroup& group = model.groups[g];
+    for (int c = group.first; c < group.first + group.channels; ++c) {
+      Moments states, shown;
+      for (const PerformedState& state : performance.states) {
+        const auto& leaf = model.trees[state.state][g].leaves[state.leaf[g]];
+        states.add(leaf.mean[0][c - group.first], state.frames);
+      }
+      for (const Pose& pose : performance.angles) shown.add(pose[c], 1.0);
+      if (shown.variance() < kStill_rad2 || states.variance() < kStill_rad2) continue;
+      const double gain =
+          std::clamp(std::sqrt(states.variance() / shown.variance()), 1.0, kMaxVarianceGain);
+      const double mean = shown.mean();
+      for (Pose& pose : performance.angles) pose[c] = mean + gain * (pose[c] - mean);
+    }
+  }
+}
 
 std::vector<PerformedState> plan(const trajectory::StateInformation& information,
                                  std::span<const int> labels, double tempo) {
@@ -99,6 +138,7 @@ Result<std::vector<int>> labels_of(const gesture::GestureModel& model, std::stri
 
 Performance perform(const trajectory::StateInformation& information, std::span<const int> labels,
                     const PerformOptions& options) {
+  assert(!labels.empty());
   Performance performance{information.rate_hz(), plan(information, labels, options.tempo), {}, {}};
   const int channels = information.model().channels();
   trajectory::InformationForm rows(channels, static_cast<int>(performance.states.size()));

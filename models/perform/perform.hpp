@@ -38,7 +38,7 @@ struct Performance {
   std::vector<Pose> variances;  // of each angle, rad^2
 };
 
-// A pose, or its variances, of a model of hands.
+// Converts a pose of a model of hands, or its variances.
 [[nodiscard]] HandAngles hand_of(const Pose& pose);
 
 // Converts words separated by blanks into label indices. Returns an error for an empty text and for
@@ -46,7 +46,7 @@ struct Performance {
 [[nodiscard]] Result<std::vector<int>> labels_of(const gesture::GestureModel& model,
                                                  std::string_view text);
 
-// At the model's rate. `labels` has at least one.
+// Performs `labels`, at least one, at the model's rate.
 [[nodiscard]] Performance perform(const trajectory::StateInformation& information,
                                   std::span<const int> labels, const PerformOptions& options);
 

@@ -1,27 +1,11 @@
-// RetargetStage: the stream's last stage, which puts its pose on another skeleton
-// (motion/retarget.hpp). One thread.
+// The stream's last stage, which puts its pose on another skeleton (models/motion/retarget.hpp).
 #pragma once
 
-#include <utility>
-
-#include "models/motion/retarget.hpp"
-#include "models/stage.hpp"
+#include "models/stage_type.hpp"
 
 namespace posed::retarget {
 
-class RetargetStage final : public Stage {
- public:
-  explicit RetargetStage(motion::Retarget retarget) : retarget_(std::move(retarget)) {}
-
-  // The variance of the pose is not carried over: it belongs to the source's channels. RT-safe.
-  void process(const StageFrame& in, StageOut& out) noexcept override {
-    retarget_.apply(in.frame, frame_);
-    out.frame({.frame = frame_, .variance_rad2 = {}, .input = in.input});
-  }
-
- private:
-  motion::Retarget retarget_;
-  Frame frame_;  // the last one: the next one's angles stay near to it
-};
+// The entry in the list of stages (models/stages/registry.cpp).
+[[nodiscard]] const StageType& retarget_type();
 
 }  // namespace posed::retarget

@@ -1,6 +1,7 @@
 #include "models/smooth/adaptive_window.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <utility>
 
@@ -74,6 +75,7 @@ void AdaptiveWindow::reset() noexcept {
 
 // RT-safe.
 int AdaptiveWindow::slot(int index) const noexcept {
+  assert(index >= 0 && index < frames_);
   return static_cast<int>((pushed_ - frames_ + index) % kMaxWindow);
 }
 

@@ -66,7 +66,7 @@ class AdaptiveWindow {
   [[nodiscard]] bool measured(int back, int channel) const noexcept {
     return sensed(slot(frames_ - 1 - back))[channel] > kNothing;
   }
-  // All channels of that frame were measured.
+  // Whether all channels of that frame were measured.
   [[nodiscard]] bool whole(int back) const noexcept {
     return whole_[static_cast<std::size_t>(slot(frames_ - 1 - back))] != 0;
   }
@@ -75,7 +75,7 @@ class AdaptiveWindow {
     return time_s_[static_cast<std::size_t>(frames_ - 1)] -
            time_s_[static_cast<std::size_t>(frames_ - 1 - back)];
   }
-  // The channel was measured in one of the window's frames at least.
+  // Whether the channel was measured in at least one of the window's frames.
   [[nodiscard]] bool known(int channel) const noexcept;
 
   [[nodiscard]] int stride() const noexcept { return information_.stride(); }

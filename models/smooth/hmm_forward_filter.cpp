@@ -1,6 +1,7 @@
 #include "models/smooth/hmm_forward_filter.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -262,6 +263,7 @@ void HmmForwardFilter::step_back(const Row& ahead, Row& backward) const noexcept
 // The features taken at a frame describe the frame before it, so frame `back` uses the
 // probabilities of one step later in time. RT-safe.
 std::span<const double> HmmForwardFilter::states(int back) const noexcept {
+  assert(knows(back));
   return {swept_[static_cast<std::size_t>(std::max(0, back - 1))].data(),
           static_cast<std::size_t>(states_)};
 }

@@ -47,7 +47,8 @@ struct LiveModel {
   std::vector<LiveState> states;  // [chain][kStates]
   // What is none of the labels (models/smooth/README.md, "None"); empty: always one of them.
   std::optional<LiveState> none;
-  // Those of a body in a frame; empty: of a hand, whose channels are the skeleton's in their order.
+  // Where the channels of a body are in a frame; empty: a hand, whose channels are the skeleton's
+  // in their order.
   std::optional<gesture::PoseChannels> body;
   int channels = 0;
   int groups = 0;

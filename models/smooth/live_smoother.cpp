@@ -1,23 +1,188 @@
 #include "models/smooth/live_smoother.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <numbers>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "models/gesture/pose_channels.hpp"
 #include "models/motion/heading.hpp"
 #include "models/smooth/adaptive_window.hpp"
-#include "models/smooth/frame_clock.hpp"
 #include "models/smooth/model_prior.hpp"
 #include "models/smooth/noise_estimate.hpp"
-#include "models/smooth/unwrap.hpp"
+#include "proto/frame/frame.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/rotation.hpp"
+#include "proto/frame/skeleton.hpp"
 
 namespace posed::smooth {
 namespace {
+
+// FrameClock: computes times that a solver can use from the times that frames carry
+// (models/smooth/README.md, "Frame clock"). Device times are used as they are; arrival times of an
+// even stream come in bursts and are drawn towards the stream's own period. Steps are never shorter
+// than half the period, so that two frames which arrive together do not look infinitely fast, and a
+// time that runs backwards counts as one period. One thread.
+class FrameClock {
+ public:
+  // Seconds since the first frame; strictly increasing. RT-safe.
+  double tick(const Header& header) noexcept;
+
+  // The stream's period: the median of the last steps [s]; 0 before the first step. RT-safe.
+  [[nodiscard]] double period_s() const noexcept { return period_s_; }
+  // True when enough steps are known to convert a lag in time into frames. RT-safe.
+  [[nodiscard]] bool settled() const noexcept { return steps_ >= kSettled; }
+
+ private:
+  void learn(double step_s) noexcept;
+
+  static constexpr int kRecent = 15;
+  static constexpr int kSettled = 3;
+
+  std::array<double, kRecent> recent_s_{};
+  int steps_ = 0;  // number of steps learned so far
+  double period_s_ = 0.0;
+  double now_s_ = 0.0;
+  double late_s_ = 0.0;  // accumulated lateness of arrivals relative to even frames
+  std::int64_t last_ns_ = kNoTime_ns;
+  bool started_ = false;
+  bool device_time_ = false;
+};
+
+constexpr double kShortestPeriod_s = 1e-3;  // 1000 Hz
+constexpr double kLongestPeriod_s = 0.2;    // a slower step is a gap
+constexpr double kFirstPeriod_s = 1.0 / 60.0;
+constexpr double kShortestStep = 0.5;  // of the period
+constexpr double kArrivalGain = 0.1;   // share of the lateness that corrects a step
+constexpr double kGap = 1.5;           // periods: a step at least this long is a gap, not jitter
+
+// RT-safe.
+double FrameClock::tick(const Header& header) noexcept {
+  const bool device_time = header.device_ns != kNoTime_ns;
+  const std::int64_t time_ns = device_time ? header.device_ns : header.arrival_ns;
+  const bool first = !std::exchange(started_, true);
+  const bool known = time_ns != kNoTime_ns && last_ns_ != kNoTime_ns &&
+                     device_time == device_time_ && time_ns > last_ns_;
+  const double beat_s = period_s_ > 0.0 ? period_s_ : kFirstPeriod_s;
+  double step_s = beat_s;
+  if (known) {
+    // Unsigned: the difference of two times may exceed the signed range.
+    step_s = static_cast<double>(static_cast<std::uint64_t>(time_ns) -
+                                 static_cast<std::uint64_t>(last_ns_)) *
+             1e-9;
+    learn(step_s);
+  }
+  last_ns_ = time_ns;
+  device_time_ = device_time;
+  if (first) return now_s_;
+  if (!device_time && settled()) {
+    late_s_ += step_s - beat_s;
+    if (late_s_ > (kGap - 1.0) * beat_s) {
+      step_s = beat_s + late_s_;
+      late_s_ = 0.0;
+    } else {
+      step_s = beat_s + kArrivalGain * late_s_;
+      late_s_ -= kArrivalGain * late_s_;
+    }
+  }
+  now_s_ += std::max(step_s, kShortestStep * beat_s);
+  return now_s_;
+}
+
+// RT-safe.
+void FrameClock::learn(double step_s) noexcept {
+  if (step_s > kLongestPeriod_s) return;
+  recent_s_[static_cast<std::size_t>(steps_ % kRecent)] = std::max(step_s, kShortestPeriod_s);
+  ++steps_;
+  std::array<double, kRecent> sorted = recent_s_;
+  const auto end = sorted.begin() + std::min(steps_, kRecent);
+  const auto middle = sorted.begin() + (end - sorted.begin()) / 2;
+  std::nth_element(sorted.begin(), middle, end);
+  period_s_ = *middle;
+}
+
+// Unwrap: removes jumps from a skeleton's rotation channels (models/smooth/README.md, "Unwrap").
+// Each channel takes the multiple of a full turn that is nearest to its previous value. Three Euler
+// angles describe a rotation in two ways, (x, y, z) and (x + pi, pi - y, z + pi); the one nearer to
+// the previous frame is used. One thread.
+class Unwrap {
+ public:
+  explicit Unwrap(const Skeleton& skeleton);
+
+  // values_rad: [rotation channels], changed in place; NaN where missing, and left NaN. RT-safe.
+  void apply(std::span<double> values_rad) noexcept;
+
+  void reset() noexcept;  // RT-safe
+
+ private:
+  std::vector<int>
+      joint_channels_;            // number of channels of each joint that has any, in channel order
+  std::vector<double> last_rad_;  // [rotation channels]; NaN before the first value
+};
+
+constexpr double kPi = std::numbers::pi;
+
+double distance_rad(const std::array<double, 3>& a, const double* b) noexcept {
+  return std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]);
+}
+
+std::array<double, 3> nearest(std::array<double, 3> angles, const double* last) noexcept {
+  for (std::size_t i = 0; i < 3; ++i) angles[i] = unwrap_near(angles[i], last[i]);
+  return angles;
+}
+
+// RT-safe.
+void unwrap_joint(double* values, const double* last) noexcept {
+  const auto same = nearest({values[0], values[1], values[2]}, last);
+  const auto other = nearest({values[0] + kPi, kPi - values[1], values[2] + kPi}, last);
+  std::ranges::copy(distance_rad(other, last) < distance_rad(same, last) ? other : same, values);
+}
+
+bool all_finite(const double* values) noexcept {
+  return std::isfinite(values[0]) && std::isfinite(values[1]) && std::isfinite(values[2]);
+}
+
+Unwrap::Unwrap(const Skeleton& skeleton) {
+  int joint = -1;
+  for (const Channel& channel : skeleton.channels) {
+    if (channel.translation) continue;
+    if (channel.joint != joint) joint_channels_.push_back(0);
+    joint = channel.joint;
+    ++joint_channels_.back();
+    last_rad_.push_back(0.0);
+  }
+  reset();
+}
+
+// RT-safe.
+void Unwrap::reset() noexcept {
+  std::ranges::fill(last_rad_, std::numeric_limits<double>::quiet_NaN());
+}
+
+// RT-safe.
+void Unwrap::apply(std::span<double> values_rad) noexcept {
+  double* values = values_rad.data();
+  double* last = last_rad_.data();
+  for (const int count : joint_channels_) {
+    if (count == 3 && all_finite(values) && all_finite(last)) {
+      unwrap_joint(values, last);
+    } else {
+      for (int i = 0; i < count; ++i) {
+        if (!std::isnan(last[i])) values[i] = unwrap_near(values[i], last[i]);
+      }
+    }
+    for (int i = 0; i < count; ++i) {
+      if (std::isfinite(values[i])) last[i] = values[i];
+    }
+    values += count;
+    last += count;
+  }
+}
 
 constexpr double kUnknown = std::numeric_limits<double>::infinity();
 constexpr double kForgetAfter_s = 1.0;  // after a longer silence the past is forgotten

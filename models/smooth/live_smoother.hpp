@@ -39,7 +39,7 @@ class LiveSmoother final : public Stage {
   // and quality (predicted where something was bridged) are the solve's, lag_frames and lag_ms say
   // how far behind `in` it is; the posterior variance goes with it. RT-safe.
   void process(const StageFrame& in, StageOut& out) noexcept override;
-  // Silence: flushes. RT-safe.
+  // After a silence it flushes. RT-safe.
   void tick(std::int64_t now_ns, StageOut& out) noexcept override;
 
   // Emits the frames that still wait, with the little that is known of their future: end of stream,

@@ -36,7 +36,7 @@ class ModelPrior final : public InformationSource {
   const HmmForwardFilter& filter_;
   double some_ = 1.0;  // the probability that the frame is one of the labels
   Belief belief_;
-  // Of each group over the window's measured frames, from 0 (unlike the model) to 1.
+  // How well each group fits over the window's measured frames, from 0 (unlike the model) to 1.
   std::array<double, gesture::kMaxGroups> fit_{};
 };
 

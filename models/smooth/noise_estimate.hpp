@@ -19,8 +19,8 @@ class NoiseEstimate {
   // one period. RT-safe.
   void push(std::span<const double> measured_rad, bool even) noexcept;
 
-  // Slightly below the estimate, because an assumed noise that is too low costs less accuracy than
-  // one that is too high. RT-safe.
+  // The assumed noise [rad]: slightly below the estimate, because an assumed noise that is too low
+  // costs less accuracy than one that is too high. RT-safe.
   [[nodiscard]] double noise_rad() const noexcept { return noise_rad_; }
 
   void reset() noexcept;  // RT-safe

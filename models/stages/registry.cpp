@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <array>
 
-#include "models/feet/feet_type.hpp"
-#include "models/generate/generate_type.hpp"
-#include "models/hand/constrain_type.hpp"
-#include "models/merge/merge_type.hpp"
-#include "models/retarget/retarget_type.hpp"
-#include "models/style/style_type.hpp"
+#include "models/feet/feet_stage.hpp"
+#include "models/generate/generate_stage.hpp"
+#include "models/hand/constrain_stage.hpp"
+#include "models/merge/merge_stage.hpp"
+#include "models/retarget/retarget_stage.hpp"
+#include "models/style/live/style_type.hpp"
 
 namespace posed {
 

@@ -1,6 +1,6 @@
 // CarriedPast: what the frames that have left a sliding window say about those still in it
 // (models/trajectory/README.md, "Sliding window"). Each solve leaves what its first frame says
-// about the next two; the window that begins one frame later takes it in. A window that begins
+// about the next two; the window that begins one frame later includes it. A window that begins
 // anywhere else starts from nothing.
 //
 // All memory is allocated at construction; the rest is RT-safe. One thread.

@@ -1,6 +1,7 @@
 #include "models/trajectory/fixed_lag.hpp"
 
 #include <algorithm>
+#include <cassert>
 
 namespace posed::trajectory {
 
@@ -44,6 +45,7 @@ void FixedLag::push(const double* information) noexcept {
 void FixedLag::estimate(int back, double* x, double* variance) noexcept {
   const auto held = static_cast<int>(std::min<long>(pushed_, static_cast<long>(factors_.size())));
   const int first = held - 1 - back;
+  assert(back >= 0 && first >= 0);
   kernel::substitute(factors_.data(), held, first, stride(), x_.get());
   std::copy_n(x_.get(), stride(), x);
   if (variance != nullptr) {

@@ -1,7 +1,7 @@
-// FixedLag: the trajectory solver as a stream (models/trajectory/README.md, "Fixed lag"). It takes
-// the rows of an InformationForm frame by frame; `lag` frames later it gives exactly the estimate
-// of a solve over the whole past and those `lag` frames. The past is eliminated only once, so a
-// frame costs three eliminations and `lag` steps back. No allocation after construction; one
+// FixedLag: the trajectory solver as a stream (models/trajectory/README.md, "Fixed lag"). It
+// accepts the rows of an InformationForm frame by frame; `lag` frames later it gives exactly the
+// estimate of a solve over the whole past and those `lag` frames. The past is eliminated only once,
+// so a frame costs three eliminations and `lag` steps back. No allocation after construction; one
 // thread.
 #pragma once
 

@@ -1,5 +1,7 @@
 #include "models/trajectory/sliding_window.hpp"
 
+#include <cassert>
+
 namespace posed::trajectory {
 
 SlidingWindow::SlidingWindow(int channels, int max_frames)
@@ -20,6 +22,7 @@ SlidingWindow::SlidingWindow(int channels, int max_frames)
 void SlidingWindow::solve(std::span<const double* const> information, Boundary boundary,
                           const double* skew, const Carry& carry) noexcept {
   frames_ = static_cast<int>(information.size());
+  assert(frames_ >= 1 && frames_ <= static_cast<int>(factors_.size()));
   kernel::eliminate({information.data(), frames_, stride_, boundary, skew, carry.in, carry.out},
                     factors_.data());
   kernel::substitute(factors_.data(), frames_, 0, stride_, x_.get());

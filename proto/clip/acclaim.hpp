@@ -30,9 +30,4 @@ struct Acclaim {
 // `name` is used in error messages.
 [[nodiscard]] Result<Acclaim> parse_asf(std::string_view text, const std::string& name);
 
-// Both take the whole text of a file.
-[[nodiscard]] Result<Clip> parse_amc(std::string_view amc, const std::string& amc_name,
-                                     std::string_view asf, const std::string& asf_name,
-                                     const ReadOptions& options = {});
-
 }  // namespace posed::clip

@@ -1,14 +1,154 @@
+// Reads ASF skeletons: words, then bones, then the skeleton.
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
 #include <map>
+#include <string>
+#include <string_view>
+#include <vector>
 
-#include "proto/clip/asf_parts.hpp"
+#include "proto/clip/acclaim.hpp"
+#include "proto/clip/text.hpp"
+#include "proto/frame/degree.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::clip {
 namespace {
+
+// Splits an ASF into words. `#` begins a comment; commas and parentheses count as white space.
+class Words {
+ public:
+  explicit Words(std::string_view text) : text_(without_bom(text)) { fill(); }
+
+  [[nodiscard]] std::string_view peek() const { return word_; }  // empty at the end
+  [[nodiscard]] std::string_view next() {
+    const std::string_view word = word_;
+    line_ = word_line_;
+    fill();
+    return word;
+  }
+  [[nodiscard]] int line() const { return line_; }  // line of the word returned last
+  [[nodiscard]] int next_line_number() const { return word_line_; }  // line of the next word
+  [[nodiscard]] bool starts_section() const { return first_ && word_.starts_with(':'); }
+
+ private:
+  [[nodiscard]] static bool is_blank(char c) {
+    return is_space(c) || c == ',' || c == '(' || c == ')';
+  }
+
+  void fill() {
+    first_ = false;
+    while (true) {
+      while (!rest_.empty() && is_blank(rest_.front())) rest_.remove_prefix(1);
+      if (!rest_.empty() && rest_.front() != '#') break;
+      if (text_.empty()) {
+        word_ = {};
+        return;
+      }
+      rest_ = next_line(text_);
+      ++word_line_;
+      first_ = true;
+    }
+    std::size_t end = 0;
+    while (end < rest_.size() && !is_blank(rest_[end])) ++end;
+    word_ = rest_.substr(0, end);
+    rest_.remove_prefix(end);
+  }
+
+  std::string_view text_;
+  std::string_view rest_;  // rest of the current line
+  std::string_view word_;
+  int word_line_ = 0;
+  int line_ = 1;
+  bool first_ = false;  // `word_` is the first on its line
+};
+
+struct AsfBone {
+  std::string name;
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  double length = 0.0;
+  std::array<double, 3> axis{};
+  std::string axis_order = "xyz";
+  std::vector<std::string> dof;
+  std::vector<std::array<double, 2>> limits;  // one pair per dof, or empty
+  std::vector<int> children;
+  bool has_parent = false;
+};
+
+struct AsfFile {
+  std::vector<AsfBone> bones;  // the root is the first
+  Eigen::Vector3d root_position = Eigen::Vector3d::Zero();
+  double length_unit = 1.0;  // in inches; 0.45 in CMU's files
+  bool degrees = true;
+};
+
+constexpr double kInch_m = 0.0254;
+
+// Adds translations in listed order, then the rotations reversed: posed lists the outermost first.
+void add_channels(const AsfBone& bone, double radians, Acclaim& out) {
+  AcclaimBone values{.name = bone.name, .channels = std::vector<int>(bone.dof.size())};
+  const auto add = [&](std::size_t i, bool translation) {
+    Channel channel;
+    channel.joint = static_cast<std::uint16_t>(out.skeleton.joints.size() - 1);
+    channel.axis = static_cast<Axis>(bone.dof[i][1] - 'x');
+    channel.translation = translation;
+    if (!bone.limits.empty()) {
+      const double scale = translation ? out.metres_per_unit : radians;
+      channel.min = static_cast<float>(bone.limits[i][0] * scale);
+      channel.max = static_cast<float>(bone.limits[i][1] * scale);
+    }
+    values.channels[i] = static_cast<int>(out.skeleton.channels.size());
+    out.skeleton.channels.push_back(channel);
+  };
+  for (std::size_t i = 0; i < bone.dof.size(); ++i) {
+    if (bone.dof[i][0] == 't') add(i, true);
+  }
+  for (std::size_t i = bone.dof.size(); i-- > 0;) {
+    if (bone.dof[i][0] == 'r') add(i, false);
+  }
+  out.bones.push_back(std::move(values));
+}
+
+// Recurses depth first. It ends, because a bone has at most one parent and the root none.
+void add_bone(const AsfFile& file, int index, const AsfBone* parent, int parent_joint,
+              Acclaim& out) {
+  const AsfBone& bone = file.bones[index];
+  const double radians = file.degrees ? kDegree : 1.0;
+  Joint joint;
+  joint.name = bone.name;
+  joint.parent = parent_joint;
+  joint.offset_m = out.metres_per_unit *
+                   (parent != nullptr ? parent->direction * parent->length : file.root_position);
+  if (bone.children.empty()) {
+    joint.end_site_m = bone.direction * (bone.length * out.metres_per_unit);
+  }
+  for (std::size_t i = 0; i < bone.axis_order.size(); ++i) {  // the first letter is innermost
+    const auto axis = static_cast<Axis>(bone.axis_order[i] - 'x');
+    joint.channel_frame = axis_rotation(axis, bone.axis[static_cast<std::size_t>(axis)] * radians) *
+                          joint.channel_frame;
+  }
+  const int here = static_cast<int>(out.skeleton.joints.size());
+  out.skeleton.joints.push_back(std::move(joint));
+  add_channels(bone, radians, out);
+  for (const int child : bone.children) add_bone(file, child, &bone, here, out);
+}
+
+Result<Acclaim> acclaim_of(const AsfFile& file, const std::string& name) {
+  Acclaim out;
+  out.metres_per_unit = kInch_m / file.length_unit;
+  out.degrees = file.degrees;
+  if (file.bones[0].dof.empty()) {
+    return fail("the :root has no order, so nothing places the figure", name);
+  }
+  add_bone(file, 0, nullptr, -1, out);
+  const auto lost = std::ranges::find_if(
+      file.bones, [&out](const AsfBone& bone) { return out.skeleton.joint_index(bone.name) < 0; });
+  if (lost != file.bones.end()) {
+    return fail("bone " + in_quotes(lost->name) + " does not hang on the root in :hierarchy", name);
+  }
+  return out;
+}
 
 class AsfReader {
  public:
@@ -51,11 +191,11 @@ class AsfReader {
 
 Result<Acclaim> AsfReader::read() {
   if (!words_.starts_section()) {
-    (void)words_.take();
+    (void)words_.next();
     return error("does not begin with a ':' section, so it is not an ASF skeleton");
   }
   while (!words_.peek().empty()) {
-    const std::string key = lower(words_.take());
+    const std::string key = lower(words_.next());
     if (auto ok = section(key); !ok) return std::unexpected(ok.error());
   }
   if (!has_hierarchy_) return error("has no :hierarchy, so its bones are not joined");
@@ -63,7 +203,7 @@ Result<Acclaim> AsfReader::read() {
 }
 
 void AsfReader::skip_section() {
-  while (!words_.peek().empty() && !words_.starts_section()) (void)words_.take();
+  while (!words_.peek().empty() && !words_.starts_section()) (void)words_.next();
 }
 
 Result<> AsfReader::section(const std::string& key) {
@@ -78,7 +218,7 @@ Result<> AsfReader::section(const std::string& key) {
 }
 
 Result<double> AsfReader::number(std::string_view what) {
-  const std::string_view word = words_.take();
+  const std::string_view word = words_.next();
   const auto value = parse_number(word);
   if (!value) return error(std::string(what) + ": " + in_quotes(word) + " is not a number");
   return *value;
@@ -95,9 +235,9 @@ Result<> AsfReader::numbers(std::string_view what, double* values, int count) {
 
 Result<> AsfReader::units() {
   while (!words_.peek().empty() && !words_.starts_section()) {
-    const std::string key = lower(words_.take());
+    const std::string key = lower(words_.next());
     if (key == "angle") {
-      const std::string unit = lower(words_.take());
+      const std::string unit = lower(words_.next());
       if (unit != "deg" && unit != "rad")
         return error("angle is in deg or rad, not " + in_quotes(unit));
       file_.degrees = unit == "deg";
@@ -114,11 +254,11 @@ Result<> AsfReader::units() {
 
 Result<> AsfReader::root() {
   while (!words_.peek().empty() && !words_.starts_section()) {
-    const std::string key = lower(words_.take());
+    const std::string key = lower(words_.next());
     if (key == "order") {
       if (auto ok = dof(file_.bones[0]); !ok) return ok;
     } else if (key == "axis") {
-      if (auto ok = order(file_.bones[0], words_.take()); !ok) return ok;
+      if (auto ok = order(file_.bones[0], words_.next()); !ok) return ok;
     } else if (key == "position") {
       if (auto ok = numbers("position of the root", file_.root_position.data(), 3); !ok) return ok;
     } else if (key == "orientation") {
@@ -133,7 +273,7 @@ Result<> AsfReader::root() {
 
 Result<> AsfReader::bone_data() {
   while (!words_.peek().empty() && !words_.starts_section()) {
-    if (lower(words_.take()) != "begin") return error("'begin' should open each bone in :bonedata");
+    if (lower(words_.next()) != "begin") return error("'begin' should open each bone in :bonedata");
     if (auto ok = bone(); !ok) return ok;
   }
   return {};
@@ -145,7 +285,7 @@ Result<> AsfReader::bone() {
     if (words_.peek().empty() || words_.starts_section()) {
       return error("bone '" + bone.name + "' is not closed by 'end'");
     }
-    const std::string key = lower(words_.take());
+    const std::string key = lower(words_.next());
     if (key == "end") break;
     if (auto ok = bone_entry(bone, key); !ok) return ok;
   }
@@ -170,7 +310,7 @@ Result<> AsfReader::bone() {
 
 Result<> AsfReader::bone_entry(AsfBone& bone, const std::string& key) {
   if (key == "name") {
-    bone.name = words_.take();
+    bone.name = words_.next();
     if (bone.name.size() > 200) return error("a bone's name is longer than 200 characters");
     return {};
   }
@@ -191,7 +331,7 @@ Result<> AsfReader::axis(AsfBone& bone) {
   if (auto ok = numbers("axis of bone '" + bone.name + "'", bone.axis.data(), 3); !ok) return ok;
   const std::string_view word = words_.peek();
   if (word.size() != 3 || lower(word) == "dof") return {};  // XYZ when no order is given
-  return order(bone, words_.take());
+  return order(bone, words_.next());
 }
 
 Result<> AsfReader::order(AsfBone& bone, std::string_view word) {
@@ -205,14 +345,14 @@ Result<> AsfReader::order(AsfBone& bone, std::string_view word) {
 Result<> AsfReader::dof(AsfBone& bone) {
   constexpr std::array<std::string_view, 6> kKnown{"rx", "ry", "rz", "tx", "ty", "tz"};
   while (std::ranges::find(kKnown, lower(words_.peek())) != kKnown.end()) {
-    const std::string token = lower(words_.take());
+    const std::string token = lower(words_.next());
     if (std::ranges::find(bone.dof, token) != bone.dof.end()) {
       return error(in_quotes(token) + " twice in the dof of '" + bone.name + "'");
     }
     bone.dof.push_back(token);
   }
   if (lower(words_.peek()) == "l") {
-    (void)words_.take();
+    (void)words_.next();
     return error("bone '" + bone.name +
                  "' has the dof 'l' (it stretches), which posed cannot play");
   }
@@ -228,10 +368,10 @@ Result<> AsfReader::limits(AsfBone& bone) {
     return parse_number(word);
   };
   while (const auto low = limit()) {
-    (void)words_.take();
+    (void)words_.next();
     const auto high = limit();
     if (!high) return error("limits of bone '" + bone.name + "' should come in pairs");
-    (void)words_.take();
+    (void)words_.next();
     bone.limits.push_back({*low, *high});
   }
   return {};
@@ -240,19 +380,19 @@ Result<> AsfReader::limits(AsfBone& bone) {
 // Reads the lines between begin and end; each names a parent and its children.
 Result<> AsfReader::hierarchy() {
   has_hierarchy_ = true;
-  if (lower(words_.take()) != "begin") return error("'begin' should follow :hierarchy");
+  if (lower(words_.next()) != "begin") return error("'begin' should follow :hierarchy");
   while (lower(words_.peek()) != "end") {
     if (words_.peek().empty()) return error("the file ends inside :hierarchy");
-    const std::string_view parent = words_.take();
+    const std::string_view parent = words_.next();
     const int line = words_.line();
     const auto at = index_.find(parent);
     if (at == index_.end())
       return error("the hierarchy names " + in_quotes(parent) + ", which is no bone");
     while (!words_.peek().empty() && words_.next_line_number() == line) {
-      if (auto ok = link(file_.bones[at->second], words_.take()); !ok) return ok;
+      if (auto ok = link(file_.bones[at->second], words_.next()); !ok) return ok;
     }
   }
-  (void)words_.take();
+  (void)words_.next();
   return {};
 }
 

@@ -1,6 +1,5 @@
-// BVH: parts of the clip reader and writer. To read or write a file, call read_clip() or
-// write_bvh() in clip.hpp; the functions here work in memory (for tests, fuzzing, the device
-// description in a log and outputs).
+// BVH: parts of the clip reader and writer that outputs and tests use on their own. To read or
+// write a file, call read_clip() or write_bvh() in clip.hpp.
 //
 // The format: a joint's rotation is the product of its channels in listed order, the first
 // outermost. Position channels replace OFFSET. Angles are in degrees; the unit of length is not
@@ -26,10 +25,6 @@ struct BvhHeader {
 
 // `name` is used in error messages. Views in the result point into `text`.
 [[nodiscard]] Result<BvhHeader> parse_bvh_header(std::string_view text, const std::string& name);
-
-// Reads a whole BVH text.
-[[nodiscard]] Result<Clip> parse_bvh(std::string_view text, const std::string& name,
-                                     const ReadOptions& options = {});
 
 // The first section of a file, "HIERARCHY" to the last "}", with the skeleton's own channels. Of an
 // Acclaim skeleton it would be wrong: convert that first (with_zyx_channels in clip.hpp).

@@ -6,8 +6,8 @@
 
 #include "proto/clip/bvh.hpp"
 #include "proto/clip/clip.hpp"
-#include "proto/clip/text.hpp"
 #include "proto/frame/degree.hpp"
+#include "proto/frame/whole_file.hpp"
 
 namespace posed::clip {
 namespace {
@@ -119,7 +119,7 @@ std::string bvh_hierarchy(const Skeleton& skeleton, double metres_per_unit) {
 
 Result<> write_bvh(const Clip& clip, const std::filesystem::path& path) {
   if (is_acclaim(*clip.skeleton)) return write_bvh(with_zyx_channels(clip), path);
-  return write_text(path, [&clip](std::ostream& file) {
+  return write_whole_file(path, [&clip](std::ostream& file) {
     file << bvh_hierarchy(*clip.skeleton, clip.metres_per_unit) << motion_head(clip);
     for (int i = 0; i < clip.frames() && file; ++i) file << motion_line(clip, i);
   });

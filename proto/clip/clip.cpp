@@ -1,10 +1,20 @@
 #include "proto/clip/clip.hpp"
 
+#include <algorithm>
+#include <array>
+#include <cassert>
 #include <cmath>
 
-#include "proto/clip/files.hpp"
+#include "proto/clip/draft.hpp"
+#include "proto/clip/format.hpp"
 
 namespace posed::clip {
+namespace {
+
+constexpr std::array kZyx{Axis::kZ, Axis::kY, Axis::kX};
+constexpr double kCentimetre_m = 0.01;
+
+}  // namespace
 
 Frame Clip::frame(int index) const {
   Frame frame;
@@ -26,11 +36,85 @@ bool has_uneven_times(const std::vector<double>& time_s, double rate_hz) {
 }
 
 Result<Clip> read_clip(const std::filesystem::path& path, const ReadOptions& options) {
-  const auto files = load_files(path, options);
-  if (!files) return std::unexpected(files.error());
-  auto draft = draft_of(*files, options);
+  const auto loaded = load_clip(path, options);
+  if (!loaded) return std::unexpected(loaded.error());
+  auto draft = loaded->format->read(loaded->file, options);
   if (!draft) return std::unexpected(draft.error());
-  return clip_of(std::move(*draft), files->name);
+  return clip_of(std::move(*draft), loaded->file.name);
+}
+
+Result<Clip> parse_clip(const ClipFile& file, const ReadOptions& options) {
+  const Format* format = format_of(file.name);
+  if (format == nullptr || format->read == nullptr) {
+    return fail("is no clip posed can read; a clip is " + listed(Use::kRead), file.name);
+  }
+  if (auto ok = check_options(*format, options, file.name); !ok) {
+    return std::unexpected(ok.error());
+  }
+  auto draft = format->read(file, options);
+  if (!draft) return std::unexpected(draft.error());
+  return clip_of(std::move(*draft), file.name);
+}
+
+Result<> write_clip(const Clip& clip, const std::filesystem::path& path) {
+  const Format* format = format_of(path);
+  if (format == nullptr || format->write == nullptr) {
+    return misuse("is no clip posed can write; a clip is " + listed(Use::kWrite), path.string());
+  }
+  return format->write(clip, path);
+}
+
+bool is_acclaim(const Skeleton& skeleton) {
+  return std::ranges::any_of(skeleton.joints, [](const Joint& joint) {
+    return !joint.channel_frame.isApprox(Eigen::Quaterniond::Identity());
+  });
+}
+
+Clip with_zyx_channels(const Clip& clip) {
+  auto skeleton = std::make_shared<Skeleton>(*clip.skeleton);
+  std::vector<int> translations;  // source columns, in the new order of the translation channels
+  skeleton->channels.clear();
+  for (int j = 0; j < std::ssize(skeleton->joints); ++j) {
+    skeleton->joints[j].channel_frame.setIdentity();
+    for (std::size_t c = 0; c < clip.skeleton->channels.size(); ++c) {
+      const Channel& channel = clip.skeleton->channels[c];
+      if (channel.joint != j || !channel.translation) continue;
+      skeleton->channels.push_back(channel);
+      translations.push_back(static_cast<int>(c));
+    }
+    for (const Axis axis : kZyx) {
+      skeleton->channels.push_back({.joint = static_cast<std::uint16_t>(j), .axis = axis});
+    }
+  }
+  const auto finished = skeleton->finish();  // updates the id
+  assert(finished);                          // these joints have passed before
+  (void)finished;
+
+  Clip out{.path = clip.path,
+           .skeleton = skeleton,
+           .frame_rate_hz = clip.frame_rate_hz,
+           .channels = ChannelMatrix(clip.frames(), std::ssize(skeleton->channels)),
+           .time_s = clip.time_s,
+           .warnings = {},
+           .metres_per_unit = kCentimetre_m};
+  std::vector<std::array<double, 3>> near(skeleton->joints.size());
+  for (int i = 0; i < clip.frames(); ++i) {
+    const auto row = clip.channels.row(i);
+    const std::span<const double> values(row.data(), static_cast<std::size_t>(row.size()));
+    std::size_t translation = 0;
+    for (int c = 0; c < std::ssize(skeleton->channels);) {
+      const Channel& channel = skeleton->channels[c];
+      if (channel.translation) {
+        out.channels(i, c++) = row[translations[translation++]];
+        continue;
+      }
+      auto& angles = near[channel.joint];
+      angles = channels_from_rotation(
+          *skeleton, channel.joint, local_rotation(*clip.skeleton, channel.joint, values), angles);
+      for (const double angle : angles) out.channels(i, c++) = angle;
+    }
+  }
+  return out;
 }
 
 }  // namespace posed::clip

@@ -1,9 +1,10 @@
-// Clip: a recorded motion read from a file. Channel values keep the file's order. Angles are in
-// radians and lengths in metres, whatever units the file uses.
+// Clip: a recorded motion as numbers, whatever its file looks like. Channel values keep the file's
+// order. Angles are in radians and lengths in metres, whatever units the file uses. Cold.
 #pragma once
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,8 @@
 namespace posed::clip {
 
 using ChannelMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+struct ClipFile;  // proto/clip/format.hpp
 
 struct Clip {
   std::string path;
@@ -33,20 +36,31 @@ struct Clip {
   [[nodiscard]] Frame frame(int index) const;
 };
 
+// Facts that a file may lack and a user can supply. The table (format.hpp) says which of them a
+// format accepts; any other that is given is refused.
 struct ReadOptions {
-  std::filesystem::path asf{};  // the skeleton of an AMC; empty: NN.asf beside NN_MM.amc
-  double amc_rate_hz = 120.0;   // AMC files do not state a rate
-  // Unit of a BVH; empty: the profile's, otherwise guessed from the figure's height.
+  // The file of the skeleton, for a format that keeps it apart; empty: NN.asf beside NN_MM.amc.
+  std::filesystem::path skeleton{};
+  // Rate of a format that does not state it; empty: its usual one.
+  std::optional<double> rate_hz{};
+  // Unit of length of a format that does not state it; empty: the profile's, otherwise guessed from
+  // the figure's height.
   std::optional<double> metres_per_unit{};
   std::string profile{};       // name of a skeleton profile; empty: found by joint names
-  std::optional<Side> hand{};  // side of a hand CSV (default right); which hand to take from a body
-  std::string hand_shape{kDefaultHandShape};  // hand shape for a hand CSV
-  double hand_rate_hz = 30.0;                 // rate of a hand CSV without times
+  std::optional<Side> hand{};  // side of a hand that does not state it; empty: right
+  std::string hand_shape{kDefaultHandShape};  // bones of a hand of which a file has only the angles
 };
 
-// Reads a .bvh, .amc or .csv (a hand), chosen by extension. Errors name file and line.
+// Reads a clip of any format of the table (format.hpp), with all its frames. Errors name file and
+// line.
 [[nodiscard]] Result<Clip> read_clip(const std::filesystem::path& path,
                                      const ReadOptions& options = {});
+
+// Reads a clip from memory. The extension of its name says the format.
+[[nodiscard]] Result<Clip> parse_clip(const ClipFile& file, const ReadOptions& options = {});
+
+// Writes a clip in the format that the extension of `path` says. An error leaves no file.
+[[nodiscard]] Result<> write_clip(const Clip& clip, const std::filesystem::path& path);
 
 // True when some frame lies more than a tenth of a step off the even clock at `rate_hz` that a BVH
 // assumes.

@@ -3,8 +3,7 @@
 #include <cmath>
 #include <optional>
 
-#include "proto/clip/reader.hpp"
-#include "proto/clip/text.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::clip {
@@ -48,13 +47,6 @@ Eigen::Quaterniond ours(const Skeleton& theirs, int joint, const Skeleton& hand,
   const Eigen::Quaterniond canonical =
       T_parent(theirs, joint) * local * theirs.joints[joint].T_world_joint.conjugate();
   return T_parent(hand, hand_joint).conjugate() * canonical * hand.joints[hand_joint].T_world_joint;
-}
-
-Result<Clip> clip_of_csv(std::string_view text, const std::string& name,
-                         const ReadOptions& options) {
-  auto draft = draft_hand_csv(text, name, options);
-  if (!draft) return std::unexpected(draft.error());
-  return clip_of(std::move(*draft), name);
 }
 
 }  // namespace
@@ -104,14 +96,9 @@ Result<HandClip> hand_of(const Clip& clip, const ReadOptions& options) {
 }
 
 Result<HandClip> read_hand_clip(const std::filesystem::path& path, const ReadOptions& options) {
-  const auto clip = read_clip(path, options);
-  if (!clip) return std::unexpected(clip.error());
-  return hand_of(*clip, options);
-}
-
-Result<HandClip> parse_hand_csv(std::string_view text, const std::string& name,
-                                const ReadOptions& options) {
-  const auto clip = clip_of_csv(text, name, options);
+  ReadOptions accepted = options;  // of a body, `hand` says which of its hands is wanted
+  if (!accepts(path, ReadOption::kHand)) accepted.hand.reset();
+  const auto clip = read_clip(path, accepted);
   if (!clip) return std::unexpected(clip.error());
   return hand_of(*clip, options);
 }

@@ -1,10 +1,10 @@
 // HandClip: the motion of one hand as hand45 angles. It is read from and written to the hand CSV,
-// or taken from any clip that has the fifteen finger joints of a hand (a BVH with fingers).
+// or extracted from any clip that has the fifteen finger joints of a hand (a BVH with fingers).
 //
 // The hand CSV: a header `time_s,thumb1_x_rad,thumb1_y_rad,thumb1_z_rad,thumb2_x_rad, ...,
 // little3_z_rad`, then one line per frame. An empty field is a missing value. Times may be unevenly
 // spaced. A missing time is interpolated; a repeated one counts as missing. Without any times the
-// frames are evenly spaced at ReadOptions::hand_rate_hz. Decreasing times are an error. Cold.
+// frames are evenly spaced at 30 Hz. Decreasing times are an error. Cold.
 #pragma once
 
 #include <filesystem>
@@ -25,16 +25,13 @@ struct HandClip {
   std::vector<std::string> warnings;
 };
 
-// Reads a .csv, or a .bvh or .amc with the finger joints of the hand that `options.hand` names.
+// Reads a hand's file, or a body's with the finger joints of the hand that `options.hand` names.
 // Errors name file and line.
 [[nodiscard]] Result<HandClip> read_hand_clip(const std::filesystem::path& path,
                                               const ReadOptions& options = {});
 
-// The same from memory; `name` is used in error messages.
-[[nodiscard]] Result<HandClip> parse_hand_csv(std::string_view text, const std::string& name,
-                                              const ReadOptions& options = {});
-
-// Takes the hand of a clip, found by its canonical bones.
+// Extracts the hand of a clip, found by its canonical bones. `options.hand` says which; without it
+// a clip of two hands is an error.
 [[nodiscard]] Result<HandClip> hand_of(const Clip& clip, const ReadOptions& options = {});
 
 // Returns the same motion as a Clip of hand_skeleton(clip.side, the shape named `hand_shape`).

@@ -2,20 +2,23 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <fstream>
+#include <ostream>
 
+#include "proto/clip/draft.hpp"
+#include "proto/clip/formats.hpp"
 #include "proto/clip/hand_clip.hpp"
-#include "proto/clip/reader.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::clip {
 namespace {
 
-constexpr double kSameTime_s = 1e-6;  // times closer than this count as the same
-constexpr double kSlowest_hz = 1.0;   // slower times are counted in another unit
-constexpr double kEven = 0.01;        // relative difference below which steps count as equal
+constexpr double kSameTime_s = 1e-6;      // times closer than this count as the same
+constexpr double kMinRate_hz = 1.0;       // slower times are counted in another unit
+constexpr double kUntimedRate_hz = 30.0;  // of a file without times
+constexpr double kEven = 0.01;            // relative difference below which steps count as equal
 
 // Column names without the time column: thumb1_x_rad ... little3_z_rad.
 const std::array<std::string, kHandChannels>& column_names() {
@@ -91,38 +94,11 @@ void interpolate(std::vector<double>& time_s, double step_s) {
   }
 }
 
-}  // namespace
-
-Result<Draft> draft_hand_csv(std::string_view text, const std::string& name,
-                             const ReadOptions& options) {
-  const auto shape = find_hand_shape(options.hand_shape);
-  if (!shape) return std::unexpected(shape.error());
-  text = without_bom(text);
-  const std::string_view all = text;
-  Draft draft;
-  bool has_header = false;
-  for (int number = 1; !text.empty(); ++number) {
-    const std::string_view line = trim(next_line(text));
-    if (line.empty()) continue;
-    if (has_header) {
-      if (draft.frames.empty()) {
-        draft.header = all.substr(0, static_cast<std::size_t>(line.data() - all.data()));
-      }
-      draft.frames.push_back({.text = line, .line = number});
-      continue;
-    }
-    if (auto ok = check_header(line, name, number); !ok) return std::unexpected(ok.error());
-    has_header = true;
-  }
-  if (!has_header) return fail("is empty, so it is no hand CSV", name);
-  draft.skeleton = hand_skeleton(options.hand.value_or(Side::kRight), **shape);
-  draft.parser = FrameParser::hand_csv();
-  draft.frame_rate_hz = draft.untimed_rate_hz = options.hand_rate_hz;
-  return draft;
-}
-
-Result<> settle_times(const Draft& draft, const std::string& name, std::vector<double>& time_s,
-                      double& rate_hz, std::vector<std::string>& warnings) {
+// Completes the times of the frames as hand_clip.hpp describes; NaN marks a missing one. Sets the
+// rate to 1 / median step.
+Result<> settle_times(Draft& draft, const std::string& name) {
+  const std::vector<FrameSpan>& frames = draft.text->frames;
+  std::vector<double>& time_s = draft.time_s;
   std::vector<double> steps_s;
   double last_s = 0.0;
   std::size_t last = time_s.size();  // index of the last known time; none so far
@@ -132,7 +108,7 @@ Result<> settle_times(const Draft& draft, const std::string& name, std::vector<d
     if (last < time_s.size() && now_s < last_s) {
       return fail("frame " + std::to_string(i + 1) + ": its time " + number_text(now_s) +
                       " lies before the " + number_text(last_s) + " of a frame above it",
-                  name, draft.frames[i].line);
+                  name, frames[i].line);
     }
     if (last < time_s.size() && now_s - last_s < kSameTime_s) now_s = std::nan("");
     if (std::isnan(now_s)) {
@@ -143,26 +119,80 @@ Result<> settle_times(const Draft& draft, const std::string& name, std::vector<d
     last_s = now_s;
     last = i;
   }
-  rate_hz = steps_s.empty() ? draft.untimed_rate_hz : rate_of(steps_s);
+  const double rate_hz = steps_s.empty() ? kUntimedRate_hz : rate_of(steps_s);
+  draft.frame_rate_hz = rate_hz;
   if (missing > 0) {
-    warnings.push_back(std::to_string(missing) + " of " + std::to_string(time_s.size()) +
-                       " frames have no time of their own; " +
-                       (steps_s.empty() ? "played at " + number_text(rate_hz) + " Hz"
-                                        : std::string("placed between the others")));
+    draft.warnings.push_back(std::to_string(missing) + " of " + std::to_string(time_s.size()) +
+                             " frames have no time of their own; " +
+                             (steps_s.empty() ? "played at " + number_text(rate_hz) + " Hz"
+                                              : std::string("placed between the others")));
   }
-  if (rate_hz < kSlowest_hz) {
+  if (rate_hz < kMinRate_hz) {
     return fail("its times are " + number_text(std::round(1000.0 / rate_hz) / 1000.0) +
                     " s apart, which is no"
                     " recording of a hand; time_s counts seconds, so divide the times by 1000 if"
                     " they are milliseconds",
-                name, draft.frames.front().line);
+                name, frames.front().line);
   }
   interpolate(time_s, 1.0 / rate_hz);
   return {};
 }
 
+Result<Draft> read_hand_csv(const ClipFile& file, const ReadOptions& options) {
+  const auto shape = find_hand_shape(options.hand_shape);
+  if (!shape) return std::unexpected(shape.error());
+  const std::string_view all = without_bom(file.bytes);
+  Draft draft;
+  TextFrames& frames = draft.text.emplace();
+  bool has_header = false;
+  std::string_view rest = all;
+  for (int number = 1; !rest.empty(); ++number) {
+    const std::string_view line = trim(next_line(rest));
+    if (line.empty()) continue;
+    if (has_header) {
+      if (frames.frames.empty()) {
+        frames.header = all.substr(0, static_cast<std::size_t>(line.data() - all.data()));
+      }
+      frames.frames.push_back({.text = line, .line = number});
+      continue;
+    }
+    if (auto ok = check_header(line, file.name, number); !ok) return std::unexpected(ok.error());
+    has_header = true;
+  }
+  if (!has_header) return fail("is empty, so it is no hand CSV", file.name);
+  draft.skeleton = hand_skeleton(options.hand.value_or(Side::kRight), **shape);
+  draft.skeleton_is_known = true;
+  frames.parser = FrameParser::hand_csv();
+  if (frames.frames.empty()) return draft;
+  if (auto ok = read_frames(frames, file.name, draft.values, draft.time_s); !ok) {
+    return std::unexpected(ok.error());
+  }
+  if (auto ok = settle_times(draft, file.name); !ok) return std::unexpected(ok.error());
+  return draft;
+}
+
+Result<> write(const Clip& clip, const std::filesystem::path& path) {
+  const auto hand = hand_of(clip);
+  if (!hand) return std::unexpected(hand.error());
+  return write_hand_csv(*hand, path);
+}
+
+}  // namespace
+
+Format hand_csv_format() {
+  return {.name = "hand CSV",
+          .extensions = {".csv"},
+          .is_hand = true,
+          .holds_gaps = true,
+          .sends_text = true,
+          .options = {ReadOption::kHand, ReadOption::kHandShape},
+          .sniff = [](std::string_view begin) { return has_line(begin, "time_s,"); },
+          .read = read_hand_csv,
+          .write = write};
+}
+
 Result<> write_hand_csv(const HandClip& clip, const std::filesystem::path& path) {
-  return write_text(path, [&clip](std::ostream& file) {
+  return write_whole_file(path, [&clip](std::ostream& file) {
     file << header_line() << '\n';
     for (std::size_t i = 0; i < clip.angles.size(); ++i) {
       std::string line = number_text(clip.time_s[i]);

@@ -7,6 +7,7 @@
 
 #include "proto/clip/text.hpp"
 #include "proto/frame/label.hpp"
+#include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
 
@@ -129,7 +130,7 @@ std::string labels_text(const std::vector<LabelSegment>& segments) {
 
 Result<> write_labels(const std::vector<LabelSegment>& segments,
                       const std::filesystem::path& path) {
-  return write_text(path, [&](std::ostream& out) { out << labels_text(segments); });
+  return write_whole_file(path, [&](std::ostream& out) { out << labels_text(segments); });
 }
 
 }  // namespace posed::clip

@@ -2,14 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstring>
-#include <fstream>
 #include <system_error>
-
-#include "proto/frame/whole_file.hpp"
 
 namespace posed::clip {
 namespace {
@@ -115,9 +110,12 @@ std::string_view Cursor::rest() {
   return trim(line);
 }
 
-Result<> write_text(const std::filesystem::path& path,
-                    const std::function<void(std::ostream&)>& write) {
-  return write_whole_file(path, write);
+bool has_line(std::string_view text, std::string_view start) noexcept {
+  while (!text.empty()) {
+    const std::string_view line = next_line(text);
+    if (trim(line).starts_with(start)) return true;
+  }
+  return false;
 }
 
 std::string_view without_bom(std::string_view text) noexcept {

@@ -1,16 +1,11 @@
-// Tools to read text from people and other programs: words with their line numbers, and numbers
-// independent of the locale.
+// Tools to read text that users and other programs wrote: words with their line numbers, and
+// numbers independent of the locale.
 #pragma once
 
 #include <cstddef>
-#include <filesystem>
-#include <functional>
-#include <iosfwd>
 #include <optional>
 #include <string>
 #include <string_view>
-
-#include "proto/frame/result.hpp"
 
 namespace posed::clip {
 
@@ -38,16 +33,19 @@ inline constexpr double kMaxValue = 1e9;
 // RT-safe.
 [[nodiscard]] std::string_view next_line(std::string_view& text) noexcept;
 
+// Returns whether a line of `text` begins with `start`, after blanks.
+[[nodiscard]] bool has_line(std::string_view text, std::string_view start) noexcept;
+
 // Walks through a text word by word and tracks the line number. Braces are words of their own.
 class Cursor {
  public:
   explicit Cursor(std::string_view text) : text_(text), all_(text) {}
 
   [[nodiscard]] std::string_view word();  // next word, across line ends; empty at the end
-  [[nodiscard]] std::string_view peek();  // like word(), without taking it
-  [[nodiscard]] std::string_view rest();  // rest of this line, trimmed; also takes the line end
+  [[nodiscard]] std::string_view peek();  // like word(), but the word stays
+  [[nodiscard]] std::string_view rest();  // rest of this line, trimmed; also skips the line end
   [[nodiscard]] std::string_view name();  // rest of this line up to a brace, trimmed
-  [[nodiscard]] int line() const { return line_; }  // line of the last word taken, from 1
+  [[nodiscard]] int line() const { return line_; }  // line of the last word returned, from 1
   [[nodiscard]] std::size_t offset() const { return all_.size() - text_.size(); }
 
  private:
@@ -58,11 +56,6 @@ class Cursor {
   int next_line_ = 1;
   int line_ = 1;
 };
-
-// Writes to a temporary file beside the target first, so that a full disk leaves no half-written
-// clip under the target's name.
-[[nodiscard]] Result<> write_text(const std::filesystem::path& path,
-                                  const std::function<void(std::ostream&)>& write);
 
 // `text` without a UTF-8 byte order mark.
 [[nodiscard]] std::string_view without_bom(std::string_view text) noexcept;

@@ -1,4 +1,4 @@
-// From a device's time to the host's.
+// Converts a device's time to the host's.
 #pragma once
 
 #include <cstdint>

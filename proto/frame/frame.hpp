@@ -1,7 +1,7 @@
 // Frame: one pose of one stream at one instant. Sample: the named values of one device at one
 // instant. Both are trivially copyable, have a fixed capacity and hold no pointer, so that they can
 // cross a lock-free ring by value. Coordinates: right-handed, Y up, metres, radians; a person in
-// T-pose faces +Z with the left hand at +X. Rotations take a joint's frame to its parent's frame.
+// T-pose faces +Z with the left hand at +X. A rotation maps a joint's frame to its parent's frame.
 #pragma once
 
 #include <array>

@@ -25,7 +25,7 @@ struct Error {
 template <typename T = void>
 using Result = std::expected<T, Error>;
 
-// What the system says of an error number. Any thread.
+// The system's text for an error number. Any thread.
 [[nodiscard]] std::string errno_text(int error = errno);
 
 // return fail("..."), return fail("...", path, line)
@@ -34,7 +34,7 @@ using Result = std::expected<T, Error>;
   return std::unexpected(Error{std::move(message), std::move(file), line, ExitCode::kFailed});
 }
 
-// The same for a mistake in how the program was called or configured (exit code 2).
+// As fail(), for a mistake in how the program was called or configured (exit code 2).
 [[nodiscard]] inline std::unexpected<Error> misuse(std::string message, std::string file = {},
                                                    int line = 0) {
   return std::unexpected(Error{std::move(message), std::move(file), line, ExitCode::kWrongUse});

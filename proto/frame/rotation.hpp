@@ -20,7 +20,8 @@ enum class Axis : std::uint8_t { kX, kY, kZ };
   return {q[3], q[0], q[1], q[2]};
 }
 
-// The same in double, normalised: a float quaternion's length is off by up to 1e-7.
+// As to_eigen(), in double and normalised, because a float quaternion's length is off by up to
+// 1e-7.
 [[nodiscard]] inline Eigen::Quaterniond to_eigen_double(const Quatf& q) noexcept {
   return to_eigen(q).cast<double>().normalized();
 }

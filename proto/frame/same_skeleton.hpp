@@ -1,4 +1,4 @@
-// Whether two skeletons can stand for each other. Cold.
+// Tells whether two skeletons are interchangeable. Cold.
 #pragma once
 
 #include "proto/frame/skeleton.hpp"

@@ -26,9 +26,9 @@ inline constexpr int kOutcomes = static_cast<int>(Outcome::kCount);
 inline constexpr std::array<std::string_view, kOutcomes> kOutcomeNames{
     "ok", "short", "bad_checksum", "out_of_range", "foreign", "late", "duplicate"};
 
-inline constexpr std::size_t kMaxBodies = 64;  // of one source
-inline constexpr std::size_t kMaxDescription =
-    256 * 1024;  // bytes; a decoder reports no longer one
+inline constexpr std::size_t kMaxBodies = 64;  // one source has at most so many
+// In bytes; a decoder reports no longer description.
+inline constexpr std::size_t kMaxDescription = 256 * 1024;
 
 // All calls are RT-safe and come from the one thread that feeds the decoder. The decoder fills what
 // it knows (pose, device_ns, quality); the owner of the sink sets stream, sequence and arrival

@@ -7,7 +7,6 @@
 #include <zlib.h>
 
 #include "proto/frame/bone_names.hpp"
-#include "proto/frame/joint_channels.hpp"
 #include "proto/frame/t_pose.hpp"
 #include "proto/text/clean.hpp"
 

@@ -6,7 +6,9 @@
 // const and shared.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -47,7 +49,7 @@ struct Joint {
 };
 
 struct Skeleton {
-  std::string name;           // profile or file of origin, for people
+  std::string name;           // profile or file of origin, shown to users
   std::vector<Joint> joints;  // at most kMaxJoints
   // Grouped by joint; within a joint the first listed rotation is outermost. A BVH keeps its order;
   // the dof of an Acclaim joint are reversed, because there the last is outermost. Position
@@ -63,6 +65,27 @@ struct Skeleton {
   // (by name and OFFSET direction), and computes id. Errors name the joint.
   [[nodiscard]] Result<> finish();
 };
+
+// A part of Skeleton::channels, so the joint's values have the same place among those of a frame.
+// RT-safe.
+[[nodiscard]] inline std::span<const Channel> channels_of(const Skeleton& skeleton,
+                                                          int joint) noexcept {
+  const auto range = std::ranges::equal_range(
+      skeleton.channels, joint, {}, [](const Channel& c) { return static_cast<int>(c.joint); });
+  return {range.begin(), range.end()};
+}
+
+// Position of a joint in its parent's frame [m], from the values of its channels: position channels
+// replace the joint's offset. RT-safe.
+[[nodiscard]] inline Eigen::Vector3d local_position(const Joint& joint,
+                                                    std::span<const Channel> channels,
+                                                    const double* values) noexcept {
+  Eigen::Vector3d position_m = joint.offset_m;
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    if (channels[i].translation) position_m[static_cast<int>(channels[i].axis)] = values[i];
+  }
+  return position_m;
+}
 
 // Computes the pose from the channel values of one frame [rad, m], in the order of
 // Skeleton::channels. Sets rotations, root position, validity, angles, counts and skeleton id.

@@ -13,7 +13,7 @@ inline constexpr int kMaxTimecode = 16;  // bytes, including the closing zero
 // "hh:mm:ss:ff" (SMPTE 12M), or "hh:mm:ss.mmm"; empty: there is none. Closed by zeros.
 using Timecode = std::array<char, kMaxTimecode>;
 
-// A text that is not of such a form is no timecode.
+// Returns the timecode in `text`; empty where the text has neither form.
 [[nodiscard]] constexpr Timecode to_timecode(std::string_view text) noexcept {
   constexpr std::string_view kFrames = "dd:dd:dd:dd", kMilliseconds = "dd:dd:dd.ddd";
   const auto has_form = [text](std::string_view form) {
@@ -27,8 +27,8 @@ using Timecode = std::array<char, kMaxTimecode>;
   return timecode;
 }
 
-// From hours, minutes, seconds and frames, the hours in the highest byte. Empty when a number is
-// none of a timecode, or all are 0: that is what devices send that have no timecode.
+// Unpacks hours, minutes, seconds and frames, the hours in the highest byte. Returns an empty
+// timecode when a number is out of range or all are 0, which devices without timecode send.
 [[nodiscard]] constexpr Timecode to_timecode(std::uint32_t packed) noexcept {
   constexpr std::array<std::uint32_t, 4> kMost{23, 59, 59, 99};
   Timecode timecode{};

@@ -25,7 +25,7 @@ class Checksum {
 
   void add(std::span<const std::byte> bytes) {
     add(static_cast<std::int64_t>(bytes.size()));
-    // zlib takes a null pointer as a request to start anew.
+    // zlib treats a null pointer as a request to start anew.
     if (!bytes.empty()) {
       crc_ = crc32_z(crc_, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size());
     }

@@ -1,5 +1,5 @@
-// The SHA-256 of bytes in lower-case hex: the key under which a log stores a file, and what tells
-// whether two machines have the same file. Cold.
+// The SHA-256 of bytes in lower-case hex: the key under which a log stores a file, and by which two
+// machines compare their files. Cold.
 #pragma once
 
 #include <cstddef>
@@ -13,7 +13,7 @@ namespace posed::log {
 
 [[nodiscard]] std::string sha256_hex(std::span<const std::byte> bytes);
 
-// Of a file of any size, read piece by piece.
+// Reads a file of any size piece by piece.
 [[nodiscard]] Result<std::string> sha256_of_file(const std::filesystem::path& path);
 
 }  // namespace posed::log

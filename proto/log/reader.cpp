@@ -5,9 +5,6 @@
 
 #include "proto/log/database.hpp"
 #include "proto/log/digest.hpp"
-#include "proto/log/old_format.hpp"
-#include "proto/log/open_whole.hpp"
-#include "proto/log/places.hpp"
 #include "proto/log/schema.hpp"
 
 namespace posed::log {
@@ -16,6 +13,68 @@ namespace {
 constexpr const char* kSelectChunks =
     "SELECT id, source, socket, direction, arrival_ns, first_item, sequences, bytes, crc FROM "
     "chunk";
+
+constexpr int kReadPatience_ms = 2000;
+
+// Checks the format of the log before reading anything else in it.
+Result<> check_marks(Database& database, const std::string& file) {
+  const auto application = database.value("PRAGMA application_id");
+  if (!application) return std::unexpected(application.error());
+  if (*application != std::to_string(kApplicationId)) {
+    return fail("not a device log (empty, or a database that is not posed's)", file);
+  }
+  const auto version = database.value("PRAGMA user_version");
+  if (!version) return std::unexpected(version.error());
+  const int format = std::stoi(*version);
+  if (format > kFormatVersion) {
+    return fail("written by a newer posed (log format " + *version + ", this one reads up to " +
+                    std::to_string(kFormatVersion) + "); update posed",
+                file);
+  }
+  if (format < kMinFormatVersion) {
+    return fail("written by a development version of posed (log format " + *version +
+                    ", this one reads " + std::to_string(kMinFormatVersion) + " and newer)",
+                file);
+  }
+  return {};
+}
+
+// After a crash the -wal file is part of the log; this merges it into the main file. That fails
+// when another process has the log open or the file is read-only; reading works all the same.
+void merge_wal(Database& database) {
+  const auto merged = database.run("PRAGMA wal_checkpoint(TRUNCATE); PRAGMA journal_mode=DELETE;");
+  static_cast<void>(merged);
+}
+
+Result<> check_whole(Database& database, const std::string& file) {
+  const auto damaged = [&](const std::string& how) {
+    return fail("the log is damaged (" + how + "); `sqlite3 FILE .recover` may save what is left",
+                file);
+  };
+  const auto page = database.value("PRAGMA page_size");
+  if (!page) return std::unexpected(page.error());
+  std::error_code error;
+  const auto size = std::filesystem::file_size(file, error);
+  // SQLite itself reads a truncated last page as if it ended in zeros.
+  if (error || size % std::stoul(*page) != 0) return damaged("cut short");
+  const auto verdict = database.value("PRAGMA quick_check(1)");
+  if (!verdict) return std::unexpected(verdict.error());
+  if (*verdict != "ok") return damaged(*verdict);
+  return {};
+}
+
+// Opens the file of a log: checks that it is one, of a format that is known, and not damaged, and
+// merges what a crash has left beside it.
+Result<Database> open_whole(const std::filesystem::path& path) {
+  const std::string file = path.string();
+  auto database = Database::open(path, Database::Mode::kReadWrite);
+  if (!database) return std::unexpected(database.error());
+  if (auto ok = check_marks(*database, file); !ok) return std::unexpected(ok.error());
+  merge_wal(*database);
+  database->set_busy_timeout_ms(kReadPatience_ms);
+  if (auto done = check_whole(*database, file); !done) return std::unexpected(done.error());
+  return database;
+}
 
 std::uint64_t unsigned_of(std::int64_t stored) { return static_cast<std::uint64_t>(stored); }
 
@@ -69,11 +128,6 @@ Result<std::vector<StreamRow>> read_streams(Database& database, const std::strin
   }
 }
 
-Result<Statement> select_rows(Database& database, bool old, const char* sql,
-                              Result<Statement> (*select_old)(Database&)) {
-  return old ? select_old(database) : database.prepare(sql);
-}
-
 }  // namespace
 
 std::unexpected<Error> damaged_row(const std::string& file, const char* table, std::int64_t id,
@@ -86,16 +140,14 @@ std::unexpected<Error> damaged_row(const std::string& file, const char* table, s
 struct Reader::State {
   Database database;
   std::string file;
-  bool old = false;  // of format 1 or 2
   std::map<std::string, std::string> meta;
   std::vector<SourceRow> sources;
   std::vector<StreamRow> streams;
   std::optional<Statement> chunks;
   std::vector<StreamPosition> places;  // from the last chunk
 
-  // Rows of the old formats have no checksum, so it is not checked for them.
   Result<bool> step(Statement& select, const char* table) const {
-    return old ? select.step() : step_checked(select, table, file);
+    return step_checked(select, table, file);
   }
 
   // The row of the chunk table to which `select` has stepped; it refers to `positions`.
@@ -110,13 +162,6 @@ struct Reader::State {
 };
 
 Result<> Reader::State::read_described() {
-  if (old) {
-    auto described = old_format::read_streams(database, file);
-    if (!described) return std::unexpected(described.error());
-    sources = std::move(described->sources);
-    streams = std::move(described->streams);
-    return {};
-  }
   auto found_sources = read_sources(database, file);
   if (!found_sources) return std::unexpected(found_sources.error());
   sources = std::move(*found_sources);
@@ -135,7 +180,6 @@ Result<ChunkRow> Reader::State::chunk(const Statement& select,
   if (auto known = check_owner(source, "chunk", id, true); !known) {
     return std::unexpected(known.error());
   }
-  if (old) return old_format::chunk(select, positions);
   if (!unpack_positions(select.bytes(6), positions)) {
     return damaged_row(file, "chunk", id, "has sequences that are cut short");
   }
@@ -170,23 +214,19 @@ Result<Reader> Reader::open(const std::filesystem::path& path) {
   const std::string file = path.string();
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) return fail("is a folder, not a log", file);
-  auto opened = open_whole(path);
-  if (!opened) return std::unexpected(opened.error());
-  Database& database = opened->database;
-  auto meta = read_meta(database);
+  auto database = open_whole(path);
+  if (!database) return std::unexpected(database.error());
+  auto meta = read_meta(*database);
   if (!meta) return std::unexpected(meta.error());
-  auto state = std::make_unique<State>(State{.database = std::move(database),
+  auto state = std::make_unique<State>(State{.database = std::move(*database),
                                              .file = file,
-                                             .old = opened->format <= kLastOldVersion,
                                              .meta = std::move(*meta),
                                              .sources = {},
                                              .streams = {},
                                              .chunks = std::nullopt,
                                              .places = {}});
   if (auto done = state->read_described(); !done) return std::unexpected(done.error());
-  auto chunks =
-      select_rows(state->database, state->old,
-                  (std::string(kSelectChunks) + " ORDER BY id").c_str(), old_format::select_chunks);
+  auto chunks = state->database.prepare(std::string(kSelectChunks) + " ORDER BY id");
   if (!chunks) return std::unexpected(chunks.error());
   state->chunks.emplace(std::move(*chunks));
   return Reader(std::move(state));
@@ -206,8 +246,6 @@ std::optional<std::size_t> Reader::place_of_stream(std::uint32_t id) const {
   if (found == state_->streams.end() || found->id != id) return std::nullopt;
   return static_cast<std::size_t>(found - state_->streams.begin());
 }
-
-bool Reader::counts_items() const { return !state_->old; }
 
 Result<std::vector<std::byte>> Reader::blob(std::string_view sha256) const {
   auto select = state_->database.prepare("SELECT bytes FROM blob WHERE sha256=?");
@@ -246,9 +284,7 @@ Result<std::optional<ChunkRow>> Reader::next_chunk() {
   return *row;
 }
 
-// Formats 1 and 2 know no sources with several bodies.
-Result<> Reader::each_description(const std::function<Result<>(const ChunkRow&)>& take) const {
-  if (state_->old) return {};
+Result<> Reader::each_description(const std::function<Result<>(const ChunkRow&)>& handle) const {
   auto select =
       state_->database.prepare(std::string(kSelectChunks) + " WHERE direction=4 ORDER BY id");
   if (!select) return std::unexpected(select.error());
@@ -259,7 +295,7 @@ Result<> Reader::each_description(const std::function<Result<>(const ChunkRow&)>
     if (!*stepped) return {};
     const auto row = state_->chunk(*select, places);
     if (!row) return std::unexpected(row.error());
-    if (auto taken = take(*row); !taken) return taken;
+    if (auto handled = handle(*row); !handled) return handled;
   }
 }
 
@@ -282,28 +318,22 @@ Result<std::optional<Reader::Extent>> Reader::extent() const {
 }
 
 Result<std::vector<DecisionRow>> Reader::decisions() const {
-  auto select = select_rows(state_->database, state_->old,
-                            "SELECT id, item, stream, stage, name, value, now_ns, crc "
-                            "FROM decision ORDER BY id",
-                            old_format::select_decisions);
+  auto select = state_->database.prepare(
+      "SELECT id, item, stream, stage, name, value, now_ns, crc FROM decision ORDER BY id");
   if (!select) return std::unexpected(select.error());
   std::vector<DecisionRow> decisions;
   for (;;) {
     const auto stepped = state_->step(*select, "decision");
     if (!stepped) return std::unexpected(stepped.error());
     if (!*stepped) return decisions;
-    if (state_->old) {
-      decisions.push_back(old_format::decision(*select));
-    } else {
-      const auto value = select->bytes(5);
-      decisions.push_back({.id = select->integer(0),
-                           .item = unsigned_of(select->integer(1)),
-                           .stream = static_cast<std::uint32_t>(select->integer(2)),
-                           .stage = std::string(select->text(3)),
-                           .name = std::string(select->text(4)),
-                           .value = {reinterpret_cast<const char*>(value.data()), value.size()},
-                           .now_ns = select->integer(6)});
-    }
+    const auto value = select->bytes(5);
+    decisions.push_back({.id = select->integer(0),
+                         .item = unsigned_of(select->integer(1)),
+                         .stream = static_cast<std::uint32_t>(select->integer(2)),
+                         .stage = std::string(select->text(3)),
+                         .name = std::string(select->text(4)),
+                         .value = {reinterpret_cast<const char*>(value.data()), value.size()},
+                         .now_ns = select->integer(6)});
     const DecisionRow& row = decisions.back();
     if (auto known = state_->check_stream(row.stream, "decision", row.id); !known) {
       return std::unexpected(known.error());
@@ -312,25 +342,19 @@ Result<std::vector<DecisionRow>> Reader::decisions() const {
 }
 
 Result<std::vector<GapRow>> Reader::gaps() const {
-  auto select = select_rows(state_->database, state_->old,
-                            "SELECT id, kind, owner, after_chunk, lost, time_ns, crc FROM gap "
-                            "ORDER BY id",
-                            old_format::select_gaps);
+  auto select = state_->database.prepare(
+      "SELECT id, kind, owner, after_chunk, lost, time_ns, crc FROM gap ORDER BY id");
   if (!select) return std::unexpected(select.error());
   std::vector<GapRow> gaps;
   for (;;) {
     const auto stepped = state_->step(*select, "gap");
     if (!stepped) return std::unexpected(stepped.error());
     if (!*stepped) return gaps;
-    if (state_->old) {
-      gaps.push_back(old_format::gap(*select));
-    } else {
-      gaps.push_back({.kind = static_cast<GapRow::Kind>(select->integer(1)),
-                      .owner = static_cast<std::uint32_t>(select->integer(2)),
-                      .after_chunk = select->integer(3),
-                      .lost = unsigned_of(select->integer(4)),
-                      .time_ns = select->integer(5)});
-    }
+    gaps.push_back({.kind = static_cast<GapRow::Kind>(select->integer(1)),
+                    .owner = static_cast<std::uint32_t>(select->integer(2)),
+                    .after_chunk = select->integer(3),
+                    .lost = unsigned_of(select->integer(4)),
+                    .time_ns = select->integer(5)});
     const GapRow& row = gaps.back();
     const bool is_source = row.kind == GapRow::Kind::kChunks;
     if (auto known = state_->check_owner(row.owner, "gap", select->integer(0), is_source); !known) {
@@ -340,7 +364,6 @@ Result<std::vector<GapRow>> Reader::gaps() const {
 }
 
 Result<std::vector<TakeRow>> Reader::takes() const {
-  if (state_->old) return std::vector<TakeRow>{};
   auto select =
       state_->database.prepare("SELECT id, name, first_item, last_item, crc FROM take ORDER BY id");
   if (!select) return std::unexpected(select.error());
@@ -358,7 +381,6 @@ struct Reader::Frames::State {
   Statement select;
   std::uint32_t stream = 0;
   bool raw = false;
-  bool old = false;
   std::string file;
 };
 
@@ -369,7 +391,7 @@ Reader::Frames::~Frames() = default;
 
 Result<std::optional<FrameRow>> Reader::Frames::next() {
   Statement& select = state_->select;
-  const auto row = state_->old ? select.step() : step_checked(select, "frame", state_->file);
+  const auto row = step_checked(select, "frame", state_->file);
   if (!row) return std::unexpected(row.error());
   if (!*row) return std::nullopt;
   return FrameRow{state_->stream, unsigned_of(select.integer(2)), state_->raw, select.bytes(4)};
@@ -377,19 +399,24 @@ Result<std::optional<FrameRow>> Reader::Frames::next() {
 
 Result<Reader::Frames> Reader::frames(std::uint32_t stream, bool raw) const {
   auto select = state_->database.prepare(
-      state_->old ? old_format::kSelectFrames
-                  : "SELECT id, stream, sequence, raw, bytes, crc FROM frame "
-                    "WHERE stream=? AND raw=? ORDER BY id");
+      "SELECT id, stream, sequence, raw, bytes, crc FROM frame "
+      "WHERE stream=? AND raw=? ORDER BY id");
   if (!select) return std::unexpected(select.error());
   select->bind(std::int64_t{stream}).bind(std::int64_t{raw});
   return Frames(std::make_unique<Frames::State>(
-      Frames::State{std::move(*select), stream, raw, state_->old, state_->file}));
+      Frames::State{std::move(*select), stream, raw, state_->file}));
 }
 
 Result<bool> Reader::has_frames() const {
   const auto any = state_->database.value("SELECT EXISTS(SELECT 1 FROM frame)");
   if (!any) return std::unexpected(any.error());
   return *any == "1";
+}
+
+Result<> check_format(const std::filesystem::path& path) {
+  auto database = Database::open(path, Database::Mode::kRead);
+  if (!database) return std::unexpected(database.error());
+  return check_marks(*database, path.string());
 }
 
 }  // namespace posed::log

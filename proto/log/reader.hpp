@@ -23,11 +23,15 @@ class Database;
 [[nodiscard]] std::unexpected<Error> damaged_row(const std::string& file, const char* table,
                                                  std::int64_t id, const std::string& how);
 
+// Fails for a file that Reader::open() refuses by its first bytes: no log, or of a format that this
+// posed does not read. Reads nothing else and changes nothing.
+[[nodiscard]] Result<> check_format(const std::filesystem::path& path);
+
 class Reader {
  public:
   // Opens the log, merges the -wal file that a crash left, and checks the whole file. A file that
   // is not a log, is from a newer posed, or is damaged is an error. A log that is still being
-  // recorded can be read up to its last commit. Logs of formats 1 and 2 are presented as format 3.
+  // recorded can be read up to its last commit.
   // Each row's checksum is verified when the row is read; the error for a mismatch names log, table
   // and row.
   [[nodiscard]] static Result<Reader> open(const std::filesystem::path& path);
@@ -43,8 +47,6 @@ class Reader {
   [[nodiscard]] const SourceRow& source_of(const StreamRow& stream) const;
   // Index of a stream in streams(); empty when the log does not describe it.
   [[nodiscard]] std::optional<std::size_t> place_of_stream(std::uint32_t id) const;
-  // True when items are counted; false for formats 1 and 2.
-  [[nodiscard]] bool counts_items() const;
 
   // The bytes stored under a hash; an error when they are missing or do not match it.
   [[nodiscard]] Result<std::vector<std::byte>> blob(std::string_view sha256) const;
@@ -55,10 +57,10 @@ class Reader {
   // valid until the next call.
   [[nodiscard]] Result<std::optional<ChunkRow>> next_chunk();
 
-  // Calls `take` with each row that describes the bodies of a source, in log order, until it fails.
-  // The row is valid during the call, which may not use next_chunk().
+  // Calls `handle` with each row that describes the bodies of a source, in log order, until it
+  // fails. The row is valid during the call, which may not use next_chunk().
   [[nodiscard]] Result<> each_description(
-      const std::function<Result<>(const ChunkRow&)>& take) const;
+      const std::function<Result<>(const ChunkRow&)>& handle) const;
 
   // Arrival times of the first and the last chunk from a device, which bound the length of the log.
   // Empty when none was logged. Cheap.

@@ -1,10 +1,9 @@
-// The rows of a device log, one struct per table, as in format 3. Ids give the order of rows within
+// The rows of a device log, one struct per table. Ids give the order of rows within
 // a table. All times are the recording host's CLOCK_MONOTONIC [ns]. The ids of sources and streams
 // are names, not indices: they need not be consecutive.
 //
 // An item is a frame, a sample or a stream event on its way from the reader to the pipeline. Items
-// are counted from 1 over all streams, including dropped ones. Formats 1 and 2 did not count them:
-// there, the numbers of items, and of samples, are 0.
+// are counted from 1 over all streams, including dropped ones.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +14,7 @@
 
 namespace posed::log {
 
-// Of one log. Bodies that come and go all the time make many, two a second at most of each.
+// Streams of one log. Bodies that come and go all the time make many: each at most two a second.
 inline constexpr std::size_t kMaxStreams = 65536;
 
 // Table source: a device that was open when recording began, with everything needed to decode its
@@ -70,9 +69,6 @@ struct DecisionRow {
   std::string name;
   std::string value;  // serialized
   std::int64_t now_ns = 0;
-  // Used only by formats 1 and 2, which did not count items: the decision takes effect just before
-  // this frame of its stream.
-  std::uint64_t before_frame = 0;
 };
 
 // Table frame, only if recording frames was requested: a posed.v1.Frame without stage stamps.
@@ -113,10 +109,10 @@ inline constexpr const char* kShedSamples = "shed-samples";  // a range of sampl
 inline constexpr const char* kTick = "tick";                 // at now_ns
 inline constexpr const char* kEnd = "end";                   // the stream has ended, at now_ns
 inline constexpr const char* kStyle = "style";
-inline constexpr const char* kAlpha = "alpha";  // of style: a number
-inline constexpr const char* kModel = "model";  // of style and generate: a sha256
+inline constexpr const char* kAlpha = "alpha";  // a parameter of style: a number
+inline constexpr const char* kModel = "model";  // a new model of style or generate: its SHA-256
 inline constexpr const char* kGenerate = "generate";
-inline constexpr const char* kPlay = "play";  // of generate: a play order
+inline constexpr const char* kPlay = "play";  // a command of generate: a play order
 inline constexpr const char* kStopPlaying = "stop-playing";
 inline constexpr const char* kConstrain = "constrain";
 }  // namespace words

@@ -2,13 +2,19 @@
 // one.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
+#include <span>
+#include <vector>
+
+#include "proto/log/rows.hpp"
 
 namespace posed::log {
 
 inline constexpr std::int32_t kApplicationId = 0x504F5345;  // "POSE" in the SQLite header
 inline constexpr std::int32_t kFormatVersion = 3;  // user_version; increases when the tables change
-inline constexpr std::int32_t kLastOldVersion = 2;  // read through old_format.hpp
+inline constexpr std::int32_t kMinFormatVersion = 3;  // the oldest that is read
 
 // STRICT: SQLite rejects values of the wrong type, so a reader need not check each row.
 inline constexpr const char* kSchema = R"sql(
@@ -36,5 +42,18 @@ CREATE TABLE take(id INTEGER PRIMARY KEY, name TEXT NOT NULL, first_item INTEGER
                   last_item INTEGER NOT NULL, crc INTEGER NOT NULL) STRICT;
 CREATE INDEX frame_of_stream ON frame(stream, raw);
 )sql";
+
+// The column `sequences` of a chunk: for each stream of its source {u32 stream id, u64 number of
+// its next frame, u64 number of its next sample}, little-endian, one after the other.
+//
+// Both replace the content of `out`; the caller passes it in so that its memory is reused.
+void pack_positions(std::span<const StreamPosition> places, std::vector<std::byte>& out);
+// Returns false when the bytes are not a whole number of entries.
+[[nodiscard]] bool unpack_positions(std::span<const std::byte> bytes,
+                                    std::vector<StreamPosition>& out);
+
+// Suffixes of the files that make up a log: SQLite keeps further files beside it while it is open,
+// or after a crash.
+inline constexpr std::array kFileSuffixes{"", "-wal", "-shm", "-journal"};
 
 }  // namespace posed::log

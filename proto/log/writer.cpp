@@ -6,8 +6,6 @@
 
 #include "proto/log/database.hpp"
 #include "proto/log/digest.hpp"
-#include "proto/log/files.hpp"
-#include "proto/log/places.hpp"
 #include "proto/log/schema.hpp"
 
 namespace posed::log {

@@ -32,8 +32,8 @@ class Writer {
   ~Writer();
 
   // Chunks, decisions, frames and gaps get the next id of their table; the id in the row is
-  // ignored. A row of a stream that is there already is replaced: whether a commit that failed has
-  // kept it is not known. So is that of a take, which is written when it begins and when it ends.
+  // ignored. A row of a stream that is there already is replaced, because a failed commit may have
+  // kept it. A row of a take is replaced, too: it is written when the take begins and when it ends.
   // Each source and stream that a row refers to must be added before the same commit.
   [[nodiscard]] Result<> add(const SourceRow& row);
   [[nodiscard]] Result<> add(const StreamRow& row);

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "proto/message/assign.hpp"
-
 namespace posed::message {
 
 const v1::Frame& FrameEncoder::encode(const Frame& frame) {

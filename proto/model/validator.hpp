@@ -17,7 +17,7 @@ class Validator {
     if (!condition && wrong_.empty()) wrong_ = what;
   }
 
-  [[nodiscard]] bool sound() const { return wrong_.empty(); }
+  [[nodiscard]] bool valid() const { return wrong_.empty(); }
 
   double number(double value, double low, double high, const char* what) {
     want(value >= low && value <= high, what);  // false for NaN
@@ -30,8 +30,8 @@ class Validator {
   }
 
   [[nodiscard]] Result<> verdict(const std::string& name) const {
-    if (sound()) return {};
-    return fail("the model is not sound: " + wrong_ + "; train it again", name);
+    if (valid()) return {};
+    return fail("the model is not valid: " + wrong_ + "; train it again", name);
   }
 
  private:

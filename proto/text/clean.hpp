@@ -8,8 +8,8 @@
 
 namespace posed {
 
-inline constexpr std::size_t kMaxNameBytes = 60;    // of a name in a sentence or a table
-inline constexpr std::size_t kMaxLineBytes = 2000;  // of a whole sentence
+inline constexpr std::size_t kMaxNameBytes = 60;    // length of a name in a sentence or a table
+inline constexpr std::size_t kMaxLineBytes = 2000;  // length of a whole sentence
 
 // Returns `text` with every control character (including line ends and tabs), invisible direction
 // mark and byte that is not UTF-8 escaped, as in \x1b, \u{202e} and \xff, so that a terminal shows
@@ -17,7 +17,7 @@ inline constexpr std::size_t kMaxLineBytes = 2000;  // of a whole sentence
 // a following "..." marks the cut. Costs O(max_bytes), however long the text is.
 [[nodiscard]] std::string clean(std::string_view text, std::size_t max_bytes = kMaxLineBytes);
 
-// The same, limited to the length of a name: for a table's cell, or inside other quotes.
+// As clean(), limited to kMaxNameBytes: for a table's cell, or inside other quotes.
 [[nodiscard]] std::string clean_name(std::string_view name);
 
 // A name from untrusted text as error messages show it: 'index_mcp'.

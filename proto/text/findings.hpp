@@ -13,7 +13,7 @@
 
 namespace posed {
 
-inline constexpr std::size_t kMaxErrors = 100;  // of one file
+inline constexpr std::size_t kMaxErrors = 100;  // more of one file are not listed
 
 struct Findings {
   // `copy` is a table that repeats the keys of `original`. Where both know a key, it belongs into
@@ -23,7 +23,7 @@ struct Findings {
   };
 
   std::string file;
-  ExitCode exit_code = ExitCode::kFailed;  // of the errors
+  ExitCode exit_code = ExitCode::kFailed;  // each error gets it
   std::vector<Error> errors{};             // in the order of reading
   // dotted paths of all keys that were looked up: "stream.style.alpha"
   std::set<std::string> known{};

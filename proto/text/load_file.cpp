@@ -7,8 +7,6 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "proto/text/size_text.hpp"
-
 namespace posed {
 namespace {
 

@@ -32,8 +32,8 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string nearest(std::string_view word, const std::set<std::string>& known) {
-  constexpr std::size_t kLongest = 64;  // longer words match nothing; the cost is n^2
-  const std::string_view start = word.substr(0, kLongest);
+  constexpr std::size_t kMaxLetters = 64;  // longer words match nothing; the cost is n^2
+  const std::string_view start = word.substr(0, kMaxLetters);
   const auto best = std::ranges::min_element(
       known, {}, [&](const std::string& candidate) { return edit_distance(start, candidate); });
   if (best == known.end()) return {};

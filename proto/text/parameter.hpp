@@ -1,5 +1,5 @@
 // Tables of named, typed, range-checked values: the options of a driver, the parameters of a stage,
-// the options of a stage's command. Config, control, device log and replay all read the same table.
+// the options of a stage's command. Config, control, device log and replay all read one table.
 // Cold.
 #pragma once
 
@@ -19,8 +19,8 @@ using ParameterValue = std::variant<bool, std::int64_t, double, std::string>;
 using Parameters = std::map<std::string, ParameterValue>;  // by ParameterSpec::name
 
 struct ParameterSpec {
-  std::string_view name;         // its unit last: "lag_s"
-  ParameterValue default_value;  // also fixes the type
+  std::string_view name;           // its unit last: "lag_s"
+  ParameterValue default_value{};  // also fixes the type
   bool required = false;
   bool is_path = false;  // relative to the config file; the default is none
   std::string_view help;
@@ -63,12 +63,13 @@ template <typename T>
   return std::get<T>(parameters.at(name));
 }
 
-// Whether a number stands for the values of this parameter, as for all but texts without words.
+// Returns whether a number stands for the values of this parameter, as it does for all but texts
+// without words.
 [[nodiscard]] bool has_number(const ParameterSpec& spec) noexcept;
 // A flag as 0 or 1, a number as it is, a word as its place among the parameter's words. Not for
 // other text.
 [[nodiscard]] double number_of(const ParameterSpec& spec, const ParameterValue& value);
-// Whether a live parameter can have the value that this number, in our units, stands for.
+// Returns whether a live parameter can have the value that this number, in our units, stands for.
 [[nodiscard]] bool takes_number(const ParameterSpec& spec, double number);
 // That value as the config writes it: "true", "1.5", "stride".
 [[nodiscard]] std::string people_text(const ParameterSpec& spec, double number);

@@ -1,4 +1,5 @@
-// ShortText: text for people with a fixed capacity, so that it can travel through a ring by value.
+// ShortText: text with a fixed capacity, shown to users, so that it can travel through a ring by
+// value.
 #pragma once
 
 #include <algorithm>

@@ -1,4 +1,4 @@
-// What every SVG picture of posed shares: numbers, escaped text and the document around the
+// Parts that every SVG picture of posed uses: numbers, escaped text and the document around the
 // elements. Cold.
 #pragma once
 

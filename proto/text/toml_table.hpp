@@ -34,7 +34,7 @@ class TableReader {
   [[nodiscard]] bool has_text(std::string_view key) const;
   // All keys in alphabetical order, for a table whose keys are free.
   [[nodiscard]] std::vector<std::string> keys() const;
-  [[nodiscard]] int line() const;  // of the table's header
+  [[nodiscard]] int line() const;  // where the table's header stands
   // of the key's value, or of the table if the key is absent
   [[nodiscard]] int line_of(std::string_view key) const;
 
@@ -85,7 +85,7 @@ class TableReader {
  private:
   // The node of a key, which becomes known; null if absent.
   const toml::node* find(std::string_view key);
-  // The same for a list; null also if it is none, which is an error.
+  // As above for a list; null also if the value is no list, which is an error.
   const toml::array* find_list(std::string_view key, const std::string& wanted);
   // The number, or nothing and an error.
   std::optional<double> number(const toml::node& node, std::string_view key, Range range,
@@ -94,7 +94,7 @@ class TableReader {
                     Range range);
   void add_type_error(const toml::node& node, std::string_view key, const std::string& wanted);
   [[nodiscard]] std::string full(std::string_view key) const;
-  [[nodiscard]] std::string shown(std::string_view key) const;  // the same, for an error
+  [[nodiscard]] std::string shown(std::string_view key) const;  // as full(), for an error
 
   const toml::table& table_;
   std::string path_;  // "stream.style"; empty for the file itself

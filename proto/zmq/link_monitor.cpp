@@ -46,7 +46,7 @@ Result<LinkMonitor> LinkMonitor::open(void* context, void* socket, bool with_key
   return LinkMonitor(std::move(*monitor), with_key);
 }
 
-Refusal LinkMonitor::take_news() {
+Refusal LinkMonitor::next_refusal() {
   while (const std::uint16_t event = read_event(monitor_.get())) {
     switch (event) {
       case ZMQ_EVENT_HANDSHAKE_SUCCEEDED:
@@ -54,21 +54,21 @@ Refusal LinkMonitor::take_news() {
         hang_ups_ = 0;
         break;
       case ZMQ_EVENT_DISCONNECTED: {
-        const bool told = std::exchange(failure_told_, false);
+        const bool known = std::exchange(failure_known_, false);
         const bool was_established = std::exchange(established_, false);
         if (was_established) ++ends_;
         // This side was the first to see that the sockets do not match; libzmq tries no more.
-        if (!was_established && !told) return Refusal::kOtherSocket;
+        if (!was_established && !known) return Refusal::kOtherSocket;
         break;
       }
       case ZMQ_EVENT_HANDSHAKE_FAILED_AUTH:
-        failure_told_ = true;
+        failure_known_ = true;
         return Refusal::kKeyNotAllowed;
       case ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL:
-        failure_told_ = true;
+        failure_known_ = true;
         return with_key_ ? Refusal::kTalksNoKeys : Refusal::kWantsKey;
       case ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL:
-        failure_told_ = true;
+        failure_known_ = true;
         if (with_key_) return Refusal::kHangsUp;
         if (++hang_ups_ == kHangUps) return Refusal::kHangsUpKeyless;
         break;

@@ -1,5 +1,5 @@
-// LinkMonitor: what libzmq says about the one connection of a socket that connects to a daemon:
-// whether it is established, and why the daemon refuses this client. One thread uses it. Cold.
+// LinkMonitor: follows the one connection of a socket that connects to a daemon: whether it is
+// established, and why the daemon refuses this client. One thread uses it. Cold.
 #pragma once
 
 #include <cstdint>
@@ -9,7 +9,7 @@
 
 namespace posed::net {
 
-// Why a daemon admits a client never, as far as the connection shows.
+// Why a daemon will never admit a client, as far as the connection shows.
 enum class Refusal : std::uint8_t {
   kNone,
   kKeyNotAllowed,   // the key is not on the daemon's list, or lacks the right
@@ -17,7 +17,7 @@ enum class Refusal : std::uint8_t {
   kHangsUp,         // the server's key is not the daemon's, or the daemon just ended
   kWantsKey,        // the daemon uses keys, and this client none
   kOtherSocket,     // the socket there is of another kind, such as control's for a subscriber
-  kHangsUpKeyless,  // one of the last two
+  kHangsUpKeyless,  // kWantsKey or kOtherSocket
 };
 
 class LinkMonitor {
@@ -26,11 +26,11 @@ class LinkMonitor {
   // uses CURVE.
   [[nodiscard]] static Result<LinkMonitor> open(void* context, void* socket, bool with_key);
 
-  [[nodiscard]] void* socket() const noexcept { return monitor_.get(); }  // to wait for news
+  [[nodiscard]] void* socket() const noexcept { return monitor_.get(); }  // readable: events wait
 
-  // Takes the news until a refusal is among them.
-  [[nodiscard]] Refusal take_news();
-  // As of the last call of take_news(): whether the connection stands, and how often one has ended.
+  // Handles the events that wait, up to the first refusal, and returns it; kNone: none refuses.
+  [[nodiscard]] Refusal next_refusal();
+  // As of the last next_refusal(): whether the connection stands, and how often one has ended.
   [[nodiscard]] bool established() const noexcept { return established_; }
   [[nodiscard]] std::uint64_t ends() const noexcept { return ends_; }
 
@@ -41,8 +41,8 @@ class LinkMonitor {
   bool with_key_;
   bool established_ = false;
   std::uint64_t ends_ = 0;
-  int hang_ups_ = 0;           // in a row, before the handshake
-  bool failure_told_ = false;  // libzmq has told why the handshake of this connection failed
+  int hang_ups_ = 0;            // in a row, before the handshake
+  bool failure_known_ = false;  // libzmq has reported why this connection's handshake failed
 };
 
 }  // namespace posed::net

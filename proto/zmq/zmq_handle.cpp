@@ -86,8 +86,8 @@ Result<> connect_socket(void* socket, const std::string& endpoint) {
                 "; an endpoint reads like tcp://127.0.0.1:5570");
 }
 
-// Asking for events handles the commands of libzmq's I/O thread, whenever it last did so.
-void hear_peers(void* socket) noexcept {
+// Reading ZMQ_EVENTS makes libzmq process pending commands from its I/O thread.
+void update_peers(void* socket) noexcept {
   int events = 0;
   std::size_t size = sizeof events;
   (void)zmq_getsockopt(socket, ZMQ_EVENTS, &events, &size);

@@ -44,7 +44,7 @@ class Message {
   }
   [[nodiscard]] bool more() const noexcept { return zmq_msg_more(&message_) != 0; }
   [[nodiscard]] std::string_view text() const noexcept {
-    // libzmq's function only reads, but takes no const pointer
+    // libzmq's function only reads, but accepts no const pointer
     auto* raw = const_cast<zmq_msg_t*>(&message_);
     return {static_cast<const char*>(zmq_msg_data(raw)), zmq_msg_size(raw)};
   }
@@ -69,19 +69,20 @@ class Message {
 [[nodiscard]] Result<> set_option(void* socket, int option, int value);
 [[nodiscard]] Result<> set_option(void* socket, int option, std::string_view value);
 
-// False for tcp://HOST:99999: libzmq takes the port modulo 65536, and would use another one without
-// a word.
+// False for tcp://HOST:99999: libzmq reduces the port modulo 65536 and would silently use another
+// one.
 [[nodiscard]] bool has_possible_port(std::string_view endpoint) noexcept;
 
 // Binds and returns the endpoint that is really bound ("tcp://127.0.0.1:*" picks a free port). If
 // the port is busy, the error says so in one sentence.
 [[nodiscard]] Result<std::string> bind_socket(void* socket, const std::string& endpoint);
-// Connects now or as soon as somebody listens there, and again after a loss, also a silent one.
+// Connects now or as soon as somebody listens there, and connects again after a loss, which
+// keep-alive packets detect where the peer vanished silently.
 [[nodiscard]] Result<> connect_socket(void* socket, const std::string& endpoint);
 
-// Lets the socket hear at once what its peers have read. A busy socket hears it once a millisecond,
-// and takes a peer that reads many messages meanwhile for one that reads none.
-void hear_peers(void* socket) noexcept;
+// Makes the socket learn at once what its peers have read. A busy socket otherwise learns it once a
+// millisecond, and mistakes a peer that is reading for one that is not.
+void update_peers(void* socket) noexcept;
 
 // Returns whether libzmq accepted the part; never blocks.
 [[nodiscard]] bool send_part(void* socket, std::string_view bytes, bool more) noexcept;

@@ -7,10 +7,10 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "models/feet/feet_type.hpp"
+#include "models/feet/feet_stage.hpp"
 #include "models/gp/synthetic.hpp"
 #include "models/motion/synthetic_walker.hpp"
-#include "models/style/style_filter.hpp"
+#include "models/style/live/style_filter.hpp"
 #include "proto/clip/clip.hpp"
 #include "tests/bench/bench.hpp"
 #include "tests/bench/cpu_time.hpp"

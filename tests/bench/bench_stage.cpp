@@ -26,7 +26,7 @@
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/emulate/emulated_device.hpp"
 #include "models/motion/synthetic_walker.hpp"
-#include "models/style/style_type.hpp"
+#include "models/style/live/style_type.hpp"
 #include "tests/bench/bench.hpp"
 
 namespace posed::bench {

@@ -14,7 +14,6 @@
 #include "models/motion/synthetic_walker.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/clip/clip.hpp"
-#include "proto/clip/reader.hpp"
 #include "proto/log/reader.hpp"
 #include "tests/e2e/outcome.hpp"
 #include "tests/e2e/served.hpp"

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "models/motion/synthetic_walker.hpp"
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
 #include "tests/e2e/logged_frames.hpp"
 #include "tests/e2e/outcome.hpp"
 #include "tests/e2e/served.hpp"

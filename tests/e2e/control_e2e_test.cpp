@@ -33,8 +33,8 @@ TEST_CASE("ctl changes a running daemon and reports from which frame on") {
   CHECK(has(foreign.err, "walk.bvh"));
   CHECK(ctl({"set", "walker", "alpha", "fast"}).code == 2);
   CHECK(ctl({"set", "walker", "beta", "1"}).code == 2);
-  CHECK(ctl({"set", "walker", "style.calibrate", "true"}).code == 0);
-  CHECK(ctl({"set", "walker", "calibrate", "1"}).code == 2);
+  CHECK(ctl({"set", "walker", "style.gate", "true"}).code == 0);
+  CHECK(ctl({"set", "walker", "gate", "1"}).code == 2);
   const auto absent = ctl({"play", "walker", "g"});
   CHECK(absent.code == 1);
   CHECK(has(absent.err, "[stream.generate]"));

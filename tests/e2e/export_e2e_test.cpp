@@ -18,7 +18,7 @@ namespace posed::test {
 namespace {
 
 // Any log; this one holds streams "a" and "b".
-std::string staged_log() { return golden("replay/staged-3.plog").string(); }
+std::string staged_log() { return golden("replay/staged.plog").string(); }
 
 }  // namespace
 

@@ -11,7 +11,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/log/reader.hpp"
 #include "tests/e2e/stage.hpp"

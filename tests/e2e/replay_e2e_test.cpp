@@ -74,7 +74,7 @@ TEST_CASE("a replay keeps the recording's own timing and publishes as the run di
 TEST_CASE("one wrong time in a log does not stop a timed replay: it is skipped and reported") {
   const TempFolder folder;
   const std::string log = staged_log(folder);
-  run_sql(log, "UPDATE chunk SET arrival_ns = arrival_ns + 86400000000000 WHERE id = 20");
+  forge(log, "UPDATE chunk SET arrival_ns = arrival_ns + 86400000000000 WHERE id = 20");
   const ProgramOutcome paced =
       posed({"replay", log, "--out", (folder.path() / "paced.bin").string()});
   INFO(paced.err);
@@ -91,7 +91,7 @@ TEST_CASE("one wrong time in a log does not stop a timed replay: it is skipped a
 TEST_CASE("a row that does not match its checksum ends a replay, with log, table and row") {
   const TempFolder folder;
   const auto log = folder.path() / "staged.plog";
-  std::filesystem::copy_file(golden("replay/staged-3.plog"), log);
+  std::filesystem::copy_file(golden("replay/staged.plog"), log);
   run_sql(log, "UPDATE chunk SET arrival_ns = arrival_ns + 1 WHERE id = 20");
   const ProgramOutcome replay = posed({"replay", log.string(), "--speed", "max"});
   CHECK(replay.code == 1);

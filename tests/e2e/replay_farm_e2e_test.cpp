@@ -28,9 +28,11 @@ struct KeptLogs {
   std::string bad = folder.write("bad.plog", "no log").string();
 
   KeptLogs() {
-    for (const char* name : {"staged.plog", "feet.plog", "staged-3.plog"}) {
+    for (const auto& [name, log] : {std::pair("staged.plog", "replay/staged.plog"),
+                                    {"feet.plog", "replay/feet.plog"},
+                                    {"staged-again.plog", "replay/staged.plog"}}) {
       good.push_back((folder.path() / name).string());
-      std::filesystem::copy_file(golden(std::string("replay/") + name), good.back());
+      std::filesystem::copy_file(golden(log), good.back());
     }
   }
 };

@@ -6,7 +6,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
 #include "proto/clip/clip.hpp"
 #include "tests/e2e/stage.hpp"
 #include "tests/support/has.hpp"

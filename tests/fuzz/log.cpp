@@ -16,7 +16,7 @@
 #include "daemon/replay/replay.hpp"
 #include "drivers/template_mocap/protocol.hpp"
 #include "models/gesture/model_file.hpp"
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
 #include "posed/v1/log.pb.h"
 #include "proto/log/digest.hpp"
 #include "proto/log/reader.hpp"
@@ -103,7 +103,7 @@ class FuzzedLog {
     if (input_.ConsumeBool()) {
       add(R"({"stage":"style","model":")" + hash() + R"(","parameters":{"alpha":)" + number() +
           R"(,"alpha_slew_per_s":)" + number() + R"(,"gate":true,"gate_fallback":)" + number() +
-          R"(,"calibrate":true}})");
+          "}}");
     }
     if (input_.ConsumeBool()) {
       add(R"({"stage":"generate","model":")" + hash() + R"(","parameters":{"lag_frames":)" +

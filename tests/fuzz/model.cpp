@@ -6,7 +6,7 @@
 #include <span>
 #include <string>
 
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
 #include "tests/fuzz/model_envelope.hpp"
 
 namespace {

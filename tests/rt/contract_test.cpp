@@ -16,7 +16,6 @@
 #include "drivers/options.hpp"
 #include "drivers/transport/transport_factory.hpp"
 #include "models/feet/feet_stage.hpp"
-#include "models/feet/feet_type.hpp"
 #include "models/gesture/synthetic_signer.hpp"
 #include "models/gp/synthetic.hpp"
 #include "models/motion/synthetic_walker.hpp"
@@ -25,6 +24,7 @@
 #include "tests/rt/check_no_breach.hpp"
 #include "tests/rt/contract.hpp"
 #include "tests/rt/rig.hpp"
+#include "tests/support/parameter_index.hpp"
 #include "tests/support/quiet_record_sink.hpp"
 #include "tests/support/stage_commands.hpp"
 #include "tests/support/synthetic_arms.hpp"
@@ -134,7 +134,7 @@ TEST_CASE("a styled body whose feet stand keeps the real-time contract", "[rt]")
   rig.start();
   REQUIRE(rig.take_frames(200) == 200);
   rig.command({.change = {.kind = pipeline::StageChange::Kind::kSet,
-                          .index = feet::FeetStage::kRoot,
+                          .index = test::parameter_index(feet::feet_type(), "root"),
                           .type = &feet::feet_type(),
                           .value = static_cast<double>(feet::RootMode::kStride)},
                .ticket = 1});

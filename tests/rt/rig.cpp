@@ -4,7 +4,7 @@
 #include <chrono>
 
 #include "daemon/system/clock.hpp"
-#include "models/feet/feet_type.hpp"
+#include "models/feet/feet_stage.hpp"
 #include "tests/rt/contract.hpp"
 
 namespace posed::rt {

@@ -10,7 +10,7 @@
 #include "daemon/pipeline/reader.hpp"
 #include "daemon/pipeline/worker.hpp"
 #include "models/generate/bound_model.hpp"
-#include "models/style/style_filter.hpp"
+#include "models/style/live/style_filter.hpp"
 
 namespace posed::rt {
 

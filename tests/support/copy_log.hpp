@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "proto/log/files.hpp"
+#include "proto/log/schema.hpp"
 
 namespace posed::test {
 

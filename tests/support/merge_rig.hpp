@@ -14,7 +14,6 @@
 
 #include "models/merge/hand_map.hpp"
 #include "models/merge/merge_stage.hpp"
-#include "models/merge/merge_type.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/rotation.hpp"

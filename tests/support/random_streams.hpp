@@ -7,7 +7,7 @@
 #include <string>
 
 #include "models/gesture/model_file.hpp"
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
 #include "tests/support/dice.hpp"
 #include "tests/support/virtual_daemon.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"

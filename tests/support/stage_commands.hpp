@@ -10,18 +10,18 @@
 #include "daemon/pipeline/stream_settings.hpp"
 #include "models/generate/bound_model.hpp"
 #include "models/generate/generate_stage.hpp"
-#include "models/generate/generate_type.hpp"
 #include "models/gesture/play_order.hpp"
-#include "models/hand/constrain_type.hpp"
-#include "models/style/style_filter.hpp"
-#include "models/style/style_type.hpp"
+#include "models/hand/constrain_stage.hpp"
+#include "models/style/live/style_filter.hpp"
+#include "models/style/live/style_type.hpp"
+#include "tests/support/parameter_index.hpp"
 
 namespace posed::test {
 
 inline pipeline::Command alpha_command(std::uint32_t stream, double alpha,
                                        std::uint64_t ticket = 0) {
   return {.change = {.kind = pipeline::StageChange::Kind::kSet,
-                     .index = style::StyleFilter::kAlpha,
+                     .index = parameter_index(style::style_type(), "alpha"),
                      .type = &style::style_type(),
                      .value = alpha},
           .stream = stream,

@@ -6,9 +6,9 @@
 
 #include "drivers/options.hpp"
 #include "drivers/template_mocap/protocol.hpp"
-#include "models/generate/generate_type.hpp"
-#include "models/style/style_model.hpp"
-#include "models/style/style_type.hpp"
+#include "models/generate/generate_stage.hpp"
+#include "models/style/live/style_type.hpp"
+#include "models/style/model/style_model.hpp"
 #include "tests/support/dice.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/support/virtual_daemon.hpp"

@@ -11,9 +11,9 @@
 #include "drivers/glove/glove_emulator.hpp"
 #include "drivers/options.hpp"
 #include "models/gesture/model_file.hpp"
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
 #include "proto/clip/clip.hpp"
-#include "proto/clip/text_clip.hpp"
+#include "proto/clip/device_clip.hpp"
 #include "tests/support/stage_commands.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/support/virtual_daemon.hpp"
@@ -74,19 +74,19 @@ VirtualStream walking_stream(const std::string& name, double length_s, unsigned 
   const auto path = folder.path() / "walk.bvh";
   const int frames = static_cast<int>(length_s * kWalkRate_hz);
   REQUIRE(clip::write_bvh(toy_walk(frames, kWalkRate_hz, 0.4), path));
-  const auto walk = clip::open_text_clip(path);
+  const auto walk = clip::open_device_clip(path);
   REQUIRE(walk);
   VirtualStream stream;
   stream.name = name;
-  stream.description = drivers::find_driver("file")->describe((*walk)->description, "walk").value();
+  stream.description = drivers::find_driver("file")->describe(walk->description, "walk").value();
   stream.settings.publish_raw = true;
   stream.settings.stages = {pipeline::stage_settings(style::style_type()),
                             pipeline::stage_settings(generate::generate_type())};
   stream.model_files = {style::serialize_model(toy_model(style_seed)), ""};
   stream.links.emplace_back();
-  for (std::size_t i = 0; i < (*walk)->frames.size(); ++i) {
+  for (std::size_t i = 0; i < walk->frames.size(); ++i) {
     stream.links[0].chunks.push_back({.at_s = static_cast<double>(i) / kWalkRate_hz,
-                                      .bytes = std::string((*walk)->frames[i]) + "\n"});
+                                      .bytes = walk->frames[i]});
   }
   return stream;
 }

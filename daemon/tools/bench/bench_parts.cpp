@@ -11,8 +11,8 @@
 #include "daemon/system/process.hpp"
 #include "models/gp/synthetic.hpp"
 #include "models/motion/synthetic_walker.hpp"
-#include "models/style/style_model.hpp"
-#include "models/style/style_type.hpp"
+#include "models/style/live/style_type.hpp"
+#include "models/style/model/style_model.hpp"
 
 namespace posed::tools {
 

@@ -6,22 +6,16 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/clip/format.hpp"
+#include "proto/clip/text.hpp"
+
 namespace posed::tools {
 namespace {
 
+using clip::has_line;
+
 constexpr std::size_t kEnough = 64 * 1024;  // bytes
 constexpr std::size_t kKeyLength = 40;      // characters of Z85
-
-// Whether a line of the text begins with `start`, after blanks.
-bool has_line(std::string_view text, std::string_view start) {
-  while (!text.empty()) {
-    const std::string_view line = text.substr(0, text.find('\n'));
-    const auto first = line.find_first_not_of(" \t");
-    if (first != std::string_view::npos && line.substr(first).starts_with(start)) return true;
-    text.remove_prefix(std::min(line.size() + 1, text.size()));
-  }
-  return false;
-}
 
 bool looks_like_key(std::string_view text) {
   while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.remove_suffix(1);
@@ -76,14 +70,11 @@ FileKind kind_of(std::string_view bytes) {
   if (bytes.starts_with("POSEDMDL")) return FileKind::kModel;
   if (bytes.starts_with("SQLite format 3")) return FileKind::kDeviceLog;
   if (looks_like_key(bytes)) return FileKind::kKey;
+  if (clip::format_of_bytes(bytes) != nullptr) return FileKind::kClip;
   if (bytes.find('\0') != std::string_view::npos) return FileKind::kOther;
   if (has_line(bytes, "[[stream]]") || has_line(bytes, "[[source]]")) return FileKind::kConfig;
   if (has_line(bytes, "[sensors]") && has_line(bytes, "driver")) return FileKind::kCalibration;
-  if (has_line(bytes, "HIERARCHY") || has_line(bytes, ":units") || has_line(bytes, ":DEGREES") ||
-      has_line(bytes, "time_s,")) {
-    return FileKind::kClip;
-  }
-  return FileKind::kOther;
+  return has_line(bytes, ":units") ? FileKind::kClip : FileKind::kOther;  // the skeleton of an AMC
 }
 
 Result<> expect_kind(const std::filesystem::path& path, FileKind wanted, std::string_view stream) {

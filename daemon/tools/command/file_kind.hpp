@@ -14,7 +14,7 @@ enum class FileKind : std::uint8_t {
   kModel,        // M.style or H.gesture
   kCalibration,  // TOML with a [sensors] table
   kConfig,       // TOML with [[stream]] tables
-  kClip,         // BVH, ASF, AMC or a hand's CSV
+  kClip,         // of any format of proto/clip/format.hpp, or an AMC's skeleton
   kDeviceLog,
   kKey,    // CURVE key, secret or public
   kOther,  // none of these

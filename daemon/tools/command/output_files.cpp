@@ -7,18 +7,23 @@
 
 #include <CLI/CLI.hpp>
 
-#include "proto/clip/file_names.hpp"
+#include "proto/clip/format.hpp"
 
 namespace posed::tools {
 namespace {
 
 namespace fs = std::filesystem;
 
-// Extensions of formats that posed or other programs recognise.
-constexpr std::array<std::string_view, 24> kFormats{
-    ".bvh",  ".amc", ".asf",  ".csv",  ".style", ".gesture", ".toml", ".lab",
-    ".plog", ".svg", ".dot",  ".gv",   ".txt",   ".json",    ".bin",  ".key",
-    ".pub",  ".glb", ".vrma", ".mcap", ".png",   ".mp4",     ".html", ".jsonl"};
+// Extensions of formats other than clips that posed or other programs recognise.
+constexpr std::array<std::string_view, 19> kOtherFormats{
+    ".asf",  ".style", ".gesture", ".toml", ".lab",  ".plog", ".svg", ".dot",  ".gv",   ".txt",
+    ".json", ".bin",   ".key",     ".pub",  ".mcap", ".png",  ".mp4", ".html", ".jsonl"};
+
+bool is_of_known_format(const fs::path& path) {
+  const std::string extension = clip::extension_of(path);
+  return clip::format_of(path) != nullptr ||
+         std::ranges::find(kOtherFormats, extension) != kOtherFormats.end();
+}
 
 std::string listed(const std::vector<std::string_view>& extensions) {
   std::string text;
@@ -55,8 +60,6 @@ Result<> check_place(const fs::path& path) {
 }
 
 }  // namespace
-
-bool is_amc(const fs::path& path) { return clip::extension_of(path) == ".amc"; }
 
 CLI::Option* add_overwrite_option(CLI::App& command, bool& overwrite) {
   return command.add_flag("--overwrite", overwrite, "Replace files that are there already");
@@ -106,7 +109,7 @@ Result<> OutputFiles::check() const {
 Result<> OutputFiles::check(const Output& output) const {
   const std::string extension = clip::extension_of(output.path);
   const bool right = std::ranges::find(output.extensions, extension) != output.extensions.end();
-  const bool other = std::ranges::find(kFormats, extension) != kFormats.end();
+  const bool other = is_of_known_format(output.path);
   if (!right && (output.strict || other)) {
     return misuse("does not end in " + listed(output.extensions) + "; choose such a name",
                   output.path.string());

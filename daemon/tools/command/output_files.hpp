@@ -17,9 +17,6 @@ class Option;
 
 namespace posed::tools {
 
-// Whether the file's name says that it is AMC, which needs a skeleton (.asf).
-[[nodiscard]] bool is_amc(const std::filesystem::path& path);
-
 // Adds `--overwrite`.
 CLI::Option* add_overwrite_option(CLI::App& command, bool& overwrite);
 

@@ -13,7 +13,7 @@
 #include "daemon/config/take_tables.hpp"
 #include "daemon/system/realtime.hpp"
 #include "drivers/transport/udp.hpp"
-#include "proto/log/open_whole.hpp"
+#include "proto/log/reader.hpp"
 #include "proto/model/model_file.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/zmq/keys.hpp"
@@ -351,9 +351,8 @@ Check check_logs(Config config) {
   for (fs::directory_iterator entry(config->record->folder, failed), end; !failed && entry != end;
        entry.increment(failed)) {
     if (entry->path().extension() != ".plog") continue;
-    const auto format = log::format_of(entry->path());
-    if (!format) {
-      return wrong(name, format.error().text(),
+    if (const auto readable = log::check_format(entry->path()); !readable) {
+      return wrong(name, readable.error().text(),
                    "move it out of " + shown(config->record->folder) + ", or update posed");
     }
     ++count;

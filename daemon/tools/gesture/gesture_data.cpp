@@ -7,7 +7,7 @@
 #include "models/gesture/body_recording.hpp"
 #include "models/gesture/questions.hpp"
 #include "models/gesture/train.hpp"
-#include "proto/clip/file_names.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/clip/label_file.hpp"
 #include "proto/frame/label.hpp"
@@ -22,7 +22,7 @@ void print_warnings(const std::string& file, const std::vector<std::string>& war
 }
 
 Result<clip::Clip> read_body(const std::string& file, const clip::ReadOptions& read) {
-  auto clip = clip::read_clip(file, read);
+  auto clip = clip::read_clip(file, clip::accepted_options(file, read));
   if (clip) print_warnings(file, clip->warnings);
   return clip;
 }
@@ -71,8 +71,9 @@ Result<> read_hands(const GestureSources& sources, GestureData& data) {
   for (const std::string& file : sources.clips) {
     auto recording = read_hand(file, sources.rate_hz, sources.read);
     if (!recording) {
-      const bool table = clip::extension_of(file) == ".csv";
-      if (!table) recording.error().message += "; to learn from the whole body, add --body";
+      const clip::Format* format = clip::format_of(file);
+      if (format == nullptr || !format->is_hand)
+        recording.error().message += "; to learn from the whole body, add --body";
       return std::unexpected(recording.error());
     }
     data.recordings.push_back(std::move(*recording));
@@ -206,7 +207,7 @@ Result<std::vector<gesture::Recording>> recordings_for(const gesture::GestureMod
 Result<clip::Clip> figure_of(const gesture::GestureModel& model, const std::filesystem::path& clip,
                              const clip::ReadOptions& read) {
   if (model.is_hand()) return clip::Clip{};
-  return clip::read_clip(clip, read);
+  return clip::read_clip(clip, clip::accepted_options(clip, read));
 }
 
 Result<gesture::Recording> load_recording(const std::filesystem::path& clip,

@@ -13,8 +13,8 @@
 
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/picture/figure.hpp"
-#include "models/gesture/apart.hpp"
 #include "models/gesture/pose_channels.hpp"
+#include "models/gesture/pose_distance.hpp"
 #include "models/gesture/train.hpp"
 #include "models/motion/naturalness.hpp"
 #include "models/perform/body_performance.hpp"

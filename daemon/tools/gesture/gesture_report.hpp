@@ -10,9 +10,9 @@
 
 #include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/report/gesture_sections.hpp"
-#include "models/gesture/drawn_tree.hpp"
 #include "models/gesture/gesture_model.hpp"
 #include "models/gesture/recording.hpp"
+#include "models/gesture/tree_drawing.hpp"
 #include "models/trajectory/state_information.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/frame/result.hpp"

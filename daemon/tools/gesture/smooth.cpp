@@ -15,6 +15,7 @@
 #include "daemon/tools/command/progress.hpp"
 #include "models/gesture/model_file.hpp"
 #include "models/smooth/live_smoother.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
@@ -161,7 +162,9 @@ Result<> smooth(const SmoothOptions& options) {
 void add_smooth(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("smooth", "Smooth a recorded hand as the live stage would");
   auto options = std::make_shared<SmoothOptions>();
-  command->add_option("in", options->in, "The hand: .csv, or a .bvh with finger joints")
+  command
+      ->add_option("in", options->in,
+                   "The hand, or a body with finger joints: " + clip::listed(clip::Use::kRead))
       ->required()
       ->type_name("IN");
   command->add_option("--out", options->out, "The hand CSV to write")

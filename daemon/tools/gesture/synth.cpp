@@ -17,7 +17,7 @@
 #include "models/perform/perform.hpp"
 #include "models/perform/state_duration.hpp"
 #include "proto/clip/bvh.hpp"
-#include "proto/clip/file_names.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/hand_shape.hpp"
 
@@ -61,10 +61,9 @@ Result<perform::PerformOptions> perform_options(const SynthOptions& options) {
 }
 
 Result<> write_hand(const clip::HandClip& hand, const SynthOptions& options) {
-  if (clip::extension_of(options.out) == ".csv") return clip::write_hand_csv(hand, options.out);
   const auto clip = clip::clip_of_hand(hand, options.shape);
   if (!clip) return std::unexpected(clip.error());
-  return clip::write_bvh(*clip, options.out);
+  return clip::write_clip(*clip, options.out);
 }
 
 // The states of the performance; those of a label begin with a line for it.
@@ -122,7 +121,7 @@ Result<Performed> perform_hand(const SynthOptions& options, perform::Performance
 // Writes a body's performance.
 Result<Performed> perform_body(const SynthOptions& options, const gesture::GestureModel& model,
                                const perform::Performance& performance) {
-  if (options.body.empty() || clip::extension_of(options.out) != ".bvh") {
+  if (options.body.empty() || clip::format_of(options.out)->is_hand) {
     return misuse(
         "the model is of a body; name a clip of the body that performs and a BVH to "
         "write: --body TAKE.bvh --out OUT.bvh",
@@ -132,7 +131,7 @@ Result<Performed> perform_body(const SynthOptions& options, const gesture::Gestu
   if (!body) return std::unexpected(body.error());
   const auto performed = perform::perform_on(model, performance, *body);
   if (!performed) return std::unexpected(performed.error());
-  if (auto written = clip::write_bvh(performed->clip, options.out); !written) {
+  if (auto written = clip::write_clip(performed->clip, options.out); !written) {
     return std::unexpected(written.error());
   }
   const double off_cm = 100.0 * performed->feet_off_m;
@@ -144,7 +143,7 @@ Result<Findings> synth(const SynthOptions& options) {
   const auto files = OutputFiles(options.overwrite)
                          .reads(options.model)
                          .reads(options.body)
-                         .writes(options.out, {".csv", ".bvh"})
+                         .writes(options.out, clip::extensions(clip::Use::kWrite))
                          .check();
   if (!files) return std::unexpected(files.error());
   const auto perform_as = perform_options(options);
@@ -204,7 +203,8 @@ void add_synth(CLI::App& app, int& exit_code) {
                     "Restore the range of motion that averaging reduces");
   command->add_flag("--unconstrained", options->unconstrained,
                     "Leave out joint limits and collisions: the model's bare trajectory");
-  command->add_option("--out", options->out, "Where to write: .csv or .bvh")->required();
+  command->add_option("--out", options->out, "To write: " + clip::listed(clip::Use::kWrite))
+      ->required();
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {

@@ -44,7 +44,7 @@ Received DaemonSocket::receive(net::Message& first, net::Message& second) noexce
 }
 
 std::string DaemonSocket::refusal() {
-  return net::refusal_words(monitor_.take_news(), domain_, peer_.server_key);
+  return net::refusal_words(monitor_.next_refusal(), domain_, peer_.server_key);
 }
 
 }  // namespace posed::link

@@ -7,7 +7,7 @@
 #include "daemon/tools/command/paint.hpp"
 #include "daemon/tools/picture/braille.hpp"
 #include "models/motion/motion.hpp"
-#include "models/style/style_filter.hpp"
+#include "models/style/live/style_filter.hpp"
 #include "posed/v1/control.pb.h"
 #include "posed/v1/posed.pb.h"
 #include "proto/message/skeleton_message.hpp"

@@ -27,7 +27,7 @@
 #include "drivers/glove/load_calibration.hpp"
 #include "models/gesture/play_order.hpp"
 #include "models/stages/registry.hpp"
-#include "models/style/style_type.hpp"
+#include "models/style/live/style_type.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
 #include "proto/text/clean.hpp"

@@ -1,5 +1,5 @@
-// `posed convert`: converts a clip to another format, a stream of a device log to a clip, a whole
-// log to MCAP, or a log of an older format to today's.
+// `posed convert`: converts a clip to another format, a stream of a device log to a clip, or a
+// whole log to MCAP.
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -8,7 +8,6 @@
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 
-#include "daemon/replay/log_upgrade.hpp"
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/findings.hpp"
@@ -17,11 +16,8 @@
 #include "daemon/tools/command/progress.hpp"
 #include "daemon/tools/export/log_clip.hpp"
 #include "daemon/tools/export/log_mcap.hpp"
-#include "models/motion/vrm_animation.hpp"
-#include "proto/clip/clip.hpp"
-#include "proto/clip/file_names.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/clip/frames_clip.hpp"
-#include "proto/clip/gltf.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
@@ -92,113 +88,93 @@ struct Convert {
   std::string in;
   std::string out;
   clip::ReadOptions read;
-  double metres_per_unit = 0.0;  // 0: not given
-  std::string hand;              // "left", "right" or not given
-  std::string stream;            // of a log; empty: the only one
-  std::string take;              // of a log, a number or a name; empty: all
-  bool takes = false;            // list those of a log
+  std::string hand;    // "left", "right" or not given
+  std::string stream;  // of a log; empty: the only one
+  std::string take;    // of a log, a number or a name; empty: all
+  bool takes = false;  // list those of a log
   bool overwrite = false, json = false;
-  bool rate_given = false, shape_given = false;
+  bool shape_given = false;
 };
 
-bool ends_in(const std::string& path, const std::string& extension) {
-  return clip::extension_of(path) == extension;
+bool is_log(const std::string& path) { return clip::extension_of(path) == ".plog"; }
+bool is_mcap(const std::string& path) { return clip::extension_of(path) == ".mcap"; }
+bool is_hand(const std::string& path) {
+  const clip::Format* format = clip::format_of(path);
+  return format != nullptr && format->is_hand;
 }
+bool holds_gaps(const std::string& path) { return clip::format_of(path)->holds_gaps; }
 
-bool is_hand_csv(const std::string& path) { return ends_in(path, ".csv"); }
-bool is_log(const std::string& path) { return ends_in(path, ".plog"); }
-bool is_mcap(const std::string& path) { return ends_in(path, ".mcap"); }
-
-// An option that would have no effect for this input or output is an error.
+// Refuses options that would have no effect for this input or output. Those of a clip's format the
+// table of formats refuses, when the clip is read.
 Result<> check_options(const Convert& convert) {
   const auto useless = [&](bool given, bool means_something, const char* what) -> Result<> {
     if (!given || means_something) return {};
     return misuse(what, convert.in);
   };
-  const bool csv_in = is_hand_csv(convert.in);
-  const bool bvh_in = ends_in(convert.in, ".bvh");
-  const bool to_csv = is_hand_csv(convert.out);
+  const bool of_log = is_log(convert.in);
+  const bool reads_clip_options = !convert.read.skeleton.empty() || !convert.read.profile.empty() ||
+                                  convert.read.rate_hz || convert.read.metres_per_unit;
   for (const auto& checked :
-       {useless(!convert.stream.empty(), is_log(convert.in),
+       {useless(!convert.stream.empty(), of_log,
                 "is not a device log (.plog), so --stream has no effect"),
-        useless(!convert.take.empty(), is_log(convert.in),
+        useless(!convert.take.empty(), of_log,
                 "is not a device log (.plog), so --take has no effect"),
-        useless(!convert.stream.empty() || !convert.take.empty(),
-                !is_mcap(convert.out) && !is_log(convert.out),
+        useless(!convert.stream.empty() || !convert.take.empty(), !is_mcap(convert.out),
                 "is written as a whole log, so --stream and --take have no effect"),
-        useless(is_mcap(convert.out) || is_log(convert.out), is_log(convert.in),
-                "is not a device log (.plog), and only a log becomes a .mcap or a newer .plog; "
-                "name a .glb"),
-        useless(!convert.read.asf.empty(), is_amc(convert.in),
-                "is not an AMC, so --skeleton has no effect"),
-        useless(convert.rate_given, is_amc(convert.in), "is not an AMC, so --rate has no effect"),
-        useless(convert.metres_per_unit != 0.0, bvh_in,
-                "is not a BVH, so --metres-per-unit has no effect"),
-        useless(!convert.read.profile.empty(), bvh_in || is_amc(convert.in),
-                "is neither a BVH nor an AMC, so --profile has no effect"),
-        useless(!convert.hand.empty(), csv_in || to_csv,
+        useless(is_mcap(convert.out), of_log,
+                "is not a device log (.plog), and only a log becomes a .mcap; name a .glb"),
+        useless(reads_clip_options, !of_log,
+                "is a device log (.plog), which says its skeleton, rate and unit; leave them out"),
+        useless(!convert.hand.empty(), is_hand(convert.in) || is_hand(convert.out),
                 "neither IN nor OUT is a hand CSV, so --hand has no effect"),
-        useless(convert.shape_given, csv_in && !to_csv,
+        useless(convert.shape_given, is_hand(convert.in) && !is_hand(convert.out),
                 "--hand-shape is for a hand CSV that becomes a figure, and has no effect here")}) {
     if (!checked) return checked;
   }
+  auto written = clip::extensions(clip::Use::kWrite);
+  written.push_back(".mcap");
   return OutputFiles(convert.overwrite)
       .reads(convert.in)
-      .reads(convert.read.asf)
-      .writes(convert.out, {".bvh", ".csv", ".glb", ".vrma", ".mcap", ".plog"})
+      .reads(convert.read.skeleton)
+      .writes(convert.out, std::move(written))
       .check();
 }
 
-bool has_even_clock(const std::string& path) { return ends_in(path, ".bvh"); }
+void warn_of_clock(const Convert& convert, clip::Clip& clip) {
+  if (clip::format_of(convert.out)->evenly_spaced &&
+      clip::has_uneven_times(clip.time_s, clip.frame_rate_hz)) {
+    clip.warnings.emplace_back(kUneven);
+  }
+}
 
-// Only a hand CSV can store gaps, and a BVH no uneven clock.
 Result<clip::Clip> read_log(const Convert& convert) {
   auto clip = clip_of_log(convert.in, convert.stream, convert.take);
-  if (!clip || is_hand_csv(convert.out)) return clip;
+  if (!clip || holds_gaps(convert.out)) return clip;
   clip::hold_missing(*clip);
-  if (has_even_clock(convert.out) && clip::has_uneven_times(clip->time_s, clip->frame_rate_hz))
-    clip->warnings.emplace_back(kUneven);
+  warn_of_clock(convert, *clip);
   return clip;
 }
 
-// A hand CSV cannot store a body.
+// The clip as OUT can hold it. A hand that becomes a figure gets its gaps filled.
 Result<clip::Clip> read(const Convert& convert) {
   if (is_log(convert.in)) return read_log(convert);
-  auto clip = clip::read_clip(convert.in, convert.read);
-  if (!clip || !is_hand_csv(convert.in) || is_hand_csv(convert.out)) return clip;
-  auto hand = clip::hand_of(*clip, convert.read);
+  clip::ReadOptions options = convert.read;
+  if (!is_hand(convert.in)) options.hand.reset();  // of a body it says which hand is written
+  auto clip = clip::read_clip(convert.in, options);
+  if (!clip || !is_hand(convert.in) || is_hand(convert.out)) return clip;
+  auto hand = clip::hand_of(*clip);
   if (!hand) return std::unexpected(hand.error());
   clip::fill_gaps(*hand);
-  if (has_even_clock(convert.out) && clip::has_uneven_times(hand->time_s, hand->rate_hz))
-    hand->warnings.emplace_back(kUneven);
-  return clip::clip_of_hand(*hand, convert.read.hand_shape);
+  auto filled = clip::clip_of_hand(*hand, convert.read.hand_shape);
+  if (filled) warn_of_clock(convert, *filled);
+  return filled;
 }
 
 Result<> write(const Convert& convert, const clip::Clip& clip) {
-  if (ends_in(convert.out, ".glb")) return clip::write_glb(clip, convert.out);
-  if (ends_in(convert.out, ".vrma")) return motion::write_vrm_animation(clip, convert.out);
-  if (!is_hand_csv(convert.out)) return clip::write_bvh(clip, convert.out);
+  if (!is_hand(convert.out)) return clip::write_clip(clip, convert.out);
   const auto hand = clip::hand_of(clip, convert.read);
   if (!hand) return std::unexpected(hand.error());
   return clip::write_hand_csv(*hand, convert.out);
-}
-
-int upgrade(const Convert& convert) {
-  const auto summary = [&] {
-    const Waiting waiting("writing " + convert.out);
-    const Interrupt interrupt;
-    return replay::upgrade_log(convert.in, convert.out, Interrupt::came);
-  }();
-  if (!summary) return report(summary.error());
-  return Findings()
-      .add("in", convert.in)
-      .add("out", convert.out)
-      .add("chunks", summary->chunks)
-      .add("decisions", summary->decisions)
-      .add("frames", summary->frames)
-      .note(fmt::format("wrote {} in today's format: {} chunks, {} decisions", convert.out,
-                        summary->chunks, summary->decisions))
-      .show(convert.json, -1);
 }
 
 int run(Convert& convert) {
@@ -214,8 +190,6 @@ int run(Convert& convert) {
   }
   if (auto ok = check_options(convert); !ok) return report(ok.error());
   if (is_mcap(convert.out)) return convert_to_mcap(convert.in, convert.out, convert.json);
-  if (is_log(convert.out)) return upgrade(convert);
-  if (convert.metres_per_unit != 0.0) convert.read.metres_per_unit = convert.metres_per_unit;
   if (!convert.hand.empty()) {
     convert.read.hand = side_named(convert.hand);
   }
@@ -245,18 +219,19 @@ void add_convert(CLI::App& app, int& exit_code) {
   CLI::App* command =
       app.add_subcommand("convert", "Write a clip, a log's stream or a log in another format");
   auto convert = std::make_shared<Convert>();
-  command->add_option("IN", convert->in, "To read: .bvh, .amc, a hand as .csv, or a log (.plog)")
+  command
+      ->add_option("IN", convert->in,
+                   "To read: " + clip::listed(clip::Use::kRead) + "; or a log (.plog)")
       ->required();
   auto* out = command->add_option(
       "--out", convert->out,
-      "To write: .bvh, .csv of a hand, .glb, .vrma; of a whole log .mcap or .plog");
-  command->add_option("--skeleton", convert->read.asf,
+      "To write: " + clip::listed(clip::Use::kWrite) + "; of a whole log a .mcap");
+  command->add_option("--skeleton", convert->read.skeleton,
                       "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
-  auto* rate =
-      command->add_option("--rate", convert->read.amc_rate_hz, "Frames per second of an AMC");
-  rate->capture_default_str();
+  command->add_option("--rate", convert->read.rate_hz,
+                      "Frames per second of an AMC, which does not say (default: 120)");
   command
-      ->add_option("--metres-per-unit", convert->metres_per_unit,
+      ->add_option("--metres-per-unit", convert->read.metres_per_unit,
                    "Unit of a BVH (default: the profile's, else by the figure's height)")
       ->check(in_range(1e-6, 1e6));
   command->add_option("--profile", convert->read.profile,
@@ -288,9 +263,7 @@ void add_convert(CLI::App& app, int& exit_code) {
       "centimetres.\n"
       "A .glb is glTF: the figure as an armature, for Blender and game engines. A .vrma moves any\n"
       "VRM avatar and needs a person's bones. Both keep the clip's times. A .mcap has pose/,\n"
-      "skeleton/ and sensor/ of all streams of a log, with the protobuf schema, in UTC. A .plog "
-      "of\n"
-      "an older posed becomes one of this posed's format, and replays with the same bits.\n\n"
+      "skeleton/ and sensor/ of all streams of a log, with the protobuf schema, in UTC.\n\n"
       "Examples:\n"
       "  posed convert 07_01.amc --out walk.bvh\n"
       "  posed convert take.amc --skeleton actor.asf --rate 60 --out take.bvh\n"
@@ -299,10 +272,8 @@ void add_convert(CLI::App& app, int& exit_code) {
       "  posed convert take1.plog --takes\n"
       "  posed convert take1.plog --take 2 --stream walker --out walker-2.bvh\n"
       "  posed convert walk.bvh --out walk.vrma\n"
-      "  posed convert take1.plog --out take1.mcap\n"
-      "  posed convert old.plog --out new.plog");
-  command->callback([convert, rate, shape, &exit_code] {
-    convert->rate_given = rate->count() > 0;
+      "  posed convert take1.plog --out take1.mcap");
+  command->callback([convert, shape, &exit_code] {
     convert->shape_given = shape->count() > 0;
     exit_code = run(*convert);
   });

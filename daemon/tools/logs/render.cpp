@@ -21,8 +21,7 @@
 #include "daemon/tools/picture/picture_file.hpp"
 #include "daemon/tools/picture/strip.hpp"
 #include "models/motion/motion.hpp"
-#include "proto/clip/clip.hpp"
-#include "proto/clip/file_names.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/hand_skeleton.hpp"
@@ -75,7 +74,7 @@ Result<> check_render(const RenderArguments& options) {
   }
   return OutputFiles(options.overwrite)
       .reads(options.in)
-      .reads(options.read.asf)
+      .reads(options.read.skeleton)
       .writes(options.out, {".svg", ".png", ".mp4"})
       .check();
 }
@@ -88,10 +87,17 @@ Result<clip::Clip> as_hand(const clip::Clip& clip, const clip::ReadOptions& read
   return clip::clip_of_hand(*hand, read.hand_shape);
 }
 
+// --hand of a body says which of its hands is drawn, once it is read.
+clip::ReadOptions in_options(const RenderArguments& options) {
+  clip::ReadOptions read = options.read;
+  if (!clip::accepts(options.in, clip::ReadOption::kHand)) read.hand.reset();
+  return read;
+}
+
 Result<clip::Clip> read_motion(const RenderArguments& options, const std::string& stream) {
   const Waiting waiting("reading " + options.in);
   auto clip = reads_log(options) ? clip_of_log(options.in, stream, options.take)
-                                 : clip::read_clip(options.in, options.read);
+                                 : clip::read_clip(options.in, in_options(options));
   if (clip && clip->skeleton->joint_of(Bone::kHips) < 0 && !hand_side(*clip->skeleton)) {
     if (auto hand = as_hand(*clip, options.read)) clip = std::move(hand);
   }
@@ -275,7 +281,9 @@ Result<> run_render(const RenderArguments& options) {
 void add_render(CLI::App& app, int& exit_code) {
   CLI::App* command = app.add_subcommand("render", "Draw a clip or a log's stream: strip or video");
   auto options = std::make_shared<RenderArguments>();
-  command->add_option("IN", options->in, "To draw: .bvh, .amc, a hand as .csv, or a log (.plog)")
+  command
+      ->add_option("IN", options->in,
+                   "To draw: " + clip::listed(clip::Use::kRead) + "; or a log (.plog)")
       ->required();
   command->add_option("--out", options->out, "To write: .svg or .png; .mp4 with --video")
       ->required();
@@ -303,7 +311,7 @@ void add_render(CLI::App& app, int& exit_code) {
   command->add_option("--stream", options->stream,
                       "Which of a log's streams (default: the only one)");
   command->add_option("--take", options->take, "Only this take of a log: its number or its name");
-  command->add_option("--skeleton", options->read.asf,
+  command->add_option("--skeleton", options->read.skeleton,
                       "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
   command->add_option("--profile", options->read.profile,
                       "Skeleton profile (default: found by the joints' names)");

@@ -13,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "proto/clip/file_names.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"

@@ -23,7 +23,7 @@
 #include "daemon/tools/export/log_clip.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/frames_clip.hpp"
-#include "proto/log/files.hpp"
+#include "proto/log/schema.hpp"
 
 namespace posed::tools {
 namespace {

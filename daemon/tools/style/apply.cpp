@@ -1,4 +1,4 @@
-// `posed apply`: sends a clip through the style stage and writes a BVH file.
+// `posed apply`: sends a clip through the style stage and writes the styled clip.
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -17,9 +17,9 @@
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
 #include "daemon/tools/style/style_options.hpp"
-#include "models/style/apply.hpp"
-#include "models/style/walker_fit.hpp"
-#include "proto/clip/clip.hpp"
+#include "models/style/judge/walker_fit.hpp"
+#include "models/style/live/apply.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::tools {
@@ -36,7 +36,7 @@ struct ApplyArguments {
 };
 
 // Reads --alpha: a number, or "auto", which is as much as the walker does not show already.
-Result<> read_alpha(ApplyArguments& options) {
+Result<> parse_alpha(ApplyArguments& options) {
   style::FilterOptions& filter = options.apply.filter;
   filter.auto_alpha = options.alpha == "auto";
   if (filter.auto_alpha) return {};
@@ -49,7 +49,7 @@ Result<> read_alpha(ApplyArguments& options) {
 
 // Reads --gate. `--gate` alone is `--gate on`, and `--gate IN` is `--gate on IN`: CLI11 gives the
 // next word to the option.
-Result<> read_gate(ApplyArguments& options) {
+Result<> parse_gate(ApplyArguments& options) {
   if (options.gate.empty()) options.gate = "on";
   if (options.gate != "on" && options.gate != "off") {
     if (!options.in.empty()) {
@@ -63,15 +63,12 @@ Result<> read_gate(ApplyArguments& options) {
 }
 
 Result<> check_files(const ApplyArguments& options) {
-  if (!options.read.asf.empty() && !is_amc(options.in)) {
-    return misuse("--skeleton is only for an AMC; leave it out", options.in.string());
-  }
   return OutputFiles(options.overwrite)
       .reads(options.model)
       .reads(options.in)
-      .reads(options.read.asf)
+      .reads(options.read.skeleton)
       .reads(options.neutral)
-      .writes(options.out, {".bvh"})
+      .writes(options.out, clip::extensions(clip::Use::kWriteBody))
       .check();
 }
 
@@ -149,31 +146,21 @@ Findings findings_of(const ApplyArguments& options, const style::StyleModel& mod
   return findings.remark((fit.is_far() ? "warning: " : "") + judged);
 }
 
-// Measures how the walker of --neutral usually walks. A script that says --calibrate goes on
-// without, because that was good for any clip and model.
-Result<> measure_neutral(const style::StyleModel& model, bool calibrates, ApplyArguments& options) {
+// Measures how the walker of --neutral usually walks.
+Result<> measure_neutral(const style::StyleModel& model, ApplyArguments& options) {
   if (options.neutral.empty()) return {};
-  const auto neutral = clip::read_clip(options.neutral, options.read);
+  const auto neutral =
+      clip::read_clip(options.neutral, clip::accepted_options(options.neutral, options.read));
   if (!neutral) return std::unexpected(neutral.error());
   const auto walker = style::measure_walker(model, options.model.string(), *neutral);
-  if (!walker && !calibrates) return std::unexpected(walker.error());
-  if (walker) {
-    options.apply.walker = *walker;
-  } else {
-    std::fprintf(stderr, "posed: %s; --calibrate does nothing\n", walker.error().text().c_str());
-  }
+  if (!walker) return std::unexpected(walker.error());
+  options.apply.walker = *walker;
   return {};
 }
 
 Result<> run(ApplyArguments options) {
-  if (auto ok = read_gate(options); !ok) return ok;
-  if (auto ok = read_alpha(options); !ok) return ok;
-  bool calibrates = std::exchange(options.apply.filter.calibrate, false);
-  if (calibrates) {
-    std::fprintf(stderr, "posed: --calibrate is the older name of --neutral IN\n");
-    calibrates = options.neutral.empty();
-    if (calibrates) options.neutral = options.in;
-  }
+  if (auto ok = parse_gate(options); !ok) return ok;
+  if (auto ok = parse_alpha(options); !ok) return ok;
   if (auto ok = check_files(options); !ok) return ok;
   const auto model = style::load_model(options.model);
   if (!model) return std::unexpected(model.error());
@@ -193,7 +180,7 @@ Result<> run(ApplyArguments options) {
   for (const std::string& warning : clip->warnings) {
     std::fprintf(stderr, "posed: %s: %s\n", options.in.c_str(), warning.c_str());
   }
-  if (auto ok = measure_neutral(*model, calibrates, options); !ok) return ok;
+  if (auto ok = measure_neutral(*model, options); !ok) return ok;
   if (options.apply.filter.gate && !model->gate.present()) {
     std::fprintf(stderr,
                  "posed: %s: has no data for the gate, so any motion is styled; train it "
@@ -208,7 +195,7 @@ Result<> run(ApplyArguments options) {
   if (!applied) return std::unexpected(applied.error());
   const auto fit = style::fit_of_walker(*model, options.model.string(), *clip);
   if (!fit) return std::unexpected(fit.error());
-  if (auto written = clip::write_bvh(applied->clip, options.out); !written) return written;
+  if (auto written = clip::write_clip(applied->clip, options.out); !written) return written;
   bar.finish();
   findings_of(options, *model, *shares, *clip, *applied, *fit).show(options.json);
   return {};
@@ -223,8 +210,11 @@ void add_apply(CLI::App& app, int& exit_code) {
   command->add_option("--model", options->model, "What `posed train style` wrote")
       ->required()
       ->type_name("FILE.style");
-  command->add_option("in", options->in, "The clip: .bvh or .amc")->type_name("IN");
-  command->add_option("--out", options->out, "The BVH to write")->required()->type_name("OUT.bvh");
+  command->add_option("in", options->in, "The clip: " + clip::listed(clip::Use::kReadBody))
+      ->type_name("IN");
+  command->add_option("--out", options->out, "To write: " + clip::listed(clip::Use::kWriteBody))
+      ->required()
+      ->type_name("OUT.bvh");
   command
       ->add_option("--alpha", options->alpha,
                    "How much: 0 none, 1 the target, negative away; auto: as much as is missing")
@@ -235,7 +225,7 @@ void add_apply(CLI::App& app, int& exit_code) {
   command->add_option("--mask", options->mask, "Styles parts of the body less: arms=0.5,head=0")
       ->type_name("MASK");
   add_root_option(*command, options->apply.feet);
-  command->add_option("--skeleton", options->read.asf, "NN.asf of an AMC (default: beside it)")
+  command->add_option("--skeleton", options->read.skeleton, "NN.asf of an AMC (default: beside it)")
       ->type_name("NN.asf");
   command->add_flag("--cold", options->apply.cold, "Start as a live stream starts");
   command
@@ -243,9 +233,8 @@ void add_apply(CLI::App& app, int& exit_code) {
                    "on (the default) or off: fade out where the model does not know the motion")
       ->type_name("[on|off]")
       ->expected(0, 1);
-  command->add_option("--neutral", options->neutral, "How this walker usually walks: .bvh or .amc")
+  command->add_option("--neutral", options->neutral, "How this walker usually walks: a clip as IN")
       ->type_name("N.bvh");
-  command->add_flag("--calibrate", filter.calibrate, "The older name of --neutral IN");
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "Summary as one JSON object on stdout");
   command->footer(R"(Examples:

@@ -15,6 +15,7 @@
 #include "daemon/tools/command/ranks.hpp"
 #include "daemon/tools/style/natural_clips.hpp"
 #include "models/natural/compare.hpp"
+#include "proto/clip/format.hpp"
 
 namespace posed::tools {
 namespace {
@@ -103,7 +104,7 @@ Findings findings_of(const EvalNaturalOptions& options, const NaturalClips& clip
 }
 
 Result<Findings> evaluate_natural(const EvalNaturalOptions& options) {
-  if (!options.skeleton.empty() && !is_amc(options.clip)) {
+  if (!options.skeleton.empty() && !clip::accepts(options.clip, clip::ReadOption::kSkeleton)) {
     return misuse("--skeleton is only for AMC clips; leave it out");
   }
   ProgressBar bar(kQuietFor_s);
@@ -128,7 +129,7 @@ void add_eval_natural(CLI::App& eval, int& exit_code) {
   CLI::App* command = eval.add_subcommand("natural", "Whether people move as a clip does");
   command->footer(kEvalNaturalFooter);
   const auto options = std::make_shared<EvalNaturalOptions>();
-  command->add_option("clip", options->clip, "The clip to judge: .bvh, .amc or a hand's .csv")
+  command->add_option("clip", options->clip, "The clip to judge: " + clip::listed(clip::Use::kRead))
       ->required();
   command->add_option("--corpus", options->corpus, "Folder of clips of people")->required();
   command->add_option("--hand", options->hand, "left or right: judge this hand of clips of bodies")

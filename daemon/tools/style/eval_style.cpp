@@ -12,12 +12,12 @@
 #include "daemon/tools/command/progress.hpp"
 #include "daemon/tools/style/style_options.hpp"
 #include "daemon/tools/style/style_report.hpp"
-#include "models/style/apply.hpp"
-#include "models/style/evaluate.hpp"
-#include "models/style/style_model.hpp"
-#include "models/style/training_check.hpp"
-#include "models/style/walker_fit.hpp"
-#include "proto/clip/clip.hpp"
+#include "models/style/judge/evaluate.hpp"
+#include "models/style/judge/walker_fit.hpp"
+#include "models/style/live/apply.hpp"
+#include "models/style/model/style_model.hpp"
+#include "models/style/train/training_check.hpp"
+#include "proto/clip/format.hpp"
 
 namespace posed::tools {
 namespace {
@@ -56,9 +56,7 @@ struct EvalOptions {
 };
 
 Result<clip::Clip> read(const std::string& path, const std::string& skeleton) {
-  clip::ReadOptions options;
-  if (is_amc(path)) options.asf = skeleton;
-  return clip::read_clip(path, options);
+  return clip::read_clip(path, clip::accepted_options(path, {.skeleton = skeleton}));
 }
 
 struct Evaluation {
@@ -150,7 +148,9 @@ Result<> check_files(const EvalOptions& options) {
 
 Result<Evaluation> evaluate(const EvalOptions& options) {
   if (auto checked = check_files(options); !checked) return std::unexpected(checked.error());
-  if (!options.skeleton.empty() && !is_amc(options.source) && !is_amc(options.target)) {
+  const bool any = clip::accepts(options.source, clip::ReadOption::kSkeleton) ||
+                   clip::accepts(options.target, clip::ReadOption::kSkeleton);
+  if (!options.skeleton.empty() && !any) {
     return misuse("--skeleton is only for AMC clips; leave it out");
   }
   const auto model = style::load_model(options.model);

@@ -4,7 +4,7 @@
 #include <system_error>
 #include <utility>
 
-#include "proto/clip/clip.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/text/toml.hpp"
 #include "proto/text/toml_table.hpp"
 
@@ -137,9 +137,8 @@ Result<> add_target_clips(const std::vector<std::string>& arguments, const std::
 Result<std::vector<style::TrainingClip>> load_clips(const Experiment& experiment) {
   std::vector<style::TrainingClip> clips;
   for (const ExperimentClip& entry : experiment.clips) {
-    clip::ReadOptions options;
-    if (entry.file.extension() == ".amc") options.asf = experiment.asf;
-    auto clip = clip::read_clip(entry.file, options);
+    auto clip = clip::read_clip(entry.file,
+                                clip::accepted_options(entry.file, {.skeleton = experiment.asf}));
     if (!clip) return std::unexpected(clip.error());
     clips.push_back({std::move(*clip), entry.group, entry.subject, entry.motion});
   }

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "models/style/train.hpp"
+#include "models/style/train/train.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::tools {

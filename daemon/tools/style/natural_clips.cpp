@@ -6,13 +6,12 @@
 #include <utility>
 
 #include "daemon/tools/command/options.hpp"
-#include "daemon/tools/command/output_files.hpp"
 #include "models/gesture/recording.hpp"
 #include "models/motion/motion.hpp"
 #include "models/natural/compare.hpp"
 #include "models/task_numbers.hpp"
 #include "proto/clip/clip.hpp"
-#include "proto/clip/file_names.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/degree.hpp"
 
@@ -44,13 +43,15 @@ class Measure {
   }
 
   [[nodiscard]] bool of_hands() const {
-    return !options_.hand.empty() || clip::extension_of(options_.clip) == ".csv";
+    const clip::Format* format = clip::format_of(options_.clip);
+    return !options_.hand.empty() || (format != nullptr && format->is_hand);
   }
   [[nodiscard]] bool may_be_clip(const Path& path) const {
-    const std::string extension = clip::extension_of(path);
-    if (extension == ".csv") return of_hands();
+    const clip::Format* format = clip::format_of(path);
+    if (format == nullptr || format->read == nullptr) return false;
+    if (format->is_hand) return of_hands();
     // A body holds two hands, so only --hand says which.
-    return (extension == ".bvh" || extension == ".amc") && (!of_hands() || !options_.hand.empty());
+    return !of_hands() || !options_.hand.empty();
   }
 
   [[nodiscard]] Result<natural::Figures> operator()(const Path& path) const {
@@ -65,12 +66,9 @@ class Measure {
   // A subject's clips have bones of their own, so a skeleton beside a clip of the corpus is right
   // for it and the named one is not.
   [[nodiscard]] clip::ReadOptions how(const Path& path) const {
-    clip::ReadOptions read;
     std::error_code ignored;
     const bool other = path != options_.clip && exists(clip::skeleton_beside(path), ignored);
-    if (is_amc(path) && !other) read.asf = options_.skeleton;
-    if (!options_.hand.empty()) read.hand = side_named(options_.hand);
-    return read;
+    return clip::accepted_options(path, {.skeleton = other ? Path() : Path(options_.skeleton)});
   }
   [[nodiscard]] Result<motion::Motion> body(const Path& path) const {
     const auto read = clip::read_clip(path, how(path));
@@ -86,7 +84,9 @@ class Measure {
     return natural::figures_of(*motion, spec_);
   }
   [[nodiscard]] Result<natural::Figures> hand_figures(const Path& path) const {
-    auto hand = clip::read_hand_clip(path, how(path));
+    clip::ReadOptions read = how(path);
+    if (!options_.hand.empty()) read.hand = side_named(options_.hand);
+    auto hand = clip::read_hand_clip(path, read);
     if (!hand) return std::unexpected(hand.error());
     clip::fill_gaps(*hand);
     const auto recording = gesture::recording_of(*hand, options_.rate_hz);
@@ -119,9 +119,9 @@ Result<std::vector<Path>> files_of(const Path& folder, const Measure& measure) {
   std::ranges::sort(files);
   if (files.empty()) {
     return fail(measure.of_hands()
-                    ? "the corpus holds no hand recording (.csv; --hand left or right takes hands "
-                      "from bodies)"
-                    : "the corpus holds no clip (.bvh or .amc)",
+                    ? "the corpus holds no hand recording (" + clip::listed(clip::Use::kRead) +
+                          "; of bodies, --hand says which hand)"
+                    : "the corpus holds no clip (" + clip::listed(clip::Use::kReadBody) + ")",
                 folder.string());
   }
   return files;

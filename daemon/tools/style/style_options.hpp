@@ -9,7 +9,7 @@
 
 #include "daemon/tools/command/findings.hpp"
 #include "models/feet/root_motion.hpp"
-#include "models/style/style_weights.hpp"
+#include "models/style/live/style_weights.hpp"
 
 namespace posed::tools {
 

@@ -15,12 +15,12 @@
 #include "models/gp/regression.hpp"
 #include "models/motion/motion.hpp"
 #include "models/motion/symmetric_eigen.hpp"
-#include "models/style/dataset.hpp"
-#include "models/style/difference.hpp"
-#include "models/style/harmonics.hpp"
-#include "models/style/train_report.hpp"
-#include "models/style/training_check.hpp"
-#include "models/style/training_pairs.hpp"
+#include "models/style/train/dataset.hpp"
+#include "models/style/train/difference_process.hpp"
+#include "models/style/train/harmonics.hpp"
+#include "models/style/train/train_report.hpp"
+#include "models/style/train/training_check.hpp"
+#include "models/style/train/training_pairs.hpp"
 
 namespace posed::tools {
 namespace {
@@ -246,7 +246,7 @@ report::StyleMap map_of_style_points(const style::Dataset& dataset, const std::s
 
 // Without style points: the clips' own mean cycles.
 report::StyleMap map_of_cycles(const style::Dataset& dataset, const std::string& motion) {
-  const auto takes = style::take_cycles(dataset);
+  const auto takes = style::clip_cycles(dataset);
   std::vector<std::size_t> clips;
   for (std::size_t c = 0; c < dataset.clips.size(); ++c) {
     if (dataset.clips[c].motion == motion) clips.push_back(c);
@@ -339,7 +339,7 @@ void StyleReport::add_cycles(const style::Findings& findings) {
   std::size_t pairs = 0;
   for (std::size_t l = 0; l < findings.lessons.size(); ++l) {
     const style::Dataset& data = *findings.lessons[l].data;
-    const auto takes = style::take_cycles(data);
+    const auto takes = style::clip_cycles(data);
     for (const auto& found : style::differences_of(data, takes, findings.lessons[l].target)) {
       StyleCycles cycles{
           .motion = found.motion,
@@ -391,7 +391,7 @@ void StyleReport::add_kernel(const style::Findings& findings) {
     for (std::size_t f = 0; f < learnt.ways.size(); ++f) {
       if (!learnt.ways[f].measured()) continue;
       walkers.push_back({stem_of(learnt.held_out[f].file), learnt.held_out[f].person,
-                         learnt.held_out[f].takes, learnt.ways[f].closes(),
+                         learnt.held_out[f].clips, learnt.ways[f].closes(),
                          learnt.ways[f].constant_closes()});
     }
     if (walkers.empty()) continue;
@@ -455,7 +455,7 @@ Result<std::pair<motion::PoseSpaceSpec, StyleCycles>> cycles_of(const EvaluatedC
   if (auto aligned = style::align(*dataset, how); !aligned) {
     return std::unexpected(aligned.error());
   }
-  const auto takes = style::take_cycles(*dataset);
+  const auto takes = style::clip_cycles(*dataset);
   StyleCycles cycles{.source_name = file_of(clips.source),
                      .target_name = file_of(clips.target),
                      .source = cycle_points(takes[0].coefficients),

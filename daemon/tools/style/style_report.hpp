@@ -10,8 +10,7 @@
 #include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/report/page.hpp"
 #include "models/motion/pose_space.hpp"
-#include "models/style/train.hpp"
-#include "proto/clip/clip.hpp"
+#include "models/style/train/train.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::tools {

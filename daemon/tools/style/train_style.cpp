@@ -14,8 +14,8 @@
 #include "daemon/tools/style/style_report.hpp"
 #include "daemon/tools/style/train_style.hpp"
 #include "models/fixed_products.hpp"
-#include "models/style/train.hpp"
-#include "proto/clip/file_names.hpp"
+#include "models/style/train/train.hpp"
+#include "proto/clip/format.hpp"
 
 namespace posed::tools {
 namespace {
@@ -108,7 +108,10 @@ Result<Experiment> experiment_of(const TrainStyleOptions& options) {
   experiment->mode = mode.value_or(experiment->mode);
   experiment->rate_hz = options.rate_hz.value_or(experiment->rate_hz);
   if (options.skeleton.empty()) return experiment;
-  if (std::ranges::none_of(experiment->clips, is_amc, &ExperimentClip::file)) {
+  const auto has_skeleton_file = [](const ExperimentClip& clip) {
+    return clip::accepts(clip.file, clip::ReadOption::kSkeleton);
+  };
+  if (std::ranges::none_of(experiment->clips, has_skeleton_file)) {
     return misuse("--skeleton is only for AMC clips; leave it out");
   }
   experiment->asf = options.skeleton;
@@ -124,9 +127,8 @@ std::vector<std::filesystem::path> inputs_of(const TrainStyleOptions& options,
   }
   for (const ExperimentClip& clip : experiment.clips) {
     inputs.push_back(clip.file);
-    if (is_amc(clip.file) && experiment.asf.empty()) {
-      inputs.push_back(clip::skeleton_beside(clip.file));
-    }
+    const auto skeleton = clip::skeleton_beside(clip.file);
+    if (!skeleton.empty() && experiment.asf.empty()) inputs.push_back(skeleton);
   }
   return inputs;
 }

@@ -7,7 +7,7 @@
 #include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/command/ranks.hpp"
 #include "daemon/tools/style/experiment.hpp"
-#include "models/style/train_report.hpp"
+#include "models/style/train/train_report.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::tools {

@@ -210,7 +210,7 @@ class Bridge::Parts {
   net::Context context_;
   Hub hub_;
   WebRoom room_;
-  http::Room connections_{.service = room_};
+  http::Connections connections_{.service = room_};
   boost::asio::io_context io_{1};
   boost::asio::steady_timer timer_;
   std::unique_ptr<DaemonLink> link_;

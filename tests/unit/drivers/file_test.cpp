@@ -76,7 +76,7 @@ TEST_CASE("a clip played live is the clip read offline, to the last bit") {
   const auto asf = test::scratch_file("small.asf", test::small_asf());
   const auto amc = test::scratch_file("small.amc", test::small_amc());
   check_plays_like_clip(amc, {{"skeleton", asf.string()}, {"rate_hz", 60.0}},
-                        {.asf = asf, .amc_rate_hz = 60.0});
+                        {.skeleton = asf, .rate_hz = 60.0});
   check_plays_like_clip(test::scratch_file("hand.csv", test::small_hand_csv()),
                         {{"hand", std::string("left")}}, {.hand = Side::kLeft});
 }
@@ -156,7 +156,7 @@ TEST_CASE("a clip that cannot be played is refused with one error message and it
       {"infinite.bvh", replaced(bvh, last, replaced(last, "-24", "inf")),
        ":28: frame 5: 'inf' is not a number a pose can have"},
       {"letters.bvh", replaced(bvh, last, "hello\n"), ":28: frame 5: 'hello'"},
-      {"clip.fbx", bvh, ": is no clip posed can read"},
+      {"clip.fbx", "Kaydara", ": is no clip posed can read; a clip is .bvh, .amc or a hand's .csv"},
   };
   for (const Case& bad : cases) {
     const auto path = test::scratch_file(bad.file, bad.text);
@@ -243,10 +243,10 @@ TEST_CASE("an option without meaning for this kind of clip is refused") {
     CHECK(device.error().exit_code == ExitCode::kWrongUse);
     return device.error().message;
   };
-  CHECK(said("rate_hz", 60.0) ==
-        "rate_hz is an option of an .amc; this clip says its own rate, and `pace` plays it faster");
-  CHECK(said("skeleton", std::string("a.asf")).starts_with("skeleton is an option of an .amc"));
-  CHECK(said("hand", std::string("left")).starts_with("hand is an option of a .csv"));
+  CHECK(said("rate_hz", 60.0) == "is a BVH, and only AMC accepts a rate; leave it out");
+  CHECK(said("skeleton", std::string("a.asf")).contains("only AMC accepts a skeleton"));
+  CHECK(said("hand", std::string("left")).contains("only hand CSV accepts a hand;"));
+  CHECK(said("hand_shape", std::string("paw")).contains("only hand CSV accepts a hand shape"));
   CHECK(must_open(bvh, {{"hand", std::string("right")}}).description.rate_hz == Approx(120.0));
 }
 

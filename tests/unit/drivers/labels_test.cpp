@@ -8,7 +8,6 @@
 #include "drivers/transport/transport_factory.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/hand_clip.hpp"
-#include "proto/clip/reader.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"

@@ -3,7 +3,7 @@
 import { el, labelled } from './dom.js';
 
 const SHOWN_ELSEWHERE = new Set(['style.alpha', 'style.weights', 'style.mask']);
-const FLAGS = new Set(['gate', 'auto_alpha', 'enabled', 'calibrate']);
+const FLAGS = new Set(['gate', 'auto_alpha', 'enabled']);
 // Parameters with a few words: the statistics give the number of the word in the daemon's list.
 const WORDS = { 'feet.root': ['off', 'stride', 'actor'] };
 

@@ -92,7 +92,7 @@ alpha = -1.5
 alpha_slew_per_s = 4.0
 gate = true
 gate_fallback = 0.25
-calibrate = true
+auto_alpha = true
 [stream.generate]
 lag_frames = 3
 lag_ms = 50
@@ -130,7 +130,7 @@ driver = "glove"
   CHECK(parameter<double>(style.parameters, "alpha_slew_per_s") == 4.0);
   CHECK(parameter<bool>(style.parameters, "gate"));
   CHECK(parameter<double>(style.parameters, "gate_fallback") == 0.25);
-  CHECK(parameter<bool>(style.parameters, "calibrate"));
+  CHECK(parameter<bool>(style.parameters, "auto_alpha"));
   const StageConfig& generate = a.stages[1];
   CHECK(generate.type->name == "generate");
   CHECK(generate.model == "stage/hand.gesture");

@@ -9,6 +9,7 @@
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
 #include "tests/support/has.hpp"
+#include "tests/support/parameter_index.hpp"
 #include "tests/support/stage_commands.hpp"
 #include "tests/unit/daemon/control/requests.hpp"
 #include "tests/unit/daemon/control/three_streams.hpp"
@@ -131,7 +132,8 @@ TEST_CASE("an alpha goes to its stream, and the reply comes when it took effect"
   CHECK_FALSE(fixture.ask(alpha_request("runner", -2.0F)));
   REQUIRE(fixture.daemon_control.sent.size() == 1);
   CHECK(fixture.daemon_control.sent[0].change.type == &style::style_type());
-  CHECK(fixture.daemon_control.sent[0].change.index == style::StyleFilter::kAlpha);
+  CHECK(fixture.daemon_control.sent[0].change.index ==
+        test::parameter_index(style::style_type(), "alpha"));
   CHECK(fixture.daemon_control.sent[0].stream == 2);
   CHECK(fixture.daemon_control.sent[0].change.value == -2.0);
   const auto reply = fixture.acknowledge(77);
@@ -217,16 +219,18 @@ TEST_CASE("any live parameter of any stage can be set, by its name or with the s
   const auto flag = [](auto& wanted) { wanted.set_flag(true); };
   const auto text = [](auto& wanted) { wanted.set_text("much"); };
   CHECK_FALSE(fixture.ask(ask("style.alpha", number(0.5))));
-  CHECK_FALSE(fixture.ask(ask("style.calibrate", flag)));
-  CHECK(fixture.daemon_control.sent[0].change.index == style::StyleFilter::kAlpha);
-  CHECK(fixture.daemon_control.sent[1].change.index == style::StyleFilter::kCalibrate);
+  CHECK_FALSE(fixture.ask(ask("style.auto_alpha", flag)));
+  CHECK(fixture.daemon_control.sent[0].change.index ==
+        test::parameter_index(style::style_type(), "alpha"));
+  CHECK(fixture.daemon_control.sent[1].change.index ==
+        test::parameter_index(style::style_type(), "auto_alpha"));
   CHECK(fixture.daemon_control.sent[1].change.value == 1.0);
   fixture.daemon_control.sent.clear();
   CHECK(has(fixture.refused(ask("alpha", number(2.5))),
             "alpha = 2.5 is out of range: it takes a number from -2 to 2"));
   CHECK(has(fixture.refused(ask("alpha", flag)), "alpha must be a number, not true or false"));
   CHECK(has(fixture.refused(ask("alpha", text)), "alpha must be a number, not text"));
-  CHECK(has(fixture.refused(ask("calibrate", number(1.0))), "calibrate must be true or false"));
+  CHECK(has(fixture.refused(ask("auto_alpha", number(1.0))), "auto_alpha must be true or false"));
   CHECK(has(fixture.refused(ask("warm_up_s", number(10.0))),
             "warm_up_s cannot change while the daemon runs"));
   CHECK(has(fixture.refused(ask("lag_ms", number(1.0))), "[stream.generate] table"));

@@ -5,7 +5,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "models/style/style_model.hpp"
+#include "models/style/model/style_model.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "daemon/control/request_handler.hpp"
-#include "models/style/style_type.hpp"
+#include "models/style/live/style_type.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::control {

@@ -8,8 +8,8 @@
 #include "daemon/devices/calibration.hpp"
 #include "daemon/devices/open_stream.hpp"
 #include "drivers/options.hpp"
-#include "models/generate/generate_type.hpp"
-#include "models/style/style_type.hpp"
+#include "models/generate/generate_stage.hpp"
+#include "models/style/live/style_type.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/support/toml_bombs.hpp"
 

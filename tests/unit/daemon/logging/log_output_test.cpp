@@ -60,16 +60,16 @@ TEST_CASE(
   }
   CHECK(limiter.admit(600 * kMs, 2, "b: frame 1"));  // another stream
   CHECK(limiter.admit(600 * kMs, 4, "a: frame 1"));  // another level
-  CHECK_FALSE(limiter.take_due(999 * kMs));
+  CHECK_FALSE(limiter.next_summary(999 * kMs));
   CHECK(limiter.next_due_ns() == 1000 * kMs);
-  const auto line = limiter.take_due(1000 * kMs);
+  const auto line = limiter.next_summary(1000 * kMs);
   REQUIRE(line);
   CHECK(line->text == "a: frame 1000 (the last of 999 like it)");
   CHECK(line->level == 2);
-  CHECK_FALSE(limiter.take_due(1000 * kMs));
+  CHECK_FALSE(limiter.next_summary(1000 * kMs));
   CHECK_FALSE(limiter.admit(1500 * kMs, 2, "a: frame 1001"));
-  CHECK(limiter.take_due(1600 * kMs, true)->text == "a: frame 1001");  // at the end at once
-  CHECK(limiter.admit(5000 * kMs, 2, "a: frame 1002"));                // quiet for a while
+  CHECK(limiter.next_summary(1600 * kMs, true)->text == "a: frame 1001");  // at the end at once
+  CHECK(limiter.admit(5000 * kMs, 2, "a: frame 1002"));                    // quiet for a while
 }
 
 TEST_CASE("lines of ever new causes are limited to a few a second, too") {
@@ -81,12 +81,12 @@ TEST_CASE("lines of ever new causes are limited to a few a second, too") {
     for (int left = i; left >= 0; left = left / 26 - 1) word += static_cast<char>('a' + left % 26);
     const std::int64_t now_ns = i * kMs;
     written += limiter.admit(now_ns, 2, "no stream " + word) ? 1 : 0;
-    while (const auto line = limiter.take_due(now_ns)) {
+    while (const auto line = limiter.next_summary(now_ns)) {
       CHECK(line->text.ends_with(" more lines of many kinds are left out"));
       reported += std::stoull(line->text);
     }
   }
-  while (const auto line = limiter.take_due(10'000 * kMs, true))
+  while (const auto line = limiter.next_summary(10'000 * kMs, true))
     reported += std::stoull(line->text);
   CHECK(written <= 256 + 8 * 10);
   CHECK(static_cast<std::uint64_t>(written) + reported == 10'000);  // every line is counted

@@ -12,7 +12,7 @@
 #include "models/motion/canonical_skeleton.hpp"
 #include "models/motion/retarget.hpp"
 #include "models/motion/synthetic_walker.hpp"
-#include "proto/clip/bvh.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/raw_peer.hpp"
 #include "tests/support/shared.hpp"
@@ -136,9 +136,11 @@ TEST_CASE("a client that wants it gets the BVH header, whose channels are the va
   REQUIRE(begin != std::string::npos);
   // The values between the name and the "||" are a motion line of that BVH.
   const std::string values = text.substr(begin + 6, text.size() - begin - 6 - 4);
-  const auto clip = clip::parse_bvh(
-      text.substr(0, begin) + "MOTION\nFrames: 1\nFrame Time: 0.0166667\n" + values + "\n",
-      "stream.bvh", {.metres_per_unit = 0.01});
+  const auto clip = clip::parse_clip(
+      {.name = "stream.bvh",
+       .bytes = text.substr(0, begin) + "MOTION\nFrames: 1\nFrame Time: 0.0166667\n" + values +
+                "\n"},
+      {.metres_per_unit = 0.01});
   if (!clip) FAIL(clip.error().text());
   CHECK(clip->skeleton->joints.size() == drivers::axis::kBones);
   CHECK(clip->channels.cols() == 6 * 59);

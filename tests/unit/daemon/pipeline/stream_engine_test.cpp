@@ -5,6 +5,7 @@
 #include "daemon/pipeline/stream_engine.hpp"
 #include "posed/v1/posed.pb.h"
 #include "tests/support/ms.hpp"
+#include "tests/support/parameter_index.hpp"
 #include "tests/support/stage_commands.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
@@ -92,7 +93,7 @@ TEST_CASE("the event of a change names the old and the new value") {
   REQUIRE(out.items.size() == 1);
   StreamEvent change = out.items[0].stream_event;
   CHECK(change.kind == v1::Event::KIND_CONTROL);
-  CHECK(change.change.index == style::StyleFilter::kAlpha);
+  CHECK(change.change.index == test::parameter_index(style::style_type(), "alpha"));
   CHECK(change.value_before == 1.0);
   CHECK(change.change.value == 0.5);
   CHECK(engine.live_parameter(0).target == 0.5);

@@ -12,7 +12,7 @@
 
 #include "daemon/publish/publisher.hpp"
 #include "daemon/system/clock.hpp"
-#include "models/style/style_type.hpp"
+#include "models/style/live/style_type.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::publish {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "daemon/pipeline/description_row.hpp"
-#include "models/style/style_type.hpp"
+#include "models/style/live/style_type.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/daemon/record/toy_recording.hpp"
 

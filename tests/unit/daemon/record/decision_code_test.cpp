@@ -6,8 +6,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "models/style/style_filter.hpp"
-#include "models/style/style_type.hpp"
+#include "models/style/live/style_filter.hpp"
+#include "models/style/live/style_type.hpp"
 #include "posed/v1/log.pb.h"
 
 namespace posed::record {

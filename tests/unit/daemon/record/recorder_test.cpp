@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "models/style/style_type.hpp"
+#include "models/style/live/style_type.hpp"
 #include "proto/log/digest.hpp"
 #include "tests/support/file_limit.hpp"
 #include "tests/support/temp_folder.hpp"

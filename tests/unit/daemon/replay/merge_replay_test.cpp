@@ -10,7 +10,7 @@
 #include "daemon/pipeline/stream_settings.hpp"
 #include "drivers/options.hpp"
 #include "drivers/template_mocap/protocol.hpp"
-#include "models/merge/merge_type.hpp"
+#include "models/merge/merge_stage.hpp"
 #include "proto/log/reader.hpp"
 #include "tests/support/dice.hpp"
 #include "tests/support/gapped_logs.hpp"

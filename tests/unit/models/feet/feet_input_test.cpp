@@ -6,6 +6,7 @@
 
 #include "models/feet/foot_score.hpp"
 #include "tests/support/seeds.hpp"
+#include "tests/support/parameter_index.hpp"
 #include "tests/unit/models/feet/standing_walker.hpp"
 
 namespace posed::feet {
@@ -273,8 +274,10 @@ TEST_CASE("whatever comes, the pose stays finite, and twice the same is the same
       if (draw() < 0.05) {
         pair.source.rotation_xyzw[joint] = {0.0F, 0.0F, std::numeric_limits<float>::quiet_NaN(), 0};
       }
-      if (draw() < 0.02) stage->set(FeetStage::kRoot, std::floor(3.0 * draw()));
-      twin->set(FeetStage::kRoot, stage->state(FeetStage::kRoot).now);
+      if (draw() < 0.02)
+        stage->set(test::parameter_index(feet_type(), "root"), std::floor(3.0 * draw()));
+      twin->set(test::parameter_index(feet_type(), "root"),
+                stage->state(test::parameter_index(feet_type(), "root")).now);
       const Frame out = through(*stage, pair.source, pair.styled);
       REQUIRE(test::same_pose(out, through(*twin, pair.source, pair.styled)));
       REQUIRE(test::root_of(out).allFinite());

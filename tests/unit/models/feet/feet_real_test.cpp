@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "models/style/apply.hpp"
-#include "models/style/evaluate.hpp"
-#include "models/style/train.hpp"
+#include "models/style/judge/evaluate.hpp"
+#include "models/style/live/apply.hpp"
+#include "models/style/train/train.hpp"
 #include "tests/support/shared.hpp"
 
 namespace posed::feet {

@@ -6,6 +6,7 @@
 #include "models/feet/foot_score.hpp"
 #include "models/feet/leg_reach.hpp"
 #include "tests/support/allocations.hpp"
+#include "tests/support/parameter_index.hpp"
 #include "tests/unit/models/feet/standing_walker.hpp"
 
 namespace posed::feet {
@@ -140,14 +141,16 @@ TEST_CASE("the root can change while it runs, without a jump", "[feet]") {
   const auto stage = feet_stage(walk.source, "stride");
   Eigen::Vector3d last_m = test::root_of(walk.source.frames[0]);
   for (std::size_t t = 0; t < walk.source.frames.size(); ++t) {
-    if (t == 240) stage->set(FeetStage::kRoot, static_cast<double>(RootMode::kActor));
-    if (t == 480) stage->set(FeetStage::kRoot, static_cast<double>(RootMode::kOff));
+    if (t == 240)
+      stage->set(test::parameter_index(feet_type(), "root"), static_cast<double>(RootMode::kActor));
+    if (t == 480)
+      stage->set(test::parameter_index(feet_type(), "root"), static_cast<double>(RootMode::kOff));
     const Frame out = through(*stage, walk.source.frames[t], walk.styled.frames[t]);
     const Eigen::Vector3d root_m = test::root_of(out);
     CHECK((root_m - last_m).norm() < 0.08);
     last_m = root_m;
   }
-  CHECK(stage->state(FeetStage::kRoot).now == 0.0);
+  CHECK(stage->state(test::parameter_index(feet_type(), "root")).now == 0.0);
   CHECK(test::root_apart_m(walk.styled.frames.back(), walk.source.frames.back()) == 0.0);
   CHECK((last_m - test::root_of(walk.source.frames.back())).norm() < 0.001);
 }
@@ -157,8 +160,8 @@ TEST_CASE("the limit of the root can change while it runs, without a jump", "[fe
   const auto stage = feet_stage(walk.source, "actor");
   Eigen::Vector3d last_m = Eigen::Vector3d::Zero();
   for (std::size_t t = 0; t < walk.source.frames.size(); ++t) {
-    if (t == 240) stage->set(FeetStage::kLimit, 0.005);
-    if (t == 360) stage->set(FeetStage::kLimit, 0.08);
+    if (t == 240) stage->set(test::parameter_index(feet_type(), "limit_m"), 0.005);
+    if (t == 360) stage->set(test::parameter_index(feet_type(), "limit_m"), 0.08);
     const Frame out = through(*stage, walk.source.frames[t], walk.styled.frames[t]);
     const Eigen::Vector3d offset_m = test::root_of(out) - test::root_of(walk.source.frames[t]);
     INFO(t);
@@ -210,7 +213,7 @@ TEST_CASE("the feet stage allocates nothing", "[feet][rt]") {
 
 TEST_CASE("the table names the roots; another word is refused", "[feet]") {
   const auto& table = feet_type().parameters;
-  const ParameterSpec& root = table[FeetStage::kRoot];
+  const ParameterSpec& root = table[test::parameter_index(feet_type(), "root")];
   CHECK(number_of(root, std::string("actor")) == static_cast<double>(RootMode::kActor));
   CHECK(people_text(root, 1.0) == "stride");
   CHECK_FALSE(takes_number(root, 3.0));

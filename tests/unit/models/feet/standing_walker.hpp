@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "models/feet/feet_stage.hpp"
-#include "models/feet/feet_type.hpp"
 #include "models/motion/motion.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "proto/frame/rotation.hpp"

@@ -28,7 +28,7 @@ std::string verdict(Spoil spoil) {
 
 bool says(const std::string& message, const std::string& what) {
   UNSCOPED_INFO(message);
-  return message.find("the model is not sound: " + what) == 0;
+  return message.find("the model is not valid: " + what) == 0;
 }
 
 }  // namespace

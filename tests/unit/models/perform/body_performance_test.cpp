@@ -13,7 +13,7 @@
 #include "models/gesture/model_file.hpp"
 #include "models/motion/kinematics.hpp"
 #include "models/motion/naturalness.hpp"
-#include "proto/clip/reader.hpp"
+#include "proto/clip/clip.hpp"
 #include "tests/support/arm_raiser.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/support/synthetic_arms.hpp"

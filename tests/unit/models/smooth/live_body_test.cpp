@@ -12,7 +12,7 @@
 #include <catch2/catch.hpp>
 
 #include "models/motion/synthetic_walker.hpp"
-#include "proto/clip/reader.hpp"
+#include "proto/clip/clip.hpp"
 #include "tests/bench/baselines.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/support/gaps.hpp"

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "models/gp/regression.hpp"
-#include "models/style/style_filter.hpp"
+#include "models/style/live/style_filter.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/frame/rotation.hpp"
 

@@ -4,9 +4,9 @@
 
 #include <filesystem>
 
-#include "proto/clip/acclaim.hpp"
 #include "proto/clip/clip.hpp"
-#include "proto/clip/text_clip.hpp"
+#include "proto/clip/device_clip.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/replaced.hpp"
@@ -65,8 +65,12 @@ const std::string kAmc =
     "thigh 41 -1.5e1\n"
     "root 1 17 -25 10 20 30\n";
 
+Result<Clip> parse_amc(const std::string& amc, const std::string& asf) {
+  return parse_clip({.name = "x.amc", .bytes = amc, .skeleton_name = "x.asf", .skeleton = asf});
+}
+
 void check_error(const std::string& asf, const std::string& amc, const std::string& expected) {
-  const auto clip = parse_amc(amc, "x.amc", asf, "x.asf");
+  const auto clip = parse_amc(amc, asf);
   REQUIRE_FALSE(clip.has_value());
   INFO(clip.error().text());
   CHECK(clip.error().text().starts_with(expected));
@@ -81,7 +85,7 @@ void check_asf(const std::string& from, const std::string& to, const std::string
 }  // namespace
 
 TEST_CASE("an AMC and its ASF give joints at bone starts and L = C M C^-1") {
-  const auto clip = parse_amc(kAmc, "x.amc", kAsf, "x.asf");
+  const auto clip = parse_amc(kAmc, kAsf);
   if (!clip) FAIL(clip.error().text());
   const Skeleton& skeleton = *clip->skeleton;
   REQUIRE(skeleton.joints.size() == 3);
@@ -109,7 +113,7 @@ TEST_CASE("radians and other line ends are understood") {
   std::string amc = replaced(kAmc, ":DEGREES", ":RADIANS");
   std::string crlf;
   for (const char c : amc) crlf += c == '\n' ? std::string("\r\n") : std::string(1, c);
-  const auto clip = parse_amc(crlf, "x.amc", kAsf, "x.asf");
+  const auto clip = parse_amc(crlf, kAsf);
   if (!clip) FAIL(clip.error().text());
   CHECK(clip->channels(0, 5) == 10.0);
 }
@@ -156,7 +160,7 @@ TEST_CASE("an ASF that would give a wrong pose is refused with its line") {
 }
 
 TEST_CASE("an AMC written as BVH is the same motion") {
-  const auto amc = parse_amc(kAmc, "x.amc", kAsf, "x.asf");
+  const auto amc = parse_amc(kAmc, kAsf);
   REQUIRE(amc.has_value());
   const auto path =
       std::filesystem::temp_directory_path() / ("posed_amc_" + std::to_string(::getpid()) + ".bvh");
@@ -184,16 +188,16 @@ TEST_CASE("a text clip decodes frame by frame to what the clip reader gives") {
     }
     const auto clip = read_clip(*path);
     REQUIRE(clip.has_value());
-    const auto text = open_text_clip(*path);
+    const auto text = open_device_clip(*path);
     if (!text) FAIL(text.error().text());
-    REQUIRE(static_cast<int>((*text)->frames.size()) == clip->frames());
-    const auto again = parse_description((*text)->description, "the log");
+    REQUIRE(static_cast<int>(text->frames.size()) == clip->frames());
+    const auto again = parse_description(text->description, "the log");
     if (!again) FAIL(again.error().text());
     CHECK(again->skeleton->id == clip->skeleton->id);
     CHECK(again->frame_rate_hz == clip->frame_rate_hz);
     std::vector<double> values(again->parser.channels());
     for (int i = 0; i < clip->frames(); i += 50) {
-      REQUIRE(again->parser.parse((*text)->frames[i], values).ok());
+      REQUIRE(again->parser.parse(text->frames[i], values).ok());
       CHECK(std::equal(values.begin(), values.end(), clip->channels.row(i).data()));
     }
   }

@@ -5,8 +5,7 @@
 #include <filesystem>
 #include <numbers>
 
-#include "proto/clip/bvh.hpp"
-#include "proto/clip/clip.hpp"
+#include "proto/clip/format.hpp"
 #include "tests/support/replaced.hpp"
 #include "tests/support/shared.hpp"
 
@@ -37,8 +36,12 @@ const std::string kTwoFrames =
     "0 100 0 0 0 0 90 0 0\n"
     "1 100 2e1 0 90 0 0 0 90";
 
+Result<Clip> parse_bvh(const std::string& text) {
+  return parse_clip({.name = "x.bvh", .bytes = text});
+}
+
 void check_error(const std::string& text, const std::string& expected) {
-  const auto clip = parse_bvh(text, "x.bvh");
+  const auto clip = parse_bvh(text);
   REQUIRE_FALSE(clip.has_value());
   INFO(clip.error().text());
   CHECK(clip.error().text().starts_with(expected));
@@ -47,7 +50,7 @@ void check_error(const std::string& text, const std::string& expected) {
 }  // namespace
 
 TEST_CASE("a BVH gives names, offsets, channels, rate and values") {
-  const auto clip = parse_bvh(kHeader + kTwoFrames, "x.bvh");
+  const auto clip = parse_bvh(kHeader + kTwoFrames);
   REQUIRE(clip.has_value());
   REQUIRE(clip->skeleton->joints.size() == 2);
   CHECK(clip->skeleton->joints[1].name == "Left Arm:upper");
@@ -72,7 +75,7 @@ TEST_CASE("a BVH is read leniently where the pose is not in doubt") {
   for (const char c : text)
     crlf += c == '\n' ? std::string("\r\n") : std::string(1, c == ' ' ? '\t' : c);
   crlf = replaced(crlf, "Left\tArm", "Left Arm");
-  const auto clip = parse_bvh(crlf, "x.bvh");
+  const auto clip = parse_bvh(crlf);
   if (!clip) FAIL(clip.error().text());
   CHECK(clip->frames() == 2);
   CHECK(clip->skeleton->joints[1].name == "Left Arm:upper");
@@ -133,7 +136,7 @@ TEST_CASE("joints nested too deep or too many are refused") {
 }
 
 TEST_CASE("a written BVH reads back the same") {
-  const auto first = parse_bvh(kHeader + kTwoFrames, "x.bvh");
+  const auto first = parse_bvh(kHeader + kTwoFrames);
   REQUIRE(first.has_value());
   const auto path =
       std::filesystem::temp_directory_path() / ("posed_bvh_" + std::to_string(::getpid()) + ".bvh");

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "proto/clip/format.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -30,14 +31,20 @@ std::string row(const std::string& time, double base) {
   return line + '\n';
 }
 
+Result<HandClip> parse_hand_csv(const std::string& text) {
+  const auto clip = parse_clip({.name = "h.csv", .bytes = text});
+  if (!clip) return std::unexpected(clip.error());
+  return hand_of(*clip);
+}
+
 std::string error_of(const std::string& text) {
-  const auto clip = parse_hand_csv(text, "h.csv");
+  const auto clip = parse_hand_csv(text);
   REQUIRE_FALSE(clip.has_value());
   return clip.error().text();
 }
 
 HandClip read(const std::string& text) {
-  auto clip = parse_hand_csv(text, "h.csv");
+  auto clip = parse_hand_csv(text);
   if (!clip) FAIL(clip.error().text());
   return std::move(*clip);
 }

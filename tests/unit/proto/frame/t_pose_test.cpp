@@ -1,7 +1,6 @@
 #include <catch2/catch.hpp>
 
-#include "proto/clip/bvh.hpp"
-#include "proto/clip/mean_pose.hpp"
+#include "proto/clip/draft.hpp"
 #include "proto/frame/bone_names.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/profile.hpp"

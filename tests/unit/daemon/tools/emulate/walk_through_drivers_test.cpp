@@ -9,8 +9,8 @@
 
 #include "models/motion/kinematics.hpp"
 #include "models/motion/synthetic_walker.hpp"
-#include "models/style/style_filter.hpp"
-#include "models/style/train.hpp"
+#include "models/style/live/style_filter.hpp"
+#include "models/style/train/train.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/shared.hpp"

@@ -1,0 +1,62 @@
+#include "models/style/judge/walker_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "models/gp/regression.hpp"
+#include "models/motion/motion.hpp"
+#include "proto/frame/degree.hpp"
+
+namespace posed::style {
+namespace {
+
+using Eigen::MatrixXd;
+
+constexpr Eigen::Index kEnoughFrames = 600;  // at most, spread evenly over a long clip
+
+MatrixXd evenly_taken(const MatrixXd& rows) {
+  const Eigen::Index step = std::max<Eigen::Index>(1, rows.rows() / kEnoughFrames);
+  return rows(Eigen::seq(0, rows.rows() - 1, step), Eigen::all);
+}
+
+}  // namespace
+
+Result<WalkerFit> fit_of_walker(const StyleModel& model, const std::string& model_name,
+                                const clip::Clip& clip) {
+  auto motion = motion::motion_of(clip);
+  if (!motion) return std::unexpected(motion.error());
+  if (motion::begins_with_added_pose(*motion)) motion::drop_first_frame(*motion);
+  const auto space = motion::PoseSpace::bind(model.space, *motion->skeleton);
+  if (!space) {
+    Error error = space.error();
+    if (error.file.empty()) error.file = model_name;
+    return std::unexpected(std::move(error));
+  }
+  const MatrixXd q =
+      evenly_taken(motion::pose_vectors(*motion, *space, motion::walk_heading_rad(*motion)));
+  if (q.cols() != model.process.inputs.cols()) {
+    return fail("the model's parts do not fit each other", model_name);
+  }
+  std::vector<double> squares;
+  squares.reserve(static_cast<std::size_t>(q.rows()));
+  for (Eigen::Index t = 0; t < q.rows(); ++t) {
+    squares.push_back(
+        (model.process.inputs.rowwise() - q.row(t)).rowwise().squaredNorm().minCoeff());
+  }
+  const auto middle = squares.begin() + std::ssize(squares) / 2;
+  std::ranges::nth_element(squares, middle);
+  const auto joints = static_cast<double>(model.space.joints.size());
+  WalkerFit fit;
+  fit.distance_deg = std::sqrt(*middle / joints) / kDegree;
+  fit.mean_change = gp::posterior_mean(model.process, q).colwise().mean();
+  return fit;
+}
+
+StyleModel with_constant_change(StyleModel model, const Eigen::VectorXd& change) {
+  model.process.weights.setZero();
+  model.process.offset = change;
+  return model;
+}
+
+}  // namespace posed::style

@@ -1,0 +1,106 @@
+#include "models/style/live/body_mask.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <string>
+
+#include "models/style/live/named_numbers.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::style {
+namespace {
+
+// In the order of BodyPart, then those that are two of them.
+constexpr std::array<std::string_view, kBodyParts> kNames{"trunk",     "head",     "left-arm",
+                                                          "right-arm", "left-leg", "right-leg"};
+struct Pair {
+  std::string_view name;
+  BodyPart left, right;
+};
+constexpr std::array kPairs{Pair{"arms", BodyPart::kLeftArm, BodyPart::kRightArm},
+                            Pair{"legs", BodyPart::kLeftLeg, BodyPart::kRightLeg}};
+
+double& at(Mask& mask, BodyPart part) { return mask[static_cast<std::size_t>(part)]; }
+
+BodyPart part_of_bone(Bone bone) {
+  if (bone <= Bone::kUpperChest) return BodyPart::kTrunk;
+  if (bone <= Bone::kHead) return BodyPart::kHead;
+  if (bone <= Bone::kLeftHand) return BodyPart::kLeftArm;
+  if (bone <= Bone::kRightHand) return BodyPart::kRightArm;
+  if (bone <= Bone::kLeftToes) return BodyPart::kLeftLeg;
+  if (bone <= Bone::kRightToes) return BodyPart::kRightLeg;
+  return bone < Bone::kRightThumbMetacarpal ? BodyPart::kLeftArm : BodyPart::kRightArm;
+}
+
+// False if no part has this name.
+bool set_part(Mask& mask, std::string_view name, double factor) {
+  for (const Pair& pair : kPairs) {
+    if (pair.name == name) at(mask, pair.left) = at(mask, pair.right) = factor;
+    if (pair.name == name) return true;
+  }
+  const auto* const found = std::ranges::find(kNames, name);
+  if (found == kNames.end()) return false;
+  mask[static_cast<std::size_t>(found - kNames.begin())] = factor;
+  return true;
+}
+
+}  // namespace
+
+Result<Mask> mask_of(std::string_view text) {
+  const auto numbers = parse_named_numbers(text, "mask", 1.0);
+  if (!numbers) return std::unexpected(numbers.error());
+  Mask mask = whole_body();
+  for (const NamedNumber& one : *numbers) {
+    if (set_part(mask, one.name, one.number)) continue;
+    std::string known;
+    for (const Pair& pair : kPairs) known += std::string(pair.name) + ", ";
+    for (const std::string_view name : kNames) known += std::string(name) + ", ";
+    return misuse("mask: the body has no part " + in_quotes(one.name) +
+                  "; it has: " + known.substr(0, known.size() - 2));
+  }
+  return mask;
+}
+
+// RT-safe
+void describe_mask(const Mask& mask, ShortText& text) noexcept {
+  bool first = true;
+  for (std::size_t p = 0; p < kBodyParts; ++p) {
+    if (mask[p] == 1.0) continue;
+    std::array<char, 32> number{};
+    const auto end = std::to_chars(number.data(), number.data() + number.size(), mask[p],
+                                   std::chars_format::general, 3)
+                         .ptr;
+    text.add(first ? "" : ",");
+    text.add(kNames[p]);
+    text.add("=");
+    text.add({number.data(), end});
+    first = false;
+  }
+  if (first) text.add("whole body");
+}
+
+BodyPart part_of_joint(const Skeleton& skeleton, int joint) {
+  for (int j = joint; j >= 0; j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
+    const auto bone = skeleton.joints[static_cast<std::size_t>(j)].bone;
+    if (bone) return part_of_bone(*bone);
+  }
+  return BodyPart::kTrunk;
+}
+
+std::vector<BodyPart> parts_of(const motion::PoseSpace& space) {
+  std::vector<BodyPart> parts;
+  parts.reserve(static_cast<std::size_t>(space.dims()));
+  for (int d = 0; d < space.dims(); ++d) {
+    parts.push_back(part_of_joint(space.skeleton(), space.skeleton_joint_of_dim(d)));
+  }
+  return parts;
+}
+
+// RT-safe
+void BodyMask::move(double step) noexcept {
+  for (std::size_t p = 0; p < kBodyParts; ++p) {
+    now_[p] += std::clamp(target_[p] - now_[p], -step, step);
+  }
+}
+
+}  // namespace posed::style

@@ -1,0 +1,46 @@
+// BoundModel: a style model bound to one skeleton, ready for the hot path. Built cold, then const;
+// the hot side holds a plain pointer and returns the old one to be freed by the cold side.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "models/gp/predictor.hpp"
+#include "models/motion/pose_space.hpp"
+#include "models/stage.hpp"
+#include "models/style/live/body_mask.hpp"
+#include "models/style/live/trained_motion.hpp"
+#include "models/style/model/style_model.hpp"
+
+namespace posed::style {
+
+struct BoundModel final : StageModel {
+  BoundModel(const StyleModel& model, motion::PoseSpace bound_space, gp::Predictor bound_predictor,
+             std::string file);
+
+  // Their names; the limits and the axis below are the first one's.
+  [[nodiscard]] const std::vector<std::string>& styles() const noexcept { return words; }
+
+  motion::PoseSpace space;
+  // Mutable, because it keeps the mixture of styles ready that the filter asks for. With several
+  // styles a model therefore serves one filter at a time at its full speed.
+  mutable gp::Predictor predictor;
+  Eigen::VectorXf limit_rad;           // [dims]
+  Eigen::VectorXf neutral;             // [dims]; empty: a model without gate data
+  std::optional<TrainedMotion> known;  // the same
+  Eigen::VectorXf axis;                // [dims]; empty: a model without a style axis
+  double axis_offset = 0.0;
+  std::vector<Eigen::VectorXf> more_limits_rad;  // of the others
+  std::vector<BodyPart> parts;                   // [dims]
+};
+
+// Returns an error for a skeleton that lacks joints of the model's pose space (it names them) and
+// for a model whose parts do not fit each other.
+[[nodiscard]] Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
+                                                                   const Skeleton& skeleton,
+                                                                   std::string name);
+
+}  // namespace posed::style

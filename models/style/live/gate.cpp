@@ -1,0 +1,126 @@
+#include "models/style/live/gate.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace posed::style {
+namespace {
+
+// README.md, "Gate", says what these were measured on.
+constexpr double kNear_deg = 28.0, kFar_deg = 35.0;         // to the nearest pose, as it is
+constexpr double kOwnNear_deg = 19.0, kOwnFar_deg = 23.5;   // from the walker's neutral pose
+constexpr double kSame_deg = 7.0, kOther_deg = 9.5;         // either; so near at any pace
+constexpr double kStill_deg_s = 8.0, kMoving_deg_s = 16.0;  // PoseSpeed
+constexpr double kRest = 0.25, kSwing = 0.4;                // of the training's least swing
+constexpr double kTooSlow = 0.3, kSlow = 0.45;              // of the training's fastest cadence
+constexpr double kFast = 1.2, kTooFast = 1.32;
+constexpr double kOfGait = 0.5;    // what LiveGait's correlation counts, in shares of that cadence,
+constexpr double kWalk = 0.2;      // above the training's highest, which counts as at least this
+constexpr double kOwnFast = 1.15;  // a walker's own cadence above this counts in its place
+
+constexpr double kCadence_s = 0.1;  // time constant of the low-pass on the cadence
+constexpr double kStage_s = 0.045;  // time constant of each of the four low-passes
+constexpr double kThere = 1e-5;     // nearer is there
+
+// 0 below `low`, 1 above `high`, without a kink between.
+double rise(double value, double low, double high) noexcept {
+  const double part = std::clamp((value - low) / (high - low), 0.0, 1.0);
+  return part * part * (3.0 - 2.0 * part);
+}
+
+}  // namespace
+
+// RT-safe
+void Gate::update(const TrainedMotion* known, bool on, const Frame& frame, std::span<const float> q,
+                  std::span<const std::uint8_t> available, const std::optional<Walker>& walker,
+                  double dt_s) noexcept {
+  wanted_ = 1.0;
+  if (known != nullptr) {
+    see_pose(*known, q, available, walker.has_value(), dt_s);
+    see_legs(*known, frame, walker, dt_s);
+    if (on) wanted_ = of_pose_ * of_legs_;
+  }
+  fresh_ = fresh_ && (known == nullptr || !on);
+  if (fresh_) return stage_.fill(1.0);
+  follow(dt_s);
+}
+
+// RT-safe
+void Gate::see_pose(const TrainedMotion& known, std::span<const float> q,
+                    std::span<const std::uint8_t> available, bool is_own, double dt_s) noexcept {
+  speed_.update(known, q, available, dt_s);
+  const double distance_deg = known.distance_deg(q, available);
+  if (std::isnan(distance_deg)) return;
+  of_pose_ = is_own ? 1.0 - rise(distance_deg, kOwnNear_deg, kOwnFar_deg)
+                    : 1.0 - rise(distance_deg, kNear_deg, kFar_deg);
+  of_near_pose_ = 1.0 - rise(distance_deg, kSame_deg, kOther_deg);
+}
+
+// How far the legs stride as in training; all the way where that cannot be told. RT-safe
+void Gate::see_legs(const TrainedMotion& known, const Frame& frame,
+                    const std::optional<Walker>& walker, double dt_s) noexcept {
+  if (!known.legs()) of_legs_ = 1.0;
+  if (!known.legs() || !known.legs()->measured(frame)) return;
+  const double leg_rad = known.legs()->value_rad(frame);
+  stride_.update(leg_rad, dt_s, known.cadence_rad_s());
+  const double height_m = known.height_m(frame);
+  if (std::isfinite(height_m)) gait_.update(height_m, leg_rad, dt_s);
+  const double rest = of_rest(known);
+  if (rest == 1.0) {
+    // The phase of legs that rest says nothing: the first steps count by their swing alone.
+    stride_.forget_cadence();
+    gait_.forget();
+    cadence_rad_s_ = 0.0;
+    of_cadence_ = 1.0;
+  }
+  double usual_rad_s = known.cadence_rad_s();
+  if (walker && walker->cadence_rad_s > kOwnFast * usual_rad_s) {
+    usual_rad_s = walker->cadence_rad_s / kOwnFast;
+  }
+  const double cadence_rad_s = std::abs(stride_.cadence_rad_s());
+  if (!std::isnan(cadence_rad_s)) {
+    const double part = cadence_rad_s_ == 0.0 ? 1.0 : -std::expm1(-dt_s / kCadence_s);
+    cadence_rad_s_ += part * (cadence_rad_s - cadence_rad_s_);
+    const double ratio = cadence_rad_s_ / usual_rad_s;
+    of_cadence_ = rise(ratio, kTooSlow, kSlow) * (1.0 - of_run(known, ratio));
+  }
+  of_legs_ = (1.0 - rest) * of_cadence_;
+}
+
+// 1 where legs or body rest. RT-safe
+double Gate::of_rest(const TrainedMotion& known) const noexcept {
+  const double swing =
+      rise(stride_.swing_rad(), kRest * known.swing_rad(), kSwing * known.swing_rad());
+  const double speed_deg_s = speed_.value_deg_s();
+  if (std::isnan(speed_deg_s)) return 1.0 - swing;
+  return 1.0 - swing * rise(speed_deg_s, kStill_deg_s, kMoving_deg_s);
+}
+
+// 1 where the legs run and did not in training: they are quicker, or the pelvis is higher while
+// they are apart. `cadence` is in shares of a usual one. The very poses of training are none of a
+// run. RT-safe
+double Gate::of_run(const TrainedMotion& known, double cadence) const noexcept {
+  const double taught = known.gait_correlation();
+  const double higher = gait_.correlation() - std::max(taught, kWalk);
+  if (!std::isnan(taught) && !std::isnan(higher)) cadence += kOfGait * higher;
+  return rise(cadence, kFast, kTooFast) * (1.0 - of_near_pose_);
+}
+
+// RT-safe
+void Gate::follow(double dt_s) noexcept {
+  const double part = -std::expm1(-dt_s / kStage_s);
+  double towards = wanted_;
+  for (double& stage : stage_) {
+    stage += part * (towards - stage);
+    if (std::abs(towards - stage) < kThere) stage = towards;
+    towards = stage;
+  }
+}
+
+// RT-safe
+void Gate::settle() noexcept {
+  if (fresh_) stage_.fill(1.0);
+  stride_.forget_cadence();
+}
+
+}  // namespace posed::style

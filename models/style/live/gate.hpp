@@ -1,0 +1,56 @@
+// Gate: fades the style out where the model does not know the motion, and in again where it does
+// (README.md, "Gate"). State of one stream. RT-safe.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "models/style/live/live_motion.hpp"
+#include "models/style/live/trained_motion.hpp"
+#include "models/style/live/warm_up.hpp"
+#include "proto/frame/frame.hpp"
+
+namespace posed::style {
+
+class Gate {
+ public:
+  // Advances by a frame, `dt_s` after the last one. `q` is the pose that the kernel sees; `walker`:
+  // seen from its own neutral pose. Where the gate is not `on`, or the model has no data for it
+  // (`known` is null), it opens: at once if it has never been on.
+  void update(const TrainedMotion* known, bool on, const Frame& frame, std::span<const float> q,
+              std::span<const std::uint8_t> available, const std::optional<Walker>& walker,
+              double dt_s) noexcept;
+
+  // How much style passes: 1 all, exactly, to 0 none, exactly; 0 before the first frame. It takes
+  // about 0.17 s half of the way, and its third derivative is finite.
+  [[nodiscard]] float open() const noexcept { return static_cast<float>(stage_.back()); }
+  // Whether the legs stride as in training; true where that is unknown.
+  [[nodiscard]] bool strides() const noexcept { return of_legs_ >= 0.5; }
+  [[nodiscard]] double cadence_rad_s() const noexcept { return stride_.cadence_rad_s(); }
+  // The next frame is the first of a clip, whose beginning it has seen backwards; open if it has
+  // seen nothing.
+  void settle() noexcept;
+
+ private:
+  void see_pose(const TrainedMotion& known, std::span<const float> q,
+                std::span<const std::uint8_t> available, bool is_own, double dt_s) noexcept;
+  void see_legs(const TrainedMotion& known, const Frame& frame, const std::optional<Walker>& walker,
+                double dt_s) noexcept;
+  [[nodiscard]] double of_rest(const TrainedMotion& known) const noexcept;
+  [[nodiscard]] double of_run(const TrainedMotion& known, double cadence) const noexcept;
+  void follow(double dt_s) noexcept;
+
+  bool fresh_ = true;  // was never on
+  LiveStride stride_;
+  LiveGait gait_;
+  PoseSpeed speed_;
+  double cadence_rad_s_ = 0.0;  // smoothed; 0: not known
+  // The last evidence; it stays where a frame has none.
+  double of_pose_ = 0.0, of_near_pose_ = 0.0, of_cadence_ = 0.0, of_legs_ = 1.0;
+  double wanted_ = 0.0;
+  std::array<double, 4> stage_{};  // low-passes in a row, the first follows wanted_
+};
+
+}  // namespace posed::style

@@ -1,0 +1,113 @@
+#include "models/style/live/live_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace posed::style {
+namespace {
+constexpr double kSpeedMemory_s = 0.04;  // time constant of the low-pass
+constexpr double kMemory_s = 0.4;        // time constant of means, variances and covariance
+constexpr double kLeastSeen_s = 0.4;     // about a step
+constexpr double kLeastHeight_m = 1e-3, kLeastApart_rad = 1e-2;  // standard deviations
+constexpr double kSmooth_s = 0.05;  // time constant of the signal's low-pass
+constexpr double kPart_s = 0.075;   // four of them: the legs rest for less within a stride
+constexpr double kBetweenTurns_s = 0.06;
+constexpr double kLeastSpan_s = 0.3;  // for a cadence
+
+}  // namespace
+
+// RT-safe
+void PoseSpeed::update(const TrainedMotion& known, std::span<const float> q,
+                       std::span<const std::uint8_t> available, double dt_s) noexcept {
+  const std::span<float> last(last_.data(), q.size());
+  if (dims_ == q.size() && dt_s > 0.0) {
+    const double speed_deg_s = known.turn_deg(last, q, available) / dt_s;
+    if (std::isnan(speed_deg_s_)) {
+      speed_deg_s_ = speed_deg_s;
+    } else if (!std::isnan(speed_deg_s)) {
+      speed_deg_s_ -= std::expm1(-dt_s / kSpeedMemory_s) * (speed_deg_s - speed_deg_s_);
+    }
+  }
+  dims_ = q.size();
+  for (std::size_t d = 0; d < q.size(); ++d) {
+    if (available[d] != 0) last[d] = q[d];
+  }
+}
+
+// A mean of all at first, then one that forgets. RT-safe
+void LiveGait::update(double height_m, double leg_rad, double dt_s) noexcept {
+  const double apart_rad = std::abs(leg_rad);
+  if (seen_s_ == 0.0) {
+    height_m_ = height_m;
+    apart_rad_ = apart_rad;
+    height_m2_ = apart_rad2_ = together_m_rad_ = 0.0;
+  }
+  if (dt_s <= 0.0) return;
+  seen_s_ += dt_s;
+  const double part = std::max(-std::expm1(-dt_s / kMemory_s), dt_s / (seen_s_ + dt_s));
+  const double up_m = height_m - height_m_;
+  const double wider_rad = apart_rad - apart_rad_;
+  height_m_ += part * up_m;
+  apart_rad_ += part * wider_rad;
+  height_m2_ = (1.0 - part) * (height_m2_ + part * up_m * up_m);
+  apart_rad2_ = (1.0 - part) * (apart_rad2_ + part * wider_rad * wider_rad);
+  together_m_rad_ = (1.0 - part) * (together_m_rad_ + part * up_m * wider_rad);
+}
+
+double LiveGait::correlation() const noexcept {
+  if (seen_s_ < kLeastSeen_s || height_m2_ < kLeastHeight_m * kLeastHeight_m ||
+      apart_rad2_ < kLeastApart_rad * kLeastApart_rad) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  return together_m_rad_ / std::sqrt(height_m2_ * apart_rad2_);
+}
+
+// RT-safe
+void LiveStride::update(double leg_rad, double dt_s, double cadence_rad_s) noexcept {
+  if (!started_) level_rad_ = leg_rad;
+  started_ = true;
+  if (dt_s <= 0.0) return;
+  const double step_rad = -std::expm1(-dt_s / kSmooth_s) * (leg_rad - level_rad_);
+  level_rad_ += step_rad;
+  speed_rad_ = step_rad / (dt_s * cadence_rad_s);
+  keep_speed(dt_s);
+  keep_turn(dt_s);
+}
+
+// RT-safe
+void LiveStride::keep_speed(double dt_s) noexcept {
+  part_s_ += dt_s;
+  if (part_s_ > kPart_s) {
+    std::ranges::copy_backward(fastest_rad_.begin(), fastest_rad_.end() - 1, fastest_rad_.end());
+    fastest_rad_[0] = 0.0;
+    part_s_ = 0.0;
+  }
+  fastest_rad_[0] = std::max(fastest_rad_[0], std::abs(speed_rad_));
+}
+
+// RT-safe
+void LiveStride::keep_turn(double dt_s) noexcept {
+  const double now_rad = std::atan2(-speed_rad_, level_rad_);
+  angle_rad_ += std::remainder(now_rad - angle_rad_, 2.0 * std::numbers::pi);
+  time_s_ += dt_s;
+  const Turn newest = turn_[(turns_ + kTurns - 1) % kTurns];
+  if (turns_ > 0 && time_s_ - newest.time_s < kBetweenTurns_s) return;
+  turn_[turns_ % kTurns] = {time_s_, angle_rad_};
+  turns_ = turns_ + 1 < 2 * kTurns ? turns_ + 1 : kTurns;
+}
+
+// A pose of long steps that is held has a level but no speed.
+double LiveStride::swing_rad() const noexcept {
+  return std::min(std::hypot(level_rad_, speed_rad_), *std::ranges::max_element(fastest_rad_));
+}
+
+double LiveStride::cadence_rad_s() const noexcept {
+  const Turn& oldest = turn_[turns_ < kTurns ? 0 : turns_ % kTurns];
+  const double span_s = time_s_ - oldest.time_s;
+  if (turns_ == 0 || span_s < kLeastSpan_s) return std::numeric_limits<double>::quiet_NaN();
+  return (angle_rad_ - oldest.angle_rad) / span_s;
+}
+
+}  // namespace posed::style

@@ -1,0 +1,244 @@
+#include <cmath>
+#include <cstdint>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "models/style/model/style_model.hpp"
+#include "proto/model/model_file.hpp"
+#include "proto/model/validator.hpp"
+
+namespace posed::style {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using model_file::kMaxNumber;
+
+constexpr int kMaxInputs = 20'000;
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+class Reader : public model_file::Validator {
+ public:
+  VectorXd vector(const google::protobuf::RepeatedField<double>& list, int size, const char* what) {
+    want(list.size() == size, what);
+    if (!sound()) return {};
+    VectorXd v = Eigen::Map<const VectorXd>(list.data(), size);
+    want(is_number(v), what);
+    return v;
+  }
+
+  MatrixXd matrix(const v1::Matrix& m, int columns, const char* what) {
+    const bool shaped = m.rows() >= 1 && m.rows() <= kMaxInputs &&
+                        m.columns() == static_cast<std::uint32_t>(columns) &&
+                        static_cast<std::int64_t>(m.rows()) * m.columns() == m.value_size();
+    want(shaped, what);
+    if (!sound()) return {};
+    MatrixXd out = Eigen::Map<const RowMajor>(m.value().data(), m.rows(), columns);
+    want(is_number(out), what);
+    return out;
+  }
+
+ private:
+  template <typename M>
+  static bool is_number(const M& m) {
+    return (m.array().abs() <= kMaxNumber).all();  // false for NaN
+  }
+};
+
+motion::PoseSpaceSpec read_space(const v1::PoseSpace& from, Reader& reader) {
+  motion::PoseSpaceSpec spec;
+  const auto space = motion::space_from_name(from.name());
+  reader.want(space.has_value(), "the name of the pose space");
+  if (space) spec.space = *space;
+  spec.joints.assign(from.joint().begin(), from.joint().end());
+  reader.want(!spec.joints.empty() && spec.joints.size() <= kMaxJoints, "the number of joints");
+  reader.want(
+      std::set<std::string>(spec.joints.begin(), spec.joints.end()).size() == spec.joints.size(),
+      "the joints' names");
+  reader.want(from.root() < spec.joints.size(), "the root joint");
+  spec.root = static_cast<int>(from.root());
+  const auto means = spec.space == motion::Space::kCmu43 ? 0 : static_cast<int>(spec.joints.size());
+  const VectorXd mean = reader.vector(from.mean_xyzw(), 4 * means, "the mean rotations");
+  for (int j = 0; j < means && reader.sound(); ++j) {
+    const Eigen::Quaterniond q(mean[4 * j + 3], mean[4 * j], mean[4 * j + 1], mean[4 * j + 2]);
+    reader.want(std::abs(q.norm() - 1.0) < 1e-6, "a mean rotation, which is no unit quaternion");
+    spec.mean.push_back(q);
+  }
+  const bool is_cmu = spec.space == motion::Space::kCmu43;
+  reader.want(!is_cmu || spec.joints.size() == motion::kCmu43Joints, "the joints of cmu43");
+  return spec;
+}
+
+gp::Trained read_process(const v1::GaussianProcess& from, int dims, Reader& reader) {
+  gp::Trained process;
+  process.inputs = reader.matrix(from.inputs(), dims, "the inputs' shape or values");
+  process.weights = reader.matrix(from.weights(), dims, "the weights' shape or values");
+  reader.want(process.inputs.rows() == process.weights.rows(), "the number of weights");
+  process.offset = reader.vector(from.offset(), dims, "the prior mean");
+  process.lambda = reader.number(from.lambda(), -60.0, 60.0, "lambda");
+  process.mu = reader.number(from.mu(), 1e-12, 1e12, "mu");
+  process.b = reader.number(from.b(), 0.0, kMaxNumber, "b");
+  process.noise = reader.number(from.noise(), 0.0, kMaxNumber, "the noise");
+  return process;
+}
+
+MoreStyle read_style(const v1::StyleTarget& from, Eigen::Index points, int dims, Reader& reader) {
+  MoreStyle style;
+  style.name = from.name();
+  style.function.weights = reader.matrix(from.weights(), dims, "a style's weights");
+  reader.want(style.function.weights.rows() == points, "the number of a style's weights");
+  style.function.offset = reader.vector(from.offset(), dims, "a style's prior mean");
+  style.limit_rad = reader.vector(from.limit_rad(), dims, "a style's limits");
+  if (reader.sound()) reader.want((style.limit_rad.array() >= 0.0).all(), "a limit below zero");
+  return style;
+}
+
+GateData read_gate(const v1::StyleGate& from, int dims, Reader& reader) {
+  GateData gate;
+  gate.neutral = reader.vector(from.neutral(), dims, "the neutral pose");
+  if (from.swing_rad() == 0.0 && from.fastest_stride_s() == 0.0) return gate;
+  gate.swing_rad = reader.number(from.swing_rad(), 1e-3, 10.0, "the legs' swing");
+  gate.fastest_stride_s = reader.number(from.fastest_stride_s(), 0.05, 100.0, "the fastest stride");
+  if (from.has_gait_correlation()) {
+    gate.gait_correlation =
+        reader.number(from.gait_correlation(), -1.0, 1.0, "the correlation of the gait");
+  }
+  return gate;
+}
+
+StyleAxis read_axis(const v1::StyleAxis& from, int dims, Reader& reader) {
+  StyleAxis axis;
+  axis.direction = reader.vector(from.direction(), dims, "the style's axis");
+  axis.offset = reader.number(from.offset(), -kMaxNumber, kMaxNumber, "the style's offset");
+  return axis;
+}
+
+StyleModel read_model(const v1::StyleModel& from, Reader& reader) {
+  StyleModel model;
+  model.space = read_space(from.space(), reader);
+  const int dims = motion::space_dims(model.space);
+  model.process = read_process(from.process(), dims, reader);
+  model.limit_rad = reader.vector(from.limit_rad(), dims, "the limits");
+  if (reader.sound()) reader.want((model.limit_rad.array() >= 0.0).all(), "a limit below zero");
+  model.to = from.to();
+  for (const v1::StyleTarget& style : from.more()) {
+    if (!reader.sound()) break;
+    model.more.push_back(read_style(style, model.process.inputs.rows(), dims, reader));
+  }
+  const auto names = model.names();
+  reader.want(names.size() <= kMaxStyles, "the number of styles");
+  reader.want(std::set<std::string>(names.begin(), names.end()).size() == names.size(),
+              "the styles' names");
+  model.rate_hz = reader.number(from.rate_hz(), 1.0, 10'000.0, "the frame rate");
+  model.from = from.from();
+  model.report_json = from.report_json();
+  if (from.has_gate()) model.gate = read_gate(from.gate(), dims, reader);
+  if (from.has_axis()) model.axis = read_axis(from.axis(), dims, reader);
+  return model;
+}
+
+void write_matrix(const MatrixXd& m, v1::Matrix& out) {
+  out.set_rows(static_cast<std::uint32_t>(m.rows()));
+  out.set_columns(static_cast<std::uint32_t>(m.cols()));
+  const RowMajor rows = m;
+  out.mutable_value()->Add(rows.data(), rows.data() + rows.size());
+}
+
+void write_vector(const VectorXd& v, google::protobuf::RepeatedField<double>& out) {
+  out.Add(v.data(), v.data() + v.size());
+}
+
+}  // namespace
+
+Result<StyleModel> parse_model(std::span<const std::byte> bytes, const std::string& name) {
+  const auto file = model_file::open(bytes, name);
+  if (!file) return std::unexpected(file.error());
+  if (!file->has_style()) {
+    return fail("the model is not a style model; make one with `posed train style`", name);
+  }
+  Reader reader;
+  StyleModel model = read_model(file->style(), reader);
+  if (auto verdict = reader.verdict(name); !verdict) return std::unexpected(verdict.error());
+  return model;
+}
+
+Result<StyleModel> load_model(const std::filesystem::path& path) {
+  const auto bytes = model_file::load(path);
+  if (!bytes) return std::unexpected(bytes.error());
+  return parse_model(std::as_bytes(std::span(*bytes)), path.string());
+}
+
+std::string serialize_model(const StyleModel& model) {
+  v1::ModelFile file;
+  v1::StyleModel& style = *file.mutable_style();
+  v1::PoseSpace& space = *style.mutable_space();
+  space.set_name(std::string(motion::space_name(model.space.space)));
+  for (const std::string& joint : model.space.joints) space.add_joint(joint);
+  for (const Eigen::Quaterniond& q : model.space.mean) {
+    for (const double value : {q.x(), q.y(), q.z(), q.w()}) space.add_mean_xyzw(value);
+  }
+  space.set_root(static_cast<std::uint32_t>(model.space.root));
+  v1::GaussianProcess& process = *style.mutable_process();
+  write_matrix(model.process.inputs, *process.mutable_inputs());
+  write_matrix(model.process.weights, *process.mutable_weights());
+  write_vector(model.process.offset, *process.mutable_offset());
+  process.set_lambda(model.process.lambda);
+  process.set_mu(model.process.mu);
+  process.set_b(model.process.b);
+  process.set_noise(model.process.noise);
+  write_vector(model.limit_rad, *style.mutable_limit_rad());
+  style.set_rate_hz(model.rate_hz);
+  style.set_from(model.from);
+  style.set_to(model.to);
+  style.set_report_json(model.report_json);
+  for (const MoreStyle& one : model.more) {
+    v1::StyleTarget& target = *style.add_more();
+    target.set_name(one.name);
+    write_matrix(one.function.weights, *target.mutable_weights());
+    write_vector(one.function.offset, *target.mutable_offset());
+    write_vector(one.limit_rad, *target.mutable_limit_rad());
+  }
+  if (model.gate.present()) {
+    write_vector(model.gate.neutral, *style.mutable_gate()->mutable_neutral());
+    style.mutable_gate()->set_swing_rad(model.gate.swing_rad);
+    style.mutable_gate()->set_fastest_stride_s(model.gate.fastest_stride_s);
+    if (!std::isnan(model.gate.gait_correlation)) {
+      style.mutable_gate()->set_gait_correlation(model.gate.gait_correlation);
+    }
+  }
+  if (model.axis.present()) {
+    write_vector(model.axis.direction, *style.mutable_axis()->mutable_direction());
+    style.mutable_axis()->set_offset(model.axis.offset);
+  }
+  return model_file::wrap(std::move(file));
+}
+
+Result<> save_model(const StyleModel& model, const std::filesystem::path& path) {
+  return model_file::save(serialize_model(model), path);
+}
+
+std::vector<std::string> StyleModel::names() const {
+  std::vector<std::string> names{to};
+  for (const MoreStyle& style : more) names.push_back(style.name);
+  return names;
+}
+
+StyleModel mixture_of(const StyleModel& model, std::span<const double> shares) {
+  StyleModel mixture = model;
+  mixture.more.clear();
+  mixture.process.weights *= shares[0];
+  mixture.process.offset *= shares[0];
+  mixture.limit_rad *= shares[0];
+  for (std::size_t s = 1; s < model.styles(); ++s) {
+    const MoreStyle& style = model.more[s - 1];
+    mixture.process.weights += shares[s] * style.function.weights;
+    mixture.process.offset += shares[s] * style.function.offset;
+    mixture.limit_rad += shares[s] * style.limit_rad;
+  }
+  return mixture;
+}
+
+}  // namespace posed::style

@@ -1,0 +1,80 @@
+// StyleModel: the result of `posed train style`, used by `run`, `apply` and `replay`. Its file is
+// described in proto/README.md: 24 bytes of header, then posed.v1.ModelFile.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "models/gp/predictor.hpp"
+#include "models/motion/pose_space.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::style {
+
+inline constexpr std::size_t kMaxStyles = gp::kMaxFunctions;  // of one model
+
+// A style after a model's first one: another function of the same inputs.
+struct MoreStyle {
+  std::string name;  // of its group
+  gp::Function function;
+  Eigen::VectorXd limit_rad;
+};
+
+// Data by which the gate and the warm-up recognise a motion that the model knows (README.md, "Gate"
+// and "Warm-up").
+struct GateData {
+  Eigen::VectorXd neutral{};  // mean pose of the source's neutral walk [dims]; empty: no gate data
+  // LiveStride's, the least mean of a training clip, and the period of the fastest clip. Both are
+  // 0 where the training shows no strides.
+  double swing_rad = 0.0;
+  double fastest_stride_s = 0.0;
+  // LiveGait's mean in the clip where it is highest; NaN: unknown.
+  double gait_correlation = std::numeric_limits<double>::quiet_NaN();
+
+  [[nodiscard]] bool present() const { return neutral.size() > 0; }
+  [[nodiscard]] bool strides() const { return swing_rad > 0.0; }
+};
+
+// How much of the style a mean pose shows, direction . q + offset: 0 the source's, 1 the target's
+// (README.md, "Auto-alpha").
+struct StyleAxis {
+  Eigen::VectorXd direction{};  // [dims]; empty: not known
+  double offset = 0.0;
+
+  [[nodiscard]] bool present() const { return direction.size() > 0; }
+};
+
+struct StyleModel {
+  motion::PoseSpaceSpec space;
+  gp::Trained process;        // q -> difference of q at alpha = 1
+  Eigen::VectorXd limit_rad;  // clamp of |difference| per dimension (1.5 x the largest in training)
+  double rate_hz = 30.0;      // of training; the filter has no memory and is correct at any rate
+  std::string from, to;       // group names, for people
+  std::string report_json;    // what `train --json` printed
+  GateData gate{};
+  StyleAxis axis{};
+  std::vector<MoreStyle> more{};  // `process`, `limit_rad` and `to` are the first style's
+
+  [[nodiscard]] std::size_t styles() const { return 1 + more.size(); }
+  [[nodiscard]] std::vector<std::string> names() const;  // of its styles, in order
+};
+
+// The model with one style alone: the sum of all, each times its share [styles()].
+[[nodiscard]] StyleModel mixture_of(const StyleModel& model, std::span<const double> shares);
+
+[[nodiscard]] Result<StyleModel> load_model(const std::filesystem::path& path);
+// Reads a model as load_model() does, from bytes (control message, device log). `name` is only for
+// error messages. Any bytes give a model or an Error, never a crash.
+[[nodiscard]] Result<StyleModel> parse_model(std::span<const std::byte> bytes,
+                                             const std::string& name);
+[[nodiscard]] std::string serialize_model(const StyleModel& model);
+[[nodiscard]] Result<> save_model(const StyleModel& model, const std::filesystem::path& path);
+
+}  // namespace posed::style

@@ -1,0 +1,48 @@
+// A clip treated as a device: the bytes of each of its frames, and a description from which they
+// can be decoded again with no other input. A log holds both, so their form is part of the log
+// format:
+//
+// - BVH, AMC and hand CSV (Format::sends_text): a frame is its piece of the file's text, ended by a
+//   line end; the description is the file's header, its first frame and the facts that need the
+//   whole clip.
+// - every other format: a frame is its time, if the clip has times, and its channel values, as
+//   little-endian doubles (FrameParser::numbers); the description is the skeleton as JSON.
+//
+// Cold.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/clip/clip.hpp"
+#include "proto/clip/frame_parser.hpp"
+
+namespace posed::clip {
+
+// Everything needed to decode the frames of a clip.
+struct FrameCoding {
+  std::shared_ptr<const Skeleton> skeleton;  // identical, including id, to the one from read_clip()
+  double frame_rate_hz = 0.0;
+  FrameParser parser;
+};
+
+// The whole clip has been read once, so every frame is known to be valid.
+struct DeviceClip {
+  FrameCoding coding;
+  std::string description;          // valid UTF-8 if the file's text is
+  std::vector<std::string> frames;  // the bytes of each frame, at least one
+  std::vector<double> time_s;       // [frame], as Clip::time_s
+  std::vector<std::string> warnings;
+};
+
+[[nodiscard]] Result<DeviceClip> open_device_clip(const std::filesystem::path& path,
+                                                  const ReadOptions& options = {});
+
+// `description` is untrusted; `name` is used in error messages.
+[[nodiscard]] Result<FrameCoding> parse_description(std::string_view description,
+                                                    const std::string& name);
+
+}  // namespace posed::clip

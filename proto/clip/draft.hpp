@@ -1,0 +1,64 @@
+// Draft: what each clip reader makes of a file, and the step from there to a Clip, which they
+// share.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "proto/clip/clip.hpp"
+#include "proto/clip/frame_parser.hpp"
+#include "proto/frame/profile.hpp"
+
+namespace posed::clip {
+
+// The text of one frame in the file.
+struct FrameSpan {
+  std::string_view text;
+  int line = 0;  // line of its first word
+};
+
+// How the frames stand in a file whose stream sends its own lines (Format::sends_text).
+struct TextFrames {
+  FrameParser parser;
+  std::string_view header;  // everything before the first frame; points into ClipFile::bytes
+  std::vector<FrameSpan> frames;
+};
+
+// The result of a format's reader: all frames of a file as numbers. clip_of() adds what only the
+// whole clip shows.
+struct Draft {
+  Skeleton skeleton;               // metres; unfinished, unless skeleton_is_known
+  bool skeleton_is_known = false;  // posed's own: it has bones, root joint and T frames
+  const Profile* profile = nullptr;
+  double frame_rate_hz = 0.0;
+  double metres_per_unit = 1.0;
+  std::vector<double> values;    // [frame x channel], rad and m
+  std::vector<double> time_s{};  // [frame], increasing; empty: evenly spaced, from 0
+  std::vector<std::string> warnings;
+  std::optional<TextFrames> text{};  // set exactly where the format sends text
+};
+
+// Parses the frames of a text into `values`, and into `time_s` the times that they carry, NaN where
+// one is missing. Errors name the frame and its line.
+[[nodiscard]] Result<> read_frames(const TextFrames& text, const std::string& name,
+                                   std::vector<double>& values, std::vector<double>& time_s);
+
+// Facts that only all frames show, supplied when only the first frame is available (the device
+// description in a log).
+struct Hints {
+  std::optional<int> root_joint;
+  KnownT T;
+};
+
+// Completes the skeleton: bones, root joint, offsets and T frames, as far as the draft does not
+// know them. A draft without frames is an error.
+[[nodiscard]] Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints = {});
+
+// Mean global rotation of each joint [joint], with the heading of each frame (from the line between
+// the upper legs) removed. Input of t_frames_from_mean_pose(), when the figure walks or stands in
+// the clip.
+[[nodiscard]] std::vector<Eigen::Quaterniond> mean_rotations(const Clip& clip);
+
+}  // namespace posed::clip

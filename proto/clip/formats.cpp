@@ -1,0 +1,202 @@
+#include "proto/clip/formats.hpp"
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <optional>
+#include <utility>
+
+#include "proto/clip/draft.hpp"
+#include "proto/clip/text.hpp"
+#include "proto/text/load_file.hpp"
+
+namespace posed::clip {
+namespace {
+
+constexpr FileRule kClip{.what = "clip", .max_bytes = 2'000'000'000};
+constexpr std::uintmax_t kMaxSkeletonFile = 16'000'000;  // bytes; real files have about 10 KB
+constexpr std::size_t kSniffedBytes = 4096;
+
+std::vector<Format>& table() {
+  static std::vector<Format> all{bvh_format(), amc_format(), hand_csv_format(), glb_format()};
+  return all;
+}
+
+bool has(const Format& format, ReadOption option) {
+  return std::ranges::find(format.options, option) != format.options.end();
+}
+
+bool serves(const Format& format, Use use) {
+  const bool reads = use == Use::kRead || use == Use::kReadBody;
+  if (reads ? format.read == nullptr : format.write == nullptr) return false;
+  return !format.is_hand || use == Use::kRead || use == Use::kWrite;
+}
+
+struct GivenOption {
+  ReadOption option;
+  std::string_view words;
+  bool given;
+};
+
+std::array<GivenOption, 6> given(const ReadOptions& options) {
+  return {{{ReadOption::kSkeleton, "a skeleton", !options.skeleton.empty()},
+           {ReadOption::kRate, "a rate", options.rate_hz.has_value()},
+           {ReadOption::kUnit, "a unit of length", options.metres_per_unit.has_value()},
+           {ReadOption::kProfile, "a profile", !options.profile.empty()},
+           {ReadOption::kHand, "a hand", options.hand.has_value()},
+           {ReadOption::kHandShape, "a hand shape", options.hand_shape != kDefaultHandShape}}};
+}
+
+// "a, b or c".
+std::string enumerated(const std::vector<std::string>& words) {
+  std::string text;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    if (i > 0) text += i + 1 == words.size() ? " or " : ", ";
+    text += words[i];
+  }
+  return text;
+}
+
+// The first bytes of a regular file; empty if it cannot be read, which load_file() then reports.
+std::string first_bytes(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) return {};
+  std::ifstream file(path, std::ios::binary);
+  std::string bytes(kSniffedBytes, '\0');
+  file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(file.gcount()));
+  return bytes;
+}
+
+std::filesystem::path beside(const Format& format, const std::filesystem::path& path) {
+  const std::string stem = path.stem().string();
+  return path.parent_path() /
+         (stem.substr(0, stem.find('_')) + std::string(format.skeleton_extension));
+}
+
+Result<> load_skeleton(const Format& format, const std::filesystem::path& path,
+                       const ReadOptions& options, ClipFile& file) {
+  const auto skeleton = options.skeleton.empty() ? beside(format, path) : options.skeleton;
+  if (options.skeleton.empty() && !std::filesystem::exists(skeleton)) {
+    return fail(
+        "needs its skeleton: " + skeleton.string() + " is not there; name it with --skeleton",
+        file.name);
+  }
+  const std::string what = "skeleton (" + std::string(format.skeleton_extension) + ")";
+  auto content = load_file(skeleton, {.what = what, .max_bytes = kMaxSkeletonFile});
+  if (!content) return std::unexpected(content.error());
+  file.skeleton_name = skeleton.string();
+  file.skeleton = std::move(*content);
+  return {};
+}
+
+}  // namespace
+
+std::span<const Format> formats() { return table(); }
+
+void add_format(Format format) {
+  if (std::ranges::find(table(), format.name, &Format::name) == table().end()) {
+    table().push_back(std::move(format));
+  }
+}
+
+std::string extension_of(const std::filesystem::path& path) {
+  return lower(path.extension().string());
+}
+
+const Format* format_of(const std::filesystem::path& path) {
+  const std::string extension = extension_of(path);
+  const auto found = std::ranges::find_if(table(), [&](const Format& format) {
+    return std::ranges::find(format.extensions, extension) != format.extensions.end();
+  });
+  return found == table().end() ? nullptr : &*found;
+}
+
+const Format* format_of_bytes(std::string_view begin) {
+  begin = without_bom(begin);
+  const auto found = std::ranges::find_if(table(), [&](const Format& format) {
+    return format.sniff != nullptr && format.sniff(begin);
+  });
+  return found == table().end() ? nullptr : &*found;
+}
+
+std::string listed(Use use) {
+  std::vector<std::string> words;
+  for (const Format& format : table()) {
+    if (!serves(format, use)) continue;
+    for (const std::string_view extension : format.extensions) {
+      words.push_back((format.is_hand ? "a hand's " : "") + std::string(extension));
+    }
+  }
+  return enumerated(words);
+}
+
+std::vector<std::string_view> extensions(Use use) {
+  std::vector<std::string_view> all;
+  for (const Format& format : table()) {
+    if (!serves(format, use)) continue;
+    all.insert(all.end(), format.extensions.begin(), format.extensions.end());
+  }
+  return all;
+}
+
+bool accepts(const std::filesystem::path& path, ReadOption option) {
+  const Format* format = format_of(path);
+  return format != nullptr && has(*format, option);
+}
+
+ReadOptions accepted_options(const std::filesystem::path& path, ReadOptions options) {
+  const ReadOptions none;
+  if (!accepts(path, ReadOption::kSkeleton)) options.skeleton = none.skeleton;
+  if (!accepts(path, ReadOption::kRate)) options.rate_hz = none.rate_hz;
+  if (!accepts(path, ReadOption::kUnit)) options.metres_per_unit = none.metres_per_unit;
+  if (!accepts(path, ReadOption::kProfile)) options.profile = none.profile;
+  if (!accepts(path, ReadOption::kHand)) options.hand = none.hand;
+  if (!accepts(path, ReadOption::kHandShape)) options.hand_shape = none.hand_shape;
+  return options;
+}
+
+Result<> check_options(const Format& format, const ReadOptions& options, const std::string& file) {
+  for (const GivenOption& option : given(options)) {
+    if (!option.given || has(format, option.option)) continue;
+    std::vector<std::string> others;
+    for (const Format& other : table()) {
+      if (has(other, option.option)) others.emplace_back(other.name);
+    }
+    return misuse("is " + std::string(format.article) + " " + std::string(format.name) +
+                      ", and only " + enumerated(others) + " accepts " + std::string(option.words) +
+                      "; leave it out",
+                  file);
+  }
+  return {};
+}
+
+std::filesystem::path skeleton_beside(const std::filesystem::path& path) {
+  const Format* format = format_of(path);
+  if (format == nullptr || format->skeleton_extension.empty()) return {};
+  return beside(*format, path);
+}
+
+Result<LoadedClip> load_clip(const std::filesystem::path& path, const ReadOptions& options) {
+  LoadedClip loaded{.format = format_of(path), .file = {.name = path.string(), .bytes = {}}};
+  if (loaded.format == nullptr) loaded.format = format_of_bytes(first_bytes(path));
+  if (loaded.format == nullptr || loaded.format->read == nullptr) {
+    if (!std::filesystem::exists(path)) {
+      return fail("is not there; check the path", loaded.file.name);
+    }
+    return fail("is no clip posed can read; a clip is " + listed(Use::kRead), loaded.file.name);
+  }
+  if (auto ok = check_options(*loaded.format, options, loaded.file.name); !ok) {
+    return std::unexpected(ok.error());
+  }
+  auto bytes = load_file(path, kClip);
+  if (!bytes) return std::unexpected(bytes.error());
+  loaded.file.bytes = std::move(*bytes);
+  if (loaded.format->skeleton_extension.empty()) return loaded;
+  if (auto ok = load_skeleton(*loaded.format, path, options, loaded.file); !ok) {
+    return std::unexpected(ok.error());
+  }
+  return loaded;
+}
+
+}  // namespace posed::clip

@@ -1,0 +1,267 @@
+#include "proto/clip/gltf.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <ostream>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <tiny_gltf.h>
+
+#include "proto/clip/formats.hpp"
+#include "proto/frame/whole_file.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::clip {
+namespace {
+
+constexpr std::size_t kMaxBytes = std::numeric_limits<std::uint32_t>::max() / 2;
+
+// Fills a tinygltf model: all numbers go into one buffer, which becomes the binary part of the
+// file.
+class ModelBuilder {
+ public:
+  explicit ModelBuilder(const GltfMotion& motion) : motion_(motion) {
+    model_.asset.version = "2.0";
+    model_.asset.generator = "posed";
+    model_.buffers.emplace_back();
+  }
+
+  [[nodiscard]] tinygltf::Model build(GltfKind kind) {
+    add_nodes();
+    add_animation();
+    if (kind == GltfKind::kSkin) add_skin();
+    if (kind == GltfKind::kVrmAnimation) add_humanoid();
+    return std::move(model_);
+  }
+
+ private:
+  // Returns the number of the accessor. glTF wants the bounds of times.
+  int add_numbers(const std::vector<float>& values, int type, bool bounds = false) {
+    auto& data = model_.buffers.front().data;
+    tinygltf::BufferView view;
+    view.buffer = 0;
+    view.byteOffset = data.size();
+    view.byteLength = values.size() * sizeof(float);
+    static_assert(std::endian::native == std::endian::little, "glTF's numbers are little-endian");
+    const auto bytes = std::as_bytes(std::span(values));
+    for (const std::byte byte : bytes) data.push_back(static_cast<unsigned char>(byte));
+    model_.bufferViews.push_back(std::move(view));
+    tinygltf::Accessor accessor;
+    accessor.bufferView = static_cast<int>(model_.bufferViews.size()) - 1;
+    accessor.componentType = TINYGLTF_COMPONENT_TYPE_FLOAT;
+    accessor.type = type;
+    const int parts = tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(type));
+    accessor.count = values.size() / static_cast<std::size_t>(parts);
+    if (bounds) {
+      const auto [least, most] = std::ranges::minmax(values);
+      accessor.minValues = {least};
+      accessor.maxValues = {most};
+    }
+    model_.accessors.push_back(std::move(accessor));
+    return static_cast<int>(model_.accessors.size()) - 1;
+  }
+
+  void add_nodes() {
+    for (const GltfNode& from : motion_.nodes) {
+      tinygltf::Node node;
+      node.name = clean(from.name);  // JSON is UTF-8; a clip's names may hold any bytes
+      node.translation = {from.offset_m.x(), from.offset_m.y(), from.offset_m.z()};
+      if (from.parent >= 0) {
+        model_.nodes[static_cast<std::size_t>(from.parent)].children.push_back(
+            static_cast<int>(model_.nodes.size()));
+      }
+      model_.nodes.push_back(std::move(node));
+    }
+    tinygltf::Scene scene;
+    scene.nodes = {0};
+    model_.scenes.push_back(std::move(scene));
+    model_.defaultScene = 0;
+  }
+
+  void add_track(tinygltf::Animation& animation, int times, int node, const char* path,
+                 const std::vector<float>& values, int type) {
+    if (values.empty()) return;
+    tinygltf::AnimationSampler sampler;
+    sampler.input = times;
+    sampler.output = add_numbers(values, type);
+    sampler.interpolation = "LINEAR";
+    tinygltf::AnimationChannel channel;
+    channel.sampler = static_cast<int>(animation.samplers.size());
+    channel.target_node = node;
+    channel.target_path = path;
+    animation.samplers.push_back(std::move(sampler));
+    animation.channels.push_back(std::move(channel));
+  }
+
+  void add_animation() {
+    tinygltf::Animation animation;
+    animation.name = clean(motion_.name);
+    const int times = add_numbers(motion_.time_s, TINYGLTF_TYPE_SCALAR, true);
+    for (std::size_t i = 0; i < motion_.nodes.size(); ++i) {
+      const GltfNode& node = motion_.nodes[i];
+      const int index = static_cast<int>(i);
+      add_track(animation, times, index, "translation", node.position_m, TINYGLTF_TYPE_VEC3);
+      add_track(animation, times, index, "rotation", node.rotation_xyzw, TINYGLTF_TYPE_VEC4);
+    }
+    // glTF does not allow an animation of nothing: a figure without channels stands still.
+    if (!animation.channels.empty()) model_.animations.push_back(std::move(animation));
+  }
+
+  // Blender makes bones only of the joints of a skin, and takes their places at rest from the
+  // inverse bind matrices.
+  void add_skin() {
+    tinygltf::Skin skin;
+    skin.name = clean(motion_.name);
+    skin.skeleton = 0;
+    std::vector<Eigen::Vector3d> place_m;  // in the world, at rest
+    std::vector<float> matrices;           // column by column
+    for (const GltfNode& node : motion_.nodes) {
+      skin.joints.push_back(static_cast<int>(place_m.size()));
+      place_m.push_back(node.offset_m);
+      if (node.parent >= 0) place_m.back() += place_m[static_cast<std::size_t>(node.parent)];
+      for (int i = 0; i < 16; ++i) matrices.push_back(i % 5 == 0 ? 1.0F : 0.0F);
+      for (int i = 0; i < 3; ++i) {
+        matrices[matrices.size() - 4 + static_cast<std::size_t>(i)] =
+            -static_cast<float>(place_m.back()[i]);
+      }
+    }
+    skin.inverseBindMatrices = add_numbers(matrices, TINYGLTF_TYPE_MAT4);
+    model_.skins.push_back(std::move(skin));
+  }
+
+  void add_humanoid() {
+    using tinygltf::Value;
+    Value::Object bones;
+    for (std::size_t i = 0; i < motion_.nodes.size(); ++i) {
+      if (!motion_.nodes[i].bone) continue;
+      bones[std::string(bone_name(*motion_.nodes[i].bone))] =
+          Value(Value::Object{{"node", Value(static_cast<int>(i))}});
+    }
+    constexpr const char* kExtension = "VRMC_vrm_animation";
+    model_.extensions[kExtension] =
+        Value(Value::Object{{"specVersion", Value(std::string("1.0"))},
+                            {"humanoid", Value(Value::Object{{"humanBones", Value(bones)}})}});
+    model_.extensionsUsed = {kExtension};
+  }
+
+  const GltfMotion& motion_;
+  tinygltf::Model model_;
+};
+
+bool all_finite(const std::vector<float>& values) {
+  return std::ranges::all_of(values, [](float value) { return std::isfinite(value); });
+}
+
+Result<> check(const GltfMotion& motion, const std::string& path) {
+  std::size_t numbers = motion.time_s.size();
+  for (const GltfNode& node : motion.nodes) {
+    numbers += node.position_m.size() + node.rotation_xyzw.size() + 16;
+    if (node.offset_m.allFinite() && all_finite(node.position_m) &&
+        all_finite(node.rotation_xyzw)) {
+      continue;
+    }
+    return fail("joint " + in_quotes(node.name) + " has no value in some frames; fill them first",
+                path);
+  }
+  if (numbers * sizeof(float) < kMaxBytes) return {};
+  return fail("would be longer than a glTF file can be; write a part of the clip", path);
+}
+
+GltfNode end_site_of(const Joint& joint, int parent) {
+  return {.name = joint.name + "_end", .parent = parent, .offset_m = *joint.end_site_m};
+}
+
+std::span<const double> values_of(const Clip& clip, int frame) {
+  const auto row = clip.channels.row(frame);
+  return {row.data(), static_cast<std::size_t>(row.size())};
+}
+
+}  // namespace
+
+Result<std::vector<float>> gltf_times(const Clip& clip) {
+  if (clip.frames() == 0) return fail("has no frames, so there is nothing to write", clip.path);
+  std::vector<float> time_s;
+  double last_s = 0.0;
+  for (int i = 0; i < clip.frames(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const double now_s =
+        clip.time_s.empty() ? i / clip.frame_rate_hz : clip.time_s[at] - clip.time_s.front();
+    auto rounded_s = static_cast<float>(now_s);
+    if (!std::isfinite(rounded_s) || now_s < last_s) {
+      return fail("the time of frame " + std::to_string(i + 1) +
+                      " is before that of the last one, or is none; mend the clip's times",
+                  clip.path);
+    }
+    if (i > 0 && rounded_s <= time_s.back()) {
+      rounded_s = std::nextafter(time_s.back(), std::numeric_limits<float>::max());
+    }
+    time_s.push_back(rounded_s);
+    last_s = now_s;
+  }
+  return time_s;
+}
+
+void add_rotation(GltfNode& node, Eigen::Quaterniond rotation) {
+  const std::vector<float>& before = node.rotation_xyzw;
+  if (!before.empty() && Eigen::Map<const Eigen::Vector4f>(&before[before.size() - 4])
+                                 .cast<double>()
+                                 .dot(rotation.coeffs()) < 0.0) {
+    rotation.coeffs() *= -1.0;
+  }
+  for (int i = 0; i < 4; ++i) {
+    node.rotation_xyzw.push_back(static_cast<float>(rotation.coeffs()[i]));
+  }
+}
+
+void add_position(GltfNode& node, const Eigen::Vector3d& position_m) {
+  for (int i = 0; i < 3; ++i) node.position_m.push_back(static_cast<float>(position_m[i]));
+}
+
+Result<> write_gltf(const GltfMotion& motion, GltfKind kind, const std::filesystem::path& path) {
+  if (auto ok = check(motion, path.string()); !ok) return ok;
+  const tinygltf::Model model = ModelBuilder(motion).build(kind);
+  return write_whole_file(path, [&model](std::ostream& file) {
+    tinygltf::TinyGLTF writer;
+    if (!writer.WriteGltfSceneToStream(&model, file, false, true)) {
+      file.setstate(std::ios::failbit);
+    }
+  });
+}
+
+Result<> write_glb(const Clip& clip, const std::filesystem::path& path) {
+  auto time_s = gltf_times(clip);
+  if (!time_s) return std::unexpected(time_s.error());
+  const Skeleton& skeleton = *clip.skeleton;
+  GltfMotion motion{.name = path.stem().string(), .time_s = std::move(*time_s), .nodes = {}};
+  for (int j = 0; j < std::ssize(skeleton.joints); ++j) {
+    const Joint& joint = skeleton.joints[j];
+    GltfNode node{.name = joint.name, .parent = joint.parent, .offset_m = joint.offset_m};
+    node.bone = joint.bone;
+    const auto channels = channels_of(skeleton, j);
+    const auto first = channels.data() - skeleton.channels.data();
+    const bool moves = std::ranges::any_of(channels, &Channel::translation);
+    const bool turns = !std::ranges::all_of(channels, &Channel::translation);
+    for (int i = 0; i < clip.frames(); ++i) {
+      const auto values = values_of(clip, i);
+      if (moves) add_position(node, local_position(joint, channels, values.data() + first));
+      if (turns) add_rotation(node, local_rotation(skeleton, j, values));
+    }
+    motion.nodes.push_back(std::move(node));
+  }
+  for (int j = 0; j < std::ssize(skeleton.joints); ++j) {  // behind all joints, to keep their order
+    if (skeleton.joints[j].end_site_m) {
+      motion.nodes.push_back(end_site_of(skeleton.joints[j], j));
+    }
+  }
+  return write_gltf(motion, GltfKind::kSkin, path);
+}
+
+Format glb_format() { return {.name = "GLB", .extensions = {".glb"}, .write = write_glb}; }
+
+}  // namespace posed::clip

@@ -1,0 +1,63 @@
+// The score of a styled walk in cases where it is known in advance, and where none is defined.
+#include "models/style/judge/evaluate.hpp"
+
+#include <catch2/catch.hpp>
+
+#include "models/motion/synthetic_walker.hpp"
+
+using namespace posed;
+using motion::make_walker;
+using motion::WalkerFamily;
+
+TEST_CASE("a walk left alone scores one, the target's own walk scores zero", "[style][evaluate]") {
+  const auto march = make_walker({.family = WalkerFamily::kMarch, .person = 1}).value();
+  const auto sway = make_walker({.family = WalkerFamily::kSway, .person = 1}).value();
+  const auto alone = style::evaluate_style(march, march, sway);
+  REQUIRE(alone);
+  CHECK(alone->cycle_ratio == 1.0);
+  CHECK(alone->ratio == 1.0);
+  CHECK(alone->jerk_ratio == 1.0);
+  CHECK(alone->component_rms_deg == 0.0);
+  const auto reached = style::evaluate_style(march, sway, sway);
+  REQUIRE(reached);
+  CHECK(reached->cycle_ratio == Approx(0.0).margin(1e-9));
+  CHECK(reached->component_rms_deg > 1.0);
+}
+
+TEST_CASE("a target that is the source itself, or a source that stands still, has no score",
+          "[style][evaluate]") {
+  auto march = make_walker({.family = WalkerFamily::kMarch, .person = 1}).value();
+  const auto sway = make_walker({.family = WalkerFamily::kSway, .person = 1}).value();
+  march.path = "march.bvh";
+  const auto same = style::evaluate_style(march, sway, march);
+  REQUIRE_FALSE(same);
+  CHECK(same.error().message.find("walks as the source does already") != std::string::npos);
+  CHECK(same.error().file == "march.bvh");
+
+  auto still = march;
+  still.path = "still.bvh";
+  still.channels.rowwise() = march.channels.row(0).eval();
+  const auto held = style::evaluate_style(still, still, sway);
+  REQUIRE_FALSE(held);
+  CHECK(held.error().message.find("does not move") != std::string::npos);
+  CHECK(held.error().file == "still.bvh");
+}
+
+TEST_CASE("a model of the canonical skeleton is compared on a target with other joint names",
+          "[style][evaluate]") {
+  const auto march = make_walker({.family = WalkerFamily::kMarch, .person = 1}).value();
+  auto sway = make_walker({.family = WalkerFamily::kSway, .person = 1}).value();
+  auto renamed = std::make_shared<Skeleton>(*sway.skeleton);
+  for (Joint& joint : renamed->joints) joint.name = "my_" + joint.name;
+  sway.skeleton = renamed;
+  sway.path = "sway.bvh";
+  const auto native = style::evaluate_style(march, march, sway);
+  REQUIRE_FALSE(native);
+  CHECK(native.error().message.contains("pose space, native"));
+  CHECK(native.error().message.contains("my_"));
+  const auto space = motion::describe_space(motion::Space::kHumanoid, *march.skeleton).value();
+  const auto alone = style::evaluate_style(march, march, sway, space);
+  REQUIRE(alone);
+  CHECK(alone->cycle_ratio == 1.0);
+  CHECK(alone->source_component_rms_deg > 1.0);
+}
