@@ -205,4 +205,17 @@ TEST_CASE("a report is written whole", "[report]") {
   CHECK_FALSE(write_page(Page("Test", "posed test"), folder.path() / "no" / "a.html"));
 }
 
+TEST_CASE("a drawing is a file without its page, and foreign words stay words", "[report]") {
+  const Figure trees = decision_trees(
+      "", {{kEvil, {{kEvil, kEvil, 1, 2}, {kEvil, kEvil}, {kEvil, kEvil}}}, {"two", {}}}, false);
+  const std::string svg = svg_file(trees.drawings);
+  CHECK(svg.find("<svg") == 0);
+  CHECK(svg.find("<script") == std::string::npos);
+  pugi::xml_document document;
+  REQUIRE(document.load_string(svg.c_str()));
+  CHECK(document.child("svg").select_nodes(".//rect[@class='leaf']").size() == 2);
+  CHECK(document.child("svg").select_nodes(".//rect[@class='ask']").size() == 1);
+  CHECK(document.child("svg").select_nodes("g").size() == 2);  // one below the other
+}
+
 }  // namespace posed::report
