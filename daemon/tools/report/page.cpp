@@ -1,11 +1,13 @@
 #include "daemon/tools/report/page.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "daemon/tools/report/plot.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/text/svg.hpp"
 
@@ -65,6 +67,15 @@ pre{white-space:pre-wrap;overflow-wrap:anywhere;font-size:.8rem;background:var(-
 .strip [stroke="#fff"]{stroke:var(--paper)}
 .strip [stroke="#4d4d4d"]{stroke:var(--s6)}.strip [fill="#4d4d4d"]{fill:var(--s6)}
 .strip [stroke="#0072b2"]{stroke:var(--s0)}.strip [stroke="#d55e00"]{stroke:var(--s1)}
+)";
+
+// The same look for a drawing that is a file: light, and without variables, which programs that
+// draw SVG do not know.
+constexpr const char* kFileStyle = R"(
+text{font:12px system-ui,sans-serif;fill:#1b1f24}.quiet{fill:#57606a}.head{font-weight:600}
+.end{text-anchor:end}.mid{text-anchor:middle}.grid{stroke:#d0d7de}.tie{stroke:#57606a;opacity:.55}
+.rule{stroke:#57606a;stroke-dasharray:5 4}polyline{fill:none;stroke-width:2}.band{opacity:.22}
+.ask{fill:#fff;stroke:#57606a}.leaf{fill:#f6f8fa;stroke:#009e73}.way{stroke:#57606a;fill:none}
 )";
 
 std::string element(std::string_view name, std::string_view text) {
@@ -185,14 +196,18 @@ std::string svg_file(const std::vector<Drawing>& drawings) {
     width_px = std::max(width_px, drawing.width_px);
     height_px += drawing.height_px + 16.0;
   }
+  std::string style = kFileStyle;
+  constexpr std::array<std::string_view, kSeries> kColours{
+      "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#b58900", "#3b9bd1", "#4d4d4d"};
+  for (std::size_t s = 0; s < kSeries; ++s) {
+    style += fmt::format(".s{0}.stroke{{stroke:{1}}}.s{0}.fill,.s{0}.band{{fill:{1}}}\n", s,
+                         kColours[s]);
+  }
   return fmt::format(
-             "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" "
-             "height=\"{1}\">\n<style>",
-             svg_number(width_px), svg_number(height_px)) +
-         kStyleSheet +
-         "svg{color-scheme:light;background:#fff}</style>\n<rect width=\"100%\" height=\"100%\" "
-         "fill=\"#fff\"/>\n" +
-         body + "</svg>\n";
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" "
+      "height=\"{1}\">\n<style>{2}</style>\n<rect width=\"100%\" height=\"100%\" "
+      "fill=\"#fff\"/>\n{3}</svg>\n",
+      svg_number(width_px), svg_number(height_px), style, body);
 }
 
 Result<> write_page(const Page& page, const std::filesystem::path& path) {
