@@ -19,6 +19,7 @@
 
 #include "daemon/logging/log_output.hpp"
 #include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/ranks.hpp"
 #include "models/motion/vrm_animation.hpp"
 #include "proto/clip/format.hpp"
 #include "proto/text/clean.hpp"
@@ -29,13 +30,6 @@ namespace {
 
 using AddCommand = void (*)(CLI::App& app, int& exit_code);
 
-constexpr auto kCommands = std::to_array<AddCommand>({
-    add_demo,   add_run,        add_check,   add_doctor, add_devices, add_calibrate, add_record,
-    add_replay, add_train,      add_apply,   add_smooth, add_synth,   add_convert,   add_render,
-    add_eval,   add_ctl,        add_monitor, add_top,    add_view,    add_relay,     add_emulate,
-    add_keygen, add_completion, add_man,     add_bench,
-});
-
 constexpr const char* kMpiFooter = R"(Examples:
   mpirun -n 8 posed-mpi train style --experiment styles.toml --out styles.style
   mpirun --hostfile hosts --map-by node --bind-to none posed-mpi train style ...
@@ -45,6 +39,32 @@ the same kind; what differs is named, and nothing is written. The model is the s
 bit, as that of `posed train`, whatever the number of ranks and threads. A rank has as many threads
 as its share of the machine's cores, at most those that mpirun binds it to (--bind-to none: all).
 Rank 0 prints and writes.)";
+
+void add_train_for(CLI::App& app, int& exit_code, const std::shared_ptr<Ranks>& ranks) {
+  CLI::App* train = app.add_subcommand("train", "Learn a model from clips");
+  train->require_subcommand(1);
+  add_train_style(*train, exit_code, ranks);
+  add_train_gesture(*train, exit_code, ranks);
+}
+
+void add_train(CLI::App& app, int& exit_code) {
+  add_train_for(app, exit_code, std::make_shared<OneRank>());
+}
+
+void add_eval(CLI::App& app, int& exit_code) {
+  CLI::App* eval = app.add_subcommand("eval", "Judge a model, or a clip");
+  eval->require_subcommand(1);
+  add_eval_gesture(*eval, exit_code);
+  add_eval_natural(*eval, exit_code);
+  add_eval_style(*eval, exit_code);
+}
+
+constexpr auto kCommands = std::to_array<AddCommand>({
+    add_demo,   add_run,        add_check,   add_doctor, add_devices, add_calibrate, add_record,
+    add_replay, add_train,      add_apply,   add_smooth, add_synth,   add_convert,   add_render,
+    add_eval,   add_ctl,        add_monitor, add_top,    add_view,    add_relay,     add_emulate,
+    add_keygen, add_completion, add_man,     add_bench,
+});
 
 // Whether the reader of stdout has gone (`posed monitor | head`).
 bool reader_of_stdout_has_gone() {
@@ -75,8 +95,8 @@ void add_options(const CLI::App& command, std::set<std::string>& known) {
   }
 }
 
-// A sentence on the first word that is no command where one stands, or on an option that none of
-// the commands before it has, with the word that it most likely means; empty if there is none.
+// Describes the first unknown command or option on the line, with the word that it most likely
+// means; empty if all are known.
 std::string unknown_word(CLI::App& app, std::span<char* const> arguments) {
   CLI::App* command = &app;
   std::set<std::string> options;

@@ -1,7 +1,6 @@
 // Manual pages, generated from the same tree of commands that parses the arguments, so that they
 // say what `--help` says.
 #include <cctype>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <sstream>

@@ -180,6 +180,7 @@ Result<GestureModel> train_gesture(const std::vector<Recording>& recordings,
   model.durations = tree_of<DurationGaussian>(grow_durations(*contexts, model, options.mdl_factor));
   set_range(recordings, model);
   model.report_json = report.json_of(model);
+  if (options.look) options.look(report.findings());
   return model;
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <functional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -14,6 +15,12 @@
 #include "proto/frame/result.hpp"
 
 namespace posed::gesture {
+
+// What a training found out on its way.
+struct TrainFindings {
+  std::size_t contexts = 0, moving_channels = 0;
+  std::vector<std::string> warnings;  // each says what to record more of
+};
 
 struct TrainOptions {
   // The labels with their classes; without any the built-in ones of a hand.
@@ -26,6 +33,7 @@ struct TrainOptions {
   TaskRunner* tasks = nullptr;    // not owned; null: one task after another
   // Called with the step and how much of it is done; false stops the training.
   std::function<bool(std::string_view step, double fraction)> progress;
+  std::function<void(TrainFindings)> look{};  // called once, when all is learnt
 };
 
 // All recordings are at one rate, which becomes the model's. Returns an error for recordings

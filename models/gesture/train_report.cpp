@@ -162,6 +162,11 @@ std::string TrainReport::mixed_warning() const {
          "): a label that was not recorded may go astray there, record more";
 }
 
+TrainFindings TrainReport::findings() const {
+  const auto moving = static_cast<std::size_t>(std::ranges::count(contexts_.moves, true));
+  return {contexts_.contexts.size(), moving, warnings()};
+}
+
 std::string TrainReport::json_of(const GestureModel& model) const {
   json report{{"rate_hz", model.rate_hz}, {"recordings", json::array()}};
   int frames = 0;

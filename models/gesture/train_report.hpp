@@ -8,6 +8,7 @@
 #include "models/gesture/context_models.hpp"
 #include "models/gesture/gesture_model.hpp"
 #include "models/gesture/grow_tree.hpp"
+#include "models/gesture/train.hpp"
 
 namespace posed::gesture {
 
@@ -19,6 +20,7 @@ class TrainReport {
 
   void add_tree(int state, int group, const GrownTree& tree);
 
+  [[nodiscard]] TrainFindings findings() const;
   // One JSON object; the same training gives the same text.
   [[nodiscard]] std::string json_of(const GestureModel& model) const;
 

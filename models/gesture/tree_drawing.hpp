@@ -39,6 +39,5 @@ struct DrawnTree {
 
 [[nodiscard]] std::string trees_text(const GestureModel& model, const TreeChoice& choice);
 [[nodiscard]] std::string trees_dot(const GestureModel& model, const TreeChoice& choice);
-[[nodiscard]] std::string trees_svg(const GestureModel& model, const TreeChoice& choice);
 
 }  // namespace posed::gesture

@@ -49,4 +49,8 @@ Result<> write_whole_file(const std::filesystem::path& path,
   return fail("cannot be written: " + why, path.string());
 }
 
+Result<> write_whole_file(const std::filesystem::path& path, std::string_view text) {
+  return write_whole_file(path, [&](std::ostream& out) { out << text; });
+}
+
 }  // namespace posed

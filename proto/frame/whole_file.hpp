@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <iosfwd>
+#include <string_view>
 
 #include "proto/frame/result.hpp"
 
@@ -28,5 +29,7 @@ class HeldSignals {
 // of HeldSignals wait until the file is written.
 [[nodiscard]] Result<> write_whole_file(const std::filesystem::path& path,
                                         const std::function<void(std::ostream&)>& write);
+// Writes the text in the same way.
+[[nodiscard]] Result<> write_whole_file(const std::filesystem::path& path, std::string_view text);
 
 }  // namespace posed

@@ -7,7 +7,6 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "daemon/tools/bench/percentiles.hpp"
 #include "models/feet/feet_stage.hpp"
 #include "models/gp/synthetic.hpp"
 #include "models/motion/synthetic_walker.hpp"
@@ -15,6 +14,7 @@
 #include "proto/clip/clip.hpp"
 #include "tests/bench/bench.hpp"
 #include "tests/bench/cpu_time.hpp"
+#include "tests/bench/percentiles.hpp"
 
 namespace posed::bench {
 namespace {
@@ -89,7 +89,7 @@ nlohmann::json measure(int points) {
         us.push_back(timed_us([&] { style.process({.frame = in, .input = &in}, out); }));
       }
     }
-    report[root] = tools::percentiles(us);
+    report[root] = percentiles(us);
   }
   return report;
 }

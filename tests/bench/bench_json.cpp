@@ -9,11 +9,11 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "daemon/tools/bench/percentiles.hpp"
 #include "drivers/rokoko/decoder.hpp"
 #include "drivers/rokoko/emulator.hpp"
 #include "tests/bench/bench.hpp"
 #include "tests/bench/cpu_time.hpp"
+#include "tests/bench/percentiles.hpp"
 
 namespace posed::bench {
 namespace {
@@ -86,7 +86,7 @@ json measure(int rounds) {
               {"bodies_per_frame",
                static_cast<double>(sink.frames) / (2.0 * static_cast<double>(ways[0].us.size()))},
               {"parsed", parsed > 0}};
-  for (const Way& way : ways) report[way.name] = tools::percentiles(way.us);
+  for (const Way& way : ways) report[way.name] = percentiles(way.us);
   for (const char* figure : {"p50_us", "p99_us"}) {
     report[std::string("nlohmann_over_read_") + figure] =
         report["nlohmann_parse"][figure].get<double>() / report["only_read"][figure].get<double>();

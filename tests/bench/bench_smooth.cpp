@@ -1,10 +1,8 @@
 // posed_bench smooth: the cost of the live smoother and its error, beside baselines that are tuned
 // on the very motion on which they are evaluated.
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <functional>
 #include <memory>
 #include <random>
 #include <string>
@@ -13,9 +11,8 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "daemon/tools/bench/percentiles.hpp"
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/degrees.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "models/gesture/synthetic_signer.hpp"
 #include "models/smooth/adaptive_window.hpp"
 #include "models/smooth/live_smoother.hpp"
@@ -23,6 +20,7 @@
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/text/json_text.hpp"
 #include "tests/bench/baselines.hpp"
+#include "tests/bench/percentiles.hpp"
 
 namespace posed::bench {
 namespace {
@@ -217,9 +215,9 @@ json cost(unsigned seed) {
     timed(solve_us, [&] { window.solve(1.0 / 60.0); });
     timed(stage_us, [&] { stage.process({.frame = frame}, last); });
   }
-  json report{{"bare_solve", tools::percentiles(bare_us)},
-              {"live_solve", tools::percentiles(solve_us)},
-              {"stage", tools::percentiles(stage_us)}};
+  json report{{"bare_solve", percentiles(bare_us)},
+              {"live_solve", percentiles(solve_us)},
+              {"stage", percentiles(stage_us)}};
   for (const char* name : {"live_solve", "stage"}) {
     report[name]["p50_over_bare"] =
         report[name]["p50_us"].get<double>() / report["bare_solve"]["p50_us"].get<double>();

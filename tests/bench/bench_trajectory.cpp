@@ -1,5 +1,5 @@
 #include "tests/bench/bench_trajectory.hpp"
-#include "daemon/tools/command/degrees.hpp"
+#include "daemon/tools/command/options.hpp"
 
 #include <unistd.h>
 

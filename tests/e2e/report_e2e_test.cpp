@@ -3,7 +3,6 @@
 #include <catch2/catch.hpp>
 
 #include <filesystem>
-#include <memory>
 
 #include <nlohmann/json.hpp>
 
@@ -146,28 +145,15 @@ TEST_CASE("a gesture model's training and evaluation draw their reports", "[repo
   CHECK(json::parse(judged.out)["holds"]["deg"] < 10.0);
 }
 
-TEST_CASE("every benchmark draws its report", "[report]") {
+TEST_CASE("the benchmark of the pipeline draws its report", "[report]") {
   const ReportDesk desk;
-  const std::vector<std::vector<std::string>> benches{
-      {"predict", "--samples", "10"},
-      {"pipeline", "--seconds", "4", "--points", "20"},
-      {"decoders", "--glove", "cyberglove", "--samples", "10"},
-      {"stage", "--performers", "1", "--seconds", "1", "--points", "20"},
-      {"relay", "--subscribers", "1", "--seconds", "1", "--turns", "1"}};
-  std::vector<std::unique_ptr<Process>> running;  // beside each other: nobody reads the times
-  for (std::vector<std::string> words : benches) {
-    const std::string page = desk.path(words.front() + ".html");
-    words.insert(words.begin(), "bench");
-    words.insert(words.end(), {"--json", "--report", page});
-    running.push_back(std::make_unique<Process>(std::move(words)));
-  }
-  for (std::size_t i = 0; i < benches.size(); ++i) {
-    const std::string printed = running[i]->rest();
-    INFO(benches[i].front() << ": " << running[i]->errors());
-    REQUIRE(running[i]->exit_code() == 0);
-    CHECK(json::accept(printed));
-    desk.check_page(benches[i].front() + ".html", printed);
-  }
+  const auto measured = posed({"bench", "pipeline", "--seconds", "4", "--points", "20", "--json",
+                               "--report", desk.path("pipeline.html")});
+  INFO(measured.err);
+  REQUIRE(measured.code == 0);
+  CHECK(json::parse(measured.out)["pipeline"]["messages"] > 100);
+  desk.check_page("pipeline.html", measured.out);
+  CHECK(has(desk.words("pipeline.html"), "The pipeline's way in parts"));
 }
 
 TEST_CASE("the experiment of acted walks draws the paper's figures", "[report][real]") {

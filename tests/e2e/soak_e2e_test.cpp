@@ -19,7 +19,6 @@
 #include <vector>
 
 #include "daemon/tools/emulate/emulated_device.hpp"
-#include "daemon/tools/emulate/emulated_port.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/options.hpp"
 #include "tests/e2e/served.hpp"

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/tools/emulate/emulated_port.hpp"
+#include "daemon/tools/emulate/emulated_device.hpp"
 #include "tests/e2e/served.hpp"
 #include "tests/support/pipe.hpp"
 

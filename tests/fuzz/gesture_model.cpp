@@ -34,7 +34,7 @@ void try_bytes(const std::string& bytes) {
   const auto model = parse_model(std::as_bytes(std::span(bytes)), "fuzz");
   if (!model) return;
   walk_all(*model);
-  static_cast<void>(trees_svg(*model, {}));
+  static_cast<void>(trees_dot(*model, {}));
   // An accepted model can be written and read back with the same bytes.
   const std::string written = serialize_model(*model);
   const auto again = parse_model(std::as_bytes(std::span(written)), "fuzz");

@@ -75,9 +75,9 @@ void check_messages(std::string_view bytes) {
     bytes.remove_prefix(2 + piece.size());
     const auto middle = piece.size() / 2;
     now_ns += 100'000'000;
-    if (kind % 5 == 0) hub.take(tab, piece, true, now_ns);
-    if (kind % 5 == 1) hub.take(tab, piece, false, now_ns);
-    if (kind % 5 == 2) hub.heard(piece.substr(0, middle), piece.substr(middle), now_ns);
+    if (kind % 5 == 0) hub.handle(tab, piece, true, now_ns);
+    if (kind % 5 == 1) hub.handle(tab, piece, false, now_ns);
+    if (kind % 5 == 2) hub.receive(piece.substr(0, middle), piece.substr(middle), now_ns);
     if (kind % 5 == 3) hub.replied(last_ticket, piece);
     if (kind % 5 == 4) hub.expire(now_ns);
   }

@@ -2,11 +2,10 @@
 
 #include <unistd.h>
 
-#include <cstdio>
 #include <cstdlib>
 #include <fstream>
 
-#include <nlohmann/json.hpp>
+#include <spdlog/fmt/fmt.h>
 
 #include "daemon/system/clock.hpp"
 #include "daemon/system/process.hpp"
@@ -89,20 +88,20 @@ Result<config::DaemonConfig> walkers_config(const Walkers& walkers, const WorkFo
   return config;
 }
 
-nlohmann::ordered_json to_json(const HopFigures& figures) {
-  return {{"p50_us", figures.p50_us},
-          {"p99_us", figures.p99_us},
-          {"p999_us", figures.p999_us},
-          {"max_us", figures.max_us},
-          {"messages", figures.messages}};
+std::string hop_heading() {
+  return fmt::format("{:<10} {:>9} {:>9} {:>9} {:>9} {:>9}", "us", "p50", "p99", "p99.9", "max",
+                     "messages");
 }
 
-void print_figures(const std::vector<std::pair<const char*, HopFigures>>& rows) {
-  std::printf("%-10s %9s %9s %9s %9s %9s\n", "us", "p50", "p99", "p99.9", "max", "messages");
-  for (const auto& [name, figures] : rows) {
-    std::printf("%-10s %9.1f %9.1f %9.1f %9.1f %9llu\n", name, figures.p50_us, figures.p99_us,
-                figures.p999_us, figures.max_us, static_cast<unsigned long long>(figures.messages));
-  }
+Findings findings_of(const HopFigures& figures, const std::string& name) {
+  return Findings()
+      .add("p50_us", figures.p50_us)
+      .add("p99_us", figures.p99_us)
+      .add("p999_us", figures.p999_us)
+      .add("max_us", figures.max_us)
+      .add("messages", figures.messages)
+      .say(fmt::format("{:<10} {:9.1f} {:9.1f} {:9.1f} {:9.1f} {:9}", name, figures.p50_us,
+                       figures.p99_us, figures.p999_us, figures.max_us, figures.messages));
 }
 
 }  // namespace posed::tools

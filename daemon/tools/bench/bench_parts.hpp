@@ -4,13 +4,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
-#include <utility>
-#include <vector>
-
-#include <nlohmann/json_fwd.hpp>
 
 #include "daemon/config/daemon_config.hpp"
-#include "daemon/tools/bench/hop_report.hpp"
+#include "daemon/tools/bench/hop_subscriber.hpp"
+#include "daemon/tools/command/findings.hpp"
 #include "models/motion/pose_space.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/skeleton.hpp"
@@ -58,8 +55,9 @@ struct Walkers {
 [[nodiscard]] Result<config::DaemonConfig> walkers_config(const Walkers& walkers,
                                                           const WorkFolder& folder);
 
-[[nodiscard]] nlohmann::ordered_json to_json(const HopFigures& figures);
-// A table on stdout, a line for each.
-void print_figures(const std::vector<std::pair<const char*, HopFigures>>& rows);
+// The heading of a table whose rows are findings_of().
+[[nodiscard]] std::string hop_heading();
+// The figures, with the row `name` of that table as their line.
+[[nodiscard]] Findings findings_of(const HopFigures& figures, const std::string& name);
 
 }  // namespace posed::tools

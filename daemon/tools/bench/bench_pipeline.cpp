@@ -1,36 +1,193 @@
 // `posed bench pipeline`: what the daemon adds to a bare ZeroMQ hop, from the reader's arrival
 // stamp to another process. The two alternate every second, on the same frames.
 #include <algorithm>
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
-#include <iterator>
+#include <filesystem>
+#include <fstream>
+#include <map>
 #include <memory>
+#include <span>
 #include <string>
+#include <system_error>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/assembly/daemon.hpp"
 #include "daemon/publish/publisher.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/system/process.hpp"
+#include "daemon/system/thread_time.hpp"
 #include "daemon/tools/bench/bench_parts.hpp"
-#include "daemon/tools/bench/bench_report.hpp"
-#include "daemon/tools/bench/hop_parts.hpp"
-#include "daemon/tools/bench/hop_report.hpp"
 #include "daemon/tools/bench/hop_subscriber.hpp"
 #include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/findings.hpp"
+#include "daemon/tools/command/output_files.hpp"
+#include "daemon/tools/report/plot.hpp"
 #include "proto/message/frame_message.hpp"
 #include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::tools {
 namespace {
 
+// By the threads' names; threads of one name are summed up. Empty where the kernel does not count.
+using TimesByThread = std::map<std::string, system::ThreadTime>;
+
+TimesByThread thread_times() {
+  TimesByThread times;
+  std::error_code ignored;  // a thread may end meanwhile
+  for (const auto& task : std::filesystem::directory_iterator("/proc/self/task", ignored)) {
+    std::string name;
+    const auto time = system::time_of_thread(std::stoi(task.path().filename()));
+    if (time && std::getline(std::ifstream(task.path() / "comm"), name)) times[name] += *time;
+  }
+  return times;
+}
+
+// Adds what passed from `before` to `after` to `sum`.
+void add_passed(const TimesByThread& before, const TimesByThread& after, TimesByThread& sum) {
+  for (const auto& [name, now] : after) {
+    const auto found = before.find(name);
+    sum[name] += now - (found == before.end() ? system::ThreadTime{} : found->second);
+  }
+}
+
+// What the threads did for each frame.
+struct ThreadShare {
+  std::string name;
+  double ran_us = 0.0, waited_us = 0.0;  // on a core; ready, but without one
+  double turns = 0.0;                    // how often it was put on a core
+};
+
+// Where the time between the arrival of a pose and its receipt by a subscriber goes: the parts of
+// the way, and the daemon's threads (daemon/HOP.md).
+struct HopParts {
+  HopFigures decode;     // in the reader, from its arrival stamp on
+  HopFigures stages;     // in the pipeline
+  HopFigures hand_over;  // from one thread to the next, twice, and the publisher's encoding
+  HopFigures socket;     // from the publisher through ZeroMQ to the subscriber
+  std::vector<ThreadShare> threads;
+
+  // What one thread fewer would save of the median at most: one of the two hand-overs.
+  [[nodiscard]] double one_thread_fewer_us() const { return hand_over.p50_us / 2.0; }
+};
+
+constexpr double kMinShare_us = 0.1;  // a frame: threads that do less are left out
+
+std::vector<ThreadShare> shares_of(const TimesByThread& times, std::size_t frames) {
+  std::vector<ThreadShare> shares;
+  const auto each = static_cast<double>(std::max<std::size_t>(frames, 1));
+  for (const auto& [name, time] : times) {
+    const ThreadShare share{.name = name,
+                            .ran_us = static_cast<double>(time.ran_ns) * 1e-3 / each,
+                            .waited_us = static_cast<double>(time.waited_ns) * 1e-3 / each,
+                            .turns = static_cast<double>(time.turns) / each};
+    if (share.ran_us + share.waited_us >= kMinShare_us) shares.push_back(share);
+  }
+  std::ranges::sort(shares, std::ranges::greater{}, &ThreadShare::ran_us);
+  return shares;
+}
+
+// Of the poses that arrived in [start_ns, end_ns); `times`: of the daemon's threads meanwhile.
+HopParts hop_parts(std::span<const Arrival> arrivals, std::int64_t start_ns, std::int64_t end_ns,
+                   const TimesByThread& times) {
+  std::vector<double> decode, stages, hand_over, socket;
+  const auto add = [](std::vector<double>& part, std::int64_t time_ns) {
+    part.push_back(static_cast<double>(time_ns) * 1e-3);
+  };
+  for (const Arrival& arrival : arrivals) {
+    if (arrival.bare || arrival.arrival_ns < start_ns || arrival.arrival_ns >= end_ns) continue;
+    add(decode, arrival.decoded_ns);
+    add(stages, arrival.stages_ns);
+    add(hand_over, arrival.sent_ns - arrival.decoded_ns - arrival.stages_ns);
+    add(socket, arrival.age_ns - arrival.sent_ns);
+  }
+  auto shares = shares_of(times, decode.size());
+  return {.decode = figures_of(std::move(decode)),
+          .stages = figures_of(std::move(stages)),
+          .hand_over = figures_of(std::move(hand_over)),
+          .socket = figures_of(std::move(socket)),
+          .threads = std::move(shares)};
+}
+
+Findings findings_of(const HopParts& parts) {
+  std::vector<Findings> threads;
+  for (const ThreadShare& thread : parts.threads) {
+    threads.push_back(Findings()
+                          .add("thread", thread.name)
+                          .add("ran_us", thread.ran_us)
+                          .add("waited_us", thread.waited_us)
+                          .add("turns", thread.turns)
+                          .say(fmt::format("{:<16} {:9.1f} {:9.1f} {:9.2f}", thread.name,
+                                           thread.ran_us, thread.waited_us, thread.turns)));
+  }
+  return Findings()
+      .say("the pipeline's way in parts:")
+      .say(hop_heading())
+      .add("decode", findings_of(parts.decode, "decode"))
+      .add("stages", findings_of(parts.stages, "stages"))
+      .add("hand_over", findings_of(parts.hand_over, "hand-over"))
+      .add("socket", findings_of(parts.socket, "socket"))
+      .add("one_thread_fewer_us", parts.one_thread_fewer_us())
+      .say(fmt::format("one thread fewer would save at most {:.1f} us of the median",
+                       parts.one_thread_fewer_us()))
+      .say(fmt::format("{:<16} {:>9} {:>9} {:>9}   a frame", "thread", "ran us", "waits us",
+                       "turns"))
+      .add("threads_per_frame", threads);
+}
+
+// Bars of the four percentiles of some distributions, and a table of them.
+report::Figure percentile_bars(const std::string& title, const std::string& sentence,
+                               const std::string& quantity,
+                               const std::vector<std::pair<std::string, HopFigures>>& peers) {
+  report::Bars bars{.quantity = quantity,
+                    .unit = "us, logarithmic",
+                    .series = {},
+                    .groups = {{"half are below (p50)", {}},
+                               {"99 % are below", {}},
+                               {"99.9 % are below", {}},
+                               {"the longest", {}}},
+                    .logarithmic = true};
+  report::Table table{
+      .columns = {{"", false}, {"p50 [us]"}, {"p99 [us]"}, {"p99.9 [us]"}, {"max [us]"}},
+      .rows = {}};
+  for (const auto& [name, figures] : peers) {
+    bars.series.push_back(name);
+    table.rows.push_back({name});
+    const double percentiles[]{figures.p50_us, figures.p99_us, figures.p999_us, figures.max_us};
+    for (std::size_t i = 0; i < bars.groups.size(); ++i) {
+      bars.groups[i].values.push_back(percentiles[i]);
+      table.rows.back().push_back(report::number_text(percentiles[i], 1));
+    }
+  }
+  report::Figure figure = report::bars_figure(title, sentence, bars);
+  figure.tables.push_back(std::move(table));
+  return figure;
+}
+
+report::Figure bars_of(const std::vector<ThreadShare>& threads) {
+  report::Bars bars{.quantity = "time for each frame",
+                    .unit = "us",
+                    .series = {"on a core", "ready, waiting for a core"},
+                    .groups = {}};
+  for (const ThreadShare& thread : threads) {
+    bars.groups.push_back({thread.name, {thread.ran_us, thread.waited_us}});
+  }
+  return report::bars_figure("What the daemon's threads did for each frame",
+                             "A thread that waits was ready, but other threads or programs had "
+                             "the cores: that part is the scheduler's.",
+                             bars);
+}
+
 constexpr double kRate_hz = kWalkers_hz;
-constexpr int kWarmUp_s = 2;  // the first turn of each is not counted
+constexpr double kMaxPressure_percent = 5.0;  // of others, above which nothing counts
+constexpr int kWarmUp_s = 2;                  // the first turn of each is not counted
 constexpr const char* kBenchPipelineFooter =
     R"(Synthetic walkers at 120 Hz through the real daemon: file driver, rings, a style model of
 --points poses, publisher; no recording. Every other second the reader sends
@@ -224,88 +381,104 @@ Result<Watched> measure(const HopOptions& options) {
   return watched;
 }
 
-nlohmann::ordered_json to_json(const HopOptions& options, const Watched& watched) {
+bool too_busy(const Watched& watched) { return watched.pressure_percent > kMaxPressure_percent; }
+
+Findings findings_of(const HopOptions& options, const Watched& watched) {
   const HopReport& report = watched.report;
-  return {{"streams", options.streams},
-          {"points", options.points},
-          {"gate", options.gate},
-          {"realtime", options.realtime},
-          {"seconds", options.seconds},
-          {"bare", to_json(report.bare)},
-          {"pipeline", to_json(report.pipeline)},
-          {"added_p50_us", report.pipeline.p50_us - report.bare.p50_us},
-          {"block_p50_ratio", report.block_p50_ratio},
-          {"block_p99_ratio", report.block_p99_ratio},
-          {"parts", to_json(watched.parts)},
-          {"dropped", watched.dropped},
-          {"shed", watched.shed},
-          {"sequence_gaps", watched.gaps},
-          {"cpu_percent", watched.pipeline_cpu_percent},
-          {"rss_10s_bytes", watched.rss_10s},
-          {"rss_end_bytes", watched.rss_end},
-          {"psi_cpu_some_before_percent", watched.pressure_before_percent},
-          {"psi_cpu_some_percent", watched.pressure_percent}};
+  const double added_us = report.pipeline.p50_us - report.bare.p50_us;
+  return Findings()
+      .add("streams", options.streams)
+      .add("points", options.points)
+      .add("gate", options.gate)
+      .add("realtime", options.realtime)
+      .add("seconds", options.seconds)
+      .say(fmt::format("{} stream(s) x {:.0f} Hz x GP of {} poses, {} s", options.streams, kRate_hz,
+                       options.points, options.seconds))
+      .say(hop_heading())
+      .add("bare", findings_of(report.bare, "bare"))
+      .add("pipeline", findings_of(report.pipeline, "pipeline"))
+      .add("added_p50_us", added_us)
+      .add("block_p50_ratio", report.block_p50_ratio)
+      .add("block_p99_ratio", report.block_p99_ratio)
+      .say(fmt::format(
+          "p50 added {:.1f} us; median over 1-s block pairs: p50 ratio {:.2f}, p99 ratio {:.2f}",
+          added_us, report.block_p50_ratio, report.block_p99_ratio))
+      .add("parts", findings_of(watched.parts))
+      .add("dropped", watched.dropped)
+      .add("shed", watched.shed)
+      .add("sequence_gaps", watched.gaps)
+      .add("cpu_percent", watched.pipeline_cpu_percent)
+      .say(fmt::format("dropped {}, shed {}, sequence gaps {}; CPU {:.1f} % of a core",
+                       watched.dropped, watched.shed, watched.gaps, watched.pipeline_cpu_percent))
+      .add("rss_10s_bytes", watched.rss_10s)
+      .add("rss_end_bytes", watched.rss_end)
+      .say(fmt::format("RSS {:.1f} MB at 10 s, {:.1f} MB at the end",
+                       static_cast<double>(watched.rss_10s) * 1e-6,
+                       static_cast<double>(watched.rss_end) * 1e-6))
+      .add("psi_cpu_some_before_percent", watched.pressure_before_percent)
+      .add("psi_cpu_some_percent", watched.pressure_percent)
+      .say(fmt::format(
+          "CPU pressure (PSI some): {:.1f} % in the 10 s before, {:.1f} % during the run{}",
+          watched.pressure_before_percent, watched.pressure_percent,
+          too_busy(watched) ? " - too busy: repeat on a quiet machine" : ""));
 }
 
-void print(const HopOptions& options, const Watched& watched) {
-  const HopReport& report = watched.report;
-  std::printf("%d stream(s) x %.0f Hz x GP of %d poses, %d s\n", options.streams, kRate_hz,
-              options.points, options.seconds);
-  print_figures({{"bare", report.bare}, {"pipeline", report.pipeline}});
-  std::printf("p50 added %.1f us; median over 1-s block pairs: p50 ratio %.2f, p99 ratio %.2f\n",
-              report.pipeline.p50_us - report.bare.p50_us, report.block_p50_ratio,
-              report.block_p99_ratio);
-  print(watched.parts);
-  std::printf("dropped %llu, shed %llu, sequence gaps %llu; CPU %.1f %% of a core\n",
-              static_cast<unsigned long long>(watched.dropped),
-              static_cast<unsigned long long>(watched.shed),
-              static_cast<unsigned long long>(watched.gaps), watched.pipeline_cpu_percent);
-  std::printf("RSS %.1f MB at 10 s, %.1f MB at the end\n",
-              static_cast<double>(watched.rss_10s) * 1e-6,
-              static_cast<double>(watched.rss_end) * 1e-6);
-  std::printf("CPU pressure (PSI some): %.1f %% in the 10 s before, %.1f %% during the run%s\n",
-              watched.pressure_before_percent, watched.pressure_percent,
-              watched.pressure_percent > kMostPressure_percent
-                  ? " - too busy: repeat on a quiet machine"
-                  : "");
+std::string pressure_words(const Watched& watched) {
+  if (watched.pressure_percent < 0.0) return "; the kernel does not say how busy the CPU was";
+  return fmt::format("; others kept the CPU busy for {:.1f} % of the time{}",
+                     watched.pressure_percent,
+                     too_busy(watched) ? ", too much: repeat on a quiet machine" : "");
 }
 
-BenchPage page_of(const HopOptions& options, const Watched& watched) {
+Result<> write_bench_page(const HopOptions& options, const Watched& watched,
+                          const Findings& findings) {
+  if (!options.report.wanted()) return {};
   const HopReport& report = watched.report;
-  BenchPage page{
-      .command = "posed bench pipeline",
-      .verdict = fmt::format("at the median the daemon adds {:.0f} us to a bare hop{}",
-                             report.pipeline.p50_us - report.bare.p50_us,
-                             pressure_words(watched.pressure_percent)),
-      .good = watched.pressure_percent <= kMostPressure_percent,
-      .figures = {report::percentile_bars(
-          {.title =
-               fmt::format("{} stream{} at {:.0f} Hz, {} poses in the style model", options.streams,
-                           options.streams == 1 ? "" : "s", kRate_hz, options.points),
-           .sentence = "The second bar of a pair is what a frame needs through the whole "
-                       "daemon, the first what ZeroMQ needs alone: their distance is posed's "
-                       "part. Equal distances are equal factors.",
-           .quantity = "from the arrival to another process",
-           .peers = {{"bare ZeroMQ hop", percentiles_of(report.bare)},
-                     {"posed's pipeline", percentiles_of(report.pipeline)}}})}};
-  std::ranges::move(figures_of(watched.parts, report.bare.p50_us),
-                    std::back_inserter(page.figures));
-  return page;
+  const HopParts& parts = watched.parts;
+  report::Page page("Measurement", "posed bench pipeline");
+  page.verdict(fmt::format("at the median the daemon adds {:.0f} us to a bare hop{}",
+                           report.pipeline.p50_us - report.bare.p50_us, pressure_words(watched)),
+               !too_busy(watched));
+  page.section("Distributions");
+  page.add(percentile_bars(
+      fmt::format("{} stream{} at {:.0f} Hz, {} poses in the style model", options.streams,
+                  options.streams == 1 ? "" : "s", kRate_hz, options.points),
+      "The second bar of a pair is what a frame needs through the whole daemon, the first what "
+      "ZeroMQ needs alone: their distance is posed's part. Equal distances are equal factors.",
+      "from the arrival to another process",
+      {{"bare ZeroMQ hop", report.bare}, {"posed's pipeline", report.pipeline}}));
+  page.add(percentile_bars(
+      "The pipeline's way in parts",
+      fmt::format("A frame is decoded in the reader, handed to the pipeline, changed by its "
+                  "stages, handed to the publisher, and sent through ZeroMQ. A bare hop takes "
+                  "{:.0f} us at the median. One thread fewer would save at most {:.0f} us of it.",
+                  report.bare.p50_us, parts.one_thread_fewer_us()),
+      "time of a frame in each part",
+      {{"decoding", parts.decode},
+       {"stages", parts.stages},
+       {"two hand-overs, encoding", parts.hand_over},
+       {"ZeroMQ to the subscriber", parts.socket}}));
+  page.add(bars_of(parts.threads));
+  add_numbers(findings, "`posed bench pipeline --help` explains them.", page);
+  add_json(findings, page);
+  return report::write_page(page, options.report.path);
 }
 
 Result<> bench_pipeline(const HopOptions& options) {
   if (auto checked = options.report.check(); !checked) return checked;
   const auto watched = measure(options);
   if (!watched) return std::unexpected(watched.error());
-  return show_bench(
-      options.json, to_json(options, *watched), [&] { print(options, *watched); },
-      page_of(options, *watched), options.report);
+  const Findings findings = findings_of(options, *watched);
+  findings.show(options.json);
+  return write_bench_page(options, *watched, findings);
 }
 
 }  // namespace
 
-void add_bench_pipeline(CLI::App& bench, int& exit_code) {
-  CLI::App* command = bench.add_subcommand(
+void add_bench(CLI::App& app, int& exit_code) {
+  CLI::App* bench = app.add_subcommand("bench", "Measure what posed costs on this machine");
+  bench->require_subcommand(1);
+  CLI::App* command = bench->add_subcommand(
       "pipeline", "Arrival to receive in another process, against a bare ZeroMQ hop");
   auto options = std::make_shared<HopOptions>();
   command->add_option("--streams", options->streams, "Streams at 120 Hz")

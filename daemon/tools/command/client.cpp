@@ -2,23 +2,56 @@
 
 #include <csignal>
 #include <cstdio>
+#include <utility>
 
+#include <google/protobuf/util/json_util.h>
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 
 #include "daemon/net/refusal_words.hpp"
 #include "daemon/system/clock.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/options.hpp"
+#include "proto/frame/time.hpp"
 #include "proto/zmq/keys.hpp"
 
 namespace posed::tools {
 namespace {
 
+constexpr double kSilence_s = 3.0;       // three stats messages are missing
+constexpr double kFirstSilence_s = 1.5;  // a running daemon sends something within a second
+
+}  // namespace
+
+void Heartbeat::beat(std::int64_t now_ns) {
+  if (reported_s_ > 0.0) returned_ = seconds(now_ns - last_ns_);
+  reported_s_ = 0.0;
+  last_ns_ = now_ns;
+  ever_beat_ = true;
+}
+
+std::optional<double> Heartbeat::silent_s(std::int64_t now_ns) const {
+  const double silence_s = seconds(now_ns - last_ns_);
+  if (silence_s < (ever_beat_ ? kSilence_s : kFirstSilence_s)) return std::nullopt;
+  return silence_s;
+}
+
+std::optional<double> Heartbeat::silence_to_report(std::int64_t now_ns) {
+  const auto silence_s = silent_s(now_ns);
+  if (!silence_s || *silence_s < 2.0 * reported_s_) return std::nullopt;
+  reported_s_ = *silence_s;
+  return silence_s;
+}
+
+std::optional<double> Heartbeat::return_to_report() {
+  return std::exchange(returned_, std::nullopt);
+}
+
+namespace {
+
 using net::Domain;
 
 // A client must never show old poses, so only few messages may wait anywhere.
-constexpr int kMessagesWaiting = 16;
-constexpr int kReceiveBuffer = 8 * 1024;  // bytes
+constexpr link::Limits kLimits{.messages = 16, .receive_buffer = 8 * 1024};
 
 volatile std::sig_atomic_t interrupt_came = 0;
 
@@ -39,34 +72,10 @@ void add_client_options(CLI::App& command, ClientOptions& options, const char* e
 Result<Connection> Connection::open(const ClientOptions& options, int type) {
   auto context = net::open_context();
   if (!context) return std::unexpected(context.error());
-  auto socket = net::open_socket(context->get(), type);
+  auto socket = link::DaemonSocket::open(context->get(), type, options, kLimits);
   if (!socket) return std::unexpected(socket.error());
-  if (!options.key.empty()) {
-    auto secured = net::secure_client(socket->get(), options.key, options.server_key);
-    if (!secured) return std::unexpected(secured.error());
-  }
-  if (type == ZMQ_SUB) {
-    for (const auto& set : {net::set_option(socket->get(), ZMQ_RCVHWM, kMessagesWaiting),
-                            net::set_option(socket->get(), ZMQ_RCVBUF, kReceiveBuffer)}) {
-      if (!set) return std::unexpected(set.error());
-    }
-  }
-  auto monitor = net::LinkMonitor::open(context->get(), socket->get(), !options.key.empty());
-  if (!monitor) return std::unexpected(monitor.error());
-  if (auto done = net::connect_socket(socket->get(), options.endpoint); !done) {
-    return std::unexpected(done.error());
-  }
-  return Connection(options, type == ZMQ_SUB ? Domain::kPublish : Domain::kControl,
-                    std::move(*context), std::move(*socket), std::move(*monitor));
+  return Connection(std::move(*context), std::move(*socket));
 }
-
-Connection::Connection(ClientOptions options, Domain domain, net::Context context,
-                       net::Socket socket, net::LinkMonitor monitor)
-    : options_(std::move(options)),
-      domain_(domain),
-      context_(std::move(context)),
-      socket_(std::move(socket)),
-      monitor_(std::move(monitor)) {}
 
 bool Connection::wait(std::chrono::milliseconds timeout) {
   zmq_pollitem_t item{socket_.get(), 0, ZMQ_POLLIN, 0};
@@ -74,21 +83,21 @@ bool Connection::wait(std::chrono::milliseconds timeout) {
 }
 
 std::optional<Error> Connection::refusal() {
-  const std::string why = net::refusal_words(monitor_.next_refusal(), domain_, options_.server_key);
+  const std::string why = socket_.refusal();
   if (why.empty()) return std::nullopt;
-  return fail("the daemon at " + options_.endpoint + " " + why).error();
+  return fail("the daemon at " + endpoint() + " " + why).error();
 }
 
 Error Connection::no_answer() const {
   if (established()) {
-    return fail("the daemon at " + options_.endpoint + " does not answer; is this its " +
-                (domain_ == Domain::kControl ? "control" : "publish") + " endpoint?")
+    return fail("the daemon at " + endpoint() + " does not answer; is this its " +
+                (socket_.domain() == Domain::kControl ? "control" : "publish") + " endpoint?")
         .error();
   }
-  const char* const hint = domain_ == Domain::kControl
+  const char* const hint = socket_.domain() == Domain::kControl
                                ? " (a replay publishes, but takes no control)"
                                : " (by default 5570 publishes, 5571 takes control)";
-  return fail("nothing answers at " + options_.endpoint +
+  return fail("nothing answers at " + endpoint() +
               "; is `posed run` going, and is this its endpoint?" + hint)
       .error();
 }
@@ -102,17 +111,17 @@ std::string Connection::silence(double silence_s) const {
 SilenceWatch::SilenceWatch(const Connection& connection, double timeout_s)
     : connection_(connection), timeout_s_(timeout_s), heart_(system::monotonic_ns()) {}
 
-void SilenceWatch::heard() { heart_.heard(system::monotonic_ns()); }
+void SilenceWatch::beat() { heart_.beat(system::monotonic_ns()); }
 
 std::string SilenceWatch::sentence(double silence_s) const {
-  if (!heart_.ever_heard()) return connection_.no_answer().message;
+  if (!heart_.ever_beat()) return connection_.no_answer().message;
   return connection_.endpoint() + ": " + connection_.silence(silence_s);
 }
 
 std::optional<std::string> SilenceWatch::silence() const {
   const auto silence_s = heart_.silent_s(system::monotonic_ns());
   if (!silence_s) return std::nullopt;
-  return heart_.ever_heard() ? connection_.silence(*silence_s) : connection_.no_answer().message;
+  return heart_.ever_beat() ? connection_.silence(*silence_s) : connection_.no_answer().message;
 }
 
 std::optional<Error> SilenceWatch::report() {
@@ -125,7 +134,7 @@ std::optional<Error> SilenceWatch::report() {
   const auto news_s = heart_.silence_to_report(now_ns);
   if (news_s && prints_) {
     std::fprintf(stderr, "posed: %s%s\n",
-                 heart_.ever_heard() ? "" : "waiting: ", sentence(*news_s).c_str());
+                 heart_.ever_beat() ? "" : "waiting: ", sentence(*news_s).c_str());
   }
   if (const auto back_s = heart_.return_to_report(); back_s && prints_) {
     std::fprintf(stderr, "posed: %s answers again, after %.0f s\n", connection_.endpoint().c_str(),
@@ -152,5 +161,19 @@ Interrupt::Interrupt() {
 }
 
 bool Interrupt::came() { return interrupt_came != 0 || std::ferror(stdout) != 0; }
+
+std::string to_json(const google::protobuf::Message& message) {
+  google::protobuf::util::JsonPrintOptions options;
+  options.always_print_primitive_fields = true;
+  std::string text;
+  if (!google::protobuf::util::MessageToJsonString(message, &text, options).ok()) return "{}";
+  return text;
+}
+
+bool print_json(const google::protobuf::Message& message) {
+  const std::string line = to_json(message) + "\n";
+  return std::fwrite(line.data(), 1, line.size(), stdout) == line.size() &&
+         std::fflush(stdout) == 0;
+}
 
 }  // namespace posed::tools

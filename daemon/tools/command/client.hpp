@@ -1,33 +1,56 @@
-// Shared by all commands that talk to a running daemon: their options, a connection that reports
-// why it cannot be established, and Ctrl-C.
+// What the commands share that talk to a running daemon: their options, a connection that reports
+// why it cannot be established, whether the daemon is silent, messages as JSON, and Ctrl-C. Cold.
 #pragma once
 
 #include <chrono>
-#include <filesystem>
+#include <cstdint>
 #include <optional>
 #include <string>
 
-#include "daemon/net/security.hpp"
-#include "daemon/tools/command/heartbeat.hpp"
+#include "daemon/tools/link/daemon_socket.hpp"
 #include "proto/frame/result.hpp"
-#include "proto/zmq/link_monitor.hpp"
 #include "proto/zmq/zmq_handle.hpp"
 
 namespace CLI {
 class App;
 }
 
+namespace google::protobuf {
+class Message;
+}
+
 namespace posed::tools {
+
+// Heartbeat: whether a daemon that sends stats every second still does. The time is a parameter, so
+// a test can choose it.
+class Heartbeat {
+ public:
+  explicit Heartbeat(std::int64_t now_ns) : last_ns_(now_ns) {}
+
+  void beat(std::int64_t now_ns);
+  // How long the daemon has been silent [s], if that is longer than normal; empty while it answers.
+  // Before the first message a shorter silence counts, because a user is waiting.
+  [[nodiscard]] std::optional<double> silent_s(std::int64_t now_ns) const;
+  [[nodiscard]] bool ever_beat() const { return ever_beat_; }
+
+  // For output as lines: the silence, whenever a line about it is due (at once, then after twice,
+  // four times, ... the time).
+  [[nodiscard]] std::optional<double> silence_to_report(std::int64_t now_ns);
+  // How long the daemon was silent [s], returned once after a silence that was reported.
+  [[nodiscard]] std::optional<double> return_to_report();
+
+ private:
+  std::int64_t last_ns_;
+  bool ever_beat_ = false;
+  double reported_s_ = 0.0;         // the last silence that was reported; 0: none
+  std::optional<double> returned_;  // not reported yet
+};
 
 // Where a daemon listens by default.
 inline constexpr const char* kOwnPublish = "tcp://127.0.0.1:5570";
 inline constexpr const char* kOwnControl = "tcp://127.0.0.1:5571";
 
-struct ClientOptions {
-  std::string endpoint;
-  std::filesystem::path key;         // the client's own NAME.key; empty: no CURVE
-  std::filesystem::path server_key;  // the daemon's NAME.pub
-};
+using ClientOptions = link::Peer;
 
 // Adds --connect (default `endpoint`), --key and --server-key.
 void add_client_options(CLI::App& command, ClientOptions& options, const char* endpoint);
@@ -39,7 +62,7 @@ class Connection {
   // reconnects when necessary.
   [[nodiscard]] static Result<Connection> open(const ClientOptions& options, int type);
 
-  [[nodiscard]] const std::string& endpoint() const { return options_.endpoint; }
+  [[nodiscard]] const std::string& endpoint() const { return socket_.peer().endpoint; }
   [[nodiscard]] void* socket() const { return socket_.get(); }
   // Waits for a message; returns false on timeout or a signal.
   [[nodiscard]] bool wait(std::chrono::milliseconds timeout);
@@ -48,20 +71,17 @@ class Connection {
   // time.
   [[nodiscard]] std::optional<Error> refusal();
   // Whether the connection is established, as of the last call of refusal().
-  [[nodiscard]] bool established() const { return monitor_.established(); }
+  [[nodiscard]] bool established() const { return socket_.established(); }
   [[nodiscard]] Error no_answer() const;  // the error if nothing answers at the endpoint
   // The sentence for a daemon that has answered before but has been silent for `silence_s`.
   [[nodiscard]] std::string silence(double silence_s) const;
 
  private:
-  Connection(ClientOptions options, net::Domain domain, net::Context context, net::Socket socket,
-             net::LinkMonitor monitor);
+  Connection(net::Context context, link::DaemonSocket socket)
+      : context_(std::move(context)), socket_(std::move(socket)) {}
 
-  ClientOptions options_;
-  net::Domain domain_;
   net::Context context_;
-  net::Socket socket_;
-  net::LinkMonitor monitor_;
+  link::DaemonSocket socket_;
 };
 
 // Watches the daemon's heartbeat, its stats, and prints on stderr when it falls silent and when it
@@ -71,7 +91,7 @@ class SilenceWatch {
   // `connection` outlives it. `timeout_s`: give up after this much silence; 0: never.
   SilenceWatch(const Connection& connection, double timeout_s);
 
-  void heard();  // call for every message
+  void beat();  // call for every message
   // Call from time to time: prints what is new. Returns an error when it is time to give up.
   [[nodiscard]] std::optional<Error> report();
   // The sentence to show while the daemon is silent; empty while it answers.
@@ -101,5 +121,12 @@ class Interrupt {
   Interrupt();
   [[nodiscard]] static bool came();
 };
+
+// Messages as canonical proto3 JSON (lowerCamelCase names, 64-bit integers as text). Every plain
+// field is written even if it has its default, so that a script always finds it.
+[[nodiscard]] std::string to_json(const google::protobuf::Message& message);
+
+// Prints one line on stdout and flushes it. Returns false if the reader of stdout has gone.
+bool print_json(const google::protobuf::Message& message);
 
 }  // namespace posed::tools

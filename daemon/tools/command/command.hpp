@@ -4,7 +4,6 @@
 #pragma once
 
 #include <memory>
-#include <string>
 
 #include "proto/frame/result.hpp"
 
@@ -40,19 +39,13 @@ void add_keygen(CLI::App& app, int& exit_code);
 void add_emulate(CLI::App& app, int& exit_code);
 void add_completion(CLI::App& app, int& exit_code);
 void add_man(CLI::App& app, int& exit_code);
-void add_train(CLI::App& app, int& exit_code);
-void add_train_for(CLI::App& app, int& exit_code, const std::shared_ptr<Ranks>& ranks);
 void add_train_gesture(CLI::App& train, int& exit_code, const std::shared_ptr<Ranks>& ranks);
 void add_train_style(CLI::App& train, int& exit_code, const std::shared_ptr<Ranks>& ranks);
 void add_apply(CLI::App& app, int& exit_code);
 void add_smooth(CLI::App& app, int& exit_code);
-void add_eval(CLI::App& app, int& exit_code);
 void add_eval_gesture(CLI::App& eval, int& exit_code);
+void add_eval_natural(CLI::App& eval, int& exit_code);
+void add_eval_style(CLI::App& eval, int& exit_code);
 void add_bench(CLI::App& app, int& exit_code);
-void add_bench_decoders(CLI::App& bench, int& exit_code);
-void add_bench_pipeline(CLI::App& bench, int& exit_code);
-void add_bench_predict(CLI::App& bench, int& exit_code);
-void add_bench_relay(CLI::App& bench, int& exit_code);
-void add_bench_stage(CLI::App& bench, int& exit_code);
 
 }  // namespace posed::tools

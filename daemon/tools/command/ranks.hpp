@@ -1,19 +1,36 @@
-// Ranks: the processes that train one model together. `posed` is alone; those of `posed-mpi` all
-// run the same command, share its tasks and come to the same model, which one of them writes.
+// Who computes a training: the threads of this process, and the processes of `posed-mpi`. Cold.
 #pragma once
 
+#include <atomic>
 #include <filesystem>
-#include <string>
-#include <utility>
 #include <vector>
 
-#include "daemon/tools/command/thread_tasks.hpp"
 #include "models/tasks.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/whole_file.hpp"
 
 namespace posed::tools {
 
+// ThreadTasks: runs a training's tasks on the machine's cores.
+class ThreadTasks final : public TaskRunner {
+ public:
+  // 0 threads: one for each core.
+  explicit ThreadTasks(unsigned threads = 0);
+
+  // `progress` is also called while no task ends, so that it can ask for a stop at any time. After
+  // a stop no other task begins; run() returns when those that run have ended, which long ones do
+  // when they see stopping().
+  [[nodiscard]] std::optional<std::vector<TaskResult>> run(std::size_t count, const Task& task,
+                                                           const TaskProgress& progress) override;
+  [[nodiscard]] bool stopping() const override { return stopping_; }
+
+ private:
+  unsigned threads_;
+  std::atomic<bool> stopping_ = false;
+};
+
+// Ranks: the processes that train one model together. `posed` is alone; those of `posed-mpi` all
+// run the same command, share its tasks and come to the same model, which one of them writes.
 class Ranks {
  public:
   Ranks() = default;

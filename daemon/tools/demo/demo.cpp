@@ -1,38 +1,48 @@
 // The demo: makes two families of synthetic walkers and a signer's glove recording, trains a style
 // model from the families and a gesture model from the glove, streams a walker that is not in the
 // training data through the daemon and watches it over ZeroMQ, as any client would.
+#include <zmq.h>
+
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
+#include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
-#include <zmq.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/assembly/daemon.hpp"
 #include "daemon/config/config.hpp"
 #include "daemon/logging/log_output.hpp"
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/findings.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/paint.hpp"
 #include "daemon/tools/demo/demo_clips.hpp"
-#include "daemon/tools/demo/demo_folder.hpp"
-#include "daemon/tools/demo/demo_hand.hpp"
 #include "daemon/tools/demo/demo_screen.hpp"
-#include "daemon/tools/demo/demo_watcher.hpp"
-#include "daemon/tools/emulate/synthetic_signer.hpp"
+#include "daemon/tools/emulate/motions.hpp"
 #include "daemon/tools/gesture/gesture_data.hpp"
 #include "daemon/tools/gesture/train_gesture.hpp"
-#include "daemon/tools/live/live_table.hpp"
+#include "daemon/tools/live/live_view.hpp"
 #include "daemon/tools/live/page.hpp"
 #include "daemon/tools/style/train_style.hpp"
 #include "daemon/tools/view/bridge.hpp"
+#include "proto/frame/profile_texts.hpp"
+#include "proto/frame/result.hpp"
+#include "proto/frame/whole_file.hpp"
+#include "proto/log/digest.hpp"
+#include "proto/text/load_file.hpp"
+
+namespace posed {
+std::span<const ProfileText> config_texts();  // config/*.toml, which CMake writes
+}
 
 namespace posed::tools {
 namespace {
@@ -40,6 +50,119 @@ namespace {
 using SteadyClock = std::chrono::steady_clock;
 constexpr double kFirstFrameWithin_s = 10.0;
 constexpr double kHandRate_hz = 30.0;
+
+// The demo's config in its folder: config/demo.toml, which is part of the binary, with the paths of
+// that folder.
+constexpr const char* kDemoConfig = "demo.toml";
+
+// The folder for the demo's clips and models, and the check whether they are what this program
+// would make again.
+class DemoFolder {
+ public:
+  explicit DemoFolder(std::filesystem::path path) : path_(std::move(path)) {}
+
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+  // Whether every file is there as this program wrote it; false after another build of posed wrote
+  // them, or after a file was changed.
+  [[nodiscard]] bool is_up_to_date() const;
+
+  // Refuses a folder with files of these names that no demo wrote; `overwrite` allows it.
+  [[nodiscard]] Result<> check_is_own(const std::vector<std::string>& names, bool overwrite) const;
+
+  // Marks the folder as the demo's before its files come: one that was interrupted is made anew.
+  [[nodiscard]] Result<> begin() const;
+
+  // Writes the config, and the stamp that is_up_to_date() reads, with a hash of every file in the
+  // folder.
+  [[nodiscard]] Result<> finish() const;
+
+ private:
+  std::filesystem::path path_;
+};
+
+namespace fs = std::filesystem;
+constexpr const char* kStamp = "demo.json";
+constexpr std::uintmax_t kMaxStamp = 64 * 1024;      // bytes of the stamp file
+constexpr std::uintmax_t kMaxBytes = 1'000'000'000;  // of the program, or of a file that it wrote
+
+// Empty if the file cannot be read.
+std::string digest_of(const fs::path& file) {
+  const auto bytes = load_file(file, {.what = "file", .max_bytes = kMaxBytes});
+  return bytes ? log::sha256_hex(std::as_bytes(std::span(*bytes))) : std::string();
+}
+
+// A hash of the whole program, because another build may train other models.
+std::string program_digest() { return digest_of("/proc/self/exe"); }
+
+// What the folder's stamp says while its files are those that this program wrote.
+std::string stamp_of(const fs::path& folder) {
+  Findings files;
+  for (const std::string& name : demo_file_names()) files.add(name, digest_of(folder / name));
+  files.add(kDemoConfig, digest_of(folder / kDemoConfig));
+  return Findings().add("program", program_digest()).add("files", files).json(2) + "\n";
+}
+
+std::string config_text() {
+  for (const ProfileText& text : config_texts()) {
+    if (text.file != kDemoConfig) continue;
+    std::string toml =
+        "# `posed demo` writes this file, and again when it makes new models: copy it "
+        "before you change it.\n" +
+        std::string(text.toml);
+    constexpr std::string_view kInSourceTree = "../build/demo/";
+    for (auto at = toml.find(kInSourceTree); at != std::string::npos;
+         at = toml.find(kInSourceTree)) {
+      toml.erase(at, kInSourceTree.size());
+    }
+    return toml;
+  }
+  return {};
+}
+
+// $XDG_CACHE_HOME/posed/demo, or ~/.cache/posed/demo.
+Result<fs::path> demo_cache_folder() {
+  const auto absolute = [](const char* name) -> fs::path {
+    const char* value = std::getenv(name);
+    const fs::path path = value == nullptr ? fs::path() : fs::path(value);
+    return path.is_absolute() ? path : fs::path();
+  };
+  fs::path cache = absolute("XDG_CACHE_HOME");
+  if (cache.empty() && !absolute("HOME").empty()) cache = absolute("HOME") / ".cache";
+  if (cache.empty()) {
+    return misuse("neither XDG_CACHE_HOME nor HOME names a folder; give --folder DIR");
+  }
+  return cache / "posed" / "demo";
+}
+
+bool DemoFolder::is_up_to_date() const {
+  const auto text = load_file(path_ / kStamp, {.what = "stamp", .max_bytes = kMaxStamp});
+  return text && *text == stamp_of(path_);
+}
+
+Result<> DemoFolder::check_is_own(const std::vector<std::string>& names, bool overwrite) const {
+  std::error_code error;
+  if (overwrite || fs::exists(path_ / kStamp, error)) return {};
+  // of a version of the demo that wrote no stamp
+  if (fs::exists(path_ / kDemoModel, error)) return {};
+  for (const std::string& name : names) {
+    if (!fs::exists(path_ / name, error)) continue;
+    return misuse("exists already, and no demo wrote it; name another folder, or add --overwrite",
+                  (path_ / name).string());
+  }
+  return {};
+}
+
+Result<> DemoFolder::begin() const {
+  std::error_code error;
+  fs::create_directories(path_, error);  // writing says what failed
+  return write_whole_file(path_ / kStamp, "{}\n");
+}
+
+Result<> DemoFolder::finish() const {
+  if (auto written = write_whole_file(path_ / kDemoConfig, config_text()); !written) return written;
+  return write_whole_file(path_ / kStamp, stamp_of(path_));
+}
 
 struct DemoOptions {
   std::filesystem::path config;   // empty: the demo's own
@@ -74,10 +197,10 @@ Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
     experiment.clips.push_back({clips->to[i], "sway", person, "walk", 0});
   }
   OneRank alone;
-  const auto report = train_and_save(experiment, 0, {.model = folder / kDemoModel}, alone);
-  if (!report) return std::unexpected(report.error());
-  const std::string verdict = (*report)["verdict"].get<std::string>();
-  if (!(*report)["written"].get<bool>()) return fail("the demo's own model is " + verdict);
+  const auto trained = train_and_save(experiment, 0, {.model = folder / kDemoModel}, alone);
+  if (!trained) return std::unexpected(trained.error());
+  const std::string& verdict = trained->verdict.sentence;
+  if (!trained->written) return fail("the demo's own model is " + verdict);
   std::fprintf(stderr, "    %s\n", verdict.c_str());
   std::fprintf(stderr, "3/4 learning the gestures g, c and p from a labelled glove recording\n");
   const auto recording = load_recording(clips->glove, clips->labels, kHandRate_hz);
@@ -92,9 +215,9 @@ void drain(Connection& connection, Watcher& watcher, DemoScreen& screen) {
   net::Message topic, body;
   while (topic.receive(connection.socket()) && topic.more() &&
          body.receive(connection.socket(), 0)) {
-    screen.take(topic.text(), body.bytes());
+    screen.handle(topic.text(), body.bytes());
     if (!topic.text().starts_with("pose/")) continue;
-    watcher.take(std::string(topic.text()), body.bytes().data(), body.bytes().size());
+    watcher.handle(std::string(topic.text()), body.bytes().data(), body.bytes().size());
   }
 }
 
@@ -112,10 +235,10 @@ std::unique_ptr<view::Bridge> serve_page_of(const assembly::Daemon& daemon,
   };
   const auto page = find_page({});
   if (!page) return why_not(page.error());
-  auto bridge = view::Bridge::start(
-      {.link = {.connect = daemon.publish_endpoint(), .control = daemon.control_endpoint()},
-       .page = *page,
-       .or_any_port = true});
+  auto bridge = view::Bridge::start({.link = {.publish = {.endpoint = daemon.publish_endpoint()},
+                                              .control = daemon.control_endpoint()},
+                                     .page = *page,
+                                     .or_any_port = true});
   if (!bridge) return why_not(bridge.error());
   std::fprintf(stderr, "see it: %s\n", (*bridge)->url().c_str());
   if (!options.no_browser) open_browser((*bridge)->url());
@@ -176,8 +299,8 @@ void print_summary(const Watcher& watcher, const DemoHand& hand, const v1::Stats
   for (const v1::StreamStats& s : stats.stream()) {
     print(
         fmt::format("{}: {:.1f} frames/s, arrival to ZeroMQ {} (99 %: {}), dropped {}, skipped {}",
-                    s.stream(), s.rate_hz(), people_duration(s.publish().p50_us()),
-                    people_duration(s.publish().p99_us()), s.dropped(), s.shed()));
+                    s.stream(), s.rate_hz(), display_duration(s.publish().p50_us() * 1e-6),
+                    display_duration(s.publish().p99_us() * 1e-6), s.dropped(), s.shed()));
   }
 }
 

@@ -1,8 +1,10 @@
 // `posed calibrate`: calibrates a user's glove from a few poses, or from another program's file.
+#include <poll.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -12,24 +14,220 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/hand_option.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/devices/calibrate_poses.hpp"
-#include "daemon/tools/devices/calibrated_hand.hpp"
 #include "daemon/tools/devices/driver_options.hpp"
-#include "daemon/tools/devices/good_poses.hpp"
+#include "daemon/tools/live/live_view.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/device_info.hpp"
 #include "drivers/glove/import.hpp"
+#include "drivers/glove/pose_check.hpp"
 #include "drivers/glove/traits.hpp"
-#include "proto/clip/text.hpp"
+#include "proto/frame/whole_file.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::tools {
 namespace {
 
 using drivers::glove::CalibrationFile;
 using drivers::glove::kPoseNames;
+
+// On the terminal, which is restored by the destructor.
+class PoseScreen final : public PoseGuide {
+ public:
+  // `note` is shown from the start; may be empty.
+  PoseScreen(const drivers::glove::Model& model, const PosePlan& plan, std::string title,
+             std::string note);
+
+  void want(drivers::glove::Pose pose) override;
+  [[nodiscard]] Word hear() override;
+  void show(const GloveSource::Raw& raw, const GloveSource::Valid& valid, PosePhase phase,
+            double left_s, double whole_s) override;
+  void restless(drivers::glove::Pose pose, const std::string& sensor) override;
+
+ private:
+  void draw();
+
+  LiveScreen screen_;
+  CalibrateView view_;
+  bool ranging_ = false;  // a pose is or was held; from now on the range of each sensor is tracked
+  std::chrono::steady_clock::time_point drawn_{}, heard_{};
+};
+
+// Prints a line on stdout when a pose is wanted ("pose fist") and instructions on stderr. The user
+// confirms with a line on stdin, unless the poses start by themselves.
+class PoseLines final : public PoseGuide {
+ public:
+  explicit PoseLines(const PosePlan& plan) : waits_(!plan.ready_s) {}
+
+  void want(drivers::glove::Pose pose) override;
+  [[nodiscard]] Word hear() override;
+  void show(const GloveSource::Raw& /*raw*/, const GloveSource::Valid& /*valid*/,
+            PosePhase /*phase*/, double /*left_s*/, double /*whole_s*/) override {}
+  void restless(drivers::glove::Pose pose, const std::string& sensor) override;
+
+ private:
+  bool waits_;
+};
+
+using drivers::glove::kPoseHints;
+using drivers::glove::kPoseNames;
+using drivers::glove::Pose;
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kRedraw{66};
+constexpr std::chrono::seconds kSilence{1};
+constexpr double kNoiseShare = 0.04;  // share of a sensor's range
+
+PoseScreen::PoseScreen(const drivers::glove::Model& model, const PosePlan& plan, std::string title,
+                       std::string note) {
+  view_.title = std::move(title);
+  view_.note = std::move(note);
+  view_.poses = plan.poses();
+  for (const drivers::glove::Sensor& sensor : model.sensors) {
+    view_.sensors.push_back({.name = sensor.name,
+                             .least = sensor.raw_min,
+                             .most = sensor.raw_max,
+                             .least_span = kNoiseShare * (sensor.raw_max - sensor.raw_min)});
+  }
+  heard_ = SteadyClock::now();
+}
+
+// Discards keys that were pressed before this pose was asked for: a superfluous Enter would start
+// it.
+void PoseScreen::want(Pose pose) {
+  while (screen_.key_pressed() != 0) {
+  }
+  view_.pose = static_cast<std::size_t>(std::ranges::find(view_.poses, pose) - view_.poses.begin());
+  view_.any_held = ranging_;
+  view_.phase = PosePhase::kAsked;
+  view_.left_s = view_.share = 0.0;
+  draw();
+}
+
+PoseGuide::Word PoseScreen::hear() {
+  if (SteadyClock::now() - drawn_ >= kRedraw) draw();
+  for (char key = screen_.key_pressed(); key != 0; key = screen_.key_pressed()) {
+    if (key == '\n' || key == '\r') return Word::kGo;
+    if (key == 'b' || key == 'B') return Word::kBack;
+    if (key == 'q' || key == 'Q') return Word::kStop;
+  }
+  return Word::kNothing;
+}
+
+void PoseScreen::show(const GloveSource::Raw& raw, const GloveSource::Valid& valid, PosePhase phase,
+                      double left_s, double whole_s) {
+  heard_ = SteadyClock::now();
+  view_.phase = phase;
+  view_.left_s = std::max(left_s, 0.0);
+  view_.share = whole_s > 0.0 ? 1.0 - view_.left_s / whole_s : 0.0;
+  if (phase != PosePhase::kAsked) view_.note.clear();  // it was about the previous pose
+  const bool first_held = phase == PosePhase::kHeld && !ranging_;
+  ranging_ = ranging_ || first_held;
+  for (std::size_t i = 0; i < view_.sensors.size(); ++i) {
+    if (!valid[i]) continue;
+    SensorView& sensor = view_.sensors[i];
+    sensor.value = static_cast<double>(raw[i]);
+    if (first_held || !sensor.there || !ranging_) sensor.low = sensor.high = sensor.value;
+    sensor.there = true;
+    sensor.low = std::min(sensor.low, sensor.value);
+    sensor.high = std::max(sensor.high, sensor.value);
+  }
+  if (SteadyClock::now() - drawn_ >= kRedraw) draw();
+}
+
+void PoseScreen::restless(Pose pose, const std::string& sensor) {
+  view_.note = "The hand moved while " + std::string(kPoseNames[static_cast<std::size_t>(pose)]) +
+               " was held (" + sensor + "). b: hold it again";
+}
+
+void PoseScreen::draw() {
+  drawn_ = SteadyClock::now();
+  view_.silent = drawn_ - heard_ >= kSilence;
+  LiveViewOptions size;
+  screen_.measure(size);
+  view_.width = size.width;
+  view_.height = size.height;
+  view_.colour = size.colour;
+  screen_.draw(calibrate_view(view_));
+}
+
+void PoseLines::want(Pose pose) {
+  const auto index = static_cast<std::size_t>(pose);
+  std::printf("pose %s\n", std::string(kPoseNames[index]).c_str());
+  std::fflush(stdout);
+  std::fprintf(stderr, "%s: %s%s\n", std::string(kPoseNames[index]).c_str(),
+               std::string(kPoseHints[index]).c_str(), waits_ ? "; then press Enter" : "");
+}
+
+void PoseLines::restless(Pose pose, const std::string& sensor) {
+  std::fprintf(stderr, "posed: warning: the hand moved while %s was held (%s)\n",
+               std::string(kPoseNames[static_cast<std::size_t>(pose)]).c_str(), sensor.c_str());
+}
+
+PoseGuide::Word PoseLines::hear() {
+  pollfd line{.fd = STDIN_FILENO, .events = POLLIN, .revents = 0};
+  while (waits_ && ::poll(&line, 1, 0) > 0) {
+    char c = 0;
+    if (::read(STDIN_FILENO, &c, 1) != 1) {
+      std::fprintf(stderr, "stdin has ended; with --seconds each pose begins by itself\n");
+      return Word::kStop;
+    }
+    if (c == '\n') return Word::kGo;
+  }
+  return Word::kNothing;
+}
+
+bool on_terminal() { return ::isatty(STDIN_FILENO) != 0 && ::isatty(STDOUT_FILENO) != 0; }
+
+// On a terminal a full-screen view leads the user; it is removed before anything else is printed.
+// `note` says why poses are asked for again; empty at first.
+Result<drivers::glove::Recorded> lead(GloveSource& source, const PosePlan& plan,
+                                      const std::string& user, const std::string& note) {
+  if (!on_terminal()) {
+    PoseLines lines(plan);
+    return record_poses(source, plan, lines);
+  }
+  std::string title = "posed calibrate: " + source.model().driver + ", " +
+                      std::string(drivers::glove::side_name(source.hand())) + " hand of " + user;
+  if (!source.identity().empty()) title += ", " + source.identity();
+  PoseScreen screen(source.model(), plan, clean(title), note);
+  return record_poses(source, plan, screen);
+}
+
+// Leads the user through the poses with `user` and reports on stderr how good they are. On a
+// terminal, poses that failed are asked for again until the user gives up; otherwise they are an
+// error that names each one and its fault. `force` accepts them all the same, with a warning.
+Result<drivers::glove::Recorded> good_poses(GloveSource& source, const PosePlan& plan,
+                                            const std::string& user, bool force) {
+  auto recorded = lead(source, plan, user, {});
+  while (recorded) {
+    const auto check = drivers::glove::check_poses(source.model(), *recorded);
+    if (!check) return std::unexpected(check.error());
+    if (check->sensors == 0) return recorded;  // nothing was measured; the fit reports it
+    if (check->usable() || force) {
+      std::fprintf(stderr, "posed: %s%s\n",
+                   check->usable() ? "" : "warning: ", check->verdict().c_str());
+      return recorded;
+    }
+    if (!on_terminal()) {
+      return fail(check->verdict() +
+                  "; no calibration was written (--force writes it all the same)");
+    }
+    PosePlan again = plan;
+    again.seconds.fill(0.0);
+    for (const auto pose : check->failed()) {
+      again.seconds[static_cast<std::size_t>(pose)] = plan.seconds[static_cast<std::size_t>(pose)];
+    }
+    const auto more = lead(source, again, user, check->verdict());
+    if (!more) return more;
+    for (const auto pose : again.poses()) {
+      (*recorded)[static_cast<std::size_t>(pose)] = (*more)[static_cast<std::size_t>(pose)];
+    }
+  }
+  return recorded;
+}
 
 constexpr double kMaxSeconds = 60.0;
 constexpr int kHandColumns = 60, kHandRows = 10;  // of the picture of the calibrated hand
@@ -229,7 +427,7 @@ Result<> calibrate(const CalibrateOptions& options) {
   if (!file) return std::unexpected(file.error());
   file->user = options.user;
   const std::string text = drivers::glove::format_calibration(*file);
-  auto written = clip::write_text(options.out, [&](std::ostream& out) { out << text; });
+  auto written = write_whole_file(options.out, text);
   if (!written) return written;
   const std::string out = options.out.string();
   std::fprintf(stderr, "%zu sensors calibrated: %s\n", file->sensors.size(), out.c_str());

@@ -7,22 +7,19 @@
 #include <vector>
 
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/findings.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/known_usb.hpp"
 #include "drivers/transport/enumerate.hpp"
 #include "proto/text/clean.hpp"
-#include "proto/text/json_text.hpp"
 
 namespace posed::tools {
 namespace {
 
 using drivers::Bus;
 using drivers::DeviceInfo;
-using nlohmann::ordered_json;
-
 constexpr const char* kFooter = R"(examples:
   posed devices              connected devices, and the id for a [[stream]] in the config
   posed devices --json       the same for a script
@@ -64,79 +61,70 @@ std::vector<DeviceInfo> list_all() {
   return all;
 }
 
-ordered_json describe(const DeviceInfo& one, const std::vector<DeviceInfo>& all) {
-  ordered_json fitting = ordered_json::array();
-  std::string hand;
+// The device, with a row of the list as its line.
+Findings describe(const DeviceInfo& one, const std::vector<DeviceInfo>& all) {
+  std::vector<Findings> fitting;
+  std::string hand, names;
   for (const drivers::KnownUsb& known : drivers::known_usb()) {
     if (!known.fits(one)) continue;
-    fitting.push_back({{"name", known.driver}, {"certain", !known.adapter}});
+    fitting.push_back(Findings().add("name", known.driver).add("certain", !known.adapter));
+    names += (names.empty() ? "" : ", ") + std::string(known.driver) + (known.adapter ? "?" : "");
     hand = known.hand(one);
   }
   const auto or_null = [](const std::string& text) {
-    return text.empty() ? ordered_json() : ordered_json(text);
+    return text.empty() ? std::nullopt : std::optional(text);
   };
-  return {{"bus", bus_name(one.bus)},
-          {"node", one.node},
-          {"id", or_null(id_of(one, all))},
-          {"vendor", one.is_usb ? ordered_json(usb_numbers(one.vendor)) : ordered_json()},
-          {"product", one.is_usb ? ordered_json(usb_numbers(one.product)) : ordered_json()},
-          {"serial", or_null(one.serial)},
-          {"port_path", or_null(one.port_path)},
-          {"name", or_null(one.name)},
-          {"drivers", fitting},
-          {"hand", or_null(hand)},
-          {"open_error", or_null(one.open_error)}};
+  // A device's name for itself may contain any bytes.
+  const auto shown = [](const std::string& text) { return text.empty() ? "-" : clean(text); };
+  const auto usb = [&](unsigned number) {
+    return one.is_usb ? std::optional(usb_numbers(number)) : std::nullopt;
+  };
+  const std::string id = id_of(one, all);
+  Findings findings;
+  findings.add("bus", bus_name(one.bus))
+      .add("node", one.node)
+      .add("id", or_null(id))
+      .add("vendor", usb(one.vendor))
+      .add("product", usb(one.product))
+      .add("serial", or_null(one.serial))
+      .add("port_path", or_null(one.port_path))
+      .add("name", or_null(one.name))
+      .add("drivers", fitting)
+      .add("hand", or_null(hand))
+      .add("open_error", or_null(one.open_error))
+      .say(fmt::format("{:<16} {:<18} {:<16} {:<6} {}", clean(one.node), shown(id), shown(names),
+                       shown(hand), shown(one.name)));
+  return one.open_error.empty() ? findings : findings.say("    " + clean(one.open_error));
 }
 
-// For printing: a device's name for itself may contain any bytes.
-std::string text_of(const ordered_json& value) {
-  return value.is_null() ? "-" : clean(value.get<std::string>());
-}
-
-void print(const ordered_json& device) {
-  std::string fitting;
-  for (const auto& driver : device["drivers"]) {
-    fitting += (fitting.empty() ? "" : ", ") + driver["name"].get<std::string>() +
-               (driver["certain"].get<bool>() ? "" : "?");
-  }
-  std::printf("%-16s %-18s %-16s %-6s %s\n", text_of(device["node"]).c_str(),
-              text_of(device["id"]).c_str(), fitting.empty() ? "-" : fitting.c_str(),
-              text_of(device["hand"]).c_str(), text_of(device["name"]).c_str());
-  if (!device["open_error"].is_null())
-    std::printf("    %s\n", text_of(device["open_error"]).c_str());
-}
-
-int list_devices(bool as_json) {
+Findings list_devices() {
   const auto all = list_all();
-  ordered_json devices = ordered_json::array(), known = ordered_json::array();
+  std::vector<Findings> devices, known;
   for (const DeviceInfo& one : all) devices.push_back(describe(one, all));
   for (const drivers::Driver& driver : drivers::registry()) {
-    known.push_back({{"name", driver.name}, {"summary", driver.summary}});
+    known.push_back(Findings()
+                        .add("name", driver.name)
+                        .add("summary", driver.summary)
+                        .say(fmt::format("  {:<14} {}", driver.name, driver.summary)));
   }
-  if (as_json) {
-    std::printf("%s\n", json_text(ordered_json{{"devices", devices}, {"drivers", known}}).c_str());
-    return 0;
-  }
-  if (devices.empty()) std::printf("no serial port, HID device or USB glove is plugged in\n");
-  if (!devices.empty())
-    std::printf("%-16s %-18s %-16s %-6s %s\n", "node", "id", "driver", "hand", "name");
-  for (const auto& device : devices) print(device);
-  std::printf("\ndrivers:\n");
-  for (const drivers::Driver& driver : drivers::registry()) {
-    std::printf("  %-14s %s\n", std::string(driver.name).c_str(),
-                std::string(driver.summary).c_str());
-  }
-  return 0;
+  return Findings()
+      .say(devices.empty() ? "no serial port, HID device or USB glove is plugged in"
+                           : fmt::format("{:<16} {:<18} {:<16} {:<6} {}", "node", "id", "driver",
+                                         "hand", "name"))
+      .add("devices", devices)
+      .say("")
+      .say("drivers:")
+      .add("drivers", known);
 }
 
 }  // namespace
 
 void add_devices(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("devices", "list the gloves and ports that are plugged in");
+  auto* command = app.add_subcommand("devices", "List the gloves and ports that are plugged in");
   auto as_json = std::make_shared<bool>(false);
-  command->add_flag("--json", *as_json, "one JSON object on stdout");
+  command->add_flag("--json", *as_json, "One JSON object on stdout");
   command->footer(kFooter);
-  command->callback([as_json, &exit_code] { exit_code = list_devices(*as_json); });
+  command->callback([as_json, &exit_code] { exit_code = list_devices().show(*as_json, -1); });
 }
 
 }  // namespace posed::tools

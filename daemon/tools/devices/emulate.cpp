@@ -11,19 +11,18 @@
 
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/net/security.hpp"
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/findings.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/devices/driver_options.hpp"
-#include "daemon/tools/emulate/clip_motion.hpp"
 #include "daemon/tools/emulate/emulated_device.hpp"
 #include "daemon/tools/emulate/log_emulator.hpp"
+#include "daemon/tools/emulate/motions.hpp"
 #include "models/gesture/synthetic_signer.hpp"
 #include "proto/text/clean.hpp"
-#include "proto/text/json_text.hpp"
 
 namespace posed::tools {
 namespace {
@@ -138,7 +137,7 @@ Result<> check_way(const EmulateOptions& options, const drivers::Driver* driver)
   const bool bodies = driver->make_layout != nullptr;
   struct Way {
     std::string_view words;
-    bool chosen, heard;
+    bool chosen, used;
   };
   const std::array ways{
       Way{"--link PATH", options.pty || !options.link.empty(), !bodies},
@@ -146,18 +145,17 @@ Result<> check_way(const EmulateOptions& options, const drivers::Driver* driver)
       Way{"--listen IP:PORT", !options.listen.empty(), has("link") && has("connect")},
       Way{"--udp IP:PORT", !options.udp.empty(), bodies && has("listen")},
       Way{"--publish ENDPOINT", !options.publish.empty(), bodies && !has("listen")}};
-  std::string heard;
+  std::string used;
   for (const Way& way : ways) {
-    if (way.heard) heard += (heard.empty() ? "" : " or ") + std::string(way.words);
+    if (way.used) used += (used.empty() ? "" : " or ") + std::string(way.words);
   }
   for (const Way& way : ways) {
-    if (!way.chosen || way.heard) continue;
+    if (!way.chosen || way.used) continue;
     return misuse(fmt::format("posed does not listen for {} over {}; give {}", driver->name,
-                              way.words.substr(0, way.words.find(' ')), heard));
+                              way.words.substr(0, way.words.find(' ')), used));
   }
-  const bool publishes = ways.back().heard && options.publish.empty();
-  if (publishes)
-    return misuse(fmt::format("{} is heard over ZeroMQ; give {}", driver->name, heard));
+  const bool publishes = ways.back().used && options.publish.empty();
+  if (publishes) return misuse(fmt::format("{} is heard over ZeroMQ; give {}", driver->name, used));
   return {};
 }
 
@@ -210,12 +208,11 @@ Result<> emulate(const EmulateOptions& options) {
   if (!moves) return std::unexpected(moves.error());
   auto port = open_port(options, *emulated);
   if (!port) return std::unexpected(port.error());
-  const nlohmann::ordered_json ready{
-      {"port", options.link.empty() ? port->name() : options.link.string()}};
+  Findings ready;
+  ready.add("port", options.link.empty() ? port->name() : options.link.string());
   emulate::EmulatedDevice device(std::move(emulated->emulator), std::move(*port), std::move(*moves),
                                  std::move(settings));
-  std::printf("%s\n", json_text(ready).c_str());
-  std::fflush(stdout);
+  ready.show(true, -1);
   std::atomic<bool> ended{false};
   std::jthread thread([&](const std::stop_token& stop) {
     device.run(stop);

@@ -43,7 +43,8 @@ std::int64_t now_ns() {
 // Collects raw values from a glove's samples: calibrated sensors come first, then their raw values.
 class RawSink final : public Sink {
  public:
-  RawSink(std::size_t sensors, const GloveSource::Take& take) : sensors_(sensors), take_(take) {}
+  RawSink(std::size_t sensors, const GloveSource::Accept& accept)
+      : sensors_(sensors), accept_(accept) {}
   void frame(std::size_t /*body*/, Frame& /*frame*/) noexcept override {}
   void outcome(Outcome /*outcome*/) noexcept override {}
   void sample(std::size_t /*body*/, Sample& sample) noexcept override {
@@ -53,14 +54,14 @@ class RawSink final : public Sink {
       raw[i] = sample.value[sensors_ + i];
       valid[i] = sample.valid[sensors_ + i];
     }
-    take_(raw, valid);
+    accept_(raw, valid);
     ++count;
   }
   std::size_t count = 0;
 
  private:
   std::size_t sensors_;
-  const GloveSource::Take& take_;
+  const GloveSource::Accept& accept_;
 };
 
 class OpenedGlove final : public GloveSource {
@@ -70,8 +71,9 @@ class OpenedGlove final : public GloveSource {
   OpenedGlove(Glove glove, drivers::Device device, std::unique_ptr<drivers::TransportFactory> ports)
       : GloveSource(std::move(glove)), ports_(std::move(ports)), device_(std::move(device)) {}
 
-  Result<> listen(double seconds, const Take& take, const std::function<bool()>& enough) override {
-    RawSink sink(model().sensors.size(), take);
+  Result<> listen(double seconds, const Accept& accept,
+                  const std::function<bool()>& enough) override {
+    RawSink sink(model().sensors.size(), accept);
     const std::int64_t start_ns = now_ns();
     const std::int64_t end_ns = start_ns + static_cast<std::int64_t>(seconds * 1e9);
     const bool polled = !device_.poll.request.empty();
@@ -107,7 +109,7 @@ class OpenedGlove final : public GloveSource {
 };
 
 // One message of the daemon about the stream; both are empty if nothing came within kLookAround.
-struct Heard {
+struct Received {
   std::optional<v1::Sample> sample;
   std::optional<v1::Stats> stats;
 };
@@ -126,21 +128,23 @@ class Subscription {
     return Subscription(std::move(*connection), stream);
   }
 
-  Result<Heard> next() {
+  Result<Received> next() {
     if (Interrupt::came()) return interrupted();
     if (auto refused = connection_.refusal()) return std::unexpected(*refused);
-    Heard heard;
-    if (!connection_.wait(kLookAround)) return heard;
+    Received received;
+    if (!connection_.wait(kLookAround)) return received;
     net::Message topic, body;
-    if (!topic.receive(connection_.socket()) || !topic.more()) return heard;
-    if (!body.receive(connection_.socket(), 0)) return heard;
+    if (!topic.receive(connection_.socket()) || !topic.more()) return received;
+    if (!body.receive(connection_.socket(), 0)) return received;
     const int size = static_cast<int>(body.bytes().size());
     if (topic.text() == "stats") {
-      if (!heard.stats.emplace().ParseFromArray(body.bytes().data(), size)) heard.stats.reset();
+      if (!received.stats.emplace().ParseFromArray(body.bytes().data(), size))
+        received.stats.reset();
     } else if (topic.text() == sensor_topic(stream_)) {
-      if (!heard.sample.emplace().ParseFromArray(body.bytes().data(), size)) heard.sample.reset();
+      if (!received.sample.emplace().ParseFromArray(body.bytes().data(), size))
+        received.sample.reset();
     }
-    return heard;
+    return received;
   }
 
   // The stats of the stream; null if there is no such stream.
@@ -171,15 +175,16 @@ class PublishedGlove final : public GloveSource {
   PublishedGlove(Glove glove, Subscription subscription)
       : GloveSource(std::move(glove)), subscription_(std::move(subscription)) {}
 
-  Result<> listen(double seconds, const Take& take, const std::function<bool()>& enough) override {
+  Result<> listen(double seconds, const Accept& accept,
+                  const std::function<bool()>& enough) override {
     const auto end = Clock::now() + std::chrono::duration<double>(seconds);
     std::size_t count = 0;
     while (Clock::now() < end) {
       if (enough()) return {};
-      const auto heard = subscription_.next();
-      if (!heard) return std::unexpected(heard.error());
-      if (heard->stats && !still_there(*heard->stats)) return gone();
-      if (heard->sample && pass_on(*heard->sample, take)) ++count;
+      const auto received = subscription_.next();
+      if (!received) return std::unexpected(received.error());
+      if (received->stats && !still_there(*received->stats)) return gone();
+      if (received->sample && pass_on(*received->sample, accept)) ++count;
     }
     if (count == 0) return nothing_came();
     return {};
@@ -192,7 +197,7 @@ class PublishedGlove final : public GloveSource {
     return stream != nullptr && !stream->away() && stream->identity() == identity();
   }
 
-  [[nodiscard]] bool pass_on(const v1::Sample& sample, const Take& take) const {
+  [[nodiscard]] bool pass_on(const v1::Sample& sample, const Accept& accept) const {
     Raw raw{};
     Valid valid;
     for (std::size_t i = 0; i < model().sensors.size(); ++i) {
@@ -202,7 +207,7 @@ class PublishedGlove final : public GloveSource {
       raw[i] = sample.value(static_cast<int>(place));
       valid[i] = place < sample.validity().size() && sample.validity()[place] != 0;
     }
-    take(raw, valid);
+    accept(raw, valid);
     return true;
   }
 
@@ -239,11 +244,11 @@ Result<std::unique_ptr<GloveSource>> GloveSource::connect(const ClientOptions& c
   if (!subscription) return std::unexpected(subscription.error());
   const auto end = Clock::now() + std::chrono::duration<double>(kGlovePatience_s);
   while (Clock::now() < end) {
-    const auto heard = subscription->next();
-    if (!heard) return std::unexpected(heard.error());
-    if (!heard->stats) continue;
-    const v1::StreamStats* stats = subscription->part_of(*heard->stats);
-    if (stats == nullptr) return no_such_stream(stream, *heard->stats);
+    const auto received = subscription->next();
+    if (!received) return std::unexpected(received.error());
+    if (!received->stats) continue;
+    const v1::StreamStats* stats = subscription->part_of(*received->stats);
+    if (stats == nullptr) return no_such_stream(stream, *received->stats);
     const drivers::Driver* driver = drivers::find_driver(stats->driver());
     if (driver == nullptr || stats->device_info().empty()) {
       return misuse("stream " + in_quotes(stream) + " is of driver " + in_quotes(stats->driver()) +

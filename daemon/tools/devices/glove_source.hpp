@@ -5,8 +5,6 @@
 #include <bitset>
 #include <functional>
 #include <memory>
-#include <optional>
-#include <span>
 #include <string>
 
 #include "daemon/tools/command/client.hpp"
@@ -22,7 +20,7 @@ class GloveSource {
   using Raw = std::array<float, drivers::glove::kMaxSensors>;
   using Valid = std::bitset<drivers::glove::kMaxSensors>;
   // [sensor of the model]; values that are not valid were not measured.
-  using Take = std::function<void(const Raw& raw, const Valid& valid)>;
+  using Accept = std::function<void(const Raw& raw, const Valid& valid)>;
 
   // Opens the device and starts it.
   [[nodiscard]] static Result<std::unique_ptr<GloveSource>> open(const drivers::Driver& driver,
@@ -41,10 +39,10 @@ class GloveSource {
   // Passes on what comes for this long, or until `enough` returns true, which is asked after each
   // measurement and ten times a second. Returns an error if the glove is lost, nothing comes, or on
   // Ctrl-C.
-  [[nodiscard]] virtual Result<> listen(double seconds, const Take& take,
+  [[nodiscard]] virtual Result<> listen(double seconds, const Accept& accept,
                                         const std::function<bool()>& enough) = 0;
-  [[nodiscard]] Result<> listen(double seconds, const Take& take) {
-    return listen(seconds, take, [] { return false; });
+  [[nodiscard]] Result<> listen(double seconds, const Accept& accept) {
+    return listen(seconds, accept, [] { return false; });
   }
 
  protected:

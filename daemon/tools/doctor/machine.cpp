@@ -63,7 +63,7 @@ std::string own_name() {
 
 std::vector<Node> glove_nodes() {
   std::vector<Node> nodes;
-  const auto take = [&](drivers::DeviceInfo&& info) {
+  const auto add = [&](drivers::DeviceInfo&& info) {
     struct stat node{};
     const bool known = ::stat(info.node.c_str(), &node) == 0 && node.st_gid != 0;
     nodes.push_back({.info = std::move(info), .group = known ? group_name(node.st_gid) : ""});
@@ -73,11 +73,11 @@ std::vector<Node> glove_nodes() {
                                [&](const drivers::KnownUsb& known) { return known.fits(info); });
   };
   for (auto& port : drivers::list_serial_ports()) {
-    if (port.is_usb) take(std::move(port));
+    if (port.is_usb) add(std::move(port));
   }
   for (auto* list : {&drivers::list_hid_nodes, &drivers::list_usb_devices}) {
     for (auto& one : list()) {
-      if (is_glove(one)) take(std::move(one));
+      if (is_glove(one)) add(std::move(one));
     }
   }
   return nodes;

@@ -40,7 +40,7 @@ struct Machine {
   bool may_schedule = false;  // CAP_SYS_NICE
   bool may_lock = false;      // CAP_IPC_LOCK
   ClockState clock = ClockState::kUnknown;
-  // Free for this user on the disk of an existing folder; empty if it cannot be told.
+  // Free for this user on the disk of an existing folder; empty if it is unknown.
   std::function<std::optional<std::uint64_t>(const std::filesystem::path&)> free_bytes{};
   std::function<bool(const std::filesystem::path&)> may_write{};  // into an existing folder
   // Binds and closes a socket. The error says what the system said.

@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-namespace posed::replay {
+namespace posed::tools {
 
 Result<FrameFile> FrameFile::create(const std::filesystem::path& path) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
@@ -26,4 +26,4 @@ Result<> FrameFile::close() {
   return {};
 }
 
-}  // namespace posed::replay
+}  // namespace posed::tools

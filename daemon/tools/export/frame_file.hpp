@@ -9,7 +9,7 @@
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/result.hpp"
 
-namespace posed::replay {
+namespace posed::tools {
 
 class FrameFile {
  public:
@@ -28,4 +28,4 @@ class FrameFile {
   std::string bytes_;
 };
 
-}  // namespace posed::replay
+}  // namespace posed::tools

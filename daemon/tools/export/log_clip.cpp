@@ -1,32 +1,132 @@
 #include "daemon/tools/export/log_clip.hpp"
 
 #include <algorithm>
-#include <cstdint>
-#include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <utility>
-#include <vector>
 
+#include "daemon/pipeline/take.hpp"
 #include "daemon/replay/replay.hpp"
-#include "daemon/tools/export/log_takes.hpp"
 #include "proto/clip/frames_clip.hpp"
-#include "proto/log/reader.hpp"
+#include "proto/frame/time.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/stream_name.hpp"
 
-namespace posed::replay {
+namespace posed::tools {
+namespace {
+
+constexpr std::size_t kMostListed = 20;  // takes in a sentence
+
+std::string list_of(const std::vector<log::TakeRow>& takes) {
+  std::string list;
+  for (std::size_t i = 0; i < takes.size() && i < kMostListed; ++i) {
+    const pipeline::Take take{.number = static_cast<std::uint32_t>(takes[i].id),
+                              .name = takes[i].name};
+    list += (i == 0 ? "" : ", ") + pipeline::words_of(take);
+  }
+  if (takes.size() > kMostListed) {
+    list += " and " + std::to_string(takes.size() - kMostListed) + " more";
+  }
+  return list;
+}
+
+// Finds between which items the chunks came that a log lacks, and marks the takes that were running
+// then. A gap lies between two chunks of one source; the items in between are other sources'.
+class GapMarker {
+ public:
+  GapMarker(const std::vector<log::GapRow>& gaps, std::vector<LoggedTake>& takes) : takes_(takes) {
+    for (const log::GapRow& gap : gaps) {
+      if (gap.kind != log::GapRow::Kind::kChunks) continue;
+      if (gap.after_chunk == 0) {
+        open_[gap.owner] = 0;
+      } else {
+        after_[gap.after_chunk] = gap.owner;
+      }
+    }
+  }
+  // In the order of the log.
+  void on_chunk(const log::ChunkRow& row) {
+    if (const auto open = open_.find(row.source); open != open_.end()) {
+      mark(open->second, row.first_item);
+      open_.erase(open);
+    }
+    if (after_.contains(row.id)) open_[row.source] = row.first_item;
+  }
+  void on_end() {
+    for (const auto& [source, item] : open_) mark(item, log::kToTheEnd);
+  }
+
+ private:
+  void mark(std::uint64_t before, std::uint64_t after) {
+    for (LoggedTake& take : takes_) {
+      const bool overlaps = take.row.first_item < after && take.row.last_item > before;
+      if (overlaps) take.has_gaps = true;
+    }
+  }
+  std::vector<LoggedTake>& takes_;
+  std::map<std::int64_t, std::uint32_t> after_;  // chunk before a gap -> its source
+  std::map<std::uint32_t, std::uint64_t> open_;  // source -> the last item before its gap
+};
+
+}  // namespace
+
+Result<log::TakeRow> find_take(const log::Reader& reader, const std::string& wanted) {
+  auto takes = reader.takes();
+  if (!takes) return std::unexpected(takes.error());
+  if (takes->empty()) return misuse("has no takes; leave --take out", reader.file());
+  for (const log::TakeRow& take : *takes) {
+    if (std::to_string(take.id) == wanted) return take;
+  }
+  std::vector<log::TakeRow> named;
+  std::ranges::copy_if(*takes, std::back_inserter(named),
+                       [&](const log::TakeRow& take) { return take.name == wanted; });
+  if (named.size() == 1) return named.front();
+  if (named.empty()) {
+    return misuse("has no take " + in_quotes(wanted) + ", but " + list_of(*takes), reader.file());
+  }
+  return misuse("has several takes named " + in_quotes(wanted) +
+                    "; give the number of one: " + list_of(named),
+                reader.file());
+}
+
+Result<std::vector<LoggedTake>> logged_takes(log::Reader& reader) {
+  auto rows = reader.takes();
+  if (!rows) return std::unexpected(rows.error());
+  std::vector<LoggedTake> takes;
+  for (log::TakeRow& row : *rows) takes.push_back({.row = std::move(row)});
+  const auto extent = reader.extent();
+  if (!extent) return std::unexpected(extent.error());
+  if (takes.empty() || !*extent) return takes;
+  const auto gaps = reader.gaps();
+  if (!gaps) return std::unexpected(gaps.error());
+  GapMarker gap_marker(*gaps, takes);
+  for (auto chunk = reader.next_chunk();; chunk = reader.next_chunk()) {
+    if (!chunk) return std::unexpected(chunk.error());
+    if (!chunk->has_value()) break;
+    const log::ChunkRow& row = **chunk;
+    gap_marker.on_chunk(row);
+    if (row.direction != 0) continue;  // the others have no time of their own
+    const double time_s = seconds(row.arrival_ns - (*extent)->first_ns);
+    for (LoggedTake& take : takes) {
+      if (!holds(take.row, row.first_item)) continue;
+      if (!take.begin_s) take.begin_s = time_s;
+      take.end_s = time_s;
+    }
+  }
+  gap_marker.on_end();
+  return takes;
+}
+
 namespace {
 
 // The streams of one name, in the order in which they came.
 using Parts = std::vector<std::uint32_t>;
 
 // Only streams with a skeleton, because others have no pose.
-std::map<std::string, Parts> parts_by_name(const Replay& replay) {
+std::map<std::string, Parts> parts_by_name(const replay::Replay& replay) {
   std::map<std::string, Parts> parts;
   for (std::uint32_t id = 0; id < replay.streams(); ++id) {
-    const ReplayStream& stream = replay.stream(id);
+    const replay::ReplayStream& stream = replay.stream(id);
     if (stream.published != nullptr) parts[stream.name].push_back(id);
   }
   const auto first_item = [&](std::uint32_t id) { return replay.stream(id).first_item; };
@@ -35,8 +135,9 @@ std::map<std::string, Parts> parts_by_name(const Replay& replay) {
 }
 
 // Of the frames that the stream published, or of its unstyled ones.
-std::shared_ptr<const Skeleton> skeleton_of(const Replay& replay, std::uint32_t id, bool raw) {
-  const ReplayStream& stream = replay.stream(id);
+std::shared_ptr<const Skeleton> skeleton_of(const replay::Replay& replay, std::uint32_t id,
+                                            bool raw) {
+  const replay::ReplayStream& stream = replay.stream(id);
   return raw ? stream.description.skeleton : stream.published;
 }
 
@@ -51,8 +152,8 @@ Parts part_named(const std::map<std::string, Parts>& parts, const std::string& w
 }
 
 // A clip has one skeleton.
-Result<> check_same_skeleton(const Replay& replay, const std::string& name, const Parts& ids,
-                             const std::string& path, bool raw = false) {
+Result<> check_same_skeleton(const replay::Replay& replay, const std::string& name,
+                             const Parts& ids, const std::string& path, bool raw = false) {
   const auto id_of = [&](std::uint32_t id) { return skeleton_of(replay, id, raw)->id; };
   const auto differs = [&](std::uint32_t id) { return id_of(id) != id_of(ids.front()); };
   if (std::ranges::none_of(ids, differs)) return {};
@@ -74,7 +175,8 @@ struct Chosen {
   bool raw = false;  // the unstyled frames of them
 };
 
-Result<Chosen> choose(const Replay& replay, const std::string& wanted, const std::string& path) {
+Result<Chosen> choose(const replay::Replay& replay, const std::string& wanted,
+                      const std::string& path) {
   const auto parts = parts_by_name(replay);
   if (parts.empty()) return fail("has no stream with a skeleton", path);
   std::string names;
@@ -108,7 +210,7 @@ class Collector {
  public:
   explicit Collector(const std::shared_ptr<const Skeleton>& skeleton) : clip_(skeleton) {}
 
-  void take(const Frame& frame) {
+  void add(const Frame& frame) {
     const Header& header = frame.header;
     if (part_ != header.stream) {
       if (last_ != 0) ++returns_;
@@ -159,7 +261,7 @@ class Collector {
 };
 
 // By stream, the name of its clip: that of the stream, or "walker#2" if its skeleton changes.
-std::map<std::uint32_t, std::string> clip_names(const Replay& replay) {
+std::map<std::uint32_t, std::string> clip_names(const replay::Replay& replay) {
   std::map<std::uint32_t, std::string> names;
   for (const auto& [name, ids] : parts_by_name(replay)) {
     const bool one = check_same_skeleton(replay, name, ids, {}).has_value();
@@ -173,7 +275,7 @@ std::map<std::uint32_t, std::string> clip_names(const Replay& replay) {
 // Collects one take after the other.
 class TakeCollector {
  public:
-  TakeCollector(const Replay& replay, std::vector<log::TakeRow> takes, std::string file,
+  TakeCollector(const replay::Replay& replay, std::vector<log::TakeRow> takes, std::string file,
                 const EachTakeClip& each)
       : replay_(replay),
         takes_(std::move(takes)),
@@ -181,13 +283,13 @@ class TakeCollector {
         each_(each),
         names_(clip_names(replay)) {}
 
-  void take(const pipeline::Item& item) {
+  void add(const pipeline::Item& item) {
     while (next_ < takes_.size() && replay_.position() > takes_[next_].last_item) end_take();
     const auto name = names_.find(item.frame.header.stream);
     if (item.kind != pipeline::Item::Kind::kFrame || name == names_.end()) return;
     if (next_ == takes_.size() || !holds(takes_[next_], replay_.position())) return;
     collectors_.try_emplace(name->second, replay_.stream(name->first).published)
-        .first->second.take(item.frame);
+        .first->second.add(item.frame);
     rate_hz_[name->second] = replay_.stream(name->first).description.rate_hz;
   }
   void finish() {
@@ -204,7 +306,7 @@ class TakeCollector {
     ++next_;
   }
 
-  const Replay& replay_;
+  const replay::Replay& replay_;
   std::vector<log::TakeRow> takes_;  // in their order; they do not overlap
   std::string file_;
   const EachTakeClip& each_;
@@ -226,18 +328,18 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
     if (!found) return std::unexpected(found.error());
     interval = std::move(*found);
   }
-  auto opened = Replay::open(*reader);
+  auto opened = replay::Replay::open(*reader);
   if (!opened) return std::unexpected(opened.error());
-  Replay& replay = **opened;
+  replay::Replay& replay = **opened;
   const auto chosen = choose(replay, stream, path.string());
   if (!chosen) return std::unexpected(chosen.error());
-  const ReplayStream& first = replay.stream(chosen->ids.front());
+  const replay::ReplayStream& first = replay.stream(chosen->ids.front());
   Collector collector(skeleton_of(replay, chosen->ids.front(), chosen->raw));
   const auto kind = chosen->raw ? pipeline::Item::Kind::kRawFrame : pipeline::Item::Kind::kFrame;
   const auto take = [&](const pipeline::Item& item) {
     if (item.kind == kind && holds(interval, replay.position()) &&
         std::ranges::find(chosen->ids, item.frame.header.stream) != chosen->ids.end()) {
-      collector.take(item.frame);
+      collector.add(item.frame);
     }
   };
   const auto done = replay.run(
@@ -268,12 +370,12 @@ Result<> each_take_clip(const std::filesystem::path& path, const EachTakeClip& e
   auto takes = reader->takes();
   if (!takes) return std::unexpected(takes.error());
   if (takes->empty()) return {};
-  auto opened = Replay::open(*reader);
+  auto opened = replay::Replay::open(*reader);
   if (!opened) return std::unexpected(opened.error());
   TakeCollector collector(**opened, std::move(*takes), path.string(), each);
   bool stopped = false;
   const auto done =
-      (*opened)->run([&](const pipeline::Item& item) { collector.take(item); },
+      (*opened)->run([&](const pipeline::Item& item) { collector.add(item); },
                      [&](const log::ChunkRow&) { return !(stopped = stopped || !goes_on()); });
   if (!done) return done;
   if (stopped) return fail("interrupted: the log is complete, but not all of its takes are clips");
@@ -281,4 +383,4 @@ Result<> each_take_clip(const std::filesystem::path& path, const EachTakeClip& e
   return {};
 }
 
-}  // namespace posed::replay
+}  // namespace posed::tools

@@ -1,15 +1,38 @@
-// Turns a stream of a device log into a clip: replays the frames that the run published. Cold.
+// Clips and takes of a device log: replays the frames that the run published. Cold.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "proto/clip/clip.hpp"
 #include "proto/frame/result.hpp"
+#include "proto/log/reader.hpp"
 #include "proto/log/rows.hpp"
 
-namespace posed::replay {
+namespace posed::tools {
+
+struct LoggedTake {
+  log::TakeRow row{};
+  // Arrival of its first and its last chunk, after that of the log's first; empty: it has none.
+  std::optional<double> begin_s{};
+  std::optional<double> end_s{};
+  bool has_gaps = false;  // the log lacks chunks that came during the take
+};
+
+// Reads through all chunks of the log.
+[[nodiscard]] Result<std::vector<LoggedTake>> logged_takes(log::Reader& reader);
+
+// `wanted` is a take's number, or its name if no other take has it. Otherwise the error lists the
+// takes that there are.
+[[nodiscard]] Result<log::TakeRow> find_take(const log::Reader& reader, const std::string& wanted);
+
+[[nodiscard]] constexpr bool holds(const log::TakeRow& take, std::uint64_t item) noexcept {
+  return item >= take.first_item && item <= take.last_item;
+}
 
 // The stream named `stream`; the only one if that is empty. A body that came several times has
 // several parts, which become one clip; "walker#2" is the second part alone, for a body that
@@ -31,4 +54,4 @@ using EachTakeClip =
 [[nodiscard]] Result<> each_take_clip(const std::filesystem::path& path, const EachTakeClip& each,
                                       const std::function<bool()>& goes_on);
 
-}  // namespace posed::replay
+}  // namespace posed::tools

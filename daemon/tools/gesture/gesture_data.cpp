@@ -1,6 +1,5 @@
 #include "daemon/tools/gesture/gesture_data.hpp"
 
-#include <algorithm>
 #include <cstdio>
 #include <utility>
 

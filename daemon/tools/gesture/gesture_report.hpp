@@ -1,35 +1,55 @@
-// What `posed train gesture --report` and `posed eval gesture --report` show. Cold.
+// The reports of `posed train gesture` and `posed eval gesture`: what a gesture model performs, how
+// it got there, and how it compares with recordings. Cold.
 #pragma once
 
 #include <filesystem>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
-#include <nlohmann/json_fwd.hpp>
-
-#include "daemon/tools/gesture/lag_curve.hpp"
+#include "daemon/tools/command/findings.hpp"
+#include "daemon/tools/report/gesture_sections.hpp"
 #include "models/gesture/gesture_model.hpp"
 #include "models/gesture/recording.hpp"
+#include "models/gesture/tree_drawing.hpp"
+#include "models/trajectory/state_information.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::tools {
 
+// The curve of these labels, at look-aheads from 0 frames on.
+[[nodiscard]] std::vector<report::LagError> lag_curve(
+    const trajectory::StateInformation& information, std::span<const int> labels);
+
+// Trees as questions and leaves, to be drawn.
+[[nodiscard]] std::vector<report::QuestionTree> question_trees(const gesture::GestureModel& model,
+                                                               const gesture::TreeChoice& choice);
+
+// The paper's string where the model has its labels, else every label once.
+[[nodiscard]] std::vector<int> labels_to_show(const gesture::GestureModel& model);
+
+// The recordings' frames, one below the other [frame][channel]; at least one recording.
+[[nodiscard]] gesture::FeatureMatrix all_poses(const std::vector<gesture::Recording>& recordings);
+
+// What `posed train gesture --report` and `posed eval gesture --report` show.
 struct GestureReport {
   std::string title, command;
-  std::string recorded_by;        // what the recordings are: "the training recordings"
-  std::vector<int> labels;        // what is performed; at least one
-  bool good = true;               // the verdict's news
-  std::vector<LagPoint> curve{};  // empty: not computed yet
-  clip::Clip body{};              // of a model of bodies: whose figure is drawn
+  std::string recorded_by;  // what the recordings are: "the training recordings"
+  std::vector<int> labels;  // what is performed; at least one
+  std::string verdict;
+  bool good = true;  // the verdict's news
+  std::vector<std::string> warnings{};
+  std::vector<report::LagError> curve{};  // empty: not computed yet
+  clip::Clip body{};                      // of a model of bodies: whose figure is drawn
 };
 
 // `recordings`: what the model is compared with; without labels only its poses are, without any
-// nothing is. `figures`: what `--json` prints.
+// nothing is. `findings`: what `--json` prints.
 [[nodiscard]] Result<> write_gesture_report(
     const GestureReport& report, const std::shared_ptr<const gesture::GestureModel>& model,
-    const std::vector<gesture::Recording>& recordings, const nlohmann::json& figures,
+    const std::vector<gesture::Recording>& recordings, const Findings& findings,
     const std::filesystem::path& path);
 
 }  // namespace posed::tools

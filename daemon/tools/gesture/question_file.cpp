@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "models/gesture/body_recording.hpp"
-#include "proto/clip/text.hpp"
+#include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/toml.hpp"
 #include "proto/text/toml_table.hpp"
@@ -23,7 +23,7 @@ constexpr const char* kJoints = "joints";
 // The classes that people write as A, B, C and so on.
 std::string class_name(int index) { return {static_cast<char>('A' + index)}; }
 
-void read_fingers(TableReader& reader, Findings& findings, gesture::ClassLists& lists) {
+void read_fingers(TableReader& reader, posed::Findings& findings, gesture::ClassLists& lists) {
   for (const gesture::ChannelGroup& finger : gesture::finger_groups()) {
     auto table = reader.table(finger.name);
     if (!table) {
@@ -69,8 +69,8 @@ bool is_body(const toml::table& root) {
 }
 
 // The labels with their classes, and those that questions may name.
-Result<> take_labels(const gesture::ClassLists& lists, const std::vector<std::string>& named,
-                     gesture::Vocabulary& vocabulary) {
+Result<> set_labels(const gesture::ClassLists& lists, const std::vector<std::string>& named,
+                    gesture::Vocabulary& vocabulary) {
   for (std::size_t g = 0; g < lists.size(); ++g) {
     vocabulary.groups[g].classes = std::max(1, static_cast<int>(lists[g].size()));
   }
@@ -109,7 +109,7 @@ void write_list(std::ostream& out, const std::string& key, const std::vector<std
 Result<gesture::Vocabulary> read_questions(const std::filesystem::path& path) {
   const auto root = load_toml(path, kQuestionLimits);
   if (!root) return misuse(root.error().message, root.error().file, root.error().line);
-  Findings findings{.file = path.string(), .exit_code = ExitCode::kWrongUse};
+  posed::Findings findings{.file = path.string(), .exit_code = ExitCode::kWrongUse};
   TableReader reader(*root, "", findings);
   std::vector<std::string> named;
   reader.read(kNamed, named);
@@ -126,15 +126,15 @@ Result<gesture::Vocabulary> read_questions(const std::filesystem::path& path) {
   if (!lists) return std::unexpected(lists.error());
   auto vocabulary = body ? gesture::body_vocabulary(groups) : gesture::Vocabulary{};
   if (!vocabulary) return misuse(vocabulary.error().message, path.string());
-  if (auto taken = take_labels(*lists, named, *vocabulary); !taken) {
-    return misuse(taken.error().message, path.string());
+  if (auto set = set_labels(*lists, named, *vocabulary); !set) {
+    return misuse(set.error().message, path.string());
   }
   return vocabulary;
 }
 
 Result<> write_questions(const gesture::Vocabulary& vocabulary, const std::filesystem::path& path) {
   const gesture::ClassLists lists = gesture::lists_of(vocabulary.labels, vocabulary.groups);
-  return clip::write_text(path, [&](std::ostream& out) {
+  return write_whole_file(path, [&](std::ostream& out) {
     out << (vocabulary.is_hand()
                 ? "# Proposed by `posed train gesture`: k-means of each finger's pose, A the most "
                   "closed.\n"

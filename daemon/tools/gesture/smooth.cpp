@@ -1,18 +1,16 @@
 // `posed smooth`: runs a recorded hand through the live smoother, as a stream would have been.
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/degrees.hpp"
-#include "daemon/tools/command/hand_option.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/findings.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
 #include "models/gesture/model_file.hpp"
@@ -20,12 +18,9 @@
 #include "proto/clip/format.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/hand_skeleton.hpp"
-#include "proto/text/json_text.hpp"
 
 namespace posed::tools {
 namespace {
-
-using nlohmann::json;
 
 constexpr std::size_t kProgressEvery = 1000;  // frames
 
@@ -62,19 +57,18 @@ class Rows final : public StageOut {
 };
 
 // The recognised gestures, one entry for each run of frames.
-json recognised(const Rows& rows, const clip::HandClip& clip) {
-  json runs = json::array();
-  double sum = 0.0;
-  for (std::size_t t = 0; t < rows.labels.size(); ++t) {
-    if (t == 0 || rows.labels[t] != rows.labels[t - 1]) {
-      runs.push_back({{"label", rows.labels[t]}, {"start_s", clip.time_s[t]}, {"frames", 0}});
-      sum = 0.0;
+std::vector<Findings> recognised(const Rows& rows, const clip::HandClip& clip) {
+  std::vector<Findings> runs;
+  for (std::size_t begin = 0, end = 0; begin < rows.labels.size(); begin = end) {
+    double sum = 0.0;
+    while (end < rows.labels.size() && rows.labels[end] == rows.labels[begin]) {
+      sum += rows.probability[end++];
     }
-    json& run = runs.back();
-    sum += rows.probability[t];
-    const int frames = run["frames"].get<int>() + 1;
-    run["frames"] = frames;
-    run["mean_probability"] = sum / frames;
+    runs.push_back(Findings()
+                       .add("label", rows.labels[begin])
+                       .add("start_s", clip.time_s[begin])
+                       .add("frames", end - begin)
+                       .add("mean_probability", sum / static_cast<double>(end - begin)));
   }
   return runs;
 }
@@ -145,24 +139,21 @@ Result<> smooth(const SmoothOptions& options) {
   const int lag_frames = smooth::lag_frames(live->lag, 1.0 / clip->rate_hz);
   const double lag_ms = 1e3 * lag_frames / clip->rate_hz;
   const double noise_deg = smoother.noise_rad() * kDegrees;
-  if (!options.json) {
-    std::printf(
-        "%s: %zu frames, %d behind (%.0f ms at %g Hz), sensor noise %.2f deg (standard "
-        "deviation of an angle%s), %ld missing values bridged\n",
-        options.out.c_str(), measured.size(), lag_frames, lag_ms, clip->rate_hz, noise_deg,
-        options.noise_deg > 0.0 ? "" : ", estimated", rows.bridged_values);
-    return {};
-  }
-  json report{{"out", options.out},
-              {"frames", measured.size()},
-              {"rate_hz", clip->rate_hz},
-              {"lag_frames", lag_frames},
-              {"lag_ms", lag_ms},
-              {"noise_deg", noise_deg},
-              {"noise_given", options.noise_deg > 0.0},
-              {"bridged_values", rows.bridged_values}};
-  if (model) report["labels"] = recognised(rows, *clip);
-  std::printf("%s\n", json_text(report, 2).c_str());
+  Findings findings;
+  findings.add("out", options.out)
+      .add("frames", measured.size())
+      .add("rate_hz", clip->rate_hz)
+      .add("lag_frames", lag_frames)
+      .add("lag_ms", lag_ms)
+      .add("noise_deg", noise_deg)
+      .add("noise_given", options.noise_deg > 0.0)
+      .add("bridged_values", rows.bridged_values)
+      .say(fmt::format("{}: {} frames, {} behind ({:.0f} ms at {:g} Hz), sensor noise {:.2f} deg "
+                       "(standard deviation of an angle{}), {} missing values bridged",
+                       options.out, measured.size(), lag_frames, lag_ms, clip->rate_hz, noise_deg,
+                       options.noise_deg > 0.0 ? "" : ", estimated", rows.bridged_values));
+  if (model) findings.add("labels", recognised(rows, *clip));
+  findings.show(options.json);
   return {};
 }
 

@@ -1,18 +1,16 @@
 // `posed synth`: performs a sequence of labels with a hand or a body and writes a file.
 #include <charconv>
 #include <cmath>
-#include <cstdio>
-#include <filesystem>
 #include <memory>
 
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/hand_option.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/findings.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
-#include "daemon/tools/command/waiting.hpp"
+#include "daemon/tools/command/progress.hpp"
 #include "models/gesture/model_file.hpp"
 #include "models/perform/body_performance.hpp"
 #include "models/perform/constrain.hpp"
@@ -22,12 +20,9 @@
 #include "proto/clip/format.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/hand_shape.hpp"
-#include "proto/text/json_text.hpp"
 
 namespace posed::tools {
 namespace {
-
-using nlohmann::json;
 
 constexpr const char* kSynthFooter = R"(Examples:
   posed synth --model hand.gesture --labels "g 1 c 3 4 p" --out hand.csv
@@ -71,24 +66,40 @@ Result<> write_hand(const clip::HandClip& hand, const SynthOptions& options) {
   return clip::write_clip(*clip, options.out);
 }
 
-json states_json(const gesture::GestureModel& model, const perform::Performance& performance) {
-  json states = json::array();
-  for (const perform::PerformedState& state : performance.states) {
-    json leaf;
+// The states of the performance; those of a label begin with a line for it.
+std::vector<Findings> findings_of(const gesture::GestureModel& model,
+                                  const perform::Performance& performance) {
+  std::vector<Findings> states;
+  for (std::size_t i = 0; i < performance.states.size(); ++i) {
+    const perform::PerformedState& state = performance.states[i];
+    const std::string& label = model.labels[state.context.current].name;
+    Findings leaf;
     for (std::size_t g = 0; g < model.groups.size(); ++g) {
-      leaf[model.groups[g].name] = state.leaf[g];
+      leaf.add(model.groups[g].name, state.leaf[g]);
     }
-    states.push_back({{"label", model.labels[state.context.current].name},
-                      {"state", state.state + 1},
-                      {"start", state.start},
-                      {"frames", state.frames},
-                      {"leaf", leaf}});
+    states.push_back(Findings()
+                         .add("label", label)
+                         .add("state", state.state + 1)
+                         .add("start", state.start)
+                         .add("frames", state.frames)
+                         .add("leaf", leaf));
+    if (i % gesture::kStates != 0) continue;
+    int frames = 0;
+    for (std::size_t s = i; s < i + gesture::kStates; ++s) frames += performance.states[s].frames;
+    states.back().say(fmt::format("{:<8} {:6} {:6}", label, state.start, frames));
   }
   return states;
 }
 
-// Constrains a hand's performance, unless it shall not, and writes it; what is to be told of it.
-Result<json> perform_hand(const SynthOptions& options, perform::Performance& performance) {
+// What is special about the performance of a hand, or of a body.
+struct Performed {
+  std::string name;  // of the figure in JSON
+  double distance_cm = 0.0;
+  std::string words;
+};
+
+// Applies the hand constraints (unless --unconstrained) and writes the file.
+Result<Performed> perform_hand(const SynthOptions& options, perform::Performance& performance) {
   const auto shape = find_hand_shape(options.shape);
   if (!shape) return std::unexpected(shape.error());
   const double gap_m = options.unconstrained ? perform::smallest_gap_m(performance, **shape)
@@ -101,12 +112,15 @@ Result<json> perform_hand(const SynthOptions& options, perform::Performance& per
     hand.time_s.push_back(static_cast<double>(t) / performance.rate_hz);
   }
   if (auto written = write_hand(hand, options); !written) return std::unexpected(written.error());
-  return json{{"min_gap_cm", 100.0 * gap_m}};
+  const double gap_cm = 100.0 * gap_m;
+  return Performed{"min_gap_cm", gap_cm,
+                   fmt::format("fingers {} {:.2f} cm {}", gap_cm < 0.0 ? "overlap by" : "at least",
+                               std::abs(gap_cm), gap_cm < 0.0 ? "at worst" : "apart")};
 }
 
 // Writes a body's performance.
-Result<json> perform_body(const SynthOptions& options, const gesture::GestureModel& model,
-                          const perform::Performance& performance) {
+Result<Performed> perform_body(const SynthOptions& options, const gesture::GestureModel& model,
+                               const perform::Performance& performance) {
   if (options.body.empty() || clip::format_of(options.out)->is_hand) {
     return misuse(
         "the model is of a body; name a clip of the body that performs and a BVH to "
@@ -120,10 +134,12 @@ Result<json> perform_body(const SynthOptions& options, const gesture::GestureMod
   if (auto written = clip::write_clip(performed->clip, options.out); !written) {
     return std::unexpected(written.error());
   }
-  return json{{"feet_off_cm", 100.0 * performed->feet_off_m}};
+  const double off_cm = 100.0 * performed->feet_off_m;
+  return Performed{"feet_off_cm", off_cm,
+                   fmt::format("feet within {:.1f} cm of their places", off_cm)};
 }
 
-Result<json> synth(const SynthOptions& options) {
+Result<Findings> synth(const SynthOptions& options) {
   const auto files = OutputFiles(options.overwrite)
                          .reads(options.model)
                          .reads(options.body)
@@ -143,39 +159,20 @@ Result<json> synth(const SynthOptions& options) {
   const trajectory::StateInformation information(
       std::make_shared<const gesture::GestureModel>(std::move(*model)), rate_hz);
   auto performance = perform::perform(information, *labels, *perform_as);
-  auto report = information.model().is_hand()
-                    ? perform_hand(options, performance)
-                    : perform_body(options, information.model(), performance);
-  if (!report) return report;
-  report->update({{"frames", performance.angles.size()},
-                  {"rate_hz", rate_hz},
-                  {"states", states_json(information.model(), performance)},
-                  {"out", options.out}});
-  return report;
-}
-
-void print_summary(const json& report) {
-  std::printf("%-8s %6s %6s\n", "label", "start", "frames");
-  for (std::size_t i = 0; i < report["states"].size(); i += gesture::kStates) {
-    int frames = 0;
-    for (std::size_t s = i; s < i + gesture::kStates; ++s) {
-      frames += report["states"][s]["frames"].get<int>();
-    }
-    const json& first = report["states"][i];
-    std::printf("%-8s %6d %6d\n", first["label"].get<std::string>().c_str(),
-                first["start"].get<int>(), frames);
-  }
-  if (report.contains("feet_off_cm")) {
-    std::printf("%d frames at %g Hz, feet within %.1f cm of their places, written to %s\n",
-                report["frames"].get<int>(), report["rate_hz"].get<double>(),
-                report["feet_off_cm"].get<double>(), report["out"].get<std::string>().c_str());
-    return;
-  }
-  const double gap_cm = report["min_gap_cm"].get<double>();
-  std::printf("%d frames at %g Hz, fingers %s %.2f cm %s, written to %s\n",
-              report["frames"].get<int>(), report["rate_hz"].get<double>(),
-              gap_cm < 0.0 ? "overlap by" : "at least", std::abs(gap_cm),
-              gap_cm < 0.0 ? "at worst" : "apart", report["out"].get<std::string>().c_str());
+  const auto performed = information.model().is_hand()
+                             ? perform_hand(options, performance)
+                             : perform_body(options, information.model(), performance);
+  if (!performed) return std::unexpected(performed.error());
+  const std::size_t frames = performance.angles.size();
+  return Findings()
+      .add("frames", frames)
+      .add("rate_hz", rate_hz)
+      .say(fmt::format("{:<8} {:>6} {:>6}", "label", "start", "frames"))
+      .add("states", findings_of(information.model(), performance))
+      .add(performed->name, performed->distance_cm)
+      .add("out", options.out)
+      .say(fmt::format("{} frames at {:g} Hz, {}, written to {}", frames, rate_hz, performed->words,
+                       options.out));
 }
 
 }  // namespace
@@ -215,13 +212,7 @@ void add_synth(CLI::App& app, int& exit_code) {
       const Waiting waiting("performing");
       return synth(*options);
     }();
-    if (!made) {
-      exit_code = report(made.error());
-    } else if (options->json) {
-      std::printf("%s\n", json_text(*made, 2).c_str());
-    } else {
-      print_summary(*made);
-    }
+    exit_code = made ? made->show(options->json) : report(made.error());
   });
 }
 

@@ -1,30 +1,79 @@
 #include "daemon/tools/gesture/train_gesture.hpp"
 
-#include <cstdio>
 #include <memory>
+#include <string>
 #include <utility>
 
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/hand_option.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/findings.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
-#include "daemon/tools/gesture/auto_label.hpp"
 #include "daemon/tools/gesture/gesture_data.hpp"
-#include "daemon/tools/gesture/gesture_figures.hpp"
 #include "daemon/tools/gesture/gesture_report.hpp"
 #include "daemon/tools/gesture/tree_options.hpp"
 #include "models/fixed_products.hpp"
+#include "models/gesture/auto_label.hpp"
 #include "models/gesture/model_file.hpp"
-#include "proto/text/json_text.hpp"
+#include "models/gesture/movement_label.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/clip/label_file.hpp"
 
 namespace posed::tools {
 namespace {
 
-using nlohmann::json;
+constexpr const char* kDefaultRest = "rest";
+
+struct AutoLabelOptions {
+  std::filesystem::path clip, examples, out;
+  std::string movement, rest;  // of a take without examples
+  bool body;                   // such a take is of a body
+  bool cycles;                 // its hold is cut so that it can be repeated
+  double rate_hz;
+  clip::ReadOptions read;
+  bool json;
+};
+
+// `posed train gesture --auto-label`: proposes labels for a recording of which few parts are
+// labelled, or which is a single movement. Returns the exit code; prints results on stdout and
+// errors on stderr.
+int auto_label(const AutoLabelOptions& options) {
+  const bool one_movement = !options.movement.empty();
+  const auto recording =
+      one_movement ? load_unlabelled(options.clip, options.body, options.rate_hz, options.read)
+                   : load_recording(options.clip, options.examples, options.rate_hz, options.read);
+  if (!recording) return report(recording.error());
+  const auto proposed = [&] {
+    const Waiting waiting("proposing labels");
+    if (!one_movement) return gesture::propose_segments(*recording);
+    const auto hold = options.cycles ? gesture::Hold::kCycles : gesture::Hold::kWhole;
+    return gesture::propose_movement(*recording, options.movement, options.rest, hold);
+  }();
+  if (!proposed) return report(proposed.error());
+  std::vector<clip::LabelSegment> labels;
+  for (const gesture::Segment& segment : *proposed) {
+    labels.push_back({segment.begin / options.rate_hz, segment.end / options.rate_hz, segment.label,
+                      static_cast<int>(labels.size()) + 1});
+  }
+  if (auto written = clip::write_labels(labels, options.out); !written) {
+    return report(written.error());
+  }
+  const std::size_t examples = recording->segments.size();
+  Findings findings;
+  findings.add("examples", examples)
+      .add("segments", labels.size())
+      .add("out", options.out.string())
+      .say(one_movement
+               ? fmt::format("{} segments proposed, written to {}; look through them",
+                             labels.size(), options.out.string())
+               : fmt::format("{} segments proposed from {} examples, written to {}; look through "
+                             "them, two gestures of one name in a row look like one",
+                             labels.size(), examples, options.out.string()));
+  return findings.show(options.json);
+}
 
 constexpr const char* kTrainGestureFooter = R"(Examples:
   posed train gesture --clip take1.csv --labels take1.lab --out hand.gesture
@@ -121,30 +170,43 @@ Result<> check(const TrainGestureOptions& options) {
       .check();
 }
 
-void print_gesture_summary(const json& report, const TrainGestureOptions& options) {
-  std::printf("%d gestures, %d frames, %d contexts, %d moving channels; leaves a state:\n",
-              report["gestures"].get<int>(), report["frames"].get<int>(),
-              report["contexts"].get<int>(), report["moving_channels"].get<int>());
-  const auto& groups = report["groups"];
-  std::printf("%-8s", "state");
-  for (const json& group : groups) std::printf("%*s", kWide, group.get<std::string>().c_str());
-  for (const json& state : report["leaves_by_state"]) {
-    std::printf("\n%-8d", state["state"].get<int>());
-    for (const json& group : groups) {
-      std::printf("%*d", kWide, state[group.get<std::string>()].get<int>());
-    }
+// A row of leaves for each state, and what was learnt from.
+void add_summary(const GestureTraining& training, const std::vector<gesture::Recording>& recordings,
+                 const std::string& out, Findings& findings) {
+  const gesture::GestureModel& model = training.model;
+  std::size_t gestures = 0;
+  Eigen::Index frames = 0;
+  for (const gesture::Recording& recording : recordings) {
+    gestures += recording.segments.size();
+    frames += recording.angles_rad.rows();
   }
-  std::printf("\n%d leaves in %zu trees, %d of durations\n", report["leaves"].get<int>(),
-              gesture::kStates * groups.size(), report["duration_leaves"].get<int>());
+  findings.say(fmt::format(
+      "{} gestures, {} frames, {} contexts, {} moving channels; leaves a state:", gestures, frames,
+      training.findings.contexts, training.findings.moving_channels));
+  std::string line = fmt::format("{:<8}", "state");
+  for (const auto& group : model.groups) line += fmt::format("{:>{}}", group.name, kWide);
+  findings.say(line);
+  std::size_t leaves = 0;
+  for (std::size_t state = 0; state < model.trees.size(); ++state) {
+    line = fmt::format("{:<8}", state + 1);
+    for (const auto& tree : model.trees[state]) {
+      line += fmt::format("{:{}}", tree.leaves.size(), kWide);
+      leaves += tree.leaves.size();
+    }
+    findings.say(line);
+  }
   std::string labels;
-  for (const json& label : report["labels"]) labels += " " + label["name"].get<std::string>();
-  std::printf("%s written after %.2f s; try: posed synth --model %s --labels \"%s\" --out %s\n",
-              options.out.c_str(), report["seconds"].get<double>(), options.out.c_str(),
-              labels.substr(1).c_str(),
-              report["body"].get<bool>() ? "body.bvh --body A_CLIP.bvh" : "hand.csv");
+  for (const auto& label : model.labels) labels += (labels.empty() ? "" : " ") + label.name;
+  findings
+      .say(fmt::format("{} leaves in {} trees, {} of durations", leaves,
+                       gesture::kStates * model.groups.size(), model.durations.leaves.size()))
+      .say(fmt::format(
+          "{0} written after {1:.2f} s; try: posed synth --model {0} --labels \"{2}\" --out {3}",
+          out, training.seconds, labels,
+          model.is_hand() ? "hand.csv" : "body.bvh --body A_CLIP.bvh"));
 }
 
-Result<json> train_gesture(const TrainGestureOptions& options, Ranks& ranks) {
+Result<Findings> train_gesture(const TrainGestureOptions& options, Ranks& ranks) {
   auto data = read_gesture_data(options, ranks.leads());
   if (!data) return std::unexpected(data.error());
   const std::vector<gesture::Recording>& recordings = data->recordings;
@@ -159,15 +221,24 @@ Result<json> train_gesture(const TrainGestureOptions& options, Ranks& ranks) {
   if (!training) return std::unexpected(training.error());
   const auto drawn = ranks.leads() ? draw_trees(training->model, *options.trees) : Result<>{};
   if (!drawn) return std::unexpected(drawn.error());
-  json report = json::parse(training->model.report_json);
-  report["seconds"] = training->seconds;
-  report["out"] = options.out;
-  report["body"] = !training->model.is_hand();
-  for (const auto& group : training->model.groups) report["groups"].push_back(group.name);
-  const std::size_t warnings = report["warnings"].size();
-  report["verdict"] = warnings == 0 ? "good: these recordings show no problem with the model"
-                                    : "usable with care: " + std::to_string(warnings) +
-                                          " warnings above say what to record more of";
+  const std::vector<std::string>& warnings = training->findings.warnings;
+  const std::string verdict = warnings.empty()
+                                  ? "good: these recordings show no problem with the model"
+                                  : fmt::format(
+                                        "usable with care: {} warnings above say what to "
+                                        "record more of",
+                                        warnings.size());
+  std::vector<std::string> groups;
+  for (const auto& group : training->model.groups) groups.push_back(group.name);
+  Findings findings;
+  findings.add_json(training->model.report_json)
+      .add("seconds", training->seconds)
+      .add("out", options.out)
+      .add("body", !training->model.is_hand())
+      .add("groups", groups)
+      .add("verdict", verdict);
+  add_summary(*training, recordings, options.out, findings);
+  findings.warn(warnings).remark(verdict);
   if (!options.report.empty() && ranks.leads()) {
     auto body = figure_of(training->model, options.clips.front(), options.read);
     if (!body) return std::unexpected(body.error());
@@ -176,12 +247,14 @@ Result<json> train_gesture(const TrainGestureOptions& options, Ranks& ranks) {
                                                .command = "posed train gesture",
                                                .recorded_by = "the training recordings",
                                                .labels = labels_to_show(*model),
-                                               .good = warnings == 0,
+                                               .verdict = verdict,
+                                               .good = warnings.empty(),
+                                               .warnings = warnings,
                                                .body = std::move(*body)},
-                                              model, recordings, report, options.report);
+                                              model, recordings, findings, options.report);
     if (!written) return std::unexpected(written.error());
   }
-  return report;
+  return findings;
 }
 
 int train_or_report(const TrainGestureOptions& options, Ranks& ranks) {
@@ -204,17 +277,7 @@ int train_or_report(const TrainGestureOptions& options, Ranks& ranks) {
   if (auto same = ranks.check_same(inputs_of(options)); !same) return report(same.error());
   const auto trained = train_gesture(options, ranks);
   if (!trained) return report(trained.error());
-  for (const json& warning : (*trained)["warnings"]) {
-    std::fprintf(stderr, "posed: warning: %s\n", warning.get<std::string>().c_str());
-  }
-  if (options.json) {
-    std::printf("%s\n", json_text(*trained, 2).c_str());
-  } else {
-    print_gesture_summary(*trained, options);
-  }
-  std::fflush(stdout);
-  std::fprintf(stderr, "posed: %s\n", (*trained)["verdict"].get<std::string>().c_str());
-  return 0;
+  return trained->show(options.json);
 }
 
 }  // namespace
@@ -228,12 +291,14 @@ Result<GestureTraining> train_gesture_and_save(const std::vector<gesture::Record
   options.progress = [&bar](std::string_view step, double fraction) {
     return bar.show(step, fraction);
   };
+  gesture::TrainFindings found;
+  options.look = [&found](gesture::TrainFindings findings) { found = std::move(findings); };
   auto model = gesture::train_gesture(recordings, options);
   if (!model) return std::unexpected(model.error());
   const double seconds = bar.elapsed_s();
   const auto saved = ranks.write_model([&] { return gesture::save_model(*model, out); });
   if (!saved) return std::unexpected(saved.error());
-  return GestureTraining{std::move(*model), seconds};
+  return GestureTraining{std::move(*model), std::move(found), seconds};
 }
 
 void add_train_gesture(CLI::App& train_command, int& exit_code,

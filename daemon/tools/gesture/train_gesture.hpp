@@ -2,10 +2,7 @@
 #pragma once
 
 #include <filesystem>
-#include <string>
 #include <vector>
-
-#include <nlohmann/json_fwd.hpp>
 
 #include "daemon/tools/command/ranks.hpp"
 #include "models/gesture/gesture_model.hpp"
@@ -16,6 +13,7 @@ namespace posed::tools {
 
 struct GestureTraining {
   gesture::GestureModel model;
+  gesture::TrainFindings findings;
   double seconds = 0.0;  // of the training itself
 };
 

@@ -1,12 +1,13 @@
 #include "daemon/tools/gesture/tree_options.hpp"
 
 #include <cstdio>
-#include <ostream>
+#include <functional>
 
 #include <CLI/CLI.hpp>
 
+#include "daemon/tools/gesture/gesture_report.hpp"
 #include "models/gesture/tree_drawing.hpp"
-#include "proto/clip/text.hpp"
+#include "proto/frame/whole_file.hpp"
 
 namespace posed::tools {
 namespace {
@@ -16,7 +17,7 @@ Result<> put(const std::string& text, const std::string& file) {
     std::fwrite(text.data(), 1, text.size(), stdout);
     return {};
   }
-  return clip::write_text(file, [&](std::ostream& out) { out << text; });
+  return write_whole_file(file, text);
 }
 
 }  // namespace
@@ -48,13 +49,17 @@ Result<> check_tree_options(const TreeOptions& options, OutputFiles& files,
 Result<> draw_trees(const gesture::GestureModel& model, const TreeOptions& options) {
   const auto choice = gesture::tree_choice(options.which, model.groups);
   if (!choice) return std::unexpected(choice.error());
-  using Draw = std::string (*)(const gesture::GestureModel&, const gesture::TreeChoice&);
-  const std::pair<const std::string&, Draw> drawings[]{{options.text, gesture::trees_text},
-                                                       {options.dot, gesture::trees_dot},
-                                                       {options.svg, gesture::trees_svg}};
+  const auto svg = [&] {
+    return report::svg_file(
+        report::decision_trees("", question_trees(model, *choice), false).drawings);
+  };
+  const std::pair<const std::string&, std::function<std::string()>> drawings[]{
+      {options.text, [&] { return gesture::trees_text(model, *choice); }},
+      {options.dot, [&] { return gesture::trees_dot(model, *choice); }},
+      {options.svg, svg}};
   for (const auto& [file, draw] : drawings) {
     if (file.empty()) continue;
-    if (auto done = put(draw(model, *choice), file); !done) return done;
+    if (auto done = put(draw(), file); !done) return done;
   }
   return {};
 }

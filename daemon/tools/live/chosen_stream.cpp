@@ -1,20 +1,112 @@
 #include "daemon/tools/live/chosen_stream.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/tools/command/paint.hpp"
-#include "daemon/tools/live/live_table.hpp"
-#include "daemon/tools/live/sparkline.hpp"
+#include "daemon/tools/picture/braille.hpp"
+#include "models/motion/motion.hpp"
 #include "models/style/live/style_filter.hpp"
 #include "posed/v1/control.pb.h"
 #include "posed/v1/posed.pb.h"
+#include "proto/message/skeleton_message.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::tools {
+namespace {
+
+// How far the room goes towards that of the present pose when it is drawn: at ten drawings a second
+// a pose that was unusually large is forgotten after some ten seconds.
+constexpr double kShrink = 0.02;
+
+// The pose in a message of `skeleton`'s stream; empty if its counts do not fit.
+std::optional<Frame> frame_from(const v1::Frame& message, const Skeleton& skeleton) {
+  const std::size_t joints = skeleton.joints.size();
+  if (message.rotation_xyzw_size() != static_cast<int>(4 * joints) ||
+      message.validity().size() != joints || message.root_position_m_size() != 3) {
+    return std::nullopt;
+  }
+  Frame frame;
+  frame.skeleton = skeleton.id;
+  frame.joint_count = static_cast<std::uint16_t>(joints);
+  for (std::size_t j = 0; j < joints; ++j) {
+    Quatf rotation{};
+    float square = 0.0F;
+    for (std::size_t i = 0; i < 4; ++i) {
+      rotation[i] = message.rotation_xyzw(static_cast<int>(4 * j + i));
+      square += rotation[i] * rotation[i];
+    }
+    // What is no rotation (false for NaN, too) counts as not rotated.
+    frame.valid[j] = std::abs(square - 1.0F) < 0.1F;
+    frame.rotation_xyzw[j] = frame.valid[j] ? rotation : kIdentity;
+  }
+  for (int i = 0; i < 3; ++i) {
+    if (!std::isfinite(message.root_position_m(i))) return std::nullopt;
+    frame.root_position_m[static_cast<std::size_t>(i)] = message.root_position_m(i);
+  }
+  return frame;
+}
+
+}  // namespace
+
+void StreamFigure::handle(std::string_view topic, std::span<const std::byte> body) {
+  if (topic == "skeleton/" + stream_) take_skeleton(body);
+  if (topic == "pose/" + stream_) take_pose(body);
+}
+
+void StreamFigure::take_skeleton(std::span<const std::byte> body) {
+  v1::Skeleton message;
+  if (!message.ParseFromArray(body.data(), static_cast<int>(body.size()))) return;
+  if (shape_ != nullptr && message.id() == wire_id_) return;
+  auto skeleton = message::skeleton_from(message);
+  if (!skeleton) return;
+  wire_id_ = message.id();
+  skeleton_ = std::move(*skeleton);
+  shape_ = std::make_unique<picture::FigureShape>(skeleton_);
+  camera_.reset();
+  figure_.reset();
+  room_.reset();
+}
+
+void StreamFigure::take_pose(std::span<const std::byte> body) {
+  v1::Frame message;
+  if (shape_ == nullptr || !message.ParseFromArray(body.data(), static_cast<int>(body.size())) ||
+      message.skeleton_id() != wire_id_) {
+    return;
+  }
+  const auto frame = frame_from(message, *skeleton_);
+  if (!frame) return;
+  if (!camera_) {
+    const motion::Motion still{.skeleton = skeleton_, .rate_hz = 1.0, .frames = {*frame}};
+    camera_.emplace(picture::View::kThreeQuarter, shape_->facing(motion::walk_heading_rad(still)));
+  }
+  figure_ = shape_->pose(*frame);
+}
+
+void StreamFigure::fit_room() {
+  picture::StripRow row;
+  row.poses.push_back({.figure = *figure_, .caption = {}});
+  const picture::StripLayout now = picture::layout_of({row}, *camera_, 1.0, false);
+  if (!room_) room_ = now;
+  const auto lower = [](double& kept, double value) {
+    kept = std::min(value, std::lerp(kept, value, kShrink));
+  };
+  const auto raise = [](double& kept, double value) {
+    kept = std::max(value, std::lerp(kept, value, kShrink));
+  };
+  lower(room_->left_m, now.left_m);
+  lower(room_->bottom_m, now.bottom_m);
+  raise(room_->right_m, now.right_m);
+  raise(room_->top_m, now.top_m);
+}
+
+std::vector<std::string> StreamFigure::lines(int columns, int rows) {
+  if (!figure_ || columns < 1 || rows < 1) return {};
+  fit_room();
+  return picture::braille(*figure_, *camera_, *room_, columns, rows);
+}
+
 namespace {
 
 constexpr std::size_t kSecondsKept = 60;
@@ -49,7 +141,7 @@ void ChosenStream::follow(const std::string& stream) {
   figure_.emplace(stream);
 }
 
-void ChosenStream::take(const v1::Stats& stats) {
+void ChosenStream::update(const v1::Stats& stats) {
   for (const v1::StreamStats& stream : stats.stream()) {
     auto& history = latency_us_[stream.stream()];
     history.push_back(stream.publish().p99_us());
@@ -66,8 +158,8 @@ void ChosenStream::take(const v1::Stats& stats) {
   asked_alpha_.reset();
 }
 
-void ChosenStream::take(std::string_view topic, std::span<const std::byte> body) {
-  if (figure_) figure_->take(topic, body);
+void ChosenStream::handle(std::string_view topic, std::span<const std::byte> body) {
+  if (figure_) figure_->handle(topic, body);
 }
 
 void ChosenStream::obey(Key key, const v1::Stats& stats) {
@@ -137,9 +229,9 @@ void ChosenStream::read_answer() {
     asked_at_.reset();
     v1::ControlReply reply;
     const auto bytes = message.bytes();
-    const bool sound = reply.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
-    if (!sound || !reply.ok()) {
-      note_ = "alpha stays: " + (sound ? clean(reply.error()) : "the answer cannot be read");
+    const bool valid = reply.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+    if (!valid || !reply.ok()) {
+      note_ = "alpha stays: " + (valid ? clean(reply.error()) : "the answer cannot be read");
       asked_alpha_.reset();
     }
     return;
@@ -165,8 +257,8 @@ std::string ChosenStream::latency_line(const std::string& stream, int columns) c
   const auto& kept = found->second;
   const double most_us = kept.empty() ? 0.0 : *std::ranges::max_element(kept);
   if (!(most_us > 0.0)) return {};
-  const std::string words =
-      fmt::format("{}: latency 99 %, at most {} ", clean_name(stream), people_duration(most_us));
+  const std::string words = fmt::format("{}: latency 99 %, at most {} ", clean_name(stream),
+                                        display_duration(most_us * 1e-6));
   const int room = columns - static_cast<int>(words.size());
   const auto count = std::min(kept.size(), static_cast<std::size_t>(std::max(room, 0)));
   const auto first = kept.end() - static_cast<std::ptrdiff_t>(count);

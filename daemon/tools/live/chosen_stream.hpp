@@ -1,11 +1,15 @@
-// ChosenStream: the stream of `posed top` and `posed demo` that the arrow keys chose: its figure,
-// its latency over the last minute, and its alpha, which the keys change.
+// What `posed top` and `posed demo` show of one stream: its figure, its latency over the last
+// minute and its alpha. Cold.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <deque>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,7 +18,8 @@
 
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/live/live_view.hpp"
-#include "daemon/tools/live/stream_figure.hpp"
+#include "daemon/tools/picture/figure.hpp"
+#include "daemon/tools/picture/strip.hpp"
 
 namespace posed::v1 {
 class Stats;
@@ -23,6 +28,55 @@ class StreamStats;
 
 namespace posed::tools {
 
+// StreamFigure: the pose of one stream of a daemon as a small figure of text, for `posed top`.
+class StreamFigure {
+ public:
+  explicit StreamFigure(std::string stream) : stream_(std::move(stream)) {}
+
+  [[nodiscard]] const std::string& stream() const { return stream_; }
+
+  // Takes a message of the daemon; those of other topics than skeleton/ and pose/ of the stream,
+  // and what cannot be parsed, change nothing.
+  void handle(std::string_view topic, std::span<const std::byte> body);
+
+  // The last pose, seen in three-quarter view as it stood when the first pose came; empty before.
+  // Call it at the rate of the screen: what the poses need as room grows at once and shrinks
+  // slowly.
+  [[nodiscard]] std::vector<std::string> lines(int columns, int rows);
+
+ private:
+  void take_skeleton(std::span<const std::byte> body);
+  void take_pose(std::span<const std::byte> body);
+  void fit_room();
+
+  std::string stream_;
+  std::uint32_t wire_id_ = 0;  // of the skeleton, as frames carry it
+  std::shared_ptr<const Skeleton> skeleton_{};
+  std::unique_ptr<picture::FigureShape> shape_{};
+  std::optional<picture::Camera> camera_{};
+  std::optional<picture::Figure> figure_{};
+  std::optional<picture::StripLayout> room_{};
+};
+
+// A row of bars from a list of numbers, one character each, for a terminal. The tallest of the
+// eight bars is the largest value. What is not above 0, or not finite, is the lowest bar.
+[[nodiscard]] inline std::string sparkline(const std::vector<double>& values) {
+  const auto height = [](double value) {
+    return std::isfinite(value) ? std::max(value, 0.0) : 0.0;
+  };
+  double largest = 0.0;
+  for (const double value : values) largest = std::max(largest, height(value));
+  std::string text;
+  for (const double value : values) {
+    const double part = largest > 0.0 ? height(value) / largest : 0.0;
+    text += "\xe2\x96";  // U+2581 to U+2588 in UTF-8
+    text += static_cast<char>(0x81 + std::lround(part * 7.0));
+  }
+  return text;
+}
+
+// ChosenStream: the stream of `posed top` and `posed demo` that the arrow keys chose: its figure,
+// its latency over the last minute, and its alpha, which the keys change.
 class ChosenStream {
  public:
   // `data` is the connection that receives the daemon's messages; it outlives the object.
@@ -32,9 +86,9 @@ class ChosenStream {
 
   // Takes the stats of another second: the choice stays, or becomes the first stream if the chosen
   // one has gone.
-  void take(const v1::Stats& stats);
+  void update(const v1::Stats& stats);
   // Takes any other message of the daemon.
-  void take(std::string_view topic, std::span<const std::byte> body);
+  void handle(std::string_view topic, std::span<const std::byte> body);
 
   // Up and down choose another stream, left and right ask the daemon for another alpha; other keys
   // do nothing. A stream without alpha gives a note that says so.

@@ -21,8 +21,7 @@
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/file_kind.hpp"
-#include "daemon/tools/command/json.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/live/live_view.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/load_calibration.hpp"
@@ -164,8 +163,8 @@ Result<> check_parameter(const std::string& name, const ParameterValue& value) {
 
 int set_parameter(const CtlOptions& options) {
   const ParameterValue value = value_of_text(options.value);
-  if (const auto sound = check_parameter(options.parameter, value); !sound) {
-    return report(sound.error());
+  if (const auto valid = check_parameter(options.parameter, value); !valid) {
+    return report(valid.error());
   }
   v1::ControlRequest request;
   auto& wanted = *request.mutable_set_parameter();
@@ -398,7 +397,7 @@ void add_style_actions(Actions& actions, CtlOptions& options) {
   CLI::App* warm =
       actions.add_for_stream("warm-up", "Measure how a new walker usually walks", warm_up,
                              R"(Example:
-  posed ctl warm-up walker --seconds 10   # it walks as usual meanwhile; an event tells the end)");
+  posed ctl warm-up walker --seconds 10   # it walks as usual meanwhile; an event reports the end)");
   const ParameterSpec& seconds = warm_up_seconds();
   options.seconds = std::get<double>(seconds.default_value);
   warm->add_option("--seconds", options.seconds,

@@ -1,6 +1,7 @@
 // `posed doctor`: what of this computer is right for posed, what is wrong, and the line that mends
 // it.
 #include "daemon/tools/doctor/doctor.hpp"
+#include "daemon/tools/command/findings.hpp"
 
 #include <unistd.h>
 
@@ -11,51 +12,47 @@
 #include <optional>
 #include <vector>
 
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/config/config.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/paint.hpp"
-#include "proto/text/json_text.hpp"
 
 namespace posed::tools {
 namespace {
-
-using nlohmann::ordered_json;
 
 struct DoctorCommand {
   std::filesystem::path config;
   bool json = false;
 };
 
-void print_as_json(const std::vector<doctor::Check>& checks, bool ok) {
-  ordered_json all{{"ok", ok}, {"checks", ordered_json::array()}};
-  for (const doctor::Check& check : checks) {
-    all["checks"].push_back(
-        {{"name", check.name}, {"ok", check.ok}, {"found", check.found}, {"fix", check.fix}});
-  }
-  std::printf("%s\n", json_text(all).c_str());
+// The line is like "ok     usb latency            no USB adapter with a latency timer is here"; a
+// fix has a line of its own, which can be copied whole.
+Findings findings_of(const doctor::Check& check, bool coloured) {
+  std::string mark = check.ok ? paint(coloured, kGreen, "ok   ") : paint(coloured, kRed, "WRONG");
+  if (!check.looked) mark = "-    ";
+  Findings findings;
+  findings.add("name", check.name)
+      .add("ok", check.ok)
+      .add("found", check.found)
+      .add("fix", check.fix)
+      .say(fmt::format("{}  {:<22}  {}", mark, check.name, check.found));
+  return check.ok ? findings : findings.say("       " + paint(coloured, kBold, check.fix));
 }
 
-// "ok     usb latency            no USB adapter with a latency timer is here"; a fix has a line of
-// its own, which can be copied whole.
-void print_for_people(const std::vector<doctor::Check>& checks) {
+Findings findings_of(const std::vector<doctor::Check>& checks) {
   const bool coloured = isatty(STDOUT_FILENO) == 1;
-  for (const doctor::Check& check : checks) {
-    std::string mark = check.ok ? paint(coloured, kGreen, "ok   ") : paint(coloured, kRed, "WRONG");
-    if (!check.looked) mark = "-    ";
-    std::printf("%s  %-22s  %s\n", mark.c_str(), check.name.c_str(), check.found.c_str());
-    if (!check.ok) std::printf("       %s\n", paint(coloured, kBold, check.fix).c_str());
-  }
+  std::vector<Findings> rows;
+  for (const doctor::Check& check : checks) rows.push_back(findings_of(check, coloured));
   const auto bad = std::ranges::count(checks, false, &doctor::Check::ok);
   const auto looked = std::ranges::count(checks, true, &doctor::Check::looked);
-  if (bad == 0) {
-    std::printf("all %td that were looked at are right\n", looked);
-  } else {
-    std::printf("%td of %td need%s mending: the line below each says how\n", bad, looked,
-                bad == 1 ? "s" : "");
-  }
+  return Findings()
+      .add("ok", bad == 0)
+      .add("checks", rows)
+      .say(bad == 0 ? fmt::format("all {} that were looked at are right", looked)
+                    : fmt::format("{} of {} need{} mending: the line below each says how", bad,
+                                  looked, bad == 1 ? "s" : ""));
 }
 
 int examine_this_machine(const DoctorCommand& command) {
@@ -66,12 +63,8 @@ int examine_this_machine(const DoctorCommand& command) {
     config = std::move(*loaded);
   }
   const auto checks = doctor::examine(doctor::this_machine(), config ? &*config : nullptr);
+  findings_of(checks).show(command.json, -1);
   const bool ok = std::ranges::all_of(checks, &doctor::Check::ok);
-  if (command.json) {
-    print_as_json(checks, ok);
-  } else {
-    print_for_people(checks);
-  }
   return static_cast<int>(ok ? ExitCode::kDone : ExitCode::kFailed);
 }
 

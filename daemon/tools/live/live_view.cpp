@@ -1,14 +1,19 @@
 #include "daemon/tools/live/live_view.hpp"
 
+#include <poll.h>
+#include <sys/ioctl.h>
+#include <termios.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstddef>
-#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/tools/command/paint.hpp"
-#include "daemon/tools/live/live_table.hpp"
 #include "daemon/tools/live/monitor_line.hpp"
 #include "models/stages/registry.hpp"
 #include "posed/v1/posed.pb.h"
@@ -17,6 +22,173 @@
 #include "proto/text/clean.hpp"
 
 namespace posed::tools {
+namespace {
+
+constexpr int kNameWidth = 11;  // that a name has before the model's is cut
+constexpr int kMinName = 6;     // the heading
+constexpr int kMinModel = 5;    // a model's name that is cut further is no help
+constexpr float kMaxShown_hz = 9999.9F;
+
+struct Health {
+  std::string word;
+  const char* colour;
+};
+
+// An unplugged device is shown as such, not only as a stream without data.
+Health health_of(const v1::StreamStats& stream, bool silent) {
+  if (silent) return {"?", kDim};
+  if (!stream.refusal().empty()) return {clean_name(stream.state()), kRed};
+  if (stream.away()) return {"away", kYellow};
+  if (stream.state() == "ended") return {"ended", kDim};
+  if (stream.state() != "live") return {clean_name(stream.state()), kYellow};
+  return has_lost(stream) ? Health{"lossy", kRed} : Health{"live", kGreen};
+}
+
+bool has_times(const v1::Percentiles& times) { return times.p99_us() > 0.0F; }
+
+struct Column {
+  std::string title;
+  int width = 0;       // 0: as the text is
+  bool right = false;  // aligned to the right
+  std::function<std::string(const v1::StreamStats&)> text;
+  std::function<const char*(const v1::StreamStats&)> colour = nullptr;
+};
+
+std::string fitted(const Column& column, const std::string& text) {
+  if (column.width == 0) return text;
+  return column.right ? fmt::format("{:>{}}", cut(text, column.width), column.width)
+                      : fmt::format("{:<{}}", cut(text, column.width), column.width);
+}
+
+bool any(const v1::Stats& stats, const std::function<bool(const v1::StreamStats&)>& is) {
+  return std::ranges::any_of(stats.stream(), is);
+}
+
+int longest(const v1::Stats& stats, const std::function<std::string(const v1::StreamStats&)>& of) {
+  int columns = 0;
+  for (const v1::StreamStats& stream : stats.stream()) {
+    columns = std::max(columns, static_cast<int>(of(stream).size()));
+  }
+  return columns;
+}
+
+std::string name_of(const v1::StreamStats& stream) { return clean_name(stream.stream()); }
+std::string model_of(const v1::StreamStats& stream) { return clean_name(stream.model()); }
+
+// The columns between the stream's name and its model.
+std::vector<Column> numbers(const v1::Stats& stats, bool silent) {
+  std::vector<Column> columns;
+  columns.push_back(
+      {.title = "STATE",
+       .width = 7,
+       .text = [silent](const auto& stream) { return health_of(stream, silent).word; },
+       .colour = [silent](const auto& stream) { return health_of(stream, silent).colour; }});
+  if (!silent) {
+    columns.push_back({.title = "HZ", .width = 6, .right = true, .text = [](const auto& stream) {
+                         return fmt::format("{:.1f}", std::min(stream.rate_hz(), kMaxShown_hz));
+                       }});
+  }
+  if (!silent && any(stats, [](const auto& stream) { return has_times(stream.publish()); })) {
+    const auto add = [&](const char* title, float (v1::Percentiles::*time)() const) {
+      columns.push_back(
+          {.title = title, .width = 8, .right = true, .text = [time](const auto& stream) {
+             const v1::Percentiles& times = stream.publish();
+             return has_times(times) ? display_duration((times.*time)() * 1e-6) : std::string("-");
+           }});
+    };
+    add("LATENCY", &v1::Percentiles::p50_us);
+    add("99 %", &v1::Percentiles::p99_us);
+  }
+  if (any(stats, has_alpha)) {
+    columns.push_back({.title = "ALPHA", .width = 5, .right = true, .text = [](const auto& stream) {
+                         return has_alpha(stream) ? fmt::format("{:.2f}", stream.alpha()) : "-";
+                       }});
+  }
+  return columns;
+}
+
+// All columns, as wide as fits.
+std::vector<Column> columns_of(const v1::Stats& stats, const LiveTableOptions& options) {
+  std::vector<Column> columns = numbers(stats, options.silent);
+  Column name{.title = "STREAM", .text = name_of};
+  Column model{.title = "MODEL", .text = model_of};
+  const int names = std::max(longest(stats, name_of), kMinName);
+  const int models = std::max(longest(stats, model_of), kMinModel);
+  bool has_model = longest(stats, model_of) > 0;
+  name.width = names;
+  if (options.width > 0) {
+    int room = options.width - (options.chosen.empty() ? 0 : 2);
+    for (const Column& column : columns) room -= column.width + 1;
+    for (; room < kMinName && columns.size() > 1; columns.pop_back()) {
+      room += columns.back().width + 1;
+    }
+    const int for_models = has_model ? models + 1 : 0;
+    name.width = std::max(std::min({names, room, std::max(kNameWidth, room - for_models)}), 1);
+    model.width = room - name.width - 1;
+    has_model = has_model && model.width >= kMinModel;
+  }
+  columns.insert(columns.begin(), std::move(name));
+  if (has_model) columns.push_back(std::move(model));
+  return columns;
+}
+
+// The cells beside each other.
+std::string row_of(const std::vector<Column>& columns, const LiveTableOptions& options,
+                   const v1::StreamStats& stream) {
+  const bool chosen = !options.chosen.empty() && stream.stream() == options.chosen;
+  std::string row = options.chosen.empty() ? "" : chosen ? "> " : "  ";
+  for (const Column& column : columns) {
+    if (&column != &columns.front()) row += " ";
+    const char* const colour = column.colour ? column.colour(stream) : chosen ? kBold : "";
+    row +=
+        paint(options.colour, options.silent ? kDim : colour, fitted(column, column.text(stream)));
+  }
+  return options.width == 0 ? row.substr(0, row.find_last_not_of(' ') + 1) : row;
+}
+
+}  // namespace
+
+bool has_alpha(const v1::StreamStats& stream) {
+  for (const v1::StageStats& stage : stream.stage()) {
+    for (const v1::ParameterStats& parameter : stage.parameter()) {
+      if (parameter.name() == "alpha") return true;
+    }
+  }
+  return false;
+}
+
+bool has_lost(const v1::StreamStats& stream) { return stream.dropped() > 0 || stream.shed() > 0; }
+
+std::string display_duration(double time_s) {
+  if (time_s < 0.99995) return fmt::format("{:.1f} ms", std::max(time_s, 0.0) * 1e3);
+  if (time_s < 9.95) return fmt::format("{:.1f} s", time_s);
+  if (time_s < 120.0) return fmt::format("{:.0f} s", time_s);
+  if (time_s < 7200.0) return fmt::format("{:.0f} min", time_s / 60.0);
+  return fmt::format("{:.1f} h", std::min(time_s / 3600.0, 9999.9));
+}
+
+std::vector<std::string> live_table(const v1::Stats& stats, const LiveTableOptions& options) {
+  const std::vector<Column> columns = columns_of(stats, options);
+  std::string heading = options.chosen.empty() ? "" : "  ";
+  for (const Column& column : columns) {
+    heading += (&column == &columns.front() ? "" : " ") + fitted(column, column.title);
+  }
+  if (options.width > 0) heading = cut(heading, options.width);
+  std::vector<std::string> lines{paint(options.colour, kDim, heading)};
+  const int streams = stats.stream_size();
+  const int room = options.rows == 0 ? streams : options.rows - 1;
+  const int shown = streams <= room ? streams : std::max(0, room - 1);
+  int first = 0;
+  for (int i = 0; i < streams; ++i) {
+    if (stats.stream(i).stream() == options.chosen) first = std::max(0, i - shown + 1);
+  }
+  for (int i = first; i < first + shown && i < streams; ++i) {
+    lines.push_back(row_of(columns, options, stats.stream(i)));
+  }
+  if (shown < streams) lines.push_back(fmt::format("... and {} more", streams - shown));
+  return lines;
+}
+
 namespace {
 
 constexpr int kMinWidth = 20;
@@ -66,7 +238,7 @@ std::string stages_row(const v1::StreamStats& stream) {
   const auto add = [&](const std::string& words) { text += (text.empty() ? "" : ", ") + words; };
   for (const v1::StageStats& one : stream.stage()) {
     if (one.time().p99_us() == 0.0F) continue;  // it processed no frame in this second
-    add(clean_name(one.name()) + " " + people_duration(one.time().p99_us()));
+    add(clean_name(one.name()) + " " + display_duration(one.time().p99_us() * 1e-6));
   }
   if (stream.lag_frames() > 0) {
     add(fmt::format("lag {} frame{} ({:.1f} ms)", stream.lag_frames(),
@@ -93,13 +265,6 @@ std::string stages_row(const v1::StreamStats& stream) {
   return text;
 }
 
-// "8 s", "5 min", "2.5 h"
-std::string for_people(double time_s) {
-  if (time_s < 120.0) return fmt::format("{:.0f} s", std::max(time_s, 0.0));
-  if (time_s < 7200.0) return fmt::format("{:.0f} min", time_s / 60.0);
-  return fmt::format("{:.1f} h", time_s / 3600.0);
-}
-
 // What the kernel dropped of a device's datagrams; empty if it dropped none.
 std::string kernel_words(std::uint64_t dropped) {
   if (dropped == 0) return {};
@@ -109,7 +274,7 @@ std::string kernel_words(std::uint64_t dropped) {
 // Whether a glove is connected, how its clock runs and what the kernel dropped; empty for a stream
 // without any of it. The drops of a body's device are in the row of its source.
 std::string device_row(const v1::StreamStats& stream, std::int64_t now_ns) {
-  const std::string since = for_people(seconds(now_ns - stream.link_ns()));
+  const std::string since = display_duration(seconds(now_ns - stream.link_ns()));
   const std::uint64_t links = stream.connections();
   if (stream.away()) {
     if (links == 0) return "not there yet; posed has looked for it for " + since;
@@ -151,12 +316,12 @@ std::string without_body(const v1::SourceStats& source) {
     const int i = static_cast<int>(outcome);
     return i < source.outcome_size() ? source.outcome(i) : 0;
   };
-  const std::uint64_t heard = count(Outcome::kOk), foreign = count(Outcome::kForeign);
+  const std::uint64_t valid = count(Outcome::kOk), foreign = count(Outcome::kForeign);
   const std::uint64_t damaged =
       count(Outcome::kShort) + count(Outcome::kBadChecksum) + count(Outcome::kOutOfRange);
-  if (heard + foreign + damaged == 0) return text + ": nothing came from the device yet";
+  if (valid + foreign + damaged == 0) return text + ": nothing came from the device yet";
   return text + fmt::format(": {} packets were right, {} damaged, {} of another device or sender",
-                            heard, damaged, foreign);
+                            valid, damaged, foreign);
 }
 
 // A line below the streams' rows about a device with several bodies; empty if there is nothing to
@@ -312,6 +477,100 @@ std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions
   }
   add(newest_notes(options, static_cast<std::size_t>(left(lines.size()))));
   return lines;
+}
+
+namespace {
+
+termios keyboard_before;  // global, because a process has one terminal
+
+void put_on_screen(const std::string& text) {
+  std::fwrite(text.data(), 1, text.size(), stdout);
+  std::fflush(stdout);
+}
+
+Key other_key(char byte) { return byte == 'q' || byte == 'Q' ? Key::kQuit : Key::kOther; }
+
+Key arrow(char last_byte) {
+  switch (last_byte) {
+    case 'A':
+      return Key::kUp;
+    case 'B':
+      return Key::kDown;
+    case 'C':
+      return Key::kRight;
+    case 'D':
+      return Key::kLeft;
+    default:
+      return Key::kOther;
+  }
+}
+
+}  // namespace
+
+LiveScreen::LiveScreen()
+    : terminal_(isatty(STDOUT_FILENO) == 1), keyboard_(terminal_ && isatty(STDIN_FILENO) == 1) {
+  if (keyboard_ && tcgetattr(STDIN_FILENO, &keyboard_before) == 0) {
+    termios raw = keyboard_before;
+    raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);  // Ctrl-C still sends a signal
+    tcsetattr(STDIN_FILENO, TCSANOW, &raw);
+  } else {
+    keyboard_ = false;
+  }
+  if (terminal_) put_on_screen("\x1b[?1049h\x1b[?25l\x1b[2J");  // alternate screen, no cursor
+}
+
+LiveScreen::~LiveScreen() {
+  if (terminal_) put_on_screen("\x1b[?25h\x1b[?1049l");
+  if (keyboard_) tcsetattr(STDIN_FILENO, TCSANOW, &keyboard_before);
+}
+
+void LiveScreen::measure(LiveViewOptions& options) const {
+  options.colour = terminal_ && std::getenv("NO_COLOR") == nullptr;
+  if (!terminal_) {
+    options.width = 0;
+    options.height = 0;
+    return;
+  }
+  winsize size{};
+  if (ioctl(STDOUT_FILENO, TIOCGWINSZ, &size) != 0 || size.ws_col == 0) return;
+  options.width = size.ws_col;
+  options.height = size.ws_row;
+}
+
+void LiveScreen::draw(const std::vector<std::string>& lines) const {
+  std::string text = terminal_ ? "\x1b[H" : "";
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (terminal_) {
+      text += lines[i] + "\x1b[K" + (i + 1 < lines.size() ? "\r\n" : "");
+    } else {
+      text += lines[i] + "\n";
+    }
+  }
+  if (terminal_) text += "\x1b[J";
+  put_on_screen(text);
+}
+
+char LiveScreen::key_pressed() const {
+  char key = 0;
+  pollfd waits{STDIN_FILENO, POLLIN, 0};
+  if (!keyboard_ || poll(&waits, 1, 0) <= 0 || ::read(STDIN_FILENO, &key, 1) != 1) return 0;
+  return key;
+}
+
+// An arrow is ESC [ A to D, or ESC O A to D where the terminal is in application mode. A network
+// may deliver its bytes apart, so the first of them are kept until the others come.
+Key LiveScreen::next_key() {
+  while (const char byte = key_pressed()) {
+    const std::size_t before = std::exchange(arrow_bytes_, 0);
+    if (byte == '\x1b') {
+      arrow_bytes_ = 1;
+    } else if (before == 1 && (byte == '[' || byte == 'O')) {
+      arrow_bytes_ = 2;
+    } else {
+      return before == 2 ? arrow(byte) : other_key(byte);
+    }
+  }
+  return Key::kNone;
 }
 
 }  // namespace posed::tools

@@ -11,9 +11,7 @@
 
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/json.hpp"
-#include "daemon/tools/command/number_range.hpp"
-#include "daemon/tools/live/clock_time.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/live/monitor_line.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/text/clean.hpp"
@@ -88,7 +86,7 @@ class Monitor {
                                 options_.client.endpoint, asked_.front(), options_.timeout_s));
       }
       if (connection_.wait(kLookAround)) {
-        if (auto taken = take(); !taken) return taken;
+        if (auto done = receive(); !done) return done;
       } else {
         report_quiet_topic();
       }
@@ -100,11 +98,11 @@ class Monitor {
   }
 
  private:
-  Result<> take() {
+  Result<> receive() {
     net::Message topic, body;
     if (!topic.receive(connection_.socket()) || !topic.more()) return {};
     if (!body.receive(connection_.socket(), 0)) return {};
-    watch_.heard();
+    watch_.beat();
     if (topic.text() == "stats") {
       if (auto known = look_at(body.bytes()); !known) return known;
     }

@@ -2,8 +2,6 @@
 
 #include <string_view>
 
-#include <spdlog/fmt/fmt.h>
-
 #include "posed/v1/posed.pb.h"
 #include "proto/text/clean.hpp"
 

@@ -70,7 +70,7 @@ void open_browser(const std::string& url) {
       posix_spawnp(&process, program.c_str(), &quiet, &usual, arguments.data(), environ) == 0;
   posix_spawnattr_destroy(&usual);
   posix_spawn_file_actions_destroy(&quiet);
-  // It ends when the browser has been told, or with the browser.
+  // It ends when the browser has got its orders, or with the browser.
   if (started) std::thread([process] { waitpid(process, nullptr, 0); }).detach();
 }
 

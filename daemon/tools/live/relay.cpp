@@ -1,6 +1,7 @@
 // `posed relay`: passes on what daemons publish, so that many subscribers cost each of them one
 // connection.
 #include "daemon/tools/relay/relay.hpp"
+#include "daemon/tools/command/findings.hpp"
 
 #include <cstdio>
 #include <filesystem>
@@ -11,7 +12,6 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/config/config.hpp"
 #include "daemon/logging/log_output.hpp"
@@ -20,9 +20,8 @@
 #include "daemon/net/zap_authenticator.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/run/serve.hpp"
-#include "proto/text/json_text.hpp"
 #include "proto/zmq/keys.hpp"
 
 namespace posed::tools {
@@ -60,7 +59,7 @@ Result<config::SecurityConfig> relay_security(const RelayCommand& command) {
                 "; name a file with a server_key in [security] (--security), or say --insecure");
 }
 
-Result<std::vector<relay::UpstreamSettings>> upstreams_of(const RelayCommand& command) {
+Result<std::vector<link::Peer>> upstreams_of(const RelayCommand& command) {
   const std::size_t keys = command.server_keys.size();
   if (keys > 1 && keys != command.from.size()) {
     return misuse(
@@ -68,9 +67,9 @@ Result<std::vector<relay::UpstreamSettings>> upstreams_of(const RelayCommand& co
                     " each --from, in their order",
                     keys));
   }
-  std::vector<relay::UpstreamSettings> upstreams;
+  std::vector<link::Peer> upstreams;
   for (std::size_t i = 0; i < command.from.size(); ++i) {
-    relay::UpstreamSettings& upstream = upstreams.emplace_back();
+    link::Peer& upstream = upstreams.emplace_back();
     upstream.endpoint = command.from[i];
     if (upstream.endpoint == command.bind) {
       return misuse(upstream.endpoint +
@@ -83,9 +82,10 @@ Result<std::vector<relay::UpstreamSettings>> upstreams_of(const RelayCommand& co
   return upstreams;
 }
 
-void print_line(const nlohmann::ordered_json& line) {
-  if (!logging::write_within(STDOUT_FILENO, json_text(line) + '\n', kLineWithin)) {
-    spdlog::warn("a line cannot be written to stdout: {}", json_text(line));
+void print_line(const Findings& findings) {
+  const std::string line = findings.json();
+  if (!logging::write_within(STDOUT_FILENO, line + '\n', kLineWithin)) {
+    spdlog::warn("a line cannot be written to stdout: {}", line);
   }
 }
 
@@ -120,16 +120,17 @@ class CounterLine {
 
  private:
   static void print_json(const relay::RelayCounts& counts, double rate_hz) {
-    print_line({{"upstreams", counts.upstreams},
-                {"streams", counts.streams},
-                {"subscribers", counts.subscribers},
-                {"subscriptions", counts.subscriptions},
-                {"messages", counts.messages},
-                {"messages_per_s", rate_hz},
-                {"bytes", counts.bytes},
-                {"late_skeletons", counts.late_skeletons},
-                {"foreign", counts.foreign},
-                {"clashes", counts.clashes}});
+    print_line(Findings()
+                   .add("upstreams", counts.upstreams)
+                   .add("streams", counts.streams)
+                   .add("subscribers", counts.subscribers)
+                   .add("subscriptions", counts.subscriptions)
+                   .add("messages", counts.messages)
+                   .add("messages_per_s", rate_hz)
+                   .add("bytes", counts.bytes)
+                   .add("late_skeletons", counts.late_skeletons)
+                   .add("foreign", counts.foreign)
+                   .add("clashes", counts.clashes));
   }
 
   const relay::Relay& relay_;
@@ -193,7 +194,10 @@ Result<> run_relay(const RelayCommand& command) {
   options.authenticator = authenticator->get();
   const auto relay = relay::Relay::open(options);
   if (!relay) return std::unexpected(relay.error());
-  print_line({{"ready", true}, {"publish", (*relay)->endpoint()}, {"from", command.from}});
+  print_line(Findings()
+                 .add("ready", true)
+                 .add("publish", (*relay)->endpoint())
+                 .add("from", command.from));
   serve_relay(**relay, **authenticator, command);
   return {};
 }

@@ -11,14 +11,13 @@
 
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/json.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/paint.hpp"
 #include "daemon/tools/live/chosen_stream.hpp"
-#include "daemon/tools/live/clock_time.hpp"
 #include "daemon/tools/live/line_file.hpp"
 #include "daemon/tools/live/live_view.hpp"
+#include "daemon/tools/live/monitor_line.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/text/clean.hpp"
 
@@ -62,7 +61,7 @@ class Top {
       if (auto refused = connection_.refusal()) return std::unexpected(*refused);
       if (auto given_up = watch_.report()) return std::unexpected(*given_up);
       const bool came = connection_.wait(kLookAround);
-      const bool new_stats = came && take(drawn);
+      const bool new_stats = came && receive(drawn);
       if (drawn && !new_stats && is_due()) show(*screen);
       if (!new_stats) continue;
       if (record_) {
@@ -98,19 +97,19 @@ class Top {
   }
 
   // Receives one message; returns true if it brought new stats. `drawn`: the figure is shown.
-  bool take(bool drawn) {
+  bool receive(bool drawn) {
     net::Message topic, body;
     if (!topic.receive(connection_.socket()) || !topic.more()) return false;
     if (!body.receive(connection_.socket(), 0)) return false;
-    watch_.heard();
+    watch_.beat();
     const auto size = static_cast<int>(body.bytes().size());
     if (topic.text() == "stats") {
       if (!stats_.ParseFromArray(body.bytes().data(), size)) return false;
-      if (drawn) chosen_.take(stats_);
+      if (drawn) chosen_.update(stats_);
       return true;
     }
     if (!topic.text().starts_with("event/")) {
-      chosen_.take(topic.text(), body.bytes());
+      chosen_.handle(topic.text(), body.bytes());
       return false;
     }
     v1::Event event;

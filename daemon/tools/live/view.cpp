@@ -10,17 +10,16 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/logging/log_output.hpp"
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/findings.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/live/page.hpp"
 #include "daemon/tools/run/serve.hpp"
 #include "daemon/tools/view/bridge.hpp"
 #include "proto/text/clean.hpp"
-#include "proto/text/json_text.hpp"
 
 namespace posed::tools {
 namespace {
@@ -58,12 +57,9 @@ Result<> warn_of_network(const ViewCommand& command) {
 
 // Shows where the page is.
 void print_url(const view::Bridge& bridge, const ViewCommand& command) {
-  std::string text = bridge.url() + '\n';
-  if (command.json) {
-    const nlohmann::ordered_json line{{"ready", true}, {"url", bridge.url()}};
-    text = json_text(line) + '\n';
-  }
-  if (!logging::write_within(STDOUT_FILENO, text, kUrlWithin)) {
+  const Findings ready = Findings().add("ready", true).add("url", bridge.url());
+  const std::string text = command.json ? ready.json() : bridge.url();
+  if (!logging::write_within(STDOUT_FILENO, text + '\n', kUrlWithin)) {
     spdlog::warn("the page's address cannot be written to stdout");
   }
   if (command.json || command.no_browser) return;
@@ -81,10 +77,8 @@ Result<> serve_page(const ViewCommand& command) {
   const auto page = find_page(command.page);
   if (!page) return std::unexpected(page.error());
   if (auto warned = warn_of_network(command); !warned) return warned;
-  view::BridgeOptions options{.link = {.connect = command.client.endpoint,
+  view::BridgeOptions options{.link = {.publish = command.client,
                                        .control = command.control,
-                                       .key = command.client.key,
-                                       .server_key = command.client.server_key,
                                        .read_only_reason = reason_of(command)},
                               .page = *page,
                               .address = command.address};

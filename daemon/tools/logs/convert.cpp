@@ -1,30 +1,86 @@
 // `posed convert`: converts a clip to another format, a stream of a device log to a clip, or a
 // whole log to MCAP.
-#include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/hand_option.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/findings.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
-#include "daemon/tools/command/waiting.hpp"
+#include "daemon/tools/command/progress.hpp"
 #include "daemon/tools/export/log_clip.hpp"
-#include "daemon/tools/logs/convert_mcap.hpp"
-#include "daemon/tools/logs/list_takes.hpp"
+#include "daemon/tools/export/log_mcap.hpp"
 #include "proto/clip/format.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/clip/hand_clip.hpp"
-#include "proto/text/json_text.hpp"
+#include "proto/log/reader.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::tools {
 namespace {
+
+// The line is like "2  walk  from 3.20 s, 10.05 s long". Of a take with gaps only what is left has
+// a time, so that it may seem shorter than it was.
+Findings findings_of(const LoggedTake& take) {
+  const bool ended = take.row.last_item != log::kToTheEnd;
+  std::string end = ended ? "" : ", to the end of the recording";
+  if (take.has_gaps) end += "; the log lacks a part of it (`posed replay` says which)";
+  Findings findings;
+  findings.add("take", take.row.id)
+      .add("name", take.row.name)
+      .add("first_item", take.row.first_item)
+      .add("ended", ended)
+      .add("gaps", take.has_gaps);
+  if (ended) findings.add("last_item", take.row.last_item);
+  std::string time = "nothing came";
+  if (take.begin_s) {
+    const double length_s = *take.end_s - *take.begin_s;
+    findings.add("begin_s", *take.begin_s).add("length_s", length_s);
+    time = fmt::format("from {:.2f} s, {:.2f} s long", *take.begin_s, length_s);
+  }
+  return findings.say(fmt::format("{}  {}  {}{}", take.row.id, clean(take.row.name), time, end));
+}
+
+// Prints the takes of the log at `path`, a line each, or as JSON. Returns the exit code.
+int list_takes(const std::string& path, bool json) {
+  auto reader = log::Reader::open(path);
+  if (!reader) return report(reader.error());
+  const auto takes = logged_takes(*reader);
+  if (!takes) return report(takes.error());
+  std::vector<Findings> list;
+  for (const LoggedTake& take : *takes) list.push_back(findings_of(take));
+  Findings findings;
+  findings.add({}, list);
+  if (list.empty()) findings.note(path + ": has no takes");
+  return findings.show(json, -1);
+}
+
+// Writes a whole log as MCAP. Returns the exit code. Ctrl-C leaves no file.
+int convert_to_mcap(const std::string& log, const std::string& out, bool json) {
+  const auto summary = [&] {
+    // A file is written with signals blocked, so the thread that shows the wait receives Ctrl-C.
+    const Waiting waiting("writing " + out);
+    const Interrupt interrupt;
+    return write_mcap(log, out, Interrupt::came);
+  }();
+  if (!summary) return report(summary.error());
+  Findings findings;
+  for (const std::string& warning : summary->warnings) findings.remark(log + ": " + warning);
+  return findings.add("in", log)
+      .add("out", out)
+      .add("messages", summary->messages)
+      .add("topics", summary->topics)
+      .add("warnings", summary->warnings)
+      .note(fmt::format("wrote {}: {} messages in {} topics", out, summary->messages,
+                        summary->topics))
+      .show(json, -1);
+}
 
 constexpr const char* kUneven = "frames are not evenly spaced, but a BVH's are: its clock differs";
 
@@ -92,7 +148,7 @@ void warn_of_clock(const Convert& convert, clip::Clip& clip) {
 }
 
 Result<clip::Clip> read_log(const Convert& convert) {
-  auto clip = replay::clip_of_log(convert.in, convert.stream, convert.take);
+  auto clip = clip_of_log(convert.in, convert.stream, convert.take);
   if (!clip || holds_gaps(convert.out)) return clip;
   clip::hold_missing(*clip);
   warn_of_clock(convert, *clip);
@@ -142,25 +198,19 @@ int run(Convert& convert) {
     return read(convert);
   }();
   if (!clip) return report(clip.error());
-  for (const std::string& warning : clip->warnings) {
-    std::fprintf(stderr, "posed: %s: %s\n", convert.in.c_str(), warning.c_str());
-  }
+  Findings findings;
+  for (const std::string& warning : clip->warnings) findings.remark(convert.in + ": " + warning);
   if (auto ok = write(convert, *clip); !ok) return report(ok.error());
-  if (!convert.json) {
-    std::fprintf(stderr, "posed: wrote %s: %d frames at %g Hz, %zu joints\n", convert.out.c_str(),
-                 clip->frames(), clip->frame_rate_hz, clip->skeleton->joints.size());
-    return static_cast<int>(ExitCode::kDone);
-  }
-  const nlohmann::json summary{{"in", convert.in},
-                               {"out", convert.out},
-                               {"frames", clip->frames()},
-                               {"rate_hz", clip->frame_rate_hz},
-                               {"joints", clip->skeleton->joints.size()},
-                               {"metres_per_unit", clip->metres_per_unit},
-                               {"warnings", clip->warnings}};
-  // Names may hold any bytes; invalid UTF-8 is replaced, because otherwise the JSON library throws.
-  std::printf("%s\n", json_text(summary).c_str());
-  return static_cast<int>(ExitCode::kDone);
+  return findings.add("in", convert.in)
+      .add("out", convert.out)
+      .add("frames", clip->frames())
+      .add("rate_hz", clip->frame_rate_hz)
+      .add("joints", clip->skeleton->joints.size())
+      .add("metres_per_unit", clip->metres_per_unit)
+      .add("warnings", clip->warnings)
+      .note(fmt::format("wrote {}: {} frames at {:g} Hz, {} joints", convert.out, clip->frames(),
+                        clip->frame_rate_hz, clip->skeleton->joints.size()))
+      .show(convert.json, -1);
 }
 
 }  // namespace

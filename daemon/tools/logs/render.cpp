@@ -11,14 +11,12 @@
 
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/hand_option.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/findings.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
-#include "daemon/tools/command/waiting.hpp"
 #include "daemon/tools/export/log_clip.hpp"
 #include "daemon/tools/picture/picture_file.hpp"
 #include "daemon/tools/picture/strip.hpp"
@@ -27,7 +25,6 @@
 #include "proto/clip/frames_clip.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/hand_skeleton.hpp"
-#include "proto/text/json_text.hpp"
 #include "proto/text/stream_name.hpp"
 
 namespace posed::tools {
@@ -99,7 +96,7 @@ clip::ReadOptions in_options(const RenderArguments& options) {
 
 Result<clip::Clip> read_motion(const RenderArguments& options, const std::string& stream) {
   const Waiting waiting("reading " + options.in);
-  auto clip = reads_log(options) ? replay::clip_of_log(options.in, stream, options.take)
+  auto clip = reads_log(options) ? clip_of_log(options.in, stream, options.take)
                                  : clip::read_clip(options.in, in_options(options));
   if (clip && clip->skeleton->joint_of(Bone::kHips) < 0 && !hand_side(*clip->skeleton)) {
     if (auto hand = as_hand(*clip, options.read)) clip = std::move(hand);
@@ -267,17 +264,15 @@ Result<> run_render(const RenderArguments& options) {
     if (auto done = picture::write_picture(*svg, options.out); !done) return done;
   }
   const Drawn& last = all->back();
-  if (options.json) {
-    const nlohmann::json summary{{"in", options.in},
-                                 {"out", options.out.string()},
-                                 {"view", options.view},
-                                 {"frames", last.motion.size()},
-                                 {"from_s", last.time_s.front()},
-                                 {"to_s", last.time_s.back()}};
-    std::printf("%s\n", json_text(summary).c_str());
-  } else {
-    std::fprintf(stderr, "posed: wrote %s\n", options.out.c_str());
-  }
+  Findings()
+      .add("in", options.in)
+      .add("out", options.out.string())
+      .add("view", options.view)
+      .add("frames", last.motion.size())
+      .add("from_s", last.time_s.front())
+      .add("to_s", last.time_s.back())
+      .note("wrote " + options.out.string())
+      .show(options.json, -1);
   return {};
 }
 

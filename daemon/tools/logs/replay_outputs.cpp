@@ -1,9 +1,33 @@
 #include "daemon/tools/logs/replay_outputs.hpp"
 
+#include <algorithm>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "daemon/tools/run/recording.hpp"
 #include "models/gp/isa.hpp"
+#include "proto/text/clean.hpp"
 #include "proto/text/stream_name.hpp"
 
 namespace posed::tools {
+
+Findings findings_of(const std::string& log, const std::string& recorded_isa,
+                     const ReplayOutcome& outcome) {
+  Findings findings;
+  findings.add("log", log)
+      .add("same", outcome.problem.empty())
+      .add("frames", outcome.frames)
+      .add("raw_frames", outcome.raw_frames)
+      .add("compared", outcome.counts.compared)
+      .add("lost", outcome.counts.lost)
+      .add("after_gap", outcome.counts.after_gap)
+      .add("past_end", outcome.counts.past_end)
+      .add("isa", outcome.isa)
+      .add("recorded_isa", recorded_isa)
+      .add("missing", outcome.missing)
+      .add("took_s", outcome.took_s);
+  return outcome.problem.empty() ? findings : findings.add("problem", outcome.problem);
+}
 
 ReplayOutputs::ReplayOutputs(const replay::Replay& replay) : replay_(replay) {
   for (std::uint32_t id = 0; id < replay.streams(); ++id) {
@@ -12,7 +36,7 @@ ReplayOutputs::ReplayOutputs(const replay::Replay& replay) : replay_(replay) {
   }
 }
 
-void ReplayOutputs::take(const pipeline::Item& item) {
+void ReplayOutputs::add(const pipeline::Item& item) {
   if (broadcast) broadcast->add(item);
   const bool raw = item.kind == pipeline::Item::Kind::kRawFrame;
   if (!raw && item.kind != pipeline::Item::Kind::kFrame) return;
@@ -47,6 +71,54 @@ Result<> set_isa_or(const std::string& wanted, const std::string& recorded) {
   if (!wanted.empty()) return gp::set_isa(wanted);
   if (gp::set_isa(recorded)) return {};
   return gp::set_isa("auto");
+}
+
+namespace {
+
+void add_gaps(const log::Reader& reader, std::vector<std::string>& missing) {
+  constexpr std::array<const char*, 3> kNames{"chunks", "decisions", "published frames"};
+  const auto gaps = reader.gaps();
+  if (!gaps) return;  // cannot happen: open() has read the gaps already
+  for (const log::GapRow& gap : *gaps) {
+    const bool chunks = gap.kind == log::GapRow::Kind::kChunks;
+    const auto owner =
+        chunks ? std::ranges::find(reader.sources(), gap.owner, &log::SourceRow::id)->name
+               : reader.streams()[*reader.place_of_stream(gap.owner)].name;
+    const auto kind = std::min<std::size_t>(static_cast<std::size_t>(gap.kind), 2);
+    missing.push_back(fmt::format("{} {}: the log lacks {} {} after chunk {}",
+                                  chunks ? "source" : "stream", owner, gap.lost, kNames[kind],
+                                  gap.after_chunk));
+  }
+}
+
+void add_undescribed(const replay::Replay& replay, std::vector<std::string>& missing) {
+  for (std::uint32_t id = 0; id < replay.streams(); ++id) {
+    const replay::ReplayStream& stream = replay.stream(id);
+    if (stream.described) continue;
+    missing.push_back(
+        fmt::format("stream {}: the log lacks the description of {}'s body {}, so nothing of it is"
+                    " replayed",
+                    clean_name(stream.name), clean_name(stream.source), clean_name(stream.body)));
+  }
+}
+
+void add_without_body(const log::Reader& reader, std::vector<std::string>& missing) {
+  for (const log::SourceRow& source : reader.sources()) {
+    const auto& streams = reader.streams();
+    if (std::ranges::find(streams, source.id, &log::StreamRow::source) == streams.end()) {
+      missing.push_back(no_body_of(source.name));
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<std::string> missing_from(const log::Reader& reader, const replay::Replay& replay) {
+  std::vector<std::string> missing;
+  add_gaps(reader, missing);
+  add_undescribed(replay, missing);
+  add_without_body(reader, missing);
+  return missing;
 }
 
 }  // namespace posed::tools

@@ -1,5 +1,5 @@
-// The outputs for the frames of a replay: the file, the comparison, the network. And the
-// instruction set on which a log is replayed. Cold.
+// What `posed replay` does with the frames of a replay, what it reports of a log, and what the log
+// lacks. Cold.
 #pragma once
 
 #include <array>
@@ -13,22 +13,40 @@
 #include "daemon/replay/broadcast.hpp"
 #include "daemon/replay/expectation.hpp"
 #include "daemon/replay/replay.hpp"
+#include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/export/frame_file.hpp"
 #include "proto/frame/result.hpp"
+#include "proto/log/reader.hpp"
 #include "proto/message/frame_message.hpp"
 
 namespace posed::tools {
 
+// What became of a log that was replayed and compared.
+struct ReplayOutcome {
+  std::uint64_t frames = 0, raw_frames = 0;
+  replay::Expectation::Counts counts{};
+  std::string isa{};      // on which it was replayed
+  std::string problem{};  // empty: all as published
+  std::vector<std::string> missing{};
+  double took_s = 0.0;
+};
+
+// One log has the same keys as each of several.
+[[nodiscard]] Findings findings_of(const std::string& log, const std::string& recorded_isa,
+                                   const ReplayOutcome& outcome);
+
+// The outputs for the frames of a replay: the file, the comparison, the network. And the
+// instruction set on which a log is replayed.
 class ReplayOutputs {
  public:
   explicit ReplayOutputs(const replay::Replay& replay);
 
-  void take(const pipeline::Item& item);
+  void add(const pipeline::Item& item);
 
   // Call after the last frame.
   [[nodiscard]] Result<> finish();
 
-  std::optional<replay::FrameFile> file;
+  std::optional<FrameFile> file;
   std::optional<replay::Expectation> expectation;
   std::unique_ptr<replay::Broadcast> broadcast;
   std::optional<Error> difference;
@@ -46,5 +64,10 @@ class ReplayOutputs {
 // Uses `wanted`; if it is empty, `recorded`, or the CPU's best where the CPU lacks that. For the
 // whole process.
 [[nodiscard]] Result<> set_isa_or(const std::string& wanted, const std::string& recorded);
+
+// What a replay cannot repeat, because the log does not hold it: one sentence for each gap, for
+// each body without a description and for each source without a stream.
+[[nodiscard]] std::vector<std::string> missing_from(const log::Reader& reader,
+                                                    const replay::Replay& replay);
 
 }  // namespace posed::tools

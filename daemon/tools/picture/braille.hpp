@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "daemon/tools/picture/camera.hpp"
 #include "daemon/tools/picture/figure.hpp"
 #include "daemon/tools/picture/strip.hpp"
 

@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "daemon/tools/picture/camera.hpp"
 #include "daemon/tools/picture/figure.hpp"
 
 namespace posed::picture {

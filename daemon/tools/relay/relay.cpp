@@ -2,17 +2,165 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <utility>
 
 #include <spdlog/spdlog.h>
 
 #include "daemon/net/peer_guard.hpp"
-#include "daemon/net/security.hpp"
 #include "daemon/net/zap_authenticator.hpp"
+#include "daemon/publish/subscriptions.hpp"
 #include "daemon/system/event_fd.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/zmq/keys.hpp"
 
 namespace posed::relay {
+namespace {
+
+// All subscriptions that there may be, and as many changes of them.
+constexpr int kSubscriptionsWaiting = static_cast<int>(2 * publish::kMaxWanted);
+
+}  // namespace
+
+Result<Upstream> Upstream::open(void* context, const link::Peer& peer) {
+  auto socket =
+      link::DaemonSocket::open(context, ZMQ_XSUB, peer, {.requests = kSubscriptionsWaiting});
+  if (!socket) return std::unexpected(socket.error());
+  return Upstream(std::move(*socket));
+}
+
+bool Upstream::subscribe(const std::string& prefix, bool on) {
+  return net::send_part(socket_.get(), (on ? '\1' : '\0') + prefix, false);
+}
+
+void Upstream::log_news() {
+  const bool before = established();
+  if (const std::string why = socket_.refusal(); !why.empty()) {
+    spdlog::error("the daemon at {} {}", endpoint(), why);
+  } else if (established() != before) {
+    spdlog::log(before ? spdlog::level::warn : spdlog::level::info, "{}: {}", endpoint(),
+                before ? "connection lost; it is tried again" : "connected");
+  }
+}
+
+namespace {
+
+constexpr std::int64_t kNoStats_ns = 3 * kNanosPerSecond;  // three stats are missing
+
+}  // namespace
+
+std::optional<std::string> MergedStats::accept(std::size_t upstream, std::string_view bytes,
+                                               std::int64_t now_ns, bool& valid) {
+  assert(upstream < latest_.size());
+  Latest& latest = latest_[upstream];
+  valid = latest.stats.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+  if (!valid) {
+    latest.ever = false;
+    return std::nullopt;
+  }
+  latest.ever = true;
+  latest.at_ns = now_ns;
+  if (latest_.size() == 1) return std::string(bytes);
+  for (v1::StreamStats& stream : *latest.stats.mutable_stream()) {
+    // What is set already comes from a relay before this one.
+    if (stream.has_monotonic_to_utc_ns()) continue;
+    stream.set_monotonic_to_utc_ns(latest.stats.monotonic_to_utc_ns());
+  }
+  const auto answers = [&](const Latest& one) {
+    return one.ever && now_ns - one.at_ns < kNoStats_ns;
+  };
+  for (std::size_t i = 0; i < upstream; ++i) {
+    if (answers(latest_[i])) return std::nullopt;  // an earlier one gives the beat
+  }
+  v1::Stats merged = latest.stats;
+  for (std::size_t i = upstream + 1; i < latest_.size(); ++i) {
+    if (!answers(latest_[i])) continue;
+    merged.mutable_stream()->MergeFrom(latest_[i].stats.stream());
+    merged.mutable_source()->MergeFrom(latest_[i].stats.source());
+  }
+  return merged.SerializeAsString();
+}
+
+namespace {
+
+constexpr std::string_view kSkeleton = "skeleton/";
+constexpr std::int64_t kSkeletonPause_ns = kNanosPerSecond / 20;
+// A daemon sends each skeleton every second. After this silence another upstream may have the name.
+constexpr std::int64_t kSilent_ns = 3 * kNanosPerSecond;
+// After this one the stream has gone.
+constexpr std::int64_t kGone_ns = 10 * kNanosPerSecond;
+
+}  // namespace
+
+std::string_view stream_of_topic(std::string_view topic) {
+  const auto slash = topic.find('/');
+  return slash == std::string_view::npos ? std::string_view() : topic.substr(slash + 1);
+}
+
+bool RelayedStreams::admit(std::string_view stream, std::size_t upstream, std::int64_t now_ns) {
+  forget_old(now_ns);
+  auto found = streams_.find(stream);
+  if (found == streams_.end()) {
+    if (streams_.size() == kMaxStreams) return false;
+    Stream fresh{.upstream = upstream};
+    fresh.due_ns = system::kForever_ns;
+    found = streams_.emplace(std::string(stream), std::move(fresh)).first;
+  } else if (found->second.upstream != upstream) {
+    if (now_ns - found->second.received_ns < kSilent_ns) return false;
+    found->second.upstream = upstream;
+  }
+  found->second.received_ns = now_ns;
+  return true;
+}
+
+void RelayedStreams::keep_skeleton(std::string_view stream, std::string_view bytes,
+                                   std::int64_t now_ns) {
+  const auto found = streams_.find(stream);
+  if (found == streams_.end()) return;
+  Stream& kept = found->second;
+  skeleton_bytes_ -= kept.skeleton.size();
+  kept.skeleton.clear();
+  kept.due_ns = system::kForever_ns;
+  if (skeleton_bytes_ + bytes.size() > kMaxSkeletonBytes) return;
+  kept.skeleton_topic = std::string(kSkeleton) + found->first;
+  kept.skeleton = bytes;
+  kept.sent_ns = now_ns;
+  skeleton_bytes_ += bytes.size();
+}
+
+void RelayedStreams::want_skeletons(std::string_view prefix) {
+  for (auto& [name, stream] : streams_) {
+    if (stream.skeleton.empty() || !stream.skeleton_topic.starts_with(prefix)) continue;
+    stream.due_ns = std::min(stream.due_ns, stream.sent_ns + kSkeletonPause_ns);
+  }
+}
+
+std::int64_t RelayedStreams::send_due(
+    std::int64_t now_ns,
+    const std::function<void(std::string_view topic, std::string_view bytes)>& send) {
+  std::int64_t next_ns = system::kForever_ns;
+  for (auto& [name, stream] : streams_) {
+    if (now_ns >= stream.due_ns) {
+      send(stream.skeleton_topic, stream.skeleton);
+      stream.sent_ns = now_ns;
+      stream.due_ns = system::kForever_ns;
+    }
+    next_ns = std::min(next_ns, stream.due_ns);
+  }
+  return next_ns;
+}
+
+void RelayedStreams::forget_old(std::int64_t now_ns) {
+  if (now_ns < forgot_ns_ + kNanosPerSecond) return;
+  forgot_ns_ = now_ns;
+  std::erase_if(streams_, [&](const auto& entry) {
+    const Stream& stream = entry.second;
+    if (now_ns - stream.received_ns < kGone_ns) return false;
+    skeleton_bytes_ -= stream.skeleton.size();
+    return true;
+  });
+}
+
 namespace {
 
 constexpr int kMessagesATurn = 256;
@@ -45,7 +193,7 @@ Result<std::unique_ptr<Relay>> Relay::open(const RelayOptions& options) {
                                               .messages_per_s = kFirstRate_hz});
   if (!socket) return std::unexpected(socket.error());
   std::vector<Upstream> upstreams;
-  for (const UpstreamSettings& settings : options.from) {
+  for (const link::Peer& settings : options.from) {
     auto upstream = Upstream::open(options.context, settings);
     if (!upstream) return std::unexpected(upstream.error());
     upstreams.push_back(std::move(*upstream));
@@ -75,12 +223,12 @@ Relay::Relay(const RelayOptions& options, publish::PublishSocket socket, std::ve
 }
 
 std::int64_t Relay::turn(std::int64_t now_ns) {
-  bool all_heard = socket_.hear(
+  bool all_received = socket_.hear(
       subscriptions_, now_ns, [this](std::string_view prefix) { streams_.want_skeletons(prefix); });
   pass_subscriptions(now_ns);
   for (std::size_t i = 0; i < upstreams_.size(); ++i) {
-    upstreams_[i].take_news();
-    all_heard = drain(i, now_ns) && all_heard;
+    upstreams_[i].log_news();
+    all_received = drain(i, now_ns) && all_received;
   }
   const std::int64_t skeleton_ns =
       streams_.send_due(now_ns, [this](std::string_view topic, std::string_view bytes) {
@@ -88,7 +236,7 @@ std::int64_t Relay::turn(std::int64_t now_ns) {
         ++counts_.late_skeletons;
       });
   every_second(now_ns);
-  if (!all_heard) return now_ns;
+  if (!all_received) return now_ns;
   const std::int64_t change_ns =
       changed_.empty() ? system::kForever_ns : now_ns + kNanosPerSecond / 20;
   return std::min({skeleton_ns, change_ns, second_ns_ + kNanosPerSecond});
@@ -110,10 +258,10 @@ void Relay::wait(std::int64_t timeout_ns) {
 bool Relay::drain(std::size_t upstream, std::int64_t now_ns) {
   net::Message topic;
   net::Message body;
-  bool sound = false;
   for (int i = 0; i < kMessagesATurn; ++i) {
-    if (!upstreams_[upstream].receive(topic, body, sound)) return true;
-    if (sound) {
+    const link::Received received = upstreams_[upstream].receive(topic, body);
+    if (received == link::Received::kNothing) return true;
+    if (received == link::Received::kMessage) {
       pass_on(upstream, topic.text(), body, now_ns);
     } else {
       ++counts_.foreign;
@@ -125,9 +273,9 @@ bool Relay::drain(std::size_t upstream, std::int64_t now_ns) {
 void Relay::pass_on(std::size_t upstream, std::string_view topic, net::Message& body,
                     std::int64_t now_ns) {
   if (topic == "stats") {
-    bool sound = false;
-    const auto stats = stats_.take(upstream, body.text(), now_ns, sound);
-    if (!sound) ++counts_.foreign;
+    bool valid = false;
+    const auto stats = stats_.accept(upstream, body.text(), now_ns, valid);
+    if (!valid) ++counts_.foreign;
     if (stats) send(topic, *stats);
     return;
   }

@@ -1,29 +1,128 @@
-// Relay: passes on what one or several daemons publish, so that hundreds of subscribers cost the
-// capture machine one connection. Messages pass unchanged; subscriptions travel the other way. A
-// subscriber that comes later gets the skeletons of its streams at once. Newest data wins: every
-// queue is short, and a slow subscriber loses messages for itself alone.
+// Upstream: a relay's one connection to a daemon, or to another relay. It connects in the
+// background and again whenever the connection is lost; libzmq then repeats the subscriptions. Only
+// few messages wait, so what comes after a stall is new. One thread uses it. Cold.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <memory>
+#include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "daemon/publish/publish_socket.hpp"
-#include "daemon/tools/relay/merged_stats.hpp"
-#include "daemon/tools/relay/relayed_streams.hpp"
-#include "daemon/tools/relay/upstream.hpp"
+#include "daemon/tools/link/daemon_socket.hpp"
+#include "posed/v1/posed.pb.h"
 #include "proto/frame/result.hpp"
 #include "proto/frame/time.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::relay {
+
+class Upstream {
+ public:
+  // `context` outlives it.
+  [[nodiscard]] static Result<Upstream> open(void* context, const link::Peer& peer);
+
+  [[nodiscard]] void* socket() const noexcept { return socket_.get(); }
+  [[nodiscard]] void* news() const noexcept { return socket_.news(); }  // readable: log_news()
+  [[nodiscard]] const std::string& endpoint() const noexcept { return socket_.peer().endpoint; }
+
+  // Returns false if the connection cannot take more subscriptions now.
+  [[nodiscard]] bool subscribe(const std::string& prefix, bool on);
+
+  [[nodiscard]] link::Received receive(net::Message& topic, net::Message& body) noexcept {
+    return socket_.receive(topic, body);
+  }
+
+  // Reads what happened to the connection, and logs when it was made, lost or refused.
+  void log_news();
+  [[nodiscard]] bool established() const noexcept { return socket_.established(); }
+
+ private:
+  explicit Upstream(link::DaemonSocket socket) : socket_(std::move(socket)) {}
+
+  link::DaemonSocket socket_;
+};
+
+// MergedStats: the stats of several daemons as those of one, so that `posed top` and `posed
+// monitor` see all streams of a relay.
+class MergedStats {
+ public:
+  explicit MergedStats(std::size_t upstreams) : latest_(upstreams) {}
+
+  // Stats came from an upstream. Returns what to publish: of one upstream its own bytes; of several
+  // the streams and sources of all that are not silent, each stream with the clock of its own
+  // machine, and everything else as the first of them says it, whenever that one sends its stats.
+  // Empty: nothing now. `valid` is false for bytes that are no stats.
+  [[nodiscard]] std::optional<std::string> accept(std::size_t upstream, std::string_view bytes,
+                                                  std::int64_t now_ns, bool& valid);
+
+ private:
+  struct Latest {
+    v1::Stats stats{};
+    std::int64_t at_ns = 0;
+    bool ever = false;
+  };
+  std::vector<Latest> latest_;  // [upstream]
+};
+
+inline constexpr std::size_t kMaxStreams = 1024;
+inline constexpr std::size_t kMaxSkeletonBytes = 16 * 1024 * 1024;  // of all streams together
+
+// The stream of a topic such as "pose/walker"; empty for other topics.
+[[nodiscard]] std::string_view stream_of_topic(std::string_view topic);
+
+// RelayedStreams: what a relay knows of the streams that pass it. Each stream belongs to the
+// upstream that sends it; a second one that sends a stream of the same name is not mixed in. The
+// last skeleton of each stream is kept for subscribers that come later. No socket, no clock of its
+// own, one thread. Cold: allocates.
+class RelayedStreams {
+ public:
+  // A message of the stream came from an upstream (its index). Returns false if it may not pass: if
+  // another upstream sends a stream of this name, or if there are kMaxStreams others.
+  [[nodiscard]] bool admit(std::string_view stream, std::size_t upstream, std::int64_t now_ns);
+
+  // The skeleton of an admitted stream has just been passed on. One beyond kMaxSkeletonBytes is not
+  // kept.
+  void keep_skeleton(std::string_view stream, std::string_view bytes, std::int64_t now_ns);
+
+  // Somebody has subscribed to the topics that begin with `prefix`: their skeletons become due, at
+  // once or 50 ms after they were last sent, because all their subscribers get them again.
+  void want_skeletons(std::string_view prefix);
+
+  // Gives the skeletons that are due to `send`; returns when the next one is.
+  [[nodiscard]] std::int64_t send_due(
+      std::int64_t now_ns,
+      const std::function<void(std::string_view topic, std::string_view bytes)>& send);
+
+  [[nodiscard]] std::size_t streams() const noexcept { return streams_.size(); }
+  [[nodiscard]] std::size_t skeleton_bytes() const noexcept { return skeleton_bytes_; }
+
+ private:
+  struct Stream {
+    std::size_t upstream = 0;
+    std::int64_t received_ns = 0;
+    std::string skeleton_topic{}, skeleton{};  // empty: none is kept
+    std::int64_t sent_ns = 0, due_ns = 0;      // of the skeleton
+  };
+  // Forgets streams that have sent nothing for a while; at most once a second.
+  void forget_old(std::int64_t now_ns);
+
+  std::map<std::string, Stream, std::less<>> streams_;
+  std::size_t skeleton_bytes_ = 0;
+  std::int64_t forgot_ns_ = 0;
+};
 
 inline constexpr std::size_t kMaxUpstreams = 16;
 
 struct RelayOptions {
   void* context = nullptr;  // the ZeroMQ context; outlives the relay
-  std::vector<UpstreamSettings> from{};
+  std::vector<link::Peer> from{};
   std::string endpoint{};
   // Checks every subscriber; null (in tests): all are admitted.
   net::ZapAuthenticator* authenticator = nullptr;
@@ -42,6 +141,10 @@ struct RelayCounts {
   std::size_t streams = 0;
 };
 
+// Relay: passes on what one or several daemons publish, so that hundreds of subscribers cost the
+// capture machine one connection. Messages pass unchanged; subscriptions travel the other way. A
+// subscriber that comes later gets the skeletons of its streams at once. Newest data wins: every
+// queue is short, and a slow subscriber loses messages for itself alone.
 class Relay {
  public:
   // Binds, and connects in the background.

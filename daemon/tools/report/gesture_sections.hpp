@@ -2,7 +2,6 @@
 // et al.; models/gesture/README.md, "References"). Cold.
 #pragma once
 
-#include <array>
 #include <string>
 #include <vector>
 
@@ -55,10 +54,11 @@ struct LabelSpan {
                                    const std::vector<picture::StripRow>& rows,
                                    const picture::Camera& camera, bool ground);
 
-// What it costs to know the labels only some frames ahead.
+// How far a performance that knows its labels only so many frames ahead is from one that knows all.
 struct LagError {
-  int frames = 0;
-  double rms_deg = 0.0, max_deg = 0.0, jerk_ratio = 0.0;
+  int frames = 0;  // of look-ahead
+  double rms_deg = 0.0, max_deg = 0.0;
+  double jerk_ratio = 0.0;  // relative to the performance that knows all
 };
 [[nodiscard]] Figure lag_error(const std::vector<LagError>& curve, double rate_hz);
 

@@ -62,6 +62,9 @@ class Page {
   std::string title_, command_, body_;
 };
 
+// Drawings below one another as an SVG file that needs no page: on white paper.
+[[nodiscard]] std::string svg_file(const std::vector<Drawing>& drawings);
+
 // Writes all of it or nothing.
 [[nodiscard]] Result<> write_page(const Page& page, const std::filesystem::path& path);
 

@@ -1,13 +1,114 @@
 #include "daemon/tools/report/plot.hpp"
 
 #include <algorithm>
+#include <cassert>
+#include <cmath>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
-#include "daemon/tools/report/look.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::report {
+namespace {
+
+// 1, 2 or 5 times a power of ten: the largest step that gives at most `most` ticks.
+double round_step(double extent, int most) {
+  const double rough = extent / std::max(1, most);
+  const double power = std::pow(10.0, std::floor(std::log10(rough)));
+  for (const double factor : {1.0, 2.0, 5.0}) {
+    if (factor * power >= rough * (1.0 - 1e-9)) return factor * power;
+  }
+  return 10.0 * power;
+}
+
+std::string tick_text(double value) {
+  const bool long_number = std::abs(value) >= 1e5 && std::abs(value) < 1e9;  // {:g}: 1e+05
+  return long_number ? fmt::format("{:.0f}", value) : fmt::format("{:g}", value);
+}
+
+}  // namespace
+
+void Range::add(double value) {
+  if (!std::isfinite(value)) return;
+  low = empty ? value : std::min(low, value);
+  high = empty ? value : std::max(high, value);
+  empty = false;
+}
+
+Axis::Axis(std::string title, std::string unit, const Range& range)
+    : title_(std::move(title)), unit_(std::move(unit)) {
+  if (range.empty) return;
+  low_ = range.low;
+  high_ = range.high;
+  if (high_ - low_ > 1e-9 * std::max(std::abs(low_), std::abs(high_))) return;
+  const double room = low_ == 0.0 ? 1.0 : 0.1 * std::abs(low_);  // all values are the same
+  low_ -= room;
+  high_ += room;
+}
+
+Axis Axis::logarithmic(std::string title, std::string unit, const Range& range) {
+  Axis axis(std::move(title), std::move(unit), {});
+  axis.logarithmic_ = true;
+  axis.low_ = 0.1;
+  axis.high_ = 1.0;
+  if (range.empty || range.high <= 0.0) return axis;
+  constexpr double kMostDecades = 1e6;  // below, a value is as good as none
+  const double least = std::max(range.low, range.high / kMostDecades);
+  axis.low_ = std::pow(10.0, std::floor(std::log10(least)));
+  axis.high_ = std::pow(10.0, std::ceil(std::log10(range.high)));
+  if (axis.high_ <= axis.low_) axis.high_ = 10.0 * axis.low_;
+  return axis;
+}
+
+void Axis::place(double from_px, double to_px) {
+  from_px_ = from_px;
+  to_px_ = to_px;
+}
+
+bool Axis::shows(double value) const {
+  return std::isfinite(value) && (!logarithmic_ || value > 0.0);
+}
+
+double Axis::px(double value) const {
+  const double inside = std::clamp(value, low_, high_);
+  const double share = logarithmic_ ? std::log(inside / low_) / std::log(high_ / low_)
+                                    : (inside - low_) / (high_ - low_);
+  return from_px_ + share * (to_px_ - from_px_);
+}
+
+std::vector<Tick> Axis::ticks(int most) const {
+  std::vector<Tick> ticks;
+  if (logarithmic_) {
+    const double decades = std::round(std::log10(high_ / low_));
+    const bool halves = 2.0 * decades + 1.0 <= most;  // room for 3 between 1 and 10
+    for (double decade = 0.0; decade <= decades; ++decade) {
+      const double value = low_ * std::pow(10.0, decade);
+      ticks.push_back({value, tick_text(value)});
+      if (halves && decade < decades) ticks.push_back({3.0 * value, tick_text(3.0 * value)});
+    }
+    return ticks;
+  }
+  const double step = round_step(high_ - low_, most);
+  for (double k = std::ceil(low_ / step - 1e-9); k * step <= high_ + 1e-9 * step; ++k) {
+    const double value = k == 0.0 ? 0.0 : k * step;  // never -0
+    ticks.push_back({value, tick_text(value)});
+  }
+  if (ticks.empty()) ticks.push_back({low_, tick_text(low_)});
+  return ticks;
+}
+
+void equal_scales(Axis& x, double width_px, Axis& y, double height_px) {
+  const double scale = std::max((x.high() - x.low()) / width_px, (y.high() - y.low()) / height_px);
+  const auto widen = [&](Axis& axis, double length_px) {
+    const double middle = 0.5 * (axis.low() + axis.high());
+    const double half = 0.5 * scale * length_px;
+    axis.widen(middle - half, middle + half);
+  };
+  widen(x, width_px);
+  widen(y, height_px);
+}
+
 namespace {
 
 constexpr double kLeft_px = 64.0, kRight_px = 20.0, kTop_px = 14.0, kBottom_px = 48.0;
@@ -159,6 +260,7 @@ void Plot::word(const Point& beside, std::string_view text) {
 
 int Plot::name_points(std::span<const Point> points, std::span<const std::string> names) {
   constexpr double kLine_px = 13.0;
+  assert(points.size() == names.size());
   std::vector<Box> taken;
   for (const Point& point : points) {
     if (shows(point)) taken.push_back(Box::around(x_.px(point.x), y_.px(point.y), kMark_px));
@@ -268,6 +370,117 @@ Drawing Plot::drawing() const {
   return {.width_px = size_.width_px,
           .height_px = size_.height_px + legend_px,
           .elements = std::move(elements)};
+}
+
+namespace {
+
+constexpr double kBarsWidth_px = 820.0, kBar_px = 13.0, kBetween_px = 9.0, kAbove_px = 26.0;
+constexpr double kBelow_px = 44.0, kNumber_px = 62.0, kMostName_px = 300.0;
+
+std::string shortened(const std::string& name) {
+  constexpr std::size_t kMostBytes = 42;
+  return clean(name, kMostBytes);
+}
+
+double names_px(const Bars& bars) {
+  double widest = 40.0;
+  for (const BarGroup& group : bars.groups) {
+    widest = std::max(widest, text_px(shortened(group.name)));
+  }
+  return std::min(widest, kMostName_px) + 14.0;
+}
+
+Axis axis_of(const Bars& bars) {
+  Range range;
+  for (const BarGroup& group : bars.groups) range.add(group.values);
+  for (const BarRule& rule : bars.rules) range.add(rule.value);
+  if (bars.logarithmic) {
+    // No bar is short only because the axis begins there.
+    range.add(range.low / 3.0);
+    return Axis::logarithmic(bars.quantity, bars.unit, range);
+  }
+  range.add(0.0);
+  return {bars.quantity, bars.unit, range};
+}
+
+std::string legend_of(const Bars& bars, double left) {
+  if (bars.series.size() < 2) return {};
+  std::string out;
+  double x = left;
+  for (std::size_t s = 0; s < bars.series.size(); ++s) {
+    out += fmt::format("<rect class=\"{} fill\"{} y=\"4\" width=\"14\" height=\"11\"/>\n",
+                       series_class(s), attribute("x", x));
+    out += fmt::format("<text{} y=\"14\">{}</text>\n", attribute("x", x + 20.0),
+                       escaped(bars.series[s]));
+    x += 44.0 + text_px(bars.series[s]);
+  }
+  return out;
+}
+
+// Grid, axis and rules; the rules' words stand at the bottom, one row each.
+std::string frame_of(const Bars& bars, const Axis& axis, double bottom) {
+  std::string out;
+  for (const Tick& tick : axis.ticks(9)) {
+    const double at = axis.px(tick.value);
+    out += fmt::format(
+        "<line class=\"grid\"{0}{1}{2}{3}/><text class=\"quiet mid\"{4}{5}>{6}</text>\n",
+        attribute("x1", at), attribute("x2", at), attribute("y1", kAbove_px),
+        attribute("y2", bottom), attribute("x", at), attribute("y", bottom + 16.0),
+        escaped(tick.text));
+  }
+  out += fmt::format("<text class=\"mid\"{}{}>{}</text>\n",
+                     attribute("x", (axis.px(axis.low()) + axis.px(axis.high())) / 2.0),
+                     attribute("y", bottom + 36.0), escaped(axis.label()));
+  for (const BarRule& rule : bars.rules) {
+    const double at = axis.px(rule.value);
+    const bool left = at > kBarsWidth_px - 180.0;
+    out += fmt::format("<line class=\"rule\"{}{}{}{}/><text class=\"quiet{}\"{}{}>{}</text>\n",
+                       attribute("x1", at), attribute("x2", at), attribute("y1", kAbove_px - 8.0),
+                       attribute("y2", bottom), left ? " end" : "",
+                       attribute("x", at + (left ? -4.0 : 4.0)), attribute("y", kAbove_px - 2.0),
+                       escaped(rule.words));
+  }
+  return out;
+}
+
+}  // namespace
+
+Drawing draw_bars(const Bars& bars) {
+  const double left = names_px(bars);
+  Axis axis = axis_of(bars);
+  axis.place(left, kBarsWidth_px - kNumber_px);
+  const std::size_t series = std::max<std::size_t>(1, bars.series.size());
+  const double group_px = kBar_px * static_cast<double>(series) + kBetween_px;
+  const double bottom = kAbove_px + group_px * static_cast<double>(bars.groups.size());
+  std::string out = legend_of(bars, left) + frame_of(bars, axis, bottom);
+  const double base = axis.px(bars.logarithmic ? axis.low() : 0.0);
+  double y = kAbove_px + kBetween_px / 2.0;
+  for (const BarGroup& group : bars.groups) {
+    out += fmt::format("<text class=\"end\"{}{}>{}</text>\n", attribute("x", left - 8.0),
+                       attribute("y", y + (group_px - kBetween_px) / 2.0 + 4.0),
+                       escaped(shortened(group.name)));
+    for (std::size_t s = 0; s < std::min(series, group.values.size()); ++s) {
+      const double top = y + kBar_px * static_cast<double>(s);
+      if (!axis.shows(group.values[s])) continue;
+      const double end = axis.px(group.values[s]);
+      out += fmt::format("<rect class=\"{} fill\"{}{}{}{}/>\n", series_class(s),
+                         attribute("x", std::min(base, end)), attribute("y", top),
+                         attribute("width", std::max(1.0, std::abs(end - base))),
+                         attribute("height", kBar_px - 2.0));
+      out += fmt::format("<text class=\"quiet\"{}{}>{}</text>\n",
+                         attribute("x", std::max(base, end) + 5.0), attribute("y", top + 10.0),
+                         number_text(group.values[s], bars.digits));
+    }
+    y += group_px;
+  }
+  return {.width_px = kBarsWidth_px, .height_px = bottom + kBelow_px, .elements = std::move(out)};
+}
+
+Figure bars_figure(std::string title, std::string sentence, const Bars& bars) {
+  return {.title = std::move(title),
+          .sentence = std::move(sentence),
+          .drawings = {draw_bars(bars)},
+          .tables = {}};
 }
 
 }  // namespace posed::report

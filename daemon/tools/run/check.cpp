@@ -1,49 +1,67 @@
 // `posed check`: does everything that `run` does before it binds a socket, and prints the results.
-#include <cstdio>
+#include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include <spdlog/fmt/fmt.h>
+#include <spdlog/fmt/ranges.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/config/config.hpp"
 #include "daemon/config/take_tables.hpp"
 #include "daemon/devices/about_stream.hpp"
 #include "daemon/devices/open_stream.hpp"
 #include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/findings.hpp"
 #include "proto/text/clean.hpp"
-#include "proto/text/json_text.hpp"
 
 namespace posed::tools {
 namespace {
-
-using nlohmann::ordered_json;
 
 struct CheckOptions {
   std::filesystem::path config;
   bool json = false;
 };
 
-// The stage with its model and parameters, in the names and units of the config.
-ordered_json summary_of(const pipeline::StageSettings& stage) {
-  ordered_json summary{{"stage", stage.type->name}};
-  if (!stage.model_name.empty()) summary["model"] = stage.model_name;
-  summary["parameters"] = ordered_json::object();
-  for (const ParameterSpec& spec : stage.type->parameters) {
-    const ParameterValue& value = stage.parameters.at(std::string(spec.name));
-    ordered_json& shown = summary["parameters"][std::string(spec.shown_name())];
-    std::visit([&](const auto& it) { shown = it; }, value);
-    if (std::holds_alternative<double>(value)) shown = std::get<double>(value) * spec.people_scale;
+// A parameter as the config writes it.
+template <typename T>
+void add_parameter(const ParameterSpec& spec, const T& value, Findings& parameters) {
+  if constexpr (std::is_same_v<T, double>) {
+    parameters.add(std::string(spec.shown_name()), value * spec.people_scale);
+  } else {
+    parameters.add(std::string(spec.shown_name()), value);
   }
-  return summary;
 }
 
-// A description of what stream number `number` would run, made with its device opened and its model
-// bound. Streams after it may have it as a partner.
-Result<ordered_json> try_stream(const config::StreamConfig& config, std::size_t number,
-                                pipeline::PartnerStreams& partners) {
+// The stage with its model and parameters, in the names and units of the config; `line` gets a part
+// about it.
+Findings findings_of(const pipeline::StageSettings& stage, std::string& line) {
+  Findings findings, parameters;
+  findings.add("stage", stage.type->name);
+  line += fmt::format(", {}", stage.type->name);
+  if (!stage.model_name.empty()) {
+    findings.add("model", stage.model_name);
+    line += " " + clean(stage.model_name);
+  }
+  for (const ParameterSpec& spec : stage.type->parameters) {
+    std::visit([&](const auto& value) { add_parameter(spec, value, parameters); },
+               stage.parameters.at(std::string(spec.name)));
+  }
+  std::string values;
+  for (const Finding& parameter : parameters.all()) {
+    values += (values.empty() ? "" : " ") + parameter.text + "=" + parameter.json();
+  }
+  if (!values.empty()) line += " (" + clean(values) + ")";
+  return findings.add("parameters", parameters);
+}
+
+// What stream number `number` would run, found out with its device opened and its models bound.
+// Streams after it may have it as a partner.
+Result<Findings> try_stream(const config::StreamConfig& config, std::size_t number,
+                            pipeline::PartnerStreams& partners) {
   const auto stream = devices::open_stream(config, partners);
   if (!stream) return std::unexpected(stream.error());
   devices::add_partner(partners, number, **stream);
@@ -54,60 +72,102 @@ Result<ordered_json> try_stream(const config::StreamConfig& config, std::size_t 
   const auto engine = devices::make_engine(0, (*stream)->stages, *bound);
   if (!engine) return devices::of_stream(config.name, engine.error());
   const drivers::Description& device = (*stream)->source->device.description;
-  ordered_json summary{{"name", config.name},
-                       {"driver", config.driver},
-                       {"device", device.identity},
-                       {"rate_hz", device.rate_hz},
-                       {"joints", device.skeleton ? device.skeleton->joints.size() : 0},
-                       {"sample_values", device.samples.names.size()},
-                       {"publish_raw", config.publish_raw},
-                       {"stale_after_s", config.stale_after_s}};
-  summary["stages"] = ordered_json::array();
-  for (const pipeline::StageSettings& stage : (*stream)->stages.settings.stages) {
-    summary["stages"].push_back(summary_of(stage));
-  }
-  summary["present"] = missing->empty();
-  summary["warnings"] = (*stream)->source->device.warnings;
+  const std::size_t joints = device.skeleton ? device.skeleton->joints.size() : 0;
+  std::vector<std::string> warnings = (*stream)->source->device.warnings;
   if (!missing->empty()) {
-    summary["warnings"].push_back("the device is not here now, and `posed run` waits for it (" +
-                                  *missing + ")");
+    warnings.push_back("the device is not here now, and `posed run` waits for it (" + *missing +
+                       ")");
   }
-  return summary;
+  std::string line = fmt::format("{}: {}{}{}, {:g} Hz, {} joints", config.name, config.driver,
+                                 missing->empty() ? " " : " (away)", clean(device.identity),
+                                 device.rate_hz, joints);
+  std::vector<Findings> stages;
+  for (const pipeline::StageSettings& stage : (*stream)->stages.settings.stages) {
+    stages.push_back(findings_of(stage, line));
+  }
+  if (config.publish_raw) line += ", raw input too";
+  Findings findings;
+  findings.say(line)
+      .add("name", config.name)
+      .add("driver", config.driver)
+      .add("device", device.identity)
+      .add("rate_hz", device.rate_hz)
+      .add("joints", joints)
+      .add("sample_values", device.samples.names.size())
+      .add("publish_raw", config.publish_raw)
+      .add("stale_after_s", config.stale_after_s)
+      .add("stages", stages)
+      .add("present", missing->empty())
+      .add("warnings", warnings);
+  for (const std::string& warning : warnings) findings.say("  note: " + clean(warning));
+  return findings;
 }
 
-// What is known about a source before its device describes its bodies.
-ordered_json summary_of(const config::SourceConfig& source) {
-  ordered_json summary{{"name", source.name}, {"driver", source.driver}, {"all", source.all}};
-  summary["streams"] = ordered_json::array();
+// What is known about a source before its device describes its bodies. The line is like "optitrack:
+// template_mocap, body 'Ann' as ann, all other bodies".
+Findings findings_of(const config::SourceConfig& source) {
+  std::vector<Findings> streams;
+  std::string line = source.name + ": " + source.driver;
   for (const auto& named : source.named) {
-    summary["streams"].push_back({{"name", named.stream.name}, {"body", named.body}});
+    streams.push_back(Findings().add("name", named.stream.name).add("body", named.body));
+    line += ", body " + in_quotes(named.body) + " as " + named.stream.name;
   }
-  return summary;
+  if (source.all) line += streams.empty() ? ", all bodies" : ", all other bodies";
+  return Findings()
+      .add("name", source.name)
+      .add("driver", source.driver)
+      .add("all", source.all)
+      .add("streams", streams)
+      .say(line);
 }
 
-ordered_json summary_of(const config::OutputConfig& output) {
-  ordered_json summary{{"name", output.name}, {"kind", config::kind_name(output.kind)}};
+// The line is like "output vmc-ann: vmc, body ann, to 127.0.0.1:39539".
+Findings findings_of(const config::OutputConfig& output) {
+  const std::string kind(config::kind_name(output.kind));
+  Findings findings;
+  findings.add("name", output.name).add("kind", kind);
+  std::string line = "output " + output.name + ": " + kind;
   for (const auto& [part, stream] : {std::pair{"body", output.body},
                                      {"left_hand", output.left_hand},
                                      {"right_hand", output.right_hand}}) {
-    if (!stream.empty()) summary[part] = stream;
+    if (stream.empty()) continue;
+    findings.add(part, stream);
+    line += std::string(", ") + part + " " + stream;
   }
-  if (output.kind == config::OutputKind::kVmc) summary["to"] = output.to;
-  if (output.kind == config::OutputKind::kBvh) summary["listen"] = output.listen;
-  if (output.rate_hz > 0.0) summary["rate_hz"] = output.rate_hz;
-  return summary;
+  if (output.kind == config::OutputKind::kBvh) {
+    findings.add("listen", output.listen);
+    line += ", on " + output.listen;
+  }
+  if (output.kind == config::OutputKind::kVmc) {
+    findings.add("to", output.to);
+    for (const std::string& to : output.to) line += ", to " + to;
+  }
+  if (output.rate_hz > 0.0) {
+    findings.add("rate_hz", output.rate_hz);
+    line += ", at most " + findings.all().back().json() + " Hz";
+  }
+  return findings.say(clean(line));
 }
 
-ordered_json summary_of(const config::RecordConfig& record) {
-  return {{"folder", record.folder.string()}, {"frames", record.frames}, {"clips", record.clips}};
+// The line is like "records to takes, with the published frames, each take as BVH".
+Findings findings_of(const config::RecordConfig& record) {
+  return Findings()
+      .add("folder", record.folder.string())
+      .add("frames", record.frames)
+      .add("clips", record.clips)
+      .say(fmt::format("records to {}{}{}", clean(record.folder.string()),
+                       record.frames ? ", with the published frames" : "",
+                       record.clips ? ", each take as BVH" : ""));
 }
 
-ordered_json summary_of(const config::TriggerConfig& trigger) {
-  return {{"listen", trigger.listen}, {"peers", trigger.peers}};
-}
-
-ordered_json summary_of(const config::MetricsConfig& metrics) {
-  return {{"listen", metrics.listen}};
+// The line is like "takes are triggered at 127.0.0.1:1512 by 192.168.1.20".
+Findings findings_of(const config::TriggerConfig& trigger) {
+  const std::string peers =
+      trigger.peers.empty() ? "this machine" : fmt::format("{}", fmt::join(trigger.peers, ", "));
+  return Findings()
+      .add("listen", trigger.listen)
+      .add("peers", trigger.peers)
+      .say(clean("takes are triggered at " + trigger.listen + " by " + peers));
 }
 
 std::string security_of(const config::DaemonConfig& config) {
@@ -115,145 +175,65 @@ std::string security_of(const config::DaemonConfig& config) {
   return "keys, " + std::to_string(config.security.clients.size()) + " clients allowed";
 }
 
-// "optitrack: template_mocap, body 'Ann' as ann, all other bodies"
-void print_source(const ordered_json& source) {
-  std::printf("%s: %s", source["name"].get<std::string>().c_str(),
-              source["driver"].get<std::string>().c_str());
-  for (const ordered_json& stream : source["streams"]) {
-    std::printf(", body %s as %s", in_quotes(stream["body"].get<std::string>()).c_str(),
-                stream["name"].get<std::string>().c_str());
+// Tries everything that the config names, and adds what cannot be used to the errors.
+void try_all(const std::string& file, config::Reading& reading, std::vector<Findings>& streams,
+             std::vector<Findings>& sources) {
+  const auto& configs = reading.config.streams;
+  std::vector<std::optional<Findings>> tried(configs.size());
+  pipeline::PartnerStreams partners;
+  for (const std::size_t i : devices::opening_order(configs)) {
+    auto found = try_stream(configs[i], i, partners);
+    if (found) tried[i] = std::move(*found);
+    if (!found) reading.errors.push_back(found.error());
   }
-  if (source["all"].get<bool>()) {
-    std::printf(", all %sbodies", source["streams"].empty() ? "" : "other ");
+  for (std::optional<Findings>& found : tried) {
+    if (found) streams.push_back(std::move(*found));
   }
-  std::puts("");
-}
-
-// "output vmc-ann: vmc, body ann, to 127.0.0.1:39539"
-void print_output(const ordered_json& output) {
-  std::string line =
-      "output " + output["name"].get<std::string>() + ": " + output["kind"].get<std::string>();
-  for (const char* part : {"body", "left_hand", "right_hand"}) {
-    if (output.contains(part))
-      line += std::string(", ") + part + " " + output[part].get<std::string>();
+  for (const config::SourceConfig& source : reading.config.sources) {
+    devices::ModelFiles models;
+    const auto opened = devices::open_source(source, models);
+    if (!opened) reading.errors.push_back(opened.error());
+    sources.push_back(findings_of(source));
   }
-  if (output.contains("listen")) line += ", on " + output["listen"].get<std::string>();
-  for (const ordered_json& to : output.value("to", ordered_json::array()))
-    line += ", to " + to.get<std::string>();
-  if (output.contains("rate_hz")) {
-    line += ", at most " + json_text(output["rate_hz"]) + " Hz";
-  }
-  std::puts(clean(line).c_str());
-}
-
-// "records to takes, with the published frames, each take as BVH"
-void print_record(const config::RecordConfig& record) {
-  const std::string folder = clean(record.folder.string());
-  std::printf("records to %s%s%s\n", folder.c_str(),
-              record.frames ? ", with the published frames" : "",
-              record.clips ? ", each take as BVH" : "");
-}
-
-// "takes are triggered at 127.0.0.1:1512 by 192.168.1.20"
-void print_trigger(const config::TriggerConfig& trigger) {
-  std::string line = "takes are triggered at " + trigger.listen + " by ";
-  if (trigger.peers.empty()) line += "this machine";
-  for (std::size_t i = 0; i < trigger.peers.size(); ++i) {
-    line += (i == 0 ? "" : ", ") + trigger.peers[i];
-  }
-  std::puts(clean(line).c_str());
-}
-
-void print(const config::DaemonConfig& config, const ordered_json& streams,
-           const ordered_json& sources, const ordered_json& outputs) {
-  std::printf("publishes on %s, controlled on %s (%s)\n", config.publish_endpoint.c_str(),
-              config.control_endpoint.c_str(), security_of(config).c_str());
-  for (const ordered_json& stream : streams) {
-    const std::string device = clean(stream["device"].get<std::string>());
-    std::printf("%s: %s%s%s, %g Hz, %d joints", stream["name"].get<std::string>().c_str(),
-                stream["driver"].get<std::string>().c_str(),
-                stream["present"].get<bool>() ? " " : " (away)", device.c_str(),
-                stream["rate_hz"].get<double>(), stream["joints"].get<int>());
-    for (const ordered_json& stage : stream["stages"]) {
-      std::printf(", %s", stage["stage"].get<std::string>().c_str());
-      if (stage.contains("model")) {
-        std::printf(" %s", clean(stage["model"].get<std::string>()).c_str());
-      }
-      std::string values;
-      for (const auto& [name, value] : stage["parameters"].items()) {
-        values += (values.empty() ? "" : " ") + name + "=" + json_text(value);
-      }
-      if (!values.empty()) std::printf(" (%s)", clean(values).c_str());
-    }
-    std::puts(stream["publish_raw"].get<bool>() ? ", raw input too" : "");
-    for (const auto& warning : stream["warnings"]) {
-      std::printf("  note: %s\n", clean(warning.get<std::string>()).c_str());
+  if (const auto& record = reading.config.record) {
+    if (auto fine = config::check_folder(*record); !fine) {
+      reading.errors.push_back(
+          {.message = fine.error().message, .file = file, .line = record->line});
     }
   }
-  for (const ordered_json& source : sources) print_source(source);
-  for (const ordered_json& output : outputs) print_output(output);
-  if (config.record) print_record(*config.record);
-  if (config.trigger) print_trigger(*config.trigger);
-  if (config.metrics) std::printf("metrics on http://%s/metrics\n", config.metrics->listen.c_str());
 }
 
 // Returns 0 if everything would run; 2 if the config is wrong; 1 if it is right, but a file or a
 // device that it names cannot be used.
 int check(const CheckOptions& options) {
   config::Reading reading = config::read_config_file(options.config, drivers::registry());
-  ordered_json streams = ordered_json::array();
-  ordered_json sources = ordered_json::array();
-  if (reading.errors.empty()) {
-    const auto& configs = reading.config.streams;
-    std::vector<ordered_json> tried(configs.size());
-    pipeline::PartnerStreams partners;
-    for (const std::size_t i : devices::opening_order(configs)) {
-      auto summary = try_stream(configs[i], i, partners);
-      if (summary) tried[i] = std::move(*summary);
-      if (!summary) reading.errors.push_back(summary.error());
-    }
-    for (ordered_json& summary : tried) {
-      if (!summary.is_null()) streams.push_back(std::move(summary));
-    }
-    for (const config::SourceConfig& source : reading.config.sources) {
-      devices::ModelFiles models;
-      const auto opened = devices::open_source(source, models);
-      if (!opened) reading.errors.push_back(opened.error());
-      sources.push_back(summary_of(source));
-    }
-    if (const auto& record = reading.config.record) {
-      if (auto fine = config::check_folder(*record); !fine) {
-        reading.errors.push_back({.message = fine.error().message,
-                                  .file = options.config.string(),
-                                  .line = record->line});
-      }
-    }
-  }
-  ordered_json outputs = ordered_json::array();
-  for (const config::OutputConfig& output : reading.config.outputs) {
-    outputs.push_back(summary_of(output));
-  }
+  std::vector<Findings> streams, sources, outputs, errors;
+  if (reading.errors.empty()) try_all(options.config.string(), reading, streams, sources);
+  const config::DaemonConfig& config = reading.config;
+  for (const config::OutputConfig& output : config.outputs) outputs.push_back(findings_of(output));
   int exit_code = 0;
-  ordered_json errors = ordered_json::array();
   for (const Error& error : reading.errors) {
     exit_code = std::max(exit_code, report(error));
-    errors.push_back({{"file", error.file}, {"line", error.line}, {"message", error.message}});
+    errors.push_back(
+        Findings().add("file", error.file).add("line", error.line).add("message", error.message));
   }
-  if (options.json) {
-    ordered_json all{{"ok", errors.empty()},
-                     {"publish", reading.config.publish_endpoint},
-                     {"control", reading.config.control_endpoint},
-                     {"streams", streams},
-                     {"sources", sources},
-                     {"outputs", outputs}};
-    if (reading.config.record) all["record"] = summary_of(*reading.config.record);
-    if (reading.config.trigger) all["trigger"] = summary_of(*reading.config.trigger);
-    if (reading.config.metrics) all["metrics"] = summary_of(*reading.config.metrics);
-    all["errors"] = errors;
-    std::printf("%s\n", json_text(all).c_str());
-  } else if (errors.empty()) {
-    print(reading.config, streams, sources, outputs);
+  Findings findings;
+  findings.add("ok", errors.empty())
+      .add("publish", config.publish_endpoint)
+      .add("control", config.control_endpoint)
+      .say(fmt::format("publishes on {}, controlled on {} ({})", config.publish_endpoint,
+                       config.control_endpoint, security_of(config)))
+      .add("streams", streams)
+      .add("sources", sources)
+      .add("outputs", outputs);
+  if (config.record) findings.add("record", findings_of(*config.record));
+  if (config.trigger) findings.add("trigger", findings_of(*config.trigger));
+  if (config.metrics) {
+    findings.add("metrics", Findings().add("listen", config.metrics->listen))
+        .say(fmt::format("metrics on http://{}/metrics", config.metrics->listen));
   }
+  findings.add("errors", errors);
+  if (options.json || errors.empty()) findings.show(options.json, -1);
   return exit_code;
 }
 

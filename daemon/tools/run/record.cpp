@@ -1,6 +1,5 @@
 // `posed record`: `run` with a device log.
 #include <memory>
-#include <string>
 
 #include <CLI/CLI.hpp>
 

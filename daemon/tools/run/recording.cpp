@@ -3,28 +3,125 @@
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <cstdio>
+#include <csignal>
+#include <ctime>
 #include <memory>
 #include <set>
+#include <system_error>
 #include <thread>
+#include <utility>
 #include <variant>
 
 #include <spdlog/fmt/chrono.h>
 #include <spdlog/fmt/fmt.h>
-#include <spdlog/spdlog.h>
-#include <nlohmann/json.hpp>
 
 #include "daemon/assembly/daemon.hpp"
 #include "daemon/record/recorder.hpp"
 #include "daemon/system/clock.hpp"
+#include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/command/output_files.hpp"
-#include "daemon/tools/run/no_body.hpp"
-#include "daemon/tools/run/set_aside.hpp"
-#include "daemon/tools/run/take_clips.hpp"
-#include "proto/text/json_text.hpp"
+#include "daemon/tools/export/log_clip.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/clip/frames_clip.hpp"
+#include "proto/log/schema.hpp"
 
 namespace posed::tools {
 namespace {
+
+Result<> write_clip(Result<clip::Clip> clip, const std::filesystem::path& path) {
+  if (!clip) return std::unexpected(clip.error());
+  std::error_code error;
+  if (std::filesystem::exists(path, error)) return fail("exists already", path.string());
+  clip::hold_missing(*clip);
+  for (const std::string& warning : clip->warnings) {
+    spdlog::warn("{}: {}", path.string(), warning);
+  }
+  if (auto written = clip::write_bvh(*clip, path); !written) return written;
+  spdlog::info("wrote {}: {} frames", path.string(), clip->frames());
+  return {};
+}
+
+// Writes each take of each stream with a pose as <log without .plog>-<take>-<stream>.bvh. A clip
+// that cannot be written is a warning; the log is not changed. An end signal that comes meanwhile
+// ends the work with an error: block end_signals() before.
+Result<> write_take_clips(const std::filesystem::path& log) {
+  const std::string stem = (log.parent_path() / log.stem()).string();
+  const auto write = [&](const log::TakeRow& take, const std::string& stream,
+                         Result<clip::Clip> clip) {
+    const std::string path = stem + "-" + std::to_string(take.id) + "-" + stream + ".bvh";
+    if (auto written = write_clip(std::move(clip), path); !written) {
+      spdlog::warn("take {} of stream {} is no clip: {}", take.id, stream, written.error().text());
+    }
+  };
+  const sigset_t signals = end_signals();
+  constexpr timespec kAtOnce{};
+  return each_take_clip(log, write, [&] { return sigtimedwait(&signals, nullptr, &kAtOnce) <= 0; });
+}
+
+// SetAside keeps a device log that is about to be replaced under another name until the new log has
+// been started successfully.
+class SetAside {
+ public:
+  // Renames `file`, if it exists, to <file>.replaced. The error says why that is impossible.
+  [[nodiscard]] static Result<SetAside> move(const std::filesystem::path& file);
+  SetAside(SetAside&& other) noexcept;
+  SetAside& operator=(SetAside&&) = delete;
+  ~SetAside();  // restores the file over the new one, unless let_go() was called
+
+  // The replacement has succeeded: deletes the old file.
+  void let_go() noexcept;
+
+ private:
+  explicit SetAside(std::filesystem::path file) : file_(std::move(file)) {}
+  static void rename(const std::filesystem::path& from, const std::filesystem::path& to,
+                     const char* suffix);
+  static void remove(const std::filesystem::path& file, const char* suffix);
+  [[nodiscard]] std::filesystem::path aside() const { return file_.string() + ".replaced"; }
+
+  std::filesystem::path file_;  // empty: nothing to restore
+};
+
+Result<SetAside> SetAside::move(const std::filesystem::path& file) {
+  std::error_code error;
+  if (!std::filesystem::exists(file, error)) return SetAside({});
+  SetAside kept(file);
+  std::filesystem::rename(file, kept.aside(), error);
+  if (error) {
+    kept.file_.clear();
+    return fail("cannot be replaced: " + error.message(), file.string());
+  }
+  for (const char* suffix : log::kFileSuffixes) kept.rename(file, kept.aside(), suffix);
+  return kept;
+}
+
+SetAside::SetAside(SetAside&& other) noexcept : file_(std::exchange(other.file_, {})) {}
+
+// Files that the failed replacement left beside its log must not be mistaken for files of the old
+// log.
+SetAside::~SetAside() {
+  if (file_.empty()) return;
+  for (const char* suffix : log::kFileSuffixes) {
+    remove(file_, suffix);
+    rename(aside(), file_, suffix);
+  }
+}
+
+void SetAside::let_go() noexcept {
+  if (file_.empty()) return;
+  for (const char* suffix : log::kFileSuffixes) remove(aside(), suffix);
+  file_.clear();
+}
+
+void SetAside::rename(const std::filesystem::path& from, const std::filesystem::path& to,
+                      const char* suffix) {
+  std::error_code ignored;  // for most suffixes there is no file
+  std::filesystem::rename(from.string() + suffix, to.string() + suffix, ignored);
+}
+
+void SetAside::remove(const std::filesystem::path& file, const char* suffix) {
+  std::error_code ignored;
+  std::filesystem::remove(file.string() + suffix, ignored);
+}
 
 // Publishes what the recorder reports on event/<stream> of the streams that it concerns.
 void post(assembly::Daemon& daemon, const record::RecorderEvent& event) {
@@ -78,30 +175,32 @@ void print_result(const RecordingPlan& options, const v1::Stats& stats,
   const std::uintmax_t bytes = gone ? 0 : size;
   std::uint64_t frames = stats.left_frames(), samples = stats.left_samples();
   const bool some_left = frames + samples > 0;
-  nlohmann::ordered_json streams = nlohmann::ordered_json::array();
+  std::vector<Findings> streams;
   for (const v1::StreamStats& stream : stats.stream()) {
     frames += stream.frames();
     samples += stream.samples();
-    streams.push_back(
-        {{"stream", stream.stream()}, {"frames", stream.frames()}, {"samples", stream.samples()}});
+    streams.push_back(Findings()
+                          .add("stream", stream.stream())
+                          .add("frames", stream.frames())
+                          .add("samples", stream.samples()));
   }
   const std::uint64_t lost = recorder.lost_chunks() + recorder.lost_frames();
   const std::uint64_t dropped = kernel_dropped(stats);
   if (options.json) {
-    const nlohmann::ordered_json line{{"file", options.out},
-                                      {"seconds", took_s},
-                                      {"bytes", bytes},
-                                      {"frames", frames},
-                                      {"samples", samples},
-                                      {"streams", streams},
-                                      {"left_frames", stats.left_frames()},
-                                      {"left_samples", stats.left_samples()},
-                                      {"missing_chunks", recorder.lost_chunks()},
-                                      {"missing_frames", recorder.lost_frames()},
-                                      {"kernel_dropped", dropped},
-                                      {"write_errors", recorder.errors()}};
-    std::printf("%s\n", json_text(line).c_str());
-    std::fflush(stdout);
+    Findings()
+        .add("file", options.out)
+        .add("seconds", took_s)
+        .add("bytes", bytes)
+        .add("frames", frames)
+        .add("samples", samples)
+        .add("streams", streams)
+        .add("left_frames", stats.left_frames())
+        .add("left_samples", stats.left_samples())
+        .add("missing_chunks", recorder.lost_chunks())
+        .add("missing_frames", recorder.lost_frames())
+        .add("kernel_dropped", dropped)
+        .add("write_errors", recorder.errors())
+        .show(true, -1);
   }
   spdlog::log(lost + recorder.errors() + dropped > 0 ? spdlog::level::warn : spdlog::level::info,
               "{}: {:.1f} s of {} stream{}{}, {} frames and {} samples published, {:.1f} MB; {}",
@@ -159,7 +258,7 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
   auto opened = assembly::Daemon::open(config);
   if (!opened) return std::unexpected(opened.error());
   assembly::Daemon& daemon = **opened;
-  if (auto sound = check_end(daemon, plan.serve); !sound) return sound;
+  if (auto ends = check_end(daemon, plan.serve); !ends) return ends;
   auto started = std::make_shared<std::atomic<bool>>(false);
   record::RecorderOptions recorder_options{
       .file = plan.out,
@@ -196,7 +295,7 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
   hooks.recorder_figures = [&recorder] { return figures_of(**recorder); };
   if (auto done = daemon.start(std::move(hooks)); !done) {
     daemon.stop();
-    // What failed at the start is told, not what follows from it.
+    // The error is what failed at the start, not what follows from it.
     [[maybe_unused]] const auto closed = (*recorder)->finish();
     std::error_code ignored;
     std::filesystem::remove(plan.out, ignored);  // nothing was recorded

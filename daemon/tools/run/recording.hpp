@@ -1,14 +1,26 @@
 // Streaming with a device log: what `posed record`, and `posed run` with a [record] table, do.
+// Cold.
 #pragma once
 
 #include <filesystem>
 #include <string>
 
+#include <spdlog/spdlog.h>
+
 #include "daemon/config/daemon_config.hpp"
 #include "daemon/tools/run/serve.hpp"
 #include "proto/frame/result.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::tools {
+
+// What `record` and `replay` report of a source without a stream in the log. It may have named
+// bodies that nobody wanted or that were refused.
+[[nodiscard]] inline std::string no_body_of(const std::string& source) {
+  return "source " + in_quotes(source) + " named no body that became a stream";
+}
+
+inline void warn_of_no_body(const std::string& source) { spdlog::warn("{}", no_body_of(source)); }
 
 struct RecordingPlan {
   std::string out;         // the log

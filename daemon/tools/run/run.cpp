@@ -27,7 +27,7 @@ Result<> run(const ServeOptions& options) {
   }
   auto daemon = assembly::Daemon::open(*config);
   if (!daemon) return std::unexpected(daemon.error());
-  if (auto sound = check_end(**daemon, options); !sound) return sound;
+  if (auto ends = check_end(**daemon, options); !ends) return ends;
   if (auto started = (*daemon)->start(); !started) return started;
   print_ready(**daemon);
   serve(**daemon, options);

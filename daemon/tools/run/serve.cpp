@@ -1,24 +1,20 @@
 #include "daemon/tools/run/serve.hpp"
 
 #include <algorithm>
-#include <csignal>
-#include <cstdio>
 #include <cstdlib>
 #include <iterator>
-#include <string>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 #include <chrono>
-#include <nlohmann/json.hpp>
 
 #include "daemon/config/config.hpp"
 #include "daemon/logging/log_output.hpp"
 #include "daemon/service/service.hpp"
 #include "daemon/system/clock.hpp"
-#include "proto/text/json_text.hpp"
+#include "daemon/tools/command/findings.hpp"
 
 namespace posed::tools {
 namespace {
@@ -106,18 +102,21 @@ Result<> check_end(const assembly::Daemon& daemon, const ServeOptions& options) 
 }
 
 void print_ready(const assembly::Daemon& daemon) {
-  nlohmann::ordered_json line{{"ready", true},
-                              {"publish", daemon.publish_endpoint()},
-                              {"control", daemon.control_endpoint()},
-                              {"streams", nlohmann::json::array()}};
-  for (const auto& stream : daemon.streams()) line["streams"].push_back(stream->config.name);
-  for (const auto& source : daemon.sources()) line["sources"].push_back(source->config.name);
-  if (!daemon.metrics_url().empty()) line["metrics"] = daemon.metrics_url();
+  std::vector<std::string> streams, sources;
+  for (const auto& stream : daemon.streams()) streams.push_back(stream->config.name);
+  for (const auto& source : daemon.sources()) sources.push_back(source->config.name);
+  Findings ready;
+  ready.add("ready", true)
+      .add("publish", daemon.publish_endpoint())
+      .add("control", daemon.control_endpoint())
+      .add("streams", streams);
+  if (!sources.empty()) ready.add("sources", sources);
+  if (!daemon.metrics_url().empty()) ready.add("metrics", daemon.metrics_url());
+  const std::string line = ready.json();
   // Not through stdio, because a pipe that is full or that nobody reads must not delay the signals
   // that stop the daemon.
-  if (!logging::write_within(STDOUT_FILENO, json_text(line) + '\n', kReadyLineWithin)) {
-    spdlog::warn("the line with the daemon's endpoints cannot be written to stdout: {}",
-                 json_text(line));
+  if (!logging::write_within(STDOUT_FILENO, line + '\n', kReadyLineWithin)) {
+    spdlog::warn("the line with the daemon's endpoints cannot be written to stdout: {}", line);
   }
 }
 

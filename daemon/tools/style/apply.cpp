@@ -10,19 +10,17 @@
 
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/degrees.hpp"
+#include "daemon/tools/command/findings.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
-#include "daemon/tools/command/shares_json.hpp"
-#include "daemon/tools/style/root_option.hpp"
+#include "daemon/tools/style/style_options.hpp"
 #include "models/style/judge/walker_fit.hpp"
 #include "models/style/live/apply.hpp"
 #include "proto/clip/format.hpp"
 #include "proto/text/clean.hpp"
-#include "proto/text/json_text.hpp"
 
 namespace posed::tools {
 namespace {
@@ -37,7 +35,7 @@ struct ApplyArguments {
   bool overwrite = false, json = false;
 };
 
-// A number, or "auto": as much as the walker does not show already.
+// Reads --alpha: a number, or "auto", which is as much as the walker does not show already.
 Result<> parse_alpha(ApplyArguments& options) {
   style::FilterOptions& filter = options.apply.filter;
   filter.auto_alpha = options.alpha == "auto";
@@ -49,8 +47,8 @@ Result<> parse_alpha(ApplyArguments& options) {
   return misuse("--alpha takes a number from -2 to 2, or auto, not " + in_quotes(options.alpha));
 }
 
-// `--gate` alone is `--gate on`, and `--gate IN` is `--gate on IN`: the library takes the next word
-// for the option's.
+// Reads --gate. `--gate` alone is `--gate on`, and `--gate IN` is `--gate on IN`: CLI11 gives the
+// next word to the option.
 Result<> parse_gate(ApplyArguments& options) {
   if (options.gate.empty()) options.gate = "on";
   if (options.gate != "on" && options.gate != "off") {
@@ -74,13 +72,6 @@ Result<> check_files(const ApplyArguments& options) {
       .check();
 }
 
-// How far training changed the poses of its own walkers [deg rms]; 0 if the model does not say,
-// as where it has several styles.
-double training_difference_deg(const style::StyleModel& model) {
-  const auto report = nlohmann::json::parse(model.report_json, nullptr, false);
-  return report.is_object() ? report.value("difference_deg", 0.0) : 0.0;
-}
-
 // Why the clip came out as it went in; empty where it did not.
 std::string unchanged(const ApplyArguments& options, const style::Applied& applied) {
   constexpr double kClosed = 0.01;  // of the gate, on average
@@ -99,7 +90,8 @@ std::string unchanged(const ApplyArguments& options, const style::Applied& appli
   return "no joint was changed" + why;
 }
 
-std::string verdict(const style::WalkerFit& fit, double rms_deg, double training_deg) {
+// `training`: what the model says of its training.
+std::string verdict(const style::WalkerFit& fit, double rms_deg, const Findings& training) {
   if (!fit.is_far()) {
     return fmt::format(
         "this walker is like those of the training ({:.1f} deg rms from the nearest "
@@ -110,37 +102,48 @@ std::string verdict(const style::WalkerFit& fit, double rms_deg, double training
       "this walker is far from the training ({:.1f} deg rms from the nearest pose it "
       "learnt from; its own walkers are within {:.0f}): the change is a guess",
       fit.distance_deg, style::WalkerFit::kFar_deg);
-  if (training_deg > 0.0) {
+  // Of several styles it gives none.
+  if (const double training_deg = training.number("difference_deg").value_or(0.0);
+      training_deg > 0.0) {
     text += fmt::format(", {:.1f} deg rms where its training had {:.1f}", rms_deg, training_deg);
   }
   return text;
 }
 
-nlohmann::json or_null(const std::optional<double>& value) {
-  return value ? nlohmann::json(*value) : nlohmann::json();
-}
-
-// What was done, without the verdict.
-nlohmann::json report_of(const ApplyArguments& options, const style::StyleModel& model,
-                         const style::Shares& shares, const clip::Clip& clip,
-                         const style::Applied& applied) {
-  return {{"out", options.out.string()},
-          {"frames", clip.frames()},
-          {"rate_hz", clip.frame_rate_hz},
-          {"from", model.from},
-          {"to", model.to},
-          {"weights", shares_json(model.names(), shares)},
-          {"mask", options.mask},
-          {"alpha", options.apply.filter.alpha},
-          {"auto_alpha", options.apply.filter.auto_alpha},
-          {"style_estimate", or_null(applied.estimate_mean)},
-          {"cold", options.apply.cold},
-          {"root", root_text(options.apply.feet)},
-          {"max_root_offset_cm", applied.max_root_offset_m * 100.0},
-          {"gate_mean", or_null(applied.gate_mean)},
-          {"joints_changed", applied.joints_changed},
-          {"rms_change_deg", applied.rms_change_rad * kDegrees},
-          {"max_change_deg", applied.max_change_rad * kDegrees}};
+Findings findings_of(const ApplyArguments& options, const style::StyleModel& model,
+                     const style::Shares& shares, const clip::Clip& clip,
+                     const style::Applied& applied, const style::WalkerFit& fit) {
+  const double rms_deg = applied.rms_change_rad * kDegrees;
+  const double max_deg = applied.max_change_rad * kDegrees;
+  const std::string judged = verdict(fit, rms_deg, Findings().add_json(model.report_json));
+  const std::string nothing = unchanged(options, applied);
+  Findings findings;
+  findings.add("out", options.out.string())
+      .add("frames", clip.frames())
+      .add("rate_hz", clip.frame_rate_hz)
+      .add("from", model.from)
+      .add("to", model.to)
+      .add("weights", mixture_findings(model.names(), shares))
+      .add("mask", options.mask)
+      .add("alpha", options.apply.filter.alpha)
+      .add("auto_alpha", options.apply.filter.auto_alpha)
+      .add("style_estimate", applied.estimate_mean)
+      .add("cold", options.apply.cold)
+      .add("root", root_text(options.apply.feet))
+      .add("max_root_offset_cm", applied.max_root_offset_m * 100.0)
+      .add("gate_mean", applied.gate_mean)
+      .add("joints_changed", applied.joints_changed)
+      .add("rms_change_deg", rms_deg)
+      .add("max_change_deg", max_deg)
+      .say(fmt::format("{}: {} frames, {} joints changed by {:.1f} deg rms, {:.1f} deg at most",
+                       options.out.string(), clip.frames(), applied.joints_changed, rms_deg,
+                       max_deg))
+      .add("distance_deg", fit.distance_deg)
+      .add("far_from_training", fit.is_far())
+      .add("verdict", judged)
+      .add("unchanged", nothing.empty() ? std::optional<std::string>() : nothing);
+  if (!nothing.empty()) findings.warn({nothing});
+  return findings.remark((fit.is_far() ? "warning: " : "") + judged);
 }
 
 // Measures how the walker of --neutral usually walks.
@@ -194,25 +197,7 @@ Result<> run(ApplyArguments options) {
   if (!fit) return std::unexpected(fit.error());
   if (auto written = clip::write_clip(applied->clip, options.out); !written) return written;
   bar.finish();
-
-  const double rms_deg = applied->rms_change_rad * kDegrees;
-  const double max_deg = applied->max_change_rad * kDegrees;
-  const std::string sentence = verdict(*fit, rms_deg, training_difference_deg(*model));
-  const std::string nothing = unchanged(options, *applied);
-  if (options.json) {
-    nlohmann::json report = report_of(options, *model, *shares, *clip, *applied);
-    report["distance_deg"] = fit->distance_deg;
-    report["far_from_training"] = fit->is_far();
-    report["verdict"] = sentence;
-    report["unchanged"] = nothing.empty() ? nlohmann::json() : nlohmann::json(nothing);
-    std::printf("%s\n", json_text(report, 2).c_str());
-  } else {
-    std::printf("%s: %d frames, %d joints changed by %.1f deg rms, %.1f deg at most\n",
-                options.out.c_str(), clip->frames(), applied->joints_changed, rms_deg, max_deg);
-  }
-  std::fflush(stdout);
-  if (!nothing.empty()) std::fprintf(stderr, "posed: warning: %s\n", nothing.c_str());
-  std::fprintf(stderr, "posed: %s%s\n", fit->is_far() ? "warning: " : "", sentence.c_str());
+  findings_of(options, *model, *shares, *clip, *applied, *fit).show(options.json);
   return {};
 }
 

@@ -1,29 +1,24 @@
-#include "daemon/tools/style/eval_natural.hpp"
-
+// `posed eval natural`: whether people move as a clip does, measured beside a corpus of clips.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <memory>
 #include <string>
 
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/findings.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
-#include "daemon/tools/command/thread_tasks.hpp"
+#include "daemon/tools/command/ranks.hpp"
 #include "daemon/tools/style/natural_clips.hpp"
 #include "models/natural/compare.hpp"
 #include "proto/clip/format.hpp"
-#include "proto/text/json_text.hpp"
 
 namespace posed::tools {
 namespace {
-
-using nlohmann::json;
 
 constexpr const char* kEvalNaturalFooter = R"(Examples:
   posed eval natural styled.bvh --corpus walks
@@ -65,40 +60,50 @@ std::string natural_verdict(const natural::Comparison& comparison, std::size_t c
                      clips);
 }
 
-json report_of(const EvalNaturalOptions& options, const NaturalClips& clips,
-               const natural::Comparison& comparison) {
-  json figures = json::object();
+Findings findings_of(const EvalNaturalOptions& options, const NaturalClips& clips,
+                     const natural::Comparison& comparison) {
+  Findings figures;
+  figures.say(fmt::format("{:<14} {:>10}   {:>10} {:>10} {:>10} {:>8}", "figure", "clip", "p5",
+                          "median", "p95", "below"));
   for (const natural::Placed& placed : comparison.figures) {
-    figures[placed.name] = {{"value", placed.value},   {"p5", placed.p5},
-                            {"median", placed.median}, {"p95", placed.p95},
-                            {"below", placed.below},   {"natural", placed.natural}};
+    figures.add(placed.name, Findings()
+                                 .add("value", placed.value)
+                                 .add("p5", placed.p5)
+                                 .add("median", placed.median)
+                                 .add("p95", placed.p95)
+                                 .add("below", placed.below)
+                                 .add("natural", placed.natural)
+                                 .say(fmt::format("{:<14} {:10.4g}   {:10.4g} {:10.4g} {:10.4g} "
+                                                  "{:6.0f} %{}",
+                                                  placed.name, placed.value, placed.p5,
+                                                  placed.median, placed.p95, 100.0 * placed.below,
+                                                  placed.natural ? "" : "  unnatural")));
   }
-  json left_out = json::array();
+  std::vector<Findings> left_out;
   for (const LeftOut& file : clips.left_out) {
-    left_out.push_back({{"file", file.file}, {"why", file.why}});
+    left_out.push_back(Findings().add("file", file.file).add("why", file.why));
   }
-  return {{"clip", options.clip.string()},
-          {"corpus", options.corpus.string()},
-          {"clips", clips.corpus.size()},
-          {"left_out", left_out},
-          {"rate_hz", options.rate_hz},
-          {"dimensions", comparison.dimensions},
-          {"figures", figures},
-          {"natural", std::ranges::all_of(comparison.figures, &natural::Placed::natural)},
-          {"verdict", natural_verdict(comparison, clips.corpus.size())}};
+  const bool natural = std::ranges::all_of(comparison.figures, &natural::Placed::natural);
+  const std::string verdict = natural_verdict(comparison, clips.corpus.size());
+  Findings findings;
+  findings.add("clip", options.clip.string())
+      .add("corpus", options.corpus.string())
+      .add("clips", clips.corpus.size())
+      .add("left_out", left_out)
+      .add("rate_hz", options.rate_hz)
+      .add("dimensions", comparison.dimensions)
+      .add("figures", figures)
+      .add("natural", natural)
+      .add("verdict", verdict);
+  if (!clips.left_out.empty()) {
+    const LeftOut& first = clips.left_out.front();
+    findings.note(fmt::format("warning: {} clips left out: {} ({}){}", left_out.size(), first.file,
+                              first.why, left_out.size() > 1 ? ", ...; --json lists them" : ""));
+  }
+  return findings.verdict(verdict, natural);
 }
 
-void print_table(const natural::Comparison& comparison) {
-  std::printf("%-14s %10s   %10s %10s %10s %8s\n", "figure", "clip", "p5", "median", "p95",
-              "below");
-  for (const natural::Placed& placed : comparison.figures) {
-    std::printf("%-14s %10.4g   %10.4g %10.4g %10.4g %6.0f %%%s\n", placed.name.c_str(),
-                placed.value, placed.p5, placed.median, placed.p95, 100.0 * placed.below,
-                placed.natural ? "" : "  unnatural");
-  }
-}
-
-Result<json> evaluate_natural(const EvalNaturalOptions& options) {
+Result<Findings> evaluate_natural(const EvalNaturalOptions& options) {
   if (!options.skeleton.empty() && !clip::accepts(options.clip, clip::ReadOption::kSkeleton)) {
     return misuse("--skeleton is only for AMC clips; leave it out");
   }
@@ -115,22 +120,7 @@ Result<json> evaluate_natural(const EvalNaturalOptions& options) {
       });
   if (!comparison) return fail("stopped");
   bar.finish();
-  if (!options.json) print_table(*comparison);
-  return report_of(options, *clips, *comparison);
-}
-
-int finish_natural(const json& report, bool as_json) {
-  if (as_json) std::printf("%s\n", json_text(report, 2).c_str());
-  std::fflush(stdout);
-  if (!as_json && !report["left_out"].empty()) {
-    const json& first = report["left_out"].front();
-    std::fprintf(stderr, "posed: warning: %zu clips left out: %s (%s)%s\n",
-                 report["left_out"].size(), first["file"].get<std::string>().c_str(),
-                 first["why"].get<std::string>().c_str(),
-                 report["left_out"].size() > 1 ? ", ...; --json lists them" : "");
-  }
-  std::fprintf(stderr, "posed: %s\n", report["verdict"].get<std::string>().c_str());
-  return static_cast<int>(report["natural"].get<bool>() ? ExitCode::kDone : ExitCode::kFailed);
+  return findings_of(options, *clips, *comparison);
 }
 
 }  // namespace
@@ -152,7 +142,7 @@ void add_eval_natural(CLI::App& eval, int& exit_code) {
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {
     const auto made = evaluate_natural(*options);
-    exit_code = made ? finish_natural(*made, options->json) : report(made.error());
+    exit_code = made ? made->show(options->json) : report(made.error());
   });
 }
 

@@ -51,8 +51,8 @@ void read_targets(TableReader& reader, std::vector<std::string>& targets) {
   reader.read("target", targets.emplace_back());
 }
 
-void read_tables(const toml::table& root, const std::filesystem::path& folder, Findings& findings,
-                 Experiment& experiment) {
+void read_tables(const toml::table& root, const std::filesystem::path& folder,
+                 posed::Findings& findings, Experiment& experiment) {
   TableReader reader(root, "", findings);
   read_targets(reader, experiment.targets);
   reader.read("rate_hz", experiment.rate_hz, {10.0, 1000.0});
@@ -80,7 +80,7 @@ void read_tables(const toml::table& root, const std::filesystem::path& folder, F
 Result<Experiment> read_experiment(const std::filesystem::path& path) {
   const auto root = load_toml(path, kExperimentLimits);
   if (!root) return misuse(root.error().message, root.error().file, root.error().line);
-  Findings findings{.file = path.string(), .exit_code = ExitCode::kWrongUse};
+  posed::Findings findings{.file = path.string(), .exit_code = ExitCode::kWrongUse};
   Experiment experiment;
   read_tables(*root, path.parent_path(), findings, experiment);
   return findings.result(std::move(experiment));

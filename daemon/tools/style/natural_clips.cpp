@@ -2,11 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
 #include <system_error>
 #include <utility>
 
-#include "daemon/tools/command/hand_option.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "models/gesture/recording.hpp"
 #include "models/motion/motion.hpp"
 #include "models/natural/compare.hpp"

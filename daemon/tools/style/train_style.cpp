@@ -1,28 +1,24 @@
 #include <algorithm>
-#include <cstdio>
+#include <cmath>
 #include <memory>
+#include <numbers>
 #include <optional>
-#include <utility>
 
+#include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "daemon/tools/command/command.hpp"
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
-#include "daemon/tools/style/experiment.hpp"
 #include "daemon/tools/style/style_report.hpp"
 #include "daemon/tools/style/train_style.hpp"
 #include "models/fixed_products.hpp"
 #include "models/style/train/train.hpp"
 #include "proto/clip/format.hpp"
-#include "proto/text/json_text.hpp"
 
 namespace posed::tools {
 namespace {
-
-using nlohmann::json;
 
 constexpr const char* kTrainStyleFooter = R"(Examples:
   posed train style --from plain_1.bvh plain_2.bvh --to proud_1.bvh proud_2.bvh --out proud.style
@@ -137,24 +133,25 @@ std::vector<std::filesystem::path> inputs_of(const TrainStyleOptions& options,
   return inputs;
 }
 
-void print_style_summary(const json& report, const std::string& out) {
-  std::printf("%-12s %-10s %-28s %8s %8s\n", "group", "motion", "clip", "period", "theta0");
-  for (const json& clip : report["clips"]) {
-    if (clip["dropped_first_frame"].get<bool>()) {
-      std::fprintf(stderr, "%s: left out the first frame, a rest pose without motion\n",
-                   clip["file"].get<std::string>().c_str());
+// A row for each clip, and what was learnt from them.
+void add_summary(const style::Findings& learnt, Findings& findings) {
+  const auto stem = [](const std::string& file) {
+    return std::filesystem::path(file).stem().string();
+  };
+  findings.say(fmt::format("{:<12} {:<10} {:<28} {:>8} {:>8}", "group", "motion", "clip", "period",
+                           "theta0"));
+  for (const style::AlignedClip& clip : learnt.dataset.clips) {
+    if (clip.dropped_first) {
+      findings.note(clip.file + ": left out the first frame, a rest pose without motion");
     }
-    const auto stem = std::filesystem::path(clip["file"].get<std::string>()).stem().string();
-    std::printf("%-12s %-10s %-28s %8.2f %8.3f\n", clip["group"].get<std::string>().c_str(),
-                clip["motion"].get<std::string>().c_str(), stem.c_str(),
-                clip["period_frames"].get<double>(), clip["theta0"].get<double>());
+    findings.say(fmt::format("{:<12} {:<10} {:<28} {:8.2f} {:8.3f}", clip.group, clip.motion,
+                             stem(clip.file), 2.0 * std::numbers::pi / clip.dtheta, clip.theta0));
   }
-  std::printf("%d dimensions, %d training poses, kernel length %.1f degrees, noise %.3g\n",
-              report["dims"].get<int>(), report["training_points"].get<int>(),
-              report["kernel"]["length_deg"].get<double>(), report["noise"].get<double>());
-  if (!report["written"].get<bool>()) return;
-  std::printf("%s written after %.2f s; try: posed apply --model %s IN.bvh --out OUT.bvh\n",
-              out.c_str(), report["seconds"].get<double>(), out.c_str());
+  const gp::Trained& process = learnt.learnt.front().process;
+  findings.say(
+      fmt::format("{} dimensions, {} training poses, kernel length {:.1f} degrees, noise {:.3g}",
+                  learnt.dataset.dims(), process.inputs.rows(), kDegrees / std::sqrt(process.mu),
+                  process.noise));
 }
 
 // Maps the progress of one training step to that of the whole training, for a single bar.
@@ -165,7 +162,7 @@ double overall(std::string_view step, double fraction) {
   return 0.3 + 0.7 * fraction;
 }
 
-Result<json> train_style(const TrainStyleOptions& options, Ranks& ranks) {
+Result<StyleTraining> train_style(const TrainStyleOptions& options, Ranks& ranks) {
   auto experiment = experiment_of(options);
   if (!experiment) return std::unexpected(experiment.error());
   const auto inputs = inputs_of(options, *experiment);
@@ -183,38 +180,19 @@ Result<json> train_style(const TrainStyleOptions& options, Ranks& ranks) {
                         ranks);
 }
 
-// Prints warnings and, last, the verdict on stderr.
-int finish(const json& report, const TrainStyleOptions& options) {
-  if (options.json) {
-    std::printf("%s\n", json_text(report, 2).c_str());
-  } else {
-    print_style_summary(report, options.out);
-  }
-  std::fflush(stdout);
-  for (const json& warning : report["warnings"]) {
-    std::fprintf(stderr, "posed: warning: %s\n", warning.get<std::string>().c_str());
-  }
-  for (std::size_t i = 1; i < report["problems"].size(); ++i) {
-    std::fprintf(stderr, "posed: %s\n", report["problems"][i].get<std::string>().c_str());
-  }
-  const bool usable = report["usable"].get<bool>();
-  const bool written = report["written"].get<bool>();
-  std::fprintf(stderr, "posed: %s%s\n", report["verdict"].get<std::string>().c_str(),
-               usable    ? ""
-               : written ? "; written, because of --force"
-                         : "; no model was written (--force writes it all the same)");
-  return static_cast<int>(written ? ExitCode::kDone : ExitCode::kFailed);
-}
-
 }  // namespace
 
-Result<json> train_and_save(const Experiment& experiment, std::uint64_t seed,
-                            const StyleFiles& files, Ranks& ranks) {
+Result<StyleTraining> train_and_save(const Experiment& experiment, std::uint64_t seed,
+                                     const StyleFiles& files, Ranks& ranks) {
   const FixedProducts fixed;
   ProgressBar bar;
   if (!bar.show("reading clips", 0.0)) return fail("stopped");
   auto clips = load_clips(experiment);
   if (!clips) return std::unexpected(clips.error());
+  StyleReport page(*clips);
+  const bool reports = !files.report.empty() && ranks.leads();
+  StyleTraining training;
+  Findings summary;
   style::TrainOptions options;
   options.target = experiment.targets.front();
   options.more_targets.assign(experiment.targets.begin() + 1, experiment.targets.end());
@@ -226,28 +204,56 @@ Result<json> train_and_save(const Experiment& experiment, std::uint64_t seed,
   options.dataset.progress = [&bar](std::string_view step, double fraction) {
     return bar.show(step, overall(step, fraction));
   };
-  StyleReport page(*clips);
-  const bool reports = !files.report.empty() && ranks.leads();
-  if (reports) options.look = [&page](const style::Findings& findings) { page.look(findings); };
+  options.look = [&](const style::Findings& learnt) {
+    if (reports) page.look(learnt);
+    training.verdict = learnt.verdict;
+    add_summary(learnt, summary);
+  };
   auto model = style::train_style(*clips, options);
   if (!model) return std::unexpected(model.error());
-  json report = json::parse(model->report_json);
-  const bool written = report["usable"].get<bool>() || files.force;
-  const auto saved = written
-                         ? ranks.write_model([&] { return style::save_model(*model, files.model); })
-                         : Result<>{};
-  if (!saved) return std::unexpected(saved.error());
-  report["mode"] = experiment.mode == style::TrainMode::kPaper ? "paper" : "default";
-  report["written"] = written;
-  report["seconds"] = bar.elapsed_s();
-  report["out"] = files.model.string();
-  if (reports) {
-    if (auto drawn = page.write(report, files.report); !drawn) {
-      return std::unexpected(drawn.error());
-    }
+  training.written = training.verdict.usable || files.force;
+  if (training.written) {
+    auto saved = ranks.write_model([&] { return style::save_model(*model, files.model); });
+    if (!saved) return std::unexpected(saved.error());
   }
-  return report;
+  training.seconds = bar.elapsed_s();
+  const std::string mode = experiment.mode == style::TrainMode::kPaper ? "paper" : "default";
+  training.findings.add_json(model->report_json)
+      .add("mode", mode)
+      .add("written", training.written)
+      .add("seconds", training.seconds)
+      .add("out", files.model.string())
+      .add_all(summary);
+  if (reports) {
+    auto drawn = page.write(training.verdict, mode, training.findings, files.report);
+    if (!drawn) return std::unexpected(drawn.error());
+  }
+  return training;
 }
+
+namespace {
+
+// What is said of a training: at last the verdict.
+Findings findings_of(const StyleTraining& training, const std::string& out) {
+  const style::TrainingVerdict& verdict = training.verdict;
+  Findings findings = training.findings;
+  if (training.written) {
+    findings.say(
+        fmt::format("{0} written after {1:.2f} s; try: posed apply --model {0} IN.bvh --out "
+                    "OUT.bvh",
+                    out, training.seconds));
+  }
+  findings.warn(verdict.warnings);
+  for (std::size_t i = 1; i < verdict.problems.size(); ++i) findings.remark(verdict.problems[i]);
+  return findings.verdict(
+      verdict.sentence + (verdict.usable     ? ""
+                          : training.written ? "; written, because of --force"
+                                             : "; no model was written (--force writes it all the "
+                                               "same)"),
+      training.written);
+}
+
+}  // namespace
 
 void add_train_style(CLI::App& train_command, int& exit_code, const std::shared_ptr<Ranks>& ranks) {
   CLI::App* style = train_command.add_subcommand("style", "Learn what makes one style another");
@@ -281,7 +287,8 @@ void add_train_style(CLI::App& train_command, int& exit_code, const std::shared_
   style->add_flag("--json", options->json, "One JSON object on stdout");
   style->callback([options, ranks, &exit_code] {
     const auto trained = train_style(*options, *ranks);
-    exit_code = trained ? finish(*trained, *options) : report(trained.error());
+    exit_code =
+        trained ? findings_of(*trained, options->out).show(options->json) : report(trained.error());
   });
 }
 

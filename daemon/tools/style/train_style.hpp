@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <filesystem>
 
-#include <nlohmann/json_fwd.hpp>
-
+#include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/command/ranks.hpp"
 #include "daemon/tools/style/experiment.hpp"
+#include "models/style/train/train_report.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::tools {
@@ -18,11 +18,16 @@ struct StyleFiles {
   std::filesystem::path report{};  // an HTML page, of an unusable model, too; empty: none
 };
 
-// Reads the experiment's clips, trains, writes the model and returns the report that `train --json`
-// prints; see `written` and `verdict` in it. Draws progress on stderr; Ctrl-C ends it with an error
-// and without a file. `ranks` share the work; one of them writes.
-[[nodiscard]] Result<nlohmann::json> train_and_save(const Experiment& experiment,
-                                                    std::uint64_t seed, const StyleFiles& files,
-                                                    Ranks& ranks);
+struct StyleTraining {
+  style::TrainingVerdict verdict;
+  bool written = false;  // the model
+  double seconds = 0.0;  // of the training
+  Findings findings;     // without the verdict
+};
+
+// Reads the experiment's clips, trains and writes the model. Draws progress on stderr; Ctrl-C ends
+// it with an error and without a file. `ranks` share the work; one of them writes.
+[[nodiscard]] Result<StyleTraining> train_and_save(const Experiment& experiment, std::uint64_t seed,
+                                                   const StyleFiles& files, Ranks& ranks);
 
 }  // namespace posed::tools

@@ -5,7 +5,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -15,20 +14,16 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
 
-#include "daemon/net/security.hpp"
+#include "daemon/tools/link/daemon_socket.hpp"
 #include "daemon/tools/view/hub.hpp"
 #include "proto/frame/result.hpp"
-#include "proto/zmq/link_monitor.hpp"
-#include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::view {
 
 struct LinkOptions {
-  std::string connect{};               // the daemon's publish endpoint
-  std::string control{};               // its control endpoint; empty: nothing is changed
-  std::filesystem::path key{};         // the bridge's own NAME.key; empty: no CURVE
-  std::filesystem::path server_key{};  // the daemon's NAME.pub
-  std::string read_only_reason{};      // why nothing may be changed; empty: it may
+  link::Peer publish{};            // the daemon's publish endpoint
+  std::string control{};           // its control endpoint, with the same keys; empty: none is used
+  std::string read_only_reason{};  // why nothing may be changed; empty: it may
 };
 
 // One connected socket and its news.
@@ -37,27 +32,25 @@ class WatchedSocket {
   // `drain` reads what waits and returns false if more may wait.
   [[nodiscard]] static Result<std::unique_ptr<WatchedSocket>> open(boost::asio::io_context& io,
                                                                    void* context, int type,
-                                                                   const LinkOptions& options,
+                                                                   const link::Peer& peer,
                                                                    std::function<bool()> drain);
   ~WatchedSocket();
   WatchedSocket(const WatchedSocket&) = delete;
   WatchedSocket& operator=(const WatchedSocket&) = delete;
 
-  [[nodiscard]] void* get() const noexcept { return socket_.get(); }
-  [[nodiscard]] net::LinkMonitor& monitor() noexcept { return monitor_; }
+  [[nodiscard]] link::DaemonSocket& socket() noexcept { return socket_; }
   // Reads what waits, and goes on when more comes. Call once at the start and from time to time.
   void turn();
-  // The same as soon as the caller is done. Call after every send, because libzmq may have taken
-  // the signal that something waits.
+  // Does what turn() does as soon as the caller is done. Call after every send, because libzmq may
+  // have taken the signal that something waits.
   void turn_soon();
 
  private:
-  WatchedSocket(net::Socket socket, net::LinkMonitor monitor, boost::asio::io_context& io, int fd,
+  WatchedSocket(link::DaemonSocket socket, boost::asio::io_context& io, int fd,
                 std::function<bool()> drain);
   void wait();
 
-  net::Socket socket_;
-  net::LinkMonitor monitor_;
+  link::DaemonSocket socket_;
   std::function<bool()> drain_;
   boost::asio::posix::stream_descriptor descriptor_;  // libzmq's own, not to be closed here
   bool waiting_ = false;
@@ -85,13 +78,13 @@ class DaemonLink {
   [[nodiscard]] Result<> open_publish();
   [[nodiscard]] Result<> open_control();
   [[nodiscard]] Result<> subscribe(const char* prefix, bool on);
-  [[nodiscard]] bool hear();
-  [[nodiscard]] bool hear_replies();
-  void take_news(std::int64_t now_ns);
+  [[nodiscard]] bool receive_messages();
+  [[nodiscard]] bool receive_replies();
+  void handle_news(std::int64_t now_ns);
   void check_control(std::int64_t now_ns);
   void connect_anew(std::int64_t now_ns);
   void ask_for_status(std::int64_t now_ns);
-  void take_status(std::string_view reply);
+  void handle_status(std::string_view reply);
 
   boost::asio::io_context& io_;
   void* context_;
@@ -101,7 +94,7 @@ class DaemonLink {
   bool wants_streams_ = false;
   bool control_stood_ = false;                         // as of the last turn
   std::uint64_t publish_ends_ = 0, control_ends_ = 0;  // of connections, that are known
-  std::int64_t heard_ns_ = 0;                          // the last message
+  std::int64_t received_ns_ = 0;                       // the last message
   std::optional<std::int64_t> asked_ns_{};             // the status request without a reply
   // When to connect anew after a refusal, for libzmq then tries no more; empty: nothing was
   // refused.

@@ -1,16 +1,48 @@
-// What the bridge answers to an HTTP request: who gets the page, who may open the WebSocket, and
-// what is refused. No socket; pure functions, so that tests and a fuzz target can try every
-// request. Cold.
+// What the bridge answers to an HTTP request: which files there are, who gets the page, who may
+// open the WebSocket, and what is refused. No socket; pure functions, so that tests and a fuzz
+// target can try every request. Cold.
 #pragma once
 
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "daemon/http/exchange.hpp"
-#include "daemon/tools/view/page_files.hpp"
+#include "proto/frame/result.hpp"
 
 namespace posed::view {
+
+// PageFiles: the files of the page, read into memory at the start. What the network names is only
+// looked up in this list and never becomes a path. Does not change afterwards.
+inline constexpr std::size_t kMaxPageFiles = 256;
+inline constexpr std::size_t kMaxPageBytes = 64 * 1024 * 1024;  // of all files together
+
+struct PageFile {
+  std::string bytes;
+  std::string_view type;  // MIME type, by the extension
+  std::string etag;       // with its quotes; changes when the bytes do
+};
+
+class PageFiles {
+ public:
+  // Reads all regular files below `folder` whose names do not begin with a dot; links are not
+  // followed. An Error says whether index.html is missing or there is too much in the folder.
+  [[nodiscard]] static Result<PageFiles> load(const std::filesystem::path& folder);
+
+  // The file of a target without its query, such as "/page.js"; "/" is index.html. Null: there is
+  // none. Valid as long as this object.
+  [[nodiscard]] const PageFile* find(std::string_view path) const;
+
+ private:
+  std::map<std::string, PageFile, std::less<>> files_;  // by "/name"
+};
+
+// The MIME type that browsers expect of a file of this name.
+[[nodiscard]] std::string_view type_of_name(std::string_view name);
 
 // What is served, and to whom.
 struct Site {

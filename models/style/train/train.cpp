@@ -158,8 +158,11 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
                     : learn_default(*dataset, lessons, tasks, progress);
   if (!learnt) return std::unexpected(learnt.error());
 
-  if (options.look) options.look({*dataset, lessons, *learnt});
-  const std::string report = json_text(whole_report(*dataset, lessons, *learnt));
+  const std::vector<TrainingCheck> checks = checks_of(lessons, *learnt);
+  const TrainingVerdict verdict = verdict_of(lessons, checks);
+  const Findings findings{*dataset, lessons, *learnt, checks, verdict};
+  if (options.look) options.look(findings);
+  const std::string report = json_text(whole_report(findings));
   GateData gate = gate_data_of(*dataset, targets);
   StyleAxis axis;  // of a mixture there is none
   if (targets.size() == 1) axis = style_axis_of(*dataset, options.target);

@@ -9,6 +9,7 @@
 #include "models/style/model/style_model.hpp"
 #include "models/style/train/dataset.hpp"
 #include "models/style/train/target_training.hpp"
+#include "models/style/train/training_check.hpp"
 
 namespace posed::style {
 
@@ -19,11 +20,15 @@ enum class TrainMode : std::uint8_t {
 
 [[nodiscard]] Result<TrainMode> mode_from_name(std::string_view name);
 
+struct TrainingVerdict;  // train_report.hpp
+
 // What training found out on its way; valid during the call that gets it.
 struct Findings {
   const Dataset& dataset;
-  const std::vector<Lesson>& lessons;  // one a target
-  const std::vector<Learnt>& learnt;   // [lesson]
+  const std::vector<Lesson>& lessons;        // one a target
+  const std::vector<Learnt>& learnt;         // [lesson]
+  const std::vector<TrainingCheck>& checks;  // [lesson]
+  const TrainingVerdict& verdict;
 };
 
 struct TrainOptions {

@@ -65,31 +65,12 @@ json style_json(const TrainingCheck& check, const Learnt& learnt, const std::str
   return report;
 }
 
-// The same for all of them: usable where each is, with the problems and warnings of each.
-json styles_json(const std::vector<json>& styles) {
-  json report{{"targets", styles},
-              {"usable", true},
-              {"problems", json::array()},
-              {"warnings", json::array()}};
-  std::string verdict;
-  std::string unusable;
-  for (const json& style : styles) {
-    const auto name = style["name"].get<std::string>();
-    const std::string said = name + ": " + style["verdict"].get<std::string>();
-    verdict += (verdict.empty() ? "" : "\n  ") + said;
-    if (unusable.empty() && !style["usable"].get<bool>()) unusable = said;
-    for (const auto* list : {"problems", "warnings"}) {
-      for (const json& sentence : style[list]) {
-        const std::string text = name + ": " + sentence.get<std::string>();
-        if (std::ranges::find(report[list], json(text)) == report[list].end()) {
-          report[list].push_back(text);
-        }
-      }
-    }
+void add_sentences(const std::string& name, const std::vector<std::string>& sentences,
+                   std::vector<std::string>& all) {
+  for (const std::string& sentence : sentences) {
+    std::string text = name + ": " + sentence;
+    if (std::ranges::find(all, text) == all.end()) all.push_back(std::move(text));
   }
-  report["usable"] = unusable.empty();
-  report["verdict"] = unusable.empty() ? verdict : unusable;
-  return report;
 }
 
 // `alone`: the process is that of the only style.
@@ -149,20 +130,53 @@ json report_of(const Dataset& dataset, const Learnt& learnt, bool alone) {
 
 }  // namespace
 
-json whole_report(const Dataset& dataset, const std::vector<Lesson>& lessons,
-                  const std::vector<Learnt>& learnt) {
-  json report = report_of(dataset, learnt.front(), lessons.size() == 1);
-  std::vector<json> styles;
+std::vector<TrainingCheck> checks_of(const std::vector<Lesson>& lessons,
+                                     const std::vector<Learnt>& learnt) {
+  std::vector<TrainingCheck> checks;
   for (std::size_t i = 0; i < lessons.size(); ++i) {
-    const TrainingCheck check = check_learnt(*lessons[i].data, learnt[i], lessons[i].target);
-    if (lessons.size() == 1) {
-      report.update(check_json(check, lessons[i].target));
-      return report;
-    }
-    styles.push_back(style_json(check, learnt[i], lessons[i].target));
+    checks.push_back(check_learnt(*lessons[i].data, learnt[i], lessons[i].target));
+  }
+  return checks;
+}
+
+TrainingVerdict verdict_of(const std::vector<Lesson>& lessons,
+                           const std::vector<TrainingCheck>& checks) {
+  if (checks.size() == 1) {
+    const TrainingCheck& check = checks.front();
+    return {check.usable(), check.problems, check.warnings, check.verdict(lessons.front().target)};
+  }
+  TrainingVerdict verdict;
+  std::string unusable;
+  for (std::size_t i = 0; i < checks.size(); ++i) {
+    const std::string& name = lessons[i].target;
+    const std::string line = name + ": " + checks[i].verdict(name);
+    verdict.sentence += (verdict.sentence.empty() ? "" : "\n  ") + line;
+    if (unusable.empty() && !checks[i].usable()) unusable = line;
+    add_sentences(name, checks[i].problems, verdict.problems);
+    add_sentences(name, checks[i].warnings, verdict.warnings);
+  }
+  verdict.usable = unusable.empty();
+  if (!verdict.usable) verdict.sentence = unusable;
+  return verdict;
+}
+
+json whole_report(const Findings& findings) {
+  const auto& [dataset, lessons, learnt, checks, verdict] = findings;
+  json report = report_of(dataset, learnt.front(), lessons.size() == 1);
+  if (lessons.size() == 1) {
+    report.update(check_json(checks.front(), lessons.front().target));
+    return report;
+  }
+  json styles = json::array();
+  for (std::size_t i = 0; i < lessons.size(); ++i) {
+    styles.push_back(style_json(checks[i], learnt[i], lessons[i].target));
   }
   report.erase("follows_days");
-  report.update(styles_json(styles));
+  report.update({{"targets", styles},
+                 {"usable", verdict.usable},
+                 {"problems", verdict.problems},
+                 {"warnings", verdict.warnings},
+                 {"verdict", verdict.sentence}});
   return report;
 }
 

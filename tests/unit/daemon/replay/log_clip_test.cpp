@@ -88,7 +88,7 @@ TEST_CASE("a log's stream becomes a clip of its published frames") {
   const auto log = folder.path() / "take.plog";
   write_staged_log(log, kFrames);
   for (const std::uint32_t id : {0U, 1U}) {
-    const auto clip = replay::clip_of_log(log, id == 0 ? "a" : "b");
+    const auto clip = tools::clip_of_log(log, id == 0 ? "a" : "b");
     if (!clip) FAIL(clip.error().text());
     const auto frames = published(log, id);
     check_same(*clip, frames);
@@ -119,16 +119,16 @@ TEST_CASE("takes are cut out of a log's stream by number or name, each frame onc
   REQUIRE(writer->close());
   std::vector<Frame> cut;
   for (const char* take : {"1", "2", "late"}) {
-    const auto clip = replay::clip_of_log(path, "b", take);
+    const auto clip = tools::clip_of_log(path, "b", take);
     if (!clip) FAIL(clip.error().text());
     CHECK(clip->frames() > 10);
     for (int i = 0; i < clip->frames(); ++i) cut.push_back(clip->frame(i));
   }
-  const auto whole = replay::clip_of_log(path, "b");
+  const auto whole = tools::clip_of_log(path, "b");
   REQUIRE(whole);
   check_same(*whole, cut);
   const auto refusal = [&](const std::string& take) {
-    const auto clip = replay::clip_of_log(path, "b", take);
+    const auto clip = tools::clip_of_log(path, "b", take);
     return clip ? "" : clip.error().message;
   };
   CHECK(refusal("walk") ==
@@ -142,15 +142,15 @@ TEST_CASE("the stream of a log must be named if there are several, and must exis
   const TempFolder folder;
   const auto log = folder.path() / "take.plog";
   write_staged_log(log, 30);
-  const auto unclear = replay::clip_of_log(log, "");
+  const auto unclear = tools::clip_of_log(log, "");
   REQUIRE_FALSE(unclear);
   CHECK(unclear.error().message.find("a, b") != std::string::npos);
   CHECK(unclear.error().message.find("--stream") != std::string::npos);
-  const auto missing = replay::clip_of_log(log, "c");
+  const auto missing = tools::clip_of_log(log, "c");
   REQUIRE_FALSE(missing);
   CHECK(missing.error().message.find("'c'") != std::string::npos);
-  CHECK_FALSE(replay::clip_of_log(folder.write("no.plog", "no log"), ""));
-  CHECK_FALSE(replay::clip_of_log(folder.path() / "none.plog", ""));
+  CHECK_FALSE(tools::clip_of_log(folder.write("no.plog", "no log"), ""));
+  CHECK_FALSE(tools::clip_of_log(folder.path() / "none.plog", ""));
 }
 
 TEST_CASE("the position goes to the channels that move the figure, wherever they are") {

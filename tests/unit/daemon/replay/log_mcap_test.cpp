@@ -9,7 +9,6 @@
 #include <google/protobuf/dynamic_message.h>
 
 #include "daemon/tools/export/log_mcap.hpp"
-#include "daemon/tools/export/mcap_writer.hpp"
 #include "proto/log/reader.hpp"
 #include "tests/support/file_text.hpp"
 #include "tests/support/has.hpp"
@@ -55,7 +54,7 @@ TEST_CASE("an MCAP holds every published frame of a log, byte for byte") {
   const auto log = folder.path() / "take.plog";
   write_staged_log(log, kLogFrames);
   const auto out = folder.path() / "take.mcap";
-  const auto summary = replay::write_mcap(log, out, go_on);
+  const auto summary = tools::write_mcap(log, out, go_on);
   if (!summary) FAIL(summary.error().text());
   CHECK(summary->warnings.empty());
   const McapReader mcap(file_text(out));
@@ -96,7 +95,7 @@ TEST_CASE("an MCAP holds every published frame of a log, byte for byte") {
 TEST_CASE("an MCAP holds the events that a replay computes") {
   const TempFolder folder;
   write_staged_log(folder.path() / "take.plog", kLogFrames);
-  REQUIRE(replay::write_mcap(folder.path() / "take.plog", folder.path() / "take.mcap", go_on));
+  REQUIRE(tools::write_mcap(folder.path() / "take.plog", folder.path() / "take.mcap", go_on));
   const McapReader mcap(file_text(folder.path() / "take.mcap"));
   const auto reader = log::Reader::open(folder.path() / "take.plog");
   REQUIRE(reader);
@@ -118,7 +117,7 @@ TEST_CASE("an MCAP holds the events that a replay computes") {
 TEST_CASE("the schema in an MCAP is enough to decode its messages") {
   const TempFolder folder;
   write_staged_log(folder.path() / "take.plog", 30);
-  REQUIRE(replay::write_mcap(folder.path() / "take.plog", folder.path() / "take.mcap", go_on));
+  REQUIRE(tools::write_mcap(folder.path() / "take.plog", folder.path() / "take.mcap", go_on));
   const McapReader mcap(file_text(folder.path() / "take.mcap"));
   google::protobuf::FileDescriptorSet set;
   REQUIRE(set.ParseFromString(mcap.schemas.at("posed.v1.Frame")));
@@ -138,23 +137,23 @@ TEST_CASE("the schema in an MCAP is enough to decode its messages") {
 TEST_CASE("a log that cannot be replayed, and a stop, leave no MCAP") {
   const TempFolder folder;
   const auto out = folder.path() / "take.mcap";
-  CHECK_FALSE(replay::write_mcap(folder.write("no.plog", "no log"), out, go_on));
+  CHECK_FALSE(tools::write_mcap(folder.write("no.plog", "no log"), out, go_on));
   const auto log = folder.path() / "take.plog";
   write_staged_log(log, 30);
-  const auto stopped = replay::write_mcap(log, out, [] { return true; });
+  const auto stopped = tools::write_mcap(log, out, [] { return true; });
   REQUIRE_FALSE(stopped);
   CHECK(has(stopped.error().message, "interrupted"));
   CHECK_FALSE(std::filesystem::exists(out));
-  CHECK_FALSE(replay::write_mcap(log, folder.path() / "nowhere/take.mcap", go_on));
+  CHECK_FALSE(tools::write_mcap(log, folder.path() / "nowhere/take.mcap", go_on));
 }
 
 TEST_CASE("an MCAP of many messages has many chunks, of none it is complete, too") {
   std::ostringstream none;
-  replay::McapWriter empty(none, "test");
+  tools::McapWriter empty(none, "test");
   empty.finish();
   CHECK(McapReader(none.str()).messages.empty());
   std::ostringstream many;
-  replay::McapWriter writer(many, "test");
+  tools::McapWriter writer(many, "test");
   const auto schema = writer.add_schema("a.B", "descriptors");
   const auto one = writer.add_channel(schema, "one");
   const auto two = writer.add_channel(schema, "two");

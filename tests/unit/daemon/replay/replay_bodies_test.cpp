@@ -193,7 +193,7 @@ TEST_CASE("the parts of a body that came several times are one clip, if its skel
   const auto path = folder.path() / "bodies.plog";
   write_body_log(path);
   const Seen seen = seen_of(path);
-  const auto waver = replay::clip_of_log(path, "Waver");
+  const auto waver = tools::clip_of_log(path, "Waver");
   if (!waver) FAIL(waver.error().text());
   CHECK(static_cast<std::uint64_t>(waver->frames()) == seen.last.at(3));
   REQUIRE(waver->warnings.size() == 1);
@@ -201,14 +201,14 @@ TEST_CASE("the parts of a body that came several times are one clip, if its skel
   CHECK(waver->channels.leftCols(3).row(0).isApprox(Eigen::RowVector3d(0.0, 0.95, 2.5), 1e-6));
   CHECK_FALSE(waver->channels.row(0).isApprox(waver->channels.row(30), 1e-3));
 
-  const auto walker = replay::clip_of_log(path, "Walker");
+  const auto walker = tools::clip_of_log(path, "Walker");
   REQUIRE_FALSE(walker);
   CHECK(names(walker.error().message, "--stream: Walker#1 (11 joints), Walker#2 (5 joints)"));
-  const auto second = replay::clip_of_log(path, "Walker#2");
+  const auto second = tools::clip_of_log(path, "Walker#2");
   REQUIRE(second);
   CHECK(second->frames() == 100);
   CHECK(second->skeleton->joints.size() == 5);
-  const auto missing = replay::clip_of_log(path, "Walker#3");
+  const auto missing = tools::clip_of_log(path, "Walker#3");
   REQUIRE_FALSE(missing);
   CHECK(names(missing.error().message, "Waver"));
 }

@@ -7,7 +7,7 @@
 
 #include "daemon/replay/replay.hpp"
 #include "daemon/tools/export/frame_file.hpp"
-#include "daemon/tools/export/log_takes.hpp"
+#include "daemon/tools/export/log_clip.hpp"
 #include "posed/v1/log.pb.h"
 #include "tests/support/has.hpp"
 #include "tests/support/log_surgery.hpp"
@@ -163,7 +163,7 @@ TEST_CASE("a take during which the log lacks chunks is said to have gaps", "[rep
                   " IN (x'15', x'16', x'17');");
   auto reader = log::Reader::open(path);
   REQUIRE(reader);
-  const auto takes = replay::logged_takes(*reader);
+  const auto takes = tools::logged_takes(*reader);
   REQUIRE(takes);
   REQUIRE(takes->size() == 3);
   CHECK(!(*takes)[0].has_gaps);

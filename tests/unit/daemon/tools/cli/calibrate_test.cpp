@@ -6,7 +6,6 @@
 #include <deque>
 
 #include "daemon/tools/devices/calibrate_poses.hpp"
-#include "daemon/tools/devices/calibrated_hand.hpp"
 #include "drivers/cyberglove/angles.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/glove/angle_map.hpp"

@@ -1,5 +1,5 @@
 // The screen of `posed calibrate`, tested as text.
-#include "daemon/tools/devices/calibrate_view.hpp"
+#include "daemon/tools/devices/calibrate_poses.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,4 +1,4 @@
-#include "daemon/tools/live/live_table.hpp"
+#include "daemon/tools/live/live_view.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -96,11 +96,14 @@ TEST_CASE("streams that do not fit are counted, the chosen one is visible", "[li
 }
 
 TEST_CASE("durations are in milliseconds with one decimal", "[live_table]") {
-  CHECK(people_duration(0.0) == "0.0 ms");
-  CHECK(people_duration(231.4) == "0.2 ms");
-  CHECK(people_duration(999'940.0) == "999.9 ms");
-  CHECK(people_duration(999'960.0) == "1.0 s");
-  CHECK(people_duration(1e18) == "9999.9 s");
+  CHECK(display_duration(0.0) == "0.0 ms");
+  CHECK(display_duration(231.4e-6) == "0.2 ms");
+  CHECK(display_duration(0.99994) == "999.9 ms");
+  CHECK(display_duration(0.99996) == "1.0 s");
+  CHECK(display_duration(12.4) == "12 s");
+  CHECK(display_duration(300.0) == "5 min");
+  CHECK(display_duration(9000.0) == "2.5 h");
+  CHECK(display_duration(1e18) == "9999.9 h");
 }
 
 }  // namespace

@@ -2,7 +2,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "daemon/tools/command/json.hpp"
+#include "daemon/tools/command/client.hpp"
 #include "daemon/tools/live/monitor_line.hpp"
 #include "posed/v1/posed.pb.h"
 

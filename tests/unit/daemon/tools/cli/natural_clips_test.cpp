@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "daemon/tools/command/thread_tasks.hpp"
+#include "daemon/tools/command/ranks.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "proto/clip/clip.hpp"
 #include "tests/support/has.hpp"

@@ -1,4 +1,4 @@
-#include "daemon/tools/command/number_range.hpp"
+#include "daemon/tools/command/options.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -1,4 +1,4 @@
-#include "daemon/tools/live/sparkline.hpp"
+#include "daemon/tools/live/chosen_stream.hpp"
 
 #include <limits>
 

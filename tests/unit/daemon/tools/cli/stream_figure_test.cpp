@@ -1,5 +1,5 @@
 // The figure of a stream, made of what a daemon sends: whole, of another stream, or damaged.
-#include "daemon/tools/live/stream_figure.hpp"
+#include "daemon/tools/live/chosen_stream.hpp"
 
 #include <cmath>
 #include <limits>
@@ -33,7 +33,7 @@ class FigureRig {
   template <typename Message>
   void send(const std::string& topic, const Message& message) {
     const std::string text = message.SerializeAsString();
-    figure.take(topic, std::as_bytes(std::span(text)));
+    figure.handle(topic, std::as_bytes(std::span(text)));
   }
   bool is_drawn() { return !figure.lines(20, 8).empty(); }
 
@@ -80,7 +80,7 @@ TEST_CASE("a stream's figure does not take damaged poses", "[stream_figure]") {
   CHECK(refuses([](v1::Frame& pose) {
     pose.set_root_position_m(0, std::numeric_limits<float>::quiet_NaN());
   }));
-  rig.figure.take("pose/walker", std::as_bytes(std::span("\xff\xff")));
+  rig.figure.handle("pose/walker", std::as_bytes(std::span("\xff\xff")));
   CHECK_FALSE(rig.is_drawn());
   // A joint that is no rotation counts as not measured; the rest of the pose is drawn.
   for (const float value : {1e30F, 0.0F, std::numeric_limits<float>::infinity()}) {

@@ -1,5 +1,5 @@
 // Tasks on threads: results in order, stops and exceptions.
-#include "daemon/tools/command/thread_tasks.hpp"
+#include "daemon/tools/command/ranks.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -5,7 +5,7 @@
 
 #include <fstream>
 
-#include "daemon/tools/doctor/wanted.hpp"
+#include "daemon/tools/doctor/doctor.hpp"
 #include "proto/log/database.hpp"
 #include "proto/model/model_file.hpp"
 #include "tests/support/has.hpp"

@@ -9,7 +9,7 @@
 
 #include <catch2/catch.hpp>
 
-#include "daemon/tools/emulate/clip_motion.hpp"
+#include "daemon/tools/emulate/motions.hpp"
 #include "drivers/driver.hpp"
 #include "models/motion/interpolate.hpp"
 #include "proto/clip/clip.hpp"

@@ -6,10 +6,8 @@
 #include <fstream>
 #include <string>
 
-#include "daemon/tools/picture/camera.hpp"
 #include "daemon/tools/picture/figure.hpp"
 #include "daemon/tools/picture/picture_file.hpp"
-#include "daemon/tools/picture/program.hpp"
 #include "daemon/tools/picture/strip.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "proto/frame/hand_skeleton.hpp"

@@ -4,8 +4,7 @@
 #include <vector>
 
 #include "daemon/system/event_fd.hpp"
-#include "daemon/tools/relay/merged_stats.hpp"
-#include "daemon/tools/relay/relayed_streams.hpp"
+#include "daemon/tools/relay/relay.hpp"
 #include "proto/frame/time.hpp"
 
 namespace posed::relay {
@@ -94,16 +93,16 @@ std::string toy_stats(const std::string& stream, std::int64_t time_ns) {
 }
 
 TEST_CASE("stats of one upstream pass as they are, those of several as one") {
-  bool sound = false;
+  bool valid = false;
   MergedStats one(1);
-  CHECK(one.take(0, toy_stats("ann", 5), kNow_ns, sound) == toy_stats("ann", 5));
-  CHECK_FALSE(one.take(0, "\xFF\xFF", kNow_ns, sound));
-  CHECK_FALSE(sound);
+  CHECK(one.accept(0, toy_stats("ann", 5), kNow_ns, valid) == toy_stats("ann", 5));
+  CHECK_FALSE(one.accept(0, "\xFF\xFF", kNow_ns, valid));
+  CHECK_FALSE(valid);
 
   MergedStats two(2);
-  CHECK(two.take(1, toy_stats("bob", 7), kNow_ns, sound));  // the other has not answered yet
+  CHECK(two.accept(1, toy_stats("bob", 7), kNow_ns, valid));  // the other has not answered yet
   v1::Stats merged;
-  REQUIRE(merged.ParseFromString(*two.take(0, toy_stats("ann", 5), kNow_ns + 1, sound)));
+  REQUIRE(merged.ParseFromString(*two.accept(0, toy_stats("ann", 5), kNow_ns + 1, valid)));
   CHECK(merged.time_ns() == 5);
   REQUIRE(merged.stream().size() == 2);
   CHECK(merged.stream(0).stream() == "ann");
@@ -111,8 +110,8 @@ TEST_CASE("stats of one upstream pass as they are, those of several as one") {
   CHECK(merged.stream(0).monotonic_to_utc_ns() == 1005);  // each on its own machine's clock
   CHECK(merged.stream(1).monotonic_to_utc_ns() == 1007);
   CHECK(merged.source().size() == 2);
-  CHECK_FALSE(two.take(1, toy_stats("bob", 8), kNow_ns + 2, sound));  // the first gives the beat
-  const auto alone = two.take(1, toy_stats("bob", 9), kNow_ns + 4 * kNanosPerSecond, sound);
+  CHECK_FALSE(two.accept(1, toy_stats("bob", 8), kNow_ns + 2, valid));  // the first gives the beat
+  const auto alone = two.accept(1, toy_stats("bob", 9), kNow_ns + 4 * kNanosPerSecond, valid);
   REQUIRE(alone);
   REQUIRE(merged.ParseFromString(*alone));
   CHECK(merged.stream().size() == 1);

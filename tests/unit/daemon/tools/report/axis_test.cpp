@@ -1,5 +1,5 @@
 // Axes: round ticks, and values that have no place.
-#include "daemon/tools/report/axis.hpp"
+#include "daemon/tools/report/plot.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -9,10 +9,7 @@
 
 #include <pugixml.hpp>
 
-#include "daemon/tools/report/bars.hpp"
-#include "daemon/tools/report/bench_sections.hpp"
 #include "daemon/tools/report/gesture_sections.hpp"
-#include "daemon/tools/report/look.hpp"
 #include "daemon/tools/report/plot.hpp"
 #include "daemon/tools/report/style_sections.hpp"
 #include "tests/support/file_text.hpp"
@@ -89,7 +86,11 @@ std::vector<Figure> other_figures(double value, const std::string& words, std::s
   std::vector<LagError> lags;
   Confusion confusion{.labels = {}, .given = {}, .share = {}, .frames = {}, .measured_on = words};
   std::vector<QuestionTree> trees;
-  PercentileBars bars{.title = words, .sentence = words, .quantity = words, .peers = {}};
+  Bars bars{.quantity = words,
+            .unit = words,
+            .series = {words, words},
+            .groups = {},
+            .logarithmic = true};
   for (std::size_t i = 0; i < count; ++i) {
     durations.push_back({words, false, {value, value}, {value, value}});
     angles.push_back({words, {{value, value}}, {{value, 1.0}}, {{1.0, value}}, {{1.0, value}}});
@@ -100,7 +101,7 @@ std::vector<Figure> other_figures(double value, const std::string& words, std::s
     confusion.share.emplace_back(count, std::isfinite(value) ? 0.5 : 0.0);
     confusion.frames.push_back(1);
     trees.push_back({words, {{words, words, 1, 2}, {words, words}, {words, words}}});
-    bars.peers.push_back({words, {value, value, value, value}});
+    bars.groups.push_back({words, {value, value}});
   }
   trees.push_back({words, {}});
   return {state_durations(durations),
@@ -108,8 +109,7 @@ std::vector<Figure> other_figures(double value, const std::string& words, std::s
           lag_error(lags, 30.0),
           label_confusion(confusion),
           decision_trees(words, trees, true),
-          percentile_bars(bars),
-          all_numbers(words, words, {{words, words}})};
+          bars_figure(words, words, bars)};
 }
 
 }  // namespace
@@ -203,6 +203,19 @@ TEST_CASE("a report is written whole", "[report]") {
   REQUIRE(write_page(Page("Test", "posed test"), folder.path() / "a.html"));
   CHECK(test::has(test::file_text(folder.path() / "a.html"), "</html>"));
   CHECK_FALSE(write_page(Page("Test", "posed test"), folder.path() / "no" / "a.html"));
+}
+
+TEST_CASE("a drawing is a file without its page, and foreign words stay words", "[report]") {
+  const Figure trees = decision_trees(
+      "", {{kEvil, {{kEvil, kEvil, 1, 2}, {kEvil, kEvil}, {kEvil, kEvil}}}, {"two", {}}}, false);
+  const std::string svg = svg_file(trees.drawings);
+  CHECK(svg.find("<svg") == 0);
+  CHECK(svg.find("<script") == std::string::npos);
+  pugi::xml_document document;
+  REQUIRE(document.load_string(svg.c_str()));
+  CHECK(document.child("svg").select_nodes(".//rect[@class='leaf']").size() == 2);
+  CHECK(document.child("svg").select_nodes(".//rect[@class='ask']").size() == 1);
+  CHECK(document.child("svg").select_nodes("g").size() == 2);  // one below the other
 }
 
 }  // namespace posed::report

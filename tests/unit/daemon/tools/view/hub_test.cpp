@@ -52,7 +52,7 @@ struct HubRig {
     joined.push_back(&tab);
   }
   void send(Tab& tab, std::uint32_t number, const v1::ControlRequest& request) {
-    hub.take(tab, numbered(number, request), false, now_ns);
+    hub.handle(tab, numbered(number, request), false, now_ns);
   }
 
   std::vector<std::pair<std::uint64_t, std::string>> asked;
@@ -92,10 +92,10 @@ v1::ControlReply reply_of(const Got& got) {
 
 TEST_CASE("a new tab is greeted and gets the skeletons and the last stats at once") {
   HubRig rig;
-  rig.hub.heard("skeleton/walker", "S", 0);
-  rig.hub.heard("pose/walker", "P", 0);
-  rig.hub.heard("stats", "old", 0);
-  rig.hub.heard("stats", "new", 0);
+  rig.hub.receive("skeleton/walker", "S", 0);
+  rig.hub.receive("pose/walker", "P", 0);
+  rig.hub.receive("stats", "old", 0);
+  rig.hub.receive("stats", "new", 0);
   Tab tab;
   rig.join(tab);
   const auto first = all_of(tab);
@@ -115,21 +115,21 @@ TEST_CASE("a skeleton is passed on when it changes, a pose with each credit, an 
   Tab tab;
   rig.join(tab);
   static_cast<void>(all_of(tab));
-  for (int i = 0; i < 3; ++i) rig.hub.heard("skeleton/a", "S", 0);
-  rig.hub.heard("skeleton/a", "T", 0);
-  rig.hub.heard("pose/a", "P", 0);
-  rig.hub.heard("event/a", "E", 0);
-  rig.hub.heard("nonsense", "N", 0);
-  rig.hub.heard("pose", "N", 0);
-  rig.hub.heard("pose/" + std::string(200, 'x'), "N", 0);
+  for (int i = 0; i < 3; ++i) rig.hub.receive("skeleton/a", "S", 0);
+  rig.hub.receive("skeleton/a", "T", 0);
+  rig.hub.receive("pose/a", "P", 0);
+  rig.hub.receive("event/a", "E", 0);
+  rig.hub.receive("nonsense", "N", 0);
+  rig.hub.receive("pose", "N", 0);
+  rig.hub.receive("pose/" + std::string(200, 'x'), "N", 0);
   rig.hub.flush();
   CHECK(rig.hub.counts().foreign == 3);
   auto got = all_of(tab);
   REQUIRE(got.size() == 2);
   CHECK(got[0].topic == "event/a");
   CHECK(got[1].body == "T");
-  rig.hub.heard("skeleton/a", "T", 0);  // the daemon repeats it every second
-  rig.hub.take(tab, R"({"type":"ready"})", true, 0);
+  rig.hub.receive("skeleton/a", "T", 0);  // the daemon repeats it every second
+  rig.hub.handle(tab, R"({"type":"ready"})", true, 0);
   got = all_of(tab);
   REQUIRE(got.size() == 1);
   CHECK(got[0].topic == "pose/a");
@@ -172,8 +172,8 @@ TEST_CASE("requests that a page may not make are refused in a reply") {
   rig.send(tab, 1, stop);
   rig.send(tab, 2, haptics);
   rig.send(tab, 3, {});
-  rig.hub.take(tab, std::string("\4\0\0\0\xff\xff", 6), false, 0);
-  rig.hub.take(tab, "123", false, 0);  // has no number to answer to
+  rig.hub.handle(tab, std::string("\4\0\0\0\xff\xff", 6), false, 0);
+  rig.hub.handle(tab, "123", false, 0);  // has no number to answer to
   CHECK(rig.asked.empty());
   const auto got = all_of(tab);
   REQUIRE(got.size() == 4);
@@ -183,7 +183,7 @@ TEST_CASE("requests that a page may not make are refused in a reply") {
   // What a newer daemon might take for something else does not pass, either.
   std::string sly = set_alpha().SerializeAsString();
   sly += std::string("\xa2\x06\x00", 3);  // field 100
-  rig.hub.take(tab, std::string("\5\0\0\0", 4) + sly, false, 0);
+  rig.hub.handle(tab, std::string("\5\0\0\0", 4) + sly, false, 0);
   REQUIRE(rig.asked.size() == 1);
   CHECK(rig.asked[0].second == set_alpha().SerializeAsString());
 }
@@ -254,7 +254,7 @@ TEST_CASE("a tab that leaves gets nothing more, and its replies are dropped") {
   static_cast<void>(all_of(tab));
   rig.hub.leave(tab);
   rig.joined.clear();
-  rig.hub.heard("event/a", "E", 0);
+  rig.hub.receive("event/a", "E", 0);
   rig.hub.replied(rig.asked[0].first, "R");
   rig.hub.expire(10 * kNanosPerSecond);
   CHECK(all_of(tab).empty());
@@ -265,11 +265,11 @@ TEST_CASE("a body that comes back after seconds has its skeleton sent again") {
   HubRig rig;
   Tab tab;
   rig.join(tab);
-  rig.hub.heard("skeleton/a", "S", 0);
+  rig.hub.receive("skeleton/a", "S", 0);
   static_cast<void>(all_of(tab));
-  rig.hub.heard("skeleton/a", "S", kNanosPerSecond);  // the daemon repeats it
+  rig.hub.receive("skeleton/a", "S", kNanosPerSecond);  // the daemon repeats it
   CHECK(all_of(tab).empty());
-  rig.hub.heard("skeleton/a", "S", 5 * kNanosPerSecond);
+  rig.hub.receive("skeleton/a", "S", 5 * kNanosPerSecond);
   CHECK(all_of(tab).size() == 1);
 }
 
@@ -277,16 +277,16 @@ TEST_CASE("a daemon that goes takes its poses and skeletons with it") {
   HubRig rig;
   Tab tab;
   rig.join(tab);
-  rig.hub.heard("skeleton/a", "S", 0);
-  rig.hub.heard("pose/a", "P", 0);
+  rig.hub.receive("skeleton/a", "S", 0);
+  rig.hub.receive("pose/a", "P", 0);
   static_cast<void>(all_of(tab));
   rig.hub.daemon_is({.alive = false, .sentence = "gone"});
-  rig.hub.take(tab, R"({"type":"ready"})", true, 0);
+  rig.hub.handle(tab, R"({"type":"ready"})", true, 0);
   auto got = all_of(tab);
   REQUIRE(got.size() == 1);
   CHECK(json::parse(got[0].body).at("sentence") == "gone");
   rig.hub.daemon_is({.alive = true});
-  rig.hub.heard("skeleton/a", "S", 0);  // the same, but a page may have forgotten it
+  rig.hub.receive("skeleton/a", "S", 0);  // the same, but a page may have forgotten it
   got = all_of(tab);
   REQUIRE(got.size() == 2);
   CHECK(got[1].topic == "skeleton/a");
@@ -296,15 +296,15 @@ TEST_CASE("streams are bounded, and forgotten when they are silent") {
   HubRig rig;
   Tab tab;
   rig.join(tab);
-  rig.hub.take(tab, R"({"type":"ready"})", true, 0);
+  rig.hub.handle(tab, R"({"type":"ready"})", true, 0);
   static_cast<void>(all_of(tab));
   for (std::size_t i = 0; i < 2 * kMaxViewStreams; ++i) {
-    rig.hub.heard("pose/" + std::to_string(i), "P", 0);
+    rig.hub.receive("pose/" + std::to_string(i), "P", 0);
   }
   CHECK(rig.hub.counts().foreign == kMaxViewStreams);
   CHECK(all_of(tab).size() == kMaxViewStreams);
   rig.hub.expire(11 * kNanosPerSecond);
-  rig.hub.heard("pose/new", "P", 11 * kNanosPerSecond);
+  rig.hub.receive("pose/new", "P", 11 * kNanosPerSecond);
   CHECK(rig.hub.counts().foreign == kMaxViewStreams);
 }
 
@@ -313,15 +313,15 @@ TEST_CASE("the clock is answered, and words that are none are ignored") {
   Tab tab;
   rig.join(tab);
   static_cast<void>(all_of(tab));
-  rig.hub.take(tab, R"({"type":"clock","t0":1234.5})", true, 9'007'199'254'740'993);
+  rig.hub.handle(tab, R"({"type":"clock","t0":1234.5})", true, 9'007'199'254'740'993);
   const json clock = json::parse(all_of(tab).at(0).body);
   CHECK(clock.at("t0") == 1234.5);
   CHECK(clock.at("monotonic_ns") == "9007199254740993");
   for (const char* word : {"", "{", "[]", "null", "{}", R"({"type":3})", R"({"type":"clock"})",
                            R"({"type":"clock","t0":"1"})", R"({"type":"other"})", "\xff\xfe"}) {
-    rig.hub.take(tab, word, true, 0);
+    rig.hub.handle(tab, word, true, 0);
   }
-  rig.hub.take(tab, R"({"type":"clock","t0":1,"x":")" + std::string(2000, 'x') + "\"}", true, 0);
+  rig.hub.handle(tab, R"({"type":"clock","t0":1,"x":")" + std::string(2000, 'x') + "\"}", true, 0);
   CHECK(all_of(tab).empty());
 }
 

@@ -1,0 +1,83 @@
+// What options of several commands share: checks of numbers, the word of --hand, and degrees. Cold.
+#pragma once
+
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "proto/frame/degree.hpp"
+#include "proto/frame/hand.hpp"
+
+// Checks of options that take a number. CLI11's own ones compare only, so `nan` passes them and a
+// command computes with it.
+
+namespace posed::tools {
+
+namespace detail {
+
+// The number that all of the text is, or NaN.
+inline double number_of(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  double value = 0.0;
+  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool whole = error == std::errc() && stop == text.data() + text.size();
+  return whole ? value : std::nan("");
+}
+
+// `takes` says which numbers, `help` is what --help shows.
+template <typename Allowed>
+CLI::Validator number_check(std::string takes, std::string help, Allowed allowed) {
+  return {[takes = std::move(takes), allowed](const std::string& text) {
+            const double value = number_of(text);
+            return std::isfinite(value) && allowed(value)
+                       ? std::string()
+                       : fmt::format("'{}' should be a number {}", text, takes);
+          },
+          std::move(help)};
+}
+
+}  // namespace detail
+
+inline CLI::Validator in_range(double least, double most) {
+  return detail::number_check(
+      fmt::format("from {:g} to {:g}", least, most),
+      fmt::format("FLOAT in [{:g} - {:g}]", least, most),
+      [least, most](double value) { return least <= value && value <= most; });
+}
+
+inline CLI::Validator above_zero() {
+  return detail::number_check("above 0", "POSITIVE", [](double value) { return value > 0.0; });
+}
+
+inline CLI::Validator zero_or_more() {
+  return detail::number_check("of 0 or more", "NONNEGATIVE",
+                              [](double value) { return value >= 0.0; });
+}
+
+// A seed: digits alone, because the library would take -1 for 2^64 - 1.
+inline CLI::Validator whole_number() {
+  return {[](const std::string& text) {
+            std::uint64_t value = 0;
+            const char* const end = text.data() + text.size();
+            const auto [stop, error] = std::from_chars(text.data(), end, value);
+            return error == std::errc() && stop == end
+                       ? std::string()
+                       : fmt::format("'{}' should be a whole number of 0 or more", text);
+          },
+          "NONNEGATIVE"};
+}
+
+// The program computes in radians; the user interface shows degrees.
+inline constexpr double kDegrees = 1.0 / kDegree;  // degrees in a radian
+
+// The side that --hand names. `word` is "left" or "right"; CLI11 has refused all others.
+[[nodiscard]] constexpr Side side_named(std::string_view word) noexcept {
+  return word == "left" ? Side::kLeft : Side::kRight;
+}
+
+}  // namespace posed::tools

@@ -1,0 +1,95 @@
+#include "daemon/tools/emulate/motions.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "drivers/driver.hpp"
+#include "drivers/options.hpp"
+#include "models/motion/interpolate.hpp"
+#include "models/motion/retarget.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/frame/sink.hpp"
+
+namespace posed::emulate {
+namespace {
+
+struct Performer {
+  std::size_t body;
+  motion::Retarget retarget;
+  Frame pose;
+};
+
+struct Performance {
+  clip::Clip clip;
+  std::vector<Performer> performers;
+  Frame pose;  // of the clip
+};
+
+void pose_bodies(Performance& performance, double time_s, drivers::Emulator& emulator) {
+  const clip::Clip& clip = performance.clip;
+  const double at = std::fmod(std::max(time_s, 0.0) * clip.frame_rate_hz, clip.frames());
+  const int before = std::min(static_cast<int>(at), clip.frames() - 1);
+  const int after = std::min(before + 1, clip.frames() - 1);
+  performance.pose = clip.frame(before);
+  motion::interpolate(*clip.skeleton, clip.frame(before), clip.frame(after), at - before,
+                      performance.pose);
+  for (Performer& performer : performance.performers) {
+    performer.retarget.apply(performance.pose, performer.pose);
+    // A suit measures all of its bones: those that the clip does not have rest on their parents.
+    for (std::size_t j = 0; j < performer.pose.joint_count; ++j) performer.pose.valid.set(j);
+    emulator.pose(performer.body, performer.pose);
+  }
+}
+
+}  // namespace
+
+Result<Motion> clip_motion(const std::filesystem::path& path, const drivers::Emulator& emulator) {
+  auto clip = clip::read_clip(path);
+  if (!clip) return std::unexpected(clip.error());
+  auto performance = std::make_shared<Performance>();
+  performance->clip = std::move(*clip);
+  for (std::size_t body = 0; body < kMaxBodies; ++body) {
+    const Skeleton* skeleton = emulator.skeleton(body);
+    if (skeleton == nullptr) continue;
+    auto retarget = motion::Retarget::bind(performance->clip.skeleton,
+                                           std::make_shared<const Skeleton>(*skeleton));
+    if (!retarget) continue;  // a prop
+    performance->performers.push_back({.body = body, .retarget = std::move(*retarget), .pose = {}});
+  }
+  if (performance->performers.empty()) {
+    return misuse("no body of the device has a bone of the clip; choose a clip of a person",
+                  path.string());
+  }
+  return Motion([performance](double time_s, drivers::Emulator& moved) {
+    pose_bodies(*performance, time_s, moved);
+  });
+}
+
+Result<std::unique_ptr<SyntheticSigner>> SyntheticSigner::start(const std::string& name,
+                                                                const std::filesystem::path& clip) {
+  const drivers::Driver* driver = drivers::find_driver(name);
+  if (driver == nullptr || driver->emulate == nullptr) {
+    return misuse("driver '" + name + "' has no emulator, so it cannot be used here");
+  }
+  auto motion = clip::read_hand_clip(clip);
+  if (!motion) return std::unexpected(motion.error());
+  const auto options = drivers::complete_options(*driver, {});
+  if (!options) return std::unexpected(options.error());
+  auto emulator = driver->emulate(*options);
+  if (!emulator) return std::unexpected(emulator.error());
+  auto port = EmulatedPort::open_pty();
+  if (!port) return std::unexpected(port.error());
+  return std::unique_ptr<SyntheticSigner>(
+      new SyntheticSigner(std::move(*emulator), std::move(*port), std::move(*motion)));
+}
+
+SyntheticSigner::SyntheticSigner(std::unique_ptr<drivers::Emulator> emulator, EmulatedPort port,
+                                 clip::HandClip clip)
+    : clip_(std::move(clip)),
+      glove_(std::move(emulator), std::move(port),
+             hand_motion([this](double time_s) { return pose_at(clip_, time_s); }), {}),
+      thread_([this](const std::stop_token& stop) { glove_.run(stop); }) {}
+
+}  // namespace posed::emulate

@@ -1,0 +1,43 @@
+// Who moves an emulated device: a clip of a person, or a synthetic signer. Cold.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "daemon/tools/emulate/emulated_device.hpp"
+#include "drivers/emulator.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::emulate {
+
+// Every person of `emulator` performs the clip, retargeted to its skeleton, interpolated
+// between frames and repeated in a loop; bodies that share no bone with the clip, such as props,
+// move as before. Without any person it is an error. Cold.
+[[nodiscard]] Result<Motion> clip_motion(const std::filesystem::path& path,
+                                         const drivers::Emulator& emulator);
+
+// SyntheticSigner: an emulated glove with a clip as its hand motion, on its own thread; the live
+// hand of the demo. It goes from labels through angles to the glove's bytes on a pseudo-terminal;
+// everything behind that is the same as for a real glove.
+class SyntheticSigner {
+ public:
+  // Starts a glove of this driver, with its default options.
+  [[nodiscard]] static Result<std::unique_ptr<SyntheticSigner>> start(
+      const std::string& driver, const std::filesystem::path& clip);
+  SyntheticSigner(const SyntheticSigner&) = delete;
+  SyntheticSigner& operator=(const SyntheticSigner&) = delete;
+
+  [[nodiscard]] const std::string& port() const noexcept { return glove_.port(); }
+
+ private:
+  SyntheticSigner(std::unique_ptr<drivers::Emulator> emulator, EmulatedPort port,
+                  clip::HandClip clip);
+
+  clip::HandClip clip_;
+  EmulatedDevice glove_;
+  std::jthread thread_;
+};
+
+}  // namespace posed::emulate
