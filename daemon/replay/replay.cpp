@@ -125,7 +125,7 @@ std::optional<std::uint64_t> Replay::broken_at(std::uint32_t stream) const {
   return contexts_[stream]->broken_at();
 }
 
-void Replay::before(const pipeline::Item& item, std::uint32_t index) noexcept {
+void Replay::before(const pipeline::Item& item, std::uint32_t /*stream*/) noexcept {
   while (const Schedule::Entry* entry = schedule_.due(item.number)) {
     apply(*entry, item.number);
   }
