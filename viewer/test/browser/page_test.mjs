@@ -409,9 +409,7 @@ pageTests(
         async () => {
           const { render } = globalThis.posedPage.world.renderer.info;
           const before = render.frame;
-          await new Promise((done) => {
-            setTimeout(done, 1500);
-          });
+          for (let i = 0; i < 60; i += 1) await new Promise(requestAnimationFrame);
           return render.frame === before;
         },
         undefined,

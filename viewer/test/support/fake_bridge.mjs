@@ -144,9 +144,9 @@ export class FakeBridge {
 
   // A quick timer asks how many frames are due: node's own are too coarse for 120 Hz.
   #publish() {
-    const { daemon } = this;
     this.#timers.push(
       setInterval(() => {
+        const { daemon } = this; // a test may put another in its place
         if (daemon.frames >= daemon.time_s() * daemon.rate_hz) return;
         if (daemon.time_s() * daemon.rate_hz - daemon.frames > 10)
           daemon.frames = Math.floor(daemon.time_s() * daemon.rate_hz);
