@@ -1,30 +1,13 @@
-#include "drivers/posed/posed.hpp"
-
-#include "drivers/make_device.hpp"
-#include "drivers/options.hpp"
+// The posed driver: a stream of another daemon, so that machines chain.
 #include "drivers/posed/decoder.hpp"
 #include "drivers/posed/emulator.hpp"
 #include "drivers/posed/layout.hpp"
 #include "drivers/posed/protocol.hpp"
-#include "drivers/transport/transport_factory.hpp"
+#include "drivers/source_type.hpp"
 
 namespace posed::drivers {
 namespace chain {
 namespace {
-
-constexpr double kDefaultRate_hz = 60.0;
-
-Result<Description> describe(const std::string& text, const std::string& identity) {
-  const auto info = parse_device_info(text, identity);
-  if (!info) return std::unexpected(info.error());
-  return source_description("posed", text, identity, info->rate_hz);
-}
-
-Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
-  const auto info = parse_device_info(description.text, description.identity);
-  if (!info) return std::unexpected(info.error());
-  return std::make_unique<UpstreamDecoder>(info->stream);
-}
 
 Result<UpstreamInfo> info_of(const Options& options) {
   UpstreamInfo info{.stream = option<std::string>(options, "stream"),
@@ -34,43 +17,15 @@ Result<UpstreamInfo> info_of(const Options& options) {
         "stream should be the name of a stream of the other daemon: a-z, digits, '-'"
         " and '_'");
   }
-  if (parse_device_info(device_info_text(info), "")) return info;
-  return misuse("rate_hz should be more than 0 and at most 1000");
+  return info;
 }
 
-SubscriptionSettings settings_of(const Options& options) {
+SubscriptionSettings subscription_of(const Options& options) {
   const auto stream = option<std::string>(options, "stream");
   return {.endpoint = option<std::string>(options, "connect"),
           .key = option<std::string>(options, "key"),
           .server_key = option<std::string>(options, "server_key"),
           .topics = {"pose/" + stream, "skeleton/" + stream}};
-}
-
-Result<Description> expect(const Options& given) {
-  const auto options = complete_options(posed_driver(), given);
-  if (!options) return std::unexpected(options.error());
-  const auto info = info_of(*options);
-  if (!info) return std::unexpected(info.error());
-  const SubscriptionSettings settings = settings_of(*options);
-  if (const auto ok = check_subscription(settings); !ok) return std::unexpected(ok.error());
-  return describe(device_info_text(*info), settings.endpoint);
-}
-
-Result<Device> open(const Options& given, TransportFactory& ports) {
-  const auto expected = expect(given);
-  if (!expected) return std::unexpected(expected.error());
-  const auto options = complete_options(posed_driver(), given);
-  auto transport = ports.subscribe(settings_of(*options));
-  if (!transport) return std::unexpected(transport.error());
-  return make_device(posed_driver(), *expected, std::move(*transport));
-}
-
-Result<std::unique_ptr<Emulator>> emulate(const Options& given) {
-  const auto options = complete_options(posed_driver(), given);
-  if (!options) return std::unexpected(options.error());
-  const auto info = info_of(*options);
-  if (!info) return std::unexpected(info.error());
-  return std::make_unique<UpstreamEmulator>(*info);
 }
 
 std::vector<OptionSpec> options() {
@@ -87,25 +42,41 @@ std::vector<OptionSpec> options() {
        .default_value = std::string(),
        .is_path = true,
        .help = "the other daemon's public key (NAME.pub)"},
-      {.name = "rate_hz",
-       .default_value = kDefaultRate_hz,
-       .help = "expected frames a second, until the stream says its rate"}};
+      rate_option(60.0, "expected frames a second, until the stream says its rate")};
 }
+
+struct Upstream : SourceType<Upstream> {
+  using Settings = UpstreamInfo;
+  static constexpr std::string_view kName = "posed";
+  static constexpr std::string_view kSummary = "a stream of another posed, so that machines chain";
+  static constexpr auto options = chain::options;
+  static constexpr auto settings = chain::info_of;
+  static constexpr auto device_info = chain::device_info_text;
+  static constexpr auto parse_device_info = chain::parse_device_info;
+  static constexpr auto make_layout = chain::make_layout;
+
+  static Result<std::string> check(const Options& options, const Settings& /*settings*/) {
+    const SubscriptionSettings subscription = subscription_of(options);
+    if (const auto ok = check_subscription(subscription); !ok) return std::unexpected(ok.error());
+    return subscription.endpoint;
+  }
+  static Result<std::unique_ptr<Decoder>> decoder(const Settings& settings,
+                                                  const Description& /*description*/) {
+    return std::make_unique<UpstreamDecoder>(settings.stream);
+  }
+  static Result<std::unique_ptr<Transport>> connect(const Options& options,
+                                                    TransportFactory& ports) {
+    return ports.subscribe(subscription_of(options));
+  }
+  static Result<std::unique_ptr<Emulator>> emulator(const Options& /*options*/,
+                                                    const Settings& settings) {
+    return std::make_unique<UpstreamEmulator>(settings);
+  }
+};
 
 }  // namespace
 }  // namespace chain
 
-const Driver& posed_driver() {
-  static const Driver driver{.name = "posed",
-                             .summary = "a stream of another posed, so that machines chain",
-                             .options = chain::options(),
-                             .open = chain::open,
-                             .make_decoder = chain::make_decoder,
-                             .describe = chain::describe,
-                             .expect = chain::expect,
-                             .make_layout = chain::make_layout,
-                             .emulate = chain::emulate};
-  return driver;
-}
+const Driver& posed_driver() { return DriverOf<chain::Upstream>::get(); }
 
 }  // namespace posed::drivers

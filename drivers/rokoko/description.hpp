@@ -59,9 +59,4 @@ static_assert(kMaxDescriptionBytes <= kMaxDescription);
 [[nodiscard]] Result<std::vector<DescribedBody>> parse_description(
     std::span<const std::byte> bytes);
 
-// The device info, and the rate [Hz] in it. Studio says nothing about itself before it streams.
-[[nodiscard]] std::string device_info_text(double rate_hz);
-[[nodiscard]] Result<double> parse_device_info(const std::string& text,
-                                               const std::string& identity);
-
 }  // namespace posed::drivers::rokoko

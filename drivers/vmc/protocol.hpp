@@ -79,9 +79,4 @@ inline constexpr std::size_t kMaxDescribed =
 // checked for being text. Cold.
 [[nodiscard]] Result<Described> parse_description(std::span<const std::byte> bytes);
 
-// The device info, and the rate [Hz] in it: what the options say.
-[[nodiscard]] std::string device_info_text(double rate_hz);
-[[nodiscard]] Result<double> parse_device_info(const std::string& text,
-                                               const std::string& identity);
-
 }  // namespace posed::drivers::vmc
