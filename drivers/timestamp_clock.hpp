@@ -15,7 +15,7 @@ class TimestampClock {
  public:
   // kDuplicate: the timestamp of the newest frame again. kLate: up to kLate_s before it. kOk: all
   // others; further back is a loop or a restart. RT-safe.
-  [[nodiscard]] Outcome take(double timestamp_s) noexcept {
+  [[nodiscard]] Outcome accept(double timestamp_s) noexcept {
     if (!std::isfinite(timestamp_s)) return Outcome::kOk;  // it keeps the time of the one before
     const double step_s = timestamp_s - newest_s_;
     if (!seen_) {

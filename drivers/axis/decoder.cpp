@@ -15,15 +15,15 @@ constexpr double kMaxTime_s = 1e9;  // only damaged frame numbers lead so far
 std::size_t to_channels(const Message& message,
                         std::array<double, kMaxFrameChannels>& channels) noexcept {
   std::size_t size = 0;
-  const auto take = [&](std::size_t at, double scale) {
+  const auto convert = [&](std::size_t at, double scale) {
     for (std::size_t i = 0; i < 3; ++i) channels[size++] = message.values[at + i] * scale;
   };
   if (message.content.reference) {
-    take(0, kCentimetre_m);
-    take(3, kDegree);
+    convert(0, kCentimetre_m);
+    convert(3, kDegree);
   }
-  take(rotations_at(message.content, kHips) - 3, kCentimetre_m);
-  for (std::size_t b = 0; b < kBones; ++b) take(rotations_at(message.content, b), kDegree);
+  convert(rotations_at(message.content, kHips) - 3, kCentimetre_m);
+  for (std::size_t b = 0; b < kBones; ++b) convert(rotations_at(message.content, b), kDegree);
   return size;
 }
 
@@ -41,26 +41,26 @@ void AxisDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns
 // RT-safe.
 bool AxisDecoder::binary(std::span<const std::byte> bytes, bool in_damage) noexcept {
   Outcome outcome = decode_binary(bytes, message_);
-  const bool sound = outcome == Outcome::kOk;
-  if (sound) outcome = take_message();
-  if (sound || !in_damage) sink_->outcome(outcome);
-  return sound;
+  const bool valid = outcome == Outcome::kOk;
+  if (valid) outcome = accept_message();
+  if (valid || !in_damage) sink_->outcome(outcome);
+  return valid;
 }
 
 // RT-safe.
 void AxisDecoder::text(std::string_view text, bool in_damage) noexcept {
   Outcome outcome = decode_text(text, message_);
-  const bool sound = outcome == Outcome::kOk;
-  if (sound) outcome = take_message();
-  if (sound || !in_damage) sink_->outcome(outcome);
+  const bool valid = outcome == Outcome::kOk;
+  if (valid) outcome = accept_message();
+  if (valid || !in_damage) sink_->outcome(outcome);
 }
 
 // RT-safe.
-Outcome AxisDecoder::take_message() noexcept {
+Outcome AxisDecoder::accept_message() noexcept {
   Present* const present = roster_.find(message_.avatar);
   if (present == nullptr) return Outcome::kOutOfRange;  // more avatars than bodies of a source
   if (settings_.datagrams && message_.frame_number != 0) {
-    const Outcome order = present->order.take(message_.frame_number);
+    const Outcome order = present->order.convert(message_.frame_number);
     if (order != Outcome::kOk) return order;
   }
   roster_.see(*present, message_, now_ns_);

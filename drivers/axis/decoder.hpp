@@ -41,7 +41,7 @@ class AxisDecoder final : public Decoder, private Messages {
   void damage(Outcome outcome) noexcept override { sink_->outcome(outcome); }
 
   // Emits the frame of `message_`.
-  [[nodiscard]] Outcome take_message() noexcept;
+  [[nodiscard]] Outcome accept_message() noexcept;
   void emit_frame(std::size_t body, const Present& present) noexcept;
 
   StreamSettings settings_;

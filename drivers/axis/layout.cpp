@@ -27,7 +27,7 @@ void add_channels(Skeleton& skeleton, bool positions, std::uint8_t order) {
 }
 
 // Other programs get the names in messages that must be UTF-8. A name that another body has already
-// is told apart by the avatar's number.
+// differs by the avatar's number.
 std::string body_name(const Avatar& avatar, const std::vector<Body>& bodies) {
   std::string name = clean(avatar.name_text());
   if (name.empty()) name = "avatar";

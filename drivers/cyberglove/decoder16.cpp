@@ -20,7 +20,7 @@ void Decoder16::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns
   for (const std::byte byte : bytes) {
     record_[size_++] = byte;
     if (!could_be_record()) hunt(sink);
-    if (size_ == kRecordBytes) take_record(sink);
+    if (size_ == kRecordBytes) accept_record(sink);
   }
 }
 
@@ -42,9 +42,9 @@ void Decoder16::hunt(Sink& sink) noexcept {
     if (fits == head) break;
   }
   strays_ += from;
-  if (strays_ > kKnownStrays && !told_) {
+  if (strays_ > kKnownStrays && !reported_) {
     sink.outcome(Outcome::kForeign);
-    told_ = true;
+    reported_ = true;
   }
   std::copy(record_.begin() + static_cast<std::ptrdiff_t>(from),
             record_.begin() + static_cast<std::ptrdiff_t>(size_), record_.begin());
@@ -52,10 +52,10 @@ void Decoder16::hunt(Sink& sink) noexcept {
 }
 
 // RT-safe.
-void Decoder16::take_record(Sink& sink) noexcept {
+void Decoder16::accept_record(Sink& sink) noexcept {
   size_ = 0;
   strays_ = 0;
-  told_ = false;
+  reported_ = false;
   std::array<float, kSensors> raw{};
   std::size_t place = kRecordHead;
   for (std::size_t i = 0; i < kSensors; ++i) {

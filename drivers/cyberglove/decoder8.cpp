@@ -34,7 +34,7 @@ void Decoder8::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*
   const std::size_t flags = sample_bytes(layout()) - kStampBytes - (layout().status ? 1 : 0);
   for (const std::byte byte : bytes) {
     if (byte == kEnd && !(layout().time && !lost_ && size_ == flags)) {
-      take_piece(sink);
+      accept_piece(sink);
       size_ = 0;
       lost_ = false;
     } else if (size_ == piece_.size()) {
@@ -47,13 +47,13 @@ void Decoder8::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*
 }
 
 // RT-safe.
-void Decoder8::take_piece(Sink& sink) noexcept {
+void Decoder8::accept_piece(Sink& sink) noexcept {
   if (lost_ || size_ == 0) return;                // already counted; or the end of an answer
   if (size_ == 1 && piece_[0] == kTouch) return;  // the answer to a CyberTouch command
   const std::span<const std::byte> piece = std::span(piece_).first(size_);
   const Outcome outcome = check_piece(piece);
   sink.outcome(outcome);
-  if (outcome == Outcome::kOk) take_sample(piece, sink);
+  if (outcome == Outcome::kOk) accept_sample(piece, sink);
 }
 
 // RT-safe.
@@ -78,7 +78,7 @@ Outcome Decoder8::check_piece(std::span<const std::byte> piece) const noexcept {
 }
 
 // RT-safe.
-void Decoder8::take_sample(std::span<const std::byte> piece, Sink& sink) noexcept {
+void Decoder8::accept_sample(std::span<const std::byte> piece, Sink& sink) noexcept {
   std::array<float, kSensors> raw{};
   std::size_t place = 1;
   for (std::size_t i = 0; i < kSensors; ++i) {

@@ -58,13 +58,13 @@ void CyberGloveEmulator::receive(std::span<const std::byte> bytes, std::int64_t 
   if (!power_up_ns_) power_up_ns_ = now_ns;
   for (const std::byte byte : bytes) input_.push_back(static_cast<char>(byte));
   while (!input_.empty()) {
-    const std::size_t taken = take_command(input_, answer);
-    if (taken == 0) return;
-    input_.erase(0, taken);
+    const std::size_t used = handle_command(input_, answer);
+    if (used == 0) return;
+    input_.erase(0, used);
   }
 }
 
-std::size_t CyberGloveEmulator::take_command(std::string_view input, Bytes& answer) {
+std::size_t CyberGloveEmulator::handle_command(std::string_view input, Bytes& answer) {
   const char c = input[0];
   if (c == '\r' || c == '\n') return 1;
   if (c == kStop) {
@@ -86,10 +86,10 @@ std::size_t CyberGloveEmulator::take_command(std::string_view input, Bytes& answ
     if (input.starts_with("!!!")) streaming_ = Streaming::kNo;
     return 3;
   }
-  if (c == '?') return take_query(input, answer);
-  if (c == '1' && settings_.level_one) return take_level_one(input, answer);
-  if (is_upper(c)) return take_binary_set(input, answer);
-  if (is_lower(c)) return take_ascii_set(input, answer);
+  if (c == '?') return handle_query(input, answer);
+  if (c == '1' && settings_.level_one) return handle_level_one(input, answer);
+  if (is_upper(c)) return handle_binary_set(input, answer);
+  if (is_lower(c)) return handle_ascii_set(input, answer);
   // "^" sets the control mode of the II and III, so the two characters "^c" do not mean stop.
   const std::size_t size = c == '^' ? 2 : 1;
   if (input.size() < size) return 0;
@@ -97,7 +97,7 @@ std::size_t CyberGloveEmulator::take_command(std::string_view input, Bytes& answ
   return size;
 }
 
-std::size_t CyberGloveEmulator::take_query(std::string_view input, Bytes& answer) const {
+std::size_t CyberGloveEmulator::handle_query(std::string_view input, Bytes& answer) const {
   if (input.size() < 2) return 0;
   const char letter = input[1];
   if (letter == 'i' || letter == 'I') {
@@ -125,7 +125,7 @@ std::size_t CyberGloveEmulator::take_query(std::string_view input, Bytes& answer
   return 2;
 }
 
-std::size_t CyberGloveEmulator::take_binary_set(std::string_view input, Bytes& answer) {
+std::size_t CyberGloveEmulator::handle_binary_set(std::string_view input, Bytes& answer) {
   const char letter = input[0];
   if (letter == 'S') {
     start(Streaming::k8Bit);
@@ -135,7 +135,7 @@ std::size_t CyberGloveEmulator::take_binary_set(std::string_view input, Bytes& a
     add_sample(std::byte{'G'}, now_ns_, answer);
     return 1;
   }
-  if (letter == 'A') return take_touch(input, answer);
+  if (letter == 'A') return handle_touch(input, answer);
   const std::size_t payload = payload_bytes(letter);
   if (payload == 0) {
     add(kUnknown, answer);
@@ -154,7 +154,7 @@ std::size_t CyberGloveEmulator::take_binary_set(std::string_view input, Bytes& a
   return 1 + payload;
 }
 
-std::size_t CyberGloveEmulator::take_ascii_set(std::string_view input, Bytes& answer) {
+std::size_t CyberGloveEmulator::handle_ascii_set(std::string_view input, Bytes& answer) {
   if (input[0] == 's') {
     start(Streaming::kAscii);
     return 1;
@@ -186,7 +186,7 @@ std::size_t CyberGloveEmulator::take_ascii_set(std::string_view input, Bytes& an
 }
 
 // CyberTouch: A n, then n pairs (motor, strength); or A 255 and six strengths.
-std::size_t CyberGloveEmulator::take_touch(std::string_view input, Bytes& answer) {
+std::size_t CyberGloveEmulator::handle_touch(std::string_view input, Bytes& answer) {
   constexpr unsigned kAll = 255;
   if (input.size() < 2) return 0;
   const unsigned count = byte_at(input, 1);
@@ -203,7 +203,7 @@ std::size_t CyberGloveEmulator::take_touch(std::string_view input, Bytes& answer
   return size;
 }
 
-std::size_t CyberGloveEmulator::take_level_one(std::string_view input, Bytes& answer) {
+std::size_t CyberGloveEmulator::handle_level_one(std::string_view input, Bytes& answer) {
   constexpr std::size_t kSize = 3;
   if (input.size() < 2) return 0;
   if (input[1] == 'S' || input[1] == 'G') {  // the echo has no end mark; records follow at once

@@ -18,15 +18,15 @@ template <typename Done>
 Result<std::string> Session::listen(milliseconds patience, Done done) {
   using Clock = std::chrono::steady_clock;
   const Clock::time_point deadline = Clock::now() + patience;
-  std::string heard;
-  while (!done(heard) && heard.size() < kMaxText) {
+  std::string received;
+  while (!done(received) && received.size() < kMaxText) {
     const auto left = std::chrono::ceil<milliseconds>(deadline - Clock::now());
     if (left.count() <= 0) break;
     const auto bytes = link_.read(left);
     if (!bytes) return std::unexpected(bytes.error());
-    for (const std::byte byte : *bytes) heard.push_back(static_cast<char>(byte));
+    for (const std::byte byte : *bytes) received.push_back(static_cast<char>(byte));
   }
-  return heard;
+  return received;
 }
 
 Result<> Session::stop() {
@@ -36,9 +36,9 @@ Result<> Session::stop() {
 
 Result<std::string> Session::info() {
   if (auto ok = link_.write(std::string_view("?i")); !ok) return std::unexpected(ok.error());
-  return listen(kInfo, [](const std::string& heard) {
-    const std::size_t at = heard.find("?i");
-    return at != std::string::npos && heard.find('\0', at) != std::string::npos;
+  return listen(kInfo, [](const std::string& received) {
+    const std::size_t at = received.find("?i");
+    return at != std::string::npos && received.find('\0', at) != std::string::npos;
   });
 }
 
@@ -46,31 +46,32 @@ Result<std::vector<unsigned>> Session::query(char letter, std::size_t value_byte
   const std::string question{'?', letter};
   if (auto ok = link_.write(question); !ok) return std::unexpected(ok.error());
   const std::size_t size = question.size() + value_bytes + 1;
-  const auto heard = listen(kAnswer, [&](const std::string& text) {
+  const auto received = listen(kAnswer, [&](const std::string& text) {
     const std::size_t at = text.find(question);
     return at != std::string::npos && text.size() >= at + size;
   });
-  if (!heard) return std::unexpected(heard.error());
-  const std::size_t at = heard->find(question);
-  if (at == std::string::npos || heard->size() < at + size || (*heard)[at + size - 1] != '\0') {
+  if (!received) return std::unexpected(received.error());
+  const std::size_t at = received->find(question);
+  if (at == std::string::npos || received->size() < at + size ||
+      (*received)[at + size - 1] != '\0') {
     return fail(link_.name() + " did not answer '" + question +
                 "' as a CyberGlove does; switch its box off and on again");
   }
   std::vector<unsigned> values(value_bytes);
   for (std::size_t i = 0; i < value_bytes; ++i) {
-    values[i] = static_cast<unsigned char>((*heard)[at + question.size() + i]);
+    values[i] = static_cast<unsigned char>((*received)[at + question.size() + i]);
   }
   return values;
 }
 
 Result<> Session::set(std::string_view command, std::string_view echo) {
   if (auto ok = link_.write(command); !ok) return ok;
-  const auto heard = listen(kAnswer, [&](const std::string& text) {
+  const auto received = listen(kAnswer, [&](const std::string& text) {
     return text.size() > echo.size() && text.find('\0', echo.size()) != std::string::npos;
   });
-  if (!heard) return std::unexpected(heard.error());
-  if (!heard->starts_with(echo)) {
-    return fail(link_.name() + " does not take the setting '" + std::string(1, command[0]) +
+  if (!received) return std::unexpected(received.error());
+  if (!received->starts_with(echo)) {
+    return fail(link_.name() + " does not accept the setting '" + std::string(1, command[0]) +
                 "'; switch its box off and on again");
   }
   return link_.drain(kAfterSet);

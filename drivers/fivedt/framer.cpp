@@ -22,7 +22,7 @@ bool Framer::advance(Readings& readings) noexcept {
 bool Framer::advance_in_step(Readings& readings) noexcept {
   const std::size_t length = packet_length(form_, pending());
   if (length == 0) {
-    if (take_tail()) return true;
+    if (consume_tail()) return true;
     in_step_ = false;
     just_lost_ = true;
     readings.outcome(Outcome::kForeign);
@@ -101,7 +101,7 @@ bool Framer::is_tail(std::byte byte) const noexcept {
 }
 
 // Consumes the byte that may follow a packet of a Data Glove 5. RT-safe.
-bool Framer::take_tail() noexcept {
+bool Framer::consume_tail() noexcept {
   if (!after_packet_) return false;
   after_packet_ = false;
   const std::byte byte = pending_[0];

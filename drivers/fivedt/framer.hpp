@@ -40,7 +40,7 @@ class Framer {
   [[nodiscard]] bool skip_damaged() noexcept;
   [[nodiscard]] bool is_packet(std::span<const std::byte> bytes) noexcept;
   [[nodiscard]] bool is_tail(std::byte byte) const noexcept;
-  [[nodiscard]] bool take_tail() noexcept;
+  [[nodiscard]] bool consume_tail() noexcept;
   [[nodiscard]] bool is_half_used(std::span<const std::byte> report) noexcept;
   void drop(std::size_t count) noexcept;
   [[nodiscard]] std::span<const std::byte> pending() const noexcept {

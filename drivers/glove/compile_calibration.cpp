@@ -13,12 +13,12 @@ namespace {
 
 // A mistake in a driver's curve appears in the first test that opens the driver.
 bool is_sound(const Curve& curve) {
-  bool sound = curve.points >= 2 && curve.points <= kMaxCurvePoints;
-  for (std::size_t i = 0; sound && i < curve.points; ++i) {
-    sound = std::isfinite(curve.raw[i]) && std::isfinite(curve.value[i]) &&
+  bool valid = curve.points >= 2 && curve.points <= kMaxCurvePoints;
+  for (std::size_t i = 0; valid && i < curve.points; ++i) {
+    valid = std::isfinite(curve.raw[i]) && std::isfinite(curve.value[i]) &&
             (i == 0 || curve.raw[i] > curve.raw[i - 1]);
   }
-  return sound;
+  return valid;
 }
 
 Result<Calibration> compile(const Model& model) {

@@ -38,9 +38,9 @@ class SampleWriter {
   explicit SampleWriter(Sample& sample) noexcept : sample_(sample) {}
 
   void add(float value, bool valid) noexcept {
-    const bool sound = valid && std::isfinite(value);
-    valid_ |= std::uint64_t{sound} << count_;
-    sample_.value[count_++] = sound ? value : 0.0F;
+    const bool finite = valid && std::isfinite(value);
+    valid_ |= std::uint64_t{finite} << count_;
+    sample_.value[count_++] = finite ? value : 0.0F;
   }
   void finish() noexcept {
     sample_.valid = valid_;

@@ -44,7 +44,9 @@ struct TextSettings {
 template <typename Self>
 class TextDecoder final : public GloveDecoder {
  public:
-  using GloveDecoder::GloveDecoder;
+  TextDecoder(std::shared_ptr<const Skeleton> skeleton,
+              std::shared_ptr<const Calibration> default_calibration)
+      : GloveDecoder(std::move(skeleton), std::move(default_calibration)) {}
 
   // RT-safe.
   void feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,

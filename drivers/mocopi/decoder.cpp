@@ -10,14 +10,14 @@ namespace {
 constexpr double kLooseLength = 1e-2;  // of the squared length of a rotation
 
 // Puts one bone of a frame in its place; false when it contradicts the layout. RT-safe.
-bool take_bone(const BoneEntry& bone, const MocopiLayout& layout, std::bitset<kMaxJoints>& taken,
-               Frame& frame) noexcept {
+bool accept_bone(const BoneEntry& bone, const MocopiLayout& layout, std::bitset<kMaxJoints>& taken,
+                 Frame& frame) noexcept {
   const std::size_t joint = layout.joint_of(bone.id);
   if (joint == layout.id.size() || taken[joint]) return false;
   taken.set(joint);
   Quatf rotation = bone.transform.rotation_xyzw;
   bool seen = false;
-  if (!take_rotation(rotation, seen, kLooseLength)) return false;
+  if (!accept_rotation(rotation, seen, kLooseLength)) return false;
   if (!is_plausible(bone.transform.position_m)) return false;
   frame.rotation_xyzw[joint] = rotation;
   frame.valid[joint] = seen;
@@ -35,19 +35,19 @@ void MocopiDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arriva
   if (outcome == Outcome::kOk && datagram.kind == Kind::kSkeleton) {
     sink.description(datagram.content);
   } else if (outcome == Outcome::kOk) {
-    outcome = take_frame(datagram.content, sink);
+    outcome = accept_frame(datagram.content, sink);
   }
   sink.outcome(outcome);
 }
 
 // RT-safe.
-Outcome MocopiDecoder::take_frame(std::span<const std::byte> content, Sink& sink) noexcept {
+Outcome MocopiDecoder::accept_frame(std::span<const std::byte> content, Sink& sink) noexcept {
   FrameHead head;
   if (!read_frame(content, head)) return Outcome::kShort;
   if (layout_ == nullptr) return Outcome::kForeign;
-  if (const Outcome order = order_.take(head.number); order != Outcome::kOk) return order;
+  if (const Outcome order = order_.accept(head.number); order != Outcome::kOk) return order;
   // The frame number says what is new; a wall clock that was set back only stops the time.
-  static_cast<void>(clock_.take(head.unix_s));
+  static_cast<void>(clock_.accept(head.unix_s));
   Frame frame;
   const Skeleton& skeleton = *layout_->bodies[0].skeleton;
   frame.skeleton = skeleton.id;
@@ -62,7 +62,7 @@ Outcome MocopiDecoder::take_frame(std::span<const std::byte> content, Sink& sink
     BoneEntry bone;
     if (name != "btdt") continue;
     if (!read_bone(value, false, bone)) return Outcome::kShort;
-    if (!take_bone(bone, *layout_, taken, frame)) return Outcome::kOutOfRange;
+    if (!accept_bone(bone, *layout_, taken, frame)) return Outcome::kOutOfRange;
   }
   if (!fields.ok()) return Outcome::kShort;
   if (!taken[0]) return Outcome::kOutOfRange;  // nothing says where the body is

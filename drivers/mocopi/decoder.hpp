@@ -24,7 +24,7 @@ class MocopiDecoder final : public Decoder {
   }
 
  private:
-  [[nodiscard]] Outcome take_frame(std::span<const std::byte> content, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_frame(std::span<const std::byte> content, Sink& sink) noexcept;
 
   const MocopiLayout* layout_ = nullptr;  // null until the app has sent its skeleton
   DatagramOrder order_{32};

@@ -48,9 +48,9 @@ Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byt
   const BoneEntry* root = nullptr;
   for (BoneEntry& bone : *bones) {
     bool seen = false;
-    const bool sound = is_plausible(bone.transform.position_m) &&
-                       take_rotation(bone.transform.rotation_xyzw, seen, 1e-2);
-    if (!sound) return wrong_tree("puts bone " + std::to_string(bone.id) + " out of the room");
+    const bool valid = is_plausible(bone.transform.position_m) &&
+                       accept_rotation(bone.transform.rotation_xyzw, seen, 1e-2);
+    if (!valid) return wrong_tree("puts bone " + std::to_string(bone.id) + " out of the room");
     const bool is_root = bone.parent == bone.id ||
                          std::ranges::find(*bones, bone.parent, &BoneEntry::id) == bones->end();
     if (is_root && root != nullptr) return wrong_tree("has two roots");

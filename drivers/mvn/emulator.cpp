@@ -148,12 +148,12 @@ void MvnEmulator::fill_queue(std::int64_t now_ns) {
   if (people_.size() > 1 && !people_[1].posed) {
     wave(time_s, people_[1].root_m, people_[1].rotation_xyzw);
   }
-  const bool tell = told_ns_ == kNoTime_ns || queued_ns_ - told_ns_ >= kNanosPerSecond;
-  if (tell) told_ns_ = queued_ns_;
+  const bool tell = reported_ns_ == kNoTime_ns || queued_ns_ - reported_ns_ >= kNanosPerSecond;
+  if (tell) reported_ns_ = queued_ns_;
   for (const Person& person : people_) {
     for (const Type type : settings_.types) {
-      const bool told_once = type == Type::kMeta || type == Type::kScale;
-      if (person.present && (tell || !told_once)) add_sample(person, type, queued_ns_);
+      const bool reported_once = type == Type::kMeta || type == Type::kScale;
+      if (person.present && (tell || !reported_once)) add_sample(person, type, queued_ns_);
     }
   }
   ++sample_;

@@ -6,7 +6,7 @@
 //   |  1  | count | character | flags | name size | name | each segment: offset x, y, z (f32) |
 //   +-----+-------+-----------+-------+-----------+------+------------------------------------+
 //    flags      u8, 1: with fingers; 2 and the higher bits: the groups of values (values.hpp)
-//    name size  u8, bytes of the name as type 12 told it; 0 when it did not
+//    name size  u8, bytes of the name as type 12 reported it; 0 when it did not
 //    offset     [m], in posed's axes, from the parent in T-pose; of 23 segments, or of 63 with
 //               fingers; of the pelvis the height above the floor
 #pragma once

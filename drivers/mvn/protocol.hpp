@@ -99,7 +99,7 @@ struct Head {
   std::uint8_t props = 0;
   std::uint8_t fingers = 0;
   std::uint16_t payload_bytes = 0;
-  bool old = false;  // before MVN 2019: body, props, fingers and payload_bytes are not told
+  bool old = false;  // before MVN 2019: body, props, fingers and payload_bytes are not reported
 };
 
 struct Datagram {
@@ -145,10 +145,10 @@ struct CharacterPose {
 [[nodiscard]] Outcome decode_meta(std::span<const std::byte> payload,
                                   std::string_view& name) noexcept;
 
-// Where the body's segments are in T-pose, in posed's axes. `told` is false for the datagrams of
-// type 13 that describe only points. RT-safe.
+// Where the body's segments are in T-pose, in posed's axes. `reported` is false for the datagrams
+// of type 13 that describe only points. RT-safe.
 [[nodiscard]] Outcome decode_scale(std::span<const std::byte> payload,
                                    std::array<Vec3f, kBodySegments>& position_m,
-                                   bool& told) noexcept;
+                                   bool& reported) noexcept;
 
 }  // namespace posed::drivers::mvn

@@ -41,7 +41,7 @@ class Tracked {
     bool lost = false;
     std::span<const std::byte> items;
   };
-  [[nodiscard]] Part take_part(const Datagram& datagram, Assembly::Buffer& to) noexcept;
+  [[nodiscard]] Part accept_part(const Datagram& datagram, Assembly::Buffer& to) noexcept;
 
   void set_name(std::string_view name) noexcept;
   void set_scale(const std::array<Vec3f, kBodySegments>& position_m) noexcept;
@@ -53,7 +53,7 @@ class Tracked {
 
  private:
   using Offsets = std::array<Vec3f, kSegments>;
-  void take_offsets(const Offsets& offset_m, std::size_t from, std::size_t to) noexcept;
+  void accept_offsets(const Offsets& offset_m, std::size_t from, std::size_t to) noexcept;
   [[nodiscard]] double farthest_m(const Offsets& offset_m, std::size_t from,
                                   std::size_t to) const noexcept;
 

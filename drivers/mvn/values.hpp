@@ -61,9 +61,9 @@ struct ValuePlaces {
 class PartOrder {
  public:
   // As DatagramOrder. RT-safe.
-  [[nodiscard]] Outcome take(const Head& head) noexcept {
+  [[nodiscard]] Outcome accept(const Head& head) noexcept {
     if (!came_.any() || head.sample != sample_) {
-      const Outcome outcome = samples_.take(head.sample);
+      const Outcome outcome = samples_.accept(head.sample);
       if (outcome != Outcome::kOk) return outcome;
       sample_ = head.sample;
       came_.reset();

@@ -42,57 +42,57 @@ void NatNetDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_
   Message message;
   Outcome outcome = decode_message(bytes, message);
   if (outcome == Outcome::kOk) {
-    if (is_from_server(message.id)) requests_.heard(arrival_ns);
-    outcome = take(message, sink);
+    if (is_from_server(message.id)) requests_.received(arrival_ns);
+    outcome = accept(message, sink);
   }
   sink.outcome(outcome);
 }
 
 // RT-safe.
-Outcome NatNetDecoder::take(const Message& message, Sink& sink) noexcept {
+Outcome NatNetDecoder::accept(const Message& message, Sink& sink) noexcept {
   switch (message.id) {
     case MessageId::kServerInfo:
-      return take_server_info(message.payload);
+      return accept_server_info(message.payload);
     case MessageId::kResponse:
-      return take_response(message.payload);
+      return accept_response(message.payload);
     case MessageId::kModelDef:
-      return take_model_def(message.payload, sink);
+      return accept_model_def(message.payload, sink);
     case MessageId::kFrame:
-      return take_frame(message.payload, sink);
+      return accept_frame(message.payload, sink);
     default:  // of no use here, or of another client
       return is_from_server(message.id) ? Outcome::kOk : Outcome::kForeign;
   }
 }
 
 // The version of the options counts more: somebody has set it. RT-safe.
-Outcome NatNetDecoder::take_server_info(std::span<const std::byte> payload) noexcept {
+Outcome NatNetDecoder::accept_server_info(std::span<const std::byte> payload) noexcept {
   ServerInfo info;
   if (!decode_server_info(payload, info)) return Outcome::kShort;
   const Version said = settings_.version.known() ? settings_.version : info.version;
   if (said != version_) has_reading_ = false;
   version_ = said;
   clock_hz_ = info.clock_hz;
-  requests_.take_server_info();
+  requests_.accept_server_info();
   return Outcome::kOk;
 }
 
 // The only request is that for the rate. RT-safe.
-Outcome NatNetDecoder::take_response(std::span<const std::byte> payload) noexcept {
+Outcome NatNetDecoder::accept_response(std::span<const std::byte> payload) noexcept {
   const float rate_hz = ByteReader(payload).f32();
   if (!(rate_hz >= kLeastRate_hz && rate_hz <= kMostRate_hz)) return Outcome::kOutOfRange;
   rate_hz_ = rate_hz;
-  requests_.take_rate();
+  requests_.accept_rate();
   return Outcome::kOk;
 }
 
 // RT-safe.
-Outcome NatNetDecoder::take_model_def(std::span<const std::byte> payload, Sink& sink) noexcept {
+Outcome NatNetDecoder::accept_model_def(std::span<const std::byte> payload, Sink& sink) noexcept {
   const DescriptionHead head{.version = version_, .z_up = settings_.z_up, .rate_hz = rate_hz_};
   write_description_head(head, std::span(description_).first<kDescriptionHeadBytes>());
   const std::size_t size = std::min(payload.size(), description_.size() - kDescriptionHeadBytes);
   std::ranges::copy(payload.first(size), description_.begin() + kDescriptionHeadBytes);
   sink.description(std::span(description_).first(kDescriptionHeadBytes + size));
-  requests_.take_bodies();
+  requests_.accept_bodies();
   return Outcome::kOk;
 }
 
@@ -117,37 +117,37 @@ bool NatNetDecoder::read(std::span<const std::byte> payload, FrameView& view) no
 }
 
 // RT-safe.
-Outcome NatNetDecoder::take_frame(std::span<const std::byte> payload, Sink& sink) noexcept {
+Outcome NatNetDecoder::accept_frame(std::span<const std::byte> payload, Sink& sink) noexcept {
   FrameView view;
   if (!read(payload, view)) return Outcome::kOutOfRange;
   if (view.bodies_changed) requests_.bodies_changed();
   if (layout_ == nullptr) return Outcome::kForeign;
-  if (const Outcome order = order_.take(view.number); order != Outcome::kOk) return order;
+  if (const Outcome order = order_.accept(view.number); order != Outcome::kOk) return order;
   device_ns_ = time_.of(view, clock_hz_);
   timecode_ = to_timecode(view.timecode);
-  taken_.reset();
-  const Outcome bodies = take_bodies(view, sink);
-  return worse(bodies, take_markers(view, sink));
+  emitted_.reset();
+  const Outcome bodies = accept_bodies(view, sink);
+  return worse(bodies, accept_markers(view, sink));
 }
 
 // RT-safe.
-Outcome NatNetDecoder::take_bodies(const FrameView& view, Sink& sink) noexcept {
+Outcome NatNetDecoder::accept_bodies(const FrameView& view, Sink& sink) noexcept {
   Outcome worst = Outcome::kOk;
   ByteReader rigid_bodies(view.rigid_bodies.bytes);
   for (std::size_t i = 0; i < view.rigid_bodies.count; ++i) {
-    worst = worse(worst, take_rigid_body(rigid_bodies, sink));
+    worst = worse(worst, accept_rigid_body(rigid_bodies, sink));
   }
   ByteReader skeletons(view.skeletons.bytes);
   for (std::size_t i = 0; i < view.skeletons.count; ++i) {
-    worst = worse(worst, take_skeleton(skeletons, sink));
+    worst = worse(worst, accept_skeleton(skeletons, sink));
   }
   return worst;
 }
 
 // RT-safe.
 Outcome NatNetDecoder::emit(std::size_t body, Frame& frame, Sink& sink) noexcept {
-  if (taken_[body]) return Outcome::kOutOfRange;
-  taken_.set(body);
+  if (emitted_[body]) return Outcome::kOutOfRange;
+  emitted_.set(body);
   frame.header.device_ns = device_ns_;
   frame.timecode = timecode_;
   frame.skeleton = layout_->bodies[body].skeleton->id;
@@ -156,7 +156,7 @@ Outcome NatNetDecoder::emit(std::size_t body, Frame& frame, Sink& sink) noexcept
 }
 
 // A body that the description does not have came after it. RT-safe.
-Outcome NatNetDecoder::take_rigid_body(ByteReader& reader, Sink& sink) noexcept {
+Outcome NatNetDecoder::accept_rigid_body(ByteReader& reader, Sink& sink) noexcept {
   RigidBody rigid;
   if (!read_rigid_body(reader, reading_, false, rigid)) return Outcome::kShort;
   const std::size_t body = layout_->body_of(false, rigid.id);
@@ -169,9 +169,9 @@ Outcome NatNetDecoder::take_rigid_body(ByteReader& reader, Sink& sink) noexcept 
   frame.joint_count = 1;
   frame.root_position_m = from_motive(rigid.position_m, settings_.z_up);
   frame.rotation_xyzw[0] = from_motive(rigid.rotation_xyzw, settings_.z_up);
-  const bool sound =
-      is_plausible(frame.root_position_m) && take_rotation(frame.rotation_xyzw[0], has_rotation);
-  if (!sound) return Outcome::kOutOfRange;
+  const bool valid =
+      is_plausible(frame.root_position_m) && accept_rotation(frame.rotation_xyzw[0], has_rotation);
+  if (!valid) return Outcome::kOutOfRange;
   frame.valid[0] = rigid.tracked && has_rotation;
   if (!frame.valid[0]) {
     frame.rotation_xyzw[0] = kIdentity;
@@ -181,39 +181,39 @@ Outcome NatNetDecoder::take_rigid_body(ByteReader& reader, Sink& sink) noexcept 
 }
 
 // RT-safe.
-Outcome NatNetDecoder::take_skeleton(ByteReader& reader, Sink& sink) noexcept {
+Outcome NatNetDecoder::accept_skeleton(ByteReader& reader, Sink& sink) noexcept {
   const std::int32_t id = reader.i32();
   const auto bones = static_cast<std::size_t>(reader.i32());  // checked by read_frame
   const std::size_t body = layout_->body_of(true, id);
   const bool known = body < layout_->bodies.size();
   SkeletonPose pose(known ? layout_->tables[body] : nobody_);
-  bool sound = known;
+  bool valid = known;
   for (std::size_t i = 0; i < bones; ++i) {
     RigidBody bone;
     if (!read_rigid_body(reader, reading_, true, bone)) return Outcome::kShort;
     bone.position_m = from_motive(bone.position_m, settings_.z_up);
     bone.rotation_xyzw = from_motive(bone.rotation_xyzw, settings_.z_up);
-    sound = sound && pose.add(bone);
+    valid = valid && pose.add(bone);
   }
   if (!known) requests_.bodies_changed();
   Frame frame;
-  if (!sound || !pose.fill(settings_.coordinates, frame)) return Outcome::kOutOfRange;
+  if (!valid || !pose.fill(settings_.coordinates, frame)) return Outcome::kOutOfRange;
   return emit(body, frame, sink);
 }
 
 // RT-safe.
-Outcome NatNetDecoder::take_markers(const FrameView& view, Sink& sink) noexcept {
+Outcome NatNetDecoder::accept_markers(const FrameView& view, Sink& sink) noexcept {
   Outcome worst = Outcome::kOk;
   for (std::size_t body = 0; body < layout_->tables.size(); ++body) {
     if (layout_->tables[body].markers == 0) continue;
-    worst = worse(worst, take_markers_of(body, view.labelled, sink));
+    worst = worse(worst, accept_markers_of(body, view.labelled, sink));
   }
   return worst;
 }
 
 // A marker that the cameras do not see is filled in by Motive: it is not valid. RT-safe.
-Outcome NatNetDecoder::take_markers_of(std::size_t body, const Entries& labelled,
-                                       Sink& sink) noexcept {
+Outcome NatNetDecoder::accept_markers_of(std::size_t body, const Entries& labelled,
+                                         Sink& sink) noexcept {
   const BodyTable& table = layout_->tables[body];
   Sample sample;
   bool any = false;

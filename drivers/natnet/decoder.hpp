@@ -41,21 +41,21 @@ class NatNetDecoder final : public Decoder {
   // After so many frames in a row that its reading does not fit, the version was a wrong guess.
   static constexpr int kMaxMisfits = 8;
 
-  [[nodiscard]] Outcome take(const Message& message, Sink& sink) noexcept;
-  [[nodiscard]] Outcome take_server_info(std::span<const std::byte> payload) noexcept;
-  [[nodiscard]] Outcome take_response(std::span<const std::byte> payload) noexcept;
-  [[nodiscard]] Outcome take_model_def(std::span<const std::byte> payload, Sink& sink) noexcept;
-  [[nodiscard]] Outcome take_frame(std::span<const std::byte> payload, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept(const Message& message, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_server_info(std::span<const std::byte> payload) noexcept;
+  [[nodiscard]] Outcome accept_response(std::span<const std::byte> payload) noexcept;
+  [[nodiscard]] Outcome accept_model_def(std::span<const std::byte> payload, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_frame(std::span<const std::byte> payload, Sink& sink) noexcept;
 
   // Reads the frame with the reading that fits; false when none does.
   [[nodiscard]] bool read(std::span<const std::byte> payload, FrameView& view) noexcept;
-  [[nodiscard]] Outcome take_bodies(const FrameView& view, Sink& sink) noexcept;
-  [[nodiscard]] Outcome take_rigid_body(ByteReader& reader, Sink& sink) noexcept;
-  [[nodiscard]] Outcome take_skeleton(ByteReader& reader, Sink& sink) noexcept;
-  [[nodiscard]] Outcome take_markers(const FrameView& view, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_bodies(const FrameView& view, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_rigid_body(ByteReader& reader, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_skeleton(ByteReader& reader, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_markers(const FrameView& view, Sink& sink) noexcept;
   // The markers of one body; emits them if there are any.
-  [[nodiscard]] Outcome take_markers_of(std::size_t body, const Entries& labelled,
-                                        Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_markers_of(std::size_t body, const Entries& labelled,
+                                          Sink& sink) noexcept;
   // Emits the body's frame, once for each packet.
   [[nodiscard]] Outcome emit(std::size_t body, Frame& frame, Sink& sink) noexcept;
 
@@ -71,7 +71,7 @@ class NatNetDecoder final : public Decoder {
   std::int64_t device_ns_ = kNoTime_ns;  // of the frame at hand
   Timecode timecode_{};                  // the same
   DatagramOrder order_{32};
-  std::bitset<kMaxBodies> taken_;  // bodies of the frame at hand so far
+  std::bitset<kMaxBodies> emitted_;  // bodies of the frame at hand so far
   const BodyTable nobody_{};
   Requests requests_;
   std::array<std::byte, 64 * 1024 + kDescriptionHeadBytes> description_{};

@@ -11,7 +11,7 @@ Requests::Requests(bool unicast)
       alive_{.datagram = encode_message(MessageId::kKeepAlive, {}), .wanted = unicast} {}
 
 // A server that says who it is may have restarted, with other bodies. RT-safe.
-void Requests::take_server_info() noexcept {
+void Requests::accept_server_info() noexcept {
   connect_.wanted = false;
   rate_.wanted = true;
   bodies_.wanted = true;
@@ -26,7 +26,7 @@ bool Requests::is_due(Question& question, std::int64_t now_ns) noexcept {
 
 // The rate before the bodies, whose description carries it. RT-safe.
 std::span<const std::byte> Requests::next(std::int64_t now_ns) noexcept {
-  if (heard_ns_ != kNoTime_ns && now_ns - heard_ns_ > kSilence_ns) connect_.wanted = true;
+  if (received_ns_ != kNoTime_ns && now_ns - received_ns_ > kSilence_ns) connect_.wanted = true;
   if (is_due(connect_, now_ns)) return connect_.datagram;
   if (connect_.wanted) return {};
   if (is_due(rate_, now_ns)) return rate_.datagram;

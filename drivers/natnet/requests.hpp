@@ -1,6 +1,6 @@
 // Requests: what to ask a NatNet server next. It is asked who it is until it answers and again when
 // it was silent, for its frame rate, for its bodies whenever they may have changed, and over
-// unicast it is told every second that somebody listens. One datagram per call.
+// unicast it also says every second that somebody listens. One datagram per call.
 #pragma once
 
 #include <cstddef>
@@ -20,10 +20,10 @@ class Requests {
   explicit Requests(bool unicast);  // cold
 
   // What came from the server. RT-safe.
-  void heard(std::int64_t arrival_ns) noexcept { heard_ns_ = arrival_ns; }
-  void take_server_info() noexcept;
-  void take_rate() noexcept { rate_.wanted = false; }
-  void take_bodies() noexcept { bodies_.wanted = false; }
+  void received(std::int64_t arrival_ns) noexcept { received_ns_ = arrival_ns; }
+  void accept_server_info() noexcept;
+  void accept_rate() noexcept { rate_.wanted = false; }
+  void accept_bodies() noexcept { bodies_.wanted = false; }
   void bodies_changed() noexcept { bodies_.wanted = true; }
 
   // The datagram to send now; empty: none. RT-safe.
@@ -42,7 +42,7 @@ class Requests {
   [[nodiscard]] static bool is_due(Question& question, std::int64_t now_ns) noexcept;
 
   Question connect_, rate_, bodies_, alive_;
-  std::int64_t heard_ns_ = kNoTime_ns;
+  std::int64_t received_ns_ = kNoTime_ns;
 };
 
 }  // namespace posed::drivers::natnet

@@ -15,7 +15,7 @@ constexpr float kMaxLag_ms = 60'000.0F;
 
 // Puts rotations and validity of all joints in their places; false when they are none of this
 // skeleton. RT-safe.
-bool take_joints(const UpstreamFrame& upstream, std::size_t joints, Frame& frame) noexcept {
+bool read_joints(const UpstreamFrame& upstream, std::size_t joints, Frame& frame) noexcept {
   if (upstream.rotation_xyzw.count != 4 * joints || upstream.validity.size() != joints) {
     return false;
   }
@@ -23,7 +23,7 @@ bool take_joints(const UpstreamFrame& upstream, std::size_t joints, Frame& frame
     Quatf& rotation = frame.rotation_xyzw[j];
     std::copy_n(&upstream.rotation_xyzw.values[4 * j], 4, rotation.begin());
     bool seen = false;
-    if (!take_rotation(rotation, seen)) return false;
+    if (!accept_rotation(rotation, seen)) return false;
     frame.valid[j] = seen && upstream.validity[j] != std::byte{0};
   }
   frame.joint_count = static_cast<std::uint16_t>(joints);
@@ -32,32 +32,32 @@ bool take_joints(const UpstreamFrame& upstream, std::size_t joints, Frame& frame
 
 // The angles of the rotation channels, if the upstream sends them. Of a joint that was not measured
 // an angle may be NaN. RT-safe.
-bool take_angles(const UpstreamFrame& upstream, const Skeleton& skeleton, Frame& frame) noexcept {
+bool read_angles(const UpstreamFrame& upstream, const Skeleton& skeleton, Frame& frame) noexcept {
   const std::size_t count = upstream.angle_rad.count;
   if (count == 0) return true;
-  std::size_t taken = 0;
+  std::size_t used = 0;
   for (const Channel& channel : skeleton.channels) {
     if (channel.translation) continue;
-    if (taken == count) return false;
-    const float angle_rad = upstream.angle_rad.values[taken];
+    if (used == count) return false;
+    const float angle_rad = upstream.angle_rad.values[used];
     const bool finite = std::isfinite(angle_rad);
     if (finite ? std::abs(angle_rad) > kMaxAngle_rad : frame.valid[channel.joint]) return false;
-    frame.angle_rad[taken++] = angle_rad;
+    frame.angle_rad[used++] = angle_rad;
   }
-  frame.angle_count = static_cast<std::uint16_t>(taken);
-  return taken == count;
+  frame.angle_count = static_cast<std::uint16_t>(used);
+  return used == count;
 }
 
 // What the upstream says of the pose beside the joints. RT-safe.
-bool take_words(const UpstreamFrame& upstream, Frame& frame) noexcept {
+bool read_words(const UpstreamFrame& upstream, Frame& frame) noexcept {
   const float probability = upstream.label_probability;
-  const bool sound = upstream.quality <= static_cast<std::uint64_t>(Quality::kStale) &&
+  const bool valid = upstream.quality <= static_cast<std::uint64_t>(Quality::kStale) &&
                      upstream.source <= static_cast<std::uint64_t>(Source::kLabels) &&
                      (upstream.label.empty() || is_label_name(upstream.label)) &&
                      probability >= 0.0F && probability <= 1.0F &&
                      upstream.lag_frames <= kMaxLag_frames && upstream.lag_ms >= 0.0F &&
                      upstream.lag_ms <= kMaxLag_ms;  // false for NaN
-  if (!sound) return false;
+  if (!valid) return false;
   frame.quality = static_cast<Quality>(upstream.quality);
   frame.source = static_cast<Source>(upstream.source);
   std::ranges::copy(upstream.label, frame.label.begin());
@@ -73,14 +73,14 @@ bool take_words(const UpstreamFrame& upstream, Frame& frame) noexcept {
 // RT-safe.
 void UpstreamDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
                            Sink& sink) noexcept {
-  sink.outcome(take(bytes, sink));
+  sink.outcome(accept(bytes, sink));
 }
 
 // RT-safe.
-Outcome UpstreamDecoder::take(std::span<const std::byte> bytes, Sink& sink) noexcept {
+Outcome UpstreamDecoder::accept(std::span<const std::byte> bytes, Sink& sink) noexcept {
   UpstreamMessage message;
   if (!split_message(bytes, message)) return Outcome::kShort;
-  if (message.topic == pose_topic_) return take_pose(message.body, sink);
+  if (message.topic == pose_topic_) return accept_pose(message.body, sink);
   if (message.topic != skeleton_topic_) return Outcome::kForeign;
   if (message.body.empty()) return Outcome::kShort;
   if (is_of_other_stream(message.body, stream_)) return Outcome::kForeign;
@@ -89,7 +89,7 @@ Outcome UpstreamDecoder::take(std::span<const std::byte> bytes, Sink& sink) noex
 }
 
 // RT-safe.
-Outcome UpstreamDecoder::take_pose(std::span<const std::byte> body, Sink& sink) noexcept {
+Outcome UpstreamDecoder::accept_pose(std::span<const std::byte> body, Sink& sink) noexcept {
   upstream_ = {};
   if (const Outcome read = read_frame(body, upstream_); read != Outcome::kOk) return read;
   // Until its skeleton comes, a pose says nothing.
@@ -97,18 +97,18 @@ Outcome UpstreamDecoder::take_pose(std::span<const std::byte> body, Sink& sink) 
   const Skeleton& skeleton = *layout_->bodies[0].skeleton;
   Frame frame;
   frame.skeleton = skeleton.id;
-  const bool sound = take_joints(upstream_, skeleton.joints.size(), frame) &&
-                     take_angles(upstream_, skeleton, frame) && take_words(upstream_, frame) &&
+  const bool valid = read_joints(upstream_, skeleton.joints.size(), frame) &&
+                     read_angles(upstream_, skeleton, frame) && read_words(upstream_, frame) &&
                      upstream_.root_position_m.count == 3 &&
                      is_plausible(upstream_.root_position_m.values);
-  if (!sound) return Outcome::kOutOfRange;
+  if (!valid) return Outcome::kOutOfRange;
   // While its own source is silent the upstream repeats the last pose once a second. That is no
   // sign of life, also for who has only just connected: the stream becomes or stays stale here,
   // too.
   if (frame.quality == Quality::kStale) return Outcome::kDuplicate;
-  if (const Outcome order = order_.take(upstream_.sequence); order != Outcome::kOk) return order;
+  if (const Outcome order = order_.accept(upstream_.sequence); order != Outcome::kOk) return order;
   // The sequence says what is new; a clock that was set back only stops the time.
-  static_cast<void>(clock_.take(seconds(upstream_.arrival_ns)));
+  static_cast<void>(clock_.accept(seconds(upstream_.arrival_ns)));
   frame.header.device_ns = clock_.device_ns();
   frame.root_position_m = upstream_.root_position_m.values;
   sink.frame(0, frame);

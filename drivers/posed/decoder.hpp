@@ -30,8 +30,8 @@ class UpstreamDecoder final : public Decoder {
   }
 
  private:
-  [[nodiscard]] Outcome take(std::span<const std::byte> bytes, Sink& sink) noexcept;
-  [[nodiscard]] Outcome take_pose(std::span<const std::byte> body, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept(std::span<const std::byte> bytes, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_pose(std::span<const std::byte> body, Sink& sink) noexcept;
 
   std::string stream_, pose_topic_, skeleton_topic_;
   const UpstreamLayout* layout_ = nullptr;  // null until the upstream has sent a skeleton

@@ -36,7 +36,7 @@ constexpr std::uint32_t kSkeletonStream = 1;
 
 // Adds one number or several packed ones; false if they do not fit. RT-safe.
 template <std::size_t N>
-bool take_floats(const WireField& field, FloatList<N>& list) noexcept {
+bool read_floats(const WireField& field, FloatList<N>& list) noexcept {
   if (field.type == WireType::kFixed32) {
     if (list.count == N) return false;
     list.values[list.count++] = field.as_float();
@@ -51,22 +51,22 @@ bool take_floats(const WireField& field, FloatList<N>& list) noexcept {
 }
 
 // RT-safe.
-bool take_number(const WireField& field, std::uint64_t& value) noexcept {
+bool read_number(const WireField& field, std::uint64_t& value) noexcept {
   value = field.value;
   return field.type == WireType::kVarint;
 }
 
 // RT-safe.
-bool take_float(const WireField& field, float& value) noexcept {
+bool read_float(const WireField& field, float& value) noexcept {
   value = field.as_float();
   return field.type == WireType::kFixed32;
 }
 
 // False for a field of another type than the schema's, or too long a list. RT-safe.
-bool take_field(const WireField& field, UpstreamFrame& frame) noexcept {
+bool read_field(const WireField& field, UpstreamFrame& frame) noexcept {
   switch (field.number) {
     case kSequence:
-      return take_number(field, frame.sequence);
+      return read_number(field, frame.sequence);
     case kArrival:
       frame.arrival_ns = static_cast<std::int64_t>(field.value);
       return field.type == WireType::kVarint;
@@ -74,27 +74,27 @@ bool take_field(const WireField& field, UpstreamFrame& frame) noexcept {
       frame.skeleton_id = static_cast<std::uint32_t>(field.value);
       return field.type == WireType::kFixed32;
     case kRootPosition:
-      return take_floats(field, frame.root_position_m);
+      return read_floats(field, frame.root_position_m);
     case kRotation:
-      return take_floats(field, frame.rotation_xyzw);
+      return read_floats(field, frame.rotation_xyzw);
     case kValidity:
       frame.validity = field.bytes;
       return field.type == WireType::kBytes;
     case kAngle:
-      return take_floats(field, frame.angle_rad);
+      return read_floats(field, frame.angle_rad);
     case kQuality:
-      return take_number(field, frame.quality);
+      return read_number(field, frame.quality);
     case kSource:
-      return take_number(field, frame.source);
+      return read_number(field, frame.source);
     case kLabel:
       frame.label = field.text();
       return field.type == WireType::kBytes;
     case kLabelProbability:
-      return take_float(field, frame.label_probability);
+      return read_float(field, frame.label_probability);
     case kLagFrames:
-      return take_number(field, frame.lag_frames);
+      return read_number(field, frame.lag_frames);
     case kLag:
-      return take_float(field, frame.lag_ms);
+      return read_float(field, frame.lag_ms);
     case kTimecode:
       frame.timecode = field.text();
       return field.type == WireType::kBytes;
@@ -129,7 +129,7 @@ Outcome read_frame(std::span<const std::byte> body, UpstreamFrame& frame) noexce
   WireReader fields(body);
   WireField field;
   while (fields.next(field)) {
-    if (!take_field(field, frame)) return Outcome::kOutOfRange;
+    if (!read_field(field, frame)) return Outcome::kOutOfRange;
   }
   return fields.ok() ? Outcome::kOk : Outcome::kShort;
 }
@@ -158,9 +158,9 @@ Result<UpstreamInfo> parse_device_info(const std::string& text, const std::strin
     info.stream = text.substr(kPrefix.size(), rate - kPrefix.size());
     const char* const end = text.data() + text.size();
     const auto [stop, error] = std::from_chars(text.data() + rate + 6, end, info.rate_hz);
-    const bool sound = error == std::errc() && stop == end && info.rate_hz > 0.0 &&
+    const bool valid = error == std::errc() && stop == end && info.rate_hz > 0.0 &&
                        info.rate_hz <= kMaxRate_hz && is_upstream_stream(info.stream);
-    if (sound) return info;
+    if (valid) return info;
   }
   return fail(
       "is not described as a posed stream ('posed stream=ann rate=60'); is it another"

@@ -1,5 +1,6 @@
 // WireReader: the fields of a protobuf message, one after the other, from untrusted bytes and
-// without allocation (protobuf's own parser allocates). protobuf.dev, "Encoding".
+// without allocation and without exceptions: protobuf's own parser allocates, and protozero's
+// throws at what is no message, which hot code may not. protobuf.dev, "Encoding".
 #pragma once
 
 #include <bit>
@@ -48,7 +49,7 @@ class WireReader {
         return fixed(8, field.value);
       case 2:
         field.type = WireType::kBytes;
-        return take(varint(), field.bytes);
+        return accept(varint(), field.bytes);
       case 5:
         field.type = WireType::kFixed32;
         return fixed(4, field.value);
@@ -77,7 +78,7 @@ class WireReader {
     stop();
     return 0;
   }
-  bool take(std::uint64_t count, std::span<const std::byte>& bytes) noexcept {
+  bool accept(std::uint64_t count, std::span<const std::byte>& bytes) noexcept {
     if (!ok_ || count > left_.size()) return stop();
     bytes = left_.first(static_cast<std::size_t>(count));
     left_ = left_.subspan(static_cast<std::size_t>(count));
@@ -88,7 +89,7 @@ class WireReader {
     static_assert(std::endian::native == std::endian::little);
     std::span<const std::byte> bytes;
     value = 0;
-    if (!take(count, bytes)) return false;
+    if (!accept(count, bytes)) return false;
     std::memcpy(&value, bytes.data(), count);
     return true;
   }

@@ -29,9 +29,9 @@ void set_rotations(const BodyPlan& plan, const Skeleton& skeleton, const SeenBod
 void StudioDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                          Sink& sink) noexcept {
   Outcome outcome = read(bytes);
-  if (outcome == Outcome::kOk) outcome = clock_.take(frame_.timestamp_s);
-  const std::int64_t heard_ns = heard_.to(arrival_ns);
-  if (outcome == Outcome::kOk) outcome = take_frame(heard_ns, sink);
+  if (outcome == Outcome::kOk) outcome = clock_.accept(frame_.timestamp_s);
+  const std::int64_t active_ns = active_time_.to(arrival_ns);
+  if (outcome == Outcome::kOk) outcome = accept_frame(active_ns, sink);
   sink.outcome(outcome);
 }
 
@@ -46,24 +46,24 @@ Outcome StudioDecoder::read(std::span<const std::byte> bytes) noexcept {
 }
 
 // RT-safe.
-Outcome StudioDecoder::take_frame(std::int64_t heard_ns, Sink& sink) noexcept {
+Outcome StudioDecoder::accept_frame(std::int64_t active_ns, Sink& sink) noexcept {
   Outcome worst = Outcome::kOk;
   std::array<SeenBody, kMaxParts> bodies;
   for (std::size_t i = 0; i < frame_.count; ++i) {
     const Subject& subject = frame_.subjects[i];
-    const std::size_t count = subject.sound ? bodies_of(subject, bodies) : 0;
-    if (!subject.sound) worst = Outcome::kOutOfRange;
+    const std::size_t count = subject.valid ? bodies_of(subject, bodies) : 0;
+    if (!subject.valid) worst = Outcome::kOutOfRange;
     for (std::size_t k = 0; k < count; ++k) {
-      if (!roster_.take(bodies[k], heard_ns)) worst = Outcome::kOutOfRange;
+      if (!roster_.accept(bodies[k], active_ns)) worst = Outcome::kOutOfRange;
     }
   }
-  const auto description = roster_.describe(heard_ns);
+  const auto description = roster_.describe(active_ns);
   if (!description.empty()) sink.description(description);
   if (layout_ == nullptr) return Outcome::kForeign;
   taken_.reset();
   for (std::size_t i = 0; i < frame_.count; ++i) {
     const Subject& subject = frame_.subjects[i];
-    const std::size_t count = subject.sound ? bodies_of(subject, bodies) : 0;
+    const std::size_t count = subject.valid ? bodies_of(subject, bodies) : 0;
     for (std::size_t k = 0; k < count; ++k) {
       const Outcome one = emit(bodies[k], sink);
       if (worst == Outcome::kOk) worst = one;

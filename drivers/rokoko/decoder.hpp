@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <span>
 
+#include "drivers/active_time.hpp"
 #include "drivers/driver.hpp"
-#include "drivers/heard_time.hpp"
 #include "drivers/rokoko/layout.hpp"
 #include "drivers/rokoko/roster.hpp"
 #include "drivers/rokoko/studio_frame.hpp"
@@ -32,13 +32,13 @@ class StudioDecoder final : public Decoder {
   static constexpr std::size_t kMaxJson = 256 * 1024;  // bytes that a datagram may unpack to
 
   [[nodiscard]] Outcome read(std::span<const std::byte> bytes) noexcept;
-  [[nodiscard]] Outcome take_frame(std::int64_t heard_ns, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_frame(std::int64_t heard_ns, Sink& sink) noexcept;
   // Emits one body if it fits the layout.
   [[nodiscard]] Outcome emit(const SeenBody& seen, Sink& sink) noexcept;
   void emit_face(std::size_t body, const Subject& subject, Sink& sink) noexcept;
 
   const StudioLayout* layout_ = nullptr;  // null until the first description is in use
-  HeardTime heard_;
+  ActiveTime active_time_;
   TimestampClock clock_;
   StudioFrame frame_;
   Roster roster_;

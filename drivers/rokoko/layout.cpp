@@ -13,13 +13,13 @@ std::string body_name(const BodyKey& key, const std::vector<Body>& before) {
   std::string name = key.name.empty() ? "unnamed" : clean(key.name.text());
   if (key.part == Part::kLeftHand) name += " left hand";
   if (key.part == Part::kRightHand) name += " right hand";
-  const auto taken = [&before](const std::string& wanted) {
+  const auto is_used = [&before](const std::string& wanted) {
     return std::ranges::find(before, wanted, &Body::name) != before.end();
   };
-  if (!taken(name)) return name;
+  if (!is_used(name)) return name;
   for (int number = 2;; ++number) {
     const std::string numbered = name + ' ' + std::to_string(number);
-    if (!taken(numbered)) return numbered;
+    if (!is_used(numbered)) return numbered;
   }
 }
 

@@ -114,7 +114,7 @@ void Roster::measure(const SeenBody& seen, Entry& entry) noexcept {
 }
 
 // RT-safe.
-bool Roster::take(const SeenBody& body, std::int64_t arrival_ns) noexcept {
+bool Roster::accept(const SeenBody& body, std::int64_t arrival_ns) noexcept {
   Entry* const entry = entry_of(body.key);
   if (entry == nullptr) return false;
   if (!entry->used) {

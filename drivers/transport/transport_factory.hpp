@@ -92,7 +92,7 @@ class TransportFactory {
 
   // What people should know about the serial port that was opened last: a sentence for the log, or
   // nothing. Given once. Cold.
-  [[nodiscard]] std::string take_note() { return std::exchange(note_, {}); }
+  [[nodiscard]] std::string consume_note() { return std::exchange(note_, {}); }
 
   // Number of connections dropped so far because their address is not in the list of peers.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }

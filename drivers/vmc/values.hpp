@@ -27,7 +27,7 @@ class Values {
   void use(const VmcLayout& layout) noexcept;
 
   // True once when a name has come that the description does not have.
-  [[nodiscard]] bool take_new() noexcept { return std::exchange(new_, false); }
+  [[nodiscard]] bool consume_new() noexcept { return std::exchange(new_, false); }
 
   // True if something came since the last sample.
   [[nodiscard]] bool fresh() const noexcept { return fresh_; }

@@ -12,7 +12,6 @@
 #include "drivers/rokoko/emulator.hpp"
 #include "drivers/rokoko/json_reader.hpp"
 #include "drivers/rokoko/lz4_frame.hpp"
-#include "drivers/rokoko/xxh32.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
@@ -244,13 +243,6 @@ TEST_CASE("LZ4 bombs and damaged frames are refused") {
     CHECK(bomb.size() < kMaxChunk);
     CHECK(outcome_of(bomb) == Outcome::kOutOfRange);
   }
-}
-
-TEST_CASE("XXH32 gives the values of its specification's test vectors") {
-  CHECK(xxh32({}) == 0x02CC5D05);
-  CHECK(xxh32(bytes_of("a")) == 0x550D7456);
-  CHECK(xxh32(bytes_of("abc")) == 0x32D153FF);
-  CHECK(xxh32(bytes_of("Nobody inspects the spammish repetition")) == 0xE2293B2F);
 }
 
 TEST_CASE("any bytes for Studio's decoder: one outcome each, sound frames, no allocation") {

@@ -1,5 +1,5 @@
-// HeardTime: the arrival time without the pauses of the sender. A decoder that forgets what has not
-// come for a while measures by it, so that a silent network or a paused system ends nothing.
+// ActiveTime: the arrival time without the pauses of the sender. A decoder that forgets what has
+// not come for a while measures by it, so that a silent network or a paused system ends nothing.
 #pragma once
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 
 namespace posed::drivers {
 
-class HeardTime {
+class ActiveTime {
  public:
   // Call it for every datagram. Begins with the first arrival and never decreases. RT-safe.
   [[nodiscard]] std::int64_t to(std::int64_t arrival_ns) noexcept {
