@@ -4,7 +4,6 @@
 
 #include "drivers/axis/decoder.hpp"
 #include "drivers/axis/emulator.hpp"
-#include "drivers/axis/layout.hpp"
 #include "drivers/glove/device_info.hpp"
 #include "drivers/source_type.hpp"
 #include "proto/clip/text.hpp"

@@ -1,14 +1,101 @@
 #include "drivers/natnet/decoder.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <string_view>
 
 #include "drivers/byte_reader.hpp"
+#include "drivers/glove/device_info.hpp"
 #include "drivers/natnet/axes.hpp"
+#include "drivers/natnet/protocol.hpp"
 #include "drivers/natnet/skeleton_pose.hpp"
 #include "drivers/pose_values.hpp"
 
 namespace posed::drivers::natnet {
+
+namespace {
+
+constexpr std::array<std::string_view, 2> kUps{"y", "z"};
+constexpr std::array<std::string_view, 3> kCoordinates{"auto", "local", "global"};
+constexpr std::array<std::string_view, 2> kCasts{"multi", "uni"};
+constexpr std::string_view kAnyVersion = "auto";
+
+}  // namespace
+
+std::string settings_text(const Settings& settings) {
+  const auto word = [](const auto& words, auto index) {
+    return std::string(words[static_cast<std::size_t>(index)]);
+  };
+  const Version version = settings.version;
+  return "natnet version=" +
+         (version.known() ? std::to_string(version.major) + '.' + std::to_string(version.minor)
+                          : std::string(kAnyVersion)) +
+         " up=" + word(kUps, settings.z_up) +
+         " coordinates=" + word(kCoordinates, settings.coordinates) +
+         " cast=" + word(kCasts, settings.unicast) + " rate=" + std::to_string(settings.rate_hz);
+}
+
+Result<Settings> parse_settings(const std::string& text, const std::string& identity) {
+  glove::DeviceInfoReader reader(text, "natnet", identity);
+  Settings settings;
+  const std::string version = reader.word("version");
+  settings.z_up = reader.choice("up", kUps) == 1;
+  settings.coordinates = static_cast<Coordinates>(reader.choice("coordinates", kCoordinates));
+  settings.unicast = reader.choice("cast", kCasts) == 1;
+  settings.rate_hz = reader.whole("rate", 1, 2000);
+  if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
+  if (version == kAnyVersion) return settings;
+  const auto parsed = parse_version(version);
+  if (!parsed) return fail(parsed.error().message, identity);
+  settings.version = *parsed;
+  return settings;
+}
+
+Result<bool> parse_up(const std::string& word) {
+  if (word == "y" || word == "z") return word == "z";
+  return misuse("up should be \"y\" or \"z\", as Motive's up axis is set");
+}
+
+Result<Coordinates> parse_coordinates(const std::string& word) {
+  const auto at = std::ranges::find(kCoordinates, word);
+  if (at != kCoordinates.end()) return static_cast<Coordinates>(at - kCoordinates.begin());
+  return misuse(
+      "coordinates should be \"auto\", \"local\" or \"global\", as Motive's skeleton coordinates "
+      "are set");
+}
+
+Requests::Requests(bool unicast)
+    : connect_{.datagram = encode_connect()},
+      rate_{.datagram = encode_text(MessageId::kRequest, "FrameRate")},
+      bodies_{.datagram = encode_message(MessageId::kRequestModelDef, {})},
+      alive_{.datagram = encode_message(MessageId::kKeepAlive, {}), .wanted = unicast} {}
+
+// A server that says who it is may have restarted, with other bodies. RT-safe.
+void Requests::accept_server_info() noexcept {
+  connect_.wanted = false;
+  rate_.wanted = true;
+  bodies_.wanted = true;
+}
+
+// RT-safe.
+bool Requests::is_due(Question& question, std::int64_t now_ns) noexcept {
+  if (!question.wanted || now_ns < question.next_ns) return false;
+  question.next_ns = now_ns + kAgain_ns;
+  return true;
+}
+
+// The rate before the bodies, whose description carries it. RT-safe.
+std::span<const std::byte> Requests::next(std::int64_t now_ns) noexcept {
+  if (received_ns_ != kNoTime_ns && now_ns - received_ns_ > kSilence_ns) connect_.wanted = true;
+  if (is_due(connect_, now_ns)) return connect_.datagram;
+  if (connect_.wanted) return {};
+  if (is_due(rate_, now_ns)) return rate_.datagram;
+  if (is_due(bodies_, now_ns)) return bodies_.datagram;
+  if (is_due(alive_, now_ns)) return alive_.datagram;
+  return {};
+}
+
 namespace {
 
 constexpr float kLeastRate_hz = 1.0F;

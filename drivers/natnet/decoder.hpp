@@ -8,16 +8,77 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "drivers/datagram_order.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/natnet/device_time.hpp"
 #include "drivers/natnet/frame.hpp"
 #include "drivers/natnet/layout.hpp"
-#include "drivers/natnet/requests.hpp"
-#include "drivers/natnet/settings.hpp"
+#include "drivers/natnet/protocol.hpp"
+#include "proto/frame/result.hpp"
+#include "proto/frame/time.hpp"
 
 namespace posed::drivers::natnet {
+
+// What a NatNet decoder must know beside the bytes: the device info in Description::text.
+
+// In which frame the server streams the bones of skeletons; kAuto: found out from each skeleton.
+enum class Coordinates : std::uint8_t { kAuto, kLocal, kGlobal };
+
+struct Settings {
+  Version version;  // unknown: as the server says
+  bool z_up = false;
+  Coordinates coordinates = Coordinates::kAuto;
+  bool unicast = false;
+  int rate_hz = 120;  // until the server says it
+};
+
+// "natnet version=auto up=y coordinates=auto cast=multi rate=120", and back. Cold.
+[[nodiscard]] std::string settings_text(const Settings& settings);
+[[nodiscard]] Result<Settings> parse_settings(const std::string& text, const std::string& identity);
+
+// The words of the options.
+[[nodiscard]] Result<bool> parse_up(const std::string& word);
+[[nodiscard]] Result<Coordinates> parse_coordinates(const std::string& word);
+
+// Requests: what to ask a NatNet server next. It is asked who it is until it answers and again when
+// it was silent, for its frame rate, for its bodies whenever they may have changed, and over
+// unicast it also says every second that somebody listens. One datagram per call.
+
+class Requests {
+ public:
+  // How often next() should be called.
+  static constexpr std::int64_t kPeriod_ns = 100'000'000;
+
+  explicit Requests(bool unicast);  // cold
+
+  // What came from the server. RT-safe.
+  void received(std::int64_t arrival_ns) noexcept { received_ns_ = arrival_ns; }
+  void accept_server_info() noexcept;
+  void accept_rate() noexcept { rate_.wanted = false; }
+  void accept_bodies() noexcept { bodies_.wanted = false; }
+  void bodies_changed() noexcept { bodies_.wanted = true; }
+
+  // The datagram to send now; empty: none. RT-safe.
+  [[nodiscard]] std::span<const std::byte> next(std::int64_t now_ns) noexcept;
+
+ private:
+  static constexpr std::int64_t kAgain_ns = kNanosPerSecond;
+  static constexpr std::int64_t kSilence_ns = 2 * kNanosPerSecond;
+
+  struct Question {
+    std::vector<std::byte> datagram;
+    bool wanted = true;
+    std::int64_t next_ns = kNoTime_ns;  // not before
+  };
+  // Whether it is to be asked now; if so, not again for a while.
+  [[nodiscard]] static bool is_due(Question& question, std::int64_t now_ns) noexcept;
+
+  Question connect_, rate_, bodies_, alive_;
+  std::int64_t received_ns_ = kNoTime_ns;
+};
 
 class NatNetDecoder final : public Decoder {
  public:

@@ -6,7 +6,7 @@
 
 #include "drivers/byte_reader.hpp"
 #include "drivers/byte_writer.hpp"
-#include "drivers/emulate/timecode.hpp"
+#include "drivers/emulate/pace.hpp"
 #include "drivers/natnet/axes.hpp"
 #include "drivers/natnet/figure.hpp"
 #include "proto/frame/rotation.hpp"

@@ -3,13 +3,21 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "drivers/driver.hpp"
 #include "drivers/natnet/protocol.hpp"
+#include "proto/frame/humanoid.hpp"
 
 namespace posed::drivers::natnet {
+
+// The bones of Motive's skeletons by their names.
+
+// Of a name in Motive's own convention, without the skeleton's name: "LUArm". Cold.
+[[nodiscard]] std::optional<Bone> motive_bone(std::string_view name);
 
 // What the decoder needs to know of one body.
 struct BodyTable {

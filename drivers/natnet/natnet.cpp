@@ -2,7 +2,6 @@
 #include "drivers/natnet/decoder.hpp"
 #include "drivers/natnet/emulator.hpp"
 #include "drivers/natnet/layout.hpp"
-#include "drivers/natnet/settings.hpp"
 #include "drivers/source_type.hpp"
 
 namespace posed::drivers {

@@ -6,9 +6,9 @@
 #include <bitset>
 #include <cstddef>
 
+#include "drivers/natnet/decoder.hpp"
 #include "drivers/natnet/frame.hpp"
 #include "drivers/natnet/layout.hpp"
-#include "drivers/natnet/settings.hpp"
 #include "proto/frame/frame.hpp"
 
 namespace posed::drivers::natnet {

@@ -4,9 +4,9 @@
 #include <span>
 #include <string_view>
 
+#include "drivers/chain/emulator.hpp"
+#include "drivers/chain/protocol.hpp"
 #include "drivers/driver.hpp"
-#include "drivers/posed/emulator.hpp"
-#include "drivers/posed/protocol.hpp"
 #include "posed/v1/posed.pb.h"
 #include "tests/fuzz/session.hpp"
 

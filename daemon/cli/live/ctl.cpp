@@ -25,7 +25,6 @@
 #include "daemon/control/uploads.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "drivers/glove/calibration_file.hpp"
-#include "drivers/glove/load_calibration.hpp"
 #include "models/gesture/play_order.hpp"
 #include "models/stages/registry.hpp"
 #include "models/style/style_type.hpp"

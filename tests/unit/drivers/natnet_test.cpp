@@ -7,9 +7,9 @@
 #include <cmath>
 #include <fstream>
 
+#include "drivers/natnet/decoder.hpp"
 #include "drivers/natnet/emulator.hpp"
 #include "drivers/natnet/figure.hpp"
-#include "drivers/natnet/requests.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"

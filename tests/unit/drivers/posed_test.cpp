@@ -12,9 +12,9 @@
 
 #include <google/protobuf/stubs/logging.h>
 
+#include "drivers/chain/emulator.hpp"
+#include "drivers/chain/protocol.hpp"
 #include "drivers/driver.hpp"
-#include "drivers/posed/emulator.hpp"
-#include "drivers/posed/protocol.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/message/frame_message.hpp"

@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <string>
 
+#include "drivers/chain/protocol.hpp"
 #include "drivers/emulate/pace.hpp"
 #include "drivers/emulator.hpp"
-#include "drivers/posed/protocol.hpp"
 #include "proto/message/frame_message.hpp"
 
 namespace posed::drivers::chain {

@@ -1,9 +1,9 @@
-#include "drivers/posed/emulator.hpp"
+#include "drivers/chain/emulator.hpp"
 
 #include <cmath>
 #include <numbers>
 
-#include "drivers/emulate/timecode.hpp"
+#include "drivers/emulate/pace.hpp"
 #include "proto/frame/rotation.hpp"
 #include "proto/message/skeleton_message.hpp"
 

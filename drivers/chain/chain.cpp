@@ -1,8 +1,7 @@
 // The posed driver: a stream of another daemon, so that machines chain.
-#include "drivers/posed/decoder.hpp"
-#include "drivers/posed/emulator.hpp"
-#include "drivers/posed/layout.hpp"
-#include "drivers/posed/protocol.hpp"
+#include "drivers/chain/decoder.hpp"
+#include "drivers/chain/emulator.hpp"
+#include "drivers/chain/protocol.hpp"
 #include "drivers/source_type.hpp"
 
 namespace posed::drivers {

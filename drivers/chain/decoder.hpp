@@ -4,16 +4,29 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 
+#include "drivers/chain/protocol.hpp"
 #include "drivers/datagram_order.hpp"
 #include "drivers/driver.hpp"
-#include "drivers/posed/layout.hpp"
-#include "drivers/posed/protocol.hpp"
 #include "drivers/timestamp_clock.hpp"
 
 namespace posed::drivers::chain {
+
+// The one body of an upstream's stream, compiled from its skeleton message.
+
+class UpstreamLayout final : public SourceLayout {
+ public:
+  // Skeleton::id at the upstream. It differs from that of the skeleton made here, because a message
+  // carries less (proto/message/skeleton_message.hpp).
+  std::uint32_t upstream_id = 0;
+};
+
+// Driver::make_layout. Cold.
+[[nodiscard]] Result<std::unique_ptr<const SourceLayout>> make_layout(
+    std::span<const std::byte> description);
 
 class UpstreamDecoder final : public Decoder {
  public:
