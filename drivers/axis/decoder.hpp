@@ -39,7 +39,7 @@ class AxisLayout final : public SourceLayout {
 [[nodiscard]] Result<std::unique_ptr<const SourceLayout>> make_layout(
     std::span<const std::byte> description);
 
-// What the options say, because the streams do not.
+// The settings that only the options say, because the streams do not.
 struct StreamSettings {
   std::uint8_t order = 0;  // of the rotations, an index of kOrderNames
   bool datagrams = false;  // over UDP, where messages come late or twice

@@ -20,8 +20,8 @@ class Messages {
   Messages& operator=(const Messages&) = delete;
   virtual ~Messages() = default;
 
-  // A whole message. The callee counts it, unless `in_damage` is set and it is not valid: then it
-  // belongs to damage that was counted already. A binary one says whether it was valid.
+  // Receives a whole message. The callee counts it, unless `in_damage` is set and it is not valid:
+  // then it belongs to damage that was counted already. A binary one says whether it was valid.
   [[nodiscard]] virtual bool binary(std::span<const std::byte> bytes, bool in_damage) noexcept = 0;
   virtual void text(std::string_view text, bool in_damage) noexcept = 0;
   // Bytes that are no message; once for all until the next valid one.

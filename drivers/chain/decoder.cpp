@@ -71,7 +71,7 @@ bool read_angles(const UpstreamFrame& upstream, const Skeleton& skeleton, Frame&
   return used == count;
 }
 
-// What the upstream says of the pose beside the joints. RT-safe.
+// Reads what the upstream says about the pose beside the joints. RT-safe.
 bool read_words(const UpstreamFrame& upstream, Frame& frame) noexcept {
   const float probability = upstream.label_probability;
   const bool valid = upstream.quality <= static_cast<std::uint64_t>(Quality::kStale) &&

@@ -124,7 +124,7 @@ enum FrameField : std::uint32_t {
   kLag = 17,
   kTimecode = 22
 };
-// Of posed.v1.Skeleton.
+// The field number of posed.v1.Skeleton that is read here.
 constexpr std::uint32_t kSkeletonStream = 1;
 
 // Adds one number or several packed ones; false if they do not fit. RT-safe.

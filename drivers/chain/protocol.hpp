@@ -1,5 +1,5 @@
-// What another daemon publishes (proto/wire/posed/v1/posed.proto), as this driver reads it. A chunk
-// is one message of ZeroMQ: its topic, a zero byte, its body.
+// The messages that another daemon publishes (proto/wire/posed/v1/posed.proto), as this driver
+// reads them. A chunk is one message of ZeroMQ: its topic, a zero byte, its body.
 //
 //   skeleton/<stream> 00 posed.v1.Skeleton       every second, and when somebody subscribes
 //   pose/<stream>     00 posed.v1.Frame
@@ -59,8 +59,8 @@ struct UpstreamMessage {
 // another type. Fields that a later version adds are skipped. RT-safe.
 [[nodiscard]] Outcome read_frame(std::span<const std::byte> body, UpstreamFrame& frame) noexcept;
 
-// Whether posed.v1.Skeleton names a stream and it is not this one. Other damage is for make_layout
-// to find. RT-safe.
+// Returns whether posed.v1.Skeleton names a stream and it is not this one. Other damage is for
+// make_layout to find. RT-safe.
 [[nodiscard]] bool is_of_other_stream(std::span<const std::byte> skeleton,
                                       std::string_view stream) noexcept;
 
@@ -72,7 +72,8 @@ struct UpstreamInfo {
 [[nodiscard]] std::string device_info_text(const UpstreamInfo& info);
 [[nodiscard]] Result<UpstreamInfo> parse_device_info(const std::string& text,
                                                      const std::string& identity);
-// Of an upstream: [a-z0-9_-], with "-raw" at most 36 bytes.
+// Returns whether an upstream may have a stream of this name: [a-z0-9_-], with "-raw" at most 36
+// bytes.
 [[nodiscard]] bool is_upstream_stream(std::string_view name);
 
 }  // namespace posed::drivers::chain

@@ -1,6 +1,7 @@
 #include "drivers/described/decoder.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -39,6 +40,7 @@ void DescribedDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arr
     const std::span<const std::byte> all(pending_.data(), pending_bytes_);
     const std::size_t done =
         table_->delimiter.empty() ? accept_stream(all, sink) : accept_delimited(all, sink);
+    assert(done > 0 || pending_bytes_ < pending_.size());  // otherwise it would never go on
     pending_bytes_ -= done;
     std::memmove(pending_.data(), pending_.data() + done, pending_bytes_);
   }

@@ -32,8 +32,8 @@ class Pace {
 
 // The timecode that emulated devices send.
 
-// Of a generator of 30 frames per second that shows one hour at the start: hours, minutes, seconds
-// and frames, the hours in the highest byte.
+// The timecode of a generator of 30 frames per second that shows one hour at the start: hours,
+// minutes, seconds and frames, the hours in the highest byte.
 [[nodiscard]] constexpr std::uint32_t timecode_at(std::int64_t time_ns) noexcept {
   const auto frames = static_cast<std::uint32_t>(time_ns / (kNanosPerSecond / 30));
   const std::uint32_t all_seconds = frames / 30;

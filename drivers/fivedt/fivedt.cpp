@@ -78,7 +78,7 @@ Result<> start_wired(Connection& link, Side hand, bool polled) {
   return polled ? Result<>() : link.write("D");
 }
 
-// What a streaming glove has sent so far.
+// Counts what a streaming glove has sent so far.
 class Received final : public Readings {
  public:
   void reading(const Reading& reading) noexcept override {

@@ -1,12 +1,14 @@
 #include "drivers/fivedt/framer.hpp"
 
 #include <algorithm>
+#include <cassert>
 
 namespace posed::drivers::fivedt {
 
 // RT-safe.
 void Framer::feed(std::span<const std::byte> bytes, Readings& readings) noexcept {
   for (const std::byte byte : bytes) {
+    assert(pending_bytes_ < pending_.size());
     pending_[pending_bytes_++] = byte;
     while (pending_bytes_ > 0 && advance(readings)) {
     }
@@ -124,6 +126,7 @@ bool Framer::is_half_used(std::span<const std::byte> report) noexcept {
 void Framer::drop(std::size_t count) noexcept {
   std::copy(pending_.begin() + static_cast<std::ptrdiff_t>(count),
             pending_.begin() + static_cast<std::ptrdiff_t>(pending_bytes_), pending_.begin());
+  assert(count <= pending_bytes_);
   pending_bytes_ -= count;
 }
 

@@ -27,7 +27,7 @@ class Framer {
  public:
   explicit Framer(Form form) noexcept : form_(form) {}
 
-  // Takes bytes cut at any position. RT-safe.
+  // Reads bytes cut at any position. RT-safe.
   void feed(std::span<const std::byte> bytes, Readings& readings) noexcept;
 
   // The last byte that a wireless glove sent after a packet; -1: none yet. RT-safe.

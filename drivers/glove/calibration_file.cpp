@@ -44,7 +44,7 @@ void read_sensor(TableReader& table, const std::string& name, CalibrationFile& f
   file.sensors.emplace(name, std::move(*points));
 }
 
-// What a file lacks that was cut off at the end of a line.
+// Detects files truncated at a line end.
 void check_complete(TableReader& reader, int sensor_count, const CalibrationFile& file) {
   if (file.driver.empty()) reader.add_error("driver", "the calibration does not say its driver");
   reader.need("hand", "write \"right\" or \"left\"");

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cassert>
 #include <cstddef>
 #include <cstring>
 #include <span>
@@ -43,6 +44,7 @@ class LineReader {
     if (overlong_) return overlong();
     std::memcpy(text_.data() + length_, piece.data(), piece.size());
     length_ += piece.size();
+    assert(length_ <= text_.size());
   }
   template <typename Line>
   void end_line(const Line& line) noexcept {

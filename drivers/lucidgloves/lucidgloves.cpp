@@ -32,7 +32,7 @@ constexpr milliseconds kInfoPatience{150};
 constexpr milliseconds kOneRead{50};
 constexpr std::string_view kAsk = "(ZA)Z\n";  // start the stream, and send your info
 
-// What has been received from a glove so far.
+// Collects what a glove has sent so far.
 struct Seen {
   glove::LineReader<kMaxLine> lines;
   bool any = false;

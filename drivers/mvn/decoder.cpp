@@ -85,7 +85,7 @@ Outcome MvnDecoder::accept_sample(Tracked& tracked, const Head& head,
                                   std::span<const std::byte> items, Sink& sink) noexcept {
   const Outcome outcome = decode_pose(head, items, pose_);
   if (outcome != Outcome::kOk) return outcome;
-  tracked.heard_ns = now_ns_;
+  tracked.received_ns = now_ns_;
   tracked.look_at(pose_, now_ns_);
   const std::int64_t device_ns = device_time_ns(tracked, head);
   const std::size_t body = layout_ == nullptr ? 0 : layout_->body_of(head.character);
@@ -174,7 +174,7 @@ Tracked* MvnDecoder::find_or_add(std::uint8_t character) noexcept {
   Tracked* room = nullptr;
   for (Tracked& tracked : characters_) {
     if (tracked.described) continue;
-    const bool better = room == nullptr || (room->known && tracked.heard_ns < room->heard_ns);
+    const bool better = room == nullptr || (room->known && tracked.received_ns < room->received_ns);
     if (!tracked.known || better) room = &tracked;
     if (!tracked.known) break;
   }

@@ -1,5 +1,5 @@
 // Decodes MVN's datagrams, over UDP or out of a TCP stream: each sample of a character becomes one
-// Frame. The decoder also keeps the list of the characters that it hears, and describes it.
+// Frame. The decoder also keeps the list of the characters that it receives, and describes it.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // The characters of an MVN stream as bodies. MVN does not list them, so the decoder writes this
-// description of those that it hears, little-endian:
+// description of those that it receives, little-endian:
 //
 //     0     1       then each character:
 //   +-----+-------+-----------+-------+-----------+------+------------------------------------+
@@ -28,7 +28,7 @@ namespace posed::drivers::mvn {
 inline constexpr std::size_t kMaxCharacters = 32;
 inline constexpr std::size_t kMvnNameBytes = 60;
 
-// What is known about a character. Plain, because the decoder keeps it.
+// The knowledge about a character: a plain struct, because the decoder keeps it.
 struct Character {
   std::uint8_t id = 0;
   bool fingers = false;

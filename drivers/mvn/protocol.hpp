@@ -123,8 +123,8 @@ struct CharacterPose {
 // Reads the first kHeadBytes of a datagram. False: they are not from MVN. RT-safe.
 [[nodiscard]] bool read_head(std::span<const std::byte> bytes, Head& head) noexcept;
 
-// Whether a datagram of this type with these items may have such a payload. Types that posed does
-// not know may have any. RT-safe.
+// Returns whether a datagram of this type with these items may have such a payload. Types that
+// posed does not know may have any. RT-safe.
 [[nodiscard]] bool is_right_size(const Head& head, std::size_t payload_bytes) noexcept;
 
 // Bytes of an item; 0 for types whose payload is no list of equal items. RT-safe.
@@ -141,12 +141,12 @@ struct CharacterPose {
 [[nodiscard]] Outcome decode_pose(const Head& head, std::span<const std::byte> items,
                                   CharacterPose& pose) noexcept;
 
-// The character's name in type 12; empty when the datagram does not tell it. RT-safe.
+// The character's name in type 12; empty when the datagram does not have it. RT-safe.
 [[nodiscard]] Outcome decode_meta(std::span<const std::byte> payload,
                                   std::string_view& name) noexcept;
 
-// Where the body's segments are in T-pose, in posed's axes. `reported` is false for the datagrams
-// of type 13 that describe only points. RT-safe.
+// Reads the positions of the body's segments in T-pose, in posed's axes. `reported` is false for
+// the datagrams of type 13 that describe only points. RT-safe.
 [[nodiscard]] Outcome decode_scale(std::span<const std::byte> payload,
                                    std::array<Vec3f, kBodySegments>& position_m,
                                    bool& reported) noexcept;

@@ -64,7 +64,7 @@ float pelvis_height_m(const std::array<Vec3f, kSegments>& offset_m) noexcept {
 void Tracked::begin(std::uint8_t id, std::int64_t now_ns) noexcept {
   *this = Tracked();
   known = true;
-  first_ns = heard_ns = now_ns;
+  first_ns = received_ns = now_ns;
   character.id = id;
 }
 
@@ -178,7 +178,7 @@ void Tracked::look_at(const CharacterPose& pose, std::int64_t now_ns) noexcept {
 }
 
 bool Tracked::belongs(std::int64_t now_ns) const noexcept {
-  if (!has_body_ || !posed_ || now_ns - heard_ns >= kPatience_ns) return false;
+  if (!has_body_ || !posed_ || now_ns - received_ns >= kPatience_ns) return false;
   return described || (named_ && scaled_) || now_ns - first_ns >= kPatience_ns;
 }
 

@@ -22,9 +22,9 @@
 
 namespace posed::drivers::natnet {
 
-// What a NatNet decoder must know beside the bytes: the device info in Description::text.
+// The settings of a NatNet decoder, which the device info in Description::text holds.
 
-// In which frame the server streams the bones of skeletons; kAuto: found out from each skeleton.
+// The frame in which the server streams the bones of skeletons; kAuto: each skeleton shows it.
 enum class Coordinates : std::uint8_t { kAuto, kLocal, kGlobal };
 
 struct Settings {
@@ -54,7 +54,7 @@ class Requests {
 
   explicit Requests(bool unicast);  // cold
 
-  // What came from the server. RT-safe.
+  // Each of these is called when such a packet of the server has come. RT-safe.
   void received(std::int64_t arrival_ns) noexcept { received_ns_ = arrival_ns; }
   void accept_server_info() noexcept;
   void accept_rate() noexcept { rate_.wanted = false; }
@@ -73,7 +73,7 @@ class Requests {
     bool wanted = true;
     std::int64_t next_ns = kNoTime_ns;  // not before
   };
-  // Whether it is to be asked now; if so, not again for a while.
+  // Returns whether it is time to ask, and then not again for a while.
   [[nodiscard]] static bool is_due(Question& question, std::int64_t now_ns) noexcept;
 
   Question connect_, rate_, bodies_, alive_;

@@ -22,7 +22,7 @@ constexpr std::array<std::pair<std::string_view, Bone>, 5> kMotiveMiddle{{{"Hip"
                                                                           {"Neck", Bone::kNeck},
                                                                           {"Head", Bone::kHead}}};
 
-// Without their side, and the left one.
+// Limb names without the L/R prefix, with the left bone.
 constexpr std::array<std::pair<std::string_view, Bone>, 8> kMotiveLimbs{
     {{"Shoulder", Bone::kLeftShoulder},
      {"UArm", Bone::kLeftUpperArm},

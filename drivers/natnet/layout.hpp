@@ -14,12 +14,11 @@
 
 namespace posed::drivers::natnet {
 
-// The bones of Motive's skeletons by their names.
-
-// Of a name in Motive's own convention, without the skeleton's name: "LUArm". Cold.
+// Returns the bone that has this name in Motive's own convention, without the skeleton's name:
+// "LUArm". Cold.
 [[nodiscard]] std::optional<Bone> motive_bone(std::string_view name);
 
-// What the decoder needs to know of one body.
+// The table by which the decoder reads one body.
 struct BodyTable {
   std::int32_t id = 0;
   bool is_skeleton = false;

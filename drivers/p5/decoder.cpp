@@ -1,6 +1,7 @@
 #include "drivers/p5/decoder.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <limits>
 
 #include "drivers/glove/angle_map.hpp"
@@ -45,6 +46,7 @@ SampleLayout layout(const glove::Model& model) {
 void P5Decoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
                      Sink& sink) noexcept {
   for (const std::byte byte : bytes) {
+    assert(pending_bytes_ < pending_.size());
     pending_[pending_bytes_++] = byte;
     while (pending_bytes_ > 0 && advance(sink)) {
     }

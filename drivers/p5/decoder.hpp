@@ -36,7 +36,7 @@ struct Settings {
 
 class P5Decoder final : public glove::GloveDecoder {
  public:
-  // Without a rig the hand's pose is never known.
+  // Without a rig the decoder never knows the hand's pose.
   P5Decoder(std::shared_ptr<const Skeleton> skeleton,
             std::shared_ptr<const glove::Calibration> calibration, std::optional<CameraRig> rig)
       : GloveDecoder(std::move(skeleton), std::move(calibration)), rig_(std::move(rig)) {}

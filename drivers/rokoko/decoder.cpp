@@ -166,7 +166,7 @@ Outcome StudioDecoder::emit(const SeenBody& seen, Sink& sink) noexcept {
   const Subject& subject = *seen.subject;
   if (plan.face && subject.face_seen.any()) emit_face(body, subject, sink);
   if (plan.joint.empty()) return Outcome::kOk;
-  // Without the root nothing says where the body is.
+  // Nothing but the root says where the body is.
   if (!subject.placed[plan.joint[0]]) return Outcome::kOutOfRange;
   const Skeleton& skeleton = *layout_->bodies[body].skeleton;
   Frame frame;

@@ -21,7 +21,7 @@ namespace posed::drivers::rokoko {
 
 // The bodies of a Studio stream, compiled from the decoder's description.
 
-// Where the joints of a skeleton come from.
+// Says from which joints of the stream a skeleton is made.
 struct BodyPlan {
   BodyKey key;
   std::vector<std::uint8_t> joint;  // [joint of the skeleton] joint of joints.hpp

@@ -31,8 +31,8 @@ namespace posed::drivers::rokoko {
 
 enum class Part : std::uint8_t { kPerson, kLeftHand, kRightHand, kProp };
 
-// What tells one body from another: two actors' hands have the same part, an actor's hands the same
-// name.
+// The key that distinguishes bodies: two actors' hands have the same part, an actor's hands the
+// same name.
 struct BodyKey {
   Part part = Part::kPerson;
   StudioName name;

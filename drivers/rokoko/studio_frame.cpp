@@ -112,7 +112,7 @@ void read_meta(JsonReader& json, Subject& subject) noexcept {
   subject.has_right_glove = subject.has_right_glove && any_glove;
 }
 
-// Of an actor (version 3), or in the list of faces (version 2). RT-safe.
+// Reads a face, which an actor has (version 3) or the list of faces (version 2). RT-safe.
 void read_face(JsonReader& json, Subject& subject, bool alone) noexcept {
   if (!json.enter_object()) return;
   for (std::string_view key; json.next(key);) {

@@ -23,7 +23,7 @@ namespace posed::drivers {
 // Checks completed options without opening anything. Cold.
 [[nodiscard]] Result<> check_network(const Options& options);
 
-// Where the bytes come from, for people and for the log: "udp 127.0.0.1:9763". Cold.
+// Says where the bytes come from, for people and for the log: "udp 127.0.0.1:9763". Cold.
 [[nodiscard]] std::string network_identity(const Options& options);
 
 // Opens what completed options describe. Cold.

@@ -20,14 +20,14 @@ namespace posed::drivers {
 // too (a multicast group), or had it a moment ago (TCP).
 [[nodiscard]] int bind_socket(const Address& address, int kind, bool shared) noexcept;
 
-// The address that the socket is bound to.
+// Returns the address that the socket is bound to.
 [[nodiscard]] Address bound_address(int fd) noexcept;
 
 // Binds a TCP socket and lets it listen. `endpoint` is the address for sentences.
 [[nodiscard]] Result<int> listen_on(const Address& address, const std::string& endpoint,
                                     int backlog);
 
-// Whether the list names the peer's address; an empty list names this machine.
+// Returns whether the list names the peer's address; an empty list names this machine.
 [[nodiscard]] bool may_connect(const Address& peer, const std::vector<std::string>& peers);
 
 // Sets a TCP connection to a device up: small packets are sent at once, and a device that has lost

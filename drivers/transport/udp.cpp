@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cerrno>
 #include <cstring>
 #include <utility>
@@ -210,7 +211,8 @@ void UdpTransport::read_control(std::size_t i, Chunk& chunk) noexcept {
   }
 }
 
-// What the kernel dropped before is no loss either: it is counted into a Chunk that nobody gets.
+// Datagrams that the kernel dropped before are no loss either: they are counted into a Chunk that
+// nobody gets.
 Result<> UdpTransport::start(std::int64_t now_ns) {
   Chunk old;
   for (int batch = 0; batch < kMaxOldBatches && receive(now_ns); ++batch) {
@@ -262,6 +264,7 @@ Chunk UdpTransport::read(std::int64_t now_ns) noexcept {
     }
     if (!socket.keeps_to) socket.to = sender;
     if (socket.membership) group_received_ns_.store(now_ns);
+    assert(message.msg_len <= batch_->bytes[i].size());
     chunk.bytes = std::span(batch_->bytes[i]).first(message.msg_len);
     chunk.socket = static_cast<std::uint8_t>(socket_);
     break;

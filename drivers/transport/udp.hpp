@@ -21,8 +21,8 @@
 
 namespace posed::drivers {
 
-// What each socket asks the kernel to hold, about a tenth of a second of a large system; the kernel
-// gives at most net.core.rmem_max.
+// The buffer that each socket asks the kernel for, about a tenth of a second of a large system; the
+// kernel gives at most net.core.rmem_max.
 inline constexpr int kUdpBuffer_bytes = 1024 * 1024;
 
 struct UdpSocketSettings {
@@ -47,7 +47,7 @@ class UdpTransport final : public Transport, public Upkeep {
   [[nodiscard]] static Result<std::unique_ptr<UdpTransport>> open(const UdpSettings& settings);
   ~UdpTransport() override;
 
-  // Where a socket really listens: "127.0.0.1:40123". Cold.
+  // Returns the address at which a socket really listens: "127.0.0.1:40123". Cold.
   [[nodiscard]] std::string endpoint(std::size_t socket) const;
 
   [[nodiscard]] int poll_fd() const noexcept override { return epoll_; }
@@ -80,7 +80,7 @@ class UdpTransport final : public Transport, public Upkeep {
   // Fills the batch from the next socket that has datagrams; false when none has.
   [[nodiscard]] bool receive(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool may_send(const Host& host) const noexcept;
-  // Whether the socket accepts datagrams of this sender, which it then belongs to.
+  // Returns whether the socket accepts datagrams of this sender, which it then belongs to.
   [[nodiscard]] bool owns(Socket& socket, const Host& sender) const noexcept;
   // Reads the ancillary data of a datagram: its arrival time, and what the kernel dropped.
   void read_control(std::size_t i, Chunk& chunk) noexcept;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <utility>
 
 #include "drivers/transport/usb_impl.hpp"
@@ -115,6 +116,7 @@ void UsbTransport::accept(Slot& slot) noexcept {
     case LIBUSB_TRANSFER_COMPLETED:
       failures_ = 0;
       if (slot.transfer->actual_length == 0) return submit(slot);
+      assert(count_ < kTransfers);  // one for each transfer, so it never overflows
       waiting_[(first_ + count_) % kTransfers] = &slot;
       ++count_;
       return;

@@ -17,7 +17,7 @@ constexpr std::string_view kTimeAddress = "/VMC/Ext/T";
 constexpr std::string_view kAvatarAddress = "/VMC/Ext/VRM";
 constexpr std::string_view kNoBone = "LastBone";  // the end of Unity's list, which some send, too
 
-// Of the squared length: some senders round the components.
+// The tolerance of the squared length: some senders round the components.
 constexpr double kLengthTolerance = 0.01;
 
 struct Transform {

@@ -34,7 +34,7 @@ class VmcDecoder final : public Decoder {
   }
 
  private:
-  // What a datagram carries, before any of it is used.
+  // The messages that a datagram carries, before any of them is used.
   struct Survey {
     bool any = false;     // message
     bool of_vmc = false;  // at least one
@@ -71,7 +71,7 @@ class VmcDecoder final : public Decoder {
   std::bitset<kBoneCount> set_;       // bones of the frame so far
   std::bitset<kBoneCount> seen_;      // those of them that have a rotation
   bool applied_ = false;              // /VMC/Ext/Blend/Apply came since the last sample
-  // What came last, in posed's axes.
+  // The last values received, in posed's axes.
   std::array<Vec3f, kBoneCount> position_m_{};     // [bone], relative to the parent
   std::array<Quatf, kBoneCount> rotation_xyzw_{};  // [bone], relative to the parent
   Vec3f root_m_{};

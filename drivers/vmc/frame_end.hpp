@@ -21,7 +21,7 @@
 
 namespace posed::drivers::vmc {
 
-// What can end a frame: a bone's message (its index), /VMC/Ext/OK and /VMC/Ext/T.
+// The messages that can end a frame: a bone's message (its index), /VMC/Ext/OK and /VMC/Ext/T.
 inline constexpr std::size_t kOkMessage = kBoneCount;
 inline constexpr std::size_t kTimeMessage = kBoneCount + 1;
 inline constexpr std::size_t kEndMessages = kBoneCount + 2;
@@ -29,7 +29,7 @@ inline constexpr std::size_t kEndMessages = kBoneCount + 2;
 // RT-safe.
 class FrameEnd {
  public:
-  // What a datagram carried, of those messages.
+  // Those messages that a datagram carried.
   struct Received {
     std::bitset<kEndMessages> messages;
     std::size_t last = kEndMessages;  // none

@@ -1,6 +1,6 @@
-// What posed uses of the VMC protocol (https://protocol.vmc.info, version 3.1): its addresses, the
-// limits of its names, and the description that the decoder writes itself, because the protocol
-// has none.
+// The part of the VMC protocol that posed uses (https://protocol.vmc.info, version 3.1): its
+// addresses, the limits of its names, and the description that the decoder writes itself, because
+// the protocol has none.
 //
 // A description of the performer, little-endian:
 //

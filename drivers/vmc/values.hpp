@@ -23,7 +23,7 @@ class Values {
   void set(ValueKind kind, std::string_view name, std::span<const float> values,
            std::int64_t arrival_ns) noexcept;
 
-  // Which names have a place in samples. It outlives its use.
+  // Sets the names that have a place in samples. `layout` outlives its use.
   void use(const VmcLayout& layout) noexcept;
 
   // True once when a name has come that the description does not have.
