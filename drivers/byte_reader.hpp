@@ -36,13 +36,13 @@ class BasicByteReader {
       left_ = {};
       return {};
     }
-    const auto taken = left_.first(count);
+    const auto read = left_.first(count);
     left_ = left_.subspan(count);
-    return taken;
+    return read;
   }
   [[nodiscard]] std::string_view text(std::size_t count) noexcept {
-    const auto taken = bytes(count);
-    return {reinterpret_cast<const char*>(taken.data()), taken.size()};
+    const auto read = bytes(count);
+    return {reinterpret_cast<const char*>(read.data()), read.size()};
   }
 
  private:

@@ -16,14 +16,14 @@ class DatagramOrder {
 
   // kOk: newer than all before it, or the device has restarted. kLate: a newer one came before it.
   // kDuplicate: it came before. RT-safe.
-  [[nodiscard]] Outcome take(std::uint64_t number) noexcept {
+  [[nodiscard]] Outcome accept(std::uint64_t number) noexcept {
     number &= mask_;
     const std::uint64_t behind = (newest_ - number) & mask_;
     if (!seen_any_ || (behind >= kWindow && !is_ahead(behind))) return begin_at(number);
     if (behind >= kWindow) {
       const std::uint64_t ahead = mask_ - behind + 1;
       seen_ = ahead >= kWindow ? 0 : seen_ << ahead;
-      return accept(number);
+      return keep(number);
     }
     // A device that restarts soon after its start repeats numbers of the window; the number of
     // some does not change at all.
@@ -44,9 +44,9 @@ class DatagramOrder {
   Outcome begin_at(std::uint64_t number) noexcept {
     seen_any_ = true;
     seen_ = 0;
-    return accept(number);
+    return keep(number);
   }
-  Outcome accept(std::uint64_t number) noexcept {
+  Outcome keep(std::uint64_t number) noexcept {
     newest_ = number;
     seen_ |= 1;
     in_a_row_ = 0;

@@ -43,7 +43,7 @@ struct Chunk {
   std::uint32_t foreign = 0;
   std::uint32_t damaged = 0;
   // Datagrams that the kernel dropped, because nobody read in time and its buffer was full. The
-  // kernel tells them with the next datagram that it keeps.
+  // kernel reports them with the next datagram that it keeps.
   std::uint32_t kernel_dropped = 0;
 };
 
@@ -132,24 +132,24 @@ class Decoder {
   virtual void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                     Sink& sink) noexcept = 0;
 
-  // The same for one chunk of a device with several sockets. RT-safe.
+  // Decodes one chunk of a device with several sockets, as feed() does. RT-safe.
   virtual void feed_socket(std::uint8_t /*socket*/, std::span<const std::byte> bytes,
                            std::int64_t arrival_ns, Sink& sink) noexcept {
     feed(bytes, arrival_ns, sink);
   }
 
-  // From the next packet on these are the bodies. The layout comes from the same driver's
-  // make_layout and outlives its use. A device with one body ignores the call. RT-safe.
+  // Decodes the bodies of this layout from the next packet on. The layout comes from the same
+  // driver's make_layout and outlives its use. A device with one body ignores the call. RT-safe.
   virtual void use(const SourceLayout& /*layout*/) noexcept {}
 
-  // What to ask the device now, for a device with a Poll without a fixed request; empty: nothing.
+  // Returns the request to send now, for a device whose Poll has no fixed one; empty: none.
   // The bytes are valid until the next call. It may depend on what was fed before, but feed() may
   // not depend on it: a replay does not call it. RT-safe.
   [[nodiscard]] virtual Request next_request(std::int64_t /*now_ns*/) noexcept { return {}; }
 };
 
-// What is known about a device before it streams. Stored in the log; enough to decode its bytes
-// again.
+// The knowledge about a device before it streams. It is stored in the log; enough to decode its
+// bytes again.
 struct Description {
   std::string driver;  // registry name
   // Device info: the device's own header (a BVH's HIERARCHY); input of the decoder.
@@ -205,7 +205,7 @@ struct Driver {
   // described above. Cold.
   Result<std::unique_ptr<const SourceLayout>> (*make_layout)(
       std::span<const std::byte> description) = nullptr;
-  // What only gloves have; null for other devices.
+  // The functions that only gloves have; null for other devices.
   const glove::GloveTraits* glove = nullptr;
   // Emulates the device, for tests, `posed emulate` and the demo; null when there is no emulator.
   Result<std::unique_ptr<Emulator>> (*emulate)(const Options& options) = nullptr;

@@ -1,6 +1,6 @@
-// Emulator: simulates a device. It holds the device's command set and state, takes the poses of its
-// bodies and produces the bytes that the real device would send. Pure: no clock, no I/O, so that
-// tests, the demo and `posed emulate` drive the same object at any speed.
+// Emulator: simulates a device. It holds the device's command set and state, is given the poses of
+// its bodies and produces the bytes that the real device would send. Pure: no clock, no I/O, so
+// that tests, the demo and `posed emulate` drive the same object at any speed.
 #pragma once
 
 #include <cstddef>
@@ -22,20 +22,20 @@ class Emulator {
   Emulator& operator=(const Emulator&) = delete;
   virtual ~Emulator() = default;
 
-  // Of one of its bodies, as the host will learn it; null for a hand and for a body that it does
-  // not have. It never changes.
+  // Returns the skeleton of one of its bodies, as the host will learn it; null for a hand and for a
+  // body that it does not have. It never changes.
   [[nodiscard]] virtual const Skeleton* skeleton(std::size_t /*body*/) const { return nullptr; }
 
   // Sets the pose of one of its bodies from now on: a frame of that skeleton, or of a hand
   // (proto/frame/hand_skeleton.hpp). A body that it does not have is ignored.
   virtual void pose(std::size_t body, const Frame& frame) = 0;
 
-  // Takes bytes from the host: of a byte stream cut at any position, of UDP one datagram. Immediate
-  // answers are added to `answer`.
+  // Receives bytes from the host: of a byte stream cut at any position, of UDP one datagram.
+  // Immediate answers are added to `answer`.
   virtual void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) = 0;
 
-  // The same for a device with several sockets: the bytes come from this socket of the host, and
-  // the answer goes there.
+  // Receives bytes as receive() does, for a device with several sockets: they come from this socket
+  // of the host, and the answer goes there.
   virtual void receive_socket(std::uint8_t /*socket*/, std::span<const std::byte> bytes,
                               std::int64_t now_ns, Bytes& answer) {
     receive(bytes, now_ns, answer);

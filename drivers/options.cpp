@@ -1,8 +1,11 @@
 #include "drivers/options.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <sstream>
 #include <utility>
+
+#include "drivers/glove/calibrated_decoder.hpp"
 
 namespace posed::drivers {
 
@@ -21,6 +24,27 @@ std::vector<std::string> words_option(const Options& options, const std::string&
   std::vector<std::string> found;
   for (std::string word; words >> word;) found.push_back(word);
   return found;
+}
+
+std::size_t choice_option(const Options& options, const std::string& name,
+                          std::span<const std::string_view> words) {
+  const auto at = std::ranges::find(words, std::string_view(option<std::string>(options, name)));
+  assert(at != words.end());
+  return static_cast<std::size_t>(at - words.begin());
+}
+
+Result<Device> make_device(const Driver& driver, const std::string& text,
+                           const std::string& identity) {
+  auto description = driver.describe(text, identity);
+  if (!description) return std::unexpected(description.error());
+  auto decoder = driver.make_decoder(*description);
+  if (!decoder) return std::unexpected(decoder.error());
+  glove::CalibratedDecoder* const calibrated = glove::calibrated_decoder(**decoder);
+  return Device{.description = std::move(*description),
+                .transport = nullptr,
+                .decoder = std::move(*decoder),
+                .warnings = {},
+                .calibrated = calibrated};
 }
 
 }  // namespace posed::drivers

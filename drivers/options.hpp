@@ -1,7 +1,9 @@
 // Reads a driver's options: the values from the config, completed and checked against the driver's
-// list.
+// list. Cold.
 #pragma once
 
+#include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,7 +13,8 @@
 namespace posed::drivers {
 
 // Returns `given` completed with the driver's defaults; a whole number is accepted for a real one.
-// An unknown option, another type or a missing required option is misuse. Cold.
+// An unknown option, another type, a value that the list does not allow and a missing required
+// option are misuse.
 [[nodiscard]] Result<Options> complete_options(const Driver& driver, const Options& given);
 
 // Reads a completed option. A name or type that is not in the driver's list is a bug in the driver.
@@ -20,8 +23,18 @@ template <typename T>
   return std::get<T>(options.at(name));
 }
 
-// A completed option that is a list of words, separated by blanks or commas.
+// Returns the words of a completed option that is a list, separated by blanks or commas.
 [[nodiscard]] std::vector<std::string> words_option(const Options& options,
                                                     const std::string& name);
+
+// Returns the place of a completed option among its words (OptionSpec::words).
+[[nodiscard]] std::size_t choice_option(const Options& options, const std::string& name,
+                                        std::span<const std::string_view> words);
+
+// Makes description and decoder from `text` (Description::text) with the driver's own describe()
+// and make_decoder(), so that a live stream uses exactly what a log rebuilds. open() adds the
+// transport and anything else.
+[[nodiscard]] Result<Device> make_device(const Driver& driver, const std::string& text,
+                                         const std::string& identity);
 
 }  // namespace posed::drivers

@@ -20,8 +20,8 @@ namespace posed::drivers {
 // Scales a quaternion to unit length. All zero means that the joint was not seen: `seen` becomes
 // false and the rotation identity. Returns false for what is no rotation: a component that is not
 // finite, or a length further from 1 than `tolerance` explains.
-[[nodiscard]] inline bool take_rotation(Quatf& rotation_xyzw, bool& seen,
-                                        double tolerance = 1e-3) noexcept {
+[[nodiscard]] inline bool accept_rotation(Quatf& rotation_xyzw, bool& seen,
+                                          double tolerance = 1e-3) noexcept {
   double squared = 0.0;
   for (const float x : rotation_xyzw) squared += static_cast<double>(x) * static_cast<double>(x);
   seen = squared != 0.0;

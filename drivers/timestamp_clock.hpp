@@ -15,13 +15,14 @@ class TimestampClock {
  public:
   // kDuplicate: the timestamp of the newest frame again. kLate: up to kLate_s before it. kOk: all
   // others; further back is a loop or a restart. RT-safe.
-  [[nodiscard]] Outcome take(double timestamp_s) noexcept {
+  [[nodiscard]] Outcome accept(double timestamp_s) noexcept {
     if (!std::isfinite(timestamp_s)) return Outcome::kOk;  // it keeps the time of the one before
     const double step_s = timestamp_s - newest_s_;
     if (!seen_) {
       seen_ = true;
     } else if (step_s == 0.0) {
-      // Many are a system whose timestamp stands: it has no clock, but its frames are new.
+      // Many of them come from a system whose timestamp stands: it has no clock, but its frames are
+      // new.
       if (same_in_a_row_ >= kMaxLate) return Outcome::kOk;
       ++same_in_a_row_;
       return Outcome::kDuplicate;
@@ -38,7 +39,7 @@ class TimestampClock {
     return Outcome::kOk;
   }
 
-  // Of the frame that was taken last: since the first one, never less than before; kNoTime_ns
+  // Returns the time of the last accepted frame since the first one; it never decreases. kNoTime_ns
   // until one has a timestamp, and while the timestamp stands. RT-safe.
   [[nodiscard]] std::int64_t device_ns() const noexcept {
     return seen_ && same_in_a_row_ < kMaxLate ? elapsed_ns_ : kNoTime_ns;

@@ -11,6 +11,7 @@
 
 #include "daemon/system/clock.hpp"
 #include "daemon/system/realtime.hpp"
+#include "drivers/transport/socket.hpp"
 
 namespace posed::control {
 namespace {
@@ -32,11 +33,9 @@ Result<std::unique_ptr<TriggerServer>> TriggerServer::start(const std::string& l
   }
   auto wake = system::EventFd::open();
   if (!wake) return std::unexpected(wake.error());
-  const int fd = ::socket(address->storage.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (fd < 0 || ::bind(fd, address->get(), address->size) != 0) {
-    const std::string why = errno_text();
-    if (fd >= 0) ::close(fd);
-    return fail("the trigger cannot listen on " + listen + ": " + why +
+  const int fd = drivers::bind_socket(*address, SOCK_DGRAM, false);
+  if (fd < 0) {
+    return fail("the trigger cannot listen on " + listen + ": " + errno_text() +
                 "; end the program that has this port, or choose another in [trigger]");
   }
   spdlog::info("trigger: listening on {}", listen);

@@ -74,7 +74,7 @@ void DeviceSupervisor::sleep() {
       std::uint64_t rung = 0;
       [[maybe_unused]] const ssize_t cleared = ::read(wake.fd(), &rung, sizeof rung);
     }
-    if ((wait[1].revents & POLLIN) != 0 && hotplug_.take()) {
+    if ((wait[1].revents & POLLIN) != 0 && hotplug_.consume()) {
       settled_ns_ = ports_.clock() + kSettles.count();
     }
   }
@@ -145,7 +145,7 @@ void DeviceSupervisor::look_for_device() {
   source_.slot->give_back.store(false);  // that request was for the previous device
   static_cast<void>(source_.slot->in.push(device_.get()));
   ports_.reader->call();
-  const std::string note = source_.ports->take_note();
+  const std::string note = source_.ports->consume_note();
   ports_.report(v1::Event::KIND_FOUND,
                 "connected: " + device_->description.identity + (note.empty() ? "" : "; " + note));
 }

@@ -5,7 +5,7 @@
 
 #include "daemon/devices/about_stream.hpp"
 #include "daemon/devices/calibration.hpp"
-#include "drivers/glove/load_calibration.hpp"
+#include "drivers/glove/calibration_file.hpp"
 #include "drivers/transport/file.hpp"
 
 namespace posed::devices {

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "drivers/axis/layout.hpp"
+#include "drivers/axis/decoder.hpp"
 #include "proto/clip/bvh.hpp"
 
 namespace posed::output {

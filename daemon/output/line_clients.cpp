@@ -7,8 +7,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "drivers/transport/keep_alive.hpp"
-#include "drivers/transport/listener.hpp"
+#include "drivers/transport/socket.hpp"
 
 namespace posed::output {
 namespace {

@@ -6,6 +6,8 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include "drivers/transport/socket.hpp"
+
 namespace posed::output {
 namespace {
 
@@ -14,7 +16,7 @@ constexpr std::int64_t kGood_ns = 2 * kNanosPerSecond;
 
 // Connected sockets, because only those learn that nobody listens at the other side.
 Result<int> open_socket(const drivers::Address& address) {
-  const int fd = ::socket(address.storage.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  const int fd = drivers::open_socket(address, SOCK_DGRAM);
   if (fd < 0) return fail("cannot open a UDP socket (" + errno_text() + ")");
   const int yes = 1;  // who writes down a broadcast address wants that
   ::setsockopt(fd, SOL_SOCKET, SO_BROADCAST, &yes, sizeof yes);

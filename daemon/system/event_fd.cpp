@@ -3,7 +3,6 @@
 #include <cerrno>
 
 #include <sys/epoll.h>
-#include <sys/eventfd.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -23,20 +22,17 @@ std::unexpected<Error> system_error(const char* what) {
 }  // namespace
 
 Result<std::unique_ptr<EventFd>> EventFd::open() {
-  const int fd = eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
-  if (fd < 0) return system_error("cannot make an eventfd");
-  return std::unique_ptr<EventFd>(new EventFd(fd));
+  std::unique_ptr<EventFd> made(new EventFd());
+  if (made->fd() < 0) return system_error("cannot make an eventfd");
+  return made;
 }
-
-EventFd::~EventFd() { close(fd_); }
 
 void EventFd::notify() noexcept {
   // Both sides exchange the flag, and the later exchange sees what the other side did before:
   // either the consumer finds the new element, or this thread finds the consumer asleep.
   if (!asleep_.exchange(false, std::memory_order_acq_rel)) return;
-  const std::uint64_t one = 1;
   const AllowedCall allowed;
-  [[maybe_unused]] const ssize_t written = write(fd_, &one, sizeof one);
+  event_.signal();
 }
 
 void rest(std::int64_t time_ns) noexcept {

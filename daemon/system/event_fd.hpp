@@ -11,6 +11,7 @@
 #include <span>
 
 #include "daemon/system/pulse.hpp"
+#include "proto/frame/event_fd.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/time.hpp"
 
@@ -19,7 +20,6 @@ namespace posed::system {
 class EventFd {
  public:
   [[nodiscard]] static Result<std::unique_ptr<EventFd>> open();
-  ~EventFd();
   EventFd(const EventFd&) = delete;
   EventFd& operator=(const EventFd&) = delete;
 
@@ -33,11 +33,11 @@ class EventFd {
   // The consumer calls it after its wait.
   void awake() noexcept { asleep_.exchange(false, std::memory_order_acq_rel); }
 
-  [[nodiscard]] int fd() const noexcept { return fd_; }
+  [[nodiscard]] int fd() const noexcept { return event_.fd(); }
 
  private:
-  explicit EventFd(int fd) noexcept : fd_(fd) {}
-  int fd_;
+  EventFd() noexcept = default;
+  RawEventFd event_;
   // No wake-up is missed, on any memory model. Every change of the flag is an exchange with acquire
   // and release, so each one synchronizes with all earlier ones in the flag's modification order (a
   // chain of read-modify-writes keeps a release sequence whole). Suppose a producer adds an element

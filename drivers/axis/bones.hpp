@@ -24,8 +24,8 @@ using Proportions = std::array<Vec3f, kBones>;
 // An earlier bone; -1 for the hips. RT-safe.
 [[nodiscard]] int bone_parent(std::size_t bone) noexcept;
 
-// Where a bone without children ends [cm], in its own frame; zero for other bones. Streams never
-// carry it. RT-safe.
+// Returns the end [cm] of a bone without children in its own frame; zero for other bones. Streams
+// never carry it. RT-safe.
 [[nodiscard]] Vec3f bone_end_cm(std::size_t bone) noexcept;
 
 // A person of 1.73 m. RT-safe.

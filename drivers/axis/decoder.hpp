@@ -4,17 +4,42 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string_view>
+#include <vector>
 
-#include "drivers/axis/layout.hpp"
+#include "drivers/axis/description.hpp"
 #include "drivers/axis/message_reader.hpp"
 #include "drivers/axis/roster.hpp"
 #include "drivers/driver.hpp"
 
 namespace posed::drivers::axis {
 
-// What the options say, because the streams do not.
+// The avatars of an Axis stream as bodies, compiled from the decoder's own description.
+
+class AxisLayout final : public SourceLayout {
+ public:
+  struct Known {
+    Avatar avatar;
+    bool reference = false;
+  };
+  std::vector<Known> known;  // [body]
+
+  // The index of a body; bodies.size() when there is no such body. RT-safe.
+  [[nodiscard]] std::size_t body_of(const Avatar& avatar) const noexcept;
+};
+
+// The skeleton of an avatar, "Reference" above the hips if the stream has it. The joints have the
+// stream's rotation channels; reference and hips also have positions. Cold.
+[[nodiscard]] Result<std::shared_ptr<const Skeleton>> skeleton_of(const AvatarEntry& entry,
+                                                                  std::uint8_t order);
+
+// Driver::make_layout. Cold.
+[[nodiscard]] Result<std::unique_ptr<const SourceLayout>> make_layout(
+    std::span<const std::byte> description);
+
+// The settings that only the options say, because the streams do not.
 struct StreamSettings {
   std::uint8_t order = 0;  // of the rotations, an index of kOrderNames
   bool datagrams = false;  // over UDP, where messages come late or twice
@@ -41,7 +66,7 @@ class AxisDecoder final : public Decoder, private Messages {
   void damage(Outcome outcome) noexcept override { sink_->outcome(outcome); }
 
   // Emits the frame of `message_`.
-  [[nodiscard]] Outcome take_message() noexcept;
+  [[nodiscard]] Outcome accept_message() noexcept;
   void emit_frame(std::size_t body, const Present& present) noexcept;
 
   StreamSettings settings_;

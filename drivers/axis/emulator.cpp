@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "drivers/axis/layout.hpp"
+#include "drivers/axis/decoder.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::drivers::axis {

@@ -20,11 +20,11 @@ class Messages {
   Messages& operator=(const Messages&) = delete;
   virtual ~Messages() = default;
 
-  // A whole message. The callee counts it, unless `in_damage` is set and it is not sound: then it
-  // belongs to damage that was counted already. A binary one says whether it was sound.
+  // Receives a whole message. The callee counts it, unless `in_damage` is set and it is not valid:
+  // then it belongs to damage that was counted already. A binary one says whether it was valid.
   [[nodiscard]] virtual bool binary(std::span<const std::byte> bytes, bool in_damage) noexcept = 0;
   virtual void text(std::string_view text, bool in_damage) noexcept = 0;
-  // Bytes that are no message; once for all until the next sound one.
+  // Bytes that are no message; once for all until the next valid one.
   virtual void damage(Outcome outcome) noexcept = 0;
 };
 
@@ -48,7 +48,7 @@ class MessageReader {
   std::array<std::byte, kMaxText> buffer_{};
   std::size_t begin_ = 0, end_ = 0;  // of the pending bytes
   std::size_t scanned_ = 0;          // pending bytes of a text that were looked at
-  bool in_damage_ = false;           // counted; no sound message since
+  bool in_damage_ = false;           // counted; no valid message since
   bool overlong_ = false;            // a text without end: discarded up to its end
 };
 

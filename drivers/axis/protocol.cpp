@@ -52,9 +52,9 @@ Outcome read_header(std::span<const std::byte> bytes, Header& header) noexcept {
   const std::uint32_t number = reader.u32();
   header.avatar = make_avatar(number, reader.text(kNameBytes));
   header.frame_number = old ? 0 : reader.u32();
-  const bool sound = displacement && reference && major >= 1 && number <= kMaxAvatar &&
+  const bool valid = displacement && reference && major >= 1 && number <= kMaxAvatar &&
                      header.count == value_count(header.content);
-  return sound ? Outcome::kOk : Outcome::kOutOfRange;
+  return valid ? Outcome::kOk : Outcome::kOutOfRange;
 }
 
 // Whether a pose can have these values. RT-safe.
@@ -88,7 +88,7 @@ std::size_t count_words(std::string_view text) noexcept {
 
 // Removes `words` words, which are at most one name, from `text`; empty when they are too long or
 // look like values. RT-safe.
-std::string_view take_name(std::string_view& text, std::size_t words) noexcept {
+std::string_view next_name(std::string_view& text, std::size_t words) noexcept {
   const std::string_view begin = text = clip::trim(text);
   bool named = words == 1;
   for (std::size_t i = 0; i < words; ++i) {
@@ -113,7 +113,7 @@ Outcome read_text(std::string_view text, std::size_t words, Message& message) no
     content = content_of(words - ++name_words);
   }
   if (!content) return Outcome::kShort;
-  const std::string_view name = take_name(text, name_words);
+  const std::string_view name = next_name(text, name_words);
   if (name.empty()) return Outcome::kShort;
   message.avatar = make_avatar(message.avatar.number, name);
   message.content = *content;

@@ -17,7 +17,7 @@
 //    name      of the avatar, zero-terminated if shorter than 32 bytes
 //    number    u32 of the frame; 0 where the sender does not count
 //
-// The same of version 1.0:
+// A binary message of version 1.0 has this head:
 //
 //      0 1     2 .. 5     6 .. 9   10 .. 13   14 .. 17   18 .. 21   22 .. 53   54 .. 61   62 63
 //   +-------+----------+----------+----------+----------+----------+----------+----------+-------+
@@ -56,7 +56,7 @@ inline constexpr std::size_t kMaxBinary = kHeaderBytes + 4 * kMaxValues;
 inline constexpr std::size_t kMaxText = 16 * 1024;  // 45 bytes a value
 inline constexpr std::string_view kTextEnd = "||";
 
-// What the values of a message are.
+// Says which values a message has.
 struct Content {
   bool displacement = false;
   bool reference = false;
@@ -68,8 +68,8 @@ struct Content {
 [[nodiscard]] constexpr std::size_t value_count(Content content) noexcept {
   return (content.reference ? 6 : 0) + (content.displacement ? 6 * kBones : 3 + 3 * kBones);
 }
-// Where the rotations of a bone are among the values; its position, if it has one, is before them.
-// RT-safe.
+// Returns the place of a bone's rotations among the values; its position, if it has one, is before
+// them. RT-safe.
 [[nodiscard]] constexpr std::size_t rotations_at(Content content, std::size_t bone) noexcept {
   return (content.reference ? 6 : 0) + 3 + (content.displacement ? 6 : 3) * bone;
 }

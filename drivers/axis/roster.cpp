@@ -59,10 +59,10 @@ Present* Roster::find(const Avatar& avatar) noexcept {
 // RT-safe.
 void Roster::see(Present& present, const Message& message, std::int64_t now_ns) noexcept {
   // After a pause of the whole stream, each avatar gets its time to come back.
-  if (since(now_ns, heard_ns_) > kGone_ns) {
+  if (since(now_ns, received_ns_) > kGone_ns) {
     for (Present& other : all_) other.seen_ns = now_ns;
   }
-  heard_ns_ = present.seen_ns = now_ns;
+  received_ns_ = present.seen_ns = now_ns;
   if (message.frame_number != 0) count_frames(present, message.frame_number);
   if (present.entry.reference != message.content.reference) {
     present.entry.reference = message.content.reference;

@@ -37,7 +37,7 @@ class Roster {
   // The place of an avatar, a new one if needed; null when all are taken. RT-safe.
   [[nodiscard]] Present* find(const Avatar& avatar) noexcept;
 
-  // Takes a sound message of it. RT-safe.
+  // Stores a valid message of it. RT-safe.
   void see(Present& present, const Message& message, std::int64_t now_ns) noexcept;
 
   // Forgets avatars that are gone. Returns the list of the others if it is not as described before,
@@ -55,7 +55,7 @@ class Roster {
   bool changed_ = false;
   bool described_ = false;         // at least once
   std::int64_t described_ns_ = 0;  // when
-  std::int64_t heard_ns_ = 0;      // when the last message of any avatar arrived
+  std::int64_t received_ns_ = 0;   // when the last message of any avatar arrived
   std::array<std::byte, kListHeadBytes + kMaxBodies * kMaxEntryBytes> list_{};
 };
 

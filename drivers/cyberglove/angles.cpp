@@ -67,12 +67,8 @@ void uncompute_right(std::span<double> value) noexcept { uncompute_angles(Side::
 }  // namespace
 
 Result<glove::Model> glove_model(Side hand) {
-  auto map = glove::device_table("cyberglove");
-  if (!map) return std::unexpected(map.error());
-  glove::Model model{.driver = "cyberglove",
-                     .sensors = {},
-                     .parameters = {{"abduction_bias", kDefaultBias}},
-                     .map_toml = std::move(*map)};
+  glove::Model model{
+      .driver = "cyberglove", .sensors = {}, .parameters = {{"abduction_bias", kDefaultBias}}};
   for (const DefaultSensor& sensor : kDefaults) {
     constexpr double kCounts = 100.0;
     model.sensors.push_back(
@@ -88,7 +84,7 @@ Result<glove::Model> glove_model(Side hand) {
   model.compute =
       hand == Side::kLeft ? compute_measured<Side::kLeft> : compute_measured<Side::kRight>;
   model.uncompute = hand == Side::kLeft ? uncompute_left : uncompute_right;
-  return model;
+  return glove::with_device_table(std::move(model), "cyberglove");
 }
 
 // RT-safe.

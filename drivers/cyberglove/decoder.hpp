@@ -44,9 +44,9 @@ class Decoder8 final : public CyberGloveDecoder {
             Sink& sink) noexcept override;
 
  private:
-  void take_piece(Sink& sink) noexcept;
+  void accept_piece(Sink& sink) noexcept;
   [[nodiscard]] Outcome check_piece(std::span<const std::byte> piece) const noexcept;
-  void take_sample(std::span<const std::byte> piece, Sink& sink) noexcept;
+  void accept_sample(std::span<const std::byte> piece, Sink& sink) noexcept;
 
   std::array<std::byte, kMaxSample> piece_{};  // bytes since the last end mark
   std::size_t size_ = 0;
@@ -73,12 +73,12 @@ class Decoder16 final : public CyberGloveDecoder {
   void add(std::byte byte, Sink& sink) noexcept;
   void hunt(Sink& sink) noexcept;
   [[nodiscard]] bool could_be_record() const noexcept;
-  void take_record(Sink& sink) noexcept;
+  void accept_record(Sink& sink) noexcept;
 
   std::array<std::byte, kRecordBytes> record_{};
   std::size_t size_ = 0;
   std::size_t strays_ = 0;  // bytes since the last record that belong to no record
-  bool told_ = false;       // the present search has already counted an outcome
+  bool reported_ = false;   // the present search has already counted an outcome
   StampClock clock_;
 };
 

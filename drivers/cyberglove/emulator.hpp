@@ -57,12 +57,12 @@ class CyberGloveEmulator final : public glove::GloveEmulator {
   static void add(std::string_view text, Bytes& out);
   void power_up();
   // Length of the command at the start of `input`; 0 when it is incomplete.
-  [[nodiscard]] std::size_t take_command(std::string_view input, Bytes& answer);
-  [[nodiscard]] std::size_t take_query(std::string_view input, Bytes& answer) const;
-  [[nodiscard]] std::size_t take_binary_set(std::string_view input, Bytes& answer);
-  [[nodiscard]] std::size_t take_ascii_set(std::string_view input, Bytes& answer);
-  [[nodiscard]] std::size_t take_level_one(std::string_view input, Bytes& answer);
-  [[nodiscard]] std::size_t take_touch(std::string_view input, Bytes& answer);
+  [[nodiscard]] std::size_t handle_command(std::string_view input, Bytes& answer);
+  [[nodiscard]] std::size_t handle_query(std::string_view input, Bytes& answer) const;
+  [[nodiscard]] std::size_t handle_binary_set(std::string_view input, Bytes& answer);
+  [[nodiscard]] std::size_t handle_ascii_set(std::string_view input, Bytes& answer);
+  [[nodiscard]] std::size_t handle_level_one(std::string_view input, Bytes& answer);
+  [[nodiscard]] std::size_t handle_touch(std::string_view input, Bytes& answer);
   [[nodiscard]] std::optional<Values> state_of(char letter) const;
   [[nodiscard]] bool set_state(char letter, const Values& values);
   [[nodiscard]] std::array<unsigned, 3> parameter_flags() const;

@@ -1,6 +1,8 @@
 // Starts a CyberGlove: checks the device, the hand and the sensors, and sets the stream's format.
 #pragma once
 
+#include <string>
+
 #include "drivers/cyberglove/protocol.hpp"
 #include "drivers/transport/connection.hpp"
 #include "proto/frame/hand.hpp"
@@ -8,17 +10,23 @@
 
 namespace posed::drivers::cyberglove {
 
-// The settings that the options request.
+// The settings that the options request. A device info keeps only hand, layout and ticks.
 struct RequestedConfig {
   Side hand = Side::kRight;
   int sensors = 0;  // 0: accept any number
-  Layout layout;    // without the mask
+  Layout layout{};  // without the mask
   bool filter = true;
-  Period period;          // for the 8-bit form
-  int divider = 1;        // for the 16-bit form
-  bool over_tcp = false;  // Wi-Fi of a III
-  std::int64_t baud = 0;  // for the error message about a wrong one
+  Period period{};         // for the 8-bit form
+  int divider = 1;         // for the 16-bit form
+  bool over_tcp = false;   // Wi-Fi of a III
+  std::int64_t baud = 0;   // for the error message about a wrong one
+  std::int64_t ticks = 0;  // of 1/115200 s between samples; 0: unknown
 };
+
+// The device info is one line, for example
+//   cyberglove hand=right sensors=22 mask=8388479 form=8bit mode=stream time=1 status=1 ticks=1152
+//   multiplier=1                             (ticks of 1/115200 s between samples, 0: unknown)
+[[nodiscard]] std::string device_info_of(const RequestedConfig& settings);
 
 // Stops a running stream, queries and sets the box, and starts it. Returns the layout with the
 // glove's own mask. Errors: no answer, another device, glove not plugged into its box, wrong hand,

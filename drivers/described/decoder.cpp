@@ -1,6 +1,7 @@
 #include "drivers/described/decoder.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -30,7 +31,7 @@ DescribedDecoder::DescribedDecoder(std::shared_ptr<const Table> table,
 // RT-safe.
 void DescribedDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
                             Sink& sink) noexcept {
-  if (table_->link.kind == LinkKind::kHid) return take_reports(bytes, sink);
+  if (table_->link.kind == LinkKind::kHid) return accept_reports(bytes, sink);
   while (!bytes.empty()) {
     const std::size_t room = std::min(bytes.size(), pending_.size() - pending_bytes_);
     std::memcpy(pending_.data() + pending_bytes_, bytes.data(), room);
@@ -38,14 +39,15 @@ void DescribedDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arr
     bytes = bytes.subspan(room);
     const std::span<const std::byte> all(pending_.data(), pending_bytes_);
     const std::size_t done =
-        table_->delimiter.empty() ? take_stream(all, sink) : take_delimited(all, sink);
+        table_->delimiter.empty() ? accept_stream(all, sink) : accept_delimited(all, sink);
+    assert(done > 0 || pending_bytes_ < pending_.size());  // otherwise it would never go on
     pending_bytes_ -= done;
     std::memmove(pending_.data(), pending_.data() + done, pending_bytes_);
   }
 }
 
 // RT-safe.
-std::size_t DescribedDecoder::take_stream(std::span<const std::byte> bytes, Sink& sink) noexcept {
+std::size_t DescribedDecoder::accept_stream(std::span<const std::byte> bytes, Sink& sink) noexcept {
   std::size_t at = 0;
   while (at < bytes.size()) {
     const Look look = look_for_packet(*table_, bytes.subspan(at));
@@ -55,7 +57,7 @@ std::size_t DescribedDecoder::take_stream(std::span<const std::byte> bytes, Sink
       ++at;
       continue;
     }
-    const bool good = take_packet(*look.rule, bytes.subspan(at, look.bytes), sink);
+    const bool good = accept_packet(*look.rule, bytes.subspan(at, look.bytes), sink);
     // With a checksum it is certain that this is a packet, whatever its values; without one the
     // header may have been data.
     const bool sure = good || look.rule->checksum.kind != ChecksumKind::kNone;
@@ -65,8 +67,8 @@ std::size_t DescribedDecoder::take_stream(std::span<const std::byte> bytes, Sink
 }
 
 // RT-safe.
-std::size_t DescribedDecoder::take_delimited(std::span<const std::byte> bytes,
-                                             Sink& sink) noexcept {
+std::size_t DescribedDecoder::accept_delimited(std::span<const std::byte> bytes,
+                                               Sink& sink) noexcept {
   const auto& delimiter = table_->delimiter;
   std::size_t begin = 0;
   for (;;) {
@@ -74,13 +76,13 @@ std::size_t DescribedDecoder::take_delimited(std::span<const std::byte> bytes,
     const auto found = std::search(from, bytes.end(), delimiter.begin(), delimiter.end());
     if (found == bytes.end()) break;
     const auto next = static_cast<std::size_t>(found - bytes.begin()) + delimiter.size();
-    if (!std::exchange(skipping_, false)) take_piece(bytes.subspan(begin, next - begin), sink);
+    if (!std::exchange(skipping_, false)) accept_piece(bytes.subspan(begin, next - begin), sink);
     begin = next;
     searched_ = 0;
   }
   const std::size_t rest = bytes.size() - begin;
   if (rest > kMaxPacketBytes) {  // longer than any packet: discard up to the next delimiter
-    if (!std::exchange(skipping_, true)) take_piece(bytes.subspan(begin), sink);
+    if (!std::exchange(skipping_, true)) accept_piece(bytes.subspan(begin), sink);
     begin = bytes.size() - (delimiter.size() - 1);
   }
   searched_ = bytes.size() - begin;
@@ -89,19 +91,19 @@ std::size_t DescribedDecoder::take_delimited(std::span<const std::byte> bytes,
 }
 
 // RT-safe.
-void DescribedDecoder::take_piece(std::span<const std::byte> piece, Sink& sink) noexcept {
+void DescribedDecoder::accept_piece(std::span<const std::byte> piece, Sink& sink) noexcept {
   in_step_ = true;  // the delimiter limits the damage, so each piece is counted
   if (piece.size() > kMaxPacketBytes) return damaged(Outcome::kShort, sink);
   const Look look = look_for_packet(*table_, piece);
   if (look.found == Look::Found::kPacket && look.bytes == piece.size()) {
-    take_packet(*look.rule, piece, sink);
+    accept_packet(*look.rule, piece, sink);
   } else {
     damaged(look.found == Look::Found::kNothing ? look.why : Outcome::kShort, sink);
   }
 }
 
 // RT-safe.
-void DescribedDecoder::take_reports(std::span<const std::byte> bytes, Sink& sink) noexcept {
+void DescribedDecoder::accept_reports(std::span<const std::byte> bytes, Sink& sink) noexcept {
   while (!bytes.empty()) {
     const Look look = look_for_packet(*table_, bytes);
     in_step_ = true;  // the next report begins with the next chunk
@@ -109,14 +111,14 @@ void DescribedDecoder::take_reports(std::span<const std::byte> bytes, Sink& sink
       damaged(look.found == Look::Found::kMayCome ? Outcome::kShort : look.why, sink);
       return;
     }
-    take_packet(*look.rule, bytes.first(look.bytes), sink);
+    accept_packet(*look.rule, bytes.first(look.bytes), sink);
     bytes = bytes.subspan(look.bytes);
   }
 }
 
 // RT-safe.
-bool DescribedDecoder::take_packet(const PacketRule& rule, std::span<const std::byte> packet,
-                                   Sink& sink) noexcept {
+bool DescribedDecoder::accept_packet(const PacketRule& rule, std::span<const std::byte> packet,
+                                     Sink& sink) noexcept {
   for (std::size_t i = 0; i < rule.fields.size(); ++i) {
     value_[i] = read_field(rule.fields[i], packet);
     if (!in_range(rule.fields[i], value_[i])) {

@@ -30,15 +30,16 @@ class DescribedDecoder final : public glove::GloveDecoder {
 
  private:
   // Each returns the number of bytes consumed.
-  std::size_t take_stream(std::span<const std::byte> bytes, Sink& sink) noexcept;
-  std::size_t take_delimited(std::span<const std::byte> bytes, Sink& sink) noexcept;
-  void take_reports(std::span<const std::byte> bytes, Sink& sink) noexcept;
+  std::size_t accept_stream(std::span<const std::byte> bytes, Sink& sink) noexcept;
+  std::size_t accept_delimited(std::span<const std::byte> bytes, Sink& sink) noexcept;
+  void accept_reports(std::span<const std::byte> bytes, Sink& sink) noexcept;
 
-  void take_piece(std::span<const std::byte> piece, Sink& sink) noexcept;
+  void accept_piece(std::span<const std::byte> piece, Sink& sink) noexcept;
   // True when the values of a whole packet are in range; they are then stored, and emitted if the
   // packet contains a pose.
-  bool take_packet(const PacketRule& rule, std::span<const std::byte> packet, Sink& sink) noexcept;
-  void keep_values(const PacketRule& rule) noexcept;  // stores what take_packet() read
+  bool accept_packet(const PacketRule& rule, std::span<const std::byte> packet,
+                     Sink& sink) noexcept;
+  void keep_values(const PacketRule& rule) noexcept;  // stores what accept_packet() read
   // Counts one outcome per damaged piece, not one per byte.
   void damaged(Outcome why, Sink& sink) noexcept;
 

@@ -1,21 +1,13 @@
-#include "drivers/described/described.hpp"
-
+// The described driver: any glove that a TOML file describes.
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 
 #include "drivers/described/decoder.hpp"
 #include "drivers/described/device_file.hpp"
 #include "drivers/described/emulator.hpp"
 #include "drivers/described/protocol.hpp"
-#include "drivers/glove/calibration_file.hpp"
-#include "drivers/glove/connect.hpp"
-#include "drivers/glove/device_info.hpp"
-#include "drivers/glove/traits.hpp"
-#include "drivers/make_device.hpp"
-#include "drivers/options.hpp"
+#include "drivers/glove/glove_type.hpp"
 #include "drivers/transport/transport_factory.hpp"
-#include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::drivers {
 namespace described {
@@ -28,95 +20,12 @@ constexpr milliseconds kFirstPacket{2000};
 constexpr double kSilence_s = 1.0;  // at least this, or this many periods of a slow device:
 constexpr double kSilentPeriods = 5.0;
 
-// The text in a log: one line of device info, then the device's description as in its file.
-std::string text_of(Side side, const std::string& toml) {
-  return "described hand=" + std::string(glove::side_name(side)) + "\n" + toml;
-}
-
-struct Described {
-  Side side = Side::kRight;
-  Table table;
-};
-
-Result<Described> parse_text(const std::string& text, const std::string& identity) {
-  const std::size_t line_end = std::min(text.find('\n'), text.size());
-  glove::DeviceInfoReader reader(text.substr(0, line_end), "described", identity);
-  Described made;
-  made.side = reader.side();
-  if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
-  if (line_end == text.size()) return fail("lacks the device's description", identity);
-  auto table = parse_device(text.substr(line_end + 1), identity);
-  if (!table) return std::unexpected(table.error());
-  made.table = std::move(*table);
-  return made;
-}
-
-Result<Description> describe(const std::string& text, const std::string& identity) {
-  const auto made = parse_text(text, identity);
-  if (!made) return std::unexpected(made.error());
-  const Table& table = made->table;
-  Description description{.driver = "described",
-                          .text = text,
-                          .identity = identity,
-                          .skeleton = std::make_shared<const Skeleton>(hand_skeleton(made->side)),
-                          .samples = glove::sample_layout(table.model, table.extra_names),
-                          .rate_hz = table.rate_hz};
-  std::ranges::copy_backward(table.extra_units, description.samples.units.end());
-  return description;
-}
-
-Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
-  auto made = parse_text(description.text, description.identity);
-  if (!made) return std::unexpected(made.error());
-  auto calibration = glove::default_calibration(made->table.model);
-  if (!calibration) return std::unexpected(calibration.error());
-  return std::make_unique<DescribedDecoder>(std::make_shared<const Table>(std::move(made->table)),
-                                            description.skeleton, std::move(*calibration));
-}
-
-Result<glove::Model> glove_model(const Description& description) {
-  auto made = parse_text(description.text, description.identity);
-  if (!made) return std::unexpected(made.error());
-  return std::move(made->table.model);
-}
-
-// The settings from the options: the hand, and a checked description. Errors name the file.
-struct Chosen {
-  Options options;
-  Side side = Side::kRight;
+// The hand, and a device description as in its file with what it says.
+struct DescribedSettings {
+  Side hand = Side::kRight;
   std::string toml;
   Table table;
 };
-
-Result<Chosen> choose(const Options& given) {
-  auto options = complete_options(described_driver(), given);
-  if (!options) return std::unexpected(options.error());
-  const auto side = glove::hand_option(*options);
-  if (!side) return std::unexpected(side.error());
-  const auto device = option<std::string>(*options, "device");
-  auto toml = device_text(device);
-  if (!toml) return std::unexpected(toml.error());
-  auto table = parse_device(*toml, device);
-  if (!table) return std::unexpected(table.error());
-  const std::int64_t baud = option<std::int64_t>(*options, "baud");
-  (*options)["baud"] = baud == 0 ? std::int64_t{table->link.baud} : baud;
-  if (option<std::string>(*options, "listen").empty()) (*options)["listen"] = table->link.listen;
-  const bool tcp = table->link.kind == LinkKind::kTcp;
-  (*options)["link"] = std::string(tcp ? "tcp" : "serial");
-  return Chosen{std::move(*options), *side, std::move(*toml), std::move(*table)};
-}
-
-Result<Description> expect(const Options& given) {
-  const auto chosen = choose(given);
-  if (!chosen) return std::unexpected(chosen.error());
-  if (chosen->table.link.kind != LinkKind::kHid) {
-    const auto sound = glove::check_connection(chosen->options);
-    if (!sound) return std::unexpected(sound.error());
-  }
-  const auto& id = option<std::string>(chosen->options, "id");
-  const auto& port = option<std::string>(chosen->options, "port");
-  return describe(text_of(chosen->side, chosen->toml), id.empty() ? port : id);
-}
 
 bool has_packet(const Table& table, std::span<const std::byte> bytes) {
   for (; !bytes.empty(); bytes = bytes.subspan(1)) {
@@ -137,60 +46,21 @@ Result<> start(const Table& table, Connection& link) {
   if (!table.link.start.empty()) {
     if (auto ok = link.write(table.link.start); !ok) return ok;
   }
-  std::vector<std::byte> heard;
+  std::vector<std::byte> received;
   const auto until = std::chrono::steady_clock::now() + kFirstPacket;
-  while (std::chrono::steady_clock::now() < until && heard.size() < 8 * kMaxPacketBytes) {
+  while (std::chrono::steady_clock::now() < until && received.size() < 8 * kMaxPacketBytes) {
     const auto bytes = link.read(kQuiet);
     if (!bytes) return std::unexpected(bytes.error());
-    heard.insert(heard.end(), bytes->begin(), bytes->end());
-    if (!bytes->empty() && has_packet(table, heard)) return {};
+    received.insert(received.end(), bytes->begin(), bytes->end());
+    if (!bytes->empty() && has_packet(table, received)) return {};
   }
-  if (heard.empty()) {
+  if (received.empty()) {
     return fail("nothing came within 2 seconds; is it the " + table.name + ", and switched on?",
                 link.name());
   }
-  return fail(std::to_string(heard.size()) + " bytes came, but no packet of a " + table.name +
+  return fail(std::to_string(received.size()) + " bytes came, but no packet of a " + table.name +
                   "; is another device on this port, or is baud wrong?",
               link.name());
-}
-
-Result<Connection> connect(const Chosen& chosen, TransportFactory& ports) {
-  const LinkRule& rule = chosen.table.link;
-  if (rule.kind != LinkKind::kHid) {
-    return glove::connect(chosen.options, ports, rule.usb_ids);
-  }
-  const std::uint32_t id = rule.usb_ids.front();
-  return ports.hid({.vendor = static_cast<std::uint16_t>(id >> 16),
-                    .products = {static_cast<std::uint16_t>(id & 0xFFFF)},
-                    .id = option<std::string>(chosen.options, "id"),
-                    .path = option<std::string>(chosen.options, "port")});
-}
-
-Result<Device> open(const Options& given, TransportFactory& ports) {
-  const auto chosen = choose(given);
-  if (!chosen) return std::unexpected(chosen.error());
-  auto link = connect(*chosen, ports);
-  if (!link) return std::unexpected(link.error());
-  if (auto ok = start(chosen->table, *link); !ok) return std::unexpected(ok.error());
-  auto device =
-      make_device(described_driver(), text_of(chosen->side, chosen->toml), link->identity());
-  if (!device) return device;
-  const bool hid = chosen->table.link.kind == LinkKind::kHid;
-  device->transport =
-      hid ? make_hid_transport(std::move(*link)) : make_link_transport(std::move(*link));
-  const double rate_hz = device->description.rate_hz;
-  device->reopen_after_s =
-      rate_hz > 0.0 ? std::max(kSilence_s, kSilentPeriods / rate_hz) : kSilence_s;
-  return device;
-}
-
-Result<std::unique_ptr<Emulator>> emulate(const Options& given) {
-  auto chosen = choose(given);
-  if (!chosen) return std::unexpected(chosen.error());
-  auto calibration = glove::default_calibration(chosen->table.model);
-  if (!calibration) return std::unexpected(calibration.error());
-  return std::make_unique<DescribedEmulator>(
-      std::make_shared<const Table>(std::move(chosen->table)), std::move(*calibration));
 }
 
 std::vector<OptionSpec> all_options() {
@@ -210,22 +80,95 @@ std::vector<OptionSpec> all_options() {
   return options;
 }
 
+struct DescribedGlove : glove::GloveType<DescribedGlove> {
+  using Settings = DescribedSettings;
+  static constexpr std::string_view kName = "described";
+  static constexpr std::string_view kSummary =
+      "any device that a TOML file describes: VMG30, OpenCyberGlove, BeBop Forte, yours";
+  static constexpr auto options = all_options;
+
+  // What the options leave out is as the description says. An error names its file.
+  static Result<Settings> settings(Options& options) {
+    const auto hand = glove::hand_option(options);
+    if (!hand) return std::unexpected(hand.error());
+    const auto device = option<std::string>(options, "device");
+    auto toml = device_text(device);
+    if (!toml) return std::unexpected(toml.error());
+    auto table = parse_device(*toml, device);
+    if (!table) return std::unexpected(table.error());
+    const LinkRule& link = table->link;
+    if (option<std::int64_t>(options, "baud") == 0) options["baud"] = std::int64_t{link.baud};
+    if (option<std::string>(options, "listen").empty()) options["listen"] = link.listen;
+    options["link"] = std::string(link.kind == LinkKind::kTcp ? "tcp" : "serial");
+    return Settings{.hand = *hand, .toml = std::move(*toml), .table = std::move(*table)};
+  }
+  static Result<std::string> check(const Options& options, const Settings& settings) {
+    const auto id = settings.table.link.kind == LinkKind::kHid
+                        ? Result<std::string>(option<std::string>(options, "id"))
+                        : GloveType::check(options, settings);
+    return id && id->empty() ? option<std::string>(options, "port") : id;
+  }
+  // One line of device info, then the description as in its file.
+  static std::string device_info(const Settings& settings) {
+    return glove::hand_info(kName, settings.hand) + "\n" + settings.toml;
+  }
+  static Result<Settings> parse_device_info(const std::string& text, const std::string& identity) {
+    const std::size_t line_end = std::min(text.find('\n'), text.size());
+    glove::DeviceInfoReader reader(text.substr(0, line_end), kName, identity);
+    Settings settings{.hand = reader.side(), .toml = {}, .table = {}};
+    if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
+    if (line_end == text.size()) return fail("lacks the device's description", identity);
+    settings.toml = text.substr(line_end + 1);
+    auto table = parse_device(settings.toml, identity);
+    if (!table) return std::unexpected(table.error());
+    settings.table = std::move(*table);
+    return settings;
+  }
+  static Result<glove::Model> model(const Settings& settings) { return settings.table.model; }
+  static SampleLayout layout(const glove::Model& model, const Settings& settings) {
+    SampleLayout layout = glove::sample_layout(model, settings.table.extra_names);
+    std::ranges::copy_backward(settings.table.extra_units, layout.units.end());
+    return layout;
+  }
+  static double rate_hz(const Settings& settings) { return settings.table.rate_hz; }
+  static std::unique_ptr<Decoder> make_decoder(
+      Settings settings, std::shared_ptr<const Skeleton> skeleton,
+      std::shared_ptr<const glove::Calibration> calibration) {
+    return std::make_unique<DescribedDecoder>(
+        std::make_shared<const Table>(std::move(settings.table)), std::move(skeleton),
+        std::move(calibration));
+  }
+  static Result<Opened> open(const Options& options, const Settings& settings,
+                             TransportFactory& ports) {
+    const LinkRule& rule = settings.table.link;
+    const bool hid = rule.kind == LinkKind::kHid;
+    const std::uint32_t usb_id = hid ? rule.usb_ids.front() : 0;
+    auto link = hid ? ports.hid({.vendor = static_cast<std::uint16_t>(usb_id >> 16),
+                                 .products = {static_cast<std::uint16_t>(usb_id & 0xFFFF)},
+                                 .id = option<std::string>(options, "id"),
+                                 .path = option<std::string>(options, "port")})
+                    : glove::connect(options, ports, rule.usb_ids);
+    if (!link) return std::unexpected(link.error());
+    if (auto ok = start(settings.table, *link); !ok) return std::unexpected(ok.error());
+    const double rate_hz = settings.table.rate_hz;
+    Opened opened{.identity = link->identity(), .transport = nullptr};
+    opened.transport =
+        hid ? make_hid_transport(std::move(*link)) : make_link_transport(std::move(*link));
+    opened.reopen_after_s =
+        rate_hz > 0.0 ? std::max(kSilence_s, kSilentPeriods / rate_hz) : kSilence_s;
+    return opened;
+  }
+  static Result<std::unique_ptr<Emulator>> emulator(const Options& /*options*/, Settings settings) {
+    auto calibration = glove::default_calibration(settings.table.model);
+    if (!calibration) return std::unexpected(calibration.error());
+    return std::make_unique<DescribedEmulator>(
+        std::make_shared<const Table>(std::move(settings.table)), std::move(*calibration));
+  }
+};
+
 }  // namespace
 }  // namespace described
 
-const Driver& described_driver() {
-  static const glove::GloveTraits traits{.glove_model = described::glove_model};
-  static const Driver driver{
-      .name = "described",
-      .summary = "any device that a TOML file describes: VMG30, OpenCyberGlove, BeBop Forte, yours",
-      .options = described::all_options(),
-      .open = described::open,
-      .make_decoder = described::make_decoder,
-      .describe = described::describe,
-      .expect = described::expect,
-      .glove = &traits,
-      .emulate = described::emulate};
-  return driver;
-}
+const Driver& described_driver() { return DriverOf<described::DescribedGlove>::get(); }
 
 }  // namespace posed::drivers

@@ -9,16 +9,7 @@ namespace posed::drivers::described {
 namespace {
 
 constexpr double kDefaultRate_hz = 100.0;
-constexpr std::size_t kMaxHeard = 256;  // longer than any command
-
-// The inverse of a two-point curve: returns the raw value.
-double raw_of(const glove::Curve& curve, double value) {
-  const double raw0 = static_cast<double>(curve.raw[0]);
-  const double value0 = static_cast<double>(curve.value[0]);
-  const double slope =
-      (static_cast<double>(curve.value[1]) - value0) / (static_cast<double>(curve.raw[1]) - raw0);
-  return raw0 + (value - value0) / slope;
-}
+constexpr std::size_t kMaxReceived = 256;  // longer than any command
 
 std::int64_t period_ns(const Table& table) {
   return std::llround(1e9 / (table.rate_hz > 0.0 ? table.rate_hz : kDefaultRate_hz));
@@ -35,28 +26,24 @@ DescribedEmulator::DescribedEmulator(std::shared_ptr<const Table> table,
 
 void DescribedEmulator::pose_hand(const HandAngles& angles) {
   for (std::size_t s = 0; s < calibration_->sensors; ++s) {
-    const auto rows = std::span(calibration_->map).first(calibration_->map_rows);
-    const auto row = std::ranges::find(rows, s, &glove::MapRow::sensor);
-    if (row == rows.end() || row->gain == 0.0F) continue;
-    const double value = (angles[row->channel] - static_cast<double>(row->offset_rad)) /
-                         static_cast<double>(row->gain);
-    raw_[s] = raw_of(calibration_->curve[s], value);
+    raw_[s] = glove::raw_of_pose(*calibration_, s, angles).value_or(raw_[s]);
   }
 }
 
 void DescribedEmulator::receive(std::span<const std::byte> bytes, std::int64_t now_ns,
                                 Bytes& /*answer*/) {
   for (const std::byte byte : bytes) {
-    if (heard_.size() == kMaxHeard) heard_.erase(heard_.begin(), heard_.begin() + kMaxHeard / 2);
-    heard_.push_back(byte);
-    if (was_told(table_->link.stop)) pace_.stop();
-    if (was_told(table_->link.start) && !pace_.running()) pace_.start(now_ns);
+    if (received_.size() == kMaxReceived)
+      received_.erase(received_.begin(), received_.begin() + kMaxReceived / 2);
+    received_.push_back(byte);
+    if (has_received(table_->link.stop)) pace_.stop();
+    if (has_received(table_->link.start) && !pace_.running()) pace_.start(now_ns);
   }
 }
 
-bool DescribedEmulator::was_told(const std::vector<std::byte>& command) const {
-  return !command.empty() && heard_.size() >= command.size() &&
-         std::ranges::equal(command, std::span(heard_).last(command.size()));
+bool DescribedEmulator::has_received(const std::vector<std::byte>& command) const {
+  return !command.empty() && received_.size() >= command.size() &&
+         std::ranges::equal(command, std::span(received_).last(command.size()));
 }
 
 void DescribedEmulator::emit(std::int64_t now_ns, Bytes& out) {

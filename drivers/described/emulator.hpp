@@ -32,14 +32,14 @@ class DescribedEmulator final : public glove::GloveEmulator {
  private:
   void add_packet(const PacketRule& rule, Bytes& out) const;
   [[nodiscard]] double value_of(const Field& field) const;
-  // True when `heard_` ends with these bytes.
-  [[nodiscard]] bool was_told(const std::vector<std::byte>& command) const;
+  // True when `received_` ends with these bytes.
+  [[nodiscard]] bool has_received(const std::vector<std::byte>& command) const;
 
   std::shared_ptr<const Table> table_;
   std::shared_ptr<const glove::Calibration> calibration_;
   std::array<double, glove::kMaxSensors> raw_{};
   std::array<double, kMaxExtras> extra_{};
-  std::vector<std::byte> heard_;
+  std::vector<std::byte> received_;
   emulate::Pace pace_;
   std::int64_t clock_ns_ = 0;  // the device's own time
 };

@@ -91,9 +91,9 @@ std::size_t length_of(const PacketRule& rule, std::span<const std::byte> bytes) 
   const BitPlace& place = rule.length.place;
   if (bytes.size() < std::size_t{place.first} + place.bytes) return 0;
   const auto length = static_cast<std::int64_t>(read_bits(place, bytes)) + rule.length.add;
-  const bool sound = length >= static_cast<std::int64_t>(rule.min_bytes) &&
+  const bool valid = length >= static_cast<std::int64_t>(rule.min_bytes) &&
                      length <= static_cast<std::int64_t>(rule.max_bytes);
-  return sound ? static_cast<std::size_t>(length) : kMaxPacketBytes + 1;
+  return valid ? static_cast<std::size_t>(length) : kMaxPacketBytes + 1;
 }
 
 Look look_for(const Table& table, const PacketRule& rule,

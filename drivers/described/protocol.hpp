@@ -18,7 +18,7 @@
 
 namespace posed::drivers::described {
 
-// What is found at the start of `bytes`.
+// The result of a look at the start of `bytes`.
 struct Look {
   enum class Found : std::uint8_t { kNothing, kMayCome, kPacket };
   Found found = Found::kNothing;

@@ -29,10 +29,7 @@ Result<glove::Model> model(Form form) {
                                   : glove::Curve::line(kStraight, 0.0, kBent, 1.0);
     model.sensors.push_back(std::move(sensor));
   }
-  auto table = glove::device_table(narrow ? "fivedt-5" : "fivedt-14");
-  if (!table) return std::unexpected(table.error());
-  model.map_toml = std::move(*table);
-  return model;
+  return glove::with_device_table(std::move(model), narrow ? "fivedt-5" : "fivedt-14");
 }
 
 SampleLayout layout(const glove::Model& model, Form form) {

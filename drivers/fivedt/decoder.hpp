@@ -17,7 +17,9 @@ namespace posed::drivers::fivedt {
 inline constexpr double kStraight = 1500.0;
 inline constexpr double kBent = 3000.0;
 
+// What the options and the device info say.
 struct Settings {
+  Side hand = Side::kRight;
   Form form = Form::kFive;
   bool polled = false;  // in polled mode an exact repeat is the same measurement again
   bool port_b = false;  // which glove of an Ultra Wireless kit

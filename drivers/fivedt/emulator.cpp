@@ -56,8 +56,8 @@ std::array<double, kMaxValues> wide_bends(const HandAngles& angles) {
 
 }  // namespace
 
-FiveDtEmulator::FiveDtEmulator(Side side, const Settings& settings)
-    : side_(side), settings_(settings), pace_(kPeriod_ns[static_cast<std::size_t>(settings.form)]) {
+FiveDtEmulator::FiveDtEmulator(const Settings& settings)
+    : settings_(settings), pace_(kPeriod_ns[static_cast<std::size_t>(settings.form)]) {
   if (settings.form != Form::kFive) pace_.start(0);
   pose_hand({});
 }
@@ -84,7 +84,7 @@ void FiveDtEmulator::receive(std::span<const std::byte> bytes, std::int64_t now_
         answer.push_back(kReady);
         break;
       case 'G': {
-        const auto info = encode_info(side_);
+        const auto info = encode_info(settings_.hand);
         answer.insert(answer.end(), info.begin(), info.end());
         break;
       }
@@ -101,7 +101,7 @@ void FiveDtEmulator::receive(std::span<const std::byte> bytes, std::int64_t now_
 }
 
 void FiveDtEmulator::send(const Reading& reading, Bytes& out) const {
-  const auto bytes = encode_packet(settings_.form, reading, side_);
+  const auto bytes = encode_packet(settings_.form, reading, settings_.hand);
   out.insert(out.end(), bytes.begin(), bytes.end());
 }
 
@@ -111,7 +111,7 @@ void FiveDtEmulator::emit(std::int64_t now_ns, Bytes& out) {
   send(reading_, out);
   if (settings_.form == Form::kFive) out.push_back(kReady);
   if (settings_.form == Form::kSixteen && records_++ % kInfoEvery == 0) {
-    send({.kind = Reading::Kind::kInfo, .right = side_ == Side::kRight}, out);
+    send({.kind = Reading::Kind::kInfo, .right = settings_.hand == Side::kRight}, out);
   }
 }
 

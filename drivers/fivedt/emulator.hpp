@@ -10,7 +10,7 @@ namespace posed::drivers::fivedt {
 class FiveDtEmulator final : public glove::GloveEmulator {
  public:
   // A Data Glove 5 sends nothing until it receives D or C; all others stream at once.
-  FiveDtEmulator(Side side, const Settings& settings);
+  explicit FiveDtEmulator(const Settings& settings);
 
   void pose_hand(const HandAngles& angles) override;
   void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
@@ -20,7 +20,6 @@ class FiveDtEmulator final : public glove::GloveEmulator {
  private:
   void send(const Reading& reading, Bytes& out) const;
 
-  Side side_;
   Settings settings_;
   emulate::Pace pace_;
   Reading reading_;

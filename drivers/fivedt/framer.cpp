@@ -1,12 +1,14 @@
 #include "drivers/fivedt/framer.hpp"
 
 #include <algorithm>
+#include <cassert>
 
 namespace posed::drivers::fivedt {
 
 // RT-safe.
 void Framer::feed(std::span<const std::byte> bytes, Readings& readings) noexcept {
   for (const std::byte byte : bytes) {
+    assert(pending_bytes_ < pending_.size());
     pending_[pending_bytes_++] = byte;
     while (pending_bytes_ > 0 && advance(readings)) {
     }
@@ -22,7 +24,7 @@ bool Framer::advance(Readings& readings) noexcept {
 bool Framer::advance_in_step(Readings& readings) noexcept {
   const std::size_t length = packet_length(form_, pending());
   if (length == 0) {
-    if (take_tail()) return true;
+    if (consume_tail()) return true;
     in_step_ = false;
     just_lost_ = true;
     readings.outcome(Outcome::kForeign);
@@ -101,7 +103,7 @@ bool Framer::is_tail(std::byte byte) const noexcept {
 }
 
 // Consumes the byte that may follow a packet of a Data Glove 5. RT-safe.
-bool Framer::take_tail() noexcept {
+bool Framer::consume_tail() noexcept {
   if (!after_packet_) return false;
   after_packet_ = false;
   const std::byte byte = pending_[0];
@@ -124,6 +126,7 @@ bool Framer::is_half_used(std::span<const std::byte> report) noexcept {
 void Framer::drop(std::size_t count) noexcept {
   std::copy(pending_.begin() + static_cast<std::ptrdiff_t>(count),
             pending_.begin() + static_cast<std::ptrdiff_t>(pending_bytes_), pending_.begin());
+  assert(count <= pending_bytes_);
   pending_bytes_ -= count;
 }
 

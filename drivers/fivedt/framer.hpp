@@ -27,7 +27,7 @@ class Framer {
  public:
   explicit Framer(Form form) noexcept : form_(form) {}
 
-  // Takes bytes cut at any position. RT-safe.
+  // Reads bytes cut at any position. RT-safe.
   void feed(std::span<const std::byte> bytes, Readings& readings) noexcept;
 
   // The last byte that a wireless glove sent after a packet; -1: none yet. RT-safe.
@@ -40,7 +40,7 @@ class Framer {
   [[nodiscard]] bool skip_damaged() noexcept;
   [[nodiscard]] bool is_packet(std::span<const std::byte> bytes) noexcept;
   [[nodiscard]] bool is_tail(std::byte byte) const noexcept;
-  [[nodiscard]] bool take_tail() noexcept;
+  [[nodiscard]] bool consume_tail() noexcept;
   [[nodiscard]] bool is_half_used(std::span<const std::byte> report) noexcept;
   void drop(std::size_t count) noexcept;
   [[nodiscard]] std::span<const std::byte> pending() const noexcept {

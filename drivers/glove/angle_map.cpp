@@ -51,10 +51,12 @@ void read_angles(TableReader& angles, const std::vector<Sensor>& sensors, Findin
 
 }  // namespace
 
-Result<std::string> device_table(std::string_view name) {
+Result<Model> with_device_table(Model model, std::string_view name) {
   const std::string file = std::string(name) + ".toml";
   for (const ProfileText& text : device_texts()) {
-    if (text.file == file) return std::string(text.toml);
+    if (text.file != file) continue;
+    model.map_toml = text.toml;
+    return model;
   }
   return fail("this posed was built without config/devices/" + file);
 }

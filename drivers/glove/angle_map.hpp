@@ -20,8 +20,8 @@
 
 namespace posed::drivers::glove {
 
-// Returns the text of config/devices/<name>.toml as built into posed. Cold.
-[[nodiscard]] Result<std::string> device_table(std::string_view name);
+// Gives the model the map in config/devices/<name>.toml, as built into posed. Cold.
+[[nodiscard]] Result<Model> with_device_table(Model model, std::string_view name);
 
 // Errors name `file` and line: unknown value or channel, invalid number. Cold.
 [[nodiscard]] Result<std::vector<MapRow>> parse_angle_map(const std::string& toml,

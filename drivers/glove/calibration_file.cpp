@@ -1,12 +1,16 @@
+// Combines a model and a user's calibration file into the Calibration that decoders use.
 #include "drivers/glove/calibration_file.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <sstream>
 #include <string_view>
 #include <utility>
 
-#include "drivers/glove/load_calibration.hpp"
+#include "drivers/glove/angle_map.hpp"
+#include "drivers/glove/device_info.hpp"
+#include "drivers/glove/fit.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
@@ -14,6 +18,7 @@
 #include "proto/text/toml_table.hpp"
 
 namespace posed::drivers::glove {
+
 namespace {
 
 constexpr int kFormat = 1;
@@ -39,7 +44,7 @@ void read_sensor(TableReader& table, const std::string& name, CalibrationFile& f
   file.sensors.emplace(name, std::move(*points));
 }
 
-// What a file lacks that was cut off at the end of a line.
+// Detects files truncated at a line end.
 void check_complete(TableReader& reader, int sensor_count, const CalibrationFile& file) {
   if (file.driver.empty()) reader.add_error("driver", "the calibration does not say its driver");
   reader.need("hand", "write \"right\" or \"left\"");
@@ -112,6 +117,132 @@ std::string format_calibration(const CalibrationFile& file) {
     out << "]\n";
   }
   return out.str();
+}
+
+namespace {
+
+// A mistake in a driver's curve appears in the first test that opens the driver.
+bool is_sound(const Curve& curve) {
+  bool valid = curve.points >= 2 && curve.points <= kMaxCurvePoints;
+  for (std::size_t i = 0; valid && i < curve.points; ++i) {
+    valid = std::isfinite(curve.raw[i]) && std::isfinite(curve.value[i]) &&
+            (i == 0 || curve.raw[i] > curve.raw[i - 1]);
+  }
+  return valid;
+}
+
+Result<Calibration> compile(const Model& model) {
+  Calibration made;
+  if (model.sensors.empty() || model.sensors.size() > kMaxSensors ||
+      model.parameters.size() > kMaxParameters) {
+    return fail("driver " + in_quotes(model.driver) +
+                " states a glove without sensors, or with more " + "than " +
+                std::to_string(kMaxSensors) + ": mend the driver");
+  }
+  made.sensors = model.sensors.size();
+  for (std::size_t i = 0; i < made.sensors; ++i) {
+    const Sensor& sensor = model.sensors[i];
+    if (!is_sound(sensor.curve)) {
+      return fail("sensor " + in_quotes(sensor.name) + " of driver " + in_quotes(model.driver) +
+                  " needs a default curve of ascending finite points: mend the driver");
+    }
+    made.curve[i] = sensor.curve;
+  }
+  for (std::size_t i = 0; i < model.parameters.size(); ++i) {
+    made.parameter[i] = static_cast<float>(model.parameters[i].second);
+  }
+  if (model.map_toml.empty()) return made;
+  const auto rows =
+      parse_angle_map(model.map_toml, "config/devices/" + model.driver + ".toml", model.sensors);
+  if (!rows) return std::unexpected(rows.error());
+  for (const MapRow& row : *rows) {
+    made.map[made.map_rows] = row;
+    made.map[made.map_rows++].gain *= static_cast<float>(model.sensors[row.sensor].map_sign);
+  }
+  return made;
+}
+
+Result<> check_owner(const Model& model, const CalibrationFile& file, Side hand,
+                     const std::string& identity) {
+  if (file.driver != model.driver) {
+    return fail("this calibration is for driver " + in_quotes(file.driver) + ", the glove is a " +
+                in_quotes(model.driver) + ": calibrate this glove");
+  }
+  if (file.hand != hand) {
+    return fail("this calibration is for the " + std::string(side_name(file.hand)) +
+                " hand, the glove is the " + std::string(side_name(hand)) +
+                " one: use that hand's file");
+  }
+  if (!file.glove.empty() && !identity.empty() && file.glove != identity) {
+    return fail("this calibration is for glove " + in_quotes(file.glove) + ", this one is " +
+                in_quotes(identity) + ": calibrate this glove, or leave `glove` empty in the file");
+  }
+  return {};
+}
+
+Result<> set_curve(const Sensor& sensor, const std::vector<std::array<double, 2>>& points,
+                   Curve& curve) {
+  if (points.size() < 2 || points.size() > kMaxCurvePoints) {
+    return fail("sensor " + in_quotes(sensor.name) + " needs 2 to " +
+                std::to_string(kMaxCurvePoints) + " points");
+  }
+  curve.points = static_cast<std::uint8_t>(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    curve.raw[i] = static_cast<float>(points[i][0]);
+    curve.value[i] = static_cast<float>(points[i][1]);
+  }
+  if (!is_sound(curve)) {
+    return fail("the raw values of sensor " + in_quotes(sensor.name) + " should ascend");
+  }
+  if (points.back()[0] - points.front()[0] < least_span(sensor)) {
+    return fail("sensor " + in_quotes(sensor.name) +
+                " hardly moved in this calibration: calibrate again, or delete its line");
+  }
+  return {};
+}
+
+}  // namespace
+
+// A sensor that hardly moved during calibration would turn its noise into motion.
+double least_span(const Sensor& sensor) {
+  constexpr double kCounts = 10.0;
+  constexpr double kShareOfRange = 0.04;
+  return std::min(kCounts, kShareOfRange * (sensor.raw_max - sensor.raw_min));
+}
+
+Result<std::shared_ptr<const Calibration>> default_calibration(const Model& model) {
+  const auto made = compile(model);
+  if (!made) return std::unexpected(made.error());
+  return std::make_shared<const Calibration>(*made);
+}
+
+Result<std::shared_ptr<const Calibration>> make_calibration(const Model& model,
+                                                            const CalibrationFile& file, Side hand,
+                                                            const std::string& identity) {
+  if (auto ok = check_owner(model, file, hand, identity); !ok) return std::unexpected(ok.error());
+  auto made = compile(model);
+  if (!made) return std::unexpected(made.error());
+  for (const auto& [name, points] : file.sensors) {
+    const auto sensor = std::ranges::find(model.sensors, name, &Sensor::name);
+    if (sensor == model.sensors.end()) {
+      return fail("the glove has no sensor " + in_quotes(name) + ": is the calibration another's?");
+    }
+    const auto index = static_cast<std::size_t>(sensor - model.sensors.begin());
+    if (auto ok = set_curve(*sensor, points, made->curve[index]); !ok) {
+      return std::unexpected(ok.error());
+    }
+  }
+  for (const auto& [name, value] : file.parameters) {
+    const auto at =
+        std::ranges::find(model.parameters, name, &std::pair<std::string, double>::first);
+    if (at == model.parameters.end()) {
+      return fail("the glove has no parameter " + in_quotes(name) +
+                  ": is the calibration another's?");
+    }
+    made->parameter[static_cast<std::size_t>(at - model.parameters.begin())] =
+        static_cast<float>(value);
+  }
+  return std::make_shared<const Calibration>(*made);
 }
 
 }  // namespace posed::drivers::glove

@@ -13,6 +13,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -51,5 +52,13 @@ struct OwnedCalibration {
 [[nodiscard]] Result<std::shared_ptr<const Calibration>> default_calibration(const Model& model);
 [[nodiscard]] Result<std::shared_ptr<const Calibration>> make_calibration(
     const Model& model, const CalibrationFile& file, Side hand, const std::string& identity);
+
+// Loads the text of a calibration file, with a size limit. parse_calibration() checks its content.
+
+// Bytes; for posed's format and those of other programs.
+inline constexpr std::size_t kMaxCalibrationFile = 64 * 1024;
+
+// Loads a regular file of at most kMaxCalibrationFile; an Error names it. Cold.
+[[nodiscard]] Result<std::string> load_calibration_text(const std::filesystem::path& path);
 
 }  // namespace posed::drivers::glove

@@ -1,16 +1,24 @@
 #include "drivers/glove/connect.hpp"
 
 #include <algorithm>
-#include <sstream>
+#include <chrono>
+#include <utility>
 
 #include "drivers/glove/device_info.hpp"
+#include "drivers/glove/line_reader.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/transport_factory.hpp"
 
 namespace posed::drivers::glove {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+using std::chrono::milliseconds;
+
 constexpr std::int64_t kMaxBaud = 4'000'000;
+constexpr milliseconds kPatience{3000};  // for a line: an ESP32 starts in about a second
+constexpr milliseconds kOneRead{50};
+constexpr std::size_t kMaxLine = 256;  // bytes
 
 std::string link_of(const Options& options) {
   return options.contains("link") ? option<std::string>(options, "link") : "serial";
@@ -60,13 +68,48 @@ Result<> check_connection(const Options& options) {
 }
 
 Result<Connection> connect(const Options& options, TransportFactory& ports,
-                           std::vector<std::uint32_t> usb_ids) {
-  if (auto sound = check_connection(options); !sound) return std::unexpected(sound.error());
+                           std::vector<std::uint32_t> usb) {
+  if (auto ok = check_connection(options); !ok) return std::unexpected(ok.error());
   if (link_of(options) == "tcp") return ports.accept(listen_settings(options));
   return ports.serial({.port = option<std::string>(options, "port"),
                        .id = option<std::string>(options, "id"),
                        .baud = static_cast<int>(option<std::int64_t>(options, "baud")),
-                       .usb_ids = std::move(usb_ids)});
+                       .usb_ids = std::move(usb)});
+}
+
+Result<Connection> connect(const Options& options, TransportFactory& ports,
+                           std::span<const KnownUsb> usb) {
+  std::vector<std::uint32_t> ids;
+  for (const KnownUsb& one : usb) {
+    ids.push_back(static_cast<std::uint32_t>(one.vendor) << 16 | one.product);
+  }
+  return connect(options, ports, std::move(ids));
+}
+
+Result<> await_line(Connection& link, const std::function<bool(std::string_view)>& is_line) {
+  LineReader<kMaxLine> lines;
+  bool any = false, good = false;
+  for (const auto begin = Clock::now(); !good || lines.in_line();) {
+    const bool late = Clock::now() - begin > kPatience;
+    if (late && good) break;  // it never pauses after a line
+    if (late) {
+      return fail(any ? "what comes is no line of this glove; check baud and port"
+                      : "the glove sends nothing; check that it is switched on, and its baud",
+                  link.name());
+    }
+    const auto bytes = link.read(kOneRead);
+    if (!bytes) return std::unexpected(bytes.error());
+    any = any || !bytes->empty();
+    lines.feed(*bytes, [&](std::string_view text) { good = good || is_line(text); }, [] {});
+  }
+  return {};
+}
+
+Opened opened(Connection link, double reopen_after_s) {
+  std::string identity = link.identity();
+  return {.identity = std::move(identity),
+          .transport = make_link_transport(std::move(link)),
+          .reopen_after_s = reopen_after_s};
 }
 
 }  // namespace posed::drivers::glove

@@ -1,10 +1,11 @@
 #include "drivers/glove/device_info.hpp"
-#include "proto/text/clean.hpp"
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <sstream>
+
+#include "proto/text/clean.hpp"
 
 namespace posed::drivers::glove {
 namespace {
@@ -19,6 +20,10 @@ Result<Side> parse_side(std::string_view name) {
   if (name == "left") return Side::kLeft;
   if (name == "right") return Side::kRight;
   return misuse("hand should be \"right\" or \"left\", not \"" + std::string(name) + "\"");
+}
+
+std::string hand_info(std::string_view driver, Side hand) {
+  return std::string(driver) + " hand=" + std::string(side_name(hand));
 }
 
 DeviceInfoReader::DeviceInfoReader(const std::string& text, std::string_view driver,

@@ -15,6 +15,9 @@ namespace posed::drivers::glove {
 [[nodiscard]] std::string_view side_name(Side side) noexcept;  // "right", "left"
 [[nodiscard]] Result<Side> parse_side(std::string_view name);
 
+// The beginning of every device info: "driver hand=right".
+[[nodiscard]] std::string hand_info(std::string_view driver, Side hand);
+
 // Reads a device info key by key. A key that is missing, repeated, unknown or out of range is
 // remembered and reported by finish(); until then it reads as its smallest allowed value. Cold.
 class DeviceInfoReader {

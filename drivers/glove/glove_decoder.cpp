@@ -1,6 +1,7 @@
 #include "drivers/glove/glove_decoder.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 
@@ -38,9 +39,10 @@ class SampleWriter {
   explicit SampleWriter(Sample& sample) noexcept : sample_(sample) {}
 
   void add(float value, bool valid) noexcept {
-    const bool sound = valid && std::isfinite(value);
-    valid_ |= std::uint64_t{sound} << count_;
-    sample_.value[count_++] = sound ? value : 0.0F;
+    const bool finite = valid && std::isfinite(value);
+    assert(count_ < kMaxGloveValues);
+    valid_ |= std::uint64_t{finite} << count_;
+    sample_.value[count_++] = finite ? value : 0.0F;
   }
   void finish() noexcept {
     sample_.valid = valid_;
@@ -73,7 +75,9 @@ GloveDecoder::GloveDecoder(std::shared_ptr<const Skeleton> skeleton,
                            std::shared_ptr<const Calibration> default_calibration)
     : skeleton_(std::move(skeleton)),
       default_(std::move(default_calibration)),
-      calibration_(default_.get()) {}
+      calibration_(default_.get()) {
+  assert(default_ != nullptr && default_->sensors <= kMaxSensors);
+}
 
 // RT-safe.
 void GloveDecoder::compute(std::span<float> /*value*/,

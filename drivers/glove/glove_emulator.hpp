@@ -1,7 +1,11 @@
 // GloveEmulator: the base of all emulated gloves. Its one body is a hand.
 #pragma once
 
+#include <optional>
+#include <string_view>
+
 #include "drivers/emulator.hpp"
+#include "drivers/glove/calibration.hpp"
 #include "proto/frame/hand.hpp"
 
 namespace posed::drivers::glove {
@@ -15,6 +19,14 @@ class GloveEmulator : public Emulator {
   // Sets the hand pose from now on [rad].
   virtual void pose_hand(const HandAngles& angles) = 0;
 };
+
+// The raw value that this sensor has in a pose, by its first entry in the angle map; none for a
+// sensor that moves nothing. Cold.
+[[nodiscard]] std::optional<double> raw_of_pose(const Calibration& calibration, std::size_t sensor,
+                                                const HandAngles& angles);
+
+// Appends text to the bytes that an emulator sends. Cold.
+void add_text(std::string_view text, Emulator::Bytes& out);
 
 // A frame of a hand with these angles, for an emulator. Cold.
 [[nodiscard]] Frame hand_frame(const HandAngles& angles);

@@ -3,10 +3,12 @@
 
 #include <array>
 #include <cstddef>
+#include <span>
 #include <vector>
 
 #include "drivers/driver.hpp"
 #include "drivers/glove/model.hpp"
+#include "drivers/known_usb.hpp"
 #include "proto/frame/hand.hpp"
 
 namespace posed::drivers::glove {
@@ -25,6 +27,11 @@ struct GloveTraits {
   // Encodes a haptics message for the device; null for a glove without motors.
   Result<std::vector<std::byte>> (*encode_haptics)(const Options& options,
                                                    const Haptics& haptics) = nullptr;
+  // The USB ids by which the glove, or the chip that it is connected to, is known.
+  std::span<const KnownUsb> usb{};
+  // The largest share of damaged packets that its framing takes for good ones. The noise test holds
+  // the decoder to it.
+  double undetected = 0.0;
 };
 
 }  // namespace posed::drivers::glove

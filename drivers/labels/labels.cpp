@@ -9,7 +9,6 @@
 
 #include "drivers/file/decoder.hpp"
 #include "drivers/labels/decoder.hpp"
-#include "drivers/make_device.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/file.hpp"
 #include "proto/clip/device_clip.hpp"

@@ -1,6 +1,5 @@
 #include "drivers/lucidgloves/decoder.hpp"
 
-#include <cstring>
 #include <limits>
 
 #include "drivers/glove/angle_map.hpp"
@@ -34,10 +33,7 @@ Result<glove::Model> model(const Settings& settings) {
                              .curve = glove::Curve::line(0.0, -1.0, max, 1.0),
                              .unit = "1"});
   }
-  auto table = glove::device_table("lucidgloves");
-  if (!table) return std::unexpected(table.error());
-  model.map_toml = std::move(*table);
-  return model;
+  return glove::with_device_table(std::move(model), "lucidgloves");
 }
 
 std::vector<std::string> extra_names() {
@@ -50,38 +46,13 @@ std::vector<std::string> extra_names() {
 // RT-safe.
 void LucidDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
                         Sink& sink) noexcept {
-  while (!bytes.empty()) {
-    const void* const line_feed = std::memchr(bytes.data(), '\n', bytes.size());
-    const std::size_t size =
-        line_feed == nullptr
-            ? bytes.size()
-            : static_cast<std::size_t>(static_cast<const std::byte*>(line_feed) - bytes.data());
-    keep(bytes.first(size), sink);
-    if (line_feed == nullptr) return;
-    end_line(sink);
-    bytes = bytes.subspan(size + 1);
-  }
+  lines_.feed(
+      bytes, [&](std::string_view text) { accept_line(text, sink); },
+      [&] { sink.outcome(Outcome::kForeign); });
 }
 
 // RT-safe.
-void LucidDecoder::keep(std::span<const std::byte> piece, Sink& sink) noexcept {
-  if (overlong_) return;
-  overlong_ = piece.size() > text_.size() - length_;
-  if (overlong_) return sink.outcome(Outcome::kForeign);
-  std::memcpy(text_.data() + length_, piece.data(), piece.size());
-  length_ += piece.size();
-}
-
-// RT-safe.
-void LucidDecoder::end_line(Sink& sink) noexcept {
-  std::string_view text(text_.data(), length_);
-  while (text.ends_with('\r')) text.remove_suffix(1);
-  length_ = 0;
-  if (overlong_) {
-    overlong_ = false;
-    return;
-  }
-  if (text.empty()) return;
+void LucidDecoder::accept_line(std::string_view text, Sink& sink) noexcept {
   Line line;
   Outcome outcome = parse_line(text, settings_.encoding, settings_.max_analog, line);
   if (outcome == Outcome::kOk && line.has_hand() && lost_a_key(line)) outcome = Outcome::kShort;
@@ -137,7 +108,7 @@ void LucidDecoder::emit_line(const Line& line, Sink& sink) noexcept {
   const auto share = [&](std::size_t place) {
     return line.has[place] ? static_cast<float>(line.value[place]) / max : kUnknown;
   };
-  const auto told = [&](std::size_t place) {
+  const auto info = [&](std::size_t place) {
     return has_info_[place] ? static_cast<float>(info_[place]) : kUnknown;
   };
   std::array<float, kExtras> extra{};
@@ -145,8 +116,8 @@ void LucidDecoder::emit_line(const Line& line, Sink& sink) noexcept {
   extra[1] = 2.0F * share(kJoyY) - 1.0F;
   extra[2] = share(kTrigger);
   for (std::size_t b = 0; b < kButtons; ++b) extra[kSticks + b] = line.pressed[b] ? 1.0F : 0.0F;
-  extra[kSticks + kButtons] = told(0);
-  extra[kSticks + kButtons + 1] = told(2);
+  extra[kSticks + kButtons] = info(0);
+  extra[kSticks + kButtons + 1] = info(2);
   packet.extra = extra;
   emit(packet, sink);
 }

@@ -8,13 +8,15 @@
 #include <vector>
 
 #include "drivers/glove/glove_decoder.hpp"
+#include "drivers/glove/line_reader.hpp"
 #include "drivers/glove/model.hpp"
 #include "drivers/lucidgloves/protocol.hpp"
 
 namespace posed::drivers::lucidgloves {
 
-// The settings of a glove that the decoder needs, from its device info.
+// What the options and the device info say.
 struct Settings {
+  Side hand = Side::kRight;
   Encoding encoding = Encoding::kAuto;
   int max_analog = 4095;
 };
@@ -41,15 +43,12 @@ class LucidDecoder final : public glove::GloveDecoder {
                std::bitset<glove::kMaxSensors>& valid) const noexcept override;
 
  private:
-  void keep(std::span<const std::byte> piece, Sink& sink) noexcept;
-  void end_line(Sink& sink) noexcept;
+  void accept_line(std::string_view text, Sink& sink) noexcept;
   [[nodiscard]] bool lost_a_key(const Line& line) noexcept;
   void emit_line(const Line& line, Sink& sink) noexcept;
 
   Settings settings_;
-  std::array<char, kMaxLine> text_{};
-  std::size_t length_ = 0;
-  bool overlong_ = false;        // the rest of the line is discarded
+  glove::LineReader<kMaxLine> lines_;
   std::bitset<kSplay> usual_{};  // fingers and joints that the glove normally sends
   int unusual_lines_ = 0;        // consecutive lines that lacked one of them
   std::array<int, 3> info_{};    // last values received

@@ -18,24 +18,19 @@ constexpr std::array<double, kJoints> kFinger_rad{0.0, 90.0 * kDegree, 100.0 * k
                                                   70.0 * kDegree};
 constexpr double kSplay_rad = 20.0 * kDegree;
 
-void add_text(const std::string& text, Emulator::Bytes& out) {
-  const auto bytes = std::as_bytes(std::span(text));
-  out.insert(out.end(), bytes.begin(), bytes.end());
-}
-
 }  // namespace
 
-LucidEmulator::LucidEmulator(Side side, Encoding encoding, int max_analog)
-    : side_(side), encoding_(encoding), max_(max_analog), pace_(kPeriod_ns) {
+LucidEmulator::LucidEmulator(const Settings& settings) : settings_(settings), pace_(kPeriod_ns) {
   pace_.start(0);
   pose_hand({});
 }
 
 void LucidEmulator::pose_hand(const HandAngles& angles) {
   line_ = {};
+  const int max = settings_.max_analog;
   const auto set = [&](std::size_t place, double share) {
     line_.has[place] = true;
-    line_.value[place] = static_cast<int>(std::lround(std::clamp(share, 0.0, 1.0) * max_));
+    line_.value[place] = static_cast<int>(std::lround(std::clamp(share, 0.0, 1.0) * max));
   };
   for (std::size_t f = 0; f < kFingers; ++f) {
     const auto& whole = f == 0 ? kThumb_rad : kFinger_rad;
@@ -57,9 +52,9 @@ void LucidEmulator::pose_hand(const HandAngles& angles) {
   set(kJoyY, 0.5);
   // The firmware recognises gestures: more than half closed counts as pressed.
   const auto curl = [&](std::size_t f) { return line_.value[kCurl + f]; };
-  line_.pressed[1] = 2 * curl(1) > max_;                                // trigger
-  line_.pressed[4] = curl(1) + curl(2) + curl(3) + curl(4) > 2 * max_;  // grab
-  line_.pressed[5] = curl(0) + curl(1) > max_;                          // pinch
+  line_.pressed[1] = 2 * curl(1) > max;                                // trigger
+  line_.pressed[4] = curl(1) + curl(2) + curl(3) + curl(4) > 2 * max;  // grab
+  line_.pressed[5] = curl(0) + curl(1) > max;                          // pinch
 }
 
 void LucidEmulator::receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) {
@@ -76,20 +71,20 @@ void LucidEmulator::receive(std::span<const std::byte> bytes, std::int64_t now_n
 
 void LucidEmulator::obey(const std::string& command, std::int64_t now_ns, Bytes& answer) {
   std::string rest = command;
-  const auto take = [&rest](const std::string& key) {
+  const auto consume = [&rest](const std::string& key) {
     const std::size_t at = rest.find(key);
     if (at != std::string::npos) rest.erase(at, key.size());
     return at != std::string::npos;
   };
-  const bool starts = take("(ZA)");
-  const bool stops = take("(ZZ)");
+  const bool starts = consume("(ZA)");
+  const bool stops = consume("(ZZ)");
   if (stops) pace_.stop();
   if (starts && !pace_.running()) pace_.start(now_ns);
-  if (take("Z")) {
+  if (consume("Z")) {
     Line info;
     info.has_info.set();
-    info.info = {kFirmware, 0, side_ == Side::kRight ? 1 : 0};
-    add_text(alpha_line(info), answer);
+    info.info = {kFirmware, 0, settings_.hand == Side::kRight ? 1 : 0};
+    glove::add_text(alpha_line(info), answer);
   }
   if (rest.starts_with('F')) {
     vibration_ = rest;
@@ -101,7 +96,8 @@ void LucidEmulator::obey(const std::string& command, std::int64_t now_ns, Bytes&
 void LucidEmulator::emit(std::int64_t now_ns, Bytes& out) {
   if (!pace_.running()) return;
   pace_.step(now_ns);
-  add_text(encoding_ == Encoding::kLegacy ? legacy_line(line_) : alpha_line(line_), out);
+  glove::add_text(settings_.encoding == Encoding::kLegacy ? legacy_line(line_) : alpha_line(line_),
+                  out);
 }
 
 }  // namespace posed::drivers::lucidgloves

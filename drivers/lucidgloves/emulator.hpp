@@ -7,14 +7,14 @@
 
 #include "drivers/emulate/pace.hpp"
 #include "drivers/glove/glove_emulator.hpp"
-#include "drivers/lucidgloves/protocol.hpp"
+#include "drivers/lucidgloves/decoder.hpp"
 
 namespace posed::drivers::lucidgloves {
 
 class LucidEmulator final : public glove::GloveEmulator {
  public:
   // kAuto sends the alpha encoding.
-  LucidEmulator(Side side, Encoding encoding, int max_analog);
+  explicit LucidEmulator(const Settings& settings);
 
   void pose_hand(const HandAngles& angles) override;
   // Commands end with a line end; all except (ZA), (ZZ), Z and forces are ignored.
@@ -29,9 +29,7 @@ class LucidEmulator final : public glove::GloveEmulator {
  private:
   void obey(const std::string& command, std::int64_t now_ns, Bytes& answer);
 
-  Side side_;
-  Encoding encoding_;
-  int max_;
+  Settings settings_;
   emulate::Pace pace_;
   Line line_;
   Forces forces_{};

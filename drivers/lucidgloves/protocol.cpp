@@ -18,7 +18,7 @@ bool is_key(char c) noexcept { return c >= 'A' && c <= 'Z'; }
 
 // Removes a number from the front of `text` and returns it. Limited to far above every range; -1
 // without a digit.
-int take_number(std::string_view& text) noexcept {
+int next_number(std::string_view& text) noexcept {
   constexpr int kTop = 10'000'000;
   int value = 0;
   std::size_t digits = 0;
@@ -31,7 +31,7 @@ int take_number(std::string_view& text) noexcept {
 
 // Removes the key at the front of `text` and returns it without parentheses; empty when there is
 // none.
-std::string_view take_key(std::string_view& text) noexcept {
+std::string_view next_key(std::string_view& text) noexcept {
   std::string_view key;
   if (text.front() == '(') {
     std::size_t close = 1;
@@ -79,7 +79,7 @@ std::optional<std::size_t> info_place(std::string_view key) noexcept {
 }
 
 // Stores one key and its number (-1: none) in the line. Unknown keys are ignored.
-Outcome take_pair(std::string_view key, int number, int max, Line& line) noexcept {
+Outcome store_pair(std::string_view key, int number, int max, Line& line) noexcept {
   if (const auto place = value_place(key)) {
     if (number < 0 || line.has[*place]) return Outcome::kForeign;
     if (number > max) return Outcome::kOutOfRange;
@@ -98,10 +98,10 @@ Outcome take_pair(std::string_view key, int number, int max, Line& line) noexcep
 
 Outcome parse_alpha(std::string_view text, int max, Line& line) noexcept {
   while (!text.empty()) {
-    const std::string_view key = take_key(text);
+    const std::string_view key = next_key(text);
     if (key.empty()) return Outcome::kForeign;
-    const int number = take_number(text);
-    if (const Outcome outcome = take_pair(key, number, max, line); outcome != Outcome::kOk) {
+    const int number = next_number(text);
+    if (const Outcome outcome = store_pair(key, number, max, line); outcome != Outcome::kOk) {
       return outcome;
     }
   }
@@ -111,7 +111,7 @@ Outcome parse_alpha(std::string_view text, int max, Line& line) noexcept {
 Outcome parse_legacy(std::string_view text, int max, Line& line) noexcept {
   std::array<int, kLegacyValues> values{};
   for (std::size_t i = 0; i < kLegacyValues; ++i) {
-    values[i] = take_number(text);
+    values[i] = next_number(text);
     const bool last = i + 1 == kLegacyValues;
     if (values[i] < 0) return Outcome::kForeign;
     if (text.empty() != last) return last ? Outcome::kForeign : Outcome::kShort;

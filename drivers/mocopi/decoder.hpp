@@ -3,14 +3,30 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
+#include <vector>
 
 #include "drivers/datagram_order.hpp"
 #include "drivers/driver.hpp"
-#include "drivers/mocopi/layout.hpp"
+#include "drivers/mocopi/protocol.hpp"
 #include "drivers/timestamp_clock.hpp"
 
 namespace posed::drivers::mocopi {
+
+// The one body of a mocopi app, compiled from the skeleton that it sends.
+
+class MocopiLayout final : public SourceLayout {
+ public:
+  std::vector<std::uint16_t> id;  // [joint], depth first
+
+  // The joint of a bone; id.size() when there is none. RT-safe.
+  [[nodiscard]] std::size_t joint_of(std::uint16_t bone) const noexcept;
+};
+
+// Driver::make_layout. Cold.
+[[nodiscard]] Result<std::unique_ptr<const SourceLayout>> make_layout(
+    std::span<const std::byte> description);
 
 class MocopiDecoder final : public Decoder {
  public:
@@ -24,7 +40,7 @@ class MocopiDecoder final : public Decoder {
   }
 
  private:
-  [[nodiscard]] Outcome take_frame(std::span<const std::byte> content, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_frame(std::span<const std::byte> content, Sink& sink) noexcept;
 
   const MocopiLayout* layout_ = nullptr;  // null until the app has sent its skeleton
   DatagramOrder order_{32};

@@ -15,7 +15,7 @@ constexpr double kBegan_s = 1.7e9;  // Unix time of the first frame
 constexpr double kWave_hz = 0.9;
 constexpr std::uint16_t kLeftUpArm = 12, kRightUpArm = 16, kRightLowArm = 17;
 
-// Where a bone of a person of 1.7 m begins, from its parent; the right side is the mirror image.
+// The begin of a bone, from its parent, of a person of 1.7 m; the right side is the mirror image.
 constexpr std::array<Vec3f, kBones> kPlaces_m{
     {{0, 0.93F, 0},  {0, 0.05F, 0},  {0, 0.05F, 0},      {0, 0.05F, 0},
      {0, 0.06F, 0},  {0, 0.06F, 0},  {0, 0.07F, 0},      {0, 0.07F, 0},

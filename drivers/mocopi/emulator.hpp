@@ -8,7 +8,7 @@
 
 #include "drivers/emulate/pace.hpp"
 #include "drivers/emulator.hpp"
-#include "drivers/mocopi/layout.hpp"
+#include "drivers/mocopi/decoder.hpp"
 
 namespace posed::drivers::mocopi {
 

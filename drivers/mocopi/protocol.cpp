@@ -6,15 +6,12 @@
 #include <limits>
 
 #include "drivers/byte_writer.hpp"
-#include "drivers/rate_text.hpp"
-#include "proto/clip/text.hpp"
 
 namespace posed::drivers::mocopi {
 namespace {
 
 constexpr std::string_view kFormat = "sony motion format";
 constexpr std::uint8_t kFormatVersion = 1;
-constexpr std::string_view kDeviceInfoPrefix = "mocopi rate=";
 
 struct BoneRow {
   std::string_view name;
@@ -218,14 +215,5 @@ std::optional<Bone> canonical_bone(std::uint16_t id) {
 }
 
 std::uint16_t usual_parent(std::uint16_t id) { return id < kBones ? kRows[id].parent : kNoParent; }
-
-std::string device_info_text(double rate_hz) {
-  return std::string(kDeviceInfoPrefix) + clip::number_text(rate_hz);
-}
-
-Result<double> parse_device_info(const std::string& text, const std::string& identity) {
-  if (const auto rate_hz = parse_rate(text, kDeviceInfoPrefix)) return *rate_hz;
-  return fail("is not described as a mocopi ('mocopi rate=60'); is it another device?", identity);
-}
 
 }  // namespace posed::drivers::mocopi

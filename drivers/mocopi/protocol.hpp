@@ -100,8 +100,4 @@ inline constexpr std::uint16_t kNoParent = 0xFFFF;
 // The parent in Sony's technical specification, for the emulator. Cold.
 [[nodiscard]] std::uint16_t usual_parent(std::uint16_t id);
 
-[[nodiscard]] std::string device_info_text(double rate_hz);
-[[nodiscard]] Result<double> parse_device_info(const std::string& text,
-                                               const std::string& identity);
-
 }  // namespace posed::drivers::mocopi

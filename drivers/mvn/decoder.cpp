@@ -39,52 +39,53 @@ void fill_frame(const CharacterPose& pose, bool fingers, Frame& frame) noexcept 
 // RT-safe.
 void MvnDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                       Sink& sink) noexcept {
-  now_ns_ = heard_time_.to(arrival_ns);
+  now_ns_ = active_time_.to(arrival_ns);
   arrival_ns_ = arrival_ns;
   if (stream_) {
     framer_.feed(bytes, [&](std::span<const std::byte> datagram) noexcept {
-      sink.outcome(datagram.empty() ? Outcome::kForeign : take(datagram, sink));
+      sink.outcome(datagram.empty() ? Outcome::kForeign : accept(datagram, sink));
       describe(sink);
     });
   } else {
-    sink.outcome(take(bytes, sink));
+    sink.outcome(accept(bytes, sink));
     describe(sink);
   }
 }
 
 // RT-safe.
-Outcome MvnDecoder::take(std::span<const std::byte> bytes, Sink& sink) noexcept {
+Outcome MvnDecoder::accept(std::span<const std::byte> bytes, Sink& sink) noexcept {
   Datagram datagram;
   const Outcome outcome = decode_datagram(bytes, datagram);
   if (outcome != Outcome::kOk) return outcome;
   switch (datagram.head.type) {
     case Type::kMeta:
-      return take_meta(datagram);
+      return accept_meta(datagram);
     case Type::kScale:
-      return take_scale(datagram);
+      return accept_scale(datagram);
     case Type::kTimeCode:
-      return take_timecode(datagram);
+      return accept_timecode(datagram);
     default:
-      return is_pose(datagram.head.type) ? take_pose(datagram, sink) : take_values(datagram, sink);
+      return is_pose(datagram.head.type) ? accept_pose(datagram, sink)
+                                         : accept_values(datagram, sink);
   }
 }
 
 // RT-safe.
-Outcome MvnDecoder::take_pose(const Datagram& datagram, Sink& sink) noexcept {
+Outcome MvnDecoder::accept_pose(const Datagram& datagram, Sink& sink) noexcept {
   Tracked* tracked = find_or_add(datagram.head.character);
   if (tracked == nullptr) return Outcome::kOutOfRange;
   if (!tracked->prefers(datagram.head, arrival_ns_)) return Outcome::kOk;
-  const Tracked::Part part = tracked->take_part(datagram, gathered_);
+  const Tracked::Part part = tracked->accept_part(datagram, gathered_);
   if (part.lost) sink.outcome(Outcome::kShort);  // stands for the part that did not come
-  return part.whole ? take_sample(*tracked, datagram.head, part.items, sink) : part.outcome;
+  return part.whole ? accept_sample(*tracked, datagram.head, part.items, sink) : part.outcome;
 }
 
 // RT-safe.
-Outcome MvnDecoder::take_sample(Tracked& tracked, const Head& head,
-                                std::span<const std::byte> items, Sink& sink) noexcept {
+Outcome MvnDecoder::accept_sample(Tracked& tracked, const Head& head,
+                                  std::span<const std::byte> items, Sink& sink) noexcept {
   const Outcome outcome = decode_pose(head, items, pose_);
   if (outcome != Outcome::kOk) return outcome;
-  tracked.heard_ns = now_ns_;
+  tracked.received_ns = now_ns_;
   tracked.look_at(pose_, now_ns_);
   const std::int64_t device_ns = device_time_ns(tracked, head);
   const std::size_t body = layout_ == nullptr ? 0 : layout_->body_of(head.character);
@@ -100,13 +101,13 @@ Outcome MvnDecoder::take_sample(Tracked& tracked, const Head& head,
 }
 
 // Types 20 to 24. RT-safe.
-Outcome MvnDecoder::take_values(const Datagram& datagram, Sink& sink) noexcept {
+Outcome MvnDecoder::accept_values(const Datagram& datagram, Sink& sink) noexcept {
   Tracked* tracked = find(datagram.head.character);
   if (tracked == nullptr) return Outcome::kForeign;  // nobody with a pose
   const Outcome outcome = decode_values(datagram, values_);
   if (outcome != Outcome::kOk) return outcome;
   const auto group = static_cast<std::size_t>(values_.group);
-  const Outcome order = tracked->value_order[group].take(datagram.head);
+  const Outcome order = tracked->value_order[group].accept(datagram.head);
   if (order != Outcome::kOk) return order;
   tracked->changed = tracked->changed || !tracked->character.values[group];
   tracked->character.values.set(group);
@@ -129,7 +130,7 @@ Outcome MvnDecoder::take_values(const Datagram& datagram, Sink& sink) noexcept {
 }
 
 // RT-safe.
-Outcome MvnDecoder::take_timecode(const Datagram& datagram) noexcept {
+Outcome MvnDecoder::accept_timecode(const Datagram& datagram) noexcept {
   const auto* text = reinterpret_cast<const char*>(datagram.payload.data());
   timecode_ = to_timecode({text, std::min(datagram.payload.size(), kTimeCodeBytes)});
   timecode_sample_ = datagram.head.sample;
@@ -137,7 +138,7 @@ Outcome MvnDecoder::take_timecode(const Datagram& datagram) noexcept {
 }
 
 // RT-safe.
-Outcome MvnDecoder::take_meta(const Datagram& datagram) noexcept {
+Outcome MvnDecoder::accept_meta(const Datagram& datagram) noexcept {
   std::string_view name;
   const Outcome outcome = decode_meta(datagram.payload, name);
   if (outcome != Outcome::kOk || name.empty()) return outcome;
@@ -148,11 +149,11 @@ Outcome MvnDecoder::take_meta(const Datagram& datagram) noexcept {
 }
 
 // RT-safe.
-Outcome MvnDecoder::take_scale(const Datagram& datagram) noexcept {
+Outcome MvnDecoder::accept_scale(const Datagram& datagram) noexcept {
   std::array<Vec3f, kBodySegments> position_m{};
-  bool told = false;
-  const Outcome outcome = decode_scale(datagram.payload, position_m, told);
-  if (outcome != Outcome::kOk || !told) return outcome;
+  bool reported = false;
+  const Outcome outcome = decode_scale(datagram.payload, position_m, reported);
+  if (outcome != Outcome::kOk || !reported) return outcome;
   Tracked* tracked = find_or_add(datagram.head.character);
   if (tracked == nullptr) return Outcome::kOutOfRange;
   tracked->set_scale(position_m);
@@ -173,7 +174,7 @@ Tracked* MvnDecoder::find_or_add(std::uint8_t character) noexcept {
   Tracked* room = nullptr;
   for (Tracked& tracked : characters_) {
     if (tracked.described) continue;
-    const bool better = room == nullptr || (room->known && tracked.heard_ns < room->heard_ns);
+    const bool better = room == nullptr || (room->known && tracked.received_ns < room->received_ns);
     if (!tracked.known || better) room = &tracked;
     if (!tracked.known) break;
   }

@@ -1,5 +1,5 @@
 // Decodes MVN's datagrams, over UDP or out of a TCP stream: each sample of a character becomes one
-// Frame. The decoder also keeps the list of the characters that it hears, and describes it.
+// Frame. The decoder also keeps the list of the characters that it receives, and describes it.
 #pragma once
 
 #include <array>
@@ -8,8 +8,8 @@
 #include <span>
 #include <string_view>
 
+#include "drivers/active_time.hpp"
 #include "drivers/driver.hpp"
-#include "drivers/heard_time.hpp"
 #include "drivers/mvn/framer.hpp"
 #include "drivers/mvn/layout.hpp"
 #include "drivers/mvn/protocol.hpp"
@@ -32,14 +32,14 @@ class MvnDecoder final : public Decoder {
   }
 
  private:
-  [[nodiscard]] Outcome take(std::span<const std::byte> bytes, Sink& sink) noexcept;
-  [[nodiscard]] Outcome take_pose(const Datagram& datagram, Sink& sink) noexcept;
-  [[nodiscard]] Outcome take_sample(Tracked& tracked, const Head& head,
-                                    std::span<const std::byte> items, Sink& sink) noexcept;
-  [[nodiscard]] Outcome take_values(const Datagram& datagram, Sink& sink) noexcept;
-  [[nodiscard]] Outcome take_timecode(const Datagram& datagram) noexcept;
-  [[nodiscard]] Outcome take_meta(const Datagram& datagram) noexcept;
-  [[nodiscard]] Outcome take_scale(const Datagram& datagram) noexcept;
+  [[nodiscard]] Outcome accept(std::span<const std::byte> bytes, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_pose(const Datagram& datagram, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_sample(Tracked& tracked, const Head& head,
+                                      std::span<const std::byte> items, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_values(const Datagram& datagram, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_timecode(const Datagram& datagram) noexcept;
+  [[nodiscard]] Outcome accept_meta(const Datagram& datagram) noexcept;
+  [[nodiscard]] Outcome accept_scale(const Datagram& datagram) noexcept;
   [[nodiscard]] Tracked* find(std::uint8_t character) noexcept;
   // The character, now known if there is room; null otherwise.
   [[nodiscard]] Tracked* find_or_add(std::uint8_t character) noexcept;
@@ -48,7 +48,7 @@ class MvnDecoder final : public Decoder {
 
   bool stream_;
   const MvnLayout* layout_ = nullptr;  // null until the first description is in use
-  HeardTime heard_time_;               // MVN may pause: that makes nobody leave
+  ActiveTime active_time_;             // MVN may pause: that makes nobody leave
   std::int64_t now_ns_ = kNoTime_ns;   // arrival of the bytes, in that time
   std::int64_t arrival_ns_ = kNoTime_ns;
   std::int64_t described_ns_ = kNoTime_ns;

@@ -1,3 +1,4 @@
+// The figures of the emulated people: invented proportions, in T-pose.
 #include "drivers/mvn/emulator.hpp"
 
 #include <algorithm>
@@ -10,6 +11,62 @@
 #include "proto/frame/rotation.hpp"
 
 namespace posed::drivers::mvn {
+
+namespace {
+
+constexpr std::array<Vec3f, kBodySegments> kTall{{
+    {0.0F, 0.98F, 0.0F},    // pelvis
+    {0.0F, 0.10F, -0.01F},  // L5
+    {0.0F, 0.12F, 0.0F},    // L3
+    {0.0F, 0.11F, 0.0F},    // T12
+    {0.0F, 0.11F, 0.0F},    // T8
+    {0.0F, 0.15F, 0.0F},    // neck
+    {0.0F, 0.10F, 0.0F},    // head
+    {-0.03F, 0.09F, 0.0F},  // right arm
+    {-0.15F, 0.0F, 0.0F},  {-0.32F, 0.0F, 0.0F}, {-0.26F, 0.0F, 0.0F},
+    {0.03F, 0.09F, 0.0F},  // left arm
+    {0.15F, 0.0F, 0.0F},   {0.32F, 0.0F, 0.0F},  {0.26F, 0.0F, 0.0F},
+    {-0.09F, 0.0F, 0.0F},  // right leg
+    {0.0F, -0.45F, 0.0F},  {0.0F, -0.43F, 0.0F}, {0.0F, -0.08F, 0.18F},
+    {0.09F, 0.0F, 0.0F},  // left leg
+    {0.0F, -0.45F, 0.0F},  {0.0F, -0.43F, 0.0F}, {0.0F, -0.08F, 0.18F},
+}};
+
+// A left hand: the carpus, then the segments of each finger from the thumb on.
+constexpr std::array<Vec3f, kHandSegments> kLeftHand{{
+    {0.01F, 0.0F, 0.0F},    {0.02F, -0.01F, 0.03F}, {0.03F, 0.0F, 0.02F}, {0.03F, 0.0F, 0.0F},
+    {0.02F, 0.0F, 0.02F},   {0.06F, 0.0F, 0.0F},    {0.04F, 0.0F, 0.0F},  {0.025F, 0.0F, 0.0F},
+    {0.02F, 0.0F, 0.0F},    {0.06F, 0.0F, 0.0F},    {0.045F, 0.0F, 0.0F}, {0.03F, 0.0F, 0.0F},
+    {0.02F, 0.0F, -0.015F}, {0.055F, 0.0F, 0.0F},   {0.04F, 0.0F, 0.0F},  {0.025F, 0.0F, 0.0F},
+    {0.02F, 0.0F, -0.03F},  {0.05F, 0.0F, 0.0F},    {0.03F, 0.0F, 0.0F},  {0.02F, 0.0F, 0.0F},
+}};
+
+Character person(std::uint8_t id, std::string_view name, float scale) {
+  Character character;
+  character.id = id;
+  character.name_bytes = static_cast<std::uint8_t>(name.size());
+  std::ranges::copy(name, character.name.begin());
+  for (std::size_t i = 0; i < kBodySegments; ++i) {
+    for (std::size_t k = 0; k < 3; ++k) character.offset_m[i][k] = scale * kTall[i][k];
+  }
+  return character;
+}
+
+}  // namespace
+
+Character emulated_walker() {
+  Character walker = person(0, "Walker", 1.0F);
+  walker.fingers = true;
+  for (std::size_t i = 0; i < kHandSegments; ++i) {
+    const auto& [x, y, z] = kLeftHand[i];
+    walker.offset_m[kLeftFingers + i] = {x, y, z};
+    walker.offset_m[kRightFingers + i] = {-x, y, z};
+  }
+  return walker;
+}
+
+Character emulated_waver() { return person(1, "Waver", 0.9F); }
+
 namespace {
 
 constexpr double kStep_hz = 0.9;  // double steps and waves a second
@@ -148,12 +205,12 @@ void MvnEmulator::fill_queue(std::int64_t now_ns) {
   if (people_.size() > 1 && !people_[1].posed) {
     wave(time_s, people_[1].root_m, people_[1].rotation_xyzw);
   }
-  const bool tell = told_ns_ == kNoTime_ns || queued_ns_ - told_ns_ >= kNanosPerSecond;
-  if (tell) told_ns_ = queued_ns_;
+  const bool tell = reported_ns_ == kNoTime_ns || queued_ns_ - reported_ns_ >= kNanosPerSecond;
+  if (tell) reported_ns_ = queued_ns_;
   for (const Person& person : people_) {
     for (const Type type : settings_.types) {
-      const bool told_once = type == Type::kMeta || type == Type::kScale;
-      if (person.present && (tell || !told_once)) add_sample(person, type, queued_ns_);
+      const bool reported_once = type == Type::kMeta || type == Type::kScale;
+      if (person.present && (tell || !reported_once)) add_sample(person, type, queued_ns_);
     }
   }
   ++sample_;

@@ -52,8 +52,8 @@ class MvnEmulator final : public Emulator {
   Settings settings_;
   std::vector<Person> people_;
   emulate::Pace samples_;
-  std::int64_t told_ns_ = kNoTime_ns;  // when types 12 and 13 were last sent
-  std::int64_t queued_ns_ = 0;         // when the datagrams that wait were due
+  std::int64_t reported_ns_ = kNoTime_ns;  // when types 12 and 13 were last sent
+  std::int64_t queued_ns_ = 0;             // when the datagrams that wait were due
   std::deque<Bytes> queue_;
   std::uint32_t sample_ = 0;
 };

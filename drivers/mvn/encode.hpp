@@ -12,7 +12,7 @@
 
 namespace posed::drivers::mvn {
 
-// The head with `payload`, whose size it tells.
+// The head with `payload`, whose size it has.
 [[nodiscard]] std::vector<std::byte> encode_datagram(const Head& head,
                                                      std::span<const std::byte> payload);
 
@@ -22,7 +22,7 @@ namespace posed::drivers::mvn {
 
 [[nodiscard]] std::vector<std::byte> encode_meta(std::string_view name);
 
-// Where the body's segments are in T-pose, in posed's axes.
+// Writes the positions of the body's segments in T-pose, given in posed's axes.
 [[nodiscard]] std::vector<std::byte> encode_scale(std::span<const Vec3f, kBodySegments> position_m);
 
 // The items of type 20, 21, 22 or 23 for a body at rest: the angles, positions or rotations of a

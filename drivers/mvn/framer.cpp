@@ -25,9 +25,9 @@ Framer::Next Framer::look(std::span<const std::byte> bytes) noexcept {
   if (!may_start(bytes)) return {.skip = until_start(bytes)};
   if (bytes.size() < kHeadBytes) return {};
   Head head;
-  const bool sound = read_head(bytes, head) && head.payload_bytes <= kMaxPayload &&
+  const bool valid = read_head(bytes, head) && head.payload_bytes <= kMaxPayload &&
                      is_right_size(head, head.payload_bytes);
-  if (!sound) return {.skip = until_start(bytes)};
+  if (!valid) return {.skip = until_start(bytes)};
   const std::size_t whole = kHeadBytes + head.payload_bytes;
   if (bytes.size() < whole) return {};
   return {.whole = whole};

@@ -17,37 +17,37 @@ class Framer {
   // (type 13) and has about 5 KB.
   static constexpr std::size_t kMaxPayload = std::size_t{16} * 1024;
 
-  // Takes bytes cut at any position. `take` gets each datagram, and empty bytes once for each run
+  // Reads bytes cut at any position. `handle` gets each datagram, and empty bytes once for each run
   // of bytes that are none. RT-safe.
-  template <typename Take>
-  void feed(std::span<const std::byte> bytes, Take&& take) noexcept {
+  template <typename Handle>
+  void feed(std::span<const std::byte> bytes, Handle&& handle) noexcept {
     while (!bytes.empty()) {
-      const std::size_t taken = std::min(bytes.size(), buffer_.size() - size_);
-      std::ranges::copy(bytes.first(taken), buffer_.begin() + static_cast<std::ptrdiff_t>(size_));
-      size_ += taken;
-      bytes = bytes.subspan(taken);
-      split(take);
+      const std::size_t used = std::min(bytes.size(), buffer_.size() - size_);
+      std::ranges::copy(bytes.first(used), buffer_.begin() + static_cast<std::ptrdiff_t>(size_));
+      size_ += used;
+      bytes = bytes.subspan(used);
+      split(handle);
     }
   }
 
  private:
   // Takes all whole datagrams out of the buffer. Afterwards it has room: what is left is shorter
   // than one datagram.
-  template <typename Take>
-  void split(Take& take) noexcept {
+  template <typename Handle>
+  void split(Handle& handle) noexcept {
     std::size_t at = 0;
     while (at < size_) {
       const std::span<const std::byte> rest = std::span(buffer_).subspan(at, size_ - at);
       const Next next = look(rest);
       if (next.skip > 0) {
-        if (!skipping_) take(std::span<const std::byte>{});
+        if (!skipping_) handle(std::span<const std::byte>{});
         skipping_ = true;
         at += next.skip;
         continue;
       }
       if (next.whole == 0) break;
       skipping_ = false;
-      take(rest.first(next.whole));
+      handle(rest.first(next.whole));
       at += next.whole;
     }
     std::copy(buffer_.begin() + static_cast<std::ptrdiff_t>(at),

@@ -1,12 +1,12 @@
 // The characters of an MVN stream as bodies. MVN does not list them, so the decoder writes this
-// description of those that it hears, little-endian:
+// description of those that it receives, little-endian:
 //
 //     0     1       then each character:
 //   +-----+-------+-----------+-------+-----------+------+------------------------------------+
 //   |  1  | count | character | flags | name size | name | each segment: offset x, y, z (f32) |
 //   +-----+-------+-----------+-------+-----------+------+------------------------------------+
 //    flags      u8, 1: with fingers; 2 and the higher bits: the groups of values (values.hpp)
-//    name size  u8, bytes of the name as type 12 told it; 0 when it did not
+//    name size  u8, bytes of the name as type 12 reported it; 0 when it did not
 //    offset     [m], in posed's axes, from the parent in T-pose; of 23 segments, or of 63 with
 //               fingers; of the pelvis the height above the floor
 #pragma once
@@ -28,7 +28,7 @@ namespace posed::drivers::mvn {
 inline constexpr std::size_t kMaxCharacters = 32;
 inline constexpr std::size_t kMvnNameBytes = 60;
 
-// What is known about a character. Plain, because the decoder keeps it.
+// The knowledge about a character: a plain struct, because the decoder keeps it.
 struct Character {
   std::uint8_t id = 0;
   bool fingers = false;

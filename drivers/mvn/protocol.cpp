@@ -65,7 +65,7 @@ bool read_segment(Type type, BigEndianReader& reader, SegmentPose& segment) noex
     segment.position_m = from_z_up(p);
     segment.rotation_xyzw = read_quaternion(reader);
   }
-  return take_rotation(segment.rotation_xyzw, segment.seen) && is_plausible(segment.position_m);
+  return accept_rotation(segment.rotation_xyzw, segment.seen) && is_plausible(segment.position_m);
 }
 
 struct Shape {
@@ -83,9 +83,9 @@ Outcome shape_of(const Head& head, std::size_t items, Shape& shape) noexcept {
     shape.props = shape.fingers ? more - kFingers : more;
     return shape.props <= kMaxProps ? Outcome::kOk : Outcome::kShort;
   }
-  const bool sound = head.body == kBodySegments && head.props <= kMaxProps &&
+  const bool valid = head.body == kBodySegments && head.props <= kMaxProps &&
                      (head.fingers == 0 || head.fingers == kFingers);
-  if (!sound) return Outcome::kOutOfRange;
+  if (!valid) return Outcome::kOutOfRange;
   shape.fingers = head.fingers != 0 && more == head.props + kFingers;
   shape.props = more == 0 ? 0 : head.props;
   return shape.fingers || more == shape.props ? Outcome::kOk : Outcome::kShort;
@@ -188,7 +188,7 @@ Outcome decode_pose(const Head& head, std::span<const std::byte> items,
   pose.fingers = shape.fingers && !unity;  // type 05 has none
   BigEndianReader reader(items);
   const std::size_t wanted = pose.fingers ? kSegments + shape.props : kBodySegments;
-  bool sound = true;
+  bool valid = true;
   for (std::size_t i = 0; i < wanted; ++i) {
     static_cast<void>(reader.i32());
     const bool prop = i >= kBodySegments && i < kBodySegments + shape.props;
@@ -196,9 +196,9 @@ Outcome decode_pose(const Head& head, std::span<const std::byte> items,
     const std::size_t segment =
         i < kBodySegments ? (unity ? kUnitySegments[i] : i) : i - shape.props;
     SegmentPose& to = prop ? ignored : pose.segments[segment];
-    sound = (read_segment(head.type, reader, to) || prop) && sound;
+    valid = (read_segment(head.type, reader, to) || prop) && valid;
   }
-  return sound ? Outcome::kOk : Outcome::kOutOfRange;
+  return valid ? Outcome::kOk : Outcome::kOutOfRange;
 }
 
 Outcome decode_meta(std::span<const std::byte> payload, std::string_view& name) noexcept {
@@ -216,16 +216,16 @@ Outcome decode_meta(std::span<const std::byte> payload, std::string_view& name) 
 }
 
 Outcome decode_scale(std::span<const std::byte> payload,
-                     std::array<Vec3f, kBodySegments>& position_m, bool& told) noexcept {
+                     std::array<Vec3f, kBodySegments>& position_m, bool& reported) noexcept {
   BigEndianReader reader(payload);
   const std::uint32_t segments = reader.u32();
   if (segments > reader.left() / kLeastSegment) return Outcome::kShort;
-  bool sound = true;
+  bool valid = true;
   for (std::size_t i = 0; i < segments; ++i) {
     if (!skip_name(reader)) return Outcome::kShort;
     const Vec3f p = from_z_up(read_vector(reader));
     if (!reader.ok()) return Outcome::kShort;
-    sound = sound && is_plausible(p);
+    valid = valid && is_plausible(p);
     if (i < kBodySegments) position_m[i] = p;
   }
   const std::uint32_t points = reader.u32();
@@ -235,8 +235,8 @@ Outcome decode_scale(std::span<const std::byte> payload,
     static_cast<void>(reader.bytes(sizeof(std::uint32_t) + kVectorBytes));
   }
   if (!reader.ok() || reader.left() != 0) return Outcome::kShort;
-  told = segments != 0;
-  return sound && (!told || segments >= kBodySegments) ? Outcome::kOk : Outcome::kOutOfRange;
+  reported = segments != 0;
+  return valid && (!reported || segments >= kBodySegments) ? Outcome::kOk : Outcome::kOutOfRange;
 }
 
 }  // namespace posed::drivers::mvn

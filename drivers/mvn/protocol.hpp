@@ -99,7 +99,7 @@ struct Head {
   std::uint8_t props = 0;
   std::uint8_t fingers = 0;
   std::uint16_t payload_bytes = 0;
-  bool old = false;  // before MVN 2019: body, props, fingers and payload_bytes are not told
+  bool old = false;  // before MVN 2019: body, props, fingers and payload_bytes are not reported
 };
 
 struct Datagram {
@@ -123,8 +123,8 @@ struct CharacterPose {
 // Reads the first kHeadBytes of a datagram. False: they are not from MVN. RT-safe.
 [[nodiscard]] bool read_head(std::span<const std::byte> bytes, Head& head) noexcept;
 
-// Whether a datagram of this type with these items may have such a payload. Types that posed does
-// not know may have any. RT-safe.
+// Returns whether a datagram of this type with these items may have such a payload. Types that
+// posed does not know may have any. RT-safe.
 [[nodiscard]] bool is_right_size(const Head& head, std::size_t payload_bytes) noexcept;
 
 // Bytes of an item; 0 for types whose payload is no list of equal items. RT-safe.
@@ -141,14 +141,14 @@ struct CharacterPose {
 [[nodiscard]] Outcome decode_pose(const Head& head, std::span<const std::byte> items,
                                   CharacterPose& pose) noexcept;
 
-// The character's name in type 12; empty when the datagram does not tell it. RT-safe.
+// The character's name in type 12; empty when the datagram does not have it. RT-safe.
 [[nodiscard]] Outcome decode_meta(std::span<const std::byte> payload,
                                   std::string_view& name) noexcept;
 
-// Where the body's segments are in T-pose, in posed's axes. `told` is false for the datagrams of
-// type 13 that describe only points. RT-safe.
+// Reads the positions of the body's segments in T-pose, in posed's axes. `reported` is false for
+// the datagrams of type 13 that describe only points. RT-safe.
 [[nodiscard]] Outcome decode_scale(std::span<const std::byte> payload,
                                    std::array<Vec3f, kBodySegments>& position_m,
-                                   bool& told) noexcept;
+                                   bool& reported) noexcept;
 
 }  // namespace posed::drivers::mvn

@@ -17,7 +17,7 @@ inline constexpr std::size_t kBodySegments = 23;
 inline constexpr std::size_t kHandSegments = 20;
 inline constexpr std::size_t kSegments = kBodySegments + 2 * kHandSegments;
 
-// Of the body's segments, the hands whose fingers may follow.
+// The hands, of the body's segments: their fingers may follow.
 inline constexpr std::size_t kRightHandSegment = 10;
 inline constexpr std::size_t kLeftHandSegment = 14;
 inline constexpr std::size_t kLeftFingers = kBodySegments;

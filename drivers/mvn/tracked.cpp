@@ -64,7 +64,7 @@ float pelvis_height_m(const std::array<Vec3f, kSegments>& offset_m) noexcept {
 void Tracked::begin(std::uint8_t id, std::int64_t now_ns) noexcept {
   *this = Tracked();
   known = true;
-  first_ns = heard_ns = now_ns;
+  first_ns = received_ns = now_ns;
   character.id = id;
 }
 
@@ -83,11 +83,11 @@ bool Tracked::prefers(const Head& head, std::int64_t now_ns) noexcept {
   return true;
 }
 
-Tracked::Part Tracked::take_part(const Datagram& datagram, Assembly::Buffer& to) noexcept {
+Tracked::Part Tracked::accept_part(const Datagram& datagram, Assembly::Buffer& to) noexcept {
   const Head& head = datagram.head;
   Part part;
   if (!assembly_.is_open() || head.sample != assembly_.sample()) {
-    part.outcome = order_.take(head.sample);
+    part.outcome = order_.accept(head.sample);
     if (part.outcome != Outcome::kOk) return part;
     part.lost = assembly_.is_open();
     assembly_.close();
@@ -119,7 +119,7 @@ void Tracked::set_name(std::string_view name) noexcept {
   changed = true;
 }
 
-void Tracked::take_offsets(const Offsets& offset_m, std::size_t from, std::size_t to) noexcept {
+void Tracked::accept_offsets(const Offsets& offset_m, std::size_t from, std::size_t to) noexcept {
   for (std::size_t i = from; i < to; ++i) character.offset_m[i] = offset_m[i];
   changed = true;
 }
@@ -148,7 +148,7 @@ void Tracked::set_scale(const std::array<Vec3f, kBodySegments>& position_m) noex
   const bool takes =
       !described || !has_body_ || farthest_m(offset_m, 0, kBodySegments) > kOtherFigure_m;
   has_body_ = true;
-  if (takes) take_offsets(offset_m, 0, kBodySegments);
+  if (takes) accept_offsets(offset_m, 0, kBodySegments);
 }
 
 void Tracked::look_at(const CharacterPose& pose, std::int64_t now_ns) noexcept {
@@ -160,11 +160,11 @@ void Tracked::look_at(const CharacterPose& pose, std::int64_t now_ns) noexcept {
   const bool hands = pose.fingers && offsets_of(pose, kBodySegments, kSegments, offset_m);
   if (body) offset_m[0] = {0.0F, pelvis_height_m(offset_m), 0.0F};
   if (body && !has_body_) {
-    take_offsets(offset_m, 0, kBodySegments);
+    accept_offsets(offset_m, 0, kBodySegments);
     has_body_ = true;
   }
   if (hands && new_fingers) {
-    take_offsets(offset_m, kBodySegments, kSegments);
+    accept_offsets(offset_m, kBodySegments, kSegments);
     character.fingers = true;
   }
   if (!look) return;
@@ -173,12 +173,12 @@ void Tracked::look_at(const CharacterPose& pose, std::int64_t now_ns) noexcept {
   const std::size_t from = body && !scaled_ ? 0 : kBodySegments;
   const std::size_t to = hands ? kSegments : kBodySegments;
   const bool differs = farthest_m(offset_m, from, to) > kOtherFigure_m;
-  if (differs && differs_) take_offsets(offset_m, from, to);
+  if (differs && differs_) accept_offsets(offset_m, from, to);
   differs_ = differs && !differs_;
 }
 
 bool Tracked::belongs(std::int64_t now_ns) const noexcept {
-  if (!has_body_ || !posed_ || now_ns - heard_ns >= kPatience_ns) return false;
+  if (!has_body_ || !posed_ || now_ns - received_ns >= kPatience_ns) return false;
   return described || (named_ && scaled_) || now_ns - first_ns >= kPatience_ns;
 }
 

@@ -101,37 +101,37 @@ bool read_quantity(QuantityKind kind, BigEndianReader& reader, std::span<float> 
   seen = true;
   if (kind == QuantityKind::kRotation) {
     Quatf rotation_xyzw = read_quaternion(reader);
-    const bool sound = take_rotation(rotation_xyzw, seen);
+    const bool valid = accept_rotation(rotation_xyzw, seen);
     std::ranges::copy(rotation_xyzw, to.begin());
-    return sound;
+    return valid;
   }
   Vec3f v = from_z_up(read_vector(reader));
-  bool sound = is_finite(v);
-  if (kind == QuantityKind::kPosition) sound = is_plausible(v);
+  bool valid = is_finite(v);
+  if (kind == QuantityKind::kPosition) valid = is_plausible(v);
   if (kind == QuantityKind::kAngles) {
     for (float& x : v) {
       const double angle_rad = static_cast<double>(x) * kDegree;
-      sound = sound && std::abs(angle_rad) <= kMaxAngle_rad;
+      valid = valid && std::abs(angle_rad) <= kMaxAngle_rad;
       x = static_cast<float>(angle_rad);
     }
   }
   std::ranges::copy(v, to.begin());
-  return sound;
+  return valid;
 }
 
 // Reads the numbers of one item to the values from `begin` on. False: a number is wrong. RT-safe.
 bool read_item(const GroupTable& table, BigEndianReader& reader, std::size_t begin,
                GroupValues& values) noexcept {
-  bool sound = true;
+  bool valid = true;
   for (const Quantity& quantity : table.quantities) {
     const std::size_t count = numbers_of(quantity);
     bool seen = false;
     const auto to = std::span(values.value).subspan(begin, count);
-    sound = read_quantity(quantity.kind, reader, to, seen) && sound;
+    valid = read_quantity(quantity.kind, reader, to, seen) && valid;
     for (std::size_t i = 0; i < count; ++i) values.valid[begin + i] = seen;
     begin += count;
   }
-  return sound;
+  return valid;
 }
 
 ValueGroup group_of(const Datagram& datagram) noexcept {
@@ -164,7 +164,7 @@ Outcome decode_values(const Datagram& datagram, GroupValues& values) noexcept {
   const std::size_t width = item_values(table);
   const bool joints = values.group == ValueGroup::kJointAngles;
   std::bitset<kBodySegments> came;
-  bool sound = true;
+  bool valid = true;
   for (std::size_t i = 0; i < datagram.head.items; ++i) {
     std::size_t segment = kNotOurs;
     if (!(joints ? read_joint_id(reader, segment) : read_segment_id(reader, segment))) {
@@ -174,11 +174,11 @@ Outcome decode_values(const Datagram& datagram, GroupValues& values) noexcept {
       static_cast<void>(reader.bytes(width * sizeof(float)));
       continue;
     }
-    sound = sound && !came[segment];
+    valid = valid && !came[segment];
     came.set(segment);
-    sound = read_item(table, reader, (segment - table.first) * width, values) && sound;
+    valid = read_item(table, reader, (segment - table.first) * width, values) && valid;
   }
-  return sound ? Outcome::kOk : Outcome::kOutOfRange;
+  return valid ? Outcome::kOk : Outcome::kOutOfRange;
 }
 
 std::size_t value_count(ValueGroup group) noexcept {

@@ -1,6 +1,7 @@
-// What MVN tells about a character beside its pose (types 20 to 24), as the named values of its
-// samples. Each of these items names its segment, so a datagram is read without the other parts of
-// its sample. Values of the body's 23 segments are handed on, those of props and fingers are not.
+// The values that MVN sends about a character beside its pose (types 20 to 24), as the named values
+// of its samples. Each of these items names its segment, so a datagram is read without the other
+// parts of its sample. Values of the body's 23 segments are handed on, those of props and fingers
+// are not.
 #pragma once
 
 #include <array>
@@ -45,8 +46,9 @@ struct GroupValues {
 
 [[nodiscard]] std::size_t value_count(ValueGroup group) noexcept;  // RT-safe
 
-// Where each group's values stand in the samples of a character that sends these groups. They stand
-// in the order of the groups; one that no longer fits into kMaxSampleValues is left out as a whole.
+// The place of each group's values in the samples of a character that sends these groups. They
+// stand in the order of the groups; one that no longer fits into kMaxSampleValues is left out as a
+// whole.
 struct ValuePlaces {
   static constexpr std::size_t kNone = ~std::size_t{0};
   std::array<std::size_t, kValueGroups> begin{};  // [group], kNone: not in the samples
@@ -57,13 +59,13 @@ struct ValuePlaces {
 // "LeftForeArm_velocity_x" and its unit. Cold.
 [[nodiscard]] SampleLayout name_values(ValueGroups groups);
 
-// Which datagrams of one type are new: parts of one sample have the same number.
+// Decides which datagrams of one type are new; the parts of one sample have the same number.
 class PartOrder {
  public:
-  // As DatagramOrder. RT-safe.
-  [[nodiscard]] Outcome take(const Head& head) noexcept {
+  // Returns what DatagramOrder::accept returns. RT-safe.
+  [[nodiscard]] Outcome accept(const Head& head) noexcept {
     if (!came_.any() || head.sample != sample_) {
-      const Outcome outcome = samples_.take(head.sample);
+      const Outcome outcome = samples_.accept(head.sample);
       if (outcome != Outcome::kOk) return outcome;
       sample_ = head.sample;
       came_.reset();

@@ -1,14 +1,101 @@
 #include "drivers/natnet/decoder.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <string_view>
 
 #include "drivers/byte_reader.hpp"
+#include "drivers/glove/device_info.hpp"
 #include "drivers/natnet/axes.hpp"
+#include "drivers/natnet/protocol.hpp"
 #include "drivers/natnet/skeleton_pose.hpp"
 #include "drivers/pose_values.hpp"
 
 namespace posed::drivers::natnet {
+
+namespace {
+
+constexpr std::array<std::string_view, 2> kUps{"y", "z"};
+constexpr std::array<std::string_view, 3> kCoordinates{"auto", "local", "global"};
+constexpr std::array<std::string_view, 2> kCasts{"multi", "uni"};
+constexpr std::string_view kAnyVersion = "auto";
+
+}  // namespace
+
+std::string settings_text(const Settings& settings) {
+  const auto word = [](const auto& words, auto index) {
+    return std::string(words[static_cast<std::size_t>(index)]);
+  };
+  const Version version = settings.version;
+  return "natnet version=" +
+         (version.known() ? std::to_string(version.major) + '.' + std::to_string(version.minor)
+                          : std::string(kAnyVersion)) +
+         " up=" + word(kUps, settings.z_up) +
+         " coordinates=" + word(kCoordinates, settings.coordinates) +
+         " cast=" + word(kCasts, settings.unicast) + " rate=" + std::to_string(settings.rate_hz);
+}
+
+Result<Settings> parse_settings(const std::string& text, const std::string& identity) {
+  glove::DeviceInfoReader reader(text, "natnet", identity);
+  Settings settings;
+  const std::string version = reader.word("version");
+  settings.z_up = reader.choice("up", kUps) == 1;
+  settings.coordinates = static_cast<Coordinates>(reader.choice("coordinates", kCoordinates));
+  settings.unicast = reader.choice("cast", kCasts) == 1;
+  settings.rate_hz = reader.whole("rate", 1, 2000);
+  if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
+  if (version == kAnyVersion) return settings;
+  const auto parsed = parse_version(version);
+  if (!parsed) return fail(parsed.error().message, identity);
+  settings.version = *parsed;
+  return settings;
+}
+
+Result<bool> parse_up(const std::string& word) {
+  if (word == "y" || word == "z") return word == "z";
+  return misuse("up should be \"y\" or \"z\", as Motive's up axis is set");
+}
+
+Result<Coordinates> parse_coordinates(const std::string& word) {
+  const auto at = std::ranges::find(kCoordinates, word);
+  if (at != kCoordinates.end()) return static_cast<Coordinates>(at - kCoordinates.begin());
+  return misuse(
+      "coordinates should be \"auto\", \"local\" or \"global\", as Motive's skeleton coordinates "
+      "are set");
+}
+
+Requests::Requests(bool unicast)
+    : connect_{.datagram = encode_connect()},
+      rate_{.datagram = encode_text(MessageId::kRequest, "FrameRate")},
+      bodies_{.datagram = encode_message(MessageId::kRequestModelDef, {})},
+      alive_{.datagram = encode_message(MessageId::kKeepAlive, {}), .wanted = unicast} {}
+
+// A server that says who it is may have restarted, with other bodies. RT-safe.
+void Requests::accept_server_info() noexcept {
+  connect_.wanted = false;
+  rate_.wanted = true;
+  bodies_.wanted = true;
+}
+
+// RT-safe.
+bool Requests::is_due(Question& question, std::int64_t now_ns) noexcept {
+  if (!question.wanted || now_ns < question.next_ns) return false;
+  question.next_ns = now_ns + kAgain_ns;
+  return true;
+}
+
+// The rate before the bodies, whose description carries it. RT-safe.
+std::span<const std::byte> Requests::next(std::int64_t now_ns) noexcept {
+  if (received_ns_ != kNoTime_ns && now_ns - received_ns_ > kSilence_ns) connect_.wanted = true;
+  if (is_due(connect_, now_ns)) return connect_.datagram;
+  if (connect_.wanted) return {};
+  if (is_due(rate_, now_ns)) return rate_.datagram;
+  if (is_due(bodies_, now_ns)) return bodies_.datagram;
+  if (is_due(alive_, now_ns)) return alive_.datagram;
+  return {};
+}
+
 namespace {
 
 constexpr float kLeastRate_hz = 1.0F;
@@ -42,57 +129,57 @@ void NatNetDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_
   Message message;
   Outcome outcome = decode_message(bytes, message);
   if (outcome == Outcome::kOk) {
-    if (is_from_server(message.id)) requests_.heard(arrival_ns);
-    outcome = take(message, sink);
+    if (is_from_server(message.id)) requests_.received(arrival_ns);
+    outcome = accept(message, sink);
   }
   sink.outcome(outcome);
 }
 
 // RT-safe.
-Outcome NatNetDecoder::take(const Message& message, Sink& sink) noexcept {
+Outcome NatNetDecoder::accept(const Message& message, Sink& sink) noexcept {
   switch (message.id) {
     case MessageId::kServerInfo:
-      return take_server_info(message.payload);
+      return accept_server_info(message.payload);
     case MessageId::kResponse:
-      return take_response(message.payload);
+      return accept_response(message.payload);
     case MessageId::kModelDef:
-      return take_model_def(message.payload, sink);
+      return accept_model_def(message.payload, sink);
     case MessageId::kFrame:
-      return take_frame(message.payload, sink);
+      return accept_frame(message.payload, sink);
     default:  // of no use here, or of another client
       return is_from_server(message.id) ? Outcome::kOk : Outcome::kForeign;
   }
 }
 
 // The version of the options counts more: somebody has set it. RT-safe.
-Outcome NatNetDecoder::take_server_info(std::span<const std::byte> payload) noexcept {
+Outcome NatNetDecoder::accept_server_info(std::span<const std::byte> payload) noexcept {
   ServerInfo info;
   if (!decode_server_info(payload, info)) return Outcome::kShort;
   const Version said = settings_.version.known() ? settings_.version : info.version;
   if (said != version_) has_reading_ = false;
   version_ = said;
   clock_hz_ = info.clock_hz;
-  requests_.take_server_info();
+  requests_.accept_server_info();
   return Outcome::kOk;
 }
 
 // The only request is that for the rate. RT-safe.
-Outcome NatNetDecoder::take_response(std::span<const std::byte> payload) noexcept {
+Outcome NatNetDecoder::accept_response(std::span<const std::byte> payload) noexcept {
   const float rate_hz = ByteReader(payload).f32();
   if (!(rate_hz >= kLeastRate_hz && rate_hz <= kMostRate_hz)) return Outcome::kOutOfRange;
   rate_hz_ = rate_hz;
-  requests_.take_rate();
+  requests_.accept_rate();
   return Outcome::kOk;
 }
 
 // RT-safe.
-Outcome NatNetDecoder::take_model_def(std::span<const std::byte> payload, Sink& sink) noexcept {
+Outcome NatNetDecoder::accept_model_def(std::span<const std::byte> payload, Sink& sink) noexcept {
   const DescriptionHead head{.version = version_, .z_up = settings_.z_up, .rate_hz = rate_hz_};
   write_description_head(head, std::span(description_).first<kDescriptionHeadBytes>());
   const std::size_t size = std::min(payload.size(), description_.size() - kDescriptionHeadBytes);
   std::ranges::copy(payload.first(size), description_.begin() + kDescriptionHeadBytes);
   sink.description(std::span(description_).first(kDescriptionHeadBytes + size));
-  requests_.take_bodies();
+  requests_.accept_bodies();
   return Outcome::kOk;
 }
 
@@ -117,37 +204,37 @@ bool NatNetDecoder::read(std::span<const std::byte> payload, FrameView& view) no
 }
 
 // RT-safe.
-Outcome NatNetDecoder::take_frame(std::span<const std::byte> payload, Sink& sink) noexcept {
+Outcome NatNetDecoder::accept_frame(std::span<const std::byte> payload, Sink& sink) noexcept {
   FrameView view;
   if (!read(payload, view)) return Outcome::kOutOfRange;
   if (view.bodies_changed) requests_.bodies_changed();
   if (layout_ == nullptr) return Outcome::kForeign;
-  if (const Outcome order = order_.take(view.number); order != Outcome::kOk) return order;
+  if (const Outcome order = order_.accept(view.number); order != Outcome::kOk) return order;
   device_ns_ = time_.of(view, clock_hz_);
   timecode_ = to_timecode(view.timecode);
-  taken_.reset();
-  const Outcome bodies = take_bodies(view, sink);
-  return worse(bodies, take_markers(view, sink));
+  emitted_.reset();
+  const Outcome bodies = accept_bodies(view, sink);
+  return worse(bodies, accept_markers(view, sink));
 }
 
 // RT-safe.
-Outcome NatNetDecoder::take_bodies(const FrameView& view, Sink& sink) noexcept {
+Outcome NatNetDecoder::accept_bodies(const FrameView& view, Sink& sink) noexcept {
   Outcome worst = Outcome::kOk;
   ByteReader rigid_bodies(view.rigid_bodies.bytes);
   for (std::size_t i = 0; i < view.rigid_bodies.count; ++i) {
-    worst = worse(worst, take_rigid_body(rigid_bodies, sink));
+    worst = worse(worst, accept_rigid_body(rigid_bodies, sink));
   }
   ByteReader skeletons(view.skeletons.bytes);
   for (std::size_t i = 0; i < view.skeletons.count; ++i) {
-    worst = worse(worst, take_skeleton(skeletons, sink));
+    worst = worse(worst, accept_skeleton(skeletons, sink));
   }
   return worst;
 }
 
 // RT-safe.
 Outcome NatNetDecoder::emit(std::size_t body, Frame& frame, Sink& sink) noexcept {
-  if (taken_[body]) return Outcome::kOutOfRange;
-  taken_.set(body);
+  if (emitted_[body]) return Outcome::kOutOfRange;
+  emitted_.set(body);
   frame.header.device_ns = device_ns_;
   frame.timecode = timecode_;
   frame.skeleton = layout_->bodies[body].skeleton->id;
@@ -156,7 +243,7 @@ Outcome NatNetDecoder::emit(std::size_t body, Frame& frame, Sink& sink) noexcept
 }
 
 // A body that the description does not have came after it. RT-safe.
-Outcome NatNetDecoder::take_rigid_body(ByteReader& reader, Sink& sink) noexcept {
+Outcome NatNetDecoder::accept_rigid_body(ByteReader& reader, Sink& sink) noexcept {
   RigidBody rigid;
   if (!read_rigid_body(reader, reading_, false, rigid)) return Outcome::kShort;
   const std::size_t body = layout_->body_of(false, rigid.id);
@@ -169,9 +256,9 @@ Outcome NatNetDecoder::take_rigid_body(ByteReader& reader, Sink& sink) noexcept 
   frame.joint_count = 1;
   frame.root_position_m = from_motive(rigid.position_m, settings_.z_up);
   frame.rotation_xyzw[0] = from_motive(rigid.rotation_xyzw, settings_.z_up);
-  const bool sound =
-      is_plausible(frame.root_position_m) && take_rotation(frame.rotation_xyzw[0], has_rotation);
-  if (!sound) return Outcome::kOutOfRange;
+  const bool valid =
+      is_plausible(frame.root_position_m) && accept_rotation(frame.rotation_xyzw[0], has_rotation);
+  if (!valid) return Outcome::kOutOfRange;
   frame.valid[0] = rigid.tracked && has_rotation;
   if (!frame.valid[0]) {
     frame.rotation_xyzw[0] = kIdentity;
@@ -181,39 +268,39 @@ Outcome NatNetDecoder::take_rigid_body(ByteReader& reader, Sink& sink) noexcept 
 }
 
 // RT-safe.
-Outcome NatNetDecoder::take_skeleton(ByteReader& reader, Sink& sink) noexcept {
+Outcome NatNetDecoder::accept_skeleton(ByteReader& reader, Sink& sink) noexcept {
   const std::int32_t id = reader.i32();
   const auto bones = static_cast<std::size_t>(reader.i32());  // checked by read_frame
   const std::size_t body = layout_->body_of(true, id);
   const bool known = body < layout_->bodies.size();
   SkeletonPose pose(known ? layout_->tables[body] : nobody_);
-  bool sound = known;
+  bool valid = known;
   for (std::size_t i = 0; i < bones; ++i) {
     RigidBody bone;
     if (!read_rigid_body(reader, reading_, true, bone)) return Outcome::kShort;
     bone.position_m = from_motive(bone.position_m, settings_.z_up);
     bone.rotation_xyzw = from_motive(bone.rotation_xyzw, settings_.z_up);
-    sound = sound && pose.add(bone);
+    valid = valid && pose.add(bone);
   }
   if (!known) requests_.bodies_changed();
   Frame frame;
-  if (!sound || !pose.fill(settings_.coordinates, frame)) return Outcome::kOutOfRange;
+  if (!valid || !pose.fill(settings_.coordinates, frame)) return Outcome::kOutOfRange;
   return emit(body, frame, sink);
 }
 
 // RT-safe.
-Outcome NatNetDecoder::take_markers(const FrameView& view, Sink& sink) noexcept {
+Outcome NatNetDecoder::accept_markers(const FrameView& view, Sink& sink) noexcept {
   Outcome worst = Outcome::kOk;
   for (std::size_t body = 0; body < layout_->tables.size(); ++body) {
     if (layout_->tables[body].markers == 0) continue;
-    worst = worse(worst, take_markers_of(body, view.labelled, sink));
+    worst = worse(worst, accept_markers_of(body, view.labelled, sink));
   }
   return worst;
 }
 
 // A marker that the cameras do not see is filled in by Motive: it is not valid. RT-safe.
-Outcome NatNetDecoder::take_markers_of(std::size_t body, const Entries& labelled,
-                                       Sink& sink) noexcept {
+Outcome NatNetDecoder::accept_markers_of(std::size_t body, const Entries& labelled,
+                                         Sink& sink) noexcept {
   const BodyTable& table = layout_->tables[body];
   Sample sample;
   bool any = false;

@@ -8,16 +8,77 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <vector>
 
 #include "drivers/datagram_order.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/natnet/device_time.hpp"
 #include "drivers/natnet/frame.hpp"
 #include "drivers/natnet/layout.hpp"
-#include "drivers/natnet/requests.hpp"
-#include "drivers/natnet/settings.hpp"
+#include "drivers/natnet/protocol.hpp"
+#include "proto/frame/result.hpp"
+#include "proto/frame/time.hpp"
 
 namespace posed::drivers::natnet {
+
+// The settings of a NatNet decoder, which the device info in Description::text holds.
+
+// The frame in which the server streams the bones of skeletons; kAuto: each skeleton shows it.
+enum class Coordinates : std::uint8_t { kAuto, kLocal, kGlobal };
+
+struct Settings {
+  Version version;  // unknown: as the server says
+  bool z_up = false;
+  Coordinates coordinates = Coordinates::kAuto;
+  bool unicast = false;
+  int rate_hz = 120;  // until the server says it
+};
+
+// "natnet version=auto up=y coordinates=auto cast=multi rate=120", and back. Cold.
+[[nodiscard]] std::string settings_text(const Settings& settings);
+[[nodiscard]] Result<Settings> parse_settings(const std::string& text, const std::string& identity);
+
+// The words of the options.
+[[nodiscard]] Result<bool> parse_up(const std::string& word);
+[[nodiscard]] Result<Coordinates> parse_coordinates(const std::string& word);
+
+// Requests: what to ask a NatNet server next. It is asked who it is until it answers and again when
+// it was silent, for its frame rate, for its bodies whenever they may have changed, and over
+// unicast it also says every second that somebody listens. One datagram per call.
+
+class Requests {
+ public:
+  // How often next() should be called.
+  static constexpr std::int64_t kPeriod_ns = 100'000'000;
+
+  explicit Requests(bool unicast);  // cold
+
+  // Each of these is called when such a packet of the server has come. RT-safe.
+  void received(std::int64_t arrival_ns) noexcept { received_ns_ = arrival_ns; }
+  void accept_server_info() noexcept;
+  void accept_rate() noexcept { rate_.wanted = false; }
+  void accept_bodies() noexcept { bodies_.wanted = false; }
+  void bodies_changed() noexcept { bodies_.wanted = true; }
+
+  // The datagram to send now; empty: none. RT-safe.
+  [[nodiscard]] std::span<const std::byte> next(std::int64_t now_ns) noexcept;
+
+ private:
+  static constexpr std::int64_t kAgain_ns = kNanosPerSecond;
+  static constexpr std::int64_t kSilence_ns = 2 * kNanosPerSecond;
+
+  struct Question {
+    std::vector<std::byte> datagram;
+    bool wanted = true;
+    std::int64_t next_ns = kNoTime_ns;  // not before
+  };
+  // Returns whether it is time to ask, and then not again for a while.
+  [[nodiscard]] static bool is_due(Question& question, std::int64_t now_ns) noexcept;
+
+  Question connect_, rate_, bodies_, alive_;
+  std::int64_t received_ns_ = kNoTime_ns;
+};
 
 class NatNetDecoder final : public Decoder {
  public:
@@ -41,21 +102,21 @@ class NatNetDecoder final : public Decoder {
   // After so many frames in a row that its reading does not fit, the version was a wrong guess.
   static constexpr int kMaxMisfits = 8;
 
-  [[nodiscard]] Outcome take(const Message& message, Sink& sink) noexcept;
-  [[nodiscard]] Outcome take_server_info(std::span<const std::byte> payload) noexcept;
-  [[nodiscard]] Outcome take_response(std::span<const std::byte> payload) noexcept;
-  [[nodiscard]] Outcome take_model_def(std::span<const std::byte> payload, Sink& sink) noexcept;
-  [[nodiscard]] Outcome take_frame(std::span<const std::byte> payload, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept(const Message& message, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_server_info(std::span<const std::byte> payload) noexcept;
+  [[nodiscard]] Outcome accept_response(std::span<const std::byte> payload) noexcept;
+  [[nodiscard]] Outcome accept_model_def(std::span<const std::byte> payload, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_frame(std::span<const std::byte> payload, Sink& sink) noexcept;
 
   // Reads the frame with the reading that fits; false when none does.
   [[nodiscard]] bool read(std::span<const std::byte> payload, FrameView& view) noexcept;
-  [[nodiscard]] Outcome take_bodies(const FrameView& view, Sink& sink) noexcept;
-  [[nodiscard]] Outcome take_rigid_body(ByteReader& reader, Sink& sink) noexcept;
-  [[nodiscard]] Outcome take_skeleton(ByteReader& reader, Sink& sink) noexcept;
-  [[nodiscard]] Outcome take_markers(const FrameView& view, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_bodies(const FrameView& view, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_rigid_body(ByteReader& reader, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_skeleton(ByteReader& reader, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_markers(const FrameView& view, Sink& sink) noexcept;
   // The markers of one body; emits them if there are any.
-  [[nodiscard]] Outcome take_markers_of(std::size_t body, const Entries& labelled,
-                                        Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_markers_of(std::size_t body, const Entries& labelled,
+                                          Sink& sink) noexcept;
   // Emits the body's frame, once for each packet.
   [[nodiscard]] Outcome emit(std::size_t body, Frame& frame, Sink& sink) noexcept;
 
@@ -71,7 +132,7 @@ class NatNetDecoder final : public Decoder {
   std::int64_t device_ns_ = kNoTime_ns;  // of the frame at hand
   Timecode timecode_{};                  // the same
   DatagramOrder order_{32};
-  std::bitset<kMaxBodies> taken_;  // bodies of the frame at hand so far
+  std::bitset<kMaxBodies> emitted_;  // bodies of the frame at hand so far
   const BodyTable nobody_{};
   Requests requests_;
   std::array<std::byte, 64 * 1024 + kDescriptionHeadBytes> description_{};

@@ -45,8 +45,8 @@ class DeviceTime {
       now_ns_ = device_ns;
     } else if (base == base_) {
       const std::int64_t step_ns = device_ns - last_ns_;
-      const bool sound = step_ns > 0 && step_ns <= kMaxStep_ns;
-      if (sound) now_ns_ = std::min(now_ns_ + step_ns, kLast_ns);
+      const bool valid = step_ns > 0 && step_ns <= kMaxStep_ns;
+      if (valid) now_ns_ = std::min(now_ns_ + step_ns, kLast_ns);
     }
     base_ = base;
     last_ns_ = device_ns;

@@ -6,7 +6,7 @@
 
 #include "drivers/byte_reader.hpp"
 #include "drivers/byte_writer.hpp"
-#include "drivers/emulate/timecode.hpp"
+#include "drivers/emulate/pace.hpp"
 #include "drivers/natnet/axes.hpp"
 #include "drivers/natnet/figure.hpp"
 #include "proto/frame/rotation.hpp"
@@ -25,7 +25,7 @@ std::uint64_t ticks_at(std::int64_t time_ns) {
          static_cast<std::uint64_t>(time_ns) / (kNanosPerSecond / kEmulatedClock_hz);
 }
 
-// What make_layout makes of the emulator's own description, so that its skeletons are those that
+// Compiles the emulator's own description with make_layout, so that its skeletons are those that
 // the host will build.
 std::unique_ptr<const SourceLayout> layout_of(const ModelDef& model, Version version) {
   const auto description = encode_description(model, version, {.version = version});

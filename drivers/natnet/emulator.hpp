@@ -9,9 +9,9 @@
 
 #include "drivers/emulate/pace.hpp"
 #include "drivers/emulator.hpp"
+#include "drivers/natnet/decoder.hpp"
 #include "drivers/natnet/encode.hpp"
 #include "drivers/natnet/layout.hpp"
-#include "drivers/natnet/settings.hpp"
 
 namespace posed::drivers::natnet {
 

@@ -30,8 +30,8 @@ struct FramePacket {
 [[nodiscard]] std::vector<std::byte> encode_frame(const FramePacket& frame, const Reading& reading);
 [[nodiscard]] std::vector<std::byte> encode_model_def(const ModelDef& model, Version version);
 
-// What a decoder passes on of such a ModelDef (Sink::description); the head has the version
-// that it has heard of.
+// Makes the description (Sink::description) that a decoder makes of such a ModelDef; the head has
+// the version that it has heard of.
 [[nodiscard]] std::vector<std::byte> encode_description(const ModelDef& model, Version version,
                                                         const DescriptionHead& head);
 

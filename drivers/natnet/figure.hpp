@@ -11,7 +11,7 @@ namespace posed::drivers::natnet {
 inline constexpr std::int32_t kPersonId = 1;
 inline constexpr std::int32_t kWandId = 2;
 
-// Where the wand's markers are, in its own frame.
+// The positions of the wand's markers in its own frame.
 inline constexpr std::array<Vec3f, 4> kWandMarkers_m{
     {{0.0F, 0.0F, 0.0F}, {0.1F, 0.0F, 0.0F}, {0.0F, 0.2F, 0.0F}, {0.0F, 0.0F, 0.3F}}};
 

@@ -3,15 +3,22 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "drivers/driver.hpp"
 #include "drivers/natnet/protocol.hpp"
+#include "proto/frame/humanoid.hpp"
 
 namespace posed::drivers::natnet {
 
-// What the decoder needs to know of one body.
+// Returns the bone that has this name in Motive's own convention, without the skeleton's name:
+// "LUArm". Cold.
+[[nodiscard]] std::optional<Bone> motive_bone(std::string_view name);
+
+// The table by which the decoder reads one body.
 struct BodyTable {
   std::int32_t id = 0;
   bool is_skeleton = false;

@@ -1,30 +1,12 @@
-#include "drivers/natnet/natnet.hpp"
-
-#include "drivers/make_device.hpp"
+// The natnet driver: skeletons, rigid bodies and markers from OptiTrack's Motive, over UDP.
 #include "drivers/natnet/decoder.hpp"
 #include "drivers/natnet/emulator.hpp"
 #include "drivers/natnet/layout.hpp"
-#include "drivers/natnet/settings.hpp"
-#include "drivers/options.hpp"
-#include "drivers/transport/transport_factory.hpp"
+#include "drivers/source_type.hpp"
 
 namespace posed::drivers {
 namespace natnet {
 namespace {
-
-constexpr std::int64_t kDefaultNatNetRate_hz = 120;
-
-Result<Description> describe(const std::string& text, const std::string& identity) {
-  const auto settings = parse_settings(text, identity);
-  if (!settings) return std::unexpected(settings.error());
-  return source_description("natnet", text, identity, static_cast<double>(settings->rate_hz));
-}
-
-Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
-  const auto settings = parse_settings(description.text, description.identity);
-  if (!settings) return std::unexpected(settings.error());
-  return std::make_unique<NatNetDecoder>(*settings);
-}
 
 Result<Settings> settings_of(const Options& options) {
   Settings settings;
@@ -79,38 +61,6 @@ Result<UdpSettings> sockets_of(const Options& options) {
   return settings;
 }
 
-Result<Description> expect(const Options& given) {
-  const auto options = complete_options(natnet_driver(), given);
-  if (!options) return std::unexpected(options.error());
-  const auto settings = settings_of(*options);
-  if (!settings) return std::unexpected(settings.error());
-  const auto sockets = sockets_of(*options);
-  if (!sockets) return std::unexpected(sockets.error());
-  if (const auto ok = check_udp(*sockets); !ok) return std::unexpected(ok.error());
-  return describe(settings_text(*settings), "udp " + sockets->sockets[0].to);
-}
-
-// UDP has no connection: the sockets open whether or not the server is there.
-Result<Device> open(const Options& given, TransportFactory& ports) {
-  const auto expected = expect(given);
-  if (!expected) return std::unexpected(expected.error());
-  const auto options = complete_options(natnet_driver(), given);
-  auto transport = ports.udp(*sockets_of(*options));
-  if (!transport) return std::unexpected(transport.error());
-  auto device = make_device(natnet_driver(), *expected, std::move(*transport));
-  if (!device) return device;
-  device->poll.period_ns = Requests::kPeriod_ns;
-  return device;
-}
-
-Result<std::unique_ptr<Emulator>> emulate(const Options& given) {
-  const auto options = complete_options(natnet_driver(), given);
-  if (!options) return std::unexpected(options.error());
-  const auto settings = settings_of(*options);
-  if (!settings) return std::unexpected(settings.error());
-  return std::make_unique<NatNetEmulator>(*settings);
-}
-
 std::vector<OptionSpec> options() {
   return {
       {.name = "server",
@@ -140,27 +90,47 @@ std::vector<OptionSpec> options() {
        .default_value = std::string(),
        .help = "the NatNet version, like 3.0; left out: as the server says"},
       {.name = "rate_hz",
-       .default_value = kDefaultNatNetRate_hz,
+       .default_value = std::int64_t{120},
        .help = "frames a second, until the server says it",
        .min = 1,
        .max = 2000}};
 }
 
+struct NatNet : SourceType<NatNet> {
+  using Settings = natnet::Settings;
+  static constexpr std::string_view kName = "natnet";
+  static constexpr std::string_view kSummary =
+      "OptiTrack: skeletons, rigid bodies and markers from Motive over NatNet 2.5 to 4";
+  static constexpr auto options = natnet::options;
+  static constexpr auto settings = natnet::settings_of;
+  static constexpr auto device_info = natnet::settings_text;
+  static constexpr auto parse_device_info = natnet::parse_settings;
+  static constexpr auto make_layout = natnet::make_layout;
+
+  static Result<std::string> check(const Options& options, const Settings& /*settings*/) {
+    const auto sockets = sockets_of(options);
+    if (!sockets) return std::unexpected(sockets.error());
+    if (const auto ok = check_udp(*sockets); !ok) return std::unexpected(ok.error());
+    return "udp " + sockets->sockets[0].to;
+  }
+  static Result<std::unique_ptr<Decoder>> decoder(const Settings& settings,
+                                                  const Description& /*description*/) {
+    return std::make_unique<NatNetDecoder>(settings);
+  }
+  static Result<std::unique_ptr<Transport>> connect(const Options& options,
+                                                    TransportFactory& ports) {
+    return ports.udp(*sockets_of(options));
+  }
+  static Poll poll() { return {.request = {}, .period_ns = Requests::kPeriod_ns}; }
+  static Result<std::unique_ptr<Emulator>> emulator(const Options& /*options*/,
+                                                    const Settings& settings) {
+    return std::make_unique<NatNetEmulator>(settings);
+  }
+};
+
 }  // namespace
 }  // namespace natnet
 
-const Driver& natnet_driver() {
-  static const Driver driver{
-      .name = "natnet",
-      .summary = "OptiTrack: skeletons, rigid bodies and markers from Motive over NatNet 2.5 to 4",
-      .options = natnet::options(),
-      .open = natnet::open,
-      .make_decoder = natnet::make_decoder,
-      .describe = natnet::describe,
-      .expect = natnet::expect,
-      .make_layout = natnet::make_layout,
-      .emulate = natnet::emulate};
-  return driver;
-}
+const Driver& natnet_driver() { return DriverOf<natnet::NatNet>::get(); }
 
 }  // namespace posed::drivers

@@ -62,7 +62,7 @@ enum class MessageId : std::uint16_t {
   kUnrecognized = 100
 };
 
-// Of NatNet, not of Motive.
+// A version of NatNet, not of Motive.
 struct Version {
   std::uint8_t major = 0;  // 0: unknown
   std::uint8_t minor = 0;

@@ -25,7 +25,7 @@ bool SkeletonPose::add(const RigidBody& bone) noexcept {
   }
   bool has_rotation = false;
   Quatf rotation = bone.rotation_xyzw;
-  if (!take_rotation(rotation, has_rotation)) return false;
+  if (!accept_rotation(rotation, has_rotation)) return false;
   seen_.set(joint);
   tracked_[joint] = bone.tracked && has_rotation;
   position_m_[joint] = bone.position_m;

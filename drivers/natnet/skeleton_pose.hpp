@@ -6,9 +6,9 @@
 #include <bitset>
 #include <cstddef>
 
+#include "drivers/natnet/decoder.hpp"
 #include "drivers/natnet/frame.hpp"
 #include "drivers/natnet/layout.hpp"
-#include "drivers/natnet/settings.hpp"
 #include "proto/frame/frame.hpp"
 
 namespace posed::drivers::natnet {
@@ -27,7 +27,7 @@ class SkeletonPose {
   [[nodiscard]] bool fill(Coordinates coordinates, Frame& frame) const noexcept;
 
  private:
-  // Whether the positions are relative to the parents: then they are the offsets of the
+  // Returns whether the positions are relative to the parents: then they are the offsets of the
   // description, however the person moves.
   [[nodiscard]] bool looks_local() const noexcept;
 

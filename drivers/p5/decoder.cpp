@@ -1,6 +1,7 @@
 #include "drivers/p5/decoder.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <limits>
 
 #include "drivers/glove/angle_map.hpp"
@@ -18,6 +19,11 @@ const std::array<std::string, 11> kExtras{"button_a", "button_b", "button_c", "l
 
 }  // namespace
 
+std::optional<CameraRig> Settings::rig() const {
+  if (heads.size() != kHeadsBytes || leds.size() != kLedsBytes) return {};
+  return CameraRig::of(std::span(heads).first<kHeadsBytes>(), std::span(leds).first<kLedsBytes>());
+}
+
 Result<glove::Model> model() {
   glove::Model model{.driver = "p5", .sensors = {}};
   for (const std::string_view finger : kFingerNames) {
@@ -26,10 +32,7 @@ Result<glove::Model> model() {
                              .curve = glove::Curve::line(0.0, 0.0, kMaxBend, 1.0),
                              .unit = "1"});
   }
-  auto table = glove::device_table("p5");
-  if (!table) return std::unexpected(table.error());
-  model.map_toml = std::move(*table);
-  return model;
+  return glove::with_device_table(std::move(model), "p5");
 }
 
 SampleLayout layout(const glove::Model& model) {
@@ -43,6 +46,7 @@ SampleLayout layout(const glove::Model& model) {
 void P5Decoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
                      Sink& sink) noexcept {
   for (const std::byte byte : bytes) {
+    assert(pending_bytes_ < pending_.size());
     pending_[pending_bytes_++] = byte;
     while (pending_bytes_ > 0 && advance(sink)) {
     }
@@ -69,7 +73,7 @@ bool P5Decoder::advance(Sink& sink) noexcept {
   const Outcome outcome = decode_report(std::span(pending_).first(kReportBytes), report);
   drop(kReportBytes);
   sink.outcome(outcome);
-  take(report, sink);
+  accept(report, sink);
   return true;
 }
 
@@ -103,7 +107,7 @@ bool P5Decoder::locate(const Report& report, RigidPose& place) noexcept {
 }
 
 // RT-safe.
-void P5Decoder::take(const Report& report, Sink& sink) noexcept {
+void P5Decoder::accept(const Report& report, Sink& sink) noexcept {
   std::array<float, kFingers> raw{};
   for (std::size_t f = 0; f < kFingers; ++f) raw[f] = static_cast<float>(report.bend[f]);
   std::array<float, kExtras.size()> extra{};

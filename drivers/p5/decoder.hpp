@@ -6,19 +6,37 @@
 #include <bitset>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "drivers/glove/glove_decoder.hpp"
 #include "drivers/glove/model.hpp"
 #include "drivers/p5/camera_rig.hpp"
+#include "proto/frame/result.hpp"
 
 namespace posed::drivers::p5 {
 
+// The device info of a P5 has its feature reports as received, in hexadecimal, so that a log is
+// decoded with the geometry of the rig with which it was recorded. A missing report is written as
+// none.
+//   p5 hand=right firmware=090403 heads=06.. leds=0c..
+struct Settings {
+  Side hand = Side::kRight;
+  std::vector<std::byte> firmware{}, heads{}, leds{};  // reports 9, 6 and 12; empty: not known
+
+  // The rig is not known unless both of its reports are.
+  [[nodiscard]] std::optional<CameraRig> rig() const;
+};
+
+[[nodiscard]] std::string device_info_of(const Settings& settings);
+[[nodiscard]] Result<Settings> parse_device_info(const std::string& text,
+                                                 const std::string& identity);
 [[nodiscard]] Result<glove::Model> model();
 [[nodiscard]] SampleLayout layout(const glove::Model& model);
 
 class P5Decoder final : public glove::GloveDecoder {
  public:
-  // Without a rig the hand's pose is never known.
+  // Without a rig the decoder never knows the hand's pose.
   P5Decoder(std::shared_ptr<const Skeleton> skeleton,
             std::shared_ptr<const glove::Calibration> calibration, std::optional<CameraRig> rig)
       : GloveDecoder(std::move(skeleton), std::move(calibration)), rig_(std::move(rig)) {}
@@ -30,7 +48,7 @@ class P5Decoder final : public glove::GloveDecoder {
  private:
   [[nodiscard]] bool advance(Sink& sink) noexcept;
   void drop(std::size_t count) noexcept;
-  void take(const Report& report, Sink& sink) noexcept;
+  void accept(const Report& report, Sink& sink) noexcept;
   // RT-safe.
   [[nodiscard]] bool locate(const Report& report, RigidPose& place) noexcept;
 

@@ -6,13 +6,9 @@
 
 #include "drivers/byte_reader.hpp"
 #include "drivers/pose_values.hpp"
-#include "drivers/rate_text.hpp"
-#include "proto/clip/text.hpp"
 
 namespace posed::drivers::rokoko {
 namespace {
-
-constexpr std::string_view kDeviceInfoPrefix = "rokoko rate=";
 
 // Writes little-endian numbers into bytes that are there. RT-safe.
 class FixedWriter {
@@ -109,16 +105,6 @@ Result<std::vector<DescribedBody>> parse_description(std::span<const std::byte> 
   }
   if (reader.left() != 0) return wrong_description("goes on after its last body");
   return bodies;
-}
-
-std::string device_info_text(double rate_hz) {
-  return std::string(kDeviceInfoPrefix) + clip::number_text(rate_hz);
-}
-
-Result<double> parse_device_info(const std::string& text, const std::string& identity) {
-  if (const auto rate_hz = parse_rate(text, kDeviceInfoPrefix)) return *rate_hz;
-  return fail("is not described as Rokoko Studio ('rokoko rate=60'); is it another device?",
-              identity);
 }
 
 }  // namespace posed::drivers::rokoko

@@ -31,8 +31,8 @@ namespace posed::drivers::rokoko {
 
 enum class Part : std::uint8_t { kPerson, kLeftHand, kRightHand, kProp };
 
-// What tells one body from another: two actors' hands have the same part, an actor's hands the same
-// name.
+// The key that distinguishes bodies: two actors' hands have the same part, an actor's hands the
+// same name.
 struct BodyKey {
   Part part = Part::kPerson;
   StudioName name;
@@ -58,10 +58,5 @@ static_assert(kMaxDescriptionBytes <= kMaxDescription);
 // The bytes are untrusted. Cold.
 [[nodiscard]] Result<std::vector<DescribedBody>> parse_description(
     std::span<const std::byte> bytes);
-
-// The device info, and the rate [Hz] in it. Studio says nothing about itself before it streams.
-[[nodiscard]] std::string device_info_text(double rate_hz);
-[[nodiscard]] Result<double> parse_device_info(const std::string& text,
-                                               const std::string& identity);
 
 }  // namespace posed::drivers::rokoko

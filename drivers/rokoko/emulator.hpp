@@ -34,9 +34,9 @@ class StudioEmulator final : public Emulator {
   [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }
   void emit(std::int64_t now_ns, Bytes& out) override;
 
-  // From now on the stream is without this body.
+  // Leaves this body out from now on.
   void set_present(std::size_t body, bool present) { bodies_[body].present = present; }
-  // From now on Anna's body, without the hands, is not captured (version 3).
+  // Stops capturing Anna's body, but not her hands, from now on (version 3).
   void set_gloves_only(bool gloves_only) { gloves_only_ = gloves_only; }
   // The timestamps begin again, as those of a recording that plays in a loop.
   void restart() { began_ns_ = pace_.due_ns(); }

@@ -38,7 +38,7 @@ inline constexpr std::size_t kFingerJointsOfHand = 20;
 // The fingers of the hand at this joint. RT-safe.
 [[nodiscard]] JointSet fingers_of(std::size_t hand) noexcept;
 
-// Of a skeleton with these joints only: the nearest ancestor among them; -1 when there is none.
+// Returns the nearest ancestor of a joint in a skeleton with these joints only; -1: there is none.
 // RT-safe.
 [[nodiscard]] int parent_among(const JointSet& joints, std::size_t joint) noexcept;
 

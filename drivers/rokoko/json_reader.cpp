@@ -203,7 +203,7 @@ bool JsonReader::text(std::string_view& value) noexcept {
 }
 
 // RT-safe.
-void JsonReader::take_any() noexcept {
+void JsonReader::skip_any() noexcept {
   char c = 0;
   if (!peek(c)) return;
   std::string_view ignored_text;
@@ -242,11 +242,11 @@ void JsonReader::take_any() noexcept {
 // RT-safe.
 void JsonReader::skip() noexcept {
   const int outside = depth_;
-  take_any();
+  skip_any();
   while (ok() && depth_ > outside) {
     std::string_view key;
     const bool in_object = (objects_ >> depth_ & 1U) != 0;
-    if (in_object ? next(key) : next()) take_any();
+    if (in_object ? next(key) : next()) skip_any();
   }
 }
 

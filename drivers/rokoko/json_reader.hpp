@@ -17,8 +17,8 @@
 
 namespace posed::drivers::rokoko {
 
-// All calls are RT-safe. After `next` exactly one value must be taken: each of the calls below it
-// takes one, whatever it is. After a fault all of them return false.
+// All calls are RT-safe. After `next` exactly one value must be read: each of the calls below it
+// reads one, whatever it is. After a fault all of them return false.
 class JsonReader {
  public:
   enum class Fault : std::uint8_t {
@@ -62,13 +62,13 @@ class JsonReader {
   [[nodiscard]] bool quoted(std::string_view& value) noexcept;
   [[nodiscard]] bool word(std::string_view expected) noexcept;
   // Takes a value that is no object or list, or enters it.
-  void take_any() noexcept;
+  void skip_any() noexcept;
 
   const char* at_;
   const char* end_;
   int depth_ = 0;
   std::uint64_t objects_ = 0;  // bit: depth at which an object was entered, not a list
-  bool first_ = false;         // nothing was taken from the one entered last
+  bool first_ = false;         // nothing was read from the one entered last
   Fault fault_ = Fault::kNone;
 };
 

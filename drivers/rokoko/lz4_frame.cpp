@@ -1,15 +1,20 @@
 #include "drivers/rokoko/lz4_frame.hpp"
 
 #include <lz4.h>
+#include <xxhash.h>
 
 #include <algorithm>
 #include <cstdint>
 
 #include "drivers/byte_reader.hpp"
-#include "drivers/rokoko/xxh32.hpp"
 
 namespace posed::drivers::rokoko {
 namespace {
+
+// The checksum of LZ4 frames.
+std::uint32_t xxh32_of(std::span<const std::byte> bytes) noexcept {
+  return XXH32(bytes.data(), bytes.size(), 0);
+}
 
 constexpr std::uint32_t kMagicNumber = 0x184D2204;
 constexpr std::size_t kMagicBytes = 4;
@@ -39,13 +44,13 @@ Outcome read_head(std::span<const std::byte> bytes, ByteReader& reader, Lz4Head&
   const std::size_t covered = bytes.size() - kMagicBytes - reader.left();
   const std::uint8_t sum = reader.u8();
   if (!reader.ok()) return Outcome::kShort;
-  const std::uint32_t expected = xxh32(bytes.subspan(kMagicBytes, covered));
+  const std::uint32_t expected = xxh32_of(bytes.subspan(kMagicBytes, covered));
   return sum == (expected >> 8U & 0xFFU) ? Outcome::kOk : Outcome::kBadChecksum;
 }
 
 // Puts one block behind the `used` bytes of the content. RT-safe.
-Outcome take_block(const Lz4Head& head, std::span<const std::byte> block, bool stored,
-                   std::span<std::byte> room, std::size_t& used) noexcept {
+Outcome accept_block(const Lz4Head& head, std::span<const std::byte> block, bool stored,
+                     std::span<std::byte> room, std::size_t& used) noexcept {
   const std::size_t most = std::min(head.block, room.size() - used);
   if (stored) {
     if (block.size() > head.block) return Outcome::kShort;
@@ -89,14 +94,14 @@ Outcome decode_lz4_frame(std::span<const std::byte> bytes, std::span<std::byte> 
     if (word == 0) break;
     const auto block = reader.bytes(word & ~kStored);
     if (!reader.ok() || block.empty()) return Outcome::kShort;
-    if (head.block_sums && reader.u32() != xxh32(block)) {
+    if (head.block_sums && reader.u32() != xxh32_of(block)) {
       return reader.ok() ? Outcome::kBadChecksum : Outcome::kShort;
     }
-    const Outcome outcome = take_block(head, block, (word & kStored) != 0, room, used);
+    const Outcome outcome = accept_block(head, block, (word & kStored) != 0, room, used);
     if (outcome != Outcome::kOk) return outcome;
   }
   content = room.first(used);
-  if (head.content_sum && reader.u32() != xxh32(content)) {
+  if (head.content_sum && reader.u32() != xxh32_of(content)) {
     return reader.ok() ? Outcome::kBadChecksum : Outcome::kShort;
   }
   const bool whole = reader.ok() && reader.left() == 0;

@@ -12,7 +12,7 @@ namespace {
 constexpr float kSameOffset_m = 0.005F;
 constexpr float kSamePart = 0.02F;  // of the offset's length
 
-// Where the joint lies in its parent's frame. RT-safe.
+// Returns the position of the joint in its parent's frame. RT-safe.
 Vec3f offset_in(const Subject& subject, std::size_t parent, std::size_t joint) noexcept {
   const auto place = [&subject](std::size_t j) {
     return Eigen::Map<const Eigen::Vector3f>(subject.position_m[j].data());
@@ -114,7 +114,7 @@ void Roster::measure(const SeenBody& seen, Entry& entry) noexcept {
 }
 
 // RT-safe.
-bool Roster::take(const SeenBody& body, std::int64_t arrival_ns) noexcept {
+bool Roster::accept(const SeenBody& body, std::int64_t arrival_ns) noexcept {
   Entry* const entry = entry_of(body.key);
   if (entry == nullptr) return false;
   if (!entry->used) {

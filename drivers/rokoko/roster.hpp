@@ -31,7 +31,7 @@ class Roster {
  public:
   // Takes a body of the frame that came at `arrival_ns`. False when there is no room for it.
   // RT-safe.
-  [[nodiscard]] bool take(const SeenBody& body, std::int64_t arrival_ns) noexcept;
+  [[nodiscard]] bool accept(const SeenBody& body, std::int64_t arrival_ns) noexcept;
 
   // The description, after all bodies of a frame: empty unless it changed, and at most once in
   // kDescribeEvery_ns. RT-safe.

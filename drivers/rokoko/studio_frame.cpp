@@ -47,7 +47,7 @@ struct Transform {
   bool placed = false, turned = false;
 
   // True if the member is one of its own; it is taken.
-  bool take(JsonReader& json, std::string_view key) noexcept {
+  bool accept(JsonReader& json, std::string_view key) noexcept {
     if (key == "position") {
       placed = read_vector(json, position_m);
       return true;
@@ -61,14 +61,14 @@ struct Transform {
 // RT-safe.
 void keep(const Transform& transform, std::size_t joint, Subject& subject) noexcept {
   if (!transform.placed) return;  // as if it had not been sent
-  if (subject.placed[joint]) subject.sound = false;
+  if (subject.placed[joint]) subject.valid = false;
   subject.placed.set(joint);
   subject.position_m[joint] = mirrored(transform.position_m);
-  subject.sound = subject.sound && is_plausible(transform.position_m);
+  subject.valid = subject.valid && is_plausible(transform.position_m);
   Quatf rotation = transform.rotation_xyzw;
   bool seen = false;
   if (!transform.turned) return;
-  subject.sound = take_rotation(rotation, seen, kRotationTolerance) && subject.sound;
+  subject.valid = accept_rotation(rotation, seen, kRotationTolerance) && subject.valid;
   subject.turned[joint] = seen;
   subject.rotation_xyzw[joint] = mirrored(rotation);
 }
@@ -78,7 +78,7 @@ void read_joint(JsonReader& json, std::size_t joint, Subject& subject) noexcept 
   Transform transform;
   if (!json.enter_object()) return;
   for (std::string_view key; json.next(key);) {
-    if (!transform.take(json, key)) json.skip();
+    if (!transform.accept(json, key)) json.skip();
   }
   keep(transform, joint, subject);
 }
@@ -112,7 +112,7 @@ void read_meta(JsonReader& json, Subject& subject) noexcept {
   subject.has_right_glove = subject.has_right_glove && any_glove;
 }
 
-// Of an actor (version 3), or in the list of faces (version 2). RT-safe.
+// Reads a face, which an actor has (version 3) or the list of faces (version 2). RT-safe.
 void read_face(JsonReader& json, Subject& subject, bool alone) noexcept {
   if (!json.enter_object()) return;
   for (std::string_view key; json.next(key);) {
@@ -175,7 +175,7 @@ void read_prop(JsonReader& json, Subject& subject) noexcept {
   for (std::string_view key; json.next(key);) {
     if (key == "name") {
       read_name(json, subject.name);
-    } else if (!transform.take(json, key)) {
+    } else if (!transform.accept(json, key)) {
       json.skip();
     }
   }
@@ -192,7 +192,7 @@ bool read_list(JsonReader& json, Subject::Kind kind, StudioFrame& frame) noexcep
     subject.name.clear();
     subject.profile.clear();
     subject.has_body = subject.has_left_glove = subject.has_right_glove = subject.has_face = true;
-    subject.sound = true;
+    subject.valid = true;
     subject.placed.reset();
     subject.turned.reset();
     subject.face_seen.reset();

@@ -65,7 +65,7 @@ struct Subject {
   StudioName profile;
   // Not said: version 2 has no "meta".
   bool has_body = true, has_left_glove = true, has_right_glove = true, has_face = true;
-  bool sound = true;  // no joint is named twice, lies out of the room or is turned by no rotation
+  bool valid = true;  // no joint is named twice, lies out of the room or is turned by no rotation
   JointSet placed;    // the position was sent
   JointSet turned;    // the rotation, too, and it is not all zero
   // [joint], of a prop [0]; global, in posed's axes

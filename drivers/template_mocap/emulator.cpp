@@ -4,7 +4,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "drivers/template_mocap/layout.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::drivers::mocap {

@@ -9,8 +9,6 @@
 
 #include "drivers/byte_reader.hpp"
 #include "drivers/byte_writer.hpp"
-#include "drivers/rate_text.hpp"
-#include "proto/clip/text.hpp"
 #include "proto/frame/plausible.hpp"
 #include "proto/text/clean.hpp"
 
@@ -21,7 +19,6 @@ constexpr std::string_view kMagic = "MCAP";
 constexpr std::size_t kHeadBytes = 8;
 constexpr std::size_t kChecksumBytes = 4;
 constexpr std::size_t kLeastJoint = 15;  // bytes: a name of one letter, parent, offset
-constexpr std::string_view kDeviceInfoPrefix = "template_mocap rate=";
 
 std::uint32_t checksum(std::span<const std::byte> bytes) noexcept {
   return static_cast<std::uint32_t>(
@@ -170,16 +167,17 @@ std::vector<std::byte> encode_frame(const FramePacket& frame) {
   return encode_datagram(Kind::kFrame, writer.finish());
 }
 
-std::string device_info_text(double rate_hz) {
-  return std::string(kDeviceInfoPrefix) + clip::number_text(rate_hz);
-}
-
-Result<double> parse_device_info(const std::string& text, const std::string& identity) {
-  if (const auto rate_hz = parse_rate(text, kDeviceInfoPrefix)) return *rate_hz;
-  return fail(
-      "is not described as a template mocap system ('template_mocap rate=100'); is it "
-      "another device?",
-      identity);
+Result<std::shared_ptr<const Skeleton>> skeleton_of(const BodyEntry& body) {
+  auto skeleton = std::make_shared<Skeleton>();
+  skeleton->name = body.name;
+  for (const JointEntry& entry : body.joints) {
+    Joint& joint = skeleton->joints.emplace_back();
+    joint.name = entry.name;
+    joint.parent = entry.parent;
+    joint.offset_m = {entry.offset_m[0], entry.offset_m[1], entry.offset_m[2]};
+  }
+  if (auto ok = skeleton->finish(); !ok) return std::unexpected(ok.error());
+  return skeleton;
 }
 
 }  // namespace posed::drivers::mocap

@@ -43,6 +43,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -50,6 +51,7 @@
 #include "proto/frame/frame.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/sink.hpp"
+#include "proto/frame/skeleton.hpp"
 
 namespace posed::drivers::mocap {
 
@@ -97,10 +99,7 @@ struct FramePacket {
 [[nodiscard]] std::vector<std::byte> encode_description(std::span<const BodyEntry> bodies);
 [[nodiscard]] std::vector<std::byte> encode_frame(const FramePacket& frame);
 
-// The device info, and the rate [Hz] in it: what the options say, because the device says nothing
-// about itself before it streams.
-[[nodiscard]] std::string device_info_text(double rate_hz);
-[[nodiscard]] Result<double> parse_device_info(const std::string& text,
-                                               const std::string& identity);
+// Makes the skeleton of a body as it was described. Cold.
+[[nodiscard]] Result<std::shared_ptr<const Skeleton>> skeleton_of(const BodyEntry& body);
 
 }  // namespace posed::drivers::mocap

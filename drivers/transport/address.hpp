@@ -15,7 +15,7 @@
 
 namespace posed::drivers {
 
-// An address with its port, as sockets take it.
+// An address with its port, in the form that sockets use.
 struct Address {
   sockaddr_storage storage{};
   socklen_t size = sizeof(sockaddr_storage);
@@ -35,8 +35,8 @@ using Host = std::array<std::uint8_t, 16>;
 [[nodiscard]] Host host_of(const Address& address) noexcept;  // RT-safe
 [[nodiscard]] bool is_loopback(const Host& host) noexcept;    // RT-safe
 [[nodiscard]] bool is_multicast(const Host& host) noexcept;
-// Whether a socket bound to one address keeps others from the other: the same port, and the same
-// host or one that stands for every address of the machine. Cold.
+// Returns whether a socket bound to one address keeps others from the other: the same port, and the
+// same host or one that stands for every address of the machine. Cold.
 [[nodiscard]] bool overlap(const Address& a, const Address& b);
 [[nodiscard]] std::string host_text(const Address& address);  // "192.168.1.20"
 [[nodiscard]] std::string endpoint_text(

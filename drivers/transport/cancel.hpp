@@ -2,35 +2,24 @@
 // when the daemon is asked to stop. Once fired it stays fired.
 #pragma once
 
-#include <sys/eventfd.h>
-#include <unistd.h>
-
 #include <atomic>
-#include <cstdint>
 
+#include "proto/frame/event_fd.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::drivers {
 
 class Cancel {
  public:
-  Cancel() noexcept : fd_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)) {}
-  ~Cancel() {
-    if (fd_ >= 0) ::close(fd_);
-  }
-  Cancel(const Cancel&) = delete;
-  Cancel& operator=(const Cancel&) = delete;
-
   // Any thread.
   void fire() noexcept {
     fired_.store(true);
-    const std::uint64_t one = 1;
-    [[maybe_unused]] const ssize_t written = ::write(fd_, &one, sizeof one);
+    event_.signal();
   }
   [[nodiscard]] bool fired() const noexcept { return fired_.load(); }
 
   // Readable once fired; -1 when no descriptor was available: then waits end at their own timeout.
-  [[nodiscard]] int fd() const noexcept { return fd_; }
+  [[nodiscard]] int fd() const noexcept { return event_.fd(); }
 
   // The result of a cancelled wait; it is not shown to the user.
   [[nodiscard]] static std::unexpected<Error> error() {
@@ -38,7 +27,7 @@ class Cancel {
   }
 
  private:
-  int fd_;
+  RawEventFd event_;
   std::atomic<bool> fired_{false};
 };
 

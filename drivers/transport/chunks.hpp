@@ -1,6 +1,7 @@
 // Chunks: raw pieces of input, stored one after the other in one block; played by file and replay.
 #pragma once
 
+#include <cassert>
 #include <cstddef>
 #include <span>
 #include <string_view>
@@ -21,6 +22,7 @@ class Chunks {
 
   // Valid until the next add(). RT-safe.
   [[nodiscard]] std::span<const std::byte> operator[](std::size_t index) const noexcept {
+    assert(index < ends_.size());
     const std::size_t begin = index == 0 ? 0 : ends_[index - 1];
     return {bytes_.data() + begin, ends_[index] - begin};
   }

@@ -36,7 +36,7 @@ ssize_t write_some(int fd, std::span<const std::byte> bytes) noexcept {
   return ::write(fd, bytes.data(), bytes.size());
 }
 
-// Of a serial port: bytes that were written and are not sent yet. 0 for any other descriptor.
+// Returns the bytes that a serial port has not sent yet; 0 for any other descriptor.
 int unsent_bytes(int fd) noexcept {
   int count = 0;
   return ::isatty(fd) == 1 && ::ioctl(fd, TIOCOUTQ, &count) == 0 ? count : 0;

@@ -59,7 +59,8 @@ class Connection {
 // Reads the available bytes, at most 4 KB per call; a hang-up or an error of the descriptor sets
 // `lost`. For serial ports and sockets, whose writes do not block.
 [[nodiscard]] std::unique_ptr<Transport> make_link_transport(Connection link);
-// The same for a link from TransportFactory::hid(), whose writes block: it is also a ColdWriter.
+// Makes the transport of a link from TransportFactory::hid(), whose writes block: it is also a
+// ColdWriter.
 [[nodiscard]] std::unique_ptr<Transport> make_hid_transport(Connection link);
 
 }  // namespace posed::drivers

@@ -1,21 +1,49 @@
+// HID gloves. hidapi lists the devices; the reports are read from the hidraw node's own descriptor,
+// because hidapi hides it and a reader thread that polls all devices at once needs one. Each read
+// of the node returns one whole report, which is all that hidapi's hid_read does.
 #include "drivers/transport/hid_transport.hpp"
 
-#include <sys/eventfd.h>
+#include <linux/hidraw.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstring>
 #include <utility>
 
+#include "drivers/transport/enumerate.hpp"
+#include "drivers/transport/node.hpp"
+#include "drivers/transport/transport_factory.hpp"
+
 namespace posed::drivers {
 
-HidTransport::HidTransport(Connection link)
-    : fd_(link.fd()),
-      waiting_(::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC)),
-      reader_(make_link_transport(std::move(link))) {}
-
-HidTransport::~HidTransport() {
-  if (waiting_ >= 0) ::close(waiting_);
+Result<Connection> TransportFactory::hid(const HidSettings& settings) {
+  if (only_prepare_) return not_opened();
+  const auto nodes = list_hid_nodes();
+  auto chosen = find_node(nodes, settings.path);
+  if (settings.path.empty()) {
+    const auto wanted = [&](const DeviceInfo& one) {
+      return one.is_usb && one.vendor == settings.vendor &&
+             (settings.products.empty() ||
+              std::ranges::find(settings.products, one.product) != settings.products.end());
+    };
+    auto found = choose(nodes, settings.id, wanted, "HID node");
+    if (!found) return std::unexpected(found.error());
+    chosen = std::move(*found);
+  }
+  const auto fd = open_node(chosen.node);
+  if (!fd) return std::unexpected(fd.error());
+  Connection link(*fd, chosen.node, chosen.identity());
+  link.heed(cancel_);
+  hidraw_devinfo info{};
+  if (::ioctl(*fd, HIDIOCGRAWINFO, &info) != 0) {
+    return fail(chosen.node + " is no HID device; see `posed devices` for those that are");
+  }
+  return link;
 }
+
+HidTransport::HidTransport(Connection link)
+    : fd_(link.fd()), reader_(make_link_transport(std::move(link))) {}
 
 // RT-safe but for the write to the eventfd.
 bool HidTransport::send(std::span<const std::byte> bytes, std::uint8_t /*socket*/) noexcept {
@@ -24,14 +52,12 @@ bool HidTransport::send(std::span<const std::byte> bytes, std::uint8_t /*socket*
   std::memcpy(sending_.bytes.data(), bytes.data(), bytes.size());
   const bool queued = queue_.push(sending_);
   if (!queued) dropped_.fetch_add(1, std::memory_order_relaxed);
-  const std::uint64_t one = 1;
-  [[maybe_unused]] const ssize_t told = ::write(waiting_, &one, sizeof one);
+  waiting_.signal();
   return queued;
 }
 
 void HidTransport::write_waiting() noexcept {
-  std::uint64_t rung = 0;
-  [[maybe_unused]] const ssize_t cleared = ::read(waiting_, &rung, sizeof rung);
+  waiting_.clear();
   while (queue_.read_available() > 0) {
     // Messages that piled up behind a slow write: only the newest still matter.
     while (queue_.read_available() > kBacklog) {

@@ -12,15 +12,13 @@
 #include "drivers/driver.hpp"
 #include "drivers/transport/cold_writer.hpp"
 #include "drivers/transport/connection.hpp"
+#include "proto/frame/event_fd.hpp"
 
 namespace posed::drivers {
 
 class HidTransport final : public Transport, public ColdWriter {
  public:
   explicit HidTransport(Connection link);
-  ~HidTransport() override;
-  HidTransport(const HidTransport&) = delete;
-  HidTransport& operator=(const HidTransport&) = delete;
 
   [[nodiscard]] int poll_fd() const noexcept override { return reader_->poll_fd(); }
   [[nodiscard]] Result<> start(std::int64_t now_ns) override { return reader_->start(now_ns); }
@@ -29,7 +27,7 @@ class HidTransport final : public Transport, public ColdWriter {
   // that.
   [[nodiscard]] bool send(std::span<const std::byte> bytes, std::uint8_t socket) noexcept override;
 
-  [[nodiscard]] int waiting_fd() const noexcept override { return waiting_; }
+  [[nodiscard]] int waiting_fd() const noexcept override { return waiting_.fd(); }
   void write_waiting() noexcept override;
   [[nodiscard]] std::uint64_t dropped() const noexcept override { return dropped_.load(); }
 
@@ -43,7 +41,7 @@ class HidTransport final : public Transport, public ColdWriter {
   };
 
   int fd_;
-  int waiting_;
+  RawEventFd waiting_;
   std::unique_ptr<Transport> reader_;
   boost::lockfree::spsc_queue<Report, boost::lockfree::capacity<kQueue>> queue_;
   Report sending_;  // belongs to the reader thread; a member because it is large

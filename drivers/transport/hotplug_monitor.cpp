@@ -40,7 +40,7 @@ void HotplugMonitor::watch_folders() {
   }
 }
 
-bool HotplugMonitor::take() {
+bool HotplugMonitor::consume() {
   alignas(inotify_event) std::array<char, 4096> events;
   bool any = false;
   while (fd_ >= 0 && ::read(fd_, events.data(), events.size()) > 0) any = true;

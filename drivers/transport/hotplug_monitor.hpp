@@ -22,7 +22,7 @@ class HotplugMonitor {
   [[nodiscard]] int poll_fd() const noexcept { return fd_; }
 
   // Consumes the pending events; returns true when a node appeared since the last call. Cold.
-  bool take();
+  bool consume();
 
  private:
   void watch_folders();

@@ -59,7 +59,7 @@ bool change(int fd, const Address& group, unsigned index, bool join) noexcept {
   return ::setsockopt(fd, IPPROTO_IP, option, &wish, sizeof wish) == 0;
 }
 
-// Without it a socket receives every group that any program of this machine has joined.
+// Otherwise a socket receives every group that any program of this machine has joined.
 void only_own_groups(int fd, sa_family_t family) {
   const int no = 0;
   if (family == AF_INET6) {

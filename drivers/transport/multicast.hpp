@@ -14,7 +14,7 @@ namespace posed::drivers {
 class Membership {
  public:
   // Joins. `interface` is its name ("eth0") or one of its addresses; empty: the system's choice.
-  // From other groups that this machine has joined the socket then receives nothing. Cold.
+  // The socket then receives nothing from other groups that this machine has joined. Cold.
   [[nodiscard]] static Result<Membership> join(int fd, const Address& group,
                                                const std::string& interface);
 

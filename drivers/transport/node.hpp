@@ -1,6 +1,8 @@
-// Device nodes: opens one, and explains in one sentence why it cannot be opened.
+// Device nodes: opens one, explains in one sentence why it cannot be opened, and asks the USB
+// adapter of a serial port for low latency. Cold.
 #pragma once
 
+#include <filesystem>
 #include <string>
 
 #include "proto/frame/result.hpp"
@@ -13,5 +15,12 @@ namespace posed::drivers {
 
 // Why a node could not be opened, and how to fix it. Cold.
 [[nodiscard]] std::string node_open_error(const std::string& path, int error);
+
+// Requests that bytes come at once from the open port `fd` with the node `node`: by low_latency,
+// which an FTDI adapter obeys, or by its latency timer below `sys`, where this process may set it.
+// Returns a sentence for the log about what it changed, or could not change; empty if the adapter
+// has no such timer or had it right.
+[[nodiscard]] std::string ask_for_low_latency(int fd, const std::string& node,
+                                              const std::filesystem::path& sys = "/sys");
 
 }  // namespace posed::drivers

@@ -10,17 +10,36 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdlib>
+#include <fstream>
 
 #include "drivers/transport/enumerate.hpp"
-#include "drivers/transport/latency_timer.hpp"
 #include "drivers/transport/node.hpp"
 #include "drivers/transport/transport_factory.hpp"
 
 namespace posed::drivers {
 namespace {
 
+namespace fs = std::filesystem;
+
 constexpr double kBaudError = 0.03;  // with this error a UART still reads every bit of a byte
 constexpr unsigned kFirstPtyMajor = 136, kLastPtyMajor = 143;  // Unix98 pseudo-terminals
+
+constexpr int kAtOnce_ms = 1;  // the least that an FTDI chip accepts
+
+// 0 if there is no timer.
+int latency_ms(const fs::path& timer) {
+  int ms = 0;
+  std::ifstream(timer) >> ms;
+  return ms;
+}
+
+// Ports that do not offer it return an error, which is ignored.
+void set_low_latency(int fd) {
+  serial_struct port{};
+  if (::ioctl(fd, TIOCGSERIAL, &port) != 0) return;
+  port.flags |= ASYNC_LOW_LATENCY;
+  ::ioctl(fd, TIOCSSERIAL, &port);
+}
 
 bool is_pseudo_terminal(int fd) {
   struct stat info{};
@@ -67,6 +86,21 @@ Result<DeviceInfo> find_port(const SerialSettings& settings) {
 }
 
 }  // namespace
+
+std::string ask_for_low_latency(int fd, const std::string& node, const fs::path& sys) {
+  std::error_code failed;
+  const fs::path port = fs::canonical(node, failed);  // /dev/serial/by-id has links
+  const fs::path name = failed ? fs::path(node).filename() : port.filename();
+  const fs::path timer = sys / "bus/usb-serial/devices" / name / "latency_timer";
+  const int before = latency_ms(timer);
+  set_low_latency(fd);
+  if (before <= kAtOnce_ms) return {};
+  if (latency_ms(timer) > kAtOnce_ms) std::ofstream(timer) << kAtOnce_ms << std::flush;
+  const int after = latency_ms(timer);
+  const std::string was = std::to_string(before) + " ms";
+  if (after <= kAtOnce_ms) return "its USB adapter collected bytes for " + was + ", now for 1 ms";
+  return "its USB adapter collects bytes for " + was + "; `posed doctor` says how to change that";
+}
 
 Result<Connection> TransportFactory::serial(const SerialSettings& settings) {
   if (settings.baud <= 0) return misuse("baud should be more than 0");

@@ -9,7 +9,6 @@
 #include <span>
 
 #include <pthread.h>
-#include <sys/eventfd.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -104,19 +103,16 @@ SubscriptionTransport::SubscriptionTransport(const SubscriptionSettings& setting
     : settings_(settings), outgoing_(kMaxChunk), incoming_(kMaxChunk) {}
 
 SubscriptionTransport::~SubscriptionTransport() {
-  const std::uint64_t one = 1;
-  if (stop_ >= 0) [[maybe_unused]]
-    const ssize_t written = ::write(stop_, &one, sizeof one);
+  stop_.signal();
   if (thread_.joinable()) thread_.join();
-  for (const int fd : {reader_, writer_, stop_}) {
+  for (const int fd : {reader_, writer_}) {
     if (fd >= 0) ::close(fd);
   }
 }
 
 Result<> SubscriptionTransport::connect() {
   std::array<int, 2> ends{};
-  stop_ = ::eventfd(0, EFD_NONBLOCK | EFD_CLOEXEC);
-  if (stop_ < 0 ||
+  if (stop_.fd() < 0 ||
       ::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, ends.data()) != 0) {
     return fail("posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
   }
@@ -159,26 +155,26 @@ void SubscriptionTransport::receive_all() {
   pthread_sigmask(SIG_BLOCK, &all, nullptr);
   std::array<zmq_pollitem_t, 3> items{{{socket_.get(), 0, ZMQ_POLLIN, 0},
                                        {monitor_->socket(), 0, ZMQ_POLLIN, 0},
-                                       {nullptr, stop_, ZMQ_POLLIN, 0}}};
+                                       {nullptr, stop_.fd(), ZMQ_POLLIN, 0}}};
   while (monitor_->next_refusal() == net::Refusal::kNone && monitor_->ends() == 0) {
     zmq_poll(items.data(), items.size(), -1);
     if ((items[2].revents & ZMQ_POLLIN) != 0) return;
-    if ((items[0].revents & ZMQ_POLLIN) != 0) take_message();
+    if ((items[0].revents & ZMQ_POLLIN) != 0) accept_message();
   }
   ::shutdown(writer_, SHUT_WR);  // the reader finds the end behind the last message
 }
 
-void SubscriptionTransport::take_message() {
+void SubscriptionTransport::accept_message() {
   net::Message topic;
   net::Message body;
   if (!topic.receive(socket_.get())) return;
-  const bool sound = topic.more() && body.receive(socket_.get()) && !body.more();
+  const bool valid = topic.more() && body.receive(socket_.get()) && !body.more();
   while (topic.more() && body.more() && body.receive(socket_.get())) {
   }
   const auto name = topic.bytes();
   const auto content = body.bytes();
   const std::size_t size = name.size() + 1 + content.size();
-  if (!sound || size > outgoing_.size()) {
+  if (!valid || size > outgoing_.size()) {
     damaged_.fetch_add(1);
     return;
   }

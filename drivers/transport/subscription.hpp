@@ -16,6 +16,7 @@
 
 #include "drivers/driver.hpp"
 #include "drivers/transport/cancel.hpp"
+#include "proto/frame/event_fd.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/zmq/link_monitor.hpp"
 #include "proto/zmq/zmq_handle.hpp"
@@ -51,7 +52,7 @@ class SubscriptionTransport final : public Transport {
   [[nodiscard]] Result<> await_link(const Cancel& cancel);
   // The thread: receives until the link or the object ends.
   void receive_all();
-  void take_message();
+  void accept_message();
   // Puts a message into the queue.
   void hand_over(std::size_t size) noexcept;
 
@@ -60,9 +61,9 @@ class SubscriptionTransport final : public Transport {
   net::Socket socket_;
   std::unique_ptr<net::LinkMonitor> monitor_;  // ends before the socket
   int reader_ = -1, writer_ = -1;              // the two ends of the queue
-  int stop_ = -1;                              // eventfd
-  std::vector<std::byte> outgoing_;            // of the thread
-  std::vector<std::byte> incoming_;            // of the reader
+  RawEventFd stop_;
+  std::vector<std::byte> outgoing_;  // of the thread
+  std::vector<std::byte> incoming_;  // of the reader
   std::atomic<std::uint32_t> dropped_{0}, damaged_{0};
   std::thread thread_;
 };

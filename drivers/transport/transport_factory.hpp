@@ -23,7 +23,7 @@ struct SerialSettings {
   std::string port{};  // "/dev/ttyUSB0"; empty: found by `id`
   std::string id{};    // USB serial number or port path, as `posed devices` lists it
   int baud = 115200;   // 8N1, no flow control
-  // Without port and id: the one port whose USB ids are in this list.
+  // If neither port nor id is given, the one port whose USB ids are in this list is opened.
   std::vector<std::uint32_t> usb_ids{};  // vendor << 16 | product
 };
 
@@ -90,9 +90,9 @@ class TransportFactory {
   // keeps a glove that connects at once. Cold.
   void only_prepare(bool on) noexcept { only_prepare_ = on; }
 
-  // What people should know about the serial port that was opened last: a sentence for the log, or
-  // nothing. Given once. Cold.
-  [[nodiscard]] std::string take_note() { return std::exchange(note_, {}); }
+  // Returns what people should know about the serial port that was opened last: a sentence for the
+  // log, or nothing. Given once. Cold.
+  [[nodiscard]] std::string consume_note() { return std::exchange(note_, {}); }
 
   // Number of connections dropped so far because their address is not in the list of peers.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }

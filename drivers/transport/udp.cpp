@@ -7,9 +7,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cerrno>
 #include <cstring>
 #include <utility>
+
+#include "drivers/transport/socket.hpp"
 
 namespace posed::drivers {
 namespace {
@@ -32,7 +35,7 @@ std::int64_t to_ns(const timespec& time) noexcept {
   return std::int64_t{time.tv_sec} * kNanosPerSecond + time.tv_nsec;
 }
 
-// What the kernel put beside a datagram under this type, if it did. RT-safe.
+// Returns the datagram's ancillary data of this type, if present. RT-safe.
 template <typename Value>
 std::optional<Value> control_value(msghdr& header, int type) noexcept {
   for (cmsghdr* part = CMSG_FIRSTHDR(&header); part != nullptr; part = CMSG_NXTHDR(&header, part)) {
@@ -148,23 +151,18 @@ Result<> UdpTransport::add(const UdpSocketSettings& settings, const UdpSettings&
   Socket& socket = sockets_.emplace_back();
   socket.to = wanted->to;
   socket.keeps_to = wanted->to.has_value();
-  const sa_family_t family = wanted->listen.storage.ss_family;
-  socket.fd = ::socket(family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  const int yes = 1;
-  if (socket.fd >= 0) {
-    ::setsockopt(socket.fd, SOL_SOCKET, SO_TIMESTAMPNS, &yes, sizeof yes);
-    ::setsockopt(socket.fd, SOL_SOCKET, SO_RXQ_OVFL, &yes, sizeof yes);
-    ::setsockopt(socket.fd, SOL_SOCKET, SO_RCVBUF, &kUdpBuffer_bytes, sizeof kUdpBuffer_bytes);
-    // Several programs may receive a group; a single address belongs to one.
-    if (wanted->group) ::setsockopt(socket.fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  }
+  // Several programs may receive a group; a single address belongs to one.
+  socket.fd = bind_socket(wanted->listen, SOCK_DGRAM, wanted->group.has_value());
   epoll_event event{};
   event.events = EPOLLIN;
-  if (socket.fd < 0 || ::bind(socket.fd, wanted->listen.get(), wanted->listen.size) != 0 ||
-      ::epoll_ctl(epoll_, EPOLL_CTL_ADD, socket.fd, &event) != 0) {
+  if (socket.fd < 0 || ::epoll_ctl(epoll_, EPOLL_CTL_ADD, socket.fd, &event) != 0) {
     return fail("cannot listen on " + settings.listen + " (" + errno_text() +
                 "); use an address of this machine and a port that is free");
   }
+  const int yes = 1;
+  ::setsockopt(socket.fd, SOL_SOCKET, SO_TIMESTAMPNS, &yes, sizeof yes);
+  ::setsockopt(socket.fd, SOL_SOCKET, SO_RXQ_OVFL, &yes, sizeof yes);
+  ::setsockopt(socket.fd, SOL_SOCKET, SO_RCVBUF, &kUdpBuffer_bytes, sizeof kUdpBuffer_bytes);
   if (!wanted->group) return {};
   auto joined = Membership::join(socket.fd, *wanted->group, all.interface);
   if (!joined) return std::unexpected(joined.error());
@@ -173,9 +171,7 @@ Result<> UdpTransport::add(const UdpSocketSettings& settings, const UdpSettings&
 }
 
 std::string UdpTransport::endpoint(std::size_t socket) const {
-  Address address;
-  ::getsockname(sockets_[socket].fd, address.get(), &address.size);
-  return endpoint_text(address);
+  return endpoint_text(bound_address(sockets_[socket].fd));
 }
 
 // RT-safe.
@@ -215,7 +211,8 @@ void UdpTransport::read_control(std::size_t i, Chunk& chunk) noexcept {
   }
 }
 
-// What the kernel dropped before is no loss either: it is counted into a Chunk that nobody gets.
+// Datagrams that the kernel dropped before are no loss either: they are counted into a Chunk that
+// nobody gets.
 Result<> UdpTransport::start(std::int64_t now_ns) {
   Chunk old;
   for (int batch = 0; batch < kMaxOldBatches && receive(now_ns); ++batch) {
@@ -227,7 +224,7 @@ Result<> UdpTransport::start(std::int64_t now_ns) {
 }
 
 void UdpTransport::upkeep(std::int64_t now_ns) noexcept {
-  if (now_ns < std::max(joined_ns_, group_heard_ns_.load()) + kRejoin_ns) return;
+  if (now_ns < std::max(joined_ns_, group_received_ns_.load()) + kRejoin_ns) return;
   joined_ns_ = now_ns;
   for (Socket& socket : sockets_) {
     if (socket.membership) socket.membership->renew(socket.fd);
@@ -236,11 +233,12 @@ void UdpTransport::upkeep(std::int64_t now_ns) noexcept {
 
 // RT-safe.
 bool UdpTransport::owns(Socket& socket, const Host& sender) const noexcept {
-  const bool owner = socket.heard_ns != kNoTime_ns && sender == socket.sender;
-  const bool free = socket.heard_ns == kNoTime_ns || batch_ns_ - socket.heard_ns >= kSilence_ns;
+  const bool owner = socket.received_ns != kNoTime_ns && sender == socket.sender;
+  const bool free =
+      socket.received_ns == kNoTime_ns || batch_ns_ - socket.received_ns >= kSilence_ns;
   if (!owner && !free) return false;
   socket.sender = sender;
-  socket.heard_ns = batch_ns_;
+  socket.received_ns = batch_ns_;
   return true;
 }
 
@@ -265,7 +263,8 @@ Chunk UdpTransport::read(std::int64_t now_ns) noexcept {
       continue;
     }
     if (!socket.keeps_to) socket.to = sender;
-    if (socket.membership) group_heard_ns_.store(now_ns);
+    if (socket.membership) group_received_ns_.store(now_ns);
+    assert(message.msg_len <= batch_->bytes[i].size());
     chunk.bytes = std::span(batch_->bytes[i]).first(message.msg_len);
     chunk.socket = static_cast<std::uint8_t>(socket_);
     break;

@@ -21,8 +21,8 @@
 
 namespace posed::drivers {
 
-// What each socket asks the kernel to hold, about a tenth of a second of a large system; the kernel
-// gives at most net.core.rmem_max.
+// The buffer that each socket asks the kernel for, about a tenth of a second of a large system; the
+// kernel gives at most net.core.rmem_max.
 inline constexpr int kUdpBuffer_bytes = 1024 * 1024;
 
 struct UdpSocketSettings {
@@ -47,7 +47,7 @@ class UdpTransport final : public Transport, public Upkeep {
   [[nodiscard]] static Result<std::unique_ptr<UdpTransport>> open(const UdpSettings& settings);
   ~UdpTransport() override;
 
-  // Where a socket really listens: "127.0.0.1:40123". Cold.
+  // Returns the address at which a socket really listens: "127.0.0.1:40123". Cold.
   [[nodiscard]] std::string endpoint(std::size_t socket) const;
 
   [[nodiscard]] int poll_fd() const noexcept override { return epoll_; }
@@ -70,8 +70,8 @@ class UdpTransport final : public Transport, public Upkeep {
     bool keeps_to = false;      // `to` is configured
     std::uint32_t dropped = 0;  // by the kernel, of all so far; begins again after 2^32
     std::optional<Membership> membership{};  // of upkeep; whether there is one never changes
-    Host sender{};                           // whose datagrams are taken
-    std::int64_t heard_ns = kNoTime_ns;      // when it sent the last; kNoTime_ns: nobody has yet
+    Host sender{};                           // whose datagrams are accepted
+    std::int64_t received_ns = kNoTime_ns;   // when it sent the last; kNoTime_ns: nobody has yet
   };
   struct Batch;  // the buffers of one recvmmsg
 
@@ -80,9 +80,9 @@ class UdpTransport final : public Transport, public Upkeep {
   // Fills the batch from the next socket that has datagrams; false when none has.
   [[nodiscard]] bool receive(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool may_send(const Host& host) const noexcept;
-  // Whether the socket takes datagrams of this sender. From then on it does.
+  // Returns whether the socket accepts datagrams of this sender, which it then belongs to.
   [[nodiscard]] bool owns(Socket& socket, const Host& sender) const noexcept;
-  // What the kernel says beside a datagram.
+  // Reads the ancillary data of a datagram: its arrival time, and what the kernel dropped.
   void read_control(std::size_t i, Chunk& chunk) noexcept;
 
   int epoll_ = -1;
@@ -93,7 +93,7 @@ class UdpTransport final : public Transport, public Upkeep {
   std::size_t socket_ = 0;               // that the batch came from
   std::int64_t batch_ns_ = 0;            // host time and wall clock, taken before the batch
   std::int64_t wall_ns_ = 0;
-  std::atomic<std::int64_t> group_heard_ns_{kNoTime_ns};  // when a group was last heard
+  std::atomic<std::int64_t> group_received_ns_{kNoTime_ns};  // when a datagram of a group last came
   std::int64_t joined_ns_ = kNoTime_ns;  // of upkeep: when the groups were last joined
 };
 

@@ -118,7 +118,7 @@ Result<> UsbLink::set_feature(std::span<const std::byte> report) {
       static_cast<std::uint16_t>(impl_->settings().interface), bytes.data(),
       static_cast<std::uint16_t>(bytes.size()), kTimeout_ms);
   if (sent == static_cast<int>(bytes.size())) return {};
-  return fail(name() + " does not take feature report " + std::to_string(number) + " (" +
+  return fail(name() + " does not accept feature report " + std::to_string(number) + " (" +
               libusb_error_name(sent) + "); unplug it and plug it in again");
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cassert>
 #include <utility>
 
 #include "drivers/transport/usb_impl.hpp"
@@ -40,7 +41,7 @@ class UsbTransport final : public Transport {
   };
 
   static void completed(libusb_transfer* transfer) noexcept;
-  void take(Slot& slot) noexcept;
+  void accept(Slot& slot) noexcept;
   void submit(Slot& slot) noexcept;
   void handle_events(timeval patience) noexcept;
   void cancel_all() noexcept;
@@ -107,14 +108,15 @@ Chunk UsbTransport::read(std::int64_t /*now_ns*/) noexcept {
 void UsbTransport::completed(libusb_transfer* transfer) noexcept {
   Slot& slot = *static_cast<Slot*>(transfer->user_data);
   slot.in_flight = false;
-  slot.owner->take(slot);
+  slot.owner->accept(slot);
 }
 
-void UsbTransport::take(Slot& slot) noexcept {
+void UsbTransport::accept(Slot& slot) noexcept {
   switch (slot.transfer->status) {
     case LIBUSB_TRANSFER_COMPLETED:
       failures_ = 0;
       if (slot.transfer->actual_length == 0) return submit(slot);
+      assert(count_ < kTransfers);  // one for each transfer, so it never overflows
       waiting_[(first_ + count_) % kTransfers] = &slot;
       ++count_;
       return;

@@ -17,7 +17,7 @@ constexpr std::string_view kTimeAddress = "/VMC/Ext/T";
 constexpr std::string_view kAvatarAddress = "/VMC/Ext/VRM";
 constexpr std::string_view kNoBone = "LastBone";  // the end of Unity's list, which some send, too
 
-// Of the squared length: some senders round the components.
+// The tolerance of the squared length: some senders round the components.
 constexpr double kLengthTolerance = 0.01;
 
 struct Transform {
@@ -34,7 +34,7 @@ bool read_transform(OscArguments& arguments, Transform& transform) noexcept {
   for (float& x_m : transform.position_m) x_m = arguments.f32();
   for (float& x : transform.rotation_xyzw) x = arguments.f32();
   if (!arguments.ok() || !is_plausible(transform.position_m)) return false;
-  if (!take_rotation(transform.rotation_xyzw, transform.seen, kLengthTolerance)) return false;
+  if (!accept_rotation(transform.rotation_xyzw, transform.seen, kLengthTolerance)) return false;
   transform.position_m = mirrored(transform.position_m);
   transform.rotation_xyzw = mirrored(transform.rotation_xyzw);
   return true;
@@ -45,32 +45,32 @@ bool read_transform(OscArguments& arguments, Transform& transform) noexcept {
 // RT-safe.
 void VmcDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                       Sink& sink) noexcept {
-  arrival_ns_ = heard_.to(arrival_ns);
+  arrival_ns_ = active_time_.to(arrival_ns);
   Outcome outcome = check_packet(bytes);
-  if (outcome == Outcome::kOk) outcome = take_packet(bytes, sink);
+  if (outcome == Outcome::kOk) outcome = accept_packet(bytes, sink);
   sink.outcome(outcome);
 }
 
 // RT-safe.
-Outcome VmcDecoder::take_packet(std::span<const std::byte> packet, Sink& sink) noexcept {
+Outcome VmcDecoder::accept_packet(std::span<const std::byte> packet, Sink& sink) noexcept {
   worst_ = Outcome::kOk;
   ended_ = false;
-  taken_.reset();
+  received_.reset();
   const std::int64_t before_ns = clock_.device_ns();
   const Survey found = survey(packet);
   if (found.any && !found.of_vmc) return Outcome::kForeign;
   if (found.time == Outcome::kLate) return Outcome::kLate;
   note(found.time);
   std::bitset<kBoneCount> bones;
-  for (std::size_t bone = 0; bone < kBoneCount; ++bone) bones[bone] = found.heard.messages[bone];
+  for (std::size_t bone = 0; bone < kBoneCount; ++bone) bones[bone] = found.received.messages[bone];
   if ((bones & set_).any()) {
     end_.missed();
     end_frame(before_ns, sink);
   }
   each_message(packet, [this](const OscMessage& message) noexcept {
-    if (!take_message(message)) note(Outcome::kOutOfRange);
+    if (!accept_message(message)) note(Outcome::kOutOfRange);
   });
-  if (end_.ends(found.heard, arrival_ns_, set_.any())) end_frame(clock_.device_ns(), sink);
+  if (end_.ends(found.received, arrival_ns_, set_.any())) end_frame(clock_.device_ns(), sink);
   const bool batch_is_over = set_.none() && (applied_ || ended_);
   if (batch_is_over && values_.fresh()) emit_sample(sink);
   if (batch_is_over || describer_.is_gone(values_, arrival_ns_)) {
@@ -89,41 +89,41 @@ VmcDecoder::Survey VmcDecoder::survey(std::span<const std::byte> packet) noexcep
     OscArguments arguments(message);
     if (message.address == kBoneAddress) {
       const std::size_t bone = find_bone(arguments.text());
-      if (bone < kBoneCount) found.heard.add(bone);
+      if (bone < kBoneCount) found.received.add(bone);
     } else if (message.address == kStatusAddress) {
-      found.heard.add(kOkMessage);
+      found.received.add(kOkMessage);
     } else if (message.address == kTimeAddress) {
-      found.heard.add(kTimeMessage);
+      found.received.add(kTimeMessage);
       const float time_s = arguments.f32();
-      found.time = arguments.ok() ? clock_.take(time_s) : Outcome::kOutOfRange;
+      found.time = arguments.ok() ? clock_.accept(time_s) : Outcome::kOutOfRange;
     }
   });
   return found;
 }
 
 // RT-safe.
-bool VmcDecoder::take_message(const OscMessage& message) noexcept {
+bool VmcDecoder::accept_message(const OscMessage& message) noexcept {
   OscArguments arguments(message);
-  if (message.address == kBoneAddress) return take_bone(arguments);
-  if (message.address == kRootAddress) return take_root(arguments);
-  if (message.address == address_of(ValueKind::kBlend)) return take_blend(arguments);
-  if (message.address == kStatusAddress) return take_status(arguments);
-  if (message.address == kAvatarAddress) return take_avatar(arguments);
+  if (message.address == kBoneAddress) return accept_bone(arguments);
+  if (message.address == kRootAddress) return accept_root(arguments);
+  if (message.address == address_of(ValueKind::kBlend)) return accept_blend(arguments);
+  if (message.address == kStatusAddress) return accept_status(arguments);
+  if (message.address == kAvatarAddress) return accept_avatar(arguments);
   for (const ValueKind kind : {ValueKind::kHeadSet, ValueKind::kController, ValueKind::kTracker}) {
-    if (message.address == address_of(kind)) return take_device(kind, arguments);
+    if (message.address == address_of(kind)) return accept_device(kind, arguments);
   }
   if (message.address == kApplyAddress) applied_ = true;
   return true;  // all others mean nothing to posed
 }
 
 // RT-safe.
-bool VmcDecoder::take_bone(OscArguments& arguments) noexcept {
+bool VmcDecoder::accept_bone(OscArguments& arguments) noexcept {
   Transform transform;
-  const bool sound = read_transform(arguments, transform);
+  const bool valid = read_transform(arguments, transform);
   if (transform.name == kNoBone) return true;
   const std::size_t bone = find_bone(transform.name);
-  if (!sound || bone == kBoneCount || taken_[bone]) return false;
-  taken_.set(bone);
+  if (!valid || bone == kBoneCount || received_[bone]) return false;
+  received_.set(bone);
   set_.set(bone);
   seen_[bone] = transform.seen;
   position_m_[bone] = transform.position_m;
@@ -132,7 +132,7 @@ bool VmcDecoder::take_bone(OscArguments& arguments) noexcept {
 }
 
 // RT-safe.
-bool VmcDecoder::take_root(OscArguments& arguments) noexcept {
+bool VmcDecoder::accept_root(OscArguments& arguments) noexcept {
   Transform transform;
   if (!read_transform(arguments, transform)) return false;
   root_m_ = transform.position_m;
@@ -142,7 +142,7 @@ bool VmcDecoder::take_root(OscArguments& arguments) noexcept {
 }
 
 // RT-safe.
-bool VmcDecoder::take_blend(OscArguments& arguments) noexcept {
+bool VmcDecoder::accept_blend(OscArguments& arguments) noexcept {
   const std::string_view name = arguments.text();
   const float value = arguments.f32();
   if (!arguments.ok() || !std::isfinite(value)) return false;
@@ -151,7 +151,7 @@ bool VmcDecoder::take_blend(OscArguments& arguments) noexcept {
 }
 
 // RT-safe.
-bool VmcDecoder::take_device(ValueKind kind, OscArguments& arguments) noexcept {
+bool VmcDecoder::accept_device(ValueKind kind, OscArguments& arguments) noexcept {
   Transform transform;
   if (!read_transform(arguments, transform)) return false;
   if (!transform.seen) return true;  // it is not tracked
@@ -163,7 +163,7 @@ bool VmcDecoder::take_device(ValueKind kind, OscArguments& arguments) noexcept {
 }
 
 // RT-safe.
-bool VmcDecoder::take_status(OscArguments& arguments) noexcept {
+bool VmcDecoder::accept_status(OscArguments& arguments) noexcept {
   constexpr std::size_t kWithTracking = 4;
   const bool with_tracking = arguments.left() >= kWithTracking;
   const bool loaded = arguments.i32() != 0;
@@ -176,7 +176,7 @@ bool VmcDecoder::take_status(OscArguments& arguments) noexcept {
 }
 
 // RT-safe.
-bool VmcDecoder::take_avatar(OscArguments& arguments) noexcept {
+bool VmcDecoder::accept_avatar(OscArguments& arguments) noexcept {
   (void)arguments.text();  // the path of its file
   const std::string_view title = arguments.text();
   if (!arguments.ok()) return false;

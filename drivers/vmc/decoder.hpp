@@ -8,8 +8,8 @@
 #include <cstdint>
 #include <span>
 
+#include "drivers/active_time.hpp"
 #include "drivers/driver.hpp"
-#include "drivers/heard_time.hpp"
 #include "drivers/vmc/describer.hpp"
 #include "drivers/vmc/frame_end.hpp"
 #include "drivers/vmc/layout.hpp"
@@ -34,23 +34,23 @@ class VmcDecoder final : public Decoder {
   }
 
  private:
-  // What a datagram carries, before any of it is used.
+  // The messages that a datagram carries, before any of them is used.
   struct Survey {
     bool any = false;     // message
     bool of_vmc = false;  // at least one
-    FrameEnd::Heard heard;
+    FrameEnd::Received received;
     Outcome time = Outcome::kOk;
   };
   [[nodiscard]] Survey survey(std::span<const std::byte> packet) noexcept;
-  [[nodiscard]] Outcome take_packet(std::span<const std::byte> packet, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_packet(std::span<const std::byte> packet, Sink& sink) noexcept;
   // Each takes the arguments of one message; false if they are wrong.
-  [[nodiscard]] bool take_message(const OscMessage& message) noexcept;
-  [[nodiscard]] bool take_bone(OscArguments& arguments) noexcept;
-  [[nodiscard]] bool take_root(OscArguments& arguments) noexcept;
-  [[nodiscard]] bool take_blend(OscArguments& arguments) noexcept;
-  [[nodiscard]] bool take_device(ValueKind kind, OscArguments& arguments) noexcept;
-  [[nodiscard]] bool take_status(OscArguments& arguments) noexcept;
-  [[nodiscard]] bool take_avatar(OscArguments& arguments) noexcept;
+  [[nodiscard]] bool accept_message(const OscMessage& message) noexcept;
+  [[nodiscard]] bool accept_bone(OscArguments& arguments) noexcept;
+  [[nodiscard]] bool accept_root(OscArguments& arguments) noexcept;
+  [[nodiscard]] bool accept_blend(OscArguments& arguments) noexcept;
+  [[nodiscard]] bool accept_device(ValueKind kind, OscArguments& arguments) noexcept;
+  [[nodiscard]] bool accept_status(OscArguments& arguments) noexcept;
+  [[nodiscard]] bool accept_avatar(OscArguments& arguments) noexcept;
   void end_frame(std::int64_t device_ns, Sink& sink) noexcept;
   [[nodiscard]] bool emit_frame(std::int64_t device_ns, Sink& sink) noexcept;
   void emit_sample(Sink& sink) noexcept;
@@ -63,15 +63,15 @@ class VmcDecoder final : public Decoder {
   SenderClock clock_;
   Values values_;
   Describer describer_;
-  HeardTime heard_;
-  std::int64_t arrival_ns_ = 0;    // of the datagram in hand, without pauses
-  Outcome worst_ = Outcome::kOk;   // in it
-  bool ended_ = false;             // a frame did in it
-  std::bitset<kBoneCount> taken_;  // bones of it
-  std::bitset<kBoneCount> set_;    // bones of the frame so far
-  std::bitset<kBoneCount> seen_;   // those of them that have a rotation
-  bool applied_ = false;           // /VMC/Ext/Blend/Apply came since the last sample
-  // What came last, in posed's axes.
+  ActiveTime active_time_;
+  std::int64_t arrival_ns_ = 0;       // of the datagram in hand, without pauses
+  Outcome worst_ = Outcome::kOk;      // in it
+  bool ended_ = false;                // a frame did in it
+  std::bitset<kBoneCount> received_;  // bones of it
+  std::bitset<kBoneCount> set_;       // bones of the frame so far
+  std::bitset<kBoneCount> seen_;      // those of them that have a rotation
+  bool applied_ = false;              // /VMC/Ext/Blend/Apply came since the last sample
+  // The last values received, in posed's axes.
   std::array<Vec3f, kBoneCount> position_m_{};     // [bone], relative to the parent
   std::array<Quatf, kBoneCount> rotation_xyzw_{};  // [bone], relative to the parent
   Vec3f root_m_{};

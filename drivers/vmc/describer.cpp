@@ -55,7 +55,7 @@ bool Describer::has_moved() const noexcept {
 // RT-safe.
 void Describer::update(Values& values, std::int64_t now_ns, Sink& sink) noexcept {
   forget_bones(now_ns);
-  if (values.take_new()) {
+  if (values.consume_new()) {
     grown_ = true;
     values_new_ = true;
   }

@@ -22,7 +22,8 @@ class Describer {
   // The bones that an ended frame set, and all positions [bone].
   void frame(const std::bitset<kBoneCount>& bones, const std::array<Vec3f, kBoneCount>& position_m,
              std::int64_t arrival_ns) noexcept;
-  // What the sender calls its avatar; for people, so it alone makes no new description.
+  // Sets the name that the sender gives its avatar. It is for people, so it alone makes no new
+  // description.
   void title(std::string_view text) noexcept;
 
   // True when nothing has come for so long that the performer is gone.

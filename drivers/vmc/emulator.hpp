@@ -22,7 +22,7 @@ class VmcEmulator final : public Emulator {
     return body == 0 ? skeleton_.get() : nullptr;
   }
   void pose(std::size_t body, const Frame& frame) override;
-  // A performer hears nothing on this port.
+  // A performer receives nothing on this port.
   void receive(std::span<const std::byte> /*bytes*/, std::int64_t /*now_ns*/,
                Bytes& /*answer*/) override {}
   [[nodiscard]] std::int64_t next_due_ns() const override;

@@ -21,7 +21,7 @@
 
 namespace posed::drivers::vmc {
 
-// What can end a frame: a bone's message (its index), /VMC/Ext/OK and /VMC/Ext/T.
+// The messages that can end a frame: a bone's message (its index), /VMC/Ext/OK and /VMC/Ext/T.
 inline constexpr std::size_t kOkMessage = kBoneCount;
 inline constexpr std::size_t kTimeMessage = kBoneCount + 1;
 inline constexpr std::size_t kEndMessages = kBoneCount + 2;
@@ -29,8 +29,8 @@ inline constexpr std::size_t kEndMessages = kBoneCount + 2;
 // RT-safe.
 class FrameEnd {
  public:
-  // What a datagram carried, of those messages.
-  struct Heard {
+  // Those messages that a datagram carried.
+  struct Received {
     std::bitset<kEndMessages> messages;
     std::size_t last = kEndMessages;  // none
 
@@ -42,15 +42,15 @@ class FrameEnd {
 
   // A datagram with such messages is over. True when a frame, of which there is something if
   // `open`, ends with it.
-  [[nodiscard]] bool ends(const Heard& heard, std::int64_t arrival_ns, bool open) noexcept {
-    if (heard.last == kEndMessages) return false;
+  [[nodiscard]] bool ends(const Received& received, std::int64_t arrival_ns, bool open) noexcept {
+    if (received.last == kEndMessages) return false;
     if (before_ != kEndMessages && arrival_ns - before_ns_ > longest_ns_) {
       longest_ns_ = arrival_ns - before_ns_;
       before_longest_ = before_;
     }
-    before_ = heard.last;
+    before_ = received.last;
     before_ns_ = arrival_ns;
-    if (!open || !heard.messages[end_]) return false;
+    if (!open || !received.messages[end_]) return false;
     misses_ = std::max(0, misses_ - 1);
     compare_pauses();
     return true;

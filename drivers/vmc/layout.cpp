@@ -55,10 +55,10 @@ Result<std::shared_ptr<const Skeleton>> make_skeleton(const Described& described
 SampleLayout name_values(const Described& described, VmcLayout& layout) {
   constexpr std::array<const char*, kValueKinds> kPrefixes{"", "hmd/", "con/", "tra/"};
   SampleLayout samples;
-  std::set<std::string, std::less<>> taken;
+  std::set<std::string, std::less<>> used;
   for (const Described::Value& value : std::span(described.values).first(described.value_count)) {
     std::string name = kPrefixes[static_cast<std::size_t>(value.kind)] + clean(value.name);
-    if (!taken.insert(name).second) continue;  // sent in two spellings that read the same
+    if (!used.insert(name).second) continue;  // sent in two spellings that read the same
     layout.values.push_back({.kind = value.kind,
                              .name = std::string(value.name),
                              .place = static_cast<int>(samples.names.size())});

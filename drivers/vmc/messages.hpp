@@ -30,7 +30,7 @@ struct Status {
 
 class DatagramWriter {
  public:
-  // Of a bundle of kBundles: with the heads of IPv4 and UDP 1,500 bytes.
+  // The size of a bundle of kBundles: with the heads of IPv4 and UDP it has 1,500 bytes.
   static constexpr std::size_t kMostBytes = 1472;
 
   explicit DatagramWriter(Packing packing) noexcept : packing_(packing) {}

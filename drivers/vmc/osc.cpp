@@ -87,7 +87,7 @@ bool is_sound_packet(std::span<const std::byte> packet, int depth) noexcept {
 
 // RT-safe.
 std::string_view OscArguments::text() noexcept {
-  if (!take('s')) return {};
+  if (!next('s')) return {};
   BigEndianReader ahead = reader_;
   const std::string_view all = ahead.text(reader_.left());
   const std::string_view text = all.substr(0, all.find('\0'));

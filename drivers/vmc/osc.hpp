@@ -39,12 +39,12 @@ class OscArguments {
 
   [[nodiscard]] bool ok() const noexcept { return ok_; }
   [[nodiscard]] std::size_t left() const noexcept { return types_.size(); }
-  [[nodiscard]] std::int32_t i32() noexcept { return take('i') ? reader_.i32() : 0; }
-  [[nodiscard]] float f32() noexcept { return take('f') ? reader_.f32() : 0.0F; }
+  [[nodiscard]] std::int32_t i32() noexcept { return next('i') ? reader_.i32() : 0; }
+  [[nodiscard]] float f32() noexcept { return next('f') ? reader_.f32() : 0.0F; }
   [[nodiscard]] std::string_view text() noexcept;
 
  private:
-  [[nodiscard]] bool take(char type) noexcept {
+  [[nodiscard]] bool next(char type) noexcept {
     ok_ = ok_ && !types_.empty() && types_.front() == type;
     if (ok_) types_.remove_prefix(1);
     return ok_;
@@ -66,16 +66,16 @@ class OscArguments {
 [[nodiscard]] bool is_bundle(std::span<const std::byte> packet) noexcept;
 inline constexpr std::size_t kBundleHeadBytes = 16;
 
-// Calls take(message) for each message of a checked packet, in their order.
-template <typename Take>
-void each_message(std::span<const std::byte> packet, Take&& take) noexcept {
+// Calls handle(message) for each message of a checked packet, in their order.
+template <typename Handle>
+void each_message(std::span<const std::byte> packet, Handle&& handle) noexcept {
   if (!is_bundle(packet)) {
     OscMessage message;
-    if (read_message(packet, message)) take(message);
+    if (read_message(packet, message)) handle(message);
     return;
   }
   BigEndianReader reader(packet.subspan(kBundleHeadBytes));
-  while (reader.left() != 0) each_message(reader.bytes(reader.u32()), take);
+  while (reader.left() != 0) each_message(reader.bytes(reader.u32()), handle);
 }
 
 }  // namespace posed::drivers::vmc

@@ -5,14 +5,11 @@
 
 #include "drivers/byte_reader.hpp"
 #include "drivers/pose_values.hpp"
-#include "drivers/rate_text.hpp"
-#include "proto/clip/text.hpp"
 
 namespace posed::drivers::vmc {
 namespace {
 
 constexpr std::uint8_t kVersion = 1;
-constexpr std::string_view kVmcInfoPrefix = "vmc rate=";
 
 // Little-endian values into memory that is large enough.
 class RoomWriter {
@@ -108,16 +105,6 @@ Result<Described> parse_description(std::span<const std::byte> bytes) {
   if (!reader.ok()) return wrong("ends too early");
   if (reader.left() != 0) return wrong("goes on after its end");
   return described;
-}
-
-std::string device_info_text(double rate_hz) {
-  return std::string(kVmcInfoPrefix) + clip::number_text(rate_hz);
-}
-
-Result<double> parse_device_info(const std::string& text, const std::string& identity) {
-  if (const auto rate_hz = parse_rate(text, kVmcInfoPrefix)) return *rate_hz;
-  return fail("is not described as a VMC performer ('vmc rate=60'); is it another device?",
-              identity);
 }
 
 }  // namespace posed::drivers::vmc

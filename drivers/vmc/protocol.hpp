@@ -1,6 +1,6 @@
-// What posed uses of the VMC protocol (https://protocol.vmc.info, version 3.1): its addresses, the
-// limits of its names, and the description that the decoder writes itself, because the protocol
-// has none.
+// The part of the VMC protocol that posed uses (https://protocol.vmc.info, version 3.1): its
+// addresses, the limits of its names, and the description that the decoder writes itself, because
+// the protocol has none.
 //
 // A description of the performer, little-endian:
 //
@@ -78,10 +78,5 @@ inline constexpr std::size_t kMaxDescribed =
 // The description in these bytes, which are untrusted; its texts are views of them. Names are not
 // checked for being text. Cold.
 [[nodiscard]] Result<Described> parse_description(std::span<const std::byte> bytes);
-
-// The device info, and the rate [Hz] in it: what the options say.
-[[nodiscard]] std::string device_info_text(double rate_hz);
-[[nodiscard]] Result<double> parse_device_info(const std::string& text,
-                                               const std::string& identity);
 
 }  // namespace posed::drivers::vmc

@@ -17,7 +17,7 @@ class SenderClock {
  public:
   // kLate: a newer time came before it, so the datagram was overtaken by another. kOutOfRange: no
   // time. kOk: taken, or too coarse to be used.
-  [[nodiscard]] Outcome take(float time_s) noexcept {
+  [[nodiscard]] Outcome accept(float time_s) noexcept {
     if (!std::isfinite(time_s) || time_s < 0.0F) return Outcome::kOutOfRange;
     if (time_s >= kFinest_s) {
       // One such value may be damaged; many are a sender that has no usable clock.

@@ -23,11 +23,11 @@ class Values {
   void set(ValueKind kind, std::string_view name, std::span<const float> values,
            std::int64_t arrival_ns) noexcept;
 
-  // Which names have a place in samples. It outlives its use.
+  // Sets the names that have a place in samples. `layout` outlives its use.
   void use(const VmcLayout& layout) noexcept;
 
   // True once when a name has come that the description does not have.
-  [[nodiscard]] bool take_new() noexcept { return std::exchange(new_, false); }
+  [[nodiscard]] bool consume_new() noexcept { return std::exchange(new_, false); }
 
   // True if something came since the last sample.
   [[nodiscard]] bool fresh() const noexcept { return fresh_; }

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "drivers/axis/axis.hpp"
 #include "drivers/axis/protocol.hpp"
+#include "drivers/driver.hpp"
 #include "tests/fuzz/session.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
@@ -18,7 +18,7 @@ using posed::fuzz::feed;
 using posed::test::CollectSink;
 using Bytes = std::vector<std::byte>;
 
-const posed::drivers::Driver& axis() { return posed::drivers::axis_driver(); }
+const posed::drivers::Driver& axis() { return *posed::drivers::find_driver("axis"); }
 
 posed::drivers::Description description() {
   return axis().describe("axis link=udp order=XZY rate=100", "fuzz").value();

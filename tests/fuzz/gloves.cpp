@@ -2,15 +2,12 @@
 // kept from input to input, as on a serial line, so that millions of inputs are cheap (`decoders`
 // creates a new one for each). A finding may therefore depend on earlier inputs: run again with the
 // same -seed.
-#include <algorithm>
 #include <cstdint>
 #include <memory>
-#include <string>
 #include <utility>
 #include <vector>
 
-#include "drivers/described/device_file.hpp"
-#include "drivers/driver.hpp"
+#include "tests/fuzz/glove_kinds.hpp"
 #include "tests/fuzz/session.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
@@ -55,24 +52,9 @@ Glove make_glove(const Driver& driver, const Options& options) {
 }
 
 std::vector<Glove> make_gloves() {
-  const std::vector<std::pair<const char*, std::vector<std::string>>> kinds{
-      {"encoding", {"alpha", "legacy"}},
-      {"form", {"8bit", "16bit"}},
-      {"model", {"5", "5-wireless", "16", "ultra-wireless", "ultra-usb-5", "ultra-usb-14"}},
-      {"device", posed::drivers::described::shipped_devices()}};
   std::vector<Glove> gloves;
-  for (const Driver& driver : posed::drivers::registry()) {
-    if (driver.glove == nullptr || driver.emulate == nullptr) continue;
-    const auto takes = [&driver](const auto& kind) {
-      return std::ranges::find(driver.options, kind.first, &posed::drivers::OptionSpec::name) !=
-             driver.options.end();
-    };
-    const auto kind = std::ranges::find_if(kinds, takes);
-    if (kind == kinds.end()) gloves.push_back(make_glove(driver, {}));
-    if (kind == kinds.end()) continue;
-    for (const std::string& word : kind->second) {
-      gloves.push_back(make_glove(driver, {{kind->first, word}}));
-    }
+  for (const auto& [driver, options] : posed::fuzz::glove_kinds()) {
+    gloves.push_back(make_glove(*driver, options));
   }
   return gloves;
 }

@@ -4,9 +4,9 @@
 #include <cstdint>
 #include <string>
 
+#include "drivers/driver.hpp"
 #include "drivers/natnet/encode.hpp"
 #include "drivers/natnet/figure.hpp"
-#include "drivers/natnet/natnet.hpp"
 #include "tests/fuzz/session.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
@@ -30,7 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                                                  "2.9", "3.0", "4.0", "4.1"};
   if (size < 1 || size > 60'000) return 0;
   const std::span bytes = std::as_bytes(std::span(data + 1, size - 1));
-  const posed::drivers::Driver& driver = posed::drivers::natnet_driver();
+  const posed::drivers::Driver& driver = *posed::drivers::find_driver("natnet");
   const std::string version = kVersions[data[0] % kVersions.size()];
   const auto description = driver.expect({{"version", version}});
   demand(description.has_value());

@@ -4,9 +4,9 @@
 #include <span>
 #include <string_view>
 
-#include "drivers/posed/emulator.hpp"
-#include "drivers/posed/posed.hpp"
-#include "drivers/posed/protocol.hpp"
+#include "drivers/chain/emulator.hpp"
+#include "drivers/chain/protocol.hpp"
+#include "drivers/driver.hpp"
 #include "posed/v1/posed.pb.h"
 #include "tests/fuzz/session.hpp"
 
@@ -31,13 +31,13 @@ void compare(std::span<const std::byte> bytes) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using posed::drivers::posed_driver;
+  using posed::drivers::find_driver;
   static const auto good = posed::fuzz::emulated_datagrams(
       chain::UpstreamEmulator({.stream = "walker", .rate_hz = 60.0}), 64);
   const std::span bytes = std::as_bytes(std::span(data, size));
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   compare(bytes);
-  posed::fuzz::Session session(posed_driver(), posed_driver().expect({}).value(),
+  posed::fuzz::Session session(*find_driver("posed"), find_driver("posed")->expect({}).value(),
                                posed::fuzz::DescriptionsOf::kSender);
   posed::fuzz::feed_pieces(session, good, bytes);
   session.feed(chain::join_message("pose/walker", text), 0);

@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "drivers/driver.hpp"
 #include "drivers/rokoko/emulator.hpp"
-#include "drivers/rokoko/rokoko.hpp"
 #include "tests/fuzz/session.hpp"
 
 namespace {
@@ -35,11 +35,11 @@ std::vector<std::vector<std::byte>> studio_datagrams() {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using posed::drivers::rokoko_driver;
+  using posed::drivers::find_driver;
   static const auto good = studio_datagrams();
   const std::span bytes = std::as_bytes(std::span(data, size));
-  posed::fuzz::Session session(rokoko_driver(), rokoko_driver().expect({}).value());
+  posed::fuzz::Session session(*find_driver("rokoko"), find_driver("rokoko")->expect({}).value());
   posed::fuzz::feed_pieces(session, good, bytes);
-  (void)rokoko_driver().make_layout(bytes);
+  (void)find_driver("rokoko")->make_layout(bytes);
   return 0;
 }

@@ -106,7 +106,7 @@ Result<std::unique_ptr<Transport>> open_soon(const LabDevice& device,
     if (transport || Clock::now() > deadline) return transport;
     pollfd wanted{.fd = arrivals.poll_fd(), .events = POLLIN, .revents = 0};
     ::poll(&wanted, 1, 50);
-    arrivals.take();
+    arrivals.consume();
   }
 }
 

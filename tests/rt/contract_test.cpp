@@ -94,7 +94,7 @@ TEST_CASE("reader and pipeline keep the real-time contract", "[rt]") {
   std::vector<RigStream> streams;
   streams.push_back(
       {.device = open_device("file", {{"path", path.string()}}), .style = first.get()});
-  streams.push_back({.device = open_device("template", {})});
+  streams.push_back({.device = open_device("labels", {{"rate_hz", 100.0}})});
   // Plays once at 20 times its speed, so it ends, and is silent until the end is noticed.
   streams.push_back(
       {.device = open_device("file", {{"path", path.string()}, {"loop", false}, {"pace", 0.0}}),
@@ -300,7 +300,7 @@ TEST_CASE("each kind of violation of the real-time contract is detected", "[rt]"
   for (const Way& way : ways) {
     INFO(kBreachNames[static_cast<std::size_t>(way.breach)]);
     std::vector<RigStream> streams;
-    streams.push_back({.device = open_device("template", {{"rate_hz", 500.0}})});
+    streams.push_back({.device = open_device("labels", {{"rate_hz", 500.0}})});
     auto& decoder = streams[0].device.decoder;
     decoder = std::make_unique<BreakingDecoder>(std::move(decoder), way.commit);
     Rig rig(std::move(streams), nullptr);

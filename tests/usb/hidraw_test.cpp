@@ -124,9 +124,9 @@ TEST_CASE("a replugged glove is reported, and found by its identity on its new n
   for (const std::string id : {"", "ULTRA-7", "1-2", "1-2:1.0", "5d70:0001 ULTRA-7"}) {
     INFO(id);
     const std::string before = glove.node();
-    arrivals.take();
+    arrivals.consume();
     glove.plug();
-    CHECK(arrivals.take());
+    CHECK(arrivals.consume());
     CHECK(glove.node() != before);
     const auto link = ports.hid({.vendor = kUltra.vendor, .id = id});
     REQUIRE(link);

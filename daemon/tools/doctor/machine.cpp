@@ -14,6 +14,7 @@
 
 #include "drivers/known_usb.hpp"
 #include "drivers/transport/address.hpp"
+#include "drivers/transport/socket.hpp"
 
 namespace posed::doctor {
 namespace {
@@ -102,17 +103,11 @@ std::optional<std::uint64_t> free_bytes(const fs::path& folder) {
 Result<> try_bind(const Listener& listener) {
   const auto address = drivers::parse_endpoint(listener.endpoint);
   if (!address) return std::unexpected(address.error());
-  const int kind = (listener.udp ? SOCK_DGRAM : SOCK_STREAM) | SOCK_CLOEXEC;
-  const int fd = ::socket(address->storage.ss_family, kind, 0);
-  if (fd < 0) return fail(errno_text());
-  const int yes = 1;
+  const int kind = listener.udp ? SOCK_DGRAM : SOCK_STREAM;
   // As the daemon does: TCP ports in TIME_WAIT, and multicast groups, are no conflict.
-  if (!listener.udp || listener.shared) {
-    ::setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &yes, sizeof yes);
-  }
-  const int failed = ::bind(fd, address->get(), address->size) == 0 ? 0 : errno;
+  const int fd = drivers::bind_socket(*address, kind, !listener.udp || listener.shared);
+  if (fd < 0) return fail(errno_text());
   ::close(fd);
-  if (failed != 0) return fail(errno_text(failed));
   return {};
 }
 

@@ -20,7 +20,7 @@
 #include "drivers/driver.hpp"
 #include "drivers/glove/glove_emulator.hpp"
 #include "drivers/transport/address.hpp"
-#include "drivers/transport/listener.hpp"
+#include "drivers/transport/socket.hpp"
 
 namespace posed::emulate {
 namespace {
@@ -99,9 +99,7 @@ Result<EmulatedPort> EmulatedPort::listen_tcp(const std::string& endpoint) {
   const auto fd = drivers::listen_on(*address, endpoint, 1);
   if (!fd) return std::unexpected(fd.error());
   port.listener_ = *fd;
-  drivers::Address bound;
-  ::getsockname(port.listener_, bound.get(), &bound.size);
-  port.name_ = drivers::endpoint_text(bound);
+  port.name_ = drivers::endpoint_text(drivers::bound_address(port.listener_));
   return port;
 }
 
@@ -112,8 +110,7 @@ Result<EmulatedPort> EmulatedPort::open_udp(const std::vector<std::string>& endp
     const std::string& endpoint = endpoints[i];
     const auto address = drivers::parse_endpoint(endpoint);
     if (!address) return std::unexpected(address.error());
-    const int fd =
-        ::socket(address->storage.ss_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    const int fd = drivers::open_socket(*address, SOCK_DGRAM);
     if (fd >= 0) port.fds_.push_back(fd);
     if (fd >= 0 && i < ports.size() && ports[i] != 0) {
       const auto own = own_address(*address, ports[i]);

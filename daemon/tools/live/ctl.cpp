@@ -24,7 +24,6 @@
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/live/live_view.hpp"
 #include "drivers/glove/calibration_file.hpp"
-#include "drivers/glove/load_calibration.hpp"
 #include "models/gesture/play_order.hpp"
 #include "models/stages/registry.hpp"
 #include "models/style/live/style_type.hpp"

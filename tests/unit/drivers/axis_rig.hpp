@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "drivers/axis/axis.hpp"
 #include "drivers/axis/emulator.hpp"
 #include "drivers/axis/protocol.hpp"
+#include "drivers/driver.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
 namespace posed::test {
@@ -58,7 +58,7 @@ inline drivers::axis::Message axis_message(std::uint32_t avatar, std::string_vie
 }
 
 struct AxisRig {
-  const drivers::Driver& driver = drivers::axis_driver();
+  const drivers::Driver& driver = *drivers::find_driver("axis");
   std::unique_ptr<drivers::Decoder> decoder;
   std::vector<std::unique_ptr<const drivers::SourceLayout>> layouts;
   CollectSink sink;

@@ -4,7 +4,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "drivers/axis/layout.hpp"
+#include "drivers/axis/decoder.hpp"
 #include "proto/clip/bvh.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/text.hpp"

@@ -329,7 +329,7 @@ TEST_CASE("any Axis description is refused or becomes bodies") {
 }
 
 TEST_CASE("wrong options of the Axis driver are refused at once") {
-  const Driver& driver = axis_driver();
+  const Driver& driver = *find_driver("axis");
   const std::vector<std::pair<Options, std::string>> wrong{
       {{{"order", std::string("XYX")}}, "order"},
       {{{"format", std::string("json")}}, "format"},

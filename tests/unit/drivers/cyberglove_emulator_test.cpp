@@ -53,8 +53,8 @@ TEST_CASE("the emulated CyberGlove answers like the real one") {
 }
 
 TEST_CASE("a CyberTouch vibrates the fingers with a force, and samples continue") {
-  const auto bytes =
-      cyberglove_driver().glove->encode_haptics({}, {.force = {1.0F, -1.0F, 0.0F, -1.0F, 0.5F}});
+  const auto bytes = find_driver("cyberglove")
+                         ->glove->encode_haptics({}, {.force = {1.0F, -1.0F, 0.0F, -1.0F, 0.5F}});
   REQUIRE(bytes);
   CHECK(text_of(*bytes) == std::string("A\x03\x00\xFF\x02\x00\x04\x80", 8));
   const auto emulator = emulator_of({});
@@ -66,7 +66,7 @@ TEST_CASE("a CyberTouch vibrates the fingers with a force, and samples continue"
   decoder->feed(next(*emulator), 0, sink);
   CHECK(sink.outcomes == std::array<int, kOutcomes>{2, 0, 0, 0, 0});
   CHECK(text_of(tell(*emulator, "?A")) == std::string("?A\xFF\0\0\0\x80\0\0", 9));
-  const auto driver = cyberglove_driver();
+  const auto driver = *find_driver("cyberglove");
   CHECK_FALSE(driver.glove->encode_haptics({}, {.force = {2.0F}}));
   CHECK_FALSE(driver.glove->encode_haptics({}, {.vibration_s = 1.0F}));
 }

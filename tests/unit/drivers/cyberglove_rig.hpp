@@ -8,18 +8,18 @@
 
 #include <catch2/catch.hpp>
 
-#include "drivers/cyberglove/cyberglove.hpp"
-#include "drivers/cyberglove/device_info.hpp"
 #include "drivers/cyberglove/emulator.hpp"
+#include "drivers/cyberglove/start.hpp"
+#include "drivers/driver.hpp"
 
 namespace posed::drivers::cyberglove {
 
 using Raw = std::array<double, kSensors>;
 
-inline std::unique_ptr<Decoder> decoder_of(const GloveSettings& glove) {
-  const auto description = cyberglove_driver().describe(device_info_of(glove), "test");
+inline std::unique_ptr<Decoder> decoder_of(const RequestedConfig& glove) {
+  const auto description = find_driver("cyberglove")->describe(device_info_of(glove), "test");
   if (!description) FAIL(description.error().text());
-  auto decoder = cyberglove_driver().make_decoder(*description);
+  auto decoder = find_driver("cyberglove")->make_decoder(*description);
   if (!decoder) FAIL(decoder.error().text());
   return std::move(*decoder);
 }

@@ -8,8 +8,8 @@
 #include <chrono>
 #include <thread>
 
-#include "drivers/cyberglove/cyberglove.hpp"
 #include "drivers/cyberglove/emulator.hpp"
+#include "drivers/driver.hpp"
 #include "drivers/transport/transport_factory.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/pseudo_terminal.hpp"
@@ -71,7 +71,7 @@ class Box {
 Result<Device> open_box(const Box& box, Options options) {
   options["port"] = box.port();
   TransportFactory ports;
-  return cyberglove_driver().open(options, ports);
+  return find_driver("cyberglove")->open(options, ports);
 }
 
 // Reads samples of an opened glove and polls for them if the mode needs it.
@@ -112,7 +112,7 @@ TEST_CASE("a CyberGlove is found, configured and read, in every form and mode") 
     if (!device) FAIL(device.error().text());
     CHECK(device->description.text.contains(one.expected));
     CHECK(device->reopen_after_s == 1.0);
-    const auto promised = cyberglove_driver().expect(one.options);
+    const auto promised = find_driver("cyberglove")->expect(one.options);
     REQUIRE(promised);
     CHECK(promised->samples.names == device->description.samples.names);
     CHECK(promised->skeleton->id == device->description.skeleton->id);
@@ -162,7 +162,7 @@ TEST_CASE("a CyberGlove's options are checked before anything is opened") {
                             {{"rate_hz", 0.1}},
                             {{"mode", std::string("poll")}, {"rate_hz", 0.0}},
                             {{"mode", std::string("sync")}, {"form", std::string("16bit")}}}) {
-    const auto device = cyberglove_driver().open(wrong, ports);
+    const auto device = find_driver("cyberglove")->open(wrong, ports);
     REQUIRE_FALSE(device);
     CHECK(device.error().exit_code == ExitCode::kWrongUse);
   }

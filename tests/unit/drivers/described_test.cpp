@@ -8,7 +8,6 @@
 #include <numeric>
 #include <sstream>
 
-#include "drivers/described/described.hpp"
 #include "drivers/described/device_file.hpp"
 #include "drivers/described/emulator.hpp"
 #include "drivers/driver.hpp"
@@ -40,9 +39,10 @@ Table shipped(const std::string& name) {
 }
 
 std::unique_ptr<Decoder> decoder_for(const std::string& toml) {
-  const auto description = described_driver().describe("described hand=right\n" + toml, "test");
+  const auto description =
+      find_driver("described")->describe("described hand=right\n" + toml, "test");
   if (!description) FAIL(description.error().text());
-  auto decoder = described_driver().make_decoder(*description);
+  auto decoder = find_driver("described")->make_decoder(*description);
   if (!decoder) FAIL(decoder.error().text());
   return std::move(*decoder);
 }
@@ -190,10 +190,11 @@ TEST_CASE("a recorded VMG30, turned back into bytes, comes back equal") {
   const Table table = shipped("vmg30");
   const auto rows = vmg30_rows(*log);
   REQUIRE(rows.size() == 300);
-  const auto description = described_driver().describe(
-      "described hand=right\n" + *described::device_text("vmg30"), "log");
+  const auto description =
+      find_driver("described")
+          ->describe("described hand=right\n" + *described::device_text("vmg30"), "log");
   REQUIRE(description);
-  const auto decoder = described_driver().make_decoder(*description);
+  const auto decoder = find_driver("described")->make_decoder(*description);
   REQUIRE(decoder);
   DescribedEmulator glove = emulator_of(table);
   turn_on(table, glove);
@@ -351,19 +352,21 @@ TEST_CASE("a mistake in a description is reported with its line and what is allo
 }
 
 TEST_CASE("an unknown device is refused with the known ones, a missing file by its path") {
-  const auto unknown = described_driver().expect({{"device", std::string("/somewhere/vmg31")}});
+  const auto unknown =
+      find_driver("described")->expect({{"device", std::string("/somewhere/vmg31")}});
   REQUIRE_FALSE(unknown);
   CHECK(unknown.error().message.find("'vmg31', only bebop_forte opencyberglove vmg30") !=
         std::string::npos);
-  const auto missing = described_driver().expect({{"device", std::string("/nowhere/own.toml")}});
+  const auto missing =
+      find_driver("described")->expect({{"device", std::string("/nowhere/own.toml")}});
   REQUIRE_FALSE(missing);
   CHECK(missing.error().text().starts_with(
       "/nowhere/own.toml: cannot read the device description: No such file or directory"));
   const auto path = test::scratch_file("own.toml", kOwnGlove);
   const auto expected =
-      described_driver().expect({{"device", path.string()}, {"hand", std::string("left")}});
+      find_driver("described")->expect({{"device", path.string()}, {"hand", std::string("left")}});
   REQUIRE(expected);
-  const auto again = described_driver().describe(expected->text, expected->identity);
+  const auto again = find_driver("described")->describe(expected->text, expected->identity);
   REQUIRE(again);
   CHECK(again->samples.names == expected->samples.names);
   CHECK(again->samples.units == expected->samples.units);

@@ -4,6 +4,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
 #include <map>
 
@@ -23,231 +24,127 @@ struct ScratchFolder {
   }
 };
 
+using drivers::Options;
+
+// A glove that its driver's emulator plays; `start` are the bytes that it needs before it streams.
+DeviceFixture glove(std::string name, std::string driver, Options options = {},
+                    std::string start = {}) {
+  return {.name = std::move(name),
+          .driver = std::move(driver),
+          .options = std::move(options),
+          .loop_chunks = 24,
+          .chunk_frames = 1,
+          .chunk_samples = 1,
+          .emulated = true,
+          .start = std::move(start)};
+}
+
+// A system with several bodies over UDP, played by its driver's emulator.
+DeviceFixture source(std::string name, std::string driver, std::size_t loop_chunks,
+                     std::size_t bodies, std::size_t samples = 0, Options options = {}) {
+  return {.name = std::move(name),
+          .driver = std::move(driver),
+          .options = std::move(options),
+          .loop_chunks = loop_chunks,
+          .chunk_frames = bodies,
+          .chunk_samples = samples,
+          .emulated = true,
+          .datagrams = true};
+}
+
+// A clip of five frames.
+DeviceFixture clip(std::string name, Options options) {
+  options["pace"] = 0.0;
+  return {.name = std::move(name),
+          .driver = "file",
+          .options = std::move(options),
+          .loop_chunks = 5,
+          .chunk_frames = 1};
+}
+
+DeviceFixture reports(DeviceFixture fixture) {
+  fixture.whole_reports = true;
+  return fixture;
+}
+
+DeviceFixture two_packets(DeviceFixture fixture) {
+  fixture.chunk_packets = 2;
+  return fixture;
+}
+
+DeviceFixture axis(std::string name, Options options) {
+  DeviceFixture fixture =
+      two_packets(source(std::move(name), "axis", 24, 2, 0, std::move(options)));
+  fixture.datagrams = false;
+  return fixture;
+}
+
 std::vector<DeviceFixture> make_specimens() {
-  const auto bvh = scratch_file("small.bvh", small_bvh());
-  const auto amc = scratch_file("01_02.amc", small_amc());
-  const auto asf = scratch_file("small.asf", small_asf());
-  const auto hand = scratch_file("hand.csv", small_hand_csv());
-  return {
-      {.name = "axis",
-       .driver = "axis",
-       .options = {},
-       .loop_chunks = 24,
-       .chunk_frames = 2,
-       .chunk_packets = 2,
-       .emulated = true},
-      {.name = "axis-text",
-       .driver = "axis",
-       .options = {{"format", std::string("text")}, {"reference", true}},
-       .loop_chunks = 24,
-       .chunk_frames = 2,
-       .chunk_packets = 2,
-       .emulated = true},
-      {.name = "cyberglove-16bit",
-       .driver = "cyberglove",
-       .options = {{"form", std::string("16bit")}},
-       .loop_chunks = 24,
-       .chunk_frames = 1,
-       .chunk_samples = 1,
-       .emulated = true,
-       .start = "1m\x03"
-                "1S"},
-      {.name = "cyberglove-18",
-       .driver = "cyberglove",
-       .options = {{"sensors", std::int64_t{18}}, {"hand", std::string("left")}, {"time", false}},
-       .loop_chunks = 24,
-       .chunk_frames = 1,
-       .chunk_samples = 1,
-       .emulated = true,
-       .start = "u 1\rS"},
-      {.name = "cyberglove-22",
-       .driver = "cyberglove",
-       .options = {},
-       .loop_chunks = 24,
-       .chunk_frames = 1,
-       .chunk_samples = 1,
-       .emulated = true,
-       .start = "u 1\rd 1\rt 1152 1\rS"},
-      {.name = "described-bebop-forte",
-       .driver = "described",
-       .options = {{"device", std::string("bebop_forte")}},
-       .loop_chunks = 24,
-       .chunk_frames = 1,
-       .chunk_samples = 1,
-       .chunk_packets = 2,
-       .emulated = true,
-       .start = "\xb0\x76\x01\xb0\x73\x01"},
-      {.name = "described-opencyberglove",
-       .driver = "described",
-       .options = {{"device", std::string("opencyberglove")}, {"hand", std::string("left")}},
-       .loop_chunks = 24,
-       .chunk_frames = 1,
-       .chunk_samples = 1,
-       .emulated = true},
-      {.name = "described-vmg30",
-       .driver = "described",
-       .options = {{"device", std::string("vmg30")}},
-       .loop_chunks = 24,
-       .chunk_frames = 1,
-       .chunk_samples = 1,
-       .emulated = true,
-       .start = "\x24\x0a\x03\x01\x32\x23"},
-      {.name = "file, bvh",
-       .driver = "file",
-       .options = {{"path", bvh.string()}, {"pace", 0.0}},
-       .loop_chunks = 5,
-       .chunk_frames = 1},
-      {.name = "file, amc",
-       .driver = "file",
-       .options = {{"path", amc.string()}, {"skeleton", asf.string()}, {"pace", 0.0}},
-       .loop_chunks = 5,
-       .chunk_frames = 1},
-      {.name = "file, hand csv",
-       .driver = "file",
-       .options = {{"path", hand.string()}, {"pace", 0.0}, {"hand", std::string("left")}},
-       .loop_chunks = 5,
-       .chunk_frames = 1},
-      {.name = "fivedt-5",
-       .driver = "fivedt",
-       .options = {{"model", std::string("5")}, {"hand", std::string("right")}},
-       .loop_chunks = 24,
-       .chunk_frames = 1,
-       .chunk_samples = 1,
-       .emulated = true,
-       .start = "AD"},
-      {.name = "fivedt-5-wireless",
-       .driver = "fivedt",
-       .options = {{"model", std::string("5-wireless")}, {"hand", std::string("left")}},
-       .loop_chunks = 24,
-       .chunk_frames = 1,
-       .chunk_samples = 1,
-       .emulated = true},
-      {.name = "fivedt-16",
-       .driver = "fivedt",
-       .options = {{"model", std::string("16")}, {"hand", std::string("right")}},
-       .loop_chunks = 24,
-       .chunk_frames = 1,
-       .chunk_samples = 1,
-       .emulated = true},
-      {.name = "fivedt-ultra-wireless",
-       .driver = "fivedt",
-       .options = {{"model", std::string("ultra-wireless")}, {"hand", std::string("right")}},
-       .loop_chunks = 24,
-       .chunk_frames = 1,
-       .chunk_samples = 1,
-       .emulated = true},
-      {.name = "fivedt-ultra-usb-5",
-       .driver = "fivedt",
-       .options = {{"model", std::string("ultra-usb-5")}, {"hand", std::string("left")}},
-       .loop_chunks = 24,
-       .chunk_frames = 1,
-       .chunk_samples = 1,
-       .emulated = true,
-       .whole_reports = true},
-      {.name = "fivedt-ultra-usb-14",
-       .driver = "fivedt",
-       .options = {{"model", std::string("ultra-usb-14")}, {"hand", std::string("right")}},
-       .loop_chunks = 24,
-       .chunk_frames = 1,
-       .chunk_samples = 1,
-       .emulated = true,
-       .whole_reports = true},
-      {.name = "labels", .driver = "labels", .options = {}, .loop_chunks = 1, .chunk_frames = 1},
-      {.name = "lucidgloves-alpha",
-       .driver = "lucidgloves",
-       .options = {},
-       .loop_chunks = 24,
-       .chunk_frames = 1,
-       .chunk_samples = 1,
-       .emulated = true},
-      {.name = "lucidgloves-legacy",
-       .driver = "lucidgloves",
-       .options = {{"encoding", std::string("legacy")},
-                   {"hand", std::string("left")},
-                   {"max_analog_value", std::int64_t{1023}}},
-       .loop_chunks = 24,
-       .chunk_frames = 1,
-       .chunk_samples = 1,
-       .emulated = true},
-      // More datagrams than its window of late ones, so that the loop is taken for a restart.
-      {.name = "mocopi",
-       .driver = "mocopi",
-       .options = {},
-       .loop_chunks = 80,
-       .chunk_frames = 1,
-       .emulated = true,
-       .datagrams = true},
-      {.name = "natnet",
-       .driver = "natnet",
-       .options = {},
-       .loop_chunks = 72,  // a step back by more than 64 frames is a restart, not a late frame
-       .chunk_frames = 2,
-       .chunk_samples = 1,
-       .emulated = true,
-       .datagrams = true},
-      {.name = "mvn",
-       .driver = "mvn",
-       .options = {{"rate_hz", 100.0},
-                   {"types", std::string("02")},
-                   {"characters", std::int64_t{1}},
-                   {"datagram_bytes", std::int64_t{4096}}},
-       .loop_chunks = 72,
-       .chunk_frames = 1,
-       .emulated = true,
-       .datagrams = true},
-      {.name = "p5",
-       .driver = "p5",
-       .options = {},
-       .loop_chunks = 24,
-       .chunk_frames = 1,
-       .chunk_samples = 1,
-       .emulated = true,
-       .whole_reports = true},
-      {.name = "posed",
-       .driver = "posed",
-       .options = {},
-       .loop_chunks = 72,  // a step back by more than 64 frames is a restart, not a late frame
-       .chunk_frames = 1,
-       .emulated = true,
-       .datagrams = true},
-      {.name = "rokoko",
-       .driver = "rokoko",
-       .options = {},
-       .loop_chunks = 24,
-       .chunk_frames = 3,
-       .chunk_samples = 1,
-       .emulated = true,
-       .datagrams = true},
-      {.name = "rokoko-v2",
-       .driver = "rokoko",
-       .options = {{"version", std::string("2")}, {"lz4", false}},
-       .loop_chunks = 24,
-       .chunk_frames = 3,
-       .chunk_samples = 1,
-       .emulated = true,
-       .datagrams = true},
-      {.name = "template",
-       .driver = "template",
-       .options = {},
-       .loop_chunks = 256,
-       .chunk_frames = 1,
-       .chunk_samples = 1},
-      {.name = "template-mocap",
-       .driver = "template_mocap",
-       .options = {},
-       .loop_chunks = 72,  // a step back by more than 64 frames is a restart, not a late frame
-       .chunk_frames = 2,
-       .emulated = true,
-       .datagrams = true},
-      {.name = "vmc",
-       .driver = "vmc",
-       .options = {},
-       .loop_chunks = 24,
-       .chunk_frames = 1,
-       .chunk_samples = 1,
-       .emulated = true,
-       .datagrams = true},
+  const std::string right = "right", left = "left";
+  const auto described = [](const std::string& name, Options options, const std::string& start) {
+    options["device"] = name;
+    std::string fixture = "described-" + name;
+    std::ranges::replace(fixture, '_', '-');
+    return glove(fixture, "described", std::move(options), start);
   };
+  const auto fivedt = [](const std::string& model, const std::string& hand,
+                         const std::string& start = {}) {
+    return glove("fivedt-" + model, "fivedt", {{"model", model}, {"hand", hand}}, start);
+  };
+  // A step back by more than 64 numbers is a restart, not a late datagram: the loops of numbered
+  // datagrams are longer than that.
+  std::vector<DeviceFixture> all{
+      axis("axis", {}),
+      axis("axis-text", {{"format", std::string("text")}, {"reference", true}}),
+      glove("cyberglove-16bit", "cyberglove", {{"form", std::string("16bit")}},
+            "1m\x03"
+            "1S"),
+      glove("cyberglove-18", "cyberglove",
+            {{"sensors", std::int64_t{18}}, {"hand", left}, {"time", false}}, "u 1\rS"),
+      glove("cyberglove-22", "cyberglove", {}, "u 1\rd 1\rt 1152 1\rS"),
+      two_packets(described("bebop_forte", {}, "\xb0\x76\x01\xb0\x73\x01")),
+      described("opencyberglove", {{"hand", left}}, {}),
+      described("vmg30", {}, "\x24\x0a\x03\x01\x32\x23"),
+      clip("file, bvh", {{"path", scratch_file("small.bvh", small_bvh()).string()}}),
+      clip("file, amc", {{"path", scratch_file("01_02.amc", small_amc()).string()},
+                         {"skeleton", scratch_file("small.asf", small_asf()).string()}}),
+      clip("file, hand csv",
+           {{"path", scratch_file("hand.csv", small_hand_csv()).string()}, {"hand", left}}),
+      fivedt("5", right, "AD"),
+      fivedt("5-wireless", left),
+      fivedt("16", right),
+      fivedt("ultra-wireless", right),
+      reports(fivedt("ultra-usb-5", left)),
+      reports(fivedt("ultra-usb-14", right)),
+      {.name = "labels", .driver = "labels", .options = {}, .loop_chunks = 1, .chunk_frames = 1},
+      glove("lucidgloves-alpha", "lucidgloves"),
+      glove("lucidgloves-legacy", "lucidgloves",
+            {{"encoding", std::string("legacy")},
+             {"hand", left},
+             {"max_analog_value", std::int64_t{1023}}}),
+      source("mocopi", "mocopi", 80, 1),
+      source("natnet", "natnet", 72, 2, 1),
+      source("mvn", "mvn", 72, 1, 0,
+             {{"rate_hz", 100.0},
+              {"types", std::string("02")},
+              {"characters", std::int64_t{1}},
+              {"datagram_bytes", std::int64_t{4096}}}),
+      reports(glove("p5", "p5")),
+      source("posed", "posed", 72, 1),
+      source("rokoko", "rokoko", 24, 3, 1),
+      source("rokoko-v2", "rokoko", 24, 3, 1, {{"version", std::string("2")}, {"lz4", false}}),
+      source("template-mocap", "template_mocap", 72, 2),
+      source("vmc", "vmc", 24, 1, 1),
+  };
+  // A glove that streams from power-on and sends a packet a frame needs no entry above.
+  for (const drivers::Driver& driver : drivers::registry()) {
+    const std::string name(driver.name);
+    const bool listed = std::ranges::find(all, name, &DeviceFixture::driver) != all.end();
+    if (!listed && driver.glove != nullptr && driver.emulate != nullptr) {
+      all.push_back(glove(name, name));
+    }
+  }
+  return all;
 }
 
 }  // namespace

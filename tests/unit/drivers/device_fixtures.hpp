@@ -1,5 +1,6 @@
-// One opened device of each kind that posed supports, for the tests in tests/unit/drivers. A new
-// driver adds its device fixture here; it is then tested for all properties that drivers must have.
+// One opened device of each kind that posed supports, for the tests in tests/unit/drivers, which
+// hold it to all properties that drivers must have. A glove of the registry that streams from
+// power-on is found there; any other new device adds its fixture to the .cpp.
 #pragma once
 
 #include <filesystem>

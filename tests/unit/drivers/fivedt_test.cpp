@@ -5,9 +5,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "drivers/driver.hpp"
 #include "drivers/fivedt/decoder.hpp"
 #include "drivers/fivedt/emulator.hpp"
-#include "drivers/fivedt/fivedt.hpp"
 #include "drivers/transport/transport_factory.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
@@ -40,7 +40,7 @@ Reading decoded(Form form, const Bytes& bytes) {
 
 // Largest error of a channel [rad] after the fixture's emulator and decoder.
 double worst_error(const test::DeviceFixture& fixture, std::size_t joints) {
-  const auto decoder = decoder_of(fivedt_driver(), fixture.options);
+  const auto decoder = decoder_of(*find_driver("fivedt"), fixture.options);
   CollectSink sink;
   for (const auto& [due_ns, bytes] : test::emulated_chunks(fixture, 1)) {
     decoder->feed(bytes, due_ns, sink);
@@ -76,7 +76,7 @@ TEST_CASE("a Data Glove 5's packet is XOR checked, and its start may be data, to
   CHECK(reading.pitch == 0x80);
   // One byte changes. With the hand still, every byte 80 looks like a start; only the position
   // shows which one is.
-  const auto decoder = decoder_of(fivedt_driver());
+  const auto decoder = decoder_of(*find_driver("fivedt"));
   CollectSink sink;
   Bytes damaged = packet;
   damaged[3] = std::byte{9};
@@ -93,7 +93,7 @@ TEST_CASE("a Data Glove 5's stream that begins in a packet's middle is found") {
   const Bytes packet = bytes_of({0x80, 10, 20, 30, 40, 50, 60, 70, 0});
   Bytes good = packet;
   for (std::size_t i = 1; i < 8; ++i) good[8] ^= good[i];
-  const auto decoder = decoder_of(fivedt_driver());
+  const auto decoder = decoder_of(*find_driver("fivedt"));
   CollectSink sink;
   decoder->feed(std::span(good).subspan(4), 0, sink);
   for (int i = 0; i < 4; ++i) decoder->feed(good, 0, sink);
@@ -104,7 +104,7 @@ TEST_CASE("a Data Glove 5's stream that begins in a packet's middle is found") {
 TEST_CASE("one byte may follow a Data Glove 5's packet: ready if wired, the hand if not") {
   const Bytes packet = bytes_of({0x80, 1, 2, 3, 4, 5, 6, 7, 0});
   const auto outcomes = [&](const std::string& model, int tail) {
-    const auto decoder = decoder_of(fivedt_driver(), {{"model", model}});
+    const auto decoder = decoder_of(*find_driver("fivedt"), {{"model", model}});
     CollectSink sink;
     for (int i = 0; i < 3; ++i) {
       decoder->feed(packet, 0, sink);
@@ -128,7 +128,7 @@ TEST_CASE("a Data Glove 16's data and info packets follow each other as they lik
   CHECK(data.size() == 36);
   CHECK(decoded(Form::kSixteen, data).value == sent.value);
   CHECK(decoded(Form::kSixteen, info).kind == Reading::Kind::kInfo);
-  const auto decoder = decoder_of(fivedt_driver(), {{"model", std::string("16")}});
+  const auto decoder = decoder_of(*find_driver("fivedt"), {{"model", std::string("16")}});
   CollectSink sink;
   for (const Bytes& bytes : {info, data, info, info, data}) decoder->feed(bytes, 0, sink);
   CHECK(sink.frames.size() == 2);
@@ -150,8 +150,8 @@ TEST_CASE("an Ultra Wireless record holds fourteen values of twelve bits, of eit
   CHECK(got.port_b);
   const Bytes other =
       fivedt::encode_packet(Form::kUltraWireless, {.value = sent.value}, Side::kRight);
-  const auto decoder = decoder_of(
-      fivedt_driver(), {{"model", std::string("ultra-wireless")}, {"kit_port", std::string("b")}});
+  const auto decoder = decoder_of(*find_driver("fivedt"), {{"model", std::string("ultra-wireless")},
+                                                           {"kit_port", std::string("b")}});
   CollectSink sink;
   for (int i = 0; i < 3; ++i) {
     decoder->feed(record, 0, sink);
@@ -162,7 +162,8 @@ TEST_CASE("an Ultra Wireless record holds fourteen values of twelve bits, of eit
 }
 
 TEST_CASE("an Ultra Wireless record after damage is found by the next one's start") {
-  const auto decoder = decoder_of(fivedt_driver(), {{"model", std::string("ultra-wireless")}});
+  const auto decoder =
+      decoder_of(*find_driver("fivedt"), {{"model", std::string("ultra-wireless")}});
   Reading reading;
   reading.value.fill(0x3C3);  // its start byte also occurs in the data
   const Bytes record = fivedt::encode_packet(Form::kUltraWireless, reading, Side::kRight);
@@ -180,7 +181,7 @@ TEST_CASE("a USB glove with five sensors has every third value") {
   for (std::size_t i = 0; i < 16; ++i) sent.value[i] = static_cast<std::uint16_t>(1500 + 100 * i);
   const Bytes report = fivedt::encode_packet(Form::kUltraUsb5, sent, Side::kRight);
   REQUIRE(report.size() == 64);
-  const auto decoder = decoder_of(fivedt_driver(), {{"model", std::string("ultra-usb-5")}});
+  const auto decoder = decoder_of(*find_driver("fivedt"), {{"model", std::string("ultra-usb-5")}});
   CollectSink sink;
   decoder->feed(report, 0, sink);
   REQUIRE(sink.samples.size() == 1);
@@ -206,12 +207,12 @@ TEST_CASE("a Data Glove 5 is asked who it is, then streams or is polled") {
   const test::ServedEmulator served(glove);
   TransportFactory ports;
   const auto other =
-      fivedt_driver().open({{"port", served.port()}, {"hand", std::string("left")}}, ports);
+      find_driver("fivedt")->open({{"port", served.port()}, {"hand", std::string("left")}}, ports);
   REQUIRE_FALSE(other);
   CHECK(other.error().message.find("right glove") != std::string::npos);
 
   const auto polled =
-      fivedt_driver().open({{"port", served.port()}, {"poll_hz", std::int64_t{100}}}, ports);
+      find_driver("fivedt")->open({{"port", served.port()}, {"poll_hz", std::int64_t{100}}}, ports);
   if (!polled) FAIL(polled.error().text());
   CHECK(polled->poll.period_ns == 10'000'000);
   CollectSink sink;
@@ -238,7 +239,8 @@ TEST_CASE("a 5DT glove that only sends is identified by its packets") {
   const test::ServedEmulator served(glove);
   TransportFactory ports;
   const auto open = [&](const std::string& model, const std::string& hand) {
-    return fivedt_driver().open({{"port", served.port()}, {"model", model}, {"hand", hand}}, ports);
+    return find_driver("fivedt")->open({{"port", served.port()}, {"model", model}, {"hand", hand}},
+                                       ports);
   };
   const auto left = open("5-wireless", "left");
   if (!left) FAIL(left.error().text());
@@ -250,7 +252,8 @@ TEST_CASE("a 5DT glove of another hand or model is refused with an error message
   const test::ServedEmulator served(glove);
   TransportFactory ports;
   const auto open = [&](const std::string& model, const std::string& hand) {
-    return fivedt_driver().open({{"port", served.port()}, {"model", model}, {"hand", hand}}, ports);
+    return find_driver("fivedt")->open({{"port", served.port()}, {"model", model}, {"hand", hand}},
+                                       ports);
   };
   const auto sixteen = open("16", "right");
   REQUIRE_FALSE(sixteen);
@@ -265,11 +268,11 @@ TEST_CASE("a 5DT glove of another hand or model is refused with an error message
 }
 
 TEST_CASE("5DT options that do not fit each other are refused") {
-  CHECK_FALSE(fivedt_driver().expect({{"model", std::string("7")}}));
+  CHECK_FALSE(find_driver("fivedt")->expect({{"model", std::string("7")}}));
   CHECK_FALSE(
-      fivedt_driver().expect({{"model", std::string("16")}, {"poll_hz", std::int64_t{50}}}));
-  CHECK_FALSE(fivedt_driver().expect({{"poll_hz", std::int64_t{-1}}}));
-  CHECK_FALSE(fivedt_driver().expect({{"kit_port", std::string("c")}}));
+      find_driver("fivedt")->expect({{"model", std::string("16")}, {"poll_hz", std::int64_t{50}}}));
+  CHECK_FALSE(find_driver("fivedt")->expect({{"poll_hz", std::int64_t{-1}}}));
+  CHECK_FALSE(find_driver("fivedt")->expect({{"kit_port", std::string("c")}}));
 }
 
 }  // namespace posed::drivers

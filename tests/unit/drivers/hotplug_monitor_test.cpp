@@ -24,29 +24,29 @@ TEST_CASE("a node that appears, or becomes accessible, is reported once") {
   const test::TempFolder dev;
   HotplugMonitor arrivals(dev.path());
   REQUIRE(arrivals.poll_fd() >= 0);
-  CHECK_FALSE(arrivals.take());
+  CHECK_FALSE(arrivals.consume());
   make_node(dev.path() / "ttyACM0");
   CHECK(readable(arrivals));
-  CHECK(arrivals.take());
+  CHECK(arrivals.consume());
   CHECK_FALSE(readable(arrivals));
-  CHECK_FALSE(arrivals.take());
+  CHECK_FALSE(arrivals.consume());
   std::filesystem::permissions(dev.path() / "ttyACM0", std::filesystem::perms::owner_read);
-  CHECK(arrivals.take());
+  CHECK(arrivals.consume());
   std::filesystem::remove(dev.path() / "ttyACM0");
-  CHECK_FALSE(arrivals.take());
+  CHECK_FALSE(arrivals.consume());
 }
 
 TEST_CASE("a USB bus that appears later is watched, too") {
   const test::TempFolder dev;
   HotplugMonitor arrivals(dev.path());
   std::filesystem::create_directory(dev.path() / "bus");
-  CHECK(arrivals.take());
+  CHECK(arrivals.consume());
   std::filesystem::create_directories(dev.path() / "bus/usb");
-  CHECK(arrivals.take());
+  CHECK(arrivals.consume());
   std::filesystem::create_directory(dev.path() / "bus/usb/001");
-  CHECK(arrivals.take());
+  CHECK(arrivals.consume());
   make_node(dev.path() / "bus/usb/001/004");
-  CHECK(arrivals.take());
+  CHECK(arrivals.consume());
 }
 
 }  // namespace posed::drivers

@@ -1,5 +1,5 @@
 // The latency timer of a USB serial adapter, in a folder that stands for /sys.
-#include "drivers/transport/latency_timer.hpp"
+#include "drivers/transport/node.hpp"
 
 #include <catch2/catch.hpp>
 

@@ -9,10 +9,10 @@
 #include <cmath>
 #include <numbers>
 
+#include "drivers/driver.hpp"
 #include "drivers/glove/traits.hpp"
 #include "drivers/lucidgloves/decoder.hpp"
 #include "drivers/lucidgloves/emulator.hpp"
-#include "drivers/lucidgloves/lucidgloves.hpp"
 #include "drivers/transport/transport_factory.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "tests/support/free_port.hpp"
@@ -44,7 +44,7 @@ void feed(Decoder& decoder, std::string_view text, Sink& sink) {
 }
 
 std::string haptics_text(const Options& options, const glove::Haptics& haptics) {
-  const auto bytes = lucidgloves_driver().glove->encode_haptics(options, haptics);
+  const auto bytes = find_driver("lucidgloves")->glove->encode_haptics(options, haptics);
   if (!bytes) return "refused: " + bytes.error().message;
   return {reinterpret_cast<const char*>(bytes->data()), bytes->size()};
 }
@@ -135,7 +135,7 @@ TEST_CASE("lines that no glove sends are classified") {
 }
 
 TEST_CASE("a finger's curl replaces joints and splay that the glove lacks") {
-  const auto decoder = decoder_of(lucidgloves_driver());
+  const auto decoder = decoder_of(*find_driver("lucidgloves"));
   CollectSink sink;
   feed(*decoder, "A0B4095C0D0E0(CAC)4095\r\n\r\n", sink);
   REQUIRE(sink.frames.size() == 1);
@@ -147,7 +147,7 @@ TEST_CASE("a finger's curl replaces joints and splay that the glove lacks") {
   CHECK(angles[2 * kFingerChannels] == Approx(0.0).margin(1e-6));
   CHECK(angles[2 * kFingerChannels + 3] == Approx(right_angle / 90.0 * 100.0));
   CHECK(sink.frames[0].valid.count() == kHandSkeletonJoints);
-  const auto layout = lucidgloves_driver().expect({})->samples;
+  const auto layout = find_driver("lucidgloves")->expect({})->samples;
   const auto place = [&](const std::string& name) {
     return static_cast<std::size_t>(std::ranges::find(layout.names, name) - layout.names.begin());
   };
@@ -160,7 +160,7 @@ TEST_CASE("a finger's curl replaces joints and splay that the glove lacks") {
 }
 
 TEST_CASE("a line that lacks a known finger is damaged, until the finger stays absent") {
-  const auto decoder = decoder_of(lucidgloves_driver());
+  const auto decoder = decoder_of(*find_driver("lucidgloves"));
   CollectSink sink;
   feed(*decoder, "A1B2C3D4E5\n", sink);
   for (int i = 0; i < 7; ++i) feed(*decoder, "A1B2D4E5\n", sink);
@@ -172,7 +172,7 @@ TEST_CASE("a line that lacks a known finger is damaged, until the finger stays a
 }
 
 TEST_CASE("a line longer than any glove's is discarded once, and its end is not read as a line") {
-  const auto decoder = decoder_of(lucidgloves_driver());
+  const auto decoder = decoder_of(*find_driver("lucidgloves"));
   CollectSink sink;
   feed(*decoder, std::string(1000, 'A') + "A1B2C3D4E5\nA1B2C3D4E5\n", sink);
   CHECK(sink.count(Outcome::kForeign) == 1);
@@ -184,7 +184,7 @@ TEST_CASE("an emulated LucidGlove's pose comes back within half a count") {
     if (fixture.driver != "lucidgloves") continue;
     INFO(fixture.name);
     const bool joints = fixture.name == "lucidgloves-alpha";
-    const auto decoder = decoder_of(lucidgloves_driver(), fixture.options);
+    const auto decoder = decoder_of(*find_driver("lucidgloves"), fixture.options);
     CollectSink sink;
     for (const auto& [due_ns, bytes] : test::emulated_chunks(fixture, 1)) {
       decoder->feed(bytes, due_ns, sink);
@@ -235,8 +235,8 @@ TEST_CASE("a LucidGlove on a port is opened, read and identified by hand and ran
   const test::ServedEmulator served(glove);
   TransportFactory ports;
   const auto open = [&](const std::string& hand, std::int64_t max) {
-    return lucidgloves_driver().open(
-        {{"port", served.port()}, {"hand", hand}, {"max_analog_value", max}}, ports);
+    return find_driver("lucidgloves")
+        ->open({{"port", served.port()}, {"hand", hand}, {"max_analog_value", max}}, ports);
   };
   {
     auto device = open("left", 4095);
@@ -263,10 +263,10 @@ TEST_CASE("a LucidGlove that connects over TCP is read, its empty lines left out
                         {"listen", "127.0.0.1:" + std::to_string(port)}};
   TransportFactory ports;
   // no glove has connected yet; it continues to listen
-  CHECK_FALSE(lucidgloves_driver().open(options, ports));
+  CHECK_FALSE(find_driver("lucidgloves")->open(options, ports));
   const NetworkGlove glove(port);
   glove.say("A1B2C3D4E5\n\r\nZ(ZV)5(ZG)0(ZH)1\n\r\n");
-  auto device = lucidgloves_driver().open(options, ports);
+  auto device = find_driver("lucidgloves")->open(options, ports);
   if (!device) FAIL(device.error().text());
   CHECK(glove.heard() == "(ZA)Z\n");
   CollectSink sink;
@@ -286,13 +286,14 @@ TEST_CASE("a LucidGlove that connects over TCP is read, its empty lines left out
 TEST_CASE("a port with another device on it is refused with what to check") {
   test::PseudoTerminal port;
   TransportFactory ports;
-  const auto device = lucidgloves_driver().open({{"port", port.port()}}, ports);
+  const auto device = find_driver("lucidgloves")->open({{"port", port.port()}}, ports);
   REQUIRE_FALSE(device);
   CHECK(device.error().message.find("sends nothing") != std::string::npos);
   LucidEmulator glove(Side::kRight, Encoding::kAlpha, 4095);
   const test::ServedEmulator served(glove);
-  const auto coarse = lucidgloves_driver().open(
-      {{"port", served.port()}, {"max_analog_value", std::int64_t{1023}}}, ports);
+  const auto coarse =
+      find_driver("lucidgloves")
+          ->open({{"port", served.port()}, {"max_analog_value", std::int64_t{1023}}}, ports);
   REQUIRE_FALSE(coarse);
   CHECK(coarse.error().message.find("4095") != std::string::npos);
 }

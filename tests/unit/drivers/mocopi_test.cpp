@@ -5,8 +5,8 @@
 #include <fstream>
 #include <random>
 
+#include "drivers/driver.hpp"
 #include "drivers/mocopi/emulator.hpp"
-#include "drivers/mocopi/mocopi.hpp"
 #include "drivers/mocopi/protocol.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/allocations.hpp"
@@ -24,7 +24,7 @@ using Bytes = std::vector<std::byte>;
 using Layout = std::unique_ptr<const SourceLayout>;
 
 std::unique_ptr<Decoder> new_decoder() {
-  const Driver& driver = mocopi_driver();
+  const Driver& driver = *find_driver("mocopi");
   return driver.make_decoder(driver.expect({}).value()).value();
 }
 
@@ -35,7 +35,7 @@ Bytes content_of(const Bytes& datagram) {
 }
 
 Result<Layout> layout_of(const std::vector<BoneEntry>& bones) {
-  return mocopi_driver().make_layout(content_of(mocopi::encode_skeleton(bones)));
+  return find_driver("mocopi")->make_layout(content_of(mocopi::encode_skeleton(bones)));
 }
 
 // A root and a bone on it, which stands in the list before it.
@@ -127,7 +127,7 @@ TEST_CASE("a wrong skeleton of mocopi is refused with a sentence that names the 
   refused(bones, "too many");
   const Bytes whole = content_of(mocopi::encode_skeleton(two_bones()));
   for (std::size_t size = 0; size < whole.size(); ++size) {
-    const auto layout = mocopi_driver().make_layout(std::span(whole).first(size));
+    const auto layout = find_driver("mocopi")->make_layout(std::span(whole).first(size));
     if (layout) CHECK(size > whole.size());
   }
 }
@@ -138,7 +138,7 @@ TEST_CASE("what the mocopi emulator sends is decoded, also when posed") {
   CollectSink sink;
   decoder->feed(next(emulator), 0, sink);
   REQUIRE(sink.descriptions == 1);
-  const auto layout = mocopi_driver().make_layout(sink.described).value();
+  const auto layout = find_driver("mocopi")->make_layout(sink.described).value();
   decoder->feed(next(emulator), 0, sink);
   CHECK(sink.count(Outcome::kForeign) == 1);
   decoder->use(*layout);
@@ -206,7 +206,7 @@ TEST_CASE("any bytes for mocopi's decoder: no allocation, sound frames") {
   std::mt19937 random(29);
   MocopiEmulator emulator(60.0);
   const Bytes skeleton = next(emulator), frame = next(emulator);
-  const auto layout = mocopi_driver().make_layout(content_of(skeleton)).value();
+  const auto layout = find_driver("mocopi")->make_layout(content_of(skeleton)).value();
   const auto decoder = new_decoder();
   decoder->use(*layout);
   CollectSink sink;
@@ -225,7 +225,7 @@ TEST_CASE("any bytes for mocopi's decoder: no allocation, sound frames") {
   for (const Frame& one : sink.frames) sound = sound && test::is_sound(one);
   CHECK(sound);
   for (const Bytes& bytes : bad) {
-    const auto other = mocopi_driver().make_layout(bytes);
+    const auto other = find_driver("mocopi")->make_layout(bytes);
     if (!other) CHECK_FALSE(other.error().message.empty());
   }
 }
@@ -260,7 +260,7 @@ TEST_CASE("write the log of the emulated mocopi", "[.write-logs]") {
 }
 
 TEST_CASE("wrong options of mocopi are refused at once") {
-  const Driver& driver = mocopi_driver();
+  const Driver& driver = *find_driver("mocopi");
   for (const Options& options :
        {Options{{"listen", std::string("0.0.0.0:12351")}}, Options{{"rate_hz", 0.0}}}) {
     const auto expected = driver.expect(options);

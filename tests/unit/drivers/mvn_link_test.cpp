@@ -186,7 +186,7 @@ TEST_CASE("mvn: learning and describing characters does not allocate") {
 }
 
 TEST_CASE("mvn: wrong options are refused at once") {
-  const Driver& driver = mvn_driver();
+  const Driver& driver = *find_driver("mvn");
   const std::vector<std::pair<Options, std::string>> wrong{
       {{{"listen", std::string("nonsense")}}, "an address and a port"},
       {{{"link", std::string("pigeon")}}, "link"},

@@ -7,10 +7,10 @@
 #include <memory>
 #include <vector>
 
+#include "drivers/driver.hpp"
 #include "drivers/mvn/decoder.hpp"
 #include "drivers/mvn/emulator.hpp"
 #include "drivers/mvn/encode.hpp"
-#include "drivers/mvn/mvn.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"

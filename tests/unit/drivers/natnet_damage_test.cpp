@@ -200,7 +200,7 @@ TEST_CASE("messages of NatNet that are not for posed, and frames before the bodi
 TEST_CASE("wrong descriptions of NatNet are refused with a sentence that names the fault") {
   const auto refused = [](const ModelDef& model, const std::string& word) {
     for (const Version version : {Version{2, 9}, Version{3, 0}, Version{4, 1}}) {
-      const auto layout = natnet_driver().make_layout(
+      const auto layout = find_driver("natnet")->make_layout(
           natnet::encode_description(model, version, {.version = version}));
       REQUIRE_FALSE(layout);
       INFO(layout.error().message);
@@ -239,7 +239,7 @@ TEST_CASE("wrong descriptions of NatNet are refused with a sentence that names t
   model.bodies.assign(65, model.bodies[1]);
   refused(model, "65 bodies");
   const auto damaged = [](const NatNetBytes& bytes) {
-    return !natnet_driver().make_layout(bytes).has_value();
+    return !find_driver("natnet")->make_layout(bytes).has_value();
   };
   for (const Version version : kDamaged) {
     const NatNetBytes whole =
@@ -256,7 +256,7 @@ TEST_CASE("wrong descriptions of NatNet are refused with a sentence that names t
 TEST_CASE("descriptions of NatNet are read in any version, told or not") {
   for (const Version version : {Version{2, 9}, Version{3, 0}, Version{4, 0}, Version{4, 1}}) {
     for (const Version said : {Version{}, version, Version{3, 0}}) {
-      const auto layout = natnet_driver().make_layout(
+      const auto layout = find_driver("natnet")->make_layout(
           natnet::encode_description(natnet::emulated_model(), version, {.version = said}));
       REQUIRE(layout);
       CHECK((*layout)->bodies.size() == 2);
@@ -267,8 +267,8 @@ TEST_CASE("descriptions of NatNet are read in any version, told or not") {
   ModelDef model = small_model();
   model.bodies[1].bones[0].name = "";
   model.bodies[0].name = "\xff";
-  const auto layout =
-      natnet_driver().make_layout(natnet::encode_description(model, {3, 0}, {.version = {3, 0}}));
+  const auto layout = find_driver("natnet")->make_layout(
+      natnet::encode_description(model, {3, 0}, {.version = {3, 0}}));
   REQUIRE(layout);
   CHECK((*layout)->bodies[0].name == "\\xff");
   CHECK((*layout)->bodies[1].name == "rigid body 2");
@@ -282,7 +282,7 @@ TEST_CASE("any description of NatNet is refused or becomes bodies") {
     for (int flips = 0; flips <= round % 4; ++flips) {
       bad[random() % bad.size()] = static_cast<std::byte>(random());
     }
-    const auto layout = natnet_driver().make_layout(bad);
+    const auto layout = find_driver("natnet")->make_layout(bad);
     if (!layout) CHECK_FALSE(layout.error().message.empty());
   }
 }

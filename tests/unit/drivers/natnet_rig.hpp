@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "drivers/driver.hpp"
 #include "drivers/natnet/encode.hpp"
 #include "drivers/natnet/layout.hpp"
-#include "drivers/natnet/natnet.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
 namespace posed::test {
@@ -20,7 +20,7 @@ using NatNetBytes = std::vector<std::byte>;
 
 struct NatNetRig {
   explicit NatNetRig(const drivers::Options& options = {}) {
-    const drivers::Driver& driver = drivers::natnet_driver();
+    const drivers::Driver& driver = *drivers::find_driver("natnet");
     auto description = driver.expect(options);
     if (!description) FAIL(description.error().text());
     decoder = driver.make_decoder(*description).value();
@@ -39,7 +39,7 @@ struct NatNetRig {
     return Outcome::kCount;
   }
   void use(std::span<const std::byte> description) {
-    auto layout = drivers::natnet_driver().make_layout(description);
+    auto layout = drivers::find_driver("natnet")->make_layout(description);
     if (!layout) FAIL(layout.error().text());
     layouts.push_back(std::move(*layout));
     decoder->use(*layouts.back());

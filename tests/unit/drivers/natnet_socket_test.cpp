@@ -30,10 +30,10 @@ struct NatNetLine {
       UdpTransport::open({.sockets = {{.listen = "127.0.0.1:0", .to = host.endpoint(1)}}}).value();
 
   Device opened() {
-    auto made = natnet_driver().open({{"server", server->endpoint(0)},
-                                      {"listen", std::string("127.0.0.1:0")},
-                                      {"unicast", true}},
-                                     ports);
+    auto made = find_driver("natnet")->open({{"server", server->endpoint(0)},
+                                             {"listen", std::string("127.0.0.1:0")},
+                                             {"unicast", true}},
+                                            ports);
     if (!made) FAIL(made.error().text());
     return std::move(*made);
   }
@@ -65,7 +65,7 @@ TEST_CASE("a NatNet server on this machine is asked who it is, and streams to th
     const Chunk chunk = received(line.host);
     CHECK(chunk.socket == 0);
     line.device.decoder->feed_socket(chunk.socket, chunk.bytes, now_ns, sink);
-    if (sink.descriptions > 0) layout = natnet_driver().make_layout(sink.described).value();
+    if (sink.descriptions > 0) layout = find_driver("natnet")->make_layout(sink.described).value();
   }
   REQUIRE(layout != nullptr);
   CHECK(layout->bodies[0].rate_hz == 120.0);
@@ -84,7 +84,7 @@ TEST_CASE("a NatNet server on this machine is asked who it is, and streams to th
 
 TEST_CASE("without options the NatNet driver joins OptiTrack's group on this machine") {
   TransportFactory ports;
-  const auto device = natnet_driver().open({{"listen", std::string("0.0.0.0:0")}}, ports);
+  const auto device = find_driver("natnet")->open({{"listen", std::string("0.0.0.0:0")}}, ports);
   if (!device) FAIL(device.error().text());
   CHECK(device->description.identity == "udp 127.0.0.1:1510");
 }

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <fstream>
 
+#include "drivers/natnet/decoder.hpp"
 #include "drivers/natnet/emulator.hpp"
 #include "drivers/natnet/figure.hpp"
-#include "drivers/natnet/requests.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
@@ -154,7 +154,8 @@ TEST_CASE("NatNet's axes and skeleton coordinates come out the same") {
     for (const std::string sent : {"local", "global"}) {
       for (const std::string read : {"auto", sent.c_str()}) {
         INFO(up << " up, " << sent << " read as " << read);
-        const auto emulator = natnet_driver().emulate({{"up", up}, {"coordinates", sent}}).value();
+        const auto emulator =
+            find_driver("natnet")->emulate({{"up", up}, {"coordinates", sent}}).value();
         NatNetRig rig({{"up", up}, {"coordinates", read}});
         check_round_trip(dynamic_cast<NatNetEmulator&>(*emulator), rig);
       }
@@ -360,7 +361,7 @@ TEST_CASE("late and repeated NatNet frames are dropped, and device time never go
 }
 
 TEST_CASE("wrong options of NatNet are refused at once") {
-  const Driver& driver = natnet_driver();
+  const Driver& driver = *find_driver("natnet");
   const std::vector<std::pair<Options, std::string>> wrong{
       {{{"server", std::string("motive")}}, "in numbers"},
       {{{"listen", std::string("nonsense")}}, "an address and a port"},
@@ -393,7 +394,7 @@ namespace {
 
 // A frame before the description, damage, a repeated datagram, and a body that leaves.
 std::string emulated_natnet_log() {
-  const auto description = natnet_driver().expect({}).value();
+  const auto description = find_driver("natnet")->expect({}).value();
   std::string text =
       "# Not a recording: made by posed's emulator of a NatNet server, with damage put in.\n"
       "driver natnet\nidentity " +

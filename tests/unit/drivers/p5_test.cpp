@@ -6,7 +6,6 @@
 #include <fstream>
 
 #include "drivers/p5/decoder.hpp"
-#include "drivers/p5/device_info.hpp"
 #include "drivers/p5/emulator.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
@@ -106,7 +105,7 @@ TEST_CASE("three consistent LEDs give the hand's position and rotation, two or f
 }
 
 TEST_CASE("an emulated P5 with its feature reports gives the position of its hand") {
-  p5::GloveSettings glove;
+  p5::Settings glove;
   const auto keep = [](const auto& bytes) { return Bytes(bytes.begin(), bytes.end()); };
   glove.firmware = keep(p5::emulated_firmware());
   glove.heads = keep(p5::emulated_heads());
@@ -141,10 +140,10 @@ TEST_CASE("an emulated P5 with its feature reports gives the position of its han
 }
 
 TEST_CASE("a P5's device info with a damaged feature report is refused") {
-  CHECK(p5::read_device_info("p5 hand=right firmware=090403 heads=none leds=none", "x"));
-  CHECK_FALSE(p5::read_device_info("p5 hand=right firmware=080403 heads=none leds=none", "x"));
-  CHECK_FALSE(p5::read_device_info("p5 hand=right firmware=0904 heads=none leds=none", "x"));
-  CHECK_FALSE(p5::read_device_info("p5 hand=right firmware=09xx03 heads=none leds=none", "x"));
+  CHECK(p5::parse_device_info("p5 hand=right firmware=090403 heads=none leds=none", "x"));
+  CHECK_FALSE(p5::parse_device_info("p5 hand=right firmware=080403 heads=none leds=none", "x"));
+  CHECK_FALSE(p5::parse_device_info("p5 hand=right firmware=0904 heads=none leds=none", "x"));
+  CHECK_FALSE(p5::parse_device_info("p5 hand=right firmware=09xx03 heads=none leds=none", "x"));
 }
 
 TEST_CASE("a real P5's feature reports give a camera rig of plausible size") {
@@ -152,11 +151,11 @@ TEST_CASE("a real P5's feature reports give a camera rig of plausible size") {
   if (!dump) {
     SKIP_WITHOUT_SHARED();
   }
-  p5::GloveSettings glove;
+  p5::Settings glove;
   glove.firmware = dumped(*dump, "9", p5::kFirmwareBytes);
   glove.heads = dumped(*dump, "6", p5::kHeadsBytes);
   glove.leds = dumped(*dump, "c", p5::kLedsBytes);
-  const auto again = p5::read_device_info(p5::device_info_of(glove), "x");
+  const auto again = p5::parse_device_info(p5::device_info_of(glove), "x");
   if (!again) FAIL(again.error().text());
   CHECK(glove.firmware == bytes_of_hex("09 04 03"));
   const auto rig = again->rig();

@@ -12,9 +12,9 @@
 
 #include <google/protobuf/stubs/logging.h>
 
-#include "drivers/posed/emulator.hpp"
-#include "drivers/posed/posed.hpp"
-#include "drivers/posed/protocol.hpp"
+#include "drivers/chain/emulator.hpp"
+#include "drivers/chain/protocol.hpp"
+#include "drivers/driver.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/message/frame_message.hpp"
@@ -43,7 +43,7 @@ struct ChainRig {
   CollectSink sink;
 
   ChainRig() {
-    const Driver& driver = posed_driver();
+    const Driver& driver = *find_driver("posed");
     decoder = driver.make_decoder(driver.expect({}).value()).value();
   }
   void describe() {
@@ -51,7 +51,7 @@ struct ChainRig {
     decoder->feed(join_message(std::string("skeleton/") + kStream, message.SerializeAsString()), 0,
                   sink);
     REQUIRE_FALSE(sink.described.empty());
-    layout = posed_driver().make_layout(sink.described).value();
+    layout = find_driver("posed")->make_layout(sink.described).value();
     decoder->use(*layout);
   }
   [[nodiscard]] Frame frame(std::uint64_t sequence) const {
@@ -331,7 +331,7 @@ TEST_CASE("whatever the bytes are, the reader accepts nothing that protobuf refu
 }
 
 TEST_CASE("wrong options of posed are refused at once") {
-  const Driver& driver = posed_driver();
+  const Driver& driver = *find_driver("posed");
   for (const Options& options :
        {Options{{"connect", std::string("192.168.1.5:5570")}},
         Options{{"stream", std::string("Ann")}}, Options{{"stream", std::string()}},
@@ -353,12 +353,13 @@ TEST_CASE("wrong options of posed are refused at once") {
 }
 
 TEST_CASE("descriptions that are none are refused") {
-  CHECK_FALSE(posed_driver().make_layout(std::as_bytes(std::span(std::string_view("\xFF\xFF")))));
-  CHECK_FALSE(posed_driver().make_layout({}));
+  CHECK_FALSE(
+      find_driver("posed")->make_layout(std::as_bytes(std::span(std::string_view("\xFF\xFF")))));
+  CHECK_FALSE(find_driver("posed")->make_layout({}));
   v1::Skeleton message = message::skeleton_message("ann", hand_skeleton(Side::kLeft), 60.0);
   message.set_stream("../ann");
   const std::string bytes = message.SerializeAsString();
-  CHECK_FALSE(posed_driver().make_layout(std::as_bytes(std::span(bytes))));
+  CHECK_FALSE(find_driver("posed")->make_layout(std::as_bytes(std::span(bytes))));
 }
 
 std::string emulated_posed_log() {

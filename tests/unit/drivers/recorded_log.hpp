@@ -2,12 +2,12 @@
 // (tests/golden/devices/NAME.log and NAME.chk).
 //
 //   # what was recorded, of which device, when, by whom
-//   driver template
+//   driver template_glove
 //   identity left index finger
-//   text BEND1 rate=100           a line of the description; repeated, they are joined by line ends
-//   at 1000000 hex a5 00 34       a chunk that came at this time [ns], as bytes
-//   at 2000000 line 0 0 0 90      the same as text, with its line end
-//   at 3000000 bodies 02 01 00    from here on the bodies of this description are used, as bytes
+//   text template_glove hand=left  a line of the description; repeated, they are joined by line
+//   ends at 1000000 hex 47 20 31       a chunk that came at this time [ns], as bytes at 2000000
+//   line 0 0 0 90      the same as text, with its line end at 3000000 bodies 02 01 00    from here
+//   on the bodies of this description are used, as bytes
 #pragma once
 
 #include <cstdint>

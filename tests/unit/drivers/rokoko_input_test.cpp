@@ -7,12 +7,11 @@
 
 #include <nlohmann/json.hpp>
 
+#include "drivers/driver.hpp"
 #include "drivers/rokoko/decoder.hpp"
 #include "drivers/rokoko/emulator.hpp"
 #include "drivers/rokoko/json_reader.hpp"
 #include "drivers/rokoko/lz4_frame.hpp"
-#include "drivers/rokoko/rokoko.hpp"
-#include "drivers/rokoko/xxh32.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
@@ -246,13 +245,6 @@ TEST_CASE("LZ4 bombs and damaged frames are refused") {
   }
 }
 
-TEST_CASE("XXH32 gives the values of its specification's test vectors") {
-  CHECK(xxh32({}) == 0x02CC5D05);
-  CHECK(xxh32(bytes_of("a")) == 0x550D7456);
-  CHECK(xxh32(bytes_of("abc")) == 0x32D153FF);
-  CHECK(xxh32(bytes_of("Nobody inspects the spammish repetition")) == 0xE2293B2F);
-}
-
 TEST_CASE("any bytes for Studio's decoder: one outcome each, sound frames, no allocation") {
   std::mt19937 random(31);
   const std::string whole = plain_frame();
@@ -260,7 +252,7 @@ TEST_CASE("any bytes for Studio's decoder: one outcome each, sound frames, no al
   const auto decoder = std::make_unique<StudioDecoder>();
   CollectSink sink(10'000);
   decoder->feed(bytes_of(whole), 0, sink);
-  const auto layout = rokoko_driver().make_layout(sink.described).value();
+  const auto layout = find_driver("rokoko")->make_layout(sink.described).value();
   decoder->use(*layout);
   std::vector<Bytes> bad;
   for (int round = 0; round < 600; ++round) {
@@ -289,25 +281,25 @@ TEST_CASE("any description of Studio's bodies is refused or becomes bodies") {
   CollectSink sink;
   StudioDecoder().feed(bytes_of(plain_frame()), 0, sink);
   const Bytes good = sink.described;
-  REQUIRE(rokoko_driver().make_layout(good));
+  REQUIRE(find_driver("rokoko")->make_layout(good));
   for (std::size_t size = 0; size < good.size(); ++size) {
-    CHECK_FALSE(rokoko_driver().make_layout(std::span(good).first(size)));
+    CHECK_FALSE(find_driver("rokoko")->make_layout(std::span(good).first(size)));
   }
   Bytes longer = good;
   longer.push_back({});
-  CHECK_FALSE(rokoko_driver().make_layout(longer));
+  CHECK_FALSE(find_driver("rokoko")->make_layout(longer));
   for (int round = 0; round < 3000; ++round) {
     Bytes bad = good;
     for (int flips = 0; flips <= round % 4; ++flips) {
       bad[random() % (round % 2 == 0 ? 30 : bad.size())] = static_cast<std::byte>(random());
     }
-    const auto layout = rokoko_driver().make_layout(bad);
+    const auto layout = find_driver("rokoko")->make_layout(bad);
     if (!layout) CHECK_FALSE(layout.error().message.empty());
   }
 }
 
 TEST_CASE("wrong options of Rokoko Studio are refused at once") {
-  const Driver& driver = rokoko_driver();
+  const Driver& driver = *find_driver("rokoko");
   const std::vector<std::pair<Options, std::string>> wrong{
       {{{"listen", std::string("0.0.0.0:14043")}}, "peers"},
       {{{"version", std::string("1")}}, "2, 2.5 or 3"},

@@ -6,8 +6,8 @@
 #include <fstream>
 #include <sstream>
 
+#include "drivers/driver.hpp"
 #include "drivers/rokoko/emulator.hpp"
-#include "drivers/rokoko/rokoko.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
@@ -24,7 +24,7 @@ using Bytes = std::vector<std::byte>;
 using Layout = std::unique_ptr<const SourceLayout>;
 
 std::unique_ptr<Decoder> new_decoder() {
-  const Driver& driver = rokoko_driver();
+  const Driver& driver = *find_driver("rokoko");
   return driver.make_decoder(driver.expect({}).value()).value();
 }
 
@@ -36,7 +36,7 @@ struct Studio {
   CollectSink sink;
 
   void use(std::span<const std::byte> description) {
-    auto layout = rokoko_driver().make_layout(description);
+    auto layout = find_driver("rokoko")->make_layout(description);
     if (!layout) FAIL(layout.error().text());
     layouts.push_back(std::move(*layout));
     decoder->use(*layouts.back());

@@ -7,9 +7,9 @@
 #include <fstream>
 #include <random>
 
+#include "drivers/driver.hpp"
 #include "drivers/template_mocap/emulator.hpp"
 #include "drivers/template_mocap/protocol.hpp"
-#include "drivers/template_mocap/template_mocap.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
@@ -27,7 +27,7 @@ using Bytes = std::vector<std::byte>;
 using Layout = std::unique_ptr<const SourceLayout>;
 
 std::unique_ptr<Decoder> new_decoder() {
-  const Driver& driver = template_mocap_driver();
+  const Driver& driver = *find_driver("template_mocap");
   return driver.make_decoder(driver.expect({}).value()).value();
 }
 
@@ -40,7 +40,7 @@ std::vector<BodyEntry> two_bodies() {
 Bytes content_of(const Bytes& datagram) { return {datagram.begin() + 8, datagram.end() - 4}; }
 
 Result<Layout> layout_of(const std::vector<BodyEntry>& bodies) {
-  return template_mocap_driver().make_layout(content_of(mocap::encode_description(bodies)));
+  return find_driver("template_mocap")->make_layout(content_of(mocap::encode_description(bodies)));
 }
 
 BodyPose still(std::uint16_t id, std::size_t joints) {
@@ -79,7 +79,7 @@ struct Session {
     const int before = sink.descriptions;
     decoder->feed(next(emulator), 0, sink);
     if (sink.descriptions == before) return;
-    layouts.push_back(template_mocap_driver().make_layout(sink.described).value());
+    layouts.push_back(find_driver("template_mocap")->make_layout(sink.described).value());
     decoder->use(*layouts.back());
   }
 };
@@ -162,17 +162,17 @@ TEST_CASE("a wrong description is refused with a sentence that names the fault")
   refused(std::vector<BodyEntry>(kMaxBodies + 1, two_bodies()[0]), "65 bodies");
   const Bytes whole = content_of(mocap::encode_description(two_bodies()));
   for (std::size_t size = 0; size < whole.size(); ++size) {
-    CHECK_FALSE(template_mocap_driver().make_layout(std::span(whole).first(size)));
+    CHECK_FALSE(find_driver("template_mocap")->make_layout(std::span(whole).first(size)));
   }
   Bytes longer = whole;
   longer.push_back({});
-  CHECK_FALSE(template_mocap_driver().make_layout(longer));
+  CHECK_FALSE(find_driver("template_mocap")->make_layout(longer));
 }
 
 TEST_CASE("counts that promise more than there is cost no memory") {
   const Bytes greedy{std::byte{64}, std::byte{1},   std::byte{0},
                      std::byte{1},  std::byte{'a'}, std::byte{96}};
-  const auto layout = template_mocap_driver().make_layout(greedy);
+  const auto layout = find_driver("template_mocap")->make_layout(greedy);
   REQUIRE_FALSE(layout);
   CHECK(layout.error().message.find("ends too early") != std::string::npos);
 }
@@ -326,7 +326,7 @@ TEST_CASE("any description is refused or becomes bodies, and decoding it does no
     for (int flips = 0; flips <= round % 4; ++flips) {
       bad[random() % bad.size()] = static_cast<std::byte>(random());
     }
-    const auto layout = template_mocap_driver().make_layout(bad);
+    const auto layout = find_driver("template_mocap")->make_layout(bad);
     if (!layout) CHECK_FALSE(layout.error().message.empty());
   }
   const std::uint64_t before = test::allocations();
@@ -336,7 +336,7 @@ TEST_CASE("any description is refused or becomes bodies, and decoding it does no
 }
 
 TEST_CASE("wrong options of the mocap system are refused at once") {
-  const Driver& driver = template_mocap_driver();
+  const Driver& driver = *find_driver("template_mocap");
   const std::vector<std::pair<Options, std::string>> wrong{
       {{{"listen", std::string("nonsense")}}, "an address and a port"},
       {{{"listen", std::string("0.0.0.0:7400")}}, "peers"},

@@ -118,9 +118,9 @@ TEST_CASE("a damaged description of a VMC performer is refused with a sentence")
   described.value_count = 1;
   std::array<std::byte, vmc::kMaxDescribed> room{};
   const Bytes good = test::bytes_of(vmc::write_description(described, room));
-  REQUIRE(vmc_driver().make_layout(good));
+  REQUIRE(find_driver("vmc")->make_layout(good));
   const auto refused = [](const Bytes& bytes) {
-    const auto layout = vmc_driver().make_layout(bytes);
+    const auto layout = find_driver("vmc")->make_layout(bytes);
     if (layout) return false;
     CHECK_FALSE(layout.error().message.empty());
     return layout.error().message.find('\n') == std::string::npos;
@@ -149,7 +149,7 @@ TEST_CASE("a damaged description of a VMC performer is refused with a sentence")
     for (int flips = 0; flips <= round % 4; ++flips) {
       bad[random() % bad.size()] = static_cast<std::byte>(random());
     }
-    const auto layout = vmc_driver().make_layout(bad);
+    const auto layout = find_driver("vmc")->make_layout(bad);
     if (layout && !(*layout)->bodies.empty()) CHECK((*layout)->bodies.size() == 1);
   }
 }

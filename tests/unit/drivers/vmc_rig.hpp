@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "drivers/byte_writer.hpp"
+#include "drivers/driver.hpp"
 #include "drivers/vmc/emulator.hpp"
 #include "drivers/vmc/messages.hpp"
-#include "drivers/vmc/vmc.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
 namespace posed::test {
@@ -72,7 +72,9 @@ inline std::vector<Bytes> vmc_burst(drivers::vmc::VmcEmulator& emulator) {
 // Feeds datagrams; uses a description at once, as the daemon does a little later.
 struct VmcSession {
   std::unique_ptr<drivers::Decoder> decoder =
-      drivers::vmc_driver().make_decoder(drivers::vmc_driver().expect({}).value()).value();
+      drivers::find_driver("vmc")
+          ->make_decoder(drivers::find_driver("vmc")->expect({}).value())
+          .value();
   std::vector<std::unique_ptr<const drivers::SourceLayout>> layouts;
   CollectSink sink;
 
@@ -80,7 +82,7 @@ struct VmcSession {
     const int before = sink.descriptions;
     decoder->feed(datagram, arrival_ns, sink);
     if (sink.descriptions == before) return;
-    layouts.push_back(drivers::vmc_driver().make_layout(sink.described).value());
+    layouts.push_back(drivers::find_driver("vmc")->make_layout(sink.described).value());
     decoder->use(*layouts.back());
   }
   // One after the other, in steps of 50 us.

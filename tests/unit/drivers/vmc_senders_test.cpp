@@ -214,25 +214,25 @@ TEST_CASE("the same VMC datagrams at the same times give the same frames") {
 TEST_CASE("VMC times order the datagrams and are the device time while they are fine enough") {
   vmc::SenderClock clock;
   CHECK(clock.device_ns() == kNoTime_ns);
-  CHECK(clock.take(10.0F) == Outcome::kOk);
-  CHECK(clock.take(10.5F) == Outcome::kOk);
+  CHECK(clock.accept(10.0F) == Outcome::kOk);
+  CHECK(clock.accept(10.5F) == Outcome::kOk);
   CHECK(clock.device_ns() == 500'000'000);
-  CHECK(clock.take(10.5F) == Outcome::kOk);
-  CHECK(clock.take(10.45F) == Outcome::kLate);
-  CHECK(clock.take(-1.0F) == Outcome::kOutOfRange);
-  CHECK(clock.take(std::nanf("")) == Outcome::kOutOfRange);
+  CHECK(clock.accept(10.5F) == Outcome::kOk);
+  CHECK(clock.accept(10.45F) == Outcome::kLate);
+  CHECK(clock.accept(-1.0F) == Outcome::kOutOfRange);
+  CHECK(clock.accept(std::nanf("")) == Outcome::kOutOfRange);
   CHECK(clock.device_ns() == 500'000'000);
-  CHECK(clock.take(0.0F) == Outcome::kOk);  // started again
-  CHECK(clock.take(1.0F) == Outcome::kOk);
+  CHECK(clock.accept(0.0F) == Outcome::kOk);  // started again
+  CHECK(clock.accept(1.0F) == Outcome::kOk);
   CHECK(clock.device_ns() == 1'500'000'000);
   int late = 0;
-  while (clock.take(0.95F) == Outcome::kLate) ++late;  // gone back for good
+  while (clock.accept(0.95F) == Outcome::kLate) ++late;  // gone back for good
   CHECK(late == 7);
-  CHECK(clock.take(1.7e9F) == Outcome::kOk);  // one damaged value
+  CHECK(clock.accept(1.7e9F) == Outcome::kOk);  // one damaged value
   CHECK(clock.device_ns() == 1'500'000'000);
-  for (int i = 0; i < 8; ++i) CHECK(clock.take(1.7e9F) == Outcome::kOk);
+  for (int i = 0; i < 8; ++i) CHECK(clock.accept(1.7e9F) == Outcome::kOk);
   CHECK(clock.device_ns() == kNoTime_ns);
-  CHECK(clock.take(3.0F) == Outcome::kOk);
+  CHECK(clock.accept(3.0F) == Outcome::kOk);
   CHECK(clock.device_ns() == 1'500'000'000);
 }
 

@@ -288,7 +288,7 @@ TEST_CASE("a VMC frame that another overtook is late") {
 }
 
 TEST_CASE("wrong options of the VMC driver are refused at once") {
-  const Driver& driver = vmc_driver();
+  const Driver& driver = *find_driver("vmc");
   const std::vector<std::pair<Options, std::string>> wrong{
       {{{"listen", std::string("nonsense")}}, "an address and a port"},
       {{{"listen", std::string("0.0.0.0:39539")}}, "peers"},

@@ -38,8 +38,7 @@ class BodyRun final : private pipeline::IntakeOut {
       : writer_(log::Writer::create(path, {}, false).value()),
         driver_(*drivers::find_driver("template_mocap")),
         intake_(next_item_, *this) {
-    const drivers::Description device =
-        driver_.describe(drivers::mocap::device_info_text(100.0), "udp").value();
+    const drivers::Description device = driver_.describe("template_mocap rate=100", "udp").value();
     decoder_ = driver_.make_decoder(device).value();
     REQUIRE(writer_.add(log::SourceRow{kSource, "room", device.driver, device.text, "udp", "{}"}));
   }

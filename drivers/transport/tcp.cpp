@@ -1,0 +1,126 @@
+// Accepts devices that connect over TCP, and connects to systems that serve their data over TCP.
+// TCP is not encrypted here, so without a list of peers posed listens on loopback only.
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <optional>
+
+#include "drivers/transport/address.hpp"
+#include "drivers/transport/socket.hpp"
+#include "drivers/transport/transport_factory.hpp"
+
+namespace posed::drivers {
+
+namespace {
+
+constexpr int kPatience_ms = 500;
+constexpr int kBacklog = 8;
+// Connections per call: an untrusted client may open them without end.
+constexpr int kMaxAtOnce = 64;
+
+Result<Address> address_of(const ListenSettings& settings) {
+  return listen_address(settings.endpoint, settings.peers,
+                        "the " + std::string(settings.device) + "s'");
+}
+
+// Meanwhile the device waits in the listener's queue and is accepted once a descriptor is free.
+std::unexpected<Error> no_descriptor(const ListenSettings& settings) {
+  return fail("a " + std::string(settings.device) + " has connected to " + settings.endpoint +
+              ", but posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
+}
+
+}  // namespace
+
+Result<> check_listen(const ListenSettings& settings) {
+  if (const auto address = address_of(settings); !address) return std::unexpected(address.error());
+  return {};
+}
+
+Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
+  auto listener = listeners_.find(settings.endpoint);
+  if (listener == listeners_.end()) {
+    const auto address = address_of(settings);
+    if (!address) return std::unexpected(address.error());
+    const auto fd = listen_on(*address, settings.endpoint, kBacklog);
+    if (!fd) return std::unexpected(fd.error());
+    listener = listeners_.emplace(settings.endpoint, *fd).first;
+  }
+  if (only_prepare_) return not_opened();
+  std::array<pollfd, 2> wanted{{{.fd = listener->second, .events = POLLIN, .revents = 0},
+                                {.fd = cancel_->fd(), .events = POLLIN, .revents = 0}}};
+  ::poll(wanted.data(), wanted.size(), kPatience_ms);
+  if (cancel_->fired()) return Cancel::error();
+  // If several are waiting, the newest is used: a device that restarts leaves its old connection
+  // behind.
+  std::optional<Connection> newest;
+  for (int i = 0; i < kMaxAtOnce; ++i) {
+    Address peer;
+    const int fd =
+        ::accept4(listener->second, peer.get(), &peer.size, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    if (fd < 0 && (errno == EINTR || errno == ECONNABORTED)) continue;
+    if (fd < 0 && (errno == EMFILE || errno == ENFILE) && !newest) return no_descriptor(settings);
+    if (fd < 0) break;
+    const std::string host = host_text(peer);
+    Connection link(fd, settings.endpoint + " from " + host, "tcp " + host);
+    link.heed(cancel_);
+    if (!may_connect(peer, settings.peers)) {
+      ++refused_;
+      continue;
+    }
+    keep_alive(fd);
+    newest = std::move(link);
+  }
+  if (newest) return std::move(*newest);
+  return fail("no " + std::string(settings.device) + " has connected to " + settings.endpoint +
+              " yet; give it this machine's address and switch it on");
+}
+
+namespace {
+
+// The supervisor tries again; meanwhile a stop must not wait long.
+constexpr int kConnectPatience_ms = 1000;
+
+std::unexpected<Error> nothing_there(const std::string& endpoint, const std::string& why) {
+  return fail("nothing answers at " + endpoint + " (" + why +
+              "); start the streaming there, and check address, port and firewall");
+}
+
+}  // namespace
+
+Result<> check_connect(const std::string& endpoint) {
+  if (const auto address = parse_endpoint(endpoint); !address) {
+    return std::unexpected(address.error());
+  }
+  return {};
+}
+
+Result<Connection> TransportFactory::connect(const std::string& endpoint) {
+  const auto address = parse_endpoint(endpoint);
+  if (!address) return std::unexpected(address.error());
+  if (only_prepare_) return not_opened();
+  const int fd = open_socket(*address, SOCK_STREAM);
+  if (fd < 0) {
+    return fail("posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
+  }
+  Connection link(fd, endpoint, "tcp " + endpoint);
+  link.heed(cancel_);
+  if (::connect(fd, address->get(), address->size) != 0) {
+    if (errno != EINPROGRESS) return nothing_there(endpoint, errno_text());
+    std::array<pollfd, 2> wanted{{{.fd = fd, .events = POLLOUT, .revents = 0},
+                                  {.fd = cancel_->fd(), .events = POLLIN, .revents = 0}}};
+    ::poll(wanted.data(), wanted.size(), kConnectPatience_ms);
+    if (cancel_->fired()) return Cancel::error();
+    if (wanted[0].revents == 0) return nothing_there(endpoint, "no reply");
+    int error = 0;
+    socklen_t size = sizeof error;
+    ::getsockopt(fd, SOL_SOCKET, SO_ERROR, &error, &size);
+    if (error != 0) return nothing_there(endpoint, errno_text(error));
+  }
+  keep_alive(fd);
+  return link;
+}
+
+}  // namespace posed::drivers
