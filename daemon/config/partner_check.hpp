@@ -6,8 +6,8 @@
 
 namespace posed::config {
 
-// Adds an error for each partner that does not exist, is the stream itself or the body of a source,
-// or has partners itself. Call when all streams and sources are read.
+// Adds an error for each partner that cannot exist, is the stream itself, or needs the stream as a
+// partner, directly or by other streams. Call when all streams and sources are read.
 void check_partners(const DaemonConfig& config, Findings& findings);
 
 }  // namespace posed::config

@@ -12,7 +12,8 @@
 #include "daemon/config/config.hpp"
 #include "daemon/config/take_tables.hpp"
 #include "daemon/devices/about_stream.hpp"
-#include "daemon/devices/open_stream.hpp"
+#include "daemon/devices/open_source.hpp"
+#include "daemon/devices/stream_stages.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 
@@ -40,20 +41,26 @@ ordered_json summary_of(const pipeline::StageSettings& stage) {
   return summary;
 }
 
-// A description of what stream number `number` would run, made with its device opened and its model
-// bound. Streams after it may have it as a partner.
-Result<ordered_json> try_stream(const config::StreamConfig& config, std::size_t number,
+// A description of what the stream would run, made with its device opened and its model bound.
+// Streams after it may have it as a partner.
+Result<ordered_json> try_stream(const config::StreamConfig& config,
                                 pipeline::PartnerStreams& partners) {
-  const auto stream = devices::open_stream(config, partners);
-  if (!stream) return std::unexpected(stream.error());
-  devices::add_partner(partners, number, **stream);
-  const auto missing = devices::try_kept_device(*(*stream)->source);
+  devices::ModelFiles files;
+  const auto source = devices::open_source(config::source_of(config), files);
+  if (!source) return std::unexpected(source.error());
+  const drivers::Body body = devices::only_body(**source);
+  auto stages = devices::load_stages(config, body.skeleton, body.rate_hz, files, partners);
+  if (!stages) return devices::of_stream(config.name, stages.error());
+  partners[config.name] = {
+      .stream = static_cast<std::uint32_t>(partners.size()),
+      .about = {.skeleton = stages->published, .rate_hz = stages->settings.rate_hz}};
+  const auto missing = devices::try_kept_device(**source);
   if (!missing) return devices::of_stream(config.name, missing.error());
-  const auto bound = devices::bind_stages((*stream)->stages);
+  const auto bound = devices::bind_stages(*stages);
   if (!bound) return devices::of_stream(config.name, bound.error());
-  const auto engine = devices::make_engine(0, (*stream)->stages, *bound);
+  const auto engine = devices::make_engine(0, *stages, *bound);
   if (!engine) return devices::of_stream(config.name, engine.error());
-  const drivers::Description& device = (*stream)->source->device.description;
+  const drivers::Description& device = (*source)->device.description;
   ordered_json summary{{"name", config.name},
                        {"driver", config.driver},
                        {"device", device.identity},
@@ -63,11 +70,11 @@ Result<ordered_json> try_stream(const config::StreamConfig& config, std::size_t 
                        {"publish_raw", config.publish_raw},
                        {"stale_after_s", config.stale_after_s}};
   summary["stages"] = ordered_json::array();
-  for (const pipeline::StageSettings& stage : (*stream)->stages.settings.stages) {
+  for (const pipeline::StageSettings& stage : stages->settings.stages) {
     summary["stages"].push_back(summary_of(stage));
   }
   summary["present"] = missing->empty();
-  summary["warnings"] = (*stream)->source->device.warnings;
+  summary["warnings"] = (*source)->device.warnings;
   if (!missing->empty()) {
     summary["warnings"].push_back("the device is not here now, and `posed run` waits for it (" +
                                   *missing + ")");
@@ -207,8 +214,10 @@ int check(const CheckOptions& options) {
     const auto& configs = reading.config.streams;
     std::vector<ordered_json> tried(configs.size());
     pipeline::PartnerStreams partners;
-    for (const std::size_t i : devices::opening_order(configs)) {
-      auto summary = try_stream(configs[i], i, partners);
+    std::vector<const config::StreamConfig*> streams_of_devices;
+    for (const config::StreamConfig& stream : configs) streams_of_devices.push_back(&stream);
+    for (const std::size_t i : devices::building_order(streams_of_devices)) {
+      auto summary = try_stream(configs[i], partners);
       if (summary) tried[i] = std::move(*summary);
       if (!summary) reading.errors.push_back(summary.error());
     }

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <iterator>
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -56,13 +57,16 @@ bool reload(assembly::Daemon& daemon, const std::string& path, service::Service&
   return true;
 }
 
+bool has_several(const std::unique_ptr<devices::OpenSource>& source) {
+  return source->has_several();
+}
+
 // For `systemctl status`. It asks no thread, because that one may be stuck.
 std::string status_of(const assembly::Daemon& daemon) {
-  const auto live = std::ranges::count_if(daemon.streams(), [](const auto& stream) {
-    return stream->counters.pipeline.state.load() == pipeline::StreamState::kLive;
-  });
-  return fmt::format("{} of {} streams live, {} sources of several bodies; poses at {}", live,
-                     daemon.streams().size(), daemon.sources().size(), daemon.publish_endpoint());
+  const auto streams = daemon.stream_counts();
+  return fmt::format(
+      "{} of {} streams live, {} sources of several bodies; poses at {}", streams.live, streams.all,
+      std::ranges::count_if(daemon.sources(), has_several), daemon.publish_endpoint());
 }
 
 }  // namespace
@@ -98,8 +102,8 @@ void prepare_to_serve() {
 }
 
 Result<> check_end(const assembly::Daemon& daemon, const ServeOptions& options) {
-  const auto endless = [](const auto& stream) { return stream->source->endless; };
-  if (!options.until_end || !std::ranges::all_of(daemon.streams(), endless)) return {};
+  const auto endless = [](const auto& source) { return source->endless; };
+  if (!options.until_end || !std::ranges::all_of(daemon.sources(), endless)) return {};
   return misuse(
       "--until-end: no source of this config ever ends (gloves come and go, clips loop); leave it"
       " out, give --seconds, or set loop = false");
@@ -109,9 +113,10 @@ void print_ready(const assembly::Daemon& daemon) {
   nlohmann::ordered_json line{{"ready", true},
                               {"publish", daemon.publish_endpoint()},
                               {"control", daemon.control_endpoint()},
-                              {"streams", nlohmann::json::array()}};
-  for (const auto& stream : daemon.streams()) line["streams"].push_back(stream->config.name);
-  for (const auto& source : daemon.sources()) line["sources"].push_back(source->config.name);
+                              {"streams", daemon.stream_names()}};
+  for (const auto& source : daemon.sources()) {
+    if (source->has_several()) line["sources"].push_back(source->config.name);
+  }
   if (!daemon.metrics_url().empty()) line["metrics"] = daemon.metrics_url();
   // Not through stdio, because a pipe that is full or that nobody reads must not delay the signals
   // that stop the daemon.

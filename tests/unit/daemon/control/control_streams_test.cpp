@@ -11,6 +11,7 @@
 #include "posed/v1/control.pb.h"
 #include "tests/support/stage_commands.hpp"
 #include "tests/unit/daemon/control/requests.hpp"
+#include "tests/unit/daemon/control/three_streams.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::control {
@@ -31,7 +32,7 @@ class PatientDaemonControl final : public DaemonControl {
     return true;
   }
   bool send(const pipeline::DeviceCommand& command) override {
-    to_device = command.stream;
+    to_device = command.source;
     return true;
   }
   void keep_model(std::span<const std::byte>) override {}
@@ -89,7 +90,8 @@ v1::ControlRequest set_model(const std::string& stream) {
 
 struct Stage {
   PatientDaemonControl pipeline;
-  RequestHandler handler{walker(), pipeline};
+  HandlerRig rig{walker(), pipeline};
+  RequestHandler& handler = rig.handler;
 
   // The error sentence; empty if the request went on to the pipeline.
   std::string ask(const v1::ControlRequest& request) {

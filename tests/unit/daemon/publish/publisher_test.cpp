@@ -235,7 +235,7 @@ TEST_CASE("a busy port gives one sentence that names it") {
   options.context = other.get();
   options.endpoint = rig.publisher->endpoint();
   options.clock = system::monotonic_ns;
-  const auto second = Publisher::open(std::move(options), {}, ring, *rig.wake);
+  const auto second = Publisher::open(std::move(options), ring, *rig.wake);
   REQUIRE_FALSE(second);
   CHECK(second.error().message.find(rig.publisher->endpoint()) != std::string::npos);
 }
