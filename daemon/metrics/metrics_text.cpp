@@ -218,7 +218,7 @@ std::string metrics_text(const Figures& figures) {
   write_clients(figures, text);
   write_recorder(figures, text);
   write_process(text);
-  return text.take();
+  return text.finish();
 }
 
 }  // namespace posed::metrics

@@ -32,7 +32,7 @@ class TextFormat {
   void sample(Labels labels, double value);
   void sample(Labels labels, const publish::DurationBuckets::Counts& counts);
 
-  [[nodiscard]] std::string take() { return std::move(text_); }
+  [[nodiscard]] std::string finish() { return std::move(text_); }
 
  private:
   void family(std::string_view name, std::string_view type, std::string_view help);

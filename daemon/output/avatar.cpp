@@ -72,7 +72,7 @@ Result<> Avatar::set_skeleton(Part part, std::shared_ptr<const Skeleton> skeleto
   return {};
 }
 
-bool Avatar::take(Part part, const Frame& frame) noexcept {
+bool Avatar::pose(Part part, const Frame& frame) noexcept {
   Source& source = sources_[index_of(part)];
   if (!source.to_canonical) return false;
   source.to_canonical->apply(frame, source.pose);

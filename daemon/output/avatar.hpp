@@ -25,12 +25,12 @@ class Avatar {
   explicit Avatar(bool hands_only) : hands_only_(hands_only) {}
 
   // The stream of a part has come, or has left (null). Without an error the part has no pose until
-  // the next take(); an error says why the skeleton cannot move this part, and then it gets none.
+  // the next pose(); an error says why the skeleton cannot move this part, and then it gets none.
   // Cold.
   [[nodiscard]] Result<> set_skeleton(Part part, std::shared_ptr<const Skeleton> skeleton);
 
   // A frame of the part's skeleton. Returns false, and does nothing, for a part without one.
-  bool take(Part part, const Frame& frame) noexcept;
+  bool pose(Part part, const Frame& frame) noexcept;
 
   // Writes the root, if there is a whole body, and all bones that have a pose, parents first. Other
   // positions than that of the hips are those of the T-pose.

@@ -61,7 +61,7 @@ std::size_t BlendShapes::set_layout(const drivers::SampleLayout& samples) {
   return left_out;
 }
 
-void BlendShapes::take(const Sample& sample) noexcept {
+void BlendShapes::add(const Sample& sample) noexcept {
   for (Shape& shape : shapes_) {
     if (shape.index >= sample.value_count || !sample.valid[shape.index]) continue;
     shape.value = sample.value[shape.index];

@@ -29,7 +29,7 @@ class BlendShapes {
   // those are. Cold.
   std::size_t set_layout(const drivers::SampleLayout& samples);
 
-  void take(const Sample& sample) noexcept;
+  void add(const Sample& sample) noexcept;
 
   // Writes the values that were measured, and that they are complete; nothing if there are none.
   void write(drivers::vmc::DatagramWriter& writer) const noexcept;

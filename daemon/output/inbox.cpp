@@ -94,7 +94,7 @@ void Inbox::stream_leaves(std::uint32_t stream) noexcept {
   wake_.notify();
 }
 
-void Inbox::take(Delivery& into) {
+void Inbox::receive(Delivery& into) {
   into.count_ = 0;
   into.streams = {};  // freed before the lock
   const std::scoped_lock lock(mutex_);

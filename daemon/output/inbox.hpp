@@ -83,7 +83,7 @@ class Inbox {
   void stream_leaves(std::uint32_t stream) noexcept;
 
   // The output's thread: replaces `into` by what is there, and is empty afterwards.
-  void take(Delivery& into);
+  void receive(Delivery& into);
 
   // Any thread.
   [[nodiscard]] std::uint64_t frames() const noexcept { return frames_.load(); }

@@ -25,7 +25,7 @@ void Output::fill(v1::OutputStats& stats) const {
 }
 
 const Delivery& Output::receive() {
-  inbox_.take(delivery_);
+  inbox_.receive(delivery_);
   return delivery_;
 }
 

@@ -39,10 +39,10 @@ std::int64_t VmcOutput::turn(std::int64_t now_ns) {
   if (begin_ns_ == kNoTime_ns) begin_ns_ = now_ns;
   const Delivery& delivery = receive();
   take_streams(delivery.streams);
-  if (delivery.sample && !assistant_) shapes_.take(*delivery.sample);
+  if (delivery.sample && !assistant_) shapes_.add(*delivery.sample);
   const Frame* newest = nullptr;
   delivery.for_each([&](Part part, const Frame& frame) {
-    if (!take(part, frame, now_ns)) return;
+    if (!pose(part, frame, now_ns)) return;
     newest = &frame;
     if (!limit_.limits()) send(frame, now_ns);
   });
@@ -81,8 +81,8 @@ bool VmcOutput::leads(Part part, std::int64_t now_ns) const noexcept {
   return true;
 }
 
-bool VmcOutput::take(Part part, const Frame& frame, std::int64_t now_ns) {
-  if (!avatar_.take(part, frame)) return false;
+bool VmcOutput::pose(Part part, const Frame& frame, std::int64_t now_ns) {
+  if (!avatar_.pose(part, frame)) return false;
   if (frame.quality != Quality::kStale) measured_ns_[index_of(part)] = now_ns;
   return leads(part, now_ns);
 }

@@ -27,7 +27,7 @@ class VmcOutput final : public Output {
  private:
   void take_streams(const PartStreams& streams);
   // Puts the frame into the avatar. Returns whether it is one of those that are sent.
-  [[nodiscard]] bool take(Part part, const Frame& frame, std::int64_t now_ns);
+  [[nodiscard]] bool pose(Part part, const Frame& frame, std::int64_t now_ns);
   // Whether the frames of this part are the ones that are sent: those of the body, or, while it has
   // none, those of the left hand, then of the right one.
   [[nodiscard]] bool leads(Part part, std::int64_t now_ns) const noexcept;

@@ -64,8 +64,8 @@ bool Intake::report(std::size_t place, std::uint8_t event, std::uint64_t ticket,
   return put_event(place, {.kind = event, .ticket = ticket, .after = ShortText(name)});
 }
 
-bool Intake::report_end(std::size_t place, bool stays) noexcept {
-  return put_event(place, {.kind = v1::Event::KIND_ENDED, .stays = stays});
+bool Intake::report_end(std::size_t place, bool leaves) noexcept {
+  return put_event(place, {.kind = v1::Event::KIND_ENDED, .leaves = leaves});
 }
 
 bool Intake::put_event(std::size_t place, const StreamEvent& event) noexcept {

@@ -33,10 +33,11 @@ struct StreamEvent {
   std::uint64_t sequence = 0;
   double value = 0.0;
   std::uint64_t ticket = 0;  // of the command that caused it; 0 if no reply is expected
-  // Of KIND_ENDED from the reader: the sequence of the last sample; and whether the stream keeps
-  // its slot, because its source has ended. A body that leaves gives its slot back.
+  // Of KIND_ENDED: the sequence of the last sample, if the event comes from the reader; and whether
+  // the stream gives its slot back, because its body has left or changed. It keeps the slot if its
+  // source has ended.
   std::uint64_t last_sample = 0;
-  bool stays = false;
+  bool leaves = false;
   StageChange change{};  // of KIND_CONTROL and KIND_PLAYING
   // The old and the new value, so that the event can name both.
   double value_before = 0.0;    // StageChange::kSet: the target until now

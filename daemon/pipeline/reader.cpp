@@ -247,17 +247,17 @@ class Reader::Source final : private IntakeOut {
   // again at the next read.
   void end() noexcept {
     if (!ports_.out->has_room(places_)) return;
-    for (std::size_t i = 0; i < places_; ++i) end_stream(i, true);
+    for (std::size_t i = 0; i < places_; ++i) end_stream(i, false);
     ended_ = true;
   }
 
-  // Ends the stream of a place: `stays` if it keeps its slot, because its source has ended; else
-  // its slot is for another. The ring has room.
-  void end_stream(std::size_t place, bool stays) noexcept {
+  // Ends the stream of a place: because its body leaves, or else because the source has ended. The
+  // ring has room.
+  void end_stream(std::size_t place, bool leaves) noexcept {
     Place& ended = *place_[place];
-    if (ended.ended && stays) return;
+    if (ended.ended && !leaves) return;
     ended.ended = true;
-    const bool reported = intake_.report_end(place, stays);
+    const bool reported = intake_.report_end(place, leaves);
     assert(reported);
   }
 
@@ -342,7 +342,7 @@ class Reader::Source final : private IntakeOut {
       const auto is_body = [&](const ReadBody& body) {
         return body.stream == place_[i]->body.stream;
       };
-      if (std::ranges::none_of(update_->bodies, is_body)) end_stream(i, false);
+      if (std::ranges::none_of(update_->bodies, is_body)) end_stream(i, true);
     }
     set_bodies(update_->bodies);
     record(Direction::kDescription, update_->log);

@@ -61,7 +61,7 @@ void StreamContext::sample(const Sample& sample) noexcept {
 // What was decoded last but never came was shed.
 void StreamContext::end(const StreamEvent& event) noexcept {
   engine_.close_gaps(event.sequence, event.last_sample, *this);
-  engine_.end(event.time_ns, event.stays, *this);
+  engine_.end(event.time_ns, event.leaves, *this);
 }
 
 void StreamContext::pass_on(const StreamEvent& event) noexcept {

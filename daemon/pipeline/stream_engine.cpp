@@ -302,7 +302,7 @@ void StreamEngine::report_stages(std::int64_t time_ns, EngineOut& out) noexcept 
   if (performed && !performs_) event(v1::Event::KIND_PLAYED, time_ns, last_out_, 0.0, out);
 }
 
-void StreamEngine::end(std::int64_t now_ns, bool stays, EngineOut& out) noexcept {
+void StreamEngine::end(std::int64_t now_ns, bool leaves, EngineOut& out) noexcept {
   out.decision({.kind = Decision::Kind::kEnd,
                 .stream = options_.stream,
                 .sequence = last_sequence_ + 1,
@@ -314,7 +314,7 @@ void StreamEngine::end(std::int64_t now_ns, bool stays, EngineOut& out) noexcept
                          .kind = v1::Event::KIND_ENDED,
                          .time_ns = now_ns,
                          .sequence = last_sequence_,
-                         .stays = stays};
+                         .leaves = leaves};
   out.item(other_);
 }
 

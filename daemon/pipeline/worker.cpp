@@ -218,7 +218,7 @@ void Worker::handle(const Item& item, StreamContext& context) noexcept {
   }
   if (context.engine().state() != StreamState::kEnded) context.end(event);
   context.handled();
-  if (!event.stays) give_back(context, event);
+  if (event.leaves) give_back(context, event);
 }
 
 void Worker::tick(std::int64_t now_ns) noexcept {

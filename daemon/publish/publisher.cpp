@@ -209,7 +209,7 @@ void Publisher::handle_notice(PublishedStream& published, const pipeline::Stream
 
 void Publisher::report_shed(PublishedStream& published, bool at_end) {
   const std::int64_t now_ns = options_.clock();
-  const auto sum = published.shed.take(now_ns, at_end);
+  const auto sum = published.shed.next_sum(now_ns, at_end);
   if (!sum) return;
   send_event(published, v1::Event::KIND_SHED, options_.data_clock(), sum->first, sentence(*sum));
 }

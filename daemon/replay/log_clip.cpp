@@ -108,7 +108,7 @@ class Collector {
  public:
   explicit Collector(const std::shared_ptr<const Skeleton>& skeleton) : clip_(skeleton) {}
 
-  void take(const Frame& frame) {
+  void add(const Frame& frame) {
     const Header& header = frame.header;
     if (part_ != header.stream) {
       if (last_ != 0) ++returns_;
@@ -181,13 +181,13 @@ class TakeCollector {
         each_(each),
         names_(clip_names(replay)) {}
 
-  void take(const pipeline::Item& item) {
+  void add(const pipeline::Item& item) {
     while (next_ < takes_.size() && replay_.position() > takes_[next_].last_item) end_take();
     const auto name = names_.find(item.frame.header.stream);
     if (item.kind != pipeline::Item::Kind::kFrame || name == names_.end()) return;
     if (next_ == takes_.size() || !holds(takes_[next_], replay_.position())) return;
     collectors_.try_emplace(name->second, replay_.stream(name->first).published)
-        .first->second.take(item.frame);
+        .first->second.add(item.frame);
     rate_hz_[name->second] = replay_.stream(name->first).description.rate_hz;
   }
   void finish() {
@@ -237,7 +237,7 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
   const auto take = [&](const pipeline::Item& item) {
     if (item.kind == kind && holds(interval, replay.position()) &&
         std::ranges::find(chosen->ids, item.frame.header.stream) != chosen->ids.end()) {
-      collector.take(item.frame);
+      collector.add(item.frame);
     }
   };
   const auto done = replay.run(
@@ -273,7 +273,7 @@ Result<> each_take_clip(const std::filesystem::path& path, const EachTakeClip& e
   TakeCollector collector(**opened, std::move(*takes), path.string(), each);
   bool stopped = false;
   const auto done =
-      (*opened)->run([&](const pipeline::Item& item) { collector.take(item); },
+      (*opened)->run([&](const pipeline::Item& item) { collector.add(item); },
                      [&](const log::ChunkRow&) { return !(stopped = stopped || !goes_on()); });
   if (!done) return done;
   if (stopped) return fail("interrupted: the log is complete, but not all of its takes are clips");

@@ -70,7 +70,7 @@ class LogToMcap {
         event_schema_(add_schema(*v1::Event::descriptor())),
         parts_(replay.streams()) {}
 
-  void take(const pipeline::Item& item) {
+  void add(const pipeline::Item& item) {
     switch (item.kind) {
       case pipeline::Item::Kind::kFrame:
       case pipeline::Item::Kind::kRawFrame:
@@ -210,7 +210,7 @@ Result<McapSummary> write_mcap(const std::filesystem::path& log, const std::file
   const auto written = write_whole_file(path, [&](std::ostream& file) {
     LogToMcap to(replay, offset_ns.value_or(0), file);
     bool stopped = false;
-    replayed = replay.run([&](const pipeline::Item& item) { to.take(item); },
+    replayed = replay.run([&](const pipeline::Item& item) { to.add(item); },
                           [&](const log::ChunkRow&) {
                             stopped = stopped || stop();
                             return !stopped && file.good();

@@ -239,7 +239,7 @@ void ReplayStreamContext::change(const pipeline::Decision& decision) noexcept {
 // Nothing more comes: what was decoded last but never came was shed.
 void ReplayStreamContext::end(std::int64_t now_ns) noexcept {
   engine_->close_gaps(last_frame_, last_sample_, *this);
-  engine_->end(now_ns, true, *this);
+  engine_->end(now_ns, false, *this);
   ended_ = true;
 }
 

@@ -19,7 +19,7 @@ TEST_CASE("a family has its help, its type and its samples, with any text as a l
   text.sample({}, 0.01);
   text.sample({{"stream", ""}}, std::numeric_limits<double>::quiet_NaN());
   text.sample({}, std::numeric_limits<double>::infinity());
-  CHECK(text.take() ==
+  CHECK(text.finish() ==
         "# HELP posed_frames_total Frames published.\n"
         "# TYPE posed_frames_total counter\n"
         "posed_frames_total{stream=\"walker\",quality=\"held\"} 12\n"
@@ -47,7 +47,7 @@ TEST_CASE("a duration counts in every bucket that is at least as long, and in th
   TextFormat text;
   text.histogram("posed_stage_seconds", "Time.");
   text.sample({{"stage", "style"}}, counts);
-  const std::string made = text.take();
+  const std::string made = text.finish();
   INFO(made);
   for (const char* line : {"# TYPE posed_stage_seconds histogram\n",
                            "\nposed_stage_seconds_bucket{stage=\"style\",le=\"5e-06\"} 2\n",

@@ -73,7 +73,7 @@ TEST_CASE("a flat hand is sent with identity rotations, a bent one turned about 
     const Part part = left ? Part::kLeftHand : Part::kRightHand;
     REQUIRE(avatar.set_skeleton(part, skeleton));
     CHECK(written(avatar).empty());  // no pose yet
-    REQUIRE(avatar.take(part, bent_hand(*skeleton, 0.0)));
+    REQUIRE(avatar.pose(part, bent_hand(*skeleton, 0.0)));
     const auto flat = written(avatar);
     CHECK(flat.size() == kHandJoints);  // neither wrist nor root
     for (const auto& [name, bone] : flat) {
@@ -86,7 +86,7 @@ TEST_CASE("a flat hand is sent with identity rotations, a bent one turned about 
     CHECK((left ? -next_m[0] : next_m[0]) > 0.02F);
     CHECK(std::abs(next_m[1]) < 1e-3F);
 
-    REQUIRE(avatar.take(part, bent_hand(*skeleton, 0.5)));
+    REQUIRE(avatar.pose(part, bent_hand(*skeleton, 0.5)));
     const SentBone bent = written(avatar).at(prefix + "MiddleIntermediate");
     // The fingers bend down: about Unity's +Z on its left (-X to -Y), about -Z on its right.
     const float half = static_cast<float>(std::sin(0.25));
@@ -101,12 +101,12 @@ TEST_CASE("a hand's stream replaces the fingers of the body and leaves its wrist
   const auto hand = shared_hand(Side::kLeft);
   Avatar avatar(false);
   REQUIRE(avatar.set_skeleton(Part::kBody, walk.skeleton));
-  REQUIRE(avatar.take(Part::kBody, walk.frame(2)));
+  REQUIRE(avatar.pose(Part::kBody, walk.frame(2)));
   const auto alone = written(avatar);
   CHECK(alone.contains("root"));
   CHECK(alone.contains("Hips"));
   REQUIRE(avatar.set_skeleton(Part::kLeftHand, hand));
-  REQUIRE(avatar.take(Part::kLeftHand, bent_hand(*hand, 0.5)));
+  REQUIRE(avatar.pose(Part::kLeftHand, bent_hand(*hand, 0.5)));
   const auto both = written(avatar);
   int fingers = 0;
   for (const auto& [name, bone] : both) {
@@ -123,7 +123,7 @@ TEST_CASE("a hand's stream replaces the fingers of the body and leaves its wrist
   // It leaves.
   REQUIRE(avatar.set_skeleton(Part::kLeftHand, nullptr));
   CHECK(written(avatar).size() == alone.size());
-  CHECK_FALSE(avatar.take(Part::kLeftHand, bent_hand(*hand, 0.5)));
+  CHECK_FALSE(avatar.pose(Part::kLeftHand, bent_hand(*hand, 0.5)));
 }
 
 TEST_CASE("an assistant's avatar has hands only") {
@@ -186,7 +186,7 @@ TEST_CASE("blend shapes go out under the names of the wanted version") {
   sample.value_count = 5;
   sample.value = {0.25F, 9.0F, 9.0F, 0.5F, 0.75F};
   sample.valid.set(0).set(1).set(2).set(3);  // A was not measured
-  shapes.take(sample);
+  shapes.add(sample);
   shapes.write(writer);
   std::string text;
   for (std::size_t i = 0; i < writer.datagrams(); ++i) {

@@ -28,7 +28,7 @@ struct InboxRig {
 
   // "B1 B2 R7": parts and sequences.
   std::string taken() {
-    inbox.take(delivery);
+    inbox.receive(delivery);
     std::string text;
     delivery.for_each([&](Part part, const Frame& frame) {
       text += "BLR"[index_of(part)] + std::to_string(frame.header.sequence) + " ";
@@ -133,10 +133,10 @@ TEST_CASE("an inbox frees nothing while it is locked") {
   rig.inbox.stream_comes(info_of(4, "ann", skeletons.make()));
   rig.inbox.stream_comes(info_of(5, "ann", skeletons.make()));
   CHECK(skeletons.freed == 2);
-  rig.inbox.take(rig.delivery);
+  rig.inbox.receive(rig.delivery);
   rig.inbox.stream_leaves(5);
   CHECK(skeletons.freed == 2);  // the delivery still has it
-  rig.inbox.take(rig.delivery);
+  rig.inbox.receive(rig.delivery);
   CHECK(skeletons.freed == 3);
   CHECK(skeletons.under_the_lock == 0);
 }
@@ -154,10 +154,10 @@ TEST_CASE("only the newest sample of the body waits") {
   sample.header.stream = 4;
   sample.value[0] = 3.0F;
   rig.inbox.sample(sample);
-  rig.inbox.take(rig.delivery);
+  rig.inbox.receive(rig.delivery);
   REQUIRE(rig.delivery.sample);
   CHECK(rig.delivery.sample->value[0] == 2.0F);
-  rig.inbox.take(rig.delivery);
+  rig.inbox.receive(rig.delivery);
   CHECK_FALSE(rig.delivery.sample);
 }
 
