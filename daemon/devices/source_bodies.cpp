@@ -75,7 +75,8 @@ bool SourceBodies::is_outdated(const Stream& stream) const {
   const auto& state = shared_.host.counters(stream.id).pipeline.state;
   const bool ended = !stream.refused && state.load() == pipeline::StreamState::kEnded;
   if (ended) return false;  // nothing more comes to it
-  if (stream.refused && shared_.kept.changes(stream.name) != stream.changes) return true;
+  const bool changed = shared_.kept.changes(stream.name) != stream.changes;
+  if (stream.missed_change || (stream.refused && changed)) return true;
   return std::ranges::any_of(stream.partners, [this](const auto& partner) {
     const auto now = shared_.partners.find(partner.first);
     return now != shared_.partners.end() && now->second.stream != partner.second;
@@ -86,9 +87,10 @@ void SourceBodies::turn(std::int64_t now_ns) {
   take_back();
   if (shared_.is_stopped() || due_ns(now_ns) > now_ns) return;
   next_ns_ = now_ns + SourceBuilder::kBetweenUpdates_ns;
+  std::vector<std::byte> newest = description_;
   auto& descriptions = source_.exchange->descriptions;
-  if (descriptions) static_cast<void>(descriptions->receive(description_));
-  build();
+  if (descriptions) static_cast<void>(descriptions->receive(newest));
+  build(std::move(newest));
 }
 
 bool SourceBodies::gone(std::uint32_t id) {
@@ -110,12 +112,12 @@ void SourceBodies::take_back() {
   }
 }
 
-void SourceBodies::build() {
+void SourceBodies::build(std::vector<std::byte> description) {
   auto update = std::make_unique<pipeline::SourceUpdate>();
   const std::vector<drivers::Body> only{source_.has_several() ? drivers::Body{}
                                                               : only_body(source_)};
   if (source_.has_several()) {
-    auto layout = source_.driver->make_layout(description_);
+    auto layout = source_.driver->make_layout(description);
     if (!layout) {
       return warn(
           "it describes its bodies in a way that posed cannot use, so they stay as they are: " +
@@ -129,6 +131,7 @@ void SourceBodies::build() {
     }
     update->layout = std::move(*layout);
   }
+  description_ = std::move(description);
   without_slot_ = without_name_ = 0;
   freed_ = shared_.slots.freed();
   std::vector<Stream> now = streams_of(update->layout ? update->layout->bodies : only, *update);
@@ -234,6 +237,8 @@ std::optional<SourceBodies::Stream> SourceBodies::stream_of(const drivers::Body&
   if (!choose_slot(stream, now == streams_.end() ? nullptr : &*now)) return std::nullopt;
   NewStream made = make(stream, config);
   shared_.host.add(std::move(made));
+  // Control took the stream for absent until now.
+  stream.missed_change = shared_.kept.changes(stream.name) != stream.changes;
   return stream;
 }
 

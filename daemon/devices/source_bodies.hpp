@@ -71,11 +71,12 @@ class SourceBodies {
     // what control had set.
     std::map<std::string, std::uint32_t> partners{};
     std::uint64_t changes = 0;
+    bool missed_change = false;  // control set something while it was built
   };
 
   [[nodiscard]] bool may_have_slot() const;
   void take_back();
-  void build();
+  void build(std::vector<std::byte> description);
   void report_oddities();
   void warn(const std::string& sentence);
   [[nodiscard]] std::vector<Stream> streams_of(const std::vector<drivers::Body>& bodies,
@@ -100,8 +101,8 @@ class SourceBodies {
   std::vector<Stream> leaving_;    // not yet ended by the worker
   std::unique_ptr<const pipeline::SourceUpdate> sent_, used_;  // under way, and in use
   std::int64_t next_ns_ = 0;                                   // not before
-  std::vector<std::byte> description_;
-  std::size_t without_slot_ = 0, without_name_ = 0;  // bodies of the description in use
+  std::vector<std::byte> description_;                         // in use
+  std::size_t without_slot_ = 0, without_name_ = 0;            // bodies of the description in use
   bool too_many_made_ = false;
   std::uint64_t freed_ = 0;     // StreamSlots::freed() when it was built
   std::uint64_t replaced_ = 0;  // descriptions, as of the last look
