@@ -1,4 +1,4 @@
-#include "daemon/config/partner_check.hpp"
+#include "daemon/config/config_file.hpp"
 
 #include <algorithm>
 #include <set>

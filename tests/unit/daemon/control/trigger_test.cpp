@@ -44,7 +44,7 @@ class TakeKeeper final : public DaemonControl {
 };
 
 struct Triggered {
-  void take(const std::string& datagram, const std::string& sender = "192.168.1.5") {
+  void handle(const std::string& datagram, const std::string& sender = "192.168.1.5") {
     trigger.handle(datagram, sender);
   }
   TakeKeeper daemon;

@@ -135,11 +135,11 @@ TEST_CASE("an assistant's avatar has hands only") {
   frame.valid.set();
   Avatar performer(false);
   REQUIRE(performer.set_skeleton(Part::kBody, person));
-  REQUIRE(performer.take(Part::kBody, frame));
+  REQUIRE(performer.pose(Part::kBody, frame));
   CHECK(written(performer).size() == kBones + 1);  // and the root
   Avatar assistant(true);
   REQUIRE(assistant.set_skeleton(Part::kBody, person));
-  REQUIRE(assistant.take(Part::kBody, frame));
+  REQUIRE(assistant.pose(Part::kBody, frame));
   const auto bones = written(assistant);
   CHECK(bones.size() == 2 * (1 + kHandJoints));
   CHECK(bones.contains("LeftHand"));
