@@ -3,18 +3,15 @@
 #include <algorithm>
 #include <atomic>
 #include <optional>
-#include <set>
 #include <thread>
 
 #include <spdlog/spdlog.h>
 
-#include "daemon/assembly/body_streams.hpp"
 #include "daemon/assembly/hot_threads.hpp"
 #include "daemon/assembly/output_threads.hpp"
+#include "daemon/assembly/streams.hpp"
 #include "daemon/control/control_server.hpp"
 #include "daemon/control/trigger_server.hpp"
-#include "daemon/devices/about_stream.hpp"
-#include "daemon/devices/device_supervisor.hpp"
 #include "daemon/metrics/metrics_server.hpp"
 #include "daemon/net/peer_guard.hpp"
 #include "daemon/net/zap_authenticator.hpp"
@@ -23,7 +20,6 @@
 #include "daemon/publish/publisher.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/system/realtime.hpp"
-#include "proto/text/stream_name.hpp"
 #include "proto/zmq/keys.hpp"
 
 namespace posed::assembly {
@@ -32,25 +28,6 @@ namespace {
 constexpr const char* kReaderName = "posed-reader";
 constexpr const char* kPipelineName = "posed-pipeline";
 constexpr const char* kPublisherName = "posed-publish";
-constexpr double kUnknownRate_hz = 1000.0;  // assumed for the rings if a device states no rate
-
-double rate_of(const devices::OpenStream& stream) {
-  const drivers::Device& device = stream.source->device;
-  if (device.transport && device.transport->rate_hz() > 0.0) return device.transport->rate_hz();
-  return device.description.rate_hz > 0.0 ? device.description.rate_hz : kUnknownRate_hz;
-}
-
-// How much of the ring to the pipeline a stream may fill: half a second of its frames and samples.
-std::size_t decoded_slots(const devices::OpenStream& stream) {
-  const drivers::Description& description = stream.source->device.description;
-  const int kinds = (description.skeleton ? 1 : 0) + (description.samples.names.empty() ? 0 : 1);
-  return pipeline::ring_slots(rate_of(stream) * std::max(kinds, 1));
-}
-// The same for the ring to the publisher, which also carries the unstyled frames.
-std::size_t finished_slots(const devices::OpenStream& stream) {
-  return decoded_slots(stream) +
-         (stream.config.publish_raw ? pipeline::ring_slots(rate_of(stream)) : 0);
-}
 
 }  // namespace
 
@@ -92,8 +69,6 @@ class Daemon::Parts final : public control::DaemonControl {
 
   config::DaemonConfig config;
   DaemonHooks hooks;
-  std::vector<std::unique_ptr<devices::OpenStream>> streams;
-  pipeline::PartnerStreams partners;  // those of them that stages may name
   std::atomic<bool> stop_asked{false};
 
   net::Context context;
@@ -104,7 +79,7 @@ class Daemon::Parts final : public control::DaemonControl {
   std::unique_ptr<pipeline::Ring<pipeline::Command>> commands;
   std::unique_ptr<pipeline::Ring<pipeline::DeviceCommand>> device_commands;
   std::unique_ptr<pipeline::Ring<pipeline::Ack>> acks;
-  std::unique_ptr<BodyStreams> bodies;               // null: no device has several
+  std::unique_ptr<Streams> streams;
   std::unique_ptr<control::RequestHandler> handler;  // owns the models
   std::unique_ptr<OutputThreads> outputs;
   std::unique_ptr<publish::Publisher> publisher;
@@ -115,7 +90,6 @@ class Daemon::Parts final : public control::DaemonControl {
   std::unique_ptr<metrics::MetricsServer> metrics;  // null: the config has no [metrics]
   std::unique_ptr<HotThreads> threads;
   std::thread publisher_thread, worker_thread, reader_thread;
-  std::vector<std::unique_ptr<devices::DeviceSupervisor>> supervisors;
 
  private:
   Result<> open_sockets();
@@ -124,46 +98,17 @@ class Daemon::Parts final : public control::DaemonControl {
   Result<> start_threads();
   Result<> start_metrics();
   [[nodiscard]] metrics::Figures figures() const;
-  [[nodiscard]] StreamUsers users() const {
-    return {.publisher = publisher.get(),
-            .handler = handler.get(),
-            .worker = worker.get(),
-            .reader = reader.get(),
-            .partners = partners,
-            .record = hooks.record_stream};
-  }
-  // Names that the bodies of sources must leave alone.
-  [[nodiscard]] std::set<std::string> stream_names() const;
 };
 
 Result<> Daemon::Parts::open() {
-  streams.resize(config.streams.size());
-  for (const std::size_t i : devices::opening_order(config.streams)) {
-    auto stream = devices::open_stream(config.streams[i], partners);
-    if (!stream) return std::unexpected(stream.error());
-    for (const std::string& warning : (*stream)->source->device.warnings) {
-      spdlog::warn("{}: {}", config.streams[i].name, warning);
-    }
-    devices::add_partner(partners, i, **stream);
-    streams[i] = std::move(*stream);
-  }
-  // Each stream has its own slots, so that no stream can use up another's, and every event finds
-  // one.
-  std::size_t into_pipeline = pipeline::kEventSlots + streams.size();
-  std::size_t out_of_pipeline = into_pipeline;
-  for (const auto& stream : streams) {
-    into_pipeline += decoded_slots(*stream);
-    out_of_pipeline += finished_slots(*stream);
-  }
-  auto opened_bodies = BodyStreams::open(config, static_cast<std::uint32_t>(streams.size()));
-  if (!opened_bodies) return std::unexpected(opened_bodies.error());
-  bodies = std::move(*opened_bodies);
-  if (bodies != nullptr) {
-    into_pipeline += bodies->all_decoded_slots() + bodies->count();
-    out_of_pipeline += bodies->all_finished_slots() + bodies->count();
+  auto opened_streams = Streams::open(config);
+  if (!opened_streams) return std::unexpected(opened_streams.error());
+  streams = std::move(*opened_streams);
+  const std::size_t into_pipeline = pipeline::kEventSlots + streams->decoded_slots();
+  const std::size_t out_of_pipeline = pipeline::kEventSlots + streams->finished_slots();
+  if (!config.sources.empty()) {
     spdlog::info(
-        "room for {} streams at once: {:.0f} MB for what is on its way",
-        streams.size() + bodies->count(),
+        "room for {} streams at once: {:.0f} MB for what is on its way", streams->slots(),
         static_cast<double>((into_pipeline + out_of_pipeline) * sizeof(pipeline::Item)) / 1e6);
   }
   decoded = std::make_unique<pipeline::Ring<pipeline::Item>>(into_pipeline);
@@ -209,21 +154,6 @@ Result<> Daemon::Parts::open_sockets() {
 }
 
 Result<> Daemon::Parts::open_publisher() {
-  std::vector<publish::StreamInfo> infos;
-  infos.reserve(streams.size());
-  for (const auto& stream : streams) {
-    infos.push_back({.stream = static_cast<std::uint32_t>(infos.size()),
-                     .name = stream->config.name,
-                     .description = stream->source->device.description,
-                     .skeleton = stream->stages.published,
-                     .rate_hz = rate_of(*stream),
-                     .stages = publish::stage_infos(stream->stages.settings),
-                     .raw = stream->config.publish_raw,
-                     .comes_and_goes = stream->source->slot != nullptr,
-                     .present = stream->source->present,
-                     .counters = &stream->counters,
-                     .source_counters = &stream->source->counters});
-  }
   publish::PublisherOptions options{.context = context.get(),
                                     .endpoint = config.publish_endpoint,
                                     .authenticator = authenticator.get(),
@@ -231,21 +161,18 @@ Result<> Daemon::Parts::open_publisher() {
                                     .more_stats = hooks.more_stats,
                                     .record_sink = hooks.record_sink,
                                     .clock = system::monotonic_ns,
-                                    .slots = streams.size(),
+                                    .slots = streams->slots(),
+                                    .messages_per_s = streams->messages_per_s(),
                                     .outputs = outputs->outputs()};
-  if (bodies != nullptr) {
-    options.slots += bodies->count();
-    for (const auto& source : bodies->sources()) {
-      options.sources.push_back({.name = source->config.name,
-                                 .driver = source->config.driver,
-                                 .comes_and_goes = source->source->slot != nullptr,
-                                 .present = source->source->present,
-                                 .counters = &source->source->counters});
-    }
-    options.more_messages_per_s = bodies->messages_per_s();
+  for (const auto& source : streams->sources()) {
+    if (!source->has_several()) continue;
+    options.sources.push_back({.name = source->config.name,
+                               .driver = source->config.driver,
+                               .comes_and_goes = source->slot != nullptr,
+                               .present = source->present,
+                               .counters = &source->counters});
   }
-  auto bound =
-      publish::Publisher::open(std::move(options), std::move(infos), *finished, *publisher_wake);
+  auto bound = publish::Publisher::open(std::move(options), *finished, *publisher_wake);
   if (!bound) return std::unexpected(bound.error());
   publisher = std::move(*bound);
   return {};
@@ -259,7 +186,7 @@ Result<> Daemon::Parts::open_engines() {
                                                .wake = pipeline_wake.get(),
                                                .publisher = publisher_wake.get(),
                                                .control = control_wake.get(),
-                                               .streams = bodies ? &bodies->exchange() : nullptr,
+                                               .streams = &streams->exchange(),
                                                .record_sink = hooks.record_sink,
                                                .clock = system::monotonic_ns});
   if (!opened_worker) return std::unexpected(opened_worker.error());
@@ -271,46 +198,14 @@ Result<> Daemon::Parts::open_engines() {
                                                .commands = device_commands.get()});
   if (!opened_reader) return std::unexpected(opened_reader.error());
   reader = std::move(*opened_reader);
-  std::vector<control::ControlledStream> controlled;
-  for (std::uint32_t i = 0; i < streams.size(); ++i) {
-    devices::OpenStream& stream = *streams[i];
-    auto bound = devices::bind_stages(stream.stages);
-    if (!bound) return devices::of_stream(stream.config.name, bound.error());
-    publisher->set_stages(i, publish::stage_infos(stream.stages.settings));
-    auto engine = devices::make_engine(i, stream.stages, *bound);
-    if (!engine) return devices::of_stream(stream.config.name, engine.error());
-    engine->clock = system::monotonic_ns;
-    worker->add(std::move(*engine), rate_of(stream), stream.counters, finished_slots(stream));
-    devices::OpenSource& source = *stream.source;
-    reader->add({.device = source.device.transport ? &source.device : nullptr,
-                 .counters = &source.counters,
-                 .slot = source.slot.get(),
-                 .calibration = source.calibration.get(),
-                 .body = pipeline::ReadBody{
-                     .stream = i, .counters = &stream.counters, .slots = decoded_slots(stream)}});
-    controlled.push_back({.stream = i,
-                          .name = stream.config.name,
-                          .publishes_raw = stream.config.publish_raw,
-                          .skeleton = stream.stages.skeleton,
-                          .settings = stream.stages.settings,
-                          .models = std::move(bound->models),
-                          .device = source.present,
-                          .options = stream.config.options,
-                          .calibration = nullptr});
-    // No client sent these commands, so they have ticket 0 and no Ack follows. The ring has space
-    // for one from every stream.
-    for (pipeline::Command& command : bound->first_commands) {
-      command.stream = i;
-      if (commands->push(command)) continue;
-      return devices::of_stream(stream.config.name,
-                                fail("too many streams perform from the start").error());
-    }
-  }
-  if (bodies != nullptr) bodies->add_to(*reader);
   auto models = control::ModelFolder::open(config.models);
   if (!models) return std::unexpected(models.error());
-  handler =
-      std::make_unique<control::RequestHandler>(std::move(controlled), *this, std::move(*models));
+  handler = std::make_unique<control::RequestHandler>(*this, streams->kept(), std::move(*models));
+  streams->begin({.publisher = publisher.get(),
+                  .handler = handler.get(),
+                  .worker = worker.get(),
+                  .reader = reader.get(),
+                  .record = hooks.record_stream});
   return {};
 }
 
@@ -341,30 +236,11 @@ Result<> Daemon::Parts::start_threads() {
     if (hooks.hot_thread) hooks.hot_thread("pipeline");
     worker->run();
   });
-  for (const auto& stream : streams) {
-    drivers::Transport* const transport = stream->source->device.transport.get();
-    if (transport == nullptr) continue;
-    if (auto started = transport->start(system::monotonic_ns()); !started) {
-      return devices::of_stream(stream->config.name, started.error());
-    }
-  }
-  if (bodies != nullptr) {
-    if (auto started = bodies->start(users(), stream_names()); !started) return started;
-  }
+  if (auto started = streams->start(); !started) return started;
   reader_thread = threads->start(kReaderName, system::kReaderPriority, [this] {
     if (hooks.hot_thread) hooks.hot_thread("reader");
     reader->run();
   });
-  for (std::uint32_t i = 0; i < streams.size(); ++i) {
-    if (!streams[i]->source->slot) continue;
-    devices::SupervisorPorts ports{
-        .reader = reader.get(), .clock = system::monotonic_ns, .report = {}};
-    ports.report = [this, i](v1::Event::Kind kind, const std::string& text) {
-      publisher->post_event(i, kind, text);
-    };
-    supervisors.push_back(
-        std::make_unique<devices::DeviceSupervisor>(*streams[i]->source, std::move(ports)));
-  }
   return {};
 }
 
@@ -389,30 +265,14 @@ metrics::Figures Daemon::Parts::figures() const {
   return all;
 }
 
-std::set<std::string> Daemon::Parts::stream_names() const {
-  std::set<std::string> names;
-  const auto add = [&](const config::StreamConfig& stream) {
-    names.insert(stream.name);
-    if (stream.publish_raw) names.insert(raw_name(stream.name));
-  };
-  for (const config::StreamConfig& stream : config.streams) add(stream);
-  for (const config::SourceConfig& source : config.sources) {
-    for (const auto& named : source.named) add(named.stream);
-  }
-  return names;
-}
-
 // Stops the threads in the order of the data, from the devices to the clients, so that each still
 // handles what the one before it made.
 void Daemon::Parts::halt() noexcept {
-  for (const auto& supervisor : supervisors)
-    supervisor->stop();  // all at once, whatever they are waiting for
+  if (streams) streams->stop_supervisors();  // all at once, whatever they are waiting for
   if (threads) threads->ending();
-  if (bodies) bodies->stop_supervisors();
   if (reader) reader->stop();
   if (reader_thread.joinable()) reader_thread.join();
-  supervisors.clear();
-  if (bodies) bodies->stop();
+  if (streams) streams->stop();
   if (worker) worker->stop();
   if (worker_thread.joinable()) worker_thread.join();
   metrics.reset();
@@ -432,15 +292,14 @@ Result<std::unique_ptr<Daemon>> Daemon::open(const config::DaemonConfig& config)
   return std::unique_ptr<Daemon>(new Daemon(std::move(parts)));
 }
 
-std::span<const std::unique_ptr<devices::OpenStream>> Daemon::streams() const noexcept {
-  return parts_->streams;
+std::span<const std::unique_ptr<devices::OpenSource>> Daemon::sources() const noexcept {
+  return parts_->streams->sources();
 }
-std::span<const std::unique_ptr<devices::BodySource>> Daemon::sources() const noexcept {
-  if (parts_->bodies == nullptr) return {};
-  return parts_->bodies->sources();
-}
-std::size_t Daemon::slots_to_come() const noexcept {
-  return parts_->bodies ? parts_->bodies->count() : 0;
+std::size_t Daemon::slots() const noexcept { return parts_->streams->slots(); }
+std::vector<std::string> Daemon::stream_names() const { return parts_->streams->names(); }
+Daemon::StreamCounts Daemon::stream_counts() const {
+  const Streams::Counts counts = parts_->streams->counts();
+  return {.live = counts.live, .all = counts.all};
 }
 Result<> Daemon::start(DaemonHooks hooks) { return parts_->start(std::move(hooks)); }
 void Daemon::stop() noexcept { parts_->halt(); }
@@ -454,10 +313,12 @@ v1::Stats Daemon::stats() const { return parts_->publisher->stats(); }
 
 bool Daemon::all_ended() const noexcept {
   bool any = false;
-  for (const auto& stream : parts_->streams) {
-    if (stream->source->endless) continue;
+  for (const auto& source : parts_->streams->sources()) {
+    if (source->endless) continue;
     any = true;
-    if (stream->counters.pipeline.state.load() != pipeline::StreamState::kEnded) return false;
+    // The only body of a device that can end has the slot of the source's number.
+    const pipeline::StreamCounters& counters = parts_->streams->counters_of(source->number);
+    if (counters.pipeline.state.load() != pipeline::StreamState::kEnded) return false;
   }
   return any;
 }
@@ -484,8 +345,8 @@ std::vector<system::ThreadPulse> Daemon::pulses() const {
     all.push_back(
         {.thread = metrics::MetricsServer::kThreadName, .pulse = &parts_->metrics->pulse()});
   }
-  if (parts_->bodies) {
-    all.push_back({.thread = BodyStreams::kThreadName, .pulse = &parts_->bodies->pulse()});
+  if (const system::Pulse* const pulse = parts_->streams->pulse()) {
+    all.push_back({.thread = Streams::kThreadName, .pulse = pulse});
   }
   return all;
 }

@@ -3,6 +3,7 @@
 // Cold, one owner thread.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <span>
@@ -10,8 +11,7 @@
 #include <vector>
 
 #include "daemon/config/daemon_config.hpp"
-#include "daemon/devices/open_stream.hpp"
-#include "daemon/devices/source_builder.hpp"
+#include "daemon/devices/stream_host.hpp"
 #include "daemon/metrics/figures.hpp"
 #include "daemon/pipeline/record_sink.hpp"
 #include "daemon/system/pulse.hpp"
@@ -24,7 +24,8 @@ namespace posed::assembly {
 // Optional extras for start(); all of them outlive the daemon's stop().
 struct DaemonHooks {
   pipeline::RecordSink* record_sink = nullptr;  // null: no recording
-  // Called for each stream that comes while the daemon runs, before its first item; may be empty.
+  // Called for each stream before its first item, at the start or while the daemon runs; may be
+  // empty.
   std::function<void(const devices::NewStream&)> record_stream{};
   std::function<void(v1::Stats&)> more_stats;  // adds the recorder's counters; may be empty
   // The same for metrics; may be empty.
@@ -41,13 +42,10 @@ class Daemon {
   Daemon(const Daemon&) = delete;
   Daemon& operator=(const Daemon&) = delete;
 
-  // In the order of the config; the index is the stream number everywhere.
-  [[nodiscard]] std::span<const std::unique_ptr<devices::OpenStream>> streams() const noexcept;
-
-  // Devices with several bodies, which have the numbers behind those of the streams as sources.
-  [[nodiscard]] std::span<const std::unique_ptr<devices::BodySource>> sources() const noexcept;
-  // how many streams of their bodies there may be at once
-  [[nodiscard]] std::size_t slots_to_come() const noexcept;
+  // By number: those of the [[stream]] tables with a device, whose streams have the same number,
+  // then those of the [[source]] tables, each in the order of the config.
+  [[nodiscard]] std::span<const std::unique_ptr<devices::OpenSource>> sources() const noexcept;
+  [[nodiscard]] std::size_t slots() const noexcept;  // how many streams there may be at once
 
   // Starts the threads and the devices. Call once.
   [[nodiscard]] Result<> start(DaemonHooks hooks = {});
@@ -62,6 +60,13 @@ class Daemon {
   // "http://127.0.0.1:5572/metrics"; empty: the config has no [metrics].
   [[nodiscard]] std::string metrics_url() const;
   [[nodiscard]] bool asked_to_stop() const noexcept;  // by a control message
+  // The names of the streams that the config names, and of the others that are there now.
+  [[nodiscard]] std::vector<std::string> stream_names() const;
+  struct StreamCounts {
+    std::size_t live = 0, all = 0;
+  };
+  // Of the streams that are there now. Asks no thread.
+  [[nodiscard]] StreamCounts stream_counts() const;
   // Whether every source that can end has ended and been published; false if there is none.
   [[nodiscard]] bool all_ended() const noexcept;
   [[nodiscard]] v1::Stats stats() const;           // as of the last second

@@ -6,9 +6,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/config/config_file.hpp"
-#include "daemon/config/output_tables.hpp"
 #include "daemon/config/port_check.hpp"
-#include "daemon/config/stream_tables.hpp"
 #include "daemon/config/take_tables.hpp"
 #include "drivers/transport/address.hpp"
 #include "models/stages/registry.hpp"

@@ -41,12 +41,12 @@ struct StreamConfig {
   int line = 0;                       // of its table, for errors; 0: nowhere
 };
 
-// A device with several bodies (Driver::make_layout). Its bodies become streams as they come.
+// A device. Where it has several bodies (Driver::make_layout), they become streams as they come.
 struct SourceConfig {
   // One of its bodies, by the device's own name for it: a [[stream]] table with source and body.
   struct NamedBody {
-    std::string body;
-    StreamConfig stream;  // without driver, options and calibration
+    std::string body;     // empty: the one body of a device that does not describe its bodies
+    StreamConfig stream;  // without driver and options; a calibration only for the one body
   };
 
   std::string name;  // [a-z0-9_-]{1,32}, unique among streams and sources
@@ -60,6 +60,17 @@ struct SourceConfig {
   StreamConfig every;
   int line = 0;  // of its table, for errors; 0: nowhere
 };
+
+// The source of a stream with a device of its own.
+[[nodiscard]] inline SourceConfig source_of(const StreamConfig& stream) {
+  SourceConfig source;
+  source.name = stream.name;
+  source.driver = stream.driver;
+  source.options = stream.options;
+  source.named.push_back({.body = {}, .stream = stream});
+  source.line = stream.line;
+  return source;
+}
 
 enum class OutputKind : std::uint8_t { kVmc, kBvh };
 

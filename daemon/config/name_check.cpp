@@ -1,4 +1,4 @@
-#include "daemon/config/name_check.hpp"
+#include "daemon/config/config_file.hpp"
 
 #include <algorithm>
 #include <map>

@@ -1,4 +1,4 @@
-#include "daemon/config/output_tables.hpp"
+#include "daemon/config/config_file.hpp"
 
 #include <algorithm>
 #include <array>

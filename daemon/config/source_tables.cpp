@@ -1,12 +1,10 @@
-#include "daemon/config/source_tables.hpp"
+#include "daemon/config/config_file.hpp"
 
 #include <string>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/config/config.hpp"
-#include "daemon/config/driver_tables.hpp"
-#include "daemon/config/stage_tables.hpp"
 #include "models/stages/registry.hpp"
 
 namespace posed::config {

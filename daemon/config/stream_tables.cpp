@@ -1,4 +1,4 @@
-#include "daemon/config/stream_tables.hpp"
+#include "daemon/config/config_file.hpp"
 
 #include <algorithm>
 #include <map>
@@ -9,11 +9,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "daemon/config/driver_tables.hpp"
-#include "daemon/config/name_check.hpp"
-#include "daemon/config/partner_check.hpp"
-#include "daemon/config/source_tables.hpp"
-#include "daemon/config/stage_tables.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/nearest_word.hpp"
 

@@ -84,8 +84,8 @@ void ControlServer::serve() {
   while (!stop_.load(std::memory_order_acquire)) {
     pulse_.beat();
     bool busy = false;
-    for (int i = 0; i < kRequestsARound && take_request(); ++i) busy = true;
-    while (take_ack()) busy = true;
+    for (int i = 0; i < kRequestsARound && handle_request(); ++i) busy = true;
+    while (handle_ack()) busy = true;
     const std::int64_t due_ns = handler_.forget_old(system::monotonic_ns());
     if (!busy) sleep(milliseconds_until(due_ns));
   }
@@ -103,7 +103,7 @@ void ControlServer::sleep(long longest_ms) {
   ports_.wake->awake();
 }
 
-bool ControlServer::take_request() {
+bool ControlServer::handle_request() {
   net::Message part;
   if (!part.receive(router_.get())) return false;
   Requester envelope;
@@ -126,12 +126,12 @@ bool ControlServer::take_request() {
   return true;
 }
 
-bool ControlServer::take_ack() {
+bool ControlServer::handle_ack() {
   std::optional<Reply> reply;
-  const bool taken =
+  const bool handled =
       ports_.acks->consume([&](const pipeline::Ack& ack) { reply = handler_.acknowledge(ack); });
   if (reply) send(*reply);
-  return taken;
+  return handled;
 }
 
 // A ROUTER socket drops a reply that a slow or disconnected client does not accept.

@@ -60,8 +60,8 @@ class ControlServer {
                 const ControlPorts& ports, RequestHandler& handler);
   void serve();
   void sleep(long longest_ms);
-  [[nodiscard]] bool take_request();
-  [[nodiscard]] bool take_ack();
+  [[nodiscard]] bool handle_request();
+  [[nodiscard]] bool handle_ack();
   void send(const Reply& reply);
 
   net::Socket router_;

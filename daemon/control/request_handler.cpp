@@ -1,6 +1,7 @@
 #include "daemon/control/request_handler.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <utility>
 #include <variant>
@@ -10,6 +11,8 @@
 
 #include "daemon/control/stage_requests.hpp"
 #include "daemon/devices/about_stream.hpp"
+#include "daemon/devices/calibration.hpp"
+#include "drivers/glove/traits.hpp"
 #include "models/stage_type.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
@@ -21,6 +24,7 @@ namespace {
 
 using devices::of_stream;
 using pipeline::Command;
+using pipeline::DeviceCommand;
 using pipeline::StageChange;
 
 Reply make_reply(Requester to, const v1::ControlReply& reply) {
@@ -33,27 +37,58 @@ Reply refusal(Requester to, const std::string& sentence) {
   return make_reply(std::move(to), reply);
 }
 
-// Texts that the new model does not take, such as weights of the styles that the one before had,
-// stand for their defaults.
-void forget_texts(const StageModel& model, pipeline::StageSettings& settings) {
-  for (const StageCommandType& command : settings.type->commands) {
-    if (!is_live_text(*settings.type, command.name)) continue;
-    auto& text = settings.parameters.at(std::string(command.name));
-    const std::vector<std::string> words{std::get<std::string>(text)};
-    if (!command.encode(&model, words, {})) text = std::string();
+constexpr float kMaxVibration_hz = 1000.0F;
+constexpr float kMaxVibration_s = 60.0F;
+
+bool within(float value, float min, float max) {
+  return std::isfinite(value) && value >= min && value <= max;
+}
+
+Result<drivers::glove::Haptics> read_haptics(const v1::ControlRequest::Haptics& wanted) {
+  drivers::glove::Haptics haptics{.vibration_hz = wanted.vibration_hz(),
+                                  .vibration_s = wanted.vibration_s(),
+                                  .vibration = wanted.vibration_amplitude()};
+  haptics.force.fill(-1.0F);
+  if (static_cast<std::size_t>(wanted.force_size()) > haptics.force.size()) {
+    return fail("a hand has five fingers: give at most five forces, thumb to little");
   }
+  std::ranges::copy(wanted.force(), haptics.force.begin());
+  const bool valid =
+      std::ranges::all_of(haptics.force, [](float force) { return within(force, -1.0F, 1.0F); }) &&
+      within(haptics.vibration_hz, 0.0F, kMaxVibration_hz) &&
+      within(haptics.vibration_s, 0.0F, kMaxVibration_s) && within(haptics.vibration, 0.0F, 1.0F);
+  if (valid) return haptics;
+  return fail(
+      "a force is 0 (free) to 1 (blocked), negative to leave it; a vibration has up to 1000 Hz,"
+      " 60 s and an amplitude of 0 to 1");
+}
+
+// The value of a live parameter for which the number stands.
+ParameterValue value_of(const ParameterSpec& spec, double number) {
+  if (std::holds_alternative<bool>(spec.default_value)) return number != 0.0;
+  if (std::holds_alternative<double>(spec.default_value)) return number;
+  if (std::holds_alternative<std::int64_t>(spec.default_value)) {
+    return static_cast<std::int64_t>(number);
+  }
+  return std::string(spec.words[static_cast<std::size_t>(number)]);
 }
 
 }  // namespace
 
-RequestHandler::RequestHandler(std::vector<ControlledStream> streams, DaemonControl& daemon_control,
-                               ModelFolder models, Clock clock)
-    : daemon_control_(daemon_control), models_(std::move(models)), clock_(clock) {
-  for (std::uint32_t i = 0; i < streams.size(); ++i) {
-    streams[i].stream = i;
-    streams_.emplace(i, std::move(streams[i]));
-  }
+ControlledStream known_stream(const config::StreamConfig& config, const std::string& source) {
+  ControlledStream stream;
+  stream.stream = pipeline::kNoStream;
+  stream.name = config.name;
+  stream.publishes_raw = config.publish_raw;
+  stream.settings = devices::possible_settings(config);
+  stream.source = source;
+  stream.models.resize(stream.settings.stages.size());
+  return stream;
 }
+
+RequestHandler::RequestHandler(DaemonControl& daemon_control, devices::KeptSettings& kept,
+                               ModelFolder models, Clock clock)
+    : daemon_control_(daemon_control), kept_(kept), models_(std::move(models)), clock_(clock) {}
 
 RequestHandler::~RequestHandler() = default;
 
@@ -65,7 +100,6 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
   if (!request.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
     return refusal(std::move(requester), "this is not a valid posed.v1.ControlRequest");
   }
-  Result<> done;
   v1::ControlReply reply;
   reply.set_ok(true);
   if (request.has_status() || request.has_stop()) {  // without the lock: these need no stream
@@ -82,36 +116,32 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
     model = std::move(*read);
   }
   const std::scoped_lock lock(mutex_);
+  const auto done = apply(request, std::as_bytes(std::span(std::as_const(model))), requester);
+  if (!done) return refusal(std::move(requester), done.error().text());
+  if (done->under_way) return std::nullopt;  // acknowledge() makes the reply
+  if (!done->stream.empty()) reply.set_stream(done->stream);
+  return make_reply(std::move(requester), reply);
+}
+
+Result<RequestHandler::Done> RequestHandler::apply(const v1::ControlRequest& request,
+                                                   std::span<const std::byte> model,
+                                                   const Requester& requester) {
   switch (request.request_case()) {
     case v1::ControlRequest::kSetParameter:
-      done = set_parameter(request, requester);
-      break;
+      return set_parameter(request, requester);
     case v1::ControlRequest::kStageCommand:
-      done = stage_command(request, requester);
-      break;
-    case v1::ControlRequest::kModelPart: {
-      const auto taken = take_model_part(request, requester);
-      if (!taken) return refusal(std::move(requester), taken.error().text());
-      if (*taken) return make_reply(std::move(requester), reply);
-      break;
-    }
+      return stage_command(request, requester);
+    case v1::ControlRequest::kModelPart:
+      return add_model_part(request, requester);
     case v1::ControlRequest::kUseModel:
-      done = set_model(request.use_model().stream(), std::as_bytes(std::span(std::as_const(model))),
-                       request.use_model().name(), requester);
-      break;
+      return set_model(request.use_model().stream(), model, request.use_model().name(), requester);
     case v1::ControlRequest::kCalibrate:
-      done = calibrate(request, requester);
-      break;
+      return calibrate(request, requester);
     case v1::ControlRequest::kHaptics:
-      done = send_haptics(request);
-      if (done) return make_reply(std::move(requester), reply);  // devices send no acknowledgement
-      break;
+      return send_haptics(request);
     default:
-      return refusal(std::move(requester),
-                     "the request is empty, or from another version of posed");
+      return fail("the request is empty, or from another version of posed");
   }
-  if (!done) return refusal(std::move(requester), done.error().text());
-  return std::nullopt;  // acknowledge() makes the reply
 }
 
 Reply RequestHandler::mark_take(const v1::ControlRequest& request, Requester requester) {
@@ -152,25 +182,32 @@ bool RequestHandler::is_earlier(Streams::iterator stream) const {
 }
 
 Result<ControlledStream*> RequestHandler::find_stream(const std::string& name) {
-  std::string names;
+  std::vector<ControlledStream*> all;
   for (auto it = streams_.begin(); it != streams_.end(); ++it) {
-    if (is_earlier(it)) continue;
-    ControlledStream& stream = it->second;
-    if (stream.name == name) return &stream;
-    if (stream.publishes_raw && raw_name(stream.name) == name) {
+    if (!is_earlier(it)) all.push_back(&it->second);
+  }
+  for (auto& [known_name, stream] : known_) {
+    if (std::ranges::find(all, known_name, &ControlledStream::name) == all.end()) {
+      all.push_back(&stream);
+    }
+  }
+  std::string names;
+  for (ControlledStream* const stream : all) {
+    if (stream->name == name) return stream;
+    if (stream->publishes_raw && raw_name(stream->name) == name) {
       return fail(
           fmt::format("{} is the input of {} before its stages and cannot be changed; name"
                       " {}",
-                      name, stream.name, stream.name));
+                      name, stream->name, stream->name));
     }
-    names += (names.empty() ? "" : ", ") + stream.name;
+    names += (names.empty() ? "" : ", ") + stream->name;
   }
   return fail(fmt::format("there is no stream {}; there is: {}", in_quotes(name),
                           names.empty() ? "none" : names));
 }
 
-Result<> RequestHandler::set_parameter(const v1::ControlRequest& request,
-                                       const Requester& requester) {
+Result<RequestHandler::Done> RequestHandler::set_parameter(const v1::ControlRequest& request,
+                                                           const Requester& requester) {
   const auto& wanted = request.set_parameter();
   const auto stream = find_stream(wanted.stream());
   if (!stream) return std::unexpected(stream.error());
@@ -179,72 +216,86 @@ Result<> RequestHandler::set_parameter(const v1::ControlRequest& request,
   if (*text) return stage_command(**text, requester);
   const auto change = parameter_change((*stream)->settings, wanted);
   if (!change) return of_stream(wanted.stream(), change.error());
-  return send(**stream, {.change = *change}, {.requester = requester});
+  const ParameterSpec& spec = change->type->parameters[change->index];
+  const NewValue value{.stage = change->type,
+                       .parameter = std::string(spec.name),
+                       .value = value_of(spec, change->value)};
+  return send(**stream, {.change = *change}, {.requester = requester, .value = value});
 }
 
-Result<> RequestHandler::stage_command(const v1::ControlRequest& request,
-                                       const Requester& requester) {
+Result<RequestHandler::Done> RequestHandler::stage_command(const v1::ControlRequest& request,
+                                                           const Requester& requester) {
   const auto& wanted = request.stage_command();
   const auto stream = find_stream(wanted.stream());
   if (!stream) return std::unexpected(stream.error());
   const auto found = find_command((*stream)->settings, wanted.name());
   if (!found) return of_stream(wanted.stream(), found.error());
-  const StageCommandType& type = found->change.type->commands[found->change.index];
-  const std::string_view why = type.refusal.empty() ? "the stage refused this" : type.refusal;
+  const StageType& stage = *found->change.type;
+  const StageCommandType& type = stage.commands[found->change.index];
+  std::optional<NewValue> value;
+  if (is_live_text(stage, type.name)) {
+    value = {.stage = &stage, .parameter = std::string(type.name), .value = joined_words(wanted)};
+  }
+  if (!(*stream)->is_there() && !value) {
+    return of_stream(wanted.stream(), fail(fmt::format("it is not there now, so there is nothing"
+                                                       " that could do {}",
+                                                       type.name))
+                                          .error());
+  }
+  UnderWay under_way{.requester = requester, .stage = found->stage, .value = std::move(value)};
+  under_way.refusal = type.refusal;
+  // What the text means depends on the model, which is bound when the stream comes.
+  if (!(*stream)->is_there()) return keep((*stream)->name, under_way);
   const auto command = encode_command(type, coming_model(**stream, found->stage), wanted);
   if (!command) return of_stream(wanted.stream(), command.error());
-  std::optional<LiveText> text;
-  if (is_live_text(*found->change.type, type.name)) {
-    text = {.parameter = std::string(type.name), .value = joined_words(wanted)};
-  }
-  return send(
-      **stream, {.change = found->change, .command = *command},
-      {.requester = requester, .stage = found->stage, .refusal = why, .text = std::move(text)});
+  return send(**stream, {.change = found->change, .command = *command}, std::move(under_way));
 }
 
-Result<bool> RequestHandler::take_model_part(const v1::ControlRequest& request,
-                                             const Requester& requester) {
+Result<RequestHandler::Done> RequestHandler::add_model_part(const v1::ControlRequest& request,
+                                                            const Requester& requester) {
   const auto& part = request.model_part();
   if (auto stream = find_stream(part.stream()); !stream) return std::unexpected(stream.error());
-  auto whole = uploads_.take(requester.empty() ? std::string() : requester.front(),
-                             {.stream = part.stream(),
-                              .sha256 = part.sha256(),
-                              .total = part.total(),
-                              .offset = part.offset(),
-                              .bytes = part.bytes()},
-                             clock_());
+  auto whole = uploads_.add(requester.empty() ? std::string() : requester.front(),
+                            {.stream = part.stream(),
+                             .sha256 = part.sha256(),
+                             .total = part.total(),
+                             .offset = part.offset(),
+                             .bytes = part.bytes()},
+                            clock_());
   if (!whole) return std::unexpected(whole.error());
-  if (!*whole) return true;
+  if (!*whole) return Done{};
   const std::string name = part.name().empty() ? "unnamed model" : clean_name(part.name());
-  const auto bytes = std::as_bytes(std::span(std::as_const(**whole)));
-  if (auto done = set_model(part.stream(), bytes, name, requester); !done) {
-    return std::unexpected(done.error());
-  }
-  return false;
+  return set_model(part.stream(), std::as_bytes(std::span(std::as_const(**whole))), name,
+                   requester);
 }
 
 // The file itself says for which stage it is.
-Result<> RequestHandler::set_model(const std::string& stream_name, std::span<const std::byte> bytes,
-                                   const std::string& name, const Requester& requester) {
+Result<RequestHandler::Done> RequestHandler::set_model(const std::string& stream_name,
+                                                       std::span<const std::byte> bytes,
+                                                       const std::string& name,
+                                                       const Requester& requester) {
   const auto found = find_stream(stream_name);
   if (!found) return std::unexpected(found.error());
   const ControlledStream& stream = **found;
   const auto stage = stage_for_model(stream.settings, bytes, name);
   if (!stage) return of_stream(stream.name, stage.error());
-  if (stream.skeleton == nullptr) return fail(stream.name + " has no skeleton to bind a model to");
   const StageType& type = *stream.settings.stages[*stage].type;
+  UnderWay under_way{.requester = requester, .stage = *stage};
+  under_way.file = {.stage = &type, .name = name, .bytes = {bytes.begin(), bytes.end()}};
+  if (!stream.is_there()) return keep(stream.name, under_way);
+  if (stream.skeleton == nullptr) return fail(stream.name + " has no skeleton to bind a model to");
   const auto context = pipeline::stage_context(stream.settings, *stage, stream.skeleton);
   if (!context) return std::unexpected(context.error());
   auto bound = type.bind_model(bytes, *context, name);
   if (!bound) return std::unexpected(bound.error());
+  under_way.model = std::move(*bound);
   Command command{.change = {.kind = StageChange::Kind::kModel, .type = &type},
-                  .model = bound->get()};
+                  .model = under_way.model.get()};
   const std::string hash = log::sha256_hex(bytes);
   std::copy_n(hash.begin(), std::min(hash.size(), command.model_hash.size() - 1),
               command.model_hash.begin());
   daemon_control_.keep_model(bytes);
-  return send(stream, command,
-              {.requester = requester, .stage = *stage, .model = std::move(*bound)});
+  return send(stream, command, std::move(under_way));
 }
 
 const StageModel* RequestHandler::coming_model(const ControlledStream& stream,
@@ -258,7 +309,9 @@ const StageModel* RequestHandler::coming_model(const ControlledStream& stream,
   return stream.models[stage].get();
 }
 
-Result<> RequestHandler::send(const ControlledStream& stream, Command command, UnderWay under_way) {
+Result<RequestHandler::Done> RequestHandler::send(const ControlledStream& stream, Command command,
+                                                  UnderWay under_way) {
+  if (!stream.is_there()) return keep(stream.name, under_way);
   command.stream = stream.stream;
   command.ticket = last_ticket_ + 1;
   if (under_way_.size() >= kMaxUnderWay || !daemon_control_.send(command)) {
@@ -267,7 +320,17 @@ Result<> RequestHandler::send(const ControlledStream& stream, Command command, U
   under_way.stream = stream.stream;
   under_way.name = stream.name;
   under_way_.emplace(++last_ticket_, std::move(under_way));
-  return {};
+  return Done{.under_way = true};
+}
+
+RequestHandler::Done RequestHandler::keep(const std::string& stream, const UnderWay& change) {
+  if (change.value) {
+    kept_.set(stream, *change.value->stage, change.value->parameter, change.value->value);
+  }
+  if (change.file.stage != nullptr) {
+    kept_.set_model(stream, *change.file.stage, change.file.bytes, change.file.name);
+  }
+  return {.stream = stream};
 }
 
 std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
@@ -284,6 +347,11 @@ std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
     if (gone || is_earlier(stream)) why = "it has left before this took effect";
     return refusal(std::move(done.requester), devices::about_stream(done.name, why));
   }
+  if (done.calibration) {
+    done.device->calibrated({.toml = done.calibration->text, .file = "the calibration sent last"});
+    calibrations_[done.source_number] = std::move(done.calibration);  // frees the one before it
+  }
+  static_cast<void>(keep(done.name, done));
   if (!gone) apply(stream->second, done);
   v1::ControlReply reply;
   reply.set_ok(true);
@@ -293,23 +361,87 @@ std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
 }
 
 void RequestHandler::apply(ControlledStream& stream, UnderWay& done) {
+  auto& settings = stream.settings.stages;
   if (done.model) {
-    auto& settings = stream.settings.stages[done.stage];
-    settings.model_name = done.model->name;
-    settings.model_words = done.model->words;
-    forget_texts(*done.model, settings);
+    settings[done.stage].model_name = done.model->name;
+    settings[done.stage].model_words = done.model->words;
+    devices::forget_texts(*done.model, settings[done.stage]);
     stream.models[done.stage] = std::move(done.model);  // frees the model that it replaces
     daemon_control_.stages_changed(stream.stream, stream.settings);
   }
-  if (done.text) {
-    stream.settings.stages[done.stage].parameters[done.text->parameter] = done.text->value;
-    daemon_control_.stages_changed(stream.stream, stream.settings);
+  if (!done.value ||
+      !text_command(*done.value->stage,
+                    *find_parameter(done.value->stage->parameters, done.value->parameter))) {
+    return;
   }
-  if (done.calibration) {
-    stream.calibration = std::move(done.calibration);
-    stream.device->calibrated(
-        {.toml = stream.calibration->text, .file = "the calibration sent last"});
+  settings[done.stage].parameters[done.value->parameter] = done.value->value;
+  daemon_control_.stages_changed(stream.stream, stream.settings);
+}
+
+Result<ControlledStream*> RequestHandler::find_device(const std::string& name) {
+  const auto found = find_stream(name);
+  if (found && !(*found)->source.empty()) {
+    return fail(
+        fmt::format("stream {} is a body of source {}; calibrations and haptics are for gloves",
+                    name, (*found)->source));
   }
+  if (found && !(*found)->is_there()) {
+    return fail(fmt::format("stream {} is not there now, because a stage has refused it", name));
+  }
+  return found;
+}
+
+Result<RequestHandler::Done> RequestHandler::calibrate(const v1::ControlRequest& request,
+                                                       const Requester& requester) {
+  const auto& wanted = request.calibrate();
+  const auto found = find_device(wanted.stream());
+  if (!found) return std::unexpected(found.error());
+  const ControlledStream& stream = **found;
+  auto compiled =
+      devices::compile_calibration(*stream.device->description(), wanted.toml(), wanted.name());
+  if (!compiled) return std::unexpected(compiled.error());
+  const DeviceCommand command{.kind = DeviceCommand::Kind::kCalibrate,
+                              .source = stream.source_number,
+                              .ticket = last_ticket_ + 1,
+                              .calibration = compiled->get(),
+                              .size = 0,
+                              .bytes = {}};
+  if (under_way_.size() >= kMaxUnderWay || !daemon_control_.send(command)) {
+    return fail("too many changes are under way; wait for their answers and try again");
+  }
+  under_way_.emplace(++last_ticket_, UnderWay{.requester = requester,
+                                              .stream = stream.stream,
+                                              .name = stream.name,
+                                              .calibration = std::move(*compiled),
+                                              .device = stream.device,
+                                              .source_number = stream.source_number});
+  return Done{.under_way = true};
+}
+
+Result<RequestHandler::Done> RequestHandler::send_haptics(const v1::ControlRequest& request) {
+  const auto found = find_device(request.haptics().stream());
+  if (!found) return std::unexpected(found.error());
+  const ControlledStream& stream = **found;
+  const std::string driver_name = stream.device->description()->driver;
+  const drivers::Driver* driver = drivers::find_driver(driver_name);
+  if (driver == nullptr || driver->glove == nullptr || driver->glove->encode_haptics == nullptr) {
+    return fail(fmt::format("stream {} has no haptics: driver '{}' only sends data", stream.name,
+                            driver_name));
+  }
+  const auto haptics = read_haptics(request.haptics());
+  if (!haptics) return std::unexpected(haptics.error());
+  const auto bytes = driver->glove->encode_haptics(stream.options, *haptics);
+  if (!bytes) return std::unexpected(bytes.error());
+  if (stream.device->away()) {
+    return fail("the glove of stream " + stream.name + " is away: plug it in and try again");
+  }
+  DeviceCommand command{.kind = DeviceCommand::Kind::kSend, .source = stream.source_number};
+  if (bytes->size() > command.bytes.size()) return fail("the device's message is too long");
+  command.size = static_cast<std::uint16_t>(bytes->size());
+  std::ranges::copy(*bytes, command.bytes.begin());
+  if (!daemon_control_.send(command))
+    return fail("too many messages wait for the device; send fewer");
+  return Done{};  // devices send no acknowledgement
 }
 
 std::int64_t RequestHandler::forget_old(std::int64_t now_ns) {
@@ -321,6 +453,11 @@ void RequestHandler::add_stream(ControlledStream stream) {
   const std::scoped_lock lock(mutex_);
   const std::uint32_t id = stream.stream;
   streams_.insert_or_assign(id, std::move(stream));
+}
+
+void RequestHandler::add_known(ControlledStream stream) {
+  const std::scoped_lock lock(mutex_);
+  known_.insert_or_assign(stream.name, std::move(stream));
 }
 
 void RequestHandler::remove_stream(std::uint32_t stream) {

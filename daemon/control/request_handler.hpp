@@ -15,8 +15,10 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/config/daemon_config.hpp"
 #include "daemon/control/model_folder.hpp"
 #include "daemon/control/uploads.hpp"
+#include "daemon/devices/kept_settings.hpp"
 #include "daemon/devices/present_device.hpp"
 #include "daemon/pipeline/messages.hpp"
 #include "daemon/pipeline/stream_settings.hpp"
@@ -40,7 +42,7 @@ using pipeline::kMaxUnderWay;
 
 // A stream as the control thread sees it.
 struct ControlledStream {
-  std::uint32_t stream = 0;  // id
+  std::uint32_t stream = 0;  // id; kNoStream: it is not there now, or a stage has refused it
   std::string name;
   bool publishes_raw = false;
   std::shared_ptr<const Skeleton> skeleton;  // models are bound to it; null: samples only
@@ -51,12 +53,16 @@ struct ControlledStream {
   // The device that calibrations must fit.
   std::shared_ptr<devices::PresentDevice> device = std::make_shared<devices::PresentDevice>();
   drivers::Options options;  // of its driver
-  // The calibration that was sent last and is in use by the reader; null: the one from the start.
-  std::unique_ptr<const drivers::glove::OwnedCalibration> calibration;
-  // Of a body of a device with several: the source's name in the config. Of a device with one, the
-  // reader's number is the stream's slot.
+  std::uint32_t source_number = 0;
+  // Of a body of a device with several: the source's name in the config.
   std::string source{};
+
+  [[nodiscard]] bool is_there() const noexcept { return stream != pipeline::kNoStream; }
 };
+
+// A stream of this config that is not there (yet), for add_known().
+[[nodiscard]] ControlledStream known_stream(const config::StreamConfig& config,
+                                            const std::string& source);
 
 // What the handler needs from the rest of the daemon. All calls come from the control thread.
 class DaemonControl {
@@ -90,10 +96,10 @@ struct Reply {
 
 class RequestHandler {
  public:
-  // `daemon_control` outlives the handler. Destroy the handler after the pipeline thread has ended,
-  // because it owns the models in use. The ids of `streams` are their indices, whatever
-  // ControlledStream::stream says.
-  RequestHandler(std::vector<ControlledStream> streams, DaemonControl& daemon_control,
+  // `daemon_control` outlives the handler, as does `kept`, which gets what is set for a stream.
+  // Destroy the handler after reader and pipeline thread have ended, because it owns the models and
+  // calibrations in use.
+  RequestHandler(DaemonControl& daemon_control, devices::KeptSettings& kept,
                  ModelFolder models = {}, Clock clock = system::monotonic_ns);
   ~RequestHandler();
   RequestHandler(const RequestHandler&) = delete;
@@ -112,6 +118,9 @@ class RequestHandler {
 
   // A stream comes. If its slot has an earlier generation, requests no longer reach that one.
   void add_stream(ControlledStream stream);
+  // A stream that may come. While it is not there, parameters and models that are set for it are
+  // kept until it comes. What was known of one of this name is replaced.
+  void add_known(ControlledStream stream);
   // The stream has left, and nothing reads its models any more. Commands under way to it are still
   // acknowledged; until then the handler keeps the models that they brought.
   void remove_stream(std::uint32_t stream);
@@ -126,53 +135,78 @@ class RequestHandler {
   // By id, the generations of a slot in their order. An earlier one stays until it is removed,
   // because the pipeline may still read its models.
   using Streams = std::map<std::uint32_t, ControlledStream, BySlot>;
-  // The new value of a live text.
-  struct LiveText {
-    std::string parameter, value;
+  // The new value of a live parameter.
+  struct NewValue {
+    const StageType* stage = nullptr;
+    std::string parameter{};
+    ParameterValue value{};
+  };
+  struct ModelFile {
+    const StageType* stage = nullptr;  // null: none
+    std::string name{};
+    std::vector<std::byte> bytes{};
   };
   struct UnderWay {
     Requester requester;
     std::uint32_t stream = 0;
     std::string name{};  // of the stream, for when it has left
     std::size_t stage = 0;
-    std::unique_ptr<const StageModel> model{};  // the stage's new model
-    std::string_view refusal{};                 // of a command: what the stage's refusal means
-    std::optional<LiveText> text{};             // of a command that sets one
+    std::unique_ptr<const StageModel> model{};  // the stage's new model, of this file:
+    ModelFile file{};
+    std::string_view refusal{};  // of a command: what the stage's refusal means
+    std::optional<NewValue> value{};
     std::unique_ptr<const drivers::glove::OwnedCalibration> calibration{};
+    // Of a calibration.
+    std::shared_ptr<devices::PresentDevice> device{};
+    std::uint32_t source_number = 0;
   };
-  // Success means that the command is under way; acknowledge() then makes the reply.
-  [[nodiscard]] Result<> set_parameter(const v1::ControlRequest& request,
+  // What has come of a request.
+  struct Done {
+    bool under_way = false;  // acknowledge() makes the reply
+    std::string stream{};    // for whose next start it is kept; empty: it has taken effect
+  };
+  [[nodiscard]] Result<Done> apply(const v1::ControlRequest& request,
+                                   std::span<const std::byte> model, const Requester& requester);
+  [[nodiscard]] Result<Done> set_parameter(const v1::ControlRequest& request,
+                                           const Requester& requester);
+  [[nodiscard]] Result<Done> stage_command(const v1::ControlRequest& request,
+                                           const Requester& requester);
+  [[nodiscard]] Result<Done> add_model_part(const v1::ControlRequest& request,
+                                            const Requester& requester);
+  [[nodiscard]] Result<Done> set_model(const std::string& stream, std::span<const std::byte> bytes,
+                                       const std::string& name, const Requester& requester);
+  [[nodiscard]] Result<Done> calibrate(const v1::ControlRequest& request,
                                        const Requester& requester);
-  [[nodiscard]] Result<> stage_command(const v1::ControlRequest& request,
-                                       const Requester& requester);
-  // Returns true if this was not the last piece, which is acknowledged at once.
-  [[nodiscard]] Result<bool> take_model_part(const v1::ControlRequest& request,
-                                             const Requester& requester);
-  [[nodiscard]] Result<> set_model(const std::string& stream, std::span<const std::byte> bytes,
-                                   const std::string& name, const Requester& requester);
-  [[nodiscard]] Result<> calibrate(const v1::ControlRequest& request, const Requester& requester);
   [[nodiscard]] Reply list_models(Requester requester) const;
   [[nodiscard]] Reply mark_take(const v1::ControlRequest& request, Requester requester);
-  [[nodiscard]] Result<> send_haptics(const v1::ControlRequest& request);
+  [[nodiscard]] Result<Done> send_haptics(const v1::ControlRequest& request);
   // Whether the slot has a later generation.
   [[nodiscard]] bool is_earlier(Streams::iterator stream) const;
-  // The live stream of this name: of a slot's generations, only the newest lives.
+  // The stream of this name that is there, or else is known; of a slot's generations, only the
+  // newest is there.
   [[nodiscard]] Result<ControlledStream*> find_stream(const std::string& name);
-  // The same, if requests for devices fit it.
+  // As find_stream, but fails for streams that have no single device.
   [[nodiscard]] Result<ControlledStream*> find_device(const std::string& name);
   // The stage's model by the time that a command that is sent now takes effect.
   [[nodiscard]] const StageModel* coming_model(const ControlledStream& stream,
                                                std::size_t stage) const;
-  [[nodiscard]] Result<> send(const ControlledStream& stream, pipeline::Command command,
-                              UnderWay under_way);
+  // Puts the command under way, or keeps the change for a stream that is not there.
+  [[nodiscard]] Result<Done> send(const ControlledStream& stream, pipeline::Command command,
+                                  UnderWay under_way);
+  // The stream has the new value or model from now on whenever it is built.
+  Done keep(const std::string& stream, const UnderWay& change);
   // What acknowledge() does to the stream.
   void apply(ControlledStream& stream, UnderWay& done);
 
   DaemonControl& daemon_control_;
+  devices::KeptSettings& kept_;
   const ModelFolder models_;
   Clock clock_;
   std::mutex mutex_;  // guards all below
   Streams streams_;
+  std::map<std::string, ControlledStream> known_;  // by name, also those that are there
+  // Those that were sent last and are in use by the reader, by number of the source.
+  std::map<std::uint32_t, std::unique_ptr<const drivers::glove::OwnedCalibration>> calibrations_;
   Uploads uploads_;
   std::map<std::uint64_t, UnderWay> under_way_;  // by ticket
   std::uint64_t last_ticket_ = 0;

@@ -42,7 +42,7 @@ bool Trigger::is_repeated(const TriggerMessage& message, const std::string& send
   return again;
 }
 
-void Trigger::take(std::string_view datagram, const std::string& sender) {
+void Trigger::handle(std::string_view datagram, const std::string& sender) {
   const auto message = parse_trigger(datagram);
   if (!message) {
     ++refused_;

@@ -19,7 +19,7 @@ class Trigger {
 
   // `sender`: the address that sent the datagram. What is refused is counted and written to the
   // log, which holds back repetitions.
-  void take(std::string_view datagram, const std::string& sender);
+  void handle(std::string_view datagram, const std::string& sender);
 
   [[nodiscard]] std::uint64_t marked() const noexcept { return marked_; }
   [[nodiscard]] std::uint64_t repeated() const noexcept { return repeated_; }

@@ -65,20 +65,20 @@ void TriggerServer::serve() {
   system::name_thread(kThreadName);
   while (!stop_.load(std::memory_order_acquire)) {
     pulse_.beat();
-    int taken = 0;
-    while (taken < kDatagramsARound && take_datagram()) ++taken;
+    int handled = 0;
+    while (handled < kDatagramsARound && handle_datagram()) ++handled;
     wake_->going_to_sleep();
     if (!stop_.load(std::memory_order_acquire)) {
       std::array<pollfd, 2> wait{{{.fd = wake_->fd(), .events = POLLIN, .revents = 0},
                                   {.fd = fd_, .events = POLLIN, .revents = 0}}};
-      const bool flooded = taken == kDatagramsARound;
+      const bool flooded = handled == kDatagramsARound;
       ::poll(wait.data(), flooded ? 1 : 2, flooded ? kPause_ms : kLongest_ms);
     }
     wake_->awake();
   }
 }
 
-bool TriggerServer::take_datagram() {
+bool TriggerServer::handle_datagram() {
   std::array<char, kMaxTrigger + 1> bytes;  // one more shows that it is too long
   drivers::Address sender;
   const ssize_t size = ::recvfrom(fd_, bytes.data(), bytes.size(), 0, sender.get(), &sender.size);
@@ -90,7 +90,7 @@ bool TriggerServer::take_datagram() {
         drivers::host_text(sender), ++strangers_);
     return true;
   }
-  trigger_.take({bytes.data(), static_cast<std::size_t>(size)}, drivers::host_text(sender));
+  trigger_.handle({bytes.data(), static_cast<std::size_t>(size)}, drivers::host_text(sender));
   return true;
 }
 

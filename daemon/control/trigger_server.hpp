@@ -35,7 +35,7 @@ class TriggerServer {
                 DaemonControl& daemon_control);
   void serve();
   // Returns false if none waits.
-  [[nodiscard]] bool take_datagram();
+  [[nodiscard]] bool handle_datagram();
   [[nodiscard]] bool may_send(const drivers::Address& sender) const;
 
   int fd_;

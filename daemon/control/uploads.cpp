@@ -51,10 +51,10 @@ Result<Uploads::Iterator> Uploads::find_or_begin(const std::string& client,
       .first;
 }
 
-Result<std::optional<std::string>> Uploads::take(const std::string& client, const ModelPiece& piece,
-                                                 std::int64_t now_ns) {
+Result<std::optional<std::string>> Uploads::add(const std::string& client, const ModelPiece& piece,
+                                                std::int64_t now_ns) {
   (void)forget_old(now_ns);
-  if (auto sound = check_piece(piece); !sound) return std::unexpected(sound.error());
+  if (auto valid = check_piece(piece); !valid) return std::unexpected(valid.error());
   auto found = find_or_begin(client, piece);
   if (!found) return std::unexpected(found.error());
   Upload& upload = (*found)->second;

@@ -33,9 +33,9 @@ class Uploads {
  public:
   // Adds a piece from `client`. Returns the model's bytes after the last piece, nullopt if more are
   // to come. An error ends the client's upload. A piece at offset 0 starts a new one.
-  [[nodiscard]] Result<std::optional<std::string>> take(const std::string& client,
-                                                        const ModelPiece& piece,
-                                                        std::int64_t now_ns);
+  [[nodiscard]] Result<std::optional<std::string>> add(const std::string& client,
+                                                       const ModelPiece& piece,
+                                                       std::int64_t now_ns);
   // Forgets uploads that have stalled. Returns when to call it next at the latest; for ever if none
   // is under way.
   [[nodiscard]] std::int64_t forget_old(std::int64_t now_ns);

@@ -1,6 +1,7 @@
 #include "daemon/devices/device_supervisor.hpp"
 
 #include <array>
+#include <cassert>
 
 #include <poll.h>
 #include <unistd.h>
@@ -44,7 +45,7 @@ void DeviceSupervisor::stop() noexcept {
 }
 
 void DeviceSupervisor::run() {
-  system::name_thread("dev-" + source_.name);
+  system::name_thread("dev-" + source_.config.name);
   while (!stop_.load()) {
     while (source_.slot->out.consume([this](drivers::Device* /*device_*/) { take_back(); })) {
     }
@@ -143,7 +144,8 @@ void DeviceSupervisor::look_for_device() {
   }
   source_.present->connected(device_->description);
   source_.slot->give_back.store(false);  // that request was for the previous device
-  static_cast<void>(source_.slot->in.push(device_.get()));
+  const bool given = source_.slot->in.push(device_.get());
+  assert(given);  // the reader had given back the device before
   ports_.reader->call();
   const std::string note = source_.ports->consume_note();
   ports_.report(v1::Event::KIND_FOUND,
@@ -153,7 +155,7 @@ void DeviceSupervisor::look_for_device() {
 // Refuses a device that differs from what the stream was set up for: its data would silently be
 // taken for other joints.
 Result<std::unique_ptr<drivers::Device>> DeviceSupervisor::try_open() {
-  auto opened = driver_.open(source_.options, *source_.ports);
+  auto opened = driver_.open(source_.config.options, *source_.ports);
   if (!opened) return std::unexpected(opened.error());
   auto device = std::make_unique<drivers::Device>(std::move(*opened));
   const drivers::Description& is = device->description;

@@ -11,12 +11,16 @@
 namespace posed::devices {
 namespace {
 
+constexpr double kUsualRate_hz = 120.0;     // of mocap systems that do not say
+constexpr double kUnknownRate_hz = 1000.0;  // of a device with one body that does not say
+
 // A device that may be unplugged is opened later by its supervisor, so that a slow or silent one
 // delays neither the start nor the other streams. Here only its options are checked.
 Result<> open_device(OpenSource& source) {
   const drivers::Driver& driver = *source.driver;
+  const drivers::Options& options = source.config.options;
   if (driver.expect == nullptr) {
-    auto device = driver.open(source.options, *source.ports);
+    auto device = driver.open(options, *source.ports);
     if (!device) return std::unexpected(device.error());
     source.device = std::move(*device);
     source.present->connected(source.device.description);
@@ -25,10 +29,10 @@ Result<> open_device(OpenSource& source) {
     return {};
   }
   source.endless = true;
-  auto description = driver.expect(source.options);
+  auto description = driver.expect(options);
   if (!description) return std::unexpected(description.error());
   source.ports->only_prepare(true);
-  const auto prepared = driver.open(source.options, *source.ports);
+  const auto prepared = driver.open(options, *source.ports);
   source.ports->only_prepare(false);
   if (!prepared && prepared.error().exit_code == ExitCode::kWrongUse) {
     return std::unexpected(prepared.error());
@@ -39,7 +43,8 @@ Result<> open_device(OpenSource& source) {
   return {};
 }
 
-Result<> open_calibration(const std::filesystem::path& path, OpenSource& source) {
+Result<> open_calibration(OpenSource& source) {
+  const std::filesystem::path& path = source.config.named[0].stream.calibration;
   if (path.empty()) return {};
   std::error_code ignored;
   if (!std::filesystem::exists(path, ignored)) {
@@ -84,34 +89,29 @@ Result<> load_models(const config::SourceConfig& source, ModelFiles& files) {
 
 }  // namespace
 
-Result<std::unique_ptr<OpenSource>> open_source(const SourceOptions& options) {
+Result<std::unique_ptr<OpenSource>> open_source(config::SourceConfig config, ModelFiles& files) {
   auto source = std::make_unique<OpenSource>();
-  source->name = options.name;
-  source->driver = drivers::find_driver(options.driver);
-  if (source->driver == nullptr) return misuse("there is no driver '" + options.driver + "'");
-  source->options = options.options;
+  source->driver = drivers::find_driver(config.driver);
+  if (source->driver == nullptr) return misuse("there is no driver '" + config.driver + "'");
+  source->config = std::move(config);
   source->ports = std::make_unique<drivers::TransportFactory>();
   Result<> opened = open_device(*source);
-  if (opened) opened = open_calibration(options.calibration, *source);
+  if (opened && !source->has_several()) opened = open_calibration(*source);
   if (opened) opened = open_slot(*source);
-  if (!opened) return std::unexpected(opened.error());
-  return source;
+  if (opened) opened = load_models(source->config, files);
+  if (opened) return source;
+  return of_source(*source, opened.error());
 }
 
-Result<std::unique_ptr<OpenSource>> open_source(const config::SourceConfig& config,
-                                                ModelFiles& files) {
-  if (auto loaded = load_models(config, files); !loaded) {
-    return of_source(config.name, loaded.error());
-  }
-  auto source =
-      open_source({.name = config.name, .driver = config.driver, .options = config.options});
-  if (!source) return of_source(config.name, source.error());
-  return source;
+std::unexpected<Error> of_source(const OpenSource& source, Error error) {
+  const std::string& name = source.config.name;
+  return source.has_several() ? of_source(name, std::move(error))
+                              : of_stream(name, std::move(error));
 }
 
 Result<std::string> try_kept_device(OpenSource& source) {
   if (!source.slot) return std::string();
-  auto device = source.driver->open(source.options, *source.ports);
+  auto device = source.driver->open(source.config.options, *source.ports);
   if (!device && device.error().exit_code == ExitCode::kWrongUse) {
     return std::unexpected(device.error());
   }
@@ -123,6 +123,28 @@ Result<std::string> try_kept_device(OpenSource& source) {
     if (!fits) return std::unexpected(fits.error());
   }
   return std::string();
+}
+
+drivers::Body only_body(const OpenSource& source) {
+  const drivers::Description& device = source.device.description;
+  return {.name = {},
+          .skeleton = device.skeleton,
+          .samples = device.samples,
+          .rate_hz = device.rate_hz};
+}
+
+double nominal_rate_hz(const OpenSource& source) {
+  if (source.config.rate_hz > 0.0) return source.config.rate_hz;
+  const double rate_hz = source.device.description.rate_hz;
+  return rate_hz > 0.0 || !source.has_several() ? rate_hz : kUsualRate_hz;
+}
+
+double expected_rate_hz(const OpenSource& source, const drivers::Body& body) {
+  if (source.config.rate_hz > 0.0) return source.config.rate_hz;
+  if (source.has_several()) return body.rate_hz > 0.0 ? body.rate_hz : nominal_rate_hz(source);
+  const auto& transport = source.device.transport;
+  if (transport && transport->rate_hz() > 0.0) return transport->rate_hz();
+  return body.rate_hz > 0.0 ? body.rate_hz : kUnknownRate_hz;
 }
 
 }  // namespace posed::devices

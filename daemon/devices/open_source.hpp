@@ -1,7 +1,9 @@
 // A source, that is, an opened device. `run` starts from it, and `check` tries it.
 #pragma once
 
-#include <filesystem>
+#include <cstddef>
+#include <cstdint>
+#include <expected>
 #include <memory>
 #include <string>
 
@@ -18,9 +20,9 @@
 namespace posed::devices {
 
 struct OpenSource {
-  std::string name;  // of the source, or of its only stream
+  config::SourceConfig config;
+  std::uint32_t number = 0;  // in the reader and in the log
   const drivers::Driver* driver = nullptr;
-  drivers::Options options;
   // Without transport and decoder if the device may be unplugged, because its supervisor opens it.
   // The description is there from the start, derived from the options.
   drivers::Device device;
@@ -31,27 +33,37 @@ struct OpenSource {
   std::unique_ptr<pipeline::DeviceSlot> slot;  // null for a device that cannot come back
   bool endless = false;  // never ends by itself: a device that may be unplugged, a looping clip
   pipeline::SourceCounters counters;
+  // With the reader; null while the source is only tried.
+  std::unique_ptr<pipeline::BodyExchange> exchange;
+  // How many slots of the rings to the pipeline and to the publisher a stream of it may fill.
+  std::size_t decoded_slots = 0, finished_slots = 0;
+
+  // Whether the device describes its bodies, which come and go. Else it has one from the start on.
+  [[nodiscard]] bool has_several() const { return driver->make_layout != nullptr; }
 };
 
-struct SourceOptions {
-  std::string name;
-  std::string driver;
-  drivers::Options options;             // complete
-  std::filesystem::path calibration{};  // of a glove; empty: use the device's default
-};
-
-// Opens the device, or works out from its options what it will be, and reads the calibration. Does
-// not wait for a device that may be unplugged. Cold.
-[[nodiscard]] Result<std::unique_ptr<OpenSource>> open_source(const SourceOptions& options);
-
-// The same for a device with several bodies. Reads the model files of its streams, too; they are
-// bound when a body is there. Errors name the source.
-[[nodiscard]] Result<std::unique_ptr<OpenSource>> open_source(const config::SourceConfig& config,
+// Opens the device, or works out from its options what it will be, reads the calibration, and loads
+// the model files of the source's streams, which are bound when a body is there. Does not wait for
+// a device that may be unplugged. Errors name the source, or the stream of a device with one body.
+// Cold.
+[[nodiscard]] Result<std::unique_ptr<OpenSource>> open_source(config::SourceConfig config,
                                                               ModelFiles& files);
+
+// The error, with the name of the source in its message, or that of the only stream.
+[[nodiscard]] std::unexpected<Error> of_source(const OpenSource& source, Error error);
 
 // For a command that needs the result now (`check`): opens the device that a supervisor would open,
 // and tries the calibration on it. Returns an empty string, or one sentence that says why the
 // device is not there now. May take a few seconds. Cold.
 [[nodiscard]] Result<std::string> try_kept_device(OpenSource& source);
+
+// The one body of a device that does not describe its bodies.
+[[nodiscard]] drivers::Body only_body(const OpenSource& source);
+
+// Frames a second of each body as the config, the driver or the device's description say; 0: they
+// do not. A device with several bodies that does not say has the usual rate of mocap systems.
+[[nodiscard]] double nominal_rate_hz(const OpenSource& source);
+// The rate for which rings and queues make room for one of its bodies; never 0.
+[[nodiscard]] double expected_rate_hz(const OpenSource& source, const drivers::Body& body);
 
 }  // namespace posed::devices

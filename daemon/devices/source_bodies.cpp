@@ -1,6 +1,7 @@
 #include "daemon/devices/source_bodies.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -13,7 +14,6 @@
 namespace posed::devices {
 namespace {
 
-constexpr double kUsualRate_hz = 120.0;  // of mocap systems that do not say
 // Streams that one run of the daemon makes. A device log has no room for more.
 constexpr std::size_t kMaxMade = 60'000;
 
@@ -24,25 +24,42 @@ bool same_body(const drivers::Body& a, const drivers::Body& b) {
 
 }  // namespace
 
-double nominal_rate_hz(const BodySource& source) {
-  if (source.config.rate_hz > 0.0) return source.config.rate_hz;
-  const double rate_hz = source.source->device.description.rate_hz;
-  return rate_hz > 0.0 ? rate_hz : kUsualRate_hz;
-}
-
-SourceBodies::SourceBodies(SharedBodies& shared, BodySource& source)
+SourceBodies::SourceBodies(SharedBodies& shared, OpenSource& source)
     : shared_(shared), source_(source) {}
 
 SourceBodies::~SourceBodies() = default;
+
+void SourceBodies::reserve_only() {
+  const auto id = shared_.slots.next_free(true);
+  assert(id);  // the config reader makes sure that there is a slot for each stream that it names
+  ++shared_.made;
+  streams_.push_back({.key = "\n1",
+                      .name = source_.config.named[0].stream.name,
+                      .id = *id,
+                      .body = only_body(source_),
+                      .named = true});
+}
+
+Result<> SourceBodies::build_only() {
+  only_.emplace(make(streams_[0], source_.config.named[0].stream));
+  if (!only_->engine) return misuse(only_->refusal);
+  return {};
+}
+
+void SourceBodies::add_only() {
+  shared_.host.add(std::move(*only_));
+  only_.reset();
+}
 
 // One update after the other: the streams of an earlier one must have left before their slots and
 // their names can be used again.
 std::int64_t SourceBodies::due_ns(std::int64_t now_ns) const {
   const bool busy = sent_ || !leaving_.empty();
-  if (busy || !(source_.exchange->descriptions.has_new() || may_have_slot())) {
-    return system::kForever_ns;
-  }
-  return std::max(now_ns, next_ns_);
+  const auto& descriptions = source_.exchange->descriptions;
+  const auto outdated = [this](const Stream& stream) { return is_outdated(stream); };
+  const bool wanted = (descriptions && descriptions->has_new()) || may_have_slot() ||
+                      std::ranges::any_of(streams_, outdated);
+  return busy || !wanted ? system::kForever_ns : std::max(now_ns, next_ns_);
 }
 
 // Whether a body without a slot may get one now.
@@ -50,12 +67,30 @@ bool SourceBodies::may_have_slot() const {
   return without_slot_ > 0 && shared_.slots.freed() != freed_;
 }
 
+// A stage is made for its partners, so it is made again when one comes or has become another
+// stream. A partner that has only left sends nothing more. A refused stream may fit what control
+// has set.
+bool SourceBodies::is_outdated(const Stream& stream) const {
+  if (shared_.made >= kMaxMade) return false;
+  const auto& state = shared_.host.counters(stream.id).pipeline.state;
+  const bool ended = !stream.refused && state.load() == pipeline::StreamState::kEnded;
+  if (ended) return false;  // nothing more comes to it
+  const bool changed = shared_.kept.changes(stream.name) != stream.changes;
+  if (stream.missed_change || (stream.refused && changed)) return true;
+  return std::ranges::any_of(stream.partners, [this](const auto& partner) {
+    const auto now = shared_.partners.find(partner.first);
+    return now != shared_.partners.end() && now->second.stream != partner.second;
+  });
+}
+
 void SourceBodies::turn(std::int64_t now_ns) {
   take_back();
   if (shared_.is_stopped() || due_ns(now_ns) > now_ns) return;
   next_ns_ = now_ns + SourceBuilder::kBetweenUpdates_ns;
-  static_cast<void>(source_.exchange->descriptions.take(description_));
-  build();
+  std::vector<std::byte> newest = description_;
+  auto& descriptions = source_.exchange->descriptions;
+  if (descriptions) static_cast<void>(descriptions->receive(newest));
+  build(std::move(newest));
 }
 
 bool SourceBodies::gone(std::uint32_t id) {
@@ -77,23 +112,29 @@ void SourceBodies::take_back() {
   }
 }
 
-void SourceBodies::build() {
-  auto layout = source_.source->driver->make_layout(description_);
-  if (!layout) {
-    return warn(
-        "it describes its bodies in a way that posed cannot use, so they stay as they are: " +
-        layout.error().text());
+void SourceBodies::build(std::vector<std::byte> description) {
+  auto update = std::make_unique<pipeline::SourceUpdate>();
+  const std::vector<drivers::Body> only{source_.has_several() ? drivers::Body{}
+                                                              : only_body(source_)};
+  if (source_.has_several()) {
+    auto layout = source_.driver->make_layout(description);
+    if (!layout) {
+      return warn(
+          "it describes its bodies in a way that posed cannot use, so they stay as they are: " +
+          layout.error().text());
+    }
+    if ((*layout)->bodies.size() > kMaxBodies) {
+      return warn(
+          fmt::format("it describes {} bodies; posed takes {} of one source, so they stay as"
+                      " they are",
+                      (*layout)->bodies.size(), kMaxBodies));
+    }
+    update->layout = std::move(*layout);
   }
-  if ((*layout)->bodies.size() > kMaxBodies) {
-    return warn(
-        fmt::format("it describes {} bodies; posed takes {} of one source, so they stay as"
-                    " they are",
-                    (*layout)->bodies.size(), kMaxBodies));
-  }
+  description_ = std::move(description);
   without_slot_ = without_name_ = 0;
   freed_ = shared_.slots.freed();
-  auto update = std::make_unique<pipeline::SourceUpdate>();
-  std::vector<Stream> now = streams_of((*layout)->bodies, *update);
+  std::vector<Stream> now = streams_of(update->layout ? update->layout->bodies : only, *update);
   if (shared_.is_stopped()) return;  // perhaps not all of them, so the reader must not have them
   const std::vector<Stream> before = std::exchange(streams_, std::move(now));
   for (const Stream& stream : before) {
@@ -105,17 +146,17 @@ void SourceBodies::build() {
   std::vector<std::uint32_t> ids(update->bodies.size());
   std::ranges::transform(update->bodies, ids.begin(), &pipeline::ReadBody::stream);
   update->log = pipeline::pack_description(ids, description_);
-  update->layout = std::move(*layout);
   sent_ = std::move(update);
-  // never full: the next update waits until this one was taken
-  static_cast<void>(source_.exchange->updates.push(sent_.get()));
+  const bool sent = source_.exchange->updates.push(sent_.get());
+  assert(sent);  // the next update waits until the reader has accepted this one
   shared_.host.call_reader();
-  tell();
+  report_oddities();
 }
 
 // What is odd about a description that is in use.
-void SourceBodies::tell() {
-  const std::uint64_t replaced = source_.exchange->descriptions.replaced();
+void SourceBodies::report_oddities() {
+  const auto& descriptions = source_.exchange->descriptions;
+  const std::uint64_t replaced = descriptions ? descriptions->replaced() : 0;
   const std::uint64_t skipped = replaced - std::exchange(replaced_, replaced);
   if (too_many_made_) {
     warn(
@@ -147,20 +188,31 @@ void SourceBodies::warn(const std::string& sentence) {
 }
 
 // The streams of these bodies. Those that stay are the same as before; the others are new, and
-// known to the host from now on.
+// known to the host from now on. Those whose stages name partners are built last, because these may
+// be among the others.
 std::vector<SourceBodies::Stream> SourceBodies::streams_of(const std::vector<drivers::Body>& bodies,
                                                            pipeline::SourceUpdate& update) {
-  std::vector<Stream> streams;
+  struct Wanted {
+    std::size_t body;
+    int number;
+    const config::StreamConfig* config;
+  };
+  std::vector<Wanted> all;
   std::map<std::string, int> called;
-  for (const drivers::Body& body : bodies) {
+  for (std::size_t body = 0; body < bodies.size(); ++body) {
+    const int number = ++called[bodies[body].name];
+    const config::StreamConfig* const config = wanted(bodies[body].name, number);
+    if (config != nullptr) all.push_back({body, number, config});
+  }
+  std::ranges::stable_partition(all,
+                                [](const Wanted& one) { return partners_of(*one.config).empty(); });
+  update.bodies.resize(bodies.size());
+  std::vector<Stream> streams;
+  for (const Wanted& one : all) {
     if (shared_.is_stopped()) break;
-    pipeline::ReadBody& read = update.bodies.emplace_back();
-    const int number = ++called[body.name];
-    const config::StreamConfig* config = wanted(body.name, number);
-    if (config == nullptr) continue;
-    auto stream = stream_of(body, number, *config);
+    auto stream = stream_of(bodies[one.body], one.number, *one.config);
     if (!stream) continue;
-    if (!stream->refused) read = read_body(*stream);
+    if (!stream->refused) update.bodies[one.body] = read_body(*stream);
     streams.push_back(std::move(*stream));
   }
   return streams;
@@ -179,11 +231,14 @@ std::optional<SourceBodies::Stream> SourceBodies::stream_of(const drivers::Body&
   Stream stream;
   stream.key = body.name + "\n" + std::to_string(number);
   const auto now = std::ranges::find(streams_, stream.key, &Stream::key);
-  if (now != streams_.end() && same_body(now->body, body)) return *now;
+  if (now != streams_.end() && same_body(now->body, body) && !is_outdated(*now)) return *now;
   stream.body = body;
   if (!choose_name(stream, number, config)) return std::nullopt;
   if (!choose_slot(stream, now == streams_.end() ? nullptr : &*now)) return std::nullopt;
-  add(stream, config);
+  NewStream made = make(stream, config);
+  shared_.host.add(std::move(made));
+  // Control took the stream for absent until now.
+  stream.missed_change = shared_.kept.changes(stream.name) != stream.changes;
   return stream;
 }
 
@@ -203,7 +258,7 @@ bool SourceBodies::choose_slot(Stream& stream, const Stream* earlier) {
   too_many_made_ = shared_.made >= kMaxMade;
   if (too_many_made_) return false;
   const auto id =
-      earlier != nullptr ? StreamSlots::next(earlier->id) : shared_.slots.take(stream.named);
+      earlier != nullptr ? StreamSlots::next(earlier->id) : shared_.slots.next_free(stream.named);
   if (!id) ++without_slot_;
   if (!id) return false;
   stream.id = *id;
@@ -214,21 +269,34 @@ bool SourceBodies::choose_slot(Stream& stream, const Stream* earlier) {
   return true;
 }
 
-void SourceBodies::add(Stream& stream, const config::StreamConfig& config) {
-  NewStream added{.id = stream.id,
-                  .source = source_,
-                  .body = stream.body,
-                  .config = config,
-                  .rate_hz = rate_of(stream.body)};
-  added.config.name = stream.name;
-  if (auto made = make_engine_of(added); !made) added.refusal = made.error().text();
-  stream.refused = !added.engine.has_value();
-  shared_.host.add(std::move(added));
+NewStream SourceBodies::make(Stream& stream, const config::StreamConfig& config) {
+  stream.changes = shared_.kept.changes(stream.name);
+  for (const std::string& name : partners_of(config)) {
+    const auto partner = shared_.partners.find(name);
+    stream.partners[name] =
+        partner == shared_.partners.end() ? pipeline::kNoStream : partner->second.stream;
+  }
+  NewStream made{.id = stream.id,
+                 .source = source_,
+                 .body = stream.body,
+                 .config = config,
+                 .rate_hz = expected_rate_hz(source_, stream.body)};
+  made.config.name = stream.name;
+  if (auto engine = make_engine_of(made); !engine) made.refusal = engine.error().text();
+  stream.refused = !made.engine.has_value();
+  if (!stream.refused) {
+    shared_.partners[stream.name] = {
+        .stream = stream.id,
+        .about = {.skeleton = made.stages.published, .rate_hz = made.stages.settings.rate_hz}};
+  }
+  return made;
 }
 
 Result<> SourceBodies::make_engine_of(NewStream& stream) const {
-  auto stages = load_stages(stream.config, stream.body.skeleton, stream.rate_hz, shared_.models,
-                            shared_.partners);
+  // A device with one body that does not state its rate leaves it open.
+  const double rate_hz = source_.has_several() ? stream.rate_hz : stream.body.rate_hz;
+  auto stages = load_stages(stream.config, stream.body.skeleton, rate_hz, shared_.models,
+                            shared_.partners, &shared_.kept);
   if (!stages) return std::unexpected(stages.error());
   stream.stages = std::move(*stages);
   auto bound = bind_stages(stream.stages);
@@ -240,19 +308,18 @@ Result<> SourceBodies::make_engine_of(NewStream& stream) const {
   return {};
 }
 
-double SourceBodies::rate_of(const drivers::Body& body) const {
-  if (source_.config.rate_hz > 0.0) return source_.config.rate_hz;
-  return body.rate_hz > 0.0 ? body.rate_hz : nominal_rate_hz(source_);
-}
-
 pipeline::ReadBody SourceBodies::read_body(const Stream& stream) const {
   return {.stream = stream.id,
           .counters = &shared_.host.counters(stream.id),
-          .slots = shared_.host.decoded_slots()};
+          .slots = source_.decoded_slots};
 }
 
 void SourceBodies::forget(const Stream& stream) {
   shared_.host.remove(stream.id);
+  const auto partner = shared_.partners.find(stream.name);
+  if (partner != shared_.partners.end() && partner->second.stream == stream.id) {
+    shared_.partners.erase(partner);
+  }
   shared_.numbers[stream.name] = pipeline::next_numbers(shared_.host.counters(stream.id));
   const auto has_slot = [&](const Stream& other) {
     return pipeline::slot_of(other.id) == pipeline::slot_of(stream.id);

@@ -3,25 +3,53 @@
 #include <algorithm>
 #include <utility>
 
+#include "daemon/devices/about_stream.hpp"
 #include "daemon/system/clock.hpp"
 
 namespace posed::devices {
+namespace {
 
-SourceBuilder::SourceBuilder(std::vector<std::unique_ptr<BodySource>>& sources, StreamSlots slots,
+// Streams that the config names.
+std::size_t count_named(const std::vector<std::unique_ptr<OpenSource>>& sources) {
+  std::size_t named = 0;
+  for (const auto& source : sources) named += source->config.named.size();
+  return named;
+}
+
+}  // namespace
+
+SourceBuilder::SourceBuilder(std::vector<std::unique_ptr<OpenSource>>& sources, std::uint32_t slots,
                              std::set<std::string> reserved, ModelFiles& models,
-                             const pipeline::PartnerStreams& partners, StreamHost& host)
+                             const KeptSettings& kept, StreamHost& host)
     : shared_{.host = host,
-              .slots = std::move(slots),
+              .slots = StreamSlots(slots, count_named(sources)),
               .names = BodyNames(std::move(reserved)),
               .models = models,
-              .partners = partners} {
+              .kept = kept} {
   for (const auto& source : sources) {
     sources_.push_back(std::make_unique<SourceBodies>(shared_, *source));
+    if (source->has_several()) continue;
+    only_.push_back(sources_.back().get());
+    only_configs_.push_back(&source->config.named[0].stream);
   }
 }
 
+Result<> SourceBuilder::open() {
+  for (SourceBodies* const source : only_) source->reserve_only();
+  for (const std::size_t i : building_order(only_configs_)) {
+    if (auto built = only_[i]->build_only(); !built) {
+      return of_stream(only_configs_[i]->name, built.error());
+    }
+  }
+  return {};
+}
+
+void SourceBuilder::begin() {
+  for (SourceBodies* const source : only_) source->add_only();
+}
+
 std::int64_t SourceBuilder::turn(std::int64_t now_ns) {
-  while (const auto id = shared_.host.take_gone()) {
+  while (const auto id = shared_.host.next_gone()) {
     for (const auto& source : sources_) {
       if (source->gone(*id)) break;
     }

@@ -1,6 +1,7 @@
-// The slots of the streams that come and go. Cold.
+// The slots of the streams. Cold.
 #pragma once
 
+#include <cassert>
 #include <cstdint>
 #include <deque>
 #include <optional>
@@ -11,19 +12,18 @@ namespace posed::devices {
 
 class StreamSlots {
  public:
-  // The slots from `first` on; those before it belong to the streams from the start. `reserved` of
-  // them are only for streams that the config names.
-  StreamSlots(std::uint32_t first, std::uint32_t count, std::size_t reserved)
-      : reserved_(reserved) {
-    for (std::uint32_t slot = first; slot < first + count; ++slot) free_.push_back({slot, 0});
+  // `reserved` of them are only for streams that the config names.
+  StreamSlots(std::uint32_t count, std::size_t reserved) : reserved_(reserved) {
+    for (std::uint32_t slot = 0; slot < count; ++slot) free_.push_back({slot, 0});
   }
 
   // A free slot with a generation that it never had, as a stream id: that of the slot that is free
   // for the longest time. Empty if none is free.
-  [[nodiscard]] std::optional<std::uint32_t> take(bool named) {
+  [[nodiscard]] std::optional<std::uint32_t> next_free(bool named) {
     if (free_.size() <= (named ? 0 : reserved_)) return std::nullopt;
     const Slot slot = free_.front();
     free_.pop_front();
+    assert(!named || reserved_ > 0);  // each named stream has one at a time
     if (named) --reserved_;
     return pipeline::stream_id(slot.number, slot.generation);
   }
@@ -35,7 +35,7 @@ class StreamSlots {
     return pipeline::stream_id(pipeline::slot_of(stream), generation + 1);
   }
 
-  // The slot's last stream has left; `named` as in take().
+  // The slot's last stream has left; `named` as in next_free().
   void give_back(std::uint32_t stream, bool named) {
     if (named) ++reserved_;
     ++freed_;

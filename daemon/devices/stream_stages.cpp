@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "daemon/devices/kept_settings.hpp"
+#include "models/stage_type.hpp"
 #include "models/stages/registry.hpp"
 
 namespace posed::devices {
@@ -27,11 +29,24 @@ Result<std::vector<config::StageConfig>> stages_of(const config::StreamConfig& c
   return stages;
 }
 
+// Puts the stream behind those that it names; a stream that has its place already stays there.
+void place(std::size_t stream, const std::vector<const config::StreamConfig*>& streams,
+           std::vector<bool>& placed, std::vector<std::size_t>& order) {
+  if (placed[stream]) return;
+  placed[stream] = true;
+  const std::set<std::string> partners = partners_of(*streams[stream]);
+  for (std::size_t i = 0; i < streams.size(); ++i) {
+    if (partners.contains(streams[i]->name)) place(i, streams, placed, order);
+  }
+  order.push_back(stream);
+}
+
 }  // namespace
 
 Result<LoadedStages> load_stages(const config::StreamConfig& config,
                                  std::shared_ptr<const Skeleton> skeleton, double rate_hz,
-                                 ModelFiles& files, const pipeline::PartnerStreams& partners) {
+                                 ModelFiles& files, const pipeline::PartnerStreams& partners,
+                                 const KeptSettings* kept) {
   LoadedStages loaded;
   loaded.settings = {
       .publish_raw = config.publish_raw, .stale_after_s = config.stale_after_s, .rate_hz = rate_hz};
@@ -53,6 +68,7 @@ Result<LoadedStages> load_stages(const config::StreamConfig& config,
     if (!bytes) return std::unexpected(bytes.error());
     file = std::move(*bytes);
   }
+  if (kept != nullptr) kept->apply(config.name, loaded);
   if (auto found = pipeline::find_partners(loaded.settings, partners); !found) {
     return std::unexpected(found.error());
   }
@@ -60,6 +76,47 @@ Result<LoadedStages> load_stages(const config::StreamConfig& config,
   if (!published) return std::unexpected(published.error());
   loaded.published = std::move(*published);
   return loaded;
+}
+
+pipeline::StreamSettings possible_settings(const config::StreamConfig& config) {
+  pipeline::StreamSettings settings{.publish_raw = config.publish_raw,
+                                    .stale_after_s = config.stale_after_s};
+  for (const StageType* type : stage_types()) {
+    const auto named = std::ranges::find(config.stages, type, &config::StageConfig::type);
+    const bool off = std::ranges::find(config.off, type) != config.off.end();
+    if (named != config.stages.end()) {
+      settings.stages.push_back({.type = type, .parameters = named->parameters});
+    } else if (config.default_stages && !off && type->is_default != nullptr) {
+      settings.stages.push_back(pipeline::stage_settings(*type));
+    }
+  }
+  return settings;
+}
+
+void forget_texts(const StageModel& model, pipeline::StageSettings& settings) {
+  for (const StageCommandType& command : settings.type->commands) {
+    if (!is_live_text(*settings.type, command.name)) continue;
+    auto& text = settings.parameters.at(std::string(command.name));
+    const std::vector<std::string> words{std::get<std::string>(text)};
+    if (!command.encode(&model, words, {})) text = std::string();
+  }
+}
+
+std::set<std::string> partners_of(const config::StreamConfig& config) {
+  std::set<std::string> partners;
+  for (const config::StageConfig& stage : config.stages) {
+    for (const std::string& name : pipeline::partner_names(*stage.type, stage.parameters)) {
+      if (!name.empty()) partners.insert(name);
+    }
+  }
+  return partners;
+}
+
+std::vector<std::size_t> building_order(const std::vector<const config::StreamConfig*>& streams) {
+  std::vector<std::size_t> order;
+  std::vector<bool> placed(streams.size());
+  for (std::size_t i = 0; i < streams.size(); ++i) place(i, streams, placed, order);
+  return order;
 }
 
 std::vector<const StageModel*> BoundStages::borrowed() const {
@@ -82,6 +139,7 @@ Result<BoundStages> bind_stages(LoadedStages& stages) {
       if (!ready) return std::unexpected(ready.error());
       model = std::move(*ready);
       stage.model_words = model->words;
+      if (stages.with_set_model.contains(stage.type)) forget_texts(*model, stage);
     }
     if (stage.type->first_command == nullptr) continue;
     const auto first = stage.type->first_command(stage.parameters, model.get(), file);

@@ -1,10 +1,10 @@
-// The stages of a stream: which ones it has by its config, their models, and its engine. The same
-// for the stream of a one-body device and for a body of a source. All cold; errors do not name the
-// stream.
+// The stages of a stream: which ones it has by its config, their models, and its engine. All cold;
+// errors do not name the stream.
 #pragma once
 
 #include <cstdint>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -24,14 +24,33 @@ struct LoadedStages {
   // For the engine; without the hashes of the models, which only the recorder knows.
   pipeline::StreamSettings settings;
   std::vector<ModelBytes> model_files;  // the bytes of each stage's model file; null without one
+  // Stages whose model control has set. Live texts that only another model knows, such as weights
+  // of its styles, then stand for their defaults.
+  std::set<const StageType*> with_set_model;
 };
 
+class KeptSettings;
+
 // Chooses the stages and reads their model files. `rate_hz` is the stream's nominal rate, 0 when
-// unknown; `partners` are the streams that stages may name.
+// unknown; `partners` are the streams that stages may name and that are there; `kept` replaces what
+// the config says, null: nothing.
 [[nodiscard]] Result<LoadedStages> load_stages(const config::StreamConfig& config,
                                                std::shared_ptr<const Skeleton> skeleton,
                                                double rate_hz, ModelFiles& files,
-                                               const pipeline::PartnerStreams& partners);
+                                               const pipeline::PartnerStreams& partners,
+                                               const KeptSettings* kept = nullptr);
+// The stages that a stream of this config may have, before its skeleton is known: those that only
+// some skeletons have are among them.
+[[nodiscard]] pipeline::StreamSettings possible_settings(const config::StreamConfig& config);
+
+// Live texts that the model does not take get their defaults.
+void forget_texts(const StageModel& model, pipeline::StageSettings& settings);
+
+// The streams that the stages of the config name as partners.
+[[nodiscard]] std::set<std::string> partners_of(const config::StreamConfig& config);
+// The order in which to build the streams: each after those that its stages name.
+[[nodiscard]] std::vector<std::size_t> building_order(
+    const std::vector<const config::StreamConfig*>& streams);
 
 // What the stages of a stream start with.
 struct BoundStages {

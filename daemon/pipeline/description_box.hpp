@@ -1,6 +1,6 @@
 // DescriptionBox passes what a device says about its bodies from the reader to the cold thread that
-// builds skeletons and stages from it. Only the newest description counts: one that was not taken
-// in time is replaced. Most devices repeat their description; a repetition is ignored.
+// builds skeletons and stages from it. Only the newest description counts: one that was not
+// received in time is replaced. Most devices repeat their description; a repetition is ignored.
 #pragma once
 
 #include <algorithm>
@@ -23,7 +23,7 @@ namespace posed::pipeline {
 // them.
 class DescriptionBox {
  public:
-  // `wake` is notified when there is something to take; it outlives the box.
+  // `wake` is notified when there is something to receive; it outlives the box.
   explicit DescriptionBox(system::EventFd& wake) : wake_(wake) {
     for (Buffer& buffer : buffers_) buffer.bytes = std::make_unique<std::byte[]>(kMaxDescription);
   }
@@ -42,16 +42,16 @@ class DescriptionBox {
     wake_.notify();
   }
 
-  // How many descriptions were replaced before they were taken. Any thread.
+  // How many descriptions were replaced before they were received. Any thread.
   [[nodiscard]] std::uint64_t replaced() const noexcept { return replaced_.load(); }
 
-  // Consumer. Whether take() would return a description.
+  // Consumer. Whether receive() would return a description.
   [[nodiscard]] bool has_new() const noexcept {
     return (newest_.load(std::memory_order_acquire) & kNew) != 0;
   }
 
   // Consumer. The newest description; false when there is none since the last call.
-  [[nodiscard]] bool take(std::vector<std::byte>& bytes) {
+  [[nodiscard]] bool receive(std::vector<std::byte>& bytes) {
     if (!has_new()) return false;
     reading_ = newest_.exchange(reading_, std::memory_order_acq_rel) & kIndex;
     const Buffer& buffer = buffers_[reading_];
@@ -61,7 +61,7 @@ class DescriptionBox {
 
  private:
   static constexpr std::uint8_t kIndex = 3;
-  static constexpr std::uint8_t kNew = 4;  // was not taken yet
+  static constexpr std::uint8_t kNew = 4;  // was not received yet
   struct Buffer {
     std::unique_ptr<std::byte[]> bytes;
     std::size_t size = 0;

@@ -30,7 +30,7 @@ void DeviceClock::restart() noexcept {
   jumps_ = jumps;
 }
 
-ClockMapping DeviceClock::take(std::int64_t device_ns, std::int64_t arrival_ns) noexcept {
+ClockMapping DeviceClock::observe(std::int64_t device_ns, std::int64_t arrival_ns) noexcept {
   if (!plausible(device_ns) || !plausible(arrival_ns)) return mapping_;
   const std::int64_t delay_ns = arrival_ns - device_ns;
   if (jumped(device_ns, delay_ns)) {

@@ -21,13 +21,13 @@ class DeviceClock {
  public:
   // Adds one packet and returns the new mapping. A packet without device time (kNoTime_ns) changes
   // nothing. If the device's time jumps (the device restarted), the estimate starts again.
-  ClockMapping take(std::int64_t device_ns, std::int64_t arrival_ns) noexcept;
+  ClockMapping observe(std::int64_t device_ns, std::int64_t arrival_ns) noexcept;
 
   // Adds the frame as a packet and writes the mapping to its header. Does nothing for a frame that
   // has no device time stamp.
   void stamp(Frame& frame) noexcept {
     if (frame.source != Source::kDevice) return;
-    frame.header.clock = take(frame.header.device_ns, frame.header.arrival_ns);
+    frame.header.clock = observe(frame.header.device_ns, frame.header.arrival_ns);
   }
 
   // A new link to the device was opened: forgets what the old link showed.

@@ -1,13 +1,16 @@
 #include "daemon/pipeline/intake.hpp"
 
+#include <cassert>
+
 #include "posed/v1/posed.pb.h"
 
 namespace posed::pipeline {
 
 void Intake::set_streams(std::span<const StreamPosition> of_body) noexcept {
+  assert(of_body.size() <= kMaxBodies);
   count_ = 0;
   place_of_.fill(kNoPlace);
-  for (std::size_t body = 0; body < of_body.size() && body < place_of_.size(); ++body) {
+  for (std::size_t body = 0; body < of_body.size(); ++body) {
     if (of_body[body].stream == kNoStream) continue;
     place_of_[body] = static_cast<std::uint8_t>(count_);
     streams_[count_++] = of_body[body];
@@ -58,12 +61,23 @@ void Intake::sample(std::size_t body, Sample& sample) noexcept {
 
 bool Intake::report(std::size_t place, std::uint8_t event, std::uint64_t ticket,
                     std::string_view name) noexcept {
+  return put_event(place, {.kind = event, .ticket = ticket, .after = ShortText(name)});
+}
+
+bool Intake::report_end(std::size_t place, bool leaves) noexcept {
+  return put_event(place, {.kind = v1::Event::KIND_ENDED, .leaves = leaves});
+}
+
+bool Intake::put_event(std::size_t place, const StreamEvent& event) noexcept {
+  assert(place < count_);
   const StreamPosition& stream = streams_[place];
   item_.kind = Item::Kind::kEvent;
   item_.number = next_item_;
-  item_.stream_event = {stream.stream, event, arrival_ns_, stream.frame - 1, 0.0, ticket};
+  item_.stream_event = event;
+  item_.stream_event.stream = stream.stream;
+  item_.stream_event.time_ns = arrival_ns_;
+  item_.stream_event.sequence = stream.frame - 1;
   item_.stream_event.last_sample = stream.sample - 1;
-  item_.stream_event.after = ShortText(name);
   if (!out_.item(place, item_)) return false;
   ++next_item_;
   return true;

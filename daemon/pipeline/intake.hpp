@@ -63,6 +63,8 @@ class Intake final : public Sink {
   // the ring is full; the caller may try again. `name` is the calibration that the event is about.
   [[nodiscard]] bool report(std::size_t place, std::uint8_t event, std::uint64_t ticket,
                             std::string_view name = {}) noexcept;
+  // Emits the end of a stream in the same way; `leaves` as in StreamEvent.
+  [[nodiscard]] bool report_end(std::size_t place, bool leaves) noexcept;
 
   // Sink: called by the decoder.
   void frame(std::size_t body, Frame& frame) noexcept override;
@@ -79,6 +81,7 @@ class Intake final : public Sink {
     return body < place_of_.size() ? place_of_[body] : kNoPlace;
   }
   void report_jump() noexcept;
+  [[nodiscard]] bool put_event(std::size_t place, const StreamEvent& event) noexcept;
   // Hands item_ over. It uses up a number even if the ring is full.
   void put(std::size_t place) noexcept;
 

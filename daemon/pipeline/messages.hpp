@@ -27,14 +27,18 @@ struct StageChange {
 
 // Something that happened to a stream; published on event/<stream>.
 struct StreamEvent {
-  std::uint32_t stream;
-  std::uint8_t kind;  // posed.v1.Event.Kind
-  std::int64_t time_ns;
-  std::uint64_t sequence;
-  double value;
-  std::uint64_t ticket = 0;       // of the command that caused it; 0 if no reply is expected
-  std::uint64_t last_sample = 0;  // of KIND_ENDED from the reader: sequence of the last sample
-  StageChange change{};           // of KIND_CONTROL and KIND_PLAYING
+  std::uint32_t stream = 0;
+  std::uint8_t kind = 0;  // posed.v1.Event.Kind
+  std::int64_t time_ns = 0;
+  std::uint64_t sequence = 0;
+  double value = 0.0;
+  std::uint64_t ticket = 0;  // of the command that caused it; 0 if no reply is expected
+  // Of KIND_ENDED: the sequence of the last sample, if the event comes from the reader; and whether
+  // the stream gives its slot back, because its body has left or changed. It keeps the slot if its
+  // source has ended.
+  std::uint64_t last_sample = 0;
+  bool leaves = false;
+  StageChange change{};  // of KIND_CONTROL and KIND_PLAYING
   // The old and the new value, so that the event can name both.
   double value_before = 0.0;    // StageChange::kSet: the target until now
   ShortText before{}, after{};  // names of models and calibrations; what a stage's command does
@@ -117,7 +121,7 @@ static_assert(std::is_trivially_copyable_v<Command>);
 struct DeviceCommand {
   enum class Kind : std::uint8_t { kCalibrate, kSend };
   Kind kind = Kind::kSend;
-  std::uint32_t stream = 0;
+  std::uint32_t source = 0;                                       // its number
   std::uint64_t ticket = 0;                                       // kCalibrate: returned in the Ack
   const drivers::glove::OwnedCalibration* calibration = nullptr;  // owned by the cold side
   std::uint16_t size = 0;                                         // kSend

@@ -3,6 +3,7 @@
 // reader's items alone decides what a stage knows, live and in replay. RT-safe, but for reserve().
 #pragma once
 
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -14,18 +15,20 @@ namespace posed::pipeline {
 class PartnerRoutes {
  public:
   // How many engines there may be at once. Cold.
-  void reserve(std::size_t engines) { hearers_.resize(engines); }
+  void reserve(std::size_t engines) { receivers_.resize(engines); }
 
   // From now on the engine gets its partners' frames, if it has partners; `out` gets what it makes
   // of them. Both stay until remove().
   void add(StreamEngine& engine, EngineOut& out) noexcept {
-    if (!engine.feeds().empty()) hearers_[count_++] = {&engine, &out};
+    if (engine.feeds().empty()) return;
+    assert(count_ < receivers_.size());
+    receivers_[count_++] = {&engine, &out};
   }
   // Does nothing for an engine that is not there.
   void remove(const StreamEngine& engine) noexcept {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < count_; ++i) {
-      if (hearers_[i].engine != &engine) hearers_[kept++] = hearers_[i];
+      if (receivers_[i].engine != &engine) receivers_[kept++] = receivers_[i];
     }
     count_ = kept;
   }
@@ -34,20 +37,20 @@ class PartnerRoutes {
   void published(const Item& item) const noexcept {
     if (item.kind != Item::Kind::kFrame || item.frame.quality == Quality::kStale) return;
     for (std::size_t i = 0; i < count_; ++i) {
-      for (const PartnerFeed& feed : hearers_[i].engine->feeds()) {
+      for (const PartnerFeed& feed : receivers_[i].engine->feeds()) {
         if (feed.stream != item.frame.header.stream) continue;
-        hearers_[i].engine->on_partner(feed, item.frame, *hearers_[i].out);
+        receivers_[i].engine->on_partner(feed, item.frame, *receivers_[i].out);
       }
     }
   }
 
  private:
-  struct Hearer {
+  struct Receiver {
     StreamEngine* engine = nullptr;
     EngineOut* out = nullptr;
   };
 
-  std::vector<Hearer> hearers_;  // the first count_
+  std::vector<Receiver> receivers_;  // the first count_
   std::size_t count_ = 0;
 };
 

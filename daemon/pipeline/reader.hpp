@@ -31,19 +31,20 @@ struct ReadBody {
 
 // The bodies of a source from now on, built by cold code.
 struct SourceUpdate {
-  std::shared_ptr<const drivers::SourceLayout> layout;
-  std::vector<ReadBody> bodies;  // [body]
-  std::vector<std::byte> log;    // the row that the log keeps (pipeline/description_row.hpp)
+  std::shared_ptr<const drivers::SourceLayout> layout;  // null: of a device with one body
+  std::vector<ReadBody> bodies;                         // [body]
+  std::vector<std::byte> log;  // the row that the log keeps (pipeline/description_row.hpp)
 };
 
-// What the reader and the cold thread that builds streams exchange about a device with several
-// bodies.
+// What the reader and the cold thread that builds streams exchange about a source.
 struct BodyExchange {
-  explicit BodyExchange(system::EventFd& wakes_builder)
-      : builder(wakes_builder), descriptions(wakes_builder) {}
+  // `describes`: the device has several bodies, and describes them.
+  BodyExchange(system::EventFd& wakes_builder, bool describes) : builder(wakes_builder) {
+    if (describes) descriptions.emplace(wakes_builder);
+  }
 
   system::EventFd& builder;
-  DescriptionBox descriptions;
+  std::optional<DescriptionBox> descriptions;  // empty: a device with one body
   // An update comes back in `taken` when it is in use, which ends the use of the one before it.
   Ring<const SourceUpdate*> updates{kUpdates}, taken{kUpdates};
   static constexpr std::size_t kUpdates = 4;
@@ -74,8 +75,8 @@ struct ReadSource {
   SourceCounters* counters = nullptr;
   DeviceSlot* slot = nullptr;  // null: a device that cannot come back
   const drivers::glove::OwnedCalibration* calibration = nullptr;  // null: use the device's default
-  std::optional<ReadBody> body{};                                 // of a device with one body
-  BodyExchange* bodies = nullptr;                                 // of a device with several
+  std::optional<ReadBody> body{};    // of a device with one body: from the start on
+  BodyExchange* exchange = nullptr;  // null: the source's bodies never change
 };
 
 class Reader {
@@ -109,7 +110,7 @@ class Reader {
          std::unique_ptr<system::Poller> poller);
   // Reads the sources that are due by the clock; returns when the next one is.
   std::int64_t serve_timed(std::int64_t now_ns) noexcept;
-  bool take_requests() noexcept;  // from slots and commands; false: some wait for space in the ring
+  bool handle_requests() noexcept;  // of slots and commands; false: some wait for space in the ring
   [[nodiscard]] bool called() const noexcept { return called_.load(std::memory_order_acquire); }
 
   ReaderPorts ports_;

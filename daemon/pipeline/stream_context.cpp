@@ -61,7 +61,7 @@ void StreamContext::sample(const Sample& sample) noexcept {
 // What was decoded last but never came was shed.
 void StreamContext::end(const StreamEvent& event) noexcept {
   engine_.close_gaps(event.sequence, event.last_sample, *this);
-  engine_.end(event.time_ns, *this);
+  engine_.end(event.time_ns, event.leaves, *this);
 }
 
 void StreamContext::pass_on(const StreamEvent& event) noexcept {
@@ -71,7 +71,7 @@ void StreamContext::pass_on(const StreamEvent& event) noexcept {
   item(passed);
 }
 
-void StreamContext::taken() noexcept {
+void StreamContext::handled() noexcept {
   count(counters_.pipeline.taken);
   publish_state();
 }

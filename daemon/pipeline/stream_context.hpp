@@ -37,7 +37,7 @@ class StreamContext final : private EngineOut {
   // place between them.
   void pass_on(const StreamEvent& event) noexcept;
   // Call after an item of the stream has been handled.
-  void taken() noexcept;
+  void handled() noexcept;
   // The worker has the stream now, or not any more: what its partners publish comes here.
   void join(PartnerRoutes& routes) noexcept { routes.add(engine_, *this); }
   void leave(PartnerRoutes& routes) const noexcept { routes.remove(engine_); }

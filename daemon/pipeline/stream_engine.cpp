@@ -302,14 +302,20 @@ void StreamEngine::report_stages(std::int64_t time_ns, EngineOut& out) noexcept 
   if (performed && !performs_) event(v1::Event::KIND_PLAYED, time_ns, last_out_, 0.0, out);
 }
 
-void StreamEngine::end(std::int64_t now_ns, EngineOut& out) noexcept {
+void StreamEngine::end(std::int64_t now_ns, bool leaves, EngineOut& out) noexcept {
   out.decision({.kind = Decision::Kind::kEnd,
                 .stream = options_.stream,
                 .sequence = last_sequence_ + 1,
                 .now_ns = now_ns});
   flush(out);
   state_ = StreamState::kEnded;
-  event(v1::Event::KIND_ENDED, now_ns, last_sequence_, 0.0, out);
+  other_.kind = Item::Kind::kEvent;
+  other_.stream_event = {.stream = options_.stream,
+                         .kind = v1::Event::KIND_ENDED,
+                         .time_ns = now_ns,
+                         .sequence = last_sequence_,
+                         .leaves = leaves};
+  out.item(other_);
 }
 
 void StreamEngine::event(std::uint8_t event, std::int64_t time_ns, std::uint64_t sequence,

@@ -91,9 +91,9 @@ class StreamEngine final {
 
   // No more frames come: the stages emit the frames that they hold back.
   void flush(EngineOut& out) noexcept;
-  // The source has ended for good: flushes the stages and sets the state to ended. Emits a
-  // decision.
-  void end(std::int64_t now_ns, EngineOut& out) noexcept;
+  // Nothing comes any more: flushes the stages and sets the state to ended. Emits a decision.
+  // `leaves` as in StreamEvent.
+  void end(std::int64_t now_ns, bool leaves, EngineOut& out) noexcept;
 
   [[nodiscard]] StreamState state() const noexcept { return state_; }
   // The live parameters of all stages, in their order.

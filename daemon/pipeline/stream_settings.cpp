@@ -21,16 +21,11 @@ StageContext context_of(const StreamSettings& settings, std::size_t stage,
   return context;
 }
 
-// Empty: the parameter names no stream.
-const std::string& partner_name(const StageSettings& stage, std::size_t partner) {
-  return parameter<std::string>(stage.parameters, std::string(stage.type->partners[partner]));
-}
-
 // From which streams stage number `stage` of the engine gets frames.
 void add_feeds(const StageSettings& settings, std::size_t stage, std::vector<PartnerFeed>& feeds) {
   for (std::size_t i = 0; i < settings.partners.size(); ++i) {
     const PartnerStream& partner = settings.partners[i];
-    if (partner.about.skeleton) feeds.push_back({partner.stream, stage, i});
+    if (partner.stream != kNoStream) feeds.push_back({partner.stream, stage, i});
   }
 }
 
@@ -53,29 +48,26 @@ StageSettings stage_settings(const StageType& type, const Parameters& changed) {
   return {.type = &type, .parameters = complete_parameters(type.parameters, changed).value()};
 }
 
-bool has_partners(const StreamSettings& settings) {
-  return std::ranges::any_of(settings.stages, [](const StageSettings& stage) {
-    for (std::size_t i = 0; i < stage.type->partners.size(); ++i) {
-      if (!partner_name(stage, i).empty()) return true;
-    }
-    return false;
-  });
+std::vector<std::string> partner_names(const StageType& type, const Parameters& parameters) {
+  std::vector<std::string> names;
+  for (const std::string_view partner : type.partners) {
+    names.push_back(parameter<std::string>(parameters, std::string(partner)));
+  }
+  return names;
 }
 
 Result<> find_partners(StreamSettings& settings, const PartnerStreams& known) {
   for (StageSettings& stage : settings.stages) {
-    stage.partners.assign(stage.type->partners.size(), {});
-    for (std::size_t i = 0; i < stage.partners.size(); ++i) {
-      const std::string& name = partner_name(stage, i);
-      if (name.empty()) continue;
-      const auto found = known.find(name);
-      if (found == known.end() || !found->second.about.skeleton) {
+    stage.partners.clear();
+    for (const std::string& name : partner_names(*stage.type, stage.parameters)) {
+      PartnerStream& partner = stage.partners.emplace_back();
+      const auto found = name.empty() ? known.end() : known.find(name);
+      if (found == known.end()) continue;
+      if (!found->second.about.skeleton) {
         return misuse("stage " + std::string(stage.type->name) + " cannot have stream " +
-                      in_quotes(name) +
-                      ": there must be a [[stream]] of this name, with a device of one body that"
-                      " opens and has poses, and without such a stage itself");
+                      in_quotes(name) + ", because that one has no poses, only samples");
       }
-      stage.partners[i] = found->second;
+      partner = found->second;
     }
   }
   return {};

@@ -18,17 +18,18 @@
 
 namespace posed::pipeline {
 
-// A stream that a stage may take as a partner.
+// A stream that a stage has as a partner.
 struct PartnerStream {
-  std::uint32_t stream = 0;  // its id
+  std::uint32_t stream = kNoStream;  // its id; kNoStream: none is named, or it is not there
   StagePartner about{};
 };
 using PartnerStreams = std::map<std::string, PartnerStream>;  // by name
 
 struct StageSettings {
   const StageType* type = nullptr;
-  Parameters parameters{};                // complete
-  std::vector<PartnerStream> partners{};  // [StageType::partners], by find_partners()
+  Parameters parameters{};  // complete
+  // [StageType::partners]; empty before find_partners().
+  std::vector<PartnerStream> partners{};
   // The model with which the stage starts.
   std::string model_sha256{};              // of its file, which the log keeps; empty: no model
   std::string model_name{};                // for people
@@ -45,9 +46,11 @@ struct StreamSettings {
 // The stage's settings with every default. For tests and tools; `changed` must fit the table.
 [[nodiscard]] StageSettings stage_settings(const StageType& type, const Parameters& changed = {});
 
-// Whether a stage of the stream names a partner: then its partners have to be known before it.
-[[nodiscard]] bool has_partners(const StreamSettings& settings);
-// Finds the streams that the stages name. `known`: all that can be partners. Cold.
+// The streams that a stage names as its partners: [StageType::partners], empty for none. Cold.
+[[nodiscard]] std::vector<std::string> partner_names(const StageType& type,
+                                                     const Parameters& parameters);
+// Finds the streams that the stages name among those that are there now, `known`. A stage runs
+// without a partner that is not there. Fails if one has no poses. Cold.
 [[nodiscard]] Result<> find_partners(StreamSettings& settings, const PartnerStreams& known);
 
 // A stage's view of the stream. `source` is the skeleton of the source's frames: the stages before

@@ -1,6 +1,7 @@
 #include "daemon/pipeline/worker.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <utility>
 
 #include "daemon/pipeline/stream_context.hpp"
@@ -27,10 +28,10 @@ Result<std::unique_ptr<Worker>> Worker::open(const WorkerPorts& ports) {
 }
 
 Worker::Worker(const WorkerPorts& ports, std::unique_ptr<system::Poller> poller)
-    : ports_(ports), poller_(std::move(poller)) {
-  if (ports_.streams == nullptr) return;
-  contexts_.resize(ports_.streams->slots);
-  coming_.resize(ports_.streams->slots);
+    : ports_(ports),
+      poller_(std::move(poller)),
+      contexts_(ports.streams->slots),
+      coming_(ports.streams->slots) {
   routes_.reserve(contexts_.size());
 }
 
@@ -43,15 +44,8 @@ std::unique_ptr<StreamContext> Worker::make_context(EngineOptions options, doubl
                                          routes_, position_);
 }
 
-void Worker::add(EngineOptions options, double rate_hz, StreamCounters& counters,
-                 std::size_t slots) {
-  owned_.push_back(make_context(std::move(options), rate_hz, counters, slots));
-  if (contexts_.size() < owned_.size()) contexts_.resize(owned_.size());
-  routes_.reserve(contexts_.size());
-  put(static_cast<std::uint32_t>(owned_.size() - 1), *owned_.back());
-}
-
 void Worker::put(std::uint32_t slot, StreamContext& context) noexcept {
+  assert(contexts_[slot] == nullptr);  // a slot has one stream at a time
   contexts_[slot] = &context;
   context.join(routes_);
 }
@@ -62,9 +56,9 @@ const StreamEngine& Worker::engine(std::uint32_t stream) const {
 
 std::int64_t Worker::turn(std::int64_t now_ns) noexcept {
   send_acks();
-  take_streams();
+  accept_streams();
   apply_commands();
-  take_items(kItemsATurn);
+  handle_items(kItemsATurn);
   tick(now_ns);
   return next_due_ns(now_ns);
 }
@@ -83,7 +77,7 @@ std::int64_t Worker::next_due_ns(std::int64_t now_ns) const noexcept {
 void Worker::finish() noexcept {
   send_acks();
   apply_commands();
-  while (!ports_.in->empty()) take_items(kItemsATurn);
+  while (!ports_.in->empty()) handle_items(kItemsATurn);
   for (StreamContext* context : contexts_) {
     if (context != nullptr) context->flush();
   }
@@ -110,15 +104,16 @@ bool Worker::idle() const noexcept {
   return ports_.in->empty() && ports_.commands->empty() && !stop_.load(std::memory_order_acquire);
 }
 
-// A stream that takes the slot of another waits until that one has left.
-void Worker::take_streams() noexcept {
-  if (ports_.streams == nullptr) return;
-  const auto take_one = [this](StreamContext* context) noexcept {
+// A stream that gets the slot of another waits until that one has left.
+void Worker::accept_streams() noexcept {
+  const auto accept = [this](StreamContext* context) noexcept {
     const std::uint32_t slot = slot_of(context->stream());
+    assert(slot < contexts_.size());
     if (contexts_[slot] == nullptr) return put(slot, *context);
+    assert(coming_[slot] == nullptr);  // the builder waits until its last one has the slot
     coming_[slot] = context;
   };
-  while (ports_.streams->coming.consume(take_one)) {
+  while (ports_.streams->coming.consume(accept)) {
   }
 }
 
@@ -127,7 +122,7 @@ void Worker::take_streams() noexcept {
 StreamContext* Worker::find(std::uint32_t stream) noexcept {
   const std::uint32_t slot = slot_of(stream);
   if (slot >= contexts_.size()) return nullptr;
-  if (contexts_[slot] == nullptr) take_streams();
+  if (contexts_[slot] == nullptr) accept_streams();
   StreamContext* const context = contexts_[slot];
   return context != nullptr && context->stream() == stream ? context : nullptr;
 }
@@ -135,15 +130,15 @@ StreamContext* Worker::find(std::uint32_t stream) noexcept {
 // The stream has left: its owner gets it back, and the slot goes to the stream that waits for it.
 void Worker::give_back(StreamContext& context, const StreamEvent& end) noexcept {
   const std::uint32_t slot = slot_of(context.stream());
-  take_streams();
+  accept_streams();
   context.leave(routes_);
   contexts_[slot] = nullptr;
   if (StreamContext* const next = std::exchange(coming_[slot], nullptr)) {
     put(slot, *next);
     next->follow(context, end);
   }
-  // never full: it has room for all streams that are there and that wait
-  static_cast<void>(ports_.streams->gone.push(&context));
+  const bool returned = ports_.streams->gone.push(&context);
+  assert(returned);  // it has room for all streams that are there and that wait
   ports_.streams->builder.notify();
 }
 
@@ -164,9 +159,9 @@ void Worker::apply_commands() noexcept {
   }
 }
 
-void Worker::take_items(int most) noexcept {
-  const auto take_one = [this](const Item& item) noexcept { take(item); };
-  for (int i = 0; i < most && ports_.in->consume(take_one); ++i) {
+void Worker::handle_items(int most) noexcept {
+  const auto handle_one = [this](const Item& item) noexcept { handle(item); };
+  for (int i = 0; i < most && ports_.in->consume(handle_one); ++i) {
   }
 }
 
@@ -176,6 +171,7 @@ void Worker::acknowledge(const Ack& ack) noexcept {
   if (ack.ticket == 0) return;  // no Ack is expected
   send_acks();
   if (unsent_count_ > 0 || !ports_.acks->push(ack)) {
+    assert(unsent_count_ < unsent_.size());
     unsent_[unsent_count_++] = ack;
   } else if (ports_.control != nullptr) {
     ports_.control->notify();
@@ -193,23 +189,24 @@ void Worker::send_acks() noexcept {
   if (ports_.control != nullptr) ports_.control->notify();
 }
 
-void Worker::take(const Item& item) noexcept {
+void Worker::handle(const Item& item) noexcept {
+  assert(item.number >= position_);  // the reader counts upwards
   position_ = item.number;
   StreamContext* const context = find(stream_of(item));
-  if (context != nullptr) take(item, *context);
+  if (context != nullptr) handle(item, *context);
   position_ = item.number + 1;
 }
 
-void Worker::take(const Item& item, StreamContext& context) noexcept {
+void Worker::handle(const Item& item, StreamContext& context) noexcept {
   context.begin();
   switch (item.kind) {
     case Item::Kind::kFrame:
     case Item::Kind::kRawFrame:
       context.frame(item.frame);
-      return context.taken();
+      return context.handled();
     case Item::Kind::kSample:
       context.sample(item.sample);
-      return context.taken();
+      return context.handled();
     case Item::Kind::kEvent:
       break;
   }
@@ -217,11 +214,11 @@ void Worker::take(const Item& item, StreamContext& context) noexcept {
   if (event.kind != v1::Event::KIND_ENDED) {
     acknowledge({.ticket = event.ticket, .stream = event.stream, .sequence = event.sequence + 1});
     context.pass_on(event);
-    return context.taken();
+    return context.handled();
   }
-  context.end(event);
-  context.taken();
-  if (slot_of(context.stream()) >= owned_.size()) give_back(context, event);
+  if (context.engine().state() != StreamState::kEnded) context.end(event);
+  context.handled();
+  if (event.leaves) give_back(context, event);
 }
 
 void Worker::tick(std::int64_t now_ns) noexcept {

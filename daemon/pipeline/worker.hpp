@@ -6,7 +6,6 @@
 #include <array>
 #include <atomic>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <vector>
 
@@ -22,13 +21,13 @@ namespace posed::pipeline {
 
 class StreamContext;
 
-// Streams that come and go while the worker runs. The cold side builds and owns them; they are
-// lent to the worker by pointer.
+// The streams of the worker. The cold side builds and owns them; they are lent to the worker by
+// pointer, before it runs and while it does.
 struct StreamExchange {
   StreamExchange(std::size_t slot_count, system::EventFd& wakes_builder)
       : slots(slot_count), builder(wakes_builder), coming(slot_count), gone(2 * slot_count) {}
 
-  std::size_t slots;            // streams at once, with those from the start
+  std::size_t slots;            // streams at once
   system::EventFd& builder;     // notified when `gone` has something
   Ring<StreamContext*> coming;  // at most one for each slot
   Ring<StreamContext*> gone;    // the worker does not use it any more
@@ -43,7 +42,7 @@ struct WorkerPorts {
   system::EventFd* wake = nullptr;       // wakes this thread
   system::EventFd* publisher = nullptr;  // notified when `out` has something
   system::EventFd* control = nullptr;    // notified when `acks` has something; may be null
-  StreamExchange* streams = nullptr;     // null: only those from the start
+  StreamExchange* streams = nullptr;
   pipeline::RecordSink* record_sink = nullptr;
   Clock clock = nullptr;
 };
@@ -53,12 +52,8 @@ class Worker {
   [[nodiscard]] static Result<std::unique_ptr<Worker>> open(const WorkerPorts& ports);
   ~Worker();
 
-  // The streams that are there from the start have the first slots, in the order in which they are
-  // added. `rate_hz` is the nominal rate, 0 when unknown; `slots` is how many slots of `out` the
-  // stream may fill. Cold, before the first turn.
-  void add(EngineOptions options, double rate_hz, StreamCounters& counters,
-           std::size_t slots = std::numeric_limits<std::size_t>::max());
-  // The same for a stream that comes later, through StreamExchange. Cold, any thread.
+  // A stream for StreamExchange::coming. `rate_hz` is the nominal rate, 0 when unknown; `slots` is
+  // how many slots of `out` the stream may fill. Cold, any thread.
   [[nodiscard]] std::unique_ptr<StreamContext> make_context(EngineOptions options, double rate_hz,
                                                             StreamCounters& counters,
                                                             std::size_t slots) const;
@@ -83,10 +78,10 @@ class Worker {
  private:
   Worker(const WorkerPorts& ports, std::unique_ptr<system::Poller> poller);
   void apply_commands() noexcept;
-  void take_items(int most) noexcept;
-  void take(const Item& item) noexcept;
-  void take(const Item& item, StreamContext& context) noexcept;
-  void take_streams() noexcept;
+  void handle_items(int most) noexcept;
+  void handle(const Item& item) noexcept;
+  void handle(const Item& item, StreamContext& context) noexcept;
+  void accept_streams() noexcept;
   [[nodiscard]] StreamContext* find(std::uint32_t stream) noexcept;
   void put(std::uint32_t slot, StreamContext& context) noexcept;
   void give_back(StreamContext& context, const StreamEvent& end) noexcept;
@@ -98,10 +93,9 @@ class Worker {
 
   WorkerPorts ports_;
   std::unique_ptr<system::Poller> poller_;
-  std::vector<std::unique_ptr<StreamContext>> owned_;  // those from the start
-  std::vector<StreamContext*> contexts_;               // by slot; null where there is none
-  std::vector<StreamContext*> coming_;                 // by slot: follow when the slot is free
-  PartnerRoutes routes_;                               // to the streams in contexts_
+  std::vector<StreamContext*> contexts_;  // by slot; null where there is none
+  std::vector<StreamContext*> coming_;    // by slot: follow when the slot is free
+  PartnerRoutes routes_;                  // to the streams in contexts_
   std::uint64_t position_ = 1;  // number of the item before which a decision made now takes effect
   // Acks for which the ring was full; never more than there are commands under way.
   std::array<Ack, kMaxUnderWay> unsent_{};

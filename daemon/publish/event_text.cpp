@@ -52,7 +52,9 @@ std::string sentence(const StreamEvent& event) {
     case v1::Event::KIND_RECOVERED:
       return "data comes again";
     case v1::Event::KIND_ENDED:
-      return fmt::format("the source has ended after {} frames", event.sequence);
+      if (!event.leaves) return fmt::format("the source has ended after {} frames", event.sequence);
+      return fmt::format("its stages are made again after frame {}, for another stream",
+                         event.sequence);
     case v1::Event::KIND_CONTROL:
       return changed(event);
     case v1::Event::KIND_CALIBRATED: {

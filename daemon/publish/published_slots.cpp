@@ -45,7 +45,7 @@ PublishedStream* PublishedSlots::find(std::uint32_t stream) noexcept {
   return found == slots_[slot].end() ? nullptr : found->get();
 }
 
-void PublishedSlots::take_additions() {
+void PublishedSlots::place_additions() {
   const std::scoped_lock lock(mutex_);
   for (auto& stream : additions_) {
     const std::uint32_t slot = pipeline::slot_of(stream->info.stream);

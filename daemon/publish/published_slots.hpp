@@ -17,7 +17,7 @@ class PublishedSlots {
  public:
   explicit PublishedSlots(std::size_t slots) : slots_(slots) {}
 
-  // Any thread, cold: the stream comes into its slot at take_additions().
+  // Any thread, cold: the stream comes into its slot at place_additions().
   void add(std::unique_ptr<PublishedStream> stream);
   // Any thread, cold. Does nothing if there is no such stream.
   void set_stages(std::uint32_t stream, std::vector<StageInfo> stages);
@@ -34,7 +34,7 @@ class PublishedSlots {
   [[nodiscard]] PublishedStream* holder(std::uint32_t slot) noexcept;
   // The stream, also if it waits; else null.
   [[nodiscard]] PublishedStream* find(std::uint32_t stream) noexcept;
-  void take_additions();
+  void place_additions();
   // The next generation takes the slot; what has it now is gone.
   void advance(std::uint32_t slot);
   // Does nothing if there is no such stream.

@@ -1,16 +1,20 @@
 #include "daemon/publish/publisher.hpp"
 
 #include <algorithm>
+#include <condition_variable>
+#include <mutex>
 #include <utility>
 
 #include <spdlog/spdlog.h>
 #include <time.h>
 
+#include "daemon/net/peer_guard.hpp"
+#include "daemon/net/zap_authenticator.hpp"
 #include "daemon/publish/event_text.hpp"
 #include "daemon/publish/frame_output.hpp"
 #include "daemon/publish/published_slots.hpp"
-#include "daemon/publish/publisher_requests.hpp"
 #include "daemon/system/process.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::publish {
 namespace {
@@ -40,55 +44,72 @@ Result<std::unique_ptr<system::Poller>> open_poller(const system::EventFd& wake,
 
 }  // namespace
 
+// What other threads ask of the publisher's thread, and results for them. Cold: never used by the
+// other hot threads.
+struct Publisher::Requests {
+  struct Posted {
+    std::uint32_t stream;
+    v1::Event::Kind kind;
+    std::string text;
+  };
+  // What the publisher does at its next turn; streams come by PublishedSlots::add().
+  struct Batch {
+    std::vector<Posted> events;
+    std::vector<std::uint32_t> leaving;
+    bool check = false;
+  };
+
+  mutable std::mutex mutex;  // guards everything but `asked`
+  Batch batch;
+  std::atomic<bool> asked{false};  // `batch` or the slots' additions have something new
+  bool served = false;             // a thread is in run()
+  // Removals, counted since the start: a caller waits until its own is done.
+  std::uint64_t removals = 0, removals_done = 0;
+  std::condition_variable done;
+  v1::Stats stats;  // the last ones, without the streams
+};
+
 Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
-                                                   std::vector<StreamInfo> streams,
                                                    pipeline::Ring<pipeline::Item>& in,
                                                    system::EventFd& wake) {
-  double messages_per_s = options.more_messages_per_s;
-  for (const StreamInfo& stream : streams) messages_per_s += stream.rate_hz * (stream.raw ? 2 : 1);
   auto socket = PublishSocket::open({.context = options.context,
                                      .endpoint = options.endpoint,
                                      .authenticator = options.authenticator,
                                      .secret_z85 = options.secret_z85,
-                                     .messages_per_s = messages_per_s});
+                                     .messages_per_s = options.messages_per_s});
   if (!socket) return std::unexpected(socket.error());
   auto poller = open_poller(wake, socket->get());
   if (!poller) return std::unexpected(poller.error());
-  return std::unique_ptr<Publisher>(new Publisher(std::move(options), std::move(streams), in, wake,
-                                                  std::move(*socket), std::move(*poller)));
+  return std::unique_ptr<Publisher>(
+      new Publisher(std::move(options), in, wake, std::move(*socket), std::move(*poller)));
 }
 
-Publisher::Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
-                     pipeline::Ring<pipeline::Item>& in, system::EventFd& wake,
-                     PublishSocket socket, std::unique_ptr<system::Poller> poller)
+Publisher::Publisher(PublisherOptions options, pipeline::Ring<pipeline::Item>& in,
+                     system::EventFd& wake, PublishSocket socket,
+                     std::unique_ptr<system::Poller> poller)
     : options_(std::move(options)),
       in_(in),
       wake_(wake),
       socket_(std::move(socket)),
       subscriptions_([this](std::string_view prefix) { return is_topic(prefix); }),
       poller_(std::move(poller)),
-      slots_(std::make_unique<PublishedSlots>(std::max(options_.slots, streams.size()))),
+      slots_(std::make_unique<PublishedSlots>(options_.slots)),
       requests_(std::make_unique<Requests>()) {
   if (!options_.data_clock) options_.data_clock = options_.clock;
-  for (std::uint32_t i = 0; i < streams.size(); ++i) {
-    streams[i].stream = i;
-    slots_->add(std::make_unique<PublishedStream>(std::move(streams[i])));
-  }
-  slots_->take_additions();
 }
 
 Publisher::~Publisher() = default;
 
 const std::string& Publisher::endpoint() const noexcept { return socket_.endpoint(); }
 
-void Publisher::take_all() {
-  while (in_.consume([this](const pipeline::Item& item) { take(item); })) {
+void Publisher::handle_all() {
+  while (in_.consume([this](const pipeline::Item& item) { handle(item); })) {
   }
 }
 
 std::int64_t Publisher::turn(std::int64_t now_ns) {
   announce_new();  // outputs must know a stream before its first frame, too
-  take_all();
+  handle_all();
   do_what_was_asked();
   // Also at the first turn, so that a status request that comes at once already finds the streams.
   if (reported_ns_ == kNoTime_ns || now_ns >= reported_ns_ + kNanosPerSecond) {
@@ -102,7 +123,7 @@ std::int64_t Publisher::turn(std::int64_t now_ns) {
 }
 
 void Publisher::finish(std::int64_t now_ns) {
-  take_all();
+  handle_all();
   slots_->for_each([this](PublishedStream& published) { report_shed(published, true); });
   every_second(now_ns);
 }
@@ -136,7 +157,7 @@ void Publisher::send(std::string_view topic, const google::protobuf::MessageLite
 PublishedStream* Publisher::stream_of(const pipeline::Item& item) {
   const std::uint32_t id = pipeline::stream_of(item);
   if (PublishedStream* const published = slots_->current(id)) return published;
-  slots_->take_additions();
+  slots_->place_additions();
   if (slots_->find(id) == nullptr) return nullptr;
   // It is the first item of a later generation, so there are no more of the earlier ones.
   const std::uint32_t slot = pipeline::slot_of(id);
@@ -149,7 +170,7 @@ PublishedStream* Publisher::stream_of(const pipeline::Item& item) {
   return slots_->current(id);
 }
 
-void Publisher::take(const pipeline::Item& item) {
+void Publisher::handle(const pipeline::Item& item) {
   using Kind = pipeline::Item::Kind;
   PublishedStream* const published = stream_of(item);
   if (published == nullptr) return;
@@ -157,7 +178,7 @@ void Publisher::take(const pipeline::Item& item) {
   switch (item.kind) {
     case Kind::kFrame:
     case Kind::kRawFrame:
-      take_frame(*published, item.frame, item.kind == Kind::kRawFrame);
+      handle_frame(*published, item.frame, item.kind == Kind::kRawFrame);
       break;
     case Kind::kSample:
       published->count_sample();
@@ -165,12 +186,12 @@ void Publisher::take(const pipeline::Item& item) {
       send(published->styled.sensor_topic, published->styled.samples.encode(item.sample));
       break;
     case Kind::kEvent:
-      take_notice(*published, item.stream_event);
+      handle_notice(*published, item.stream_event);
       break;
   }
 }
 
-void Publisher::take_notice(PublishedStream& published, const pipeline::StreamEvent& event) {
+void Publisher::handle_notice(PublishedStream& published, const pipeline::StreamEvent& event) {
   const auto kind = static_cast<v1::Event::Kind>(event.kind);
   if (kind == v1::Event::KIND_SHED) {
     published.shed.add(event.sequence, static_cast<std::uint64_t>(event.value));
@@ -188,12 +209,12 @@ void Publisher::take_notice(PublishedStream& published, const pipeline::StreamEv
 
 void Publisher::report_shed(PublishedStream& published, bool at_end) {
   const std::int64_t now_ns = options_.clock();
-  const auto sum = published.shed.take(now_ns, at_end);
+  const auto sum = published.shed.next_sum(now_ns, at_end);
   if (!sum) return;
   send_event(published, v1::Event::KIND_SHED, options_.data_clock(), sum->first, sentence(*sum));
 }
 
-void Publisher::take_frame(PublishedStream& published, const Frame& frame, bool raw) {
+void Publisher::handle_frame(PublishedStream& published, const Frame& frame, bool raw) {
   Channel& channel = raw ? *published.raw : published.styled;
   const v1::Frame& bare = channel.frames.encode(frame);
   if (options_.record_sink != nullptr && options_.record_sink->wants_published()) {
@@ -321,6 +342,150 @@ void Publisher::every_second(std::int64_t now_ns) {
   reported_ns_ = now_ns;
   reported_cpu_ns_ = cpu_ns;
   send("stats", stats);
+}
+
+template <typename Change>
+void Publisher::ask(Change&& change) {
+  {
+    const std::scoped_lock lock(requests_->mutex);
+    change(requests_->batch);
+  }
+  requests_->asked.store(true);
+  wake_.notify();
+}
+
+void Publisher::stop() noexcept {
+  stop_.store(true, std::memory_order_release);
+  wake_.notify();
+}
+
+void Publisher::add(StreamInfo stream) {
+  slots_->add(std::make_unique<PublishedStream>(std::move(stream)));
+  const std::scoped_lock lock(requests_->mutex);
+  if (!requests_->served) return slots_->place_additions();
+  requests_->asked.store(true);
+  wake_.notify();
+}
+
+void Publisher::remove(std::uint32_t stream) {
+  std::unique_lock lock(requests_->mutex);
+  if (!requests_->served) {
+    slots_->place_additions();
+    handle_all();
+    return remove_now(stream);
+  }
+  requests_->batch.leaving.push_back(stream);
+  const std::uint64_t mine = ++requests_->removals;
+  requests_->asked.store(true);
+  wake_.notify();
+  requests_->done.wait(lock, [&] { return requests_->removals_done >= mine; });
+}
+
+void Publisher::set_stages(std::uint32_t stream, std::vector<StageInfo> stages) {
+  slots_->set_stages(stream, std::move(stages));
+}
+
+void Publisher::post_event(std::uint32_t stream, v1::Event::Kind kind, std::string text) {
+  ask([&](Requests::Batch& batch) { batch.events.push_back({stream, kind, std::move(text)}); });
+}
+
+void Publisher::check_subscribers() {
+  ask([](Requests::Batch& batch) { batch.check = true; });
+}
+
+v1::Stats Publisher::stats() const {
+  v1::Stats stats;
+  {
+    const std::scoped_lock lock(requests_->mutex);
+    stats = requests_->stats;
+  }
+  slots_->fill(stats);
+  stats.set_time_ns(options_.data_clock());
+  add_sources(stats);
+  add_outputs(stats);
+  if (options_.more_stats) options_.more_stats(stats);
+  return stats;
+}
+
+std::vector<StreamFigures> Publisher::figures() const { return slots_->figures(); }
+
+void Publisher::add_sources(v1::Stats& stats) const {
+  for (const SourceInfo& info : options_.sources) {
+    v1::SourceStats& source = *stats.add_source();
+    source.set_name(info.name);
+    source.set_driver(info.driver);
+    source.set_identity(clean(info.present->description()->identity));
+    source.set_away(is_away(*info.counters, info.comes_and_goes));
+    source.set_connections(info.counters->connections.load());
+    for (const auto& outcome : info.counters->outcome) source.add_outcome(outcome.load());
+    source.set_kernel_dropped(info.counters->kernel_dropped.load());
+    const auto of_source = [&](const v1::StreamStats& stream) {
+      return stream.source_name() == info.name;
+    };
+    source.set_streams(
+        static_cast<std::uint32_t>(std::ranges::count_if(stats.stream(), of_source)));
+  }
+}
+
+void Publisher::add_outputs(v1::Stats& stats) const {
+  for (const FrameOutput* const output : options_.outputs) output->fill(*stats.add_output());
+}
+
+bool Publisher::asked() const noexcept { return requests_->asked.load(); }
+
+void Publisher::do_what_was_asked() {
+  if (!requests_->asked.exchange(false)) return;
+  Requests::Batch batch;
+  {
+    const std::scoped_lock lock(requests_->mutex);
+    std::swap(batch, requests_->batch);
+  }
+  slots_->place_additions();
+  announce_new();
+  for (const Requests::Posted& event : batch.events) {
+    PublishedStream* const published = slots_->find(event.stream);
+    if (published == nullptr) continue;  // it has left
+    send_event(*published, event.kind, options_.data_clock(), 0, event.text);
+  }
+  if (!batch.leaving.empty()) {
+    handle_all();  // items that came after this turn's first look, but before the removal
+    for (const std::uint32_t stream : batch.leaving) remove_now(stream);
+    const std::scoped_lock lock(requests_->mutex);
+    requests_->removals_done += batch.leaving.size();
+    requests_->done.notify_all();
+  }
+  if (!batch.check || options_.authenticator == nullptr) return;
+  socket_.guard().cut_unless([this](std::string_view user) {
+    return options_.authenticator->allows(user, net::Domain::kPublish);
+  });
+}
+
+void Publisher::remove_now(std::uint32_t stream) {
+  if (PublishedStream* const published = slots_->find(stream)) {
+    report_shed(*published, true);
+    published->leave_outputs();
+  }
+  slots_->remove(stream);
+}
+
+void Publisher::begin_serving() {
+  const std::scoped_lock lock(requests_->mutex);
+  requests_->served = true;
+}
+
+// After this call no thread may block on the publisher.
+void Publisher::end_serving() {
+  while (true) {
+    do_what_was_asked();
+    const std::scoped_lock lock(requests_->mutex);
+    requests_->served = !requests_->batch.leaving.empty();
+    if (!requests_->served) return;
+  }
+}
+
+void Publisher::keep_stats(v1::Stats stats) {
+  const std::scoped_lock lock(requests_->mutex);
+  requests_->stats = std::move(stats);
 }
 
 }  // namespace posed::publish

@@ -83,12 +83,10 @@ struct PublisherOptions {
   // The clock for the times of published frames, events and stats. Empty: `clock`. A replay
   // publishes in the time of its recording.
   std::function<std::int64_t()> data_clock{};
-  bool stamps = true;  // false: leaves published_ns out, because it would have no meaning
-  // How many streams there may be at once, with those that are there from the start. As many as
-  // those: none will come.
-  std::size_t slots = 0;
+  bool stamps = true;           // false: leaves published_ns out, because it would have no meaning
+  std::size_t slots = 0;        // how many streams there may be at once
+  double messages_per_s = 0.0;  // of all streams that there may be
   std::vector<SourceInfo> sources{};
-  double more_messages_per_s = 0.0;  // of the streams that may come
   // Which get the streams that they want; outlive the publisher.
   std::vector<FrameOutput*> outputs{};
 };
@@ -98,10 +96,8 @@ class PublishedStream;
 
 class Publisher {
  public:
-  // Binds. `in` and `wake` outlive the publisher. The ids of `streams` are their indices, whatever
-  // StreamInfo::stream says.
+  // Binds. `in` and `wake` outlive the publisher.
   [[nodiscard]] static Result<std::unique_ptr<Publisher>> open(PublisherOptions options,
-                                                               std::vector<StreamInfo> streams,
                                                                pipeline::Ring<pipeline::Item>& in,
                                                                system::EventFd& wake);
   ~Publisher();
@@ -122,8 +118,9 @@ class Publisher {
   void stop() noexcept;
   // Of the thread in run().
   [[nodiscard]] const system::Pulse& pulse() const noexcept { return pulse_; }
-  // A stream comes. It is there at the publisher's next turn; but if its slot still has an earlier
-  // generation, at its own first item, or when the earlier one is removed.
+  // A stream comes. It is there at the publisher's next turn, at once if no thread is in run(); but
+  // if its slot still has an earlier generation, at its own first item, or when the earlier one is
+  // removed.
   void add(StreamInfo stream);
   // The stream leaves; nothing happens if there is none of this id. Waits until everything that is
   // in the ring now has been taken, and until nothing uses the stream's counters any more. If no
@@ -146,13 +143,12 @@ class Publisher {
 
  private:
   struct Requests;
-  Publisher(PublisherOptions options, std::vector<StreamInfo> streams,
-            pipeline::Ring<pipeline::Item>& in, system::EventFd& wake, PublishSocket socket,
-            std::unique_ptr<system::Poller> poller);
-  void take_all();
-  void take(const pipeline::Item& item);
-  void take_frame(PublishedStream& published, const Frame& frame, bool raw);
-  void take_notice(PublishedStream& published, const pipeline::StreamEvent& event);
+  Publisher(PublisherOptions options, pipeline::Ring<pipeline::Item>& in, system::EventFd& wake,
+            PublishSocket socket, std::unique_ptr<system::Poller> poller);
+  void handle_all();
+  void handle(const pipeline::Item& item);
+  void handle_frame(PublishedStream& published, const Frame& frame, bool raw);
+  void handle_notice(PublishedStream& published, const pipeline::StreamEvent& event);
   // The stream of an item; null if there is none.
   [[nodiscard]] PublishedStream* stream_of(const pipeline::Item& item);
   void report_shed(PublishedStream& published, bool at_end);
@@ -170,7 +166,6 @@ class Publisher {
   // Call after the streams were added, because a source says how many it has.
   void add_sources(v1::Stats& stats) const;
   void add_outputs(v1::Stats& stats) const;
-  // These and the functions for other threads: publisher_requests.cpp.
   [[nodiscard]] bool asked() const noexcept;
   void do_what_was_asked();
   void remove_now(std::uint32_t stream);

@@ -28,7 +28,7 @@ class ShedTally {
   }
 
   // The sum to report now, if one is due. At the end of a stream the rest is always due.
-  [[nodiscard]] std::optional<Sum> take(std::int64_t now_ns, bool at_end = false) noexcept {
+  [[nodiscard]] std::optional<Sum> next_sum(std::int64_t now_ns, bool at_end = false) noexcept {
     const bool reported_lately =
         reported_ns_ != kNoTime_ns && now_ns - reported_ns_ < kNanosPerSecond;
     if (unreported_.frames == 0 || (reported_lately && !at_end)) return std::nullopt;

@@ -34,10 +34,8 @@ struct RecorderEvent {
 
 class LogWriterLoop {
  public:
-  // `streams`: those whose rows are in the log already. Calls `report` from within turn() and
-  // finish(). The rings must outlive this object.
+  // Calls `report` from within turn() and finish(). The rings must outlive this object.
   LogWriterLoop(RecordRings& rings, log::Writer writer, std::filesystem::path path,
-                std::span<const RecordedStream> streams,
                 std::function<void(const RecorderEvent&)> report);
 
   // Call every 50 to 100 ms; commits when 250 ms have passed since the last commit.
@@ -97,10 +95,10 @@ class LogWriterLoop {
                std::uint64_t from_frame = kNoFrame);
   [[nodiscard]] Result<log::GapRow> gap_row(const Tally& tally, std::uint64_t lost,
                                             std::int64_t now_ns, std::uint64_t from_frame) const;
-  void take_streams();
-  void take_changes();
+  void add_streams();
+  void add_takes();
   [[nodiscard]] std::vector<std::uint32_t> streams_now() const;
-  void add_stream(std::uint32_t id, std::uint32_t source, std::optional<RecordedStream> row);
+  void add_stream(RecordedStream row);
   // The state of a stream that a record names; null if it was never added. `item`: from which on
   // the record proves that the stream is there; 0: it does not say.
   StreamState* meet(std::uint32_t id, std::uint64_t item);

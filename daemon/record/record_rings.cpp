@@ -129,12 +129,12 @@ Result<pipeline::Take> RecordRings::mark_take(const pipeline::TakeMark& mark) {
   return takes_.mark(mark, newest_item_.load(kRelaxed));
 }
 
-std::vector<std::vector<std::byte>> RecordRings::take_models() {
+std::vector<std::vector<std::byte>> RecordRings::next_models() {
   const std::lock_guard lock(added_mutex_);
   return std::exchange(models_, {});
 }
 
-std::vector<RecordedStream> RecordRings::take_streams() {
+std::vector<RecordedStream> RecordRings::next_streams() {
   const std::lock_guard lock(added_mutex_);
   return std::exchange(streams_, {});
 }

@@ -133,16 +133,16 @@ class RecordRings final : public pipeline::RecordSink {
   }
   template <typename Each>
   void drain_decisions(Each&& each) {
-    const auto take = [&](const DecisionRecord& record) {
+    const auto drain = [&](const DecisionRecord& record) {
       give_back(slots_[pipeline::slot_of(record.decision.stream)].decisions, 1);
       each(record);
     };
-    while (decisions_.consume(take)) {
+    while (decisions_.consume(drain)) {
     }
   }
-  [[nodiscard]] std::vector<std::vector<std::byte>> take_models();
-  [[nodiscard]] std::vector<RecordedStream> take_streams();
-  [[nodiscard]] std::vector<TakeChange> take_changes() { return takes_.take_changes(); }
+  [[nodiscard]] std::vector<std::vector<std::byte>> next_models();
+  [[nodiscard]] std::vector<RecordedStream> next_streams();
+  [[nodiscard]] std::vector<TakeChange> next_takes() { return takes_.next_changes(); }
   void set_state(RecorderState state) { takes_.set_state(std::move(state)); }
 
   [[nodiscard]] std::size_t sources() const noexcept { return sources_.size(); }

@@ -16,24 +16,24 @@
 #include "proto/log/writer.hpp"
 
 namespace posed::devices {
-struct BodySource;
 struct NewStream;
-struct OpenStream;
+struct OpenSource;
 }  // namespace posed::devices
 
 namespace posed::record {
 
 struct RecordedSource {
-  log::SourceRow row{};      // its id is the source's number
-  double rate_hz = 0.0;      // nominal, of its frames; 0: unknown
-  std::size_t bodies = 1;    // the most that it can have at once
-  bool bodies_come = false;  // its bodies become streams as they come, also if there is only one
+  log::SourceRow row{};  // its id is the source's number
+  double rate_hz = 0.0;  // nominal, of its frames; 0: unknown
+  // The most that it can have at once, each with a chunk's position; 0: one, from the start on.
+  std::size_t bodies = 0;
 };
 
 struct RecordedStream {
   std::uint32_t id = 0;
   std::uint32_t source = 0;  // its number
   std::string body{};        // the device's name for it; empty if the source has only one body
+  bool from_start = false;   // it is there before the first item
   std::string name{};
   StreamSettings settings{};                       // without the hashes of its models
   std::vector<devices::ModelBytes> model_files{};  // one for each stage, null without a model
@@ -41,24 +41,14 @@ struct RecordedStream {
 
 // What the log begins with.
 struct RecordedSetup {
-  std::vector<RecordedSource> sources{};  // by number
-  std::vector<RecordedStream> streams{};  // those that are there from the start, by id
-  // How many more streams there may be at once, each in a slot of its own after those of `streams`;
-  // and the highest nominal rate of one of them.
-  std::size_t slots_to_come = 0;
-  double rate_to_come_hz = 0.0;
-
-  // Adds a device with one body: a source and a stream, both with the next number.
-  void add_device(log::SourceRow row, StreamSettings settings,
-                  std::vector<devices::ModelBytes> model_files);
-  // Adds a device whose bodies come later, with the next number. `bodies` is how many at most.
-  void add_bodies(log::SourceRow row, double rate_hz, std::size_t bodies);
+  std::vector<RecordedSource> sources{};  // by number; those with one body first
+  // How many streams there may be at once. Those of sources with one body have the first slots.
+  std::size_t slots = 0;
 };
 
-// Of the daemon's devices, those with one body first.
+// `slots`: how many streams there may be at once.
 [[nodiscard]] RecordedSetup recorded_setup(
-    std::span<const std::unique_ptr<devices::OpenStream>> streams,
-    std::span<const std::unique_ptr<devices::BodySource>> sources, std::size_t slots_to_come);
+    std::span<const std::unique_ptr<devices::OpenSource>> sources, std::size_t slots);
 
 // For a body that has become a stream.
 [[nodiscard]] RecordedStream recorded_stream(const devices::NewStream& stream);

@@ -52,9 +52,6 @@ Result<log::Writer> begin_log(const RecorderOptions& options, const RecordedSetu
   for (const RecordedSource& source : setup.sources) {
     if (auto done = writer->add(source.row); !done) return std::unexpected(done.error());
   }
-  for (const RecordedStream& stream : setup.streams) {
-    if (auto done = add_stream_row(*writer, stream, 1); !done) return std::unexpected(done.error());
-  }
   if (auto done = writer->commit(); !done) return std::unexpected(done.error());
   return writer;
 }
@@ -64,20 +61,18 @@ Result<std::unique_ptr<Recorder>> Recorder::open(RecorderOptions options,
   auto writer = begin_log(options, setup);
   if (!writer) return std::unexpected(writer.error());
   const RingSizes sizes = ring_sizes(setup, options.frames);
-  // Without bodies to come it is little.
-  if (setup.slots_to_come > 0) {
+  // Where no bodies come it is little.
+  if (bodies_come(setup)) {
     spdlog::info("{}: {:.0f} MB of memory are set aside for what is on its way into the log",
                  options.file.string(), static_cast<double>(total_bytes(sizes)) / 1e6);
   }
-  return std::unique_ptr<Recorder>(
-      new Recorder(std::move(options), setup, sizes, std::move(*writer)));
+  return std::unique_ptr<Recorder>(new Recorder(std::move(options), sizes, std::move(*writer)));
 }
 
-Recorder::Recorder(RecorderOptions options, const RecordedSetup& setup, const RingSizes& sizes,
-                   log::Writer writer)
+Recorder::Recorder(RecorderOptions options, const RingSizes& sizes, log::Writer writer)
     : options_(std::move(options)),
       rings_(sizes),
-      log_writer_(rings_, std::move(writer), options_.file, setup.streams, options_.report),
+      log_writer_(rings_, std::move(writer), options_.file, options_.report),
       thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
 Recorder::~Recorder() = default;

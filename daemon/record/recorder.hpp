@@ -52,8 +52,8 @@ class Recorder {
 
   [[nodiscard]] pipeline::RecordSink& record_sink() noexcept { return rings_; }
 
-  // A body of a source has become a stream. Call it before the first record of the stream is made;
-  // its row comes into the log with that record. Any thread.
+  // A stream comes. Call it before the first record of the stream is made; its row comes into the
+  // log with that record, or at once if it is there from the start. Any thread.
   void add_stream(RecordedStream stream) { rings_.add_stream(std::move(stream)); }
 
   // Stops the thread, writes the rest and leaves a single file. Call once, after every thread that
@@ -72,8 +72,7 @@ class Recorder {
   [[nodiscard]] const std::filesystem::path& file() const noexcept { return options_.file; }
 
  private:
-  Recorder(RecorderOptions options, const RecordedSetup& setup, const RingSizes& sizes,
-           log::Writer writer);
+  Recorder(RecorderOptions options, const RingSizes& sizes, log::Writer writer);
   void run(const std::stop_token& stop);
 
   RecorderOptions options_;

@@ -1,6 +1,7 @@
 #include "daemon/record/ring_sizes.hpp"
 
 #include <algorithm>
+#include <cassert>
 
 #include "daemon/pipeline/messages.hpp"
 #include "daemon/record/record_rings.hpp"
@@ -26,13 +27,17 @@ constexpr std::size_t kMinManyBodies = 2 * 1024 * 1024;  // several descriptions
 // the memory is set aside from the start: 27 streams at 120 Hz have all of it.
 constexpr std::size_t kMaxFramesToCome = 128 * 1024 * 1024;
 
+constexpr auto kDecisions = static_cast<std::size_t>(kRing_s * kDecisionsPerSecond);
+// There may be many of them, and a decision is large.
+constexpr std::size_t kDecisionsToCome = kDecisions / 4;
+
 std::size_t held(double bytes_per_s, std::size_t least) {
   return std::max(static_cast<std::size_t>(kRing_s * bytes_per_s), least);
 }
 
 std::size_t bytes_of_source(const RecordedSource& source, std::size_t least) {
   const bool known = source.rate_hz > 0.0;
-  if (!source.bodies_come) {
+  if (source.bodies == 0) {
     return held(known ? source.rate_hz * kBytesPerFrame : kUnknownBytesPerSecond, least);
   }
   const std::size_t datagrams = (source.bodies + kBodiesPerDatagram - 1) / kBodiesPerDatagram;
@@ -50,26 +55,32 @@ std::size_t bytes_of_frames(double rate_hz, std::size_t least) {
 
 }  // namespace
 
+bool bodies_come(const RecordedSetup& setup) {
+  return std::ranges::any_of(setup.sources,
+                             [](const RecordedSource& source) { return source.bodies > 0; });
+}
+
 RingSizes ring_sizes(const RecordedSetup& setup, bool frames) {
   RingSizes sizes;
+  const auto to_come =
+      std::ranges::find_if(setup.sources, [](const auto& source) { return source.bodies > 0; });
+  const auto at_start = static_cast<std::size_t>(to_come - setup.sources.begin());
   const std::size_t per_source = kMinRings / std::max<std::size_t>(setup.sources.size(), 1);
-  for (const RecordedSource& source : setup.sources) {
+  const std::size_t per_stream = kMinRings / std::max<std::size_t>(at_start, 1);
+  double rate_to_come_hz = 0.0;  // the highest
+  for (std::size_t i = 0; i < setup.sources.size(); ++i) {
+    const RecordedSource& source = setup.sources[i];
     sizes.chunk_bytes.push_back(bytes_of_source(source, per_source));
+    if (i >= at_start) rate_to_come_hz = std::max(rate_to_come_hz, source.rate_hz);
+    if (i >= at_start) continue;
+    sizes.slots.push_back({.frame_bytes = frames ? bytes_of_frames(source.rate_hz, per_stream) : 0,
+                           .decisions = kDecisions});
   }
-  // There may be many of them, and a decision is large.
-  constexpr auto kDecisionsToCome = static_cast<std::size_t>(kRing_s * kDecisionsPerSecond / 4);
-  constexpr auto kDecisions = static_cast<std::size_t>(kRing_s * kDecisionsPerSecond);
-  const std::size_t per_stream = kMinRings / std::max<std::size_t>(setup.streams.size(), 1);
-  for (const RecordedStream& stream : setup.streams) {
-    sizes.slots.push_back(
-        {.frame_bytes = frames ? bytes_of_frames(stream.settings.rate_hz, per_stream) : 0,
-         .decisions = kDecisions});
-  }
-  const std::size_t most = kMaxFramesToCome / std::max<std::size_t>(setup.slots_to_come, 1);
-  const std::size_t to_come =
-      frames ? std::min(bytes_of_frames(setup.rate_to_come_hz, 0), most) : 0;
-  sizes.slots.resize(setup.streams.size() + setup.slots_to_come,
-                     {.frame_bytes = to_come, .decisions = kDecisionsToCome});
+  assert(setup.slots >= at_start);
+  const std::size_t most = kMaxFramesToCome / std::max<std::size_t>(setup.slots - at_start, 1);
+  const std::size_t frames_to_come =
+      frames ? std::min(bytes_of_frames(rate_to_come_hz, 0), most) : 0;
+  sizes.slots.resize(setup.slots, {.frame_bytes = frames_to_come, .decisions = kDecisionsToCome});
   return sizes;
 }
 

@@ -21,6 +21,9 @@ struct RingSizes {
 // For a setup at its nominal rates; `frames`: the published frames are recorded, too.
 [[nodiscard]] RingSizes ring_sizes(const RecordedSetup& setup, bool frames);
 
+// Whether streams come while the daemon runs.
+[[nodiscard]] bool bodies_come(const RecordedSetup& setup);
+
 // The memory that rings of these sizes need.
 [[nodiscard]] std::size_t total_bytes(const RingSizes& sizes);
 

@@ -33,6 +33,11 @@ Json to_json(const StageSettings& stage) {
     json["model"] = stage.model_sha256;
     json["model_name"] = stage.model_name;
   }
+  // Ids of streams; null where a partner is not named or was not there.
+  for (const pipeline::PartnerStream& partner : stage.partners) {
+    const bool there = partner.stream != pipeline::kNoStream;
+    json["partners"].push_back(there ? Json(partner.stream) : Json());
+  }
   Json& parameters = json["parameters"] = Json::object();
   for (const ParameterSpec& spec : stage.type->parameters) {
     const std::string name(spec.name);
@@ -53,8 +58,15 @@ std::optional<StageSettings> stage_of(const Json& json) {
   }
   auto parameters = complete_parameters(type->parameters, given);
   if (!parameters) return std::nullopt;
+  std::vector<pipeline::PartnerStream> partners;
+  for (const Json& partner : json.value("partners", Json::array())) {
+    partners.push_back(
+        {.stream = partner.is_null() ? pipeline::kNoStream : partner.get<std::uint32_t>()});
+  }
+  if (!partners.empty() && partners.size() != type->partners.size()) return std::nullopt;
   return StageSettings{.type = type,
                        .parameters = std::move(*parameters),
+                       .partners = std::move(partners),
                        .model_sha256 = json.value("model", ""),
                        .model_name = json.value("model_name", "")};
 }

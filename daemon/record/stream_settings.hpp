@@ -13,7 +13,8 @@ namespace posed::record {
 using pipeline::StreamSettings;
 
 [[nodiscard]] std::string to_json(const StreamSettings& settings);
-// `file` is the log's name, for the error. Refuses stages that this version of posed does not have.
+// `file` is the log's name, for the error. The partners of stages are the ids of streams, where the
+// log names them. Refuses stages that this version of posed does not have.
 [[nodiscard]] Result<StreamSettings> settings_from_json(const std::string& json,
                                                         const std::string& file);
 

@@ -89,7 +89,7 @@ RecorderState Takes::state() const {
   return state_;
 }
 
-std::vector<TakeChange> Takes::take_changes() {
+std::vector<TakeChange> Takes::next_changes() {
   const std::scoped_lock lock(mutex_);
   return std::exchange(changes_, {});
 }

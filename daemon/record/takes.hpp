@@ -40,7 +40,7 @@ class Takes {
   void set_state(RecorderState state);
   [[nodiscard]] RecorderState state() const;
   // What has changed since the last call, in order.
-  [[nodiscard]] std::vector<TakeChange> take_changes();
+  [[nodiscard]] std::vector<TakeChange> next_changes();
 
  private:
   // The take that runs, as things are now.

@@ -18,11 +18,10 @@ namespace {
 
 constexpr auto kLookAgain = std::chrono::milliseconds(1);
 
-// Of the streams that are there from the start, or of bodies: of those of one name, one at a time.
-double most_frames_per_s(const Replay& replay, bool of_bodies) {
+// Of the streams of one name, one is there at a time.
+double max_frames_per_s(const Replay& replay) {
   std::map<std::string, double> rates_hz;
   for (std::uint32_t id = 0; id < replay.streams(); ++id) {
-    if (replay.stream(id).body.empty() == of_bodies) continue;
     double& rate_hz = rates_hz[replay.stream(id).name];
     rate_hz = std::max(rate_hz, replay.stream(id).settings.rate_hz);
   }
@@ -77,18 +76,11 @@ Result<std::unique_ptr<Broadcast>> Broadcast::open(const BroadcastOptions& optio
   }
   auto wake = system::EventFd::open();
   if (!wake) return std::unexpected(wake.error());
-  const double bodies_per_s = most_frames_per_s(replay, true);
-  const double frames_per_s = most_frames_per_s(replay, false) + bodies_per_s;
+  const double frames_per_s = max_frames_per_s(replay);
   std::unique_ptr<Broadcast> self(
       new Broadcast(options, replay, pipeline::ring_slots(frames_per_s), std::move(*wake)));
-  std::vector<publish::StreamInfo> infos;
   for (std::uint32_t id = 0; id < replay.streams(); ++id) {
     self->settings_.push_back(replay.stream(id).settings);
-    // the publisher numbers its first streams from 0 on
-    if (!replay.stream(id).body.empty() || infos.size() < id) continue;
-    self->presence_[id] = Presence::kHere;
-    self->publish_values(id);
-    infos.push_back(self->info_of(id));
   }
   auto context = net::open_context();
   if (!context) return std::unexpected(context.error());
@@ -101,7 +93,7 @@ Result<std::unique_ptr<Broadcast>> Broadcast::open(const BroadcastOptions& optio
   published.context = self->context_.get();
   published.endpoint = endpoint;
   published.slots = replay.streams();
-  published.more_messages_per_s = bodies_per_s;
+  published.messages_per_s = frames_per_s;
   published.clock = system::monotonic_ns;
   published.data_clock = [clock = &self->clock_] { return clock->now_ns(); };
   // at full speed no frame has a meaningful time of publication
@@ -110,10 +102,12 @@ Result<std::unique_ptr<Broadcast>> Broadcast::open(const BroadcastOptions& optio
     stats.set_replay_file(file);
     stats.set_replay_speed(speed);
   };
-  auto publisher =
-      publish::Publisher::open(std::move(published), std::move(infos), self->ring_, *self->wake_);
+  auto publisher = publish::Publisher::open(std::move(published), self->ring_, *self->wake_);
   if (!publisher) return std::unexpected(publisher.error());
   self->publisher_ = std::move(*publisher);
+  for (std::uint32_t id = 0; id < replay.streams(); ++id) {
+    if (replay.stream(id).is_there_from_start) self->come(id);
+  }
   self->thread_ = std::jthread([publisher = self->publisher_.get()] { publisher->run(); });
   return self;
 }

@@ -15,6 +15,7 @@ Result<std::unique_ptr<Replay>> Replay::open(log::Reader& reader) {
   if (auto done = replay->open_contexts(); !done) return std::unexpected(done.error());
   if (auto done = replay->open_sources(); !done) return std::unexpected(done.error());
   if (auto done = replay->load_descriptions(); !done) return std::unexpected(done.error());
+  if (auto done = replay->build_streams(); !done) return std::unexpected(done.error());
   if (auto done = replay->load_decisions(); !done) return std::unexpected(done.error());
   if (auto done = replay->load_gaps(); !done) return std::unexpected(done.error());
   for (const auto& context : replay->contexts_) context->ready();
@@ -39,27 +40,47 @@ Result<> Replay::open_contexts() {
   return {};
 }
 
-// Those whose stages name other streams come after these.
 Result<> Replay::open_sources() {
-  sources_.resize(reader_.sources().size());
-  for (const bool with_partners : {false, true}) {
-    for (std::size_t s = 0; s < sources_.size(); ++s) {
-      const log::SourceRow& row = reader_.sources()[s];
-      std::vector<ReplayStreamContext*> streams;
-      bool named = false;
-      for (std::size_t i = 0; i < contexts_.size(); ++i) {
-        if (reader_.streams()[i].source != row.id) continue;
-        streams.push_back(contexts_[i].get());
-        named = named || pipeline::has_partners(contexts_[i]->stream().settings);
-      }
-      // nothing of a source without streams was published
-      if (streams.empty() || named != with_partners) continue;
-      auto source = ReplaySource::open(row, std::move(streams), *this, reader_.file());
-      if (!source) return std::unexpected(source.error());
-      sources_[s] = std::move(*source);
+  for (const log::SourceRow& row : reader_.sources()) {
+    auto& source = sources_.emplace_back();
+    std::vector<ReplayStreamContext*> streams;
+    for (std::size_t i = 0; i < contexts_.size(); ++i) {
+      if (reader_.streams()[i].source == row.id) streams.push_back(contexts_[i].get());
     }
+    if (streams.empty()) continue;  // nothing of it was published
+    auto opened = ReplaySource::open(row, std::move(streams), *this, reader_.file());
+    if (!opened) return std::unexpected(opened.error());
+    source = std::move(*opened);
   }
   return {};
+}
+
+Result<> Replay::build_streams() {
+  std::vector<Built> built(contexts_.size(), Built::kNo);
+  for (std::size_t i = 0; i < contexts_.size(); ++i) {
+    if (auto done = build_stream(i, built); !done) return done;
+  }
+  return {};
+}
+
+// Those that the stream's stages have as partners are built before it.
+Result<> Replay::build_stream(std::size_t stream, std::vector<Built>& built) {
+  ReplayStreamContext& context = *contexts_[stream];
+  if (!context.stream().described || built[stream] == Built::kYes) return {};
+  if (built[stream] == Built::kUnderWay) {
+    return fail("the log is damaged (stream " + in_quotes(context.stream().name) +
+                    " has itself as a partner); use another copy of it",
+                reader_.file());
+  }
+  built[stream] = Built::kUnderWay;
+  std::vector<const ReplayStreamContext*> partners;
+  for (std::size_t i = 0; i < contexts_.size(); ++i) {
+    if (!context.has_partner(*contexts_[i]) || !contexts_[i]->stream().described) continue;
+    if (auto done = build_stream(i, built); !done) return done;
+    partners.push_back(contexts_[i].get());
+  }
+  built[stream] = Built::kYes;
+  return context.build(partners);
 }
 
 Result<> Replay::load_descriptions() {
@@ -105,11 +126,11 @@ Result<> Replay::load_gaps() {
   return {};
 }
 
-// What a stream publishes also depends on the partners of its stages.
+// What a stream publishes also depends on the partners of its stages, and on theirs.
 void Replay::set_gap(std::size_t stream, std::int64_t after_chunk) {
   contexts_[stream]->set_gap(after_chunk);
-  for (const auto& context : contexts_) {
-    if (context->needs(contexts_[stream]->index())) context->set_gap(after_chunk);
+  for (std::size_t i = 0; i < contexts_.size(); ++i) {
+    if (contexts_[i]->needs(contexts_[stream]->index())) set_gap(i, after_chunk);
   }
 }
 

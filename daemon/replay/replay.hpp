@@ -69,6 +69,9 @@ class Replay final : private ReplayHost {
   [[nodiscard]] Result<> open_contexts();
   [[nodiscard]] Result<> open_sources();
   [[nodiscard]] Result<> load_descriptions();
+  enum class Built : std::uint8_t { kNo, kUnderWay, kYes };
+  [[nodiscard]] Result<> build_streams();
+  [[nodiscard]] Result<> build_stream(std::size_t stream, std::vector<Built>& built);
   [[nodiscard]] Result<> load_decisions();
   [[nodiscard]] Result<> load_gaps();
   void set_gap(std::size_t stream, std::int64_t after_chunk);

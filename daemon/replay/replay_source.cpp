@@ -57,16 +57,23 @@ Result<> ReplaySource::open_device() {
   device_ = std::move(*description);
   decoder_ = std::move(*decoder);
   if (has_several()) return {};
-  if (streams_.size() > 1) {
+  // Its stream may have been built several times, in one slot.
+  const auto is_other = [this](const ReplayStreamContext* stream) {
+    return pipeline::slot_of(stream->log_id()) != pipeline::slot_of(streams_[0]->log_id());
+  };
+  if (std::ranges::any_of(streams_, is_other)) {
     return fail("the log is damaged (source " + in_quotes(source_.name) +
                     " has several bodies, but devices of driver " + in_quotes(driver_.name) +
                     " have one); use another copy of it",
                 file_);
   }
-  places_ = streams_;
+  only_.skeleton = device_.skeleton;
+  only_.samples = device_.samples;
+  only_.rate_hz = device_.rate_hz;
+  places_ = {streams_[0]};
   const StreamPosition begin{.stream = places_[0]->index()};
   intake_.set_streams(std::span(&begin, 1));
-  return places_[0]->describe(device_);
+  return places_[0]->describe(device_, false);
 }
 
 ReplayStreamContext* ReplaySource::find(std::uint32_t log_id) const {
@@ -93,18 +100,20 @@ Result<ReplaySource::Bodies> ReplaySource::bodies_of(const log::ChunkRow& row) {
   const auto damaged = [&](const std::string& how) {
     return log::damaged_row(file_, "chunk", row.id, how);
   };
-  if (!has_several()) {
+  const auto unpacked = pipeline::unpack_description(row.bytes);
+  if (!unpacked) return damaged("has a description that is cut short");
+  Bodies bodies;
+  if (has_several()) {
+    auto layout = layout_of(unpacked->description);
+    if (!layout) {
+      return damaged("has a description that cannot be read (" + layout.error().message + ")");
+    }
+    bodies.layout = std::move(*layout);
+  } else if (!unpacked->description.empty()) {
     return damaged("describes bodies, but devices of driver " + in_quotes(driver_.name) +
                    " have one");
   }
-  const auto unpacked = pipeline::unpack_description(row.bytes);
-  if (!unpacked) return damaged("has a description that is cut short");
-  auto layout = layout_of(unpacked->description);
-  if (!layout) {
-    return damaged("has a description that cannot be read (" + layout.error().message + ")");
-  }
-  Bodies bodies{.layout = std::move(*layout), .streams = {}};
-  const auto& described = bodies.layout->bodies;
+  const std::span<const drivers::Body> described = bodies_in(bodies.layout);
   if (described.size() != unpacked->streams.size()) {
     return damaged("describes " + std::to_string(described.size()) +
                    " bodies, but names streams for " + std::to_string(unpacked->streams.size()));
@@ -140,15 +149,14 @@ Result<> ReplaySource::expect(const log::ChunkRow& row) {
   for (std::size_t i = 0; i < bodies->streams.size(); ++i) {
     ReplayStreamContext* const stream = bodies->streams[i];
     if (stream == nullptr || stream->stream().described) continue;
-    const drivers::Body& body = bodies->layout->bodies[i];
+    const drivers::Body& body = bodies_in(bodies->layout)[i];
     drivers::Description description = device_;
     description.skeleton = body.skeleton;
     description.samples = body.samples;
     description.rate_hz = stream->stream().settings.rate_hz;
-    if (auto done = stream->describe(std::move(description)); !done) return done;
     // The bodies of the first description come at once; the engine of a later one would wait long,
     // and there may be thousands.
-    if (!at_once) stream->set_aside();
+    if (auto done = stream->describe(std::move(description), !at_once); !done) return done;
   }
   return {};
 }
@@ -191,7 +199,8 @@ Result<> ReplaySource::find_place(const log::ChunkRow& chunk) {
   const bool same = std::ranges::equal(positions_, intake_.next().streams, {},
                                        &StreamPosition::stream, &StreamPosition::stream);
   // A gap may hide the row by which the bodies changed.
-  const bool excused = has_several() && gap_after_ && chunk.id > *gap_after_;
+  const bool changes = has_several() || streams_.size() > 1;
+  const bool excused = changes && gap_after_ && chunk.id > *gap_after_;
   if (!same && !excused) return impossible(chunk);
   arrived(chunk, positions_);
   return {};
@@ -220,7 +229,7 @@ Result<> ReplaySource::use_bodies(const log::ChunkRow& row) {
   }
   intake_.set_streams(positions_);
   arrived(row, {});
-  decoder_->use(*bodies->layout);
+  if (bodies->layout) decoder_->use(*bodies->layout);
   layout_ = bodies->layout;
   return {};
 }
@@ -276,7 +285,7 @@ void ReplaySource::use_calibration() {
 }
 
 bool ReplaySource::item(std::size_t place, pipeline::Item& item) noexcept {
-  places_[place]->take(item);
+  places_[place]->handle(item);
   return true;
 }
 

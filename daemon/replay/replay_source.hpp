@@ -43,8 +43,8 @@ class ReplaySource final : private pipeline::IntakeOut {
 
  private:
   struct Bodies {
-    std::shared_ptr<const drivers::SourceLayout> layout;
-    std::vector<ReplayStreamContext*> streams;  // [body], null: nobody wanted it
+    std::shared_ptr<const drivers::SourceLayout> layout{};  // null: of a device with one body
+    std::vector<ReplayStreamContext*> streams{};            // [body], null: nobody wanted it
   };
 
   [[nodiscard]] Result<> open_device();
@@ -61,6 +61,10 @@ class ReplaySource final : private pipeline::IntakeOut {
   [[nodiscard]] ReplayStreamContext* find(std::uint32_t log_id) const;
   [[nodiscard]] pipeline::StreamPosition position(const ReplayStreamContext& stream,
                                                   const log::StreamPosition& place) const;
+  [[nodiscard]] std::span<const drivers::Body> bodies_in(
+      const std::shared_ptr<const drivers::SourceLayout>& layout) const {
+    return layout ? std::span(layout->bodies) : std::span(&only_, 1);
+  }
   [[nodiscard]] bool has_several() const noexcept { return driver_.make_layout != nullptr; }
   [[nodiscard]] std::unexpected<Error> impossible(const log::ChunkRow& chunk) const;
 
@@ -76,7 +80,9 @@ class ReplaySource final : private pipeline::IntakeOut {
   drivers::Description device_;  // from its latest device info
   std::unique_ptr<drivers::Decoder> decoder_;
   std::unique_ptr<const devices::OwnedCalibration> calibration_;  // null: use the device's default
-  // The layouts of late, by the SHA-256 of their description: people come and go in few rooms.
+  drivers::Body only_;  // of a device that does not describe its bodies
+  // Cache of recent layouts, keyed by the SHA-256 of their description; a recording has few
+  // distinct ones.
   std::map<std::string, std::shared_ptr<const drivers::SourceLayout>> layouts_;
   std::shared_ptr<const drivers::SourceLayout> layout_;  // in use
   pipeline::Intake intake_;

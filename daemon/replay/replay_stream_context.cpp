@@ -24,31 +24,57 @@ Result<std::unique_ptr<ReplayStreamContext>> ReplayStreamContext::open(
   self->stream_.body = stream.body;
   if (!stream.body.empty()) self->stream_.source = source.name;
   self->stream_.first_item = stream.first_item;
+  self->stream_.is_there_from_start =
+      stream.body.empty() && pipeline::generation_of(stream.id) == 0;
   auto settings = record::settings_from_json(stream.stages_json, file);
   if (!settings) return std::unexpected(settings.error());
   self->stream_.settings = std::move(*settings);
   return self;
 }
 
-Result<> ReplayStreamContext::describe(drivers::Description description) {
-  record::StreamSettings& settings = stream_.settings;
-  if (!settings.stages.empty() && !description.skeleton) {
+std::unexpected<Error> ReplayStreamContext::about(Error error) const {
+  error.message = "stream " + in_quotes(stream_.name) + ": " + error.message;
+  error.file = file_;
+  return std::unexpected(std::move(error));
+}
+
+Result<> ReplayStreamContext::describe(drivers::Description description, bool waits) {
+  if (!stream_.settings.stages.empty() && !description.skeleton) {
     return fail("stream " + in_quotes(stream_.name) + " has stages but no skeleton", file_);
   }
-  settings.rate_hz = description.rate_hz;  // the models are bound to this rate
-  if (auto found = pipeline::find_partners(settings, host_.partners); !found) {
-    return fail("stream " + in_quotes(stream_.name) + ": " + found.error().message, file_);
-  }
-  auto published = pipeline::published_skeleton(settings, description.skeleton);
-  if (!published) return std::unexpected(published.error());
-  stream_.published = std::move(*published);
-  if (stream_.source.empty() && !pipeline::has_partners(settings)) {
-    host_.partners[stream_.name] = {
-        .stream = index_, .about = {.skeleton = stream_.published, .rate_hz = settings.rate_hz}};
-  }
+  stream_.settings.rate_hz = description.rate_hz;  // the models are bound to this rate
   stream_.description = std::move(description);
   stream_.described = true;
-  return make_engine();
+  waits_ = waits;
+  return {};
+}
+
+bool ReplayStreamContext::has_partner(const ReplayStreamContext& other) const {
+  for (const pipeline::StageSettings& stage : stream_.settings.stages) {
+    const auto names = pipeline::partner_names(*stage.type, stage.parameters);
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (names[i] != other.stream_.name) continue;
+      if (stage.partners.empty() || stage.partners[i].stream == other.log_id_) return true;
+    }
+  }
+  return false;
+}
+
+Result<> ReplayStreamContext::build(std::span<const ReplayStreamContext* const> partners) {
+  record::StreamSettings& settings = stream_.settings;
+  pipeline::PartnerStreams known;
+  for (const ReplayStreamContext* const partner : partners) {
+    known[partner->stream_.name] = {.stream = partner->index_,
+                                    .about = {.skeleton = partner->stream_.published,
+                                              .rate_hz = partner->stream_.settings.rate_hz}};
+  }
+  if (auto found = pipeline::find_partners(settings, known); !found) return about(found.error());
+  auto published = pipeline::published_skeleton(settings, stream_.description.skeleton);
+  if (!published) return std::unexpected(published.error());
+  stream_.published = std::move(*published);
+  if (auto made = make_engine(); !made) return made;
+  if (waits_) set_aside();
+  return {};
 }
 
 void ReplayStreamContext::set_aside() {
@@ -84,7 +110,7 @@ Result<> ReplayStreamContext::make_engine() {
 bool ReplayStreamContext::needs(std::uint32_t partner) const noexcept {
   for (const pipeline::StageSettings& stage : stream_.settings.stages) {
     for (const pipeline::PartnerStream& named : stage.partners) {
-      if (named.about.skeleton && named.stream == partner) return true;
+      if (named.stream == partner) return true;
     }
   }
   return false;
@@ -165,7 +191,7 @@ void ReplayStreamContext::begin(const pipeline::StreamPosition& first) noexcept 
 }
 
 // What was decoded after the end never came: the reader gave the stream no more space in the ring.
-void ReplayStreamContext::take(pipeline::Item& item) noexcept {
+void ReplayStreamContext::handle(pipeline::Item& item) noexcept {
   host_.before(item, index_);
   pipeline::StreamEngine* const engine = needed_engine();
   if (engine == nullptr || ended_) return;
@@ -213,7 +239,7 @@ void ReplayStreamContext::change(const pipeline::Decision& decision) noexcept {
 // Nothing more comes: what was decoded last but never came was shed.
 void ReplayStreamContext::end(std::int64_t now_ns) noexcept {
   engine_->close_gaps(last_frame_, last_sample_, *this);
-  engine_->end(now_ns, *this);
+  engine_->end(now_ns, false, *this);
   ended_ = true;
 }
 

@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -33,6 +34,7 @@ struct ReplayStream {
   std::string name;
   std::string source, body;      // of a device with several bodies, else empty
   std::uint64_t first_item = 0;  // with which it begins
+  bool is_there_from_start = false;
   // False if the log lacks the description of its body: then nothing is replayed of it.
   bool described = false;
   drivers::Description description{};
@@ -58,9 +60,7 @@ class ReplayHost {
   // An error that could not be returned at once; it ends the replay.
   virtual void failed(Error error) noexcept = 0;
 
-  std::uint64_t next_item = 1;  // the next Item::number
-  pipeline::PartnerStreams
-      partners{};                    // streams that stages may name, by what was described so far
+  std::uint64_t next_item = 1;       // the next Item::number
   pipeline::PartnerRoutes routes{};  // to the engines that there are
 };
 
@@ -73,11 +73,15 @@ class ReplayStreamContext final : private pipeline::EngineOut {
   ReplayStreamContext(std::uint32_t index, std::uint32_t log_id, ReplayModels& models,
                       ReplayHost& host, std::string file);
 
-  // What the device says of the stream's body. Makes the models and the engine, so that nothing can
-  // fail later.
-  [[nodiscard]] Result<> describe(drivers::Description description);
-  // Frees the engine until something comes for the stream.
-  void set_aside();
+  // What the device says of the stream's body. `waits`: it comes late, so that its engine is freed
+  // until then.
+  [[nodiscard]] Result<> describe(drivers::Description description, bool waits);
+  // The streams that its stages have as partners, by their ids in the log or, in an older log, by
+  // their names.
+  [[nodiscard]] bool has_partner(const ReplayStreamContext& other) const;
+  // After describe(), and after build() of its partners: makes the models and the engine, so that
+  // nothing can fail later.
+  [[nodiscard]] Result<> build(std::span<const ReplayStreamContext* const> partners);
 
   // Before the first chunk, after describe(), for each decision of the stream in the log's order:
   // loads what the decision needs, so that nothing can fail later, and remembers which frames never
@@ -100,7 +104,7 @@ class ReplayStreamContext final : private pipeline::EngineOut {
   // belong to the streams of its name before it.
   void begin(const pipeline::StreamPosition& first) noexcept;
   // From the intake.
-  void take(pipeline::Item& item) noexcept;
+  void handle(pipeline::Item& item) noexcept;
   void apply(const pipeline::Decision& decision) noexcept;
   // Its body is no longer among those of the source, at this time: frees the engine for good.
   void leave(std::int64_t now_ns) noexcept;
@@ -121,6 +125,8 @@ class ReplayStreamContext final : private pipeline::EngineOut {
 
  private:
   [[nodiscard]] Result<> make_engine();
+  void set_aside();
+  [[nodiscard]] std::unexpected<Error> about(Error error) const;
   // Makes it when it is first needed; null if there is none.
   [[nodiscard]] pipeline::StreamEngine* needed_engine() noexcept;
   [[nodiscard]] std::optional<std::size_t> stage_of(const pipeline::StageChange& change) const;
@@ -143,6 +149,7 @@ class ReplayStreamContext final : private pipeline::EngineOut {
   ReplayHost& host_;
   std::string file_;
   ReplayStream stream_;
+  bool waits_ = false;
   std::vector<std::unique_ptr<const StageModel>> models_in_use_;  // one for each stage, or null
   std::set<std::pair<std::size_t, std::string>> tried_;           // stage and hash
   std::unique_ptr<pipeline::StreamEngine> engine_;

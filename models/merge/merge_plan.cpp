@@ -78,7 +78,10 @@ Result<MergePlan> MergePlan::make(const StageContext& context) {
       return std::unexpected(fits.error());
     }
   }
-  if (gloves[0] == nullptr && gloves[1] == nullptr) {
+  const auto is_named = [&](const char* name) {
+    return !parameter<std::string>(context.parameters, name).empty();
+  };
+  if (std::ranges::none_of(kNames, is_named)) {
     return misuse(
         "stage merge names no glove; name a glove's stream as its left, as its right or"
         " both");

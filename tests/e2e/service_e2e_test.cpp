@@ -9,6 +9,7 @@
 #include <fstream>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <poll.h>
@@ -18,7 +19,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <nlohmann/json.hpp>
+
 #include "tests/e2e/served.hpp"
+#include "tests/support/free_port.hpp"
+#include "tests/support/mocap_room.hpp"
 
 namespace posed::test {
 namespace {
@@ -100,17 +105,19 @@ pid_t thread_named(pid_t process, const std::string& name) {
 
 // A daemon with all kinds of threads, started as systemd does it.
 struct ServiceStage {
-  explicit ServiceStage(const std::string& command = "record") {
+  explicit ServiceStage(const std::string& command = "record", const std::string& config = {}) {
     REQUIRE(clip::write_bvh(toy_walk(240, 120.0), folder.path() / "walk.bvh"));
-    folder.write("posed.toml", std::string(Stage::kEndpoints) +
-                                   "[trigger]\nlisten = \"127.0.0.1:0\"\n"
-                                   "[metrics]\nlisten = \"127.0.0.1:0\"\n" +
-                                   Stage::kWalker +
-                                   "[[output]]\nkind = \"vmc\"\nbody = \"walker\"\n"
-                                   "to = [\"127.0.0.1:9\"]\n"
-                                   "[[source]]\nname = \"stage\"\ndriver = \"template_mocap\"\n"
-                                   "streams = \"all\"\n[source.template_mocap]\n"
-                                   "listen = \"127.0.0.1:0\"\n");
+    folder.write("posed.toml",
+                 !config.empty() ? config
+                                 : std::string(Stage::kEndpoints) +
+                                       "[trigger]\nlisten = \"127.0.0.1:0\"\n"
+                                       "[metrics]\nlisten = \"127.0.0.1:0\"\n" +
+                                       Stage::kWalker +
+                                       "[[output]]\nkind = \"vmc\"\nbody = \"walker\"\n"
+                                       "to = [\"127.0.0.1:9\"]\n"
+                                       "[[source]]\nname = \"stage\"\ndriver = \"template_mocap\"\n"
+                                       "streams = \"all\"\n[source.template_mocap]\n"
+                                       "listen = \"127.0.0.1:0\"\n");
     const std::string socket_path = (folder.path() / "notify").string();
     const auto usec = std::chrono::duration_cast<std::chrono::microseconds>(kWithin).count();
     std::vector<std::string> words{"env",
@@ -129,6 +136,31 @@ struct ServiceStage {
   NotifySocket socket{folder.path() / "notify"};
   std::optional<Process> daemon;
 };
+
+TEST_CASE("a service counts the streams of bodies, and its first line names those of the config") {
+  const std::uint16_t port = free_port();
+  ServiceStage stage("run", std::string(Stage::kEndpoints) +
+                                "[[source]]\nname = \"room\"\ndriver = \"template_mocap\"\n"
+                                "streams = \"all\"\n[source.template_mocap]\n"
+                                "listen = \"127.0.0.1:" +
+                                std::to_string(port) +
+                                "\"\n[[stream]]\nname = \"lead\"\nsource = \"room\"\n"
+                                "body = \"Person 0\"\n");
+  const auto line = stage.daemon->line();
+  INFO(stage.daemon->errors());
+  REQUIRE(line);
+  CHECK(nlohmann::json::parse(*line).at("streams") == nlohmann::json::array({"lead"}));
+  CHECK(stage.socket.comes("STATUS=0 of 0 streams live"));
+  std::jthread people([&](const std::stop_token& stop) {
+    MocapRoom room(port);
+    for (int frame = 0; !stop.stop_requested(); ++frame) {
+      if (frame % 50 == 0) room.describe();
+      room.frame();
+      std::this_thread::sleep_for(10ms);
+    }
+  });
+  CHECK(stage.socket.comes("STATUS=2 of 2 streams live"));
+}
 
 TEST_CASE("a service says that it is ready, what it does, that it reloads, and that it ends") {
   ServiceStage stage("run");

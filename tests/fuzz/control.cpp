@@ -57,6 +57,7 @@ class DaemonControl final : public control::DaemonControl {
 // A body with a style and a hand with gestures.
 std::vector<control::ControlledStream> two_streams() {
   std::vector<control::ControlledStream> streams(2);
+  streams[1].stream = 1;
   streams[1].name = "h";
   streams[1].skeleton = std::make_shared<const Skeleton>(hand_skeleton(Side::kRight));
   streams[1].settings.rate_hz = 30.0;
@@ -80,7 +81,13 @@ void check(const control::Reply& answer) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static DaemonControl daemon_control;
-  static control::RequestHandler handler(two_streams(), daemon_control);
+  static devices::KeptSettings kept;
+  static control::RequestHandler handler(daemon_control, kept);
+  static const bool added = [] {
+    for (control::ControlledStream& stream : two_streams()) handler.add_stream(std::move(stream));
+    return true;
+  }();
+  if (!added) std::abort();
   if (const auto answer = handler.handle({}, std::as_bytes(std::span(data, size)))) check(*answer);
   for (const pipeline::Ack& ack : std::exchange(daemon_control.acks, {})) {
     const auto answer = handler.acknowledge(ack);

@@ -66,6 +66,9 @@ std::vector<control::ControlledStream> three_streams() {
   streams[0].skeleton = std::make_shared<const Skeleton>(test::toy_skeleton());
   streams[0].settings.stages.push_back(pipeline::stage_settings(style::style_type()));
   streams[0].models.resize(1);
+  for (std::uint32_t i = 0; i < streams.size(); ++i) {
+    streams[i].stream = streams[i].source_number = i;
+  }
   streams[1].name = "h";
   streams[1].skeleton = std::make_shared<const Skeleton>(hand_skeleton(Side::kRight));
   streams[1].settings.rate_hz = 30.0;
@@ -120,12 +123,25 @@ std::string broken_calibration(FuzzedDataProvider& data) {
 }
 
 std::string stream_name(FuzzedDataProvider& data) {
-  return data.PickValueInArray({"w", "h", "g", "nobody"});
+  return data.PickValueInArray({"w", "h", "g", "absent", "nobody"});
 }
 
 struct Fixture {
   DaemonControl daemon_control;
-  control::RequestHandler handler{three_streams(), daemon_control};
+  devices::KeptSettings kept;
+  control::RequestHandler handler{daemon_control, kept};
+
+  Fixture() {
+    for (control::ControlledStream& stream : three_streams()) {
+      handler.add_stream(std::move(stream));
+    }
+    config::StreamConfig absent;
+    absent.name = "absent";
+    absent.stages.push_back(
+        {.type = &style::style_type(),
+         .parameters = complete_parameters(style::style_type().parameters, {}).value()});
+    handler.add_known(control::known_stream(absent, "room"));
+  }
 
   void ask(const std::string& client, const v1::ControlRequest& request) {
     const std::string bytes = request.SerializeAsString();

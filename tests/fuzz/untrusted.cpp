@@ -77,7 +77,7 @@ void try_uploads(FuzzedDataProvider& data) {
     if (data.ConsumeIntegralInRange(0, 7) == 0)
       piece.offset = data.ConsumeIntegral<std::uint64_t>();
     if (data.ConsumeIntegralInRange(0, 7) == 0) piece.total = data.ConsumeIntegral<std::uint64_t>();
-    const auto taken = uploads.take(std::to_string(client), piece, now_ns);
+    const auto taken = uploads.add(std::to_string(client), piece, now_ns);
     demand(!taken || !*taken);  // no piece has the right checksum
     offset[client] = taken ? piece.offset + piece.bytes.size() : 0;
     demand(uploads.bytes() <= control::kMaxModel);
@@ -95,7 +95,7 @@ class Sockets final : public control::DaemonControl {
     options.endpoint = "tcp://127.0.0.1:*";
     options.authenticator = authenticator_.get();
     options.clock = system::monotonic_ns;
-    publisher_ = publish::Publisher::open(std::move(options), {}, items_, *wake_).value();
+    publisher_ = publish::Publisher::open(std::move(options), items_, *wake_).value();
     control::ControlPorts ports;
     ports.acks = &acks_;
     ports.wake = control_wake_.get();
@@ -139,7 +139,8 @@ class Sockets final : public control::DaemonControl {
   pipeline::Ring<pipeline::Ack> acks_{64};
   std::unique_ptr<system::EventFd> wake_ = system::EventFd::open().value();
   std::unique_ptr<system::EventFd> control_wake_ = system::EventFd::open().value();
-  control::RequestHandler handler_{{}, *this};
+  devices::KeptSettings kept_;
+  control::RequestHandler handler_{*this, kept_};
   std::unique_ptr<publish::Publisher> publisher_;
   std::unique_ptr<control::ControlServer> server_;
 };

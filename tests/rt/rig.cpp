@@ -3,21 +3,30 @@
 
 #include <chrono>
 
+#include "daemon/pipeline/stream_context.hpp"
 #include "daemon/system/clock.hpp"
 #include "models/feet/feet_stage.hpp"
 #include "tests/rt/contract.hpp"
 
 namespace posed::rt {
+namespace {
+
+constexpr std::size_t kRigSlots = 1024;  // of the ring to the publisher
+
+}  // namespace
+
 Rig::Rig(std::vector<RigStream> streams, pipeline::RecordSink* record_sink)
     : streams_(std::move(streams)),
       pipeline_wake_(system::EventFd::open().value()),
-      publisher_wake_(system::EventFd::open().value()) {
+      publisher_wake_(system::EventFd::open().value()),
+      exchange_(streams_.size(), *builder_wake_) {
   worker_ = pipeline::Worker::open({.in = &decoded_,
                                     .out = &finished_,
                                     .commands = &commands_,
                                     .acks = &acks_,
                                     .wake = pipeline_wake_.get(),
                                     .publisher = publisher_wake_.get(),
+                                    .streams = &exchange_,
                                     .record_sink = record_sink,
                                     .clock = system::monotonic_ns})
                 .value();
@@ -52,7 +61,9 @@ Rig::Rig(std::vector<RigStream> streams, pipeline::RecordSink* record_sink)
             {&hand::constrain_type(), hand::constrain_type().make(context, nullptr).value()});
       }
     }
-    worker_->add(std::move(options), stream.device.description.rate_hz, *counters_.back());
+    contexts_.push_back(worker_->make_context(std::move(options), stream.device.description.rate_hz,
+                                              *counters_.back(), kRigSlots));
+    exchange_.coming.push(contexts_.back().get());
     source_counters_.push_back(std::make_unique<pipeline::SourceCounters>());
     reader_->add({.device = &stream.device,
                   .counters = source_counters_.back().get(),

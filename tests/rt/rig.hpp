@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "daemon/pipeline/reader.hpp"
+#include "daemon/pipeline/stream_context.hpp"
 #include "daemon/pipeline/worker.hpp"
 #include "models/generate/bound_model.hpp"
 #include "models/style/live/style_filter.hpp"
@@ -50,7 +51,10 @@ class Rig {
   pipeline::Ring<pipeline::Command> commands_{16};
   pipeline::Ring<pipeline::DeviceCommand> device_commands_{16};
   pipeline::Ring<pipeline::Ack> acks_{16};
+  std::unique_ptr<system::EventFd> builder_wake_ = system::EventFd::open().value();
   std::unique_ptr<system::EventFd> pipeline_wake_, publisher_wake_;
+  pipeline::StreamExchange exchange_;
+  std::vector<std::unique_ptr<pipeline::StreamContext>> contexts_;
   std::unique_ptr<pipeline::Worker> worker_;
   std::unique_ptr<pipeline::Reader> reader_;
   std::atomic<int> watched_{0};

@@ -8,6 +8,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "tests/support/virtual_stream_context.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
 namespace posed::test {
@@ -26,68 +27,115 @@ void PublishedStream::count(const Frame& frame, bool is_raw, bool in_lists) {
   published.at_s.push_back(seconds(virtual_now_ns - kVirtualBegin_ns));
 }
 
-VirtualBodies::VirtualBodies(std::vector<VirtualSource> sources, std::uint32_t first,
-                             std::size_t streams, bool keeps_log)
-    : first_(first),
+VirtualBodies::VirtualBodies(const std::vector<std::unique_ptr<VirtualStreamContext>>& only,
+                             std::vector<VirtualSource> sources, std::size_t bodies, bool keeps_log)
+    : only_(only),
       wake_(system::EventFd::open().value()),
-      counters_(streams),
+      counters_(only.size() + (sources.empty() ? 0 : bodies)),
+      only_published_(only.size()),
       keeps_log_(keeps_log) {
-  for (VirtualSource& source : sources) {
-    auto one = std::make_unique<devices::BodySource>();
-    one->config = std::move(source.config);
-    one->number = first + static_cast<std::uint32_t>(sources_.size());
-    one->source = std::make_unique<devices::OpenSource>();
-    one->source->name = one->config.name;
-    one->source->driver = drivers::find_driver(one->config.driver);
-    one->source->options = one->config.options;
-    one->source->device.description = one->source->driver->expect(one->config.options).value();
-    one->exchange = std::make_unique<pipeline::BodyExchange>(*wake_);
-    devices_.push_back(std::make_unique<ScriptedDevice>(one->source->device.description,
-                                                        std::move(source.links), source.repeat_s,
-                                                        std::move(source.poll)));
-    sources_.push_back(std::move(one));
-    files_.push_back(std::move(source.files));
-    slots_ = std::max(slots_, source.slots);
+  kept_.wakes(*wake_);
+  std::size_t slots_of_body = 0;
+  for (const VirtualSource& source : sources) {
+    slots_of_body = std::max(slots_of_body, source.slots);
   }
-  exchange_ = std::make_unique<pipeline::StreamExchange>(first + streams, *wake_);
+  for (const auto& context : only_) {
+    all_slots_ += context->stream.slots + 1;
+    open_only(*context);
+  }
+  for (VirtualSource& source : sources) {
+    source.slots = slots_of_body;
+    open_source(std::move(source));
+  }
+  all_slots_ += (counters_.size() - only_.size()) * (slots_of_body + 1);
+  exchange_ = std::make_unique<pipeline::StreamExchange>(counters_.size(), *wake_);
 }
 
 VirtualBodies::~VirtualBodies() = default;
 
-void VirtualBodies::add_to(record::RecordedSetup& setup) const {
-  const record::RecordedSetup own = record::recorded_setup({}, sources_, counters_.size());
-  for (const auto& source : own.sources) {
-    setup.add_bodies(source.row, source.rate_hz, source.bodies);
+void VirtualBodies::open_only(VirtualStreamContext& context) {
+  const VirtualStream& stream = context.stream;
+  config::StreamConfig config;
+  config.name = stream.name;
+  config.driver = stream.description.driver;
+  config.publish_raw = stream.settings.publish_raw;
+  config.stale_after_s = stream.settings.stale_after_s;
+  config.default_stages = false;
+  for (std::size_t i = 0; i < stream.settings.stages.size(); ++i) {
+    const pipeline::StageSettings& stage = stream.settings.stages[i];
+    config.stages.push_back({.type = stage.type, .parameters = stage.parameters});
+    if (i >= stream.model_files.size() || stream.model_files[i].empty()) continue;
+    const std::string name = stream.name + "-" + std::to_string(i);
+    model_folder_.write(name, stream.model_files[i]);
+    config.stages.back().model = model_folder_.path() / name;
   }
-  setup.slots_to_come = own.slots_to_come;
+  auto source = std::make_unique<devices::OpenSource>();
+  source->config = config::source_of(config);
+  source->device.description = stream.description;
+  open(std::move(source), context.device, stream.slots);
+}
+
+void VirtualBodies::open_source(VirtualSource virtual_source) {
+  auto source = std::make_unique<devices::OpenSource>();
+  source->config = std::move(virtual_source.config);
+  source->device.description =
+      drivers::find_driver(source->config.driver)->expect(source->config.options).value();
+  owned_devices_.push_back(
+      std::make_unique<ScriptedDevice>(source->device.description, std::move(virtual_source.links),
+                                       virtual_source.repeat_s, std::move(virtual_source.poll)));
+  files_.push_back(std::move(virtual_source.files));
+  open(std::move(source), *owned_devices_.back(), virtual_source.slots);
+}
+
+void VirtualBodies::open(std::unique_ptr<devices::OpenSource> source, ScriptedDevice& device,
+                         std::size_t slots) {
+  source->number = static_cast<std::uint32_t>(sources_.size());
+  source->driver = drivers::find_driver(source->device.description.driver);
+  source->exchange = std::make_unique<pipeline::BodyExchange>(*wake_, source->has_several());
+  source->decoded_slots = source->finished_slots = slots;
+  devices_.push_back(&device);
+  sources_.push_back(std::move(source));
+}
+
+record::RecordedSetup VirtualBodies::setup() const {
+  return record::recorded_setup(sources_, counters_.size());
 }
 
 void VirtualBodies::add_to(pipeline::Reader& reader) {
   for (std::size_t i = 0; i < sources_.size(); ++i) {
-    reader.add({.device = devices_[i]->next(),
-                .counters = &sources_[i]->source->counters,
-                .slot = &devices_[i]->slot(),
-                .bodies = sources_[i]->exchange.get()});
+    pipeline::ReadSource read{.device = devices_[i]->next(),
+                              .counters = &sources_[i]->counters,
+                              .slot = &devices_[i]->slot(),
+                              .exchange = sources_[i]->exchange.get()};
+    if (i < only_.size()) {
+      const std::string& calibration = only_[i]->stream.calibration;
+      if (!calibration.empty()) read.calibration = only_[i]->compile(calibration);
+      read.body = {.stream = static_cast<std::uint32_t>(i),
+                   .counters = &counters_[i],
+                   .slots = sources_[i]->decoded_slots};
+    }
+    reader.add(read);
   }
 }
 
 void VirtualBodies::start(pipeline::Worker& worker, pipeline::Reader& reader,
-                          record::RecordRings* record_sink, std::set<std::string> reserved,
-                          pipeline::PartnerStreams partners, std::function<void()> meanwhile) {
+                          record::RecordRings* record_sink, std::function<void()> meanwhile) {
   worker_ = &worker;
   reader_ = &reader;
   record_sink_ = record_sink;
-  std::size_t named_bodies = 0;
-  meanwhile_ = std::move(meanwhile);
-  partners_ = std::move(partners);
+  std::set<std::string> reserved;
   for (const auto& source : sources_) {
     for (const auto& named : source->config.named) reserved.insert(named.stream.name);
-    named_bodies += source->config.named.size();
   }
-  builder_ = std::make_unique<devices::SourceBuilder>(
-      sources_,
-      devices::StreamSlots(first_, static_cast<std::uint32_t>(counters_.size()), named_bodies),
-      std::move(reserved), models_, partners_, *this);
+  builder_ = std::make_unique<devices::SourceBuilder>(sources_,
+                                                      static_cast<std::uint32_t>(counters_.size()),
+                                                      std::move(reserved), models_, kept_, *this);
+  const auto opened = builder_->open();
+  INFO((opened ? "" : opened.error().text()));
+  REQUIRE(opened);
+  builder_->begin();
+  meanwhile_ = std::move(meanwhile);
+  add_to(reader);
   builder_due_ns_ = virtual_now_ns;
 }
 
@@ -126,13 +174,22 @@ PublishedStream& VirtualBodies::find(std::uint32_t stream) {
   const auto found = streams_.find(stream);
   REQUIRE(found != streams_.end());
   REQUIRE(found->second->context != nullptr);
-  REQUIRE_FALSE(found->second->published.ended);
+  // Of a device with one body, whose stream stays when its source has ended.
+  REQUIRE((found->second->about.body.empty() || !found->second->published.ended));
   return found->second->published;
 }
 
 void VirtualBodies::publish_end(PublishedStream& stream) {
   stream.ended = true;
   builder_due_ns_ = virtual_now_ns;  // it may wait for this in remove()
+}
+
+VirtualDaemon::Published VirtualBodies::published(std::uint32_t source) const {
+  VirtualDaemon::Published published = only_published_[source];
+  for (const auto& [id, stream] : streams_) {
+    if (pipeline::slot_of(id) == source) published += stream->published.published;
+  }
+  return published;
 }
 
 std::optional<std::uint32_t> VirtualBodies::stream_of(const std::string& body) const {
@@ -156,15 +213,19 @@ void VirtualBodies::keep(std::uint32_t stream, bool left) {
   about.decoded = counts.reader.frames;
   about.unpublished = counts.pipeline.dropped;
   about.lost = counts.reader.dropped + counts.pipeline.shed + about.unpublished;
-  if (keeps_log_) log_.push_back(std::move(about));
+  if (about.body.empty()) {
+    only_published_[pipeline::slot_of(stream)] += about.published;
+  } else if (keeps_log_) {
+    log_.push_back(std::move(about));
+  }
   streams_.erase(found);
 }
 
 pipeline::StreamCounters& VirtualBodies::counters(std::uint32_t stream) {
-  return counters_[pipeline::slot_of(stream) - first_];
+  return counters_[pipeline::slot_of(stream)];
 }
 
-// In the order of assembly::BodyStreams::add.
+// In the order of assembly::Streams::add.
 void VirtualBodies::add(devices::NewStream stream) {
   const std::uint32_t id = stream.id;
   if (record_sink_ != nullptr && stream.engine) {
@@ -179,19 +240,19 @@ void VirtualBodies::add(devices::NewStream stream) {
                                         std::move(stream.bound.models));
   if (stream.engine) {
     stream.engine->clock = virtual_clock;
-    added->context =
-        worker_->make_context(std::move(*stream.engine), stream.rate_hz, counters(id), slots_);
+    added->context = worker_->make_context(std::move(*stream.engine), stream.rate_hz, counters(id),
+                                           stream.source.finished_slots);
     for (pipeline::Command& command : stream.bound.first_commands) command.stream = id;
     added->context->set_first_commands(std::move(stream.bound.first_commands));
     REQUIRE(exchange_->coming.push(added->context.get()));
   }
   REQUIRE(streams_.emplace(id, std::move(added)).second);
-  meanwhile_();
+  if (meanwhile_) meanwhile_();
 }
 
 // The daemon's publisher ends a removal after the items that are in its ring. Here the builder
 // waits for the stream's last item.
-std::optional<std::uint32_t> VirtualBodies::take_gone() {
+std::optional<std::uint32_t> VirtualBodies::next_gone() {
   while (exchange_->gone.consume(
       [this](const pipeline::StreamContext* context) { gone_.push_back(context->stream()); })) {
   }
@@ -205,7 +266,7 @@ std::optional<std::uint32_t> VirtualBodies::take_gone() {
 
 void VirtualBodies::remove(std::uint32_t stream) { keep(stream, true); }
 
-void VirtualBodies::warn(const devices::BodySource& /*source*/, const std::string& sentence) {
+void VirtualBodies::warn(const devices::OpenSource& /*source*/, const std::string& sentence) {
   REQUIRE_FALSE(sentence.empty());
   ++warnings_;
 }

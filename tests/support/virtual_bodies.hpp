@@ -1,5 +1,5 @@
 // VirtualBodies: the sources of a VirtualDaemon, and the streams of their bodies. It is to the
-// SourceBuilder what assembly::BodyStreams is in the daemon, but without threads and sockets.
+// SourceBuilder what assembly::Streams is in the daemon, but without threads and sockets.
 #pragma once
 
 #include <cstdint>
@@ -21,9 +21,12 @@
 #include "daemon/system/event_fd.hpp"
 #include "proto/message/frame_message.hpp"
 #include "tests/support/scripted_device.hpp"
+#include "tests/support/temp_folder.hpp"
 #include "tests/support/virtual_daemon.hpp"
 
 namespace posed::test {
+
+struct VirtualStreamContext;
 
 // What the publisher of a VirtualDaemon keeps about one stream.
 struct PublishedStream {
@@ -42,25 +45,30 @@ struct PublishedStream {
 
 class VirtualBodies final : public devices::StreamHost {
  public:
-  // `first` is the number of the first source and the slot of the first stream.
-  VirtualBodies(std::vector<VirtualSource> sources, std::uint32_t first, std::size_t streams,
-                bool keeps_log);
+  // `only` are the devices with one body, which outlive the object; `bodies` is how many streams
+  // the bodies of `sources` may have at once.
+  VirtualBodies(const std::vector<std::unique_ptr<VirtualStreamContext>>& only,
+                std::vector<VirtualSource> sources, std::size_t bodies, bool keeps_log);
   ~VirtualBodies() override;
 
-  [[nodiscard]] std::size_t streams() const { return counters_.size(); }
-  [[nodiscard]] std::size_t all_slots() const { return streams() * (slots_ + 1); }
+  [[nodiscard]] std::size_t all_slots() const { return all_slots_; }  // of each ring
   [[nodiscard]] pipeline::StreamExchange& exchange() { return *exchange_; }
-  // All streams that there were, by the time of their end; complete after finish(), empty if no
-  // log is kept.
+  // What the streams of a device with one body published, and what was counted for it.
+  [[nodiscard]] VirtualDaemon::Published published(std::uint32_t source) const;
+  [[nodiscard]] const pipeline::StreamCounters& counters_of(std::uint32_t source) const {
+    return counters_[source];
+  }
+  // All streams of the other bodies that there were, by the time of their end; complete after
+  // finish(), empty if no log is kept.
   [[nodiscard]] const std::vector<VirtualBody>& log() const { return log_; }
   [[nodiscard]] std::size_t warnings() const { return warnings_; }
 
-  void add_to(record::RecordedSetup& setup) const;
-  void add_to(pipeline::Reader& reader);
+  [[nodiscard]] record::RecordedSetup setup() const;
   // `meanwhile` lets the other parts run while the builder is at work.
   void start(pipeline::Worker& worker, pipeline::Reader& reader, record::RecordRings* record_sink,
-             std::set<std::string> reserved, pipeline::PartnerStreams partners,
              std::function<void()> meanwhile);
+  // What control sets for streams.
+  [[nodiscard]] devices::KeptSettings& kept() { return kept_; }
 
   // Whether the reader has bodies or a device to take.
   [[nodiscard]] bool reader_is_called() const;
@@ -86,30 +94,36 @@ class VirtualBodies final : public devices::StreamHost {
     std::vector<std::unique_ptr<const StageModel>> models;
     std::unique_ptr<pipeline::StreamContext> context{};  // null for a refused body
   };
-  void keep(std::uint32_t stream, bool left);  // in log_
+  void open_only(VirtualStreamContext& context);
+  void open_source(VirtualSource source);
+  void open(std::unique_ptr<devices::OpenSource> source, ScriptedDevice& device, std::size_t slots);
+  void add_to(pipeline::Reader& reader);
+  void keep(std::uint32_t stream, bool left);  // what it published
 
   // StreamHost
   pipeline::StreamCounters& counters(std::uint32_t stream) override;
-  [[nodiscard]] std::size_t decoded_slots() const override { return slots_; }
   void add(devices::NewStream stream) override;
-  std::optional<std::uint32_t> take_gone() override;
+  std::optional<std::uint32_t> next_gone() override;
   void remove(std::uint32_t stream) override;
   void call_reader() override { reader_->call(); }
-  void warn(const devices::BodySource& source, const std::string& sentence) override;
+  void warn(const devices::OpenSource& source, const std::string& sentence) override;
 
-  std::uint32_t first_;
-  std::size_t slots_ = 0;  // of one stream, in each ring
+  const std::vector<std::unique_ptr<VirtualStreamContext>>& only_;
+  std::size_t all_slots_ = 0;
   std::unique_ptr<system::EventFd> wake_;
-  std::vector<std::unique_ptr<devices::BodySource>> sources_;
-  std::vector<std::unique_ptr<ScriptedDevice>> devices_;  // of the sources
+  std::vector<std::unique_ptr<devices::OpenSource>> sources_;  // those with one body first
+  std::vector<ScriptedDevice*> devices_;                       // of the sources
+  std::vector<std::unique_ptr<ScriptedDevice>> owned_devices_;
   std::vector<std::shared_ptr<const TempFolder>> files_;  // of their configs
-  std::deque<pipeline::StreamCounters> counters_;         // by slot, from first_ on
+  TempFolder model_folder_;
+  std::deque<pipeline::StreamCounters> counters_;  // by slot
+  std::vector<VirtualDaemon::Published> only_published_;
   std::unique_ptr<pipeline::StreamExchange> exchange_;
   pipeline::Worker* worker_ = nullptr;
   pipeline::Reader* reader_ = nullptr;
   record::RecordRings* record_sink_ = nullptr;
   devices::ModelFiles models_;
-  pipeline::PartnerStreams partners_;  // that stages may name
+  devices::KeptSettings kept_;
   std::function<void()> meanwhile_;
   std::unique_ptr<devices::SourceBuilder> builder_;
   std::int64_t builder_due_ns_ = 0;

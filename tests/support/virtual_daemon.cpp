@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <random>
-#include <set>
 
 #include <catch2/catch.hpp>
 
@@ -27,14 +26,6 @@ constexpr std::int64_t kMaxHoldup_ns = 400'000'000;
 constexpr std::int64_t kMaxStep_ns = 8'000'000;  // while the builder is at work
 constexpr int kItemsPublishedATurn = 32;
 
-std::vector<devices::ModelBytes> shared(const std::vector<std::string>& files) {
-  std::vector<devices::ModelBytes> bytes;
-  for (const std::string& file : files) {
-    bytes.push_back(file.empty() ? nullptr : std::make_shared<const std::string>(file));
-  }
-  return bytes;
-}
-
 bool within(const std::vector<Spell>& spells) {
   return std::ranges::any_of(spells, [](const Spell& spell) {
     return at_ns(spell.from_s) <= virtual_now_ns && virtual_now_ns < at_ns(spell.until_s);
@@ -54,10 +45,9 @@ class VirtualDaemon::Parts {
   std::vector<VirtualSource> sources;
   std::vector<VirtualCommand> script;
   std::vector<pipeline::Ack> acks_taken;
-  std::size_t acked = 0;                  // how many Acks there were
-  std::unique_ptr<VirtualBodies> bodies;  // null without sources
-  pipeline::PartnerStreams partners;      // that stages may name
-  std::uint64_t write_errors = 0;         // of the log, until it was closed
+  std::size_t acked = 0;  // how many Acks there were
+  std::unique_ptr<VirtualBodies> bodies;
+  std::uint64_t write_errors = 0;  // of the log, until it was closed
 
  private:
   enum Part : std::uint8_t {
@@ -72,13 +62,10 @@ class VirtualDaemon::Parts {
   };
 
   void open();
-  void find_partners();
   void open_log();
-  [[nodiscard]] pipeline::EngineOptions engine_of(VirtualStreamContext& context) const;
   void take_turn(Part part);
   [[nodiscard]] std::int64_t due_ns(Part part) const;
   void publish(int most);
-  [[nodiscard]] PublishedStream& published_stream(std::uint32_t stream);
   void publish_frame(PublishedStream& stream, const pipeline::Item& item);
   void speak(const VirtualCommand& command, std::uint64_t ticket);
   void keep_devices();
@@ -109,35 +96,9 @@ class VirtualDaemon::Parts {
   std::array<std::int64_t, kParts> held_until_ns{};  // no turn before this time
 };
 
-void VirtualDaemon::Parts::find_partners() {
-  for (const auto& context : contexts) {
-    const VirtualStream& stream = context->stream;
-    if (pipeline::has_partners(stream.settings)) continue;
-    const auto skeleton =
-        pipeline::published_skeleton(stream.settings, stream.description.skeleton);
-    REQUIRE(skeleton);
-    partners[stream.name] = {.stream = context->published.id,
-                             .about = {.skeleton = *skeleton, .rate_hz = stream.settings.rate_hz}};
-  }
-  for (const auto& context : contexts) {
-    REQUIRE(pipeline::find_partners(context->stream.settings, partners));
-  }
-}
-
 void VirtualDaemon::Parts::open_log() {
   if (options.log.empty()) return;
-  record::RecordedSetup setup;
-  for (const auto& context : contexts) {
-    const VirtualStream& stream = context->stream;
-    setup.add_device({.id = 0,
-                      .name = stream.name,
-                      .driver = stream.description.driver,
-                      .text = stream.description.text,
-                      .identity = stream.description.identity,
-                      .config = "{}"},
-                     stream.settings, shared(stream.model_files));
-  }
-  if (bodies) bodies->add_to(setup);
+  const record::RecordedSetup setup = bodies->setup();
   record::RecorderOptions recorder;
   recorder.file = options.log;
   recorder.clock = virtual_clock;
@@ -145,38 +106,17 @@ void VirtualDaemon::Parts::open_log() {
   REQUIRE(writer);
   record_sink = std::make_unique<record::RecordRings>(record::RingSizes{
       .chunk_bytes = std::vector<std::size_t>(setup.sources.size(), options.chunk_bytes),
-      .slots = std::vector<record::SlotSizes>(setup.streams.size() + setup.slots_to_come,
-                                              options.record_slot)});
-  log_writer =
-      std::make_unique<record::LogWriterLoop>(*record_sink, std::move(*writer), options.log,
-                                              setup.streams, [](const record::RecorderEvent&) {});
-}
-
-pipeline::EngineOptions VirtualDaemon::Parts::engine_of(VirtualStreamContext& context) const {
-  const VirtualStream& stream = context.stream;
-  std::vector<const StageModel*> models;
-  for (std::size_t i = 0; i < stream.settings.stages.size(); ++i) {
-    const std::string& file = stream.model_files[i];
-    models.push_back(file.empty() ? nullptr : context.bind(i, file));
-  }
-  auto engine = pipeline::engine_options(context.published.id, stream.settings,
-                                         stream.description.skeleton, models);
-  REQUIRE(engine);
-  return std::move(*engine);
+      .slots = std::vector<record::SlotSizes>(setup.slots, options.record_slot)});
+  log_writer = std::make_unique<record::LogWriterLoop>(
+      *record_sink, std::move(*writer), options.log, [](const record::RecorderEvent&) {});
 }
 
 void VirtualDaemon::Parts::open() {
   virtual_now_ns = kVirtualBegin_ns;
-  const auto count = static_cast<std::uint32_t>(contexts.size());
-  if (!sources.empty()) {
-    bodies = std::make_unique<VirtualBodies>(std::move(sources), count, options.bodies,
-                                             !options.counts_only);
-  }
-  find_partners();
+  bodies = std::make_unique<VirtualBodies>(contexts, std::move(sources), options.bodies,
+                                           !options.counts_only);
   open_log();
-  std::size_t slots = pipeline::kEventSlots + contexts.size();
-  for (const auto& context : contexts) slots += context->stream.slots;
-  if (bodies) slots += bodies->all_slots();
+  const std::size_t slots = pipeline::kEventSlots + bodies->all_slots();
   decoded = std::make_unique<pipeline::Ring<pipeline::Item>>(slots);
   finished = std::make_unique<pipeline::Ring<pipeline::Item>>(slots);
   commands = std::make_unique<pipeline::Ring<pipeline::Command>>(pipeline::kMaxUnderWay);
@@ -191,7 +131,7 @@ void VirtualDaemon::Parts::open() {
                                    .acks = acks.get(),
                                    .wake = pipeline_wake.get(),
                                    .publisher = publisher_wake.get(),
-                                   .streams = bodies ? &bodies->exchange() : nullptr,
+                                   .streams = &bodies->exchange(),
                                    .record_sink = record_sink.get(),
                                    .clock = virtual_clock})
                .value();
@@ -201,25 +141,7 @@ void VirtualDaemon::Parts::open() {
                                    .clock = virtual_clock,
                                    .commands = device_commands.get()})
                .value();
-  for (const auto& context : contexts) {
-    const VirtualStream& stream = context->stream;
-    worker->add(engine_of(*context), stream.description.rate_hz, context->counters, stream.slots);
-    reader->add(
-        {.device = context->device.next(),
-         .counters = &context->source_counters,
-         .slot = &context->device.slot(),
-         .calibration = stream.calibration.empty() ? nullptr : context->compile(stream.calibration),
-         .body = pipeline::ReadBody{.stream = context->published.id,
-                                    .counters = &context->counters,
-                                    .slots = stream.slots}});
-  }
-  if (bodies) {
-    std::set<std::string> names;
-    for (const auto& context : contexts) names.insert(context->stream.name);
-    bodies->add_to(*reader);
-    bodies->start(*worker, *reader, record_sink.get(), std::move(names), partners,
-                  [this] { run_beside_builder(); });
-  }
+  bodies->start(*worker, *reader, record_sink.get(), [this] { run_beside_builder(); });
   std::ranges::stable_sort(script, {}, &VirtualCommand::at_s);
   reader->begin();
   due.fill(kVirtualBegin_ns);
@@ -277,10 +199,7 @@ std::int64_t VirtualDaemon::Parts::due_ns(Part part) const {
   switch (part) {
     case kReader:
       if (!device_commands->empty()) at = virtual_now_ns;
-      for (const auto& context : contexts) {
-        if (!context->device.slot().in.empty()) at = virtual_now_ns;
-      }
-      if (bodies && bodies->reader_is_called()) at = virtual_now_ns;
+      if (bodies->reader_is_called()) at = virtual_now_ns;
       break;
     case kWorker:
       if (!decoded->empty() || !commands->empty()) at = virtual_now_ns;
@@ -292,11 +211,10 @@ std::int64_t VirtualDaemon::Parts::due_ns(Part part) const {
       at = next_command < script.size() ? at_ns(script[next_command].at_s) : system::kForever_ns;
       break;
     case kSupervisor:
-      at = bodies ? bodies->supervisor_due_ns() : system::kForever_ns;
-      for (const auto& context : contexts) at = std::min(at, context->device.due_ns());
+      at = bodies->supervisor_due_ns();
       break;
     case kBuilder:
-      at = bodies ? bodies->due_ns() : system::kForever_ns;
+      at = bodies->due_ns();
       break;
     default:
       break;
@@ -341,10 +259,7 @@ void VirtualDaemon::Parts::write_log() {
   write_errors = log_writer->errors();
 }
 
-void VirtualDaemon::Parts::keep_devices() {
-  for (const auto& context : contexts) context->device.supervise(*reader);
-  if (bodies) bodies->supervise();
-}
+void VirtualDaemon::Parts::keep_devices() { bodies->supervise(); }
 
 // A model takes its time to be read and bound, and the hot threads do not wait for it.
 void VirtualDaemon::Parts::run_beside_builder() {
@@ -370,7 +285,7 @@ void VirtualDaemon::Parts::speak(const VirtualCommand& wanted, std::uint64_t tic
   VirtualStreamContext& context = *contexts[wanted.stream];
   if (wanted.kind == Kind::kCalibrate) {
     REQUIRE(device_commands->push({.kind = pipeline::DeviceCommand::Kind::kCalibrate,
-                                   .stream = wanted.stream,
+                                   .source = wanted.stream,
                                    .ticket = ticket,
                                    .calibration = context.compile(wanted.bytes)}));
     return reader->call();
@@ -408,9 +323,9 @@ void VirtualDaemon::Parts::speak(const VirtualCommand& wanted, std::uint64_t tic
 }
 
 void VirtualDaemon::Parts::publish(int most) {
-  const auto take = [this](const pipeline::Item& item) {
+  const auto publish_one = [this](const pipeline::Item& item) {
     using Kind = pipeline::Item::Kind;
-    PublishedStream& stream = published_stream(pipeline::stream_of(item));
+    PublishedStream& stream = bodies->find(pipeline::stream_of(item));
     pipeline::count(stream.counters.publisher.taken);
     switch (item.kind) {
       case Kind::kSample:
@@ -420,24 +335,20 @@ void VirtualDaemon::Parts::publish(int most) {
         if (item.stream_event.kind == v1::Event::KIND_SHED) {
           stream.published.missed += static_cast<std::uint64_t>(item.stream_event.value);
         }
-        if (bodies && item.stream_event.kind == v1::Event::KIND_ENDED) bodies->publish_end(stream);
+        if (item.stream_event.kind == v1::Event::KIND_ENDED) bodies->publish_end(stream);
         break;
       default:
         publish_frame(stream, item);
     }
   };
-  for (int i = 0; i < most && finished->consume(take); ++i) {
+  for (int i = 0; i < most && finished->consume(publish_one); ++i) {
   }
-  const auto take_ack = [this](const pipeline::Ack& ack) {
+  const auto count_ack = [this](const pipeline::Ack& ack) {
     ++acked;
     if (!options.counts_only) acks_taken.push_back(ack);
   };
-  while (acks->consume(take_ack)) {
+  while (acks->consume(count_ack)) {
   }
-}
-
-PublishedStream& VirtualDaemon::Parts::published_stream(std::uint32_t stream) {
-  return stream < contexts.size() ? contexts[stream]->published : bodies->find(stream);
 }
 
 void VirtualDaemon::Parts::publish_frame(PublishedStream& stream, const pipeline::Item& item) {
@@ -454,7 +365,7 @@ void VirtualDaemon::Parts::stop() {
   worker->finish();
   while (!finished->empty() || !acks->empty()) publish(kItemsPublishedATurn);
   if (log_writer) REQUIRE(log_writer->finish(virtual_now_ns));
-  if (bodies) bodies->finish();
+  bodies->finish();
 }
 
 // To close the log would complete it, so its files are put back as they were.
@@ -464,7 +375,7 @@ void VirtualDaemon::Parts::kill() {
   if (log_writer) copy_log(options.log, copy);
   log_writer.reset();
   if (!options.log.empty()) copy_log(copy, options.log);
-  if (bodies) bodies->finish();
+  bodies->finish();
 }
 
 VirtualDaemon::VirtualDaemon(VirtualOptions options)
@@ -472,8 +383,7 @@ VirtualDaemon::VirtualDaemon(VirtualOptions options)
 VirtualDaemon::~VirtualDaemon() = default;
 
 void VirtualDaemon::add(VirtualStream stream) {
-  const auto id = static_cast<std::uint32_t>(parts_->contexts.size());
-  parts_->contexts.push_back(std::make_unique<VirtualStreamContext>(std::move(stream), id));
+  parts_->contexts.push_back(std::make_unique<VirtualStreamContext>(std::move(stream)));
 }
 void VirtualDaemon::add(VirtualSource source) { parts_->sources.push_back(std::move(source)); }
 void VirtualDaemon::command(VirtualCommand command) {
@@ -481,19 +391,27 @@ void VirtualDaemon::command(VirtualCommand command) {
 }
 void VirtualDaemon::run(double until_s) { parts_->run(until_s); }
 
-const VirtualDaemon::Published& VirtualDaemon::published(std::uint32_t stream) const {
-  return parts_->contexts[stream]->published.published;
+VirtualDaemon::Published& VirtualDaemon::Published::operator+=(const Published& next) {
+  frames += next.frames;
+  raw += next.raw;
+  samples += next.samples;
+  newest = std::max(newest, next.newest);
+  numbers += next.numbers;
+  missed += next.missed;
+  sequences.insert(sequences.end(), next.sequences.begin(), next.sequences.end());
+  at_s.insert(at_s.end(), next.at_s.begin(), next.at_s.end());
+  root_z_m.insert(next.root_z_m.begin(), next.root_z_m.end());
+  return *this;
+}
+
+VirtualDaemon::Published VirtualDaemon::published(std::uint32_t stream) const {
+  return parts_->bodies->published(stream);
 }
 const pipeline::StreamCounters& VirtualDaemon::counters(std::uint32_t stream) const {
-  return parts_->contexts[stream]->counters;
+  return parts_->bodies->counters_of(stream);
 }
-const std::vector<VirtualBody>& VirtualDaemon::bodies() const {
-  static const std::vector<VirtualBody> none;
-  return parts_->bodies ? parts_->bodies->log() : none;
-}
-std::size_t VirtualDaemon::warnings() const {
-  return parts_->bodies ? parts_->bodies->warnings() : 0;
-}
+const std::vector<VirtualBody>& VirtualDaemon::bodies() const { return parts_->bodies->log(); }
+std::size_t VirtualDaemon::warnings() const { return parts_->bodies->warnings(); }
 std::uint64_t VirtualDaemon::write_errors() const { return parts_->write_errors; }
 const std::vector<pipeline::Ack>& VirtualDaemon::acks() const { return parts_->acks_taken; }
 

@@ -142,8 +142,12 @@ class VirtualDaemon {
     std::vector<std::uint64_t> sequences;   // of the styled frames, as they came
     std::vector<double> at_s;               // of each of them, when it was published
     std::set<long> root_z_m;                // rounded, of all frames
+
+    // Adds what the next stream of the same name published.
+    Published& operator+=(const Published& next);
   };
-  [[nodiscard]] const Published& published(std::uint32_t stream) const;
+  // Of a stream with a device of its own, so far.
+  [[nodiscard]] Published published(std::uint32_t stream) const;
   [[nodiscard]] const pipeline::StreamCounters& counters(std::uint32_t stream) const;
   // After run(): all streams that bodies of sources ever had, those of one slot in order.
   [[nodiscard]] const std::vector<VirtualBody>& bodies() const;

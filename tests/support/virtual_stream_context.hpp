@@ -15,11 +15,13 @@
 namespace posed::test {
 
 struct VirtualStreamContext {
-  VirtualStreamContext(VirtualStream script, std::uint32_t number)
+  explicit VirtualStreamContext(VirtualStream script)
       : stream(std::move(script)),
-        device(stream.description, std::move(stream.links), stream.repeat_s),
-        published(number, stream.name, counters) {
+        device(stream.description, std::move(stream.links), stream.repeat_s) {
     stream.settings.rate_hz = stream.description.rate_hz;
+    for (std::size_t i = 0; i < stream.model_files.size(); ++i) {
+      if (!stream.model_files[i].empty()) static_cast<void>(bind(i, stream.model_files[i]));
+    }
   }
 
   // The file, bound to stage number `stage`; once, however often it is used.
@@ -46,12 +48,9 @@ struct VirtualStreamContext {
   }
 
   VirtualStream stream;
-  pipeline::StreamCounters counters;
-  pipeline::SourceCounters source_counters;
   ScriptedDevice device;
   std::map<std::pair<std::size_t, std::string>, std::unique_ptr<const StageModel>> models;
   std::map<std::string, std::unique_ptr<const drivers::glove::OwnedCalibration>> calibrations;
-  PublishedStream published;
 };
 
 }  // namespace posed::test

@@ -295,13 +295,13 @@ struct Watched {
 };
 
 // A serialized frame of the same size as the stream's.
-std::string sample_body(const devices::OpenStream& stream) {
-  const Skeleton& skeleton = *stream.source->device.description.skeleton;
+std::string sample_body(const devices::OpenSource& source) {
+  const Skeleton& skeleton = *source.device.description.skeleton;
   Frame frame;
   pose_from_channels(skeleton, std::vector<double>(skeleton.channels.size(), 0.1), frame);
   frame.header.sequence = frame.header.arrival_ns = system::monotonic_ns();
   frame.header.device_ns = frame.header.arrival_ns;
-  message::FrameEncoder encoder(stream.config.name);
+  message::FrameEncoder encoder(source.config.name);
   static_cast<void>(encoder.encode(frame));
   const std::int64_t some_ns = frame.header.arrival_ns;
   return encoder.stamp({some_ns, some_ns}, {}).SerializeAsString();
@@ -328,10 +328,10 @@ void watch(const assembly::Daemon& daemon, const Turns& turns, int seconds, Watc
   }
   const int measured_s = (seconds + 1) / 2;
   watched.pipeline_cpu_percent = static_cast<double>(pipeline_cpu_ns) * 1e-7 / measured_s;
-  for (const auto& stream : daemon.streams()) {
-    const auto& counters = stream->counters;
-    watched.dropped += counters.reader.dropped + counters.pipeline.dropped;
-    watched.shed += counters.pipeline.shed;
+  const v1::Stats stats = daemon.stats();
+  for (const v1::StreamStats& stream : stats.stream()) {
+    watched.dropped += stream.dropped();
+    watched.shed += stream.shed();
   }
 }
 
@@ -350,12 +350,12 @@ Result<Watched> measure(const HopOptions& options) {
   if (!daemon) return std::unexpected(daemon.error());
   auto context = net::open_context();
   if (!context) return std::unexpected(context.error());
-  auto hop = BareHop::open(context->get(), options.streams, sample_body(*(*daemon)->streams()[0]));
+  auto hop = BareHop::open(context->get(), options.streams, sample_body(*(*daemon)->sources()[0]));
   if (!hop) return std::unexpected(hop.error());
   Turns turns;
   int place = 0;
-  for (const auto& stream : (*daemon)->streams()) {
-    drivers::Device& device = stream->source->device;
+  for (const auto& source : (*daemon)->sources()) {
+    drivers::Device& device = source->device;
     device.decoder = std::make_unique<TurnDecoder>(std::move(device.decoder), **hop, turns);
     device.transport = std::make_unique<LaterTransport>(
         std::move(device.transport), nanoseconds(place++ / (kRate_hz * options.streams)));

@@ -123,6 +123,10 @@ int ask_and_print(const CtlOptions& options, const v1::ControlRequest& request, 
 int show_change(const CtlOptions& options, const Result<v1::ControlReply>& reply,
                 const std::string& what) {
   return show(options, reply, [&](const v1::ControlReply& accepted) {
+    if (accepted.sequence() == 0) {
+      std::printf("%s: in effect when it comes: %s\n", accepted.stream().c_str(), what.c_str());
+      return;
+    }
     std::printf("%s: in effect from frame %llu: %s\n", accepted.stream().c_str(),
                 static_cast<unsigned long long>(accepted.sequence()), what.c_str());
   });

@@ -13,7 +13,8 @@
 #include "daemon/config/config.hpp"
 #include "daemon/config/take_tables.hpp"
 #include "daemon/devices/about_stream.hpp"
-#include "daemon/devices/open_stream.hpp"
+#include "daemon/devices/open_source.hpp"
+#include "daemon/devices/stream_stages.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/findings.hpp"
 #include "proto/text/clean.hpp"
@@ -58,22 +59,28 @@ Findings findings_of(const pipeline::StageSettings& stage, std::string& line) {
   return findings.add("parameters", parameters);
 }
 
-// What stream number `number` would run, found out with its device opened and its models bound.
+// Describes what the stream would run, found out with its device opened and its models bound.
 // Streams after it may have it as a partner.
-Result<Findings> try_stream(const config::StreamConfig& config, std::size_t number,
+Result<Findings> try_stream(const config::StreamConfig& config,
                             pipeline::PartnerStreams& partners) {
-  const auto stream = devices::open_stream(config, partners);
-  if (!stream) return std::unexpected(stream.error());
-  devices::add_partner(partners, number, **stream);
-  const auto missing = devices::try_kept_device(*(*stream)->source);
+  devices::ModelFiles files;
+  const auto source = devices::open_source(config::source_of(config), files);
+  if (!source) return std::unexpected(source.error());
+  const drivers::Body body = devices::only_body(**source);
+  auto stages = devices::load_stages(config, body.skeleton, body.rate_hz, files, partners);
+  if (!stages) return devices::of_stream(config.name, stages.error());
+  partners[config.name] = {
+      .stream = static_cast<std::uint32_t>(partners.size()),
+      .about = {.skeleton = stages->published, .rate_hz = stages->settings.rate_hz}};
+  const auto missing = devices::try_kept_device(**source);
   if (!missing) return devices::of_stream(config.name, missing.error());
-  const auto bound = devices::bind_stages((*stream)->stages);
+  const auto bound = devices::bind_stages(*stages);
   if (!bound) return devices::of_stream(config.name, bound.error());
-  const auto engine = devices::make_engine(0, (*stream)->stages, *bound);
+  const auto engine = devices::make_engine(0, *stages, *bound);
   if (!engine) return devices::of_stream(config.name, engine.error());
-  const drivers::Description& device = (*stream)->source->device.description;
+  const drivers::Description& device = (*source)->device.description;
   const std::size_t joints = device.skeleton ? device.skeleton->joints.size() : 0;
-  std::vector<std::string> warnings = (*stream)->source->device.warnings;
+  std::vector<std::string> warnings = (*source)->device.warnings;
   if (!missing->empty()) {
     warnings.push_back("the device is not here now, and `posed run` waits for it (" + *missing +
                        ")");
@@ -81,9 +88,9 @@ Result<Findings> try_stream(const config::StreamConfig& config, std::size_t numb
   std::string line = fmt::format("{}: {}{}{}, {:g} Hz, {} joints", config.name, config.driver,
                                  missing->empty() ? " " : " (away)", clean(device.identity),
                                  device.rate_hz, joints);
-  std::vector<Findings> stages;
-  for (const pipeline::StageSettings& stage : (*stream)->stages.settings.stages) {
-    stages.push_back(findings_of(stage, line));
+  std::vector<Findings> stage_findings;
+  for (const pipeline::StageSettings& stage : stages->settings.stages) {
+    stage_findings.push_back(findings_of(stage, line));
   }
   if (config.publish_raw) line += ", raw input too";
   Findings findings;
@@ -96,7 +103,7 @@ Result<Findings> try_stream(const config::StreamConfig& config, std::size_t numb
       .add("sample_values", device.samples.names.size())
       .add("publish_raw", config.publish_raw)
       .add("stale_after_s", config.stale_after_s)
-      .add("stages", stages)
+      .add("stages", stage_findings)
       .add("present", missing->empty())
       .add("warnings", warnings);
   for (const std::string& warning : warnings) findings.say("  note: " + clean(warning));
@@ -181,8 +188,10 @@ void try_all(const std::string& file, config::Reading& reading, std::vector<Find
   const auto& configs = reading.config.streams;
   std::vector<std::optional<Findings>> tried(configs.size());
   pipeline::PartnerStreams partners;
-  for (const std::size_t i : devices::opening_order(configs)) {
-    auto found = try_stream(configs[i], i, partners);
+  std::vector<const config::StreamConfig*> streams_of_devices;
+  for (const config::StreamConfig& stream : configs) streams_of_devices.push_back(&stream);
+  for (const std::size_t i : devices::building_order(streams_of_devices)) {
+    auto found = try_stream(configs[i], partners);
     if (found) tried[i] = std::move(*found);
     if (!found) reading.errors.push_back(found.error());
   }

@@ -131,13 +131,10 @@ void post(assembly::Daemon& daemon, const record::RecorderEvent& event) {
   for (const std::uint32_t stream : event.streams) daemon.post_event(stream, kind, event.text);
 }
 
-// Datagrams that never came to posed. Those of a body's device count once, with its source.
-std::uint64_t kernel_dropped(const v1::Stats& stats) {
+// Datagrams that never came to posed.
+std::uint64_t kernel_dropped(const assembly::Daemon& daemon) {
   std::uint64_t dropped = 0;
-  for (const v1::SourceStats& source : stats.source()) dropped += source.kernel_dropped();
-  for (const v1::StreamStats& stream : stats.stream()) {
-    if (stream.source_name().empty()) dropped += stream.kernel_dropped();
-  }
+  for (const auto& source : daemon.sources()) dropped += source->counters.kernel_dropped.load();
   return dropped;
 }
 
@@ -168,8 +165,9 @@ std::string missing_words(const record::Recorder& recorder, std::uint64_t droppe
 }
 
 // Prints a summary. Gaps were already reported when they happened.
-void print_result(const RecordingPlan& options, const v1::Stats& stats,
+void print_result(const RecordingPlan& options, const assembly::Daemon& daemon,
                   const record::Recorder& recorder, double took_s) {
+  const v1::Stats stats = daemon.stats();
   std::error_code gone;  // somebody deleted the log meanwhile
   const auto size = std::filesystem::file_size(options.out, gone);
   const std::uintmax_t bytes = gone ? 0 : size;
@@ -185,7 +183,7 @@ void print_result(const RecordingPlan& options, const v1::Stats& stats,
                           .add("samples", stream.samples()));
   }
   const std::uint64_t lost = recorder.lost_chunks() + recorder.lost_frames();
-  const std::uint64_t dropped = kernel_dropped(stats);
+  const std::uint64_t dropped = kernel_dropped(daemon);
   if (options.json) {
     Findings()
         .add("file", options.out)
@@ -272,15 +270,14 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
       }};
   auto replaced = SetAside::move(plan.out);
   if (!replaced) return std::unexpected(replaced.error());
-  std::set<std::string> with_body;
-  auto recorder = record::Recorder::open(
-      std::move(recorder_options),
-      record::recorded_setup(daemon.streams(), daemon.sources(), daemon.slots_to_come()));
+  std::set<std::uint32_t> with_body;  // sources, by number
+  auto recorder = record::Recorder::open(std::move(recorder_options),
+                                         record::recorded_setup(daemon.sources(), daemon.slots()));
   if (!recorder) return std::unexpected(recorder.error());
   assembly::DaemonHooks hooks;
   hooks.record_sink = &(*recorder)->record_sink();
   hooks.record_stream = [&recorder, &with_body](const devices::NewStream& stream) {
-    with_body.insert(stream.source.config.name);
+    with_body.insert(stream.source.number);
     (*recorder)->add_stream(record::recorded_stream(stream));
   };
   hooks.more_stats = [&recorder](v1::Stats& stats) {
@@ -310,9 +307,9 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
   const double took_s = seconds(system::monotonic_ns() - start_ns);
   auto finished = (*recorder)->finish();
   for (const auto& source : daemon.sources()) {
-    if (!with_body.contains(source->config.name)) warn_of_no_body(source->config.name);
+    if (!with_body.contains(source->number)) warn_of_no_body(source->config.name);
   }
-  print_result(plan, daemon.stats(), **recorder, took_s);
+  print_result(plan, daemon, **recorder, took_s);
   if (finished && plan.clips) return write_take_clips(plan.out);
   return finished;
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstdlib>
 #include <iterator>
+#include <memory>
+#include <string>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
@@ -52,13 +54,16 @@ bool reload(assembly::Daemon& daemon, const std::string& path, service::Service&
   return true;
 }
 
+bool has_several(const std::unique_ptr<devices::OpenSource>& source) {
+  return source->has_several();
+}
+
 // For `systemctl status`. It asks no thread, because that one may be stuck.
 std::string status_of(const assembly::Daemon& daemon) {
-  const auto live = std::ranges::count_if(daemon.streams(), [](const auto& stream) {
-    return stream->counters.pipeline.state.load() == pipeline::StreamState::kLive;
-  });
-  return fmt::format("{} of {} streams live, {} sources of several bodies; poses at {}", live,
-                     daemon.streams().size(), daemon.sources().size(), daemon.publish_endpoint());
+  const auto streams = daemon.stream_counts();
+  return fmt::format(
+      "{} of {} streams live, {} sources of several bodies; poses at {}", streams.live, streams.all,
+      std::ranges::count_if(daemon.sources(), has_several), daemon.publish_endpoint());
 }
 
 }  // namespace
@@ -94,22 +99,23 @@ void prepare_to_serve() {
 }
 
 Result<> check_end(const assembly::Daemon& daemon, const ServeOptions& options) {
-  const auto endless = [](const auto& stream) { return stream->source->endless; };
-  if (!options.until_end || !std::ranges::all_of(daemon.streams(), endless)) return {};
+  const auto endless = [](const auto& source) { return source->endless; };
+  if (!options.until_end || !std::ranges::all_of(daemon.sources(), endless)) return {};
   return misuse(
       "--until-end: no source of this config ever ends (gloves come and go, clips loop); leave it"
       " out, give --seconds, or set loop = false");
 }
 
 void print_ready(const assembly::Daemon& daemon) {
-  std::vector<std::string> streams, sources;
-  for (const auto& stream : daemon.streams()) streams.push_back(stream->config.name);
-  for (const auto& source : daemon.sources()) sources.push_back(source->config.name);
+  std::vector<std::string> sources;
+  for (const auto& source : daemon.sources()) {
+    if (source->has_several()) sources.push_back(source->config.name);
+  }
   Findings ready;
   ready.add("ready", true)
       .add("publish", daemon.publish_endpoint())
       .add("control", daemon.control_endpoint())
-      .add("streams", streams);
+      .add("streams", daemon.stream_names());
   if (!sources.empty()) ready.add("sources", sources);
   if (!daemon.metrics_url().empty()) ready.add("metrics", daemon.metrics_url());
   const std::string line = ready.json();

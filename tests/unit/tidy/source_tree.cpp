@@ -11,7 +11,6 @@
 namespace posed::tidy {
 namespace {
 
-constexpr int kMaxLines = 500;
 constexpr std::size_t kMaxColumns = 100;
 
 // Replaces comments and the contents of string and character literals by blanks, keeping all
@@ -192,9 +191,6 @@ std::vector<Finding> check_title(const std::string& path, const std::string& tex
 
 std::vector<Finding> check_sizes(const SourceFile& file) {
   std::vector<Finding> findings;
-  if (file.lines.size() > kMaxLines) {
-    findings.push_back({file.path, kMaxLines, "has more than 500 lines: split it"});
-  }
   // Written in two halves so that this check does not report its own source.
   const std::regex mark(std::string("\\b(TO") + "DO|FIX" + "ME|XX" + "X)\\b");
   for (std::size_t i = 0; i < file.lines.size(); ++i) {

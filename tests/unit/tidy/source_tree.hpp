@@ -52,7 +52,7 @@ struct Target {
                                                     const std::string& text);
 // A README begins with a title. A formatter for code that ran over one has broken it.
 [[nodiscard]] std::vector<Finding> check_title(const std::string& path, const std::string& text);
-// At most 500 lines a file, 100 columns a line, no left-over marks.
+// At most 100 columns a line, no left-over marks.
 [[nodiscard]] std::vector<Finding> check_sizes(const SourceFile& file);
 // Programmers read the .proto files as the description of what posed publishes: every field has a
 // comment on its line.

@@ -67,7 +67,8 @@ class Booth final : public DaemonControl {
   std::unique_ptr<system::EventFd> wake_ = *system::EventFd::open();
   pipeline::Ring<Ack> acks_{kMaxUnderWay};
   pipeline::Ring<Ack> acks_feed_{kMaxUnderWay};
-  RequestHandler handler_{three_streams(), *this};
+  HandlerRig rig_{three_streams(), *this};
+  RequestHandler& handler_ = rig_.handler;
   std::unique_ptr<ControlServer> server_;
 };
 

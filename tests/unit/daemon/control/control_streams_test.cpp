@@ -11,6 +11,7 @@
 #include "posed/v1/control.pb.h"
 #include "tests/support/stage_commands.hpp"
 #include "tests/unit/daemon/control/requests.hpp"
+#include "tests/unit/daemon/control/three_streams.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::control {
@@ -31,7 +32,7 @@ class PatientDaemonControl final : public DaemonControl {
     return true;
   }
   bool send(const pipeline::DeviceCommand& command) override {
-    to_device = command.stream;
+    to_device = command.source;
     return true;
   }
   void keep_model(std::span<const std::byte>) override {}
@@ -89,12 +90,21 @@ v1::ControlRequest set_model(const std::string& stream) {
 
 struct Stage {
   PatientDaemonControl pipeline;
-  RequestHandler handler{walker(), pipeline};
+  HandlerRig rig{walker(), pipeline};
+  RequestHandler& handler = rig.handler;
 
   // The error sentence; empty if the request went on to the pipeline.
   std::string ask(const v1::ControlRequest& request) {
     const std::string bytes = request.SerializeAsString();
     return error_of(handler.handle({"me"}, std::as_bytes(std::span(bytes))));
+  }
+  v1::ControlReply reply_to(const v1::ControlRequest& request) {
+    const std::string bytes = request.SerializeAsString();
+    const auto answer = handler.handle({"me"}, std::as_bytes(std::span(bytes)));
+    v1::ControlReply reply;
+    REQUIRE(answer);
+    REQUIRE(reply.ParseFromString(answer->bytes));
+    return reply;
   }
   // The error sentence after the pipeline's answer; empty if it is a success.
   std::string acknowledge(const Command& command, bool refused, bool gone = false) {
@@ -180,6 +190,52 @@ TEST_CASE("a command that meets a changing body is answered so") {
   CHECK(stage.ask(set_alpha("ann")).empty());
   CHECK(stage.acknowledge(*stage.pipeline.next(), true, true) ==
         "stream 'ann': its body changes just now; try again");
+}
+
+TEST_CASE("what is set for a stream that is not there is kept until it comes, and stays") {
+  Stage stage;
+  config::StreamConfig config;
+  config.name = "emma";
+  config.stages.push_back(
+      {.type = &style::style_type(),
+       .parameters = complete_parameters(style::style_type().parameters, {}).value()});
+  stage.handler.add_known(known_stream(config, "optitrack"));
+  CHECK(stage.ask(set_alpha("x")) == "there is no stream 'x'; there is: walker, emma");
+
+  // The reply comes at once: the pipeline has nothing to do.
+  CHECK(stage.reply_to(set_alpha("emma")).ok());
+  const v1::ControlReply reply = stage.reply_to(set_model("emma"));
+  CHECK(reply.ok());
+  CHECK(reply.stream() == "emma");
+  CHECK(reply.sequence() == 0);
+  CHECK_FALSE(stage.pipeline.next());
+  CHECK(stage.ask(alpha_request("emma", 7.0F)).contains("out of range"));
+  v1::ControlRequest warm_up;
+  warm_up.mutable_stage_command()->set_stream("emma");
+  warm_up.mutable_stage_command()->set_name("warm-up");
+  CHECK(stage.ask(warm_up).contains("is not there now"));
+  CHECK(stage.ask(model_request("emma", "no model")) != "");
+
+  const auto kept = [&] {
+    devices::LoadedStages loaded;
+    loaded.settings.stages.push_back(pipeline::stage_settings(style::style_type()));
+    loaded.model_files.resize(1);
+    stage.rig.kept.apply("emma", loaded);
+    return loaded;
+  };
+  CHECK(parameter<double>(kept().settings.stages[0].parameters, "alpha") == 0.5);
+  CHECK(kept().settings.stages[0].model_name == "sway.style");
+  REQUIRE(kept().model_files[0]);
+  CHECK(*kept().model_files[0] == style::serialize_model(test::toy_model(1, 0.3)));
+
+  // What is set while the stream is there stays, too, once it has taken effect.
+  stage.handler.add_stream(styled("emma", kAnn));
+  CHECK(stage.ask(alpha_request("emma", 0.75F)).empty());
+  CHECK(parameter<double>(kept().settings.stages[0].parameters, "alpha") == 0.5);
+  CHECK(stage.acknowledge(*stage.pipeline.next(), false).empty());
+  stage.handler.remove_stream(kAnn);
+  CHECK(parameter<double>(kept().settings.stages[0].parameters, "alpha") == 0.75);
+  CHECK(stage.reply_to(set_alpha("emma")).ok());
 }
 
 TEST_CASE("calibrations and haptics are not for bodies of a device with several") {

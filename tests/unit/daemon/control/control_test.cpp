@@ -66,7 +66,8 @@ v1::ControlReply reply_of(const std::optional<Reply>& answer) {
 
 struct Fixture {
   FakeDaemonControl daemon_control;
-  RequestHandler handler{three_streams(), daemon_control};
+  HandlerRig rig{three_streams(), daemon_control};
+  RequestHandler& handler = rig.handler;
 
   std::optional<Reply> ask(const std::string& bytes) {
     return handler.handle({"me"}, std::as_bytes(std::span(bytes)));

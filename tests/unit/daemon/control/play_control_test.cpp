@@ -8,6 +8,7 @@
 #include "posed/v1/control.pb.h"
 #include "proto/frame/hand_skeleton.hpp"
 #include "tests/support/stage_commands.hpp"
+#include "tests/unit/daemon/control/three_streams.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
 
 namespace posed::control {
@@ -54,7 +55,8 @@ std::vector<ControlledStream> hands() {
 
 struct PlayDesk {
   QuietDaemonControl daemon_control;
-  RequestHandler handler{hands(), daemon_control};
+  HandlerRig rig{hands(), daemon_control};
+  RequestHandler& handler = rig.handler;
 
   // The error sentence; empty if the request went on to the pipeline.
   std::string refusal(const v1::ControlRequest& request) {

@@ -28,4 +28,19 @@ inline std::vector<ControlledStream> three_streams() {
   return streams;
 }
 
+// A handler of these streams, which get ids from 0 on, and what it keeps for them.
+struct HandlerRig {
+  HandlerRig(std::vector<ControlledStream> streams, DaemonControl& daemon_control,
+             ModelFolder models = {}, Clock clock = system::monotonic_ns)
+      : handler(daemon_control, kept, std::move(models), clock) {
+    for (std::uint32_t i = 0; i < streams.size(); ++i) {
+      streams[i].stream = streams[i].source_number = i;
+      handler.add_stream(std::move(streams[i]));
+    }
+  }
+
+  devices::KeptSettings kept;
+  RequestHandler handler;
+};
+
 }  // namespace posed::control

@@ -44,8 +44,8 @@ class TakeKeeper final : public DaemonControl {
 };
 
 struct Triggered {
-  void take(const std::string& datagram, const std::string& sender = "192.168.1.5") {
-    trigger.take(datagram, sender);
+  void handle(const std::string& datagram, const std::string& sender = "192.168.1.5") {
+    trigger.handle(datagram, sender);
   }
   TakeKeeper daemon;
   Trigger trigger{daemon, []() noexcept { return std::int64_t{42}; }};
@@ -104,8 +104,8 @@ TEST_CASE("a trigger begins and ends takes, each command once") {
   const std::string start = start_text(
       "<Name VALUE=\"walk\"/><TimeCode VALUE=\"01:02:03:04\"/><Delay VALUE=\"500\"/>"
       "<PacketID VALUE=\"1\"/>");
-  triggered.take(start);
-  triggered.take(start);
+  triggered.handle(start);
+  triggered.handle(start);
   REQUIRE(triggered.daemon.marks.size() == 1);
   CHECK(triggered.trigger.repeated() == 1);
   const pipeline::TakeMark& begun = triggered.daemon.marks[0];
@@ -114,25 +114,25 @@ TEST_CASE("a trigger begins and ends takes, each command once") {
   CHECK(begun.timecode == "01:02:03:04");
   CHECK(begun.time_ns == 42);
   CHECK(begun.remark == "triggered by 192.168.1.5, its delay '500' (ms) is not waited for");
-  triggered.take(start, "192.168.1.6");  // another sender counts for itself
+  triggered.handle(start, "192.168.1.6");  // another sender counts for itself
   CHECK(triggered.daemon.marks.size() == 2);
   const std::string stop =
       "<CaptureStop RESULT=\"FAIL\"><Name VALUE=\"walk\"/><PacketID VALUE=\"1\"/></CaptureStop>";
-  triggered.take(stop);
+  triggered.handle(stop);
   REQUIRE(triggered.daemon.marks.size() == 3);
   CHECK_FALSE(triggered.daemon.marks[2].start);
   CHECK(triggered.daemon.marks[2].name.empty());
   CHECK(has(triggered.daemon.marks[2].remark, "result 'FAIL'"));
   CHECK(triggered.trigger.marked() == 3);
-  triggered.take("rubbish");
+  triggered.handle("rubbish");
   triggered.daemon.recording = false;
-  triggered.take(start_text(""));
+  triggered.handle(start_text(""));
   CHECK(triggered.trigger.refused() == 2);
 }
 
 TEST_CASE("a trigger's name is made printable and short rather than refused") {
   Triggered triggered;
-  triggered.take(start_text("<Name VALUE=\"a&#27;[2J" + std::string(300, 'x') + "\"/>"));
+  triggered.handle(start_text("<Name VALUE=\"a&#27;[2J" + std::string(300, 'x') + "\"/>"));
   REQUIRE(triggered.daemon.marks.size() == 1);
   const std::string& name = triggered.daemon.marks[0].name;
   CHECK(name.starts_with("a\\x1b[2Jxx"));

@@ -7,7 +7,7 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/devices/device_supervisor.hpp"
-#include "daemon/devices/open_stream.hpp"
+#include "daemon/devices/open_source.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/tools/emulate/emulated_device.hpp"
 #include "drivers/glove/calibration_file.hpp"
@@ -46,7 +46,8 @@ class SupervisedStream {
     config.name = "right";
     config.driver = "lucidgloves";
     config.options = drivers::complete_options(lucidgloves(), {{"port", port.string()}}).value();
-    stream = devices::open_stream(config).value();
+    ModelFiles files;
+    source = devices::open_source(config::source_of(config), files).value();
     reader_ = pipeline::Reader::open({.out = &decoded_,
                                       .pipeline = wake_.get(),
                                       .record_sink = nullptr,
@@ -54,12 +55,12 @@ class SupervisedStream {
                                       .commands = &commands_})
                   .value();
     reader_->add({.device = nullptr,
-                  .counters = &stream->source->counters,
-                  .slot = stream->source->slot.get(),
+                  .counters = &source->counters,
+                  .slot = source->slot.get(),
                   .calibration = nullptr,
-                  .body = pipeline::ReadBody{.stream = 0, .counters = &stream->counters}});
+                  .body = pipeline::ReadBody{.stream = 0, .counters = &counters}});
     reader_thread_ = std::thread([this] { reader_->run(); });
-    supervisor_.emplace(*stream->source,
+    supervisor_.emplace(*source,
                         SupervisorPorts{.reader = reader_.get(),
                                         .clock = system::monotonic_ns,
                                         .report = [this](v1::Event::Kind kind, const std::string&) {
@@ -92,13 +93,14 @@ class SupervisedStream {
   }
   void calibrate(const drivers::glove::OwnedCalibration& calibration) {
     REQUIRE(commands_.push({.kind = pipeline::DeviceCommand::Kind::kCalibrate,
-                            .stream = 0,
+                            .source = 0,
                             .ticket = 7,
                             .calibration = &calibration}));
     reader_->call();
   }
 
-  std::unique_ptr<devices::OpenStream> stream;
+  std::unique_ptr<devices::OpenSource> source;
+  pipeline::StreamCounters counters;
   std::atomic<int> lost{0}, found{0};
 
  private:
@@ -133,7 +135,7 @@ TEST_CASE("a supervised glove is read each time it is plugged in, and calibrated
     }
     kept.wait_for_loss(time);
   }
-  CHECK(kept.stream->counters.reader.dropped.load() == 0);
+  CHECK(kept.counters.reader.dropped.load() == 0);
 }
 
 }  // namespace posed::devices

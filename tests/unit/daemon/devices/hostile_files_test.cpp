@@ -6,7 +6,7 @@
 
 #include "daemon/config/config.hpp"
 #include "daemon/devices/calibration.hpp"
-#include "daemon/devices/open_stream.hpp"
+#include "daemon/devices/open_source.hpp"
 #include "drivers/options.hpp"
 #include "models/generate/generate_stage.hpp"
 #include "models/style/live/style_type.hpp"
@@ -25,7 +25,8 @@ config::StreamConfig stream_of(const std::string& driver, const drivers::Options
 }
 
 std::string refusal(const config::StreamConfig& config) {
-  const auto opened = devices::open_stream(config);
+  devices::ModelFiles files;
+  const auto opened = devices::open_source(config::source_of(config), files);
   REQUIRE_FALSE(opened);
   CHECK(opened.error().message.starts_with("stream 'hand': "));
   return opened.error().message;

@@ -13,8 +13,15 @@
 #include "daemon/devices/source_builder.hpp"
 #include "daemon/pipeline/description_row.hpp"
 #include "daemon/system/clock.hpp"
+#include "drivers/options.hpp"
 #include "drivers/template_mocap/protocol.hpp"
+#include "models/merge/merge_stage.hpp"
+#include "models/motion/synthetic_walker.hpp"
 #include "models/stages/registry.hpp"
+#include "models/style/live/style_type.hpp"
+#include "proto/clip/bvh.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::devices {
 namespace {
@@ -32,21 +39,30 @@ BodyEntry person(std::uint16_t id, const std::string& name, int joints = 2) {
   return body;
 }
 
-// A builder for one source "room" with `slots` slots from slot 1 on.
+// A builder for one source "room" with `slots` slots, and for these devices with one body, each
+// with a slot of its own.
 class Room final : private StreamHost {
  public:
-  explicit Room(std::uint32_t slots, config::SourceConfig config = {}) {
-    auto source = std::make_unique<BodySource>();
+  explicit Room(std::uint32_t slots, config::SourceConfig config = {},
+                const std::vector<config::StreamConfig>& devices = {}) {
+    for (const config::StreamConfig& device : devices) {
+      ModelFiles files;
+      sources_.push_back(open_source(config::source_of(device), files).value());
+      sources_.back()->exchange = std::make_unique<pipeline::BodyExchange>(*wake_, false);
+    }
+    auto source = std::make_unique<OpenSource>();
     source->config = std::move(config);
     source->config.name = "room";
     source->config.all = true;
-    source->source = std::make_unique<OpenSource>();
-    source->source->driver = drivers::find_driver("template_mocap");
-    source->exchange = std::make_unique<pipeline::BodyExchange>(*wake_);
-    const std::size_t named = source->config.named.size();
+    source->driver = drivers::find_driver("template_mocap");
+    source->exchange = std::make_unique<pipeline::BodyExchange>(*wake_, true);
     sources_.push_back(std::move(source));
-    builder_.emplace(sources_, StreamSlots(1, slots, named), std::set<std::string>{"walker"},
-                     models_, partners_, static_cast<StreamHost&>(*this));
+    for (std::uint32_t i = 0; i < sources_.size(); ++i) sources_[i]->number = i;
+    const auto all = static_cast<std::uint32_t>(devices.size()) + slots;
+    builder_.emplace(sources_, all, std::set<std::string>{"walker"}, models_, kept,
+                     static_cast<StreamHost&>(*this));
+    REQUIRE(builder_->open());
+    builder_->begin();
   }
 
   // The device describes these bodies, and all that follows is done. What the reader is given is
@@ -56,7 +72,7 @@ class Room final : private StreamHost {
     describe_bytes(std::span(datagram).subspan(8, datagram.size() - 12));
   }
   void describe_bytes(std::span<const std::byte> bytes) {
-    sources_[0]->exchange->descriptions.put(bytes);
+    sources_.back()->exchange->descriptions->put(bytes);
     settle();
   }
 
@@ -65,16 +81,7 @@ class Room final : private StreamHost {
     for (int i = 0; i < 8; ++i) {
       now_ns_ += kStep_ns;
       static_cast<void>(builder_->turn(now_ns_));
-      pipeline::BodyExchange& exchange = *sources_[0]->exchange;
-      static_cast<void>(exchange.updates.consume([&](const pipeline::SourceUpdate* given) {
-        std::set<std::uint32_t> now;
-        for (const pipeline::ReadBody& body : given->bodies) now.insert(body.stream);
-        for (const auto& [id, name] : running) {
-          if (!now.contains(id)) gone_.push_back(id);
-        }
-        update = given;
-        CHECK(exchange.taken.push(given));
-      }));
+      for (const auto& source : sources_) accept_update(*source);
     }
   }
 
@@ -87,23 +94,47 @@ class Room final : private StreamHost {
     return all;
   }
 
-  std::map<std::uint32_t, std::string> running;  // names by stream
-  std::map<std::uint32_t, std::string> refused;  // sentences by stream
-  const pipeline::SourceUpdate* update = nullptr;
+  // The id of the stream that runs under this name.
+  [[nodiscard]] std::uint32_t id_of(const std::string& name) const {
+    for (const auto& [id, running_name] : running) {
+      if (running_name == name) return id;
+    }
+    return pipeline::kNoStream;
+  }
+
+  KeptSettings kept;
+  std::map<std::uint32_t, std::string> running;                // names by stream
+  std::map<std::uint32_t, pipeline::StreamSettings> settings;  // of all that ran
+  std::map<std::uint32_t, std::string> refused;                // sentences by stream
+  const pipeline::SourceUpdate* update = nullptr;              // of the room
   std::vector<std::string> warnings;
   std::size_t stop_at = 0;  // the builder is stopped when it adds this stream, from 1; 0: never
 
  private:
+  // As the reader, and then the worker.
+  void accept_update(OpenSource& source) {
+    static_cast<void>(source.exchange->updates.consume([&](const pipeline::SourceUpdate* given) {
+      std::set<std::uint32_t> now;
+      for (const pipeline::ReadBody& body : given->bodies) now.insert(body.stream);
+      for (const auto& [id, name] : running) {
+        if (source_of_[id] == source.number && !now.contains(id)) gone_.push_back(id);
+      }
+      if (source.has_several()) update = given;
+      CHECK(source.exchange->taken.push(given));
+    }));
+  }
+
   pipeline::StreamCounters& counters(std::uint32_t stream) override {
     return counters_.at(pipeline::slot_of(stream));
   }
-  [[nodiscard]] std::size_t decoded_slots() const override { return 64; }
   void add(NewStream stream) override {
     if (stream.engine) running[stream.id] = stream.config.name;
+    settings[stream.id] = stream.stages.settings;
+    source_of_[stream.id] = stream.source.number;
     if (!stream.engine) refused[stream.id] = stream.refusal;
     if (stop_at > 0 && running.size() == stop_at) builder_->stop();
   }
-  std::optional<std::uint32_t> take_gone() override {
+  std::optional<std::uint32_t> next_gone() override {
     if (gone_.empty()) return std::nullopt;
     const std::uint32_t id = gone_.back();
     gone_.pop_back();
@@ -113,21 +144,62 @@ class Room final : private StreamHost {
     CHECK(running.erase(stream) + refused.erase(stream) == 1);
   }
   void call_reader() override {}
-  void warn(const BodySource&, const std::string& sentence) override {
+  void warn(const OpenSource&, const std::string& sentence) override {
     warnings.push_back(sentence);
   }
 
   std::unique_ptr<system::EventFd> wake_ = system::EventFd::open().value();
-  std::vector<std::unique_ptr<BodySource>> sources_;
+  std::vector<std::unique_ptr<OpenSource>> sources_;
+  std::map<std::uint32_t, std::uint32_t> source_of_;  // by stream
   std::array<pipeline::StreamCounters, 16> counters_;
   std::vector<std::uint32_t> gone_;
   ModelFiles models_;
-  pipeline::PartnerStreams partners_;
   std::optional<SourceBuilder> builder_;
   std::int64_t now_ns_ = 0;
 };
 
 using Names = std::vector<std::string>;
+
+// A person with arms but without fingers, or the left hand of one as a body of its own.
+BodyEntry with_joints(std::uint16_t id, const std::string& name,
+                      const std::vector<std::pair<std::string, int>>& joints) {
+  BodyEntry body{.id = id, .name = name, .joints = {}};
+  for (const auto& [joint, parent] : joints) {
+    body.joints.push_back({.name = joint, .parent = parent, .offset_m = {0.1F, 0.0F, 0.0F}});
+  }
+  return body;
+}
+BodyEntry walking_person(std::uint16_t id, const std::string& name) {
+  return with_joints(id, name,
+                     {{"Hips", -1},
+                      {"Spine", 0},
+                      {"Head", 1},
+                      {"LeftArm", 1},
+                      {"LeftForeArm", 3},
+                      {"LeftHand", 4},
+                      {"RightArm", 1},
+                      {"RightForeArm", 6},
+                      {"RightHand", 7}});
+}
+BodyEntry left_hand(std::uint16_t id, const std::string& name) {
+  std::vector<std::pair<std::string, int>> joints{{"LeftHand", -1}};
+  for (const char* finger : {"Thumb", "Index", "Middle", "Ring", "Pinky"}) {
+    for (int joint = 1; joint <= 3; ++joint) {
+      const int parent = joint == 1 ? 0 : static_cast<int>(joints.size()) - 1;
+      joints.emplace_back("LeftHand" + std::string(finger) + std::to_string(joint), parent);
+    }
+  }
+  return with_joints(id, name, joints);
+}
+
+config::StreamConfig merged_with(const std::string& partner) {
+  const StageType& merge = merge::merge_type();
+  config::StreamConfig config;
+  config.stages.push_back(
+      {.type = &merge,
+       .parameters = complete_parameters(merge.parameters, {{"left", partner}}).value()});
+  return config;
+}
 
 }  // namespace
 
@@ -220,6 +292,84 @@ TEST_CASE("a body that a stage cannot serve is refused with its sentence") {
   CHECK(room.update->bodies[0].stream == pipeline::kNoStream);
   room.describe({});
   CHECK(room.refused.empty());
+}
+
+TEST_CASE("a body that comes later becomes the partner of a stream, which is built again for it") {
+  config::SourceConfig config;
+  config.named.push_back({.body = "Ann", .stream = merged_with("room-hand")});
+  config.named[0].stream.name = "ann";
+  Room room(4, std::move(config));
+  room.describe({walking_person(1, "Ann")});
+  const std::uint32_t alone = room.id_of("ann");
+  REQUIRE(alone != pipeline::kNoStream);
+  CHECK(room.settings[alone].stages[0].partners[0].stream == pipeline::kNoStream);
+
+  room.describe({walking_person(1, "Ann"), left_hand(2, "Hand")});
+  const std::uint32_t merged = room.id_of("ann");
+  CHECK(merged == StreamSlots::next(alone));
+  CHECK(room.settings[merged].stages[0].partners[0].stream == room.id_of("room-hand"));
+  CHECK(room.update->bodies[0].stream == merged);
+
+  // It stays as it is while the hand is away, and is built again for the hand's next stream.
+  room.describe({walking_person(1, "Ann")});
+  CHECK(room.id_of("ann") == merged);
+  room.describe({left_hand(2, "Hand"), walking_person(1, "Ann")});
+  CHECK(room.id_of("ann") == StreamSlots::next(merged));
+  CHECK(room.settings[room.id_of("ann")].stages[0].partners[0].stream == room.id_of("room-hand"));
+}
+
+TEST_CASE("a device's only stream is built again for a body that comes, and others are not") {
+  config::StreamConfig walker = merged_with("room-hand");
+  const test::TempFolder folder;
+  const auto clip = folder.path() / "walk.bvh";
+  REQUIRE(clip::write_bvh(*motion::make_walker({.seconds = 0.5}), clip));
+  walker.name = "walker";
+  walker.driver = "file";
+  walker.options =
+      drivers::complete_options(*drivers::find_driver("file"), {{"path", clip.string()}}).value();
+  config::StreamConfig other = walker;
+  other.name = "other";
+  other.stages.clear();
+  Room room(2, {}, {walker, other});
+  CHECK(room.id_of("walker") == 0);
+  CHECK(room.id_of("other") == 1);
+  room.describe({left_hand(1, "Hand")});
+  CHECK(room.id_of("walker") == pipeline::stream_id(0, 1));
+  CHECK(room.id_of("other") == 1);
+  CHECK(room.settings[room.id_of("walker")].stages[0].partners[0].stream ==
+        room.id_of("room-hand"));
+}
+
+TEST_CASE(
+    "a refused body gets the model that control sets, and keeps what is set when it returns") {
+  const std::string model = style::serialize_model(test::toy_model(1));
+  const StageType& style = style::style_type();
+  config::SourceConfig config;
+  config.every.stages.push_back(
+      {.type = &style, .parameters = complete_parameters(style.parameters, {}).value()});
+  Room room(2, std::move(config));
+  const Skeleton toy = test::toy_skeleton();
+  std::vector<std::pair<std::string, int>> joints;
+  for (const Joint& joint : toy.joints) joints.emplace_back(joint.name, joint.parent);
+  const BodyEntry ann = with_joints(1, "Ann", joints);
+  room.describe({ann});
+  CHECK(room.running.empty());
+  REQUIRE(room.refused.size() == 1);
+
+  room.kept.set_model("room-ann", style, std::as_bytes(std::span(model)), "sway.style");
+  room.kept.set("room-ann", style, "alpha", 0.25);
+  room.settle();
+  const std::uint32_t id = room.id_of("room-ann");
+  INFO((room.refused.empty() ? "" : room.refused.begin()->second));
+  REQUIRE(id != pipeline::kNoStream);
+  CHECK(room.settings[id].stages[0].model_name == "sway.style");
+  CHECK(parameter<double>(room.settings[id].stages[0].parameters, "alpha") == 0.25);
+
+  room.describe({});
+  room.describe({ann});
+  REQUIRE(room.id_of("room-ann") != pipeline::kNoStream);
+  CHECK(parameter<double>(room.settings[room.id_of("room-ann")].stages[0].parameters, "alpha") ==
+        0.25);
 }
 
 TEST_CASE("names of bodies are plain, short and not those of other streams") {

@@ -72,7 +72,7 @@ TEST_CASE("a device whose write blocks delays no other stream") {
                .body = ReadBody{.stream = 1, .counters = &of_walker}});
   REQUIRE(walker.transport->start(monotonic_ns()));
   std::thread reads([&] { reader->run(); });
-  DeviceCommand felt{.kind = DeviceCommand::Kind::kSend, .stream = 0};
+  DeviceCommand felt{.kind = DeviceCommand::Kind::kSend, .source = 0};
   felt.size = 8;
   REQUIRE(commands.push(felt));
   reader->call();

@@ -55,7 +55,7 @@ TEST_CASE("100 ppm, batches of 8 ms, a wrap of 16 bits: mapped within 1 ms after
   for (int i = 0; i < static_cast<int>(150 * kRate_hz); ++i) {  // the counter wraps twice
     const auto packet = device.packet(i);
     const std::int64_t device_ns = counter.to(packet.count).ticks * 1'000'000;
-    const ClockMapping mapping = clock.take(device_ns, packet.arrival_ns);
+    const ClockMapping mapping = clock.observe(device_ns, packet.arrival_ns);
     REQUIRE(mapping.valid);
     const std::int64_t host_ns = to_host_ns(mapping, device_ns);
     if (packet.true_ns - device.started_ns > 30 * kNanosPerSecond) {
@@ -79,22 +79,22 @@ TEST_CASE("a device that restarts is mapped again, and impossible times change n
   std::int64_t arrival_ns = 5 * kNanosPerSecond;
   std::int64_t device_ns = 0;
   for (int i = 0; i < 3000; ++i) {
-    clock.take(device_ns += 10'000'000, arrival_ns += 10'000'000);
+    clock.observe(device_ns += 10'000'000, arrival_ns += 10'000'000);
   }
   CHECK(to_host_ns(clock.mapping(), device_ns) == arrival_ns);
-  const ClockMapping before = clock.take(kNoTime_ns, arrival_ns);
+  const ClockMapping before = clock.observe(kNoTime_ns, arrival_ns);
   CHECK(before.offset_ns == clock.mapping().offset_ns);
   device_ns = 7;  // switched off and on again
-  for (int i = 0; i < 10; ++i) clock.take(device_ns += 10'000'000, arrival_ns += 10'000'000);
+  for (int i = 0; i < 10; ++i) clock.observe(device_ns += 10'000'000, arrival_ns += 10'000'000);
   CHECK(to_host_ns(clock.mapping(), device_ns) == arrival_ns);
   CHECK(clock.jumps() == 1);
   // Unplugged for a minute during which its time stood still.
   arrival_ns += 60 * kNanosPerSecond;
-  for (int i = 0; i < 300; ++i) clock.take(device_ns += 10'000'000, arrival_ns += 10'000'000);
+  for (int i = 0; i < 300; ++i) clock.observe(device_ns += 10'000'000, arrival_ns += 10'000'000);
   CHECK(to_host_ns(clock.mapping(), device_ns) == arrival_ns);
   // Times at the ends of the number range.
-  clock.take(std::numeric_limits<std::int64_t>::max(), arrival_ns);
-  clock.take(device_ns, std::numeric_limits<std::int64_t>::min() + 1);
+  clock.observe(std::numeric_limits<std::int64_t>::max(), arrival_ns);
+  clock.observe(device_ns, std::numeric_limits<std::int64_t>::min() + 1);
   CHECK(to_host_ns(clock.mapping(), device_ns) == arrival_ns);
 }
 

@@ -34,7 +34,7 @@ class MergedDevice {
     header.device_ns = nanoseconds(now_s * scale_) + 777'000'000'000;
     header.arrival_ns = std::max(last_ns_, 1'000'000'000 + nanoseconds(now_s + delay_s));
     last_ns_ = header.arrival_ns;
-    header.clock = clock_.take(header.device_ns, header.arrival_ns);
+    header.clock = clock_.observe(header.device_ns, header.arrival_ns);
     return header;
   }
 

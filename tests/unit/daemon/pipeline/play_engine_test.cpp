@@ -112,7 +112,7 @@ TEST_CASE("silence and the end release the frames that wait; then the stream is 
   hand.frames(10);
   CHECK(hand.engine->state() == StreamState::kLive);
   const std::size_t before_end = hand.out.frames.size();
-  hand.engine->end(hand.now_ns, hand.out);
+  hand.engine->end(hand.now_ns, false, hand.out);
   CHECK(hand.out.frames.size() == before_end + 2);
   CHECK(hand.out.frames.back().header.sequence == 30);
 }

@@ -152,7 +152,7 @@ TEST_CASE("a source that has ended is not stale") {
   StreamEngine engine(plain());
   CollectedItems out;
   engine.on_frame(frame_at(1, 0), out);
-  engine.end(10 * kMs, out);
+  engine.end(10 * kMs, false, out);
   CHECK(engine.state() == StreamState::kEnded);
   CHECK(engine.next_tick_ns() == kNoTime_ns);
   CHECK_FALSE(engine.tick(kNanosPerSecond, out));

@@ -28,9 +28,10 @@ class PublisherRig {
     options.endpoint = "tcp://127.0.0.1:*";
     options.clock = system::monotonic_ns;
     options.slots = 4;
-    options.more_messages_per_s = 1000.0;
+    options.messages_per_s = 1200.0;
     options.outputs = std::move(outputs);
-    publisher = Publisher::open(std::move(options), {std::move(info)}, ring, *wake).value();
+    publisher = Publisher::open(std::move(options), ring, *wake).value();
+    publisher->add(std::move(info));
     subscriber = net::open_socket(context.get(), ZMQ_SUB).value();
     REQUIRE(net::set_option(subscriber.get(), ZMQ_SUBSCRIBE, std::string_view()));
     REQUIRE(net::set_option(subscriber.get(), ZMQ_RCVTIMEO, 20));

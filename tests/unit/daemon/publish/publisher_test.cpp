@@ -130,7 +130,7 @@ TEST_CASE(
   std::uint64_t reported = 0, lines = 0;
   for (std::uint64_t i = 0; i < 1000; ++i) {  // ten seconds; one frame of four is published
     tally.add(4 * i + 1, 3);
-    const auto sum = tally.take(static_cast<std::int64_t>(i) * kStep_ns);
+    const auto sum = tally.next_sum(static_cast<std::int64_t>(i) * kStep_ns);
     if (!sum) continue;
     CHECK(sum->first == reported / 3 * 4 + 1);
     CHECK(sum->last == 4 * i + 3);
@@ -138,10 +138,10 @@ TEST_CASE(
     ++lines;
   }
   CHECK(lines == 10);
-  const auto rest = tally.take(999 * kStep_ns, true);
+  const auto rest = tally.next_sum(999 * kStep_ns, true);
   REQUIRE(rest);
   CHECK(reported + rest->frames == 3000);
-  CHECK_FALSE(tally.take(2000 * kStep_ns, true));
+  CHECK_FALSE(tally.next_sum(2000 * kStep_ns, true));
 }
 
 TEST_CASE("a flood of skipped frames is one event, and its sum when the stream ends") {
@@ -235,7 +235,7 @@ TEST_CASE("a busy port gives one sentence that names it") {
   options.context = other.get();
   options.endpoint = rig.publisher->endpoint();
   options.clock = system::monotonic_ns;
-  const auto second = Publisher::open(std::move(options), {}, ring, *rig.wake);
+  const auto second = Publisher::open(std::move(options), ring, *rig.wake);
   REQUIRE_FALSE(second);
   CHECK(second.error().message.find(rig.publisher->endpoint()) != std::string::npos);
 }

@@ -26,12 +26,13 @@ TEST_CASE("two bodies of a source are recorded with their places and the row tha
   options.clock = []() noexcept -> std::int64_t {
     return std::chrono::steady_clock::now().time_since_epoch().count();
   };
-  RecordedSetup setup;
-  setup.add_device(toy_source("glove"), {}, {});
-  setup.add_bodies(toy_source("mocap"), 120.0, 8);
-  setup.slots_to_come = 8;
+  const RecordedSetup setup{
+      .sources = {{.row = toy_source("glove", 0)},
+                  {.row = toy_source("mocap", 1), .rate_hz = 120.0, .bodies = 8}},
+      .slots = 9};
   auto recorder = Recorder::open(options, setup);
   REQUIRE(recorder);
+  (*recorder)->add_stream({.id = 0, .source = 0, .from_start = true, .name = "glove"});
   const std::uint32_t ann = stream_id(1, 1), bob = stream_id(2, 1);
   RecordedStream stream{.id = ann, .source = 1, .body = "Ann", .name = "mocap-ann"};
   stream.settings.stages.push_back(pipeline::stage_settings(style::style_type()));
@@ -138,7 +139,8 @@ TEST_CASE("sources and slots do not take each other's space, and an event names 
   auto writer = make_writer(path, 1);
   REQUIRE(writer.add(toy_source("mocap", 1)));
   std::vector<RecorderEvent> events;
-  LogWriterLoop log_writer(rings, std::move(writer), path, one_body_streams(1),
+  add_one_body_streams(rings, 1);
+  LogWriterLoop log_writer(rings, std::move(writer), path,
                            [&](const RecorderEvent& event) { events.push_back(event); });
   const std::vector<StreamPosition> places{{stream_id(1, 1), 1, 1}, {stream_id(2, 1), 1, 1}};
   for (const StreamPosition& place : places) {
@@ -167,12 +169,11 @@ TEST_CASE("sources and slots do not take each other's space, and an event names 
 }
 
 TEST_CASE("the rings of a setup hold 5 s of a device and any description of bodies") {
-  RecordedSetup setup;
-  setup.add_device(toy_source("glove"), {.rate_hz = 100.0}, {});
-  setup.add_bodies(toy_source("mocap"), 10.0, 4);
-  setup.add_bodies(toy_source("large"), 240.0, 64);
-  setup.slots_to_come = 64;
-  setup.rate_to_come_hz = 240.0;
+  const RecordedSetup setup{
+      .sources = {{.row = toy_source("glove"), .rate_hz = 100.0},
+                  {.row = toy_source("mocap"), .rate_hz = 10.0, .bodies = 4},
+                  {.row = toy_source("large"), .rate_hz = 240.0, .bodies = 64}},
+      .slots = 65};
   RingSizes sizes = ring_sizes(setup, false);
   REQUIRE(sizes.chunk_bytes.size() == 3);
   CHECK(sizes.chunk_bytes[0] >= 2'000'000);

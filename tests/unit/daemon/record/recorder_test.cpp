@@ -23,8 +23,8 @@ TEST_CASE("what two hot threads give to the record sink is complete and in order
   const TempFolder dir;
   const auto path = dir.path() / "a.plog";
   RecordRings rings(ring_sizes_of(2, 4096, {.frame_bytes = 4096, .decisions = 64}));
-  LogWriterLoop log_writer(rings, make_writer(path, 2), path, one_body_streams(2),
-                           [](const RecorderEvent&) {});
+  add_one_body_streams(rings, 2);
+  LogWriterLoop log_writer(rings, make_writer(path, 2), path, [](const RecorderEvent&) {});
   constexpr std::uint64_t kChunks = 5000;
   std::atomic<bool> running{true};
   std::atomic<std::uint64_t> refused{0};
@@ -59,7 +59,8 @@ TEST_CASE("a full ring becomes a gap row where it happened, and is reported once
   const auto path = dir.path() / "a.plog";
   RecordRings rings(ring_sizes_of(2, 1024, {.frame_bytes = 1024, .decisions = 2}));
   std::vector<RecorderEvent> events;
-  LogWriterLoop log_writer(rings, make_writer(path, 2), path, one_body_streams(2),
+  add_one_body_streams(rings, 2);
+  LogWriterLoop log_writer(rings, make_writer(path, 2), path,
                            [&](const RecorderEvent& event) { events.push_back(event); });
   const std::string line(400, '1');
   for (std::uint64_t i = 1; i <= 6; ++i) put_chunk(rings, 0, i, line);  // two fit
@@ -85,8 +86,8 @@ TEST_CASE("a source that can wait is told when more than half of its room is tak
   const TempFolder dir;
   const auto path = dir.path() / "a.plog";
   RecordRings rings(ring_sizes_of(2, 2048, {.frame_bytes = 2048, .decisions = 8}));
-  LogWriterLoop log_writer(rings, make_writer(path, 2), path, one_body_streams(2),
-                           [](const RecorderEvent&) {});
+  add_one_body_streams(rings, 2);
+  LogWriterLoop log_writer(rings, make_writer(path, 2), path, [](const RecorderEvent&) {});
   const std::string line(400, '1');
   for (std::uint64_t i = 1; i <= 3; ++i) {
     CHECK(rings.keeps_up(0, 0));
@@ -108,8 +109,8 @@ TEST_CASE("a stream that fills its share of the rings does not affect another st
   const TempFolder dir;
   const auto path = dir.path() / "a.plog";
   RecordRings rings(ring_sizes_of(2, 4096, {.frame_bytes = 4096, .decisions = 8}));
-  LogWriterLoop log_writer(rings, make_writer(path, 2), path, one_body_streams(2),
-                           [](const RecorderEvent&) {});
+  add_one_body_streams(rings, 2);
+  LogWriterLoop log_writer(rings, make_writer(path, 2), path, [](const RecorderEvent&) {});
   const std::string line(40, '1');
   constexpr std::uint64_t kTurns = 20;
   for (std::uint64_t turn = 1; turn <= kTurns; ++turn) {
@@ -138,8 +139,8 @@ TEST_CASE("the gap of a lost decision begins before the chunk that it concerns")
   const TempFolder dir;
   const auto path = dir.path() / "a.plog";
   RecordRings rings(ring_sizes_of(1, 4096, {.frame_bytes = 0, .decisions = 1}));
-  LogWriterLoop log_writer(rings, make_writer(path, 1), path, one_body_streams(1),
-                           [](const RecorderEvent&) {});
+  add_one_body_streams(rings, 1);
+  LogWriterLoop log_writer(rings, make_writer(path, 1), path, [](const RecorderEvent&) {});
   for (std::uint64_t frame = 1; frame <= 10; ++frame) put_chunk(rings, 0, frame, "1\n");
   log_writer.turn(kTurn_ns);
   rings.decision({.stream = 0, .item = 3, .sequence = 3});
@@ -160,7 +161,8 @@ TEST_CASE(
   const auto path = dir.path() / "a.plog";
   RecordRings rings(ring_sizes_of(2, 1 << 20, {.frame_bytes = 0, .decisions = 64}));
   std::vector<RecorderEvent> events;
-  LogWriterLoop log_writer(rings, make_writer(path, 2), path, one_body_streams(2),
+  add_one_body_streams(rings, 2);
+  LogWriterLoop log_writer(rings, make_writer(path, 2), path,
                            [&](const RecorderEvent& event) { events.push_back(event); });
   const std::string model = "model bytes";
   const std::string line(20'000, '1');
@@ -208,9 +210,9 @@ TEST_CASE("a model that comes again is kept once, so a full disk does not fill t
   rings.keep_model(bytes_of("model"));
   rings.keep_model(bytes_of("another"));
   rings.keep_model(bytes_of("model"));
-  CHECK(rings.take_models().size() == 2);
+  CHECK(rings.next_models().size() == 2);
   rings.keep_model(bytes_of("another"));
-  CHECK(rings.take_models().empty());
+  CHECK(rings.next_models().empty());
 }
 
 TEST_CASE("the recorder's thread writes by its own timer and leaves one file") {
@@ -221,8 +223,7 @@ TEST_CASE("the recorder's thread writes by its own timer and leaves one file") {
   };
   pipeline::StreamSettings settings;
   settings.stages.push_back(pipeline::stage_settings(style::style_type()));
-  RecordedSetup setup;
-  setup.add_device(toy_source("a"), settings, {std::make_shared<const std::string>("12")});
+  const RecordedSetup setup{.sources = {{.row = toy_source("a")}}, .slots = 1};
   RecorderOptions options;
   options.file = path;
   options.frames = true;
@@ -230,6 +231,12 @@ TEST_CASE("the recorder's thread writes by its own timer and leaves one file") {
   options.clock = clock;
   auto recorder = Recorder::open(options, setup);
   REQUIRE(recorder);
+  (*recorder)->add_stream({.id = 0,
+                           .source = 0,
+                           .from_start = true,
+                           .name = "a",
+                           .settings = settings,
+                           .model_files = {std::make_shared<const std::string>("12")}});
   CHECK((*recorder)->record_sink().wants_published());
   for (std::uint64_t i = 1; i <= 100; ++i) {
     put_chunk((*recorder)->record_sink(), 0, i, "1 2 3\n");

@@ -22,6 +22,7 @@ std::vector<log::TakeRow> takes_in(const std::filesystem::path& path) {
 }
 
 struct TakesRecording {
+  TakesRecording() { test::add_one_body_streams(rings, 1); }
   void chunk(std::uint64_t item) {
     const pipeline::StreamPosition place{.stream = 0, .frame = item};
     rings.chunk(0, 0, pipeline::Direction::kFromDevice, static_cast<std::int64_t>(item),
@@ -41,7 +42,7 @@ struct TakesRecording {
   std::int64_t now_ns = 0;
   std::vector<RecorderEvent> events;
   RecordRings rings{test::ring_sizes_of(1, 4096, {.frame_bytes = 64, .decisions = 8})};
-  LogWriterLoop log_writer{rings, test::make_writer(path, 1), path, test::one_body_streams(1),
+  LogWriterLoop log_writer{rings, test::make_writer(path, 1), path,
                            [this](const RecorderEvent& event) { events.push_back(event); }};
 };
 

@@ -32,23 +32,23 @@ inline record::RingSizes ring_sizes_of(std::size_t count, std::size_t chunk_byte
   return {.chunk_bytes = std::vector(count, chunk_bytes), .slots = std::vector(count, slot)};
 }
 
-inline std::vector<record::RecordedStream> one_body_streams(std::uint32_t count) {
-  std::vector<record::RecordedStream> streams;
-  for (std::uint32_t id = 0; id < count; ++id) streams.push_back({.id = id, .source = id});
-  return streams;
+// Those of sources with one body each.
+inline void add_one_body_streams(record::RecordRings& rings, std::uint32_t count) {
+  for (std::uint32_t id = 0; id < count; ++id) {
+    rings.add_stream(
+        {.id = id, .source = id, .from_start = true, .name = "s" + std::to_string(id)});
+  }
 }
 
 inline log::SourceRow toy_source(const std::string& name, std::uint32_t id = 0) {
   return {id, name, "file", "", "", "{}"};
 }
 
-inline log::Writer make_writer(const std::filesystem::path& path, std::uint32_t streams) {
+inline log::Writer make_writer(const std::filesystem::path& path, std::uint32_t sources) {
   auto writer = log::Writer::create(path, {}, false);
   REQUIRE(writer);
-  for (std::uint32_t id = 0; id < streams; ++id) {
-    const std::string name = "s" + std::to_string(id);
-    REQUIRE(writer->add(toy_source(name, id)));
-    REQUIRE(writer->add(log::StreamRow{id, id, "", name, "{}", 1}));
+  for (std::uint32_t id = 0; id < sources; ++id) {
+    REQUIRE(writer->add(toy_source("s" + std::to_string(id), id)));
   }
   REQUIRE(writer->commit());
   return std::move(*writer);
@@ -129,7 +129,7 @@ inline std::vector<std::uint32_t> ids_of(const log::Reader& reader) {
 // The recorder without its thread, for one source of several bodies.
 struct BodiesRecording {
   explicit BodiesRecording(const record::RingSizes& sizes)
-      : rings(sizes), log_writer(rings, writer_of_many(path), path, {}, [&](const auto& event) {
+      : rings(sizes), log_writer(rings, writer_of_many(path), path, [&](const auto& event) {
           events.push_back(event);
         }) {}
   void turn() { log_writer.turn(now_ns += kTurn_ns); }

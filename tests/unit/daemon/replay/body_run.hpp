@@ -156,7 +156,7 @@ class BodyRun final : private pipeline::IntakeOut {
   void leave(Stream& stream) {
     item_ = next_item_++;
     close_gaps(stream);
-    stream.engine->end(now_ns_, stream);
+    stream.engine->end(now_ns_, true, stream);
     item_ = 0;
     stream.place = -1;
     frames_[stream.body.name] = stream.last_frame;

@@ -53,13 +53,22 @@ class StagedStream final : private pipeline::IntakeOut, private pipeline::Engine
 
   void add_to(record::RecordedSetup& setup) const {
     const drivers::Description& description = device_.description;
-    setup.add_device({.id = 0,
-                      .name = name_,
-                      .driver = description.driver,
-                      .text = description.text,
-                      .identity = "toy.bvh",
-                      .config = "{}"},
-                     settings_, {std::make_shared<const std::string>(model_bytes_)});
+    setup.sources.push_back({.row = {.id = id_,
+                                     .name = name_,
+                                     .driver = description.driver,
+                                     .text = description.text,
+                                     .identity = "toy.bvh",
+                                     .config = "{}"},
+                             .rate_hz = settings_.rate_hz});
+    ++setup.slots;
+  }
+  void add_to(record::Recorder& recorder) const {
+    recorder.add_stream({.id = id_,
+                         .source = id_,
+                         .from_start = true,
+                         .name = name_,
+                         .settings = settings_,
+                         .model_files = {std::make_shared<const std::string>(model_bytes_)}});
   }
 
   void set_record_sink(pipeline::RecordSink& record_sink) { record_sink_ = &record_sink; }
@@ -173,7 +182,10 @@ inline void write_staged_log(const std::filesystem::path& path, std::size_t fram
   options.clock = []() noexcept -> std::int64_t { return 1'000'000'000; };
   auto recorder = record::Recorder::open(std::move(options), setup);
   REQUIRE(recorder);
-  for (const auto& stream : streams) stream->set_record_sink((*recorder)->record_sink());
+  for (const auto& stream : streams) {
+    stream->add_to(**recorder);
+    stream->set_record_sink((*recorder)->record_sink());
+  }
   std::int64_t now_ns = 5'000'000'000;
   for (std::size_t i = 0; i < frames; ++i) {
     now_ns += 16'666'667;

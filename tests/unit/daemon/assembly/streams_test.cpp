@@ -92,9 +92,8 @@ TEST_CASE("bodies come, go and change while the daemon records", "[bodies]") {
   recording.file = file;
   recording.frames = true;
   recording.clock = system::monotonic_ns;
-  auto recorder = record::Recorder::open(
-      std::move(recording),
-      record::recorded_setup(daemon.streams(), daemon.sources(), daemon.slots_to_come()));
+  auto recorder = record::Recorder::open(std::move(recording),
+                                         record::recorded_setup(daemon.sources(), daemon.slots()));
   REQUIRE(recorder);
   DaemonHooks hooks;
   hooks.record_sink = &(*recorder)->record_sink();
@@ -115,6 +114,14 @@ TEST_CASE("bodies come, go and change while the daemon records", "[bodies]") {
         std::chrono::nanoseconds(std::max<std::int64_t>(next_ns - system::monotonic_ns(), 0)));
   }
   const v1::Stats stats = daemon.stats();
+  // The anchor, the walker and others; the refused one is never live.
+  const Daemon::StreamCounts counts = daemon.stream_counts();
+  CHECK(counts.live >= 2);
+  CHECK(counts.all > counts.live);
+  const std::vector<std::string> names = daemon.stream_names();
+  for (const char* name : {"walker", "anchor", "refused"}) {
+    CHECK(std::ranges::count(names, name) == 1);
+  }
   daemon.stop();
   REQUIRE((*recorder)->finish());
 
