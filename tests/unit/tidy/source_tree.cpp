@@ -98,6 +98,15 @@ const std::vector<Ban>& hot_bans() {
   return bans;
 }
 
+// Whether a line has the macro RT_SAFE before a declaration, or a comment that calls what follows
+// RT-safe.
+bool marks_hot_code(const SourceFile& file, std::size_t line) {
+  static const std::regex macro(R"(^\s*(template\b.*>\s*)?RT_SAFE\b)");
+  if (std::regex_search(file.code[line], macro)) return true;
+  const auto said = file.lines[line].find("RT-safe");
+  return said != std::string::npos && file.lines[line].find("//") < said;
+}
+
 // The line on which the body that starts at or after `from` closes; `from` itself when there is no
 // body.
 std::size_t end_of_body(const std::vector<std::string>& code, std::size_t from) {
@@ -236,9 +245,8 @@ std::vector<Finding> check_guarded_input(const SourceFile& file) {
 std::vector<Finding> check_hot_code(const SourceFile& file, int& bodies) {
   std::vector<Finding> findings;
   for (std::size_t i = 0; i < file.lines.size(); ++i) {
-    if (file.lines[i].find("RT-safe") == std::string::npos) continue;
-    if (file.lines[i].find("//") == std::string::npos) continue;
-    // The comment may continue; the function starts at the first line with code.
+    if (!marks_hot_code(file, i)) continue;
+    // A comment may continue; the function starts at the first line with code.
     std::size_t start = i;
     while (start < file.code.size() &&
            file.code[start].find_first_not_of(' ') == std::string::npos) {
@@ -260,7 +268,7 @@ std::vector<Finding> check_hot_code(const SourceFile& file, int& bodies) {
       for (const Ban& ban : hot_bans()) {
         if (std::regex_search(file.code[line], ban.pattern)) {
           findings.push_back({file.path, static_cast<int>(line) + 1,
-                              std::string(ban.why) + " in a function marked RT-safe"});
+                              std::string(ban.why) + " in a function marked RT_SAFE"});
         }
       }
     }

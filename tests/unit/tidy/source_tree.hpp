@@ -60,7 +60,8 @@ struct Target {
 // TOML is parsed in proto/text/toml.cpp alone, which checks its depth first; outside of tests a
 // whole file is read by load_file alone, which bounds it.
 [[nodiscard]] std::vector<Finding> check_guarded_input(const SourceFile& file);
-// Bodies of functions marked RT-safe neither allocate, lock, log, throw nor call the system.
+// Bodies of functions marked RT_SAFE (proto/frame/rt_safe.hpp), or called RT-safe in the comment
+// above, neither allocate, lock, log, throw nor call the system.
 // `bodies` counts the functions that were found, so that a test can verify that the check is
 // effective.
 [[nodiscard]] std::vector<Finding> check_hot_code(const SourceFile& file, int& bodies);
