@@ -15,8 +15,8 @@ class DatagramOrder {
       : mask_(bits >= 64 ? ~std::uint64_t{0} : (std::uint64_t{1} << bits) - 1) {}
 
   // kOk: newer than all before it, or the device has restarted. kLate: a newer one came before it.
-  // kDuplicate: it came before. RT-safe.
-  [[nodiscard]] Outcome accept(std::uint64_t number) noexcept {
+  // kDuplicate: it came before.
+  RT_SAFE [[nodiscard]] Outcome accept(std::uint64_t number) noexcept {
     number &= mask_;
     const std::uint64_t behind = (newest_ - number) & mask_;
     if (!seen_any_ || (behind >= kWindow && !is_ahead(behind))) return begin_at(number);

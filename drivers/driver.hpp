@@ -60,8 +60,8 @@ class Transport {
   [[nodiscard]] virtual int poll_fd() const noexcept = 0;
 
   // Host time of the next chunk of a source driven by time (files, replay), and of one that was
-  // received but not yet read; kNoTime_ns when only the descriptor announces chunks. RT-safe.
-  [[nodiscard]] virtual std::int64_t next_due_ns() const noexcept { return kNoTime_ns; }
+  // received but not yet read; kNoTime_ns when only the descriptor announces chunks.
+  RT_SAFE [[nodiscard]] virtual std::int64_t next_due_ns() const noexcept { return kNoTime_ns; }
 
   // True when the source must not lose frames and may wait instead (a file played as fast as
   // possible): it is read only when the pipeline has caught up.
@@ -71,7 +71,7 @@ class Transport {
   [[nodiscard]] virtual double rate_hz() const noexcept { return 0.0; }
 
   // Starts the source (the clock of a file begins to run). Cold.
-  [[nodiscard]] virtual Result<> start(std::int64_t now_ns) = 0;
+  virtual Result<> start(std::int64_t now_ns) = 0;
 
   // The next chunk, at most one; call again until it is empty. Never blocks. RT-safe except for its
   // read.
@@ -128,24 +128,26 @@ class Decoder {
 
   // Decodes bytes, which may be cut at any position; `arrival_ns` is the time of the read. The
   // bytes are untrusted: for any input it neither crashes nor hangs, and it counts what it cannot
-  // use. RT-safe.
-  virtual void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-                    Sink& sink) noexcept = 0;
+  // use.
+  RT_SAFE virtual void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                            Sink& sink) noexcept = 0;
 
-  // Decodes one chunk of a device with several sockets, as feed() does. RT-safe.
-  virtual void feed_socket(std::uint8_t /*socket*/, std::span<const std::byte> bytes,
-                           std::int64_t arrival_ns, Sink& sink) noexcept {
+  // Decodes one chunk of a device with several sockets, as feed() does.
+  RT_SAFE virtual void feed_socket(std::uint8_t /*socket*/, std::span<const std::byte> bytes,
+                                   std::int64_t arrival_ns, Sink& sink) noexcept {
     feed(bytes, arrival_ns, sink);
   }
 
   // Decodes the bodies of this layout from the next packet on. The layout comes from the same
-  // driver's make_layout and outlives its use. A device with one body ignores the call. RT-safe.
-  virtual void use(const SourceLayout& /*layout*/) noexcept {}
+  // driver's make_layout and outlives its use. A device with one body ignores the call.
+  RT_SAFE virtual void use(const SourceLayout& /*layout*/) noexcept {}
 
   // Returns the request to send now, for a device whose Poll has no fixed one; empty: none.
   // The bytes are valid until the next call. It may depend on what was fed before, but feed() may
-  // not depend on it: a replay does not call it. RT-safe.
-  [[nodiscard]] virtual Request next_request(std::int64_t /*now_ns*/) noexcept { return {}; }
+  // not depend on it: a replay does not call it.
+  RT_SAFE [[nodiscard]] virtual Request next_request(std::int64_t /*now_ns*/) noexcept {
+    return {};
+  }
 };
 
 // The knowledge about a device before it streams. It is stored in the log; enough to decode its

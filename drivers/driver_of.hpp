@@ -52,58 +52,47 @@ class DriverOf {
     Options options;
     typename Type::Settings settings;
   };
-  [[nodiscard]] static Result<Chosen> choose(const Options& given) {
-    auto options = complete_options(get(), given);
-    if (!options) return std::unexpected(options.error());
-    auto settings = Type::settings(*options);
-    if (!settings) return std::unexpected(settings.error());
-    return Chosen{std::move(*options), std::move(*settings)};
+  static Result<Chosen> choose(const Options& given) {
+    auto options = TRY(complete_options(get(), given));
+    auto settings = TRY(Type::settings(options));
+    return Chosen{std::move(options), std::move(settings)};
   }
 
  private:
   static Result<Description> describe(const std::string& text, const std::string& identity) {
-    const auto settings = Type::parse_device_info(text, identity);
-    if (!settings) return std::unexpected(settings.error());
-    auto description = Type::describe(*settings);
-    if (!description) return description;
-    description->driver = Type::kName;
-    description->text = text;
-    description->identity = identity;
+    const auto settings = TRY(Type::parse_device_info(text, identity));
+    auto description = TRY(Type::describe(settings));
+    description.driver = Type::kName;
+    description.text = text;
+    description.identity = identity;
     return description;
   }
 
   static Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
-    auto settings = Type::parse_device_info(description.text, description.identity);
-    if (!settings) return std::unexpected(settings.error());
-    return Type::decoder(std::move(*settings), description);
+    auto settings = TRY(Type::parse_device_info(description.text, description.identity));
+    return Type::decoder(std::move(settings), description);
   }
 
   static Result<Description> expect(const Options& given) {
-    const auto chosen = choose(given);
-    if (!chosen) return std::unexpected(chosen.error());
-    const auto identity = Type::check(chosen->options, chosen->settings);
-    if (!identity) return std::unexpected(identity.error());
-    return describe(Type::device_info(chosen->settings), *identity);
+    const auto chosen = TRY(choose(given));
+    const auto identity = TRY(Type::check(chosen.options, chosen.settings));
+    return describe(Type::device_info(chosen.settings), identity);
   }
 
   static Result<Device> open(const Options& given, TransportFactory& ports) {
-    auto chosen = choose(given);
-    if (!chosen) return std::unexpected(chosen.error());
-    auto opened = Type::open(chosen->options, chosen->settings, ports);
-    if (!opened) return std::unexpected(opened.error());
-    auto device = make_device(get(), Type::device_info(chosen->settings), opened->identity);
-    if (!device) return device;
-    device->transport = std::move(opened->transport);
-    device->warnings = std::move(opened->warnings);
-    device->poll = std::move(opened->poll);
-    device->reopen_after_s = opened->reopen_after_s;
+    auto chosen = TRY(choose(given));
+    auto opened = TRY(Type::open(chosen.options, chosen.settings, ports));
+    auto device = TRY(make_device(get(), Type::device_info(chosen.settings), opened.identity));
+    device.transport = std::move(opened.transport);
+    device.warnings = std::move(opened.warnings);
+    device.poll = std::move(opened.poll);
+    device.reopen_after_s = opened.reopen_after_s;
     return device;
   }
 
   static Result<std::unique_ptr<Emulator>> emulate(const Options& given) {
-    auto chosen = choose(given);
-    if (!chosen) return std::unexpected(chosen.error());
-    return Type::emulator(chosen->options, std::move(chosen->settings));
+    auto chosen = TRY(choose(given));
+    return Type::emulator(chosen.options, std::move(chosen.settings));
   }
 
   static Driver make() {

@@ -30,19 +30,17 @@ std::size_t choice_option(const Options& options, const std::string& name,
                           std::span<const std::string_view> words) {
   const auto at = std::ranges::find(words, std::string_view(option<std::string>(options, name)));
   assert(at != words.end());
-  return static_cast<std::size_t>(at - words.begin());
+  return at - words.begin();
 }
 
 Result<Device> make_device(const Driver& driver, const std::string& text,
                            const std::string& identity) {
-  auto description = driver.describe(text, identity);
-  if (!description) return std::unexpected(description.error());
-  auto decoder = driver.make_decoder(*description);
-  if (!decoder) return std::unexpected(decoder.error());
-  glove::CalibratedDecoder* const calibrated = glove::calibrated_decoder(**decoder);
-  return Device{.description = std::move(*description),
+  auto description = TRY(driver.describe(text, identity));
+  auto decoder = TRY(driver.make_decoder(description));
+  glove::CalibratedDecoder* const calibrated = glove::calibrated_decoder(*decoder);
+  return Device{.description = std::move(description),
                 .transport = nullptr,
-                .decoder = std::move(*decoder),
+                .decoder = std::move(decoder),
                 .warnings = {},
                 .calibrated = calibrated};
 }

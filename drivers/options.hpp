@@ -15,7 +15,7 @@ namespace posed::drivers {
 // Returns `given` completed with the driver's defaults; a whole number is accepted for a real one.
 // An unknown option, another type, a value that the list does not allow and a missing required
 // option are misuse.
-[[nodiscard]] Result<Options> complete_options(const Driver& driver, const Options& given);
+Result<Options> complete_options(const Driver& driver, const Options& given);
 
 // Reads a completed option. A name or type that is not in the driver's list is a bug in the driver.
 template <typename T>
@@ -34,7 +34,7 @@ template <typename T>
 // Makes description and decoder from `text` (Description::text) with the driver's own describe()
 // and make_decoder(), so that a live stream uses exactly what a log rebuilds. open() adds the
 // transport and anything else.
-[[nodiscard]] Result<Device> make_device(const Driver& driver, const std::string& text,
-                                         const std::string& identity);
+Result<Device> make_device(const Driver& driver, const std::string& text,
+                           const std::string& identity);
 
 }  // namespace posed::drivers

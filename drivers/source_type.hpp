@@ -47,12 +47,10 @@ struct SourceType {
   static Poll poll() { return {}; }
   // A network socket opens whether or not the device is there.
   static Result<Opened> open(const Options& options, auto& settings, TransportFactory& ports) {
-    auto identity = Self::check(options, settings);
-    if (!identity) return std::unexpected(identity.error());
-    auto transport = Self::connect(options, ports);
-    if (!transport) return std::unexpected(transport.error());
+    auto identity = TRY(Self::check(options, settings));
+    auto transport = TRY(Self::connect(options, ports));
     return Opened{
-        .identity = std::move(*identity), .transport = std::move(*transport), .poll = Self::poll()};
+        .identity = std::move(identity), .transport = std::move(transport), .poll = Self::poll()};
   }
 };
 
@@ -77,7 +75,7 @@ struct RateSource : SourceType<Self> {
     return Settings{.rate_hz = option<double>(options, "rate_hz")};
   }
   static Result<std::string> check(const Options& options, const Settings& /*settings*/) {
-    if (const auto ok = check_udp(udp_settings(options)); !ok) return std::unexpected(ok.error());
+    TRY(check_udp(udp_settings(options)));
     return "udp " + option<std::string>(options, "listen");
   }
   static std::string prefix() { return std::string(Self::kName) + " rate="; }

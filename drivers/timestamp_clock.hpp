@@ -14,8 +14,8 @@ namespace posed::drivers {
 class TimestampClock {
  public:
   // kDuplicate: the timestamp of the newest frame again. kLate: up to kLate_s before it. kOk: all
-  // others; further back is a loop or a restart. RT-safe.
-  [[nodiscard]] Outcome accept(double timestamp_s) noexcept {
+  // others; further back is a loop or a restart.
+  RT_SAFE [[nodiscard]] Outcome accept(double timestamp_s) noexcept {
     if (!std::isfinite(timestamp_s)) return Outcome::kOk;  // it keeps the time of the one before
     const double step_s = timestamp_s - newest_s_;
     if (!seen_) {
@@ -40,8 +40,8 @@ class TimestampClock {
   }
 
   // Returns the time of the last accepted frame since the first one; it never decreases. kNoTime_ns
-  // until one has a timestamp, and while the timestamp stands. RT-safe.
-  [[nodiscard]] std::int64_t device_ns() const noexcept {
+  // until one has a timestamp, and while the timestamp stands.
+  RT_SAFE [[nodiscard]] std::int64_t device_ns() const noexcept {
     return seen_ && same_in_a_row_ < kMaxLate ? elapsed_ns_ : kNoTime_ns;
   }
 

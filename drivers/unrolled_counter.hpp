@@ -3,6 +3,8 @@
 
 #include <cstdint>
 
+#include "proto/frame/rt_safe.hpp"
+
 namespace posed::drivers {
 
 // Counts modulo 2^bits. A step of less than half the range is forward; a larger step means that the
@@ -17,8 +19,7 @@ class UnrolledCounter {
     bool restarted;
   };
 
-  // RT-safe.
-  Step to(std::uint64_t count) noexcept {
+  RT_SAFE Step to(std::uint64_t count) noexcept {
     count &= mask_;
     if (!seen_) {
       seen_ = true;

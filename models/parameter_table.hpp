@@ -91,17 +91,18 @@ class ParameterTable {
     return options;
   }
 
-  // What Stage::set() does: `index` is that of a live number in specs(). RT-safe.
-  void set(Owner& owner, Options& options, std::size_t index, double number) const noexcept {
+  // What Stage::set() does: `index` is that of a live number in specs().
+  RT_SAFE void set(Owner& owner, Options& options, std::size_t index,
+                   double number) const noexcept {
     assert(index < rows_.size() && rows_[index].assign != nullptr);
     const Row& row = rows_[index];
     if (row.live.set != nullptr) (owner.*row.live.set)(number);
     row.assign(options, number);
   }
 
-  // What Stage::state() does. RT-safe.
-  [[nodiscard]] ParameterState state(const Owner& owner, const Options& options,
-                                     std::size_t index) const noexcept {
+  // What Stage::state() does.
+  RT_SAFE [[nodiscard]] ParameterState state(const Owner& owner, const Options& options,
+                                             std::size_t index) const noexcept {
     assert(index < rows_.size() && rows_[index].number != nullptr);
     const Row& row = rows_[index];
     if (row.live.state != nullptr) return (owner.*row.live.state)();

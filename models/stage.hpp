@@ -81,9 +81,9 @@ struct StageCommand {
     std::memcpy(command.bytes.data(), &value, sizeof(T));
     return command;
   }
-  // The value that of() has stored; a default one for another type. RT-safe.
+  // The value that of() has stored; a default one for another type.
   template <typename T>
-  [[nodiscard]] T as() const noexcept {
+  RT_SAFE [[nodiscard]] T as() const noexcept {
     T value{};
     if (size == sizeof(T)) std::memcpy(&value, bytes.data(), sizeof(T));
     return value;
@@ -108,7 +108,7 @@ class Stage {
                        StageOut& /*out*/) noexcept {}
 
   // A frame or a sample of the stream arrived, so it is not silent. Called before process().
-  virtual void heard(std::int64_t /*arrival_ns*/) noexcept {}
+  virtual void received(std::int64_t /*arrival_ns*/) noexcept {}
   // When tick() is wanted if nothing arrives until then; kNoTime_ns: it is not.
   [[nodiscard]] virtual std::int64_t next_due_ns() const noexcept { return kNoTime_ns; }
   // Nothing has arrived until `now_ns`, at which the tick was due.

@@ -49,7 +49,7 @@ class NumberReader {
   [[nodiscard]] Eigen::MatrixXd matrix() {
     const Eigen::Index rows = index();
     const Eigen::Index cols = index();
-    const auto size = static_cast<std::size_t>(rows * cols);
+    const std::size_t size = rows * cols;
     assert(left_ >= size);
     const double* const values = next_;
     next_ += size;

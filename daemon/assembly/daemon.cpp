@@ -101,9 +101,7 @@ class Daemon::Parts final : public control::DaemonControl {
 };
 
 Result<> Daemon::Parts::open() {
-  auto opened_streams = Streams::open(config);
-  if (!opened_streams) return std::unexpected(opened_streams.error());
-  streams = std::move(*opened_streams);
+  streams = TRY(Streams::open(config));
   const std::size_t into_pipeline = pipeline::kEventSlots + streams->decoded_slots();
   const std::size_t out_of_pipeline = pipeline::kEventSlots + streams->finished_slots();
   if (!config.sources.empty()) {
@@ -118,38 +116,30 @@ Result<> Daemon::Parts::open() {
       std::make_unique<pipeline::Ring<pipeline::DeviceCommand>>(control::kMaxUnderWay);
   acks = std::make_unique<pipeline::Ring<pipeline::Ack>>(control::kMaxUnderWay);
   for (auto* wake : {&pipeline_wake, &publisher_wake, &control_wake}) {
-    auto opened = system::EventFd::open();
-    if (!opened) return std::unexpected(opened.error());
-    *wake = std::move(*opened);
+    auto opened = TRY(system::EventFd::open());
+    *wake = std::move(opened);
   }
   return {};
 }
 
 Result<> Daemon::Parts::start(DaemonHooks wanted) {
   hooks = std::move(wanted);
-  if (auto opened = open_sockets(); !opened) return opened;
-  if (auto opened = open_engines(); !opened) return opened;
+  TRY(open_sockets());
+  TRY(open_engines());
   return start_threads();
 }
 
 Result<> Daemon::Parts::open_sockets() {
   net::raise_file_limit();
-  auto opened = net::open_context();
-  if (!opened) return std::unexpected(opened.error());
-  context = std::move(*opened);
+  context = TRY(net::open_context());
   std::optional<net::AccessList> allowed;  // empty without keys
   if (!config.security.server_key.empty()) {
-    auto keys = net::read_secret_key(config.security.server_key);
-    if (!keys) return std::unexpected(keys.error());
-    secret_z85 = keys->secret_z85;
+    auto keys = TRY(net::read_secret_key(config.security.server_key));
+    secret_z85 = keys.secret_z85;
     allowed.emplace(config.security.clients);
   }
-  auto started = net::ZapAuthenticator::start(context.get(), std::move(allowed));
-  if (!started) return std::unexpected(started.error());
-  authenticator = std::move(*started);
-  auto opened_outputs = OutputThreads::open(config.outputs);
-  if (!opened_outputs) return std::unexpected(opened_outputs.error());
-  outputs = std::move(*opened_outputs);
+  authenticator = TRY(net::ZapAuthenticator::start(context.get(), std::move(allowed)));
+  outputs = TRY(OutputThreads::open(config.outputs));
   return open_publisher();
 }
 
@@ -172,35 +162,28 @@ Result<> Daemon::Parts::open_publisher() {
                                .present = source->present,
                                .counters = &source->counters});
   }
-  auto bound = publish::Publisher::open(std::move(options), *finished, *publisher_wake);
-  if (!bound) return std::unexpected(bound.error());
-  publisher = std::move(*bound);
+  publisher = TRY(publish::Publisher::open(std::move(options), *finished, *publisher_wake));
   return {};
 }
 
 Result<> Daemon::Parts::open_engines() {
-  auto opened_worker = pipeline::Worker::open({.in = decoded.get(),
-                                               .out = finished.get(),
-                                               .commands = commands.get(),
-                                               .acks = acks.get(),
-                                               .wake = pipeline_wake.get(),
-                                               .publisher = publisher_wake.get(),
-                                               .control = control_wake.get(),
-                                               .streams = &streams->exchange(),
-                                               .record_sink = hooks.record_sink,
-                                               .clock = system::monotonic_ns});
-  if (!opened_worker) return std::unexpected(opened_worker.error());
-  worker = std::move(*opened_worker);
-  auto opened_reader = pipeline::Reader::open({.out = decoded.get(),
-                                               .pipeline = pipeline_wake.get(),
-                                               .record_sink = hooks.record_sink,
-                                               .clock = system::monotonic_ns,
-                                               .commands = device_commands.get()});
-  if (!opened_reader) return std::unexpected(opened_reader.error());
-  reader = std::move(*opened_reader);
-  auto models = control::ModelFolder::open(config.models);
-  if (!models) return std::unexpected(models.error());
-  handler = std::make_unique<control::RequestHandler>(*this, streams->kept(), std::move(*models));
+  worker = TRY(pipeline::Worker::open({.in = decoded.get(),
+                                       .out = finished.get(),
+                                       .commands = commands.get(),
+                                       .acks = acks.get(),
+                                       .wake = pipeline_wake.get(),
+                                       .publisher = publisher_wake.get(),
+                                       .control = control_wake.get(),
+                                       .streams = &streams->exchange(),
+                                       .record_sink = hooks.record_sink,
+                                       .clock = system::monotonic_ns}));
+  reader = TRY(pipeline::Reader::open({.out = decoded.get(),
+                                       .pipeline = pipeline_wake.get(),
+                                       .record_sink = hooks.record_sink,
+                                       .clock = system::monotonic_ns,
+                                       .commands = device_commands.get()}));
+  auto models = TRY(control::ModelFolder::open(config.models));
+  handler = std::make_unique<control::RequestHandler>(*this, streams->kept(), std::move(models));
   streams->begin({.publisher = publisher.get(),
                   .handler = handler.get(),
                   .worker = worker.get(),
@@ -210,21 +193,17 @@ Result<> Daemon::Parts::open_engines() {
 }
 
 Result<> Daemon::Parts::start_threads() {
-  auto server = control::ControlServer::start(context.get(), config.control_endpoint,
+  control = TRY(control::ControlServer::start(context.get(), config.control_endpoint,
                                               {.acks = acks.get(),
                                                .wake = control_wake.get(),
                                                .authenticator = authenticator.get(),
                                                .secret_z85 = secret_z85},
-                                              *handler);
-  if (!server) return std::unexpected(server.error());
-  control = std::move(*server);
+                                              *handler));
   if (config.trigger) {
-    auto listening =
-        control::TriggerServer::start(config.trigger->listen, config.trigger->peers, *this);
-    if (!listening) return std::unexpected(listening.error());
-    trigger = std::move(*listening);
+    trigger =
+        TRY(control::TriggerServer::start(config.trigger->listen, config.trigger->peers, *this));
   }
-  if (auto started = start_metrics(); !started) return started;
+  TRY(start_metrics());
   outputs->start([this](std::optional<std::uint32_t> stream, const std::string& text) {
     if (stream) return publisher->post_event(*stream, v1::Event::KIND_WARNING, text);
     spdlog::warn("{}", text);
@@ -236,7 +215,7 @@ Result<> Daemon::Parts::start_threads() {
     if (hooks.hot_thread) hooks.hot_thread("pipeline");
     worker->run();
   });
-  if (auto started = streams->start(); !started) return started;
+  TRY(streams->start());
   reader_thread = threads->start(kReaderName, system::kReaderPriority, [this] {
     if (hooks.hot_thread) hooks.hot_thread("reader");
     reader->run();
@@ -246,9 +225,8 @@ Result<> Daemon::Parts::start_threads() {
 
 Result<> Daemon::Parts::start_metrics() {
   if (!config.metrics) return {};
-  auto server = metrics::MetricsServer::start(config.metrics->listen, [this] { return figures(); });
-  if (!server) return std::unexpected(server.error());
-  metrics = std::move(*server);
+  metrics =
+      TRY(metrics::MetricsServer::start(config.metrics->listen, [this] { return figures(); }));
   return {};
 }
 
@@ -288,7 +266,7 @@ Daemon::~Daemon() = default;
 
 Result<std::unique_ptr<Daemon>> Daemon::open(const config::DaemonConfig& config) {
   auto parts = std::make_unique<Parts>(config);
-  if (auto opened = parts->open(); !opened) return std::unexpected(opened.error());
+  TRY(parts->open());
   return std::unique_ptr<Daemon>(new Daemon(std::move(parts)));
 }
 

@@ -37,7 +37,7 @@ struct DaemonHooks {
 class Daemon {
  public:
   // Opens devices and models and binds the sockets. Errors name the stream.
-  [[nodiscard]] static Result<std::unique_ptr<Daemon>> open(const config::DaemonConfig& config);
+  static Result<std::unique_ptr<Daemon>> open(const config::DaemonConfig& config);
   ~Daemon();  // stops the daemon first
   Daemon(const Daemon&) = delete;
   Daemon& operator=(const Daemon&) = delete;
@@ -48,7 +48,7 @@ class Daemon {
   [[nodiscard]] std::size_t slots() const noexcept;  // how many streams there may be at once
 
   // Starts the threads and the devices. Call once.
-  [[nodiscard]] Result<> start(DaemonHooks hooks = {});
+  Result<> start(DaemonHooks hooks = {});
   // Ends the threads; everything that was read is still decoded and published. May be called again.
   void stop() noexcept;
 

@@ -17,15 +17,11 @@ Result<std::unique_ptr<OutputThreads>> OutputThreads::open(
     const std::vector<config::OutputConfig>& configs) {
   auto threads = std::unique_ptr<OutputThreads>(new OutputThreads);
   for (const config::OutputConfig& config : configs) {
-    auto output = output::open_output(config);
-    if (!output) return std::unexpected(output.error());
-    auto poller = system::Poller::open();
-    if (!poller) return std::unexpected(poller.error());
-    if (auto added = (*poller)->add((*output)->wake()); !added) {
-      return std::unexpected(added.error());
-    }
-    threads->running_.push_back({.output = std::move(*output),
-                                 .poller = std::move(*poller),
+    auto output = TRY(output::open_output(config));
+    auto poller = TRY(system::Poller::open());
+    TRY(poller->add(output->wake()));
+    threads->running_.push_back({.output = std::move(output),
+                                 .poller = std::move(poller),
                                  .pulse = std::make_unique<system::Pulse>(),
                                  .thread = {}});
   }
@@ -39,9 +35,9 @@ std::vector<publish::FrameOutput*> OutputThreads::outputs() const {
   return outputs;
 }
 
-void OutputThreads::start(const output::Tell& tell) {
+void OutputThreads::start(const output::Notify& notify) {
   for (Running& running : running_) {
-    running.output->set_tell(tell);
+    running.output->set_notify(notify);
     running.thread = std::thread([this, &running] { run(running); });
   }
 }

@@ -17,7 +17,7 @@ namespace posed::assembly {
 class OutputThreads {
  public:
   // Opens their sockets; nothing runs yet.
-  [[nodiscard]] static Result<std::unique_ptr<OutputThreads>> open(
+  static Result<std::unique_ptr<OutputThreads>> open(
       const std::vector<config::OutputConfig>& configs);
   ~OutputThreads() { stop(); }
   OutputThreads(const OutputThreads&) = delete;
@@ -26,8 +26,8 @@ class OutputThreads {
   // For the publisher; valid until the destructor.
   [[nodiscard]] std::vector<publish::FrameOutput*> outputs() const;
 
-  // Call once. `tell` is called by the threads.
-  void start(const output::Tell& tell);
+  // Call once. `notify` is called by the threads.
+  void start(const output::Notify& notify);
   // What was handed over before is still sent. May be called again.
   void stop() noexcept;
   // Of all threads; valid until the destructor.

@@ -46,40 +46,35 @@ std::set<std::string> reserved_names(const std::vector<std::unique_ptr<devices::
 
 Result<std::unique_ptr<Streams>> Streams::open(const config::DaemonConfig& config) {
   std::unique_ptr<Streams> self(new Streams(config));
-  auto wake = system::EventFd::open();
-  if (!wake) return std::unexpected(wake.error());
-  self->wake_ = std::move(*wake);
-  auto poller = system::Poller::open();
-  if (!poller) return std::unexpected(poller.error());
-  self->poller_ = std::move(*poller);
-  if (auto added = self->poller_->add(*self->wake_); !added) return std::unexpected(added.error());
+  self->wake_ = TRY(system::EventFd::open());
+  self->poller_ = TRY(system::Poller::open());
+  TRY(self->poller_->add(*self->wake_));
   self->kept_.wakes(*self->wake_);
-  if (auto opened = self->open_sources(); !opened) return std::unexpected(opened.error());
+  TRY(self->open_sources());
   self->make_room();
-  if (auto opened = self->open_builder(); !opened) return std::unexpected(opened.error());
+  TRY(self->open_builder());
   return self;
 }
 
 Result<> Streams::open_sources() {
   for (const config::StreamConfig& stream : config_.streams) {
-    if (auto opened = open_source(config::source_of(stream)); !opened) return opened;
+    TRY(open_source(config::source_of(stream)));
   }
   for (const config::SourceConfig& source : config_.sources) {
-    if (auto opened = open_source(source); !opened) return opened;
+    TRY(open_source(source));
   }
   return {};
 }
 
 Result<> Streams::open_source(config::SourceConfig config) {
-  auto source = devices::open_source(std::move(config), models_);
-  if (!source) return std::unexpected(source.error());
-  for (const std::string& warning : (*source)->device.warnings) {
-    spdlog::warn("{}: {}", (*source)->config.name, warning);
+  auto source = TRY(devices::open_source(std::move(config), models_));
+  for (const std::string& warning : source->device.warnings) {
+    spdlog::warn("{}: {}", source->config.name, warning);
   }
-  (*source)->number = static_cast<std::uint32_t>(sources_.size());
-  (*source)->exchange = std::make_unique<pipeline::BodyExchange>(*wake_, (*source)->has_several());
-  several_ = several_ || (*source)->has_several();
-  sources_.push_back(std::move(*source));
+  source->number = static_cast<std::uint32_t>(sources_.size());
+  source->exchange = std::make_unique<pipeline::BodyExchange>(*wake_, source->has_several());
+  several_ = several_ || source->has_several();
+  sources_.push_back(std::move(source));
   return {};
 }
 

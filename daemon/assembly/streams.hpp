@@ -41,7 +41,7 @@ class Streams final : public devices::StreamHost {
 
   // Opens the sources, those of the [[stream]] tables with a device first, and builds the streams
   // of devices with one body.
-  [[nodiscard]] static Result<std::unique_ptr<Streams>> open(const config::DaemonConfig& config);
+  static Result<std::unique_ptr<Streams>> open(const config::DaemonConfig& config);
   ~Streams() override;  // call after stop()
 
   // By number.
@@ -62,7 +62,7 @@ class Streams final : public devices::StreamHost {
   // Call before the threads of the users run.
   void begin(StreamUsers users);
   // Starts the devices, the builder and the supervisors.
-  [[nodiscard]] Result<> start();
+  Result<> start();
   // Ends looking for devices; returns at once.
   void stop_supervisors() noexcept;
   // After the reader has ended: ends the threads.
@@ -84,10 +84,10 @@ class Streams final : public devices::StreamHost {
 
  private:
   explicit Streams(const config::DaemonConfig& config) : config_(config) {}
-  [[nodiscard]] Result<> open_sources();
-  [[nodiscard]] Result<> open_source(config::SourceConfig config);
+  Result<> open_sources();
+  Result<> open_source(config::SourceConfig config);
   void make_room();
-  [[nodiscard]] Result<> open_builder();
+  Result<> open_builder();
   void run();
   // An event of a source, on all of its streams; only in the daemon's own log while it has none.
   void report(const devices::OpenSource& source, v1::Event::Kind kind, const std::string& text);

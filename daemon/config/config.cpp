@@ -223,9 +223,8 @@ Result<config::DaemonConfig> load_config(const std::filesystem::path& path, Driv
 Result<SecurityConfig> load_security(const std::filesystem::path& path) {
   Findings findings{.file = path.string(), .exit_code = ExitCode::kWrongUse};
   SecurityConfig security;
-  const auto root_table = load_toml(path, kLimits);
-  if (!root_table) return std::unexpected(root_table.error());
-  TableReader root(*root_table, "", findings);
+  const auto root_table = TRY(load_toml(path, kLimits));
+  TableReader root(root_table, "", findings);
   const ConfigFile file{.folder = path.parent_path(), .drivers = {}, .findings = findings};
   if (auto table = root.table("security")) read_security(*table, file, security);
   root.finish();

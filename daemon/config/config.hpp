@@ -34,12 +34,11 @@ using Drivers = std::span<const drivers::Driver>;
 [[nodiscard]] Reading read_config_file(const std::filesystem::path& path, Drivers drivers);
 
 // Reads the file; returns the first error, if any.
-[[nodiscard]] Result<config::DaemonConfig> load_config(const std::filesystem::path& path,
-                                                       Drivers drivers);
+Result<config::DaemonConfig> load_config(const std::filesystem::path& path, Drivers drivers);
 
 // Reads a file with the table [security] alone, for a command that serves without a config; it
 // must name a server key. Returns the first error, if any.
-[[nodiscard]] Result<SecurityConfig> load_security(const std::filesystem::path& path);
+Result<SecurityConfig> load_security(const std::filesystem::path& path);
 
 [[nodiscard]] bool is_stream_name(std::string_view name);  // [a-z0-9_-]{1,32}
 

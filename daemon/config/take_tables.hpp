@@ -12,6 +12,6 @@ void read_trigger(TableReader& root, DaemonConfig& config);
 
 // Fails where a folder or file of recordings cannot be made: a file is in the way, the file system
 // takes none, or the permission is missing. Makes a folder there for a moment.
-[[nodiscard]] Result<> check_folder(const RecordConfig& record);
+Result<> check_folder(const RecordConfig& record);
 
 }  // namespace posed::config

@@ -17,16 +17,16 @@ constexpr int kRepliesWaiting = 16;  // per client
 constexpr int kReceiveBuffer_bytes = 64 * 1024;
 constexpr std::int64_t kMaxPart = kMaxRequest + 1024;  // bytes
 // bytes that have not become a request, of all clients together
-constexpr std::uint64_t kMaxUnheard = 512 * 1024;
-constexpr int kLastWords_ms = 500;       // time to send the reply to `stop`
+constexpr std::uint64_t kMaxUnfinished = 512 * 1024;
+constexpr int kLinger_ms = 500;          // time to send the reply to `stop`
 constexpr int kRequestsARound = 16;      // then acknowledgements are handled
 constexpr std::size_t kMaxEnvelope = 4;  // parts before the request
 
 Result<> set_limits(void* router) {
   for (const auto& [option, value] : {std::pair{ZMQ_SNDHWM, kRepliesWaiting},
-                                      {ZMQ_LINGER, kLastWords_ms},
+                                      {ZMQ_LINGER, kLinger_ms},
                                       {ZMQ_ROUTER_HANDOVER, 1}}) {
-    if (auto set = net::set_option(router, option, value); !set) return set;
+    TRY(net::set_option(router, option, value));
   }
   return net::set_receive_limits(router, kMaxPart, kRequestsWaiting, kReceiveBuffer_bytes);
 }
@@ -41,26 +41,20 @@ Result<std::unique_ptr<ControlServer>> ControlServer::start(void* context,
                                                             const std::string& endpoint,
                                                             const ControlPorts& ports,
                                                             RequestHandler& handler) {
-  auto router = net::open_socket(context, ZMQ_ROUTER);
-  if (!router) return std::unexpected(router.error());
-  if (auto set = set_limits(router->get()); !set) return std::unexpected(set.error());
+  auto router = TRY(net::open_socket(context, ZMQ_ROUTER));
+  TRY(set_limits(router.get()));
   if (ports.authenticator != nullptr) {
-    if (auto set = net::secure_server(router->get(), net::Domain::kControl, ports.secret_z85);
-        !set) {
-      return std::unexpected(set.error());
-    }
+    TRY(net::secure_server(router.get(), net::Domain::kControl, ports.secret_z85));
   }
-  auto guard = net::PeerGuard::open(context, router->get(),
-                                    {.name = "control",
-                                     .max_peers = net::peer_shares().control,
-                                     .max_unheard = kMaxUnheard,
-                                     .max_unheard_of_all = kMaxUnheard,
-                                     .authenticator = ports.authenticator});
-  if (!guard) return std::unexpected(guard.error());
-  auto bound = net::bind_socket(router->get(), endpoint);
-  if (!bound) return std::unexpected(bound.error());
+  auto guard = TRY(net::PeerGuard::open(context, router.get(),
+                                        {.name = "control",
+                                         .max_peers = net::peer_shares().control,
+                                         .max_unfinished = kMaxUnfinished,
+                                         .max_unfinished_of_all = kMaxUnfinished,
+                                         .authenticator = ports.authenticator}));
+  auto bound = TRY(net::bind_socket(router.get(), endpoint));
   return std::unique_ptr<ControlServer>(
-      new ControlServer(std::move(*router), std::move(*guard), std::move(*bound), ports, handler));
+      new ControlServer(std::move(router), std::move(guard), std::move(bound), ports, handler));
 }
 
 ControlServer::ControlServer(net::Socket router, std::unique_ptr<net::PeerGuard> guard,
@@ -114,7 +108,7 @@ bool ControlServer::handle_request() {
   if (envelope.size() > kMaxEnvelope) return true;  // not a client of this protocol: no reply
   ++requests_;
   (void)guard_->drain_ended();  // this socket keeps no state for a connection
-  if (const int client = net::source_of(part); guard_->knows(client)) guard_->heard(client, {});
+  if (const int client = net::source_of(part); guard_->knows(client)) guard_->received(client, {});
   if (ports_.authenticator != nullptr &&
       !ports_.authenticator->allows(part.property("User-Id"), net::Domain::kControl)) {
     v1::ControlReply reply;

@@ -36,10 +36,9 @@ struct ControlCounts {
 class ControlServer {
  public:
   // Binds and starts the thread. `handler` outlives the server.
-  [[nodiscard]] static Result<std::unique_ptr<ControlServer>> start(void* context,
-                                                                    const std::string& endpoint,
-                                                                    const ControlPorts& ports,
-                                                                    RequestHandler& handler);
+  static Result<std::unique_ptr<ControlServer>> start(void* context, const std::string& endpoint,
+                                                      const ControlPorts& ports,
+                                                      RequestHandler& handler);
   ~ControlServer();
   ControlServer(const ControlServer&) = delete;
   ControlServer& operator=(const ControlServer&) = delete;

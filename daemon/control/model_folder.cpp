@@ -12,7 +12,7 @@
 namespace posed::control {
 namespace {
 
-constexpr std::size_t kMostModels = 256;
+constexpr std::size_t kMaxModels = 256;
 
 // Empty: no model file.
 std::string_view kind_of(const std::filesystem::path& file) {
@@ -49,14 +49,13 @@ Result<std::vector<FolderModel>> ModelFolder::list() const {
     return fail("the folder of models cannot be read: " + error.message(), folder_.string());
   }
   std::ranges::sort(models, {}, &FolderModel::name);
-  if (models.size() > kMostModels) models.resize(kMostModels);
+  if (models.size() > kMaxModels) models.resize(kMaxModels);
   return models;
 }
 
 Result<std::string> ModelFolder::read(std::string_view name) const {
-  const auto models = list();
-  if (!models) return std::unexpected(models.error());
-  if (std::ranges::find(*models, name, &FolderModel::name) == models->end()) {
+  const auto models = TRY(list());
+  if (std::ranges::find(models, name, &FolderModel::name) == models.end()) {
     return fail(fmt::format(
         "there is no model {} in the daemon's list; `posed ctl models` shows it", in_quotes(name)));
   }

@@ -21,12 +21,12 @@ class ModelFolder {
  public:
   ModelFolder() = default;  // no folder: the list is empty
   // Says so when `folder`, unless it is empty, is not a folder.
-  [[nodiscard]] static Result<ModelFolder> open(std::filesystem::path folder);
+  static Result<ModelFolder> open(std::filesystem::path folder);
 
   // Regular files that end in .style or .gesture, by name; the first 256.
-  [[nodiscard]] Result<std::vector<FolderModel>> list() const;
+  Result<std::vector<FolderModel>> list() const;
   // The bytes of a model of the list.
-  [[nodiscard]] Result<std::string> read(std::string_view name) const;
+  Result<std::string> read(std::string_view name) const;
 
  private:
   explicit ModelFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}

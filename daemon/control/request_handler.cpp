@@ -22,7 +22,7 @@
 namespace posed::control {
 namespace {
 
-using devices::of_stream;
+using devices::in_stream;
 using pipeline::Command;
 using pipeline::DeviceCommand;
 using pipeline::StageChange;
@@ -209,35 +209,33 @@ Result<ControlledStream*> RequestHandler::find_stream(const std::string& name) {
 Result<RequestHandler::Done> RequestHandler::set_parameter(const v1::ControlRequest& request,
                                                            const Requester& requester) {
   const auto& wanted = request.set_parameter();
-  const auto stream = find_stream(wanted.stream());
-  if (!stream) return std::unexpected(stream.error());
-  const auto text = text_change((*stream)->settings, wanted);
-  if (!text) return of_stream(wanted.stream(), text.error());
+  const auto stream = TRY(find_stream(wanted.stream()));
+  const auto text = text_change(stream->settings, wanted);
+  if (!text) return in_stream(wanted.stream(), text.error());
   if (*text) return stage_command(**text, requester);
-  const auto change = parameter_change((*stream)->settings, wanted);
-  if (!change) return of_stream(wanted.stream(), change.error());
+  const auto change = parameter_change(stream->settings, wanted);
+  if (!change) return in_stream(wanted.stream(), change.error());
   const ParameterSpec& spec = change->type->parameters[change->index];
   const NewValue value{.stage = change->type,
                        .parameter = std::string(spec.name),
                        .value = value_of(spec, change->value)};
-  return send(**stream, {.change = *change}, {.requester = requester, .value = value});
+  return send(*stream, {.change = *change}, {.requester = requester, .value = value});
 }
 
 Result<RequestHandler::Done> RequestHandler::stage_command(const v1::ControlRequest& request,
                                                            const Requester& requester) {
   const auto& wanted = request.stage_command();
-  const auto stream = find_stream(wanted.stream());
-  if (!stream) return std::unexpected(stream.error());
-  const auto found = find_command((*stream)->settings, wanted.name());
-  if (!found) return of_stream(wanted.stream(), found.error());
+  const auto stream = TRY(find_stream(wanted.stream()));
+  const auto found = find_command(stream->settings, wanted.name());
+  if (!found) return in_stream(wanted.stream(), found.error());
   const StageType& stage = *found->change.type;
   const StageCommandType& type = stage.commands[found->change.index];
   std::optional<NewValue> value;
   if (is_live_text(stage, type.name)) {
     value = {.stage = &stage, .parameter = std::string(type.name), .value = joined_words(wanted)};
   }
-  if (!(*stream)->is_there() && !value) {
-    return of_stream(wanted.stream(), fail(fmt::format("it is not there now, so there is nothing"
+  if (!stream->is_there() && !value) {
+    return in_stream(wanted.stream(), fail(fmt::format("it is not there now, so there is nothing"
                                                        " that could do {}",
                                                        type.name))
                                           .error());
@@ -245,28 +243,26 @@ Result<RequestHandler::Done> RequestHandler::stage_command(const v1::ControlRequ
   UnderWay under_way{.requester = requester, .stage = found->stage, .value = std::move(value)};
   under_way.refusal = type.refusal;
   // What the text means depends on the model, which is bound when the stream comes.
-  if (!(*stream)->is_there()) return keep((*stream)->name, under_way);
-  const auto command = encode_command(type, coming_model(**stream, found->stage), wanted);
-  if (!command) return of_stream(wanted.stream(), command.error());
-  return send(**stream, {.change = found->change, .command = *command}, std::move(under_way));
+  if (!stream->is_there()) return keep(stream->name, under_way);
+  const auto command = encode_command(type, coming_model(*stream, found->stage), wanted);
+  if (!command) return in_stream(wanted.stream(), command.error());
+  return send(*stream, {.change = found->change, .command = *command}, std::move(under_way));
 }
 
 Result<RequestHandler::Done> RequestHandler::add_model_part(const v1::ControlRequest& request,
                                                             const Requester& requester) {
   const auto& part = request.model_part();
-  if (auto stream = find_stream(part.stream()); !stream) return std::unexpected(stream.error());
-  auto whole = uploads_.add(requester.empty() ? std::string() : requester.front(),
-                            {.stream = part.stream(),
-                             .sha256 = part.sha256(),
-                             .total = part.total(),
-                             .offset = part.offset(),
-                             .bytes = part.bytes()},
-                            clock_());
-  if (!whole) return std::unexpected(whole.error());
-  if (!*whole) return Done{};
+  TRY(find_stream(part.stream()));
+  auto whole = TRY(uploads_.add(requester.empty() ? std::string() : requester.front(),
+                                {.stream = part.stream(),
+                                 .sha256 = part.sha256(),
+                                 .total = part.total(),
+                                 .offset = part.offset(),
+                                 .bytes = part.bytes()},
+                                clock_()));
+  if (!whole) return Done{};
   const std::string name = part.name().empty() ? "unnamed model" : clean_name(part.name());
-  return set_model(part.stream(), std::as_bytes(std::span(std::as_const(**whole))), name,
-                   requester);
+  return set_model(part.stream(), std::as_bytes(std::span(std::as_const(*whole))), name, requester);
 }
 
 // The file itself says for which stage it is.
@@ -274,21 +270,17 @@ Result<RequestHandler::Done> RequestHandler::set_model(const std::string& stream
                                                        std::span<const std::byte> bytes,
                                                        const std::string& name,
                                                        const Requester& requester) {
-  const auto found = find_stream(stream_name);
-  if (!found) return std::unexpected(found.error());
-  const ControlledStream& stream = **found;
+  const auto found = TRY(find_stream(stream_name));
+  const ControlledStream& stream = *found;
   const auto stage = stage_for_model(stream.settings, bytes, name);
-  if (!stage) return of_stream(stream.name, stage.error());
+  if (!stage) return in_stream(stream.name, stage.error());
   const StageType& type = *stream.settings.stages[*stage].type;
   UnderWay under_way{.requester = requester, .stage = *stage};
   under_way.file = {.stage = &type, .name = name, .bytes = {bytes.begin(), bytes.end()}};
   if (!stream.is_there()) return keep(stream.name, under_way);
   if (stream.skeleton == nullptr) return fail(stream.name + " has no skeleton to bind a model to");
-  const auto context = pipeline::stage_context(stream.settings, *stage, stream.skeleton);
-  if (!context) return std::unexpected(context.error());
-  auto bound = type.bind_model(bytes, *context, name);
-  if (!bound) return std::unexpected(bound.error());
-  under_way.model = std::move(*bound);
+  const auto context = TRY(pipeline::stage_context(stream.settings, *stage, stream.skeleton));
+  under_way.model = TRY(type.bind_model(bytes, context, name));
   Command command{.change = {.kind = StageChange::Kind::kModel, .type = &type},
                   .model = under_way.model.get()};
   const std::string hash = log::sha256_hex(bytes);
@@ -394,16 +386,14 @@ Result<ControlledStream*> RequestHandler::find_device(const std::string& name) {
 Result<RequestHandler::Done> RequestHandler::calibrate(const v1::ControlRequest& request,
                                                        const Requester& requester) {
   const auto& wanted = request.calibrate();
-  const auto found = find_device(wanted.stream());
-  if (!found) return std::unexpected(found.error());
-  const ControlledStream& stream = **found;
-  auto compiled =
-      devices::compile_calibration(*stream.device->description(), wanted.toml(), wanted.name());
-  if (!compiled) return std::unexpected(compiled.error());
+  const auto found = TRY(find_device(wanted.stream()));
+  const ControlledStream& stream = *found;
+  auto compiled = TRY(
+      devices::compile_calibration(*stream.device->description(), wanted.toml(), wanted.name()));
   const DeviceCommand command{.kind = DeviceCommand::Kind::kCalibrate,
                               .source = stream.source_number,
                               .ticket = last_ticket_ + 1,
-                              .calibration = compiled->get(),
+                              .calibration = compiled.get(),
                               .size = 0,
                               .bytes = {}};
   if (under_way_.size() >= kMaxUnderWay || !daemon_control_.send(command)) {
@@ -412,33 +402,30 @@ Result<RequestHandler::Done> RequestHandler::calibrate(const v1::ControlRequest&
   under_way_.emplace(++last_ticket_, UnderWay{.requester = requester,
                                               .stream = stream.stream,
                                               .name = stream.name,
-                                              .calibration = std::move(*compiled),
+                                              .calibration = std::move(compiled),
                                               .device = stream.device,
                                               .source_number = stream.source_number});
   return Done{.under_way = true};
 }
 
 Result<RequestHandler::Done> RequestHandler::send_haptics(const v1::ControlRequest& request) {
-  const auto found = find_device(request.haptics().stream());
-  if (!found) return std::unexpected(found.error());
-  const ControlledStream& stream = **found;
+  const auto found = TRY(find_device(request.haptics().stream()));
+  const ControlledStream& stream = *found;
   const std::string driver_name = stream.device->description()->driver;
   const drivers::Driver* driver = drivers::find_driver(driver_name);
   if (driver == nullptr || driver->glove == nullptr || driver->glove->encode_haptics == nullptr) {
     return fail(fmt::format("stream {} has no haptics: driver '{}' only sends data", stream.name,
                             driver_name));
   }
-  const auto haptics = read_haptics(request.haptics());
-  if (!haptics) return std::unexpected(haptics.error());
-  const auto bytes = driver->glove->encode_haptics(stream.options, *haptics);
-  if (!bytes) return std::unexpected(bytes.error());
+  const auto haptics = TRY(read_haptics(request.haptics()));
+  const auto bytes = TRY(driver->glove->encode_haptics(stream.options, haptics));
   if (stream.device->away()) {
     return fail("the glove of stream " + stream.name + " is away: plug it in and try again");
   }
   DeviceCommand command{.kind = DeviceCommand::Kind::kSend, .source = stream.source_number};
-  if (bytes->size() > command.bytes.size()) return fail("the device's message is too long");
-  command.size = static_cast<std::uint16_t>(bytes->size());
-  std::ranges::copy(*bytes, command.bytes.begin());
+  if (bytes.size() > command.bytes.size()) return fail("the device's message is too long");
+  command.size = static_cast<std::uint16_t>(bytes.size());
+  std::ranges::copy(bytes, command.bytes.begin());
   if (!daemon_control_.send(command))
     return fail("too many messages wait for the device; send fewer");
   return Done{};  // devices send no acknowledgement

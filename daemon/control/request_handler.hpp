@@ -81,7 +81,7 @@ class DaemonControl {
   // A stage of the stream has another model, or another text: `stats` should tell it.
   virtual void stages_changed(std::uint32_t stream, const pipeline::StreamSettings& settings) = 0;
   // Marks a take in the log; fails if the daemon is not recording. Any cold thread.
-  [[nodiscard]] virtual Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) = 0;
+  virtual Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) = 0;
   virtual void fill(v1::Stats& stats) = 0;
   virtual void stop() = 0;  // starts the daemon's shutdown; returns at once
 };
@@ -165,34 +165,29 @@ class RequestHandler {
     bool under_way = false;  // acknowledge() makes the reply
     std::string stream{};    // for whose next start it is kept; empty: it has taken effect
   };
-  [[nodiscard]] Result<Done> apply(const v1::ControlRequest& request,
-                                   std::span<const std::byte> model, const Requester& requester);
-  [[nodiscard]] Result<Done> set_parameter(const v1::ControlRequest& request,
-                                           const Requester& requester);
-  [[nodiscard]] Result<Done> stage_command(const v1::ControlRequest& request,
-                                           const Requester& requester);
-  [[nodiscard]] Result<Done> add_model_part(const v1::ControlRequest& request,
-                                            const Requester& requester);
-  [[nodiscard]] Result<Done> set_model(const std::string& stream, std::span<const std::byte> bytes,
-                                       const std::string& name, const Requester& requester);
-  [[nodiscard]] Result<Done> calibrate(const v1::ControlRequest& request,
-                                       const Requester& requester);
+  Result<Done> apply(const v1::ControlRequest& request, std::span<const std::byte> model,
+                     const Requester& requester);
+  Result<Done> set_parameter(const v1::ControlRequest& request, const Requester& requester);
+  Result<Done> stage_command(const v1::ControlRequest& request, const Requester& requester);
+  Result<Done> add_model_part(const v1::ControlRequest& request, const Requester& requester);
+  Result<Done> set_model(const std::string& stream, std::span<const std::byte> bytes,
+                         const std::string& name, const Requester& requester);
+  Result<Done> calibrate(const v1::ControlRequest& request, const Requester& requester);
   [[nodiscard]] Reply list_models(Requester requester) const;
   [[nodiscard]] Reply mark_take(const v1::ControlRequest& request, Requester requester);
-  [[nodiscard]] Result<Done> send_haptics(const v1::ControlRequest& request);
+  Result<Done> send_haptics(const v1::ControlRequest& request);
   // Whether the slot has a later generation.
   [[nodiscard]] bool is_earlier(Streams::iterator stream) const;
   // The stream of this name that is there, or else is known; of a slot's generations, only the
   // newest is there.
-  [[nodiscard]] Result<ControlledStream*> find_stream(const std::string& name);
+  Result<ControlledStream*> find_stream(const std::string& name);
   // As find_stream, but fails for streams that have no single device.
-  [[nodiscard]] Result<ControlledStream*> find_device(const std::string& name);
+  Result<ControlledStream*> find_device(const std::string& name);
   // The stage's model by the time that a command that is sent now takes effect.
   [[nodiscard]] const StageModel* coming_model(const ControlledStream& stream,
                                                std::size_t stage) const;
   // Puts the command under way, or keeps the change for a stream that is not there.
-  [[nodiscard]] Result<Done> send(const ControlledStream& stream, pipeline::Command command,
-                                  UnderWay under_way);
+  Result<Done> send(const ControlledStream& stream, pipeline::Command command, UnderWay under_way);
   // The stream has the new value or model from now on whenever it is built.
   Done keep(const std::string& stream, const UnderWay& change);
   // What acknowledge() does to the stream.

@@ -110,10 +110,9 @@ Result<Parameters> options_of(const StageCommandType& type,
     }
     const bool flag = std::holds_alternative<bool>(spec->default_value);
     const bool is_flag = flag && (number == 0.0 || number == 1.0);
-    const auto value =
-        from_people(*spec, is_flag ? ParameterValue(number == 1.0) : ParameterValue(number), name);
-    if (!value) return std::unexpected(value.error());
-    given.emplace(spec->name, *value);
+    const auto value = TRY(from_display(
+        *spec, is_flag ? ParameterValue(number == 1.0) : ParameterValue(number), name));
+    given.emplace(spec->name, value);
   }
   return complete_parameters(type.options, given);
 }
@@ -129,38 +128,34 @@ Result<Place> find_parameter_place(const StreamSettings& settings, const std::st
 
 Result<StageChange> parameter_change(const StreamSettings& settings,
                                      const v1::ControlRequest::SetParameter& wanted) {
-  const auto place = find_parameter_place(settings, wanted.name());
-  if (!place) return std::unexpected(place.error());
-  const StageType& type = *settings.stages[place->stage].type;
-  const ParameterSpec& spec = type.parameters[place->index];
+  const auto place = TRY(find_parameter_place(settings, wanted.name()));
+  const StageType& type = *settings.stages[place.stage].type;
+  const ParameterSpec& spec = type.parameters[place.index];
   if (!spec.live) {
     return fail(
         fmt::format("{} cannot change while the daemon runs; set it in [stream.{}] and start"
                     " again",
                     spec.shown_name(), type.name));
   }
-  const auto value = from_people(spec, value_in(wanted), spec.shown_name());
-  if (!value) return std::unexpected(value.error());
+  const auto value = TRY(from_display(spec, value_in(wanted), spec.shown_name()));
   return StageChange{.kind = StageChange::Kind::kSet,
-                     .index = static_cast<std::uint8_t>(place->index),
+                     .index = static_cast<std::uint8_t>(place.index),
                      .type = &type,
-                     .value = number_of(spec, *value)};
+                     .value = number_of(spec, value)};
 }
 
 Result<std::optional<v1::ControlRequest>> text_change(
     const StreamSettings& settings, const v1::ControlRequest::SetParameter& wanted) {
-  const auto place = find_parameter_place(settings, wanted.name());
-  if (!place) return std::unexpected(place.error());
-  const StageType& type = *settings.stages[place->stage].type;
-  const ParameterSpec& spec = type.parameters[place->index];
+  const auto place = TRY(find_parameter_place(settings, wanted.name()));
+  const StageType& type = *settings.stages[place.stage].type;
+  const ParameterSpec& spec = type.parameters[place.index];
   if (!text_command(type, spec)) return std::nullopt;
-  const auto value = from_people(spec, value_in(wanted), spec.shown_name());
-  if (!value) return std::unexpected(value.error());
+  const auto value = TRY(from_display(spec, value_in(wanted), spec.shown_name()));
   v1::ControlRequest request;
   auto& command = *request.mutable_stage_command();
   command.set_stream(wanted.stream());
   command.set_name(fmt::format("{}.{}", type.name, spec.name));
-  std::string_view rest = std::get<std::string>(*value);
+  std::string_view rest = std::get<std::string>(value);
   while (!rest.empty()) {
     const auto comma = rest.find(',');
     command.add_word(std::string(rest.substr(0, comma)));
@@ -174,12 +169,11 @@ Result<FoundCommand> find_command(const StreamSettings& settings, const std::str
   const auto names = [](const StageType& type) {
     return names_of(type.commands, &StageCommandType::name);
   };
-  const auto place = find_place(settings, name, "command", names);
-  if (!place) return std::unexpected(place.error());
-  return FoundCommand{.stage = place->stage,
+  const auto place = TRY(find_place(settings, name, "command", names));
+  return FoundCommand{.stage = place.stage,
                       .change = {.kind = StageChange::Kind::kCommand,
-                                 .index = static_cast<std::uint8_t>(place->index),
-                                 .type = settings.stages[place->stage].type}};
+                                 .index = static_cast<std::uint8_t>(place.index),
+                                 .type = settings.stages[place.stage].type}};
 }
 
 std::string joined_words(const v1::ControlRequest::StageCommand& wanted) {
@@ -197,18 +191,16 @@ Result<StageCommand> encode_command(const StageCommandType& type, const StageMod
     return fail(
         fmt::format("{} is too long: a word has at most {} bytes", in_quotes(word), kMaxWord));
   }
-  const auto options = options_of(type, wanted);
-  if (!options) return std::unexpected(options.error());
+  const auto options = TRY(options_of(type, wanted));
   const std::vector<std::string> words(wanted.word().begin(), wanted.word().end());
-  return type.encode(model, words, *options);
+  return type.encode(model, words, options);
 }
 
 Result<std::size_t> stage_for_model(const StreamSettings& settings, std::span<const std::byte> file,
                                     const std::string& name) {
-  const auto opened = model_file::open(file, name);
-  if (!opened) return std::unexpected(opened.error());
+  const auto opened = TRY(model_file::open(file, name));
   const auto takes = [&](const StageType& type) {
-    return type.takes != nullptr && type.takes(*opened);
+    return type.takes != nullptr && type.takes(opened);
   };
   for (std::size_t i = 0; i < settings.stages.size(); ++i) {
     if (takes(*settings.stages[i].type)) return i;

@@ -15,12 +15,12 @@
 namespace posed::control {
 
 // The change that a SetParameter asks for, checked against the parameter's type and range.
-[[nodiscard]] Result<pipeline::StageChange> parameter_change(
-    const pipeline::StreamSettings& settings, const v1::ControlRequest::SetParameter& wanted);
+Result<pipeline::StageChange> parameter_change(const pipeline::StreamSettings& settings,
+                                               const v1::ControlRequest::SetParameter& wanted);
 
 // The same as a request for the stage's command, where the parameter is a live text
 // (models/live_text.hpp): the pieces between its commas are the words. Nothing for another one.
-[[nodiscard]] Result<std::optional<v1::ControlRequest>> text_change(
+Result<std::optional<v1::ControlRequest>> text_change(
     const pipeline::StreamSettings& settings, const v1::ControlRequest::SetParameter& wanted);
 
 struct FoundCommand {
@@ -28,20 +28,18 @@ struct FoundCommand {
   pipeline::StageChange change;
 };
 // `name` is "generate.play", or "play" where only one stage has such a command.
-[[nodiscard]] Result<FoundCommand> find_command(const pipeline::StreamSettings& settings,
-                                                const std::string& name);
+Result<FoundCommand> find_command(const pipeline::StreamSettings& settings,
+                                  const std::string& name);
 
 // The words of a command as one text, with the commas between which they stood.
 [[nodiscard]] std::string joined_words(const v1::ControlRequest::StageCommand& wanted);
 
 // `model` is the stage's model by the time that the command arrives; it may be null.
-[[nodiscard]] Result<StageCommand> encode_command(const StageCommandType& type,
-                                                  const StageModel* model,
-                                                  const v1::ControlRequest::StageCommand& wanted);
+Result<StageCommand> encode_command(const StageCommandType& type, const StageModel* model,
+                                    const v1::ControlRequest::StageCommand& wanted);
 
 // The index of the stage for which a model file is. `name` is the file's, for errors.
-[[nodiscard]] Result<std::size_t> stage_for_model(const pipeline::StreamSettings& settings,
-                                                  std::span<const std::byte> file,
-                                                  const std::string& name);
+Result<std::size_t> stage_for_model(const pipeline::StreamSettings& settings,
+                                    std::span<const std::byte> file, const std::string& name);
 
 }  // namespace posed::control

@@ -76,15 +76,14 @@ Result<TriggerMessage> parse_trigger(std::string_view datagram) {
     return fail("it is not XML from byte " + std::to_string(parsed.offset) + " on (" +
                 parsed.description() + ")");
   }
-  const auto root = only_root(document);
-  if (!root) return std::unexpected(root.error());
-  const std::string_view kind = root->name();
+  const auto root = TRY(only_root(document));
+  const std::string_view kind = root.name();
   if (kind != "CaptureStart" && kind != "CaptureStop") {
     return fail("its element is " + in_quotes(kind) + " instead of CaptureStart or CaptureStop");
   }
   TriggerMessage message{.start = kind == "CaptureStart"};
-  if (auto read = read_children(*root, message); !read) return std::unexpected(read.error());
-  message.result = root->attribute("RESULT").value();
+  TRY(read_children(root, message));
+  message.result = root.attribute("RESULT").value();
   const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
   if (message.packet_id.size() > kMaxDigits || !std::ranges::all_of(message.packet_id, is_digit)) {
     return fail("its PacketID " + in_quotes(message.packet_id) + " is not a number");

@@ -26,6 +26,6 @@ struct TriggerMessage {
 // Closing zeros and white space, a BOM and leading white space are allowed. Entities and document
 // types are refused, and so is everything else that is not one whole element. The error is a
 // sentence for people.
-[[nodiscard]] Result<TriggerMessage> parse_trigger(std::string_view datagram);
+Result<TriggerMessage> parse_trigger(std::string_view datagram);
 
 }  // namespace posed::control

@@ -23,24 +23,21 @@ constexpr int kDatagramsARound = 16;
 Result<std::unique_ptr<TriggerServer>> TriggerServer::start(const std::string& listen,
                                                             const std::vector<std::string>& peers,
                                                             DaemonControl& daemon_control) {
-  const auto address = drivers::listen_address(listen, peers, "the senders'");
-  if (!address) return std::unexpected(address.error());
+  const auto address = TRY(drivers::listen_address(listen, peers, "the senders'"));
   std::vector<drivers::Host> hosts;
   for (const std::string& peer : peers) {
-    const auto host = drivers::parse_host(peer);
-    if (!host) return std::unexpected(host.error());
-    hosts.push_back(drivers::host_of(*host));
+    const auto host = TRY(drivers::parse_host(peer));
+    hosts.push_back(drivers::host_of(host));
   }
-  auto wake = system::EventFd::open();
-  if (!wake) return std::unexpected(wake.error());
-  const int fd = drivers::bind_socket(*address, SOCK_DGRAM, false);
+  auto wake = TRY(system::EventFd::open());
+  const int fd = drivers::bind_socket(address, SOCK_DGRAM, false);
   if (fd < 0) {
     return fail("the trigger cannot listen on " + listen + ": " + errno_text() +
                 "; end the program that has this port, or choose another in [trigger]");
   }
   spdlog::info("trigger: listening on {}", listen);
   return std::unique_ptr<TriggerServer>(
-      new TriggerServer(fd, std::move(*wake), std::move(hosts), daemon_control));
+      new TriggerServer(fd, std::move(wake), std::move(hosts), daemon_control));
 }
 
 TriggerServer::TriggerServer(int fd, std::unique_ptr<system::EventFd> wake,
@@ -61,7 +58,7 @@ TriggerServer::~TriggerServer() {
 // Between two rounds it pauses, so that a flood costs little of a core; the kernel drops the rest.
 void TriggerServer::serve() {
   constexpr int kPause_ms = 10;
-  constexpr int kLongest_ms = system::kLongestSleep_ns / 1'000'000;
+  constexpr int kMaxWait_ms = system::kMaxSleep_ns / 1'000'000;
   system::name_thread(kThreadName);
   while (!stop_.load(std::memory_order_acquire)) {
     pulse_.beat();
@@ -72,7 +69,7 @@ void TriggerServer::serve() {
       std::array<pollfd, 2> wait{{{.fd = wake_->fd(), .events = POLLIN, .revents = 0},
                                   {.fd = fd_, .events = POLLIN, .revents = 0}}};
       const bool flooded = handled == kDatagramsARound;
-      ::poll(wait.data(), flooded ? 1 : 2, flooded ? kPause_ms : kLongest_ms);
+      ::poll(wait.data(), flooded ? 1 : 2, flooded ? kPause_ms : kMaxWait_ms);
     }
     wake_->awake();
   }

@@ -19,9 +19,9 @@ class TriggerServer {
  public:
   // `listen` and `peers` as in the config. Binds and starts the thread; `daemon_control` outlives
   // the server. Broadcasts are received where `listen` is 0.0.0.0.
-  [[nodiscard]] static Result<std::unique_ptr<TriggerServer>> start(
-      const std::string& listen, const std::vector<std::string>& peers,
-      DaemonControl& daemon_control);
+  static Result<std::unique_ptr<TriggerServer>> start(const std::string& listen,
+                                                      const std::vector<std::string>& peers,
+                                                      DaemonControl& daemon_control);
   ~TriggerServer();
   TriggerServer(const TriggerServer&) = delete;
   TriggerServer& operator=(const TriggerServer&) = delete;

@@ -54,18 +54,17 @@ Result<Uploads::Iterator> Uploads::find_or_begin(const std::string& client,
 Result<std::optional<std::string>> Uploads::add(const std::string& client, const ModelPiece& piece,
                                                 std::int64_t now_ns) {
   (void)forget_old(now_ns);
-  if (auto valid = check_piece(piece); !valid) return std::unexpected(valid.error());
-  auto found = find_or_begin(client, piece);
-  if (!found) return std::unexpected(found.error());
-  Upload& upload = (*found)->second;
+  TRY(check_piece(piece));
+  auto found = TRY(find_or_begin(client, piece));
+  Upload& upload = found->second;
   if (piece.offset != upload.bytes.size() || piece.total != upload.total ||
       piece.sha256 != upload.sha256 || piece.stream != upload.stream ||
       piece.bytes.size() > upload.total - upload.bytes.size()) {
-    erase(*found);
+    erase(found);
     return fail("this piece does not continue the one before; send the model again from offset 0");
   }
   if (bytes_ + piece.bytes.size() > kMaxModel) {
-    erase(*found);
+    erase(found);
     return fail("others are sending models; try again in some seconds");
   }
   upload.bytes += piece.bytes;
@@ -74,7 +73,7 @@ Result<std::optional<std::string>> Uploads::add(const std::string& client, const
   if (upload.bytes.size() < upload.total) return std::nullopt;
   bytes_ -= upload.bytes.size();
   Upload whole = std::move(upload);
-  uploads_.erase(*found);
+  uploads_.erase(found);
   if (log::sha256_hex(std::as_bytes(std::span(whole.bytes))) != whole.sha256) {
     return fail("the model arrived damaged: its sha256 is different; send it again");
   }

@@ -33,9 +33,8 @@ class Uploads {
  public:
   // Adds a piece from `client`. Returns the model's bytes after the last piece, nullopt if more are
   // to come. An error ends the client's upload. A piece at offset 0 starts a new one.
-  [[nodiscard]] Result<std::optional<std::string>> add(const std::string& client,
-                                                       const ModelPiece& piece,
-                                                       std::int64_t now_ns);
+  Result<std::optional<std::string>> add(const std::string& client, const ModelPiece& piece,
+                                         std::int64_t now_ns);
   // Forgets uploads that have stalled. Returns when to call it next at the latest; for ever if none
   // is under way.
   [[nodiscard]] std::int64_t forget_old(std::int64_t now_ns);
@@ -48,7 +47,7 @@ class Uploads {
     std::int64_t last_ns = 0;
   };
   using Iterator = std::map<std::string, Upload>::iterator;
-  [[nodiscard]] Result<Iterator> find_or_begin(const std::string& client, const ModelPiece& piece);
+  Result<Iterator> find_or_begin(const std::string& client, const ModelPiece& piece);
   void erase(Iterator upload);
 
   std::map<std::string, Upload> uploads_;  // by client

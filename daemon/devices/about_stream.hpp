@@ -16,12 +16,12 @@ namespace posed::devices {
 }
 
 // The error, with the stream's name in its message.
-[[nodiscard]] inline std::unexpected<Error> of_stream(const std::string& name, Error error) {
+[[nodiscard]] inline std::unexpected<Error> in_stream(const std::string& name, Error error) {
   error.message = about_stream(name, error.message);
   return std::unexpected(std::move(error));
 }
 
-[[nodiscard]] inline std::unexpected<Error> of_source(const std::string& name, Error error) {
+[[nodiscard]] inline std::unexpected<Error> in_source(const std::string& name, Error error) {
   error.message = "source " + in_quotes(name) + ": " + error.message;
   return std::unexpected(std::move(error));
 }

@@ -16,14 +16,11 @@ Result<std::unique_ptr<const OwnedCalibration>> compile_calibration(
     return misuse(
         "driver " + in_quotes(description.driver) + " has no sensors that can be calibrated", file);
   }
-  const auto model = driver->glove->glove_model(description);
-  if (!model) return std::unexpected(model.error());
-  const auto parsed = drivers::glove::parse_calibration(toml, file);
-  if (!parsed) return std::unexpected(parsed.error());
-  auto compiled = drivers::glove::make_calibration(*model, *parsed, *hand, description.identity);
-  if (!compiled) return std::unexpected(compiled.error());
-  return std::make_unique<const OwnedCalibration>(OwnedCalibration{
-      std::move(*compiled), toml, std::filesystem::path(file).filename().string()});
+  const auto model = TRY(driver->glove->glove_model(description));
+  const auto parsed = TRY(drivers::glove::parse_calibration(toml, file));
+  auto compiled = TRY(drivers::glove::make_calibration(model, parsed, *hand, description.identity));
+  return std::make_unique<const OwnedCalibration>(
+      OwnedCalibration{std::move(compiled), toml, std::filesystem::path(file).filename().string()});
 }
 
 }  // namespace posed::devices

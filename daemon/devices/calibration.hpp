@@ -16,7 +16,7 @@ using OwnedCalibration = drivers::glove::OwnedCalibration;
 // `toml` is the file's text, `file` its name for errors. Refuses a calibration that does not fit:
 // the device is not a glove, the file is for another driver, hand or glove, or it names unknown
 // sensors.
-[[nodiscard]] Result<std::unique_ptr<const OwnedCalibration>> compile_calibration(
+Result<std::unique_ptr<const OwnedCalibration>> compile_calibration(
     const drivers::Description& description, const std::string& toml, const std::string& file);
 
 }  // namespace posed::devices

@@ -102,7 +102,7 @@ void DeviceSupervisor::watch_silence() {
   if (device_->reopen_after_s <= 0.0 || asked_back_) return;
   const pipeline::SourceCounters& counters = source_.counters;
   if (!counters.connected.load()) return;
-  const std::int64_t silent_ns = ports_.clock() - counters.heard_ns.load();
+  const std::int64_t silent_ns = ports_.clock() - counters.received_ns.load();
   if (seconds(silent_ns) < device_->reopen_after_s) return;
   asked_back_ = true;
   source_.slot->give_back.store(true);
@@ -155,9 +155,8 @@ void DeviceSupervisor::look_for_device() {
 // Refuses a device that differs from what the stream was set up for: its data would silently be
 // taken for other joints.
 Result<std::unique_ptr<drivers::Device>> DeviceSupervisor::try_open() {
-  auto opened = driver_.open(source_.config.options, *source_.ports);
-  if (!opened) return std::unexpected(opened.error());
-  auto device = std::make_unique<drivers::Device>(std::move(*opened));
+  auto opened = TRY(driver_.open(source_.config.options, *source_.ports));
+  auto device = std::make_unique<drivers::Device>(std::move(opened));
   const drivers::Description& is = device->description;
   const drivers::Description& was = source_.device.description;
   const auto id = [](const drivers::Description& d) { return d.skeleton ? d.skeleton->id : 0; };
@@ -166,12 +165,9 @@ Result<std::unique_ptr<drivers::Device>> DeviceSupervisor::try_open() {
                 "); connect the one that the stream began with, or start posed again");
   }
   if (const auto in_use = source_.present->calibration(); !in_use.toml.empty()) {
-    const auto fits = compile_calibration(is, in_use.toml, in_use.file);
-    if (!fits) return std::unexpected(fits.error());
+    TRY(compile_calibration(is, in_use.toml, in_use.file));
   }
-  if (auto started = device->transport->start(ports_.clock()); !started) {
-    return std::unexpected(started.error());
-  }
+  TRY(device->transport->start(ports_.clock()));
   return device;
 }
 

@@ -48,7 +48,7 @@ class DeviceSupervisor {
   void watch_silence();
   void write_to_device();
   void look_for_device();
-  [[nodiscard]] Result<std::unique_ptr<drivers::Device>> try_open();
+  Result<std::unique_ptr<drivers::Device>> try_open();
   void sleep();
   [[nodiscard]] bool settling() const;  // a device node appeared a moment ago
 

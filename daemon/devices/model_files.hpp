@@ -16,12 +16,11 @@ using ModelBytes = std::shared_ptr<const std::string>;
 
 class ModelFiles {
  public:
-  [[nodiscard]] Result<ModelBytes> load(const std::filesystem::path& path) {
+  Result<ModelBytes> load(const std::filesystem::path& path) {
     ModelBytes& bytes = bytes_[path];
     if (bytes) return bytes;
-    auto read = model_file::load(path);
-    if (!read) return std::unexpected(read.error());
-    bytes = std::make_shared<const std::string>(std::move(*read));
+    auto read = TRY(model_file::load(path));
+    bytes = std::make_shared<const std::string>(std::move(read));
     return bytes;
   }
 

@@ -20,24 +20,22 @@ Result<> open_device(OpenSource& source) {
   const drivers::Driver& driver = *source.driver;
   const drivers::Options& options = source.config.options;
   if (driver.expect == nullptr) {
-    auto device = driver.open(options, *source.ports);
-    if (!device) return std::unexpected(device.error());
-    source.device = std::move(*device);
+    auto device = TRY(driver.open(options, *source.ports));
+    source.device = std::move(device);
     source.present->connected(source.device.description);
     const auto* file = dynamic_cast<const drivers::FileTransport*>(source.device.transport.get());
     source.endless = file != nullptr && file->loops();
     return {};
   }
   source.endless = true;
-  auto description = driver.expect(options);
-  if (!description) return std::unexpected(description.error());
+  auto description = TRY(driver.expect(options));
   source.ports->only_prepare(true);
   const auto prepared = driver.open(options, *source.ports);
   source.ports->only_prepare(false);
   if (!prepared && prepared.error().exit_code == ExitCode::kWrongUse) {
     return std::unexpected(prepared.error());
   }
-  source.device.description = std::move(*description);
+  source.device.description = std::move(description);
   source.present->connected(source.device.description);
   source.present->gone();
   return {};
@@ -54,22 +52,18 @@ Result<> open_calibration(OpenSource& source) {
                     "`, or leave out `calibration` and use the glove's defaults",
                 path.string());
   }
-  const auto text = drivers::glove::load_calibration_text(path);
-  if (!text) return std::unexpected(text.error());
+  const auto text = TRY(drivers::glove::load_calibration_text(path));
   auto compiled =
-      devices::compile_calibration(*source.present->description(), *text, path.string());
-  if (!compiled) return std::unexpected(compiled.error());
-  source.present->calibrated({.toml = *text, .file = path.string()});
-  source.calibration = std::move(*compiled);
+      TRY(devices::compile_calibration(*source.present->description(), text, path.string()));
+  source.present->calibrated({.toml = text, .file = path.string()});
+  source.calibration = std::move(compiled);
   return {};
 }
 
 Result<> open_slot(OpenSource& source) {
   if (source.driver->expect == nullptr) return {};
   source.slot = std::make_unique<pipeline::DeviceSlot>();
-  auto wake = system::EventFd::open();
-  if (!wake) return std::unexpected(wake.error());
-  source.slot->supervisor = std::move(*wake);
+  source.slot->supervisor = TRY(system::EventFd::open());
   return {};
 }
 
@@ -79,9 +73,7 @@ Result<> load_models(const config::SourceConfig& source, ModelFiles& files) {
   for (const config::StreamConfig* stream : streams) {
     for (const config::StageConfig& stage : stream->stages) {
       if (stage.model.empty()) continue;
-      if (const auto bytes = files.load(stage.model); !bytes) {
-        return std::unexpected(bytes.error());
-      }
+      TRY(files.load(stage.model));
     }
   }
   return {};
@@ -100,13 +92,13 @@ Result<std::unique_ptr<OpenSource>> open_source(config::SourceConfig config, Mod
   if (opened) opened = open_slot(*source);
   if (opened) opened = load_models(source->config, files);
   if (opened) return source;
-  return of_source(*source, opened.error());
+  return in_source(*source, opened.error());
 }
 
-std::unexpected<Error> of_source(const OpenSource& source, Error error) {
+std::unexpected<Error> in_source(const OpenSource& source, Error error) {
   const std::string& name = source.config.name;
-  return source.has_several() ? of_source(name, std::move(error))
-                              : of_stream(name, std::move(error));
+  return source.has_several() ? in_source(name, std::move(error))
+                              : in_stream(name, std::move(error));
 }
 
 Result<std::string> try_kept_device(OpenSource& source) {
@@ -119,8 +111,7 @@ Result<std::string> try_kept_device(OpenSource& source) {
   source.device = std::move(*device);
   source.present->connected(source.device.description);
   if (const auto in_use = source.present->calibration(); !in_use.toml.empty()) {
-    const auto fits = compile_calibration(source.device.description, in_use.toml, in_use.file);
-    if (!fits) return std::unexpected(fits.error());
+    TRY(compile_calibration(source.device.description, in_use.toml, in_use.file));
   }
   return std::string();
 }

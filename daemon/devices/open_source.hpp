@@ -46,8 +46,7 @@ struct OpenSource {
 // the model files of the source's streams, which are bound when a body is there. Does not wait for
 // a device that may be unplugged. Errors name the source, or the stream of a device with one body.
 // Cold.
-[[nodiscard]] Result<std::unique_ptr<OpenSource>> open_source(config::SourceConfig config,
-                                                              ModelFiles& files);
+Result<std::unique_ptr<OpenSource>> open_source(config::SourceConfig config, ModelFiles& files);
 
 // The error, with the name of the source in its message, or that of the only stream.
 [[nodiscard]] std::unexpected<Error> of_source(const OpenSource& source, Error error);
@@ -55,7 +54,7 @@ struct OpenSource {
 // For a command that needs the result now (`check`): opens the device that a supervisor would open,
 // and tries the calibration on it. Returns an empty string, or one sentence that says why the
 // device is not there now. May take a few seconds. Cold.
-[[nodiscard]] Result<std::string> try_kept_device(OpenSource& source);
+Result<std::string> try_kept_device(OpenSource& source);
 
 // The one body of a device that does not describe its bodies.
 [[nodiscard]] drivers::Body only_body(const OpenSource& source);

@@ -295,16 +295,13 @@ NewStream SourceBodies::make(Stream& stream, const config::StreamConfig& config)
 Result<> SourceBodies::make_engine_of(NewStream& stream) const {
   // A device with one body that does not state its rate leaves it open.
   const double rate_hz = source_.has_several() ? stream.rate_hz : stream.body.rate_hz;
-  auto stages = load_stages(stream.config, stream.body.skeleton, rate_hz, shared_.models,
-                            shared_.partners, &shared_.kept);
-  if (!stages) return std::unexpected(stages.error());
-  stream.stages = std::move(*stages);
-  auto bound = bind_stages(stream.stages);
-  if (!bound) return std::unexpected(bound.error());
-  stream.bound = std::move(*bound);
-  auto engine = make_engine(stream.id, stream.stages, stream.bound);
-  if (!engine) return std::unexpected(engine.error());
-  stream.engine = std::move(*engine);
+  auto stages = TRY(load_stages(stream.config, stream.body.skeleton, rate_hz, shared_.models,
+                                shared_.partners, &shared_.kept));
+  stream.stages = std::move(stages);
+  auto bound = TRY(bind_stages(stream.stages));
+  stream.bound = std::move(bound);
+  auto engine = TRY(make_engine(stream.id, stream.stages, stream.bound));
+  stream.engine = std::move(engine);
   return {};
 }
 

@@ -49,7 +49,7 @@ class SourceBodies {
   // For a device with one body, before all else: reserves the slot of its stream, builds the
   // stream, and makes it known to the host. The error is that of a stage.
   void reserve_only();
-  [[nodiscard]] Result<> build_only();
+  Result<> build_only();
   void add_only();
 
   // When something is to be built: `now_ns` or later; kForever_ns: nothing until something comes.
@@ -90,7 +90,7 @@ class SourceBodies {
   [[nodiscard]] bool choose_slot(Stream& stream, const Stream* earlier);
   // The stream with its engine, or with the reason why a stage refuses it.
   [[nodiscard]] NewStream make(Stream& stream, const config::StreamConfig& config);
-  [[nodiscard]] Result<> make_engine_of(NewStream& stream) const;
+  Result<> make_engine_of(NewStream& stream) const;
   [[nodiscard]] pipeline::ReadBody read_body(const Stream& stream) const;
   void forget(const Stream& stream);
 

@@ -38,7 +38,7 @@ Result<> SourceBuilder::open() {
   for (SourceBodies* const source : only_) source->reserve_only();
   for (const std::size_t i : building_order(only_configs_)) {
     if (auto built = only_[i]->build_only(); !built) {
-      return of_stream(only_configs_[i]->name, built.error());
+      return in_stream(only_configs_[i]->name, built.error());
     }
   }
   return {};

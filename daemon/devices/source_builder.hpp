@@ -27,7 +27,7 @@ class SourceBuilder {
 
   // Builds the streams of devices with one body, those that others have as partners first. They
   // have the first slots, in the order of the sources. The error names the stream.
-  [[nodiscard]] Result<> open();
+  Result<> open();
   // Makes these streams known to the host, in the order of the sources. Call once, before the
   // reader runs.
   void begin();

@@ -21,9 +21,8 @@ Result<std::vector<config::StageConfig>> stages_of(const config::StreamConfig& c
     if (named != config.stages.end()) {
       stages.push_back(*named);
     } else if (!off && type->is_default != nullptr && type->is_default(*skeleton)) {
-      auto parameters = complete_parameters(type->parameters, {});
-      if (!parameters) return std::unexpected(parameters.error());
-      stages.push_back({.type = type, .parameters = std::move(*parameters)});
+      auto parameters = TRY(complete_parameters(type->parameters, {}));
+      stages.push_back({.type = type, .parameters = std::move(parameters)});
     }
   }
   return stages;
@@ -50,31 +49,23 @@ Result<LoadedStages> load_stages(const config::StreamConfig& config,
   LoadedStages loaded;
   loaded.settings = {
       .publish_raw = config.publish_raw, .stale_after_s = config.stale_after_s, .rate_hz = rate_hz};
-  auto stages = stages_of(config, skeleton.get());
-  if (!stages) return std::unexpected(stages.error());
+  auto stages = TRY(stages_of(config, skeleton.get()));
   loaded.skeleton = std::move(skeleton);
-  for (config::StageConfig& stage : *stages) {
+  for (config::StageConfig& stage : stages) {
     if (stage.type->read_files != nullptr) {
-      if (auto read = stage.type->read_files(stage.parameters); !read) {
-        return std::unexpected(read.error());
-      }
+      TRY(stage.type->read_files(stage.parameters));
     }
     loaded.settings.stages.push_back({.type = stage.type,
                                       .parameters = std::move(stage.parameters),
                                       .model_name = stage.model.filename().string()});
     ModelBytes& file = loaded.model_files.emplace_back();
     if (stage.model.empty()) continue;
-    auto bytes = files.load(stage.model);
-    if (!bytes) return std::unexpected(bytes.error());
-    file = std::move(*bytes);
+    file = TRY(files.load(stage.model));
   }
   if (kept != nullptr) kept->apply(config.name, loaded);
-  if (auto found = pipeline::find_partners(loaded.settings, partners); !found) {
-    return std::unexpected(found.error());
-  }
-  auto published = pipeline::published_skeleton(loaded.settings, loaded.skeleton);
-  if (!published) return std::unexpected(published.error());
-  loaded.published = std::move(*published);
+  TRY(pipeline::find_partners(loaded.settings, partners));
+  auto published = TRY(pipeline::published_skeleton(loaded.settings, loaded.skeleton));
+  loaded.published = std::move(published);
   return loaded;
 }
 
@@ -133,22 +124,18 @@ Result<BoundStages> bind_stages(LoadedStages& stages) {
     std::span<const std::byte> file;
     if (stages.skeleton && stages.model_files[i]) {
       file = std::as_bytes(std::span(*stages.model_files[i]));
-      const auto context = pipeline::stage_context(stages.settings, i, stages.skeleton);
-      if (!context) return std::unexpected(context.error());
-      auto ready = stage.type->bind_model(file, *context, stage.model_name);
-      if (!ready) return std::unexpected(ready.error());
-      model = std::move(*ready);
+      const auto context = TRY(pipeline::stage_context(stages.settings, i, stages.skeleton));
+      model = TRY(stage.type->bind_model(file, context, stage.model_name));
       stage.model_words = model->words;
       if (stages.with_set_model.contains(stage.type)) forget_texts(*model, stage);
     }
     if (stage.type->first_command == nullptr) continue;
-    const auto first = stage.type->first_command(stage.parameters, model.get(), file);
-    if (!first) return std::unexpected(first.error());
-    if (!*first) continue;
+    const auto first = TRY(stage.type->first_command(stage.parameters, model.get(), file));
+    if (!first) continue;
     bound.first_commands.push_back({.change = {.kind = pipeline::StageChange::Kind::kCommand,
-                                               .index = static_cast<std::uint8_t>((*first)->index),
+                                               .index = static_cast<std::uint8_t>(first->index),
                                                .type = stage.type},
-                                    .command = (*first)->command});
+                                    .command = first->command});
   }
   return bound;
 }

@@ -34,11 +34,10 @@ class KeptSettings;
 // Chooses the stages and reads their model files. `rate_hz` is the stream's nominal rate, 0 when
 // unknown; `partners` are the streams that stages may name and that are there; `kept` replaces what
 // the config says, null: nothing.
-[[nodiscard]] Result<LoadedStages> load_stages(const config::StreamConfig& config,
-                                               std::shared_ptr<const Skeleton> skeleton,
-                                               double rate_hz, ModelFiles& files,
-                                               const pipeline::PartnerStreams& partners,
-                                               const KeptSettings* kept = nullptr);
+Result<LoadedStages> load_stages(const config::StreamConfig& config,
+                                 std::shared_ptr<const Skeleton> skeleton, double rate_hz,
+                                 ModelFiles& files, const pipeline::PartnerStreams& partners,
+                                 const KeptSettings* kept = nullptr);
 // The stages that a stream of this config may have, before its skeleton is known: those that only
 // some skeletons have are among them.
 [[nodiscard]] pipeline::StreamSettings possible_settings(const config::StreamConfig& config);
@@ -62,11 +61,10 @@ struct BoundStages {
   [[nodiscard]] std::vector<const StageModel*> borrowed() const;
 };
 // Checks and binds the models, and fills in the words that they know.
-[[nodiscard]] Result<BoundStages> bind_stages(LoadedStages& stages);
+Result<BoundStages> bind_stages(LoadedStages& stages);
 
 // The engine of the stream with this id, untimed. `bound` outlives it.
-[[nodiscard]] Result<pipeline::EngineOptions> make_engine(std::uint32_t stream,
-                                                          const LoadedStages& stages,
-                                                          const BoundStages& bound);
+Result<pipeline::EngineOptions> make_engine(std::uint32_t stream, const LoadedStages& stages,
+                                            const BoundStages& bound);
 
 }  // namespace posed::devices

@@ -6,7 +6,7 @@
 namespace posed::http {
 namespace {
 
-constexpr std::size_t kLongestHost = 262;  // a DNS name and a port
+constexpr std::size_t kMaxHostBytes = 262;  // a DNS name and a port
 
 }  // namespace
 
@@ -15,7 +15,7 @@ bool is_host(std::string_view text) {
     return (sign >= 'a' && sign <= 'z') || (sign >= 'A' && sign <= 'Z') ||
            (sign >= '0' && sign <= '9') || std::string_view("-.:[]").contains(sign);
   };
-  return !text.empty() && text.size() <= kLongestHost && std::ranges::all_of(text, fits);
+  return !text.empty() && text.size() <= kMaxHostBytes && std::ranges::all_of(text, fits);
 }
 
 bool is_own_host(std::string_view host, const std::vector<std::string>& hosts) {

@@ -30,9 +30,8 @@ class Server {
     std::string advice{};                 // the end of the error: what to do if no port is free
   };
   // `io` and `connections` outlive the server.
-  [[nodiscard]] static Result<std::unique_ptr<Server>> open(boost::asio::io_context& io,
-                                                            Connections& connections,
-                                                            const Options& options);
+  static Result<std::unique_ptr<Server>> open(boost::asio::io_context& io, Connections& connections,
+                                              const Options& options);
 
   [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
   // "http://127.0.0.1:5580/". A server that listens on all addresses gives the loopback address.

@@ -19,7 +19,7 @@
 namespace posed::metrics {
 namespace {
 
-constexpr std::chrono::nanoseconds kBeatEvery{system::kLongestSleep_ns / 2};
+constexpr std::chrono::nanoseconds kBeatEvery{system::kMaxSleep_ns / 2};
 
 boost::asio::ip::tcp::endpoint endpoint_of(const drivers::Address& address) {
   boost::asio::ip::tcp::endpoint endpoint;
@@ -47,14 +47,11 @@ class MetricsServer::Parts {
   Parts& operator=(const Parts&) = delete;
 
   Result<> start(const std::string& listen) {
-    const auto address = drivers::parse_endpoint(listen);
-    if (!address) return std::unexpected(address.error());
-    auto server = http::Server::open(
+    const auto address = TRY(drivers::parse_endpoint(listen));
+    server_ = TRY(http::Server::open(
         io_, connections_,
-        {.at = endpoint_of(*address),
-         .advice = "end the program that has this port, or choose another in [metrics]"});
-    if (!server) return std::unexpected(server.error());
-    server_ = std::move(*server);
+        {.at = endpoint_of(address),
+         .advice = "end the program that has this port, or choose another in [metrics]"}));
     service_.set_hosts(server_->hosts());
     url_ = server_->url() + "metrics";
     spdlog::info("metrics: {}", url_);
@@ -90,7 +87,7 @@ class MetricsServer::Parts {
 Result<std::unique_ptr<MetricsServer>> MetricsServer::start(const std::string& listen,
                                                             std::function<Figures()> collect) {
   auto parts = std::make_unique<Parts>(std::move(collect));
-  if (auto started = parts->start(listen); !started) return std::unexpected(started.error());
+  TRY(parts->start(listen));
   return std::unique_ptr<MetricsServer>(new MetricsServer(std::move(parts)));
 }
 

@@ -19,8 +19,8 @@ class MetricsServer {
   // Starts the thread, which calls `collect` at most ten times a second. `listen` is an address and
   // a port; for port 0 the system chooses one. Everything that `collect` uses must outlive the
   // server.
-  [[nodiscard]] static Result<std::unique_ptr<MetricsServer>> start(
-      const std::string& listen, std::function<Figures()> collect);
+  static Result<std::unique_ptr<MetricsServer>> start(const std::string& listen,
+                                                      std::function<Figures()> collect);
   ~MetricsServer();  // joins the thread
   MetricsServer(const MetricsServer&) = delete;
   MetricsServer& operator=(const MetricsServer&) = delete;

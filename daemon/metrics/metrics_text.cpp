@@ -118,7 +118,7 @@ void write_devices(const v1::Stats& stats, TextFormat& text) {
   text.counter("posed_packets_total", "Packets of the device, by what became of them.");
   for_each_device(stats, [&](const std::string& name, const auto& device) {
     for (int i = 0; i < device.outcome_size() && i < kOutcomes; ++i) {
-      text.sample({{"device", name}, {"outcome", kOutcomeNames[static_cast<std::size_t>(i)]}},
+      text.sample({{"device", name}, {"outcome", kOutcomeNames[i]}},
                   std::uint64_t{device.outcome(i)});
     }
   });

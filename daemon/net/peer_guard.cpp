@@ -67,29 +67,22 @@ Result<std::unique_ptr<PeerGuard>> PeerGuard::open(void* context, void* socket,
       0) {
     return fail(std::string("cannot watch connections: ") + zmq_strerror(zmq_errno()));
   }
-  auto monitor = open_socket(context, ZMQ_PAIR);
-  if (!monitor) return std::unexpected(monitor.error());
+  auto monitor = TRY(open_socket(context, ZMQ_PAIR));
   // No limit: otherwise libzmq's own thread would wait here until this guard reads.
-  if (auto set = set_option(monitor->get(), ZMQ_RCVHWM, 0); !set) {
-    return std::unexpected(set.error());
-  }
-  if (auto done = connect_socket(monitor->get(), endpoint); !done) {
-    return std::unexpected(done.error());
-  }
+  TRY(set_option(monitor.get(), ZMQ_RCVHWM, 0));
+  TRY(connect_socket(monitor.get(), endpoint));
   int fd = -1;
   std::size_t size = sizeof fd;
-  if (zmq_getsockopt(monitor->get(), ZMQ_FD, &fd, &size) != 0) {
+  if (zmq_getsockopt(monitor.get(), ZMQ_FD, &fd, &size) != 0) {
     return fail("ZeroMQ names no descriptor to wait for");
   }
-  auto wake = system::EventFd::open();
-  if (!wake) return std::unexpected(wake.error());
-  auto poller = system::Poller::open();
-  if (!poller) return std::unexpected(poller.error());
-  for (const Result<>& added : {(*poller)->add(**wake), (*poller)->add(fd, 0)}) {
+  auto wake = TRY(system::EventFd::open());
+  auto poller = TRY(system::Poller::open());
+  for (const Result<>& added : {poller->add(*wake), poller->add(fd, 0)}) {
     if (!added) return std::unexpected(added.error());
   }
   return std::unique_ptr<PeerGuard>(
-      new PeerGuard(socket, std::move(*monitor), std::move(*wake), std::move(*poller), limits));
+      new PeerGuard(socket, std::move(monitor), std::move(wake), std::move(poller), limits));
 }
 
 PeerGuard::PeerGuard(void* socket, Socket monitor, std::unique_ptr<system::EventFd> wake,
@@ -126,7 +119,7 @@ void PeerGuard::serve() {
 }
 
 std::int64_t PeerGuard::turn(std::int64_t now_ns) {
-  hear_monitor();
+  receive_monitor();
   if (peers_.empty()) return system::kForever_ns;
   if (is_inspection_due(now_ns)) {
     inspected_ns_ = now_ns;
@@ -150,7 +143,7 @@ bool PeerGuard::is_inspection_due(std::int64_t now_ns) {
 
 // A monitor event has two parts: the event number (16 bits) with the descriptor (32 bits), then the
 // endpoint.
-void PeerGuard::hear_monitor() {
+void PeerGuard::receive_monitor() {
   Message part;
   while (part.receive(monitor_.get())) {
     std::uint16_t event = 0;
@@ -174,20 +167,20 @@ void PeerGuard::admit(int fd) {
 }
 
 void PeerGuard::inspect_all() {
-  std::uint64_t unheard = 0;
+  std::uint64_t unfinished = 0;
   std::uint64_t most = 0;
   int most_fd = -1;
   for (const auto& [fd, peer] : peers_) {
     const std::uint64_t bytes = received_bytes(fd);
-    const std::uint64_t since = bytes - std::min(bytes, peer.heard);
+    const std::uint64_t since = bytes - std::min(bytes, peer.received);
     if (peer.is_cut) continue;
-    unheard += since;
+    unfinished += since;
     if (since > most) {
       most = since;
       most_fd = fd;
     }
   }
-  if (most <= limits_.max_unheard && unheard <= limits_.max_unheard_of_all) return;
+  if (most <= limits_.max_unfinished && unfinished <= limits_.max_unfinished_of_all) return;
   cut_offender(most_fd, "sent much and ended no message");
   malloc_trim(0);
   resident_before_ = 0;  // others may be flooding, too: check all again at the next tick
@@ -196,17 +189,17 @@ void PeerGuard::inspect_all() {
 bool PeerGuard::knows(int fd) {
   const std::scoped_lock lock(mutex_);
   if (fd < 0 || peers_.contains(fd)) return fd >= 0;
-  hear_monitor();  // its connection event may still be waiting
+  receive_monitor();  // its connection event may still be waiting
   wake_->notify();
   return peers_.contains(fd);
 }
 
-void PeerGuard::heard(int fd, std::string_view user) {
+void PeerGuard::received(int fd, std::string_view user) {
   const std::scoped_lock lock(mutex_);
   const auto found = peers_.find(fd);
   if (found == peers_.end()) return;
   Peer& peer = found->second;
-  peer.heard = received_bytes(fd);
+  peer.received = received_bytes(fd);
   if (!peer.spoke) peer.user = user;
   peer.spoke = true;
 }
@@ -249,7 +242,7 @@ void PeerGuard::cut_now(int fd, const char* why) {
 
 void PeerGuard::cut_unless(const std::function<bool(std::string_view user)>& allowed) {
   const std::scoped_lock lock(mutex_);
-  hear_monitor();
+  receive_monitor();
   for (const auto& [fd, peer] : peers_) {
     if (!peer.spoke || !allowed(peer.user)) {
       cut_now(fd, "has lost its right, or has not identified itself");
@@ -277,10 +270,10 @@ PeerShares peer_shares() {
   rlimit limit{};
   getrlimit(RLIMIT_NOFILE, &limit);
   std::error_code none;
-  const auto open = static_cast<std::size_t>(
-      std::distance(std::filesystem::directory_iterator("/proc/self/fd", none), {}));
+  const std::size_t open =
+      std::distance(std::filesystem::directory_iterator("/proc/self/fd", none), {});
   const std::size_t used = open + kReservedFiles;
-  const auto files = static_cast<std::size_t>(limit.rlim_cur);
+  const std::size_t files = limit.rlim_cur;
   const std::size_t free = files > used ? files - used : 0;
   return {.publish = std::clamp(free * 3 / 4, kMinPeers, kMaxSubscribers),
           .control = std::clamp(free / 4, kMinPeers, kMaxControllers)};

@@ -35,8 +35,7 @@ namespace posed::net {
 // How much memory a peer may make libzmq use: the size of one part in bytes (handshakes included),
 // the number of whole messages that wait to be read, and the kernel's buffer behind them. Call
 // before bind.
-[[nodiscard]] Result<> set_receive_limits(void* socket, std::int64_t part_bytes, int messages,
-                                          int buffer_bytes);
+Result<> set_receive_limits(void* socket, std::int64_t part_bytes, int messages, int buffer_bytes);
 // Returns the descriptor of the connection through which `message` came; -1 if there is none.
 [[nodiscard]] int source_of(const Message& message);
 
@@ -47,8 +46,8 @@ struct PeerLimits {
   std::size_t max_peers = 0;  // further connections are cut at once
   // Limits of the bytes that have not yet become a whole message: of one peer, and of all peers
   // together.
-  std::uint64_t max_unheard = 0;
-  std::uint64_t max_unheard_of_all = 0;
+  std::uint64_t max_unfinished = 0;
+  std::uint64_t max_unfinished_of_all = 0;
   ZapAuthenticator* authenticator = nullptr;  // slowed down when a peer is cut for what it sent
 };
 
@@ -56,14 +55,14 @@ class PeerGuard {
  public:
   // Call before `socket` is bound, so that no connection is missed. Destroy the guard before the
   // socket.
-  [[nodiscard]] static Result<std::unique_ptr<PeerGuard>> open(void* context, void* socket,
-                                                               const PeerLimits& limits);
+  static Result<std::unique_ptr<PeerGuard>> open(void* context, void* socket,
+                                                 const PeerLimits& limits);
   ~PeerGuard();
   PeerGuard(const PeerGuard&) = delete;
   PeerGuard& operator=(const PeerGuard&) = delete;
 
   // A whole message came through the connection `fd`, from the peer with this User-Id.
-  void heard(int fd, std::string_view user);
+  void received(int fd, std::string_view user);
   // Closes the connection; `why` completes the sentence "a connection was cut: it ...".
   void cut(int fd, const char* why);
   // Closes every connection whose User-Id is no longer allowed, and those that have not sent a
@@ -80,7 +79,7 @@ class PeerGuard {
  private:
   struct Peer {
     std::uint64_t cookie = 0;  // the kernel's id of this connection, because descriptors are reused
-    std::uint64_t heard = 0;   // bytes received when its last whole message was read
+    std::uint64_t received = 0;  // bytes received when its last whole message was read
     std::string user;
     bool spoke = false;
     bool is_cut = false;
@@ -90,7 +89,7 @@ class PeerGuard {
   void serve();
   // Each function below must be called with mutex_ held.
   [[nodiscard]] std::int64_t turn(std::int64_t now_ns);  // returns when the next turn is due
-  void hear_monitor();
+  void receive_monitor();
   void admit(int fd);
   [[nodiscard]] bool is_inspection_due(std::int64_t now_ns);
   void inspect_all();

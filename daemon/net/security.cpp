@@ -54,7 +54,7 @@ Result<> secure_server(void* socket, Domain domain, const std::string& secret_z8
     if (!set) return set;
   }
   if (secret_z85.empty()) return {};
-  if (auto set = set_option(socket, ZMQ_CURVE_SERVER, 1); !set) return set;
+  TRY(set_option(socket, ZMQ_CURVE_SERVER, 1));
   return set_option(socket, ZMQ_CURVE_SECRETKEY, secret_z85);
 }
 

@@ -40,7 +40,7 @@ class AccessList {
 
 // Makes `socket` a CURVE server of this domain. Call before bind. A ZapAuthenticator must be
 // running in the same context, or every client is refused.
-[[nodiscard]] Result<> secure_server(void* socket, Domain domain, const std::string& secret_z85);
+Result<> secure_server(void* socket, Domain domain, const std::string& secret_z85);
 
 // Whether an endpoint that binds there can be reached from this machine only: tcp to 127.*, ::1 or
 // localhost, ipc and inproc.

@@ -15,11 +15,11 @@ constexpr long kPause_ms = 50;
 constexpr std::size_t kMaxRequestParts = 16;  // parts; RFC 27 needs 7 for CURVE
 
 // All parts of one message; parts beyond kMaxRequestParts are dropped.
-std::vector<std::string> read_parts(void* door, Message& part) {
+std::vector<std::string> read_parts(void* handler, Message& part) {
   std::vector<std::string> parts;
   do {
     if (parts.size() < kMaxRequestParts) parts.emplace_back(part.text());
-  } while (part.more() && part.receive(door, 0));
+  } while (part.more() && part.receive(handler, 0));
   return parts;
 }
 
@@ -27,27 +27,25 @@ std::vector<std::string> read_parts(void* door, Message& part) {
 
 Result<std::unique_ptr<ZapAuthenticator>> ZapAuthenticator::start(void* context,
                                                                   std::optional<AccessList> list) {
-  auto door = open_socket(context, ZMQ_REP);
+  auto handler = open_socket(context, ZMQ_REP);
   auto stop_in = open_socket(context, ZMQ_PAIR);
   auto stop_out = open_socket(context, ZMQ_PAIR);
-  for (const auto* socket : {&door, &stop_in, &stop_out}) {
+  for (const auto* socket : {&handler, &stop_in, &stop_out}) {
     if (!*socket) return std::unexpected(socket->error());
   }
   const std::string bell = "inproc://posed.authenticator";
-  if (auto done = bind_socket(door->get(), kZapEndpoint); !done) {
+  if (auto done = bind_socket(handler->get(), kZapEndpoint); !done) {
     return fail("this ZeroMQ context has an authenticator already");
   }
-  if (auto done = bind_socket(stop_in->get(), bell); !done) return std::unexpected(done.error());
-  if (auto done = connect_socket(stop_out->get(), bell); !done) {
-    return std::unexpected(done.error());
-  }
+  TRY(bind_socket(stop_in->get(), bell));
+  TRY(connect_socket(stop_out->get(), bell));
   return std::unique_ptr<ZapAuthenticator>(new ZapAuthenticator(
-      std::move(*door), std::move(*stop_in), std::move(*stop_out), std::move(list)));
+      std::move(*handler), std::move(*stop_in), std::move(*stop_out), std::move(list)));
 }
 
-ZapAuthenticator::ZapAuthenticator(Socket door, Socket stop_in, Socket stop_out,
+ZapAuthenticator::ZapAuthenticator(Socket handler, Socket stop_in, Socket stop_out,
                                    std::optional<AccessList> list)
-    : door_(std::move(door)),
+    : handler_(std::move(handler)),
       stop_in_(std::move(stop_in)),
       stop_out_(std::move(stop_out)),
       list_(std::move(list)),
@@ -73,7 +71,7 @@ bool ZapAuthenticator::allows(std::string_view user_id, Domain domain) const {
 
 void ZapAuthenticator::serve() {
   std::array<zmq_pollitem_t, 2> wait{
-      {{door_.get(), 0, ZMQ_POLLIN, 0}, {stop_in_.get(), 0, ZMQ_POLLIN, 0}}};
+      {{handler_.get(), 0, ZMQ_POLLIN, 0}, {stop_in_.get(), 0, ZMQ_POLLIN, 0}}};
   for (;;) {
     if (zmq_poll(wait.data(), 2, -1) < 0) {
       if (zmq_errno() == EINTR) continue;
@@ -81,7 +79,7 @@ void ZapAuthenticator::serve() {
     }
     if ((wait[1].revents & ZMQ_POLLIN) != 0) return;
     Message part;
-    if ((wait[0].revents & ZMQ_POLLIN) != 0 && part.receive(door_.get())) {
+    if ((wait[0].revents & ZMQ_POLLIN) != 0 && part.receive(handler_.get())) {
       answer(part);
       pause();
     }
@@ -107,7 +105,7 @@ bool ZapAuthenticator::welcomes(const ZapRequest& request) const {
 }
 
 void ZapAuthenticator::answer(Message& part) {
-  const auto request = read_zap_request(read_parts(door_.get(), part));
+  const auto request = read_zap_request(read_parts(handler_.get(), part));
   const bool welcome = request && welcomes(*request);
   if (!welcome) refused_.fetch_add(1);
   // version, request id, status, text, user id, metadata
@@ -118,7 +116,7 @@ void ZapAuthenticator::answer(Message& part) {
                                               welcome ? std::string_view(request->key_z85) : "",
                                               ""};
   for (std::size_t i = 0; i < reply.size(); ++i) {
-    (void)send_part(door_.get(), reply[i], i + 1 < reply.size());
+    (void)send_part(handler_.get(), reply[i], i + 1 < reply.size());
   }
 }
 

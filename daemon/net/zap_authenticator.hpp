@@ -23,8 +23,8 @@ class ZapAuthenticator {
   // The handler's socket is bound before this returns. Start the authenticator before the first
   // socket of the context is made and destroy it after the last one is closed; otherwise a
   // handshake finds no handler and is refused.
-  [[nodiscard]] static Result<std::unique_ptr<ZapAuthenticator>> start(
-      void* context, std::optional<AccessList> list);
+  static Result<std::unique_ptr<ZapAuthenticator>> start(void* context,
+                                                         std::optional<AccessList> list);
   ~ZapAuthenticator();
   ZapAuthenticator(const ZapAuthenticator&) = delete;
   ZapAuthenticator& operator=(const ZapAuthenticator&) = delete;
@@ -50,13 +50,13 @@ class ZapAuthenticator {
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_.load(); }
 
  private:
-  ZapAuthenticator(Socket door, Socket stop_in, Socket stop_out, std::optional<AccessList> list);
+  ZapAuthenticator(Socket handler, Socket stop_in, Socket stop_out, std::optional<AccessList> list);
   void serve();
   void pause();
   void answer(Message& version);
   [[nodiscard]] bool welcomes(const ZapRequest& request) const;
 
-  Socket door_;      // REP on inproc://zeromq.zap.01, used by the thread
+  Socket handler_;   // REP on inproc://zeromq.zap.01, used by the thread
   Socket stop_in_;   // receives the stop message, used by the thread
   Socket stop_out_;  // sends the stop message
   mutable std::mutex mutex_;

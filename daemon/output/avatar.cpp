@@ -51,13 +51,11 @@ Result<> Avatar::set_skeleton(Part part, std::shared_ptr<const Skeleton> skeleto
   Source& source = sources_[index_of(part)];
   source = {};
   if (skeleton == nullptr) return {};
-  auto canonical = motion::canonical_skeleton(*skeleton, top_of(part));
-  if (!canonical) return std::unexpected(canonical.error());
+  auto canonical = TRY(motion::canonical_skeleton(*skeleton, top_of(part)));
   const std::string name = in_quotes(skeleton->name);
-  auto bound = motion::Retarget::bind(std::move(skeleton), *canonical);
-  if (!bound) return std::unexpected(bound.error());
-  for (std::size_t j = 0; j < (*canonical)->joints.size(); ++j) {
-    const Joint& joint = (*canonical)->joints[j];
+  auto bound = TRY(motion::Retarget::bind(std::move(skeleton), canonical));
+  for (std::size_t j = 0; j < canonical->joints.size(); ++j) {
+    const Joint& joint = canonical->joints[j];
     const auto bone = sent_bone(*joint.bone);
     if (!bone || !writes(part, *joint.bone)) continue;
     const Eigen::Vector3f offset_m = joint.offset_m.cast<float>();
@@ -68,7 +66,7 @@ Result<> Avatar::set_skeleton(Part part, std::shared_ptr<const Skeleton> skeleto
     return fail("skeleton " + name + " has no bones of a " +
                 (part == Part::kBody ? "hand" : std::string(words_for(part))));
   }
-  source.to_canonical = std::move(*bound);
+  source.to_canonical = std::move(bound);
   return {};
 }
 

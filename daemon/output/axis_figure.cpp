@@ -18,19 +18,15 @@ Result<AxisFigure> AxisFigure::make(std::shared_ptr<const Skeleton> skeleton,
                                     std::string_view name) {
   axis::AvatarEntry entry;
   entry.avatar = axis::make_avatar(0, name);
-  const auto average = axis::skeleton_of(entry, kOrder);
-  if (!average) return std::unexpected(average.error());
-  const auto to_average = motion::Retarget::bind(skeleton, *average);
-  if (!to_average) return std::unexpected(to_average.error());
-  const auto scale = static_cast<float>(1.0 / to_average->scale());
+  const auto average = TRY(axis::skeleton_of(entry, kOrder));
+  const auto to_average = TRY(motion::Retarget::bind(skeleton, average));
+  const auto scale = static_cast<float>(1.0 / to_average.scale());
   for (Vec3f& offset_cm : entry.offset_cm) {
     for (float& x_cm : offset_cm) x_cm *= scale;
   }
-  auto figure = axis::skeleton_of(entry, kOrder);
-  if (!figure) return std::unexpected(figure.error());
-  auto to_figure = motion::Retarget::bind(std::move(skeleton), std::move(*figure));
-  if (!to_figure) return std::unexpected(to_figure.error());
-  AxisFigure made(std::move(*to_figure), entry.offset_cm);
+  auto figure = TRY(axis::skeleton_of(entry, kOrder));
+  auto to_figure = TRY(motion::Retarget::bind(std::move(skeleton), std::move(figure)));
+  AxisFigure made(std::move(to_figure), entry.offset_cm);
   made.message_.avatar = entry.avatar;
   made.message_.content.displacement = true;
   return made;

@@ -24,8 +24,7 @@ class AxisFigure {
   // Makes a figure that has the legs of `skeleton`, so that its feet stand where the person's do,
   // and otherwise the proportions of an average person. Fails if the skeleton has no bone of a
   // person. Cold.
-  [[nodiscard]] static Result<AxisFigure> make(std::shared_ptr<const Skeleton> skeleton,
-                                               std::string_view name);
+  static Result<AxisFigure> make(std::shared_ptr<const Skeleton> skeleton, std::string_view name);
 
   // Returns a frame of the skeleton as "0 ann 0.000000 92.1... ||\n", valid until the next call. A
   // joint that was not measured keeps its rotation of the T-pose relative to its parent.

@@ -9,9 +9,8 @@ namespace posed::output {
 
 Result<std::unique_ptr<Output>> BvhOutput::open(const config::OutputConfig& config,
                                                 std::unique_ptr<system::EventFd> wake) {
-  auto clients = LineClients::open(config.listen, config.peers);
-  if (!clients) return std::unexpected(clients.error());
-  return std::make_unique<BvhOutput>(config, std::move(wake), std::move(*clients));
+  auto clients = TRY(LineClients::open(config.listen, config.peers));
+  return std::make_unique<BvhOutput>(config, std::move(wake), std::move(clients));
 }
 
 BvhOutput::BvhOutput(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake,
@@ -25,7 +24,7 @@ std::int64_t BvhOutput::turn(std::int64_t now_ns) {
   const Delivery& delivery = receive();
   update_stream(delivery.streams[index_of(Part::kBody)]);
   if (look_ns_ == kNoTime_ns || now_ns >= look_ns_) {
-    for (const std::string& news : clients_.look(now_ns)) tell(news);
+    for (const std::string& news : clients_.look(now_ns)) notify(news);
     look_ns_ = now_ns + LineClients::kLook_ns;
   }
   const Frame* newest = nullptr;
@@ -49,10 +48,11 @@ void BvhOutput::update_stream(const std::shared_ptr<const PartStream>& stream) {
   figure_.reset();
   if (stream == nullptr) return;
   if (stream->skeleton == nullptr)
-    return tell("stream " + in_quotes(stream->name) + " has no pose");
+    return notify("stream " + in_quotes(stream->name) + " has no pose");
   auto figure = AxisFigure::make(stream->skeleton, stream->name);
   if (!figure) {
-    return tell("stream " + in_quotes(stream->name) + " cannot be sent: " + figure.error().message);
+    return notify("stream " + in_quotes(stream->name) +
+                  " cannot be sent: " + figure.error().message);
   }
   figure_ = std::make_unique<AxisFigure>(std::move(*figure));
   if (header_) clients_.set_greeting(figure_->hierarchy());

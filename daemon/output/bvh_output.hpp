@@ -15,8 +15,8 @@ namespace posed::output {
 
 class BvhOutput final : public Output {
  public:
-  [[nodiscard]] static Result<std::unique_ptr<Output>> open(const config::OutputConfig& config,
-                                                            std::unique_ptr<system::EventFd> wake);
+  static Result<std::unique_ptr<Output>> open(const config::OutputConfig& config,
+                                              std::unique_ptr<system::EventFd> wake);
   BvhOutput(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake,
             LineClients clients);
 

@@ -12,8 +12,8 @@
 namespace posed::output {
 namespace {
 
-constexpr int kWaiting = 16;     // connections that the kernel keeps until they are let in
-constexpr int kMostAtOnce = 16;  // that are let in or refused in one look
+constexpr int kWaiting = 16;    // connections that the kernel keeps until they are let in
+constexpr int kMaxAtOnce = 16;  // that are let in or refused in one look
 // A few lines: what the kernel keeps for a client that does not read is old when it does.
 constexpr int kLineBuffer = 16 * 1024;  // bytes
 constexpr std::int64_t kPatience_ns = 2 * kNanosPerSecond;
@@ -28,15 +28,13 @@ bool has_closed(int fd) noexcept {
 }  // namespace
 
 Result<LineClients> LineClients::open(const std::string& listen, std::vector<std::string> peers) {
-  const auto address = drivers::listen_address(listen, peers, "the clients'");
-  if (!address) return std::unexpected(address.error());
-  const auto fd = drivers::listen_on(*address, listen, kWaiting);
-  if (!fd) return std::unexpected(fd.error());
+  const auto address = TRY(drivers::listen_address(listen, peers, "the clients'"));
+  const auto fd = TRY(drivers::listen_on(address, listen, kWaiting));
   LineClients clients;
-  clients.listener_ = *fd;
+  clients.listener_ = fd;
   clients.peers_ = std::move(peers);
   drivers::Address bound;
-  ::getsockname(*fd, bound.get(), &bound.size);
+  ::getsockname(fd, bound.get(), &bound.size);
   clients.endpoint_ = drivers::endpoint_text(bound);
   return clients;
 }
@@ -47,7 +45,7 @@ LineClients::LineClients(LineClients&& other) noexcept
       greeting_(std::move(other.greeting_)),
       peers_(std::move(other.peers_)),
       clients_(std::exchange(other.clients_, {})),
-      told_ns_(other.told_ns_) {}
+      reported_ns_(other.reported_ns_) {}
 
 LineClients::~LineClients() {
   for (const Client& client : clients_) ::close(client.fd);
@@ -67,7 +65,7 @@ bool LineClients::write(Client& client, std::string_view text) {
     client.gone = errno != EAGAIN && errno != EINTR;
     return false;
   }
-  client.rest = text.substr(static_cast<std::size_t>(sent));
+  client.rest = text.substr(sent);
   client.stuck_ns = kNoTime_ns;
   return true;
 }
@@ -100,22 +98,22 @@ SendOutcome LineClients::send(std::string_view line, std::int64_t now_ns) {
 void LineClients::refuse(const drivers::Address& peer, const std::string& why, std::int64_t now_ns,
                          std::vector<std::string>& news) {
   // Whoever may connect may do so all the time.
-  if (told_ns_ != kNoTime_ns && now_ns < told_ns_ + kNanosPerSecond) return;
-  told_ns_ = now_ns;
+  if (reported_ns_ != kNoTime_ns && now_ns < reported_ns_ + kNanosPerSecond) return;
+  reported_ns_ = now_ns;
   news.push_back(drivers::host_text(peer) + " was refused: " + why);
 }
 
 void LineClients::let_in(std::int64_t now_ns, std::vector<std::string>& news) {
-  for (int i = 0; i < kMostAtOnce; ++i) {
+  for (int i = 0; i < kMaxAtOnce; ++i) {
     drivers::Address peer;
     const int fd = ::accept4(listener_, peer.get(), &peer.size, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (fd < 0) return;  // also without a descriptor: then it waits
     if (!drivers::may_connect(peer, peers_)) {
       ::close(fd);
       refuse(peer, "it is not among the peers", now_ns, news);
-    } else if (clients_.size() == kMostClients) {
+    } else if (clients_.size() == kMaxClients) {
       ::close(fd);
-      refuse(peer, "there are " + std::to_string(kMostClients) + " clients, the most there may be",
+      refuse(peer, "there are " + std::to_string(kMaxClients) + " clients, the most there may be",
              now_ns, news);
     } else {
       drivers::keep_alive(fd);

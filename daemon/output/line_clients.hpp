@@ -18,12 +18,11 @@ namespace posed::output {
 // One thread. No call waits.
 class LineClients {
  public:
-  static constexpr std::size_t kMostClients = 16;
+  static constexpr std::size_t kMaxClients = 16;
 
   // Listens on an address such as "127.0.0.1:7002"; for port 0 the system chooses one. Beyond
   // loopback `peers` must name the addresses that may connect. Cold.
-  [[nodiscard]] static Result<LineClients> open(const std::string& listen,
-                                                std::vector<std::string> peers);
+  static Result<LineClients> open(const std::string& listen, std::vector<std::string> peers);
   ~LineClients();
   LineClients(LineClients&& other) noexcept;
   LineClients& operator=(LineClients&&) = delete;
@@ -68,7 +67,7 @@ class LineClients {
   std::string endpoint_, greeting_;
   std::vector<std::string> peers_;
   std::vector<Client> clients_;
-  std::int64_t told_ns_ = kNoTime_ns;  // when a refusal was last told
+  std::int64_t reported_ns_ = kNoTime_ns;  // when a refusal was last told
 };
 
 }  // namespace posed::output

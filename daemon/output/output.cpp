@@ -35,21 +35,20 @@ void Output::count(const SendOutcome& outcome) noexcept {
   failures_ += outcome.failed;
 }
 
-void Output::tell(const std::string& text) const {
+void Output::notify(const std::string& text) const {
   std::optional<std::uint32_t> concerned;
   for (const auto& stream : streams()) {
     if (stream != nullptr && !concerned) concerned = stream->id;
   }
   const std::string sentence = "output " + name_ + ": " + text;
-  if (tell_) return tell_(concerned, sentence);
+  if (notify_) return notify_(concerned, sentence);
   spdlog::warn("{}", sentence);
 }
 
 Result<std::unique_ptr<Output>> open_output(const config::OutputConfig& config) {
-  auto wake = system::EventFd::open();
-  if (!wake) return std::unexpected(wake.error());
-  auto opened = config.kind == config::OutputKind::kBvh ? BvhOutput::open(config, std::move(*wake))
-                                                        : VmcOutput::open(config, std::move(*wake));
+  auto wake = TRY(system::EventFd::open());
+  auto opened = config.kind == config::OutputKind::kBvh ? BvhOutput::open(config, std::move(wake))
+                                                        : VmcOutput::open(config, std::move(wake));
   if (!opened) return fail("output " + config.name + ": " + opened.error().message);
   return opened;
 }

@@ -21,7 +21,7 @@
 namespace posed::output {
 
 // Tells people something: beside a stream that it concerns, if one is there.
-using Tell = std::function<void(std::optional<std::uint32_t> stream, const std::string& text)>;
+using Notify = std::function<void(std::optional<std::uint32_t> stream, const std::string& text)>;
 
 class Output : public publish::FrameOutput {
  public:
@@ -29,7 +29,7 @@ class Output : public publish::FrameOutput {
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   // Call it before the first turn.
-  void set_tell(Tell tell) { tell_ = std::move(tell); }
+  void set_notify(Notify notify) { notify_ = std::move(notify); }
 
   // The output's thread calls it. It does everything that is due at `now_ns` and never waits.
   // Returns the latest time of the next call; call it earlier if wake() is notified.
@@ -51,7 +51,7 @@ class Output : public publish::FrameOutput {
   [[nodiscard]] const Delivery& receive();
   // The streams as of the last receive().
   [[nodiscard]] const PartStreams& streams() const noexcept { return delivery_.streams; }
-  void tell(const std::string& text) const;
+  void notify(const std::string& text) const;
   // These two set the values that fill() reports.
   void count(const SendOutcome& outcome) noexcept;
   void set_receivers(std::size_t count) noexcept {
@@ -65,10 +65,10 @@ class Output : public publish::FrameOutput {
   Delivery delivery_;
   std::atomic<std::uint64_t> sent_{0}, dropped_{0}, failures_{0};
   std::atomic<std::uint32_t> receivers_now_{0};
-  Tell tell_;
+  Notify notify_;
 };
 
 // Opens the sockets of an output. Errors name it. Cold.
-[[nodiscard]] Result<std::unique_ptr<Output>> open_output(const config::OutputConfig& config);
+Result<std::unique_ptr<Output>> open_output(const config::OutputConfig& config);
 
 }  // namespace posed::output

@@ -34,14 +34,12 @@ std::string why(int error) {
 Result<UdpReceivers> UdpReceivers::open(const std::vector<std::string>& endpoints) {
   UdpReceivers receivers;
   for (const std::string& endpoint : endpoints) {
-    const auto address = drivers::parse_endpoint(endpoint);
-    if (!address) return std::unexpected(address.error());
-    const auto fd = open_socket(*address);
-    if (!fd) return std::unexpected(fd.error());
+    const auto address = TRY(drivers::parse_endpoint(endpoint));
+    const auto fd = TRY(open_socket(address));
     Receiver& receiver = receivers.receivers_.emplace_back();
     receiver.endpoint = endpoint;
-    receiver.address = *address;
-    receiver.fd = *fd;
+    receiver.address = address;
+    receiver.fd = fd;
     connect(receiver);
   }
   return receivers;
@@ -109,12 +107,12 @@ SendOutcome UdpReceivers::send(std::span<const std::byte> datagram, std::int64_t
 std::vector<std::string> UdpReceivers::drain_news(std::int64_t now_ns) {
   std::vector<std::string> news;
   for (Receiver& receiver : receivers_) {
-    if (receiver.failing && !receiver.told) {
-      receiver.told = true;
+    if (receiver.failing && !receiver.reported) {
+      receiver.reported = true;
       news.push_back("sending to " + receiver.endpoint + " fails: " + why(receiver.error));
     } else if (receiver.failing && receiver.good_ns != kNoTime_ns &&
                now_ns >= receiver.good_ns + kGood_ns) {
-      receiver.failing = receiver.told = false;
+      receiver.failing = receiver.reported = false;
       news.push_back("sending to " + receiver.endpoint + " works again");
     }
   }

@@ -21,7 +21,7 @@ class UdpReceivers {
  public:
   // Takes addresses such as "127.0.0.1:39539", numbers only. Fails if one is malformed or if no
   // socket can be opened; an address that cannot be reached now is tried again once a second. Cold.
-  [[nodiscard]] static Result<UdpReceivers> open(const std::vector<std::string>& endpoints);
+  static Result<UdpReceivers> open(const std::vector<std::string>& endpoints);
   ~UdpReceivers();
   UdpReceivers(UdpReceivers&& other) noexcept : receivers_(std::move(other.receivers_)) {}
   UdpReceivers& operator=(UdpReceivers&&) = delete;
@@ -44,10 +44,10 @@ class UdpReceivers {
     drivers::Address address;
     int fd = -1;
     bool connected = false;
-    std::int64_t retry_ns = kNoTime_ns;  // when to connect again
-    int error = 0;                       // the last one
-    bool failing = false, told = false;  // told: that it is
-    std::int64_t good_ns = kNoTime_ns;   // when it took a datagram again; kNoTime_ns: not since
+    std::int64_t retry_ns = kNoTime_ns;      // when to connect again
+    int error = 0;                           // the last one
+    bool failing = false, reported = false;  // reported: that it is
+    std::int64_t good_ns = kNoTime_ns;       // when it took a datagram again; kNoTime_ns: not since
   };
   UdpReceivers() = default;
   static void connect(Receiver& receiver) noexcept;

@@ -17,9 +17,8 @@ constexpr std::int64_t kLeads_ns = kNanosPerSecond / 4;
 
 Result<std::unique_ptr<Output>> VmcOutput::open(const config::OutputConfig& config,
                                                 std::unique_ptr<system::EventFd> wake) {
-  auto receivers = UdpReceivers::open(config.to);
-  if (!receivers) return std::unexpected(receivers.error());
-  return std::make_unique<VmcOutput>(config, std::move(wake), std::move(*receivers));
+  auto receivers = TRY(UdpReceivers::open(config.to));
+  return std::make_unique<VmcOutput>(config, std::move(wake), std::move(receivers));
 }
 
 VmcOutput::VmcOutput(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake,
@@ -47,7 +46,7 @@ std::int64_t VmcOutput::turn(std::int64_t now_ns) {
     if (!limit_.limits()) send(frame, now_ns);
   });
   if (limit_.limits() && newest != nullptr && limit_.admit(now_ns)) send(*newest, now_ns);
-  for (const std::string& news : receivers_.drain_news(now_ns)) tell(news);
+  for (const std::string& news : receivers_.drain_news(now_ns)) notify(news);
   return system::kForever_ns;
 }
 
@@ -59,15 +58,15 @@ void VmcOutput::update_streams(const PartStreams& streams) {
     measured_ns_[index_of(part)] = kNoTime_ns;
     const auto set = avatar_.set_skeleton(part, stream ? stream->skeleton : nullptr);
     if (!set) {
-      tell("stream " + in_quotes(stream->name) + " cannot move its " +
-           std::string(words_for(part)) + ": " + set.error().message);
+      notify("stream " + in_quotes(stream->name) + " cannot move its " +
+             std::string(words_for(part)) + ": " + set.error().message);
     }
     if (part != Part::kBody) continue;
     const std::size_t left_out =
         shapes_.set_layout(stream ? stream->samples : drivers::SampleLayout{});
     if (left_out > 0) {
-      tell(std::to_string(left_out) + " blend shapes of stream " + in_quotes(stream->name) +
-           " are left out: their names are too long for a frame");
+      notify(std::to_string(left_out) + " blend shapes of stream " + in_quotes(stream->name) +
+             " are left out: their names are too long for a frame");
     }
   }
 }

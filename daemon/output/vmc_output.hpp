@@ -17,8 +17,8 @@ namespace posed::output {
 
 class VmcOutput final : public Output {
  public:
-  [[nodiscard]] static Result<std::unique_ptr<Output>> open(const config::OutputConfig& config,
-                                                            std::unique_ptr<system::EventFd> wake);
+  static Result<std::unique_ptr<Output>> open(const config::OutputConfig& config,
+                                              std::unique_ptr<system::EventFd> wake);
   VmcOutput(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake,
             UdpReceivers receivers);
 

@@ -17,11 +17,11 @@ enum class StreamState : std::uint8_t { kWaiting, kLive, kStale, kEnded };
 // Of one source. The streams of its bodies share it.
 struct alignas(64) SourceCounters {
   std::array<std::atomic<std::uint64_t>, kOutcomes> outcome{};
-  std::atomic<std::uint64_t> kernel_dropped{0};    // as in drivers::Chunk
-  std::atomic<std::int64_t> heard_ns{kNoTime_ns};  // arrival of the last good packet
-  std::atomic<bool> connected{false};              // a link to the device is open
-  std::atomic<std::uint64_t> connections{0};       // links opened since the start
-  std::atomic<std::int64_t> link_ns{kNoTime_ns};   // when `connected` last changed
+  std::atomic<std::uint64_t> kernel_dropped{0};       // as in drivers::Chunk
+  std::atomic<std::int64_t> received_ns{kNoTime_ns};  // arrival of the last good packet
+  std::atomic<bool> connected{false};                 // a link to the device is open
+  std::atomic<std::uint64_t> connections{0};          // links opened since the start
+  std::atomic<std::int64_t> link_ns{kNoTime_ns};      // when `connected` last changed
 };
 
 struct alignas(64) ReaderCounters {
@@ -111,12 +111,11 @@ class RingShare {
   // Nothing of an earlier stream of the slot may be in the ring any more.
   RingShare(std::size_t size, const std::atomic<std::uint64_t>& taken) noexcept
       : size_(size), put_(taken.load(std::memory_order_acquire)), taken_(&taken) {}
-  // RT-safe.
-  [[nodiscard]] bool has_room(std::size_t amount = 1) const noexcept {
+  RT_SAFE [[nodiscard]] bool has_room(std::size_t amount = 1) const noexcept {
     return put_ - taken_->load(std::memory_order_acquire) + amount <= size_;
   }
-  // Counts what was just put into the ring for this stream. RT-safe.
-  void add(std::size_t amount = 1) noexcept { put_ += amount; }
+  // Counts what was just put into the ring for this stream.
+  RT_SAFE void add(std::size_t amount = 1) noexcept { put_ += amount; }
 
  private:
   std::uint64_t size_;
@@ -124,8 +123,8 @@ class RingShare {
   const std::atomic<std::uint64_t>* taken_;
 };
 
-// Adds `n`. Only one thread may write the counter. RT-safe.
-inline void count(std::atomic<std::uint64_t>& counter, std::uint64_t n = 1) noexcept {
+// Adds `n`. Only one thread may write the counter.
+RT_SAFE inline void count(std::atomic<std::uint64_t>& counter, std::uint64_t n = 1) noexcept {
   counter.store(counter.load(std::memory_order_relaxed) + n, std::memory_order_relaxed);
 }
 

@@ -16,10 +16,10 @@ constexpr std::int64_t kEarly_ns = 50'000'000;
 // Packets that arrive this much later, for kLateFor_ns: not a delay; the device's time jumped back.
 constexpr std::int64_t kLate_ns = 250'000'000;
 constexpr std::int64_t kLateFor_ns = kNanosPerSecond;
-constexpr std::int64_t kFarthest_ns = std::numeric_limits<std::int64_t>::max() / 4;
+constexpr std::int64_t kMaxTime_ns = std::numeric_limits<std::int64_t>::max() / 4;
 
 bool plausible(std::int64_t time_ns) noexcept {
-  return time_ns > -kFarthest_ns && time_ns < kFarthest_ns;
+  return time_ns > -kMaxTime_ns && time_ns < kMaxTime_ns;
 }
 
 }  // namespace

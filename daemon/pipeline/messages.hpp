@@ -62,8 +62,7 @@ struct Item {
 };
 static_assert(std::is_trivially_copyable_v<Item>);
 
-// RT-safe.
-[[nodiscard]] inline std::uint32_t stream_of(const Item& item) noexcept {
+RT_SAFE [[nodiscard]] inline std::uint32_t stream_of(const Item& item) noexcept {
   if (item.kind == Item::Kind::kEvent) return item.stream_event.stream;
   return item.kind == Item::Kind::kSample ? item.sample.header.stream : item.frame.header.stream;
 }

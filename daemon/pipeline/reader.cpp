@@ -164,7 +164,8 @@ class Reader::Source final : private IntakeOut {
   }
 
   void outcome(Outcome outcome) noexcept override {
-    if (outcome == Outcome::kOk) counters_.heard_ns.store(arrival_ns_, std::memory_order_relaxed);
+    if (outcome == Outcome::kOk)
+      counters_.received_ns.store(arrival_ns_, std::memory_order_relaxed);
     count(counters_.outcome[static_cast<std::size_t>(outcome)]);
   }
 
@@ -217,7 +218,7 @@ class Reader::Source final : private IntakeOut {
     if (used_ != nullptr && used_->layout) device.decoder->use(*used_->layout);
     poll_due_ns_ = device.poll.period_ns == 0 ? kNoTime_ns : ports_.clock();
     const std::int64_t now_ns = ports_.clock();
-    counters_.heard_ns.store(now_ns, std::memory_order_relaxed);
+    counters_.received_ns.store(now_ns, std::memory_order_relaxed);
     counters_.link_ns.store(now_ns, std::memory_order_relaxed);
     counters_.connected.store(true, std::memory_order_release);
     count(counters_.connections);
@@ -414,12 +415,10 @@ class Reader::Source final : private IntakeOut {
 };
 
 Result<std::unique_ptr<Reader>> Reader::open(const ReaderPorts& ports) {
-  auto wake = system::EventFd::open();
-  if (!wake) return std::unexpected(wake.error());
-  auto poller = system::Poller::open();
-  if (!poller) return std::unexpected(poller.error());
-  if (auto added = (*poller)->add(**wake); !added) return std::unexpected(added.error());
-  return std::unique_ptr<Reader>(new Reader(ports, std::move(*wake), std::move(*poller)));
+  auto wake = TRY(system::EventFd::open());
+  auto poller = TRY(system::Poller::open());
+  TRY(poller->add(*wake));
+  return std::unique_ptr<Reader>(new Reader(ports, std::move(wake), std::move(poller)));
 }
 
 Reader::Reader(const ReaderPorts& ports, std::unique_ptr<system::EventFd> wake,

@@ -81,7 +81,7 @@ struct ReadSource {
 
 class Reader {
  public:
-  [[nodiscard]] static Result<std::unique_ptr<Reader>> open(const ReaderPorts& ports);
+  static Result<std::unique_ptr<Reader>> open(const ReaderPorts& ports);
   ~Reader();
 
   // Sources are numbered in the order in which they are added. Cold, before run().
@@ -92,8 +92,8 @@ class Reader {
   void begin() noexcept;
   // One round: applies commands, then reads a limited amount from each device, so that none delays
   // the others. Returns the latest time at which the next turn is due [ns]; kForever_ns: only when
-  // call() was used or a device is ready. RT-safe.
-  std::int64_t turn(std::int64_t now_ns) noexcept;
+  // call() was used or a device is ready.
+  RT_SAFE std::int64_t turn(std::int64_t now_ns) noexcept;
 
   // begin(), then one turn after another until stop(). The calling thread becomes the reader
   // thread.

@@ -33,21 +33,21 @@ class RecordSink {
   // Reader thread, before decoding. `next` holds the numbers that the first frame, sample and item
   // made from this chunk will get; with them replay can continue after a gap. A source may have
   // several sockets; the first is 0. If the ring is full the chunk is counted as lost, and the log
-  // gets a gap row and an event. RT-safe.
-  virtual void chunk(std::uint32_t source, std::uint8_t socket, Direction direction,
-                     std::int64_t arrival_ns, const pipeline::Position& next,
-                     std::span<const std::byte> bytes) noexcept = 0;
+  // gets a gap row and an event.
+  RT_SAFE virtual void chunk(std::uint32_t source, std::uint8_t socket, Direction direction,
+                             std::int64_t arrival_ns, const pipeline::Position& next,
+                             std::span<const std::byte> bytes) noexcept = 0;
 
-  // Pipeline thread. RT-safe.
-  virtual void decision(const pipeline::Decision& decision) noexcept = 0;
+  // Pipeline thread.
+  RT_SAFE virtual void decision(const pipeline::Decision& decision) noexcept = 0;
 
   // Publisher thread, in pipeline order. `bytes` is a serialized posed.v1.Frame without stage
-  // stamps. Called only if wants_published(), whose value never changes. RT-safe.
-  [[nodiscard]] virtual bool wants_published() const noexcept = 0;
+  // stamps. Called only if wants_published(), whose value never changes.
+  RT_SAFE [[nodiscard]] virtual bool wants_published() const noexcept = 0;
   virtual void published(std::uint32_t stream, std::uint64_t sequence, bool raw,
                          std::span<const std::byte> bytes) noexcept = 0;
-  // Pipeline thread: a frame was not published because the publisher's ring was full. RT-safe.
-  virtual void unpublished(std::uint32_t stream) noexcept = 0;
+  // Pipeline thread: a frame was not published because the publisher's ring was full.
+  RT_SAFE virtual void unpublished(std::uint32_t stream) noexcept = 0;
 
   // Control thread, before the command that names the model: keeps the bytes of a model file under
   // their SHA-256. Cold: allocates and locks.
@@ -55,12 +55,12 @@ class RecordSink {
 
   // Any cold thread: marks the beginning or the end of a take, behind the last chunk that was read
   // before the newest one. Returns the take that began or ended. Allocates and locks.
-  [[nodiscard]] virtual Result<Take> mark_take(const TakeMark& mark) = 0;
+  virtual Result<Take> mark_take(const TakeMark& mark) = 0;
 
   // Reader thread: whether the recorder has taken so much that a source that can wait may go on;
-  // otherwise records of the source or of the stream would soon be lost. RT-safe.
-  [[nodiscard]] virtual bool keeps_up(std::uint32_t source,
-                                      std::uint32_t stream) const noexcept = 0;
+  // otherwise records of the source or of the stream would soon be lost.
+  RT_SAFE [[nodiscard]] virtual bool keeps_up(std::uint32_t source,
+                                              std::uint32_t stream) const noexcept = 0;
 };
 
 }  // namespace posed::pipeline

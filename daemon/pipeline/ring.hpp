@@ -9,6 +9,8 @@
 
 #include <boost/lockfree/spsc_queue.hpp>
 
+#include "proto/frame/rt_safe.hpp"
+
 namespace posed::pipeline {
 
 // The size of a ring in time: it holds half a second of everything that may come, and bursts.
@@ -32,10 +34,10 @@ class Ring {
     queue_.reset();
   }
 
-  // Producer. False when full. RT-safe.
-  [[nodiscard]] bool push(const T& item) noexcept { return queue_.push(item); }
-  // Producer: whether so many pushes will succeed. RT-safe.
-  [[nodiscard]] bool has_room(std::size_t count = 1) const noexcept {
+  // Producer. False when full.
+  RT_SAFE [[nodiscard]] bool push(const T& item) noexcept { return queue_.push(item); }
+  // Producer: whether so many pushes will succeed.
+  RT_SAFE [[nodiscard]] bool has_room(std::size_t count = 1) const noexcept {
     return queue_.write_available() >= count;
   }
 
@@ -45,8 +47,8 @@ class Ring {
   [[nodiscard]] bool consume(Use&& use) noexcept {
     return queue_.consume_one(std::forward<Use>(use)) > 0;
   }
-  // Consumer. RT-safe.
-  [[nodiscard]] bool empty() const noexcept { return queue_.read_available() == 0; }
+  // Consumer.
+  RT_SAFE [[nodiscard]] bool empty() const noexcept { return queue_.read_available() == 0; }
 
  private:
   boost::lockfree::spsc_queue<T> queue_;

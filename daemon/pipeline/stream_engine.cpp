@@ -69,7 +69,7 @@ void StreamEngine::on_frame(const Frame& frame, EngineOut& out) noexcept {
   const Header& header = frame.header;
   shed_until(header.sequence, header.arrival_ns, out);
   last_sequence_ = header.sequence;
-  heard(header.arrival_ns, out);
+  received(header.arrival_ns, out);
   if (options_.publish_raw) {
     pose_.kind = Item::Kind::kRawFrame;
     pose_.frame = frame;
@@ -125,7 +125,7 @@ void StreamEngine::emit(const Frame& frame, EngineOut& out) noexcept {
 void StreamEngine::on_sample(const Sample& sample, EngineOut& out) noexcept {
   shed_samples_until(sample.header.sequence, out);
   last_sample_ = sample.header.sequence;
-  heard(sample.header.arrival_ns, out);
+  received(sample.header.arrival_ns, out);
   other_.kind = Item::Kind::kSample;
   other_.sample = sample;
   out.item(other_);
@@ -143,9 +143,9 @@ void StreamEngine::on_partner(const PartnerFeed& feed, const Frame& frame,
 }
 
 // Data arrived: a stream that was silent has recovered.
-void StreamEngine::heard(std::int64_t arrival_ns, EngineOut& out) noexcept {
+void StreamEngine::received(std::int64_t arrival_ns, EngineOut& out) noexcept {
   last_arrival_ns_ = arrival_ns;
-  for (const EngineStage& stage : options_.stages) stage.stage->heard(arrival_ns);
+  for (const EngineStage& stage : options_.stages) stage.stage->received(arrival_ns);
   const StreamState before = state_;
   state_ = StreamState::kLive;
   if (before == StreamState::kWaiting) {
@@ -244,7 +244,7 @@ Ack StreamEngine::apply(const Command& command, EngineOut& out) noexcept {
   other_.kind = Item::Kind::kEvent;
   other_.stream_event = event;
   out.item(other_);
-  tell(last_arrival_ns_, out);
+  notify(last_arrival_ns_, out);
   return ack;
 }
 
@@ -276,11 +276,11 @@ void StreamEngine::flush(EngineOut& out) noexcept {
     Chain rest(*this, i + 1, out);
     options_.stages[i].stage->flush(rest);
   }
-  tell(last_arrival_ns_, out);
+  notify(last_arrival_ns_, out);
 }
 
 // What the stages have to tell people.
-void StreamEngine::tell(std::int64_t time_ns, EngineOut& out) noexcept {
+void StreamEngine::notify(std::int64_t time_ns, EngineOut& out) noexcept {
   for (const EngineStage& stage : options_.stages) {
     while (const auto notice = stage.stage->take_notice()) {
       const StageNoticeType& type = stage.type->notices[notice->index];
@@ -296,7 +296,7 @@ void StreamEngine::tell(std::int64_t time_ns, EngineOut& out) noexcept {
 
 // What has come of the stages' work: what they tell, and that a performance is over.
 void StreamEngine::report_stages(std::int64_t time_ns, EngineOut& out) noexcept {
-  tell(time_ns, out);
+  notify(time_ns, out);
   const bool performed = performs_;
   performs_ = any_performs();
   if (performed && !performs_) event(v1::Event::KIND_PLAYED, time_ns, last_out_, 0.0, out);

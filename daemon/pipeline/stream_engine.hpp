@@ -118,14 +118,14 @@ class StreamEngine final {
   void run(std::size_t next, const StageFrame& frame, EngineOut& out) noexcept;
   void emit(const Frame& frame, EngineOut& out) noexcept;
   std::size_t time_stage(std::size_t stage) noexcept;
-  void tell(std::int64_t time_ns, EngineOut& out) noexcept;
+  void notify(std::int64_t time_ns, EngineOut& out) noexcept;
   void report_stages(std::int64_t time_ns, EngineOut& out) noexcept;
   void shed_until(std::uint64_t sequence, std::int64_t time_ns, EngineOut& out) noexcept;
   void shed_samples_until(std::uint64_t sequence, EngineOut& out) noexcept;
   [[nodiscard]] std::int64_t stale_due_ns() const noexcept;
   [[nodiscard]] std::int64_t stages_due_ns() const noexcept;
   [[nodiscard]] bool any_performs() const noexcept;
-  void heard(std::int64_t arrival_ns, EngineOut& out) noexcept;
+  void received(std::int64_t arrival_ns, EngineOut& out) noexcept;
   void event(std::uint8_t event, std::int64_t time_ns, std::uint64_t sequence, double value,
              EngineOut& out) noexcept;
   [[nodiscard]] bool change(Stage& stage, const Command& command, StreamEvent& event) noexcept;
@@ -155,8 +155,9 @@ class StreamEngine final {
   Item other_;             // the sample or event on its way out
 };
 
-// Copies the engine's live parameters and readings to where `stats` reads them. RT-safe.
-inline void publish_values(const StreamEngine& engine, PipelineCounters& counters) noexcept {
+// Copies the engine's live parameters and readings to where `stats` reads them.
+RT_SAFE inline void publish_values(const StreamEngine& engine,
+                                   PipelineCounters& counters) noexcept {
   for (std::size_t i = 0; i < engine.live_parameters(); ++i) {
     const ParameterState state = engine.live_parameter(i);
     counters.parameter[i].now.store(state.now, std::memory_order_relaxed);

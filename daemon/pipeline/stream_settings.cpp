@@ -35,9 +35,7 @@ Result<std::shared_ptr<const Skeleton>> skeleton_before(const StreamSettings& se
                                                         std::shared_ptr<const Skeleton> skeleton) {
   for (std::size_t i = 0; i < stages && skeleton; ++i) {
     if (settings.stages[i].type->leaves == nullptr) continue;
-    auto next = settings.stages[i].type->leaves(context_of(settings, i, std::move(skeleton)));
-    if (!next) return next;
-    skeleton = std::move(*next);
+    skeleton = TRY(settings.stages[i].type->leaves(context_of(settings, i, std::move(skeleton))));
   }
   return skeleton;
 }
@@ -75,9 +73,8 @@ Result<> find_partners(StreamSettings& settings, const PartnerStreams& known) {
 
 Result<StageContext> stage_context(const StreamSettings& settings, std::size_t stage,
                                    const std::shared_ptr<const Skeleton>& source) {
-  auto skeleton = skeleton_before(settings, stage, source);
-  if (!skeleton) return std::unexpected(skeleton.error());
-  return context_of(settings, stage, std::move(*skeleton));
+  auto skeleton = TRY(skeleton_before(settings, stage, source));
+  return context_of(settings, stage, std::move(skeleton));
 }
 
 Result<std::shared_ptr<const Skeleton>> published_skeleton(
@@ -103,11 +100,9 @@ Result<EngineOptions> engine_options(std::uint32_t stream, const StreamSettings&
       const auto fault = type.check(settings.stages[i].parameters, models[i] != nullptr);
       if (fault) return misuse(fault->sentence);
     }
-    const auto context = stage_context(settings, i, skeleton);
-    if (!context) return std::unexpected(context.error());
-    auto stage = type.make(*context, models[i]);
-    if (!stage) return std::unexpected(stage.error());
-    options.stages.push_back({&type, std::move(*stage)});
+    const auto context = TRY(stage_context(settings, i, skeleton));
+    auto stage = TRY(type.make(context, models[i]));
+    options.stages.push_back({&type, std::move(stage)});
     add_feeds(settings.stages[i], i, options.feeds);
     live += static_cast<std::size_t>(std::ranges::count_if(
         type.parameters, [](const ParameterSpec& spec) { return spec.live && has_number(spec); }));

@@ -51,25 +51,24 @@ struct StreamSettings {
                                                      const Parameters& parameters);
 // Finds the streams that the stages name among those that are there now, `known`. A stage runs
 // without a partner that is not there. Fails if one has no poses. Cold.
-[[nodiscard]] Result<> find_partners(StreamSettings& settings, const PartnerStreams& known);
+Result<> find_partners(StreamSettings& settings, const PartnerStreams& known);
 
 // A stage's view of the stream. `source` is the skeleton of the source's frames: the stages before
 // this one may change it. The error says which of them cannot serve it. Cold.
-[[nodiscard]] Result<StageContext> stage_context(const StreamSettings& settings, std::size_t stage,
-                                                 const std::shared_ptr<const Skeleton>& source);
+Result<StageContext> stage_context(const StreamSettings& settings, std::size_t stage,
+                                   const std::shared_ptr<const Skeleton>& source);
 
 // The skeleton of the frames that leave the last stage; null for a stream that has samples only.
 // Cold.
-[[nodiscard]] Result<std::shared_ptr<const Skeleton>> published_skeleton(
+Result<std::shared_ptr<const Skeleton>> published_skeleton(
     const StreamSettings& settings, const std::shared_ptr<const Skeleton>& source);
 
 // The options of the engine of stream number `stream`, with its stages. `models` has one entry for
 // each stage, null where it starts without one; they outlive the engine or are replaced. `skeleton`
 // is null for a stream that has samples only. The error says which stage cannot serve the stream.
 // Cold.
-[[nodiscard]] Result<EngineOptions> engine_options(std::uint32_t stream,
-                                                   const StreamSettings& settings,
-                                                   const std::shared_ptr<const Skeleton>& skeleton,
-                                                   std::span<const StageModel* const> models);
+Result<EngineOptions> engine_options(std::uint32_t stream, const StreamSettings& settings,
+                                     const std::shared_ptr<const Skeleton>& skeleton,
+                                     std::span<const StageModel* const> models);
 
 }  // namespace posed::pipeline

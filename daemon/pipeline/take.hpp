@@ -32,7 +32,7 @@ struct Take {
 };
 
 // An error unless the name has at most kMaxTakeName bytes of printable UTF-8.
-[[nodiscard]] Result<> check_take_name(std::string_view name);
+Result<> check_take_name(std::string_view name);
 
 // "take 3 'walk'", or "take 3" without a name.
 [[nodiscard]] std::string words_of(const Take& take);

@@ -21,10 +21,9 @@ constexpr std::int64_t kAcksAgain_ns = 1'000'000;
 }  // namespace
 
 Result<std::unique_ptr<Worker>> Worker::open(const WorkerPorts& ports) {
-  auto poller = system::Poller::open();
-  if (!poller) return std::unexpected(poller.error());
-  if (auto added = (*poller)->add(*ports.wake); !added) return std::unexpected(added.error());
-  return std::unique_ptr<Worker>(new Worker(ports, std::move(*poller)));
+  auto poller = TRY(system::Poller::open());
+  TRY(poller->add(*ports.wake));
+  return std::unique_ptr<Worker>(new Worker(ports, std::move(poller)));
 }
 
 Worker::Worker(const WorkerPorts& ports, std::unique_ptr<system::Poller> poller)

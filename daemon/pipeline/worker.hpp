@@ -49,7 +49,7 @@ struct WorkerPorts {
 
 class Worker {
  public:
-  [[nodiscard]] static Result<std::unique_ptr<Worker>> open(const WorkerPorts& ports);
+  static Result<std::unique_ptr<Worker>> open(const WorkerPorts& ports);
   ~Worker();
 
   // A stream for StreamExchange::coming. `rate_hz` is the nominal rate, 0 when unknown; `slots` is
@@ -59,11 +59,11 @@ class Worker {
                                                             std::size_t slots) const;
 
   // One round: commands, a bounded number of items, and the ticks that are due. Returns the latest
-  // time at which the next turn is due [ns]; kForever_ns: only when a ring has something. RT-safe.
-  std::int64_t turn(std::int64_t now_ns) noexcept;
+  // time at which the next turn is due [ns]; kForever_ns: only when a ring has something.
+  RT_SAFE std::int64_t turn(std::int64_t now_ns) noexcept;
   // After the reader's last turn: handles all items that wait, then makes the stages emit what they
-  // hold back. RT-safe.
-  void finish() noexcept;
+  // hold back.
+  RT_SAFE void finish() noexcept;
 
   // One turn after another until stop(), then finish(). The calling thread becomes the pipeline
   // thread.

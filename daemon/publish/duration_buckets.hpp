@@ -26,8 +26,8 @@ class DurationBuckets {
     std::uint64_t sum_ns = 0;
   };
 
-  // Only one thread. RT-safe. Negative durations count as 0.
-  void add(std::int64_t duration_ns) noexcept {
+  // Only one thread. Negative durations count as 0.
+  RT_SAFE void add(std::int64_t duration_ns) noexcept {
     const std::int64_t value = std::max<std::int64_t>(duration_ns, 0);
     std::size_t bucket = 0;
     for (const std::int64_t bound : kBounds_ns) bucket += value > bound ? 1 : 0;

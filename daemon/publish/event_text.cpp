@@ -25,7 +25,7 @@ std::string changed(const StreamEvent& event) {
     case StageChange::Kind::kSet: {
       const ParameterSpec& spec = change.type->parameters[change.index];
       return fmt::format("{}.{} {} -> {} from frame {}", change.type->name, spec.shown_name(),
-                         people_text(spec, event.value_before), people_text(spec, change.value),
+                         display_text(spec, event.value_before), display_text(spec, change.value),
                          event.sequence);
     }
     case StageChange::Kind::kModel:

@@ -8,12 +8,14 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "proto/frame/rt_safe.hpp"
+
 namespace posed::publish {
 
 class LatencyHistogram {
  public:
-  // RT-safe. Negative durations count as 0.
-  void add(std::int64_t duration_ns) noexcept {
+  // Negative durations count as 0.
+  RT_SAFE void add(std::int64_t duration_ns) noexcept {
     const auto value = static_cast<std::uint64_t>(std::max<std::int64_t>(duration_ns, 0));
     ++buckets_[bucket(value)];
     ++count_;
@@ -40,7 +42,7 @@ class LatencyHistogram {
   // bits after the leading one.
   static constexpr std::size_t kBuckets = 8 + 61 * 8;
   [[nodiscard]] static std::size_t bucket(std::uint64_t value) noexcept {
-    if (value < 8) return static_cast<std::size_t>(value);
+    if (value < 8) return value;
     const int exponent =
         static_cast<int>(std::bit_width(value)) - 4;  // value >> exponent is in 8..15
     return static_cast<std::size_t>(exponent) * 8 + static_cast<std::size_t>(value >> exponent);

@@ -22,8 +22,8 @@ constexpr int kSubscriptionsWaiting = 2;
 constexpr int kReceiveBuffer_bytes = 8 * 1024;
 // Bytes of one peer that have not become a message: the kernel and libzmq hold up to 16 KB before
 // the owner receives anything.
-constexpr std::uint64_t kMaxUnheard = 24 * 1024;
-constexpr std::uint64_t kMaxUnheardOfAll = 512 * 1024;
+constexpr std::uint64_t kMaxUnfinished = 24 * 1024;
+constexpr std::uint64_t kMaxUnfinishedOfAll = 512 * 1024;
 constexpr int kSubscriptionsATurn = 64;
 // bytes; the kernel's default alone can hold seconds of old poses
 constexpr int kSendBuffer = 8 * 1024;
@@ -36,38 +36,26 @@ int send_high_water_mark(double messages_per_s) {
 
 Result<> set_queue_options(void* socket, double messages_per_s) {
   const int depth = send_high_water_mark(messages_per_s);
-  if (auto set = net::set_option(socket, ZMQ_SNDHWM, depth); !set) return set;
+  TRY(net::set_option(socket, ZMQ_SNDHWM, depth));
   return net::set_option(socket, ZMQ_SNDBUF, kSendBuffer);
 }
 
 Result<PublishSocket> PublishSocket::open(const PublishSocketSettings& settings) {
-  auto socket = net::open_socket(settings.context, ZMQ_XPUB);
-  if (!socket) return std::unexpected(socket.error());
-  if (auto set = set_queue_options(socket->get(), settings.messages_per_s); !set) {
-    return std::unexpected(set.error());
-  }
-  if (auto set = net::set_option(socket->get(), ZMQ_XPUB_VERBOSER, 1); !set) {
-    return std::unexpected(set.error());
-  }
+  auto socket = TRY(net::open_socket(settings.context, ZMQ_XPUB));
+  TRY(set_queue_options(socket.get(), settings.messages_per_s));
+  TRY(net::set_option(socket.get(), ZMQ_XPUB_VERBOSER, 1));
   if (settings.authenticator != nullptr) {
-    auto secured = net::secure_server(socket->get(), net::Domain::kPublish, settings.secret_z85);
-    if (!secured) return std::unexpected(secured.error());
+    TRY(net::secure_server(socket.get(), net::Domain::kPublish, settings.secret_z85));
   }
-  if (auto set = net::set_receive_limits(socket->get(), kMaxPart, kSubscriptionsWaiting,
-                                         kReceiveBuffer_bytes);
-      !set) {
-    return std::unexpected(set.error());
-  }
-  auto guard = net::PeerGuard::open(settings.context, socket->get(),
-                                    {.name = "publish",
-                                     .max_peers = net::peer_shares().publish,
-                                     .max_unheard = kMaxUnheard,
-                                     .max_unheard_of_all = kMaxUnheardOfAll,
-                                     .authenticator = settings.authenticator});
-  if (!guard) return std::unexpected(guard.error());
-  auto endpoint = net::bind_socket(socket->get(), settings.endpoint);
-  if (!endpoint) return std::unexpected(endpoint.error());
-  return PublishSocket(std::move(*socket), std::move(*guard), std::move(*endpoint));
+  TRY(net::set_receive_limits(socket.get(), kMaxPart, kSubscriptionsWaiting, kReceiveBuffer_bytes));
+  auto guard = TRY(net::PeerGuard::open(settings.context, socket.get(),
+                                        {.name = "publish",
+                                         .max_peers = net::peer_shares().publish,
+                                         .max_unfinished = kMaxUnfinished,
+                                         .max_unfinished_of_all = kMaxUnfinishedOfAll,
+                                         .authenticator = settings.authenticator}));
+  auto endpoint = TRY(net::bind_socket(socket.get(), settings.endpoint));
+  return PublishSocket(std::move(socket), std::move(guard), std::move(endpoint));
 }
 
 PublishSocket::PublishSocket(net::Socket socket, std::unique_ptr<net::PeerGuard> guard,
@@ -78,8 +66,9 @@ PublishSocket::~PublishSocket() = default;
 PublishSocket::PublishSocket(PublishSocket&&) noexcept = default;
 
 // A subscription message is one byte (1: subscribe, 0: unsubscribe), then the beginning of a topic.
-bool PublishSocket::hear(Subscriptions& subscriptions, std::int64_t now_ns,
-                         const std::function<void(std::string_view prefix)>& subscribed) {
+bool PublishSocket::receive_subscriptions(
+    Subscriptions& subscriptions, std::int64_t now_ns,
+    const std::function<void(std::string_view prefix)>& subscribed) {
   for (const int peer : guard_->drain_ended()) subscriptions.forget(peer);
   net::Message message;
   for (int i = 0; i < kSubscriptionsATurn; ++i) {
@@ -88,7 +77,7 @@ bool PublishSocket::hear(Subscriptions& subscriptions, std::int64_t now_ns,
     const int peer = net::source_of(message);
     // gone meanwhile, or libzmq unsubscribes for a peer that is gone
     if (!guard_->knows(peer)) continue;
-    guard_->heard(peer, message.property("User-Id"));
+    guard_->received(peer, message.property("User-Id"));
     if (text.empty() || static_cast<unsigned char>(text.front()) > 1) {
       guard_->cut(peer, "sent an invalid subscription");
     } else if (!subscriptions.ask(peer, text.substr(1), text.front() == 1, now_ns)) {

@@ -24,7 +24,7 @@ namespace posed::publish {
 // The length of a message queue that holds a quarter of a second of all streams together.
 [[nodiscard]] int send_high_water_mark(double messages_per_s);
 // Sets that queue length, and a small kernel buffer behind it. Call before bind.
-[[nodiscard]] Result<> set_queue_options(void* socket, double messages_per_s);
+Result<> set_queue_options(void* socket, double messages_per_s);
 
 struct PublishSocketSettings {
   void* context = nullptr;  // the ZeroMQ context; outlives the socket
@@ -38,7 +38,7 @@ struct PublishSocketSettings {
 class PublishSocket {
  public:
   // Binds.
-  [[nodiscard]] static Result<PublishSocket> open(const PublishSocketSettings& settings);
+  static Result<PublishSocket> open(const PublishSocketSettings& settings);
   ~PublishSocket();
   PublishSocket(PublishSocket&&) noexcept;
   PublishSocket& operator=(PublishSocket&&) = delete;
@@ -50,8 +50,9 @@ class PublishSocket {
 
   // Hears subscriptions, at most 64, and keeps `subscriptions` up to date. Calls `subscribed` with
   // the prefix of each new one that is within the limits. Returns false if more may wait.
-  [[nodiscard]] bool hear(Subscriptions& subscriptions, std::int64_t now_ns,
-                          const std::function<void(std::string_view prefix)>& subscribed);
+  [[nodiscard]] bool receive_subscriptions(
+      Subscriptions& subscriptions, std::int64_t now_ns,
+      const std::function<void(std::string_view prefix)>& subscribed);
 
  private:
   PublishSocket(net::Socket socket, std::unique_ptr<net::PeerGuard> guard, std::string endpoint);

@@ -28,8 +28,8 @@ class PublishedSlots {
 
   // All below: the publisher's thread, or another one while that does not run.
 
-  // The stream if it has its slot; else null. RT-safe.
-  [[nodiscard]] PublishedStream* current(std::uint32_t stream) noexcept;
+  // The stream if it has its slot; else null.
+  RT_SAFE [[nodiscard]] PublishedStream* current(std::uint32_t stream) noexcept;
   // Whatever has the slot; null if nothing has.
   [[nodiscard]] PublishedStream* holder(std::uint32_t slot) noexcept;
   // The stream, also if it waits; else null.

@@ -69,8 +69,8 @@ void fill_stages(const std::vector<StageInfo>& stages, const pipeline::PipelineC
       const pipeline::ParameterCounter& counter = counters.parameter[live++];
       v1::ParameterStats& parameter = *stage.add_parameter();
       parameter.set_name(std::string(spec.shown_name()));
-      parameter.set_value(counter.now.load() * spec.people_scale);
-      parameter.set_target(counter.target.load() * spec.people_scale);
+      parameter.set_value(counter.now.load() * spec.display_scale);
+      parameter.set_target(counter.target.load() * spec.display_scale);
       if (spec.name != "alpha") continue;
       stats.set_alpha(static_cast<float>(parameter.value()));
       stats.set_alpha_target(static_cast<float>(parameter.target()));

@@ -29,14 +29,13 @@ std::int64_t clock_ns(clockid_t clock) {
 
 // The publisher's thread waits for new items and for messages of subscribers.
 Result<std::unique_ptr<system::Poller>> open_poller(const system::EventFd& wake, void* socket) {
-  auto poller = system::Poller::open();
-  if (!poller) return poller;
+  auto poller = TRY(system::Poller::open());
   int socket_fd = -1;
   std::size_t size = sizeof socket_fd;
   if (zmq_getsockopt(socket, ZMQ_FD, &socket_fd, &size) != 0) {
     return fail("ZeroMQ names no descriptor to wait for");
   }
-  for (const Result<>& added : {(*poller)->add(wake), (*poller)->add(socket_fd, 0)}) {
+  for (const Result<>& added : {poller->add(wake), poller->add(socket_fd, 0)}) {
     if (!added) return std::unexpected(added.error());
   }
   return poller;
@@ -72,16 +71,14 @@ struct Publisher::Requests {
 Result<std::unique_ptr<Publisher>> Publisher::open(PublisherOptions options,
                                                    pipeline::Ring<pipeline::Item>& in,
                                                    system::EventFd& wake) {
-  auto socket = PublishSocket::open({.context = options.context,
-                                     .endpoint = options.endpoint,
-                                     .authenticator = options.authenticator,
-                                     .secret_z85 = options.secret_z85,
-                                     .messages_per_s = options.messages_per_s});
-  if (!socket) return std::unexpected(socket.error());
-  auto poller = open_poller(wake, socket->get());
-  if (!poller) return std::unexpected(poller.error());
+  auto socket = TRY(PublishSocket::open({.context = options.context,
+                                         .endpoint = options.endpoint,
+                                         .authenticator = options.authenticator,
+                                         .secret_z85 = options.secret_z85,
+                                         .messages_per_s = options.messages_per_s}));
+  auto poller = TRY(open_poller(wake, socket.get()));
   return std::unique_ptr<Publisher>(
-      new Publisher(std::move(options), in, wake, std::move(*socket), std::move(*poller)));
+      new Publisher(std::move(options), in, wake, std::move(socket), std::move(poller)));
 }
 
 Publisher::Publisher(PublisherOptions options, pipeline::Ring<pipeline::Item>& in,
@@ -115,10 +112,10 @@ std::int64_t Publisher::turn(std::int64_t now_ns) {
   if (reported_ns_ == kNoTime_ns || now_ns >= reported_ns_ + kNanosPerSecond) {
     every_second(now_ns);
   }
-  const bool all_heard = socket_.hear(subscriptions_, now_ns,
-                                      [this](std::string_view prefix) { want_skeletons(prefix); });
+  const bool all_received = socket_.receive_subscriptions(
+      subscriptions_, now_ns, [this](std::string_view prefix) { want_skeletons(prefix); });
   const std::int64_t skeleton_ns = send_skeletons(now_ns);
-  if (!all_heard) return now_ns;
+  if (!all_received) return now_ns;
   return std::min(reported_ns_ + kNanosPerSecond, skeleton_ns);
 }
 

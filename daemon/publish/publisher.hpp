@@ -97,9 +97,9 @@ class PublishedStream;
 class Publisher {
  public:
   // Binds. `in` and `wake` outlive the publisher.
-  [[nodiscard]] static Result<std::unique_ptr<Publisher>> open(PublisherOptions options,
-                                                               pipeline::Ring<pipeline::Item>& in,
-                                                               system::EventFd& wake);
+  static Result<std::unique_ptr<Publisher>> open(PublisherOptions options,
+                                                 pipeline::Ring<pipeline::Item>& in,
+                                                 system::EventFd& wake);
   ~Publisher();
 
   [[nodiscard]] const std::string& endpoint() const noexcept;  // the endpoint that is really bound

@@ -153,14 +153,14 @@ log::DecisionRow row_of(const Decision& decision) {
 Result<Decision> decision_of(const log::DecisionRow& row, const std::string& file) {
   Decision decision{.stream = row.stream, .item = row.item, .now_ns = row.now_ns};
   Value value;
-  bool sound = value.ParseFromString(row.value);
-  if (sound && row.stage == words::kEngine) {
-    sound = read_engine(row.name, value, decision);
-  } else if (sound) {
+  bool valid = value.ParseFromString(row.value);
+  if (valid && row.stage == words::kEngine) {
+    valid = read_engine(row.name, value, decision);
+  } else if (valid) {
     const StageType* type = find_stage_type(row.stage);
-    sound = type != nullptr && read_change(*type, row.name, value, decision);
+    valid = type != nullptr && read_change(*type, row.name, value, decision);
   }
-  if (!sound) return log::damaged_row(file, "decision", row.id, "makes no sense");
+  if (!valid) return log::damaged_row(file, "decision", row.id, "makes no sense");
   return decision;
 }
 

@@ -14,7 +14,6 @@ namespace posed::record {
 // The decision in a row. Rows of format 3 store `sequence` only for kShed and kShedSamples; those
 // of older formats store it for every decision. A row that no pipeline can have written is damage:
 // the error names `file` and the row.
-[[nodiscard]] Result<pipeline::Decision> decision_of(const log::DecisionRow& row,
-                                                     const std::string& file);
+Result<pipeline::Decision> decision_of(const log::DecisionRow& row, const std::string& file);
 
 }  // namespace posed::record

@@ -201,9 +201,7 @@ Result<log::GapRow> LogWriterLoop::gap_row(const Tally& tally, std::uint64_t los
                                            std::int64_t now_ns, std::uint64_t from_frame) const {
   log::GapRow row{tally.kind, tally.owner, sources_[tally.source].last_chunk, lost, now_ns};
   if (tally.kind != GapKind::kDecisions || from_frame == kNoFrame) return row;
-  const auto before = writer_->chunk_before_frame(tally.source, tally.owner, from_frame);
-  if (!before) return std::unexpected(before.error());
-  row.after_chunk = *before;
+  row.after_chunk = TRY(writer_->chunk_before_frame(tally.source, tally.owner, from_frame));
   return row;
 }
 
@@ -212,20 +210,20 @@ Result<log::GapRow> LogWriterLoop::gap_row(const Tally& tally, std::uint64_t los
 Result<> LogWriterLoop::write_stream_rows() {
   for (const auto& [id, stream] : streams_) {
     if (!stream.named || !stream.row) continue;
-    if (auto done = add_stream_row(*writer_, *stream.row, stream.first_item); !done) return done;
+    TRY(add_stream_row(*writer_, *stream.row, stream.first_item));
   }
   return {};
 }
 
 Result<> LogWriterLoop::commit(std::int64_t now_ns) {
   for (const auto& model : models_) {
-    if (auto kept = writer_->add_blob(model); !kept) return std::unexpected(kept.error());
+    TRY(writer_->add_blob(model));
   }
   for (const auto& [number, take] : takes_) {
-    if (auto done = writer_->add(take); !done) return done;
+    TRY(writer_->add(take));
   }
-  if (auto done = write_stream_rows(); !done) return done;
-  if (auto done = writer_->commit(); !done) return done;
+  TRY(write_stream_rows());
+  TRY(writer_->commit());
   models_.clear();
   takes_.clear();
   for (SourceState& source : sources_) source.committed_chunk = source.last_chunk;

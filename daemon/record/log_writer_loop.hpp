@@ -41,7 +41,7 @@ class LogWriterLoop {
   // Call every 50 to 100 ms; commits when 250 ms have passed since the last commit.
   void turn(std::int64_t now_ns);
   // Call after the producers have stopped: writes the rest and leaves a single file.
-  [[nodiscard]] Result<> finish(std::int64_t now_ns);
+  Result<> finish(std::int64_t now_ns);
 
   // Any thread. The number of chunks missing in the log, of published frames that it should have,
   // and of failed attempts to write.
@@ -93,8 +93,8 @@ class LogWriterLoop {
   // `from_frame`: the first frame that the lost decisions may concern.
   void put_gap(Tally& tally, std::uint64_t lost, std::int64_t now_ns,
                std::uint64_t from_frame = kNoFrame);
-  [[nodiscard]] Result<log::GapRow> gap_row(const Tally& tally, std::uint64_t lost,
-                                            std::int64_t now_ns, std::uint64_t from_frame) const;
+  Result<log::GapRow> gap_row(const Tally& tally, std::uint64_t lost, std::int64_t now_ns,
+                              std::uint64_t from_frame) const;
   void add_streams();
   void add_takes();
   [[nodiscard]] std::vector<std::uint32_t> streams_now() const;
@@ -102,9 +102,9 @@ class LogWriterLoop {
   // The state of a stream that a record names; null if it was never added. `item`: from which on
   // the record proves that the stream is there; 0: it does not say.
   StreamState* meet(std::uint32_t id, std::uint64_t item);
-  [[nodiscard]] Result<> write_stream_rows();
-  [[nodiscard]] Result<> write_lost(std::int64_t now_ns);
-  [[nodiscard]] Result<> commit(std::int64_t now_ns);
+  Result<> write_stream_rows();
+  Result<> write_lost(std::int64_t now_ns);
+  Result<> commit(std::int64_t now_ns);
   void count_lost(Tally& tally, std::uint64_t count);
   void fail(const Error& error, std::int64_t now_ns);
   void resume(std::int64_t now_ns);

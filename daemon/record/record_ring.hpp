@@ -13,6 +13,8 @@
 
 #include <boost/lockfree/spsc_queue.hpp>
 
+#include "proto/frame/rt_safe.hpp"
+
 namespace posed::record {
 
 // Header: trivially copyable, with a member `bytes` that holds the length of all bytes behind it.
@@ -33,9 +35,9 @@ class RecordRing {
   }
 
   // Producer. The bytes behind the header are those of `first` and then those of `second`. Returns
-  // false if the ring is full; then nothing was written. RT-safe.
-  [[nodiscard]] bool push(const Header& header, std::span<const std::byte> first,
-                          std::span<const std::byte> second = {}) noexcept {
+  // false if the ring is full; then nothing was written.
+  RT_SAFE [[nodiscard]] bool push(const Header& header, std::span<const std::byte> first,
+                                  std::span<const std::byte> second = {}) noexcept {
     if (ring_.write_available() < size_of(header)) return false;
     std::array<std::byte, sizeof(Header)> image;
     std::memcpy(image.data(), &header, sizeof(Header));

@@ -19,9 +19,9 @@ std::size_t sum_of(const std::vector<SlotSizes>& slots, std::size_t SlotSizes::*
 }
 
 // Adds a record to its share of a ring with `push`. A record that fits carries `lost_before`;
-// otherwise it is itself counted as lost, and the result is false. RT-safe.
-bool put(auto& share, Losses& lost, std::size_t amount, std::uint64_t lost_before,
-         auto&& push) noexcept {
+// otherwise it is itself counted as lost, and the result is false.
+RT_SAFE bool put(auto& share, Losses& lost, std::size_t amount, std::uint64_t lost_before,
+                 auto&& push) noexcept {
   if (share.share.has_room(amount) && push()) {
     share.share.add(amount);
     pipeline::count(share.put, amount);
@@ -59,10 +59,10 @@ void RecordRings::add_stream(RecordedStream stream) {
   streams_.push_back(std::move(stream));
 }
 
-// RT-safe
-void RecordRings::chunk(std::uint32_t number, std::uint8_t socket, pipeline::Direction direction,
-                        std::int64_t arrival_ns, const pipeline::Position& next,
-                        std::span<const std::byte> bytes) noexcept {
+RT_SAFE void RecordRings::chunk(std::uint32_t number, std::uint8_t socket,
+                                pipeline::Direction direction, std::int64_t arrival_ns,
+                                const pipeline::Position& next,
+                                std::span<const std::byte> bytes) noexcept {
   newest_item_.store(next.item, kRelaxed);
   Source& source = sources_[number];
   const auto positions = std::as_bytes(next.streams);
@@ -78,15 +78,13 @@ void RecordRings::chunk(std::uint32_t number, std::uint8_t socket, pipeline::Dir
       [&] { return chunks_.push(header, positions, bytes); });
 }
 
-// RT-safe
-bool RecordRings::keeps_up(std::uint32_t source, std::uint32_t stream) const noexcept {
+RT_SAFE bool RecordRings::keeps_up(std::uint32_t source, std::uint32_t stream) const noexcept {
   const std::uint32_t slot = pipeline::slot_of(stream);
   if (!sources_[source].share.is_half_free()) return false;
   return !wants_published_ || slot >= slots_.size() || slots_[slot].frames.is_half_free();
 }
 
-// RT-safe
-void RecordRings::decision(const pipeline::Decision& decision) noexcept {
+RT_SAFE void RecordRings::decision(const pipeline::Decision& decision) noexcept {
   StreamLosses* stream = find(decision.stream);
   if (stream == nullptr) return;
   Losses& lost = stream->decisions;
@@ -99,9 +97,8 @@ void RecordRings::decision(const pipeline::Decision& decision) noexcept {
   lost.lost_from_frame.store(std::min(before, first_frame_of(decision)), kRelaxed);
 }
 
-// RT-safe
-void RecordRings::published(std::uint32_t id, std::uint64_t sequence, bool raw,
-                            std::span<const std::byte> bytes) noexcept {
+RT_SAFE void RecordRings::published(std::uint32_t id, std::uint64_t sequence, bool raw,
+                                    std::span<const std::byte> bytes) noexcept {
   StreamLosses* stream = find(id);
   if (stream == nullptr) return;
   const FrameHeader header{.bytes = static_cast<std::uint32_t>(bytes.size()),
@@ -113,8 +110,7 @@ void RecordRings::published(std::uint32_t id, std::uint64_t sequence, bool raw,
       header.lost_before, [&] { return frames_.push(header, bytes); });
 }
 
-// RT-safe
-void RecordRings::unpublished(std::uint32_t id) noexcept {
+RT_SAFE void RecordRings::unpublished(std::uint32_t id) noexcept {
   if (!wants_published_) return;
   if (StreamLosses* stream = find(id)) stream->frames.total.fetch_add(1, kRelaxed);
 }
@@ -139,8 +135,8 @@ std::vector<RecordedStream> RecordRings::next_streams() {
   return std::exchange(streams_, {});
 }
 
-// The stream is nearly always the newest of its slot, or the one before. RT-safe.
-StreamLosses* RecordRings::find(std::uint32_t stream) const noexcept {
+// The stream is nearly always the newest of its slot, or the one before.
+RT_SAFE StreamLosses* RecordRings::find(std::uint32_t stream) const noexcept {
   const std::uint32_t slot = pipeline::slot_of(stream);
   if (slot >= slots_.size()) return nullptr;
   StreamLosses* found = slots_[slot].newest.load(std::memory_order_acquire);
@@ -148,8 +144,7 @@ StreamLosses* RecordRings::find(std::uint32_t stream) const noexcept {
   return found;
 }
 
-// RT-safe
-const StreamLosses* RecordRings::losses_of(std::uint32_t stream) const noexcept {
+RT_SAFE const StreamLosses* RecordRings::losses_of(std::uint32_t stream) const noexcept {
   return find(stream);
 }
 

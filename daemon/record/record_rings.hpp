@@ -52,8 +52,9 @@ struct FrameHeader {
 // Stands for "no frame"; compares as later than any frame.
 inline constexpr std::uint64_t kNoFrame = std::numeric_limits<std::uint64_t>::max();
 
-// The first frame of its stream that a decision concerns. RT-safe.
-[[nodiscard]] inline std::uint64_t first_frame_of(const pipeline::Decision& decision) noexcept {
+// The first frame of its stream that a decision concerns.
+RT_SAFE [[nodiscard]] inline std::uint64_t first_frame_of(
+    const pipeline::Decision& decision) noexcept {
   const bool of_samples = decision.kind == pipeline::Decision::Kind::kShedSamples;
   return of_samples ? kNoFrame : decision.sequence;
 }
@@ -107,7 +108,7 @@ class RecordRings final : public pipeline::RecordSink {
   void keep_model(std::span<const std::byte> bytes) override;
   // A take has the chunks from the newest one at its beginning up to the one before the newest at
   // its end, with all their items. So two takes in a row have each item once.
-  [[nodiscard]] Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) override;
+  Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) override;
   [[nodiscard]] std::optional<pipeline::Take> running_take() const { return takes_.running(); }
   [[nodiscard]] RecorderState state() const { return takes_.state(); }
 
@@ -158,8 +159,8 @@ class RecordRings final : public pipeline::RecordSink {
   // the single producer of this kind, which writes `put` for the other threads.
   struct Share {
     explicit Share(std::size_t size) noexcept : half(size / 2), share(size, taken) {}
-    // Any thread. RT-safe.
-    [[nodiscard]] bool is_half_free() const noexcept {
+    // Any thread.
+    RT_SAFE [[nodiscard]] bool is_half_free() const noexcept {
       const std::uint64_t now = taken.load(std::memory_order_acquire);
       return put.load(std::memory_order_relaxed) <= now + half;
     }

@@ -48,9 +48,8 @@ Result<> add_stream_row(log::Writer& writer, const RecordedStream& stream,
   StreamSettings settings = stream.settings;
   for (std::size_t i = 0; i < settings.stages.size(); ++i) {
     if (!stream.model_files[i]) continue;
-    auto hash = writer.add_blob(std::as_bytes(std::span(*stream.model_files[i])));
-    if (!hash) return std::unexpected(hash.error());
-    settings.stages[i].model_sha256 = std::move(*hash);
+    auto hash = TRY(writer.add_blob(std::as_bytes(std::span(*stream.model_files[i]))));
+    settings.stages[i].model_sha256 = std::move(hash);
   }
   return writer.add(log::StreamRow{.id = stream.id,
                                    .source = stream.source,

@@ -54,7 +54,7 @@ struct RecordedSetup {
 [[nodiscard]] RecordedStream recorded_stream(const devices::NewStream& stream);
 
 // Adds the stream's models and then its row. A row that is there already is replaced.
-[[nodiscard]] Result<> add_stream_row(log::Writer& writer, const RecordedStream& stream,
-                                      std::uint64_t first_item);
+Result<> add_stream_row(log::Writer& writer, const RecordedStream& stream,
+                        std::uint64_t first_item);
 
 }  // namespace posed::record

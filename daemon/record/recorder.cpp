@@ -47,26 +47,24 @@ std::map<std::string, std::string> meta_of(const RecorderOptions& options) {
 }  // namespace
 
 Result<log::Writer> begin_log(const RecorderOptions& options, const RecordedSetup& setup) {
-  auto writer = log::Writer::create(options.file, meta_of(options), options.overwrite);
-  if (!writer) return writer;
+  auto writer = TRY(log::Writer::create(options.file, meta_of(options), options.overwrite));
   for (const RecordedSource& source : setup.sources) {
-    if (auto done = writer->add(source.row); !done) return std::unexpected(done.error());
+    TRY(writer.add(source.row));
   }
-  if (auto done = writer->commit(); !done) return std::unexpected(done.error());
+  TRY(writer.commit());
   return writer;
 }
 
 Result<std::unique_ptr<Recorder>> Recorder::open(RecorderOptions options,
                                                  const RecordedSetup& setup) {
-  auto writer = begin_log(options, setup);
-  if (!writer) return std::unexpected(writer.error());
+  auto writer = TRY(begin_log(options, setup));
   const RingSizes sizes = ring_sizes(setup, options.frames);
   // Where no bodies come it is little.
   if (bodies_come(setup)) {
     spdlog::info("{}: {:.0f} MB of memory are set aside for what is on its way into the log",
                  options.file.string(), static_cast<double>(total_bytes(sizes)) / 1e6);
   }
-  return std::unique_ptr<Recorder>(new Recorder(std::move(options), sizes, std::move(*writer)));
+  return std::unique_ptr<Recorder>(new Recorder(std::move(options), sizes, std::move(writer)));
 }
 
 Recorder::Recorder(RecorderOptions options, const RingSizes& sizes, log::Writer writer)

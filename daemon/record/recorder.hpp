@@ -36,16 +36,15 @@ struct RecorderOptions {
 };
 
 // Creates the log, and writes and commits its content before the first chunk.
-[[nodiscard]] Result<log::Writer> begin_log(const RecorderOptions& options,
-                                            const RecordedSetup& setup);
+Result<log::Writer> begin_log(const RecorderOptions& options, const RecordedSetup& setup);
 
 class Recorder {
  public:
   static constexpr const char* kThreadName = "posed-record";
 
   // Creates the log and starts the thread.
-  [[nodiscard]] static Result<std::unique_ptr<Recorder>> open(RecorderOptions options,
-                                                              const RecordedSetup& setup);
+  static Result<std::unique_ptr<Recorder>> open(RecorderOptions options,
+                                                const RecordedSetup& setup);
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
   ~Recorder();
@@ -58,7 +57,7 @@ class Recorder {
 
   // Stops the thread, writes the rest and leaves a single file. Call once, after every thread that
   // uses record_sink() has ended.
-  [[nodiscard]] Result<> finish();
+  Result<> finish();
 
   // Any thread.
   [[nodiscard]] const system::Pulse& pulse() const noexcept { return pulse_; }

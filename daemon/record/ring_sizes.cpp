@@ -64,7 +64,7 @@ RingSizes ring_sizes(const RecordedSetup& setup, bool frames) {
   RingSizes sizes;
   const auto to_come =
       std::ranges::find_if(setup.sources, [](const auto& source) { return source.bodies > 0; });
-  const auto at_start = static_cast<std::size_t>(to_come - setup.sources.begin());
+  const std::size_t at_start = to_come - setup.sources.begin();
   const std::size_t per_source = kMinRings / std::max<std::size_t>(setup.sources.size(), 1);
   const std::size_t per_stream = kMinRings / std::max<std::size_t>(at_start, 1);
   double rate_to_come_hz = 0.0;  // the highest

@@ -71,7 +71,7 @@ std::optional<StageSettings> stage_of(const Json& json) {
                        .model_name = json.value("model_name", "")};
 }
 
-bool sound(const StreamSettings& settings) {
+bool valid(const StreamSettings& settings) {
   constexpr double kMaxSetting = 1e6;  // s, Hz: far beyond sense, far below overflow
   return settings.stale_after_s > 0.0 && settings.stale_after_s <= kMaxSetting &&
          settings.rate_hz >= 0.0 && settings.rate_hz <= kMaxSetting;
@@ -106,7 +106,7 @@ Result<StreamSettings> settings_from_json(const std::string& json, const std::st
       }
       settings.stages.push_back(std::move(*read));
     }
-    if (!sound(settings)) return fail("the log is damaged (a stream's settings are invalid)", file);
+    if (!valid(settings)) return fail("the log is damaged (a stream's settings are invalid)", file);
     return settings;
   } catch (const nlohmann::json::exception& error) {
     return fail("the log is damaged (a stream's settings: " + std::string(error.what()) + ")",

@@ -15,8 +15,7 @@ using pipeline::StreamSettings;
 [[nodiscard]] std::string to_json(const StreamSettings& settings);
 // `file` is the log's name, for the error. The partners of stages are the ids of streams, where the
 // log names them. Refuses stages that this version of posed does not have.
-[[nodiscard]] Result<StreamSettings> settings_from_json(const std::string& json,
-                                                        const std::string& file);
+Result<StreamSettings> settings_from_json(const std::string& json, const std::string& file);
 
 // source.config: the options with which a driver was opened.
 [[nodiscard]] std::string to_json(const drivers::Options& options);

@@ -33,8 +33,7 @@ class Takes {
  public:
   // `next_item`: the first item behind the mark. Returns the take that began or ended. Fails when
   // none runs that could be ended, or when there are too many.
-  [[nodiscard]] Result<pipeline::Take> mark(const pipeline::TakeMark& mark,
-                                            std::uint64_t next_item);
+  Result<pipeline::Take> mark(const pipeline::TakeMark& mark, std::uint64_t next_item);
   [[nodiscard]] std::optional<pipeline::Take> running() const;
   // Told by the recorder thread; the takes carry it on.
   void set_state(RecorderState state);

@@ -74,20 +74,15 @@ Result<std::unique_ptr<Broadcast>> Broadcast::open(const BroadcastOptions& optio
                   "; a replay knows no keys and publishes on this machine only: say --endpoint "
                   "tcp://127.0.0.1:5570");
   }
-  auto wake = system::EventFd::open();
-  if (!wake) return std::unexpected(wake.error());
+  auto wake = TRY(system::EventFd::open());
   const double frames_per_s = max_frames_per_s(replay);
   std::unique_ptr<Broadcast> self(
-      new Broadcast(options, replay, pipeline::ring_slots(frames_per_s), std::move(*wake)));
+      new Broadcast(options, replay, pipeline::ring_slots(frames_per_s), std::move(wake)));
   for (std::uint32_t id = 0; id < replay.streams(); ++id) {
     self->settings_.push_back(replay.stream(id).settings);
   }
-  auto context = net::open_context();
-  if (!context) return std::unexpected(context.error());
-  self->context_ = std::move(*context);
-  auto authenticator = net::ZapAuthenticator::start(self->context_.get(), std::nullopt);
-  if (!authenticator) return std::unexpected(authenticator.error());
-  self->authenticator_ = std::move(*authenticator);
+  self->context_ = TRY(net::open_context());
+  self->authenticator_ = TRY(net::ZapAuthenticator::start(self->context_.get(), std::nullopt));
   publish::PublisherOptions published;
   published.authenticator = self->authenticator_.get();
   published.context = self->context_.get();

@@ -54,8 +54,8 @@ class Broadcast {
  public:
   // Binds and starts the publisher's thread. A log holds no keys, so only loopback is allowed. The
   // replay outlives the broadcast.
-  [[nodiscard]] static Result<std::unique_ptr<Broadcast>> open(const BroadcastOptions& options,
-                                                               const Replay& replay);
+  static Result<std::unique_ptr<Broadcast>> open(const BroadcastOptions& options,
+                                                 const Replay& replay);
   ~Broadcast();  // publishes what is waiting, then ends
   Broadcast(const Broadcast&) = delete;
   Broadcast& operator=(const Broadcast&) = delete;

@@ -75,27 +75,22 @@ std::string first_difference(const v1::Frame& live, const v1::Frame& replayed) {
 
 Result<Expectation> Expectation::open(const log::Reader& reader) {
   const std::string& file = reader.file();
-  const auto has_frames = reader.has_frames();
-  if (!has_frames) return std::unexpected(has_frames.error());
-  if (!*has_frames) {
+  const auto has_frames = TRY(reader.has_frames());
+  if (!has_frames) {
     return fail("holds no published frames to expect; record with --frames", file);
   }
   Expectation expectation(file);
   for (const log::StreamRow& row : reader.streams()) {
     Stream stream{.name = row.name, .channels = {}, .may_lack = 0};
     for (const bool raw : {false, true}) {
-      auto frames = reader.frames(row.id, raw);
-      if (!frames) return std::unexpected(frames.error());
-      stream.channels[raw].emplace(Channel{std::move(*frames), std::nullopt, {}});
-      if (auto done = expectation.advance(*stream.channels[raw]); !done) {
-        return std::unexpected(done.error());
-      }
+      auto frames = TRY(reader.frames(row.id, raw));
+      stream.channels[raw].emplace(Channel{std::move(frames), std::nullopt, {}});
+      TRY(expectation.advance(*stream.channels[raw]));
     }
     expectation.streams_.push_back(std::move(stream));
   }
-  const auto gaps = reader.gaps();
-  if (!gaps) return std::unexpected(gaps.error());
-  for (const log::GapRow& gap : *gaps) {
+  const auto gaps = TRY(reader.gaps());
+  for (const log::GapRow& gap : gaps) {
     if (gap.kind == log::GapRow::Kind::kFrames) {
       expectation.streams_[*reader.place_of_stream(gap.owner)].may_lack += gap.lost;
     }
@@ -112,17 +107,16 @@ std::string Expectation::how_it_lacks(const Channel& channel) {
 
 Result<> Expectation::advance(Channel& channel) const {
   channel.difference.clear();
-  const auto row = channel.frames.next();
-  if (!row) return std::unexpected(row.error());
-  if (!row->has_value()) {
+  const auto row = TRY(channel.frames.next());
+  if (!row.has_value()) {
     channel.live.reset();
     return {};
   }
   channel.live.emplace();
-  const auto bytes = (*row)->bytes;
+  const auto bytes = row->bytes;
   if (!channel.live->ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
     return fail(
-        fmt::format("the log is damaged (published frame {} cannot be read)", (*row)->sequence),
+        fmt::format("the log is damaged (published frame {} cannot be read)", row->sequence),
         file_);
   }
   return {};
@@ -181,7 +175,7 @@ Result<> Expectation::finish(std::uint32_t id, std::optional<std::uint64_t> brok
       } else {
         ++counts_.after_gap;
       }
-      if (auto done = advance(channel); !done) return done;
+      TRY(advance(channel));
     }
   }
   return {};

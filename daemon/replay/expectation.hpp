@@ -21,17 +21,17 @@ namespace posed::replay {
 class Expectation {
  public:
   // The reader outlives it. For a log without frames the error says how to record one with frames.
-  [[nodiscard]] static Result<Expectation> open(const log::Reader& reader);
+  static Result<Expectation> open(const log::Reader& reader);
 
   // Compares the next frame of the replay. Streams are numbered as in Replay; `broken_at` is
   // Replay::broken_at() of the stream. The error at the first difference names stream, sequence and
   // field.
-  [[nodiscard]] Result<> compare(std::uint32_t stream, bool raw, const v1::Frame& replayed,
-                                 std::optional<std::uint64_t> broken_at);
+  Result<> compare(std::uint32_t stream, bool raw, const v1::Frame& replayed,
+                   std::optional<std::uint64_t> broken_at);
   // Call after the replay: an error if a published frame was not replayed.
-  [[nodiscard]] Result<> finish(std::uint32_t stream, std::optional<std::uint64_t> broken_at);
+  Result<> finish(std::uint32_t stream, std::optional<std::uint64_t> broken_at);
   // Call after all streams have finished: an error if not one frame could be compared.
-  [[nodiscard]] Result<> check_compared() const;
+  Result<> check_compared() const;
 
   struct Counts {
     std::uint64_t compared = 0;
@@ -61,9 +61,9 @@ class Expectation {
   };
   explicit Expectation(std::string file) : file_(std::move(file)) {}
   [[nodiscard]] static std::string how_it_lacks(const Channel& channel);
-  [[nodiscard]] Result<> advance(Channel& channel) const;
-  [[nodiscard]] Result<> differs(const Stream& stream, bool raw, std::uint64_t sequence,
-                                 const std::string& how) const;
+  Result<> advance(Channel& channel) const;
+  Result<> differs(const Stream& stream, bool raw, std::uint64_t sequence,
+                   const std::string& how) const;
 
   std::string file_;
   std::vector<Stream> streams_;

@@ -12,12 +12,12 @@ Replay::Replay(log::Reader& reader) : reader_(reader), models_(reader) {}
 
 Result<std::unique_ptr<Replay>> Replay::open(log::Reader& reader) {
   std::unique_ptr<Replay> replay(new Replay(reader));
-  if (auto done = replay->open_contexts(); !done) return std::unexpected(done.error());
-  if (auto done = replay->open_sources(); !done) return std::unexpected(done.error());
-  if (auto done = replay->load_descriptions(); !done) return std::unexpected(done.error());
-  if (auto done = replay->build_streams(); !done) return std::unexpected(done.error());
-  if (auto done = replay->load_decisions(); !done) return std::unexpected(done.error());
-  if (auto done = replay->load_gaps(); !done) return std::unexpected(done.error());
+  TRY(replay->open_contexts());
+  TRY(replay->open_sources());
+  TRY(replay->load_descriptions());
+  TRY(replay->build_streams());
+  TRY(replay->load_decisions());
+  TRY(replay->load_gaps());
   for (const auto& context : replay->contexts_) context->ready();
   return replay;
 }
@@ -31,10 +31,9 @@ Result<> Replay::open_contexts() {
   }
   for (const log::StreamRow& row : streams) {
     const auto index = static_cast<std::uint32_t>(contexts_.size());
-    auto context = ReplayStreamContext::open(index, reader_.source_of(row), row, models_, *this,
-                                             reader_.file());
-    if (!context) return std::unexpected(context.error());
-    contexts_.push_back(std::move(*context));
+    auto context = TRY(ReplayStreamContext::open(index, reader_.source_of(row), row, models_, *this,
+                                                 reader_.file()));
+    contexts_.push_back(std::move(context));
   }
   routes.reserve(contexts_.size());
   return {};
@@ -48,9 +47,7 @@ Result<> Replay::open_sources() {
       if (reader_.streams()[i].source == row.id) streams.push_back(contexts_[i].get());
     }
     if (streams.empty()) continue;  // nothing of it was published
-    auto opened = ReplaySource::open(row, std::move(streams), *this, reader_.file());
-    if (!opened) return std::unexpected(opened.error());
-    source = std::move(*opened);
+    source = TRY(ReplaySource::open(row, std::move(streams), *this, reader_.file()));
   }
   return {};
 }
@@ -58,7 +55,7 @@ Result<> Replay::open_sources() {
 Result<> Replay::build_streams() {
   std::vector<Built> built(contexts_.size(), Built::kNo);
   for (std::size_t i = 0; i < contexts_.size(); ++i) {
-    if (auto done = build_stream(i, built); !done) return done;
+    TRY(build_stream(i, built));
   }
   return {};
 }
@@ -76,7 +73,7 @@ Result<> Replay::build_stream(std::size_t stream, std::vector<Built>& built) {
   std::vector<const ReplayStreamContext*> partners;
   for (std::size_t i = 0; i < contexts_.size(); ++i) {
     if (!context.has_partner(*contexts_[i]) || !contexts_[i]->stream().described) continue;
-    if (auto done = build_stream(i, built); !done) return done;
+    TRY(build_stream(i, built));
     partners.push_back(contexts_[i].get());
   }
   built[stream] = Built::kYes;
@@ -93,26 +90,23 @@ Result<> Replay::load_descriptions() {
 ReplaySource* Replay::source_of(std::uint32_t log_id) const {
   const auto& rows = reader_.sources();
   const auto found = std::ranges::lower_bound(rows, log_id, {}, &log::SourceRow::id);
-  return sources_[static_cast<std::size_t>(found - rows.begin())].get();
+  return sources_[found - rows.begin()].get();
 }
 
 Result<> Replay::load_decisions() {
-  auto rows = reader_.decisions();
-  if (!rows) return std::unexpected(rows.error());
-  for (log::DecisionRow& row : *rows) {
-    const auto decision = record::decision_of(row, reader_.file());
-    if (!decision) return std::unexpected(decision.error());
+  auto rows = TRY(reader_.decisions());
+  for (log::DecisionRow& row : rows) {
+    const auto decision = TRY(record::decision_of(row, reader_.file()));
     const std::size_t stream = *reader_.place_of_stream(row.stream);
-    if (auto done = contexts_[stream]->expect(*decision); !done) return done;
+    TRY(contexts_[stream]->expect(decision));
     schedule_.add({stream, std::move(row)});
   }
   return {};
 }
 
 Result<> Replay::load_gaps() {
-  const auto gaps = reader_.gaps();
-  if (!gaps) return std::unexpected(gaps.error());
-  for (const log::GapRow& gap : *gaps) {
+  const auto gaps = TRY(reader_.gaps());
+  for (const log::GapRow& gap : gaps) {
     for (std::size_t i = 0; i < contexts_.size(); ++i) {
       const log::StreamRow& row = reader_.streams()[i];
       const bool chunks = gap.kind == log::GapRow::Kind::kChunks && row.source == gap.owner;
@@ -177,14 +171,13 @@ const pipeline::StreamEngine* Replay::engine(std::uint32_t stream) const {
 Result<> Replay::run(const Out& out, const Pace& pace) {
   out_ = &out;
   for (;;) {
-    const auto chunk = reader_.next_chunk();
-    if (!chunk) return std::unexpected(chunk.error());
-    if (!chunk->has_value()) break;
-    if (!pace(**chunk)) return {};
-    apply_gaps((*chunk)->id);
-    ReplaySource* const source = source_of((*chunk)->source);
+    const auto chunk = TRY(reader_.next_chunk());
+    if (!chunk.has_value()) break;
+    if (!pace(*chunk)) return {};
+    apply_gaps(chunk->id);
+    ReplaySource* const source = source_of(chunk->source);
     if (source == nullptr) continue;
-    if (auto fed = source->feed(**chunk); !fed) return fed;
+    TRY(source->feed(*chunk));
     if (error_) return std::unexpected(*error_);
   }
   apply_gaps(std::numeric_limits<std::int64_t>::max());

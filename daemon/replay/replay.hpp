@@ -28,7 +28,7 @@ class Replay final : private ReplayHost {
   // Builds decoders, models and engines of all streams. Those of bodies that come later than the
   // first ones of their source are built again when they come, so that few are in memory. The
   // reader outlives the replay.
-  [[nodiscard]] static Result<std::unique_ptr<Replay>> open(log::Reader& reader);
+  static Result<std::unique_ptr<Replay>> open(log::Reader& reader);
   ~Replay() override = default;
 
   [[nodiscard]] std::uint32_t streams() const {
@@ -43,7 +43,7 @@ class Replay final : private ReplayHost {
   using Out = std::function<void(const pipeline::Item&)>;
   // Called before each chunk; false ends the replay there.
   using Pace = std::function<bool(const log::ChunkRow&)>;
-  [[nodiscard]] Result<> run(const Out& out, const Pace& pace);
+  Result<> run(const Out& out, const Pace& pace);
 
   // Call before run(): `decided` receives each decision as it takes effect, with the number of the
   // item before which it does.
@@ -66,14 +66,14 @@ class Replay final : private ReplayHost {
 
  private:
   explicit Replay(log::Reader& reader);
-  [[nodiscard]] Result<> open_contexts();
-  [[nodiscard]] Result<> open_sources();
-  [[nodiscard]] Result<> load_descriptions();
+  Result<> open_contexts();
+  Result<> open_sources();
+  Result<> load_descriptions();
   enum class Built : std::uint8_t { kNo, kUnderWay, kYes };
-  [[nodiscard]] Result<> build_streams();
-  [[nodiscard]] Result<> build_stream(std::size_t stream, std::vector<Built>& built);
-  [[nodiscard]] Result<> load_decisions();
-  [[nodiscard]] Result<> load_gaps();
+  Result<> build_streams();
+  Result<> build_stream(std::size_t stream, std::vector<Built>& built);
+  Result<> load_decisions();
+  Result<> load_gaps();
   void set_gap(std::size_t stream, std::int64_t after_chunk);
   void apply_gaps(std::int64_t chunk);
   void apply(const Schedule::Entry& entry, std::uint64_t item) noexcept;

@@ -9,9 +9,8 @@ Result<std::unique_ptr<const StageModel>> ReplayModels::bind(const std::string& 
                                                              const StageContext& context) {
   auto found = files_.find(hash);
   if (found == files_.end()) {
-    auto bytes = reader_.blob(hash);
-    if (!bytes) return std::unexpected(bytes.error());
-    found = files_.emplace(hash, std::move(*bytes)).first;
+    auto bytes = TRY(reader_.blob(hash));
+    found = files_.emplace(hash, std::move(bytes)).first;
   }
   return type.bind_model(found->second, context, "the log's model " + hash.substr(0, 12));
 }

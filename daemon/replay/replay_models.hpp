@@ -22,9 +22,8 @@ class ReplayModels {
 
   // Binds the model stored under `hash` for a stage. Errors name the model. If binding has
   // succeeded once it succeeds again.
-  [[nodiscard]] Result<std::unique_ptr<const StageModel>> bind(const std::string& hash,
-                                                               const StageType& type,
-                                                               const StageContext& context);
+  Result<std::unique_ptr<const StageModel>> bind(const std::string& hash, const StageType& type,
+                                                 const StageContext& context);
 
  private:
   const log::Reader& reader_;

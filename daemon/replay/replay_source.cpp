@@ -45,17 +45,15 @@ Result<std::unique_ptr<ReplaySource>> ReplaySource::open(const log::SourceRow& s
                 file);
   }
   auto self = std::make_unique<ReplaySource>(*driver, source, std::move(streams), host, file);
-  if (auto done = self->open_device(); !done) return std::unexpected(done.error());
+  TRY(self->open_device());
   return self;
 }
 
 Result<> ReplaySource::open_device() {
-  auto description = driver_.describe(source_.text, source_.identity);
-  if (!description) return std::unexpected(description.error());
-  auto decoder = driver_.make_decoder(*description);
-  if (!decoder) return std::unexpected(decoder.error());
-  device_ = std::move(*description);
-  decoder_ = std::move(*decoder);
+  auto description = TRY(driver_.describe(source_.text, source_.identity));
+  auto decoder = TRY(driver_.make_decoder(description));
+  device_ = std::move(description);
+  decoder_ = std::move(decoder);
   if (has_several()) return {};
   // Its stream may have been built several times, in one slot.
   const auto is_other = [this](const ReplayStreamContext* stream) {
@@ -89,10 +87,9 @@ Result<std::shared_ptr<const drivers::SourceLayout>> ReplaySource::layout_of(
     std::span<const std::byte> description) {
   std::string hash = log::sha256_hex(description);
   if (const auto known = layouts_.find(hash); known != layouts_.end()) return known->second;
-  auto made = driver_.make_layout(description);
-  if (!made) return std::unexpected(made.error());
+  auto made = TRY(driver_.make_layout(description));
   if (layouts_.size() == kKeptLayouts) layouts_.clear();
-  return layouts_.emplace(std::move(hash), std::move(*made)).first->second;
+  return layouts_.emplace(std::move(hash), std::move(made)).first->second;
 }
 
 // Checks everything that a description row says.
@@ -143,20 +140,19 @@ Result<ReplaySource::Bodies> ReplaySource::bodies_of(const log::ChunkRow& row) {
 
 // The rate is the one to which the live run bound the models.
 Result<> ReplaySource::expect(const log::ChunkRow& row) {
-  const auto bodies = bodies_of(row);
-  if (!bodies) return std::unexpected(bodies.error());
+  const auto bodies = TRY(bodies_of(row));
   const bool at_once = !std::exchange(described_, true);
-  for (std::size_t i = 0; i < bodies->streams.size(); ++i) {
-    ReplayStreamContext* const stream = bodies->streams[i];
+  for (std::size_t i = 0; i < bodies.streams.size(); ++i) {
+    ReplayStreamContext* const stream = bodies.streams[i];
     if (stream == nullptr || stream->stream().described) continue;
-    const drivers::Body& body = bodies_in(bodies->layout)[i];
+    const drivers::Body& body = bodies_in(bodies.layout)[i];
     drivers::Description description = device_;
     description.skeleton = body.skeleton;
     description.samples = body.samples;
     description.rate_hz = stream->stream().settings.rate_hz;
     // The bodies of the first description come at once; the engine of a later one would wait long,
     // and there may be thousands.
-    if (auto done = stream->describe(std::move(description), !at_once); !done) return done;
+    TRY(stream->describe(std::move(description), !at_once));
   }
   return {};
 }
@@ -209,16 +205,15 @@ Result<> ReplaySource::find_place(const log::ChunkRow& chunk) {
 // Swaps the bodies as the live reader does. The ends of those who leave were decided at items
 // before this row; what was decided at the next item may be for those who come.
 Result<> ReplaySource::use_bodies(const log::ChunkRow& row) {
-  const auto bodies = bodies_of(row);
-  if (!bodies) return std::unexpected(bodies.error());
+  const auto bodies = TRY(bodies_of(row));
   if (row.first_item > 0) host_.reach(row.first_item - 1);
   for (ReplayStreamContext* const stream : places_) {
-    if (std::ranges::count(bodies->streams, stream) == 0) stream->leave(row.arrival_ns);
+    if (std::ranges::count(bodies.streams, stream) == 0) stream->leave(row.arrival_ns);
   }
   const std::vector<ReplayStreamContext*> before = std::exchange(places_, {});
   positions_.clear();
   auto place = row.places.begin();
-  for (ReplayStreamContext* const stream : bodies->streams) {
+  for (ReplayStreamContext* const stream : bodies.streams) {
     if (stream == nullptr) {
       positions_.push_back({.stream = pipeline::kNoStream});
       continue;
@@ -229,15 +224,15 @@ Result<> ReplaySource::use_bodies(const log::ChunkRow& row) {
   }
   intake_.set_streams(positions_);
   arrived(row, {});
-  if (bodies->layout) decoder_->use(*bodies->layout);
-  layout_ = bodies->layout;
+  if (bodies.layout) decoder_->use(*bodies.layout);
+  layout_ = bodies.layout;
   return {};
 }
 
 Result<> ReplaySource::feed(const log::ChunkRow& chunk) {
   const auto direction = static_cast<pipeline::Direction>(chunk.direction);
   if (direction == pipeline::Direction::kDescription) return use_bodies(chunk);
-  if (auto found = find_place(chunk); !found) return found;
+  TRY(find_place(chunk));
   switch (direction) {
     case pipeline::Direction::kFromDevice:
       decoder_->feed_socket(static_cast<std::uint8_t>(chunk.socket), chunk.bytes, arrival_ns_,
@@ -257,12 +252,9 @@ Result<> ReplaySource::feed(const log::ChunkRow& chunk) {
 
 // The device came back, perhaps with other properties; what the pipeline was bound to stays.
 Result<> ReplaySource::use_device(const std::string& info) {
-  auto description = driver_.describe(info, source_.identity);
-  if (!description) return std::unexpected(description.error());
-  auto decoder = driver_.make_decoder(*description);
-  if (!decoder) return std::unexpected(decoder.error());
-  decoder_ = std::move(*decoder);
-  device_ = std::move(*description);
+  auto description = TRY(driver_.describe(info, source_.identity));
+  decoder_ = TRY(driver_.make_decoder(description));
+  device_ = std::move(description);
   intake_.new_link();
   if (calibration_) use_calibration();
   if (layout_) decoder_->use(*layout_);
@@ -272,9 +264,7 @@ Result<> ReplaySource::use_device(const std::string& info) {
 Result<> ReplaySource::calibrate(const std::string& toml) {
   drivers::Description device = device_;
   device.identity.clear();  // the live run has checked to which device it belongs
-  auto compiled = devices::compile_calibration(device, toml, "the log's calibration");
-  if (!compiled) return std::unexpected(compiled.error());
-  calibration_ = std::move(*compiled);
+  calibration_ = TRY(devices::compile_calibration(device, toml, "the log's calibration"));
   use_calibration();
   return {};
 }

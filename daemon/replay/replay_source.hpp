@@ -24,19 +24,19 @@ class ReplaySource final : private pipeline::IntakeOut {
  public:
   // `streams` are those of the source, by their ids in the log; at least one. They, the row and the
   // host outlive the object.
-  [[nodiscard]] static Result<std::unique_ptr<ReplaySource>> open(
-      const log::SourceRow& source, std::vector<ReplayStreamContext*> streams, ReplayHost& host,
-      const std::string& file);
+  static Result<std::unique_ptr<ReplaySource>> open(const log::SourceRow& source,
+                                                    std::vector<ReplayStreamContext*> streams,
+                                                    ReplayHost& host, const std::string& file);
   ReplaySource(const drivers::Driver& driver, const log::SourceRow& source,
                std::vector<ReplayStreamContext*> streams, ReplayHost& host, std::string file);
 
   // Before the first chunk, for each description of the source in the log's order: checks it, and
   // describes the streams that it is the first to name.
-  [[nodiscard]] Result<> expect(const log::ChunkRow& row);
+  Result<> expect(const log::ChunkRow& row);
   // The log lacks chunks, and perhaps descriptions, after this chunk.
   void set_gap(std::int64_t after_chunk);
 
-  [[nodiscard]] Result<> feed(const log::ChunkRow& chunk);
+  Result<> feed(const log::ChunkRow& chunk);
 
   // The number that the next sample of the stream with this index will get; 0 if it has none now.
   [[nodiscard]] std::uint64_t next_sample(std::uint32_t stream) const noexcept;
@@ -47,14 +47,14 @@ class ReplaySource final : private pipeline::IntakeOut {
     std::vector<ReplayStreamContext*> streams{};            // [body], null: nobody wanted it
   };
 
-  [[nodiscard]] Result<> open_device();
-  [[nodiscard]] Result<Bodies> bodies_of(const log::ChunkRow& row);
-  [[nodiscard]] Result<std::shared_ptr<const drivers::SourceLayout>> layout_of(
+  Result<> open_device();
+  Result<Bodies> bodies_of(const log::ChunkRow& row);
+  Result<std::shared_ptr<const drivers::SourceLayout>> layout_of(
       std::span<const std::byte> description);
-  [[nodiscard]] Result<> use_bodies(const log::ChunkRow& row);
-  [[nodiscard]] Result<> find_place(const log::ChunkRow& chunk);
-  [[nodiscard]] Result<> use_device(const std::string& info);
-  [[nodiscard]] Result<> calibrate(const std::string& toml);
+  Result<> use_bodies(const log::ChunkRow& row);
+  Result<> find_place(const log::ChunkRow& chunk);
+  Result<> use_device(const std::string& info);
+  Result<> calibrate(const std::string& toml);
   void use_calibration();
   void arrived(const log::ChunkRow& chunk, std::span<const pipeline::StreamPosition> positions);
   // Null if the source does not have the stream.

@@ -26,9 +26,8 @@ Result<std::unique_ptr<ReplayStreamContext>> ReplayStreamContext::open(
   self->stream_.first_item = stream.first_item;
   self->stream_.is_there_from_start =
       stream.body.empty() && pipeline::generation_of(stream.id) == 0;
-  auto settings = record::settings_from_json(stream.stages_json, file);
-  if (!settings) return std::unexpected(settings.error());
-  self->stream_.settings = std::move(*settings);
+  auto settings = TRY(record::settings_from_json(stream.stages_json, file));
+  self->stream_.settings = std::move(settings);
   return self;
 }
 
@@ -69,10 +68,9 @@ Result<> ReplayStreamContext::build(std::span<const ReplayStreamContext* const> 
                                               .rate_hz = partner->stream_.settings.rate_hz}};
   }
   if (auto found = pipeline::find_partners(settings, known); !found) return about(found.error());
-  auto published = pipeline::published_skeleton(settings, stream_.description.skeleton);
-  if (!published) return std::unexpected(published.error());
-  stream_.published = std::move(*published);
-  if (auto made = make_engine(); !made) return made;
+  auto published = TRY(pipeline::published_skeleton(settings, stream_.description.skeleton));
+  stream_.published = std::move(published);
+  TRY(make_engine());
   if (waits_) set_aside();
   return {};
 }
@@ -89,9 +87,8 @@ Result<> ReplayStreamContext::make_engine() {
   std::vector<const StageModel*> borrowed;
   for (std::size_t i = 0; i < settings.stages.size(); ++i) {
     if (!settings.stages[i].model_sha256.empty()) {
-      auto bound = bind(i, settings.stages[i].model_sha256);
-      if (!bound) return std::unexpected(bound.error());
-      models_in_use_[i] = std::move(*bound);
+      auto bound = TRY(bind(i, settings.stages[i].model_sha256));
+      models_in_use_[i] = std::move(bound);
     }
     borrowed.push_back(models_in_use_[i].get());
   }
@@ -132,9 +129,8 @@ Result<std::unique_ptr<const StageModel>> ReplayStreamContext::bind(std::size_t 
   const record::StreamSettings& settings = stream_.settings;
   const StageType& type = *settings.stages[stage].type;
   if (!type.has_model()) return fail("stage " + std::string(type.name) + " has no model", file_);
-  const auto context = pipeline::stage_context(settings, stage, stream_.description.skeleton);
-  if (!context) return std::unexpected(context.error());
-  return models_.bind(hash, type, *context);
+  const auto context = TRY(pipeline::stage_context(settings, stage, stream_.description.skeleton));
+  return models_.bind(hash, type, context);
 }
 
 // Index of the stage; empty if the stream does not have it: then the live run ignored the change,
@@ -161,8 +157,7 @@ Result<> ReplayStreamContext::expect(const pipeline::Decision& decision) {
       const bool is_model = decision.change.kind == pipeline::StageChange::Kind::kModel;
       if (!is_model || !stage || !stream_.described) return {};
       if (!tried_.emplace(*stage, hash).second) return {};
-      const auto bound = bind(*stage, hash);
-      if (!bound) return std::unexpected(bound.error());
+      TRY(bind(*stage, hash));
       return {};
     }
     default:

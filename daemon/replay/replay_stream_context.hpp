@@ -67,26 +67,28 @@ class ReplayHost {
 class ReplayStreamContext final : private pipeline::EngineOut {
  public:
   // Published items have `index` as their stream. Host and models outlive the object.
-  [[nodiscard]] static Result<std::unique_ptr<ReplayStreamContext>> open(
-      std::uint32_t index, const log::SourceRow& source, const log::StreamRow& stream,
-      ReplayModels& models, ReplayHost& host, const std::string& file);
+  static Result<std::unique_ptr<ReplayStreamContext>> open(std::uint32_t index,
+                                                           const log::SourceRow& source,
+                                                           const log::StreamRow& stream,
+                                                           ReplayModels& models, ReplayHost& host,
+                                                           const std::string& file);
   ReplayStreamContext(std::uint32_t index, std::uint32_t log_id, ReplayModels& models,
                       ReplayHost& host, std::string file);
 
   // What the device says of the stream's body. `waits`: it comes late, so that its engine is freed
   // until then.
-  [[nodiscard]] Result<> describe(drivers::Description description, bool waits);
+  Result<> describe(drivers::Description description, bool waits);
   // The streams that its stages have as partners, by their ids in the log or, in an older log, by
   // their names.
   [[nodiscard]] bool has_partner(const ReplayStreamContext& other) const;
   // After describe(), and after build() of its partners: makes the models and the engine, so that
   // nothing can fail later.
-  [[nodiscard]] Result<> build(std::span<const ReplayStreamContext* const> partners);
+  Result<> build(std::span<const ReplayStreamContext* const> partners);
 
   // Before the first chunk, after describe(), for each decision of the stream in the log's order:
   // loads what the decision needs, so that nothing can fail later, and remembers which frames never
   // reached the engine.
-  [[nodiscard]] Result<> expect(const pipeline::Decision& decision);
+  Result<> expect(const pipeline::Decision& decision);
   // The log lacks chunks or decisions after this chunk.
   void set_gap(std::int64_t after_chunk);
   // Call after the last expect() and set_gap().
@@ -124,14 +126,13 @@ class ReplayStreamContext final : private pipeline::EngineOut {
   [[nodiscard]] const pipeline::StreamEngine* engine() const noexcept { return engine_.get(); }
 
  private:
-  [[nodiscard]] Result<> make_engine();
+  Result<> make_engine();
   void set_aside();
   [[nodiscard]] std::unexpected<Error> about(Error error) const;
   // Makes it when it is first needed; null if there is none.
   [[nodiscard]] pipeline::StreamEngine* needed_engine() noexcept;
   [[nodiscard]] std::optional<std::size_t> stage_of(const pipeline::StageChange& change) const;
-  [[nodiscard]] Result<std::unique_ptr<const StageModel>> bind(std::size_t stage,
-                                                               const std::string& hash);
+  Result<std::unique_ptr<const StageModel>> bind(std::size_t stage, const std::string& hash);
   void change(const pipeline::Decision& decision) noexcept;
   void end(std::int64_t now_ns) noexcept;
 

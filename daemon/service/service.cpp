@@ -14,7 +14,7 @@ namespace posed::service {
 namespace {
 
 // Between two looks a thread may sleep that long, and needs as long again on a busy machine.
-constexpr std::int64_t kLeastWithin_ns = 2 * Watchdog::kLooks * system::kLongestSleep_ns;
+constexpr std::int64_t kMinWatchdog_ns = 2 * Watchdog::kLooks * system::kMaxSleep_ns;
 
 }  // namespace
 
@@ -23,32 +23,32 @@ Service::Service(std::vector<system::ThreadPulse> threads)
   std::uint64_t within_us = 0;
   if (!present_ || ::sd_watchdog_enabled(0, &within_us) <= 0) return;
   const auto within_ns = static_cast<std::int64_t>(within_us) * 1000;
-  if (within_ns < kLeastWithin_ns) {
+  if (within_ns < kMinWatchdog_ns) {
     spdlog::warn("WatchdogSec is too short for signs of life in time; set it to {} s or more",
-                 kLeastWithin_ns / kNanosPerSecond);
+                 kMinWatchdog_ns / kNanosPerSecond);
   }
   watchdog_.emplace(std::move(threads), within_ns, system::waits_for_disk);
 }
 
-void Service::tell(const std::string& words) {
+void Service::notify(const std::string& words) {
   if (!present_) return;
   if (const int sent = ::sd_notify(0, words.c_str()); sent < 0 && !std::exchange(warned_, true)) {
     spdlog::warn("systemd cannot be told of this daemon's state ({})", errno_text(-sent));
   }
 }
 
-void Service::ready() { tell("READY=1"); }
+void Service::ready() { notify("READY=1"); }
 
 void Service::reloading() {
-  tell("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(system::monotonic_ns() / 1000));
+  notify("RELOADING=1\nMONOTONIC_USEC=" + std::to_string(system::monotonic_ns() / 1000));
 }
 
-void Service::stopping() { tell("STOPPING=1\nSTATUS=ending"); }
+void Service::stopping() { notify("STOPPING=1\nSTATUS=ending"); }
 
 void Service::status(const std::string& sentence) {
   if (sentence == status_) return;
   status_ = sentence;
-  tell("STATUS=" + sentence);
+  notify("STATUS=" + sentence);
 }
 
 void Service::turn(std::int64_t now_ns) {
@@ -64,7 +64,7 @@ void Service::turn(std::int64_t now_ns) {
                  thread);
   }
   for (const std::string& thread : found.again) spdlog::warn("the thread {} goes on", thread);
-  if (found.alive) tell("WATCHDOG=1");
+  if (found.alive) notify("WATCHDOG=1");
 }
 
 }  // namespace posed::service

@@ -34,7 +34,7 @@ class Service {
   void turn(std::int64_t now_ns);
 
  private:
-  void tell(const std::string& words);
+  void notify(const std::string& words);
 
   bool present_;
   bool warned_ = false;

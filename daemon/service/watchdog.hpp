@@ -23,7 +23,7 @@ class Watchdog {
   using WaitsForDisk = std::function<bool(const std::string&)>;
 
   // The service manager wants a sign of life every `within_ns`. A kLooks-th of it has to be longer
-  // than system::kLongestSleep_ns.
+  // than system::kMaxSleep_ns.
   Watchdog(std::vector<system::ThreadPulse> threads, std::int64_t within_ns,
            WaitsForDisk waits_for_disk);
 

@@ -5,12 +5,12 @@
 #include <cstdint>
 #include <ctime>
 
+#include "proto/frame/rt_safe.hpp"
 #include "proto/frame/time.hpp"
 
 namespace posed::system {
 
-// RT-safe
-inline std::int64_t monotonic_ns() noexcept {
+RT_SAFE inline std::int64_t monotonic_ns() noexcept {
   timespec now{};
   clock_gettime(CLOCK_MONOTONIC, &now);
   return std::int64_t{now.tv_sec} * kNanosPerSecond + now.tv_nsec;

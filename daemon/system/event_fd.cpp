@@ -92,7 +92,7 @@ std::span<const std::uint32_t> Poller::wait(std::int64_t timeout_ns) noexcept {
   }
   std::size_t ready = 0;
   for (int i = 0; i < count; ++i) {
-    const std::uint32_t key = events[static_cast<std::size_t>(i)].data.u32;
+    const std::uint32_t key = events[i].data.u32;
     if (key != kWakeKey) ready_[ready++] = key;
   }
   return std::span(ready_).first(ready);

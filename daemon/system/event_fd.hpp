@@ -19,7 +19,7 @@ namespace posed::system {
 
 class EventFd {
  public:
-  [[nodiscard]] static Result<std::unique_ptr<EventFd>> open();
+  static Result<std::unique_ptr<EventFd>> open();
   EventFd(const EventFd&) = delete;
   EventFd& operator=(const EventFd&) = delete;
 
@@ -53,9 +53,9 @@ class EventFd {
 inline constexpr std::int64_t kForever_ns = std::numeric_limits<std::int64_t>::max();
 
 // How long a thread may sleep when its next turn is due at `due_ns`: never negative, and never so
-// long that it seems to be stuck. RT-safe.
-[[nodiscard]] inline std::int64_t time_left_ns(std::int64_t due_ns, Clock clock) noexcept {
-  return std::clamp<std::int64_t>(due_ns - clock(), 0, kLongestSleep_ns);
+// long that it seems to be stuck.
+RT_SAFE [[nodiscard]] inline std::int64_t time_left_ns(std::int64_t due_ns, Clock clock) noexcept {
+  return std::clamp<std::int64_t>(due_ns - clock(), 0, kMaxSleep_ns);
 }
 
 // Sleeps for `time_ns`, whatever happens; returns at once if that is 0. One system call; RT-safe
@@ -64,15 +64,15 @@ void rest(std::int64_t time_ns) noexcept;
 
 class Poller {
  public:
-  [[nodiscard]] static Result<std::unique_ptr<Poller>> open();
+  static Result<std::unique_ptr<Poller>> open();
   ~Poller();
   Poller(const Poller&) = delete;
   Poller& operator=(const Poller&) = delete;
 
   // Adds an EventFd; it is edge-triggered, so that it never needs to be read.
-  [[nodiscard]] Result<> add(const EventFd& wake);
+  Result<> add(const EventFd& wake);
   // Adds a device's descriptor; it is level-triggered, and wait() returns its `key`.
-  [[nodiscard]] Result<> add(int fd, std::uint32_t key);
+  Result<> add(int fd, std::uint32_t key);
   // Removes the descriptor of a device that has ended; it would stay readable for ever.
   void remove(int fd) noexcept;
 

@@ -137,9 +137,7 @@ int parse_and_run(int argc, char** argv, CLI::App& app, const int& exit_code) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     const std::string unknown =
-        error.get_exit_code() == 0
-            ? ""
-            : unknown_word(app, std::span(argv, static_cast<std::size_t>(argc)).subspan(1));
+        error.get_exit_code() == 0 ? "" : unknown_word(app, std::span(argv, argc).subspan(1));
     if (!unknown.empty()) return report(misuse(unknown + " (--help tells more)").error());
     const bool asked_for_help = app.exit(error) == 0;
     return static_cast<int>(asked_for_help ? ExitCode::kDone : ExitCode::kWrongUse);

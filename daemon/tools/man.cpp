@@ -133,9 +133,9 @@ Result<> write_pages(const CLI::App& app, const fs::path& folder, bool overwrite
   }
   OutputFiles files(overwrite);
   for (const auto& [file, text] : pages) files.writes(file, {".1"});
-  if (auto ok = files.check(); !ok) return ok;
+  TRY(files.check());
   for (const auto& [file, text] : pages) {
-    if (auto ok = write_man_page(file, text); !ok) return ok;
+    TRY(write_man_page(file, text));
   }
   return {};
 }

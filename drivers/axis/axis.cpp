@@ -17,12 +17,12 @@ constexpr std::string_view kConnect = "127.0.0.1:7001";
 constexpr std::string_view kListen = "127.0.0.1:7002";
 constexpr std::array<std::string_view, 2> kLinks{"tcp", "udp"};
 constexpr double kEmulatedRate_hz = 60.0;
-constexpr double kSlowest_hz = 1.0;
+constexpr double kMinRate_hz = 1.0;
 constexpr double kMaxSplit = 64 * 1024;
 
 // 0: unknown.
 bool is_rate(double rate_hz) {
-  return rate_hz == 0.0 || (rate_hz >= kSlowest_hz && rate_hz <= kMaxRate_hz);
+  return rate_hz == 0.0 || (rate_hz >= kMinRate_hz && rate_hz <= kMaxRate_hz);
 }
 
 std::string device_info_of(const StreamSettings& settings) {
@@ -37,7 +37,7 @@ Result<StreamSettings> read_device_info(const std::string& text, const std::stri
   settings.datagrams = reader.choice("link", kLinks) == 1;
   settings.order = static_cast<std::uint8_t>(reader.choice("order", kOrderNames));
   const auto rate_hz = clip::parse_number(reader.word("rate"));
-  if (const auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
+  TRY(reader.finish());
   if (!rate_hz || !is_rate(*rate_hz)) {
     return fail("the device info of 'axis' has a rate that cannot be; the log is damaged",
                 identity);
@@ -107,7 +107,7 @@ struct Axis : SourceType<Axis> {
         .rate_hz = rate_hz};
   }
   static Result<std::string> check(const Options& options, const Settings& /*settings*/) {
-    if (const auto ok = check_network(options); !ok) return std::unexpected(ok.error());
+    TRY(check_network(options));
     return network_identity(options);
   }
   static Result<std::unique_ptr<Decoder>> decoder(const Settings& settings,

@@ -82,8 +82,8 @@ constexpr Proportions kProportions = [] {
   return all;
 }();
 
-// The axis along which a bone points in T-pose; 3 for other bones. RT-safe.
-std::size_t axis_of(const Vec3f& offset) noexcept {
+// The axis along which a bone points in T-pose; 3 for other bones.
+RT_SAFE std::size_t axis_of(const Vec3f& offset) noexcept {
   std::size_t found = 3;
   for (std::size_t i = 0; i < 3; ++i) {
     if (offset[i] == 0.0F) continue;
@@ -105,8 +105,7 @@ Vec3f bone_end_cm(std::size_t bone) noexcept { return kRows[bone].end_cm; }
 
 const Proportions& default_proportions() noexcept { return kProportions; }
 
-// RT-safe.
-Vec3f offset_from(std::size_t bone, const Vec3f& displacement_cm) noexcept {
+RT_SAFE Vec3f offset_from(std::size_t bone, const Vec3f& displacement_cm) noexcept {
   constexpr float kNear = 0.966F;  // cosine of 15 degrees; the shifts turn a bone by less than 5
   const std::size_t axis = axis_of(kProportions[bone]);
   if (axis == 3) return displacement_cm;

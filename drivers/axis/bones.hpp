@@ -21,20 +21,20 @@ using Proportions = std::array<Vec3f, kBones>;
 // "RightHandThumb1" as the vendor spells it. Cold.
 [[nodiscard]] std::string bone_name(std::size_t bone);
 
-// An earlier bone; -1 for the hips. RT-safe.
-[[nodiscard]] int bone_parent(std::size_t bone) noexcept;
+// An earlier bone; -1 for the hips.
+RT_SAFE [[nodiscard]] int bone_parent(std::size_t bone) noexcept;
 
 // Returns the end [cm] of a bone without children in its own frame; zero for other bones. Streams
-// never carry it. RT-safe.
-[[nodiscard]] Vec3f bone_end_cm(std::size_t bone) noexcept;
+// never carry it.
+RT_SAFE [[nodiscard]] Vec3f bone_end_cm(std::size_t bone) noexcept;
 
-// A person of 1.73 m. RT-safe.
-[[nodiscard]] const Proportions& default_proportions() noexcept;
+// A person of 1.73 m.
+RT_SAFE [[nodiscard]] const Proportions& default_proportions() noexcept;
 
 // The offset of a bone from the displacement that a stream carries for it. The applications shift
 // bones a little (up to 4 cm at the feet) so that feet and hands stay where they touch something,
 // although bones have no joints that could slide. A bone that points along an axis in T-pose
-// therefore keeps its direction and takes only its length from the stream. RT-safe.
-[[nodiscard]] Vec3f offset_from(std::size_t bone, const Vec3f& displacement_cm) noexcept;
+// therefore keeps its direction and takes only its length from the stream.
+RT_SAFE [[nodiscard]] Vec3f offset_from(std::size_t bone, const Vec3f& displacement_cm) noexcept;
 
 }  // namespace posed::drivers::axis

@@ -59,24 +59,21 @@ Result<std::shared_ptr<const Skeleton>> skeleton_of(const AvatarEntry& entry, st
     if (const Vec3f end_cm = bone_end_cm(b); end_cm != Vec3f{}) joint.end_site_m = metres(end_cm);
     add_channels(*skeleton, b == kHips, order);
   }
-  if (auto ok = skeleton->finish(); !ok) return std::unexpected(ok.error());
+  TRY(skeleton->finish());
   return skeleton;
 }
 
-// RT-safe.
-std::size_t AxisLayout::body_of(const Avatar& avatar) const noexcept {
-  return static_cast<std::size_t>(std::ranges::find(known, avatar, &Known::avatar) - known.begin());
+RT_SAFE std::size_t AxisLayout::body_of(const Avatar& avatar) const noexcept {
+  return std::ranges::find(known, avatar, &Known::avatar) - known.begin();
 }
 
 Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description) {
-  const auto list = parse_list(description);
-  if (!list) return std::unexpected(list.error());
+  const auto list = TRY(parse_list(description));
   auto layout = std::make_unique<AxisLayout>();
-  for (const AvatarEntry& entry : list->avatars) {
-    auto skeleton = skeleton_of(entry, list->order);
-    if (!skeleton) return std::unexpected(skeleton.error());
+  for (const AvatarEntry& entry : list.avatars) {
+    auto skeleton = TRY(skeleton_of(entry, list.order));
     layout->bodies.push_back(
-        {.name = body_name(entry.avatar, layout->bodies), .skeleton = std::move(*skeleton)});
+        {.name = body_name(entry.avatar, layout->bodies), .skeleton = std::move(skeleton)});
     layout->known.push_back({.avatar = entry.avatar, .reference = entry.reference});
   }
   return layout;
@@ -88,9 +85,8 @@ constexpr std::size_t kMaxFrameChannels = 6 + 3 + 3 * kBones;
 constexpr double kMaxTime_s = 1e9;  // only damaged frame numbers lead so far
 
 // The values of a message as those of skeleton_of()'s channels [m, rad]; returns their number.
-// RT-safe.
-std::size_t to_channels(const Message& message,
-                        std::array<double, kMaxFrameChannels>& channels) noexcept {
+RT_SAFE std::size_t to_channels(const Message& message,
+                                std::array<double, kMaxFrameChannels>& channels) noexcept {
   std::size_t size = 0;
   const auto convert = [&](std::size_t at, double scale) {
     for (std::size_t i = 0; i < 3; ++i) channels[size++] = message.values[at + i] * scale;
@@ -106,17 +102,15 @@ std::size_t to_channels(const Message& message,
 
 }  // namespace
 
-// RT-safe.
-void AxisDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-                       Sink& sink) noexcept {
+RT_SAFE void AxisDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                               Sink& sink) noexcept {
   sink_ = &sink;
   now_ns_ = arrival_ns;
   reader_.feed(bytes, *this);
   if (const auto news = roster_.news(arrival_ns); !news.empty()) sink.description(news);
 }
 
-// RT-safe.
-bool AxisDecoder::binary(std::span<const std::byte> bytes, bool in_damage) noexcept {
+RT_SAFE bool AxisDecoder::binary(std::span<const std::byte> bytes, bool in_damage) noexcept {
   Outcome outcome = decode_binary(bytes, message_);
   const bool valid = outcome == Outcome::kOk;
   if (valid) outcome = accept_message();
@@ -124,16 +118,14 @@ bool AxisDecoder::binary(std::span<const std::byte> bytes, bool in_damage) noexc
   return valid;
 }
 
-// RT-safe.
-void AxisDecoder::text(std::string_view text, bool in_damage) noexcept {
+RT_SAFE void AxisDecoder::text(std::string_view text, bool in_damage) noexcept {
   Outcome outcome = decode_text(text, message_);
   const bool valid = outcome == Outcome::kOk;
   if (valid) outcome = accept_message();
   if (valid || !in_damage) sink_->outcome(outcome);
 }
 
-// RT-safe.
-Outcome AxisDecoder::accept_message() noexcept {
+RT_SAFE Outcome AxisDecoder::accept_message() noexcept {
   Present* const present = roster_.find(message_.avatar);
   if (present == nullptr) return Outcome::kOutOfRange;  // more avatars than bodies of a source
   if (settings_.datagrams && message_.frame_number != 0) {
@@ -151,8 +143,7 @@ Outcome AxisDecoder::accept_message() noexcept {
   return Outcome::kOk;
 }
 
-// RT-safe.
-void AxisDecoder::emit_frame(std::size_t body, const Present& present) noexcept {
+RT_SAFE void AxisDecoder::emit_frame(std::size_t body, const Present& present) noexcept {
   std::array<double, kMaxFrameChannels> channels;
   const std::size_t count = to_channels(message_, channels);
   Frame frame;

@@ -26,18 +26,16 @@ class AxisLayout final : public SourceLayout {
   };
   std::vector<Known> known;  // [body]
 
-  // The index of a body; bodies.size() when there is no such body. RT-safe.
-  [[nodiscard]] std::size_t body_of(const Avatar& avatar) const noexcept;
+  // The index of a body; bodies.size() when there is no such body.
+  RT_SAFE [[nodiscard]] std::size_t body_of(const Avatar& avatar) const noexcept;
 };
 
 // The skeleton of an avatar, "Reference" above the hips if the stream has it. The joints have the
 // stream's rotation channels; reference and hips also have positions. Cold.
-[[nodiscard]] Result<std::shared_ptr<const Skeleton>> skeleton_of(const AvatarEntry& entry,
-                                                                  std::uint8_t order);
+Result<std::shared_ptr<const Skeleton>> skeleton_of(const AvatarEntry& entry, std::uint8_t order);
 
 // Driver::make_layout. Cold.
-[[nodiscard]] Result<std::unique_ptr<const SourceLayout>> make_layout(
-    std::span<const std::byte> description);
+Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description);
 
 // The settings that only the options say, because the streams do not.
 struct StreamSettings {
@@ -51,12 +49,12 @@ class AxisDecoder final : public Decoder, private Messages {
   explicit AxisDecoder(const StreamSettings& settings) noexcept
       : settings_(settings), roster_(settings.order) {}
 
-  // Takes bytes cut at any position. RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-            Sink& sink) noexcept override;
+  // Takes bytes cut at any position.
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept override;
 
-  // Takes what make_layout made. RT-safe.
-  void use(const SourceLayout& layout) noexcept override {
+  // Takes what make_layout made.
+  RT_SAFE void use(const SourceLayout& layout) noexcept override {
     layout_ = static_cast<const AxisLayout*>(&layout);
   }
 

@@ -41,17 +41,15 @@ Result<AvatarEntry> read_entry(ByteReader& reader) {
 
 }  // namespace
 
-// RT-safe.
-std::size_t write_list_head(std::uint8_t order, std::size_t avatars,
-                            std::span<std::byte> out) noexcept {
+RT_SAFE std::size_t write_list_head(std::uint8_t order, std::size_t avatars,
+                                    std::span<std::byte> out) noexcept {
   Packer packer(out);
   packer.number(order, 1);
   packer.number(static_cast<std::uint32_t>(avatars), 1);
   return packer.size();
 }
 
-// RT-safe.
-std::size_t write_entry(const AvatarEntry& entry, std::span<std::byte> out) noexcept {
+RT_SAFE std::size_t write_entry(const AvatarEntry& entry, std::span<std::byte> out) noexcept {
   Packer packer(out);
   packer.number(entry.avatar.number, 4);
   packer.number((entry.reference ? kReference : 0) | (entry.measured ? kMeasured : 0), 1);
@@ -74,13 +72,11 @@ Result<AvatarList> parse_list(std::span<const std::byte> bytes) {
                  std::to_string(kMaxBodies));
   }
   for (std::size_t i = 0; i < count; ++i) {
-    auto entry = read_entry(reader);
-    if (!entry) return std::unexpected(entry.error());
-    if (std::ranges::find(list.avatars, entry->avatar, &AvatarEntry::avatar) !=
-        list.avatars.end()) {
+    auto entry = TRY(read_entry(reader));
+    if (std::ranges::find(list.avatars, entry.avatar, &AvatarEntry::avatar) != list.avatars.end()) {
       return wrong("has an avatar twice");
     }
-    list.avatars.push_back(*entry);
+    list.avatars.push_back(entry);
   }
   if (reader.left() != 0) return wrong("goes on after its last avatar");
   return list;

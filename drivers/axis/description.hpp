@@ -47,13 +47,13 @@ inline constexpr std::size_t kListHeadBytes = 2;
 inline constexpr std::size_t kMaxEntryBytes = 4 + 1 + kNameBytes + 12 * (kBones - 1);
 static_assert(kListHeadBytes + kMaxBodies * kMaxEntryBytes <= kMaxDescription);
 
-// Write the head, and an avatar behind it, and return the number of bytes. RT-safe.
-std::size_t write_list_head(std::uint8_t order, std::size_t avatars,
-                            std::span<std::byte> out) noexcept;
+// Write the head, and an avatar behind it, and return the number of bytes.
+RT_SAFE std::size_t write_list_head(std::uint8_t order, std::size_t avatars,
+                                    std::span<std::byte> out) noexcept;
 std::size_t write_entry(const AvatarEntry& entry, std::span<std::byte> out) noexcept;
 
 // Cold; the bytes are untrusted.
-[[nodiscard]] Result<AvatarList> parse_list(std::span<const std::byte> bytes);
+Result<AvatarList> parse_list(std::span<const std::byte> bytes);
 
 // The axes of an order, by its index in kOrderNames.
 [[nodiscard]] std::array<Axis, 3> order_axes(std::uint8_t order);

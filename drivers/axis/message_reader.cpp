@@ -12,22 +12,19 @@ constexpr std::byte kCalculation{0x88};
 constexpr std::byte kCalculationEnd{0x99};
 constexpr std::size_t kCountAt = 6;  // the bytes before it are the same in all messages of a sender
 
-// RT-safe.
-bool is_blank(std::byte byte) noexcept {
+RT_SAFE bool is_blank(std::byte byte) noexcept {
   const auto c = std::to_integer<unsigned>(byte);
   return c == ' ' || (c >= '\t' && c <= '\r');
 }
 
-// RT-safe.
-bool is_text(std::byte byte) noexcept {
+RT_SAFE bool is_text(std::byte byte) noexcept {
   const auto c = std::to_integer<unsigned>(byte);
   return is_blank(byte) || (c > 0x20 && c != 0x7F && c != 0xFF);
 }
 
 }  // namespace
 
-// RT-safe.
-void MessageReader::feed(std::span<const std::byte> bytes, Messages& messages) noexcept {
+RT_SAFE void MessageReader::feed(std::span<const std::byte> bytes, Messages& messages) noexcept {
   while (!bytes.empty()) {
     if (end_ == buffer_.size()) {
       std::memmove(buffer_.data(), buffer_.data() + begin_, end_ - begin_);
@@ -43,21 +40,18 @@ void MessageReader::feed(std::span<const std::byte> bytes, Messages& messages) n
   }
 }
 
-// RT-safe.
-void MessageReader::drop(std::size_t count) noexcept {
+RT_SAFE void MessageReader::drop(std::size_t count) noexcept {
   begin_ += count;
   scanned_ = 0;
   if (begin_ == end_) begin_ = end_ = 0;
 }
 
-// RT-safe.
-void MessageReader::count_damage(Outcome outcome, Messages& messages) noexcept {
+RT_SAFE void MessageReader::count_damage(Outcome outcome, Messages& messages) noexcept {
   if (!in_damage_) messages.damage(outcome);
   in_damage_ = true;
 }
 
-// RT-safe.
-bool MessageReader::advance(Messages& messages) noexcept {
+RT_SAFE bool MessageReader::advance(Messages& messages) noexcept {
   const auto bytes = pending();
   if (scanned_ != 0 || overlong_) return advance_text(messages);
   if (is_blank(bytes[0])) {
@@ -78,8 +72,7 @@ bool MessageReader::advance(Messages& messages) noexcept {
   return true;
 }
 
-// RT-safe.
-bool MessageReader::advance_binary(Messages& messages) noexcept {
+RT_SAFE bool MessageReader::advance_binary(Messages& messages) noexcept {
   const auto bytes = pending();
   if (bytes.size() < kHeaderBytes) return false;
   std::size_t size = 0;
@@ -103,8 +96,8 @@ bool MessageReader::advance_binary(Messages& messages) noexcept {
   return true;
 }
 
-// The header of calculation data is counted; its values are then skipped as damage is. RT-safe.
-bool MessageReader::advance_calculation(Messages& messages) noexcept {
+// The header of calculation data is counted; its values are then skipped as damage is.
+RT_SAFE bool MessageReader::advance_calculation(Messages& messages) noexcept {
   const auto bytes = pending();
   if (bytes.size() < kHeaderBytes) return false;
   const auto end = bytes.subspan(kHeaderBytes - 2, 2);
@@ -115,8 +108,7 @@ bool MessageReader::advance_calculation(Messages& messages) noexcept {
   return true;
 }
 
-// RT-safe.
-bool MessageReader::advance_text(Messages& messages) noexcept {
+RT_SAFE bool MessageReader::advance_text(Messages& messages) noexcept {
   const auto bytes = pending();
   constexpr std::byte kBar{'|'};
   std::size_t at = scanned_;

@@ -30,8 +30,7 @@ class Messages {
 
 class MessageReader {
  public:
-  // RT-safe.
-  void feed(std::span<const std::byte> bytes, Messages& messages) noexcept;
+  RT_SAFE void feed(std::span<const std::byte> bytes, Messages& messages) noexcept;
 
  private:
   // Each returns false when more bytes are needed.

@@ -5,10 +5,9 @@
 
 namespace posed::drivers::axis {
 
-// RT-safe.
-void fill_values(const Skeleton& skeleton, const Proportions& offset_cm,
-                 std::span<const Quatf> rotation_xyzw, const Vec3f& root_m, NearAngles& near_rad,
-                 Message& message) noexcept {
+RT_SAFE void fill_values(const Skeleton& skeleton, const Proportions& offset_cm,
+                         std::span<const Quatf> rotation_xyzw, const Vec3f& root_m,
+                         NearAngles& near_rad, Message& message) noexcept {
   // Adding zero makes a negative zero positive: the same pose gives the same bytes.
   const auto angles_at = [&](std::size_t joint, std::size_t at) {
     near_rad[joint] = channels_from_rotation(
@@ -17,7 +16,7 @@ void fill_values(const Skeleton& skeleton, const Proportions& offset_cm,
       message.values[at + i] = near_rad[joint][i] / kDegree + 0.0;
     }
   };
-  const auto root = static_cast<std::size_t>(skeleton.root_joint);
+  const std::size_t root = skeleton.root_joint;
   Eigen::Vector3d at_m(root_m[0], root_m[1], root_m[2]);
   if (root == 1) {  // the reference stays at the origin
     angles_at(0, 3);

@@ -17,9 +17,9 @@ using NearAngles = std::array<std::array<double, 3>, kBones + 1>;  // [joint] ra
 
 // Fills `message.values` for its content. `skeleton` is one of skeleton_of() (layout.hpp), with a
 // reference if the content has one; `rotation_xyzw` is [joint], `root_m` where the hips are.
-// `offset_cm` is sent as displacement. RT-safe.
-void fill_values(const Skeleton& skeleton, const Proportions& offset_cm,
-                 std::span<const Quatf> rotation_xyzw, const Vec3f& root_m, NearAngles& near_rad,
-                 Message& message) noexcept;
+// `offset_cm` is sent as displacement.
+RT_SAFE void fill_values(const Skeleton& skeleton, const Proportions& offset_cm,
+                         std::span<const Quatf> rotation_xyzw, const Vec3f& root_m,
+                         NearAngles& near_rad, Message& message) noexcept;
 
 }  // namespace posed::drivers::axis

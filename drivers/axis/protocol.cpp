@@ -30,14 +30,12 @@ struct Header {
   std::uint32_t frame_number = 0;
 };
 
-// RT-safe.
-bool flag(std::uint32_t value, bool& set) noexcept {
+RT_SAFE bool flag(std::uint32_t value, bool& set) noexcept {
   set = value == 1;
   return value <= 1;
 }
 
-// RT-safe.
-Outcome read_header(std::span<const std::byte> bytes, Header& header) noexcept {
+RT_SAFE Outcome read_header(std::span<const std::byte> bytes, Header& header) noexcept {
   if (bytes.size() < kHeaderBytes) return Outcome::kShort;
   ByteReader end(bytes.subspan(kEndAt, 2));
   ByteReader reader(bytes);
@@ -57,8 +55,8 @@ Outcome read_header(std::span<const std::byte> bytes, Header& header) noexcept {
   return valid ? Outcome::kOk : Outcome::kOutOfRange;
 }
 
-// Whether a pose can have these values. RT-safe.
-bool plausible(Content content, std::span<const double> values) noexcept {
+// Whether a pose can have these values.
+RT_SAFE bool plausible(Content content, std::span<const double> values) noexcept {
   const std::size_t group = content.displacement ? 6 : 3;
   const std::size_t first = content.reference ? 6 : 0;
   for (std::size_t i = 0; i < values.size(); ++i) {
@@ -69,8 +67,8 @@ bool plausible(Content content, std::span<const double> values) noexcept {
   return true;
 }
 
-// Fills `values` with the numbers of the text; false when a word is none. RT-safe.
-bool read_numbers(std::string_view text, std::span<double> values) noexcept {
+// Fills `values` with the numbers of the text; false when a word is none.
+RT_SAFE bool read_numbers(std::string_view text, std::span<double> values) noexcept {
   for (double& value : values) {
     const auto number = clip::parse_number(clip::next_word(text));
     if (!number) return false;
@@ -79,16 +77,15 @@ bool read_numbers(std::string_view text, std::span<double> values) noexcept {
   return true;
 }
 
-// RT-safe.
-std::size_t count_words(std::string_view text) noexcept {
+RT_SAFE std::size_t count_words(std::string_view text) noexcept {
   std::size_t words = 0;
   while (!clip::next_word(text).empty()) ++words;
   return words;
 }
 
 // Removes `words` words, which are at most one name, from `text`; empty when they are too long or
-// look like values. RT-safe.
-std::string_view next_name(std::string_view& text, std::size_t words) noexcept {
+// look like values.
+RT_SAFE std::string_view next_name(std::string_view& text, std::size_t words) noexcept {
   const std::string_view begin = text = clip::trim(text);
   bool named = words == 1;
   for (std::size_t i = 0; i < words; ++i) {
@@ -99,14 +96,13 @@ std::string_view next_name(std::string_view& text, std::size_t words) noexcept {
   return named && name.size() <= kNameBytes ? name : std::string_view();
 }
 
-// RT-safe.
-std::optional<Content> content_of(std::size_t count) noexcept {
+RT_SAFE std::optional<Content> content_of(std::size_t count) noexcept {
   const auto* const at = std::ranges::find(kContents, count, value_count);
   return at == kContents.end() ? std::nullopt : std::optional(*at);
 }
 
-// Reads name and values; `words` is how many words the text has. RT-safe.
-Outcome read_text(std::string_view text, std::size_t words, Message& message) noexcept {
+// Reads name and values; `words` is how many words the text has.
+RT_SAFE Outcome read_text(std::string_view text, std::size_t words, Message& message) noexcept {
   std::size_t name_words = 1;
   auto content = content_of(words - name_words);
   while (!content && name_words < kNameBytes && name_words < words) {
@@ -122,38 +118,33 @@ Outcome read_text(std::string_view text, std::size_t words, Message& message) no
                                                                    : Outcome::kOutOfRange;
 }
 
-// RT-safe.
-bool fits_a_name(char c) noexcept {
+RT_SAFE bool fits_a_name(char c) noexcept {
   const auto code = static_cast<unsigned char>(c);
   return code > 0x20 && code != 0x7F && code != 0xFF && c != '|';
 }
 
 }  // namespace
 
-// RT-safe.
-std::string_view Avatar::name_text() const noexcept {
+RT_SAFE std::string_view Avatar::name_text() const noexcept {
   const auto* const end = std::ranges::find(name, '\0');
   return {name.data(), static_cast<std::size_t>(end - name.begin())};
 }
 
-// RT-safe.
-Avatar make_avatar(std::uint32_t number, std::string_view name) noexcept {
+RT_SAFE Avatar make_avatar(std::uint32_t number, std::string_view name) noexcept {
   Avatar avatar{.number = number, .name = {}};
   name = name.substr(0, std::min({name.find('\0'), name.size(), kNameBytes}));
   std::ranges::copy(name, avatar.name.begin());
   return avatar;
 }
 
-// RT-safe.
-Outcome measure_binary(std::span<const std::byte> header, std::size_t& size) noexcept {
+RT_SAFE Outcome measure_binary(std::span<const std::byte> header, std::size_t& size) noexcept {
   Header read;
   const Outcome outcome = read_header(header, read);
   size = kHeaderBytes + 4 * read.count;
   return outcome;
 }
 
-// RT-safe.
-Outcome decode_binary(std::span<const std::byte> bytes, Message& message) noexcept {
+RT_SAFE Outcome decode_binary(std::span<const std::byte> bytes, Message& message) noexcept {
   Header header;
   if (const Outcome outcome = read_header(bytes, header); outcome != Outcome::kOk) return outcome;
   if (bytes.size() != kHeaderBytes + 4 * header.count) return Outcome::kShort;
@@ -166,8 +157,7 @@ Outcome decode_binary(std::span<const std::byte> bytes, Message& message) noexce
   return plausible(header.content, values) ? Outcome::kOk : Outcome::kOutOfRange;
 }
 
-// RT-safe.
-Outcome decode_text(std::string_view text, Message& message) noexcept {
+RT_SAFE Outcome decode_text(std::string_view text, Message& message) noexcept {
   message.frame_number = 0;
   const std::string_view number = clip::next_word(text);
   const std::size_t words = count_words(text);
@@ -180,8 +170,8 @@ Outcome decode_text(std::string_view text, Message& message) noexcept {
   return outcome == Outcome::kOk && !known ? Outcome::kOutOfRange : outcome;
 }
 
-// RT-safe.
-std::size_t encode_binary(const Message& message, Form form, std::span<std::byte> out) noexcept {
+RT_SAFE std::size_t encode_binary(const Message& message, Form form,
+                                  std::span<std::byte> out) noexcept {
   const std::size_t count = value_count(message.content);
   const std::size_t size = kHeaderBytes + 4 * count;
   if (out.size() < size) return 0;
@@ -203,8 +193,7 @@ std::size_t encode_binary(const Message& message, Form form, std::span<std::byte
   return size;
 }
 
-// RT-safe.
-std::size_t encode_text(const Message& message, std::span<char> out) noexcept {
+RT_SAFE std::size_t encode_text(const Message& message, std::span<char> out) noexcept {
   char* at = out.data();
   char* const end = at + out.size();
   const auto put = [&](char c) {
@@ -225,7 +214,7 @@ std::size_t encode_text(const Message& message, std::span<char> out) noexcept {
   }
   if (end - at < 3) return 0;
   for (const char c : {' ', kTextEnd[0], kTextEnd[1]}) put(c);
-  return static_cast<std::size_t>(at - out.data());
+  return at - out.data();
 }
 
 }  // namespace posed::drivers::axis

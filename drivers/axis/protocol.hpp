@@ -64,13 +64,14 @@ struct Content {
   bool operator==(const Content&) const = default;
 };
 
-// 354, 180, 360 or 186. RT-safe.
-[[nodiscard]] constexpr std::size_t value_count(Content content) noexcept {
+// 354, 180, 360 or 186.
+RT_SAFE [[nodiscard]] constexpr std::size_t value_count(Content content) noexcept {
   return (content.reference ? 6 : 0) + (content.displacement ? 6 * kBones : 3 + 3 * kBones);
 }
 // Returns the place of a bone's rotations among the values; its position, if it has one, is before
-// them. RT-safe.
-[[nodiscard]] constexpr std::size_t rotations_at(Content content, std::size_t bone) noexcept {
+// them.
+RT_SAFE [[nodiscard]] constexpr std::size_t rotations_at(Content content,
+                                                         std::size_t bone) noexcept {
   return (content.reference ? 6 : 0) + 3 + (content.displacement ? 6 : 3) * bone;
 }
 
@@ -82,8 +83,8 @@ struct Avatar {
   bool operator==(const Avatar&) const = default;
   [[nodiscard]] std::string_view name_text() const noexcept;
 };
-// The name is cut at kNameBytes. RT-safe.
-[[nodiscard]] Avatar make_avatar(std::uint32_t number, std::string_view name) noexcept;
+// The name is cut at kNameBytes.
+RT_SAFE [[nodiscard]] Avatar make_avatar(std::uint32_t number, std::string_view name) noexcept;
 
 enum class Form : std::uint8_t { kBinary, kOldBinary, kText };
 inline constexpr std::array<std::string_view, 3> kFormNames{"binary", "binary-1.0", "text"};
@@ -98,23 +99,25 @@ struct Message {
 
 // The length in bytes of the binary message that begins with these kHeaderBytes bytes, in `size`.
 // kForeign: calculation data, or no header. kOutOfRange: a header with counts, flags or an avatar
-// that cannot be. RT-safe.
-[[nodiscard]] Outcome measure_binary(std::span<const std::byte> header, std::size_t& size) noexcept;
+// that cannot be.
+RT_SAFE [[nodiscard]] Outcome measure_binary(std::span<const std::byte> header,
+                                             std::size_t& size) noexcept;
 
-// Decodes a binary message of that length. kOutOfRange: a value that no pose has. RT-safe.
-[[nodiscard]] Outcome decode_binary(std::span<const std::byte> bytes, Message& message) noexcept;
+// Decodes a binary message of that length. kOutOfRange: a value that no pose has.
+RT_SAFE [[nodiscard]] Outcome decode_binary(std::span<const std::byte> bytes,
+                                            Message& message) noexcept;
 
 // Decodes a text message without its "||". kShort: another number of values. kOutOfRange: a value
 // that is no number or that no pose has, or such an avatar. A name of several words is accepted if
-// one of them is no number. RT-safe.
-[[nodiscard]] Outcome decode_text(std::string_view text, Message& message) noexcept;
+// one of them is no number.
+RT_SAFE [[nodiscard]] Outcome decode_text(std::string_view text, Message& message) noexcept;
 
 // Encode a message into `out` and return its length, 0 when `out` is too small. A binary message
 // needs kHeaderBytes + 4 * value_count() bytes, a text message at most kMaxText; nothing is
 // allocated. Text has six decimals, as the vendor's BVH files do, and '_' for what a name cannot
-// contain. RT-safe.
-[[nodiscard]] std::size_t encode_binary(const Message& message, Form form,
-                                        std::span<std::byte> out) noexcept;
+// contain.
+RT_SAFE [[nodiscard]] std::size_t encode_binary(const Message& message, Form form,
+                                                std::span<std::byte> out) noexcept;
 [[nodiscard]] std::size_t encode_text(const Message& message, std::span<char> out) noexcept;
 
 }  // namespace posed::drivers::axis

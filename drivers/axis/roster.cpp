@@ -13,14 +13,13 @@ constexpr std::int64_t kDescribeEvery_ns = kNanosPerSecond / 2;
 constexpr float kOtherLength_cm = 1.5F;
 constexpr std::int64_t kSettled_ns = kNanosPerSecond;
 
-// The time between two arrivals, which a damaged log may put anywhere. RT-safe.
-std::int64_t since(std::int64_t now_ns, std::int64_t then_ns) noexcept {
+// The time between two arrivals, which a damaged log may put anywhere.
+RT_SAFE std::int64_t since(std::int64_t now_ns, std::int64_t then_ns) noexcept {
   return static_cast<std::int64_t>(static_cast<std::uint64_t>(now_ns) -
                                    static_cast<std::uint64_t>(then_ns));
 }
 
-// RT-safe.
-Proportions offsets_of(const Message& message) noexcept {
+RT_SAFE Proportions offsets_of(const Message& message) noexcept {
   Proportions offset_cm = default_proportions();
   for (std::size_t b = 1; b < kBones; ++b) {
     const double* const at = message.values.data() + rotations_at(message.content, b) - 3;
@@ -30,8 +29,7 @@ Proportions offsets_of(const Message& message) noexcept {
   return offset_cm;
 }
 
-// RT-safe.
-bool other_lengths(const Proportions& a, const Proportions& b) noexcept {
+RT_SAFE bool other_lengths(const Proportions& a, const Proportions& b) noexcept {
   const auto length = [](const Vec3f& v) { return std::hypot(v[0], v[1], v[2]); };
   for (std::size_t i = 1; i < kBones; ++i) {
     if (std::abs(length(a[i]) - length(b[i])) > kOtherLength_cm) return true;
@@ -41,8 +39,7 @@ bool other_lengths(const Proportions& a, const Proportions& b) noexcept {
 
 }  // namespace
 
-// RT-safe.
-Present* Roster::find(const Avatar& avatar) noexcept {
+RT_SAFE Present* Roster::find(const Avatar& avatar) noexcept {
   Present* free = nullptr;
   for (Present& present : all_) {
     if (present.used && present.entry.avatar == avatar) return &present;
@@ -56,8 +53,7 @@ Present* Roster::find(const Avatar& avatar) noexcept {
   return free;
 }
 
-// RT-safe.
-void Roster::see(Present& present, const Message& message, std::int64_t now_ns) noexcept {
+RT_SAFE void Roster::see(Present& present, const Message& message, std::int64_t now_ns) noexcept {
   // After a pause of the whole stream, each avatar gets its time to come back.
   if (since(now_ns, received_ns_) > kGone_ns) {
     for (Present& other : all_) other.seen_ns = now_ns;
@@ -71,14 +67,13 @@ void Roster::see(Present& present, const Message& message, std::int64_t now_ns) 
   if (message.content.displacement) measure(present, message, now_ns);
 }
 
-// RT-safe.
-void Roster::count_frames(Present& present, std::uint32_t frame_number) noexcept {
+RT_SAFE void Roster::count_frames(Present& present, std::uint32_t frame_number) noexcept {
   present.tick = present.first_tick + present.counter.to(frame_number).ticks;
   newest_tick_ = std::max(newest_tick_, present.tick);
 }
 
-// RT-safe.
-void Roster::measure(Present& present, const Message& message, std::int64_t now_ns) noexcept {
+RT_SAFE void Roster::measure(Present& present, const Message& message,
+                             std::int64_t now_ns) noexcept {
   const Proportions offset_cm = offsets_of(message);
   if (present.entry.measured) {
     if (!other_lengths(offset_cm, present.entry.offset_cm)) {
@@ -94,8 +89,7 @@ void Roster::measure(Present& present, const Message& message, std::int64_t now_
   changed_ = true;
 }
 
-// RT-safe.
-void Roster::forget_gone(std::int64_t now_ns) noexcept {
+RT_SAFE void Roster::forget_gone(std::int64_t now_ns) noexcept {
   for (Present& present : all_) {
     if (!present.used || since(now_ns, present.seen_ns) <= kGone_ns) continue;
     present.used = false;
@@ -103,8 +97,7 @@ void Roster::forget_gone(std::int64_t now_ns) noexcept {
   }
 }
 
-// RT-safe.
-std::span<const std::byte> Roster::news(std::int64_t now_ns) noexcept {
+RT_SAFE std::span<const std::byte> Roster::news(std::int64_t now_ns) noexcept {
   forget_gone(now_ns);
   if (!changed_ || (described_ && since(now_ns, described_ns_) < kDescribeEvery_ns)) return {};
   const std::span<std::byte> list(list_);

@@ -34,15 +34,15 @@ class Roster {
   // `order` of the rotations, an index of kOrderNames.
   explicit Roster(std::uint8_t order) noexcept : order_(order) {}
 
-  // The place of an avatar, a new one if needed; null when all are taken. RT-safe.
-  [[nodiscard]] Present* find(const Avatar& avatar) noexcept;
+  // The place of an avatar, a new one if needed; null when all are taken.
+  RT_SAFE [[nodiscard]] Present* find(const Avatar& avatar) noexcept;
 
-  // Stores a valid message of it. RT-safe.
-  void see(Present& present, const Message& message, std::int64_t now_ns) noexcept;
+  // Stores a valid message of it.
+  RT_SAFE void see(Present& present, const Message& message, std::int64_t now_ns) noexcept;
 
   // Forgets avatars that are gone. Returns the list of the others if it is not as described before,
-  // at most twice a second, otherwise nothing. RT-safe.
-  [[nodiscard]] std::span<const std::byte> news(std::int64_t now_ns) noexcept;
+  // at most twice a second, otherwise nothing.
+  RT_SAFE [[nodiscard]] std::span<const std::byte> news(std::int64_t now_ns) noexcept;
 
  private:
   void count_frames(Present& present, std::uint32_t frame_number) noexcept;

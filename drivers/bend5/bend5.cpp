@@ -28,8 +28,8 @@ struct Bend5 : glove::TextGlove<Bend5> {
   static constexpr std::array<std::string_view, 0> kExtras{};
   static constexpr double kUndetected = 0.9;  // other digits are a line, too
 
-  // kForeign for what is no such line, kOutOfRange for a value above 1023. RT-safe.
-  static Outcome parse(std::string_view text, Reading& reading) noexcept {
+  // kForeign for what is no such line, kOutOfRange for a value above 1023.
+  RT_SAFE static Outcome parse(std::string_view text, Reading& reading) noexcept {
     const char* at = text.data();
     const char* const end = text.data() + text.size();
     for (std::size_t s = 0; s < kSensors.size(); ++s) {

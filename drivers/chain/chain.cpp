@@ -56,7 +56,7 @@ struct Upstream : SourceType<Upstream> {
 
   static Result<std::string> check(const Options& options, const Settings& /*settings*/) {
     const SubscriptionSettings subscription = subscription_of(options);
-    if (const auto ok = check_subscription(subscription); !ok) return std::unexpected(ok.error());
+    TRY(check_subscription(subscription));
     return subscription.endpoint;
   }
   static Result<std::unique_ptr<Decoder>> decoder(const Settings& settings,

@@ -20,13 +20,12 @@ Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byt
   if (!is_upstream_stream(message.stream())) {
     return fail("the upstream's skeleton names no stream; is it a posed of another version?");
   }
-  auto skeleton = message::skeleton_from(message);
-  if (!skeleton) return std::unexpected(skeleton.error());
+  auto skeleton = TRY(message::skeleton_from(message));
   auto layout = std::make_unique<UpstreamLayout>();
   layout->upstream_id = message.id();
   const double rate_hz = message.rate_hz();
   layout->bodies.push_back({.name = message.stream(),
-                            .skeleton = std::move(*skeleton),
+                            .skeleton = std::move(skeleton),
                             .rate_hz = rate_hz > 0.0 && rate_hz <= 1000.0 ? rate_hz : 0.0});
   return layout;
 }
@@ -37,8 +36,8 @@ constexpr std::uint64_t kMaxLag_frames = 1000;
 constexpr float kMaxLag_ms = 60'000.0F;
 
 // Puts rotations and validity of all joints in their places; false when they are none of this
-// skeleton. RT-safe.
-bool read_joints(const UpstreamFrame& upstream, std::size_t joints, Frame& frame) noexcept {
+// skeleton.
+RT_SAFE bool read_joints(const UpstreamFrame& upstream, std::size_t joints, Frame& frame) noexcept {
   if (upstream.rotation_xyzw.count != 4 * joints || upstream.validity.size() != joints) {
     return false;
   }
@@ -54,8 +53,9 @@ bool read_joints(const UpstreamFrame& upstream, std::size_t joints, Frame& frame
 }
 
 // The angles of the rotation channels, if the upstream sends them. Of a joint that was not measured
-// an angle may be NaN. RT-safe.
-bool read_angles(const UpstreamFrame& upstream, const Skeleton& skeleton, Frame& frame) noexcept {
+// an angle may be NaN.
+RT_SAFE bool read_angles(const UpstreamFrame& upstream, const Skeleton& skeleton,
+                         Frame& frame) noexcept {
   const std::size_t count = upstream.angle_rad.count;
   if (count == 0) return true;
   std::size_t used = 0;
@@ -71,8 +71,8 @@ bool read_angles(const UpstreamFrame& upstream, const Skeleton& skeleton, Frame&
   return used == count;
 }
 
-// Reads what the upstream says about the pose beside the joints. RT-safe.
-bool read_words(const UpstreamFrame& upstream, Frame& frame) noexcept {
+// Reads what the upstream says about the pose beside the joints.
+RT_SAFE bool read_words(const UpstreamFrame& upstream, Frame& frame) noexcept {
   const float probability = upstream.label_probability;
   const bool valid = upstream.quality <= static_cast<std::uint64_t>(Quality::kStale) &&
                      upstream.source <= static_cast<std::uint64_t>(Source::kLabels) &&
@@ -93,14 +93,12 @@ bool read_words(const UpstreamFrame& upstream, Frame& frame) noexcept {
 
 }  // namespace
 
-// RT-safe.
-void UpstreamDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
-                           Sink& sink) noexcept {
+RT_SAFE void UpstreamDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
+                                   Sink& sink) noexcept {
   sink.outcome(accept(bytes, sink));
 }
 
-// RT-safe.
-Outcome UpstreamDecoder::accept(std::span<const std::byte> bytes, Sink& sink) noexcept {
+RT_SAFE Outcome UpstreamDecoder::accept(std::span<const std::byte> bytes, Sink& sink) noexcept {
   UpstreamMessage message;
   if (!split_message(bytes, message)) return Outcome::kShort;
   if (message.topic == pose_topic_) return accept_pose(message.body, sink);
@@ -111,8 +109,7 @@ Outcome UpstreamDecoder::accept(std::span<const std::byte> bytes, Sink& sink) no
   return Outcome::kOk;
 }
 
-// RT-safe.
-Outcome UpstreamDecoder::accept_pose(std::span<const std::byte> body, Sink& sink) noexcept {
+RT_SAFE Outcome UpstreamDecoder::accept_pose(std::span<const std::byte> body, Sink& sink) noexcept {
   upstream_ = {};
   if (const Outcome read = read_frame(body, upstream_); read != Outcome::kOk) return read;
   // Until its skeleton comes, a pose says nothing.

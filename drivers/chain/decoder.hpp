@@ -25,20 +25,19 @@ class UpstreamLayout final : public SourceLayout {
 };
 
 // Driver::make_layout. Cold.
-[[nodiscard]] Result<std::unique_ptr<const SourceLayout>> make_layout(
-    std::span<const std::byte> description);
+Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description);
 
 class UpstreamDecoder final : public Decoder {
  public:
   explicit UpstreamDecoder(const std::string& stream)
       : stream_(stream), pose_topic_("pose/" + stream), skeleton_topic_("skeleton/" + stream) {}
 
-  // Takes one message per call. RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-            Sink& sink) noexcept override;
+  // Takes one message per call.
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept override;
 
-  // Takes what make_layout made. RT-safe.
-  void use(const SourceLayout& layout) noexcept override {
+  // Takes what make_layout made.
+  RT_SAFE void use(const SourceLayout& layout) noexcept override {
     layout_ = static_cast<const UpstreamLayout*>(&layout);
   }
 

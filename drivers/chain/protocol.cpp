@@ -86,8 +86,8 @@ class WireReader {
   }
   bool accept(std::uint64_t count, std::span<const std::byte>& bytes) noexcept {
     if (!ok_ || count > left_.size()) return stop();
-    bytes = left_.first(static_cast<std::size_t>(count));
-    left_ = left_.subspan(static_cast<std::size_t>(count));
+    bytes = left_.first(count);
+    left_ = left_.subspan(count);
     return true;
   }
   // Little-endian, as the machines that posed runs on.
@@ -127,9 +127,9 @@ enum FrameField : std::uint32_t {
 // The field number of posed.v1.Skeleton that is read here.
 constexpr std::uint32_t kSkeletonStream = 1;
 
-// Adds one number or several packed ones; false if they do not fit. RT-safe.
+// Adds one number or several packed ones; false if they do not fit.
 template <std::size_t N>
-bool read_floats(const WireField& field, FloatList<N>& list) noexcept {
+RT_SAFE bool read_floats(const WireField& field, FloatList<N>& list) noexcept {
   if (field.type == WireType::kFixed32) {
     if (list.count == N) return false;
     list.values[list.count++] = field.as_float();
@@ -143,20 +143,18 @@ bool read_floats(const WireField& field, FloatList<N>& list) noexcept {
   return true;
 }
 
-// RT-safe.
-bool read_number(const WireField& field, std::uint64_t& value) noexcept {
+RT_SAFE bool read_number(const WireField& field, std::uint64_t& value) noexcept {
   value = field.value;
   return field.type == WireType::kVarint;
 }
 
-// RT-safe.
-bool read_float(const WireField& field, float& value) noexcept {
+RT_SAFE bool read_float(const WireField& field, float& value) noexcept {
   value = field.as_float();
   return field.type == WireType::kFixed32;
 }
 
-// False for a field of another type than the schema's, or too long a list. RT-safe.
-bool read_field(const WireField& field, UpstreamFrame& frame) noexcept {
+// False for a field of another type than the schema's, or too long a list.
+RT_SAFE bool read_field(const WireField& field, UpstreamFrame& frame) noexcept {
   switch (field.number) {
     case kSequence:
       return read_number(field, frame.sequence);
@@ -198,11 +196,10 @@ bool read_field(const WireField& field, UpstreamFrame& frame) noexcept {
 
 }  // namespace
 
-// RT-safe.
-bool split_message(std::span<const std::byte> chunk, UpstreamMessage& message) noexcept {
+RT_SAFE bool split_message(std::span<const std::byte> chunk, UpstreamMessage& message) noexcept {
   const auto end = std::ranges::find(chunk, std::byte{0});
   if (end == chunk.end()) return false;
-  const auto size = static_cast<std::size_t>(end - chunk.begin());
+  const std::size_t size = end - chunk.begin();
   message.topic = {reinterpret_cast<const char*>(chunk.data()), size};
   message.body = chunk.subspan(size + 1);
   return true;
@@ -217,8 +214,7 @@ std::vector<std::byte> join_message(std::string_view topic, std::string_view bod
   return chunk;
 }
 
-// RT-safe.
-Outcome read_frame(std::span<const std::byte> body, UpstreamFrame& frame) noexcept {
+RT_SAFE Outcome read_frame(std::span<const std::byte> body, UpstreamFrame& frame) noexcept {
   WireReader fields(body);
   WireField field;
   while (fields.next(field)) {
@@ -227,8 +223,8 @@ Outcome read_frame(std::span<const std::byte> body, UpstreamFrame& frame) noexce
   return fields.ok() ? Outcome::kOk : Outcome::kShort;
 }
 
-// RT-safe.
-bool is_of_other_stream(std::span<const std::byte> skeleton, std::string_view stream) noexcept {
+RT_SAFE bool is_of_other_stream(std::span<const std::byte> skeleton,
+                                std::string_view stream) noexcept {
   WireReader fields(skeleton);
   WireField field;
   bool other = false;

@@ -49,20 +49,21 @@ struct UpstreamMessage {
   std::span<const std::byte> body{};
 };
 
-// False for a chunk without a zero byte. RT-safe.
-[[nodiscard]] bool split_message(std::span<const std::byte> chunk,
-                                 UpstreamMessage& message) noexcept;
+// False for a chunk without a zero byte.
+RT_SAFE [[nodiscard]] bool split_message(std::span<const std::byte> chunk,
+                                         UpstreamMessage& message) noexcept;
 // The chunk of a message. Cold.
 [[nodiscard]] std::vector<std::byte> join_message(std::string_view topic, std::string_view body);
 
 // kShort for bytes that are no message, kOutOfRange for lists that are too long and for fields of
-// another type. Fields that a later version adds are skipped. RT-safe.
-[[nodiscard]] Outcome read_frame(std::span<const std::byte> body, UpstreamFrame& frame) noexcept;
+// another type. Fields that a later version adds are skipped.
+RT_SAFE [[nodiscard]] Outcome read_frame(std::span<const std::byte> body,
+                                         UpstreamFrame& frame) noexcept;
 
 // Returns whether posed.v1.Skeleton names a stream and it is not this one. Other damage is for
-// make_layout to find. RT-safe.
-[[nodiscard]] bool is_of_other_stream(std::span<const std::byte> skeleton,
-                                      std::string_view stream) noexcept;
+// make_layout to find.
+RT_SAFE [[nodiscard]] bool is_of_other_stream(std::span<const std::byte> skeleton,
+                                              std::string_view stream) noexcept;
 
 // Device info: "posed stream=ann rate=60".
 struct UpstreamInfo {
@@ -70,8 +71,7 @@ struct UpstreamInfo {
   double rate_hz = 0.0;
 };
 [[nodiscard]] std::string device_info_text(const UpstreamInfo& info);
-[[nodiscard]] Result<UpstreamInfo> parse_device_info(const std::string& text,
-                                                     const std::string& identity);
+Result<UpstreamInfo> parse_device_info(const std::string& text, const std::string& identity);
 // Returns whether an upstream may have a stream of this name: [a-z0-9_-], with "-raw" at most 36
 // bytes.
 [[nodiscard]] bool is_upstream_stream(std::string_view name);

@@ -87,9 +87,8 @@ Result<glove::Model> glove_model(Side hand) {
   return glove::with_device_table(std::move(model), "cyberglove");
 }
 
-// RT-safe.
-void compute_angles(float abduction_bias, Side hand, std::uint32_t fitted, std::span<float> value,
-                    Valid& valid) noexcept {
+RT_SAFE void compute_angles(float abduction_bias, Side hand, std::uint32_t fitted,
+                            std::span<float> value, Valid& valid) noexcept {
   value[kThumbRoll] = std::min(value[kThumbRoll], kMaxThumbRoll_rad);
   compute_abductions(abduction_bias, value, valid);
   for (const std::size_t dip : {kIndexDip, kMiddleDip, kRingDip, kLittleDip}) {

@@ -18,15 +18,15 @@ using Valid = std::bitset<glove::kMaxSensors>;
 
 // 23 sensors by name, in mask order, with curves of default gains. A raw value is an 8-bit count;
 // the 16-bit form adds steps of a sixteenth. Cold.
-[[nodiscard]] Result<glove::Model> glove_model(Side hand);
+Result<glove::Model> glove_model(Side hand);
 
 // Index in Calibration::parameter.
 inline constexpr std::size_t kAbductionBias = 0;
 
 // Turns calibrated values [23] into the library's angles [rad], in place: flexion negative,
-// abductions absolute. Distal joints that `fitted` lacks are computed. RT-safe.
-void compute_angles(float abduction_bias, Side hand, std::uint32_t fitted, std::span<float> value,
-                    Valid& valid) noexcept;
+// abductions absolute. Distal joints that `fitted` lacks are computed.
+RT_SAFE void compute_angles(float abduction_bias, Side hand, std::uint32_t fitted,
+                            std::span<float> value, Valid& valid) noexcept;
 
 // The inverse, for emulators: angles as compute_angles gives them to calibrated values. The middle
 // finger's own abduction is lost, because the sensors measure only differences.

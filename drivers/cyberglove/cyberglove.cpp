@@ -117,10 +117,9 @@ struct CyberGlove : glove::GloveType<CyberGlove> {
   static constexpr auto options = all_options;
 
   static Result<Settings> settings(const Options& options) {
-    const auto hand = glove::hand_option(options);
-    if (!hand) return std::unexpected(hand.error());
+    const auto hand = TRY(glove::hand_option(options));
     RequestedConfig requested{
-        .hand = *hand,
+        .hand = hand,
         .sensors = static_cast<int>(option<std::int64_t>(options, "sensors")),
         .layout = {.form = static_cast<Form>(choice_option(options, "form", kForms)),
                    .mode = static_cast<Mode>(choice_option(options, "mode", kModes)),
@@ -131,9 +130,7 @@ struct CyberGlove : glove::GloveType<CyberGlove> {
         .over_tcp = option<std::string>(options, "link") == "tcp",
         .baud = option<std::int64_t>(options, "baud")};
     if (requested.sensors == 18) requested.layout.mask = kMask18;
-    if (auto ok = set_rate(option<double>(options, "rate_hz"), requested); !ok) {
-      return std::unexpected(ok.error());
-    }
+    TRY(set_rate(option<double>(options, "rate_hz"), requested));
     return requested;
   }
   static constexpr auto device_info = device_info_of;
@@ -149,7 +146,7 @@ struct CyberGlove : glove::GloveType<CyberGlove> {
     glove.layout.status = reader.whole("status", 0, 1) == 1;
     glove.ticks = reader.whole("ticks", 0, kMaxTicks);
     glove.layout.multiplier = reader.whole("multiplier", 1, kMaxMultiplier);
-    if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
+    TRY(reader.finish());
     if (std::popcount(glove.layout.mask) == sensors) return glove;
     return fail(
         "the device info of a 'cyberglove' and its mask have different numbers of sensors; the log "
@@ -172,12 +169,10 @@ struct CyberGlove : glove::GloveType<CyberGlove> {
                                       settings.layout);
   }
   static Result<Opened> open(const Options& options, Settings& settings, TransportFactory& ports) {
-    auto link = glove::connect(options, ports, kFtdi);
-    if (!link) return std::unexpected(link.error());
-    const auto layout = start(*link, settings);
-    if (!layout) return std::unexpected(layout.error());
-    settings.layout = *layout;
-    Opened opened = glove::opened(std::move(*link), kSilence_s);
+    auto link = TRY(glove::connect(options, ports, kFtdi));
+    const auto layout = TRY(start(link, settings));
+    settings.layout = layout;
+    Opened opened = glove::opened(std::move(link), kSilence_s);
     opened.poll = poll_of(settings);
     return opened;
   }

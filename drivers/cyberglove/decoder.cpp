@@ -28,9 +28,8 @@ bool are_pairs(std::span<const std::byte> bytes) noexcept {
 
 }  // namespace
 
-// RT-safe.
-void Decoder8::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
-                    Sink& sink) noexcept {
+RT_SAFE void Decoder8::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
+                            Sink& sink) noexcept {
   // A stamp's flags are zero on gloves that never set their bit 7 (the author of Vista saw one).
   const std::size_t flags = sample_bytes(layout()) - kStampBytes - (layout().status ? 1 : 0);
   for (const std::byte byte : bytes) {
@@ -47,8 +46,7 @@ void Decoder8::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*
   }
 }
 
-// RT-safe.
-void Decoder8::accept_piece(Sink& sink) noexcept {
+RT_SAFE void Decoder8::accept_piece(Sink& sink) noexcept {
   if (lost_ || size_ == 0) return;                // already counted; or the end of an answer
   if (size_ == 1 && piece_[0] == kTouch) return;  // the answer to a CyberTouch command
   const std::span<const std::byte> piece = std::span(piece_).first(size_);
@@ -57,8 +55,7 @@ void Decoder8::accept_piece(Sink& sink) noexcept {
   if (outcome == Outcome::kOk) accept_sample(piece, sink);
 }
 
-// RT-safe.
-Outcome Decoder8::check_piece(std::span<const std::byte> piece) const noexcept {
+RT_SAFE Outcome Decoder8::check_piece(std::span<const std::byte> piece) const noexcept {
   const std::size_t size = sample_bytes(layout());
   if (piece[0] != lead(layout().mode)) return Outcome::kForeign;
   if (piece.size() < size) return Outcome::kShort;
@@ -78,8 +75,7 @@ Outcome Decoder8::check_piece(std::span<const std::byte> piece) const noexcept {
   return Outcome::kOk;
 }
 
-// RT-safe.
-void Decoder8::accept_sample(std::span<const std::byte> piece, Sink& sink) noexcept {
+RT_SAFE void Decoder8::accept_sample(std::span<const std::byte> piece, Sink& sink) noexcept {
   std::array<float, kSensors> raw{};
   std::size_t place = 1;
   for (std::size_t i = 0; i < kSensors; ++i) {
@@ -120,9 +116,8 @@ constexpr float kSteps = 16.0F;  // per 8-bit count, so that both forms share ca
 
 }  // namespace
 
-// RT-safe.
-void Decoder16::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
-                     Sink& sink) noexcept {
+RT_SAFE void Decoder16::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
+                             Sink& sink) noexcept {
   for (const std::byte byte : bytes) {
     record_[size_++] = byte;
     if (!could_be_record()) hunt(sink);
@@ -130,16 +125,16 @@ void Decoder16::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns
   }
 }
 
-// Checks the last byte only; those before were checked when they arrived. RT-safe.
-bool Decoder16::could_be_record() const noexcept {
+// Checks the last byte only; those before were checked when they arrived.
+RT_SAFE bool Decoder16::could_be_record() const noexcept {
   const std::size_t place = size_ - 1;
   if (place < kRecordHead) return fits_pattern(place, record_[place]);
   constexpr std::size_t kEndAt = kRecordBytes - kRecordEnd.size();
   return place < kEndAt || record_[place] == kRecordEnd[place - kEndAt];
 }
 
-// The bytes were not a record; searches for the next one, which may begin inside them. RT-safe.
-void Decoder16::hunt(Sink& sink) noexcept {
+// The bytes were not a record; searches for the next one, which may begin inside them.
+RT_SAFE void Decoder16::hunt(Sink& sink) noexcept {
   std::size_t from = 1;
   for (; from < size_; ++from) {
     const std::size_t head = std::min(size_ - from, kRecordHead);
@@ -157,8 +152,7 @@ void Decoder16::hunt(Sink& sink) noexcept {
   size_ -= from;
 }
 
-// RT-safe.
-void Decoder16::accept_record(Sink& sink) noexcept {
+RT_SAFE void Decoder16::accept_record(Sink& sink) noexcept {
   size_ = 0;
   strays_ = 0;
   reported_ = false;

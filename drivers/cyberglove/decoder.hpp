@@ -39,9 +39,8 @@ class Decoder8 final : public CyberGloveDecoder {
  public:
   using CyberGloveDecoder::CyberGloveDecoder;
 
-  // RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-            Sink& sink) noexcept override;
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept override;
 
  private:
   void accept_piece(Sink& sink) noexcept;
@@ -65,9 +64,8 @@ class Decoder16 final : public CyberGloveDecoder {
         clock_(sub_frames_a_day(record_layout.multiplier),
                std::int64_t{10} * kFrames_hz * record_layout.multiplier) {}
 
-  // RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-            Sink& sink) noexcept override;
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept override;
 
  private:
   void add(std::byte byte, Sink& sink) noexcept;

@@ -16,7 +16,7 @@ namespace posed::drivers::cyberglove {
 namespace {
 
 constexpr std::int64_t kNs = 78125, kTicks = 9;  // 9 ticks of 1/115200 s are 78125 ns
-constexpr std::int64_t kFastest_ticks = 768;     // 150 Hz: the result of "as fast as possible"
+constexpr std::int64_t kMinPeriod_ticks = 768;   // 150 Hz: the result of "as fast as possible"
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 
 double raw_of(const glove::Curve& line, double value) {
@@ -38,12 +38,10 @@ CyberGloveEmulator::CyberGloveEmulator(EmulatorSettings settings, glove::Model m
 }
 
 Result<std::unique_ptr<CyberGloveEmulator>> CyberGloveEmulator::make(EmulatorSettings settings) {
-  auto model = glove_model(settings.hand);
-  if (!model) return std::unexpected(model.error());
-  auto calibration = glove::default_calibration(*model);
-  if (!calibration) return std::unexpected(calibration.error());
+  auto model = TRY(glove_model(settings.hand));
+  auto calibration = TRY(glove::default_calibration(model));
   return std::unique_ptr<CyberGloveEmulator>(
-      new CyberGloveEmulator(std::move(settings), std::move(*model), std::move(*calibration)));
+      new CyberGloveEmulator(std::move(settings), std::move(model), std::move(calibration)));
 }
 
 void CyberGloveEmulator::pose_hand(const HandAngles& angles) {
@@ -68,7 +66,7 @@ std::int64_t CyberGloveEmulator::due_after_start_ns(std::int64_t records) const 
   if (streaming_ == Streaming::k16Bit) {
     return records * divider_ * kSecond_ns / (std::int64_t{kFrames_hz} * multiplier_);
   }
-  const std::int64_t ticks = period_.ticks() == 0 ? kFastest_ticks : period_.ticks();
+  const std::int64_t ticks = period_.ticks() == 0 ? kMinPeriod_ticks : period_.ticks();
   return records * ticks * kNs / kTicks;
 }
 
@@ -152,7 +150,7 @@ namespace {
 
 constexpr char kStop = 0x03, kInitialise = 0x09, kReboot = 0x12;
 constexpr std::string_view kUnknown(" e?\r\n\0", 6);
-constexpr std::size_t kLongestCommand = 64;  // ASCII, up to its CR
+constexpr std::size_t kMaxCommandBytes = 64;  // ASCII, up to its CR
 
 char upper(char letter) { return static_cast<char>(letter - 'a' + 'A'); }
 
@@ -309,7 +307,7 @@ std::size_t CyberGloveEmulator::handle_ascii_set(std::string_view input, Bytes& 
   }
   const std::size_t end = input.find('\r');
   if (end == std::string_view::npos) {
-    if (input.size() < kLongestCommand) return 0;
+    if (input.size() < kMaxCommandBytes) return 0;
     add(kUnknown, answer);
     return input.size();
   }

@@ -36,7 +36,7 @@ struct EmulatorSettings {
 
 class CyberGloveEmulator final : public glove::GloveEmulator {
  public:
-  [[nodiscard]] static Result<std::unique_ptr<CyberGloveEmulator>> make(EmulatorSettings settings);
+  static Result<std::unique_ptr<CyberGloveEmulator>> make(EmulatorSettings settings);
 
   void pose_hand(const HandAngles& angles) override;
   void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;

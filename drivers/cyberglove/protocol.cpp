@@ -19,14 +19,13 @@ std::int64_t pair(std::span<const std::byte, kRecordHead> head, std::size_t plac
 
 }  // namespace
 
-// RT-safe.
-std::size_t sample_bytes(const Layout& layout) noexcept {
+RT_SAFE std::size_t sample_bytes(const Layout& layout) noexcept {
   return 1 + static_cast<std::size_t>(std::popcount(layout.mask)) +
          (layout.time ? kStampBytes : 0) + (layout.status ? 1 : 0);
 }
 
-// RT-safe.
-bool decode_stamp(std::span<const std::byte, kStampBytes> bytes, std::uint32_t& count) noexcept {
+RT_SAFE bool decode_stamp(std::span<const std::byte, kStampBytes> bytes,
+                          std::uint32_t& count) noexcept {
   const auto flags = std::to_integer<unsigned>(bytes[0]);
   count = 0;
   for (unsigned k = 0; k < 4; ++k) {
@@ -48,9 +47,8 @@ std::array<std::byte, kStampBytes> encode_stamp(std::uint32_t count) noexcept {
   return bytes;
 }
 
-// RT-safe.
-std::int64_t decode_time_of_day(std::span<const std::byte, kRecordHead> head,
-                                int multiplier) noexcept {
+RT_SAFE std::int64_t decode_time_of_day(std::span<const std::byte, kRecordHead> head,
+                                        int multiplier) noexcept {
   const std::int64_t hours = pair(head, 0);
   const std::int64_t minutes = pair(head, 3);
   const std::int64_t seconds = pair(head, 6);

@@ -27,6 +27,8 @@
 #include <span>
 #include <string_view>
 
+#include "proto/frame/rt_safe.hpp"
+
 namespace posed::drivers::cyberglove {
 
 // Sensors by their bit in a mask: group * 4 + joint (CyberGlove Reference Manual, page 20).
@@ -94,12 +96,12 @@ inline constexpr std::byte kStatusMark{0x80};
 // finger, 5 is the palm. The answer is 'A' 00, between two samples.
 inline constexpr std::byte kTouch{'A'};
 
-// Number of bytes before the pairs and the end: lead, sensors, stamp, status. RT-safe.
-[[nodiscard]] std::size_t sample_bytes(const Layout& layout) noexcept;
+// Number of bytes before the pairs and the end: lead, sensors, stamp, status.
+RT_SAFE [[nodiscard]] std::size_t sample_bytes(const Layout& layout) noexcept;
 
-// False when a flag does not fit its byte. RT-safe.
-[[nodiscard]] bool decode_stamp(std::span<const std::byte, kStampBytes> bytes,
-                                std::uint32_t& count) noexcept;
+// False when a flag does not fit its byte.
+RT_SAFE [[nodiscard]] bool decode_stamp(std::span<const std::byte, kStampBytes> bytes,
+                                        std::uint32_t& count) noexcept;
 [[nodiscard]] std::array<std::byte, kStampBytes> encode_stamp(std::uint32_t count) noexcept;
 
 inline constexpr std::size_t kRecordBytes = 61;
@@ -119,9 +121,9 @@ inline constexpr std::string_view kRecordPattern = "dd:dd:dd:dd:dS";
 }
 
 // Sub-frames since midnight from a head that fits the pattern; negative when it is not a valid time
-// of day. RT-safe.
-[[nodiscard]] std::int64_t decode_time_of_day(std::span<const std::byte, kRecordHead> head,
-                                              int multiplier) noexcept;
+// of day.
+RT_SAFE [[nodiscard]] std::int64_t decode_time_of_day(std::span<const std::byte, kRecordHead> head,
+                                                      int multiplier) noexcept;
 [[nodiscard]] std::array<std::byte, kRecordHead> encode_time_of_day(std::int64_t sub_frames,
                                                                     int multiplier) noexcept;
 [[nodiscard]] constexpr std::int64_t sub_frames_a_day(int multiplier) noexcept {

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <optional>
 
+#include "proto/frame/rt_safe.hpp"
+
 namespace posed::drivers::cyberglove {
 
 // Counts modulo `range`. Stamps have no checksum, so a step of more than `plausible` counts (or
@@ -16,8 +18,8 @@ class StampClock {
   StampClock(std::int64_t range, std::int64_t plausible) noexcept
       : range_(range), plausible_(plausible) {}
 
-  // Ticks since the first stamp; increases with every call. RT-safe.
-  std::int64_t to(std::int64_t count) noexcept {
+  // Ticks since the first stamp; increases with every call.
+  RT_SAFE std::int64_t to(std::int64_t count) noexcept {
     if (!last_) {
       last_ = count;
       return ticks_;

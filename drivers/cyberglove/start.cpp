@@ -21,23 +21,23 @@ class Session {
   explicit Session(Connection& link) : link_(link) {}
 
   // Stops a running stream and discards the bytes still arriving.
-  [[nodiscard]] Result<> stop();
+  Result<> stop();
   // Returns the text about the device; empty when nothing came; otherwise the bytes received, even
   // if they are no such text.
-  [[nodiscard]] Result<std::string> info();
+  Result<std::string> info();
   // Returns the value bytes after "?L". They may be zero, so the answer is read by its length.
-  [[nodiscard]] Result<std::vector<unsigned>> query(char letter, std::size_t value_bytes);
+  Result<std::vector<unsigned>> query(char letter, std::size_t value_bytes);
   // Sends a setting and waits for its echo. Sources differ by a byte about the answer, so only the
   // letters are compared; then the line is drained.
-  [[nodiscard]] Result<> set(std::string_view command, std::string_view echo);
-  [[nodiscard]] Result<> send(std::string_view bytes) { return link_.write(bytes); }
+  Result<> set(std::string_view command, std::string_view echo);
+  Result<> send(std::string_view bytes) { return link_.write(bytes); }
 
   [[nodiscard]] const std::string& name() const { return link_.name(); }
 
  private:
   // Collects bytes until `done(text)` or until the wait is over; silence is not an error.
   template <typename Done>
-  [[nodiscard]] Result<std::string> listen(std::chrono::milliseconds patience, Done done);
+  Result<std::string> listen(std::chrono::milliseconds patience, Done done);
 
   Connection& link_;
 };
@@ -59,20 +59,19 @@ Result<std::string> Session::listen(milliseconds patience, Done done) {
   while (!done(received) && received.size() < kMaxText) {
     const auto left = std::chrono::ceil<milliseconds>(deadline - Clock::now());
     if (left.count() <= 0) break;
-    const auto bytes = link_.read(left);
-    if (!bytes) return std::unexpected(bytes.error());
-    for (const std::byte byte : *bytes) received.push_back(static_cast<char>(byte));
+    const auto bytes = TRY(link_.read(left));
+    for (const std::byte byte : bytes) received.push_back(static_cast<char>(byte));
   }
   return received;
 }
 
 Result<> Session::stop() {
-  if (auto ok = link_.write(std::string_view("\x03")); !ok) return ok;
+  TRY(link_.write(std::string_view("\x03")));
   return link_.drain(kQuiet);
 }
 
 Result<std::string> Session::info() {
-  if (auto ok = link_.write(std::string_view("?i")); !ok) return std::unexpected(ok.error());
+  TRY(link_.write(std::string_view("?i")));
   return listen(kInfo, [](const std::string& received) {
     const std::size_t at = received.find("?i");
     return at != std::string::npos && received.find('\0', at) != std::string::npos;
@@ -81,33 +80,30 @@ Result<std::string> Session::info() {
 
 Result<std::vector<unsigned>> Session::query(char letter, std::size_t value_bytes) {
   const std::string question{'?', letter};
-  if (auto ok = link_.write(question); !ok) return std::unexpected(ok.error());
+  TRY(link_.write(question));
   const std::size_t size = question.size() + value_bytes + 1;
-  const auto received = listen(kAnswer, [&](const std::string& text) {
+  const auto received = TRY(listen(kAnswer, [&](const std::string& text) {
     const std::size_t at = text.find(question);
     return at != std::string::npos && text.size() >= at + size;
-  });
-  if (!received) return std::unexpected(received.error());
-  const std::size_t at = received->find(question);
-  if (at == std::string::npos || received->size() < at + size ||
-      (*received)[at + size - 1] != '\0') {
+  }));
+  const std::size_t at = received.find(question);
+  if (at == std::string::npos || received.size() < at + size || received[at + size - 1] != '\0') {
     return fail(link_.name() + " did not answer '" + question +
                 "' as a CyberGlove does; switch its box off and on again");
   }
   std::vector<unsigned> values(value_bytes);
   for (std::size_t i = 0; i < value_bytes; ++i) {
-    values[i] = static_cast<unsigned char>((*received)[at + question.size() + i]);
+    values[i] = static_cast<unsigned char>(received[at + question.size() + i]);
   }
   return values;
 }
 
 Result<> Session::set(std::string_view command, std::string_view echo) {
-  if (auto ok = link_.write(command); !ok) return ok;
-  const auto received = listen(kAnswer, [&](const std::string& text) {
+  TRY(link_.write(command));
+  const auto received = TRY(listen(kAnswer, [&](const std::string& text) {
     return text.size() > echo.size() && text.find('\0', echo.size()) != std::string::npos;
-  });
-  if (!received) return std::unexpected(received.error());
-  if (!received->starts_with(echo)) {
+  }));
+  if (!received.starts_with(echo)) {
     return fail(link_.name() + " does not accept the setting '" + std::string(1, command[0]) +
                 "'; switch its box off and on again");
   }
@@ -119,18 +115,17 @@ constexpr unsigned kInitialised = 1, kGloveIn = 2;  // bits of ?G
 char byte_of(std::int64_t value) { return static_cast<char>(value & 0xFF); }
 
 Result<> check_device(Session& session, const RequestedConfig& requested) {
-  const auto info = session.info();
-  if (!info) return std::unexpected(info.error());
-  if (info->contains("CyberGlove")) return {};
+  const auto info = TRY(session.info());
+  if (info.contains("CyberGlove")) return {};
   const std::string rate =
       requested.over_tcp ? "" : " at " + std::to_string(requested.baud) + " baud";
-  if (info->empty()) {
+  if (info.empty()) {
     return fail("nothing answers on " + session.name() + rate +
                 ": switch the CyberGlove's box on, and set baud as the box is set");
   }
   const auto printable = std::ranges::count_if(
-      *info, [](char c) { return (c >= ' ' && c <= '~') || c == '\r' || c == '\n' || c == '\0'; });
-  if (printable < static_cast<std::ptrdiff_t>(info->size() * 3 / 4)) {
+      info, [](char c) { return (c >= ' ' && c <= '~') || c == '\r' || c == '\n' || c == '\0'; });
+  if (printable < static_cast<std::ptrdiff_t>(info.size() * 3 / 4)) {
     return fail(session.name() + " sends answers that make no sense" + rate +
                 ": set baud as the CyberGlove's box is set (9600 to 115200), or name another port");
   }
@@ -138,19 +133,17 @@ Result<> check_device(Session& session, const RequestedConfig& requested) {
 }
 
 Result<> check_glove(Session& session) {
-  const auto state = session.query('G', 1);
-  if (!state) return std::unexpected(state.error());
-  if (((*state)[0] & kGloveIn) == 0) {
+  const auto state = TRY(session.query('G', 1));
+  if ((state[0] & kGloveIn) == 0) {
     return fail("the glove is not plugged into its box on " + session.name() + ": plug it in");
   }
-  if (((*state)[0] & kInitialised) != 0) return {};
+  if ((state[0] & kInitialised) != 0) return {};
   return session.set("\x09", "\x09");  // the box reads the glove's data again
 }
 
 Result<> check_hand(Session& session, Side hand) {
-  const auto right = session.query('R', 1);
-  if (!right) return std::unexpected(right.error());
-  const Side worn = (*right)[0] == 0 ? Side::kLeft : Side::kRight;
+  const auto right = TRY(session.query('R', 1));
+  const Side worn = right[0] == 0 ? Side::kLeft : Side::kRight;
   if (worn == hand) return {};
   const std::string name(glove::side_name(worn));
   return fail("the glove on " + session.name() + " is a " + name + " one: set hand = \"" + name +
@@ -160,12 +153,10 @@ Result<> check_hand(Session& session, Side hand) {
 // Reads the mask of the fitted sensors. Gloves with 18 and 22 sensors are known; for others the
 // box's mask is used if its sensor count agrees.
 Result<std::uint32_t> read_mask(Session& session, int wanted) {
-  const auto count = session.query('S', 1);
-  if (!count) return std::unexpected(count.error());
-  const auto sensors = static_cast<int>((*count)[0]);
-  const auto bytes = session.query('K', 3);
-  if (!bytes) return std::unexpected(bytes.error());
-  const std::uint32_t mask = ((*bytes)[0] | (*bytes)[1] << 8 | (*bytes)[2] << 16) & kAllSensors;
+  const auto count = TRY(session.query('S', 1));
+  const auto sensors = static_cast<int>(count[0]);
+  const auto bytes = TRY(session.query('K', 3));
+  const std::uint32_t mask = (bytes[0] | bytes[1] << 8 | bytes[2] << 16) & kAllSensors;
   if (wanted != 0 && sensors != wanted) {
     return fail("the glove on " + session.name() + " has " + std::to_string(sensors) +
                 " sensors, not " + std::to_string(wanted) +
@@ -179,10 +170,9 @@ Result<std::uint32_t> read_mask(Session& session, int wanted) {
 }
 
 Result<> set_and_read_back(Session& session, char letter, bool on) {
-  if (auto ok = session.set(std::string{letter, on ? '\x01' : '\0'}, {&letter, 1}); !ok) return ok;
-  const auto value = session.query(letter, 1);
-  if (!value) return std::unexpected(value.error());
-  if (((*value)[0] != 0) == on) return {};
+  TRY(session.set(std::string{letter, on ? '\x01' : '\0'}, {&letter, 1}));
+  const auto value = TRY(session.query(letter, 1));
+  if ((value[0] != 0) == on) return {};
   return fail(session.name() + " does not keep the setting '" + std::string(1, letter) +
               "'; switch its box off and on again");
 }
@@ -191,22 +181,19 @@ Result<> set_and_read_back(Session& session, char letter, bool on) {
 Result<> set_layout(Session& session, const Layout& layout) {
   const std::string mask{'M', byte_of(layout.mask), byte_of(layout.mask >> 8),
                          byte_of(layout.mask >> 16)};
-  if (auto ok = session.set(mask, "M"); !ok) return ok;
-  if (auto ok = session.set(std::string{'N', byte_of(std::popcount(layout.mask))}, "N"); !ok) {
-    return ok;
-  }
-  if (auto ok = set_and_read_back(session, 'U', layout.status); !ok) return ok;
+  TRY(session.set(mask, "M"));
+  TRY(session.set(std::string{'N', byte_of(std::popcount(layout.mask))}, "N"));
+  TRY(set_and_read_back(session, 'U', layout.status));
   return set_and_read_back(session, 'D', layout.time);
 }
 
 Result<> start_8bit(Session& session, const RequestedConfig& requested, const Layout& layout) {
-  if (auto ok = set_layout(session, layout); !ok) return ok;
-  if (auto ok = session.set(std::string{'F', requested.filter ? '\x01' : '\0'}, "F"); !ok)
-    return ok;
+  TRY(set_layout(session, layout));
+  TRY(session.set(std::string{'F', requested.filter ? '\x01' : '\0'}, "F"));
   // Sent in ASCII, because sources differ on the byte order of the binary form.
   const std::string period =
       "t " + std::to_string(requested.period.w1) + " " + std::to_string(requested.period.w2) + "\r";
-  if (auto ok = session.set(period, "t"); !ok) return ok;
+  TRY(session.set(period, "t"));
   switch (layout.mode) {
     case Mode::kStream:
       return session.send("S");
@@ -237,17 +224,15 @@ Result<> start_16bit(Session& session, const RequestedConfig& requested, const L
 
 Result<Layout> start(Connection& link, const RequestedConfig& requested) {
   Session session(link);
-  if (auto ok = session.stop(); !ok) return std::unexpected(ok.error());
-  if (auto ok = check_device(session, requested); !ok) return std::unexpected(ok.error());
-  if (auto ok = check_glove(session); !ok) return std::unexpected(ok.error());
-  if (auto ok = check_hand(session, requested.hand); !ok) return std::unexpected(ok.error());
-  const auto mask = read_mask(session, requested.sensors);
-  if (!mask) return std::unexpected(mask.error());
+  TRY(session.stop());
+  TRY(check_device(session, requested));
+  TRY(check_glove(session));
+  TRY(check_hand(session, requested.hand));
+  const auto mask = TRY(read_mask(session, requested.sensors));
   Layout layout = requested.layout;
-  layout.mask = *mask;
-  const auto started = layout.form == Form::k8Bit ? start_8bit(session, requested, layout)
-                                                  : start_16bit(session, requested, layout);
-  if (!started) return std::unexpected(started.error());
+  layout.mask = mask;
+  TRY(layout.form == Form::k8Bit ? start_8bit(session, requested, layout)
+                                 : start_16bit(session, requested, layout));
   return layout;
 }
 

@@ -31,6 +31,6 @@ struct RequestedConfig {
 // Stops a running stream, queries and sets the box, and starts it. Returns the layout with the
 // glove's own mask. Errors: no answer, another device, glove not plugged into its box, wrong hand,
 // wrong number of sensors. Cold: takes a second or two.
-[[nodiscard]] Result<Layout> start(Connection& link, const RequestedConfig& requested);
+Result<Layout> start(Connection& link, const RequestedConfig& requested);
 
 }  // namespace posed::drivers::cyberglove

@@ -28,9 +28,8 @@ DescribedDecoder::DescribedDecoder(std::shared_ptr<const Table> table,
   extra_.fill(std::numeric_limits<float>::quiet_NaN());
 }
 
-// RT-safe.
-void DescribedDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
-                            Sink& sink) noexcept {
+RT_SAFE void DescribedDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
+                                    Sink& sink) noexcept {
   if (table_->link.kind == LinkKind::kHid) return accept_reports(bytes, sink);
   while (!bytes.empty()) {
     const std::size_t room = std::min(bytes.size(), pending_.size() - pending_bytes_);
@@ -46,8 +45,8 @@ void DescribedDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arr
   }
 }
 
-// RT-safe.
-std::size_t DescribedDecoder::accept_stream(std::span<const std::byte> bytes, Sink& sink) noexcept {
+RT_SAFE std::size_t DescribedDecoder::accept_stream(std::span<const std::byte> bytes,
+                                                    Sink& sink) noexcept {
   std::size_t at = 0;
   while (at < bytes.size()) {
     const Look look = look_for_packet(*table_, bytes.subspan(at));
@@ -66,9 +65,8 @@ std::size_t DescribedDecoder::accept_stream(std::span<const std::byte> bytes, Si
   return at;
 }
 
-// RT-safe.
-std::size_t DescribedDecoder::accept_delimited(std::span<const std::byte> bytes,
-                                               Sink& sink) noexcept {
+RT_SAFE std::size_t DescribedDecoder::accept_delimited(std::span<const std::byte> bytes,
+                                                       Sink& sink) noexcept {
   const auto& delimiter = table_->delimiter;
   std::size_t begin = 0;
   for (;;) {
@@ -90,8 +88,7 @@ std::size_t DescribedDecoder::accept_delimited(std::span<const std::byte> bytes,
   return begin;
 }
 
-// RT-safe.
-void DescribedDecoder::accept_piece(std::span<const std::byte> piece, Sink& sink) noexcept {
+RT_SAFE void DescribedDecoder::accept_piece(std::span<const std::byte> piece, Sink& sink) noexcept {
   in_step_ = true;  // the delimiter limits the damage, so each piece is counted
   if (piece.size() > kMaxPacketBytes) return damaged(Outcome::kShort, sink);
   const Look look = look_for_packet(*table_, piece);
@@ -102,8 +99,8 @@ void DescribedDecoder::accept_piece(std::span<const std::byte> piece, Sink& sink
   }
 }
 
-// RT-safe.
-void DescribedDecoder::accept_reports(std::span<const std::byte> bytes, Sink& sink) noexcept {
+RT_SAFE void DescribedDecoder::accept_reports(std::span<const std::byte> bytes,
+                                              Sink& sink) noexcept {
   while (!bytes.empty()) {
     const Look look = look_for_packet(*table_, bytes);
     in_step_ = true;  // the next report begins with the next chunk
@@ -116,9 +113,9 @@ void DescribedDecoder::accept_reports(std::span<const std::byte> bytes, Sink& si
   }
 }
 
-// RT-safe.
-bool DescribedDecoder::accept_packet(const PacketRule& rule, std::span<const std::byte> packet,
-                                     Sink& sink) noexcept {
+RT_SAFE bool DescribedDecoder::accept_packet(const PacketRule& rule,
+                                             std::span<const std::byte> packet,
+                                             Sink& sink) noexcept {
   for (std::size_t i = 0; i < rule.fields.size(); ++i) {
     value_[i] = read_field(rule.fields[i], packet);
     if (!in_range(rule.fields[i], value_[i])) {
@@ -139,8 +136,7 @@ bool DescribedDecoder::accept_packet(const PacketRule& rule, std::span<const std
   return true;
 }
 
-// RT-safe.
-void DescribedDecoder::keep_values(const PacketRule& rule) noexcept {
+RT_SAFE void DescribedDecoder::keep_values(const PacketRule& rule) noexcept {
   for (std::size_t i = 0; i < rule.fields.size(); ++i) {
     const Field& field = rule.fields[i];
     const double value = value_[i];
@@ -159,8 +155,7 @@ void DescribedDecoder::keep_values(const PacketRule& rule) noexcept {
   }
 }
 
-// RT-safe.
-void DescribedDecoder::damaged(Outcome why, Sink& sink) noexcept {
+RT_SAFE void DescribedDecoder::damaged(Outcome why, Sink& sink) noexcept {
   if (std::exchange(in_step_, false)) sink.outcome(why);
 }
 

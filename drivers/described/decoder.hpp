@@ -24,9 +24,8 @@ class DescribedDecoder final : public glove::GloveDecoder {
   DescribedDecoder(std::shared_ptr<const Table> table, std::shared_ptr<const Skeleton> skeleton,
                    std::shared_ptr<const glove::Calibration> default_calibration);
 
-  // RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-            Sink& sink) noexcept override;
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept override;
 
  private:
   // Each returns the number of bytes consumed.

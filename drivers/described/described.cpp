@@ -40,19 +40,18 @@ bool has_packet(const Table& table, std::span<const std::byte> bytes) {
 // With a wrong baud rate or another device on the port, none does.
 Result<> start(const Table& table, Connection& link) {
   if (!table.link.stop.empty()) {
-    if (auto ok = link.write(table.link.stop); !ok) return ok;
-    if (auto ok = link.drain(kQuiet); !ok) return ok;
+    TRY(link.write(table.link.stop));
+    TRY(link.drain(kQuiet));
   }
   if (!table.link.start.empty()) {
-    if (auto ok = link.write(table.link.start); !ok) return ok;
+    TRY(link.write(table.link.start));
   }
   std::vector<std::byte> received;
   const auto until = std::chrono::steady_clock::now() + kFirstPacket;
   while (std::chrono::steady_clock::now() < until && received.size() < 8 * kMaxPacketBytes) {
-    const auto bytes = link.read(kQuiet);
-    if (!bytes) return std::unexpected(bytes.error());
-    received.insert(received.end(), bytes->begin(), bytes->end());
-    if (!bytes->empty() && has_packet(table, received)) return {};
+    const auto bytes = TRY(link.read(kQuiet));
+    received.insert(received.end(), bytes.begin(), bytes.end());
+    if (!bytes.empty() && has_packet(table, received)) return {};
   }
   if (received.empty()) {
     return fail("nothing came within 2 seconds; is it the " + table.name + ", and switched on?",
@@ -89,18 +88,15 @@ struct DescribedGlove : glove::GloveType<DescribedGlove> {
 
   // What the options leave out is as the description says. An error names its file.
   static Result<Settings> settings(Options& options) {
-    const auto hand = glove::hand_option(options);
-    if (!hand) return std::unexpected(hand.error());
+    const auto hand = TRY(glove::hand_option(options));
     const auto device = option<std::string>(options, "device");
-    auto toml = device_text(device);
-    if (!toml) return std::unexpected(toml.error());
-    auto table = parse_device(*toml, device);
-    if (!table) return std::unexpected(table.error());
-    const LinkRule& link = table->link;
+    auto toml = TRY(device_text(device));
+    auto table = TRY(parse_device(toml, device));
+    const LinkRule& link = table.link;
     if (option<std::int64_t>(options, "baud") == 0) options["baud"] = std::int64_t{link.baud};
     if (option<std::string>(options, "listen").empty()) options["listen"] = link.listen;
     options["link"] = std::string(link.kind == LinkKind::kTcp ? "tcp" : "serial");
-    return Settings{.hand = *hand, .toml = std::move(*toml), .table = std::move(*table)};
+    return Settings{.hand = hand, .toml = std::move(toml), .table = std::move(table)};
   }
   static Result<std::string> check(const Options& options, const Settings& settings) {
     const auto id = settings.table.link.kind == LinkKind::kHid
@@ -116,12 +112,11 @@ struct DescribedGlove : glove::GloveType<DescribedGlove> {
     const std::size_t line_end = std::min(text.find('\n'), text.size());
     glove::DeviceInfoReader reader(text.substr(0, line_end), kName, identity);
     Settings settings{.hand = reader.side(), .toml = {}, .table = {}};
-    if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
+    TRY(reader.finish());
     if (line_end == text.size()) return fail("lacks the device's description", identity);
     settings.toml = text.substr(line_end + 1);
-    auto table = parse_device(settings.toml, identity);
-    if (!table) return std::unexpected(table.error());
-    settings.table = std::move(*table);
+    auto table = TRY(parse_device(settings.toml, identity));
+    settings.table = std::move(table);
     return settings;
   }
   static Result<glove::Model> model(const Settings& settings) { return settings.table.model; }
@@ -143,26 +138,24 @@ struct DescribedGlove : glove::GloveType<DescribedGlove> {
     const LinkRule& rule = settings.table.link;
     const bool hid = rule.kind == LinkKind::kHid;
     const std::uint32_t usb_id = hid ? rule.usb_ids.front() : 0;
-    auto link = hid ? ports.hid({.vendor = static_cast<std::uint16_t>(usb_id >> 16),
-                                 .products = {static_cast<std::uint16_t>(usb_id & 0xFFFF)},
-                                 .id = option<std::string>(options, "id"),
-                                 .path = option<std::string>(options, "port")})
-                    : glove::connect(options, ports, rule.usb_ids);
-    if (!link) return std::unexpected(link.error());
-    if (auto ok = start(settings.table, *link); !ok) return std::unexpected(ok.error());
+    auto link = TRY(hid ? ports.hid({.vendor = static_cast<std::uint16_t>(usb_id >> 16),
+                                     .products = {static_cast<std::uint16_t>(usb_id & 0xFFFF)},
+                                     .id = option<std::string>(options, "id"),
+                                     .path = option<std::string>(options, "port")})
+                        : glove::connect(options, ports, rule.usb_ids));
+    TRY(start(settings.table, link));
     const double rate_hz = settings.table.rate_hz;
-    Opened opened{.identity = link->identity(), .transport = nullptr};
+    Opened opened{.identity = link.identity(), .transport = nullptr};
     opened.transport =
-        hid ? make_hid_transport(std::move(*link)) : make_link_transport(std::move(*link));
+        hid ? make_hid_transport(std::move(link)) : make_link_transport(std::move(link));
     opened.reopen_after_s =
         rate_hz > 0.0 ? std::max(kSilence_s, kSilentPeriods / rate_hz) : kSilence_s;
     return opened;
   }
   static Result<std::unique_ptr<Emulator>> emulator(const Options& /*options*/, Settings settings) {
-    auto calibration = glove::default_calibration(settings.table.model);
-    if (!calibration) return std::unexpected(calibration.error());
+    auto calibration = TRY(glove::default_calibration(settings.table.model));
     return std::make_unique<DescribedEmulator>(
-        std::make_shared<const Table>(std::move(settings.table)), std::move(*calibration));
+        std::make_shared<const Table>(std::move(settings.table)), std::move(calibration));
   }
 };
 

@@ -82,18 +82,15 @@ bool describes_packets(std::string_view toml) { return toml.find("[[packet]]") !
 }  // namespace
 
 Result<Table> parse_device(const std::string& toml, const std::string& file) {
-  const auto root = parse_toml(toml, file, {.what = kWhat, .bytes = kMaxDeviceFile});
-  if (!root) return std::unexpected(root.error());
+  const auto root = TRY(parse_toml(toml, file, {.what = kWhat, .bytes = kMaxDeviceFile}));
   Findings findings{.file = file};
-  TableReader device(*root, "", findings);
+  TableReader device(root, "", findings);
   Table read;
   read_device(device, findings, read);
-  auto table = findings.result(std::move(read));
-  if (!table) return table;
-  table->model.driver = "described";
-  table->model.map_toml = toml;
-  const auto rows = glove::parse_angle_map(toml, file, table->model.sensors);
-  if (!rows) return std::unexpected(rows.error());
+  auto table = TRY(findings.result(std::move(read)));
+  table.model.driver = "described";
+  table.model.map_toml = toml;
+  TRY(glove::parse_angle_map(toml, file, table.model.sensors));
   return table;
 }
 

@@ -13,11 +13,11 @@ namespace posed::drivers::described {
 inline constexpr std::size_t kMaxDeviceFile = 64 * 1024;  // bytes
 
 // An error names `file`, the line and the allowed values. Cold.
-[[nodiscard]] Result<Table> parse_device(const std::string& toml, const std::string& file);
+Result<Table> parse_device(const std::string& toml, const std::string& file);
 
 // Returns the text of the description that `device` names: one built into posed ("vmg30") or, when
 // it ends in ".toml", a file. Cold.
-[[nodiscard]] Result<std::string> device_text(const std::string& device);
+Result<std::string> device_text(const std::string& device);
 
 // The names of the built-in descriptions. Cold.
 [[nodiscard]] std::vector<std::string> shipped_devices();

@@ -121,8 +121,7 @@ Look look_for(const Table& table, const PacketRule& rule,
 
 }  // namespace
 
-// RT-safe.
-Look look_for_packet(const Table& table, std::span<const std::byte> bytes) noexcept {
+RT_SAFE Look look_for_packet(const Table& table, std::span<const std::byte> bytes) noexcept {
   Look best;
   for (const PacketRule& rule : table.packets) {
     const Look look = look_for(table, rule, bytes);
@@ -134,13 +133,11 @@ Look look_for_packet(const Table& table, std::span<const std::byte> bytes) noexc
   return best;
 }
 
-// RT-safe.
-std::uint64_t read_bits(const BitPlace& place, std::span<const std::byte> packet) noexcept {
+RT_SAFE std::uint64_t read_bits(const BitPlace& place, std::span<const std::byte> packet) noexcept {
   return gather(place, packet) >> place.shift & mask_of(place.bits);
 }
 
-// RT-safe.
-double read_field(const Field& field, std::span<const std::byte> packet) noexcept {
+RT_SAFE double read_field(const Field& field, std::span<const std::byte> packet) noexcept {
   const std::uint64_t bits = read_bits(field.place, packet);
   if (field.form == Form::kUnsigned) return static_cast<double>(bits);
   if (field.form == Form::kSigned) {

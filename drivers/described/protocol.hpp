@@ -27,11 +27,13 @@ struct Look {
   std::size_t bytes = 0;  // for kPacket: its length
 };
 
-// kMayCome: the bytes could be the beginning of a packet that is not complete yet. RT-safe.
-[[nodiscard]] Look look_for_packet(const Table& table, std::span<const std::byte> bytes) noexcept;
+// kMayCome: the bytes could be the beginning of a packet that is not complete yet.
+RT_SAFE [[nodiscard]] Look look_for_packet(const Table& table,
+                                           std::span<const std::byte> bytes) noexcept;
 
-// The raw value of a field in a complete packet. RT-safe.
-[[nodiscard]] double read_field(const Field& field, std::span<const std::byte> packet) noexcept;
+// The raw value of a field in a complete packet.
+RT_SAFE [[nodiscard]] double read_field(const Field& field,
+                                        std::span<const std::byte> packet) noexcept;
 [[nodiscard]] std::uint64_t read_bits(const BitPlace& place,
                                       std::span<const std::byte> packet) noexcept;
 

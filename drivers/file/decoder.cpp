@@ -13,8 +13,8 @@ namespace posed::drivers {
 namespace {
 
 // A word that is a number but not a plausible one (nan, inf, 1e300) counts as out of range; any
-// other word as foreign. RT-safe.
-Outcome outcome_of(const clip::FrameOutcome& parsed) noexcept {
+// other word as foreign.
+RT_SAFE Outcome outcome_of(const clip::FrameOutcome& parsed) noexcept {
   switch (parsed.fault) {
     case clip::FrameFault::kNone:
       return Outcome::kOk;
@@ -35,8 +35,7 @@ Outcome outcome_of(const clip::FrameOutcome& parsed) noexcept {
   }
 }
 
-// RT-safe.
-bool is_frame_number(std::string_view line) noexcept {
+RT_SAFE bool is_frame_number(std::string_view line) noexcept {
   return std::ranges::all_of(line, [](char c) { return c >= '0' && c <= '9'; });
 }
 
@@ -47,9 +46,8 @@ ClipDecoder::ClipDecoder(clip::FrameCoding coding)
   assert(coding_.parser.frame_bytes() <= text_.size());
 }
 
-// RT-safe.
-void ClipDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
-                       Sink& sink) noexcept {
+RT_SAFE void ClipDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
+                               Sink& sink) noexcept {
   if (coding_.parser.frame_bytes() > 0) {
     feed_numbers(bytes, sink);
     return;
@@ -67,16 +65,15 @@ void ClipDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_
   }
 }
 
-// Frames of numbers have no mark between them; all have the same length. RT-safe.
-void ClipDecoder::feed_numbers(std::span<const std::byte> bytes, Sink& sink) noexcept {
+// Frames of numbers have no mark between them; all have the same length.
+RT_SAFE void ClipDecoder::feed_numbers(std::span<const std::byte> bytes, Sink& sink) noexcept {
   for (const std::byte byte : bytes) {
     text_[size_++] = static_cast<char>(byte);
     if (size_ == coding_.parser.frame_bytes()) finish_frame(sink);
   }
 }
 
-// RT-safe.
-void ClipDecoder::end_line(Sink& sink) noexcept {
+RT_SAFE void ClipDecoder::end_line(Sink& sink) noexcept {
   const std::string_view line = clip::trim({text_.data() + line_begin_, size_ - line_begin_});
   if (skipping_ || line.empty() || line.front() == '#') {
     skipping_ = false;
@@ -103,8 +100,7 @@ void ClipDecoder::end_line(Sink& sink) noexcept {
   if (++lines_ >= coding_.parser.lines()) finish_frame(sink);
 }
 
-// RT-safe.
-void ClipDecoder::begin_block(std::string_view line, Sink& sink) noexcept {
+RT_SAFE void ClipDecoder::begin_block(std::string_view line, Sink& sink) noexcept {
   const char* const begin = line.data();
   const std::size_t length = line.size();
   if (lines_ > 0) drop_frame(Outcome::kShort, sink);
@@ -114,8 +110,7 @@ void ClipDecoder::begin_block(std::string_view line, Sink& sink) noexcept {
   lines_ = 1;
 }
 
-// RT-safe.
-void ClipDecoder::finish_frame(Sink& sink) noexcept {
+RT_SAFE void ClipDecoder::finish_frame(Sink& sink) noexcept {
   const clip::FrameOutcome parsed = coding_.parser.parse({text_.data(), size_}, values_);
   const Outcome outcome = outcome_of(parsed);
   // A bone may span two lines; the limit keeps garbage from being collected without end.
@@ -133,21 +128,18 @@ void ClipDecoder::finish_frame(Sink& sink) noexcept {
   sink.frame(frame);
 }
 
-// RT-safe.
-void ClipDecoder::drop_frame(Outcome outcome, Sink& sink) noexcept {
+RT_SAFE void ClipDecoder::drop_frame(Outcome outcome, Sink& sink) noexcept {
   size_ = line_begin_ = lines_ = 0;
   (void)next_time_ns(std::numeric_limits<double>::quiet_NaN());
   sink.outcome(outcome);
 }
 
-// RT-safe.
-std::int64_t ClipDecoder::next_time_ns(double given_s) noexcept {
+RT_SAFE std::int64_t ClipDecoder::next_time_ns(double given_s) noexcept {
   if (coding_.parser.timed()) return next_given_time_ns(given_s);
   return nanoseconds(static_cast<double>(frames_++) / coding_.frame_rate_hz);
 }
 
-// RT-safe.
-std::int64_t ClipDecoder::next_given_time_ns(double given_s) noexcept {
+RT_SAFE std::int64_t ClipDecoder::next_given_time_ns(double given_s) noexcept {
   const std::int64_t step_ns = std::max<std::int64_t>(1, nanoseconds(1 / coding_.frame_rate_hz));
   const bool is_first = last_ns_ == kNoTime_ns;
   const std::int64_t following_ns = is_first ? 0 : last_ns_ + step_ns;

@@ -1,5 +1,6 @@
-// Decodes the bytes of a clip into frames, one by one: the motion lines of a BVH, the lines of a hand
-// CSV, the blocks of lines of an AMC, or the numbers of any other format (proto/clip/device_clip).
+// Decodes the bytes of a clip into frames, one by one: the motion lines of a BVH, the lines of a
+// hand CSV, the blocks of lines of an AMC, or the numbers of any other format
+// (proto/clip/device_clip).
 #pragma once
 
 #include <cstddef>
@@ -13,15 +14,14 @@
 namespace posed::drivers {
 
 // Device time is the clip's time: frame n, counted over all loops and including unreadable frames,
-// is at n / rate. Where frames carry their times, a frame without one comes one step after the frame
-// before it, and a time earlier than the times before it begins the next loop.
+// is at n / rate. Where frames carry their times, a frame without one comes one step after the
+// frame before it, and a time earlier than the times before it begins the next loop.
 class ClipDecoder final : public Decoder {
  public:
   explicit ClipDecoder(clip::FrameCoding coding);
 
-  // RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-            Sink& sink) noexcept override;
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept override;
 
  private:
   void feed_numbers(std::span<const std::byte> bytes, Sink& sink) noexcept;

@@ -13,20 +13,18 @@ namespace {
 constexpr std::string_view kDefaultHand = "right";
 
 Result<Description> describe(const std::string& text, const std::string& identity) {
-  auto coding = clip::parse_description(text, identity);
-  if (!coding) return std::unexpected(coding.error());
+  auto coding = TRY(clip::parse_description(text, identity));
   return Description{.driver = "file",
                      .text = text,
                      .identity = identity,
-                     .skeleton = std::move(coding->skeleton),
+                     .skeleton = std::move(coding.skeleton),
                      .samples = {},
-                     .rate_hz = coding->frame_rate_hz};
+                     .rate_hz = coding.frame_rate_hz};
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
-  auto coding = clip::parse_description(description.text, description.identity);
-  if (!coding) return std::unexpected(coding.error());
-  return std::make_unique<ClipDecoder>(std::move(*coding));
+  auto coding = TRY(clip::parse_description(description.text, description.identity));
+  return std::make_unique<ClipDecoder>(std::move(coding));
 }
 
 // One chunk per frame.
@@ -51,26 +49,23 @@ clip::ReadOptions read_options(const Options& options) {
 }
 
 Result<Device> open(const Options& given, TransportFactory& /*ports*/) {
-  const auto options = complete_options(file_driver(), given);
-  if (!options) return std::unexpected(options.error());
-  const std::string path = option<std::string>(*options, "path");
-  const std::string hand = option<std::string>(*options, "hand");
+  const auto options = TRY(complete_options(file_driver(), given));
+  const std::string path = option<std::string>(options, "path");
+  const std::string hand = option<std::string>(options, "hand");
   if (hand != "left" && hand != "right") return misuse("hand is left or right");
-  const auto clip = clip::open_device_clip(path, read_options(*options));
-  if (!clip) return std::unexpected(clip.error());
-  auto device = make_device(file_driver(), clip->description, path);
-  if (!device) return device;
-  auto transport = FileTransport::open(chunks_of(*clip), {.rate_hz = device->description.rate_hz,
-                                                           .pace = option<double>(*options, "pace"),
-                                                           .loop = option<bool>(*options, "loop"),
-                                                           .time_s = clip->time_s});
+  const auto clip = TRY(clip::open_device_clip(path, read_options(options)));
+  auto device = TRY(make_device(file_driver(), clip.description, path));
+  auto transport = FileTransport::open(chunks_of(clip), {.rate_hz = device.description.rate_hz,
+                                                         .pace = option<double>(options, "pace"),
+                                                         .loop = option<bool>(options, "loop"),
+                                                         .time_s = clip.time_s});
   if (!transport) {
     Error error = transport.error();
     error.file = path;
     return std::unexpected(std::move(error));
   }
-  device->transport = std::move(*transport);
-  device->warnings = clip->warnings;
+  device.transport = std::move(*transport);
+  device.warnings = clip.warnings;
   return device;
 }
 

@@ -40,16 +40,14 @@ SampleLayout layout(const glove::Model& model, Form form) {
   return layout;
 }
 
-// RT-safe.
-void FiveDtDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
-                         Sink& sink) noexcept {
+RT_SAFE void FiveDtDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
+                                 Sink& sink) noexcept {
   sink_ = &sink;
   framer_.feed(bytes, *this);
   sink_ = nullptr;
 }
 
-// RT-safe.
-void FiveDtDecoder::reading(const Reading& reading) noexcept {
+RT_SAFE void FiveDtDecoder::reading(const Reading& reading) noexcept {
   const bool mine = settings_.form != Form::kUltraWireless || reading.port_b == settings_.port_b;
   if (reading.kind != Reading::Kind::kData || !mine) return;
   const std::size_t sensors = sensors_of(settings_.form);

@@ -25,7 +25,7 @@ struct Settings {
   bool port_b = false;  // which glove of an Ultra Wireless kit
 };
 
-[[nodiscard]] Result<glove::Model> model(Form form);
+Result<glove::Model> model(Form form);
 [[nodiscard]] SampleLayout layout(const glove::Model& model, Form form);
 
 class FiveDtDecoder final : public glove::GloveDecoder, private Readings {
@@ -36,9 +36,8 @@ class FiveDtDecoder final : public glove::GloveDecoder, private Readings {
         settings_(settings),
         framer_(settings.form) {}
 
-  // RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-            Sink& sink) noexcept override;
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept override;
 
  private:
   void reading(const Reading& reading) noexcept override;

@@ -35,9 +35,8 @@ Result<bool> collect(Connection& link, Bytes& bytes, const Enough& enough) {
   const auto begin = Clock::now();
   while (!enough()) {
     if (Clock::now() - begin > kPatience) return false;
-    const auto more = link.read(kOneRead);
-    if (!more) return std::unexpected(more.error());
-    bytes.insert(bytes.end(), more->begin(), more->end());
+    const auto more = TRY(link.read(kOneRead));
+    bytes.insert(bytes.end(), more.begin(), more.end());
   }
   return true;
 }
@@ -50,27 +49,25 @@ std::unexpected<Error> other_hand(const Connection& link, Side found) {
 
 // Starts a Data Glove 5 with a two-way cable: asks for its info, then starts the stream.
 Result<> start_wired(Connection& link, Side hand, bool polled) {
-  if (auto ok = link.drain(kQuiet); !ok) return ok;
-  if (auto ok = link.write("A"); !ok) return ok;
+  TRY(link.drain(kQuiet));
+  TRY(link.write("A"));
   Bytes answer;
   const auto ready =
-      collect(link, answer, [&] { return std::ranges::find(answer, kReady) != answer.end(); });
-  if (!ready) return std::unexpected(ready.error());
-  if (!*ready) {
+      TRY(collect(link, answer, [&] { return std::ranges::find(answer, kReady) != answer.end(); }));
+  if (!ready) {
     return fail(
         "the glove does not answer; check that it is switched on and a Data Glove 5 at "
         "19200 baud, or choose model = \"5-wireless\" for one that only sends",
         link.name());
   }
   answer.clear();
-  if (auto ok = link.write("G"); !ok) return ok;
+  TRY(link.write("G"));
   constexpr std::array kMark{std::byte{'B'}, std::byte{'R'}};
   const auto info = [&] { return std::ranges::search(answer, kMark).begin(); };
-  const auto whole = collect(link, answer, [&] {
+  const auto whole = TRY(collect(link, answer, [&] {
     return answer.end() - info() >= static_cast<std::ptrdiff_t>(kInfoBytes);
-  });
-  if (!whole) return std::unexpected(whole.error());
-  if (!*whole) return fail("what answers is no 5DT Data Glove 5; check the port", link.name());
+  }));
+  if (!whole) return fail("what answers is no 5DT Data Glove 5; check the port", link.name());
   const bool right = (info()[4] & std::byte{1}) != std::byte{0};
   if (right != (hand == Side::kRight)) {
     return other_hand(link, right ? Side::kRight : Side::kLeft);
@@ -100,13 +97,12 @@ Result<std::vector<std::string>> await_stream(Connection& link, const Settings& 
   Received received;
   Bytes bytes;
   std::size_t fed = 0;
-  const auto good = collect(link, bytes, [&] {
+  const auto good = TRY(collect(link, bytes, [&] {
     framer.feed(std::span(bytes).subspan(fed), received);
     fed = bytes.size();
     return received.packets >= kPackets;
-  });
-  if (!good) return std::unexpected(good.error());
-  if (!*good) {
+  }));
+  if (!good) {
     return fail(bytes.empty()
                     ? "the glove sends nothing; check that it is switched on, its model and baud"
                     : "what comes is not of this model of 5DT glove; check model, baud and port",
@@ -130,8 +126,7 @@ Result<std::vector<std::string>> await_stream(Connection& link, const Settings& 
 // users.
 Result<std::vector<std::string>> start(Connection& link, const Settings& settings) {
   if (settings.form != Form::kFive) return await_stream(link, settings);
-  const auto ok = start_wired(link, settings.hand, settings.polled);
-  if (!ok) return std::unexpected(ok.error());
+  TRY(start_wired(link, settings.hand, settings.polled));
   return std::vector<std::string>();
 }
 
@@ -178,15 +173,14 @@ struct FiveDt : glove::GloveType<FiveDt> {
   static constexpr auto options = all_options;
 
   static Result<Settings> settings(Options& options) {
-    const auto hand = glove::hand_option(options);
-    if (!hand) return std::unexpected(hand.error());
+    const auto hand = TRY(glove::hand_option(options));
     const auto form = static_cast<Form>(choice_option(options, "model", kFormNames));
     const bool polled = option<std::int64_t>(options, "poll_hz") > 0;
     if (polled && form != Form::kFive) {
       return misuse("poll_hz should be 0 (stream): only model = \"5\" can be polled");
     }
     if (option<std::int64_t>(options, "baud") == 0) options["baud"] = usual_baud(form);
-    return Settings{.hand = *hand,
+    return Settings{.hand = hand,
                     .form = form,
                     .polled = polled,
                     .port_b = choice_option(options, "kit_port", kKitPorts) == 1};
@@ -207,7 +201,7 @@ struct FiveDt : glove::GloveType<FiveDt> {
     settings.form = static_cast<Form>(reader.choice("model", kFormNames));
     settings.polled = reader.choice("mode", kModes) == 1;
     settings.port_b = reader.choice("kit_port", kKitPorts) == 1;
-    if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
+    TRY(reader.finish());
     return settings;
   }
   static Result<glove::Model> model(const Settings& settings) {
@@ -224,18 +218,16 @@ struct FiveDt : glove::GloveType<FiveDt> {
   static Result<Opened> open(const Options& options, const Settings& settings,
                              TransportFactory& ports) {
     const bool usb = is_usb(settings.form);
-    auto link = usb ? ports.hid({.vendor = kUltraUsb[0].vendor,
-                                 .products = products(settings),
-                                 .id = option<std::string>(options, "id"),
-                                 .path = option<std::string>(options, "port")})
-                    : glove::connect(options, ports, std::vector<std::uint32_t>());
-    if (!link) return std::unexpected(link.error());
-    auto warnings = start(*link, settings);
-    if (!warnings) return std::unexpected(warnings.error());
-    Opened opened{.identity = link->identity(),
-                  .transport = usb ? make_hid_transport(std::move(*link))
-                                   : make_link_transport(std::move(*link)),
-                  .warnings = std::move(*warnings),
+    auto link = TRY(usb ? ports.hid({.vendor = kUltraUsb[0].vendor,
+                                     .products = products(settings),
+                                     .id = option<std::string>(options, "id"),
+                                     .path = option<std::string>(options, "port")})
+                        : glove::connect(options, ports, std::vector<std::uint32_t>()));
+    auto warnings = TRY(start(link, settings));
+    Opened opened{.identity = link.identity(),
+                  .transport = usb ? make_hid_transport(std::move(link))
+                                   : make_link_transport(std::move(link)),
+                  .warnings = std::move(warnings),
                   .reopen_after_s = kSilence_s};
     if (settings.polled) {
       opened.poll = {.request = {std::byte{'C'}},

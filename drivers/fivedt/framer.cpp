@@ -5,8 +5,7 @@
 
 namespace posed::drivers::fivedt {
 
-// RT-safe.
-void Framer::feed(std::span<const std::byte> bytes, Readings& readings) noexcept {
+RT_SAFE void Framer::feed(std::span<const std::byte> bytes, Readings& readings) noexcept {
   for (const std::byte byte : bytes) {
     assert(pending_bytes_ < pending_.size());
     pending_[pending_bytes_++] = byte;
@@ -15,13 +14,12 @@ void Framer::feed(std::span<const std::byte> bytes, Readings& readings) noexcept
   }
 }
 
-// Consumes bytes from the front; returns false when it needs more bytes. RT-safe.
-bool Framer::advance(Readings& readings) noexcept {
+// Consumes bytes from the front; returns false when it needs more bytes.
+RT_SAFE bool Framer::advance(Readings& readings) noexcept {
   return in_step_ ? advance_in_step(readings) : advance_hunting();
 }
 
-// RT-safe.
-bool Framer::advance_in_step(Readings& readings) noexcept {
+RT_SAFE bool Framer::advance_in_step(Readings& readings) noexcept {
   const std::size_t length = packet_length(form_, pending());
   if (length == 0) {
     if (consume_tail()) return true;
@@ -49,8 +47,8 @@ bool Framer::advance_in_step(Readings& readings) noexcept {
   return true;
 }
 
-// Searches for the next packet that cannot be a coincidence. RT-safe.
-bool Framer::advance_hunting() noexcept {
+// Searches for the next packet that cannot be a coincidence.
+RT_SAFE bool Framer::advance_hunting() noexcept {
   if (just_lost_) return skip_damaged();
   const std::size_t length = packet_length(form_, pending());
   const std::size_t needed = length + (form_ == Form::kUltraWireless ? 1 : 0);
@@ -63,8 +61,8 @@ bool Framer::advance_hunting() noexcept {
 
 // When bytes were changed but none lost, the next packet is at its expected position, which is
 // tried first: in the packets of a Data Glove 5 any byte 80 looks like a start, even with a valid
-// checksum while the hand does not move. RT-safe.
-bool Framer::skip_damaged() noexcept {
+// checksum while the hand does not move.
+RT_SAFE bool Framer::skip_damaged() noexcept {
   const std::size_t length = packet_bytes(form_);
   if (pending_bytes_ <= length) return false;
   const std::size_t start = length + (is_tail(pending_[length]) ? 1 : 0);
@@ -78,8 +76,8 @@ bool Framer::skip_damaged() noexcept {
 }
 
 // True when `bytes` begins with a whole packet, and for an Ultra Wireless kit with one more byte if
-// it is available. RT-safe.
-bool Framer::is_packet(std::span<const std::byte> bytes) noexcept {
+// it is available.
+RT_SAFE bool Framer::is_packet(std::span<const std::byte> bytes) noexcept {
   const std::size_t length = packet_length(form_, bytes);
   const auto packet = bytes.first(length);
   Reading reading;
@@ -96,14 +94,13 @@ bool Framer::is_packet(std::span<const std::byte> bytes) noexcept {
   return !is_usb(form_) || (reading.value[0] != 0 && is_half_used(packet));
 }
 
-// RT-safe.
-bool Framer::is_tail(std::byte byte) const noexcept {
+RT_SAFE bool Framer::is_tail(std::byte byte) const noexcept {
   return (form_ == Form::kFive && byte == kReady) ||
          (form_ == Form::kFiveWireless && is_capability(byte));
 }
 
-// Consumes the byte that may follow a packet of a Data Glove 5. RT-safe.
-bool Framer::consume_tail() noexcept {
+// Consumes the byte that may follow a packet of a Data Glove 5.
+RT_SAFE bool Framer::consume_tail() noexcept {
   if (!after_packet_) return false;
   after_packet_ = false;
   const std::byte byte = pending_[0];
@@ -114,16 +111,15 @@ bool Framer::consume_tail() noexcept {
 }
 
 // True when a glove that leaves the second half of its reports zero still does so: over USB nothing
-// shifts, but a report of another kind is noticed. RT-safe.
-bool Framer::is_half_used(std::span<const std::byte> report) noexcept {
+// shifts, but a report of another kind is noticed.
+RT_SAFE bool Framer::is_half_used(std::span<const std::byte> report) noexcept {
   const bool zero = std::ranges::all_of(report.subspan(2 * kMaxValues),
                                         [](std::byte byte) { return byte == std::byte{0}; });
   if (usb_tail_ == Tail::kUnknown) usb_tail_ = zero ? Tail::kZero : Tail::kUsed;
   return zero || usb_tail_ == Tail::kUsed;
 }
 
-// RT-safe.
-void Framer::drop(std::size_t count) noexcept {
+RT_SAFE void Framer::drop(std::size_t count) noexcept {
   std::copy(pending_.begin() + static_cast<std::ptrdiff_t>(count),
             pending_.begin() + static_cast<std::ptrdiff_t>(pending_bytes_), pending_.begin());
   assert(count <= pending_bytes_);

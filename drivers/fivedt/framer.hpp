@@ -27,11 +27,11 @@ class Framer {
  public:
   explicit Framer(Form form) noexcept : form_(form) {}
 
-  // Reads bytes cut at any position. RT-safe.
-  void feed(std::span<const std::byte> bytes, Readings& readings) noexcept;
+  // Reads bytes cut at any position.
+  RT_SAFE void feed(std::span<const std::byte> bytes, Readings& readings) noexcept;
 
-  // The last byte that a wireless glove sent after a packet; -1: none yet. RT-safe.
-  [[nodiscard]] int capability() const noexcept { return capability_; }
+  // The last byte that a wireless glove sent after a packet; -1: none yet.
+  RT_SAFE [[nodiscard]] int capability() const noexcept { return capability_; }
 
  private:
   [[nodiscard]] bool advance(Readings& readings) noexcept;

@@ -100,28 +100,26 @@ std::vector<std::byte> encode_ultra(const Reading& reading) {
 
 }  // namespace
 
-// RT-safe.
-bool is_usb(Form form) noexcept { return form == Form::kUltraUsb5 || form == Form::kUltraUsb14; }
+RT_SAFE bool is_usb(Form form) noexcept {
+  return form == Form::kUltraUsb5 || form == Form::kUltraUsb14;
+}
 
 std::size_t sensors_of(Form form) noexcept {
   constexpr std::array<std::size_t, 6> kSensors{5, 5, 16, 14, 5, 14};
   return kSensors[static_cast<std::size_t>(form)];
 }
 
-// RT-safe.
-std::size_t packet_bytes(Form form) noexcept {
+RT_SAFE std::size_t packet_bytes(Form form) noexcept {
   constexpr std::array<std::size_t, 6> kBytes{kFiveBytes,  kFiveBytes, kSixteenBytes,
                                               kUltraBytes, kUsbBytes,  kUsbBytes};
   return kBytes[static_cast<std::size_t>(form)];
 }
 
-// RT-safe.
-std::size_t value_of_sensor(Form form, std::size_t index) noexcept {
+RT_SAFE std::size_t value_of_sensor(Form form, std::size_t index) noexcept {
   return form == Form::kUltraUsb5 ? 3 * index : index;
 }
 
-// RT-safe.
-std::size_t packet_length(Form form, std::span<const std::byte> bytes) noexcept {
+RT_SAFE std::size_t packet_length(Form form, std::span<const std::byte> bytes) noexcept {
   switch (form) {
     case Form::kFive:
     case Form::kFiveWireless:
@@ -138,8 +136,8 @@ std::size_t packet_length(Form form, std::span<const std::byte> bytes) noexcept 
   }
 }
 
-// RT-safe.
-Outcome decode_packet(Form form, std::span<const std::byte> bytes, Reading& reading) noexcept {
+RT_SAFE Outcome decode_packet(Form form, std::span<const std::byte> bytes,
+                              Reading& reading) noexcept {
   reading = {};
   switch (form) {
     case Form::kFive:
@@ -194,13 +192,11 @@ std::vector<std::byte> encode_info(Side side) {
   return bytes;
 }
 
-// RT-safe.
-bool is_capability(std::byte byte) noexcept {
+RT_SAFE bool is_capability(std::byte byte) noexcept {
   return byte == std::byte{0x00} || byte == std::byte{0x01} || says_left(byte);
 }
 
-// RT-safe.
-bool says_left(std::byte capability) noexcept {
+RT_SAFE bool says_left(std::byte capability) noexcept {
   return capability == std::byte{0x06} || capability == std::byte{0x40};
 }
 

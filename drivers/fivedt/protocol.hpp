@@ -55,11 +55,11 @@ inline constexpr std::size_t kMaxPacket = 64;
 inline constexpr std::size_t kMaxValues = 16;
 inline constexpr std::byte kReady{0x55};  // the answer to A; may also follow a packet
 
-[[nodiscard]] bool is_usb(Form form) noexcept;  // sends reports, not a byte stream; RT-safe
-[[nodiscard]] std::size_t sensors_of(Form form) noexcept;    // RT-safe
-[[nodiscard]] std::size_t packet_bytes(Form form) noexcept;  // of a measurement packet; RT-safe
-// Index of sensor `index` among the values of a packet. RT-safe.
-[[nodiscard]] std::size_t value_of_sensor(Form form, std::size_t index) noexcept;
+RT_SAFE [[nodiscard]] bool is_usb(Form form) noexcept;  // sends reports, not a byte stream
+RT_SAFE [[nodiscard]] std::size_t sensors_of(Form form) noexcept;
+RT_SAFE [[nodiscard]] std::size_t packet_bytes(Form form) noexcept;  // of a measurement packet
+// Index of sensor `index` among the values of a packet.
+RT_SAFE [[nodiscard]] std::size_t value_of_sensor(Form form, std::size_t index) noexcept;
 
 // The content of one packet.
 struct Reading {
@@ -73,13 +73,14 @@ struct Reading {
 
 // Length of the packet that begins with these bytes; 0 when no packet begins like this. One byte is
 // enough to tell whether it is 0; until the length is certain, it is a lower bound greater than
-// bytes.size(). RT-safe.
-[[nodiscard]] std::size_t packet_length(Form form, std::span<const std::byte> bytes) noexcept;
+// bytes.size().
+RT_SAFE [[nodiscard]] std::size_t packet_length(Form form,
+                                                std::span<const std::byte> bytes) noexcept;
 
 // `bytes` is one packet. Fills `reading` and returns kOk; otherwise kBadChecksum, kOutOfRange (more
-// than 12 bits) or kForeign. RT-safe.
-[[nodiscard]] Outcome decode_packet(Form form, std::span<const std::byte> bytes,
-                                    Reading& reading) noexcept;
+// than 12 bits) or kForeign.
+RT_SAFE [[nodiscard]] Outcome decode_packet(Form form, std::span<const std::byte> bytes,
+                                            Reading& reading) noexcept;
 
 // The bytes that the glove would send; `side` goes into the tenth byte of a wireless type.
 [[nodiscard]] std::vector<std::byte> encode_packet(Form form, const Reading& reading, Side side);
@@ -88,8 +89,7 @@ inline constexpr std::size_t kInfoBytes = 32;
 [[nodiscard]] std::vector<std::byte> encode_info(Side side);
 
 // True when the byte is a valid tenth byte of a wireless type; and when it means a left hand.
-// RT-safe.
-[[nodiscard]] bool is_capability(std::byte byte) noexcept;
+RT_SAFE [[nodiscard]] bool is_capability(std::byte byte) noexcept;
 [[nodiscard]] bool says_left(std::byte capability) noexcept;
 
 }  // namespace posed::drivers::fivedt

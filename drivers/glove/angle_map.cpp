@@ -63,10 +63,9 @@ Result<Model> with_device_table(Model model, std::string_view name) {
 
 Result<std::vector<MapRow>> parse_angle_map(const std::string& toml, const std::string& file,
                                             const std::vector<Sensor>& sensors) {
-  const auto table = parse_toml(toml, file, {.what = "device description"});
-  if (!table) return std::unexpected(table.error());
+  const auto table = TRY(parse_toml(toml, file, {.what = "device description"}));
   Findings findings{.file = file};
-  TableReader reader(*table, "", findings);
+  TableReader reader(table, "", findings);
   std::vector<MapRow> rows;
   reader.need("angles", "it says which joints of the hand each value moves");
   if (auto angles = reader.table("angles")) read_angles(*angles, sensors, findings, rows);
@@ -75,7 +74,7 @@ Result<std::vector<MapRow>> parse_angle_map(const std::string& toml, const std::
 
 int hand_channel(std::string_view name) {
   for (int finger = 0; finger < kFingers; ++finger) {
-    const std::string_view start = kFingerNames[static_cast<std::size_t>(finger)];
+    const std::string_view start = kFingerNames[finger];
     if (!name.starts_with(start)) continue;
     name.remove_prefix(start.size());
     if (name.size() != 3 || name[0] < '1' || name[0] > '3' || name[1] != '_' || name[2] < 'x' ||

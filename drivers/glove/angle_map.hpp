@@ -21,12 +21,11 @@
 namespace posed::drivers::glove {
 
 // Gives the model the map in config/devices/<name>.toml, as built into posed. Cold.
-[[nodiscard]] Result<Model> with_device_table(Model model, std::string_view name);
+Result<Model> with_device_table(Model model, std::string_view name);
 
 // Errors name `file` and line: unknown value or channel, invalid number. Cold.
-[[nodiscard]] Result<std::vector<MapRow>> parse_angle_map(const std::string& toml,
-                                                          const std::string& file,
-                                                          const std::vector<Sensor>& sensors);
+Result<std::vector<MapRow>> parse_angle_map(const std::string& toml, const std::string& file,
+                                            const std::vector<Sensor>& sensors);
 
 // Turns "index1_x" into its index in HandAngles; -1 when there is no such channel. Cold.
 [[nodiscard]] int hand_channel(std::string_view name);

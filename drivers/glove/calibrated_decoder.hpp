@@ -14,8 +14,8 @@ class CalibratedDecoder {
   virtual ~CalibratedDecoder() = default;
 
   // Uses this calibration from the next packet on; the calibration must outlive its use. Until the
-  // first call the device's default applies. RT-safe.
-  virtual void calibrate(const Calibration& calibration) noexcept = 0;
+  // first call the device's default applies.
+  RT_SAFE virtual void calibrate(const Calibration& calibration) noexcept = 0;
 };
 
 // The decoder of a glove; null for other devices. Cold: the reader uses Device::calibrated.

@@ -14,17 +14,16 @@ Curve Curve::line(double raw0, double value0, double raw1, double value1) noexce
   return curve;
 }
 
-// RT-safe.
-float Curve::value_at(float raw_value) const noexcept {
+RT_SAFE float Curve::value_at(float raw_value) const noexcept {
   std::size_t piece = 1;  // ends at this point; the first and the last are extended outwards
   while (piece + 1 < points && raw_value > raw[piece]) ++piece;
   const float share = (raw_value - raw[piece - 1]) / (raw[piece] - raw[piece - 1]);
   return value[piece - 1] + share * (value[piece] - value[piece - 1]);
 }
 
-// RT-safe.
-void Calibration::map_to_hand(std::span<const float> value, const std::bitset<kMaxSensors>& valid,
-                              HandAngles& angles) const noexcept {
+RT_SAFE void Calibration::map_to_hand(std::span<const float> value,
+                                      const std::bitset<kMaxSensors>& valid,
+                                      HandAngles& angles) const noexcept {
   angles.fill(0.0);
   for (std::size_t r = 0; r < map_rows; ++r) {
     const MapRow& row = map[r];

@@ -30,7 +30,7 @@ struct Curve {
   std::uint8_t points = 0;  // at least 2 after construction
 
   [[nodiscard]] static Curve line(double raw0, double value0, double raw1, double value1) noexcept;
-  [[nodiscard]] float value_at(float raw_value) const noexcept;  // RT-safe
+  RT_SAFE [[nodiscard]] float value_at(float raw_value) const noexcept;
 };
 
 // The contribution of one calibrated value to one hand45 channel.
@@ -49,9 +49,9 @@ struct Calibration {
   std::size_t map_rows = 0;
 
   // Sums the rows of the map. A channel without a row is zero; a channel with an invalid value is
-  // not finite, so its joint is not valid. RT-safe.
-  void map_to_hand(std::span<const float> value, const std::bitset<kMaxSensors>& valid,
-                   HandAngles& angles) const noexcept;
+  // not finite, so its joint is not valid.
+  RT_SAFE void map_to_hand(std::span<const float> value, const std::bitset<kMaxSensors>& valid,
+                           HandAngles& angles) const noexcept;
 };
 
 }  // namespace posed::drivers::glove

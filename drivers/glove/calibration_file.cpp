@@ -63,10 +63,9 @@ void check_complete(TableReader& reader, int sensor_count, const CalibrationFile
 Result<CalibrationFile> parse_calibration(const std::string& toml,
                                           const std::filesystem::path& path) {
   const std::string file = path.string();
-  const auto table = parse_toml(toml, file, kLimits);
-  if (!table) return std::unexpected(table.error());
+  const auto table = TRY(parse_toml(toml, file, kLimits));
   Findings findings{.file = file};
-  TableReader reader(*table, "", findings);
+  TableReader reader(table, "", findings);
   int format = 0;
   reader.read("format", format, kAnyCount);
   if (format != kFormat) {
@@ -122,7 +121,7 @@ std::string format_calibration(const CalibrationFile& file) {
 namespace {
 
 // A mistake in a driver's curve appears in the first test that opens the driver.
-bool is_sound(const Curve& curve) {
+bool is_valid(const Curve& curve) {
   bool valid = curve.points >= 2 && curve.points <= kMaxCurvePoints;
   for (std::size_t i = 0; valid && i < curve.points; ++i) {
     valid = std::isfinite(curve.raw[i]) && std::isfinite(curve.value[i]) &&
@@ -142,7 +141,7 @@ Result<Calibration> compile(const Model& model) {
   made.sensors = model.sensors.size();
   for (std::size_t i = 0; i < made.sensors; ++i) {
     const Sensor& sensor = model.sensors[i];
-    if (!is_sound(sensor.curve)) {
+    if (!is_valid(sensor.curve)) {
       return fail("sensor " + in_quotes(sensor.name) + " of driver " + in_quotes(model.driver) +
                   " needs a default curve of ascending finite points: mend the driver");
     }
@@ -152,10 +151,9 @@ Result<Calibration> compile(const Model& model) {
     made.parameter[i] = static_cast<float>(model.parameters[i].second);
   }
   if (model.map_toml.empty()) return made;
-  const auto rows =
-      parse_angle_map(model.map_toml, "config/devices/" + model.driver + ".toml", model.sensors);
-  if (!rows) return std::unexpected(rows.error());
-  for (const MapRow& row : *rows) {
+  const auto rows = TRY(
+      parse_angle_map(model.map_toml, "config/devices/" + model.driver + ".toml", model.sensors));
+  for (const MapRow& row : rows) {
     made.map[made.map_rows] = row;
     made.map[made.map_rows++].gain *= static_cast<float>(model.sensors[row.sensor].map_sign);
   }
@@ -191,7 +189,7 @@ Result<> set_curve(const Sensor& sensor, const std::vector<std::array<double, 2>
     curve.raw[i] = static_cast<float>(points[i][0]);
     curve.value[i] = static_cast<float>(points[i][1]);
   }
-  if (!is_sound(curve)) {
+  if (!is_valid(curve)) {
     return fail("the raw values of sensor " + in_quotes(sensor.name) + " should ascend");
   }
   if (points.back()[0] - points.front()[0] < least_span(sensor)) {
@@ -211,26 +209,22 @@ double least_span(const Sensor& sensor) {
 }
 
 Result<std::shared_ptr<const Calibration>> default_calibration(const Model& model) {
-  const auto made = compile(model);
-  if (!made) return std::unexpected(made.error());
-  return std::make_shared<const Calibration>(*made);
+  const auto made = TRY(compile(model));
+  return std::make_shared<const Calibration>(made);
 }
 
 Result<std::shared_ptr<const Calibration>> make_calibration(const Model& model,
                                                             const CalibrationFile& file, Side hand,
                                                             const std::string& identity) {
-  if (auto ok = check_owner(model, file, hand, identity); !ok) return std::unexpected(ok.error());
-  auto made = compile(model);
-  if (!made) return std::unexpected(made.error());
+  TRY(check_owner(model, file, hand, identity));
+  auto made = TRY(compile(model));
   for (const auto& [name, points] : file.sensors) {
     const auto sensor = std::ranges::find(model.sensors, name, &Sensor::name);
     if (sensor == model.sensors.end()) {
       return fail("the glove has no sensor " + in_quotes(name) + ": is the calibration another's?");
     }
-    const auto index = static_cast<std::size_t>(sensor - model.sensors.begin());
-    if (auto ok = set_curve(*sensor, points, made->curve[index]); !ok) {
-      return std::unexpected(ok.error());
-    }
+    const std::size_t index = sensor - model.sensors.begin();
+    TRY(set_curve(*sensor, points, made.curve[index]));
   }
   for (const auto& [name, value] : file.parameters) {
     const auto at =
@@ -239,10 +233,9 @@ Result<std::shared_ptr<const Calibration>> make_calibration(const Model& model,
       return fail("the glove has no parameter " + in_quotes(name) +
                   ": is the calibration another's?");
     }
-    made->parameter[static_cast<std::size_t>(at - model.parameters.begin())] =
-        static_cast<float>(value);
+    made.parameter[at - model.parameters.begin()] = static_cast<float>(value);
   }
-  return std::make_shared<const Calibration>(*made);
+  return std::make_shared<const Calibration>(made);
 }
 
 }  // namespace posed::drivers::glove

@@ -41,17 +41,18 @@ struct OwnedCalibration {
 };
 
 // Errors name file and line: truncated, not finite, raw values that do not increase. Cold.
-[[nodiscard]] Result<CalibrationFile> parse_calibration(const std::string& toml,
-                                                        const std::filesystem::path& file);
+Result<CalibrationFile> parse_calibration(const std::string& toml,
+                                          const std::filesystem::path& file);
 [[nodiscard]] std::string format_calibration(const CalibrationFile& file);
 
 // The model's default calibration, and the one made from `file` (a sensor that the file does not
 // name keeps its default). An error for: another driver, another hand, another glove (not checked
 // when `identity` is empty), unknown sensors, or a sensor whose raw values span less than 10 counts
 // (4 % of the range of a coarser one). Cold.
-[[nodiscard]] Result<std::shared_ptr<const Calibration>> default_calibration(const Model& model);
-[[nodiscard]] Result<std::shared_ptr<const Calibration>> make_calibration(
-    const Model& model, const CalibrationFile& file, Side hand, const std::string& identity);
+Result<std::shared_ptr<const Calibration>> default_calibration(const Model& model);
+Result<std::shared_ptr<const Calibration>> make_calibration(const Model& model,
+                                                            const CalibrationFile& file, Side hand,
+                                                            const std::string& identity);
 
 // Loads the text of a calibration file, with a size limit. parse_calibration() checks its content.
 
@@ -59,6 +60,6 @@ struct OwnedCalibration {
 inline constexpr std::size_t kMaxCalibrationFile = 64 * 1024;
 
 // Loads a regular file of at most kMaxCalibrationFile; an Error names it. Cold.
-[[nodiscard]] Result<std::string> load_calibration_text(const std::filesystem::path& path);
+Result<std::string> load_calibration_text(const std::filesystem::path& path);
 
 }  // namespace posed::drivers::glove

@@ -69,7 +69,7 @@ Result<> check_connection(const Options& options) {
 
 Result<Connection> connect(const Options& options, TransportFactory& ports,
                            std::vector<std::uint32_t> usb) {
-  if (auto ok = check_connection(options); !ok) return std::unexpected(ok.error());
+  TRY(check_connection(options));
   if (link_of(options) == "tcp") return ports.accept(listen_settings(options));
   return ports.serial({.port = option<std::string>(options, "port"),
                        .id = option<std::string>(options, "id"),
@@ -97,10 +97,9 @@ Result<> await_line(Connection& link, const std::function<bool(std::string_view)
                       : "the glove sends nothing; check that it is switched on, and its baud",
                   link.name());
     }
-    const auto bytes = link.read(kOneRead);
-    if (!bytes) return std::unexpected(bytes.error());
-    any = any || !bytes->empty();
-    lines.feed(*bytes, [&](std::string_view text) { good = good || is_line(text); }, [] {});
+    const auto bytes = TRY(link.read(kOneRead));
+    any = any || !bytes.empty();
+    lines.feed(bytes, [&](std::string_view text) { good = good || is_line(text); }, [] {});
   }
   return {};
 }

@@ -73,7 +73,7 @@ std::size_t DeviceInfoReader::choice(std::string_view key,
                                      std::span<const std::string_view> names) {
   const std::string text = word(key);
   const auto at = std::ranges::find(names, std::string_view(text));
-  if (at != names.end()) return static_cast<std::size_t>(at - names.begin());
+  if (at != names.end()) return at - names.begin();
   add_error("has an unknown " + in_quotes(key));
   return 0;
 }

@@ -13,7 +13,7 @@
 namespace posed::drivers::glove {
 
 [[nodiscard]] std::string_view side_name(Side side) noexcept;  // "right", "left"
-[[nodiscard]] Result<Side> parse_side(std::string_view name);
+Result<Side> parse_side(std::string_view name);
 
 // The beginning of every device info: "driver hand=right".
 [[nodiscard]] std::string hand_info(std::string_view driver, Side hand);
@@ -30,7 +30,7 @@ class DeviceInfoReader {
   [[nodiscard]] std::string word(std::string_view key);
 
   // Reports the first error as one sentence; a key that was never read is also an error.
-  [[nodiscard]] Result<> finish() const;
+  Result<> finish() const;
 
  private:
   void add_error(std::string what);

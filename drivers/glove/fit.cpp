@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kSame = 0.05;  // rad or share: poses that differ by less do not move a sensor
 
-std::size_t channel(std::string_view name) { return static_cast<std::size_t>(hand_channel(name)); }
+std::size_t channel(std::string_view name) { return hand_channel(name); }
 
 void bend(HandAngles& hand, std::string_view name, double degrees) {
   hand[channel(name)] = degrees * kDegree;
@@ -43,13 +43,12 @@ HandAngles hand_in(Pose pose) {
 }
 
 Result<std::vector<double>> values_of(const Model& model, const HandAngles& hand) {
-  const auto rows =
-      parse_angle_map(model.map_toml, "config/devices/" + model.driver + ".toml", model.sensors);
-  if (!rows) return std::unexpected(rows.error());
+  const auto rows = TRY(
+      parse_angle_map(model.map_toml, "config/devices/" + model.driver + ".toml", model.sensors));
   const std::size_t sensors = model.sensors.size();
   std::vector<double> sum(sensors, 0.0);
   std::vector<double> count(sensors, 0.0);
-  for (const MapRow& row : *rows) {
+  for (const MapRow& row : rows) {
     const double gain = static_cast<double>(row.gain) * model.sensors[row.sensor].map_sign;
     if (gain == 0.0) continue;
     sum[row.sensor] += (hand[row.channel] - static_cast<double>(row.offset_rad)) / gain;
@@ -96,9 +95,8 @@ double SensorPoses::span() const { return std::abs(pose_raw - flat_raw); }
 Result<std::vector<SensorPoses>> poses_of_sensors(const Model& model, const Recorded& recorded) {
   std::array<std::vector<double>, kPoses> wanted;
   for (std::size_t p = 0; p < kPoses; ++p) {
-    auto values = values_of(model, hand_in(static_cast<Pose>(p)));
-    if (!values) return std::unexpected(values.error());
-    wanted[p] = std::move(*values);
+    auto values = TRY(values_of(model, hand_in(static_cast<Pose>(p))));
+    wanted[p] = std::move(values);
   }
   std::vector<SensorPoses> found;
   for (std::size_t i = 0; i < model.sensors.size(); ++i) {
@@ -121,13 +119,12 @@ Result<std::vector<SensorPoses>> poses_of_sensors(const Model& model, const Reco
 }
 
 Result<Fitted> fit_poses(const Model& model, const Recorded& recorded) {
-  const auto sensors = poses_of_sensors(model, recorded);
-  if (!sensors) return std::unexpected(sensors.error());
+  const auto sensors = TRY(poses_of_sensors(model, recorded));
   if (std::ranges::all_of(recorded[0], [](const Held& flat) { return flat.count == 0; })) {
     return fail("no raw values came while the hand was flat: is the glove sending?");
   }
   Fitted fitted;
-  for (const SensorPoses& at : *sensors) {
+  for (const SensorPoses& at : sensors) {
     const Sensor& sensor = model.sensors[at.sensor];
     if (!(at.span() >= least_span(sensor))) {
       fitted.warnings.push_back("sensor " + sensor.name + " hardly moved from flat to " +

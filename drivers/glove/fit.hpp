@@ -58,8 +58,7 @@ struct SensorPoses {
 };
 
 // For each sensor that was measured with the flat hand and that a recorded pose moves.
-[[nodiscard]] Result<std::vector<SensorPoses>> poses_of_sensors(const Model& model,
-                                                                const Recorded& recorded);
+Result<std::vector<SensorPoses>> poses_of_sensors(const Model& model, const Recorded& recorded);
 
 struct Fitted {
   std::map<std::string, std::vector<std::array<double, 2>>> sensors;  // for CalibrationFile
@@ -70,11 +69,11 @@ struct Fitted {
 // Takes two points per sensor: the flat hand and the pose that moves it most. A sensor that no pose
 // moves keeps its default; so does one that moved less than 10 counts, with a warning. Fails when
 // no flat hand was recorded, or no sensor moved at all.
-[[nodiscard]] Result<Fitted> fit_poses(const Model& model, const Recorded& recorded);
+Result<Fitted> fit_poses(const Model& model, const Recorded& recorded);
 
 // The calibrated values [sensor] of a hand in this pose, before the device's own formula; not
 // finite for a sensor that the map does not name.
-[[nodiscard]] Result<std::vector<double>> values_of(const Model& model, const HandAngles& hand);
+Result<std::vector<double>> values_of(const Model& model, const HandAngles& hand);
 
 // The angles of a hand whose sensors have the means of `held`, as a decoder with this calibration
 // of the model gives them; not finite for a channel without a measured sensor.

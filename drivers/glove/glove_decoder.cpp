@@ -22,8 +22,8 @@ void drop_what_is_no_number(std::span<const float> value,
   }
 }
 
-// Removes angles that no finger can have; returns false when there were any. RT-safe.
-bool drop_implausible(HandAngles& angles) noexcept {
+// Removes angles that no finger can have; returns false when there were any.
+RT_SAFE bool drop_implausible(HandAngles& angles) noexcept {
   bool plausible = true;
   for (double& angle_rad : angles) {
     if (!std::isfinite(angle_rad) || std::abs(angle_rad) <= kMaxHandAngle_rad) continue;
@@ -79,12 +79,10 @@ GloveDecoder::GloveDecoder(std::shared_ptr<const Skeleton> skeleton,
   assert(default_ != nullptr && default_->sensors <= kMaxSensors);
 }
 
-// RT-safe.
-void GloveDecoder::compute(std::span<float> /*value*/,
-                           std::bitset<kMaxSensors>& /*valid*/) const noexcept {}
+RT_SAFE void GloveDecoder::compute(std::span<float> /*value*/,
+                                   std::bitset<kMaxSensors>& /*valid*/) const noexcept {}
 
-// RT-safe.
-void GloveDecoder::emit(const Packet& packet, Sink& sink) noexcept {
+RT_SAFE void GloveDecoder::emit(const Packet& packet, Sink& sink) noexcept {
   const std::size_t sensors = default_->sensors;
   std::array<float, kMaxSensors> raw{};
   std::array<float, kMaxSensors> value{};
@@ -116,9 +114,8 @@ void GloveDecoder::emit(const Packet& packet, Sink& sink) noexcept {
   pose(values, valid, packet, sink);
 }
 
-// RT-safe.
-void GloveDecoder::pose(std::span<const float> value, const std::bitset<kMaxSensors>& valid,
-                        const Packet& packet, Sink& sink) noexcept {
+RT_SAFE void GloveDecoder::pose(std::span<const float> value, const std::bitset<kMaxSensors>& valid,
+                                const Packet& packet, Sink& sink) noexcept {
   if (skeleton_ == nullptr) return;
   HandAngles angles;
   calibration_->map_to_hand(value, valid, angles);

@@ -28,8 +28,8 @@ struct Packet {
 
 class GloveDecoder : public Decoder, public CalibratedDecoder {
  public:
-  // A calibration with a different number of sensors is ignored. RT-safe.
-  void calibrate(const Calibration& calibration) noexcept override {
+  // A calibration with a different number of sensors is ignored.
+  RT_SAFE void calibrate(const Calibration& calibration) noexcept override {
     if (calibration.sensors == default_->sensors) calibration_ = &calibration;
   }
 
@@ -39,12 +39,13 @@ class GloveDecoder : public Decoder, public CalibratedDecoder {
                std::shared_ptr<const Calibration> default_calibration);
 
   // Emits the Sample, then the Frame (no Frame when no channel of the map is known). A value that
-  // is not finite or too large is marked as not valid and is zero in the Sample. RT-safe.
-  void emit(const Packet& packet, Sink& sink) noexcept;
+  // is not finite or too large is marked as not valid and is zero in the Sample.
+  RT_SAFE void emit(const Packet& packet, Sink& sink) noexcept;
 
   // Applies the device's formula to calibrated values, in place (relative abductions, computed
-  // joints); may make values valid. RT-safe.
-  virtual void compute(std::span<float> value, std::bitset<kMaxSensors>& valid) const noexcept;
+  // joints); may make values valid.
+  RT_SAFE virtual void compute(std::span<float> value,
+                               std::bitset<kMaxSensors>& valid) const noexcept;
 
   [[nodiscard]] const Calibration& calibration() const noexcept { return *calibration_; }
 

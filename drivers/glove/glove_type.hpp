@@ -32,7 +32,7 @@ struct GloveType {
   static constexpr double kUndetected = 0.0;
 
   static Result<std::string> check(const Options& options, const auto& /*settings*/) {
-    if (auto ok = check_connection(options); !ok) return std::unexpected(ok.error());
+    TRY(check_connection(options));
     return option<std::string>(options, "id");
   }
 
@@ -43,22 +43,19 @@ struct GloveType {
   static double rate_hz(const auto& /*settings*/) { return 0.0; }
 
   static Result<Description> describe(const auto& settings) {
-    const auto model = Self::model(settings);
-    if (!model) return std::unexpected(model.error());
+    const auto model = TRY(Self::model(settings));
     return Description{.driver = {},
                        .text = {},
                        .identity = {},
                        .skeleton = std::make_shared<const Skeleton>(hand_skeleton(settings.hand)),
-                       .samples = Self::layout(*model, settings),
+                       .samples = Self::layout(model, settings),
                        .rate_hz = Self::rate_hz(settings)};
   }
 
   static Result<std::unique_ptr<Decoder>> decoder(auto settings, const Description& description) {
-    const auto model = Self::model(settings);
-    if (!model) return std::unexpected(model.error());
-    auto calibration = default_calibration(*model);
-    if (!calibration) return std::unexpected(calibration.error());
-    return Self::make_decoder(std::move(settings), description.skeleton, std::move(*calibration));
+    const auto model = TRY(Self::model(settings));
+    auto calibration = TRY(default_calibration(model));
+    return Self::make_decoder(std::move(settings), description.skeleton, std::move(calibration));
   }
 
   static const GloveTraits& traits() {
@@ -73,14 +70,12 @@ struct GloveType {
 
  private:
   static Result<Model> glove_model(const Description& description) {
-    const auto settings = Self::parse_device_info(description.text, description.identity);
-    if (!settings) return std::unexpected(settings.error());
-    return Self::model(*settings);
+    const auto settings = TRY(Self::parse_device_info(description.text, description.identity));
+    return Self::model(settings);
   }
   static Result<std::vector<std::byte>> haptics(const Options& given, const Haptics& haptics) {
-    const auto chosen = DriverOf<Self>::choose(given);
-    if (!chosen) return std::unexpected(chosen.error());
-    return Self::encode_haptics(chosen->options, chosen->settings, haptics);
+    const auto chosen = TRY(DriverOf<Self>::choose(given));
+    return Self::encode_haptics(chosen.options, chosen.settings, haptics);
   }
 };
 

@@ -91,7 +91,7 @@ Result<> import_virtual_hand(std::string_view text, const std::string& file,
 // are measured relative to it), so its line belongs to no sensor. That the other fingers' lines are
 // the sensors between the fingers is inferred.
 
-constexpr double kLeastCounts = 10.0;
+constexpr double kMinCounts = 10.0;
 
 constexpr std::array<std::string_view, 22> kAsrNames{
     "wrist_yaw",  "wrist_pitch", "thumb_abd",  "thumb_roll", "thumb_mcp",  "thumb_ip",
@@ -122,7 +122,7 @@ Result<> import_asr(std::string_view text, const std::string& file, CalibrationF
     }
     if (kAsrNames[i].empty() || first[1] == second[1]) continue;  // the sensor keeps its default
     if (first[0] > second[0]) std::swap(first, second);
-    if (second[0] - first[0] < kLeastCounts) {
+    if (second[0] - first[0] < kMinCounts) {
       return fail("sensor '" + std::string(kAsrNames[i]) +
                       "' hardly moved in this calibration (less than 10 counts): calibrate again",
                   file, number);
@@ -211,9 +211,8 @@ Result<CalibrationFile> import_calibration(const std::filesystem::path& path, co
     return fail("calibrations are imported for driver 'cyberglove' only; calibrate this glove",
                 file);
   }
-  const auto loaded = load_calibration_text(path);
-  if (!loaded) return std::unexpected(loaded.error());
-  const std::string_view text = clip::trim(clip::without_bom(*loaded));
+  const auto loaded = TRY(load_calibration_text(path));
+  const std::string_view text = clip::trim(clip::without_bom(loaded));
   CalibrationFile made{.driver = model.driver,
                        .glove = {},
                        .user = {},

@@ -14,7 +14,7 @@ namespace posed::drivers::glove {
 // The kind of file is detected from its content. The glove's identity and the user stay empty,
 // because the files do not contain them. Errors name file and line: unknown kind, truncated file, a
 // sensor that hardly moved, another hand, a driver other than cyberglove. Cold.
-[[nodiscard]] Result<CalibrationFile> import_calibration(const std::filesystem::path& path,
-                                                         const Model& model, Side hand);
+Result<CalibrationFile> import_calibration(const std::filesystem::path& path, const Model& model,
+                                           Side hand);
 
 }  // namespace posed::drivers::glove

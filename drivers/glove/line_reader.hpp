@@ -9,6 +9,8 @@
 #include <span>
 #include <string_view>
 
+#include "proto/frame/rt_safe.hpp"
+
 namespace posed::drivers::glove {
 
 // A line has at most `max` bytes before its line feed.
@@ -17,9 +19,10 @@ class LineReader {
  public:
   // Reads bytes cut at any position. Calls line(text) for each whole line, without its line end;
   // empty lines are left out. Calls overlong() once for a line longer than `max`, whose rest is
-  // then dropped. RT-safe.
+  // then dropped.
   template <typename Line, typename Overlong>
-  void feed(std::span<const std::byte> bytes, const Line& line, const Overlong& overlong) noexcept {
+  RT_SAFE void feed(std::span<const std::byte> bytes, const Line& line,
+                    const Overlong& overlong) noexcept {
     while (!bytes.empty()) {
       const void* const feed = std::memchr(bytes.data(), '\n', bytes.size());
       const std::size_t size =

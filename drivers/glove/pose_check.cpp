@@ -12,7 +12,7 @@ namespace {
 // by more (median 0.2 to 0.4).
 constexpr double kMovedShare = 0.1;
 // A sensor with a span below this share of its range is measured relative to the range: noise.
-constexpr double kShortestWay = 0.04;
+constexpr double kMinTravel = 0.04;
 // Share of the span between two poses that the driver's default predicts.
 constexpr double kStuckShare = 0.1;
 constexpr double kFailedShare = 0.25;  // share of a pose's sensors
@@ -63,7 +63,7 @@ PoseFinding find(const Model& model, const Recorded& recorded, Pose pose,
     if (pose != Pose::kFlat && at.pose != pose) continue;
     const Sensor& sensor = model.sensors[at.sensor];
     ++finding.sensors;
-    const double way = std::max(at.span(), kShortestWay * range_of(sensor));
+    const double way = std::max(at.span(), kMinTravel * range_of(sensor));
     unrest.push_back(recorded[static_cast<std::size_t>(pose)][at.sensor].deviation() / way);
     if (unrest.back() > kMovedShare) {
       finding.moved.push_back(sensor.name);
@@ -118,14 +118,13 @@ std::string PoseCheck::verdict() const {
 }
 
 Result<PoseCheck> check_poses(const Model& model, const Recorded& recorded) {
-  const auto sensors = poses_of_sensors(model, recorded);
-  if (!sensors) return std::unexpected(sensors.error());
+  const auto sensors = TRY(poses_of_sensors(model, recorded));
   PoseCheck check;
-  check.sensors = static_cast<int>(sensors->size());
+  check.sensors = static_cast<int>(sensors.size());
   for (std::size_t p = 0; p < kPoses; ++p) {
     const bool held =
         std::ranges::any_of(recorded[p], [](const Held& sensor) { return sensor.count > 0; });
-    if (held) check.poses.push_back(find(model, recorded, static_cast<Pose>(p), *sensors));
+    if (held) check.poses.push_back(find(model, recorded, static_cast<Pose>(p), sensors));
   }
   return check;
 }

@@ -35,6 +35,6 @@ struct PoseCheck {
 };
 
 // Fails when the device's map cannot be read.
-[[nodiscard]] Result<PoseCheck> check_poses(const Model& model, const Recorded& recorded);
+Result<PoseCheck> check_poses(const Model& model, const Recorded& recorded);
 
 }  // namespace posed::drivers::glove

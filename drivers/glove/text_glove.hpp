@@ -48,9 +48,8 @@ class TextDecoder final : public GloveDecoder {
               std::shared_ptr<const Calibration> default_calibration)
       : GloveDecoder(std::move(skeleton), std::move(default_calibration)) {}
 
-  // RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
-            Sink& sink) noexcept override {
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
+                    Sink& sink) noexcept override {
     lines_.feed(
         bytes,
         [&](std::string_view text) {
@@ -103,9 +102,8 @@ struct TextGlove : GloveType<Self> {
 
   static std::vector<OptionSpec> options() { return serial_options(Self::kBaud); }
   static Result<Settings> settings(const Options& options) {
-    const auto hand = hand_option(options);
-    if (!hand) return std::unexpected(hand.error());
-    return Settings{.hand = *hand};
+    const auto hand = TRY(hand_option(options));
+    return Settings{.hand = hand};
   }
   static std::string device_info(const Settings& settings) {
     return hand_info(Self::kName, settings.hand);
@@ -113,7 +111,7 @@ struct TextGlove : GloveType<Self> {
   static Result<Settings> parse_device_info(const std::string& text, const std::string& identity) {
     DeviceInfoReader reader(text, Self::kName, identity);
     const Settings settings{.hand = reader.side()};
-    if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
+    TRY(reader.finish());
     return settings;
   }
   static std::vector<std::string> extra_names() {
@@ -136,22 +134,19 @@ struct TextGlove : GloveType<Self> {
   }
   static Result<Opened> open(const Options& options, const Settings& /*settings*/,
                              TransportFactory& ports) {
-    auto link = connect(options, ports, Self::kUsb);
-    if (!link) return std::unexpected(link.error());
+    auto link = TRY(connect(options, ports, Self::kUsb));
     const auto is_line = [](std::string_view text) {
       typename Self::Reading reading;
       return Self::parse(text, reading) == Outcome::kOk;
     };
-    if (auto ok = await_line(*link, is_line); !ok) return std::unexpected(ok.error());
-    return opened(std::move(*link), kLineSilence_s);
+    TRY(await_line(link, is_line));
+    return opened(std::move(link), kLineSilence_s);
   }
   static Result<std::unique_ptr<Emulator>> emulator(const Options& /*options*/,
                                                     const Settings& settings) {
-    const auto model = Self::model(settings);
-    if (!model) return std::unexpected(model.error());
-    auto calibration = default_calibration(*model);
-    if (!calibration) return std::unexpected(calibration.error());
-    return std::make_unique<TextEmulator<Self>>(std::move(*calibration));
+    const auto model = TRY(Self::model(settings));
+    auto calibration = TRY(default_calibration(model));
+    return std::make_unique<TextEmulator<Self>>(std::move(calibration));
   }
 };
 

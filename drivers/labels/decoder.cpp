@@ -12,9 +12,8 @@ LabelsDecoder::LabelsDecoder(const Frame& rest, double rate_hz) : rest_(rest), r
   rest_.quality = Quality::kHeld;
 }
 
-// RT-safe.
-void LabelsDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
-                         Sink& sink) noexcept {
+RT_SAFE void LabelsDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
+                                 Sink& sink) noexcept {
   for (const std::byte byte : bytes) {
     if (static_cast<char>(byte) != kBeat.front()) {
       if (!std::exchange(foreign_, true)) sink.outcome(Outcome::kForeign);

@@ -18,9 +18,8 @@ class LabelsDecoder final : public Decoder {
   // `rest` is posed for the stream's skeleton; its header does not matter.
   LabelsDecoder(const Frame& rest, double rate_hz);
 
-  // RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-            Sink& sink) noexcept override;
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept override;
 
  private:
   Frame rest_;

@@ -59,13 +59,12 @@ Error damaged(const std::string& identity) {
 // The body of a clip, as it stands in that frame.
 Result<Performer> body_of(std::string_view frame, std::string_view description, double rate_hz,
                           const std::string& identity) {
-  auto coding = clip::parse_description(description, identity);
-  if (!coding) return std::unexpected(coding.error());
-  Performer body{.skeleton = coding->skeleton, .rest = {}, .rate_hz = rate_hz};
+  auto coding = TRY(clip::parse_description(description, identity));
+  Performer body{.skeleton = coding.skeleton, .rest = {}, .rate_hz = rate_hz};
   if (body.skeleton->joint_of(Bone::kHips) < 0) {
     return fail("is no clip of a body, because no joint of it is the hips", identity);
   }
-  ClipDecoder decoder(std::move(*coding));
+  ClipDecoder decoder(std::move(coding));
   RestSink sink;
   decoder.feed(std::as_bytes(std::span(frame)), 0, sink);
   if (!sink.rest) return std::unexpected(damaged(identity));
@@ -100,49 +99,44 @@ Result<Performer> parse_text(const std::string& text, const std::string& identit
 }
 
 Result<Description> describe(const std::string& text, const std::string& identity) {
-  auto performer = parse_text(text, identity);
-  if (!performer) return std::unexpected(performer.error());
+  auto performer = TRY(parse_text(text, identity));
   return Description{.driver = "labels",
                      .text = text,
                      .identity = identity,
-                     .skeleton = std::move(performer->skeleton),
+                     .skeleton = std::move(performer.skeleton),
                      .samples = {},
-                     .rate_hz = performer->rate_hz};
+                     .rate_hz = performer.rate_hz};
 }
 
 Result<std::unique_ptr<Decoder>> make_decoder(const Description& description) {
-  const auto performer = parse_text(description.text, description.identity);
-  if (!performer) return std::unexpected(performer.error());
-  return std::make_unique<LabelsDecoder>(performer->rest, performer->rate_hz);
+  const auto performer = TRY(parse_text(description.text, description.identity));
+  return std::make_unique<LabelsDecoder>(performer.rest, performer.rate_hz);
 }
 
 Result<Device> make_body(const std::string& path, double rate_hz) {
-  const auto clip = clip::open_device_clip(path);
-  if (!clip) return std::unexpected(clip.error());
-  auto device = make_device(labels_driver(), body_text(*clip, rate_hz), path);
-  if (device) device->warnings = clip->warnings;
+  const auto clip = TRY(clip::open_device_clip(path));
+  auto device = make_device(labels_driver(), body_text(clip, rate_hz), path);
+  if (device) device->warnings = clip.warnings;
   return device;
 }
 
 Result<Device> open(const Options& given, TransportFactory& /*ports*/) {
-  const auto options = complete_options(labels_driver(), given);
-  if (!options) return std::unexpected(options.error());
-  const auto& side = option<std::string>(*options, "side");
-  const auto& body = option<std::string>(*options, "body");
-  const double rate_hz = option<double>(*options, "rate_hz");
+  const auto options = TRY(complete_options(labels_driver(), given));
+  const auto& side = option<std::string>(options, "side");
+  const auto& body = option<std::string>(options, "body");
+  const double rate_hz = option<double>(options, "rate_hz");
   if (side != "left" && side != "right") return misuse("side should be \"left\" or \"right\"");
   if (!(rate_hz >= 1.0 && rate_hz <= kMaxRate_hz)) {
     return misuse("rate_hz should be 1 to 1000 frames a second");
   }
-  auto device = body.empty()
-                    ? make_device(labels_driver(), hand_text(side, rate_hz), side + " hand")
-                    : make_body(body, rate_hz);
-  if (!device) return device;
+  auto device =
+      TRY(body.empty() ? make_device(labels_driver(), hand_text(side, rate_hz), side + " hand")
+                       : make_body(body, rate_hz));
   Chunks beat;
   beat.add(LabelsDecoder::kBeat);
-  auto transport = FileTransport::open(std::move(beat), {.rate_hz = device->description.rate_hz});
-  if (!transport) return std::unexpected(transport.error());
-  device->transport = std::move(*transport);
+  auto transport =
+      TRY(FileTransport::open(std::move(beat), {.rate_hz = device.description.rate_hz}));
+  device.transport = std::move(transport);
   return device;
 }
 

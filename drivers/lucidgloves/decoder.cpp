@@ -43,16 +43,14 @@ std::vector<std::string> extra_names() {
   return names;
 }
 
-// RT-safe.
-void LucidDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
-                        Sink& sink) noexcept {
+RT_SAFE void LucidDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
+                                Sink& sink) noexcept {
   lines_.feed(
       bytes, [&](std::string_view text) { accept_line(text, sink); },
       [&] { sink.outcome(Outcome::kForeign); });
 }
 
-// RT-safe.
-void LucidDecoder::accept_line(std::string_view text, Sink& sink) noexcept {
+RT_SAFE void LucidDecoder::accept_line(std::string_view text, Sink& sink) noexcept {
   Line line;
   Outcome outcome = parse_line(text, settings_.encoding, settings_.max_analog, line);
   if (outcome == Outcome::kOk && line.has_hand() && lost_a_key(line)) outcome = Outcome::kShort;
@@ -67,8 +65,8 @@ void LucidDecoder::accept_line(std::string_view text, Sink& sink) noexcept {
 }
 
 // A glove sends the same fingers in every line: one that lacks some of them is damaged, until it
-// has done so for a while. RT-safe.
-bool LucidDecoder::lost_a_key(const Line& line) noexcept {
+// has done so for a while.
+RT_SAFE bool LucidDecoder::lost_a_key(const Line& line) noexcept {
   std::bitset<kSplay> sent;
   for (std::size_t i = 0; i < kSplay; ++i) sent[i] = line.has[i];
   const bool lost = (usual_ & ~sent).any();
@@ -79,9 +77,8 @@ bool LucidDecoder::lost_a_key(const Line& line) noexcept {
   return false;
 }
 
-// RT-safe.
-void LucidDecoder::compute(std::span<float> value,
-                           std::bitset<glove::kMaxSensors>& valid) const noexcept {
+RT_SAFE void LucidDecoder::compute(std::span<float> value,
+                                   std::bitset<glove::kMaxSensors>& valid) const noexcept {
   for (std::size_t f = 0; f < kFingers; ++f) {
     const std::size_t splay = kFingers * kJoints + f;
     if (valid[splay] || !valid[f * kJoints + 1]) continue;
@@ -90,8 +87,7 @@ void LucidDecoder::compute(std::span<float> value,
   }
 }
 
-// RT-safe.
-void LucidDecoder::emit_line(const Line& line, Sink& sink) noexcept {
+RT_SAFE void LucidDecoder::emit_line(const Line& line, Sink& sink) noexcept {
   std::array<float, kSensors> raw{};
   glove::Packet packet{.raw = raw, .valid = {}, .extra = {}};
   for (std::size_t i = 0; i < kFingers * kJoints; ++i) {

@@ -24,7 +24,7 @@ struct Settings {
 // Twenty joints (finger by finger, from the palm outwards) and five splays.
 inline constexpr std::size_t kSensors = kFingers * kJoints + kFingers;
 
-[[nodiscard]] Result<glove::Model> model(const Settings& settings);
+Result<glove::Model> model(const Settings& settings);
 [[nodiscard]] std::vector<std::string> extra_names();
 
 class LucidDecoder final : public glove::GloveDecoder {
@@ -33,14 +33,13 @@ class LucidDecoder final : public glove::GloveDecoder {
                std::shared_ptr<const glove::Calibration> calibration, const Settings& settings)
       : GloveDecoder(std::move(skeleton), std::move(calibration)), settings_(settings) {}
 
-  // RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-            Sink& sink) noexcept override;
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept override;
 
  protected:
-  // A glove without splay sensors gets splay zero. RT-safe.
-  void compute(std::span<float> value,
-               std::bitset<glove::kMaxSensors>& valid) const noexcept override;
+  // A glove without splay sensors gets splay zero.
+  RT_SAFE void compute(std::span<float> value,
+                       std::bitset<glove::kMaxSensors>& valid) const noexcept override;
 
  private:
   void accept_line(std::string_view text, Sink& sink) noexcept;

@@ -72,7 +72,7 @@ std::unexpected<Error> no_glove(const Connection& link, const Settings& settings
 // Waits a few seconds at most for a valid line, because a board that restarts when its port opens
 // sends other text first. If possible, the link is left at the end of a line.
 Result<> start(Connection& link, const Settings& settings) {
-  if (auto ok = link.write(kAsk); !ok) return ok;
+  TRY(link.write(kAsk));
   Seen seen;
   const auto begin = Clock::now();
   auto good = begin;  // when the first good line came
@@ -82,9 +82,8 @@ Result<> start(Connection& link, const Settings& settings) {
     const bool informed = seen.is_right >= 0 || now - good > kInfoPatience;
     if (seen.hand && informed && (!seen.lines.in_line() || now - good > 2 * kInfoPatience)) break;
     if (now - begin > kPatience) return no_glove(link, settings, seen);
-    const auto bytes = link.read(kOneRead);
-    if (!bytes) return std::unexpected(bytes.error());
-    seen.accept(*bytes, settings);
+    const auto bytes = TRY(link.read(kOneRead));
+    seen.accept(bytes, settings);
   }
   const int wanted = settings.hand == Side::kRight ? 1 : 0;
   if (seen.is_right >= 0 && seen.is_right != wanted) {
@@ -126,10 +125,9 @@ struct LucidGlove : glove::GloveType<LucidGlove> {
   static constexpr auto extra_names = lucidgloves::extra_names;
 
   static Result<Settings> settings(const Options& options) {
-    const auto hand = glove::hand_option(options);
-    if (!hand) return std::unexpected(hand.error());
+    const auto hand = TRY(glove::hand_option(options));
     return Settings{
-        .hand = *hand,
+        .hand = hand,
         .encoding = static_cast<Encoding>(choice_option(options, "encoding", kEncodingNames)),
         .max_analog = static_cast<int>(option<std::int64_t>(options, "max_analog_value"))};
   }
@@ -143,7 +141,7 @@ struct LucidGlove : glove::GloveType<LucidGlove> {
     Settings settings{.hand = reader.side()};
     settings.encoding = static_cast<Encoding>(reader.choice("encoding", kEncodingNames));
     settings.max_analog = reader.whole("max", 1, kMaxAnalog);
-    if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
+    TRY(reader.finish());
     return settings;
   }
   static std::unique_ptr<Decoder> make_decoder(
@@ -153,10 +151,9 @@ struct LucidGlove : glove::GloveType<LucidGlove> {
   }
   static Result<Opened> open(const Options& options, const Settings& settings,
                              TransportFactory& ports) {
-    auto link = glove::connect(options, ports, kUsbIds);
-    if (!link) return std::unexpected(link.error());
-    if (auto ok = start(*link, settings); !ok) return std::unexpected(ok.error());
-    return glove::opened(std::move(*link), kSilence_s);
+    auto link = TRY(glove::connect(options, ports, kUsbIds));
+    TRY(start(link, settings));
+    return glove::opened(std::move(link), kSilence_s);
   }
   static Result<std::unique_ptr<Emulator>> emulator(const Options& /*options*/,
                                                     const Settings& settings) {

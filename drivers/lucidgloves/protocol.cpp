@@ -47,7 +47,7 @@ std::string_view next_key(std::string_view& text) noexcept {
 }
 
 bool is_finger(char c) noexcept { return c >= 'A' && c < 'A' + kFingers; }
-std::size_t finger_of(char c) noexcept { return static_cast<std::size_t>(c - 'A'); }
+std::size_t finger_of(char c) noexcept { return c - 'A'; }
 
 // Index of the value that belongs to a key; empty when the key has no value.
 std::optional<std::size_t> value_place(std::string_view key) noexcept {
@@ -139,16 +139,14 @@ void add_value(std::string& text, const std::string& key, const Line& line, std:
 
 }  // namespace
 
-// RT-safe.
-bool Line::has_hand() const noexcept {
+RT_SAFE bool Line::has_hand() const noexcept {
   for (std::size_t i = kCurl; i < kSplay; ++i) {
     if (has[i]) return true;
   }
   return false;
 }
 
-// RT-safe.
-Outcome parse_line(std::string_view text, Encoding encoding, int max, Line& line) noexcept {
+RT_SAFE Outcome parse_line(std::string_view text, Encoding encoding, int max, Line& line) noexcept {
   line = {};
   if (encoding == Encoding::kAuto) {
     const bool joined = text.find('&') != std::string_view::npos;

@@ -61,15 +61,15 @@ struct Line {
   std::bitset<3> has_info;
 
   // True when the line contains a measurement of a finger.
-  [[nodiscard]] bool has_hand() const noexcept;  // RT-safe
+  RT_SAFE [[nodiscard]] bool has_hand() const noexcept;
 };
 
 // Parses `text`, without its LF. kOk fills `line`; kOutOfRange for a value above `max`; kShort for
 // a legacy line with fewer than thirteen values, or an alpha line with neither a finger nor an
 // info; kForeign for input that no glove sends: an unknown character, a value without a key, a
-// repeated key. RT-safe.
-[[nodiscard]] Outcome parse_line(std::string_view text, Encoding encoding, int max,
-                                 Line& line) noexcept;
+// repeated key.
+RT_SAFE [[nodiscard]] Outcome parse_line(std::string_view text, Encoding encoding, int max,
+                                         Line& line) noexcept;
 
 // The line that the glove would send, including LF.
 [[nodiscard]] std::string alpha_line(const Line& line);

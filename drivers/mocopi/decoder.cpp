@@ -39,22 +39,20 @@ void add_bones(const std::vector<BoneEntry>& bones, const BoneEntry& bone, int p
 
 }  // namespace
 
-// RT-safe.
-std::size_t MocopiLayout::joint_of(std::uint16_t bone) const noexcept {
-  return static_cast<std::size_t>(std::ranges::find(id, bone) - id.begin());
+RT_SAFE std::size_t MocopiLayout::joint_of(std::uint16_t bone) const noexcept {
+  return std::ranges::find(id, bone) - id.begin();
 }
 
 Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description) {
-  auto bones = parse_skeleton(description);
-  if (!bones) return std::unexpected(bones.error());
+  auto bones = TRY(parse_skeleton(description));
   const BoneEntry* root = nullptr;
-  for (BoneEntry& bone : *bones) {
+  for (BoneEntry& bone : bones) {
     bool seen = false;
     const bool valid = is_plausible(bone.transform.position_m) &&
                        accept_rotation(bone.transform.rotation_xyzw, seen, 1e-2);
     if (!valid) return wrong_tree("puts bone " + std::to_string(bone.id) + " out of the room");
     const bool is_root = bone.parent == bone.id ||
-                         std::ranges::find(*bones, bone.parent, &BoneEntry::id) == bones->end();
+                         std::ranges::find(bones, bone.parent, &BoneEntry::id) == bones.end();
     if (is_root && root != nullptr) return wrong_tree("has two roots");
     if (is_root) root = &bone;
   }
@@ -62,10 +60,10 @@ Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byt
   auto layout = std::make_unique<MocopiLayout>();
   auto skeleton = std::make_shared<Skeleton>();
   skeleton->name = "mocopi";
-  add_bones(*bones, *root, -1, *skeleton, *layout);
+  add_bones(bones, *root, -1, *skeleton, *layout);
   // Bones that are their own ancestors hang below no root.
-  if (skeleton->joints.size() != bones->size()) return wrong_tree("has bones in a circle");
-  if (auto ok = skeleton->finish(); !ok) return std::unexpected(ok.error());
+  if (skeleton->joints.size() != bones.size()) return wrong_tree("has bones in a circle");
+  TRY(skeleton->finish());
   layout->bodies.push_back({.name = "mocopi", .skeleton = std::move(skeleton)});
   return layout;
 }
@@ -74,9 +72,9 @@ namespace {
 
 constexpr double kLooseLength = 1e-2;  // of the squared length of a rotation
 
-// Puts one bone of a frame in its place; false when it contradicts the layout. RT-safe.
-bool accept_bone(const BoneEntry& bone, const MocopiLayout& layout, std::bitset<kMaxJoints>& taken,
-                 Frame& frame) noexcept {
+// Puts one bone of a frame in its place; false when it contradicts the layout.
+RT_SAFE bool accept_bone(const BoneEntry& bone, const MocopiLayout& layout,
+                         std::bitset<kMaxJoints>& taken, Frame& frame) noexcept {
   const std::size_t joint = layout.joint_of(bone.id);
   if (joint == layout.id.size() || taken[joint]) return false;
   taken.set(joint);
@@ -92,9 +90,8 @@ bool accept_bone(const BoneEntry& bone, const MocopiLayout& layout, std::bitset<
 
 }  // namespace
 
-// RT-safe.
-void MocopiDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
-                         Sink& sink) noexcept {
+RT_SAFE void MocopiDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
+                                 Sink& sink) noexcept {
   Datagram datagram;
   Outcome outcome = decode_datagram(bytes, datagram);
   if (outcome == Outcome::kOk && datagram.kind == Kind::kSkeleton) {
@@ -105,8 +102,8 @@ void MocopiDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arriva
   sink.outcome(outcome);
 }
 
-// RT-safe.
-Outcome MocopiDecoder::accept_frame(std::span<const std::byte> content, Sink& sink) noexcept {
+RT_SAFE Outcome MocopiDecoder::accept_frame(std::span<const std::byte> content,
+                                            Sink& sink) noexcept {
   FrameHead head;
   if (!read_frame(content, head)) return Outcome::kShort;
   if (layout_ == nullptr) return Outcome::kForeign;

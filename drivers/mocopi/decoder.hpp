@@ -20,22 +20,21 @@ class MocopiLayout final : public SourceLayout {
  public:
   std::vector<std::uint16_t> id;  // [joint], depth first
 
-  // The joint of a bone; id.size() when there is none. RT-safe.
-  [[nodiscard]] std::size_t joint_of(std::uint16_t bone) const noexcept;
+  // The joint of a bone; id.size() when there is none.
+  RT_SAFE [[nodiscard]] std::size_t joint_of(std::uint16_t bone) const noexcept;
 };
 
 // Driver::make_layout. Cold.
-[[nodiscard]] Result<std::unique_ptr<const SourceLayout>> make_layout(
-    std::span<const std::byte> description);
+Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description);
 
 class MocopiDecoder final : public Decoder {
  public:
-  // Takes one datagram per call. RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-            Sink& sink) noexcept override;
+  // Takes one datagram per call.
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept override;
 
-  // Takes what make_layout made. RT-safe.
-  void use(const SourceLayout& layout) noexcept override {
+  // Takes what make_layout made.
+  RT_SAFE void use(const SourceLayout& layout) noexcept override {
     layout_ = static_cast<const MocopiLayout*>(&layout);
   }
 

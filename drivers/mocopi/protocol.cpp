@@ -49,9 +49,9 @@ constexpr std::array<BoneRow, kBones> kRows{{{"root", kNoParent, Bone::kHips},
                                              {"r_foot", 24, Bone::kRightFoot},
                                              {"r_toes", 25, Bone::kRightToes}}};
 
-// The field of this name inside a value; false when it is not there. RT-safe.
-bool find_field(std::span<const std::byte> within, std::string_view wanted,
-                std::span<const std::byte>& value) noexcept {
+// The field of this name inside a value; false when it is not there.
+RT_SAFE bool find_field(std::span<const std::byte> within, std::string_view wanted,
+                        std::span<const std::byte>& value) noexcept {
   FieldReader fields(within);
   std::string_view name;
   while (fields.next(name, value)) {
@@ -60,8 +60,7 @@ bool find_field(std::span<const std::byte> within, std::string_view wanted,
   return false;
 }
 
-// RT-safe.
-bool is_head(std::span<const std::byte> head) noexcept {
+RT_SAFE bool is_head(std::span<const std::byte> head) noexcept {
   std::span<const std::byte> format, version;
   if (!find_field(head, "ftyp", format) || !find_field(head, "vrsn", version)) return false;
   const std::string_view text(reinterpret_cast<const char*>(format.data()), format.size());
@@ -119,8 +118,7 @@ Bytes whole_datagram(const Bytes& content) {
 
 }  // namespace
 
-// RT-safe.
-bool FieldReader::next(std::string_view& name, std::span<const std::byte>& value) noexcept {
+RT_SAFE bool FieldReader::next(std::string_view& name, std::span<const std::byte>& value) noexcept {
   if (reader_.left() == 0) return false;
   const std::uint32_t length = reader_.u32();
   name = reader_.text(4);
@@ -128,8 +126,7 @@ bool FieldReader::next(std::string_view& name, std::span<const std::byte>& value
   return reader_.ok();
 }
 
-// RT-safe.
-Outcome decode_datagram(std::span<const std::byte> bytes, Datagram& datagram) noexcept {
+RT_SAFE Outcome decode_datagram(std::span<const std::byte> bytes, Datagram& datagram) noexcept {
   FieldReader fields(bytes);
   std::string_view name;
   std::span<const std::byte> value;
@@ -144,8 +141,8 @@ Outcome decode_datagram(std::span<const std::byte> bytes, Datagram& datagram) no
   return found ? Outcome::kOk : Outcome::kForeign;
 }
 
-// RT-safe.
-bool read_bone(std::span<const std::byte> value, bool with_parent, BoneEntry& bone) noexcept {
+RT_SAFE bool read_bone(std::span<const std::byte> value, bool with_parent,
+                       BoneEntry& bone) noexcept {
   std::span<const std::byte> id, parent, numbers;
   if (!find_field(value, "bnid", id) || id.size() != 2) return false;
   if (!find_field(value, "tran", numbers) || numbers.size() != 28) return false;
@@ -158,8 +155,7 @@ bool read_bone(std::span<const std::byte> value, bool with_parent, BoneEntry& bo
   return true;
 }
 
-// RT-safe.
-bool read_frame(std::span<const std::byte> content, FrameHead& head) noexcept {
+RT_SAFE bool read_frame(std::span<const std::byte> content, FrameHead& head) noexcept {
   std::span<const std::byte> number, unix_time;
   if (!find_field(content, "fnum", number) || number.size() != 4) return false;
   if (!find_field(content, "btrs", head.bones)) return false;

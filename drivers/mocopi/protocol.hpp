@@ -43,10 +43,11 @@ namespace posed::drivers::mocopi {
 class FieldReader {
  public:
   explicit FieldReader(std::span<const std::byte> bytes) noexcept : reader_(bytes) {}
-  // False at the end, and when a field is longer than what is left. RT-safe.
-  [[nodiscard]] bool next(std::string_view& name, std::span<const std::byte>& value) noexcept;
-  // Every field fitted. RT-safe.
-  [[nodiscard]] bool ok() const noexcept { return reader_.ok(); }
+  // False at the end, and when a field is longer than what is left.
+  RT_SAFE [[nodiscard]] bool next(std::string_view& name,
+                                  std::span<const std::byte>& value) noexcept;
+  // Every field fitted.
+  RT_SAFE [[nodiscard]] bool ok() const noexcept { return reader_.ok(); }
 
  private:
   ByteReader reader_;
@@ -64,18 +65,17 @@ struct Datagram {
 };
 
 // kForeign: not mocopi's, or of another version. kShort: cut, or a field that does not fit.
-// RT-safe.
-[[nodiscard]] Outcome decode_datagram(std::span<const std::byte> bytes,
-                                      Datagram& datagram) noexcept;
+RT_SAFE [[nodiscard]] Outcome decode_datagram(std::span<const std::byte> bytes,
+                                              Datagram& datagram) noexcept;
 
 struct BoneEntry {
   std::uint16_t id = 0, parent = 0;
   Transform transform{};
 };
 
-// One bndt or btdt; false when a field is missing or has the wrong size. RT-safe.
-[[nodiscard]] bool read_bone(std::span<const std::byte> value, bool with_parent,
-                             BoneEntry& bone) noexcept;
+// One bndt or btdt; false when a field is missing or has the wrong size.
+RT_SAFE [[nodiscard]] bool read_bone(std::span<const std::byte> value, bool with_parent,
+                                     BoneEntry& bone) noexcept;
 
 struct FrameHead {
   std::uint32_t number = 0;
@@ -85,7 +85,7 @@ struct FrameHead {
 [[nodiscard]] bool read_frame(std::span<const std::byte> content, FrameHead& head) noexcept;
 
 // The bones of a skdf, which is untrusted: at most kMaxJoints, no number twice. Cold.
-[[nodiscard]] Result<std::vector<BoneEntry>> parse_skeleton(std::span<const std::byte> content);
+Result<std::vector<BoneEntry>> parse_skeleton(std::span<const std::byte> content);
 
 // The datagrams as the app sends them. Cold.
 [[nodiscard]] std::vector<std::byte> encode_skeleton(std::span<const BoneEntry> bones);

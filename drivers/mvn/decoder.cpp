@@ -11,8 +11,8 @@ constexpr std::int64_t kBetweenDescriptions_ns = 300'000'000;
 constexpr std::size_t kTimeCodeBytes = 12;  // "HH:MM:SS.mmm"; closing bytes may follow
 
 // The joints of a skeleton with or without fingers from the segments of a pose. A segment that was
-// not seen moves with its parent. RT-safe.
-void fill_frame(const CharacterPose& pose, bool fingers, Frame& frame) noexcept {
+// not seen moves with its parent.
+RT_SAFE void fill_frame(const CharacterPose& pose, bool fingers, Frame& frame) noexcept {
   const JointTable& table = joint_table(fingers);
   std::array<Eigen::Quaterniond, kSegments> turned;  // [joint], in the room
   frame.joint_count = static_cast<std::uint16_t>(table.count);
@@ -21,7 +21,7 @@ void fill_frame(const CharacterPose& pose, bool fingers, Frame& frame) noexcept 
     const std::size_t s = table.segment[j];
     const bool seen = pose.segments[s].seen && (s < kBodySegments || pose.fingers);
     const Eigen::Quaterniond above =
-        j == 0 ? Eigen::Quaterniond::Identity() : turned[static_cast<std::size_t>(table.parent[j])];
+        j == 0 ? Eigen::Quaterniond::Identity() : turned[table.parent[j]];
     frame.valid[j] = seen;
     frame.rotation_xyzw[j] = kIdentity;
     turned[j] = above;
@@ -36,9 +36,8 @@ void fill_frame(const CharacterPose& pose, bool fingers, Frame& frame) noexcept 
 
 }  // namespace
 
-// RT-safe.
-void MvnDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-                      Sink& sink) noexcept {
+RT_SAFE void MvnDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                              Sink& sink) noexcept {
   now_ns_ = active_time_.to(arrival_ns);
   arrival_ns_ = arrival_ns;
   if (stream_) {
@@ -52,8 +51,7 @@ void MvnDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
   }
 }
 
-// RT-safe.
-Outcome MvnDecoder::accept(std::span<const std::byte> bytes, Sink& sink) noexcept {
+RT_SAFE Outcome MvnDecoder::accept(std::span<const std::byte> bytes, Sink& sink) noexcept {
   Datagram datagram;
   const Outcome outcome = decode_datagram(bytes, datagram);
   if (outcome != Outcome::kOk) return outcome;
@@ -70,8 +68,7 @@ Outcome MvnDecoder::accept(std::span<const std::byte> bytes, Sink& sink) noexcep
   }
 }
 
-// RT-safe.
-Outcome MvnDecoder::accept_pose(const Datagram& datagram, Sink& sink) noexcept {
+RT_SAFE Outcome MvnDecoder::accept_pose(const Datagram& datagram, Sink& sink) noexcept {
   Tracked* tracked = find_or_add(datagram.head.character);
   if (tracked == nullptr) return Outcome::kOutOfRange;
   if (!tracked->prefers(datagram.head, arrival_ns_)) return Outcome::kOk;
@@ -80,9 +77,8 @@ Outcome MvnDecoder::accept_pose(const Datagram& datagram, Sink& sink) noexcept {
   return part.whole ? accept_sample(*tracked, datagram.head, part.items, sink) : part.outcome;
 }
 
-// RT-safe.
-Outcome MvnDecoder::accept_sample(Tracked& tracked, const Head& head,
-                                  std::span<const std::byte> items, Sink& sink) noexcept {
+RT_SAFE Outcome MvnDecoder::accept_sample(Tracked& tracked, const Head& head,
+                                          std::span<const std::byte> items, Sink& sink) noexcept {
   const Outcome outcome = decode_pose(head, items, pose_);
   if (outcome != Outcome::kOk) return outcome;
   tracked.received_ns = now_ns_;
@@ -100,8 +96,8 @@ Outcome MvnDecoder::accept_sample(Tracked& tracked, const Head& head,
   return Outcome::kOk;
 }
 
-// Types 20 to 24. RT-safe.
-Outcome MvnDecoder::accept_values(const Datagram& datagram, Sink& sink) noexcept {
+// Types 20 to 24.
+RT_SAFE Outcome MvnDecoder::accept_values(const Datagram& datagram, Sink& sink) noexcept {
   Tracked* tracked = find(datagram.head.character);
   if (tracked == nullptr) return Outcome::kForeign;  // nobody with a pose
   const Outcome outcome = decode_values(datagram, values_);
@@ -129,16 +125,14 @@ Outcome MvnDecoder::accept_values(const Datagram& datagram, Sink& sink) noexcept
   return Outcome::kOk;
 }
 
-// RT-safe.
-Outcome MvnDecoder::accept_timecode(const Datagram& datagram) noexcept {
+RT_SAFE Outcome MvnDecoder::accept_timecode(const Datagram& datagram) noexcept {
   const auto* text = reinterpret_cast<const char*>(datagram.payload.data());
   timecode_ = to_timecode({text, std::min(datagram.payload.size(), kTimeCodeBytes)});
   timecode_sample_ = datagram.head.sample;
   return Outcome::kOk;
 }
 
-// RT-safe.
-Outcome MvnDecoder::accept_meta(const Datagram& datagram) noexcept {
+RT_SAFE Outcome MvnDecoder::accept_meta(const Datagram& datagram) noexcept {
   std::string_view name;
   const Outcome outcome = decode_meta(datagram.payload, name);
   if (outcome != Outcome::kOk || name.empty()) return outcome;
@@ -148,8 +142,7 @@ Outcome MvnDecoder::accept_meta(const Datagram& datagram) noexcept {
   return Outcome::kOk;
 }
 
-// RT-safe.
-Outcome MvnDecoder::accept_scale(const Datagram& datagram) noexcept {
+RT_SAFE Outcome MvnDecoder::accept_scale(const Datagram& datagram) noexcept {
   std::array<Vec3f, kBodySegments> position_m{};
   bool reported = false;
   const Outcome outcome = decode_scale(datagram.payload, position_m, reported);
@@ -160,16 +153,15 @@ Outcome MvnDecoder::accept_scale(const Datagram& datagram) noexcept {
   return Outcome::kOk;
 }
 
-// RT-safe.
-Tracked* MvnDecoder::find(std::uint8_t character) noexcept {
+RT_SAFE Tracked* MvnDecoder::find(std::uint8_t character) noexcept {
   for (Tracked& tracked : characters_) {
     if (tracked.known && tracked.character.id == character) return &tracked;
   }
   return nullptr;
 }
 
-// Characters that are gone keep their slot, and so their name, until another one needs it. RT-safe.
-Tracked* MvnDecoder::find_or_add(std::uint8_t character) noexcept {
+// Characters that are gone keep their slot, and so their name, until another one needs it.
+RT_SAFE Tracked* MvnDecoder::find_or_add(std::uint8_t character) noexcept {
   if (Tracked* known = find(character); known != nullptr) return known;
   Tracked* room = nullptr;
   for (Tracked& tracked : characters_) {
@@ -182,8 +174,7 @@ Tracked* MvnDecoder::find_or_add(std::uint8_t character) noexcept {
   return room;
 }
 
-// RT-safe.
-std::int64_t MvnDecoder::device_time_ns(Tracked& tracked, const Head& head) noexcept {
+RT_SAFE std::int64_t MvnDecoder::device_time_ns(Tracked& tracked, const Head& head) noexcept {
   if (!tracked.clock.has_begun()) {
     const TimeCode* other = nullptr;
     for (const Tracked& each : characters_) {
@@ -194,8 +185,8 @@ std::int64_t MvnDecoder::device_time_ns(Tracked& tracked, const Head& head) noex
   return tracked.clock.to_ns(head.time_ms);
 }
 
-// Describes the characters if they are others than before. RT-safe.
-void MvnDecoder::describe(Sink& sink) noexcept {
+// Describes the characters if they are others than before.
+RT_SAFE void MvnDecoder::describe(Sink& sink) noexcept {
   if (described_ns_ != kNoTime_ns && now_ns_ - described_ns_ < kBetweenDescriptions_ns) return;
   bool due = false;
   std::size_t count = 0;

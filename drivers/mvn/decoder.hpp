@@ -22,12 +22,11 @@ class MvnDecoder final : public Decoder {
   // `stream`: the bytes come over TCP, cut anywhere; otherwise each call gets one datagram.
   explicit MvnDecoder(bool stream) noexcept : stream_(stream) {}
 
-  // RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-            Sink& sink) noexcept override;
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept override;
 
-  // Takes what make_layout made. RT-safe.
-  void use(const SourceLayout& layout) noexcept override {
+  // Takes what make_layout made.
+  RT_SAFE void use(const SourceLayout& layout) noexcept override {
     layout_ = static_cast<const MvnLayout*>(&layout);
   }
 

@@ -125,7 +125,7 @@ CharacterPose pose_of(const Character& character, const Vec3f& root_m, const Rot
     segment.rotation_xyzw = from_eigen(turn);
     global[i] = turn;
     if (parent < 0 || local) continue;
-    const auto above = static_cast<std::size_t>(parent);
+    const std::size_t above = parent;
     global[i] = (global[above] * turn).normalized();
     segment.rotation_xyzw = from_eigen(global[i]);
     const Vec3f& o = character.offset_m[i];
@@ -205,12 +205,12 @@ void MvnEmulator::fill_queue(std::int64_t now_ns) {
   if (people_.size() > 1 && !people_[1].posed) {
     wave(time_s, people_[1].root_m, people_[1].rotation_xyzw);
   }
-  const bool tell = reported_ns_ == kNoTime_ns || queued_ns_ - reported_ns_ >= kNanosPerSecond;
-  if (tell) reported_ns_ = queued_ns_;
+  const bool notify = reported_ns_ == kNoTime_ns || queued_ns_ - reported_ns_ >= kNanosPerSecond;
+  if (notify) reported_ns_ = queued_ns_;
   for (const Person& person : people_) {
     for (const Type type : settings_.types) {
       const bool reported_once = type == Type::kMeta || type == Type::kScale;
-      if (person.present && (tell || !reported_once)) add_sample(person, type, queued_ns_);
+      if (person.present && (notify || !reported_once)) add_sample(person, type, queued_ns_);
     }
   }
   ++sample_;

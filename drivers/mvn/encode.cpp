@@ -127,7 +127,7 @@ std::vector<std::byte> encode_values(Type type, const CharacterPose& pose) {
     const std::size_t end = writer.size() + item_bytes(type);
     const auto id = static_cast<std::int32_t>(i + 1);
     if (joint) {
-      const auto parent = static_cast<std::size_t>(parent_segment(i));
+      const std::size_t parent = parent_segment(i);
       writer.i32(kPointsOfSegment * static_cast<std::int32_t>(parent + 1));
       writer.i32(kPointsOfSegment * id);
       write_vector(writer, to_z_up(to_euler(between(pose.segments[parent], pose.segments[i]))));

@@ -18,9 +18,9 @@ class Framer {
   static constexpr std::size_t kMaxPayload = std::size_t{16} * 1024;
 
   // Reads bytes cut at any position. `handle` gets each datagram, and empty bytes once for each run
-  // of bytes that are none. RT-safe.
+  // of bytes that are none.
   template <typename Handle>
-  void feed(std::span<const std::byte> bytes, Handle&& handle) noexcept {
+  RT_SAFE void feed(std::span<const std::byte> bytes, Handle&& handle) noexcept {
     while (!bytes.empty()) {
       const std::size_t used = std::min(bytes.size(), buffer_.size() - size_);
       std::ranges::copy(bytes.first(used), buffer_.begin() + static_cast<std::ptrdiff_t>(size_));

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::uint8_t kDescriptionVersion = 1;
 constexpr std::uint8_t kWithFingers = 1;
-constexpr std::uint8_t kMostFlags = (1U << (1 + kValueGroups)) - 1;
+constexpr std::uint8_t kMaxFlags = (1U << (1 + kValueGroups)) - 1;
 
 // RT-safe.
 class FixedWriter {
@@ -47,7 +47,7 @@ Result<Character> read_character(ByteReader& reader) {
   character.fingers = (flags & kWithFingers) != 0;
   character.values = ValueGroups(flags >> 1);
   character.name_bytes = reader.u8();
-  if (flags > kMostFlags || character.name_bytes > kMvnNameBytes) {
+  if (flags > kMaxFlags || character.name_bytes > kMvnNameBytes) {
     return mvn_wrong("has a character that makes no sense");
   }
   const std::string_view name = reader.text(character.name_bytes);
@@ -98,8 +98,7 @@ std::size_t write_character(const Character& character, std::span<std::byte> to)
 }
 
 std::size_t MvnLayout::body_of(std::uint8_t character) const noexcept {
-  return static_cast<std::size_t>(std::ranges::find(entries, character, &Entry::character) -
-                                  entries.begin());
+  return std::ranges::find(entries, character, &Entry::character) - entries.begin();
 }
 
 std::string body_name(const Character& character) {
@@ -121,7 +120,7 @@ Result<std::shared_ptr<const Skeleton>> skeleton_of(const Character& character) 
     joint.bone = segment_bone(segment);
   }
   set_mvn_t_frames(*skeleton);
-  if (auto ok = skeleton->finish(); !ok) return std::unexpected(ok.error());
+  TRY(skeleton->finish());
   return skeleton;
 }
 
@@ -135,20 +134,18 @@ Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byt
   auto layout = std::make_unique<MvnLayout>();
   std::bitset<256> seen;
   for (std::size_t i = 0; i < count; ++i) {
-    const auto character = read_character(reader);
-    if (!character) return std::unexpected(character.error());
-    if (seen[character->id]) return mvn_wrong("has the same character twice");
-    seen.set(character->id);
-    auto skeleton = skeleton_of(*character);
-    if (!skeleton) return std::unexpected(skeleton.error());
+    const auto character = TRY(read_character(reader));
+    if (seen[character.id]) return mvn_wrong("has the same character twice");
+    seen.set(character.id);
+    auto skeleton = TRY(skeleton_of(character));
     Body& body = layout->bodies.emplace_back();
-    body.name = body_name(*character);
-    body.skeleton = std::move(*skeleton);
-    body.samples = name_values(character->values);
-    layout->entries.push_back({.character = character->id,
-                               .fingers = character->fingers,
-                               .groups = character->values,
-                               .values = place_values(character->values)});
+    body.name = body_name(character);
+    body.skeleton = std::move(skeleton);
+    body.samples = name_values(character.values);
+    layout->entries.push_back({.character = character.id,
+                               .fingers = character.fingers,
+                               .groups = character.values,
+                               .values = place_values(character.values)});
   }
   if (reader.left() != 0) return mvn_wrong("goes on after its last character");
   return layout;

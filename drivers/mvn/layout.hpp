@@ -46,8 +46,9 @@ struct Character {
 inline constexpr std::size_t kMaxCharacterBytes = 3 + kMvnNameBytes + kSegments * sizeof(Vec3f);
 inline constexpr std::size_t kMaxMvnDescription = 2 + kMaxCharacters * kMaxCharacterBytes;
 
-// Writes the head, and one character after the other; each returns the bytes written. RT-safe.
-std::size_t write_description_head(std::size_t characters, std::span<std::byte> to) noexcept;
+// Writes the head, and one character after the other; each returns the bytes written.
+RT_SAFE std::size_t write_description_head(std::size_t characters,
+                                           std::span<std::byte> to) noexcept;
 std::size_t write_character(const Character& character, std::span<std::byte> to) noexcept;
 
 class MvnLayout final : public SourceLayout {
@@ -60,18 +61,17 @@ class MvnLayout final : public SourceLayout {
   };
   std::vector<Entry> entries;  // [body]
 
-  // The index of a body; bodies.size() when there is no such body. RT-safe.
-  [[nodiscard]] std::size_t body_of(std::uint8_t character) const noexcept;
+  // The index of a body; bodies.size() when there is no such body.
+  RT_SAFE [[nodiscard]] std::size_t body_of(std::uint8_t character) const noexcept;
 };
 
 // Driver::make_layout. Cold.
-[[nodiscard]] Result<std::unique_ptr<const SourceLayout>> make_layout(
-    std::span<const std::byte> description);
+Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description);
 
 // "Factory", or "character-0" for one without a name. Cold.
 [[nodiscard]] std::string body_name(const Character& character);
 
 // The skeleton of a character. Cold.
-[[nodiscard]] Result<std::shared_ptr<const Skeleton>> skeleton_of(const Character& character);
+Result<std::shared_ptr<const Skeleton>> skeleton_of(const Character& character);
 
 }  // namespace posed::drivers::mvn

@@ -74,20 +74,19 @@ struct Mvn : SourceType<Mvn> {
   static constexpr auto connect = open_network;
 
   static Result<Settings> settings(const Options& options) {
-    auto types = types_of(options);
-    if (!types) return std::unexpected(types.error());
+    auto types = TRY(types_of(options));
     const double rate_hz = option<double>(options, "rate_hz");
     return Settings{
         .stream = option<std::string>(options, "link") == "tcp",
         .rate_hz = rate_hz,
         .emulated = {
             .rate_hz = rate_hz,
-            .types = std::move(*types),
+            .types = std::move(types),
             .characters = static_cast<std::size_t>(option<std::int64_t>(options, "characters")),
             .longest = static_cast<std::size_t>(option<std::int64_t>(options, "datagram_bytes"))}};
   }
   static Result<std::string> check(const Options& options, const Settings& /*settings*/) {
-    if (const auto ok = check_network(options); !ok) return std::unexpected(ok.error());
+    TRY(check_network(options));
     return network_identity(options);
   }
   // MVN says nothing about itself, so the device info repeats the options.

@@ -15,9 +15,9 @@ namespace {
 constexpr std::string_view kMagic = "MXTP";
 constexpr std::size_t kVectorBytes = 12;
 constexpr std::size_t kLongTrackerBytes = 68;  // of newer versions
-constexpr std::size_t kLeastTimeCode = 8;      // "HH:MM:SS", at least
-constexpr std::size_t kLeastName = 4;          // bytes: the size of an empty name
-constexpr std::size_t kLeastSegment = 16;      // bytes: an empty name, a position
+constexpr std::size_t kMinTimeCodeBytes = 8;   // "HH:MM:SS", at least
+constexpr std::size_t kMinNameBytes = 4;       // bytes: the size of an empty name
+constexpr std::size_t kMinSegmentBytes = 16;   // bytes: an empty name, a position
 constexpr float kCentimetre_m = 0.01F;
 constexpr std::uint8_t kLast = 0x80;
 
@@ -150,13 +150,13 @@ bool read_head(std::span<const std::byte> bytes, Head& head) noexcept {
 bool is_right_size(const Head& head, std::size_t payload_bytes) noexcept {
   switch (head.type) {
     case Type::kMeta:
-      return payload_bytes >= kLeastName;
+      return payload_bytes >= kMinNameBytes;
     case Type::kScale:
       return payload_bytes >= 2 * sizeof(std::int32_t);
     case Type::kCentreOfMass:
       return payload_bytes >= kVectorBytes;
     case Type::kTimeCode:
-      return payload_bytes >= kLeastTimeCode;
+      return payload_bytes >= kMinTimeCodeBytes;
     case Type::kTrackers:
       if (payload_bytes == head.items * kLongTrackerBytes) return true;
       break;
@@ -219,7 +219,7 @@ Outcome decode_scale(std::span<const std::byte> payload,
                      std::array<Vec3f, kBodySegments>& position_m, bool& reported) noexcept {
   BigEndianReader reader(payload);
   const std::uint32_t segments = reader.u32();
-  if (segments > reader.left() / kLeastSegment) return Outcome::kShort;
+  if (segments > reader.left() / kMinSegmentBytes) return Outcome::kShort;
   bool valid = true;
   for (std::size_t i = 0; i < segments; ++i) {
     if (!skip_name(reader)) return Outcome::kShort;

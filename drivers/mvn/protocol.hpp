@@ -120,35 +120,35 @@ struct CharacterPose {
   bool local = false;                           // relative to the parent, otherwise global
 };
 
-// Reads the first kHeadBytes of a datagram. False: they are not from MVN. RT-safe.
-[[nodiscard]] bool read_head(std::span<const std::byte> bytes, Head& head) noexcept;
+// Reads the first kHeadBytes of a datagram. False: they are not from MVN.
+RT_SAFE [[nodiscard]] bool read_head(std::span<const std::byte> bytes, Head& head) noexcept;
 
 // Returns whether a datagram of this type with these items may have such a payload. Types that
-// posed does not know may have any. RT-safe.
-[[nodiscard]] bool is_right_size(const Head& head, std::size_t payload_bytes) noexcept;
+// posed does not know may have any.
+RT_SAFE [[nodiscard]] bool is_right_size(const Head& head, std::size_t payload_bytes) noexcept;
 
-// Bytes of an item; 0 for types whose payload is no list of equal items. RT-safe.
-[[nodiscard]] std::size_t item_bytes(Type type) noexcept;
-[[nodiscard]] bool is_pose(Type type) noexcept;  // RT-safe
+// Bytes of an item; 0 for types whose payload is no list of equal items.
+RT_SAFE [[nodiscard]] std::size_t item_bytes(Type type) noexcept;
+RT_SAFE [[nodiscard]] bool is_pose(Type type) noexcept;
 
 // kOk fills `datagram`; kForeign: not from MVN, or of a type that posed does not know; kShort: cut,
-// or longer than it says. RT-safe.
-[[nodiscard]] Outcome decode_datagram(std::span<const std::byte> bytes,
-                                      Datagram& datagram) noexcept;
+// or longer than it says.
+RT_SAFE [[nodiscard]] Outcome decode_datagram(std::span<const std::byte> bytes,
+                                              Datagram& datagram) noexcept;
 
 // The items of a whole sample, in their order. kShort: not as many as the head says; kOutOfRange: a
-// number is no position or rotation, or the head names segments that no character has. RT-safe.
-[[nodiscard]] Outcome decode_pose(const Head& head, std::span<const std::byte> items,
-                                  CharacterPose& pose) noexcept;
+// number is no position or rotation, or the head names segments that no character has.
+RT_SAFE [[nodiscard]] Outcome decode_pose(const Head& head, std::span<const std::byte> items,
+                                          CharacterPose& pose) noexcept;
 
-// The character's name in type 12; empty when the datagram does not have it. RT-safe.
-[[nodiscard]] Outcome decode_meta(std::span<const std::byte> payload,
-                                  std::string_view& name) noexcept;
+// The character's name in type 12; empty when the datagram does not have it.
+RT_SAFE [[nodiscard]] Outcome decode_meta(std::span<const std::byte> payload,
+                                          std::string_view& name) noexcept;
 
 // Reads the positions of the body's segments in T-pose, in posed's axes. `reported` is false for
-// the datagrams of type 13 that describe only points. RT-safe.
-[[nodiscard]] Outcome decode_scale(std::span<const std::byte> payload,
-                                   std::array<Vec3f, kBodySegments>& position_m,
-                                   bool& reported) noexcept;
+// the datagrams of type 13 that describe only points.
+RT_SAFE [[nodiscard]] Outcome decode_scale(std::span<const std::byte> payload,
+                                           std::array<Vec3f, kBodySegments>& position_m,
+                                           bool& reported) noexcept;
 
 }  // namespace posed::drivers::mvn

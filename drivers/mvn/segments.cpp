@@ -70,7 +70,7 @@ constexpr JointTable make_table(bool fingers) noexcept {
   std::array<int, kSegments> joint_of{};
   const auto add = [&](std::size_t segment) {
     const int parent = parent_segment(segment);
-    table.parent[table.count] = parent < 0 ? -1 : joint_of[static_cast<std::size_t>(parent)];
+    table.parent[table.count] = parent < 0 ? -1 : joint_of[parent];
     joint_of[segment] = static_cast<int>(table.count);
     table.segment[table.count++] = static_cast<std::uint8_t>(segment);
   };

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "proto/frame/humanoid.hpp"
+#include "proto/frame/rt_safe.hpp"
 
 namespace posed::drivers::mvn {
 
@@ -27,8 +28,8 @@ inline constexpr std::size_t kRightFingers = kBodySegments + kHandSegments;
 inline constexpr std::array<std::uint8_t, kBodySegments> kUnitySegments{
     0, 15, 16, 17, 18, 19, 20, 21, 22, 1, 2, 3, 4, 11, 12, 13, 14, 7, 8, 9, 10, 5, 6};
 
-// The parent of a segment; -1 for the pelvis. RT-safe.
-[[nodiscard]] constexpr int parent_segment(std::size_t segment) noexcept {
+// The parent of a segment; -1 for the pelvis.
+RT_SAFE [[nodiscard]] constexpr int parent_segment(std::size_t segment) noexcept {
   constexpr std::array<int, kBodySegments> kParents{-1, 0,  1,  2, 3,  4,  5,  4, 7,  8,  9, 4,
                                                     11, 12, 13, 0, 15, 16, 17, 0, 19, 20, 21};
   if (segment < kBodySegments) return kParents[segment];
@@ -54,7 +55,7 @@ struct JointTable {
   std::array<std::uint8_t, kSegments> segment{};  // [joint]
   std::array<int, kSegments> parent{};            // [joint], a joint; -1 for the first
 };
-[[nodiscard]] const JointTable& joint_table(bool fingers) noexcept;  // RT-safe
+RT_SAFE [[nodiscard]] const JointTable& joint_table(bool fingers) noexcept;
 
 // "Pelvis", "L5", "LeftUpperArm", "LeftSecondMiddlePhalange". Cold.
 [[nodiscard]] std::string segment_name(std::size_t segment);

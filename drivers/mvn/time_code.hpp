@@ -38,7 +38,7 @@ class TimeCode {
       ticks_ms_ = counter_.to(code_ms).ticks;
       const std::int64_t step_ms = ticks_ms_ - before_ms;
       // A longer step is none: MVN has restarted, or the value is damaged.
-      if (step_ms <= kLongest_ms) time_ms_ = std::min(time_ms_ + step_ms, kLast_ms);
+      if (step_ms <= kMaxGap_ms) time_ms_ = std::min(time_ms_ + step_ms, kLast_ms);
       newest_ms_ = code_ms;
       moves_ = true;
     }
@@ -47,7 +47,7 @@ class TimeCode {
 
  private:
   static constexpr std::uint32_t kNear_ms = 1000;
-  static constexpr std::int64_t kLongest_ms = 3'600'000;
+  static constexpr std::int64_t kMaxGap_ms = 3'600'000;
   static constexpr std::int64_t kLast_ms = INT64_MAX / 2 / 1'000'000;
 
   UnrolledCounter counter_{32};

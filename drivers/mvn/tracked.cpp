@@ -26,15 +26,15 @@ int rank(Type type) noexcept {
 }
 
 // Each of the segments from `from` on and below `to` from its parent, in the parent's frame. False:
-// a segment that is needed was not seen. RT-safe.
-bool offsets_of(const CharacterPose& pose, std::size_t from, std::size_t to,
-                std::array<Vec3f, kSegments>& offset_m) noexcept {
+// a segment that is needed was not seen.
+RT_SAFE bool offsets_of(const CharacterPose& pose, std::size_t from, std::size_t to,
+                        std::array<Vec3f, kSegments>& offset_m) noexcept {
   for (std::size_t i = from; i < to; ++i) {
     const SegmentPose& segment = pose.segments[i];
     const int parent = parent_segment(i);
     if (!segment.seen) return false;
     if (parent < 0) continue;
-    const SegmentPose& above = pose.segments[static_cast<std::size_t>(parent)];
+    const SegmentPose& above = pose.segments[parent];
     if (!above.seen) return false;
     offset_m[i] = segment.position_m;
     if (pose.local) continue;
@@ -51,8 +51,8 @@ bool offsets_of(const CharacterPose& pose, std::size_t from, std::size_t to,
   return true;
 }
 
-// How high the pelvis stands above the toes of a straight leg. RT-safe.
-float pelvis_height_m(const std::array<Vec3f, kSegments>& offset_m) noexcept {
+// How high the pelvis stands above the toes of a straight leg.
+RT_SAFE float pelvis_height_m(const std::array<Vec3f, kSegments>& offset_m) noexcept {
   constexpr std::array<std::size_t, 4> kLeftLeg{19, 20, 21, 22};
   float height_m = 0.0F;
   for (const std::size_t i : kLeftLeg) height_m -= offset_m[i][1];
@@ -141,7 +141,7 @@ void Tracked::set_scale(const std::array<Vec3f, kBodySegments>& position_m) noex
   Offsets offset_m{};
   offset_m[0] = {0.0F, position_m[0][1], 0.0F};
   for (std::size_t i = 1; i < kBodySegments; ++i) {
-    const Vec3f& above = position_m[static_cast<std::size_t>(parent_segment(i))];
+    const Vec3f& above = position_m[parent_segment(i)];
     for (std::size_t k = 0; k < 3; ++k) offset_m[i][k] = position_m[i][k] - above[k];
   }
   scaled_ = true;

@@ -67,25 +67,25 @@ constexpr std::size_t item_values(const GroupTable& table) noexcept {
 }
 
 constexpr std::size_t kNotOurs = kBodySegments;  // a prop, a finger, angles between other segments
-constexpr std::int32_t kHighestSegmentId = static_cast<std::int32_t>(kMaxItems) + 1;
+constexpr std::int32_t kMaxSegmentId = static_cast<std::int32_t>(kMaxItems) + 1;
 
-// The segment that an item of types 21 to 23 names. False: no character has it. RT-safe.
-bool read_segment_id(BigEndianReader& reader, std::size_t& segment) noexcept {
+// The segment that an item of types 21 to 23 names. False: no character has it.
+RT_SAFE bool read_segment_id(BigEndianReader& reader, std::size_t& segment) noexcept {
   const std::int32_t id = reader.i32();
-  if (id < 1 || id > kHighestSegmentId) return false;
+  if (id < 1 || id > kMaxSegmentId) return false;
   segment = std::min(static_cast<std::size_t>(id - 1), kNotOurs);
   return true;
 }
 
 // The lower segment of the joint that an item of type 20 names. MVN also streams angles between
-// segments that are no neighbours, or from the vertical (segment 0): they are no joints. RT-safe.
-bool read_joint_id(BigEndianReader& reader, std::size_t& segment) noexcept {
+// segments that are no neighbours, or from the vertical (segment 0): they are no joints.
+RT_SAFE bool read_joint_id(BigEndianReader& reader, std::size_t& segment) noexcept {
   const std::int32_t parent = reader.i32();
   const std::int32_t child = reader.i32();
   if (parent < 0 || child < kPointsOfSegment) return false;
   const std::int32_t parent_id = parent / kPointsOfSegment;
   const std::int32_t child_id = child / kPointsOfSegment;
-  if (parent_id > kHighestSegmentId || child_id > kHighestSegmentId) return false;
+  if (parent_id > kMaxSegmentId || child_id > kMaxSegmentId) return false;
   segment = std::min(static_cast<std::size_t>(child_id - 1), kNotOurs);
   if (segment == 0 || parent_segment(segment) != parent_id - 1) segment = kNotOurs;
   return true;
@@ -95,9 +95,9 @@ bool is_finite(const Vec3f& v) noexcept {
   return std::ranges::all_of(v, [](float x) { return std::isfinite(x); });
 }
 
-// Reads a quantity to `to`. False: it is none. RT-safe.
-bool read_quantity(QuantityKind kind, BigEndianReader& reader, std::span<float> to,
-                   bool& seen) noexcept {
+// Reads a quantity to `to`. False: it is none.
+RT_SAFE bool read_quantity(QuantityKind kind, BigEndianReader& reader, std::span<float> to,
+                           bool& seen) noexcept {
   seen = true;
   if (kind == QuantityKind::kRotation) {
     Quatf rotation_xyzw = read_quaternion(reader);
@@ -119,9 +119,9 @@ bool read_quantity(QuantityKind kind, BigEndianReader& reader, std::span<float> 
   return valid;
 }
 
-// Reads the numbers of one item to the values from `begin` on. False: a number is wrong. RT-safe.
-bool read_item(const GroupTable& table, BigEndianReader& reader, std::size_t begin,
-               GroupValues& values) noexcept {
+// Reads the numbers of one item to the values from `begin` on. False: a number is wrong.
+RT_SAFE bool read_item(const GroupTable& table, BigEndianReader& reader, std::size_t begin,
+                       GroupValues& values) noexcept {
   bool valid = true;
   for (const Quantity& quantity : table.quantities) {
     const std::size_t count = numbers_of(quantity);

@@ -29,22 +29,22 @@ inline constexpr std::size_t kValueGroups = static_cast<std::size_t>(ValueGroup:
 using ValueGroups = std::bitset<kValueGroups>;  // [group], those that a character has sent
 
 // Numbers that an item may have behind its ids: those of a tracker of newer versions.
-inline constexpr std::size_t kMostItemValues = 16;
-inline constexpr std::size_t kMostGroupValues = kBodySegments * kMostItemValues;
+inline constexpr std::size_t kMaxItemValues = 16;
+inline constexpr std::size_t kMaxGroupValues = kBodySegments * kMaxItemValues;
 
 // The values of one datagram, of a group as a whole: those that it did not tell are not valid.
 struct GroupValues {
   ValueGroup group = ValueGroup::kCentreOfMass;
-  std::array<float, kMostGroupValues> value{};  // in posed's units and axes
-  std::bitset<kMostGroupValues> valid;
+  std::array<float, kMaxGroupValues> value{};  // in posed's units and axes
+  std::bitset<kMaxGroupValues> valid;
 };
 
 // The datagram is one of types 20 to 24 as decode_datagram passes it. kOutOfRange: a segment that
 // no character has or that comes twice, or a number that is no position, rotation or angle; no
-// value counts then. RT-safe.
-[[nodiscard]] Outcome decode_values(const Datagram& datagram, GroupValues& values) noexcept;
+// value counts then.
+RT_SAFE [[nodiscard]] Outcome decode_values(const Datagram& datagram, GroupValues& values) noexcept;
 
-[[nodiscard]] std::size_t value_count(ValueGroup group) noexcept;  // RT-safe
+RT_SAFE [[nodiscard]] std::size_t value_count(ValueGroup group) noexcept;
 
 // The place of each group's values in the samples of a character that sends these groups. They
 // stand in the order of the groups; one that no longer fits into kMaxSampleValues is left out as a
@@ -54,7 +54,7 @@ struct ValuePlaces {
   std::array<std::size_t, kValueGroups> begin{};  // [group], kNone: not in the samples
   std::size_t count = 0;                          // of all values
 };
-[[nodiscard]] ValuePlaces place_values(ValueGroups groups) noexcept;  // RT-safe
+RT_SAFE [[nodiscard]] ValuePlaces place_values(ValueGroups groups) noexcept;
 
 // "LeftForeArm_velocity_x" and its unit. Cold.
 [[nodiscard]] SampleLayout name_values(ValueGroups groups);
@@ -62,8 +62,8 @@ struct ValuePlaces {
 // Decides which datagrams of one type are new; the parts of one sample have the same number.
 class PartOrder {
  public:
-  // Returns what DatagramOrder::accept returns. RT-safe.
-  [[nodiscard]] Outcome accept(const Head& head) noexcept {
+  // Returns what DatagramOrder::accept returns.
+  RT_SAFE [[nodiscard]] Outcome accept(const Head& head) noexcept {
     if (!came_.any() || head.sample != sample_) {
       const Outcome outcome = samples_.accept(head.sample);
       if (outcome != Outcome::kOk) return outcome;

@@ -44,7 +44,7 @@ Result<Settings> parse_settings(const std::string& text, const std::string& iden
   settings.coordinates = static_cast<Coordinates>(reader.choice("coordinates", kCoordinates));
   settings.unicast = reader.choice("cast", kCasts) == 1;
   settings.rate_hz = reader.whole("rate", 1, 2000);
-  if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
+  TRY(reader.finish());
   if (version == kAnyVersion) return settings;
   const auto parsed = parse_version(version);
   if (!parsed) return fail(parsed.error().message, identity);
@@ -71,22 +71,21 @@ Requests::Requests(bool unicast)
       bodies_{.datagram = encode_message(MessageId::kRequestModelDef, {})},
       alive_{.datagram = encode_message(MessageId::kKeepAlive, {}), .wanted = unicast} {}
 
-// A server that says who it is may have restarted, with other bodies. RT-safe.
-void Requests::accept_server_info() noexcept {
+// A server that says who it is may have restarted, with other bodies.
+RT_SAFE void Requests::accept_server_info() noexcept {
   connect_.wanted = false;
   rate_.wanted = true;
   bodies_.wanted = true;
 }
 
-// RT-safe.
-bool Requests::is_due(Question& question, std::int64_t now_ns) noexcept {
+RT_SAFE bool Requests::is_due(Question& question, std::int64_t now_ns) noexcept {
   if (!question.wanted || now_ns < question.next_ns) return false;
   question.next_ns = now_ns + kAgain_ns;
   return true;
 }
 
-// The rate before the bodies, whose description carries it. RT-safe.
-std::span<const std::byte> Requests::next(std::int64_t now_ns) noexcept {
+// The rate before the bodies, whose description carries it.
+RT_SAFE std::span<const std::byte> Requests::next(std::int64_t now_ns) noexcept {
   if (received_ns_ != kNoTime_ns && now_ns - received_ns_ > kSilence_ns) connect_.wanted = true;
   if (is_due(connect_, now_ns)) return connect_.datagram;
   if (connect_.wanted) return {};
@@ -98,8 +97,8 @@ std::span<const std::byte> Requests::next(std::int64_t now_ns) noexcept {
 
 namespace {
 
-constexpr float kLeastRate_hz = 1.0F;
-constexpr float kMostRate_hz = 10'000.0F;
+constexpr float kMinServerRate_hz = 1.0F;
+constexpr float kMaxServerRate_hz = 10'000.0F;
 
 bool is_from_server(MessageId id) noexcept {
   switch (id) {
@@ -123,9 +122,8 @@ Outcome worse(Outcome a, Outcome b) noexcept { return b == Outcome::kOk ? a : b;
 NatNetDecoder::NatNetDecoder(const Settings& settings)
     : settings_(settings), version_(settings.version), requests_(settings.unicast) {}
 
-// RT-safe.
-void NatNetDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-                         Sink& sink) noexcept {
+RT_SAFE void NatNetDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                                 Sink& sink) noexcept {
   Message message;
   Outcome outcome = decode_message(bytes, message);
   if (outcome == Outcome::kOk) {
@@ -135,8 +133,7 @@ void NatNetDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_
   sink.outcome(outcome);
 }
 
-// RT-safe.
-Outcome NatNetDecoder::accept(const Message& message, Sink& sink) noexcept {
+RT_SAFE Outcome NatNetDecoder::accept(const Message& message, Sink& sink) noexcept {
   switch (message.id) {
     case MessageId::kServerInfo:
       return accept_server_info(message.payload);
@@ -151,8 +148,8 @@ Outcome NatNetDecoder::accept(const Message& message, Sink& sink) noexcept {
   }
 }
 
-// The version of the options counts more: somebody has set it. RT-safe.
-Outcome NatNetDecoder::accept_server_info(std::span<const std::byte> payload) noexcept {
+// The version of the options counts more: somebody has set it.
+RT_SAFE Outcome NatNetDecoder::accept_server_info(std::span<const std::byte> payload) noexcept {
   ServerInfo info;
   if (!decode_server_info(payload, info)) return Outcome::kShort;
   const Version said = settings_.version.known() ? settings_.version : info.version;
@@ -163,17 +160,17 @@ Outcome NatNetDecoder::accept_server_info(std::span<const std::byte> payload) no
   return Outcome::kOk;
 }
 
-// The only request is that for the rate. RT-safe.
-Outcome NatNetDecoder::accept_response(std::span<const std::byte> payload) noexcept {
+// The only request is that for the rate.
+RT_SAFE Outcome NatNetDecoder::accept_response(std::span<const std::byte> payload) noexcept {
   const float rate_hz = ByteReader(payload).f32();
-  if (!(rate_hz >= kLeastRate_hz && rate_hz <= kMostRate_hz)) return Outcome::kOutOfRange;
+  if (!(rate_hz >= kMinServerRate_hz && rate_hz <= kMaxServerRate_hz)) return Outcome::kOutOfRange;
   rate_hz_ = rate_hz;
   requests_.accept_rate();
   return Outcome::kOk;
 }
 
-// RT-safe.
-Outcome NatNetDecoder::accept_model_def(std::span<const std::byte> payload, Sink& sink) noexcept {
+RT_SAFE Outcome NatNetDecoder::accept_model_def(std::span<const std::byte> payload,
+                                                Sink& sink) noexcept {
   const DescriptionHead head{.version = version_, .z_up = settings_.z_up, .rate_hz = rate_hz_};
   write_description_head(head, std::span(description_).first<kDescriptionHeadBytes>());
   const std::size_t size = std::min(payload.size(), description_.size() - kDescriptionHeadBytes);
@@ -183,8 +180,7 @@ Outcome NatNetDecoder::accept_model_def(std::span<const std::byte> payload, Sink
   return Outcome::kOk;
 }
 
-// RT-safe.
-bool NatNetDecoder::read(std::span<const std::byte> payload, FrameView& view) noexcept {
+RT_SAFE bool NatNetDecoder::read(std::span<const std::byte> payload, FrameView& view) noexcept {
   if (has_reading_) {
     if (read_frame(payload, reading_, view)) {
       misfits_ = 0;
@@ -203,8 +199,8 @@ bool NatNetDecoder::read(std::span<const std::byte> payload, FrameView& view) no
   return false;
 }
 
-// RT-safe.
-Outcome NatNetDecoder::accept_frame(std::span<const std::byte> payload, Sink& sink) noexcept {
+RT_SAFE Outcome NatNetDecoder::accept_frame(std::span<const std::byte> payload,
+                                            Sink& sink) noexcept {
   FrameView view;
   if (!read(payload, view)) return Outcome::kOutOfRange;
   if (view.bodies_changed) requests_.bodies_changed();
@@ -217,8 +213,7 @@ Outcome NatNetDecoder::accept_frame(std::span<const std::byte> payload, Sink& si
   return worse(bodies, accept_markers(view, sink));
 }
 
-// RT-safe.
-Outcome NatNetDecoder::accept_bodies(const FrameView& view, Sink& sink) noexcept {
+RT_SAFE Outcome NatNetDecoder::accept_bodies(const FrameView& view, Sink& sink) noexcept {
   Outcome worst = Outcome::kOk;
   ByteReader rigid_bodies(view.rigid_bodies.bytes);
   for (std::size_t i = 0; i < view.rigid_bodies.count; ++i) {
@@ -231,8 +226,7 @@ Outcome NatNetDecoder::accept_bodies(const FrameView& view, Sink& sink) noexcept
   return worst;
 }
 
-// RT-safe.
-Outcome NatNetDecoder::emit(std::size_t body, Frame& frame, Sink& sink) noexcept {
+RT_SAFE Outcome NatNetDecoder::emit(std::size_t body, Frame& frame, Sink& sink) noexcept {
   if (emitted_[body]) return Outcome::kOutOfRange;
   emitted_.set(body);
   frame.header.device_ns = device_ns_;
@@ -242,8 +236,8 @@ Outcome NatNetDecoder::emit(std::size_t body, Frame& frame, Sink& sink) noexcept
   return Outcome::kOk;
 }
 
-// A body that the description does not have came after it. RT-safe.
-Outcome NatNetDecoder::accept_rigid_body(ByteReader& reader, Sink& sink) noexcept {
+// A body that the description does not have came after it.
+RT_SAFE Outcome NatNetDecoder::accept_rigid_body(ByteReader& reader, Sink& sink) noexcept {
   RigidBody rigid;
   if (!read_rigid_body(reader, reading_, false, rigid)) return Outcome::kShort;
   const std::size_t body = layout_->body_of(false, rigid.id);
@@ -267,10 +261,9 @@ Outcome NatNetDecoder::accept_rigid_body(ByteReader& reader, Sink& sink) noexcep
   return emit(body, frame, sink);
 }
 
-// RT-safe.
-Outcome NatNetDecoder::accept_skeleton(ByteReader& reader, Sink& sink) noexcept {
+RT_SAFE Outcome NatNetDecoder::accept_skeleton(ByteReader& reader, Sink& sink) noexcept {
   const std::int32_t id = reader.i32();
-  const auto bones = static_cast<std::size_t>(reader.i32());  // checked by read_frame
+  const std::size_t bones = reader.i32();  // checked by read_frame
   const std::size_t body = layout_->body_of(true, id);
   const bool known = body < layout_->bodies.size();
   SkeletonPose pose(known ? layout_->tables[body] : nobody_);
@@ -288,8 +281,7 @@ Outcome NatNetDecoder::accept_skeleton(ByteReader& reader, Sink& sink) noexcept 
   return emit(body, frame, sink);
 }
 
-// RT-safe.
-Outcome NatNetDecoder::accept_markers(const FrameView& view, Sink& sink) noexcept {
+RT_SAFE Outcome NatNetDecoder::accept_markers(const FrameView& view, Sink& sink) noexcept {
   Outcome worst = Outcome::kOk;
   for (std::size_t body = 0; body < layout_->tables.size(); ++body) {
     if (layout_->tables[body].markers == 0) continue;
@@ -298,9 +290,9 @@ Outcome NatNetDecoder::accept_markers(const FrameView& view, Sink& sink) noexcep
   return worst;
 }
 
-// A marker that the cameras do not see is filled in by Motive: it is not valid. RT-safe.
-Outcome NatNetDecoder::accept_markers_of(std::size_t body, const Entries& labelled,
-                                         Sink& sink) noexcept {
+// A marker that the cameras do not see is filled in by Motive: it is not valid.
+RT_SAFE Outcome NatNetDecoder::accept_markers_of(std::size_t body, const Entries& labelled,
+                                                 Sink& sink) noexcept {
   const BodyTable& table = layout_->tables[body];
   Sample sample;
   bool any = false;

@@ -37,11 +37,11 @@ struct Settings {
 
 // "natnet version=auto up=y coordinates=auto cast=multi rate=120", and back. Cold.
 [[nodiscard]] std::string settings_text(const Settings& settings);
-[[nodiscard]] Result<Settings> parse_settings(const std::string& text, const std::string& identity);
+Result<Settings> parse_settings(const std::string& text, const std::string& identity);
 
 // The words of the options.
-[[nodiscard]] Result<bool> parse_up(const std::string& word);
-[[nodiscard]] Result<Coordinates> parse_coordinates(const std::string& word);
+Result<bool> parse_up(const std::string& word);
+Result<Coordinates> parse_coordinates(const std::string& word);
 
 // Requests: what to ask a NatNet server next. It is asked who it is until it answers and again when
 // it was silent, for its frame rate, for its bodies whenever they may have changed, and over
@@ -54,15 +54,15 @@ class Requests {
 
   explicit Requests(bool unicast);  // cold
 
-  // Each of these is called when such a packet of the server has come. RT-safe.
-  void received(std::int64_t arrival_ns) noexcept { received_ns_ = arrival_ns; }
+  // Each of these is called when such a packet of the server has come.
+  RT_SAFE void received(std::int64_t arrival_ns) noexcept { received_ns_ = arrival_ns; }
   void accept_server_info() noexcept;
   void accept_rate() noexcept { rate_.wanted = false; }
   void accept_bodies() noexcept { bodies_.wanted = false; }
   void bodies_changed() noexcept { bodies_.wanted = true; }
 
-  // The datagram to send now; empty: none. RT-safe.
-  [[nodiscard]] std::span<const std::byte> next(std::int64_t now_ns) noexcept;
+  // The datagram to send now; empty: none.
+  RT_SAFE [[nodiscard]] std::span<const std::byte> next(std::int64_t now_ns) noexcept;
 
  private:
   static constexpr std::int64_t kAgain_ns = kNanosPerSecond;
@@ -84,17 +84,16 @@ class NatNetDecoder final : public Decoder {
  public:
   explicit NatNetDecoder(const Settings& settings);
 
-  // Takes one datagram per call, of either socket. RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-            Sink& sink) noexcept override;
+  // Takes one datagram per call, of either socket.
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept override;
 
-  // Takes what make_layout made. RT-safe.
-  void use(const SourceLayout& layout) noexcept override {
+  // Takes what make_layout made.
+  RT_SAFE void use(const SourceLayout& layout) noexcept override {
     layout_ = static_cast<const NatNetLayout*>(&layout);
   }
 
-  // RT-safe.
-  [[nodiscard]] Request next_request(std::int64_t now_ns) noexcept override {
+  RT_SAFE [[nodiscard]] Request next_request(std::int64_t now_ns) noexcept override {
     return {.bytes = requests_.next(now_ns), .socket = 0};
   }
 

@@ -140,7 +140,7 @@ void NatNetEmulator::move(double time_s) {
   if (Pose& pose = poses_[0]; !pose.posed) {
     const Skeleton& skeleton = *layout_->bodies[0].skeleton;
     const auto turn = [&](Bone bone, const Quatf& rotation) {
-      pose.rotation_xyzw[static_cast<std::size_t>(skeleton.joint_of(bone))] = rotation;
+      pose.rotation_xyzw[skeleton.joint_of(bone)] = rotation;
     };
     pose.root_m = {static_cast<float>(-kEmulatedPath_m * std::cos(lap)), 0.95F,
                    static_cast<float>(kEmulatedPath_m * std::sin(lap))};
@@ -173,7 +173,7 @@ SkeletonPacket NatNetEmulator::person() const {
     Eigen::Vector3d here_m = Eigen::Vector3f(offset.data()).cast<double>();
     Eigen::Quaterniond rotation = to_eigen_double(pose.rotation_xyzw[j]);
     if (j > 0 && !local) {
-      const auto parent = static_cast<std::size_t>(table.parents[j]);
+      const std::size_t parent = table.parents[j];
       here_m = at_m[parent] + turned[parent] * here_m;
       rotation = turned[parent] * rotation;
     }

@@ -163,17 +163,15 @@ void Readings::add(Version version) noexcept {
   if (version.major == 3) put({.version = version, .padded = true});
 }
 
-// RT-safe.
-bool read_frame(std::span<const std::byte> payload, const Reading& reading,
-                FrameView& view) noexcept {
+RT_SAFE bool read_frame(std::span<const std::byte> payload, const Reading& reading,
+                        FrameView& view) noexcept {
   ByteReader reader(payload);
   view = {.number = reader.u32()};
   return read_parts(reader, reading, view) && read_suffix(reader, reading, view);
 }
 
-// RT-safe.
-bool read_rigid_body(ByteReader& reader, const Reading& reading, bool is_bone,
-                     RigidBody& body) noexcept {
+RT_SAFE bool read_rigid_body(ByteReader& reader, const Reading& reading, bool is_bone,
+                             RigidBody& body) noexcept {
   const Version version = reading.version;
   body.id = reader.i32();
   for (float& x_m : body.position_m) x_m = reader.f32();
@@ -193,8 +191,8 @@ bool read_rigid_body(ByteReader& reader, const Reading& reading, bool is_bone,
   return reader.ok();
 }
 
-// RT-safe.
-bool read_labelled(ByteReader& reader, const Reading& reading, LabelledMarker& marker) noexcept {
+RT_SAFE bool read_labelled(ByteReader& reader, const Reading& reading,
+                           LabelledMarker& marker) noexcept {
   const std::uint32_t id = reader.u32();
   marker.model = static_cast<std::uint16_t>(id >> 16);
   marker.number = static_cast<std::uint16_t>(id & 0xffff);

@@ -80,9 +80,9 @@ struct FrameView {
   bool bodies_changed = false;
 };
 
-// False when the payload does not fit the reading exactly. RT-safe.
-[[nodiscard]] bool read_frame(std::span<const std::byte> payload, const Reading& reading,
-                              FrameView& view) noexcept;
+// False when the payload does not fit the reading exactly.
+RT_SAFE [[nodiscard]] bool read_frame(std::span<const std::byte> payload, const Reading& reading,
+                                      FrameView& view) noexcept;
 
 struct RigidBody {
   std::int32_t id = 0;
@@ -98,9 +98,9 @@ struct LabelledMarker {
   bool occluded = false;
 };
 
-// Reads one entry; false when it is cut or its counts make no sense. RT-safe.
-[[nodiscard]] bool read_rigid_body(ByteReader& reader, const Reading& reading, bool is_bone,
-                                   RigidBody& body) noexcept;
+// Reads one entry; false when it is cut or its counts make no sense.
+RT_SAFE [[nodiscard]] bool read_rigid_body(ByteReader& reader, const Reading& reading, bool is_bone,
+                                           RigidBody& body) noexcept;
 [[nodiscard]] bool read_labelled(ByteReader& reader, const Reading& reading,
                                  LabelledMarker& marker) noexcept;
 

@@ -137,11 +137,10 @@ void name_joints(Skeleton& skeleton) {
 
 Result<std::shared_ptr<const Skeleton>> skeleton_of(const BodyDef& body, bool z_up,
                                                     BodyTable& table) {
-  const auto order = order_of(body);
-  if (!order) return std::unexpected(order.error());
+  const auto order = TRY(order_of(body));
   auto skeleton = std::make_shared<Skeleton>();
   skeleton->name = shown_name(body);
-  for (const std::size_t at : *order) {
+  for (const std::size_t at : order) {
     const BoneDef& bone = body.bones[at];
     const Vec3f offset_m = from_motive(bone.offset_m, z_up);
     if (!is_plausible(offset_m)) {
@@ -152,7 +151,7 @@ Result<std::shared_ptr<const Skeleton>> skeleton_of(const BodyDef& body, bool z_
     joint.name = body.is_skeleton ? bone_name_of(body, bone) : "rigid body";
     joint.offset_m = {offset_m[0], offset_m[1], offset_m[2]};
     for (std::size_t j = 0; j < table.bone_ids.size(); ++j) {
-      if (body.bones[(*order)[j]].id == bone.parent) joint.parent = static_cast<int>(j);
+      if (body.bones[order[j]].id == bone.parent) joint.parent = static_cast<int>(j);
     }
     table.bone_ids.push_back(static_cast<std::uint16_t>(bone.id));
     table.parents.push_back(joint.parent);
@@ -190,11 +189,10 @@ Result<> add_body(const BodyDef& body, const ModelDef& model, const DescriptionH
   }
   BodyTable table{.id = body.id, .is_skeleton = body.is_skeleton};
   table.markers = marker_count(body, model);
-  auto skeleton = skeleton_of(body, head.z_up, table);
-  if (!skeleton) return std::unexpected(skeleton.error());
+  auto skeleton = TRY(skeleton_of(body, head.z_up, table));
   const bool has_rate = head.rate_hz > 0.0F && head.rate_hz <= kMaxNatNetRate_hz;
   layout.bodies.push_back({.name = shown_name(body),
-                           .skeleton = std::move(*skeleton),
+                           .skeleton = std::move(skeleton),
                            .samples = sample_layout_of(table.markers),
                            .rate_hz = has_rate ? static_cast<double>(head.rate_hz) : 0.0});
   layout.tables.push_back(std::move(table));
@@ -203,18 +201,16 @@ Result<> add_body(const BodyDef& body, const ModelDef& model, const DescriptionH
 
 }  // namespace
 
-// RT-safe.
-std::size_t BodyTable::joint_of(std::uint16_t bone_id, std::size_t guess) const noexcept {
+RT_SAFE std::size_t BodyTable::joint_of(std::uint16_t bone_id, std::size_t guess) const noexcept {
   if (guess < bone_ids.size() && bone_ids[guess] == bone_id) return guess;
-  return static_cast<std::size_t>(std::ranges::find(bone_ids, bone_id) - bone_ids.begin());
+  return std::ranges::find(bone_ids, bone_id) - bone_ids.begin();
 }
 
-// RT-safe.
-std::size_t NatNetLayout::body_of(bool is_skeleton, std::int32_t id) const noexcept {
+RT_SAFE std::size_t NatNetLayout::body_of(bool is_skeleton, std::int32_t id) const noexcept {
   const auto at = std::ranges::find_if(tables, [&](const BodyTable& table) noexcept {
     return table.is_skeleton == is_skeleton && table.id == id;
   });
-  return static_cast<std::size_t>(at - tables.begin());
+  return at - tables.begin();
 }
 
 Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description) {
@@ -222,16 +218,15 @@ Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byt
     return fail("the description of the NatNet server's bodies is cut; record the log again");
   }
   const DescriptionHead head = read_description_head(description);
-  const auto model = parse_model_def(description.subspan(kDescriptionHeadBytes), head.version);
-  if (!model) return std::unexpected(model.error());
-  if (model->bodies.size() > kMaxBodies) {
-    return fail("the NatNet server streams " + std::to_string(model->bodies.size()) +
+  const auto model = TRY(parse_model_def(description.subspan(kDescriptionHeadBytes), head.version));
+  if (model.bodies.size() > kMaxBodies) {
+    return fail("the NatNet server streams " + std::to_string(model.bodies.size()) +
                 " bodies, and posed follows at most " + std::to_string(kMaxBodies) +
                 "; disable some in Motive");
   }
   auto layout = std::make_unique<NatNetLayout>();
-  for (const BodyDef& body : model->bodies) {
-    if (auto ok = add_body(body, *model, head, *layout); !ok) return std::unexpected(ok.error());
+  for (const BodyDef& body : model.bodies) {
+    TRY(add_body(body, model, head, *layout));
   }
   return layout;
 }

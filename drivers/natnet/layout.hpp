@@ -28,20 +28,19 @@ struct BodyTable {
   std::size_t markers = 0;                // their numbers are 1 to this
 
   // The index of the bone's joint; bone_ids.size() when there is none. `guess` is looked at first.
-  // RT-safe.
-  [[nodiscard]] std::size_t joint_of(std::uint16_t bone_id, std::size_t guess) const noexcept;
+  RT_SAFE [[nodiscard]] std::size_t joint_of(std::uint16_t bone_id,
+                                             std::size_t guess) const noexcept;
 };
 
 class NatNetLayout final : public SourceLayout {
  public:
   std::vector<BodyTable> tables;  // [body]
 
-  // The index of a body; bodies.size() when there is no such body. RT-safe.
-  [[nodiscard]] std::size_t body_of(bool is_skeleton, std::int32_t id) const noexcept;
+  // The index of a body; bodies.size() when there is no such body.
+  RT_SAFE [[nodiscard]] std::size_t body_of(bool is_skeleton, std::int32_t id) const noexcept;
 };
 
 // Driver::make_layout. Cold.
-[[nodiscard]] Result<std::unique_ptr<const SourceLayout>> make_layout(
-    std::span<const std::byte> description);
+Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description);
 
 }  // namespace posed::drivers::natnet

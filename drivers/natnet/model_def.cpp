@@ -159,8 +159,8 @@ class ModelReader {
     std::size_t count = 0;
     if (!read_text(reader, body.name)) return false;
     body.id = reader.i32();
-    constexpr std::size_t kLeastBone = 1 + 4 + 4 + 12;
-    if (!read_count(reader, kLeastBone, count)) return false;
+    constexpr std::size_t kMinBoneBytes = 1 + 4 + 4 + 12;
+    if (!read_count(reader, kMinBoneBytes, count)) return false;
     for (std::size_t i = 0; i < count; ++i) {
       if (!read_bone(reader, reading_.bones_have_markers, body.bones.emplace_back())) return false;
     }

@@ -49,6 +49,6 @@ struct ModelDef {
 
 // Reads it as this version, and if that does not use up the payload exactly, as each other one; the
 // version may be unknown. The bytes are untrusted. Cold.
-[[nodiscard]] Result<ModelDef> parse_model_def(std::span<const std::byte> payload, Version version);
+Result<ModelDef> parse_model_def(std::span<const std::byte> payload, Version version);
 
 }  // namespace posed::drivers::natnet

@@ -11,16 +11,12 @@ namespace {
 Result<Settings> settings_of(const Options& options) {
   Settings settings;
   if (const auto& version = option<std::string>(options, "version"); !version.empty()) {
-    const auto parsed = parse_version(version);
-    if (!parsed) return std::unexpected(parsed.error());
-    settings.version = *parsed;
+    settings.version = TRY(parse_version(version));
   }
-  const auto z_up = parse_up(option<std::string>(options, "up"));
-  if (!z_up) return std::unexpected(z_up.error());
-  const auto coordinates = parse_coordinates(option<std::string>(options, "coordinates"));
-  if (!coordinates) return std::unexpected(coordinates.error());
-  settings.z_up = *z_up;
-  settings.coordinates = *coordinates;
+  const auto z_up = TRY(parse_up(option<std::string>(options, "up")));
+  const auto coordinates = TRY(parse_coordinates(option<std::string>(options, "coordinates")));
+  settings.z_up = z_up;
+  settings.coordinates = coordinates;
   settings.unicast = option<bool>(options, "unicast");
   settings.rate_hz = static_cast<int>(option<std::int64_t>(options, "rate_hz"));
   return settings;
@@ -41,20 +37,19 @@ Result<Address> server_of(const Options& options) {
 
 // The command socket and the data socket. Only the server may send to them.
 Result<UdpSettings> sockets_of(const Options& options) {
-  const auto server = server_of(options);
-  if (!server) return std::unexpected(server.error());
-  const bool here = is_loopback(host_of(*server));
+  const auto server = TRY(server_of(options));
+  const bool here = is_loopback(host_of(server));
   const auto& listen = option<std::string>(options, "listen");
   auto command_listen = option<std::string>(options, "command_listen");
   if (command_listen.empty()) {
-    const bool v6 = server->storage.ss_family == AF_INET6;
+    const bool v6 = server.storage.ss_family == AF_INET6;
     command_listen = here ? (v6 ? "[::1]:0" : "127.0.0.1:0") : (v6 ? "[::]:0" : "0.0.0.0:0");
   }
   UdpSettings settings{
-      .sockets = {{.listen = command_listen, .to = endpoint_text(*server)}, {.listen = listen}},
+      .sockets = {{.listen = command_listen, .to = endpoint_text(server)}, {.listen = listen}},
       .interface = option<std::string>(options, "interface"),
-      .peers = {host_text(*server)}};
-  if (here && settings.interface.empty()) settings.interface = host_text(*server);
+      .peers = {host_text(server)}};
+  if (here && settings.interface.empty()) settings.interface = host_text(server);
   if (!option<bool>(options, "unicast")) {
     settings.sockets[1].group = option<std::string>(options, "group");
   }
@@ -108,10 +103,9 @@ struct NatNet : SourceType<NatNet> {
   static constexpr auto make_layout = natnet::make_layout;
 
   static Result<std::string> check(const Options& options, const Settings& /*settings*/) {
-    const auto sockets = sockets_of(options);
-    if (!sockets) return std::unexpected(sockets.error());
-    if (const auto ok = check_udp(*sockets); !ok) return std::unexpected(ok.error());
-    return "udp " + sockets->sockets[0].to;
+    const auto sockets = TRY(sockets_of(options));
+    TRY(check_udp(sockets));
+    return "udp " + sockets.sockets[0].to;
   }
   static Result<std::unique_ptr<Decoder>> decoder(const Settings& settings,
                                                   const Description& /*description*/) {

@@ -43,8 +43,7 @@ Result<Version> parse_version(std::string_view text) {
   return misuse("version should be a NatNet version from 2.5 to 4.x, like \"3.0\"");
 }
 
-// RT-safe.
-Outcome decode_message(std::span<const std::byte> bytes, Message& message) noexcept {
+RT_SAFE Outcome decode_message(std::span<const std::byte> bytes, Message& message) noexcept {
   ByteReader reader(bytes);
   const std::uint16_t id = reader.u16();
   const std::size_t length = reader.u16();
@@ -55,8 +54,7 @@ Outcome decode_message(std::span<const std::byte> bytes, Message& message) noexc
   return Outcome::kOk;
 }
 
-// RT-safe.
-bool decode_server_info(std::span<const std::byte> payload, ServerInfo& info) noexcept {
+RT_SAFE bool decode_server_info(std::span<const std::byte> payload, ServerInfo& info) noexcept {
   ByteReader reader(payload);
   static_cast<void>(reader.bytes(kNameBytes + kVersionBytes));
   info.version.major = reader.u8();
@@ -67,9 +65,8 @@ bool decode_server_info(std::span<const std::byte> payload, ServerInfo& info) no
   return true;
 }
 
-// RT-safe.
-void write_description_head(const DescriptionHead& head,
-                            std::span<std::byte, kDescriptionHeadBytes> bytes) noexcept {
+RT_SAFE void write_description_head(const DescriptionHead& head,
+                                    std::span<std::byte, kDescriptionHeadBytes> bytes) noexcept {
   const auto rate = std::bit_cast<std::array<std::byte, 4>>(head.rate_hz);
   static_assert(std::endian::native == std::endian::little);
   bytes[0] = std::byte{head.version.major};
@@ -79,8 +76,7 @@ void write_description_head(const DescriptionHead& head,
   for (std::size_t i = 0; i < rate.size(); ++i) bytes[4 + i] = rate[i];
 }
 
-// RT-safe.
-DescriptionHead read_description_head(std::span<const std::byte> bytes) noexcept {
+RT_SAFE DescriptionHead read_description_head(std::span<const std::byte> bytes) noexcept {
   ByteReader reader(bytes);
   DescriptionHead head;
   head.version.major = reader.u8();

@@ -72,24 +72,25 @@ struct Version {
 };
 
 // "3.0"; nullopt for other text.
-[[nodiscard]] Result<Version> parse_version(std::string_view text);
+Result<Version> parse_version(std::string_view text);
 
 struct Message {
   MessageId id{};
   std::span<const std::byte> payload;
 };
 
-// kOk fills `message`; kForeign: no id of NatNet; kShort: cut, or longer than it says. RT-safe.
-[[nodiscard]] Outcome decode_message(std::span<const std::byte> bytes, Message& message) noexcept;
+// kOk fills `message`; kForeign: no id of NatNet; kShort: cut, or longer than it says.
+RT_SAFE [[nodiscard]] Outcome decode_message(std::span<const std::byte> bytes,
+                                             Message& message) noexcept;
 
 struct ServerInfo {
   Version version;
   std::uint64_t clock_hz = 0;  // of its ticks; 0 before 3.0
 };
 
-// False when the payload is too short. RT-safe.
-[[nodiscard]] bool decode_server_info(std::span<const std::byte> payload,
-                                      ServerInfo& info) noexcept;
+// False when the payload is too short.
+RT_SAFE [[nodiscard]] bool decode_server_info(std::span<const std::byte> payload,
+                                              ServerInfo& info) noexcept;
 
 // The head of a description.
 struct DescriptionHead {
@@ -99,11 +100,11 @@ struct DescriptionHead {
 };
 inline constexpr std::size_t kDescriptionHeadBytes = 8;
 
-// RT-safe.
-void write_description_head(const DescriptionHead& head,
-                            std::span<std::byte, kDescriptionHeadBytes> bytes) noexcept;
-// Zero when there are too few bytes. RT-safe.
-[[nodiscard]] DescriptionHead read_description_head(std::span<const std::byte> bytes) noexcept;
+RT_SAFE void write_description_head(const DescriptionHead& head,
+                                    std::span<std::byte, kDescriptionHeadBytes> bytes) noexcept;
+// Zero when there are too few bytes.
+RT_SAFE [[nodiscard]] DescriptionHead read_description_head(
+    std::span<const std::byte> bytes) noexcept;
 
 // The datagrams of the host and of the server. Cold.
 [[nodiscard]] std::vector<std::byte> encode_message(MessageId id,

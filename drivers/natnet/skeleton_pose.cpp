@@ -37,7 +37,7 @@ bool SkeletonPose::looks_local() const noexcept {
   double local_m = 0.0;  // misfit of each reading
   double global_m = 0.0;
   for (std::size_t j = 1; j < table_.parents.size(); ++j) {
-    const auto parent = static_cast<std::size_t>(table_.parents[j]);
+    const std::size_t parent = table_.parents[j];
     const Eigen::Vector3d offset_m = vector_of(table_.offsets_m[j]);
     const Eigen::Vector3d here_m = vector_of(position_m_[j]);
     const Eigen::Vector3d from_parent_m = here_m - vector_of(position_m_[parent]);
@@ -60,8 +60,8 @@ bool SkeletonPose::fill(Coordinates coordinates, Frame& frame) const noexcept {
   // that.
   std::array<Eigen::Quaterniond, kMaxJoints> turned;
   for (std::size_t j = 0; j < joints; ++j) {
-    const Eigen::Quaterniond above = j == 0 ? Eigen::Quaterniond::Identity()
-                                            : turned[static_cast<std::size_t>(table_.parents[j])];
+    const Eigen::Quaterniond above =
+        j == 0 ? Eigen::Quaterniond::Identity() : turned[table_.parents[j]];
     if (!tracked_[j]) {
       frame.rotation_xyzw[j] = kIdentity;
       turned[j] = above;

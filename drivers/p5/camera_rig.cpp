@@ -30,10 +30,10 @@ std::int16_t counts(double tangent) {
   return static_cast<std::int16_t>(std::lround(std::clamp(kFocal * tangent, -615.0, 615.0)));
 }
 
-// Returns the LEDs whose distances to at least two others are correct. RT-safe.
-std::bitset<kLeds> agreeing(const CameraRig& rig,
-                            const std::array<Eigen::Vector3d, kLeds>& position_m,
-                            const std::bitset<kLeds>& seen) noexcept {
+// Returns the LEDs whose distances to at least two others are correct.
+RT_SAFE std::bitset<kLeds> agreeing(const CameraRig& rig,
+                                    const std::array<Eigen::Vector3d, kLeds>& position_m,
+                                    const std::bitset<kLeds>& seen) noexcept {
   constexpr double kTolerance = 0.2;
   std::bitset<kLeds> good;
   for (std::size_t i = 0; i < kLeds; ++i) {
@@ -65,8 +65,8 @@ CameraRig CameraRig::of(std::span<const std::byte, kHeadsBytes> heads,
   return rig;
 }
 
-// RT-safe.
-bool CameraRig::locate(const LedObservation& spot, Eigen::Vector3d& position_m) const noexcept {
+RT_SAFE bool CameraRig::locate(const LedObservation& spot,
+                               Eigen::Vector3d& position_m) const noexcept {
   const double tan1 = std::tan(std::atan(spot.v1 / kFocal) + tilt1_rad);
   const double tan2 = std::tan(std::atan(spot.v2 / kFocal) + tilt2_rad);
   const double beta_rad = std::atan(spot.h / kFocal);
@@ -88,9 +88,8 @@ LedObservation CameraRig::project(std::size_t led, const Eigen::Vector3d& positi
           .h = counts(-position_m.x() / ahead_m)};
 }
 
-// RT-safe.
-bool fit_hand(const CameraRig& rig, const std::array<Eigen::Vector3d, kLeds>& position_m,
-              std::bitset<kLeds> seen, RigidPose& place) noexcept {
+RT_SAFE bool fit_hand(const CameraRig& rig, const std::array<Eigen::Vector3d, kLeds>& position_m,
+                      std::bitset<kLeds> seen, RigidPose& place) noexcept {
   const std::bitset<kLeds> good = agreeing(rig, position_m, seen);
   if (good.count() < 3) return false;
   const double share = 1.0 / static_cast<double>(good.count());

@@ -23,8 +23,9 @@ struct CameraRig {
                                     std::span<const std::byte, kLedsBytes> leds);
 
   // Computes the position of a LED from unwrapped values; false when the lines of sight from the
-  // heads do not meet in front of them. RT-safe.
-  [[nodiscard]] bool locate(const LedObservation& spot, Eigen::Vector3d& position_m) const noexcept;
+  // heads do not meet in front of them.
+  RT_SAFE [[nodiscard]] bool locate(const LedObservation& spot,
+                                    Eigen::Vector3d& position_m) const noexcept;
   // The inverse: the values that the heads measure, not wrapped, for a LED in front of them.
   [[nodiscard]] LedObservation project(std::size_t led, const Eigen::Vector3d& position_m) const;
 };
@@ -35,9 +36,9 @@ struct RigidPose {
 };
 
 // Computes the hand pose from three or more seen LEDs; false when fewer have consistent distances
-// (within 20 %). RT-safe.
-[[nodiscard]] bool fit_hand(const CameraRig& rig,
-                            const std::array<Eigen::Vector3d, kLeds>& position_m,
-                            std::bitset<kLeds> seen, RigidPose& place) noexcept;
+// (within 20 %).
+RT_SAFE [[nodiscard]] bool fit_hand(const CameraRig& rig,
+                                    const std::array<Eigen::Vector3d, kLeds>& position_m,
+                                    std::bitset<kLeds> seen, RigidPose& place) noexcept;
 
 }  // namespace posed::drivers::p5

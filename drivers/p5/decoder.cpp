@@ -42,9 +42,8 @@ SampleLayout layout(const glove::Model& model) {
   return layout;
 }
 
-// RT-safe.
-void P5Decoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
-                     Sink& sink) noexcept {
+RT_SAFE void P5Decoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
+                             Sink& sink) noexcept {
   for (const std::byte byte : bytes) {
     assert(pending_bytes_ < pending_.size());
     pending_[pending_bytes_++] = byte;
@@ -53,8 +52,8 @@ void P5Decoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns
   }
 }
 
-// Over USB reports arrive complete; a log or a test may split and damage them. RT-safe.
-bool P5Decoder::advance(Sink& sink) noexcept {
+// Over USB reports arrive complete; a log or a test may split and damage them.
+RT_SAFE bool P5Decoder::advance(Sink& sink) noexcept {
   const bool begins = pending_[0] == std::byte{1};
   if (!begins) {
     if (in_step_) sink.outcome(Outcome::kForeign);
@@ -77,15 +76,13 @@ bool P5Decoder::advance(Sink& sink) noexcept {
   return true;
 }
 
-// RT-safe.
-void P5Decoder::drop(std::size_t count) noexcept {
+RT_SAFE void P5Decoder::drop(std::size_t count) noexcept {
   std::copy(pending_.begin() + static_cast<std::ptrdiff_t>(count),
             pending_.begin() + static_cast<std::ptrdiff_t>(pending_bytes_), pending_.begin());
   pending_bytes_ -= count;
 }
 
-// RT-safe.
-bool P5Decoder::locate(const Report& report, RigidPose& place) noexcept {
+RT_SAFE bool P5Decoder::locate(const Report& report, RigidPose& place) noexcept {
   for (int& reports : unseen_) reports = std::min(reports + 1, kForgotten);
   if (!rig_) return false;
   std::array<Eigen::Vector3d, kLeds> position_m;
@@ -106,8 +103,7 @@ bool P5Decoder::locate(const Report& report, RigidPose& place) noexcept {
   return fit_hand(*rig_, position_m, seen, place) && place.position_m.norm() <= kMaxPosition_m;
 }
 
-// RT-safe.
-void P5Decoder::accept(const Report& report, Sink& sink) noexcept {
+RT_SAFE void P5Decoder::accept(const Report& report, Sink& sink) noexcept {
   std::array<float, kFingers> raw{};
   for (std::size_t f = 0; f < kFingers; ++f) raw[f] = static_cast<float>(report.bend[f]);
   std::array<float, kExtras.size()> extra{};

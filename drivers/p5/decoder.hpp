@@ -29,9 +29,8 @@ struct Settings {
 };
 
 [[nodiscard]] std::string device_info_of(const Settings& settings);
-[[nodiscard]] Result<Settings> parse_device_info(const std::string& text,
-                                                 const std::string& identity);
-[[nodiscard]] Result<glove::Model> model();
+Result<Settings> parse_device_info(const std::string& text, const std::string& identity);
+Result<glove::Model> model();
 [[nodiscard]] SampleLayout layout(const glove::Model& model);
 
 class P5Decoder final : public glove::GloveDecoder {
@@ -41,16 +40,14 @@ class P5Decoder final : public glove::GloveDecoder {
             std::shared_ptr<const glove::Calibration> calibration, std::optional<CameraRig> rig)
       : GloveDecoder(std::move(skeleton), std::move(calibration)), rig_(std::move(rig)) {}
 
-  // RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-            Sink& sink) noexcept override;
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept override;
 
  private:
   [[nodiscard]] bool advance(Sink& sink) noexcept;
   void drop(std::size_t count) noexcept;
   void accept(const Report& report, Sink& sink) noexcept;
-  // RT-safe.
-  [[nodiscard]] bool locate(const Report& report, RigidPose& place) noexcept;
+  RT_SAFE [[nodiscard]] bool locate(const Report& report, RigidPose& place) noexcept;
 
   std::optional<CameraRig> rig_;
   std::array<std::byte, kReportBytes + 1> pending_{};

@@ -51,7 +51,7 @@ Result<Settings> parse_device_info(const std::string& text, const std::string& i
   const std::string firmware = reader.word("firmware");
   const std::string heads = reader.word("heads");
   const std::string leds = reader.word("leds");
-  if (auto ok = reader.finish(); !ok) return std::unexpected(ok.error());
+  TRY(reader.finish());
   if (!read_hex(firmware, kFirmwareReport, kFirmwareBytes, settings.firmware) ||
       !read_hex(heads, kHeadsReport, kHeadsBytes, settings.heads) ||
       !read_hex(leds, kLedsReport, kLedsBytes, settings.leds)) {
@@ -93,9 +93,8 @@ struct P5 : glove::GloveType<P5> {
              .help = "right or left: which hand wears it"}};
   }
   static Result<Settings> settings(const Options& options) {
-    const auto hand = glove::hand_option(options);
-    if (!hand) return std::unexpected(hand.error());
-    return Settings{.hand = *hand};
+    const auto hand = TRY(glove::hand_option(options));
+    return Settings{.hand = hand};
   }
   static Result<std::string> check(const Options& options, const Settings& /*settings*/) {
     return option<std::string>(options, "id");
@@ -112,20 +111,19 @@ struct P5 : glove::GloveType<P5> {
     return std::make_unique<P5Decoder>(std::move(skeleton), std::move(calibration), settings.rig());
   }
   static Result<Opened> open(const Options& options, Settings& settings, TransportFactory& ports) {
-    auto link = ports.usb({.vendor = kP5Usb[0].vendor,
-                           .product = kP5Usb[0].product,
-                           .id = option<std::string>(options, "id"),
-                           .interface = kInterface,
-                           .report_bytes = kReportBytes});
-    if (!link) return std::unexpected(link.error());
+    auto link = TRY(ports.usb({.vendor = kP5Usb[0].vendor,
+                               .product = kP5Usb[0].product,
+                               .id = option<std::string>(options, "id"),
+                               .interface = kInterface,
+                               .report_bytes = kReportBytes}));
     std::vector<std::string> warnings;
-    settings.firmware = feature(*link, kFirmwareReport, kFirmwareBytes, warnings);
-    settings.heads = feature(*link, kHeadsReport, kHeadsBytes, warnings);
-    settings.leds = feature(*link, kLedsReport, kLedsBytes, warnings);
-    std::string identity = link->identity();
+    settings.firmware = feature(link, kFirmwareReport, kFirmwareBytes, warnings);
+    settings.heads = feature(link, kHeadsReport, kHeadsBytes, warnings);
+    settings.leds = feature(link, kLedsReport, kLedsBytes, warnings);
+    std::string identity = link.identity();
     // An idle device sends no reports, so silence is no reason to reopen it.
     return Opened{.identity = std::move(identity),
-                  .transport = make_usb_transport(std::move(*link)),
+                  .transport = make_usb_transport(std::move(link)),
                   .warnings = std::move(warnings)};
   }
   static Result<std::unique_ptr<Emulator>> emulator(const Options& /*options*/,

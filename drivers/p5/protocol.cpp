@@ -34,8 +34,7 @@ std::int16_t signed_10(unsigned value) noexcept {
 
 }  // namespace
 
-// RT-safe.
-Outcome decode_report(std::span<const std::byte> bytes, Report& report) noexcept {
+RT_SAFE Outcome decode_report(std::span<const std::byte> bytes, Report& report) noexcept {
   if (bytes[0] != kInputReport) return Outcome::kForeign;
   report = {};
   for (std::size_t i = 0; i < kFingers; ++i) {
@@ -70,8 +69,7 @@ std::array<std::byte, kReportBytes> encode_report(const Report& report) noexcept
   return bytes;
 }
 
-// RT-safe.
-std::int16_t unwrapped(std::int16_t value, std::int16_t before) noexcept {
+RT_SAFE std::int16_t unwrapped(std::int16_t value, std::int16_t before) noexcept {
   constexpr int kEdge = 409;  // beyond it a value may have wrapped
   constexpr int kJump = 670;  // more than a hand moves between two reports
   constexpr int kTurn = 1024;

@@ -51,11 +51,12 @@ struct Report {
   std::array<LedObservation, kSpots> spot{};
 };
 
-// kOk fills `report`; kForeign for another report number. RT-safe.
-[[nodiscard]] Outcome decode_report(std::span<const std::byte> bytes, Report& report) noexcept;
+// kOk fills `report`; kForeign for another report number.
+RT_SAFE [[nodiscard]] Outcome decode_report(std::span<const std::byte> bytes,
+                                            Report& report) noexcept;
 [[nodiscard]] std::array<std::byte, kReportBytes> encode_report(const Report& report) noexcept;
 
-// Unwraps a 10-bit value, given the value `before` it (already unwrapped). RT-safe.
-[[nodiscard]] std::int16_t unwrapped(std::int16_t value, std::int16_t before) noexcept;
+// Unwraps a 10-bit value, given the value `before` it (already unwrapped).
+RT_SAFE [[nodiscard]] std::int16_t unwrapped(std::int16_t value, std::int16_t before) noexcept;
 
 }  // namespace posed::drivers::p5

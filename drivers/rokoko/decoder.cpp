@@ -53,30 +53,27 @@ Result<std::shared_ptr<const Skeleton>> skeleton_of(const DescribedBody& body,
     const int parent = parent_among(body.joints, j);
     const Vec3f& offset_m = body.offset_m[j];
     joint.name = studio_joint(j).name;
-    joint.parent = parent < 0 ? -1 : place[static_cast<std::size_t>(parent)];
+    joint.parent = parent < 0 ? -1 : place[parent];
     joint.offset_m = {offset_m[0], offset_m[1], offset_m[2]};
     joint.bone = studio_joint(j).bone;
     joint.T_world_joint = to_eigen_double(t_pose_rotation(j));
   }
-  if (auto ok = skeleton->finish(); !ok) return std::unexpected(ok.error());
+  TRY(skeleton->finish());
   return skeleton;
 }
 
-// RT-safe.
-std::size_t StudioLayout::body_of(const BodyKey& key) const noexcept {
-  return static_cast<std::size_t>(std::ranges::find(plans, key, &BodyPlan::key) - plans.begin());
+RT_SAFE std::size_t StudioLayout::body_of(const BodyKey& key) const noexcept {
+  return std::ranges::find(plans, key, &BodyPlan::key) - plans.begin();
 }
 
 Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description) {
-  const auto described = parse_description(description);
-  if (!described) return std::unexpected(described.error());
+  const auto described = TRY(parse_description(description));
   auto layout = std::make_unique<StudioLayout>();
-  for (const DescribedBody& body : *described) {
+  for (const DescribedBody& body : described) {
     const std::string name = body_name(body.key, layout->bodies);
-    auto skeleton = skeleton_of(body, name);
-    if (!skeleton) return std::unexpected(skeleton.error());
+    auto skeleton = TRY(skeleton_of(body, name));
     layout->bodies.push_back({.name = name,
-                              .skeleton = std::move(*skeleton),
+                              .skeleton = std::move(skeleton),
                               .samples = body.face ? face_samples() : SampleLayout{}});
     BodyPlan& plan = layout->plans.emplace_back();
     plan.key = body.key;
@@ -91,13 +88,13 @@ Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byt
 namespace {
 
 // Sets the rotations relative to the parents. A joint that this frame does not have is not valid:
-// it turns with its parent. RT-safe.
-void set_rotations(const BodyPlan& plan, const Skeleton& skeleton, const SeenBody& body,
-                   Frame& frame) noexcept {
+// it turns with its parent.
+RT_SAFE void set_rotations(const BodyPlan& plan, const Skeleton& skeleton, const SeenBody& body,
+                           Frame& frame) noexcept {
   std::array<Quatf, kMaxJoints> global{};
   for (std::size_t j = 0; j < plan.joint.size(); ++j) {
     const int parent = skeleton.joints[j].parent;
-    const Quatf& around = parent < 0 ? kIdentity : global[static_cast<std::size_t>(parent)];
+    const Quatf& around = parent < 0 ? kIdentity : global[parent];
     const bool seen = body.joints[plan.joint[j]];
     frame.valid[j] = seen;
     global[j] = seen ? body.subject->rotation_xyzw[plan.joint[j]] : around;
@@ -109,9 +106,8 @@ void set_rotations(const BodyPlan& plan, const Skeleton& skeleton, const SeenBod
 
 }  // namespace
 
-// RT-safe.
-void StudioDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-                         Sink& sink) noexcept {
+RT_SAFE void StudioDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                                 Sink& sink) noexcept {
   Outcome outcome = read(bytes);
   if (outcome == Outcome::kOk) outcome = clock_.accept(frame_.timestamp_s);
   const std::int64_t active_ns = active_time_.to(arrival_ns);
@@ -119,8 +115,7 @@ void StudioDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_
   sink.outcome(outcome);
 }
 
-// RT-safe.
-Outcome StudioDecoder::read(std::span<const std::byte> bytes) noexcept {
+RT_SAFE Outcome StudioDecoder::read(std::span<const std::byte> bytes) noexcept {
   if (is_lz4_frame(bytes)) {
     const Outcome outcome = decode_lz4_frame(bytes, json_, bytes);
     if (outcome != Outcome::kOk) return outcome;
@@ -129,8 +124,7 @@ Outcome StudioDecoder::read(std::span<const std::byte> bytes) noexcept {
   return read_studio_frame(json, frame_);
 }
 
-// RT-safe.
-Outcome StudioDecoder::accept_frame(std::int64_t active_ns, Sink& sink) noexcept {
+RT_SAFE Outcome StudioDecoder::accept_frame(std::int64_t active_ns, Sink& sink) noexcept {
   Outcome worst = Outcome::kOk;
   std::array<SeenBody, kMaxParts> bodies;
   for (std::size_t i = 0; i < frame_.count; ++i) {
@@ -156,8 +150,7 @@ Outcome StudioDecoder::accept_frame(std::int64_t active_ns, Sink& sink) noexcept
   return worst;
 }
 
-// RT-safe.
-Outcome StudioDecoder::emit(const SeenBody& seen, Sink& sink) noexcept {
+RT_SAFE Outcome StudioDecoder::emit(const SeenBody& seen, Sink& sink) noexcept {
   const std::size_t body = layout_->body_of(seen.key);
   if (body == layout_->bodies.size()) return Outcome::kForeign;  // described, not yet in use
   if (taken_[body]) return Outcome::kOutOfRange;
@@ -179,8 +172,8 @@ Outcome StudioDecoder::emit(const SeenBody& seen, Sink& sink) noexcept {
   return Outcome::kOk;
 }
 
-// RT-safe.
-void StudioDecoder::emit_face(std::size_t body, const Subject& subject, Sink& sink) noexcept {
+RT_SAFE void StudioDecoder::emit_face(std::size_t body, const Subject& subject,
+                                      Sink& sink) noexcept {
   Sample sample;
   sample.header.device_ns = clock_.device_ns();
   sample.value_count = kFaceValues;

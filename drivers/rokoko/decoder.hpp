@@ -32,26 +32,25 @@ class StudioLayout final : public SourceLayout {
  public:
   std::vector<BodyPlan> plans;  // [body]
 
-  // The index of a body; bodies.size() when there is no such body. RT-safe.
-  [[nodiscard]] std::size_t body_of(const BodyKey& key) const noexcept;
+  // The index of a body; bodies.size() when there is no such body.
+  RT_SAFE [[nodiscard]] std::size_t body_of(const BodyKey& key) const noexcept;
 };
 
 // The skeleton of a body as it was described; null for one with only a face. Cold.
-[[nodiscard]] Result<std::shared_ptr<const Skeleton>> skeleton_of(const DescribedBody& body,
-                                                                  const std::string& name);
+Result<std::shared_ptr<const Skeleton>> skeleton_of(const DescribedBody& body,
+                                                    const std::string& name);
 
 // Driver::make_layout. Cold.
-[[nodiscard]] Result<std::unique_ptr<const SourceLayout>> make_layout(
-    std::span<const std::byte> description);
+Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description);
 
 class StudioDecoder final : public Decoder {
  public:
-  // Takes one datagram per call. RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-            Sink& sink) noexcept override;
+  // Takes one datagram per call.
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept override;
 
-  // Takes what make_layout made. RT-safe.
-  void use(const SourceLayout& layout) noexcept override {
+  // Takes what make_layout made.
+  RT_SAFE void use(const SourceLayout& layout) noexcept override {
     layout_ = static_cast<const StudioLayout*>(&layout);
   }
 
@@ -59,7 +58,7 @@ class StudioDecoder final : public Decoder {
   static constexpr std::size_t kMaxJson = 256 * 1024;  // bytes that a datagram may unpack to
 
   [[nodiscard]] Outcome read(std::span<const std::byte> bytes) noexcept;
-  [[nodiscard]] Outcome accept_frame(std::int64_t heard_ns, Sink& sink) noexcept;
+  [[nodiscard]] Outcome accept_frame(std::int64_t received_ns, Sink& sink) noexcept;
   // Emits one body if it fits the layout.
   [[nodiscard]] Outcome emit(const SeenBody& seen, Sink& sink) noexcept;
   void emit_face(std::size_t body, const Subject& subject, Sink& sink) noexcept;

@@ -70,8 +70,7 @@ Result<DescribedBody> read_described_body(ByteReader& reader) {
 
 }  // namespace
 
-// RT-safe.
-std::size_t write_body(const DescribedBody& body, std::span<std::byte> room) noexcept {
+RT_SAFE std::size_t write_body(const DescribedBody& body, std::span<std::byte> room) noexcept {
   FixedWriter writer(room);
   writer.number(static_cast<std::uint64_t>(body.key.part), 1);
   writer.number(body.face ? 1 : 0, 1);
@@ -96,12 +95,11 @@ Result<std::vector<DescribedBody>> parse_description(std::span<const std::byte> 
   if (count > kMaxBodies) return wrong_description("has too many bodies");
   std::vector<DescribedBody> bodies;
   for (std::size_t i = 0; i < count; ++i) {
-    auto body = read_described_body(reader);
-    if (!body) return std::unexpected(body.error());
-    if (std::ranges::find(bodies, body->key, &DescribedBody::key) != bodies.end()) {
+    auto body = TRY(read_described_body(reader));
+    if (std::ranges::find(bodies, body.key, &DescribedBody::key) != bodies.end()) {
       return wrong_description("names a body twice");
     }
-    bodies.push_back(*body);
+    bodies.push_back(body);
   }
   if (reader.left() != 0) return wrong_description("goes on after its last body");
   return bodies;

@@ -52,11 +52,11 @@ inline constexpr std::size_t kMaxBodyBytes = 3 + kMaxNameBytes + 8 + kStudioJoin
 inline constexpr std::size_t kMaxDescriptionBytes = 1 + kMaxBodies * kMaxBodyBytes;
 static_assert(kMaxDescriptionBytes <= kMaxDescription);
 
-// Writes one body and returns its length; `room` has at least kMaxBodyBytes. RT-safe.
-[[nodiscard]] std::size_t write_body(const DescribedBody& body, std::span<std::byte> room) noexcept;
+// Writes one body and returns its length; `room` has at least kMaxBodyBytes.
+RT_SAFE [[nodiscard]] std::size_t write_body(const DescribedBody& body,
+                                             std::span<std::byte> room) noexcept;
 
 // The bytes are untrusted. Cold.
-[[nodiscard]] Result<std::vector<DescribedBody>> parse_description(
-    std::span<const std::byte> bytes);
+Result<std::vector<DescribedBody>> parse_description(std::span<const std::byte> bytes);
 
 }  // namespace posed::drivers::rokoko

@@ -179,7 +179,7 @@ void StudioEmulator::turn(std::size_t body, std::string_view joint,
   const int parent = skeleton.joints[j].parent;
   const Eigen::Quaterniond T_parent =
       parent < 0 ? Eigen::Quaterniond::Identity() : skeleton.joints[parent].T_world_joint;
-  bodies_[body].frame.rotation_xyzw[static_cast<std::size_t>(j)] =
+  bodies_[body].frame.rotation_xyzw[j] =
       from_eigen(T_parent.conjugate() * canonical * skeleton.joints[j].T_world_joint);
 }
 
@@ -283,7 +283,7 @@ std::string StudioEmulator::joints_json(const EmulatedBody& body) const {
       rotation[j] = turned;
       place[j] = Eigen::Map<const Eigen::Vector3f>(body.frame.root_position_m.data());
     } else {
-      const auto parent = static_cast<std::size_t>(joint.parent);
+      const std::size_t parent = joint.parent;
       rotation[j] = rotation[parent] * turned;
       place[j] = place[parent] + rotation[parent] * joint.offset_m.cast<float>();
     }

@@ -127,10 +127,10 @@ constexpr auto sorted_names(const std::array<std::string_view, count>& names) {
 constexpr auto kSortedJoints = sorted_names(kJointNames);
 constexpr auto kSortedFace = sorted_names(kFace);
 
-// RT-safe.
 template <std::size_t count>
-std::size_t index_of(std::string_view name, const std::array<std::string_view, count>& names,
-                     const std::array<std::uint8_t, count>& order) noexcept {
+RT_SAFE std::size_t index_of(std::string_view name,
+                             const std::array<std::string_view, count>& names,
+                             const std::array<std::uint8_t, count>& order) noexcept {
   const auto at =
       std::ranges::lower_bound(order, name, {}, [&names](std::uint8_t i) { return names[i]; });
   return at != order.end() && names[*at] == name ? *at : count;
@@ -138,37 +138,30 @@ std::size_t index_of(std::string_view name, const std::array<std::string_view, c
 
 }  // namespace
 
-// RT-safe.
-const StudioJoint& studio_joint(std::size_t joint) noexcept { return kJoints[joint]; }
-// RT-safe.
-std::string_view face_value_name(std::size_t value) noexcept { return kFace[value]; }
-// RT-safe.
-std::size_t joint_named(std::string_view name) noexcept {
+RT_SAFE const StudioJoint& studio_joint(std::size_t joint) noexcept { return kJoints[joint]; }
+RT_SAFE std::string_view face_value_name(std::size_t value) noexcept { return kFace[value]; }
+RT_SAFE std::size_t joint_named(std::string_view name) noexcept {
   return index_of(name, kJointNames, kSortedJoints);
 }
-// RT-safe.
-std::size_t face_value_named(std::string_view name) noexcept {
+RT_SAFE std::size_t face_value_named(std::string_view name) noexcept {
   return index_of(name, kFace, kSortedFace);
 }
 
-// RT-safe.
-JointSet fingers_of(std::size_t hand) noexcept {
+RT_SAFE JointSet fingers_of(std::size_t hand) noexcept {
   JointSet fingers;
   for (std::size_t i = 1; i <= kFingerJointsOfHand; ++i) fingers.set(hand + i);
   return fingers;
 }
 
-// RT-safe.
-int parent_among(const JointSet& joints, std::size_t joint) noexcept {
+RT_SAFE int parent_among(const JointSet& joints, std::size_t joint) noexcept {
   int parent = kJoints[joint].parent;
-  while (parent >= 0 && !joints[static_cast<std::size_t>(parent)]) {
-    parent = kJoints[static_cast<std::size_t>(parent)].parent;
+  while (parent >= 0 && !joints[parent]) {
+    parent = kJoints[parent].parent;
   }
   return parent;
 }
 
-// RT-safe.
-JointSet connected(const JointSet& joints) noexcept {
+RT_SAFE JointSet connected(const JointSet& joints) noexcept {
   JointSet kept;
   for (std::size_t j = 0; j < kStudioJoints; ++j) {
     if (joints[j]) kept[j] = kept.none() || parent_among(kept, j) >= 0;

@@ -26,28 +26,27 @@ struct StudioJoint {
   std::array<float, 4> reference_wxyz{};
 };
 
-[[nodiscard]] const StudioJoint& studio_joint(std::size_t joint) noexcept;   // RT-safe.
-[[nodiscard]] std::string_view face_value_name(std::size_t value) noexcept;  // RT-safe.
-[[nodiscard]] std::size_t joint_named(std::string_view name) noexcept;       // RT-safe.
-[[nodiscard]] std::size_t face_value_named(std::string_view name) noexcept;  // RT-safe.
+RT_SAFE [[nodiscard]] const StudioJoint& studio_joint(std::size_t joint) noexcept;
+RT_SAFE [[nodiscard]] std::string_view face_value_name(std::size_t value) noexcept;
+RT_SAFE [[nodiscard]] std::size_t joint_named(std::string_view name) noexcept;
+RT_SAFE [[nodiscard]] std::size_t face_value_named(std::string_view name) noexcept;
 
 inline constexpr std::size_t kLeftHandJoint = 8;  // its fingers follow
 inline constexpr std::size_t kRightHandJoint = 32;
 inline constexpr std::size_t kFingerJointsOfHand = 20;
 
-// The fingers of the hand at this joint. RT-safe.
-[[nodiscard]] JointSet fingers_of(std::size_t hand) noexcept;
+// The fingers of the hand at this joint.
+RT_SAFE [[nodiscard]] JointSet fingers_of(std::size_t hand) noexcept;
 
 // Returns the nearest ancestor of a joint in a skeleton with these joints only; -1: there is none.
-// RT-safe.
-[[nodiscard]] int parent_among(const JointSet& joints, std::size_t joint) noexcept;
+RT_SAFE [[nodiscard]] int parent_among(const JointSet& joints, std::size_t joint) noexcept;
 
-// Those of the joints that one skeleton can hold: the first one, and what hangs below it. RT-safe.
-[[nodiscard]] JointSet connected(const JointSet& joints) noexcept;
+// Those of the joints that one skeleton can hold: the first one, and what hangs below it.
+RT_SAFE [[nodiscard]] JointSet connected(const JointSet& joints) noexcept;
 
 // Unity's axes are left-handed, Y up, facing +Z with the left hand at -X: posed's are their mirror
-// image in X. RT-safe.
-[[nodiscard]] inline Vec3f mirrored(const Vec3f& position) noexcept {
+// image in X.
+RT_SAFE [[nodiscard]] inline Vec3f mirrored(const Vec3f& position) noexcept {
   return {-position[0], position[1], position[2]};
 }
 [[nodiscard]] inline Quatf mirrored(const Quatf& rotation_xyzw) noexcept {

@@ -16,8 +16,8 @@ bool is_not_finite(std::string_view word) noexcept {
   return word == "NaN" || word == "Infinity" || word == "-Infinity";
 }
 
-// The four hexadecimal digits at the beginning of `text`; false when there are none. RT-safe.
-bool hex4(std::string_view text, std::uint32_t& code) noexcept {
+// The four hexadecimal digits at the beginning of `text`; false when there are none.
+RT_SAFE bool hex4(std::string_view text, std::uint32_t& code) noexcept {
   constexpr std::string_view kDigits = "0123456789abcdef0123456789ABCDEF";
   if (text.size() < 4) return false;
   code = 0;
@@ -30,8 +30,8 @@ bool hex4(std::string_view text, std::uint32_t& code) noexcept {
 }
 
 // The character of \uXXXX, or of two of them, at the beginning of `raw`, and the number of bytes
-// that it takes there; 0 when it is none. RT-safe.
-std::size_t escaped_code(std::string_view raw, std::uint32_t& code) noexcept {
+// that it takes there; 0 when it is none.
+RT_SAFE std::size_t escaped_code(std::string_view raw, std::uint32_t& code) noexcept {
   if (!raw.starts_with("\\u") || !hex4(raw.substr(2), code)) return 0;
   if (code < 0xD800 || code > 0xDFFF) return 6;
   std::uint32_t low = 0;
@@ -66,23 +66,22 @@ char simple_escape(char letter) noexcept {
 
 }  // namespace
 
-// RT-safe.
-bool JsonReader::fail(Fault fault) noexcept {
+RT_SAFE bool JsonReader::fail(Fault fault) noexcept {
   if (fault_ == Fault::kNone) fault_ = fault;
   at_ = end_;
   return false;
 }
 
-// The first character of what comes next. RT-safe.
-bool JsonReader::peek(char& first) noexcept {
+// The first character of what comes next.
+RT_SAFE bool JsonReader::peek(char& first) noexcept {
   while (at_ != end_ && (*at_ == ' ' || *at_ == '\n' || *at_ == '\r' || *at_ == '\t')) ++at_;
   if (at_ == end_) return fail(Fault::kCut);
   first = *at_;
   return true;
 }
 
-// False at the end of the object or list, which is left. RT-safe.
-bool JsonReader::separate(char close) noexcept {
+// False at the end of the object or list, which is left.
+RT_SAFE bool JsonReader::separate(char close) noexcept {
   char c = 0;
   if (!ok() || !peek(c)) return false;
   if (c == close) {
@@ -100,8 +99,7 @@ bool JsonReader::separate(char close) noexcept {
   return true;
 }
 
-// RT-safe.
-bool JsonReader::next(std::string_view& key) noexcept {
+RT_SAFE bool JsonReader::next(std::string_view& key) noexcept {
   char c = 0;
   if (!separate('}') || !peek(c)) return false;
   if (c != '"') return fail(Fault::kWrong);
@@ -111,11 +109,9 @@ bool JsonReader::next(std::string_view& key) noexcept {
   return true;
 }
 
-// RT-safe.
-bool JsonReader::next() noexcept { return separate(']'); }
+RT_SAFE bool JsonReader::next() noexcept { return separate(']'); }
 
-// RT-safe.
-bool JsonReader::enter(char open, bool object) noexcept {
+RT_SAFE bool JsonReader::enter(char open, bool object) noexcept {
   char c = 0;
   if (!ok() || !peek(c)) return false;
   if (c != open) {
@@ -131,8 +127,7 @@ bool JsonReader::enter(char open, bool object) noexcept {
   return true;
 }
 
-// RT-safe.
-bool JsonReader::quoted(std::string_view& value) noexcept {
+RT_SAFE bool JsonReader::quoted(std::string_view& value) noexcept {
   const char* const begin = ++at_;
   while (at_ != end_ && *at_ != '"') {
     if (static_cast<unsigned char>(*at_) < 0x20) return fail(Fault::kWrong);
@@ -144,8 +139,7 @@ bool JsonReader::quoted(std::string_view& value) noexcept {
   return true;
 }
 
-// RT-safe.
-bool JsonReader::word(std::string_view expected) noexcept {
+RT_SAFE bool JsonReader::word(std::string_view expected) noexcept {
   const std::string_view left(at_, static_cast<std::size_t>(end_ - at_));
   if (left.starts_with(expected)) {
     at_ += expected.size();
@@ -154,8 +148,7 @@ bool JsonReader::word(std::string_view expected) noexcept {
   return fail(expected.starts_with(left) ? Fault::kCut : Fault::kWrong);
 }
 
-// RT-safe.
-bool JsonReader::number(double& value) noexcept {
+RT_SAFE bool JsonReader::number(double& value) noexcept {
   char c = 0;
   if (!ok() || !peek(c)) return false;
   if (c == '"') {
@@ -181,8 +174,7 @@ bool JsonReader::number(double& value) noexcept {
   return true;
 }
 
-// RT-safe.
-bool JsonReader::boolean(bool& value) noexcept {
+RT_SAFE bool JsonReader::boolean(bool& value) noexcept {
   char c = 0;
   if (!ok() || !peek(c)) return false;
   if (c != 't' && c != 'f') {
@@ -193,8 +185,7 @@ bool JsonReader::boolean(bool& value) noexcept {
   return word(value ? "true" : "false");
 }
 
-// RT-safe.
-bool JsonReader::text(std::string_view& value) noexcept {
+RT_SAFE bool JsonReader::text(std::string_view& value) noexcept {
   char c = 0;
   if (!ok() || !peek(c)) return false;
   if (c == '"') return quoted(value);
@@ -202,8 +193,7 @@ bool JsonReader::text(std::string_view& value) noexcept {
   return false;
 }
 
-// RT-safe.
-void JsonReader::skip_any() noexcept {
+RT_SAFE void JsonReader::skip_any() noexcept {
   char c = 0;
   if (!peek(c)) return;
   std::string_view ignored_text;
@@ -239,8 +229,7 @@ void JsonReader::skip_any() noexcept {
   }
 }
 
-// RT-safe.
-void JsonReader::skip() noexcept {
+RT_SAFE void JsonReader::skip() noexcept {
   const int outside = depth_;
   skip_any();
   while (ok() && depth_ > outside) {
@@ -250,14 +239,12 @@ void JsonReader::skip() noexcept {
   }
 }
 
-// RT-safe.
-bool JsonReader::at_end() noexcept {
+RT_SAFE bool JsonReader::at_end() noexcept {
   while (at_ != end_ && (*at_ == ' ' || *at_ == '\n' || *at_ == '\r' || *at_ == '\t')) ++at_;
   return at_ == end_;
 }
 
-// RT-safe.
-std::size_t unescape_json(std::string_view raw, std::span<char> room) noexcept {
+RT_SAFE std::size_t unescape_json(std::string_view raw, std::span<char> room) noexcept {
   std::size_t used = 0;
   while (!raw.empty()) {
     Utf8 one{{raw[0]}, 1};

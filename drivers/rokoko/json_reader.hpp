@@ -15,6 +15,8 @@
 #include <span>
 #include <string_view>
 
+#include "proto/frame/rt_safe.hpp"
+
 namespace posed::drivers::rokoko {
 
 // All calls are RT-safe. After `next` exactly one value must be read: each of the calls below it
@@ -73,7 +75,8 @@ class JsonReader {
 };
 
 // Writes the text that a JSON string stands for, as UTF-8, and returns its length: at most `room`,
-// cut between two characters. Escapes that are wrong are left as they are. RT-safe.
-[[nodiscard]] std::size_t unescape_json(std::string_view raw, std::span<char> room) noexcept;
+// cut between two characters. Escapes that are wrong are left as they are.
+RT_SAFE [[nodiscard]] std::size_t unescape_json(std::string_view raw,
+                                                std::span<char> room) noexcept;
 
 }  // namespace posed::drivers::rokoko

@@ -28,8 +28,8 @@ struct Lz4Head {
   std::size_t block = 0;
 };
 
-// RT-safe.
-Outcome read_head(std::span<const std::byte> bytes, ByteReader& reader, Lz4Head& head) noexcept {
+RT_SAFE Outcome read_head(std::span<const std::byte> bytes, ByteReader& reader,
+                          Lz4Head& head) noexcept {
   const unsigned flags = reader.u8();
   const unsigned sizes = reader.u8();
   head.linked = (flags & 0x20U) == 0;
@@ -48,9 +48,9 @@ Outcome read_head(std::span<const std::byte> bytes, ByteReader& reader, Lz4Head&
   return sum == (expected >> 8U & 0xFFU) ? Outcome::kOk : Outcome::kBadChecksum;
 }
 
-// Puts one block behind the `used` bytes of the content. RT-safe.
-Outcome accept_block(const Lz4Head& head, std::span<const std::byte> block, bool stored,
-                     std::span<std::byte> room, std::size_t& used) noexcept {
+// Puts one block behind the `used` bytes of the content.
+RT_SAFE Outcome accept_block(const Lz4Head& head, std::span<const std::byte> block, bool stored,
+                             std::span<std::byte> room, std::size_t& used) noexcept {
   const std::size_t most = std::min(head.block, room.size() - used);
   if (stored) {
     if (block.size() > head.block) return Outcome::kShort;
@@ -72,14 +72,12 @@ Outcome accept_block(const Lz4Head& head, std::span<const std::byte> block, bool
 
 }  // namespace
 
-// RT-safe.
-bool is_lz4_frame(std::span<const std::byte> bytes) noexcept {
+RT_SAFE bool is_lz4_frame(std::span<const std::byte> bytes) noexcept {
   return ByteReader(bytes).u32() == kMagicNumber;
 }
 
-// RT-safe.
-Outcome decode_lz4_frame(std::span<const std::byte> bytes, std::span<std::byte> room,
-                         std::span<const std::byte>& content) noexcept {
+RT_SAFE Outcome decode_lz4_frame(std::span<const std::byte> bytes, std::span<std::byte> room,
+                                 std::span<const std::byte>& content) noexcept {
   ByteReader reader(bytes);
   if (reader.u32() != kMagicNumber) return Outcome::kForeign;
   Lz4Head head;

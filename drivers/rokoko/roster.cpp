@@ -12,8 +12,8 @@ namespace {
 constexpr float kSameOffset_m = 0.005F;
 constexpr float kSamePart = 0.02F;  // of the offset's length
 
-// Returns the position of the joint in its parent's frame. RT-safe.
-Vec3f offset_in(const Subject& subject, std::size_t parent, std::size_t joint) noexcept {
+// Returns the position of the joint in its parent's frame.
+RT_SAFE Vec3f offset_in(const Subject& subject, std::size_t parent, std::size_t joint) noexcept {
   const auto place = [&subject](std::size_t j) {
     return Eigen::Map<const Eigen::Vector3f>(subject.position_m[j].data());
   };
@@ -22,8 +22,7 @@ Vec3f offset_in(const Subject& subject, std::size_t parent, std::size_t joint) n
   return {offset.x(), offset.y(), offset.z()};
 }
 
-// RT-safe.
-bool same_offset(const Vec3f& a, const Vec3f& b) noexcept {
+RT_SAFE bool same_offset(const Vec3f& a, const Vec3f& b) noexcept {
   float apart = 0.0F;
   float length = 0.0F;
   for (std::size_t i = 0; i < 3; ++i) {
@@ -33,20 +32,20 @@ bool same_offset(const Vec3f& a, const Vec3f& b) noexcept {
   return std::sqrt(apart) <= std::max(kSameOffset_m, kSamePart * std::sqrt(length));
 }
 
-// True if every joint of the frame lies where the description has it. RT-safe.
-bool same_proportions(const SeenBody& seen, const DescribedBody& body) noexcept {
+// True if every joint of the frame lies where the description has it.
+RT_SAFE bool same_proportions(const SeenBody& seen, const DescribedBody& body) noexcept {
   for (std::size_t j = 0; j < kStudioJoints; ++j) {
     if (!seen.joints[j] || !body.joints[j]) continue;
     const int parent = parent_among(body.joints, j);
-    if (parent < 0 || !seen.joints[static_cast<std::size_t>(parent)]) continue;
+    if (parent < 0 || !seen.joints[parent]) continue;
     const Vec3f offset = offset_in(*seen.subject, static_cast<std::size_t>(parent), j);
     if (!same_offset(offset, body.offset_m[j])) return false;
   }
   return true;
 }
 
-// RT-safe.
-SeenBody part_of(const Subject& subject, Part part, const JointSet& joints, bool face) noexcept {
+RT_SAFE SeenBody part_of(const Subject& subject, Part part, const JointSet& joints,
+                         bool face) noexcept {
   return {.key = {.part = part, .name = subject.name},
           .joints = connected(joints),
           .face = face,
@@ -55,8 +54,8 @@ SeenBody part_of(const Subject& subject, Part part, const JointSet& joints, bool
 
 }  // namespace
 
-// RT-safe.
-std::size_t bodies_of(const Subject& subject, std::array<SeenBody, kMaxParts>& bodies) noexcept {
+RT_SAFE std::size_t bodies_of(const Subject& subject,
+                              std::array<SeenBody, kMaxParts>& bodies) noexcept {
   std::size_t count = 0;
   const JointSet& joints = subject.turned;
   const JointSet left = fingers_of(kLeftHandJoint), right = fingers_of(kRightHandJoint);
@@ -88,8 +87,7 @@ std::size_t bodies_of(const Subject& subject, std::array<SeenBody, kMaxParts>& b
   return count;
 }
 
-// RT-safe.
-Roster::Entry* Roster::entry_of(const BodyKey& key) noexcept {
+RT_SAFE Roster::Entry* Roster::entry_of(const BodyKey& key) noexcept {
   Entry* free = nullptr;
   for (Entry& entry : entries_) {
     if (entry.used && entry.body.key == key) return &entry;
@@ -98,8 +96,7 @@ Roster::Entry* Roster::entry_of(const BodyKey& key) noexcept {
   return free;
 }
 
-// RT-safe.
-void Roster::measure(const SeenBody& seen, Entry& entry) noexcept {
+RT_SAFE void Roster::measure(const SeenBody& seen, Entry& entry) noexcept {
   DescribedBody& body = entry.body;
   body.joints = seen.joints;
   body.face = body.face || seen.face;
@@ -113,8 +110,7 @@ void Roster::measure(const SeenBody& seen, Entry& entry) noexcept {
   changed_ = true;
 }
 
-// RT-safe.
-bool Roster::accept(const SeenBody& body, std::int64_t arrival_ns) noexcept {
+RT_SAFE bool Roster::accept(const SeenBody& body, std::int64_t arrival_ns) noexcept {
   Entry* const entry = entry_of(body.key);
   if (entry == nullptr) return false;
   if (!entry->used) {
@@ -145,8 +141,7 @@ bool Roster::accept(const SeenBody& body, std::int64_t arrival_ns) noexcept {
   return true;
 }
 
-// RT-safe.
-std::span<const std::byte> Roster::describe(std::int64_t arrival_ns) noexcept {
+RT_SAFE std::span<const std::byte> Roster::describe(std::int64_t arrival_ns) noexcept {
   for (Entry& entry : entries_) {
     if (!entry.used || arrival_ns - entry.seen_ns <= kSettled_ns) continue;
     entry.used = false;

@@ -23,19 +23,18 @@ struct SeenBody {
 inline constexpr std::size_t kMaxParts = 3;  // the most bodies of one subject
 
 // The bodies that a subject is: a person, or the two hands of one without a body; none for a
-// subject without data. Returns how many. RT-safe.
-[[nodiscard]] std::size_t bodies_of(const Subject& subject,
-                                    std::array<SeenBody, kMaxParts>& bodies) noexcept;
+// subject without data. Returns how many.
+RT_SAFE [[nodiscard]] std::size_t bodies_of(const Subject& subject,
+                                            std::array<SeenBody, kMaxParts>& bodies) noexcept;
 
 class Roster {
  public:
   // Takes a body of the frame that came at `arrival_ns`. False when there is no room for it.
-  // RT-safe.
-  [[nodiscard]] bool accept(const SeenBody& body, std::int64_t arrival_ns) noexcept;
+  RT_SAFE [[nodiscard]] bool accept(const SeenBody& body, std::int64_t arrival_ns) noexcept;
 
   // The description, after all bodies of a frame: empty unless it changed, and at most once in
-  // kDescribeEvery_ns. RT-safe.
-  [[nodiscard]] std::span<const std::byte> describe(std::int64_t arrival_ns) noexcept;
+  // kDescribeEvery_ns.
+  RT_SAFE [[nodiscard]] std::span<const std::byte> describe(std::int64_t arrival_ns) noexcept;
 
  private:
   static constexpr std::int64_t kDescribeEvery_ns = kNanosPerSecond / 4;

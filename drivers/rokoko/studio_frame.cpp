@@ -10,20 +10,20 @@
 namespace posed::drivers::rokoko {
 namespace {
 
-constexpr double kLargestFloat = std::numeric_limits<float>::max();
+constexpr double kMaxFloat = std::numeric_limits<float>::max();
 constexpr double kRotationTolerance = 1e-2;  // of the squared length: some senders round to digits
 constexpr double kMaxFaceValue = 10.0;       // 1 is a fully open jaw; exaggeration stays below 2
 constexpr double kFaceUnits = 100.0;         // Studio counts to 100, ARKit to 1
 
-// A cast of a double beyond a float's range is undefined. RT-safe.
-float narrowed(double value) noexcept {
-  return std::abs(value) <= kLargestFloat ? static_cast<float>(value)
-                                          : std::numeric_limits<float>::quiet_NaN();
+// A cast of a double beyond a float's range is undefined.
+RT_SAFE float narrowed(double value) noexcept {
+  return std::abs(value) <= kMaxFloat ? static_cast<float>(value)
+                                      : std::numeric_limits<float>::quiet_NaN();
 }
 
-// {"x": 1, "y": 2, ...} into the values; true if all of them were there. RT-safe.
+// {"x": 1, "y": 2, ...} into the values; true if all of them were there.
 template <std::size_t count>
-bool read_vector(JsonReader& json, std::array<float, count>& values) noexcept {
+RT_SAFE bool read_vector(JsonReader& json, std::array<float, count>& values) noexcept {
   constexpr std::string_view kLetters = "xyzw";
   unsigned seen = 0;
   if (!json.enter_object()) return false;
@@ -58,8 +58,7 @@ struct Transform {
   }
 };
 
-// RT-safe.
-void keep(const Transform& transform, std::size_t joint, Subject& subject) noexcept {
+RT_SAFE void keep(const Transform& transform, std::size_t joint, Subject& subject) noexcept {
   if (!transform.placed) return;  // as if it had not been sent
   if (subject.placed[joint]) subject.valid = false;
   subject.placed.set(joint);
@@ -73,8 +72,7 @@ void keep(const Transform& transform, std::size_t joint, Subject& subject) noexc
   subject.rotation_xyzw[joint] = mirrored(rotation);
 }
 
-// RT-safe.
-void read_joint(JsonReader& json, std::size_t joint, Subject& subject) noexcept {
+RT_SAFE void read_joint(JsonReader& json, std::size_t joint, Subject& subject) noexcept {
   Transform transform;
   if (!json.enter_object()) return;
   for (std::string_view key; json.next(key);) {
@@ -83,14 +81,12 @@ void read_joint(JsonReader& json, std::size_t joint, Subject& subject) noexcept 
   keep(transform, joint, subject);
 }
 
-// RT-safe.
-void read_name(JsonReader& json, StudioName& name) noexcept {
+RT_SAFE void read_name(JsonReader& json, StudioName& name) noexcept {
   std::string_view raw;
   if (json.text(raw)) name.set(raw);
 }
 
-// RT-safe.
-void read_meta(JsonReader& json, Subject& subject) noexcept {
+RT_SAFE void read_meta(JsonReader& json, Subject& subject) noexcept {
   bool any_glove = true;
   if (!json.enter_object()) return;
   for (std::string_view key; json.next(key);) {
@@ -112,8 +108,8 @@ void read_meta(JsonReader& json, Subject& subject) noexcept {
   subject.has_right_glove = subject.has_right_glove && any_glove;
 }
 
-// Reads a face, which an actor has (version 3) or the list of faces (version 2). RT-safe.
-void read_face(JsonReader& json, Subject& subject, bool alone) noexcept {
+// Reads a face, which an actor has (version 3) or the list of faces (version 2).
+RT_SAFE void read_face(JsonReader& json, Subject& subject, bool alone) noexcept {
   if (!json.enter_object()) return;
   for (std::string_view key; json.next(key);) {
     const std::size_t i = face_value_named(key);
@@ -132,8 +128,7 @@ void read_face(JsonReader& json, Subject& subject, bool alone) noexcept {
   }
 }
 
-// RT-safe.
-void read_body(JsonReader& json, Subject& subject) noexcept {
+RT_SAFE void read_body(JsonReader& json, Subject& subject) noexcept {
   if (!json.enter_object()) return;
   for (std::string_view key; json.next(key);) {
     const std::size_t joint = joint_named(key);
@@ -145,8 +140,7 @@ void read_body(JsonReader& json, Subject& subject) noexcept {
   }
 }
 
-// RT-safe.
-void read_actor(JsonReader& json, Subject& subject) noexcept {
+RT_SAFE void read_actor(JsonReader& json, Subject& subject) noexcept {
   if (!json.enter_object()) return;
   for (std::string_view key; json.next(key);) {
     const std::size_t joint = joint_named(key);
@@ -168,8 +162,7 @@ void read_actor(JsonReader& json, Subject& subject) noexcept {
   }
 }
 
-// RT-safe.
-void read_prop(JsonReader& json, Subject& subject) noexcept {
+RT_SAFE void read_prop(JsonReader& json, Subject& subject) noexcept {
   Transform transform;
   if (!json.enter_object()) return;
   for (std::string_view key; json.next(key);) {
@@ -182,8 +175,8 @@ void read_prop(JsonReader& json, Subject& subject) noexcept {
   keep(transform, 0, subject);
 }
 
-// Reads a list of subjects; false when there are too many. RT-safe.
-bool read_list(JsonReader& json, Subject::Kind kind, StudioFrame& frame) noexcept {
+// Reads a list of subjects; false when there are too many.
+RT_SAFE bool read_list(JsonReader& json, Subject::Kind kind, StudioFrame& frame) noexcept {
   if (!json.enter_array()) return true;
   while (json.next()) {
     if (frame.count == kMaxSubjects) return false;
@@ -204,8 +197,8 @@ bool read_list(JsonReader& json, Subject::Kind kind, StudioFrame& frame) noexcep
 }
 
 // A member of "scene" (version 3) or of the whole (version 2). False when there are too many
-// subjects. RT-safe.
-bool read_member(JsonReader& json, std::string_view key, StudioFrame& frame) noexcept {
+// subjects.
+RT_SAFE bool read_member(JsonReader& json, std::string_view key, StudioFrame& frame) noexcept {
   if (key == "actors") return read_list(json, Subject::Kind::kActor, frame);
   if (key == "props" || key == "trackers") return read_list(json, Subject::Kind::kProp, frame);
   if (key == "faces") return read_list(json, Subject::Kind::kFace, frame);
@@ -217,8 +210,8 @@ bool read_member(JsonReader& json, std::string_view key, StudioFrame& frame) noe
   return true;
 }
 
-// 3, 2.5 or "3.0"; 0 when it is none of them. RT-safe.
-double read_version(JsonReader& json) noexcept {
+// 3, 2.5 or "3.0"; 0 when it is none of them.
+RT_SAFE double read_version(JsonReader& json) noexcept {
   double version = 0.0;
   JsonReader as_number = json;
   if (as_number.number(version)) {
@@ -231,8 +224,8 @@ double read_version(JsonReader& json) noexcept {
   return within.number(version) ? version : 0.0;
 }
 
-// The faces of version 2 become those of the actors with the same profile. RT-safe.
-void join_faces(StudioFrame& frame) noexcept {
+// The faces of version 2 become those of the actors with the same profile.
+RT_SAFE void join_faces(StudioFrame& frame) noexcept {
   for (std::size_t i = 0; i < frame.count; ++i) {
     Subject& face = frame.subjects[i];
     if (face.kind != Subject::Kind::kFace || face.profile.empty()) continue;
@@ -250,17 +243,14 @@ void join_faces(StudioFrame& frame) noexcept {
 
 }  // namespace
 
-// RT-safe.
-void StudioName::set(std::string_view raw) noexcept { size_ = unescape_json(raw, bytes_); }
+RT_SAFE void StudioName::set(std::string_view raw) noexcept { size_ = unescape_json(raw, bytes_); }
 
-// RT-safe.
-void StudioName::keep(std::string_view text) noexcept {
+RT_SAFE void StudioName::keep(std::string_view text) noexcept {
   size_ = std::min(text.size(), bytes_.size());
   std::ranges::copy(text.substr(0, size_), bytes_.begin());
 }
 
-// RT-safe.
-Outcome read_studio_frame(std::string_view json, StudioFrame& frame) noexcept {
+RT_SAFE Outcome read_studio_frame(std::string_view json, StudioFrame& frame) noexcept {
   JsonReader reader(json);
   frame.count = 0;
   frame.timestamp_s = std::numeric_limits<double>::quiet_NaN();

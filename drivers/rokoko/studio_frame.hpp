@@ -41,10 +41,10 @@ inline constexpr std::size_t kMaxNameBytes = 64;  // longer ones are cut
 
 class StudioName {
  public:
-  // Takes a JSON string as it is written. RT-safe.
-  void set(std::string_view raw) noexcept;
-  // Takes the bytes themselves. RT-safe.
-  void keep(std::string_view text) noexcept;
+  // Takes a JSON string as it is written.
+  RT_SAFE void set(std::string_view raw) noexcept;
+  // Takes the bytes themselves.
+  RT_SAFE void keep(std::string_view text) noexcept;
   void clear() noexcept { size_ = 0; }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
   [[nodiscard]] std::string_view text() const noexcept { return {bytes_.data(), size_}; }
@@ -82,7 +82,7 @@ struct StudioFrame {
 };
 
 // kOk: `frame` is filled. kForeign: not a frame of Studio, or of version 1. kShort: it is cut, is
-// not JSON, or goes on after its end. kOutOfRange: too many subjects, or too deep. RT-safe.
-[[nodiscard]] Outcome read_studio_frame(std::string_view json, StudioFrame& frame) noexcept;
+// not JSON, or goes on after its end. kOutOfRange: too many subjects, or too deep.
+RT_SAFE [[nodiscard]] Outcome read_studio_frame(std::string_view json, StudioFrame& frame) noexcept;
 
 }  // namespace posed::drivers::rokoko

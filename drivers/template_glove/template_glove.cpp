@@ -18,24 +18,23 @@ namespace posed::drivers {
 namespace template_glove {
 namespace {
 
-// Removes the next number and its blank from the front of `text`; -1 if there is none. RT-safe.
-int next_number(std::string_view& text, int base = 10) noexcept {
+// Removes the next number and its blank from the front of `text`; -1 if there is none.
+RT_SAFE int next_number(std::string_view& text, int base = 10) noexcept {
   int number = -1;
   const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), number, base);
-  const auto used = static_cast<std::size_t>(stop - text.data());
+  const std::size_t used = stop - text.data();
   text.remove_prefix(used < text.size() && text[used] == ' ' ? used + 1 : used);
   return error == std::errc() && number >= 0 ? number : -1;
 }
 
-// Removes this word from the front of `text`, if `text` begins with it. RT-safe.
-bool next_word(std::string_view& text, std::string_view word) noexcept {
+// Removes this word from the front of `text`, if `text` begins with it.
+RT_SAFE bool next_word(std::string_view& text, std::string_view word) noexcept {
   if (!text.starts_with(word)) return false;
   text.remove_prefix(word.size());
   return true;
 }
 
-// RT-safe.
-int checksum_of(std::string_view text) noexcept {
+RT_SAFE int checksum_of(std::string_view text) noexcept {
   unsigned sum = 0;
   for (const char c : text) sum ^= static_cast<unsigned char>(c);
   return static_cast<int>(sum);
@@ -53,8 +52,8 @@ struct TemplateGlove : glove::TextGlove<TemplateGlove> {
   static constexpr std::array<std::string_view, 1> kExtras{"button"};
   static constexpr double kUndetected = 0.005;  // 8 bits miss one in 256 of two faults in a line
 
-  // kForeign for what is no such line, kBadChecksum, kOutOfRange. RT-safe.
-  static Outcome parse(std::string_view text, Reading& reading) noexcept {
+  // kForeign for what is no such line, kBadChecksum, kOutOfRange.
+  RT_SAFE static Outcome parse(std::string_view text, Reading& reading) noexcept {
     const std::size_t star = text.find('*');
     if (star == std::string_view::npos) return Outcome::kForeign;
     std::string_view sum = text.substr(star + 1);

@@ -18,7 +18,7 @@ namespace {
 constexpr std::string_view kMagic = "MCAP";
 constexpr std::size_t kHeadBytes = 8;
 constexpr std::size_t kChecksumBytes = 4;
-constexpr std::size_t kLeastJoint = 15;  // bytes: a name of one letter, parent, offset
+constexpr std::size_t kMinJointBytes = 15;  // bytes: a name of one letter, parent, offset
 
 std::uint32_t checksum(std::span<const std::byte> bytes) noexcept {
   return static_cast<std::uint32_t>(
@@ -47,25 +47,23 @@ Result<std::string> read_name(ByteReader& reader) {
 Result<BodyEntry> read_body(ByteReader& reader) {
   BodyEntry body;
   body.id = reader.u16();
-  auto name = read_name(reader);
-  if (!name) return std::unexpected(name.error());
-  body.name = std::move(*name);
+  auto name = TRY(read_name(reader));
+  body.name = std::move(name);
   const std::string place = "of body " + in_quotes(body.name) + " ";
   const std::size_t joints = reader.u8();
   if (joints == 0 || joints > kMaxJoints) {
     return wrong(place + "has " + std::to_string(joints) + " joints instead of 1 to " +
                  std::to_string(kMaxJoints));
   }
-  if (joints * kLeastJoint > reader.left()) return wrong(place + "ends too early");
+  if (joints * kMinJointBytes > reader.left()) return wrong(place + "ends too early");
   std::set<std::string, std::less<>> names;
   for (std::size_t j = 0; j < joints; ++j) {
-    auto joint_name = read_name(reader);
-    if (!joint_name) return std::unexpected(joint_name.error());
-    if (!names.insert(*joint_name).second) {
-      return wrong(place + "has two joints " + in_quotes(*joint_name));
+    auto joint_name = TRY(read_name(reader));
+    if (!names.insert(joint_name).second) {
+      return wrong(place + "has two joints " + in_quotes(joint_name));
     }
     JointEntry& joint = body.joints.emplace_back();
-    joint.name = std::move(*joint_name);
+    joint.name = std::move(joint_name);
     const int parent = reader.u8();
     joint.parent = parent == 0xff ? -1 : parent;
     for (float& x_m : joint.offset_m) x_m = reader.f32();
@@ -83,8 +81,7 @@ Result<BodyEntry> read_body(ByteReader& reader) {
 
 }  // namespace
 
-// RT-safe.
-Outcome decode_datagram(std::span<const std::byte> bytes, Datagram& datagram) noexcept {
+RT_SAFE Outcome decode_datagram(std::span<const std::byte> bytes, Datagram& datagram) noexcept {
   ByteReader reader(bytes);
   if (reader.text(kMagic.size()) != kMagic) return Outcome::kForeign;
   const std::uint8_t kind = reader.u8();
@@ -111,12 +108,11 @@ Result<std::vector<BodyEntry>> parse_description(std::span<const std::byte> cont
   std::set<std::string, std::less<>> names;
   std::set<std::uint16_t> ids;
   for (std::size_t i = 0; i < count; ++i) {
-    auto body = read_body(reader);
-    if (!body) return std::unexpected(body.error());
-    if (!names.insert(body->name).second || !ids.insert(body->id).second) {
-      return wrong("has two bodies with the name or number of " + in_quotes(body->name));
+    auto body = TRY(read_body(reader));
+    if (!names.insert(body.name).second || !ids.insert(body.id).second) {
+      return wrong("has two bodies with the name or number of " + in_quotes(body.name));
     }
-    bodies.push_back(std::move(*body));
+    bodies.push_back(std::move(body));
   }
   if (reader.left() != 0) return wrong("goes on after its last body");
   return bodies;
@@ -176,7 +172,7 @@ Result<std::shared_ptr<const Skeleton>> skeleton_of(const BodyEntry& body) {
     joint.parent = entry.parent;
     joint.offset_m = {entry.offset_m[0], entry.offset_m[1], entry.offset_m[2]};
   }
-  if (auto ok = skeleton->finish(); !ok) return std::unexpected(ok.error());
+  TRY(skeleton->finish());
   return skeleton;
 }
 

@@ -85,13 +85,13 @@ struct FramePacket {
 };
 
 // kOk fills `datagram`; kForeign: not of this device; kShort: cut, or longer than it says;
-// kBadChecksum. RT-safe.
-[[nodiscard]] Outcome decode_datagram(std::span<const std::byte> bytes,
-                                      Datagram& datagram) noexcept;
+// kBadChecksum.
+RT_SAFE [[nodiscard]] Outcome decode_datagram(std::span<const std::byte> bytes,
+                                              Datagram& datagram) noexcept;
 
 // The content of a description, which is untrusted: at most kMaxBodies bodies with 1 to kMaxJoints
 // joints, no two with the same id or name. Cold.
-[[nodiscard]] Result<std::vector<BodyEntry>> parse_description(std::span<const std::byte> content);
+Result<std::vector<BodyEntry>> parse_description(std::span<const std::byte> content);
 
 // The datagrams as the device and the host send them. Cold.
 [[nodiscard]] std::vector<std::byte> encode_datagram(Kind kind, std::span<const std::byte> content);
@@ -100,6 +100,6 @@ struct FramePacket {
 [[nodiscard]] std::vector<std::byte> encode_frame(const FramePacket& frame);
 
 // Makes the skeleton of a body as it was described. Cold.
-[[nodiscard]] Result<std::shared_ptr<const Skeleton>> skeleton_of(const BodyEntry& body);
+Result<std::shared_ptr<const Skeleton>> skeleton_of(const BodyEntry& body);
 
 }  // namespace posed::drivers::mocap

@@ -20,20 +20,18 @@ class MocapLayout final : public SourceLayout {
  public:
   std::vector<std::uint16_t> id;  // [body], as the device numbers them
 
-  // Returns the index of a body; bodies.size() when there is no such body. RT-safe.
-  [[nodiscard]] std::size_t body_of(std::uint16_t wanted) const noexcept {
-    return static_cast<std::size_t>(std::ranges::find(id, wanted) - id.begin());
+  // Returns the index of a body; bodies.size() when there is no such body.
+  RT_SAFE [[nodiscard]] std::size_t body_of(std::uint16_t wanted) const noexcept {
+    return std::ranges::find(id, wanted) - id.begin();
   }
 };
 
 Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description) {
-  const auto entries = parse_description(description);
-  if (!entries) return std::unexpected(entries.error());
+  const auto entries = TRY(parse_description(description));
   auto layout = std::make_unique<MocapLayout>();
-  for (const BodyEntry& entry : *entries) {
-    auto skeleton = skeleton_of(entry);
-    if (!skeleton) return std::unexpected(skeleton.error());
-    layout->bodies.push_back({.name = entry.name, .skeleton = std::move(*skeleton)});
+  for (const BodyEntry& entry : entries) {
+    auto skeleton = TRY(skeleton_of(entry));
+    layout->bodies.push_back({.name = entry.name, .skeleton = std::move(skeleton)});
     layout->id.push_back(entry.id);
   }
   return layout;
@@ -53,12 +51,12 @@ bool read_rotation(ByteReader& reader, Quatf& rotation, bool& seen) noexcept {
 // that the layout names.
 class MocapDecoder final : public Decoder {
  public:
-  // Each call decodes one datagram. RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-            Sink& sink) noexcept override;
+  // Each call decodes one datagram.
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept override;
 
-  // `layout` is one that make_layout made. RT-safe.
-  void use(const SourceLayout& layout) noexcept override {
+  // `layout` is one that make_layout made.
+  RT_SAFE void use(const SourceLayout& layout) noexcept override {
     layout_ = static_cast<const MocapLayout*>(&layout);
   }
 
@@ -73,9 +71,8 @@ class MocapDecoder final : public Decoder {
   DatagramOrder order_{32};              // the clock sees only frames that are new
 };
 
-// RT-safe.
-void MocapDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
-                        Sink& sink) noexcept {
+RT_SAFE void MocapDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
+                                Sink& sink) noexcept {
   Datagram datagram;
   Outcome outcome = decode_datagram(bytes, datagram);
   if (outcome == Outcome::kOk) {
@@ -94,8 +91,7 @@ void MocapDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival
   sink.outcome(outcome);
 }
 
-// RT-safe.
-Outcome MocapDecoder::read_frame(std::span<const std::byte> content, Sink& sink) noexcept {
+RT_SAFE Outcome MocapDecoder::read_frame(std::span<const std::byte> content, Sink& sink) noexcept {
   ByteReader reader(content);
   const std::uint32_t number = reader.u32();
   const std::uint32_t time_us = reader.u32();
@@ -114,8 +110,8 @@ Outcome MocapDecoder::read_frame(std::span<const std::byte> content, Sink& sink)
   return worst == Outcome::kOk && reader.left() != 0 ? Outcome::kShort : worst;
 }
 
-// RT-safe.
-Outcome MocapDecoder::read_body(ByteReader& reader, std::int64_t device_ns, Sink& sink) noexcept {
+RT_SAFE Outcome MocapDecoder::read_body(ByteReader& reader, std::int64_t device_ns,
+                                        Sink& sink) noexcept {
   Frame frame;
   const std::uint16_t id = reader.u16();
   const std::size_t joints = reader.u8();

@@ -38,8 +38,7 @@ std::optional<Address> parse_numbers(const std::string& host, const char* port) 
 
 }  // namespace
 
-// RT-safe.
-Host host_of(const Address& address) noexcept {
+RT_SAFE Host host_of(const Address& address) noexcept {
   Host host{};
   if (address.storage.ss_family == AF_INET6) {
     sockaddr_in6 v6{};
@@ -54,8 +53,7 @@ Host host_of(const Address& address) noexcept {
   return host;
 }
 
-// RT-safe.
-bool is_loopback(const Host& host) noexcept {
+RT_SAFE bool is_loopback(const Host& host) noexcept {
   return is_v4(host) ? host[kMappedBytes] == 127 : host == kLoopback6;
 }
 
@@ -110,9 +108,8 @@ Result<Address> parse_host(const std::string& host) {
 
 Result<Address> listen_address(const std::string& endpoint, const std::vector<std::string>& peers,
                                std::string_view whose) {
-  auto address = parse_endpoint(endpoint);
-  if (!address) return address;
-  if (peers.empty() && !is_loopback(host_of(*address))) {
+  auto address = TRY(parse_endpoint(endpoint));
+  if (peers.empty() && !is_loopback(host_of(address))) {
     return misuse("to listen on " + endpoint + ", name " + std::string(whose) +
                   " addresses in peers; without them only loopback listens");
   }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "proto/frame/result.hpp"
+#include "proto/frame/rt_safe.hpp"
 
 namespace posed::drivers {
 
@@ -32,8 +33,8 @@ struct Address {
 // socket compares equal to itself.
 using Host = std::array<std::uint8_t, 16>;
 
-[[nodiscard]] Host host_of(const Address& address) noexcept;  // RT-safe
-[[nodiscard]] bool is_loopback(const Host& host) noexcept;    // RT-safe
+RT_SAFE [[nodiscard]] Host host_of(const Address& address) noexcept;
+RT_SAFE [[nodiscard]] bool is_loopback(const Host& host) noexcept;
 [[nodiscard]] bool is_multicast(const Host& host) noexcept;
 // Returns whether a socket bound to one address keeps others from the other: the same port, and the
 // same host or one that stands for every address of the machine. Cold.
@@ -43,15 +44,14 @@ using Host = std::array<std::uint8_t, 16>;
     const Address& address);  // "192.168.1.20:1511", "[::1]:1511"
 
 // Parses "127.0.0.1:5200" or "[::1]:5200". Cold.
-[[nodiscard]] Result<Address> parse_endpoint(const std::string& endpoint);
+Result<Address> parse_endpoint(const std::string& endpoint);
 
 // Parses "127.0.0.1" or "::1"; the port is 0. Cold.
-[[nodiscard]] Result<Address> parse_host(const std::string& host);
+Result<Address> parse_host(const std::string& host);
 
 // The address to listen on. Devices are not authenticated, so without a list of peers it must be
 // loopback; `whose` ("the gloves'") says whose addresses belong there. Cold.
-[[nodiscard]] Result<Address> listen_address(const std::string& endpoint,
-                                             const std::vector<std::string>& peers,
-                                             std::string_view whose);
+Result<Address> listen_address(const std::string& endpoint, const std::vector<std::string>& peers,
+                               std::string_view whose);
 
 }  // namespace posed::drivers

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "proto/frame/rt_safe.hpp"
+
 namespace posed::drivers {
 
 class Chunks {
@@ -20,8 +22,8 @@ class Chunks {
 
   [[nodiscard]] std::size_t count() const noexcept { return ends_.size(); }
 
-  // Valid until the next add(). RT-safe.
-  [[nodiscard]] std::span<const std::byte> operator[](std::size_t index) const noexcept {
+  // Valid until the next add().
+  RT_SAFE [[nodiscard]] std::span<const std::byte> operator[](std::size_t index) const noexcept {
     assert(index < ends_.size());
     const std::size_t begin = index == 0 ? 0 : ends_[index - 1];
     return {bytes_.data() + begin, ends_[index] - begin};

@@ -57,7 +57,7 @@ class LinkTransport final : public Transport {
   explicit LinkTransport(Connection link) : link_(std::move(link)) {}
 
   [[nodiscard]] int poll_fd() const noexcept override { return link_.fd(); }
-  [[nodiscard]] Result<> start(std::int64_t now_ns) override;
+  Result<> start(std::int64_t now_ns) override;
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
   [[nodiscard]] bool send(std::span<const std::byte> bytes, std::uint8_t socket) noexcept override;
 
@@ -105,7 +105,7 @@ bool LinkTransport::send(std::span<const std::byte> bytes, std::uint8_t /*socket
   if (bytes.size() > unsent_.size() || !flush()) return false;
   const ssize_t sent = write_some(link_.fd(), bytes);
   if (sent < 0) return false;
-  const auto rest = bytes.subspan(static_cast<std::size_t>(sent));
+  const auto rest = bytes.subspan(sent);
   std::memcpy(unsent_.data(), rest.data(), rest.size());
   unsent_from_ = 0;
   unsent_to_ = rest.size();
@@ -171,7 +171,7 @@ Result<> Connection::write(std::span<const std::byte> bytes) {
     if (cancelled()) return Cancel::error();
     const ssize_t sent = write_some(fd_, bytes);
     if (sent > 0) {
-      bytes = bytes.subspan(static_cast<std::size_t>(sent));
+      bytes = bytes.subspan(sent);
       continue;
     }
     if (sent < 0 && !not_now(errno)) return fail(gone(name_, errno));
@@ -199,7 +199,7 @@ Result<std::vector<std::byte>> Connection::read(std::chrono::milliseconds patien
       continue;
     }
     if (got <= 0) return fail(gone(name_, got == 0 ? 0 : errno));
-    bytes.resize(static_cast<std::size_t>(got));
+    bytes.resize(got);
     return bytes;
   }
 }
@@ -207,9 +207,8 @@ Result<std::vector<std::byte>> Connection::read(std::chrono::milliseconds patien
 Result<> Connection::drain(std::chrono::milliseconds quiet) {
   const auto deadline = Clock::now() + kDrainPatience;
   while (true) {
-    const auto bytes = read(std::min(quiet, left_until(deadline)));
-    if (!bytes) return std::unexpected(bytes.error());
-    if (bytes->empty() || Clock::now() >= deadline) return {};
+    const auto bytes = TRY(read(std::min(quiet, left_until(deadline))));
+    if (bytes.empty() || Clock::now() >= deadline) return {};
   }
 }
 

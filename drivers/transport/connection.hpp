@@ -38,13 +38,13 @@ class Connection {
   void heed(std::shared_ptr<const Cancel> cancel) noexcept { cancel_ = std::move(cancel); }
 
   // Cold. Writes all bytes, within a second; an error states what happened to the device.
-  [[nodiscard]] Result<> write(std::span<const std::byte> bytes);
-  [[nodiscard]] Result<> write(std::string_view text);
+  Result<> write(std::span<const std::byte> bytes);
+  Result<> write(std::string_view text);
   // Cold. Returns the bytes that came within `patience`, as soon as there are any; empty when none
   // came.
-  [[nodiscard]] Result<std::vector<std::byte>> read(std::chrono::milliseconds patience);
+  Result<std::vector<std::byte>> read(std::chrono::milliseconds patience);
   // Cold. Discards bytes until none has come for `quiet` (at most a second in all).
-  [[nodiscard]] Result<> drain(std::chrono::milliseconds quiet);
+  Result<> drain(std::chrono::milliseconds quiet);
 
  private:
   void close() noexcept;

@@ -39,10 +39,9 @@ struct DeviceInfo {
 
 // Returns the one that answers to `id` (any when empty) and satisfies `wanted`. When none or
 // several match, the error lists the candidates; `kind` is used in it ("serial port").
-[[nodiscard]] Result<DeviceInfo> choose(const std::vector<DeviceInfo>& device,
-                                        const std::string& id,
-                                        const std::function<bool(const DeviceInfo&)>& wanted,
-                                        const std::string& kind);
+Result<DeviceInfo> choose(const std::vector<DeviceInfo>& device, const std::string& id,
+                          const std::function<bool(const DeviceInfo&)>& wanted,
+                          const std::string& kind);
 
 // Returns the one with this node, also through a link; only the node itself when it is not listed.
 [[nodiscard]] DeviceInfo find_node(const std::vector<DeviceInfo>& device, const std::string& path);

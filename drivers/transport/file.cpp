@@ -25,8 +25,7 @@ Result<double> period_of(const PlaybackOptions& options) {
 
 Result<std::unique_ptr<Transport>> FileTransport::open(Chunks chunks,
                                                        const PlaybackOptions& options) {
-  const auto period_ns = period_of(options);
-  if (!period_ns) return std::unexpected(period_ns.error());
+  const auto period_ns = TRY(period_of(options));
   if (chunks.count() == 0) return fail("there is nothing to play");
   for (std::size_t i = 0; i < chunks.count(); ++i) {
     if (chunks[i].size() > kMaxChunk) {
@@ -34,7 +33,7 @@ Result<std::unique_ptr<Transport>> FileTransport::open(Chunks chunks,
                   std::to_string(kMaxChunk) + " bytes, so it cannot be played");
     }
   }
-  return std::unique_ptr<Transport>(new FileTransport(std::move(chunks), *period_ns, options));
+  return std::unique_ptr<Transport>(new FileTransport(std::move(chunks), period_ns, options));
 }
 
 FileTransport::FileTransport(Chunks chunks, double period_ns, const PlaybackOptions& options)
@@ -50,16 +49,14 @@ Result<> FileTransport::start(std::int64_t now_ns) {
   return {};
 }
 
-// RT-safe.
-std::int64_t FileTransport::next_due_ns() const noexcept {
+RT_SAFE std::int64_t FileTransport::next_due_ns() const noexcept {
   if (due_ns_.empty()) return start_ns_ + std::llround(static_cast<double>(given_) * period_ns_);
   const std::uint64_t round = given_ / due_ns_.size();
   return start_ns_ +
          std::llround(static_cast<double>(round) * round_ns_ + due_ns_[given_ % due_ns_.size()]);
 }
 
-// RT-safe.
-Chunk FileTransport::read(std::int64_t now_ns) noexcept {
+RT_SAFE Chunk FileTransport::read(std::int64_t now_ns) noexcept {
   if (!loop_ && given_ == chunks_.count()) return {.bytes = {}, .end = true};
   if (now_ns < next_due_ns()) return {};
   return {.bytes = chunks_[given_++ % chunks_.count()], .end = false};

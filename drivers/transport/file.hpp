@@ -24,8 +24,7 @@ struct PlaybackOptions {
 class FileTransport final : public Transport {
  public:
   // Needs at least one chunk, and none longer than kMaxChunk. An invalid pace or rate is misuse.
-  [[nodiscard]] static Result<std::unique_ptr<Transport>> open(Chunks chunks,
-                                                               const PlaybackOptions& options);
+  static Result<std::unique_ptr<Transport>> open(Chunks chunks, const PlaybackOptions& options);
 
   [[nodiscard]] int poll_fd() const noexcept override { return -1; }
   [[nodiscard]] std::int64_t next_due_ns() const noexcept override;
@@ -35,7 +34,7 @@ class FileTransport final : public Transport {
   }
   // True when it starts again after the last chunk, so that it never ends.
   [[nodiscard]] bool loops() const noexcept { return loop_; }
-  [[nodiscard]] Result<> start(std::int64_t now_ns) override;
+  Result<> start(std::int64_t now_ns) override;
   // Ends with an empty chunk after the last. RT-safe: no system call at all.
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
 

@@ -27,16 +27,13 @@ Result<Connection> TransportFactory::hid(const HidSettings& settings) {
              (settings.products.empty() ||
               std::ranges::find(settings.products, one.product) != settings.products.end());
     };
-    auto found = choose(nodes, settings.id, wanted, "HID node");
-    if (!found) return std::unexpected(found.error());
-    chosen = std::move(*found);
+    chosen = TRY(choose(nodes, settings.id, wanted, "HID node"));
   }
-  const auto fd = open_node(chosen.node);
-  if (!fd) return std::unexpected(fd.error());
-  Connection link(*fd, chosen.node, chosen.identity());
+  const auto fd = TRY(open_node(chosen.node));
+  Connection link(fd, chosen.node, chosen.identity());
   link.heed(cancel_);
   hidraw_devinfo info{};
-  if (::ioctl(*fd, HIDIOCGRAWINFO, &info) != 0) {
+  if (::ioctl(fd, HIDIOCGRAWINFO, &info) != 0) {
     return fail(chosen.node + " is no HID device; see `posed devices` for those that are");
   }
   return link;

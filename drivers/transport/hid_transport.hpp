@@ -21,7 +21,7 @@ class HidTransport final : public Transport, public ColdWriter {
   explicit HidTransport(Connection link);
 
   [[nodiscard]] int poll_fd() const noexcept override { return reader_->poll_fd(); }
-  [[nodiscard]] Result<> start(std::int64_t now_ns) override { return reader_->start(now_ns); }
+  Result<> start(std::int64_t now_ns) override { return reader_->start(now_ns); }
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override { return reader_->read(now_ns); }
   // Queues the report and wakes the supervisor with one write to an eventfd. RT-safe except for
   // that.

@@ -72,17 +72,16 @@ void only_own_groups(int fd, sa_family_t family) {
 }  // namespace
 
 Result<Membership> Membership::join(int fd, const Address& group, const std::string& interface) {
-  const auto index = interface_index(interface);
-  if (!index) return std::unexpected(index.error());
+  const auto index = TRY(interface_index(interface));
   only_own_groups(fd, group.storage.ss_family);
-  if (!change(fd, group, *index, true)) {
+  if (!change(fd, group, index, true)) {
     return fail("cannot join the multicast group " + host_text(group) + " (" + errno_text() +
                 "); name the network interface that the device is on");
   }
   Membership joined;
   joined.group_ = group;
-  joined.index_ = *index;
-  if (*index != 0) ::if_indextoname(*index, joined.name_.data());
+  joined.index_ = index;
+  if (index != 0) ::if_indextoname(index, joined.name_.data());
   return joined;
 }
 

@@ -15,8 +15,7 @@ class Membership {
  public:
   // Joins. `interface` is its name ("eth0") or one of its addresses; empty: the system's choice.
   // The socket then receives nothing from other groups that this machine has joined. Cold.
-  [[nodiscard]] static Result<Membership> join(int fd, const Address& group,
-                                               const std::string& interface);
+  static Result<Membership> join(int fd, const Address& group, const std::string& interface);
 
   // Leaves and joins again, because an interface that goes away takes the membership with it, and
   // one that returns has another number. While it is away, nothing happens. Other threads may read

@@ -79,16 +79,15 @@ std::string network_identity(const Options& options) {
 }
 
 Result<std::unique_ptr<Transport>> open_network(const Options& options, TransportFactory& ports) {
-  if (const auto ok = check_network(options); !ok) return std::unexpected(ok.error());
+  TRY(check_network(options));
   if (!over_tcp(options)) {
-    auto sockets = ports.udp(udp_settings(options));
-    if (!sockets) return std::unexpected(sockets.error());
-    return std::move(*sockets);
+    auto sockets = TRY(ports.udp(udp_settings(options)));
+    return sockets;
   }
   const auto& connect = option<std::string>(options, "connect");
-  auto link = connect.empty() ? ports.accept(tcp_listen_settings(options)) : ports.connect(connect);
-  if (!link) return std::unexpected(link.error());
-  return make_link_transport(std::move(*link));
+  auto link =
+      TRY(connect.empty() ? ports.accept(tcp_listen_settings(options)) : ports.connect(connect));
+  return make_link_transport(std::move(link));
 }
 
 }  // namespace posed::drivers

@@ -21,13 +21,12 @@ namespace posed::drivers {
                                                       std::string_view listen);
 
 // Checks completed options without opening anything. Cold.
-[[nodiscard]] Result<> check_network(const Options& options);
+Result<> check_network(const Options& options);
 
 // Says where the bytes come from, for people and for the log: "udp 127.0.0.1:9763". Cold.
 [[nodiscard]] std::string network_identity(const Options& options);
 
 // Opens what completed options describe. Cold.
-[[nodiscard]] Result<std::unique_ptr<Transport>> open_network(const Options& options,
-                                                              TransportFactory& ports);
+Result<std::unique_ptr<Transport>> open_network(const Options& options, TransportFactory& ports);
 
 }  // namespace posed::drivers

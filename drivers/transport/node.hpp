@@ -11,7 +11,7 @@ namespace posed::drivers {
 
 // Opens the node for reading and writing, non-blocking, not inherited, locked against a second
 // posed. The caller closes it. Cold.
-[[nodiscard]] Result<int> open_node(const std::string& path);
+Result<int> open_node(const std::string& path);
 
 // Why a node could not be opened, and how to fix it. Cold.
 [[nodiscard]] std::string node_open_error(const std::string& path, int error);

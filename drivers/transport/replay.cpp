@@ -6,7 +6,7 @@
 namespace posed::drivers {
 namespace {
 
-constexpr double kLongest_ns = 1e18;  // thirty years: a damaged arrival time must not overflow
+constexpr double kMaxTime_ns = 1e18;  // thirty years: a damaged arrival time must not overflow
 
 }  // namespace
 
@@ -29,17 +29,15 @@ Result<> ReplayTransport::start(std::int64_t now_ns) {
   return {};
 }
 
-// RT-safe.
-std::int64_t ReplayTransport::next_due_ns() const noexcept {
+RT_SAFE std::int64_t ReplayTransport::next_due_ns() const noexcept {
   if (speed_ == 0.0 || next_ == recording_.count()) return start_ns_;
   const double waited_ns =
       (static_cast<double>(recording_.arrival_ns(next_)) - static_cast<double>(origin_ns_)) /
       speed_;
-  return start_ns_ + static_cast<std::int64_t>(std::clamp(waited_ns, 0.0, kLongest_ns));
+  return start_ns_ + static_cast<std::int64_t>(std::clamp(waited_ns, 0.0, kMaxTime_ns));
 }
 
-// RT-safe.
-Chunk ReplayTransport::read(std::int64_t now_ns) noexcept {
+RT_SAFE Chunk ReplayTransport::read(std::int64_t now_ns) noexcept {
   if (next_ == recording_.count()) return {.bytes = {}, .end = true};
   if (now_ns < next_due_ns()) return {};
   const std::size_t chunk = next_++;

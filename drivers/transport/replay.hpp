@@ -38,14 +38,13 @@ class ReplayTransport final : public Transport {
  public:
   // `speed` 1 is the recorded pace, 0 as fast as possible. An empty recording ends at once. A chunk
   // longer than kMaxChunk or an invalid speed is an error.
-  [[nodiscard]] static Result<std::unique_ptr<Transport>> open(Recording recording,
-                                                               std::int64_t origin_ns,
-                                                               double speed);
+  static Result<std::unique_ptr<Transport>> open(Recording recording, std::int64_t origin_ns,
+                                                 double speed);
 
   [[nodiscard]] int poll_fd() const noexcept override { return -1; }
   [[nodiscard]] std::int64_t next_due_ns() const noexcept override;
   [[nodiscard]] bool lossless() const noexcept override { return speed_ == 0.0; }
-  [[nodiscard]] Result<> start(std::int64_t now_ns) override;
+  Result<> start(std::int64_t now_ns) override;
   // Ends with an empty chunk after the last. RT-safe: no system call at all.
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
 

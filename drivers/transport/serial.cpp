@@ -105,23 +105,21 @@ std::string ask_for_low_latency(int fd, const std::string& node, const fs::path&
 Result<Connection> TransportFactory::serial(const SerialSettings& settings) {
   if (settings.baud <= 0) return misuse("baud should be more than 0");
   if (only_prepare_) return not_opened();
-  const auto port = find_port(settings);
-  if (!port) return std::unexpected(port.error());
-  const auto fd = open_node(port->node);
-  if (!fd) return std::unexpected(fd.error());
-  Connection link(*fd, port->node, port->identity());
+  const auto port = TRY(find_port(settings));
+  const auto fd = TRY(open_node(port.node));
+  Connection link(fd, port.node, port.identity());
   link.heed(cancel_);
-  if (auto ok = set_raw(*fd, port->node, settings.baud); !ok) return std::unexpected(ok.error());
+  TRY(set_raw(fd, port.node, settings.baud));
   // flock keeps out a second posed; TIOCEXCL keeps out programs that do not use flock. Not on a
   // pseudo-terminal: there it would remain set while the other side keeps the node open.
-  if (!is_pseudo_terminal(*fd) && ::ioctl(*fd, TIOCEXCL) != 0) {
-    return fail(node_open_error(port->node, errno));
+  if (!is_pseudo_terminal(fd) && ::ioctl(fd, TIOCEXCL) != 0) {
+    return fail(node_open_error(port.node, errno));
   }
   const int lines = TIOCM_DTR | TIOCM_RTS;
-  ::ioctl(*fd, TIOCMBIS, &lines);  // a port without modem lines returns an error, which is ignored
-  if (auto note = ask_for_low_latency(*fd, port->node); !note.empty()) note_ = std::move(note);
+  ::ioctl(fd, TIOCMBIS, &lines);  // a port without modem lines returns an error, which is ignored
+  if (auto note = ask_for_low_latency(fd, port.node); !note.empty()) note_ = std::move(note);
   // Discards old bytes, which were meant for another program or came at another rate.
-  ::ioctl(*fd, TCFLSH, TCIOFLUSH);
+  ::ioctl(fd, TCFLSH, TCIOFLUSH);
   return link;
 }
 

@@ -24,8 +24,7 @@ namespace posed::drivers {
 [[nodiscard]] Address bound_address(int fd) noexcept;
 
 // Binds a TCP socket and lets it listen. `endpoint` is the address for sentences.
-[[nodiscard]] Result<int> listen_on(const Address& address, const std::string& endpoint,
-                                    int backlog);
+Result<int> listen_on(const Address& address, const std::string& endpoint, int backlog);
 
 // Returns whether the list names the peer's address; an empty list names this machine.
 [[nodiscard]] bool may_connect(const Address& peer, const std::vector<std::string>& peers);

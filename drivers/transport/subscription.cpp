@@ -22,12 +22,12 @@ constexpr int kMessagesWaiting = 16;   // in libzmq
 constexpr int kLinkBuffer = 8 * 1024;  // bytes, in the kernel before libzmq
 // Bytes. libzmq ends the connection at a larger message, so this is well above what is delivered: a
 // message that is only too long to be a chunk is counted, and costs no connection.
-constexpr std::int64_t kMostReceived = 1024 * 1024;
-static_assert(kMostReceived > std::int64_t{kMaxChunk});
+constexpr std::int64_t kMaxReceived = 1024 * 1024;
+static_assert(kMaxReceived > std::int64_t{kMaxChunk});
 // Bytes between thread and reader, which the kernel doubles for its own use: a quarter of a second
 // of a large skeleton at 120 Hz.
 constexpr int kQueue = 128 * 1024;
-constexpr int kMostDiscarded = 256;  // for one message; more than the queue holds
+constexpr int kMaxDiscarded = 256;  // for one message; more than the queue holds
 
 Error refusal_error(net::Refusal refusal, const SubscriptionSettings& settings) {
   const std::string daemon = "the daemon at " + settings.endpoint;
@@ -59,14 +59,14 @@ Error refusal_error(net::Refusal refusal, const SubscriptionSettings& settings) 
 }
 
 Result<> set_all(void* socket, const SubscriptionSettings& settings) {
-  const std::string_view most(reinterpret_cast<const char*>(&kMostReceived), sizeof kMostReceived);
+  const std::string_view most(reinterpret_cast<const char*>(&kMaxReceived), sizeof kMaxReceived);
   for (const Result<>& set : {net::set_option(socket, ZMQ_MAXMSGSIZE, most),
                               net::set_option(socket, ZMQ_RCVHWM, kMessagesWaiting),
                               net::set_option(socket, ZMQ_RCVBUF, kLinkBuffer)}) {
     if (!set) return set;
   }
   for (const std::string& topic : settings.topics) {
-    if (auto set = net::set_option(socket, ZMQ_SUBSCRIBE, topic); !set) return set;
+    TRY(net::set_option(socket, ZMQ_SUBSCRIBE, topic));
   }
   if (settings.key.empty()) return {};
   return net::secure_client(socket, settings.key, settings.server_key);
@@ -83,18 +83,16 @@ Result<> check_subscription(const SubscriptionSettings& settings) {
     return misuse("key and server_key belong together: set both, or none");
   }
   if (settings.key.empty()) return {};
-  if (const auto own = net::read_secret_key(settings.key); !own)
-    return std::unexpected(own.error());
-  const auto server = net::read_public_key(settings.server_key);
-  if (!server) return std::unexpected(server.error());
+  TRY(net::read_secret_key(settings.key));
+  TRY(net::read_public_key(settings.server_key));
   return {};
 }
 
 Result<std::unique_ptr<SubscriptionTransport>> SubscriptionTransport::open(
     const SubscriptionSettings& settings, const Cancel& cancel) {
   std::unique_ptr<SubscriptionTransport> made(new SubscriptionTransport(settings));
-  if (auto done = made->connect(); !done) return std::unexpected(done.error());
-  if (auto done = made->await_link(cancel); !done) return std::unexpected(done.error());
+  TRY(made->connect());
+  TRY(made->await_link(cancel));
   made->thread_ = std::thread([transport = made.get()] { transport->receive_all(); });
   return made;
 }
@@ -119,16 +117,11 @@ Result<> SubscriptionTransport::connect() {
   reader_ = ends[0];
   writer_ = ends[1];
   ::setsockopt(writer_, SOL_SOCKET, SO_SNDBUF, &kQueue, sizeof kQueue);
-  auto context = net::open_context();
-  if (!context) return std::unexpected(context.error());
-  context_ = std::move(*context);
-  auto socket = net::open_socket(context_.get(), ZMQ_SUB);
-  if (!socket) return std::unexpected(socket.error());
-  socket_ = std::move(*socket);
-  if (auto set = set_all(socket_.get(), settings_); !set) return set;
-  auto monitor = net::LinkMonitor::open(context_.get(), socket_.get(), !settings_.key.empty());
-  if (!monitor) return std::unexpected(monitor.error());
-  monitor_ = std::make_unique<net::LinkMonitor>(std::move(*monitor));
+  context_ = TRY(net::open_context());
+  socket_ = TRY(net::open_socket(context_.get(), ZMQ_SUB));
+  TRY(set_all(socket_.get(), settings_));
+  auto monitor = TRY(net::LinkMonitor::open(context_.get(), socket_.get(), !settings_.key.empty()));
+  monitor_ = std::make_unique<net::LinkMonitor>(std::move(monitor));
   return net::connect_socket(socket_.get(), settings_.endpoint);
 }
 
@@ -187,7 +180,7 @@ void SubscriptionTransport::accept_message() {
 
 void SubscriptionTransport::hand_over(std::size_t size) noexcept {
   std::byte discarded{};
-  for (int i = 0; i < kMostDiscarded; ++i) {
+  for (int i = 0; i < kMaxDiscarded; ++i) {
     if (::send(writer_, outgoing_.data(), size, MSG_DONTWAIT | MSG_NOSIGNAL) >= 0) return;
     if (errno != EAGAIN && errno != ENOBUFS) break;
     // Both ends are of this process, so the oldest message can be taken from the reader's.
@@ -203,7 +196,7 @@ Chunk SubscriptionTransport::read(std::int64_t /*now_ns*/) noexcept {
     chunk.lost = true;
     return chunk;
   }
-  if (size > 0) chunk.bytes = std::span(incoming_).first(static_cast<std::size_t>(size));
+  if (size > 0) chunk.bytes = std::span(incoming_).first(size);
   chunk.damaged = damaged_.exchange(0);
   chunk.kernel_dropped = dropped_.exchange(0);
   return chunk;

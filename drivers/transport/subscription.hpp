@@ -31,25 +31,25 @@ struct SubscriptionSettings {
 };
 
 // Checks the endpoint and reads the key files, without connecting. Cold.
-[[nodiscard]] Result<> check_subscription(const SubscriptionSettings& settings);
+Result<> check_subscription(const SubscriptionSettings& settings);
 
 class SubscriptionTransport final : public Transport {
  public:
   // Waits for the connection for up to a second, or until `cancel` fires. Cold.
-  [[nodiscard]] static Result<std::unique_ptr<SubscriptionTransport>> open(
-      const SubscriptionSettings& settings, const Cancel& cancel);
+  static Result<std::unique_ptr<SubscriptionTransport>> open(const SubscriptionSettings& settings,
+                                                             const Cancel& cancel);
   ~SubscriptionTransport() override;
 
   [[nodiscard]] int poll_fd() const noexcept override { return reader_; }
   // Keeps what came since open(): a skeleton may be among it.
-  [[nodiscard]] Result<> start(std::int64_t /*now_ns*/) override { return {}; }
+  Result<> start(std::int64_t /*now_ns*/) override { return {}; }
   // A chunk is a topic, a zero byte, and the message. Chunk::lost when the connection ended.
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
 
  private:
   explicit SubscriptionTransport(const SubscriptionSettings& settings);
-  [[nodiscard]] Result<> connect();
-  [[nodiscard]] Result<> await_link(const Cancel& cancel);
+  Result<> connect();
+  Result<> await_link(const Cancel& cancel);
   // The thread: receives until the link or the object ends.
   void receive_all();
   void accept_message();

@@ -35,18 +35,16 @@ std::unexpected<Error> no_descriptor(const ListenSettings& settings) {
 }  // namespace
 
 Result<> check_listen(const ListenSettings& settings) {
-  if (const auto address = address_of(settings); !address) return std::unexpected(address.error());
+  TRY(address_of(settings));
   return {};
 }
 
 Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
   auto listener = listeners_.find(settings.endpoint);
   if (listener == listeners_.end()) {
-    const auto address = address_of(settings);
-    if (!address) return std::unexpected(address.error());
-    const auto fd = listen_on(*address, settings.endpoint, kBacklog);
-    if (!fd) return std::unexpected(fd.error());
-    listener = listeners_.emplace(settings.endpoint, *fd).first;
+    const auto address = TRY(address_of(settings));
+    const auto fd = TRY(listen_on(address, settings.endpoint, kBacklog));
+    listener = listeners_.emplace(settings.endpoint, fd).first;
   }
   if (only_prepare_) return not_opened();
   std::array<pollfd, 2> wanted{{{.fd = listener->second, .events = POLLIN, .revents = 0},
@@ -91,23 +89,20 @@ std::unexpected<Error> nothing_there(const std::string& endpoint, const std::str
 }  // namespace
 
 Result<> check_connect(const std::string& endpoint) {
-  if (const auto address = parse_endpoint(endpoint); !address) {
-    return std::unexpected(address.error());
-  }
+  TRY(parse_endpoint(endpoint));
   return {};
 }
 
 Result<Connection> TransportFactory::connect(const std::string& endpoint) {
-  const auto address = parse_endpoint(endpoint);
-  if (!address) return std::unexpected(address.error());
+  const auto address = TRY(parse_endpoint(endpoint));
   if (only_prepare_) return not_opened();
-  const int fd = open_socket(*address, SOCK_STREAM);
+  const int fd = open_socket(address, SOCK_STREAM);
   if (fd < 0) {
     return fail("posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
   }
   Connection link(fd, endpoint, "tcp " + endpoint);
   link.heed(cancel_);
-  if (::connect(fd, address->get(), address->size) != 0) {
+  if (::connect(fd, address.get(), address.size) != 0) {
     if (errno != EINPROGRESS) return nothing_there(endpoint, errno_text());
     std::array<pollfd, 2> wanted{{{.fd = fd, .events = POLLOUT, .revents = 0},
                                   {.fd = cancel_->fd(), .events = POLLIN, .revents = 0}}};

@@ -9,14 +9,14 @@ TransportFactory::~TransportFactory() {
 }
 
 Result<std::unique_ptr<UdpTransport>> TransportFactory::udp(const UdpSettings& settings) {
-  if (const auto ok = check_udp(settings); !ok) return std::unexpected(ok.error());
+  TRY(check_udp(settings));
   if (only_prepare_) return not_opened();
   return UdpTransport::open(settings);
 }
 
 Result<std::unique_ptr<SubscriptionTransport>> TransportFactory::subscribe(
     const SubscriptionSettings& settings) {
-  if (const auto ok = check_subscription(settings); !ok) return std::unexpected(ok.error());
+  TRY(check_subscription(settings));
   if (only_prepare_) return not_opened();
   return SubscriptionTransport::open(settings, *cancel_);
 }

@@ -43,10 +43,10 @@ struct HidSettings {
 };
 
 // Checks these settings without listening. Cold.
-[[nodiscard]] Result<> check_listen(const ListenSettings& settings);
+Result<> check_listen(const ListenSettings& settings);
 
 // Checks an address to connect to, "192.168.1.5:7001". Cold.
-[[nodiscard]] Result<> check_connect(const std::string& endpoint);
+Result<> check_connect(const std::string& endpoint);
 
 class TransportFactory {
  public:
@@ -57,29 +57,28 @@ class TransportFactory {
 
   // Opens a port in raw mode, exclusive, DTR set. Errors are one sentence: missing, no permission
   // (with the udev rule or group that fixes it), in use (by whom, if known). Cold.
-  [[nodiscard]] Result<Connection> serial(const SerialSettings& settings);
+  Result<Connection> serial(const SerialSettings& settings);
 
   // Waits up to half a second for a device to connect. Listens from the first call on, so that one
   // that connects between two calls is kept. Connections from addresses not in `peers` are
   // dropped and counted. Cold.
-  [[nodiscard]] Result<Connection> accept(const ListenSettings& settings);
+  Result<Connection> accept(const ListenSettings& settings);
 
   // Connects to a system that serves its data over TCP. Waits for it up to a second. Cold.
-  [[nodiscard]] Result<Connection> connect(const std::string& endpoint);
+  Result<Connection> connect(const std::string& endpoint);
 
   // Opens a hidraw node: one report per read and per write. Cold.
-  [[nodiscard]] Result<Connection> hid(const HidSettings& settings);
+  Result<Connection> hid(const HidSettings& settings);
 
   // Opens a USB device without a node of its own kind and claims its interface. Cold.
-  [[nodiscard]] Result<UsbLink> usb(const UsbSettings& settings);
+  Result<UsbLink> usb(const UsbSettings& settings);
 
   // Opens the sockets of a device that sends datagrams. Does not wait for it. Cold.
-  [[nodiscard]] Result<std::unique_ptr<UdpTransport>> udp(const UdpSettings& settings);
+  Result<std::unique_ptr<UdpTransport>> udp(const UdpSettings& settings);
 
   // Subscribes to topics of another posed. Waits up to a second for it; an error says why it
   // refuses. Cold.
-  [[nodiscard]] Result<std::unique_ptr<SubscriptionTransport>> subscribe(
-      const SubscriptionSettings& settings);
+  Result<std::unique_ptr<SubscriptionTransport>> subscribe(const SubscriptionSettings& settings);
 
   // Ends present and future waits, here and on the links made here; for a thread that stops posed
   // while a device is being opened. Any thread.

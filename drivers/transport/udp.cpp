@@ -35,9 +35,9 @@ std::int64_t to_ns(const timespec& time) noexcept {
   return std::int64_t{time.tv_sec} * kNanosPerSecond + time.tv_nsec;
 }
 
-// Returns the datagram's ancillary data of this type, if present. RT-safe.
+// Returns the datagram's ancillary data of this type, if present.
 template <typename Value>
-std::optional<Value> control_value(msghdr& header, int type) noexcept {
+RT_SAFE std::optional<Value> control_value(msghdr& header, int type) noexcept {
   for (cmsghdr* part = CMSG_FIRSTHDR(&header); part != nullptr; part = CMSG_NXTHDR(&header, part)) {
     if (part->cmsg_level != SOL_SOCKET || part->cmsg_type != type) continue;
     Value value{};
@@ -61,27 +61,24 @@ struct Wanted {
 
 Result<Wanted> wanted_of(const UdpSocketSettings& socket, const UdpSettings& all) {
   Wanted wanted;
-  const auto listen = listen_address(socket.listen, all.peers, "the senders'");
-  if (!listen) return std::unexpected(listen.error());
-  wanted.listen = *listen;
+  const auto listen = TRY(listen_address(socket.listen, all.peers, "the senders'"));
+  wanted.listen = listen;
   if (!socket.to.empty()) {
-    const auto to = parse_endpoint(socket.to);
-    if (!to) return std::unexpected(to.error());
-    wanted.to = *to;
+    const auto to = TRY(parse_endpoint(socket.to));
+    wanted.to = to;
   }
   if (socket.group.empty()) return wanted;
-  const auto group = parse_host(socket.group);
-  if (!group) return std::unexpected(group.error());
-  if (!is_multicast(host_of(*group))) {
+  const auto group = TRY(parse_host(socket.group));
+  if (!is_multicast(host_of(group))) {
     return misuse("'" + socket.group + "' should be a multicast address, like 239.255.42.99");
   }
-  const bool same_family = group->storage.ss_family == listen->storage.ss_family;
-  if (!same_family || is_loopback(host_of(*listen))) {
+  const bool same_family = group.storage.ss_family == listen.storage.ss_family;
+  if (!same_family || is_loopback(host_of(listen))) {
     return misuse("to receive the group " + socket.group + ", listen on " +
-                  (group->storage.ss_family == AF_INET6 ? "[::]" : "0.0.0.0") + ":PORT, not on " +
+                  (group.storage.ss_family == AF_INET6 ? "[::]" : "0.0.0.0") + ":PORT, not on " +
                   socket.listen);
   }
-  wanted.group = *group;
+  wanted.group = group;
   return wanted;
 }
 
@@ -94,8 +91,8 @@ struct UdpTransport::Batch {
   std::array<std::array<std::byte, kMaxDatagram>, kBatch> bytes{};
   alignas(cmsghdr) std::array<std::array<std::byte, kControlBytes>, kBatch> control{};
 
-  // The kernel changes the headers with every call. RT-safe.
-  void prepare() noexcept {
+  // The kernel changes the headers with every call.
+  RT_SAFE void prepare() noexcept {
     for (std::size_t i = 0; i < kBatch; ++i) {
       part[i] = {.iov_base = bytes[i].data(), .iov_len = bytes[i].size()};
       msghdr& header = message[i].msg_hdr;
@@ -113,11 +110,10 @@ struct UdpTransport::Batch {
 Result<> check_udp(const UdpSettings& settings) {
   if (settings.sockets.empty()) return misuse("name an address to listen on, like 127.0.0.1:1511");
   for (const std::string& peer : settings.peers) {
-    if (const auto host = parse_host(peer); !host) return std::unexpected(host.error());
+    TRY(parse_host(peer));
   }
   for (const UdpSocketSettings& socket : settings.sockets) {
-    const auto wanted = wanted_of(socket, settings);
-    if (!wanted) return std::unexpected(wanted.error());
+    TRY(wanted_of(socket, settings));
   }
   return {};
 }
@@ -132,7 +128,7 @@ UdpTransport::~UdpTransport() {
 }
 
 Result<std::unique_ptr<UdpTransport>> UdpTransport::open(const UdpSettings& settings) {
-  if (const auto ok = check_udp(settings); !ok) return std::unexpected(ok.error());
+  TRY(check_udp(settings));
   std::unique_ptr<UdpTransport> self(new UdpTransport());
   for (const std::string& peer : settings.peers) self->peers_.push_back(host_of(*parse_host(peer)));
   self->epoll_ = ::epoll_create1(EPOLL_CLOEXEC);
@@ -140,19 +136,18 @@ Result<std::unique_ptr<UdpTransport>> UdpTransport::open(const UdpSettings& sett
     return fail("posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
   }
   for (const UdpSocketSettings& socket : settings.sockets) {
-    if (const auto ok = self->add(socket, settings); !ok) return std::unexpected(ok.error());
+    TRY(self->add(socket, settings));
   }
   return self;
 }
 
 Result<> UdpTransport::add(const UdpSocketSettings& settings, const UdpSettings& all) {
-  const auto wanted = wanted_of(settings, all);
-  if (!wanted) return std::unexpected(wanted.error());
+  const auto wanted = TRY(wanted_of(settings, all));
   Socket& socket = sockets_.emplace_back();
-  socket.to = wanted->to;
-  socket.keeps_to = wanted->to.has_value();
+  socket.to = wanted.to;
+  socket.keeps_to = wanted.to.has_value();
   // Several programs may receive a group; a single address belongs to one.
-  socket.fd = bind_socket(wanted->listen, SOCK_DGRAM, wanted->group.has_value());
+  socket.fd = bind_socket(wanted.listen, SOCK_DGRAM, wanted.group.has_value());
   epoll_event event{};
   event.events = EPOLLIN;
   if (socket.fd < 0 || ::epoll_ctl(epoll_, EPOLL_CTL_ADD, socket.fd, &event) != 0) {
@@ -163,10 +158,8 @@ Result<> UdpTransport::add(const UdpSocketSettings& settings, const UdpSettings&
   ::setsockopt(socket.fd, SOL_SOCKET, SO_TIMESTAMPNS, &yes, sizeof yes);
   ::setsockopt(socket.fd, SOL_SOCKET, SO_RXQ_OVFL, &yes, sizeof yes);
   ::setsockopt(socket.fd, SOL_SOCKET, SO_RCVBUF, &kUdpBuffer_bytes, sizeof kUdpBuffer_bytes);
-  if (!wanted->group) return {};
-  auto joined = Membership::join(socket.fd, *wanted->group, all.interface);
-  if (!joined) return std::unexpected(joined.error());
-  socket.membership = *joined;
+  if (!wanted.group) return {};
+  socket.membership = TRY(Membership::join(socket.fd, *wanted.group, all.interface));
   return {};
 }
 
@@ -174,8 +167,7 @@ std::string UdpTransport::endpoint(std::size_t socket) const {
   return endpoint_text(bound_address(sockets_[socket].fd));
 }
 
-// RT-safe.
-bool UdpTransport::may_send(const Host& host) const noexcept {
+RT_SAFE bool UdpTransport::may_send(const Host& host) const noexcept {
   if (peers_.empty()) return is_loopback(host);
   return std::ranges::find(peers_, host) != peers_.end();
 }
@@ -199,8 +191,7 @@ bool UdpTransport::receive(std::int64_t now_ns) noexcept {
 }
 
 // The kernel counts its drops from the socket's beginning and says nothing while there are none.
-// RT-safe.
-void UdpTransport::read_control(std::size_t i, Chunk& chunk) noexcept {
+RT_SAFE void UdpTransport::read_control(std::size_t i, Chunk& chunk) noexcept {
   msghdr& header = batch_->message[i].msg_hdr;
   if (const auto stamp = control_value<timespec>(header, SCM_TIMESTAMPNS)) {
     const std::int64_t age_ns = wall_ns_ - to_ns(*stamp);
@@ -231,8 +222,7 @@ void UdpTransport::upkeep(std::int64_t now_ns) noexcept {
   }
 }
 
-// RT-safe.
-bool UdpTransport::owns(Socket& socket, const Host& sender) const noexcept {
+RT_SAFE bool UdpTransport::owns(Socket& socket, const Host& sender) const noexcept {
   const bool owner = socket.received_ns != kNoTime_ns && sender == socket.sender;
   const bool free =
       socket.received_ns == kNoTime_ns || batch_ns_ - socket.received_ns >= kSilence_ns;

@@ -39,12 +39,12 @@ struct UdpSettings {
 };
 
 // Checks these settings without opening a socket. Cold.
-[[nodiscard]] Result<> check_udp(const UdpSettings& settings);
+Result<> check_udp(const UdpSettings& settings);
 
 class UdpTransport final : public Transport, public Upkeep {
  public:
   // An address other than loopback without peers is an error. Cold.
-  [[nodiscard]] static Result<std::unique_ptr<UdpTransport>> open(const UdpSettings& settings);
+  static Result<std::unique_ptr<UdpTransport>> open(const UdpSettings& settings);
   ~UdpTransport() override;
 
   // Returns the address at which a socket really listens: "127.0.0.1:40123". Cold.
@@ -56,7 +56,7 @@ class UdpTransport final : public Transport, public Upkeep {
     return next_ < received_ ? batch_ns_ : kNoTime_ns;
   }
   // Discards what came since open(): it is old by now.
-  [[nodiscard]] Result<> start(std::int64_t now_ns) override;
+  Result<> start(std::int64_t now_ns) override;
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
   // While nothing comes of a group, joins it again every two seconds.
   void upkeep(std::int64_t now_ns) noexcept override;
@@ -76,7 +76,7 @@ class UdpTransport final : public Transport, public Upkeep {
   struct Batch;  // the buffers of one recvmmsg
 
   UdpTransport();
-  [[nodiscard]] Result<> add(const UdpSocketSettings& settings, const UdpSettings& all);
+  Result<> add(const UdpSocketSettings& settings, const UdpSettings& all);
   // Fills the batch from the next socket that has datagrams; false when none has.
   [[nodiscard]] bool receive(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool may_send(const Host& host) const noexcept;

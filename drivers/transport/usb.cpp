@@ -63,9 +63,7 @@ UsbLink::Impl::~Impl() {
 }
 
 Result<> UsbLink::Impl::claim() {
-  const auto context = make_context();
-  if (!context) return std::unexpected(context.error());
-  context_ = *context;
+  context_ = TRY(make_context());
   if (const int failed = libusb_wrap_sys_device(context_, node_, &handle_); failed != 0) {
     handle_ = nullptr;
     return fail(name_ + " does not open as a USB device (" + libusb_says(failed) + ")");
@@ -104,7 +102,7 @@ Result<std::vector<std::byte>> UsbLink::feature(std::uint8_t report, std::size_t
     return fail(name() + " does not give feature report " + std::to_string(report) + " (" +
                 libusb_error_name(got) + "); unplug it and plug it in again");
   }
-  const auto text = std::as_bytes(std::span(answer)).first(static_cast<std::size_t>(got));
+  const auto text = std::as_bytes(std::span(answer)).first(got);
   return std::vector<std::byte>(text.begin(), text.end());
 }
 
@@ -127,13 +125,11 @@ Result<UsbLink> TransportFactory::usb(const UsbSettings& settings) {
   const auto wanted = [&](const DeviceInfo& one) {
     return one.vendor == settings.vendor && one.product == settings.product;
   };
-  const auto chosen = choose(list_usb_devices(), settings.id, wanted, "USB device");
-  if (!chosen) return std::unexpected(chosen.error());
-  const auto node = open_node(chosen->node);
-  if (!node) return std::unexpected(node.error());
+  const auto chosen = TRY(choose(list_usb_devices(), settings.id, wanted, "USB device"));
+  const auto node = TRY(open_node(chosen.node));
   auto impl =
-      std::make_unique<UsbLink::Impl>(*node, settings, chosen->node, chosen->identity(), cancel_);
-  if (auto ok = impl->claim(); !ok) return std::unexpected(ok.error());
+      std::make_unique<UsbLink::Impl>(node, settings, chosen.node, chosen.identity(), cancel_);
+  TRY(impl->claim());
   return UsbLink(std::move(impl));
 }
 

@@ -39,9 +39,9 @@ class UsbLink {
 
   // Cold, at most a second. Reads the feature report with this number, at most `bytes` long. Its
   // first byte comes from the device and usually is the number.
-  [[nodiscard]] Result<std::vector<std::byte>> feature(std::uint8_t report, std::size_t bytes);
+  Result<std::vector<std::byte>> feature(std::uint8_t report, std::size_t bytes);
   // Cold, at most a second. `report` begins with its number.
-  [[nodiscard]] Result<> set_feature(std::span<const std::byte> report);
+  Result<> set_feature(std::span<const std::byte> report);
 
  private:
   friend std::unique_ptr<Transport> make_usb_transport(UsbLink link);

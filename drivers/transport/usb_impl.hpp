@@ -25,7 +25,7 @@ class UsbLink::Impl {
   Impl(const Impl&) = delete;
   Impl& operator=(const Impl&) = delete;
 
-  [[nodiscard]] Result<> claim();
+  Result<> claim();
 
   // A transfer that has begun takes up to a second; after a cancel no transfer is begun.
   [[nodiscard]] bool cancelled() const noexcept { return cancel_->fired(); }

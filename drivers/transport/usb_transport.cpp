@@ -29,7 +29,7 @@ class UsbTransport final : public Transport {
   UsbTransport& operator=(const UsbTransport&) = delete;
 
   [[nodiscard]] int poll_fd() const noexcept override { return epoll_; }
-  [[nodiscard]] Result<> start(std::int64_t now_ns) override;
+  Result<> start(std::int64_t now_ns) override;
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
 
  private:
@@ -101,7 +101,7 @@ Chunk UsbTransport::read(std::int64_t /*now_ns*/) noexcept {
   handed_over_ = waiting_[first_];
   first_ = (first_ + 1) % kTransfers;
   --count_;
-  const auto size = static_cast<std::size_t>(handed_over_->transfer->actual_length);
+  const std::size_t size = handed_over_->transfer->actual_length;
   return {.bytes = std::as_bytes(std::span(handed_over_->bytes)).first(size)};
 }
 

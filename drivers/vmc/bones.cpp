@@ -65,13 +65,10 @@ constexpr std::array<BoneEntry, kBoneCount> kVmcBones{
 
 }  // namespace
 
-// RT-safe.
-const std::array<BoneEntry, kBoneCount>& bone_table() noexcept { return kVmcBones; }
+RT_SAFE const std::array<BoneEntry, kBoneCount>& bone_table() noexcept { return kVmcBones; }
 
-// RT-safe.
-std::size_t find_bone(std::string_view name) noexcept {
-  return static_cast<std::size_t>(std::ranges::find(kVmcBones, name, &BoneEntry::name) -
-                                  kVmcBones.begin());
+RT_SAFE std::size_t find_bone(std::string_view name) noexcept {
+  return std::ranges::find(kVmcBones, name, &BoneEntry::name) - kVmcBones.begin();
 }
 
 }  // namespace posed::drivers::vmc

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "proto/frame/humanoid.hpp"
+#include "proto/frame/rt_safe.hpp"
 
 namespace posed::drivers::vmc {
 
@@ -23,7 +24,7 @@ inline constexpr std::size_t kHips = 0;
 // [bone]
 [[nodiscard]] const std::array<BoneEntry, kBoneCount>& bone_table() noexcept;
 
-// kBoneCount when there is no such bone. Upper and lower case differ, as in the protocol. RT-safe.
-[[nodiscard]] std::size_t find_bone(std::string_view name) noexcept;
+// kBoneCount when there is no such bone. Upper and lower case differ, as in the protocol.
+RT_SAFE [[nodiscard]] std::size_t find_bone(std::string_view name) noexcept;
 
 }  // namespace posed::drivers::vmc

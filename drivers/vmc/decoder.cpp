@@ -28,8 +28,8 @@ struct Transform {
 };
 
 // In posed's axes; false for missing or mistyped arguments and for what is no position or no
-// rotation. RT-safe.
-bool read_transform(OscArguments& arguments, Transform& transform) noexcept {
+// rotation.
+RT_SAFE bool read_transform(OscArguments& arguments, Transform& transform) noexcept {
   transform.name = arguments.text();
   for (float& x_m : transform.position_m) x_m = arguments.f32();
   for (float& x : transform.rotation_xyzw) x = arguments.f32();
@@ -42,17 +42,15 @@ bool read_transform(OscArguments& arguments, Transform& transform) noexcept {
 
 }  // namespace
 
-// RT-safe.
-void VmcDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-                      Sink& sink) noexcept {
+RT_SAFE void VmcDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                              Sink& sink) noexcept {
   arrival_ns_ = active_time_.to(arrival_ns);
   Outcome outcome = check_packet(bytes);
   if (outcome == Outcome::kOk) outcome = accept_packet(bytes, sink);
   sink.outcome(outcome);
 }
 
-// RT-safe.
-Outcome VmcDecoder::accept_packet(std::span<const std::byte> packet, Sink& sink) noexcept {
+RT_SAFE Outcome VmcDecoder::accept_packet(std::span<const std::byte> packet, Sink& sink) noexcept {
   worst_ = Outcome::kOk;
   ended_ = false;
   received_.reset();
@@ -80,8 +78,7 @@ Outcome VmcDecoder::accept_packet(std::span<const std::byte> packet, Sink& sink)
   return worst_;
 }
 
-// RT-safe.
-VmcDecoder::Survey VmcDecoder::survey(std::span<const std::byte> packet) noexcept {
+RT_SAFE VmcDecoder::Survey VmcDecoder::survey(std::span<const std::byte> packet) noexcept {
   Survey found;
   each_message(packet, [&](const OscMessage& message) noexcept {
     found.any = true;
@@ -101,8 +98,7 @@ VmcDecoder::Survey VmcDecoder::survey(std::span<const std::byte> packet) noexcep
   return found;
 }
 
-// RT-safe.
-bool VmcDecoder::accept_message(const OscMessage& message) noexcept {
+RT_SAFE bool VmcDecoder::accept_message(const OscMessage& message) noexcept {
   OscArguments arguments(message);
   if (message.address == kBoneAddress) return accept_bone(arguments);
   if (message.address == kRootAddress) return accept_root(arguments);
@@ -116,8 +112,7 @@ bool VmcDecoder::accept_message(const OscMessage& message) noexcept {
   return true;  // all others mean nothing to posed
 }
 
-// RT-safe.
-bool VmcDecoder::accept_bone(OscArguments& arguments) noexcept {
+RT_SAFE bool VmcDecoder::accept_bone(OscArguments& arguments) noexcept {
   Transform transform;
   const bool valid = read_transform(arguments, transform);
   if (transform.name == kNoBone) return true;
@@ -131,8 +126,7 @@ bool VmcDecoder::accept_bone(OscArguments& arguments) noexcept {
   return true;
 }
 
-// RT-safe.
-bool VmcDecoder::accept_root(OscArguments& arguments) noexcept {
+RT_SAFE bool VmcDecoder::accept_root(OscArguments& arguments) noexcept {
   Transform transform;
   if (!read_transform(arguments, transform)) return false;
   root_m_ = transform.position_m;
@@ -141,8 +135,7 @@ bool VmcDecoder::accept_root(OscArguments& arguments) noexcept {
   return true;
 }
 
-// RT-safe.
-bool VmcDecoder::accept_blend(OscArguments& arguments) noexcept {
+RT_SAFE bool VmcDecoder::accept_blend(OscArguments& arguments) noexcept {
   const std::string_view name = arguments.text();
   const float value = arguments.f32();
   if (!arguments.ok() || !std::isfinite(value)) return false;
@@ -150,8 +143,7 @@ bool VmcDecoder::accept_blend(OscArguments& arguments) noexcept {
   return true;
 }
 
-// RT-safe.
-bool VmcDecoder::accept_device(ValueKind kind, OscArguments& arguments) noexcept {
+RT_SAFE bool VmcDecoder::accept_device(ValueKind kind, OscArguments& arguments) noexcept {
   Transform transform;
   if (!read_transform(arguments, transform)) return false;
   if (!transform.seen) return true;  // it is not tracked
@@ -162,8 +154,7 @@ bool VmcDecoder::accept_device(ValueKind kind, OscArguments& arguments) noexcept
   return true;
 }
 
-// RT-safe.
-bool VmcDecoder::accept_status(OscArguments& arguments) noexcept {
+RT_SAFE bool VmcDecoder::accept_status(OscArguments& arguments) noexcept {
   constexpr std::size_t kWithTracking = 4;
   const bool with_tracking = arguments.left() >= kWithTracking;
   const bool loaded = arguments.i32() != 0;
@@ -175,8 +166,7 @@ bool VmcDecoder::accept_status(OscArguments& arguments) noexcept {
   return true;
 }
 
-// RT-safe.
-bool VmcDecoder::accept_avatar(OscArguments& arguments) noexcept {
+RT_SAFE bool VmcDecoder::accept_avatar(OscArguments& arguments) noexcept {
   (void)arguments.text();  // the path of its file
   const std::string_view title = arguments.text();
   if (!arguments.ok()) return false;
@@ -184,8 +174,7 @@ bool VmcDecoder::accept_avatar(OscArguments& arguments) noexcept {
   return true;
 }
 
-// RT-safe.
-void VmcDecoder::end_frame(std::int64_t device_ns, Sink& sink) noexcept {
+RT_SAFE void VmcDecoder::end_frame(std::int64_t device_ns, Sink& sink) noexcept {
   ended_ = true;
   // A model that is not loaded has no pose; what is sent for it describes nobody.
   if (loaded_) describer_.frame(set_, position_m_, arrival_ns_);
@@ -198,8 +187,8 @@ void VmcDecoder::end_frame(std::int64_t device_ns, Sink& sink) noexcept {
   seen_.reset();
 }
 
-// False if the body would be out of the room. RT-safe.
-bool VmcDecoder::emit_frame(std::int64_t device_ns, Sink& sink) noexcept {
+// False if the body would be out of the room.
+RT_SAFE bool VmcDecoder::emit_frame(std::int64_t device_ns, Sink& sink) noexcept {
   const Skeleton& skeleton = *layout_->skeleton();
   Frame frame;
   frame.header.device_ns = device_ns;
@@ -210,8 +199,8 @@ bool VmcDecoder::emit_frame(std::int64_t device_ns, Sink& sink) noexcept {
   for (std::size_t bone = 0; bone < kBoneCount; ++bone) {
     const int joint = layout_->joint_of[bone];
     if (joint == VmcLayout::kNone || !seen_[bone]) continue;
-    frame.rotation_xyzw[static_cast<std::size_t>(joint)] = rotation_xyzw_[bone];
-    frame.valid.set(static_cast<std::size_t>(joint));
+    frame.rotation_xyzw[joint] = rotation_xyzw_[bone];
+    frame.valid.set(joint);
   }
   // The room's transform, then the hips. A sender without hips moves the body by its root alone.
   const bool placed = layout_->hips_sent ? frame.valid[kHips] : root_seen_;
@@ -231,8 +220,7 @@ bool VmcDecoder::emit_frame(std::int64_t device_ns, Sink& sink) noexcept {
   return true;
 }
 
-// RT-safe.
-void VmcDecoder::emit_sample(Sink& sink) noexcept {
+RT_SAFE void VmcDecoder::emit_sample(Sink& sink) noexcept {
   if (!loaded_ || layout_ == nullptr || layout_->value_count == 0) return;
   Sample sample;
   sample.header.device_ns = clock_.device_ns();

@@ -23,12 +23,12 @@ class VmcDecoder final : public Decoder {
  public:
   VmcDecoder() noexcept { rotation_xyzw_.fill(kIdentity); }
 
-  // Takes one datagram per call. RT-safe.
-  void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
-            Sink& sink) noexcept override;
+  // Takes one datagram per call.
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
+                    Sink& sink) noexcept override;
 
-  // Takes what make_layout made. RT-safe.
-  void use(const SourceLayout& layout) noexcept override {
+  // Takes what make_layout made.
+  RT_SAFE void use(const SourceLayout& layout) noexcept override {
     layout_ = static_cast<const VmcLayout*>(&layout);
     values_.use(*layout_);
   }

@@ -5,10 +5,9 @@
 
 namespace posed::drivers::vmc {
 
-// RT-safe.
-void Describer::frame(const std::bitset<kBoneCount>& bones,
-                      const std::array<Vec3f, kBoneCount>& position_m,
-                      std::int64_t arrival_ns) noexcept {
+RT_SAFE void Describer::frame(const std::bitset<kBoneCount>& bones,
+                              const std::array<Vec3f, kBoneCount>& position_m,
+                              std::int64_t arrival_ns) noexcept {
   grown_ = grown_ || (bones & ~bones_).any();
   bones_ |= bones;
   for (std::size_t bone = 0; bone < kBoneCount; ++bone) {
@@ -19,30 +18,26 @@ void Describer::frame(const std::bitset<kBoneCount>& bones,
   }
 }
 
-// RT-safe.
-void Describer::title(std::string_view text) noexcept {
+RT_SAFE void Describer::title(std::string_view text) noexcept {
   if (text.size() > title_.size()) return;
   std::ranges::copy(text, title_.begin());
   title_size_ = text.size();
 }
 
-// RT-safe.
-void Describer::forget_bones(std::int64_t now_ns) noexcept {
+RT_SAFE void Describer::forget_bones(std::int64_t now_ns) noexcept {
   for (std::size_t bone = 0; bone < kBoneCount; ++bone) {
     if (now_ns - last_ns_[bone] >= kGone_ns) bones_.reset(bone);
   }
 }
 
-// RT-safe.
-bool Describer::is_gone(const Values& values, std::int64_t now_ns) const noexcept {
+RT_SAFE bool Describer::is_gone(const Values& values, std::int64_t now_ns) const noexcept {
   for (std::size_t bone = 0; bone < kBoneCount; ++bone) {
     if (bones_[bone] && now_ns - last_ns_[bone] < kGone_ns) return false;
   }
   return values.last_ns() == kNoTime_ns || now_ns - values.last_ns() >= kGone_ns;
 }
 
-// RT-safe.
-bool Describer::has_moved() const noexcept {
+RT_SAFE bool Describer::has_moved() const noexcept {
   for (std::size_t bone = 0; bone < kBoneCount; ++bone) {
     if (!bones_[bone]) continue;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -52,8 +47,7 @@ bool Describer::has_moved() const noexcept {
   return false;
 }
 
-// RT-safe.
-void Describer::update(Values& values, std::int64_t now_ns, Sink& sink) noexcept {
+RT_SAFE void Describer::update(Values& values, std::int64_t now_ns, Sink& sink) noexcept {
   forget_bones(now_ns);
   if (values.consume_new()) {
     grown_ = true;
@@ -65,16 +59,15 @@ void Describer::update(Values& values, std::int64_t now_ns, Sink& sink) noexcept
   if (steady_ < kSteady || !(changed || has_moved())) return;
   if (described_ns_ != kNoTime_ns) {
     const std::int64_t since_ns = now_ns - described_ns_;
-    if (since_ns > 2 * kMostBetween_ns || changed) between_moves_ns_ = kBetween_ns;
+    if (since_ns > 2 * kMaxInterval_ns || changed) between_moves_ns_ = kBetween_ns;
     if (since_ns < between_moves_ns_) return;
-    if (!changed) between_moves_ns_ = std::min(2 * between_moves_ns_, kMostBetween_ns);
+    if (!changed) between_moves_ns_ = std::min(2 * between_moves_ns_, kMaxInterval_ns);
   }
   there_ = there;
   describe(values, now_ns, sink);
 }
 
-// RT-safe.
-void Describer::describe(const Values& values, std::int64_t now_ns, Sink& sink) noexcept {
+RT_SAFE void Describer::describe(const Values& values, std::int64_t now_ns, Sink& sink) noexcept {
   described_.title = {title_.data(), title_size_};
   described_.bones = bones_;
   described_.offset_m = offset_m_;

@@ -38,7 +38,7 @@ class Describer {
   static constexpr std::int64_t kBetween_ns = kNanosPerSecond / 2;  // descriptions
   // Between descriptions that only moved bones: doubled each time up to this, because each one
   // begins the stream again, and some avatars stretch.
-  static constexpr std::int64_t kMostBetween_ns = 64 * kNanosPerSecond;
+  static constexpr std::int64_t kMaxInterval_ns = 64 * kNanosPerSecond;
   static constexpr float kMoved_m = 0.005F;
   static constexpr int kSteady = 2;  // frames without a new bone or value
 

@@ -59,13 +59,13 @@ class FrameEnd {
   // A bone came again before the frame's end; called before the datagram with it is over.
   void missed() noexcept {
     misses_ += kMiss;
-    if (misses_ > kMostMisses && before_ != kEndMessages) be(before_);
+    if (misses_ > kMaxMisses && before_ != kEndMessages) be(before_);
     forget_pauses();
   }
 
  private:
   static constexpr int kMiss = 2;
-  static constexpr int kMostMisses = 3;
+  static constexpr int kMaxMisses = 3;
   static constexpr int kAgree = 3;  // frames
 
   void be(std::size_t message) noexcept {

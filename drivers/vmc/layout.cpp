@@ -13,10 +13,10 @@ constexpr const char* kPerformer = "performer";
 // The nearest parent that is sent; the hips are always there.
 std::size_t parent_of(const Described& described, std::size_t bone) {
   int parent = bone_table()[bone].parent;
-  while (parent > 0 && !described.bones[static_cast<std::size_t>(parent)]) {
-    parent = bone_table()[static_cast<std::size_t>(parent)].parent;
+  while (parent > 0 && !described.bones[parent]) {
+    parent = bone_table()[parent].parent;
   }
-  return static_cast<std::size_t>(std::max(parent, 0));
+  return std::max(parent, 0);
 }
 
 // The height of the hips above the soles when the person stands straight.
@@ -47,7 +47,7 @@ Result<std::shared_ptr<const Skeleton>> make_skeleton(const Described& described
     const Vec3f& offset_m = described.offset_m[bone];
     joint.offset_m = {offset_m[0], offset_m[1], offset_m[2]};
   }
-  if (auto ok = skeleton->finish(); !ok) return std::unexpected(ok.error());
+  TRY(skeleton->finish());
   return skeleton;
 }
 
@@ -78,8 +78,7 @@ SampleLayout name_values(const Described& described, VmcLayout& layout) {
 
 }  // namespace
 
-// RT-safe.
-int VmcLayout::place_of(ValueKind kind, std::string_view name) const noexcept {
+RT_SAFE int VmcLayout::place_of(ValueKind kind, std::string_view name) const noexcept {
   for (const Value& value : values) {
     if (value.kind == kind && value.name == name) return value.place;
   }
@@ -87,16 +86,14 @@ int VmcLayout::place_of(ValueKind kind, std::string_view name) const noexcept {
 }
 
 Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description) {
-  const auto described = parse_description(description);
-  if (!described) return std::unexpected(described.error());
+  const auto described = TRY(parse_description(description));
   auto layout = std::make_unique<VmcLayout>();
   layout->joint_of.fill(VmcLayout::kNone);
   Body body{.name = kPerformer, .skeleton = nullptr};
-  body.samples = name_values(*described, *layout);
-  if (described->bones.any()) {
-    auto skeleton = make_skeleton(*described, *layout);
-    if (!skeleton) return std::unexpected(skeleton.error());
-    body.skeleton = std::move(*skeleton);
+  body.samples = name_values(described, *layout);
+  if (described.bones.any()) {
+    auto skeleton = TRY(make_skeleton(described, *layout));
+    body.skeleton = std::move(skeleton);
   }
   if (body.skeleton != nullptr || layout->value_count > 0) {
     layout->bodies.push_back(std::move(body));

@@ -17,8 +17,7 @@ class VmcLayout final : public SourceLayout {
   static constexpr int kNone = -1;
 
   // The index of the first sample value of this blend shape or device; kNone if it has none.
-  // RT-safe.
-  [[nodiscard]] int place_of(ValueKind kind, std::string_view name) const noexcept;
+  RT_SAFE [[nodiscard]] int place_of(ValueKind kind, std::string_view name) const noexcept;
 
   // Null if nothing or only values are sent.
   [[nodiscard]] const Skeleton* skeleton() const noexcept {
@@ -37,7 +36,6 @@ class VmcLayout final : public SourceLayout {
 };
 
 // Driver::make_layout. Cold.
-[[nodiscard]] Result<std::unique_ptr<const SourceLayout>> make_layout(
-    std::span<const std::byte> description);
+Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description);
 
 }  // namespace posed::drivers::vmc

@@ -51,35 +51,30 @@ class VmcMessage {
 
 }  // namespace
 
-// RT-safe.
-void DatagramWriter::start() noexcept { count_ = 0; }
+RT_SAFE void DatagramWriter::start() noexcept { count_ = 0; }
 
-// RT-safe.
-std::span<const std::byte> DatagramWriter::datagram(std::size_t i) const noexcept {
+RT_SAFE std::span<const std::byte> DatagramWriter::datagram(std::size_t i) const noexcept {
   const std::size_t begin = i == 0 ? 0 : ends_[i - 1];
   return std::span(room_).subspan(begin, ends_[i] - begin);
 }
 
-// RT-safe.
-bool DatagramWriter::root(const Vec3f& position_m, const Quatf& rotation_xyzw) noexcept {
+RT_SAFE bool DatagramWriter::root(const Vec3f& position_m, const Quatf& rotation_xyzw) noexcept {
   return transform("/VMC/Ext/Root/Pos", "root", position_m, rotation_xyzw);
 }
 
-// RT-safe.
-bool DatagramWriter::bone(std::size_t bone, const Vec3f& position_m,
-                          const Quatf& rotation_xyzw) noexcept {
+RT_SAFE bool DatagramWriter::bone(std::size_t bone, const Vec3f& position_m,
+                                  const Quatf& rotation_xyzw) noexcept {
   return transform("/VMC/Ext/Bone/Pos", bone_table()[bone].name, position_m, rotation_xyzw);
 }
 
-// RT-safe.
-bool DatagramWriter::device(ValueKind kind, std::string_view serial, const Vec3f& position_m,
-                            const Quatf& rotation_xyzw) noexcept {
+RT_SAFE bool DatagramWriter::device(ValueKind kind, std::string_view serial,
+                                    const Vec3f& position_m, const Quatf& rotation_xyzw) noexcept {
   return transform(address_of(kind), serial, position_m, rotation_xyzw);
 }
 
-// RT-safe.
-bool DatagramWriter::transform(const char* address, std::string_view name, const Vec3f& position_m,
-                               const Quatf& rotation_xyzw) noexcept {
+RT_SAFE bool DatagramWriter::transform(const char* address, std::string_view name,
+                                       const Vec3f& position_m,
+                                       const Quatf& rotation_xyzw) noexcept {
   if (!is_usable(name)) return false;
   return add(VmcMessage(address)
                  .text(name)
@@ -88,18 +83,17 @@ bool DatagramWriter::transform(const char* address, std::string_view name, const
                  .finish());
 }
 
-// RT-safe.
-bool DatagramWriter::blend(std::string_view name, float value) noexcept {
+RT_SAFE bool DatagramWriter::blend(std::string_view name, float value) noexcept {
   if (!is_usable(name)) return false;
   return add(
       VmcMessage(address_of(ValueKind::kBlend)).text(name).numbers(std::span(&value, 1)).finish());
 }
 
-// RT-safe.
-bool DatagramWriter::apply() noexcept { return add(VmcMessage("/VMC/Ext/Blend/Apply").finish()); }
+RT_SAFE bool DatagramWriter::apply() noexcept {
+  return add(VmcMessage("/VMC/Ext/Blend/Apply").finish());
+}
 
-// RT-safe.
-bool DatagramWriter::status(const Status& status) noexcept {
+RT_SAFE bool DatagramWriter::status(const Status& status) noexcept {
   return add(VmcMessage("/VMC/Ext/OK")
                  .number(status.loaded ? 1 : 0)
                  .number(status.calibration)
@@ -108,30 +102,28 @@ bool DatagramWriter::status(const Status& status) noexcept {
                  .finish());
 }
 
-// RT-safe.
-bool DatagramWriter::loaded() noexcept { return add(VmcMessage("/VMC/Ext/OK").number(1).finish()); }
+RT_SAFE bool DatagramWriter::loaded() noexcept {
+  return add(VmcMessage("/VMC/Ext/OK").number(1).finish());
+}
 
-// RT-safe.
-bool DatagramWriter::time(float time_s) noexcept {
+RT_SAFE bool DatagramWriter::time(float time_s) noexcept {
   return add(VmcMessage("/VMC/Ext/T").numbers(std::span(&time_s, 1)).finish());
 }
 
-// RT-safe.
-bool DatagramWriter::avatar(std::string_view path, std::string_view title) noexcept {
+RT_SAFE bool DatagramWriter::avatar(std::string_view path, std::string_view title) noexcept {
   if (path.size() > kMaxVmcName || title.size() > kMaxVmcName) return false;
   return add(VmcMessage("/VMC/Ext/VRM").text(path).text(title).finish());
 }
 
-// RT-safe.
-bool DatagramWriter::add(std::span<const std::byte> message) noexcept {
+RT_SAFE bool DatagramWriter::add(std::span<const std::byte> message) noexcept {
   const bool bundled = packing_ != Packing::kMessages;
-  const std::size_t most = packing_ == Packing::kOneBundle ? kRoom : kMostBytes;
+  const std::size_t most = packing_ == Packing::kOneBundle ? kRoom : kMaxBytes;
   const std::size_t needed = message.size() + (bundled ? kElementHead : 0);
   const bool goes_on = bundled && count_ > 0 && datagram(count_ - 1).size() + needed <= most;
   const std::size_t head = bundled && !goes_on ? kBundleHead.size() : 0;
   if (size() + head + needed > kRoom) return false;
   if (!goes_on) {
-    if (count_ == kMostDatagrams) return false;
+    if (count_ == kMaxDatagrams) return false;
     ends_[count_] = size();
     ++count_;
     put(std::span(kBundleHead).first(head));
@@ -148,8 +140,7 @@ bool DatagramWriter::add(std::span<const std::byte> message) noexcept {
   return true;
 }
 
-// RT-safe.
-void DatagramWriter::put(std::span<const std::byte> bytes) noexcept {
+RT_SAFE void DatagramWriter::put(std::span<const std::byte> bytes) noexcept {
   std::ranges::copy(bytes, room_.begin() + static_cast<std::ptrdiff_t>(size()));
   ends_[count_ - 1] += bytes.size();
 }

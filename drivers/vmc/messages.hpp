@@ -31,7 +31,7 @@ struct Status {
 class DatagramWriter {
  public:
   // The size of a bundle of kBundles: with the heads of IPv4 and UDP it has 1,500 bytes.
-  static constexpr std::size_t kMostBytes = 1472;
+  static constexpr std::size_t kMaxBytes = 1472;
 
   explicit DatagramWriter(Packing packing) noexcept : packing_(packing) {}
 
@@ -56,7 +56,7 @@ class DatagramWriter {
 
  private:
   static constexpr std::size_t kRoom = 24 * 1024;
-  static constexpr std::size_t kMostDatagrams = 256;
+  static constexpr std::size_t kMaxDatagrams = 256;
 
   bool transform(const char* address, std::string_view name, const Vec3f& position_m,
                  const Quatf& rotation_xyzw) noexcept;
@@ -66,7 +66,7 @@ class DatagramWriter {
 
   Packing packing_;
   std::size_t count_ = 0;
-  std::array<std::size_t, kMostDatagrams> ends_{};  // of each datagram, in room_
+  std::array<std::size_t, kMaxDatagrams> ends_{};  // of each datagram, in room_
   std::array<std::byte, kRoom> room_{};
 };
 

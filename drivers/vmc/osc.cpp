@@ -10,11 +10,10 @@ constexpr std::string_view kOscBundle{"#bundle\0", 8};  // with its zero
 std::size_t padded(std::size_t bytes) noexcept { return (bytes + 3) / 4 * 4; }
 
 // The text up to its zero; false when there is none, or when the padding is cut or is not zeros.
-// RT-safe.
-bool read_text(BigEndianReader& reader, std::span<const std::byte>& rest,
-               std::string_view& text) noexcept {
+RT_SAFE bool read_text(BigEndianReader& reader, std::span<const std::byte>& rest,
+                       std::string_view& text) noexcept {
   const auto end = std::ranges::find(rest, std::byte{0});
-  const auto length = static_cast<std::size_t>(end - rest.begin());
+  const std::size_t length = end - rest.begin();
   if (end == rest.end() || padded(length + 1) > rest.size()) return false;
   text = reader.text(padded(length + 1));
   rest = rest.subspan(padded(length + 1));
@@ -23,8 +22,8 @@ bool read_text(BigEndianReader& reader, std::span<const std::byte>& rest,
   return zeros;
 }
 
-// True when the arguments hold what the types say. RT-safe.
-bool holds(std::span<const std::byte> arguments, std::string_view types) noexcept {
+// True when the arguments hold what the types say.
+RT_SAFE bool holds(std::span<const std::byte> arguments, std::string_view types) noexcept {
   BigEndianReader reader(arguments);
   for (const char type : types) {
     switch (type) {
@@ -66,8 +65,7 @@ bool holds(std::span<const std::byte> arguments, std::string_view types) noexcep
   return true;
 }
 
-// RT-safe.
-bool is_sound_packet(std::span<const std::byte> packet, int depth) noexcept {
+RT_SAFE bool is_valid_packet(std::span<const std::byte> packet, int depth) noexcept {
   if (packet.empty() || packet.size() % 4 != 0) return false;
   if (!is_bundle(packet)) {
     OscMessage message;
@@ -78,15 +76,14 @@ bool is_sound_packet(std::span<const std::byte> packet, int depth) noexcept {
   while (reader.left() != 0) {
     const std::size_t size = reader.u32();
     if (!reader.ok() || size > reader.left()) return false;
-    if (!is_sound_packet(reader.bytes(size), depth + 1)) return false;
+    if (!is_valid_packet(reader.bytes(size), depth + 1)) return false;
   }
   return true;
 }
 
 }  // namespace
 
-// RT-safe.
-std::string_view OscArguments::text() noexcept {
+RT_SAFE std::string_view OscArguments::text() noexcept {
   if (!next('s')) return {};
   BigEndianReader ahead = reader_;
   const std::string_view all = ahead.text(reader_.left());
@@ -95,13 +92,11 @@ std::string_view OscArguments::text() noexcept {
   return text;
 }
 
-// RT-safe.
-bool is_bundle(std::span<const std::byte> packet) noexcept {
+RT_SAFE bool is_bundle(std::span<const std::byte> packet) noexcept {
   return BigEndianReader(packet).text(kOscBundle.size()) == kOscBundle;
 }
 
-// RT-safe.
-bool read_message(std::span<const std::byte> bytes, OscMessage& message) noexcept {
+RT_SAFE bool read_message(std::span<const std::byte> bytes, OscMessage& message) noexcept {
   BigEndianReader reader(bytes);
   if (!read_text(reader, bytes, message.address) || !message.address.starts_with('/')) return false;
   message.types = {};
@@ -113,11 +108,10 @@ bool read_message(std::span<const std::byte> bytes, OscMessage& message) noexcep
   return true;
 }
 
-// RT-safe.
-Outcome check_packet(std::span<const std::byte> packet) noexcept {
+RT_SAFE Outcome check_packet(std::span<const std::byte> packet) noexcept {
   const bool is_message = !packet.empty() && packet.front() == std::byte{'/'};
   if (!is_message && !is_bundle(packet)) return Outcome::kForeign;
-  return is_sound_packet(packet, 0) ? Outcome::kOk : Outcome::kShort;
+  return is_valid_packet(packet, 0) ? Outcome::kOk : Outcome::kShort;
 }
 
 }  // namespace posed::drivers::vmc

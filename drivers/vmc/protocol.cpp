@@ -74,9 +74,8 @@ Result<> read_values(ByteReader& reader, Described& described) {
 
 }  // namespace
 
-// RT-safe.
-std::span<const std::byte> write_description(const Described& described,
-                                             std::array<std::byte, kMaxDescribed>& room) noexcept {
+RT_SAFE std::span<const std::byte> write_description(
+    const Described& described, std::array<std::byte, kMaxDescribed>& room) noexcept {
   RoomWriter writer(room);
   writer.u8(kVersion);
   writer.name(described.title);
@@ -100,8 +99,8 @@ Result<Described> parse_description(std::span<const std::byte> bytes) {
   if (reader.u8() != kVersion) return wrong("is of another version");
   described.title = reader.text(reader.u8());
   if (!reader.ok() || described.title.size() > kMaxVmcName) return wrong("has a wrong title");
-  if (auto ok = read_bones(reader, described); !ok) return std::unexpected(ok.error());
-  if (auto ok = read_values(reader, described); !ok) return std::unexpected(ok.error());
+  TRY(read_bones(reader, described));
+  TRY(read_values(reader, described));
   if (!reader.ok()) return wrong("ends too early");
   if (reader.left() != 0) return wrong("goes on after its end");
   return described;

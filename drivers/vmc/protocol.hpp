@@ -71,12 +71,12 @@ struct Described {
 inline constexpr std::size_t kMaxDescribed =
     4 + kMaxVmcName + kBoneCount * 13 + kMaxVmcValues * (2 + kMaxVmcName);
 
-// The bytes of a description, written into `room`. RT-safe.
-[[nodiscard]] std::span<const std::byte> write_description(
+// The bytes of a description, written into `room`.
+RT_SAFE [[nodiscard]] std::span<const std::byte> write_description(
     const Described& described, std::array<std::byte, kMaxDescribed>& room) noexcept;
 
 // The description in these bytes, which are untrusted; its texts are views of them. Names are not
 // checked for being text. Cold.
-[[nodiscard]] Result<Described> parse_description(std::span<const std::byte> bytes);
+Result<Described> parse_description(std::span<const std::byte> bytes);
 
 }  // namespace posed::drivers::vmc

@@ -21,15 +21,15 @@ class SenderClock {
     if (!std::isfinite(time_s) || time_s < 0.0F) return Outcome::kOutOfRange;
     if (time_s >= kFinest_s) {
       // One such value may be damaged; many are a sender that has no usable clock.
-      if (coarse_ < kMostCoarse) ++coarse_;
-      if (coarse_ == kMostCoarse) seen_ = false;
+      if (coarse_ < kMaxCoarse) ++coarse_;
+      if (coarse_ == kMaxCoarse) seen_ = false;
       return Outcome::kOk;
     }
     coarse_ = 0;
     const double step_s = static_cast<double>(time_s) - static_cast<double>(newest_s_);
     const bool late = seen_ && step_s < 0.0 && step_s > -kLate_s;
     late_ = late ? late_ + 1 : 0;
-    if (late && late_ < kMostLate) return Outcome::kLate;
+    if (late && late_ < kMaxLate) return Outcome::kLate;
     // A larger step back is a sender that started again: time continues from where it was.
     if (seen_ && step_s > 0.0) ticks_ns_ = std::min(ticks_ns_ + nanoseconds(step_s), kLast_ns);
     seen_ = true;
@@ -45,8 +45,8 @@ class SenderClock {
   static constexpr float kFinest_s = 65536.0F;
   static constexpr std::int64_t kLast_ns = INT64_MAX / 2;
   static constexpr double kLate_s = 0.1;  // no network holds a datagram back for longer
-  static constexpr int kMostLate = 8;     // in a row; then the sender's time has gone back
-  static constexpr int kMostCoarse = 8;   // in a row
+  static constexpr int kMaxLate = 8;      // in a row; then the sender's time has gone back
+  static constexpr int kMaxCoarse = 8;    // in a row
 
   float newest_s_ = 0.0F;
   std::int64_t ticks_ns_ = 0;

@@ -4,9 +4,8 @@
 
 namespace posed::drivers::vmc {
 
-// RT-safe.
-void Values::set(ValueKind kind, std::string_view name, std::span<const float> values,
-                 std::int64_t arrival_ns) noexcept {
+RT_SAFE void Values::set(ValueKind kind, std::string_view name, std::span<const float> values,
+                         std::int64_t arrival_ns) noexcept {
   Entry* entry = find(kind, name);
   if (entry == nullptr) entry = make(kind, name, arrival_ns);
   if (entry == nullptr) return;
@@ -15,16 +14,16 @@ void Values::set(ValueKind kind, std::string_view name, std::span<const float> v
   entry->fresh = fresh_ = true;
 }
 
-// RT-safe.
-Values::Entry* Values::find(ValueKind kind, std::string_view name) noexcept {
+RT_SAFE Values::Entry* Values::find(ValueKind kind, std::string_view name) noexcept {
   const auto known = std::span(entries_).first(count_);
   const auto found = std::ranges::find_if(
       known, [&](const Entry& entry) { return entry.kind == kind && entry.name() == name; });
   return found == known.end() ? nullptr : &*found;
 }
 
-// Null when there is no place. RT-safe.
-Values::Entry* Values::make(ValueKind kind, std::string_view name, std::int64_t now_ns) noexcept {
+// Null when there is no place.
+RT_SAFE Values::Entry* Values::make(ValueKind kind, std::string_view name,
+                                    std::int64_t now_ns) noexcept {
   if (name.empty() || name.size() > kMaxVmcName) return nullptr;
   Entry* entry = nullptr;
   if (count_ < entries_.size()) {
@@ -42,16 +41,14 @@ Values::Entry* Values::make(ValueKind kind, std::string_view name, std::int64_t 
   return entry;
 }
 
-// RT-safe.
-void Values::use(const VmcLayout& layout) noexcept {
+RT_SAFE void Values::use(const VmcLayout& layout) noexcept {
   layout_ = &layout;
   for (Entry& entry : std::span(entries_).first(count_)) {
     entry.place = layout.place_of(entry.kind, entry.name());
   }
 }
 
-// RT-safe.
-void Values::fill(Sample& sample) noexcept {
+RT_SAFE void Values::fill(Sample& sample) noexcept {
   sample.value_count = static_cast<std::uint16_t>(layout_ == nullptr ? 0 : layout_->value_count);
   for (Entry& entry : std::span(entries_).first(count_)) {
     const bool there = entry.kind == ValueKind::kBlend || entry.fresh;
@@ -66,8 +63,7 @@ void Values::fill(Sample& sample) noexcept {
   fresh_ = false;
 }
 
-// RT-safe.
-void Values::describe(std::int64_t now_ns, Described& described) const noexcept {
+RT_SAFE void Values::describe(std::int64_t now_ns, Described& described) const noexcept {
   std::size_t values = 0;
   described.value_count = 0;
   for (const Entry& entry : std::span(entries_).first(count_)) {

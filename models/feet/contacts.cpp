@@ -24,14 +24,12 @@ double bell(double x) { return std::exp(-x * x); }
 
 Contacts::Contacts(const Legs& legs) noexcept : legs_(&legs), scale_(legs.scale()) {}
 
-// RT-safe.
-void Contacts::forget() noexcept {
+RT_SAFE void Contacts::forget() noexcept {
   restart();
   grounded_.fill(false);
 }
 
-// RT-safe.
-void Contacts::follow(Track& track, const Eigen::Vector3d& at_m, double dt_s) noexcept {
+RT_SAFE void Contacts::follow(Track& track, const Eigen::Vector3d& at_m, double dt_s) noexcept {
   if (track.seen) {
     const Eigen::Vector3d velocity_m_s = (at_m - track.at_m) / dt_s;
     track.velocity_m_s += smoothing(dt_s, kSpeedTau_s) * (velocity_m_s - track.velocity_m_s);
@@ -42,8 +40,8 @@ void Contacts::follow(Track& track, const Eigen::Vector3d& at_m, double dt_s) no
   track.at_m = at_m;
 }
 
-// RT-safe.
-void Contacts::judge(const Track& track, std::size_t point, PointContact& contact) const noexcept {
+RT_SAFE void Contacts::judge(const Track& track, std::size_t point,
+                             PointContact& contact) const noexcept {
   const double height_m = std::max(0.0, track.at_m.y() - ground_m_[point]);
   contact.speed_m_s = track.velocity_m_s.norm();
   const bool lasts = height_m < kLow_m * scale_ || track.slow_s >= kPatience_s;
@@ -53,8 +51,8 @@ void Contacts::judge(const Track& track, std::size_t point, PointContact& contac
   contact.weight = near * bell(contact.speed_m_s / (kWeight_m_s * scale_));
 }
 
-// RT-safe.
-void Contacts::update(const LegPose& pose, const Eigen::Vector3d& root_m, double dt_s) noexcept {
+RT_SAFE void Contacts::update(const LegPose& pose, const Eigen::Vector3d& root_m,
+                              double dt_s) noexcept {
   assert(dt_s > 0.0);
   for (std::size_t leg = 0; leg < kLegs; ++leg) {
     for (std::size_t p = 0; p < kPoints; ++p) {

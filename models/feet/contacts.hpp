@@ -22,18 +22,20 @@ class Contacts {
   // All lengths and speeds scale with `legs`, which must outlive this object.
   explicit Contacts(const Legs& legs) noexcept;
 
-  // Judges the performer's next pose, `dt_s` > 0 after the last one. RT-safe.
-  void update(const LegPose& pose, const Eigen::Vector3d& root_m, double dt_s) noexcept;
-  // The next pose does not continue the last one; the ground stays. RT-safe.
-  void restart() noexcept { started_ = false; }
-  // As restart(), and the height of the ground is forgotten, too. RT-safe.
-  void forget() noexcept;
+  // Judges the performer's next pose, `dt_s` > 0 after the last one.
+  RT_SAFE void update(const LegPose& pose, const Eigen::Vector3d& root_m, double dt_s) noexcept;
+  // The next pose does not continue the last one; the ground stays.
+  RT_SAFE void restart() noexcept { started_ = false; }
+  // As restart(), and the height of the ground is forgotten, too.
+  RT_SAFE void forget() noexcept;
 
   [[nodiscard]] const PointContact& point(std::size_t leg, std::size_t point) const noexcept {
     return contact_[leg][point];
   }
-  // Height at which a point of this kind stands [m]. RT-safe.
-  [[nodiscard]] double ground_m(std::size_t point) const noexcept { return ground_m_[point]; }
+  // Height at which a point of this kind stands [m].
+  RT_SAFE [[nodiscard]] double ground_m(std::size_t point) const noexcept {
+    return ground_m_[point];
+  }
 
  private:
   struct Track {

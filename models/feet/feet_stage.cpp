@@ -19,11 +19,11 @@ namespace posed::feet {
 namespace {
 
 constexpr double kUnknownRate_hz = 60.0;
-constexpr double kMaxStep_s = 0.1;     // a frame of the slowest stream
-constexpr double kLeastStep = 0.5;     // of the nominal one: frames that arrive together are not
-constexpr double kGap_s = 0.25;        // after a longer silence the feet have gone on unseen
-constexpr double kFastest_m_s = 12.0;  // no person runs faster
-constexpr double kJump = 0.3;          // of a leg's length: what tracking may be off by in a frame
+constexpr double kMaxStep_s = 0.1;      // a frame of the slowest stream
+constexpr double kMinStep = 0.5;        // of the nominal one: frames that arrive together are not
+constexpr double kGap_s = 0.25;         // after a longer silence the feet have gone on unseen
+constexpr double kMaxSpeed_m_s = 12.0;  // no person runs faster
+constexpr double kJump = 0.3;           // of a leg's length: what tracking may be off by in a frame
 constexpr double kChangeTau_s = 0.3;
 constexpr double kSink_m = 0.005;     // a foot may sink by so much
 constexpr double kNoChange_m = 0.01;  // a style that moves feet by less is fading out or gone
@@ -32,13 +32,12 @@ Eigen::Vector3d vector_of(const Vec3f& v) {
   return {static_cast<double>(v[0]), static_cast<double>(v[1]), static_cast<double>(v[2])};
 }
 
-// RT-safe.
-void move_root(const Eigen::Vector3d& root_m, const Eigen::Vector3d& offset_m,
-               Frame& frame) noexcept {
+RT_SAFE void move_root(const Eigen::Vector3d& root_m, const Eigen::Vector3d& offset_m,
+                       Frame& frame) noexcept {
   if (offset_m.isZero(0.0)) return;  // every bit stays
   const Eigen::Vector3d moved_m = root_m + offset_m;
   for (int i = 0; i < 3; ++i) {
-    frame.root_position_m[static_cast<std::size_t>(i)] = static_cast<float>(moved_m[i]);
+    frame.root_position_m[i] = static_cast<float>(moved_m[i]);
   }
 }
 
@@ -62,8 +61,8 @@ class FeetStage final : public Stage {
             const FeetOptions& options) noexcept;
 
   // Emits one frame for each frame in. Frames of another skeleton, and frames whose unstyled
-  // original is not known, pass through. RT-safe.
-  void process(const StageFrame& in, StageOut& out) noexcept override;
+  // original is not known, pass through.
+  RT_SAFE void process(const StageFrame& in, StageOut& out) noexcept override;
   void set(std::size_t parameter, double value) noexcept override {
     table_.set(*this, options_, parameter, value);
   }
@@ -111,8 +110,8 @@ const FeetStage::Table& FeetStage::table() {
            .min = 0.0,
            .max = 0.5,
            .live = true,
-           .people_name = "limit_cm",
-           .people_scale = 100.0}),
+           .display_name = "limit_cm",
+           .display_scale = 100.0}),
   });
   return table;
 }
@@ -122,24 +121,23 @@ FeetStage::FeetStage(std::shared_ptr<const Skeleton> skeleton, Legs legs, double
     : skeleton_(std::move(skeleton)),
       legs_(std::move(legs)),
       nominal_s_(1.0 / (rate_hz > 0.0 ? rate_hz : kUnknownRate_hz)),
-      least_s_(rate_hz > 0.0 ? kLeastStep / rate_hz : 0.0),
+      least_s_(rate_hz > 0.0 ? kMinStep / rate_hz : 0.0),
       options_(options),
       contacts_(legs_),
       root_(legs_) {}
 
-// RT-safe.
-bool FeetStage::serves(const StageFrame& in) const noexcept {
+RT_SAFE bool FeetStage::serves(const StageFrame& in) const noexcept {
   return in.input != nullptr && in.frame.skeleton == skeleton_->id &&
          in.input->skeleton == skeleton_->id;
 }
 
 // The time since the last frame [s]. A performer who has gone unseen for a while, or who is
-// somewhere else all at once, begins anew. RT-safe.
-double FeetStage::step_s(const Frame& frame, const Eigen::Vector3d& root_m) noexcept {
+// somewhere else all at once, begins anew.
+RT_SAFE double FeetStage::step_s(const Frame& frame, const Eigen::Vector3d& root_m) noexcept {
   const double gap_s = elapsed_.next_s(frame.header);
   const double dt_s = gap_s > 0.0 ? std::min(std::max(gap_s, least_s_), kMaxStep_s) : nominal_s_;
   const double moved_m = (root_m - last_root_m_).norm();
-  const double fastest_m = kFastest_m_s * std::max(gap_s, dt_s);
+  const double fastest_m = kMaxSpeed_m_s * std::max(gap_s, dt_s);
   const bool teleports = seen_ && moved_m > kJump * legs_.length_m() + fastest_m;
   if (teleports) {
     root_.forget();
@@ -151,8 +149,8 @@ double FeetStage::step_s(const Frame& frame, const Eigen::Vector3d& root_m) noex
   return dt_s;
 }
 
-// 0 while the style moves the feet, 1 where it does not. RT-safe.
-double FeetStage::gone(double dt_s) noexcept {
+// 0 while the style moves the feet, 1 where it does not.
+RT_SAFE double FeetStage::gone(double dt_s) noexcept {
   change_m_ *= std::exp(-dt_s / kChangeTau_s);
   for (std::size_t leg = 0; leg < kLegs; ++leg) {
     if (!performer_.measured[leg] || !avatar_.measured[leg]) continue;
@@ -166,23 +164,21 @@ double FeetStage::gone(double dt_s) noexcept {
   return std::clamp(1.0 - change_m_ / kNoChange_m, 0.0, 1.0);
 }
 
-// RT-safe.
-void FeetStage::restart() noexcept {
+RT_SAFE void FeetStage::restart() noexcept {
   contacts_.restart();
   root_.restart();
   for (FootHold& hold : holds_) hold.restart();
 }
 
-// RT-safe.
-void FeetStage::forget() noexcept {
+RT_SAFE void FeetStage::forget() noexcept {
   seen_ = false;
   root_.forget();
   contacts_.forget();
   holds_ = {};
 }
 
-// How high the lowest point of the performer's feet is above where such a point stands. RT-safe.
-double FeetStage::lowest_sole_m(const Eigen::Vector3d& root_m) const noexcept {
+// How high the lowest point of the performer's feet is above where such a point stands.
+RT_SAFE double FeetStage::lowest_sole_m(const Eigen::Vector3d& root_m) const noexcept {
   double lowest_m = std::numeric_limits<double>::infinity();
   for (std::size_t leg = 0; leg < kLegs; ++leg) {
     if (!performer_.measured[leg]) continue;
@@ -195,10 +191,10 @@ double FeetStage::lowest_sole_m(const Eigen::Vector3d& root_m) const noexcept {
   return lowest_m;
 }
 
-// Bends a leg so that its foot stands. `root_m` is the performer's. RT-safe.
-void FeetStage::hold(std::size_t leg, const Eigen::Vector3d& root_m,
-                     const Eigen::Vector3d& offset_m, double gone, double dt_s,
-                     Frame& frame) noexcept {
+// Bends a leg so that its foot stands. `root_m` is the performer's.
+RT_SAFE void FeetStage::hold(std::size_t leg, const Eigen::Vector3d& root_m,
+                             const Eigen::Vector3d& offset_m, double gone, double dt_s,
+                             Frame& frame) noexcept {
   const Leg& bones = legs_.leg(leg);
   FootHold& hold = holds_[leg];
   if (!performer_.measured[leg] || !avatar_.measured[leg]) return hold.restart();
@@ -232,15 +228,14 @@ void FeetStage::hold(std::size_t leg, const Eigen::Vector3d& root_m,
   write_leg(*skeleton_, bones, avatar_, bent, turn * avatar_.world_rotation[foot], frame);
 }
 
-// RT-safe.
-void FeetStage::process(const StageFrame& in, StageOut& out) noexcept {
+RT_SAFE void FeetStage::process(const StageFrame& in, StageOut& out) noexcept {
   const Eigen::Vector3d root_m = vector_of(in.frame.root_position_m);
   if (!serves(in)) {
     forget();
     return out.frame(in);
   }
   // Without a root nothing is known of the feet, but the avatar stays where it was.
-  const bool rooted = in.frame.valid[static_cast<std::size_t>(skeleton_->root_joint)];
+  const bool rooted = in.frame.valid[skeleton_->root_joint];
   if (!rooted || !root_m.allFinite()) {
     restart();
     Frame frame = in.frame;
@@ -256,16 +251,15 @@ void FeetStage::process(const StageFrame& in, StageOut& out) noexcept {
   const Eigen::Vector3d offset_m = root_.update(pair, contacts_, gone_now, dt_s, options_.root);
   Frame frame = in.frame;
   move_root(root_m, offset_m, frame);
-  const double let_go = options_.root.mode == RootMode::kOff ? 1.0 : gone_now;
-  for (std::size_t leg = 0; leg < kLegs; ++leg) hold(leg, root_m, offset_m, let_go, dt_s, frame);
+  const double released = options_.root.mode == RootMode::kOff ? 1.0 : gone_now;
+  for (std::size_t leg = 0; leg < kLegs; ++leg) hold(leg, root_m, offset_m, released, dt_s, frame);
   out.frame({.frame = frame, .variance_rad2 = in.variance_rad2, .input = in.input});
 }
 
 Result<std::unique_ptr<Stage>> make_stage(std::shared_ptr<const Skeleton> skeleton, double rate_hz,
                                           const FeetOptions& options) {
-  auto legs = Legs::find(*skeleton);
-  if (!legs) return std::unexpected(legs.error());
-  return std::make_unique<FeetStage>(std::move(skeleton), std::move(*legs), rate_hz, options);
+  auto legs = TRY(Legs::find(*skeleton));
+  return std::make_unique<FeetStage>(std::move(skeleton), std::move(legs), rate_hz, options);
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ namespace posed::feet {
 
 // The stage for an offline command. `rate_hz`: nominal, for frames without times; 0: unknown.
 // Returns an error for a skeleton whose legs cannot be found.
-[[nodiscard]] Result<std::unique_ptr<Stage>> make_feet_stage(
-    std::shared_ptr<const Skeleton> skeleton, double rate_hz, const RootOptions& root);
+Result<std::unique_ptr<Stage>> make_feet_stage(std::shared_ptr<const Skeleton> skeleton,
+                                               double rate_hz, const RootOptions& root);
 
 }  // namespace posed::feet

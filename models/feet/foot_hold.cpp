@@ -22,9 +22,9 @@ constexpr double kHeld = 0.5;  // from this on the foot stands
 
 }  // namespace
 
-// Moves and turns the foot as the performer's. RT-safe.
-void FootHold::stand(const FootPair& pair, const std::array<PointContact, kPoints>& contact,
-                     double hold) noexcept {
+// Moves and turns the foot as the performer's.
+RT_SAFE void FootHold::stand(const FootPair& pair, const std::array<PointContact, kPoints>& contact,
+                             double hold) noexcept {
   const FootPair::Foot& performer = pair.performer;
   const FootPair::Foot& avatar = pair.avatar;
   const Quaterniond old_turn(rotation_exp(change_.turn_rad));
@@ -49,11 +49,10 @@ void FootHold::stand(const FootPair& pair, const std::array<PointContact, kPoint
   if (weight > 0.0) change_.ankle_m += hold * wanted_m / weight;
 }
 
-// RT-safe.
-const FootHold::Change& FootHold::update(const FootPair& pair,
-                                         const std::array<PointContact, kPoints>& contact,
-                                         const HoldOptions& options, double gone,
-                                         double dt_s) noexcept {
+RT_SAFE const FootHold::Change& FootHold::update(const FootPair& pair,
+                                                 const std::array<PointContact, kPoints>& contact,
+                                                 const HoldOptions& options, double gone,
+                                                 double dt_s) noexcept {
   assert(dt_s > 0.0);
   const double most = std::max(contact[kAnkle].weight, contact[kToe].weight);
   const double hold = options.share * std::min(1.0, kGain * most) * (1.0 - gone);

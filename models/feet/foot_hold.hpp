@@ -43,13 +43,13 @@ class FootHold {
   };
 
   // Advances by a frame, `dt_s` > 0 after the last one. `gone`: 1 where the style moves no foot.
-  // RT-safe.
-  const Change& update(const FootPair& pair, const std::array<PointContact, kPoints>& contact,
-                       const HoldOptions& options, double gone, double dt_s) noexcept;
-  // Call where the leg could not reach so far: the ankle was moved by this only. RT-safe.
-  void reached(const Eigen::Vector3d& ankle_m) noexcept { change_.ankle_m = ankle_m; }
-  // The next frame does not continue the last one. The change stays. RT-safe.
-  void restart() noexcept { started_ = false; }
+  RT_SAFE const Change& update(const FootPair& pair,
+                               const std::array<PointContact, kPoints>& contact,
+                               const HoldOptions& options, double gone, double dt_s) noexcept;
+  // Call where the leg could not reach so far: the ankle was moved by this only.
+  RT_SAFE void reached(const Eigen::Vector3d& ankle_m) noexcept { change_.ankle_m = ankle_m; }
+  // The next frame does not continue the last one. The change stays.
+  RT_SAFE void restart() noexcept { started_ = false; }
 
  private:
   void stand(const FootPair& pair, const std::array<PointContact, kPoints>& contact,

@@ -55,8 +55,8 @@ std::optional<double> slide_m_s(const motion::Motion& source, const motion::Moti
   FootPoints source_before(*legs, source.frames[0]);
   FootPoints moved_before(*legs, moved.frames[0]);
   for (int t = 1; t < frames; ++t) {
-    const FootPoints source_now(*legs, source.frames[static_cast<std::size_t>(t)]);
-    const FootPoints moved_now(*legs, moved.frames[static_cast<std::size_t>(t)]);
+    const FootPoints source_now(*legs, source.frames[t]);
+    const FootPoints moved_now(*legs, moved.frames[t]);
     for (std::size_t leg = 0; leg < kLegs; ++leg) {
       for (const std::size_t p : {kAnkle, kToe}) {
         const auto knows = [&](const FootPoints& points) { return points.known[leg][p]; };
@@ -120,8 +120,7 @@ double root_speed_m_s(const motion::Motion& motion, double period_s) {
   const int apart = std::max(1, static_cast<int>(std::lround(period_s * motion.rate_hz)));
   std::vector<double> far_m;
   for (int t = apart; t < motion.size(); ++t) {
-    far_m.push_back(over_ground_m(root_of(motion.frames[static_cast<std::size_t>(t)]) -
-                                  root_of(motion.frames[static_cast<std::size_t>(t - apart)])));
+    far_m.push_back(over_ground_m(root_of(motion.frames[t]) - root_of(motion.frames[t - apart])));
   }
   if (far_m.empty()) return 0.0;
   return median(far_m) * motion.rate_hz / apart;

@@ -11,20 +11,20 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kStraight = 0.1;    // below this sine of the knee's bend its hinge leads
-constexpr double kReversed = 0.35;   // a knee that is bent backwards by more is built that way
-constexpr double kEase = 0.15;       // of the leg's length and rad: over it a knee turns forward
-constexpr double kSoftFrom = 0.97;   // of the leg's length: beyond, it straightens ever slower
-constexpr double kLongest = 0.9995;  // a leg is never quite straight
-constexpr double kShortest = 0.3;
+constexpr double kStraight = 0.1;     // below this sine of the knee's bend its hinge leads
+constexpr double kReversed = 0.35;    // a knee that is bent backwards by more is built that way
+constexpr double kEase = 0.15;        // of the leg's length and rad: over it a knee turns forward
+constexpr double kSoftFrom = 0.97;    // of the leg's length: beyond, it straightens ever slower
+constexpr double kMaxReach = 0.9995;  // a leg is never quite straight
+constexpr double kMinReach = 0.3;
 
-std::size_t at(int joint) { return static_cast<std::size_t>(joint); }
+std::size_t at(int joint) { return joint; }
 
 // The distance that the leg makes of a wanted one. A leg that is straighter already stays so.
 double reachable_m(double wanted_m, double now_m, double length_m) {
-  const double longest_m = std::max(kLongest * length_m, std::min(now_m, length_m));
+  const double longest_m = std::max(kMaxReach * length_m, std::min(now_m, length_m));
   const double soft_m = std::min(std::max(kSoftFrom * length_m, now_m), longest_m);
-  if (wanted_m <= soft_m) return std::max(wanted_m, std::min(now_m, kShortest * length_m));
+  if (wanted_m <= soft_m) return std::max(wanted_m, std::min(now_m, kMinReach * length_m));
   const double room_m = longest_m - soft_m;
   if (room_m <= 0.0) return longest_m;
   return longest_m - room_m * std::exp(-(wanted_m - soft_m) / room_m);
@@ -70,9 +70,8 @@ Vector3d hinge_of(const Skeleton& skeleton, const Leg& leg, const LegPose& pose)
 
 }  // namespace
 
-// RT-safe.
-Reach reach(const Skeleton& skeleton, const Leg& leg, const LegPose& pose,
-            const Vector3d& ankle_m) noexcept {
+RT_SAFE Reach reach(const Skeleton& skeleton, const Leg& leg, const LegPose& pose,
+                    const Vector3d& ankle_m) noexcept {
   const Vector3d& hip_m = pose.from_root_m[at(leg.thigh)];
   const Vector3d& knee_m = pose.from_root_m[at(leg.shin)];
   const Vector3d thigh_m = knee_m - hip_m;
@@ -94,9 +93,8 @@ Reach reach(const Skeleton& skeleton, const Leg& leg, const LegPose& pose,
   return {.ankle_m = hip_m + turn * bent_m, .leg_turn = turn, .knee_turn = knee};
 }
 
-// RT-safe.
-void write_leg(const Skeleton& skeleton, const Leg& leg, const LegPose& pose, const Reach& bent,
-               const Quaterniond& foot, Frame& frame) noexcept {
+RT_SAFE void write_leg(const Skeleton& skeleton, const Leg& leg, const LegPose& pose,
+                       const Reach& bent, const Quaterniond& foot, Frame& frame) noexcept {
   const auto parent_of = [&](int joint) {
     const int parent = skeleton.joints[at(joint)].parent;
     return parent < 0 ? Quaterniond::Identity() : pose.world_rotation[at(parent)];

@@ -17,13 +17,13 @@ struct Reach {
 };
 
 // Bends `leg` of `pose` so that its ankle gets to `ankle_m`. Places are from the root joint, in
-// world axes. RT-safe.
-[[nodiscard]] Reach reach(const Skeleton& skeleton, const Leg& leg, const LegPose& pose,
-                          const Eigen::Vector3d& ankle_m) noexcept;
+// world axes.
+RT_SAFE [[nodiscard]] Reach reach(const Skeleton& skeleton, const Leg& leg, const LegPose& pose,
+                                  const Eigen::Vector3d& ankle_m) noexcept;
 
 // Writes the bent leg into `frame`, whose pose `pose` was, with the foot turned to `foot` in the
-// world. RT-safe.
-void write_leg(const Skeleton& skeleton, const Leg& leg, const LegPose& pose, const Reach& bent,
-               const Eigen::Quaterniond& foot, Frame& frame) noexcept;
+// world.
+RT_SAFE void write_leg(const Skeleton& skeleton, const Leg& leg, const LegPose& pose,
+                       const Reach& bent, const Eigen::Quaterniond& foot, Frame& frame) noexcept;
 
 }  // namespace posed::feet

@@ -20,7 +20,7 @@ constexpr std::array<LegBones, kLegs> kLegBones{{
 
 std::vector<int> chain_to(const Skeleton& skeleton, int joint) {
   std::vector<int> chain;
-  for (int j = joint; j >= 0; j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
+  for (int j = joint; j >= 0; j = skeleton.joints[j].parent) {
     chain.push_back(j);
   }
   std::ranges::reverse(chain);
@@ -31,15 +31,15 @@ std::vector<int> chain_to(const Skeleton& skeleton, int joint) {
 // no joints there.
 double length_between_m(const Skeleton& skeleton, int from, int to) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (int j = to; j >= 0 && j != from; j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
-    sum += skeleton.joints[static_cast<std::size_t>(j)].offset_m;
+  for (int j = to; j >= 0 && j != from; j = skeleton.joints[j].parent) {
+    sum += skeleton.joints[j].offset_m;
   }
   return sum.norm();
 }
 
 // The tip of a joint that has one.
 Leg::Place tip_of(const Skeleton& skeleton, int joint) {
-  const auto& end = skeleton.joints[static_cast<std::size_t>(joint)].end_site_m;
+  const auto& end = skeleton.joints[joint].end_site_m;
   if (!end || end->norm() < kNoLength_m) return {};
   return {.joint = joint, .offset_m = *end};
 }
@@ -90,37 +90,35 @@ Result<Legs> Legs::find(const Skeleton& skeleton) {
   std::ranges::sort(needed);
   needed.erase(std::unique(needed.begin(), needed.end()), needed.end());
   for (const int j : needed) {
-    const Joint& joint = skeleton.joints[static_cast<std::size_t>(j)];
+    const Joint& joint = skeleton.joints[j];
     legs.joints_.push_back({.joint = j, .parent = joint.parent, .offset_m = joint.offset_m});
   }
   legs.root_ = skeleton.root_joint;
   return legs;
 }
 
-// RT-safe.
-void Legs::pose(const Frame& frame, LegPose& pose) const noexcept {
+RT_SAFE void Legs::pose(const Frame& frame, LegPose& pose) const noexcept {
   for (const Link& bone : joints_) {
-    const auto j = static_cast<std::size_t>(bone.joint);
+    const std::size_t j = bone.joint;
     const Eigen::Quaterniond local = to_eigen_double(frame.rotation_xyzw[j]);
     if (bone.parent < 0) {
       pose.world_rotation[j] = local;
       pose.from_root_m[j].setZero();
       continue;
     }
-    const auto parent = static_cast<std::size_t>(bone.parent);
+    const std::size_t parent = bone.parent;
     pose.world_rotation[j] = pose.world_rotation[parent] * local;
     pose.from_root_m[j] = pose.from_root_m[parent] + pose.world_rotation[parent] * bone.offset_m;
   }
-  const Eigen::Vector3d root = pose.from_root_m[static_cast<std::size_t>(root_)];
-  for (const Link& bone : joints_) pose.from_root_m[static_cast<std::size_t>(bone.joint)] -= root;
+  const Eigen::Vector3d root = pose.from_root_m[root_];
+  for (const Link& bone : joints_) pose.from_root_m[bone.joint] -= root;
   for (std::size_t i = 0; i < kLegs; ++i) {
     const Leg& leg = legs_[i];
-    pose.measured[i] = leg.exists() && std::ranges::all_of(leg.chain, [&](int j) {
-                         return frame.valid[static_cast<std::size_t>(j)];
-                       });
+    pose.measured[i] =
+        leg.exists() && std::ranges::all_of(leg.chain, [&](int j) { return frame.valid[j]; });
     for (std::size_t p = 0; p < kPoints; ++p) {
       if (!leg.has(p)) continue;
-      const auto j = static_cast<std::size_t>(leg.points[p].joint);
+      const std::size_t j = leg.points[p].joint;
       Eigen::Vector3d& at_m = pose.point_from_root_m[i][p];
       at_m = pose.from_root_m[j] + pose.world_rotation[j] * leg.points[p].offset_m;
       // A rotation that is none counts as not measured, whatever its flag says.

@@ -53,10 +53,9 @@ class Legs {
  public:
   // Finds the legs by the canonical bones of the joints. One leg is enough; none is an error that
   // says which bones are missing. Cold.
-  [[nodiscard]] static Result<Legs> find(const Skeleton& skeleton);
+  static Result<Legs> find(const Skeleton& skeleton);
 
-  // RT-safe.
-  void pose(const Frame& frame, LegPose& pose) const noexcept;
+  RT_SAFE void pose(const Frame& frame, LegPose& pose) const noexcept;
 
   [[nodiscard]] const Leg& leg(std::size_t index) const noexcept { return legs_[index]; }
   // Thigh and shin of the longer leg [m].

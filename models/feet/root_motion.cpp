@@ -31,8 +31,7 @@ Eigen::Vector3d shortened(const Eigen::Vector3d& v, double length) {
 
 RootMotion::RootMotion(const Legs& legs) noexcept : legs_(&legs), scale_(legs.scale()) {}
 
-// RT-safe.
-void RootMotion::forget() noexcept {
+RT_SAFE void RootMotion::forget() noexcept {
   restart();
   offset_m_.setZero();
   drift_m_s_.setZero();
@@ -43,8 +42,9 @@ void RootMotion::forget() noexcept {
 }
 
 // The offset moves so that standing points move over the ground as the performer's do: the weighted
-// mean of what each of them asks for. RT-safe.
-void RootMotion::walk(const OfPoints<Placed>& now, const Contacts& contacts, double dt_s) noexcept {
+// mean of what each of them asks for.
+RT_SAFE void RootMotion::walk(const OfPoints<Placed>& now, const Contacts& contacts,
+                              double dt_s) noexcept {
   double weight = 0.0;
   Eigen::Vector3d wanted_m = Eigen::Vector3d::Zero();
   for (std::size_t leg = 0; leg < kLegs; ++leg) {
@@ -70,8 +70,8 @@ void RootMotion::walk(const OfPoints<Placed>& now, const Contacts& contacts, dou
   pending_m_ -= smooth_m;
 }
 
-// The way back to the performer, over the ground. RT-safe.
-void RootMotion::come_back(double gone, double dt_s, RootMode mode) noexcept {
+// The way back to the performer, over the ground.
+RT_SAFE void RootMotion::come_back(double gone, double dt_s, RootMode mode) noexcept {
   const double share = mode == RootMode::kActor ? kReturnTau_s / kActorTau_s : gone;
   const Eigen::Vector3d back =
       approached(Eigen::Vector3d(offset_m_.x(), 0.0, offset_m_.z()), share * dt_s / kReturnTau_s,
@@ -81,9 +81,9 @@ void RootMotion::come_back(double gone, double dt_s, RootMode mode) noexcept {
 }
 
 // How high the lowest points of a body are above where such points stand; those within a few
-// centimetres of the lowest count gradually, so that another lowest point is no step. RT-safe.
-double RootMotion::lowest_m(const OfPoints<Placed>& now, const Contacts& contacts,
-                            Eigen::Vector3d Placed::* body) const noexcept {
+// centimetres of the lowest count gradually, so that another lowest point is no step.
+RT_SAFE double RootMotion::lowest_m(const OfPoints<Placed>& now, const Contacts& contacts,
+                                    Eigen::Vector3d Placed::* body) const noexcept {
   double lowest_m = std::numeric_limits<double>::infinity();
   for (const auto& leg : now) {
     for (std::size_t p = 0; p < kPoints; ++p) {
@@ -101,9 +101,9 @@ double RootMotion::lowest_m(const OfPoints<Placed>& now, const Contacts& contact
   return lowest_m - soft_m * std::log(sum);
 }
 
-// The height that brings the avatar's feet as near to the ground as the performer's. RT-safe.
-void RootMotion::lift(const OfPoints<Placed>& now, const Contacts& contacts, double gone,
-                      double dt_s) noexcept {
+// The height that brings the avatar's feet as near to the ground as the performer's.
+RT_SAFE void RootMotion::lift(const OfPoints<Placed>& now, const Contacts& contacts, double gone,
+                              double dt_s) noexcept {
   const double wanted_m =
       lowest_m(now, contacts, &Placed::performer_m) - lowest_m(now, contacts, &Placed::avatar_m);
   if (!std::isfinite(wanted_m)) return;  // no foot is known
@@ -112,8 +112,7 @@ void RootMotion::lift(const OfPoints<Placed>& now, const Contacts& contacts, dou
   if (gone >= 1.0 && std::abs(offset_m_.y()) < kSettled_m) offset_m_.y() = 0.0;
 }
 
-// RT-safe.
-OfPoints<RootMotion::Placed> RootMotion::placed(const PosePair& pair) const noexcept {
+RT_SAFE OfPoints<RootMotion::Placed> RootMotion::placed(const PosePair& pair) const noexcept {
   OfPoints<Placed> now{};
   for (std::size_t leg = 0; leg < kLegs; ++leg) {
     if (!pair.performer.measured[leg] || !pair.avatar.measured[leg]) continue;
@@ -127,17 +126,17 @@ OfPoints<RootMotion::Placed> RootMotion::placed(const PosePair& pair) const noex
   return now;
 }
 
-// Whether the same points are known as in the frame before. RT-safe.
-bool RootMotion::same_points(const OfPoints<Placed>& now) const noexcept {
+// Whether the same points are known as in the frame before.
+RT_SAFE bool RootMotion::same_points(const OfPoints<Placed>& now) const noexcept {
   for (std::size_t leg = 0; leg < kLegs; ++leg) {
     if (now[leg][kAnkle].known != before_[leg][kAnkle].known) return false;
   }
   return true;
 }
 
-// RT-safe.
-Eigen::Vector3d RootMotion::update(const PosePair& pair, const Contacts& contacts, double gone,
-                                   double dt_s, const RootOptions& options) noexcept {
+RT_SAFE Eigen::Vector3d RootMotion::update(const PosePair& pair, const Contacts& contacts,
+                                           double gone, double dt_s,
+                                           const RootOptions& options) noexcept {
   assert(dt_s > 0.0);
   const OfPoints<Placed> now = placed(pair);
   const bool off = options.mode == RootMode::kOff;

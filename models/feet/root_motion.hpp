@@ -52,15 +52,15 @@ class RootMotion {
   explicit RootMotion(const Legs& legs) noexcept;
 
   // The offset of the avatar's root [m] for a frame, `dt_s` > 0 after the last one. `gone` is 0
-  // while the poses differ and 1 where they do not: then the offset returns to 0. RT-safe.
-  Eigen::Vector3d update(const PosePair& pair, const Contacts& contacts, double gone, double dt_s,
-                         const RootOptions& options) noexcept;
-  // The offset of the last frame [m]. RT-safe.
-  [[nodiscard]] const Eigen::Vector3d& offset_m() const noexcept { return emitted_m_; }
-  // The next frame does not continue the last one. The offset stays. RT-safe.
-  void restart() noexcept { started_ = false; }
-  // Restarts with the avatar where the performer is. RT-safe.
-  void forget() noexcept;
+  // while the poses differ and 1 where they do not: then the offset returns to 0.
+  RT_SAFE Eigen::Vector3d update(const PosePair& pair, const Contacts& contacts, double gone,
+                                 double dt_s, const RootOptions& options) noexcept;
+  // The offset of the last frame [m].
+  RT_SAFE [[nodiscard]] const Eigen::Vector3d& offset_m() const noexcept { return emitted_m_; }
+  // The next frame does not continue the last one. The offset stays.
+  RT_SAFE void restart() noexcept { started_ = false; }
+  // Restarts with the avatar where the performer is.
+  RT_SAFE void forget() noexcept;
 
  private:
   struct Placed {

@@ -25,11 +25,10 @@ BoundModel::BoundModel(trajectory::StateInformation states,
 Result<std::unique_ptr<const BoundModel>> bind_model(gesture::GestureModel model,
                                                      const Skeleton& skeleton, double rate_hz,
                                                      std::string name) {
-  auto live = smooth::bind_live_model(model, skeleton, name);
-  if (!live) return std::unexpected(live.error());
+  auto live = TRY(smooth::bind_live_model(model, skeleton, name));
   auto shared = std::make_shared<const gesture::GestureModel>(std::move(model));
   return std::make_unique<const BoundModel>(
-      trajectory::StateInformation(std::move(shared), stream_rate_hz(rate_hz)), std::move(*live),
+      trajectory::StateInformation(std::move(shared), stream_rate_hz(rate_hz)), std::move(live),
       std::move(name));
 }
 

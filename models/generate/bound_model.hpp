@@ -38,9 +38,8 @@ struct BoundModel final : StageModel {
 
 // Returns an error for a skeleton that lacks channels of the model. `rate_hz` is the stream's, 0 if
 // unknown. Cold.
-[[nodiscard]] Result<std::unique_ptr<const BoundModel>> bind_model(gesture::GestureModel model,
-                                                                   const Skeleton& skeleton,
-                                                                   double rate_hz,
-                                                                   std::string name);
+Result<std::unique_ptr<const BoundModel>> bind_model(gesture::GestureModel model,
+                                                     const Skeleton& skeleton, double rate_hz,
+                                                     std::string name);
 
 }  // namespace posed::generate

@@ -32,7 +32,7 @@ GenerateStage::GenerateStage(std::shared_ptr<const Skeleton> skeleton,
       player_(rate_hz, gesture::most_channels(*skeleton_)),
       model_(model),
       period_ns_(nanoseconds(1.0 / rate_hz)),
-      live_(static_cast<std::size_t>(gesture::most_channels(*skeleton_))),
+      live_(gesture::most_channels(*skeleton_)),
       read_(live_.size()) {
   if (hand_side(*skeleton_)) {
     hand_ = gesture::PoseChannels::of_hand(*skeleton_);
@@ -43,8 +43,7 @@ GenerateStage::GenerateStage(std::shared_ptr<const Skeleton> skeleton,
   use_channels();
 }
 
-// RT-safe.
-void GenerateStage::use_channels() noexcept {
+RT_SAFE void GenerateStage::use_channels() noexcept {
   if (hand_) {
     pose_channels_ = &*hand_;
   } else {
@@ -52,8 +51,7 @@ void GenerateStage::use_channels() noexcept {
   }
 }
 
-// RT-safe.
-void GenerateStage::use(const StageModel& model) noexcept {
+RT_SAFE void GenerateStage::use(const StageModel& model) noexcept {
   model_ = static_cast<const BoundModel*>(&model);
   static_cast<void>(smoother_.set_model(model_->live.get()));
   player_.set_model(model_);
@@ -65,16 +63,14 @@ void GenerateStage::use(const StageModel& model) noexcept {
   player_.go_on_from(used(live_));
 }
 
-// RT-safe.
-bool GenerateStage::command(std::size_t index, const StageCommand& command) noexcept {
+RT_SAFE bool GenerateStage::command(std::size_t index, const StageCommand& command) noexcept {
   if (index == kPlay) return player_.play(command.as<gesture::PlayOrder>());
   player_.stop();
   return true;
 }
 
-// RT-safe.
-void GenerateStage::describe(std::size_t index, const StageCommand& command,
-                             ShortText& text) const noexcept {
+RT_SAFE void GenerateStage::describe(std::size_t index, const StageCommand& command,
+                                     ShortText& text) const noexcept {
   if (index != kPlay || model_ == nullptr) return;
   const auto& labels = model_->gesture().labels;
   const auto order = command.as<gesture::PlayOrder>();
@@ -95,8 +91,7 @@ class GenerateStage::Smoothed final : public StageOut {
   StageOut& out_;
 };
 
-// RT-safe.
-void GenerateStage::process(const StageFrame& in, StageOut& out) noexcept {
+RT_SAFE void GenerateStage::process(const StageFrame& in, StageOut& out) noexcept {
   Smoothed smoothed(*this, out);
   if (in.frame.skeleton != skeleton_->id) {
     smoother_.flush(smoothed);
@@ -109,22 +104,19 @@ void GenerateStage::process(const StageFrame& in, StageOut& out) noexcept {
   }
 }
 
-// RT-safe.
-void GenerateStage::heard(std::int64_t arrival_ns) noexcept {
-  last_heard_ns_ = arrival_ns;
+RT_SAFE void GenerateStage::received(std::int64_t arrival_ns) noexcept {
+  last_received_ns_ = arrival_ns;
   last_tick_ns_ = kNoTime_ns;
 }
 
-// RT-safe.
-std::int64_t GenerateStage::next_due_ns() const noexcept {
+RT_SAFE std::int64_t GenerateStage::next_due_ns() const noexcept {
   const bool waiting = entered_ != 0 || performs();
-  if (!waiting || last_heard_ns_ == kNoTime_ns) return kNoTime_ns;
+  if (!waiting || last_received_ns_ == kNoTime_ns) return kNoTime_ns;
   if (last_tick_ns_ != kNoTime_ns) return last_tick_ns_ + period_ns_;
-  return last_heard_ns_ + std::max(kSilence_ns, kSilentFrames * period_ns_);
+  return last_received_ns_ + std::max(kSilence_ns, kSilentFrames * period_ns_);
 }
 
-// RT-safe.
-void GenerateStage::tick(std::int64_t now_ns, StageOut& out) noexcept {
+RT_SAFE void GenerateStage::tick(std::int64_t now_ns, StageOut& out) noexcept {
   last_tick_ns_ = now_ns;
   flush(out);
   if (!performs() || !has_last_) return;
@@ -136,14 +128,13 @@ void GenerateStage::tick(std::int64_t now_ns, StageOut& out) noexcept {
   show(last_, only_performs ? std::span<const double>() : used(live_), out);
 }
 
-// RT-safe.
-void GenerateStage::flush(StageOut& out) noexcept {
+RT_SAFE void GenerateStage::flush(StageOut& out) noexcept {
   Smoothed smoothed(*this, out);
   smoother_.flush(smoothed);
 }
 
-// A frame comes out of the smoother. RT-safe.
-void GenerateStage::smoothed(const StageFrame& in, StageOut& out) noexcept {
+// A frame comes out of the smoother.
+RT_SAFE void GenerateStage::smoothed(const StageFrame& in, StageOut& out) noexcept {
   entered_ = std::max(entered_ - 1, 0);
   channels_ = std::min(in.variance_rad2.size(), variance_rad2_.size());
   std::copy_n(in.variance_rad2.begin(), channels_, variance_rad2_.begin());
@@ -157,8 +148,8 @@ void GenerateStage::smoothed(const StageFrame& in, StageOut& out) noexcept {
   show(last_, used(live_), out);
 }
 
-// A frame of a stream that only performs: a hand at rest, or a body as it stands. RT-safe.
-void GenerateStage::rest(const StageFrame& in, StageOut& out) noexcept {
+// A frame of a stream that only performs: a hand at rest, or a body as it stands.
+RT_SAFE void GenerateStage::rest(const StageFrame& in, StageOut& out) noexcept {
   if (pose_channels_ == nullptr) return out.frame(in);
   const bool first = !std::exchange(has_last_, true);
   last_ = in.frame;
@@ -169,8 +160,8 @@ void GenerateStage::rest(const StageFrame& in, StageOut& out) noexcept {
   show(last_, {}, out);
 }
 
-// Reads the live pose from a frame; what it did not measure stays. RT-safe.
-void GenerateStage::follow(const Frame& frame) noexcept {
+// Reads the live pose from a frame; what it did not measure stays.
+RT_SAFE void GenerateStage::follow(const Frame& frame) noexcept {
   const double dt_s = std::min(elapsed_.next_s(frame.header), kMaxStep_s);
   if (pose_channels_->has_heading(frame)) {
     static_cast<void>(heading_.update(pose_channels_->heading_rad(frame), dt_s));
@@ -183,15 +174,16 @@ void GenerateStage::follow(const Frame& frame) noexcept {
   }
 }
 
-// What the player makes of the frame goes out. RT-safe.
-void GenerateStage::show(Frame& frame, std::span<const double> live, StageOut& out) noexcept {
+// What the player makes of the frame goes out.
+RT_SAFE void GenerateStage::show(Frame& frame, std::span<const double> live,
+                                 StageOut& out) noexcept {
   const GesturePlayer::Pose shown = player_.step(live);
   if (shown.what != GesturePlayer::What::kLive) pose(shown, frame);
   if (shown.what == GesturePlayer::What::kPerformed) {
-    const std::string& name = model_->gesture().labels[static_cast<std::size_t>(shown.label)].name;
+    const std::string& name = model_->gesture().labels[shown.label].name;
     std::copy_n(name.begin(), std::min(name.size(), frame.label.size() - 1), frame.label.begin());
     frame.label_probability = 1.0F;
-    const auto all = static_cast<std::size_t>(frame.angle_count);
+    const std::size_t all = frame.angle_count;
     if (channels_ < all) {  // the smoother did not see this frame: it is exact but for these
       std::fill(variance_rad2_.begin(), variance_rad2_.begin() + frame.angle_count, 0.0);
       channels_ = all;
@@ -201,8 +193,8 @@ void GenerateStage::show(Frame& frame, std::span<const double> live, StageOut& o
   out.frame({.frame = frame, .variance_rad2 = variance_rad2()});
 }
 
-// A body stays where its feet are: the model knows no place of the root. RT-safe.
-void GenerateStage::pose(const GesturePlayer::Pose& shown, Frame& frame) noexcept {
+// A body stays where its feet are: the model knows no place of the root.
+RT_SAFE void GenerateStage::pose(const GesturePlayer::Pose& shown, Frame& frame) noexcept {
   if (standing_) {
     const perform::Standing::Feet places_m = standing_->feet_m(frame);
     pose_channels_->write(shown.angles, heading_.value_rad(), frame);
@@ -234,9 +226,8 @@ bool takes(const v1::ModelFile& file) { return file.has_gesture(); }
 Result<std::unique_ptr<const StageModel>> bind(std::span<const std::byte> file,
                                                const StageContext& context,
                                                const std::string& name) {
-  auto model = gesture::parse_model(file, name);
-  if (!model) return std::unexpected(model.error());
-  return bind_model(std::move(*model), *context.skeleton, context.rate_hz, name);
+  auto model = TRY(gesture::parse_model(file, name));
+  return bind_model(std::move(model), *context.skeleton, context.rate_hz, name);
 }
 
 std::optional<ParameterFault> check(const Parameters& parameters, bool has_model) {
@@ -259,10 +250,9 @@ Result<StageCommand> play(const StageModel* model, std::span<const std::string> 
     return fail("there is no gesture model; send one with `posed ctl model STREAM H.gesture`");
   }
   const auto order =
-      gesture::make_play_order(*gesture_of(model), words, parameter<double>(options, "tempo"),
-                               parameter<bool>(options, "loop"));
-  if (!order) return std::unexpected(order.error());
-  return StageCommand::of(*order);
+      TRY(gesture::make_play_order(*gesture_of(model), words, parameter<double>(options, "tempo"),
+                                   parameter<bool>(options, "loop")));
+  return StageCommand::of(order);
 }
 
 void play_to_log(const StageCommand& command, v1::DecisionValue& value) {
@@ -276,7 +266,7 @@ std::optional<StageCommand> play_from_log(const v1::DecisionValue& value) {
   constexpr std::uint32_t kMaxLabelIndex = std::numeric_limits<std::uint16_t>::max();
   PlayOrder order;
   const auto& play = value.play();
-  const auto count = static_cast<std::size_t>(play.label_size());
+  const std::size_t count = play.label_size();
   if (!value.has_play() || count == 0 || count > order.label.size()) return std::nullopt;
   for (const std::uint32_t label : play.label()) {
     if (label > kMaxLabelIndex) return std::nullopt;
@@ -322,15 +312,15 @@ const Table& parameter_table() {
              .help = "the lag as a time instead; 0: use lag_frames",
              .min = 0.0,
              .max = smooth::kMaxLag_s,
-             .people_name = "lag_ms",
-             .people_scale = 1e3}),
+             .display_name = "lag_ms",
+             .display_scale = 1e3}),
         Table::row<&smooth::LiveOptions::noise_rad>(
             {.name = "noise_rad",
              .help = "standard deviation of the sensor's noise; 0: estimated from the stream",
              .min = 0.0,
              .max = kMaxNoise_rad,
-             .people_name = "noise_deg",
-             .people_scale = 1.0 / kDegree}),
+             .display_name = "noise_deg",
+             .display_scale = 1.0 / kDegree}),
         {.spec = {.name = "labels",
                   .default_value = std::string(),
                   .help = "performed from the start: \"g 1 c\""}}};
@@ -372,9 +362,8 @@ Result<std::optional<StageType::FirstCommand>> first_command(const Parameters& p
                                                              std::span<const std::byte> /*file*/) {
   const auto labels = gesture::split_labels(parameter<std::string>(parameters, "labels"));
   if (labels.empty()) return std::nullopt;
-  const auto command = play(model, labels, parameters);
-  if (!command) return std::unexpected(command.error());
-  return StageType::FirstCommand{GenerateStage::kPlay, *command};
+  const auto command = TRY(play(model, labels, parameters));
+  return StageType::FirstCommand{GenerateStage::kPlay, command};
 }
 
 }  // namespace

@@ -35,19 +35,18 @@ class GenerateStage final : public Stage {
   GenerateStage(std::shared_ptr<const Skeleton> skeleton, const smooth::LiveOptions& options,
                 double rate_hz, const BoundModel* model);
 
-  // Emits the frames that are due. RT-safe.
-  void process(const StageFrame& in, StageOut& out) noexcept override;
+  // Emits the frames that are due.
+  RT_SAFE void process(const StageFrame& in, StageOut& out) noexcept override;
   // Frames that wait go out after a few frames' silence, and a performance goes on at the stream's
-  // rate, under the last frame's sequence. RT-safe.
-  void heard(std::int64_t arrival_ns) noexcept override;
+  // rate, under the last frame's sequence.
+  RT_SAFE void received(std::int64_t arrival_ns) noexcept override;
   [[nodiscard]] std::int64_t next_due_ns() const noexcept override;
   void tick(std::int64_t now_ns, StageOut& out) noexcept override;
-  // Emits the frames that wait: the source has ended. RT-safe.
-  void flush(StageOut& out) noexcept override;
+  // Emits the frames that wait: the source has ended.
+  RT_SAFE void flush(StageOut& out) noexcept override;
   [[nodiscard]] bool performs() const noexcept override { return player_.busy(); }
 
-  // RT-safe.
-  void use(const StageModel& model) noexcept override;
+  RT_SAFE void use(const StageModel& model) noexcept override;
   [[nodiscard]] const BoundModel* model() const noexcept override { return model_; }
   [[nodiscard]] bool command(std::size_t index, const StageCommand& command) noexcept override;
   void describe(std::size_t index, const StageCommand& command,
@@ -64,7 +63,7 @@ class GenerateStage final : public Stage {
   void pose(const GesturePlayer::Pose& shown, Frame& frame) noexcept;
   void use_channels() noexcept;
   [[nodiscard]] std::span<double> used(std::vector<double>& values) const noexcept {
-    return std::span(values).first(static_cast<std::size_t>(pose_channels_->count()));
+    return std::span(values).first(pose_channels_->count());
   }
   // Variances of the frame that goes out.
   [[nodiscard]] std::span<const double> variance_rad2() const noexcept {
@@ -81,7 +80,7 @@ class GenerateStage final : public Stage {
   Elapsed elapsed_;
   motion::LiveHeading heading_;  // used for a body
   std::int64_t period_ns_;       // between frames performed in silence
-  std::int64_t last_heard_ns_ = kNoTime_ns;
+  std::int64_t last_received_ns_ = kNoTime_ns;
   std::int64_t last_tick_ns_ = kNoTime_ns;  // in this silence
   int entered_ = 0;                         // frames that wait in the smoother
   bool has_last_ = false;

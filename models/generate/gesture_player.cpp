@@ -17,9 +17,8 @@ constexpr int kLoopAhead = 3;
 
 }  // namespace
 
-// RT-safe.
-void QuinticOffset::start(std::span<const double> offset, std::span<const double> velocity,
-                          int frames) noexcept {
+RT_SAFE void QuinticOffset::start(std::span<const double> offset, std::span<const double> velocity,
+                                  int frames) noexcept {
   assert(frames > 0 && offset.size() <= offset_.size() && velocity.size() <= velocity_.size());
   std::ranges::copy(offset, offset_.begin());
   std::ranges::copy(velocity, velocity_.begin());
@@ -27,8 +26,7 @@ void QuinticOffset::start(std::span<const double> offset, std::span<const double
   frames_ = frames;
 }
 
-// RT-safe.
-void QuinticOffset::add_next(std::span<double> pose) noexcept {
+RT_SAFE void QuinticOffset::add_next(std::span<double> pose) noexcept {
   if (done()) return;
   ++frame_;
   const double t = static_cast<double>(frame_) / frames_;
@@ -42,7 +40,7 @@ void QuinticOffset::add_next(std::span<double> pose) noexcept {
 
 GesturePlayer::GesturePlayer(double rate_hz, int channels)
     : rate_hz_(rate_hz),
-      channels_(static_cast<std::size_t>(channels)),
+      channels_(channels),
       player_(rate_hz, channels, {.look_ahead_s = kLookAhead_s, .capacity = kMaxWaiting + 4}),
       way_back_(channels) {
   for (auto* pose :
@@ -51,8 +49,7 @@ GesturePlayer::GesturePlayer(double rate_hz, int channels)
   }
 }
 
-// RT-safe.
-void GesturePlayer::set_model(const BoundModel* model) noexcept {
+RT_SAFE void GesturePlayer::set_model(const BoundModel* model) noexcept {
   stop();
   model_ = model;
   if (model_ == nullptr) return;
@@ -60,8 +57,7 @@ void GesturePlayer::set_model(const BoundModel* model) noexcept {
   channels_ = static_cast<std::size_t>(model_->gesture().channels());
 }
 
-// RT-safe.
-void GesturePlayer::go_on_from(std::span<const double> pose) noexcept {
+RT_SAFE void GesturePlayer::go_on_from(std::span<const double> pose) noexcept {
   started_ = true;
   live_known_ = false;
   for (auto* known : {&hold_, &past_[0], &past_[1]}) std::ranges::copy(pose, known->begin());
@@ -70,8 +66,7 @@ void GesturePlayer::go_on_from(std::span<const double> pose) noexcept {
   if (stopping_) phase_ = Phase::kPerforming;
 }
 
-// RT-safe.
-bool GesturePlayer::play(const gesture::PlayOrder& order) noexcept {
+RT_SAFE bool GesturePlayer::play(const gesture::PlayOrder& order) noexcept {
   if (model_ == nullptr || order.size == 0 || order.size > order.label.size()) return false;
   if (order.size > kMaxWaiting - ahead_) return false;
   const std::size_t known = model_->gesture().labels.size();
@@ -90,21 +85,18 @@ bool GesturePlayer::play(const gesture::PlayOrder& order) noexcept {
   return true;
 }
 
-// RT-safe.
-void GesturePlayer::append(int label) noexcept {
+RT_SAFE void GesturePlayer::append(int label) noexcept {
   if (player_.add(label)) ++ahead_;
 }
 
-// RT-safe.
-void GesturePlayer::stop() noexcept {
+RT_SAFE void GesturePlayer::stop() noexcept {
   player_.clear();
   ahead_ = 0;
   loop_.size = 0;
   stopping_ = phase_ == Phase::kPerforming;
 }
 
-// RT-safe.
-GesturePlayer::Pose GesturePlayer::step(std::span<const double> live) noexcept {
+RT_SAFE GesturePlayer::Pose GesturePlayer::step(std::span<const double> live) noexcept {
   const bool is_live = !live.empty();
   if (is_live && !std::exchange(live_known_, true)) {
     for (auto& pose : live_) std::ranges::copy(live, pose.begin());
@@ -140,8 +132,7 @@ GesturePlayer::Pose GesturePlayer::step(std::span<const double> live) noexcept {
   return pose;
 }
 
-// RT-safe.
-bool GesturePlayer::next_performed() noexcept {
+RT_SAFE bool GesturePlayer::next_performed() noexcept {
   keep_looping();
   const int before = played_.state;
   if (!player_.next(played_)) return false;
@@ -149,16 +140,14 @@ bool GesturePlayer::next_performed() noexcept {
   return true;
 }
 
-// RT-safe.
-void GesturePlayer::keep_looping() noexcept {
+RT_SAFE void GesturePlayer::keep_looping() noexcept {
   while (loop_.size > 0 && ahead_ < kLoopAhead) {
-    append(loop_.label[static_cast<std::size_t>(loop_next_)]);
+    append(loop_.label[loop_next_]);
     loop_next_ = (loop_next_ + 1) % loop_.size;
   }
 }
 
-// RT-safe.
-void GesturePlayer::begin_way_back(bool live) noexcept {
+RT_SAFE void GesturePlayer::begin_way_back(bool live) noexcept {
   stopping_ = false;
   player_.clear();
   ahead_ = 0;

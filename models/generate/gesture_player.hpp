@@ -25,9 +25,7 @@ namespace posed::generate {
 class QuinticOffset {
  public:
   // Allocates for poses of at most `channels` channels.
-  explicit QuinticOffset(int channels)
-      : offset_(static_cast<std::size_t>(channels)),
-        velocity_(static_cast<std::size_t>(channels)) {}
+  explicit QuinticOffset(int channels) : offset_(channels), velocity_(channels) {}
 
   // [channel]; `velocity` is in radians per frame; the offset is zero after `frames` frames.
   void start(std::span<const double> offset, std::span<const double> velocity, int frames) noexcept;

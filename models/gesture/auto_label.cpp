@@ -13,8 +13,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kSmooth_s = 0.07;   // half width of the moving average against sensor noise
-constexpr double kShortest_s = 0.3;  // no gesture is shorter
+constexpr double kSmooth_s = 0.07;      // half width of the moving average against sensor noise
+constexpr double kMinDuration_s = 0.3;  // no gesture is shorter
 constexpr double kSearch_s =
     0.5;  // a move's fastest moment is at most this far from the change of pose
 constexpr double kRestShare = 0.1;  // of the peak's energy above rest: here the move starts
@@ -101,7 +101,7 @@ class Proposer {
   [[nodiscard]] std::vector<int> best_labels() const {
     const MatrixXd cost = costs();
     const Index labels = cost.cols();
-    const double price = 4.0 * frames(kShortest_s) / 2.0;
+    const double price = 4.0 * frames(kMinDuration_s) / 2.0;
     Eigen::MatrixXi from(cost.rows(), labels);
     VectorXd best = cost.row(0);
     for (Index t = 1; t < cost.rows(); ++t) {
@@ -169,12 +169,12 @@ class Proposer {
     for (Segment rest : proposed) {
       for (const Segment& example : recording_.segments) {
         if (example.end <= rest.begin || example.begin >= rest.end) continue;
-        if (example.begin - rest.begin >= frames(kShortest_s)) {
+        if (example.begin - rest.begin >= frames(kMinDuration_s)) {
           left.push_back({rest.begin, example.begin, rest.label});
         }
         rest.begin = std::min(example.end, rest.end);
       }
-      if (rest.frames() >= std::max(frames(kShortest_s), kStates)) left.push_back(rest);
+      if (rest.frames() >= std::max(frames(kMinDuration_s), kStates)) left.push_back(rest);
     }
     left.insert(left.end(), recording_.segments.begin(), recording_.segments.end());
     return joined(std::move(left));

@@ -15,6 +15,6 @@ namespace posed::gesture {
 // `recording.segments` are the examples, one or more of each label; they are returned unchanged
 // among the proposals. Where in a move the person puts the border is learnt from the examples.
 // Returns an error for examples of fewer than two labels and for poses that are all alike.
-[[nodiscard]] Result<std::vector<Segment>> propose_segments(const Recording& recording);
+Result<std::vector<Segment>> propose_segments(const Recording& recording);
 
 }  // namespace posed::gesture

@@ -58,31 +58,29 @@ Result<motion::Motion> motion_at(const clip::Clip& clip, double rate_hz,
                     "that have it, or groups without it",
                 clip.path);
   }
-  auto motion = motion::motion_of(clip);
-  if (!motion) return motion;
-  if (motion::begins_with_added_pose(*motion)) motion::drop_first_frame(*motion);
-  if (motion->size() < kStates) {
-    return fail("the recording has " + std::to_string(motion->size()) +
+  auto motion = TRY(motion::motion_of(clip));
+  if (motion::begins_with_added_pose(motion)) motion::drop_first_frame(motion);
+  if (motion.size() < kStates) {
+    return fail("the recording has " + std::to_string(motion.size()) +
                     " frames; a gesture alone needs " + std::to_string(kStates),
                 clip.path);
   }
-  return motion::resample(*motion, rate_hz);
+  return motion::resample(motion, rate_hz);
 }
 
 // The motion's rotation vectors.
 Result<Recording> recording_of(const motion::Motion& motion, const Vocabulary& vocabulary,
                                const std::string& file) {
-  const auto space = motion::PoseSpace::bind(*vocabulary.body, *motion.skeleton);
-  if (!space) return std::unexpected(space.error());
+  const auto space = TRY(motion::PoseSpace::bind(*vocabulary.body, *motion.skeleton));
   Recording recording{.file = file, .rate_hz = motion.rate_hz, .angles_rad = {}, .segments = {}};
-  recording.angles_rad = motion::pose_vectors(motion, *space, motion::walk_heading_rad(motion));
+  recording.angles_rad = motion::pose_vectors(motion, space, motion::walk_heading_rad(motion));
   const FeatureMatrix& q = recording.angles_rad;
   const double apart_rad = (q.bottomRows<1>() - q.topRows<1>()).norm();
   recording.closed = apart_rad <= kSamePose_rad * std::sqrt(static_cast<double>(q.cols()) / 3.0);
   for (Eigen::Index t = 1; t < q.rows(); ++t) {
-    for (int c = 0; c < space->dims(); ++c) {
+    for (int c = 0; c < space.dims(); ++c) {
       if (std::abs(q(t, c) - q(t - 1, c)) <= std::numbers::pi) continue;
-      const auto joint = static_cast<std::size_t>(space->joint_of_dim(c));
+      const std::size_t joint = space.joint_of_dim(c);
       return fail("joint " + vocabulary.body->joints[joint] + " turns over between the frames " +
                       std::to_string(t) + " and " + std::to_string(t + 1) +
                       ", so it cannot be learnt from; leave the clip out",
@@ -129,7 +127,7 @@ Result<Vocabulary> body_vocabulary(const std::vector<JointGroup>& groups) {
   body.space = motion::Space::kHumanoid;
   int first = 0;
   for (const JointGroup& group : groups) {
-    if (auto sound = check_group(groups, group); !sound) return std::unexpected(sound.error());
+    TRY(check_group(groups, group));
     const auto channels = 3 * static_cast<int>(group.joints.size());
     vocabulary.groups.push_back({group.name, first, channels, 1});
     first += channels;
@@ -149,29 +147,24 @@ Result<std::vector<Recording>> body_recordings(const std::vector<clip::Clip>& cl
   std::vector<motion::Motion> motions;
   std::vector<const motion::Motion*> all;
   for (const clip::Clip& clip : clips) {
-    auto motion = motion_at(clip, rate_hz, vocabulary);
-    if (!motion) return std::unexpected(motion.error());
-    motions.push_back(std::move(*motion));
+    auto motion = TRY(motion_at(clip, rate_hz, vocabulary));
+    motions.push_back(std::move(motion));
   }
   all.reserve(motions.size());
   for (const motion::Motion& motion : motions) all.push_back(&motion);
-  if (auto set = motion::set_mean_rotations(all, *vocabulary.body); !set) {
-    return std::unexpected(set.error());
-  }
+  TRY(motion::set_mean_rotations(all, *vocabulary.body));
   std::vector<Recording> recordings;
   for (std::size_t i = 0; i < motions.size(); ++i) {
-    auto recording = recording_of(motions[i], vocabulary, clips[i].path);
-    if (!recording) return std::unexpected(recording.error());
-    recordings.push_back(std::move(*recording));
+    auto recording = TRY(recording_of(motions[i], vocabulary, clips[i].path));
+    recordings.push_back(std::move(recording));
   }
   return recordings;
 }
 
 Result<Recording> body_recording(const clip::Clip& clip, double rate_hz,
                                  const Vocabulary& vocabulary) {
-  const auto motion = motion_at(clip, rate_hz, vocabulary);
-  if (!motion) return std::unexpected(motion.error());
-  return recording_of(*motion, vocabulary, clip.path);
+  const auto motion = TRY(motion_at(clip, rate_hz, vocabulary));
+  return recording_of(motion, vocabulary, clip.path);
 }
 
 }  // namespace posed::gesture

@@ -25,17 +25,16 @@ struct JointGroup {
 
 // A vocabulary of these groups without labels, its mean rotations those of the T-pose. Errors: a
 // group without joints, a joint that is no bone or is in two groups, no group with the hips.
-[[nodiscard]] Result<Vocabulary> body_vocabulary(const std::vector<JointGroup>& groups);
+Result<Vocabulary> body_vocabulary(const std::vector<JointGroup>& groups);
 
 // The clips at `rate_hz`, without segments; sets the vocabulary's mean rotations to theirs. A rest
 // pose that a converter put in front is left out. Errors name the clip: a skeleton that lacks
 // joints of the vocabulary, too few frames, a joint that turns over between two frames.
-[[nodiscard]] Result<std::vector<Recording>> body_recordings(const std::vector<clip::Clip>& clips,
-                                                             double rate_hz,
-                                                             Vocabulary& vocabulary);
+Result<std::vector<Recording>> body_recordings(const std::vector<clip::Clip>& clips, double rate_hz,
+                                               Vocabulary& vocabulary);
 
 // Reads one more clip, about the mean rotations that the vocabulary already has.
-[[nodiscard]] Result<Recording> body_recording(const clip::Clip& clip, double rate_hz,
-                                               const Vocabulary& vocabulary);
+Result<Recording> body_recording(const clip::Clip& clip, double rate_hz,
+                                 const Vocabulary& vocabulary);
 
 }  // namespace posed::gesture

@@ -32,8 +32,8 @@ struct ContextModels {
 // Every segment's label is one of `labels`, every recording has segments; the neighbours of a
 // recording's first and last gesture are that gesture itself. Errors: the progress callback asked
 // to stop, or no channel moves.
-[[nodiscard]] Result<ContextModels> train_contexts(const std::vector<Recording>& recordings,
-                                                   const std::vector<Label>& labels,
-                                                   const ContextOptions& options);
+Result<ContextModels> train_contexts(const std::vector<Recording>& recordings,
+                                     const std::vector<Label>& labels,
+                                     const ContextOptions& options);
 
 }  // namespace posed::gesture

@@ -7,10 +7,10 @@ int label_at(const Context& context, int position) noexcept {
   return position == 0 ? context.previous : position == 1 ? context.current : context.next;
 }
 
-// Descends the tree of a group, or that of the durations, from its root to a leaf. RT-safe.
+// Descends the tree of a group, or that of the durations, from its root to a leaf.
 template <typename Gaussian>
-int walk(const Tree<Gaussian>& tree, const Vocabulary& vocabulary, int group,
-         const Context& context) noexcept {
+RT_SAFE int walk(const Tree<Gaussian>& tree, const Vocabulary& vocabulary, int group,
+                 const Context& context) noexcept {
   const int statements = vocabulary.statements(group);
   int node = 0;
   while (tree.nodes[node].question >= 0) {
@@ -23,19 +23,18 @@ int walk(const Tree<Gaussian>& tree, const Vocabulary& vocabulary, int group,
 
 }  // namespace
 
-// RT-safe.
-int leaf_index(const GestureModel& model, int state, int group, const Context& context) noexcept {
+RT_SAFE int leaf_index(const GestureModel& model, int state, int group,
+                       const Context& context) noexcept {
   return walk(model.trees[state][group], model, group, context);
 }
 
-// RT-safe.
-const GroupGaussian& leaf(const GestureModel& model, int state, int group,
-                          const Context& context) noexcept {
+RT_SAFE const GroupGaussian& leaf(const GestureModel& model, int state, int group,
+                                  const Context& context) noexcept {
   return model.trees[state][group].leaves[leaf_index(model, state, group, context)];
 }
 
-// RT-safe.
-const DurationGaussian& duration(const GestureModel& model, const Context& context) noexcept {
+RT_SAFE const DurationGaussian& duration(const GestureModel& model,
+                                         const Context& context) noexcept {
   return model.durations.leaves[walk(model.durations, model, Vocabulary::kDurations, context)];
 }
 

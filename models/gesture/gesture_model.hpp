@@ -62,9 +62,9 @@ struct GestureModel : Vocabulary {
 };
 
 // The leaf that a group's tree selects for a state in its context, as an index and as its
-// Gaussian. `state` from 0. RT-safe.
-[[nodiscard]] int leaf_index(const GestureModel& model, int state, int group,
-                             const Context& context) noexcept;
+// Gaussian. `state` from 0.
+RT_SAFE [[nodiscard]] int leaf_index(const GestureModel& model, int state, int group,
+                                     const Context& context) noexcept;
 [[nodiscard]] const GroupGaussian& leaf(const GestureModel& model, int state, int group,
                                         const Context& context) noexcept;
 [[nodiscard]] const DurationGaussian& duration(const GestureModel& model,

@@ -90,9 +90,7 @@ MatrixXd log_density(const Frames& frames, const StateModel& model) {
   return density;
 }
 
-Band whole_band(Index frames, int states) {
-  return {std::vector<int>(static_cast<std::size_t>(frames), 0), states};
-}
+Band whole_band(Index frames, int states) { return {std::vector<int>(frames, 0), states}; }
 
 Posterior forward_backward(const MatrixXd& density, const VectorXd& stay, const Band& band) {
   const Index frames = density.rows();
@@ -138,8 +136,7 @@ Path viterbi(const MatrixXd& density, const VectorXd& stay) {
       best[j] = std::max(stayed, moved) + density(t, j);
     }
   }
-  Path path{std::vector<int>(static_cast<std::size_t>(frames), states - 1),
-            best[states - 1] + log_leave[states - 1]};
+  Path path{std::vector<int>(frames, states - 1), best[states - 1] + log_leave[states - 1]};
   for (Index t = frames - 1; t > 0; --t) {
     path.state[t - 1] = path.state[t] - (came(t, path.state[t]) ? 1 : 0);
   }

@@ -36,7 +36,7 @@ motion::PoseSpaceSpec read_joints(const v1::PoseSpace& from, Validator& check) {
   }
   check.want(from.root() < body.joints.size(), "the root joint");
   check.want(from.mean_xyzw_size() == 4 * from.joint_size(), "the number of mean rotations");
-  for (int j = 0; j < from.joint_size() && check.sound(); ++j) {
+  for (int j = 0; j < from.joint_size() && check.valid(); ++j) {
     const auto at = [&](int i) { return from.mean_xyzw(4 * j + i); };
     body.mean.emplace_back(at(3), at(0), at(1), at(2));
     check.want(std::abs(body.mean.back().norm() - 1.0) < 1e-6, "a mean rotation's length");
@@ -55,7 +55,7 @@ std::vector<ChannelGroup> read_groups(const v1::GestureModel& from, Validator& c
     check.want(names.insert(group.name()).second, "a group's name, which stands twice");
     check.want(group.joints() >= 1 && group.joints() <= kBones, "the number of a group's joints");
     check.want(group.classes() >= 1 && group.classes() <= kMaxClasses, "a group's classes");
-    if (!check.sound()) return groups;
+    if (!check.valid()) return groups;
     const int channels = 3 * static_cast<int>(group.joints());
     groups.push_back({group.name(), first, channels, static_cast<int>(group.classes())});
     first += channels;
@@ -71,13 +71,13 @@ std::vector<Label> read_labels(const v1::GestureModel& from,
   std::set<std::string> names;
   check.want(from.label_size() >= 1 && from.label_size() <= kMaxModelLabels,
              "the number of labels");
-  if (!check.sound()) return labels;
+  if (!check.valid()) return labels;
   for (const v1::GestureLabel& label : from.label()) {
     Label read{.name = label.name(), .group_class = {}, .trained = label.trained()};
     check.want(is_label_name(read.name), "a label's name");
     check.want(names.insert(read.name).second, "a label's name, which stands twice");
     check.want(label.finger_class_size() == count, "a label's classes, not one a finger or group");
-    for (int g = 0; g < count && check.sound(); ++g) {
+    for (int g = 0; g < count && check.valid(); ++g) {
       check.want(label.finger_class(g) < static_cast<unsigned>(groups[g].classes),
                  "a label's class");
       read.group_class.push_back(static_cast<int>(label.finger_class(g)));
@@ -122,7 +122,7 @@ void read_vocabulary(const v1::GestureModel& from, Vocabulary& vocabulary, Valid
   } else {
     check.want(from.group_size() == 0, "the groups, which a hand does not have");
   }
-  if (!check.sound()) return;
+  if (!check.valid()) return;
   vocabulary.labels = read_labels(from, vocabulary.groups, check);
   vocabulary.named = read_named(from, check);
   vocabulary.tells_none = from.tells_none();
@@ -145,7 +145,7 @@ void write_vocabulary(const Vocabulary& vocabulary, v1::GestureModel& out) {
 using model_file::kMaxNumber;
 using model_file::Validator;
 
-constexpr int kMostDeep = 12;           // more questions make no larger tree than these do
+constexpr int kMaxTreeDepth = 12;       // more questions make no larger tree than these do
 constexpr double kMinVariance = 1e-20;  // its inverse can still be summed without overflow
 
 // Copies the file's row, from `row` on, into a leaf's values.
@@ -185,12 +185,12 @@ void read_nodes(const v1::GestureTree& from, int questions, Tree<Gaussian>& tree
                 Validator& check) {
   const int count = from.question_size();
   // No path asks a question twice.
-  const int most = 1 << std::min(questions, kMostDeep);
+  const int most = 1 << std::min(questions, kMaxTreeDepth);
   check.want(count >= 1 && count < 2 * most, "the number of nodes of a tree");
   check.want(from.yes_size() == count && from.no_size() == count && from.leaf_size() == count,
              "the node arrays of a tree, which differ in length");
   if (!check.valid()) return;
-  std::vector<int> parents(static_cast<std::size_t>(count));
+  std::vector<int> parents(count);
   int leaves = 0;
   for (int i = 0; i < count && check.valid(); ++i) {
     const TreeNode node{from.question(i), from.yes(i), from.no(i), from.leaf(i)};
@@ -211,7 +211,7 @@ void read_nodes(const v1::GestureTree& from, int questions, Tree<Gaussian>& tree
   for (int i = 1; i < count && check.valid(); ++i) {
     check.want(parents[i] == 1, "a tree's node, which is not the child of one node");
   }
-  tree.leaves.resize(static_cast<std::size_t>(leaves));
+  tree.leaves.resize(leaves);
 }
 
 template <typename Gaussian>
@@ -285,21 +285,19 @@ void write_tree(const Tree<Gaussian>& tree, v1::GestureTree& out) {
 }  // namespace
 
 Result<GestureModel> parse_model(std::span<const std::byte> bytes, const std::string& name) {
-  const auto file = model_file::open(bytes, name);
-  if (!file) return std::unexpected(file.error());
-  if (!file->has_gesture()) {
+  const auto file = TRY(model_file::open(bytes, name));
+  if (!file.has_gesture()) {
     return fail("the model is not a gesture model; make one with `posed train gesture`", name);
   }
   Validator check;
-  GestureModel model = read_model(file->gesture(), check);
-  if (auto verdict = check.verdict(name); !verdict) return std::unexpected(verdict.error());
+  GestureModel model = read_model(file.gesture(), check);
+  TRY(check.verdict(name));
   return model;
 }
 
 Result<GestureModel> load_model(const std::filesystem::path& path) {
-  const auto bytes = model_file::load(path);
-  if (!bytes) return std::unexpected(bytes.error());
-  return parse_model(std::as_bytes(std::span(*bytes)), path.string());
+  const auto bytes = TRY(model_file::load(path));
+  return parse_model(std::as_bytes(std::span(bytes)), path.string());
 }
 
 std::string serialize_model(const GestureModel& model) {

@@ -15,12 +15,11 @@ namespace posed::gesture {
 
 // Everything that a lookup relies on is checked: each tree is a single tree, its numbers are
 // finite, its variances positive, and every label is in exactly one class per finger.
-[[nodiscard]] Result<GestureModel> load_model(const std::filesystem::path& path);
+Result<GestureModel> load_model(const std::filesystem::path& path);
 // Reads a model as load_model() does, from bytes (control message, device log). `name` is only for
 // error messages. Any bytes give a model or an Error, never a crash.
-[[nodiscard]] Result<GestureModel> parse_model(std::span<const std::byte> bytes,
-                                               const std::string& name);
+Result<GestureModel> parse_model(std::span<const std::byte> bytes, const std::string& name);
 [[nodiscard]] std::string serialize_model(const GestureModel& model);
-[[nodiscard]] Result<> save_model(const GestureModel& model, const std::filesystem::path& path);
+Result<> save_model(const GestureModel& model, const std::filesystem::path& path);
 
 }  // namespace posed::gesture

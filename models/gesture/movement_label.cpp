@@ -13,13 +13,13 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr double kAverage_s = 0.07;          // half width of the moving average
-constexpr double kLeast_rad = 10 * kDegree;  // norm over all joints: less is no movement
-constexpr double kOnsetShare = 0.1;          // of the fastest frame: here a way begins
-constexpr double kBackShare = 0.5;           // of the farthest distance: a take ends nearer
-constexpr double kSteady_rad = 8 * kDegree;  // deviation over all joints: less is a tremor
-constexpr std::size_t kFewestCycles = 3;
-constexpr int kLongestCycle = 2;      // of the shortest one
+constexpr double kAverage_s = 0.07;                // half width of the moving average
+constexpr double kMinMovement_rad = 10 * kDegree;  // norm over all joints: less is no movement
+constexpr double kOnsetShare = 0.1;                // of the fastest frame: here a way begins
+constexpr double kBackShare = 0.5;                 // of the farthest distance: a take ends nearer
+constexpr double kSteady_rad = 8 * kDegree;        // deviation over all joints: less is a tremor
+constexpr std::size_t kMinCycles = 3;
+constexpr int kMaxCycleRatio = 2;     // of the shortest one
 constexpr double kHysteresis = 0.5;   // deviations that a cycle passes on both sides of the mean
 constexpr double kWholeCycle = 0.75;  // of the mean cycle: a shorter rest belongs to the one before
 
@@ -103,8 +103,8 @@ Oscillation oscillation_in(const Recording& recording, int from, int to) {
     shortest = std::min(shortest, found.cycles[i] - found.cycles[i - 1]);
     longest = std::max(longest, found.cycles[i] - found.cycles[i - 1]);
   }
-  found.steady = found.deviation_rad >= kSteady_rad && found.cycles.size() > kFewestCycles &&
-                 shortest >= kStates && longest <= kLongestCycle * shortest;
+  found.steady = found.deviation_rad >= kSteady_rad && found.cycles.size() > kMinCycles &&
+                 shortest >= kStates && longest <= kMaxCycleRatio * shortest;
   for (int& begin : found.cycles) begin += from;
   return found;
 }
@@ -115,7 +115,7 @@ Result<std::vector<Segment>> propose_movement(const Recording& recording,
   const VectorXd distance = distance_from_start(recording);
   const auto frames = static_cast<int>(distance.size());
   const double half = kBackShare * distance.maxCoeff();
-  if (2.0 * half < kLeast_rad) {
+  if (2.0 * half < kMinMovement_rad) {
     return fail("nothing moves in the take; a movement begins and ends in rest", recording.file);
   }
   if (distance[frames - 1] >= half) {

@@ -19,10 +19,9 @@ enum class Hold : std::uint8_t { kWhole, kCycles };
 
 // Two segments, or more with Hold::kCycles; `movement` and `rest` are their labels. Returns an
 // error for a take that does not leave its first pose and come back to it.
-[[nodiscard]] Result<std::vector<Segment>> propose_movement(const Recording& recording,
-                                                            const std::string& movement,
-                                                            const std::string& rest,
-                                                            Hold hold = Hold::kWhole);
+Result<std::vector<Segment>> propose_movement(const Recording& recording,
+                                              const std::string& movement, const std::string& rest,
+                                              Hold hold = Hold::kWhole);
 
 // How a movement oscillates: along the direction in which its poses scatter most.
 struct Oscillation {

@@ -32,9 +32,8 @@ static_assert(std::is_trivially_copyable_v<PlayOrder>);
 
 // The order for these label names. Errors: a name that the model does not know (the message lists
 // the known ones), no labels, too many labels, a tempo (duration scale) out of range. Cold.
-[[nodiscard]] Result<PlayOrder> make_play_order(const GestureModel& model,
-                                                std::span<const std::string> names, double tempo,
-                                                bool loop);
+Result<PlayOrder> make_play_order(const GestureModel& model, std::span<const std::string> names,
+                                  double tempo, bool loop);
 
 // "g 1  c" -> g, 1, c.
 [[nodiscard]] std::vector<std::string> split_labels(const std::string& text);

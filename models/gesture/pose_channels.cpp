@@ -22,8 +22,8 @@ double distance2(const double* a, const double* b) noexcept {
   return sum;
 }
 
-// The same rotation the other way round, where that is nearer. RT-safe.
-void turn_near(const double* last, double* value) noexcept {
+// The same rotation the other way round, where that is nearer.
+RT_SAFE void turn_near(const double* last, double* value) noexcept {
   const double angle_rad = std::hypot(value[0], value[1], value[2]);
   if (!(angle_rad > kNoTurn_rad)) return;  // also where it is not finite
   const double other = 1.0 - 2.0 * std::numbers::pi / angle_rad;
@@ -57,10 +57,9 @@ Result<PoseChannels> PoseChannels::bind(const Vocabulary& vocabulary, const Skel
                 " is a hand: give it to a stream of a body");
   }
   if (is_hand) return of_hand(skeleton);
-  auto space = motion::PoseSpace::bind(*vocabulary.body, skeleton);
-  if (!space) return std::unexpected(space.error());
+  auto space = TRY(motion::PoseSpace::bind(*vocabulary.body, skeleton));
   PoseChannels channels;
-  channels.count_ = space->dims();
+  channels.count_ = space.dims();
   if (channels.count_ > most_channels(skeleton)) {
     return fail("the model has a joint twice; train it again");
   }
@@ -68,28 +67,26 @@ Result<PoseChannels> PoseChannels::bind(const Vocabulary& vocabulary, const Skel
   for (const Channel& channel : skeleton.channels) {
     if (channel.translation) continue;
     int first = 0;
-    while (first < channels.count_ && space->skeleton_joint_of_dim(first) != channel.joint) {
+    while (first < channels.count_ && space.skeleton_joint_of_dim(first) != channel.joint) {
       first += 3;
     }
     channels.first_of_.push_back(first < channels.count_ ? first : -1);
   }
-  channels.space_ = std::move(*space);
+  channels.space_ = std::move(space);
   return channels;
 }
 
-// RT-safe.
-int PoseChannels::joint_of(int channel) const noexcept {
+RT_SAFE int PoseChannels::joint_of(int channel) const noexcept {
   return space_ ? space_->skeleton_joint_of_dim(channel) : 1 + channel / 3;
 }
 
-// RT-safe.
-void PoseChannels::read(const Frame& frame, double heading_rad,
-                        std::span<double> values) const noexcept {
+RT_SAFE void PoseChannels::read(const Frame& frame, double heading_rad,
+                                std::span<double> values) const noexcept {
   if (!space_) {
     std::ranges::copy(hand_angles(frame), values.begin());
     return;
   }
-  const auto dims = static_cast<std::size_t>(count_);
+  const std::size_t dims = count_;
   std::array<float, motion::kMaxPoseDims> q;
   std::array<std::uint8_t, motion::kMaxPoseDims> available;
   space_->to_vector(frame, heading_rad, {q.data(), dims}, {available.data(), dims});
@@ -99,15 +96,14 @@ void PoseChannels::read(const Frame& frame, double heading_rad,
   }
 }
 
-// RT-safe.
-void PoseChannels::unwrap(std::span<const double> last, std::span<double> values) const noexcept {
+RT_SAFE void PoseChannels::unwrap(std::span<const double> last,
+                                  std::span<double> values) const noexcept {
   if (!space_) return;
   for (std::size_t d = 0; d + 3 <= values.size(); d += 3) turn_near(&last[d], &values[d]);
 }
 
-// RT-safe.
-void PoseChannels::write(std::span<const double> values, double heading_rad,
-                         Frame& frame) const noexcept {
+RT_SAFE void PoseChannels::write(std::span<const double> values, double heading_rad,
+                                 Frame& frame) const noexcept {
   if (space_) return space_->put(frame, heading_rad, values);
   HandAngles angles;
   std::copy_n(values.begin(), angles.size(), angles.begin());
@@ -116,16 +112,15 @@ void PoseChannels::write(std::span<const double> values, double heading_rad,
   frame.root_position_m = root_position_m;
 }
 
-// RT-safe.
-void PoseChannels::spread(std::span<const double> variance,
-                          std::span<double> of_frame) const noexcept {
+RT_SAFE void PoseChannels::spread(std::span<const double> variance,
+                                  std::span<double> of_frame) const noexcept {
   if (!space_) {
     for (std::size_t c = 0; c < of_frame.size(); ++c) of_frame[c] = variance[kAngleOfChannel[c]];
     return;
   }
   for (std::size_t c = 0; c < of_frame.size(); ++c) {
     if (first_of_[c] < 0) continue;
-    const auto d = static_cast<std::size_t>(first_of_[c]);
+    const std::size_t d = first_of_[c];
     of_frame[c] = (variance[d] + variance[d + 1] + variance[d + 2]) / 3.0;
   }
 }

@@ -27,8 +27,7 @@ class PoseChannels {
  public:
   // Errors: a hand's vocabulary on a skeleton that is no hand, a body's on a hand or on a skeleton
   // that lacks joints of it. Cold.
-  [[nodiscard]] static Result<PoseChannels> bind(const Vocabulary& vocabulary,
-                                                 const Skeleton& skeleton);
+  static Result<PoseChannels> bind(const Vocabulary& vocabulary, const Skeleton& skeleton);
   // The channels of a hand, which need no vocabulary. `skeleton` is a hand. Cold.
   [[nodiscard]] static PoseChannels of_hand(const Skeleton& skeleton);
 

@@ -149,9 +149,8 @@ Result<std::vector<Label>> labels_of(const ClassLists& lists,
   }
   for (Label& label : labels) {
     for (std::size_t g = 0; g < groups.size(); ++g) {
-      const auto found = class_of(lists[g], groups[g], label.name);
-      if (!found) return std::unexpected(found.error());
-      label.group_class.push_back(*found);
+      const auto found = TRY(class_of(lists[g], groups[g], label.name));
+      label.group_class.push_back(found);
     }
   }
   return labels;
@@ -164,7 +163,7 @@ ClassLists lists_of(const std::vector<Label>& labels, const std::vector<ChannelG
   }
   for (const Label& label : labels) {
     for (std::size_t g = 0; g < groups.size(); ++g) {
-      lists[g][static_cast<std::size_t>(label.group_class[g])].push_back(label.name);
+      lists[g][label.group_class[g]].push_back(label.name);
     }
   }
   return lists;

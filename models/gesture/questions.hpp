@@ -18,8 +18,8 @@ using ClassLists = std::vector<std::vector<std::vector<std::string>>>;
 // Every label of the lists in exactly one class per group, in order of first mention. Returns an
 // error for a label that is in no class or in two classes of a group, and for a name that is not a
 // valid label.
-[[nodiscard]] Result<std::vector<Label>> labels_of(
-    const ClassLists& lists, const std::vector<ChannelGroup>& groups = finger_groups());
+Result<std::vector<Label>> labels_of(const ClassLists& lists,
+                                     const std::vector<ChannelGroup>& groups = finger_groups());
 [[nodiscard]] ClassLists lists_of(const std::vector<Label>& labels,
                                   const std::vector<ChannelGroup>& groups = finger_groups());
 

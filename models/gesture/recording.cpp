@@ -74,7 +74,7 @@ double duration_s(const clip::HandClip& clip) {
 }
 
 Result<Recording> recording_of(const clip::HandClip& clip, double rate_hz) {
-  if (auto sound = check_values(clip); !sound) return std::unexpected(sound.error());
+  TRY(check_values(clip));
   Recording recording{.file = clip.path, .rate_hz = rate_hz, .angles_rad = {}, .segments = {}};
   if (is_even(clip, rate_hz)) {
     recording.angles_rad.resize(static_cast<Index>(clip.angles.size()), kHandChannels);

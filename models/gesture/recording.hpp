@@ -39,12 +39,12 @@ struct Recording {
 // Reads the clip at `rate_hz`, interpolated linearly unless its times already have that rate.
 // Errors: fewer frames than a gesture has states, missing values (`posed smooth` fills gaps), times
 // that do not increase.
-[[nodiscard]] Result<Recording> recording_of(const clip::HandClip& clip, double rate_hz);
+Result<Recording> recording_of(const clip::HandClip& clip, double rate_hz);
 
 // Cuts the recording at the labels; `file` is the label file's name for errors. Returns an error
 // for a segment past the end of the recording and for one with fewer frames than a gesture has
 // states.
-[[nodiscard]] Result<> cut(Recording& recording, const std::vector<clip::LabelSegment>& labels,
-                           const std::string& file);
+Result<> cut(Recording& recording, const std::vector<clip::LabelSegment>& labels,
+             const std::string& file);
 
 }  // namespace posed::gesture

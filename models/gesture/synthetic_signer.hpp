@@ -38,6 +38,6 @@ struct Performance {
 };
 
 // Returns an error for a label other than g c p 1 3 4.
-[[nodiscard]] Result<Performance> make_performance(const SignerOptions& options);
+Result<Performance> make_performance(const SignerOptions& options);
 
 }  // namespace posed::gesture

@@ -151,9 +151,7 @@ Result<GestureModel> train_gesture(const std::vector<Recording>& recordings,
   GestureModel model;
   static_cast<Vocabulary&>(model) = options.vocabulary;
   model.rate_hz = recordings.front().rate_hz;
-  if (auto marked = mark_trained(recordings, model.labels); !marked) {
-    return std::unexpected(marked.error());
-  }
+  TRY(mark_trained(recordings, model.labels));
   SerialTasks serial;
   TaskRunner& tasks = options.tasks != nullptr ? *options.tasks : serial;
   ContextOptions context_options{options.segmental_rounds, options.rounds, options.embedded_rounds,
@@ -163,9 +161,8 @@ Result<GestureModel> train_gesture(const std::vector<Recording>& recordings,
       return options.progress("aligning gestures", kTreesFrom * fraction);
     };
   }
-  const auto contexts = train_contexts(recordings, model.labels, context_options);
-  if (!contexts) return std::unexpected(contexts.error());
-  TrainReport report(recordings, *contexts, model);
+  const auto contexts = TRY(train_contexts(recordings, model.labels, context_options));
+  TrainReport report(recordings, contexts, model);
   const auto groups = static_cast<int>(model.groups.size());
   for (int tree = 0; tree < kStates * groups; ++tree) {
     const double fraction = kTreesFrom + (1.0 - kTreesFrom) * tree / (kStates * groups);
@@ -173,11 +170,11 @@ Result<GestureModel> train_gesture(const std::vector<Recording>& recordings,
       return training_stopped();
     }
     const int state = tree / groups;
-    const GrownTree grown = grow_group(*contexts, model, state, tree % groups, options.mdl_factor);
+    const GrownTree grown = grow_group(contexts, model, state, tree % groups, options.mdl_factor);
     report.add_tree(state, tree % groups, grown);
     model.trees[state].push_back(tree_of<GroupGaussian>(grown));
   }
-  model.durations = tree_of<DurationGaussian>(grow_durations(*contexts, model, options.mdl_factor));
+  model.durations = tree_of<DurationGaussian>(grow_durations(contexts, model, options.mdl_factor));
   set_range(recordings, model);
   model.report_json = report.json_of(model);
   if (options.look) options.look(report.findings());

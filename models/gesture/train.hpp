@@ -39,8 +39,8 @@ struct TrainOptions {
 // All recordings are at one rate, which becomes the model's. Returns an error for recordings
 // without segments and for labels that are in no class. The report (what `train --json` prints,
 // without the seconds) is in the model.
-[[nodiscard]] Result<GestureModel> train_gesture(const std::vector<Recording>& recordings,
-                                                 const TrainOptions& options);
+Result<GestureModel> train_gesture(const std::vector<Recording>& recordings,
+                                   const TrainOptions& options);
 
 // The held pose of each recorded label: the mean over the last half of its segments, without their
 // last tenth.

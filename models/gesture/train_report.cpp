@@ -66,8 +66,7 @@ double TrainReport::apart_rad(int state, int group, const std::vector<int>& memb
     Eigen::VectorXd angles;
     double frames = 0.0;
   };
-  std::vector<Sum> classes(static_cast<std::size_t>(channels.classes),
-                           Sum{Eigen::VectorXd::Zero(channels.channels)});
+  std::vector<Sum> classes(channels.classes, Sum{Eigen::VectorXd::Zero(channels.channels)});
   for (const int row : members) {
     const Statistics& sums = contexts_.sums[row];
     const Label& label = vocabulary_.labels[contexts_.contexts[row].current];
@@ -163,7 +162,7 @@ std::string TrainReport::mixed_warning() const {
 }
 
 TrainFindings TrainReport::findings() const {
-  const auto moving = static_cast<std::size_t>(std::ranges::count(contexts_.moves, true));
+  const std::size_t moving = std::ranges::count(contexts_.moves, true);
   return {contexts_.contexts.size(), moving, warnings()};
 }
 

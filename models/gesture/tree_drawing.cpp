@@ -25,7 +25,7 @@ class Words {
   }
 
   [[nodiscard]] std::size_t position_of(int question) const {
-    return static_cast<std::size_t>(question / model_.statements(group_));
+    return question / model_.statements(group_);
   }
 
   // [label] for which the question's answer is yes.

@@ -17,8 +17,8 @@ struct TreeChoice {
 };
 // Parses "all", "middle" (all its states), "4" (state 4 of all groups) or "middle:4"; anything else
 // is a usage error. A body's groups have other names than fingers.
-[[nodiscard]] Result<TreeChoice> tree_choice(
-    std::string_view text, const std::vector<ChannelGroup>& groups = finger_groups());
+Result<TreeChoice> tree_choice(std::string_view text,
+                               const std::vector<ChannelGroup>& groups = finger_groups());
 
 // A tree with the texts that all its drawings share, those below and those of a report.
 struct DrawnNode {

@@ -31,8 +31,7 @@ int Vocabulary::label_index(std::string_view name) const noexcept {
   return found == labels.end() ? -1 : static_cast<int>(found - labels.begin());
 }
 
-// RT-safe.
-int Vocabulary::statements(int group) const noexcept {
+RT_SAFE int Vocabulary::statements(int group) const noexcept {
   int classes = 0;
   if (group != kDurations) {
     classes = groups[group].classes;
@@ -44,8 +43,7 @@ int Vocabulary::statements(int group) const noexcept {
   return classes + static_cast<int>(named.size());
 }
 
-// RT-safe.
-bool Vocabulary::holds(int group, int statement, int label) const noexcept {
+RT_SAFE bool Vocabulary::holds(int group, int statement, int label) const noexcept {
   const int classes = statements(group) - static_cast<int>(named.size());
   if (statement >= classes) return named[statement - classes] == label;
   if (group != kDurations) return labels[label].group_class[group] == statement;

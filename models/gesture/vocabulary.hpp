@@ -35,8 +35,8 @@ struct Label {
   bool trained = false;            // it occurs in the training recordings
 };
 
-// The class of a finger's label that most fingers have, the lowest one in a tie. RT-safe.
-[[nodiscard]] int majority_class(const Label& label) noexcept;
+// The class of a finger's label that most fingers have, the lowest one in a tie.
+RT_SAFE [[nodiscard]] int majority_class(const Label& label) noexcept;
 
 struct Vocabulary {
   // A body's joints, group by group, with the rotations about which its channels are rotation

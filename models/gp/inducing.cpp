@@ -26,7 +26,7 @@ Inducing choose_inducing(const Eigen::MatrixXd& X, double mu, int limit,
                          const std::function<bool(double)>& enough) {
   const auto points = static_cast<int>(X.rows());
   Inducing chosen;
-  chosen.order.resize(static_cast<std::size_t>(points));
+  chosen.order.resize(points);
   std::iota(chosen.order.begin(), chosen.order.end(), 0);
   Eigen::VectorXd residual = Eigen::VectorXd::Ones(points);
   chosen.factor.resize(points, std::min(limit, points));
@@ -87,9 +87,9 @@ Result<Trained> fit_inducing(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
                              const Eigen::VectorXd& offset, const Hyper& hyper, int limit) {
   std::vector<int> all(static_cast<std::size_t>(X.rows()));
   std::iota(all.begin(), all.end(), 0);
-  auto learnt = fit_functions(X, std::array{FunctionData{std::move(all), Y, offset}}, hyper, limit);
-  if (!learnt) return std::unexpected(learnt.error());
-  return std::move(learnt->front());
+  auto learnt =
+      TRY(fit_functions(X, std::array{FunctionData{std::move(all), Y, offset}}, hyper, limit));
+  return std::move(learnt.front());
 }
 
 }  // namespace posed::gp

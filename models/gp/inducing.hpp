@@ -30,9 +30,8 @@ struct Inducing {
 
 // Fits as fit() (regression.hpp) does with b = 0, but with at most `limit` poses, fitted to all
 // pairs by least squares with the noise as ridge (subset of regressors).
-[[nodiscard]] Result<Trained> fit_inducing(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
-                                           const Eigen::VectorXd& offset, const Hyper& hyper,
-                                           int limit);
+Result<Trained> fit_inducing(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
+                             const Eigen::VectorXd& offset, const Hyper& hyper, int limit);
 
 // The training data of one of several functions that share their poses.
 struct FunctionData {
@@ -42,8 +41,8 @@ struct FunctionData {
 };
 
 // Fits several functions as fit_inducing() does, on common poses that are chosen among all of X.
-[[nodiscard]] Result<std::vector<Trained>> fit_functions(const Eigen::MatrixXd& X,
-                                                         std::span<const FunctionData> functions,
-                                                         const Hyper& hyper, int limit);
+Result<std::vector<Trained>> fit_functions(const Eigen::MatrixXd& X,
+                                           std::span<const FunctionData> functions,
+                                           const Hyper& hyper, int limit);
 
 }  // namespace posed::gp

@@ -11,7 +11,7 @@ namespace posed::gp {
 
 // "portable", "avx2", "avx512" or "auto". Applies to the whole process: call it before any
 // predictor runs on another thread. Returns an error for an instruction set that this CPU lacks.
-[[nodiscard]] Result<> set_isa(std::string_view name);
+Result<> set_isa(std::string_view name);
 
 // The instruction set in use: "portable", "avx2" or "avx512".
 [[nodiscard]] std::string_view isa_name();

@@ -105,10 +105,10 @@ HWY_INLINE void accumulate(const float* HWY_RESTRICT A, int stride, int width,
 
 HWY_INLINE void accumulate_tile(const float* A, int stride, int width, const float* k, float* even,
                                 float* odd) {
-  constexpr int kMost = kWide == 16 ? 4 : 6;  // vectors whose two sums stay in registers
+  constexpr int kMaxVectors = kWide == 16 ? 4 : 6;  // vectors whose two sums stay in registers
   int column = 0;
   while (column < stride) {
-    const int vectors = std::min((stride - column) / kWide, kMost);
+    const int vectors = std::min((stride - column) / kWide, kMaxVectors);
     const float* from = A + column;
     switch (vectors) {
       case 6:

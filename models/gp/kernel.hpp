@@ -15,6 +15,8 @@
 
 #include <cstdint>
 
+#include "proto/frame/rt_safe.hpp"
+
 namespace posed::gp::kernel {
 
 inline constexpr int kTile = 64;      // points in a full tile
@@ -51,8 +53,9 @@ struct Blocks {
 void weighted_sum(const Tiles& tiles, const Query& query, float* out) noexcept;
 
 // weighted_sum() with sum_s shares_s A_s for A; blocks without a share are not read. One block of
-// share 1 gives the bits of weighted_sum() with these weights. RT-safe.
-void blended_sum(const Tiles& tiles, const Blocks& blocks, const Query& query, float* out) noexcept;
+// share 1 gives the bits of weighted_sum() with these weights.
+RT_SAFE void blended_sum(const Tiles& tiles, const Blocks& blocks, const Query& query,
+                         float* out) noexcept;
 
 // out = 2^x for x <= 0, exactly 0 below -125. count: a multiple of 16. For tests.
 void exp2_of(const float* x, int count, float* out) noexcept;

@@ -119,7 +119,7 @@ class History {
     VectorXd r = -gradient;
     VectorXd alpha(pairs_.size());
     for (auto i = static_cast<int>(pairs_.size()) - 1; i >= 0; --i) {
-      const auto& p = pairs_[static_cast<std::size_t>(i)];
+      const auto& p = pairs_[i];
       alpha[i] = p.inverse_product * p.step.dot(r);
       r -= alpha[i] * p.change;
     }
@@ -128,7 +128,7 @@ class History {
       r /= last.inverse_product * last.change.squaredNorm();
     }
     for (int i = 0; i < static_cast<int>(pairs_.size()); ++i) {
-      const auto& p = pairs_[static_cast<std::size_t>(i)];
+      const auto& p = pairs_[i];
       r += (alpha[i] - p.inverse_product * p.change.dot(r)) * p.step;
     }
     return r;

@@ -55,7 +55,7 @@ Result<> validate_more(const Trained& t, std::span<const Function> more) {
     if (one.weights.cols() != t.weights.cols()) {
       return fail("the model's functions differ in their number of outputs");
     }
-    if (auto valid = validate(other); !valid) return valid;
+    TRY(validate(other));
   }
   return {};
 }
@@ -110,7 +110,7 @@ std::array<float, kMaxDims> constant_of(const Eigen::MatrixXd& weights,
   std::array<float, kMaxDims> constant{};
   const Eigen::VectorXd sum = offset + b * weights.colwise().sum().transpose();
   for (Eigen::Index o = 0; o < sum.size(); ++o) {
-    constant[static_cast<std::size_t>(o)] = static_cast<float>(sum[o]);
+    constant[o] = static_cast<float>(sum[o]);
   }
   return constant;
 }
@@ -141,8 +141,8 @@ Predictor& Predictor::operator=(Predictor&&) noexcept = default;
 Predictor::~Predictor() = default;
 
 Result<Predictor> Predictor::build(const Trained& trained, std::span<const Function> more) {
-  if (auto valid = validate(trained); !valid) return std::unexpected(valid.error());
-  if (auto valid = validate_more(trained, more); !valid) return std::unexpected(valid.error());
+  TRY(validate(trained));
+  TRY(validate_more(trained, more));
   auto parts = std::make_unique<Parts>();
   parts->dims = static_cast<int>(trained.inputs.cols());
   parts->outputs = static_cast<int>(trained.weights.cols());
@@ -179,9 +179,8 @@ std::span<const float> Predictor::constant() const noexcept {
   return {parts_->constant.data(), static_cast<std::size_t>(parts_->outputs)};
 }
 
-// RT-safe.
-void Predictor::Parts::mixed_constant(std::span<const float> shares,
-                                      std::span<float> out) const noexcept {
+RT_SAFE void Predictor::Parts::mixed_constant(std::span<const float> shares,
+                                              std::span<float> out) const noexcept {
   const bool mixed = shares.empty() || constants.empty();  // `constant` is the mixture's
   for (int o = 0; o < outputs; ++o) {
     out[o] = mixed ? constant[o] : 0.0F;
@@ -191,13 +190,12 @@ void Predictor::Parts::mixed_constant(std::span<const float> shares,
   }
 }
 
-// RT-safe.
-void Predictor::constant(std::span<const float> shares, std::span<float> out) const noexcept {
+RT_SAFE void Predictor::constant(std::span<const float> shares,
+                                 std::span<float> out) const noexcept {
   parts_->mixed_constant(shares, out);
 }
 
-// RT-safe.
-void Predictor::Parts::mix_weights(int point) noexcept {
+RT_SAFE void Predictor::Parts::mix_weights(int point) noexcept {
   const int row = padded(outputs);
   const auto functions = static_cast<int>(constants.size());
   const int first = point / kTile * kTile;  // of its tile
@@ -214,8 +212,7 @@ void Predictor::Parts::mix_weights(int point) noexcept {
   }
 }
 
-// RT-safe.
-bool Predictor::settle(std::span<const float> shares) noexcept {
+RT_SAFE bool Predictor::settle(std::span<const float> shares) noexcept {
   Parts& p = *parts_;
   if (p.constants.empty()) return true;
   if (!std::ranges::equal(shares, std::span(p.mixture).first(shares.size()))) {
@@ -230,9 +227,8 @@ bool Predictor::settle(std::span<const float> shares) noexcept {
   return true;
 }
 
-// RT-safe.
-void Predictor::mean(std::span<const float> q, std::span<const std::uint8_t> available,
-                     std::span<float> out, std::span<const float> shares) const noexcept {
+RT_SAFE void Predictor::mean(std::span<const float> q, std::span<const std::uint8_t> available,
+                             std::span<float> out, std::span<const float> shares) const noexcept {
   const Parts& p = *parts_;
   assert(q.size() >= static_cast<std::size_t>(p.dims));
   std::array<std::uint16_t, kMaxDims> present;

@@ -19,6 +19,7 @@
 
 #include "models/gp/trained.hpp"
 #include "proto/frame/result.hpp"
+#include "proto/frame/rt_safe.hpp"
 
 namespace posed::gp {
 
@@ -29,8 +30,7 @@ class Predictor {
   // Checks shapes and values; precomputes the tiles. Cold.
   // `more`: further functions, in the shapes of `trained`, at most kMaxFunctions in all. At first
   // the mixture is the function of `trained` alone.
-  [[nodiscard]] static Result<Predictor> build(const Trained& trained,
-                                               std::span<const Function> more = {});
+  static Result<Predictor> build(const Trained& trained, std::span<const Function> more = {});
   Predictor(Predictor&&) noexcept;
   Predictor& operator=(Predictor&&) noexcept;
   ~Predictor();
@@ -39,22 +39,22 @@ class Predictor {
   [[nodiscard]] int outputs() const noexcept;    // D_out
   [[nodiscard]] int functions() const noexcept;  // 1 without `more`
 
-  // The limit of f far from all training poses: offset + b sum w [D_out]. RT-safe.
-  [[nodiscard]] std::span<const float> constant() const noexcept;
-  // Writes that limit for other shares [functions] into out [D_out]. RT-safe.
-  void constant(std::span<const float> shares, std::span<float> out) const noexcept;
+  // The limit of f far from all training poses: offset + b sum w [D_out].
+  RT_SAFE [[nodiscard]] std::span<const float> constant() const noexcept;
+  // Writes that limit for other shares [functions] into out [D_out].
+  RT_SAFE void constant(std::span<const float> shares, std::span<float> out) const noexcept;
 
   // Works towards the mixture of these shares [functions] and returns whether mean() without shares
   // gives it. A call puts the weights of one part in kSettleCalls together; until all are, ask with
-  // shares. Not for a predictor that another thread uses. RT-safe.
-  [[nodiscard]] bool settle(std::span<const float> shares) noexcept;
+  // shares. Not for a predictor that another thread uses.
+  RT_SAFE [[nodiscard]] bool settle(std::span<const float> shares) noexcept;
   static constexpr int kSettleCalls = 64;
 
   // f(q) into out [D_out]; constant() where nothing is available. q must be finite; its missing
   // values are not read. `available` is empty (all) or D flags. `shares` is empty (those of the
-  // mixture) or [functions]. RT-safe.
-  void mean(std::span<const float> q, std::span<const std::uint8_t> available, std::span<float> out,
-            std::span<const float> shares = {}) const noexcept;
+  // mixture) or [functions].
+  RT_SAFE void mean(std::span<const float> q, std::span<const std::uint8_t> available,
+                    std::span<float> out, std::span<const float> shares = {}) const noexcept;
 
  private:
   struct Parts;

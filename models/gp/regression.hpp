@@ -51,8 +51,8 @@ struct Evidence {
 
 // Weights C^-1 (Y - offset) for Y [N x D_out]. Returns an error when shapes differ, a value is not
 // finite, or C is not positive definite.
-[[nodiscard]] Result<Trained> fit(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
-                                  const Eigen::VectorXd& offset, const Hyper& hyper);
+Result<Trained> fit(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
+                    const Eigen::VectorXd& offset, const Hyper& hyper);
 
 struct Posterior {
   Eigen::MatrixXd mean;      // [Q x D_out], offset included

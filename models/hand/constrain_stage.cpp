@@ -30,8 +30,8 @@ class ConstrainStage final : public Stage {
   explicit ConstrainStage(std::shared_ptr<const Skeleton> skeleton);
 
   // Moves the frame's angles to the nearest that are allowed; an angle that is known well moves
-  // less. A hand that lacks an angle is left alone. RT-safe.
-  void process(const StageFrame& in, StageOut& out) noexcept override;
+  // less. A hand that lacks an angle is left alone.
+  RT_SAFE void process(const StageFrame& in, StageOut& out) noexcept override;
 
  private:
   std::shared_ptr<const Skeleton> skeleton_;
@@ -41,8 +41,7 @@ class ConstrainStage final : public Stage {
 ConstrainStage::ConstrainStage(std::shared_ptr<const Skeleton> skeleton)
     : skeleton_(std::move(skeleton)), solver_(shape_of(*skeleton_)) {}
 
-// RT-safe.
-void ConstrainStage::process(const StageFrame& in, StageOut& out) noexcept {
+RT_SAFE void ConstrainStage::process(const StageFrame& in, StageOut& out) noexcept {
   if (in.frame.skeleton != skeleton_->id) {
     solver_.reset();
     return out.frame(in);

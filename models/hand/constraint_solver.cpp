@@ -20,8 +20,8 @@ class PlacedHand {
  public:
   explicit PlacedHand(const HandGeometry& geometry) : geometry_(geometry) {}
 
-  // Puts the hand into a pose; returns its smallest gap [m], at most 10 mm. RT-safe.
-  double move_to(const HandAngles& angles) noexcept;
+  // Puts the hand into a pose; returns its smallest gap [m], at most 10 mm.
+  RT_SAFE double move_to(const HandAngles& angles) noexcept;
 
   [[nodiscard]] const HandGeometry& geometry() const noexcept { return geometry_; }
   [[nodiscard]] const HandPose& pose() const noexcept { return pose_; }
@@ -66,8 +66,8 @@ constexpr double kSliver_m = 1e-5;  // a gap that stays positive after rounding 
 constexpr double kLoyalty = 0.7;  // another side must cost less than this share of the present one
 constexpr int kMaxRounds = 16;
 constexpr int kHalvings = 10;
-constexpr int kStartHalvings = 4;      // a start need not be exact
-constexpr double kLeastWeight = 1e-9;  // smallest weight, relative to the largest one
+constexpr int kStartHalvings = 4;    // a start need not be exact
+constexpr double kMinWeight = 1e-9;  // smallest weight, relative to the largest one
 
 // `over` is the distance of an angle inside its limit, less than kHinge_rad; it is bent smoothly
 // onto zero. A quadratic is used instead of a softplus, so that angles well inside do not change
@@ -339,7 +339,7 @@ ConstraintReport ConstraintSolver::step(HandAngles& angles, const HandAngles& va
     weight[c] = usable ? variance[c] : kDegree * kDegree;
   }
   const double most = *std::ranges::max_element(weight);
-  for (double& w : weight) w = std::max(w / most, kLeastWeight);
+  for (double& w : weight) w = std::max(w / most, kMinWeight);
   const HandGeometry& geometry = state.hand.geometry();
   if (state.options.limits) {
     for (std::size_t c = 0; c < angles.size(); ++c) {

@@ -48,12 +48,11 @@ class ConstraintSolver {
 
   // Changes `angles` [rad]. `variance` [rad^2] weights them; a value that is not finite or not
   // above zero counts as one degree squared. The gap afterwards is at least zero for any finite
-  // input. RT-safe.
-  ConstraintReport step(HandAngles& angles, const HandAngles& variance) noexcept;
+  // input.
+  RT_SAFE ConstraintReport step(HandAngles& angles, const HandAngles& variance) noexcept;
 
   // Forgets the previous frame; call it after a gap in the stream or at a change of source.
-  // RT-safe.
-  void reset() noexcept;
+  RT_SAFE void reset() noexcept;
 
  private:
   struct State;
@@ -61,7 +60,7 @@ class ConstraintSolver {
 };
 
 // Smallest gap between bones of two fingers [m], at most 10 mm; below zero where they overlap.
-// RT-safe.
-[[nodiscard]] double min_gap_m(const HandGeometry& geometry, const HandAngles& angles) noexcept;
+RT_SAFE [[nodiscard]] double min_gap_m(const HandGeometry& geometry,
+                                       const HandAngles& angles) noexcept;
 
 }  // namespace posed::hand

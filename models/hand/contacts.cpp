@@ -10,9 +10,9 @@ namespace {
 
 constexpr double kCrossed_m = 1e-9;  // centre lines closer than this have no direction between them
 
-// The direction that separates the pair. RT-safe.
-Eigen::Vector3d direction_apart(const HandPose& pose, BonePair pair,
-                                const Eigen::Vector3d& apart) noexcept {
+// The direction that separates the pair.
+RT_SAFE Eigen::Vector3d direction_apart(const HandPose& pose, BonePair pair,
+                                        const Eigen::Vector3d& apart) noexcept {
   const double distance_m = apart.norm();
   if (distance_m > kCrossed_m) return apart / distance_m;
   const Eigen::Vector3d across =
@@ -22,10 +22,9 @@ Eigen::Vector3d direction_apart(const HandPose& pose, BonePair pair,
 }
 
 // d(point)/d(angle) = axis x (point - joint) for the angles of the joints before the point.
-// RT-safe.
-void add_slope(const HandPose& pose, int bone, const Eigen::Vector3d& point_m,
-               const Eigen::Vector3d& direction,
-               std::array<double, kFingerChannels>& slope) noexcept {
+RT_SAFE void add_slope(const HandPose& pose, int bone, const Eigen::Vector3d& point_m,
+                       const Eigen::Vector3d& direction,
+                       std::array<double, kFingerChannels>& slope) noexcept {
   const int finger = bone / kFingerJoints;
   for (int joint = finger * kFingerJoints; joint <= bone; ++joint) {
     const Eigen::Vector3d lever = (point_m - pose.from_m[joint]).cross(direction);

@@ -7,9 +7,9 @@
 namespace posed::hand {
 namespace {
 
-// RT-safe.
-void place_bones(const FingerGeometry& finger, const double* angles, Eigen::Vector3d* from_m,
-                 Eigen::Vector3d* to_m, Eigen::Vector3d* axis) noexcept {
+RT_SAFE void place_bones(const FingerGeometry& finger, const double* angles,
+                         Eigen::Vector3d* from_m, Eigen::Vector3d* to_m,
+                         Eigen::Vector3d* axis) noexcept {
   Eigen::Matrix3d turned = finger.frame;  // columns: the channels' axes in the wrist's frame
   Eigen::Vector3d at_m = finger.base_m;
   const Eigen::Vector3d along = finger.frame.transpose() * finger.along;

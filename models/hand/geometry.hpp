@@ -9,6 +9,7 @@
 
 #include "proto/frame/hand.hpp"
 #include "proto/frame/hand_shape.hpp"
+#include "proto/frame/rt_safe.hpp"
 
 namespace posed::hand {
 
@@ -37,10 +38,10 @@ struct HandPose {
       axis;  // unit vector about which each angle turns in this pose
 };
 
-// Applies R = Rz(twist) Rx(flexion) Ry(spread) at each joint, from base to tip. RT-safe.
-void place(const HandGeometry& geometry, const HandAngles& angles, HandPose& pose) noexcept;
-// Places one finger as place_hand() does; the others stay as they are. RT-safe.
-void place_finger(const HandGeometry& geometry, int finger, const HandAngles& angles,
-                  HandPose& pose) noexcept;
+// Applies R = Rz(twist) Rx(flexion) Ry(spread) at each joint, from base to tip.
+RT_SAFE void place(const HandGeometry& geometry, const HandAngles& angles, HandPose& pose) noexcept;
+// Places one finger as place_hand() does; the others stay as they are.
+RT_SAFE void place_finger(const HandGeometry& geometry, int finger, const HandAngles& angles,
+                          HandPose& pose) noexcept;
 
 }  // namespace posed::hand

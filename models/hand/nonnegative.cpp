@@ -12,7 +12,7 @@ struct Support {
   std::array<int, kMaxUnknowns> index{};
   int count = 0;
 
-  void add(int i) noexcept { index[static_cast<std::size_t>(count++)] = i; }
+  void add(int i) noexcept { index[count++] = i; }
   void keep_positive(const SmallVector& x) noexcept {
     const auto end =
         std::remove_if(index.begin(), index.begin() + count, [&](int i) { return x[i] <= 0.0; });
@@ -21,7 +21,7 @@ struct Support {
   [[nodiscard]] bool has(int i) const noexcept {
     return std::find(index.begin(), index.begin() + count, i) != index.begin() + count;
   }
-  [[nodiscard]] int operator[](int k) const noexcept { return index[static_cast<std::size_t>(k)]; }
+  [[nodiscard]] int operator[](int k) const noexcept { return index[k]; }
 };
 
 // H x = c on the support alone, by Cholesky; `wanted` is zero elsewhere. False: not positive.

@@ -4,6 +4,8 @@
 
 #include <Eigen/Core>
 
+#include "proto/frame/rt_safe.hpp"
+
 namespace posed::hand {
 
 inline constexpr int kMaxUnknowns = 40;
@@ -12,8 +14,8 @@ using SmallMatrix =
 using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxUnknowns>;
 
 // `x` is the start, none of it below zero, and becomes the solution. False: H is not positive
-// definite, or the sets did not settle; `x` is then no worse than the start. RT-safe.
-[[nodiscard]] bool solve_nonnegative(const SmallMatrix& H, const SmallVector& c,
-                                     SmallVector& x) noexcept;
+// definite, or the sets did not settle; `x` is then no worse than the start.
+RT_SAFE [[nodiscard]] bool solve_nonnegative(const SmallMatrix& H, const SmallVector& c,
+                                             SmallVector& x) noexcept;
 
 }  // namespace posed::hand

@@ -9,13 +9,13 @@ namespace posed::hand {
 namespace {
 
 constexpr int kMaxNewtonSteps = 12;
-constexpr int kMaxCycles = 30;         // of sweeps and Newton steps
-constexpr double kStill_rad = 1e-7;    // a sweep that moves no angle farther is the last one
-constexpr double kFlat = 1e-18;        // A V A' of a row that moves nothing
-constexpr double kRidge = 1e-10;       // of the largest diagonal: rows may depend on each other
-constexpr double kMostPush_rad = 8.0;  // no force alone pushes an angle farther
-constexpr double kMet_m = 1e-8;        // a constraint that lacks less holds
-constexpr double kTorn_m = 1e-6;       // constraints that lack more contradict each other
+constexpr int kMaxCycles = 30;        // of sweeps and Newton steps
+constexpr double kStill_rad = 1e-7;   // a sweep that moves no angle farther is the last one
+constexpr double kFlat = 1e-18;       // A V A' of a row that moves nothing
+constexpr double kRidge = 1e-10;      // of the largest diagonal: rows may depend on each other
+constexpr double kMaxPush_rad = 8.0;  // no force alone pushes an angle farther
+constexpr double kMet_m = 1e-8;       // a constraint that lacks less holds
+constexpr double kTorn_m = 1e-6;      // constraints that lack more contradict each other
 constexpr int kMaxHalvings = 4;
 
 // [row][angle], each angle scaled by the root of its variance; no heap.
@@ -45,7 +45,7 @@ class Dual {
       });
       if (sum <= kFlat) continue;
       ease_[r] = 1.0 / sum;
-      most_[r] = kMostPush_rad / push;
+      most_[r] = kMaxPush_rad / push;
     }
   }
 
@@ -136,8 +136,8 @@ class Dual {
     for (int i = 0; i < kMaxHalvings; ++i, share *= 0.5) {
       RowForces next = before;
       for (Eigen::Index k = 0; k < step.size(); ++k) {
-        double& force = next[active[static_cast<std::size_t>(k)]];
-        force = bounded(active[static_cast<std::size_t>(k)], force + share * step[k]);
+        double& force = next[active[k]];
+        force = bounded(active[k], force + share * step[k]);
       }
       set(next);
       if (value() >= value_before - 1e-13 * std::abs(value_before)) return;

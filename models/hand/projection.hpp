@@ -30,9 +30,9 @@ struct Box {
 };
 
 // min (y - target)' diag(1/variance) (y - target) subject to all `rows` and, where `box` is given,
-// to the box. Forces of pairs without a row are dropped. RT-safe.
-[[nodiscard]] HandAngles project(const HandAngles& target, const HandAngles& variance,
-                                 std::span<const Row> rows, const Box* box,
-                                 Forces& forces) noexcept;
+// to the box. Forces of pairs without a row are dropped.
+RT_SAFE [[nodiscard]] HandAngles project(const HandAngles& target, const HandAngles& variance,
+                                         std::span<const Row> rows, const Box* box,
+                                         Forces& forces) noexcept;
 
 }  // namespace posed::hand

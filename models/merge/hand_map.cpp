@@ -20,9 +20,7 @@ constexpr std::array<double, kFingerJoints> kThumbAtRest_rad{5 * kRadian, 10 * k
 constexpr std::array<double, kFingerJoints> kFingerAtRest_rad{20 * kRadian, 30 * kRadian,
                                                               15 * kRadian};
 
-const Joint& joint_at(const Skeleton& skeleton, int joint) {
-  return skeleton.joints[static_cast<std::size_t>(joint)];
-}
+const Joint& joint_at(const Skeleton& skeleton, int joint) { return skeleton.joints[joint]; }
 
 // T of the joint above; identity above the root.
 Quaterniond T_above(const Skeleton& skeleton, int joint) {
@@ -53,13 +51,13 @@ Result<> HandMap::check(const std::string& stream, Side side, const Skeleton& gl
 
 Result<HandMap> HandMap::bind(const std::string& stream, Side side, const Skeleton& glove,
                               const Skeleton& merged, Wrist wrist) {
-  if (auto ok = check(stream, side, glove); !ok) return std::unexpected(ok.error());
+  TRY(check(stream, side, glove));
   HandMap map;
   map.glove_ = &glove;
   map.merged_ = &merged;
   map.side_ = side;
   for (int finger = 0; finger < kHandJoints; ++finger) {
-    if (auto ok = map.bind_finger(side, finger, glove); !ok) return std::unexpected(ok.error());
+    TRY(map.bind_finger(side, finger, glove));
   }
   const bool measured = has_rotations(glove, glove.joint_of(hand_bone_of(side)));
   if (wrist == Wrist::kGlove && !measured) {
@@ -80,7 +78,7 @@ HandMap::Reading HandMap::reading_of(Side side, int finger, const Skeleton& glov
 }
 
 Result<> HandMap::bind_finger(Side side, int finger, const Skeleton& glove) {
-  const auto i = static_cast<std::size_t>(finger);
+  const std::size_t i = finger;
   read_[i] = reading_of(side, finger, glove);
   Turning& turning = turn_[i];
   turning.joint = merged_->joint_of(hand_bone(side, finger));
@@ -113,42 +111,40 @@ void HandMap::bind_wrist(Side side, const Skeleton& glove) {
   turning.after = joint_at(*merged_, turning.joint).T_world_joint;
 }
 
-// RT-safe.
-HandPose HandMap::read(const Frame& glove) const noexcept {
+RT_SAFE HandPose HandMap::read(const Frame& glove) const noexcept {
   std::array<Quaterniond, kMaxJoints> world;
   for (std::size_t j = 0; j < glove_->joints.size(); ++j) {
     const int parent = glove_->joints[j].parent;
     const Quaterniond local = to_eigen_double(glove.rotation_xyzw[j]);
-    world[j] = parent < 0 ? local : world[static_cast<std::size_t>(parent)] * local;
+    world[j] = parent < 0 ? local : world[parent] * local;
   }
   HandPose pose;
   for (std::size_t i = 0; i < kHandTurns; ++i) {
     const Reading& reading = read_[i];
     if (reading.joint < 0) continue;
-    const auto joint = static_cast<std::size_t>(reading.joint);
+    const std::size_t joint = reading.joint;
     Quaterniond turn = world[joint];
     if (reading.above >= 0)
       turn = world[static_cast<std::size_t>(reading.above)].conjugate() * turn;
     pose.turn[i] = (reading.before * turn * reading.after).normalized();
     // false for a rotation that is none: not finite, or all zero
-    const bool sound = pose.turn[i].norm() > 0.5;
-    pose.valid[i] = glove.valid[joint] && sound;
+    const bool usable = pose.turn[i].norm() > 0.5;
+    pose.valid[i] = glove.valid[joint] && usable;
   }
   return pose;
 }
 
-// RT-safe.
-void HandMap::write(const HandPose& pose, Frame& frame) const noexcept {
+RT_SAFE void HandMap::write(const HandPose& pose, Frame& frame) const noexcept {
   if (pose.valid.none()) return;
   for (const auto& [joint, rotation] : stiff_) {
     set_rotation(*merged_, joint, rotation, frame);
-    frame.valid.set(static_cast<std::size_t>(joint));
+    frame.valid.set(joint);
   }
   for (std::size_t i = 0; i < kHandTurns; ++i) {
     const Turning& turning = turn_[i];
     if (turning.joint < 0 || !pose.valid[i]) continue;
     set_rotation(*merged_, turning.joint, turning.before * pose.turn[i] * turning.after, frame);
-    frame.valid.set(static_cast<std::size_t>(turning.joint));
+    frame.valid.set(turning.joint);
   }
 }
 
@@ -165,7 +161,7 @@ HandPose HandMap::relaxed() const {
   HandMap map;
   map.glove_ = &hand;
   for (int finger = 0; finger < kHandJoints; ++finger) {
-    map.read_[static_cast<std::size_t>(finger)] = reading_of(side_, finger, hand);
+    map.read_[finger] = reading_of(side_, finger, hand);
   }
   HandPose pose = map.read(frame);
   pose.valid.set(kWrist);

@@ -41,9 +41,9 @@ struct TimedPose {
 };
 
 // `base`, with each joint that both `a` and `b` know on the shortest arc from `a` (part 0) to `b`
-// (part 1). RT-safe.
-[[nodiscard]] inline HandPose blend(const HandPose& base, const HandPose& a, const HandPose& b,
-                                    double part) noexcept {
+// (part 1).
+RT_SAFE [[nodiscard]] inline HandPose blend(const HandPose& base, const HandPose& a,
+                                            const HandPose& b, double part) noexcept {
   HandPose pose = base;
   for (std::size_t i = 0; i < kHandTurns; ++i) {
     if (a.valid[i] && b.valid[i]) pose.turn[i] = a.turn[i].slerp(part, b.turn[i]);
@@ -61,11 +61,10 @@ enum class Wrist : std::uint8_t {
 class HandMap {
  public:
   // `stream`, of the glove, is for the errors. Both skeletons outlive the object.
-  [[nodiscard]] static Result<HandMap> bind(const std::string& stream, Side side,
-                                            const Skeleton& glove, const Skeleton& merged,
-                                            Wrist wrist);
+  static Result<HandMap> bind(const std::string& stream, Side side, const Skeleton& glove,
+                              const Skeleton& merged, Wrist wrist);
   // Whether bind() could use the glove for this side; the error says why not. Cold.
-  [[nodiscard]] static Result<> check(const std::string& stream, Side side, const Skeleton& glove);
+  static Result<> check(const std::string& stream, Side side, const Skeleton& glove);
 
   // What a frame of the glove says.
   [[nodiscard]] HandPose read(const Frame& glove) const noexcept;
@@ -90,7 +89,7 @@ class HandMap {
 
   HandMap() = default;
   [[nodiscard]] static Reading reading_of(Side side, int finger, const Skeleton& glove);
-  [[nodiscard]] Result<> bind_finger(Side side, int finger, const Skeleton& glove);
+  Result<> bind_finger(Side side, int finger, const Skeleton& glove);
   void bind_wrist(Side side, const Skeleton& glove);
 
   const Skeleton* glove_ = nullptr;

@@ -7,16 +7,16 @@ namespace posed::merge {
 namespace {
 
 constexpr std::int64_t kUsualInterval_ns = 10'000'000;
-constexpr std::int64_t kLongestInterval_ns = 100'000'000;
+constexpr std::int64_t kMaxInterval_ns = 100'000'000;
 constexpr std::int64_t kSilentIntervals = 4;
 // Less than this is the jitter of a radio link, whatever the rate.
-constexpr std::int64_t kLeastSilence_ns = 20'000'000;
+constexpr std::int64_t kMinSilence_ns = 20'000'000;
 constexpr std::int64_t kIntervalsAveraged = 16;
 // A glove whose time goes back by more than this has started again.
 constexpr std::int64_t kJumpBack_ns = kNanosPerSecond;
 
-// From 0 to 1 without a jump of the speed. RT-safe.
-double eased(std::int64_t since_ns, std::int64_t length_ns) noexcept {
+// From 0 to 1 without a jump of the speed.
+RT_SAFE double eased(std::int64_t since_ns, std::int64_t length_ns) noexcept {
   const double part =
       std::clamp(static_cast<double>(since_ns) / static_cast<double>(length_ns), 0.0, 1.0);
   return part * part * (3.0 - 2.0 * part);
@@ -27,16 +27,14 @@ double eased(std::int64_t since_ns, std::int64_t length_ns) noexcept {
 HandTrack::HandTrack(double rate_hz, std::int64_t hold_ns, const HandPose& relaxed)
     : relaxed_(relaxed),
       hold_ns_(hold_ns),
-      interval_ns_(rate_hz > 0.0 ? std::min(nanoseconds(1.0 / rate_hz), kLongestInterval_ns)
+      interval_ns_(rate_hz > 0.0 ? std::min(nanoseconds(1.0 / rate_hz), kMaxInterval_ns)
                                  : kUsualInterval_ns) {}
 
-// RT-safe.
-std::int64_t HandTrack::silent_after_ns() const noexcept {
-  return std::max(kSilentIntervals * interval_ns_, kLeastSilence_ns);
+RT_SAFE std::int64_t HandTrack::silent_after_ns() const noexcept {
+  return std::max(kSilentIntervals * interval_ns_, kMinSilence_ns);
 }
 
-// RT-safe.
-void HandTrack::receive(const TimedPose& pose, std::int64_t now_ns) noexcept {
+RT_SAFE void HandTrack::receive(const TimedPose& pose, std::int64_t now_ns) noexcept {
   received_ns_ = std::max(received_ns_, now_ns);
   if (!history_.empty()) {
     const std::int64_t step_ns = pose.time_ns - history_.newest().time_ns;
@@ -47,14 +45,14 @@ void HandTrack::receive(const TimedPose& pose, std::int64_t now_ns) noexcept {
       left_ = shown_;
     }
     if (step_ns < 0) history_.clear();
-    const std::int64_t interval_ns = std::clamp<std::int64_t>(step_ns, 0, kLongestInterval_ns);
+    const std::int64_t interval_ns = std::clamp<std::int64_t>(step_ns, 0, kMaxInterval_ns);
     if (step_ns > 0) interval_ns_ += (interval_ns - interval_ns_) / kIntervalsAveraged;
   }
   history_.add(pose);
 }
 
-// What the glove says of this time, or is assumed to say. RT-safe.
-TimedPose HandTrack::source_pose(std::int64_t time_ns) noexcept {
+// What the glove says of this time, or is assumed to say.
+RT_SAFE TimedPose HandTrack::source_pose(std::int64_t time_ns) noexcept {
   TimedPose at = history_.pose_at(time_ns);
   const std::int64_t before_ns = std::exchange(used_ns_, at.time_ns);
   if (at.time_ns >= time_ns) return at;
@@ -68,8 +66,7 @@ TimedPose HandTrack::source_pose(std::int64_t time_ns) noexcept {
   return at;
 }
 
-// RT-safe.
-std::optional<TimedPose> HandTrack::pose_at(std::int64_t time_ns) noexcept {
+RT_SAFE std::optional<TimedPose> HandTrack::pose_at(std::int64_t time_ns) noexcept {
   if (history_.empty()) return std::nullopt;
   TimedPose at = source_pose(time_ns);
   if (returns_) {

@@ -22,15 +22,15 @@ class HandHistory {
   static constexpr std::size_t kPoses = 128;
 
   [[nodiscard]] bool empty() const noexcept { return count_ == 0; }
-  // Call only if there is one. RT-safe.
-  [[nodiscard]] const TimedPose& newest() const noexcept {
+  // Call only if there is one.
+  RT_SAFE [[nodiscard]] const TimedPose& newest() const noexcept {
     assert(!empty());
     return back(0);
   }
 
   void clear() noexcept { count_ = 0; }
-  // `pose` is later than the newest; the oldest makes room for it. RT-safe.
-  void add(const TimedPose& pose) noexcept {
+  // `pose` is later than the newest; the oldest makes room for it.
+  RT_SAFE void add(const TimedPose& pose) noexcept {
     assert(empty() || pose.time_ns > newest().time_ns);
     next_ = (next_ + 1) % kPoses;
     poses_[next_] = pose;
@@ -39,8 +39,8 @@ class HandHistory {
 
   // The pose at this time, interpolated between the two around it; beyond the ends the first or the
   // last one as it is. A joint that only one of the two knows is the one of the nearer. The quality
-  // is the worse one. Call only if there is one. RT-safe.
-  [[nodiscard]] TimedPose pose_at(std::int64_t time_ns) const noexcept {
+  // is the worse one. Call only if there is one.
+  RT_SAFE [[nodiscard]] TimedPose pose_at(std::int64_t time_ns) const noexcept {
     assert(!empty());
     if (time_ns >= newest().time_ns) return newest();
     std::size_t i = 1;
@@ -74,26 +74,26 @@ class HandTrack {
   // `rate_hz` of the glove, 0 when unknown; later it is measured. `relaxed`: a hand at rest.
   HandTrack(double rate_hz, std::int64_t hold_ns, const HandPose& relaxed);
 
-  // The body has begun at `now_ns`; from now on the glove is expected. RT-safe.
-  void begin(std::int64_t now_ns) noexcept {
+  // The body has begun at `now_ns`; from now on the glove is expected.
+  RT_SAFE void begin(std::int64_t now_ns) noexcept {
     if (received_ns_ == kNoTime_ns) received_ns_ = now_ns;
   }
   // The glove's next pose, which came at `now_ns`. A pose that is not later than the newest one is
-  // ignored, unless the glove's time has jumped back. RT-safe.
-  void receive(const TimedPose& pose, std::int64_t now_ns) noexcept;
+  // ignored, unless the glove's time has jumped back.
+  RT_SAFE void receive(const TimedPose& pose, std::int64_t now_ns) noexcept;
 
   // Whether a body's frame of this time is better with the glove's next pose, and the glove has not
-  // been silent for so long that none is likely to come. RT-safe.
-  [[nodiscard]] bool awaited(std::int64_t time_ns, std::int64_t now_ns) const noexcept {
+  // been silent for so long that none is likely to come.
+  RT_SAFE [[nodiscard]] bool awaited(std::int64_t time_ns, std::int64_t now_ns) const noexcept {
     const bool here = !history_.empty() && history_.newest().time_ns >= time_ns;
     return !here && received_ns_ != kNoTime_ns && now_ns - received_ns_ < silent_after_ns();
   }
   // The pose for a body's frame; empty as long as the glove has not measured any. Times do not
-  // decrease. RT-safe.
-  [[nodiscard]] std::optional<TimedPose> pose_at(std::int64_t time_ns) noexcept;
+  // decrease.
+  RT_SAFE [[nodiscard]] std::optional<TimedPose> pose_at(std::int64_t time_ns) noexcept;
 
-  // Without a frame for so long the glove counts as silent. RT-safe.
-  [[nodiscard]] std::int64_t silent_after_ns() const noexcept;
+  // Without a frame for so long the glove counts as silent.
+  RT_SAFE [[nodiscard]] std::int64_t silent_after_ns() const noexcept;
 
  private:
   [[nodiscard]] TimedPose source_pose(std::int64_t time_ns) noexcept;

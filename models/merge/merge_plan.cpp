@@ -49,8 +49,8 @@ const ParameterTable<MergeOptions, Stage>& MergeOptions::table() {
                                          .help = "how long a frame waits for the gloves at most",
                                          .min = 0.0,
                                          .max = 0.1,
-                                         .people_name = "wait_ms",
-                                         .people_scale = 1000.0}),
+                                         .display_name = "wait_ms",
+                                         .display_scale = 1000.0}),
       Table::row<&MergeOptions::wrist>(
           {.name = "wrist",
            .help = "who turns the wrist: body, glove, or auto: the glove if it measures it"}),
@@ -74,9 +74,7 @@ Result<MergePlan> MergePlan::make(const StageContext& context) {
   for (std::size_t i = 0; i < gloves.size() && i < context.partners.size(); ++i) {
     gloves[i] = context.partners[i].skeleton.get();
     if (gloves[i] == nullptr) continue;
-    if (auto fits = HandMap::check(options.gloves[i], static_cast<Side>(i), *gloves[i]); !fits) {
-      return std::unexpected(fits.error());
-    }
+    TRY(HandMap::check(options.gloves[i], static_cast<Side>(i), *gloves[i]));
   }
   const auto is_named = [&](const char* name) {
     return !parameter<std::string>(context.parameters, name).empty();
@@ -86,26 +84,23 @@ Result<MergePlan> MergePlan::make(const StageContext& context) {
         "stage merge names no glove; name a glove's stream as its left, as its right or"
         " both");
   }
-  auto merged = merge_skeletons(*context.skeleton, gloves);
-  if (!merged) return std::unexpected(merged.error());
-  plan.merged = std::move(*merged);
+  auto merged = TRY(merge_skeletons(*context.skeleton, gloves));
+  plan.merged = std::move(merged);
   const Skeleton& skeleton = *plan.merged.skeleton;
   plan.angles = static_cast<std::uint16_t>(std::ranges::count_if(skeleton.channels, is_rotation));
   for (std::size_t i = 0; i < gloves.size(); ++i) {
     if (gloves[i] == nullptr) continue;
-    auto map = HandMap::bind(options.gloves[i], static_cast<Side>(i), *gloves[i], skeleton,
-                             wrist.value_or(Wrist::kAuto));
-    if (!map) return std::unexpected(map.error());
+    auto map = TRY(HandMap::bind(options.gloves[i], static_cast<Side>(i), *gloves[i], skeleton,
+                                 wrist.value_or(Wrist::kAuto)));
     plan.hands[i] = Hand{.glove = context.partners[i].skeleton,
                          .rate_hz = context.partners[i].rate_hz,
-                         .map = std::move(*map)};
+                         .map = std::move(map)};
     add_hand_angles(skeleton, static_cast<Side>(i), plan.hand_angles);
   }
   return plan;
 }
 
-// RT-safe.
-void MergePlan::expand(const Frame& in, Frame& out) const noexcept {
+RT_SAFE void MergePlan::expand(const Frame& in, Frame& out) const noexcept {
   copy_all_but_pose(in, out);
   out.skeleton = merged.skeleton->id;
   out.joint_count = static_cast<std::uint16_t>(merged.skeleton->joints.size());
@@ -114,12 +109,12 @@ void MergePlan::expand(const Frame& in, Frame& out) const noexcept {
   out.valid.reset();
   for (std::size_t j = 0; j < out.joint_count; ++j) out.rotation_xyzw[j] = kIdentity;
   for (std::size_t j = 0; j < merged.joint_of.size(); ++j) {
-    const auto to = static_cast<std::size_t>(merged.joint_of[j]);
+    const std::size_t to = merged.joint_of[j];
     out.rotation_xyzw[to] = in.rotation_xyzw[j];
     out.valid[to] = in.valid[j];
   }
   for (std::size_t i = 0; i < std::min<std::size_t>(in.angle_count, merged.angle_of.size()); ++i) {
-    out.angle_rad[static_cast<std::size_t>(merged.angle_of[i])] = in.angle_rad[i];
+    out.angle_rad[merged.angle_of[i]] = in.angle_rad[i];
   }
   for (const JointAngles& joint : hand_angles) {
     for (float& angle_rad : std::span(out.angle_rad).subspan(joint.first, joint.count)) {
@@ -128,8 +123,7 @@ void MergePlan::expand(const Frame& in, Frame& out) const noexcept {
   }
 }
 
-// RT-safe.
-void MergePlan::remove_unknown_angles(Frame& frame) const noexcept {
+RT_SAFE void MergePlan::remove_unknown_angles(Frame& frame) const noexcept {
   for (const JointAngles& joint : hand_angles) {
     if (frame.valid[joint.joint]) continue;
     std::ranges::fill(std::span(frame.angle_rad).subspan(joint.first, joint.count),

@@ -49,12 +49,12 @@ struct MergePlan {
   std::int64_t hold_ns = 0;
 
   // The error names the stream of a glove that does not fit.
-  [[nodiscard]] static Result<MergePlan> make(const StageContext& context);
+  static Result<MergePlan> make(const StageContext& context);
   // The body's frame on the merged skeleton. Joints that the body does not have are not valid, and
-  // have the angles that `out` had: the next ones are chosen near to them. RT-safe.
-  void expand(const Frame& in, Frame& out) const noexcept;
-  // Call when the hands are written: joints that are not valid have no angles. RT-safe.
-  void remove_unknown_angles(Frame& frame) const noexcept;
+  // have the angles that `out` had: the next ones are chosen near to them.
+  RT_SAFE void expand(const Frame& in, Frame& out) const noexcept;
+  // Call when the hands are written: joints that are not valid have no angles.
+  RT_SAFE void remove_unknown_angles(Frame& frame) const noexcept;
 };
 
 // The value of the parameter `wrist`; empty for an unknown word.

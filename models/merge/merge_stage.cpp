@@ -40,8 +40,8 @@ class MergeStage final : public Stage {
 };
 
 // When the frame was measured, on the host's clock: by the device's clock, if it has one. A frame
-// cannot have been measured after it arrived. RT-safe.
-std::int64_t time_of(const Header& header) noexcept {
+// cannot have been measured after it arrived.
+RT_SAFE std::int64_t time_of(const Header& header) noexcept {
   if (!header.clock.valid || header.device_ns == kNoTime_ns) return header.arrival_ns;
   return std::min(to_host_ns(header.clock, header.device_ns), header.arrival_ns);
 }
@@ -53,8 +53,7 @@ MergeStage::MergeStage(MergePlan plan) : plan_(std::move(plan)) {
   }
 }
 
-// RT-safe.
-void MergeStage::process(const StageFrame& in, StageOut& out) noexcept {
+RT_SAFE void MergeStage::process(const StageFrame& in, StageOut& out) noexcept {
   const std::int64_t now_ns = in.frame.header.arrival_ns;
   if (in.frame.skeleton != plan_.body->id) return out.frame(in);  // not this stage's body
   for (auto& track : tracks_) {
@@ -67,8 +66,9 @@ void MergeStage::process(const StageFrame& in, StageOut& out) noexcept {
   release_ready(now_ns, out);
 }
 
-// A glove's stage may have delayed the frame, so it came later than its header says. RT-safe.
-void MergeStage::partner(std::size_t partner, const StageFrame& in, StageOut& out) noexcept {
+// A glove's stage may have delayed the frame, so it came later than its header says.
+RT_SAFE void MergeStage::partner(std::size_t partner, const StageFrame& in,
+                                 StageOut& out) noexcept {
   if (partner >= tracks_.size() || !tracks_[partner]) return;
   const Frame& frame = in.frame;
   const MergePlan::Hand& hand = *plan_.hands[partner];
@@ -83,34 +83,31 @@ void MergeStage::partner(std::size_t partner, const StageFrame& in, StageOut& ou
   release_ready(now_ns, out);
 }
 
-// RT-safe.
-std::int64_t MergeStage::next_due_ns() const noexcept {
+RT_SAFE std::int64_t MergeStage::next_due_ns() const noexcept {
   return count_ == 0 ? kNoTime_ns : waiting_[first_].header.arrival_ns + plan_.wait_ns;
 }
 
-// RT-safe.
-void MergeStage::tick(std::int64_t now_ns, StageOut& out) noexcept { release_ready(now_ns, out); }
+RT_SAFE void MergeStage::tick(std::int64_t now_ns, StageOut& out) noexcept {
+  release_ready(now_ns, out);
+}
 
-// RT-safe.
-void MergeStage::flush(StageOut& out) noexcept {
+RT_SAFE void MergeStage::flush(StageOut& out) noexcept {
   while (count_ > 0) release(waiting_[first_].header.arrival_ns, out);
 }
 
-// RT-safe.
-bool MergeStage::ready(const Frame& frame, std::int64_t now_ns) const noexcept {
+RT_SAFE bool MergeStage::ready(const Frame& frame, std::int64_t now_ns) const noexcept {
   if (now_ns >= frame.header.arrival_ns + plan_.wait_ns) return true;
   const std::int64_t time_ns = time_of(frame.header);
   return std::ranges::none_of(
       tracks_, [&](const auto& track) { return track && track->awaited(time_ns, now_ns); });
 }
 
-// RT-safe.
-void MergeStage::release_ready(std::int64_t now_ns, StageOut& out) noexcept {
+RT_SAFE void MergeStage::release_ready(std::int64_t now_ns, StageOut& out) noexcept {
   while (count_ > 0 && ready(waiting_[first_], now_ns)) release(now_ns, out);
 }
 
-// The oldest frame goes out with what is known of the hands at its time. RT-safe.
-void MergeStage::release(std::int64_t now_ns, StageOut& out) noexcept {
+// The oldest frame goes out with what is known of the hands at its time.
+RT_SAFE void MergeStage::release(std::int64_t now_ns, StageOut& out) noexcept {
   assert(count_ > 0);
   const Frame& body = waiting_[first_];
   plan_.expand(body, merged_);
@@ -139,15 +136,13 @@ std::optional<ParameterFault> check(const Parameters& parameters, bool /*has_mod
 }
 
 Result<std::shared_ptr<const Skeleton>> leaves(const StageContext& context) {
-  auto plan = MergePlan::make(context);
-  if (!plan) return std::unexpected(plan.error());
-  return plan->merged.skeleton;
+  auto plan = TRY(MergePlan::make(context));
+  return plan.merged.skeleton;
 }
 
 Result<std::unique_ptr<Stage>> make(const StageContext& context, const StageModel* /*model*/) {
-  auto plan = MergePlan::make(context);
-  if (!plan) return std::unexpected(plan.error());
-  return std::make_unique<MergeStage>(std::move(*plan));
+  auto plan = TRY(MergePlan::make(context));
+  return std::make_unique<MergeStage>(std::move(plan));
 }
 
 }  // namespace

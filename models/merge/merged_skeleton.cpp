@@ -19,7 +19,7 @@ class Merger {
   Result<MergedSkeleton> merge() {
     merged_.name = body_.name + " with hands";
     for (int j = 0; j < std::ssize(body_.joints); ++j) add_body_joint(j);
-    merged_.root_joint = joint_of_[static_cast<std::size_t>(body_.root_joint)];
+    merged_.root_joint = joint_of_[body_.root_joint];
     if (auto ok = merged_.finish(); !ok) {
       return fail("with the hands " + ok.error().message + " (the body alone has " +
                   std::to_string(body_.joints.size()) + ")");
@@ -40,8 +40,8 @@ class Merger {
 
   void add_body_joint(int old) {
     const int joint = next();
-    Joint copy = body_.joints[static_cast<std::size_t>(old)];
-    if (copy.parent >= 0) copy.parent = joint_of_[static_cast<std::size_t>(copy.parent)];
+    Joint copy = body_.joints[old];
+    if (copy.parent >= 0) copy.parent = joint_of_[copy.parent];
     const std::optional<Bone> bone = copy.bone;
     joint_of_.push_back(joint);
     merged_.joints.push_back(std::move(copy));
@@ -72,10 +72,10 @@ class Merger {
   void add_finger(Side side, int finger, int parent) {
     const Skeleton& glove = *gloves_[static_cast<std::size_t>(side)];
     const int from = glove.joint_of(hand_bone(side, finger));
-    const auto& wrist = glove.joints[static_cast<std::size_t>(glove.joint_of(hand_bone_of(side)))];
-    const auto& hand = body_.joints[static_cast<std::size_t>(body_.joint_of(hand_bone_of(side)))];
+    const auto& wrist = glove.joints[glove.joint_of(hand_bone_of(side))];
+    const auto& hand = body_.joints[body_.joint_of(hand_bone_of(side))];
     const Eigen::Quaterniond turn = hand.T_world_joint.conjugate() * wrist.T_world_joint;
-    const Joint& original = glove.joints[static_cast<std::size_t>(from)];
+    const Joint& original = glove.joints[from];
     Joint joint;
     joint.name = bone_name(hand_bone(side, finger));
     joint.parent = parent;
@@ -96,11 +96,11 @@ class Merger {
   static Eigen::Vector3d offset_m(const Skeleton& glove, int joint, int above) {
     Eigen::Vector3d sum_m = Eigen::Vector3d::Zero();
     for (int j = joint; j != above && j >= 0;) {
-      const Joint& one = glove.joints[static_cast<std::size_t>(j)];
+      const Joint& one = glove.joints[j];
       j = one.parent;
-      if (j >= 0) sum_m += glove.joints[static_cast<std::size_t>(j)].T_world_joint * one.offset_m;
+      if (j >= 0) sum_m += glove.joints[j].T_world_joint * one.offset_m;
     }
-    return glove.joints[static_cast<std::size_t>(above)].T_world_joint.conjugate() * sum_m;
+    return glove.joints[above].T_world_joint.conjugate() * sum_m;
   }
 
   const Skeleton& body_;

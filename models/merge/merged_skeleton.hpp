@@ -33,7 +33,7 @@ struct MergedSkeleton {
 
 // `gloves`: left and right, null for none; each has all fifteen finger joints of its side. Fails if
 // the body lacks the hand, or if there are more joints than posed carries.
-[[nodiscard]] Result<MergedSkeleton> merge_skeletons(const Skeleton& body,
-                                                     const std::array<const Skeleton*, 2>& gloves);
+Result<MergedSkeleton> merge_skeletons(const Skeleton& body,
+                                       const std::array<const Skeleton*, 2>& gloves);
 
 }  // namespace posed::merge

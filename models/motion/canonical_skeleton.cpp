@@ -23,7 +23,7 @@ Result<std::shared_ptr<const Skeleton>> canonical_skeleton(const Skeleton& skele
   for (std::size_t j = 0; j < count; ++j) {
     const Joint& from = skeleton.joints[j];
     if (from.parent >= 0) {
-      const auto parent = static_cast<std::size_t>(from.parent);
+      const std::size_t parent = from.parent;
       position_m[j] = position_m[parent] + skeleton.joints[parent].T_world_joint * from.offset_m;
       place[j] = place[parent];
     }
@@ -35,15 +35,14 @@ Result<std::shared_ptr<const Skeleton>> canonical_skeleton(const Skeleton& skele
     joint.parent = place[j];
     joint.bone = from.bone;
     if (joint.parent >= 0) {
-      const Bone above = *canonical->joints[static_cast<std::size_t>(joint.parent)].bone;
-      joint.offset_m =
-          position_m[j] - position_m[static_cast<std::size_t>(skeleton.joint_of(above))];
+      const Bone above = *canonical->joints[joint.parent].bone;
+      joint.offset_m = position_m[j] - position_m[skeleton.joint_of(above)];
     }
     if (from.end_site_m) joint.end_site_m = from.T_world_joint * *from.end_site_m;
     place[j] = static_cast<int>(canonical->joints.size());
     canonical->joints.push_back(std::move(joint));
   }
-  if (auto ok = canonical->finish(); !ok) return std::unexpected(ok.error());
+  TRY(canonical->finish());
   return canonical;
 }
 

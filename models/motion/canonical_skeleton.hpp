@@ -12,7 +12,7 @@ namespace posed::motion {
 // The bones that `skeleton` has from `root` downwards, under their VRM names, where they are in its
 // T-pose; every rotation of that pose is identity. `root` is the hips of a person, or the wrist of
 // a single hand. Fails for a skeleton without it. Cold.
-[[nodiscard]] Result<std::shared_ptr<const Skeleton>> canonical_skeleton(const Skeleton& skeleton,
-                                                                         Bone root = Bone::kHips);
+Result<std::shared_ptr<const Skeleton>> canonical_skeleton(const Skeleton& skeleton,
+                                                           Bone root = Bone::kHips);
 
 }  // namespace posed::motion

@@ -44,15 +44,15 @@ inline constexpr std::array<Cmu43Joint, kCmu43Joints> kCmu43{{
 // C = Rz Ry Rx of the axis line.
 [[nodiscard]] Eigen::Quaterniond cmu43_axis_frame(const Cmu43Joint& joint);
 
-// The angles (x, y, z) [rad] of R = Rz Ry Rx, and back. RT-safe.
-[[nodiscard]] Eigen::Vector3d euler_xyz_rad(const Eigen::Quaterniond& rotation) noexcept;
+// The angles (x, y, z) [rad] of R = Rz Ry Rx, and back.
+RT_SAFE [[nodiscard]] Eigen::Vector3d euler_xyz_rad(const Eigen::Quaterniond& rotation) noexcept;
 [[nodiscard]] Eigen::Quaterniond rotation_from_euler_xyz(const Eigen::Vector3d& angle_rad) noexcept;
 
 // The rotation vector, in the outer frame, of a small change of the Euler angles at `angle_rad`;
 // the middle angle is limited to +-75 degrees, because near 90 degrees x and z turn about one axis
-// and a difference of them has no meaning (README.md, "Euler angles near the pole"). RT-safe.
-[[nodiscard]] Eigen::Vector3d euler_change_as_vector(const Eigen::Vector3d& angle_rad,
-                                                     const Eigen::Vector3d& change_rad) noexcept;
+// and a difference of them has no meaning (README.md, "Euler angles near the pole").
+RT_SAFE [[nodiscard]] Eigen::Vector3d euler_change_as_vector(
+    const Eigen::Vector3d& angle_rad, const Eigen::Vector3d& change_rad) noexcept;
 inline constexpr double kMaxMiddleAngle_rad = 75.0 * 3.14159265358979323846 / 180.0;
 
 }  // namespace posed::motion

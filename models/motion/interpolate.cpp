@@ -6,9 +6,8 @@
 
 namespace posed::motion {
 
-// RT-safe.
-void interpolate(const Skeleton& skeleton, const Frame& a, const Frame& b, double share,
-                 Frame& out) noexcept {
+RT_SAFE void interpolate(const Skeleton& skeleton, const Frame& a, const Frame& b, double share,
+                         Frame& out) noexcept {
   for (std::size_t i = 0; i < out.root_position_m.size(); ++i) {
     out.root_position_m[i] =
         std::lerp(a.root_position_m[i], b.root_position_m[i], static_cast<float>(share));

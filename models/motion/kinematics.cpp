@@ -20,7 +20,7 @@ WorldPose world_pose(const Skeleton& skeleton, const Frame& frame) {
   // The offsets above the root joint only give where the recording began; the true root position is
   // the frame's.
   Eigen::Vector3d root;
-  for (int i = 0; i < 3; ++i) root[i] = frame.root_position_m[static_cast<std::size_t>(i)];
+  for (int i = 0; i < 3; ++i) root[i] = frame.root_position_m[i];
   const Eigen::Vector3d shift = root - pose.position_m[skeleton.root_joint];
   for (Eigen::Vector3d& position : pose.position_m) position += shift;
   return pose;

@@ -19,25 +19,23 @@ std::optional<LegSignal> LegSignal::find(const Skeleton& skeleton) {
 
 LegSignal::LegSignal(const Skeleton& skeleton, int right, int left) {
   const auto thigh_of = [&](int j) {
-    const Joint& joint = skeleton.joints[static_cast<std::size_t>(j)];
+    const Joint& joint = skeleton.joints[j];
     const Quaterniond before =
-        joint.parent < 0 ? Quaterniond::Identity()
-                         : skeleton.joints[static_cast<std::size_t>(joint.parent)].T_world_joint;
+        joint.parent < 0 ? Quaterniond::Identity() : skeleton.joints[joint.parent].T_world_joint;
     return Thigh{static_cast<std::size_t>(j), before, joint.T_world_joint.conjugate()};
   };
   thighs_ = {thigh_of(right), thigh_of(left)};
 }
 
-// RT-safe
-bool LegSignal::measured(const Frame& frame) const noexcept {
+RT_SAFE bool LegSignal::measured(const Frame& frame) const noexcept {
   return std::ranges::all_of(thighs_, [&](const Thigh& thigh) {
     return thigh.joint < frame.joint_count && frame.valid[thigh.joint];
   });
 }
 
 // The thigh points down in the T-pose; its flexion is how far forward it points in the pelvis
-// frame. RT-safe
-double LegSignal::value_rad(const Frame& frame) const noexcept {
+// frame.
+RT_SAFE double LegSignal::value_rad(const Frame& frame) const noexcept {
   const auto flexion_rad = [&](const Thigh& thigh) {
     const Quaterniond canonical =
         thigh.before * to_eigen_double(frame.rotation_xyzw[thigh.joint]) * thigh.after;

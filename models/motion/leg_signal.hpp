@@ -17,11 +17,11 @@ class LegSignal {
   // Empty for a skeleton that names no upper legs. Cold.
   [[nodiscard]] static std::optional<LegSignal> find(const Skeleton& skeleton);
 
-  // Whether this frame measured both thighs. RT-safe.
-  [[nodiscard]] bool measured(const Frame& frame) const noexcept;
+  // Whether this frame measured both thighs.
+  RT_SAFE [[nodiscard]] bool measured(const Frame& frame) const noexcept;
 
-  // Right minus left flexion of the thigh against the pelvis [rad], forward positive. RT-safe.
-  [[nodiscard]] double value_rad(const Frame& frame) const noexcept;
+  // Right minus left flexion of the thigh against the pelvis [rad], forward positive.
+  RT_SAFE [[nodiscard]] double value_rad(const Frame& frame) const noexcept;
 
  private:
   // The rotation of the joint in canonical axes is before L after.

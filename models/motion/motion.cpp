@@ -19,7 +19,7 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-constexpr double kShortestChord_m = 0.5;
+constexpr double kMinChord_m = 0.5;
 constexpr double kSameRate = 1e-3;           // relative
 constexpr double kAddedPoseJump = 4.0;       // times the largest step that follows
 constexpr double kAddedPoseJump_rad = 0.09;  // and at least 5 degrees rms over the joints
@@ -141,7 +141,7 @@ double walk_heading_rad(const Motion& motion) {
   const auto& last = motion.frames.back().root_position_m;
   const double dx = static_cast<double>(last[0]) - first[0];
   const double dz = static_cast<double>(last[2]) - first[2];
-  if (std::hypot(dx, dz) >= kShortestChord_m) return std::atan2(dx, dz);
+  if (std::hypot(dx, dz) >= kMinChord_m) return std::atan2(dx, dz);
   const Quaterniond T_inverse = skeleton.joints[skeleton.root_joint].T_world_joint.conjugate();
   Vector3d forward = Vector3d::Zero();
   for (const Frame& frame : motion.frames) {
@@ -177,9 +177,8 @@ Result<> set_mean_rotations(std::span<const Motion* const> motions, PoseSpaceSpe
   if (spec.mean.empty()) return {};
   std::vector<Eigen::Matrix4d> sums(spec.mean.size(), Eigen::Matrix4d::Zero());
   for (const Motion* motion : motions) {
-    const auto space = PoseSpace::bind(spec, *motion->skeleton);
-    if (!space) return std::unexpected(space.error());
-    const MatrixXd q = pose_vectors(*motion, *space, walk_heading_rad(*motion));
+    const auto space = TRY(PoseSpace::bind(spec, *motion->skeleton));
+    const MatrixXd q = pose_vectors(*motion, space, walk_heading_rad(*motion));
     for (int j = 0; j < std::ssize(spec.mean); ++j) {
       for (int t = 0; t < q.rows(); ++t) {
         const Vector3d v = q.block<1, 3>(t, 3 * j).transpose();

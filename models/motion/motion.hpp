@@ -25,7 +25,7 @@ struct Motion {
 
 // The clip's poses at the clip's own rate. Refuses a clip without frames, without a rate, or with a
 // value that is not finite; the error names the clip and the frame.
-[[nodiscard]] Result<Motion> motion_of(const clip::Clip& clip);
+Result<Motion> motion_of(const clip::Clip& clip);
 
 // Whether the first frame does not belong to the motion. Some converters put the figure's rest pose
 // in front (CMU's cgspeed BVH files), so the step to the second frame is larger than any person
@@ -51,8 +51,7 @@ void drop_first_frame(Motion& motion);
 
 // Sets the means of `spec` to the mean rotations over these motions, all with equal weight. cmu43
 // has no means. Returns an error for a skeleton that lacks joints of the space.
-[[nodiscard]] Result<> set_mean_rotations(std::span<const Motion* const> motions,
-                                          PoseSpaceSpec& spec);
+Result<> set_mean_rotations(std::span<const Motion* const> motions, PoseSpaceSpec& spec);
 
 // LegSignal of every frame [rad]. Empty when the skeleton names no upper legs.
 [[nodiscard]] std::optional<Eigen::VectorXd> leg_signal(const Motion& motion);

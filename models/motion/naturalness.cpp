@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 constexpr double kMaxFrequency_hz = 10.0;  // upper end of the part of the spectrum that counts
-constexpr double kLeastAmplitude = 0.05;   // relative to the largest amplitude
+constexpr double kMinAmplitude = 0.05;     // relative to the largest amplitude
 constexpr int kPadLevel = 4;               // zero-padding: 2^4 times the next power of two
 constexpr Eigen::Index kWindow = 30;       // frames of a feature
 constexpr Eigen::Index kWindowsPerDimension = 10;
@@ -108,15 +108,14 @@ double spectral_arc_length(std::span<const double> speed, double rate_hz) {
   const double largest = *std::ranges::max_element(amplitude);
   if (!(largest > 0.0)) return kNone;
   for (double& a : amplitude) a /= largest;
-  const auto counts = [](double a) { return a >= kLeastAmplitude; };
+  const auto counts = [](double a) { return a >= kMinAmplitude; };
   const auto first = std::ranges::find_if(amplitude, counts) - amplitude.begin();
   const auto last =
       amplitude.rend() - std::find_if(amplitude.rbegin(), amplitude.rend(), counts) - 1;
   double length = 0.0;
   for (auto k = first; k < last; ++k) {
     const double across = 1.0 / static_cast<double>(last - first);
-    length += std::hypot(across, amplitude[static_cast<std::size_t>(k) + 1] -
-                                     amplitude[static_cast<std::size_t>(k)]);
+    length += std::hypot(across, amplitude[static_cast<std::size_t>(k) + 1] - amplitude[k]);
   }
   return -length;
 }

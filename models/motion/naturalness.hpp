@@ -37,7 +37,7 @@ struct Gaussian {
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;
 };
-[[nodiscard]] Result<Gaussian> gaussian_of(const Rows& rows);
+Result<Gaussian> gaussian_of(const Rows& rows);
 
 // |m1 - m2|^2 + tr(S1 + S2 - 2 (S1 S2)^(1/2)), at least 0.
 [[nodiscard]] double frechet_distance(const Gaussian& a, const Gaussian& b);
@@ -65,6 +65,6 @@ struct WindowSums {
 // Frechet distance between the features (those of WindowSums) of two motions, on the first
 // `dimensions` principal components. Fewer dimensions are used where the motions are too short for
 // ten windows per dimension; an error is returned where even one dimension is too many.
-[[nodiscard]] Result<double> motion_distance(const Rows& a, const Rows& b, int dimensions = 20);
+Result<double> motion_distance(const Rows& a, const Rows& b, int dimensions = 20);
 
 }  // namespace posed::motion

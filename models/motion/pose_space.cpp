@@ -116,13 +116,12 @@ Result<PoseSpaceSpec> describe_space(Space space, const Skeleton& skeleton) {
     }
     spec.mean.assign(spec.joints.size(), Quaterniond::Identity());
   }
-  auto bound = PoseSpace::bind(spec, skeleton);
-  if (!bound) return std::unexpected(bound.error());
+  TRY(PoseSpace::bind(spec, skeleton));
   return spec;
 }
 
 Result<PoseSpace> PoseSpace::bind(const PoseSpaceSpec& spec, const Skeleton& skeleton) {
-  if (auto checked = check_spec(spec); !checked) return std::unexpected(checked.error());
+  TRY(check_spec(spec));
   PoseSpace space;
   space.skeleton_ = std::make_shared<const Skeleton>(skeleton);
   space.root_ = spec.root;
@@ -175,21 +174,19 @@ int PoseSpace::skeleton_joint_of_dim(int d) const noexcept {
   return items_[joint_of_dim_[d]].joint;
 }
 
-// RT-safe
-bool PoseSpace::chain_measured(const Item& item, const Frame& frame) const noexcept {
+RT_SAFE bool PoseSpace::chain_measured(const Item& item, const Frame& frame) const noexcept {
   bool all = item.joint < frame.joint_count;
   for (int i = item.chain_begin; i < item.chain_end; ++i) all = all && frame.valid[chain_[i]];
   return all;
 }
 
-// RT-safe
-bool PoseSpace::measured(const Item& item, const Frame& frame) const noexcept {
+RT_SAFE bool PoseSpace::measured(const Item& item, const Frame& frame) const noexcept {
   return chain_measured(item, frame) && frame.valid[item.joint];
 }
 
-// The product of all factors before L in V, without the mean. RT-safe
-Quaterniond PoseSpace::base(const Item& item, const Frame& frame,
-                            double heading_rad) const noexcept {
+// The product of all factors before L in V, without the mean.
+RT_SAFE Quaterniond PoseSpace::base(const Item& item, const Frame& frame,
+                                    double heading_rad) const noexcept {
   Quaterniond rotation = item.before;
   if (&item == &items_[root_]) rotation = axis_rotation(Axis::kY, -heading_rad) * rotation;
   for (int i = item.chain_begin; i < item.chain_end; ++i) {
@@ -198,13 +195,11 @@ Quaterniond PoseSpace::base(const Item& item, const Frame& frame,
   return rotation;
 }
 
-// RT-safe
-bool PoseSpace::has_heading(const Frame& frame) const noexcept {
+RT_SAFE bool PoseSpace::has_heading(const Frame& frame) const noexcept {
   return measured(items_[root_], frame);
 }
 
-// RT-safe
-double PoseSpace::heading_rad(const Frame& frame) const noexcept {
+RT_SAFE double PoseSpace::heading_rad(const Frame& frame) const noexcept {
   const Item& root = items_[root_];
   const Quaterniond now =
       base(root, frame, 0.0) * to_eigen_double(frame.rotation_xyzw[root.joint]) * root.after;
@@ -212,9 +207,8 @@ double PoseSpace::heading_rad(const Frame& frame) const noexcept {
   return twist_angle_rad(Quaterniond(now * root.mean.conjugate()), unit(Axis::kY));
 }
 
-// RT-safe
-void PoseSpace::to_vector(const Frame& frame, double heading_rad, std::span<float> q,
-                          std::span<std::uint8_t> available) const noexcept {
+RT_SAFE void PoseSpace::to_vector(const Frame& frame, double heading_rad, std::span<float> q,
+                                  std::span<std::uint8_t> available) const noexcept {
   for (const Item& item : items_) {
     const bool here = measured(item, frame);
     Vector3d value = Vector3d::Zero();
@@ -233,9 +227,8 @@ void PoseSpace::to_vector(const Frame& frame, double heading_rad, std::span<floa
   }
 }
 
-// RT-safe
-bool PoseSpace::convert(const PoseSpace& from, std::span<const float> from_q,
-                        std::span<float> q) const noexcept {
+RT_SAFE bool PoseSpace::convert(const PoseSpace& from, std::span<const float> from_q,
+                                std::span<float> q) const noexcept {
   const auto same = [](const Item& a, const Item& b) {
     return a.joint == b.joint && a.axes == b.axes && a.before.coeffs() == b.before.coeffs();
   };
@@ -248,7 +241,7 @@ bool PoseSpace::convert(const PoseSpace& from, std::span<const float> from_q,
     return true;
   }
   for (std::size_t i = 0; i < items_.size(); ++i) {
-    const auto d = static_cast<std::size_t>(items_[i].first_dim);
+    const std::size_t d = items_[i].first_dim;
     const Vector3d v(from_q[d], from_q[d + 1], from_q[d + 2]);
     const Vector3d w = rotation_log(
         Quaterniond(items_[i].mean.conjugate() * from.items_[i].mean * rotation_exp(v)));
@@ -258,9 +251,9 @@ bool PoseSpace::convert(const PoseSpace& from, std::span<const float> from_q,
   return true;
 }
 
-// V after the change; `rotation` is V as the frame has it. RT-safe
-Quaterniond PoseSpace::changed(const Item& item, const Quaterniond& rotation, const float* q,
-                               const float* delta) const noexcept {
+// V after the change; `rotation` is V as the frame has it.
+RT_SAFE Quaterniond PoseSpace::changed(const Item& item, const Quaterniond& rotation,
+                                       const float* q, const float* delta) const noexcept {
   // A joint may turn about an axis that the space does not list (cmu43); that angle is kept.
   Vector3d now = euler_ ? euler_xyz_rad(rotation) : Vector3d::Zero();
   Vector3d change = Vector3d::Zero();
@@ -277,9 +270,8 @@ Quaterniond PoseSpace::changed(const Item& item, const Quaterniond& rotation, co
   return rotation_exp(euler_change_as_vector(now, change)) * rotation_from_euler_xyz(now);
 }
 
-// RT-safe
-void PoseSpace::add(Frame& frame, double heading_rad, std::span<const float> q,
-                    std::span<const float> delta) const noexcept {
+RT_SAFE void PoseSpace::add(Frame& frame, double heading_rad, std::span<const float> q,
+                            std::span<const float> delta) const noexcept {
   for (const Item& item : items_) {
     const auto change = delta.subspan(item.first_dim, item.dims);
     const bool moves = std::ranges::any_of(change, [](float d) { return d != 0.0F; });
@@ -293,15 +285,15 @@ void PoseSpace::add(Frame& frame, double heading_rad, std::span<const float> q,
   }
 }
 
-// RT-safe
-void PoseSpace::put(Frame& frame, double heading_rad, std::span<const double> q) const noexcept {
+RT_SAFE void PoseSpace::put(Frame& frame, double heading_rad,
+                            std::span<const double> q) const noexcept {
   for (const Item& item : items_) {
-    const auto d = static_cast<std::size_t>(item.first_dim);
+    const std::size_t d = item.first_dim;
     const Vector3d v(q[d], q[d + 1], q[d + 2]);
     if (!v.allFinite() || !chain_measured(item, frame)) continue;
     const Quaterniond to_base = item.mean.conjugate() * base(item, frame, heading_rad);
     const Quaterniond local = to_base.conjugate() * rotation_exp(v) * item.after.conjugate();
-    frame.valid[static_cast<std::size_t>(item.joint)] = true;
+    frame.valid[item.joint] = true;
     set_rotation(*skeleton_, item.joint, local, frame);
   }
 }

@@ -30,7 +30,7 @@ inline constexpr int kCmu43Joints = 19;
 
 enum class Space : std::uint8_t { kNative, kCmu43, kHumanoid };
 [[nodiscard]] std::string_view space_name(Space space);
-[[nodiscard]] Result<Space> space_from_name(std::string_view name);
+Result<Space> space_from_name(std::string_view name);
 
 // What a model stores of its space.
 struct PoseSpaceSpec {
@@ -43,7 +43,7 @@ struct PoseSpaceSpec {
 
 // The spec of `space` on `skeleton`, with identity for every mean; it lists the joints that a model
 // trained on such clips has. The error names the joints that are missing.
-[[nodiscard]] Result<PoseSpaceSpec> describe_space(Space space, const Skeleton& skeleton);
+Result<PoseSpaceSpec> describe_space(Space space, const Skeleton& skeleton);
 
 // How many dimensions q has in this spec.
 [[nodiscard]] int space_dims(const PoseSpaceSpec& spec);
@@ -52,7 +52,7 @@ struct PoseSpaceSpec {
 class PoseSpace {
  public:
   // Returns an error that names the missing joints when the skeleton lacks joints of the space.
-  [[nodiscard]] static Result<PoseSpace> bind(const PoseSpaceSpec& spec, const Skeleton& skeleton);
+  static Result<PoseSpace> bind(const PoseSpaceSpec& spec, const Skeleton& skeleton);
 
   [[nodiscard]] const Skeleton& skeleton() const noexcept { return *skeleton_; }
   [[nodiscard]] int dims() const noexcept;
@@ -62,32 +62,31 @@ class PoseSpace {
   [[nodiscard]] int skeleton_joint_of_dim(int d) const noexcept;
 
   // Turn about +Y that brings the training mean of the root nearest to this frame's root [rad].
-  // RT-safe.
-  [[nodiscard]] double heading_rad(const Frame& frame) const noexcept;
+  RT_SAFE [[nodiscard]] double heading_rad(const Frame& frame) const noexcept;
 
-  // False where this frame did not measure the root; heading_rad() then has no meaning. RT-safe.
-  [[nodiscard]] bool has_heading(const Frame& frame) const noexcept;
+  // False where this frame did not measure the root; heading_rad() then has no meaning.
+  RT_SAFE [[nodiscard]] bool has_heading(const Frame& frame) const noexcept;
 
   // q [dims] of `frame` seen from `heading_rad`; available[d] is 0 where the joint was not measured
-  // (q is then 0, the training mean). RT-safe.
-  void to_vector(const Frame& frame, double heading_rad, std::span<float> q,
-                 std::span<std::uint8_t> available) const noexcept;
+  // (q is then 0, the training mean).
+  RT_SAFE void to_vector(const Frame& frame, double heading_rad, std::span<float> q,
+                         std::span<std::uint8_t> available) const noexcept;
 
   // The q of this space for the pose that is `from_q` in another; both have `kMaxPoseDims` values.
-  // False, and nothing is written, where the two do not describe the same joints. RT-safe.
-  [[nodiscard]] bool convert(const PoseSpace& from, std::span<const float> from_q,
-                             std::span<float> q) const noexcept;
+  // False, and nothing is written, where the two do not describe the same joints.
+  RT_SAFE [[nodiscard]] bool convert(const PoseSpace& from, std::span<const float> from_q,
+                                     std::span<float> q) const noexcept;
 
   // Replaces the pose of `frame` by q + delta in the space's own sense, channel angles included;
   // joints that are not available and joints outside the space are unchanged; a zero delta leaves
-  // every bit of the frame unchanged. RT-safe.
-  void add(Frame& frame, double heading_rad, std::span<const float> q,
-           std::span<const float> delta) const noexcept;
+  // every bit of the frame unchanged.
+  RT_SAFE void add(Frame& frame, double heading_rad, std::span<const float> q,
+                   std::span<const float> delta) const noexcept;
 
   // Gives the joints of a space of rotation vectors the pose q [dims], whether they were measured
   // or not; then they are. A joint with q that is not finite, or with unmeasured joints between it
-  // and the joint of the space above it, is unchanged. RT-safe.
-  void put(Frame& frame, double heading_rad, std::span<const double> q) const noexcept;
+  // and the joint of the space above it, is unchanged.
+  RT_SAFE void put(Frame& frame, double heading_rad, std::span<const double> q) const noexcept;
 
  private:
   // One joint of the space. The rotation that q describes is

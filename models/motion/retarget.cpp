@@ -15,7 +15,7 @@ using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
 // No person or figure is larger than another by more; legs of such a skeleton are a mistake.
-constexpr double kMostScale = 50.0;
+constexpr double kMaxScale = 50.0;
 
 // The length of the leg's parts that both skeletons have.
 struct Legs {
@@ -30,8 +30,8 @@ std::optional<double> length_m(const Skeleton& skeleton, Bone above, Bone bone) 
   if (top < 0 || joint < 0) return std::nullopt;
   double sum_m = 0.0;
   while (joint >= 0 && joint != top) {
-    sum_m += skeleton.joints[static_cast<std::size_t>(joint)].offset_m.norm();
-    joint = skeleton.joints[static_cast<std::size_t>(joint)].parent;
+    sum_m += skeleton.joints[joint].offset_m.norm();
+    joint = skeleton.joints[joint].parent;
   }
   if (joint < 0) return std::nullopt;
   return sum_m;
@@ -56,13 +56,13 @@ Legs leg_lengths(const Skeleton& from, const Skeleton& to) {
 
 using Rotations = std::array<Quaterniond, kMaxJoints>;  // [joint], joint's frame to the world
 
-// The offset from the skeleton's root joint to `joint`, a joint below it, in the world. RT-safe.
-Vector3d from_root(const Skeleton& skeleton, const Rotations& world, int joint) noexcept {
+// The offset from the skeleton's root joint to `joint`, a joint below it, in the world.
+RT_SAFE Vector3d from_root(const Skeleton& skeleton, const Rotations& world, int joint) noexcept {
   Vector3d offset_m = Vector3d::Zero();
   while (joint >= 0 && joint != skeleton.root_joint) {
-    const Joint& here = skeleton.joints[static_cast<std::size_t>(joint)];
+    const Joint& here = skeleton.joints[joint];
     if (here.parent < 0) return Vector3d::Zero();  // the hips lie above the root joint
-    offset_m += world[static_cast<std::size_t>(here.parent)] * here.offset_m;
+    offset_m += world[here.parent] * here.offset_m;
     joint = here.parent;
   }
   return offset_m;
@@ -90,7 +90,7 @@ Result<Retarget> Retarget::bind(std::shared_ptr<const Skeleton> from,
   }
   const Legs legs = leg_lengths(*from, *to);
   const double scale = legs.to_m / legs.from_m;  // not finite without legs
-  if (scale > 1.0 / kMostScale && scale < kMostScale) retarget.scale_ = scale;
+  if (scale > 1.0 / kMaxScale && scale < kMaxScale) retarget.scale_ = scale;
   retarget.angles_ = static_cast<std::uint16_t>(std::ranges::count_if(
       to->channels, [](const Channel& channel) { return !channel.translation; }));
   retarget.from_ = std::move(from);
@@ -98,13 +98,12 @@ Result<Retarget> Retarget::bind(std::shared_ptr<const Skeleton> from,
   return retarget;
 }
 
-// RT-safe.
-void Retarget::apply(const Frame& in, Frame& out) const noexcept {
+RT_SAFE void Retarget::apply(const Frame& in, Frame& out) const noexcept {
   Rotations source, target;
   for (std::size_t j = 0; j < from_->joints.size(); ++j) {
     const int parent = from_->joints[j].parent;
     const Quaterniond local = to_eigen_double(in.rotation_xyzw[j]);
-    source[j] = parent < 0 ? local : source[static_cast<std::size_t>(parent)] * local;
+    source[j] = parent < 0 ? local : source[parent] * local;
   }
   copy_all_but_pose(in, out);
   out.skeleton = to_->id;
@@ -116,8 +115,8 @@ void Retarget::apply(const Frame& in, Frame& out) const noexcept {
   for (std::size_t j = 0; j < parts_.size(); ++j) {
     const Part& part = parts_[j];
     const int above = to_->joints[j].parent;
-    const auto parent = static_cast<std::size_t>(above < 0 ? 0 : above);
-    const auto from = static_cast<std::size_t>(part.source < 0 ? 0 : part.source);
+    const std::size_t parent = above < 0 ? 0 : above;
+    const std::size_t from = part.source < 0 ? 0 : part.source;
     const bool measured = part.source >= 0 && part.source < in.joint_count && in.valid[from];
     if (measured) {
       C[j] = source[from] * part.before;
@@ -135,7 +134,7 @@ void Retarget::apply(const Frame& in, Frame& out) const noexcept {
   position_m *= scale_;
   if (hips >= 0 && hips_there >= 0) position_m -= from_root(*to_, target, hips_there);
   for (int i = 0; i < 3; ++i) {
-    out.root_position_m[static_cast<std::size_t>(i)] = static_cast<float>(position_m[i]);
+    out.root_position_m[i] = static_cast<float>(position_m[i]);
   }
 }
 

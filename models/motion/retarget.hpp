@@ -19,8 +19,8 @@ namespace posed::motion {
 class Retarget {
  public:
   // Fails when the two have no bone in common. Cold.
-  [[nodiscard]] static Result<Retarget> bind(std::shared_ptr<const Skeleton> from,
-                                             std::shared_ptr<const Skeleton> to);
+  static Result<Retarget> bind(std::shared_ptr<const Skeleton> from,
+                               std::shared_ptr<const Skeleton> to);
 
   [[nodiscard]] const std::shared_ptr<const Skeleton>& target() const noexcept { return to_; }
   // Target's length of legs by the source's; 1 where one of them has no legs, or absurd ones.
@@ -29,8 +29,8 @@ class Retarget {
   // Replaces `out` by the pose of `in`, a frame of the source, with its header, quality, label and
   // times. A joint of the target that the source does not have, or did not measure, stays with its
   // parent as in the T-pose and is not valid. Angles are those nearest to the ones in `out`, so
-  // that `out` is best the frame before. RT-safe.
-  void apply(const Frame& in, Frame& out) const noexcept;
+  // that `out` is best the frame before.
+  RT_SAFE void apply(const Frame& in, Frame& out) const noexcept;
 
  private:
   struct Part {

@@ -67,7 +67,7 @@ void set_legs(std::vector<JointWaves>& joint, const FamilyAmounts& f) {
   for (int side = 0; side < 2; ++side) {
     const double phase = side == 0 ? pi : 0.0;  // the right thigh is forward at phase 0
     const double sign = side == 0 ? 1.0 : -1.0;
-    const auto thigh = static_cast<std::size_t>(side == 0 ? 13 : 16);
+    const std::size_t thigh = side == 0 ? 13 : 16;
     joint[thigh][0] = {-4.0, -f.thigh_swing, phase, 4.0, 0.6};
     joint[thigh][2] = {sign * f.thigh_in, 1.5, phase, 0.0, 0.0};
     joint[thigh + 1][0] = {f.knee * 0.75, f.knee * 0.6, phase + 1.9, f.knee * 0.45,
@@ -81,7 +81,7 @@ void set_arms(std::vector<JointWaves>& joint, const FamilyAmounts& f) {
   for (int side = 0; side < 2; ++side) {
     const double phase = side == 0 ? 0.0 : pi;  // each arm swings with the other side's leg
     const double sign = side == 0 ? 1.0 : -1.0;
-    const auto upper = static_cast<std::size_t>(side == 0 ? 6 : 10);
+    const std::size_t upper = side == 0 ? 6 : 10;
     joint[upper][2] = {sign * (f.arm_out - 82.0), 2.0, phase, 0.0, 0.0};  // hanging beside the body
     joint[upper][1] = {0.0, sign * -f.arm_swing, phase, 0.0, 0.0};
     joint[upper + 1][1] = {sign * -f.elbow, sign * -f.elbow * 0.35, phase, 0.0, 0.0};
@@ -145,7 +145,7 @@ Result<Skeleton> make_skeleton(double scale) {
     }
     skeleton.joints.push_back(std::move(joint));
   }
-  if (auto finished = skeleton.finish(); !finished) return std::unexpected(finished.error());
+  TRY(skeleton.finish());
   return skeleton;
 }
 
@@ -156,9 +156,8 @@ Result<clip::Clip> make_walker(const WalkerOptions& options) {
   const std::vector<JointWaves> waves = family_waves(options.family);
   clip::Clip walk;
   walk.path = "synthetic";
-  auto skeleton = make_skeleton(person.scale);
-  if (!skeleton) return std::unexpected(skeleton.error());
-  walk.skeleton = std::make_shared<const Skeleton>(std::move(*skeleton));
+  auto skeleton = TRY(make_skeleton(person.scale));
+  walk.skeleton = std::make_shared<const Skeleton>(std::move(skeleton));
   walk.frame_rate_hz = options.rate_hz;
   const auto frames = static_cast<Eigen::Index>(std::lround(options.seconds * options.rate_hz));
   walk.channels.resize(frames, static_cast<Eigen::Index>(walk.skeleton->channels.size()));

@@ -26,6 +26,6 @@ struct WalkerOptions {
 
 // A clip of one walk along +Z. Skeleton with BVH-style ZXY channels and canonical names;
 // deterministic.
-[[nodiscard]] Result<clip::Clip> make_walker(const WalkerOptions& options);
+Result<clip::Clip> make_walker(const WalkerOptions& options);
 
 }  // namespace posed::motion

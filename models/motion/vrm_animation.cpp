@@ -40,9 +40,7 @@ double hips_height_m(const Skeleton& humanoid) {
   double lowest_m = 0.0;
   std::vector<double> height_m;  // [joint], from the hips
   for (const Joint& joint : humanoid.joints) {
-    height_m.push_back(joint.parent < 0
-                           ? 0.0
-                           : height_m[static_cast<std::size_t>(joint.parent)] + joint.offset_m.y());
+    height_m.push_back(joint.parent < 0 ? 0.0 : height_m[joint.parent] + joint.offset_m.y());
     lowest_m = std::min(lowest_m, height_m.back());
     if (joint.end_site_m) lowest_m = std::min(lowest_m, height_m.back() + joint.end_site_m->y());
   }
@@ -63,19 +61,16 @@ std::vector<clip::GltfNode> nodes_of(const Skeleton& humanoid) {
 }  // namespace
 
 Result<> write_vrm_animation(const clip::Clip& clip, const std::filesystem::path& path) {
-  auto time_s = clip::gltf_times(clip);
-  if (!time_s) return std::unexpected(time_s.error());
-  if (auto ok = check_bones(*clip.skeleton, clip.path); !ok) return ok;
-  auto humanoid = canonical_skeleton(*clip.skeleton);
-  if (!humanoid) return std::unexpected(humanoid.error());
-  if (auto ok = check_bones(**humanoid, clip.path); !ok) return ok;  // some hang beside the hips
-  const auto retarget = Retarget::bind(clip.skeleton, *humanoid);
-  if (!retarget) return std::unexpected(retarget.error());
+  auto time_s = TRY(clip::gltf_times(clip));
+  TRY(check_bones(*clip.skeleton, clip.path));
+  auto humanoid = TRY(canonical_skeleton(*clip.skeleton));
+  TRY(check_bones(*humanoid, clip.path));  // some hang beside the hips
+  const auto retarget = TRY(Retarget::bind(clip.skeleton, humanoid));
   clip::GltfMotion motion{
-      .name = path.stem().string(), .time_s = std::move(*time_s), .nodes = nodes_of(**humanoid)};
+      .name = path.stem().string(), .time_s = std::move(time_s), .nodes = nodes_of(*humanoid)};
   Frame pose;
   for (int i = 0; i < clip.frames(); ++i) {
-    retarget->apply(clip.frame(i), pose);
+    retarget.apply(clip.frame(i), pose);
     const auto& p = pose.root_position_m;
     clip::add_position(motion.nodes.front(), Eigen::Vector3f(p[0], p[1], p[2]).cast<double>());
     for (std::size_t j = 0; j < motion.nodes.size(); ++j) {

@@ -12,8 +12,7 @@ namespace posed::motion {
 // skeleton stands in T-pose on the ground, with the person's proportions; every bone that there is
 // turns, the fingers too, and the hips move. Fails for a skeleton without a bone that VRM requires,
 // and names those that are missing.
-[[nodiscard]] Result<> write_vrm_animation(const clip::Clip& clip,
-                                           const std::filesystem::path& path);
+Result<> write_vrm_animation(const clip::Clip& clip, const std::filesystem::path& path);
 
 // Its row of the table of clip formats, which the program adds when it starts (clip::add_format).
 [[nodiscard]] clip::Format vrm_animation_format();

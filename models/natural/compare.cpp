@@ -9,8 +9,8 @@
 namespace posed::natural {
 namespace {
 
-constexpr int kMostDimensions = 20;
-constexpr double kLeastRoom = 0.1;  // of the median: a corpus of near-copies has no width
+constexpr int kMaxDimensions = 20;
+constexpr double kMinRoom = 0.1;  // of the median: a corpus of near-copies has no width
 constexpr double kUnmeasured = std::numeric_limits<double>::quiet_NaN();
 
 // Which values of a figure are not natural: only high ones, or low ones, too.
@@ -59,7 +59,7 @@ void place(std::string name, double value, std::vector<double> of_corpus, Bad ba
   const std::size_t before = of_corpus.size();
   std::erase_if(of_corpus, [](double x) { return !std::isfinite(x); });
   const bool all_have = of_corpus.size() == before;
-  if (of_corpus.size() < kLeastClips || (!std::isfinite(value) && !all_have)) return;
+  if (of_corpus.size() < kMinClips || (!std::isfinite(value) && !all_have)) return;
   std::ranges::sort(of_corpus);
   Placed placed{.name = std::move(name),
                 .value = value,
@@ -68,7 +68,7 @@ void place(std::string name, double value, std::vector<double> of_corpus, Bad ba
                 .p95 = percentile(of_corpus, 0.95)};
   const auto lower = std::ranges::lower_bound(of_corpus, value) - of_corpus.begin();
   placed.below = static_cast<double>(lower) / static_cast<double>(of_corpus.size());
-  const double room = std::max(placed.p95 - placed.p5, kLeastRoom * std::abs(placed.median));
+  const double room = std::max(placed.p95 - placed.p5, kMinRoom * std::abs(placed.median));
   placed.natural = value <= placed.p95 + room && (bad == Bad::kHigh || value >= placed.p5 - room);
   figures.push_back(std::move(placed));
 }
@@ -83,7 +83,7 @@ std::vector<double> all_of(const std::vector<Figures>& corpus, Member member) {
 int shared_dimensions(const Figures& clip, const std::vector<Figures>& corpus) {
   double fewest = clip.windows.count;
   for (const Figures& figures : corpus) fewest = std::min(fewest, figures.windows.count);
-  return std::min({kMostDimensions, motion::most_dimensions(fewest),
+  return std::min({kMaxDimensions, motion::most_dimensions(fewest),
                    static_cast<int>(clip.windows.first.size())});
 }
 
@@ -111,7 +111,7 @@ std::optional<std::vector<TaskResult>> leave_one_out(const std::vector<Figures>&
 
 std::optional<Comparison> compare(const Figures& clip, const std::vector<Figures>& corpus,
                                   TaskRunner& tasks, const CompareProgress& progress) {
-  assert(corpus.size() >= kLeastClips);
+  assert(corpus.size() >= kMinClips);
   Comparison comparison;
   comparison.dimensions = shared_dimensions(clip, corpus);
   motion::WindowSums all;

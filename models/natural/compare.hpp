@@ -12,7 +12,7 @@
 
 namespace posed::natural {
 
-inline constexpr std::size_t kLeastClips = 3;  // of a corpus; fewer have no spread
+inline constexpr std::size_t kMinClips = 3;  // of a corpus; fewer have no spread
 
 // One figure of the clip, and the distribution of the same figure over the corpus.
 struct Placed {
@@ -31,7 +31,7 @@ struct Comparison {
 // Receives the fraction done; returning false stops the work.
 using CompareProgress = std::function<bool(double fraction)>;
 
-// `corpus` has at least kLeastClips. Each clip of it is a task. Nothing where `progress` asked to
+// `corpus` has at least kMinClips. Each clip of it is a task. Nothing where `progress` asked to
 // stop.
 [[nodiscard]] std::optional<Comparison> compare(const Figures& clip,
                                                 const std::vector<Figures>& corpus,

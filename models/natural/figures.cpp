@@ -44,14 +44,13 @@ Result<Figures> figures_of(const motion::Motion& motion, const motion::PoseSpace
   if (!space) return fail("its skeleton lacks joints of the clip");
   const motion::Rows angles_deg =
       motion::pose_vectors(motion, *space, motion::walk_heading_rad(motion)) / kDegree;
-  auto figures = figures_of(angles_deg, motion.rate_hz);
-  if (!figures) return figures;
+  auto figures = TRY(figures_of(angles_deg, motion.rate_hz));
   // The root turns against the world, which no joint limits.
   for (int d = 0; d < space->dims(); ++d) {
-    if (space->joint_of_dim(d) == spec.root) figures->low_deg[d] = figures->high_deg[d] = 0.0;
+    if (space->joint_of_dim(d) == spec.root) figures.low_deg[d] = figures.high_deg[d] = 0.0;
   }
-  figures->slide_cm_s = in_cm(feet::slide_m_s(motion, motion));
-  figures->sink_cm = in_cm(feet::below_standing_m(motion));
+  figures.slide_cm_s = in_cm(feet::slide_m_s(motion, motion));
+  figures.sink_cm = in_cm(feet::below_standing_m(motion));
   return figures;
 }
 

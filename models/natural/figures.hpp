@@ -24,12 +24,11 @@ struct Figures {
 };
 
 // Measures angles [frames x channels], deg. Returns an error where they are too short for features.
-[[nodiscard]] Result<Figures> figures_of(const motion::Rows& angles_deg, double rate_hz);
+Result<Figures> figures_of(const motion::Rows& angles_deg, double rate_hz);
 
 // Measures a body at one rate by the rotation vectors of its joints about the means of `spec`.
 // Returns an error for a skeleton that lacks joints of `spec`.
-[[nodiscard]] Result<Figures> figures_of(const motion::Motion& motion,
-                                         const motion::PoseSpaceSpec& spec);
+Result<Figures> figures_of(const motion::Motion& motion, const motion::PoseSpaceSpec& spec);
 
 // Packs the figures as a task's numbers, behind those that `numbers` has, and reads them back.
 void write(const Figures& figures, NumberWriter& numbers);

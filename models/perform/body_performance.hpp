@@ -20,8 +20,7 @@ class BodyFigure {
  public:
   // Returns an error for a model of hands, for a body that lacks joints of the model, and for one
   // without a frame.
-  [[nodiscard]] static Result<BodyFigure> of(const gesture::GestureModel& model,
-                                             const clip::Clip& body);
+  static Result<BodyFigure> of(const gesture::GestureModel& model, const clip::Clip& body);
 
   struct Posed {
     Frame frame;
@@ -51,8 +50,7 @@ struct BodyPerformance {
 };
 
 // The errors are those of BodyFigure::of, and a performance of fewer than two frames is one.
-[[nodiscard]] Result<BodyPerformance> perform_on(const gesture::GestureModel& model,
-                                                 const Performance& performance,
-                                                 const clip::Clip& body);
+Result<BodyPerformance> perform_on(const gesture::GestureModel& model,
+                                   const Performance& performance, const clip::Clip& body);
 
 }  // namespace posed::perform

@@ -23,54 +23,46 @@ void begin_state(Cursor& cursor, const LabelSequence& script,
 
 }  // namespace
 
-LabelSequence::LabelSequence(int capacity) : labels_(static_cast<std::size_t>(capacity)) {}
+LabelSequence::LabelSequence(int capacity) : labels_(capacity) {}
 
-// RT-safe.
-bool LabelSequence::append(int label) noexcept {
+RT_SAFE bool LabelSequence::append(int label) noexcept {
   const auto capacity = static_cast<long>(labels_.size());
   if (end_ - first_ == capacity) return false;
-  labels_[static_cast<std::size_t>(end_ % capacity)] = label;
+  labels_[end_ % capacity] = label;
   ++end_;
   return true;
 }
 
-// RT-safe.
-void LabelSequence::clear() noexcept { first_ = end_; }
+RT_SAFE void LabelSequence::clear() noexcept { first_ = end_; }
 
-// RT-safe.
-bool LabelSequence::has_next(long position) const noexcept {
+RT_SAFE bool LabelSequence::has_next(long position) const noexcept {
   return position + 1 < end_ || (loop_ && !empty());
 }
 
-// RT-safe.
-long LabelSequence::next(long position) const noexcept {
+RT_SAFE long LabelSequence::next(long position) const noexcept {
   assert(has_next(position));
   return position + 1 < end_ ? position + 1 : first_;
 }
 
-// RT-safe.
-gesture::Context LabelSequence::context(long position) const noexcept {
+RT_SAFE gesture::Context LabelSequence::context(long position) const noexcept {
   const int current = label(position);
   const int previous = position > first_ ? label(position - 1) : loop_ ? label(end_ - 1) : current;
   return {previous, current, has_next(position) ? label(next(position)) : current};
 }
 
-// RT-safe.
-void LabelSequence::forget_before(long position) noexcept {
+RT_SAFE void LabelSequence::forget_before(long position) noexcept {
   if (!loop_) first_ = std::max(first_, position - 1);
 }
 
-// RT-safe.
-Cursor enter(const LabelSequence& script, const trajectory::StateInformation& information,
-             long position, double tempo) noexcept {
+RT_SAFE Cursor enter(const LabelSequence& script, const trajectory::StateInformation& information,
+                     long position, double tempo) noexcept {
   Cursor cursor{.position = position};
   begin_state(cursor, script, information, tempo);
   return cursor;
 }
 
-// RT-safe.
-void step(Cursor& cursor, const LabelSequence& script,
-          const trajectory::StateInformation& information, double tempo) noexcept {
+RT_SAFE void step(Cursor& cursor, const LabelSequence& script,
+                  const trajectory::StateInformation& information, double tempo) noexcept {
   if (cursor.frames_left > 1) {
     --cursor.frames_left;
     return;

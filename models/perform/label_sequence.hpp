@@ -51,13 +51,13 @@ struct Cursor {
   double carried = 0.0;  // frames lost to rounding so far
 };
 
-// Moves to the first state of `position`. RT-safe.
-[[nodiscard]] Cursor enter(const LabelSequence& script,
-                           const trajectory::StateInformation& information, long position,
-                           double tempo) noexcept;
+// Moves to the first state of `position`.
+RT_SAFE [[nodiscard]] Cursor enter(const LabelSequence& script,
+                                   const trajectory::StateInformation& information, long position,
+                                   double tempo) noexcept;
 
-// Advances by one frame; frames_left is 0 after the last one, until a label is appended. RT-safe.
-void step(Cursor& cursor, const LabelSequence& script,
-          const trajectory::StateInformation& information, double tempo) noexcept;
+// Advances by one frame; frames_left is 0 after the last one, until a label is appended.
+RT_SAFE void step(Cursor& cursor, const LabelSequence& script,
+                  const trajectory::StateInformation& information, double tempo) noexcept;
 
 }  // namespace posed::perform

@@ -63,8 +63,8 @@ LabelSequencePlayer::LabelSequencePlayer(double rate_hz, int channels, const Pla
   factor_rows_ = zero_rows(most * trajectory::kernel::kFactorRows, stride);
   x_ = zero_rows(most, stride);
   variance_ = zero_rows(1, stride);
-  frames_.resize(static_cast<std::size_t>(most));
-  factors_.resize(static_cast<std::size_t>(most));
+  frames_.resize(most);
+  factors_.resize(most);
 }
 
 LabelSequencePlayer::LabelSequencePlayer(const trajectory::StateInformation& information,
@@ -73,8 +73,7 @@ LabelSequencePlayer::LabelSequencePlayer(const trajectory::StateInformation& inf
   begin(information);
 }
 
-// RT-safe.
-void LabelSequencePlayer::begin(const trajectory::StateInformation& information) noexcept {
+RT_SAFE void LabelSequencePlayer::begin(const trajectory::StateInformation& information) noexcept {
   information_ = &information;
   channels_ = information.model().channels();
   stride_ = trajectory::padded(channels_);
@@ -84,30 +83,26 @@ void LabelSequencePlayer::begin(const trajectory::StateInformation& information)
   }
 }
 
-// RT-safe.
-void LabelSequencePlayer::use(const trajectory::StateInformation& information) noexcept {
+RT_SAFE void LabelSequencePlayer::use(const trajectory::StateInformation& information) noexcept {
   clear();
   begin(information);
 }
 
-// The six rows of a slot. RT-safe.
-double* LabelSequencePlayer::slot(int index) noexcept {
+// The six rows of a slot.
+RT_SAFE double* LabelSequencePlayer::slot(int index) noexcept {
   return states_.get() + static_cast<std::ptrdiff_t>(index) * kRows * stride_;
 }
 
-// RT-safe.
-void LabelSequencePlayer::set_tempo(double tempo) noexcept {
+RT_SAFE void LabelSequencePlayer::set_tempo(double tempo) noexcept {
   tempo_ = std::clamp(tempo, kMinTempo, kMaxTempo);
 }
 
-// RT-safe.
-void LabelSequencePlayer::clear() noexcept {
+RT_SAFE void LabelSequencePlayer::clear() noexcept {
   script_.clear();
   started_ = false;
 }
 
-// RT-safe.
-void LabelSequencePlayer::start() noexcept {
+RT_SAFE void LabelSequencePlayer::start() noexcept {
   assert(script_.empty() || information_ != nullptr);
   started_ = !script_.empty();
   carries_ = false;
@@ -115,9 +110,8 @@ void LabelSequencePlayer::start() noexcept {
   if (started_) cursor_ = enter(script_, *information_, script_.first(), tempo_);
 }
 
-// RT-safe.
-void LabelSequencePlayer::start(std::span<const double> before,
-                                std::span<const double> last) noexcept {
+RT_SAFE void LabelSequencePlayer::start(std::span<const double> before,
+                                        std::span<const double> last) noexcept {
   start();
   if (!started_) return;
   std::copy_n(before.begin(), channels_, before_.get());
@@ -125,8 +119,8 @@ void LabelSequencePlayer::start(std::span<const double> before,
   glide();
 }
 
-// Starts the lead-in from the last two poses into the cursor's state. RT-safe.
-void LabelSequencePlayer::glide() noexcept {
+// Starts the lead-in from the last two poses into the cursor's state.
+RT_SAFE void LabelSequencePlayer::glide() noexcept {
   double* const lead = slot(0);
   information_->fill(script_.context(cursor_.position), 0, lead);
   double farthest_rad = 0.0;
@@ -147,8 +141,8 @@ void LabelSequencePlayer::glide() noexcept {
 }
 
 // Writes pointers to the information of the frames that are not final into frames_ and returns
-// their number; `shown` becomes the cursor of the frame to output. RT-safe.
-int LabelSequencePlayer::plan(Cursor& shown) noexcept {
+// their number; `shown` becomes the cursor of the frame to output.
+RT_SAFE int LabelSequencePlayer::plan(Cursor& shown) noexcept {
   const int most = lead_left_ + look_ahead_ + 1;
   int frames = 0;
   for (; frames < lead_left_; ++frames) frames_[frames] = slot(0);
@@ -168,8 +162,7 @@ int LabelSequencePlayer::plan(Cursor& shown) noexcept {
   return frames;
 }
 
-// RT-safe.
-void LabelSequencePlayer::advance(int frames) noexcept {
+RT_SAFE void LabelSequencePlayer::advance(int frames) noexcept {
   if (frames < kSettling) {
     ++shown_;
     return;
@@ -183,8 +176,7 @@ void LabelSequencePlayer::advance(int frames) noexcept {
   }
 }
 
-// RT-safe.
-bool LabelSequencePlayer::next(PlayedFrame& out) noexcept {
+RT_SAFE bool LabelSequencePlayer::next(PlayedFrame& out) noexcept {
   if (!started_) return false;
   if (cursor_.frames_left == 0 &&
       script_.has_next(cursor_.position)) {  // an appended label ends the rest
@@ -204,7 +196,7 @@ bool LabelSequencePlayer::next(PlayedFrame& out) noexcept {
   trajectory::kernel::variance(factors_.data(), frames, shown_, stride_, variance_.get(), 0);
   std::swap(before_, last_);
   std::copy_n(x_.get(), channels_, last_.get());
-  const auto channels = static_cast<std::size_t>(channels_);
+  const std::size_t channels = channels_;
   out.angle = {last_.get(), channels};
   out.variance = {variance_.get(), channels};
   out.label = script_.context(shown.position).current;

@@ -166,13 +166,13 @@ gesture::Recording recording_of(const gesture::GestureModel& model,
   const auto channels = static_cast<Eigen::Index>(performance.angles.front().size());
   recording.angles_rad.resize(static_cast<Eigen::Index>(performance.angles.size()), channels);
   for (Eigen::Index t = 0; t < recording.angles_rad.rows(); ++t) {
-    const Pose& pose = performance.angles[static_cast<std::size_t>(t)];
+    const Pose& pose = performance.angles[t];
     recording.angles_rad.row(t) = Eigen::Map<const Eigen::RowVectorXd>(pose.data(), channels);
   }
   for (const PerformedState& state : performance.states) {
     const int end = state.start + state.frames;
     if (state.state == 0) {
-      const auto label = static_cast<std::size_t>(state.context.current);
+      const std::size_t label = state.context.current;
       recording.segments.push_back({state.start, end, model.labels[label].name});
     }
     recording.segments.back().end = end;

@@ -43,8 +43,7 @@ struct Performance {
 
 // Converts words separated by blanks into label indices. Returns an error for an empty text and for
 // words that are not labels of the model; the error lists the labels.
-[[nodiscard]] Result<std::vector<int>> labels_of(const gesture::GestureModel& model,
-                                                 std::string_view text);
+Result<std::vector<int>> labels_of(const gesture::GestureModel& model, std::string_view text);
 
 // Performs `labels`, at least one, at the model's rate.
 [[nodiscard]] Performance perform(const trajectory::StateInformation& information,

@@ -13,7 +13,7 @@ Standing::Standing(const Skeleton& skeleton) {
   const auto chain_to = [&skeleton](int joint) {
     Chain chain;
     while (joint >= 0) {
-      const Joint& link = skeleton.joints[static_cast<std::size_t>(joint)];
+      const Joint& link = skeleton.joints[joint];
       chain.push_back({.joint = joint, .offset_m = link.offset_m});
       joint = link.parent;
     }
@@ -25,22 +25,21 @@ Standing::Standing(const Skeleton& skeleton) {
            chain_to(skeleton.joint_of(Bone::kRightFoot))};
 }
 
-// From the top joint, which is the same for root and feet. RT-safe.
-Vector3d Standing::place_m(const Chain& chain, const Frame& frame) noexcept {
+// From the top joint, which is the same for root and feet.
+RT_SAFE Vector3d Standing::place_m(const Chain& chain, const Frame& frame) noexcept {
   Vector3d place = Vector3d::Zero();
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   for (std::size_t i = 0; i < chain.size(); ++i) {
     if (i > 0) place += rotation * chain[i].offset_m;
-    const auto joint = static_cast<std::size_t>(chain[i].joint);
+    const std::size_t joint = chain[i].joint;
     rotation = rotation * to_eigen_double(frame.rotation_xyzw[joint]);
   }
   return place;
 }
 
-// RT-safe.
-Standing::Feet Standing::feet_m(const Frame& frame) const noexcept {
+RT_SAFE Standing::Feet Standing::feet_m(const Frame& frame) const noexcept {
   Vector3d root;
-  for (int i = 0; i < 3; ++i) root[i] = frame.root_position_m[static_cast<std::size_t>(i)];
+  for (int i = 0; i < 3; ++i) root[i] = frame.root_position_m[i];
   const Vector3d shift = root - place_m(root_, frame);
   Feet feet;
   for (std::size_t f = 0; f < feet.size(); ++f) {
@@ -50,8 +49,7 @@ Standing::Feet Standing::feet_m(const Frame& frame) const noexcept {
   return feet;
 }
 
-// RT-safe.
-double Standing::stand(const Feet& places_m, Frame& frame) const noexcept {
+RT_SAFE double Standing::stand(const Feet& places_m, Frame& frame) const noexcept {
   const Feet feet = feet_m(frame);
   Vector3d shift = Vector3d::Zero();
   double count = 0.0;

@@ -8,15 +8,13 @@ namespace posed::perform {
 
 using gesture::kStates;
 
-// RT-safe.
-int state_frames(double mean, double variance, double rho, double carried) noexcept {
-  constexpr double kLongest = 1e6;  // frames; a damaged model must not overflow an int
+RT_SAFE int state_frames(double mean, double variance, double rho, double carried) noexcept {
+  constexpr double kMaxDuration = 1e6;  // frames; a damaged model must not overflow an int
   const double frames = std::floor(mean + rho * variance + carried + 0.5);
-  return static_cast<int>(std::clamp(frames, 1.0, kLongest));
+  return static_cast<int>(std::clamp(frames, 1.0, kMaxDuration));
 }
 
-// RT-safe.
-double tempo_rho(const gesture::DurationGaussian& duration, double tempo) noexcept {
+RT_SAFE double tempo_rho(const gesture::DurationGaussian& duration, double tempo) noexcept {
   if (tempo == 1.0) return 0.0;
   double wanted = 0.0;
   for (int s = 0; s < kStates; ++s) wanted += state_frames(duration.mean[s], 0.0, 0.0, 0.0);

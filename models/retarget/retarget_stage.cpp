@@ -17,8 +17,8 @@ class RetargetStage final : public Stage {
  public:
   explicit RetargetStage(motion::Retarget retarget) : retarget_(std::move(retarget)) {}
 
-  // The variance of the pose is not carried over: it belongs to the source's channels. RT-safe.
-  void process(const StageFrame& in, StageOut& out) noexcept override {
+  // The variance of the pose is not carried over: it belongs to the source's channels.
+  RT_SAFE void process(const StageFrame& in, StageOut& out) noexcept override {
     retarget_.apply(in.frame, frame_);
     out.frame({.frame = frame_, .variance_rad2 = {}, .input = in.input});
   }
@@ -31,26 +31,22 @@ class RetargetStage final : public Stage {
 Result<std::shared_ptr<const Skeleton>> target(const StageContext& context) {
   const auto& to = parameter<std::string>(context.parameters, "to");
   if (to == kHumanoid) return motion::canonical_skeleton(*context.skeleton);
-  auto coding = clip::parse_description(to, "the skeleton to retarget to");
-  if (!coding) return std::unexpected(coding.error());
-  return std::move(coding->skeleton);
+  auto coding = TRY(clip::parse_description(to, "the skeleton to retarget to"));
+  return std::move(coding.skeleton);
 }
 
 Result<std::unique_ptr<Stage>> make(const StageContext& context, const StageModel* /*model*/) {
-  auto skeleton = target(context);
-  if (!skeleton) return std::unexpected(skeleton.error());
-  auto retarget = motion::Retarget::bind(context.skeleton, std::move(*skeleton));
-  if (!retarget) return std::unexpected(retarget.error());
-  return std::make_unique<RetargetStage>(std::move(*retarget));
+  auto skeleton = TRY(target(context));
+  auto retarget = TRY(motion::Retarget::bind(context.skeleton, std::move(skeleton)));
+  return std::make_unique<RetargetStage>(std::move(retarget));
 }
 
 // Of a clip only the skeleton is kept, in the text form that a device log has for it, too.
 Result<> read_target(Parameters& parameters) {
   auto& to = std::get<std::string>(parameters.at("to"));
   if (to == kHumanoid) return {};
-  const auto clip = clip::open_device_clip(to);
-  if (!clip) return std::unexpected(clip.error());
-  to = clip->description;
+  const auto clip = TRY(clip::open_device_clip(to));
+  to = clip.description;
   return {};
 }
 

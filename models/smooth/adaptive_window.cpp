@@ -33,8 +33,7 @@ constexpr int kLengthSlack = 8;  // the window's length over the loss that it do
 
 }  // namespace
 
-// RT-safe.
-int window_frames(double period_s) noexcept {
+RT_SAFE int window_frames(double period_s) noexcept {
   if (period_s <= 0.0) return kEvenWindow;
   return std::clamp(static_cast<int>(std::lround(kWindow_s / period_s)), kEvenWindow, kMaxWindow);
 }
@@ -42,14 +41,14 @@ int window_frames(double period_s) noexcept {
 AdaptiveWindow::AdaptiveWindow(int channels)
     : channels_(channels),
       information_(channels, kMaxWindow),
-      sensed_(static_cast<std::size_t>(2 * kMaxWindow * information_.stride()), 1.0),
+      sensed_(2 * kMaxWindow * information_.stride(), 1.0),
       window_(channels, kMaxWindow),
       past_(information_.stride()),
       steady_(channels, information_.stride(), kMaxWindow),
       whole_(kMaxWindow),
       ring_time_s_(kMaxWindow),
-      last_measured_(static_cast<std::size_t>(channels)),
-      held_rad_(static_cast<std::size_t>(channels)),
+      last_measured_(channels),
+      held_rad_(channels),
       active_(trajectory::make_rows(1, information_.stride())),
       speeds_(trajectory::make_rows(kMaxWindow + 1, information_.stride())),
       density_(trajectory::make_rows(1, information_.stride())),
@@ -61,8 +60,7 @@ AdaptiveWindow::AdaptiveWindow(int channels)
   reset();
 }
 
-// RT-safe.
-void AdaptiveWindow::reset() noexcept {
+RT_SAFE void AdaptiveWindow::reset() noexcept {
   pushed_ = 0;
   frames_ = length_ = 0;
   std::ranges::fill(last_measured_, -1);
@@ -73,25 +71,22 @@ void AdaptiveWindow::reset() noexcept {
   steady_.reset();
 }
 
-// RT-safe.
-int AdaptiveWindow::slot(int index) const noexcept {
+RT_SAFE int AdaptiveWindow::slot(int index) const noexcept {
   assert(index >= 0 && index < frames_);
   return static_cast<int>((pushed_ - frames_ + index) % kMaxWindow);
 }
 
-// RT-safe.
-bool AdaptiveWindow::known(int channel) const noexcept {
-  const long when = last_measured_[static_cast<std::size_t>(channel)];
+RT_SAFE bool AdaptiveWindow::known(int channel) const noexcept {
+  const long when = last_measured_[channel];
   return when >= 0 && when >= pushed_ - frames_;
 }
 
-// RT-safe.
-void AdaptiveWindow::push(double time_s, std::span<const double> measured_rad,
-                          double noise_rad) noexcept {
+RT_SAFE void AdaptiveWindow::push(double time_s, std::span<const double> measured_rad,
+                                  double noise_rad) noexcept {
   const int at = static_cast<int>(pushed_ % kMaxWindow);
-  ring_time_s_[static_cast<std::size_t>(at)] = time_s;
+  ring_time_s_[at] = time_s;
   information_.clear(at);
-  whole_[static_cast<std::size_t>(at)] = 1;
+  whole_[at] = 1;
   double* const position = sensed_.data() + static_cast<std::ptrdiff_t>(2 * at) * stride();
   double* const mean = position + stride();
   const double precision = 1.0 / (noise_rad * noise_rad);
@@ -99,7 +94,7 @@ void AdaptiveWindow::push(double time_s, std::span<const double> measured_rad,
     const bool measured = std::isfinite(measured_rad[c]);
     // A sensor with a dead band repeats its value while the joint moves on within the band.
     const bool repeats = last_measured_[c] >= 0 && measured_rad[c] == held_rad_[c];
-    if (!measured) whole_[static_cast<std::size_t>(at)] = 0;
+    if (!measured) whole_[at] = 0;
     if (measured) {
       if (last_measured_[c] < 0 && pushed_ > 0) adopt(c, measured_rad[c]);
       if (last_measured_[c] >= 0 && !repeats) active_[c] = 1.0;
@@ -117,15 +112,14 @@ void AdaptiveWindow::push(double time_s, std::span<const double> measured_rad,
       {.variance_rad2 = 1.0 / precision, .density = density_.get(), .active = active_.get()});
 }
 
-// RT-safe.
-void AdaptiveWindow::copy_sensed(int slot) noexcept {
+RT_SAFE void AdaptiveWindow::copy_sensed(int slot) noexcept {
   std::copy_n(sensed(slot), stride(), information_.row(slot, trajectory::kPosition));
   std::copy_n(sensed(slot) + stride(), stride(), information_.row(slot, trajectory::kPositionMean));
 }
 
 // Sets the earlier frames of a channel that is measured for the first time to its value, so that
-// nothing pulls it away from where it starts. RT-safe.
-void AdaptiveWindow::adopt(std::size_t channel, double value_rad) noexcept {
+// nothing pulls it away from where it starts.
+RT_SAFE void AdaptiveWindow::adopt(std::size_t channel, double value_rad) noexcept {
   const long from = std::max<long>(0, pushed_ - kMaxWindow + 1);
   for (long i = from; i < pushed_; ++i) {
     const int at = static_cast<int>(i % kMaxWindow);
@@ -134,8 +128,8 @@ void AdaptiveWindow::adopt(std::size_t channel, double value_rad) noexcept {
   }
 }
 
-// Collects the window's frames and the times between them. RT-safe.
-void AdaptiveWindow::begin(double period_s) noexcept {
+// Collects the window's frames and the times between them.
+RT_SAFE void AdaptiveWindow::begin(double period_s) noexcept {
   period_s_ = period_s > 0.0 ? period_s : 1.0 / kEvenRate_hz;
   // The period of frames with jitter is never the same twice, and a window that loses more than one
   // frame at a time loses its past, too. So it grows at once, and shrinks only if that is by much.
@@ -144,14 +138,14 @@ void AdaptiveWindow::begin(double period_s) noexcept {
   frames_ = static_cast<int>(std::min<long>(pushed_, length_));
   past_.begin(pushed_ - frames_);
   for (int i = 0; i < frames_; ++i) {
-    const auto index = static_cast<std::size_t>(i);
+    const std::size_t index = i;
     rows_[index] = information_.frame(slot(i));
-    time_s_[index] = ring_time_s_[static_cast<std::size_t>(slot(i))];
+    time_s_[index] = ring_time_s_[slot(i)];
     step_s_[index] = i > 0 ? time_s_[index] - time_s_[index - 1] : 0.0;
   }
   even_ = true;
   for (int i = 1; i + 1 < frames_; ++i) {
-    const auto index = static_cast<std::size_t>(i);
+    const std::size_t index = i;
     const double before_s = step_s_[index];
     const double after_s = step_s_[index + 1];
     skew_[index] = (after_s - before_s) / (after_s + before_s);
@@ -160,8 +154,8 @@ void AdaptiveWindow::begin(double period_s) noexcept {
 }
 
 // Removes the information that InformationSource added for the last solve. The precisions of delta
-// and delta-delta are rewritten for each solve; their means are zero otherwise. RT-safe.
-void AdaptiveWindow::forget_extra() noexcept {
+// and delta-delta are rewritten for each solve; their means are zero otherwise.
+RT_SAFE void AdaptiveWindow::forget_extra() noexcept {
   if (!std::exchange(extra_, false)) return;
   for (int i = 0; i < frames_; ++i) {
     copy_sensed(slot(i));
@@ -170,8 +164,7 @@ void AdaptiveWindow::forget_extra() noexcept {
   }
 }
 
-// RT-safe.
-void AdaptiveWindow::loose_prior() noexcept {
+RT_SAFE void AdaptiveWindow::loose_prior() noexcept {
   for (int i = 1; i + 1 < frames_; ++i) {
     const double curve = 1.0 / (kFirstDensity * delta_delta_time_s3(i));
     std::fill_n(information_.row(slot(i), trajectory::kDelta), 2 * stride(), 0.0);
@@ -180,26 +173,23 @@ void AdaptiveWindow::loose_prior() noexcept {
   }
 }
 
-// RT-safe.
-void AdaptiveWindow::speed_prior() noexcept {
+RT_SAFE void AdaptiveWindow::speed_prior() noexcept {
   kernel::sum_speeds(window_.x(0), frames_, stride(), step_s_.data(), active_.get(), speeds_.get(),
                      hand_speeds_.data());
   double active = 0.0;
-  for (int c = 0; c < channels_; ++c) active += active_[static_cast<std::size_t>(c)];
+  for (int c = 0; c < channels_; ++c) active += active_[c];
   const double reach_s = kSpeedReach_s + 0.5 * period_s_;
   int from = 0;
   int to = 0;  // frames from <= j < to are within the averaging time
   for (int i = 1; i + 1 < frames_; ++i) {
-    const auto at = [this](int index) { return time_s_[static_cast<std::size_t>(index)]; };
+    const auto at = [this](int index) { return time_s_[index]; };
     while (at(from) < at(i) - reach_s) ++from;
     while (to < frames_ && at(to) <= at(i) + reach_s) ++to;
     // Frame j represents the step before it; the first frame represents the step after it.
     const double first_s = from > 0 ? at(from - 1) : at(0) - step_s_[1];
     const double per_s = 1.0 / (at(to - 1) - first_s);
-    const double hand =
-        hand_speeds_[static_cast<std::size_t>(to)] - hand_speeds_[static_cast<std::size_t>(from)];
-    const double delta_s =
-        0.5 * (step_s_[static_cast<std::size_t>(i)] + step_s_[static_cast<std::size_t>(i) + 1]);
+    const double hand = hand_speeds_[to] - hand_speeds_[from];
+    const double delta_s = 0.5 * (step_s_[i] + step_s_[static_cast<std::size_t>(i) + 1]);
     const kernel::Speed speed{.per_s = (1.0 - kHandShare) * per_s,
                               .hand = active > 0.0 ? kHandShare * hand * per_s / active : 0.0};
     const kernel::Spread spread{.delta_base = kDeltaBase * delta_s,
@@ -219,21 +209,18 @@ void AdaptiveWindow::speed_prior() noexcept {
   }
 }
 
-// RT-safe.
-void AdaptiveWindow::run(const trajectory::Carry& carry) noexcept {
+RT_SAFE void AdaptiveWindow::run(const trajectory::Carry& carry) noexcept {
   window_.solve({rows_.data(), static_cast<std::size_t>(frames_)}, trajectory::Boundary::kDrop,
                 even_ ? nullptr : skew_.data(), carry);
 }
 
-// RT-safe.
-void AdaptiveWindow::solve_once(double period_s) noexcept {
+RT_SAFE void AdaptiveWindow::solve_once(double period_s) noexcept {
   begin(period_s);
   loose_prior();
   run(past_.incoming());
 }
 
-// RT-safe.
-void AdaptiveWindow::solve(double period_s, InformationSource* extra) noexcept {
+RT_SAFE void AdaptiveWindow::solve(double period_s, InformationSource* extra) noexcept {
   solve_once(period_s);
   if (frames_ < 3) return;  // too few frames for a delta window: only the first solve is done
   for (int pass = 0; pass < kPasses; ++pass) {
@@ -249,9 +236,9 @@ void AdaptiveWindow::solve(double period_s, InformationSource* extra) noexcept {
 }
 
 // Variance of the delta-delta divided by Q: dt^3 for even frames (models/smooth/README.md, "Uneven
-// frames"). RT-safe.
-double AdaptiveWindow::delta_delta_time_s3(int index) const noexcept {
-  const double before_s = step_s_[static_cast<std::size_t>(index)];
+// frames").
+RT_SAFE double AdaptiveWindow::delta_delta_time_s3(int index) const noexcept {
+  const double before_s = step_s_[index];
   const double after_s = step_s_[static_cast<std::size_t>(index) + 1];
   return 2.0 * before_s * before_s * after_s * after_s / (before_s + after_s);
 }

@@ -68,12 +68,11 @@ class AdaptiveWindow {
   }
   // Whether all channels of that frame were measured.
   [[nodiscard]] bool whole(int back) const noexcept {
-    return whole_[static_cast<std::size_t>(slot(frames_ - 1 - back))] != 0;
+    return whole_[slot(frames_ - 1 - back)] != 0;
   }
   // Time between that frame and the newest [s].
   [[nodiscard]] double age_s(int back) const noexcept {
-    return time_s_[static_cast<std::size_t>(frames_ - 1)] -
-           time_s_[static_cast<std::size_t>(frames_ - 1 - back)];
+    return time_s_[frames_ - 1] - time_s_[frames_ - 1 - back];
   }
   // Whether the channel was measured in at least one of the window's frames.
   [[nodiscard]] bool known(int channel) const noexcept;

@@ -19,14 +19,14 @@ const double kLogRestart = std::log(1e-4);
 constexpr double kLost = 1e-4;
 const double kLogLost = std::log(kLost);
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
-constexpr double kShortestStay = 1.5;  // frames
+constexpr double kMinStay_frames = 1.5;  // frames
 constexpr double kNever = -std::numeric_limits<double>::infinity();
 constexpr double kVanished = 1e-200;
 // Variance that sensor noise adds to a feature, relative to the noise variance of a value.
 constexpr std::array<double, kDeltaWindows> kNoiseGain{1.0, 0.5, 6.0};
 
 std::size_t padded_features(int channels) noexcept {
-  return static_cast<std::size_t>(trajectory::padded(kDeltaWindows * channels));
+  return trajectory::padded(kDeltaWindows * channels);
 }
 
 // ln(e^a + e^b)
@@ -44,14 +44,13 @@ HmmForwardFilter::HmmForwardFilter(int max_window, int max_channels)
       weight_(feature_.size()),
       tables_(kMaxLiveChains * kStates + 1),
       rows_(tables_.size() * kTableRows * feature_.size()),
-      forward_(static_cast<std::size_t>(max_window)),
-      likelihood_(static_cast<std::size_t>(max_window)),
-      swept_(static_cast<std::size_t>(max_window)) {
-  for (auto& row : past_) row.resize(static_cast<std::size_t>(max_channels));
+      forward_(max_window),
+      likelihood_(max_window),
+      swept_(max_window) {
+  for (auto& row : past_) row.resize(max_channels);
 }
 
-// RT-safe.
-void HmmForwardFilter::set_model(const LiveModel* model) noexcept {
+RT_SAFE void HmmForwardFilter::set_model(const LiveModel* model) noexcept {
   model_ = model;
   states_ = model == nullptr ? 0 : static_cast<int>(model->states.size());
   features_ = model == nullptr ? 0 : padded_features(model->channels);
@@ -59,8 +58,7 @@ void HmmForwardFilter::set_model(const LiveModel* model) noexcept {
   reset();
 }
 
-// RT-safe.
-void HmmForwardFilter::reset() noexcept {
+RT_SAFE void HmmForwardFilter::reset() noexcept {
   pushed_ = 0;
   swept_frames_ = 0;
   even_frames_ = 0;
@@ -73,12 +71,12 @@ void HmmForwardFilter::reset() noexcept {
   log_chains_ = std::log(static_cast<double>(model_->chains.size()));
 }
 
-// Recomputes a state's Gaussian for this stream's rate and sensor noise. RT-safe.
-void HmmForwardFilter::renew_table(std::size_t s) noexcept {
+// Recomputes a state's Gaussian for this stream's rate and sensor noise.
+RT_SAFE void HmmForwardFilter::renew_table(std::size_t s) noexcept {
   const LiveState& from = state(s);
   Table& table = tables_[s];
   const RateFactors rule = rate_factors(pace_);
-  const auto channels = static_cast<std::size_t>(model_->channels);
+  const std::size_t channels = model_->channels;
   double* const mean = features_of(s, kMean);
   double* const half_precision = features_of(s, kHalfPrecision);
   double* const half_log = features_of(s, kHalfLog);
@@ -93,14 +91,13 @@ void HmmForwardFilter::renew_table(std::size_t s) noexcept {
     }
   }
   for (; k < features_; ++k) mean[k] = half_precision[k] = half_log[k] = 0.0;
-  table.stay = 1.0 - 1.0 / std::max(kShortestStay, from.frames * pace_);
+  table.stay = 1.0 - 1.0 / std::max(kMinStay_frames, from.frames * pace_);
   table.log_stay = std::log(table.stay);
   table.log_leave = std::log(1.0 - table.stay);
 }
 
-// RT-safe.
-void HmmForwardFilter::push(std::span<const double> measured_rad, bool even, double period_s,
-                            double noise_rad) noexcept {
+RT_SAFE void HmmForwardFilter::push(std::span<const double> measured_rad, bool even,
+                                    double period_s, double noise_rad) noexcept {
   if (model_ == nullptr) return;
   const bool first = period_s_ <= 0.0;
   period_s_ = period_s > 0.0 ? period_s : 1.0 / model_->rate_hz;
@@ -121,9 +118,9 @@ void HmmForwardFilter::push(std::span<const double> measured_rad, bool even, dou
   advance(log_emission);
 }
 
-// The tempered log likelihood of every state; missing values are left out. RT-safe.
-void HmmForwardFilter::weigh(std::span<const double> measured_rad, Row& out) noexcept {
-  const auto channels = static_cast<std::size_t>(model_->channels);
+// The tempered log likelihood of every state; missing values are left out.
+RT_SAFE void HmmForwardFilter::weigh(std::span<const double> measured_rad, Row& out) noexcept {
+  const std::size_t channels = model_->channels;
   std::fill_n(feature_.begin(), features_, 0.0);
   std::fill_n(weight_.begin(), features_, 0.0);
   const bool near = even_frames_ == 2;
@@ -155,9 +152,9 @@ void HmmForwardFilter::weigh(std::span<const double> measured_rad, Row& out) noe
   }
 }
 
-// One step of the forward filter. RT-safe.
-void HmmForwardFilter::advance(const Row& log_emission) noexcept {
-  const auto states = static_cast<std::size_t>(states_);
+// One step of the forward filter.
+RT_SAFE void HmmForwardFilter::advance(const Row& log_emission) noexcept {
+  const std::size_t states = states_;
   LabelRow leaving;  // log probability of leaving each label's last states
   std::fill_n(leaving.begin(), model_->labels.size(), kNever);
   double leaving_any = kNever;
@@ -173,8 +170,7 @@ void HmmForwardFilter::advance(const Row& log_emission) noexcept {
     const int previous = model_->chains[s / kStates].previous;
     double entering = log_now_[s > 0 ? s - 1 : 0] + tables_[s > 0 ? s - 1 : 0].log_leave;
     if (s % kStates == 0) {
-      entering = (previous == kAny ? leaving_any : leaving[static_cast<std::size_t>(previous)]) -
-                 log_choices_;
+      entering = (previous == kAny ? leaving_any : leaving[previous]) - log_choices_;
       entering = log_sum(entering, kLogRestart);
       if (model_->none) {
         entering = log_sum(entering, log_now_[states] + tables_[states].log_leave - log_chains_);
@@ -193,7 +189,7 @@ void HmmForwardFilter::advance(const Row& log_emission) noexcept {
   const double norm = top + std::log(sum);
   const double best = *std::max_element(log_emission.begin(),
                                         log_emission.begin() + static_cast<std::ptrdiff_t>(all()));
-  const auto at = static_cast<std::size_t>(pushed_ % max_window_);
+  const std::size_t at = pushed_ % max_window_;
   for (std::size_t s = 0; s < all(); ++s) {
     log_now_[s] = next[s] - norm;
     forward_[at][s] = std::exp(log_now_[s]);
@@ -203,16 +199,16 @@ void HmmForwardFilter::advance(const Row& log_emission) noexcept {
 }
 
 // Backward recursion from the newest frame. State probabilities are computed in the linear domain;
-// a frame for which all products vanish keeps its forward probabilities. RT-safe.
-void HmmForwardFilter::sweep(int frames) noexcept {
+// a frame for which all products vanish keeps its forward probabilities.
+RT_SAFE void HmmForwardFilter::sweep(int frames) noexcept {
   if (model_ == nullptr) return;
   const std::size_t states = all();
   Row backward;
   std::fill_n(backward.begin(), states, 1.0);
   swept_frames_ = static_cast<int>(std::min<long>(frames, pushed_));
   for (int back = 0; back < swept_frames_; ++back) {
-    const auto at = static_cast<std::size_t>((pushed_ - 1 - back) % max_window_);
-    Row& belief = swept_[static_cast<std::size_t>(back)];
+    const std::size_t at = (pushed_ - 1 - back) % max_window_;
+    Row& belief = swept_[back];
     double sum = 0.0;
     for (std::size_t s = 0; s < states; ++s) {
       belief[s] = forward_[at][s] * backward[s];
@@ -228,16 +224,16 @@ void HmmForwardFilter::sweep(int frames) noexcept {
   }
 }
 
-// One backward step, from a frame to the one before it; scaled so that the largest is 1. RT-safe.
-void HmmForwardFilter::step_back(const Row& ahead, Row& backward) const noexcept {
-  const auto states = static_cast<std::size_t>(states_);
+// One backward step, from a frame to the one before it; scaled so that the largest is 1.
+RT_SAFE void HmmForwardFilter::step_back(const Row& ahead, Row& backward) const noexcept {
+  const std::size_t states = states_;
   const double choice = std::exp(-log_choices_);
   LabelRow entries;  // of the first states of the chains that follow a label
   std::fill_n(entries.begin(), model_->labels.size(), 0.0);
   double entries_any = 0.0;
   for (std::size_t s = 0; s < states; s += kStates) {
     const int previous = model_->chains[s / kStates].previous;
-    if (previous != kAny) entries[static_cast<std::size_t>(previous)] += choice * ahead[s];
+    if (previous != kAny) entries[previous] += choice * ahead[s];
     if (previous == kAny) entries_any += choice * ahead[s];
   }
   double largest = kVanished;
@@ -261,21 +257,18 @@ void HmmForwardFilter::step_back(const Row& ahead, Row& backward) const noexcept
 }
 
 // The features taken at a frame describe the frame before it, so frame `back` uses the
-// probabilities of one step later in time. RT-safe.
-std::span<const double> HmmForwardFilter::states(int back) const noexcept {
+// probabilities of one step later in time.
+RT_SAFE std::span<const double> HmmForwardFilter::states(int back) const noexcept {
   assert(knows(back));
-  return {swept_[static_cast<std::size_t>(std::max(0, back - 1))].data(),
-          static_cast<std::size_t>(states_)};
+  return {swept_[std::max(0, back - 1)].data(), static_cast<std::size_t>(states_)};
 }
 
-// RT-safe.
-double HmmForwardFilter::none(int back) const noexcept {
+RT_SAFE double HmmForwardFilter::none(int back) const noexcept {
   if (!model_->none) return 0.0;
-  return swept_[static_cast<std::size_t>(std::max(0, back - 1))][static_cast<std::size_t>(states_)];
+  return swept_[std::max(0, back - 1)][states_];
 }
 
-// RT-safe.
-HmmForwardFilter::Answer HmmForwardFilter::label(int back) const noexcept {
+RT_SAFE HmmForwardFilter::Answer HmmForwardFilter::label(int back) const noexcept {
   Answer answer;
   if (!knows(back)) return answer;
   const auto belief = states(back);

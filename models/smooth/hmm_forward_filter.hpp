@@ -25,31 +25,31 @@ class HmmForwardFilter {
   // For models of at most `max_channels` channels.
   HmmForwardFilter(int max_window, int max_channels);
 
-  // Restarts with this model, which is not owned; with null, no gesture is recognised. RT-safe.
-  void set_model(const LiveModel* model) noexcept;
+  // Restarts with this model, which is not owned; with null, no gesture is recognised.
+  RT_SAFE void set_model(const LiveModel* model) noexcept;
   [[nodiscard]] const LiveModel* model() const noexcept { return model_; }
 
   // The next frame: [channels of the model] rad, NaN where missing; `even`: it follows the previous
-  // frame by one period. RT-safe.
-  void push(std::span<const double> measured_rad, bool even, double period_s,
-            double noise_rad) noexcept;
+  // frame by one period.
+  RT_SAFE void push(std::span<const double> measured_rad, bool even, double period_s,
+                    double noise_rad) noexcept;
 
-  // Sweeps back over the last `frames` pushed frames. RT-safe.
-  void sweep(int frames) noexcept;
+  // Sweeps back over the last `frames` pushed frames.
+  RT_SAFE void sweep(int frames) noexcept;
 
   // Whether the last sweep covers the frame `back` before the newest; false for frames that came
-  // before the model was set. RT-safe.
-  [[nodiscard]] bool knows(int back) const noexcept {
+  // before the model was set.
+  RT_SAFE [[nodiscard]] bool knows(int back) const noexcept {
     return std::max(back - 1, 0) < swept_frames_;
   }
 
   // State probabilities of that frame from the last sweep; needs knows(back). [states], sums to 1.
-  // The newest frame gets those of the frame before it. RT-safe.
-  [[nodiscard]] std::span<const double> states(int back) const noexcept;
+  // The newest frame gets those of the frame before it.
+  RT_SAFE [[nodiscard]] std::span<const double> states(int back) const noexcept;
 
   // The probability that the frame is none of the labels; 0 for models that do not know what is
-  // none. RT-safe.
-  [[nodiscard]] double none(int back) const noexcept;
+  // none.
+  RT_SAFE [[nodiscard]] double none(int back) const noexcept;
 
   // The most probable label of that frame, its index and probability. RT-safe.
   struct Answer {
@@ -59,10 +59,10 @@ class HmmForwardFilter {
   static constexpr int kNone = -2;
   [[nodiscard]] Answer label(int back) const noexcept;
 
-  // The stream's rate over the model's. RT-safe.
-  [[nodiscard]] double pace() const noexcept { return pace_; }
+  // The stream's rate over the model's.
+  RT_SAFE [[nodiscard]] double pace() const noexcept { return pace_; }
 
-  void reset() noexcept;  // RT-safe
+  RT_SAFE void reset() noexcept;
 
  private:
   // One state's Gaussian, three rows of features ([window][channel], padded) in rows_: mean, half

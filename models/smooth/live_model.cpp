@@ -45,7 +45,7 @@ std::vector<Context> contexts_of(int label, std::span<const int> previous,
 std::vector<int> trained_labels(const GestureModel& model) {
   std::vector<int> trained;
   for (int i = 0; i < std::ssize(model.labels); ++i) {
-    if (model.labels[static_cast<std::size_t>(i)].trained) trained.push_back(i);
+    if (model.labels[i].trained) trained.push_back(i);
   }
   return trained;
 }
@@ -70,8 +70,7 @@ std::size_t model_channel(const GestureModel& model, std::size_t channel) {
 
 int group_of(const GestureModel& model, std::size_t channel) {
   int group = 0;
-  while (static_cast<int>(channel) >= model.groups[static_cast<std::size_t>(group)].first +
-                                          model.groups[static_cast<std::size_t>(group)].channels) {
+  while (static_cast<int>(channel) >= model.groups[group].first + model.groups[group].channels) {
     ++group;
   }
   return group;
@@ -80,20 +79,19 @@ int group_of(const GestureModel& model, std::size_t channel) {
 // Moment matching over the contexts: the mean of their means, and the mean of their variances plus
 // the spread of their means (models/smooth/README.md, "Live model").
 LiveState state_of(const GestureModel& model, const std::vector<Context>& contexts, int state) {
-  const auto channels = static_cast<std::size_t>(model.channels());
+  const std::size_t channels = model.channels();
   LiveState pooled{.mean = LiveRows(kDeltaWindows * channels),
                    .variance = LiveRows(kDeltaWindows * channels)};
   const double share = 1.0 / static_cast<double>(contexts.size());
   LiveRows square(kDeltaWindows * channels);
   double frames = 0.0;
   for (const Context& context : contexts) {
-    frames += share * gesture::duration(model, context).mean[static_cast<std::size_t>(state)];
+    frames += share * gesture::duration(model, context).mean[state];
     for (std::size_t c = 0; c < channels; ++c) {
       const std::size_t angle = model_channel(model, c);
       const int group = group_of(model, angle);
       const auto& leaf = gesture::leaf(model, state, group, context);
-      const std::size_t at =
-          angle - static_cast<std::size_t>(model.groups[static_cast<std::size_t>(group)].first);
+      const std::size_t at = angle - static_cast<std::size_t>(model.groups[group].first);
       for (std::size_t w = 0; w < kDeltaWindows; ++w) {
         const double mean = leaf.mean[w][at];
         pooled.mean[w * channels + c] += share * mean;
@@ -112,7 +110,7 @@ LiveState state_of(const GestureModel& model, const std::vector<Context>& contex
 // A Gaussian around all of the model's states that is so wide that only what is far from each of
 // them is more probable there (models/smooth/README.md, "None").
 LiveState none_of(const LiveModel& model) {
-  const auto channels = static_cast<std::size_t>(model.channels);
+  const std::size_t channels = model.channels;
   LiveState none{.mean = LiveRows(kDeltaWindows * channels),
                  .variance = LiveRows(kDeltaWindows * channels),
                  .frames = kNone_s * model.rate_hz};
@@ -159,16 +157,15 @@ Result<std::unique_ptr<const LiveModel>> bind_live_model(const GestureModel& mod
                 name);
   }
   for (const int label : trained) {
-    const std::string& from = model.labels[static_cast<std::size_t>(label)].name;
+    const std::string& from = model.labels[label].name;
     auto& to = live->labels.emplace_back();
     std::copy_n(from.begin(), std::min(from.size(), to.size() - 1), to.begin());
   }
   live->chains = chains_of(static_cast<int>(trained.size()));
   for (const LiveChain& chain : live->chains) {
-    const int label = trained[static_cast<std::size_t>(chain.label)];
+    const int label = trained[chain.label];
     const std::span<const int> all(trained);
-    const auto previous =
-        chain.previous == kAny ? all : all.subspan(static_cast<std::size_t>(chain.previous), 1);
+    const auto previous = chain.previous == kAny ? all : all.subspan(chain.previous, 1);
     const auto contexts = contexts_of(label, previous, trained);
     for (int state = 0; state < kStates; ++state) {
       live->states.push_back(state_of(model, contexts, state));

@@ -70,7 +70,8 @@ struct RateFactors {
 
 // Returns an error for a skeleton that lacks channels of the model and for a model with more than
 // kMaxLiveChains labels. `name` is for errors.
-[[nodiscard]] Result<std::unique_ptr<const LiveModel>> bind_live_model(
-    const gesture::GestureModel& model, const Skeleton& skeleton, const std::string& name);
+Result<std::unique_ptr<const LiveModel>> bind_live_model(const gesture::GestureModel& model,
+                                                         const Skeleton& skeleton,
+                                                         const std::string& name);
 
 }  // namespace posed::smooth

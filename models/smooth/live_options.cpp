@@ -20,8 +20,7 @@ std::unexpected<Error> bad_lag(std::string_view text) {
 
 }  // namespace
 
-// RT-safe.
-int lag_frames(const LiveLag& lag, double period_s) noexcept {
+RT_SAFE int lag_frames(const LiveLag& lag, double period_s) noexcept {
   if (period_s <= 0.0) period_s = 1.0 / kEvenRate_hz;  // the period is not known yet
   const bool even = period_s * kEvenRate_hz * kRateSlack >= 1.0;
   const int most = even ? kMaxLagFrames : static_cast<int>(kMaxLag_s / period_s + 1e-6);

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "proto/frame/result.hpp"
+#include "proto/frame/rt_safe.hpp"
 
 namespace posed::smooth {
 
@@ -21,11 +22,11 @@ inline constexpr double kMaxLag_s = 0.170;
 inline constexpr double kEvenRate_hz =
     60.0;  // up to this rate the bound is in frames, above it in time
 
-// Frames of lag at a rate, within the bounds. RT-safe.
-[[nodiscard]] int lag_frames(const LiveLag& lag, double period_s) noexcept;
+// Frames of lag at a rate, within the bounds.
+RT_SAFE [[nodiscard]] int lag_frames(const LiveLag& lag, double period_s) noexcept;
 
 // Parses "1" (frames, at most as many as 170 ms can hold) or "33ms". Errors state what is allowed.
-[[nodiscard]] Result<LiveLag> parse_lag(std::string_view text);
+Result<LiveLag> parse_lag(std::string_view text);
 
 struct LiveOptions {
   LiveLag lag;

@@ -30,13 +30,13 @@ namespace {
 // time that runs backwards counts as one period. One thread.
 class FrameClock {
  public:
-  // Seconds since the first frame; strictly increasing. RT-safe.
-  double tick(const Header& header) noexcept;
+  // Seconds since the first frame; strictly increasing.
+  RT_SAFE double tick(const Header& header) noexcept;
 
-  // The stream's period: the median of the last steps [s]; 0 before the first step. RT-safe.
-  [[nodiscard]] double period_s() const noexcept { return period_s_; }
-  // True when enough steps are known to convert a lag in time into frames. RT-safe.
-  [[nodiscard]] bool settled() const noexcept { return steps_ >= kSettled; }
+  // The stream's period: the median of the last steps [s]; 0 before the first step.
+  RT_SAFE [[nodiscard]] double period_s() const noexcept { return period_s_; }
+  // True when enough steps are known to convert a lag in time into frames.
+  RT_SAFE [[nodiscard]] bool settled() const noexcept { return steps_ >= kSettled; }
 
  private:
   void learn(double step_s) noexcept;
@@ -54,15 +54,14 @@ class FrameClock {
   bool device_time_ = false;
 };
 
-constexpr double kShortestPeriod_s = 1e-3;  // 1000 Hz
-constexpr double kLongestPeriod_s = 0.2;    // a slower step is a gap
+constexpr double kMinPeriod_s = 1e-3;  // 1000 Hz
+constexpr double kMaxPeriod_s = 0.2;   // a slower step is a gap
 constexpr double kFirstPeriod_s = 1.0 / 60.0;
-constexpr double kShortestStep = 0.5;  // of the period
-constexpr double kArrivalGain = 0.1;   // share of the lateness that corrects a step
-constexpr double kGap = 1.5;           // periods: a step at least this long is a gap, not jitter
+constexpr double kMinStep = 0.5;      // of the period
+constexpr double kArrivalGain = 0.1;  // share of the lateness that corrects a step
+constexpr double kGap = 1.5;          // periods: a step at least this long is a gap, not jitter
 
-// RT-safe.
-double FrameClock::tick(const Header& header) noexcept {
+RT_SAFE double FrameClock::tick(const Header& header) noexcept {
   const bool device_time = header.device_ns != kNoTime_ns;
   const std::int64_t time_ns = device_time ? header.device_ns : header.arrival_ns;
   const bool first = !std::exchange(started_, true);
@@ -90,14 +89,13 @@ double FrameClock::tick(const Header& header) noexcept {
       late_s_ -= kArrivalGain * late_s_;
     }
   }
-  now_s_ += std::max(step_s, kShortestStep * beat_s);
+  now_s_ += std::max(step_s, kMinStep * beat_s);
   return now_s_;
 }
 
-// RT-safe.
-void FrameClock::learn(double step_s) noexcept {
-  if (step_s > kLongestPeriod_s) return;
-  recent_s_[static_cast<std::size_t>(steps_ % kRecent)] = std::max(step_s, kShortestPeriod_s);
+RT_SAFE void FrameClock::learn(double step_s) noexcept {
+  if (step_s > kMaxPeriod_s) return;
+  recent_s_[steps_ % kRecent] = std::max(step_s, kMinPeriod_s);
   ++steps_;
   std::array<double, kRecent> sorted = recent_s_;
   const auto end = sorted.begin() + std::min(steps_, kRecent);
@@ -114,10 +112,10 @@ class Unwrap {
  public:
   explicit Unwrap(const Skeleton& skeleton);
 
-  // values_rad: [rotation channels], changed in place; NaN where missing, and left NaN. RT-safe.
-  void apply(std::span<double> values_rad) noexcept;
+  // values_rad: [rotation channels], changed in place; NaN where missing, and left NaN.
+  RT_SAFE void apply(std::span<double> values_rad) noexcept;
 
-  void reset() noexcept;  // RT-safe
+  RT_SAFE void reset() noexcept;
 
  private:
   std::vector<int>
@@ -136,8 +134,7 @@ std::array<double, 3> nearest(std::array<double, 3> angles, const double* last) 
   return angles;
 }
 
-// RT-safe.
-void unwrap_joint(double* values, const double* last) noexcept {
+RT_SAFE void unwrap_joint(double* values, const double* last) noexcept {
   const auto same = nearest({values[0], values[1], values[2]}, last);
   const auto other = nearest({values[0] + kPi, kPi - values[1], values[2] + kPi}, last);
   std::ranges::copy(distance_rad(other, last) < distance_rad(same, last) ? other : same, values);
@@ -159,13 +156,11 @@ Unwrap::Unwrap(const Skeleton& skeleton) {
   reset();
 }
 
-// RT-safe.
-void Unwrap::reset() noexcept {
+RT_SAFE void Unwrap::reset() noexcept {
   std::ranges::fill(last_rad_, std::numeric_limits<double>::quiet_NaN());
 }
 
-// RT-safe.
-void Unwrap::apply(std::span<double> values_rad) noexcept {
+RT_SAFE void Unwrap::apply(std::span<double> values_rad) noexcept {
   double* values = values_rad.data();
   double* last = last_rad_.data();
   for (const int count : joint_channels_) {
@@ -233,7 +228,7 @@ struct LiveSmoother::State {
         values(figure.channels.size()),
         pending(kMaxPending),
         heading_rad(kMaxPending) {
-    free_angle.resize(static_cast<std::size_t>(angles));
+    free_angle.resize(angles);
     for (std::size_t i = 0; i < figure.channels.size(); ++i) {
       if (figure.channels[i].translation) continue;
       angle_value.push_back(i);
@@ -294,8 +289,7 @@ LiveSmoother::LiveSmoother(const Skeleton& skeleton, const LiveOptions& options,
 }
 LiveSmoother::~LiveSmoother() = default;
 
-// RT-safe.
-void LiveSmoother::State::lay_out(const LiveModel* model) noexcept {
+RT_SAFE void LiveSmoother::State::lay_out(const LiveModel* model) noexcept {
   body = model != nullptr && model->body ? &*model->body : nullptr;
   body_columns = body != nullptr ? static_cast<std::size_t>(body->count()) : 0;
   free_angles = 0;
@@ -306,13 +300,12 @@ void LiveSmoother::State::lay_out(const LiveModel* model) noexcept {
   std::ranges::fill(posed, 0.0);
 }
 
-// What waits is solved for a last time before the columns change. RT-safe.
-void LiveSmoother::State::use(const LiveModel* model) noexcept {
+// What waits is solved for a last time before the columns change.
+RT_SAFE void LiveSmoother::State::use(const LiveModel* model) noexcept {
   const bool changes = body != nullptr || (model != nullptr && model->body);
   if (changes) {
     for (long i = std::max(emitted, ready); i < received; ++i) {
-      rebuild(pending[static_cast<std::size_t>(i % kMaxPending)],
-              static_cast<int>(received - 1 - i));
+      rebuild(pending[i % kMaxPending], static_cast<int>(received - 1 - i));
     }
     ready = received;
     forget();
@@ -322,17 +315,16 @@ void LiveSmoother::State::use(const LiveModel* model) noexcept {
   filter.set_model(model);
 }
 
-// RT-safe.
-bool LiveSmoother::State::serves(const Frame& frame) const noexcept {
+RT_SAFE bool LiveSmoother::State::serves(const Frame& frame) const noexcept {
   return body_columns + free_angles > 0 && frame.skeleton == skeleton.id &&
          frame.angle_count == angles && frame.joint_count == skeleton.joints.size();
 }
 
 // Stores the frame and extracts its channels, unwrapped. Channels that were not measured become NaN
 // in both: all channels of a joint that is not valid, except those that the source does provide
-// beside missing ones. RT-safe.
-void LiveSmoother::State::receive(const Frame& frame, double step_s) noexcept {
-  Frame& kept = pending[static_cast<std::size_t>(received % kMaxPending)];
+// beside missing ones.
+RT_SAFE void LiveSmoother::State::receive(const Frame& frame, double step_s) noexcept {
+  Frame& kept = pending[received % kMaxPending];
   kept = frame;
   ++received;
   std::size_t first = 0;
@@ -342,7 +334,7 @@ void LiveSmoother::State::receive(const Frame& frame, double step_s) noexcept {
     for (; end < angle_value.size() && skeleton.channels[angle_value[end]].joint == joint; ++end) {
       lacks = lacks || !std::isfinite(frame.angle_rad[end]);
     }
-    const bool there = lacks || frame.valid[static_cast<std::size_t>(joint)];
+    const bool there = lacks || frame.valid[joint];
     for (; first < end; ++first) {
       float& value = kept.angle_rad[first];
       if (!there || !std::isfinite(value)) value = std::numeric_limits<float>::quiet_NaN();
@@ -354,13 +346,13 @@ void LiveSmoother::State::receive(const Frame& frame, double step_s) noexcept {
   if (body != nullptr) receive_body(frame, step_s);
 }
 
-// The columns of a body's model, as the frame stored last has them. RT-safe.
-void LiveSmoother::State::receive_body(const Frame& frame, double step_s) noexcept {
+// The columns of a body's model, as the frame stored last has them.
+RT_SAFE void LiveSmoother::State::receive_body(const Frame& frame, double step_s) noexcept {
   if (body->has_heading(frame)) {
     const double dt_s = std::min(step_s, kHeadingStep_s);
     static_cast<void>(heading.update(body->heading_rad(frame), dt_s));
   }
-  heading_rad[static_cast<std::size_t>((received - 1) % kMaxPending)] = heading.value_rad();
+  heading_rad[(received - 1) % kMaxPending] = heading.value_rad();
   const std::span<double> values_rad = std::span(measured).first(body_columns);
   body->read(frame, heading.value_rad(), values_rad);
   body->unwrap(std::span(posed).first(body_columns), values_rad);
@@ -369,16 +361,14 @@ void LiveSmoother::State::receive_body(const Frame& frame, double step_s) noexce
   }
 }
 
-// RT-safe.
-void LiveSmoother::State::forget() noexcept {
+RT_SAFE void LiveSmoother::State::forget() noexcept {
   unwrap.reset();
   window.reset();
   filter.reset();
   heading = motion::LiveHeading();
 }
 
-// RT-safe.
-void LiveSmoother::process(const StageFrame& in, StageOut& out) noexcept {
+RT_SAFE void LiveSmoother::process(const StageFrame& in, StageOut& out) noexcept {
   State& s = *state_;
   if (!s.serves(in.frame)) {
     flush(out);
@@ -399,7 +389,7 @@ void LiveSmoother::process(const StageFrame& in, StageOut& out) noexcept {
   if (s.options.noise_rad <= 0.0) s.noise.push(s.measured, even);
   s.window.push(now_s, s.measured, noise_rad());
   if (s.filter.model() != nullptr) {
-    const auto modelled = static_cast<std::size_t>(s.filter.model()->channels);
+    const std::size_t modelled = s.filter.model()->channels;
     s.filter.push(std::span(s.measured).first(modelled), even, period_s, noise_rad());
     s.filter.sweep(window_frames(period_s));
   }
@@ -411,14 +401,13 @@ void LiveSmoother::process(const StageFrame& in, StageOut& out) noexcept {
   s.emit_until(s.received - 1 - lag_frames(s.options.lag, period_s), out);
 }
 
-// RT-safe.
-void LiveSmoother::tick(std::int64_t /*now_ns*/, StageOut& out) noexcept { flush(out); }
+RT_SAFE void LiveSmoother::tick(std::int64_t /*now_ns*/, StageOut& out) noexcept { flush(out); }
 
-// RT-safe.
-void LiveSmoother::flush(StageOut& out) noexcept { state_->emit_until(state_->received - 1, out); }
+RT_SAFE void LiveSmoother::flush(StageOut& out) noexcept {
+  state_->emit_until(state_->received - 1, out);
+}
 
-// RT-safe.
-void LiveSmoother::reset() noexcept {
+RT_SAFE void LiveSmoother::reset() noexcept {
   State& s = *state_;
   s.forget();
   s.noise.reset();
@@ -427,23 +416,21 @@ void LiveSmoother::reset() noexcept {
   s.last_s = 0.0;
 }
 
-// RT-safe.
-const LiveModel* LiveSmoother::set_model(const LiveModel* model) noexcept {
+RT_SAFE const LiveModel* LiveSmoother::set_model(const LiveModel* model) noexcept {
   const LiveModel* const before = state_->filter.model();
   state_->use(model);
   return before;
 }
 
-// RT-safe.
-double LiveSmoother::noise_rad() const noexcept {
+RT_SAFE double LiveSmoother::noise_rad() const noexcept {
   const State& s = *state_;
   return s.options.noise_rad > 0.0 ? s.options.noise_rad : s.noise.noise_rad();
 }
 
-// Frames up to number `last` go out. RT-safe.
-void LiveSmoother::State::emit_until(long last, StageOut& out) noexcept {
+// Frames up to number `last` go out.
+RT_SAFE void LiveSmoother::State::emit_until(long last, StageOut& out) noexcept {
   for (; emitted <= last; ++emitted) {
-    Frame frame = pending[static_cast<std::size_t>(emitted % kMaxPending)];
+    Frame frame = pending[emitted % kMaxPending];
     if (emitted >= ready) {
       rebuild(frame, static_cast<int>(received - 1 - emitted));
     } else {
@@ -453,8 +440,8 @@ void LiveSmoother::State::emit_until(long last, StageOut& out) noexcept {
   }
 }
 
-// Writes the solve's result into the frame `back` frames before the newest. RT-safe.
-void LiveSmoother::State::rebuild(Frame& frame, int back) noexcept {
+// Writes the solve's result into the frame `back` frames before the newest.
+RT_SAFE void LiveSmoother::State::rebuild(Frame& frame, int back) noexcept {
   window.variance(back, column_variance.get());
   const double* const x = window.x(back);
   frame.lag_frames = static_cast<std::uint16_t>(back);
@@ -476,17 +463,16 @@ void LiveSmoother::State::rebuild(Frame& frame, int back) noexcept {
   turn_joints(frame);
   if (body != nullptr) {
     const long number = received - 1 - back;
-    pose_body(frame, heading_rad[static_cast<std::size_t>(number % kMaxPending)], x);
+    pose_body(frame, heading_rad[number % kMaxPending], x);
   }
   if (filter.model() != nullptr) name_gesture(frame, back);
 }
 
-// RT-safe.
-void LiveSmoother::State::name_gesture(Frame& frame, int back) const noexcept {
+RT_SAFE void LiveSmoother::State::name_gesture(Frame& frame, int back) const noexcept {
   const HmmForwardFilter::Answer answer = filter.label(back);
   frame.label.fill('\0');
   if (answer.label >= 0) {
-    frame.label = filter.model()->labels[static_cast<std::size_t>(answer.label)];
+    frame.label = filter.model()->labels[answer.label];
   } else if (answer.label == HmmForwardFilter::kNone) {
     std::ranges::copy(kNoneName, frame.label.begin());
   }
@@ -494,8 +480,7 @@ void LiveSmoother::State::name_gesture(Frame& frame, int back) const noexcept {
 }
 
 // Computes rotations from the free angles; a joint is valid when all its channels are known.
-// RT-safe.
-void LiveSmoother::State::turn_joints(Frame& frame) noexcept {
+RT_SAFE void LiveSmoother::State::turn_joints(Frame& frame) noexcept {
   for (std::size_t i = 0; i < free_angles; ++i) {
     const std::size_t c = free_angle[i];
     values[angle_value[c]] = static_cast<double>(frame.angle_rad[c]);
@@ -510,15 +495,15 @@ void LiveSmoother::State::turn_joints(Frame& frame) noexcept {
       ++first;
     }
     if (covered) continue;
-    const auto j = static_cast<std::size_t>(joint);
+    const std::size_t j = joint;
     frame.rotation_xyzw[j] =
         frame.valid[j] ? from_eigen(local_rotation(skeleton, joint, values)) : kIdentity;
   }
 }
 
 // Poses the joints of a body's model; one that no frame of the window measured stays as it is.
-// RT-safe.
-void LiveSmoother::State::pose_body(Frame& frame, double toward_rad, const double* x) noexcept {
+RT_SAFE void LiveSmoother::State::pose_body(Frame& frame, double toward_rad,
+                                            const double* x) noexcept {
   for (std::size_t c = 0; c < body_columns; ++c) {
     const bool known = window.known(static_cast<int>(c));
     posed_now[c] = known ? x[c] : std::numeric_limits<double>::quiet_NaN();

@@ -37,24 +37,24 @@ class LiveSmoother final : public Stage {
   // Emits none, one or several frames: those that are `lag` behind `in` and have not gone out. An
   // emitted frame keeps its own header, source, root and stamps; its angles, rotations, validity
   // and quality (predicted where something was bridged) are the solve's, lag_frames and lag_ms say
-  // how far behind `in` it is; the posterior variance goes with it. RT-safe.
-  void process(const StageFrame& in, StageOut& out) noexcept override;
-  // After a silence it flushes. RT-safe.
-  void tick(std::int64_t now_ns, StageOut& out) noexcept override;
+  // how far behind `in` it is; the posterior variance goes with it.
+  RT_SAFE void process(const StageFrame& in, StageOut& out) noexcept override;
+  // After a silence it flushes.
+  RT_SAFE void tick(std::int64_t now_ns, StageOut& out) noexcept override;
 
   // Emits the frames that still wait, with the little that is known of their future: end of stream,
-  // or silence. The stream may go on after it. RT-safe.
-  void flush(StageOut& out) noexcept override;
+  // or silence. The stream may go on after it.
+  RT_SAFE void flush(StageOut& out) noexcept override;
 
-  // Forgets the past; the next frame is treated as the first one. RT-safe.
-  void reset() noexcept;
+  // Forgets the past; the next frame is treated as the first one.
+  RT_SAFE void reset() noexcept;
 
   // Takes effect at the next frame; returns the previous model. Channels of a body are those of its
-  // model, so the past is then forgotten. RT-safe.
-  const LiveModel* set_model(const LiveModel* model) noexcept;
+  // model, so the past is then forgotten.
+  RT_SAFE const LiveModel* set_model(const LiveModel* model) noexcept;
 
-  // Sensor noise in use [rad]. RT-safe.
-  [[nodiscard]] double noise_rad() const noexcept;
+  // Sensor noise in use [rad].
+  RT_SAFE [[nodiscard]] double noise_rad() const noexcept;
 
  private:
   struct State;

@@ -12,7 +12,7 @@ constexpr double kPull = 0.1;       // weight of the model's pose beside a measu
 constexpr double kGapPull = 0.3;    // and where the channel is missing
 constexpr double kFit2 = 2.0;       // normalised squared distance at which the fit is one half
 constexpr double kBelieved = 1e-3;  // states with a smaller probability are left out
-constexpr double kLeastVariance = 1e-12;
+constexpr double kMinModelVariance = 1e-12;
 
 }  // namespace
 
@@ -24,11 +24,10 @@ ModelPrior::ModelPrior(const HmmForwardFilter& filter, int max_channels) : filte
 
 // Mean and variance of one frame over its state probabilities, of the position and, with `moving`,
 // of delta and delta-delta, which only gaps need; false where the model believes in no state.
-// RT-safe.
-bool ModelPrior::believe(int back, bool moving) noexcept {
+RT_SAFE bool ModelPrior::believe(int back, bool moving) noexcept {
   const LiveModel& model = *filter_.model();
   const auto states = filter_.states(back);
-  const auto channels = static_cast<std::size_t>(model.channels);
+  const std::size_t channels = model.channels;
   const std::size_t windows = moving ? kDeltaWindows : 1;
   const std::size_t features = windows * channels;
   LiveRows& mean = belief_.mean;
@@ -53,15 +52,14 @@ bool ModelPrior::believe(int back, bool moving) noexcept {
   for (std::size_t w = 0; w < windows; ++w) {
     for (std::size_t k = w * channels; k < (w + 1) * channels; ++k) {
       const double m = mean[k] / sum;
-      variance[k] = std::max(variance[k] / sum - m * m, kLeastVariance) * rule.variance[w];
+      variance[k] = std::max(variance[k] / sum - m * m, kMinModelVariance) * rule.variance[w];
       mean[k] = m * rule.mean[w];
     }
   }
   return true;
 }
 
-// RT-safe.
-void ModelPrior::measure_distance(const AdaptiveWindow& window, int back) noexcept {
+RT_SAFE void ModelPrior::measure_distance(const AdaptiveWindow& window, int back) noexcept {
   const LiveModel& model = *filter_.model();
   const double* const x = window.x(back);
   std::array<double, gesture::kMaxGroups> sum{};
@@ -79,8 +77,8 @@ void ModelPrior::measure_distance(const AdaptiveWindow& window, int back) noexce
 }
 
 // How well each group follows the model's gestures in the frames where its first channel is
-// measured. RT-safe.
-void ModelPrior::measure_fit(const AdaptiveWindow& window) noexcept {
+// measured.
+RT_SAFE void ModelPrior::measure_fit(const AdaptiveWindow& window) noexcept {
   const LiveModel& model = *filter_.model();
   std::array<double, gesture::kMaxGroups> frames{};
   fit_.fill(0.0);
@@ -89,9 +87,9 @@ void ModelPrior::measure_fit(const AdaptiveWindow& window) noexcept {
     measure_distance(window, back);
     int last = -1;
     for (int c = 0; c < model.channels; ++c) {
-      const int group = model.group[static_cast<std::size_t>(c)];
+      const int group = model.group[c];
       if (std::exchange(last, group) == group || !window.measured(back, c)) continue;
-      const auto g = static_cast<std::size_t>(group);
+      const std::size_t g = group;
       const double ratio = belief_.distance2[g] / kFit2;
       fit_[g] += 1.0 / (1.0 + ratio * ratio);
       frames[g] += 1.0;
@@ -101,8 +99,8 @@ void ModelPrior::measure_fit(const AdaptiveWindow& window) noexcept {
 }
 
 // Pulls towards the model's pose with its variance times (1 + e^2/2)^2, so that a group which is
-// elsewhere is not disturbed. RT-safe.
-void ModelPrior::pull(AdaptiveWindow& window, int back) noexcept {
+// elsewhere is not disturbed.
+RT_SAFE void ModelPrior::pull(AdaptiveWindow& window, int back) noexcept {
   const LiveModel& model = *filter_.model();
   std::array<double, gesture::kMaxGroups> weight{}, weight_in_gap{};
   for (std::size_t g = 0; g < static_cast<std::size_t>(model.groups); ++g) {
@@ -126,8 +124,8 @@ void ModelPrior::pull(AdaptiveWindow& window, int back) noexcept {
 }
 
 // In a gap the gestures' own delta and delta-delta replace the adaptive prior in proportion to the
-// group's fit. RT-safe.
-void ModelPrior::bridge(AdaptiveWindow& window, int back, std::size_t c) noexcept {
+// group's fit.
+RT_SAFE void ModelPrior::bridge(AdaptiveWindow& window, int back, std::size_t c) noexcept {
   const LiveModel& model = *filter_.model();
   const double fit = some_ * fit_[static_cast<std::size_t>(model.group[c])];
   constexpr std::array kPrecision{trajectory::kDelta, trajectory::kDeltaDelta};
@@ -142,8 +140,7 @@ void ModelPrior::bridge(AdaptiveWindow& window, int back, std::size_t c) noexcep
 }
 
 // Nothing is added to the newest frame, because the features taken at it describe the frame before.
-// RT-safe.
-void ModelPrior::add(AdaptiveWindow& window) noexcept {
+RT_SAFE void ModelPrior::add(AdaptiveWindow& window) noexcept {
   bool gap = false;
   for (int back = 0; back < window.frames(); ++back) gap = gap || !window.whole(back);
   if (gap) measure_fit(window);

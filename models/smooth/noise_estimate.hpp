@@ -9,6 +9,8 @@
 #include <span>
 #include <vector>
 
+#include "proto/frame/rt_safe.hpp"
+
 namespace posed::smooth {
 
 class NoiseEstimate {
@@ -16,14 +18,14 @@ class NoiseEstimate {
   explicit NoiseEstimate(int channels);
 
   // The next frame's channels [rad], NaN where missing. `even`: it follows the previous frame by
-  // one period. RT-safe.
-  void push(std::span<const double> measured_rad, bool even) noexcept;
+  // one period.
+  RT_SAFE void push(std::span<const double> measured_rad, bool even) noexcept;
 
   // The assumed noise [rad]: slightly below the estimate, because an assumed noise that is too low
-  // costs less accuracy than one that is too high. RT-safe.
-  [[nodiscard]] double noise_rad() const noexcept { return noise_rad_; }
+  // costs less accuracy than one that is too high.
+  RT_SAFE [[nodiscard]] double noise_rad() const noexcept { return noise_rad_; }
 
-  void reset() noexcept;  // RT-safe
+  RT_SAFE void reset() noexcept;
 
  private:
   void count(double size_rad) noexcept;

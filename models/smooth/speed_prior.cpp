@@ -85,15 +85,14 @@ namespace posed::smooth::kernel {
 HWY_EXPORT(sum_speeds);
 HWY_EXPORT(set_precision);
 
-// RT-safe.
-void sum_speeds(const double* x, int frames, int stride, const double* step_s, const double* active,
-                double* sum, double* hand) noexcept {
+RT_SAFE void sum_speeds(const double* x, int frames, int stride, const double* step_s,
+                        const double* active, double* sum, double* hand) noexcept {
   HWY_DYNAMIC_DISPATCH(sum_speeds)(x, frames, stride, step_s, active, sum, hand);
 }
 
-// RT-safe.
-void set_precision(const double* sum_from, const double* sum_to, int stride, const Speed& speed,
-                   const Spread& spread, const Steady& steady, const Prior& out) noexcept {
+RT_SAFE void set_precision(const double* sum_from, const double* sum_to, int stride,
+                           const Speed& speed, const Spread& spread, const Steady& steady,
+                           const Prior& out) noexcept {
   HWY_DYNAMIC_DISPATCH(set_precision)(sum_from, sum_to, stride, speed, spread, steady, out);
 }
 

@@ -10,11 +10,11 @@ namespace posed::smooth {
 namespace {
 
 constexpr double kFirstSpeed2 = 1e4 * kDegree * kDegree;  // variance [rad^2/s^2]
-constexpr double kLeastProbability = 0.05;                // so that neither model is ever ruled out
-constexpr double kMostEvidence = 30.0;  // largest log likelihood ratio that a frame may add
+constexpr double kMinProbability = 0.05;                  // so that neither model is ever ruled out
+constexpr double kMaxEvidence = 30.0;  // largest log likelihood ratio that a frame may add
 
-// The Gaussian with the mean and covariance of the mixture of both. RT-safe.
-ConstantVelocity mixed(const ConstantVelocity& a, double share, const ConstantVelocity& b) {
+// The Gaussian with the mean and covariance of the mixture of both.
+RT_SAFE ConstantVelocity mixed(const ConstantVelocity& a, double share, const ConstantVelocity& b) {
   const double rest = 1.0 - share;
   const double between = share * rest;
   const double dx = a.x - b.x;
@@ -28,8 +28,7 @@ ConstantVelocity mixed(const ConstantVelocity& a, double share, const ConstantVe
 
 }  // namespace
 
-// RT-safe.
-void ConstantVelocity::predict(double step_s, double density) noexcept {
+RT_SAFE void ConstantVelocity::predict(double step_s, double density) noexcept {
   const double step2 = step_s * step_s;
   x += step_s * v;
   xx += 2.0 * step_s * xv + step2 * vv + density * step2 * step_s / 3.0;
@@ -37,9 +36,8 @@ void ConstantVelocity::predict(double step_s, double density) noexcept {
   vv += density * step_s;
 }
 
-// RT-safe.
-ConstantVelocity::Innovation ConstantVelocity::update(double measured_rad,
-                                                      double variance_rad2) noexcept {
+RT_SAFE ConstantVelocity::Innovation ConstantVelocity::update(double measured_rad,
+                                                              double variance_rad2) noexcept {
   const double variance = xx + variance_rad2;
   const double precision = 1.0 / variance;
   const double off = measured_rad - x;
@@ -53,8 +51,7 @@ ConstantVelocity::Innovation ConstantVelocity::update(double measured_rad,
   return {.variance = variance, .distance2 = off * off * precision};
 }
 
-// RT-safe.
-void InteractingModels::start(double measured_rad, double variance_rad2) noexcept {
+RT_SAFE void InteractingModels::start(double measured_rad, double variance_rad2) noexcept {
   loose_ = {.x = measured_rad, .xx = variance_rad2, .vv = kFirstSpeed2};
   tight_ = loose_;
   loose_probability_ = 0.5;
@@ -62,8 +59,9 @@ void InteractingModels::start(double measured_rad, double variance_rad2) noexcep
 }
 
 // The motion may change its kind between two frames: each model goes on from the mixture of both
-// states that may have led to it. RT-safe.
-void InteractingModels::predict(double step_s, const Stay& stay, const Density& density) noexcept {
+// states that may have led to it.
+RT_SAFE void InteractingModels::predict(double step_s, const Stay& stay,
+                                        const Density& density) noexcept {
   assert(started_);
   const double remains = loose_probability_ * stay.loose;
   const double leaves = loose_probability_ - remains;
@@ -77,20 +75,18 @@ void InteractingModels::predict(double step_s, const Stay& stay, const Density& 
   tight_.predict(step_s, density.tight);
 }
 
-// RT-safe.
-double InteractingModels::surprise(double measured_rad, double variance_rad2) noexcept {
+RT_SAFE double InteractingModels::surprise(double measured_rad, double variance_rad2) noexcept {
   assert(started_);
   const auto loose = loose_.update(measured_rad, variance_rad2);
   const auto tight = tight_.update(measured_rad, variance_rad2);
   return 0.5 * (tight.distance2 - loose.distance2 + std::log(tight.variance / loose.variance));
 }
 
-// RT-safe.
-void InteractingModels::weigh(double log_loose_over_tight) noexcept {
-  const double ratio = std::exp(std::clamp(log_loose_over_tight, -kMostEvidence, kMostEvidence));
+RT_SAFE void InteractingModels::weigh(double log_loose_over_tight) noexcept {
+  const double ratio = std::exp(std::clamp(log_loose_over_tight, -kMaxEvidence, kMaxEvidence));
   const double loose = loose_probability_ * ratio;
-  loose_probability_ = std::clamp(loose / (loose + 1.0 - loose_probability_), kLeastProbability,
-                                  1.0 - kLeastProbability);
+  loose_probability_ = std::clamp(loose / (loose + 1.0 - loose_probability_), kMinProbability,
+                                  1.0 - kMinProbability);
 }
 
 namespace {
@@ -109,33 +105,31 @@ const double SteadyMotion::kDensityRoot = std::sqrt(std::sqrt(kSteadyDensity));
 SteadyMotion::SteadyMotion(int channels, int stride, int frames)
     : stride_(stride),
       frames_(frames),
-      models_(static_cast<std::size_t>(channels)),
-      evidence_(static_cast<std::size_t>(channels)),
-      time_s_(static_cast<std::size_t>(frames)),
+      models_(channels),
+      evidence_(channels),
+      time_s_(frames),
       loose_(trajectory::make_rows(frames, stride)) {
   reset();
 }
 
-// RT-safe.
-void SteadyMotion::reset() noexcept {
+RT_SAFE void SteadyMotion::reset() noexcept {
   pushed_ = 0;
   std::ranges::fill(models_, InteractingModels());
   std::fill_n(loose_.get(), static_cast<std::ptrdiff_t>(frames_) * stride_, 1.0);
 }
 
-// RT-safe.
-void SteadyMotion::push(double time_s, std::span<const double> measured_rad,
-                        const Channels& known) noexcept {
-  const auto before = static_cast<std::size_t>((pushed_ + frames_ - 1) % frames_);
+RT_SAFE void SteadyMotion::push(double time_s, std::span<const double> measured_rad,
+                                const Channels& known) noexcept {
+  const std::size_t before = (pushed_ + frames_ - 1) % frames_;
   follow(pushed_ > 0 ? time_s - time_s_[before] : 0.0, measured_rad, known);
   remember(time_s, measured_rad);
   ++pushed_;
 }
 
 // Channels of a hand begin and end their motions together, so the mean of their evidence counts
-// for each of them. RT-safe.
-void SteadyMotion::follow(double step_s, std::span<const double> measured_rad,
-                          const Channels& known) noexcept {
+// for each of them.
+RT_SAFE void SteadyMotion::follow(double step_s, std::span<const double> measured_rad,
+                                  const Channels& known) noexcept {
   const InteractingModels::Stay stay{.loose = std::exp(-step_s / kUnsteadyFor_s),
                                      .tight = std::exp(-step_s / kSteadyFor_s)};
   double sum = 0.0;
@@ -162,16 +156,15 @@ void SteadyMotion::follow(double step_s, std::span<const double> measured_rad,
 
 // A change of the motion shows in the measurements some frames after it began, so the frames
 // before are at least as loose. A missing value is bridged as the speed-adaptive prior does it.
-// RT-safe.
-void SteadyMotion::remember(double time_s, std::span<const double> measured_rad) noexcept {
+RT_SAFE void SteadyMotion::remember(double time_s, std::span<const double> measured_rad) noexcept {
   double* const newest = row(pushed_);
-  time_s_[static_cast<std::size_t>(pushed_ % frames_)] = time_s;
+  time_s_[pushed_ % frames_] = time_s;
   for (std::size_t c = 0; c < models_.size(); ++c) {
     newest[c] = std::isfinite(measured_rad[c]) ? models_[c].loose() : 1.0;
   }
   const long first = std::max<long>(0, pushed_ + 1 - frames_);
   for (long i = pushed_ - 1; i >= first; --i) {
-    if (time_s_[static_cast<std::size_t>(i % frames_)] < time_s - kUnnoticed_s) break;
+    if (time_s_[i % frames_] < time_s - kUnnoticed_s) break;
     double* const earlier = row(i);
     for (std::size_t c = 0; c < models_.size(); ++c) {
       earlier[c] = std::max(earlier[c], models_[c].loose());

@@ -7,8 +7,7 @@ namespace posed::trajectory {
 CarriedPast::CarriedPast(int stride)
     : now_(make_rows(kernel::kCarryRows, stride)), next_(make_rows(kernel::kCarryRows, stride)) {}
 
-// RT-safe.
-void CarriedPast::begin(long first) noexcept {
+RT_SAFE void CarriedPast::begin(long first) noexcept {
   if (first == first_) return;
   first_ = first;
   from_ = kNone;
@@ -17,18 +16,15 @@ void CarriedPast::begin(long first) noexcept {
   from_ = std::exchange(left_, kNone);
 }
 
-// RT-safe.
-Carry CarriedPast::incoming() const noexcept {
+RT_SAFE Carry CarriedPast::incoming() const noexcept {
   return {.in = from_ == kNone ? nullptr : now_.get(), .out = nullptr};
 }
 
-// RT-safe.
-Carry CarriedPast::incoming_and_outgoing() noexcept {
+RT_SAFE Carry CarriedPast::incoming_and_outgoing() noexcept {
   left_ = first_ + 1;
   return {.in = incoming().in, .out = next_.get()};
 }
 
-// RT-safe.
-void CarriedPast::forget() noexcept { first_ = from_ = left_ = kNone; }
+RT_SAFE void CarriedPast::forget() noexcept { first_ = from_ = left_ = kNone; }
 
 }  // namespace posed::trajectory

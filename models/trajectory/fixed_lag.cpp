@@ -19,13 +19,12 @@ FixedLag::FixedLag(int channels, int lag)
   for (int i = 0; i < kOpen; ++i) tail_[i] = recent_.frame(i);
 }
 
-// RT-safe.
-void FixedLag::push(const double* information) noexcept {
+RT_SAFE void FixedLag::push(const double* information) noexcept {
   if (pushed_ >= kOpen) std::ranges::rotate(tail_, tail_.begin() + 1);
   const long open = std::min<long>(pushed_, kOpen - 1);
   double* newest = recent_.row(static_cast<int>(pushed_ % kOpen), kPosition);
   std::copy_n(information, kRows * stride(), newest);
-  tail_[static_cast<std::size_t>(open)] = newest;
+  tail_[open] = newest;
   if (pushed_ >= static_cast<long>(factors_.size())) {
     std::ranges::rotate(factors_, factors_.begin() + 1);
   }
@@ -41,8 +40,7 @@ void FixedLag::push(const double* information) noexcept {
                     factors_.data() + held - frames);
 }
 
-// RT-safe.
-void FixedLag::estimate(int back, double* x, double* variance) noexcept {
+RT_SAFE void FixedLag::estimate(int back, double* x, double* variance) noexcept {
   const auto held = static_cast<int>(std::min<long>(pushed_, static_cast<long>(factors_.size())));
   const int first = held - 1 - back;
   assert(back >= 0 && first >= 0);

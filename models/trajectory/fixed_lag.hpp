@@ -17,14 +17,14 @@ class FixedLag {
  public:
   FixedLag(int channels, int lag);
 
-  // Adds the next frame; its rows are copied. RT-safe.
-  void push(const double* information) noexcept;
+  // Adds the next frame; its rows are copied.
+  RT_SAFE void push(const double* information) noexcept;
 
   // The estimate of the frame `back` frames before the last pushed one, given all pushed frames;
   // `back` from 0 to min(lag, pushed() - 1). After push(), estimate(lag) is the stream's output; at
   // the end of the sequence, `back` = lag - 1 down to 0 gives the remaining frames. x, variance:
-  // [stride()], 64-byte aligned; variance may be null. RT-safe.
-  void estimate(int back, double* x, double* variance) noexcept;
+  // [stride()], 64-byte aligned; variance may be null.
+  RT_SAFE void estimate(int back, double* x, double* variance) noexcept;
 
   [[nodiscard]] int lag() const noexcept { return lag_; }
   [[nodiscard]] int stride() const noexcept { return recent_.stride(); }

@@ -13,8 +13,7 @@ InformationForm::InformationForm(int channels, int frames)
   for (int f = 0; f < frames; ++f) clear(f);
 }
 
-// RT-safe.
-void InformationForm::clear(int frame) noexcept {
+RT_SAFE void InformationForm::clear(int frame) noexcept {
   double* rows = row(frame, kPosition);
   std::fill_n(rows, kRows * stride_, 0.0);
   std::fill(rows + channels_, rows + stride_, 1.0);

@@ -13,6 +13,8 @@
 
 #include <hwy/aligned_allocator.h>
 
+#include "proto/frame/rt_safe.hpp"
+
 namespace posed::trajectory {
 
 inline constexpr int kLanes = 8;  // rows are padded to this many doubles, one cache line
@@ -43,8 +45,8 @@ class InformationForm {
  public:
   InformationForm(int channels, int frames);
 
-  // [channels()], 64-byte aligned. RT-safe.
-  [[nodiscard]] double* row(int frame, Row row) noexcept {
+  // [channels()], 64-byte aligned.
+  RT_SAFE [[nodiscard]] double* row(int frame, Row row) noexcept {
     return data_.get() + (static_cast<std::ptrdiff_t>(frame) * kRows + row) * stride_;
   }
   [[nodiscard]] const double* row(int frame, Row row) const noexcept {
@@ -53,8 +55,8 @@ class InformationForm {
   // The frame's six rows, as solvers take them.
   [[nodiscard]] const double* frame(int frame) const noexcept { return row(frame, kPosition); }
 
-  // Sets the frame's information to zero. RT-safe.
-  void clear(int frame) noexcept;
+  // Sets the frame's information to zero.
+  RT_SAFE void clear(int frame) noexcept;
 
   [[nodiscard]] int channels() const noexcept { return channels_; }
   [[nodiscard]] int frames() const noexcept { return frames_; }

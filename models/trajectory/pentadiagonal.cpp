@@ -246,18 +246,15 @@ HWY_EXPORT(eliminate);
 HWY_EXPORT(substitute);
 HWY_EXPORT(variance);
 
-// RT-safe.
-void eliminate(const System& system, double* const* factors) noexcept {
+RT_SAFE void eliminate(const System& system, double* const* factors) noexcept {
   HWY_DYNAMIC_DISPATCH(eliminate)(system, factors);
 }
-// RT-safe.
-void substitute(const double* const* factors, int frames, int first, int stride,
-                double* x) noexcept {
+RT_SAFE void substitute(const double* const* factors, int frames, int first, int stride,
+                        double* x) noexcept {
   HWY_DYNAMIC_DISPATCH(substitute)(factors, frames, first, stride, x);
 }
-// RT-safe.
-void variance(const double* const* factors, int frames, int first, int stride, double* out,
-              int step) noexcept {
+RT_SAFE void variance(const double* const* factors, int frames, int first, int stride, double* out,
+                      int step) noexcept {
   HWY_DYNAMIC_DISPATCH(variance)(factors, frames, first, stride, out, step);
 }
 

@@ -18,9 +18,8 @@ SlidingWindow::SlidingWindow(int channels, int max_frames)
   }
 }
 
-// RT-safe.
-void SlidingWindow::solve(std::span<const double* const> information, Boundary boundary,
-                          const double* skew, const Carry& carry) noexcept {
+RT_SAFE void SlidingWindow::solve(std::span<const double* const> information, Boundary boundary,
+                                  const double* skew, const Carry& carry) noexcept {
   frames_ = static_cast<int>(information.size());
   assert(frames_ >= 1 && frames_ <= static_cast<int>(factors_.size()));
   kernel::eliminate({information.data(), frames_, stride_, boundary, skew, carry.in, carry.out},
@@ -28,13 +27,11 @@ void SlidingWindow::solve(std::span<const double* const> information, Boundary b
   kernel::substitute(factors_.data(), frames_, 0, stride_, x_.get());
 }
 
-// RT-safe.
-void SlidingWindow::variance(int frame, double* out) const noexcept {
+RT_SAFE void SlidingWindow::variance(int frame, double* out) const noexcept {
   kernel::variance(factors_.data(), frames_, frame, stride_, out, 0);
 }
 
-// RT-safe.
-void SlidingWindow::variances(double* out) const noexcept {
+RT_SAFE void SlidingWindow::variances(double* out) const noexcept {
   kernel::variance(factors_.data(), frames_, 0, stride_, out, stride_);
 }
 

@@ -27,12 +27,13 @@ class SlidingWindow {
 
   // Solves the given frames (1 to max_frames), each pointer to a frame's rows
   // (InformationForm::frame() of this many channels). `skew`: [frames] for uneven frames
-  // (kernel::System::skew), else null. RT-safe.
-  void solve(std::span<const double* const> information, Boundary boundary = Boundary::kDrop,
-             const double* skew = nullptr, const Carry& carry = {}) noexcept;
+  // (kernel::System::skew), else null.
+  RT_SAFE void solve(std::span<const double* const> information,
+                     Boundary boundary = Boundary::kDrop, const double* skew = nullptr,
+                     const Carry& carry = {}) noexcept;
 
-  // Results of the last solve. [channels], padded; RT-safe.
-  [[nodiscard]] const double* x(int frame) const noexcept {
+  // Results of the last solve. [channels], padded;
+  RT_SAFE [[nodiscard]] const double* x(int frame) const noexcept {
     return x_.get() + static_cast<std::ptrdiff_t>(frame) * stride_;
   }
   void variance(int frame, double* out) const noexcept;  // out: [stride()], 64-byte aligned

@@ -43,8 +43,8 @@ StateInformation::StateInformation(std::shared_ptr<const gesture::GestureModel> 
   }
 }
 
-// RT-safe.
-void StateInformation::fill(const Context& context, int state, double* rows) const noexcept {
+RT_SAFE void StateInformation::fill(const Context& context, int state,
+                                    double* rows) const noexcept {
   const int channels = model_->channels();
   const int stride = padded(channels);
   for (int g = 0; g < std::ssize(model_->groups); ++g) {
@@ -58,8 +58,7 @@ void StateInformation::fill(const Context& context, int state, double* rows) con
   }
 }
 
-// RT-safe.
-DurationGaussian StateInformation::duration(const Context& context) const noexcept {
+RT_SAFE DurationGaussian StateInformation::duration(const Context& context) const noexcept {
   const double r = rate_hz_ / model_->rate_hz;
   DurationGaussian duration = gesture::duration(*model_, context);
   for (double& mean : duration.mean) mean *= r;

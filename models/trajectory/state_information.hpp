@@ -21,11 +21,12 @@ class StateInformation {
   StateInformation(std::shared_ptr<const gesture::GestureModel> model, double rate_hz);
 
   // Writes the kRows rows (stride padded(channels of the model)) of one frame in `state` (from 0)
-  // of a gesture. RT-safe.
-  void fill(const gesture::Context& context, int state, double* rows) const noexcept;
+  // of a gesture.
+  RT_SAFE void fill(const gesture::Context& context, int state, double* rows) const noexcept;
 
-  // Durations in frames of rate_hz(). RT-safe.
-  [[nodiscard]] gesture::DurationGaussian duration(const gesture::Context& context) const noexcept;
+  // Durations in frames of rate_hz().
+  RT_SAFE [[nodiscard]] gesture::DurationGaussian duration(
+      const gesture::Context& context) const noexcept;
 
   [[nodiscard]] const gesture::GestureModel& model() const noexcept { return *model_; }
   [[nodiscard]] double rate_hz() const noexcept { return rate_hz_; }

@@ -28,6 +28,6 @@ struct Acclaim {
 };
 
 // `name` is used in error messages.
-[[nodiscard]] Result<Acclaim> parse_asf(std::string_view text, const std::string& name);
+Result<Acclaim> parse_asf(std::string_view text, const std::string& name);
 
 }  // namespace posed::clip

@@ -47,29 +47,23 @@ Result<> split(std::string_view amc, const std::string& name, TextFrames& frames
 }
 
 Result<Draft> read_amc(const ClipFile& file, const ReadOptions& options) {
-  auto acclaim = parse_asf(file.skeleton, file.skeleton_name);
-  if (!acclaim) return std::unexpected(acclaim.error());
+  auto acclaim = TRY(parse_asf(file.skeleton, file.skeleton_name));
   const double rate_hz = options.rate_hz.value_or(kUsualRate_hz);
   if (!(rate_hz > 0.1 && rate_hz <= 100'000.0)) {
     return misuse("the frame rate of an AMC should be more than 0.1 and at most 100000 Hz");
   }
-  const auto profile = find_profile(acclaim->skeleton, options.profile);
-  if (!profile) return std::unexpected(profile.error());
+  const auto profile = TRY(find_profile(acclaim.skeleton, options.profile));
   Draft draft;
-  draft.profile = *profile;
-  bool degrees = acclaim->degrees;
+  draft.profile = profile;
+  bool degrees = acclaim.degrees;
   TextFrames& frames = draft.text.emplace();
-  if (auto ok = split(without_bom(file.bytes), file.name, frames, degrees); !ok) {
-    return std::unexpected(ok.error());
-  }
-  frames.parser = FrameParser::amc(*acclaim, degrees);
-  draft.skeleton = std::move(acclaim->skeleton);
+  TRY(split(without_bom(file.bytes), file.name, frames, degrees));
+  frames.parser = FrameParser::amc(acclaim, degrees);
+  draft.skeleton = std::move(acclaim.skeleton);
   draft.skeleton.name = std::filesystem::path(file.skeleton_name).stem().string();
-  draft.metres_per_unit = acclaim->metres_per_unit;
+  draft.metres_per_unit = acclaim.metres_per_unit;
   draft.frame_rate_hz = rate_hz;
-  if (auto ok = read_frames(frames, file.name, draft.values, draft.time_s); !ok) {
-    return std::unexpected(ok.error());
-  }
+  TRY(read_frames(frames, file.name, draft.values, draft.time_s));
   return draft;
 }
 

@@ -196,7 +196,7 @@ Result<Acclaim> AsfReader::read() {
   }
   while (!words_.peek().empty()) {
     const std::string key = lower(words_.next());
-    if (auto ok = section(key); !ok) return std::unexpected(ok.error());
+    TRY(section(key));
   }
   if (!has_hierarchy_) return error("has no :hierarchy, so its bones are not joined");
   return acclaim_of(file_, name_);
@@ -226,9 +226,8 @@ Result<double> AsfReader::number(std::string_view what) {
 
 Result<> AsfReader::numbers(std::string_view what, double* values, int count) {
   for (int i = 0; i < count; ++i) {
-    const auto value = number(what);
-    if (!value) return std::unexpected(value.error());
-    values[i] = *value;
+    const auto value = TRY(number(what));
+    values[i] = value;
   }
   return {};
 }
@@ -243,11 +242,10 @@ Result<> AsfReader::units() {
       file_.degrees = unit == "deg";
       continue;
     }
-    const auto value = number(key);
-    if (!value) return std::unexpected(value.error());
+    const auto value = TRY(number(key));
     if (key != "length") continue;
-    if (!(*value > 1e-6)) return error("length should be more than 0; CMU's is 0.45");
-    file_.length_unit = *value;
+    if (!(value > 1e-6)) return error("length should be more than 0; CMU's is 0.45");
+    file_.length_unit = value;
   }
   return {};
 }
@@ -256,14 +254,13 @@ Result<> AsfReader::root() {
   while (!words_.peek().empty() && !words_.starts_section()) {
     const std::string key = lower(words_.next());
     if (key == "order") {
-      if (auto ok = dof(file_.bones[0]); !ok) return ok;
+      TRY(dof(file_.bones[0]));
     } else if (key == "axis") {
-      if (auto ok = order(file_.bones[0], words_.next()); !ok) return ok;
+      TRY(order(file_.bones[0], words_.next()));
     } else if (key == "position") {
-      if (auto ok = numbers("position of the root", file_.root_position.data(), 3); !ok) return ok;
+      TRY(numbers("position of the root", file_.root_position.data(), 3));
     } else if (key == "orientation") {
-      if (auto ok = numbers("orientation of the root", file_.bones[0].axis.data(), 3); !ok)
-        return ok;
+      TRY(numbers("orientation of the root", file_.bones[0].axis.data(), 3));
     } else {
       return error(in_quotes(key) + " is not known in :root");
     }
@@ -274,7 +271,7 @@ Result<> AsfReader::root() {
 Result<> AsfReader::bone_data() {
   while (!words_.peek().empty() && !words_.starts_section()) {
     if (lower(words_.next()) != "begin") return error("'begin' should open each bone in :bonedata");
-    if (auto ok = bone(); !ok) return ok;
+    TRY(bone());
   }
   return {};
 }
@@ -287,7 +284,7 @@ Result<> AsfReader::bone() {
     }
     const std::string key = lower(words_.next());
     if (key == "end") break;
-    if (auto ok = bone_entry(bone, key); !ok) return ok;
+    TRY(bone_entry(bone, key));
   }
   if (bone.name.empty()) return error("a bone has no name");
   if (!bone.limits.empty() && bone.limits.size() != bone.dof.size()) {
@@ -328,7 +325,7 @@ Result<> AsfReader::bone_entry(AsfBone& bone, const std::string& key) {
 }
 
 Result<> AsfReader::axis(AsfBone& bone) {
-  if (auto ok = numbers("axis of bone '" + bone.name + "'", bone.axis.data(), 3); !ok) return ok;
+  TRY(numbers("axis of bone '" + bone.name + "'", bone.axis.data(), 3));
   const std::string_view word = words_.peek();
   if (word.size() != 3 || lower(word) == "dof") return {};  // XYZ when no order is given
   return order(bone, words_.next());
@@ -389,7 +386,7 @@ Result<> AsfReader::hierarchy() {
     if (at == index_.end())
       return error("the hierarchy names " + in_quotes(parent) + ", which is no bone");
     while (!words_.peek().empty() && words_.next_line_number() == line) {
-      if (auto ok = link(file_.bones[at->second], words_.next()); !ok) return ok;
+      TRY(link(file_.bones[at->second], words_.next()));
     }
   }
   (void)words_.next();

@@ -108,34 +108,30 @@ double unit_of(const Skeleton& skeleton, const ReadOptions& options, const Profi
 
 Result<Draft> read_bvh(const ClipFile& file, const ReadOptions& options) {
   const std::string_view text = without_bom(file.bytes);
-  auto header = parse_bvh_header(text, file.name);
-  if (!header) return std::unexpected(header.error());
-  const auto profile = find_profile(header->skeleton, options.profile);
-  if (!profile) return std::unexpected(profile.error());
+  auto header = TRY(parse_bvh_header(text, file.name));
+  const auto profile = TRY(find_profile(header.skeleton, options.profile));
   Draft draft;
-  draft.profile = *profile;
-  draft.metres_per_unit = unit_of(header->skeleton, options, *profile, draft.warnings);
-  draft.skeleton = std::move(header->skeleton);
+  draft.profile = profile;
+  draft.metres_per_unit = unit_of(header.skeleton, options, profile, draft.warnings);
+  draft.skeleton = std::move(header.skeleton);
   scale_lengths(draft.skeleton, draft.metres_per_unit);
   draft.skeleton.name = std::filesystem::path(file.name).stem().string();
-  draft.frame_rate_hz = header->frame_rate_hz;
+  draft.frame_rate_hz = header.frame_rate_hz;
   TextFrames& frames = draft.text.emplace();
   frames.parser = FrameParser::bvh(draft.skeleton, draft.metres_per_unit);
-  frames.header = text.substr(0, header->motion_offset);
-  std::string_view motion = text.substr(header->motion_offset);
-  for (int line = header->motion_line; !motion.empty(); ++line) {
+  frames.header = text.substr(0, header.motion_offset);
+  std::string_view motion = text.substr(header.motion_offset);
+  for (int line = header.motion_line; !motion.empty(); ++line) {
     const std::string_view frame = trim(next_line(motion));
     if (!frame.empty()) frames.frames.push_back({.text = frame, .line = line});
   }
-  const auto declared = parse_number(header->declared_frames);
+  const auto declared = parse_number(header.declared_frames);
   const std::size_t found = frames.frames.size();
   if (!declared || *declared != static_cast<double>(found)) {
-    draft.warnings.push_back("'Frames:' says " + in_quotes(header->declared_frames) +
+    draft.warnings.push_back("'Frames:' says " + in_quotes(header.declared_frames) +
                              ", but there are " + std::to_string(found) + "; read all of them");
   }
-  if (auto ok = read_frames(frames, file.name, draft.values, draft.time_s); !ok) {
-    return std::unexpected(ok.error());
-  }
+  TRY(read_frames(frames, file.name, draft.values, draft.time_s));
   return draft;
 }
 
@@ -203,9 +199,9 @@ Result<BvhHeader> HeaderReader::read() {
     return error("does not begin with HIERARCHY, so it is not a BVH");
   }
   if (lower(cursor_.word()) != "root") return error("ROOT should follow HIERARCHY");
-  if (auto ok = begin_joint(); !ok) return std::unexpected(ok.error());
+  TRY(begin_joint());
   while (!open_.empty()) {
-    if (auto ok = entry(); !ok) return std::unexpected(ok.error());
+    TRY(entry());
   }
   const std::string word = lower(cursor_.word());
   if (word == "root") return error("has a second ROOT; posed reads one figure a file");
@@ -213,7 +209,7 @@ Result<BvhHeader> HeaderReader::read() {
   if (word != "motion")
     return error("has no MOTION after its hierarchy, so there is nothing to play");
   if (header_.skeleton.channels.empty()) return error("lists no CHANNELS, so nothing can move");
-  if (auto ok = motion(); !ok) return std::unexpected(ok.error());
+  TRY(motion());
   return std::move(header_);
 }
 
@@ -279,7 +275,7 @@ Result<> HeaderReader::end_site() {
   if (cursor_.word() != "{") return error("'{' should follow End Site in " + place());
   Eigen::Vector3d tip = Eigen::Vector3d::Zero();
   if (lower(cursor_.word()) != "offset") return error("End Site without OFFSET in " + place());
-  if (auto ok = offset(tip); !ok) return ok;
+  TRY(offset(tip));
   if (cursor_.word() != "}") return error("End Site is not closed in " + place());
   joints()[open_.back().joint].end_site_m = tip;
   return {};

@@ -24,7 +24,7 @@ struct BvhHeader {
 };
 
 // `name` is used in error messages. Views in the result point into `text`.
-[[nodiscard]] Result<BvhHeader> parse_bvh_header(std::string_view text, const std::string& name);
+Result<BvhHeader> parse_bvh_header(std::string_view text, const std::string& name);
 
 // The first section of a file, "HIERARCHY" to the last "}", with the skeleton's own channels. Of an
 // Acclaim skeleton it would be wrong: convert that first (with_zyx_channels in clip.hpp).

@@ -19,8 +19,7 @@ constexpr double kCentimetre_m = 0.01;
 Frame Clip::frame(int index) const {
   Frame frame;
   frame.header.sequence = static_cast<std::uint64_t>(index) + 1;
-  frame.header.device_ns =
-      nanoseconds(time_s.empty() ? index / frame_rate_hz : time_s[static_cast<std::size_t>(index)]);
+  frame.header.device_ns = nanoseconds(time_s.empty() ? index / frame_rate_hz : time_s[index]);
   frame.source = Source::kFile;
   const auto row = channels.row(index);
   pose_from_channels(*skeleton, {row.data(), static_cast<std::size_t>(row.size())}, frame);
@@ -36,11 +35,9 @@ bool has_uneven_times(const std::vector<double>& time_s, double rate_hz) {
 }
 
 Result<Clip> read_clip(const std::filesystem::path& path, const ReadOptions& options) {
-  const auto loaded = load_clip(path, options);
-  if (!loaded) return std::unexpected(loaded.error());
-  auto draft = loaded->format->read(loaded->file, options);
-  if (!draft) return std::unexpected(draft.error());
-  return clip_of(std::move(*draft), loaded->file.name);
+  const auto loaded = TRY(load_clip(path, options));
+  auto draft = TRY(loaded.format->read(loaded.file, options));
+  return clip_of(std::move(draft), loaded.file.name);
 }
 
 Result<Clip> parse_clip(const ClipFile& file, const ReadOptions& options) {
@@ -48,12 +45,9 @@ Result<Clip> parse_clip(const ClipFile& file, const ReadOptions& options) {
   if (format == nullptr || format->read == nullptr) {
     return fail("is no clip posed can read; a clip is " + listed(Use::kRead), file.name);
   }
-  if (auto ok = check_options(*format, options, file.name); !ok) {
-    return std::unexpected(ok.error());
-  }
-  auto draft = format->read(file, options);
-  if (!draft) return std::unexpected(draft.error());
-  return clip_of(std::move(*draft), file.name);
+  TRY(check_options(*format, options, file.name));
+  auto draft = TRY(format->read(file, options));
+  return clip_of(std::move(draft), file.name);
 }
 
 Result<> write_clip(const Clip& clip, const std::filesystem::path& path) {
@@ -100,7 +94,7 @@ Clip with_zyx_channels(const Clip& clip) {
   std::vector<std::array<double, 3>> near(skeleton->joints.size());
   for (int i = 0; i < clip.frames(); ++i) {
     const auto row = clip.channels.row(i);
-    const std::span<const double> values(row.data(), static_cast<std::size_t>(row.size()));
+    const std::span<const double> values(row.data(), row.size());
     std::size_t translation = 0;
     for (int c = 0; c < std::ssize(skeleton->channels);) {
       const Channel& channel = skeleton->channels[c];

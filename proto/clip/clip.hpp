@@ -53,14 +53,13 @@ struct ReadOptions {
 
 // Reads a clip of any format of the table (format.hpp), with all its frames. Errors name file and
 // line.
-[[nodiscard]] Result<Clip> read_clip(const std::filesystem::path& path,
-                                     const ReadOptions& options = {});
+Result<Clip> read_clip(const std::filesystem::path& path, const ReadOptions& options = {});
 
 // Reads a clip from memory. The extension of its name says the format.
-[[nodiscard]] Result<Clip> parse_clip(const ClipFile& file, const ReadOptions& options = {});
+Result<Clip> parse_clip(const ClipFile& file, const ReadOptions& options = {});
 
 // Writes a clip in the format that the extension of `path` says. An error leaves no file.
-[[nodiscard]] Result<> write_clip(const Clip& clip, const std::filesystem::path& path);
+Result<> write_clip(const Clip& clip, const std::filesystem::path& path);
 
 // True when some frame lies more than a tenth of a step off the even clock at `rate_hz` that a BVH
 // assumes.
@@ -75,6 +74,6 @@ struct ReadOptions {
 
 // Writes `clip` as BVH in its own unit, with its own joint names, hierarchy, channel order and
 // rate. An Acclaim skeleton becomes a BVH with ZYX rotation channels on every joint.
-[[nodiscard]] Result<> write_bvh(const Clip& clip, const std::filesystem::path& path);
+Result<> write_bvh(const Clip& clip, const std::filesystem::path& path);
 
 }  // namespace posed::clip

@@ -110,28 +110,25 @@ Result<FrameCoding> parse_text(const Format& format, const Facts& facts, double 
   options.profile = word_of(facts, "profile", "");
   options.hand_shape = word_of(facts, "shape", kDefaultHandShape);
   options.hand = word_of(facts, "hand", "right") == "left" ? Side::kLeft : Side::kRight;
-  auto draft = format.read(file, options);
-  if (!draft) return std::unexpected(draft.error());
-  assert(draft->text);
-  FrameCoding coding{.skeleton = nullptr, .frame_rate_hz = rate_hz, .parser = draft->text->parser};
+  auto draft = TRY(format.read(file, options));
+  assert(draft.text);
+  FrameCoding coding{.skeleton = nullptr, .frame_rate_hz = rate_hz, .parser = draft.text->parser};
   Hints hints{.root_joint = static_cast<int>(*root), .T = {}};
   const std::string axes = word_of(facts, "T", "");
   for (std::size_t i = 0; i + 6 <= axes.size(); i += 6) {
     hints.T.push_back(axes_from_text(std::string_view(axes).substr(i, 6)));
   }
-  auto clip = clip_of(std::move(*draft), name, hints);
-  if (!clip) return std::unexpected(clip.error());
-  coding.skeleton = clip->skeleton;
+  auto clip = TRY(clip_of(std::move(draft), name, hints));
+  coding.skeleton = clip.skeleton;
   return coding;
 }
 
 Result<FrameCoding> parse_numbers(const Facts& facts, double rate_hz, std::string_view body,
                                   const std::string& name) {
-  auto skeleton = skeleton_from_json(body, name);
-  if (!skeleton) return std::unexpected(skeleton.error());
-  auto parser = FrameParser::numbers(*skeleton, fact(facts, "timed") == 1.0);
+  auto skeleton = TRY(skeleton_from_json(body, name));
+  auto parser = FrameParser::numbers(skeleton, fact(facts, "timed") == 1.0);
   if (parser.frame_bytes() == 0) return damaged(name);
-  return FrameCoding{.skeleton = std::make_shared<const Skeleton>(std::move(*skeleton)),
+  return FrameCoding{.skeleton = std::make_shared<const Skeleton>(std::move(skeleton)),
                      .frame_rate_hz = rate_hz,
                      .parser = std::move(parser)};
 }
@@ -159,25 +156,22 @@ void add_numbers(const Clip& clip, DeviceClip& out) {
 }  // namespace
 
 Result<DeviceClip> open_device_clip(const std::filesystem::path& path, const ReadOptions& options) {
-  const auto loaded = load_clip(path, options);
-  if (!loaded) return std::unexpected(loaded.error());
-  auto draft = loaded->format->read(loaded->file, options);
-  if (!draft) return std::unexpected(draft.error());
-  assert(draft->text.has_value() == loaded->format->sends_text);
-  const bool has_profile = draft->profile != nullptr;
-  const auto text = std::exchange(draft->text, std::nullopt);
-  auto clip = clip_of(std::move(*draft), loaded->file.name);
-  if (!clip) return std::unexpected(clip.error());
+  const auto loaded = TRY(load_clip(path, options));
+  auto draft = TRY(loaded.format->read(loaded.file, options));
+  assert(draft.text.has_value() == loaded.format->sends_text);
+  const bool has_profile = draft.profile != nullptr;
+  const auto text = std::exchange(draft.text, std::nullopt);
+  auto clip = TRY(clip_of(std::move(draft), loaded.file.name));
   DeviceClip out;
-  out.coding.skeleton = clip->skeleton;
-  out.coding.frame_rate_hz = clip->frame_rate_hz;
+  out.coding.skeleton = clip.skeleton;
+  out.coding.frame_rate_hz = clip.frame_rate_hz;
   if (text) {
-    add_text(*loaded, *text, has_profile, *clip, options, out);
+    add_text(loaded, *text, has_profile, clip, options, out);
   } else {
-    add_numbers(*clip, out);
+    add_numbers(clip, out);
   }
-  out.time_s = std::move(clip->time_s);
-  out.warnings = std::move(clip->warnings);
+  out.time_s = std::move(clip.time_s);
+  out.warnings = std::move(clip.warnings);
   return out;
 }
 

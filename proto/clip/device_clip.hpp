@@ -38,11 +38,10 @@ struct DeviceClip {
   std::vector<std::string> warnings;
 };
 
-[[nodiscard]] Result<DeviceClip> open_device_clip(const std::filesystem::path& path,
-                                                  const ReadOptions& options = {});
+Result<DeviceClip> open_device_clip(const std::filesystem::path& path,
+                                    const ReadOptions& options = {});
 
 // `description` is untrusted; `name` is used in error messages.
-[[nodiscard]] Result<FrameCoding> parse_description(std::string_view description,
-                                                    const std::string& name);
+Result<FrameCoding> parse_description(std::string_view description, const std::string& name);
 
 }  // namespace posed::clip

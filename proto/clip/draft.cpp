@@ -69,8 +69,8 @@ Result<> check_values(const Clip& clip) {
 Result<> complete(Clip& clip, Skeleton& skeleton, const Profile* profile, const Hints& hints) {
   if (profile == nullptr) {
     name_bones(skeleton);
-  } else if (auto ok = name_bones(*profile, skeleton); !ok) {
-    return ok;
+  } else {
+    TRY(name_bones(*profile, skeleton));
   }
   const int hips = skeleton.joint_of(Bone::kHips);
   skeleton.root_joint = hints.root_joint ? *hints.root_joint
@@ -151,7 +151,7 @@ Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints) {
   assert(clip.time_s.empty() || std::ssize(clip.time_s) == clip.frames());
   auto skeleton = std::make_shared<Skeleton>(std::move(draft.skeleton));
   clip.skeleton = skeleton;
-  if (auto ok = check_values(clip); !ok) return std::unexpected(ok.error());
+  TRY(check_values(clip));
   if (draft.skeleton_is_known) return clip;
   if (auto ok = complete(clip, *skeleton, draft.profile, hints); !ok) {
     return fail(ok.error().message, name);
@@ -167,7 +167,7 @@ std::vector<Eigen::Quaterniond> mean_rotations(const Clip& clip) {
   std::vector<Eigen::Vector4d> sum(skeleton.joints.size(), Eigen::Vector4d::Zero());
   for (int i = 0; i < clip.frames(); ++i) {
     const auto row = clip.channels.row(i);
-    const std::span<const double> values(row.data(), static_cast<std::size_t>(row.size()));
+    const std::span<const double> values(row.data(), row.size());
     for (int j = 0; j < std::ssize(skeleton.joints); ++j) {
       const int parent = skeleton.joints[j].parent;
       const Eigen::Quaterniond local = local_rotation(skeleton, j, values);

@@ -42,8 +42,8 @@ struct Draft {
 
 // Parses the frames of a text into `values`, and into `time_s` the times that they carry, NaN where
 // one is missing. Errors name the frame and its line.
-[[nodiscard]] Result<> read_frames(const TextFrames& text, const std::string& name,
-                                   std::vector<double>& values, std::vector<double>& time_s);
+Result<> read_frames(const TextFrames& text, const std::string& name, std::vector<double>& values,
+                     std::vector<double>& time_s);
 
 // Facts that only all frames show, supplied when only the first frame is available (the device
 // description in a log).
@@ -54,7 +54,7 @@ struct Hints {
 
 // Completes the skeleton: bones, root joint, offsets and T frames, as far as the draft does not
 // know them. A draft without frames is an error.
-[[nodiscard]] Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints = {});
+Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints = {});
 
 // Mean global rotation of each joint [joint], with the heading of each frame (from the line between
 // the upper legs) removed. Input of t_frames_from_mean_pose(), when the figure walks or stands in

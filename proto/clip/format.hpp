@@ -81,8 +81,7 @@ enum class Use : std::uint8_t { kRead, kReadBody, kWrite, kWriteBody };
 // clips by the same options.
 [[nodiscard]] ReadOptions accepted_options(const std::filesystem::path& path, ReadOptions options);
 // Refuses options that a format does not accept, instead of silently ignoring them.
-[[nodiscard]] Result<> check_options(const Format& format, const ReadOptions& options,
-                                     const std::string& file);
+Result<> check_options(const Format& format, const ReadOptions& options, const std::string& file);
 
 // Where the skeleton of a clip lies that has a file of its own, unless the user names it: NN.asf
 // beside NN_MM.amc. Empty for other formats.
@@ -94,7 +93,6 @@ struct LoadedClip {
   const Format* format;
   ClipFile file;
 };
-[[nodiscard]] Result<LoadedClip> load_clip(const std::filesystem::path& path,
-                                           const ReadOptions& options);
+Result<LoadedClip> load_clip(const std::filesystem::path& path, const ReadOptions& options);
 
 }  // namespace posed::clip

@@ -64,7 +64,7 @@ std::string first_bytes(const std::filesystem::path& path) {
   std::ifstream file(path, std::ios::binary);
   std::string bytes(kSniffedBytes, '\0');
   file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(file.gcount()));
+  bytes.resize(file.gcount());
   return bytes;
 }
 
@@ -83,10 +83,9 @@ Result<> load_skeleton(const Format& format, const std::filesystem::path& path,
         file.name);
   }
   const std::string what = "skeleton (" + std::string(format.skeleton_extension) + ")";
-  auto content = load_file(skeleton, {.what = what, .max_bytes = kMaxSkeletonFile});
-  if (!content) return std::unexpected(content.error());
+  auto content = TRY(load_file(skeleton, {.what = what, .max_bytes = kMaxSkeletonFile}));
   file.skeleton_name = skeleton.string();
-  file.skeleton = std::move(*content);
+  file.skeleton = std::move(content);
   return {};
 }
 
@@ -186,16 +185,11 @@ Result<LoadedClip> load_clip(const std::filesystem::path& path, const ReadOption
     }
     return fail("is no clip posed can read; a clip is " + listed(Use::kRead), loaded.file.name);
   }
-  if (auto ok = check_options(*loaded.format, options, loaded.file.name); !ok) {
-    return std::unexpected(ok.error());
-  }
-  auto bytes = load_file(path, kClip);
-  if (!bytes) return std::unexpected(bytes.error());
-  loaded.file.bytes = std::move(*bytes);
+  TRY(check_options(*loaded.format, options, loaded.file.name));
+  auto bytes = TRY(load_file(path, kClip));
+  loaded.file.bytes = std::move(bytes);
   if (loaded.format->skeleton_extension.empty()) return loaded;
-  if (auto ok = load_skeleton(*loaded.format, path, options, loaded.file); !ok) {
-    return std::unexpected(ok.error());
-  }
+  TRY(load_skeleton(*loaded.format, path, options, loaded.file));
   return loaded;
 }
 

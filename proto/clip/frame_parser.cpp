@@ -246,7 +246,7 @@ FrameOutcome FrameParser::parse_block(std::string_view text,
         return add_error(ends ? FrameFault::kUnknownBone : FrameFault::kNotANumber, word, word);
       }
       if (outcome.found < outcome.expected) {
-        const auto channel = static_cast<std::size_t>(bone.channels[outcome.found]);
+        const std::size_t channel = bone.channels[outcome.found];
         if (!keep(*value, channel, values)) return add_error(FrameFault::kImplausible, word, word);
       }
       ++outcome.found;

@@ -78,8 +78,9 @@ class FrameParser {
   [[nodiscard]] std::size_t lines() const noexcept { return lines_; }
 
   // Parses `text` into `values` [channels(), rad and m]. They are unspecified unless the outcome is
-  // ok. In a text, white space and line ends do not matter. RT-safe.
-  [[nodiscard]] FrameOutcome parse(std::string_view text, std::span<double> values) const noexcept;
+  // ok. In a text, white space and line ends do not matter.
+  RT_SAFE [[nodiscard]] FrameOutcome parse(std::string_view text,
+                                           std::span<double> values) const noexcept;
 
  private:
   FrameOutcome parse_line(std::string_view text, std::span<double> values) const noexcept;
@@ -88,9 +89,9 @@ class FrameParser {
   FrameOutcome parse_numbers(std::string_view bytes, std::span<double> values) const noexcept;
   [[nodiscard]] int find_bone(std::string_view name) const noexcept;
 
-  // Scales and stores one value; returns false when it is not plausible. RT-safe.
-  [[nodiscard]] bool keep(double value, std::size_t channel,
-                          std::span<double> values) const noexcept;
+  // Scales and stores one value; returns false when it is not plausible.
+  RT_SAFE [[nodiscard]] bool keep(double value, std::size_t channel,
+                                  std::span<double> values) const noexcept;
 
   std::vector<double> scale_;       // [channel], factor from file value to rad or m
   std::vector<double> limit_;       // [channel], largest allowed size of a value, rad or m

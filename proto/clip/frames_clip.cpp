@@ -51,7 +51,7 @@ int moving_joint(const Skeleton& skeleton) {
 }
 
 Eigen::Quaterniond rotation_of(const Frame& frame, int joint) {
-  return to_eigen_double(frame.rotation_xyzw[static_cast<std::size_t>(joint)]);
+  return to_eigen_double(frame.rotation_xyzw[joint]);
 }
 
 double median_step_s(const std::vector<double>& time_s) {
@@ -106,7 +106,7 @@ void FramesClip::add_angles(const Frame& frame) {
                            [](double value) { return std::isfinite(value) ? value : 0.0; });
     const auto turned =
         channels_from_rotation(*skeleton_, joint, rotation_of(frame, joint), near_rad);
-    const bool known = frame.valid[static_cast<std::size_t>(joint)];
+    const bool known = frame.valid[joint];
     for (std::size_t i = 0; i < angles.size(); ++i) angles[i] = known ? turned[i] : kNoValue;
   }
 }

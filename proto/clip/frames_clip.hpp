@@ -21,8 +21,7 @@ class FramesClip {
 
   // `time_s` holds the time of every frame, increasing. `rate_hz` is the rate of the clip; 0: one
   // over the median step. Fails with fewer than two frames.
-  [[nodiscard]] Result<Clip> finish(const std::string& path, double rate_hz,
-                                    std::vector<double> time_s) const;
+  Result<Clip> finish(const std::string& path, double rate_hz, std::vector<double> time_s) const;
 
  private:
   void add_angles(const Frame& frame);

@@ -73,8 +73,7 @@ class ModelBuilder {
       node.name = clean(from.name);  // JSON is UTF-8; a clip's names may hold any bytes
       node.translation = {from.offset_m.x(), from.offset_m.y(), from.offset_m.z()};
       if (from.parent >= 0) {
-        model_.nodes[static_cast<std::size_t>(from.parent)].children.push_back(
-            static_cast<int>(model_.nodes.size()));
+        model_.nodes[from.parent].children.push_back(static_cast<int>(model_.nodes.size()));
       }
       model_.nodes.push_back(std::move(node));
     }
@@ -124,7 +123,7 @@ class ModelBuilder {
     for (const GltfNode& node : motion_.nodes) {
       skin.joints.push_back(static_cast<int>(place_m.size()));
       place_m.push_back(node.offset_m);
-      if (node.parent >= 0) place_m.back() += place_m[static_cast<std::size_t>(node.parent)];
+      if (node.parent >= 0) place_m.back() += place_m[node.parent];
       for (int i = 0; i < 16; ++i) matrices.push_back(i % 5 == 0 ? 1.0F : 0.0F);
       for (int i = 0; i < 3; ++i) {
         matrices[matrices.size() - 4 + static_cast<std::size_t>(i)] =
@@ -189,7 +188,7 @@ Result<std::vector<float>> gltf_times(const Clip& clip) {
   std::vector<float> time_s;
   double last_s = 0.0;
   for (int i = 0; i < clip.frames(); ++i) {
-    const auto at = static_cast<std::size_t>(i);
+    const std::size_t at = i;
     const double now_s =
         clip.time_s.empty() ? i / clip.frame_rate_hz : clip.time_s[at] - clip.time_s.front();
     auto rounded_s = static_cast<float>(now_s);
@@ -224,7 +223,7 @@ void add_position(GltfNode& node, const Eigen::Vector3d& position_m) {
 }
 
 Result<> write_gltf(const GltfMotion& motion, GltfKind kind, const std::filesystem::path& path) {
-  if (auto ok = check(motion, path.string()); !ok) return ok;
+  TRY(check(motion, path.string()));
   const tinygltf::Model model = ModelBuilder(motion).build(kind);
   return write_whole_file(path, [&model](std::ostream& file) {
     tinygltf::TinyGLTF writer;
@@ -235,10 +234,9 @@ Result<> write_gltf(const GltfMotion& motion, GltfKind kind, const std::filesyst
 }
 
 Result<> write_glb(const Clip& clip, const std::filesystem::path& path) {
-  auto time_s = gltf_times(clip);
-  if (!time_s) return std::unexpected(time_s.error());
+  auto time_s = TRY(gltf_times(clip));
   const Skeleton& skeleton = *clip.skeleton;
-  GltfMotion motion{.name = path.stem().string(), .time_s = std::move(*time_s), .nodes = {}};
+  GltfMotion motion{.name = path.stem().string(), .time_s = std::move(time_s), .nodes = {}};
   for (int j = 0; j < std::ssize(skeleton.joints); ++j) {
     const Joint& joint = skeleton.joints[j];
     GltfNode node{.name = joint.name, .parent = joint.parent, .offset_m = joint.offset_m};

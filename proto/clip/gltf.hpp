@@ -40,7 +40,7 @@ enum class GltfKind : std::uint8_t {
 // Times of the clip's frames, from 0. glTF wants each later than the one before it, in the
 // precision of a float: frames that came at one moment are set apart by its least step. Fails for a
 // clip without frames, and for a time that is before the last one or no number.
-[[nodiscard]] Result<std::vector<float>> gltf_times(const Clip& clip);
+Result<std::vector<float>> gltf_times(const Clip& clip);
 
 // Adds the rotation of the next frame, in that of the two signs of a quaternion that is nearer to
 // the frame before: a program that interpolates the numbers then goes the shorter way round.
@@ -49,11 +49,10 @@ void add_position(GltfNode& node, const Eigen::Vector3d& position_m);
 
 // The same motion gives the same bytes. Fails when a value is not a finite number, or when the file
 // would be longer than a .glb can be (4 GB).
-[[nodiscard]] Result<> write_gltf(const GltfMotion& motion, GltfKind kind,
-                                  const std::filesystem::path& path);
+Result<> write_gltf(const GltfMotion& motion, GltfKind kind, const std::filesystem::path& path);
 
 // Writes `clip` as .glb: a node for each joint and each end site, where the skeleton has them at
 // rest, and their motion at the clip's own times.
-[[nodiscard]] Result<> write_glb(const Clip& clip, const std::filesystem::path& path);
+Result<> write_glb(const Clip& clip, const std::filesystem::path& path);
 
 }  // namespace posed::clip

@@ -23,8 +23,8 @@ FoundHand find_hand(const Skeleton& skeleton, Side side) {
   FoundHand found;
   for (int j = 0; j < kHandJoints; ++j) {
     const Bone bone = hand_bone(side, j);
-    found.joints[static_cast<std::size_t>(j)] = skeleton.joint_of(bone);
-    if (found.joints[static_cast<std::size_t>(j)] < 0 && !found.missing) found.missing = bone;
+    found.joints[j] = skeleton.joint_of(bone);
+    if (found.joints[j] < 0 && !found.missing) found.missing = bone;
   }
   return found;
 }
@@ -53,36 +53,35 @@ Eigen::Quaterniond ours(const Skeleton& theirs, int joint, const Skeleton& hand,
 
 Result<HandClip> hand_of(const Clip& clip, const ReadOptions& options) {
   const Skeleton& skeleton = *clip.skeleton;
-  const auto side = side_of(clip, options);
-  if (!side) return std::unexpected(side.error());
-  const FoundHand found = find_hand(skeleton, *side);
+  const auto side = TRY(side_of(clip, options));
+  const FoundHand found = find_hand(skeleton, side);
   if (found.missing) {
-    return fail("has no " + std::string(side_name(*side)) + " hand with fifteen finger joints: " +
+    return fail("has no " + std::string(side_name(side)) + " hand with fifteen finger joints: " +
                     std::string(bone_name(*found.missing)) + " is missing",
                 clip.path);
   }
   HandClip out{.path = clip.path,
-               .side = *side,
+               .side = side,
                .rate_hz = clip.frame_rate_hz,
                .time_s = clip.time_s,
-               .angles = std::vector<HandAngles>(static_cast<std::size_t>(clip.frames())),
+               .angles = std::vector<HandAngles>(clip.frames()),
                .warnings = clip.warnings};
   for (int i = static_cast<int>(out.time_s.size()); i < clip.frames(); ++i) {
     out.time_s.push_back(i / clip.frame_rate_hz);
   }
-  const bool is_ours = hand_side(skeleton) == *side;
-  const Skeleton hand = hand_skeleton(*side);
+  const bool is_ours = hand_side(skeleton) == side;
+  const Skeleton hand = hand_skeleton(side);
   std::array<std::array<double, 3>, kHandJoints> near{};
   for (int i = 0; i < clip.frames(); ++i) {
     const auto row = clip.channels.row(i);
-    HandAngles& angles = out.angles[static_cast<std::size_t>(i)];
+    HandAngles& angles = out.angles[i];
     if (is_ours) {
       for (std::size_t a = 0; a < angles.size(); ++a) {
         angles[a] = row[static_cast<Eigen::Index>(kChannelOfAngle[a])];
       }
       continue;
     }
-    const std::span<const double> values(row.data(), static_cast<std::size_t>(row.size()));
+    const std::span<const double> values(row.data(), row.size());
     for (std::size_t j = 0; j < kHandJoints; ++j) {
       const int joint = found.joints[j];
       const int target = static_cast<int>(j) + 1;
@@ -98,17 +97,15 @@ Result<HandClip> hand_of(const Clip& clip, const ReadOptions& options) {
 Result<HandClip> read_hand_clip(const std::filesystem::path& path, const ReadOptions& options) {
   ReadOptions accepted = options;  // of a body, `hand` says which of its hands is wanted
   if (!accepts(path, ReadOption::kHand)) accepted.hand.reset();
-  const auto clip = read_clip(path, accepted);
-  if (!clip) return std::unexpected(clip.error());
-  return hand_of(*clip, options);
+  const auto clip = TRY(read_clip(path, accepted));
+  return hand_of(clip, options);
 }
 
 Result<Clip> clip_of_hand(const HandClip& hand, const std::string& hand_shape) {
-  const auto shape = find_hand_shape(hand_shape);
-  if (!shape) return std::unexpected(shape.error());
+  const auto shape = TRY(find_hand_shape(hand_shape));
   if (hand.angles.empty()) return fail("has no frames", hand.path);
   Clip clip{.path = hand.path,
-            .skeleton = std::make_shared<Skeleton>(hand_skeleton(hand.side, **shape)),
+            .skeleton = std::make_shared<Skeleton>(hand_skeleton(hand.side, *shape)),
             .frame_rate_hz = hand.rate_hz,
             .channels = ChannelMatrix(std::ssize(hand.angles), kHandChannels),
             .time_s = hand.time_s,

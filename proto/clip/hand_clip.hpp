@@ -27,15 +27,14 @@ struct HandClip {
 
 // Reads a hand's file, or a body's with the finger joints of the hand that `options.hand` names.
 // Errors name file and line.
-[[nodiscard]] Result<HandClip> read_hand_clip(const std::filesystem::path& path,
-                                              const ReadOptions& options = {});
+Result<HandClip> read_hand_clip(const std::filesystem::path& path, const ReadOptions& options = {});
 
 // Extracts the hand of a clip, found by its canonical bones. `options.hand` says which; without it
 // a clip of two hands is an error.
-[[nodiscard]] Result<HandClip> hand_of(const Clip& clip, const ReadOptions& options = {});
+Result<HandClip> hand_of(const Clip& clip, const ReadOptions& options = {});
 
 // Returns the same motion as a Clip of hand_skeleton(clip.side, the shape named `hand_shape`).
-[[nodiscard]] Result<Clip> clip_of_hand(const HandClip& clip, const std::string& hand_shape);
+Result<Clip> clip_of_hand(const HandClip& clip, const std::string& hand_shape);
 
 // Fills missing values: linearly over a gap, with the nearest value at the ends, with zero in a
 // channel without any value. Reports the number in `warnings`. For formats that cannot hold missing
@@ -43,6 +42,6 @@ struct HandClip {
 void fill_gaps(HandClip& clip);
 
 // Writes the hand CSV; a value that is not finite becomes an empty field.
-[[nodiscard]] Result<> write_hand_csv(const HandClip& clip, const std::filesystem::path& path);
+Result<> write_hand_csv(const HandClip& clip, const std::filesystem::path& path);
 
 }  // namespace posed::clip

@@ -139,8 +139,7 @@ Result<> settle_times(Draft& draft, const std::string& name) {
 }
 
 Result<Draft> read_hand_csv(const ClipFile& file, const ReadOptions& options) {
-  const auto shape = find_hand_shape(options.hand_shape);
-  if (!shape) return std::unexpected(shape.error());
+  const auto shape = TRY(find_hand_shape(options.hand_shape));
   const std::string_view all = without_bom(file.bytes);
   Draft draft;
   TextFrames& frames = draft.text.emplace();
@@ -151,30 +150,27 @@ Result<Draft> read_hand_csv(const ClipFile& file, const ReadOptions& options) {
     if (line.empty()) continue;
     if (has_header) {
       if (frames.frames.empty()) {
-        frames.header = all.substr(0, static_cast<std::size_t>(line.data() - all.data()));
+        frames.header = all.substr(0, line.data() - all.data());
       }
       frames.frames.push_back({.text = line, .line = number});
       continue;
     }
-    if (auto ok = check_header(line, file.name, number); !ok) return std::unexpected(ok.error());
+    TRY(check_header(line, file.name, number));
     has_header = true;
   }
   if (!has_header) return fail("is empty, so it is no hand CSV", file.name);
-  draft.skeleton = hand_skeleton(options.hand.value_or(Side::kRight), **shape);
+  draft.skeleton = hand_skeleton(options.hand.value_or(Side::kRight), *shape);
   draft.skeleton_is_known = true;
   frames.parser = FrameParser::hand_csv();
   if (frames.frames.empty()) return draft;
-  if (auto ok = read_frames(frames, file.name, draft.values, draft.time_s); !ok) {
-    return std::unexpected(ok.error());
-  }
-  if (auto ok = settle_times(draft, file.name); !ok) return std::unexpected(ok.error());
+  TRY(read_frames(frames, file.name, draft.values, draft.time_s));
+  TRY(settle_times(draft, file.name));
   return draft;
 }
 
 Result<> write(const Clip& clip, const std::filesystem::path& path) {
-  const auto hand = hand_of(clip);
-  if (!hand) return std::unexpected(hand.error());
-  return write_hand_csv(*hand, path);
+  const auto hand = TRY(hand_of(clip));
+  return write_hand_csv(hand, path);
 }
 
 }  // namespace

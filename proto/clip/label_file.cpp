@@ -94,9 +94,8 @@ Result<std::vector<LabelSegment>> parse_labels(std::string_view text, const std:
   for (int number = 1; !text.empty(); ++number) {
     const std::string_view line = trim(next_line(text));
     if (line.empty()) continue;
-    auto segment = parse_line(line, file, number, all_integers);
-    if (!segment) return std::unexpected(segment.error());
-    segments.push_back(std::move(*segment));
+    auto segment = TRY(parse_line(line, file, number, all_integers));
+    segments.push_back(std::move(segment));
   }
   if (segments.empty()) return fail("there is no label in this file", file);
   if (all_integers && segments.back().end_s > kHtkFrom) {
@@ -105,17 +104,14 @@ Result<std::vector<LabelSegment>> parse_labels(std::string_view text, const std:
       s.end_s *= kHtkUnit_s;
     }
   }
-  if (auto ordered = check_order(segments, recording_s, file); !ordered) {
-    return std::unexpected(ordered.error());
-  }
+  TRY(check_order(segments, recording_s, file));
   return segments;
 }
 
 Result<std::vector<LabelSegment>> read_labels(const std::filesystem::path& path,
                                               double recording_s) {
-  const auto text = load_file(path, {.what = "label file", .max_bytes = kMaxLabelFile});
-  if (!text) return std::unexpected(text.error());
-  return parse_labels(*text, path.string(), recording_s);
+  const auto text = TRY(load_file(path, {.what = "label file", .max_bytes = kMaxLabelFile}));
+  return parse_labels(text, path.string(), recording_s);
 }
 
 std::string labels_text(const std::vector<LabelSegment>& segments) {

@@ -22,16 +22,15 @@ struct LabelSegment {
 // Fails, naming file and line, on an unreadable or negative time; on a segment that is empty, runs
 // backwards, overlaps the one before or ends after `recording_s`; and on a name that is not a valid
 // label (proto/frame/label.hpp). There may be gaps between segments.
-[[nodiscard]] Result<std::vector<LabelSegment>> parse_labels(
+Result<std::vector<LabelSegment>> parse_labels(
     std::string_view text, const std::string& file,
     double recording_s = std::numeric_limits<double>::infinity());
-[[nodiscard]] Result<std::vector<LabelSegment>> read_labels(
+Result<std::vector<LabelSegment>> read_labels(
     const std::filesystem::path& path,
     double recording_s = std::numeric_limits<double>::infinity());
 
 // Times are in seconds with six decimals; reading the text gives the same segments.
 [[nodiscard]] std::string labels_text(const std::vector<LabelSegment>& segments);
-[[nodiscard]] Result<> write_labels(const std::vector<LabelSegment>& segments,
-                                    const std::filesystem::path& path);
+Result<> write_labels(const std::vector<LabelSegment>& segments, const std::filesystem::path& path);
 
 }  // namespace posed::clip

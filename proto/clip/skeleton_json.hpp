@@ -14,6 +14,6 @@ namespace posed::clip {
 [[nodiscard]] std::string skeleton_json(const Skeleton& skeleton);
 
 // Reads untrusted text. The skeleton has passed Skeleton::finish(). `name` is used in errors.
-[[nodiscard]] Result<Skeleton> skeleton_from_json(std::string_view text, const std::string& name);
+Result<Skeleton> skeleton_from_json(std::string_view text, const std::string& name);
 
 }  // namespace posed::clip

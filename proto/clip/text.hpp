@@ -7,11 +7,13 @@
 #include <string>
 #include <string_view>
 
+#include "proto/frame/rt_safe.hpp"
+
 namespace posed::clip {
 
 // Parses a finite number of at most kMaxValue in size, with or without an exponent. A leading '+'
-// is allowed; a number too small for a double becomes 0. RT-safe.
-[[nodiscard]] std::optional<double> parse_number(std::string_view word) noexcept;
+// is allowed; a number too small for a double becomes 0.
+RT_SAFE [[nodiscard]] std::optional<double> parse_number(std::string_view word) noexcept;
 
 // The shortest text that reads back as the same number.
 [[nodiscard]] std::string number_text(double value);
@@ -19,19 +21,17 @@ namespace posed::clip {
 // Largest |value| of a joint angle or length that parse_number() accepts.
 inline constexpr double kMaxValue = 1e9;
 
-// RT-safe.
-[[nodiscard]] constexpr bool is_space(char c) noexcept {
+RT_SAFE [[nodiscard]] constexpr bool is_space(char c) noexcept {
   return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\v' || c == '\f';
 }
 [[nodiscard]] std::string_view trim(std::string_view text) noexcept;
 [[nodiscard]] std::string lower(std::string_view text);
 
-// Removes the first word from `text` and returns it; empty at the end. RT-safe.
-[[nodiscard]] std::string_view next_word(std::string_view& text) noexcept;
+// Removes the first word from `text` and returns it; empty at the end.
+RT_SAFE [[nodiscard]] std::string_view next_word(std::string_view& text) noexcept;
 
 // Removes the first line from `text` and returns it without its end (\n, \r\n or a bare \r).
-// RT-safe.
-[[nodiscard]] std::string_view next_line(std::string_view& text) noexcept;
+RT_SAFE [[nodiscard]] std::string_view next_line(std::string_view& text) noexcept;
 
 // Returns whether a line of `text` begins with `start`, after blanks.
 [[nodiscard]] bool has_line(std::string_view text, std::string_view start) noexcept;

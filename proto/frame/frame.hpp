@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "proto/frame/rt_safe.hpp"
 #include "proto/frame/time.hpp"
 #include "proto/frame/timecode.hpp"
 
@@ -65,8 +66,8 @@ struct Frame {
 static_assert(std::is_trivially_copyable_v<Frame>);
 
 // Gives `out` everything of `in` that does not depend on a skeleton: times, quality, source, lag,
-// label, timecode. RT-safe.
-inline void copy_all_but_pose(const Frame& in, Frame& out) noexcept {
+// label, timecode.
+RT_SAFE inline void copy_all_but_pose(const Frame& in, Frame& out) noexcept {
   out.header = in.header;
   out.quality = in.quality;
   out.source = in.source;

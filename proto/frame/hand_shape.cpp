@@ -63,10 +63,9 @@ void read_finger(TableReader& table, FingerShape& finger) {
 }  // namespace
 
 Result<HandShape> parse_hand_shape(std::string_view text, const std::string& file) {
-  const auto table = parse_toml(text, file, {.what = "hand"});
-  if (!table) return std::unexpected(table.error());
+  const auto table = TRY(parse_toml(text, file, {.what = "hand"}));
   Findings findings{.file = file};
-  TableReader reader(*table, "", findings);
+  TableReader reader(table, "", findings);
   HandShape shape;
   reader.require("name", shape.name);
   for (std::size_t f = 0; f < kFingers; ++f) {

@@ -37,11 +37,11 @@ struct HandShape {
 };
 
 // `text` is TOML; `file` is used in error messages, which name the line.
-[[nodiscard]] Result<HandShape> parse_hand_shape(std::string_view text, const std::string& file);
+Result<HandShape> parse_hand_shape(std::string_view text, const std::string& file);
 
 // All built-in shapes, and the one called `name`; an unknown name is an error that lists them.
 [[nodiscard]] std::span<const HandShape> hand_shapes();
-[[nodiscard]] Result<const HandShape*> find_hand_shape(const std::string& name);
+Result<const HandShape*> find_hand_shape(const std::string& name);
 
 inline constexpr std::string_view kDefaultHandShape = "adult";
 [[nodiscard]] const HandShape& default_hand_shape();

@@ -22,13 +22,13 @@ namespace posed {
 
 inline constexpr int kHandSkeletonJoints = 1 + kHandJoints;
 
-// Index of a finger's joint (0 to 2, from the palm outwards) in the skeleton. RT-safe.
-[[nodiscard]] constexpr int hand_joint(int finger, int joint) noexcept {
+// Index of a finger's joint (0 to 2, from the palm outwards) in the skeleton.
+RT_SAFE [[nodiscard]] constexpr int hand_joint(int finger, int joint) noexcept {
   return 1 + finger * kFingerJoints + joint;
 }
 
-// The canonical bone of a finger joint, counted from 0 over the fingers. RT-safe.
-[[nodiscard]] constexpr Bone hand_bone(Side side, int joint) noexcept {
+// The canonical bone of a finger joint, counted from 0 over the fingers.
+RT_SAFE [[nodiscard]] constexpr Bone hand_bone(Side side, int joint) noexcept {
   const Bone first = side == Side::kLeft ? Bone::kLeftThumbMetacarpal : Bone::kRightThumbMetacarpal;
   return static_cast<Bone>(static_cast<int>(first) + joint);
 }
@@ -57,11 +57,12 @@ inline constexpr std::array<std::size_t, kHandChannels> kChannelOfAngle = [] {
 // The side of a skeleton made by hand_skeleton() (of any shape); empty for other skeletons.
 [[nodiscard]] std::optional<Side> hand_side(const Skeleton& skeleton);
 
-// The angles in a frame of a hand skeleton; not finite where the source had no value. RT-safe.
-[[nodiscard]] HandAngles hand_angles(const Frame& frame) noexcept;
+// The angles in a frame of a hand skeleton; not finite where the source had no value.
+RT_SAFE [[nodiscard]] HandAngles hand_angles(const Frame& frame) noexcept;
 
 // Poses the frame of a hand skeleton: sets rotations, validity and angle_rad. A joint with an angle
-// that is not finite is not valid. Does not change header, label, quality or stamps. RT-safe.
-void set_hand_angles(const Skeleton& skeleton, const HandAngles& angles, Frame& frame) noexcept;
+// that is not finite is not valid. Does not change header, label, quality or stamps.
+RT_SAFE void set_hand_angles(const Skeleton& skeleton, const HandAngles& angles,
+                             Frame& frame) noexcept;
 
 }  // namespace posed

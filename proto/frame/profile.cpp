@@ -63,10 +63,9 @@ bool matches(const Profile& profile, const Skeleton& skeleton) {
 }  // namespace
 
 Result<Profile> parse_profile(std::string_view text, const std::string& name) {
-  const auto table = parse_toml(text, name, {.what = "skeleton profile"});
-  if (!table) return std::unexpected(table.error());
+  const auto table = TRY(parse_toml(text, name, {.what = "skeleton profile"}));
   Findings findings{.file = name};
-  TableReader reader(*table, "", findings);
+  TableReader reader(table, "", findings);
   Profile profile;
   std::string note;
   reader.require("name", profile.name);

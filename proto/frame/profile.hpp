@@ -31,15 +31,14 @@ struct Profile {
 [[nodiscard]] std::span<const Profile> profiles();
 
 // `text` is TOML; `name` is used in error messages. Cold.
-[[nodiscard]] Result<Profile> parse_profile(std::string_view text, const std::string& name);
+Result<Profile> parse_profile(std::string_view text, const std::string& name);
 
 // Returns the profile called `name`; with an empty name, the first that matches the skeleton, or
 // null. An unknown name is an error that lists the known ones. Cold.
-[[nodiscard]] Result<const Profile*> find_profile(const Skeleton& skeleton,
-                                                  const std::string& name);
+Result<const Profile*> find_profile(const Skeleton& skeleton, const std::string& name);
 
 // Sets the bones as the profile defines them. An error names the joints that are missing. Cold.
-[[nodiscard]] Result<> name_bones(const Profile& profile, Skeleton& skeleton);
+Result<> name_bones(const Profile& profile, Skeleton& skeleton);
 
 // The T frames that the profile defines, for set_t_frames(). Cold.
 [[nodiscard]] KnownT known_t(const Profile& profile, const Skeleton& skeleton);

@@ -52,7 +52,7 @@ T moved_value(Result<T>&& result) {
   if constexpr (!std::is_void_v<T>) return *std::move(result);
 }
 
-// The system's text for an error number. Any thread.
+// What the system says of an error number. Any thread.
 [[nodiscard]] std::string errno_text(int error = errno);
 
 // return fail("..."), return fail("...", path, line)
@@ -61,7 +61,7 @@ T moved_value(Result<T>&& result) {
   return std::unexpected(Error{std::move(message), std::move(file), line, ExitCode::kFailed});
 }
 
-// As fail(), for a mistake in how the program was called or configured (exit code 2).
+// The same for a mistake in how the program was called or configured (exit code 2).
 [[nodiscard]] inline std::unexpected<Error> misuse(std::string message, std::string file = {},
                                                    int line = 0) {
   return std::unexpected(Error{std::move(message), std::move(file), line, ExitCode::kWrongUse});

@@ -119,17 +119,17 @@ Result<> check_channels(const Skeleton& skeleton) {
 }
 
 // q * v, bit for bit as Eigen computes it, but inlined: Eigen's call would take a sixth of the time
-// of a glove's packet. RT-safe.
-Eigen::Vector3d turned(const Eigen::Quaterniond& q, const Eigen::Vector3d& v) noexcept {
+// of a glove's packet.
+RT_SAFE Eigen::Vector3d turned(const Eigen::Quaterniond& q, const Eigen::Vector3d& v) noexcept {
   const Eigen::Vector3d axis = q.vec();
   const Eigen::Vector3d across = 2.0 * axis.cross(v);
   return v + q.w() * across + axis.cross(across);
 }
 
 // L = C M C^-1, where M is the product in listed order, first outermost. Not finite when a channel
-// is not finite. RT-safe.
-Eigen::Quaterniond local_rotation(const Joint& joint, std::span<const Channel> channels,
-                                  const double* values) noexcept {
+// is not finite.
+RT_SAFE Eigen::Quaterniond local_rotation(const Joint& joint, std::span<const Channel> channels,
+                                          const double* values) noexcept {
   Eigen::Quaterniond m = Eigen::Quaterniond::Identity();
   bool any = false;
   for (std::size_t i = 0; i < channels.size(); ++i) {
@@ -203,8 +203,8 @@ int Skeleton::joint_of(Bone bone) const {
 }
 
 Result<> Skeleton::finish() {
-  if (auto ok = check_joints(*this); !ok) return ok;
-  if (auto ok = check_channels(*this); !ok) return ok;
+  TRY(check_joints(*this));
+  TRY(check_channels(*this));
   if (std::ranges::none_of(joints, [](const Joint& j) { return j.bone.has_value(); })) {
     name_bones(*this);
     set_t_frames(*this);
@@ -216,7 +216,7 @@ Result<> Skeleton::finish() {
 Eigen::Quaterniond local_rotation(const Skeleton& skeleton, int joint,
                                   std::span<const double> values) noexcept {
   const std::span<const Channel> channels = channels_of(skeleton, joint);
-  const auto first = static_cast<std::size_t>(channels.data() - skeleton.channels.data());
+  const std::size_t first = channels.data() - skeleton.channels.data();
   if (first + channels.size() > values.size()) return Eigen::Quaterniond::Identity();
   return local_rotation(skeleton.joints[joint], channels, values.data() + first);
 }
@@ -252,7 +252,7 @@ void pose_from_channels(const Skeleton& skeleton, std::span<const double> values
   for (int j = skeleton.root_joint; j >= 0; j = skeleton.joints[j].parent) {
     const Joint& joint = skeleton.joints[j];
     const std::span<const Channel> channels = channels_of(skeleton, j);
-    const auto first = static_cast<std::size_t>(channels.data() - skeleton.channels.data());
+    const std::size_t first = channels.data() - skeleton.channels.data();
     if (first + channels.size() > values.size()) return;
     if (j != skeleton.root_joint) {
       root = local_rotation(joint, channels, values.data() + first) * root;
@@ -261,7 +261,7 @@ void pose_from_channels(const Skeleton& skeleton, std::span<const double> values
   }
   if (root.allFinite()) {
     for (int i = 0; i < 3; ++i) {
-      frame.root_position_m[static_cast<std::size_t>(i)] = static_cast<float>(root[i]);
+      frame.root_position_m[i] = static_cast<float>(root[i]);
     }
   }
 }
@@ -286,13 +286,13 @@ std::array<double, 3> channels_from_rotation(const Skeleton& skeleton, int joint
 
 void set_rotation(const Skeleton& skeleton, int joint, const Eigen::Quaterniond& rotation,
                   Frame& frame) noexcept {
-  frame.rotation_xyzw[static_cast<std::size_t>(joint)] = from_eigen(rotation.normalized());
+  frame.rotation_xyzw[joint] = from_eigen(rotation.normalized());
   if (frame.angle_count == 0) return;
   const auto turns = [](const Channel& channel) { return !channel.translation; };
   const std::span<const Channel> channels = channels_of(skeleton, joint);
   float* const angles =
       frame.angle_rad.data() + std::count_if(skeleton.channels.data(), channels.data(), turns);
-  const auto count = static_cast<std::size_t>(std::ranges::count_if(channels, turns));
+  const std::size_t count = std::ranges::count_if(channels, turns);
   std::array<double, 3> near_rad{};
   // An angle that was not measured is no guide.
   for (std::size_t i = 0; i < count; ++i) {

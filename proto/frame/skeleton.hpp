@@ -63,23 +63,22 @@ struct Skeleton {
 
   // Checks counts and order, sets canonical bones and their T frames where `bone` is not set yet
   // (by name and OFFSET direction), and computes id. Errors name the joint.
-  [[nodiscard]] Result<> finish();
+  Result<> finish();
 };
 
 // A part of Skeleton::channels, so the joint's values have the same place among those of a frame.
-// RT-safe.
-[[nodiscard]] inline std::span<const Channel> channels_of(const Skeleton& skeleton,
-                                                          int joint) noexcept {
+RT_SAFE [[nodiscard]] inline std::span<const Channel> channels_of(const Skeleton& skeleton,
+                                                                  int joint) noexcept {
   const auto range = std::ranges::equal_range(
       skeleton.channels, joint, {}, [](const Channel& c) { return static_cast<int>(c.joint); });
   return {range.begin(), range.end()};
 }
 
 // Position of a joint in its parent's frame [m], from the values of its channels: position channels
-// replace the joint's offset. RT-safe.
-[[nodiscard]] inline Eigen::Vector3d local_position(const Joint& joint,
-                                                    std::span<const Channel> channels,
-                                                    const double* values) noexcept {
+// replace the joint's offset.
+RT_SAFE [[nodiscard]] inline Eigen::Vector3d local_position(const Joint& joint,
+                                                            std::span<const Channel> channels,
+                                                            const double* values) noexcept {
   Eigen::Vector3d position_m = joint.offset_m;
   for (std::size_t i = 0; i < channels.size(); ++i) {
     if (channels[i].translation) position_m[static_cast<int>(channels[i].axis)] = values[i];
@@ -89,24 +88,23 @@ struct Skeleton {
 
 // Computes the pose from the channel values of one frame [rad, m], in the order of
 // Skeleton::channels. Sets rotations, root position, validity, angles, counts and skeleton id.
-// RT-safe.
-void pose_from_channels(const Skeleton& skeleton, std::span<const double> values,
-                        Frame& frame) noexcept;
+RT_SAFE void pose_from_channels(const Skeleton& skeleton, std::span<const double> values,
+                                Frame& frame) noexcept;
 
-// The local rotation L of one joint from the channel values of the whole frame, in double. RT-safe.
-[[nodiscard]] Eigen::Quaterniond local_rotation(const Skeleton& skeleton, int joint,
-                                                std::span<const double> values) noexcept;
+// The local rotation L of one joint from the channel values of the whole frame, in double.
+RT_SAFE [[nodiscard]] Eigen::Quaterniond local_rotation(const Skeleton& skeleton, int joint,
+                                                        std::span<const double> values) noexcept;
 
 // The three Euler angles [rad] of `rotation` in the joint's own channel order (first listed
 // outermost), in the solution nearest to `near_rad`. With fewer than three axes, the closest
-// rotation that the joint can make. RT-safe.
-[[nodiscard]] std::array<double, 3> channels_from_rotation(const Skeleton& skeleton, int joint,
-                                                           const Eigen::Quaterniond& rotation,
-                                                           const std::array<double, 3>& near_rad);
+// rotation that the joint can make.
+RT_SAFE [[nodiscard]] std::array<double, 3> channels_from_rotation(
+    const Skeleton& skeleton, int joint, const Eigen::Quaterniond& rotation,
+    const std::array<double, 3>& near_rad);
 
 // Changes one joint of the frame: its rotation and, if the frame carries angles, the nearest values
-// of its channels. RT-safe.
-void set_rotation(const Skeleton& skeleton, int joint, const Eigen::Quaterniond& rotation,
-                  Frame& frame) noexcept;
+// of its channels.
+RT_SAFE void set_rotation(const Skeleton& skeleton, int joint, const Eigen::Quaterniond& rotation,
+                          Frame& frame) noexcept;
 
 }  // namespace posed

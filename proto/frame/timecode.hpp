@@ -30,12 +30,12 @@ using Timecode = std::array<char, kMaxTimecode>;
 // Unpacks hours, minutes, seconds and frames, the hours in the highest byte. Returns an empty
 // timecode when a number is out of range or all are 0, which devices without timecode send.
 [[nodiscard]] constexpr Timecode to_timecode(std::uint32_t packed) noexcept {
-  constexpr std::array<std::uint32_t, 4> kMost{23, 59, 59, 99};
+  constexpr std::array<std::uint32_t, 4> kMaxOfField{23, 59, 59, 99};
   Timecode timecode{};
   if (packed == 0) return timecode;
   for (std::size_t i = 0; i < 4; ++i) {
     const std::uint32_t number = (packed >> (24 - 8 * i)) & 0xFFU;
-    if (number > kMost[i]) return {};
+    if (number > kMaxOfField[i]) return {};
     timecode[3 * i] = static_cast<char>('0' + number / 10);
     timecode[3 * i + 1] = static_cast<char>('0' + number % 10);
     if (i < 3) timecode[3 * i + 2] = ':';

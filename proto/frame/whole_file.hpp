@@ -27,9 +27,9 @@ class HeldSignals {
 // the previous content and no half-written file; only kill -9 or a power cut can leave
 // PATH.<pid>.part. A symbolic link is kept: the file that it points to is replaced. The signals
 // of HeldSignals wait until the file is written.
-[[nodiscard]] Result<> write_whole_file(const std::filesystem::path& path,
-                                        const std::function<void(std::ostream&)>& write);
+Result<> write_whole_file(const std::filesystem::path& path,
+                          const std::function<void(std::ostream&)>& write);
 // Writes the text in the same way.
-[[nodiscard]] Result<> write_whole_file(const std::filesystem::path& path, std::string_view text);
+Result<> write_whole_file(const std::filesystem::path& path, std::string_view text);
 
 }  // namespace posed

@@ -165,11 +165,9 @@ Result<Statement> Database::prepare(std::string_view sql) {
 }
 
 Result<std::string> Database::value(std::string_view sql) {
-  auto statement = prepare(sql);
-  if (!statement) return std::unexpected(std::move(statement.error()));
-  const auto row = statement->step();
-  if (!row) return std::unexpected(row.error());
-  return std::string(*row ? statement->text(0) : std::string_view{});
+  auto statement = TRY(prepare(sql));
+  const auto row = TRY(statement.step());
+  return std::string(row ? statement.text(0) : std::string_view{});
 }
 
 std::int64_t Database::last_insert_id() const { return sqlite3_last_insert_rowid(handle_.get()); }

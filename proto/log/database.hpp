@@ -31,9 +31,9 @@ class Statement {
   Statement& bind_checksum();
 
   // True: a row is available. False: there are no more rows, until reset().
-  [[nodiscard]] Result<bool> step();
+  Result<bool> step();
   // For statements without rows: runs step(), then reset().
-  [[nodiscard]] Result<> execute();
+  Result<> execute();
   void reset();
 
   // Columns of the current row; views are valid until the next step() or reset().
@@ -59,13 +59,13 @@ class Statement {
 class Database {
  public:
   enum class Mode : std::uint8_t { kCreate, kReadWrite, kRead };
-  [[nodiscard]] static Result<Database> open(const std::filesystem::path& path, Mode mode);
+  static Result<Database> open(const std::filesystem::path& path, Mode mode);
 
   // Runs any number of statements without parameters and discards their rows.
-  [[nodiscard]] Result<> run(const char* sql);
-  [[nodiscard]] Result<Statement> prepare(std::string_view sql);
+  Result<> run(const char* sql);
+  Result<Statement> prepare(std::string_view sql);
   // Returns the first column of the first row of `sql`, as SQLite prints it.
-  [[nodiscard]] Result<std::string> value(std::string_view sql);
+  Result<std::string> value(std::string_view sql);
 
   [[nodiscard]] std::int64_t last_insert_id() const;
   // Sets how long to wait for another process that holds the file.

@@ -14,6 +14,6 @@ namespace posed::log {
 [[nodiscard]] std::string sha256_hex(std::span<const std::byte> bytes);
 
 // Reads a file of any size piece by piece.
-[[nodiscard]] Result<std::string> sha256_of_file(const std::filesystem::path& path);
+Result<std::string> sha256_of_file(const std::filesystem::path& path);
 
 }  // namespace posed::log

@@ -18,21 +18,19 @@ constexpr int kReadPatience_ms = 2000;
 
 // Checks the format of the log before reading anything else in it.
 Result<> check_marks(Database& database, const std::string& file) {
-  const auto application = database.value("PRAGMA application_id");
-  if (!application) return std::unexpected(application.error());
-  if (*application != std::to_string(kApplicationId)) {
+  const auto application = TRY(database.value("PRAGMA application_id"));
+  if (application != std::to_string(kApplicationId)) {
     return fail("not a device log (empty, or a database that is not posed's)", file);
   }
-  const auto version = database.value("PRAGMA user_version");
-  if (!version) return std::unexpected(version.error());
-  const int format = std::stoi(*version);
+  const auto version = TRY(database.value("PRAGMA user_version"));
+  const int format = std::stoi(version);
   if (format > kFormatVersion) {
-    return fail("written by a newer posed (log format " + *version + ", this one reads up to " +
+    return fail("written by a newer posed (log format " + version + ", this one reads up to " +
                     std::to_string(kFormatVersion) + "); update posed",
                 file);
   }
   if (format < kMinFormatVersion) {
-    return fail("written by a development version of posed (log format " + *version +
+    return fail("written by a development version of posed (log format " + version +
                     ", this one reads " + std::to_string(kMinFormatVersion) + " and newer)",
                 file);
   }
@@ -51,15 +49,13 @@ Result<> check_whole(Database& database, const std::string& file) {
     return fail("the log is damaged (" + how + "); `sqlite3 FILE .recover` may save what is left",
                 file);
   };
-  const auto page = database.value("PRAGMA page_size");
-  if (!page) return std::unexpected(page.error());
+  const auto page = TRY(database.value("PRAGMA page_size"));
   std::error_code error;
   const auto size = std::filesystem::file_size(file, error);
   // SQLite itself reads a truncated last page as if it ended in zeros.
-  if (error || size % std::stoul(*page) != 0) return damaged("cut short");
-  const auto verdict = database.value("PRAGMA quick_check(1)");
-  if (!verdict) return std::unexpected(verdict.error());
-  if (*verdict != "ok") return damaged(*verdict);
+  if (error || size % std::stoul(page) != 0) return damaged("cut short");
+  const auto verdict = TRY(database.value("PRAGMA quick_check(1)"));
+  if (verdict != "ok") return damaged(verdict);
   return {};
 }
 
@@ -67,26 +63,23 @@ Result<> check_whole(Database& database, const std::string& file) {
 // merges what a crash has left beside it.
 Result<Database> open_whole(const std::filesystem::path& path) {
   const std::string file = path.string();
-  auto database = Database::open(path, Database::Mode::kReadWrite);
-  if (!database) return std::unexpected(database.error());
-  if (auto ok = check_marks(*database, file); !ok) return std::unexpected(ok.error());
-  merge_wal(*database);
-  database->set_busy_timeout_ms(kReadPatience_ms);
-  if (auto done = check_whole(*database, file); !done) return std::unexpected(done.error());
+  auto database = TRY(Database::open(path, Database::Mode::kReadWrite));
+  TRY(check_marks(database, file));
+  merge_wal(database);
+  database.set_busy_timeout_ms(kReadPatience_ms);
+  TRY(check_whole(database, file));
   return database;
 }
 
 std::uint64_t unsigned_of(std::int64_t stored) { return static_cast<std::uint64_t>(stored); }
 
 Result<std::map<std::string, std::string>> read_meta(Database& database) {
-  auto select = database.prepare("SELECT key, value FROM meta");
-  if (!select) return std::unexpected(select.error());
+  auto select = TRY(database.prepare("SELECT key, value FROM meta"));
   std::map<std::string, std::string> meta;
   for (;;) {
-    const auto row = select->step();
-    if (!row) return std::unexpected(row.error());
-    if (!*row) return meta;
-    meta.emplace(select->text(0), select->text(1));
+    const auto row = TRY(select.step());
+    if (!row) return meta;
+    meta.emplace(select.text(0), select.text(1));
   }
 }
 
@@ -98,33 +91,29 @@ Result<bool> step_checked(Statement& select, const char* table, const std::strin
 }
 
 Result<std::vector<SourceRow>> read_sources(Database& database, const std::string& file) {
-  auto select = database.prepare(
-      "SELECT id, name, driver, text, identity, config, crc FROM source ORDER BY id");
-  if (!select) return std::unexpected(select.error());
+  auto select = TRY(database.prepare(
+      "SELECT id, name, driver, text, identity, config, crc FROM source ORDER BY id"));
   std::vector<SourceRow> sources;
   for (;;) {
-    const auto row = step_checked(*select, "source", file);
-    if (!row) return std::unexpected(row.error());
-    if (!*row) return sources;
-    const auto text = [&](int column) { return std::string(select->text(column)); };
-    sources.push_back({static_cast<std::uint32_t>(select->integer(0)), text(1), text(2), text(3),
+    const auto row = TRY(step_checked(select, "source", file));
+    if (!row) return sources;
+    const auto text = [&](int column) { return std::string(select.text(column)); };
+    sources.push_back({static_cast<std::uint32_t>(select.integer(0)), text(1), text(2), text(3),
                        text(4), text(5)});
   }
 }
 
 Result<std::vector<StreamRow>> read_streams(Database& database, const std::string& file) {
-  auto select = database.prepare(
-      "SELECT id, source, body, name, stages_json, first_item, crc FROM stream ORDER BY id");
-  if (!select) return std::unexpected(select.error());
+  auto select = TRY(database.prepare(
+      "SELECT id, source, body, name, stages_json, first_item, crc FROM stream ORDER BY id"));
   std::vector<StreamRow> streams;
   for (;;) {
-    const auto row = step_checked(*select, "stream", file);
-    if (!row) return std::unexpected(row.error());
-    if (!*row) return streams;
-    const auto text = [&](int column) { return std::string(select->text(column)); };
-    streams.push_back({static_cast<std::uint32_t>(select->integer(0)),
-                       static_cast<std::uint32_t>(select->integer(1)), text(2), text(3), text(4),
-                       unsigned_of(select->integer(5))});
+    const auto row = TRY(step_checked(select, "stream", file));
+    if (!row) return streams;
+    const auto text = [&](int column) { return std::string(select.text(column)); };
+    streams.push_back({static_cast<std::uint32_t>(select.integer(0)),
+                       static_cast<std::uint32_t>(select.integer(1)), text(2), text(3), text(4),
+                       unsigned_of(select.integer(5))});
   }
 }
 
@@ -162,14 +151,10 @@ struct Reader::State {
 };
 
 Result<> Reader::State::read_described() {
-  auto found_sources = read_sources(database, file);
-  if (!found_sources) return std::unexpected(found_sources.error());
-  sources = std::move(*found_sources);
-  auto found_streams = read_streams(database, file);
-  if (!found_streams) return std::unexpected(found_streams.error());
-  streams = std::move(*found_streams);
+  sources = TRY(read_sources(database, file));
+  streams = TRY(read_streams(database, file));
   for (const StreamRow& row : streams) {
-    if (auto known = check_owner(row.source, "stream", row.id, true); !known) return known;
+    TRY(check_owner(row.source, "stream", row.id, true));
   }
   return {};
 }
@@ -177,9 +162,7 @@ Result<> Reader::State::read_described() {
 Result<ChunkRow> Reader::State::chunk(const Statement& select,
                                       std::vector<StreamPosition>& positions) const {
   const std::int64_t id = select.integer(0), source = select.integer(1);
-  if (auto known = check_owner(source, "chunk", id, true); !known) {
-    return std::unexpected(known.error());
-  }
+  TRY(check_owner(source, "chunk", id, true));
   if (!unpack_positions(select.bytes(6), positions)) {
     return damaged_row(file, "chunk", id, "has sequences that are cut short");
   }
@@ -214,21 +197,18 @@ Result<Reader> Reader::open(const std::filesystem::path& path) {
   const std::string file = path.string();
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) return fail("is a folder, not a log", file);
-  auto database = open_whole(path);
-  if (!database) return std::unexpected(database.error());
-  auto meta = read_meta(*database);
-  if (!meta) return std::unexpected(meta.error());
-  auto state = std::make_unique<State>(State{.database = std::move(*database),
+  auto database = TRY(open_whole(path));
+  auto meta = TRY(read_meta(database));
+  auto state = std::make_unique<State>(State{.database = std::move(database),
                                              .file = file,
-                                             .meta = std::move(*meta),
+                                             .meta = std::move(meta),
                                              .sources = {},
                                              .streams = {},
                                              .chunks = std::nullopt,
                                              .places = {}});
-  if (auto done = state->read_described(); !done) return std::unexpected(done.error());
-  auto chunks = state->database.prepare(std::string(kSelectChunks) + " ORDER BY id");
-  if (!chunks) return std::unexpected(chunks.error());
-  state->chunks.emplace(std::move(*chunks));
+  TRY(state->read_described());
+  auto chunks = TRY(state->database.prepare(std::string(kSelectChunks) + " ORDER BY id"));
+  state->chunks.emplace(std::move(chunks));
   return Reader(std::move(state));
 }
 
@@ -248,13 +228,11 @@ std::optional<std::size_t> Reader::place_of_stream(std::uint32_t id) const {
 }
 
 Result<std::vector<std::byte>> Reader::blob(std::string_view sha256) const {
-  auto select = state_->database.prepare("SELECT bytes FROM blob WHERE sha256=?");
-  if (!select) return std::unexpected(select.error());
-  const auto row = select->bind(sha256).step();
-  if (!row) return std::unexpected(row.error());
+  auto select = TRY(state_->database.prepare("SELECT bytes FROM blob WHERE sha256=?"));
+  const auto row = TRY(select.bind(sha256).step());
   const std::string name(sha256);
-  if (!*row) return fail("lacks the file with SHA-256 " + name, state_->file);
-  const auto bytes = select->bytes(0);
+  if (!row) return fail("lacks the file with SHA-256 " + name, state_->file);
+  const auto bytes = select.bytes(0);
   if (sha256_hex(bytes) != name) {
     return fail("the log is damaged (the file kept as " + name + " does not match its hash)",
                 state_->file);
@@ -263,52 +241,43 @@ Result<std::vector<std::byte>> Reader::blob(std::string_view sha256) const {
 }
 
 Result<std::vector<std::string>> Reader::blobs() const {
-  auto select = state_->database.prepare("SELECT sha256 FROM blob ORDER BY sha256");
-  if (!select) return std::unexpected(select.error());
+  auto select = TRY(state_->database.prepare("SELECT sha256 FROM blob ORDER BY sha256"));
   std::vector<std::string> hashes;
   for (;;) {
-    const auto row = select->step();
-    if (!row) return std::unexpected(row.error());
-    if (!*row) return hashes;
-    hashes.emplace_back(select->text(0));
+    const auto row = TRY(select.step());
+    if (!row) return hashes;
+    hashes.emplace_back(select.text(0));
   }
 }
 
 Result<std::optional<ChunkRow>> Reader::next_chunk() {
   Statement& select = *state_->chunks;
-  const auto stepped = state_->step(select, "chunk");
-  if (!stepped) return std::unexpected(stepped.error());
-  if (!*stepped) return std::nullopt;
-  auto row = state_->chunk(select, state_->places);
-  if (!row) return std::unexpected(row.error());
-  return *row;
+  const auto stepped = TRY(state_->step(select, "chunk"));
+  if (!stepped) return std::nullopt;
+  auto row = TRY(state_->chunk(select, state_->places));
+  return row;
 }
 
 Result<> Reader::each_description(const std::function<Result<>(const ChunkRow&)>& handle) const {
   auto select =
-      state_->database.prepare(std::string(kSelectChunks) + " WHERE direction=4 ORDER BY id");
-  if (!select) return std::unexpected(select.error());
+      TRY(state_->database.prepare(std::string(kSelectChunks) + " WHERE direction=4 ORDER BY id"));
   std::vector<StreamPosition> places;
   for (;;) {
-    const auto stepped = state_->step(*select, "chunk");
-    if (!stepped) return std::unexpected(stepped.error());
-    if (!*stepped) return {};
-    const auto row = state_->chunk(*select, places);
-    if (!row) return std::unexpected(row.error());
-    if (auto handled = handle(*row); !handled) return handled;
+    const auto stepped = TRY(state_->step(select, "chunk"));
+    if (!stepped) return {};
+    const auto row = TRY(state_->chunk(select, places));
+    TRY(handle(row));
   }
 }
 
 Result<std::optional<Reader::Extent>> Reader::extent() const {
   const auto arrival = [this](const char* order) -> Result<std::optional<std::int64_t>> {
-    auto select = state_->database.prepare(
+    auto select = TRY(state_->database.prepare(
         std::string("SELECT arrival_ns FROM chunk WHERE direction=0 ORDER BY id ") + order +
-        " LIMIT 1");
-    if (!select) return std::unexpected(select.error());
-    const auto row = select->step();
-    if (!row) return std::unexpected(row.error());
-    if (!*row) return std::nullopt;
-    return select->integer(0);
+        " LIMIT 1"));
+    const auto row = TRY(select.step());
+    if (!row) return std::nullopt;
+    return select.integer(0);
   };
   const auto first = arrival("ASC"), last = arrival("DESC");
   if (!first) return std::unexpected(first.error());
@@ -318,62 +287,52 @@ Result<std::optional<Reader::Extent>> Reader::extent() const {
 }
 
 Result<std::vector<DecisionRow>> Reader::decisions() const {
-  auto select = state_->database.prepare(
-      "SELECT id, item, stream, stage, name, value, now_ns, crc FROM decision ORDER BY id");
-  if (!select) return std::unexpected(select.error());
+  auto select = TRY(state_->database.prepare(
+      "SELECT id, item, stream, stage, name, value, now_ns, crc FROM decision ORDER BY id"));
   std::vector<DecisionRow> decisions;
   for (;;) {
-    const auto stepped = state_->step(*select, "decision");
-    if (!stepped) return std::unexpected(stepped.error());
-    if (!*stepped) return decisions;
-    const auto value = select->bytes(5);
-    decisions.push_back({.id = select->integer(0),
-                         .item = unsigned_of(select->integer(1)),
-                         .stream = static_cast<std::uint32_t>(select->integer(2)),
-                         .stage = std::string(select->text(3)),
-                         .name = std::string(select->text(4)),
+    const auto stepped = TRY(state_->step(select, "decision"));
+    if (!stepped) return decisions;
+    const auto value = select.bytes(5);
+    decisions.push_back({.id = select.integer(0),
+                         .item = unsigned_of(select.integer(1)),
+                         .stream = static_cast<std::uint32_t>(select.integer(2)),
+                         .stage = std::string(select.text(3)),
+                         .name = std::string(select.text(4)),
                          .value = {reinterpret_cast<const char*>(value.data()), value.size()},
-                         .now_ns = select->integer(6)});
+                         .now_ns = select.integer(6)});
     const DecisionRow& row = decisions.back();
-    if (auto known = state_->check_stream(row.stream, "decision", row.id); !known) {
-      return std::unexpected(known.error());
-    }
+    TRY(state_->check_stream(row.stream, "decision", row.id));
   }
 }
 
 Result<std::vector<GapRow>> Reader::gaps() const {
-  auto select = state_->database.prepare(
-      "SELECT id, kind, owner, after_chunk, lost, time_ns, crc FROM gap ORDER BY id");
-  if (!select) return std::unexpected(select.error());
+  auto select = TRY(state_->database.prepare(
+      "SELECT id, kind, owner, after_chunk, lost, time_ns, crc FROM gap ORDER BY id"));
   std::vector<GapRow> gaps;
   for (;;) {
-    const auto stepped = state_->step(*select, "gap");
-    if (!stepped) return std::unexpected(stepped.error());
-    if (!*stepped) return gaps;
-    gaps.push_back({.kind = static_cast<GapRow::Kind>(select->integer(1)),
-                    .owner = static_cast<std::uint32_t>(select->integer(2)),
-                    .after_chunk = select->integer(3),
-                    .lost = unsigned_of(select->integer(4)),
-                    .time_ns = select->integer(5)});
+    const auto stepped = TRY(state_->step(select, "gap"));
+    if (!stepped) return gaps;
+    gaps.push_back({.kind = static_cast<GapRow::Kind>(select.integer(1)),
+                    .owner = static_cast<std::uint32_t>(select.integer(2)),
+                    .after_chunk = select.integer(3),
+                    .lost = unsigned_of(select.integer(4)),
+                    .time_ns = select.integer(5)});
     const GapRow& row = gaps.back();
     const bool is_source = row.kind == GapRow::Kind::kChunks;
-    if (auto known = state_->check_owner(row.owner, "gap", select->integer(0), is_source); !known) {
-      return std::unexpected(known.error());
-    }
+    TRY(state_->check_owner(row.owner, "gap", select.integer(0), is_source));
   }
 }
 
 Result<std::vector<TakeRow>> Reader::takes() const {
-  auto select =
-      state_->database.prepare("SELECT id, name, first_item, last_item, crc FROM take ORDER BY id");
-  if (!select) return std::unexpected(select.error());
+  auto select = TRY(state_->database.prepare(
+      "SELECT id, name, first_item, last_item, crc FROM take ORDER BY id"));
   std::vector<TakeRow> takes;
   for (;;) {
-    const auto stepped = state_->step(*select, "take");
-    if (!stepped) return std::unexpected(stepped.error());
-    if (!*stepped) return takes;
-    takes.push_back({select->integer(0), std::string(select->text(1)),
-                     unsigned_of(select->integer(2)), unsigned_of(select->integer(3))});
+    const auto stepped = TRY(state_->step(select, "take"));
+    if (!stepped) return takes;
+    takes.push_back({select.integer(0), std::string(select.text(1)), unsigned_of(select.integer(2)),
+                     unsigned_of(select.integer(3))});
   }
 }
 
@@ -391,32 +350,28 @@ Reader::Frames::~Frames() = default;
 
 Result<std::optional<FrameRow>> Reader::Frames::next() {
   Statement& select = state_->select;
-  const auto row = step_checked(select, "frame", state_->file);
-  if (!row) return std::unexpected(row.error());
-  if (!*row) return std::nullopt;
+  const auto row = TRY(step_checked(select, "frame", state_->file));
+  if (!row) return std::nullopt;
   return FrameRow{state_->stream, unsigned_of(select.integer(2)), state_->raw, select.bytes(4)};
 }
 
 Result<Reader::Frames> Reader::frames(std::uint32_t stream, bool raw) const {
-  auto select = state_->database.prepare(
-      "SELECT id, stream, sequence, raw, bytes, crc FROM frame "
-      "WHERE stream=? AND raw=? ORDER BY id");
-  if (!select) return std::unexpected(select.error());
-  select->bind(std::int64_t{stream}).bind(std::int64_t{raw});
-  return Frames(std::make_unique<Frames::State>(
-      Frames::State{std::move(*select), stream, raw, state_->file}));
+  auto select =
+      TRY(state_->database.prepare("SELECT id, stream, sequence, raw, bytes, crc FROM frame "
+                                   "WHERE stream=? AND raw=? ORDER BY id"));
+  select.bind(std::int64_t{stream}).bind(std::int64_t{raw});
+  return Frames(
+      std::make_unique<Frames::State>(Frames::State{std::move(select), stream, raw, state_->file}));
 }
 
 Result<bool> Reader::has_frames() const {
-  const auto any = state_->database.value("SELECT EXISTS(SELECT 1 FROM frame)");
-  if (!any) return std::unexpected(any.error());
-  return *any == "1";
+  const auto any = TRY(state_->database.value("SELECT EXISTS(SELECT 1 FROM frame)"));
+  return any == "1";
 }
 
 Result<> check_format(const std::filesystem::path& path) {
-  auto database = Database::open(path, Database::Mode::kRead);
-  if (!database) return std::unexpected(database.error());
-  return check_marks(*database, path.string());
+  auto database = TRY(Database::open(path, Database::Mode::kRead));
+  return check_marks(database, path.string());
 }
 
 }  // namespace posed::log

@@ -25,7 +25,7 @@ class Database;
 
 // Fails for a file that Reader::open() refuses by its first bytes: no log, or of a format that this
 // posed does not read. Reads nothing else and changes nothing.
-[[nodiscard]] Result<> check_format(const std::filesystem::path& path);
+Result<> check_format(const std::filesystem::path& path);
 
 class Reader {
  public:
@@ -34,7 +34,7 @@ class Reader {
   // recorded can be read up to its last commit.
   // Each row's checksum is verified when the row is read; the error for a mismatch names log, table
   // and row.
-  [[nodiscard]] static Result<Reader> open(const std::filesystem::path& path);
+  static Result<Reader> open(const std::filesystem::path& path);
 
   Reader(Reader&&) noexcept;
   Reader& operator=(Reader&&) noexcept;
@@ -49,30 +49,29 @@ class Reader {
   [[nodiscard]] std::optional<std::size_t> place_of_stream(std::uint32_t id) const;
 
   // The bytes stored under a hash; an error when they are missing or do not match it.
-  [[nodiscard]] Result<std::vector<std::byte>> blob(std::string_view sha256) const;
+  Result<std::vector<std::byte>> blob(std::string_view sha256) const;
   // The hashes of all that are stored.
-  [[nodiscard]] Result<std::vector<std::string>> blobs() const;
+  Result<std::vector<std::string>> blobs() const;
 
   // The next chunk of all sources in log order; empty after the last. Its bytes and places are
   // valid until the next call.
-  [[nodiscard]] Result<std::optional<ChunkRow>> next_chunk();
+  Result<std::optional<ChunkRow>> next_chunk();
 
   // Calls `handle` with each row that describes the bodies of a source, in log order, until it
   // fails. The row is valid during the call, which may not use next_chunk().
-  [[nodiscard]] Result<> each_description(
-      const std::function<Result<>(const ChunkRow&)>& handle) const;
+  Result<> each_description(const std::function<Result<>(const ChunkRow&)>& handle) const;
 
   // Arrival times of the first and the last chunk from a device, which bound the length of the log.
   // Empty when none was logged. Cheap.
   struct Extent {
     std::int64_t first_ns = 0, last_ns = 0;
   };
-  [[nodiscard]] Result<std::optional<Extent>> extent() const;
+  Result<std::optional<Extent>> extent() const;
 
   // Decisions of all streams, in log order.
-  [[nodiscard]] Result<std::vector<DecisionRow>> decisions() const;
-  [[nodiscard]] Result<std::vector<GapRow>> gaps() const;
-  [[nodiscard]] Result<std::vector<TakeRow>> takes() const;
+  Result<std::vector<DecisionRow>> decisions() const;
+  Result<std::vector<GapRow>> gaps() const;
+  Result<std::vector<TakeRow>> takes() const;
 
   // The published frames of one stream, raw or styled, in pipeline order. Must not outlive the
   // reader.
@@ -82,7 +81,7 @@ class Reader {
     Frames& operator=(Frames&&) noexcept;
     ~Frames();
     // Empty after the last; the bytes are valid until the next call.
-    [[nodiscard]] Result<std::optional<FrameRow>> next();
+    Result<std::optional<FrameRow>> next();
 
    private:
     friend class Reader;
@@ -90,8 +89,8 @@ class Reader {
     explicit Frames(std::unique_ptr<State> state);
     std::unique_ptr<State> state_;
   };
-  [[nodiscard]] Result<Frames> frames(std::uint32_t stream, bool raw) const;
-  [[nodiscard]] Result<bool> has_frames() const;
+  Result<Frames> frames(std::uint32_t stream, bool raw) const;
+  Result<bool> has_frames() const;
 
  private:
   struct State;

@@ -48,10 +48,9 @@ Result<> make_room_for(const std::filesystem::path& path, bool overwrite) {
 }
 
 Result<> write_meta(Database& database, const std::map<std::string, std::string>& meta) {
-  auto insert = database.prepare("INSERT INTO meta VALUES(?,?)");
-  if (!insert) return std::unexpected(insert.error());
+  auto insert = TRY(database.prepare("INSERT INTO meta VALUES(?,?)"));
   for (const auto& [key, value] : meta) {
-    if (auto done = insert->bind(key).bind(value).execute(); !done) return done;
+    TRY(insert.bind(key).bind(value).execute());
   }
   return {};
 }
@@ -61,8 +60,8 @@ Result<> write_birth(Database& database, const std::map<std::string, std::string
   const std::string tables = "BEGIN;" + std::string(kSchema) +
                              "PRAGMA application_id=" + std::to_string(kApplicationId) +
                              ";PRAGMA user_version=" + std::to_string(kFormatVersion) + ";";
-  if (auto done = database.run(tables.c_str()); !done) return done;
-  if (auto done = write_meta(database, meta); !done) return done;
+  TRY(database.run(tables.c_str()));
+  TRY(write_meta(database, meta));
   return database.run("COMMIT");
 }
 
@@ -114,34 +113,30 @@ Result<Writer> Writer::on(Database database) {
   auto state = std::make_unique<State>(
       State{.database = std::move(database), .statements = {}, .sequences = {}});
   for (const std::string_view sql : kSql) {
-    auto statement = state->database.prepare(sql);
-    if (!statement) return std::unexpected(statement.error());
-    state->statements.push_back(std::move(*statement));
+    auto statement = TRY(state->database.prepare(sql));
+    state->statements.push_back(std::move(statement));
   }
   for (std::size_t table = 0; table < kNumbered; ++table) {
     const auto last =
-        state->database.value("SELECT ifnull(max(id),0) FROM " + std::string(kNames[table]));
-    if (!last) return std::unexpected(last.error());
-    state->last_id[table] = state->committed_id[table] = std::stoll(*last);
+        TRY(state->database.value("SELECT ifnull(max(id),0) FROM " + std::string(kNames[table])));
+    state->last_id[table] = state->committed_id[table] = std::stoll(last);
   }
   return Writer(std::move(state));
 }
 
 Result<Writer> Writer::create(const std::filesystem::path& path,
                               const std::map<std::string, std::string>& meta, bool overwrite) {
-  if (auto done = make_room_for(path, overwrite); !done) return std::unexpected(done.error());
-  auto database = Database::open(path, Database::Mode::kCreate);
-  if (!database) return std::unexpected(database.error());
-  if (auto done = make_durable(*database); !done) return std::unexpected(done.error());
-  if (auto done = write_birth(*database, meta); !done) return std::unexpected(done.error());
-  return on(std::move(*database));
+  TRY(make_room_for(path, overwrite));
+  auto database = TRY(Database::open(path, Database::Mode::kCreate));
+  TRY(make_durable(database));
+  TRY(write_birth(database, meta));
+  return on(std::move(database));
 }
 
 Result<Writer> Writer::reopen(const std::filesystem::path& path) {
-  auto database = Database::open(path, Database::Mode::kReadWrite);
-  if (!database) return std::unexpected(database.error());
-  if (auto done = make_durable(*database); !done) return std::unexpected(done.error());
-  return on(std::move(*database));
+  auto database = TRY(Database::open(path, Database::Mode::kReadWrite));
+  TRY(make_durable(database));
+  return on(std::move(database));
 }
 
 Result<> Writer::add(const SourceRow& row) {
@@ -220,24 +215,21 @@ Result<> Writer::add(const TakeRow& row) {
 
 Result<std::string> Writer::add_blob(std::span<const std::byte> bytes) {
   std::string hash = sha256_hex(bytes);
-  auto done = state_->insert(state_->statements[kBlob].bind(hash).bind(bytes));
-  if (!done) return std::unexpected(done.error());
+  TRY(state_->insert(state_->statements[kBlob].bind(hash).bind(bytes)));
   return hash;
 }
 
 Result<std::int64_t> Writer::chunk_before_frame(std::uint32_t source, std::uint32_t stream,
                                                 std::uint64_t frame) const {
-  auto backwards =
-      state_->database.prepare("SELECT id, sequences FROM chunk WHERE source=? ORDER BY id DESC");
-  if (!backwards) return std::unexpected(backwards.error());
-  backwards->bind(std::int64_t{source});
+  auto backwards = TRY(
+      state_->database.prepare("SELECT id, sequences FROM chunk WHERE source=? ORDER BY id DESC"));
+  backwards.bind(std::int64_t{source});
   std::vector<StreamPosition> places;
   for (bool holds_frame = false;;) {
-    const auto row = backwards->step();
-    if (!row) return std::unexpected(row.error());
-    if (!*row) return 0;
-    if (holds_frame) return backwards->integer(0);
-    if (!unpack_positions(backwards->bytes(1), places)) continue;
+    const auto row = TRY(backwards.step());
+    if (!row) return 0;
+    if (holds_frame) return backwards.integer(0);
+    if (!unpack_positions(backwards.bytes(1), places)) continue;
     const auto place = std::ranges::find(places, stream, &StreamPosition::stream);
     holds_frame = place != places.end() && place->next_frame <= frame;
   }
@@ -262,7 +254,7 @@ void Writer::rollback() {
 }
 
 Result<> Writer::close() {
-  if (auto done = commit(); !done) return done;
+  TRY(commit());
   state_->statements.clear();  // an open statement would keep the log in WAL mode
   return state_->database.run("PRAGMA wal_checkpoint(TRUNCATE); PRAGMA journal_mode=DELETE;");
 }

@@ -21,11 +21,10 @@ class Writer {
  public:
   // Creates the file with all tables and `meta`, committed. Fails if the file exists, unless
   // `overwrite` is set.
-  [[nodiscard]] static Result<Writer> create(const std::filesystem::path& path,
-                                             const std::map<std::string, std::string>& meta,
-                                             bool overwrite);
+  static Result<Writer> create(const std::filesystem::path& path,
+                               const std::map<std::string, std::string>& meta, bool overwrite);
   // Continues a log that create() made and that an error interrupted.
-  [[nodiscard]] static Result<Writer> reopen(const std::filesystem::path& path);
+  static Result<Writer> reopen(const std::filesystem::path& path);
 
   Writer(Writer&&) noexcept;
   Writer& operator=(Writer&&) noexcept;
@@ -35,28 +34,28 @@ class Writer {
   // ignored. A row of a stream that is there already is replaced, because a failed commit may have
   // kept it. A row of a take is replaced, too: it is written when the take begins and when it ends.
   // Each source and stream that a row refers to must be added before the same commit.
-  [[nodiscard]] Result<> add(const SourceRow& row);
-  [[nodiscard]] Result<> add(const StreamRow& row);
-  [[nodiscard]] Result<> add(const ChunkRow& row);
-  [[nodiscard]] Result<> add(const DecisionRow& row);
-  [[nodiscard]] Result<> add(const FrameRow& row);
-  [[nodiscard]] Result<> add(const GapRow& row);
-  [[nodiscard]] Result<> add(const TakeRow& row);
+  Result<> add(const SourceRow& row);
+  Result<> add(const StreamRow& row);
+  Result<> add(const ChunkRow& row);
+  Result<> add(const DecisionRow& row);
+  Result<> add(const FrameRow& row);
+  Result<> add(const GapRow& row);
+  Result<> add(const TakeRow& row);
   // Stores the bytes once, even if added again; returns their SHA-256.
-  [[nodiscard]] Result<std::string> add_blob(std::span<const std::byte> bytes);
+  Result<std::string> add_blob(std::span<const std::byte> bytes);
 
   [[nodiscard]] std::int64_t last_chunk_id() const;  // 0 before the first
   // Id of the source's last chunk before the chunk that contains this frame of its stream; 0 when
   // there is none. Searches from the end of the log.
-  [[nodiscard]] Result<std::int64_t> chunk_before_frame(std::uint32_t source, std::uint32_t stream,
-                                                        std::uint64_t frame) const;
+  Result<std::int64_t> chunk_before_frame(std::uint32_t source, std::uint32_t stream,
+                                          std::uint64_t frame) const;
 
   // Makes all rows so far survive kill -9 and power loss.
-  [[nodiscard]] Result<> commit();
+  Result<> commit();
   // Call it after an error: discards the rows since the last commit, so that writing may continue.
   void rollback();
   // Commits, and leaves one file without -wal.
-  [[nodiscard]] Result<> close();
+  Result<> close();
 
  private:
   struct State;

@@ -121,14 +121,12 @@ Result<std::shared_ptr<const Skeleton>> skeleton_from(const v1::Skeleton& messag
   auto skeleton = std::make_shared<Skeleton>();
   skeleton->name = clean(message.name(), kMaxNameBytes);
   skeleton->root_joint = static_cast<int>(message.root_joint());
-  skeleton->joints.resize(static_cast<std::size_t>(joints));
+  skeleton->joints.resize(joints);
   for (int j = 0; j < joints; ++j) {
-    if (auto read = read_joint(message, j, skeleton->joints[j]); !read) {
-      return std::unexpected(read.error());
-    }
+    TRY(read_joint(message, j, skeleton->joints[j]));
   }
-  if (auto read = read_channels(message, *skeleton); !read) return std::unexpected(read.error());
-  if (auto finished = skeleton->finish(); !finished) return std::unexpected(finished.error());
+  TRY(read_channels(message, *skeleton));
+  TRY(skeleton->finish());
   return skeleton;
 }
 

@@ -17,6 +17,6 @@ namespace posed::message {
 // and the error names what is wrong. A message does not say in which frame a joint's channels turn,
 // nor its limits; but a hand that posed knows, with the same id, comes back complete. For
 // any other skeleton the id differs from that in the message.
-[[nodiscard]] Result<std::shared_ptr<const Skeleton>> skeleton_from(const v1::Skeleton& message);
+Result<std::shared_ptr<const Skeleton>> skeleton_from(const v1::Skeleton& message);
 
 }  // namespace posed::message

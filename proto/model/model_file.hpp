@@ -16,7 +16,7 @@ namespace posed::model_file {
 
 // Returns the payload of a whole model file. `name` is used in error messages only. Invalid bytes
 // of any kind give an Error, never a crash.
-[[nodiscard]] Result<v1::ModelFile> open(std::span<const std::byte> bytes, const std::string& name);
+Result<v1::ModelFile> open(std::span<const std::byte> bytes, const std::string& name);
 
 // Returns the whole file that contains `file`; fills in posed's version. The same model gives the
 // same bytes.
@@ -27,7 +27,7 @@ inline constexpr std::size_t kMaxModelFile = std::size_t{256} * 1024 * 1024;  //
 
 // Read and write the bytes of a model file. A file is written completely or not at all; only a
 // regular file of at most kMaxModelFile is read.
-[[nodiscard]] Result<std::string> load(const std::filesystem::path& path);
-[[nodiscard]] Result<> save(const std::string& bytes, const std::filesystem::path& path);
+Result<std::string> load(const std::filesystem::path& path);
+Result<> save(const std::string& bytes, const std::filesystem::path& path);
 
 }  // namespace posed::model_file

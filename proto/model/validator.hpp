@@ -29,7 +29,7 @@ class Validator {
     for (const double value : values) number(value, low, high, what);
   }
 
-  [[nodiscard]] Result<> verdict(const std::string& name) const {
+  Result<> verdict(const std::string& name) const {
     if (valid()) return {};
     return fail("the model is not valid: " + wrong_ + "; train it again", name);
   }

@@ -28,9 +28,9 @@ Character first_character(std::string_view text) {
     if ((next & 0xC0U) != 0x80U) return {};
     code = code << 6 | (next & 0x3FU);
   }
-  constexpr std::array<std::uint32_t, 5> kLeast{0, 0, 0x80, 0x800, 0x10000};
+  constexpr std::array<std::uint32_t, 5> kMinCodePoint{0, 0, 0x80, 0x800, 0x10000};
   const bool surrogate = code >= 0xD800 && code <= 0xDFFF;
-  if (code < kLeast[bytes] || code > 0x10FFFF || surrogate) return {};
+  if (code < kMinCodePoint[bytes] || code > 0x10FFFF || surrogate) return {};
   return {code, bytes};
 }
 

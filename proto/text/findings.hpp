@@ -43,7 +43,7 @@ struct Findings {
   // `value` if there are no errors; otherwise the one with the smallest line, for callers that
   // report a single error.
   template <typename T>
-  [[nodiscard]] Result<T> result(T value) const {
+  Result<T> result(T value) const {
     if (errors.empty()) return value;
     return std::unexpected(first_error());
   }

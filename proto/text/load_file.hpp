@@ -28,7 +28,6 @@ struct FileRule {
 }
 
 // Returns all bytes of the file. An Error names the path and the reason.
-[[nodiscard]] Result<std::string> load_file(const std::filesystem::path& path,
-                                            const FileRule& rule);
+Result<std::string> load_file(const std::filesystem::path& path, const FileRule& rule);
 
 }  // namespace posed

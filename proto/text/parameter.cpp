@@ -21,8 +21,8 @@ std::string text_of(double number) {
   return {text.data(), end};
 }
 
-double people_bound(const ParameterSpec& spec, double bound) {
-  const double scaled = bound * spec.people_scale;
+double display_bound(const ParameterSpec& spec, double bound) {
+  const double scaled = bound * spec.display_scale;
   // A bound such as 90 degrees stays a round number on its way to radians and back.
   const double rounded = std::round(scaled * 1e9) / 1e9;
   return std::isfinite(rounded) ? rounded : bound;
@@ -58,18 +58,18 @@ Result<ParameterValue> one_of_words(const ParameterSpec& spec, const std::string
 
 const ParameterSpec* find_parameter(std::span<const ParameterSpec> table, std::string_view name) {
   const auto found = std::ranges::find_if(table, [&](const ParameterSpec& spec) {
-    return spec.name == name || spec.people_name == name;
+    return spec.name == name || spec.display_name == name;
   });
   return name.empty() || found == table.end() ? nullptr : &*found;
 }
 
-Result<ParameterValue> from_people(const ParameterSpec& spec, const ParameterValue& value,
-                                   std::string_view place) {
+Result<ParameterValue> from_display(const ParameterSpec& spec, const ParameterValue& value,
+                                    std::string_view place) {
   const bool real = std::holds_alternative<double>(spec.default_value);
   if (const auto* number = std::get_if<double>(&value);
       number != nullptr && is_whole(*number) &&
       std::holds_alternative<std::int64_t>(spec.default_value)) {
-    return from_people(spec, static_cast<std::int64_t>(*number), place);
+    return from_display(spec, static_cast<std::int64_t>(*number), place);
   }
   const auto* whole = std::get_if<std::int64_t>(&value);
   if (value.index() != spec.default_value.index() && !(real && whole != nullptr)) {
@@ -80,10 +80,10 @@ Result<ParameterValue> from_people(const ParameterSpec& spec, const ParameterVal
   }
   if (real) {
     const double given = whole != nullptr ? static_cast<double>(*whole) : std::get<double>(value);
-    const double ours = given / spec.people_scale;
+    const double ours = given / spec.display_scale;
     if (within(spec, ours)) return ours;
     return misuse(
-        out_of_range(place, given, people_bound(spec, spec.min), people_bound(spec, spec.max)));
+        out_of_range(place, given, display_bound(spec, spec.min), display_bound(spec, spec.max)));
   }
   if (whole != nullptr && !within(spec, static_cast<double>(*whole))) {
     return misuse(out_of_range(place, static_cast<double>(*whole), spec.min, spec.max, true));
@@ -109,11 +109,10 @@ Result<Parameters> complete_parameters(std::span<const ParameterSpec> table,
       continue;
     }
     ParameterSpec ours = spec;
-    ours.people_name = {};
-    ours.people_scale = 1.0;
-    auto value = from_people(ours, at->second, name);
-    if (!value) return std::unexpected(value.error());
-    complete.emplace(name, std::move(*value));
+    ours.display_name = {};
+    ours.display_scale = 1.0;
+    auto value = TRY(from_display(ours, at->second, name));
+    complete.emplace(name, std::move(value));
   }
   return complete;
 }
@@ -141,14 +140,14 @@ bool takes_number(const ParameterSpec& spec, double number) {
   return within(spec, number) && (!whole || is_whole(number));
 }
 
-std::string people_text(const ParameterSpec& spec, double number) {
+std::string display_text(const ParameterSpec& spec, double number) {
   if (std::holds_alternative<bool>(spec.default_value)) return number != 0.0 ? "true" : "false";
   if (!spec.words.empty()) {
     return takes_number(spec, number) ? std::string(spec.words[static_cast<std::size_t>(number)])
                                       : std::string();
   }
   std::array<char, 32> text{};
-  const double shown = number * spec.people_scale;
+  const double shown = number * spec.display_scale;
   const auto end =
       std::to_chars(text.data(), text.data() + text.size(), shown, std::chars_format::general, 6)
           .ptr;

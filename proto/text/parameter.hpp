@@ -29,15 +29,15 @@ struct ParameterSpec {
   double max = std::numeric_limits<double>::max();
   // Control can change it while the stream runs: numbers, flags, and texts with `words`.
   bool live = false;
-  // People write some numbers in another unit: as `people_name` ("lag_ms"), with `people_scale` of
-  // their units to one of ours (1000). Empty: the same name and unit.
-  std::string_view people_name{};
-  double people_scale = 1.0;
+  // People write some numbers in another unit: as `display_name` ("lag_ms"), with `display_scale`
+  // of their units to one of ours (1000). Empty: the same name and unit.
+  std::string_view display_name{};
+  double display_scale = 1.0;
   // A text that is one of these. Where it is live, a number stands for it: its place here.
   std::span<const std::string_view> words{};
 
   [[nodiscard]] std::string_view shown_name() const noexcept {
-    return people_name.empty() ? name : people_name;
+    return display_name.empty() ? name : display_name;
   }
 };
 
@@ -48,14 +48,13 @@ struct ParameterSpec {
 // Checks type and range of a value in people's units and returns it in ours; an integer is accepted
 // for a real number, and a real number without a fraction for an integer. `place` names it in the
 // error: "stream.style.alpha = 3 is out of range: it takes a number from -2 to 2".
-[[nodiscard]] Result<ParameterValue> from_people(const ParameterSpec& spec,
-                                                 const ParameterValue& value,
-                                                 std::string_view place);
+Result<ParameterValue> from_display(const ParameterSpec& spec, const ParameterValue& value,
+                                    std::string_view place);
 
 // The values of `given`, which are in our units, checked, and the defaults of all others. A name
 // that is not in the table, another type and a number out of range are errors.
-[[nodiscard]] Result<Parameters> complete_parameters(std::span<const ParameterSpec> table,
-                                                     const Parameters& given);
+Result<Parameters> complete_parameters(std::span<const ParameterSpec> table,
+                                       const Parameters& given);
 
 // The value of a complete table. Another name or type than the table's is a bug of the caller.
 template <typename T>
@@ -72,7 +71,7 @@ template <typename T>
 // Returns whether a live parameter can have the value that this number, in our units, stands for.
 [[nodiscard]] bool takes_number(const ParameterSpec& spec, double number);
 // That value as the config writes it: "true", "1.5", "stride".
-[[nodiscard]] std::string people_text(const ParameterSpec& spec, double number);
+[[nodiscard]] std::string display_text(const ParameterSpec& spec, double number);
 
 // " of milliseconds" for a name that ends in _ms, and so on; empty without a known unit.
 [[nodiscard]] std::string unit_words(std::string_view name);

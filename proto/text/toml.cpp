@@ -165,7 +165,7 @@ Result<> check_toml(std::string_view text, const std::string& file, const TomlLi
 
 Result<toml::table> parse_toml(std::string_view text, const std::string& file,
                                const TomlLimits& limits) {
-  if (auto fits = check_toml(text, file, limits); !fits) return std::unexpected(fits.error());
+  TRY(check_toml(text, file, limits));
   try {
     return toml::parse(text, file);
   } catch (const toml::parse_error& error) {
@@ -176,9 +176,8 @@ Result<toml::table> parse_toml(std::string_view text, const std::string& file,
 }
 
 Result<toml::table> load_toml(const std::filesystem::path& path, const TomlLimits& limits) {
-  const auto text = load_file(path, {.what = limits.what, .max_bytes = limits.bytes});
-  if (!text) return std::unexpected(text.error());
-  return parse_toml(*text, path.string(), limits);
+  const auto text = TRY(load_file(path, {.what = limits.what, .max_bytes = limits.bytes}));
+  return parse_toml(text, path.string(), limits);
 }
 
 }  // namespace posed

@@ -28,16 +28,14 @@ struct TomlLimits {
 // Returns an Error with the line where a limit is exceeded. Comments and strings are skipped as
 // TOML 1.0 defines them. For a text that is not TOML the result may be either, but it never accepts
 // a text that toml++ would nest deeper. No recursion, one pass, memory for at most `depth` levels.
-[[nodiscard]] Result<> check_toml(std::string_view text, const std::string& file,
-                                  const TomlLimits& limits);
+Result<> check_toml(std::string_view text, const std::string& file, const TomlLimits& limits);
 
 // Returns the table of a text that stays within `limits`; `file` is the name in an Error. Throws
 // nothing. The table is shallow enough to be walked and destroyed by recursion.
-[[nodiscard]] Result<toml::table> parse_toml(std::string_view text, const std::string& file,
-                                             const TomlLimits& limits);
+Result<toml::table> parse_toml(std::string_view text, const std::string& file,
+                               const TomlLimits& limits);
 
 // Reads and parses a file, whose size is limited by limits.bytes.
-[[nodiscard]] Result<toml::table> load_toml(const std::filesystem::path& path,
-                                            const TomlLimits& limits);
+Result<toml::table> load_toml(const std::filesystem::path& path, const TomlLimits& limits);
 
 }  // namespace posed

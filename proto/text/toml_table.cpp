@@ -189,7 +189,7 @@ void TableReader::read(const ParameterSpec& spec, ParameterValue& value) {
   if (!node->is_value() || node->is_date() || node->is_time() || node->is_date_time()) {
     return add_type_error(*node, key, "a single value");
   }
-  auto checked = from_people(spec, given, full(key));
+  auto checked = from_display(spec, given, full(key));
   if (!checked) return add_error(key, checked.error().message);
   value = std::move(*checked);
 }
@@ -241,7 +241,7 @@ std::size_t TableReader::choice(std::string_view key, std::span<const std::strin
   const toml::node* node = find(key);
   if (node == nullptr) return 0;
   const auto found = std::ranges::find(words, node->value_or(std::string_view()));
-  if (found != words.end()) return static_cast<std::size_t>(found - words.begin());
+  if (found != words.end()) return found - words.begin();
   add_error(key, shown(key) + " must be one of these words in quotes: " + listed(words, ", "));
   return 0;
 }

@@ -37,7 +37,7 @@ Result<std::string> read_key(const File& file, const std::filesystem::path& path
   std::array<char, kMaxKeyFile> buffer{};
   const ssize_t size = read(file.get(), buffer.data(), buffer.size());
   if (size < 0) return fail("cannot read the key: " + errno_text(), path);
-  std::string text(buffer.data(), static_cast<std::size_t>(size));
+  std::string text(buffer.data(), size);
   while (!text.empty() && (text.back() == '\n' || text.back() == '\r')) text.pop_back();
   if (!is_key(text)) {
     return fail("this is not a key: expected the 40 characters that `posed keygen` writes", path);
@@ -92,9 +92,7 @@ Result<KeyPair> write_new_keys(const std::string& name, const std::filesystem::p
   std::filesystem::create_directories(folder, made);
   if (made) return fail("cannot make the folder: " + made.message(), folder);
   const auto secret_path = folder / (name + ".key");
-  if (auto done = write_key(secret_path, pair.secret_z85, 0600); !done) {
-    return std::unexpected(done.error());
-  }
+  TRY(write_key(secret_path, pair.secret_z85, 0600));
   if (auto done = write_key(folder / (name + ".pub"), pair.public_z85, 0644); !done) {
     unlink(secret_path.c_str());
     return std::unexpected(done.error());
@@ -115,13 +113,12 @@ Result<KeyPair> read_secret_key(const std::filesystem::path& path) {
             path.string(),
         path);
   }
-  auto secret = read_key(file, path);
-  if (!secret) return std::unexpected(secret.error());
+  auto secret = TRY(read_key(file, path));
   std::array<char, kKeyLength + 1> public_z85{};
-  if (zmq_curve_public(public_z85.data(), secret->c_str()) != 0) {
+  if (zmq_curve_public(public_z85.data(), secret.c_str()) != 0) {
     return fail("this libzmq was built without CURVE; install Debian's libzmq5");
   }
-  return KeyPair{public_z85.data(), *secret};
+  return KeyPair{public_z85.data(), secret};
 }
 
 Result<std::string> read_public_key(const std::filesystem::path& path) {
@@ -136,13 +133,11 @@ Result<std::string> read_public_key(const std::filesystem::path& path) {
 
 Result<> secure_client(void* socket, const std::filesystem::path& key_file,
                        const std::filesystem::path& server_key_file) {
-  const auto own = read_secret_key(key_file);
-  if (!own) return std::unexpected(own.error());
-  const auto server = read_public_key(server_key_file);
-  if (!server) return std::unexpected(server.error());
-  for (const Result<>& set : {set_option(socket, ZMQ_CURVE_SERVERKEY, *server),
-                              set_option(socket, ZMQ_CURVE_PUBLICKEY, own->public_z85),
-                              set_option(socket, ZMQ_CURVE_SECRETKEY, own->secret_z85)}) {
+  const auto own = TRY(read_secret_key(key_file));
+  const auto server = TRY(read_public_key(server_key_file));
+  for (const Result<>& set : {set_option(socket, ZMQ_CURVE_SERVERKEY, server),
+                              set_option(socket, ZMQ_CURVE_PUBLICKEY, own.public_z85),
+                              set_option(socket, ZMQ_CURVE_SECRETKEY, own.secret_z85)}) {
     if (!set) return set;
   }
   return {};

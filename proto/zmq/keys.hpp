@@ -18,21 +18,20 @@ struct KeyPair {
 
 // Makes a key pair and writes DIR/NAME.pub and DIR/NAME.key (mode 0600). Refuses to overwrite
 // either file, and leaves neither behind when one cannot be written.
-[[nodiscard]] Result<KeyPair> write_new_keys(const std::string& name,
-                                             const std::filesystem::path& folder);
+Result<KeyPair> write_new_keys(const std::string& name, const std::filesystem::path& folder);
 
 // Reads NAME.key. Refuses a file that other users can read, because its key is no longer secret.
-[[nodiscard]] Result<KeyPair> read_secret_key(const std::filesystem::path& path);
+Result<KeyPair> read_secret_key(const std::filesystem::path& path);
 
 // Reads NAME.pub; returns the key in Z85.
-[[nodiscard]] Result<std::string> read_public_key(const std::filesystem::path& path);
+Result<std::string> read_public_key(const std::filesystem::path& path);
 
 // Whether `text` has the form of a key: 40 characters of Z85.
 [[nodiscard]] bool is_key(const std::string& text);
 
 // Makes `socket` a CURVE client with its own NAME.key and the server's NAME.pub. Call before
 // connect.
-[[nodiscard]] Result<> secure_client(void* socket, const std::filesystem::path& key_file,
-                                     const std::filesystem::path& server_key_file);
+Result<> secure_client(void* socket, const std::filesystem::path& key_file,
+                       const std::filesystem::path& server_key_file);
 
 }  // namespace posed::net

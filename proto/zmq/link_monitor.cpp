@@ -38,12 +38,9 @@ Result<LinkMonitor> LinkMonitor::open(void* context, void* socket, bool with_key
   if (zmq_socket_monitor(socket, endpoint.c_str(), kEvents) != 0) {
     return fail(std::string("cannot watch the connection: ") + zmq_strerror(zmq_errno()));
   }
-  auto monitor = open_socket(context, ZMQ_PAIR);
-  if (!monitor) return std::unexpected(monitor.error());
-  if (auto done = connect_socket(monitor->get(), endpoint); !done) {
-    return std::unexpected(done.error());
-  }
-  return LinkMonitor(std::move(*monitor), with_key);
+  auto monitor = TRY(open_socket(context, ZMQ_PAIR));
+  TRY(connect_socket(monitor.get(), endpoint));
+  return LinkMonitor(std::move(monitor), with_key);
 }
 
 Refusal LinkMonitor::next_refusal() {

@@ -24,7 +24,7 @@ class LinkMonitor {
  public:
   // Call before the socket connects; destroy the monitor before the socket. `with_key`: the client
   // uses CURVE.
-  [[nodiscard]] static Result<LinkMonitor> open(void* context, void* socket, bool with_key);
+  static Result<LinkMonitor> open(void* context, void* socket, bool with_key);
 
   [[nodiscard]] void* socket() const noexcept { return monitor_.get(); }  // readable: events wait
 

@@ -7,7 +7,7 @@
 namespace posed::net {
 namespace {
 
-constexpr std::size_t kHighestPort = 65535;
+constexpr std::size_t kMaxPort = 65535;
 
 std::string last_error() { return zmq_strerror(zmq_errno()); }
 
@@ -26,7 +26,7 @@ Result<Context> open_context() {
 Result<Socket> open_socket(void* context, int type) {
   Socket socket(zmq_socket(context, type));
   if (!socket) return fail("ZeroMQ cannot open a socket: " + last_error());
-  if (auto set = set_option(socket.get(), ZMQ_LINGER, 0); !set) return std::unexpected(set.error());
+  TRY(set_option(socket.get(), ZMQ_LINGER, 0));
   return socket;
 }
 
@@ -46,7 +46,7 @@ bool has_possible_port(std::string_view endpoint) noexcept {
   for (const char letter : endpoint.substr(endpoint.rfind(':') + 1)) {
     if (letter < '0' || letter > '9') return true;  // "*", or what libzmq itself refuses
     port = port * 10 + static_cast<std::size_t>(letter - '0');
-    if (port > kHighestPort) return false;
+    if (port > kMaxPort) return false;
   }
   return true;
 }
@@ -79,7 +79,7 @@ Result<> connect_socket(void* socket, const std::string& endpoint) {
                                       {ZMQ_TCP_KEEPALIVE_IDLE, 2},
                                       {ZMQ_TCP_KEEPALIVE_INTVL, 1},
                                       {ZMQ_TCP_KEEPALIVE_CNT, 3}}) {
-    if (auto set = set_option(socket, option, value); !set) return set;
+    TRY(set_option(socket, option, value));
   }
   if (zmq_connect(socket, endpoint.c_str()) == 0) return {};
   return misuse("cannot connect to '" + endpoint + "': " + last_error() +

@@ -61,13 +61,13 @@ class Message {
   zmq_msg_t message_;
 };
 
-[[nodiscard]] Result<Context> open_context();
+Result<Context> open_context();
 
 // A socket that drops unsent messages when it is closed (linger 0).
-[[nodiscard]] Result<Socket> open_socket(void* context, int type);
+Result<Socket> open_socket(void* context, int type);
 
-[[nodiscard]] Result<> set_option(void* socket, int option, int value);
-[[nodiscard]] Result<> set_option(void* socket, int option, std::string_view value);
+Result<> set_option(void* socket, int option, int value);
+Result<> set_option(void* socket, int option, std::string_view value);
 
 // False for tcp://HOST:99999: libzmq reduces the port modulo 65536 and would silently use another
 // one.
@@ -75,10 +75,10 @@ class Message {
 
 // Binds and returns the endpoint that is really bound ("tcp://127.0.0.1:*" picks a free port). If
 // the port is busy, the error says so in one sentence.
-[[nodiscard]] Result<std::string> bind_socket(void* socket, const std::string& endpoint);
+Result<std::string> bind_socket(void* socket, const std::string& endpoint);
 // Connects now or as soon as somebody listens there, and connects again after a loss, which
 // keep-alive packets detect where the peer vanished silently.
-[[nodiscard]] Result<> connect_socket(void* socket, const std::string& endpoint);
+Result<> connect_socket(void* socket, const std::string& endpoint);
 
 // Makes the socket learn at once what its peers have read. A busy socket otherwise learns it once a
 // millisecond, and mistakes a peer that is reading for one that is not.

@@ -70,33 +70,28 @@ class LentEmulator final : public Emulator {
 // The driver opens the emulator as it would open the glove; afterwards the emulator streams.
 Result<std::unique_ptr<drivers::Decoder>> opened_decoder(const Driver& driver, Options options,
                                                          Emulator& emulator) {
-  auto port = emulate::EmulatedPort::open_pty();
-  if (!port) return std::unexpected(port.error());
-  options["port"] = port->name();
-  emulate::EmulatedDevice glove(std::make_unique<LentEmulator>(emulator), std::move(*port), {}, {});
+  auto port = TRY(emulate::EmulatedPort::open_pty());
+  options["port"] = port.name();
+  emulate::EmulatedDevice glove(std::make_unique<LentEmulator>(emulator), std::move(port), {}, {});
   const std::jthread thread([&](const std::stop_token& stop) { glove.run(stop); });
   drivers::TransportFactory ports;
-  auto device = driver.open(options, ports);
-  if (!device) return std::unexpected(device.error());
-  return std::move(device->decoder);
+  auto device = TRY(driver.open(options, ports));
+  return std::move(device.decoder);
 }
 
 Result<std::unique_ptr<drivers::Decoder>> expected_decoder(const Driver& driver,
                                                            const Options& options) {
-  const auto description = driver.expect(options);
-  if (!description) return std::unexpected(description.error());
-  return driver.make_decoder(*description);
+  const auto description = TRY(driver.expect(options));
+  return driver.make_decoder(description);
 }
 
 Result<BenchGlove> make_bench_glove(const Driver& driver, const std::string& name,
                                     const Options& options) {
-  auto emulator = driver.emulate(options);
-  if (!emulator) return std::unexpected(emulator.error());
-  auto decoder = (*emulator)->next_due_ns() == kNoTime_ns
-                     ? opened_decoder(driver, options, **emulator)
-                     : expected_decoder(driver, options);
-  if (!decoder) return std::unexpected(decoder.error());
-  return BenchGlove{name, std::move(*emulator), std::move(*decoder)};
+  auto emulator = TRY(driver.emulate(options));
+  auto decoder =
+      TRY(emulator->next_due_ns() == kNoTime_ns ? opened_decoder(driver, options, *emulator)
+                                                : expected_decoder(driver, options));
+  return BenchGlove{name, std::move(emulator), std::move(decoder)};
 }
 
 // The variants of a driver's gloves that differ in their bytes.
@@ -123,9 +118,8 @@ Result<std::vector<BenchGlove>> bench_gloves() {
   for (const Driver& driver : drivers::registry()) {
     if (driver.glove == nullptr || driver.emulate == nullptr) continue;
     for (const auto& [name, options] : glove_kinds(driver)) {
-      auto glove = make_bench_glove(driver, name, options);
-      if (!glove) return std::unexpected(glove.error());
-      gloves.push_back(std::move(*glove));
+      auto glove = TRY(make_bench_glove(driver, name, options));
+      gloves.push_back(std::move(glove));
     }
   }
   return gloves;
@@ -229,12 +223,10 @@ std::int64_t take_record(BenchLine& line, std::size_t bytes, drivers::Decoder* d
 }
 
 Result<json> decoder_latency(BenchGlove& glove, int samples) {
-  auto port = emulate::EmulatedPort::open_pty();
-  if (!port) return std::unexpected(port.error());
+  auto port = TRY(emulate::EmulatedPort::open_pty());
   drivers::TransportFactory ports;
-  auto link = ports.serial({.port = port->name()});
-  if (!link) return std::unexpected(link.error());
-  BenchLine line{std::move(*port), drivers::make_link_transport(std::move(*link))};
+  auto link = TRY(ports.serial({.port = port.name()}));
+  BenchLine line{std::move(port), drivers::make_link_transport(std::move(link))};
   std::vector<double> bare_us, decoded_us;
   RingSink sink;
   std::atomic<int> wanted{0};
@@ -294,14 +286,12 @@ struct DecoderBench {
 Result<> bench_decoders(const DecoderBench& bench) {
   json report = json::array();
   if (!bench.json) std::printf("latency in us: p50, p99, p99.9, max\n");
-  auto gloves = bench_gloves();
-  if (!gloves) return std::unexpected(gloves.error());
-  for (BenchGlove& glove : *gloves) {
+  auto gloves = TRY(bench_gloves());
+  for (BenchGlove& glove : gloves) {
     if (!glove.name.starts_with(bench.glove)) continue;
     json entry{{"glove", glove.name}, {"throughput", decoder_rate(glove)}};
-    auto ways = decoder_latency(glove, bench.samples);
-    if (!ways) return std::unexpected(ways.error());
-    entry["latency"] = std::move(*ways);
+    auto ways = TRY(decoder_latency(glove, bench.samples));
+    entry["latency"] = std::move(ways);
     if (!bench.json) print_glove(entry);
     report.push_back(std::move(entry));
   }

@@ -41,23 +41,18 @@ struct BenchGenerateOptions {
 };
 
 Result<gesture::GestureModel> synthetic_model() {
-  const auto performance = gesture::make_performance({});
-  if (!performance) return std::unexpected(performance.error());
+  const auto performance = TRY(gesture::make_performance({}));
   constexpr double kRate_hz = 30.0;
-  auto recording = gesture::recording_of(performance->clip, kRate_hz);
-  if (!recording) return std::unexpected(recording.error());
-  if (auto cut = gesture::cut(*recording, performance->labels, "synthetic labels"); !cut) {
-    return std::unexpected(cut.error());
-  }
-  return gesture::train_gesture({*recording}, {});
+  auto recording = TRY(gesture::recording_of(performance.clip, kRate_hz));
+  TRY(gesture::cut(recording, performance.labels, "synthetic labels"));
+  return gesture::train_gesture({recording}, {});
 }
 
 // Every sequence of four of the labels g c p 1 3 4, or `count` of them, evenly spaced.
 Result<json> bench_strings(const trajectory::StateInformation& information, int count) {
-  const auto alphabet = perform::labels_of(information.model(), "g c p 1 3 4");
-  if (!alphabet) return std::unexpected(alphabet.error());
+  const auto alphabet = TRY(perform::labels_of(information.model(), "g c p 1 3 4"));
   constexpr int kLength = 4;
-  const auto letters = static_cast<int>(alphabet->size());
+  const auto letters = static_cast<int>(alphabet.size());
   const int all = static_cast<int>(std::pow(letters, kLength));
   const int asked = count < 0 ? all : std::min(count, all);
   tools::ProgressBar bar;
@@ -70,7 +65,7 @@ Result<json> bench_strings(const trajectory::StateInformation& information, int 
     if (!bar.show("strings", static_cast<double>(i) / asked)) return fail("stopped");
     std::vector<int> labels;
     for (int code = static_cast<int>(static_cast<long>(i) * all / asked), l = 0; l < kLength; ++l) {
-      labels.push_back((*alphabet)[static_cast<std::size_t>(code % letters)]);
+      labels.push_back(alphabet[static_cast<std::size_t>(code % letters)]);
       code /= letters;
     }
     auto performance = perform::perform(information, labels, {});
@@ -91,17 +86,15 @@ Result<json> bench_strings(const trajectory::StateInformation& information, int 
 }
 
 Result<json> bench(const BenchGenerateOptions& options) {
-  auto model = options.model.empty() ? synthetic_model() : gesture::load_model(options.model);
-  if (!model) return std::unexpected(model.error());
-  const double rate_hz = model->rate_hz;
+  auto model = TRY(options.model.empty() ? synthetic_model() : gesture::load_model(options.model));
+  const double rate_hz = model.rate_hz;
   const trajectory::StateInformation information(
-      std::make_shared<const gesture::GestureModel>(std::move(*model)), rate_hz);
+      std::make_shared<const gesture::GestureModel>(std::move(model)), rate_hz);
   json report{{"streaming", bench_streaming(information)},
               {"batch", bench_batch(information, options.samples)}};
   if (options.strings != 0) {
-    auto strings = bench_strings(information, options.strings);
-    if (!strings) return std::unexpected(strings.error());
-    report["strings"] = *strings;
+    auto strings = TRY(bench_strings(information, options.strings));
+    report["strings"] = strings;
   }
   return report;
 }

@@ -84,15 +84,12 @@ int relay_until_stopped(tools::PipePair& parent) {
 Result<std::vector<Turn>> fork_turns(const RelayBench& bench) {
   std::vector<Turn> turns;
   for (int i = 0; i < bench.turns; ++i) {
-    auto direct = tools::HopSubscriber::fork(true);
-    if (!direct) return std::unexpected(direct.error());
-    auto relay = tools::ChildProcess::fork(relay_until_stopped, true);
-    if (!relay) return std::unexpected(relay.error());
-    Turn turn{std::move(*direct), std::move(*relay), {}};
+    auto direct = TRY(tools::HopSubscriber::fork(true));
+    auto relay = TRY(tools::ChildProcess::fork(relay_until_stopped, true));
+    Turn turn{std::move(direct), std::move(relay), {}};
     for (int s = 0; s < bench.subscribers; ++s) {
-      auto behind = tools::HopSubscriber::fork(true);
-      if (!behind) return std::unexpected(behind.error());
-      turn.behind.push_back(std::move(*behind));
+      auto behind = TRY(tools::HopSubscriber::fork(true));
+      turn.behind.push_back(std::move(behind));
     }
     turns.push_back(std::move(turn));
   }
@@ -108,28 +105,21 @@ double cpu_percent_during(int seconds) {
 }
 
 Result<> collect(tools::HopSubscriber& subscriber, ReceivedFrames& frames, bool ages) {
-  auto received = subscriber.finish();
-  if (!received) return std::unexpected(received.error());
-  frames.gaps += received->gaps;
+  auto received = TRY(subscriber.finish());
+  frames.gaps += received.gaps;
   if (!ages) return {};
-  const std::vector<double> ages_us = tools::send_ages_us(received->messages);
+  const std::vector<double> ages_us = tools::send_ages_us(received.messages);
   frames.send_us.insert(frames.send_us.end(), ages_us.begin(), ages_us.end());
   return {};
 }
 
 // How long a subscriber that comes now waits for a skeleton.
 Result<double> late_joiner_us(void* context, const std::string& endpoint) {
-  auto socket = net::open_socket(context, ZMQ_SUB);
-  if (!socket) return std::unexpected(socket.error());
-  if (auto set = net::set_option(socket->get(), ZMQ_SUBSCRIBE, std::string_view("skeleton/"));
-      !set) {
-    return std::unexpected(set.error());
-  }
+  auto socket = TRY(net::open_socket(context, ZMQ_SUB));
+  TRY(net::set_option(socket.get(), ZMQ_SUBSCRIBE, std::string_view("skeleton/")));
   const std::int64_t begun_ns = system::monotonic_ns();
-  if (auto done = net::connect_socket(socket->get(), endpoint); !done) {
-    return std::unexpected(done.error());
-  }
-  zmq_pollitem_t item{socket->get(), 0, ZMQ_POLLIN, 0};
+  TRY(net::connect_socket(socket.get(), endpoint));
+  zmq_pollitem_t item{socket.get(), 0, ZMQ_POLLIN, 0};
   if (zmq_poll(&item, 1, 5000) != 1) return fail("no skeleton came within 5 s");
   return static_cast<double>(system::monotonic_ns() - begun_ns) * 1e-3;
 }
@@ -138,22 +128,20 @@ Result<> measure_turn(const RelayBench& bench, const std::string& daemon, Turn& 
                       RelayFigures& figures) {
   turn.direct->begin({daemon});
   figures.direct.cpu_percent += cpu_percent_during(bench.seconds) / bench.turns;
-  if (auto taken = collect(*turn.direct, figures.direct, true); !taken) return taken;
+  TRY(collect(*turn.direct, figures.direct, true));
   turn.relay.pipes().write_line(daemon);
   const std::string relay = turn.relay.pipes().read_line();
   if (relay.empty()) return fail("the relay's process ended early");
   for (const auto& subscriber : turn.behind) subscriber->begin({relay});
   figures.relayed.cpu_percent += cpu_percent_during(bench.seconds) / bench.turns;
-  auto context = net::open_context();
-  if (!context) return std::unexpected(context.error());
+  auto context = TRY(net::open_context());
   for (int i = 0; i < kLateJoiners; ++i) {
-    const auto late_us = late_joiner_us(context->get(), relay);
-    if (!late_us) return std::unexpected(late_us.error());
-    figures.late_us.push_back(*late_us);
+    const auto late_us = TRY(late_joiner_us(context.get(), relay));
+    figures.late_us.push_back(late_us);
   }
   for (const auto& subscriber : turn.behind) {
     const bool first = subscriber == turn.behind.front();  // all hear the same stamps
-    if (auto taken = collect(*subscriber, figures.relayed, first); !taken) return taken;
+    TRY(collect(*subscriber, figures.relayed, first));
   }
   turn.relay.pipes().close_to();
   return {};
@@ -161,20 +149,16 @@ Result<> measure_turn(const RelayBench& bench, const std::string& daemon, Turn& 
 
 Result<RelayFigures> measure(const RelayBench& bench) {
   spdlog::set_level(spdlog::level::err);  // only the figures are to be printed
-  auto turns = fork_turns(bench);
-  if (!turns) return std::unexpected(turns.error());
+  auto turns = TRY(fork_turns(bench));
   const tools::WorkFolder folder;
-  const auto config = tools::walkers_config({.streams = bench.streams}, folder);
-  if (!config) return std::unexpected(config.error());
-  auto daemon = assembly::Daemon::open(*config);
-  if (!daemon) return std::unexpected(daemon.error());
-  if (auto started = (*daemon)->start(); !started) return std::unexpected(started.error());
+  const auto config = TRY(tools::walkers_config({.streams = bench.streams}, folder));
+  auto daemon = TRY(assembly::Daemon::open(config));
+  TRY(daemon->start());
   RelayFigures figures;
-  for (Turn& turn : *turns) {
-    auto measured = measure_turn(bench, (*daemon)->publish_endpoint(), turn, figures);
-    if (!measured) return std::unexpected(measured.error());
+  for (Turn& turn : turns) {
+    TRY(measure_turn(bench, daemon->publish_endpoint(), turn, figures));
   }
-  (*daemon)->stop();
+  daemon->stop();
   return figures;
 }
 
@@ -212,9 +196,8 @@ tools::Findings findings_of(const RelayBench& bench, const RelayFigures& figures
 }
 
 Result<> bench_relay(const RelayBench& bench) {
-  const auto measured = measure(bench);
-  if (!measured) return std::unexpected(measured.error());
-  findings_of(bench, *measured).show(bench.json);
+  const auto measured = TRY(measure(bench));
+  findings_of(bench, measured).show(bench.json);
   return {};
 }
 

@@ -64,17 +64,14 @@ Result<std::vector<Truth>> truths_of(const BenchSmoothOptions& options) {
     truths.push_back({std::move(angles), hand.rate_hz});
   };
   for (const std::string& path : options.clips) {
-    auto hand = clip::read_hand_clip(path);
-    if (!hand) return std::unexpected(hand.error());
-    if (hand->angles.size() < 100)
-      return fail("has fewer than 100 frames; take a longer one", path);
-    add(std::move(*hand));
+    auto hand = TRY(clip::read_hand_clip(path));
+    if (hand.angles.size() < 100) return fail("has fewer than 100 frames; take a longer one", path);
+    add(std::move(hand));
   }
   if (!truths.empty()) return truths;
-  auto made = gesture::make_performance(
-      {.gestures = 20, .rate_hz = 60.0, .noise_deg = 0.0, .dead_band_deg = 0.0});
-  if (!made) return std::unexpected(made.error());
-  add(std::move(made->clip));
+  auto made = TRY(gesture::make_performance(
+      {.gestures = 20, .rate_hz = 60.0, .noise_deg = 0.0, .dead_band_deg = 0.0}));
+  add(std::move(made.clip));
   return truths;
 }
 
@@ -258,9 +255,8 @@ void print(const json& report) {
 Result<> bench_smooth(const BenchSmoothOptions& options) {
   json report{{"cost", cost(options.seed)}};
   if (!options.cost) {
-    const auto truths = truths_of(options);
-    if (!truths) return std::unexpected(truths.error());
-    report["accuracy"] = accuracy(*truths, options.seed);
+    const auto truths = TRY(truths_of(options));
+    report["accuracy"] = accuracy(truths, options.seed);
   }
   if (options.json) {
     std::printf("%s\n", json_text(report, 2).c_str());

@@ -139,11 +139,9 @@ int receive_of_avatars(tools::PipePair& parent) {
 Result<config::DaemonConfig> stage_config(const StageBench& bench, const std::vector<int>& ports,
                                           const std::string& avatars,
                                           const tools::WorkFolder& folder) {
-  const auto walker = motion::make_walker({});
-  if (!walker) return std::unexpected(walker.error());
-  auto written = tools::write_synthetic_model(motion::Space::kHumanoid, *walker->skeleton,
-                                              bench.points, folder / "model.style");
-  if (!written) return std::unexpected(written.error());
+  const auto walker = TRY(motion::make_walker({}));
+  TRY(tools::write_synthetic_model(motion::Space::kHumanoid, *walker.skeleton, bench.points,
+                                   folder / "model.style"));
   config::DaemonConfig config;
   config.publish_endpoint = config.control_endpoint = "tcp://127.0.0.1:*";
   config.realtime = bench.realtime;
@@ -207,37 +205,30 @@ void watch(int seconds_, StageFigures& figures) {
 
 Result<StageFigures> measure(const StageBench& bench) {
   spdlog::set_level(spdlog::level::err);  // only the figures are to be printed
-  auto subscriber = tools::HopSubscriber::fork();
-  if (!subscriber) return std::unexpected(subscriber.error());
-  auto performers = tools::ChildProcess::fork(
-      [&bench](tools::PipePair& parent) { return perform_until_stopped(parent, bench.rate_hz); });
-  if (!performers) return std::unexpected(performers.error());
-  auto avatars = tools::ChildProcess::fork(receive_of_avatars);
-  if (!avatars) return std::unexpected(avatars.error());
+  auto subscriber = TRY(tools::HopSubscriber::fork());
+  auto performers = TRY(tools::ChildProcess::fork(
+      [&bench](tools::PipePair& parent) { return perform_until_stopped(parent, bench.rate_hz); }));
+  auto avatars = TRY(tools::ChildProcess::fork(receive_of_avatars));
   const tools::WorkFolder folder;
-  const auto ports = free_ports(bench.performers);
-  if (!ports) return std::unexpected(ports.error());
-  const std::string avatar_port = avatars->pipes().read_line();
-  const auto config = stage_config(bench, *ports, "127.0.0.1:" + avatar_port, folder);
-  if (!config) return std::unexpected(config.error());
-  auto daemon = assembly::Daemon::open(*config);
-  if (!daemon) return std::unexpected(daemon.error());
-  if (auto started = (*daemon)->start(); !started) return std::unexpected(started.error());
-  (*subscriber)->begin({(*daemon)->publish_endpoint()});
-  for (const int port : *ports) performers->pipes().write_line(address_of(port));
-  performers->pipes().write_line("");
+  const auto ports = TRY(free_ports(bench.performers));
+  const std::string avatar_port = avatars.pipes().read_line();
+  const auto config = TRY(stage_config(bench, ports, "127.0.0.1:" + avatar_port, folder));
+  auto daemon = TRY(assembly::Daemon::open(config));
+  TRY(daemon->start());
+  subscriber->begin({daemon->publish_endpoint()});
+  for (const int port : ports) performers.pipes().write_line(address_of(port));
+  performers.pipes().write_line("");
   StageFigures figures;
   watch(bench.seconds, figures);
-  performers->pipes().close_to();
+  performers.pipes().close_to();
   std::this_thread::sleep_for(kSettle);  // for the last statistics
-  count((*daemon)->stats(), figures);
-  (*daemon)->stop();
-  auto received = (*subscriber)->finish();
-  if (!received) return std::unexpected(received.error());
-  figures.gaps = received->gaps;
-  figures.send = tools::figures_of(tools::send_ages_us(received->messages));
-  avatars->pipes().close_to();
-  if (!avatars->pipes().read(&figures.avatars_received, sizeof figures.avatars_received)) {
+  count(daemon->stats(), figures);
+  daemon->stop();
+  auto received = TRY(subscriber->finish());
+  figures.gaps = received.gaps;
+  figures.send = tools::figures_of(tools::send_ages_us(received.messages));
+  avatars.pipes().close_to();
+  if (!avatars.pipes().read(&figures.avatars_received, sizeof figures.avatars_received)) {
     return fail("the avatars' process ended early");
   }
   return figures;
@@ -279,9 +270,8 @@ tools::Findings findings_of(const StageBench& bench, const StageFigures& figures
 }
 
 Result<> bench_stage(const StageBench& bench) {
-  const auto measured = measure(bench);
-  if (!measured) return std::unexpected(measured.error());
-  findings_of(bench, *measured).show(bench.json);
+  const auto measured = TRY(measure(bench));
+  findings_of(bench, measured).show(bench.json);
   return {};
 }
 

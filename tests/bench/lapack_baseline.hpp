@@ -12,7 +12,7 @@ namespace posed::bench {
 class LapackBaseline {
  public:
   // Returns an error when liblapack.so.3 is not installed.
-  [[nodiscard]] static Result<LapackBaseline> load();
+  static Result<LapackBaseline> load();
 
   // The trajectory of every channel, [channel][frame], from the information of all frames.
   void solve(const trajectory::InformationForm& information, std::vector<double>& x);

@@ -25,7 +25,6 @@ struct SptkRun {
 
 // Runs mlpg with the influence range `range` (-s), whose delay is range + 1. Returns an error when
 // sptk is not installed.
-[[nodiscard]] Result<SptkRun> run_sptk(const SptkInput& input, int range,
-                                       const std::filesystem::path& folder);
+Result<SptkRun> run_sptk(const SptkInput& input, int range, const std::filesystem::path& folder);
 
 }  // namespace posed::bench

@@ -174,12 +174,12 @@ listen = "127.0.0.1:1599"
   INFO(shown.err);
   CHECK(has(shown.out, "records to " + served.path("monday") + ", each take as BVH\n"));
   CHECK(has(shown.out, "takes ... 127.0.0.1:1599"));
-  const auto told = json::parse(posed({"check", "--config", config, "--json"}).out);
-  CHECK(told.at("record").at("folder") == served.path("monday"));
-  CHECK(told.at("record").at("frames") == false);
-  CHECK(told.at("record").at("clips") == true);
-  CHECK(told.at("trigger").at("listen") == "127.0.0.1:1599");
-  CHECK(told.at("trigger").at("peers").empty());
+  const auto reported = json::parse(posed({"check", "--config", config, "--json"}).out);
+  CHECK(reported.at("record").at("folder") == served.path("monday"));
+  CHECK(reported.at("record").at("frames") == false);
+  CHECK(reported.at("record").at("clips") == true);
+  CHECK(reported.at("trigger").at("listen") == "127.0.0.1:1599");
+  CHECK(reported.at("trigger").at("peers").empty());
 }
 
 TEST_CASE("unknown clients get no access, and a withdrawn key is cut off") {

@@ -176,9 +176,9 @@ TEST_CASE("a published replay is marked as one, and its times are consistent") {
   replay.send(SIGINT);
   CHECK(replay.exit_code() == 0);
 
-  const ProgramOutcome unheard = posed({"replay", log, "--endpoint", "tcp://127.0.0.1:*"});
-  CHECK(unheard.code == 2);
-  CHECK(has(unheard.err, "--publish"));
+  const ProgramOutcome unreceived = posed({"replay", log, "--endpoint", "tcp://127.0.0.1:*"});
+  CHECK(unreceived.code == 2);
+  CHECK(has(unreceived.err, "--publish"));
   Process cut({"replay", log, "--speed", "0.05", "--out", (folder.path() / "cut").string()});
   CHECK(cut.comes_to_say("replayed 0 of "));  // its progress
   cut.send(SIGINT);
@@ -256,10 +256,10 @@ TEST_CASE("each command explains its own options, and refuses those without an e
        {std::array{"cyberglove", "--udp", "give --link PATH or --tcp HOST:PORT"},
         std::array{"natnet", "--tcp", "give --udp IP:PORT"},
         std::array{"posed", "--udp", "give --publish ENDPOINT"}}) {
-    const auto unheard = posed({"emulate", device, way, "127.0.0.1:9", "--seconds", "0.1"});
-    CHECK(unheard.code == 2);
-    CHECK(has(unheard.err, std::string("posed does not listen for ") + device + " ... " + way));
-    CHECK(has(unheard.err, advice));
+    const auto unreceived = posed({"emulate", device, way, "127.0.0.1:9", "--seconds", "0.1"});
+    CHECK(unreceived.code == 2);
+    CHECK(has(unreceived.err, std::string("posed does not listen for ") + device + " ... " + way));
+    CHECK(has(unreceived.err, advice));
   }
   const auto mistyped = [](std::vector<std::string> words, const std::string& sentence) {
     const auto refused = posed(std::move(words));

@@ -36,7 +36,8 @@ std::unique_ptr<drivers::UdpTransport> listen_at(const std::string& endpoint) {
 }
 
 // The newest rotation of each bone, as it was sent, until so many status messages have come.
-std::map<std::string, std::array<float, 7>> hear_bones(drivers::UdpTransport& socket, int frames) {
+std::map<std::string, std::array<float, 7>> receive_bones(drivers::UdpTransport& socket,
+                                                          int frames) {
   std::map<std::string, std::array<float, 7>> bones;
   const auto until = steady_clock::now() + std::chrono::seconds(20);
   while (frames > 0 && steady_clock::now() < until) {
@@ -121,7 +122,7 @@ TEST_CASE("posed run sends a stream to a VMC application and reports it") {
   CHECK(checked.out.find("output vmc-ann: vmc, body ann, to " + socket->endpoint(0)) !=
         std::string::npos);
   served.start();
-  const auto bones = hear_bones(*socket, 30);
+  const auto bones = receive_bones(*socket, 30);
   CHECK(bones.contains("Hips"));
   CHECK(bones.contains("Head"));
   const auto top = posed({"top", "--connect", served.publish, "--count", "2", "--json"});
@@ -168,7 +169,7 @@ TEST_CASE("oscdump prints what the VMC output sends") {
   served.write_output("[[output]]\nkind = \"vmc\"\nbody = \"ann\"\nto = [\"" + socket->endpoint(0) +
                       "\", \"127.0.0.1:" + std::to_string(port) + "\"]\n");
   served.start();
-  const auto bones = hear_bones(*socket, 10);
+  const auto bones = receive_bones(*socket, 10);
   const std::string text = dump.printed("/VMC/Ext/T");
   CHECK(bones.size() >= 3);
   for (const auto& [name, values] : bones) {

@@ -43,7 +43,7 @@ class Walkers : public Stage {
     folder.write("posed.toml", config);
   }
 
-  void tell(std::vector<std::string> what) const {
+  void notify(std::vector<std::string> what) const {
     const ProgramOutcome outcome = ctl(std::move(what));
     INFO(outcome.err);
     CHECK(outcome.code == 0);
@@ -85,8 +85,8 @@ class Walkers : public Stage {
 TEST_CASE("replays of alpha and model changes and a forced shed give one FRAMES.bin as published") {
   Walkers stage;
   stage.record();
-  stage.tell({"set", "walker", "alpha", "-0.5"});
-  stage.tell({"model", "other", stage.path("two.style")});
+  stage.notify({"set", "walker", "alpha", "-0.5"});
+  stage.notify({"model", "other", stage.path("two.style")});
   stage.hold_back_pipeline(true);
   for (int i = 0; i < 10 && !stage.decisions().contains("shed"); ++i) {
     stage.daemon->send(SIGSTOP);
@@ -95,7 +95,7 @@ TEST_CASE("replays of alpha and model changes and a forced shed give one FRAMES.
     std::this_thread::sleep_for(800ms);  // a log may be read while it is written
   }
   stage.hold_back_pipeline(false);
-  stage.tell({"set", "other", "alpha", "0.25"});
+  stage.notify({"set", "other", "alpha", "0.25"});
   std::this_thread::sleep_for(300ms);
   stage.daemon->send(SIGTERM);
   CHECK(stage.daemon->exit_code() == 0);

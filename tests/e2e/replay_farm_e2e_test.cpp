@@ -116,8 +116,8 @@ TEST_CASE("each log is replayed on its own instruction set, or all on one", "[fa
   CHECK(own[2]["isa"] == "portable");
   if (own[1]["isa"] != "avx2") WARN("this CPU has no AVX2");
   for (const json& line : check_as_alone({"--isa", "portable"})) CHECK(line["isa"] == "portable");
-  const auto told = farm(kept.good, {"--expect", "--isa", "portable"});
-  CHECK(has(told.out, "avx2 ... portable ... last bits"));
+  const auto reported = farm(kept.good, {"--expect", "--isa", "portable"});
+  CHECK(has(reported.out, "avx2 ... portable ... last bits"));
 }
 
 TEST_CASE("what the logs lack is told, and nothing compared is a failure", "[farm]") {

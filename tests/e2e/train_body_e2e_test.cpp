@@ -137,9 +137,9 @@ TEST_CASE("Raised arms are learnt, and both are raised", "[train_body]") {
                             "All trees of left-arm", "Which gesture is recognised"}) {
     CHECK(page.find(there) != std::string::npos);
   }
-  const auto told = eval({"--reference", both, "--reference-labels", labels});
-  CHECK(told.code == 0);
-  CHECK(told.out.find("raise-both (new)") != std::string::npos);
+  const auto reported = eval({"--reference", both, "--reference-labels", labels});
+  CHECK(reported.code == 0);
+  CHECK(reported.out.find("raise-both (new)") != std::string::npos);
   CHECK(one_sentence(eval({"--report", takes.file("y.html")}), 2, "add --reference TAKE.bvh"));
   CHECK(one_sentence(eval({"--reference", both, "--reference-labels",
                            takes.folder.write("x.lab", "0 1 jump\n").string()}),
@@ -210,9 +210,9 @@ TEST_CASE("What no body can be learnt from is refused", "[train_body]") {
   }
   const auto other = takes.folder.write("lame.bvh", lame).string();
   for (const bool first : {true, false}) {
-    const std::string& sound = takes.clips[1];
+    const std::string& valid = takes.clips[1];
     CHECK(one_sentence(
-        posed({"train", "gesture", "--body", "--clip", first ? other : sound, first ? sound : other,
+        posed({"train", "gesture", "--body", "--clip", first ? other : valid, first ? valid : other,
                "--labels", takes.labels[0], takes.labels[1], "--out", takes.file("x.gesture")}),
         1, "leftFoot"));
   }

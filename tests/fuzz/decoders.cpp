@@ -61,11 +61,11 @@ void check(const CollectSink& sink) {
   std::int64_t before_ns = posed::kNoTime_ns;
   for (const posed::Frame& frame : sink.frames) {
     const std::int64_t device_ns = frame.header.device_ns;
-    demand(posed::test::is_sound(frame));
+    demand(posed::test::is_valid(frame));
     demand(device_ns >= before_ns);
     before_ns = device_ns;
   }
-  for (const posed::Sample& sample : sink.samples) demand(posed::test::is_sound(sample));
+  for (const posed::Sample& sample : sink.samples) demand(posed::test::is_valid(sample));
 }
 
 void try_bytes(const char* driver, const std::string& text, std::size_t piece,
@@ -131,7 +131,7 @@ void try_bodies(const posed::drivers::Driver& driver, std::span<const std::byte>
   CollectSink sink(0);
   feed(*decoder, bytes, 0, sink);
   for (const std::size_t body : sink.bodies) demand(body < (*layout)->bodies.size());
-  for (const posed::Frame& frame : sink.frames) demand(posed::test::is_sound(frame));
+  for (const posed::Frame& frame : sink.frames) demand(posed::test::is_valid(frame));
   const auto any = driver.make_layout(bytes);
   if (!any) return;
   demand((*any)->bodies.size() <= posed::kMaxBodies);

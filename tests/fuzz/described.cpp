@@ -127,10 +127,10 @@ DescribedDecoder decoder_of(const std::shared_ptr<const Table>& table) {
 void check(const CollectSink& sink) {
   std::int64_t before_ns = posed::kNoTime_ns;
   for (const posed::Frame& frame : sink.frames) {
-    demand(posed::test::is_sound(frame) && frame.header.device_ns >= before_ns);
+    demand(posed::test::is_valid(frame) && frame.header.device_ns >= before_ns);
     before_ns = frame.header.device_ns;
   }
-  for (const posed::Sample& sample : sink.samples) demand(posed::test::is_sound(sample));
+  for (const posed::Sample& sample : sink.samples) demand(posed::test::is_valid(sample));
 }
 
 void try_bytes(const std::shared_ptr<const Table>& table, std::size_t piece,

@@ -21,13 +21,13 @@ using Bytes = std::vector<std::byte>;
 
 constexpr std::size_t kRecords = 2;
 
-class SoundSink final : public posed::Sink {
+class ValidSink final : public posed::Sink {
  public:
   void frame(std::size_t /*body*/, posed::Frame& frame) noexcept override {
-    demand(posed::test::is_sound(frame));
+    demand(posed::test::is_valid(frame));
   }
   void sample(std::size_t /*body*/, posed::Sample& sample) noexcept override {
-    demand(posed::test::is_sound(sample));
+    demand(posed::test::is_valid(sample));
   }
   void outcome(posed::Outcome /*outcome*/) noexcept override {}
 };
@@ -73,7 +73,7 @@ Bytes edited(const Bytes& records, std::span<const std::byte> edits) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static std::vector<Glove> gloves = make_gloves();
   const auto bytes = std::as_bytes(std::span(data, size));
-  SoundSink sink;
+  ValidSink sink;
   for (Glove& glove : gloves) {
     feed(*glove.decoder, bytes, 0, sink);
     feed(*glove.decoder, edited(glove.records, bytes), 0, sink);

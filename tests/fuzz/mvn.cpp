@@ -39,7 +39,7 @@ const SourceLayout& two_characters() {
 
 void check(const CollectSink& sink) {
   for (const std::size_t body : sink.bodies) demand(body < two_characters().bodies.size());
-  posed::fuzz::demand_sound(sink);
+  posed::fuzz::demand_valid(sink);
   if (sink.descriptions > 0) demand(posed::drivers::mvn::make_layout(sink.described).has_value());
 }
 

@@ -20,7 +20,7 @@ using posed::test::CollectSink;
 void check(const CollectSink& sink, const posed::drivers::SourceLayout& layout) {
   for (const std::size_t body : sink.bodies) demand(body < layout.bodies.size());
   for (const std::size_t body : sink.sample_bodies) demand(body < layout.bodies.size());
-  posed::fuzz::demand_sound(sink);
+  posed::fuzz::demand_valid(sink);
 }
 
 }  // namespace

@@ -28,9 +28,9 @@ inline void feed(drivers::Decoder& decoder, std::span<const std::byte> bytes,
 }
 
 // What a decoder emits has rotations of length 1 and finite numbers.
-inline void demand_sound(const test::CollectSink& sink) {
-  for (const Frame& frame : sink.frames) demand(test::is_sound(frame));
-  for (const Sample& sample : sink.samples) demand(test::is_sound(sample));
+inline void demand_valid(const test::CollectSink& sink) {
+  for (const Frame& frame : sink.frames) demand(test::is_valid(frame));
+  for (const Sample& sample : sink.samples) demand(test::is_valid(sample));
 }
 
 // Who wrote the descriptions that a decoder emits: one that writes them itself writes sound ones,
@@ -47,7 +47,7 @@ class Session {
   void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns) {
     const int before = sink.descriptions;
     fuzz::feed(*decoder_, bytes, arrival_ns, sink);
-    demand_sound(sink);
+    demand_valid(sink);
     for (const std::size_t body : sink.bodies) demand(body < layouts_.back()->bodies.size());
     sink.frames.clear();
     sink.bodies.clear();
@@ -86,12 +86,12 @@ std::vector<std::vector<std::byte>> emulated_datagrams(Emulator&& emulator, std:
 inline int feed_pieces(Session& session, const std::vector<std::vector<std::byte>>& good,
                        std::span<const std::byte> input) {
   constexpr int kFirst = 4;
-  constexpr int kMostPieces = 100;
+  constexpr int kMaxPieces = 100;
   std::int64_t now_ns = 0;
   std::size_t next = 0;
   while (next < kFirst) session.feed(good[next++], now_ns);
   int pieces = 0;
-  for (; input.size() >= 2 && pieces < kMostPieces; ++pieces) {
+  for (; input.size() >= 2 && pieces < kMaxPieces; ++pieces) {
     const std::size_t length =
         std::min(input.size() - 2, 4 * std::to_integer<std::size_t>(input[0]));
     const auto at = 17 * std::to_integer<std::size_t>(input[1]);

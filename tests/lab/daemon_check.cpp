@@ -93,8 +93,8 @@ class DaemonCheck {
     const LabDevice& device = glove.device();
     Replug replug{.unplugged = Clock::now(), .plugged = {}, .node = {}};
     device.unplug();
-    const auto told = [&] { return listener_.lost_since(glove.name(), replug.unplugged); };
-    if (!wait_until(told)) trouble_ += glove.name() + ": unplugged, and posed does not tell; ";
+    const auto reported = [&] { return listener_.lost_since(glove.name(), replug.unplugged); };
+    if (!wait_until(reported)) trouble_ += glove.name() + ": unplugged, and posed does not tell; ";
     std::this_thread::sleep_for(kUnplugged);
     replug.plugged = Clock::now();
     device.plug();
@@ -106,7 +106,7 @@ class DaemonCheck {
   }
 
   bool check(const Speaker& glove) {
-    const Verdict verdict = judge(listener_.heard(glove.name()), glove.said(),
+    const Verdict verdict = judge(listener_.received(glove.name()), glove.said(),
                                   glove.glove().modulus, replugs_[glove.name()]);
     const bool good = verdict.good() && trouble_.empty();
     std::printf("%s posed %s: %zu replugs, %s\n", good ? "ok  " : "FAIL", glove.name().c_str(),

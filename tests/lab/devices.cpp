@@ -139,9 +139,8 @@ std::unique_ptr<LabDevice> hid_device() {
   auto device = device_of(bench, "hidraw");
   device->there_since = looks_for(drivers::list_hid_nodes, ids);
   device->open = [ids]() -> Result<std::unique_ptr<drivers::Transport>> {
-    auto link = TransportFactory().hid({.vendor = ids.vendor, .id = ids.serial});
-    if (!link) return std::unexpected(link.error());
-    return drivers::make_link_transport(std::move(*link));
+    auto link = TRY(TransportFactory().hid({.vendor = ids.vendor, .id = ids.serial}));
+    return drivers::make_link_transport(std::move(link));
   };
   return device;
 }
@@ -156,9 +155,8 @@ std::unique_ptr<LabDevice> serial_device() {
   device->plug_hung = [bench] { bench->gadget.plug(); };
   device->there_since = looks_for(drivers::list_serial_ports, ids);
   device->open = [ids]() -> Result<std::unique_ptr<drivers::Transport>> {
-    auto link = TransportFactory().serial({.id = ids.serial});
-    if (!link) return std::unexpected(link.error());
-    return drivers::make_link_transport(std::move(*link));
+    auto link = TRY(TransportFactory().serial({.id = ids.serial}));
+    return drivers::make_link_transport(std::move(link));
   };
   return device;
 }
@@ -184,14 +182,12 @@ std::unique_ptr<LabDevice> usb_device() {
   device->say = [side](auto bytes) { return side->send(bytes); };
   device->there_since = looks_for(drivers::list_usb_devices, ids);
   device->open = [ids]() -> Result<std::unique_ptr<drivers::Transport>> {
-    auto link = TransportFactory().usb(
-        {.vendor = ids.vendor, .product = ids.product, .interface = kP5Interface});
-    if (!link) return std::unexpected(link.error());
-    const auto firmware = link->feature(9, 4);
-    if (!firmware) return std::unexpected(firmware.error());
-    if (*firmware != feature(9)) return fail("feature report 9 came back changed");
-    if (auto ok = link->set_feature(*firmware); !ok) return std::unexpected(ok.error());
-    return drivers::make_usb_transport(std::move(*link));
+    auto link = TRY(TransportFactory().usb(
+        {.vendor = ids.vendor, .product = ids.product, .interface = kP5Interface}));
+    const auto firmware = TRY(link.feature(9, 4));
+    if (firmware != feature(9)) return fail("feature report 9 came back changed");
+    TRY(link.set_feature(firmware));
+    return drivers::make_usb_transport(std::move(link));
   };
   return device;
 }

@@ -16,7 +16,7 @@ constexpr auto kMaxSilence = 200ms;  // ten reports
 constexpr auto kUnderWay = 30ms;     // from the glove to the daemon
 
 // The number of the last report with this value that was sent before the sample arrived.
-std::size_t number_of(const HeardSample& sample, const std::vector<Moment>& said,
+std::size_t number_of(const ReceivedSample& sample, const std::vector<Moment>& said,
                       std::uint32_t modulus) {
   const auto later = std::upper_bound(said.begin() + 1, said.end(), sample.arrived);
   auto n = static_cast<std::size_t>(later - said.begin()) - 1;
@@ -27,19 +27,19 @@ std::size_t number_of(const HeardSample& sample, const std::vector<Moment>& said
 // One glove's samples in order of arrival, session by session.
 class Judge {
  public:
-  Judge(const Heard& heard, const std::vector<Moment>& said, std::uint32_t modulus,
+  Judge(const Received& received, const std::vector<Moment>& said, std::uint32_t modulus,
         const std::vector<Replug>& replugs)
-      : heard_(heard), said_(said), modulus_(modulus), replugs_(replugs) {}
+      : received_(received), said_(said), modulus_(modulus), replugs_(replugs) {}
 
   Verdict judge() {
-    for (const HeardSample& sample : heard_.samples) take(sample);
-    verdict_.samples = heard_.samples.size();
+    for (const ReceivedSample& sample : received_.samples) take(sample);
+    verdict_.samples = received_.samples.size();
     if (session_ < replugs_.size()) say("no frame came after replug " + number(session_ + 1));
     return verdict_;
   }
 
  private:
-  void take(const HeardSample& sample) {
+  void take(const ReceivedSample& sample) {
     if (last_ && sample.sequence != last_->sequence + 1) ++verdict_.gaps;
     const auto begun = std::ranges::upper_bound(replugs_, sample.arrived, {}, &Replug::plugged);
     const auto session = static_cast<std::size_t>(begun - replugs_.begin());
@@ -60,13 +60,13 @@ class Judge {
     report_ = n;
   }
 
-  void begin(std::size_t session, std::size_t first, const HeardSample& sample) {
+  void begin(std::size_t session, std::size_t first, const ReceivedSample& sample) {
     if (session != session_ + 1) say("no frame came after replug " + number(session_ + 1));
     const Replug& replug = replugs_[session - 1];
-    verdict_.back = std::max(verdict_.back, sample.heard - replug.node);
-    verdict_.since_plug = std::max(verdict_.since_plug, sample.heard - replug.plugged);
-    const auto found = std::ranges::upper_bound(heard_.found, replug.plugged);
-    if (found == heard_.found.end()) return say("posed did not tell that it found the glove");
+    verdict_.back = std::max(verdict_.back, sample.received - replug.node);
+    verdict_.since_plug = std::max(verdict_.since_plug, sample.received - replug.plugged);
+    const auto found = std::ranges::upper_bound(received_.found, replug.plugged);
+    if (found == received_.found.end()) return say("posed did not tell that it found the glove");
     if (first <= report_) return say("report " + number(first) + " came twice");
     const std::size_t lost = first - report_ - 1;
     verdict_.lost_a_replug = std::max<std::uint64_t>(verdict_.lost_a_replug, lost);
@@ -80,12 +80,12 @@ class Judge {
     verdict_.problems += (verdict_.problems.empty() ? "" : ", ") + what;
   }
 
-  const Heard& heard_;
+  const Received& received_;
   const std::vector<Moment>& said_;
   std::uint32_t modulus_;
   const std::vector<Replug>& replugs_;
   Verdict verdict_;
-  std::optional<HeardSample> last_;
+  std::optional<ReceivedSample> last_;
   std::size_t session_ = 0;  // of the last sample
   std::size_t report_ = 0;   // the last known report
 };
@@ -111,9 +111,9 @@ std::string Verdict::text() const {
          ms(silence) + " ms at most" + (problems.empty() ? "" : ": " + problems);
 }
 
-Verdict judge(const Heard& heard, const std::vector<Moment>& said, std::uint32_t modulus,
+Verdict judge(const Received& received, const std::vector<Moment>& said, std::uint32_t modulus,
               const std::vector<Replug>& replugs) {
-  return Judge(heard, said, modulus, replugs).judge();
+  return Judge(received, said, modulus, replugs).judge();
 }
 
 }  // namespace posed::lab

@@ -39,7 +39,7 @@ struct Verdict {
 };
 
 // `said[n]` is the time at which report n was sent; sensors hold n % `modulus`.
-Verdict judge(const Heard& heard, const std::vector<Moment>& said, std::uint32_t modulus,
+Verdict judge(const Received& received, const std::vector<Moment>& said, std::uint32_t modulus,
               const std::vector<Replug>& replugs);
 
 }  // namespace posed::lab

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kLookAround_ms = 50;
 constexpr std::string_view kSamples = "sensor/", kEvents = "event/";
-constexpr int kFewestSensors =
+constexpr int kMinSensors =
     4;  // fewest sensors of a line whose beginning was cut off when the port was opened
 
 // The common value of all valid raw sensors; empty when they differ or are too few.
@@ -26,7 +26,7 @@ std::optional<std::uint32_t> common_value(const v1::Sample& sample) {
     common = sample.value(i);
     ++sensors;
   }
-  if (!common || sensors < kFewestSensors) return {};
+  if (!common || sensors < kMinSensors) return {};
   return static_cast<std::uint32_t>(std::lround(*common));
 }
 
@@ -37,13 +37,13 @@ Moment moment(std::int64_t monotonic_ns) { return Moment(std::chrono::nanosecond
 Listener::Listener(const std::string& endpoint)
     : thread_([this, endpoint](const std::stop_token& stop) { listen(stop, endpoint); }) {}
 
-const Heard& Listener::of(const std::string& stream) const {
-  static const Heard nothing;
-  const auto at = heard_.find(stream);
-  return at == heard_.end() ? nothing : at->second;
+const Received& Listener::of(const std::string& stream) const {
+  static const Received nothing;
+  const auto at = received_.find(stream);
+  return at == received_.end() ? nothing : at->second;
 }
 
-Heard Listener::heard(const std::string& stream) const {
+Received Listener::received(const std::string& stream) const {
   const std::lock_guard lock(mutex_);
   return of(stream);
 }
@@ -51,7 +51,7 @@ Heard Listener::heard(const std::string& stream) const {
 std::size_t Listener::samples_since(const std::string& stream, Moment begin) const {
   const std::lock_guard lock(mutex_);
   const auto& samples = of(stream).samples;
-  const auto first = std::ranges::lower_bound(samples, begin, {}, &HeardSample::arrived);
+  const auto first = std::ranges::lower_bound(samples, begin, {}, &ReceivedSample::arrived);
   return static_cast<std::size_t>(samples.end() - first);
 }
 
@@ -86,12 +86,12 @@ void Listener::take_sample(std::string_view bytes) {
     give_up("a sample that is no message");
   }
   const std::lock_guard lock(mutex_);
-  auto& samples = heard_[sample.stream()].samples;
+  auto& samples = received_[sample.stream()].samples;
   // A sample that is published again while its stream is stale is not a new one.
   if (!samples.empty() && samples.back().sequence == sample.sequence()) return;
   samples.push_back({.sequence = sample.sequence(),
                      .arrived = moment(sample.arrival_ns()),
-                     .heard = std::chrono::steady_clock::now(),
+                     .received = std::chrono::steady_clock::now(),
                      .value = common_value(sample)});
 }
 
@@ -101,9 +101,9 @@ void Listener::take_event(std::string_view bytes) {
     give_up("an event that is no message");
   }
   const std::lock_guard lock(mutex_);
-  Heard& heard = heard_[event.stream()];
-  if (event.kind() == v1::Event::KIND_FOUND) heard.found.push_back(moment(event.time_ns()));
-  if (event.kind() == v1::Event::KIND_LOST) heard.lost.push_back(moment(event.time_ns()));
+  Received& received = received_[event.stream()];
+  if (event.kind() == v1::Event::KIND_FOUND) received.found.push_back(moment(event.time_ns()));
+  if (event.kind() == v1::Event::KIND_LOST) received.lost.push_back(moment(event.time_ns()));
 }
 
 }  // namespace posed::lab

@@ -14,16 +14,16 @@
 
 namespace posed::lab {
 
-struct HeardSample {
+struct ReceivedSample {
   std::uint64_t sequence = 0;
-  Moment arrived;  // at the daemon
-  Moment heard;    // here
+  Moment arrived;   // at the daemon
+  Moment received;  // here
   std::optional<std::uint32_t>
       value;  // common value of all raw sensors; empty: they differ, or are too few
 };
 
-struct Heard {
-  std::vector<HeardSample> samples;
+struct Received {
+  std::vector<ReceivedSample> samples;
   std::vector<Moment> found, lost;  // times of posed's events
 };
 
@@ -31,19 +31,19 @@ class Listener {
  public:
   explicit Listener(const std::string& endpoint);
 
-  [[nodiscard]] Heard heard(const std::string& stream) const;
+  [[nodiscard]] Received received(const std::string& stream) const;
   // The number of samples so far that arrived at the daemon at or after `begin`.
   [[nodiscard]] std::size_t samples_since(const std::string& stream, Moment begin) const;
   [[nodiscard]] bool lost_since(const std::string& stream, Moment begin) const;
 
  private:
-  [[nodiscard]] const Heard& of(const std::string& stream) const;
+  [[nodiscard]] const Received& of(const std::string& stream) const;
   void listen(const std::stop_token& stop, const std::string& endpoint);
   void take_sample(std::string_view bytes);
   void take_event(std::string_view bytes);
 
   mutable std::mutex mutex_;
-  std::map<std::string, Heard> heard_;
+  std::map<std::string, Received> received_;
   std::jthread thread_;
 };
 

@@ -88,15 +88,15 @@ class LabelScore {
   void add(const Followed& hand, const gesture::Recording& truth, int lag) {
     for (std::size_t i = 0; i < truth.segments.size(); ++i) {
       const gesture::Segment& segment = truth.segments[i];
-      int told = segment.end - segment.begin;
+      int reported = segment.end - segment.begin;
       for (int t = segment.begin; t < segment.end; ++t) {
         const auto at = static_cast<std::size_t>(t);
         const bool right = hand.label[at] == segment.label;
         ++frames_;
         hits_ += right ? 1 : 0;
-        if (right && hand.probability[at] > 0.8) told = std::min(told, t - segment.begin);
+        if (right && hand.probability[at] > 0.8) reported = std::min(reported, t - segment.begin);
       }
-      if (i > 0) delays_.push_back(told + lag);
+      if (i > 0) delays_.push_back(reported + lag);
     }
   }
   [[nodiscard]] double accuracy() const { return static_cast<double>(hits_) / frames_; }

@@ -20,7 +20,7 @@ class QuietRecordSink : public pipeline::RecordSink {
   }
   void unpublished(std::uint32_t) noexcept override {}
   void keep_model(std::span<const std::byte>) override {}
-  [[nodiscard]] Result<pipeline::Take> mark_take(const pipeline::TakeMark&) override {
+  Result<pipeline::Take> mark_take(const pipeline::TakeMark&) override {
     return fail("it keeps no takes");
   }
 };

@@ -46,7 +46,7 @@ class ScriptedTransport final : public drivers::Transport {
                                       : system::kForever_ns;
     return std::min(chunk_ns, at_ns(link_.until_s + later_s_));
   }
-  [[nodiscard]] Result<> start(std::int64_t /*now_ns*/) override { return {}; }
+  Result<> start(std::int64_t /*now_ns*/) override { return {}; }
   [[nodiscard]] drivers::Chunk read(std::int64_t now_ns) noexcept override {
     if (now_ns >= at_ns(link_.until_s + later_s_))
       return {.bytes = {}, .end = link_.ends, .lost = !link_.ends};

@@ -15,7 +15,7 @@ namespace posed::test {
 
 void PublishedStream::count(const Frame& frame, bool is_raw, bool in_lists) {
   ++(is_raw ? published.raw : published.frames);
-  REQUIRE(is_sound(frame));
+  REQUIRE(is_valid(frame));
   published.root_z_m.insert(std::lround(frame.root_position_m[2]));
   if (is_raw) return;
   const std::uint64_t sequence = frame.header.sequence;

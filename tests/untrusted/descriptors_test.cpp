@@ -27,7 +27,7 @@ Crowd crowd() {
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   const double cpu_s = target.daemon->cpu_s();
   const auto start = std::chrono::steady_clock::now();
-  CHECK(innocent.hears(60));
+  CHECK(innocent.receives(60));
   const std::chrono::duration<double> passed = std::chrono::steady_clock::now() - start;
   const double share = (target.daemon->cpu_s() - cpu_s) / passed.count();
   peers.clear();

@@ -34,7 +34,7 @@ Damage attack(const std::function<void(const Target&)>& work) {
     work(target);
     return true;
   });
-  CHECK(innocent.hears(10));
+  CHECK(innocent.receives(10));
   innocent.stop();
   CHECK(target.ctl({"status"}).code == 0);
   CHECK_FALSE(target.daemon->exit_code(std::chrono::milliseconds(0)));

@@ -70,12 +70,12 @@ class Innocent {
     REQUIRE(net::set_option(socket_.get(), ZMQ_RCVTIMEO, 20));
     REQUIRE(net::connect_socket(socket_.get(), endpoint));
     thread_ = std::thread([this] { listen(); });
-    REQUIRE(hears(10));
+    REQUIRE(receives(10));
     longest_ns = 0;
   }
   ~Innocent() { stop(); }
   // Waits until `more` further frames arrive; returns false when they do not.
-  bool hears(std::uint64_t more) const {
+  bool receives(std::uint64_t more) const {
     const std::uint64_t wanted = frames + more;
     const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(30);
     while (frames < wanted && std::chrono::steady_clock::now() < end) {

@@ -84,9 +84,9 @@ bool HidGlove::say(std::span<const std::byte> report) {
   return ::write(bell_, "", 1) == 1;
 }
 
-HidGlove::Bytes HidGlove::heard() {
+HidGlove::Bytes HidGlove::received() {
   const std::lock_guard lock(mutex_);
-  return std::exchange(heard_, {});
+  return std::exchange(received_, {});
 }
 
 bool HidGlove::has_open(UMockdevIoctlClient* client) const {
@@ -129,7 +129,7 @@ bool HidGlove::answer_write(UMockdevIoctlClient* client) {
   const std::lock_guard lock(mutex_);
   UMockdevIoctlData* const data = umockdev_ioctl_client_get_arg(client);
   const auto bytes = std::as_bytes(std::span(data->data, static_cast<std::size_t>(data->data_len)));
-  heard_.insert(heard_.end(), bytes.begin(), bytes.end());
+  received_.insert(received_.end(), bytes.begin(), bytes.end());
   const bool here = has_open(client);
   umockdev_ioctl_client_complete(client, here ? data->data_len : -1, here ? 0 : EIO);
   return true;

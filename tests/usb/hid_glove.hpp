@@ -27,7 +27,7 @@ class HidGlove {
   // Sends one report; false when it is not plugged in or the host has 64 unread reports.
   bool say(std::span<const std::byte> report);
   // What the host wrote to it since the last call.
-  [[nodiscard]] Bytes heard();
+  [[nodiscard]] Bytes received();
 
   [[nodiscard]] const std::string& node() const { return node_; }
 
@@ -47,7 +47,7 @@ class HidGlove {
   std::mutex mutex_;  // guards what follows; one thread plugs, others send and handle requests
   int bell_ = -1;     // the node is a FIFO that holds a byte for every report
   std::deque<Bytes> reports_;
-  Bytes heard_;
+  Bytes received_;
   IoctlHandler handler_;  // last: its thread uses all of the above
 };
 

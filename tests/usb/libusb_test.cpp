@@ -75,9 +75,9 @@ TEST_CASE("feature reports go to and from a USB device, and a missing one is an 
     const auto leds = link->feature(drivers::p5::kLedsReport, 62);
     REQUIRE(leds);
     CHECK(*leds == all(drivers::p5::emulated_leds()));
-    const P5Glove::Bytes told{std::byte{1}, std::byte{2}, std::byte{3}};
-    CHECK(link->set_feature(told));
-    CHECK(glove.last_set() == told);
+    const P5Glove::Bytes reported{std::byte{1}, std::byte{2}, std::byte{3}};
+    CHECK(link->set_feature(reported));
+    CHECK(glove.last_set() == reported);
     const auto missing = link->feature(200, 8);
     REQUIRE_FALSE(missing);
     CHECK(mentions(missing.error(), "feature report 200"));
@@ -145,7 +145,7 @@ TEST_CASE("the P5 driver reads heads, LEDs and reports from libusb") {
   CHECK(live.count(Outcome::kOk) == 50);
   REQUIRE(live.frames.size() == 50);
   for (std::size_t i = 0; i < live.frames.size(); ++i) {
-    CHECK(is_sound(live.frames[i]));
+    CHECK(is_valid(live.frames[i]));
     CHECK(same_pose(live.frames[i], again.frames[i]));
   }
   CHECK_FALSE(same_pose(live.frames.front(), live.frames[25]));

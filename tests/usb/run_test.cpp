@@ -81,9 +81,9 @@ TEST_CASE("gloves on hidraw are unplugged and return on another node; the log ha
   Process events(
       {"monitor", "--connect", publish, "--topic", "event", "--stream", "ultra", "--json"});
   const auto expect_frames = [&] {
-    const auto heard =
+    const auto received =
         posed({"monitor", "--connect", publish, "--stream", "ultra", "--json", "--count", "30"});
-    CHECK(heard.code == 0);
+    CHECK(received.code == 0);
   };
   mine.plug();
   ultra.plug();

@@ -38,7 +38,7 @@ class Speaker {
     std::int64_t now_ns = 0;
     for (std::size_t i = 0; !stop.stop_requested(); std::this_thread::sleep_for(kPeriod)) {
       Report report;
-      emulator_->receive(glove_.heard(), now_ns, report);
+      emulator_->receive(glove_.received(), now_ns, report);
       if (emulator_->next_due_ns() != kNoTime_ns) {
         now_ns = emulator_->next_due_ns();
         emulator_->pose(0, drivers::glove::hand_frame(closing_hand(i++ % kPoses, kPoses)));

@@ -45,12 +45,9 @@ WorkFolder::~WorkFolder() {
 Result<> write_synthetic_model(motion::Space kind, const Skeleton& skeleton, int points,
                                const std::filesystem::path& path) {
   style::StyleModel model;
-  auto spec = motion::describe_space(kind, skeleton);
-  if (!spec) return std::unexpected(spec.error());
-  model.space = std::move(*spec);
-  const auto space = motion::PoseSpace::bind(model.space, skeleton);
-  if (!space) return std::unexpected(space.error());
-  const int dims = space->dims();
+  model.space = TRY(motion::describe_space(kind, skeleton));
+  const auto space = TRY(motion::PoseSpace::bind(model.space, skeleton));
+  const int dims = space.dims();
   model.process = gp::synthetic(points, dims).process;
   model.limit_rad = Eigen::VectorXd::Constant(dims, 0.5);
   model.gate = {.neutral = Eigen::VectorXd::Zero(dims), .swing_rad = 0.1, .fastest_stride_s = 1.0};
@@ -60,16 +57,10 @@ Result<> write_synthetic_model(motion::Space kind, const Skeleton& skeleton, int
 }
 
 Result<config::DaemonConfig> walkers_config(const Walkers& walkers, const WorkFolder& folder) {
-  const auto clip = motion::make_walker({.rate_hz = kWalkers_hz});
-  if (!clip) return std::unexpected(clip.error());
-  if (auto written = clip::write_bvh(*clip, folder / "walker.bvh"); !written) {
-    return std::unexpected(written.error());
-  }
-  if (auto written = write_synthetic_model(motion::Space::kNative, *clip->skeleton, walkers.points,
-                                           folder / "model.style");
-      !written) {
-    return std::unexpected(written.error());
-  }
+  const auto clip = TRY(motion::make_walker({.rate_hz = kWalkers_hz}));
+  TRY(clip::write_bvh(clip, folder / "walker.bvh"));
+  TRY(write_synthetic_model(motion::Space::kNative, *clip.skeleton, walkers.points,
+                            folder / "model.style"));
   const StageType& type = style::style_type();
   config::DaemonConfig config;
   config.publish_endpoint = config.control_endpoint = "tcp://127.0.0.1:*";

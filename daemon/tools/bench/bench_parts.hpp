@@ -42,8 +42,8 @@ class WorkFolder {
 };
 
 // Writes a style model of so many synthetic poses, in a pose space of the skeleton.
-[[nodiscard]] Result<> write_synthetic_model(motion::Space space, const Skeleton& skeleton,
-                                             int points, const std::filesystem::path& path);
+Result<> write_synthetic_model(motion::Space space, const Skeleton& skeleton, int points,
+                               const std::filesystem::path& path);
 
 inline constexpr double kWalkers_hz = 120.0;
 struct Walkers {
@@ -52,8 +52,7 @@ struct Walkers {
   bool gate = false;
 };
 // A daemon on free ports, without real-time rights, that styles synthetic walkers from files.
-[[nodiscard]] Result<config::DaemonConfig> walkers_config(const Walkers& walkers,
-                                                          const WorkFolder& folder);
+Result<config::DaemonConfig> walkers_config(const Walkers& walkers, const WorkFolder& folder);
 
 // The heading of a table whose rows are findings_of().
 [[nodiscard]] std::string hop_heading();

@@ -215,14 +215,10 @@ class BareHop {
       : socket_(std::move(socket)), endpoint_(std::move(endpoint)), body_(std::move(body)) {}
 
   static Result<std::unique_ptr<BareHop>> open(void* context, int streams, std::string body) {
-    auto socket = net::open_socket(context, ZMQ_PUB);
-    if (!socket) return std::unexpected(socket.error());
-    if (auto set = publish::set_queue_options(socket->get(), kRate_hz * streams); !set) {
-      return std::unexpected(set.error());
-    }
-    auto endpoint = net::bind_socket(socket->get(), "tcp://127.0.0.1:*");
-    if (!endpoint) return std::unexpected(endpoint.error());
-    return std::make_unique<BareHop>(std::move(*socket), std::move(*endpoint), std::move(body));
+    auto socket = TRY(net::open_socket(context, ZMQ_PUB));
+    TRY(publish::set_queue_options(socket.get(), kRate_hz * streams));
+    auto endpoint = TRY(net::bind_socket(socket.get(), "tcp://127.0.0.1:*"));
+    return std::make_unique<BareHop>(std::move(socket), std::move(endpoint), std::move(body));
   }
 
   void send(std::int64_t arrival_ns) noexcept {
@@ -270,9 +266,7 @@ class LaterTransport final : public drivers::Transport {
   [[nodiscard]] int poll_fd() const noexcept override { return inner_->poll_fd(); }
   [[nodiscard]] std::int64_t next_due_ns() const noexcept override { return inner_->next_due_ns(); }
   [[nodiscard]] double rate_hz() const noexcept override { return inner_->rate_hz(); }
-  [[nodiscard]] Result<> start(std::int64_t now_ns) override {
-    return inner_->start(now_ns + later_ns_);
-  }
+  Result<> start(std::int64_t now_ns) override { return inner_->start(now_ns + later_ns_); }
   [[nodiscard]] drivers::Chunk read(std::int64_t now_ns) noexcept override {
     return inner_->read(now_ns);
   }
@@ -337,47 +331,41 @@ void watch(const assembly::Daemon& daemon, const Turns& turns, int seconds, Watc
 
 Result<Watched> measure(const HopOptions& options) {
   spdlog::set_level(spdlog::level::err);  // only the figures are to be printed
-  auto subscriber = HopSubscriber::fork();
-  if (!subscriber) return std::unexpected(subscriber.error());
+  auto subscriber = TRY(HopSubscriber::fork());
   const WorkFolder folder;
-  auto config = walkers_config(
-      {.streams = options.streams, .points = options.points, .gate = options.gate}, folder);
-  if (!config) return std::unexpected(config.error());
+  auto config = TRY(walkers_config(
+      {.streams = options.streams, .points = options.points, .gate = options.gate}, folder));
   // Each gets its turn every other second.
-  for (config::StreamConfig& stream : config->streams) stream.stale_after_s = 3.0;
-  config->realtime = options.realtime;
-  auto daemon = assembly::Daemon::open(*config);
-  if (!daemon) return std::unexpected(daemon.error());
-  auto context = net::open_context();
-  if (!context) return std::unexpected(context.error());
-  auto hop = BareHop::open(context->get(), options.streams, sample_body(*(*daemon)->sources()[0]));
-  if (!hop) return std::unexpected(hop.error());
+  for (config::StreamConfig& stream : config.streams) stream.stale_after_s = 3.0;
+  config.realtime = options.realtime;
+  auto daemon = TRY(assembly::Daemon::open(config));
+  auto context = TRY(net::open_context());
+  auto hop = TRY(BareHop::open(context.get(), options.streams, sample_body(*daemon->sources()[0])));
   Turns turns;
   int place = 0;
-  for (const auto& source : (*daemon)->sources()) {
+  for (const auto& source : daemon->sources()) {
     drivers::Device& device = source->device;
-    device.decoder = std::make_unique<TurnDecoder>(std::move(device.decoder), **hop, turns);
+    device.decoder = std::make_unique<TurnDecoder>(std::move(device.decoder), *hop, turns);
     device.transport = std::make_unique<LaterTransport>(
         std::move(device.transport), nanoseconds(place++ / (kRate_hz * options.streams)));
   }
   turns.start_ns = system::monotonic_ns() + kNanosPerSecond / 2;
-  if (auto started = (*daemon)->start(); !started) return std::unexpected(started.error());
-  (*subscriber)->begin({(*daemon)->publish_endpoint(), (*hop)->endpoint()});
+  TRY(daemon->start());
+  subscriber->begin({daemon->publish_endpoint(), hop->endpoint()});
   Watched watched;
   watched.pressure_before_percent = cpu_pressure("avg10=");
   const double pressure_us = cpu_pressure("total=");
   const std::int64_t begun_ns = system::monotonic_ns();
-  watch(**daemon, turns, options.seconds, watched);
+  watch(*daemon, turns, options.seconds, watched);
   watched.pressure_percent =
       (cpu_pressure("total=") - pressure_us) / (seconds(system::monotonic_ns() - begun_ns) * 1e4);
-  (*daemon)->stop();
-  auto arrivals = (*subscriber)->finish();
-  if (!arrivals) return std::unexpected(arrivals.error());
-  watched.gaps = arrivals->gaps;
+  daemon->stop();
+  auto arrivals = TRY(subscriber->finish());
+  watched.gaps = arrivals.gaps;
   const std::int64_t end_ns = turns.start_ns + options.seconds * kNanosPerSecond;
-  watched.report = report_hops(arrivals->messages, turns.start_ns, end_ns);
-  watched.parts = hop_parts(arrivals->messages, turns.start_ns + kWarmUp_s * kNanosPerSecond,
-                            end_ns, watched.threads);
+  watched.report = report_hops(arrivals.messages, turns.start_ns, end_ns);
+  watched.parts = hop_parts(arrivals.messages, turns.start_ns + kWarmUp_s * kNanosPerSecond, end_ns,
+                            watched.threads);
   return watched;
 }
 
@@ -465,12 +453,11 @@ Result<> write_bench_page(const HopOptions& options, const Watched& watched,
 }
 
 Result<> bench_pipeline(const HopOptions& options) {
-  if (auto checked = options.report.check(); !checked) return checked;
-  const auto watched = measure(options);
-  if (!watched) return std::unexpected(watched.error());
-  const Findings findings = findings_of(options, *watched);
+  TRY(options.report.check());
+  const auto watched = TRY(measure(options));
+  const Findings findings = findings_of(options, watched);
   findings.show(options.json);
-  return write_bench_page(options, *watched, findings);
+  return write_bench_page(options, watched, findings);
 }
 
 }  // namespace

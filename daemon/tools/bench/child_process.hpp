@@ -43,8 +43,8 @@ class ChildProcess {
   // Forks; `run` is what the child does, without any other descriptor of the parent. Call before
   // the process has a second thread or a ZeroMQ context. `gives_way`: whenever others want the CPU,
   // the child waits, as a program on another machine would not disturb this one.
-  [[nodiscard]] static Result<ChildProcess> fork(const std::function<int(PipePair& parent)>& run,
-                                                 bool gives_way = false);
+  static Result<ChildProcess> fork(const std::function<int(PipePair& parent)>& run,
+                                   bool gives_way = false);
   ChildProcess(ChildProcess&& other) noexcept
       : process_(std::exchange(other.process_, -1)), pipes_(std::move(other.pipes_)) {}
   ChildProcess& operator=(ChildProcess&&) = delete;

@@ -89,9 +89,8 @@ int record_until_stopped(PipePair& parent) {
 }  // namespace
 
 Result<std::unique_ptr<HopSubscriber>> HopSubscriber::fork(bool gives_way) {
-  auto process = ChildProcess::fork(record_until_stopped, gives_way);
-  if (!process) return std::unexpected(process.error());
-  return std::unique_ptr<HopSubscriber>(new HopSubscriber(std::move(*process)));
+  auto process = TRY(ChildProcess::fork(record_until_stopped, gives_way));
+  return std::unique_ptr<HopSubscriber>(new HopSubscriber(std::move(process)));
 }
 
 void HopSubscriber::begin(const std::vector<std::string>& endpoints) {

@@ -30,12 +30,12 @@ struct ReceivedMessages {
 class HopSubscriber {
  public:
   // Forks; ChildProcess::fork says when.
-  [[nodiscard]] static Result<std::unique_ptr<HopSubscriber>> fork(bool gives_way = false);
+  static Result<std::unique_ptr<HopSubscriber>> fork(bool gives_way = false);
 
   // Makes the process connect to the endpoints; returns when they have been sent.
   void begin(const std::vector<std::string>& endpoints);
   // Ends the process and returns what it recorded.
-  [[nodiscard]] Result<ReceivedMessages> finish();
+  Result<ReceivedMessages> finish();
 
  private:
   explicit HopSubscriber(ChildProcess process) : process_(std::move(process)) {}

@@ -70,11 +70,9 @@ void add_client_options(CLI::App& command, ClientOptions& options, const char* e
 }
 
 Result<Connection> Connection::open(const ClientOptions& options, int type) {
-  auto context = net::open_context();
-  if (!context) return std::unexpected(context.error());
-  auto socket = link::DaemonSocket::open(context->get(), type, options, kLimits);
-  if (!socket) return std::unexpected(socket.error());
-  return Connection(std::move(*context), std::move(*socket));
+  auto context = TRY(net::open_context());
+  auto socket = TRY(link::DaemonSocket::open(context.get(), type, options, kLimits));
+  return Connection(std::move(context), std::move(socket));
 }
 
 bool Connection::wait(std::chrono::milliseconds timeout) {

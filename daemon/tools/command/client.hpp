@@ -60,7 +60,7 @@ class Connection {
  public:
   // `type` is ZMQ_SUB or ZMQ_DEALER. Returns at once; libzmq connects in the background, and
   // reconnects when necessary.
-  [[nodiscard]] static Result<Connection> open(const ClientOptions& options, int type);
+  static Result<Connection> open(const ClientOptions& options, int type);
 
   [[nodiscard]] const std::string& endpoint() const { return socket_.peer().endpoint; }
   [[nodiscard]] void* socket() const { return socket_.get(); }

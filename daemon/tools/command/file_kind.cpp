@@ -83,7 +83,7 @@ Result<> expect_kind(const std::filesystem::path& path, FileKind wanted, std::st
   std::ifstream file(path, std::ios::binary);
   std::string bytes(kEnough, '\0');
   file.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(file.gcount()));
+  bytes.resize(file.gcount());
   const FileKind kind = kind_of(bytes);
   if (kind == wanted || kind == FileKind::kOther) return {};
   return fail(fmt::format("is {}, not {}{}", kind_name(kind), kind_name(wanted),

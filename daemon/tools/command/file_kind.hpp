@@ -26,7 +26,6 @@ enum class FileKind : std::uint8_t {
 // An error if the file is of another kind than `wanted`; it says what the file is and which command
 // reads it, for `stream`. No error if its kind is unknown or it cannot be read: then the code that
 // reads the whole file reports it.
-[[nodiscard]] Result<> expect_kind(const std::filesystem::path& path, FileKind wanted,
-                                   std::string_view stream);
+Result<> expect_kind(const std::filesystem::path& path, FileKind wanted, std::string_view stream);
 
 }  // namespace posed::tools

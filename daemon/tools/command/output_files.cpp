@@ -97,7 +97,7 @@ OutputFiles& OutputFiles::writes_any_but_other(const fs::path& path,
 
 Result<> OutputFiles::check() const {
   for (auto output = outputs_.begin(); output != outputs_.end(); ++output) {
-    if (auto ok = check(*output); !ok) return ok;
+    TRY(check(*output));
     const auto twice = std::any_of(outputs_.begin(), output, [&](const Output& other) {
       return same_file(other.path, output->path);
     });
@@ -120,7 +120,7 @@ Result<> OutputFiles::check(const Output& output) const {
                     output.path.string());
     }
   }
-  if (auto ok = check_place(output.path); !ok) return ok;
+  TRY(check_place(output.path));
   std::error_code error;
   if (!overwrite_ && fs::exists(output.path, error)) {
     return misuse("exists already; name another file, or add --overwrite to replace it",

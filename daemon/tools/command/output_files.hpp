@@ -29,7 +29,7 @@ struct ReportFile {
   bool overwrite = false;
 
   [[nodiscard]] bool wanted() const { return !path.empty(); }
-  [[nodiscard]] Result<> check() const;
+  Result<> check() const;
 };
 void add_report_file(CLI::App& command, ReportFile& file);
 
@@ -54,7 +54,7 @@ class OutputFiles {
                                     std::vector<std::string_view> extensions);
 
   // Wrong use (exit code 2) if one of the files must not be written; names the file and what to do.
-  [[nodiscard]] Result<> check() const;
+  Result<> check() const;
 
  private:
   struct Output {
@@ -62,7 +62,7 @@ class OutputFiles {
     std::vector<std::string_view> extensions;
     bool strict;
   };
-  [[nodiscard]] Result<> check(const Output& output) const;
+  Result<> check(const Output& output) const;
 
   bool overwrite_;
   std::vector<std::filesystem::path> inputs_;

@@ -23,7 +23,7 @@ inline constexpr const char* kBold = "\x1b[1m";
 
 // Cuts to `width` columns (at least one); a "~" at the end shows that something was cut.
 [[nodiscard]] inline std::string cut(const std::string& text, int width) {
-  const auto columns = static_cast<std::size_t>(width < 1 ? 1 : width);
+  const std::size_t columns = width < 1 ? 1 : width;
   return text.size() <= columns ? text : text.substr(0, columns - 1) + "~";
 }
 

@@ -46,21 +46,21 @@ class Ranks {
 
   // Call before the work, with every file that it reads: an error in all ranks where one of them
   // reads other bytes than the first.
-  [[nodiscard]] virtual Result<> check_same(const std::vector<std::filesystem::path>& inputs) = 0;
+  virtual Result<> check_same(const std::vector<std::filesystem::path>& inputs) = 0;
 
   // Lets the one that leads write the model. A signal that ends the process comes before that, or
   // when it is known that the model is there.
   template <typename Write>
-  [[nodiscard]] Result<> write_model(const Write& write) {
+  Result<> write_model(const Write& write) {
     if (!leads()) return {};
     const HeldSignals held;
     auto written = write();
-    if (written) model_is_there();
+    if (written) model_written();
     return written;
   }
 
  protected:
-  virtual void model_is_there() {}
+  virtual void model_written() {}
 };
 
 // This process alone, on the machine's cores.
@@ -68,9 +68,7 @@ class OneRank final : public Ranks {
  public:
   [[nodiscard]] TaskRunner& tasks() override { return tasks_; }
   [[nodiscard]] bool leads() const override { return true; }
-  [[nodiscard]] Result<> check_same(const std::vector<std::filesystem::path>& /*inputs*/) override {
-    return {};
-  }
+  Result<> check_same(const std::vector<std::filesystem::path>& /*inputs*/) override { return {}; }
 
  private:
   ThreadTasks tasks_;

@@ -68,14 +68,14 @@ class DemoFolder {
   [[nodiscard]] bool is_up_to_date() const;
 
   // Refuses a folder with files of these names that no demo wrote; `overwrite` allows it.
-  [[nodiscard]] Result<> check_is_own(const std::vector<std::string>& names, bool overwrite) const;
+  Result<> check_is_own(const std::vector<std::string>& names, bool overwrite) const;
 
   // Marks the folder as the demo's before its files come: one that was interrupted is made anew.
-  [[nodiscard]] Result<> begin() const;
+  Result<> begin() const;
 
   // Writes the config, and the stamp that is_up_to_date() reads, with a hash of every file in the
   // folder.
-  [[nodiscard]] Result<> finish() const;
+  Result<> finish() const;
 
  private:
   std::filesystem::path path_;
@@ -160,7 +160,7 @@ Result<> DemoFolder::begin() const {
 }
 
 Result<> DemoFolder::finish() const {
-  if (auto written = write_whole_file(path_ / kDemoConfig, config_text()); !written) return written;
+  TRY(write_whole_file(path_ / kDemoConfig, config_text()));
   return write_whole_file(path_ / kStamp, stamp_of(path_));
 }
 
@@ -176,37 +176,33 @@ struct DemoOptions {
 // Makes the demo's files, unless this program has made them before.
 Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
   const DemoFolder kept(folder);
-  if (auto own = kept.check_is_own(demo_file_names(), overwrite); !own) return own;
+  TRY(kept.check_is_own(demo_file_names(), overwrite));
   if (kept.is_up_to_date()) {
     std::fprintf(stderr, "1-3/4 using what was made and learnt before, in %s\n", folder.c_str());
     return {};
   }
   std::fprintf(stderr, "1/4 making synthetic walkers and a synthetic signer in %s\n",
                folder.c_str());
-  if (auto begun = kept.begin(); !begun) return begun;
-  const auto clips = make_demo_clips(folder);
-  if (!clips) return std::unexpected(clips.error());
+  TRY(kept.begin());
+  const auto clips = TRY(make_demo_clips(folder));
   std::fprintf(stderr, "2/4 learning the style march -> sway from %zu clips\n",
-               clips->from.size() + clips->to.size());
+               clips.from.size() + clips.to.size());
   Experiment experiment;
   experiment.targets = {"sway"};
   // The same number is the same person in both families.
-  for (std::size_t i = 0; i < clips->from.size(); ++i) {
+  for (std::size_t i = 0; i < clips.from.size(); ++i) {
     const std::string person = std::to_string(i + 1);
-    experiment.clips.push_back({clips->from[i], "march", person, "walk", 0});
-    experiment.clips.push_back({clips->to[i], "sway", person, "walk", 0});
+    experiment.clips.push_back({clips.from[i], "march", person, "walk", 0});
+    experiment.clips.push_back({clips.to[i], "sway", person, "walk", 0});
   }
   OneRank alone;
-  const auto trained = train_and_save(experiment, 0, {.model = folder / kDemoModel}, alone);
-  if (!trained) return std::unexpected(trained.error());
-  const std::string& verdict = trained->verdict.sentence;
-  if (!trained->written) return fail("the demo's own model is " + verdict);
+  const auto trained = TRY(train_and_save(experiment, 0, {.model = folder / kDemoModel}, alone));
+  const std::string& verdict = trained.verdict.sentence;
+  if (!trained.written) return fail("the demo's own model is " + verdict);
   std::fprintf(stderr, "    %s\n", verdict.c_str());
   std::fprintf(stderr, "3/4 learning the gestures g, c and p from a labelled glove recording\n");
-  const auto recording = load_recording(clips->glove, clips->labels, kHandRate_hz);
-  if (!recording) return std::unexpected(recording.error());
-  const auto hand = train_gesture_and_save({*recording}, {}, folder / kDemoHand, alone);
-  if (!hand) return std::unexpected(hand.error());
+  const auto recording = TRY(load_recording(clips.glove, clips.labels, kHandRate_hz));
+  TRY(train_gesture_and_save({recording}, {}, folder / kDemoHand, alone));
   return kept.finish();
 }
 
@@ -251,18 +247,17 @@ Result<> watch(const assembly::Daemon& daemon, const DemoOptions& options, const
                Watcher& watcher, DemoHand& hand) {
   ClientOptions client;
   client.endpoint = daemon.publish_endpoint();
-  auto connection = Connection::open(client, ZMQ_SUB);
-  if (!connection) return std::unexpected(connection.error());
-  if (auto set = net::set_option(connection->socket(), ZMQ_SUBSCRIBE, "pose/"); !set) return set;
-  DemoScreen screen(daemon, *connection, url);
+  auto connection = TRY(Connection::open(client, ZMQ_SUB));
+  TRY(net::set_option(connection.socket(), ZMQ_SUBSCRIBE, "pose/"));
+  DemoScreen screen(daemon, connection, url);
   const auto start = SteadyClock::now();
   std::optional<SteadyClock::time_point> first_frame;
   while (!Interrupt::came() && !screen.quits() && !daemon.asked_to_stop()) {
-    if (connection->wait(kLookAround)) drain(*connection, watcher, screen);
+    if (connection.wait(kLookAround)) drain(connection, watcher, screen);
     if (!first_frame && watcher.styled() > 0) first_frame = SteadyClock::now();
     if (first_frame && options.seconds && seconds_since(*first_frame) >= *options.seconds) break;
     if (first_frame) {
-      if (auto tended = hand.tend(seconds_since(*first_frame)); !tended) return tended;
+      TRY(hand.tend(seconds_since(*first_frame)));
     }
     if (!first_frame && seconds_since(start) > kFirstFrameWithin_s) {
       return fail("no styled frame arrived within 10 s; the log above says why");
@@ -279,10 +274,9 @@ Result<Signers> put_on_gloves(config::DaemonConfig& config, const std::filesyste
   for (config::StreamConfig& stream : config.streams) {
     const auto port = stream.options.find("port");
     if (port == stream.options.end() || !std::get<std::string>(port->second).empty()) continue;
-    auto signer = emulate::SyntheticSigner::start(stream.driver, clip);
-    if (!signer) return std::unexpected(signer.error());
-    port->second = (*signer)->port();
-    signers.push_back(std::move(*signer));
+    auto signer = TRY(emulate::SyntheticSigner::start(stream.driver, clip));
+    port->second = signer->port();
+    signers.push_back(std::move(signer));
   }
   return signers;
 }
@@ -307,28 +301,24 @@ void print_summary(const Watcher& watcher, const DemoHand& hand, const v1::Stats
 Result<> stream(const DemoOptions& options, const std::filesystem::path& folder) {
   const auto own = folder / kDemoConfig;
   auto config =
-      config::load_config(options.config.empty() ? own : options.config, drivers::registry());
-  if (!config) return std::unexpected(config.error());
+      TRY(config::load_config(options.config.empty() ? own : options.config, drivers::registry()));
   logging::sum_up_repeats();
   const Interrupt interrupt;
-  const auto signers = put_on_gloves(*config, folder / kDemoSigner);
-  if (!signers) return std::unexpected(signers.error());
-  auto daemon = assembly::Daemon::open(*config);
-  if (!daemon) return std::unexpected(daemon.error());
-  if (auto started = (*daemon)->start(); !started) return started;
-  const auto bridge = serve_page_of(**daemon, options);
+  TRY(put_on_gloves(config, folder / kDemoSigner));
+  auto daemon = TRY(assembly::Daemon::open(config));
+  TRY(daemon->start());
+  const auto bridge = serve_page_of(*daemon, options);
   std::fprintf(stderr, "4/4 streaming %s (not learnt from) on %s\n", kDemoWalker,
-               (*daemon)->publish_endpoint().c_str());
-  auto hand = DemoHand::open((*daemon)->control_endpoint());
-  if (!hand) return std::unexpected(hand.error());
-  Watcher watcher(*hand);
+               daemon->publish_endpoint().c_str());
+  auto hand = TRY(DemoHand::open(daemon->control_endpoint()));
+  Watcher watcher(hand);
   const std::string url = bridge ? bridge->url() : "";
-  const auto watched = watch(**daemon, options, url, watcher, *hand);
-  const v1::Stats stats = (*daemon)->stats();
-  (*daemon)->stop();
+  const auto watched = watch(*daemon, options, url, watcher, hand);
+  const v1::Stats stats = daemon->stats();
+  daemon->stop();
   if (!watched) return watched;
   std::puts("");
-  print_summary(watcher, *hand, stats);
+  print_summary(watcher, hand, stats);
   return {};
 }
 
@@ -336,9 +326,8 @@ Result<> stream(const DemoOptions& options, const std::filesystem::path& folder)
 Result<std::filesystem::path> folder_of(const DemoOptions& options) {
   if (!options.folder.empty()) return std::filesystem::absolute(options.folder);
   if (options.config.empty()) return demo_cache_folder();
-  const auto config = config::load_config(options.config, drivers::registry());
-  if (!config) return std::unexpected(config.error());
-  for (const config::StreamConfig& stream : config->streams) {
+  const auto config = TRY(config::load_config(options.config, drivers::registry()));
+  for (const config::StreamConfig& stream : config.streams) {
     for (const config::StageConfig& stage : stream.stages) {
       if (stage.model.filename() != kDemoModel) continue;
       return std::filesystem::absolute(stage.model).lexically_normal().parent_path();
@@ -362,12 +351,11 @@ Result<> check_options(const DemoOptions& options) {
 }
 
 Result<> demo(const DemoOptions& options) {
-  if (auto ok = check_options(options); !ok) return ok;
+  TRY(check_options(options));
   if (!options.prepare.empty()) return prepare(options.prepare, options.overwrite);
-  const auto folder = folder_of(options);
-  if (!folder) return std::unexpected(folder.error());
-  if (auto prepared = prepare(*folder, options.overwrite); !prepared) return prepared;
-  return stream(options, *folder);
+  const auto folder = TRY(folder_of(options));
+  TRY(prepare(folder, options.overwrite));
+  return stream(options, folder);
 }
 
 }  // namespace

@@ -18,11 +18,8 @@ constexpr const char* kGloveLabels = "glove_train.lab";
 
 Result<std::filesystem::path> write_walker(const std::filesystem::path& path,
                                            const motion::WalkerOptions& options) {
-  const auto walk = motion::make_walker(options);
-  if (!walk) return std::unexpected(walk.error());
-  if (auto written = clip::write_bvh(*walk, path); !written) {
-    return std::unexpected(written.error());
-  }
+  const auto walk = TRY(motion::make_walker(options));
+  TRY(clip::write_bvh(walk, path));
   return path;
 }
 
@@ -30,14 +27,12 @@ Result<std::filesystem::path> write_walker(const std::filesystem::path& path,
 Result<> write_hands(const std::filesystem::path& folder, DemoClips& clips) {
   clips.glove = folder / kGlove;
   clips.labels = folder / kGloveLabels;
-  const auto learnt = gesture::make_performance({});
-  if (!learnt) return std::unexpected(learnt.error());
-  if (auto done = clip::write_hand_csv(learnt->clip, clips.glove); !done) return done;
-  if (auto done = clip::write_labels(learnt->labels, clips.labels); !done) return done;
-  const auto signer = gesture::make_performance(
-      {.person = kNewPerson, .script = {"g", "c", "p", "g", "c", "p", "c", "g", "p", "c"}});
-  if (!signer) return std::unexpected(signer.error());
-  return clip::write_hand_csv(signer->clip, folder / kDemoSigner);
+  const auto learnt = TRY(gesture::make_performance({}));
+  TRY(clip::write_hand_csv(learnt.clip, clips.glove));
+  TRY(clip::write_labels(learnt.labels, clips.labels));
+  const auto signer = TRY(gesture::make_performance(
+      {.person = kNewPerson, .script = {"g", "c", "p", "g", "c", "p", "c", "g", "p", "c"}}));
+  return clip::write_hand_csv(signer.clip, folder / kDemoSigner);
 }
 
 }  // namespace
@@ -59,20 +54,18 @@ Result<DemoClips> make_demo_clips(const std::filesystem::path& folder) {
   DemoClips clips;
   for (std::uint32_t person = 1; person <= kPeople; ++person) {
     // The two families have different people, as with real actors.
-    auto march = write_walker(folder / fmt::format("march_{}.bvh", person),
-                              {.family = motion::WalkerFamily::kMarch, .person = person});
-    if (!march) return std::unexpected(march.error());
-    auto sway = write_walker(folder / fmt::format("sway_{}.bvh", person),
-                             {.family = motion::WalkerFamily::kSway, .person = kPeople + person});
-    if (!sway) return std::unexpected(sway.error());
-    clips.from.push_back(*march);
-    clips.to.push_back(*sway);
+    auto march = TRY(write_walker(folder / fmt::format("march_{}.bvh", person),
+                                  {.family = motion::WalkerFamily::kMarch, .person = person}));
+    auto sway =
+        TRY(write_walker(folder / fmt::format("sway_{}.bvh", person),
+                         {.family = motion::WalkerFamily::kSway, .person = kPeople + person}));
+    clips.from.push_back(march);
+    clips.to.push_back(sway);
   }
-  auto walker = write_walker(
+  TRY(write_walker(
       folder / kDemoWalker,
-      {.family = motion::WalkerFamily::kMarch, .person = kNewPerson, .seconds = kNewWalkSeconds});
-  if (!walker) return std::unexpected(walker.error());
-  if (auto done = write_hands(folder, clips); !done) return std::unexpected(done.error());
+      {.family = motion::WalkerFamily::kMarch, .person = kNewPerson, .seconds = kNewWalkSeconds}));
+  TRY(write_hands(folder, clips));
   return clips;
 }
 

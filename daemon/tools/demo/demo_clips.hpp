@@ -29,6 +29,6 @@ struct DemoClips {
 
 // Writes the clips of both families and the new walker, the glove recording with its labels and the
 // new signer into `folder`, which is created.
-[[nodiscard]] Result<DemoClips> make_demo_clips(const std::filesystem::path& folder);
+Result<DemoClips> make_demo_clips(const std::filesystem::path& folder);
 
 }  // namespace posed::tools

@@ -35,9 +35,8 @@ bool is_performed(const v1::Frame& frame) {
 Result<DemoHand> DemoHand::open(const std::string& control) {
   ClientOptions client;
   client.endpoint = control;
-  auto connection = Connection::open(client, ZMQ_DEALER);
-  if (!connection) return std::unexpected(connection.error());
-  return DemoHand(std::move(*connection));
+  auto connection = TRY(Connection::open(client, ZMQ_DEALER));
+  return DemoHand(std::move(connection));
 }
 
 void DemoHand::handle(const v1::Frame& frame) {

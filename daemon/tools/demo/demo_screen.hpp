@@ -33,12 +33,12 @@ inline constexpr const char* kDemoHandStream = "hand";
 class DemoHand {
  public:
   // `control` is the daemon's control endpoint.
-  [[nodiscard]] static Result<DemoHand> open(const std::string& control);
+  static Result<DemoHand> open(const std::string& control);
 
   // Call with each frame of the stream kDemoHandStream.
   void handle(const v1::Frame& frame);
   // Sends the labels when it is time, and reads the reply; `seconds` since the start.
-  [[nodiscard]] Result<> tend(double seconds);
+  Result<> tend(double seconds);
 
   [[nodiscard]] std::string note() const;     // what the hand does now, one line
   [[nodiscard]] std::string summary() const;  // what it has done; empty if no hand was seen

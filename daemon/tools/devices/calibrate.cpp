@@ -41,7 +41,7 @@ class PoseScreen final : public PoseGuide {
              std::string note);
 
   void want(drivers::glove::Pose pose) override;
-  [[nodiscard]] Word hear() override;
+  [[nodiscard]] Word receive() override;
   void show(const GloveSource::Raw& raw, const GloveSource::Valid& valid, PosePhase phase,
             double left_s, double whole_s) override;
   void restless(drivers::glove::Pose pose, const std::string& sensor) override;
@@ -52,7 +52,7 @@ class PoseScreen final : public PoseGuide {
   LiveScreen screen_;
   CalibrateView view_;
   bool ranging_ = false;  // a pose is or was held; from now on the range of each sensor is tracked
-  std::chrono::steady_clock::time_point drawn_{}, heard_{};
+  std::chrono::steady_clock::time_point drawn_{}, received_{};
 };
 
 // Prints a line on stdout when a pose is wanted ("pose fist") and instructions on stderr. The user
@@ -62,7 +62,7 @@ class PoseLines final : public PoseGuide {
   explicit PoseLines(const PosePlan& plan) : waits_(!plan.ready_s) {}
 
   void want(drivers::glove::Pose pose) override;
-  [[nodiscard]] Word hear() override;
+  [[nodiscard]] Word receive() override;
   void show(const GloveSource::Raw& /*raw*/, const GloveSource::Valid& /*valid*/,
             PosePhase /*phase*/, double /*left_s*/, double /*whole_s*/) override {}
   void restless(drivers::glove::Pose pose, const std::string& sensor) override;
@@ -91,7 +91,7 @@ PoseScreen::PoseScreen(const drivers::glove::Model& model, const PosePlan& plan,
                              .most = sensor.raw_max,
                              .least_span = kNoiseShare * (sensor.raw_max - sensor.raw_min)});
   }
-  heard_ = SteadyClock::now();
+  received_ = SteadyClock::now();
 }
 
 // Discards keys that were pressed before this pose was asked for: a superfluous Enter would start
@@ -106,7 +106,7 @@ void PoseScreen::want(Pose pose) {
   draw();
 }
 
-PoseGuide::Word PoseScreen::hear() {
+PoseGuide::Word PoseScreen::receive() {
   if (SteadyClock::now() - drawn_ >= kRedraw) draw();
   for (char key = screen_.key_pressed(); key != 0; key = screen_.key_pressed()) {
     if (key == '\n' || key == '\r') return Word::kGo;
@@ -118,7 +118,7 @@ PoseGuide::Word PoseScreen::hear() {
 
 void PoseScreen::show(const GloveSource::Raw& raw, const GloveSource::Valid& valid, PosePhase phase,
                       double left_s, double whole_s) {
-  heard_ = SteadyClock::now();
+  received_ = SteadyClock::now();
   view_.phase = phase;
   view_.left_s = std::max(left_s, 0.0);
   view_.share = whole_s > 0.0 ? 1.0 - view_.left_s / whole_s : 0.0;
@@ -144,7 +144,7 @@ void PoseScreen::restless(Pose pose, const std::string& sensor) {
 
 void PoseScreen::draw() {
   drawn_ = SteadyClock::now();
-  view_.silent = drawn_ - heard_ >= kSilence;
+  view_.silent = drawn_ - received_ >= kSilence;
   LiveViewOptions size;
   screen_.measure(size);
   view_.width = size.width;
@@ -166,7 +166,7 @@ void PoseLines::restless(Pose pose, const std::string& sensor) {
                std::string(kPoseNames[static_cast<std::size_t>(pose)]).c_str(), sensor.c_str());
 }
 
-PoseGuide::Word PoseLines::hear() {
+PoseGuide::Word PoseLines::receive() {
   pollfd line{.fd = STDIN_FILENO, .events = POLLIN, .revents = 0};
   while (waits_ && ::poll(&line, 1, 0) > 0) {
     char c = 0;
@@ -203,27 +203,25 @@ Result<drivers::glove::Recorded> good_poses(GloveSource& source, const PosePlan&
                                             const std::string& user, bool force) {
   auto recorded = lead(source, plan, user, {});
   while (recorded) {
-    const auto check = drivers::glove::check_poses(source.model(), *recorded);
-    if (!check) return std::unexpected(check.error());
-    if (check->sensors == 0) return recorded;  // nothing was measured; the fit reports it
-    if (check->usable() || force) {
+    const auto check = TRY(drivers::glove::check_poses(source.model(), *recorded));
+    if (check.sensors == 0) return recorded;  // nothing was measured; the fit reports it
+    if (check.usable() || force) {
       std::fprintf(stderr, "posed: %s%s\n",
-                   check->usable() ? "" : "warning: ", check->verdict().c_str());
+                   check.usable() ? "" : "warning: ", check.verdict().c_str());
       return recorded;
     }
     if (!on_terminal()) {
-      return fail(check->verdict() +
+      return fail(check.verdict() +
                   "; no calibration was written (--force writes it all the same)");
     }
     PosePlan again = plan;
     again.seconds.fill(0.0);
-    for (const auto pose : check->failed()) {
+    for (const auto pose : check.failed()) {
       again.seconds[static_cast<std::size_t>(pose)] = plan.seconds[static_cast<std::size_t>(pose)];
     }
-    const auto more = lead(source, again, user, check->verdict());
-    if (!more) return more;
+    const auto more = TRY(lead(source, again, user, check.verdict()));
     for (const auto pose : again.poses()) {
-      (*recorded)[static_cast<std::size_t>(pose)] = (*more)[static_cast<std::size_t>(pose)];
+      (*recorded)[static_cast<std::size_t>(pose)] = more[static_cast<std::size_t>(pose)];
     }
   }
   return recorded;
@@ -284,7 +282,7 @@ Result<PosePlan> plan_of(const CalibrateOptions& options) {
     if (name == kPoseNames.end() || !(seconds >= 0.0 && seconds <= kMaxSeconds)) {
       return misuse("'" + word + "': --pose is flat, fist, thumb or spread =SECONDS, 0 to 60");
     }
-    plan.seconds[static_cast<std::size_t>(name - kPoseNames.begin())] = seconds;
+    plan.seconds[name - kPoseNames.begin()] = seconds;
   }
   if (plan.seconds[0] <= 0.0) return misuse("the flat hand cannot be left out");
   return plan;
@@ -293,10 +291,9 @@ Result<PosePlan> plan_of(const CalibrateOptions& options) {
 // The glove of a running stream is already set up; options that would change it are an error.
 Result<std::unique_ptr<GloveSource>> connect(const CalibrateOptions& options) {
   if (options.stream.empty()) return misuse("--connect also needs --stream");
-  auto source = GloveSource::connect(options.client, options.stream);
-  if (!source) return source;
-  const std::string& driver = (*source)->model().driver;
-  const std::string_view hand = drivers::glove::side_name((*source)->hand());
+  auto source = TRY(GloveSource::connect(options.client, options.stream));
+  const std::string& driver = source->model().driver;
+  const std::string_view hand = drivers::glove::side_name(source->hand());
   if (!options.driver.empty() && options.driver != driver) {
     return misuse("stream '" + options.stream + "' is of driver '" + driver +
                   "': leave out --driver");
@@ -321,11 +318,9 @@ Error with_way_through(Error error) {
 
 Result<std::unique_ptr<GloveSource>> open_glove(const CalibrateOptions& options) {
   if (options.live) return connect(options);
-  const auto driver = named_driver(options.driver);
-  if (!driver) return std::unexpected(driver.error());
-  const auto completed = driver_options(**driver, options);
-  if (!completed) return std::unexpected(completed.error());
-  auto source = GloveSource::open(**driver, *completed);
+  const auto driver = TRY(named_driver(options.driver));
+  const auto completed = TRY(driver_options(*driver, options));
+  auto source = GloveSource::open(*driver, completed);
   if (!source) return std::unexpected(with_way_through(source.error()));
   return source;
 }
@@ -347,11 +342,10 @@ CalibrationFile blank_file(const GloveSource& source) {
 Result<> show_hand(const GloveSource& source, const CalibrationFile& file,
                    const drivers::glove::Recorded& recorded) {
   const auto calibration =
-      drivers::glove::make_calibration(source.model(), file, source.hand(), source.identity());
-  if (!calibration) return std::unexpected(calibration.error());
+      TRY(drivers::glove::make_calibration(source.model(), file, source.hand(), source.identity()));
   if (::isatty(STDERR_FILENO) == 0) return {};
   std::fputs("the calibrated hand, in the poses as they were held:\n", stderr);
-  for (const std::string& line : calibrated_hand(source.model(), **calibration, source.hand(),
+  for (const std::string& line : calibrated_hand(source.model(), *calibration, source.hand(),
                                                  recorded, kHandColumns, kHandRows)) {
     std::fprintf(stderr, "%s\n", line.c_str());
   }
@@ -359,22 +353,16 @@ Result<> show_hand(const GloveSource& source, const CalibrationFile& file,
 }
 
 Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
-  const auto plan = plan_of(options);
-  if (!plan) return std::unexpected(plan.error());
-  const auto source = open_glove(options);
-  if (!source) return std::unexpected(source.error());
-  const auto recorded = good_poses(**source, *plan, options.user, options.force);
-  if (!recorded) return std::unexpected(recorded.error());
-  auto fitted = drivers::glove::fit_poses((*source)->model(), *recorded);
-  if (!fitted) return std::unexpected(fitted.error());
-  for (const std::string& warning : fitted->warnings) {
+  const auto plan = TRY(plan_of(options));
+  const auto source = TRY(open_glove(options));
+  const auto recorded = TRY(good_poses(*source, plan, options.user, options.force));
+  auto fitted = TRY(drivers::glove::fit_poses(source->model(), recorded));
+  for (const std::string& warning : fitted.warnings) {
     std::fprintf(stderr, "posed: warning: %s\n", warning.c_str());
   }
-  CalibrationFile file = blank_file(**source);
-  file.sensors = std::move(fitted->sensors);
-  if (auto shown = show_hand(**source, file, *recorded); !shown) {
-    return std::unexpected(shown.error());
-  }
+  CalibrationFile file = blank_file(*source);
+  file.sensors = std::move(fitted.sensors);
+  TRY(show_hand(*source, file, recorded));
   return file;
 }
 
@@ -382,23 +370,17 @@ Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
 // too.
 Result<CalibrationFile> from_file(const CalibrateOptions& options) {
   if (options.live) {
-    const auto source = connect(options);
-    if (!source) return std::unexpected(source.error());
-    auto file =
-        drivers::glove::import_calibration(options.import, (*source)->model(), (*source)->hand());
-    if (file) file->glove = blank_file(**source).glove;
+    const auto source = TRY(connect(options));
+    auto file = drivers::glove::import_calibration(options.import, source->model(), source->hand());
+    if (file) file->glove = blank_file(*source).glove;
     return file;
   }
-  const auto driver = named_driver(options.driver.empty() ? "cyberglove" : options.driver);
-  if (!driver) return std::unexpected(driver.error());
-  const auto completed = driver_options(**driver, options);
-  if (!completed) return std::unexpected(completed.error());
-  const auto description = (*driver)->expect(*completed);
-  if (!description) return std::unexpected(description.error());
-  const auto model = (*driver)->glove->glove_model(*description);
-  if (!model) return std::unexpected(model.error());
+  const auto driver = TRY(named_driver(options.driver.empty() ? "cyberglove" : options.driver));
+  const auto completed = TRY(driver_options(*driver, options));
+  const auto description = TRY(driver->expect(completed));
+  const auto model = TRY(driver->glove->glove_model(description));
   const Side hand = side_named(options.hand);
-  return drivers::glove::import_calibration(options.import, *model, hand);
+  return drivers::glove::import_calibration(options.import, model, hand);
 }
 
 // Checked before the user goes through the poses. An option that would have no effect is refused.
@@ -422,15 +404,13 @@ Result<> check_options(const CalibrateOptions& options) {
 
 Result<> calibrate(const CalibrateOptions& options) {
   const Interrupt interrupt;
-  if (auto ok = check_options(options); !ok) return ok;
-  auto file = options.import.empty() ? from_poses(options) : from_file(options);
-  if (!file) return std::unexpected(file.error());
-  file->user = options.user;
-  const std::string text = drivers::glove::format_calibration(*file);
-  auto written = write_whole_file(options.out, text);
-  if (!written) return written;
+  TRY(check_options(options));
+  auto file = TRY(options.import.empty() ? from_poses(options) : from_file(options));
+  file.user = options.user;
+  const std::string text = drivers::glove::format_calibration(file);
+  TRY(write_whole_file(options.out, text));
   const std::string out = options.out.string();
-  std::fprintf(stderr, "%zu sensors calibrated: %s\n", file->sensors.size(), out.c_str());
+  std::fprintf(stderr, "%zu sensors calibrated: %s\n", file.sensors.size(), out.c_str());
   if (options.live) {
     std::fprintf(stderr, "use it now:     posed ctl calibrate %s %s\n", options.stream.c_str(),
                  out.c_str());

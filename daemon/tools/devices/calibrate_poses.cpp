@@ -29,7 +29,7 @@ constexpr int kMinBar = 5;
 // Shortens a name in its middle, because sensor names differ at their beginning and end:
 // "thumb_jo~t1".
 std::string squeezed(const std::string& name, int width) {
-  const auto columns = static_cast<std::size_t>(width);
+  const std::size_t columns = width;
   if (name.size() <= columns) return name;
   return name.substr(0, columns - 3) + "~" + name.substr(name.size() - 2);
 }
@@ -57,7 +57,7 @@ std::string what_to_do(const CalibrateView& view) {
   const int done = static_cast<int>(std::clamp(view.share, 0.0, 1.0) * kSteps);
   return fmt::format("{} [{:<{}}] {:.1f} s",
                      view.phase == PosePhase::kAsked ? "Get ready " : "Hold still",
-                     std::string(static_cast<std::size_t>(done), '='), kSteps, view.left_s);
+                     std::string(done, '='), kSteps, view.left_s);
 }
 
 std::string cell(const CalibrateView& view, const SensorView& sensor, int width, int name_width) {
@@ -86,11 +86,11 @@ std::vector<std::string> table(const CalibrateView& view, int width, int rows) {
     name_width = std::max(name_width, static_cast<int>(sensor->name.size()));
   }
   name_width = std::min(name_width, cell_width - kBesideBar - kMinBar);
-  std::vector<std::string> text(static_cast<std::size_t>(lines));
+  std::vector<std::string> text(lines);
   for (int i = 0; i < std::min(count, lines * columns); ++i) {
-    std::string& line = text[static_cast<std::size_t>(i % lines)];
+    std::string& line = text[i % lines];
     if (i >= lines) line += " ";
-    line += cell(view, *there[static_cast<std::size_t>(i)], cell_width, name_width);
+    line += cell(view, *there[i], cell_width, name_width);
   }
   if (count > lines * columns) {
     text.back() =
@@ -133,7 +133,7 @@ std::vector<std::string> calibrate_view(const CalibrateView& view) {
   const std::string legend = view.any_held ? "# now   - where it has been   ! has not moved yet"
                                            : "# now   - where it has been";
   lines.push_back(paint(view.colour, kDim, cut(legend, width)));
-  const auto most = static_cast<std::size_t>(std::max(view.height, 1));
+  const std::size_t most = std::max(view.height, 1);
   if (lines.size() > most) lines.resize(most);
   return lines;
 }
@@ -155,14 +155,13 @@ class Recording {
   Result<Recorded> run() {
     const std::vector<Pose> poses = plan_.poses();
     for (std::size_t i = 0; i < poses.size();) {
-      const auto word = ask(poses[i]);
-      if (!word) return std::unexpected(word.error());
-      if (*word == PoseGuide::Word::kStop) return fail("stopped; no calibration was written");
-      if (*word == PoseGuide::Word::kBack) {
+      const auto word = TRY(ask(poses[i]));
+      if (word == PoseGuide::Word::kStop) return fail("stopped; no calibration was written");
+      if (word == PoseGuide::Word::kBack) {
         i -= i > 0 ? 1 : 0;
         continue;
       }
-      if (auto held = hold(poses[i]); !held) return std::unexpected(held.error());
+      TRY(hold(poses[i]));
       ++i;
     }
     return recorded_;
@@ -179,7 +178,7 @@ class Recording {
     begin();
     PoseGuide::Word word = PoseGuide::Word::kNothing;
     const auto enough = [&] {
-      word = guide_.hear();
+      word = guide_.receive();
       if (plan_.ready_s && word == PoseGuide::Word::kNothing && past_s() >= ready_s) {
         word = PoseGuide::Word::kGo;
       }
@@ -189,9 +188,7 @@ class Recording {
       guide_.show(raw, valid, PosePhase::kAsked, ready_s - past_s(), ready_s);
     };
     while (word == PoseGuide::Word::kNothing) {
-      if (auto ok = source_.listen(kPatience_s, show, enough); !ok) {
-        return std::unexpected(ok.error());
-      }
+      TRY(source_.listen(kPatience_s, show, enough));
     }
     return word;
   }
@@ -206,7 +203,7 @@ class Recording {
     const auto settle = [&](const Raw& raw, const Valid& valid) {
       guide_.show(raw, valid, PosePhase::kSettling, whole_s - past_s(), whole_s);
     };
-    if (auto ok = source_.listen(plan_.settle_s, settle); !ok) return ok;
+    TRY(source_.listen(plan_.settle_s, settle));
     begin();
     std::array<std::optional<Span>, drivers::glove::kMaxSensors> spans{};
     const auto keep = [&](const Raw& raw, const Valid& valid) {
@@ -219,7 +216,7 @@ class Recording {
       }
       guide_.show(raw, valid, PosePhase::kHeld, held_s - past_s(), whole_s);
     };
-    if (auto ok = source_.listen(held_s, keep); !ok) return ok;
+    TRY(source_.listen(held_s, keep));
     const auto& sensors = source_.model().sensors;
     for (std::size_t i = 0; i < sensors.size(); ++i) {
       if (!spans[i] || !is_restless(*spans[i], sensors[i])) continue;
@@ -267,8 +264,8 @@ namespace {
 
 using drivers::glove::Recorded;
 
-constexpr int kGap = 2;           // blanks between the hands
-constexpr int kMostColumns = 18;  // of a hand
+constexpr int kGap = 2;              // blanks between the hands
+constexpr int kMaxHandColumns = 18;  // of a hand
 
 bool was_held(const Recorded& recorded, std::size_t pose) {
   return std::ranges::any_of(recorded[pose], [](const auto& sensor) { return sensor.count > 0; });
@@ -296,9 +293,9 @@ std::vector<std::string> calibrated_hand(const drivers::glove::Model& model,
   }
   const int hands = static_cast<int>(poses.poses.size());
   if (hands == 0 || rows < 2) return {};
-  const int width = std::clamp((columns + kGap) / hands - kGap, 1, kMostColumns);
+  const int width = std::clamp((columns + kGap) / hands - kGap, 1, kMaxHandColumns);
   const picture::StripLayout room = picture::layout_of({poses}, camera, 1.0, false);
-  std::vector<std::string> lines(static_cast<std::size_t>(rows));
+  std::vector<std::string> lines(rows);
   for (const auto& [figure, caption] : poses.poses) {
     auto drawn = picture::braille(figure, camera, room, width, rows - 1);
     drawn.push_back(fmt::format("{:^{}.{}}", caption, width, width));

@@ -79,7 +79,7 @@ class PoseGuide {
   // The user's reply while a pose is asked for. The call must not wait; it is made at least ten
   // times a second.
   enum class Word { kNothing, kGo, kBack, kStop };
-  [[nodiscard]] virtual Word hear() = 0;
+  [[nodiscard]] virtual Word receive() = 0;
 
   // One measurement. `left_s` of `whole_s` remain: of the time to get ready, or of the time to hold
   // still, settling included. Both are 0 if the user ends the phase.
@@ -91,8 +91,8 @@ class PoseGuide {
 };
 
 // An error if the user gives up, the glove is unplugged, or it sends nothing.
-[[nodiscard]] Result<drivers::glove::Recorded> record_poses(GloveSource& source,
-                                                            const PosePlan& plan, PoseGuide& guide);
+Result<drivers::glove::Recorded> record_poses(GloveSource& source, const PosePlan& plan,
+                                              PoseGuide& guide);
 
 // The recorded poses beside each other with their names below, at one scale: `rows` lines of UTF-8
 // of at most `columns` characters. A joint that no sensor measures is straight.

@@ -10,7 +10,7 @@
 namespace posed::tools {
 
 // Completed with the driver's defaults; an unknown key or a wrong value is an error (wrong use).
-[[nodiscard]] Result<drivers::Options> parse_driver_options(const drivers::Driver& driver,
-                                                            const std::vector<std::string>& words);
+Result<drivers::Options> parse_driver_options(const drivers::Driver& driver,
+                                              const std::vector<std::string>& words);
 
 }  // namespace posed::tools

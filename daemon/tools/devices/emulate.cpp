@@ -57,14 +57,13 @@ Result<emulate::Motion> motion(const EmulateOptions& options, const Emulated& em
   }
   auto clip = std::make_shared<clip::HandClip>();
   if (!options.clip.empty()) {
-    auto read = clip::read_hand_clip(options.clip);
-    if (!read) return std::unexpected(read.error());
-    *clip = std::move(*read);
+    auto read = TRY(clip::read_hand_clip(options.clip));
+    *clip = std::move(read);
   } else {
-    auto made = gesture::make_performance(
-        {.script = {"p", "g", "c", "p", "1", "3", "4", "p"}, .noise_deg = 0.0, .dead_band_deg = 0});
-    if (!made) return std::unexpected(made.error());
-    *clip = std::move(made->clip);
+    auto made = TRY(gesture::make_performance({.script = {"p", "g", "c", "p", "1", "3", "4", "p"},
+                                               .noise_deg = 0.0,
+                                               .dead_band_deg = 0}));
+    *clip = std::move(made.clip);
   }
   return emulate::hand_motion([clip](double time_s) { return emulate::pose_at(*clip, time_s); });
 }
@@ -81,9 +80,8 @@ Result<std::unique_ptr<drivers::Emulator>> make_emulator(const std::string& name
     return misuse("'" + name +
                   "' is neither a log nor a device that can be emulated; there is: " + known);
   }
-  auto options = parse_driver_options(*driver, set);
-  if (!options) return std::unexpected(options.error());
-  return driver->emulate(*options);
+  auto options = TRY(parse_driver_options(*driver, set));
+  return driver->emulate(options);
 }
 
 Result<Emulated> open_emulator(const EmulateOptions& options) {
@@ -91,25 +89,21 @@ Result<Emulated> open_emulator(const EmulateOptions& options) {
     if (!options.stream.empty()) {
       return misuse("--stream chooses from a log's streams; '" + options.what + "' is not a log");
     }
-    auto made = make_emulator(options.what, options.set);
-    if (!made) return std::unexpected(made.error());
-    return Emulated{.emulator = std::move(*made), .driver = drivers::find_driver(options.what)};
+    auto made = TRY(make_emulator(options.what, options.set));
+    return Emulated{.emulator = std::move(made), .driver = drivers::find_driver(options.what)};
   }
   if (!options.clip.empty()) return misuse("a log has its own motion: leave out --clip");
   const std::size_t addresses = std::max<std::size_t>(options.udp.size(), 1);
-  auto device = emulate::read_logged_device(options.what, options.stream, addresses);
-  if (!device) return std::unexpected(device.error());
+  auto device = TRY(emulate::read_logged_device(options.what, options.stream, addresses));
   std::unique_ptr<drivers::Emulator> speaker;
-  const drivers::Driver* driver = drivers::find_driver(device->driver);
+  const drivers::Driver* driver = drivers::find_driver(device.driver);
   if (driver != nullptr && driver->emulate != nullptr) {
-    auto made = make_emulator(device->driver, options.set);
-    if (!made) return std::unexpected(made.error());
-    speaker = std::move(*made);
+    speaker = TRY(make_emulator(device.driver, options.set));
   } else if (!options.set.empty()) {
-    return misuse("the log's device (driver '" + device->driver +
+    return misuse("the log's device (driver '" + device.driver +
                   "') takes no options: leave out --set");
   }
-  return Emulated{.emulator = std::make_unique<emulate::LogEmulator>(std::move(device->recording),
+  return Emulated{.emulator = std::make_unique<emulate::LogEmulator>(std::move(device.recording),
                                                                      std::move(speaker)),
                   .driver = driver};
 }
@@ -194,23 +188,19 @@ Result<emulate::EmulatedPort> open_port(const EmulateOptions& options, const Emu
 
 Result<> emulate(const EmulateOptions& options) {
   const Interrupt interrupt;
-  if (const auto ok = check_reach(options); !ok) return ok;
-  auto emulated = open_emulator(options);
-  if (!emulated) return std::unexpected(emulated.error());
-  if (const auto ok = check_way(options, emulated->driver); !ok) return ok;
+  TRY(check_reach(options));
+  auto emulated = TRY(open_emulator(options));
+  TRY(check_way(options, emulated.driver));
   emulate::EmulatedDevice::Settings settings{.speed = options.speed};
   for (const std::string& word : options.faults) {
-    const auto fault = drivers::emulate::parse_fault(word);
-    if (!fault) return std::unexpected(fault.error());
-    settings.faults.emplace_back(*fault, options.seed + settings.faults.size());
+    const auto fault = TRY(drivers::emulate::parse_fault(word));
+    settings.faults.emplace_back(fault, options.seed + settings.faults.size());
   }
-  auto moves = motion(options, *emulated);
-  if (!moves) return std::unexpected(moves.error());
-  auto port = open_port(options, *emulated);
-  if (!port) return std::unexpected(port.error());
+  auto moves = TRY(motion(options, emulated));
+  auto port = TRY(open_port(options, emulated));
   Findings ready;
-  ready.add("port", options.link.empty() ? port->name() : options.link.string());
-  emulate::EmulatedDevice device(std::move(emulated->emulator), std::move(*port), std::move(*moves),
+  ready.add("port", options.link.empty() ? port.name() : options.link.string());
+  emulate::EmulatedDevice device(std::move(emulated.emulator), std::move(port), std::move(moves),
                                  std::move(settings));
   ready.show(true, -1);
   std::atomic<bool> ended{false};

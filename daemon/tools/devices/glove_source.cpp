@@ -88,7 +88,7 @@ class OpenedGlove final : public GloveSource {
       }
       pollfd wanted{.fd = device_.transport->poll_fd(), .events = POLLIN, .revents = 0};
       (void)::poll(&wanted, 1, polled ? 2 : static_cast<int>(kLookAround.count()));
-      if (auto ok = read(now, sink); !ok) return ok;
+      TRY(read(now, sink));
     }
     if (sink.count == 0) return nothing_came();
     return {};
@@ -118,14 +118,11 @@ struct Received {
 class Subscription {
  public:
   static Result<Subscription> open(const ClientOptions& client, const std::string& stream) {
-    auto connection = Connection::open(client, ZMQ_SUB);
-    if (!connection) return std::unexpected(connection.error());
+    auto connection = TRY(Connection::open(client, ZMQ_SUB));
     for (const std::string& topic : {sensor_topic(stream), std::string("stats")}) {
-      if (auto ok = net::set_option(connection->socket(), ZMQ_SUBSCRIBE, topic); !ok) {
-        return std::unexpected(ok.error());
-      }
+      TRY(net::set_option(connection.socket(), ZMQ_SUBSCRIBE, topic));
     }
-    return Subscription(std::move(*connection), stream);
+    return Subscription(std::move(connection), stream);
   }
 
   Result<Received> next() {
@@ -181,10 +178,9 @@ class PublishedGlove final : public GloveSource {
     std::size_t count = 0;
     while (Clock::now() < end) {
       if (enough()) return {};
-      const auto received = subscription_.next();
-      if (!received) return std::unexpected(received.error());
-      if (received->stats && !still_there(*received->stats)) return gone();
-      if (received->sample && pass_on(*received->sample, accept)) ++count;
+      const auto received = TRY(subscription_.next());
+      if (received.stats && !still_there(*received.stats)) return gone();
+      if (received.sample && pass_on(*received.sample, accept)) ++count;
     }
     if (count == 0) return nothing_came();
     return {};
@@ -202,7 +198,7 @@ class PublishedGlove final : public GloveSource {
     Valid valid;
     for (std::size_t i = 0; i < model().sensors.size(); ++i) {
       const auto at = std::ranges::find(sample.name(), "raw_" + model().sensors[i].name);
-      const auto place = static_cast<std::size_t>(at - sample.name().begin());
+      const std::size_t place = at - sample.name().begin();
       if (place >= static_cast<std::size_t>(sample.value_size())) return false;
       raw[i] = sample.value(static_cast<int>(place));
       valid[i] = place < sample.validity().size() && sample.validity()[place] != 0;
@@ -222,33 +218,28 @@ Result<GloveSource::Glove> GloveSource::known(const drivers::Driver& driver,
   if (driver.glove == nullptr || !hand) {
     return misuse("driver " + in_quotes(driver.name) + " is not for gloves");
   }
-  auto model = driver.glove->glove_model(description);
-  if (!model) return std::unexpected(model.error());
-  return Glove{.model = std::move(*model), .identity = description.identity, .hand = *hand};
+  auto model = TRY(driver.glove->glove_model(description));
+  return Glove{.model = std::move(model), .identity = description.identity, .hand = *hand};
 }
 
 Result<std::unique_ptr<GloveSource>> GloveSource::open(const drivers::Driver& driver,
                                                        const drivers::Options& options) {
   auto ports = std::make_unique<drivers::TransportFactory>();
-  auto device = driver.open(options, *ports);
-  if (!device) return std::unexpected(device.error());
-  auto glove = known(driver, device->description);
-  if (!glove) return std::unexpected(glove.error());
-  if (auto ok = device->transport->start(now_ns()); !ok) return std::unexpected(ok.error());
-  return std::make_unique<OpenedGlove>(std::move(*glove), std::move(*device), std::move(ports));
+  auto device = TRY(driver.open(options, *ports));
+  auto glove = TRY(known(driver, device.description));
+  TRY(device.transport->start(now_ns()));
+  return std::make_unique<OpenedGlove>(std::move(glove), std::move(device), std::move(ports));
 }
 
 Result<std::unique_ptr<GloveSource>> GloveSource::connect(const ClientOptions& client,
                                                           const std::string& stream) {
-  auto subscription = Subscription::open(client, stream);
-  if (!subscription) return std::unexpected(subscription.error());
+  auto subscription = TRY(Subscription::open(client, stream));
   const auto end = Clock::now() + std::chrono::duration<double>(kGlovePatience_s);
   while (Clock::now() < end) {
-    const auto received = subscription->next();
-    if (!received) return std::unexpected(received.error());
-    if (!received->stats) continue;
-    const v1::StreamStats* stats = subscription->part_of(*received->stats);
-    if (stats == nullptr) return no_such_stream(stream, *received->stats);
+    const auto received = TRY(subscription.next());
+    if (!received.stats) continue;
+    const v1::StreamStats* stats = subscription.part_of(*received.stats);
+    if (stats == nullptr) return no_such_stream(stream, *received.stats);
     const drivers::Driver* driver = drivers::find_driver(stats->driver());
     if (driver == nullptr || stats->device_info().empty()) {
       return misuse("stream " + in_quotes(stream) + " is of driver " + in_quotes(stats->driver()) +
@@ -258,13 +249,11 @@ Result<std::unique_ptr<GloveSource>> GloveSource::connect(const ClientOptions& c
       return fail("the glove of stream " + in_quotes(stream) +
                   " is away: plug it in and begin again");
     }
-    const auto description = driver->describe(stats->device_info(), stats->identity());
-    if (!description) return std::unexpected(description.error());
-    auto glove = known(*driver, *description);
-    if (!glove) return std::unexpected(glove.error());
-    return std::make_unique<PublishedGlove>(std::move(*glove), std::move(*subscription));
+    const auto description = TRY(driver->describe(stats->device_info(), stats->identity()));
+    auto glove = TRY(known(*driver, description));
+    return std::make_unique<PublishedGlove>(std::move(glove), std::move(subscription));
   }
-  return std::unexpected(subscription->no_answer());
+  return std::unexpected(subscription.no_answer());
 }
 
 }  // namespace posed::tools

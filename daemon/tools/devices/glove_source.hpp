@@ -23,11 +23,11 @@ class GloveSource {
   using Accept = std::function<void(const Raw& raw, const Valid& valid)>;
 
   // Opens the device and starts it.
-  [[nodiscard]] static Result<std::unique_ptr<GloveSource>> open(const drivers::Driver& driver,
-                                                                 const drivers::Options& options);
+  static Result<std::unique_ptr<GloveSource>> open(const drivers::Driver& driver,
+                                                   const drivers::Options& options);
   // For a stream of a running daemon; the daemon reports which glove it is.
-  [[nodiscard]] static Result<std::unique_ptr<GloveSource>> connect(const ClientOptions& client,
-                                                                    const std::string& stream);
+  static Result<std::unique_ptr<GloveSource>> connect(const ClientOptions& client,
+                                                      const std::string& stream);
   virtual ~GloveSource() = default;
   GloveSource(const GloveSource&) = delete;
   GloveSource& operator=(const GloveSource&) = delete;
@@ -39,9 +39,9 @@ class GloveSource {
   // Passes on what comes for this long, or until `enough` returns true, which is asked after each
   // measurement and ten times a second. Returns an error if the glove is lost, nothing comes, or on
   // Ctrl-C.
-  [[nodiscard]] virtual Result<> listen(double seconds, const Accept& accept,
-                                        const std::function<bool()>& enough) = 0;
-  [[nodiscard]] Result<> listen(double seconds, const Accept& accept) {
+  virtual Result<> listen(double seconds, const Accept& accept,
+                          const std::function<bool()>& enough) = 0;
+  Result<> listen(double seconds, const Accept& accept) {
     return listen(seconds, accept, [] { return false; });
   }
 
@@ -51,8 +51,8 @@ class GloveSource {
     std::string identity;
     Side hand = Side::kRight;
   };
-  [[nodiscard]] static Result<Glove> known(const drivers::Driver& driver,
-                                           const drivers::Description& description);
+  static Result<Glove> known(const drivers::Driver& driver,
+                             const drivers::Description& description);
   explicit GloveSource(Glove glove) : glove_(std::move(glove)) {}
 
  private:

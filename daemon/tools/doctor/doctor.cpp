@@ -94,7 +94,7 @@ constexpr const char* kInstallRules =
     "sudo cp config/udev/70-posed.rules /etc/udev/rules.d/ && sudo udevadm control --reload &&"
     " sudo udevadm trigger";
 constexpr const char* kGroups[] = {"dialout", "plugdev"};  // those of the udev rules
-constexpr int kLongestLatency_ms = 1;
+constexpr int kMaxLatency_ms = 1;
 
 bool gloves_matter(const Machine& machine, Config config) {
   return !machine.nodes.empty() || (config != nullptr && wants_gloves(*config));
@@ -183,7 +183,7 @@ Check check_usb_latency(const Machine& machine) {
     if (latency.empty()) continue;  // only FTDI's adapters collect bytes
     const std::string node = port.filename().string();
     add_word(ports, node);
-    if (number_of(latency) <= kLongestLatency_ms) continue;
+    if (number_of(latency) <= kMaxLatency_ms) continue;
     add_word(slow, node);
     slow += " " + latency + " ms";
   }
@@ -214,7 +214,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kLeastRecording_h = 1.0;
+constexpr double kMinRecording_h = 1.0;
 
 // The folder itself, or the first one above it that exists.
 fs::path existing(fs::path folder) {
@@ -260,10 +260,8 @@ std::vector<fs::path> model_files(const config::DaemonConfig& config) {
 }
 
 Result<> try_model(const fs::path& path) {
-  const auto bytes = model_file::load(path);
-  if (!bytes) return std::unexpected(bytes.error());
-  const auto opened = model_file::open(std::as_bytes(std::span(*bytes)), path.string());
-  if (!opened) return std::unexpected(opened.error());
+  const auto bytes = TRY(model_file::load(path));
+  TRY(model_file::open(std::as_bytes(std::span(bytes)), path.string()));
   return {};
 }
 
@@ -288,7 +286,7 @@ Check check_disk(const Machine& machine, Config config) {
   const std::string found =
       fmt::format("{:.1f} GB free in {}, for about {:.1f} hours at {:.0f} KB a second",
                   static_cast<double>(*free) / 1e9, shown(folder), hours, rate / 1e3);
-  if (hours >= kLeastRecording_h) return right(name, found);
+  if (hours >= kMinRecording_h) return right(name, found);
   return wrong(name, found, "free some space, or set [record] folder to a larger disk");
 }
 
@@ -367,7 +365,7 @@ namespace fs = std::filesystem;
 
 // mlockall counts addresses, also those of thread stacks that nobody has touched: a daemon with
 // room for 64 streams has 0.6 GB of them. Beyond the limit it could not even start a thread.
-constexpr std::uint64_t kLeastLocked_bytes = std::uint64_t{2} << 30;
+constexpr std::uint64_t kMinLocked_bytes = std::uint64_t{2} << 30;
 
 // The line that gives this user a right at the next login; a service has it in its unit.
 std::string limit_line(const Machine& machine, const char* what) {
@@ -420,7 +418,7 @@ Check check_memory_lock(const Machine& machine, Config config) {
   if (machine.locked_limit_bytes == kNoLimit) return right(name, "without limit");
   const std::string found =
       std::to_string(machine.locked_limit_bytes / 1024) + " KB may be locked (RLIMIT_MEMLOCK)";
-  if (machine.locked_limit_bytes >= kLeastLocked_bytes) return right(name, found);
+  if (machine.locked_limit_bytes >= kMinLocked_bytes) return right(name, found);
   return wrong(name, found + ": a page that was swapped out delays a frame",
                limit_line(machine, "memlock unlimited"));
 }

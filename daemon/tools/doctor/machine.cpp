@@ -47,9 +47,9 @@ std::string group_name(gid_t id) {
 }
 
 std::set<std::string> own_groups() {
-  std::vector<gid_t> ids(static_cast<std::size_t>(std::max(::getgroups(0, nullptr), 0)));
+  std::vector<gid_t> ids(std::max(::getgroups(0, nullptr), 0));
   const int count = ::getgroups(static_cast<int>(ids.size()), ids.data());
-  ids.resize(static_cast<std::size_t>(std::max(count, 0)));
+  ids.resize(std::max(count, 0));
   ids.push_back(::getegid());
   std::set<std::string> names;
   for (const gid_t id : ids) names.insert(group_name(id));
@@ -101,11 +101,10 @@ std::optional<std::uint64_t> free_bytes(const fs::path& folder) {
 
 // Without listen(), so nobody can connect meanwhile.
 Result<> try_bind(const Listener& listener) {
-  const auto address = drivers::parse_endpoint(listener.endpoint);
-  if (!address) return std::unexpected(address.error());
+  const auto address = TRY(drivers::parse_endpoint(listener.endpoint));
   const int kind = listener.udp ? SOCK_DGRAM : SOCK_STREAM;
   // As the daemon does: TCP ports in TIME_WAIT, and multicast groups, are no conflict.
-  const int fd = drivers::bind_socket(*address, kind, !listener.udp || listener.shared);
+  const int fd = drivers::bind_socket(address, kind, !listener.udp || listener.shared);
   if (fd < 0) return fail(errno_text());
   ::close(fd);
   return {};

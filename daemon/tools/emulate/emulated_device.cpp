@@ -71,16 +71,15 @@ Result<EmulatedPort> EmulatedPort::open_pty(const std::filesystem::path& link) {
   cfmakeraw(&mode);
   tcsetattr(slave, TCSANOW, &mode);
   if (link.empty()) return port;
-  if (auto made = make_link(link, name.data()); !made) return std::unexpected(made.error());
+  TRY(make_link(link, name.data()));
   port.link_ = link;
   return port;
 }
 
 Result<EmulatedPort> EmulatedPort::connect_tcp(const std::string& endpoint) {
-  const auto address = drivers::parse_endpoint(endpoint);
-  if (!address) return std::unexpected(address.error());
-  const int fd = ::socket(address->storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  if (fd < 0 || ::connect(fd, address->get(), address->size) != 0) {
+  const auto address = TRY(drivers::parse_endpoint(endpoint));
+  const int fd = ::socket(address.storage.ss_family, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  if (fd < 0 || ::connect(fd, address.get(), address.size) != 0) {
     const std::string why = errno_text();
     if (fd >= 0) ::close(fd);
     return fail("nothing listens at " + endpoint + " (" + why +
@@ -93,12 +92,9 @@ Result<EmulatedPort> EmulatedPort::connect_tcp(const std::string& endpoint) {
 }
 
 Result<EmulatedPort> EmulatedPort::listen_tcp(const std::string& endpoint) {
-  const auto address = drivers::parse_endpoint(endpoint);
-  if (!address) return std::unexpected(address.error());
+  const auto address = TRY(drivers::parse_endpoint(endpoint));
   EmulatedPort port(Kind::kTcpServer, {}, "");
-  const auto fd = drivers::listen_on(*address, endpoint, 1);
-  if (!fd) return std::unexpected(fd.error());
-  port.listener_ = *fd;
+  port.listener_ = TRY(drivers::listen_on(address, endpoint, 1));
   port.name_ = drivers::endpoint_text(drivers::bound_address(port.listener_));
   return port;
 }
@@ -108,18 +104,17 @@ Result<EmulatedPort> EmulatedPort::open_udp(const std::vector<std::string>& endp
   EmulatedPort port(Kind::kUdp, {}, "");
   for (std::size_t i = 0; i < endpoints.size(); ++i) {
     const std::string& endpoint = endpoints[i];
-    const auto address = drivers::parse_endpoint(endpoint);
-    if (!address) return std::unexpected(address.error());
-    const int fd = drivers::open_socket(*address, SOCK_DGRAM);
+    const auto address = TRY(drivers::parse_endpoint(endpoint));
+    const int fd = drivers::open_socket(address, SOCK_DGRAM);
     if (fd >= 0) port.fds_.push_back(fd);
     if (fd >= 0 && i < ports.size() && ports[i] != 0) {
-      const auto own = own_address(*address, ports[i]);
+      const auto own = own_address(address, ports[i]);
       if (::bind(fd, own.get(), own.size) != 0) {
         return fail("cannot use the device's port " + std::to_string(ports[i]) + " (" +
                     errno_text() + "); end the program that has it");
       }
     }
-    if (fd < 0 || ::connect(fd, address->get(), address->size) != 0) {
+    if (fd < 0 || ::connect(fd, address.get(), address.size) != 0) {
       return fail("cannot send to " + endpoint + " (" + errno_text() +
                   "); name an address that this machine reaches");
     }
@@ -130,15 +125,9 @@ Result<EmulatedPort> EmulatedPort::open_udp(const std::vector<std::string>& endp
 
 Result<EmulatedPort> EmulatedPort::publish(const std::string& endpoint) {
   EmulatedPort port(Kind::kPublish, {}, "");
-  auto context = net::open_context();
-  if (!context) return std::unexpected(context.error());
-  port.context_ = std::move(*context);
-  auto socket = net::open_socket(port.context_.get(), ZMQ_PUB);
-  if (!socket) return std::unexpected(socket.error());
-  port.publisher_ = std::move(*socket);
-  auto bound = net::bind_socket(port.publisher_.get(), endpoint);
-  if (!bound) return std::unexpected(bound.error());
-  port.name_ = *bound;
+  port.context_ = TRY(net::open_context());
+  port.publisher_ = TRY(net::open_socket(port.context_.get(), ZMQ_PUB));
+  port.name_ = TRY(net::bind_socket(port.publisher_.get(), endpoint));
   return port;
 }
 
@@ -197,7 +186,7 @@ std::optional<EmulatedPort::Received> EmulatedPort::receive(std::chrono::nanosec
     return Received{};
   }
   if (size <= 0 && kind_ != Kind::kUdp) return std::nullopt;
-  received.bytes.resize(static_cast<std::size_t>(size));
+  received.bytes.resize(size);
   return received;
 }
 
@@ -216,7 +205,7 @@ void EmulatedPort::send(std::uint8_t socket, std::span<const std::byte> bytes) n
                              ? ::write(fds_[socket], bytes.data(), bytes.size())
                              : ::send(fds_[socket], bytes.data(), bytes.size(), MSG_NOSIGNAL);
     if (sent <= 0) return;
-    bytes = bytes.subspan(static_cast<std::size_t>(sent));
+    bytes = bytes.subspan(sent);
   }
 }
 

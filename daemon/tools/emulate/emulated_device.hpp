@@ -30,22 +30,22 @@ class EmulatedPort {
  public:
   // A pseudo-terminal in raw mode. With `link`, a symbolic link at that path points to it while it
   // is open. An existing link is replaced; any other file is an error.
-  [[nodiscard]] static Result<EmulatedPort> open_pty(const std::filesystem::path& link = {});
+  static Result<EmulatedPort> open_pty(const std::filesystem::path& link = {});
   // Connects to HOST:PORT, numbers only; fails if nothing listens there.
-  [[nodiscard]] static Result<EmulatedPort> connect_tcp(const std::string& endpoint);
+  static Result<EmulatedPort> connect_tcp(const std::string& endpoint);
 
   // Waits at IP:PORT for the host to connect, for systems that serve their data. The newest
   // connection counts; port 0 means any that is free, and name() says which.
-  [[nodiscard]] static Result<EmulatedPort> listen_tcp(const std::string& endpoint);
+  static Result<EmulatedPort> listen_tcp(const std::string& endpoint);
 
   // Sends datagrams to these sockets of the host, "IP:PORT", whether or not it is there already.
   // `ports`: those of this machine that they come from; 0 or left out: any.
-  [[nodiscard]] static Result<EmulatedPort> open_udp(const std::vector<std::string>& endpoints,
-                                                     const std::vector<std::uint16_t>& ports = {});
+  static Result<EmulatedPort> open_udp(const std::vector<std::string>& endpoints,
+                                       const std::vector<std::uint16_t>& ports = {});
 
   // Publishes over ZeroMQ at this endpoint, "tcp://127.0.0.1:5575": what send() gets is a topic, a
   // zero byte and the message.
-  [[nodiscard]] static Result<EmulatedPort> publish(const std::string& endpoint);
+  static Result<EmulatedPort> publish(const std::string& endpoint);
 
   ~EmulatedPort();
   EmulatedPort(EmulatedPort&& other) noexcept;

@@ -32,26 +32,24 @@ void LogEmulator::emit(std::int64_t, Bytes& out) {
 
 Result<LoggedDevice> read_logged_device(const std::string& log, const std::string& stream,
                                         std::size_t addresses) {
-  auto reader = log::Reader::open(log);
-  if (!reader) return std::unexpected(reader.error());
+  auto reader = TRY(log::Reader::open(log));
   const log::StreamRow* wanted = nullptr;
   std::string names;
-  for (const log::StreamRow& row : reader->streams()) {
+  for (const log::StreamRow& row : reader.streams()) {
     names += (names.empty() ? "" : ", ") + row.name;
-    if (row.name == stream || (stream.empty() && reader->streams().size() == 1)) wanted = &row;
+    if (row.name == stream || (stream.empty() && reader.streams().size() == 1)) wanted = &row;
   }
   if (wanted == nullptr) {
     return misuse("choose one of its streams with --stream: " + names, log);
   }
-  const log::SourceRow& source = reader->source_of(*wanted);
+  const log::SourceRow& source = reader.source_of(*wanted);
   LoggedDevice device{
       .stream = wanted->name, .driver = source.driver, .text = source.text, .recording = {}};
   std::size_t sockets = 1;
   for (;;) {
-    const auto chunk = reader->next_chunk();
-    if (!chunk) return std::unexpected(chunk.error());
-    if (!chunk->has_value()) break;
-    const log::ChunkRow& row = **chunk;
+    const auto chunk = TRY(reader.next_chunk());
+    if (!chunk.has_value()) break;
+    const log::ChunkRow& row = *chunk;
     if (row.source != source.id) continue;
     sockets = std::max<std::size_t>(sockets, row.socket + std::size_t{1});
     if (row.direction != static_cast<std::uint8_t>(pipeline::Direction::kFromDevice)) continue;

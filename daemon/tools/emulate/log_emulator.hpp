@@ -51,8 +51,7 @@ struct LoggedDevice {
   std::string stream, driver, text;
   drivers::Recording recording;
 };
-[[nodiscard]] Result<LoggedDevice> read_logged_device(const std::string& log,
-                                                      const std::string& stream,
-                                                      std::size_t addresses);
+Result<LoggedDevice> read_logged_device(const std::string& log, const std::string& stream,
+                                        std::size_t addresses);
 
 }  // namespace posed::emulate

@@ -46,10 +46,9 @@ void pose_bodies(Performance& performance, double time_s, drivers::Emulator& emu
 }  // namespace
 
 Result<Motion> clip_motion(const std::filesystem::path& path, const drivers::Emulator& emulator) {
-  auto clip = clip::read_clip(path);
-  if (!clip) return std::unexpected(clip.error());
+  auto clip = TRY(clip::read_clip(path));
   auto performance = std::make_shared<Performance>();
-  performance->clip = std::move(*clip);
+  performance->clip = std::move(clip);
   for (std::size_t body = 0; body < kMaxBodies; ++body) {
     const Skeleton* skeleton = emulator.skeleton(body);
     if (skeleton == nullptr) continue;
@@ -73,16 +72,12 @@ Result<std::unique_ptr<SyntheticSigner>> SyntheticSigner::start(const std::strin
   if (driver == nullptr || driver->emulate == nullptr) {
     return misuse("driver '" + name + "' has no emulator, so it cannot be used here");
   }
-  auto motion = clip::read_hand_clip(clip);
-  if (!motion) return std::unexpected(motion.error());
-  const auto options = drivers::complete_options(*driver, {});
-  if (!options) return std::unexpected(options.error());
-  auto emulator = driver->emulate(*options);
-  if (!emulator) return std::unexpected(emulator.error());
-  auto port = EmulatedPort::open_pty();
-  if (!port) return std::unexpected(port.error());
+  auto motion = TRY(clip::read_hand_clip(clip));
+  const auto options = TRY(drivers::complete_options(*driver, {}));
+  auto emulator = TRY(driver->emulate(options));
+  auto port = TRY(EmulatedPort::open_pty());
   return std::unique_ptr<SyntheticSigner>(
-      new SyntheticSigner(std::move(*emulator), std::move(*port), std::move(*motion)));
+      new SyntheticSigner(std::move(emulator), std::move(port), std::move(motion)));
 }
 
 SyntheticSigner::SyntheticSigner(std::unique_ptr<drivers::Emulator> emulator, EmulatedPort port,

@@ -15,8 +15,7 @@ namespace posed::emulate {
 // Every person of `emulator` performs the clip, retargeted to its skeleton, interpolated
 // between frames and repeated in a loop; bodies that share no bone with the clip, such as props,
 // move as before. Without any person it is an error. Cold.
-[[nodiscard]] Result<Motion> clip_motion(const std::filesystem::path& path,
-                                         const drivers::Emulator& emulator);
+Result<Motion> clip_motion(const std::filesystem::path& path, const drivers::Emulator& emulator);
 
 // SyntheticSigner: an emulated glove with a clip as its hand motion, on its own thread; the live
 // hand of the demo. It goes from labels through angles to the glove's bytes on a pseudo-terminal;
@@ -24,8 +23,8 @@ namespace posed::emulate {
 class SyntheticSigner {
  public:
   // Starts a glove of this driver, with its default options.
-  [[nodiscard]] static Result<std::unique_ptr<SyntheticSigner>> start(
-      const std::string& driver, const std::filesystem::path& clip);
+  static Result<std::unique_ptr<SyntheticSigner>> start(const std::string& driver,
+                                                        const std::filesystem::path& clip);
   SyntheticSigner(const SyntheticSigner&) = delete;
   SyntheticSigner& operator=(const SyntheticSigner&) = delete;
 

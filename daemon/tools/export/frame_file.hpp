@@ -13,11 +13,11 @@ namespace posed::tools {
 
 class FrameFile {
  public:
-  [[nodiscard]] static Result<FrameFile> create(const std::filesystem::path& path);
+  static Result<FrameFile> create(const std::filesystem::path& path);
 
   void add(const v1::Frame& frame);
   // Returns whether everything was written.
-  [[nodiscard]] Result<> close();
+  Result<> close();
 
  private:
   FrameFile(std::ofstream file, std::filesystem::path path)

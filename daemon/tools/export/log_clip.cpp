@@ -15,17 +15,17 @@
 namespace posed::tools {
 namespace {
 
-constexpr std::size_t kMostListed = 20;  // takes in a sentence
+constexpr std::size_t kMaxListed = 20;  // takes in a sentence
 
 std::string list_of(const std::vector<log::TakeRow>& takes) {
   std::string list;
-  for (std::size_t i = 0; i < takes.size() && i < kMostListed; ++i) {
+  for (std::size_t i = 0; i < takes.size() && i < kMaxListed; ++i) {
     const pipeline::Take take{.number = static_cast<std::uint32_t>(takes[i].id),
                               .name = takes[i].name};
     list += (i == 0 ? "" : ", ") + pipeline::words_of(take);
   }
-  if (takes.size() > kMostListed) {
-    list += " and " + std::to_string(takes.size() - kMostListed) + " more";
+  if (takes.size() > kMaxListed) {
+    list += " and " + std::to_string(takes.size() - kMaxListed) + " more";
   }
   return list;
 }
@@ -71,18 +71,17 @@ class GapMarker {
 }  // namespace
 
 Result<log::TakeRow> find_take(const log::Reader& reader, const std::string& wanted) {
-  auto takes = reader.takes();
-  if (!takes) return std::unexpected(takes.error());
-  if (takes->empty()) return misuse("has no takes; leave --take out", reader.file());
-  for (const log::TakeRow& take : *takes) {
+  auto takes = TRY(reader.takes());
+  if (takes.empty()) return misuse("has no takes; leave --take out", reader.file());
+  for (const log::TakeRow& take : takes) {
     if (std::to_string(take.id) == wanted) return take;
   }
   std::vector<log::TakeRow> named;
-  std::ranges::copy_if(*takes, std::back_inserter(named),
+  std::ranges::copy_if(takes, std::back_inserter(named),
                        [&](const log::TakeRow& take) { return take.name == wanted; });
   if (named.size() == 1) return named.front();
   if (named.empty()) {
-    return misuse("has no take " + in_quotes(wanted) + ", but " + list_of(*takes), reader.file());
+    return misuse("has no take " + in_quotes(wanted) + ", but " + list_of(takes), reader.file());
   }
   return misuse("has several takes named " + in_quotes(wanted) +
                     "; give the number of one: " + list_of(named),
@@ -90,23 +89,20 @@ Result<log::TakeRow> find_take(const log::Reader& reader, const std::string& wan
 }
 
 Result<std::vector<LoggedTake>> logged_takes(log::Reader& reader) {
-  auto rows = reader.takes();
-  if (!rows) return std::unexpected(rows.error());
+  auto rows = TRY(reader.takes());
   std::vector<LoggedTake> takes;
-  for (log::TakeRow& row : *rows) takes.push_back({.row = std::move(row)});
-  const auto extent = reader.extent();
-  if (!extent) return std::unexpected(extent.error());
-  if (takes.empty() || !*extent) return takes;
-  const auto gaps = reader.gaps();
-  if (!gaps) return std::unexpected(gaps.error());
-  GapMarker gap_marker(*gaps, takes);
+  for (log::TakeRow& row : rows) takes.push_back({.row = std::move(row)});
+  const auto extent = TRY(reader.extent());
+  if (takes.empty() || !extent) return takes;
+  const auto gaps = TRY(reader.gaps());
+  GapMarker gap_marker(gaps, takes);
   for (auto chunk = reader.next_chunk();; chunk = reader.next_chunk()) {
     if (!chunk) return std::unexpected(chunk.error());
     if (!chunk->has_value()) break;
     const log::ChunkRow& row = **chunk;
     gap_marker.on_chunk(row);
     if (row.direction != 0) continue;  // the others have no time of their own
-    const double time_s = seconds(row.arrival_ns - (*extent)->first_ns);
+    const double time_s = seconds(row.arrival_ns - extent->first_ns);
     for (LoggedTake& take : takes) {
       if (!holds(take.row, row.first_item)) continue;
       if (!take.begin_s) take.begin_s = time_s;
@@ -199,9 +195,7 @@ Result<Chosen> choose(const replay::Replay& replay, const std::string& wanted,
         path);
   }
   const std::string& name = replay.stream(chosen.ids.front()).name;
-  if (auto same = check_same_skeleton(replay, name, chosen.ids, path, raw); !same) {
-    return std::unexpected(same.error());
-  }
+  TRY(check_same_skeleton(replay, name, chosen.ids, path, raw));
   return chosen;
 }
 
@@ -227,7 +221,7 @@ class Collector {
 
   [[nodiscard]] std::size_t frames() const { return arrival_ns_.size(); }
 
-  [[nodiscard]] Result<clip::Clip> finish(const std::string& path, double rate_hz) const {
+  Result<clip::Clip> finish(const std::string& path, double rate_hz) const {
     auto clip = clip_.finish(path, rate_hz, times_s());
     if (clip && missing_ > 0) {
       clip->warnings.push_back(std::to_string(missing_) +
@@ -320,44 +314,37 @@ class TakeCollector {
 
 Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::string& stream,
                                const std::string& wanted_take) {
-  auto reader = log::Reader::open(path);
-  if (!reader) return std::unexpected(reader.error());
+  auto reader = TRY(log::Reader::open(path));
   log::TakeRow interval{.name = {}, .last_item = log::kToTheEnd};
   if (!wanted_take.empty()) {
-    auto found = find_take(*reader, wanted_take);
-    if (!found) return std::unexpected(found.error());
-    interval = std::move(*found);
+    interval = TRY(find_take(reader, wanted_take));
   }
-  auto opened = replay::Replay::open(*reader);
-  if (!opened) return std::unexpected(opened.error());
-  replay::Replay& replay = **opened;
-  const auto chosen = choose(replay, stream, path.string());
-  if (!chosen) return std::unexpected(chosen.error());
-  const replay::ReplayStream& first = replay.stream(chosen->ids.front());
-  Collector collector(skeleton_of(replay, chosen->ids.front(), chosen->raw));
-  const auto kind = chosen->raw ? pipeline::Item::Kind::kRawFrame : pipeline::Item::Kind::kFrame;
+  auto opened = TRY(replay::Replay::open(reader));
+  replay::Replay& replay = *opened;
+  const auto chosen = TRY(choose(replay, stream, path.string()));
+  const replay::ReplayStream& first = replay.stream(chosen.ids.front());
+  Collector collector(skeleton_of(replay, chosen.ids.front(), chosen.raw));
+  const auto kind = chosen.raw ? pipeline::Item::Kind::kRawFrame : pipeline::Item::Kind::kFrame;
   const auto take = [&](const pipeline::Item& item) {
     if (item.kind == kind && holds(interval, replay.position()) &&
-        std::ranges::find(chosen->ids, item.frame.header.stream) != chosen->ids.end()) {
+        std::ranges::find(chosen.ids, item.frame.header.stream) != chosen.ids.end()) {
       collector.add(item.frame);
     }
   };
-  const auto done = replay.run(
-      take, [&](const log::ChunkRow&) { return replay.position() <= interval.last_item; });
-  if (!done) return std::unexpected(done.error());
+  TRY(replay.run(take,
+                 [&](const log::ChunkRow&) { return replay.position() <= interval.last_item; }));
   if (!wanted_take.empty() && collector.frames() < 2) {
     return fail("take " + std::to_string(interval.id) + " has " +
                     std::to_string(collector.frames()) + " frames of stream " +
                     in_quotes(first.name) + ", and a clip needs two",
                 path.string());
   }
-  auto clip = collector.finish(path.string(), first.description.rate_hz);
-  if (!clip) return clip;
-  for (const std::uint32_t id : chosen->ids) {
+  auto clip = TRY(collector.finish(path.string(), first.description.rate_hz));
+  for (const std::uint32_t id : chosen.ids) {
     const auto broken = replay.broken_at(id);
     if (!broken) continue;
-    clip->warnings.push_back("the log is known to lack data from frame " + std::to_string(*broken) +
-                             " on");
+    clip.warnings.push_back("the log is known to lack data from frame " + std::to_string(*broken) +
+                            " on");
     break;
   }
   return clip;
@@ -365,19 +352,14 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
 
 Result<> each_take_clip(const std::filesystem::path& path, const EachTakeClip& each,
                         const std::function<bool()>& goes_on) {
-  auto reader = log::Reader::open(path);
-  if (!reader) return std::unexpected(reader.error());
-  auto takes = reader->takes();
-  if (!takes) return std::unexpected(takes.error());
-  if (takes->empty()) return {};
-  auto opened = replay::Replay::open(*reader);
-  if (!opened) return std::unexpected(opened.error());
-  TakeCollector collector(**opened, std::move(*takes), path.string(), each);
+  auto reader = TRY(log::Reader::open(path));
+  auto takes = TRY(reader.takes());
+  if (takes.empty()) return {};
+  auto opened = TRY(replay::Replay::open(reader));
+  TakeCollector collector(*opened, std::move(takes), path.string(), each);
   bool stopped = false;
-  const auto done =
-      (*opened)->run([&](const pipeline::Item& item) { collector.add(item); },
-                     [&](const log::ChunkRow&) { return !(stopped = stopped || !goes_on()); });
-  if (!done) return done;
+  TRY(opened->run([&](const pipeline::Item& item) { collector.add(item); },
+                  [&](const log::ChunkRow&) { return !(stopped = stopped || !goes_on()); }));
   if (stopped) return fail("interrupted: the log is complete, but not all of its takes are clips");
   collector.finish();
   return {};

@@ -24,11 +24,11 @@ struct LoggedTake {
 };
 
 // Reads through all chunks of the log.
-[[nodiscard]] Result<std::vector<LoggedTake>> logged_takes(log::Reader& reader);
+Result<std::vector<LoggedTake>> logged_takes(log::Reader& reader);
 
 // `wanted` is a take's number, or its name if no other take has it. Otherwise the error lists the
 // takes that there are.
-[[nodiscard]] Result<log::TakeRow> find_take(const log::Reader& reader, const std::string& wanted);
+Result<log::TakeRow> find_take(const log::Reader& reader, const std::string& wanted);
 
 [[nodiscard]] constexpr bool holds(const log::TakeRow& take, std::uint64_t item) noexcept {
   return item >= take.first_item && item <= take.last_item;
@@ -40,9 +40,8 @@ struct LoggedTake {
 // of the device if it has them, otherwise those of arrival, starting from 0. `take`: only what was
 // published during this take of the log, by its number or its name; empty: all. `warnings`
 // describes what the log or the run left out.
-[[nodiscard]] Result<clip::Clip> clip_of_log(const std::filesystem::path& path,
-                                             const std::string& stream,
-                                             const std::string& take = {});
+Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::string& stream,
+                               const std::string& take = {});
 
 // `stream`: its name, with "#2" behind it for a part with a skeleton of its own.
 using EachTakeClip =
@@ -51,7 +50,7 @@ using EachTakeClip =
 // Calls `each` with the clip of each take and stream, in the order of the takes; one replay of the
 // log makes them all, with the frames of one take in memory. Streams with fewer than two frames in
 // a take are left out. Ends with an error when `goes_on` says no.
-[[nodiscard]] Result<> each_take_clip(const std::filesystem::path& path, const EachTakeClip& each,
-                                      const std::function<bool()>& goes_on);
+Result<> each_take_clip(const std::filesystem::path& path, const EachTakeClip& each,
+                        const std::function<bool()>& goes_on);
 
 }  // namespace posed::tools

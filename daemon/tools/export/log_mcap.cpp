@@ -277,9 +277,9 @@ std::optional<std::int64_t> utc_offset_ns(const log::Reader& reader) {
   std::int64_t offset_ns = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), offset_ns);
   // The sum with a time of the log must fit.
-  constexpr std::int64_t kMost_ns = std::numeric_limits<std::int64_t>::max() / 2;
+  constexpr std::int64_t kMaxTime_ns = std::numeric_limits<std::int64_t>::max() / 2;
   const bool plausible = error == std::errc() && end == text.data() + text.size() &&
-                         offset_ns >= 0 && offset_ns <= kMost_ns;
+                         offset_ns >= 0 && offset_ns <= kMaxTime_ns;
   return plausible ? std::optional(offset_ns) : std::nullopt;
 }
 
@@ -422,13 +422,11 @@ void warn_of_gaps(const replay::Replay& replay, std::vector<std::string>& warnin
 
 Result<McapSummary> write_mcap(const std::filesystem::path& log, const std::filesystem::path& path,
                                const std::function<bool()>& stop) {
-  auto reader = log::Reader::open(log);
-  if (!reader) return std::unexpected(reader.error());
-  auto opened = replay::Replay::open(*reader);
-  if (!opened) return std::unexpected(opened.error());
-  replay::Replay& replay = **opened;
+  auto reader = TRY(log::Reader::open(log));
+  auto opened = TRY(replay::Replay::open(reader));
+  replay::Replay& replay = *opened;
   McapSummary summary;
-  const auto offset_ns = utc_offset_ns(*reader);
+  const auto offset_ns = utc_offset_ns(reader);
   if (!offset_ns) {
     summary.warnings.emplace_back(
         "the log does not say when it was made, so times count from the start of its computer");

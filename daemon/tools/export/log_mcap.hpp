@@ -93,8 +93,7 @@ struct McapSummary {
 // that no pipeline made: takes, devices that come and go, the recorder's own. Frames go to the file
 // as they are computed, so the memory does not grow with the log. `stop` is asked before each chunk
 // of the log; true ends the writing with an error and without a file.
-[[nodiscard]] Result<McapSummary> write_mcap(const std::filesystem::path& log,
-                                             const std::filesystem::path& path,
-                                             const std::function<bool()>& stop);
+Result<McapSummary> write_mcap(const std::filesystem::path& log, const std::filesystem::path& path,
+                               const std::function<bool()>& stop);
 
 }  // namespace posed::tools

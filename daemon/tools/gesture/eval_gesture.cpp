@@ -133,7 +133,7 @@ double nearest_deg(const motion::Rows& rows, const motion::Rows& reference) {
 Smoothness smoothness(const gesture::Vocabulary& vocabulary, const gesture::Recording& motion) {
   const motion::Rows rows = degrees_of(motion);
   const Eigen::VectorXd speed = motion::speed_of(rows, motion.rate_hz);
-  const std::span<const double> values(speed.data(), static_cast<std::size_t>(speed.size()));
+  const std::span<const double> values(speed.data(), speed.size());
   Smoothness smoothness{.frames = rows.rows(),
                         .jerk = motion::jerk_rms(rows),
                         .ldlj = motion::log_dimensionless_jerk(values, motion.rate_hz),
@@ -189,7 +189,7 @@ Hold hold_of(const gesture::GestureModel& model, const gesture::LabelPose& wante
              const std::vector<std::vector<double>>& poses) {
   const int label = model.label_index(wanted.name);
   Hold hold{.label = wanted.name,
-            .recorded = model.labels[static_cast<std::size_t>(label)].trained,
+            .recorded = model.labels[label].trained,
             .all = {},
             .groups = std::vector<HoldDistances>(model.groups.size())};
   for (const std::vector<double>& pose : poses) {
@@ -400,20 +400,17 @@ Result<Compared> compared_with(const EvalGestureOptions& options,
                                const gesture::GestureModel& model) {
   std::vector<std::string> references;
   if (!options.reference.empty()) references.push_back(options.reference);
-  auto reference = recordings_for(model, references);
-  if (!reference) return std::unexpected(reference.error());
+  auto reference = TRY(recordings_for(model, references));
   if (!options.reference_labels.empty()) {
-    const auto done = cut_at(reference->front(), options.reference_labels);
-    if (!done) return std::unexpected(done.error());
+    TRY(cut_at(reference.front(), options.reference_labels));
   }
-  auto recorded = recordings_for(model, options.recorded);
-  if (!recorded) return std::unexpected(recorded.error());
-  return Compared{std::move(*reference), std::move(*recorded)};
+  auto recorded = TRY(recordings_for(model, options.recorded));
+  return Compared{std::move(reference), std::move(recorded)};
 }
 
 Result<> check(const EvalGestureOptions& options, const gesture::GestureModel& model) {
   OutputFiles files(options.overwrite);
-  if (auto trees = check_tree_options(*options.trees, files, model.groups); !trees) return trees;
+  TRY(check_tree_options(*options.trees, files, model.groups));
   if (!model.is_hand() && !options.report.empty() && options.reference.empty()) {
     return misuse(
         "a body's report is drawn on the figure of a recording; add --reference TAKE.bvh");
@@ -436,11 +433,9 @@ Result<> measure_space(const EvalGestureOptions& options, const gesture::Gesture
     return {};
   }
   if (options.reference.empty()) return {};
-  const auto body = figure_of(model, options.reference);
-  if (!body) return std::unexpected(body.error());
-  const auto performed = perform::perform_on(model, performance, *body);
-  if (!performed) return std::unexpected(performed.error());
-  evaluation.feet_off_m = performed->feet_off_m;
+  const auto body = TRY(figure_of(model, options.reference));
+  const auto performed = TRY(perform::perform_on(model, performance, body));
+  evaluation.feet_off_m = performed.feet_off_m;
   return {};
 }
 
@@ -450,13 +445,11 @@ Result<> compare(const trajectory::StateInformation& information,
                  GestureEvaluation& evaluation) {
   if (compared.reference.empty()) return {};
   const gesture::Recording& reference = compared.reference.front();
-  auto beside = against(information.model(), performed, reference);
-  if (!beside) return std::unexpected(beside.error());
-  evaluation.beside = std::move(*beside);
+  auto beside = TRY(against(information.model(), performed, reference));
+  evaluation.beside = std::move(beside);
   if (reference.segments.empty()) return {};
-  auto holds = hold_errors(information, reference, compared.recorded);
-  if (!holds) return std::unexpected(holds.error());
-  evaluation.holds = std::move(*holds);
+  auto holds = TRY(hold_errors(information, reference, compared.recorded));
+  evaluation.holds = std::move(holds);
   return {};
 }
 
@@ -465,8 +458,7 @@ Result<> write_report(const EvalGestureOptions& options,
                       const std::vector<int>& labels, const Compared& compared,
                       const GestureEvaluation& evaluation, const Findings& findings) {
   if (options.report.empty()) return {};
-  auto body = figure_of(*model, options.reference);
-  if (!body) return std::unexpected(body.error());
+  auto body = TRY(figure_of(*model, options.reference));
   return write_gesture_report({.title = "Evaluation of gestures",
                                .command = "posed eval gesture",
                                .recorded_by = "the reference",
@@ -474,48 +466,37 @@ Result<> write_report(const EvalGestureOptions& options,
                                .verdict = gesture_verdict(evaluation),
                                .good = evaluation.good(),
                                .curve = evaluation.curve,
-                               .body = std::move(*body)},
+                               .body = std::move(body)},
                               model, compared.reference, findings, options.report);
 }
 
 Result<Findings> evaluate_gesture(const EvalGestureOptions& options) {
-  auto loaded = gesture::load_model(options.model);
-  if (!loaded) return std::unexpected(loaded.error());
-  if (auto checked = check(options, *loaded); !checked) return std::unexpected(checked.error());
-  const auto model = std::make_shared<const gesture::GestureModel>(std::move(*loaded));
-  if (auto drawn = draw_trees(*model, *options.trees); !drawn) {
-    return std::unexpected(drawn.error());
-  }
+  auto loaded = TRY(gesture::load_model(options.model));
+  TRY(check(options, loaded));
+  const auto model = std::make_shared<const gesture::GestureModel>(std::move(loaded));
+  TRY(draw_trees(*model, *options.trees));
   GestureEvaluation evaluation{.labels = options.labels};
   if (options.labels.empty()) {
     for (const gesture::Label& label : model->labels) evaluation.labels += label.name + " ";
   }
-  const auto labels = perform::labels_of(*model, evaluation.labels);
-  if (!labels) return std::unexpected(labels.error());
-  const auto compared = compared_with(options, *model);
-  if (!compared) return std::unexpected(compared.error());
+  const auto labels = TRY(perform::labels_of(*model, evaluation.labels));
+  const auto compared = TRY(compared_with(options, *model));
   const trajectory::StateInformation information(model, model->rate_hz);
-  auto performance = perform::perform(information, *labels, {});
-  if (auto done = measure_space(options, *model, performance, evaluation); !done) {
-    return std::unexpected(done.error());
-  }
+  auto performance = perform::perform(information, labels, {});
+  TRY(measure_space(options, *model, performance, evaluation));
   const gesture::Recording performed = perform::recording_of(*model, performance);
   evaluation.performed = smoothness(*model, performed);
-  evaluation.curve = lag_curve(information, *labels);
-  if (auto done = compare(information, performed, *compared, evaluation); !done) {
-    return std::unexpected(done.error());
-  }
+  evaluation.curve = lag_curve(information, labels);
+  TRY(compare(information, performed, compared, evaluation));
   Findings findings = findings_of(evaluation, *model);
   if (!options.svg.empty()) {
     const auto figure = report::lag_error(evaluation.curve, model->rate_hz);
-    const auto written = write_whole_file(options.svg, report::svg_file(figure.drawings));
-    if (!written) return std::unexpected(written.error());
+    TRY(write_whole_file(options.svg, report::svg_file(figure.drawings)));
     findings.add("svg", options.svg);
   }
   const std::string verdict = gesture_verdict(evaluation);
   findings.add("verdict", verdict).verdict(verdict, evaluation.good());
-  auto written = write_report(options, model, *labels, *compared, evaluation, findings);
-  if (!written) return std::unexpected(written.error());
+  TRY(write_report(options, model, labels, compared, evaluation, findings));
   return findings;
 }
 

@@ -29,10 +29,9 @@ Result<clip::Clip> read_body(const std::string& file, const clip::ReadOptions& r
 
 Result<gesture::Recording> read_hand(const std::filesystem::path& file, double rate_hz,
                                      const clip::ReadOptions& read) {
-  const auto hand = clip::read_hand_clip(file, read);
-  if (!hand) return std::unexpected(hand.error());
-  print_warnings(file.string(), hand->warnings);
-  return gesture::recording_of(*hand, rate_hz);
+  const auto hand = TRY(clip::read_hand_clip(file, read));
+  print_warnings(file.string(), hand.warnings);
+  return gesture::recording_of(hand, rate_hz);
 }
 
 Result<gesture::Vocabulary> body_of(const Skeleton& skeleton) {
@@ -44,9 +43,8 @@ Result<gesture::Vocabulary> body_of(const Skeleton& skeleton) {
 Result<> read_bodies(const GestureSources& sources, GestureData& data) {
   std::vector<clip::Clip> clips;
   for (const std::string& file : sources.clips) {
-    auto clip = read_body(file, sources.read);
-    if (!clip) return std::unexpected(clip.error());
-    clips.push_back(std::move(*clip));
+    auto clip = TRY(read_body(file, sources.read));
+    clips.push_back(std::move(clip));
   }
   if (sources.questions.empty()) {
     for (const clip::Clip& clip : clips) {
@@ -61,9 +59,8 @@ Result<> read_bodies(const GestureSources& sources, GestureData& data) {
       data.vocabulary = std::move(*vocabulary);
     }
   }
-  auto recordings = gesture::body_recordings(clips, sources.rate_hz, data.vocabulary);
-  if (!recordings) return std::unexpected(recordings.error());
-  data.recordings = std::move(*recordings);
+  auto recordings = TRY(gesture::body_recordings(clips, sources.rate_hz, data.vocabulary));
+  data.recordings = std::move(recordings);
   return {};
 }
 
@@ -90,14 +87,12 @@ Result<gesture::LabelPose> shown_pose(const std::string& show, const GestureSour
                   "' shows no pose; write --show NAME=POSE.csv, NAME of 1 to 15 signs");
   }
   const std::string file = show.substr(equals + 1);
-  const auto recording = [&]() -> Result<gesture::Recording> {
+  const auto recording = TRY([&]() -> Result<gesture::Recording> {
     if (vocabulary.is_hand()) return read_hand(file, sources.rate_hz, sources.read);
-    const auto clip = read_body(file, sources.read);
-    if (!clip) return std::unexpected(clip.error());
-    return gesture::body_recording(*clip, sources.rate_hz, vocabulary);
-  }();
-  if (!recording) return std::unexpected(recording.error());
-  const Eigen::RowVectorXd mean = recording->angles_rad.colwise().mean();
+    const auto clip = TRY(read_body(file, sources.read));
+    return gesture::body_recording(clip, sources.rate_hz, vocabulary);
+  }());
+  const Eigen::RowVectorXd mean = recording.angles_rad.colwise().mean();
   return gesture::LabelPose{show.substr(0, equals), {mean.begin(), mean.end()}};
 }
 
@@ -127,12 +122,11 @@ Result<> complete_labels(const GestureSources& sources, bool writes, GestureData
     }
   }
   if (!sources.propose.empty() && writes) {
-    if (auto written = write_questions(vocabulary, sources.propose); !written) return written;
+    TRY(write_questions(vocabulary, sources.propose));
   }
   for (const std::string& show : sources.shows) {
-    const auto shown = shown_pose(show, sources, vocabulary);
-    if (!shown) return std::unexpected(shown.error());
-    put_last(gesture::label_like(*shown, poses, vocabulary.labels, vocabulary.groups), vocabulary);
+    const auto shown = TRY(shown_pose(show, sources, vocabulary));
+    put_last(gesture::label_like(shown, poses, vocabulary.labels, vocabulary.groups), vocabulary);
   }
   return {};
 }
@@ -142,9 +136,7 @@ Result<> complete_labels(const GestureSources& sources, bool writes, GestureData
 Result<GestureData> read_gesture_data(const GestureSources& sources, bool writes) {
   GestureData data;
   if (!sources.questions.empty()) {
-    auto read = read_questions(sources.questions);
-    if (!read) return std::unexpected(read.error());
-    data.vocabulary = std::move(*read);
+    data.vocabulary = TRY(read_questions(sources.questions));
     if (sources.body && data.vocabulary.is_hand()) {
       return misuse(
           "the questions are of a hand's fingers; leave out --body, or give groups of "
@@ -153,53 +145,42 @@ Result<GestureData> read_gesture_data(const GestureSources& sources, bool writes
     }
   }
   const bool body = sources.questions.empty() ? sources.body : !data.vocabulary.is_hand();
-  if (auto read = body ? read_bodies(sources, data) : read_hands(sources, data); !read) {
-    return std::unexpected(read.error());
-  }
+  TRY(body ? read_bodies(sources, data) : read_hands(sources, data));
   for (std::size_t i = 0; i < sources.clips.size(); ++i) {
-    if (auto done = cut_at(data.recordings[i], sources.labels[i]); !done) {
-      return std::unexpected(done.error());
-    }
+    TRY(cut_at(data.recordings[i], sources.labels[i]));
   }
-  if (auto done = complete_labels(sources, writes, data); !done) {
-    return std::unexpected(done.error());
-  }
+  TRY(complete_labels(sources, writes, data));
   return data;
 }
 
 Result<std::vector<gesture::ChannelGroup>> groups_of(const GestureSources& sources) {
   if (!sources.questions.empty()) {
-    auto read = read_questions(sources.questions);
-    if (!read) return std::unexpected(read.error());
-    return std::move(read->groups);
+    auto read = TRY(read_questions(sources.questions));
+    return std::move(read.groups);
   }
   if (!sources.body) return gesture::finger_groups();
   return gesture::body_vocabulary(gesture::body_groups())->groups;
 }
 
 Result<> cut_at(gesture::Recording& recording, const std::filesystem::path& labels) {
-  const auto segments = clip::read_labels(labels);
-  if (!segments) return std::unexpected(segments.error());
-  return gesture::cut(recording, *segments, labels.string());
+  const auto segments = TRY(clip::read_labels(labels));
+  return gesture::cut(recording, segments, labels.string());
 }
 
 Result<std::vector<gesture::Recording>> recordings_for(const gesture::GestureModel& model,
                                                        const std::vector<std::string>& clips) {
   std::vector<gesture::Recording> recordings;
   for (const std::string& file : clips) {
-    const auto recording = [&]() -> Result<gesture::Recording> {
+    const auto recording = TRY([&]() -> Result<gesture::Recording> {
       if (!model.is_hand()) {
-        const auto body = read_body(file, {});
-        if (!body) return std::unexpected(body.error());
-        return gesture::body_recording(*body, model.rate_hz, model);
+        const auto body = TRY(read_body(file, {}));
+        return gesture::body_recording(body, model.rate_hz, model);
       }
-      auto hand = clip::read_hand_clip(file);
-      if (!hand) return std::unexpected(hand.error());
-      clip::fill_gaps(*hand);
-      return gesture::recording_of(*hand, model.rate_hz);
-    }();
-    if (!recording) return std::unexpected(recording.error());
-    recordings.push_back(*recording);
+      auto hand = TRY(clip::read_hand_clip(file));
+      clip::fill_gaps(hand);
+      return gesture::recording_of(hand, model.rate_hz);
+    }());
+    recordings.push_back(recording);
   }
   return recordings;
 }
@@ -213,20 +194,17 @@ Result<clip::Clip> figure_of(const gesture::GestureModel& model, const std::file
 Result<gesture::Recording> load_recording(const std::filesystem::path& clip,
                                           const std::filesystem::path& labels, double rate_hz,
                                           const clip::ReadOptions& read) {
-  auto recording = read_hand(clip, rate_hz, read);
-  if (!recording) return recording;
-  if (auto done = cut_at(*recording, labels); !done) return std::unexpected(done.error());
+  auto recording = TRY(read_hand(clip, rate_hz, read));
+  TRY(cut_at(recording, labels));
   return recording;
 }
 
 Result<gesture::Recording> load_unlabelled(const std::filesystem::path& clip, bool body,
                                            double rate_hz, const clip::ReadOptions& read) {
   if (!body) return read_hand(clip, rate_hz, read);
-  const auto read_clip = read_body(clip.string(), read);
-  if (!read_clip) return std::unexpected(read_clip.error());
-  const auto vocabulary = body_of(*read_clip->skeleton);
-  if (!vocabulary) return std::unexpected(vocabulary.error());
-  return gesture::body_recording(*read_clip, rate_hz, *vocabulary);
+  const auto read_clip = TRY(read_body(clip.string(), read));
+  const auto vocabulary = TRY(body_of(*read_clip.skeleton));
+  return gesture::body_recording(read_clip, rate_hz, vocabulary);
 }
 
 }  // namespace posed::tools

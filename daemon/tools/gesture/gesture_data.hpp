@@ -29,33 +29,30 @@ struct GestureData {
 };
 
 // `writes`: whether proposed classes are written to `propose`.
-[[nodiscard]] Result<GestureData> read_gesture_data(const GestureSources& sources, bool writes);
+Result<GestureData> read_gesture_data(const GestureSources& sources, bool writes);
 
 // The groups of channels that the model will have, as far as they are known without the clips:
 // those of the questions file, else a hand's fingers, else those of a whole body.
-[[nodiscard]] Result<std::vector<gesture::ChannelGroup>> groups_of(const GestureSources& sources);
+Result<std::vector<gesture::ChannelGroup>> groups_of(const GestureSources& sources);
 
 // A hand's clip with its labels, resampled to the training rate.
-[[nodiscard]] Result<gesture::Recording> load_recording(const std::filesystem::path& clip,
-                                                        const std::filesystem::path& labels,
-                                                        double rate_hz,
-                                                        const clip::ReadOptions& read = {});
+Result<gesture::Recording> load_recording(const std::filesystem::path& clip,
+                                          const std::filesystem::path& labels, double rate_hz,
+                                          const clip::ReadOptions& read = {});
 
 // Recordings to compare a model with, each as it sees them: at its rate, a hand's gaps filled.
-[[nodiscard]] Result<std::vector<gesture::Recording>> recordings_for(
-    const gesture::GestureModel& model, const std::vector<std::string>& clips);
+Result<std::vector<gesture::Recording>> recordings_for(const gesture::GestureModel& model,
+                                                       const std::vector<std::string>& clips);
 
 // Cuts the recording at the labels of a file.
-[[nodiscard]] Result<> cut_at(gesture::Recording& recording, const std::filesystem::path& labels);
+Result<> cut_at(gesture::Recording& recording, const std::filesystem::path& labels);
 
 // The clip on whose figure a model of bodies is drawn; empty for one of hands.
-[[nodiscard]] Result<clip::Clip> figure_of(const gesture::GestureModel& model,
-                                           const std::filesystem::path& clip,
-                                           const clip::ReadOptions& read = {});
+Result<clip::Clip> figure_of(const gesture::GestureModel& model, const std::filesystem::path& clip,
+                             const clip::ReadOptions& read = {});
 
 // A clip without labels, of a body about its T-pose, or of a hand.
-[[nodiscard]] Result<gesture::Recording> load_unlabelled(const std::filesystem::path& clip,
-                                                         bool body, double rate_hz,
-                                                         const clip::ReadOptions& read);
+Result<gesture::Recording> load_unlabelled(const std::filesystem::path& clip, bool body,
+                                           double rate_hz, const clip::ReadOptions& read);
 
 }  // namespace posed::tools

@@ -27,7 +27,7 @@
 namespace posed::tools {
 namespace {
 
-constexpr std::size_t kMostSegments = 8;  // of a recording that are drawn
+constexpr std::size_t kMaxSegments = 8;  // of a recording that are drawn
 constexpr double kBandDeviations = 2.0;
 constexpr std::size_t kHoldStart = 2, kHoldEnd = 4;  // states, from 0
 
@@ -152,9 +152,7 @@ GestureFigures::GestureFigures(std::shared_ptr<const gesture::GestureModel> mode
                       : std::make_shared<const Skeleton>(hand_skeleton(Side::kRight))),
       shape_(skeleton_) {}
 
-const std::string& GestureFigures::name(int label) const {
-  return model_->labels[static_cast<std::size_t>(label)].name;
-}
+const std::string& GestureFigures::name(int label) const { return model_->labels[label].name; }
 
 std::string GestureFigures::label_text() const {
   std::string text;
@@ -251,7 +249,7 @@ std::optional<report::Figure> GestureFigures::over(const gesture::Recording& rec
   std::vector<int> labels;
   for (const gesture::Segment& segment : recording.segments) {
     const int label = model_->label_index(segment.label);
-    if (label < 0 || segments.size() == kMostSegments) break;
+    if (label < 0 || segments.size() == kMaxSegments) break;
     segments.push_back(segment);
     labels.push_back(label);
   }
@@ -290,9 +288,9 @@ std::optional<report::Figure> GestureFigures::unseen(const gesture::FeatureMatri
   picture::StripRow nearest{.title = "nearest pose of " + from, .poses = {}};
   const auto performance = perform(labels_);
   for (std::size_t k = 0; k < labels_.size(); ++k) {
-    if (model_->labels[static_cast<std::size_t>(labels_[k])].trained) continue;
+    if (model_->labels[labels_[k]].trained) continue;
     const int held = range_of(performance, k, kHoldStart, kHoldEnd).middle();
-    const perform::Pose& wanted = performance.angles[static_cast<std::size_t>(held)];
+    const perform::Pose& wanted = performance.angles[held];
     const Eigen::Map<const Eigen::RowVectorXd> row(wanted.data(), poses.cols());
     Eigen::Index at = 0;
     (poses.rowwise() - row).rowwise().squaredNorm().minCoeff(&at);
@@ -317,11 +315,10 @@ report::Figure GestureFigures::durations() const {
   std::vector<report::LabelDurations> all;
   for (int label = 0; label < std::ssize(model_->labels); ++label) {
     const gesture::DurationGaussian& frames = gesture::duration(*model_, {label, label, label});
-    report::LabelDurations durations{
-        .label = name(label),
-        .recorded = model_->labels[static_cast<std::size_t>(label)].trained,
-        .mean_s = {},
-        .deviation_s = {}};
+    report::LabelDurations durations{.label = name(label),
+                                     .recorded = model_->labels[label].trained,
+                                     .mean_s = {},
+                                     .deviation_s = {}};
     for (std::size_t s = 0; s < gesture::kStates; ++s) {
       durations.mean_s.push_back(frames.mean[s] / model_->rate_hz);
       durations.deviation_s.push_back(std::sqrt(frames.variance[s]) / model_->rate_hz);
@@ -339,7 +336,7 @@ std::vector<report::Figure> GestureFigures::trees() const {
   const auto largest = std::ranges::max_element(of_state, {}, leaves) - of_state.begin();
   const int first = hand ? kMiddle : static_cast<int>(largest);
   const auto words = [&](int group) {
-    const std::string& of_group = model_->groups[static_cast<std::size_t>(group)].name;
+    const std::string& of_group = model_->groups[group].name;
     return hand ? "the " + of_group + " finger" : of_group;
   };
   std::vector<report::Figure> figures{
@@ -424,7 +421,7 @@ std::optional<report::Figure> confusion_of(const gesture::GestureModel& model,
     const auto recognised = recognised_in(recording, skeleton, first, *channels, **live);
     for (const gesture::Segment& segment : recording.segments) {
       for (int t = segment.begin; t < segment.end; ++t) {
-        const std::string label = recognised[static_cast<std::size_t>(t)].data();
+        const std::string label = recognised[t].data();
         ++counts[segment.label][label.empty() ? kNoGesture : label];
       }
     }
@@ -515,9 +512,7 @@ Result<> write_gesture_report(const GestureReport& report,
                               const Findings& findings, const std::filesystem::path& path) {
   std::optional<perform::BodyFigure> body;
   if (!model->is_hand()) {
-    auto figure = perform::BodyFigure::of(*model, report.body);
-    if (!figure) return std::unexpected(figure.error());
-    body = std::move(*figure);
+    body = TRY(perform::BodyFigure::of(*model, report.body));
   }
   const GestureFigures drawn(model, report.labels, std::move(body));
   report::Page page(report.title, report.command);

@@ -47,9 +47,9 @@ struct GestureReport {
 
 // `recordings`: what the model is compared with; without labels only its poses are, without any
 // nothing is. `findings`: what `--json` prints.
-[[nodiscard]] Result<> write_gesture_report(
-    const GestureReport& report, const std::shared_ptr<const gesture::GestureModel>& model,
-    const std::vector<gesture::Recording>& recordings, const Findings& findings,
-    const std::filesystem::path& path);
+Result<> write_gesture_report(const GestureReport& report,
+                              const std::shared_ptr<const gesture::GestureModel>& model,
+                              const std::vector<gesture::Recording>& recordings,
+                              const Findings& findings, const std::filesystem::path& path);
 
 }  // namespace posed::tools

@@ -74,10 +74,9 @@ Result<> set_labels(const gesture::ClassLists& lists, const std::vector<std::str
   for (std::size_t g = 0; g < lists.size(); ++g) {
     vocabulary.groups[g].classes = std::max(1, static_cast<int>(lists[g].size()));
   }
-  auto labels = gesture::labels_of(lists, vocabulary.groups);
-  if (!labels) return std::unexpected(labels.error());
-  if (labels->empty()) return fail("no gesture is in any class");
-  vocabulary.labels = std::move(*labels);
+  auto labels = TRY(gesture::labels_of(lists, vocabulary.groups));
+  if (labels.empty()) return fail("no gesture is in any class");
+  vocabulary.labels = std::move(labels);
   for (const std::string& name : named) {
     vocabulary.named.push_back(vocabulary.label_index(name));
     if (vocabulary.named.back() >= 0) continue;
@@ -122,11 +121,10 @@ Result<gesture::Vocabulary> read_questions(const std::filesystem::path& path) {
     read_fingers(reader, findings, given);
   }
   reader.finish();
-  const auto lists = findings.result(std::move(given));
-  if (!lists) return std::unexpected(lists.error());
+  const auto lists = TRY(findings.result(std::move(given)));
   auto vocabulary = body ? gesture::body_vocabulary(groups) : gesture::Vocabulary{};
   if (!vocabulary) return misuse(vocabulary.error().message, path.string());
-  if (auto set = set_labels(*lists, named, *vocabulary); !set) {
+  if (auto set = set_labels(lists, named, *vocabulary); !set) {
     return misuse(set.error().message, path.string());
   }
   return vocabulary;

@@ -11,9 +11,8 @@ namespace posed::tools {
 
 // A file whose tables have joints is a body's. Errors name file and line, or the label in which a
 // finger or group is in no class or in two.
-[[nodiscard]] Result<gesture::Vocabulary> read_questions(const std::filesystem::path& path);
+Result<gesture::Vocabulary> read_questions(const std::filesystem::path& path);
 
-[[nodiscard]] Result<> write_questions(const gesture::Vocabulary& vocabulary,
-                                       const std::filesystem::path& path);
+Result<> write_questions(const gesture::Vocabulary& vocabulary, const std::filesystem::path& path);
 
 }  // namespace posed::tools

@@ -75,50 +75,43 @@ std::vector<Findings> recognised(const Rows& rows, const clip::HandClip& clip) {
 
 Result<std::unique_ptr<const smooth::LiveModel>> load(const std::string& path,
                                                       const Skeleton& skeleton) {
-  const auto model = gesture::load_model(path);
-  if (!model) return std::unexpected(model.error());
-  return smooth::bind_live_model(*model, skeleton, path);
+  const auto model = TRY(gesture::load_model(path));
+  return smooth::bind_live_model(model, skeleton, path);
 }
 
 Result<smooth::LiveOptions> live_options(const SmoothOptions& options, double rate_hz) {
-  const auto lag = smooth::parse_lag(options.lag);
-  if (!lag) return std::unexpected(lag.error());
-  const int frames = smooth::lag_frames(*lag, 1.0 / rate_hz);
-  if (lag->seconds == 0.0 && frames < lag->frames) {
+  const auto lag = TRY(smooth::parse_lag(options.lag));
+  const int frames = smooth::lag_frames(lag, 1.0 / rate_hz);
+  if (lag.seconds == 0.0 && frames < lag.frames) {
     return misuse("a lag of " + options.lag + " frames is too long at " +
                   std::to_string(std::lround(rate_hz)) + " Hz; give at most " +
                   std::to_string(frames));
   }
-  return smooth::LiveOptions{.lag = *lag, .noise_rad = options.noise_deg / kDegrees};
+  return smooth::LiveOptions{.lag = lag, .noise_rad = options.noise_deg / kDegrees};
 }
 
 Result<> smooth(const SmoothOptions& options) {
-  const auto files = OutputFiles(options.overwrite)
-                         .reads(options.in)
-                         .reads(options.model)
-                         .writes(options.out, {".csv"})
-                         .check();
-  if (!files) return files;
+  TRY(OutputFiles(options.overwrite)
+          .reads(options.in)
+          .reads(options.model)
+          .writes(options.out, {".csv"})
+          .check());
   clip::ReadOptions read;
   if (!options.hand.empty()) read.hand = side_named(options.hand);
-  auto clip = clip::read_hand_clip(options.in, read);
-  if (!clip) return std::unexpected(clip.error());
-  for (const std::string& warning : clip->warnings) {
+  auto clip = TRY(clip::read_hand_clip(options.in, read));
+  for (const std::string& warning : clip.warnings) {
     std::fprintf(stderr, "posed: %s: %s\n", options.in.c_str(), warning.c_str());
   }
-  const auto live = live_options(options, clip->rate_hz);
-  if (!live) return std::unexpected(live.error());
-  const Skeleton skeleton = hand_skeleton(clip->side);
+  const auto live = TRY(live_options(options, clip.rate_hz));
+  const Skeleton skeleton = hand_skeleton(clip.side);
   std::unique_ptr<const smooth::LiveModel> model;
   if (!options.model.empty()) {
-    auto loaded = load(options.model, skeleton);
-    if (!loaded) return std::unexpected(loaded.error());
-    model = std::move(*loaded);
+    model = TRY(load(options.model, skeleton));
   }
 
-  smooth::LiveSmoother smoother(skeleton, *live, model.get());
-  const std::vector<HandAngles> measured = clip->angles;
-  Rows rows(*clip);
+  smooth::LiveSmoother smoother(skeleton, live, model.get());
+  const std::vector<HandAngles> measured = clip.angles;
+  Rows rows(clip);
   ProgressBar bar(kQuietFor_s);
   for (std::size_t t = 0; t < measured.size(); ++t) {
     const bool shows = t % kProgressEvery == 0;
@@ -129,20 +122,20 @@ Result<> smooth(const SmoothOptions& options) {
     Frame frame;
     set_hand_angles(skeleton, measured[t], frame);
     frame.header.sequence = t + 1;
-    frame.header.device_ns = nanoseconds(clip->time_s[t] - clip->time_s[0]);
+    frame.header.device_ns = nanoseconds(clip.time_s[t] - clip.time_s[0]);
     smoother.process({.frame = frame}, rows);
   }
   smoother.flush(rows);
-  if (auto written = clip::write_hand_csv(*clip, options.out); !written) return written;
+  TRY(clip::write_hand_csv(clip, options.out));
   bar.finish();
 
-  const int lag_frames = smooth::lag_frames(live->lag, 1.0 / clip->rate_hz);
-  const double lag_ms = 1e3 * lag_frames / clip->rate_hz;
+  const int lag_frames = smooth::lag_frames(live.lag, 1.0 / clip.rate_hz);
+  const double lag_ms = 1e3 * lag_frames / clip.rate_hz;
   const double noise_deg = smoother.noise_rad() * kDegrees;
   Findings findings;
   findings.add("out", options.out)
       .add("frames", measured.size())
-      .add("rate_hz", clip->rate_hz)
+      .add("rate_hz", clip.rate_hz)
       .add("lag_frames", lag_frames)
       .add("lag_ms", lag_ms)
       .add("noise_deg", noise_deg)
@@ -150,9 +143,9 @@ Result<> smooth(const SmoothOptions& options) {
       .add("bridged_values", rows.bridged_values)
       .say(fmt::format("{}: {} frames, {} behind ({:.0f} ms at {:g} Hz), sensor noise {:.2f} deg "
                        "(standard deviation of an angle{}), {} missing values bridged",
-                       options.out, measured.size(), lag_frames, lag_ms, clip->rate_hz, noise_deg,
+                       options.out, measured.size(), lag_frames, lag_ms, clip.rate_hz, noise_deg,
                        options.noise_deg > 0.0 ? "" : ", estimated", rows.bridged_values));
-  if (model) findings.add("labels", recognised(rows, *clip));
+  if (model) findings.add("labels", recognised(rows, clip));
   findings.show(options.json);
   return {};
 }

@@ -61,9 +61,8 @@ Result<perform::PerformOptions> perform_options(const SynthOptions& options) {
 }
 
 Result<> write_hand(const clip::HandClip& hand, const SynthOptions& options) {
-  const auto clip = clip::clip_of_hand(hand, options.shape);
-  if (!clip) return std::unexpected(clip.error());
-  return clip::write_clip(*clip, options.out);
+  const auto clip = TRY(clip::clip_of_hand(hand, options.shape));
+  return clip::write_clip(clip, options.out);
 }
 
 // The states of the performance; those of a label begin with a line for it.
@@ -100,10 +99,9 @@ struct Performed {
 
 // Applies the hand constraints (unless --unconstrained) and writes the file.
 Result<Performed> perform_hand(const SynthOptions& options, perform::Performance& performance) {
-  const auto shape = find_hand_shape(options.shape);
-  if (!shape) return std::unexpected(shape.error());
-  const double gap_m = options.unconstrained ? perform::smallest_gap_m(performance, **shape)
-                                             : perform::constrain(performance, **shape).min_gap_m;
+  const auto shape = TRY(find_hand_shape(options.shape));
+  const double gap_m = options.unconstrained ? perform::smallest_gap_m(performance, *shape)
+                                             : perform::constrain(performance, *shape).min_gap_m;
   clip::HandClip hand;
   hand.side = side_named(options.hand);
   hand.rate_hz = performance.rate_hz;
@@ -111,7 +109,7 @@ Result<Performed> perform_hand(const SynthOptions& options, perform::Performance
     hand.angles.push_back(perform::hand_of(performance.angles[t]));
     hand.time_s.push_back(static_cast<double>(t) / performance.rate_hz);
   }
-  if (auto written = write_hand(hand, options); !written) return std::unexpected(written.error());
+  TRY(write_hand(hand, options));
   const double gap_cm = 100.0 * gap_m;
   return Performed{"min_gap_cm", gap_cm,
                    fmt::format("fingers {} {:.2f} cm {}", gap_cm < 0.0 ? "overlap by" : "at least",
@@ -127,51 +125,42 @@ Result<Performed> perform_body(const SynthOptions& options, const gesture::Gestu
         "write: --body TAKE.bvh --out OUT.bvh",
         options.model);
   }
-  const auto body = clip::read_clip(options.body);
-  if (!body) return std::unexpected(body.error());
-  const auto performed = perform::perform_on(model, performance, *body);
-  if (!performed) return std::unexpected(performed.error());
-  if (auto written = clip::write_clip(performed->clip, options.out); !written) {
-    return std::unexpected(written.error());
-  }
-  const double off_cm = 100.0 * performed->feet_off_m;
+  const auto body = TRY(clip::read_clip(options.body));
+  const auto performed = TRY(perform::perform_on(model, performance, body));
+  TRY(clip::write_clip(performed.clip, options.out));
+  const double off_cm = 100.0 * performed.feet_off_m;
   return Performed{"feet_off_cm", off_cm,
                    fmt::format("feet within {:.1f} cm of their places", off_cm)};
 }
 
 Result<Findings> synth(const SynthOptions& options) {
-  const auto files = OutputFiles(options.overwrite)
-                         .reads(options.model)
-                         .reads(options.body)
-                         .writes(options.out, clip::extensions(clip::Use::kWrite))
-                         .check();
-  if (!files) return std::unexpected(files.error());
-  const auto perform_as = perform_options(options);
-  if (!perform_as) return std::unexpected(perform_as.error());
-  auto model = gesture::load_model(options.model);
-  if (!model) return std::unexpected(model.error());
-  if (model->is_hand() && !options.body.empty()) {
+  TRY(OutputFiles(options.overwrite)
+          .reads(options.model)
+          .reads(options.body)
+          .writes(options.out, clip::extensions(clip::Use::kWrite))
+          .check());
+  const auto perform_as = TRY(perform_options(options));
+  auto model = TRY(gesture::load_model(options.model));
+  if (model.is_hand() && !options.body.empty()) {
     return misuse("the model is of hands; leave out --body", options.model);
   }
-  const auto labels = perform::labels_of(*model, options.labels);
-  if (!labels) return std::unexpected(labels.error());
-  const double rate_hz = model->rate_hz;
+  const auto labels = TRY(perform::labels_of(model, options.labels));
+  const double rate_hz = model.rate_hz;
   const trajectory::StateInformation information(
-      std::make_shared<const gesture::GestureModel>(std::move(*model)), rate_hz);
-  auto performance = perform::perform(information, *labels, *perform_as);
-  const auto performed = information.model().is_hand()
-                             ? perform_hand(options, performance)
-                             : perform_body(options, information.model(), performance);
-  if (!performed) return std::unexpected(performed.error());
+      std::make_shared<const gesture::GestureModel>(std::move(model)), rate_hz);
+  auto performance = perform::perform(information, labels, perform_as);
+  const auto performed =
+      TRY(information.model().is_hand() ? perform_hand(options, performance)
+                                        : perform_body(options, information.model(), performance));
   const std::size_t frames = performance.angles.size();
   return Findings()
       .add("frames", frames)
       .add("rate_hz", rate_hz)
       .say(fmt::format("{:<8} {:>6} {:>6}", "label", "start", "frames"))
       .add("states", findings_of(information.model(), performance))
-      .add(performed->name, performed->distance_cm)
+      .add(performed.name, performed.distance_cm)
       .add("out", options.out)
-      .say(fmt::format("{} frames at {:g} Hz, {}, written to {}", frames, rate_hz, performed->words,
+      .say(fmt::format("{} frames at {:g} Hz, {}, written to {}", frames, rate_hz, performed.words,
                        options.out));
 }
 

@@ -145,7 +145,7 @@ std::vector<std::filesystem::path> inputs_of(const TrainGestureOptions& options)
 
 Result<> check(const TrainGestureOptions& options) {
   if (options.auto_label) {
-    if (auto useful = check_auto_label(options); !useful) return useful;
+    TRY(check_auto_label(options));
   } else if (!options.movement.empty()) {
     return misuse("--movement labels a take; add --auto-label");
   } else if (options.cycles) {
@@ -157,9 +157,8 @@ Result<> check(const TrainGestureOptions& options) {
     return misuse("--propose-questions makes the classes that --questions reads; name one of them");
   }
   OutputFiles files(options.overwrite);
-  const auto groups = groups_of(options);
-  if (!groups) return std::unexpected(groups.error());
-  if (auto trees = check_tree_options(*options.trees, files, *groups); !trees) return trees;
+  const auto groups = TRY(groups_of(options));
+  TRY(check_tree_options(*options.trees, files, groups));
   files.reads_all(inputs_of(options));
   if (options.auto_label) {
     return files.writes_any_but_other(options.out, {".lab"}).check();
@@ -207,21 +206,19 @@ void add_summary(const GestureTraining& training, const std::vector<gesture::Rec
 }
 
 Result<Findings> train_gesture(const TrainGestureOptions& options, Ranks& ranks) {
-  auto data = read_gesture_data(options, ranks.leads());
-  if (!data) return std::unexpected(data.error());
-  const std::vector<gesture::Recording>& recordings = data->recordings;
-  if (options.none && !data->vocabulary.is_hand()) {
+  auto data = TRY(read_gesture_data(options, ranks.leads()));
+  const std::vector<gesture::Recording>& recordings = data.recordings;
+  if (options.none && !data.vocabulary.is_hand()) {
     return misuse("a live body is always told what is none of its gestures; leave out --none");
   }
   gesture::TrainOptions train_options;
-  train_options.vocabulary = std::move(data->vocabulary);
+  train_options.vocabulary = std::move(data.vocabulary);
   train_options.vocabulary.tells_none = options.none;
   train_options.embedded_rounds = options.embedded_rounds;
-  auto training = train_gesture_and_save(recordings, std::move(train_options), options.out, ranks);
-  if (!training) return std::unexpected(training.error());
-  const auto drawn = ranks.leads() ? draw_trees(training->model, *options.trees) : Result<>{};
-  if (!drawn) return std::unexpected(drawn.error());
-  const std::vector<std::string>& warnings = training->findings.warnings;
+  auto training =
+      TRY(train_gesture_and_save(recordings, std::move(train_options), options.out, ranks));
+  TRY(ranks.leads() ? draw_trees(training.model, *options.trees) : Result<>{});
+  const std::vector<std::string>& warnings = training.findings.warnings;
   const std::string verdict = warnings.empty()
                                   ? "good: these recordings show no problem with the model"
                                   : fmt::format(
@@ -229,30 +226,28 @@ Result<Findings> train_gesture(const TrainGestureOptions& options, Ranks& ranks)
                                         "record more of",
                                         warnings.size());
   std::vector<std::string> groups;
-  for (const auto& group : training->model.groups) groups.push_back(group.name);
+  for (const auto& group : training.model.groups) groups.push_back(group.name);
   Findings findings;
-  findings.add_json(training->model.report_json)
-      .add("seconds", training->seconds)
+  findings.add_json(training.model.report_json)
+      .add("seconds", training.seconds)
       .add("out", options.out)
-      .add("body", !training->model.is_hand())
+      .add("body", !training.model.is_hand())
       .add("groups", groups)
       .add("verdict", verdict);
-  add_summary(*training, recordings, options.out, findings);
+  add_summary(training, recordings, options.out, findings);
   findings.warn(warnings).remark(verdict);
   if (!options.report.empty() && ranks.leads()) {
-    auto body = figure_of(training->model, options.clips.front(), options.read);
-    if (!body) return std::unexpected(body.error());
-    const auto model = std::make_shared<const gesture::GestureModel>(std::move(training->model));
-    const auto written = write_gesture_report({.title = "Training of gestures",
-                                               .command = "posed train gesture",
-                                               .recorded_by = "the training recordings",
-                                               .labels = labels_to_show(*model),
-                                               .verdict = verdict,
-                                               .good = warnings.empty(),
-                                               .warnings = warnings,
-                                               .body = std::move(*body)},
-                                              model, recordings, findings, options.report);
-    if (!written) return std::unexpected(written.error());
+    auto body = TRY(figure_of(training.model, options.clips.front(), options.read));
+    const auto model = std::make_shared<const gesture::GestureModel>(std::move(training.model));
+    TRY(write_gesture_report({.title = "Training of gestures",
+                              .command = "posed train gesture",
+                              .recorded_by = "the training recordings",
+                              .labels = labels_to_show(*model),
+                              .verdict = verdict,
+                              .good = warnings.empty(),
+                              .warnings = warnings,
+                              .body = std::move(body)},
+                             model, recordings, findings, options.report));
   }
   return findings;
 }
@@ -293,12 +288,10 @@ Result<GestureTraining> train_gesture_and_save(const std::vector<gesture::Record
   };
   gesture::TrainFindings found;
   options.look = [&found](gesture::TrainFindings findings) { found = std::move(findings); };
-  auto model = gesture::train_gesture(recordings, options);
-  if (!model) return std::unexpected(model.error());
+  auto model = TRY(gesture::train_gesture(recordings, options));
   const double seconds = bar.elapsed_s();
-  const auto saved = ranks.write_model([&] { return gesture::save_model(*model, out); });
-  if (!saved) return std::unexpected(saved.error());
-  return GestureTraining{std::move(*model), std::move(found), seconds};
+  TRY(ranks.write_model([&] { return gesture::save_model(model, out); }));
+  return GestureTraining{std::move(model), std::move(found), seconds};
 }
 
 void add_train_gesture(CLI::App& train_command, int& exit_code,

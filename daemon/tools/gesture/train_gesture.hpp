@@ -19,8 +19,8 @@ struct GestureTraining {
 
 // Trains the model and writes it to `out`. Draws progress on stderr; Ctrl-C ends it with an error
 // and without a file. `ranks` share the work; one of them writes.
-[[nodiscard]] Result<GestureTraining> train_gesture_and_save(
-    const std::vector<gesture::Recording>& recordings, gesture::TrainOptions options,
-    const std::filesystem::path& out, Ranks& ranks);
+Result<GestureTraining> train_gesture_and_save(const std::vector<gesture::Recording>& recordings,
+                                               gesture::TrainOptions options,
+                                               const std::filesystem::path& out, Ranks& ranks);
 
 }  // namespace posed::tools

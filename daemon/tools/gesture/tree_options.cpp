@@ -34,8 +34,7 @@ void add_tree_options(CLI::App& command, const std::shared_ptr<TreeOptions>& opt
 
 Result<> check_tree_options(const TreeOptions& options, OutputFiles& files,
                             const std::vector<gesture::ChannelGroup>& groups) {
-  auto choice = gesture::tree_choice(options.which, groups);
-  if (!choice) return std::unexpected(choice.error());
+  TRY(gesture::tree_choice(options.which, groups));
   if (options.which_given && options.text.empty() && options.dot.empty() && options.svg.empty()) {
     return misuse("--trees says which trees to draw; add --tree-text, --tree-dot or --tree-svg");
   }
@@ -47,19 +46,18 @@ Result<> check_tree_options(const TreeOptions& options, OutputFiles& files,
 }
 
 Result<> draw_trees(const gesture::GestureModel& model, const TreeOptions& options) {
-  const auto choice = gesture::tree_choice(options.which, model.groups);
-  if (!choice) return std::unexpected(choice.error());
+  const auto choice = TRY(gesture::tree_choice(options.which, model.groups));
   const auto svg = [&] {
     return report::svg_file(
-        report::decision_trees("", question_trees(model, *choice), false).drawings);
+        report::decision_trees("", question_trees(model, choice), false).drawings);
   };
   const std::pair<const std::string&, std::function<std::string()>> drawings[]{
-      {options.text, [&] { return gesture::trees_text(model, *choice); }},
-      {options.dot, [&] { return gesture::trees_dot(model, *choice); }},
+      {options.text, [&] { return gesture::trees_text(model, choice); }},
+      {options.dot, [&] { return gesture::trees_dot(model, choice); }},
       {options.svg, svg}};
   for (const auto& [file, draw] : drawings) {
     if (file.empty()) continue;
-    if (auto done = put(draw(), file); !done) return done;
+    TRY(put(draw(), file));
   }
   return {};
 }

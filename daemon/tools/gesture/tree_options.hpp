@@ -25,8 +25,8 @@ void add_tree_options(CLI::App& command, const std::shared_ptr<TreeOptions>& opt
 
 // Checks that `which` names trees of these groups, and that they are drawn somewhere if it is
 // given; adds the drawings to `files`. Call before long work.
-[[nodiscard]] Result<> check_tree_options(const TreeOptions& options, OutputFiles& files,
-                                          const std::vector<gesture::ChannelGroup>& groups);
-[[nodiscard]] Result<> draw_trees(const gesture::GestureModel& model, const TreeOptions& options);
+Result<> check_tree_options(const TreeOptions& options, OutputFiles& files,
+                            const std::vector<gesture::ChannelGroup>& groups);
+Result<> draw_trees(const gesture::GestureModel& model, const TreeOptions& options);
 
 }  // namespace posed::tools

@@ -8,30 +8,25 @@
 namespace posed::link {
 
 Result<DaemonSocket> DaemonSocket::open(void* context, int type, Peer peer, const Limits& limits) {
-  auto socket = net::open_socket(context, type);
-  if (!socket) return std::unexpected(socket.error());
+  auto socket = TRY(net::open_socket(context, type));
   const bool keys = !peer.key.empty();
   if (keys) {
-    auto secured = net::secure_client(socket->get(), peer.key, peer.server_key);
-    if (!secured) return std::unexpected(secured.error());
+    TRY(net::secure_client(socket.get(), peer.key, peer.server_key));
   }
   const std::string_view largest(reinterpret_cast<const char*>(&limits.largest_part),
                                  sizeof limits.largest_part);
   for (const Result<>& set :
-       {net::set_option(socket->get(), ZMQ_MAXMSGSIZE, largest),
-        net::set_option(socket->get(), ZMQ_RCVHWM, limits.messages),
-        net::set_option(socket->get(), ZMQ_RCVBUF, limits.receive_buffer),
-        net::set_option(socket->get(), ZMQ_SNDHWM, limits.requests),
-        net::set_option(socket->get(), ZMQ_IMMEDIATE, limits.only_connected ? 1 : 0)}) {
+       {net::set_option(socket.get(), ZMQ_MAXMSGSIZE, largest),
+        net::set_option(socket.get(), ZMQ_RCVHWM, limits.messages),
+        net::set_option(socket.get(), ZMQ_RCVBUF, limits.receive_buffer),
+        net::set_option(socket.get(), ZMQ_SNDHWM, limits.requests),
+        net::set_option(socket.get(), ZMQ_IMMEDIATE, limits.only_connected ? 1 : 0)}) {
     if (!set) return std::unexpected(set.error());
   }
-  auto monitor = net::LinkMonitor::open(context, socket->get(), keys);
-  if (!monitor) return std::unexpected(monitor.error());
-  if (auto done = net::connect_socket(socket->get(), peer.endpoint); !done) {
-    return std::unexpected(done.error());
-  }
+  auto monitor = TRY(net::LinkMonitor::open(context, socket.get(), keys));
+  TRY(net::connect_socket(socket.get(), peer.endpoint));
   const auto domain = type == ZMQ_DEALER ? net::Domain::kControl : net::Domain::kPublish;
-  return DaemonSocket(std::move(peer), domain, std::move(*socket), std::move(*monitor));
+  return DaemonSocket(std::move(peer), domain, std::move(socket), std::move(monitor));
 }
 
 Received DaemonSocket::receive(net::Message& first, net::Message& second) noexcept {

@@ -36,8 +36,7 @@ enum class Received { kNothing, kMessage, kMalformed };
 class DaemonSocket {
  public:
   // `type` is ZMQ_SUB, ZMQ_XSUB or ZMQ_DEALER. Returns at once. `context` outlives the socket.
-  [[nodiscard]] static Result<DaemonSocket> open(void* context, int type, Peer peer,
-                                                 const Limits& limits);
+  static Result<DaemonSocket> open(void* context, int type, Peer peer, const Limits& limits);
 
   [[nodiscard]] void* get() const noexcept { return socket_.get(); }
   [[nodiscard]] const Peer& peer() const noexcept { return peer_; }

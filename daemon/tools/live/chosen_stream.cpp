@@ -43,7 +43,7 @@ std::optional<Frame> frame_from(const v1::Frame& message, const Skeleton& skelet
   }
   for (int i = 0; i < 3; ++i) {
     if (!std::isfinite(message.root_position_m(i))) return std::nullopt;
-    frame.root_position_m[static_cast<std::size_t>(i)] = message.root_position_m(i);
+    frame.root_position_m[i] = message.root_position_m(i);
   }
   return frame;
 }
@@ -110,7 +110,7 @@ std::vector<std::string> StreamFigure::lines(int columns, int rows) {
 namespace {
 
 constexpr std::size_t kSecondsKept = 60;
-constexpr int kFigureColumns = 36, kFewestRows = 6, kMostRows = 16;
+constexpr int kFigureColumns = 36, kMinRows = 6, kMaxShownRows = 16;
 constexpr double kAlphaStep = 0.1;
 constexpr std::chrono::seconds kAnswerWithin{3};  // with an answer
 
@@ -275,8 +275,8 @@ std::vector<std::string> ChosenStream::lines(const v1::Stats& stats, int columns
   std::string keys = stats.stream_size() > 1 ? "up/down: stream   " : "";
   const bool controls = !control_options_.endpoint.empty() && stats.replay_file().empty();
   if (has_alpha(*chosen) && controls) keys += "left/right: alpha   ";
-  const int figure_rows = std::min(rows - static_cast<int>(out.size()) - 1, kMostRows);
-  if (figure_rows >= kFewestRows) {
+  const int figure_rows = std::min(rows - static_cast<int>(out.size()) - 1, kMaxShownRows);
+  if (figure_rows >= kMinRows) {
     for (std::string& row : figure_->lines(std::min(columns, kFigureColumns), figure_rows)) {
       out.push_back(std::move(row));
     }

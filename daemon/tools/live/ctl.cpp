@@ -78,16 +78,14 @@ Result<v1::ControlReply> ask(Connection& connection, const CtlOptions& options,
 
 Result<v1::ControlReply> ask(const CtlOptions& options, const v1::ControlRequest& request) {
   const Interrupt interrupt;
-  auto connection = Connection::open(options.client, ZMQ_DEALER);
-  if (!connection) return std::unexpected(connection.error());
-  return ask(*connection, options, request);
+  auto connection = TRY(Connection::open(options.client, ZMQ_DEALER));
+  return ask(connection, options, request);
 }
 
 // Sends the model piece by piece. Returns the reply to the last piece, or the first refusal.
 Result<v1::ControlReply> upload(const CtlOptions& options, const std::string& model) {
   const Interrupt interrupt;
-  auto connection = Connection::open(options.client, ZMQ_DEALER);
-  if (!connection) return std::unexpected(connection.error());
+  auto connection = TRY(Connection::open(options.client, ZMQ_DEALER));
   v1::ControlRequest request;
   auto& part = *request.mutable_model_part();
   part.set_stream(options.stream);
@@ -98,7 +96,7 @@ Result<v1::ControlReply> upload(const CtlOptions& options, const std::string& mo
   for (std::size_t offset = 0; offset < model.size(); offset += control::kMaxPiece) {
     part.set_offset(offset);
     part.set_bytes(model.substr(offset, control::kMaxPiece));
-    reply = ask(*connection, options, request);
+    reply = ask(connection, options, request);
     if (!reply || !reply->ok()) return reply;
   }
   return reply;
@@ -153,7 +151,7 @@ Result<> check_parameter(const std::string& name, const ParameterValue& value) {
       const std::string whole = fmt::format("{}.{}", stage->name, alone);
       if (spec.live) known.insert({alone, whole});
       if (name != alone && name != whole) continue;
-      const auto checked = from_people(spec, value, name);
+      const auto checked = from_display(spec, value, name);
       if (checked) return {};
       if (!wrong) wrong = checked.error();
     }
@@ -249,12 +247,9 @@ int stop_playing(const CtlOptions& options) {
 // Checks everything about the file itself; only the daemon knows whether it fits the glove.
 Result<std::string> read_calibration(const CtlOptions& options) {
   const auto& path = options.calibration;
-  const auto fits = expect_kind(path, FileKind::kCalibration, options.stream);
-  if (!fits) return std::unexpected(fits.error());
-  auto text = drivers::glove::load_calibration_text(path);
-  if (!text) return text;
-  const auto parsed = drivers::glove::parse_calibration(*text, path);
-  if (!parsed) return std::unexpected(parsed.error());
+  TRY(expect_kind(path, FileKind::kCalibration, options.stream));
+  auto text = TRY(drivers::glove::load_calibration_text(path));
+  TRY(drivers::glove::parse_calibration(text, path));
   return text;
 }
 
@@ -371,8 +366,8 @@ std::string live_parameters() {
       if (!spec.live) continue;
       const bool flag = std::holds_alternative<bool>(spec.default_value);
       std::string range = flag ? "true or false"
-                               : fmt::format("{:g} to {:g}", spec.min * spec.people_scale,
-                                             spec.max * spec.people_scale);
+                               : fmt::format("{:g} to {:g}", spec.min * spec.display_scale,
+                                             spec.max * spec.display_scale);
       if (!has_number(spec)) range = "a=0.6,b=0.4";
       if (!spec.words.empty()) range = fmt::format("{}", fmt::join(spec.words, ", "));
       lines += fmt::format("  {:<26} {:<14} {}\n",

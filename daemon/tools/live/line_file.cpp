@@ -20,7 +20,7 @@ Result<> LineFile::open() {
 
 Result<> LineFile::add(std::string_view line) {
   if (fd_ < 0) {
-    if (auto opened = open(); !opened) return opened;
+    TRY(open());
   }
   const std::string text = std::string(line) + '\n';
   std::size_t written = 0;

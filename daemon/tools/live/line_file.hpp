@@ -20,10 +20,10 @@ class LineFile {
 
   // Writes the line and its end in one piece. After an error (a full disk) the lines before it stay
   // and nothing of this one.
-  [[nodiscard]] Result<> add(std::string_view line);
+  Result<> add(std::string_view line);
 
  private:
-  [[nodiscard]] Result<> open();
+  Result<> open();
 
   std::filesystem::path path_;
   int fd_ = -1;

@@ -227,9 +227,9 @@ std::string head(const v1::Stats& stats, const LiveViewOptions& options) {
 // by default.
 std::string unusual_value(const ParameterSpec& spec, const v1::ParameterStats& parameter) {
   if (!has_number(spec)) return clean_name(parameter.text());
-  const double usual = number_of(spec, spec.default_value) * spec.people_scale;
+  const double usual = number_of(spec, spec.default_value) * spec.display_scale;
   if (parameter.value() == usual) return {};
-  return people_text(spec, parameter.value() / spec.people_scale);
+  return display_text(spec, parameter.value() / spec.display_scale);
 }
 
 // A line below the stream's row about its stages; empty if there is nothing to report.
@@ -376,7 +376,7 @@ std::vector<Detail> details_of(const v1::StreamStats& stream, std::int64_t now_n
 // As many lines as the text needs.
 std::vector<std::string> broken(const std::string& text, const LiveViewOptions& options,
                                 const char* colour, int indent) {
-  const std::string blanks(static_cast<std::size_t>(indent), ' ');
+  const std::string blanks(indent, ' ');
   std::vector<std::string> lines{text};
   if (options.width > 0) lines = wrapped(text, options.width - indent, "  ");
   for (std::string& line : lines) line = paint(options.colour, colour, line).insert(0, blanks);

@@ -70,14 +70,10 @@ class Monitor {
 
   Result<> run() {
     for (const std::string& topic : asked_) {
-      if (auto set = net::set_option(connection_.socket(), ZMQ_SUBSCRIBE, topic); !set) {
-        return set;
-      }
+      TRY(net::set_option(connection_.socket(), ZMQ_SUBSCRIBE, topic));
     }
     const std::string_view stats = "stats";
-    if (auto set = net::set_option(connection_.socket(), ZMQ_SUBSCRIBE, stats); !set) {
-      return set;
-    }
+    TRY(net::set_option(connection_.socket(), ZMQ_SUBSCRIBE, stats));
     while (!Interrupt::came() && !finished_) {
       if (auto refused = connection_.refusal()) return std::unexpected(*refused);
       if (auto given_up = watch_.report()) return std::unexpected(*given_up);
@@ -86,7 +82,7 @@ class Monitor {
                                 options_.client.endpoint, asked_.front(), options_.timeout_s));
       }
       if (connection_.wait(kLookAround)) {
-        if (auto done = receive(); !done) return done;
+        TRY(receive());
       } else {
         report_quiet_topic();
       }
@@ -104,7 +100,7 @@ class Monitor {
     if (!body.receive(connection_.socket(), 0)) return {};
     watch_.beat();
     if (topic.text() == "stats") {
-      if (auto known = look_at(body.bytes()); !known) return known;
+      TRY(look_at(body.bytes()));
     }
     // A subscription is a prefix: walker also matches walker-raw.
     const bool all = options_.stream.empty() && topic.text() != "stats";
@@ -177,9 +173,8 @@ Result<> watch(const MonitorOptions& options) {
     return misuse("stats are of all streams: leave out --stream, or choose another --topic");
   }
   const Interrupt interrupt;
-  auto connection = Connection::open(options.client, ZMQ_SUB);
-  if (!connection) return std::unexpected(connection.error());
-  return Monitor(options, std::move(*connection)).run();
+  auto connection = TRY(Connection::open(options.client, ZMQ_SUB));
+  return Monitor(options, std::move(connection)).run();
 }
 
 }  // namespace

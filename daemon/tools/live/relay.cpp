@@ -173,32 +173,24 @@ void serve_relay(relay::Relay& relay, net::ZapAuthenticator& authenticator,
 
 Result<> run_relay(const RelayCommand& command) {
   prepare_to_serve();
-  const auto security = relay_security(command);
-  if (!security) return std::unexpected(security.error());
-  auto upstreams = upstreams_of(command);
-  if (!upstreams) return std::unexpected(upstreams.error());
+  const auto security = TRY(relay_security(command));
+  auto upstreams = TRY(upstreams_of(command));
   net::raise_file_limit();
-  const auto context = net::open_context();
-  if (!context) return std::unexpected(context.error());
+  const auto context = TRY(net::open_context());
   relay::RelayOptions options{
-      .context = context->get(), .from = std::move(*upstreams), .endpoint = command.bind};
+      .context = context.get(), .from = std::move(upstreams), .endpoint = command.bind};
   std::optional<net::AccessList> allowed;  // empty without keys
-  if (!security->server_key.empty()) {
-    auto keys = net::read_secret_key(security->server_key);
-    if (!keys) return std::unexpected(keys.error());
-    options.secret_z85 = keys->secret_z85;
-    allowed.emplace(security->clients);
+  if (!security.server_key.empty()) {
+    auto keys = TRY(net::read_secret_key(security.server_key));
+    options.secret_z85 = keys.secret_z85;
+    allowed.emplace(security.clients);
   }
-  const auto authenticator = net::ZapAuthenticator::start(context->get(), std::move(allowed));
-  if (!authenticator) return std::unexpected(authenticator.error());
-  options.authenticator = authenticator->get();
-  const auto relay = relay::Relay::open(options);
-  if (!relay) return std::unexpected(relay.error());
-  print_line(Findings()
-                 .add("ready", true)
-                 .add("publish", (*relay)->endpoint())
-                 .add("from", command.from));
-  serve_relay(**relay, **authenticator, command);
+  const auto authenticator = TRY(net::ZapAuthenticator::start(context.get(), std::move(allowed)));
+  options.authenticator = authenticator.get();
+  const auto relay = TRY(relay::Relay::open(options));
+  print_line(
+      Findings().add("ready", true).add("publish", relay->endpoint()).add("from", command.from));
+  serve_relay(*relay, *authenticator, command);
   return {};
 }
 

@@ -65,7 +65,7 @@ class Top {
       if (drawn && !new_stats && is_due()) show(*screen);
       if (!new_stats) continue;
       if (record_) {
-        if (auto kept = record_->add(to_json(stats_)); !kept) return kept;
+        TRY(record_->add(to_json(stats_)));
       }
       const bool shown = screen ? show(*screen) : print_json(stats_);
       if (!shown) return {};  // the reader of stdout has gone
@@ -158,17 +158,13 @@ class Top {
 Result<> top(const TopOptions& options) {
   OutputFiles files(options.overwrite);
   files.reads(options.client.key).reads(options.client.server_key);
-  if (auto fine = files.writes_any_but_other(options.record, {".jsonl"}).check(); !fine)
-    return fine;
+  TRY(files.writes_any_but_other(options.record, {".jsonl"}).check());
   const Interrupt interrupt;
-  auto connection = Connection::open(options.client, ZMQ_SUB);
-  if (!connection) return std::unexpected(connection.error());
+  auto connection = TRY(Connection::open(options.client, ZMQ_SUB));
   for (const char* topic : {"stats", "event/"}) {
-    if (auto set = net::set_option(connection->socket(), ZMQ_SUBSCRIBE, topic); !set) {
-      return set;
-    }
+    TRY(net::set_option(connection.socket(), ZMQ_SUBSCRIBE, topic));
   }
-  return Top(options, std::move(*connection)).run();
+  return Top(options, std::move(connection)).run();
 }
 
 }  // namespace

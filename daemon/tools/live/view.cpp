@@ -44,9 +44,8 @@ std::string reason_of(const ViewCommand& command) {
 }
 
 Result<> warn_of_network(const ViewCommand& command) {
-  const auto own = view::is_loopback_address(command.address);
-  if (!own) return std::unexpected(own.error());
-  if (*own) return {};
+  const auto own = TRY(view::is_loopback_address(command.address));
+  if (own) return {};
   logging::say(fmt::format(
       "posed: warning: other machines reach this page on {}: whoever has its address can see the"
       " streams{}, and everybody on the way can read that address, for HTTP is not encrypted; an"
@@ -74,19 +73,17 @@ void print_url(const view::Bridge& bridge, const ViewCommand& command) {
 
 Result<> serve_page(const ViewCommand& command) {
   prepare_to_serve();
-  const auto page = find_page(command.page);
-  if (!page) return std::unexpected(page.error());
-  if (auto warned = warn_of_network(command); !warned) return warned;
+  const auto page = TRY(find_page(command.page));
+  TRY(warn_of_network(command));
   view::BridgeOptions options{.link = {.publish = command.client,
                                        .control = command.control,
                                        .read_only_reason = reason_of(command)},
-                              .page = *page,
+                              .page = page,
                               .address = command.address};
   options.port = command.port.value_or(view::kUsualPort);
   options.or_any_port = !command.port;
-  const auto bridge = view::Bridge::start(options);
-  if (!bridge) return std::unexpected(bridge.error());
-  print_url(**bridge, command);
+  const auto bridge = TRY(view::Bridge::start(options));
+  print_url(*bridge, command);
   const sigset_t set = end_signals();
   while (sigwaitinfo(&set, nullptr) < 0) {  // interrupted: stopped and continued
   }

@@ -162,19 +162,17 @@ Result<clip::Clip> read(const Convert& convert) {
   if (!is_hand(convert.in)) options.hand.reset();  // of a body it says which hand is written
   auto clip = clip::read_clip(convert.in, options);
   if (!clip || !is_hand(convert.in) || is_hand(convert.out)) return clip;
-  auto hand = clip::hand_of(*clip);
-  if (!hand) return std::unexpected(hand.error());
-  clip::fill_gaps(*hand);
-  auto filled = clip::clip_of_hand(*hand, convert.read.hand_shape);
+  auto hand = TRY(clip::hand_of(*clip));
+  clip::fill_gaps(hand);
+  auto filled = clip::clip_of_hand(hand, convert.read.hand_shape);
   if (filled) warn_of_clock(convert, *filled);
   return filled;
 }
 
 Result<> write(const Convert& convert, const clip::Clip& clip) {
   if (!is_hand(convert.out)) return clip::write_clip(clip, convert.out);
-  const auto hand = clip::hand_of(clip, convert.read);
-  if (!hand) return std::unexpected(hand.error());
-  return clip::write_hand_csv(*hand, convert.out);
+  const auto hand = TRY(clip::hand_of(clip, convert.read));
+  return clip::write_hand_csv(hand, convert.out);
 }
 
 int run(Convert& convert) {

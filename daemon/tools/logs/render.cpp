@@ -82,9 +82,8 @@ Result<> check_render(const RenderArguments& options) {
 // A clip of fingers without a body (a BVH of `posed synth`) as a hand of ours, which is drawn as
 // one.
 Result<clip::Clip> as_hand(const clip::Clip& clip, const clip::ReadOptions& read) {
-  auto hand = clip::hand_of(clip, read);
-  if (!hand) return std::unexpected(hand.error());
-  return clip::clip_of_hand(*hand, read.hand_shape);
+  auto hand = TRY(clip::hand_of(clip, read));
+  return clip::clip_of_hand(hand, read.hand_shape);
 }
 
 // --hand of a body says which of its hands is drawn, once it is read.
@@ -107,18 +106,16 @@ Result<clip::Clip> read_motion(const RenderArguments& options, const std::string
 
 // The frames between --from and --to.
 Result<Drawn> drawn_of(const RenderArguments& options, const clip::Clip& clip, std::string name) {
-  auto motion = motion::motion_of(clip);
-  if (!motion) return std::unexpected(motion.error());
+  auto motion = TRY(motion::motion_of(clip));
   Drawn drawn;
   drawn.name = std::move(name);
-  drawn.motion.skeleton = motion->skeleton;
-  drawn.motion.rate_hz = motion->rate_hz;
-  for (int i = 0; i < motion->size(); ++i) {
-    const double time_s =
-        clip.time_s.empty() ? i / clip.frame_rate_hz : clip.time_s[static_cast<std::size_t>(i)];
+  drawn.motion.skeleton = motion.skeleton;
+  drawn.motion.rate_hz = motion.rate_hz;
+  for (int i = 0; i < motion.size(); ++i) {
+    const double time_s = clip.time_s.empty() ? i / clip.frame_rate_hz : clip.time_s[i];
     if (time_s < options.from_s.value_or(0.0)) continue;
     if (options.to_s && time_s > *options.to_s) break;
-    drawn.motion.frames.push_back(motion->frames[static_cast<std::size_t>(i)]);
+    drawn.motion.frames.push_back(motion.frames[i]);
     drawn.time_s.push_back(time_s);
   }
   if (drawn.motion.frames.empty()) {
@@ -136,24 +133,18 @@ Result<Drawn> drawn_of(const RenderArguments& options, const clip::Clip& clip, s
 Result<std::vector<Drawn>> read_all(const RenderArguments& options) {
   std::vector<Drawn> all;
   const auto add = [&](const std::string& stream, const std::string& name) -> Result<> {
-    const auto clip = read_motion(options, stream);
-    if (!clip) return std::unexpected(clip.error());
-    for (const std::string& warning : clip->warnings) {
+    const auto clip = TRY(read_motion(options, stream));
+    for (const std::string& warning : clip.warnings) {
       std::fprintf(stderr, "posed: %s: %s\n", options.in.c_str(), warning.c_str());
     }
-    auto drawn = drawn_of(options, *clip, name);
-    if (!drawn) return std::unexpected(drawn.error());
-    all.push_back(std::move(*drawn));
+    auto drawn = TRY(drawn_of(options, clip, name));
+    all.push_back(std::move(drawn));
     return {};
   };
   if (options.raw_beside) {
-    if (auto done = add(raw_name(options.stream), "as it came in"); !done) {
-      return std::unexpected(done.error());
-    }
+    TRY(add(raw_name(options.stream), "as it came in"));
   }
-  if (auto done = add(options.stream, options.raw_beside ? "as posed published it" : ""); !done) {
-    return std::unexpected(done.error());
-  }
+  TRY(add(options.stream, options.raw_beside ? "as posed published it" : ""));
   return all;
 }
 
@@ -190,7 +181,7 @@ Result<std::string> still(const RenderArguments& options, const std::vector<Draw
       const double part = poses > 1 ? static_cast<double>(i) / (poses - 1) : 0.0;
       const int frame =
           std::min(end, options.frame.value_or(static_cast<int>(std::lround(part * end))));
-      const auto at = static_cast<std::size_t>(frame);
+      const std::size_t at = frame;
       row.poses.push_back(pose_at(drawn, at, time_words(drawn.time_s[at])));
     }
     rows.push_back(std::move(row));
@@ -229,7 +220,7 @@ Result<> render_video(const RenderArguments& options, const std::vector<Drawn>& 
     return row;
   };
   std::vector<picture::StripRow> every;
-  every.reserve(static_cast<std::size_t>(frames));
+  every.reserve(frames);
   for (int frame = 0; frame < frames; ++frame) every.push_back(row_at(frame));
   const auto layout = picture::layout_of(every, camera, kPose_px, !last.shape->is_hand());
   ProgressBar bar(kQuietFor_s);
@@ -241,7 +232,7 @@ Result<> render_video(const RenderArguments& options, const std::vector<Drawn>& 
        .rate_hz = rate_hz,
        .draw =
            [&](int frame) {
-             const auto at = static_cast<std::size_t>(frame);
+             const std::size_t at = frame;
              return picture::strip_svg({every[at]}, camera, layout, text);
            },
        .progress = [&](int drawn) { return bar.show("drawing", 1.0 * drawn / frames); }},
@@ -251,19 +242,16 @@ Result<> render_video(const RenderArguments& options, const std::vector<Drawn>& 
 }
 
 Result<> run_render(const RenderArguments& options) {
-  if (auto ok = check_render(options); !ok) return ok;
-  const auto view = picture::view_from_name(options.view);
-  if (!view) return std::unexpected(view.error());
-  const auto all = read_all(options);
-  if (!all) return std::unexpected(all.error());
+  TRY(check_render(options));
+  const auto view = TRY(picture::view_from_name(options.view));
+  const auto all = TRY(read_all(options));
   if (options.video) {
-    if (auto done = render_video(options, *all, *view); !done) return done;
+    TRY(render_video(options, all, view));
   } else {
-    const auto svg = still(options, *all, *view);
-    if (!svg) return std::unexpected(svg.error());
-    if (auto done = picture::write_picture(*svg, options.out); !done) return done;
+    const auto svg = TRY(still(options, all, view));
+    TRY(picture::write_picture(svg, options.out));
   }
-  const Drawn& last = all->back();
+  const Drawn& last = all.back();
   Findings()
       .add("in", options.in)
       .add("out", options.out.string())

@@ -71,15 +71,12 @@ FarmLog look_at(const std::string& path) {
 
 // Compares until `together` asks to stop.
 Result<> compare(const FarmLog& log, Together& together, ReplayOutcome& outcome) {
-  auto reader = log::Reader::open(log.path);
-  if (!reader) return std::unexpected(reader.error());
-  auto opened = replay::Replay::open(*reader);
-  if (!opened) return std::unexpected(opened.error());
-  auto expectation = replay::Expectation::open(*reader);
-  if (!expectation) return std::unexpected(expectation.error());
-  outcome.missing = missing_from(*reader, **opened);
-  ReplayOutputs outputs(**opened);
-  outputs.expectation = std::move(*expectation);
+  auto reader = TRY(log::Reader::open(log.path));
+  auto opened = TRY(replay::Replay::open(reader));
+  auto expectation = TRY(replay::Expectation::open(reader));
+  outcome.missing = missing_from(reader, *opened);
+  ReplayOutputs outputs(*opened);
+  outputs.expectation = std::move(expectation);
   std::int64_t reported_ns = 0;
   const auto pace = [&](const log::ChunkRow& chunk) {
     if (static_cast<pipeline::Direction>(chunk.direction) == pipeline::Direction::kFromDevice) {
@@ -90,7 +87,7 @@ Result<> compare(const FarmLog& log, Together& together, ReplayOutcome& outcome)
     }
     return !together.stop && !outputs.difference;
   };
-  auto done = (*opened)->run([&](const pipeline::Item& item) { outputs.add(item); }, pace);
+  auto done = opened->run([&](const pipeline::Item& item) { outputs.add(item); }, pace);
   if (done) done = outputs.finish();
   together.replayed_ns += log.length_ns - reported_ns;
   outcome.frames = outputs.frames;
@@ -150,7 +147,7 @@ Result<std::vector<ReplayOutcome>> replay_all(const std::vector<FarmLog>& logs,
   std::vector<ReplayOutcome> outcomes(logs.size());
   std::size_t before = 0;  // logs of the groups that are done
   for (const auto& [recorded, members] : groups_of(logs, isa)) {
-    if (auto set = set_isa_or(isa, recorded); !set) return std::unexpected(set.error());
+    TRY(set_isa_or(isa, recorded));
     const Task task = [&](std::size_t i) {
       ReplayOutcome outcome;
       const auto start = std::chrono::steady_clock::now();
@@ -304,7 +301,7 @@ Result<double> speed_of(const std::string& text) {
 // Equal bits are guaranteed for one instruction set only: by default that of the log.
 Result<> choose_isa(const ReplayOptions& options, const log::Reader& reader) {
   const std::string recorded = recorded_isa(reader);
-  if (auto set = set_isa_or(options.isa, recorded); !set) return set;
+  TRY(set_isa_or(options.isa, recorded));
   if (recorded != "auto" && recorded != gp::isa_name()) {
     spdlog::warn("recorded on {}, replayed on {}: the last bits may differ", recorded,
                  gp::isa_name());
@@ -352,29 +349,25 @@ void print_json(const ReplayOptions& options, const std::string& recorded,
 Result<> open_outputs(const ReplayOptions& options, double speed, const log::Reader& reader,
                       const replay::Replay& replay, ReplayOutputs& outputs) {
   if (options.expect) {
-    auto expectation = replay::Expectation::open(reader);
-    if (!expectation) return std::unexpected(expectation.error());
-    outputs.expectation = std::move(*expectation);
+    auto expectation = TRY(replay::Expectation::open(reader));
+    outputs.expectation = std::move(expectation);
   }
   if (!options.out.empty()) {
-    auto file = FrameFile::create(options.out);
-    if (!file) return std::unexpected(file.error());
-    outputs.file = std::move(*file);
+    auto file = TRY(FrameFile::create(options.out));
+    outputs.file = std::move(file);
   }
   if (!options.publish) return {};
   const auto meta = reader.meta().find("publish_endpoint");
   std::string endpoint = meta == reader.meta().end() ? "" : meta->second;
   if (!options.endpoint.empty()) endpoint = options.endpoint;
-  const auto extent = reader.extent();
-  if (!extent) return std::unexpected(extent.error());
+  const auto extent = TRY(reader.extent());
   auto broadcast =
-      replay::Broadcast::open({.endpoint = endpoint,
-                               .log = std::filesystem::path(options.log).filename().string(),
-                               .speed = speed,
-                               .begin_ns = *extent ? (*extent)->first_ns : 0},
-                              replay);
-  if (!broadcast) return std::unexpected(broadcast.error());
-  outputs.broadcast = std::move(*broadcast);
+      TRY(replay::Broadcast::open({.endpoint = endpoint,
+                                   .log = std::filesystem::path(options.log).filename().string(),
+                                   .speed = speed,
+                                   .begin_ns = extent ? extent->first_ns : 0},
+                                  replay));
+  outputs.broadcast = std::move(broadcast);
   Findings()
       .add("ready", true)
       .add("publish", outputs.broadcast->endpoint())
@@ -394,28 +387,23 @@ Result<> ended_early(const ReplayOptions& options, const ReplayOutputs& outputs)
 }
 
 Result<> replay(const ReplayOptions& options) {
-  const auto speed = speed_of(options.speed);
-  if (!speed) return std::unexpected(speed.error());
-  const auto files = OutputFiles(options.overwrite)
-                         .reads(options.log)
-                         .writes_any_but_other(options.out, {".bin"})
-                         .check();
-  if (!files) return files;
-  auto reader = log::Reader::open(options.log);
-  if (!reader) return std::unexpected(reader.error());
-  if (auto chosen = choose_isa(options, *reader); !chosen) return chosen;
-  auto opened = replay::Replay::open(*reader);
-  if (!opened) return std::unexpected(opened.error());
-  replay::Replay& replay = **opened;
-  ReplayOutcome outcome{.missing = missing_from(*reader, replay)};
+  const auto speed = TRY(speed_of(options.speed));
+  TRY(OutputFiles(options.overwrite)
+          .reads(options.log)
+          .writes_any_but_other(options.out, {".bin"})
+          .check());
+  auto reader = TRY(log::Reader::open(options.log));
+  TRY(choose_isa(options, reader));
+  auto opened = TRY(replay::Replay::open(reader));
+  replay::Replay& replay = *opened;
+  ReplayOutcome outcome{.missing = missing_from(reader, replay)};
   for (const std::string& missing : outcome.missing) spdlog::warn("{}", missing);
   ReplayOutputs outputs(replay);
-  if (auto done = open_outputs(options, *speed, *reader, replay, outputs); !done) return done;
-  const auto extent = reader->extent();
-  if (!extent) return std::unexpected(extent.error());
-  ReplayProgress progress(*extent);
+  TRY(open_outputs(options, speed, reader, replay, outputs));
+  const auto extent = TRY(reader.extent());
+  ReplayProgress progress(extent);
   const Interrupt interrupt;  // after the progress bar, because it takes over Ctrl-C
-  Pacer pacer(options.log, *speed);
+  Pacer pacer(options.log, speed);
   const auto pace = [&](const log::ChunkRow& chunk) {
     if (!pacer(chunk)) return false;
     if (static_cast<pipeline::Direction>(chunk.direction) != pipeline::Direction::kFromDevice) {
@@ -434,7 +422,7 @@ Result<> replay(const ReplayOptions& options) {
   outcome.isa = gp::isa_name();
   if (!done) outcome.problem = done.error().text();
   outcome.took_s = progress.elapsed_s();
-  if (options.json && (done || options.expect)) print_json(options, recorded_isa(*reader), outcome);
+  if (options.json && (done || options.expect)) print_json(options, recorded_isa(reader), outcome);
   if (done) print_summary(options, outcome);
   return done;
 }

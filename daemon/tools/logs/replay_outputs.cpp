@@ -52,7 +52,7 @@ void ReplayOutputs::add(const pipeline::Item& item) {
 
 Result<> ReplayOutputs::finish() {
   if (file) {
-    if (auto closed = file->close(); !closed) return closed;
+    TRY(file->close());
   }
   for (std::uint32_t id = 0; expectation && !difference && id < encoders_.size(); ++id) {
     auto same = expectation->finish(id, replay_.broken_at(id));

@@ -44,7 +44,7 @@ class ReplayOutputs {
   void add(const pipeline::Item& item);
 
   // Call after the last frame.
-  [[nodiscard]] Result<> finish();
+  Result<> finish();
 
   std::optional<FrameFile> file;
   std::optional<replay::Expectation> expectation;
@@ -63,7 +63,7 @@ class ReplayOutputs {
 
 // Uses `wanted`; if it is empty, `recorded`, or the CPU's best where the CPU lacks that. For the
 // whole process.
-[[nodiscard]] Result<> set_isa_or(const std::string& wanted, const std::string& recorded);
+Result<> set_isa_or(const std::string& wanted, const std::string& recorded);
 
 // What a replay cannot repeat, because the log does not hold it: one sentence for each gap, for
 // each body without a description and for each source without a stream.

@@ -35,8 +35,7 @@ class Silence {
     std::string text(kEnough, '\0');
     const auto end = lseek(kept_, 0, SEEK_END);
     const auto from = std::max<off_t>(0, end - static_cast<off_t>(kEnough));
-    text.resize(
-        static_cast<std::size_t>(std::max<ssize_t>(0, pread(kept_, text.data(), kEnough, from))));
+    text.resize(std::max<ssize_t>(0, pread(kept_, text.data(), kEnough, from)));
     while (text.ends_with('\n')) text.pop_back();
     return text.substr(text.rfind('\n') + 1);
   }
@@ -51,8 +50,8 @@ void ended_by_mpirun(int /*signal*/) {
     static_cast<void>(::write(STDERR_FILENO, words.data(), words.size()));
   };
   say("posed-mpi: ended by mpirun, because a rank has died or somebody asked for it; ");
-  say(posed::mpi::g_model_is_there != 0 ? "the model had been written before\n"
-                                        : "no model was written\n");
+  say(posed::mpi::g_model_written != 0 ? "the model had been written before\n"
+                                       : "no model was written\n");
   _exit(1);
 }
 

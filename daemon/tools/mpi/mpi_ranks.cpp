@@ -43,12 +43,10 @@ Link::Link() {
 Link::~Link() { MPI_Finalize(); }
 
 std::string Link::name(int rank) const {
-  return "rank " + std::to_string(rank) + " on " + hosts_[static_cast<std::size_t>(rank)];
+  return "rank " + std::to_string(rank) + " on " + hosts_[rank];
 }
 
-int Link::ranks_here() const {
-  return static_cast<int>(std::ranges::count(hosts_, hosts_[static_cast<std::size_t>(rank_)]));
-}
+int Link::ranks_here() const { return static_cast<int>(std::ranges::count(hosts_, hosts_[rank_])); }
 
 void Link::send(int to, Kind kind, std::span<const std::byte> bytes) {
   MPI_Send(bytes.data(), static_cast<int>(bytes.size()), MPI_BYTE, to, static_cast<int>(kind),
@@ -63,7 +61,7 @@ std::optional<Message> Link::poll() {
   int size = 0;
   MPI_Get_count(&status, MPI_BYTE, &size);
   Message message{status.MPI_SOURCE, static_cast<Kind>(status.MPI_TAG),
-                  std::vector<std::byte>(static_cast<std::size_t>(size))};
+                  std::vector<std::byte>(size)};
   MPI_Recv(message.bytes.data(), size, MPI_BYTE, status.MPI_SOURCE, status.MPI_TAG, MPI_COMM_WORLD,
            MPI_STATUS_IGNORE);
   return message;
@@ -86,7 +84,7 @@ std::unexpected<Error> ended() { return fail("the ranks have ended"); }
 
 }  // namespace
 
-volatile std::sig_atomic_t g_model_is_there = 0;
+volatile std::sig_atomic_t g_model_written = 0;
 
 unsigned threads_here(const Link& link) {
   cpu_set_t bound;
@@ -117,8 +115,8 @@ std::vector<MpiRanks::Fact> MpiRanks::facts_of(
 
 std::optional<std::vector<TaskResult>> MpiRanks::run_share(std::size_t count, const Task& task,
                                                            const TaskProgress& progress) {
-  const auto ranks = static_cast<std::size_t>(link_.size());
-  const auto own = static_cast<std::size_t>(link_.rank());
+  const std::size_t ranks = link_.size();
+  const std::size_t own = link_.rank();
   const std::size_t share = (count + ranks - 1 - own) / ranks;
   return threads_.run(share, [&](std::size_t i) { return task(i * ranks + own); }, progress);
 }
@@ -129,7 +127,7 @@ Result<> Leader::check_same(const std::vector<std::filesystem::path>& inputs) {
   send_all(Kind::kInputs, std::as_bytes(std::span(text)));
   while (answers(Kind::kCompared) + 1 < done_.size()) {
     const bool all_here = listen();
-    if (auto same = compared(); !same) return same;
+    TRY(compared());
     if (!all_here) return fail(loss_);
     std::this_thread::sleep_for(kPause);
   }
@@ -178,13 +176,13 @@ void Leader::stop() {
 }
 
 std::size_t Leader::answers(Kind kind) const {
-  return static_cast<std::size_t>(std::ranges::count(came_, kind, &Message::kind));
+  return std::ranges::count(came_, kind, &Message::kind);
 }
 
 bool Leader::listen() {
   while (auto message = link().poll()) {
     if (message->kind == Kind::kDone) {
-      done_[static_cast<std::size_t>(message->from)] = std::stoul(std::string(message->text()));
+      done_[message->from] = std::stoul(std::string(message->text()));
     } else if (message->kind == Kind::kLeft) {
       ++left_;
       if (loss_.empty()) {
@@ -233,7 +231,7 @@ std::optional<std::vector<TaskResult>> Leader::run(std::size_t count, const Task
   return results;
 }
 
-void Leader::leave(const std::string& /*last_words*/) {
+void Leader::leave(const std::string& /*message*/) {
   stop();
   while (left_ + 1 < link().size()) {
     static_cast<void>(listen());
@@ -268,8 +266,8 @@ std::optional<std::vector<TaskResult>> Follower::run(std::size_t count, const Ta
   return unpacked(all->bytes);
 }
 
-void Follower::leave(const std::string& last_words) {
-  link().send(kLeaderRank, Kind::kLeft, last_words);
+void Follower::leave(const std::string& message) {
+  link().send(kLeaderRank, Kind::kLeft, message);
   while (!stopped_) static_cast<void>(order());
 }
 

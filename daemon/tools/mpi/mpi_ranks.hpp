@@ -96,7 +96,7 @@ class Link {
 [[nodiscard]] unsigned threads_here(const Link& link);
 
 // Whether the leader has written the model; for a signal handler.
-extern volatile std::sig_atomic_t g_model_is_there;
+extern volatile std::sig_atomic_t g_model_written;
 
 // The ranks of `posed-mpi`. All run one command in step; rank 0 leads: it alone asks the caller
 // whether to go on, prints and writes. Task i is computed by rank i modulo their number; the
@@ -108,9 +108,9 @@ class MpiRanks : public tools::Ranks, protected TaskRunner {
 
   [[nodiscard]] TaskRunner& tasks() final { return *this; }
 
-  // Call when the command has ended here. Returns when it has ended in all ranks. `last_words`:
+  // Call when the command has ended here. Returns when it has ended in all ranks. `message`:
   // what this rank has printed, which the leader shows where it did not expect the end.
-  virtual void leave(const std::string& last_words) = 0;
+  virtual void leave(const std::string& message) = 0;
 
  protected:
   struct Fact {
@@ -136,24 +136,23 @@ class Leader final : public MpiRanks {
  public:
   using MpiRanks::MpiRanks;
   [[nodiscard]] bool leads() const override { return true; }
-  [[nodiscard]] Result<> check_same(const std::vector<std::filesystem::path>& inputs) override;
-  void leave(const std::string& last_words) override;
+  Result<> check_same(const std::vector<std::filesystem::path>& inputs) override;
+  void leave(const std::string& message) override;
 
  private:
   [[nodiscard]] std::optional<std::vector<TaskResult>> run(std::size_t count, const Task& task,
                                                            const TaskProgress& progress) override;
-  void model_is_there() override { g_model_is_there = 1; }
+  void model_written() override { g_model_written = 1; }
   void send_all(Kind kind, std::span<const std::byte> bytes = {});
   void stop();
   // Takes what has come; false where a rank has left.
   [[nodiscard]] bool listen();
   [[nodiscard]] std::size_t answers(Kind kind) const;
   // What another rank found to differ.
-  [[nodiscard]] Result<> compared() const;
+  Result<> compared() const;
 
   std::vector<Message> came_;  // the answers of one round, but not kDone
-  std::vector<std::size_t> done_ =
-      std::vector<std::size_t>(static_cast<std::size_t>(link().size()));
+  std::vector<std::size_t> done_ = std::vector<std::size_t>(link().size());
   int left_ = 0;      // ranks that have ended
   std::string loss_;  // the first of them, with its last words
   bool stopped_ = false;
@@ -163,8 +162,8 @@ class Follower final : public MpiRanks {
  public:
   using MpiRanks::MpiRanks;
   [[nodiscard]] bool leads() const override { return false; }
-  [[nodiscard]] Result<> check_same(const std::vector<std::filesystem::path>& inputs) override;
-  void leave(const std::string& last_words) override;
+  Result<> check_same(const std::vector<std::filesystem::path>& inputs) override;
+  void leave(const std::string& message) override;
 
  private:
   [[nodiscard]] std::optional<std::vector<TaskResult>> run(std::size_t count, const Task& task,

@@ -12,7 +12,7 @@ namespace {
 
 constexpr int kDotsAcross = 2, kDotsDown = 4;  // of a character
 constexpr int kHeadDots = 48;                  // of the circle that is the head
-constexpr double kLongest = 1e4;               // dots of a stick; a longer one is no pose
+constexpr double kMaxLength = 1e4;             // dots of a stick; a longer one is no pose
 
 // The bit of each dot in a braille pattern, row by row (Unicode, block U+2800).
 constexpr std::array<std::array<std::uint8_t, kDotsAcross>, kDotsDown> kBit{
@@ -34,9 +34,8 @@ class Dots {
     const auto across_at = static_cast<int>(x);
     const auto down_at = static_cast<int>(y);
     const int cell = down_at / kDotsDown * columns_ + across_at / kDotsAcross;
-    const auto row = static_cast<std::size_t>(down_at % kDotsDown);
-    patterns_[static_cast<std::size_t>(cell)] |=
-        kBit[row][static_cast<std::size_t>(across_at % kDotsAcross)];
+    const std::size_t row = down_at % kDotsDown;
+    patterns_[cell] |= kBit[row][across_at % kDotsAcross];
   }
 
   // A pattern is the three bytes of U+2800 and its dots.
@@ -80,7 +79,7 @@ std::vector<std::string> braille(const Figure& figure, const Camera& camera,
     const Seen from = camera.see(stick.from_m);
     const Seen to = camera.see(stick.to_m);
     const double length = std::hypot(to.right_m - from.right_m, to.up_m - from.up_m) * dots_per_m;
-    if (!(length < kLongest)) continue;
+    if (!(length < kMaxLength)) continue;
     const int steps = static_cast<int>(std::ceil(length)) + 1;
     for (int i = 0; i <= steps; ++i) {
       const double part = static_cast<double>(i) / steps;
@@ -96,7 +95,7 @@ std::vector<std::string> braille(const Figure& figure, const Camera& camera,
     }
   }
   std::vector<std::string> text;
-  text.reserve(static_cast<std::size_t>(std::max(rows, 0)));
+  text.reserve(std::max(rows, 0));
   for (int row = 0; row < rows; ++row) text.push_back(dots.row(row));
   return text;
 }

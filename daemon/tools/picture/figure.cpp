@@ -69,7 +69,7 @@ std::string_view side_colour(std::optional<Bone> bone, std::string_view otherwis
 
 // The colour of what begins at a joint: a joint without a canonical bone belongs to its parent.
 std::string_view colour_of(const Skeleton& skeleton, int joint) {
-  const Joint& at = skeleton.joints[static_cast<std::size_t>(joint)];
+  const Joint& at = skeleton.joints[joint];
   return side_colour(at.bone, at.parent < 0 ? kMiddle : colour_of(skeleton, at.parent));
 }
 
@@ -80,7 +80,7 @@ double reach_m(const Skeleton& skeleton) {
     const Joint& joint = skeleton.joints[j];
     const bool below_root = joint.parent >= 0 && static_cast<int>(j) != skeleton.root_joint;
     if (below_root) {
-      way_m[j] = way_m[static_cast<std::size_t>(joint.parent)] + joint.offset_m.norm();
+      way_m[j] = way_m[joint.parent] + joint.offset_m.norm();
     }
     longest_m = std::max(longest_m, way_m[j] + joint.end_site_m.value_or(Vector3d::Zero()).norm());
   }
@@ -89,7 +89,7 @@ double reach_m(const Skeleton& skeleton) {
 
 // Joints above the root joint are places in the room, not parts of the body.
 bool is_part_of_body(const Skeleton& skeleton, int joint) {
-  for (; joint >= 0; joint = skeleton.joints[static_cast<std::size_t>(joint)].parent) {
+  for (; joint >= 0; joint = skeleton.joints[joint].parent) {
     if (joint == skeleton.root_joint) return true;
   }
   return false;
@@ -104,23 +104,22 @@ FigureShape::FigureShape(std::shared_ptr<const Skeleton> skeleton)
   for (int j = 0; j < static_cast<int>(skeleton_->joints.size()); ++j) {
     if (!is_part_of_body(*skeleton_, j)) continue;
     if (j != skeleton_->root_joint) add_limb(j, false);
-    if (skeleton_->joints[static_cast<std::size_t>(j)].end_site_m) add_limb(j, true);
+    if (skeleton_->joints[j].end_site_m) add_limb(j, true);
   }
 }
 
 void FigureShape::add_limb(int joint, bool tip) {
-  const Joint& at = skeleton_->joints[static_cast<std::size_t>(joint)];
+  const Joint& at = skeleton_->joints[joint];
   // The bone that turns with the joint where the limb begins.
   const int begin = tip ? joint : at.parent;
   Limb limb{.joint = joint, .tip = tip, .width_m = kLimbWidth * reach_m_, .colour = kMiddle};
   if (hand_) {
     const int place = begin - 1;  // of the finger joints, 15 in all; -1: the wrist
-    limb.width_m =
-        place < 0 ? kPalmWidth_m : kCapsuleWidth_m[static_cast<std::size_t>(place % kFingerJoints)];
-    if (place >= 0) limb.colour = kFingerColours[static_cast<std::size_t>(place / kFingerJoints)];
+    limb.width_m = place < 0 ? kPalmWidth_m : kCapsuleWidth_m[place % kFingerJoints];
+    if (place >= 0) limb.colour = kFingerColours[place / kFingerJoints];
   } else {
     limb.colour = colour_of(*skeleton_, begin);
-    const auto& bone = skeleton_->joints[static_cast<std::size_t>(begin)].bone;
+    const auto& bone = skeleton_->joints[begin].bone;
     if (limb.colour == kMiddle) limb.width_m = kTrunkWidth * reach_m_;
     if ((bone && is_finger(*bone)) || (at.bone && is_finger(*at.bone))) {
       limb.width_m = kFingerWidth * reach_m_;
@@ -137,11 +136,11 @@ Figure FigureShape::pose(const Frame& frame) const {
     return world.position_m[j] + world.rotation[j] * local_m;
   };
   Figure figure;
-  figure.place_m = world.position_m[static_cast<std::size_t>(skeleton_->root_joint)];
+  figure.place_m = world.position_m[skeleton_->root_joint];
   figure.place_m.y() = 0.0;
   for (const Limb& limb : limbs_) {
-    const auto j = static_cast<std::size_t>(limb.joint);
-    const auto parent = static_cast<std::size_t>(std::max(0, skeleton_->joints[j].parent));
+    const std::size_t j = limb.joint;
+    const std::size_t parent = std::max(0, skeleton_->joints[j].parent);
     figure.sticks.push_back({.from_m = world.position_m[limb.tip ? j : parent],
                              .to_m = limb.tip ? tip_m(j) : world.position_m[j],
                              .width_m = limb.width_m,
@@ -149,7 +148,7 @@ Figure FigureShape::pose(const Frame& frame) const {
   }
   const int head = hand_ ? -1 : skeleton_->joint_of(Bone::kHead);
   if (head >= 0) {
-    const auto j = static_cast<std::size_t>(head);
+    const std::size_t j = head;
     const double radius_m = kHeadRadius * reach_m_;
     // Without a tip the head continues the neck.
     const Vector3d local_m =

@@ -25,7 +25,7 @@ enum class View : std::uint8_t {
 };
 
 // "front", "side" or "three-quarter"; anything else is a usage error.
-[[nodiscard]] Result<View> view_from_name(std::string_view name);
+Result<View> view_from_name(std::string_view name);
 [[nodiscard]] std::string_view view_words(View view);  // "from the side", for a caption
 
 // Unit vectors of a figure, in the world.

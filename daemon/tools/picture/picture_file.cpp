@@ -22,7 +22,7 @@ namespace posed::picture {
 namespace {
 
 // The end of what the program wrote on its stderr, in one line.
-std::string last_words(int descriptor) {
+std::string message(int descriptor) {
   constexpr std::size_t kKept = 400;
   std::string text;
   char part[4096];
@@ -54,7 +54,7 @@ Result<> run_program(const std::vector<std::string>& arguments, const std::strin
   const int failed = posix_spawnp(&child, argv[0], &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
   ::close(said[1]);
-  const std::string words = failed == 0 ? last_words(said[0]) : std::string();
+  const std::string words = failed == 0 ? message(said[0]) : std::string();
   ::close(said[0]);
   if (failed == ENOENT) {
     return fail("needs the program " + arguments.front() +
@@ -74,7 +74,7 @@ namespace {
 // A folder for files that only the drawing programs read; it goes with the object.
 class TemporaryFolder {
  public:
-  [[nodiscard]] static Result<std::unique_ptr<TemporaryFolder>> make() {
+  static Result<std::unique_ptr<TemporaryFolder>> make() {
     std::error_code error;
     std::string name = (std::filesystem::temp_directory_path(error) / "posed-XXXXXX").string();
     if (error || ::mkdtemp(name.data()) == nullptr) {
@@ -98,9 +98,8 @@ class TemporaryFolder {
 
 // So that the file at `to` appears only when it is whole.
 Result<> copy_whole(const std::string& from, const std::filesystem::path& to) {
-  const auto bytes = load_file(from, {.what = "picture", .max_bytes = 1U << 30});
-  if (!bytes) return std::unexpected(bytes.error());
-  return write_whole_file(to, *bytes);
+  const auto bytes = TRY(load_file(from, {.what = "picture", .max_bytes = 1U << 30}));
+  return write_whole_file(to, bytes);
 }
 
 std::string frame_name(int frame) {
@@ -113,11 +112,10 @@ std::string frame_name(int frame) {
 
 Result<> write_picture(const std::string& svg, const std::filesystem::path& path) {
   if (clip::extension_of(path) == ".svg") return write_whole_file(path, svg);
-  const auto folder = TemporaryFolder::make();
-  if (!folder) return std::unexpected(folder.error());
-  const std::string drawing = (*folder)->file("picture.svg");
-  const std::string pixels = (*folder)->file("picture.png");
-  if (auto done = write_whole_file(drawing, svg); !done) return done;
+  const auto folder = TRY(TemporaryFolder::make());
+  const std::string drawing = folder->file("picture.svg");
+  const std::string pixels = folder->file("picture.png");
+  TRY(write_whole_file(drawing, svg));
   const auto made =
       run_program({"rsvg-convert", "--format=png", "--output=" + pixels, drawing}, "librsvg2-bin");
   if (!made) return fail("a PNG " + made.error().message + "; or write an .svg", path.string());
@@ -125,20 +123,19 @@ Result<> write_picture(const std::string& svg, const std::filesystem::path& path
 }
 
 Result<> write_video(const Video& video, const std::filesystem::path& path) {
-  const auto folder = TemporaryFolder::make();
-  if (!folder) return std::unexpected(folder.error());
+  const auto folder = TRY(TemporaryFolder::make());
   for (int frame = 0; frame < video.frames; ++frame) {
     if (!video.progress(frame)) return fail("interrupted; nothing was written", path.string());
-    const std::string name = (*folder)->file(frame_name(frame));
-    if (auto done = write_whole_file(name, video.draw(frame)); !done) return done;
+    const std::string name = folder->file(frame_name(frame));
+    TRY(write_whole_file(name, video.draw(frame)));
   }
-  const std::string encoded = (*folder)->file("video.mp4");
+  const std::string encoded = folder->file("video.mp4");
   // H.264 with half as many colour samples, which every player shows, needs an even width and
   // height.
   const auto made =
       run_program({"ffmpeg", "-loglevel", "error", "-framerate", std::to_string(video.rate_hz),
-                   "-i", (*folder)->file("%06d.svg"), "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2",
-                   "-c:v", "libx264", "-pix_fmt", "yuv420p", encoded},
+                   "-i", folder->file("%06d.svg"), "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v",
+                   "libx264", "-pix_fmt", "yuv420p", encoded},
                   "ffmpeg");
   if (!made) return fail("a video " + made.error().message, path.string());
   return copy_whole(encoded, path);

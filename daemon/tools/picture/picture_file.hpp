@@ -14,11 +14,10 @@ namespace posed::picture {
 // Runs `arguments`, of which the first is the program's name, found in PATH. Its input is empty and
 // its output is discarded. `package`: of Debian, for the sentence that is returned if the program
 // is not installed. Ctrl-C reaches the program too; then the error says that it was interrupted.
-[[nodiscard]] Result<> run_program(const std::vector<std::string>& arguments,
-                                   const std::string& package);
+Result<> run_program(const std::vector<std::string>& arguments, const std::string& package);
 
 // `path` ends in .svg or .png.
-[[nodiscard]] Result<> write_picture(const std::string& svg, const std::filesystem::path& path);
+Result<> write_picture(const std::string& svg, const std::filesystem::path& path);
 
 struct Video {
   int frames = 0;
@@ -27,6 +26,6 @@ struct Video {
   std::function<bool(int done)> progress;      // called before each frame; false interrupts
 };
 // `path` ends in .mp4.
-[[nodiscard]] Result<> write_video(const Video& video, const std::filesystem::path& path);
+Result<> write_video(const Video& video, const std::filesystem::path& path);
 
 }  // namespace posed::picture

@@ -24,9 +24,8 @@ constexpr int kSubscriptionsWaiting = static_cast<int>(2 * publish::kMaxWanted);
 
 Result<Upstream> Upstream::open(void* context, const link::Peer& peer) {
   auto socket =
-      link::DaemonSocket::open(context, ZMQ_XSUB, peer, {.requests = kSubscriptionsWaiting});
-  if (!socket) return std::unexpected(socket.error());
-  return Upstream(std::move(*socket));
+      TRY(link::DaemonSocket::open(context, ZMQ_XSUB, peer, {.requests = kSubscriptionsWaiting}));
+  return Upstream(std::move(socket));
 }
 
 bool Upstream::subscribe(const std::string& prefix, bool on) {
@@ -186,19 +185,17 @@ Result<std::unique_ptr<Relay>> Relay::open(const RelayOptions& options) {
   if (options.from.empty() || options.from.size() > kMaxUpstreams) {
     return misuse("a relay has 1 to " + std::to_string(kMaxUpstreams) + " upstreams");
   }
-  auto socket = publish::PublishSocket::open({.context = options.context,
-                                              .endpoint = options.endpoint,
-                                              .authenticator = options.authenticator,
-                                              .secret_z85 = options.secret_z85,
-                                              .messages_per_s = kFirstRate_hz});
-  if (!socket) return std::unexpected(socket.error());
+  auto socket = TRY(publish::PublishSocket::open({.context = options.context,
+                                                  .endpoint = options.endpoint,
+                                                  .authenticator = options.authenticator,
+                                                  .secret_z85 = options.secret_z85,
+                                                  .messages_per_s = kFirstRate_hz}));
   std::vector<Upstream> upstreams;
   for (const link::Peer& settings : options.from) {
-    auto upstream = Upstream::open(options.context, settings);
-    if (!upstream) return std::unexpected(upstream.error());
-    upstreams.push_back(std::move(*upstream));
+    auto upstream = TRY(Upstream::open(options.context, settings));
+    upstreams.push_back(std::move(upstream));
   }
-  return std::unique_ptr<Relay>(new Relay(options, std::move(*socket), std::move(upstreams)));
+  return std::unique_ptr<Relay>(new Relay(options, std::move(socket), std::move(upstreams)));
 }
 
 Relay::Relay(const RelayOptions& options, publish::PublishSocket socket, std::vector<Upstream> from)
@@ -223,7 +220,7 @@ Relay::Relay(const RelayOptions& options, publish::PublishSocket socket, std::ve
 }
 
 std::int64_t Relay::turn(std::int64_t now_ns) {
-  bool all_received = socket_.hear(
+  bool all_received = socket_.receive_subscriptions(
       subscriptions_, now_ns, [this](std::string_view prefix) { streams_.want_skeletons(prefix); });
   pass_subscriptions(now_ns);
   for (std::size_t i = 0; i < upstreams_.size(); ++i) {

@@ -26,7 +26,7 @@ namespace posed::relay {
 class Upstream {
  public:
   // `context` outlives it.
-  [[nodiscard]] static Result<Upstream> open(void* context, const link::Peer& peer);
+  static Result<Upstream> open(void* context, const link::Peer& peer);
 
   [[nodiscard]] void* socket() const noexcept { return socket_.get(); }
   [[nodiscard]] void* news() const noexcept { return socket_.news(); }  // readable: log_news()
@@ -148,7 +148,7 @@ struct RelayCounts {
 class Relay {
  public:
   // Binds, and connects in the background.
-  [[nodiscard]] static Result<std::unique_ptr<Relay>> open(const RelayOptions& options);
+  static Result<std::unique_ptr<Relay>> open(const RelayOptions& options);
 
   [[nodiscard]] const std::string& endpoint() const noexcept { return socket_.endpoint(); }
 

@@ -82,7 +82,7 @@ class TreeDrawing {
  private:
   // A node is in the middle of its leaves.
   double place(int node, std::size_t column) {
-    const auto at = static_cast<std::size_t>(node);
+    const std::size_t at = node;
     const QuestionNode& here = tree_.nodes[at];
     if (column >= widths_.size()) widths_.resize(column + 1, 0.0);
     widths_[column] = std::max(
@@ -109,7 +109,7 @@ class TreeDrawing {
     if (here.yes < 0) return out;
     const double from = x_px_[column_[node]] + widths_[column_[node]];
     for (const bool yes : {true, false}) {
-      const auto child = static_cast<std::size_t>(yes ? here.yes : here.no);
+      const std::size_t child = yes ? here.yes : here.no;
       const double to = x_px_[column_[child]];
       const double bend = from + 12.0;
       out += fmt::format("<path class=\"way\" d=\"M{:.1f} {:.1f}H{:.1f}V{:.1f}H{:.1f}\"/>\n", from,
@@ -184,13 +184,13 @@ namespace {
 constexpr double kCell_px = 54.0, kCellHeight_px = 34.0, kConfusionLeft_px = 190.0;
 constexpr double kConfusionTop_px = 48.0;
 constexpr const char* kColumns = "recognised label [% of the frames]";
-constexpr double kDeepest = 0.6;  // opacity of a full cell, on which text can still be read
+constexpr double kMaxOpacity = 0.6;  // opacity of a full cell, on which text can still be read
 
 std::string cell_at(double x, double y, double share, bool agrees) {
   std::string out = fmt::format("<rect class=\"cell {} fill\"{}{}{}{} fill-opacity=\"{:.3f}\"/>\n",
                                 agrees ? "s0" : "s1", attribute("x", x), attribute("y", y),
                                 attribute("width", kCell_px), attribute("height", kCellHeight_px),
-                                kDeepest * share);
+                                kMaxOpacity * share);
   if (share < 0.0005) return out;
   return out +
          fmt::format("<text class=\"mid\"{}{}>{}</text>\n", attribute("x", x + kCell_px / 2.0),

@@ -66,6 +66,6 @@ class Page {
 [[nodiscard]] std::string svg_file(const std::vector<Drawing>& drawings);
 
 // Writes all of it or nothing.
-[[nodiscard]] Result<> write_page(const Page& page, const std::filesystem::path& path);
+Result<> write_page(const Page& page, const std::filesystem::path& path);
 
 }  // namespace posed::report

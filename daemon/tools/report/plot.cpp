@@ -53,8 +53,8 @@ Axis Axis::logarithmic(std::string title, std::string unit, const Range& range) 
   axis.low_ = 0.1;
   axis.high_ = 1.0;
   if (range.empty || range.high <= 0.0) return axis;
-  constexpr double kMostDecades = 1e6;  // below, a value is as good as none
-  const double least = std::max(range.low, range.high / kMostDecades);
+  constexpr double kMaxRatio = 1e6;  // below, a value is as good as none
+  const double least = std::max(range.low, range.high / kMaxRatio);
   axis.low_ = std::pow(10.0, std::floor(std::log10(least)));
   axis.high_ = std::pow(10.0, std::ceil(std::log10(range.high)));
   if (axis.high_ <= axis.low_) axis.high_ = 10.0 * axis.low_;
@@ -113,7 +113,7 @@ namespace {
 
 constexpr double kLeft_px = 64.0, kRight_px = 20.0, kTop_px = 14.0, kBottom_px = 48.0;
 constexpr double kLegendRow_px = 20.0, kSample_px = 26.0, kMark_px = 4.5;
-constexpr int kMostTicks = 8;
+constexpr int kMaxAxisTicks = 8;
 
 std::string words_at(std::string_view kind, double x_px, double y_px, std::string_view text) {
   return fmt::format("<text class=\"{}\"{}{}>{}</text>\n", kind, attribute("x", x_px),
@@ -315,7 +315,7 @@ std::string Plot::grid() const {
     out += line_at("grid", {kLeft_px, at}, {right, at});
     out += words_at("quiet end", kLeft_px - 7.0, at + 4.0, tick.text);
   }
-  for (const Tick& tick : x_.ticks(kMostTicks)) {
+  for (const Tick& tick : x_.ticks(kMaxAxisTicks)) {
     const double at = x_.px(tick.value);
     out += line_at("grid", {at, kTop_px}, {at, bottom});
     out += words_at("quiet mid", at, bottom + 17.0, tick.text);
@@ -375,11 +375,11 @@ Drawing Plot::drawing() const {
 namespace {
 
 constexpr double kBarsWidth_px = 820.0, kBar_px = 13.0, kBetween_px = 9.0, kAbove_px = 26.0;
-constexpr double kBelow_px = 44.0, kNumber_px = 62.0, kMostName_px = 300.0;
+constexpr double kBelow_px = 44.0, kNumber_px = 62.0, kMaxName_px = 300.0;
 
 std::string shortened(const std::string& name) {
-  constexpr std::size_t kMostBytes = 42;
-  return clean(name, kMostBytes);
+  constexpr std::size_t kMaxBytes = 42;
+  return clean(name, kMaxBytes);
 }
 
 double names_px(const Bars& bars) {
@@ -387,7 +387,7 @@ double names_px(const Bars& bars) {
   for (const BarGroup& group : bars.groups) {
     widest = std::max(widest, text_px(shortened(group.name)));
   }
-  return std::min(widest, kMostName_px) + 14.0;
+  return std::min(widest, kMaxName_px) + 14.0;
 }
 
 Axis axis_of(const Bars& bars) {

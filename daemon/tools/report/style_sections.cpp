@@ -93,10 +93,10 @@ Figure kernel_choice(const std::vector<TriedLength>& tried, double chosen_deg,
 }
 
 Figure held_out_walkers(const std::vector<HeldOutWalker>& walkers) {
-  constexpr std::size_t kMostRows = 40;
+  constexpr std::size_t kMaxShownRows = 40;
   std::vector<HeldOutWalker> worst = walkers;
   std::ranges::stable_sort(worst, {}, &HeldOutWalker::closes);
-  if (worst.size() > kMostRows) worst.resize(kMostRows);
+  if (worst.size() > kMaxShownRows) worst.resize(kMaxShownRows);
   Table table{.columns = {{"held-out clip", false},
                           {"person", false},
                           {"takes left out"},
@@ -170,10 +170,10 @@ Figure pose_paths(const PosePaths& paths) {
 }
 
 Figure stride_scores(const std::vector<ClipStride>& clips, double warn, double refuse) {
-  constexpr std::size_t kMostClips = 40;
+  constexpr std::size_t kMaxClips = 40;
   std::vector<ClipStride> worst = clips;
   std::ranges::stable_sort(worst, std::ranges::greater{}, &ClipStride::score);
-  if (worst.size() > kMostClips) worst.resize(kMostClips);
+  if (worst.size() > kMaxClips) worst.resize(kMaxClips);
   Bars bars{.quantity = "stride score: share of the legs' motion that fits no stride",
             .unit = "1",
             .series = {"score"},

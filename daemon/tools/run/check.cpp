@@ -31,7 +31,7 @@ struct CheckOptions {
 template <typename T>
 void add_parameter(const ParameterSpec& spec, const T& value, Findings& parameters) {
   if constexpr (std::is_same_v<T, double>) {
-    parameters.add(std::string(spec.shown_name()), value * spec.people_scale);
+    parameters.add(std::string(spec.shown_name()), value * spec.display_scale);
   } else {
     parameters.add(std::string(spec.shown_name()), value);
   }
@@ -64,23 +64,22 @@ Findings findings_of(const pipeline::StageSettings& stage, std::string& line) {
 Result<Findings> try_stream(const config::StreamConfig& config,
                             pipeline::PartnerStreams& partners) {
   devices::ModelFiles files;
-  const auto source = devices::open_source(config::source_of(config), files);
-  if (!source) return std::unexpected(source.error());
-  const drivers::Body body = devices::only_body(**source);
+  const auto source = TRY(devices::open_source(config::source_of(config), files));
+  const drivers::Body body = devices::only_body(*source);
   auto stages = devices::load_stages(config, body.skeleton, body.rate_hz, files, partners);
-  if (!stages) return devices::of_stream(config.name, stages.error());
+  if (!stages) return devices::in_stream(config.name, stages.error());
   partners[config.name] = {
       .stream = static_cast<std::uint32_t>(partners.size()),
       .about = {.skeleton = stages->published, .rate_hz = stages->settings.rate_hz}};
-  const auto missing = devices::try_kept_device(**source);
-  if (!missing) return devices::of_stream(config.name, missing.error());
+  const auto missing = devices::try_kept_device(*source);
+  if (!missing) return devices::in_stream(config.name, missing.error());
   const auto bound = devices::bind_stages(*stages);
-  if (!bound) return devices::of_stream(config.name, bound.error());
+  if (!bound) return devices::in_stream(config.name, bound.error());
   const auto engine = devices::make_engine(0, *stages, *bound);
-  if (!engine) return devices::of_stream(config.name, engine.error());
-  const drivers::Description& device = (*source)->device.description;
+  if (!engine) return devices::in_stream(config.name, engine.error());
+  const drivers::Description& device = source->device.description;
   const std::size_t joints = device.skeleton ? device.skeleton->joints.size() : 0;
-  std::vector<std::string> warnings = (*source)->device.warnings;
+  std::vector<std::string> warnings = source->device.warnings;
   if (!missing->empty()) {
     warnings.push_back("the device is not here now, and `posed run` waits for it (" + *missing +
                        ")");

@@ -13,13 +13,12 @@ namespace {
 
 Result<> record(RecordingPlan plan) {
   prepare_to_serve();
-  auto config = config::load_config(plan.serve.config, drivers::registry());
-  if (!config) return std::unexpected(config.error());
-  if (config->record) {
-    plan.frames = plan.frames || config->record->frames;
-    plan.clips = config->record->clips;
+  auto config = TRY(config::load_config(plan.serve.config, drivers::registry()));
+  if (config.record) {
+    plan.frames = plan.frames || config.record->frames;
+    plan.clips = config.record->clips;
   }
-  return stream_and_record(plan, *config);
+  return stream_and_record(plan, config);
 }
 
 }  // namespace

@@ -36,7 +36,7 @@ Result<> write_clip(Result<clip::Clip> clip, const std::filesystem::path& path) 
   for (const std::string& warning : clip->warnings) {
     spdlog::warn("{}: {}", path.string(), warning);
   }
-  if (auto written = clip::write_bvh(*clip, path); !written) return written;
+  TRY(clip::write_bvh(*clip, path));
   spdlog::info("wrote {}: {} frames", path.string(), clip->frames());
   return {};
 }
@@ -63,13 +63,13 @@ Result<> write_take_clips(const std::filesystem::path& log) {
 class SetAside {
  public:
   // Renames `file`, if it exists, to <file>.replaced. The error says why that is impossible.
-  [[nodiscard]] static Result<SetAside> move(const std::filesystem::path& file);
+  static Result<SetAside> move(const std::filesystem::path& file);
   SetAside(SetAside&& other) noexcept;
   SetAside& operator=(SetAside&&) = delete;
-  ~SetAside();  // restores the file over the new one, unless let_go() was called
+  ~SetAside();  // restores the file over the new one, unless release() was called
 
   // The replacement has succeeded: deletes the old file.
-  void let_go() noexcept;
+  void release() noexcept;
 
  private:
   explicit SetAside(std::filesystem::path file) : file_(std::move(file)) {}
@@ -106,7 +106,7 @@ SetAside::~SetAside() {
   }
 }
 
-void SetAside::let_go() noexcept {
+void SetAside::release() noexcept {
   if (file_.empty()) return;
   for (const char* suffix : log::kFileSuffixes) remove(aside(), suffix);
   file_.clear();
@@ -252,11 +252,10 @@ Result<std::string> new_log(const std::filesystem::path& folder) {
 }
 
 Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig& config) {
-  if (auto fine = check_out(plan, config); !fine) return fine;
-  auto opened = assembly::Daemon::open(config);
-  if (!opened) return std::unexpected(opened.error());
-  assembly::Daemon& daemon = **opened;
-  if (auto ends = check_end(daemon, plan.serve); !ends) return ends;
+  TRY(check_out(plan, config));
+  auto opened = TRY(assembly::Daemon::open(config));
+  assembly::Daemon& daemon = *opened;
+  TRY(check_end(daemon, plan.serve));
   auto started = std::make_shared<std::atomic<bool>>(false);
   record::RecorderOptions recorder_options{
       .file = plan.out,
@@ -268,48 +267,46 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
       .report = [&daemon, started](const record::RecorderEvent& event) {
         if (*started) post(daemon, event);
       }};
-  auto replaced = SetAside::move(plan.out);
-  if (!replaced) return std::unexpected(replaced.error());
+  auto replaced = TRY(SetAside::move(plan.out));
   std::set<std::uint32_t> with_body;  // sources, by number
-  auto recorder = record::Recorder::open(std::move(recorder_options),
-                                         record::recorded_setup(daemon.sources(), daemon.slots()));
-  if (!recorder) return std::unexpected(recorder.error());
+  auto recorder = TRY(record::Recorder::open(
+      std::move(recorder_options), record::recorded_setup(daemon.sources(), daemon.slots())));
   assembly::DaemonHooks hooks;
-  hooks.record_sink = &(*recorder)->record_sink();
+  hooks.record_sink = &recorder->record_sink();
   hooks.record_stream = [&recorder, &with_body](const devices::NewStream& stream) {
     with_body.insert(stream.source.number);
-    (*recorder)->add_stream(record::recorded_stream(stream));
+    recorder->add_stream(record::recorded_stream(stream));
   };
   hooks.more_stats = [&recorder](v1::Stats& stats) {
-    stats.set_recorder_lost_chunks((*recorder)->lost_chunks());
-    stats.set_recorder_errors((*recorder)->errors());
-    stats.set_recorder_file((*recorder)->file().string());
-    stats.set_recorder_trouble((*recorder)->trouble());
-    if (const auto take = (*recorder)->running_take()) {
+    stats.set_recorder_lost_chunks(recorder->lost_chunks());
+    stats.set_recorder_errors(recorder->errors());
+    stats.set_recorder_file(recorder->file().string());
+    stats.set_recorder_trouble(recorder->trouble());
+    if (const auto take = recorder->running_take()) {
       *stats.mutable_take() = pipeline::stats_of(*take);
     }
   };
-  hooks.recorder_figures = [&recorder] { return figures_of(**recorder); };
+  hooks.recorder_figures = [&recorder] { return figures_of(*recorder); };
   if (auto done = daemon.start(std::move(hooks)); !done) {
     daemon.stop();
     // The error is what failed at the start, not what follows from it.
-    [[maybe_unused]] const auto closed = (*recorder)->finish();
+    [[maybe_unused]] const auto closed = recorder->finish();
     std::error_code ignored;
     std::filesystem::remove(plan.out, ignored);  // nothing was recorded
     return done;
   }
-  replaced->let_go();
+  replaced.release();
   *started = true;
   print_ready(daemon);
   const std::int64_t start_ns = system::monotonic_ns();
   serve(daemon, plan.serve,
-        {{.thread = record::Recorder::kThreadName, .pulse = &(*recorder)->pulse()}});
+        {{.thread = record::Recorder::kThreadName, .pulse = &recorder->pulse()}});
   const double took_s = seconds(system::monotonic_ns() - start_ns);
-  auto finished = (*recorder)->finish();
+  auto finished = recorder->finish();
   for (const auto& source : daemon.sources()) {
     if (!with_body.contains(source->number)) warn_of_no_body(source->config.name);
   }
-  print_result(plan, daemon, **recorder, took_s);
+  print_result(plan, daemon, *recorder, took_s);
   if (finished && plan.clips) return write_take_clips(plan.out);
   return finished;
 }

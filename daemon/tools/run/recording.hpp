@@ -33,10 +33,9 @@ struct RecordingPlan {
 
 // A path in the folder, named after the present time, that no file has: "<folder>/<utc>.plog", like
 // 20261123T013005Z.plog. Makes the folder if it is not there.
-[[nodiscard]] Result<std::string> new_log(const std::filesystem::path& folder);
+Result<std::string> new_log(const std::filesystem::path& folder);
 
 // Call prepare_to_serve() first. Returns when the daemon has ended and the log is complete.
-[[nodiscard]] Result<> stream_and_record(const RecordingPlan& plan,
-                                         const config::DaemonConfig& config);
+Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig& config);
 
 }  // namespace posed::tools

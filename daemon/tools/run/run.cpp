@@ -14,23 +14,20 @@ namespace {
 
 Result<> run(const ServeOptions& options) {
   prepare_to_serve();
-  auto config = config::load_config(options.config, drivers::registry());
-  if (!config) return std::unexpected(config.error());
-  if (config->record) {
-    auto log = new_log(config->record->folder);
-    if (!log) return std::unexpected(log.error());
-    return stream_and_record({.out = std::move(*log),
-                              .frames = config->record->frames,
-                              .clips = config->record->clips,
+  auto config = TRY(config::load_config(options.config, drivers::registry()));
+  if (config.record) {
+    auto log = TRY(new_log(config.record->folder));
+    return stream_and_record({.out = std::move(log),
+                              .frames = config.record->frames,
+                              .clips = config.record->clips,
                               .serve = options},
-                             *config);
+                             config);
   }
-  auto daemon = assembly::Daemon::open(*config);
-  if (!daemon) return std::unexpected(daemon.error());
-  if (auto ends = check_end(**daemon, options); !ends) return ends;
-  if (auto started = (*daemon)->start(); !started) return started;
-  print_ready(**daemon);
-  serve(**daemon, options);
+  auto daemon = TRY(assembly::Daemon::open(config));
+  TRY(check_end(*daemon, options));
+  TRY(daemon->start());
+  print_ready(*daemon);
+  serve(*daemon, options);
   return {};
 }
 

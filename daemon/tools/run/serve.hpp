@@ -38,7 +38,7 @@ struct ServeOptions {
 void add_serve_options(CLI::App& command, ServeOptions& options);
 
 // Refuses --until-end if no source can end.
-[[nodiscard]] Result<> check_end(const assembly::Daemon& daemon, const ServeOptions& options);
+Result<> check_end(const assembly::Daemon& daemon, const ServeOptions& options);
 
 // Waits for SIGINT, SIGTERM, a control message or the end that the options set, then stops the
 // daemon. SIGHUP reads the client list again if keys are used; otherwise it means a closed terminal

@@ -150,38 +150,32 @@ Findings findings_of(const ApplyArguments& options, const style::StyleModel& mod
 Result<> measure_neutral(const style::StyleModel& model, ApplyArguments& options) {
   if (options.neutral.empty()) return {};
   const auto neutral =
-      clip::read_clip(options.neutral, clip::accepted_options(options.neutral, options.read));
-  if (!neutral) return std::unexpected(neutral.error());
-  const auto walker = style::measure_walker(model, options.model.string(), *neutral);
-  if (!walker) return std::unexpected(walker.error());
-  options.apply.walker = *walker;
+      TRY(clip::read_clip(options.neutral, clip::accepted_options(options.neutral, options.read)));
+  const auto walker = TRY(style::measure_walker(model, options.model.string(), neutral));
+  options.apply.walker = walker;
   return {};
 }
 
 Result<> run(ApplyArguments options) {
-  if (auto ok = parse_gate(options); !ok) return ok;
-  if (auto ok = parse_alpha(options); !ok) return ok;
-  if (auto ok = check_files(options); !ok) return ok;
-  const auto model = style::load_model(options.model);
-  if (!model) return std::unexpected(model.error());
-  if (options.apply.filter.auto_alpha && !model->axis.present()) {
+  TRY(parse_gate(options));
+  TRY(parse_alpha(options));
+  TRY(check_files(options));
+  const auto model = TRY(style::load_model(options.model));
+  if (options.apply.filter.auto_alpha && !model.axis.present()) {
     return misuse(
         "the model has no style axis, so --alpha auto cannot tell how much is missing: "
         "give a number, or train a model of one style with this version of posed",
         options.model.string());
   }
-  const auto shares = style::shares_of(options.apply.filter.weights, model->names());
-  if (!shares) return std::unexpected(shares.error());
-  const auto mask = style::mask_of(options.mask);
-  if (!mask) return std::unexpected(mask.error());
-  options.apply.filter.mask = *mask;
-  const auto clip = clip::read_clip(options.in, options.read);
-  if (!clip) return std::unexpected(clip.error());
-  for (const std::string& warning : clip->warnings) {
+  const auto shares = TRY(style::shares_of(options.apply.filter.weights, model.names()));
+  const auto mask = TRY(style::mask_of(options.mask));
+  options.apply.filter.mask = mask;
+  const auto clip = TRY(clip::read_clip(options.in, options.read));
+  for (const std::string& warning : clip.warnings) {
     std::fprintf(stderr, "posed: %s: %s\n", options.in.c_str(), warning.c_str());
   }
-  if (auto ok = measure_neutral(*model, options); !ok) return ok;
-  if (options.apply.filter.gate && !model->gate.present()) {
+  TRY(measure_neutral(model, options));
+  if (options.apply.filter.gate && !model.gate.present()) {
     std::fprintf(stderr,
                  "posed: %s: has no data for the gate, so any motion is styled; train it "
                  "again, or use --gate off\n",
@@ -191,13 +185,12 @@ Result<> run(ApplyArguments options) {
   options.apply.progress = [&bar](int done, int total) {
     return bar.show("styling", static_cast<double>(done) / total);
   };
-  const auto applied = style::apply_to_clip(*model, options.model.string(), *clip, options.apply);
-  if (!applied) return std::unexpected(applied.error());
-  const auto fit = style::fit_of_walker(*model, options.model.string(), *clip);
-  if (!fit) return std::unexpected(fit.error());
-  if (auto written = clip::write_clip(applied->clip, options.out); !written) return written;
+  const auto applied =
+      TRY(style::apply_to_clip(model, options.model.string(), clip, options.apply));
+  const auto fit = TRY(style::fit_of_walker(model, options.model.string(), clip));
+  TRY(clip::write_clip(applied.clip, options.out));
   bar.finish();
-  findings_of(options, *model, *shares, *clip, *applied, *fit).show(options.json);
+  findings_of(options, model, shares, clip, applied, fit).show(options.json);
   return {};
 }
 

@@ -110,17 +110,16 @@ Result<Findings> evaluate_natural(const EvalNaturalOptions& options) {
   ProgressBar bar(kQuietFor_s);
   ThreadTasks tasks;
   constexpr double kReading = 0.9;  // of the progress
-  const auto clips = read_natural_clips(options, tasks, [&bar](double fraction) {
+  const auto clips = TRY(read_natural_clips(options, tasks, [&bar](double fraction) {
     return bar.show("reading the corpus", kReading * fraction);
-  });
-  if (!clips) return std::unexpected(clips.error());
+  }));
   const auto comparison =
-      natural::compare(clips->clip, clips->corpus, tasks, [&bar](double fraction) {
+      natural::compare(clips.clip, clips.corpus, tasks, [&bar](double fraction) {
         return bar.show("comparing", kReading + (1.0 - kReading) * fraction);
       });
   if (!comparison) return fail("stopped");
   bar.finish();
-  return findings_of(options, *clips, *comparison);
+  return findings_of(options, clips, *comparison);
 }
 
 }  // namespace

@@ -147,29 +147,22 @@ Result<> check_files(const EvalOptions& options) {
 }
 
 Result<Evaluation> evaluate(const EvalOptions& options) {
-  if (auto checked = check_files(options); !checked) return std::unexpected(checked.error());
+  TRY(check_files(options));
   const bool any = clip::accepts(options.source, clip::ReadOption::kSkeleton) ||
                    clip::accepts(options.target, clip::ReadOption::kSkeleton);
   if (!options.skeleton.empty() && !any) {
     return misuse("--skeleton is only for AMC clips; leave it out");
   }
-  const auto model = style::load_model(options.model);
-  if (!model) return std::unexpected(model.error());
-  const auto source = read(options.source, options.skeleton);
-  if (!source) return std::unexpected(source.error());
-  const auto target = read(options.target, options.skeleton);
-  if (!target) return std::unexpected(target.error());
-  const auto shares = style::shares_of(options.weights, model->names());
-  if (!shares) return std::unexpected(shares.error());
-  const style::StyleModel mixture = style::mixture_of(*model, shares->all());
-  const auto fit = style::fit_of_walker(mixture, options.model, *source);
-  if (!fit) return std::unexpected(fit.error());
-  const style::StyleModel constant = style::with_constant_change(mixture, fit->mean_change);
+  const auto model = TRY(style::load_model(options.model));
+  const auto source = TRY(read(options.source, options.skeleton));
+  const auto target = TRY(read(options.target, options.skeleton));
+  const auto shares = TRY(style::shares_of(options.weights, model.names()));
+  const style::StyleModel mixture = style::mixture_of(model, shares.all());
+  const auto fit = TRY(style::fit_of_walker(mixture, options.model, source));
+  const style::StyleModel constant = style::with_constant_change(mixture, fit.mean_change);
   ProgressBar bar(kQuietFor_s);
-  Evaluation evaluation{.score = {},
-                        .constant = {},
-                        .fit = *fit,
-                        .weights = mixture_findings(model->names(), *shares)};
+  Evaluation evaluation{
+      .score = {}, .constant = {}, .fit = fit, .weights = mixture_findings(model.names(), shares)};
   for (const bool full : {false, true}) {
     style::ApplyOptions apply;
     apply.filter.alpha = options.alpha;
@@ -179,19 +172,17 @@ Result<Evaluation> evaluate(const EvalOptions& options) {
       return bar.show("styling", 0.5 * full + 0.5 * done / total);
     };
     const auto styled =
-        style::apply_to_clip(full ? *model : constant, options.model, *source, apply);
-    if (!styled) return std::unexpected(styled.error());
-    const auto score = style::evaluate_style(*source, styled->clip, *target, model->space);
-    if (!score) return std::unexpected(score.error());
-    (full ? evaluation.score : evaluation.constant) = *score;
-    evaluation.gate_mean = styled->gate_mean;
-    evaluation.moved_rms_deg = styled->rms_change_rad * kDegrees;
+        TRY(style::apply_to_clip(full ? model : constant, options.model, source, apply));
+    const auto score = TRY(style::evaluate_style(source, styled.clip, target, model.space));
+    (full ? evaluation.score : evaluation.constant) = score;
+    evaluation.gate_mean = styled.gate_mean;
+    evaluation.moved_rms_deg = styled.rms_change_rad * kDegrees;
     if (full && options.report.wanted()) {
-      evaluation.clips = {.source = *source,
-                          .styled = styled->clip,
-                          .target = *target,
-                          .space = model->space.space,
-                          .rate_hz = model->rate_hz};
+      evaluation.clips = {.source = source,
+                          .styled = styled.clip,
+                          .target = target,
+                          .space = model.space.space,
+                          .rate_hz = model.rate_hz};
     }
   }
   return evaluation;

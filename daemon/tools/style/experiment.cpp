@@ -137,10 +137,9 @@ Result<> add_target_clips(const std::vector<std::string>& arguments, const std::
 Result<std::vector<style::TrainingClip>> load_clips(const Experiment& experiment) {
   std::vector<style::TrainingClip> clips;
   for (const ExperimentClip& entry : experiment.clips) {
-    auto clip = clip::read_clip(entry.file,
-                                clip::accepted_options(entry.file, {.skeleton = experiment.asf}));
-    if (!clip) return std::unexpected(clip.error());
-    clips.push_back({std::move(*clip), entry.group, entry.subject, entry.motion});
+    auto clip = TRY(clip::read_clip(
+        entry.file, clip::accepted_options(entry.file, {.skeleton = experiment.asf})));
+    clips.push_back({std::move(clip), entry.group, entry.subject, entry.motion});
   }
   return clips;
 }

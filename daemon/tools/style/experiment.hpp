@@ -30,7 +30,7 @@ struct Experiment {
 };
 
 // Errors name file and line; the error for an unknown key names the nearest known one.
-[[nodiscard]] Result<Experiment> read_experiment(const std::filesystem::path& path);
+Result<Experiment> read_experiment(const std::filesystem::path& path);
 
 // A clip named on the command line, [PERSON:]FILE. The person is the part before the first colon
 // where no file has the whole name and that part holds no '/', which only a file's name does;
@@ -42,10 +42,10 @@ struct Experiment {
 // '=' where no file has the whole name and that part holds no '/'; it is the group of its clip and
 // of those after it, up to the next NAME. Without any, all are the group "to". Adds the clips and
 // the targets. The error is for clips before the first NAME.
-[[nodiscard]] Result<> add_target_clips(const std::vector<std::string>& arguments,
-                                        const std::string& motion, Experiment& experiment);
+Result<> add_target_clips(const std::vector<std::string>& arguments, const std::string& motion,
+                          Experiment& experiment);
 
 // Reads the clips themselves.
-[[nodiscard]] Result<std::vector<style::TrainingClip>> load_clips(const Experiment& experiment);
+Result<std::vector<style::TrainingClip>> load_clips(const Experiment& experiment);
 
 }  // namespace posed::tools

@@ -30,15 +30,11 @@ class Measure {
   static Result<Measure> of(const NaturalOptions& options) {
     Measure measure(options);
     if (measure.of_hands()) return measure;
-    const auto motion = measure.body(options.clip);
-    if (!motion) return std::unexpected(motion.error());
-    auto spec = motion::describe_space(motion::Space::kNative, *motion->skeleton);
-    if (!spec) return std::unexpected(spec.error());
-    const std::array<const motion::Motion*, 1> one{&*motion};
-    if (auto set = motion::set_mean_rotations(one, *spec); !set) {
-      return std::unexpected(set.error());
-    }
-    measure.spec_ = std::move(*spec);
+    const auto motion = TRY(measure.body(options.clip));
+    auto spec = TRY(motion::describe_space(motion::Space::kNative, *motion.skeleton));
+    const std::array<const motion::Motion*, 1> one{&motion};
+    TRY(motion::set_mean_rotations(one, spec));
+    measure.spec_ = std::move(spec);
     return measure;
   }
 
@@ -54,7 +50,7 @@ class Measure {
     return !of_hands() || !options_.hand.empty();
   }
 
-  [[nodiscard]] Result<natural::Figures> operator()(const Path& path) const {
+  Result<natural::Figures> operator()(const Path& path) const {
     auto figures = of_hands() ? hand_figures(path) : body_figures(path);
     if (!figures && figures.error().file.empty()) figures.error().file = path.string();
     return figures;
@@ -70,28 +66,23 @@ class Measure {
     const bool other = path != options_.clip && exists(clip::skeleton_beside(path), ignored);
     return clip::accepted_options(path, {.skeleton = other ? Path() : Path(options_.skeleton)});
   }
-  [[nodiscard]] Result<motion::Motion> body(const Path& path) const {
-    const auto read = clip::read_clip(path, how(path));
-    if (!read) return std::unexpected(read.error());
-    auto motion = motion::motion_of(*read);
-    if (!motion) return motion;
-    if (motion::begins_with_added_pose(*motion)) motion::drop_first_frame(*motion);
-    return motion::resample(*motion, options_.rate_hz);
+  Result<motion::Motion> body(const Path& path) const {
+    const auto read = TRY(clip::read_clip(path, how(path)));
+    auto motion = TRY(motion::motion_of(read));
+    if (motion::begins_with_added_pose(motion)) motion::drop_first_frame(motion);
+    return motion::resample(motion, options_.rate_hz);
   }
-  [[nodiscard]] Result<natural::Figures> body_figures(const Path& path) const {
-    const auto motion = body(path);
-    if (!motion) return std::unexpected(motion.error());
-    return natural::figures_of(*motion, spec_);
+  Result<natural::Figures> body_figures(const Path& path) const {
+    const auto motion = TRY(body(path));
+    return natural::figures_of(motion, spec_);
   }
-  [[nodiscard]] Result<natural::Figures> hand_figures(const Path& path) const {
+  Result<natural::Figures> hand_figures(const Path& path) const {
     clip::ReadOptions read = how(path);
     if (!options_.hand.empty()) read.hand = side_named(options_.hand);
-    auto hand = clip::read_hand_clip(path, read);
-    if (!hand) return std::unexpected(hand.error());
-    clip::fill_gaps(*hand);
-    const auto recording = gesture::recording_of(*hand, options_.rate_hz);
-    if (!recording) return std::unexpected(recording.error());
-    return natural::figures_of(recording->angles_rad / kDegree, options_.rate_hz);
+    auto hand = TRY(clip::read_hand_clip(path, read));
+    clip::fill_gaps(hand);
+    const auto recording = TRY(gesture::recording_of(hand, options_.rate_hz));
+    return natural::figures_of(recording.angles_rad / kDegree, options_.rate_hz);
   }
 
   NaturalOptions options_;
@@ -128,13 +119,13 @@ Result<std::vector<Path>> files_of(const Path& folder, const Measure& measure) {
 }
 
 Result<> check_enough(const NaturalClips& clips, const Path& corpus) {
-  if (clips.corpus.size() >= natural::kLeastClips) return {};
+  if (clips.corpus.size() >= natural::kMinClips) return {};
   const std::size_t count = clips.corpus.size();
   std::string why = (count == 0   ? "no clip"
                      : count == 1 ? "one clip"
                                   : "two clips") +
                     std::string(" can be compared with, and a spread needs ") +
-                    std::to_string(natural::kLeastClips);
+                    std::to_string(natural::kMinClips);
   if (!clips.left_out.empty()) {
     why += "; left out: " + clips.left_out.front().file + " (" + clips.left_out.front().why + ")";
     const std::size_t more = clips.left_out.size() - 1;
@@ -170,31 +161,25 @@ void add_clip(const Path& file, const TaskResult& numbers, NaturalClips& clips) 
 
 Result<NaturalClips> read_natural_clips(const NaturalOptions& options, TaskRunner& tasks,
                                         const ReadProgress& progress) {
-  const auto measure = Measure::of(options);
-  if (!measure) return std::unexpected(measure.error());
+  const auto measure = TRY(Measure::of(options));
   NaturalClips clips;
-  auto own = (*measure)(options.clip);
-  if (!own) return std::unexpected(own.error());
-  clips.clip = std::move(*own);
-  const auto files = files_of(options.corpus, *measure);
-  if (!files) return std::unexpected(files.error());
-  for (std::size_t first = 0; first < files->size(); first += kBatch) {
+  clips.clip = TRY(measure(options.clip));
+  const auto files = TRY(files_of(options.corpus, measure));
+  for (std::size_t first = 0; first < files.size(); first += kBatch) {
     const auto task = [&](std::size_t i) {
-      return numbers_of((*files)[first + i], options.clip, *measure);
+      return numbers_of(files[first + i], options.clip, measure);
     };
     const auto found =
-        tasks.run(std::min(kBatch, files->size() - first), task, [&](std::size_t done) {
-          const auto share = static_cast<double>(first + done) / static_cast<double>(files->size());
+        tasks.run(std::min(kBatch, files.size() - first), task, [&](std::size_t done) {
+          const auto share = static_cast<double>(first + done) / static_cast<double>(files.size());
           return !progress || progress(share);
         });
     if (!found) return fail("stopped");
     for (std::size_t i = 0; i < found->size(); ++i) {
-      add_clip((*files)[first + i], (*found)[i], clips);
+      add_clip(files[first + i], (*found)[i], clips);
     }
   }
-  if (auto enough = check_enough(clips, options.corpus); !enough) {
-    return std::unexpected(enough.error());
-  }
+  TRY(check_enough(clips, options.corpus));
   return clips;
 }
 

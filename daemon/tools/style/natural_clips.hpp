@@ -34,10 +34,9 @@ struct NaturalClips {
 using ReadProgress = std::function<bool(double fraction)>;
 
 // Every file of the corpus is a task. Errors: the clip itself cannot be measured, a part of the
-// folder cannot be read, it has no clips, fewer than natural::kLeastClips can be compared with, or
+// folder cannot be read, it has no clips, fewer than natural::kMinClips can be compared with, or
 // a stop. Clips with other joints, too short ones and the clip itself are left out.
-[[nodiscard]] Result<NaturalClips> read_natural_clips(const NaturalOptions& options,
-                                                      TaskRunner& tasks,
-                                                      const ReadProgress& progress);
+Result<NaturalClips> read_natural_clips(const NaturalOptions& options, TaskRunner& tasks,
+                                        const ReadProgress& progress);
 
 }  // namespace posed::tools

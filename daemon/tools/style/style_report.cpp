@@ -43,8 +43,7 @@ struct StyleCycles {
 class CycleFigures {
  public:
   // `clip`: whose bones are drawn. It has frames.
-  [[nodiscard]] static Result<CycleFigures> make(const clip::Clip& clip,
-                                                 const motion::PoseSpaceSpec& spec);
+  static Result<CycleFigures> make(const clip::Clip& clip, const motion::PoseSpaceSpec& spec);
 
   [[nodiscard]] report::Figure poses(const StyleCycles& cycles) const;
   [[nodiscard]] report::Figure paths(const StyleCycles& cycles) const;
@@ -120,22 +119,20 @@ CycleFigures::CycleFigures(motion::PoseSpaceSpec spec, motion::PoseSpace space, 
     : spec_(std::move(spec)), space_(std::move(space)), base_(base), shape_(std::move(skeleton)) {}
 
 Result<CycleFigures> CycleFigures::make(const clip::Clip& clip, const motion::PoseSpaceSpec& spec) {
-  auto motion = motion::motion_of(clip);
-  if (!motion) return std::unexpected(motion.error());
-  if (motion::begins_with_added_pose(*motion)) motion::drop_first_frame(*motion);
-  auto space = motion::PoseSpace::bind(spec, *motion->skeleton);
-  if (!space) return std::unexpected(space.error());
-  Frame base = motion->frames[motion->frames.size() / 2];
+  auto motion = TRY(motion::motion_of(clip));
+  if (motion::begins_with_added_pose(motion)) motion::drop_first_frame(motion);
+  auto space = TRY(motion::PoseSpace::bind(spec, *motion.skeleton));
+  Frame base = motion.frames[motion.frames.size() / 2];
   double height_m = 0.0;
-  for (const Frame& frame : motion->frames) {
-    height_m += static_cast<double>(frame.root_position_m[1]) / motion->size();
+  for (const Frame& frame : motion.frames) {
+    height_m += static_cast<double>(frame.root_position_m[1]) / motion.size();
   }
   base.root_position_m = {0.0F, static_cast<float>(height_m), 0.0F};
-  return CycleFigures(spec, std::move(*space), base, motion->skeleton);
+  return CycleFigures(spec, std::move(space), base, motion.skeleton);
 }
 
 picture::Figure CycleFigures::pose(const VectorXd& q) const {
-  const auto dims = static_cast<std::size_t>(space_.dims());
+  const std::size_t dims = space_.dims();
   std::vector<float> now(dims);
   std::vector<float> change(dims);
   std::vector<std::uint8_t> available(dims);
@@ -191,7 +188,7 @@ report::Figure CycleFigures::residuals(const StyleCycles& cycles) const {
   joints.reserve(spec_.joints.size());
   for (const std::string& name : spec_.joints) joints.push_back({name, 0.0, 0.0});
   for (int d = 0; d < space_.dims(); ++d) {
-    report::JointResidual& joint = joints[static_cast<std::size_t>(space_.joint_of_dim(d))];
+    report::JointResidual& joint = joints[space_.joint_of_dim(d)];
     joint.before_deg += (cycles.source.col(d) - cycles.target.col(d)).squaredNorm();
     joint.after_deg += (cycles.styled.col(d) - cycles.target.col(d)).squaredNorm();
   }
@@ -228,7 +225,7 @@ report::StyleMap map_of_style_points(const style::Dataset& dataset, const std::s
   }
   MatrixXd rows(std::ssize(subjects), subjects.front()->xi.size());
   for (Eigen::Index i = 0; i < rows.rows(); ++i) {
-    rows.row(i) = subjects[static_cast<std::size_t>(i)]->xi.transpose();
+    rows.row(i) = subjects[i]->xi.transpose();
   }
   report::StyleMap map = map_of(rows, 1.0);
   for (std::size_t i = 0; i < subjects.size(); ++i) {
@@ -253,8 +250,7 @@ report::StyleMap map_of_cycles(const style::Dataset& dataset, const std::string&
   }
   MatrixXd rows(std::ssize(clips), kReportPhases * dataset.dims());
   for (Eigen::Index i = 0; i < rows.rows(); ++i) {
-    rows.row(i) =
-        cycle_points(takes[clips[static_cast<std::size_t>(i)]].coefficients).reshaped().transpose();
+    rows.row(i) = cycle_points(takes[clips[i]].coefficients).reshaped().transpose();
   }
   const double joints = static_cast<double>(dataset.spec.joints.size());
   report::StyleMap map = map_of(rows, kDegrees / std::sqrt(kReportPhases * joints));
@@ -450,18 +446,15 @@ Result<std::pair<motion::PoseSpaceSpec, StyleCycles>> cycles_of(const EvaluatedC
   const std::vector<style::TrainingClip> all{{clips.source, "source", "walker", "walk"},
                                              {clips.styled, "styled", "walker", "walk"},
                                              {clips.target, "target", "walker", "walk"}};
-  auto dataset = style::make_dataset(all, {"target"}, how);
-  if (!dataset) return std::unexpected(dataset.error());
-  if (auto aligned = style::align(*dataset, how); !aligned) {
-    return std::unexpected(aligned.error());
-  }
-  const auto takes = style::clip_cycles(*dataset);
+  auto dataset = TRY(style::make_dataset(all, {"target"}, how));
+  TRY(style::align(dataset, how));
+  const auto takes = style::clip_cycles(dataset);
   StyleCycles cycles{.source_name = file_of(clips.source),
                      .target_name = file_of(clips.target),
                      .source = cycle_points(takes[0].coefficients),
                      .styled = cycle_points(takes[1].coefficients),
                      .target = cycle_points(takes[2].coefficients)};
-  return std::pair{dataset->spec, std::move(cycles)};
+  return std::pair{dataset.spec, std::move(cycles)};
 }
 
 // A bar for each value.
@@ -475,11 +468,9 @@ report::Figure bars_of(const std::vector<std::pair<std::string, double>>& values
 
 Result<> write_eval_style_report(const StyleEvaluation& evaluation, const EvaluatedClips& clips,
                                  const std::filesystem::path& path) {
-  const auto measured = cycles_of(clips);
-  if (!measured) return std::unexpected(measured.error());
-  const auto& [spec, cycles] = *measured;
-  const auto drawn = CycleFigures::make(clips.source, spec);
-  if (!drawn) return std::unexpected(drawn.error());
+  const auto measured = TRY(cycles_of(clips));
+  const auto& [spec, cycles] = measured;
+  const auto drawn = TRY(CycleFigures::make(clips.source, spec));
   report::Page page("Evaluation of a style",
                     "posed eval style, " + cycles.source_name + " towards " + cycles.target_name);
   page.verdict(evaluation.verdict, evaluation.helps);
@@ -494,9 +485,9 @@ Result<> write_eval_style_report(const StyleEvaluation& evaluation, const Evalua
                     .series = {"distance"},
                     .groups = {},
                     .digits = 3}));
-  page.add(drawn->poses(cycles));
-  page.add(drawn->paths(cycles));
-  page.add(drawn->residuals(cycles));
+  page.add(drawn.poses(cycles));
+  page.add(drawn.paths(cycles));
+  page.add(drawn.residuals(cycles));
   page.section("The feet");
   page.add(bars_of(evaluation.slides_cm_s, "How standing feet slide",
                    "A standing foot of a real walk hardly moves; a styled bar much longer than the "

@@ -25,8 +25,8 @@ class StyleReport {
   void look(const style::Findings& findings);
 
   // `verdict`: of the training; `mode`: its name; `findings`: what `--json` prints.
-  [[nodiscard]] Result<> write(const style::TrainingVerdict& verdict, const std::string& mode,
-                               const Findings& findings, const std::filesystem::path& path) const;
+  Result<> write(const style::TrainingVerdict& verdict, const std::string& mode,
+                 const Findings& findings, const std::filesystem::path& path) const;
 
  private:
   void add_map(const style::Findings& findings);
@@ -54,8 +54,7 @@ struct StyleEvaluation {
   std::vector<std::pair<std::string, double>> distances;    // of the mean cycle, over the source's
   std::vector<std::pair<std::string, double>> slides_cm_s;  // speed of standing feet
 };
-[[nodiscard]] Result<> write_eval_style_report(const StyleEvaluation& evaluation,
-                                               const EvaluatedClips& clips,
-                                               const std::filesystem::path& path);
+Result<> write_eval_style_report(const StyleEvaluation& evaluation, const EvaluatedClips& clips,
+                                 const std::filesystem::path& path);
 
 }  // namespace posed::tools

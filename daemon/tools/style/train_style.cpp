@@ -82,9 +82,7 @@ Result<Experiment> clips_of(const TrainStyleOptions& options) {
   for (const std::string& file : options.from) {
     experiment.clips.push_back(named_clip(file, "from", motion));
   }
-  if (auto added = add_target_clips(options.to, motion, experiment); !added) {
-    return std::unexpected(added.error());
-  }
+  TRY(add_target_clips(options.to, motion, experiment));
   return experiment;
 }
 
@@ -92,29 +90,24 @@ Result<Experiment> clips_of(const TrainStyleOptions& options) {
 Result<Experiment> experiment_of(const TrainStyleOptions& options) {
   std::optional<motion::Space> space;
   if (options.pose_space) {
-    const auto named = motion::space_from_name(*options.pose_space);
-    if (!named) return std::unexpected(named.error());
-    space = *named;
+    space = TRY(motion::space_from_name(*options.pose_space));
   }
   std::optional<style::TrainMode> mode;
   if (options.mode) {
-    const auto named = style::mode_from_name(*options.mode);
-    if (!named) return std::unexpected(named.error());
-    mode = *named;
+    mode = TRY(style::mode_from_name(*options.mode));
   }
-  auto experiment = clips_of(options);
-  if (!experiment) return experiment;
-  experiment->space = space.value_or(experiment->space);
-  experiment->mode = mode.value_or(experiment->mode);
-  experiment->rate_hz = options.rate_hz.value_or(experiment->rate_hz);
+  auto experiment = TRY(clips_of(options));
+  experiment.space = space.value_or(experiment.space);
+  experiment.mode = mode.value_or(experiment.mode);
+  experiment.rate_hz = options.rate_hz.value_or(experiment.rate_hz);
   if (options.skeleton.empty()) return experiment;
   const auto has_skeleton_file = [](const ExperimentClip& clip) {
     return clip::accepts(clip.file, clip::ReadOption::kSkeleton);
   };
-  if (std::ranges::none_of(experiment->clips, has_skeleton_file)) {
+  if (std::ranges::none_of(experiment.clips, has_skeleton_file)) {
     return misuse("--skeleton is only for AMC clips; leave it out");
   }
-  experiment->asf = options.skeleton;
+  experiment.asf = options.skeleton;
   return experiment;
 }
 
@@ -163,19 +156,17 @@ double overall(std::string_view step, double fraction) {
 }
 
 Result<StyleTraining> train_style(const TrainStyleOptions& options, Ranks& ranks) {
-  auto experiment = experiment_of(options);
-  if (!experiment) return std::unexpected(experiment.error());
-  const auto inputs = inputs_of(options, *experiment);
+  auto experiment = TRY(experiment_of(options));
+  const auto inputs = inputs_of(options, experiment);
   if (ranks.leads()) {
-    const auto ok = OutputFiles(options.overwrite)
-                        .reads_all(inputs)
-                        .writes_any_but_other(options.out, {".style"})
-                        .writes(options.report, {".html"})
-                        .check();
-    if (!ok) return std::unexpected(ok.error());
+    TRY(OutputFiles(options.overwrite)
+            .reads_all(inputs)
+            .writes_any_but_other(options.out, {".style"})
+            .writes(options.report, {".html"})
+            .check());
   }
-  if (auto same = ranks.check_same(inputs); !same) return std::unexpected(same.error());
-  return train_and_save(*experiment, options.seed,
+  TRY(ranks.check_same(inputs));
+  return train_and_save(experiment, options.seed,
                         {.model = options.out, .force = options.force, .report = options.report},
                         ranks);
 }
@@ -187,9 +178,8 @@ Result<StyleTraining> train_and_save(const Experiment& experiment, std::uint64_t
   const FixedProducts fixed;
   ProgressBar bar;
   if (!bar.show("reading clips", 0.0)) return fail("stopped");
-  auto clips = load_clips(experiment);
-  if (!clips) return std::unexpected(clips.error());
-  StyleReport page(*clips);
+  auto clips = TRY(load_clips(experiment));
+  StyleReport page(clips);
   const bool reports = !files.report.empty() && ranks.leads();
   StyleTraining training;
   Findings summary;
@@ -209,24 +199,21 @@ Result<StyleTraining> train_and_save(const Experiment& experiment, std::uint64_t
     training.verdict = learnt.verdict;
     add_summary(learnt, summary);
   };
-  auto model = style::train_style(*clips, options);
-  if (!model) return std::unexpected(model.error());
+  auto model = TRY(style::train_style(clips, options));
   training.written = training.verdict.usable || files.force;
   if (training.written) {
-    auto saved = ranks.write_model([&] { return style::save_model(*model, files.model); });
-    if (!saved) return std::unexpected(saved.error());
+    TRY(ranks.write_model([&] { return style::save_model(model, files.model); }));
   }
   training.seconds = bar.elapsed_s();
   const std::string mode = experiment.mode == style::TrainMode::kPaper ? "paper" : "default";
-  training.findings.add_json(model->report_json)
+  training.findings.add_json(model.report_json)
       .add("mode", mode)
       .add("written", training.written)
       .add("seconds", training.seconds)
       .add("out", files.model.string())
       .add_all(summary);
   if (reports) {
-    auto drawn = page.write(training.verdict, mode, training.findings, files.report);
-    if (!drawn) return std::unexpected(drawn.error());
+    TRY(page.write(training.verdict, mode, training.findings, files.report));
   }
   return training;
 }

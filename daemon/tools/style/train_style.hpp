@@ -27,7 +27,7 @@ struct StyleTraining {
 
 // Reads the experiment's clips, trains and writes the model. Draws progress on stderr; Ctrl-C ends
 // it with an error and without a file. `ranks` share the work; one of them writes.
-[[nodiscard]] Result<StyleTraining> train_and_save(const Experiment& experiment, std::uint64_t seed,
-                                                   const StyleFiles& files, Ranks& ranks);
+Result<StyleTraining> train_and_save(const Experiment& experiment, std::uint64_t seed,
+                                     const StyleFiles& files, Ranks& ranks);
 
 }  // namespace posed::tools

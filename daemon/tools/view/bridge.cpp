@@ -129,9 +129,8 @@ Result<boost::asio::ip::address> address_of(const std::string& text) {
 }  // namespace
 
 Result<bool> is_loopback_address(const std::string& address) {
-  const auto parsed = address_of(address);
-  if (!parsed) return std::unexpected(parsed.error());
-  return parsed->is_loopback();
+  const auto parsed = TRY(address_of(address));
+  return parsed.is_loopback();
 }
 
 // In the order in which they need each other: connections of pages live in the io_context's
@@ -139,26 +138,21 @@ Result<bool> is_loopback_address(const std::string& address) {
 class Bridge::Parts {
  public:
   static Result<std::unique_ptr<Parts>> open(const BridgeOptions& options) {
-    auto page = PageFiles::load(options.page);
-    if (!page) return std::unexpected(page.error());
-    auto context = net::open_context();
-    if (!context) return std::unexpected(context.error());
+    auto page = TRY(PageFiles::load(options.page));
+    auto context = TRY(net::open_context());
     std::unique_ptr<Parts> parts(
-        new Parts(std::move(*context), {.files = std::move(*page), .token = random_token()},
+        new Parts(std::move(context), {.files = std::move(page), .token = random_token()},
                   {.version = POSED_VERSION,
                    .connect = options.link.connect,
                    .same_machine = net::is_loopback(options.link.connect)}));
-    auto link = DaemonLink::open(parts->io_, parts->context_.get(), options.link, parts->hub_);
-    if (!link) return std::unexpected(link.error());
-    parts->link_ = std::move(*link);
-    const auto address = address_of(options.address);
-    if (!address) return std::unexpected(address.error());
-    auto server = http::Server::open(parts->io_, parts->connections_,
-                                     {.at = {*address, options.port},
-                                      .or_any = options.or_any_port,
-                                      .advice = "choose another port (--port 0: any free one)"});
-    if (!server) return std::unexpected(server.error());
-    parts->server_ = std::move(*server);
+    parts->link_ =
+        TRY(DaemonLink::open(parts->io_, parts->context_.get(), options.link, parts->hub_));
+    const auto address = TRY(address_of(options.address));
+    parts->server_ =
+        TRY(http::Server::open(parts->io_, parts->connections_,
+                               {.at = {address, options.port},
+                                .or_any = options.or_any_port,
+                                .advice = "choose another port (--port 0: any free one)"}));
     parts->room_.site.hosts = parts->server_->hosts();
     parts->url_ = parts->server_->url() + "?token=" + parts->room_.site.token;
     return parts;
@@ -220,10 +214,9 @@ class Bridge::Parts {
 };
 
 Result<std::unique_ptr<Bridge>> Bridge::start(const BridgeOptions& options) {
-  auto parts = Parts::open(options);
-  if (!parts) return std::unexpected(parts.error());
-  (*parts)->start();
-  return std::unique_ptr<Bridge>(new Bridge(std::move(*parts)));
+  auto parts = TRY(Parts::open(options));
+  parts->start();
+  return std::unique_ptr<Bridge>(new Bridge(std::move(parts)));
 }
 
 Bridge::Bridge(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}

@@ -90,7 +90,7 @@ struct BridgeOptions {
 };
 
 // Whether an address is this machine's own, which no other machine reaches.
-[[nodiscard]] Result<bool> is_loopback_address(const std::string& address);
+Result<bool> is_loopback_address(const std::string& address);
 
 // Bridge: what `posed view` runs. A thread of its own serves the page over HTTP, passes on what a
 // daemon publishes to every open page at that page's pace, and the pages' requests to the daemon.
@@ -98,7 +98,7 @@ struct BridgeOptions {
 class Bridge {
  public:
   // Reads the page, listens and connects in the background.
-  [[nodiscard]] static Result<std::unique_ptr<Bridge>> start(const BridgeOptions& options);
+  static Result<std::unique_ptr<Bridge>> start(const BridgeOptions& options);
   // Ends the thread; open pages see their connection end.
   ~Bridge();
   Bridge(const Bridge&) = delete;

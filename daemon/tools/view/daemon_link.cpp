@@ -31,15 +31,14 @@ Result<std::unique_ptr<WatchedSocket>> WatchedSocket::open(boost::asio::io_conte
                                                            const link::Peer& peer,
                                                            std::function<bool()> drain) {
   auto socket =
-      link::DaemonSocket::open(context, type, peer, {.only_connected = type == ZMQ_DEALER});
-  if (!socket) return std::unexpected(socket.error());
+      TRY(link::DaemonSocket::open(context, type, peer, {.only_connected = type == ZMQ_DEALER}));
   int fd = -1;
   std::size_t size = sizeof fd;
-  if (zmq_getsockopt(socket->get(), ZMQ_FD, &fd, &size) != 0) {
+  if (zmq_getsockopt(socket.get(), ZMQ_FD, &fd, &size) != 0) {
     return fail("the bridge cannot wait for its connection to the daemon");
   }
   return std::unique_ptr<WatchedSocket>(
-      new WatchedSocket(std::move(*socket), io, fd, std::move(drain)));
+      new WatchedSocket(std::move(socket), io, fd, std::move(drain)));
 }
 
 WatchedSocket::WatchedSocket(link::DaemonSocket socket, boost::asio::io_context& io, int fd,
@@ -83,24 +82,23 @@ Result<std::unique_ptr<DaemonLink>> DaemonLink::open(boost::asio::io_context& io
   hub.daemon_is({.alive = false,
                  .sentence = "waiting for the daemon at " + options.publish.endpoint +
                              "; is `posed run` going, and is this its publish endpoint?"});
-  if (auto opened = link->open_publish(); !opened) return std::unexpected(opened.error());
+  TRY(link->open_publish());
   if (!options.read_only_reason.empty()) {
     hub.control_is({.may = false, .reason = options.read_only_reason});
     return link;
   }
-  if (auto opened = link->open_control(); !opened) return std::unexpected(opened.error());
+  TRY(link->open_control());
   return link;
 }
 
 Result<> DaemonLink::open_publish() {
-  auto socket = WatchedSocket::open(io_, context_, ZMQ_SUB, options_.publish,
-                                    [this] { return receive_messages(); });
-  if (!socket) return std::unexpected(socket.error());
+  auto socket = TRY(WatchedSocket::open(io_, context_, ZMQ_SUB, options_.publish,
+                                        [this] { return receive_messages(); }));
   publish_again_ns_.reset();
-  publish_ = std::move(*socket);
+  publish_ = std::move(socket);
   publish_ends_ = 0;
   for (const char* prefix : kAlways) {
-    if (auto set = subscribe(prefix, true); !set) return set;
+    TRY(subscribe(prefix, true));
   }
   if (std::exchange(wants_streams_, false)) want_streams(true);
   publish_->turn_soon();
@@ -110,12 +108,11 @@ Result<> DaemonLink::open_publish() {
 Result<> DaemonLink::open_control() {
   link::Peer peer = options_.publish;
   peer.endpoint = options_.control;
-  auto socket =
-      WatchedSocket::open(io_, context_, ZMQ_DEALER, peer, [this] { return receive_replies(); });
-  if (!socket) return std::unexpected(socket.error());
+  auto socket = TRY(
+      WatchedSocket::open(io_, context_, ZMQ_DEALER, peer, [this] { return receive_replies(); }));
   control_again_ns_.reset();
   asked_ns_.reset();
-  control_ = std::move(*socket);
+  control_ = std::move(socket);
   control_ends_ = 0;
   control_stood_ = false;
   control_->turn_soon();

@@ -30,10 +30,9 @@ struct LinkOptions {
 class WatchedSocket {
  public:
   // `drain` reads what waits and returns false if more may wait.
-  [[nodiscard]] static Result<std::unique_ptr<WatchedSocket>> open(boost::asio::io_context& io,
-                                                                   void* context, int type,
-                                                                   const link::Peer& peer,
-                                                                   std::function<bool()> drain);
+  static Result<std::unique_ptr<WatchedSocket>> open(boost::asio::io_context& io, void* context,
+                                                     int type, const link::Peer& peer,
+                                                     std::function<bool()> drain);
   ~WatchedSocket();
   WatchedSocket(const WatchedSocket&) = delete;
   WatchedSocket& operator=(const WatchedSocket&) = delete;
@@ -60,10 +59,8 @@ class WatchedSocket {
 class DaemonLink {
  public:
   // `io`, `context` and `hub` outlive the link.
-  [[nodiscard]] static Result<std::unique_ptr<DaemonLink>> open(boost::asio::io_context& io,
-                                                                void* context,
-                                                                const LinkOptions& options,
-                                                                Hub& hub);
+  static Result<std::unique_ptr<DaemonLink>> open(boost::asio::io_context& io, void* context,
+                                                  const LinkOptions& options, Hub& hub);
 
   // Whether poses, samples and events are wanted, because a page is open.
   void want_streams(bool wanted);
@@ -75,9 +72,9 @@ class DaemonLink {
  private:
   DaemonLink(boost::asio::io_context& io, void* context, const LinkOptions& options, Hub& hub)
       : io_(io), context_(context), options_(options), hub_(hub) {}
-  [[nodiscard]] Result<> open_publish();
-  [[nodiscard]] Result<> open_control();
-  [[nodiscard]] Result<> subscribe(const char* prefix, bool on);
+  Result<> open_publish();
+  Result<> open_control();
+  Result<> subscribe(const char* prefix, bool on);
   [[nodiscard]] bool receive_messages();
   [[nodiscard]] bool receive_replies();
   void handle_news(std::int64_t now_ns);

@@ -73,8 +73,8 @@ Result<PageRequest> read_request(std::string_view bytes) {
 }
 
 Bytes with_topic(std::string_view topic, std::string_view body) {
-  constexpr std::size_t kLongestTopic = 255;
-  topic = topic.substr(0, kLongestTopic);
+  constexpr std::size_t kMaxTopicBytes = 255;
+  topic = topic.substr(0, kMaxTopicBytes);
   std::string bytes;
   bytes.reserve(1 + topic.size() + body.size());
   bytes += static_cast<char>(topic.size());
@@ -220,11 +220,11 @@ void Hub::receive(std::string_view topic, std::string_view body, std::int64_t no
     stats_ = with_topic(topic, body);
     for (Tab* tab : tabs_) tab->outbox.put_newest(topic, stats_);
   } else {
-    hear_stream(topic, body, now_ns);
+    receive_stream(topic, body, now_ns);
   }
 }
 
-void Hub::hear_stream(std::string_view topic, std::string_view body, std::int64_t now_ns) {
+void Hub::receive_stream(std::string_view topic, std::string_view body, std::int64_t now_ns) {
   const auto slash = topic.find('/');
   const bool skeleton = topic.starts_with(kSkeleton);
   const bool event = topic.starts_with("event/");
@@ -243,7 +243,7 @@ void Hub::hear_stream(std::string_view topic, std::string_view body, std::int64_
     }
     known = streams_.emplace(std::string(name), Stream{}).first;
   }
-  known->second.heard_ns = now_ns;
+  known->second.received_ns = now_ns;
   if (tabs_.empty() && !skeleton) return;
   Bytes bytes = with_topic(topic, body);
   if (skeleton) {
@@ -310,7 +310,7 @@ void Hub::expire(std::int64_t now_ns) {
     asked.tab->wake();
   }
   std::erase_if(streams_, [&](const auto& entry) {
-    if (now_ns - entry.second.heard_ns < kGone_ns) return false;
+    if (now_ns - entry.second.received_ns < kGone_ns) return false;
     forget(entry.first);
     return true;
   });

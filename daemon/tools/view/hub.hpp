@@ -42,7 +42,7 @@ struct PageRequest {
 };
 
 // An Error if there is not even a number.
-[[nodiscard]] Result<PageRequest> read_request(std::string_view bytes);
+Result<PageRequest> read_request(std::string_view bytes);
 
 // What the daemon published: the length of the topic, the topic, the body. The topic has at most
 // 255 bytes.
@@ -130,7 +130,7 @@ class Hub {
 
  private:
   struct Stream {
-    std::int64_t heard_ns = 0;
+    std::int64_t received_ns = 0;
     Bytes skeleton{};              // with its topic; null: none yet
     std::int64_t skeleton_ns = 0;  // when it came last
   };
@@ -144,7 +144,7 @@ class Hub {
   [[nodiscard]] std::string reason_against(const Tab& tab, const PageRequest& asked,
                                            std::int64_t now_ns) const;
   void note_upload(Tab& tab, const v1::ControlRequest& request, std::int64_t now_ns);
-  void hear_stream(std::string_view topic, std::string_view body, std::int64_t now_ns);
+  void receive_stream(std::string_view topic, std::string_view body, std::int64_t now_ns);
   void send_to_all(const Parcel& parcel);
   void forget(std::string_view stream);
 

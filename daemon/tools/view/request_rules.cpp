@@ -61,9 +61,9 @@ Result<PageFiles> PageFiles::load(const fs::path& folder) {
     }
     std::error_code gone;  // since the folder was listed
     if (at->is_symlink(gone) || !at->is_regular_file(gone)) continue;
-    auto read = load_file(at->path(), {.what = "file of the page", .max_bytes = kMaxPageBytes});
-    if (!read) return std::unexpected(read.error());
-    bytes += read->size();
+    auto read =
+        TRY(load_file(at->path(), {.what = "file of the page", .max_bytes = kMaxPageBytes}));
+    bytes += read.size();
     if (page.files_.size() == kMaxPageFiles || bytes > kMaxPageBytes) {
       return fail(fmt::format("the folder of the page has more than {} files or {} MB; name the"
                               " folder that `./run page` makes",
@@ -72,8 +72,8 @@ Result<PageFiles> PageFiles::load(const fs::path& folder) {
     }
     std::string name = "/" + at->path().lexically_relative(folder).generic_string();
     const std::string_view type = type_of_name(name);
-    std::string etag = etag_of(*read);
-    page.files_.emplace(std::move(name), PageFile{std::move(*read), type, std::move(etag)});
+    std::string etag = etag_of(read);
+    page.files_.emplace(std::move(name), PageFile{std::move(read), type, std::move(etag)});
   }
   if (error) return fail("the folder of the page cannot be read: " + error.message(), folder);
   if (page.find("/") == nullptr) {

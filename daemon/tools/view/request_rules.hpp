@@ -31,7 +31,7 @@ class PageFiles {
  public:
   // Reads all regular files below `folder` whose names do not begin with a dot; links are not
   // followed. An Error says whether index.html is missing or there is too much in the folder.
-  [[nodiscard]] static Result<PageFiles> load(const std::filesystem::path& folder);
+  static Result<PageFiles> load(const std::filesystem::path& folder);
 
   // The file of a target without its query, such as "/page.js"; "/" is index.html. Null: there is
   // none. Valid as long as this object.

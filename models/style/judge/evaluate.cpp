@@ -65,14 +65,10 @@ Result<motion::PoseSpaceSpec> space_about(const motion::PoseSpaceSpec& model_spa
                                           const motion::Motion& target) {
   motion::PoseSpaceSpec spec = model_space;
   if (spec.space == motion::Space::kNative) {
-    auto native = motion::describe_space(spec.space, *target.skeleton);
-    if (!native) return native;
-    spec = std::move(*native);
+    spec = TRY(motion::describe_space(spec.space, *target.skeleton));
   }
   const motion::Motion* of_target[] = {&target};
-  if (auto set = motion::set_mean_rotations(of_target, spec); !set) {
-    return std::unexpected(set.error());
-  }
+  TRY(motion::set_mean_rotations(of_target, spec));
   return spec;
 }
 
@@ -87,35 +83,29 @@ double jerk(const MatrixXd& q) {
 
 Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& styled,
                                   const clip::Clip& target, const motion::PoseSpaceSpec& space) {
-  auto target_motion = motion::motion_of(target);
-  if (!target_motion) return std::unexpected(target_motion.error());
-  if (motion::begins_with_added_pose(*target_motion)) motion::drop_first_frame(*target_motion);
-  const auto spec = space_about(space, *target_motion);
+  auto target_motion = TRY(motion::motion_of(target));
+  if (motion::begins_with_added_pose(target_motion)) motion::drop_first_frame(target_motion);
+  const auto spec = space_about(space, target_motion);
   if (!spec) return fail(spec.error().message, target.path);
-  const auto goal = view_of(*target_motion, *spec, target.path);
-  if (!goal) return std::unexpected(goal.error());
-  auto source_motion = motion::motion_of(source);
-  if (!source_motion) return std::unexpected(source_motion.error());
-  auto styled_motion = motion::motion_of(styled);
-  if (!styled_motion) return std::unexpected(styled_motion.error());
-  if (motion::begins_with_added_pose(*source_motion)) {  // then the styled copy does, too
-    motion::drop_first_frame(*source_motion);
-    motion::drop_first_frame(*styled_motion);
+  const auto goal = TRY(view_of(target_motion, *spec, target.path));
+  auto source_motion = TRY(motion::motion_of(source));
+  auto styled_motion = TRY(motion::motion_of(styled));
+  if (motion::begins_with_added_pose(source_motion)) {  // then the styled copy does, too
+    motion::drop_first_frame(source_motion);
+    motion::drop_first_frame(styled_motion);
   }
-  const auto before = view_of(*source_motion, *spec, source.path);
-  if (!before) return std::unexpected(before.error());
-  const auto after = view_of(*styled_motion, *spec, styled.path);
-  if (!after) return std::unexpected(after.error());
+  const auto before = TRY(view_of(source_motion, *spec, source.path));
+  const auto after = TRY(view_of(styled_motion, *spec, styled.path));
 
   const MatrixXd grid = grid_basis();
-  const MatrixXd goal_coefficients = goal->coefficients();
+  const MatrixXd goal_coefficients = goal.coefficients();
   const MatrixXd goal_cycle = grid * goal_coefficients;
   const auto at = [&](const View& view) {
     return MatrixXd(harmonic_basis(view.phase, kCycleHarmonics) * goal_coefficients);
   };
   StyleScore score;
-  const double apart = rms(grid * before->coefficients() - goal_cycle);
-  const double source_jerk = jerk(before->q);
+  const double apart = rms(grid * before.coefficients() - goal_cycle);
+  const double source_jerk = jerk(before.q);
   if (!(source_jerk > 0.0)) {
     return fail("the source does not move; give a clip of a walk", source.path);
   }
@@ -125,20 +115,20 @@ Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& st
         "give a target in another style",
         target.path);
   }
-  score.cycle_ratio = rms(grid * after->coefficients() - goal_cycle) / apart;
-  score.ratio = rms(after->q - at(*after)) / rms(before->q - at(*before));
-  score.jerk_ratio = jerk(after->q) / source_jerk;
-  score.component_rms_deg = rms(after->q - before->q) / kDegree;
+  score.cycle_ratio = rms(grid * after.coefficients() - goal_cycle) / apart;
+  score.ratio = rms(after.q - at(after)) / rms(before.q - at(before));
+  score.jerk_ratio = jerk(after.q) / source_jerk;
+  score.component_rms_deg = rms(after.q - before.q) / kDegree;
   score.source_component_rms_deg = apart / kDegree;
-  score.source_period_s = before->period_s;
-  score.target_period_s = goal->period_s;
-  score.slide_m_s = {.source = feet::slide_m_s(*source_motion, *source_motion),
-                     .styled = feet::slide_m_s(*source_motion, *styled_motion),
-                     .target = feet::slide_m_s(*target_motion, *target_motion)};
-  score.root_speed_m_s = {.source = feet::root_speed_m_s(*source_motion, before->period_s),
-                          .styled = feet::root_speed_m_s(*styled_motion, before->period_s),
-                          .target = feet::root_speed_m_s(*target_motion, goal->period_s)};
-  score.sink_m = feet::sink_m(*source_motion, *styled_motion);
+  score.source_period_s = before.period_s;
+  score.target_period_s = goal.period_s;
+  score.slide_m_s = {.source = feet::slide_m_s(source_motion, source_motion),
+                     .styled = feet::slide_m_s(source_motion, styled_motion),
+                     .target = feet::slide_m_s(target_motion, target_motion)};
+  score.root_speed_m_s = {.source = feet::root_speed_m_s(source_motion, before.period_s),
+                          .styled = feet::root_speed_m_s(styled_motion, before.period_s),
+                          .target = feet::root_speed_m_s(target_motion, goal.period_s)};
+  score.sink_m = feet::sink_m(source_motion, styled_motion);
   return score;
 }
 

@@ -37,8 +37,8 @@ struct StyleScore {
 // like the target is an error, because the ratios divide by the difference between source and
 // target. The poses are compared in `space`, the model's own; in the native space over all joints
 // of the target, which the source must have. The error names the joints that a clip lacks.
-[[nodiscard]] Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& styled,
-                                                const clip::Clip& target,
-                                                const motion::PoseSpaceSpec& space = {});
+Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& styled,
+                                  const clip::Clip& target,
+                                  const motion::PoseSpaceSpec& space = {});
 
 }  // namespace posed::style

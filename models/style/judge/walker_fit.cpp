@@ -24,17 +24,16 @@ MatrixXd evenly_taken(const MatrixXd& rows) {
 
 Result<WalkerFit> fit_of_walker(const StyleModel& model, const std::string& model_name,
                                 const clip::Clip& clip) {
-  auto motion = motion::motion_of(clip);
-  if (!motion) return std::unexpected(motion.error());
-  if (motion::begins_with_added_pose(*motion)) motion::drop_first_frame(*motion);
-  const auto space = motion::PoseSpace::bind(model.space, *motion->skeleton);
+  auto motion = TRY(motion::motion_of(clip));
+  if (motion::begins_with_added_pose(motion)) motion::drop_first_frame(motion);
+  const auto space = motion::PoseSpace::bind(model.space, *motion.skeleton);
   if (!space) {
     Error error = space.error();
     if (error.file.empty()) error.file = model_name;
     return std::unexpected(std::move(error));
   }
   const MatrixXd q =
-      evenly_taken(motion::pose_vectors(*motion, *space, motion::walk_heading_rad(*motion)));
+      evenly_taken(motion::pose_vectors(motion, *space, motion::walk_heading_rad(motion)));
   if (q.cols() != model.process.inputs.cols()) {
     return fail("the model's parts do not fit each other", model_name);
   }

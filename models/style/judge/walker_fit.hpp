@@ -27,9 +27,8 @@ struct WalkerFit {
 };
 
 // Returns the same errors as apply_to_clip(). `model_name` is for errors.
-[[nodiscard]] Result<WalkerFit> fit_of_walker(const StyleModel& model,
-                                              const std::string& model_name,
-                                              const clip::Clip& clip);
+Result<WalkerFit> fit_of_walker(const StyleModel& model, const std::string& model_name,
+                                const clip::Clip& clip);
 
 // A copy of the model, of one style, that gives the same change for every pose, that is, a constant
 // offset.

@@ -90,8 +90,7 @@ class RootWriter {
   static Result<RootWriter> open(clip::Clip& clip) {
     RootWriter writer(clip);
     const Skeleton& skeleton = *clip.skeleton;
-    for (int j = skeleton.root_joint; j >= 0;
-         j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
+    for (int j = skeleton.root_joint; j >= 0; j = skeleton.joints[j].parent) {
       std::size_t count = 0;
       for (std::size_t c = 0; c < skeleton.channels.size(); ++c) {
         const Channel& channel = skeleton.channels[c];
@@ -109,9 +108,8 @@ class RootWriter {
   void write(int row, const Frame& frame, const Eigen::Vector3d& offset_m) {
     const Skeleton& skeleton = *clip_.skeleton;
     Eigen::Quaterniond parent = Eigen::Quaterniond::Identity();
-    for (int j = skeleton.joints[static_cast<std::size_t>(joint_)].parent; j >= 0;
-         j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
-      parent = to_eigen_double(frame.rotation_xyzw[static_cast<std::size_t>(j)]) * parent;
+    for (int j = skeleton.joints[joint_].parent; j >= 0; j = skeleton.joints[j].parent) {
+      parent = to_eigen_double(frame.rotation_xyzw[j]) * parent;
     }
     const Eigen::Vector3d local_m = parent.conjugate() * offset_m;
     for (std::size_t i = 0; i < 3; ++i) {
@@ -162,15 +160,14 @@ class ChannelWriter {
 
 Result<Walker> measure_walker(const StyleModel& model, const std::string& model_name,
                               const clip::Clip& clip) {
-  if (auto sound = check_clip(clip); !sound) return std::unexpected(sound.error());
-  const auto bound = bind_model(model, *clip.skeleton, model_name);
-  if (!bound) return std::unexpected(bound.error());
-  if (!(*bound)->known) {
+  TRY(check_clip(clip));
+  const auto bound = TRY(bind_model(model, *clip.skeleton, model_name));
+  if (!bound->known) {
     return fail("the model has no data for a warm-up: train it again with this version of posed",
                 model_name);
   }
-  StyleFilter filter(bound->get(), {.alpha = 0.0});
-  settle(filter, clip, settled_heading_rad(clip, (*bound)->space));
+  StyleFilter filter(bound.get(), {.alpha = 0.0});
+  settle(filter, clip, settled_heading_rad(clip, bound->space));
   const double seconds = (clip.frames() - 1.5) / clip.frame_rate_hz;  // ends at the last frame
   Catch ignored;
   for (int i = 0; i < clip.frames(); ++i) {
@@ -187,22 +184,20 @@ Result<Walker> measure_walker(const StyleModel& model, const std::string& model_
 
 Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_name,
                               const clip::Clip& clip, const ApplyOptions& options) {
-  if (auto sound = check_clip(clip); !sound) return std::unexpected(sound.error());
-  const auto bound = bind_model(model, *clip.skeleton, model_name);
-  if (!bound) return std::unexpected(bound.error());
-  const BoundModel& ready = **bound;
+  TRY(check_clip(clip));
+  const auto bound = TRY(bind_model(model, *clip.skeleton, model_name));
+  const BoundModel& ready = *bound;
   StyleFilter filter(&ready, options.filter);
   if (options.walker) filter.set_walker(*options.walker);
   if (!options.cold) settle(filter, clip, settled_heading_rad(clip, ready.space));
 
-  auto feet = feet_stage(clip, options);
-  if (!feet) return std::unexpected(feet.error());
+  auto feet = TRY(feet_stage(clip, options));
   Applied applied{.clip = clip::is_acclaim(*clip.skeleton) ? clip::with_zyx_channels(clip) : clip};
   ChannelWriter writer(applied.clip);
   auto root = RootWriter::open(applied.clip);
   if (options.feet && !root) return std::unexpected(root.error());
   motion::TurnSum turned;
-  ThroughFeet out(std::move(*feet));
+  ThroughFeet out(std::move(feet));
   double gates = 0.0;
   double estimates = 0.0;
   int estimated = 0;

@@ -40,13 +40,13 @@ struct Applied {
 // The walker's own neutral pose and cadence by a warm-up over the whole clip (README.md,
 // "Warm-up"). Returns the errors of apply_to_clip(), and one for a model without data for it and
 // for a clip that shows no walk.
-[[nodiscard]] Result<Walker> measure_walker(const StyleModel& model, const std::string& model_name,
-                                            const clip::Clip& clip);
+Result<Walker> measure_walker(const StyleModel& model, const std::string& model_name,
+                              const clip::Clip& clip);
 
 // Returns an error for a clip without frames or with a value that is not finite, and for a skeleton
 // that lacks joints of the model or, with `feet`, has no leg or no position channels; the error
 // names what is missing. `model_name` is for errors.
-[[nodiscard]] Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_name,
-                                            const clip::Clip& clip, const ApplyOptions& options);
+Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_name,
+                              const clip::Clip& clip, const ApplyOptions& options);
 
 }  // namespace posed::style

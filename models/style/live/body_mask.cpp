@@ -40,17 +40,16 @@ bool set_part(Mask& mask, std::string_view name, double factor) {
   }
   const auto* const found = std::ranges::find(kNames, name);
   if (found == kNames.end()) return false;
-  mask[static_cast<std::size_t>(found - kNames.begin())] = factor;
+  mask[found - kNames.begin()] = factor;
   return true;
 }
 
 }  // namespace
 
 Result<Mask> mask_of(std::string_view text) {
-  const auto numbers = parse_named_numbers(text, "mask", 1.0);
-  if (!numbers) return std::unexpected(numbers.error());
+  const auto numbers = TRY(parse_named_numbers(text, "mask", 1.0));
   Mask mask = whole_body();
-  for (const NamedNumber& one : *numbers) {
+  for (const NamedNumber& one : numbers) {
     if (set_part(mask, one.name, one.number)) continue;
     std::string known;
     for (const Pair& pair : kPairs) known += std::string(pair.name) + ", ";
@@ -61,8 +60,7 @@ Result<Mask> mask_of(std::string_view text) {
   return mask;
 }
 
-// RT-safe
-void describe_mask(const Mask& mask, ShortText& text) noexcept {
+RT_SAFE void describe_mask(const Mask& mask, ShortText& text) noexcept {
   bool first = true;
   for (std::size_t p = 0; p < kBodyParts; ++p) {
     if (mask[p] == 1.0) continue;
@@ -80,8 +78,8 @@ void describe_mask(const Mask& mask, ShortText& text) noexcept {
 }
 
 BodyPart part_of_joint(const Skeleton& skeleton, int joint) {
-  for (int j = joint; j >= 0; j = skeleton.joints[static_cast<std::size_t>(j)].parent) {
-    const auto bone = skeleton.joints[static_cast<std::size_t>(j)].bone;
+  for (int j = joint; j >= 0; j = skeleton.joints[j].parent) {
+    const auto bone = skeleton.joints[j].bone;
     if (bone) return part_of_bone(*bone);
   }
   return BodyPart::kTrunk;
@@ -89,15 +87,14 @@ BodyPart part_of_joint(const Skeleton& skeleton, int joint) {
 
 std::vector<BodyPart> parts_of(const motion::PoseSpace& space) {
   std::vector<BodyPart> parts;
-  parts.reserve(static_cast<std::size_t>(space.dims()));
+  parts.reserve(space.dims());
   for (int d = 0; d < space.dims(); ++d) {
     parts.push_back(part_of_joint(space.skeleton(), space.skeleton_joint_of_dim(d)));
   }
   return parts;
 }
 
-// RT-safe
-void BodyMask::move(double step) noexcept {
+RT_SAFE void BodyMask::move(double step) noexcept {
   for (std::size_t p = 0; p < kBodyParts; ++p) {
     now_[p] += std::clamp(target_[p] - now_[p], -step, step);
   }

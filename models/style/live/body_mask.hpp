@@ -23,10 +23,10 @@ using Mask = std::array<double, kBodyParts>;  // by BodyPart
 
 // What people write: "arms=0.5,head=0"; a part that is not named has 1. "arms" and "legs" are both
 // sides. The error lists the parts that there are. Cold.
-[[nodiscard]] Result<Mask> mask_of(std::string_view text);
+Result<Mask> mask_of(std::string_view text);
 
-// The parts that differ from 1, as text; "whole body" if none does. RT-safe.
-void describe_mask(const Mask& mask, ShortText& text) noexcept;
+// The parts that differ from 1, as text; "whole body" if none does.
+RT_SAFE void describe_mask(const Mask& mask, ShortText& text) noexcept;
 
 [[nodiscard]] BodyPart part_of_joint(const Skeleton& skeleton, int joint);
 // The part of each dimension of q. Cold.

@@ -50,9 +50,7 @@ Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
     if (error.file.empty()) error.file = name;
     return std::unexpected(std::move(error));
   }
-  if (auto fits = check_fit(model, space->dims(), name); !fits) {
-    return std::unexpected(fits.error());
-  }
+  TRY(check_fit(model, space->dims(), name));
   std::vector<gp::Function> more;
   more.reserve(model.more.size());
   for (const MoreStyle& style : model.more) more.push_back(style.function);

@@ -39,8 +39,7 @@ struct BoundModel final : StageModel {
 
 // Returns an error for a skeleton that lacks joints of the model's pose space (it names them) and
 // for a model whose parts do not fit each other.
-[[nodiscard]] Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
-                                                                   const Skeleton& skeleton,
-                                                                   std::string name);
+Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
+                                                     const Skeleton& skeleton, std::string name);
 
 }  // namespace posed::style

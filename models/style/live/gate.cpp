@@ -30,10 +30,9 @@ double rise(double value, double low, double high) noexcept {
 
 }  // namespace
 
-// RT-safe
-void Gate::update(const TrainedMotion* known, bool on, const Frame& frame, std::span<const float> q,
-                  std::span<const std::uint8_t> available, const std::optional<Walker>& walker,
-                  double dt_s) noexcept {
+RT_SAFE void Gate::update(const TrainedMotion* known, bool on, const Frame& frame,
+                          std::span<const float> q, std::span<const std::uint8_t> available,
+                          const std::optional<Walker>& walker, double dt_s) noexcept {
   wanted_ = 1.0;
   if (known != nullptr) {
     see_pose(*known, q, available, walker.has_value(), dt_s);
@@ -45,9 +44,9 @@ void Gate::update(const TrainedMotion* known, bool on, const Frame& frame, std::
   follow(dt_s);
 }
 
-// RT-safe
-void Gate::see_pose(const TrainedMotion& known, std::span<const float> q,
-                    std::span<const std::uint8_t> available, bool is_own, double dt_s) noexcept {
+RT_SAFE void Gate::see_pose(const TrainedMotion& known, std::span<const float> q,
+                            std::span<const std::uint8_t> available, bool is_own,
+                            double dt_s) noexcept {
   speed_.update(known, q, available, dt_s);
   const double distance_deg = known.distance_deg(q, available);
   if (std::isnan(distance_deg)) return;
@@ -56,9 +55,9 @@ void Gate::see_pose(const TrainedMotion& known, std::span<const float> q,
   of_near_pose_ = 1.0 - rise(distance_deg, kSame_deg, kOther_deg);
 }
 
-// How far the legs stride as in training; all the way where that cannot be told. RT-safe
-void Gate::see_legs(const TrainedMotion& known, const Frame& frame,
-                    const std::optional<Walker>& walker, double dt_s) noexcept {
+// How far the legs stride as in training; all the way where that cannot be told.
+RT_SAFE void Gate::see_legs(const TrainedMotion& known, const Frame& frame,
+                            const std::optional<Walker>& walker, double dt_s) noexcept {
   if (!known.legs()) of_legs_ = 1.0;
   if (!known.legs() || !known.legs()->measured(frame)) return;
   const double leg_rad = known.legs()->value_rad(frame);
@@ -87,8 +86,8 @@ void Gate::see_legs(const TrainedMotion& known, const Frame& frame,
   of_legs_ = (1.0 - rest) * of_cadence_;
 }
 
-// 1 where legs or body rest. RT-safe
-double Gate::of_rest(const TrainedMotion& known) const noexcept {
+// 1 where legs or body rest.
+RT_SAFE double Gate::of_rest(const TrainedMotion& known) const noexcept {
   const double swing =
       rise(stride_.swing_rad(), kRest * known.swing_rad(), kSwing * known.swing_rad());
   const double speed_deg_s = speed_.value_deg_s();
@@ -98,16 +97,15 @@ double Gate::of_rest(const TrainedMotion& known) const noexcept {
 
 // 1 where the legs run and did not in training: they are quicker, or the pelvis is higher while
 // they are apart. `cadence` is in shares of a usual one. The very poses of training are none of a
-// run. RT-safe
-double Gate::of_run(const TrainedMotion& known, double cadence) const noexcept {
+// run.
+RT_SAFE double Gate::of_run(const TrainedMotion& known, double cadence) const noexcept {
   const double taught = known.gait_correlation();
   const double higher = gait_.correlation() - std::max(taught, kWalk);
   if (!std::isnan(taught) && !std::isnan(higher)) cadence += kOfGait * higher;
   return rise(cadence, kFast, kTooFast) * (1.0 - of_near_pose_);
 }
 
-// RT-safe
-void Gate::follow(double dt_s) noexcept {
+RT_SAFE void Gate::follow(double dt_s) noexcept {
   const double part = -std::expm1(-dt_s / kStage_s);
   double towards = wanted_;
   for (double& stage : stage_) {
@@ -117,8 +115,7 @@ void Gate::follow(double dt_s) noexcept {
   }
 }
 
-// RT-safe
-void Gate::settle() noexcept {
+RT_SAFE void Gate::settle() noexcept {
   if (fresh_) stage_.fill(1.0);
   stride_.forget_cadence();
 }

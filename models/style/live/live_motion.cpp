@@ -9,18 +9,17 @@ namespace posed::style {
 namespace {
 constexpr double kSpeedMemory_s = 0.04;  // time constant of the low-pass
 constexpr double kMemory_s = 0.4;        // time constant of means, variances and covariance
-constexpr double kLeastSeen_s = 0.4;     // about a step
-constexpr double kLeastHeight_m = 1e-3, kLeastApart_rad = 1e-2;  // standard deviations
+constexpr double kMinSeen_s = 0.4;       // about a step
+constexpr double kMinHeight_m = 1e-3, kMinApart_rad = 1e-2;  // standard deviations
 constexpr double kSmooth_s = 0.05;  // time constant of the signal's low-pass
 constexpr double kPart_s = 0.075;   // four of them: the legs rest for less within a stride
 constexpr double kBetweenTurns_s = 0.06;
-constexpr double kLeastSpan_s = 0.3;  // for a cadence
+constexpr double kMinSpan_s = 0.3;  // for a cadence
 
 }  // namespace
 
-// RT-safe
-void PoseSpeed::update(const TrainedMotion& known, std::span<const float> q,
-                       std::span<const std::uint8_t> available, double dt_s) noexcept {
+RT_SAFE void PoseSpeed::update(const TrainedMotion& known, std::span<const float> q,
+                               std::span<const std::uint8_t> available, double dt_s) noexcept {
   const std::span<float> last(last_.data(), q.size());
   if (dims_ == q.size() && dt_s > 0.0) {
     const double speed_deg_s = known.turn_deg(last, q, available) / dt_s;
@@ -36,8 +35,8 @@ void PoseSpeed::update(const TrainedMotion& known, std::span<const float> q,
   }
 }
 
-// A mean of all at first, then one that forgets. RT-safe
-void LiveGait::update(double height_m, double leg_rad, double dt_s) noexcept {
+// A mean of all at first, then one that forgets.
+RT_SAFE void LiveGait::update(double height_m, double leg_rad, double dt_s) noexcept {
   const double apart_rad = std::abs(leg_rad);
   if (seen_s_ == 0.0) {
     height_m_ = height_m;
@@ -57,15 +56,14 @@ void LiveGait::update(double height_m, double leg_rad, double dt_s) noexcept {
 }
 
 double LiveGait::correlation() const noexcept {
-  if (seen_s_ < kLeastSeen_s || height_m2_ < kLeastHeight_m * kLeastHeight_m ||
-      apart_rad2_ < kLeastApart_rad * kLeastApart_rad) {
+  if (seen_s_ < kMinSeen_s || height_m2_ < kMinHeight_m * kMinHeight_m ||
+      apart_rad2_ < kMinApart_rad * kMinApart_rad) {
     return std::numeric_limits<double>::quiet_NaN();
   }
   return together_m_rad_ / std::sqrt(height_m2_ * apart_rad2_);
 }
 
-// RT-safe
-void LiveStride::update(double leg_rad, double dt_s, double cadence_rad_s) noexcept {
+RT_SAFE void LiveStride::update(double leg_rad, double dt_s, double cadence_rad_s) noexcept {
   if (!started_) level_rad_ = leg_rad;
   started_ = true;
   if (dt_s <= 0.0) return;
@@ -76,8 +74,7 @@ void LiveStride::update(double leg_rad, double dt_s, double cadence_rad_s) noexc
   keep_turn(dt_s);
 }
 
-// RT-safe
-void LiveStride::keep_speed(double dt_s) noexcept {
+RT_SAFE void LiveStride::keep_speed(double dt_s) noexcept {
   part_s_ += dt_s;
   if (part_s_ > kPart_s) {
     std::ranges::copy_backward(fastest_rad_.begin(), fastest_rad_.end() - 1, fastest_rad_.end());
@@ -87,8 +84,7 @@ void LiveStride::keep_speed(double dt_s) noexcept {
   fastest_rad_[0] = std::max(fastest_rad_[0], std::abs(speed_rad_));
 }
 
-// RT-safe
-void LiveStride::keep_turn(double dt_s) noexcept {
+RT_SAFE void LiveStride::keep_turn(double dt_s) noexcept {
   const double now_rad = std::atan2(-speed_rad_, level_rad_);
   angle_rad_ += std::remainder(now_rad - angle_rad_, 2.0 * std::numbers::pi);
   time_s_ += dt_s;
@@ -106,7 +102,7 @@ double LiveStride::swing_rad() const noexcept {
 double LiveStride::cadence_rad_s() const noexcept {
   const Turn& oldest = turn_[turns_ < kTurns ? 0 : turns_ % kTurns];
   const double span_s = time_s_ - oldest.time_s;
-  if (turns_ == 0 || span_s < kLeastSpan_s) return std::numeric_limits<double>::quiet_NaN();
+  if (turns_ == 0 || span_s < kMinSpan_s) return std::numeric_limits<double>::quiet_NaN();
   return (angle_rad_ - oldest.angle_rad) / span_s;
 }
 

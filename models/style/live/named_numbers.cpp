@@ -47,12 +47,11 @@ Result<std::vector<NamedNumber>> parse_named_numbers(std::string_view text, std:
       return misuse(std::string(what) + ": " + in_quotes(std::string(entry)) +
                     " is not NAME=NUMBER; write, for example, one=0.6,other=0.4");
     }
-    const auto number = number_in(trimmed(entry.substr(equals + 1)), entry, what, max);
-    if (!number) return std::unexpected(number.error());
+    const auto number = TRY(number_in(trimmed(entry.substr(equals + 1)), entry, what, max));
     if (std::ranges::find(found, name, &NamedNumber::name) != found.end()) {
       return misuse(std::string(what) + ": " + in_quotes(name) + " is named twice");
     }
-    found.push_back({name, *number});
+    found.push_back({name, number});
     if (comma == std::string_view::npos) return found;
     text.remove_prefix(comma + 1);
   }

@@ -17,8 +17,7 @@ struct NamedNumber {
 // In the order of the text; blanks around names and numbers do not count, empty text has none.
 // `what` names the text in the error: "weights". Numbers are from 0 to `max`, and no name comes
 // twice.
-[[nodiscard]] Result<std::vector<NamedNumber>> parse_named_numbers(std::string_view text,
-                                                                   std::string_view what,
-                                                                   double max);
+Result<std::vector<NamedNumber>> parse_named_numbers(std::string_view text, std::string_view what,
+                                                     double max);
 
 }  // namespace posed::style

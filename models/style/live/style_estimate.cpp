@@ -2,19 +2,20 @@
 
 #include <limits>
 
+#include "proto/frame/rt_safe.hpp"
+
 namespace posed::style {
 namespace {
 
 constexpr double kLastSecond_s = 1.0;
-constexpr double kLeastPart_s = 1.0 / 48.0;  // so that all of them fit
-constexpr double kLeastKnown_s = 0.5;
+constexpr double kMinPart_s = 1.0 / 48.0;  // so that all of them fit
+constexpr double kMinKnown_s = 0.5;
 
 }  // namespace
 
-// RT-safe
-void StyleEstimate::update(double place, double dt_s) noexcept {
+RT_SAFE void StyleEstimate::update(double place, double dt_s) noexcept {
   const auto at = [&](std::size_t i) -> Part& { return parts_[(oldest_ + i) % parts_.size()]; };
-  if (count_ == 0 || at(count_ - 1).time_s >= kLeastPart_s) at(count_++) = {};
+  if (count_ == 0 || at(count_ - 1).time_s >= kMinPart_s) at(count_++) = {};
   for (Part* const part : {&at(count_ - 1), &all_}) {
     part->sum_s += place * dt_s;
     part->time_s += dt_s;
@@ -30,7 +31,7 @@ void StyleEstimate::update(double place, double dt_s) noexcept {
 }
 
 double StyleEstimate::value() const noexcept {
-  if (all_.time_s < kLeastKnown_s) return std::numeric_limits<double>::quiet_NaN();
+  if (all_.time_s < kMinKnown_s) return std::numeric_limits<double>::quiet_NaN();
   return all_.sum_s / all_.time_s;
 }
 

@@ -27,8 +27,7 @@ bool usable(const Quatf& q) noexcept {
 }
 
 // A joint whose quaternion is not a rotation counts as not measured, whatever its flag says.
-// RT-safe.
-void drop_broken_joints(Frame& frame) noexcept {
+RT_SAFE void drop_broken_joints(Frame& frame) noexcept {
   for (std::size_t j = 0; j < frame.joint_count; ++j) {
     if (usable(frame.rotation_xyzw[j])) continue;
     frame.valid[j] = false;
@@ -55,21 +54,18 @@ StyleFilter::StyleFilter(const BoundModel* model, const FilterOptions& options) 
   mix_limits();
 }
 
-// RT-safe
-void StyleFilter::set_alpha(float alpha) noexcept {
+RT_SAFE void StyleFilter::set_alpha(float alpha) noexcept {
   if (!std::isfinite(alpha)) return;
   alpha_target_ = std::clamp(static_cast<double>(alpha), -kMaxAlpha, kMaxAlpha);
 }
 
-// RT-safe
-bool StyleFilter::set_shares(const Shares& shares) noexcept {
+RT_SAFE bool StyleFilter::set_shares(const Shares& shares) noexcept {
   if (model_ == nullptr || shares.count != model_->styles().size()) return false;
   weights_.aim(shares);
   return true;
 }
 
-// RT-safe
-const BoundModel* StyleFilter::set_model(const BoundModel* model) noexcept {
+RT_SAFE const BoundModel* StyleFilter::set_model(const BoundModel* model) noexcept {
   assert(model != nullptr);
   discontinuity_ = true;
   tracker_.exchange(model_, *model);
@@ -119,7 +115,7 @@ const StyleFilter::Table& StyleFilter::table() {
                 .default_value = 0.0,
                 .help = "measure the walker's own neutral pose so long at the start; 0: do not",
                 .min = 0.0,
-                .max = kLongestWarmUp_s}},
+                .max = kMaxWarmUp_s}},
       {.spec = {.name = "neutral",
                 .default_value = std::string(),
                 .is_path = true,
@@ -142,14 +138,12 @@ const StyleFilter::Table& StyleFilter::table() {
   return table;
 }
 
-// RT-safe
-void StyleFilter::use(const StageModel& model) noexcept {
+RT_SAFE void StyleFilter::use(const StageModel& model) noexcept {
   static_cast<void>(set_model(static_cast<const BoundModel*>(&model)));
 }
 
-// RT-safe
-void StyleFilter::describe(std::size_t index, const StageCommand& command,
-                           ShortText& text) const noexcept {
+RT_SAFE void StyleFilter::describe(std::size_t index, const StageCommand& command,
+                                   ShortText& text) const noexcept {
   if (index == kMask) describe_mask(command.as<Mask>(), text);
   if (index == kWeights && model_ != nullptr) {
     describe_shares(command.as<Shares>(), model_->styles(), text);
@@ -158,8 +152,7 @@ void StyleFilter::describe(std::size_t index, const StageCommand& command,
 
 float StyleFilter::alpha() const noexcept { return static_cast<float>(alpha_); }
 
-// RT-safe
-bool StyleFilter::command(std::size_t index, const StageCommand& command) noexcept {
+RT_SAFE bool StyleFilter::command(std::size_t index, const StageCommand& command) noexcept {
   switch (index) {
     case kWarmUp:
       return tracker_.warm_up(model_, command.as<double>());
@@ -177,29 +170,27 @@ bool StyleFilter::command(std::size_t index, const StageCommand& command) noexce
   }
 }
 
-// The constant part of the model jumps with the fallback. RT-safe
-void StyleFilter::set_gate_fallback(double value) noexcept {
+// The constant part of the model jumps with the fallback.
+RT_SAFE void StyleFilter::set_gate_fallback(double value) noexcept {
   discontinuity_ = discontinuity_ || value != options_.gate_fallback;
 }
 
-// Who shows the style already gets the rest of it. RT-safe
-double StyleFilter::wanted_alpha() const noexcept { return alpha_target_ * missing_; }
+// Who shows the style already gets the rest of it.
+RT_SAFE double StyleFilter::wanted_alpha() const noexcept { return alpha_target_ * missing_; }
 
-// While nothing is known of how much the walker shows, it stays as it was. RT-safe
-void StyleFilter::find_missing() noexcept {
-  const bool told = options_.auto_alpha && model_ != nullptr && model_->axis.size() > 0;
-  const double shown = told ? tracker_.estimate() : 0.0;
+// While nothing is known of how much the walker shows, it stays as it was.
+RT_SAFE void StyleFilter::find_missing() noexcept {
+  const bool reported = options_.auto_alpha && model_ != nullptr && model_->axis.size() > 0;
+  const double shown = reported ? tracker_.estimate() : 0.0;
   if (!std::isnan(shown)) missing_ = std::clamp(1.0 - shown, 0.0, 1.0);
 }
 
-// RT-safe
-double StyleFilter::gate() const noexcept {
+RT_SAFE double StyleFilter::gate() const noexcept {
   const bool gated = options_.gate && model_ != nullptr && model_->known;
   return gated ? static_cast<double>(tracker_.open()) : kUnknownReading;
 }
 
-// RT-safe
-double StyleFilter::reading(std::size_t reading) const noexcept {
+RT_SAFE double StyleFilter::reading(std::size_t reading) const noexcept {
   return reading == kStyleGate ? gate() : estimate();
 }
 
@@ -211,8 +202,7 @@ void StyleFilter::settle(const Frame& frame, double heading_rad) noexcept {
   heading_.settle(heading_rad, has_heading ? model_->space.heading_rad(frame) : heading_rad);
 }
 
-// RT-safe
-void StyleFilter::preview(const Frame& frame, double heading_rad, double dt_s) noexcept {
+RT_SAFE void StyleFilter::preview(const Frame& frame, double heading_rad, double dt_s) noexcept {
   if (model_ == nullptr || frame.skeleton != model_->space.skeleton().id) return;
   heading_.settle(heading_rad, heading_rad);
   gap_s_ = dt_s;
@@ -220,8 +210,7 @@ void StyleFilter::preview(const Frame& frame, double heading_rad, double dt_s) n
   static_cast<void>(read_pose(frame, dt_s, pose));
 }
 
-// RT-safe
-void StyleFilter::process(const StageFrame& in, StageOut& out) noexcept {
+RT_SAFE void StyleFilter::process(const StageFrame& in, StageOut& out) noexcept {
   Frame frame = in.frame;
   drop_broken_joints(frame);
   gap_s_ = elapsed_.next_s(frame.header);
@@ -244,17 +233,16 @@ void StyleFilter::process(const StageFrame& in, StageOut& out) noexcept {
   out.frame({.frame = frame, .variance_rad2 = in.variance_rad2, .input = in.input});
 }
 
-// What the model sees of a frame. Returns whether that has changed suddenly. RT-safe
-bool StyleFilter::read_pose(const Frame& frame, double dt_s, Pose& pose) noexcept {
-  const auto dims = static_cast<std::size_t>(model_->space.dims());
+// What the model sees of a frame. Returns whether that has changed suddenly.
+RT_SAFE bool StyleFilter::read_pose(const Frame& frame, double dt_s, Pose& pose) noexcept {
+  const std::size_t dims = model_->space.dims();
   model_->space.to_vector(frame, heading_.value_rad(), {pose.q.data(), dims},
                           {pose.available.data(), dims});
   return tracker_.see(*model_, frame, {pose.q.data(), dims}, {pose.available.data(), dims}, gap_s_,
                       dt_s, {pose.input.data(), dims});
 }
 
-// RT-safe
-void StyleFilter::style(Frame& frame, double dt_s) noexcept {
+RT_SAFE void StyleFilter::style(Frame& frame, double dt_s) noexcept {
   const motion::PoseSpace& space = model_->space;
   if (space.has_heading(frame) && heading_.update(space.heading_rad(frame), dt_s)) {
     discontinuity_ = true;
@@ -264,7 +252,7 @@ void StyleFilter::style(Frame& frame, double dt_s) noexcept {
   if (read_pose(frame, dt_s, pose)) discontinuity_ = true;
   if (alpha_ != 0.0) {
     Dims delta;
-    const auto dims = static_cast<std::size_t>(space.dims());
+    const std::size_t dims = space.dims();
     answer(pose, delta);
     space.add(frame, heading_.value_rad(), {pose.q.data(), dims}, {delta.data(), dims});
   }
@@ -275,14 +263,13 @@ void StyleFilter::style(Frame& frame, double dt_s) noexcept {
   last_out_ = frame.rotation_xyzw;
 }
 
-// Empty while the predictor has the mixture ready. RT-safe
-std::span<const float> StyleFilter::shares_to_ask() noexcept {
+// Empty while the predictor has the mixture ready.
+RT_SAFE std::span<const float> StyleFilter::shares_to_ask() noexcept {
   if (weights_.moving() || !model_->predictor.settle(weights_.shares())) return weights_.shares();
   return {};
 }
 
-// RT-safe
-void StyleFilter::mix_limits() noexcept {
+RT_SAFE void StyleFilter::mix_limits() noexcept {
   const Eigen::VectorXf& first = model_->limit_rad;
   const std::span<const float> shares = weights_.shares();
   for (Eigen::Index d = 0; d < first.size(); ++d) {
@@ -290,14 +277,14 @@ void StyleFilter::mix_limits() noexcept {
     for (std::size_t s = 1; s < shares.size(); ++s) {
       limit += shares[s] * model_->more_limits_rad[s - 1][d];
     }
-    limit_rad_[static_cast<std::size_t>(d)] = limit;
+    limit_rad_[d] = limit;
   }
 }
 
-// The model delta: alpha times the mixture of styles, gated, clamped and masked. RT-safe
-void StyleFilter::answer(const Pose& pose, Dims& delta) noexcept {
+// The model delta: alpha times the mixture of styles, gated, clamped and masked.
+RT_SAFE void StyleFilter::answer(const Pose& pose, Dims& delta) noexcept {
   const gp::Predictor& predictor = model_->predictor;
-  const auto dims = static_cast<std::size_t>(predictor.inputs());
+  const std::size_t dims = predictor.inputs();
   predictor.mean({pose.input.data(), dims}, {pose.available.data(), dims}, {delta.data(), dims},
                  shares_to_ask());
   const float open = tracker_.open();
@@ -315,8 +302,9 @@ void StyleFilter::answer(const Pose& pose, Dims& delta) noexcept {
 }
 
 // Per joint c = log(D_new^T D_old), so that R_styled exp(c) is what the old model delta would have
-// given for this frame. RT-safe
-void StyleFilter::begin_blend(const Rotations& in, const Frame& styled, double dt_s) noexcept {
+// given for this frame.
+RT_SAFE void StyleFilter::begin_blend(const Rotations& in, const Frame& styled,
+                                      double dt_s) noexcept {
   const int joints = std::min<int>(last_joints_, styled.joint_count);
   blend_weight_ = joints > 0 ? std::max(0.0, 1.0 - options_.alpha_slew_per_s * dt_s) : 0.0;
   blend_from_.fill({});
@@ -327,13 +315,11 @@ void StyleFilter::begin_blend(const Rotations& in, const Frame& styled, double d
         to_eigen_double(last_in_[j]).conjugate() * to_eigen_double(last_out_[j]);
     const Vector3d c = rotation_log(Quaterniond(new_delta.conjugate() * old_delta));
     if (c.norm() < kNoTurn_rad) continue;
-    for (int i = 0; i < 3; ++i)
-      blend_from_[j][static_cast<std::size_t>(i)] = static_cast<float>(c[i]);
+    for (int i = 0; i < 3; ++i) blend_from_[j][i] = static_cast<float>(c[i]);
   }
 }
 
-// RT-safe
-void StyleFilter::blend(Frame& styled) const noexcept {
+RT_SAFE void StyleFilter::blend(Frame& styled) const noexcept {
   if (blend_weight_ <= 0.0) return;
   for (std::size_t j = 0; j < styled.joint_count; ++j) {
     const Vec3f& c = blend_from_[j];

@@ -50,8 +50,8 @@ struct FilterOptions {
   Mask mask = whole_body();    // of the parts of the body
 };
 inline constexpr double kUsualWarmUp_s = 10.0;
-inline constexpr double kShortestWarmUp_s = 2.0;
-inline constexpr double kLongestWarmUp_s = 600.0;
+inline constexpr double kMinWarmUp_s = 2.0;
+inline constexpr double kMaxWarmUp_s = 600.0;
 inline constexpr double kMaxAlpha = 2.0;
 
 class StyleFilter final : public Stage {
@@ -61,14 +61,14 @@ class StyleFilter final : public Stage {
   StyleFilter(const BoundModel* model, const FilterOptions& options) noexcept;
 
   // Emits one frame for each frame in, with its header, quality and variance. A joint
-  // whose quaternion is not finite or has no length comes out as not measured. RT-safe.
-  void process(const StageFrame& in, StageOut& out) noexcept override;
+  // whose quaternion is not finite or has no length comes out as not measured.
+  RT_SAFE void process(const StageFrame& in, StageOut& out) noexcept override;
 
-  // All take effect at the next frame; RT-safe. Alpha is clamped to +-2; NaN is ignored. set_model
+  // All take effect at the next frame; Alpha is clamped to +-2; NaN is ignored. set_model
   // returns the old pointer, which is no longer read; `model` is not null (to switch styling off,
   // set alpha to 0). Weights stay with the names of their styles. set_shares returns false for
   // shares of another model.
-  void set_alpha(float alpha) noexcept;
+  RT_SAFE void set_alpha(float alpha) noexcept;
   [[nodiscard]] bool set_shares(const Shares& shares) noexcept;
   void set_mask(const Mask& mask) noexcept { mask_.aim(mask); }
   [[nodiscard]] const BoundModel* set_model(const BoundModel* model) noexcept;
@@ -80,10 +80,10 @@ class StyleFilter final : public Stage {
   // time.
   void preview(const Frame& frame, double heading_rad, double dt_s) noexcept;
 
-  // How much the gate passes, 0 to 1; NaN while it is off or the model has no data for it. RT-safe.
-  [[nodiscard]] double gate() const noexcept;
-  // How much of the style the walker shows already; NaN: unknown. RT-safe.
-  [[nodiscard]] double estimate() const noexcept { return tracker_.estimate(); }
+  // How much the gate passes, 0 to 1; NaN while it is off or the model has no data for it.
+  RT_SAFE [[nodiscard]] double gate() const noexcept;
+  // How much of the style the walker shows already; NaN: unknown.
+  RT_SAFE [[nodiscard]] double estimate() const noexcept { return tracker_.estimate(); }
   // Offline: the walker is known from elsewhere; what a warm-up has found.
   void set_walker(const Walker& walker) noexcept { tracker_.set_walker(walker); }
   [[nodiscard]] const std::optional<Walker>& walker() const noexcept { return tracker_.walker(); }

@@ -22,7 +22,7 @@ const BoundModel* style_of(const StageModel* model) {
 // What does not depend on the model.
 std::optional<ParameterFault> check(const Parameters& parameters, bool /*has_model*/) {
   const double seconds = parameter<double>(parameters, "warm_up_s");
-  if (seconds != 0.0 && seconds < kShortestWarmUp_s) {
+  if (seconds != 0.0 && seconds < kMinWarmUp_s) {
     return ParameterFault{
         "warm_up_s", "warm_up_s is too short to measure a walk: give at least 2, or 0 for none"};
   }
@@ -51,9 +51,8 @@ bool takes(const v1::ModelFile& file) { return file.has_style(); }
 Result<std::unique_ptr<const StageModel>> bind(std::span<const std::byte> file,
                                                const StageContext& context,
                                                const std::string& name) {
-  const auto model = parse_model(file, name);
-  if (!model) return std::unexpected(model.error());
-  return bind_model(*model, *context.skeleton, name);
+  const auto model = TRY(parse_model(file, name));
+  return bind_model(model, *context.skeleton, name);
 }
 
 // A live text comes in pieces that end at its commas.
@@ -68,16 +67,14 @@ Result<StageCommand> set_weights(const StageModel* model, std::span<const std::s
   if (model == nullptr) {
     return fail("there is no style model; send one with `posed ctl model STREAM M.style`");
   }
-  const auto shares = shares_of(joined(words), style_of(model)->styles());
-  if (!shares) return std::unexpected(shares.error());
-  return StageCommand::of(*shares);
+  const auto shares = TRY(shares_of(joined(words), style_of(model)->styles()));
+  return StageCommand::of(shares);
 }
 
 Result<StageCommand> set_mask(const StageModel* /*model*/, std::span<const std::string> words,
                               const Parameters& /*options*/) {
-  const auto mask = mask_of(joined(words));
-  if (!mask) return std::unexpected(mask.error());
-  return StageCommand::of(*mask);
+  const auto mask = TRY(mask_of(joined(words)));
+  return StageCommand::of(mask);
 }
 
 void write_numbers(std::span<const double> numbers, v1::DecisionValue& value) {
@@ -87,9 +84,9 @@ void write_numbers(std::span<const double> numbers, v1::DecisionValue& value) {
 // Numbers from 0 to 1; empty if there are none or others.
 std::vector<double> read_numbers(const v1::DecisionValue& value, std::size_t most) {
   const auto& list = value.weights().weight();
-  const bool sound = value.has_weights() && static_cast<std::size_t>(list.size()) <= most &&
+  const bool valid = value.has_weights() && static_cast<std::size_t>(list.size()) <= most &&
                      std::ranges::all_of(list, [](double n) { return n >= 0.0 && n <= 1.0; });
-  return sound ? std::vector<double>(list.begin(), list.end()) : std::vector<double>();
+  return valid ? std::vector<double>(list.begin(), list.end()) : std::vector<double>();
 }
 
 void weights_to_log(const StageCommand& command, v1::DecisionValue& value) {
@@ -155,7 +152,7 @@ void warm_up_to_log(const StageCommand& command, v1::DecisionValue& value) {
 
 std::optional<StageCommand> warm_up_from_log(const v1::DecisionValue& value) {
   const double seconds = value.number();
-  if (!(seconds >= kShortestWarmUp_s && seconds <= kLongestWarmUp_s)) return std::nullopt;
+  if (!(seconds >= kMinWarmUp_s && seconds <= kMaxWarmUp_s)) return std::nullopt;
   return StageCommand::of(seconds);
 }
 
@@ -174,8 +171,8 @@ std::vector<StageCommandType> commands() {
            .options = {{.name = "seconds",
                         .default_value = kUsualWarmUp_s,
                         .help = "how long it walks",
-                        .min = kShortestWarmUp_s,
-                        .max = kLongestWarmUp_s}},
+                        .min = kMinWarmUp_s,
+                        .max = kMaxWarmUp_s}},
            .refusal = "the model has no data for a warm-up: train it again with this version of "
                       "posed",
            .encode = warm_up,
@@ -205,13 +202,10 @@ std::vector<StageCommandType> commands() {
 // A clip of the walker's usual walk stands for a warm-up.
 Result<StageCommand> neutral_of_clip(const std::string& path, const StageModel& model,
                                      std::span<const std::byte> file) {
-  const auto style = parse_model(file, model.name);
-  if (!style) return std::unexpected(style.error());
-  const auto clip = clip::read_clip(path);
-  if (!clip) return std::unexpected(clip.error());
-  const auto walker = measure_walker(*style, model.name, *clip);
-  if (!walker) return std::unexpected(walker.error());
-  return command_of(*walker);
+  const auto style = TRY(parse_model(file, model.name));
+  const auto clip = TRY(clip::read_clip(path));
+  const auto walker = TRY(measure_walker(style, model.name, clip));
+  return command_of(walker);
 }
 
 Result<std::optional<StageType::FirstCommand>> first_command(const Parameters& parameters,
@@ -219,9 +213,8 @@ Result<std::optional<StageType::FirstCommand>> first_command(const Parameters& p
                                                              std::span<const std::byte> file) {
   const auto neutral = parameter<std::string>(parameters, "neutral");
   if (!neutral.empty() && model != nullptr) {
-    const auto command = neutral_of_clip(neutral, *model, file);
-    if (!command) return std::unexpected(command.error());
-    return StageType::FirstCommand{StyleFilter::kNeutral, *command};
+    const auto command = TRY(neutral_of_clip(neutral, *model, file));
+    return StageType::FirstCommand{StyleFilter::kNeutral, command};
   }
   const double seconds = parameter<double>(parameters, "warm_up_s");
   if (seconds == 0.0) return std::nullopt;

@@ -29,23 +29,21 @@ std::string listed_names(std::span<const std::string> names) {
 }
 
 Result<std::vector<NamedNumber>> parsed(std::string_view weights) {
-  auto numbers = parse_named_numbers(weights, "weights", kMaxWeight);
-  if (!numbers) return numbers;
+  auto numbers = TRY(parse_named_numbers(weights, "weights", kMaxWeight));
   const auto is_zero = [](const NamedNumber& one) { return one.number == 0.0; };
-  if (!numbers->empty() && std::ranges::all_of(*numbers, is_zero)) {
+  if (!numbers.empty() && std::ranges::all_of(numbers, is_zero)) {
     return misuse("weights: all are 0, so there is nothing to mix; for no style, set alpha to 0");
   }
   return numbers;
 }
 
-// Without anything in common, `count` is 0. RT-safe
-Shares renamed(const Shares& shares, std::span<const std::string> before,
-               std::span<const std::string> after) noexcept {
+// Without anything in common, `count` is 0.
+RT_SAFE Shares renamed(const Shares& shares, std::span<const std::string> before,
+                       std::span<const std::string> after) noexcept {
   Shares kept{.count = static_cast<std::uint16_t>(after.size())};
   for (std::size_t s = 0; s < shares.count; ++s) {
     const auto found = std::ranges::find(after, before[s]);
-    if (found != after.end())
-      kept.of[static_cast<std::size_t>(found - after.begin())] = shares.of[s];
+    if (found != after.end()) kept.of[found - after.begin()] = shares.of[s];
   }
   if (!(sum_of(kept) > 0.0)) return {};
   normalise(kept);
@@ -61,31 +59,28 @@ Shares first_alone(std::size_t count) noexcept {
 }
 
 Result<> check_weights(std::string_view weights) {
-  const auto numbers = parsed(weights);
-  if (!numbers) return std::unexpected(numbers.error());
+  TRY(parsed(weights));
   return {};
 }
 
 Result<Shares> shares_of(std::string_view weights, std::span<const std::string> styles) {
-  const auto numbers = parsed(weights);
-  if (!numbers) return std::unexpected(numbers.error());
-  if (numbers->empty()) return first_alone(styles.size());
+  const auto numbers = TRY(parsed(weights));
+  if (numbers.empty()) return first_alone(styles.size());
   Shares shares{.count = static_cast<std::uint16_t>(styles.size())};
-  for (const NamedNumber& one : *numbers) {
+  for (const NamedNumber& one : numbers) {
     const auto found = std::ranges::find(styles, one.name);
     if (found == styles.end()) {
       return misuse("weights: the model has no style " + in_quotes(one.name) +
                     "; it has: " + listed_names(styles));
     }
-    shares.of[static_cast<std::size_t>(found - styles.begin())] = one.number;
+    shares.of[found - styles.begin()] = one.number;
   }
   normalise(shares);
   return shares;
 }
 
-// RT-safe
-void describe_shares(const Shares& shares, std::span<const std::string> styles,
-                     ShortText& text) noexcept {
+RT_SAFE void describe_shares(const Shares& shares, std::span<const std::string> styles,
+                             ShortText& text) noexcept {
   bool first = true;
   for (std::size_t s = 0; s < std::min<std::size_t>(shares.count, styles.size()); ++s) {
     if (shares.of[s] == 0.0) continue;
@@ -101,21 +96,18 @@ void describe_shares(const Shares& shares, std::span<const std::string> styles,
   }
 }
 
-// RT-safe
-void StyleWeights::set_now(const Shares& shares) noexcept {
+RT_SAFE void StyleWeights::set_now(const Shares& shares) noexcept {
   now_ = shares;
   std::ranges::transform(now_.of, single_.begin(),
                          [](double share) { return static_cast<float>(share); });
 }
 
-// RT-safe
-void StyleWeights::begin(const Shares& shares) noexcept {
+RT_SAFE void StyleWeights::begin(const Shares& shares) noexcept {
   set_now(shares);
   target_ = shares;
 }
 
-// RT-safe
-void StyleWeights::move(double step) noexcept {
+RT_SAFE void StyleWeights::move(double step) noexcept {
   if (!moving()) return;
   double way = 0.0;
   for (std::size_t s = 0; s < now_.count; ++s) way += 0.5 * std::abs(target_.of[s] - now_.of[s]);
@@ -128,9 +120,8 @@ void StyleWeights::move(double step) noexcept {
   set_now(next);
 }
 
-// RT-safe
-void StyleWeights::rename(std::span<const std::string> before,
-                          std::span<const std::string> after) noexcept {
+RT_SAFE void StyleWeights::rename(std::span<const std::string> before,
+                                  std::span<const std::string> after) noexcept {
   const Shares now = renamed(now_, before, after);
   target_ = renamed(target_, before, after);
   if (target_.count == 0) target_ = first_alone(after.size());

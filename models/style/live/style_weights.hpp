@@ -30,14 +30,13 @@ struct Shares {
 
 // What people write, for a model with these styles: "feminine=0.6,elderly=0.4"; empty is
 // first_alone(). The error lists the styles that there are. Cold.
-[[nodiscard]] Result<Shares> shares_of(std::string_view weights,
-                                       std::span<const std::string> styles);
+Result<Shares> shares_of(std::string_view weights, std::span<const std::string> styles);
 // Whether it can be right for any model: what does not need the styles' names. Cold.
-[[nodiscard]] Result<> check_weights(std::string_view weights);
+Result<> check_weights(std::string_view weights);
 
-// Writes shares as text: "feminine=0.6,elderly=0.4". RT-safe.
-void describe_shares(const Shares& shares, std::span<const std::string> styles,
-                     ShortText& text) noexcept;
+// Writes shares as text: "feminine=0.6,elderly=0.4".
+RT_SAFE void describe_shares(const Shares& shares, std::span<const std::string> styles,
+                             ShortText& text) noexcept;
 
 // The shares of a live filter. They move in a straight line, so that at most `step` of the mixture
 // changes at once: sum |change| / 2 <= step. RT-safe.

@@ -26,7 +26,7 @@ TrainedMotion::TrainedMotion(const StyleModel& model, const Skeleton& skeleton)
       cadence_rad_s_(model.gate.strides() ? 2.0 * std::numbers::pi / model.gate.fastest_stride_s
                                           : 0.0),
       gait_correlation_(model.gate.gait_correlation),
-      root_joint_(static_cast<std::size_t>(skeleton.root_joint)) {
+      root_joint_(skeleton.root_joint) {
   if (model.gate.strides()) legs_ = motion::LegSignal::find(skeleton);
   const Eigen::MatrixXf kept = kept_poses(model.process, kPoses).cast<float>();
   const Eigen::Index blocks = (kept.rows() + kBlock - 1) / kBlock;
@@ -39,9 +39,9 @@ TrainedMotion::TrainedMotion(const StyleModel& model, const Skeleton& skeleton)
   }
 }
 
-// Of the squares' sum over the available dimensions. RT-safe
-double TrainedMotion::rms_deg(float sum_rad2,
-                              std::span<const std::uint8_t> available) const noexcept {
+// Of the squares' sum over the available dimensions.
+RT_SAFE double TrainedMotion::rms_deg(float sum_rad2,
+                                      std::span<const std::uint8_t> available) const noexcept {
   double there = 0.0;
   for (const std::uint8_t one : available) there += one != 0 ? 1.0 : 0.0;
   if (there == 0.0) return std::numeric_limits<double>::quiet_NaN();
@@ -50,25 +50,23 @@ double TrainedMotion::rms_deg(float sum_rad2,
   return std::sqrt(whole_rad2 / joints_) / kDegree;
 }
 
-// RT-safe
-double TrainedMotion::distance_deg(std::span<const float> q,
-                                   std::span<const std::uint8_t> available) const noexcept {
+RT_SAFE double TrainedMotion::distance_deg(std::span<const float> q,
+                                           std::span<const std::uint8_t> available) const noexcept {
   const auto dims = static_cast<Eigen::Index>(q.size());
   Block nearest = Block::Constant(std::numeric_limits<float>::infinity());
   for (Eigen::Index first = 0; first < poses_.cols(); first += dims) {
     Block sum = Block::Zero();
     for (Eigen::Index d = 0; d < dims; ++d) {
-      if (available[static_cast<std::size_t>(d)] == 0) continue;
-      sum += (q[static_cast<std::size_t>(d)] - poses_.col(first + d)).square();
+      if (available[d] == 0) continue;
+      sum += (q[d] - poses_.col(first + d)).square();
     }
     nearest = nearest.min(sum);
   }
   return rms_deg(nearest.minCoeff(), available);
 }
 
-// RT-safe
-double TrainedMotion::turn_deg(std::span<const float> from, std::span<const float> to,
-                               std::span<const std::uint8_t> available) const noexcept {
+RT_SAFE double TrainedMotion::turn_deg(std::span<const float> from, std::span<const float> to,
+                                       std::span<const std::uint8_t> available) const noexcept {
   float sum = 0.0F;
   for (std::size_t d = 0; d < from.size(); ++d) {
     if (available[d] != 0) sum += (to[d] - from[d]) * (to[d] - from[d]);
@@ -76,8 +74,7 @@ double TrainedMotion::turn_deg(std::span<const float> from, std::span<const floa
   return rms_deg(sum, available);
 }
 
-// RT-safe
-double TrainedMotion::height_m(const Frame& frame) const noexcept {
+RT_SAFE double TrainedMotion::height_m(const Frame& frame) const noexcept {
   return frame.valid[root_joint_] ? static_cast<double>(frame.root_position_m[1])
                                   : std::numeric_limits<double>::quiet_NaN();
 }

@@ -20,9 +20,9 @@ class TrainedMotion {
   TrainedMotion(const StyleModel& model, const Skeleton& skeleton);
 
   // From q [dims] to the nearest of the kept training poses: the rotation, rms over joints [deg].
-  // Missing dimensions count as those that are there; NaN where none is. RT-safe.
-  [[nodiscard]] double distance_deg(std::span<const float> q,
-                                    std::span<const std::uint8_t> available) const noexcept;
+  // Missing dimensions count as those that are there; NaN where none is.
+  RT_SAFE [[nodiscard]] double distance_deg(std::span<const float> q,
+                                            std::span<const std::uint8_t> available) const noexcept;
 
   // The rotation from one pose to another [dims], rms over joints [deg]; missing dimensions as
   // above.
@@ -35,8 +35,8 @@ class TrainedMotion {
   [[nodiscard]] double cadence_rad_s() const noexcept { return cadence_rad_s_; }
   // LiveGait's correlation in the training; NaN: unknown.
   [[nodiscard]] double gait_correlation() const noexcept { return gait_correlation_; }
-  // Height of the pelvis; NaN where the frame did not measure it. RT-safe.
-  [[nodiscard]] double height_m(const Frame& frame) const noexcept;
+  // Height of the pelvis; NaN where the frame did not measure it.
+  RT_SAFE [[nodiscard]] double height_m(const Frame& frame) const noexcept;
 
  private:
   [[nodiscard]] double rms_deg(float sum_rad2,

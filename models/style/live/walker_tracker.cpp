@@ -12,10 +12,9 @@ constexpr double kInterruption_s = 1.0;  // of the frames
 
 }  // namespace
 
-// RT-safe
-bool WalkerTracker::see(const BoundModel& model, const Frame& frame, std::span<const float> q,
-                        std::span<const std::uint8_t> available, double gap_s, double dt_s,
-                        std::span<float> input) noexcept {
+RT_SAFE bool WalkerTracker::see(const BoundModel& model, const Frame& frame,
+                                std::span<const float> q, std::span<const std::uint8_t> available,
+                                double gap_s, double dt_s, std::span<float> input) noexcept {
   report_missing_data(model);
   const TrainedMotion* const known = model.known ? &*model.known : nullptr;
   relate(model, q, input);
@@ -25,16 +24,15 @@ bool WalkerTracker::see(const BoundModel& model, const Frame& frame, std::span<c
   return jumped;
 }
 
-// Once a model. RT-safe
-void WalkerTracker::report_missing_data(const BoundModel& model) noexcept {
+// Once a model.
+RT_SAFE void WalkerTracker::report_missing_data(const BoundModel& model) noexcept {
   if (gate_on_ && !model.known && !std::exchange(reported_no_gate_, true)) report(kNoGateData);
   const bool no_axis = model.axis.size() == 0;
   if (auto_alpha_ && no_axis && !std::exchange(reported_no_axis_, true)) report(kNoAxis);
 }
 
-// RT-safe
-void WalkerTracker::relate(const BoundModel& model, std::span<const float> q,
-                           std::span<float> input) const noexcept {
+RT_SAFE void WalkerTracker::relate(const BoundModel& model, std::span<const float> q,
+                                   std::span<float> input) const noexcept {
   for (std::size_t d = 0; d < q.size(); ++d) {
     input[d] = q[d];
     if (!walker_ || walker_->measured[d] == 0 || model.neutral.size() == 0) continue;
@@ -42,10 +40,10 @@ void WalkerTracker::relate(const BoundModel& model, std::span<const float> q,
   }
 }
 
-// The warm-up and the estimate. Returns whether a warm-up has ended well. RT-safe
-bool WalkerTracker::measure(const BoundModel& model, std::span<const float> q,
-                            std::span<const std::uint8_t> available, double gap_s,
-                            double dt_s) noexcept {
+// The warm-up and the estimate. Returns whether a warm-up has ended well.
+RT_SAFE bool WalkerTracker::measure(const BoundModel& model, std::span<const float> q,
+                                    std::span<const std::uint8_t> available, double gap_s,
+                                    double dt_s) noexcept {
   const bool walks = gate_.strides();
   const bool all = std::ranges::all_of(available, [](std::uint8_t one) { return one != 0; });
   if (model.axis.size() > 0 && walks && all) {
@@ -70,37 +68,33 @@ bool WalkerTracker::measure(const BoundModel& model, std::span<const float> q,
   return true;
 }
 
-// Whether a walker can be known with this model. RT-safe
-bool WalkerTracker::serves(const BoundModel* model) noexcept {
+// Whether a walker can be known with this model.
+RT_SAFE bool WalkerTracker::serves(const BoundModel* model) noexcept {
   if (model == nullptr) return false;
   // No reply reaches whoever wrote the config, so it is a notice.
   if (!model->known && !std::exchange(reported_no_gate_, true)) report(kNoGateData);
   return model->known.has_value();
 }
 
-// RT-safe
-bool WalkerTracker::warm_up(const BoundModel* model, double seconds) noexcept {
+RT_SAFE bool WalkerTracker::warm_up(const BoundModel* model, double seconds) noexcept {
   if (!serves(model)) return false;
   warm_up_.begin(seconds);
   return true;
 }
 
-// RT-safe
-bool WalkerTracker::know(const BoundModel* model, const Walker& walker) noexcept {
+RT_SAFE bool WalkerTracker::know(const BoundModel* model, const Walker& walker) noexcept {
   if (!serves(model)) return false;
   warm_up_.stop();
   walker_ = walker;
   return true;
 }
 
-// RT-safe
-void WalkerTracker::interrupt() noexcept {
+RT_SAFE void WalkerTracker::interrupt() noexcept {
   if (warm_up_.running()) report(kInterrupted);
   warm_up_.stop();
 }
 
-// RT-safe
-void WalkerTracker::exchange(const BoundModel* from, const BoundModel& to) noexcept {
+RT_SAFE void WalkerTracker::exchange(const BoundModel* from, const BoundModel& to) noexcept {
   interrupt();
   estimate_.forget();
   reported_no_gate_ = false;
@@ -116,8 +110,7 @@ void WalkerTracker::exchange(const BoundModel* from, const BoundModel& to) noexc
   }
 }
 
-// RT-safe
-std::optional<StageNotice> WalkerTracker::take_notice() noexcept {
+RT_SAFE std::optional<StageNotice> WalkerTracker::take_notice() noexcept {
   if (pending_ == 0) return std::nullopt;
   const auto next = static_cast<std::size_t>(std::countr_zero(pending_));
   pending_ &= pending_ - 1;

@@ -11,11 +11,11 @@
 namespace posed::style {
 namespace {
 
-constexpr double kLeastWalked = 0.5;  // of the time
+constexpr double kMinWalked = 0.5;  // of the time
 
 constexpr double kStep_rad = 1e-4;
 constexpr std::size_t kDims = motion::kMaxPoseDims;
-constexpr double kFastest_rad_s = 1000.0;
+constexpr double kMaxSpeed_rad_s = 1000.0;
 
 // A Walker in less than half of its size.
 struct Packed {
@@ -46,8 +46,7 @@ StageCommand command_of(const Walker& walker) noexcept {
   return StageCommand::of(packed);
 }
 
-// RT-safe
-Walker walker_of(const StageCommand& command) noexcept {
+RT_SAFE Walker walker_of(const StageCommand& command) noexcept {
   const auto packed = command.as<Packed>();
   Walker walker;
   for (std::size_t d = 0; d < kDims; ++d) {
@@ -82,21 +81,20 @@ std::optional<StageCommand> walker_from_log(const v1::DecisionValue& value) {
     packed.add(d, steps);
   }
   if (walker.has_cadence_rad_s()) {
-    if (!(std::abs(walker.cadence_rad_s()) <= kFastest_rad_s)) return std::nullopt;
+    if (!(std::abs(walker.cadence_rad_s()) <= kMaxSpeed_rad_s)) return std::nullopt;
     packed.cadence_rad_s = walker.cadence_rad_s();
   }
   return StageCommand::of(packed);
 }
 
-// RT-safe
-void WarmUp::begin(double seconds) noexcept {
+RT_SAFE void WarmUp::begin(double seconds) noexcept {
   *this = {};
   seconds_ = left_s_ = seconds;
 }
 
-// RT-safe
-WarmUp::Outcome WarmUp::update(std::span<const float> q, std::span<const std::uint8_t> available,
-                               bool walks, double cadence_rad_s, double dt_s) noexcept {
+RT_SAFE WarmUp::Outcome WarmUp::update(std::span<const float> q,
+                                       std::span<const std::uint8_t> available, bool walks,
+                                       double cadence_rad_s, double dt_s) noexcept {
   if (!running()) return Outcome::kNone;
   left_s_ -= dt_s;
   if (walks) {
@@ -112,11 +110,10 @@ WarmUp::Outcome WarmUp::update(std::span<const float> q, std::span<const std::ui
     }
   }
   if (running()) return Outcome::kNone;
-  return walked_s_ >= kLeastWalked * seconds_ ? Outcome::kDone : Outcome::kStood;
+  return walked_s_ >= kMinWalked * seconds_ ? Outcome::kDone : Outcome::kStood;
 }
 
-// RT-safe
-Walker WarmUp::walker() const noexcept {
+RT_SAFE Walker WarmUp::walker() const noexcept {
   Walker walker;
   for (std::size_t d = 0; d < sum_.size(); ++d) {
     if (time_s_[d] <= 0.0) continue;

@@ -52,8 +52,7 @@ class WarmUp {
 // that is known from a clip (parameter `neutral`) replays like one that was warmed up live.
 // Rounds angles to 1e-4 rad, because a command is small. Angles are those of q, within +-pi. Cold.
 [[nodiscard]] StageCommand command_of(const Walker& walker) noexcept;
-// RT-safe.
-[[nodiscard]] Walker walker_of(const StageCommand& command) noexcept;
+RT_SAFE [[nodiscard]] Walker walker_of(const StageCommand& command) noexcept;
 
 void walker_to_log(const StageCommand& command, v1::DecisionValue& value);
 // Empty for a value that walker_to_log() cannot have written.

@@ -25,7 +25,7 @@ class Reader : public model_file::Validator {
  public:
   VectorXd vector(const google::protobuf::RepeatedField<double>& list, int size, const char* what) {
     want(list.size() == size, what);
-    if (!sound()) return {};
+    if (!valid()) return {};
     VectorXd v = Eigen::Map<const VectorXd>(list.data(), size);
     want(is_number(v), what);
     return v;
@@ -36,7 +36,7 @@ class Reader : public model_file::Validator {
                         m.columns() == static_cast<std::uint32_t>(columns) &&
                         static_cast<std::int64_t>(m.rows()) * m.columns() == m.value_size();
     want(shaped, what);
-    if (!sound()) return {};
+    if (!valid()) return {};
     MatrixXd out = Eigen::Map<const RowMajor>(m.value().data(), m.rows(), columns);
     want(is_number(out), what);
     return out;
@@ -63,7 +63,7 @@ motion::PoseSpaceSpec read_space(const v1::PoseSpace& from, Reader& reader) {
   spec.root = static_cast<int>(from.root());
   const auto means = spec.space == motion::Space::kCmu43 ? 0 : static_cast<int>(spec.joints.size());
   const VectorXd mean = reader.vector(from.mean_xyzw(), 4 * means, "the mean rotations");
-  for (int j = 0; j < means && reader.sound(); ++j) {
+  for (int j = 0; j < means && reader.valid(); ++j) {
     const Eigen::Quaterniond q(mean[4 * j + 3], mean[4 * j], mean[4 * j + 1], mean[4 * j + 2]);
     reader.want(std::abs(q.norm() - 1.0) < 1e-6, "a mean rotation, which is no unit quaternion");
     spec.mean.push_back(q);
@@ -93,7 +93,7 @@ MoreStyle read_style(const v1::StyleTarget& from, Eigen::Index points, int dims,
   reader.want(style.function.weights.rows() == points, "the number of a style's weights");
   style.function.offset = reader.vector(from.offset(), dims, "a style's prior mean");
   style.limit_rad = reader.vector(from.limit_rad(), dims, "a style's limits");
-  if (reader.sound()) reader.want((style.limit_rad.array() >= 0.0).all(), "a limit below zero");
+  if (reader.valid()) reader.want((style.limit_rad.array() >= 0.0).all(), "a limit below zero");
   return style;
 }
 
@@ -123,10 +123,10 @@ StyleModel read_model(const v1::StyleModel& from, Reader& reader) {
   const int dims = motion::space_dims(model.space);
   model.process = read_process(from.process(), dims, reader);
   model.limit_rad = reader.vector(from.limit_rad(), dims, "the limits");
-  if (reader.sound()) reader.want((model.limit_rad.array() >= 0.0).all(), "a limit below zero");
+  if (reader.valid()) reader.want((model.limit_rad.array() >= 0.0).all(), "a limit below zero");
   model.to = from.to();
   for (const v1::StyleTarget& style : from.more()) {
-    if (!reader.sound()) break;
+    if (!reader.valid()) break;
     model.more.push_back(read_style(style, model.process.inputs.rows(), dims, reader));
   }
   const auto names = model.names();
@@ -155,21 +155,19 @@ void write_vector(const VectorXd& v, google::protobuf::RepeatedField<double>& ou
 }  // namespace
 
 Result<StyleModel> parse_model(std::span<const std::byte> bytes, const std::string& name) {
-  const auto file = model_file::open(bytes, name);
-  if (!file) return std::unexpected(file.error());
-  if (!file->has_style()) {
+  const auto file = TRY(model_file::open(bytes, name));
+  if (!file.has_style()) {
     return fail("the model is not a style model; make one with `posed train style`", name);
   }
   Reader reader;
-  StyleModel model = read_model(file->style(), reader);
-  if (auto verdict = reader.verdict(name); !verdict) return std::unexpected(verdict.error());
+  StyleModel model = read_model(file.style(), reader);
+  TRY(reader.verdict(name));
   return model;
 }
 
 Result<StyleModel> load_model(const std::filesystem::path& path) {
-  const auto bytes = model_file::load(path);
-  if (!bytes) return std::unexpected(bytes.error());
-  return parse_model(std::as_bytes(std::span(*bytes)), path.string());
+  const auto bytes = TRY(model_file::load(path));
+  return parse_model(std::as_bytes(std::span(bytes)), path.string());
 }
 
 std::string serialize_model(const StyleModel& model) {

@@ -70,12 +70,11 @@ struct StyleModel {
 // The model with one style alone: the sum of all, each times its share [styles()].
 [[nodiscard]] StyleModel mixture_of(const StyleModel& model, std::span<const double> shares);
 
-[[nodiscard]] Result<StyleModel> load_model(const std::filesystem::path& path);
+Result<StyleModel> load_model(const std::filesystem::path& path);
 // Reads a model as load_model() does, from bytes (control message, device log). `name` is only for
 // error messages. Any bytes give a model or an Error, never a crash.
-[[nodiscard]] Result<StyleModel> parse_model(std::span<const std::byte> bytes,
-                                             const std::string& name);
+Result<StyleModel> parse_model(std::span<const std::byte> bytes, const std::string& name);
 [[nodiscard]] std::string serialize_model(const StyleModel& model);
-[[nodiscard]] Result<> save_model(const StyleModel& model, const std::filesystem::path& path);
+Result<> save_model(const StyleModel& model, const std::filesystem::path& path);
 
 }  // namespace posed::style

@@ -69,9 +69,7 @@ Result<std::vector<Source>> read_sources(const std::vector<TrainingClip>& clips,
                   clip.clip.path);
     }
     if (space == motion::Space::kNative && !sources.empty()) {
-      auto same =
-          check_same_figure(*sources.front().motion.skeleton, *at_rate.skeleton, clip.clip.path);
-      if (!same) return std::unexpected(same.error());
+      TRY(check_same_figure(*sources.front().motion.skeleton, *at_rate.skeleton, clip.clip.path));
     }
     const double heading_rad = motion::walk_heading_rad(at_rate);
     sources.push_back({&clip, std::move(at_rate), heading_rad, added_pose});
@@ -237,9 +235,8 @@ Result<> align_by_mgpm(Dataset& dataset, std::size_t motion, const DatasetOption
       return options.progress("aligning phases", (static_cast<double>(motion) + fraction) * share);
     };
   }
-  auto fits = mgpm_train(data, theta0, dtheta, mgpm);
-  if (!fits) return std::unexpected(fits.error());
-  const MgpmParams& best = fits->front().params;
+  auto fits = TRY(mgpm_train(data, theta0, dtheta, mgpm));
+  const MgpmParams& best = fits.front().params;
   for (int m = 0; m < std::ssize(members); ++m) {
     AlignedClip& clip = dataset.clips[members[m]];
     clip.theta0 = best.theta0[m];
@@ -251,7 +248,7 @@ Result<> align_by_mgpm(Dataset& dataset, std::size_t motion, const DatasetOption
     dataset.subjects[subjects[s]].xi = best.xi.row(s).transpose();
   }
   dataset.fitted.push_back(dataset.motions[motion]);
-  dataset.fits.push_back(std::move(fits->front()));
+  dataset.fits.push_back(std::move(fits.front()));
   dataset.states.push_back(data);
   return {};
 }
@@ -275,29 +272,23 @@ Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips,
                              const std::vector<std::string>& targets,
                              const DatasetOptions& options) {
   if (clips.empty()) return misuse("there is no clip to learn from");
-  auto sources = read_sources(clips, options.rate_hz, options.space);
-  if (!sources) return std::unexpected(sources.error());
+  auto sources = TRY(read_sources(clips, options.rate_hz, options.space));
   Dataset dataset;
   dataset.rate_hz = options.rate_hz;
-  auto spec = motion::describe_space(options.space, *sources->front().motion.skeleton);
-  if (!spec) return std::unexpected(in_clip(spec.error(), sources->front().clip->clip.path));
+  auto spec = motion::describe_space(options.space, *sources.front().motion.skeleton);
+  if (!spec) return std::unexpected(in_clip(spec.error(), sources.front().clip->clip.path));
   dataset.spec = std::move(*spec);
   // The mean rotations are those of the filter's input, that is of the sources.
   std::vector<const motion::Motion*> source_motions;
-  for (const Source& source : *sources) {
+  for (const Source& source : sources) {
     if (std::ranges::find(targets, source.clip->group) != targets.end()) continue;
     source_motions.push_back(&source.motion);
   }
-  if (auto set = motion::set_mean_rotations(source_motions, dataset.spec); !set) {
-    return std::unexpected(set.error());
-  }
-  for (const Source& source : *sources) {
-    auto q = vectors(dataset.spec, source);
-    if (!q) return std::unexpected(q.error());
-    if (auto checked = check_turns(*q, source.clip->clip.path); !checked) {
-      return std::unexpected(checked.error());
-    }
-    AlignedClip clip = aligned_clip(source, std::move(*q), options.rate_hz);
+  TRY(motion::set_mean_rotations(source_motions, dataset.spec));
+  for (const Source& source : sources) {
+    auto q = TRY(vectors(dataset.spec, source));
+    TRY(check_turns(q, source.clip->clip.path));
+    AlignedClip clip = aligned_clip(source, std::move(q), options.rate_hz);
     clip.subject = subject_index(dataset, *source.clip);
     if (std::ranges::find(dataset.motions, clip.motion) == dataset.motions.end()) {
       dataset.motions.push_back(clip.motion);
@@ -305,9 +296,7 @@ Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips,
     dataset.clips.push_back(std::move(clip));
   }
   for (const std::string& motion : dataset.motions) use_principal_component(dataset, motion);
-  if (auto followed = follow_clips(dataset, options); !followed) {
-    return std::unexpected(followed.error());
-  }
+  TRY(follow_clips(dataset, options));
   return dataset;
 }
 
@@ -317,7 +306,7 @@ Result<> align(Dataset& dataset, const DatasetOptions& options) {
     const bool legs =
         std::ranges::all_of(members, [&](int c) { return dataset.clips[c].has_legs; });
     if (options.mgpm || !legs) {
-      if (auto done = align_by_mgpm(dataset, m, options); !done) return done;
+      TRY(align_by_mgpm(dataset, m, options));
       continue;
     }
     for (const int c : members) turn_to_legs(dataset.clips[c]);

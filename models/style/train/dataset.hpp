@@ -79,13 +79,13 @@ struct Dataset {
 
 // Reads poses and strides. Phases have no common origin yet: theta0 is each clip's own leg phase.
 // The training mean of the pose space is over the clips of every group but `targets`.
-[[nodiscard]] Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips,
-                                           const std::vector<std::string>& targets,
-                                           const DatasetOptions& options);
+Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips,
+                             const std::vector<std::string>& targets,
+                             const DatasetOptions& options);
 
 // Gives all clips of a motion phases with a common origin: each clip's own strides, shifted so that
 // its leg signal peaks at phase 0. The MGPM estimates the phases of a motion with clips that name
 // no legs and, with `mgpm`, of all (README.md, "Phase alignment").
-[[nodiscard]] Result<> align(Dataset& dataset, const DatasetOptions& options);
+Result<> align(Dataset& dataset, const DatasetOptions& options);
 
 }  // namespace posed::style

@@ -22,7 +22,7 @@ MatrixXd on_grid(const std::vector<MatrixXd>& cycles) {
   const MatrixXd basis = grid_basis();
   MatrixXd poses(kGridFrames * std::ssize(cycles), cycles.front().cols());
   for (Eigen::Index i = 0; i < std::ssize(cycles); ++i) {
-    poses.middleRows(i * kGridFrames, kGridFrames) = basis * cycles[static_cast<std::size_t>(i)];
+    poses.middleRows(i * kGridFrames, kGridFrames) = basis * cycles[i];
   }
   return poses;
 }
@@ -60,10 +60,9 @@ MatrixXd grid_outputs(const Outputs& outputs) {
   const MatrixXd basis = grid_basis();
   MatrixXd Y = MatrixXd::Zero(kGridFrames * std::ssize(outputs.of_input), outputs.offset.size());
   for (Eigen::Index i = 0; i < std::ssize(outputs.of_input); ++i) {
-    const int d = outputs.of_input[static_cast<std::size_t>(i)];
+    const int d = outputs.of_input[i];
     if (d == kNoDifference) continue;
-    Y.middleRows(i * kGridFrames, kGridFrames) =
-        basis * outputs.differences[static_cast<std::size_t>(d)];
+    Y.middleRows(i * kGridFrames, kGridFrames) = basis * outputs.differences[d];
   }
   return Y;
 }
@@ -75,8 +74,8 @@ Result<gp::Trained> fit_difference(const TrainingPairs& pairs, const Kernel& ker
   const MatrixXd residual = Y.rowwise() - offset.transpose();
   const gp::Hyper hyper =
       hyper_of(kernel, residual.squaredNorm() / static_cast<double>(residual.size()));
-  return X.rows() <= kMostPoses ? gp::fit(X, Y, offset, hyper)
-                                : gp::fit_inducing(X, Y, offset, hyper, kMostPoses);
+  return X.rows() <= kMaxPoses ? gp::fit(X, Y, offset, hyper)
+                               : gp::fit_inducing(X, Y, offset, hyper, kMaxPoses);
 }
 
 Result<std::vector<gp::Trained>> fit_differences(std::span<const StylePairs> styles,
@@ -98,7 +97,7 @@ Result<std::vector<gp::Trained>> fit_differences(std::span<const StylePairs> sty
     poses = std::max(poses, function.rows.size());
   }
   return gp::fit_functions(on_grid(cycles), functions, hyper_of(kernel, squares / count),
-                           std::min(static_cast<int>(poses), kMostPoses));
+                           std::min(static_cast<int>(poses), kMaxPoses));
 }
 
 gp::Hyper paper_kernel(const MatrixXd& X, const MatrixXd& Y, const std::function<bool()>& stop) {

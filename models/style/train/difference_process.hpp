@@ -21,7 +21,7 @@ inline constexpr int kGridFrames = 28;  // points of a cycle that the process is
 [[nodiscard]] Eigen::MatrixXd grid_basis();
 
 // The most poses that a process keeps; above it they are inducing poses (models/gp/inducing.hpp).
-inline constexpr int kMostPoses = 800;
+inline constexpr int kMaxPoses = 800;
 
 inline constexpr int kNoDifference = -1;
 
@@ -70,8 +70,8 @@ struct Way {
 [[nodiscard]] Eigen::MatrixXd grid_outputs(const Outputs& outputs);
 
 // The default model: the offset as prior mean, an RBF of this length on the residual, b = 0, the
-// noise relative to the signal variance; at most kMostPoses poses.
-[[nodiscard]] Result<gp::Trained> fit_difference(const TrainingPairs& pairs, const Kernel& kernel);
+// noise relative to the signal variance; at most kMaxPoses poses.
+Result<gp::Trained> fit_difference(const TrainingPairs& pairs, const Kernel& kernel);
 
 // The training data of one of several styles in one model.
 struct StylePairs {
@@ -81,16 +81,16 @@ struct StylePairs {
 
 // Fits several styles that share kernel and poses: each is trained on its own pairs. The
 // poses are chosen among the `cycles` of all clips, as many as the largest style alone would have.
-[[nodiscard]] Result<std::vector<gp::Trained>> fit_differences(
-    std::span<const StylePairs> styles, const std::vector<Eigen::MatrixXd>& cycles,
-    const Kernel& kernel);
+Result<std::vector<gp::Trained>> fit_differences(std::span<const StylePairs> styles,
+                                                 const std::vector<Eigen::MatrixXd>& cycles,
+                                                 const Kernel& kernel);
 
 // The method of Sato et al. (--mode paper; README.md, "What differs from the paper, measured"):
 // differences Y [N x D] at the mean cycle X [N x D], all kernel values by evidence (SCG). The
 // search for them takes seconds; once `stop` (may be empty) returns true, it gives the best so far.
 [[nodiscard]] gp::Hyper paper_kernel(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
                                      const std::function<bool()>& stop = {});
-[[nodiscard]] Result<gp::Trained> fit_paper(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
-                                            const gp::Hyper& kernel);
+Result<gp::Trained> fit_paper(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
+                              const gp::Hyper& kernel);
 
 }  // namespace posed::style

@@ -63,14 +63,14 @@ double weak_first_penalty(const VectorXd& c) {
   return kFirstHarmonicPenalty * (1.0 - share);
 }
 
-bool has_stride(int frames, double rate_hz) { return frames >= kShortestStride_s * rate_hz + 1.0; }
+bool has_stride(int frames, double rate_hz) { return frames >= kMinStride_s * rate_hz + 1.0; }
 
 Stride find_stride(const VectorXd& signal, double rate_hz) {
   const auto frames = static_cast<int>(signal.size());
   assert(has_stride(frames, rate_hz));
-  const double longest = std::min(kLongestStride_s * rate_hz, static_cast<double>(frames));
+  const double longest = std::min(kMaxStride_s * rate_hz, static_cast<double>(frames));
   const double slowest = kTurn / longest;
-  const double fastest = kTurn / (kShortestStride_s * rate_hz);
+  const double fastest = kTurn / (kMinStride_s * rate_hz);
   const VectorXd centred = signal.array() - signal.mean();
   const double power = std::max(centred.squaredNorm(), 1e-300);
   Stride best;

@@ -44,7 +44,7 @@ struct Stride {
 
 // Whether `frames` at `rate_hz` can hold a stride at all.
 [[nodiscard]] bool has_stride(int frames, double rate_hz);
-inline constexpr double kShortestStride_s = 0.6;
-inline constexpr double kLongestStride_s = 1.7;
+inline constexpr double kMinStride_s = 0.6;
+inline constexpr double kMaxStride_s = 1.7;
 
 }  // namespace posed::style

@@ -20,11 +20,11 @@ using Eigen::VectorXd;
 
 constexpr std::array kNoises{1e-3, 1e-2, 1e-1};
 constexpr std::array kFirstLengths_deg{30.0, 50.0, 75.0, 100.0};
-constexpr double kWiden = 1.5;          // from one length to the next beyond the first ones
-constexpr double kShortest_deg = 10.0;  // a frame's own noise is of this size
-constexpr double kLongest_deg = 400.0;  // a straight line over all poses
-constexpr double kExplained = 1e-5;     // unexplained variance of a pose that needs no more poses
-constexpr int kFoldPoses = 320;         // enough to compare kernels; the model itself has more
+constexpr double kWiden = 1.5;            // from one length to the next beyond the first ones
+constexpr double kMinLength_deg = 10.0;   // a frame's own noise is of this size
+constexpr double kMaxLength_deg = 400.0;  // a straight line over all poses
+constexpr double kExplained = 1e-5;       // unexplained variance of a pose that needs no more poses
+constexpr int kFoldPoses = 320;           // enough to compare kernels; the model itself has more
 constexpr std::size_t kChunk = 8;  // folds a task; fixed, so that every machine has the same tasks
 constexpr double kRoundShare = 0.8;  // of the progress that is left: another round may follow
 constexpr std::size_t kNumbers = 4;  // that a task gives for a fold and a noise
@@ -118,10 +118,10 @@ class Search {
     const std::size_t total = lengths_deg.size() * chunks_.size();
     const auto found = tasks_.run(total, task, [&](std::size_t done) {
       const double share = static_cast<double>(done) / static_cast<double>(total);
-      return !progress_ || progress_(told_ + kRoundShare * share * (1.0 - told_));
+      return !progress_ || progress_(reported_ + kRoundShare * share * (1.0 - reported_));
     });
     if (!found) return false;
-    told_ += kRoundShare * (1.0 - told_);
+    reported_ += kRoundShare * (1.0 - reported_);
     for (std::size_t l = 0; l < lengths_deg.size(); ++l) {
       keep_best(lengths_deg[l], std::span(*found).subspan(l * chunks_.size(), chunks_.size()));
     }
@@ -166,7 +166,7 @@ class Search {
   const FoldProgress& progress_;
   std::vector<Chunk> chunks_;
   std::vector<MatrixXd> X_;  // of each style
-  double told_ = 0.0;        // progress at the end of the last round
+  double reported_ = 0.0;    // progress at the end of the last round
   double best_deg_ = 0.0;
   ChosenKernel best_{{}, std::numeric_limits<double>::infinity(), {}, {}};
   std::vector<TriedKernel> tried_;
@@ -196,9 +196,9 @@ std::optional<ChosenKernel> choose_kernel(std::span<const LeaveOut> styles, Task
   while (!lengths_deg.empty()) {
     if (!search.try_lengths(lengths_deg)) return std::nullopt;
     lengths_deg.clear();
-    if (search.best_deg() == shortest && shortest / kWiden >= kShortest_deg) {
+    if (search.best_deg() == shortest && shortest / kWiden >= kMinLength_deg) {
       lengths_deg.push_back(shortest /= kWiden);
-    } else if (search.best_deg() == longest && longest * kWiden <= kLongest_deg) {
+    } else if (search.best_deg() == longest && longest * kWiden <= kMaxLength_deg) {
       lengths_deg.push_back(longest *= kWiden);
     }
   }

@@ -100,9 +100,7 @@ struct MgpmFit {
 // Returns the fits of all starts, the best first; they depend on the data and the seed alone. The
 // common turn of all phases, which the likelihood leaves undetermined, is fixed by holding the
 // first clip's phase. The only error is that `progress` asked to stop.
-[[nodiscard]] Result<std::vector<MgpmFit>> mgpm_train(const MgpmData& data,
-                                                      const Eigen::VectorXd& theta0,
-                                                      const Eigen::VectorXd& dtheta,
-                                                      const MgpmOptions& options);
+Result<std::vector<MgpmFit>> mgpm_train(const MgpmData& data, const Eigen::VectorXd& theta0,
+                                        const Eigen::VectorXd& dtheta, const MgpmOptions& options);
 
 }  // namespace posed::style

@@ -28,9 +28,9 @@ std::map<Key, std::vector<int>> clips_by_person(const Dataset& dataset,
   std::map<Key, std::vector<int>> found;
   for (int i = 0; i < std::ssize(cycles); ++i) {
     if (std::ranges::find(left_out, i) != left_out.end()) continue;
-    const auto c = static_cast<std::size_t>(cycles[static_cast<std::size_t>(i)].clip);
+    const std::size_t c = cycles[i].clip;
     const AlignedClip& clip = dataset.clips[c];
-    const auto& person = dataset.subjects[static_cast<std::size_t>(clip.subject)].name;
+    const auto& person = dataset.subjects[clip.subject].name;
     found[{clip.motion, clip.group, person}].push_back(i);
   }
   return found;
@@ -59,7 +59,7 @@ MatrixXd stacked_cycles(const std::vector<ClipCycle>& cycles, const std::vector<
   const auto dims = cycles.front().coefficients.cols();
   MatrixXd rows(std::ssize(members), kGridFrames * dims);
   for (Eigen::Index i = 0; i < std::ssize(members); ++i) {
-    const auto at = static_cast<std::size_t>(members[static_cast<std::size_t>(i)]);
+    const std::size_t at = members[i];
     rows.row(i) = (grid * cycles[at].coefficients).reshaped().transpose();
   }
   return rows;
@@ -85,7 +85,7 @@ double median_distance(const MatrixXd& distances) {
 
 // 1 where source clip k may predict the partner of source clip i: not itself, and no other that
 // lies beside the same target clip, whose partner is the answer or a part of it.
-MatrixXd may_tell(const MatrixXd& places) {
+MatrixXd may_predict(const MatrixXd& places) {
   constexpr double kRounding = 1e-9;
   return ((places * places.transpose()).array() < kRounding).cast<double>();
 }
@@ -104,7 +104,7 @@ double left_out_error(const MatrixXd& weights, const MatrixXd& partners) {
 // How much clips k count for clip i, rows of sum 1; empty where one mean does as well.
 MatrixXd day_weights(const MatrixXd& sources, const MatrixXd& targets, const MatrixXd& places) {
   const MatrixXd partners = places * targets;
-  const MatrixXd others = may_tell(places);
+  const MatrixXd others = may_predict(places);
   const MatrixXd distances = distances_between(sources);
   const double median = median_distance(distances);
   double best = kWorth * left_out_error(others, partners);
@@ -126,7 +126,7 @@ MatrixXd mean_of(const std::vector<ClipCycle>& cycles, const std::vector<int>& m
   MatrixXd sum =
       MatrixXd::Zero(cycles.front().coefficients.rows(), cycles.front().coefficients.cols());
   for (Eigen::Index i = 0; i < std::ssize(members); ++i) {
-    const auto at = static_cast<std::size_t>(members[static_cast<std::size_t>(i)]);
+    const std::size_t at = members[i];
     sum += weights[i] * cycles[at].coefficients;
   }
   return sum;
@@ -155,9 +155,8 @@ std::vector<std::pair<int, MatrixXd>> day_changes(const Dataset& dataset,
     const MatrixXd mean = mean_of(cycles, targets, all * places) - mean_of(cycles, sources, all);
     for (Eigen::Index i = 0; i < std::ssize(sources); ++i) {
       const Eigen::RowVectorXd alike = weights.row(i);
-      changes.emplace_back(
-          sources[static_cast<std::size_t>(i)],
-          mean_of(cycles, targets, alike * places) - mean_of(cycles, sources, alike) - mean);
+      changes.emplace_back(sources[i], mean_of(cycles, targets, alike * places) -
+                                           mean_of(cycles, sources, alike) - mean);
     }
   }
   return changes;

@@ -21,10 +21,10 @@ constexpr double kFullTurn = 2.0 * std::numbers::pi;
 constexpr int kCadences = 40;          // candidates, 2.7 % apart
 constexpr double kWindow = 1.5;        // strides of the candidate that its window holds
 constexpr double kHop_s = 0.1;         // between windows
-constexpr int kMostSteps = 2;          // of cadence from one window to the next
+constexpr int kMaxSteps = 2;           // of cadence from one window to the next
 constexpr double kStepCost = 0.02;     // of one such step
 constexpr double kMismatchCost = 0.5;  // of phases that do not follow from one another
-constexpr double kLeastAdvance = 0.5;  // of the slowest cadence's
+constexpr double kMinAdvance = 0.5;    // of the slowest cadence's
 constexpr double kQuiet = 0.05;        // of the signal's variance: a quieter window says little
 
 // Least squares of [1, 3 harmonics] of one cadence on a window with Hann weights.
@@ -81,7 +81,7 @@ class Chain {
   [[nodiscard]] std::vector<double> phases() const {
     const std::vector<int> chosen = cheapest();
     // Where the legs show no stride the fits' phases may stand still or go back.
-    const double least = kLeastAdvance * candidates_.back().dtheta * static_cast<double>(hop_);
+    const double least = kMinAdvance * candidates_.back().dtheta * static_cast<double>(hop_);
     std::vector<double> phase{fits_[0][at(chosen[0])].phase};
     for (std::size_t k = 1; k < fits_.size(); ++k) {
       const double expected = advance(chosen[k - 1], chosen[k]);
@@ -93,7 +93,7 @@ class Chain {
   }
 
  private:
-  static std::size_t at(int i) { return static_cast<std::size_t>(i); }
+  static std::size_t at(int i) { return i; }
 
   [[nodiscard]] double advance(int from, int to) const {
     return 0.5 * static_cast<double>(hop_) *
@@ -115,8 +115,8 @@ class Chain {
       std::vector<double> next(at(count), std::numeric_limits<double>::infinity());
       auto& origin = came_from.emplace_back(at(count), 0);
       for (int to = 0; to < count; ++to) {
-        const int last = std::min(count - 1, to + kMostSteps);
-        for (int from = std::max(0, to - kMostSteps); from <= last; ++from) {
+        const int last = std::min(count - 1, to + kMaxSteps);
+        for (int from = std::max(0, to - kMaxSteps); from <= last; ++from) {
           const double sum = cost[at(from)] + step_cost(k, from, to);
           if (sum < next[at(to)]) {
             next[at(to)] = sum;
@@ -141,8 +141,8 @@ class Chain {
 };
 
 std::vector<Candidate> candidates_for(Eigen::Index frames, double rate_hz) {
-  const double shortest = kShortestStride_s * rate_hz;
-  const double longest = std::min(kLongestStride_s * rate_hz, static_cast<double>(frames));
+  const double shortest = kMinStride_s * rate_hz;
+  const double longest = std::min(kMaxStride_s * rate_hz, static_cast<double>(frames));
   std::vector<Candidate> candidates;
   for (int i = 0; i < kCadences; ++i) {
     const double period = shortest * std::pow(longest / shortest, i / (kCadences - 1.0));
@@ -157,7 +157,7 @@ VectorXd between(const std::vector<double>& at_places, Eigen::Index hop, Eigen::
                  double dtheta) {
   VectorXd phase(frames);
   for (Eigen::Index t = 0; t < frames; ++t) {
-    const auto k = static_cast<std::size_t>(t / hop);
+    const std::size_t k = t / hop;
     const auto beyond = static_cast<double>(t % hop);
     const double rate = k + 1 < at_places.size()
                             ? (at_places[k + 1] - at_places[k]) / static_cast<double>(hop)

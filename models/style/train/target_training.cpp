@@ -19,9 +19,8 @@ Result<std::vector<gp::Trained>> fit_styles(const Dataset& all, const std::vecto
                                             std::vector<TrainingPairs> pairs,
                                             const Kernel& kernel) {
   if (lessons.size() == 1) {
-    auto process = fit_difference(pairs.front(), kernel);
-    if (!process) return std::unexpected(process.error());
-    return std::vector{std::move(*process)};
+    auto process = TRY(fit_difference(pairs.front(), kernel));
+    return std::vector{std::move(process)};
   }
   std::vector<StylePairs> styles;
   styles.reserve(lessons.size());
@@ -114,9 +113,8 @@ Result<std::vector<Learnt>> learn_default(const Dataset& all, const std::vector<
                       .ways = chosen->folds[i],
                       .tried = chosen->tried});
   }
-  auto processes = fit_styles(all, lessons, std::move(pairs), chosen->kernel);
-  if (!processes) return std::unexpected(processes.error());
-  for (std::size_t i = 0; i < lessons.size(); ++i) learnt[i].process = std::move((*processes)[i]);
+  auto processes = TRY(fit_styles(all, lessons, std::move(pairs), chosen->kernel));
+  for (std::size_t i = 0; i < lessons.size(); ++i) learnt[i].process = std::move(processes[i]);
   return learnt;
 }
 
@@ -149,9 +147,8 @@ Result<std::vector<Learnt>> learn_paper(const Dataset& dataset, const std::strin
       tasks.run(1, search, [&](std::size_t /*done*/) { return !progress || progress(0.0); });
   if (!found) return training_stopped();
   auto process =
-      fit_paper(X, Y, gp::Hyper::of(Eigen::Map<const VectorXd>(found->front().data(), 4)));
-  if (!process) return std::unexpected(process.error());
-  return std::vector{Learnt{std::move(*process), Y, "evidence"}};
+      TRY(fit_paper(X, Y, gp::Hyper::of(Eigen::Map<const VectorXd>(found->front().data(), 4))));
+  return std::vector{Learnt{std::move(process), Y, "evidence"}};
 }
 
 }  // namespace posed::style

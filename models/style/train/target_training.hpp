@@ -42,15 +42,12 @@ struct Learnt {
 };
 
 // One process a lesson; they share kernel and poses.
-[[nodiscard]] Result<std::vector<Learnt>> learn_default(const Dataset& all,
-                                                        const std::vector<Lesson>& lessons,
-                                                        TaskRunner& tasks,
-                                                        const FoldProgress& progress);
+Result<std::vector<Learnt>> learn_default(const Dataset& all, const std::vector<Lesson>& lessons,
+                                          TaskRunner& tasks, const FoldProgress& progress);
 
 // The method of Sato et al. (--mode paper): mean source cycle -> difference of the mean cycles,
 // kernel values by evidence.
-[[nodiscard]] Result<std::vector<Learnt>> learn_paper(const Dataset& dataset,
-                                                      const std::string& target, TaskRunner& tasks,
-                                                      const FoldProgress& progress);
+Result<std::vector<Learnt>> learn_paper(const Dataset& dataset, const std::string& target,
+                                        TaskRunner& tasks, const FoldProgress& progress);
 
 }  // namespace posed::style

@@ -128,45 +128,37 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
     return !options.dataset.progress || options.dataset.progress(step, fraction);
   };
   const std::vector<std::string> targets = targets_of(options);
-  if (auto checked = check_targets(targets, options.mode); !checked) {
-    return std::unexpected(checked.error());
-  }
+  TRY(check_targets(targets, options.mode));
   for (const std::string& target : targets) {
-    if (auto checked = check_groups(clips, targets, target); !checked) {
-      return std::unexpected(checked.error());
-    }
+    TRY(check_groups(clips, targets, target));
   }
-  if (auto checked = check_recordings(clips); !checked) return std::unexpected(checked.error());
+  TRY(check_recordings(clips));
   if (!report_step("reading poses", 0.0)) return training_stopped();
   DatasetOptions how = options.dataset;
   how.mgpm = options.mode == TrainMode::kPaper;
-  auto dataset = make_dataset(clips, targets, how);
-  if (!dataset) return std::unexpected(dataset.error());
+  auto dataset = TRY(make_dataset(clips, targets, how));
   if (!report_step("aligning phases", 0.0)) return training_stopped();
-  if (auto aligned = align(*dataset, how); !aligned) {
-    return std::unexpected(aligned.error());
-  }
+  TRY(align(dataset, how));
   const auto progress = [&](double fraction) {
     return report_step("learning the difference", fraction);
   };
   if (!progress(0.0)) return training_stopped();
   SerialTasks serial;
   TaskRunner& tasks = how.tasks != nullptr ? *how.tasks : serial;
-  const std::vector<Lesson> lessons = lessons_of(*dataset, targets);
-  auto learnt = options.mode == TrainMode::kPaper
-                    ? learn_paper(*dataset, options.target, tasks, progress)
-                    : learn_default(*dataset, lessons, tasks, progress);
-  if (!learnt) return std::unexpected(learnt.error());
+  const std::vector<Lesson> lessons = lessons_of(dataset, targets);
+  auto learnt =
+      TRY(options.mode == TrainMode::kPaper ? learn_paper(dataset, options.target, tasks, progress)
+                                            : learn_default(dataset, lessons, tasks, progress));
 
-  const std::vector<TrainingCheck> checks = checks_of(lessons, *learnt);
+  const std::vector<TrainingCheck> checks = checks_of(lessons, learnt);
   const TrainingVerdict verdict = verdict_of(lessons, checks);
-  const Findings findings{*dataset, lessons, *learnt, checks, verdict};
+  const Findings findings{dataset, lessons, learnt, checks, verdict};
   if (options.look) options.look(findings);
   const std::string report = json_text(whole_report(findings));
-  GateData gate = gate_data_of(*dataset, targets);
+  GateData gate = gate_data_of(dataset, targets);
   StyleAxis axis;  // of a mixture there is none
-  if (targets.size() == 1) axis = style_axis_of(*dataset, options.target);
-  StyleModel model = model_of(std::move(*dataset), targets, std::move(*learnt));
+  if (targets.size() == 1) axis = style_axis_of(dataset, options.target);
+  StyleModel model = model_of(std::move(dataset), targets, std::move(learnt));
   model.report_json = report;
   model.gate = std::move(gate);
   model.axis = std::move(axis);

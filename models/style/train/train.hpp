@@ -18,7 +18,7 @@ enum class TrainMode : std::uint8_t {
   kPaper,    // Sato et al.: MGPM mean cycles, their kernel, evidence maximised by SCG
 };
 
-[[nodiscard]] Result<TrainMode> mode_from_name(std::string_view name);
+Result<TrainMode> mode_from_name(std::string_view name);
 
 struct TrainingVerdict;  // train_report.hpp
 
@@ -43,7 +43,6 @@ struct TrainOptions {
 // independently. Clips that cannot be learnt from give an error of one sentence that names the
 // clip. The report (what `train --json` prints, without the seconds) is in the model; its `usable`,
 // `problems`, `warnings` and `verdict` state whether the model is fit for use (training_check.hpp).
-[[nodiscard]] Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
-                                             const TrainOptions& options);
+Result<StyleModel> train_style(const std::vector<TrainingClip>& clips, const TrainOptions& options);
 
 }  // namespace posed::style

@@ -19,7 +19,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 // README.md, "Verdicts", says what was measured.
-constexpr double kLeastSwing_deg = 6.0;
+constexpr double kMinSwing_deg = 6.0;
 
 // What a motion of strides is called, or begins with.
 constexpr std::array<std::string_view, 5> kGaits{"walk", "run", "jog", "march", "gait"};
@@ -55,8 +55,8 @@ void measure_cycles(const Dataset& dataset, const std::string& target, TrainingC
   double scatter = 0.0;
   int companions = 0;
   for (const ClipCycle& cycle : cycles) {
-    const AlignedClip& clip = dataset.clips[static_cast<std::size_t>(cycle.clip)];
-    const std::string& person = dataset.subjects[static_cast<std::size_t>(clip.subject)].name;
+    const AlignedClip& clip = dataset.clips[cycle.clip];
+    const std::string& person = dataset.subjects[clip.subject].name;
     const double from_own = difference_squares(
         dataset,
         cycle.coefficients - group_cycle(dataset, cycles, clip.group, clip.motion, person));
@@ -87,7 +87,7 @@ double swing_deg(const VectorXd& leg) {
 // Why the clip's legs show no strides; empty where they do.
 std::string no_strides(const AlignedClip& clip) {
   const double swing = swing_deg(clip.leg);
-  if (swing < kLeastSwing_deg) {
+  if (swing < kMinSwing_deg) {
     return "the legs swing by " + with_digits(swing, 1) + " deg rms only";
   }
   if (clip.stride_score <= kNoStrides) return {};
@@ -130,8 +130,8 @@ void check_motions(const Dataset& dataset, TrainingCheck& check) {
 void check_closing(const std::string& target, TrainingCheck& check) {
   // Two clips of one style by one actor are 1.2 to 4.4 deg rms apart, styles 9.5 and more (dataset
   // 1 and 2; the table is in README.md, "Verdicts").
-  constexpr double kLeastDifference_deg = 5.0;
-  if (check.difference_deg < kLeastDifference_deg) {
+  constexpr double kMinDifference_deg = 5.0;
+  if (check.difference_deg < kMinDifference_deg) {
     check.problems.push_back("there is no difference to learn: the groups' mean cycles are " +
                              with_digits(check.difference_deg, 1) +
                              " deg rms apart, as two takes of one style are; give clips of two "

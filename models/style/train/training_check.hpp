@@ -52,6 +52,6 @@ struct TrainingCheck {
                                            const Way& way, ClosingBy closing_by);
 
 // Returns an error when two clips of different groups are the same recording.
-[[nodiscard]] Result<> check_recordings(const std::vector<TrainingClip>& clips);
+Result<> check_recordings(const std::vector<TrainingClip>& clips);
 
 }  // namespace posed::style

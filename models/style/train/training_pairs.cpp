@@ -17,11 +17,11 @@ using Eigen::VectorXd;
 using Cycles = std::vector<ClipCycle>;
 
 const AlignedClip& clip_of(const Dataset& dataset, const ClipCycle& cycle) {
-  return dataset.clips[static_cast<std::size_t>(cycle.clip)];
+  return dataset.clips[cycle.clip];
 }
 
 const std::string& person_of(const Dataset& dataset, const AlignedClip& clip) {
-  return dataset.subjects[static_cast<std::size_t>(clip.subject)].name;
+  return dataset.subjects[clip.subject].name;
 }
 
 // Everybody with a clip of this group and motion, in the clips' order.
@@ -70,7 +70,7 @@ Cycles without(const Cycles& cycles, const std::vector<int>& left_out) {
   Cycles kept;
   for (int i = 0; i < std::ssize(cycles); ++i) {
     if (std::ranges::find(left_out, i) == left_out.end()) {
-      kept.push_back(cycles[static_cast<std::size_t>(i)]);
+      kept.push_back(cycles[i]);
     }
   }
   return kept;
@@ -88,8 +88,8 @@ Fold fold_of(const Dataset& dataset, const Cycles& cycles, std::size_t asked,
              std::vector<int> left_out, const TrainingPairs& all, const std::string& target) {
   const AlignedClip& clip = clip_of(dataset, cycles[asked]);
   const auto differences = differences_of(dataset, without(cycles, left_out), target);
-  const Difference& shown = differences[static_cast<std::size_t>(index_of(differences, clip))];
-  const auto own = static_cast<std::size_t>(all.outputs.of_input[asked]);
+  const Difference& shown = differences[index_of(differences, clip)];
+  const std::size_t own = all.outputs.of_input[asked];
   Fold fold;
   fold.truth = own < differences.size() ? shown.delta : all.outputs.differences[own];
   fold.goal = goal_of(dataset, cycles, clip, shown, target);
@@ -108,7 +108,7 @@ std::vector<int> leave_out_for(const Dataset& dataset, const Cycles& cycles,
   const AlignedClip& clip = clip_of(dataset, cycles[asked]);
   std::vector<int> person;
   for (int i = 0; i < std::ssize(cycles); ++i) {
-    const AlignedClip& other = clip_of(dataset, cycles[static_cast<std::size_t>(i)]);
+    const AlignedClip& other = clip_of(dataset, cycles[i]);
     if (person_of(dataset, other) == person_of(dataset, clip)) person.push_back(i);
   }
   for (auto& left_out : {person, std::vector<int>{static_cast<int>(asked)}}) {
@@ -191,7 +191,7 @@ LeaveOut half_folds(const Dataset& dataset, const std::string& target) {
   std::vector<FoldPlan> folds;
   for (const auto& tested : halves) {
     for (const int part : tested) {
-      const auto i = static_cast<std::size_t>(part);
+      const std::size_t i = part;
       if (pairs.outputs.of_input[i] != kNoDifference) folds.push_back({i, tested});
     }
   }
@@ -203,7 +203,7 @@ LeaveOut half_folds(const Dataset& dataset, const std::string& target) {
 Cycles clip_cycles(const Dataset& dataset) {
   Cycles cycles;
   for (int c = 0; c < std::ssize(dataset.clips); ++c) {
-    const AlignedClip& clip = dataset.clips[static_cast<std::size_t>(c)];
+    const AlignedClip& clip = dataset.clips[c];
     cycles.push_back({c, fit_harmonics(clip.phase(), clip.q, kCycleHarmonics)});
   }
   return cycles;
@@ -268,8 +268,8 @@ TrainingPairs make_training_pairs(const Dataset& dataset, const Cycles& cycles,
   }
   for (auto& [clip, day] : day_changes(dataset, cycles, left_out, target)) {
     pairs.follows_days = true;
-    int& index = outputs.of_input[static_cast<std::size_t>(clip)];
-    day += outputs.differences[static_cast<std::size_t>(index)];
+    int& index = outputs.of_input[clip];
+    day += outputs.differences[index];
     index = static_cast<int>(std::ssize(outputs.differences));
     outputs.differences.push_back(std::move(day));
   }

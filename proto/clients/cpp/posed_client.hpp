@@ -75,7 +75,7 @@ inline World world_of(const Pose& pose) {
       world.position_m.push_back({});
       continue;
     }
-    const auto above = static_cast<std::size_t>(skeleton.parent(j));
+    const std::size_t above = skeleton.parent(j);
     const auto& offsets = skeleton.offset_m();
     const Vector offset{offsets[3 * j], offsets[3 * j + 1], offsets[3 * j + 2]};
     world.position_m.push_back(add(world.position_m[above], rotate(world.rotation[above], offset)));

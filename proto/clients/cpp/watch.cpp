@@ -21,7 +21,7 @@ int main(int argc, char** argv) {
       std::printf("%s %llu\n", pose->frame.stream().c_str(),
                   static_cast<unsigned long long>(pose->frame.sequence()));
       for (int j = 0; j < pose->skeleton->joint_name_size(); ++j) {
-        const auto& at = world.position_m[static_cast<std::size_t>(j)];
+        const auto& at = world.position_m[j];
         std::printf("  %s %.6f %.6f %.6f\n", pose->skeleton->joint_name(j).c_str(),
                     static_cast<double>(at[0]), static_cast<double>(at[1]),
                     static_cast<double>(at[2]));

@@ -45,9 +45,9 @@ void feed_all(Decoder& decoder, const std::vector<Bytes>& pieces, Sink& sink) {
 // A byte stream in pieces of any size; datagrams whole.
 void feed_cut(const DeviceFixture& fixture, Decoder& decoder, const std::vector<Bytes>& chunks,
               std::mt19937& random, Sink& sink) {
-  constexpr std::size_t kLongest = 300;
+  constexpr std::size_t kMaxLength = 300;
   if (fixture.datagrams) return feed_all(decoder, chunks, sink);
-  feed_in_pieces(decoder, joined(chunks), kLongest, random, sink);
+  feed_in_pieces(decoder, joined(chunks), kMaxLength, random, sink);
 }
 
 void check_same(const CollectSink& got, const CollectSink& expected) {
@@ -67,16 +67,16 @@ void check_same(const CollectSink& got, const CollectSink& expected) {
 
 // Checks all frames and samples. Device times never decrease: a repeated packet, and the first one
 // after a device restart, keep the previous time.
-void check_sound(const CollectSink& sink) {
-  bool sound = true;
+void check_valid(const CollectSink& sink) {
+  bool valid = true;
   std::int64_t before_ns = kNoTime_ns;
   for (const Frame& frame : sink.frames) {
     const std::int64_t device_ns = frame.header.device_ns;
-    sound = sound && test::is_sound(frame) && device_ns >= before_ns;
+    valid = valid && test::is_valid(frame) && device_ns >= before_ns;
     before_ns = device_ns;
   }
-  for (const Sample& sample : sink.samples) sound = sound && test::is_sound(sample);
-  CHECK(sound);
+  for (const Sample& sample : sink.samples) valid = valid && test::is_valid(sample);
+  CHECK(valid);
 }
 
 }  // namespace
@@ -106,7 +106,7 @@ TEST_CASE("a chunk is decoded at once and completely, and every loop equals the 
       CHECK(sink.samples.size() == (i + 1) * fixture.chunk_samples);
     }
     CHECK(sink.count(Outcome::kOk) == static_cast<int>(chunks.size() * fixture.chunk_packets));
-    check_sound(sink);
+    check_valid(sink);
     const std::size_t loop = fixture.loop_chunks * fixture.chunk_frames;
     for (std::size_t i = loop; i < sink.frames.size(); ++i) {
       CHECK(test::same_pose(sink.frames[i], sink.frames[i - loop]));
@@ -237,7 +237,7 @@ TEST_CASE("garbage and flipped bytes are counted, never a crash or an invalid po
       Bytes noise(random() % 3000);
       for (std::byte& byte : noise) byte = static_cast<std::byte>(random());
       feed_in_pieces(*decoder, noise, 300, random, sink);
-      check_sound(sink);
+      check_valid(sink);
       // The decoder resynchronises: of two more loops the second is decoded completely.
       feed_cut(fixture, *decoder, good, random, sink);
       sink.clear();

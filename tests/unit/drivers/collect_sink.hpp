@@ -73,7 +73,7 @@ inline bool same_values(const Sample& a, const Sample& b) {
 }
 
 // Every valid value is finite, and every valid rotation has unit length.
-inline bool is_sound(const Frame& frame) {
+inline bool is_valid(const Frame& frame) {
   for (std::size_t j = 0; j < frame.joint_count; ++j) {
     double squared = 0.0;
     for (const float x : frame.rotation_xyzw[j]) squared += static_cast<double>(x) * x;
@@ -85,7 +85,7 @@ inline bool is_sound(const Frame& frame) {
   return frame.joint_count <= kMaxJoints && frame.angle_count <= kMaxChannels;
 }
 
-inline bool is_sound(const Sample& sample) {
+inline bool is_valid(const Sample& sample) {
   for (std::size_t i = 0; i < sample.value_count; ++i) {
     if (sample.valid[i] && !std::isfinite(sample.value[i])) return false;
   }

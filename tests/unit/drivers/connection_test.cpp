@@ -74,7 +74,7 @@ TEST_CASE("every byte value crosses a port unchanged, both ways") {
   const PseudoTerminal terminal;
   Connection link = open_port(terminal);
   REQUIRE(link.write(all_bytes()));
-  CHECK(terminal.heard() == all_bytes());
+  CHECK(terminal.received() == all_bytes());
   terminal.say(all_bytes());
   const auto bytes = link.read(kPatience);
   REQUIRE(bytes);
@@ -86,7 +86,7 @@ TEST_CASE("a port takes the baud rates of gloves") {
     const PseudoTerminal terminal;
     Connection link = open_port(terminal, baud);
     REQUIRE(link.write("x"));
-    CHECK(terminal.heard() == "x");
+    CHECK(terminal.received() == "x");
   }
   TransportFactory ports;
   CHECK_FALSE(ports.serial({.port = "/dev/null", .baud = 0}));
@@ -155,14 +155,14 @@ TEST_CASE("a message that a full port took in part is completed before anything 
   std::string taken;
   while (transport->send(letters)) taken.append(letters.size(), 'a');
   if (transport->send(digit)) taken += '1';  // the kernel may have freed space meanwhile
-  std::string heard;
-  while (heard.size() < taken.size()) {
-    heard += terminal.heard();
+  std::string received;
+  while (received.size() < taken.size()) {
+    received += terminal.received();
     CHECK(transport->read(0).bytes.empty());  // read() also sends the rest
   }
-  CHECK(heard == taken);
+  CHECK(received == taken);
   REQUIRE(transport->send(digit));
-  CHECK(terminal.heard() == "1");
+  CHECK(terminal.received() == "1");
 }
 
 TEST_CASE("a message longer than the buffer is refused whole") {

@@ -11,7 +11,7 @@ using test::CollectSink;
 
 TEST_CASE("the emulated CyberGlove answers like the real one") {
   const auto emulator = emulator_of({.mask = kMask18});
-  const auto ask = [&](std::string_view text) { return text_of(tell(*emulator, text)); };
+  const auto ask = [&](std::string_view text) { return text_of(notify(*emulator, text)); };
   using namespace std::string_literals;
   CHECK(ask("?i").contains("CyberGlove"));
   CHECK(ask("?i").back() == '\0');
@@ -59,13 +59,13 @@ TEST_CASE("a CyberTouch vibrates the fingers with a force, and samples continue"
   CHECK(text_of(*bytes) == std::string("A\x03\x00\xFF\x02\x00\x04\x80", 8));
   const auto emulator = emulator_of({});
   const auto decoder = decoder_of({.hand = Side::kRight, .layout = kPlain22});
-  (void)tell(*emulator, plain_start());
+  (void)notify(*emulator, plain_start());
   CollectSink sink;
   decoder->feed(next(*emulator), 0, sink);
-  decoder->feed(tell(*emulator, text_of(*bytes)), 0, sink);
+  decoder->feed(notify(*emulator, text_of(*bytes)), 0, sink);
   decoder->feed(next(*emulator), 0, sink);
   CHECK(sink.outcomes == std::array<int, kOutcomes>{2, 0, 0, 0, 0});
-  CHECK(text_of(tell(*emulator, "?A")) == std::string("?A\xFF\0\0\0\x80\0\0", 9));
+  CHECK(text_of(notify(*emulator, "?A")) == std::string("?A\xFF\0\0\0\x80\0\0", 9));
   const auto driver = *find_driver("cyberglove");
   CHECK_FALSE(driver.glove->encode_haptics({}, {.force = {2.0F}}));
   CHECK_FALSE(driver.glove->encode_haptics({}, {.vibration_s = 1.0F}));
@@ -74,7 +74,7 @@ TEST_CASE("a CyberTouch vibrates the fingers with a force, and samples continue"
 TEST_CASE("a CyberGlove's sensor that is stuck stays where it is") {
   const auto emulator = emulator_of({.stuck_sensor = kIndexMcp, .stuck_at = 77});
   const auto decoder = decoder_of({.hand = Side::kRight, .layout = kPlain22});
-  (void)tell(*emulator, plain_start());
+  (void)notify(*emulator, plain_start());
   emulator->set_raw(some_raw());
   CollectSink sink;
   decoder->feed(next(*emulator), 0, sink);

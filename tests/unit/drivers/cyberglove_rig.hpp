@@ -30,7 +30,7 @@ inline std::unique_ptr<CyberGloveEmulator> emulator_of(EmulatorSettings settings
   return std::move(*emulator);
 }
 
-inline Emulator::Bytes tell(Emulator& emulator, std::string_view text) {
+inline Emulator::Bytes notify(Emulator& emulator, std::string_view text) {
   Emulator::Bytes answer;
   emulator.receive(std::as_bytes(std::span(text)), 0, answer);
   return answer;

@@ -40,11 +40,11 @@ class Box {
     Emulator::Bytes out;
     while (!stop_) {
       pollfd wanted{.fd = terminal_.fd(), .events = POLLIN, .revents = 0};
-      const bool heard = ::poll(&wanted, 1, 2) == 1 && (wanted.revents & POLLIN) != 0;
+      const bool received = ::poll(&wanted, 1, 2) == 1 && (wanted.revents & POLLIN) != 0;
       const std::int64_t now_ns = std::chrono::steady_clock::now().time_since_epoch().count();
       out.clear();
-      if (heard) {
-        const std::string text = terminal_.heard();
+      if (received) {
+        const std::string text = terminal_.received();
         if (emulator_) {
           emulator_->receive(std::as_bytes(std::span(text)), now_ns, out);
         } else {

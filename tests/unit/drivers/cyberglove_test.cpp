@@ -94,7 +94,7 @@ TEST_CASE("real joint angles come back from a CyberGlove's bytes on a pseudo-ter
   for (const auto& file : std::filesystem::directory_iterator(*folder)) {
     const auto emulator = emulator_of({.mask = kMask18});
     const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout, .ticks = 1920});
-    (void)tell(*emulator, "u 1\rd 1\rt 1920 1\rS");
+    (void)notify(*emulator, "u 1\rd 1\rt 1920 1\rS");
     Line line;
     for (const Raw& angles : test::read_grasp_rows(file.path())) {
       emulator->set_raw(counts_of(angles, *model));
@@ -126,7 +126,7 @@ TEST_CASE("an 18-sensor CyberGlove's distal joints are computed, a 22's are meas
     const auto emulator = emulator_of({.mask = mask});
     const auto decoder = decoder_of(
         {.hand = Side::kRight, .layout = {.mask = mask, .time = false, .status = false}});
-    (void)tell(*emulator, plain_start());
+    (void)notify(*emulator, plain_start());
     emulator->set_raw(some_raw());
     CollectSink sink;
     decoder->feed(next(*emulator), 0, sink);
@@ -178,7 +178,7 @@ TEST_CASE("a pose given to the CyberGlove's emulator comes out of the decoder, e
   for (const Side hand : {Side::kRight, Side::kLeft}) {
     const auto emulator = emulator_of({.hand = hand});
     const auto decoder = decoder_of({.hand = hand, .layout = kPlain22});
-    (void)tell(*emulator, plain_start());
+    (void)notify(*emulator, plain_start());
     // The middle finger's own spread is computed from its neighbours'.
     constexpr double kIndex = 0.2, kRing = 0.1, kBias = 0.248;
     constexpr double kMiddle = -kBias * (kIndex - kRing) / (1.0 - 2.0 * kBias);
@@ -208,7 +208,7 @@ TEST_CASE("a pose given to the CyberGlove's emulator comes out of the decoder, e
 
 TEST_CASE("an 8-bit sample is framed by length and end together") {
   const auto emulator = emulator_of({});
-  (void)tell(*emulator, plain_start());
+  (void)notify(*emulator, plain_start());
   emulator->set_raw(some_raw());  // one value is 'S'
   const Emulator::Bytes good = next(*emulator);
   REQUIRE(good.size() == 24);
@@ -252,7 +252,7 @@ TEST_CASE("a CyberGlove's time stamp crosses zero bytes and its wrap") {
   for (const std::uint32_t first : {0U, 0xFFU, 0xFFFF'FF00U, 0x0100'0000U, 0xFFFF'FFFFU}) {
     const auto emulator = emulator_of({.first_count = first});
     const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout, .ticks = 1152});
-    (void)tell(*emulator, "u 1\rd 1\rt 1152 1\rS");
+    (void)notify(*emulator, "u 1\rd 1\rt 1152 1\rS");
     CollectSink sink;
     for (int i = 0; i < 300; ++i) decoder->feed(next(*emulator), 0, sink);
     REQUIRE(sink.samples.size() == 300);
@@ -272,7 +272,7 @@ TEST_CASE("stamps with an inconsistent flag are ignored; flags may be zero") {
   const Layout layout{.mask = kMask22, .time = true, .status = true};
   const auto emulator = emulator_of({.first_count = 0x01010101});
   const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout, .ticks = 1152});
-  (void)tell(*emulator, "u 1\rd 1\rt 1152 1\rS");
+  (void)notify(*emulator, "u 1\rd 1\rt 1152 1\rS");
   auto sample = next(*emulator);
   REQUIRE(sample[23] == std::byte{0x80});
   sample[23] = std::byte{0};
@@ -301,15 +301,15 @@ TEST_CASE("a polled CyberGlove without new values repeats the last ones") {
   const Layout layout{.mode = Mode::kPoll, .mask = kMask22, .time = false, .status = false};
   const auto emulator = emulator_of({});
   const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout});
-  (void)tell(*emulator, std::string("U\0D\0", 4));
+  (void)notify(*emulator, std::string("U\0D\0", 4));
   CollectSink sink;
   emulator->set_raw(some_raw());
-  decoder->feed(tell(*emulator, "G"), 0, sink);
-  decoder->feed(tell(*emulator, "G"), 0, sink);
+  decoder->feed(notify(*emulator, "G"), 0, sink);
+  decoder->feed(notify(*emulator, "G"), 0, sink);
   Raw other = some_raw();
   other[kThumbIp] += 1.0;
   emulator->set_raw(other);
-  decoder->feed(tell(*emulator, "G"), 0, sink);
+  decoder->feed(notify(*emulator, "G"), 0, sink);
   REQUIRE(sink.samples.size() == 3);
   CHECK(sink.samples[0].quality == Quality::kMeasured);
   CHECK(sink.samples[1].quality == Quality::kHeld);
@@ -321,7 +321,7 @@ TEST_CASE("a CyberGlove without its sensors is counted, not posed; its switch is
   const Layout layout{.mask = kMask22, .time = false, .status = true};
   const auto emulator = emulator_of({});
   const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout});
-  (void)tell(*emulator, std::string("U\1D\0W\1L\1S", 9));
+  (void)notify(*emulator, std::string("U\1D\0W\1L\1S", 9));
   CollectSink sink;
   decoder->feed(next(*emulator), 0, sink);
   REQUIRE(sink.samples.size() == 1);
@@ -341,8 +341,8 @@ TEST_CASE("16-bit records: sixteenths of a count, strays skipped, midnight cross
   const auto emulator =
       emulator_of({.level_one = true, .first_sub_frame = sub_frames_a_day(3) - 10});
   const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout, .ticks = 1280});
-  CHECK(text_of(tell(*emulator, "1m\x03")) == std::string("1m\x03\0", 4));
-  const Emulator::Bytes echo = tell(*emulator, "1S");
+  CHECK(text_of(notify(*emulator, "1m\x03")) == std::string("1m\x03\0", 4));
+  const Emulator::Bytes echo = notify(*emulator, "1S");
   CHECK(text_of(echo) == "1S");
   Raw raw = some_raw();
   raw[kIndexMcp] = 100.0625;
@@ -365,7 +365,7 @@ TEST_CASE("16-bit records: sixteenths of a count, strays skipped, midnight cross
 TEST_CASE("a damaged 16-bit record loses only itself, and gives one outcome") {
   const Layout layout{.form = Form::k16Bit, .mask = kMask22, .multiplier = 1};
   const auto emulator = emulator_of({.level_one = true});
-  (void)tell(*emulator, "1S");
+  (void)notify(*emulator, "1S");
   std::vector<Emulator::Bytes> records;
   for (int i = 0; i < 3; ++i) records.push_back(next(*emulator));
   REQUIRE(records[0].size() == kRecordBytes);
@@ -402,7 +402,7 @@ TEST_CASE("an 18-sensor glove's 16-bit records have empty places") {
   const Layout layout{.form = Form::k16Bit, .mask = kMask18, .multiplier = 1};
   const auto emulator = emulator_of({.mask = kMask18, .level_one = true});
   const auto decoder = decoder_of({.hand = Side::kRight, .layout = layout});
-  (void)tell(*emulator, "1S");
+  (void)notify(*emulator, "1S");
   CollectSink sink;
   decoder->feed(next(*emulator), 0, sink);
   CHECK(sink.count(Outcome::kOk) == 1);

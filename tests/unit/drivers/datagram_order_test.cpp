@@ -87,12 +87,12 @@ TEST_CASE("a timestamp that stands is no clock, but its frames are new") {
 }
 
 TEST_CASE("heard time leaves out the sender's pauses") {
-  ActiveTime heard;
-  CHECK(heard.to(5'000'000'000) == 5'000'000'000);
-  CHECK(heard.to(5'100'000'000) == 5'100'000'000);
-  CHECK(heard.to(9'000'000'000) == 5'600'000'000);
-  CHECK(heard.to(8'000'000'000) == 5'600'000'000);  // never back
-  CHECK(heard.to(8'010'000'000) == 5'610'000'000);
+  ActiveTime received;
+  CHECK(received.to(5'000'000'000) == 5'000'000'000);
+  CHECK(received.to(5'100'000'000) == 5'100'000'000);
+  CHECK(received.to(9'000'000'000) == 5'600'000'000);
+  CHECK(received.to(8'000'000'000) == 5'600'000'000);  // never back
+  CHECK(received.to(8'010'000'000) == 5'610'000'000);
 }
 
 }  // namespace posed::drivers

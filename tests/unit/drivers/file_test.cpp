@@ -280,11 +280,11 @@ TEST_CASE("what a clip leaves undetermined is reported as a warning") {
   const Device device = must_open(
       test::scratch_file("warn.bvh", replaced(test::small_bvh(), "Frames: 5", "Frames: 500")));
   REQUIRE_FALSE(device.warnings.empty());
-  bool told = false;
+  bool reported = false;
   for (const std::string& warning : device.warnings) {
-    told = told || warning.find("500") != std::string::npos;
+    reported = reported || warning.find("500") != std::string::npos;
   }
-  CHECK(told);
+  CHECK(reported);
 }
 
 }  // namespace posed::drivers

@@ -230,11 +230,11 @@ TEST_CASE("NaN never leaves a glove decoder as valid") {
     decoder.emit({.raw = std::array{bad, 51.0F}, .valid = 0b11, .extra = {}}, sink);
     REQUIRE(sink.samples.size() == 1);
     REQUIRE(sink.frames.size() == 1);
-    CHECK(test::is_sound(sink.samples[0]));
+    CHECK(test::is_valid(sink.samples[0]));
     CHECK_FALSE(sink.samples[0].valid[0]);
     CHECK(sink.samples[0].value[0] == 0.0F);
     CHECK_FALSE(sink.frames[0].valid[static_cast<std::size_t>(hand_joint(1, 0))]);
-    CHECK(test::is_sound(sink.frames[0]));
+    CHECK(test::is_valid(sink.frames[0]));
     sink.clear();
   }
   decoder.emit({.raw = std::array{100.0F}, .valid = {}, .extra = std::array{kNaN}}, sink);

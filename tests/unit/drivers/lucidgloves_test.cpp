@@ -65,7 +65,7 @@ class NetworkGlove {
     REQUIRE(::send(fd_, text.data(), text.size(), MSG_NOSIGNAL) ==
             static_cast<ssize_t>(text.size()));
   }
-  [[nodiscard]] std::string heard() const {
+  [[nodiscard]] std::string received() const {
     std::array<char, 256> text{};
     const ssize_t got = ::recv(fd_, text.data(), text.size(), 0);
     return {text.data(), static_cast<std::size_t>(got < 0 ? 0 : got)};
@@ -205,24 +205,24 @@ TEST_CASE("an emulated LucidGlove's pose comes back within half a count") {
 
 TEST_CASE("forces and vibrations reach the glove as requested, and negative ones change nothing") {
   LucidEmulator glove(Side::kRight, Encoding::kAuto, 4095);
-  const auto tell = [&](const std::string& text) {
+  const auto notify = [&](const std::string& text) {
     Emulator::Bytes answer;
     glove.receive(std::as_bytes(std::span(text)), 0, answer);
   };
-  tell(haptics_text({}, {.force = {0.0F, 0.5F, 1.0F, 0.25F, 0.75F}}));
+  notify(haptics_text({}, {.force = {0.0F, 0.5F, 1.0F, 0.25F, 0.75F}}));
   CHECK(glove.forces() == lucidgloves::Forces{0, 500, 1000, 250, 750});
-  tell(haptics_text({}, {.force = {1.0F, -1.0F, -1.0F, -1.0F, 0.0F}}));
+  notify(haptics_text({}, {.force = {1.0F, -1.0F, -1.0F, -1.0F, 0.0F}}));
   CHECK(glove.forces() == lucidgloves::Forces{1000, 500, 1000, 250, 0});
-  tell(haptics_text({{"force_range", std::int64_t{4095}}}, {.force = {1.0F, 0, 0, 0, 0}}));
+  notify(haptics_text({{"force_range", std::int64_t{4095}}}, {.force = {1.0F, 0, 0, 0, 0}}));
   CHECK(glove.forces()[0] == 4095);
   const Options legacy{{"encoding", std::string("legacy")}};
   CHECK(haptics_text(legacy, {.force = {0.1F, 0, 0, 0, 1.0F}}) == "100&0&0&0&1000\n");
-  tell(haptics_text(legacy, {.force = {0.1F, 0.2F, 0, -1.0F, 1.0F}}));
+  notify(haptics_text(legacy, {.force = {0.1F, 0.2F, 0, -1.0F, 1.0F}}));
   CHECK(glove.forces() == lucidgloves::Forces{100, 200, 0, 0, 1000});
   const glove::Haptics buzz{
       .force = {-1, -1, -1, -1, -1}, .vibration_hz = 80.0F, .vibration_s = 0.1F, .vibration = 0.5F};
   CHECK(haptics_text({}, buzz) == "A-1B-1C-1D-1E-1\nF80.00G0.10H0.50\n");
-  tell(haptics_text({}, buzz));
+  notify(haptics_text({}, buzz));
   CHECK(glove.vibration() == "F80.00G0.10H0.50");
   CHECK(glove.forces() == lucidgloves::Forces{100, 200, 0, 0, 1000});
   CHECK(haptics_text(legacy, buzz).starts_with("refused"));
@@ -268,7 +268,7 @@ TEST_CASE("a LucidGlove that connects over TCP is read, its empty lines left out
   glove.say("A1B2C3D4E5\n\r\nZ(ZV)5(ZG)0(ZH)1\n\r\n");
   auto device = find_driver("lucidgloves")->open(options, ports);
   if (!device) FAIL(device.error().text());
-  CHECK(glove.heard() == "(ZA)Z\n");
+  CHECK(glove.received() == "(ZA)Z\n");
   CollectSink sink;
   REQUIRE(device->transport->start(0));
   glove.say("A1B2C3D4E5\n\r\nA2B2C3D4E5\n\r\n");
@@ -280,7 +280,7 @@ TEST_CASE("a LucidGlove that connects over TCP is read, its empty lines left out
   CHECK(sink.frames.size() == 2);
   CHECK(sink.outcomes == std::array<int, kOutcomes>{2});
   REQUIRE(device->transport->send(std::as_bytes(std::span(std::string_view("A0B0C0D0E0\n")))));
-  CHECK(glove.heard() == "A0B0C0D0E0\n");
+  CHECK(glove.received() == "A0B0C0D0E0\n");
 }
 
 TEST_CASE("a port with another device on it is refused with what to check") {

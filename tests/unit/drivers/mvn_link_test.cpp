@@ -107,7 +107,7 @@ TEST_CASE("mvn: a TCP stream goes on at the next head after damage") {
     session.feed_raw(bad);
     // 3000 bytes are gone, and those of the datagrams beside them.
     CHECK(session.sink.frames.size() >= 80);
-    for (const Frame& frame : session.sink.frames) CHECK(test::is_sound(frame));
+    for (const Frame& frame : session.sink.frames) CHECK(test::is_valid(frame));
   }
   TcpSession garbage;
   garbage.feed_raw(MvnBytes(200'000, std::byte{'M'}));

@@ -390,18 +390,18 @@ TEST_CASE("mvn: a frame carries the time code of its sample or of the one before
     REQUIRE(session.sink.frames.size() == 1);
     return std::string(view_of(session.sink.frames[0].timecode));
   };
-  const auto tell = [&](std::uint32_t sample, std::string_view text) {
+  const auto notify = [&](std::uint32_t sample, std::string_view text) {
     session.feed(encode_datagram(test::mvn_head(Type::kTimeCode, sample, false),
                                  std::as_bytes(std::span(text))));
   };
   CHECK(timecode_of_frame(11).empty());
-  tell(12, "01:02:03.004");
+  notify(12, "01:02:03.004");
   CHECK(timecode_of_frame(12) == "01:02:03.004");
   CHECK(timecode_of_frame(13) == "01:02:03.004");  // its own comes behind it
   CHECK(timecode_of_frame(14).empty());            // MVN has stopped sending it
-  tell(15, std::string_view("01:02:03.034\0", 13));
+  notify(15, std::string_view("01:02:03.034\0", 13));
   CHECK(timecode_of_frame(15) == "01:02:03.034");
-  tell(16, "no time code");
+  notify(16, "no time code");
   CHECK(timecode_of_frame(16).empty());
   CHECK(session.damaged() == 0);
 }

@@ -356,17 +356,17 @@ TEST_CASE("mvn: the character's data are checked, counts before memory") {
   CHECK(decode_meta(greedy, name) == Outcome::kShort);
 
   std::array<Vec3f, kBodySegments> places{};
-  bool told = false;
+  bool reported = false;
   greedy.resize(8, std::byte{0xFF});
-  CHECK(decode_scale(greedy, places, told) == Outcome::kShort);
+  CHECK(decode_scale(greedy, places, reported) == Outcome::kShort);
   const MvnBytes points(4 + 4, std::byte{});  // no segments, no points
-  CHECK(decode_scale(points, places, told) == Outcome::kOk);
-  CHECK_FALSE(told);
+  CHECK(decode_scale(points, places, reported) == Outcome::kOk);
+  CHECK_FALSE(reported);
   MvnBytes scale = encode_scale(places);
-  CHECK(decode_scale(scale, places, told) == Outcome::kOk);
-  CHECK(told);
+  CHECK(decode_scale(scale, places, reported) == Outcome::kOk);
+  CHECK(reported);
   put_float(scale, 4 + 4 + 6, std::nanf(""));  // the pelvis
-  CHECK(decode_scale(scale, places, told) == Outcome::kOutOfRange);
+  CHECK(decode_scale(scale, places, reported) == Outcome::kOutOfRange);
 }
 
 }  // namespace posed::drivers::mvn

@@ -62,7 +62,7 @@ struct ValueSession : MvnSession {
     sink.clear();
   }
   // What the newest sample says, by name; values that are not valid are left out.
-  [[nodiscard]] std::map<std::string, float> told() const {
+  [[nodiscard]] std::map<std::string, float> reported() const {
     std::map<std::string, float> values;
     const Sample& sample = sink.samples.back();
     const auto& names = bodies()[0].samples.names;
@@ -106,11 +106,11 @@ TEST_CASE("mvn: joint angles are radians about posed's axes, named by the lower 
   session.feed(value_datagram(Type::kJointAngles, 7, {kElbow}));
   REQUIRE(session.sink.samples.size() == 1);
   CHECK(session.sink.samples[0].header.device_ns == 70'000'000 - 10'000'000);
-  const auto told = session.told();
-  REQUIRE(told.size() == 3);  // segment 10 is the right forearm
-  CHECK(told.at("RightForeArm_angle_x") == Approx(0.0));
-  CHECK(told.at("RightForeArm_angle_y") == Approx(-3.14159265));
-  CHECK(told.at("RightForeArm_angle_z") == Approx(1.57079633));
+  const auto reported = session.reported();
+  REQUIRE(reported.size() == 3);  // segment 10 is the right forearm
+  CHECK(reported.at("RightForeArm_angle_x") == Approx(0.0));
+  CHECK(reported.at("RightForeArm_angle_y") == Approx(-3.14159265));
+  CHECK(reported.at("RightForeArm_angle_z") == Approx(1.57079633));
   CHECK(session.unit_of("RightForeArm_angle_x") == "rad");
 }
 
@@ -119,24 +119,24 @@ TEST_CASE("mvn: kinematics of segments are in posed's axes, each with its unit")
                         value_datagram(Type::kAngular, 6, {kTurnedFoot})});
   CHECK(session.bodies()[0].samples.names.size() == 23 * (9 + 10));
   session.feed(value_datagram(Type::kLinear, 7, {kFoot}));
-  auto told = session.told();
-  REQUIRE(told.size() == 9);
-  CHECK(told.at("RightFoot_position_z") == 1.0F);
-  CHECK(told.at("RightFoot_position_x") == 2.0F);
-  CHECK(told.at("RightFoot_position_y") == 3.0F);
-  CHECK(told.at("RightFoot_velocity_z") == 4.0F);
-  CHECK(told.at("RightFoot_acceleration_y") == 9.0F);
+  auto reported = session.reported();
+  REQUIRE(reported.size() == 9);
+  CHECK(reported.at("RightFoot_position_z") == 1.0F);
+  CHECK(reported.at("RightFoot_position_x") == 2.0F);
+  CHECK(reported.at("RightFoot_position_y") == 3.0F);
+  CHECK(reported.at("RightFoot_velocity_z") == 4.0F);
+  CHECK(reported.at("RightFoot_acceleration_y") == 9.0F);
   CHECK(session.unit_of("RightFoot_position_x") == "m");
   CHECK(session.unit_of("RightFoot_velocity_x") == "m/s");
   CHECK(session.unit_of("RightFoot_acceleration_x") == "m/s^2");
   session.feed(value_datagram(Type::kAngular, 7, {kTurnedFoot}));
-  told = session.told();
-  REQUIRE(told.size() == 10);
-  CHECK(told.at("RightFoot_rotation_y") == Approx(std::sqrt(0.5)));  // about the vertical
-  CHECK(told.at("RightFoot_rotation_w") == Approx(std::sqrt(0.5)));
-  CHECK(told.at("RightFoot_rotation_x") == 0.0F);
-  CHECK(told.at("RightFoot_angular_velocity_x") == 2.0F);
-  CHECK(told.at("RightFoot_angular_acceleration_z") == 4.0F);
+  reported = session.reported();
+  REQUIRE(reported.size() == 10);
+  CHECK(reported.at("RightFoot_rotation_y") == Approx(std::sqrt(0.5)));  // about the vertical
+  CHECK(reported.at("RightFoot_rotation_w") == Approx(std::sqrt(0.5)));
+  CHECK(reported.at("RightFoot_rotation_x") == 0.0F);
+  CHECK(reported.at("RightFoot_angular_velocity_x") == 2.0F);
+  CHECK(reported.at("RightFoot_angular_acceleration_z") == 4.0F);
   CHECK(session.unit_of("RightFoot_angular_velocity_x") == "rad/s");
   CHECK(session.unit_of("RightFoot_angular_acceleration_x") == "rad/s^2");
   CHECK(session.damaged() == 0);
@@ -146,19 +146,19 @@ TEST_CASE("mvn: trackers come in two lengths") {
   ValueSession brief({value_datagram(Type::kTrackers, 6, {{{1}, counted(10, true)}})});
   CHECK(brief.bodies()[0].samples.names.size() == 23 * 10);
   brief.feed(value_datagram(Type::kTrackers, 7, {{{1}, counted(10, true)}}));
-  auto told = brief.told();
-  REQUIRE(told.size() == 10);
-  CHECK(told.at("Pelvis_tracker_free_acceleration_z") == 1.0F);
-  CHECK(told.at("Pelvis_tracker_magnetic_field_x") == 5.0F);
+  auto reported = brief.reported();
+  REQUIRE(reported.size() == 10);
+  CHECK(reported.at("Pelvis_tracker_free_acceleration_z") == 1.0F);
+  CHECK(reported.at("Pelvis_tracker_magnetic_field_x") == 5.0F);
   ValueSession whole({value_datagram(Type::kTrackers, 6, {kLongTracker})});
   CHECK(whole.bodies()[0].samples.names.size() == 23 * 16);
   whole.feed(value_datagram(Type::kTrackers, 7, {kLongTracker}));
-  told = whole.told();
-  REQUIRE(told.size() == 16);
-  CHECK(told.at("Pelvis_tracker_free_acceleration_z") == 1.0F);
-  CHECK(told.at("Pelvis_tracker_acceleration_z") == 4.0F);
-  CHECK(told.at("Pelvis_tracker_angular_velocity_z") == 7.0F);
-  CHECK(told.at("Pelvis_tracker_magnetic_field_z") == 10.0F);
+  reported = whole.reported();
+  REQUIRE(reported.size() == 16);
+  CHECK(reported.at("Pelvis_tracker_free_acceleration_z") == 1.0F);
+  CHECK(reported.at("Pelvis_tracker_acceleration_z") == 4.0F);
+  CHECK(reported.at("Pelvis_tracker_angular_velocity_z") == 7.0F);
+  CHECK(reported.at("Pelvis_tracker_magnetic_field_z") == 10.0F);
   CHECK(whole.unit_of("Pelvis_tracker_magnetic_field_z") == "1");
 }
 
@@ -195,12 +195,12 @@ TEST_CASE("mvn: values of props, fingers and joints that are none are left out")
   ValueSession session(
       {value_datagram(Type::kLinear, 6, {kFoot}), value_datagram(Type::kJointAngles, 6, {kElbow})});
   session.feed(value_datagram(Type::kLinear, 7, {{{25}, counted(9)}, kFoot, {{68}, counted(9)}}));
-  CHECK(session.told().size() == 9);
+  CHECK(session.reported().size() == 9);
   // From the vertical to the pelvis, and from the pelvis to T8.
   session.feed(value_datagram(
       Type::kJointAngles, 7,
       {{{0, 256}, {1.0F, 2.0F, 3.0F}}, kElbow, {{256, 5 * 256}, {1.0F, 2.0F, 3.0F}}}));
-  CHECK(session.told().size() == 3);
+  CHECK(session.reported().size() == 3);
   session.feed(value_datagram(Type::kLinear, 8, {}));
   session.feed(value_datagram(Type::kLinear, 9, {{{25}, counted(9)}}));
   CHECK(session.sink.samples.size() == 2);  // nothing of ours, no sample
@@ -209,7 +209,7 @@ TEST_CASE("mvn: values of props, fingers and joints that are none are left out")
   std::fill_n(lost.numbers.begin(), 4, 0.0F);
   ValueSession other({value_datagram(Type::kTrackers, 6, {kLongTracker})});
   other.feed(value_datagram(Type::kTrackers, 7, {lost}));
-  CHECK(other.told().size() == 12);
+  CHECK(other.reported().size() == 12);
   CHECK(session.damaged() + other.damaged() == 0);
 }
 

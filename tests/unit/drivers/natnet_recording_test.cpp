@@ -129,14 +129,14 @@ TEST_CASE("the recorded NatNet session reads the same when nobody has said its v
   const auto folder = test::shared(kSession);
   if (!folder) SKIP_WITHOUT_SHARED();
   const RecordedSession session(*folder);
-  NatNetRig told;
-  introduce(told, session);
+  NatNetRig reported;
+  introduce(reported, session);
   NatNetRig alone;
   REQUIRE(alone.feed(with_id(session.all, 5).at(0)) == Outcome::kOk);
   for (const NatNetBytes& bytes : session.frames) {
-    REQUIRE(told.feed(bytes) == Outcome::kOk);
+    REQUIRE(reported.feed(bytes) == Outcome::kOk);
     REQUIRE(alone.feed(bytes) == Outcome::kOk);
-    CHECK(test::same_pose(alone.sink.frames.back(), told.sink.frames.back()));
+    CHECK(test::same_pose(alone.sink.frames.back(), reported.sink.frames.back()));
   }
 }
 
@@ -264,13 +264,13 @@ TEST_CASE("recorded NatNet packets of Motive 1.5, 1.7 and 1.9") {
                              {"1.7.2", {2, 7}, "Rigid Body 1", 1, 0x91},
                              {"1.9.0", {2, 9}, "Triangle", 2, 0x75}};
   for (const Old& old : all) {
-    for (const bool told : {true, false}) {
-      INFO(old.motive << (told ? " with" : " without") << " its ServerInfo");
+    for (const bool reported : {true, false}) {
+      INFO(old.motive << (reported ? " with" : " without") << " its ServerInfo");
       NatNetRig rig;
       const auto packet = [&](const char* number) {
         return file_bytes(*folder / ("frame-motive-" + old.motive + '-' + number + ".bin"));
       };
-      if (told) REQUIRE(rig.feed(packet("000")) == Outcome::kOk);
+      if (reported) REQUIRE(rig.feed(packet("000")) == Outcome::kOk);
       natnet::ModelDef model;
       model.markers[old.name] = 3;
       model.bodies.push_back(

@@ -107,11 +107,11 @@ void check_round_trip(NatNetEmulator& emulator, NatNetRig& rig) {
 
 TEST_CASE("every NatNet version, there and back, told or found out") {
   for (const Version version : kNatNetVersions) {
-    for (const bool told : {true, false}) {
-      INFO(text_of(version) << (told ? " told" : " found out"));
+    for (const bool reported : {true, false}) {
+      INFO(text_of(version) << (reported ? " told" : " found out"));
       NatNetEmulator emulator(Settings{.version = version});
       NatNetRig rig;
-      if (told) REQUIRE(rig.feed(asked(emulator, natnet::encode_connect())) == Outcome::kOk);
+      if (reported) REQUIRE(rig.feed(asked(emulator, natnet::encode_connect())) == Outcome::kOk);
       check_round_trip(emulator, rig);
       const Sample& sample = rig.sink.samples[0];
       CHECK(sample.valid[8]);
@@ -212,10 +212,10 @@ TEST_CASE("the readings that the sources of NatNet do not agree on") {
         natnet::Reading{.version = {2, 8}}, natnet::Reading{.version = {2, 5}},
         natnet::Reading{.version = {2, 5}, .timestamp = false},
         natnet::Reading{.version = {3, 0}, .padded = true}}) {
-    for (const bool told : {true, false}) {
-      INFO(text_of(sent.version) << ' ' << sent.bones_have_params << sent.padded << told);
+    for (const bool reported : {true, false}) {
+      INFO(text_of(sent.version) << ' ' << sent.bones_have_params << sent.padded << reported);
       NatNetRig rig;
-      if (told) {
+      if (reported) {
         REQUIRE(rig.feed(natnet::encode_server_info({.version = sent.version})) == Outcome::kOk);
       }
       REQUIRE(rig.feed(natnet::encode_model_def(natnet::emulated_model(), sent.version)) ==

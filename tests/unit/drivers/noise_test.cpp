@@ -21,8 +21,8 @@ using test::Bytes;
 using test::DeviceFixture;
 
 constexpr std::size_t kPackets = 150 * 60 * 10;
-constexpr double kNoise = 0.01;       // of bytes
-constexpr std::size_t kMostLate = 8;  // most packets by which a decoder's output may be late
+constexpr double kNoise = 0.01;             // of bytes
+constexpr std::size_t kMaxLatePackets = 8;  // most packets by which a decoder's output may be late
 
 // The largest share of damaged packets that are accepted as good, for gloves whose framing cannot
 // detect all damage. Of a glove that is not listed its driver says it (GloveTraits::undetected).
@@ -71,7 +71,7 @@ class Judge {
     waiting_.push_back({sample, whole});
     ++tally_.sent;
     if (whole) ++tally_.whole;
-    while (waiting_.size() > kMostLate) give_up();
+    while (waiting_.size() > kMaxLatePackets) give_up();
   }
   void came(const Sample& sample) {
     const auto at = std::ranges::find_if(

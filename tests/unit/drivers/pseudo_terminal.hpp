@@ -34,7 +34,7 @@ class PseudoTerminal {
   void say(std::string_view text) const {
     REQUIRE(::write(fd_, text.data(), text.size()) == static_cast<ssize_t>(text.size()));
   }
-  [[nodiscard]] std::string heard() const {
+  [[nodiscard]] std::string received() const {
     std::array<char, 4096> text{};
     const ssize_t got = ::read(fd_, text.data(), text.size());
     return {text.data(), static_cast<std::size_t>(got < 0 ? 0 : got)};

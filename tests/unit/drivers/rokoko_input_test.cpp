@@ -270,10 +270,10 @@ TEST_CASE("any bytes for Studio's decoder: one outcome each, sound frames, no al
   int outcomes = 0;
   for (const int count : sink.outcomes) outcomes += count;
   CHECK(outcomes == 601);
-  bool sound = true;
-  for (const Frame& frame : sink.frames) sound = sound && test::is_sound(frame);
-  for (const Sample& sample : sink.samples) sound = sound && test::is_sound(sample);
-  CHECK(sound);
+  bool valid = true;
+  for (const Frame& frame : sink.frames) valid = valid && test::is_valid(frame);
+  for (const Sample& sample : sink.samples) valid = valid && test::is_valid(sample);
+  CHECK(valid);
 }
 
 TEST_CASE("any description of Studio's bodies is refused or becomes bodies") {

@@ -34,14 +34,15 @@ class ServedEmulator {
   }
 
   void serve() {
-    std::array<std::byte, 256> heard{};
+    std::array<std::byte, 256> received{};
     while (!stop_) {
       pollfd ready{.fd = terminal_.fd(), .events = POLLIN, .revents = 0};
       drivers::Emulator::Bytes out;
       if (::poll(&ready, 1, 1) > 0 && (ready.revents & POLLIN) != 0) {
-        const ssize_t got = ::read(terminal_.fd(), heard.data(), heard.size());
+        const ssize_t got = ::read(terminal_.fd(), received.data(), received.size());
         if (got > 0) {
-          emulator_.receive(std::span(heard).first(static_cast<std::size_t>(got)), now_ns(), out);
+          emulator_.receive(std::span(received).first(static_cast<std::size_t>(got)), now_ns(),
+                            out);
         }
       }
       const std::int64_t due_ns = emulator_.next_due_ns();

@@ -306,7 +306,7 @@ TEST_CASE("the emulated people move smoothly and for ever") {
   for (int i = 0; i < 1300; ++i) session.step(emulator);
   double farthest = 0.0;
   for (std::size_t i = 2; i < sink.frames.size(); ++i) {
-    CHECK(test::is_sound(sink.frames[i]));
+    CHECK(test::is_valid(sink.frames[i]));
     for (std::size_t k = 0; k < 3; ++k) {
       const double step_m = std::abs(static_cast<double>(sink.frames[i].root_position_m[k]) -
                                      static_cast<double>(sink.frames[i - 2].root_position_m[k]));

@@ -171,24 +171,24 @@ TEST_CASE("a socket has one sender at a time; after a second of silence another 
   const Peer second("127.0.0.3:0");
   const Peer program("127.0.0.2:0");  // another one on the first sender's computer
   std::int64_t time_ns = 10 * kNanosPerSecond;
-  const auto heard = [&](const Peer& from) {
+  const auto arrives = [&](const Peer& from) {
     REQUIRE(from.send(transport->endpoint(0), "x"));
     REQUIRE(is_ready(*transport));
     const Chunk chunk = transport->read(time_ns);
     CHECK(chunk.foreign == (chunk.bytes.empty() ? 1 : 0));
     return !chunk.bytes.empty();
   };
-  CHECK(heard(first));
-  CHECK_FALSE(heard(second));
+  CHECK(arrives(first));
+  CHECK_FALSE(arrives(second));
   time_ns += kNanosPerSecond * 9 / 10;
-  CHECK_FALSE(heard(second));  // to be refused keeps nothing
-  CHECK(heard(program));
+  CHECK_FALSE(arrives(second));  // to be refused keeps nothing
+  CHECK(arrives(program));
   time_ns += kNanosPerSecond * 9 / 10;
-  CHECK_FALSE(heard(second));
-  CHECK(heard(first));
+  CHECK_FALSE(arrives(second));
+  CHECK(arrives(first));
   time_ns += kNanosPerSecond;
-  CHECK(heard(second));
-  CHECK_FALSE(heard(first));
+  CHECK(arrives(second));
+  CHECK_FALSE(arrives(first));
 }
 
 TEST_CASE("empty and too long datagrams are dropped and counted") {
@@ -314,8 +314,8 @@ TEST_CASE("a multicast group is received on the chosen interface") {
     CHECK(next(**opened) == "nothing");
     // Joining it again in a silence is no work of the reader; who does it disturbs nothing.
     CHECK((*opened)->next_due_ns() == kNoTime_ns);
-    const std::int64_t heard_ns = now_ns();
-    for (int i = 1; i < 10; ++i) (*opened)->upkeep(heard_ns + i * kNanosPerSecond);
+    const std::int64_t received_ns = now_ns();
+    for (int i = 1; i < 10; ++i) (*opened)->upkeep(received_ns + i * kNanosPerSecond);
     REQUIRE(peer.send("239.255.42.99" + port, "to all again"));
     CHECK(next(**opened) == "to all again");
   }

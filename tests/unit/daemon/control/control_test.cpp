@@ -263,10 +263,10 @@ TEST_CASE("a live text is sent as its stage's command, made for the model that w
   CHECK(sent[2].change.index == style::StyleFilter::kMask);
   CHECK(sent[2].command.as<style::Mask>()[2] == 0.5);
   for (int i = 0; i < 3; ++i) CHECK(fixture.acknowledge(9).ok());
-  const auto& told = fixture.daemon_control.changed->second.stages[0];
-  CHECK(told.model_words == std::vector<std::string>{"s1", "s2"});
-  CHECK(std::get<std::string>(told.parameters.at("weights")) == "s1=1,s2=3");
-  CHECK(std::get<std::string>(told.parameters.at("mask")) == "arms=0.5");
+  const auto& reported = fixture.daemon_control.changed->second.stages[0];
+  CHECK(reported.model_words == std::vector<std::string>{"s1", "s2"});
+  CHECK(std::get<std::string>(reported.parameters.at("weights")) == "s1=1,s2=3");
+  CHECK(std::get<std::string>(reported.parameters.at("mask")) == "arms=0.5");
   CHECK(has(fixture.refused(ask("weights", "sad=1")), "no style 'sad'; it has: s1, s2"));
   CHECK(has(fixture.refused(ask("weights", "s1=0")), "all are 0"));
   CHECK(has(fixture.refused(ask("weights", "s1=1,")), "is not NAME=NUMBER"));

@@ -29,9 +29,11 @@ struct Stage {
   std::unique_ptr<ZapAuthenticator> authenticator =
       *ZapAuthenticator::start(here.get(), full_list());
   Socket publisher = *open_socket(here.get(), ZMQ_XPUB);
-  std::unique_ptr<PeerGuard> guard = *PeerGuard::open(
-      here.get(), publisher.get(),
-      {.name = "test", .max_peers = 10, .max_unheard = 100'000, .max_unheard_of_all = 100'000});
+  std::unique_ptr<PeerGuard> guard = *PeerGuard::open(here.get(), publisher.get(),
+                                                      {.name = "test",
+                                                       .max_peers = 10,
+                                                       .max_unfinished = 100'000,
+                                                       .max_unfinished_of_all = 100'000});
   Socket router = *open_socket(here.get(), ZMQ_ROUTER);
   std::string pose_endpoint, control_endpoint;
 
@@ -66,17 +68,17 @@ struct Stage {
   }
 
   // As the publisher does: so the guard learns which User-Id each connection has.
-  void hear_subscriptions() const {
+  void receive_subscriptions() const {
     Message message;
     while (message.receive(publisher.get())) {
       if (guard->knows(source_of(message))) {
-        guard->heard(source_of(message), message.property("User-Id"));
+        guard->received(source_of(message), message.property("User-Id"));
       }
     }
   }
 
   // Whether a published message reaches the subscriber in time. Reads old messages first.
-  [[nodiscard]] bool hears(void* subscriber, std::chrono::milliseconds within) const {
+  [[nodiscard]] bool receives(void* subscriber, std::chrono::milliseconds within) const {
     Message message;
     while (message.receive(subscriber)) {
     }
@@ -107,7 +109,7 @@ constexpr auto kNever = 400ms;  // long enough for a handshake that must not hap
 TEST_CASE("a listed key has the rights that the list gives it") {
   const Stage stage;
   const auto viewer = stage.client(ZMQ_SUB, stage.pose_endpoint, "viewer");
-  CHECK(stage.hears(viewer.get(), kSoon));
+  CHECK(stage.receives(viewer.get(), kSoon));
   const auto director = stage.client(ZMQ_DEALER, stage.control_endpoint, "director");
   CHECK(stage.sender_of_request(director.get(), kSoon) == stage.director.public_z85);
   const auto reaching = stage.client(ZMQ_DEALER, stage.control_endpoint, "viewer");
@@ -118,31 +120,31 @@ TEST_CASE("a listed key has the rights that the list gives it") {
 TEST_CASE("an unknown client receives nothing: no key, a key not listed, a wrong server key") {
   const Stage stage;
   const auto keyless = stage.client(ZMQ_SUB, stage.pose_endpoint, "");
-  CHECK_FALSE(stage.hears(keyless.get(), kNever));
+  CHECK_FALSE(stage.receives(keyless.get(), kNever));
   const auto unlisted = stage.client(ZMQ_SUB, stage.pose_endpoint, "unknown");
-  CHECK_FALSE(stage.hears(unlisted.get(), kNever));
+  CHECK_FALSE(stage.receives(unlisted.get(), kNever));
   const auto misled = stage.client(ZMQ_SUB, stage.pose_endpoint, "viewer", "other_server");
-  CHECK_FALSE(stage.hears(misled.get(), kNever));
+  CHECK_FALSE(stage.receives(misled.get(), kNever));
   const auto good = stage.client(ZMQ_SUB, stage.pose_endpoint, "viewer");
-  CHECK(stage.hears(good.get(), kSoon));
+  CHECK(stage.receives(good.get(), kSoon));
 }
 
 TEST_CASE("a subscriber whose key is withdrawn is disconnected, the others are not") {
   Stage stage;
   const auto viewer = stage.client(ZMQ_SUB, stage.pose_endpoint, "viewer");
   const auto director = stage.client(ZMQ_SUB, stage.pose_endpoint, "director");
-  REQUIRE(stage.hears(viewer.get(), kSoon));
-  REQUIRE(stage.hears(director.get(), kSoon));
+  REQUIRE(stage.receives(viewer.get(), kSoon));
+  REQUIRE(stage.receives(director.get(), kSoon));
 
-  stage.hear_subscriptions();
+  stage.receive_subscriptions();
   CHECK(stage.guard->peers() == 2);
 
   CHECK(stage.authenticator->replace(stage.without_viewer()).publisher_must_check);
   stage.guard->cut_unless(
       [&](std::string_view user) { return stage.authenticator->allows(user, Domain::kPublish); });
   CHECK(stage.guard->cuts() == 1);
-  CHECK(stage.hears(director.get(), kSoon));
-  CHECK_FALSE(stage.hears(viewer.get(), kNever));
+  CHECK(stage.receives(director.get(), kSoon));
+  CHECK_FALSE(stage.receives(viewer.get(), kNever));
   CHECK_FALSE(stage.authenticator->replace(stage.full_list()).publisher_must_check);
 }
 
@@ -160,7 +162,7 @@ TEST_CASE("without an authenticator a secured socket refuses every client") {
   Stage stage;
   stage.authenticator.reset();
   const auto viewer = stage.client(ZMQ_SUB, stage.pose_endpoint, "viewer");
-  CHECK_FALSE(stage.hears(viewer.get(), kNever));
+  CHECK_FALSE(stage.receives(viewer.get(), kNever));
 }
 
 TEST_CASE("one context has one authenticator") {

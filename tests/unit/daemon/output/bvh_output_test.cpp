@@ -110,7 +110,7 @@ void check_lines(const clip::Clip& walk, int frames) {
   CHECK(compared > 15 * (frames - 6));
   CHECK(worst_rad < 1e-5);
   CHECK(worst_m < 1e-3);
-  CHECK(rig.told.empty());
+  CHECK(rig.reported.empty());
 }
 
 }  // namespace
@@ -136,11 +136,11 @@ TEST_CASE("a client that wants it gets the BVH header, whose channels are the va
   REQUIRE(begin != std::string::npos);
   // The values between the name and the "||" are a motion line of that BVH.
   const std::string values = text.substr(begin + 6, text.size() - begin - 6 - 4);
-  const auto clip = clip::parse_clip(
-      {.name = "stream.bvh",
-       .bytes = text.substr(0, begin) + "MOTION\nFrames: 1\nFrame Time: 0.0166667\n" + values +
-                "\n"},
-      {.metres_per_unit = 0.01});
+  const auto clip =
+      clip::parse_clip({.name = "stream.bvh",
+                        .bytes = text.substr(0, begin) +
+                                 "MOTION\nFrames: 1\nFrame Time: 0.0166667\n" + values + "\n"},
+                       {.metres_per_unit = 0.01});
   if (!clip) FAIL(clip.error().text());
   CHECK(clip->skeleton->joints.size() == drivers::axis::kBones);
   CHECK(clip->channels.cols() == 6 * 59);
@@ -165,8 +165,8 @@ TEST_CASE("a client that does not read misses whole lines, is disconnected, and 
   }
   CHECK(lines == frames);
   CHECK(rig.stats().receivers() == 1);
-  REQUIRE(rig.told.size() == 1);
-  CHECK(rig.told[0].find("was disconnected: it took nothing for 2 s") != std::string::npos);
+  REQUIRE(rig.reported.size() == 1);
+  CHECK(rig.reported[0].find("was disconnected: it took nothing for 2 s") != std::string::npos);
   CHECK(rig.stats().dropped() > 100);
   CHECK(rig.stats().failures() == 0);  // the system refused no send
   // What it finds in its buffers is whole lines, except for the last one.
@@ -274,13 +274,13 @@ TEST_CASE("of the frames that come together, a limited rate sends the newest") {
 TEST_CASE("there are at most 16 clients; one that goes makes room") {
   BvhRig rig(bvh_config());
   std::vector<test::RawPeer> peers;
-  for (std::size_t i = 0; i < LineClients::kMostClients; ++i) peers.push_back(rig.connect());
+  for (std::size_t i = 0; i < LineClients::kMaxClients; ++i) peers.push_back(rig.connect());
   CHECK(rig.stats().receivers() == 16);
-  CHECK(rig.told.empty());
+  CHECK(rig.reported.empty());
   CHECK(rig.connect().hung_up());
   CHECK(rig.stats().failures() == 0);
-  REQUIRE(rig.told.size() == 1);
-  CHECK(rig.told[0].find("127.0.0.1 was refused: there are 16 clients") != std::string::npos);
+  REQUIRE(rig.reported.size() == 1);
+  CHECK(rig.reported[0].find("127.0.0.1 was refused: there are 16 clients") != std::string::npos);
   peers.pop_back();
   const test::RawPeer next = rig.connect();
   CHECK(rig.stats().receivers() == 16);
@@ -294,8 +294,9 @@ TEST_CASE("only peers that the config names get lines") {
   config.peers = {"192.0.2.7"};
   BvhRig rig(config);
   CHECK(rig.connect().hung_up());
-  REQUIRE(rig.told.size() == 1);
-  CHECK(rig.told[0].find("127.0.0.1 was refused: it is not among the peers") != std::string::npos);
+  REQUIRE(rig.reported.size() == 1);
+  CHECK(rig.reported[0].find("127.0.0.1 was refused: it is not among the peers") !=
+        std::string::npos);
   CHECK(rig.stats().receivers() == 0);
   config.peers.clear();
   config.listen = "0.0.0.0:0";

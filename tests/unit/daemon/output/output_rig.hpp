@@ -19,23 +19,23 @@
 namespace posed::output {
 
 // A program that an output sends to.
-class UdpEar {
+class UdpReceiver {
  public:
-  explicit UdpEar(const std::string& listen = "127.0.0.1:0")
+  explicit UdpReceiver(const std::string& listen = "127.0.0.1:0")
       : transport_(drivers::UdpTransport::open({.sockets = {{.listen = listen}}}).value()) {}
 
   [[nodiscard]] std::string endpoint() const { return transport_->endpoint(0); }
   // The datagrams that have come since the last call. Waits until there were `all` since the first
   // one, because a busy kernel delivers them a little later; five seconds at most.
-  [[nodiscard]] std::vector<std::vector<std::byte>> heard(std::uint64_t all = 0) {
+  [[nodiscard]] std::vector<std::vector<std::byte>> received(std::uint64_t all = 0) {
     std::vector<std::vector<std::byte>> datagrams;
     const std::int64_t until_ns = system::monotonic_ns() + 5 * kNanosPerSecond;
     while (true) {
       const drivers::Chunk chunk = transport_->read(0);
       if (!chunk.bytes.empty()) {
         datagrams.emplace_back(chunk.bytes.begin(), chunk.bytes.end());
-        ++heard_;
-      } else if (heard_ >= all || system::monotonic_ns() > until_ns) {
+        ++received_;
+      } else if (received_ >= all || system::monotonic_ns() > until_ns) {
         return datagrams;
       }
     }
@@ -43,7 +43,7 @@ class UdpEar {
 
  private:
   std::unique_ptr<drivers::UdpTransport> transport_;
-  std::uint64_t heard_ = 0;
+  std::uint64_t received_ = 0;
 };
 
 inline publish::StreamInfo info_of(std::uint32_t id, const std::string& name,
@@ -69,8 +69,8 @@ struct OutputRig {
     auto opened = open_output(config);
     if (!opened) FAIL(opened.error().text());
     output = std::move(*opened);
-    output->set_tell([this](std::optional<std::uint32_t> stream, const std::string& text) {
-      told.push_back((stream ? std::to_string(*stream) + ": " : "") + text);
+    output->set_notify([this](std::optional<std::uint32_t> stream, const std::string& text) {
+      reported.push_back((stream ? std::to_string(*stream) + ": " : "") + text);
     });
   }
   [[nodiscard]] v1::OutputStats stats() const {
@@ -87,7 +87,7 @@ struct OutputRig {
   }
 
   std::unique_ptr<Output> output;
-  std::vector<std::string> told;
+  std::vector<std::string> reported;
 };
 
 }  // namespace posed::output

@@ -50,18 +50,18 @@ std::string statuses(const std::vector<std::vector<std::byte>>& datagrams) {
   return text;
 }
 
-config::OutputConfig vmc_config(const std::vector<const UdpEar*>& ears,
+config::OutputConfig vmc_config(const std::vector<const UdpReceiver*>& receivers,
                                 const std::string& body = "ann") {
   config::OutputConfig config;
   config.body = body;
-  for (const UdpEar* ear : ears) config.to.push_back(ear->endpoint());
+  for (const UdpReceiver* receiver : receivers) config.to.push_back(receiver->endpoint());
   return config;
 }
 
 // Sends the clip to posed's own receiver and compares every bone.
 void check_round_trip(const clip::Clip& walk, int frames) {
-  UdpEar ear;
-  OutputRig rig(vmc_config({&ear}));
+  UdpReceiver receiver;
+  OutputRig rig(vmc_config({&receiver}));
   rig.output->stream_comes(info_of(0, "ann", walk.skeleton));
   const auto canonical = motion::canonical_skeleton(*walk.skeleton).value();
   const auto retarget = motion::Retarget::bind(walk.skeleton, canonical).value();
@@ -74,7 +74,7 @@ void check_round_trip(const clip::Clip& walk, int frames) {
     retarget.apply(walk.frame(i), expected);
     rig.pass(frame_of(0, walk.frame(i)), now_ns);
     const std::size_t before = session.sink.frames.size();
-    const auto datagrams = ear.heard(rig.sent());
+    const auto datagrams = receiver.received(rig.sent());
     REQUIRE(datagrams.size() > 0);
     for (const auto& datagram : datagrams) CHECK(datagram.size() <= 1472);
     session.feed(datagrams, now_ns);
@@ -99,7 +99,7 @@ void check_round_trip(const clip::Clip& walk, int frames) {
   CHECK(worst_rad < 1e-5);
   CHECK(worst_m < 1e-5);
   CHECK(session.layouts.size() == 1);
-  CHECK(rig.told.empty());
+  CHECK(rig.reported.empty());
   CHECK(rig.stats().frames() == static_cast<std::uint64_t>(frames));
   CHECK(rig.stats().dropped() == 0);
 }
@@ -118,8 +118,8 @@ TEST_CASE("a recorded walk arrives through the VMC output as it was") {
 }
 
 TEST_CASE("the VMC output sends bundles of the protocol's bytes") {
-  UdpEar ear;
-  OutputRig rig(vmc_config({&ear}));
+  UdpReceiver receiver;
+  OutputRig rig(vmc_config({&receiver}));
   Skeleton one;
   one.name = "one";
   one.joints.resize(2);
@@ -137,7 +137,7 @@ TEST_CASE("the VMC output sends bundles of the protocol's bytes") {
   frame.rotation_xyzw.fill(kIdentity);
   frame.valid.set();
   rig.pass(frame, 0);
-  const auto datagrams = ear.heard(rig.sent());
+  const auto datagrams = receiver.received(rig.sent());
   REQUIRE(datagrams.size() == 1);
   const std::string text(reinterpret_cast<const char*>(datagrams[0].data()), datagrams[0].size());
   CHECK(text.starts_with(std::string("#bundle\0\0\0\0\0\0\0\0\1", 16)));
@@ -167,8 +167,8 @@ TEST_CASE("the VMC output sends bundles of the protocol's bytes") {
 }
 
 TEST_CASE("the VMC output keeps its rate and says when a pose is old") {
-  UdpEar ear;
-  config::OutputConfig config = vmc_config({&ear});
+  UdpReceiver receiver;
+  config::OutputConfig config = vmc_config({&receiver});
   config.rate_hz = 60.0;
   OutputRig rig(config);
   const clip::Clip walk = motion::make_walker({.seconds = 1.0, .rate_hz = 120.0}).value();
@@ -176,7 +176,7 @@ TEST_CASE("the VMC output keeps its rate and says when a pose is old") {
   int frames = 0;
   for (int i = 0; i < 120; ++i) {
     rig.pass(frame_of(0, walk.frame(i)), i * kSixtieth_ns / 2);
-    if (!ear.heard(rig.sent()).empty()) ++frames;
+    if (!receiver.received(rig.sent()).empty()) ++frames;
   }
   CHECK(frames == 60);
   CHECK(rig.stats().frames() == 120);
@@ -184,12 +184,12 @@ TEST_CASE("the VMC output keeps its rate and says when a pose is old") {
   Frame stale = frame_of(0, walk.frame(119));
   stale.quality = Quality::kStale;
   rig.pass(stale, 3 * kNanosPerSecond);
-  CHECK(statuses(ear.heard(rig.sent())) == "1300 ");  // not tracking
+  CHECK(statuses(receiver.received(rig.sent())) == "1300 ");  // not tracking
 }
 
 TEST_CASE("of the frames that come together, the VMC output with a rate sends the newest") {
-  UdpEar ear;
-  config::OutputConfig config = vmc_config({&ear});
+  UdpReceiver receiver;
+  config::OutputConfig config = vmc_config({&receiver});
   config.rate_hz = 60.0;
   OutputRig rig(config);
   const clip::Clip walk = motion::make_walker({.seconds = 1.0, .rate_hz = 60.0}).value();
@@ -200,12 +200,13 @@ TEST_CASE("of the frames that come together, the VMC output with a rate sends th
     rig.output->frame(frame);
   }
   static_cast<void>(rig.output->turn(0));
-  CHECK(statuses(ear.heard(rig.sent())) == "1300 ");  // of the last frame alone, an old pose
+  CHECK(statuses(receiver.received(rig.sent())) ==
+        "1300 ");  // of the last frame alone, an old pose
 }
 
 TEST_CASE("an assistant sends hands only, driven by whichever hand is there") {
-  UdpEar ear;
-  config::OutputConfig config = vmc_config({&ear}, "");
+  UdpReceiver receiver;
+  config::OutputConfig config = vmc_config({&receiver}, "");
   config.left_hand = "left";
   config.right_hand = "right";
   config.assistant = true;
@@ -218,27 +219,27 @@ TEST_CASE("an assistant sends hands only, driven by whichever hand is there") {
   rig.output->stream_comes(info_of(1, "left", left));
   rig.output->stream_comes(info_of(2, "right", right));
   rig.pass(frame_of(2, right_pose), 0);
-  const std::string right_only = contents(ear.heard(rig.sent()));
+  const std::string right_only = contents(receiver.received(rig.sent()));
   CHECK(right_only.starts_with("RightThumbProximal "));
   CHECK(right_only.ends_with("RightLittleDistal OK T "));
   CHECK(right_only.find("Left") == std::string::npos);
   CHECK(right_only.find("root") == std::string::npos);
   rig.pass(frame_of(1, left_pose), kSixtieth_ns);
-  const std::string both = contents(ear.heard(rig.sent()));
+  const std::string both = contents(receiver.received(rig.sent()));
   CHECK(both.find("LeftThumbProximal ") == 0);
   CHECK(both.find("RightThumbProximal ") != std::string::npos);
   rig.pass(frame_of(2, right_pose), kSixtieth_ns + 1);
-  CHECK(ear.heard(rig.sent()).empty());  // the left hand's frames carry the right one
+  CHECK(receiver.received(rig.sent()).empty());  // the left hand's frames carry the right one
   rig.pass(frame_of(2, right_pose), kNanosPerSecond);
-  CHECK_FALSE(ear.heard(rig.sent()).empty());  // it is silent
+  CHECK_FALSE(receiver.received(rig.sent()).empty());  // it is silent
 }
 
 TEST_CASE("a dead receiver is counted and told once, and the other one hears everything") {
-  UdpEar ear;
-  config::OutputConfig config = vmc_config({&ear});
+  UdpReceiver receiver;
+  config::OutputConfig config = vmc_config({&receiver});
   std::string endpoint;
   {
-    const UdpEar dead;
+    const UdpReceiver dead;
     endpoint = dead.endpoint();
   }  // nobody listens there any more
   config.to.insert(config.to.begin(), endpoint);
@@ -252,29 +253,30 @@ TEST_CASE("a dead receiver is counted and told once, and the other one hears eve
   const std::uint64_t before = datagrams();
   CHECK(before >= 120);
   CHECK(rig.stats().sent() % 2 == 0);
-  CHECK(ear.heard(before).size() == before);
+  CHECK(receiver.received(before).size() == before);
   CHECK(rig.stats().receivers() == 2);
   CHECK(rig.stats().failures() > before * 3 / 4);
   CHECK(rig.stats().failures() < before);
-  REQUIRE(rig.told.size() == 1);
-  CHECK(rig.told[0] == "5: output test: sending to " + endpoint +
-                           " fails: nobody listens there; start the receiver, or correct its port");
+  REQUIRE(rig.reported.size() == 1);
+  CHECK(rig.reported[0] ==
+        "5: output test: sending to " + endpoint +
+            " fails: nobody listens there; start the receiver, or correct its port");
 
-  UdpEar again(endpoint);  // it starts
+  UdpReceiver again(endpoint);  // it starts
   for (int i = 0; i < 180; ++i) {
     rig.pass(frame_of(5, walk.frame(i % 60)), kNanosPerSecond + i * kSixtieth_ns);
   }
   // Also the datagram at which the last refusal was reported has come.
   const std::uint64_t since = datagrams() - before;
-  CHECK(again.heard(since).size() == since);
-  CHECK(ear.heard(before + since).size() == since);
-  REQUIRE(rig.told.size() == 2);
-  CHECK(rig.told[1] == "5: output test: sending to " + endpoint + " works again");
+  CHECK(again.received(since).size() == since);
+  CHECK(receiver.received(before + since).size() == since);
+  REQUIRE(rig.reported.size() == 2);
+  CHECK(rig.reported[1] == "5: output test: sending to " + endpoint + " works again");
 }
 
 TEST_CASE("an output tells which stream cannot move its part, and goes on with the others") {
-  UdpEar ear;
-  config::OutputConfig config = vmc_config({&ear});
+  UdpReceiver receiver;
+  config::OutputConfig config = vmc_config({&receiver});
   config.left_hand = "glove";
   OutputRig rig(config);
   const clip::Clip walk = motion::make_walker({.seconds = 0.2, .rate_hz = 60.0}).value();
@@ -286,14 +288,14 @@ TEST_CASE("an output tells which stream cannot move its part, and goes on with t
   rig.pass(frame_of(1, hand), 0);
   rig.pass(frame_of(0, walk.frame(0)), 1);
   rig.pass(frame_of(0, walk.frame(1)), kSixtieth_ns);
-  REQUIRE(rig.told.size() == 1);
-  CHECK(rig.told[0].find("0: output test: stream 'glove' cannot move its left hand: ") == 0);
-  CHECK(contents(ear.heard(rig.sent())).find("Hips ") != std::string::npos);
+  REQUIRE(rig.reported.size() == 1);
+  CHECK(rig.reported[0].find("0: output test: stream 'glove' cannot move its left hand: ") == 0);
+  CHECK(contents(receiver.received(rig.sent())).find("Hips ") != std::string::npos);
 }
 
 TEST_CASE("an output's face keeps its values and gets the names that are wanted") {
-  UdpEar ear;
-  config::OutputConfig config = vmc_config({&ear});
+  UdpReceiver receiver;
+  config::OutputConfig config = vmc_config({&receiver});
   config.vrm1_names = true;
   OutputRig rig(config);
   const clip::Clip walk = motion::make_walker({.seconds = 0.2, .rate_hz = 60.0}).value();
@@ -305,7 +307,7 @@ TEST_CASE("an output's face keeps its values and gets the names that are wanted"
   rig.output->sample(sample);
   for (int i = 0; i < 2; ++i) {
     rig.pass(frame_of(0, walk.frame(i)), i * kSixtieth_ns);
-    CHECK(contents(ear.heard(rig.sent())).find(" happy Apply OK T ") != std::string::npos);
+    CHECK(contents(receiver.received(rig.sent())).find(" happy Apply OK T ") != std::string::npos);
   }
 }
 

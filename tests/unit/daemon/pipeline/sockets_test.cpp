@@ -21,7 +21,7 @@ class TwoSockets final : public drivers::Transport {
  public:
   [[nodiscard]] int poll_fd() const noexcept override { return -1; }
   [[nodiscard]] std::int64_t next_due_ns() const noexcept override { return now_ns; }
-  [[nodiscard]] Result<> start(std::int64_t) override { return {}; }
+  Result<> start(std::int64_t) override { return {}; }
   [[nodiscard]] drivers::Chunk read(std::int64_t) noexcept override {
     if (given_) return {};
     given_ = true;

@@ -67,18 +67,19 @@ TEST_CASE("one peer cannot use up the subscriptions that all have together") {
 }
 
 TEST_CASE("the first subscription to a prefix is told, and the end of the last one") {
-  std::string told;
-  Subscriptions subscriptions(
-      [](std::string_view) { return false; },
-      [&](const std::string& prefix, bool wanted) { told += (wanted ? "+" : "-") + prefix + " "; });
+  std::string reported;
+  Subscriptions subscriptions([](std::string_view) { return false; },
+                              [&](const std::string& prefix, bool wanted) {
+                                reported += (wanted ? "+" : "-") + prefix + " ";
+                              });
   for (const int peer : {1, 2, 1}) CHECK(subscriptions.ask(peer, "pose/a", true, 0));
   CHECK(subscriptions.ask(2, "nonsense", true, 0));  // never a topic: nobody need hear of it
   CHECK(subscriptions.ask(2, "stats", true, 0));
-  CHECK(told == "+pose/a +stats ");
+  CHECK(reported == "+pose/a +stats ");
   CHECK(subscriptions.ask(1, "pose/a", false, 0));
-  CHECK(told == "+pose/a +stats ");
+  CHECK(reported == "+pose/a +stats ");
   subscriptions.forget(2);
-  CHECK(told == "+pose/a +stats -pose/a -stats ");
+  CHECK(reported == "+pose/a +stats -pose/a -stats ");
 }
 
 TEST_CASE("a peer that subscribes too often is refused, and admitted again later") {

@@ -215,7 +215,7 @@ TEST_CASE("the table names the roots; another word is refused", "[feet]") {
   const auto& table = feet_type().parameters;
   const ParameterSpec& root = table[test::parameter_index(feet_type(), "root")];
   CHECK(number_of(root, std::string("actor")) == static_cast<double>(RootMode::kActor));
-  CHECK(people_text(root, 1.0) == "stride");
+  CHECK(display_text(root, 1.0) == "stride");
   CHECK_FALSE(takes_number(root, 3.0));
   CHECK_FALSE(takes_number(root, 0.5));
   const auto refused = complete_parameters(table, {{"root", std::string("walk")}});

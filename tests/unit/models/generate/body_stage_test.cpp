@@ -62,7 +62,7 @@ class ArmStage {
   void frames(int count) {
     for (int i = 0; i < count; ++i) {
       live = input();
-      stage_->heard(live.header.arrival_ns);
+      stage_->received(live.header.arrival_ns);
       stage_->process({.frame = live}, out);
     }
   }

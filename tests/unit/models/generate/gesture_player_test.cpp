@@ -160,8 +160,8 @@ TEST_CASE("the tempo divides a performance's length", "[playback]") {
     player.set_model(model.get());
     const auto shown = perform(player, order(*model, "g 1 c 3 4 p", tempo), rate_hz, false, 0);
     // The lead-in is the same at any tempo: it goes from a flat hand to the first label.
-    constexpr double kFarthest_rad = 1.3, kLeadSpeed_rad_s = 300.0 * std::numbers::pi / 180.0;
-    const double lead = std::ceil(rate_hz * 1.5 * kFarthest_rad / kLeadSpeed_rad_s);
+    constexpr double kMaxDistance_rad = 1.3, kLeadSpeed_rad_s = 300.0 * std::numbers::pi / 180.0;
+    const double lead = std::ceil(rate_hz * 1.5 * kMaxDistance_rad / kLeadSpeed_rad_s);
     return double(count_of(shown, What::kPerformed)) - lead;
   };
   const double natural = frames(1.0);

@@ -39,7 +39,7 @@ double share_found(const Recording& truth, const std::vector<Segment>& proposed)
   return found / static_cast<double>(truth.segments.size() - 1);
 }
 
-void check_sound(const Recording& recording, const std::vector<Segment>& proposed) {
+void check_valid(const Recording& recording, const std::vector<Segment>& proposed) {
   for (std::size_t i = 0; i < proposed.size(); ++i) {
     CHECK(proposed[i].frames() >= 1);
     if (i > 0) CHECK(proposed[i].begin >= proposed[i - 1].end);
@@ -63,7 +63,7 @@ TEST_CASE("Nine of ten borders are proposed within 150 ms on real poses", "[auto
     REQUIRE(few.segments.size() == 6);
     const auto proposed = propose_segments(few);
     REQUIRE(proposed.has_value());
-    check_sound(few, *proposed);
+    check_valid(few, *proposed);
     const double share = share_found(truth, *proposed);
     std::cout << "auto-label, seed " << seed << ": " << 100.0 * share
               << " % of borders within 150 ms, " << proposed->size() << " segments for "
@@ -86,7 +86,7 @@ TEST_CASE("Where people put the border is learnt from the examples", "[auto_labe
     const Recording few = with_examples(moved, 2);
     const auto proposed = propose_segments(few);
     REQUIRE(proposed.has_value());
-    check_sound(few, *proposed);
+    check_valid(few, *proposed);
     CHECK(share_found(moved, *proposed) >= 0.9);
   }
 }

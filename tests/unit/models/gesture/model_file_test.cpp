@@ -48,9 +48,9 @@ TEST_CASE("A gesture model reads back as it was written", "[gesture_file]") {
   CHECK(duration(*parsed, context).mean == duration(model, context).mean);
   CHECK(parsed->high == model.high);
   CHECK_FALSE(parsed->tells_none);
-  GestureModel telling = model;
-  telling.tells_none = true;
-  CHECK(parse(serialize_model(telling))->tells_none);
+  GestureModel with_none = model;
+  with_none.tells_none = true;
+  CHECK(parse(serialize_model(with_none))->tells_none);
 }
 
 TEST_CASE("A gesture model is saved completely and loaded again", "[gesture_file]") {

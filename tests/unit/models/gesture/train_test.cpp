@@ -33,7 +33,7 @@ bool warned(const GestureModel& model, const std::string& what) {
 }
 
 // Whether every number that a lookup can return would be accepted in a model file.
-bool sound(const GestureModel& model) {
+bool valid(const GestureModel& model) {
   const std::string bytes = serialize_model(model);
   const auto parsed = parse_model(std::as_bytes(std::span(bytes)), "trained");
   if (!parsed) UNSCOPED_INFO(parsed.error().message);
@@ -81,7 +81,7 @@ TEST_CASE("A synthetic corpus is learnt, unseen labels included", "[train]") {
   const Recording recording = performed({});
   const auto model = train_gesture({recording}, {});
   REQUIRE(model.has_value());
-  CHECK(sound(*model));
+  CHECK(valid(*model));
   CHECK_FALSE(warned(*model, "gestures; below 20"));
   CHECK_FALSE(warned(*model, "may go astray"));
   const auto report = nlohmann::json::parse(model->report_json);
@@ -110,7 +110,7 @@ TEST_CASE("Few gestures are learnt with a warning", "[train]") {
   CHECK(warned(*few, "only 12 gestures"));
   const auto one = train_gesture({performed({.script = {"g"}})}, {});
   REQUIRE(one.has_value());
-  CHECK(sound(*one));
+  CHECK(valid(*one));
   CHECK(warned(*one, "'g' was recorded once only"));
 }
 
@@ -146,7 +146,7 @@ TEST_CASE("Constant channels do no harm", "[train]") {
   recording.angles_rad.middleCols(kFingerChannels, kFingerChannels).setConstant(0.3);  // the index
   const auto model = train_gesture({recording}, {});
   REQUIRE(model.has_value());
-  CHECK(sound(*model));
+  CHECK(valid(*model));
   for (int state = 0; state < kStates; ++state) {
     CHECK(model->trees[state][1].leaves.size() == 1);
     CHECK(model->trees[state][1].leaves[0].mean[0][0] == Approx(0.3));

@@ -17,7 +17,7 @@ std::string body_refusal(const std::vector<JointGroup>& groups) {
   return vocabulary ? "" : vocabulary.error().message;
 }
 
-bool tells(const std::string& message, const std::string& what) {
+bool mentions(const std::string& message, const std::string& what) {
   UNSCOPED_INFO(message);
   return message.find(what) != std::string::npos;
 }
@@ -83,15 +83,15 @@ TEST_CASE("A body's durations ask for the classes of each group, and labels by n
 
 TEST_CASE("Groups that do not divide a body are refused", "[vocabulary]") {
   CHECK(body_refusal(body_groups()).empty());
-  CHECK(tells(body_refusal({{"arm", {}}, {"rest", {"hips"}}}), "group 'arm' has no joints"));
-  CHECK(tells(body_refusal({{"arm", {"elbow"}}, {"rest", {"hips"}}}),
-              "'elbow', which is no bone of the humanoid"));
-  CHECK(tells(body_refusal({{"arm", {"leftHand"}}, {"rest", {"hips", "leftHand"}}}),
-              "groups overlap: joint 'leftHand' is in 'arm' and again in 'rest'"));
-  CHECK(tells(body_refusal({{"arm", {"leftHand", "leftHand"}}}), "groups overlap"));
-  CHECK(tells(body_refusal({{"arm", {"leftHand"}}}), "no group has the joint hips"));
-  CHECK(tells(body_refusal({{"two words", {"hips"}}}), "is no name of a group"));
-  CHECK(tells(body_refusal({}), "1 to 16 groups"));
+  CHECK(mentions(body_refusal({{"arm", {}}, {"rest", {"hips"}}}), "group 'arm' has no joints"));
+  CHECK(mentions(body_refusal({{"arm", {"elbow"}}, {"rest", {"hips"}}}),
+                 "'elbow', which is no bone of the humanoid"));
+  CHECK(mentions(body_refusal({{"arm", {"leftHand"}}, {"rest", {"hips", "leftHand"}}}),
+                 "groups overlap: joint 'leftHand' is in 'arm' and again in 'rest'"));
+  CHECK(mentions(body_refusal({{"arm", {"leftHand", "leftHand"}}}), "groups overlap"));
+  CHECK(mentions(body_refusal({{"arm", {"leftHand"}}}), "no group has the joint hips"));
+  CHECK(mentions(body_refusal({{"two words", {"hips"}}}), "is no name of a group"));
+  CHECK(mentions(body_refusal({}), "1 to 16 groups"));
 }
 
 TEST_CASE("Labels of equal classes stay apart if questions may name one", "[vocabulary]") {
@@ -151,12 +151,12 @@ TEST_CASE("A body's model file with a wrong body is refused", "[gesture_file]") 
     return parsed ? std::string("sound") : parsed.error().message;
   };
   CHECK(verdict([](auto&) {}) == "sound");
-  CHECK(tells(verdict([](auto& m) { m.body->joints[0] = "elbow"; }), "no bone"));
-  CHECK(tells(verdict([](auto& m) { m.body->mean[0].w() = 2.0; }), "a mean rotation"));
-  CHECK(tells(verdict([](auto& m) { m.groups[0].channels = 6; }), "the groups"));
-  CHECK(tells(verdict([](auto& m) { m.groups[0].classes = 27; }), "classes"));
-  CHECK(tells(verdict([](auto& m) { m.named = {2}; }), "a label that questions name"));
-  CHECK(tells(verdict([](auto& m) { m.body.reset(); }), "a label's classes"));
+  CHECK(mentions(verdict([](auto& m) { m.body->joints[0] = "elbow"; }), "no bone"));
+  CHECK(mentions(verdict([](auto& m) { m.body->mean[0].w() = 2.0; }), "a mean rotation"));
+  CHECK(mentions(verdict([](auto& m) { m.groups[0].channels = 6; }), "the groups"));
+  CHECK(mentions(verdict([](auto& m) { m.groups[0].classes = 27; }), "classes"));
+  CHECK(mentions(verdict([](auto& m) { m.named = {2}; }), "a label that questions name"));
+  CHECK(mentions(verdict([](auto& m) { m.body.reset(); }), "a label's classes"));
 }
 
 }  // namespace posed::gesture

@@ -85,13 +85,13 @@ TEST_CASE("the same pose twice is marked as held") {
 TEST_CASE("when too many frames wait, the oldest goes out at once") {
   OneHand hand({{"wait_s", 0.1}});
   hand.send_glove(0, 0.2);
-  constexpr auto kMost = static_cast<int>(kMaxWaiting);
-  for (int i = 1; i <= kMost; ++i) hand.send_body(i * kMs);
+  constexpr auto kMaxFrames = static_cast<int>(kMaxWaiting);
+  for (int i = 1; i <= kMaxFrames; ++i) hand.send_body(i * kMs);
   CHECK(hand.rig.out.empty());
-  hand.send_body((kMost + 1) * kMs);
+  hand.send_body((kMaxFrames + 1) * kMs);
   REQUIRE(hand.rig.out.size() == 1);
   CHECK(hand.rig.out[0].frame.header.sequence == 1);
-  CHECK(hand.rig.out[0].frame.lag_frames == kMost - 1);
+  CHECK(hand.rig.out[0].frame.lag_frames == kMaxFrames - 1);
   hand.rig.flush();
   CHECK(hand.rig.out.size() == kMaxWaiting + 1);
 }

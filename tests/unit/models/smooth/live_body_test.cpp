@@ -128,12 +128,12 @@ class RealTakes {
 TEST_CASE("a live body's movements are recognised", "[live][body]") {
   for (const double rate_hz : {30.0, 120.0}) {
     const gesture::Recording truth = seen(arms().kept, rate_hz, arms().model);
-    const FollowedBody told = arms().follow(degrees(truth), rate_hz, 1, arms().live.get());
+    const FollowedBody reported = arms().follow(degrees(truth), rate_hz, 1, arms().live.get());
     test::FrameScore score;
-    score.add(told.label, truth, 0.3);
+    score.add(reported.label, truth, 0.3);
     INFO(rate_hz << " Hz");
     CHECK(score.share() >= 0.9);
-    REQUIRE(told.frames.size() == static_cast<std::size_t>(truth.angles_rad.rows()));
+    REQUIRE(reported.frames.size() == static_cast<std::size_t>(truth.angles_rad.rows()));
     CHECK(arms().follow(degrees(truth), rate_hz, 1, nullptr).label[40].empty());
   }
 }
@@ -144,21 +144,21 @@ TEST_CASE("a body's movements are steadied, and dropouts bridged", "[live][body]
     const Motion measured = test::noisy(degrees(truth), noise_deg, 5);
     const auto rms_deg = [&](const LiveModel* model) {
       const auto options = test::live_options(1, noise_deg);
-      const FollowedBody told =
+      const FollowedBody reported =
           followed_body(arms().model, arms().kept.clip, measured, 30.0, options, model);
-      return bench::rms_deg(told.channels, degrees(truth));
+      return bench::rms_deg(reported.channels, degrees(truth));
     };
     INFO(noise_deg << " deg");
     CHECK(rms_deg(arms().live.get()) < 0.7 * bench::rms_deg(measured, degrees(truth)));
     CHECK(rms_deg(arms().live.get()) < 1.02 * rms_deg(nullptr));
   }
   const test::Gaps gaps = test::with_gaps(test::noisy(degrees(truth), 1.0, 5), 8, 3);
-  const FollowedBody told = arms().follow(gaps.measured, 30.0, 1, arms().live.get());
+  const FollowedBody reported = arms().follow(gaps.measured, 30.0, 1, arms().live.get());
   test::GapError error;
-  error.add(degrees(truth), told.channels, gaps);
+  error.add(degrees(truth), reported.channels, gaps);
   CHECK(error.ours_deg() < error.held_deg());
-  for (std::size_t t = 0; t < told.frames.size(); ++t) {
-    CHECK((told.frames[t].quality == Quality::kPredicted) == gaps.missing[t]);
+  for (std::size_t t = 0; t < reported.frames.size(); ++t) {
+    CHECK((reported.frames[t].quality == Quality::kPredicted) == gaps.missing[t]);
   }
 }
 
@@ -266,10 +266,10 @@ TEST_CASE("five movements of real people are recognised", "[live][body][real]") 
       const ArmTake take = takes.take(movement, kept);
       const auto live = bound(model, *take.clip.skeleton);
       const gesture::Recording truth = seen(take, 30.0, model);
-      const FollowedBody told = followed_body(model, take.clip, degrees(truth), 30.0,
-                                              test::live_options(1, 0.5), live.get());
-      score.add(told.label, truth, 0.3);
-      all.add(told.label, truth, 0.3);
+      const FollowedBody reported = followed_body(model, take.clip, degrees(truth), 30.0,
+                                                  test::live_options(1, 0.5), live.get());
+      score.add(reported.label, truth, 0.3);
+      all.add(reported.label, truth, 0.3);
     }
     std::cout << "take " << kept << " kept back: " << score.share() << " of " << score.frames()
               << " frames right after 0.3 s\n";
@@ -298,9 +298,9 @@ TEST_CASE("a real body is steadied more than by filters tuned on it", "[live][bo
         trials.push_back({.truth = truth, .measured = measured, .rate_hz = rate_hz});
         const auto error = [&](const LiveModel* with) {
           const auto options = test::live_options(1, noise_deg);
-          const FollowedBody told =
+          const FollowedBody reported =
               followed_body(model, take.clip, measured, rate_hz, options, with);
-          return std::pow(bench::rms_deg(told.channels, truth), 2) / 4.0;
+          return std::pow(bench::rms_deg(reported.channels, truth), 2) / 4.0;
         };
         squares += error(live.get());
         without += error(nullptr);

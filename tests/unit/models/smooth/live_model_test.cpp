@@ -44,7 +44,7 @@ const smooth::LiveModel& real_pose_model() {
 }
 
 // The same, and what is none of its gestures is told.
-const smooth::LiveModel& telling_none() {
+const smooth::LiveModel& model_with_none() {
   static const auto kModel = model_of(real_pose_corpus(*shared(kLibras), 7), true);
   return *kModel;
 }
@@ -63,9 +63,10 @@ int none_percent(const std::string& sign) {
       const double way = u * u * u * (10.0 - u * (15.0 - 6.0 * u));  // minimum jerk
       motion.row(t) = (start.row(i) + way * (poses.row(i) - start.row(i))) / kDegree;
     }
-    const auto told = followed(noisy(motion, 1.0, 5), 30.0, live_options(1, 1.0), &telling_none());
+    const auto reported =
+        followed(noisy(motion, 1.0, 5), 30.0, live_options(1, 1.0), &model_with_none());
     for (std::size_t t = kHeld; t < kFrames - 2; ++t, ++held) {
-      none += told.label[t] == smooth::kNoneName ? 1 : 0;
+      none += reported.label[t] == smooth::kNoneName ? 1 : 0;
     }
   }
   return 100 * none / held;
@@ -78,9 +79,9 @@ TEST_CASE("a live hand's gestures are recognised", "[live][labels]") {
     LabelScore score;
     for (const unsigned seed : {123U, 5U, 77U}) {
       const SyntheticHand hand = synthetic_hand(40, seed);
-      const auto told = followed(noisy(hand.angles, noise_deg, 5), 30.0, live_options(1, noise_deg),
-                                 &synthetic_model());
-      score.add(told, recording_of(hand), 1);
+      const auto reported = followed(noisy(hand.angles, noise_deg, 5), 30.0,
+                                     live_options(1, noise_deg), &synthetic_model());
+      score.add(reported, recording_of(hand), 1);
     }
     std::cout << "labels, synthetic hand, " << noise_deg << " deg, lag 1: " << score.accuracy()
               << " of frames right, p > 0.8 after " << score.median_delay() << " frames\n";
@@ -114,7 +115,7 @@ TEST_CASE("a hand that makes none of the gestures is told so where the model doe
     const Motion measured = noisy(truth.angles_rad / kDegree, noise_deg, 5);
     const auto options = live_options(1, noise_deg);
     without.add(followed(measured, 30.0, options, &real_pose_model()), truth, 1);
-    with.add(followed(measured, 30.0, options, &telling_none()), truth, 1);
+    with.add(followed(measured, 30.0, options, &model_with_none()), truth, 1);
     CHECK(with.accuracy() == without.accuracy());
   }
   // Real poses of the three signs with their whole spread, then of all others.

@@ -79,10 +79,10 @@ TEST_CASE("a BVH is read leniently where the pose is not in doubt") {
   if (!clip) FAIL(clip.error().text());
   CHECK(clip->frames() == 2);
   CHECK(clip->skeleton->joints[1].name == "Left Arm:upper");
-  bool told = false;
+  bool reported = false;
   for (const std::string& warning : clip->warnings)
-    told |= warning.find("'4000000000'") != std::string::npos;
-  CHECK(told);
+    reported |= warning.find("'4000000000'") != std::string::npos;
+  CHECK(reported);
 }
 
 TEST_CASE("a BVH that would give a wrong pose is refused with its line") {

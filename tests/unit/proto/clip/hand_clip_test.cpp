@@ -32,9 +32,8 @@ std::string row(const std::string& time, double base) {
 }
 
 Result<HandClip> parse_hand_csv(const std::string& text) {
-  const auto clip = parse_clip({.name = "h.csv", .bytes = text});
-  if (!clip) return std::unexpected(clip.error());
-  return hand_of(*clip);
+  const auto clip = TRY(parse_clip({.name = "h.csv", .bytes = text}));
+  return hand_of(clip);
 }
 
 std::string error_of(const std::string& text) {

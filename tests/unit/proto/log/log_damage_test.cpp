@@ -101,22 +101,18 @@ TEST_CASE("a flipped bit in any column of any row is detected, and log, table an
 
 // Everything that a replay uses, as the reader returns it.
 Result<std::string> contents(const std::filesystem::path& path) {
-  auto reader = Reader::open(path);
-  if (!reader) return std::unexpected(reader.error());
+  auto reader = TRY(Reader::open(path));
   std::string all;
   const auto add = [&](const auto&... parts) { ((all += parts, all += '\n'), ...); };
-  for (const auto& row : reader->sources()) add(row.name, row.driver, row.text, row.identity);
-  for (const auto& row : reader->streams()) add(row.name, row.stages_json);
+  for (const auto& row : reader.sources()) add(row.name, row.driver, row.text, row.identity);
+  for (const auto& row : reader.streams()) add(row.name, row.stages_json);
   for (;;) {
-    const auto chunk = reader->next_chunk();
-    if (!chunk) return std::unexpected(chunk.error());
-    if (!chunk->has_value()) break;
-    add(std::to_string((*chunk)->id), std::to_string((*chunk)->arrival_ns),
-        text_of((*chunk)->bytes));
+    const auto chunk = TRY(reader.next_chunk());
+    if (!chunk.has_value()) break;
+    add(std::to_string(chunk->id), std::to_string(chunk->arrival_ns), text_of(chunk->bytes));
   }
-  const auto decisions = reader->decisions();
-  if (!decisions) return std::unexpected(decisions.error());
-  for (const auto& row : *decisions) add(std::to_string(row.item), row.stage, row.name, row.value);
+  const auto decisions = TRY(reader.decisions());
+  for (const auto& row : decisions) add(std::to_string(row.item), row.stage, row.name, row.value);
   return all;
 }
 
@@ -134,7 +130,7 @@ TEST_CASE("any flipped bit of a log is reported or changes nothing") {
   const auto expected = contents(whole);
   REQUIRE(expected);
   const auto bits = 8 * std::filesystem::file_size(whole);
-  int told = 0;
+  int reported = 0;
   for (std::uintmax_t bit = 0; bit < bits; bit += bits / 400) {
     std::filesystem::copy_file(whole, path, std::filesystem::copy_options::overwrite_existing);
     {
@@ -147,9 +143,9 @@ TEST_CASE("any flipped bit of a log is reported or changes nothing") {
     INFO("bit " << bit);
     if (found) CHECK(*found == *expected);
     if (!found) CHECK(found.error().file == path.string());
-    told += found ? 0 : 1;
+    reported += found ? 0 : 1;
   }
-  CHECK(told > 50);  // the other bits are in unused parts of pages
+  CHECK(reported > 50);  // the other bits are in unused parts of pages
 }
 
 }  // namespace

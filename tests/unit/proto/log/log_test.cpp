@@ -69,10 +69,10 @@ TEST_CASE("a log gives back every row it was given") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
   constexpr std::uint32_t kLate = 3U << 16U | 5U;  // ids are names, not indices
-  constexpr std::uint64_t kMost = ~std::uint64_t{0};
+  constexpr std::uint64_t kMaxId = ~std::uint64_t{0};
   Writer writer = writer_with_two_streams(path);
   REQUIRE(writer.add(log::StreamRow{kLate, 1, "Ann", "b-ann", "{\"stages\":[]}", 40}));
-  const std::vector<log::StreamPosition> places{{1, 7, 8}, {kLate, 300, kMost}};
+  const std::vector<log::StreamPosition> places{{1, 7, 8}, {kLate, 300, kMaxId}};
   REQUIRE(writer.add(log::ChunkRow{.source = 1,
                                    .socket = 2,
                                    .direction = 3,
@@ -82,7 +82,7 @@ TEST_CASE("a log gives back every row it was given") {
                                    .bytes = bytes_of("1 2 3\n")}));
   REQUIRE(writer.add(chunk_row(0, 1, "")));
   CHECK(writer.last_chunk_id() == 2);
-  REQUIRE(writer.add(log::DecisionRow{.item = kMost,
+  REQUIRE(writer.add(log::DecisionRow{.item = kMaxId,
                                       .stream = kLate,
                                       .stage = "style",
                                       .name = "alpha",
@@ -122,7 +122,7 @@ TEST_CASE("a log gives back every row it was given") {
   REQUIRE((*chunk)->places.size() == 2);
   CHECK((*chunk)->places[1].stream == kLate);
   CHECK((*chunk)->places[1].next_frame == 300);
-  CHECK((*chunk)->places[1].next_sample == kMost);
+  CHECK((*chunk)->places[1].next_sample == kMaxId);
   CHECK(text_of((*chunk)->bytes) == "1 2 3\n");
   chunk = reader->next_chunk();
   REQUIRE((chunk && chunk->has_value()));
@@ -132,7 +132,7 @@ TEST_CASE("a log gives back every row it was given") {
 
   const auto decisions = reader->decisions();
   REQUIRE((decisions && decisions->size() == 1));
-  CHECK(decisions->front().item == kMost);
+  CHECK(decisions->front().item == kMaxId);
   CHECK(decisions->front().stream == kLate);
   CHECK(decisions->front().stage == "style");
   CHECK(decisions->front().name == "alpha");

@@ -17,25 +17,25 @@ const std::array<ParameterSpec, 4> kTable{{
      .help = "",
      .min = 0.0,
      .max = 90.0 * kDegree,
-     .people_name = "noise_deg",
-     .people_scale = 1.0 / kDegree},
+     .display_name = "noise_deg",
+     .display_scale = 1.0 / kDegree},
     {.name = "count", .default_value = std::int64_t{3}, .help = "", .min = 0.0, .max = 9.0},
     {.name = "on", .default_value = false, .help = ""},
 }};
 
 std::string parameter_refusal(const ParameterSpec& spec, const ParameterValue& value) {
-  const auto checked = from_people(spec, value, spec.shown_name());
+  const auto checked = from_display(spec, value, spec.shown_name());
   return checked ? std::string() : checked.error().message;
 }
 
 TEST_CASE("a value is checked against its type and its range, in the units of people") {
-  CHECK(from_people(kTable[0], std::int64_t{2}, "gain") == ParameterValue(2.0));
+  CHECK(from_display(kTable[0], std::int64_t{2}, "gain") == ParameterValue(2.0));
   CHECK(parameter_refusal(kTable[0], 2.5) ==
         "gain = 2.5 is out of range: it takes a number from -2 to 2");
   CHECK(parameter_refusal(kTable[0], std::numeric_limits<double>::quiet_NaN())
             .contains("out of range"));
   CHECK(parameter_refusal(kTable[0], true) == "gain must be a number, not true or false");
-  CHECK(std::get<double>(from_people(kTable[1], 90.0, "").value()) == Approx(1.5707963268));
+  CHECK(std::get<double>(from_display(kTable[1], 90.0, "").value()) == Approx(1.5707963268));
   CHECK(parameter_refusal(kTable[1], 91.0) ==
         "noise_deg = 91 is out of range: it takes a number of degrees from 0 to 90");
   CHECK(parameter_refusal(kTable[2], 0.5) == "count must be an integer, not a number");

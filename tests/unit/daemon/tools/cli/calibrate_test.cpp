@@ -28,7 +28,7 @@ class ScriptedUser final : public PoseGuide {
     asked.push_back(pose);
     glove_.hold(pose);
   }
-  Word hear() override {
+  Word receive() override {
     if (script_.empty()) return Word::kGo;
     const Word word = script_.front();
     script_.pop_front();

@@ -33,7 +33,7 @@ struct WalkerFolders {
   [[nodiscard]] fs::path of(std::uint32_t person) const {
     return folder.path() / std::to_string(person);
   }
-  [[nodiscard]] Result<NaturalClips> read() const {
+  Result<NaturalClips> read() const {
     ThreadTasks tasks(1);
     return read_natural_clips(
         {.clip = of(1) / "walk.bvh", .corpus = folder.path(), .skeleton = {}, .hand = {}}, tasks,

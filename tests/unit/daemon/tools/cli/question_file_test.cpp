@@ -112,15 +112,15 @@ TEST_CASE("The groups of a body are read, and read back as written", "[questions
 }
 
 TEST_CASE("Groups of a body that are wrong are refused", "[questions]") {
-  const auto tells = [](const std::string& text, const char* what) {
+  const auto mentions = [](const std::string& text, const char* what) {
     UNSCOPED_INFO(text);
     return text.find(what) != std::string::npos && text.find("arms.toml") != std::string::npos;
   };
-  CHECK(tells(arms_refusal("joints = \\[\"spine\", \"chest\"\\]", ""),
-              "group 'trunk' has no joints"));
-  CHECK(tells(arms_refusal("\"chest\"", "\"head\""), "groups overlap: joint 'head'"));
-  CHECK(tells(arms_refusal("\"spine\"", "\"back\""), "'back', which is no bone"));
-  CHECK(tells(arms_refusal("B = \\[\"raise-left\"", "D = [\"raise-left\""), "unknown key"));
-  CHECK(tells(arms_refusal("B = \\[\"raise-left\", ", "B = ["), "in no class of the left-arm"));
-  CHECK(tells(arms_refusal("\\[head\\]", "named = [\"wave\"]\n[head]"), "named has 'wave'"));
+  CHECK(mentions(arms_refusal("joints = \\[\"spine\", \"chest\"\\]", ""),
+                 "group 'trunk' has no joints"));
+  CHECK(mentions(arms_refusal("\"chest\"", "\"head\""), "groups overlap: joint 'head'"));
+  CHECK(mentions(arms_refusal("\"spine\"", "\"back\""), "'back', which is no bone"));
+  CHECK(mentions(arms_refusal("B = \\[\"raise-left\"", "D = [\"raise-left\""), "unknown key"));
+  CHECK(mentions(arms_refusal("B = \\[\"raise-left\", ", "B = ["), "in no class of the left-arm"));
+  CHECK(mentions(arms_refusal("\\[head\\]", "named = [\"wave\"]\n[head]"), "named has 'wave'"));
 }

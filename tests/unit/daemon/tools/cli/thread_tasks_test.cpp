@@ -14,12 +14,12 @@ using namespace posed::tools;
 TEST_CASE("results come in the tasks' order, whatever the number of threads", "[tasks]") {
   for (const unsigned threads : {0U, 1U, 3U, 64U}) {
     ThreadTasks tasks(threads);
-    std::size_t told = 0;
+    std::size_t reported = 0;
     const auto found = tasks.run(
         100, [](std::size_t i) { return TaskResult{static_cast<double>(i * i)}; },
         [&](std::size_t done) {
-          CHECK(done >= told);
-          told = done;
+          CHECK(done >= reported);
+          reported = done;
           return true;
         });
     REQUIRE(found);

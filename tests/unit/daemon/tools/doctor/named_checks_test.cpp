@@ -16,7 +16,7 @@ namespace {
 
 using test::glove_config;
 using test::has;
-using test::SoundMachine;
+using test::HealthyMachine;
 
 // A log's file as far as its marks, of this format.
 void write_marks(const std::filesystem::path& path, int format) {
@@ -28,9 +28,9 @@ void write_marks(const std::filesystem::path& path, int format) {
 }
 
 TEST_CASE("doctor: without a config the checks of what it names are not made, which is right") {
-  const SoundMachine sound;
+  const HealthyMachine healthy;
   for (const Check& check :
-       {check_disk(sound.machine, nullptr), check_ports(sound.machine, nullptr),
+       {check_disk(healthy.machine, nullptr), check_ports(healthy.machine, nullptr),
         check_keys(nullptr), check_models(nullptr), check_logs(nullptr)}) {
     INFO(check.name);
     CHECK(check.ok);
@@ -40,44 +40,44 @@ TEST_CASE("doctor: without a config the checks of what it names are not made, wh
 }
 
 TEST_CASE("doctor: a recording needs an hour of disk") {
-  SoundMachine sound;
+  HealthyMachine healthy;
   auto config = glove_config();
-  CHECK(has(check_disk(sound.machine, &config).found, "no [record]"));
-  config.record = {.folder = sound.folder.path() / "takes" / "new"};
-  CHECK(check_disk(sound.machine, &config).ok);
-  std::ofstream(sound.folder.path() / "file") << "x";
+  CHECK(has(check_disk(healthy.machine, &config).found, "no [record]"));
+  config.record = {.folder = healthy.folder.path() / "takes" / "new"};
+  CHECK(check_disk(healthy.machine, &config).ok);
+  std::ofstream(healthy.folder.path() / "file") << "x";
   for (const char* taken : {"file", "file/takes"}) {
-    config.record->folder = sound.folder.path() / taken;
-    const Check in_the_way = check_disk(sound.machine, &config);
+    config.record->folder = healthy.folder.path() / taken;
+    const Check in_the_way = check_disk(healthy.machine, &config);
     CHECK_FALSE(in_the_way.ok);
     CHECK(has(in_the_way.found, "file is a file, so it cannot be a folder for recordings"));
   }
-  config.record->folder = sound.folder.path() / "takes" / "new";
+  config.record->folder = healthy.folder.path() / "takes" / "new";
   const double an_hour = recorded_bytes_per_s(config) * 3600.0;
   CHECK(an_hour > 0.0);
-  sound.machine.free_bytes = [&](const std::filesystem::path& folder) {
-    CHECK(folder == sound.folder.path());  // the first that exists
+  healthy.machine.free_bytes = [&](const std::filesystem::path& folder) {
+    CHECK(folder == healthy.folder.path());  // the first that exists
     return static_cast<std::uint64_t>(an_hour * 0.9);
   };
-  const Check full = check_disk(sound.machine, &config);
+  const Check full = check_disk(healthy.machine, &config);
   CHECK_FALSE(full.ok);
   CHECK(has(full.found, "for about 0.9 hours"));
   config.record->frames = true;  // needs more
   CHECK(recorded_bytes_per_s(config) * 3600.0 > an_hour);
-  sound.machine.may_write = [](const auto&) { return false; };
-  CHECK(has(check_disk(sound.machine, &config).fix, "sudo chown ann"));
+  healthy.machine.may_write = [](const auto&) { return false; };
+  CHECK(has(check_disk(healthy.machine, &config).fix, "sudo chown ann"));
 }
 
 TEST_CASE("doctor: the ports of a config have to be free") {
-  SoundMachine sound;
+  HealthyMachine healthy;
   config::DaemonConfig config;
   config.trigger.emplace();
-  CHECK(check_ports(sound.machine, &config).found == "3 can be bound");
-  sound.machine.try_bind = [](const Listener& one) -> Result<> {
+  CHECK(check_ports(healthy.machine, &config).found == "3 can be bound");
+  healthy.machine.try_bind = [](const Listener& one) -> Result<> {
     if (one.who == "trigger") return fail("Address already in use");
     return {};
   };
-  const Check bad = check_ports(sound.machine, &config);
+  const Check bad = check_ports(healthy.machine, &config);
   CHECK_FALSE(bad.ok);
   CHECK(bad.found == "trigger: udp 127.0.0.1:1512 cannot be bound (Address already in use)");
   CHECK(has(bad.fix, "ss -tulpn"));
@@ -130,10 +130,10 @@ TEST_CASE("doctor: this machine binds a free port and refuses one in use") {
 }
 
 TEST_CASE("doctor: secret keys are for their owner alone") {
-  const SoundMachine sound;
+  const HealthyMachine healthy;
   config::DaemonConfig config;
   CHECK(check_keys(&config).ok);
-  const auto key = sound.folder.write("server.key", std::string(40, 'k') + "\n");
+  const auto key = healthy.folder.write("server.key", std::string(40, 'k') + "\n");
   config.security.server_key = key;
   ::chmod(key.c_str(), 0600);
   CHECK(check_keys(&config).ok);
@@ -141,7 +141,7 @@ TEST_CASE("doctor: secret keys are for their owner alone") {
   const Check bad = check_keys(&config);
   CHECK_FALSE(bad.ok);
   CHECK(bad.fix == "chmod 600 " + key.string());
-  sound.folder.write("server.key", "my password\n");
+  healthy.folder.write("server.key", "my password\n");
   ::chmod(key.c_str(), 0600);
   CHECK(has(check_keys(&config).found, "this is not a key"));
   std::filesystem::remove(key);
@@ -149,42 +149,42 @@ TEST_CASE("doctor: secret keys are for their owner alone") {
 }
 
 TEST_CASE("doctor: models are of a version that this one reads") {
-  const SoundMachine sound;
+  const HealthyMachine healthy;
   auto config = glove_config();
   CHECK(check_models(&config).ok);
   v1::ModelFile file;
   file.mutable_style();
   std::string bytes = model_file::wrap(file);
-  const auto path = sound.folder.write("walk.style", bytes);
+  const auto path = healthy.folder.write("walk.style", bytes);
   config.streams[0].stages.push_back({.model = path});
   CHECK(check_models(&config).found == "1 that this version reads");
   bytes[8] = 99;  // version
-  sound.folder.write("walk.style", bytes);
+  healthy.folder.write("walk.style", bytes);
   const Check bad = check_models(&config);
   CHECK_FALSE(bad.ok);
   CHECK(has(bad.found, path.string()));
 }
 
 TEST_CASE("doctor: logs are of a version that this one reads") {
-  const SoundMachine sound;
+  const HealthyMachine healthy;
   config::DaemonConfig config;
   CHECK(check_logs(&config).ok);
-  config.record = {.folder = sound.folder.path()};
+  config.record = {.folder = healthy.folder.path()};
   CHECK(has(check_logs(&config).found, "none in"));
-  write_marks(sound.folder.path() / "old.plog", 2);
+  write_marks(healthy.folder.path() / "old.plog", 2);
   CHECK(check_logs(&config).found == "1 that this version reads");
-  write_marks(sound.folder.path() / "new.plog", 4);
+  write_marks(healthy.folder.path() / "new.plog", 4);
   const Check bad = check_logs(&config);
   CHECK_FALSE(bad.ok);
   CHECK(has(bad.found, "written by a newer posed"));
 }
 
 TEST_CASE("doctor: a sound machine passes every check, and no two have one name") {
-  SoundMachine sound;
-  sound.plug_in();
+  HealthyMachine healthy;
+  healthy.plug_in();
   const auto config = glove_config();
   std::set<std::string> names;
-  for (const Check& check : examine(sound.machine, &config)) {
+  for (const Check& check : examine(healthy.machine, &config)) {
     INFO(check.name << ": " << check.found);
     CHECK(check.ok);
     CHECK(check.fix.empty());

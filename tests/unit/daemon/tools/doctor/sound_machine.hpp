@@ -12,8 +12,8 @@
 
 namespace posed::test {
 
-struct SoundMachine {
-  SoundMachine() {
+struct HealthyMachine {
+  HealthyMachine() {
     machine.root = folder.path();
     machine.user = "ann";
     machine.groups = {"ann", "dialout", "plugdev"};

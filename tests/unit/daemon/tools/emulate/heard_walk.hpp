@@ -26,7 +26,7 @@ inline Frame pose_at(const clip::Clip& clip, std::int64_t at_ns) {
   return pose;
 }
 
-struct HeardPose {
+struct ReceivedPose {
   std::string body;
   std::shared_ptr<const Skeleton> skeleton;
   Frame frame;
@@ -41,7 +41,7 @@ class EmulatedHost {
   explicit EmulatedHost(const drivers::Driver& driver)
       : driver_(driver), decoder_(driver.make_decoder(driver.expect({}).value()).value()) {}
 
-  void hear(std::uint8_t socket, const std::vector<std::byte>& bytes, std::int64_t now_ns) {
+  void receive(std::uint8_t socket, const std::vector<std::byte>& bytes, std::int64_t now_ns) {
     const int before = sink.descriptions;
     decoder_->feed_socket(socket, bytes, now_ns, sink);
     if (sink.descriptions == before) return;
@@ -63,12 +63,13 @@ class EmulatedHost {
 };
 
 // The frames of all bodies during this time; nothing may be damaged or out of order.
-inline std::vector<HeardPose> hear_walk(const drivers::Driver& driver,
-                                        const std::filesystem::path& bvh, std::int64_t length_ns) {
+inline std::vector<ReceivedPose> receive_walk(const drivers::Driver& driver,
+                                              const std::filesystem::path& bvh,
+                                              std::int64_t length_ns) {
   const auto emulator = driver.emulate({}).value();
   const emulate::Motion motion = emulate::clip_motion(bvh, *emulator).value();
   EmulatedHost host(driver);
-  std::vector<HeardPose> all;
+  std::vector<ReceivedPose> all;
   std::int64_t posed_ns = 0, posed_before_ns = 0;
   while (posed_ns < length_ns) {
     const std::int64_t due_ns = emulator->next_due_ns();
@@ -78,7 +79,7 @@ inline std::vector<HeardPose> hear_walk(const drivers::Driver& driver,
     std::vector<std::byte> bytes;
     const std::uint8_t socket = emulator->next_socket();
     emulator->emit(due_ns, bytes);
-    host.hear(socket, bytes, due_ns);
+    host.receive(socket, bytes, due_ns);
     for (std::size_t i = 0; i < host.sink.frames.size(); ++i) {
       const drivers::Body& body = host.body(host.sink.bodies[i]);
       all.push_back({body.name, body.skeleton, host.sink.frames[i], posed_ns, posed_before_ns});

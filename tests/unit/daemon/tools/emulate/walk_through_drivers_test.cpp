@@ -21,7 +21,7 @@ namespace posed::emulate {
 namespace {
 
 using motion::WalkerFamily;
-using test::HeardPose;
+using test::ReceivedPose;
 
 constexpr double kWithin_rad = 0.1 * kDegree;
 constexpr std::int64_t kLength_ns = 2 * kNanosPerSecond;
@@ -67,39 +67,39 @@ class Walk {
   }
 
   // The frames of the first person, with a time for the filter.
-  [[nodiscard]] std::vector<HeardPose> through(const drivers::Driver& driver) const {
-    std::vector<HeardPose> all = test::hear_walk(driver, path(), kLength_ns);
-    std::erase_if(all, [](const HeardPose& heard) {  // props
-      return Turns(*heard.skeleton, heard.frame).there.count() < 5;
+  [[nodiscard]] std::vector<ReceivedPose> through(const drivers::Driver& driver) const {
+    std::vector<ReceivedPose> all = test::receive_walk(driver, path(), kLength_ns);
+    std::erase_if(all, [](const ReceivedPose& received) {  // props
+      return Turns(*received.skeleton, received.frame).there.count() < 5;
     });
     const std::string first = all.empty() ? "" : all[0].body;
-    std::erase_if(all, [&](const HeardPose& heard) { return heard.body != first; });
-    for (HeardPose& heard : all) {
-      heard.frame.header.device_ns = kNoTime_ns;
-      heard.frame.header.arrival_ns = heard.posed_ns;
+    std::erase_if(all, [&](const ReceivedPose& received) { return received.body != first; });
+    for (ReceivedPose& received : all) {
+      received.frame.header.device_ns = kNoTime_ns;
+      received.frame.header.arrival_ns = received.posed_ns;
     }
     return all;
   }
   // The same frames from the file: as the emulator was posed last, or before that.
-  [[nodiscard]] std::vector<HeardPose> from_file(const std::vector<HeardPose>& walker) const {
-    std::vector<HeardPose> same;
-    for (const HeardPose& heard : walker) {
+  [[nodiscard]] std::vector<ReceivedPose> from_file(const std::vector<ReceivedPose>& walker) const {
+    std::vector<ReceivedPose> same;
+    for (const ReceivedPose& received : walker) {
       const auto at = [&](std::int64_t time_ns) {
-        HeardPose pose = heard;
+        ReceivedPose pose = received;
         pose.frame = test::pose_at(clip_, time_ns);
-        pose.frame.header = heard.frame.header;
+        pose.frame.header = received.frame.header;
         pose.skeleton = clip_.skeleton;
         return pose;
       };
-      const HeardPose last = at(heard.posed_ns), before = at(heard.posed_before_ns);
+      const ReceivedPose last = at(received.posed_ns), before = at(received.posed_before_ns);
       const bool is_last =
-          difference({heard}, {last}).rms_rad() < difference({heard}, {before}).rms_rad();
+          difference({received}, {last}).rms_rad() < difference({received}, {before}).rms_rad();
       same.push_back(is_last ? last : before);
     }
     return same;
   }
-  [[nodiscard]] static Difference difference(const std::vector<HeardPose>& a,
-                                             const std::vector<HeardPose>& b) {
+  [[nodiscard]] static Difference difference(const std::vector<ReceivedPose>& a,
+                                             const std::vector<ReceivedPose>& b) {
     Difference all;
     for (std::size_t i = 0; i < a.size(); ++i) {
       all.add(Turns(*a[i].skeleton, a[i].frame), Turns(*b[i].skeleton, b[i].frame));
@@ -132,7 +132,7 @@ style::StyleModel humanoid_model() {
 }
 
 // As the live stage and `apply --cold` do it; empty if the skeleton lacks bones of the model.
-std::vector<HeardPose> styled(const style::StyleModel& model, std::vector<HeardPose> walker) {
+std::vector<ReceivedPose> styled(const style::StyleModel& model, std::vector<ReceivedPose> walker) {
   struct Last final : StageOut {
     void frame(const StageFrame& styled) noexcept override { now = styled.frame; }
     Frame now;
@@ -141,9 +141,9 @@ std::vector<HeardPose> styled(const style::StyleModel& model, std::vector<HeardP
   const auto bound = style::bind_model(model, *walker[0].skeleton, "sway");
   if (!bound) return {};
   style::StyleFilter filter(bound->get(), options);
-  for (HeardPose& heard : walker) {
-    filter.process({.frame = heard.frame}, last);
-    heard.frame = last.now;
+  for (ReceivedPose& received : walker) {
+    filter.process({.frame = received.frame}, last);
+    received.frame = last.now;
   }
   return walker;
 }

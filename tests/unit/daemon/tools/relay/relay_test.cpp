@@ -27,7 +27,7 @@ class RelayRig {
       const auto endpoint = net::bind_socket(daemons[i].get(), "tcp://127.0.0.1:*").value();
       options.from.push_back({.endpoint = endpoint});
     }
-    heard.resize(upstreams);
+    received.resize(upstreams);
     relay = Relay::open(options).value();
   }
 
@@ -49,9 +49,9 @@ class RelayRig {
         while (message.receive(daemons[i].get())) {
           const std::string prefix(message.text().substr(1));
           if (message.text().front() == '\1')
-            ++heard[i][prefix];
+            ++received[i][prefix];
           else
-            --heard[i][prefix];
+            --received[i][prefix];
         }
       }
       if (done()) return true;
@@ -61,7 +61,7 @@ class RelayRig {
   }
   // Waits until an upstream has heard that the relay subscribes to this.
   bool subscribes(const std::string& prefix, std::size_t upstream = 0) {
-    return until([&] { return heard[upstream][prefix] > 0; });
+    return until([&] { return received[upstream][prefix] > 0; });
   }
 
   void publish(const std::string& topic, const std::string& body, std::size_t upstream = 0) {
@@ -84,7 +84,7 @@ class RelayRig {
 
   net::Context context = net::open_context().value();
   std::vector<net::Socket> daemons;
-  std::vector<std::map<std::string, int>> heard;  // [upstream] subscriptions by prefix
+  std::vector<std::map<std::string, int>> received;  // [upstream] subscriptions by prefix
   std::unique_ptr<Relay> relay;
 };
 
@@ -98,8 +98,8 @@ TEST_CASE("a relay passes on what its subscribers want, and subscribes to nothin
   rig.publish("pose/ann", "1");
   CHECK(rig.next(first) == "pose/ann=1");
   CHECK(rig.next(second) == "pose/ann=1");
-  CHECK(rig.heard[0]["pose/ann"] == 1);  // once for both
-  CHECK(rig.heard[0].size() == 3);
+  CHECK(rig.received[0]["pose/ann"] == 1);  // once for both
+  CHECK(rig.received[0].size() == 3);
   CHECK(rig.relay->counts().messages == 1);
   CHECK(rig.relay->counts().upstreams == 1);
 }
@@ -125,9 +125,9 @@ TEST_CASE("a subscription ends upstream when its last subscriber has gone") {
   REQUIRE(rig.subscribes("pose/ann"));
   first.reset();
   REQUIRE(rig.until([&] { return rig.relay->counts().subscribers == 1; }));
-  CHECK(rig.heard[0]["pose/ann"] == 1);
+  CHECK(rig.received[0]["pose/ann"] == 1);
   second.reset();
-  CHECK(rig.until([&] { return rig.heard[0]["pose/ann"] == 0; }));
+  CHECK(rig.until([&] { return rig.received[0]["pose/ann"] == 0; }));
 }
 
 TEST_CASE("a subscriber that comes later gets the skeleton without the upstream's help") {

@@ -54,9 +54,9 @@ class WarmedToy {
     return last.out;
   }
   std::vector<std::size_t> notices() {
-    std::vector<std::size_t> told;
-    while (const auto notice = filter.take_notice()) told.push_back(notice->index);
-    return told;
+    std::vector<std::size_t> reported;
+    while (const auto notice = filter.take_notice()) reported.push_back(notice->index);
+    return reported;
   }
   style::StyleFilter filter;
   test::LastFrame last;
@@ -143,11 +143,11 @@ TEST_CASE("a model of an older posed has neither gate nor warm-up, and says so o
   WarmedToy ungated(old.get(), {.gate = false});
   CHECK(delta_of(ungated.walk(90), out, 2).angularDistance(Eigen::Quaterniond::Identity()) < 1e-6);
   CHECK(ungated.notices().empty());
-  WarmedToy unheard(old.get(), {.gate = false, .auto_alpha = true});
-  unheard.walk(90);
-  CHECK(unheard.notices() == std::vector<std::size_t>{WalkerTracker::kNoAxis});
-  CHECK_FALSE(unheard.warm_up(2.0));
-  CHECK(unheard.notices() == std::vector<std::size_t>{WalkerTracker::kNoGateData});
+  WarmedToy unreceived(old.get(), {.gate = false, .auto_alpha = true});
+  unreceived.walk(90);
+  CHECK(unreceived.notices() == std::vector<std::size_t>{WalkerTracker::kNoAxis});
+  CHECK_FALSE(unreceived.warm_up(2.0));
+  CHECK(unreceived.notices() == std::vector<std::size_t>{WalkerTracker::kNoGateData});
 }
 
 TEST_CASE("a walker goes into a command, into the log and back within half of 1e-4 rad",

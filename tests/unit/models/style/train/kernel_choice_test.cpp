@@ -88,15 +88,15 @@ TEST_CASE("progress never goes back when lengths are added", "[style][people]") 
     fold.truth.row(0) = fold.outputs.offset;
   }
   double last = 0.0;
-  int told = 0;
+  int reported = 0;
   SerialTasks tasks;
   const auto chosen = style::choose_kernel(far.leave_out(), tasks, [&](double fraction) {
     CHECK(fraction >= last);
     CHECK(fraction <= 1.0);
     last = fraction;
-    ++told;
+    ++reported;
     return true;
   });
   REQUIRE(chosen);
-  CHECK(told == 2 * (4 + 1 + 1));  // two tasks a length: four first ones, 20 and 13 degrees
+  CHECK(reported == 2 * (4 + 1 + 1));  // two tasks a length: four first ones, 20 and 13 degrees
 }
