@@ -13,48 +13,7 @@
 namespace posed::hand {
 namespace {
 
-// PlacedHand: a hand in its latest pose, and the gaps between its bones there. A solver moves some
-// fingers a little and looks again, so fingers whose angles are the same as in the pose before, to
-// the bit, keep their places, and pairs of two such fingers their gaps. One stream, one thread.
-class PlacedHand {
- public:
-  explicit PlacedHand(const HandGeometry& geometry) : geometry_(geometry) {}
-
-  // Puts the hand into a pose; returns its smallest gap [m], at most 10 mm.
-  RT_SAFE double move_to(const HandAngles& angles) noexcept;
-
-  [[nodiscard]] const HandGeometry& geometry() const noexcept { return geometry_; }
-  [[nodiscard]] const HandPose& pose() const noexcept { return pose_; }
-  // Exact below 10 mm.
-  [[nodiscard]] const Gaps& gaps_m() const noexcept { return gaps_m_; }
-
- private:
-  HandGeometry geometry_;
-  HandAngles angles_{};
-  HandPose pose_;
-  Gaps gaps_m_{};
-  double smallest_m_ = 0.0;
-  bool is_placed_ = false;
-};
-
 constexpr double kFar_m = 10e-3;  // gaps above this are not computed
-
-double PlacedHand::move_to(const HandAngles& angles) noexcept {
-  Fingers moved = kAllFingers;
-  for (int f = 0; is_placed_ && f < kFingers; ++f) {
-    const auto first = angles.begin() + kFingerChannels * f;
-    moved[f] = !std::equal(first, first + kFingerChannels, angles_.begin() + kFingerChannels * f);
-  }
-  if (moved.none()) return smallest_m_;
-  for (int f = 0; f < kFingers; ++f) {
-    if (moved[f]) place_finger(geometry_, f, angles, pose_);
-  }
-  find_gaps(geometry_, pose_, kFar_m, gaps_m_, moved);
-  angles_ = angles;
-  is_placed_ = true;
-  smallest_m_ = smallest(gaps_m_);
-  return smallest_m_;
-}
 
 constexpr double kNear_m = 3e-3;            // pairs nearer than this take part in the projection
 constexpr double kHinge_rad = 4 * kDegree;  // bending starts this far inside a limit
@@ -140,6 +99,47 @@ HandAngles between(const HandAngles& from, const HandAngles& to, double share) n
 }
 
 }  // namespace
+
+// PlacedHand: a hand in its latest pose, and the gaps between its bones there. A solver moves some
+// fingers a little and looks again, so fingers whose angles are the same as in the pose before, to
+// the bit, keep their places, and pairs of two such fingers their gaps. One stream, one thread.
+class PlacedHand {
+ public:
+  explicit PlacedHand(const HandGeometry& geometry) : geometry_(geometry) {}
+
+  // Puts the hand into a pose; returns its smallest gap [m], at most 10 mm.
+  RT_SAFE double move_to(const HandAngles& angles) noexcept;
+
+  [[nodiscard]] const HandGeometry& geometry() const noexcept { return geometry_; }
+  [[nodiscard]] const HandPose& pose() const noexcept { return pose_; }
+  // Exact below 10 mm.
+  [[nodiscard]] const Gaps& gaps_m() const noexcept { return gaps_m_; }
+
+ private:
+  HandGeometry geometry_;
+  HandAngles angles_{};
+  HandPose pose_;
+  Gaps gaps_m_{};
+  double smallest_m_ = 0.0;
+  bool is_placed_ = false;
+};
+
+double PlacedHand::move_to(const HandAngles& angles) noexcept {
+  Fingers moved = kAllFingers;
+  for (int f = 0; is_placed_ && f < kFingers; ++f) {
+    const auto first = angles.begin() + kFingerChannels * f;
+    moved[f] = !std::equal(first, first + kFingerChannels, angles_.begin() + kFingerChannels * f);
+  }
+  if (moved.none()) return smallest_m_;
+  for (int f = 0; f < kFingers; ++f) {
+    if (moved[f]) place_finger(geometry_, f, angles, pose_);
+  }
+  find_gaps(geometry_, pose_, kFar_m, gaps_m_, moved);
+  angles_ = angles;
+  is_placed_ = true;
+  smallest_m_ = smallest(gaps_m_);
+  return smallest_m_;
+}
 
 struct ConstraintSolver::State {
   State(const HandGeometry& geometry, const ConstraintOptions& wanted)

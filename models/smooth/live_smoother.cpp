@@ -23,6 +23,60 @@
 namespace posed::smooth {
 namespace {
 
+constexpr double kMinPeriod_s = 1e-3;  // 1000 Hz
+constexpr double kMaxPeriod_s = 0.2;   // a slower step is a gap
+constexpr double kFirstPeriod_s = 1.0 / 60.0;
+constexpr double kMinStep = 0.5;      // of the period
+constexpr double kArrivalGain = 0.1;  // share of the lateness that corrects a step
+constexpr double kGap = 1.5;          // periods: a step at least this long is a gap, not jitter
+
+constexpr double kPi = std::numbers::pi;
+
+double distance_rad(const std::array<double, 3>& a, const double* b) noexcept {
+  return std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]);
+}
+
+std::array<double, 3> nearest(std::array<double, 3> angles, const double* last) noexcept {
+  for (std::size_t i = 0; i < 3; ++i) angles[i] = unwrap_near(angles[i], last[i]);
+  return angles;
+}
+
+RT_SAFE void unwrap_joint(double* values, const double* last) noexcept {
+  const auto same = nearest({values[0], values[1], values[2]}, last);
+  const auto other = nearest({values[0] + kPi, kPi - values[1], values[2] + kPi}, last);
+  std::ranges::copy(distance_rad(other, last) < distance_rad(same, last) ? other : same, values);
+}
+
+bool all_finite(const double* values) noexcept {
+  return std::isfinite(values[0]) && std::isfinite(values[1]) && std::isfinite(values[2]);
+}
+
+constexpr double kUnknown = std::numeric_limits<double>::infinity();
+constexpr double kForgetAfter_s = 1.0;  // after a longer silence the past is forgotten
+constexpr int kMaxPending = static_cast<int>(kMaxLag_s * 1000.0) + 2;  // frames at 1000 Hz
+constexpr long kMaxWaiting = 8;  // most frames that wait until the period is known
+constexpr double kEvenStep =
+    1.5;  // periods: frames with a longer step between them are not neighbours
+constexpr double kHeadingStep_s = 0.1;  // the heading takes a longer step between frames for this
+
+int rotation_channels(const Skeleton& skeleton) {
+  return static_cast<int>(std::ranges::count_if(
+      skeleton.channels, [](const Channel& channel) { return !channel.translation; }));
+}
+
+// The most columns of the window: a gesture model of a body has three for each joint that is a
+// bone, in place of the joint's own channels.
+int most_columns(const Skeleton& skeleton, int angles) {
+  if (hand_side(skeleton)) return angles;
+  const auto is_free = [&skeleton](const Channel& channel) {
+    return !channel.translation && !skeleton.joints[channel.joint].bone;
+  };
+  return std::max(angles, gesture::most_channels(skeleton) +
+                              static_cast<int>(std::ranges::count_if(skeleton.channels, is_free)));
+}
+
+}  // namespace
+
 // FrameClock: computes times that a solver can use from the times that frames carry
 // (models/smooth/README.md, "Frame clock"). Device times are used as they are; arrival times of an
 // even stream come in bursts and are drawn towards the stream's own period. Steps are never shorter
@@ -53,13 +107,6 @@ class FrameClock {
   bool started_ = false;
   bool device_time_ = false;
 };
-
-constexpr double kMinPeriod_s = 1e-3;  // 1000 Hz
-constexpr double kMaxPeriod_s = 0.2;   // a slower step is a gap
-constexpr double kFirstPeriod_s = 1.0 / 60.0;
-constexpr double kMinStep = 0.5;      // of the period
-constexpr double kArrivalGain = 0.1;  // share of the lateness that corrects a step
-constexpr double kGap = 1.5;          // periods: a step at least this long is a gap, not jitter
 
 RT_SAFE double FrameClock::tick(const Header& header) noexcept {
   const bool device_time = header.device_ns != kNoTime_ns;
@@ -123,27 +170,6 @@ class Unwrap {
   std::vector<double> last_rad_;  // [rotation channels]; NaN before the first value
 };
 
-constexpr double kPi = std::numbers::pi;
-
-double distance_rad(const std::array<double, 3>& a, const double* b) noexcept {
-  return std::abs(a[0] - b[0]) + std::abs(a[1] - b[1]) + std::abs(a[2] - b[2]);
-}
-
-std::array<double, 3> nearest(std::array<double, 3> angles, const double* last) noexcept {
-  for (std::size_t i = 0; i < 3; ++i) angles[i] = unwrap_near(angles[i], last[i]);
-  return angles;
-}
-
-RT_SAFE void unwrap_joint(double* values, const double* last) noexcept {
-  const auto same = nearest({values[0], values[1], values[2]}, last);
-  const auto other = nearest({values[0] + kPi, kPi - values[1], values[2] + kPi}, last);
-  std::ranges::copy(distance_rad(other, last) < distance_rad(same, last) ? other : same, values);
-}
-
-bool all_finite(const double* values) noexcept {
-  return std::isfinite(values[0]) && std::isfinite(values[1]) && std::isfinite(values[2]);
-}
-
 Unwrap::Unwrap(const Skeleton& skeleton) {
   int joint = -1;
   for (const Channel& channel : skeleton.channels) {
@@ -178,32 +204,6 @@ RT_SAFE void Unwrap::apply(std::span<double> values_rad) noexcept {
     last += count;
   }
 }
-
-constexpr double kUnknown = std::numeric_limits<double>::infinity();
-constexpr double kForgetAfter_s = 1.0;  // after a longer silence the past is forgotten
-constexpr int kMaxPending = static_cast<int>(kMaxLag_s * 1000.0) + 2;  // frames at 1000 Hz
-constexpr long kMaxWaiting = 8;  // most frames that wait until the period is known
-constexpr double kEvenStep =
-    1.5;  // periods: frames with a longer step between them are not neighbours
-constexpr double kHeadingStep_s = 0.1;  // the heading takes a longer step between frames for this
-
-int rotation_channels(const Skeleton& skeleton) {
-  return static_cast<int>(std::ranges::count_if(
-      skeleton.channels, [](const Channel& channel) { return !channel.translation; }));
-}
-
-// The most columns of the window: a gesture model of a body has three for each joint that is a
-// bone, in place of the joint's own channels.
-int most_columns(const Skeleton& skeleton, int angles) {
-  if (hand_side(skeleton)) return angles;
-  const auto is_free = [&skeleton](const Channel& channel) {
-    return !channel.translation && !skeleton.joints[channel.joint].bone;
-  };
-  return std::max(angles, gesture::most_channels(skeleton) +
-                              static_cast<int>(std::ranges::count_if(skeleton.channels, is_free)));
-}
-
-}  // namespace
 
 // The window solves for columns: first the channels of a body's gesture model, then the skeleton's
 // rotation channels, or angles, that are not among the model's joints: without such a model all of
