@@ -49,7 +49,7 @@ struct OpenSource {
 Result<std::unique_ptr<OpenSource>> open_source(config::SourceConfig config, ModelFiles& files);
 
 // The error, with the name of the source in its message, or that of the only stream.
-[[nodiscard]] std::unexpected<Error> of_source(const OpenSource& source, Error error);
+[[nodiscard]] std::unexpected<Error> in_source(const OpenSource& source, Error error);
 
 // For a command that needs the result now (`check`): opens the device that a supervisor would open,
 // and tries the calibration on it. Returns an empty string, or one sentence that says why the

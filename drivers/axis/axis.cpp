@@ -86,7 +86,7 @@ std::vector<OptionSpec> all_options() {
   return specs;
 }
 
-struct Axis : SourceType<Axis> {
+struct AxisSource : SourceType<AxisSource> {
   using Settings = StreamSettings;
   static constexpr std::string_view kName = axis::kName;
   static constexpr std::string_view kSummary =
@@ -129,6 +129,6 @@ struct Axis : SourceType<Axis> {
 }  // namespace
 }  // namespace axis
 
-const Driver& axis_driver() { return DriverOf<axis::Axis>::get(); }
+const Driver& axis_driver() { return DriverOf<axis::AxisSource>::get(); }
 
 }  // namespace posed::drivers

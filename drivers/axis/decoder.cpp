@@ -129,7 +129,7 @@ RT_SAFE Outcome AxisDecoder::accept_message() noexcept {
   Present* const present = roster_.find(message_.avatar);
   if (present == nullptr) return Outcome::kOutOfRange;  // more avatars than bodies of a source
   if (settings_.datagrams && message_.frame_number != 0) {
-    const Outcome order = present->order.convert(message_.frame_number);
+    const Outcome order = present->order.accept(message_.frame_number);
     if (order != Outcome::kOk) return order;
   }
   roster_.see(*present, message_, now_ns_);

@@ -39,11 +39,6 @@ std::int64_t ticks_of(const RequestedConfig& requested) {
   return kTicksAFrame * requested.divider / requested.layout.multiplier;
 }
 
-std::int64_t ticks_of(const RequestedConfig& requested) {
-  if (requested.layout.form == Form::k8Bit) return requested.period.ticks();
-  return kTicksAFrame * requested.divider / requested.layout.multiplier;
-}
-
 Result<> set_rate(double rate_hz, RequestedConfig& requested) {
   if (!(rate_hz >= 0.0 && rate_hz <= kMaxSampleRate_hz) || (rate_hz > 0.0 && rate_hz < 1.0)) {
     return misuse("rate_hz should be 1 to 1000, or 0 for as fast as the glove can");
@@ -153,7 +148,9 @@ struct CyberGlove : glove::GloveType<CyberGlove> {
         "is damaged",
         identity);
   }
-  static Result<glove::Model> model(const Settings& settings) { return glove_model(settings.hand); }
+  static Result<glove::Model> model(const Settings& settings) {
+    return cyberglove::glove_model(settings.hand);
+  }
   static std::vector<std::string> extra_names() { return {"switch", "light"}; }
   static double rate_hz(const Settings& settings) {
     return settings.ticks == 0 ? 0.0 : kTicks_hz / static_cast<double>(settings.ticks);

@@ -109,7 +109,8 @@ Result<std::vector<std::string>> await_stream(Connection& link, const Settings& 
                 link.name());
   }
   const Side other = settings.hand == Side::kRight ? Side::kLeft : Side::kRight;
-  if (received.info && received.right != (hand == Side::kRight)) return other_hand(link, other);
+  if (received.info && received.right != (settings.hand == Side::kRight))
+    return other_hand(link, other);
   std::vector<std::string> warnings;
   const int capability = framer.capability();
   if (capability >= 0 &&

@@ -98,7 +98,7 @@ RT_SAFE Outcome MocapDecoder::read_frame(std::span<const std::byte> content, Sin
   const std::size_t bodies = reader.u8();
   if (!reader.ok()) return Outcome::kShort;
   if (layout_ == nullptr) return Outcome::kForeign;  // the poll asks for a description
-  if (const Outcome order = order_.next(number); order != Outcome::kOk) return order;
+  if (const Outcome order = order_.accept(number); order != Outcome::kOk) return order;
   const std::int64_t device_ns = clock_.to(time_us).ticks * 1000;
   emitted_.reset();
   Outcome worst = Outcome::kOk;

@@ -76,10 +76,7 @@ Result<MergePlan> MergePlan::make(const StageContext& context) {
     if (gloves[i] == nullptr) continue;
     TRY(HandMap::check(options.gloves[i], static_cast<Side>(i), *gloves[i]));
   }
-  const auto is_named = [&](const char* name) {
-    return !parameter<std::string>(context.parameters, name).empty();
-  };
-  if (std::ranges::none_of(kNames, is_named)) {
+  if (std::ranges::all_of(options.gloves, &std::string::empty)) {
     return misuse(
         "stage merge names no glove; name a glove's stream as its left, as its right or"
         " both");
