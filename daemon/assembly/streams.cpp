@@ -156,7 +156,7 @@ Result<> Streams::start() {
     drivers::Transport* const transport = source->device.transport.get();
     if (transport == nullptr) continue;
     if (auto started = transport->start(system::monotonic_ns()); !started) {
-      return devices::of_source(*source, started.error());
+      return devices::in_source(*source, started.error());
     }
   }
   if (several_) thread_ = std::thread([this] { run(); });

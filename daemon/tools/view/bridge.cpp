@@ -143,8 +143,8 @@ class Bridge::Parts {
     std::unique_ptr<Parts> parts(
         new Parts(std::move(context), {.files = std::move(page), .token = random_token()},
                   {.version = POSED_VERSION,
-                   .connect = options.link.connect,
-                   .same_machine = net::is_loopback(options.link.connect)}));
+                   .connect = options.link.publish.endpoint,
+                   .same_machine = net::is_loopback(options.link.publish.endpoint)}));
     parts->link_ =
         TRY(DaemonLink::open(parts->io_, parts->context_.get(), options.link, parts->hub_));
     const auto address = TRY(address_of(options.address));
