@@ -203,7 +203,7 @@ TEST_CASE("emulated 5DT gloves' poses come back as exactly as their sensors allo
 }
 
 TEST_CASE("a Data Glove 5 is asked who it is, then streams or is polled") {
-  FiveDtEmulator glove(Side::kRight, {.form = Form::kFive});
+  FiveDtEmulator glove({.hand = Side::kRight, .form = Form::kFive});
   const test::ServedEmulator served(glove);
   TransportFactory ports;
   const auto other =
@@ -235,7 +235,7 @@ TEST_CASE("a Data Glove 5 is asked who it is, then streams or is polled") {
 }
 
 TEST_CASE("a 5DT glove that only sends is identified by its packets") {
-  FiveDtEmulator glove(Side::kLeft, {.form = Form::kFiveWireless});
+  FiveDtEmulator glove({.hand = Side::kLeft, .form = Form::kFiveWireless});
   const test::ServedEmulator served(glove);
   TransportFactory ports;
   const auto open = [&](const std::string& model, const std::string& hand) {
@@ -248,7 +248,7 @@ TEST_CASE("a 5DT glove that only sends is identified by its packets") {
 }
 
 TEST_CASE("a 5DT glove of another hand or model is refused with an error message") {
-  FiveDtEmulator glove(Side::kLeft, {.form = Form::kFiveWireless});
+  FiveDtEmulator glove({.hand = Side::kLeft, .form = Form::kFiveWireless});
   const test::ServedEmulator served(glove);
   TransportFactory ports;
   const auto open = [&](const std::string& model, const std::string& hand) {

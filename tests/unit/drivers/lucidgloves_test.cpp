@@ -204,7 +204,7 @@ TEST_CASE("an emulated LucidGlove's pose comes back within half a count") {
 }
 
 TEST_CASE("forces and vibrations reach the glove as requested, and negative ones change nothing") {
-  LucidEmulator glove(Side::kRight, Encoding::kAuto, 4095);
+  LucidEmulator glove({.hand = Side::kRight, .encoding = Encoding::kAuto, .max_analog = 4095});
   const auto notify = [&](const std::string& text) {
     Emulator::Bytes answer;
     glove.receive(std::as_bytes(std::span(text)), 0, answer);
@@ -231,7 +231,7 @@ TEST_CASE("forces and vibrations reach the glove as requested, and negative ones
 }
 
 TEST_CASE("a LucidGlove on a port is opened, read and identified by hand and range") {
-  LucidEmulator glove(Side::kLeft, Encoding::kAlpha, 4095);
+  LucidEmulator glove({.hand = Side::kLeft, .encoding = Encoding::kAlpha, .max_analog = 4095});
   const test::ServedEmulator served(glove);
   TransportFactory ports;
   const auto open = [&](const std::string& hand, std::int64_t max) {
@@ -289,7 +289,7 @@ TEST_CASE("a port with another device on it is refused with what to check") {
   const auto device = find_driver("lucidgloves")->open({{"port", port.port()}}, ports);
   REQUIRE_FALSE(device);
   CHECK(device.error().message.find("sends nothing") != std::string::npos);
-  LucidEmulator glove(Side::kRight, Encoding::kAlpha, 4095);
+  LucidEmulator glove({.hand = Side::kRight, .encoding = Encoding::kAlpha, .max_analog = 4095});
   const test::ServedEmulator served(glove);
   const auto coarse =
       find_driver("lucidgloves")

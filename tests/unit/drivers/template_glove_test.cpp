@@ -11,16 +11,15 @@ namespace {
 
 const Driver& template_glove() { return *find_driver("template_glove"); }
 
-test::CollectSink decoded_template(std::string_view text) {
-  test::CollectSink sink;
+void decode_template(std::string_view text, test::CollectSink& sink) {
   test::decoder_of(template_glove(), {})->feed(std::as_bytes(std::span(text)), 0, sink);
-  return sink;
 }
 
 }  // namespace
 
 TEST_CASE("a line of the template glove is as in its drawing") {
-  const auto sink = decoded_template("G 1023 512 0 87 1001 B 1 *3D\r\n");
+  test::CollectSink sink;
+  decode_template("G 1023 512 0 87 1001 B 1 *3D\r\n", sink);
   CHECK(sink.count(Outcome::kOk) == 1);
   REQUIRE(sink.samples.size() == 1);
   const Sample& sample = sink.samples[0];
@@ -34,9 +33,14 @@ TEST_CASE("a line of the template glove is as in its drawing") {
 }
 
 TEST_CASE("a damaged line of the template glove is counted as what it is") {
-  CHECK(decoded_template("G 1023 512 0 87 1001 B 1 *00\n").count(Outcome::kBadChecksum) == 1);
-  CHECK(decoded_template("1023 512 0 87 1001\n").count(Outcome::kForeign) == 1);
-  CHECK(decoded_template("G 1024 0 0 0 0 B 0 *00\n").frames.empty());
+  test::CollectSink sink;
+  decode_template("G 1023 512 0 87 1001 B 1 *00\n", sink);
+  CHECK(sink.count(Outcome::kBadChecksum) == 1);
+  decode_template("1023 512 0 87 1001\n", sink);
+  CHECK(sink.count(Outcome::kForeign) == 1);
+  decode_template("G 1024 0 0 0 0 B 0 *32\n", sink);
+  CHECK(sink.count(Outcome::kOutOfRange) == 1);
+  CHECK(sink.frames.empty());
 }
 
 TEST_CASE("a template glove opens at its first line, and says what comes instead of one") {
