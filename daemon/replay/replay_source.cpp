@@ -98,6 +98,11 @@ Result<ReplaySource::Bodies> ReplaySource::bodies_of(const log::ChunkRow& row) {
     return log::damaged_row(file_, "chunk", row.id, how);
   };
   const auto unpacked = pipeline::unpack_description(row.bytes);
+  // That of a device with one body says only which stream the body has from there on.
+  if (!has_several() && (!unpacked || !unpacked->description.empty())) {
+    return damaged("describes bodies, but devices of driver " + in_quotes(driver_.name) +
+                   " have one");
+  }
   if (!unpacked) return damaged("has a description that is cut short");
   Bodies bodies;
   if (has_several()) {
@@ -106,9 +111,6 @@ Result<ReplaySource::Bodies> ReplaySource::bodies_of(const log::ChunkRow& row) {
       return damaged("has a description that cannot be read (" + layout.error().message + ")");
     }
     bodies.layout = std::move(*layout);
-  } else if (!unpacked->description.empty()) {
-    return damaged("describes bodies, but devices of driver " + in_quotes(driver_.name) +
-                   " have one");
   }
   const std::span<const drivers::Body> described = bodies_in(bodies.layout);
   if (described.size() != unpacked->streams.size()) {

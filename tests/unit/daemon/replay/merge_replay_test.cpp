@@ -261,19 +261,19 @@ TEST_CASE("a body that comes late gives its hand to streams that were there befo
   CHECK(streams["room-bob"] == 2);
   CHECK(streams["hands-left"] == 2);
   CHECK(daemon.published(0).missed == 0);
-  CHECK(daemon.published(0).frames > 400);
+  CHECK(daemon.published(0).frames > 110);  // 30 a second
   const Replayed result = replayed(path);
   REQUIRE((result.difference ? result.difference->text() : "") == "");
   CHECK(result.counts.lost + result.counts.after_gap + result.counts.past_end == 0);
   for (const std::string& bytes : result.frames) {
     v1::Frame frame;
     REQUIRE(frame.ParseFromString(bytes));
-    // A person without fingers has fewer joints than a hand more.
-    const auto fingers = std::ranges::count(frame.validity(), 1);
-    if (fingers > kHandJoints + 9) ++with_fingers[frame.stream()];
+    // A person has nine joints without the hand, the walker a few more.
+    const auto valid = std::ranges::count(frame.validity(), 1);
+    if (valid >= kHandJoints + 9) ++with_fingers[frame.stream()];
   }
-  CHECK(with_fingers["room-ann"] > 200);
-  CHECK(with_fingers["walker"] > 200);
+  CHECK(with_fingers["room-ann"] > 150);
+  CHECK(with_fingers["walker"] > 40);
   const auto reader = log::Reader::open(path);
   REQUIRE(reader);
   const auto of_walker = [](const log::StreamRow& row) { return row.name == "walker"; };
