@@ -76,7 +76,7 @@ Findings describe(const DeviceInfo& one, const std::vector<DeviceInfo>& all) {
   };
   // A device's name for itself may contain any bytes.
   const auto shown = [](const std::string& text) { return text.empty() ? "-" : clean(text); };
-  const auto usb = [&](unsigned number) {
+  const auto usb = [&](std::uint16_t number) {
     return one.is_usb ? std::optional(usb_numbers(number)) : std::nullopt;
   };
   const std::string id = id_of(one, all);
