@@ -309,7 +309,7 @@ class Reader::Source final : private IntakeOut {
         positions[body].sample = now[before].sample;
       } else {
         const NextNumbers next = next_numbers(*one.counters);
-        places[count].emplace(one);
+        places[count] = Place(one);
         positions[body].frame = next.frame;
         positions[body].sample = next.sample;
       }

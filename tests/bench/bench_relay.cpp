@@ -25,8 +25,8 @@ namespace posed::bench {
 namespace {
 
 constexpr const char* kBenchRelayFooter =
-    R"(Synthetic walkers at 120 Hz through the real daemon, received in turn by one subscriber and by
-a relay with --subscribers. Relay and subscribers are processes of their own that give way to the
+    R"(Synthetic walkers at 120 Hz through the real daemon, received in turn by one subscriber and
+by a relay with --subscribers. Relay and subscribers are processes of their own that give way to the
 daemon, as on other machines. CPU is the daemon's process alone; `send` is the time from a frame's
 arrival to its hand-over to ZeroMQ. At the end subscribers that come late ask for a skeleton.
 

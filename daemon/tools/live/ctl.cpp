@@ -395,7 +395,7 @@ void add_style_actions(Actions& actions, CtlOptions& options) {
   CLI::App* warm =
       actions.add_for_stream("warm-up", "Measure how a new walker usually walks", warm_up,
                              R"(Example:
-  posed ctl warm-up walker --seconds 10   # it walks as usual meanwhile; an event reports the end)");
+  posed ctl warm-up walker --seconds 10   # it walks meanwhile; an event reports the end)");
   const ParameterSpec& seconds = warm_up_seconds();
   options.seconds = std::get<double>(seconds.default_value);
   warm->add_option("--seconds", options.seconds,
