@@ -2,6 +2,7 @@
 #include "tests/support/stage_commands.hpp"
 
 #include <chrono>
+#include <cstdlib>
 
 #include "daemon/pipeline/stream_context.hpp"
 #include "daemon/system/clock.hpp"
@@ -63,7 +64,7 @@ Rig::Rig(std::vector<RigStream> streams, pipeline::RecordSink* record_sink)
     }
     contexts_.push_back(worker_->make_context(std::move(options), stream.device.description.rate_hz,
                                               *counters_.back(), kRigSlots));
-    exchange_.coming.push(contexts_.back().get());
+    if (!exchange_.coming.push(contexts_.back().get())) std::abort();
     source_counters_.push_back(std::make_unique<pipeline::SourceCounters>());
     reader_->add({.device = &stream.device,
                   .counters = source_counters_.back().get(),

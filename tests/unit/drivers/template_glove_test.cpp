@@ -2,6 +2,8 @@
 #include <catch2/catch.hpp>
 
 #include "drivers/transport/transport_factory.hpp"
+#include "proto/frame/degree.hpp"
+#include "proto/frame/hand_skeleton.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/decoder_of.hpp"
 #include "tests/unit/drivers/served_emulator.hpp"
@@ -28,8 +30,7 @@ TEST_CASE("a line of the template glove is as in its drawing") {
   CHECK(sample.value[5] == 1023.0F);                 // thumb, raw
   CHECK(sample.value[10] == 1.0F);                   // button
   REQUIRE(sink.frames.size() == 1);
-  CHECK(sink.frames[0].angle_rad[3] ==
-        Approx(60.0 * 3.14159265 / 180.0));  // the thumb's second joint
+  CHECK(hand_angles(sink.frames[0])[3] == Approx(60.0 * kDegree));  // the thumb's second joint
 }
 
 TEST_CASE("a damaged line of the template glove is counted as what it is") {
