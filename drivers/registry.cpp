@@ -7,17 +7,27 @@
 namespace posed::drivers {
 
 using Entry = const Driver&();
-Entry axis_driver, bend5_driver, cyberglove_driver, described_driver, file_driver, fivedt_driver,
-    labels_driver, lucidgloves_driver, mocopi_driver, mvn_driver, natnet_driver, p5_driver,
-    posed_driver, rokoko_driver, template_glove_driver, template_mocap_driver, vmc_driver;
+Entry axis_driver, cyberglove_driver, described_driver, file_driver, fivedt_driver, labels_driver,
+    lucidgloves_driver, mocopi_driver, mvn_driver, natnet_driver, p5_driver, posed_driver,
+    rokoko_driver, template_glove_driver, template_mocap_driver, vmc_driver;
 
 std::span<const Driver> registry() {
-  static const std::array drivers{
-      axis_driver(),   bend5_driver(),  cyberglove_driver(),     described_driver(),
-      file_driver(),   fivedt_driver(), labels_driver(),         lucidgloves_driver(),
-      mocopi_driver(), mvn_driver(),    natnet_driver(),         p5_driver(),
-      posed_driver(),  rokoko_driver(), template_glove_driver(), template_mocap_driver(),
-      vmc_driver()};
+  static const std::array drivers{axis_driver(),
+                                  cyberglove_driver(),
+                                  described_driver(),
+                                  file_driver(),
+                                  fivedt_driver(),
+                                  labels_driver(),
+                                  lucidgloves_driver(),
+                                  mocopi_driver(),
+                                  mvn_driver(),
+                                  natnet_driver(),
+                                  p5_driver(),
+                                  posed_driver(),
+                                  rokoko_driver(),
+                                  template_glove_driver(),
+                                  template_mocap_driver(),
+                                  vmc_driver()};
   return drivers;
 }
 
