@@ -34,7 +34,7 @@ TEST_CASE("the table of streams has only columns that a stream needs", "[live_ta
   walker.mutable_publish()->set_p99_us(33'160'663.0F);
   CHECK(live_table(stats, {.width = 0}) ==
         Lines{"STREAM STATE       HZ  LATENCY     99 % ALPHA MODEL",
-              "walker live     120.0   0.2 ms   33.2 s -0.50 march-to-sway.style",
+              "walker live     120.0   0.2 ms     33 s -0.50 march-to-sway.style",
               "hand   live     120.0        -        -     -"});
 }
 
@@ -47,7 +47,7 @@ TEST_CASE("the table of streams fits 60 columns, and gives a wide terminal the n
   walker.mutable_publish()->set_p99_us(1e18F);
   walker.set_rate_hz(1e9F);
   const auto narrow = live_table(stats, {.width = 60, .chosen = walker.stream()});
-  CHECK(narrow[1] == "> a-performe~ live    9999.9   0.0 ms 9999.9 s  1.00 march-~");
+  CHECK(narrow[1] == "> a-performe~ live    9999.9   0.0 ms 9999.9 h  1.00 march-~");
   CHECK(narrow[1].size() == 60);
   CHECK(live_table(stats, {.width = 100})[1].contains("a-performer-with-a-long-name live"));
   CHECK(live_table(stats, {.width = 100})[1].contains(" march-to-sway.style"));
