@@ -28,8 +28,9 @@ namespace posed {
 
 // A stream whose frames a stage gets beside those of its own.
 struct StagePartner {
-  std::shared_ptr<const Skeleton> skeleton{};  // of the frames that it publishes; null: none named
-  double rate_hz = 0.0;                        // nominal; 0: unknown
+  std::shared_ptr<const Skeleton>
+      skeleton{};        // of the frames that it publishes; null: it is not there
+  double rate_hz = 0.0;  // nominal; 0: unknown
 };
 
 // The stream that a stage is made for.
@@ -87,9 +88,8 @@ struct StageType {
   std::string_view name;  // no other stage or driver has it; the name of its table in the config
   std::string_view summary;
   std::vector<ParameterSpec> parameters{};
-  // Those parameters, all of them text, that name other streams; an empty name is none. A partner
-  // has a device of one body, so that its skeleton is known before the first frame, and no partners
-  // itself.
+  // Those parameters, all of them text, that name other streams; an empty name is none. While a
+  // partner is not there the stage runs without it; when one comes, the stage is made again.
   std::vector<std::string_view> partners{};
   StageInput input = StageInput::kHandsOn;
   bool needs_input = false;  // without StageFrame::input it does nothing

@@ -24,6 +24,7 @@
 #include "tests/e2e/stage.hpp"
 #include "tests/support/asked_again.hpp"
 #include "tests/support/free_port.hpp"
+#include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::test {
 namespace {
@@ -103,11 +104,11 @@ std::set<std::uint64_t> frames_within(const std::string& endpoint, const std::st
   return sequences;
 }
 
-// A stream `bend` of 120 Hz, and a stream `flood` to which a glove can connect at this port.
+// A stream `walker` of 120 Hz, and a stream `flood` to which a glove can connect at this port.
 std::string config_with_port(std::uint16_t port) {
   return std::string(Stage::kEndpoints) +
-         "[[stream]]\nname = \"bend\"\ndriver = \"template\"\n[stream.template]\n"
-         "rate_hz = 120.0\n"
+         "[[stream]]\nname = \"walker\"\ndriver = \"file\"\n[stream.file]\n"
+         "path = \"walk.bvh\"\nloop = true\n"
          "[[stream]]\nname = \"flood\"\ndriver = \"lucidgloves\"\n"
          "[stream.lucidgloves]\nlink = \"tcp\"\nlisten = \"127.0.0.1:" +
          std::to_string(port) + "\"\n";
@@ -117,6 +118,7 @@ std::string config_with_port(std::uint16_t port) {
 std::uint64_t lost_by_recorded_neighbour() {
   Stage stage;
   const std::uint16_t port = free_port();
+  REQUIRE(clip::write_bvh(toy_walk(240, 120.0), stage.folder.path() / "walk.bvh"));
   stage.folder.write("posed.toml", config_with_port(port));
   stage.record();
   const std::uint64_t sent = flood(port, flood_time());
@@ -156,9 +158,10 @@ struct Neighbour {
 Neighbour neighbour_of_flood() {
   Stage stage;
   const std::uint16_t port = free_port();
+  REQUIRE(clip::write_bvh(toy_walk(240, 120.0), stage.folder.path() / "walk.bvh"));
   stage.folder.write("posed.toml", config_with_port(port));
   stage.launch("run");
-  const auto before = frames_within(stage.publish, "bend", 500ms);
+  const auto before = frames_within(stage.publish, "walker", 500ms);
   REQUIRE(before.size() > 20);
   const std::uint64_t memory_before = resident_bytes(stage.daemon->pid());
 
@@ -166,7 +169,7 @@ Neighbour neighbour_of_flood() {
   std::uint64_t sent = 0;
   std::jthread glove([&] { sent = flood(port, time + 500ms); });
   std::this_thread::sleep_for(500ms);  // the daemon exchanges the device info with it
-  const auto during = frames_within(stage.publish, "bend", time);
+  const auto during = frames_within(stage.publish, "walker", time);
   const std::uint64_t memory = resident_bytes(stage.daemon->pid());
   glove.join();
 

@@ -41,10 +41,13 @@ std::string fixed_endpoint() { return "tcp://127.0.0.1:" + std::to_string(free_p
 
 // A daemon that publishes at a known endpoint, so that it can come back there.
 void launch_at(Stage& stage, const std::string& endpoint, const std::string& stream) {
+  REQUIRE(clip::write_bvh(toy_walk(240, 120.0), stage.folder.path() / "walk.bvh"));
   stage.folder.write("posed.toml", "realtime = false\n[publish]\nendpoint = \"" + endpoint +
                                        "\"\n[control]\nendpoint = \"tcp://127.0.0.1:*\"\n"
                                        "[[stream]]\nname = \"" +
-                                       stream + "\"\ndriver = \"template\"\n");
+                                       stream +
+                                       "\"\ndriver = \"file\"\n[stream.file]\npath = \"walk.bvh\"\n"
+                                       "loop = true\n");
   stage.launch("run");
 }
 
@@ -128,14 +131,14 @@ TEST_CASE("a relay finds a daemon that comes back") {
   Stage stage;
   const std::string endpoint = fixed_endpoint();
   RelayProcess relay({"--from", endpoint});  // before the daemon
-  launch_at(stage, endpoint, "bend");
+  launch_at(stage, endpoint, "walker");
   Process monitor({"monitor", "--connect", relay.publish, "--topic", "sensor"});
   REQUIRE(monitor.line());
   stage.daemon->send(SIGKILL);
   REQUIRE(stage.daemon->exit_code());
   while (monitor.line(500ms)) {
   }
-  launch_at(stage, endpoint, "bend");
+  launch_at(stage, endpoint, "walker");
   CHECK(monitor.line());
   CHECK(has(relay.process->errors(), "lost ... again"));
 }

@@ -345,8 +345,14 @@ TEST_CASE(
   const std::string model = style::serialize_model(test::toy_model(1));
   const StageType& style = style::style_type();
   config::SourceConfig config;
+  // The model of the config is for people with other joints.
+  style::StyleModel other = test::toy_model(2);
+  for (std::string& joint : other.space.joints) joint += "-other";
+  const test::TempFolder folder;
   config.every.stages.push_back(
-      {.type = &style, .parameters = complete_parameters(style.parameters, {}).value()});
+      {.type = &style,
+       .parameters = complete_parameters(style.parameters, {}).value(),
+       .model = folder.write("other.style", style::serialize_model(other))});
   Room room(2, std::move(config));
   const Skeleton toy = test::toy_skeleton();
   std::vector<std::pair<std::string, int>> joints;

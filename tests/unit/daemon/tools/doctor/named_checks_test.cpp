@@ -173,7 +173,8 @@ TEST_CASE("doctor: logs are of a version that this one reads") {
   CHECK(has(check_logs(&config).found, "none in"));
   write_marks(healthy.folder.path() / "good.plog", 3);
   CHECK(check_logs(&config).found == "1 that this version reads");
-  for (const auto& [version, why] : {std::pair{2, "development version"}, std::pair{4, "newer posed"}}) {
+  for (const auto& [version, why] :
+       {std::pair{2, "development version"}, std::pair{4, "newer posed"}}) {
     const auto path = healthy.folder.path() / "other.plog";
     write_marks(path, version);
     const Check bad = check_logs(&config);
