@@ -42,7 +42,9 @@ void SourceBodies::reserve_only() {
 
 Result<> SourceBodies::build_only() {
   only_.emplace(make(streams_[0], source_.config.named[0].stream));
-  if (!only_->engine) return misuse(only_->refusal);
+  if (!only_->engine) {
+    return std::unexpected(Error{only_->refusal, {}, 0, only_->exit_code});
+  }
   return {};
 }
 
@@ -282,7 +284,10 @@ NewStream SourceBodies::make(Stream& stream, const config::StreamConfig& config)
                  .config = config,
                  .rate_hz = expected_rate_hz(source_, stream.body)};
   made.config.name = stream.name;
-  if (auto engine = make_engine_of(made); !engine) made.refusal = engine.error().text();
+  if (auto engine = make_engine_of(made); !engine) {
+    made.refusal = engine.error().text();
+    made.exit_code = engine.error().exit_code;
+  }
   stream.refused = !made.engine.has_value();
   if (!stream.refused) {
     shared_.partners[stream.name] = {

@@ -26,6 +26,7 @@ struct NewStream {
   // Empty for a body that a stage cannot serve; `refusal` says why.
   std::optional<pipeline::EngineOptions> engine{};
   std::string refusal{};
+  ExitCode exit_code = ExitCode::kFailed;  // with which a refusal ends the start
 };
 
 // All calls come from the builder's thread, or from the one that begins.

@@ -132,7 +132,7 @@ TEST_CASE("a relay finds a daemon that comes back") {
   const std::string endpoint = fixed_endpoint();
   RelayProcess relay({"--from", endpoint});  // before the daemon
   launch_at(stage, endpoint, "walker");
-  Process monitor({"monitor", "--connect", relay.publish, "--topic", "sensor"});
+  Process monitor({"monitor", "--connect", relay.publish, "--topic", "pose"});
   REQUIRE(monitor.line());
   stage.daemon->send(SIGKILL);
   REQUIRE(stage.daemon->exit_code());
@@ -150,7 +150,7 @@ TEST_CASE("a relay of two daemons has the streams of both, and their stats as on
   launch_at(second, fixed_endpoint(), "right");
   RelayProcess relay({"--from", first.publish, "--from", second.publish});
   for (const char* stream : {"left", "right"}) {
-    const auto seen = posed({"monitor", "--connect", relay.publish, "--topic", "sensor", "--stream",
+    const auto seen = posed({"monitor", "--connect", relay.publish, "--topic", "pose", "--stream",
                              stream, "--count", "3", "--timeout", "20"});
     INFO(seen.err);
     CHECK(seen.code == 0);
