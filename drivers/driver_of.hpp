@@ -5,7 +5,7 @@
 //
 //   kName, kSummary                              registry name, and a line for users
 //   Settings                                     what the options and the device info say
-//   options()                                    the table of the driver's options
+//   option_specs()                               the table of the driver's options
 //   settings(Options&) -> Result<Settings>       reads completed options and may add to them
 //   check(options, settings)                     checks the connection without opening anything;
 //     -> Result<std::string>                     gives the identity of the expected device
@@ -98,7 +98,7 @@ class DriverOf {
   static Driver make() {
     Driver driver{.name = Type::kName,
                   .summary = Type::kSummary,
-                  .options = Type::options(),
+                  .options = Type::option_specs(),
                   .open = open,
                   .make_decoder = make_decoder,
                   .describe = describe,

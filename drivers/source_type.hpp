@@ -65,7 +65,7 @@ struct RateSource : SourceType<Self> {
   using Settings = RateSettings;
 
   static std::vector<OptionSpec> more_options() { return {}; }
-  static std::vector<OptionSpec> options() {
+  static std::vector<OptionSpec> option_specs() {
     auto specs = udp_options(Self::kListen);
     specs.push_back(rate_option(Self::kRate_hz, Self::kRateHelp));
     for (OptionSpec& spec : Self::more_options()) specs.push_back(std::move(spec));

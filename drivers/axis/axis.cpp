@@ -91,7 +91,7 @@ struct AxisSource : SourceType<AxisSource> {
   static constexpr std::string_view kName = axis::kName;
   static constexpr std::string_view kSummary =
       "Axis Neuron and Axis Studio (Perception Neuron): their BVH streams over TCP or UDP";
-  static constexpr auto options = axis::all_options;
+  static constexpr auto option_specs = axis::all_options;
   static constexpr auto device_info = axis::device_info_of;
   static constexpr auto parse_device_info = axis::read_device_info;
   static constexpr auto make_layout = axis::make_layout;

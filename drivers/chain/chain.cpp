@@ -48,7 +48,7 @@ struct Upstream : SourceType<Upstream> {
   using Settings = UpstreamInfo;
   static constexpr std::string_view kName = "posed";
   static constexpr std::string_view kSummary = "a stream of another posed, so that machines chain";
-  static constexpr auto options = chain::options;
+  static constexpr auto option_specs = chain::options;
   static constexpr auto settings = chain::info_of;
   static constexpr auto device_info = chain::device_info_text;
   static constexpr auto parse_device_info = chain::parse_device_info;

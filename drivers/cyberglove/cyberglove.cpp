@@ -109,7 +109,7 @@ struct CyberGlove : glove::GloveType<CyberGlove> {
   static constexpr std::string_view kName = "cyberglove";
   static constexpr std::string_view kSummary = "CyberGlove I, II and III over a serial port or TCP";
   static constexpr std::span<const KnownUsb> kUsb = kFtdi;
-  static constexpr auto options = all_options;
+  static constexpr auto option_specs = all_options;
 
   static Result<Settings> settings(const Options& options) {
     const auto hand = TRY(glove::hand_option(options));

@@ -84,7 +84,7 @@ struct DescribedGlove : glove::GloveType<DescribedGlove> {
   static constexpr std::string_view kName = "described";
   static constexpr std::string_view kSummary =
       "any device that a TOML file describes: VMG30, OpenCyberGlove, BeBop Forte, yours";
-  static constexpr auto options = all_options;
+  static constexpr auto option_specs = all_options;
 
   // What the options leave out is as the description says. An error names its file.
   static Result<Settings> settings(Options& options) {

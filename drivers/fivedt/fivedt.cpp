@@ -171,7 +171,7 @@ struct FiveDt : glove::GloveType<FiveDt> {
   static constexpr std::string_view kSummary =
       "5DT data gloves: serial, Ultra Wireless and Ultra USB";
   static constexpr std::span<const KnownUsb> kUsb = kUltraUsb;
-  static constexpr auto options = all_options;
+  static constexpr auto option_specs = all_options;
 
   static Result<Settings> settings(Options& options) {
     const auto hand = TRY(glove::hand_option(options));

@@ -1,9 +1,9 @@
 // GloveType: the base for the `Type` of DriverOf for gloves (drivers/driver_of.hpp). `Self` adds
 //
-//   kName, kSummary, options(), settings(), device_info(), parse_device_info(), open(), emulator()
-//   Settings, with a member `hand`
-//   model(settings) -> Result<Model>             the sensors, before calibration
-//   make_decoder(settings, skeleton, calibration) -> std::unique_ptr<Decoder>
+//   kName, kSummary, option_specs(), settings(), device_info(), parse_device_info(), open(),
+//   emulator() Settings, with a member `hand` model(settings) -> Result<Model>             the
+//   sensors, before calibration make_decoder(settings, skeleton, calibration) ->
+//   std::unique_ptr<Decoder>
 //
 // and, if it has them, extra_names(), layout(), rate_hz(), kUsb, kUndetected and encode_haptics().
 // Cold.

@@ -100,7 +100,7 @@ template <typename Self>
 struct TextGlove : GloveType<Self> {
   using Settings = TextSettings;
 
-  static std::vector<OptionSpec> options() { return serial_options(Self::kBaud); }
+  static std::vector<OptionSpec> option_specs() { return serial_options(Self::kBaud); }
   static Result<Settings> settings(const Options& options) {
     const auto hand = TRY(hand_option(options));
     return Settings{.hand = hand};

@@ -120,7 +120,7 @@ struct LucidGlove : glove::GloveType<LucidGlove> {
   static constexpr std::string_view kSummary =
       "LucidGloves and others that speak OpenGloves, over a serial port or TCP";
   static constexpr std::span<const KnownUsb> kUsb = kUsbIds;
-  static constexpr auto options = all_options;
+  static constexpr auto option_specs = all_options;
   static constexpr auto model = lucidgloves::model;
   static constexpr auto extra_names = lucidgloves::extra_names;
 

@@ -69,7 +69,7 @@ struct Mvn : SourceType<Mvn> {
   static constexpr std::string_view kName = "mvn";
   static constexpr std::string_view kSummary =
       "Xsens MVN (Movella): people in suits, with or without gloves, over UDP or TCP";
-  static constexpr auto options = mvn::options;
+  static constexpr auto option_specs = mvn::options;
   static constexpr auto make_layout = mvn::make_layout;
   static constexpr auto connect = open_network;
 

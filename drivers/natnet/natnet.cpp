@@ -96,7 +96,7 @@ struct NatNet : SourceType<NatNet> {
   static constexpr std::string_view kName = "natnet";
   static constexpr std::string_view kSummary =
       "OptiTrack: skeletons, rigid bodies and markers from Motive over NatNet 2.5 to 4";
-  static constexpr auto options = natnet::options;
+  static constexpr auto option_specs = natnet::options;
   static constexpr auto settings = natnet::settings_of;
   static constexpr auto device_info = natnet::settings_text;
   static constexpr auto parse_device_info = natnet::parse_settings;

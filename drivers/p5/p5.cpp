@@ -84,7 +84,7 @@ struct P5 : glove::GloveType<P5> {
   static constexpr std::string_view kSummary = "Essential Reality P5, over libusb";
   static constexpr std::span<const KnownUsb> kUsb = kP5Usb;
 
-  static std::vector<OptionSpec> options() {
+  static std::vector<OptionSpec> option_specs() {
     return {{.name = "id",
              .default_value = std::string(),
              .help = "USB port path, as posed devices lists it; left out: the only one"},
