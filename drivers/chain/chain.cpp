@@ -59,17 +59,17 @@ struct Upstream : SourceType<Upstream> {
     TRY(check_subscription(subscription));
     return subscription.endpoint;
   }
-  static Result<std::unique_ptr<Decoder>> decoder(const Settings& settings,
+  static Result<std::unique_ptr<Decoder>> decoder(const Settings& known,
                                                   const Description& /*description*/) {
-    return std::make_unique<UpstreamDecoder>(settings.stream);
+    return std::make_unique<UpstreamDecoder>(known.stream);
   }
   static Result<std::unique_ptr<Transport>> connect(const Options& options,
                                                     TransportFactory& ports) {
     return ports.subscribe(subscription_of(options));
   }
   static Result<std::unique_ptr<Emulator>> emulator(const Options& /*options*/,
-                                                    const Settings& settings) {
-    return std::make_unique<UpstreamEmulator>(settings);
+                                                    const Settings& known) {
+    return std::make_unique<UpstreamEmulator>(known);
   }
 };
 

@@ -107,9 +107,9 @@ struct NatNet : SourceType<NatNet> {
     TRY(check_udp(sockets));
     return "udp " + sockets.sockets[0].to;
   }
-  static Result<std::unique_ptr<Decoder>> decoder(const Settings& settings,
+  static Result<std::unique_ptr<Decoder>> decoder(const Settings& known,
                                                   const Description& /*description*/) {
-    return std::make_unique<NatNetDecoder>(settings);
+    return std::make_unique<NatNetDecoder>(known);
   }
   static Result<std::unique_ptr<Transport>> connect(const Options& options,
                                                     TransportFactory& ports) {
@@ -117,8 +117,8 @@ struct NatNet : SourceType<NatNet> {
   }
   static Poll poll() { return {.request = {}, .period_ns = Requests::kPeriod_ns}; }
   static Result<std::unique_ptr<Emulator>> emulator(const Options& /*options*/,
-                                                    const Settings& settings) {
-    return std::make_unique<NatNetEmulator>(settings);
+                                                    const Settings& known) {
+    return std::make_unique<NatNetEmulator>(known);
   }
 };
 
