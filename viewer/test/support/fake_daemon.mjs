@@ -164,7 +164,6 @@ export class FakeDaemon {
           parameter: [
             { name: 'alpha', value: body.alpha, target: body.target },
             { name: 'gate', value: 1, target: 1 },
-            { name: 'calibrate', value: 0, target: 0 },
             { name: 'mask', text: body.mask },
             { name: 'weights', text: body.weights },
           ],
@@ -239,7 +238,7 @@ export class FakeDaemon {
     else if (name === 'style.weights') body.weights = text;
     else if (name === 'feet.limit_cm' && number > 0) body.limit_cm = number;
     else if (name === 'feet.root' && root >= 0) body.root = root;
-    else if (!['style.gate', 'style.calibrate'].includes(name) || flag === undefined)
+    else if (name !== 'style.gate' || flag === undefined)
       return { ok: false, error: `${name}: give a number from -2 to 2` };
     return done;
   }
