@@ -30,34 +30,7 @@ class Findings {
   // are null there. People see it only in a sentence, or by say_numbers(). A name that is there
   // already gets the new value.
   template <typename T>
-  Findings& add(std::string name, const T& value) {
-    if constexpr (std::is_same_v<T, Findings>) {
-      return add_object(std::move(name), value);
-    } else if constexpr (requires {
-                           value.has_value();
-                           *value;
-                         }) {
-      return value ? add(std::move(name), *value) : add_scalar(std::move(name), {});
-    } else if constexpr (std::is_convertible_v<T, std::string_view>) {
-      return add_scalar(std::move(name), std::string(std::string_view(value)));
-    } else if constexpr (std::is_same_v<T, bool> || std::floating_point<T>) {
-      return add_scalar(std::move(name), value);
-    } else if constexpr (std::signed_integral<T>) {
-      return add_scalar(std::move(name), std::int64_t{value});
-    } else if constexpr (std::unsigned_integral<T>) {
-      return add_scalar(std::move(name), std::uint64_t{value});
-    } else {
-      std::vector<Findings> items;
-      for (const auto& item : value) {
-        if constexpr (std::is_same_v<std::remove_cvref_t<decltype(item)>, Findings>) {
-          items.push_back(item);
-        } else {
-          items.push_back(Findings().add({}, item));  // without a name it is the value alone
-        }
-      }
-      return add_list(std::move(name), std::move(items));
-    }
-  }
+  Findings& add(std::string name, const T& value);
   // Adds every finding of `others`.
   Findings& add_all(const Findings& others);
   // Adds what a JSON object in a text holds; nothing of any other text.
@@ -109,6 +82,36 @@ struct Finding {
 
   [[nodiscard]] std::string json() const;  // the value on one line
 };
+
+template <typename T>
+Findings& Findings::add(std::string name, const T& value) {
+  if constexpr (std::is_same_v<T, Findings>) {
+    return add_object(std::move(name), value);
+  } else if constexpr (requires {
+                         value.has_value();
+                         *value;
+                       }) {
+    return value ? add(std::move(name), *value) : add_scalar(std::move(name), {});
+  } else if constexpr (std::is_convertible_v<T, std::string_view>) {
+    return add_scalar(std::move(name), std::string(std::string_view(value)));
+  } else if constexpr (std::is_same_v<T, bool> || std::floating_point<T>) {
+    return add_scalar(std::move(name), value);
+  } else if constexpr (std::signed_integral<T>) {
+    return add_scalar(std::move(name), std::int64_t{value});
+  } else if constexpr (std::unsigned_integral<T>) {
+    return add_scalar(std::move(name), std::uint64_t{value});
+  } else {
+    std::vector<Findings> items;
+    for (const auto& item : value) {
+      if constexpr (std::is_same_v<std::remove_cvref_t<decltype(item)>, Findings>) {
+        items.push_back(item);
+      } else {
+        items.push_back(Findings().add({}, item));  // without a name it is the value alone
+      }
+    }
+    return add_list(std::move(name), std::move(items));
+  }
+}
 
 // Adds a table of every number, where there are some, with a sentence that says what they are.
 void add_numbers(const Findings& findings, const std::string& sentence, report::Page& page);
