@@ -85,8 +85,8 @@ VirtualStream walking_stream(const std::string& name, double length_s, unsigned 
   stream.model_files = {style::serialize_model(toy_model(style_seed)), ""};
   stream.links.emplace_back();
   for (std::size_t i = 0; i < walk->frames.size(); ++i) {
-    stream.links[0].chunks.push_back({.at_s = static_cast<double>(i) / kWalkRate_hz,
-                                      .bytes = walk->frames[i]});
+    stream.links[0].chunks.push_back(
+        {.at_s = static_cast<double>(i) / kWalkRate_hz, .bytes = walk->frames[i]});
   }
   return stream;
 }

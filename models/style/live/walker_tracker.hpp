@@ -19,14 +19,7 @@ namespace posed::style {
 class WalkerTracker {
  public:
   // The notices, in the order of style_type().
-  enum Notice : std::size_t {
-    kNoGateData,
-    kWarmedUp,
-    kStood,
-    kInterrupted,
-    kOtherJoints,
-    kNoAxis
-  };
+  enum Notice : std::size_t { kNoGateData, kWarmedUp, kStood, kInterrupted, kOtherJoints, kNoAxis };
 
   // Advances by a frame's q, `gap_s` after the last one, of which `dt_s` count, and writes what the
   // kernel shall see of it: q as if the walker's neutral pose were the training's. Returns whether

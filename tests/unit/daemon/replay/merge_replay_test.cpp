@@ -158,8 +158,8 @@ VirtualStream walker_with(config::StageConfig stage) {
   stream.slots = 256;
   stream.links.emplace_back();
   for (std::size_t i = 0; i < walk->frames.size(); ++i) {
-    stream.links[0].chunks.push_back({.at_s = static_cast<double>(i) / stream.description.rate_hz,
-                                      .bytes = walk->frames[i]});
+    stream.links[0].chunks.push_back(
+        {.at_s = static_cast<double>(i) / stream.description.rate_hz, .bytes = walk->frames[i]});
   }
   return stream;
 }

@@ -5,8 +5,8 @@
 #include <random>
 
 #include "models/feet/foot_score.hpp"
-#include "tests/support/seeds.hpp"
 #include "tests/support/parameter_index.hpp"
+#include "tests/support/seeds.hpp"
 #include "tests/unit/models/feet/standing_walker.hpp"
 
 namespace posed::feet {
