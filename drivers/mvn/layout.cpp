@@ -7,7 +7,6 @@
 
 #include "drivers/byte_reader.hpp"
 #include "drivers/pose_values.hpp"
-#include "proto/frame/t_pose.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::drivers::mvn {
@@ -60,20 +59,6 @@ Result<Character> read_character(ByteReader& reader) {
   return character;
 }
 
-bool is_foot(Bone bone) { return bone == Bone::kLeftFoot || bone == Bone::kRightFoot; }
-
-// In T-pose all segments are unturned; the sole is flat then, so the line from ankle to toes
-// slopes. It is laid on its axis as for every other figure, and the toes follow it.
-void set_mvn_t_frames(Skeleton& skeleton) {
-  KnownT known(skeleton.joints.size());
-  for (std::size_t j = 0; j < known.size(); ++j) {
-    const auto& bone = skeleton.joints[j].bone;
-    const bool toes = bone == Bone::kLeftToes || bone == Bone::kRightToes;
-    if (!toes && !(bone && is_foot(*bone))) known[j] = Eigen::Quaterniond::Identity();
-  }
-  set_t_frames(skeleton, known);
-}
-
 }  // namespace
 
 std::size_t write_description_head(std::size_t characters, std::span<std::byte> to) noexcept {
@@ -117,9 +102,8 @@ Result<std::shared_ptr<const Skeleton>> skeleton_of(const Character& character) 
     joint.name = segment_name(segment);
     joint.parent = table.parent[j];
     joint.offset_m = {offset_m[0], offset_m[1], offset_m[2]};
-    joint.bone = segment_bone(segment);
+    joint.bone = segment_bone(segment);  // in T-pose no segment is turned, so T is identity
   }
-  set_mvn_t_frames(*skeleton);
   TRY(skeleton->finish());
   return skeleton;
 }

@@ -11,7 +11,7 @@ struct BodySegment {
 };
 
 // Of the four segments between pelvis and neck, the first two and the last are bones, as in files
-// of such figures (proto/frame/bone_names.cpp).
+// of such figures.
 constexpr std::array<BodySegment, kBodySegments> kBody{{
     {"Pelvis", Bone::kHips},
     {"L5", Bone::kSpine},

@@ -9,7 +9,6 @@
 #include "drivers/natnet/axes.hpp"
 #include "drivers/natnet/model_def.hpp"
 #include "drivers/pose_values.hpp"
-#include "proto/frame/bone_names.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::drivers::natnet {
@@ -124,7 +123,8 @@ Result<std::vector<std::size_t>> order_of(const BodyDef& body) {
   return order;
 }
 
-// In T-pose all bones of Motive's skeletons have the rotation identity, whatever their names.
+// In T-pose all bones of Motive's skeletons have the rotation identity, whatever their names. Names
+// of the other conventions (FBX, BVH) are left to the recogniser.
 void name_joints(Skeleton& skeleton) {
   for (Joint& joint : skeleton.joints) {
     const auto bone = motive_bone(joint.name);
@@ -132,7 +132,6 @@ void name_joints(Skeleton& skeleton) {
   }
   if (skeleton.joint_of(Bone::kHips) >= 0) return;
   for (Joint& joint : skeleton.joints) joint.bone.reset();
-  name_bones(skeleton);  // the conventions FBX and BVH
 }
 
 Result<std::shared_ptr<const Skeleton>> skeleton_of(const BodyDef& body, bool z_up,

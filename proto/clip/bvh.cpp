@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "proto/clip/draft.hpp"
+#include "proto/clip/figure.hpp"
 #include "proto/clip/formats.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/text/clean.hpp"
@@ -93,38 +94,108 @@ void scale_lengths(Skeleton& skeleton, double metres_per_unit) {
   }
 }
 
-double unit_of(const Skeleton& skeleton, const ReadOptions& options, const Profile* profile,
-               std::vector<std::string>& warnings) {
-  if (options.metres_per_unit) return *options.metres_per_unit;
-  if (profile != nullptr && profile->metres_per_unit) {
-    if (!profile->person || is_a_person(skeleton, *profile->metres_per_unit)) {
-      return *profile->metres_per_unit;
-    }
-    warnings.push_back("has the joints of profile '" + profile->name +
-                       "' but not its unit of length");
+// A profile's unit, unless the figure would be no person in it.
+std::optional<double> unit_of(const Profile& profile, const Skeleton& skeleton,
+                              std::vector<std::string>& warnings) {
+  if (!profile.metres_per_unit) return std::nullopt;
+  if (!profile.person || is_a_person(skeleton, *profile.metres_per_unit)) {
+    return profile.metres_per_unit;
   }
-  return guess_unit(skeleton, warnings);
+  warnings.push_back("has the joints of profile '" + profile.name +
+                     "' but not its unit of length");
+  return std::nullopt;
+}
+
+// Frames for the recogniser, in rad and file units. Those that cannot be parsed are left out: the
+// reader of all frames will refuse them with their line.
+ChannelMatrix sample_of(const Skeleton& skeleton, std::span<const FrameSpan> frames) {
+  constexpr double kTinyUnit_m = 1e-6;  // so that no position is beyond a pose's
+  const auto parser = FrameParser::bvh(skeleton, kTinyUnit_m);
+  const auto picked = sample_frames(static_cast<int>(frames.size()),
+                                    static_cast<int>(skeleton.joints.size()));
+  ChannelMatrix sample(std::ssize(picked), std::ssize(skeleton.channels));
+  int count = 0;
+  for (const int i : picked) {
+    auto row = sample.row(count);
+    const std::span<double> values(row.data(), static_cast<std::size_t>(row.size()));
+    if (!parser.parse(frames[i].text, values).ok()) continue;
+    for (std::size_t c = 0; c < values.size(); ++c) {
+      if (skeleton.channels[c].translation) values[c] /= kTinyUnit_m;
+    }
+    ++count;
+  }
+  sample.conservativeResize(count, Eigen::NoChange);
+  return sample;
+}
+
+// One line that says what was taken for granted.
+std::string taken_as(const rig::Rig& rig) {
+  std::string text = "names neither its unit nor its upward axis; taken as " + rig.unit + " (" +
+                     rig.why_unit + ") and " + std::string(up_text(rig.up));
+  return rig.why_up.empty() ? text : text + " (" + rig.why_up + ")";
+}
+
+// Finds bones, T frames, unit and upward axis, and brings the skeleton into metres and +Y up.
+// Returns the factors of the file's channels (FrameParser::bvh).
+Result<std::vector<double>> recognise_draft(const ReadOptions& options,
+                                            std::span<const FrameSpan> frames, Draft& draft) {
+  Skeleton& skeleton = draft.skeleton;
+  rig::RigInput known;
+  known.up = options.up;
+  known.metres_per_unit = options.metres_per_unit;
+  if (draft.profile != nullptr) {
+    TRY(add_profile(*draft.profile, skeleton, known));
+    if (!known.metres_per_unit) {
+      known.metres_per_unit = unit_of(*draft.profile, skeleton, draft.warnings);
+    }
+  }
+  const bool unit_is_known = known.metres_per_unit.has_value();
+  const rig::Rig rig = recognise(skeleton, sample_of(skeleton, frames), std::move(known));
+  if (!rig.metres_per_unit) {
+    draft.metres_per_unit = guess_unit(skeleton, draft.warnings);
+  } else {
+    draft.metres_per_unit = *rig.metres_per_unit;
+    if (!unit_is_known) draft.warnings.push_back(taken_as(rig));
+  }
+  if (unit_is_known && rig.up != UpAxis::kPlusY && !options.up) {
+    draft.warnings.push_back("does not name its upward axis; taken as " +
+                             std::string(up_text(rig.up)) + ": " + rig.why_up);
+  }
+  draft.warnings.insert(draft.warnings.end(), rig.notes.begin(), rig.notes.end());
+  draft.up = rig.up;
+  draft.is_recognised = true;
+  apply(rig, skeleton);
+  scale_lengths(skeleton, draft.metres_per_unit);
+  const std::size_t joints = skeleton.joints.size();
+  const std::vector<char> stays = leave_out_joints(skeleton);
+  std::vector<double> factors = turn_axes(up_turn(rig.up), skeleton);
+  if (stays.empty()) return factors;
+  draft.warnings.push_back("has " + std::to_string(joints) + " joints; of those that are no bones, " +
+                           std::to_string(joints - skeleton.joints.size()) + " were left out");
+  std::vector<double> of_file;
+  auto next = factors.begin();
+  for (const char stay : stays) of_file.push_back(stay != 0 ? *next++ : 0.0);
+  return of_file;
 }
 
 Result<Draft> read_bvh(const ClipFile& file, const ReadOptions& options) {
   const std::string_view text = without_bom(file.bytes);
   auto header = TRY(parse_bvh_header(text, file.name));
-  const auto profile = TRY(find_profile(header.skeleton, options.profile));
   Draft draft;
-  draft.profile = profile;
-  draft.metres_per_unit = unit_of(header.skeleton, options, profile, draft.warnings);
   draft.skeleton = std::move(header.skeleton);
-  scale_lengths(draft.skeleton, draft.metres_per_unit);
   draft.skeleton.name = std::filesystem::path(file.name).stem().string();
   draft.frame_rate_hz = header.frame_rate_hz;
   TextFrames& frames = draft.text.emplace();
-  frames.parser = FrameParser::bvh(draft.skeleton, draft.metres_per_unit);
   frames.header = text.substr(0, header.motion_offset);
   std::string_view motion = text.substr(header.motion_offset);
   for (int line = header.motion_line; !motion.empty(); ++line) {
     const std::string_view frame = trim(next_line(motion));
     if (!frame.empty()) frames.frames.push_back({.text = frame, .line = line});
   }
+  draft.profile = TRY(find_profile(draft.skeleton, options.profile));
+  const auto factors = recognise_draft(options, frames.frames, draft);
+  if (!factors) return fail(factors.error().message, file.name);
+  frames.parser = FrameParser::bvh(draft.skeleton, draft.metres_per_unit, *factors);
   const auto declared = parse_number(header.declared_frames);
   const std::size_t found = frames.frames.size();
   if (!declared || *declared != static_cast<double>(found)) {
@@ -135,6 +206,7 @@ Result<Draft> read_bvh(const ClipFile& file, const ReadOptions& options) {
   return draft;
 }
 
+constexpr std::size_t kMaxFileJoints = 1000;  // of which posed carries kMaxJoints
 constexpr int kMaxDepth = 96;
 constexpr double kMaxFrameTime_s = 10.0;
 constexpr double kMaxRate_hz = 100'000.0;
@@ -218,9 +290,8 @@ Result<> HeaderReader::begin_joint() {
   if (name.empty()) return error("a joint has no name");
   if (name.size() > 200) return error("a joint's name is longer than 200 characters");
   if (open_.size() >= kMaxDepth) return error("joints are nested deeper than 96");
-  if (joints().size() >= static_cast<std::size_t>(kMaxJoints)) {
-    return error("has more than " + std::to_string(kMaxJoints) +
-                 " joints; leave out joints that do not matter, for example finger tips");
+  if (joints().size() >= kMaxFileJoints) {
+    return error("has more than " + std::to_string(kMaxFileJoints) + " joints");
   }
   if (header_.skeleton.joint_index(name) >= 0) {
     return error("a second joint is named " + in_quotes(name) + "; give each its own name");

@@ -6,6 +6,7 @@
 
 #include "proto/clip/bvh.hpp"
 #include "proto/clip/clip.hpp"
+#include "proto/clip/figure.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/whole_file.hpp"
 
@@ -42,6 +43,18 @@ std::string motion_line(const Clip& clip, int index) {
     append(line, channels[c].translation ? value / clip.metres_per_unit : value * kDegreesPerRad);
   }
   return line + "\n";
+}
+
+// The clip in the axes of its file.
+Clip in_file_axes(Clip clip) {
+  auto skeleton = std::make_shared<Skeleton>(*clip.skeleton);
+  const auto factors = turn_axes(up_turn(clip.up).transpose(), *skeleton);
+  for (std::size_t c = 0; c < factors.size(); ++c) {
+    clip.channels.col(static_cast<Eigen::Index>(c)) *= factors[c];
+  }
+  clip.skeleton = std::move(skeleton);
+  clip.up = UpAxis::kPlusY;
+  return clip;
 }
 
 class HierarchyWriter {
@@ -119,6 +132,7 @@ std::string bvh_hierarchy(const Skeleton& skeleton, double metres_per_unit) {
 
 Result<> write_bvh(const Clip& clip, const std::filesystem::path& path) {
   if (is_acclaim(*clip.skeleton)) return write_bvh(with_zyx_channels(clip), path);
+  if (clip.up != UpAxis::kPlusY) return write_bvh(in_file_axes(clip), path);
   return write_whole_file(path, [&clip](std::ostream& file) {
     file << bvh_hierarchy(*clip.skeleton, clip.metres_per_unit) << motion_head(clip);
     for (int i = 0; i < clip.frames() && file; ++i) file << motion_line(clip, i);

@@ -13,6 +13,7 @@
 #include "proto/frame/hand_shape.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/skeleton.hpp"
+#include "proto/rig/up.hpp"
 
 namespace posed::clip {
 
@@ -28,8 +29,10 @@ struct Clip {
   ChannelMatrix channels;
   std::vector<double> time_s{};       // [frame], increasing; empty: evenly spaced, from 0
   std::vector<std::string> warnings;  // one sentence for each thing that was read leniently
-  // Unit of the file, kept so that the clip can be written back in it.
+  // Unit and upward axis of the file, kept so that the clip can be written back in them. Skeleton
+  // and channels have +Y up.
   double metres_per_unit = 0.01;
+  UpAxis up = UpAxis::kPlusY;
 
   [[nodiscard]] int frames() const { return static_cast<int>(channels.rows()); }
   // The pose, with a device time from the index; the stream is not set.
@@ -43,9 +46,11 @@ struct ReadOptions {
   std::filesystem::path skeleton{};
   // Rate of a format that does not state it; empty: its usual one.
   std::optional<double> rate_hz{};
-  // Unit of length of a format that does not state it; empty: the profile's, otherwise guessed from
-  // the figure's height.
+  // Unit of length of a format that does not state it; empty: the profile's, otherwise recognised
+  // by the figure's legs.
   std::optional<double> metres_per_unit{};
+  // Axis that points up in a format that does not state it; empty: recognised by the figure.
+  std::optional<UpAxis> up{};
   std::string profile{};       // name of a skeleton profile; empty: found by joint names
   std::optional<Side> hand{};  // side of a hand that does not state it; empty: right
   std::string hand_shape{kDefaultHandShape};  // bones of a hand of which a file has only the angles
@@ -72,8 +77,8 @@ Result<> write_clip(const Clip& clip, const std::filesystem::path& path);
 // outermost). An Acclaim joint with few degrees of freedom then can hold any rotation.
 [[nodiscard]] Clip with_zyx_channels(const Clip& clip);
 
-// Writes `clip` as BVH in its own unit, with its own joint names, hierarchy, channel order and
-// rate. An Acclaim skeleton becomes a BVH with ZYX rotation channels on every joint.
+// Writes `clip` as BVH in its own unit and axes, with its own joint names, hierarchy, channel order
+// and rate. An Acclaim skeleton becomes a BVH with ZYX rotation channels on every joint.
 Result<> write_bvh(const Clip& clip, const std::filesystem::path& path);
 
 }  // namespace posed::clip

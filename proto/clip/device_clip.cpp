@@ -10,6 +10,8 @@
 #include "proto/clip/format.hpp"
 #include "proto/clip/skeleton_json.hpp"
 #include "proto/clip/text.hpp"
+#include "proto/frame/axes_text.hpp"
+#include "proto/rig/up.hpp"
 
 namespace posed::clip {
 namespace {
@@ -36,8 +38,8 @@ std::string first_line(std::string_view kind, const Clip& clip) {
          " rate_hz=" + number_text(clip.frame_rate_hz);
 }
 
-std::string describe_text(const LoadedClip& loaded, const TextFrames& text, bool has_profile,
-                          const Clip& clip, const ReadOptions& options) {
+std::string describe_text(const LoadedClip& loaded, const TextFrames& text, const Clip& clip,
+                          const ReadOptions& options) {
   const Skeleton& skeleton = *clip.skeleton;
   std::string out = first_line(text_key(*loaded.format), clip);
   out += " metres_per_unit=" + number_text(clip.metres_per_unit);
@@ -46,15 +48,14 @@ std::string describe_text(const LoadedClip& loaded, const TextFrames& text, bool
   if (loaded.format->is_hand) {
     out += options.hand == Side::kLeft ? " hand=left" : " hand=right";
     out += " shape=" + options.hand_shape;
-  } else if (!options.profile.empty()) {
-    out += " profile=" + options.profile;
   }
-  // Only the whole clip shows this; the other facts follow from the header.
-  if (!loaded.format->is_hand && !has_profile && !zero_pose_is_t(skeleton)) {
-    out += " T=";
-    for (const Joint& joint : skeleton.joints) out += axes_text(joint.T_world_joint);
+  // What the whole clip shows. Logs of posed 0.1 have no skeleton here, but some have T=.
+  const std::string known = loaded.format->is_hand ? std::string() : skeleton_json(skeleton);
+  if (!known.empty()) {
+    out += " up=" + std::string(up_text(clip.up));
+    out += " skeleton_bytes=" + std::to_string(known.size());
   }
-  out += '\n' + loaded.file.skeleton;
+  out += '\n' + known + loaded.file.skeleton;
   out.append(text.header).append(text.frames.front().text);
   return out;
 }
@@ -95,6 +96,10 @@ Result<FrameCoding> parse_text(const Format& format, const Facts& facts, double 
   const auto metres = fact(facts, "metres_per_unit");
   const auto root = fact(facts, "root_joint");
   const auto asf_bytes = fact(facts, "asf_bytes");
+  const double known_bytes = fact(facts, "skeleton_bytes").value_or(0.0);
+  if (!(known_bytes >= 0.0) || known_bytes > static_cast<double>(body.size())) return damaged(name);
+  const std::string_view known = body.substr(0, static_cast<std::size_t>(known_bytes));
+  body.remove_prefix(known.size());
   if (!metres || !root || !asf_bytes || !(*asf_bytes >= 0.0) ||
       *asf_bytes > static_cast<double>(body.size()) || !(*root >= 0.0 && *root < kMaxJoints)) {
     return damaged(name);
@@ -108,6 +113,7 @@ Result<FrameCoding> parse_text(const Format& format, const Facts& facts, double 
   options.rate_hz = rate_hz;
   options.metres_per_unit = metres;
   options.profile = word_of(facts, "profile", "");
+  options.up = up_from_text(word_of(facts, "up", "+y"));
   options.hand_shape = word_of(facts, "shape", kDefaultHandShape);
   options.hand = word_of(facts, "hand", "right") == "left" ? Side::kLeft : Side::kRight;
   auto draft = TRY(format.read(file, options));
@@ -117,6 +123,14 @@ Result<FrameCoding> parse_text(const Format& format, const Facts& facts, double 
   const std::string axes = word_of(facts, "T", "");
   for (std::size_t i = 0; i + 6 <= axes.size(); i += 6) {
     hints.T.push_back(axes_from_text(std::string_view(axes).substr(i, 6)));
+  }
+  if (!known.empty()) {
+    auto skeleton = TRY(skeleton_from_json(known, name));
+    const bool same = std::ranges::equal(skeleton.joints, draft.skeleton.joints, {}, &Joint::name,
+                                         &Joint::name);
+    if (!same || skeleton.channels.size() != draft.skeleton.channels.size()) return damaged(name);
+    draft.skeleton = std::move(skeleton);
+    draft.skeleton_is_known = true;
   }
   auto clip = TRY(clip_of(std::move(draft), name, hints));
   coding.skeleton = clip.skeleton;
@@ -133,10 +147,10 @@ Result<FrameCoding> parse_numbers(const Facts& facts, double rate_hz, std::strin
                      .parser = std::move(parser)};
 }
 
-void add_text(const LoadedClip& loaded, const TextFrames& text, bool has_profile, const Clip& clip,
+void add_text(const LoadedClip& loaded, const TextFrames& text, const Clip& clip,
               const ReadOptions& options, DeviceClip& out) {
   out.coding.parser = text.parser;
-  out.description = describe_text(loaded, text, has_profile, clip, options);
+  out.description = describe_text(loaded, text, clip, options);
   for (const FrameSpan& frame : text.frames) {
     out.frames.emplace_back(frame.text);
     if (!out.frames.back().ends_with('\n')) out.frames.back() += '\n';
@@ -159,14 +173,13 @@ Result<DeviceClip> open_device_clip(const std::filesystem::path& path, const Rea
   const auto loaded = TRY(load_clip(path, options));
   auto draft = TRY(loaded.format->read(loaded.file, options));
   assert(draft.text.has_value() == loaded.format->sends_text);
-  const bool has_profile = draft.profile != nullptr;
   const auto text = std::exchange(draft.text, std::nullopt);
   auto clip = TRY(clip_of(std::move(draft), loaded.file.name));
   DeviceClip out;
   out.coding.skeleton = clip.skeleton;
   out.coding.frame_rate_hz = clip.frame_rate_hz;
   if (text) {
-    add_text(loaded, *text, has_profile, clip, options, out);
+    add_text(loaded, *text, clip, options, out);
   } else {
     add_numbers(clip, out);
   }

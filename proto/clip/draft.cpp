@@ -4,8 +4,8 @@
 #include <cassert>
 #include <cmath>
 
+#include "proto/clip/figure.hpp"
 #include "proto/clip/text.hpp"
-#include "proto/frame/bone_names.hpp"
 #include "proto/frame/plausible.hpp"
 #include "proto/text/clean.hpp"
 
@@ -27,20 +27,27 @@ int find_root_joint(const Skeleton& skeleton, const ChannelMatrix& channels) {
   return 0;
 }
 
-// Position channels of a joint below the root joint replace its OFFSET. Bones keep their length, so
-// these channels should be constant; their value becomes the offset. Warns when one moves.
+// Bones keep their length, so the position channels of a joint below the root joint should be
+// constant. Warns when one moves.
 void settle_offsets(Clip& clip, Skeleton& skeleton) {
+  const auto row = clip.channels.row(0);
+  const std::span<const double> first(row.data(), static_cast<std::size_t>(row.size()));
+  for (int j = skeleton.root_joint + 1; j < std::ssize(skeleton.joints); ++j) {
+    Joint& joint = skeleton.joints[j];
+    const Eigen::Vector3d offset_m = settled_offset(skeleton, j, first);
+    for (int i = 0; i < 3; ++i) {
+      if (std::abs(offset_m[i] - joint.offset_m[i]) > 0.1 * kSameLength_m) {
+        joint.offset_m[i] = offset_m[i];
+      }
+    }
+  }
   int warned = -1;
   for (std::size_t c = 0; c < skeleton.channels.size(); ++c) {
     const Channel& channel = skeleton.channels[c];
     if (!channel.translation || channel.joint <= skeleton.root_joint) continue;
-    Joint& joint = skeleton.joints[channel.joint];
-    const double first_m = clip.channels(0, static_cast<Eigen::Index>(c));
-    double& offset_m = joint.offset_m[static_cast<int>(channel.axis)];
-    if (std::abs(first_m - offset_m) > 0.1 * kSameLength_m) offset_m = first_m;
     if (channel.joint != warned && varies(clip.channels, c)) {
       warned = channel.joint;
-      clip.warnings.push_back("joint " + in_quotes(joint.name) +
+      clip.warnings.push_back("joint " + in_quotes(skeleton.joints[channel.joint].name) +
                               " changes its distance from its parent; posed keeps that of the "
                               "first frame");
     }
@@ -64,31 +71,34 @@ Result<> check_values(const Clip& clip) {
   return {};
 }
 
-// Sets bones, root joint, offsets and T frames in this order, because each step needs the one
-// before.
-Result<> complete(Clip& clip, Skeleton& skeleton, const Profile* profile, const Hints& hints) {
-  if (profile == nullptr) {
-    name_bones(skeleton);
-  } else {
-    TRY(name_bones(*profile, skeleton));
+// For formats that state their unit and have +Y up.
+Result<> recognise_clip(Clip& clip, Skeleton& skeleton, const Profile* profile,
+                        const Hints& hints) {
+  rig::RigInput known;
+  known.T = hints.T;
+  known.up = UpAxis::kPlusY;
+  known.metres_per_unit = 1.0;
+  if (profile != nullptr) TRY(add_profile(*profile, skeleton, known));
+  const auto picked =
+      sample_frames(clip.frames(), static_cast<int>(skeleton.joints.size()));
+  const ChannelMatrix sample = clip.channels(picked, Eigen::all);
+  const rig::Rig rig = recognise(skeleton, sample, std::move(known));
+  apply(rig, skeleton);
+  clip.warnings.insert(clip.warnings.end(), rig.notes.begin(), rig.notes.end());
+  return {};
+}
+
+// Sets bones, T frames, root joint and offsets.
+Result<> complete(Clip& clip, Skeleton& skeleton, const Draft& draft, const Hints& hints) {
+  if (!draft.is_recognised) TRY(recognise_clip(clip, skeleton, draft.profile, hints));
+  for (std::size_t j = 0; j < std::min(hints.T.size(), skeleton.joints.size()); ++j) {
+    if (hints.T[j]) skeleton.joints[j].T_world_joint = *hints.T[j];
   }
   const int hips = skeleton.joint_of(Bone::kHips);
   skeleton.root_joint = hints.root_joint ? *hints.root_joint
                         : hips >= 0      ? hips
                                          : find_root_joint(skeleton, clip.channels);
   settle_offsets(clip, skeleton);
-  if (profile != nullptr) {
-    set_t_frames(skeleton, known_t(*profile, skeleton));
-  } else if (zero_pose_is_t(skeleton)) {
-    set_t_frames(skeleton);
-  } else if (!hints.T.empty()) {
-    set_t_frames(skeleton, hints.T);
-  } else {
-    set_t_frames(skeleton, t_frames_from_mean_pose(skeleton, mean_rotations(clip)));
-    clip.warnings.emplace_back(
-        "the zero pose is no T-pose and no skeleton profile fits; the T-pose is taken from the "
-        "mean pose of the clip, which should walk or stand");
-  }
   const auto far = std::ranges::find_if(skeleton.joints, [](const Joint& joint) {
     return !(joint.offset_m.norm() <= kMaxPosition_m) ||
            (joint.end_site_m && !(joint.end_site_m->norm() <= kMaxPosition_m));
@@ -98,14 +108,6 @@ Result<> complete(Clip& clip, Skeleton& skeleton, const Profile* profile, const 
                 " lies more than 1 km from its parent; is the unit of length right?");
   }
   return skeleton.finish();
-}
-
-// The line from the right to the left upper leg in the hips' frame; zero when either is unknown.
-Eigen::Vector3d hip_line(const Skeleton& skeleton) {
-  const int left = skeleton.joint_of(Bone::kLeftUpperLeg);
-  const int right = skeleton.joint_of(Bone::kRightUpperLeg);
-  if (left < 0 || right < 0) return Eigen::Vector3d::Zero();
-  return skeleton.joints[left].offset_m - skeleton.joints[right].offset_m;
 }
 
 }  // namespace
@@ -143,6 +145,7 @@ Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints) {
   clip.path = name;
   clip.frame_rate_hz = draft.frame_rate_hz;
   clip.metres_per_unit = draft.metres_per_unit;
+  clip.up = draft.up;
   clip.warnings = std::move(draft.warnings);
   clip.time_s = std::move(draft.time_s);
   clip.channels = Eigen::Map<const ChannelMatrix>(
@@ -153,39 +156,10 @@ Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints) {
   clip.skeleton = skeleton;
   TRY(check_values(clip));
   if (draft.skeleton_is_known) return clip;
-  if (auto ok = complete(clip, *skeleton, draft.profile, hints); !ok) {
+  if (auto ok = complete(clip, *skeleton, draft, hints); !ok) {
     return fail(ok.error().message, name);
   }
   return clip;
-}
-
-std::vector<Eigen::Quaterniond> mean_rotations(const Clip& clip) {
-  const Skeleton& skeleton = *clip.skeleton;
-  const Eigen::Vector3d line = hip_line(skeleton);
-  const int hips = std::max(skeleton.joint_of(Bone::kHips), 0);
-  std::vector<Eigen::Quaterniond> global(skeleton.joints.size());
-  std::vector<Eigen::Vector4d> sum(skeleton.joints.size(), Eigen::Vector4d::Zero());
-  for (int i = 0; i < clip.frames(); ++i) {
-    const auto row = clip.channels.row(i);
-    const std::span<const double> values(row.data(), row.size());
-    for (int j = 0; j < std::ssize(skeleton.joints); ++j) {
-      const int parent = skeleton.joints[j].parent;
-      const Eigen::Quaterniond local = local_rotation(skeleton, j, values);
-      global[j] = parent < 0 ? local : global[parent] * local;
-    }
-    // Left is +X when the figure faces +Z.
-    const Eigen::Vector3d left = global[hips] * line;
-    const Eigen::Quaterniond back = axis_rotation(Axis::kY, std::atan2(left.z(), left.x()));
-    for (std::size_t j = 0; j < global.size(); ++j) {
-      const Eigen::Vector4d q = (back * global[j]).coeffs();
-      sum[j] += q.dot(sum[j]) < 0 ? Eigen::Vector4d(-q) : q;
-    }
-  }
-  for (std::size_t j = 0; j < global.size(); ++j) {
-    global[j] = sum[j].norm() > 1e-9 ? Eigen::Quaterniond(sum[j].normalized())
-                                     : Eigen::Quaterniond::Identity();
-  }
-  return global;
 }
 
 }  // namespace posed::clip

@@ -31,9 +31,11 @@ struct TextFrames {
 struct Draft {
   Skeleton skeleton;               // metres; unfinished, unless skeleton_is_known
   bool skeleton_is_known = false;  // posed's own: it has bones, root joint and T frames
+  bool is_recognised = false;      // bones and T frames are set
   const Profile* profile = nullptr;
   double frame_rate_hz = 0.0;
   double metres_per_unit = 1.0;
+  UpAxis up = UpAxis::kPlusY;  // of the file; the skeleton has +Y up
   std::vector<double> values;    // [frame x channel], rad and m
   std::vector<double> time_s{};  // [frame], increasing; empty: evenly spaced, from 0
   std::vector<std::string> warnings;
@@ -49,16 +51,11 @@ Result<> read_frames(const TextFrames& text, const std::string& name, std::vecto
 // description in a log).
 struct Hints {
   std::optional<int> root_joint;
-  KnownT T;
+  std::vector<std::optional<Eigen::Quaterniond>> T;  // [joint]
 };
 
 // Completes the skeleton: bones, root joint, offsets and T frames, as far as the draft does not
 // know them. A draft without frames is an error.
 Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints = {});
-
-// Mean global rotation of each joint [joint], with the heading of each frame (from the line between
-// the upper legs) removed. Input of t_frames_from_mean_pose(), when the figure walks or stands in
-// the clip.
-[[nodiscard]] std::vector<Eigen::Quaterniond> mean_rotations(const Clip& clip);
 
 }  // namespace posed::clip

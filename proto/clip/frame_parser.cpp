@@ -73,9 +73,15 @@ std::string FrameOutcome::sentence() const {
   return {};
 }
 
-FrameParser FrameParser::bvh(const Skeleton& skeleton, double metres_per_unit) {
+FrameParser FrameParser::bvh(const Skeleton& skeleton, double metres_per_unit,
+                             std::span<const double> factors) {
   FrameParser parser;
   parser.scale_ = scales(skeleton, metres_per_unit, kDegree);
+  std::size_t c = 0;
+  for (const double factor : factors) {
+    parser.left_out_.push_back(factor == 0.0 ? 1 : 0);
+    if (factor != 0.0) parser.scale_[c++] *= factor;
+  }
   parser.limit_ = limits(skeleton);
   return parser;
 }
@@ -124,7 +130,9 @@ FrameOutcome FrameParser::parse_line(std::string_view text,
                                      std::span<double> values) const noexcept {
   FrameOutcome outcome;
   const char* const begin = text.data();
-  outcome.expected = std::min(scale_.size(), values.size());
+  const std::size_t columns = left_out_.empty() ? scale_.size() : left_out_.size();
+  outcome.expected = values.size() < scale_.size() ? values.size() : columns;
+  std::size_t channel = 0;
   for (std::string_view word = next_word(text); !word.empty(); word = next_word(text)) {
     outcome.offset = static_cast<std::size_t>(word.data() - begin);
     if (outcome.found == outcome.expected) {
@@ -133,14 +141,15 @@ FrameOutcome FrameParser::parse_line(std::string_view text,
       return outcome;
     }
     const auto value = parse_number(word);
-    if (!value || !keep(*value, outcome.found, values)) {
+    const bool left_out = !left_out_.empty() && left_out_[outcome.found] != 0;
+    if (!value || (!left_out && !keep(*value, channel++, values))) {
       outcome.fault = value ? FrameFault::kImplausible : FrameFault::kNotANumber;
       outcome.where = word;
       return outcome;
     }
     ++outcome.found;
   }
-  if (outcome.found < scale_.size()) outcome.fault = FrameFault::kTooFew;
+  if (outcome.found < columns) outcome.fault = FrameFault::kTooFew;
   return outcome;
 }
 

@@ -46,7 +46,10 @@ struct FrameOutcome {
 class FrameParser {
  public:
   // Parses a BVH motion line: the values of all channels in order, in degrees and file units.
-  [[nodiscard]] static FrameParser bvh(const Skeleton& skeleton, double metres_per_unit);
+  // `factors` [channel of the file]: -1 where its axis is turned round, 0 where its joint was left
+  // out (clip/figure.hpp), else 1; empty for a skeleton as it stands in the file.
+  [[nodiscard]] static FrameParser bvh(const Skeleton& skeleton, double metres_per_unit,
+                                       std::span<const double> factors = {});
 
   // Parses an AMC block: the frame's number, then for each bone its name and its values.
   [[nodiscard]] static FrameParser amc(const Acclaim& acclaim, bool degrees);
@@ -94,6 +97,7 @@ class FrameParser {
                                   std::span<double> values) const noexcept;
 
   std::vector<double> scale_;       // [channel], factor from file value to rad or m
+  std::vector<char> left_out_;      // [channel of the file]; empty: none is
   std::vector<double> limit_;       // [channel], largest allowed size of a value, rad or m
   std::vector<AcclaimBone> bones_;  // AMC, sorted by name
   std::size_t lines_ = 1;

@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <utility>
 
+#include "proto/frame/axes_text.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/profile_texts.hpp"
 #include "proto/text/clean.hpp"
@@ -54,6 +55,8 @@ bool matches(const Profile& profile, const Skeleton& skeleton) {
     return skeleton.joint_index(joint) >= 0;
   };
   if (profile.match.empty() || !std::ranges::all_of(profile.match, has)) return false;
+  const auto has_joint = [&has](const auto& entry) { return has(entry.first); };
+  if (!std::ranges::all_of(profile.bones, has_joint)) return false;
   return std::ranges::all_of(profile.along, [&skeleton](const auto& entry) {
     const int joint = skeleton.joint_index(entry.first);
     return joint >= 0 && points_along(skeleton.joints[joint], entry.second);
@@ -115,25 +118,28 @@ Result<const Profile*> find_profile(const Skeleton& skeleton, const std::string&
   return misuse("there is no skeleton profile " + in_quotes(name) + "; there are " + known);
 }
 
-Result<> name_bones(const Profile& profile, Skeleton& skeleton) {
+Result<std::vector<std::optional<Bone>>> named_bones(const Profile& profile,
+                                                     const Skeleton& skeleton) {
+  std::vector<std::optional<Bone>> bones(skeleton.joints.size());
   std::string missing;
   for (const auto& [joint, bone] : profile.bones) {
     const int index = skeleton.joint_index(joint);
     if (index < 0) {
       missing += (missing.empty() ? "" : ", ") + joint;
     } else {
-      skeleton.joints[index].bone = bone;
+      bones[index] = bone;
     }
   }
   if (!missing.empty()) {
     return fail("the skeleton is not of profile " + in_quotes(profile.name) + ": it has no joint " +
                 missing);
   }
-  return {};
+  return bones;
 }
 
-KnownT known_t(const Profile& profile, const Skeleton& skeleton) {
-  KnownT known(skeleton.joints.size());
+std::vector<std::optional<Eigen::Quaterniond>> known_t(const Profile& profile,
+                                                       const Skeleton& skeleton) {
+  std::vector<std::optional<Eigen::Quaterniond>> known(skeleton.joints.size());
   for (const auto& [joint, T] : profile.T) {
     if (const int index = skeleton.joint_index(joint); index >= 0) known[index] = T;
   }

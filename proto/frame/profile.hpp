@@ -11,7 +11,6 @@
 
 #include "proto/frame/result.hpp"
 #include "proto/frame/skeleton.hpp"
-#include "proto/frame/t_pose.hpp"
 
 namespace posed {
 
@@ -22,7 +21,7 @@ struct Profile {
   std::vector<std::string> match;  // the profile fits a figure with all these joints,
   std::map<std::string, std::string> along;  // if these joints' OFFSETs point this way ("-y")
   std::map<std::string, Bone> bones;         // joint name -> canonical bone
-  // Joint name -> T; other joints get theirs by the rule in t_pose.hpp.
+  // Joint name -> T; other bones get theirs from the recogniser (proto/rig).
   std::map<std::string, Eigen::Quaterniond> T;
 };
 
@@ -33,14 +32,17 @@ struct Profile {
 // `text` is TOML; `name` is used in error messages. Cold.
 Result<Profile> parse_profile(std::string_view text, const std::string& name);
 
-// Returns the profile called `name`; with an empty name, the first that matches the skeleton, or
-// null. An unknown name is an error that lists the known ones. Cold.
+// Returns the profile called `name`; with an empty name, the first that matches the skeleton and
+// whose bones are all there, or null. An unknown name is an error that lists the known ones. Cold.
 Result<const Profile*> find_profile(const Skeleton& skeleton, const std::string& name);
 
-// Sets the bones as the profile defines them. An error names the joints that are missing. Cold.
-Result<> name_bones(const Profile& profile, Skeleton& skeleton);
+// The bones of the skeleton's joints as the profile defines them [joint]. An error names the joints
+// that are missing. Cold.
+Result<std::vector<std::optional<Bone>>> named_bones(const Profile& profile,
+                                                     const Skeleton& skeleton);
 
-// The T frames that the profile defines, for set_t_frames(). Cold.
-[[nodiscard]] KnownT known_t(const Profile& profile, const Skeleton& skeleton);
+// The T frames that the profile defines [joint]. Cold.
+[[nodiscard]] std::vector<std::optional<Eigen::Quaterniond>> known_t(const Profile& profile,
+                                                                     const Skeleton& skeleton);
 
 }  // namespace posed

@@ -61,8 +61,8 @@ struct Skeleton {
   [[nodiscard]] int joint_index(std::string_view joint_name) const;  // -1 when there is none
   [[nodiscard]] int joint_of(Bone bone) const;                       // -1 when there is none
 
-  // Checks counts and order, sets canonical bones and their T frames where `bone` is not set yet
-  // (by name and OFFSET direction), and computes id. Errors name the joint.
+  // Checks counts and order, recognises bones and their T frames where no joint has a bone yet
+  // (proto/rig), and computes id. Errors name the joint.
   Result<> finish();
 };
 

@@ -1,0 +1,249 @@
+#include "proto/rig/bones.hpp"
+
+#include <map>
+
+namespace posed::rig {
+namespace {
+
+constexpr std::size_t kFingerBones = 15;
+
+bool is_finger(const JointName& name) { return finger_of(name) || name.has("finger"); }
+
+// A hand alone: most joints are named as fingers.
+std::optional<BoneJoints> find_hand(const Figure& figure, const std::vector<JointName>& names) {
+  std::vector<int> fingers;
+  int sides = 0;
+  for (int j = 0; j < figure.size(); ++j) {
+    if (!is_finger(names[j])) continue;
+    fingers.push_back(j);
+    sides += static_cast<int>(names[j].side);
+  }
+  if (fingers.size() < 6 || 10 * fingers.size() < 6 * names.size()) return std::nullopt;
+  const Side side = sides > 0 ? Side::kLeft : Side::kRight;
+  BoneJoints bones;
+  bones.set(on(side, Bone::kLeftHand), figure.common(fingers));
+  find_fingers(figure, names, side, bones);
+  return bones;
+}
+
+// The chain above the arms that holds no arm: neck and head where neither is named.
+std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>& names,
+                             const BoneJoints& bones, int chest) {
+  std::vector<int> rest;
+  for (const int child : figure.children(chest)) {
+    bool holds_limb = false;
+    for (int b = 0; b < kBones; ++b) {
+      const int joint = bones[static_cast<Bone>(b)];
+      holds_limb = holds_limb || (joint >= 0 && figure.below(child, joint));
+    }
+    if (!holds_limb) rest.push_back(child);
+  }
+  std::vector<int> likely;
+  std::ranges::copy_if(rest, std::back_inserter(likely),
+                       [&](int j) { return !names[j].helper && figure[j].offset.norm() > 0.0; });
+  if (!likely.empty()) rest = likely;
+  if (rest.empty()) return {};
+  const auto length = [&figure](int j) {
+    double sum = 0.0;
+    for (const double segment : figure.segments(figure.main_chain(j))) sum += segment;
+    return sum;
+  };
+  const int first = *std::ranges::max_element(rest, {}, length);
+  std::vector<int> chain;
+  for (const int j : figure.main_chain(first)) {
+    const bool tip = figure.children(j).empty() && figure.end_length(j) <= 0.0;
+    if (!tip && !names[j].has("end") && !names[j].has("nub")) chain.push_back(j);
+  }
+  return chain.empty() ? std::vector{first} : chain;
+}
+
+struct Upper {
+  int head = -1;
+  int top = -1;  // where the path from the hips ends
+};
+
+Upper find_head(const Figure& figure, const std::vector<JointName>& names, const BoneJoints& bones,
+                int chest, std::vector<std::string>& notes) {
+  std::vector<int> necks;
+  for (int j = 0; j < figure.size(); ++j) {
+    if (is_head(names[j]) && figure.below(chest, j)) return {.head = j, .top = j};
+    if (is_neck(names[j])) necks.push_back(j);
+  }
+  if (!necks.empty()) {
+    return {.head = necks.size() > 1 ? necks.back() : -1, .top = necks.back()};
+  }
+  const auto chain = chain_above(figure, names, bones, chest);
+  if (chain.empty()) return {.top = chest};
+  notes.emplace_back("head and neck are known by their place only");
+  return {.head = chain.back(), .top = chain.back()};
+}
+
+void keep_if_any(std::vector<int>& joints, const auto& is_wanted) {
+  std::vector<int> kept;
+  std::ranges::copy_if(joints, std::back_inserter(kept), is_wanted);
+  if (!kept.empty()) joints = std::move(kept);
+}
+
+void set_trunk(const std::vector<int>& trunk, BoneJoints& bones) {
+  const std::size_t n = trunk.size();
+  if (n > 0) bones.set(Bone::kSpine, trunk[0]);
+  if (n == 2) bones.set(Bone::kChest, trunk[1]);
+  if (n > 2) {
+    bones.set(Bone::kChest, trunk[n / 2]);
+    bones.set(Bone::kUpperChest, trunk.back());
+  }
+}
+
+// Bones of an incomplete person, each by its name alone.
+void find_parts(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones) {
+  std::vector<int> trunk;
+  for (int j = 0; j < figure.size(); ++j) {
+    const auto take = [&](Bone bone) {
+      if (!bones.has(bone)) bones.set(bone, j);
+    };
+    if (is_pelvis(names[j])) take(Bone::kHips);
+    if (is_neck(names[j])) take(Bone::kNeck);
+    if (is_head(names[j])) take(Bone::kHead);
+    if (is_trunk(names[j])) trunk.push_back(j);
+  }
+  set_trunk(trunk, bones);
+  if (bones.has(Bone::kHips) || trunk.empty() || figure[trunk[0]].parent != 0) return;
+  if (names[0].stem == "root") bones.set(Bone::kHips, 0);
+}
+
+using FingerJoints = std::map<int, std::vector<int>>;  // [finger], from the hand on
+
+FingerJoints finger_joints(const Figure& figure, const std::vector<JointName>& names, int hand) {
+  std::vector<int> below;
+  for (int j = 0; j < figure.size(); ++j) {
+    if (j != hand && figure.below(hand, j)) below.push_back(j);
+  }
+  const bool from_zero = std::ranges::any_of(below, [&names](int j) {
+    return names[j].digits.starts_with('0') && names[j].has("finger");
+  });
+  FingerJoints out;
+  for (const int j : below) {
+    const JointName& name = names[j];
+    auto finger = finger_of(name);
+    if (!finger && (name.has("finger") || name.has("fing")) && !name.digits.empty()) {
+      finger = name.digits.front() - '0' - (from_zero ? 0 : 1);
+    }
+    if (finger && *finger >= 0 && *finger < kFingers) out[*finger].push_back(j);
+  }
+  return out;
+}
+
+// Leaves the three joints of a finger: without tips, and without the bone inside the palm.
+void trim_finger(const Figure& figure, const std::vector<JointName>& names, int finger,
+                 std::vector<int>& joints) {
+  std::erase_if(joints, [&](int j) { return names[j].has("end") || names[j].has("nub"); });
+  if (finger > 0 && joints.size() > 3) {
+    std::erase_if(joints, [&](int j) {
+      return std::ranges::any_of(std::array{"meta", "metacarpal", "in", "inhand", "tip"},
+                                 [&](const char* word) { return names[j].has(word); });
+    });
+  }
+  // CMU's one thumb joint lies in the wrist, and no thumb does.
+  if (joints.size() == 1 && figure[joints.front()].offset.isZero()) joints.clear();
+  if (joints.size() <= 3) return;
+  const JointName& first = names[joints.front()];
+  const bool in_palm = first.has("root") || first.has("metacarpal") || first.digits.empty() ||
+                       first.digits == "0" || first.digits == "00";
+  if (in_palm && finger > 0) joints.erase(joints.begin());
+  joints.resize(3);
+}
+
+}  // namespace
+
+Bone on(Side side, Bone left) {
+  if (side == Side::kLeft) return left;
+  const std::size_t step = left >= Bone::kLeftThumbMetacarpal ? kFingerBones : 4;
+  return static_cast<Bone>(static_cast<std::size_t>(left) + step);
+}
+
+bool BoneJoints::has_limbs() const {
+  return std::ranges::all_of(kSides, [this](Side side) {
+    return has(on(side, Bone::kLeftUpperLeg)) && has(on(side, Bone::kLeftLowerLeg)) &&
+           has(on(side, Bone::kLeftUpperArm)) && has(on(side, Bone::kLeftLowerArm));
+  });
+}
+
+std::vector<std::optional<Bone>> BoneJoints::by_joint(int joints) const {
+  std::vector<std::optional<Bone>> out(joints);
+  for (int b = 0; b < kBones; ++b) {
+    if (const int joint = joint_[b]; joint >= 0) out[joint] = static_cast<Bone>(b);
+  }
+  return out;
+}
+
+void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones,
+                std::vector<std::string>& notes) {
+  const int chest = figure.common({bones[Bone::kLeftUpperArm], bones[Bone::kRightUpperArm]});
+  const int hips = figure.common({bones[Bone::kLeftUpperLeg], bones[Bone::kRightUpperLeg], chest});
+  bones.set(Bone::kHips, hips);
+  const auto [head, top] = find_head(figure, names, bones, chest, notes);
+  std::vector<int> trunk;
+  std::vector<int> neck;
+  for (const int j : figure.path(top)) {
+    if (j == hips || !figure.below(hips, j)) continue;
+    if (figure.below(j, chest)) {
+      trunk.push_back(j);
+    } else if (j != head) {
+      neck.push_back(j);
+    }
+  }
+  // Arms may begin at the neck, but a joint of that name is no trunk.
+  while (trunk.size() > 1 && is_neck(names[trunk.back()])) {
+    neck.insert(neck.begin(), trunk.back());
+    trunk.pop_back();
+  }
+  keep_if_any(trunk, [&names](int j) { return !names[j].helper; });
+  keep_if_any(neck, [&names](int j) {
+    return !names[j].helper || names[j].has("twist") || is_neck(names[j]);
+  });
+  // Above the arms, a joint named as trunk below one named neck belongs to the trunk.
+  while (neck.size() > 1 && is_trunk(names[neck.front()]) &&
+         std::any_of(neck.begin() + 1, neck.end(), [&](int j) { return is_neck(names[j]); })) {
+    trunk.push_back(neck.front());
+    neck.erase(neck.begin());
+  }
+  set_trunk(trunk, bones);
+  if (!neck.empty()) bones.set(Bone::kNeck, neck.front());
+  if (head >= 0) bones.set(Bone::kHead, head);
+}
+
+void find_fingers(const Figure& figure, const std::vector<JointName>& names, Side side,
+                  BoneJoints& bones) {
+  for (auto& [finger, joints] : finger_joints(figure, names, bones[on(side, Bone::kLeftHand)])) {
+    trim_finger(figure, names, finger, joints);
+    const int first = static_cast<int>(Bone::kLeftThumbMetacarpal) + kFingerJoints * finger;
+    for (int i = 0; i < kFingerJoints && i < std::ssize(joints); ++i) {
+      bones.set(on(side, static_cast<Bone>(first + i)), joints[i]);
+    }
+  }
+}
+
+FoundBones find_bones(const Figure& figure, const std::vector<JointName>& names) {
+  FoundBones out;
+  find_limbs(figure, names, out.joint);
+  if (!out.joint.has_limbs()) {
+    if (const auto hand = find_hand(figure, names)) {
+      out.kind = Kind::kHand;
+      out.joint = *hand;
+      return out;
+    }
+    if (const auto limbs = limbs_by_shape(figure, names, out.notes)) out.joint = *limbs;
+  }
+  if (out.joint.has_limbs()) {
+    out.kind = Kind::kPerson;
+    find_trunk(figure, names, out.joint, out.notes);
+  } else {
+    find_parts(figure, names, out.joint);
+  }
+  for (const Side side : kSides) {
+    if (out.joint.has(on(side, Bone::kLeftHand))) find_fingers(figure, names, side, out.joint);
+  }
+  return out;
+}
+
+}  // namespace posed::rig

@@ -1,0 +1,67 @@
+// Which joint is which bone, from the names and the shape of the tree alone. Cold.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "proto/frame/hand.hpp"
+#include "proto/frame/humanoid.hpp"
+#include "proto/rig/figure.hpp"
+#include "proto/rig/words.hpp"
+
+namespace posed::rig {
+
+inline constexpr std::array kSides{Side::kLeft, Side::kRight};
+
+// The left bone's counterpart of a side.
+[[nodiscard]] Bone on(Side side, Bone left);
+
+// The joint of each bone; -1 where there is none.
+class BoneJoints {
+ public:
+  BoneJoints() { joint_.fill(-1); }
+  [[nodiscard]] int operator[](Bone bone) const { return joint_[static_cast<std::size_t>(bone)]; }
+  [[nodiscard]] bool has(Bone bone) const { return (*this)[bone] >= 0; }
+  void set(Bone bone, int joint) { joint_[static_cast<std::size_t>(bone)] = joint; }
+  [[nodiscard]] bool has_limbs() const;  // both sides' upper and lower arms and legs
+  [[nodiscard]] std::vector<std::optional<Bone>> by_joint(int joints) const;
+
+ private:
+  std::array<int, kBones> joint_{};
+};
+
+enum class Kind : std::uint8_t {
+  kPerson,  // two legs, two arms and what joins them
+  kPart,    // some bones of a person, known by name
+  kHand,    // a hand without a body
+};
+
+struct FoundBones {
+  Kind kind = Kind::kPart;
+  BoneJoints joint;
+  std::vector<std::string> notes;  // sentences
+};
+
+[[nodiscard]] FoundBones find_bones(const Figure& figure, const std::vector<JointName>& names);
+
+// Legs and arms by names: along each path from the root the words that fit best, in the order of
+// the limb.
+void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones);
+
+// Legs and arms by the tree alone: two mirrored pairs of chains, one above the other. The names,
+// else the feet, say which side is left. Empty when the tree has no such pairs.
+[[nodiscard]] std::optional<BoneJoints> limbs_by_shape(const Figure& figure,
+                                                       const std::vector<JointName>& names,
+                                                       std::vector<std::string>& notes);
+
+// Pelvis, trunk, neck and head from where the limbs begin.
+void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones,
+                std::vector<std::string>& notes);
+
+// Fingers below the joint of the side's hand.
+void find_fingers(const Figure& figure, const std::vector<JointName>& names, Side side,
+                  BoneJoints& bones);
+
+}  // namespace posed::rig

@@ -1,0 +1,238 @@
+#include "proto/rig/t_frames.hpp"
+
+namespace posed::rig {
+namespace {
+
+constexpr std::size_t at(Side side) { return static_cast<std::size_t>(side); }
+
+Vec mirror(const Vec& v) { return {-v.x(), v.y(), v.z()}; }
+
+}  // namespace
+
+void Frames::legs() {
+  const Mat Th = *T(Bone::kHips);
+  Both thigh;
+  Both world;
+  for (const Side side : kSides) {
+    thigh[at(side)] = *off(on(side, Bone::kLeftUpperLeg), on(side, Bone::kLeftLowerLeg));
+    world[at(side)] = Th * direction(thigh[at(side)]);
+  }
+  const auto down = [](const Vec& v) { return angle_deg(v, -kY) < 110; };
+  const bool real = angle_deg(mirror(world[0]), world[1]) < 25 && std::ranges::all_of(world, down);
+  const auto toes = std::array{toe_way(Side::kLeft), toe_way(Side::kRight)};
+  // Toes that point into the ground show that the axes of the legs are their own.
+  const bool into_ground =
+      toes[0] && toes[1] &&
+      std::min(angle_deg(Th * *toes[0], -kY), angle_deg(Th * *toes[1], -kY)) < 25;
+  if (!real || into_ground) {
+    folded_legs(thigh);
+    return;
+  }
+  if (legs_by_feet(thigh)) return;
+  for (const Side side : kSides) {
+    leg(side, minimal(world[at(side)], -kY) * Th, 1.0, "zero pose");
+    real_foot(side, sure(on(side, Bone::kLeftLowerLeg)), "zero pose", false);
+  }
+}
+
+// Feet that both point aside say where forward is in the legs' own frames.
+bool Frames::legs_by_feet(const Both& thigh) {
+  const Mat Th = *T(Bone::kHips);
+  const auto toes = std::array{toe_way(Side::kLeft), toe_way(Side::kRight)};
+  if (!toes[0] || !toes[1]) return false;
+  std::array<double, 2> aside_deg{};
+  for (const Side side : kSides) {
+    const Vec way = Th * *toes[at(side)];
+    aside_deg[at(side)] = std::atan2(way.x(), way.z()) / kDegree;
+  }
+  const double most = std::max(std::abs(aside_deg[0]), std::abs(aside_deg[1]));
+  if (most <= 75 && std::abs(aside_deg[0] + aside_deg[1]) <= 60) return false;
+  for (const Side side : kSides) {
+    const std::string why = "the foot gives forward";
+    leg(side, frame(thigh[at(side)], -kY, *toes[at(side)], kZ), 0.9, why);
+    real_foot(side, sure(on(side, Bone::kLeftLowerLeg)), why, true);
+  }
+  return true;
+}
+
+void Frames::folded_legs(const Both& thigh) {
+  legs_folded_ = true;
+  std::array found{laterals(Side::kLeft, thigh[0]), laterals(Side::kRight, thigh[1])};
+  // One lateral axis for both legs where their bones lie along one local axis: makers mirror by it.
+  const auto left = nearest_axis(direction(thigh[0]), 10);
+  const auto right = nearest_axis(direction(thigh[1]), 10);
+  if (left && right && std::abs(left->dot(*right)) > 0.9) {
+    for (std::size_t k = 0; k < found[0].size(); ++k) {
+      found[0][k].score = (found[0][k].score + found[1][k].score) / 2;
+      found[1][k].score = found[0][k].score;
+    }
+  }
+  for (const Side side : kSides) {
+    auto& order = found[at(side)];
+    std::ranges::stable_sort(order, std::greater{}, &Lateral::score);
+    const double best = order[0].score;
+    const double second = order.size() > 1 ? order[1].score : -1.0;
+    const bool clear = best > 0.7 && best - second > 0.35;
+    if (!clear) {
+      notes_.push_back("the zero pose is folded, and nothing shows how the " +
+                       std::string(side_text(side)) +
+                       " leg is twisted: use a clip in which the knees bend");
+    }
+    leg(side, frame(thigh[at(side)], -kY, order[0].axis, kX), clear ? 0.9 : 0.2,
+        "bone axis and knee (" + short_text(best, 2) + ", next best " + short_text(second, 2) +
+            ")");
+    folded_foot(side, sure(on(side, Bone::kLeftLowerLeg)));
+  }
+}
+
+// Each local axis across the thigh: does the knee bend about it, forwards, and does it stay with
+// the pelvis' left?
+std::vector<Frames::Lateral> Frames::laterals(Side side, const Vec& thigh) const {
+  const int hips = joint_[Bone::kHips];
+  const int joint = joint_[on(side, Bone::kLeftUpperLeg)];
+  const Vec left = T(Bone::kHips)->transpose() * kX;
+  const Bend knee =
+      bend(on(side, Bone::kLeftUpperLeg), on(side, Bone::kLeftLowerLeg), on(side, Bone::kLeftFoot));
+  const double trust = std::clamp((knee.flex_deg - 5) / 15, 0.0, 1.0) *
+                       std::clamp((knee.agree - 0.6) / 0.3, 0.0, 1.0);
+  std::vector<Lateral> out;
+  for (const Vec& axis : axes_across(thigh)) {
+    const double stays = motion_.mean(
+        [&](int i) { return (motion_.world(i, joint) * axis).dot(motion_.world(i, hips) * left); });
+    out.push_back({.axis = axis, .score = trust * knee.axis.dot(axis) + (1 - trust) * stays});
+  }
+  return out;
+}
+
+void Frames::leg(Side side, const Mat& T_thigh, double sure_leg, const std::string& why) {
+  const Bone lower = on(side, Bone::kLeftLowerLeg);
+  set(on(side, Bone::kLeftUpperLeg), T_thigh, sure_leg, why);
+  const auto shin = rest(lower, {on(side, Bone::kLeftFoot), on(side, Bone::kLeftToes)});
+  if (shin && angle_deg(T_thigh * *shin, -kY) > 110) {
+    set(lower, minimal(T_thigh * *shin, -kY) * T_thigh, std::min(sure_leg, 0.3),
+        "the shin is folded against the thigh; its twist is a guess");
+    return;
+  }
+  set(lower, shin ? Mat(minimal(T_thigh * *shin, -kY) * T_thigh) : T_thigh, sure_leg, why);
+}
+
+// A shin that is upright in the zero pose stands on a flat sole; else the foot goes with the shin.
+void Frames::real_foot(Side side, double sure_foot, const std::string& why, bool by_feet) {
+  const Bone foot = on(side, Bone::kLeftFoot);
+  const Bone lower = on(side, Bone::kLeftLowerLeg);
+  if (!joint_.has(foot)) return;
+  const Mat Tl = *T(lower);
+  const Mat Th = by_feet ? *T(on(side, Bone::kLeftUpperLeg)) : *T(Bone::kHips);
+  const auto way = rest(lower, {foot});
+  const bool stands = !way || angle_deg(Th * *way, -kY) < 15;
+  Mat Tf = stands ? Th : Tl;
+  std::string why_foot = stands ? "flat sole in the " + why : "goes with the shin";
+  const auto toes = toe_way(side);
+  if (toes && angle_deg(Tf * *toes, kZ) > 75) {
+    Tf = minimal(Tf * *toes, kZ) * Tf;
+    sure_foot = 0.5;
+    why_foot = "the zero pose hides the sole: ankle to toes laid level";
+  }
+  set(foot, Tf, sure_foot, why_foot);
+  if (joint_.has(on(side, Bone::kLeftToes))) {
+    set(on(side, Bone::kLeftToes), Tf, sure_foot, "goes with the foot");
+  }
+}
+
+// Of a folded foot, the lateral axis is the one that stays nearest to the shin's, and the sole
+// slopes as in standing feet of the clip, else as a foot of this length does.
+void Frames::folded_foot(Side side, double sure_leg) {
+  const Bone foot = on(side, Bone::kLeftFoot);
+  const int shin = joint_[on(side, Bone::kLeftLowerLeg)];
+  if (!joint_.has(foot)) return;
+  const Mat Tl = *T(on(side, Bone::kLeftLowerLeg));
+  Mat Tf = Tl;
+  double sure_foot = 0.3;
+  std::string why = "a foot without length: goes with the shin";
+  if (const auto way = foot_way(side)) {
+    if (why_sole_.empty()) find_sole();
+    const double guess =
+        std::asin(std::min(0.6, 0.075 * leg_length() / std::max(foot_length(side), 1e-9)));
+    const double slope = sole_.value_or(guess);
+    Lateral best{.axis = kX, .score = -2.0};
+    for (const Vec& axis : axes_across(*way)) {
+      const double score = motion_.mean([&](int i) {
+        return (motion_.world(i, joint_[foot]) * axis)
+            .dot(motion_.world(i, shin) * (Tl.transpose() * kX));
+      });
+      if (score > best.score) best = {.axis = axis, .score = score};
+    }
+    Tf = frame(*way, Vec(0, -std::sin(slope), std::cos(slope)), best.axis, kX);
+    sure_foot = (sole_ ? sure_leg : std::min(sure_leg, 0.4)) * (best.score > 0.75 ? 1.0 : 0.4);
+    why = "folded foot: ankle to toes sloped " + short_text(slope / kDegree, 0) + " degrees " +
+          why_sole_;
+  }
+  set(foot, Tf, sure_foot, why);
+  if (joint_.has(on(side, Bone::kLeftToes))) {
+    set(on(side, Bone::kLeftToes), Tf, sure_foot, "goes with the foot");
+  }
+}
+
+std::optional<Vec> Frames::foot_way(Side side) const {
+  auto way = rest(on(side, Bone::kLeftFoot), {on(side, Bone::kLeftToes)});
+  if (!way) way = leaf(on(side, Bone::kLeftFoot));
+  return way ? std::optional(direction(*way)) : std::nullopt;
+}
+
+// From the ankle to the farthest point of the toes. An end site without a toe joint proves nothing.
+std::optional<Vec> Frames::toe_way(Side side) const {
+  const auto way = rest(on(side, Bone::kLeftFoot), {on(side, Bone::kLeftToes)});
+  if (!way) return std::nullopt;
+  return direction(*way + leaf(on(side, Bone::kLeftToes)).value_or(Vec::Zero()));
+}
+
+double Frames::foot_length(Side side) const {
+  const auto way = rest(on(side, Bone::kLeftFoot), {on(side, Bone::kLeftToes)});
+  return way ? way->norm() : leaf(on(side, Bone::kLeftFoot)).value_or(Vec::Zero()).norm();
+}
+
+// One slope for both feet; none where the clip does not show it.
+void Frames::find_sole() {
+  why_sole_ = "by its length, which is a guess";
+  if (motion_.poses() < 30) return;
+  std::vector<double> slopes;
+  for (const Side side : kSides) add_slopes(side, slopes);
+  if (slopes.size() < 6) return;
+  const double low = percentile(slopes, 25);
+  const double middle = percentile(slopes, 50);
+  const double high = percentile(slopes, 75);
+  if (high - low > 12 * kDegree || middle <= -5 * kDegree || middle >= 55 * kDegree) return;
+  sole_ = middle;
+  why_sole_ = "in the frames in which a foot stands";
+}
+
+// Adds the slope from ankle to toes of each frame in which the foot is low and slow [rad].
+void Frames::add_slopes(Side side, std::vector<double>& slopes) const {
+  const auto way = foot_way(side);
+  if (!way) return;
+  const int joint = joint_[on(side, Bone::kLeftFoot)];
+  const Vec up = up_turn(up_).transpose() * kY;
+  const double length = foot_length(side);
+  const auto ahead = [&](int i) -> Vec { return motion_.world(i, joint) * *way; };
+  const auto ankle = [&](int i) { return motion_.position(i, joint); };
+  const auto toes = [&](int i) -> Vec { return ankle(i) + ahead(i) * length; };
+  const int last = motion_.poses() - 1;
+  std::vector<double> speed;  // per frame
+  std::vector<double> height;
+  for (int i = 0; i <= last; ++i) {
+    const int from = std::max(i - 1, 0);
+    const int to = std::min(i + 1, last);
+    speed.push_back(((toes(to) - toes(from)).norm() + (ankle(to) - ankle(from)).norm()) /
+                    (to - from));
+    height.push_back((ankle(i) + toes(i)).dot(up) / 2);
+  }
+  const double low = percentile(height, 5) + 0.06 * leg_length();
+  const double slow = percentile(speed, 25);
+  for (int i = 0; i <= last; ++i) {
+    if (height[i] < low && speed[i] <= slow) {
+      slopes.push_back(-std::asin(std::clamp(ahead(i).dot(up), -1.0, 1.0)));
+    }
+  }
+}
+
+}  // namespace posed::rig

@@ -1,0 +1,76 @@
+#include <span>
+
+#include "proto/rig/bones.hpp"
+
+namespace posed::rig {
+namespace {
+
+constexpr std::size_t kSlots = 4;
+
+// The best choice of joints for the first slots of a limb along one path: slots in order, each at
+// most once.
+struct Choice {
+  double value = -9.0;
+  std::array<int, kSlots> joint{-1, -1, -1, -1};
+};
+using Choices = std::array<Choice, kSlots + 1>;  // [number of the last filled slot]
+
+const Choice& best_of(std::span<const Choice> choices) {
+  return *std::ranges::max_element(choices, {}, &Choice::value);
+}
+
+// `needed`: slots without which there is no limb; one filled counts 1 more.
+void extend(Choices& choices, const Fit& fit, int joint, int rank,
+            const std::array<bool, kSlots>& needed) {
+  const Choices before = choices;
+  for (std::size_t k = 0; k < kSlots; ++k) {
+    if (fit[k] <= 0.0) continue;
+    Choice choice = best_of(std::span(before).first(k + 1));
+    choice.value += fit[k] + (needed[k] ? 1.0 : 0.0) - 1e-3 * rank;
+    choice.joint[k] = joint;
+    if (choice.value > choices[k + 1].value) choices[k + 1] = choice;
+  }
+}
+
+std::array<int, kSlots> best_chain(const Figure& figure,
+                                   const std::vector<std::optional<Fit>>& fits,
+                                   const std::array<bool, kSlots>& needed) {
+  std::vector<Choices> at(fits.size());
+  Choice best{.value = 0.0};
+  for (int j = 0; j < figure.size(); ++j) {
+    const int parent = figure[j].parent;
+    if (parent >= 0) {
+      at[j] = at[parent];
+    } else {
+      at[j][0].value = 0.0;
+    }
+    if (!fits[j]) continue;
+    extend(at[j], *fits[j], j, figure.depth(j) - 1, needed);
+    const Choice& top = best_of(at[j]);
+    if (top.value > best.value + 1e-9) best = top;
+  }
+  return best.joint;
+}
+
+}  // namespace
+
+void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones) {
+  const auto find = [&](Side side, Bone first, auto fit_of,
+                        const std::array<bool, kSlots>& needed) {
+    const NameSide wanted = side == Side::kLeft ? NameSide::kLeft : NameSide::kRight;
+    std::vector<std::optional<Fit>> fits(names.size());
+    for (std::size_t j = 0; j < names.size(); ++j) {
+      if (names[j].side == wanted) fits[j] = fit_of(names[j]);
+    }
+    const auto chain = best_chain(figure, fits, needed);
+    for (std::size_t k = 0; k < kSlots; ++k) {
+      bones.set(on(side, static_cast<Bone>(static_cast<std::size_t>(first) + k)), chain[k]);
+    }
+  };
+  for (const Side side : kSides) {
+    find(side, Bone::kLeftUpperLeg, leg_fit, {true, true, false, false});
+    find(side, Bone::kLeftShoulder, arm_fit, {false, true, true, false});
+  }
+}
+
+}  // namespace posed::rig

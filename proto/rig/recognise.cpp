@@ -1,0 +1,143 @@
+#include "proto/rig/recognise.hpp"
+
+#include <cmath>
+
+namespace posed::rig {
+namespace {
+
+constexpr double kAdultLeg_m = 0.82;   // thigh and shin
+constexpr double kAdultHand_m = 0.18;  // wrist to the tip of the middle finger
+constexpr double kMaxLength = 1e9;
+
+struct LengthUnit {
+  double metres;
+  std::string_view name;
+  double doubt;  // how much worse the fit of a more usual unit may be
+};
+constexpr double kCmu_m = 0.0254 / 0.45;
+constexpr std::array<LengthUnit, 8> kLengthUnits{{{1.0, "metres", 0.0},
+                                                  {0.01, "centimetres", 0.0},
+                                                  {0.001, "millimetres", 0.1},
+                                                  {0.0254, "inches", 0.25},
+                                                  {0.1, "decimetres", 0.3},
+                                                  {0.3048, "feet", 0.35},
+                                                  {kCmu_m, "inches / 0.45", 0.6},
+                                                  {2.4384, "Poser's units of 8 feet", 0.45}}};
+
+const LengthUnit& unit_for(double length, double true_m, bool is_cmu) {
+  return *std::ranges::min_element(kLengthUnits, {}, [&](const LengthUnit& unit) {
+    const bool usual = is_cmu && unit.metres == kCmu_m;
+    return std::abs(std::log(length * unit.metres / true_m)) + (usual ? 0.0 : unit.doubt);
+  });
+}
+
+void set_unit(double length, double true_m, bool is_cmu, std::string_view what, Rig& rig) {
+  if (!(length > 0.0)) return;
+  const LengthUnit& unit = unit_for(length, true_m, is_cmu);
+  if (!rig.metres_per_unit) {
+    rig.metres_per_unit = unit.metres;
+    rig.unit = unit.name;
+  }
+  const double length_m = length * *rig.metres_per_unit;
+  rig.why_unit = std::string(what) + ' ' + short_text(length_m, 2) + " m long";
+  if (length_m < 0.73 * true_m || length_m > 1.34 * true_m) {
+    rig.notes.push_back(rig.why_unit + ": is the unit of length right?");
+  }
+}
+
+bool is_sane(const std::vector<RigJoint>& joints) {
+  const auto sane = [](const Vec& v) {
+    return v.allFinite() && v.cwiseAbs().maxCoeff() < kMaxLength;
+  };
+  return !joints.empty() && std::ranges::all_of(joints, [&sane](const RigJoint& joint) {
+    return sane(joint.offset) && (!joint.end_site || sane(*joint.end_site));
+  });
+}
+
+std::vector<std::string_view> names_of(const std::vector<RigJoint>& joints) {
+  std::vector<std::string_view> names;
+  for (const RigJoint& joint : joints) names.push_back(joint.name);
+  return names;
+}
+
+FoundBones known_bones(const std::vector<std::optional<Bone>>& bones) {
+  FoundBones out;
+  for (std::size_t j = 0; j < bones.size(); ++j) {
+    if (bones[j]) out.joint.set(*bones[j], static_cast<int>(j));
+  }
+  if (out.joint.has_limbs()) out.kind = Kind::kPerson;
+  return out;
+}
+
+Eigen::Quaterniond rotation_of(const Mat& m) {
+  if (!m.allFinite()) return Eigen::Quaterniond::Identity();
+  return Eigen::Quaterniond(m).normalized();
+}
+
+// Joints that are no bones go with their parent; those above the hips go with the hips.
+void collect(const RigInput& input, const Frames& frames, Rig& rig) {
+  const auto& hips = frames.T(Bone::kHips);
+  for (std::size_t j = 0; j < input.joints.size(); ++j) {
+    const int parent = input.joints[j].parent;
+    Eigen::Quaterniond T = parent >= 0 ? rig.T[parent]
+                           : hips      ? rotation_of(*hips)
+                                       : Eigen::Quaterniond::Identity();
+    if (rig.bone[j]) {
+      if (const auto& found = frames.T(*rig.bone[j])) T = rotation_of(*found);
+      rig.evidence[j] = frames.evidence(*rig.bone[j]);
+    }
+    if (j < input.T.size() && input.T[j]) T = *input.T[j];
+    rig.T[j] = T;
+  }
+}
+
+bool knows_all_frames(const RigInput& input) {
+  if (input.T.size() < input.bones.size() || input.bones.empty()) return false;
+  for (std::size_t j = 0; j < input.bones.size(); ++j) {
+    if (input.bones[j] && !input.T[j]) return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+Rig recognise(const RigInput& input) {
+  Rig rig;
+  rig.bone.resize(input.joints.size());
+  rig.T.resize(input.joints.size(), Eigen::Quaterniond::Identity());
+  rig.evidence.resize(input.joints.size());
+  rig.metres_per_unit = input.metres_per_unit;
+  if (!is_sane(input.joints)) return rig;
+  const Figure figure(input.joints);
+  const auto names = parse_names(names_of(input.joints));
+  const FoundBones found =
+      input.bones.empty() ? find_bones(figure, names) : known_bones(input.bones);
+  const Motion motion(figure, input.poses);
+  rig.kind = found.kind;
+  rig.bone = found.joint.by_joint(figure.size());
+  std::vector<std::string> notes = found.notes;
+  Frames frames(figure, names, found.joint, motion, notes);
+  if (found.kind == Kind::kPerson && frames.can_find_person()) {
+    frames.find_person();
+    const bool is_cmu = std::ranges::any_of(names, [](const JointName& name) {
+      return name.stem.find("hipjoint") != std::string::npos;
+    });
+    set_unit(frames.leg_length(), kAdultLeg_m, is_cmu, "thigh and shin are", rig);
+  } else if (found.kind == Kind::kHand) {
+    const Side side = found.joint.has(Bone::kLeftHand) ? Side::kLeft : Side::kRight;
+    frames.find_hand(side);
+    set_unit(frames.hand_length(side), kAdultHand_m, false, "the hand is", rig);
+  } else {
+    rig.kind = Kind::kPart;
+    frames.lay_parts();
+  }
+  rig.up = input.up.value_or(frames.up());
+  rig.why_up = frames.why_up();
+  if (!knows_all_frames(input)) {
+    rig.notes.insert(rig.notes.begin(), notes.begin(), notes.end());
+  }
+  collect(input, frames, rig);
+  return rig;
+}
+
+}  // namespace posed::rig

@@ -1,0 +1,179 @@
+#include <cmath>
+#include <numeric>
+
+#include "proto/rig/bones.hpp"
+
+namespace posed::rig {
+namespace {
+
+constexpr std::size_t kMaxPairs = 400;  // the longest; a person has a dozen
+constexpr int kMaxSiblings = 64;
+
+constexpr std::array kLeg{Bone::kLeftUpperLeg, Bone::kLeftLowerLeg, Bone::kLeftFoot,
+                          Bone::kLeftToes};
+constexpr std::array kArm{Bone::kLeftShoulder, Bone::kLeftUpperArm, Bone::kLeftLowerArm,
+                          Bone::kLeftHand};
+
+// Two chains that begin at one joint and are as long as each other.
+struct Pair {
+  double length = 0.0;
+  int parent = 0;
+  int one = 0, other = 0;  // where the chains begin
+};
+
+std::optional<Pair> mirrored(const Figure& figure, int parent, int one, int other) {
+  const int joints = figure.main_chain_length(one);
+  if (joints < 3 || joints != figure.main_chain_length(other)) return std::nullopt;
+  const auto a = figure.segments(figure.main_chain(one));
+  const auto b = figure.segments(figure.main_chain(other));
+  double length = 0.0;
+  double gap = 0.0;
+  for (std::size_t i = 0; i < std::min<std::size_t>(a.size(), 4); ++i) {
+    length += a[i];
+    gap += std::abs(a[i] - b[i]);
+  }
+  const double apart = std::abs(figure[one].offset.norm() - figure[other].offset.norm());
+  if (!(length > 0.0) || gap >= 0.15 * length || apart >= 0.15 * length) return std::nullopt;
+  return Pair{.length = length, .parent = parent, .one = one, .other = other};
+}
+
+std::vector<Pair> find_pairs(const Figure& figure) {
+  std::vector<Pair> pairs;
+  for (int j = 0; j < figure.size(); ++j) {
+    const auto& children = figure.children(j);
+    const int count = std::min(static_cast<int>(children.size()), kMaxSiblings);
+    for (int a = 0; a < count; ++a) {
+      for (int b = a + 1; b < count; ++b) {
+        if (const auto pair = mirrored(figure, j, children[a], children[b])) pairs.push_back(*pair);
+      }
+    }
+  }
+  if (pairs.size() > kMaxPairs) {
+    std::ranges::stable_sort(pairs, std::greater{}, &Pair::length);
+    pairs.resize(kMaxPairs);
+  }
+  return pairs;
+}
+
+bool fit_together(const Figure& figure, const Pair& legs, const Pair& arms) {
+  return figure.below(legs.parent, arms.parent) && !figure.below(legs.one, arms.parent) &&
+         !figure.below(legs.other, arms.parent) && !figure.below(arms.one, legs.parent) &&
+         !figure.below(arms.one, legs.one) && arms.length >= 0.4 * legs.length &&
+         arms.length <= 1.5 * legs.length;
+}
+
+// Where the longest two consecutive segments of a limb begin: thigh and shin, upper and lower arm.
+// Clavicles come before an arm, so of nearly equal ones the last counts there.
+std::size_t long_bones(const std::vector<double>& segments, bool arm) {
+  std::size_t first = 0;
+  double longest = 0.0;
+  for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
+    longest = std::max(longest, std::min(segments[i], segments[i + 1]));
+  }
+  for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
+    if (std::min(segments[i], segments[i + 1]) > (arm ? 0.8 : 0.999) * longest) first = i;
+  }
+  return first;
+}
+
+void set_limb(const Figure& figure, const Pair& pair, bool arm, BoneJoints& bones) {
+  const std::size_t first = long_bones(figure.segments(figure.main_chain(pair.one)), arm);
+  for (const Side side : kSides) {
+    const auto chain = figure.main_chain(side == Side::kLeft ? pair.one : pair.other);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::size_t at = first + k - (arm ? 1 : 0);  // wraps where an arm has no clavicle
+      if (at < chain.size()) bones.set(on(side, arm ? kArm[k] : kLeg[k]), chain[at]);
+    }
+  }
+}
+
+// Whether `bones` has a limb's sides right: by its names, else by the line from right to left.
+bool sides_are_right(const std::vector<JointName>& names, const BoneJoints& bones,
+                     const std::array<Bone, 4>& limb, const Vec& line, const Vec& left, bool sure,
+                     std::vector<std::string>& notes) {
+  int votes = 0;
+  for (const Side side : kSides) {
+    for (const Bone bone : limb) {
+      const int joint = bones[on(side, bone)];
+      if (joint >= 0) votes += static_cast<int>(names[joint].side) * (side == Side::kLeft ? 1 : -1);
+    }
+  }
+  if (votes != 0) return votes > 0;
+  const bool unclear =
+      !sure || line.norm() < 1e-9 || std::abs(direction(line).dot(direction(left))) < 0.5;
+  if (unclear) {
+    notes.emplace_back("which side is left is not known: neither the names nor the feet say it");
+  }
+  return line.dot(left) >= 0.0;
+}
+
+void swap_sides(BoneJoints& bones, const std::array<Bone, 4>& limb) {
+  for (const Bone bone : limb) {
+    const int left = bones[bone];
+    bones.set(bone, bones[on(Side::kRight, bone)]);
+    bones.set(on(Side::kRight, bone), left);
+  }
+}
+
+void settle_sides(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones,
+                  std::vector<std::string>& notes) {
+  std::vector<int> all;
+  for (int b = 0; b < kBones; ++b) {
+    if (bones.has(static_cast<Bone>(b))) all.push_back(bones[static_cast<Bone>(b)]);
+  }
+  const int hips = figure.common(all);
+  const auto at = [&](Side side, Bone bone) {
+    return figure.between(hips, bones[on(side, bone)]).value_or(Vec::Zero());
+  };
+  Vec ahead = Vec::Zero();
+  Vec up = Vec::Zero();
+  for (const Side side : kSides) {
+    const Bone foot = bones.has(on(side, Bone::kLeftFoot)) ? Bone::kLeftFoot : Bone::kLeftLowerLeg;
+    const int toes = bones[on(side, Bone::kLeftToes)];
+    ahead += toes >= 0 ? figure[toes].offset
+                       : figure[bones[on(side, foot)]].end_site.value_or(Vec::Zero());
+    up += at(side, Bone::kLeftUpperArm) - at(side, foot);
+  }
+  up = direction(up);
+  const Vec left = up.cross(across(ahead, up));
+  const bool sure = left.norm() >= 0.5 * ahead.norm();
+  for (const bool arm : {false, true}) {
+    const auto& limb = arm ? kArm : kLeg;
+    const Bone first = arm ? Bone::kLeftUpperArm : Bone::kLeftLowerLeg;
+    const Vec line = at(Side::kLeft, first) - at(Side::kRight, first);
+    if (!sides_are_right(names, bones, limb, line, left, sure, notes)) swap_sides(bones, limb);
+  }
+  if (std::ranges::none_of(names, [](const JointName& n) { return n.side != NameSide::kNone; })) {
+    notes.emplace_back(
+        "bones are known by shape only; left and right by the direction of the feet");
+  }
+}
+
+}  // namespace
+
+std::optional<BoneJoints> limbs_by_shape(const Figure& figure, const std::vector<JointName>& names,
+                                         std::vector<std::string>& notes) {
+  const std::vector<Pair> pairs = find_pairs(figure);
+  double best = -1e300;
+  const Pair* legs = nullptr;
+  const Pair* arms = nullptr;
+  for (const Pair& leg : pairs) {
+    for (const Pair& arm : pairs) {
+      if (&leg == &arm || !fit_together(figure, leg, arm)) continue;
+      const double score = leg.length + arm.length - 0.01 * figure.depth(leg.parent);
+      if (score <= best + 1e-9) continue;
+      best = score;
+      legs = &leg;
+      arms = &arm;
+    }
+  }
+  if (legs == nullptr) return std::nullopt;
+  BoneJoints bones;
+  set_limb(figure, *legs, false, bones);
+  set_limb(figure, *arms, true, bones);
+  if (!bones.has_limbs()) return std::nullopt;
+  settle_sides(figure, names, bones, notes);
+  return bones;
+}
+
+}  // namespace posed::rig

@@ -1,0 +1,131 @@
+// T frames: the world rotation of each bone's joint in the canonical T-pose (+Y up, +X left, +Z
+// forward). The zero pose decides wherever it shows a person. Where it is folded, the clip is asked
+// for one bit at a time (which local axis is the hinge?), and its answer counts only by a wide
+// margin; so T is the same for every clip of one figure. Cold.
+#pragma once
+
+#include <array>
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "proto/rig/bones.hpp"
+#include "proto/rig/motion.hpp"
+#include "proto/rig/up.hpp"
+
+namespace posed::rig {
+
+// How sure a T frame is, and from what it comes.
+struct Evidence {
+  double sure = 0.0;  // 1 zero pose, .9 sure of one bit, .8 the clip decided, at most .4 a guess
+  std::string why;
+};
+
+// How a limb bends: the mean axis in the upper joint's frame, the 90th percentile of the angle
+// [deg], and how far all bends agree (1: one axis, one way).
+struct Bend {
+  Vec axis;
+  double flex_deg = 0.0;
+  double agree = 0.0;
+};
+
+class Frames {
+ public:
+  // The arguments stay alive as long as this.
+  Frames(const Figure& figure, const std::vector<JointName>& names, const BoneJoints& joint,
+         const Motion& motion, std::vector<std::string>& notes);
+
+  void find_person();  // needs limbs of some length (can_find_person)
+  void find_hand(Side side);
+  void lay_parts();  // for an incomplete figure: from a zero pose near the T-pose
+  [[nodiscard]] bool can_find_person() const;
+
+  [[nodiscard]] const std::optional<Mat>& T(Bone bone) const { return T_[index(bone)]; }
+  [[nodiscard]] const Evidence& evidence(Bone bone) const { return evidence_[index(bone)]; }
+  [[nodiscard]] UpAxis up() const { return up_; }
+  [[nodiscard]] const std::string& why_up() const { return why_up_; }
+  [[nodiscard]] double leg_length() const;
+  [[nodiscard]] double hand_length(Side side) const;
+
+ private:
+  struct Lateral {  // a local axis, and how well it serves as the left of a leg
+    Vec axis;
+    double score = 0.0;
+  };
+  using Both = std::array<Vec, 2>;  // [side]
+
+  static std::size_t index(Bone bone) { return static_cast<std::size_t>(bone); }
+  void set(Bone bone, const Mat& T, double sure, std::string why);
+  [[nodiscard]] double sure(Bone bone) const { return evidence_[index(bone)].sure; }
+
+  // From one bone to another below it, in the zero pose.
+  [[nodiscard]] std::optional<Vec> off(Bone from, Bone to) const;
+  // From a bone to the first of those after it that lies elsewhere.
+  [[nodiscard]] std::optional<Vec> rest(Bone bone, std::initializer_list<Bone> after) const;
+  [[nodiscard]] std::optional<Vec> leaf(Bone bone) const;  // to the farthest child or tip
+  [[nodiscard]] Bend bend(Bone upper, Bone lower, Bone end) const;
+  // Mean angle of the bone's canonical rotation if its T were this.
+  [[nodiscard]] double bent_deg(Bone before, Bone bone, const Mat& T) const;
+
+  void pelvis();
+  [[nodiscard]] Vec pelvis_up(const Vec& line, const std::vector<Vec>& hints) const;
+  void trunk();
+  void find_chest();
+  void trunk_bone(Bone before, Bone bone, const std::optional<Vec>& rest_way);
+  void head(Bone before, const Mat& T, double sure_now, const std::string& why);
+  void find_up();
+  void legs();
+  [[nodiscard]] bool legs_by_feet(const Both& thigh);
+  void folded_legs(const Both& thigh);
+  [[nodiscard]] std::vector<Lateral> laterals(Side side, const Vec& thigh) const;
+  void leg(Side side, const Mat& T, double sure, const std::string& why);
+  void real_foot(Side side, double sure, const std::string& why, bool by_feet);
+  void folded_foot(Side side, double sure);
+  [[nodiscard]] std::optional<Vec> foot_way(Side side) const;
+  [[nodiscard]] std::optional<Vec> toe_way(Side side) const;
+  [[nodiscard]] double foot_length(Side side) const;
+  void find_sole();
+  void add_slopes(Side side, std::vector<double>& slopes) const;
+  void arms();
+  [[nodiscard]] bool arms_are_real(const Both& arm,
+                                   const std::array<std::optional<Vec>, 2>& palm) const;
+  void arms_by_elbows(const Both& arm);
+  [[nodiscard]] std::optional<Vec> hinge(Side side, const Vec& arm,
+                                         const std::optional<Vec>& like) const;
+  [[nodiscard]] std::optional<Vec> palm(Side side) const;
+  void arm(Side side, const Mat& T, double sure, const std::string& why, bool folded);
+  void fingers(Side side);
+  void check_hinges();
+  void lay(Bone bone, const Mat& T_parent);
+
+  const Figure& figure_;
+  const std::vector<JointName>& names_;
+  const BoneJoints& joint_;
+  const Motion& motion_;
+  std::vector<std::string>& notes_;
+  std::array<std::optional<Mat>, kBones> T_;
+  std::array<Evidence, kBones> evidence_;
+  double size_ = 0.0;  // of the thigh; lengths below a millionth of it are none
+  bool upright_ = false;
+  bool legs_folded_ = false;
+  Vec zero_up_ = kY;
+  UpAxis up_ = UpAxis::kPlusY;
+  std::string why_up_;
+  Bone top_ = Bone::kHips;  // the trunk bone that carries the arms
+  int carrier_ = 0;         // the joint that carries them
+  std::optional<Mat> T_chest_;
+  std::optional<double> sole_;  // slope from ankle to toes in a standing foot [rad]
+  std::string why_sole_;
+};
+
+[[nodiscard]] inline Vec outwards(Side side) { return side == Side::kLeft ? kX : Vec(-kX); }
+[[nodiscard]] inline std::string_view side_text(Side side) {
+  return side == Side::kLeft ? "left" : "right";
+}
+
+// `value` with no more than two digits behind the point, for sentences.
+[[nodiscard]] std::string short_text(double value, int digits);
+
+}  // namespace posed::rig

@@ -1,0 +1,168 @@
+#include <random>
+
+#include <catch2/catch.hpp>
+
+#include "proto/frame/rotation.hpp"
+#include "tests/unit/proto/rig/maker.hpp"
+
+namespace posed {
+namespace {
+
+using rig::Mat;
+using rig::Vec;
+using test::ZeroPose;
+
+Mat yaw(double deg) { return Eigen::AngleAxisd(deg * kDegree, rig::kY).toRotationMatrix(); }
+
+double worst_deg(const rig::Rig& rig, const test::Made& made) {
+  double worst = 0.0;
+  for (std::size_t j = 0; j < made.T.size(); ++j) {
+    const Eigen::Quaterniond truth(made.T[j]);
+    worst = std::max(worst, angle_between_rad(rig.T[j], truth) / kDegree);
+  }
+  return worst;
+}
+
+void check_made(const test::Made& made, UpAxis up, double metres_per_unit) {
+  const rig::Rig rig = rig::recognise(made.input);
+  CHECK(rig.kind == rig::Kind::kPerson);
+  for (int b = 0; b < test::kMakerJoints; ++b) {
+    INFO(made.input.joints[b].name);
+    CHECK(rig.bone[b] == static_cast<Bone>(b));
+  }
+  CHECK(worst_deg(rig, made) < 1.0);
+  CHECK(up_text(rig.up) == up_text(up));
+  CHECK(rig.metres_per_unit == Approx(metres_per_unit));
+}
+
+}  // namespace
+
+TEST_CASE("rig: a person is recognised in every maker's names, zero pose, axes and unit") {
+  constexpr std::array kUnits{1.0, 0.01, 0.001, 0.0254};
+  constexpr unsigned kSeed = 20;
+  std::mt19937 random(kSeed);
+  for (const test::Scheme& scheme : test::kSchemes) {
+    for (const ZeroPose zero :
+         {ZeroPose::kT, ZeroPose::kA, ZeroPose::kArmsDown, ZeroPose::kFolded}) {
+      const double metres = kUnits[random() % kUnits.size()];
+      const UpAxis up = random() % 2 == 0 ? UpAxis::kPlusY : UpAxis::kPlusZ;
+      // A folded zero pose has bones along its local axes, so it is not turned by odd angles.
+      const double turned_deg = zero == ZeroPose::kFolded ? 0.0 : 30.0 * (random() % 12);
+      INFO(scheme.names[0] << ", zero pose " << static_cast<int>(zero) << ", " << metres << " m, "
+                           << up_text(up) << " up, turned by " << turned_deg);
+      const Mat axes = up_turn(up).transpose() * yaw(turned_deg);
+      check_made(test::make(scheme, zero, axes, metres), up, metres);
+    }
+  }
+}
+
+TEST_CASE("rig: parts of one clip give the same T frames") {
+  for (const ZeroPose zero : {ZeroPose::kA, ZeroPose::kFolded}) {
+    const auto whole = test::make(test::kSchemes[0], zero, Mat::Identity(), 0.01, 0, 240);
+    const auto expected = rig::recognise(whole.input);
+    for (const int first : {0, 60, 120, 180}) {
+      const auto part = test::make(test::kSchemes[0], zero, Mat::Identity(), 0.01, first, 60);
+      const auto got = rig::recognise(part.input);
+      for (std::size_t j = 0; j < got.T.size(); ++j) {
+        CHECK(angle_between_rad(got.T[j], expected.T[j]) < 1e-6);
+      }
+    }
+  }
+}
+
+TEST_CASE("rig: a live skeleton needs no clip") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kArmsDown, Mat::Identity(), 1.0);
+  made.input.poses = {};
+  check_made(made, UpAxis::kPlusY, 1.0);
+  CHECK(rig::recognise(made.input).notes.empty());
+}
+
+TEST_CASE("rig: eyes, tips, twists and zero-length hips are no bones and move no T") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  made.input.poses = {};
+  auto& joints = made.input.joints;
+  const int head = static_cast<int>(Bone::kHead);
+  const int arm = static_cast<int>(Bone::kLeftUpperArm);
+  joints.push_back({.name = "LeftEye", .parent = head, .offset = {3, 2, 9}, .end_site = {}});
+  joints.push_back({.name = "Jaw", .parent = head, .offset = {0, -3, 9}, .end_site = {}});
+  joints.push_back({.name = "LeftArmTwist", .parent = arm, .offset = {9, 0, 0}, .end_site = {}});
+  const rig::Rig rig = rig::recognise(made.input);
+  for (int b = 0; b < test::kMakerJoints; ++b) CHECK(rig.bone[b] == static_cast<Bone>(b));
+  for (std::size_t j = test::kMakerJoints; j < joints.size(); ++j) {
+    CHECK_FALSE(rig.bone[j].has_value());
+  }
+  CHECK(worst_deg(rig, made) < 1.0);
+}
+
+TEST_CASE("rig: without names the shape tells the limbs, and the feet which side is left") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kA, Mat::Identity(), 0.01);
+  for (std::size_t j = 0; j < made.input.joints.size(); ++j) {
+    made.input.joints[j].name = "J" + std::to_string(j);
+  }
+  const rig::Rig rig = rig::recognise(made.input);
+  REQUIRE(rig.kind == rig::Kind::kPerson);
+  for (const Bone bone : {Bone::kHips, Bone::kLeftUpperArm, Bone::kRightLowerArm,
+                          Bone::kLeftUpperLeg, Bone::kRightFoot, Bone::kHead}) {
+    INFO(bone_name(bone));
+    CHECK(rig.bone[static_cast<std::size_t>(bone)] == bone);
+  }
+  CHECK_FALSE(rig.notes.empty());
+}
+
+TEST_CASE("rig: what a caller knows goes before what is recognised") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  made.input.bones.resize(test::kMakerJoints);
+  for (int b = 0; b < test::kMakerJoints; ++b) made.input.bones[b] = static_cast<Bone>(b);
+  made.input.bones[1].reset();  // no spine
+  const auto known = Eigen::Quaterniond(yaw(90));
+  made.input.T.resize(test::kMakerJoints);
+  made.input.T[static_cast<std::size_t>(Bone::kLeftHand)] = known;
+  made.input.metres_per_unit = 0.02;
+  made.input.up = UpAxis::kMinusZ;
+  const rig::Rig rig = rig::recognise(made.input);
+  CHECK_FALSE(rig.bone[1].has_value());
+  CHECK(rig.T[static_cast<std::size_t>(Bone::kLeftHand)].isApprox(known));
+  CHECK(rig.metres_per_unit == 0.02);
+  CHECK(rig.up == UpAxis::kMinusZ);
+}
+
+TEST_CASE("rig: any input ends in an answer") {
+  const auto answer = [](const rig::RigInput& input) {
+    const rig::Rig rig = rig::recognise(input);
+    CHECK(rig.bone.size() == input.joints.size());
+    for (const auto& T : rig.T) CHECK(std::abs(T.norm() - 1.0) < 1e-9);
+  };
+  answer({});
+  constexpr int kMany = 3000;
+  rig::RigInput deep;
+  rig::RigInput wide;
+  rig::RigInput chains;
+  for (int j = 0; j < kMany; ++j) {
+    const std::string name = (j % 2 == 0 ? "LeftArm" : "l") + std::string(j % 200, 'l');
+    deep.joints.push_back({.name = name, .parent = j - 1, .offset = {0, 1, 0}, .end_site = {}});
+    wide.joints.push_back(
+        {.name = name, .parent = j == 0 ? -1 : 0, .offset = {1, 0, 0}, .end_site = {}});
+    const int parent = j == 0 ? -1 : j % 3 == 1 ? 0 : j - 1;
+    chains.joints.push_back({.name = "x", .parent = parent, .offset = {1, 0, 0}, .end_site = {}});
+  }
+  answer(deep);
+  answer(wide);
+  answer(chains);
+  auto made = test::make(test::kSchemes[1], ZeroPose::kFolded, Mat::Identity(), 1.0);
+  made.input.poses.rotation[7].w() = std::nan("");
+  answer(made.input);
+  made.input.joints[3].offset.x() = std::numeric_limits<double>::infinity();
+  answer(made.input);
+  for (auto& joint : made.input.joints) joint.offset.setZero();
+  answer(made.input);
+  std::mt19937 random(1);
+  for (int round = 0; round < 50; ++round) {
+    auto some = test::make(test::kSchemes[round % 12], ZeroPose::kT, Mat::Identity(), 1.0);
+    for (auto& joint : some.input.joints) {
+      joint.offset = Vec(random() % 3, random() % 3, random() % 3) - Vec::Ones();
+    }
+    answer(some.input);
+  }
+}
+
+}  // namespace posed
