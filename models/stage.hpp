@@ -56,6 +56,7 @@ struct StageModel {
 
   std::string name;                // of its file, for messages
   std::vector<std::string> words;  // that it knows, for people: names of styles, gesture labels
+  std::string remark;              // a sentence about this skeleton, for people; may be empty
 };
 
 // A live parameter, as a number; true and false are 1 and 0.

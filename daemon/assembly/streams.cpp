@@ -226,6 +226,12 @@ void Streams::add(devices::NewStream stream) {
                          .body = stream.body.name,
                          .refusal = stream.refusal});
   if (!stream.engine) return;
+  if (!stream.stages.remark.empty()) {
+    spdlog::info("{}: {}", stream.config.name, stream.stages.remark);
+  }
+  for (const auto& model : stream.bound.models) {
+    if (model && !model->remark.empty()) spdlog::info("{}: {}", stream.config.name, model->remark);
+  }
   stream.engine->clock = system::monotonic_ns;
   auto context = users_.worker->make_context(std::move(*stream.engine), stream.rate_hz,
                                              counters(id), source.finished_slots);

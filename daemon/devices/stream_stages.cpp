@@ -10,9 +10,16 @@
 namespace posed::devices {
 namespace {
 
+// A rigid body, such as a sword that a performer holds.
+bool is_prop(const Skeleton& skeleton) {
+  return skeleton.joints.size() == 1 && !skeleton.joints.front().bone;
+}
+
 // The stages that the config names, and those that a stream of this skeleton has by default.
+// All stages are for people and hands, so a prop passes unchanged.
 Result<std::vector<config::StageConfig>> stages_of(const config::StreamConfig& config,
                                                    const Skeleton* skeleton) {
+  if (skeleton != nullptr && is_prop(*skeleton)) return std::vector<config::StageConfig>();
   if (!config.default_stages || skeleton == nullptr) return config.stages;
   std::vector<config::StageConfig> stages;
   for (const StageType* type : stage_types()) {
@@ -50,6 +57,9 @@ Result<LoadedStages> load_stages(const config::StreamConfig& config,
   loaded.settings = {
       .publish_raw = config.publish_raw, .stale_after_s = config.stale_after_s, .rate_hz = rate_hz};
   auto stages = TRY(stages_of(config, skeleton.get()));
+  if (skeleton && is_prop(*skeleton) && !config.stages.empty()) {
+    loaded.remark = "a rigid body; it passes unchanged, because its stages are for people";
+  }
   loaded.skeleton = std::move(skeleton);
   for (config::StageConfig& stage : stages) {
     if (stage.type->read_files != nullptr) {

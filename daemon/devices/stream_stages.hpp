@@ -27,6 +27,7 @@ struct LoadedStages {
   // Stages whose model control has set. Live texts that only another model knows, such as weights
   // of its styles, then stand for their defaults.
   std::set<const StageType*> with_set_model;
+  std::string remark;  // a sentence about this skeleton, for people; may be empty
 };
 
 class KeptSettings;

@@ -1,6 +1,7 @@
 #include "models/motion/pose_space.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <span>
@@ -46,6 +47,32 @@ int find_joint(const PoseSpaceSpec& spec, std::size_t i, const Skeleton& skeleto
     return skeleton.joint_index(is_acclaim(skeleton) ? kCmu43[i].asf : kCmu43[i].bvh);
   }
   return skeleton.joint_index(name);
+}
+
+std::vector<int> find_joints(const PoseSpaceSpec& spec, const Skeleton& skeleton) {
+  std::vector<int> joints(spec.joints.size());
+  for (std::size_t i = 0; i < joints.size(); ++i) joints[i] = find_joint(spec, i, skeleton);
+  return joints;
+}
+
+// Those of the missing joints that `counts`.
+std::vector<std::string> missing_of(const PoseSpaceSpec& spec, const std::vector<int>& joints,
+                                    const auto& counts) {
+  std::vector<std::string> missing;
+  for (std::size_t i = 0; i < joints.size(); ++i) {
+    if (joints[i] < 0 && counts(spec.joints[i])) missing.push_back(spec.joints[i]);
+  }
+  return missing;
+}
+
+// A figure without one of these bones is no person whose manner of walking could be changed.
+constexpr std::array kCore{Bone::kHips,          Bone::kLeftUpperArm,  Bone::kLeftLowerArm,
+                           Bone::kRightUpperArm, Bone::kRightLowerArm, Bone::kLeftUpperLeg,
+                           Bone::kLeftLowerLeg,  Bone::kRightUpperLeg, Bone::kRightLowerLeg};
+
+bool is_core(std::string_view name) {
+  const auto bone = bone_from_name(name);
+  return bone && std::ranges::find(kCore, *bone) != kCore.end();
 }
 
 std::unexpected<Error> missing_joints(const PoseSpaceSpec& spec,
@@ -98,6 +125,10 @@ Result<Space> space_from_name(std::string_view name) {
                 "; choose native, cmu43 or humanoid");
 }
 
+bool is_person(const Skeleton& skeleton) {
+  return std::ranges::all_of(kCore, [&](Bone bone) { return skeleton.joint_of(bone) >= 0; });
+}
+
 int space_dims(const PoseSpaceSpec& spec) {
   return spec.space == Space::kCmu43 ? 43 : 3 * static_cast<int>(spec.joints.size());
 }
@@ -122,50 +153,84 @@ Result<PoseSpaceSpec> describe_space(Space space, const Skeleton& skeleton) {
 
 Result<PoseSpace> PoseSpace::bind(const PoseSpaceSpec& spec, const Skeleton& skeleton) {
   TRY(check_spec(spec));
+  const std::vector<int> joints = find_joints(spec, skeleton);
+  const auto missing = missing_of(spec, joints, [](const std::string& /*name*/) { return true; });
+  if (!missing.empty()) return missing_joints(spec, missing, skeleton);
+  return bind_joints(spec, skeleton, joints);
+}
+
+Result<PoseSpace> PoseSpace::bind_person(const PoseSpaceSpec& spec, const Skeleton& skeleton) {
+  if (spec.space != Space::kHumanoid) return bind(spec, skeleton);
+  TRY(check_spec(spec));
+  const std::vector<int> joints = find_joints(spec, skeleton);
+  const std::string& root = spec.joints[spec.root];
+  const auto needed = missing_of(
+      spec, joints, [&](const std::string& name) { return name == root || is_core(name); });
+  if (!needed.empty()) return missing_joints(spec, needed, skeleton);
+  return bind_joints(spec, skeleton, joints);
+}
+
+PoseSpace PoseSpace::bind_joints(const PoseSpaceSpec& spec, const Skeleton& skeleton,
+                                 const std::vector<int>& joints) {
   PoseSpace space;
   space.skeleton_ = std::make_shared<const Skeleton>(skeleton);
   space.root_ = spec.root;
   space.euler_ = spec.space == Space::kCmu43;
-  std::vector<std::string> missing;
-  std::vector<int> joints;
-  for (std::size_t i = 0; i < spec.joints.size(); ++i) {
-    joints.push_back(find_joint(spec, i, skeleton));
-    if (joints.back() < 0) missing.push_back(spec.joints[i]);
-  }
-  if (!missing.empty()) return missing_joints(spec, missing, skeleton);
-
+  space.missing_ = missing_of(spec, joints, [](const std::string& /*name*/) { return true; });
   for (std::size_t i = 0; i < joints.size(); ++i) {
     Item item;
     item.joint = joints[i];
     item.first_dim = static_cast<int>(space.joint_of_dim_.size());
-    // The root's rotation is relative to the world, a humanoid bone's to the next bone of the space
-    // above it, so that a rig with an additional joint in between gives the same bone rotations.
-    const bool is_root = static_cast<int>(i) == spec.root;
-    item.chain_begin = static_cast<int>(space.chain_.size());
-    int parent = skeleton.joints[item.joint].parent;
-    if (is_root || spec.space == Space::kHumanoid) {
-      while (parent >= 0 && (is_root || std::ranges::find(joints, parent) == joints.end())) {
-        space.chain_.insert(space.chain_.begin() + item.chain_begin, parent);
-        parent = skeleton.joints[parent].parent;
-      }
-    }
-    item.chain_end = static_cast<int>(space.chain_.size());
-    if (spec.space == Space::kHumanoid) {
-      if (parent >= 0) item.before = skeleton.joints[parent].T_world_joint;
-      item.after = skeleton.joints[item.joint].T_world_joint.conjugate();
-    }
+    if (item.joint >= 0) space.set_chain(spec, joints, item);
     if (space.euler_) {
       item.axes = kCmu43[i].axes;
       item.dims = std::popcount(static_cast<unsigned>(item.axes));
       item.after = cmu43_axis_frame(kCmu43[i]);
       item.before = item.after.conjugate();
     } else {
-      item.mean = spec.mean[i];
+      item.mean = item.own_mean = spec.mean[i];
     }
     space.joint_of_dim_.insert(space.joint_of_dim_.end(), item.dims, static_cast<int>(i));
     space.items_.push_back(item);
   }
+  if (!space.missing_.empty()) space.set_lost(spec, joints);
   return space;
+}
+
+// The root's rotation is relative to the world, a humanoid bone's to the next bone of the space
+// above it, so that a rig with an additional joint in between gives the same bone rotations.
+void PoseSpace::set_chain(const PoseSpaceSpec& spec, const std::vector<int>& joints, Item& item) {
+  const bool is_root = item.joint == joints[spec.root];
+  item.chain_begin = static_cast<int>(chain_.size());
+  int parent = skeleton_->joints[item.joint].parent;
+  if (is_root || spec.space == Space::kHumanoid) {
+    while (parent >= 0 && (is_root || std::ranges::find(joints, parent) == joints.end())) {
+      chain_.insert(chain_.begin() + item.chain_begin, parent);
+      parent = skeleton_->joints[parent].parent;
+    }
+  }
+  item.chain_end = static_cast<int>(chain_.size());
+  if (spec.space != Space::kHumanoid) return;
+  if (parent >= 0) item.before = skeleton_->joints[parent].T_world_joint;
+  item.after = skeleton_->joints[item.joint].T_world_joint.conjugate();
+}
+
+void PoseSpace::set_lost(const PoseSpaceSpec& spec, const std::vector<int>& joints) {
+  const std::vector<float> at_rest(joint_of_dim_.size(), 0.0F);
+  for (std::size_t i = 0; i < items_.size(); ++i) {
+    Item& item = items_[i];
+    item.lost_begin = static_cast<int>(lost_.size());
+    auto above = parent_of(*bone_from_name(spec.joints[i]));
+    for (; item.joint >= 0 && above; above = parent_of(*above)) {
+      const auto found = std::ranges::find(spec.joints, bone_name(*above));
+      if (found == spec.joints.end()) continue;
+      const auto index = found - spec.joints.begin();
+      if (joints[index] >= 0) break;
+      lost_.insert(lost_.begin() + item.lost_begin, static_cast<int>(index));
+    }
+    item.lost_end = static_cast<int>(lost_.size());
+    item.mean = turned_mean(item, std::span<const float>(at_rest));
+  }
 }
 
 int PoseSpace::dims() const noexcept { return static_cast<int>(joint_of_dim_.size()); }
@@ -175,7 +240,7 @@ int PoseSpace::skeleton_joint_of_dim(int d) const noexcept {
 }
 
 RT_SAFE bool PoseSpace::chain_measured(const Item& item, const Frame& frame) const noexcept {
-  bool all = item.joint < frame.joint_count;
+  bool all = item.joint >= 0 && item.joint < frame.joint_count;
   for (int i = item.chain_begin; i < item.chain_end; ++i) all = all && frame.valid[chain_[i]];
   return all;
 }
@@ -270,15 +335,30 @@ RT_SAFE Quaterniond PoseSpace::changed(const Item& item, const Quaterniond& rota
   return rotation_exp(euler_change_as_vector(now, change)) * rotation_from_euler_xyz(now);
 }
 
+template <typename T>
+RT_SAFE Quaterniond PoseSpace::turned_mean(const Item& item, std::span<const T> q) const noexcept {
+  if (item.lost_begin == item.lost_end) return item.mean;
+  Quaterniond mean = Quaterniond::Identity();
+  for (int i = item.lost_begin; i < item.lost_end; ++i) {
+    const Item& lost = items_[lost_[i]];
+    const Vector3d v(q[lost.first_dim], q[lost.first_dim + 1], q[lost.first_dim + 2]);
+    mean = mean * lost.own_mean * rotation_exp(v);
+  }
+  return mean * item.own_mean;
+}
+
 RT_SAFE void PoseSpace::add(Frame& frame, double heading_rad, std::span<const float> q,
                             std::span<const float> delta) const noexcept {
   for (const Item& item : items_) {
     const auto change = delta.subspan(item.first_dim, item.dims);
-    const bool moves = std::ranges::any_of(change, [](float d) { return d != 0.0F; });
+    const Quaterniond mean = turned_mean(item, delta);
+    const bool moves = std::ranges::any_of(change, [](float d) { return d != 0.0F; }) ||
+                       mean.coeffs() != item.mean.coeffs();
     if (!moves || !measured(item, frame)) continue;
-    const Quaterniond to_base = item.mean.conjugate() * base(item, frame, heading_rad);
-    const Quaterniond now = to_base * to_eigen_double(frame.rotation_xyzw[item.joint]) * item.after;
-    const Quaterniond local = to_base.conjugate() *
+    const Quaterniond from_base = base(item, frame, heading_rad);
+    const Quaterniond now = item.mean.conjugate() * from_base *
+                            to_eigen_double(frame.rotation_xyzw[item.joint]) * item.after;
+    const Quaterniond local = from_base.conjugate() * mean *
                               changed(item, now, &q[item.first_dim], change.data()) *
                               item.after.conjugate();
     set_rotation(*skeleton_, item.joint, local, frame);
@@ -290,9 +370,11 @@ RT_SAFE void PoseSpace::put(Frame& frame, double heading_rad,
   for (const Item& item : items_) {
     const std::size_t d = item.first_dim;
     const Vector3d v(q[d], q[d + 1], q[d + 2]);
-    if (!v.allFinite() || !chain_measured(item, frame)) continue;
-    const Quaterniond to_base = item.mean.conjugate() * base(item, frame, heading_rad);
-    const Quaterniond local = to_base.conjugate() * rotation_exp(v) * item.after.conjugate();
+    const Quaterniond mean = turned_mean(item, q);
+    const bool known = v.allFinite() && mean.coeffs().allFinite();
+    if (!known || !chain_measured(item, frame)) continue;
+    const Quaterniond local = base(item, frame, heading_rad).conjugate() * mean * rotation_exp(v) *
+                              item.after.conjugate();
     frame.valid[item.joint] = true;
     set_rotation(*skeleton_, item.joint, local, frame);
   }

@@ -45,6 +45,10 @@ struct PoseSpaceSpec {
 // trained on such clips has. The error names the joints that are missing.
 Result<PoseSpaceSpec> describe_space(Space space, const Skeleton& skeleton);
 
+// True where the skeleton has the bones that every humanoid space needs: the hips, upper and lower
+// arms and legs.
+[[nodiscard]] bool is_person(const Skeleton& skeleton);
+
 // How many dimensions q has in this spec.
 [[nodiscard]] int space_dims(const PoseSpaceSpec& spec);
 
@@ -54,11 +58,20 @@ class PoseSpace {
   // Returns an error that names the missing joints when the skeleton lacks joints of the space.
   static Result<PoseSpace> bind(const PoseSpaceSpec& spec, const Skeleton& skeleton);
 
+  // The same for a person who lacks some bones of a humanoid space, such as toes or a chest: their
+  // dimensions are never available. A bone below a missing one (an arm without its shoulder) is
+  // seen as if the missing one kept its training mean, and gets the change of both. Hips, upper and
+  // lower arms and legs must be there. Other spaces need every joint.
+  static Result<PoseSpace> bind_person(const PoseSpaceSpec& spec, const Skeleton& skeleton);
+
+  // The joints of the spec that the skeleton lacks; empty after bind().
+  [[nodiscard]] const std::vector<std::string>& missing() const noexcept { return missing_; }
+
   [[nodiscard]] const Skeleton& skeleton() const noexcept { return *skeleton_; }
   [[nodiscard]] int dims() const noexcept;
   // Which joint of `spec.joints` dimension d belongs to.
   [[nodiscard]] int joint_of_dim(int d) const noexcept;
-  // The joint of the skeleton that it is.
+  // The joint of the skeleton that it is; -1 where the skeleton lacks it.
   [[nodiscard]] int skeleton_joint_of_dim(int d) const noexcept;
 
   // Turn about +Y that brings the training mean of the root nearest to this frame's root [rad].
@@ -93,17 +106,28 @@ class PoseSpace {
   //   V = mean^-1 [Ry(-heading) for the root] before (product of `chain`) L after
   // `before` and `after` carry the T frames (humanoid) or the Acclaim axes (cmu43).
   struct Item {
-    int joint = 0;      // L is this joint's rotation in the frame
+    int joint = 0;      // L is this joint's rotation in the frame; -1: the skeleton lacks it
     int first_dim = 0;  // of q
     int dims = 3;
     std::uint8_t axes = 7;  // cmu43: bit x = 1, y = 2, z = 4 of the listed degrees of freedom
     int chain_begin = 0, chain_end = 0;  // of chain_: joints between V's base and `joint`
+    int lost_begin = 0, lost_end = 0;    // of lost_: missing items between the same two
     Eigen::Quaterniond before = Eigen::Quaterniond::Identity();
     Eigen::Quaterniond after = Eigen::Quaterniond::Identity();
-    Eigen::Quaterniond mean = Eigen::Quaterniond::Identity();
+    Eigen::Quaterniond own_mean = Eigen::Quaterniond::Identity();
+    Eigen::Quaterniond mean = Eigen::Quaterniond::Identity();  // those of lost_, then own_mean
   };
 
   PoseSpace() = default;
+  static PoseSpace bind_joints(const PoseSpaceSpec& spec, const Skeleton& skeleton,
+                               const std::vector<int>& joints);
+  // Sets what lies between the item and the next joint of the space above it.
+  void set_chain(const PoseSpaceSpec& spec, const std::vector<int>& joints, Item& item);
+  void set_lost(const PoseSpaceSpec& spec, const std::vector<int>& joints);
+  // `mean` after the lost items have turned by their part of q [dims].
+  template <typename T>
+  [[nodiscard]] Eigen::Quaterniond turned_mean(const Item& item,
+                                               std::span<const T> q) const noexcept;
   [[nodiscard]] bool measured(const Item& item, const Frame& frame) const noexcept;
   [[nodiscard]] bool chain_measured(const Item& item, const Frame& frame) const noexcept;
   [[nodiscard]] Eigen::Quaterniond base(const Item& item, const Frame& frame,
@@ -114,6 +138,8 @@ class PoseSpace {
   std::shared_ptr<const Skeleton> skeleton_;
   std::vector<Item> items_;
   std::vector<int> chain_;
+  std::vector<int> lost_;  // items, from above
+  std::vector<std::string> missing_;
   std::vector<int> joint_of_dim_;
   int root_ = 0;
   bool euler_ = false;

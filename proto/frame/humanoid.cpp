@@ -69,4 +69,26 @@ std::optional<Bone> bone_from_name(std::string_view name) {
   return std::nullopt;
 }
 
+std::optional<Bone> parent_of(Bone bone) {
+  switch (bone) {
+    case Bone::kHips:
+      return std::nullopt;
+    case Bone::kLeftUpperLeg:
+    case Bone::kRightUpperLeg:
+      return Bone::kHips;
+    case Bone::kLeftShoulder:
+    case Bone::kRightShoulder:
+      return Bone::kUpperChest;
+    default:
+      break;
+  }
+  const std::string_view name = bone_name(bone);
+  const bool is_finger = bone >= Bone::kLeftThumbMetacarpal;
+  const bool is_thumb = name.find("Thumb") != std::string_view::npos;
+  if (is_finger && name.ends_with(is_thumb ? "Metacarpal" : "Proximal")) {
+    return bone < Bone::kRightThumbMetacarpal ? Bone::kLeftHand : Bone::kRightHand;
+  }
+  return static_cast<Bone>(static_cast<int>(bone) - 1);
+}
+
 }  // namespace posed

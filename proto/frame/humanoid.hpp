@@ -69,4 +69,7 @@ inline constexpr int kBones = static_cast<int>(Bone::kCount);
 [[nodiscard]] std::string_view bone_name(Bone bone);
 [[nodiscard]] std::optional<Bone> bone_from_name(std::string_view name);
 
+// The bone that carries this one in a figure that has them all; none for the hips.
+[[nodiscard]] std::optional<Bone> parent_of(Bone bone);
+
 }  // namespace posed

@@ -80,6 +80,9 @@ Result<Findings> try_stream(const config::StreamConfig& config,
   const drivers::Description& device = source->device.description;
   const std::size_t joints = device.skeleton ? device.skeleton->joints.size() : 0;
   std::vector<std::string> warnings = source->device.warnings;
+  for (const auto& model : bound->models) {
+    if (model && !model->remark.empty()) warnings.push_back(model->remark);
+  }
   if (!missing->empty()) {
     warnings.push_back("the device is not here now, and `posed run` waits for it (" + *missing +
                        ")");

@@ -190,6 +190,7 @@ Result<> run(ApplyArguments options) {
   const auto fit = TRY(style::fit_of_walker(model, options.model.string(), clip));
   TRY(clip::write_clip(applied.clip, options.out));
   bar.finish();
+  if (!applied.remark.empty()) std::fprintf(stderr, "posed: %s\n", applied.remark.c_str());
   findings_of(options, model, shares, clip, applied, fit).show(options.json);
   return {};
 }

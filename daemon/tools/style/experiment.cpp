@@ -17,7 +17,7 @@ constexpr std::size_t kMaxClips = 4000;
 
 // A value that must be one of a few words.
 template <typename T>
-void read_choice(TableReader& reader, const char* key, T& value,
+void read_choice(TableReader& reader, const char* key, auto& value,
                  Result<T> (*parse)(std::string_view)) {
   std::string word;
   reader.read(key, word);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,7 @@ struct ExperimentClip {
 struct Experiment {
   std::vector<std::string> targets;  // at least one
   double rate_hz = 30.0;
-  motion::Space space = motion::Space::kNative;
+  std::optional<motion::Space> space;  // unset: humanoid where all clips show people
   style::TrainMode mode = style::TrainMode::kDefault;
   std::filesystem::path asf;  // skeleton of all AMC clips; empty: each has one beside it
   std::vector<ExperimentClip> clips;

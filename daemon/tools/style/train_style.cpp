@@ -40,7 +40,7 @@ make one model:
   target = "proud"           # or several: ["proud", "sad"]
   mode = "default"           # or "paper"; --mode overrides it
   rate_hz = 30               # --rate overrides it
-  pose_space = "native"      # or "cmu43", "humanoid"; --pose-space overrides it
+  pose_space = "humanoid"    # or "native", "cmu43"; --pose-space overrides it
   skeleton = "02.asf"        # of AMC clips, if not beside them; --skeleton overrides it
   [[clip]]
   file = "plain_1.bvh"       # relative to the experiment file
@@ -97,7 +97,7 @@ Result<Experiment> experiment_of(const TrainStyleOptions& options) {
     mode = TRY(style::mode_from_name(*options.mode));
   }
   auto experiment = TRY(clips_of(options));
-  experiment.space = space.value_or(experiment.space);
+  if (space) experiment.space = *space;
   experiment.mode = mode.value_or(experiment.mode);
   experiment.rate_hz = options.rate_hz.value_or(experiment.rate_hz);
   if (options.skeleton.empty()) return experiment;
@@ -137,14 +137,16 @@ void add_summary(const style::Findings& learnt, Findings& findings) {
     if (clip.dropped_first) {
       findings.note(clip.file + ": left out the first frame, a rest pose without motion");
     }
+    for (const std::string& what : clip.mended) findings.note(clip.file + ": " + what);
     findings.say(fmt::format("{:<12} {:<10} {:<28} {:8.2f} {:8.3f}", clip.group, clip.motion,
                              stem(clip.file), 2.0 * std::numbers::pi / clip.dtheta, clip.theta0));
   }
   const gp::Trained& process = learnt.learnt.front().process;
   findings.say(
-      fmt::format("{} dimensions, {} training poses, kernel length {:.1f} degrees, noise {:.3g}",
-                  learnt.dataset.dims(), process.inputs.rows(), kDegrees / std::sqrt(process.mu),
-                  process.noise));
+      fmt::format("{} dimensions of the {} space, {} training poses, kernel length {:.1f} degrees, "
+                  "noise {:.3g}",
+                  learnt.dataset.dims(), motion::space_name(learnt.dataset.spec.space),
+                  process.inputs.rows(), kDegrees / std::sqrt(process.mu), process.noise));
 }
 
 // Maps the progress of one training step to that of the whole training, for a single bar.
@@ -187,7 +189,12 @@ Result<StyleTraining> train_and_save(const Experiment& experiment, std::uint64_t
   options.target = experiment.targets.front();
   options.more_targets.assign(experiment.targets.begin() + 1, experiment.targets.end());
   options.mode = experiment.mode;
-  options.dataset.space = experiment.space;
+  // A person's model then runs on any person's skeleton, whoever recorded it.
+  const bool are_people = std::ranges::all_of(clips, [](const style::TrainingClip& clip) {
+    return motion::is_person(*clip.clip.skeleton);
+  });
+  options.dataset.space =
+      experiment.space.value_or(are_people ? motion::Space::kHumanoid : motion::Space::kNative);
   options.dataset.rate_hz = experiment.rate_hz;
   options.dataset.seed = seed;
   options.dataset.tasks = &ranks.tasks();
@@ -255,7 +262,8 @@ void add_train_style(CLI::App& train_command, int& exit_code, const std::shared_
                     "TOML file that lists the clips and may set mode, rate_hz and pose_space");
   style->add_option("--skeleton", options->skeleton, "NN.asf of AMC clips, if not beside them");
   style->add_option("--pose-space", options->pose_space,
-                    "native, cmu43 or humanoid (default: the experiment's, else native)");
+                    "humanoid, native or cmu43 (default: the experiment's, else humanoid where "
+                    "all clips show people)");
   style
       ->add_option("--rate", options->rate_hz,
                    "Frames per second to learn at (default: the experiment's, else 30)")

@@ -26,7 +26,7 @@ Result<WalkerFit> fit_of_walker(const StyleModel& model, const std::string& mode
                                 const clip::Clip& clip) {
   auto motion = TRY(motion::motion_of(clip));
   if (motion::begins_with_added_pose(motion)) motion::drop_first_frame(motion);
-  const auto space = motion::PoseSpace::bind(model.space, *motion.skeleton);
+  const auto space = motion::PoseSpace::bind_person(model.space, *motion.skeleton);
   if (!space) {
     Error error = space.error();
     if (error.file.empty()) error.file = model_name;

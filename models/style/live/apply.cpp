@@ -192,7 +192,8 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
   if (!options.cold) settle(filter, clip, settled_heading_rad(clip, ready.space));
 
   auto feet = TRY(feet_stage(clip, options));
-  Applied applied{.clip = clip::is_acclaim(*clip.skeleton) ? clip::with_zyx_channels(clip) : clip};
+  Applied applied{.clip = clip::is_acclaim(*clip.skeleton) ? clip::with_zyx_channels(clip) : clip,
+                  .remark = ready.remark};
   ChannelWriter writer(applied.clip);
   auto root = RootWriter::open(applied.clip);
   if (options.feet && !root) return std::unexpected(root.error());

@@ -85,11 +85,14 @@ BodyPart part_of_joint(const Skeleton& skeleton, int joint) {
   return BodyPart::kTrunk;
 }
 
-std::vector<BodyPart> parts_of(const motion::PoseSpace& space) {
+std::vector<BodyPart> parts_of(const motion::PoseSpace& space, const motion::PoseSpaceSpec& spec) {
   std::vector<BodyPart> parts;
   parts.reserve(space.dims());
   for (int d = 0; d < space.dims(); ++d) {
-    parts.push_back(part_of_joint(space.skeleton(), space.skeleton_joint_of_dim(d)));
+    const int joint = space.skeleton_joint_of_dim(d);
+    const auto bone = bone_from_name(spec.joints[static_cast<std::size_t>(space.joint_of_dim(d))]);
+    parts.push_back(joint < 0 && bone ? part_of_bone(*bone)
+                                      : part_of_joint(space.skeleton(), joint));
   }
   return parts;
 }

@@ -29,8 +29,9 @@ Result<Mask> mask_of(std::string_view text);
 RT_SAFE void describe_mask(const Mask& mask, ShortText& text) noexcept;
 
 [[nodiscard]] BodyPart part_of_joint(const Skeleton& skeleton, int joint);
-// The part of each dimension of q. Cold.
-[[nodiscard]] std::vector<BodyPart> parts_of(const motion::PoseSpace& space);
+// The part of each dimension of q of a space bound from `spec`. Cold.
+[[nodiscard]] std::vector<BodyPart> parts_of(const motion::PoseSpace& space,
+                                             const motion::PoseSpaceSpec& spec);
 
 // The factors of a live filter; each moves by at most `step` at once. RT-safe.
 class BodyMask {

@@ -24,6 +24,24 @@ Result<> check_fit(const StyleModel& model, int dims, const std::string& name) {
               name);
 }
 
+// What the user is told of the joints that the figure lacks.
+std::string left_alone(const motion::PoseSpace& space) {
+  if (space.missing().empty()) return {};
+  std::string names;
+  for (const std::string& name : space.missing()) names += (names.empty() ? "" : ", ") + name;
+  return "the figure has no " + names + ", which the model was trained with; the rest is styled";
+}
+
+// The axis over the dimensions that are there, longer by what the others would have added.
+Eigen::VectorXf served_axis(const Eigen::VectorXf& axis, const std::vector<std::uint8_t>& served) {
+  Eigen::VectorXf there = axis;
+  for (Eigen::Index d = 0; d < axis.size(); ++d) {
+    if (served[static_cast<std::size_t>(d)] == 0) there[d] = 0.0F;
+  }
+  const float kept = there.squaredNorm();
+  return kept > 0.0F ? Eigen::VectorXf(there * (axis.squaredNorm() / kept)) : there;
+}
+
 }  // namespace
 
 BoundModel::BoundModel(const StyleModel& model, motion::PoseSpace bound_space,
@@ -35,7 +53,13 @@ BoundModel::BoundModel(const StyleModel& model, motion::PoseSpace bound_space,
       neutral(model.gate.neutral.cast<float>()),
       axis(model.axis.direction.cast<float>()),
       axis_offset(model.axis.offset),
-      parts(parts_of(space)) {
+      parts(parts_of(space, model.space)) {
+  remark = left_alone(space);
+  served.assign(static_cast<std::size_t>(space.dims()), 1);
+  for (int d = 0; d < space.dims(); ++d) {
+    served[static_cast<std::size_t>(d)] = space.skeleton_joint_of_dim(d) >= 0 ? 1 : 0;
+  }
+  if (axis.size() > 0) axis = served_axis(axis, served);
   for (const MoreStyle& style : model.more) {
     more_limits_rad.emplace_back(style.limit_rad.cast<float>());
   }
@@ -44,7 +68,7 @@ BoundModel::BoundModel(const StyleModel& model, motion::PoseSpace bound_space,
 
 Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
                                                      const Skeleton& skeleton, std::string name) {
-  auto space = motion::PoseSpace::bind(model.space, skeleton);
+  auto space = motion::PoseSpace::bind_person(model.space, skeleton);
   if (!space) {
     Error error = space.error();
     if (error.file.empty()) error.file = name;

@@ -35,10 +35,12 @@ struct BoundModel final : StageModel {
   double axis_offset = 0.0;
   std::vector<Eigen::VectorXf> more_limits_rad;  // of the others
   std::vector<BodyPart> parts;                   // [dims]
+  std::vector<std::uint8_t> served;              // [dims], 0 where the skeleton lacks the joint
 };
 
-// Returns an error for a skeleton that lacks joints of the model's pose space (it names them) and
-// for a model whose parts do not fit each other.
+// Returns an error for a skeleton that cannot serve the model's pose space
+// (PoseSpace::bind_person), which names what is missing, and for a model whose parts do not fit
+// each other.
 Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
                                                      const Skeleton& skeleton, std::string name);
 

@@ -45,7 +45,7 @@ RT_SAFE bool WalkerTracker::measure(const BoundModel& model, std::span<const flo
                                     std::span<const std::uint8_t> available, double gap_s,
                                     double dt_s) noexcept {
   const bool walks = gate_.strides();
-  const bool all = std::ranges::all_of(available, [](std::uint8_t one) { return one != 0; });
+  const bool all = std::ranges::equal(available, model.served);
   if (model.axis.size() > 0 && walks && all) {
     double place = model.axis_offset;
     for (std::size_t d = 0; d < q.size(); ++d) {

@@ -7,6 +7,7 @@
 
 #include "models/motion/motion.hpp"
 #include "models/motion/symmetric_eigen.hpp"
+#include "models/style/train/flips.hpp"
 #include "models/style/train/harmonics.hpp"
 #include "models/style/train/stride_phase.hpp"
 #include "proto/text/clean.hpp"
@@ -77,25 +78,37 @@ Result<std::vector<Source>> read_sources(const std::vector<TrainingClip>& clips,
   return sources;
 }
 
-Result<MatrixXd> vectors(const motion::PoseSpaceSpec& spec, const Source& source) {
+// The pose vectors of a clip, without flips, and what was mended.
+struct Vectors {
+  MatrixXd q;
+  std::vector<std::string> mended;
+};
+
+Result<Vectors> vectors(const motion::PoseSpaceSpec& spec, const Source& source, double rate_hz) {
+  const std::string& path = source.clip->clip.path;
   const auto space = motion::PoseSpace::bind(spec, *source.motion.skeleton);
-  if (!space) return std::unexpected(in_clip(space.error(), source.clip->clip.path));
-  return motion::pose_vectors(source.motion, *space, source.heading_rad);
+  if (!space) return std::unexpected(in_clip(space.error(), path));
+  Vectors vectors{.q = motion::pose_vectors(source.motion, *space, source.heading_rad),
+                  .mended = {}};
+  auto mended = mend_flips(spec, *space, rate_hz, vectors.q);
+  if (!mended) return std::unexpected(in_clip(mended.error(), path));
+  vectors.mended = std::move(*mended);
+  return vectors;
 }
 
-// Angles that jump by a turn between two frames would be learnt as a motion that nobody made.
-Result<> check_turns(const MatrixXd& q, const std::string& path) {
-  for (int t = 1; t < q.rows(); ++t) {
-    if ((q.row(t) - q.row(t - 1)).lpNorm<Eigen::Infinity>() > std::numbers::pi) {
-      return fail(
-          "frame " + std::to_string(t + 1) +
-              " of the resampled clip turns a joint by more "
-              "than half a turn at once; cut the clip there or, where Euler angles turn over "
-              "(cmu43), use --pose-space native",
-          path);
-    }
+// The bones that all figures have: a style of people of whom one has no toes is one without toes.
+void keep_common_bones(const std::vector<Source>& sources, motion::PoseSpaceSpec& spec) {
+  std::vector<std::string> common;
+  for (const std::string& name : spec.joints) {
+    const auto has = [bone = *bone_from_name(name)](const Source& source) {
+      return source.motion.skeleton->joint_of(bone) >= 0;
+    };
+    if (std::ranges::all_of(sources, has)) common.push_back(name);
   }
-  return {};
+  // Without its root or any bone the spec stays, and the clip that lacks them is refused.
+  if (common.empty() || common.front() != spec.joints[static_cast<std::size_t>(spec.root)]) return;
+  spec.joints = std::move(common);
+  spec.mean.resize(spec.joints.size());
 }
 
 int subject_index(Dataset& dataset, const TrainingClip& clip) {
@@ -278,6 +291,7 @@ Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips,
   auto spec = motion::describe_space(options.space, *sources.front().motion.skeleton);
   if (!spec) return std::unexpected(in_clip(spec.error(), sources.front().clip->clip.path));
   dataset.spec = std::move(*spec);
+  if (options.space == motion::Space::kHumanoid) keep_common_bones(sources, dataset.spec);
   // The mean rotations are those of the filter's input, that is of the sources.
   std::vector<const motion::Motion*> source_motions;
   for (const Source& source : sources) {
@@ -286,9 +300,9 @@ Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips,
   }
   TRY(motion::set_mean_rotations(source_motions, dataset.spec));
   for (const Source& source : sources) {
-    auto q = TRY(vectors(dataset.spec, source));
-    TRY(check_turns(q, source.clip->clip.path));
-    AlignedClip clip = aligned_clip(source, std::move(q), options.rate_hz);
+    auto seen = TRY(vectors(dataset.spec, source, options.rate_hz));
+    AlignedClip clip = aligned_clip(source, std::move(seen.q), options.rate_hz);
+    clip.mended = std::move(seen.mended);
     clip.subject = subject_index(dataset, *source.clip);
     if (std::ranges::find(dataset.motions, clip.motion) == dataset.motions.end()) {
       dataset.motions.push_back(clip.motion);

@@ -39,13 +39,14 @@ struct DatasetOptions {
 
 struct AlignedClip {
   std::string file, group, motion;
-  int subject = 0;             // index into Dataset::subjects
-  bool dropped_first = false;  // the file's first frame was an added rest pose
-  Eigen::MatrixXd q;           // [T x D], rad
-  Eigen::MatrixXd state;       // y = (v, q, dq/dt) [T x 3 + 2D]; 89 for cmu43, as in Sato et al.
-  Eigen::VectorXd leg;         // the stride's reference signal [T]
-  Eigen::VectorXd height_m;    // of the root [T]
-  bool has_legs = false;       // else `leg` is the first principal component of q
+  int subject = 0;                  // index into Dataset::subjects
+  bool dropped_first = false;       // the file's first frame was an added rest pose
+  std::vector<std::string> mended;  // sentences about joints that flipped
+  Eigen::MatrixXd q;                // [T x D], rad
+  Eigen::MatrixXd state;     // y = (v, q, dq/dt) [T x 3 + 2D]; 89 for cmu43, as in Sato et al.
+  Eigen::VectorXd leg;       // the stride's reference signal [T]
+  Eigen::VectorXd height_m;  // of the root [T]
+  bool has_legs = false;     // else `leg` is the first principal component of q
   double theta0 = 0.0, dtheta = 0.0;  // phase of the first frame, mean phase per frame
   Eigen::VectorXd local_phase;  // of every frame, from theta0 = 0; empty: the cadence is constant
   double stride_score = 0.0;    // of the leg signal under its own strides (stride_phase.hpp)

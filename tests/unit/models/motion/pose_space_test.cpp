@@ -188,6 +188,68 @@ TEST_CASE("Near the pole of its Euler angles a cmu43 joint still moves by a smal
   CHECK(turn < 0.2);
 }
 
+TEST_CASE("A person without chest, shoulders and toes is styled as one who has them",
+          "[pose_space]") {
+  const Motion walk = walker();
+  auto spec = describe_space(Space::kHumanoid, *walk.skeleton);
+  REQUIRE(spec.has_value());
+  for (std::size_t i = 0; i < spec->mean.size(); ++i) {
+    spec->mean[i] = rotation_exp(Vector3d(0.1 * std::sin(i), 0.2, -0.1));
+  }
+  Skeleton lacking = *walk.skeleton;
+  int lost = 0;
+  for (const Bone bone :
+       {Bone::kChest, Bone::kLeftShoulder, Bone::kRightShoulder, Bone::kLeftToes}) {
+    const int joint = lacking.joint_of(bone);
+    if (joint < 0) continue;
+    lacking.joints[joint].bone.reset();
+    ++lost;
+  }
+  REQUIRE(lost > 0);
+  const auto whole = PoseSpace::bind(*spec, *walk.skeleton);
+  REQUIRE_FALSE(PoseSpace::bind(*spec, lacking).has_value());
+  const auto rest = PoseSpace::bind_person(*spec, lacking);
+  REQUIRE(rest.has_value());
+  CHECK(static_cast<int>(rest->missing().size()) == lost);
+
+  // The missing joints stand as in the training's mean, which is what the rest has to assume.
+  std::vector<double> q(whole->dims());
+  std::vector<float> delta(whole->dims());
+  for (int d = 0; d < whole->dims(); ++d) {
+    const bool is_there = rest->skeleton_joint_of_dim(d) >= 0;
+    q[d] = is_there ? 0.2 * std::sin(3.0 * d) : 0.0;
+    delta[d] = static_cast<float>(0.15 * std::cos(2.0 * d));
+  }
+  Frame frame = walk.frames[0];
+  whole->put(frame, 0.3, q);
+  const auto seen = vector_of(*rest, frame, 0.3);
+  const auto seen_whole = vector_of(*whole, frame, 0.3);
+  for (int d = 0; d < rest->dims(); ++d) {
+    CHECK((seen.available[d] != 0) == (rest->skeleton_joint_of_dim(d) >= 0));
+    CHECK(seen.q[d] == Approx(seen_whole.q[d]).margin(1e-5));
+  }
+  Frame expected = frame;
+  Frame styled = frame;
+  whole->add(expected, 0.3, seen_whole.q, delta);
+  rest->add(styled, 0.3, seen.q, delta);
+  const auto world = [&](const Frame& of, int joint) {
+    Quaterniond rotation = Quaterniond::Identity();
+    for (int j = joint; j >= 0; j = lacking.joints[j].parent) {
+      rotation = to_eigen_double(of.rotation_xyzw[j]) * rotation;
+    }
+    return rotation;
+  };
+  for (int j = 0; j < static_cast<int>(lacking.joints.size()); ++j) {
+    if (!lacking.joints[j].bone) continue;
+    INFO(lacking.joints[j].name);
+    CHECK(angle_between_rad(world(styled, j), world(expected, j)) < 1e-4);
+  }
+  lacking.joints[lacking.joint_of(Bone::kLeftLowerArm)].bone.reset();
+  const auto refused = PoseSpace::bind_person(*spec, lacking);
+  REQUIRE_FALSE(refused.has_value());
+  CHECK(refused.error().message.find("leftLowerArm") != std::string::npos);
+}
+
 TEST_CASE("A skeleton that cannot serve is refused with the missing joints", "[pose_space]") {
   const Motion walk = walker();
   auto spec = describe_space(Space::kNative, *walk.skeleton);
