@@ -4,6 +4,7 @@
 #include "drivers/options.hpp"
 #include "drivers/transport/file.hpp"
 #include "proto/clip/device_clip.hpp"
+#include "proto/clip/figure.hpp"
 #include "proto/clip/format.hpp"
 
 namespace posed::drivers {
@@ -36,13 +37,23 @@ Chunks chunks_of(const clip::DeviceClip& clip) {
 
 // A value that is the option's default counts as not given. Whether the clip's format accepts the
 // others, the table of formats says.
-clip::ReadOptions read_options(const Options& options) {
+Result<clip::ReadOptions> read_options(const Options& options) {
   clip::ReadOptions read;
   read.skeleton = option<std::string>(options, "skeleton");
   if (const auto rate_hz = option<double>(options, "rate_hz"); rate_hz != 0.0) {
     read.rate_hz = rate_hz;
   }
   read.profile = option<std::string>(options, "profile");
+  if (const auto up = option<std::string>(options, "up"); !up.empty()) {
+    read.up = up_from_text(up);
+    if (!read.up) return misuse("up is +y, +z, -y, -z or +x");
+  }
+  if (const auto unit = option<std::string>(options, "unit"); !unit.empty()) {
+    read.metres_per_unit = clip::metres_of_unit(unit);
+    if (!read.metres_per_unit) {
+      return misuse("unit is m, dm, cm, mm, inch, foot or a number of metres");
+    }
+  }
   if (option<std::string>(options, "hand") != kDefaultHand) read.hand = Side::kLeft;
   read.hand_shape = option<std::string>(options, "hand_shape");
   return read;
@@ -53,7 +64,8 @@ Result<Device> open(const Options& given, TransportFactory& /*ports*/) {
   const std::string path = option<std::string>(options, "path");
   const std::string hand = option<std::string>(options, "hand");
   if (hand != "left" && hand != "right") return misuse("hand is left or right");
-  const auto clip = TRY(clip::open_device_clip(path, read_options(options)));
+  const auto read = TRY(read_options(options));
+  const auto clip = TRY(clip::open_device_clip(path, read));
   auto device = TRY(make_device(file_driver(), clip.description, path));
   auto transport = FileTransport::open(chunks_of(clip), {.rate_hz = device.description.rate_hz,
                                                          .pace = option<double>(options, "pace"),
@@ -91,7 +103,14 @@ std::vector<OptionSpec> options() {
        .help = "frames a second of an .amc, which does not say; 0 is 120"},
       {.name = "profile",
        .default_value = std::string(),
-       .help = "skeleton profile; left out, found by the joints' names"},
+       .help = "skeleton profile: a name, or a file that `posed inspect --write` made; left out, "
+               "the figure is recognised"},
+      {.name = "up",
+       .default_value = std::string(),
+       .help = "the axis of a .bvh that points up, such as +z; left out, recognised"},
+      {.name = "unit",
+       .default_value = std::string(),
+       .help = "of a .bvh: m, dm, cm, mm, inch, foot or a number of metres; left out, recognised"},
       {.name = "hand",
        .default_value = std::string(kDefaultHand),
        .help = "whose hand a .csv is: left or right"},

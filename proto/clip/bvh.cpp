@@ -101,8 +101,7 @@ std::optional<double> unit_of(const Profile& profile, const Skeleton& skeleton,
   if (!profile.person || is_a_person(skeleton, *profile.metres_per_unit)) {
     return profile.metres_per_unit;
   }
-  warnings.push_back("has the joints of profile '" + profile.name +
-                     "' but not its unit of length");
+  warnings.push_back("has the joints of profile '" + profile.name + "' but not its unit of length");
   return std::nullopt;
 }
 
@@ -111,8 +110,8 @@ std::optional<double> unit_of(const Profile& profile, const Skeleton& skeleton,
 ChannelMatrix sample_of(const Skeleton& skeleton, std::span<const FrameSpan> frames) {
   constexpr double kTinyUnit_m = 1e-6;  // so that no position is beyond a pose's
   const auto parser = FrameParser::bvh(skeleton, kTinyUnit_m);
-  const auto picked = sample_frames(static_cast<int>(frames.size()),
-                                    static_cast<int>(skeleton.joints.size()));
+  const auto picked =
+      sample_frames(static_cast<int>(frames.size()), static_cast<int>(skeleton.joints.size()));
   ChannelMatrix sample(std::ssize(picked), std::ssize(skeleton.channels));
   int count = 0;
   for (const int i : picked) {
@@ -150,7 +149,9 @@ Result<std::vector<double>> recognise_draft(const ReadOptions& options,
     }
   }
   const bool unit_is_known = known.metres_per_unit.has_value();
-  const rig::Rig rig = recognise(skeleton, sample_of(skeleton, frames), std::move(known));
+  draft.rig = std::make_shared<const rig::Rig>(
+      recognise(skeleton, sample_of(skeleton, frames), std::move(known)));
+  const rig::Rig& rig = *draft.rig;
   if (!rig.metres_per_unit) {
     draft.metres_per_unit = guess_unit(skeleton, draft.warnings);
   } else {
@@ -163,7 +164,6 @@ Result<std::vector<double>> recognise_draft(const ReadOptions& options,
   }
   draft.warnings.insert(draft.warnings.end(), rig.notes.begin(), rig.notes.end());
   draft.up = rig.up;
-  draft.is_recognised = true;
   apply(rig, skeleton);
   scale_lengths(skeleton, draft.metres_per_unit);
   const std::size_t joints = skeleton.joints.size();
@@ -436,7 +436,7 @@ Format bvh_format() {
           .extensions = {".bvh"},
           .evenly_spaced = true,
           .sends_text = true,
-          .options = {ReadOption::kUnit, ReadOption::kProfile},
+          .options = {ReadOption::kUnit, ReadOption::kUp, ReadOption::kProfile},
           .sniff = [](std::string_view begin) { return has_line(begin, "HIERARCHY"); },
           .read = read_bvh,
           .write = write_bvh};

@@ -13,6 +13,7 @@
 #include "proto/frame/hand_shape.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/skeleton.hpp"
+#include "proto/rig/recognise.hpp"
 #include "proto/rig/up.hpp"
 
 namespace posed::clip {
@@ -33,6 +34,8 @@ struct Clip {
   // and channels have +Y up.
   double metres_per_unit = 0.01;
   UpAxis up = UpAxis::kPlusY;
+  // What was recognised of the file's figure, in the file's axes; null where the format knows it.
+  std::shared_ptr<const rig::Rig> rig{};
 
   [[nodiscard]] int frames() const { return static_cast<int>(channels.rows()); }
   // The pose, with a device time from the index; the stream is not set.
@@ -51,8 +54,10 @@ struct ReadOptions {
   std::optional<double> metres_per_unit{};
   // Axis that points up in a format that does not state it; empty: recognised by the figure.
   std::optional<UpAxis> up{};
-  std::string profile{};       // name of a skeleton profile; empty: found by joint names
-  std::optional<Side> hand{};  // side of a hand that does not state it; empty: right
+  // Name of a skeleton profile, or a file (.toml) that `posed inspect --write` made; empty: found
+  // by the joints' names.
+  std::string profile{};
+  std::optional<Side> hand{};                 // side of a hand that does not state it; empty: right
   std::string hand_shape{kDefaultHandShape};  // bones of a hand of which a file has only the angles
 };
 

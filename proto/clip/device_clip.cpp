@@ -112,7 +112,9 @@ Result<FrameCoding> parse_text(const Format& format, const Facts& facts, double 
   ReadOptions options;
   options.rate_hz = rate_hz;
   options.metres_per_unit = metres;
+  // A log names no file: only a built-in profile.
   options.profile = word_of(facts, "profile", "");
+  if (options.profile.ends_with(".toml")) return damaged(name);
   options.up = up_from_text(word_of(facts, "up", "+y"));
   options.hand_shape = word_of(facts, "shape", kDefaultHandShape);
   options.hand = word_of(facts, "hand", "right") == "left" ? Side::kLeft : Side::kRight;

@@ -79,18 +79,18 @@ Result<> recognise_clip(Clip& clip, Skeleton& skeleton, const Profile* profile,
   known.up = UpAxis::kPlusY;
   known.metres_per_unit = 1.0;
   if (profile != nullptr) TRY(add_profile(*profile, skeleton, known));
-  const auto picked =
-      sample_frames(clip.frames(), static_cast<int>(skeleton.joints.size()));
+  const auto picked = sample_frames(clip.frames(), static_cast<int>(skeleton.joints.size()));
   const ChannelMatrix sample = clip.channels(picked, Eigen::all);
-  const rig::Rig rig = recognise(skeleton, sample, std::move(known));
-  apply(rig, skeleton);
-  clip.warnings.insert(clip.warnings.end(), rig.notes.begin(), rig.notes.end());
+  auto rig = std::make_shared<const rig::Rig>(recognise(skeleton, sample, std::move(known)));
+  apply(*rig, skeleton);
+  clip.warnings.insert(clip.warnings.end(), rig->notes.begin(), rig->notes.end());
+  clip.rig = std::move(rig);
   return {};
 }
 
 // Sets bones, T frames, root joint and offsets.
 Result<> complete(Clip& clip, Skeleton& skeleton, const Draft& draft, const Hints& hints) {
-  if (!draft.is_recognised) TRY(recognise_clip(clip, skeleton, draft.profile, hints));
+  if (!draft.rig) TRY(recognise_clip(clip, skeleton, draft.profile.get(), hints));
   for (std::size_t j = 0; j < std::min(hints.T.size(), skeleton.joints.size()); ++j) {
     if (hints.T[j]) skeleton.joints[j].T_world_joint = *hints.T[j];
   }
@@ -146,6 +146,7 @@ Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints) {
   clip.frame_rate_hz = draft.frame_rate_hz;
   clip.metres_per_unit = draft.metres_per_unit;
   clip.up = draft.up;
+  clip.rig = draft.rig;
   clip.warnings = std::move(draft.warnings);
   clip.time_s = std::move(draft.time_s);
   clip.channels = Eigen::Map<const ChannelMatrix>(

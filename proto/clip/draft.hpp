@@ -2,6 +2,7 @@
 // share.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,6 +11,7 @@
 #include "proto/clip/clip.hpp"
 #include "proto/clip/frame_parser.hpp"
 #include "proto/frame/profile.hpp"
+#include "proto/rig/recognise.hpp"
 
 namespace posed::clip {
 
@@ -29,13 +31,13 @@ struct TextFrames {
 // The result of a format's reader: all frames of a file as numbers. clip_of() adds what only the
 // whole clip shows.
 struct Draft {
-  Skeleton skeleton;               // metres; unfinished, unless skeleton_is_known
-  bool skeleton_is_known = false;  // posed's own: it has bones, root joint and T frames
-  bool is_recognised = false;      // bones and T frames are set
-  const Profile* profile = nullptr;
+  Skeleton skeleton;                    // metres; unfinished, unless skeleton_is_known
+  bool skeleton_is_known = false;       // posed's own: it has bones, root joint and T frames
+  std::shared_ptr<const rig::Rig> rig;  // what set bones and T frames; null: not set yet
+  std::shared_ptr<const Profile> profile;
   double frame_rate_hz = 0.0;
   double metres_per_unit = 1.0;
-  UpAxis up = UpAxis::kPlusY;  // of the file; the skeleton has +Y up
+  UpAxis up = UpAxis::kPlusY;    // of the file; the skeleton has +Y up
   std::vector<double> values;    // [frame x channel], rad and m
   std::vector<double> time_s{};  // [frame], increasing; empty: evenly spaced, from 0
   std::vector<std::string> warnings;

@@ -1,6 +1,10 @@
 #include "proto/clip/figure.hpp"
 
 #include <algorithm>
+#include <array>
+#include <utility>
+
+#include "proto/clip/text.hpp"
 
 namespace posed::clip {
 
@@ -81,7 +85,7 @@ void apply(const rig::Rig& rig, Skeleton& skeleton) {
 Result<> add_profile(const Profile& profile, const Skeleton& skeleton, rig::RigInput& known) {
   known.bones = TRY(named_bones(profile, skeleton));
   known.T = known_t(profile, skeleton);
-  known.up = UpAxis::kPlusY;
+  known.up = profile.up;
   return {};
 }
 
@@ -136,6 +140,17 @@ std::vector<double> turn_axes(const Eigen::Matrix3d& turn, Skeleton& skeleton) {
     factors.push_back(to[axis] < 0.0 ? -1.0 : 1.0);
   }
   return factors;
+}
+
+std::optional<double> metres_of_unit(std::string_view text) {
+  constexpr std::array<std::pair<std::string_view, double>, 6> kNames{
+      {{"m", 1.0}, {"dm", 0.1}, {"cm", 0.01}, {"mm", 0.001}, {"inch", 0.0254}, {"foot", 0.3048}}};
+  const auto* const named =
+      std::ranges::find(kNames, text, &std::pair<std::string_view, double>::first);
+  if (named != kNames.end()) return named->second;
+  const auto metres = parse_number(text);
+  if (!metres || !(*metres >= 1e-6 && *metres <= 1e6)) return std::nullopt;
+  return metres;
 }
 
 }  // namespace posed::clip

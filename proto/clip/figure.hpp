@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "proto/clip/clip.hpp"
@@ -39,5 +40,9 @@ std::vector<char> leave_out_joints(Skeleton& skeleton);
 // Expresses the figure in axes turned by `turn`, which maps axes to axes. Returns the factor, 1 or
 // -1, by which the values of each channel change; channels keep their order.
 std::vector<double> turn_axes(const Eigen::Matrix3d& turn, Skeleton& skeleton);
+
+// Metres in the unit of this name (m, dm, cm, mm, inch, foot), or the number of metres that the
+// text is; empty for anything else.
+[[nodiscard]] std::optional<double> metres_of_unit(std::string_view text);
 
 }  // namespace posed::clip

@@ -9,11 +9,14 @@
 #include "proto/frame/degree.hpp"
 #include "proto/frame/profile_texts.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/load_file.hpp"
 #include "proto/text/toml.hpp"
 #include "proto/text/toml_table.hpp"
 
 namespace posed {
 namespace {
+
+constexpr std::uintmax_t kMaxProfileBytes = 1 << 20;
 
 void read_bones(TableReader& table, Profile& profile) {
   for (const std::string& key : table.keys()) {  // canonical bone = "joint"
@@ -76,6 +79,13 @@ Result<Profile> parse_profile(std::string_view text, const std::string& name) {
   if (reader.has("metres_per_unit")) {
     reader.read("metres_per_unit", profile.metres_per_unit.emplace(), {1e-6, 1e6});
   }
+  std::string up(up_text(profile.up));
+  reader.read("up", up);
+  if (const auto axis = up_from_text(up)) {
+    profile.up = *axis;
+  } else {
+    reader.add_error("up", "up is +y, +z, -y, -z or +x");
+  }
   reader.read("person", profile.person);
   reader.read("match", profile.match);
   if (auto along = reader.table("along")) {
@@ -108,10 +118,18 @@ std::span<const Profile> profiles() {
   return all;
 }
 
-Result<const Profile*> find_profile(const Skeleton& skeleton, const std::string& name) {
+Result<std::shared_ptr<const Profile>> find_profile(const Skeleton& skeleton,
+                                                    const std::string& name) {
+  if (name.ends_with(".toml")) {
+    const std::string text =
+        TRY(load_file(name, {.what = "skeleton profile", .max_bytes = kMaxProfileBytes}));
+    return std::make_shared<const Profile>(TRY(parse_profile(text, name)));
+  }
   std::string known;
   for (const Profile& profile : profiles()) {
-    if (name.empty() ? matches(profile, skeleton) : profile.name == name) return &profile;
+    const bool is_it = name.empty() ? matches(profile, skeleton) : profile.name == name;
+    // Built-in profiles are never freed.
+    if (is_it) return std::shared_ptr<const Profile>(std::shared_ptr<void>(), &profile);
     known += (known.empty() ? "" : ", ") + profile.name;
   }
   if (name.empty()) return nullptr;

@@ -86,7 +86,10 @@ void collect(const RigInput& input, const Frames& frames, Rig& rig) {
       if (const auto& found = frames.T(*rig.bone[j])) T = rotation_of(*found);
       rig.evidence[j] = frames.evidence(*rig.bone[j]);
     }
-    if (j < input.T.size() && input.T[j]) T = *input.T[j];
+    if (j < input.T.size() && input.T[j]) {
+      T = *input.T[j];
+      rig.evidence[j] = {1.0, "a profile says so"};
+    }
     rig.T[j] = T;
   }
 }

@@ -27,6 +27,8 @@ void add_replay(CLI::App& app, int& exit_code);
 void add_synth(CLI::App& app, int& exit_code);
 void add_convert(CLI::App& app, int& exit_code);
 void add_render(CLI::App& app, int& exit_code);
+void add_inspect(CLI::App& app, int& exit_code);
+void add_compare(CLI::App& app, int& exit_code);
 void add_calibrate(CLI::App& app, int& exit_code);
 void add_check(CLI::App& app, int& exit_code);
 void add_devices(CLI::App& app, int& exit_code);

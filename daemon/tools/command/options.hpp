@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "proto/clip/figure.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/hand.hpp"
 
@@ -78,6 +79,27 @@ inline constexpr double kDegrees = 1.0 / kDegree;  // degrees in a radian
 // The side that --hand names. `word` is "left" or "right"; CLI11 has refused all others.
 [[nodiscard]] constexpr Side side_named(std::string_view word) noexcept {
   return word == "left" ? Side::kLeft : Side::kRight;
+}
+
+// The options that say what a clip's figure is: --profile, --up and --unit.
+inline void add_figure_options(CLI::App& command, clip::ReadOptions& read) {
+  command.add_option("--profile", read.profile,
+                     "Skeleton profile: a name, or a file that `posed inspect --write` made "
+                     "(default: recognised)");
+  command
+      .add_option_function<std::string>(
+          "--up", [&read](const std::string& text) { read.up = up_from_text(text); },
+          "The axis of a BVH that points up (default: recognised)")
+      ->check(CLI::IsMember({"+y", "+z", "-y", "-z", "+x"}));
+  command
+      .add_option_function<std::string>(
+          "--unit",
+          [&read](const std::string& text) { read.metres_per_unit = clip::metres_of_unit(text); },
+          "Unit of a BVH: m, dm, cm, mm, inch, foot or a number of metres (default: recognised)")
+      ->check([](const std::string& text) {
+        return clip::metres_of_unit(text) ? std::string()
+                                          : fmt::format("'{}' is no unit of length", text);
+      });
 }
 
 }  // namespace posed::tools

@@ -113,7 +113,8 @@ Result<> check_options(const Convert& convert) {
   };
   const bool of_log = is_log(convert.in);
   const bool reads_clip_options = !convert.read.skeleton.empty() || !convert.read.profile.empty() ||
-                                  convert.read.rate_hz || convert.read.metres_per_unit;
+                                  convert.read.rate_hz || convert.read.metres_per_unit ||
+                                  convert.read.up;
   for (const auto& checked :
        {useless(!convert.stream.empty(), of_log,
                 "is not a device log (.plog), so --stream has no effect"),
@@ -228,12 +229,7 @@ void add_convert(CLI::App& app, int& exit_code) {
                       "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
   command->add_option("--rate", convert->read.rate_hz,
                       "Frames per second of an AMC, which does not say (default: 120)");
-  command
-      ->add_option("--metres-per-unit", convert->read.metres_per_unit,
-                   "Unit of a BVH (default: the profile's, else by the figure's height)")
-      ->check(in_range(1e-6, 1e6));
-  command->add_option("--profile", convert->read.profile,
-                      "Skeleton profile (default: found by the joints' names)");
+  add_figure_options(*command, convert->read);
   auto* stream = command->add_option(
       "--stream", convert->stream,
       "Which of a log's streams (default: the only one); NAME#2: its second part, "

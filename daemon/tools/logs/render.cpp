@@ -301,8 +301,7 @@ void add_render(CLI::App& app, int& exit_code) {
   command->add_option("--take", options->take, "Only this take of a log: its number or its name");
   command->add_option("--skeleton", options->read.skeleton,
                       "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
-  command->add_option("--profile", options->read.profile,
-                      "Skeleton profile (default: found by the joints' names)");
+  add_figure_options(*command, options->read);
   command->add_option("--hand", options->hand, "The hand of a hand CSV")
       ->check(CLI::IsMember({"left", "right"}));
   add_overwrite_option(*command, options->overwrite);

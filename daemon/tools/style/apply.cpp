@@ -221,6 +221,7 @@ void add_apply(CLI::App& app, int& exit_code) {
   add_root_option(*command, options->apply.feet);
   command->add_option("--skeleton", options->read.skeleton, "NN.asf of an AMC (default: beside it)")
       ->type_name("NN.asf");
+  add_figure_options(*command, options->read);
   command->add_flag("--cold", options->apply.cold, "Start as a live stream starts");
   command
       ->add_option("--gate", options->gate,

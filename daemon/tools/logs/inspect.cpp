@@ -1,0 +1,321 @@
+// `posed inspect`: what posed takes a clip's figure for, bone by bone, drawn in T-pose beside the
+// first frame, and the file that corrects it. `posed compare`: whether two clips show one figure.
+#include <algorithm>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <spdlog/fmt/fmt.h>
+#include <toml++/toml.h>
+#include <CLI/CLI.hpp>
+
+#include "daemon/tools/command/command.hpp"
+#include "daemon/tools/command/findings.hpp"
+#include "daemon/tools/command/options.hpp"
+#include "daemon/tools/command/output_files.hpp"
+#include "daemon/tools/picture/braille.hpp"
+#include "daemon/tools/picture/picture_file.hpp"
+#include "daemon/tools/picture/strip.hpp"
+#include "models/motion/motion.hpp"
+#include "proto/clip/format.hpp"
+#include "proto/clip/formats.hpp"
+#include "proto/frame/degree.hpp"
+#include "proto/frame/whole_file.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::tools {
+namespace {
+
+constexpr double kUnsure = 0.5;
+constexpr double kRow_px = 320.0;
+
+struct InspectArguments {
+  std::string in;
+  std::filesystem::path write, out;
+  clip::ReadOptions read;
+  bool overwrite = false, json = false;
+};
+
+Result<clip::Clip> read_figure(const std::string& path, const clip::ReadOptions& options) {
+  auto clip = TRY(clip::read_clip(path, options));
+  if (clip.rig) return clip;
+  return misuse("holds the angles of a known hand; there is no figure to recognise", path);
+}
+
+// The frame in which the figure stands in the T-pose, where the clip's first one stands.
+Frame t_pose(const clip::Clip& clip) {
+  Frame frame = clip.frame(0);
+  const Skeleton& skeleton = *clip.skeleton;
+  for (std::size_t j = 0; j < skeleton.joints.size(); ++j) {
+    const Joint& joint = skeleton.joints[j];
+    const Eigen::Quaterniond parent = joint.parent < 0
+                                          ? Eigen::Quaterniond::Identity()
+                                          : skeleton.joints[joint.parent].T_world_joint;
+    frame.rotation_xyzw[j] = from_eigen(parent.conjugate() * joint.T_world_joint);
+    frame.valid[j] = true;
+  }
+  return frame;
+}
+
+struct Drawing {
+  picture::FigureShape shape;
+  std::vector<picture::StripRow> rows;
+  double heading_rad = 0.0;
+
+  [[nodiscard]] picture::Camera camera(picture::View view, double heading) const {
+    return {view, shape.facing(heading)};
+  }
+};
+
+Result<Drawing> drawing_of(const clip::Clip& clip) {
+  const auto motion = TRY(motion::motion_of(clip));
+  Drawing drawing{.shape = picture::FigureShape(clip.skeleton),
+                  .rows = {},
+                  .heading_rad = motion::walk_heading_rad(motion)};
+  drawing.rows.push_back({.title = "", .poses = {}});
+  drawing.rows[0].poses.push_back({drawing.shape.pose(t_pose(clip)), "T-pose"});
+  drawing.rows[0].poses.push_back({drawing.shape.pose(motion.frames[0]), "first frame"});
+  return drawing;
+}
+
+// Four views beside each other, for the terminal: T-pose and first frame, from the front and the
+// side.
+std::vector<std::string> terminal_drawing(const Drawing& drawing) {
+  constexpr int kColumns = 19;
+  constexpr int kRows = 14;
+  std::vector<std::string> lines(
+      kRows + 1, std::string(drawing.rows[0].poses[0].figure.sticks.empty() ? 0 : 1, ' '));
+  lines[0] = fmt::format(" {:<{}}{:<{}}", "T-pose", 2 * kColumns, "first frame", 2 * kColumns);
+  for (std::size_t p = 0; p < drawing.rows[0].poses.size(); ++p) {
+    // In T-pose a figure looks along +Z, whatever the motion's heading.
+    const double heading_rad = p == 0 ? 0.0 : drawing.heading_rad;
+    for (const auto view : {picture::View::kFront, picture::View::kSide}) {
+      const picture::Camera camera = drawing.camera(view, heading_rad);
+      const auto room = picture::layout_of(drawing.rows, camera, kRow_px, true);
+      const auto rows =
+          picture::braille(drawing.rows[0].poses[p].figure, camera, room, kColumns, kRows);
+      for (std::size_t r = 0; r < rows.size(); ++r) lines[r + 1] += rows[r];
+    }
+  }
+  return lines;
+}
+
+bool is_of_the_body(Bone bone) { return bone < Bone::kLeftThumbMetacarpal; }
+
+std::string missing_bones(const Skeleton& skeleton) {
+  std::string names;
+  for (int b = 0; b < kBones; ++b) {
+    const auto bone = static_cast<Bone>(b);
+    if (!is_of_the_body(bone) || skeleton.joint_of(bone) >= 0) continue;
+    names += (names.empty() ? "" : ", ") + std::string(bone_name(bone));
+  }
+  return names;
+}
+
+std::string_view kind_words(const Skeleton& skeleton) {
+  if (motion::is_person(skeleton)) return "a person";
+  return skeleton.joint_of(Bone::kLeftHand) >= 0 || skeleton.joint_of(Bone::kRightHand) >= 0
+             ? "a hand, or a part of a person"
+             : "no person";
+}
+
+void add_bones(const clip::Clip& clip, Findings& findings) {
+  std::vector<Findings> bones;
+  int others = 0;
+  for (std::size_t j = 0; j < clip.skeleton->joints.size(); ++j) {
+    const Joint& joint = clip.skeleton->joints[j];
+    if (!joint.bone) {
+      ++others;
+      continue;
+    }
+    const rig::Evidence& evidence = clip.rig->evidence[j];
+    bones.push_back(
+        Findings()
+            .add("bone", bone_name(*joint.bone))
+            .add("joint", joint.name)
+            .add("sure", evidence.sure)
+            .add("why", evidence.why)
+            .say(fmt::format("  {:<24} {:<24} {:4.2f}{} {}", bone_name(*joint.bone),
+                             clean_name(joint.name), evidence.sure,
+                             evidence.sure < kUnsure ? " ?" : "  ", clean(evidence.why))));
+  }
+  findings.say(fmt::format("  {:<24} {:<24} sure", "bone", "joint"));
+  findings.add("bones", bones);
+  findings.add("other_joints", others);
+  const std::string missing = missing_bones(*clip.skeleton);
+  findings.add("missing", missing);
+  if (!missing.empty()) findings.say("  it has no " + missing);
+  if (others > 0) findings.say(fmt::format("  {} joints are no bones of a person", others));
+}
+
+Findings findings_of(const InspectArguments& options, const clip::Clip& clip,
+                     const Drawing& drawing) {
+  Findings findings;
+  const std::string unit =
+      clip.rig->unit.empty() ? fmt::format("{:g} m", clip.metres_per_unit) : clip.rig->unit;
+  findings.add("in", options.in)
+      .add("person", motion::is_person(*clip.skeleton))
+      .add("up", up_text(clip.up))
+      .add("metres_per_unit", clip.metres_per_unit)
+      .say(fmt::format("{}: {}; {} points up{}, lengths in {}{}", options.in,
+                       kind_words(*clip.skeleton), up_text(clip.up),
+                       clip.rig->why_up.empty() ? "" : " (" + clip.rig->why_up + ")", unit,
+                       clip.rig->why_unit.empty() ? "" : " (" + clip.rig->why_unit + ")"));
+  for (const std::string& line : terminal_drawing(drawing)) findings.say(line);
+  add_bones(clip, findings);
+  findings.add("notes", clip.rig->notes);
+  for (const std::string& note : clip.rig->notes) findings.say("  note: " + clean(note));
+  return findings;
+}
+
+std::string quoted(const std::string& text) {
+  std::ostringstream out;
+  out << toml::value<std::string>(text);
+  return out.str();
+}
+
+// The profile that says of this skeleton what was recognised; T as three angles [deg], x innermost.
+std::string profile_text(const clip::Clip& clip) {
+  std::string text = fmt::format(
+      "# Written by `posed inspect {}`. Correct what is wrong, and give the file as the profile.\n"
+      "name = {}\nmetres_per_unit = {:.9g}\nup = \"{}\"\n\n[bones] # bone = joint\n",
+      clean(std::filesystem::path(clip.path).filename().string()), quoted(clip.skeleton->name),
+      clip.metres_per_unit, up_text(clip.up));
+  std::string frames = "\n[T] # turn of each joint's axes in the T-pose [deg] about x, y, z\n";
+  for (std::size_t j = 0; j < clip.skeleton->joints.size(); ++j) {
+    const Joint& joint = clip.skeleton->joints[j];
+    if (!joint.bone) continue;
+    text += fmt::format("{} = {} # sure {:.2g}: {}\n", bone_name(*joint.bone), quoted(joint.name),
+                        clip.rig->evidence[j].sure, clean(clip.rig->evidence[j].why));
+    const Eigen::Vector3d zyx_rad = clip.rig->T[j].toRotationMatrix().eulerAngles(2, 1, 0);
+    frames += fmt::format("{} = [{:.6f}, {:.6f}, {:.6f}]\n", quoted(joint.name),
+                          zyx_rad[2] / kDegree, zyx_rad[1] / kDegree, zyx_rad[0] / kDegree);
+  }
+  return text + frames;
+}
+
+Result<> run_inspect(const InspectArguments& options) {
+  TRY(OutputFiles(options.overwrite)
+          .reads(options.in)
+          .writes(options.write, {".toml"})
+          .writes(options.out, {".svg", ".png"})
+          .check());
+  const auto clip = TRY(read_figure(options.in, options.read));
+  const auto drawing = TRY(drawing_of(clip));
+  if (!options.write.empty()) TRY(write_whole_file(options.write, profile_text(clip)));
+  if (!options.out.empty()) {
+    const auto camera = drawing.camera(picture::View::kThreeQuarter, 0.0);
+    const auto layout = picture::layout_of(drawing.rows, camera, kRow_px, true);
+    TRY(picture::write_picture(
+        picture::strip_svg(drawing.rows, camera, layout,
+                           {.title = std::filesystem::path(options.in).filename().string(),
+                            .sentence = "What posed takes the figure for; " +
+                                        std::string(drawing.shape.legend())}),
+        options.out));
+  }
+  findings_of(options, clip, drawing).show(options.json);
+  return {};
+}
+
+struct Difference {
+  std::string joint;
+  double value = 0.0;
+
+  void see(const std::string& name, double other) {
+    if (!(other > value)) return;
+    value = other;
+    joint = name;
+  }
+};
+
+Result<int> run_compare(const std::string& a, const std::string& b, bool json) {
+  constexpr double kSame_deg = 0.01;
+  constexpr double kSameLength = 0.01;
+  const auto first = TRY(read_figure(a, {}));
+  const auto second = TRY(read_figure(b, {}));
+  Difference turn_deg;
+  Difference length;
+  std::string missing;
+  for (const Joint& joint : first.skeleton->joints) {
+    const int other = joint.bone ? second.skeleton->joint_of(*joint.bone)
+                                 : second.skeleton->joint_index(joint.name);
+    if (other < 0) {
+      missing += (missing.empty() ? "" : ", ") + clean_name(joint.name);
+      continue;
+    }
+    const Joint& there = second.skeleton->joints[other];
+    turn_deg.see(joint.name, angle_between_rad(joint.T_world_joint, there.T_world_joint) / kDegree);
+    const double longer = std::max(joint.offset_m.norm(), there.offset_m.norm());
+    if (joint.parent < 0 || longer < 0.01) continue;
+    length.see(joint.name, std::abs(joint.offset_m.norm() - there.offset_m.norm()) / longer);
+  }
+  const bool same_skeleton =
+      missing.empty() && first.skeleton->joints.size() == second.skeleton->joints.size();
+  const bool same_T = turn_deg.value <= kSame_deg;
+  const bool same_size = length.value <= kSameLength;
+  Findings findings;
+  findings.add("same_skeleton", same_skeleton)
+      .add("same_T", same_T)
+      .add("same_size", same_size)
+      .add("T_deg", turn_deg.value)
+      .add("length_share", length.value)
+      .add("missing", missing)
+      .say(same_skeleton
+               ? "same joints"
+               : "other joints" + (missing.empty() ? "" : ": " + b + " has no " + missing))
+      .say(same_T ? "same T-pose"
+                  : fmt::format("other T-pose: {} is {:.2f} deg apart", clean_name(turn_deg.joint),
+                                turn_deg.value))
+      .say(same_size ? "same sizes"
+                     : fmt::format("other sizes: {} differs by {:.0f} %", clean_name(length.joint),
+                                   100.0 * length.value));
+  findings.verdict(same_skeleton && same_T ? (same_size ? "one figure" : "one figure, two persons")
+                                           : "two figures",
+                   same_skeleton && same_T);
+  return findings.show(json);
+}
+
+}  // namespace
+
+void add_inspect(CLI::App& app, int& exit_code) {
+  CLI::App* command =
+      app.add_subcommand("inspect", "Show what posed takes a clip's figure for, bone by bone");
+  const auto options = std::make_shared<InspectArguments>();
+  command->add_option("IN", options->in, "The clip: " + clip::listed(clip::Use::kRead))->required();
+  command
+      ->add_option("--write", options->write,
+                   "Write it as a profile to correct, which --profile and [stream.file] take")
+      ->type_name("MAP.toml");
+  command->add_option("--out", options->out, "Draw T-pose and first frame")
+      ->type_name("OUT.svg|png");
+  add_figure_options(*command, options->read);
+  add_overwrite_option(*command, options->overwrite);
+  command->add_flag("--json", options->json, "Print the findings as JSON on stdout");
+  command->callback([options, &exit_code] {
+    const auto done = run_inspect(*options);
+    exit_code = done ? static_cast<int>(ExitCode::kDone) : report(done.error());
+  });
+}
+
+void add_compare(CLI::App& app, int& exit_code) {
+  CLI::App* command =
+      app.add_subcommand("compare", "Tell whether two clips show one figure, and one person");
+  struct Arguments {
+    std::string a, b;
+    bool json = false;
+  };
+  const auto options = std::make_shared<Arguments>();
+  command->add_option("A", options->a, "A clip")->required();
+  command->add_option("B", options->b, "Another one")->required();
+  command->add_flag("--json", options->json, "Print the findings as JSON on stdout");
+  command->callback([options, &exit_code] {
+    const auto done = run_compare(options->a, options->b, options->json);
+    exit_code = done ? *done : report(done.error());
+  });
+}
+
+}  // namespace posed::tools
