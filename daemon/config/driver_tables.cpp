@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <set>
+#include <string>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -14,6 +16,20 @@ namespace {
 
 constexpr std::array<std::string_view, 3> kIdentityKeys{"port", "id", "hand"};
 
+// The driver that somebody most likely means: of nearly that name, or for devices of that name.
+std::string nearest_driver(const std::string& name, Drivers known) {
+  constexpr std::size_t kMinWord = 4;  // a shorter one is part of too many
+  std::set<std::string> names;
+  for (const drivers::Driver& driver : known) names.emplace(driver.name);
+  const std::string near = nearest(name, names);
+  if (!near.empty() || name.size() < kMinWord) return near;
+  const auto same = [](char a, char b) { return std::tolower(a) == std::tolower(b); };
+  for (const drivers::Driver& driver : known) {
+    if (!std::ranges::search(driver.summary, name, same).empty()) return std::string(driver.name);
+  }
+  return {};
+}
+
 }  // namespace
 
 const drivers::Driver* named_driver(TableReader& table, const ConfigFile& file,
@@ -21,9 +37,7 @@ const drivers::Driver* named_driver(TableReader& table, const ConfigFile& file,
   const auto driver = std::ranges::find(file.drivers, name, &drivers::Driver::name);
   if (driver != file.drivers.end()) return &*driver;
   if (name.empty()) return nullptr;
-  std::set<std::string> names;
-  for (const drivers::Driver& known : file.drivers) names.emplace(known.name);
-  const std::string near = nearest(name, names);
+  const std::string near = nearest_driver(name, file.drivers);
   table.add_error("driver", fmt::format("there is no driver of this name; {}",
                                         near.empty() ? "`posed devices` lists them"
                                                      : "the nearest is '" + near +

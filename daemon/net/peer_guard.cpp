@@ -270,8 +270,11 @@ PeerShares peer_shares() {
   rlimit limit{};
   getrlimit(RLIMIT_NOFILE, &limit);
   std::error_code none;
-  const std::size_t open =
-      std::distance(std::filesystem::directory_iterator("/proc/self/fd", none), {});
+  std::size_t open = 0;
+  for (std::filesystem::directory_iterator file("/proc/self/fd", none), end; !none && file != end;
+       file.increment(none)) {
+    ++open;
+  }
   const std::size_t used = open + kReservedFiles;
   const std::size_t files = limit.rlim_cur;
   const std::size_t free = files > used ? files - used : 0;

@@ -92,6 +92,7 @@ void fill_readings(const std::vector<StageInfo>& stages, const pipeline::Pipelin
   }
 }
 
+constexpr double kLossy_s = 10.0;  // after its last loss, as posed.proto says
 constexpr std::array<const char*, 4> kStateNames{"waiting", "live", "stale", "ended"};
 
 }  // namespace
@@ -221,8 +222,12 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
   fill_stages(now_.stages, pipeline, stats);
   stats.set_lag_frames(now_.lag_frames);
   stats.set_lag_ms(now_.lag_ms);
-  stats.set_label(std::string(now_.label.begin(), std::ranges::find(now_.label, '\0')));
-  stats.set_label_probability(now_.label_probability);
+  // A hand that is not there makes no gesture; one that performs needs no device.
+  const bool comes = pipeline.state.load() == pipeline::StreamState::kLive && !stats.away();
+  const bool labelled = comes || now_.source == Source::kLabels;
+  const auto end = labelled ? std::ranges::find(now_.label, '\0') : now_.label.begin();
+  stats.set_label(std::string(now_.label.begin(), end));
+  stats.set_label_probability(labelled ? now_.label_probability : 0.0F);
   stats.set_source(static_cast<v1::Source>(now_.source));
   if (now_.clock.valid) stats.set_clock_offset_ns(now_.clock.offset_ns);
   stats.set_clock_drift_ppm(now_.clock.drift_ppm);
@@ -265,6 +270,10 @@ v1::StreamStats PublishedStream::report(double seconds_since) {
   const auto frames = static_cast<double>(stats.frames() - frames_reported_);
   stats.set_rate_hz(seconds_since > 0.0 ? static_cast<float>(frames / seconds_since) : 0.0F);
   frames_reported_ = stats.frames();
+  const std::uint64_t lost = stats.dropped() + stats.shed() + stats.kernel_dropped();
+  lossy_for_s_ = lost > lost_reported_ ? kLossy_s : lossy_for_s_ - seconds_since;
+  lost_reported_ = lost;
+  stats.set_lossy(lossy_for_s_ > 0.0);
   *stats.mutable_decode() = percentiles(decode_);
   *stats.mutable_stages() = percentiles(stages_);
   for (std::size_t i = 0; i < info.stages.size(); ++i) {

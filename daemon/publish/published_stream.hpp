@@ -95,7 +95,8 @@ class PublishedStream {
   mutable system::PriorityMutex mutex_;
   Now now_;                   // under mutex_
   v1::StreamStats reported_;  // by the last report(); under mutex_
-  std::uint64_t frames_reported_ = 0;
+  std::uint64_t frames_reported_ = 0, lost_reported_ = 0;
+  double lossy_for_s_ = 0.0;  // how long it still counts as a stream that loses frames
   LatencyHistogram decode_, stages_, publish_;
   std::array<LatencyHistogram, kMaxStages> stage_;
   // The same since the start.

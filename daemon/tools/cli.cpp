@@ -18,6 +18,7 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/logging/log_output.hpp"
+#include "daemon/system/last_words.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/ranks.hpp"
 #include "models/motion/vrm_animation.hpp"
@@ -111,6 +112,9 @@ std::string unknown_word(CLI::App& app, std::span<char* const> arguments) {
       add_options(*command, options);
       continue;
     }
+    if (!is_option && word.ends_with(".toml") && command->get_option_no_throw("--config")) {
+      return fmt::format("a config needs its option: --config {}", word);
+    }
     std::set<std::string> commands;
     for (const CLI::App* one : command->get_subcommands(nullptr)) commands.insert(one->get_name());
     const std::string dashes = is_option ? "--" : "";  // which are no letters to be mistyped
@@ -153,6 +157,7 @@ void add_commands(CLI::App& app, int& exit_code) {
 }
 
 int main_of(int argc, char** argv) {
+  system::end_with_a_sentence();
   logging::protect_standard_descriptors();
   const logging::LogOutput log;
   CLI::App app{"posed: live poses in, another style out", "posed"};
@@ -162,6 +167,7 @@ int main_of(int argc, char** argv) {
 }
 
 int train_main_of(int argc, char** argv, const std::shared_ptr<Ranks>& ranks) {
+  system::end_with_a_sentence();
   logging::protect_standard_descriptors();
   const logging::LogOutput log;
   CLI::App app{"posed-mpi: posed train on the cores of many machines", "posed-mpi"};

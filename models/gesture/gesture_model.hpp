@@ -19,6 +19,9 @@ namespace posed::gesture {
 
 inline constexpr int kStates = 5;
 inline constexpr int kDeltaWindows = 3;  // static, delta, delta-delta
+// The longest that a state, and a gesture that is learnt, may last: a pose that is held for longer
+// is no gesture, and performing one would fill the memory.
+inline constexpr double kMaxState_s = 600.0;
 
 // A diagonal Gaussian over one group's features: [window][channel of the group].
 struct GroupGaussian {

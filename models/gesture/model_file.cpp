@@ -12,6 +12,7 @@
 #include "posed/v1/model.pb.h"
 #include "proto/frame/humanoid.hpp"
 #include "proto/frame/label.hpp"
+#include "proto/frame/plausible.hpp"
 #include "proto/model/model_file.hpp"
 #include "proto/model/validator.hpp"
 
@@ -142,11 +143,18 @@ void write_vocabulary(const Vocabulary& vocabulary, v1::GestureModel& out) {
   if (vocabulary.tells_none) out.set_tells_none(true);
 }
 
-using model_file::kMaxNumber;
-using model_file::Validator;
+constexpr int kMaxTreeDepth = 12;           // more questions make no larger tree than these do
+constexpr double kMaxTrainedFrames = 1e12;  // of training, all recordings together
+// A thousandth of what training leaves at least for noise; far less would leave the solvers without
+// digits.
+constexpr double kMinDeviation = 1e-6;  // rad, or frames
 
-constexpr int kMaxTreeDepth = 12;       // more questions make no larger tree than these do
-constexpr double kMinVariance = 1e-20;  // its inverse can still be summed without overflow
+// What the Gaussians of a tree may say, whose deviations are at most as large as their means.
+struct GaussianRange {
+  double low, high;
+};
+// The largest delta-delta of angles that are plausible themselves is four times as large as they.
+constexpr GaussianRange kAngles{-4.0 * kMaxAngle_rad, 4.0 * kMaxAngle_rad};
 
 // Copies the file's row, from `row` on, into a leaf's values.
 void read_row(const double* row, int dims, std::array<std::vector<double>, kDeltaWindows>& to) {
@@ -215,7 +223,8 @@ void read_nodes(const v1::GestureTree& from, int questions, Tree<Gaussian>& tree
 }
 
 template <typename Gaussian>
-Tree<Gaussian> read_tree(const v1::GestureTree& from, const TreeShape& shape, Validator& check) {
+Tree<Gaussian> read_tree(const v1::GestureTree& from, const TreeShape& shape,
+                         const GaussianRange& range, Validator& check) {
   Tree<Gaussian> tree;
   read_nodes(from, shape.questions, tree, check);
   if (!check.valid()) return {};
@@ -224,9 +233,10 @@ Tree<Gaussian> read_tree(const v1::GestureTree& from, const TreeShape& shape, Va
   check.want(from.mean_size() == leaves * dims && from.variance_size() == leaves * dims &&
                  from.occupancy_size() == leaves,
              "the number of a tree's means, variances or occupancies");
-  check.numbers(from.mean(), -kMaxNumber, kMaxNumber, "a mean");
-  check.numbers(from.variance(), kMinVariance, kMaxNumber, "a variance");
-  check.numbers(from.occupancy(), 0.0, kMaxNumber, "an occupancy");
+  check.numbers(from.mean(), range.low, range.high, "a mean");
+  check.numbers(from.variance(), kMinDeviation * kMinDeviation, range.high * range.high,
+                "a variance");
+  check.numbers(from.occupancy(), 0.0, kMaxTrainedFrames, "an occupancy");
   if (!check.valid()) return {};
   for (int i = 0; i < leaves; ++i) {
     read_row(from.mean().data() + i * dims, dims, tree.leaves[i].mean);
@@ -242,9 +252,10 @@ void read_range(const v1::GestureModel& from, GestureModel& model, Validator& ch
              "the range of the angles");
   if (!check.valid()) return;
   for (int c = 0; c < channels; ++c) {
-    model.low.push_back(check.number(from.low_rad(c), -1e3, 1e3, "the range of an angle"));
+    model.low.push_back(
+        check.number(from.low_rad(c), -kMaxAngle_rad, kMaxAngle_rad, "the range of an angle"));
     model.high.push_back(
-        check.number(from.high_rad(c), model.low.back(), 1e3, "the range of an angle"));
+        check.number(from.high_rad(c), model.low.back(), kMaxAngle_rad, "the range of an angle"));
   }
 }
 
@@ -258,10 +269,12 @@ GestureModel read_model(const v1::GestureModel& from, Validator& check) {
   if (!check.valid()) return model;
   for (int i = 0; i < kStates * groups; ++i) {
     const TreeShape shape = shape_of(model, i % groups);
-    model.trees[i / groups].push_back(read_tree<GroupGaussian>(from.tree(i), shape, check));
+    model.trees[i / groups].push_back(
+        read_tree<GroupGaussian>(from.tree(i), shape, kAngles, check));
   }
   const TreeShape shape = shape_of(model, Vocabulary::kDurations);
-  model.durations = read_tree<DurationGaussian>(from.duration(), shape, check);
+  const GaussianRange frames{0.0, kMaxState_s * model.rate_hz};
+  model.durations = read_tree<DurationGaussian>(from.duration(), shape, frames, check);
   read_range(from, model, check);
   model.report_json = from.report_json();
   return model;

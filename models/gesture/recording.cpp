@@ -12,7 +12,7 @@ using Eigen::Index;
 
 constexpr double kEven = 0.25;      // of a frame: largest deviation of times from an even grid
 constexpr double kMaxFrames = 1e7;  // 90 hours at 30 Hz
-constexpr double kMaxAngle_rad =
+constexpr double kMaxFinger_rad =
     20;  // three turns: no finger has such an angle, so the values are degrees
 
 auto row_of(const clip::HandClip& clip, std::size_t frame) {
@@ -32,7 +32,7 @@ Result<> check_values(const clip::HandClip& clip) {
       return fail(frame + " lacks a value; fill gaps with `posed smooth` before training",
                   clip.path);
     }
-    if (angles.cwiseAbs().maxCoeff() > kMaxAngle_rad) {
+    if (angles.cwiseAbs().maxCoeff() > kMaxFinger_rad) {
       return fail(frame + " has an angle beyond three turns; angles are in radians", clip.path);
     }
     if (t > 0 && !(clip.time_s[t] > clip.time_s[t - 1])) {
@@ -110,6 +110,12 @@ Result<> cut(Recording& recording, const std::vector<clip::LabelSegment>& labels
       return fail("the segment has " + std::to_string(segment.frames()) + " frames at " +
                       std::to_string(recording.rate_hz) + " Hz; a gesture needs at least " +
                       std::to_string(kStates),
+                  file, label.line);
+    }
+    if (segment.frames() > kMaxState_s * recording.rate_hz) {
+      return fail("the segment lasts " + std::to_string(segment.frames() / recording.rate_hz) +
+                      " s; a gesture lasts at most " + std::to_string(std::lround(kMaxState_s)) +
+                      " s: mark a part of it",
                   file, label.line);
     }
     recording.segments.push_back(std::move(segment));

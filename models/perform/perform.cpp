@@ -5,10 +5,12 @@
 #include <cmath>
 #include <set>
 #include <sstream>
+#include <utility>
 
 #include "models/perform/label_sequence.hpp"
 #include "models/trajectory/fixed_lag.hpp"
 #include "models/trajectory/sliding_window.hpp"
+#include "proto/frame/plausible.hpp"
 
 namespace posed::perform {
 namespace {
@@ -51,23 +53,29 @@ void restore_variance(const gesture::GestureModel& model, Performance& performan
   }
 }
 
-std::vector<PerformedState> plan(const trajectory::StateInformation& information,
-                                 std::span<const int> labels, double tempo) {
+Result<std::vector<PerformedState>> plan(const trajectory::StateInformation& information,
+                                         std::span<const int> labels, double tempo) {
+  const auto most = static_cast<int>(kMaxPerformedAngles /
+                                     static_cast<std::size_t>(information.model().channels()));
   LabelSequence script(static_cast<int>(labels.size()));
   for (const int label : labels) static_cast<void>(script.append(label));
   std::vector<PerformedState> states;
   int start = 0;
   for (Cursor cursor = enter(script, information, script.first(), tempo); cursor.frames_left > 0;
        step(cursor, script, information, tempo)) {
-    if (cursor.frames_left == cursor.frames) {
-      PerformedState& entered = states.emplace_back(
-          PerformedState{script.context(cursor.position), cursor.state, start, cursor.frames, {}});
-      for (int g = 0; g < std::ssize(information.model().groups); ++g) {
-        entered.leaf.push_back(
-            gesture::leaf_index(information.model(), cursor.state, g, entered.context));
-      }
+    if (cursor.frames > most - start) {
+      return fail("the " + std::to_string(labels.size()) + " labels last more than " +
+                  std::to_string(std::lround(most / information.rate_hz())) +
+                  " s, the most that is performed at once; name fewer labels, or a higher tempo");
     }
-    ++start;
+    PerformedState& entered = states.emplace_back(
+        PerformedState{script.context(cursor.position), cursor.state, start, cursor.frames, {}});
+    for (int g = 0; g < std::ssize(information.model().groups); ++g) {
+      entered.leaf.push_back(
+          gesture::leaf_index(information.model(), cursor.state, g, entered.context));
+    }
+    start += cursor.frames;
+    cursor.frames_left = 1;  // so that the next step is into the next state
   }
   return states;
 }
@@ -136,10 +144,11 @@ Result<std::vector<int>> labels_of(const gesture::GestureModel& model, std::stri
   return labels;
 }
 
-Performance perform(const trajectory::StateInformation& information, std::span<const int> labels,
-                    const PerformOptions& options) {
+Result<Performance> perform(const trajectory::StateInformation& information,
+                            std::span<const int> labels, const PerformOptions& options) {
   assert(!labels.empty());
-  Performance performance{information.rate_hz(), plan(information, labels, options.tempo), {}, {}};
+  auto states = TRY(plan(information, labels, options.tempo));
+  Performance performance{information.rate_hz(), std::move(states), {}, {}};
   const int channels = information.model().channels();
   trajectory::InformationForm rows(channels, static_cast<int>(performance.states.size()));
   std::vector<const double*> frames;
@@ -156,6 +165,12 @@ Performance perform(const trajectory::StateInformation& information, std::span<c
     solve_all(frames, channels, performance);
   }
   if (options.global_variance) restore_variance(information.model(), performance);
+  const auto plausible = [](double angle_rad) { return std::abs(angle_rad) <= kMaxAngle_rad; };
+  for (const Pose& pose : performance.angles) {
+    if (!std::ranges::all_of(pose, plausible)) {
+      return fail("the model performs angles that nobody has; train it again");
+    }
+  }
   return performance;
 }
 

@@ -45,9 +45,15 @@ struct Performance {
 // words that are not labels of the model; the error lists the labels.
 Result<std::vector<int>> labels_of(const gesture::GestureModel& model, std::string_view text);
 
-// Performs `labels`, at least one, at the model's rate.
-[[nodiscard]] Performance perform(const trajectory::StateInformation& information,
-                                  std::span<const int> labels, const PerformOptions& options);
+// The most frames times channels of a performance, which takes about 100 bytes for each: more than
+// an hour of a hand, a quarter of an hour of a body at 120 Hz.
+inline constexpr std::size_t kMaxPerformedAngles = 8'000'000;
+
+// Performs `labels`, at least one, at the model's rate. Returns an error, before memory is spent,
+// if that would take more than kMaxPerformedAngles, and for a model whose numbers give no plausible
+// angles.
+Result<Performance> perform(const trajectory::StateInformation& information,
+                            std::span<const int> labels, const PerformOptions& options);
 
 // A performance as a recording of it would be, with a segment for each label.
 [[nodiscard]] gesture::Recording recording_of(const gesture::GestureModel& model,

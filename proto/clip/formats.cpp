@@ -78,7 +78,7 @@ std::filesystem::path beside(const Format& format, const std::filesystem::path& 
 Result<> load_skeleton(const Format& format, const std::filesystem::path& path,
                        const ReadOptions& options, ClipFile& file) {
   const auto skeleton = options.skeleton.empty() ? beside(format, path) : options.skeleton;
-  if (options.skeleton.empty() && !std::filesystem::exists(skeleton)) {
+  if (options.skeleton.empty() && !expect_there(skeleton)) {
     return fail(
         "needs its skeleton: " + skeleton.string() + " is not there; name it with --skeleton",
         file.name);
@@ -182,9 +182,7 @@ Result<LoadedClip> load_clip(const std::filesystem::path& path, const ReadOption
   LoadedClip loaded{.format = format_of(path), .file = {.name = path.string(), .bytes = {}}};
   if (loaded.format == nullptr) loaded.format = format_of_bytes(first_bytes(path));
   if (loaded.format == nullptr || loaded.format->read == nullptr) {
-    if (!std::filesystem::exists(path)) {
-      return fail("is not there; check the path", loaded.file.name);
-    }
+    TRY(expect_there(path));
     return fail("is no clip posed can read; a clip is " + listed(Use::kRead), loaded.file.name);
   }
   TRY(check_options(*loaded.format, options, loaded.file.name));

@@ -5,9 +5,11 @@
 #include <fstream>
 #include <system_error>
 
+#include <google/protobuf/descriptor.h>
 #include <zlib.h>
 
 #include "proto/frame/whole_file.hpp"
+#include "proto/message/wire_reader.hpp"
 #include "proto/text/load_file.hpp"
 
 namespace posed::model_file {
@@ -16,6 +18,10 @@ namespace {
 constexpr std::string_view kMagic = "POSEDMDL";
 constexpr std::uint32_t kVersion = 1;
 constexpr std::size_t kHeaderBytes = 24;
+
+// Of a file, all its messages together; packed numbers are one field. The largest models have about
+// 5,000: four for each of 1,000 labels, eight for each of 81 trees, the joints.
+constexpr std::size_t kMaxFields = 20'000;
 
 template <typename T>
 void put(std::string& out, T value) {
@@ -36,6 +42,21 @@ T get(std::span<const std::byte> bytes) {
 std::uint32_t crc_of(const void* data, std::size_t size) {
   return static_cast<std::uint32_t>(
       crc32_z(crc32_z(0, nullptr, 0), static_cast<const Bytef*>(data), size));
+}
+
+// Adds the fields of a message, and of those inside it, to `fields`, and stops above kMaxFields;
+// false where the bytes are no message. protobuf makes an object of 16 to 200 bytes of a field that
+// takes two in the file, so they are counted before it sees them.
+bool count_fields(std::span<const std::byte> bytes, const google::protobuf::Descriptor& type,
+                  std::size_t& fields) {
+  message::WireReader reader(bytes);
+  for (message::WireField field; fields <= kMaxFields && reader.next(field); ++fields) {
+    const auto* const known = type.FindFieldByNumber(static_cast<int>(field.number));
+    const bool is_message = known != nullptr && known->message_type() != nullptr &&
+                            field.type == message::WireType::kBytes;
+    if (is_message && !count_fields(field.bytes, *known->message_type(), fields)) return false;
+  }
+  return reader.ok();
 }
 
 }  // namespace
@@ -61,8 +82,15 @@ Result<v1::ModelFile> open(std::span<const std::byte> bytes, const std::string& 
   if (get<std::uint32_t>(bytes.subspan(20)) != crc_of(payload.data(), payload.size())) {
     return fail("the model's checksum does not fit its bytes; copy it again", name);
   }
+  std::size_t fields = 0;
+  const bool is_message = count_fields(payload, *v1::ModelFile::descriptor(), fields);
+  if (fields > kMaxFields) {
+    return fail("the model has more than " + std::to_string(kMaxFields) +
+                    " fields, which no model of `posed train` has; train it again",
+                name);
+  }
   v1::ModelFile file;
-  if (payload.size() > INT32_MAX ||
+  if (!is_message || payload.size() > INT32_MAX ||
       !file.ParseFromArray(payload.data(), static_cast<int>(payload.size()))) {
     return fail("the model's payload cannot be read; train it again", name);
   }

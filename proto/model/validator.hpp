@@ -8,9 +8,6 @@
 
 namespace posed::model_file {
 
-// Small enough that products stay within the hot path's floats.
-inline constexpr double kMaxNumber = 1e30;
-
 class Validator {
  public:
   void want(bool condition, const char* what) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <system_error>
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -28,6 +29,13 @@ class Descriptor {
 };
 
 }  // namespace
+
+Result<> expect_there(const std::filesystem::path& path) {
+  std::error_code why;
+  if (std::filesystem::exists(path, why)) return {};
+  if (!why) return fail("is not there; check the path", path.string());
+  return fail("cannot be reached (" + why.message() + "); check the path", path.string());
+}
 
 Result<std::string> load_file(const std::filesystem::path& path, const FileRule& rule) {
   const std::string what(rule.what);

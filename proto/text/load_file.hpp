@@ -27,6 +27,9 @@ struct FileRule {
   return std::to_string(bytes) + " bytes";
 }
 
+// An Error if nothing of that name is there, or if it cannot be reached, which says why.
+Result<> expect_there(const std::filesystem::path& path);
+
 // Returns all bytes of the file. An Error names the path and the reason.
 Result<std::string> load_file(const std::filesystem::path& path, const FileRule& rule);
 

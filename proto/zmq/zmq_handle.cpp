@@ -2,7 +2,12 @@
 
 #include <array>
 #include <cerrno>
+#include <future>
+#include <string>
+#include <system_error>
+#include <thread>
 #include <utility>
+#include <vector>
 
 namespace posed::net {
 namespace {
@@ -15,9 +20,26 @@ std::string no_such_port(const std::string& endpoint) {
   return "'" + endpoint + "' names a port that does not exist: give one from 1 to 65535";
 }
 
+// libzmq ends the process where it may not begin a thread, with a line about its source code. So as
+// many are tried first, and some of posed's own, all at once.
+Result<> try_threads() {
+  constexpr int kThreads = 4;
+  std::vector<std::jthread> threads;
+  std::promise<void> end;  // breaks, which ends the wait, before the threads are joined
+  const auto ended = end.get_future().share();
+  try {
+    for (int i = 0; i < kThreads; ++i) threads.emplace_back([ended] { ended.wait(); });
+  } catch (const std::system_error& error) {
+    return fail("no more threads may begin (" + std::string(error.what()) +
+                "): allow more processes (ulimit -u) or memory (ulimit -v)");
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<Context> open_context() {
+  TRY(try_threads());
   Context context(zmq_ctx_new());
   if (!context) return fail("ZeroMQ does not start: " + last_error());
   return context;

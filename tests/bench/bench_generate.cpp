@@ -68,7 +68,7 @@ Result<json> bench_strings(const trajectory::StateInformation& information, int 
       labels.push_back(alphabet[static_cast<std::size_t>(code % letters)]);
       code /= letters;
     }
-    auto performance = perform::perform(information, labels, {});
+    auto performance = TRY(perform::perform(information, labels, {}));
     const auto kept = perform::constrain(performance, default_hand_shape());
     smallest_m = std::min(smallest_m, kept.min_gap_m);
     before_m = std::min(before_m, kept.before_m);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -114,6 +115,19 @@ TEST_CASE("a clip is natural or not, and the exit code says which", "[eval_natur
   CHECK(printed["figures"]["jerk"]["natural"] == false);
   CHECK(printed["figures"]["jerk"]["below"] == 1.0);
   CHECK(printed["left_out"].empty());
+}
+
+TEST_CASE("the verdict of eval natural is a page, too", "[eval_natural]") {
+  const Corpus marchers(4);
+  marchers.walk("another.bvh", {WalkerFamily::kMarch, 40});
+  const std::string page = marchers.path("natural.html");
+  const auto judged = marchers.judge("another.bvh", {"--report", page});
+  INFO(judged.err);
+  std::ifstream file(page);
+  const std::string html{std::istreambuf_iterator<char>(file), {}};
+  CHECK(has(html, "natural"));
+  CHECK(has(html, "slide_cm_s"));
+  CHECK(marchers.judge("another.bvh", {"--report", page}).code == 2);  // it is there already
 }
 
 TEST_CASE("what cannot be compared with is left out and told", "[eval_natural]") {

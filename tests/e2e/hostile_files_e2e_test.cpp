@@ -11,6 +11,7 @@
 #include "proto/log/checksum.hpp"
 #include "tests/e2e/served.hpp"
 #include "tests/support/emulated_glove.hpp"
+#include "tests/support/permission.hpp"
 #include "tests/support/toml_bombs.hpp"
 
 namespace posed::test {
@@ -153,6 +154,28 @@ TEST_CASE("a log with escape sequences in its driver's name is refused without p
     CHECK(outcome.err.size() < 2000);
     CHECK((outcome.err + outcome.out).find('\x1b') == std::string::npos);
   }
+}
+
+TEST_CASE("a path that cannot be used is one error message") {
+  const Served served;
+  const std::string circle = served.path("circle.bvh");
+  std::filesystem::create_symlink(circle, circle);
+  const std::string endless(300, 'a');
+  const auto refused = [&](const std::string& path) {
+    check_refused({"convert", path, "--out", served.path("out.bvh")}, "cannot be reached");
+    check_refused({"emulate", path}, "cannot be reached");
+  };
+  refused(circle);
+  refused(served.path(endless + ".bvh"));
+  {
+    const AsNobody nobody;  // may not enter the folder
+    refused(served.path("walk.bvh"));
+  }
+  served.folder.write("posed.toml",
+                      stream_with("driver = \"file\"\n[stream.file]\npath = \"walk.bvh\"\n"
+                                  "[stream.retarget]\nto = \"" +
+                                  endless + "\"\n"));
+  check_refused({"check", "--config", served.path("posed.toml")}, endless);
 }
 
 TEST_CASE("check reports that a glove is not connected, and that the daemon would wait for it") {

@@ -275,6 +275,7 @@ TEST_CASE("each command explains its own options, and refuses those without an e
   CHECK(missing.code == 1);
   CHECK(has(missing.err, "nope: is not there"));
   CHECK(has(posed({"emulate", "nope.plog"}).err, "nope.plog: is not there"));
+  CHECK(mistyped({"run", "my.toml"}, "--config my.toml"));
   CHECK(mistyped({"monito"}, "'monito' ... monitor"));
   CHECK(mistyped({"ctl", "--connect", kNobody, "sett"}, "the nearest is set"));
   CHECK(mistyped({"train", "style", "--form", "a.bvh"}, "'--form' ... --from"));

@@ -82,7 +82,7 @@ inline perform::Performance perform_text(const gesture::GestureModel& model,
                                          const std::string& text) {
   const trajectory::StateInformation information(
       std::make_shared<const gesture::GestureModel>(model), model.rate_hz);
-  return perform::perform(information, perform::labels_of(model, text).value(), {});
+  return perform::perform(information, perform::labels_of(model, text).value(), {}).value();
 }
 
 // Frames [from, to) in which the performance's `index`-th label is held, as label_poses() has them

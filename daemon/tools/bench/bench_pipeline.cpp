@@ -42,10 +42,11 @@ using TimesByThread = std::map<std::string, system::ThreadTime>;
 TimesByThread thread_times() {
   TimesByThread times;
   std::error_code ignored;  // a thread may end meanwhile
-  for (const auto& task : std::filesystem::directory_iterator("/proc/self/task", ignored)) {
+  for (std::filesystem::directory_iterator task("/proc/self/task", ignored), end;
+       !ignored && task != end; task.increment(ignored)) {
     std::string name;
-    const auto time = system::time_of_thread(std::stoi(task.path().filename()));
-    if (time && std::getline(std::ifstream(task.path() / "comm"), name)) times[name] += *time;
+    const auto time = system::time_of_thread(std::stoi(task->path().filename()));
+    if (time && std::getline(std::ifstream(task->path() / "comm"), name)) times[name] += *time;
   }
   return times;
 }

@@ -324,13 +324,14 @@ Result<> stream(const DemoOptions& options, const std::filesystem::path& folder)
 
 // The folder for clips and models, in which the config looks for them.
 Result<std::filesystem::path> folder_of(const DemoOptions& options) {
-  if (!options.folder.empty()) return std::filesystem::absolute(options.folder);
+  std::error_code ignored;  // the folder in which the daemon runs may be gone
+  if (!options.folder.empty()) return std::filesystem::absolute(options.folder, ignored);
   if (options.config.empty()) return demo_cache_folder();
   const auto config = TRY(config::load_config(options.config, drivers::registry()));
   for (const config::StreamConfig& stream : config.streams) {
     for (const config::StageConfig& stage : stream.stages) {
       if (stage.model.filename() != kDemoModel) continue;
-      return std::filesystem::absolute(stage.model).lexically_normal().parent_path();
+      return std::filesystem::absolute(stage.model, ignored).lexically_normal().parent_path();
     }
   }
   return misuse("no stream has the demo's model, " + std::string(kDemoModel) +

@@ -23,6 +23,7 @@
 #include "daemon/tools/emulate/motions.hpp"
 #include "models/gesture/synthetic_signer.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/load_file.hpp"
 
 namespace posed::tools {
 namespace {
@@ -76,7 +77,7 @@ Result<std::unique_ptr<drivers::Emulator>> make_emulator(const std::string& name
     for (const drivers::Driver& other : drivers::registry()) {
       if (other.emulate != nullptr) known += (known.empty() ? "" : ", ") + std::string(other.name);
     }
-    if (name.ends_with(".plog")) return fail("is not there; check the path", name);
+    if (name.ends_with(".plog") || name.find('/') != std::string::npos) TRY(expect_there(name));
     return misuse("'" + name +
                   "' is neither a log nor a device that can be emulated; there is: " + known);
   }
@@ -85,7 +86,8 @@ Result<std::unique_ptr<drivers::Emulator>> make_emulator(const std::string& name
 }
 
 Result<Emulated> open_emulator(const EmulateOptions& options) {
-  if (!std::filesystem::is_regular_file(options.what)) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(options.what, ignored)) {
     if (!options.stream.empty()) {
       return misuse("--stream chooses from a log's streams; '" + options.what + "' is not a log");
     }

@@ -219,7 +219,7 @@ Result<Holds> hold_errors(const trajectory::StateInformation& information,
   for (const gesture::Segment& segment : known.segments) {
     labels.push_back(model.label_index(segment.label));
   }
-  auto performance = perform::perform(information, labels, {});
+  auto performance = TRY(perform::perform(information, labels, {}));
   if (model.is_hand()) perform::constrain(performance, default_hand_shape());
   const auto performed = gesture::label_poses({perform::recording_of(model, performance)});
   const auto wanted = gesture::label_poses({known});  // the same names in the same order
@@ -482,11 +482,12 @@ Result<Findings> evaluate_gesture(const EvalGestureOptions& options) {
   const auto labels = TRY(perform::labels_of(*model, evaluation.labels));
   const auto compared = TRY(compared_with(options, *model));
   const trajectory::StateInformation information(model, model->rate_hz);
-  auto performance = perform::perform(information, labels, {});
+  auto performance = TRY(perform::perform(information, labels, {}));
   TRY(measure_space(options, *model, performance, evaluation));
   const gesture::Recording performed = perform::recording_of(*model, performance);
   evaluation.performed = smoothness(*model, performed);
-  evaluation.curve = lag_curve(information, labels);
+  auto curve = TRY(lag_curve(information, labels));
+  evaluation.curve = std::move(curve);
   TRY(compare(information, performed, compared, evaluation));
   Findings findings = findings_of(evaluation, *model);
   if (!options.svg.empty()) {

@@ -98,8 +98,9 @@ class GestureFigures {
  public:
   // `labels`: what is performed, indices into the model's; at least one. `body`: who performs a
   // model of bodies; empty for one of hands.
-  GestureFigures(std::shared_ptr<const gesture::GestureModel> model, std::vector<int> labels,
-                 std::optional<perform::BodyFigure> body);
+  static Result<GestureFigures> make(const std::shared_ptr<const gesture::GestureModel>& model,
+                                     std::vector<int> labels,
+                                     std::optional<perform::BodyFigure> body);
 
   // The performance as a strip, two poses a label.
   [[nodiscard]] report::Figure strip() const;
@@ -107,7 +108,8 @@ class GestureFigures {
   [[nodiscard]] report::Figure trajectories() const;
   // The same labels as the beginning of a recording, over what was recorded; empty for a recording
   // without labels of the model.
-  [[nodiscard]] std::optional<report::Figure> over(const gesture::Recording& recording) const;
+  [[nodiscard]] Result<std::optional<report::Figure>> over(
+      const gesture::Recording& recording) const;
   // Each label of the model that was not recorded, in its hold, beside the nearest of these poses
   // [frame][channel], rad; empty where all were recorded.
   [[nodiscard]] std::optional<report::Figure> unseen(const gesture::FeatureMatrix& poses,
@@ -116,15 +118,17 @@ class GestureFigures {
   // One tree to begin with, then all of them, folded away.
   [[nodiscard]] std::vector<report::Figure> trees() const;
   // What it costs to know the labels late; computes the curve if it is empty.
-  [[nodiscard]] report::Figure lag(const std::vector<report::LagError>& curve) const {
-    return report::lag_error(curve.empty() ? lag_curve(information_, labels_) : curve,
-                             model_->rate_hz);
+  [[nodiscard]] Result<report::Figure> lag(std::vector<report::LagError> curve) const {
+    if (curve.empty()) curve = TRY(lag_curve(information_, labels_));
+    return report::lag_error(curve, model_->rate_hz);
   }
 
   [[nodiscard]] std::string label_text() const;  // "g 1 c"
 
  private:
-  [[nodiscard]] perform::Performance perform(std::span<const int> labels) const;
+  GestureFigures(std::shared_ptr<const gesture::GestureModel> model, std::vector<int> labels,
+                 trajectory::StateInformation information, perform::Performance performance,
+                 std::optional<perform::BodyFigure> body);
   [[nodiscard]] picture::Figure pose(const perform::Pose& angles_rad) const;
   [[nodiscard]] report::Figure strip_of(const std::string& title, const std::string& sentence,
                                         const std::vector<picture::StripRow>& rows) const;
@@ -137,16 +141,37 @@ class GestureFigures {
   std::shared_ptr<const gesture::GestureModel> model_;
   std::vector<int> labels_;
   trajectory::StateInformation information_;
+  perform::Performance performance_;  // of labels_
   std::optional<perform::BodyFigure> body_;
   std::shared_ptr<const Skeleton> skeleton_;
   picture::FigureShape shape_;
 };
 
+// As `posed synth` performs it.
+Result<perform::Performance> performance_of(const trajectory::StateInformation& information,
+                                            std::span<const int> labels) {
+  auto performance = TRY(perform::perform(information, labels, {}));
+  if (information.model().is_hand()) perform::constrain(performance, default_hand_shape());
+  return performance;
+}
+
+Result<GestureFigures> GestureFigures::make(
+    const std::shared_ptr<const gesture::GestureModel>& model, std::vector<int> labels,
+    std::optional<perform::BodyFigure> body) {
+  trajectory::StateInformation information(model, model->rate_hz);
+  auto performance = TRY(performance_of(information, labels));
+  return GestureFigures(model, std::move(labels), std::move(information), std::move(performance),
+                        std::move(body));
+}
+
 GestureFigures::GestureFigures(std::shared_ptr<const gesture::GestureModel> model,
-                               std::vector<int> labels, std::optional<perform::BodyFigure> body)
+                               std::vector<int> labels, trajectory::StateInformation information,
+                               perform::Performance performance,
+                               std::optional<perform::BodyFigure> body)
     : model_(std::move(model)),
       labels_(std::move(labels)),
-      information_(model_, model_->rate_hz),
+      information_(std::move(information)),
+      performance_(std::move(performance)),
       body_(std::move(body)),
       skeleton_(body_ ? body_->skeleton()
                       : std::make_shared<const Skeleton>(hand_skeleton(Side::kRight))),
@@ -158,12 +183,6 @@ std::string GestureFigures::label_text() const {
   std::string text;
   for (const int label : labels_) text += (text.empty() ? "" : " ") + name(label);
   return text;
-}
-
-perform::Performance GestureFigures::perform(std::span<const int> labels) const {
-  auto performance = perform::perform(information_, labels, {});
-  if (model_->is_hand()) perform::constrain(performance, default_hand_shape());
-  return performance;
 }
 
 picture::Figure GestureFigures::pose(const perform::Pose& angles_rad) const {
@@ -196,15 +215,14 @@ report::Figure GestureFigures::trajectories_of(const std::string& title,
 }
 
 report::Figure GestureFigures::strip() const {
-  const auto performance = perform(labels_);
   picture::StripRow row;
   for (std::size_t k = 0; k < labels_.size(); ++k) {
     const std::string& label = name(labels_[k]);
-    const int moving = range_of(performance, k, 0, kHoldStart).middle();
-    const int held = range_of(performance, k, kHoldStart, kHoldEnd).middle();
+    const int moving = range_of(performance_, k, 0, kHoldStart).middle();
+    const int held = range_of(performance_, k, kHoldStart, kHoldEnd).middle();
     for (const auto& [frame, words] : {std::pair(moving, "to " + label), std::pair(held, label)}) {
       row.poses.push_back(
-          {.figure = pose(performance.angles[static_cast<std::size_t>(frame)]), .caption = words});
+          {.figure = pose(performance_.angles[static_cast<std::size_t>(frame)]), .caption = words});
     }
   }
   const char* const part = model_->is_hand() ? "finger" : "group";
@@ -216,7 +234,7 @@ report::Figure GestureFigures::strip() const {
       "\"" + label_text() + "\" as the model performs it",
       fmt::format("From left to right, two poses a gesture, on the way to it and held, {:.1f} s in "
                   "all; {}.{}",
-                  static_cast<double>(performance.angles.size()) / performance.rate_hz,
+                  static_cast<double>(performance_.angles.size()) / performance_.rate_hz,
                   shape_.legend(),
                   never.empty()
                       ? ""
@@ -225,17 +243,16 @@ report::Figure GestureFigures::strip() const {
 }
 
 report::Figure GestureFigures::trajectories() const {
-  const auto performance = perform(labels_);
   const auto channels = shown_channels(*model_);
   auto angles = no_angles(*model_, channels);
-  for (int t = 0; t < std::ssize(performance.angles); ++t) {
-    add_frame(performance, t, t / performance.rate_hz, channels, angles);
+  for (int t = 0; t < std::ssize(performance_.angles); ++t) {
+    add_frame(performance_, t, t / performance_.rate_hz, channels, angles);
   }
   std::vector<report::LabelSpan> spans;
   for (std::size_t k = 0; k < labels_.size(); ++k) {
-    const FrameRange all = range_of(performance, k, 0, gesture::kStates);
+    const FrameRange all = range_of(performance_, k, 0, gesture::kStates);
     spans.push_back(
-        {name(labels_[k]), all.from / performance.rate_hz, all.to / performance.rate_hz});
+        {name(labels_[k]), all.from / performance_.rate_hz, all.to / performance_.rate_hz});
   }
   return trajectories_of(
       "The performed angles, with what the model leaves open",
@@ -244,7 +261,8 @@ report::Figure GestureFigures::trajectories() const {
       angles, spans);
 }
 
-std::optional<report::Figure> GestureFigures::over(const gesture::Recording& recording) const {
+Result<std::optional<report::Figure>> GestureFigures::over(
+    const gesture::Recording& recording) const {
   std::vector<gesture::Segment> segments;
   std::vector<int> labels;
   for (const gesture::Segment& segment : recording.segments) {
@@ -254,7 +272,7 @@ std::optional<report::Figure> GestureFigures::over(const gesture::Recording& rec
     labels.push_back(label);
   }
   if (labels.empty()) return std::nullopt;
-  const auto performance = perform(labels);
+  const auto performance = TRY(performance_of(information_, labels));
   const auto channels = shown_channels(*model_);
   auto angles = no_angles(*model_, channels);
   const double period_s = 1.0 / recording.rate_hz;
@@ -286,11 +304,10 @@ std::optional<report::Figure> GestureFigures::unseen(const gesture::FeatureMatri
                                                      const std::string& from) const {
   picture::StripRow performed{.title = "performed", .poses = {}};
   picture::StripRow nearest{.title = "nearest pose of " + from, .poses = {}};
-  const auto performance = perform(labels_);
   for (std::size_t k = 0; k < labels_.size(); ++k) {
     if (model_->labels[labels_[k]].trained) continue;
-    const int held = range_of(performance, k, kHoldStart, kHoldEnd).middle();
-    const perform::Pose& wanted = performance.angles[held];
+    const int held = range_of(performance_, k, kHoldStart, kHoldEnd).middle();
+    const perform::Pose& wanted = performance_.angles[held];
     const Eigen::Map<const Eigen::RowVectorXd> row(wanted.data(), poses.cols());
     Eigen::Index at = 0;
     (poses.rowwise() - row).rowwise().squaredNorm().minCoeff(&at);
@@ -436,37 +453,38 @@ std::optional<report::Figure> confusion_of(const gesture::GestureModel& model,
   return report::label_confusion(shares_of(counts, labels, measured_on));
 }
 
-void add_comparison(const GestureReport& report, const GestureFigures& figures,
-                    const gesture::GestureModel& model,
-                    const std::vector<gesture::Recording>& recordings, report::Page& page) {
-  if (recordings.empty()) return;
+Result<> add_comparison(const GestureReport& report, const GestureFigures& figures,
+                        const gesture::GestureModel& model,
+                        const std::vector<gesture::Recording>& recordings, report::Page& page) {
+  if (recordings.empty()) return {};
   page.section("Beside " + report.recorded_by);
-  if (const auto over = figures.over(recordings.front())) page.add(*over);
+  const auto over = TRY(figures.over(recordings.front()));
+  if (over) page.add(*over);
   if (const auto unseen = figures.unseen(all_poses(recordings), report.recorded_by)) {
     page.add(*unseen);
   }
   if (const auto confusion = confusion_of(model, report.body, recordings, report.recorded_by)) {
     page.add(*confusion);
   }
+  return {};
 }
 
 }  // namespace
 
-std::vector<report::LagError> lag_curve(const trajectory::StateInformation& information,
-                                        std::span<const int> labels) {
+Result<std::vector<report::LagError>> lag_curve(const trajectory::StateInformation& information,
+                                                std::span<const int> labels) {
   assert(!labels.empty());
-  const auto rows_of = [&](const perform::PerformOptions& options) {
-    return perform::recording_of(information.model(),
-                                 perform::perform(information, labels, options))
-        .angles_rad;
+  const auto rows_of = [&](const perform::PerformOptions& options) -> Result<motion::Rows> {
+    const auto performance = TRY(perform::perform(information, labels, options));
+    return perform::recording_of(information.model(), performance).angles_rad;
   };
-  const motion::Rows full = rows_of({});
+  const auto full = TRY(rows_of({}));
   const double jerk = motion::jerk_rms(full);
   std::vector<report::LagError> curve;
   for (const int frames : {0, 1, 2, 3, 4, 6, 8, 10, 12, 15, 20, 25, 30, 40}) {
     perform::PerformOptions options;
     options.look_ahead = frames;
-    const motion::Rows rows = rows_of(options);
+    const auto rows = TRY(rows_of(options));
     const motion::Rows off = rows - full;
     curve.push_back(
         {frames, kDegrees * std::sqrt(off.squaredNorm() / static_cast<double>(off.size())),
@@ -514,16 +532,17 @@ Result<> write_gesture_report(const GestureReport& report,
   if (!model->is_hand()) {
     body = TRY(perform::BodyFigure::of(*model, report.body));
   }
-  const GestureFigures drawn(model, report.labels, std::move(body));
+  const auto drawn = TRY(GestureFigures::make(model, report.labels, std::move(body)));
   report::Page page(report.title, report.command);
   page.verdict(report.verdict, report.good);
   page.warnings(report.warnings);
   page.section("What it performs");
   page.add(drawn.strip());
   page.add(drawn.trajectories());
-  add_comparison(report, drawn, *model, recordings, page);
+  TRY(add_comparison(report, drawn, *model, recordings, page));
   page.section("How it is made");
-  page.add(drawn.lag(report.curve));
+  const auto lag = TRY(drawn.lag(report.curve));
+  page.add(lag);
   page.add(drawn.durations());
   for (const report::Figure& tree : drawn.trees()) page.add(tree);
   add_numbers(findings, "Counts and measures, by their names.", page);

@@ -20,8 +20,8 @@
 namespace posed::tools {
 
 // The curve of these labels, at look-aheads from 0 frames on.
-[[nodiscard]] std::vector<report::LagError> lag_curve(
-    const trajectory::StateInformation& information, std::span<const int> labels);
+Result<std::vector<report::LagError>> lag_curve(const trajectory::StateInformation& information,
+                                                std::span<const int> labels);
 
 // Trees as questions and leaves, to be drawn.
 [[nodiscard]] std::vector<report::QuestionTree> question_trees(const gesture::GestureModel& model,

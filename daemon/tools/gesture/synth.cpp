@@ -148,7 +148,7 @@ Result<Findings> synth(const SynthOptions& options) {
   const double rate_hz = model.rate_hz;
   const trajectory::StateInformation information(
       std::make_shared<const gesture::GestureModel>(std::move(model)), rate_hz);
-  auto performance = perform::perform(information, labels, perform_as);
+  auto performance = TRY(perform::perform(information, labels, perform_as));
   const auto performed =
       TRY(information.model().is_hand() ? perform_hand(options, performance)
                                         : perform_body(options, information.model(), performance));

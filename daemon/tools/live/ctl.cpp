@@ -278,7 +278,8 @@ int haptics(const CtlOptions& options) {
     wanted.set_vibration_amplitude(options.vibration[2]);
   }
   return ask_and_print(options, request, [&](const v1::ControlReply&) {
-    std::printf("%s: sent to the device\n", options.stream.c_str());
+    std::printf("%s: sent to the glove, which does not answer; one without motors ignores it\n",
+                options.stream.c_str());
   });
 }
 

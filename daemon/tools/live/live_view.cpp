@@ -41,7 +41,7 @@ Health health_of(const v1::StreamStats& stream, bool silent) {
   if (stream.away()) return {"away", kYellow};
   if (stream.state() == "ended") return {"ended", kDim};
   if (stream.state() != "live") return {clean_name(stream.state()), kYellow};
-  return has_lost(stream) ? Health{"lossy", kRed} : Health{"live", kGreen};
+  return stream.lossy() ? Health{"lossy", kRed} : Health{"live", kGreen};
 }
 
 bool has_times(const v1::Percentiles& times) { return times.p99_us() > 0.0F; }
@@ -364,7 +364,9 @@ struct Detail {
 std::vector<Detail> details_of(const v1::StreamStats& stream, std::int64_t now_ns,
                                bool only_wrong) {
   const bool refused = !stream.refusal().empty();
-  std::vector<Detail> details{{kRed, lost_row(stream)}};
+  std::vector<Detail> details;
+  if (stream.lossy() || !only_wrong)
+    details.push_back({stream.lossy() ? kRed : "", lost_row(stream)});
   if (refused || !only_wrong) details.push_back({refused ? kRed : "", body_row(stream)});
   if (stream.away() || !only_wrong) {
     details.push_back({stream.away() ? kYellow : "", device_row(stream, now_ns)});
@@ -434,9 +436,9 @@ int rows_of_notes(const LiveViewOptions& options) {
 }  // namespace
 
 const char* const kColumnsHelp = R"(Columns, one row a stream; one that no stream needs is left out:
-  STATE    live, lossy (frames were dropped or skipped: the machine is too slow), waiting (nothing
-           came yet), stale (fell silent), away (device unplugged), ended, refused (a stage cannot
-           serve this body)
+  STATE    live, lossy (frames were dropped or skipped in the last ten seconds: the machine is too
+           slow), waiting (nothing came yet), stale (fell silent), away (device unplugged), ended,
+           refused (a stage cannot serve this body)
   HZ       frames published in the last second
   LATENCY  from arrival to handed out, lag included: half of the frames of the last second took at
            most this, and 99 % at most the column behind it

@@ -21,6 +21,7 @@
 #include "proto/clip/hand_clip.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/load_file.hpp"
 
 namespace posed::tools {
 namespace {
@@ -181,9 +182,7 @@ int run(Convert& convert) {
     if (is_log(convert.in)) return list_takes(convert.in, convert.json);
     return report(misuse("is not a device log (.plog), so it has no takes", convert.in).error());
   }
-  if (!std::filesystem::exists(convert.in)) {
-    return report(fail("is not there; check the path", convert.in).error());
-  }
+  if (auto there = expect_there(convert.in); !there) return report(there.error());
   if (convert.out.empty()) {
     return report(misuse("say what to write: --out OUT.bvh", convert.in).error());
   }
@@ -207,8 +206,9 @@ int run(Convert& convert) {
       .add("joints", clip->skeleton->joints.size())
       .add("metres_per_unit", clip->metres_per_unit)
       .add("warnings", clip->warnings)
-      .note(fmt::format("wrote {}: {} frames at {:g} Hz, {} joints", convert.out, clip->frames(),
-                        clip->frame_rate_hz, clip->skeleton->joints.size()))
+      .note(fmt::format("wrote {}: {} frame{} at {:g} Hz, {} joints", convert.out, clip->frames(),
+                        clip->frames() == 1 ? "" : "s", clip->frame_rate_hz,
+                        clip->skeleton->joints.size()))
       .show(convert.json, -1);
 }
 

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
@@ -13,6 +15,7 @@
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
 #include "daemon/tools/command/ranks.hpp"
+#include "daemon/tools/report/page.hpp"
 #include "daemon/tools/style/natural_clips.hpp"
 #include "models/natural/compare.hpp"
 #include "proto/clip/format.hpp"
@@ -24,6 +27,7 @@ constexpr const char* kEvalNaturalFooter = R"(Examples:
   posed eval natural styled.bvh --corpus walks
   posed eval natural hand.csv --corpus recordings --json
   posed eval natural take.bvh --corpus takes --hand right    # the fingers of bodies
+  posed eval natural styled.bvh --corpus walks --report natural.html
 
 Each figure of the clip stands beside the same figure of the corpus' clips: median, 5th and 95th
 percentile, and the share of them that is below. Each of these is measured against the others, the
@@ -41,6 +45,7 @@ of the joints' rotation vectors about the clip's mean pose; of hands, the 45 ang
 Clips without the joints of this one, and clips shorter than 49 frames, are left out and listed.)";
 
 struct EvalNaturalOptions : NaturalOptions {
+  ReportFile report;
   bool json = false;
 };
 
@@ -103,7 +108,39 @@ Findings findings_of(const EvalNaturalOptions& options, const NaturalClips& clip
   return findings.verdict(verdict, natural);
 }
 
+Result<> write_natural_report(const natural::Comparison& comparison, const NaturalClips& clips,
+                              const Findings& findings, const std::filesystem::path& path) {
+  report::Page page("Whether people move so", "posed eval natural");
+  const bool natural = std::ranges::all_of(comparison.figures, &natural::Placed::natural);
+  page.verdict(natural_verdict(comparison, clips.corpus.size()), natural);
+  report::Table table{
+      .columns =
+          {{"figure", false}, {"clip"}, {"p5"}, {"median"}, {"p95"}, {"below, %"}, {"", false}},
+      .rows = {}};
+  for (const natural::Placed& placed : comparison.figures) {
+    std::vector<std::string> row{placed.name};
+    for (const double value : {placed.value, placed.p5, placed.median, placed.p95}) {
+      row.push_back(report::number_text(value, 3));
+    }
+    row.push_back(report::number_text(100.0 * placed.below, 0));
+    row.emplace_back(placed.natural ? "" : "unnatural");
+    table.rows.push_back(std::move(row));
+  }
+  page.section("Beside the corpus");
+  page.add({.title = "Each figure of the clip and of the corpus' clips",
+            .sentence = "p5 and p95: one in twenty of the corpus' clips is below, one above. "
+                        "`posed eval natural --help` says what the figures are.",
+            .drawings = {},
+            .tables = {std::move(table)}});
+  add_json(findings, page);
+  return report::write_page(page, path);
+}
+
 Result<Findings> evaluate_natural(const EvalNaturalOptions& options) {
+  TRY(OutputFiles(options.report.overwrite)
+          .reads(options.clip)
+          .writes(options.report.path, {".html"})
+          .check());
   if (!options.skeleton.empty() && !clip::accepts(options.clip, clip::ReadOption::kSkeleton)) {
     return misuse("--skeleton is only for AMC clips; leave it out");
   }
@@ -119,7 +156,11 @@ Result<Findings> evaluate_natural(const EvalNaturalOptions& options) {
       });
   if (!comparison) return fail("stopped");
   bar.finish();
-  return findings_of(options, clips, *comparison);
+  Findings findings = findings_of(options, clips, *comparison);
+  if (options.report.wanted()) {
+    TRY(write_natural_report(*comparison, clips, findings, options.report.path));
+  }
+  return findings;
 }
 
 }  // namespace
@@ -138,6 +179,7 @@ void add_eval_natural(CLI::App& eval, int& exit_code) {
   command->add_option("--rate", options->rate_hz, "Frames per second at which to compare")
       ->check(in_range(10.0, 1000.0))
       ->capture_default_str();
+  add_report_file(*command, options->report);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {
     const auto made = evaluate_natural(*options);

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "proto/frame/plausible.hpp"
 #include "proto/model/model_file.hpp"
 #include "proto/model/validator.hpp"
 
@@ -15,37 +16,48 @@ namespace {
 
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
-using model_file::kMaxNumber;
-
 constexpr int kMaxInputs = 20'000;
+
+// The numbers of a process. Training gives weights below 1e9 and variances below 1; with these even
+// the sum of kMaxInputs terms, each a weight times a kernel's value, stays within the hot path's
+// floats (3e38).
+constexpr double kMaxWeight = 1e15;                                // rad
+constexpr double kMinLogVariance = -60.0, kMaxLogVariance = 30.0;  // of rad^2
+constexpr double kMaxVariance = 1e13;                              // rad^2, e^kMaxLogVariance
+
+// How fast a mean pose changes the style that it shows: two poses apart by the noise of a float are
+// the difference of two styles.
+constexpr double kMaxSlope = 1e9;  // 1/rad
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 class Reader : public model_file::Validator {
  public:
-  VectorXd vector(const google::protobuf::RepeatedField<double>& list, int size, const char* what) {
+  VectorXd vector(const google::protobuf::RepeatedField<double>& list, int size, double low,
+                  double high, const char* what) {
     want(list.size() == size, what);
     if (!valid()) return {};
-    VectorXd v = Eigen::Map<const VectorXd>(list.data(), size);
-    want(is_number(v), what);
-    return v;
+    numbers(list, low, high, what);
+    return Eigen::Map<const VectorXd>(list.data(), size);
   }
 
-  MatrixXd matrix(const v1::Matrix& m, int columns, const char* what) {
+  MatrixXd matrix(const v1::Matrix& m, int columns, double largest, const char* what) {
     const bool shaped = m.rows() >= 1 && m.rows() <= kMaxInputs &&
                         m.columns() == static_cast<std::uint32_t>(columns) &&
                         static_cast<std::int64_t>(m.rows()) * m.columns() == m.value_size();
     want(shaped, what);
     if (!valid()) return {};
-    MatrixXd out = Eigen::Map<const RowMajor>(m.value().data(), m.rows(), columns);
-    want(is_number(out), what);
-    return out;
+    numbers(m.value(), -largest, largest, what);
+    return Eigen::Map<const RowMajor>(m.value().data(), m.rows(), columns);
   }
 
- private:
-  template <typename M>
-  static bool is_number(const M& m) {
-    return (m.array().abs() <= kMaxNumber).all();  // false for NaN
+  // Angles of a pose, or differences of two.
+  VectorXd angles(const google::protobuf::RepeatedField<double>& list, int size, const char* what) {
+    return vector(list, size, -kMaxAngle_rad, kMaxAngle_rad, what);
+  }
+
+  VectorXd limits(const google::protobuf::RepeatedField<double>& list, int size) {
+    return vector(list, size, 0.0, kMaxAngle_rad, "the limits");
   }
 };
 
@@ -62,7 +74,7 @@ motion::PoseSpaceSpec read_space(const v1::PoseSpace& from, Reader& reader) {
   reader.want(from.root() < spec.joints.size(), "the root joint");
   spec.root = static_cast<int>(from.root());
   const auto means = spec.space == motion::Space::kCmu43 ? 0 : static_cast<int>(spec.joints.size());
-  const VectorXd mean = reader.vector(from.mean_xyzw(), 4 * means, "the mean rotations");
+  const VectorXd mean = reader.vector(from.mean_xyzw(), 4 * means, -2.0, 2.0, "the mean rotations");
   for (int j = 0; j < means && reader.valid(); ++j) {
     const Eigen::Quaterniond q(mean[4 * j + 3], mean[4 * j], mean[4 * j + 1], mean[4 * j + 2]);
     reader.want(std::abs(q.norm() - 1.0) < 1e-6, "a mean rotation, which is no unit quaternion");
@@ -75,31 +87,30 @@ motion::PoseSpaceSpec read_space(const v1::PoseSpace& from, Reader& reader) {
 
 gp::Trained read_process(const v1::GaussianProcess& from, int dims, Reader& reader) {
   gp::Trained process;
-  process.inputs = reader.matrix(from.inputs(), dims, "the inputs' shape or values");
-  process.weights = reader.matrix(from.weights(), dims, "the weights' shape or values");
+  process.inputs = reader.matrix(from.inputs(), dims, kMaxAngle_rad, "the inputs' shape or values");
+  process.weights = reader.matrix(from.weights(), dims, kMaxWeight, "the weights' shape or values");
   reader.want(process.inputs.rows() == process.weights.rows(), "the number of weights");
-  process.offset = reader.vector(from.offset(), dims, "the prior mean");
-  process.lambda = reader.number(from.lambda(), -60.0, 60.0, "lambda");
+  process.offset = reader.angles(from.offset(), dims, "the prior mean");
+  process.lambda = reader.number(from.lambda(), kMinLogVariance, kMaxLogVariance, "lambda");
   process.mu = reader.number(from.mu(), 1e-12, 1e12, "mu");
-  process.b = reader.number(from.b(), 0.0, kMaxNumber, "b");
-  process.noise = reader.number(from.noise(), 0.0, kMaxNumber, "the noise");
+  process.b = reader.number(from.b(), 0.0, kMaxVariance, "b");
+  process.noise = reader.number(from.noise(), 0.0, kMaxVariance, "the noise");
   return process;
 }
 
 MoreStyle read_style(const v1::StyleTarget& from, Eigen::Index points, int dims, Reader& reader) {
   MoreStyle style;
   style.name = from.name();
-  style.function.weights = reader.matrix(from.weights(), dims, "a style's weights");
+  style.function.weights = reader.matrix(from.weights(), dims, kMaxWeight, "a style's weights");
   reader.want(style.function.weights.rows() == points, "the number of a style's weights");
-  style.function.offset = reader.vector(from.offset(), dims, "a style's prior mean");
-  style.limit_rad = reader.vector(from.limit_rad(), dims, "a style's limits");
-  if (reader.valid()) reader.want((style.limit_rad.array() >= 0.0).all(), "a limit below zero");
+  style.function.offset = reader.angles(from.offset(), dims, "a style's prior mean");
+  style.limit_rad = reader.limits(from.limit_rad(), dims);
   return style;
 }
 
 GateData read_gate(const v1::StyleGate& from, int dims, Reader& reader) {
   GateData gate;
-  gate.neutral = reader.vector(from.neutral(), dims, "the neutral pose");
+  gate.neutral = reader.angles(from.neutral(), dims, "the neutral pose");
   if (from.swing_rad() == 0.0 && from.fastest_stride_s() == 0.0) return gate;
   gate.swing_rad = reader.number(from.swing_rad(), 1e-3, 10.0, "the legs' swing");
   gate.fastest_stride_s = reader.number(from.fastest_stride_s(), 0.05, 100.0, "the fastest stride");
@@ -112,8 +123,9 @@ GateData read_gate(const v1::StyleGate& from, int dims, Reader& reader) {
 
 StyleAxis read_axis(const v1::StyleAxis& from, int dims, Reader& reader) {
   StyleAxis axis;
-  axis.direction = reader.vector(from.direction(), dims, "the style's axis");
-  axis.offset = reader.number(from.offset(), -kMaxNumber, kMaxNumber, "the style's offset");
+  axis.direction = reader.vector(from.direction(), dims, -kMaxSlope, kMaxSlope, "the style's axis");
+  const double most = kMaxSlope * kMaxAngle_rad * dims;
+  axis.offset = reader.number(from.offset(), -most, most, "the style's offset");
   return axis;
 }
 
@@ -122,8 +134,7 @@ StyleModel read_model(const v1::StyleModel& from, Reader& reader) {
   model.space = read_space(from.space(), reader);
   const int dims = motion::space_dims(model.space);
   model.process = read_process(from.process(), dims, reader);
-  model.limit_rad = reader.vector(from.limit_rad(), dims, "the limits");
-  if (reader.valid()) reader.want((model.limit_rad.array() >= 0.0).all(), "a limit below zero");
+  model.limit_rad = reader.limits(from.limit_rad(), dims);
   model.to = from.to();
   for (const v1::StyleTarget& style : from.more()) {
     if (!reader.valid()) break;

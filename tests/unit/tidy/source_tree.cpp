@@ -6,6 +6,7 @@
 #include <iterator>
 #include <map>
 #include <regex>
+#include <set>
 #include <sstream>
 
 namespace posed::tidy {
@@ -238,6 +239,47 @@ std::vector<Finding> check_guarded_input(const SourceFile& file) {
       findings.push_back(
           {file.path, line, "reads a whole file without the bounds of proto/text/load_file.hpp"});
     }
+  }
+  return findings;
+}
+
+std::vector<Finding> check_throwing_paths(const SourceFile& file) {
+  static const std::regex asks(
+      R"(\b(?:std::filesystem|fs)::(?:\w*exists|is_\w+|file_size|\w*status|create_\w+|remove\w*|)"
+      R"(rename|\w*canonical|absolute|current_path|temp_directory_path|equivalent|copy\w*|)"
+      R"(last_write_time|read_symlink|relative|proximate|permissions|resize_file|space|)"
+      R"(hard_link_count|\w*directory_iterator(?:\s+\w+)?)\s*[({](?![)}]))");
+  static const std::regex ranges(R"(\bfor\s*\([^;]*[^:]:[^:][^;]*directory_iterator)");
+  static const std::regex declared(R"(\berror_code&?\s+(\w+))");
+  if (first_folder(file.path) == "tests") return {};
+  std::string text;
+  for (const std::string& line : file.code) text += line + '\n';
+  std::set<std::string> codes;
+  for (std::sregex_iterator at(text.begin(), text.end(), declared), end; at != end; ++at) {
+    codes.insert((*at)[1]);
+  }
+  std::vector<Finding> findings;
+  const auto find = [&](std::size_t at) {
+    const auto line =
+        std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(at), '\n');
+    findings.push_back({file.path, static_cast<int>(line) + 1,
+                        "throws where a path cannot be used; pass an std::error_code"});
+  };
+  for (std::sregex_iterator at(text.begin(), text.end(), ranges), end; at != end; ++at) {
+    find(at->position());
+  }
+  for (std::sregex_iterator at(text.begin(), text.end(), asks), end; at != end; ++at) {
+    const std::size_t first = at->position() + at->length();
+    std::size_t last = first;
+    for (int depth = 1; last < text.size(); ++last) {
+      depth += text[last] == '(' || text[last] == '{' ? 1 : 0;
+      depth -= text[last] == ')' || text[last] == '}' ? 1 : 0;
+      if (depth == 0) break;
+    }
+    const std::string arguments = text.substr(first, last - first);
+    static const std::regex last_word(R"((\w+)\s*$)");
+    std::smatch word;
+    if (!std::regex_search(arguments, word, last_word) || !codes.contains(word[1])) find(first);
   }
   return findings;
 }

@@ -60,6 +60,10 @@ struct Target {
 // TOML is parsed in proto/text/toml.cpp alone, which checks its depth first; outside of tests a
 // whole file is read by load_file alone, which bounds it.
 [[nodiscard]] std::vector<Finding> check_guarded_input(const SourceFile& file);
+// A file that may not be reached, or a name that is too long, is a sentence and no exception:
+// outside of tests, functions of std::filesystem that ask the system get an std::error_code as the
+// last argument, and directories are walked by increment().
+[[nodiscard]] std::vector<Finding> check_throwing_paths(const SourceFile& file);
 // Bodies of functions marked RT_SAFE (proto/frame/rt_safe.hpp), or called RT-safe in the comment
 // above, neither allocate, lock, log, throw nor call the system.
 // `bodies` counts the functions that were found, so that a test can verify that the check is

@@ -201,6 +201,27 @@ TEST_CASE("TOML and whole files are read through their guards", "[tidy]") {
   CHECK(findings_of(posed::tidy::check_guarded_input) == "");
 }
 
+TEST_CASE("no path that cannot be used throws an exception", "[tidy]") {
+  const auto bad = posed::tidy::source_from_text(
+      "daemon/a.cpp",
+      "if (std::filesystem::exists(path)) return;\n"
+      "std::error_code ignored;\n"
+      "if (std::filesystem::exists(path, ignored)) return;\n"
+      "fs::rename(from.string() + suffix,\n           name(to), ignored);\n"
+      "fs::rename(from, name(to));\n"
+      "for (const auto& file : fs::directory_iterator(folder, ignored)) use(file);\n"
+      "for (fs::directory_iterator at(folder, ignored), end; at != end; at.increment(ignored)) {}\n"
+      "std::filesystem::directory_iterator at{folder};\n"
+      "at != fs::directory_iterator();\n");
+  const std::string found = listed(posed::tidy::check_throwing_paths(bad));
+  CHECK(found.find("daemon/a.cpp:1:") != std::string::npos);
+  CHECK(found.find("daemon/a.cpp:6:") != std::string::npos);
+  CHECK(found.find("daemon/a.cpp:7:") != std::string::npos);
+  CHECK(found.find("daemon/a.cpp:9:") != std::string::npos);
+  CHECK(posed::tidy::check_throwing_paths(bad).size() == 4);
+  CHECK(findings_of(posed::tidy::check_throwing_paths) == "");
+}
+
 TEST_CASE("functions marked RT_SAFE neither allocate, lock, log, throw nor call the system",
           "[tidy]") {
   const auto bad = posed::tidy::source_from_text(

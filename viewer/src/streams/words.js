@@ -18,8 +18,8 @@ export function stateOf(stats) {
   if (stats.state === 'unknown') return state('unknown', 'off', 'there is no word of it any more');
   if (stats.state !== 'live') return state(stats.state, 'busy');
   const lost = stats.dropped + stats.shed + stats.kernel_dropped;
-  if (lost > 0) return state('live', 'good', `${lost} frames were lost so far: see below`);
-  return state('live', 'good');
+  if (stats.lossy) return state('lossy', 'bad', `${lost} frames were lost so far, the last just now`);
+  return state('live', 'good', lost > 0 ? `${lost} frames were lost so far, none of late` : '');
 }
 
 // How current a pose is, for people; empty when it is measured.

@@ -74,6 +74,7 @@ export const StreamStats = {
   32: ['kernel_dropped', 'uint'],
   34: ['style_estimate', 'float', '?'],
   35: ['style_gate', 'float', '?'],
+  36: ['lossy', 'bool'],
 };
 
 export const TakeStats = {

@@ -103,13 +103,17 @@ test('states in words, the worst first', () => {
     dropped: 0,
     shed: 0,
     kernel_dropped: 0,
+    lossy: false,
   };
   assert.equal(stateOf(live).word, 'live');
   assert.equal(stateOf({ ...live, away: true }).word, 'lost');
   assert.equal(stateOf({ ...live, away: true, connections: 0 }).word, 'away');
   assert.equal(stateOf({ ...live, state: 'stale' }).tone, 'busy');
   assert.equal(stateOf({ ...live, refusal: 'no hips', away: true }).sentence, 'no hips');
-  assert.match(stateOf({ ...live, shed: 3 }).sentence, /3 frames/);
+  assert.equal(stateOf({ ...live, shed: 3 }).tone, 'good');
+  assert.match(stateOf({ ...live, shed: 3 }).sentence, /3 frames .* none of late/);
+  assert.equal(stateOf({ ...live, shed: 3, lossy: true }).word, 'lossy');
+  assert.equal(stateOf({ ...live, shed: 3, lossy: true }).tone, 'bad');
 });
 
 test('jitter of even frames is 0, also when the page sees only some', () => {

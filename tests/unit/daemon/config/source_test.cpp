@@ -14,7 +14,7 @@ Result<std::unique_ptr<const drivers::SourceLayout>> no_layout(std::span<const s
 std::vector<drivers::Driver> mocap_drivers() {
   using drivers::OptionSpec;
   drivers::Driver mocap{.name = "mocap",
-                        .summary = "people",
+                        .summary = "people, as Motive sends them",
                         .options = {OptionSpec{"listen", std::string("here"), false, false, ""},
                                     OptionSpec{"rate_hz", 100.0, false, false, ""}},
                         .open = nullptr,
@@ -188,6 +188,8 @@ TEST_CASE("a source: its name, driver, rate and streams are checked") {
                                         "\"\nbody = \"B\"\n"))
             .errors.empty());
   CHECK(source_complaint(driven("moca")) ==
+        "3: there is no driver of this name; the nearest is 'mocap' (`posed devices` lists them)");
+  CHECK(source_complaint(driven("motive")) ==
         "3: there is no driver of this name; the nearest is 'mocap' (`posed devices` lists them)");
   CHECK(source_complaint(driven("glove") + "port = \"x\"\n[source.glove]\n") ==
         "3: glove has one body; name it in a [[stream]] table with driver = \"glove\"");

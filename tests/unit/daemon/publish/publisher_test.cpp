@@ -189,6 +189,55 @@ TEST_CASE("a glove counts as unplugged only after the reader has started") {
   CHECK_FALSE(published.stats().away());
 }
 
+TEST_CASE("of a hand that is away no gesture is recognised") {
+  pipeline::StreamCounters counters;
+  pipeline::SourceCounters source;
+  StreamInfo info;
+  info.name = "right";
+  info.comes_and_goes = true;
+  info.counters = &counters;
+  info.source_counters = &source;
+  PublishedStream published(std::move(info));
+  source.connected = true;
+  source.link_ns = 7;
+  counters.pipeline.state = pipeline::StreamState::kLive;
+  Frame frame;
+  frame.label = {'g'};
+  frame.label_probability = 1.0F;
+  published.count(frame, {});
+  CHECK(published.stats().label() == "g");
+  CHECK(published.stats().label_probability() == 1.0F);
+  source.connected = false;
+  CHECK(published.stats().label().empty());
+  CHECK(published.stats().label_probability() == 0.0F);
+  source.connected = true;
+  counters.pipeline.state = pipeline::StreamState::kStale;
+  CHECK(published.stats().label().empty());
+  frame.source = Source::kLabels;
+  published.count(frame, {});
+  CHECK(published.stats().label() == "g");
+}
+
+TEST_CASE("a stream is lossy for ten seconds after its last loss") {
+  pipeline::StreamCounters counters;
+  pipeline::SourceCounters source;
+  StreamInfo info;
+  info.name = "walker";
+  info.counters = &counters;
+  info.source_counters = &source;
+  PublishedStream published(std::move(info));
+  CHECK_FALSE(published.report(1.0).lossy());
+  for (auto* const loss : {&counters.pipeline.shed, &counters.pipeline.dropped}) {
+    *loss = 1;
+    for (int second = 0; second < 10; ++second) CHECK(published.report(1.0).lossy());
+    CHECK(published.report(1.0).shed() == 1);
+    CHECK_FALSE(published.stats().lossy());
+  }
+  source.kernel_dropped = 7;
+  CHECK(published.report(1.0).lossy());
+  CHECK(published.stats().lossy());
+}
+
 TEST_CASE("the status is current, although stats are published once a second") {
   PublisherRig rig;
   REQUIRE(rig.receive("stats", 1));

@@ -97,3 +97,16 @@ TEST_CASE("Numbers and labels that a lookup cannot use are refused", "[gesture_f
   CHECK(says(verdict([](auto& m) { m.labels[1].group_class[3] = 3; }), "a label's class"));
   CHECK(says(verdict([](auto& m) { m.low[7] = 1; }), "the range of an angle"));
 }
+
+TEST_CASE("Numbers that no training gives are refused", "[gesture_file]") {
+  CHECK(
+      says(verdict([](auto& m) { m.durations.leaves[0].mean[4] = 3600.0 * m.rate_hz; }), "a mean"));
+  CHECK(says(verdict([](auto& m) { m.durations.leaves[0].mean[0] = -5.0; }), "a mean"));
+  CHECK(says(verdict([](auto& m) { m.durations.leaves[0].variance[0] = 1e20; }), "a variance"));
+  CHECK(says(verdict([](auto& m) { m.trees[0][0].leaves[0].mean[0][0] = 1e4; }), "a mean"));
+  CHECK(says(verdict([](auto& m) { m.trees[0][0].leaves[0].variance[0][0] = 1e8; }), "a variance"));
+  CHECK(says(verdict([](auto& m) { m.durations.occupancy[0] = 1e20; }), "an occupancy"));
+  CHECK(says(verdict([](auto& m) { m.high[7] = 900.0; }), "the range of an angle"));
+  // The longest state that is one is well below.
+  CHECK(verdict([](auto& m) { m.durations.leaves[0].mean[4] = 60.0 * m.rate_hz; }) == "sound");
+}

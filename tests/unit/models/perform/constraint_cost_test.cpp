@@ -41,7 +41,7 @@ TEST_CASE("the processor time of the constraints on all strings of four labels",
   std::vector<double> us;
   double smallest_m = 1.0;
   for (const auto& string : strings_of_four(labels_of(*model, "g c p 1 3 4").value())) {
-    Performance performance = perform(information, string, {});
+    Performance performance = perform(information, string, {}).value();
     hand::ConstraintSolver solver;
     for (std::size_t t = 0; t < performance.angles.size(); ++t) {
       HandAngles pose = hand_of(performance.angles[t]);

@@ -30,7 +30,7 @@ Performance performed(const StateInformation& information, const std::string& te
                       const perform::PerformOptions& options = {}) {
   const auto labels = perform::labels_of(information.model(), text);
   REQUIRE(labels.has_value());
-  return perform::perform(information, *labels, options);
+  return perform::perform(information, *labels, options).value();
 }
 
 double rms_apart_deg(const Performance& a, const Performance& b) {
@@ -78,6 +78,24 @@ double held_off_deg(const Performance& p, int label, const Eigen::VectorXd& real
 }
 
 }  // namespace
+
+TEST_CASE("A performance that would not fit the memory is refused in one sentence", "[perform]") {
+  gesture::GestureModel model = test::toy_gesture_model();
+  for (auto& leaf : model.durations.leaves) leaf.mean.fill(gesture::kMaxState_s * model.rate_hz);
+  const auto information = information_of(std::move(model));
+  const std::vector<int> labels(100, 0);
+  const auto refused = perform::perform(information, labels, {});
+  REQUIRE_FALSE(refused.has_value());
+  CHECK(refused.error().message.find("the 100 labels last more than") == 0);
+}
+
+TEST_CASE("The longest gesture is performed", "[perform]") {
+  gesture::GestureModel model = test::toy_gesture_model();
+  model.rate_hz = 10.0;
+  for (auto& leaf : model.durations.leaves) leaf.mean[2] = gesture::kMaxState_s * model.rate_hz;
+  const auto held = performed(information_of(std::move(model)), "g");
+  CHECK(std::ssize(held.angles) > 6'000);
+}
 
 TEST_CASE("a performance lists its states, from the first frame to the last", "[generate]") {
   const auto information = information_of(test::toy_gesture_model());

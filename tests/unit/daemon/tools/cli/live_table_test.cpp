@@ -66,6 +66,8 @@ TEST_CASE("the health of a stream has a word and a colour", "[live_table]") {
   CHECK(row(stream, true).contains("\x1b[2m?"));
   CHECK_FALSE(row(stream, true).contains("120.0"));
   stream.set_shed(1);
+  CHECK(row(stream).contains("\x1b[32mlive"));
+  stream.set_lossy(true);
   CHECK(row(stream).contains("\x1b[31mlossy"));
   for (const char* state : {"waiting", "stale"}) {
     stream.set_state(state);

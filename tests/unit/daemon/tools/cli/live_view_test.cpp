@@ -271,11 +271,13 @@ TEST_CASE("the live view says in words what was lost") {
   stats.mutable_stream(0)->set_dropped(12);
   stats.mutable_stream(0)->set_shed(3);
   LiveViewOptions options{.width = 120, .height = 0};
-  CHECK(live_view(stats, options)[2].starts_with("walker0 lossy "));
+  CHECK(live_view(stats, options)[2].starts_with("walker0 live "));
   CHECK(live_view(stats, options)[3] ==
         "  walker0: frames: 12 dropped because a queue was full, 3 skipped for newer ones, so far "
         "(machine too slow)");
   options.colour = true;
+  CHECK(live_view(stats, options)[3].starts_with("  walker0"));
+  stats.mutable_stream(0)->set_lossy(true);
   CHECK(live_view(stats, options)[3].starts_with("  \x1b[31mwalker0"));
 }
 

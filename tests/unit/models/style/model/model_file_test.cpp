@@ -68,7 +68,7 @@ TEST_CASE("A model of several styles reads back as it was written", "[model_file
   model.more[0].function.weights.conservativeResize(4, 6);
   refused(model, "number of a style's weights");
   model.more[0] = {"elderly", {other.process.weights, other.process.offset}, -other.limit_rad};
-  refused(model, "limit below zero");
+  refused(model, "the limits");
   model.more[0] = {"elderly", {other.process.weights, other.process.offset.head(3)}, {}};
   refused(model, "a style's prior mean");
 }
@@ -140,7 +140,7 @@ TEST_CASE("A model whose parts do not fit is refused by name", "[model_file]") {
   refused(model, "joints' names");
   model = small_model();
   model.limit_rad[3] = -1.0;
-  refused(model, "limit below zero");
+  refused(model, "the limits");
   model = small_model();
   model.process.mu = -1.0;
   refused(model, "mu");
@@ -157,4 +157,31 @@ TEST_CASE("A model whose parts do not fit is refused by name", "[model_file]") {
   model = small_model();
   model.space.joints.assign(97, "");
   refused(model, "number of joints");
+}
+
+TEST_CASE("Numbers that no training gives are refused", "[model_file]") {
+  const auto with = [](auto spoil) {
+    StyleModel model = small_model();
+    spoil(model);
+    return model;
+  };
+  refused(with([](auto& m) { m.process.inputs(0, 0) = 1e4; }), "inputs' shape or values");
+  refused(with([](auto& m) { m.process.weights(0, 0) = -1e20; }), "weights' shape or values");
+  refused(with([](auto& m) { m.process.offset[0] = 1e4; }), "the prior mean");
+  refused(with([](auto& m) { m.process.lambda = 50.0; }), "lambda");
+  refused(with([](auto& m) { m.process.b = 1e20; }), "b");
+  refused(with([](auto& m) { m.process.noise = 1e20; }), "the noise");
+  refused(with([](auto& m) { m.limit_rad[0] = 1e4; }), "the limits");
+  refused(with([](auto& m) {
+            m.gate = {Eigen::VectorXd::Constant(6, 1e4), 0.5, 1.0};
+          }),
+          "the neutral pose");
+  refused(with([](auto& m) {
+            m.axis = {Eigen::VectorXd::Constant(6, 1e20), 0.0};
+          }),
+          "the style's axis");
+  refused(with([](auto& m) {
+            m.axis = {Eigen::VectorXd::Constant(6, 1.0), 1e20};
+          }),
+          "the style's offset");
 }
