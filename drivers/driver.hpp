@@ -42,8 +42,9 @@ struct Chunk {
   // not among the peers, and empty or too long ones.
   std::uint32_t foreign = 0;
   std::uint32_t damaged = 0;
-  // Datagrams that the kernel dropped, because nobody read in time and its buffer was full. The
-  // kernel reports them with the next datagram that it keeps.
+  // Datagrams that were dropped because nobody read in time: by the kernel, whose buffer was full
+  // and which reports them with the next datagram that it keeps, and by the transport, because they
+  // had waited for more than a second.
   std::uint32_t kernel_dropped = 0;
 };
 

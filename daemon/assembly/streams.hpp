@@ -93,6 +93,7 @@ class Streams final : public devices::StreamHost {
   void report(const devices::OpenSource& source, v1::Event::Kind kind, const std::string& text);
 
   // StreamHost
+  void is_alive() noexcept override { pulse_.beat(); }
   pipeline::StreamCounters& counters(std::uint32_t stream) override {
     return counters_[pipeline::slot_of(stream)];
   }

@@ -76,9 +76,13 @@ ControlServer::~ControlServer() {
 void ControlServer::serve() {
   system::name_thread(kThreadName);
   while (!stop_.load(std::memory_order_acquire)) {
-    pulse_.beat();
     bool busy = false;
-    for (int i = 0; i < kRequestsARound && handle_request(); ++i) busy = true;
+    // A large model takes a second, so each request is a sign of life.
+    for (int i = 0; i < kRequestsARound; ++i) {
+      pulse_.beat();
+      if (!handle_request()) break;
+      busy = true;
+    }
     while (handle_ack()) busy = true;
     const std::int64_t due_ns = handler_.forget_old(system::monotonic_ns());
     if (!busy) sleep(milliseconds_until(due_ns));

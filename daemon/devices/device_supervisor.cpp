@@ -53,10 +53,18 @@ void DeviceSupervisor::run() {
       look_for_device();
     } else {
       write_to_device();
-      if (upkeep_ != nullptr) upkeep_->upkeep(ports_.clock());
+      keep_up();
       watch_silence();
     }
     sleep();
+  }
+}
+
+void DeviceSupervisor::keep_up() {
+  if (upkeep_ == nullptr) return;
+  upkeep_->upkeep(ports_.clock());
+  if (const std::string note = upkeep_->consume_note(); !note.empty()) {
+    ports_.report(v1::Event::KIND_WARNING, note);
   }
 }
 

@@ -49,6 +49,7 @@ class DeviceSupervisor {
   void write_to_device();
   void look_for_device();
   Result<std::unique_ptr<drivers::Device>> try_open();
+  void keep_up();
   void sleep();
   [[nodiscard]] bool settling() const;  // a device node appeared a moment ago
 

@@ -14,9 +14,6 @@
 namespace posed::devices {
 namespace {
 
-// Streams that one run of the daemon makes. A device log has no room for more.
-constexpr std::size_t kMaxMade = 60'000;
-
 bool same_body(const drivers::Body& a, const drivers::Body& b) {
   return same_skeleton(a.skeleton.get(), b.skeleton.get()) && a.samples.names == b.samples.names &&
          a.samples.units == b.samples.units;
@@ -32,7 +29,7 @@ SourceBodies::~SourceBodies() = default;
 void SourceBodies::reserve_only() {
   const auto id = shared_.slots.next_free(true);
   assert(id);  // the config reader makes sure that there is a slot for each stream that it names
-  ++shared_.made;
+  ++made_;
   streams_.push_back({.key = "\n1",
                       .name = source_.config.named[0].stream.name,
                       .id = *id,
@@ -64,6 +61,11 @@ std::int64_t SourceBodies::due_ns(std::int64_t now_ns) const {
   return busy || !wanted ? system::kForever_ns : std::max(now_ns, next_ns_);
 }
 
+std::size_t SourceBodies::share() const {
+  const std::size_t alike = source_.has_several() ? shared_.several : shared_.single;
+  return shared_.max_made / 2 / std::max<std::size_t>(alike, 1);
+}
+
 // Whether a body without a slot may get one now.
 bool SourceBodies::may_have_slot() const {
   return without_slot_ > 0 && shared_.slots.freed() != freed_;
@@ -73,7 +75,7 @@ bool SourceBodies::may_have_slot() const {
 // stream. A partner that has only left sends nothing more. A refused stream may fit what control
 // has set.
 bool SourceBodies::is_outdated(const Stream& stream) const {
-  if (shared_.made >= kMaxMade) return false;
+  if (made_ >= share() && !stream.named) return false;
   const auto& state = shared_.host.counters(stream.id).pipeline.state;
   const bool ended = !stream.refused && state.load() == pipeline::StreamState::kEnded;
   if (ended) return false;  // nothing more comes to it
@@ -88,7 +90,9 @@ bool SourceBodies::is_outdated(const Stream& stream) const {
 void SourceBodies::turn(std::int64_t now_ns) {
   take_back();
   if (shared_.is_stopped() || due_ns(now_ns) > now_ns) return;
-  next_ns_ = now_ns + SourceBuilder::kBetweenUpdates_ns;
+  // Beyond its share a source makes streams seldom, and only for bodies that the config names.
+  next_ns_ = now_ns + (made_ < share() ? SourceBuilder::kBetweenUpdates_ns
+                                       : SourceBuilder::kBetweenLateUpdates_ns);
   std::vector<std::byte> newest = description_;
   auto& descriptions = source_.exchange->descriptions;
   if (descriptions) static_cast<void>(descriptions->receive(newest));
@@ -135,6 +139,7 @@ void SourceBodies::build(std::vector<std::byte> description) {
   }
   description_ = std::move(description);
   without_slot_ = without_name_ = 0;
+  too_many_made_ = false;
   freed_ = shared_.slots.freed();
   std::vector<Stream> now = streams_of(update->layout ? update->layout->bodies : only, *update);
   if (shared_.is_stopped()) return;  // perhaps not all of them, so the reader must not have them
@@ -162,9 +167,9 @@ void SourceBodies::report_oddities() {
   const std::uint64_t skipped = replaced - std::exchange(replaced_, replaced);
   if (too_many_made_) {
     warn(
-        fmt::format("its bodies came and went {} times, so new ones are not streamed; look why it"
-                    " loses them, and start posed again",
-                    shared_.made));
+        fmt::format("its bodies came and went {} times, so new ones are not streamed unless the"
+                    " config names them; look why it loses them, and start posed again",
+                    share()));
   } else if (without_slot_ > 0) {
     warn(
         fmt::format("{} of its bodies are not streamed, because all streams are in use; raise"
@@ -257,14 +262,16 @@ bool SourceBodies::choose_name(Stream& stream, int number, const config::StreamC
 
 // `earlier`: the body's stream until now, whose slot and numbers this one takes over.
 bool SourceBodies::choose_slot(Stream& stream, const Stream* earlier) {
-  too_many_made_ = shared_.made >= kMaxMade;
-  if (too_many_made_) return false;
+  if (made_ >= share() && !stream.named) {
+    too_many_made_ = true;
+    return false;
+  }
   const auto id =
       earlier != nullptr ? StreamSlots::next(earlier->id) : shared_.slots.next_free(stream.named);
   if (!id) ++without_slot_;
   if (!id) return false;
   stream.id = *id;
-  ++shared_.made;
+  ++made_;
   if (earlier == nullptr) {
     pipeline::restart(shared_.host.counters(stream.id), shared_.numbers[stream.name]);
   }
@@ -272,6 +279,7 @@ bool SourceBodies::choose_slot(Stream& stream, const Stream* earlier) {
 }
 
 NewStream SourceBodies::make(Stream& stream, const config::StreamConfig& config) {
+  shared_.host.is_alive();
   stream.changes = shared_.kept.changes(stream.name);
   for (const std::string& name : partners_of(config)) {
     const auto partner = shared_.partners.find(name);

@@ -30,11 +30,12 @@ struct SharedBodies {
   BodyNames names;
   ModelFiles& models;
   const KeptSettings& kept;
+  std::size_t max_made;                 // streams that one run of the daemon makes without a pause
   pipeline::PartnerStreams partners{};  // the streams that are there
+  std::size_t several = 0, single = 0;  // sources with several bodies, and with one
   // The next frame and sample numbers of streams that left, by stream name; a returning stream
   // continues them.
   std::map<std::string, pipeline::NextNumbers> numbers{};
-  std::size_t made = 0;  // streams since the start
   std::atomic<bool> stopped{false};
 
   [[nodiscard]] bool is_stopped() const noexcept { return stopped.load(std::memory_order_acquire); }
@@ -74,6 +75,8 @@ class SourceBodies {
     bool missed_change = false;  // control set something while it was built
   };
 
+  // How many streams this source may make without a pause, so that it takes none of another's.
+  [[nodiscard]] std::size_t share() const;
   [[nodiscard]] bool may_have_slot() const;
   void take_back();
   void build(std::vector<std::byte> description);
@@ -103,6 +106,7 @@ class SourceBodies {
   std::int64_t next_ns_ = 0;                                   // not before
   std::vector<std::byte> description_;                         // in use
   std::size_t without_slot_ = 0, without_name_ = 0;            // bodies of the description in use
+  std::size_t made_ = 0;                                       // streams since the start
   bool too_many_made_ = false;
   std::uint64_t freed_ = 0;     // StreamSlots::freed() when it was built
   std::uint64_t replaced_ = 0;  // descriptions, as of the last look

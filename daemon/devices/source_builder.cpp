@@ -20,13 +20,15 @@ std::size_t count_named(const std::vector<std::unique_ptr<OpenSource>>& sources)
 
 SourceBuilder::SourceBuilder(std::vector<std::unique_ptr<OpenSource>>& sources, std::uint32_t slots,
                              std::set<std::string> reserved, ModelFiles& models,
-                             const KeptSettings& kept, StreamHost& host)
+                             const KeptSettings& kept, StreamHost& host, std::size_t max_made)
     : shared_{.host = host,
               .slots = StreamSlots(slots, count_named(sources)),
               .names = BodyNames(std::move(reserved)),
               .models = models,
-              .kept = kept} {
+              .kept = kept,
+              .max_made = max_made} {
   for (const auto& source : sources) {
+    ++(source->has_several() ? shared_.several : shared_.single);
     sources_.push_back(std::make_unique<SourceBodies>(shared_, *source));
     if (source->has_several()) continue;
     only_.push_back(sources_.back().get());

@@ -18,12 +18,17 @@ class SourceBuilder {
  public:
   // At most this often the bodies of a source change.
   static constexpr std::int64_t kBetweenUpdates_ns = 500'000'000;
+  // And this often once it has made its share of streams.
+  static constexpr std::int64_t kBetweenLateUpdates_ns = 10 * kNanosPerSecond;
+  // A device log has room for more streams (log::kMaxStreams).
+  static constexpr std::size_t kMaxMade = 60'000;
 
   // Sources, models, settings and host outlive the builder, and the reader ends before it.
-  // `reserved` are names that no body may get; `slots` is how many streams there may be at once.
+  // `reserved` are names that no body may get; `slots` is how many streams there may be at once;
+  // `max_made` is how many are made without a pause in all, of which each source has its share.
   SourceBuilder(std::vector<std::unique_ptr<OpenSource>>& sources, std::uint32_t slots,
                 std::set<std::string> reserved, ModelFiles& models, const KeptSettings& kept,
-                StreamHost& host);
+                StreamHost& host, std::size_t max_made = kMaxMade);
 
   // Builds the streams of devices with one body, those that others have as partners first. They
   // have the first slots, in the order of the sources. The error names the stream.

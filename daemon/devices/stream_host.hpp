@@ -37,6 +37,9 @@ class StreamHost {
   StreamHost& operator=(const StreamHost&) = delete;
   virtual ~StreamHost() = default;
 
+  // The builder's thread goes on: called before each stream that it builds, because many with large
+  // models need seconds together.
+  virtual void is_alive() noexcept = 0;
   // Of the slot of this stream; they outlive the host.
   virtual pipeline::StreamCounters& counters(std::uint32_t stream) = 0;
   // Makes the stream known to publisher, control, log and worker, so that its first item may come.

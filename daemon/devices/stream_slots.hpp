@@ -17,8 +17,8 @@ class StreamSlots {
     for (std::uint32_t slot = 0; slot < count; ++slot) free_.push_back({slot, 0});
   }
 
-  // A free slot with a generation that it never had, as a stream id: that of the slot that is free
-  // for the longest time. Empty if none is free.
+  // A free slot with its next generation, as a stream id: that of the slot that is free for the
+  // longest time. Empty if none is free.
   [[nodiscard]] std::optional<std::uint32_t> next_free(bool named) {
     if (free_.size() <= (named ? 0 : reserved_)) return std::nullopt;
     const Slot slot = free_.front();
@@ -28,20 +28,20 @@ class StreamSlots {
     return pipeline::stream_id(slot.number, slot.generation);
   }
 
-  // The next stream in the same slot; empty if the slot has no more generations.
-  [[nodiscard]] static std::optional<std::uint32_t> next(std::uint32_t stream) {
+  // The next stream in the same slot. After 65,534 of them the ids come again, except the first:
+  // those that had them ended long ago.
+  [[nodiscard]] static std::uint32_t next(std::uint32_t stream) {
     const std::uint32_t generation = pipeline::generation_of(stream);
-    if (generation >= pipeline::kMaxGeneration) return std::nullopt;
-    return pipeline::stream_id(pipeline::slot_of(stream), generation + 1);
+    return pipeline::stream_id(pipeline::slot_of(stream),
+                               generation < pipeline::kMaxGeneration ? generation + 1 : 1);
   }
 
   // The slot's last stream has left; `named` as in next_free().
   void give_back(std::uint32_t stream, bool named) {
     if (named) ++reserved_;
     ++freed_;
-    if (const auto id = next(stream)) {
-      free_.push_back({pipeline::slot_of(*id), pipeline::generation_of(*id)});
-    }
+    const std::uint32_t id = next(stream);
+    free_.push_back({pipeline::slot_of(id), pipeline::generation_of(id)});
   }
 
   // How often a slot was given back.

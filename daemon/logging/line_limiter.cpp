@@ -56,6 +56,25 @@ bool LineLimiter::may_begin_another(std::int64_t now_ns) {
   return true;
 }
 
+bool LineLimiter::admit_of_kind(std::int64_t now_ns, const Line& last, std::uint64_t count) {
+  const std::string cause = cause_of(last.text);
+  const std::size_t colon = cause.find(": ");
+  if (colon == cause.npos || cause.find(' ') < colon) return true;  // not of a stream
+  Kind& kind = kinds_[std::to_string(last.level) + cause.substr(colon)];
+  kind.credit =
+      std::min(kStreamsAtOnce, kind.credit + kOfKindPerSecond * seconds(now_ns - kind.credit_ns));
+  kind.credit_ns = now_ns;
+  if (kind.credit >= 1.0) {
+    kind.credit -= 1.0;
+    return true;
+  }
+  if (kind.held.held == 0)
+    kind.held.written_ns = std::max(kind.held.written_ns, now_ns - kPeriod_ns);
+  kind.held.held += count;
+  kind.held.last = last;
+  return false;
+}
+
 bool LineLimiter::admit(std::int64_t now_ns, int level, std::string_view text) {
   std::string key = std::to_string(level) + cause_of(text);
   const auto found = causes_.find(key);
@@ -63,7 +82,7 @@ bool LineLimiter::admit(std::int64_t now_ns, int level, std::string_view text) {
     Cause& cause = found->second;
     if (cause.held == 0 && now_ns - cause.written_ns >= kPeriod_ns) {
       cause.written_ns = now_ns;
-      return true;
+      return admit_of_kind(now_ns, {level, std::string(text)}, 1);
     }
     ++cause.held;
     cause.last = {level, std::string(text)};
@@ -77,8 +96,13 @@ bool LineLimiter::admit(std::int64_t now_ns, int level, std::string_view text) {
     others_.last.level = std::max(others_.last.level, level);
     return false;
   }
+  std::erase_if(kinds_, [&](const auto& entry) {
+    const Kind& kind = entry.second;
+    const double credit = kind.credit + kOfKindPerSecond * seconds(now_ns - kind.credit_ns);
+    return kind.held.held == 0 && credit >= kStreamsAtOnce;
+  });
   causes_.emplace(std::move(key), Cause{.written_ns = now_ns, .held = 0, .last = {}});
-  return true;
+  return admit_of_kind(now_ns, {level, std::string(text)}, 1);
 }
 
 std::optional<LineLimiter::Line> LineLimiter::next_summary(std::int64_t now_ns, bool at_end) {
@@ -90,7 +114,14 @@ std::optional<LineLimiter::Line> LineLimiter::next_summary(std::int64_t now_ns, 
     const std::uint64_t held = std::exchange(cause.held, 0);
     Line line{cause.last.level, with_count(cause.last, held), cause_of(cause.last.text), held};
     cause.written_ns = now_ns;
-    return line;
+    if (admit_of_kind(now_ns, cause.last, held)) return line;
+  }
+  for (auto& [key, kind] : kinds_) {
+    if (!due(kind.held)) continue;
+    const std::uint64_t held = std::exchange(kind.held.held, 0);
+    kind.held.written_ns = now_ns;
+    const Line& last = kind.held.last;
+    return Line{last.level, with_count(last, held), cause_of(last.text), held};
   }
   if (!due(others_)) return std::nullopt;
   Line line{others_.last.level,
@@ -108,6 +139,7 @@ std::int64_t LineLimiter::next_due_ns() const {
     next_ns = next_ns == kNoTime_ns ? due_ns : std::min(next_ns, due_ns);
   };
   for (const auto& [key, cause] : causes_) look(cause);
+  for (const auto& [key, kind] : kinds_) look(kind.held);
   look(others_);
   return next_ns;
 }

@@ -1,7 +1,9 @@
 // LineLimiter writes at most one line a second for each cause, so that nobody who can make the
 // daemon log something can fill its log. Two lines have the same cause if they have the same level
 // and differ only in numbers. The first line is written at once. Lines that follow within a second
-// are counted, and the last of them is written with the count. Pure: no clock, no lock, no output.
+// are counted, and the last of them is written with the count. Many streams with one cause (bodies
+// that come and go all the time) are counted together after their first lines. Pure: no clock, no
+// lock, no output.
 #pragma once
 
 #include <cstdint>
@@ -44,8 +46,17 @@ class LineLimiter {
     std::uint64_t held = 0;       // lines held back since then
     Line last;
   };
+  // The same cause of all streams.
+  struct Kind {
+    double credit = kStreamsAtOnce;  // lines that may still be written; grows again slowly
+    std::int64_t credit_ns = 0;
+    Cause held{};
+  };
   [[nodiscard]] bool may_begin_another(std::int64_t now_ns);
+  // Takes a line from the credit of its kind, or holds back these lines.
+  [[nodiscard]] bool admit_of_kind(std::int64_t now_ns, const Line& last, std::uint64_t count);
 
+  std::map<std::string, Kind, std::less<>> kinds_;
   std::map<std::string, Cause, std::less<>> causes_;
   // lines held back because there were too many causes
   Cause others_{.written_ns = kNoTime_ns, .held = 0, .last = {}};
@@ -55,6 +66,8 @@ class LineLimiter {
 
   static constexpr double kMaxAtOnce = 256.0;  // enough for the lines of 64 streams at their start
   static constexpr double kNewPerSecond = 8.0;
+  static constexpr double kStreamsAtOnce = 64.0;
+  static constexpr double kOfKindPerSecond = 0.125;
 };
 
 }  // namespace posed::logging

@@ -11,11 +11,11 @@
 #include <sys/resource.h>
 #include <sys/socket.h>
 
-#include "daemon/net/received_bytes.hpp"
 #include "daemon/net/zap_authenticator.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/system/process.hpp"
 #include "proto/frame/time.hpp"
+#include "proto/zmq/tcp_peer.hpp"
 
 namespace posed::net {
 namespace {
@@ -31,12 +31,6 @@ constexpr std::size_t kMaxControllers = 64;
 // kept free for devices, logs and models that are opened later
 constexpr std::size_t kReservedFiles = 16;
 constexpr std::size_t kMinPeers = 4;
-
-std::uint64_t cookie_of(int fd) {
-  std::uint64_t cookie = 0;
-  socklen_t size = sizeof cookie;
-  return getsockopt(fd, SOL_SOCKET, SO_COOKIE, &cookie, &size) == 0 ? cookie : 0;
-}
 
 }  // namespace
 

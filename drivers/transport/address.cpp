@@ -3,8 +3,10 @@
 #include <netdb.h>
 
 #include <algorithm>
+#include <charconv>
 #include <cstring>
 #include <optional>
+#include <system_error>
 
 namespace posed::drivers {
 namespace {
@@ -17,13 +19,15 @@ bool is_v4(const Host& host) noexcept {
   return std::equal(kMapped.begin(), kMapped.begin() + kMappedBytes, host.begin());
 }
 
-std::uint16_t port_of(const Address& address) noexcept {
-  std::uint16_t port = 0;  // at the same place for IPv4 and IPv6
-  std::memcpy(&port, reinterpret_cast<const char*>(&address.storage) + 2, sizeof port);
-  return ntohs(port);
+// The C library would take "-1" for 65535, and 65536 for 0.
+bool is_port(std::string_view text) noexcept {
+  unsigned port = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
+  return error == std::errc() && end == text.data() + text.size() && port <= 65535;
 }
 
 std::optional<Address> parse_numbers(const std::string& host, const char* port) {
+  if (port != nullptr && !is_port(port)) return std::nullopt;
   addrinfo wish{};
   wish.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV | AI_PASSIVE;
   wish.ai_socktype = SOCK_STREAM;
@@ -37,6 +41,12 @@ std::optional<Address> parse_numbers(const std::string& host, const char* port) 
 }
 
 }  // namespace
+
+RT_SAFE std::uint16_t port_of(const Address& address) noexcept {
+  std::uint16_t port = 0;  // at the same place for IPv4 and IPv6
+  std::memcpy(&port, reinterpret_cast<const char*>(&address.storage) + 2, sizeof port);
+  return ntohs(port);
+}
 
 RT_SAFE Host host_of(const Address& address) noexcept {
   Host host{};

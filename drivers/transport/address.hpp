@@ -33,6 +33,7 @@ struct Address {
 // socket compares equal to itself.
 using Host = std::array<std::uint8_t, 16>;
 
+RT_SAFE [[nodiscard]] std::uint16_t port_of(const Address& address) noexcept;
 RT_SAFE [[nodiscard]] Host host_of(const Address& address) noexcept;
 RT_SAFE [[nodiscard]] bool is_loopback(const Host& host) noexcept;
 [[nodiscard]] bool is_multicast(const Host& host) noexcept;

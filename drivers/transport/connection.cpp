@@ -5,6 +5,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstring>
@@ -74,7 +75,7 @@ class LinkTransport final : public Transport {
 // Discards bytes that came while other devices were being opened: they are old, and all would get
 // one arrival time. Bounded, because a device may send without pause.
 Result<> LinkTransport::start(std::int64_t /*now_ns*/) {
-  for (int i = 0; i < kMaxWaiting && ::read(link_.fd(), buffer_.data(), buffer_.size()) > 0; ++i) {
+  for (int i = 0; i < kMaxWaiting && link_.receive(buffer_) > 0; ++i) {
   }
   return {};
 }
@@ -83,10 +84,10 @@ Result<> LinkTransport::start(std::int64_t /*now_ns*/) {
 // mean a hang-up (VMIN is 1). RT-safe except for the read.
 Chunk LinkTransport::read(std::int64_t /*now_ns*/) noexcept {
   flush();
-  const ssize_t got = ::read(link_.fd(), buffer_.data(), buffer_.size());
+  const ssize_t got = link_.receive(buffer_);
   if (got > 0) return {.bytes = {buffer_.data(), static_cast<std::size_t>(got)}};
   if (got < 0 && not_now(errno)) return {};
-  return {.bytes = {}, .lost = true};
+  return {.bytes = {}, .lost = true, .foreign = link_.was_browser() ? 1U : 0U};
 }
 
 // RT-safe except for the write.
@@ -146,7 +147,11 @@ Connection::Connection(Connection&& other) noexcept
     : fd_(std::exchange(other.fd_, -1)),
       name_(std::move(other.name_)),
       identity_(std::move(other.identity_)),
-      cancel_(std::move(other.cancel_)) {}
+      cancel_(std::move(other.cancel_)),
+      undecided_(other.undecided_),
+      was_browser_(other.was_browser_),
+      kept_back_(other.kept_back_),
+      kept_(other.kept_) {}
 
 Connection& Connection::operator=(Connection&& other) noexcept {
   if (this == &other) return *this;
@@ -155,7 +160,30 @@ Connection& Connection::operator=(Connection&& other) noexcept {
   name_ = std::move(other.name_);
   identity_ = std::move(other.identity_);
   cancel_ = std::move(other.cancel_);
+  undecided_ = other.undecided_;
+  was_browser_ = other.was_browser_;
+  kept_back_ = other.kept_back_;
+  kept_ = other.kept_;
   return *this;
+}
+
+ssize_t Connection::receive(std::span<std::byte> buffer) noexcept {
+  if (!undecided_) return was_browser_ ? 0 : ::read(fd_, buffer.data(), buffer.size());
+  std::ranges::copy(std::span(kept_back_).first(kept_), buffer.begin());
+  const ssize_t got = ::read(fd_, buffer.data() + kept_, buffer.size() - kept_);
+  if (got <= 0) return got;
+  const auto bytes = buffer.first(kept_ + static_cast<std::size_t>(got));
+  const Beginning beginning = beginning_of(bytes);
+  if (beginning == Beginning::kOpen) {
+    kept_ = bytes.size();
+    std::ranges::copy(bytes, kept_back_.begin());
+    errno = EAGAIN;
+    return -1;
+  }
+  undecided_ = false;
+  was_browser_ = beginning == Beginning::kBrowser;
+  if (was_browser_) ::shutdown(fd_, SHUT_RDWR);
+  return was_browser_ ? 0 : static_cast<ssize_t>(bytes.size());
 }
 
 void Connection::wait_for(short events, milliseconds patience) const {
@@ -191,7 +219,7 @@ Result<std::vector<std::byte>> Connection::read(std::chrono::milliseconds patien
   std::vector<std::byte> bytes(kRead);
   while (true) {
     if (cancelled()) return Cancel::error();
-    const ssize_t got = ::read(fd_, bytes.data(), bytes.size());
+    const ssize_t got = receive(bytes);
     if (got < 0 && not_now(errno)) {
       const auto left = left_until(deadline);
       if (left.count() == 0) return std::vector<std::byte>{};

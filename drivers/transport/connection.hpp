@@ -3,6 +3,9 @@
 // takes it over for the reader thread.
 #pragma once
 
+#include <sys/types.h>
+
+#include <array>
 #include <chrono>
 #include <cstddef>
 #include <memory>
@@ -13,6 +16,7 @@
 
 #include "drivers/driver.hpp"
 #include "drivers/transport/cancel.hpp"
+#include "drivers/transport/first_bytes.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::drivers {
@@ -37,6 +41,15 @@ class Connection {
   // waits no more.
   void heed(std::shared_ptr<const Cancel> cancel) noexcept { cancel_ = std::move(cancel); }
 
+  // From now on the link ends, as if hung up, if what comes begins as what a web browser sends. For
+  // links that others have made.
+  void refuse_browsers() noexcept { undecided_ = true; }
+  [[nodiscard]] bool was_browser() const noexcept { return was_browser_; }
+  // Reads what is there into the buffer, which has room for more than kMaxBeginning bytes: as
+  // ::read(). Bytes that do not yet tell a browser from a device are kept back until they do.
+  // RT-safe except for its system calls.
+  [[nodiscard]] ssize_t receive(std::span<std::byte> buffer) noexcept;
+
   // Cold. Writes all bytes, within a second; an error states what happened to the device.
   Result<> write(std::span<const std::byte> bytes);
   Result<> write(std::string_view text);
@@ -54,6 +67,9 @@ class Connection {
   int fd_ = -1;
   std::string name_, identity_;
   std::shared_ptr<const Cancel> cancel_;
+  bool undecided_ = false, was_browser_ = false;
+  std::array<std::byte, kMaxBeginning> kept_back_{};
+  std::size_t kept_ = 0;
 };
 
 // Reads the available bytes, at most 4 KB per call; a hang-up or an error of the descriptor sets

@@ -42,7 +42,10 @@ Result<int> listen_on(const Address& address, const std::string& endpoint, int b
 
 bool may_connect(const Address& peer, const std::vector<std::string>& peers) {
   if (peers.empty()) return is_loopback(host_of(peer));
-  return std::ranges::find(peers, host_text(peer)) != peers.end();
+  return std::ranges::any_of(peers, [&](const std::string& text) {
+    const auto named = parse_host(text);
+    return named && host_of(*named) == host_of(peer);
+  });
 }
 
 void keep_alive(int fd) noexcept {

@@ -20,10 +20,8 @@ namespace {
 constexpr std::chrono::milliseconds kPatience{1000};
 constexpr int kMessagesWaiting = 16;   // in libzmq
 constexpr int kLinkBuffer = 8 * 1024;  // bytes, in the kernel before libzmq
-// Bytes. libzmq ends the connection at a larger message, so this is well above what is delivered: a
-// message that is only too long to be a chunk is counted, and costs no connection.
-constexpr std::int64_t kMaxReceived = 1024 * 1024;
-static_assert(kMaxReceived > std::int64_t{kMaxChunk});
+// A message that is only too long to be a chunk is counted, and costs no connection.
+static_assert(net::kMaxReceivedPart > std::int64_t{kMaxChunk});
 // Bytes between thread and reader, which the kernel doubles for its own use: a quarter of a second
 // of a large skeleton at 120 Hz.
 constexpr int kQueue = 128 * 1024;
@@ -59,9 +57,7 @@ Error refusal_error(net::Refusal refusal, const SubscriptionSettings& settings) 
 }
 
 Result<> set_all(void* socket, const SubscriptionSettings& settings) {
-  const std::string_view most(reinterpret_cast<const char*>(&kMaxReceived), sizeof kMaxReceived);
-  for (const Result<>& set : {net::set_option(socket, ZMQ_MAXMSGSIZE, most),
-                              net::set_option(socket, ZMQ_RCVHWM, kMessagesWaiting),
+  for (const Result<>& set : {net::set_option(socket, ZMQ_RCVHWM, kMessagesWaiting),
                               net::set_option(socket, ZMQ_RCVBUF, kLinkBuffer)}) {
     if (!set) return set;
   }
@@ -120,15 +116,14 @@ Result<> SubscriptionTransport::connect() {
   context_ = TRY(net::open_context());
   socket_ = TRY(net::open_socket(context_.get(), ZMQ_SUB));
   TRY(set_all(socket_.get(), settings_));
-  auto monitor = TRY(net::LinkMonitor::open(context_.get(), socket_.get(), !settings_.key.empty()));
-  monitor_ = std::make_unique<net::LinkMonitor>(std::move(monitor));
+  monitor_ = TRY(net::LinkMonitor::open(context_.get(), socket_.get(), !settings_.key.empty()));
   return net::connect_socket(socket_.get(), settings_.endpoint);
 }
 
 Result<> SubscriptionTransport::await_link(const Cancel& cancel) {
   const auto end = std::chrono::steady_clock::now() + kPatience;
   std::array<zmq_pollitem_t, 2> items{
-      {{monitor_->socket(), 0, ZMQ_POLLIN, 0}, {nullptr, cancel.fd(), ZMQ_POLLIN, 0}}};
+      {{nullptr, monitor_->fd(), ZMQ_POLLIN, 0}, {nullptr, cancel.fd(), ZMQ_POLLIN, 0}}};
   while (!cancel.fired()) {
     const net::Refusal refusal = monitor_->next_refusal();
     if (refusal != net::Refusal::kNone) return std::unexpected(refusal_error(refusal, settings_));
@@ -147,7 +142,7 @@ void SubscriptionTransport::receive_all() {
   sigfillset(&all);
   pthread_sigmask(SIG_BLOCK, &all, nullptr);
   std::array<zmq_pollitem_t, 3> items{{{socket_.get(), 0, ZMQ_POLLIN, 0},
-                                       {monitor_->socket(), 0, ZMQ_POLLIN, 0},
+                                       {nullptr, monitor_->fd(), ZMQ_POLLIN, 0},
                                        {nullptr, stop_.fd(), ZMQ_POLLIN, 0}}};
   while (monitor_->next_refusal() == net::Refusal::kNone && monitor_->ends() == 0) {
     zmq_poll(items.data(), items.size(), -1);
@@ -160,9 +155,9 @@ void SubscriptionTransport::receive_all() {
 void SubscriptionTransport::accept_message() {
   net::Message topic;
   net::Message body;
-  if (!topic.receive(socket_.get())) return;
-  const bool valid = topic.more() && body.receive(socket_.get()) && !body.more();
-  while (topic.more() && body.more() && body.receive(socket_.get())) {
+  if (!monitor_->receive(topic)) return;
+  const bool valid = topic.more() && monitor_->receive(body) && !body.more();
+  while (topic.more() && body.more() && monitor_->receive(body)) {
   }
   const auto name = topic.bytes();
   const auto content = body.bytes();

@@ -7,8 +7,10 @@
 #include <array>
 #include <cerrno>
 #include <optional>
+#include <span>
 
 #include "drivers/transport/address.hpp"
+#include "drivers/transport/first_bytes.hpp"
 #include "drivers/transport/socket.hpp"
 #include "drivers/transport/transport_factory.hpp"
 
@@ -26,6 +28,14 @@ Result<Address> address_of(const ListenSettings& settings) {
                         "the " + std::string(settings.device) + "s'");
 }
 
+// As far as what has come already tells, so that a page does not take the place of a device.
+bool begins_like_a_browser(int fd) noexcept {
+  std::array<std::byte, kMaxBeginning> bytes{};
+  const ssize_t got = ::recv(fd, bytes.data(), bytes.size(), MSG_PEEK | MSG_DONTWAIT);
+  return got > 0 &&
+         beginning_of(std::span(bytes).first(static_cast<std::size_t>(got))) == Beginning::kBrowser;
+}
+
 // Meanwhile the device waits in the listener's queue and is accepted once a descriptor is free.
 std::unexpected<Error> no_descriptor(const ListenSettings& settings) {
   return fail("a " + std::string(settings.device) + " has connected to " + settings.endpoint +
@@ -35,6 +45,9 @@ std::unexpected<Error> no_descriptor(const ListenSettings& settings) {
 }  // namespace
 
 Result<> check_listen(const ListenSettings& settings) {
+  for (const std::string& peer : settings.peers) {
+    TRY(parse_host(peer));
+  }
   TRY(address_of(settings));
   return {};
 }
@@ -64,10 +77,11 @@ Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
     const std::string host = host_text(peer);
     Connection link(fd, settings.endpoint + " from " + host, "tcp " + host);
     link.heed(cancel_);
-    if (!may_connect(peer, settings.peers)) {
+    if (!may_connect(peer, settings.peers) || begins_like_a_browser(fd)) {
       ++refused_;
       continue;
     }
+    link.refuse_browsers();
     keep_alive(fd);
     newest = std::move(link);
   }

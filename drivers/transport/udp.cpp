@@ -22,9 +22,11 @@ constexpr std::size_t kMaxDatagram = 65'507;  // bytes; the most that IPv4 carri
 // Room for the kernel's time stamp and its count of drops.
 constexpr std::size_t kControlBytes =
     CMSG_SPACE(sizeof(timespec)) + CMSG_SPACE(sizeof(std::uint32_t));
-// A datagram counts as at most this old: an older stamp means that the wall clock was set.
 constexpr int kMaxOldBatches = 1000;  // more than a socket's buffer holds
-constexpr std::int64_t kMaxAge_ns = 50'000'000;
+// Older datagrams are dropped and counted: posed was stopped meanwhile, and newest data wins. (The
+// stamps are of the wall clock; where it is set, the few datagrams that wait at that moment count
+// as new, or are dropped.)
+constexpr std::int64_t kMaxAge_ns = kNanosPerSecond;
 // While nothing comes of a group, it is joined again this often.
 constexpr std::int64_t kRejoin_ns = 2 * kNanosPerSecond;
 // A sender that says nothing for so long loses its socket to another one.
@@ -195,7 +197,7 @@ RT_SAFE void UdpTransport::read_control(std::size_t i, Chunk& chunk) noexcept {
   msghdr& header = batch_->message[i].msg_hdr;
   if (const auto stamp = control_value<timespec>(header, SCM_TIMESTAMPNS)) {
     const std::int64_t age_ns = wall_ns_ - to_ns(*stamp);
-    chunk.arrival_ns = batch_ns_ - std::clamp<std::int64_t>(age_ns, 0, kMaxAge_ns);
+    chunk.arrival_ns = batch_ns_ - std::max<std::int64_t>(age_ns, 0);
   }
   if (const auto dropped = control_value<std::uint32_t>(header, SO_RXQ_OVFL)) {
     chunk.kernel_dropped += *dropped - std::exchange(sockets_[socket_].dropped, *dropped);
@@ -222,14 +224,39 @@ void UdpTransport::upkeep(std::int64_t now_ns) noexcept {
   }
 }
 
-RT_SAFE bool UdpTransport::owns(Socket& socket, const Host& sender) const noexcept {
-  const bool owner = socket.received_ns != kNoTime_ns && sender == socket.sender;
+// A sender is a program, known by its address and port. One that is sent to (`to`) answers from
+// several ports, and one may have a new port for each datagram: its earlier ports do not come back,
+// as those of two programs do.
+RT_SAFE bool UdpTransport::owns(Socket& socket, const Address& address) noexcept {
+  const Host host = host_of(address);
+  const std::uint16_t port = port_of(address);
   const bool free =
       socket.received_ns == kNoTime_ns || batch_ns_ - socket.received_ns >= kSilence_ns;
-  if (!owner && !free) return false;
-  socket.sender = sender;
+  const bool same_host = socket.received_ns != kNoTime_ns && host == socket.sender;
+  const bool same_port = same_host && port == socket.port;
+  const bool new_port = same_host && socket.datagrams == 1 && port != socket.port_before;
+  if (!free && !same_port && !new_port && !(same_host && socket.keeps_to)) {
+    if (same_host && second_sender_.load() == SecondSender::kNone) {
+      second_sender_.store(SecondSender::kSeen);
+    }
+    return false;
+  }
+  if (!same_port) {
+    socket.port_before = same_host && !free ? socket.port : std::uint16_t{0};
+    socket.datagrams = 0;
+  }
+  ++socket.datagrams;
+  socket.sender = host;
+  socket.port = port;
   socket.received_ns = batch_ns_;
   return true;
+}
+
+std::string UdpTransport::consume_note() {
+  if (second_sender_.load() != SecondSender::kSeen) return {};
+  second_sender_.store(SecondSender::kTold);
+  return "two programs on one computer send to this port: the first is heard until it is silent for"
+         " a second; give each a port and a source of its own";
 }
 
 // RT-safe except for its reads. A flood of datagrams to be dropped ends the call after one batch.
@@ -238,14 +265,18 @@ Chunk UdpTransport::read(std::int64_t now_ns) noexcept {
   if (next_ >= received_ && !receive(now_ns)) return chunk;
   while (next_ < received_) {
     const std::size_t i = next_++;
+    chunk.arrival_ns = kNoTime_ns;
     mmsghdr& message = batch_->message[i];
     Address& sender = batch_->sender[i];
     sender.size = message.msg_hdr.msg_namelen;
     read_control(i, chunk);
     Socket& socket = sockets_[socket_];
-    const Host host = host_of(sender);
-    if (!may_send(host) || !owns(socket, host)) {
+    if (!may_send(host_of(sender)) || !owns(socket, sender)) {
       ++chunk.foreign;
+      continue;
+    }
+    if (chunk.arrival_ns != kNoTime_ns && batch_ns_ - chunk.arrival_ns > kMaxAge_ns) {
+      ++chunk.kernel_dropped;
       continue;
     }
     if (message.msg_len == 0 || (message.msg_hdr.msg_flags & MSG_TRUNC) != 0) {

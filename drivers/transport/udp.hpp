@@ -60,6 +60,7 @@ class UdpTransport final : public Transport, public Upkeep {
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
   // While nothing comes of a group, joins it again every two seconds.
   void upkeep(std::int64_t now_ns) noexcept override;
+  [[nodiscard]] std::string consume_note() override;
   using Transport::send;
   [[nodiscard]] bool send(std::span<const std::byte> bytes, std::uint8_t socket) noexcept override;
 
@@ -69,9 +70,11 @@ class UdpTransport final : public Transport, public Upkeep {
     std::optional<Address> to;  // a configured one, or the last sender
     bool keeps_to = false;      // `to` is configured
     std::uint32_t dropped = 0;  // by the kernel, of all so far; begins again after 2^32
-    std::optional<Membership> membership{};  // of upkeep; whether there is one never changes
-    Host sender{};                           // whose datagrams are accepted
-    std::int64_t received_ns = kNoTime_ns;   // when it sent the last; kNoTime_ns: nobody has yet
+    std::optional<Membership> membership{};   // of upkeep; whether there is one never changes
+    Host sender{};                            // whose datagrams are accepted
+    std::uint16_t port = 0, port_before = 0;  // of that sender, and the one it had before
+    std::uint64_t datagrams = 0;              // that came from its port
+    std::int64_t received_ns = kNoTime_ns;    // when it sent the last; kNoTime_ns: nobody has yet
   };
   struct Batch;  // the buffers of one recvmmsg
 
@@ -81,7 +84,7 @@ class UdpTransport final : public Transport, public Upkeep {
   [[nodiscard]] bool receive(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool may_send(const Host& host) const noexcept;
   // Returns whether the socket accepts datagrams of this sender, which it then belongs to.
-  [[nodiscard]] bool owns(Socket& socket, const Host& sender) const noexcept;
+  [[nodiscard]] bool owns(Socket& socket, const Address& sender) noexcept;
   // Reads the ancillary data of a datagram: its arrival time, and what the kernel dropped.
   void read_control(std::size_t i, Chunk& chunk) noexcept;
 
@@ -94,6 +97,8 @@ class UdpTransport final : public Transport, public Upkeep {
   std::int64_t batch_ns_ = 0;            // host time and wall clock, taken before the batch
   std::int64_t wall_ns_ = 0;
   std::atomic<std::int64_t> group_received_ns_{kNoTime_ns};  // when a datagram of a group last came
+  enum class SecondSender : std::uint8_t { kNone, kSeen, kTold };
+  std::atomic<SecondSender> second_sender_{SecondSender::kNone};
   std::int64_t joined_ns_ = kNoTime_ns;  // of upkeep: when the groups were last joined
 };
 

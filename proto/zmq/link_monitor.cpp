@@ -1,9 +1,19 @@
 #include "proto/zmq/link_monitor.hpp"
 
-#include <atomic>
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
 #include <cstring>
 #include <string>
 #include <utility>
+
+#include <malloc.h>
+#include <poll.h>
+#include <pthread.h>
+#include <sys/socket.h>
+
+#include "proto/zmq/tcp_peer.hpp"
 
 namespace posed::net {
 namespace {
@@ -14,24 +24,48 @@ namespace {
 // many times in a row; a daemon that is merely ending is not there for a second try.
 constexpr int kHangUps = 3;
 
-constexpr int kEvents = ZMQ_EVENT_HANDSHAKE_SUCCEEDED | ZMQ_EVENT_HANDSHAKE_FAILED_AUTH |
-                        ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL | ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL |
-                        ZMQ_EVENT_DISCONNECTED;
+constexpr int kEvents = ZMQ_EVENT_CONNECTED | ZMQ_EVENT_HANDSHAKE_SUCCEEDED |
+                        ZMQ_EVENT_HANDSHAKE_FAILED_AUTH | ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL |
+                        ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL | ZMQ_EVENT_DISCONNECTED;
 
-// Reads the first part of a monitor message: event number and value (zmq_socket_monitor).
-std::uint16_t read_event(void* monitor) {
+// What a connection may have brought since it was looked at last: counted when it ends, so that
+// many short ones bring no more than a long one while nothing is received.
+constexpr std::uint64_t kUnseen = 384 * 1024;
+
+constexpr int kTick_ms = 10;  // a flood of empty parts fills about 0.7 GB a second
+
+struct MonitorEvent {
+  std::uint16_t number = 0;
+  std::int32_t value = 0;  // a descriptor, or a reason
+};
+
+// Reads a monitor message (zmq_socket_monitor): number and value, then the endpoint.
+MonitorEvent read_event(void* monitor) {
   Message part;
-  if (!part.receive(monitor)) return 0;
-  std::uint16_t event = 0;
-  if (part.text().size() >= sizeof event) std::memcpy(&event, part.text().data(), sizeof event);
+  MonitorEvent event;
+  if (!part.receive(monitor)) return event;
+  if (part.text().size() == sizeof event.number + sizeof event.value) {
+    std::memcpy(&event.number, part.text().data(), sizeof event.number);
+    std::memcpy(&event.value, part.text().data() + sizeof event.number, sizeof event.value);
+  }
   while (part.more() && part.receive(monitor, 0)) {
   }
   return event;
 }
 
+// Bytes that a part took on the wire (ZMTP 3): the header of its frame, and of CURVE's box.
+std::uint64_t wire_bytes(std::size_t part, bool with_key) {
+  constexpr std::uint64_t kBox = 33, kShortFrame = 255, kShortHeader = 2, kLongHeader = 9;
+  const std::uint64_t frame = part + (with_key ? kBox : 0);
+  return frame + (frame > kShortFrame ? kLongHeader : kShortHeader);
+}
+
 }  // namespace
 
-Result<LinkMonitor> LinkMonitor::open(void* context, void* socket, bool with_key) {
+Result<std::unique_ptr<LinkMonitor>> LinkMonitor::open(void* context, void* socket, bool with_key) {
+  const std::string_view largest(reinterpret_cast<const char*>(&kMaxReceivedPart),
+                                 sizeof kMaxReceivedPart);
+  TRY(set_option(socket, ZMQ_MAXMSGSIZE, largest));
   // unique names, because a context may have several
   static std::atomic<unsigned> number{0};
   const std::string endpoint = "inproc://posed.link." + std::to_string(++number);
@@ -39,41 +73,157 @@ Result<LinkMonitor> LinkMonitor::open(void* context, void* socket, bool with_key
     return fail(std::string("cannot watch the connection: ") + zmq_strerror(zmq_errno()));
   }
   auto monitor = TRY(open_socket(context, ZMQ_PAIR));
+  // No limit: otherwise libzmq's own thread would wait here until the events are read.
+  TRY(set_option(monitor.get(), ZMQ_RCVHWM, 0));
   TRY(connect_socket(monitor.get(), endpoint));
-  return LinkMonitor(std::move(monitor), with_key);
+  int fd = -1;
+  std::size_t size = sizeof fd;
+  if (zmq_getsockopt(monitor.get(), ZMQ_FD, &fd, &size) != 0) {
+    return fail("ZeroMQ names no descriptor to wait for");
+  }
+  std::unique_ptr<LinkMonitor> link(new LinkMonitor(socket, std::move(monitor), fd, with_key));
+  if (link->news_.fd() < 0 || link->wake_.fd() < 0) {
+    return fail("posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
+  }
+  link->thread_ = std::thread([watched = link.get()] { watched->watch(); });
+  return link;
+}
+
+LinkMonitor::LinkMonitor(void* socket, Socket monitor, int monitor_fd, bool with_key)
+    : socket_(socket), with_key_(with_key), monitor_fd_(monitor_fd), monitor_(std::move(monitor)) {}
+
+LinkMonitor::~LinkMonitor() {
+  stop_.store(true);
+  wake_.signal();
+  if (thread_.joinable()) thread_.join();
+  zmq_socket_monitor(socket_, nullptr, 0);
+}
+
+void LinkMonitor::watch() {
+  pthread_setname_np(pthread_self(), "posed-link");
+  sigset_t all;
+  sigfillset(&all);
+  pthread_sigmask(SIG_BLOCK, &all, nullptr);
+  std::array<pollfd, 2> items{{{.fd = monitor_fd_, .events = POLLIN, .revents = 0},
+                               {.fd = wake_.fd(), .events = POLLIN, .revents = 0}}};
+  while (!stop_.load()) {
+    int wait_ms = -1;
+    {
+      const std::scoped_lock lock(mutex_);
+      handle_events();
+      inspect();
+      if (is_connected()) wait_ms = kTick_ms;
+    }
+    ::poll(items.data(), items.size(), wait_ms);
+    wake_.clear();
+  }
+}
+
+bool LinkMonitor::receive(Message& part) noexcept {
+  const bool received =
+      part.receive(socket_) || (zmq_errno() == EAGAIN && !is_empty() && part.receive(socket_));
+  if (!received) return false;
+  const std::scoped_lock lock(mutex_);
+  // What had arrived when nothing waited cannot belong to a message behind this one.
+  accounted_ = std::max(accounted_ + wire_bytes(part.text().size(), with_key_), when_empty_);
+  return true;
+}
+
+bool LinkMonitor::is_empty() noexcept {
+  int fd = -1;
+  std::uint64_t cookie = 0;
+  {
+    const std::scoped_lock lock(mutex_);
+    fd = fd_;
+    cookie = cookie_;
+  }
+  const std::uint64_t arrived = received_bytes(fd);
+  int events = ZMQ_POLLIN;
+  std::size_t size = sizeof events;
+  static_cast<void>(zmq_getsockopt(socket_, ZMQ_EVENTS, &events, &size));
+  if ((events & ZMQ_POLLIN) != 0) return false;
+  const std::scoped_lock lock(mutex_);
+  const bool same = fd_ == fd && cookie_ == cookie && (fd < 0 || cookie_of(fd) == cookie);
+  if (same) when_empty_ = before_ + arrived;
+  accounted_ = std::max(accounted_, before_);  // nothing of earlier connections is left
+  return true;
+}
+
+void LinkMonitor::handle_events() {
+  for (;;) {
+    const MonitorEvent event = read_event(monitor_.get());
+    if (event.number == 0) return;
+    const Refusal refusal = handle(event.number, event.value);
+    if (refusal_ == Refusal::kNone) refusal_ = refusal;
+    news_.signal();
+  }
+}
+
+Refusal LinkMonitor::handle(std::uint16_t event, int value) {
+  switch (event) {
+    case ZMQ_EVENT_CONNECTED:
+      fd_ = value;
+      cookie_ = cookie_of(value);
+      is_cut_ = false;
+      break;
+    case ZMQ_EVENT_HANDSHAKE_SUCCEEDED:
+      state_.established = true;
+      hang_ups_ = 0;
+      break;
+    case ZMQ_EVENT_DISCONNECTED: {
+      fd_ = -1;
+      before_ += std::exchange(arrived_, 0) + kUnseen;
+      const bool was_cut = std::exchange(is_cut_, false);
+      if (was_cut) malloc_trim(0);
+      const bool known = std::exchange(failure_known_, false);
+      const bool was_established = std::exchange(state_.established, false);
+      if (was_established) ++state_.ends;
+      // This side was the first to see that the sockets do not match; libzmq tries no more.
+      if (!was_established && !known && !was_cut) return Refusal::kOtherSocket;
+      break;
+    }
+    case ZMQ_EVENT_HANDSHAKE_FAILED_AUTH:
+      failure_known_ = true;
+      return Refusal::kKeyNotAllowed;
+    case ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL:
+      failure_known_ = true;
+      return with_key_ ? Refusal::kTalksNoKeys : Refusal::kWantsKey;
+    case ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL:
+      failure_known_ = true;
+      if (is_cut_) break;
+      if (with_key_) return Refusal::kHangsUp;
+      if (++hang_ups_ == kHangUps) return Refusal::kHangsUpKeyless;
+      break;
+    default:
+      break;
+  }
+  return Refusal::kNone;
+}
+
+void LinkMonitor::inspect() {
+  if (!is_connected() || is_cut_) return;
+  arrived_ = received_bytes(fd_);
+  const std::uint64_t all = before_ + arrived_;
+  accounted_ = std::min(accounted_, all);
+  if (all - accounted_ <= kMaxUnreceived) return;
+  is_cut_ = true;
+  // libzmq's thread may have closed the connection since then, and its descriptor may have been
+  // reused.
+  if (cookie_ == 0 || cookie_of(fd_) != cookie_) return;
+  ::shutdown(fd_, SHUT_RDWR);
+  ++state_.cuts;
+  news_.signal();
 }
 
 Refusal LinkMonitor::next_refusal() {
-  while (const std::uint16_t event = read_event(monitor_.get())) {
-    switch (event) {
-      case ZMQ_EVENT_HANDSHAKE_SUCCEEDED:
-        established_ = true;
-        hang_ups_ = 0;
-        break;
-      case ZMQ_EVENT_DISCONNECTED: {
-        const bool known = std::exchange(failure_known_, false);
-        const bool was_established = std::exchange(established_, false);
-        if (was_established) ++ends_;
-        // This side was the first to see that the sockets do not match; libzmq tries no more.
-        if (!was_established && !known) return Refusal::kOtherSocket;
-        break;
-      }
-      case ZMQ_EVENT_HANDSHAKE_FAILED_AUTH:
-        failure_known_ = true;
-        return Refusal::kKeyNotAllowed;
-      case ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL:
-        failure_known_ = true;
-        return with_key_ ? Refusal::kTalksNoKeys : Refusal::kWantsKey;
-      case ZMQ_EVENT_HANDSHAKE_FAILED_NO_DETAIL:
-        failure_known_ = true;
-        if (with_key_) return Refusal::kHangsUp;
-        if (++hang_ups_ == kHangUps) return Refusal::kHangsUpKeyless;
-        break;
-      default:
-        break;
-    }
-  }
-  return Refusal::kNone;
+  news_.clear();
+  static_cast<void>(is_empty());  // some wait for long before they receive
+  const std::scoped_lock lock(mutex_);
+  const bool connected = is_connected();
+  handle_events();
+  if (connected != is_connected()) wake_.signal();  // the thread waits otherwise
+  told_ = state_;
+  return std::exchange(refusal_, Refusal::kNone);
 }
 
 }  // namespace posed::net

@@ -1,9 +1,23 @@
-// LinkMonitor: follows the one connection of a socket that connects to a daemon: whether it is
-// established, and why the daemon refuses this client. One thread uses it. Cold.
+// LinkMonitor: the one connection of a socket that connects to a daemon. It receives the socket's
+// messages, knows whether the connection is established and why the daemon refuses this client, and
+// ends a connection whose peer would fill the memory.
+//
+// libzmq counts neither the parts of a message nor its bytes against the high-water mark, and an
+// empty part (two bytes on the wire) takes 64 in memory. So a thread asks the kernel every 10 ms
+// how many bytes have arrived, subtracts those that were received as messages, and shuts the
+// connection down when too many are left; libzmq frees them and connects again. That bounds the
+// memory whoever the peer is: whoever takes a daemon's port while it is away can be anybody. The
+// kernel has no such count for ipc:// connections; they are protected by the file's permissions.
+// One thread uses a LinkMonitor. Cold.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
+#include <memory>
+#include <mutex>
+#include <thread>
 
+#include "proto/frame/event_fd.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/zmq/zmq_handle.hpp"
 
@@ -20,29 +34,72 @@ enum class Refusal : std::uint8_t {
   kHangsUpKeyless,  // kWantsKey or kOtherSocket
 };
 
+// Bytes of one part; the stats of 256 streams have about 200 KB. libzmq ends the connection at a
+// larger one.
+inline constexpr std::int64_t kMaxReceivedPart = 1024 * 1024;
+// Bytes that may have arrived without being received: more than a part, and as many empty parts as
+// take 48 MB.
+inline constexpr std::uint64_t kMaxUnreceived = 3 * 1024 * 1024 / 2;
+
 class LinkMonitor {
  public:
   // Call before the socket connects; destroy the monitor before the socket. `with_key`: the client
-  // uses CURVE.
-  static Result<LinkMonitor> open(void* context, void* socket, bool with_key);
+  // uses CURVE. Limits the parts of the socket's messages.
+  static Result<std::unique_ptr<LinkMonitor>> open(void* context, void* socket, bool with_key);
+  ~LinkMonitor();
+  LinkMonitor(const LinkMonitor&) = delete;
+  LinkMonitor& operator=(const LinkMonitor&) = delete;
 
-  [[nodiscard]] void* socket() const noexcept { return monitor_.get(); }  // readable: events wait
+  // The next part, if a message waits. Every part of the socket must be received here: the others
+  // would count as never received.
+  [[nodiscard]] bool receive(Message& part) noexcept;
 
-  // Handles the events that wait, up to the first refusal, and returns it; kNone: none refuses.
+  [[nodiscard]] int fd() const noexcept { return news_.fd(); }  // readable: events wait
+
+  // Handles the events that wait, and returns why the daemon refuses this client, once for each
+  // refusal; kNone: nothing new.
   [[nodiscard]] Refusal next_refusal();
-  // As of the last next_refusal(): whether the connection stands, and how often one has ended.
-  [[nodiscard]] bool established() const noexcept { return established_; }
-  [[nodiscard]] std::uint64_t ends() const noexcept { return ends_; }
+  // As of the last next_refusal(): whether the connection stands, how often one has ended, and how
+  // many of them ended here because the peer sent too much.
+  [[nodiscard]] bool established() const noexcept { return told_.established; }
+  [[nodiscard]] std::uint64_t ends() const noexcept { return told_.ends; }
+  [[nodiscard]] std::uint64_t cuts() const noexcept { return told_.cuts; }
 
  private:
-  LinkMonitor(Socket monitor, bool with_key) : monitor_(std::move(monitor)), with_key_(with_key) {}
+  struct State {
+    bool established = false;
+    std::uint64_t ends = 0;
+    std::uint64_t cuts = 0;
+  };
+  LinkMonitor(void* socket, Socket monitor, int monitor_fd, bool with_key);
+  void watch();
+  // Whether no message waits; if so, notes it.
+  [[nodiscard]] bool is_empty() noexcept;
+  // Each function below must be called with mutex_ held.
+  void handle_events();
+  [[nodiscard]] Refusal handle(std::uint16_t event, int value);
+  [[nodiscard]] bool is_connected() const noexcept { return fd_ >= 0; }
+  void inspect();
 
+  void* socket_;
+  const bool with_key_;
+  const int monitor_fd_;
+  RawEventFd news_, wake_;
+  State told_;  // of the owner's thread
+  std::mutex mutex_;
   Socket monitor_;
-  bool with_key_;
-  bool established_ = false;
-  std::uint64_t ends_ = 0;
-  int hang_ups_ = 0;            // in a row, before the handshake
-  bool failure_known_ = false;  // libzmq has reported why this connection's handshake failed
+  State state_;
+  Refusal refusal_ = Refusal::kNone;  // not told yet
+  int hang_ups_ = 0;                  // in a row, before the handshake
+  bool failure_known_ = false;        // libzmq has reported why this connection's handshake failed
+  int fd_ = -1;                       // the connection's descriptor; -1: none
+  std::uint64_t cookie_ = 0;          // and its id
+  bool is_cut_ = false;
+  // Bytes that have arrived: in earlier connections, in this one as of the last look, and in all
+  // when nothing waited to be received; and how many belong to parts that were received.
+  std::uint64_t before_ = 0, arrived_ = 0, when_empty_ = 0, accounted_ = 0;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
 };
 
 }  // namespace posed::net

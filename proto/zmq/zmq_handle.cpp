@@ -2,6 +2,8 @@
 
 #include <array>
 #include <cerrno>
+#include <charconv>
+#include <cstdint>
 #include <future>
 #include <string>
 #include <system_error>
@@ -12,7 +14,7 @@
 namespace posed::net {
 namespace {
 
-constexpr std::size_t kMaxPort = 65535;
+constexpr std::uint32_t kMaxPort = 65535;
 
 std::string last_error() { return zmq_strerror(zmq_errno()); }
 
@@ -64,17 +66,26 @@ Result<> set_option(void* socket, int option, std::string_view value) {
 
 bool has_possible_port(std::string_view endpoint) noexcept {
   if (!endpoint.starts_with("tcp://")) return true;
-  std::size_t port = 0;
-  for (const char letter : endpoint.substr(endpoint.rfind(':') + 1)) {
-    if (letter < '0' || letter > '9') return true;  // "*", or what libzmq itself refuses
-    port = port * 10 + static_cast<std::size_t>(letter - '0');
-    if (port > kMaxPort) return false;
-  }
-  return true;
+  const std::string_view text = endpoint.substr(endpoint.rfind(':') + 1);
+  if (text == "*" || text == "!") return true;
+  std::uint32_t port = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
+  return error == std::errc() && end == text.data() + text.size() && port <= kMaxPort;
 }
+
+namespace {
+
+// libzmq uses IPv6 only where it is told to.
+Result<> choose_family(void* socket, std::string_view endpoint) {
+  if (!endpoint.starts_with("tcp://[")) return {};
+  return set_option(socket, ZMQ_IPV6, 1);
+}
+
+}  // namespace
 
 Result<std::string> bind_socket(void* socket, const std::string& endpoint) {
   if (!has_possible_port(endpoint)) return misuse(no_such_port(endpoint));
+  TRY(choose_family(socket, endpoint));
   if (zmq_bind(socket, endpoint.c_str()) != 0) {
     if (zmq_errno() == EADDRINUSE) {
       return fail(endpoint +
@@ -96,6 +107,7 @@ Result<std::string> bind_socket(void* socket, const std::string& endpoint) {
 
 Result<> connect_socket(void* socket, const std::string& endpoint) {
   if (!has_possible_port(endpoint)) return misuse(no_such_port(endpoint));
+  TRY(choose_family(socket, endpoint));
   // A daemon that loses its power or its network says nothing: TCP finds that out in five seconds.
   for (const auto& [option, value] : {std::pair{ZMQ_TCP_KEEPALIVE, 1},
                                       {ZMQ_TCP_KEEPALIVE_IDLE, 2},

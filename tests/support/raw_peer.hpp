@@ -73,6 +73,8 @@ class RawPeer {
       throw std::runtime_error("nothing listens at " + endpoint);
     }
   }
+  // The other side of a connection that was accepted.
+  [[nodiscard]] static RawPeer of(int fd) { return RawPeer(fd); }
   ~RawPeer() {
     if (fd_ >= 0) close(fd_);
   }
@@ -125,6 +127,7 @@ class RawPeer {
   }
 
  private:
+  explicit RawPeer(int fd) : fd_(fd) {}
   bool wait(short events, std::chrono::milliseconds within) const {
     pollfd item{fd_, events, 0};
     return poll(&item, 1, static_cast<int>(within.count())) > 0;

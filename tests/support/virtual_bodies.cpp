@@ -28,11 +28,13 @@ void PublishedStream::count(const Frame& frame, bool is_raw, bool in_lists) {
 }
 
 VirtualBodies::VirtualBodies(const std::vector<std::unique_ptr<VirtualStreamContext>>& only,
-                             std::vector<VirtualSource> sources, std::size_t bodies, bool keeps_log)
+                             std::vector<VirtualSource> sources, std::size_t bodies,
+                             std::size_t max_made, bool keeps_log)
     : only_(only),
       wake_(system::EventFd::open().value()),
       counters_(only.size() + (sources.empty() ? 0 : bodies)),
       only_published_(only.size()),
+      max_made_(max_made),
       keeps_log_(keeps_log) {
   kept_.wakes(*wake_);
   std::size_t slots_of_body = 0;
@@ -127,9 +129,9 @@ void VirtualBodies::start(pipeline::Worker& worker, pipeline::Reader& reader,
   for (const auto& source : sources_) {
     for (const auto& named : source->config.named) reserved.insert(named.stream.name);
   }
-  builder_ = std::make_unique<devices::SourceBuilder>(sources_,
-                                                      static_cast<std::uint32_t>(counters_.size()),
-                                                      std::move(reserved), models_, kept_, *this);
+  builder_ = std::make_unique<devices::SourceBuilder>(
+      sources_, static_cast<std::uint32_t>(counters_.size()), std::move(reserved), models_, kept_,
+      *this, max_made_);
   const auto opened = builder_->open();
   INFO((opened ? "" : opened.error().text()));
   REQUIRE(opened);

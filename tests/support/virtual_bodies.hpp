@@ -48,7 +48,8 @@ class VirtualBodies final : public devices::StreamHost {
   // `only` are the devices with one body, which outlive the object; `bodies` is how many streams
   // the bodies of `sources` may have at once.
   VirtualBodies(const std::vector<std::unique_ptr<VirtualStreamContext>>& only,
-                std::vector<VirtualSource> sources, std::size_t bodies, bool keeps_log);
+                std::vector<VirtualSource> sources, std::size_t bodies, std::size_t max_made,
+                bool keeps_log);
   ~VirtualBodies() override;
 
   [[nodiscard]] std::size_t all_slots() const { return all_slots_; }  // of each ring
@@ -101,6 +102,7 @@ class VirtualBodies final : public devices::StreamHost {
   void keep(std::uint32_t stream, bool left);  // what it published
 
   // StreamHost
+  void is_alive() noexcept override {}
   pipeline::StreamCounters& counters(std::uint32_t stream) override;
   void add(devices::NewStream stream) override;
   std::optional<std::uint32_t> next_gone() override;
@@ -129,6 +131,7 @@ class VirtualBodies final : public devices::StreamHost {
   std::int64_t builder_due_ns_ = 0;
   std::map<std::uint32_t, std::unique_ptr<Stream>> streams_;  // those that were not removed
   std::vector<std::uint32_t> gone_;                           // given back by the worker
+  std::size_t max_made_;
   bool keeps_log_;
   std::vector<VirtualBody> log_;
   std::size_t warnings_ = 0;

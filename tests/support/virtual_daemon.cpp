@@ -114,7 +114,7 @@ void VirtualDaemon::Parts::open_log() {
 void VirtualDaemon::Parts::open() {
   virtual_now_ns = kVirtualBegin_ns;
   bodies = std::make_unique<VirtualBodies>(contexts, std::move(sources), options.bodies,
-                                           !options.counts_only);
+                                           options.max_made, !options.counts_only);
   open_log();
   const std::size_t slots = pipeline::kEventSlots + bodies->all_slots();
   decoded = std::make_unique<pipeline::Ring<pipeline::Item>>(slots);

@@ -107,8 +107,9 @@ struct VirtualOptions {
   std::vector<Spell> asleep{};
   // The process ends there as if by SIGKILL, so the log is as its last commit left it.
   double killed_at_s = kNever_s;
-  std::size_t ack_slots = 64;  // of the ring to control
-  std::size_t bodies = 8;      // of all sources that may have a stream at once
+  std::size_t ack_slots = 64;     // of the ring to control
+  std::size_t bodies = 8;         // of all sources that may have a stream at once
+  std::size_t max_made = 60'000;  // streams that are made without a pause
   // Each device's and each stream's share of the recorder's rings.
   std::size_t chunk_bytes = 4 << 20;
   record::SlotSizes record_slot{.frame_bytes = 16 << 20, .decisions = 2048};
@@ -191,6 +192,10 @@ struct VirtualBody {
 // number for the person; a person may get a new one, but nobody that of another.
 [[nodiscard]] VirtualSource mocap_source(const std::string& name, double length_s,
                                          std::uint64_t seed);
+
+// One person at 50 Hz, named by the config as the source is, who leaves at half of `back_s`,
+// returns then and stays.
+[[nodiscard]] VirtualSource guest_source(const std::string& name, double back_s, double end_s);
 
 // Inserts silences, unplugs (on streams with a glove) and bursts into the stream's only link, at
 // random.

@@ -228,4 +228,41 @@ VirtualSource mocap_source(const std::string& name, double length_s, std::uint64
   return source;
 }
 
+VirtualSource guest_source(const std::string& name, double back_s, double end_s) {
+  constexpr double kRate_hz = 50.0;
+  constexpr std::uint16_t kGuest = 500;  // nobody else's number
+  VirtualSource source;
+  source.bodies = {"Gia"};
+  source.config.name = name;
+  source.config.driver = "template_mocap";
+  source.config.options =
+      drivers::complete_options(*drivers::find_driver("template_mocap"), {}).value();
+  source.config.named.push_back({.body = "Gia", .stream = {}});
+  source.config.named[0].stream.name = name;
+  std::vector<ScriptedChunk> chunks;
+  const auto send = [&](double at_s, const Bytes& bytes) {
+    chunks.push_back({.at_s = at_s,
+                      .bytes = {reinterpret_cast<const char*>(bytes.data()),  // NOLINT: as text
+                                bytes.size()}});
+  };
+  for (std::uint32_t i = 0; i < end_s * kRate_hz; ++i) {
+    const double now_s = i / kRate_hz;
+    const bool here = now_s < back_s / 2 || now_s >= back_s;
+    std::vector<BodyEntry> entries;
+    FramePacket packet{
+        .number = i + 1, .time_us = static_cast<std::uint32_t>(now_s * 1e6), .bodies = {}};
+    if (here) {
+      entries.push_back({.id = kGuest, .name = "Gia", .joints = figure(0)});
+      BodyPose& pose = packet.bodies.emplace_back();
+      pose.id = kGuest;
+      pose.root_m = {static_cast<float>(now_s), 0.9F, static_cast<float>(kGuest)};
+      pose.rotation_xyzw.assign(entries[0].joints.size(), turn(0.3 * std::sin(6.0 * now_s)));
+    }
+    if (i % 10 == 0) send(now_s, drivers::mocap::encode_description(entries));
+    send(now_s, drivers::mocap::encode_frame(packet));
+  }
+  source.links.push_back({.chunks = std::move(chunks), .flood = {}});
+  return source;
+}
+
 }  // namespace posed::test

@@ -64,6 +64,12 @@ class Connection {
 
   [[nodiscard]] const std::string& endpoint() const { return socket_.peer().endpoint; }
   [[nodiscard]] void* socket() const { return socket_.get(); }
+  // The next part, if a message waits. Whatever comes must be received here.
+  [[nodiscard]] bool receive(net::Message& part) { return socket_.receive(part); }
+  // The next message of two parts, a topic and its body; others are skipped.
+  [[nodiscard]] bool receive(net::Message& topic, net::Message& body) {
+    return socket_.receive(topic, body) == link::Received::kMessage;
+  }
   // Waits for a message; returns false on timeout or a signal.
   [[nodiscard]] bool wait(std::chrono::milliseconds timeout);
 

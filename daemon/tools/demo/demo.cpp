@@ -209,8 +209,7 @@ Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
 // Receives every message that waits.
 void drain(Connection& connection, Watcher& watcher, DemoScreen& screen) {
   net::Message topic, body;
-  while (topic.receive(connection.socket()) && topic.more() &&
-         body.receive(connection.socket(), 0)) {
+  while (connection.receive(topic, body)) {
     screen.handle(topic.text(), body.bytes());
     if (!topic.text().starts_with("pose/")) continue;
     watcher.handle(std::string(topic.text()), body.bytes().data(), body.bytes().size());

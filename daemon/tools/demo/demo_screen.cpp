@@ -11,6 +11,7 @@
 
 #include "daemon/assembly/daemon.hpp"
 #include "posed/v1/control.pb.h"
+#include "proto/message/bounded_parse.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::tools {
@@ -64,10 +65,9 @@ Result<> DemoHand::tend(double seconds) {
     }
   }
   net::Message message;
-  if (!message.receive(connection_.socket())) return {};
+  if (!connection_.receive(message)) return {};
   v1::ControlReply reply;
-  const auto bytes = message.bytes();
-  if (!reply.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())) || !reply.ok()) {
+  if (!message::parse_bounded(reply, message.bytes()) || !reply.ok()) {
     return fail("the demo's own play command was refused: " + reply.error());
   }
   return {};

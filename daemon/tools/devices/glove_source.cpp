@@ -10,6 +10,7 @@
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/sink.hpp"
+#include "proto/message/bounded_parse.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::tools {
@@ -131,15 +132,11 @@ class Subscription {
     Received received;
     if (!connection_.wait(kLookAround)) return received;
     net::Message topic, body;
-    if (!topic.receive(connection_.socket()) || !topic.more()) return received;
-    if (!body.receive(connection_.socket(), 0)) return received;
-    const int size = static_cast<int>(body.bytes().size());
+    if (!connection_.receive(topic, body)) return received;
     if (topic.text() == "stats") {
-      if (!received.stats.emplace().ParseFromArray(body.bytes().data(), size))
-        received.stats.reset();
+      if (!message::parse_bounded(received.stats.emplace(), body.bytes())) received.stats.reset();
     } else if (topic.text() == sensor_topic(stream_)) {
-      if (!received.sample.emplace().ParseFromArray(body.bytes().data(), size))
-        received.sample.reset();
+      if (!message::parse_bounded(received.sample.emplace(), body.bytes())) received.sample.reset();
     }
     return received;
   }

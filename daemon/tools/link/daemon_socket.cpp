@@ -1,7 +1,5 @@
 #include "daemon/tools/link/daemon_socket.hpp"
 
-#include <string_view>
-
 #include "daemon/net/security.hpp"
 #include "proto/zmq/keys.hpp"
 
@@ -13,11 +11,8 @@ Result<DaemonSocket> DaemonSocket::open(void* context, int type, Peer peer, cons
   if (keys) {
     TRY(net::secure_client(socket.get(), peer.key, peer.server_key));
   }
-  const std::string_view largest(reinterpret_cast<const char*>(&limits.largest_part),
-                                 sizeof limits.largest_part);
   for (const Result<>& set :
-       {net::set_option(socket.get(), ZMQ_MAXMSGSIZE, largest),
-        net::set_option(socket.get(), ZMQ_RCVHWM, limits.messages),
+       {net::set_option(socket.get(), ZMQ_RCVHWM, limits.messages),
         net::set_option(socket.get(), ZMQ_RCVBUF, limits.receive_buffer),
         net::set_option(socket.get(), ZMQ_SNDHWM, limits.requests),
         net::set_option(socket.get(), ZMQ_IMMEDIATE, limits.only_connected ? 1 : 0)}) {
@@ -30,16 +25,16 @@ Result<DaemonSocket> DaemonSocket::open(void* context, int type, Peer peer, cons
 }
 
 Received DaemonSocket::receive(net::Message& first, net::Message& second) noexcept {
-  if (!first.receive(get())) return Received::kNothing;
+  if (!receive(first)) return Received::kNothing;
   if (!first.more()) return Received::kMalformed;
-  const bool whole = second.receive(get()) && !second.more();
-  while (second.more() && second.receive(get())) {
+  const bool whole = receive(second) && !second.more();
+  while (second.more() && receive(second)) {
   }
   return whole ? Received::kMessage : Received::kMalformed;
 }
 
 std::string DaemonSocket::refusal() {
-  return net::refusal_words(monitor_.next_refusal(), domain_, peer_.server_key);
+  return net::refusal_words(monitor_->next_refusal(), domain_, peer_.server_key);
 }
 
 }  // namespace posed::link

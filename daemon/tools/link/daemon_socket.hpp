@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -22,11 +23,13 @@ struct Peer {
   std::filesystem::path server_key{};  // the daemon's NAME.pub
 };
 
+// Bytes of a message of a stream; a skeleton of 256 joints has about 30 KB. Only stats are longer.
+inline constexpr std::size_t kMaxStreamMessage = 64 * 1024;
+
 struct Limits {
-  int messages = 64;               // that wait here; the skeletons of streams come together
+  int messages = 48;               // that wait here; large skeletons that come together need 1.5 MB
   int receive_buffer = 16 * 1024;  // bytes, of the kernel
-  std::int64_t largest_part = 1024 * 1024;  // bytes; the stats of 256 streams have about 200 KB
-  int requests = 64;                        // or subscriptions, that wait to be sent
+  int requests = 64;               // or subscriptions, that wait to be sent
   bool only_connected = false;  // refuse requests while there is no connection, instead of sending
                                 // them when there is one, much later
 };
@@ -38,23 +41,29 @@ class DaemonSocket {
   // `type` is ZMQ_SUB, ZMQ_XSUB or ZMQ_DEALER. Returns at once. `context` outlives the socket.
   static Result<DaemonSocket> open(void* context, int type, Peer peer, const Limits& limits);
 
+  // To wait, to send and to set options; what comes is received below.
   [[nodiscard]] void* get() const noexcept { return socket_.get(); }
   [[nodiscard]] const Peer& peer() const noexcept { return peer_; }
   [[nodiscard]] net::Domain domain() const noexcept { return domain_; }
-  [[nodiscard]] void* news() const noexcept { return monitor_.socket(); }  // readable: refusal()
+  [[nodiscard]] int news_fd() const noexcept { return monitor_->fd(); }  // readable: refusal()
 
   // The next message, if one waits. One that is not of two parts is skipped whole and malformed.
   [[nodiscard]] Received receive(net::Message& first, net::Message& second) noexcept;
+  // The next part, if a message waits.
+  [[nodiscard]] bool receive(net::Message& part) noexcept { return monitor_->receive(part); }
 
   // Reads what happened to the connection. Returns why the daemon refuses it, as the end of a
   // sentence that begins with the daemon's name; empty if it does not.
   [[nodiscard]] std::string refusal();
-  // Both as of the last call of refusal(): whether the connection stands, and how many have ended.
-  [[nodiscard]] bool established() const noexcept { return monitor_.established(); }
-  [[nodiscard]] std::uint64_t ends() const noexcept { return monitor_.ends(); }
+  // As of the last call of refusal(): whether the connection stands, how many have ended, and how
+  // many of those because the peer sent more than any daemon does.
+  [[nodiscard]] bool established() const noexcept { return monitor_->established(); }
+  [[nodiscard]] std::uint64_t ends() const noexcept { return monitor_->ends(); }
+  [[nodiscard]] std::uint64_t cuts() const noexcept { return monitor_->cuts(); }
 
  private:
-  DaemonSocket(Peer peer, net::Domain domain, net::Socket socket, net::LinkMonitor monitor)
+  DaemonSocket(Peer peer, net::Domain domain, net::Socket socket,
+               std::unique_ptr<net::LinkMonitor> monitor)
       : peer_(std::move(peer)),
         domain_(domain),
         socket_(std::move(socket)),
@@ -63,7 +72,7 @@ class DaemonSocket {
   Peer peer_;
   net::Domain domain_;
   net::Socket socket_;
-  net::LinkMonitor monitor_;
+  std::unique_ptr<net::LinkMonitor> monitor_;  // ends before the socket
 };
 
 }  // namespace posed::link

@@ -10,6 +10,7 @@
 #include "models/style/live/style_filter.hpp"
 #include "posed/v1/control.pb.h"
 #include "posed/v1/posed.pb.h"
+#include "proto/message/bounded_parse.hpp"
 #include "proto/message/skeleton_message.hpp"
 #include "proto/text/clean.hpp"
 
@@ -57,7 +58,7 @@ void StreamFigure::handle(std::string_view topic, std::span<const std::byte> bod
 
 void StreamFigure::take_skeleton(std::span<const std::byte> body) {
   v1::Skeleton message;
-  if (!message.ParseFromArray(body.data(), static_cast<int>(body.size()))) return;
+  if (!message::parse_bounded(message, body)) return;
   if (shape_ != nullptr && message.id() == wire_id_) return;
   auto skeleton = message::skeleton_from(message);
   if (!skeleton) return;
@@ -71,7 +72,7 @@ void StreamFigure::take_skeleton(std::span<const std::byte> body) {
 
 void StreamFigure::take_pose(std::span<const std::byte> body) {
   v1::Frame message;
-  if (shape_ == nullptr || !message.ParseFromArray(body.data(), static_cast<int>(body.size())) ||
+  if (shape_ == nullptr || !message::parse_bounded(message, body) ||
       message.skeleton_id() != wire_id_) {
     return;
   }
@@ -225,11 +226,10 @@ void ChosenStream::ask(const std::string& stream, double alpha) {
 // back.
 void ChosenStream::read_answer() {
   net::Message message;
-  if (message.receive(control_->socket())) {
+  if (control_->receive(message)) {
     asked_at_.reset();
     v1::ControlReply reply;
-    const auto bytes = message.bytes();
-    const bool valid = reply.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
+    const bool valid = message::parse_bounded(reply, message.bytes());
     if (!valid || !reply.ok()) {
       note_ = "alpha stays: " + (valid ? clean(reply.error()) : "the answer cannot be read");
       asked_alpha_.reset();

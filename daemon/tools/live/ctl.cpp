@@ -29,6 +29,7 @@
 #include "models/style/live/style_type.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
+#include "proto/message/bounded_parse.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
 #include "proto/text/nearest_word.hpp"
@@ -62,10 +63,9 @@ Result<v1::ControlReply> ask(Connection& connection, const CtlOptions& options,
     if (auto refused = connection.refusal()) return std::unexpected(*refused);
     if (!connection.wait(kLookAround)) continue;
     net::Message message;
-    if (!message.receive(connection.socket())) continue;
+    if (!connection.receive(message)) continue;
     v1::ControlReply reply;
-    const auto bytes = message.bytes();
-    if (message.more() || !reply.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
+    if (message.more() || !message::parse_bounded(reply, message.bytes())) {
       return fail(options.client.endpoint + " does not answer like a posed daemon");
     }
     return reply;

@@ -14,6 +14,7 @@
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/live/monitor_line.hpp"
 #include "posed/v1/posed.pb.h"
+#include "proto/message/bounded_parse.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/stream_name.hpp"
 
@@ -36,7 +37,7 @@ struct MonitorOptions {
 template <typename Message>
 bool show(std::span<const std::byte> bytes, bool as_json) {
   Message message;
-  if (!message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return false;
+  if (!message::parse_bounded(message, bytes)) return false;
   if (as_json) return print_json(message);
   std::printf("%s %s\n", clock_time().c_str(), monitor_line(message).c_str());
   return std::fflush(stdout) == 0;
@@ -96,8 +97,7 @@ class Monitor {
  private:
   Result<> receive() {
     net::Message topic, body;
-    if (!topic.receive(connection_.socket()) || !topic.more()) return {};
-    if (!body.receive(connection_.socket(), 0)) return {};
+    if (!connection_.receive(topic, body)) return {};
     watch_.beat();
     if (topic.text() == "stats") {
       TRY(look_at(body.bytes()));
@@ -118,8 +118,7 @@ class Monitor {
   // there is an error, unless streams come and go here, as bodies of sources do.
   Result<> look_at(std::span<const std::byte> bytes) {
     v1::Stats stats;
-    const auto size = static_cast<int>(bytes.size());
-    if (looked_ || !stats.ParseFromArray(bytes.data(), size) || stats.stream().empty()) return {};
+    if (looked_ || !message::parse_bounded(stats, bytes) || stats.stream().empty()) return {};
     looked_ = true;
     if (!stats.replay_file().empty()) {
       std::fprintf(stderr, "posed: %s\n", replay_words(stats).c_str());

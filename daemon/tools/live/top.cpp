@@ -19,6 +19,7 @@
 #include "daemon/tools/live/live_view.hpp"
 #include "daemon/tools/live/monitor_line.hpp"
 #include "posed/v1/posed.pb.h"
+#include "proto/message/bounded_parse.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::tools {
@@ -99,12 +100,10 @@ class Top {
   // Receives one message; returns true if it brought new stats. `drawn`: the figure is shown.
   bool receive(bool drawn) {
     net::Message topic, body;
-    if (!topic.receive(connection_.socket()) || !topic.more()) return false;
-    if (!body.receive(connection_.socket(), 0)) return false;
+    if (!connection_.receive(topic, body)) return false;
     watch_.beat();
-    const auto size = static_cast<int>(body.bytes().size());
     if (topic.text() == "stats") {
-      if (!stats_.ParseFromArray(body.bytes().data(), size)) return false;
+      if (!message::parse_bounded(stats_, body.bytes())) return false;
       if (drawn) chosen_.update(stats_);
       return true;
     }
@@ -113,7 +112,7 @@ class Top {
       return false;
     }
     v1::Event event;
-    if (!event.ParseFromArray(body.bytes().data(), size)) return false;
+    if (!message::parse_bounded(event, body.bytes())) return false;
     add_note(clean_name(event.stream()) + ": " + clean(event.text()));
     return false;
   }

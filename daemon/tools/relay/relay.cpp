@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <set>
+#include <span>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -11,6 +13,7 @@
 #include "daemon/net/zap_authenticator.hpp"
 #include "daemon/publish/subscriptions.hpp"
 #include "daemon/system/event_fd.hpp"
+#include "proto/message/bounded_parse.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/zmq/keys.hpp"
 
@@ -34,8 +37,12 @@ bool Upstream::subscribe(const std::string& prefix, bool on) {
 
 void Upstream::log_news() {
   const bool before = established();
+  const std::uint64_t cuts = socket_.cuts();
   if (const std::string why = socket_.refusal(); !why.empty()) {
     spdlog::error("the daemon at {} {}", endpoint(), why);
+  } else if (socket_.cuts() != cuts) {
+    spdlog::warn("{} sends more than any daemon does; its connection was ended and is tried again",
+                 endpoint());
   } else if (established() != before) {
     spdlog::log(before ? spdlog::level::warn : spdlog::level::info, "{}: {}", endpoint(),
                 before ? "connection lost; it is tried again" : "connected");
@@ -46,38 +53,60 @@ namespace {
 
 constexpr std::int64_t kNoStats_ns = 3 * kNanosPerSecond;  // three stats are missing
 
+struct Names {
+  std::set<std::string> streams{}, sources{};
+};
+
+// What is set already comes from a relay before this one.
+void name_clock(v1::Stats& stats) {
+  for (v1::StreamStats& stream : *stats.mutable_stream()) {
+    if (stream.has_monotonic_to_utc_ns()) continue;
+    stream.set_monotonic_to_utc_ns(stats.monotonic_to_utc_ns());
+  }
+}
+
+// Adds the streams and sources of `bytes` whose names are new, as many as there is room for.
+void add_new(v1::Stats& merged, std::string_view bytes, Names& names) {
+  v1::Stats stats;
+  if (!message::parse_bounded(stats, std::as_bytes(std::span(bytes)))) return;
+  name_clock(stats);
+  for (v1::StreamStats& stream : *stats.mutable_stream()) {
+    if (names.streams.size() >= kMaxStreams) break;
+    if (names.streams.insert(stream.stream()).second) merged.add_stream()->Swap(&stream);
+  }
+  for (v1::SourceStats& source : *stats.mutable_source()) {
+    if (names.sources.size() >= kMaxStreams) break;
+    if (names.sources.insert(source.name()).second) merged.add_source()->Swap(&source);
+  }
+}
+
 }  // namespace
 
 std::optional<std::string> MergedStats::accept(std::size_t upstream, std::string_view bytes,
                                                std::int64_t now_ns, bool& valid) {
   assert(upstream < latest_.size());
   Latest& latest = latest_[upstream];
-  valid = latest.stats.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
-  if (!valid) {
-    latest.ever = false;
-    return std::nullopt;
-  }
-  latest.ever = true;
+  v1::Stats stats;
+  valid = message::parse_bounded(stats, std::as_bytes(std::span(bytes)));
+  latest.ever = valid;
+  latest.bytes = valid && latest_.size() > 1 ? std::string(bytes) : std::string();
+  if (!valid) return std::nullopt;
   latest.at_ns = now_ns;
   if (latest_.size() == 1) return std::string(bytes);
-  for (v1::StreamStats& stream : *latest.stats.mutable_stream()) {
-    // What is set already comes from a relay before this one.
-    if (stream.has_monotonic_to_utc_ns()) continue;
-    stream.set_monotonic_to_utc_ns(latest.stats.monotonic_to_utc_ns());
-  }
   const auto answers = [&](const Latest& one) {
     return one.ever && now_ns - one.at_ns < kNoStats_ns;
   };
   for (std::size_t i = 0; i < upstream; ++i) {
     if (answers(latest_[i])) return std::nullopt;  // an earlier one gives the beat
   }
-  v1::Stats merged = latest.stats;
+  name_clock(stats);
+  Names names;
+  for (const v1::StreamStats& stream : stats.stream()) names.streams.insert(stream.stream());
+  for (const v1::SourceStats& source : stats.source()) names.sources.insert(source.name());
   for (std::size_t i = upstream + 1; i < latest_.size(); ++i) {
-    if (!answers(latest_[i])) continue;
-    merged.mutable_stream()->MergeFrom(latest_[i].stats.stream());
-    merged.mutable_source()->MergeFrom(latest_[i].stats.source());
+    if (answers(latest_[i])) add_new(stats, latest_[i].bytes, names);
   }
-  return merged.SerializeAsString();
+  return stats.SerializeAsString();
 }
 
 namespace {
@@ -245,7 +274,7 @@ void Relay::wait(std::int64_t timeout_ns) {
   items[count++] = {socket_.get(), 0, ZMQ_POLLIN, 0};
   for (const Upstream& upstream : upstreams_) {
     items[count++] = {upstream.socket(), 0, ZMQ_POLLIN, 0};
-    items[count++] = {upstream.news(), 0, ZMQ_POLLIN, 0};
+    items[count++] = {nullptr, upstream.news_fd(), ZMQ_POLLIN, 0};
   }
   constexpr std::int64_t kMilli_ns = 1'000'000;
   zmq_poll(items.data(), count,
@@ -276,7 +305,7 @@ void Relay::pass_on(std::size_t upstream, std::string_view topic, net::Message& 
     if (stats) send(topic, *stats);
     return;
   }
-  if (!is_whole_topic(topic)) {
+  if (!is_whole_topic(topic) || body.text().size() > link::kMaxStreamMessage) {
     ++counts_.foreign;
     return;
   }

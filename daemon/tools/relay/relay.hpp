@@ -29,7 +29,7 @@ class Upstream {
   static Result<Upstream> open(void* context, const link::Peer& peer);
 
   [[nodiscard]] void* socket() const noexcept { return socket_.get(); }
-  [[nodiscard]] void* news() const noexcept { return socket_.news(); }  // readable: log_news()
+  [[nodiscard]] int news_fd() const noexcept { return socket_.news_fd(); }  // readable: log_news()
   [[nodiscard]] const std::string& endpoint() const noexcept { return socket_.peer().endpoint; }
 
   // Returns false if the connection cannot take more subscriptions now.
@@ -58,13 +58,14 @@ class MergedStats {
   // Stats came from an upstream. Returns what to publish: of one upstream its own bytes; of several
   // the streams and sources of all that are not silent, each stream with the clock of its own
   // machine, and everything else as the first of them says it, whenever that one sends its stats.
-  // Empty: nothing now. `valid` is false for bytes that are no stats.
+  // Of a stream or source that several of them name, the first one's counts: relays in a circle
+  // send everything back. Empty: nothing now. `valid` is false for bytes that are no stats.
   [[nodiscard]] std::optional<std::string> accept(std::size_t upstream, std::string_view bytes,
                                                   std::int64_t now_ns, bool& valid);
 
  private:
   struct Latest {
-    v1::Stats stats{};
+    std::string bytes{};  // as bytes, because a hostile message takes much more memory parsed
     std::int64_t at_ns = 0;
     bool ever = false;
   };

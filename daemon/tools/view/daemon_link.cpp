@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstring>
+#include <span>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -9,6 +10,7 @@
 
 #include "daemon/system/clock.hpp"
 #include "proto/frame/time.hpp"
+#include "proto/message/bounded_parse.hpp"
 
 namespace posed::view {
 namespace {
@@ -230,7 +232,7 @@ void DaemonLink::ask_for_status(std::int64_t now_ns) {
 
 void DaemonLink::handle_status(std::string_view bytes) {
   v1::ControlReply reply;
-  if (!reply.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) return;
+  if (!message::parse_bounded(reply, std::as_bytes(std::span(bytes)))) return;
   asked_ns_.reset();
   hub_.control_is({.may = reply.ok(), .reason = reply.error()});
 }

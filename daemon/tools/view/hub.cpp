@@ -224,13 +224,23 @@ void Hub::receive(std::string_view topic, std::string_view body, std::int64_t no
   }
 }
 
+Bytes Hub::counted(std::string_view topic, std::string_view body) const {
+  Bytes bytes = with_topic(topic, body);
+  const std::string* const text = bytes.get();
+  *kept_ += text->size();
+  return {text, [kept = kept_, owner = std::move(bytes)](const std::string* gone) {
+            *kept -= gone->size();
+          }};
+}
+
 void Hub::receive_stream(std::string_view topic, std::string_view body, std::int64_t now_ns) {
   const auto slash = topic.find('/');
   const bool skeleton = topic.starts_with(kSkeleton);
   const bool event = topic.starts_with("event/");
   const bool thinned =
       std::ranges::any_of(kThinned, [&](const char* kind) { return topic.starts_with(kind); });
-  if (!skeleton && !event && !thinned) {
+  const bool fits = body.size() <= link::kMaxStreamMessage && *kept_ + body.size() <= kMaxKeptBytes;
+  if ((!skeleton && !event && !thinned) || !fits) {
     ++counts_.foreign;
     return;
   }
@@ -245,7 +255,7 @@ void Hub::receive_stream(std::string_view topic, std::string_view body, std::int
   }
   known->second.received_ns = now_ns;
   if (tabs_.empty() && !skeleton) return;
-  Bytes bytes = with_topic(topic, body);
+  const Bytes bytes = counted(topic, body);
   if (skeleton) {
     // The daemon repeats it every second, for clients that come later. After a pause the stream had
     // left, and pages have forgotten its skeleton.

@@ -6,11 +6,13 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <set>
 #include <string>
 #include <string_view>
 #include <variant>
 
+#include "daemon/tools/link/daemon_socket.hpp"
 #include "daemon/tools/view/outbox.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/frame/result.hpp"
@@ -77,7 +79,10 @@ struct Greeting {
 [[nodiscard]] Parcel no_reply_word(std::uint32_t number, const std::string& sentence);
 
 inline constexpr std::size_t kMaxViewStreams = 1024;  // more are not shown
-inline constexpr std::size_t kMaxUnderWay = 8;        // requests of one page at once
+// Bytes of all streams' messages that are kept for the pages; more are left out. Those of a large
+// setup have some MB.
+inline constexpr std::size_t kMaxKeptBytes = 32 * 1024 * 1024;
+inline constexpr std::size_t kMaxUnderWay = 8;  // requests of one page at once
 
 // An open page.
 struct Tab {
@@ -127,6 +132,8 @@ class Hub {
   // Gives up requests without a reply and streams that are silent. Call from time to time.
   void expire(std::int64_t now_ns);
   [[nodiscard]] const HubCounts& counts() const noexcept { return counts_; }
+  // Bytes of streams that are kept, here and in the outboxes.
+  [[nodiscard]] std::size_t kept_bytes() const noexcept { return *kept_; }
 
  private:
   struct Stream {
@@ -144,6 +151,8 @@ class Hub {
   [[nodiscard]] std::string reason_against(const Tab& tab, const PageRequest& asked,
                                            std::int64_t now_ns) const;
   void note_upload(Tab& tab, const v1::ControlRequest& request, std::int64_t now_ns);
+  // The message behind its topic, counted in kept_ for as long as anybody has it.
+  [[nodiscard]] Bytes counted(std::string_view topic, std::string_view body) const;
   void receive_stream(std::string_view topic, std::string_view body, std::int64_t now_ns);
   void send_to_all(const Parcel& parcel);
   void forget(std::string_view stream);
@@ -160,6 +169,7 @@ class Hub {
   // The daemon sees one client, which may send one model at a time.
   const Tab* uploader_ = nullptr;
   std::int64_t upload_ns_ = 0;
+  std::shared_ptr<std::size_t> kept_ = std::make_shared<std::size_t>(0);  // bytes
   HubCounts counts_;
 };
 

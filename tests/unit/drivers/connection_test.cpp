@@ -254,6 +254,75 @@ TEST_CASE("only peers may connect, and without peers only loopback listens") {
   const Client unknown(port);
   CHECK_FALSE(ports.accept(others));
   CHECK(ports.refused() == 1);
+  CHECK_FALSE(check_listen({.endpoint = loopback(port), .peers = {"glove.local"}}));
+  CHECK(check_listen({.endpoint = loopback(port), .peers = {"::ffff:192.0.2.7"}}));
+}
+
+TEST_CASE("a connection that begins as a web browser's is ended and counted, byte by byte, too") {
+  const std::string body(3000, 'A');
+  const std::vector<std::string> browsers{
+      "POST / HTTP/1.1\r\n\r\n" + body,    "GET / HTTP/1.1\r\n\r\n",
+      "OPTIONS * HTTP/1.1\r\n\r\n" + body, "PUT / HTTP/1.1\r\n\r\n" + body,
+      "HEAD / HTTP/1.1\r\n\r\n",           "CONNECT a:1 HTTP/1.1\r\n\r\n",
+      "PRI * HTTP/2.0\r\n\r\n" + body,     "\x16\x03\x01" + body};
+  for (const std::string& request : browsers) {
+    for (const std::size_t piece : {std::size_t{1}, std::size_t{4}, request.size()}) {
+      INFO(request.substr(0, 8) << " in pieces of " << piece);
+      const std::uint16_t port = free_port();
+      TransportFactory ports;
+      CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
+      const Client page(port);
+      auto link = ports.accept({.endpoint = loopback(port)});
+      REQUIRE(link);
+      const auto transport = make_link_transport(std::move(*link));
+      REQUIRE(transport->start(0));
+      Chunk chunk;
+      for (std::size_t at = 0; at < std::min<std::size_t>(request.size(), 12) && !chunk.lost;) {
+        page.say(request.substr(at, piece));
+        at += piece;
+        REQUIRE(readable(*transport));
+        chunk = transport->read(0);
+        CHECK(chunk.bytes.empty());
+      }
+      CHECK(chunk.lost);
+      CHECK(chunk.foreign == 1);
+      CHECK(transport->read(0).bytes.empty());
+    }
+  }
+}
+
+TEST_CASE("a page whose request has come already takes no device's place, nor is it read") {
+  const std::uint16_t port = free_port();
+  TransportFactory ports;
+  CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
+  const Client glove(port), page(port);
+  glove.say("glove");
+  page.say("POST / HTTP/1.1\r\n\r\n");
+  auto link = ports.accept({.endpoint = loopback(port)});
+  REQUIRE(link);
+  const auto bytes = link->read(kPatience);
+  REQUIRE(bytes);
+  CHECK(text_of(*bytes) == "glove");
+  CHECK(ports.refused() == 1);
+}
+
+TEST_CASE("bytes that begin like a browser's and go on otherwise are a device's, all of them") {
+  const std::uint16_t port = free_port();
+  TransportFactory ports;
+  CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
+  const Client glove(port);
+  auto link = ports.accept({.endpoint = loopback(port)});
+  REQUIRE(link);
+  const auto transport = make_link_transport(std::move(*link));
+  glove.say("PO");
+  REQUIRE(readable(*transport));
+  CHECK(transport->read(0).bytes.empty());
+  glove.say("S1\nGET / ");
+  REQUIRE(readable(*transport));
+  CHECK(text_of(transport->read(0).bytes) == "POS1\nGET / ");
+  glove.say("POST / ");
+  REQUIRE(readable(*transport));
+  CHECK(text_of(transport->read(0).bytes) == "POST / ");
 }
 
 TEST_CASE("cancelling while a device is opened ends all waits, then and later") {
@@ -290,7 +359,8 @@ TEST_CASE("ports that only prepare listen already, open nothing and still refuse
 
 TEST_CASE("an endpoint that is invalid or taken is refused with an error message") {
   TransportFactory ports;
-  for (const char* wrong : {"", "5200", ":5200", "127.0.0.1:", "glove:5200", "127.0.0.1:x"}) {
+  for (const char* wrong : {"", "5200", ":5200", "127.0.0.1:", "glove:5200", "127.0.0.1:x",
+                            "127.0.0.1:-1", "127.0.0.1:65536", "127.0.0.1:+5"}) {
     const auto link = ports.accept({.endpoint = wrong});
     REQUIRE_FALSE(link);
     CHECK(link.error().exit_code == ExitCode::kWrongUse);

@@ -2,7 +2,9 @@
 #include <atomic>
 #include <chrono>
 #include <memory>
+#include <mutex>
 #include <optional>
+#include <set>
 #include <string>
 #include <thread>
 #include <utility>
@@ -55,12 +57,20 @@ class Booth final : public DaemonControl {
   Result<pipeline::Take> mark_take(const pipeline::TakeMark&) override {
     return fail("not recording");
   }
-  void fill(v1::Stats& stats) override { stats.set_rss_bytes(42); }
+  void fill(v1::Stats& stats) override {
+    while (hold_status) std::this_thread::sleep_for(1ms);
+    stats.set_rss_bytes(42);
+    const std::scoped_lock lock(mutex);
+    if (server_) beats_at_status.insert(server_->pulse().beats());
+  }
   void stop() override { stopped = true; }
   [[nodiscard]] const std::string& endpoint() const { return server_->endpoint(); }
 
   std::atomic<std::uint64_t> commands{0};
   std::atomic<bool> stopped{false};
+  std::atomic<bool> hold_status{false};
+  std::mutex mutex;
+  std::set<std::uint64_t> beats_at_status;  // as many as there had been at each status request
 
  private:
   Context context_;
@@ -120,6 +130,19 @@ TEST_CASE("the control socket answers REQ and DEALER clients") {
   REQUIRE(done);
   CHECK(done->ok());
   CHECK(done->sequence() == 1);
+}
+
+TEST_CASE("each request is a sign of life, also where many wait") {
+  Booth booth;
+  booth.hold_status = true;
+  const Client client(booth.endpoint(), ZMQ_DEALER);
+  constexpr int kRequests = 12;
+  for (int i = 0; i < kRequests; ++i) client.send(status_request());
+  std::this_thread::sleep_for(100ms);  // most of them wait behind the first now
+  booth.hold_status = false;
+  for (int i = 0; i < kRequests; ++i) REQUIRE(client.receive(5s));
+  const std::scoped_lock lock(booth.mutex);
+  CHECK(booth.beats_at_status.size() == kRequests);
 }
 
 TEST_CASE("clients that are silent, never read, send garbage or flood do not delay others") {

@@ -44,7 +44,8 @@ BodyEntry person(std::uint16_t id, const std::string& name, int joints = 2) {
 class Room final : private StreamHost {
  public:
   explicit Room(std::uint32_t slots, config::SourceConfig config = {},
-                const std::vector<config::StreamConfig>& devices = {}) {
+                const std::vector<config::StreamConfig>& devices = {},
+                std::size_t max_made = SourceBuilder::kMaxMade) {
     for (const config::StreamConfig& device : devices) {
       ModelFiles files;
       sources_.push_back(open_source(config::source_of(device), files).value());
@@ -60,7 +61,7 @@ class Room final : private StreamHost {
     for (std::uint32_t i = 0; i < sources_.size(); ++i) sources_[i]->number = i;
     const auto all = static_cast<std::uint32_t>(devices.size()) + slots;
     builder_.emplace(sources_, all, std::set<std::string>{"walker"}, models_, kept,
-                     static_cast<StreamHost&>(*this));
+                     static_cast<StreamHost&>(*this), max_made);
     REQUIRE(builder_->open());
     builder_->begin();
   }
@@ -83,6 +84,12 @@ class Room final : private StreamHost {
       static_cast<void>(builder_->turn(now_ns_));
       for (const auto& source : sources_) accept_update(*source);
     }
+  }
+
+  // So much time passes, and what is due then is done.
+  void pass(std::int64_t time_ns) {
+    now_ns_ += time_ns;
+    settle();
   }
 
   [[nodiscard]] std::vector<std::string> names() const {
@@ -108,6 +115,9 @@ class Room final : private StreamHost {
   std::map<std::uint32_t, std::string> refused;                // sentences by stream
   const pipeline::SourceUpdate* update = nullptr;              // of the room
   std::vector<std::string> warnings;
+  int alive = 0;                // signs of life
+  std::set<int> alive_at_adds;  // as many as there had been when each stream was added
+  std::size_t adds = 0;
   std::size_t stop_at = 0;  // the builder is stopped when it adds this stream, from 1; 0: never
 
  private:
@@ -124,10 +134,13 @@ class Room final : private StreamHost {
     }));
   }
 
+  void is_alive() noexcept override { ++alive; }
   pipeline::StreamCounters& counters(std::uint32_t stream) override {
     return counters_.at(pipeline::slot_of(stream));
   }
   void add(NewStream stream) override {
+    alive_at_adds.insert(alive);
+    ++adds;
     if (stream.engine) running[stream.id] = stream.config.name;
     settings[stream.id] = stream.stages.settings;
     source_of_[stream.id] = stream.source.number;
@@ -271,6 +284,48 @@ TEST_CASE("a body that the config names always has a slot") {
   CHECK(room.names() == Names{"room-bob", ""});
   room.describe({person(2, "Bob"), person(3, "Cleo"), person(1, "Ann")});
   CHECK(room.names() == Names{"room-bob", "", "lead"});
+}
+
+TEST_CASE("each stream that is built is a sign of life") {
+  Room room(8);
+  room.describe({person(1, "Ann"), person(2, "Bob"), person(3, "Cay"), person(4, "Dee")});
+  CHECK(room.adds == 4);
+  CHECK(room.alive_at_adds.size() == 4);
+}
+
+TEST_CASE("bodies that come and go use up their own source's streams; named ones always return") {
+  // Half of the 40 is for the room, the only source with several bodies.
+  config::SourceConfig config;
+  config.named.push_back({.body = "Ann", .stream = {}});
+  config.named[0].stream.name = "lead";
+  Room room(4, std::move(config), {}, 40);
+  for (int i = 0; i < 40; ++i) {
+    room.describe({person(2, "Bob", 2 + i % 2), person(1, "Ann", 2 + i % 2)});
+    room.describe({});
+  }
+  CHECK(room.adds > 20);
+  CHECK(room.adds < 50);
+  CHECK(room.id_of("room-bob") == pipeline::kNoStream);
+  room.describe({person(2, "Bob"), person(1, "Ann")});
+  room.pass(SourceBuilder::kBetweenLateUpdates_ns);
+  CHECK(room.names() == Names{"", "lead"});
+  REQUIRE_FALSE(room.warnings.empty());
+  CHECK_THAT(room.warnings.back(), Catch::Contains("its bodies came and went 20 times"));
+}
+
+TEST_CASE("a slot's ids come again after tens of thousands of streams, except the first") {
+  StreamSlots slots(1, 1);
+  const auto first = slots.next_free(true);
+  REQUIRE(first);
+  std::uint32_t id = *first;
+  for (std::uint32_t i = 0; i < 70'000; ++i) {
+    slots.give_back(id, true);
+    const auto next = slots.next_free(true);
+    REQUIRE(next);
+    if (*next == id || *next == *first || *next == pipeline::kNoStream) FAIL("stream " << i);
+    id = *next;
+  }
+  CHECK(pipeline::generation_of(id) > 0);
 }
 
 TEST_CASE("a body that a stage cannot serve is refused with its sentence") {

@@ -72,6 +72,33 @@ TEST_CASE(
   CHECK(limiter.admit(5000 * kMs, 2, "a: frame 1002"));                    // quiet for a while
 }
 
+TEST_CASE("many streams that come and go all the time give a line or two a second together") {
+  LineLimiter limiter;
+  int written = 0;
+  std::uint64_t told = 0;
+  const auto count = [&](std::uint64_t lines) {
+    ++written;
+    told += lines;
+  };
+  constexpr int kSeconds = 60, kStreams = 60;
+  std::int64_t now_ns = 0;
+  for (int i = 0; i < kSeconds * kStreams; ++i) {
+    now_ns += 1000 * kMs / kStreams;
+    const std::string text = "room-" + std::string(1, static_cast<char>('A' + i % kStreams));
+    if (limiter.admit(now_ns, 2, text + ": the body has left")) count(1);
+    while (const auto line = limiter.next_summary(now_ns)) count(line->count);
+  }
+  while (const auto line = limiter.next_summary(now_ns, true)) count(line->count);
+  CHECK(written < 64 + 2 * kSeconds);
+  CHECK(told == kSeconds * kStreams);
+  // After a quiet time each stream has its own lines again.
+  now_ns += 3600 * kNanosPerSecond;
+  for (int i = 0; i < kStreams; ++i) {
+    const std::string text = "room-" + std::string(1, static_cast<char>('A' + i));
+    CHECK(limiter.admit(now_ns, 2, text + ": the body has left"));
+  }
+}
+
 TEST_CASE("lines of ever new causes are limited to a few a second, too") {
   LineLimiter limiter;
   int written = 0;

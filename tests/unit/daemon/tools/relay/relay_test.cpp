@@ -151,9 +151,10 @@ TEST_CASE("messages that are not posed's are dropped and counted") {
   REQUIRE(net::send_part(rig.daemons[0].get(), "pose/ann", true));
   REQUIRE(net::send_part(rig.daemons[0].get(), "1", true));
   REQUIRE(net::send_part(rig.daemons[0].get(), "2", false));
+  rig.publish("pose/ann", std::string(link::kMaxStreamMessage + 1, 'x'));
   rig.publish("pose/ann", "good");
   CHECK(rig.next(all) == "pose/ann=good");
-  CHECK(rig.relay->counts().foreign == 5);
+  CHECK(rig.relay->counts().foreign == 6);
 }
 
 TEST_CASE("streams of two upstreams come through one relay; a name that both have is not mixed") {

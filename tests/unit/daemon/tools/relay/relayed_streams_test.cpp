@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "daemon/system/event_fd.hpp"
+#include "daemon/system/process.hpp"
 #include "daemon/tools/relay/relay.hpp"
 #include "proto/frame/time.hpp"
 
@@ -115,6 +116,36 @@ TEST_CASE("stats of one upstream pass as they are, those of several as one") {
   REQUIRE(alone);
   REQUIRE(merged.ParseFromString(*alone));
   CHECK(merged.stream().size() == 1);
+}
+
+TEST_CASE("relays in a circle do not make the stats grow") {
+  bool valid = false;
+  MergedStats relay(2);  // of a daemon, and of the relay that it is itself an upstream of
+  std::string all = toy_stats("bob", 1);
+  for (int second = 0; second < 20; ++second) {
+    const std::int64_t now_ns = kNow_ns + second * kNanosPerSecond;
+    static_cast<void>(relay.accept(1, all, now_ns, valid));
+    const auto merged = relay.accept(0, toy_stats("ann", 5), now_ns, valid);
+    REQUIRE(merged);
+    all = *merged;
+  }
+  v1::Stats merged;
+  REQUIRE(merged.ParseFromString(all));
+  CHECK(merged.stream().size() == 2);
+  CHECK(merged.source().size() == 2);
+}
+
+TEST_CASE("stats of half a million empty parts are refused before memory is spent on them") {
+  std::string bomb;
+  while (bomb.size() < 1'000'000) bomb += std::string("\x1a\x00", 2);  // an empty StreamStats
+  MergedStats relay(3);
+  const auto before = system::resident_bytes();
+  bool valid = true;
+  for (std::size_t upstream = 0; upstream < 3; ++upstream) {
+    CHECK_FALSE(relay.accept(upstream, bomb, kNow_ns, valid));
+    CHECK_FALSE(valid);
+  }
+  CHECK(system::resident_bytes() < before + 32'000'000);
 }
 
 }  // namespace

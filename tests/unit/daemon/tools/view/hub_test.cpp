@@ -90,6 +90,26 @@ v1::ControlReply reply_of(const Got& got) {
   return reply;
 }
 
+TEST_CASE("what a hostile daemon sends is kept up to a limit, and let go with its streams") {
+  HubRig rig;
+  Tab tab;
+  rig.join(tab);
+  const std::string large(link::kMaxStreamMessage, 'x');
+  for (int i = 0; i < 2000; ++i) {
+    const std::string name = std::to_string(i);
+    rig.hub.receive("skeleton/" + name, large, 0);
+    rig.hub.receive("pose/" + name, large, 0);
+    rig.hub.receive("pose/" + name, large + "x", 0);
+  }
+  CHECK(rig.hub.kept_bytes() > kMaxKeptBytes / 2);
+  CHECK(rig.hub.kept_bytes() <= kMaxKeptBytes + 1000);
+  CHECK(rig.hub.counts().foreign > 2000);
+  rig.hub.daemon_is({.alive = false});
+  CHECK(rig.hub.kept_bytes() == 0);
+  rig.hub.receive("skeleton/walker", "S", 0);
+  CHECK(rig.hub.kept_bytes() > 0);
+}
+
 TEST_CASE("a new tab is greeted and gets the skeletons and the last stats at once") {
   HubRig rig;
   rig.hub.receive("skeleton/walker", "S", 0);

@@ -1,4 +1,4 @@
-#include "daemon/net/received_bytes.hpp"
+#include "proto/zmq/tcp_peer.hpp"
 
 #include <linux/tcp.h>
 #include <netinet/in.h>
@@ -11,6 +11,12 @@ std::uint64_t received_bytes(int fd) {
   socklen_t size = sizeof info;
   if (getsockopt(fd, IPPROTO_TCP, TCP_INFO, &info, &size) != 0) return 0;
   return info.tcpi_bytes_received;
+}
+
+std::uint64_t cookie_of(int fd) {
+  std::uint64_t cookie = 0;
+  socklen_t size = sizeof cookie;
+  return getsockopt(fd, SOL_SOCKET, SO_COOKIE, &cookie, &size) == 0 ? cookie : 0;
 }
 
 }  // namespace posed::net

@@ -1,0 +1,115 @@
+// Whoever has a daemon's port while it is away, and sends without end: the memory of every command
+// that connects there is bounded.
+#include <atomic>
+#include <chrono>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "tests/support/process.hpp"
+#include "tests/support/raw_listener.hpp"
+#include "tests/support/temp_folder.hpp"
+#include "tests/untrusted/target.hpp"
+
+namespace posed::test {
+namespace {
+
+constexpr double kAtStart_MB = 60.0;  // a daemon that does nothing has less
+
+double memory_MB(pid_t pid) {
+  std::ifstream statm("/proc/" + std::to_string(pid) + "/statm");
+  double size = 0.0;
+  double resident = 0.0;
+  statm >> size >> resident;
+  return resident * static_cast<double>(sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
+// Sends to each who connects, one after the other, until the end.
+class Flood {
+ public:
+  Flood(std::string socket_type, std::string bytes)
+      : socket_type_(std::move(socket_type)),
+        bytes_(std::move(bytes)),
+        thread_([this] { run(); }) {}
+  ~Flood() {
+    stop_ = true;
+    thread_.join();
+  }
+  Flood(const Flood&) = delete;
+  Flood& operator=(const Flood&) = delete;
+  [[nodiscard]] const std::string& endpoint() const { return impostor_.endpoint(); }
+
+  std::atomic<std::uint64_t> sent{0}, connections{0};
+
+ private:
+  void run() {
+    while (!stop_) {
+      try {
+        const RawPeer peer = impostor_.accept();
+        if (!peer.shake_hands(socket_type_)) continue;
+        ++connections;
+        while (!stop_ && peer.send(bytes_, std::chrono::milliseconds(500))) sent += bytes_.size();
+      } catch (const std::exception&) {  // nobody connected for a while
+      }
+    }
+  }
+
+  std::string socket_type_, bytes_;
+  RawListener impostor_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+std::string bomb_of_stats() {
+  return zmtp::frame("stats", 1) + zmtp::frame(repeated(std::string("\x1a\x00", 2), 1'000'000));
+}
+
+TEST_CASE("whoever has the daemon's port cannot fill the memory of those that connect to it") {
+  const TempFolder folder;
+  folder.write("index.html", "<p>the page");
+  const std::vector<std::pair<std::string, std::string>> floods{
+      {"empty parts", repeated(zmtp::frame("", 1), 64'000)},
+      {"parts of 200 bytes", repeated(zmtp::frame(std::string(200, 'x'), 1), 64'000)},
+      {"stats of empty parts", bomb_of_stats()}};
+  for (const auto& [what, bytes] : floods) {
+    for (const std::string command : {"run", "relay", "view", "monitor", "top", "ctl"}) {
+      INFO("posed " << command << ", sent " << what);
+      Flood flood(command == "ctl" ? "ROUTER" : "PUB", bytes);
+      folder.write("posed.toml",
+                   std::string(Stage::kEndpoints) +
+                       "[[source]]\nname = \"far\"\ndriver = \"posed\"\nstreams = \"all\"\n"
+                       "[source.posed]\nconnect = \"" +
+                       flood.endpoint() + "\"\n");
+      std::vector<std::string> arguments{command};
+      if (command == "run") {
+        arguments.insert(arguments.end(), {"--config", (folder.path() / "posed.toml").string()});
+      } else if (command == "relay") {
+        arguments.insert(arguments.end(),
+                         {"--from", flood.endpoint(), "--bind", "tcp://127.0.0.1:*"});
+      } else {
+        arguments.insert(arguments.end(), {"--connect", flood.endpoint()});
+      }
+      if (command == "ctl") arguments.insert(arguments.end(), {"status", "--timeout", "3"});
+      if (command == "view") {
+        arguments.insert(arguments.end(), {"--port", "0", "--page", folder.path().string()});
+      }
+      Process process(arguments);
+      const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(4);
+      double most_MB = 0.0;
+      while (std::chrono::steady_clock::now() < end) {
+        most_MB = std::max(most_MB, memory_MB(process.pid()));
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+      CHECK(flood.sent > 0);
+      CHECK(most_MB < kAtStart_MB + kMaxGrowth_MB);
+      WARN(command << ", " << what << ": at most " << most_MB << " MB, " << flood.connections
+                   << " connections");
+    }
+  }
+}
+
+}  // namespace
+}  // namespace posed::test
