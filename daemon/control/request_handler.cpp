@@ -33,7 +33,7 @@ Reply make_reply(Requester to, const v1::ControlReply& reply) {
 
 Reply refusal(Requester to, const std::string& sentence) {
   v1::ControlReply reply;
-  reply.set_error(sentence);
+  reply.set_error(clean(sentence));
   return make_reply(std::move(to), reply);
 }
 
@@ -158,7 +158,7 @@ Reply RequestHandler::mark_take(const v1::ControlRequest& request, Requester req
   v1::ControlReply reply;
   reply.set_ok(true);
   *reply.mutable_take() = pipeline::stats_of(*take);
-  reply.set_recorder_trouble(take->trouble);
+  reply.set_recorder_trouble(clean(take->trouble));
   return make_reply(std::move(requester), reply);
 }
 

@@ -1,5 +1,6 @@
 #include "daemon/control/trigger.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include <spdlog/spdlog.h>
@@ -42,6 +43,15 @@ bool Trigger::is_repeated(const TriggerMessage& message, const std::string& send
   return again;
 }
 
+bool Trigger::comes_too_fast() {
+  const std::int64_t now_ns = clock_();
+  if (allowed_ns_ == kNoTime_ns) allowed_ns_ = now_ns;
+  allowed_ns_ = std::max(allowed_ns_, now_ns);
+  if (allowed_ns_ - now_ns > (kAtOnce - 1) * kStartEvery_ns) return true;
+  allowed_ns_ += kStartEvery_ns;
+  return false;
+}
+
 void Trigger::handle(std::string_view datagram, const std::string& sender) {
   const auto message = parse_trigger(datagram);
   if (!message) {
@@ -52,6 +62,14 @@ void Trigger::handle(std::string_view datagram, const std::string& sender) {
   }
   if (is_repeated(*message, sender)) {
     ++repeated_;
+    return;
+  }
+  if (message->start && comes_too_fast()) {
+    ++refused_;
+    spdlog::warn(
+        "trigger: a take of {} is refused: takes begin too fast; name the capture system in"
+        " [trigger] peers ({} so far)",
+        sender, refused_);
     return;
   }
   pipeline::TakeMark mark{.start = message->start,

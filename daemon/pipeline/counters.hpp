@@ -2,6 +2,7 @@
 // written by one thread only and may be read by any thread.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstddef>
@@ -52,6 +53,7 @@ struct ReadingCounter {
 
 struct alignas(64) PipelineCounters {
   std::atomic<std::uint64_t> consumed{0};  // sequence of the last frame taken from the ring
+  std::atomic<std::uint64_t> last_out{0};  // sequence of the last frame that left the stages
   std::atomic<std::uint64_t> taken{0};     // items taken from the ring
   std::atomic<std::uint64_t> shed{0};      // frames and samples skipped because newer ones waited
   std::atomic<std::uint64_t> dropped{0};   // items for which the publisher's ring was full
@@ -78,7 +80,9 @@ struct NextNumbers {
   std::uint64_t frame = 1, sample = 1;
 };
 [[nodiscard]] inline NextNumbers next_numbers(const StreamCounters& counters) noexcept {
-  return {.frame = counters.reader.frames.load(std::memory_order_acquire) + 1,
+  return {.frame = std::max(counters.reader.frames.load(std::memory_order_acquire),
+                            counters.pipeline.last_out.load(std::memory_order_acquire)) +
+                   1,
           .sample = counters.reader.samples.load(std::memory_order_acquire) + 1};
 }
 
@@ -93,6 +97,7 @@ inline void restart(StreamCounters& counters, const NextNumbers& first) noexcept
   counters.reader.last_dropped = first.frame - 1;
   counters.reader.last_dropped_sample = first.sample - 1;
   counters.pipeline.consumed = first.frame - 1;
+  counters.pipeline.last_out = first.frame - 1;
   counters.pipeline.shed = 0;
   counters.pipeline.dropped = 0;
   counters.pipeline.state = StreamState::kWaiting;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "daemon/pipeline/intake.hpp"
+#include "daemon/pipeline/junk_gate.hpp"
 #include "daemon/system/hot_mark.hpp"
 #include "drivers/glove/calibrated_decoder.hpp"
 #include "posed/v1/posed.pb.h"
@@ -30,6 +31,7 @@ class Reader::Source final : private IntakeOut {
   static constexpr std::size_t kBytesATurn = 4096;
   // Frames of a lossless source on their way through the pipeline; below what the pipeline sheds.
   static constexpr std::uint64_t kFramesUnderWay = 2;
+  static constexpr std::size_t kRowBytes = 100;  // of a chunk in the log, besides its content
 
  public:
   Source(std::uint32_t number, const ReadSource& read, const ReaderPorts& ports,
@@ -164,8 +166,10 @@ class Reader::Source final : private IntakeOut {
   }
 
   void outcome(Outcome outcome) noexcept override {
-    if (outcome == Outcome::kOk)
+    if (outcome == Outcome::kOk) {
+      used_chunk_ = true;
       counters_.received_ns.store(arrival_ns_, std::memory_order_relaxed);
+    }
     count(counters_.outcome[static_cast<std::size_t>(outcome)]);
   }
 
@@ -177,13 +181,23 @@ class Reader::Source final : private IntakeOut {
     count(counters_.outcome[static_cast<std::size_t>(Outcome::kForeign)], chunk.foreign);
     count(counters_.outcome[static_cast<std::size_t>(Outcome::kShort)], chunk.damaged);
     count(counters_.kernel_dropped, chunk.kernel_dropped);
-    if (!chunk.bytes.empty()) {
-      record(Direction::kFromDevice, chunk.bytes, chunk.socket);
-      device_->decoder->feed_socket(chunk.socket, chunk.bytes, arrival_ns_, intake_);
-    }
+    if (!chunk.bytes.empty()) accept(chunk);
     if (chunk.end) end();
     if (chunk.lost) give_back();
     return chunk.bytes.size();
+  }
+
+  // Records and decodes the bytes, unless a recording would be flooded with rubbish.
+  void accept(const drivers::Chunk& chunk) noexcept {
+    const auto cost = static_cast<std::int64_t>(kRowBytes + places_ * sizeof(StreamPosition) +
+                                                chunk.bytes.size());
+    if (ports_.record_sink != nullptr && !gate_.admits(chunk.sender, cost, arrival_ns_)) {
+      return outcome(Outcome::kForeign);
+    }
+    record(Direction::kFromDevice, chunk.bytes, chunk.socket);
+    used_chunk_ = false;
+    device_->decoder->feed_socket(chunk.socket, chunk.bytes, arrival_ns_, intake_);
+    gate_.decoded(chunk.sender, used_chunk_, cost, arrival_ns_);
   }
 
   // A source without a descriptor is driven by time alone, so it needs no system call.
@@ -408,6 +422,8 @@ class Reader::Source final : private IntakeOut {
   const SourceUpdate* used_ = nullptr;    // null before the first one
   std::int64_t poll_due_ns_ = kNoTime_ns;
   std::int64_t arrival_ns_ = 0;
+  JunkGate gate_;
+  bool used_chunk_ = false;  // something of the chunk that is decoded was of use
   bool ended_ = false;
   std::array<std::optional<Place>, kMaxBodies> place_;  // as in intake_.next().streams
   std::size_t places_ = 0;

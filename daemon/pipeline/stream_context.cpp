@@ -132,6 +132,7 @@ void StreamContext::decision(const Decision& decision) noexcept {
 }
 
 void StreamContext::publish_state() noexcept {
+  counters_.pipeline.last_out.store(engine_.last_out(), std::memory_order_release);
   counters_.pipeline.state.store(engine_.state(), std::memory_order_relaxed);
   publish_values(engine_, counters_.pipeline);
 }

@@ -73,6 +73,7 @@ void StreamEngine::on_frame(const Frame& frame, EngineOut& out) noexcept {
   if (options_.publish_raw) {
     pose_.kind = Item::Kind::kRawFrame;
     pose_.frame = frame;
+    pose_.frame.header.sequence += added_;
     out.item(pose_);
   }
   stage_us_.fill(0.0F);
@@ -110,14 +111,18 @@ void StreamEngine::close_gaps(std::uint64_t last_frame, std::uint64_t last_sampl
   shed_samples_until(last_sample + 1, out);
 }
 
-// Publishes a frame that leaves the last stage.
+// Publishes a frame that leaves the last stage. A frame that a stage made while none came has the
+// number of the last one that did: it gets its own, and those after it are moved on.
 void StreamEngine::emit(const Frame& frame, EngineOut& out) noexcept {
   pose_.kind = Item::Kind::kFrame;
   pose_.frame = frame;
+  std::uint64_t& sequence = pose_.frame.header.sequence;
+  if (sequence + added_ <= last_out_) added_ = last_out_ + 1 - sequence;
+  sequence += added_;
   const std::size_t last = time_stage(kMaxStages);
   pose_.frame.stage_us = stage_us_;
   has_pose_ = true;
-  last_out_ = frame.header.sequence;
+  last_out_ = sequence;
   out.item(pose_);
   time_stage(last);
 }
@@ -228,7 +233,7 @@ Ack StreamEngine::apply(const Command& command, EngineOut& out) noexcept {
   const bool leaving = command.change.kind == StageChange::Kind::kCommand;
   Ack ack{.ticket = command.ticket,
           .stream = options_.stream,
-          .sequence = (leaving ? last_out_ : last_sequence_) + 1};
+          .sequence = (leaving ? last_out_ : last_sequence_ + added_) + 1};
   out.decision({.kind = Decision::Kind::kChange,
                 .stream = options_.stream,
                 .sequence = last_sequence_ + 1,
@@ -287,7 +292,7 @@ void StreamEngine::notify(std::int64_t time_ns, EngineOut& out) noexcept {
       const int kind = type.is_warning ? v1::Event::KIND_WARNING : v1::Event::KIND_CALIBRATED;
       other_.kind = Item::Kind::kEvent;
       other_.stream_event = {options_.stream, static_cast<std::uint8_t>(kind), time_ns,
-                             last_sequence_, 0.0};
+                             last_sequence_ + added_, 0.0};
       other_.stream_event.notice = type.sentence;
       out.item(other_);
     }
@@ -299,7 +304,7 @@ void StreamEngine::report_stages(std::int64_t time_ns, EngineOut& out) noexcept 
   notify(time_ns, out);
   const bool performed = performs_;
   performs_ = any_performs();
-  if (performed && !performs_) event(v1::Event::KIND_PLAYED, time_ns, last_out_, 0.0, out);
+  if (performed && !performs_) event(v1::Event::KIND_PLAYED, time_ns, last_out_ - added_, 0.0, out);
 }
 
 void StreamEngine::end(std::int64_t now_ns, bool leaves, EngineOut& out) noexcept {
@@ -313,15 +318,15 @@ void StreamEngine::end(std::int64_t now_ns, bool leaves, EngineOut& out) noexcep
   other_.stream_event = {.stream = options_.stream,
                          .kind = v1::Event::KIND_ENDED,
                          .time_ns = now_ns,
-                         .sequence = last_sequence_,
+                         .sequence = last_sequence_ + added_,
                          .leaves = leaves};
   out.item(other_);
 }
 
-void StreamEngine::event(std::uint8_t event, std::int64_t time_ns, std::uint64_t sequence,
+void StreamEngine::event(std::uint8_t event, std::int64_t time_ns, std::uint64_t entered,
                          double value, EngineOut& out) noexcept {
   other_.kind = Item::Kind::kEvent;
-  other_.stream_event = {options_.stream, event, time_ns, sequence, value};
+  other_.stream_event = {options_.stream, event, time_ns, entered + added_, value};
   out.item(other_);
 }
 

@@ -57,7 +57,7 @@ class StreamEngine final {
   // Call before the first frame and sample: these are their sequences, because earlier ones belong
   // to the stream of the same name before it.
   void start_at(std::uint64_t frame, std::uint64_t sample) noexcept {
-    last_sequence_ = frame - 1;
+    last_sequence_ = last_out_ = frame - 1;
     last_sample_ = sample - 1;
   }
 
@@ -96,6 +96,8 @@ class StreamEngine final {
   void end(std::int64_t now_ns, bool leaves, EngineOut& out) noexcept;
 
   [[nodiscard]] StreamState state() const noexcept { return state_; }
+  // The number of the last frame that left the stages.
+  RT_SAFE [[nodiscard]] std::uint64_t last_out() const noexcept { return last_out_; }
   // The live parameters of all stages, in their order.
   [[nodiscard]] std::size_t live_parameters() const noexcept { return live_.size(); }
   [[nodiscard]] ParameterState live_parameter(std::size_t i) const noexcept {
@@ -126,7 +128,8 @@ class StreamEngine final {
   [[nodiscard]] std::int64_t stages_due_ns() const noexcept;
   [[nodiscard]] bool any_performs() const noexcept;
   void received(std::int64_t arrival_ns, EngineOut& out) noexcept;
-  void event(std::uint8_t event, std::int64_t time_ns, std::uint64_t sequence, double value,
+  // `entered`: the number as of a frame that came in.
+  void event(std::uint8_t event, std::int64_t time_ns, std::uint64_t entered, double value,
              EngineOut& out) noexcept;
   [[nodiscard]] bool change(Stage& stage, const Command& command, StreamEvent& event) noexcept;
 
@@ -142,7 +145,9 @@ class StreamEngine final {
   StreamState state_ = StreamState::kWaiting;
   std::uint64_t last_sequence_ = 0;  // of the last frame that entered
   std::uint64_t last_out_ = 0;       // of the last frame that left
-  std::uint64_t last_sample_ = 0;    // of the last sample that entered
+  // By how much numbers grow on their way out: the frames that stages have made while none came.
+  std::uint64_t added_ = 0;
+  std::uint64_t last_sample_ = 0;  // of the last sample that entered
   std::int64_t last_arrival_ns_ = kNoTime_ns;
   std::int64_t next_held_ns_ = kNoTime_ns;
   // Timing: which stage is running, since when, and how long each has taken in this call.

@@ -97,7 +97,7 @@ v1::Event event_message(const std::string& stream, v1::Event::Kind kind, std::in
   event.set_kind(kind);
   event.set_time_ns(time_ns);
   event.set_sequence(sequence);
-  event.set_text(text);
+  event.set_text(clean(text));
   return event;
 }
 

@@ -36,10 +36,10 @@ LogWriterLoop::LogWriterLoop(RecordRings& rings, log::Writer writer, std::filesy
 }
 
 void LogWriterLoop::turn(std::int64_t now_ns) {
-  if (!writer_ && now_ns >= retry_ns_) resume(now_ns);
+  if (!writer_.is_open() && now_ns >= retry_ns_) resume(now_ns);
   drain(now_ns);
   report_overflows(now_ns);
-  if (writer_ && now_ns - last_commit_ns_ >= kCommitEvery_ns) {
+  if (writer_.is_open() && now_ns - last_commit_ns_ >= kCommitEvery_ns) {
     if (auto done = commit(now_ns); !done) fail(done.error(), now_ns);
   }
   rings_.set_state({.trouble = trouble_, .lost_chunks = lost_chunks()});
@@ -121,8 +121,8 @@ LogWriterLoop::StreamState* LogWriterLoop::meet(std::uint32_t id, std::uint64_t 
 
 template <typename Row>
 bool LogWriterLoop::put(Tally& tally, const Row& row, std::int64_t now_ns) {
-  if (writer_) {
-    auto done = writer_->add(row);
+  if (writer_.is_open()) {
+    auto done = writer_.add(row);
     if (done) {
       ++tally.uncommitted;
       return true;
@@ -156,7 +156,7 @@ void LogWriterLoop::put_chunk(const ChunkHeader& header,
                           .first_item = header.item,
                           .places = places_,
                           .bytes = bytes};
-  if (put(source.chunks, row, now_ns)) source.last_chunk = writer_->last_chunk_id();
+  if (put(source.chunks, row, now_ns)) source.last_chunk = writer_.last_chunk_id();
 }
 
 void LogWriterLoop::put_decision(const DecisionRecord& record, std::int64_t now_ns) {
@@ -181,9 +181,9 @@ void LogWriterLoop::put_gap(Tally& tally, std::uint64_t lost, std::int64_t now_n
                             std::uint64_t from_frame) {
   if (lost == 0) return;
   if (tally.kind != GapKind::kChunks) meet(tally.owner, 0);
-  if (writer_) {
+  if (writer_.is_open()) {
     const auto row = gap_row(tally, lost, now_ns, from_frame);
-    auto done = row ? writer_->add(*row) : std::unexpected(row.error());
+    auto done = row ? writer_.add(*row) : std::unexpected(row.error());
     if (done) {
       tally.in_gaps += lost;
       tally.uncommitted_from_frame = std::min(tally.uncommitted_from_frame, from_frame);
@@ -201,7 +201,7 @@ Result<log::GapRow> LogWriterLoop::gap_row(const Tally& tally, std::uint64_t los
                                            std::int64_t now_ns, std::uint64_t from_frame) const {
   log::GapRow row{tally.kind, tally.owner, sources_[tally.source].last_chunk, lost, now_ns};
   if (tally.kind != GapKind::kDecisions || from_frame == kNoFrame) return row;
-  row.after_chunk = TRY(writer_->chunk_before_frame(tally.source, tally.owner, from_frame));
+  row.after_chunk = TRY(writer_.chunk_before_frame(tally.source, tally.owner, from_frame));
   return row;
 }
 
@@ -210,20 +210,26 @@ Result<log::GapRow> LogWriterLoop::gap_row(const Tally& tally, std::uint64_t los
 Result<> LogWriterLoop::write_stream_rows() {
   for (const auto& [id, stream] : streams_) {
     if (!stream.named || !stream.row) continue;
-    TRY(add_stream_row(*writer_, *stream.row, stream.first_item));
+    TRY(add_stream_row(writer_, *stream.row, stream.first_item));
   }
   return {};
 }
 
 Result<> LogWriterLoop::commit(std::int64_t now_ns) {
+  if (!writer_.is_in_place()) {
+    return posed::fail(
+        "the log was deleted, moved or replaced while it was written; put it back, or end the"
+        " recording and begin another",
+        path_.string());
+  }
   for (const auto& model : models_) {
-    TRY(writer_->add_blob(model));
+    TRY(writer_.add_blob(model));
   }
   for (const auto& [number, take] : takes_) {
-    TRY(writer_->add(take));
+    TRY(writer_.add(take));
   }
   TRY(write_stream_rows());
-  TRY(writer_->commit());
+  TRY(writer_.commit());
   models_.clear();
   takes_.clear();
   for (SourceState& source : sources_) source.committed_chunk = source.last_chunk;
@@ -239,21 +245,22 @@ Result<> LogWriterLoop::commit(std::int64_t now_ns) {
 }
 
 Result<> LogWriterLoop::finish(std::int64_t now_ns) {
-  if (!writer_) resume(now_ns);
+  if (!writer_.is_open()) resume(now_ns);
   drain(now_ns);
   report_overflows(now_ns);
   each_tally([&](Tally& tally) {
     put_gap(tally, tally.in_rings->pending(), now_ns,
             tally.kind == GapKind::kDecisions ? tally.in_rings->lost_from_frame.load() : kNoFrame);
   });
-  if (writer_) {
+  if (writer_.is_open()) {
     if (auto done = commit(now_ns); !done) fail(done.error(), now_ns);
   }
-  if (!writer_) {
-    return posed::fail("recording could not be finished; the log ends at the last commit",
-                       path_.string());
+  if (!writer_.is_open()) {
+    return posed::fail(
+        "recording could not be finished; the log ends at the last commit (" + trouble_ + ")",
+        path_.string());
   }
-  return writer_->close();
+  return writer_.close();
 }
 
 void LogWriterLoop::count_lost(Tally& tally, std::uint64_t count) {
@@ -262,14 +269,9 @@ void LogWriterLoop::count_lost(Tally& tally, std::uint64_t count) {
   if (tally.kind == GapKind::kFrames) lost_frames_ += count;
 }
 
-// Everything written since the last commit is lost. The writer is closed, too, because after an I/O
-// error only a new connection is known to be in a valid state.
+// Everything written since the last commit is lost.
 void LogWriterLoop::fail(const Error& error, std::int64_t now_ns) {
-  writer_->rollback();
-  writer_.reset();
-  trouble_ = error.text();
-  ++errors_;
-  error_ns_ = now_ns;
+  writer_.interrupt();
   // An almost full disk accepts a little now and then, so try again less and less often.
   const bool held_long = now_ns - resumed_ns_ > kLastRetry_ns;
   retry_after_ns_ = held_long ? kFirstRetry_ns : std::min(2 * retry_after_ns_, kLastRetry_ns);
@@ -280,32 +282,35 @@ void LogWriterLoop::fail(const Error& error, std::int64_t now_ns) {
     tally.lost_from_frame =
         std::min(tally.lost_from_frame, std::exchange(tally.uncommitted_from_frame, kNoFrame));
   });
+  for (SourceState& source : sources_) source.last_chunk = source.committed_chunk;
+  failed(error, now_ns);
+}
+
+// Counts an attempt to write that has failed, and says the first one.
+void LogWriterLoop::failed(const Error& error, std::int64_t now_ns) {
+  ++errors_;
+  error_ns_ = now_ns;
+  const bool is_known = !trouble_.empty();
+  trouble_ = error.text();
+  if (is_known) return;
   const RecorderEvent event{.kind = RecorderEvent::Kind::kError,
                             .streams = streams_now(),
                             .time_ns = now_ns,
-                            .text = "recording stopped, streaming continues: " + error.text()};
-  for (SourceState& source : sources_) source.last_chunk = source.committed_chunk;
+                            .text = "recording stopped, streaming continues: " + trouble_};
   spdlog::error("{}", event.text);
   report_(event);
 }
 
 // Tries to write the gap rows for what is missing; recording continues only after that has worked.
 void LogWriterLoop::resume(std::int64_t now_ns) {
+  if (retry_after_ns_ == 0) retry_after_ns_ = kFirstRetry_ns;  // it was never begun
   retry_ns_ = now_ns + retry_after_ns_;
-  auto writer = log::Writer::reopen(path_);
-  if (!writer) {
-    ++errors_;
-    error_ns_ = now_ns;
-    return;
-  }
-  writer_ = std::move(*writer);
-  auto done = write_lost(now_ns);
+  auto done = writer_.resume();
+  if (done) done = write_lost(now_ns);
   if (done) done = commit(now_ns);
   if (!done) {
-    writer_.reset();
-    ++errors_;
-    error_ns_ = now_ns;
-    return;
+    writer_.interrupt();
+    return failed(done.error(), now_ns);
   }
   trouble_.clear();
   resumed_ns_ = now_ns;
@@ -325,7 +330,7 @@ Result<> LogWriterLoop::write_lost(std::int64_t now_ns) {
   each_tally([&](const Tally& tally) {
     if (tally.lost == 0 || !done) return;
     const auto row = gap_row(tally, tally.lost, now_ns, tally.lost_from_frame);
-    done = row ? writer_->add(*row) : std::unexpected(row.error());
+    done = row ? writer_.add(*row) : std::unexpected(row.error());
   });
   return done;
 }

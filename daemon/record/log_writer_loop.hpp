@@ -34,7 +34,8 @@ struct RecorderEvent {
 
 class LogWriterLoop {
  public:
-  // Calls `report` from within turn() and finish(). The rings must outlive this object.
+  // Calls `report` from within turn() and finish(). The rings must outlive this object. A writer
+  // that is not open is opened by the first turn that can.
   LogWriterLoop(RecordRings& rings, log::Writer writer, std::filesystem::path path,
                 std::function<void(const RecorderEvent&)> report);
 
@@ -107,6 +108,7 @@ class LogWriterLoop {
   Result<> commit(std::int64_t now_ns);
   void count_lost(Tally& tally, std::uint64_t count);
   void fail(const Error& error, std::int64_t now_ns);
+  void failed(const Error& error, std::int64_t now_ns);
   void resume(std::int64_t now_ns);
   void report_overflows(std::int64_t now_ns);
   void report_gap(const Tally& tally, std::int64_t now_ns, const std::string& text);
@@ -120,8 +122,8 @@ class LogWriterLoop {
   }
 
   RecordRings& rings_;
-  std::optional<log::Writer> writer_;  // empty while writing fails
-  std::string trouble_;                // why writing fails
+  log::Writer writer_;   // closed while writing fails
+  std::string trouble_;  // why writing fails
   std::filesystem::path path_;
   std::function<void(const RecorderEvent&)> report_;
   std::vector<SourceState> sources_;              // by number

@@ -46,18 +46,19 @@ std::map<std::string, std::string> meta_of(const RecorderOptions& options) {
 
 }  // namespace
 
-Result<log::Writer> begin_log(const RecorderOptions& options, const RecordedSetup& setup) {
-  auto writer = TRY(log::Writer::create(options.file, meta_of(options), options.overwrite));
-  for (const RecordedSource& source : setup.sources) {
-    TRY(writer.add(source.row));
-  }
-  TRY(writer.commit());
-  return writer;
+log::Writer log_writer(const RecorderOptions& options, const RecordedSetup& setup) {
+  log::Beginning beginning{.meta = meta_of(options)};
+  for (const RecordedSource& source : setup.sources) beginning.sources.push_back(source.row);
+  return {options.file, std::move(beginning), options.reserved};
 }
 
 Result<std::unique_ptr<Recorder>> Recorder::open(RecorderOptions options,
                                                  const RecordedSetup& setup) {
-  auto writer = TRY(begin_log(options, setup));
+  log::Writer writer = log_writer(options, setup);
+  // Otherwise the thread tries again, and says why it fails.
+  if (auto begun = writer.resume(); !begun && !options.may_begin_later) {
+    return std::unexpected(begun.error());
+  }
   const RingSizes sizes = ring_sizes(setup, options.frames);
   // Where no bodies come it is little.
   if (bodies_come(setup)) {

@@ -26,7 +26,8 @@ namespace posed::record {
 
 struct RecorderOptions {
   std::filesystem::path file;
-  bool overwrite = false;
+  bool reserved = false;         // log::reserve() has made it; else there must be none
+  bool may_begin_later = false;  // a log that cannot be begun is tried again, as after an error
   bool frames = false;           // record the published frames, too
   std::string config_text;       // the daemon's whole config, for human readers
   std::string publish_endpoint;  // where the daemon published; replay publishes there, too
@@ -35,14 +36,14 @@ struct RecorderOptions {
   std::function<void(const RecorderEvent&)> report = [](const RecorderEvent&) {};
 };
 
-// Creates the log, and writes and commits its content before the first chunk.
-Result<log::Writer> begin_log(const RecorderOptions& options, const RecordedSetup& setup);
+// The writer of the log, not open yet.
+log::Writer log_writer(const RecorderOptions& options, const RecordedSetup& setup);
 
 class Recorder {
  public:
   static constexpr const char* kThreadName = "posed-record";
 
-  // Creates the log and starts the thread.
+  // Begins the log and starts the thread.
   static Result<std::unique_ptr<Recorder>> open(RecorderOptions options,
                                                 const RecordedSetup& setup);
   Recorder(const Recorder&) = delete;

@@ -14,7 +14,8 @@
 
 namespace posed::record {
 
-inline constexpr std::uint32_t kMaxTakes = 9999;  // of a recording
+// Of a recording. A trigger alone needs days to reach it (control/trigger.hpp).
+inline constexpr std::uint32_t kMaxTakes = 99'999;
 
 // A take has begun or ended.
 struct TakeChange {

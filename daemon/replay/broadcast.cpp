@@ -12,6 +12,7 @@
 #include "daemon/replay/stream_info.hpp"
 #include "daemon/system/clock.hpp"
 #include "models/stage_type.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::replay {
 namespace {
@@ -94,7 +95,7 @@ Result<std::unique_ptr<Broadcast>> Broadcast::open(const BroadcastOptions& optio
   // at full speed no frame has a meaningful time of publication
   published.stamps = options.speed != 0.0;
   published.more_stats = [file = options.log, speed = options.speed](v1::Stats& stats) {
-    stats.set_replay_file(file);
+    stats.set_replay_file(clean(file));
     stats.set_replay_speed(speed);
   };
   auto publisher = publish::Publisher::open(std::move(published), self->ring_, *self->wake_);

@@ -56,6 +56,16 @@ bool write_to(const Address& to, int fd, std::span<const std::byte> bytes) noexc
   return sent == static_cast<ssize_t>(bytes.size());
 }
 
+// A number that tells addresses with their ports apart (FNV-1a); never 0.
+RT_SAFE std::uint64_t number_of(const Address& address) noexcept {
+  const auto bytes = std::as_bytes(std::span(&address.storage, 1)).first(address.size);
+  std::uint64_t number = 0xcbf29ce484222325U;
+  for (const std::byte byte : bytes) {
+    number = (number ^ static_cast<std::uint64_t>(byte)) * 0x100000001b3U;
+  }
+  return number | 1U;
+}
+
 struct Wanted {
   Address listen;
   std::optional<Address> group, to;
@@ -288,6 +298,7 @@ Chunk UdpTransport::read(std::int64_t now_ns) noexcept {
     assert(message.msg_len <= batch_->bytes[i].size());
     chunk.bytes = std::span(batch_->bytes[i]).first(message.msg_len);
     chunk.socket = static_cast<std::uint8_t>(socket_);
+    chunk.sender = number_of(sender);
     break;
   }
   return chunk;

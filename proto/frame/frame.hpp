@@ -36,7 +36,7 @@ struct StageStamps {
 // Origin and times, common to frames and samples.
 struct Header {
   std::uint32_t stream = 0;              // index of the stream in the daemon's config
-  std::uint64_t sequence = 0;            // counts the stream's decoded frames from 1; never repeats
+  std::uint64_t sequence = 0;            // counts the stream's frames from 1; see Quality::kStale
   std::int64_t device_ns = kNoTime_ns;   // the device's own time; kNoTime_ns if it has none
   std::int64_t arrival_ns = kNoTime_ns;  // host time, taken right after the read
   ClockMapping clock;                    // mapping from device time to host time, as far as known

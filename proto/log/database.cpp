@@ -2,10 +2,32 @@
 
 #include <sqlite3.h>
 
+#include <array>
+#include <utility>
+
+#include "proto/log/schema.hpp"
+
 namespace posed::log {
 namespace {
 
 constexpr int kMaxValue = 256 * 1024 * 1024;  // bytes; a log's largest value is a model file
+constexpr std::int64_t kMaxHeap = 1024LL * 1024 * 1024;  // bytes, of all logs of the process
+
+// A statement that reads or checks a whole log needs about 3 operations of SQLite's machine for
+// each byte.
+constexpr int kOperationsACall = 1000;
+constexpr std::uint64_t kFreeCalls = 1000;
+constexpr std::uint64_t kBytesACall = 60;
+
+// Logs need little of what SQLite can do.
+constexpr std::array<std::pair<int, int>, 8> kLimits{{{SQLITE_LIMIT_LENGTH, kMaxValue},
+                                                      {SQLITE_LIMIT_SQL_LENGTH, 10'000},
+                                                      {SQLITE_LIMIT_COLUMN, 20},
+                                                      {SQLITE_LIMIT_EXPR_DEPTH, 20},
+                                                      {SQLITE_LIMIT_COMPOUND_SELECT, 2},
+                                                      {SQLITE_LIMIT_ATTACHED, 0},
+                                                      {SQLITE_LIMIT_TRIGGER_DEPTH, 1},
+                                                      {SQLITE_LIMIT_WORKER_THREADS, 0}}};
 
 // Turns an SQLite failure into one sentence, with advice where there is some.
 std::unexpected<Error> failure(sqlite3* handle, const std::string& file) {
@@ -26,6 +48,8 @@ std::unexpected<Error> failure(sqlite3* handle, const std::string& file) {
       return fail("reading or writing failed: " + why, file);
     case SQLITE_READONLY:
       return fail("may only be read; give it, and its folder, write permission", file);
+    case SQLITE_INTERRUPT:
+      return fail("takes longer to read than its size explains; use another copy of it", file);
     case SQLITE_BUSY:
       return fail("in use by another process", file);
     default:
@@ -35,8 +59,20 @@ std::unexpected<Error> failure(sqlite3* handle, const std::string& file) {
 
 }  // namespace
 
-Statement::Statement(sqlite3_stmt* statement, std::string file)
-    : statement_(statement), file_(std::move(file)) {}
+int Budget::spend(void* budget) {
+  auto& self = *static_cast<Budget*>(budget);
+  if (++self.spent_ <= kFreeCalls) return 0;
+  std::uint64_t bytes = 0;
+  for (const char* suffix : kFileSuffixes) {
+    std::error_code gone;
+    const auto size = std::filesystem::file_size(self.file_ + suffix, gone);
+    if (!gone) bytes += size;
+  }
+  return self.spent_ > kFreeCalls + bytes / kBytesACall ? 1 : 0;
+}
+
+Statement::Statement(sqlite3_stmt* statement, std::string file, Budget& budget)
+    : statement_(statement), file_(std::move(file)), budget_(&budget) {}
 
 void Statement::Finalize::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
 
@@ -68,6 +104,7 @@ Statement& Statement::bind_checksum() {
 
 Result<bool> Statement::step() {
   if (done_) return false;
+  budget_->renew();
   switch (sqlite3_step(statement_.get())) {
     case SQLITE_ROW:
       return true;
@@ -133,22 +170,52 @@ bool Statement::checksum_matches() const {
 void Database::Close::operator()(sqlite3* handle) const { sqlite3_close_v2(handle); }
 
 Result<Database> Database::open(const std::filesystem::path& path, Mode mode) {
-  const int flags = mode == Mode::kCreate      ? SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE
-                    : mode == Mode::kReadWrite ? SQLITE_OPEN_READWRITE
-                                               : SQLITE_OPEN_READONLY;
+  const int flags = mode == Mode::kReadWrite ? SQLITE_OPEN_READWRITE : SQLITE_OPEN_READONLY;
   sqlite3* handle = nullptr;
   const int code = sqlite3_open_v2(path.c_str(), &handle, flags | SQLITE_OPEN_NOMUTEX, nullptr);
   Database database(handle, path.string());
   if (code != SQLITE_OK) return failure(handle, path.string());
-  sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, kMaxValue);
-  // A log may come from an untrusted source: nothing in its schema may run.
+  for (const auto& [limit, value] : kLimits) sqlite3_limit(handle, limit, value);
+  sqlite3_hard_heap_limit64(kMaxHeap);
+  sqlite3_progress_handler(handle, kOperationsACall, Budget::spend, database.budget_.get());
   sqlite3_db_config(handle, SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
   sqlite3_db_config(handle, SQLITE_DBCONFIG_TRUSTED_SCHEMA, 0, nullptr);
   sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_TRIGGER, 0, nullptr);
+  sqlite3_db_config(handle, SQLITE_DBCONFIG_ENABLE_VIEW, 0, nullptr);
   return database;
 }
 
+Database::Database(sqlite3* handle, std::string file)
+    : budget_(std::make_unique<Budget>(file)), handle_(handle), file_(std::move(file)) {}
+
+// One line for each table and index.
+Result<std::string> Database::schema() {
+  auto select =
+      TRY(prepare("SELECT type, name, tbl_name, ifnull(sql,'') FROM sqlite_master"
+                  " ORDER BY name"));
+  std::string lines;
+  for (;;) {
+    const auto row = TRY(select.step());
+    if (!row) return lines;
+    for (int column = 0; column < 4; ++column) lines += std::string(select.text(column)) + '\t';
+    lines += '\n';
+  }
+}
+
+Result<> Database::check_schema() {
+  auto fresh = TRY(open(":memory:", Mode::kReadWrite));
+  TRY(fresh.run(kSchema));
+  const auto ours = TRY(fresh.schema());
+  const auto found = TRY(schema());
+  if (found == ours) return {};
+  return fail(
+      "the log is damaged or forged (its tables are not those that posed makes); use another"
+      " copy of it",
+      file_);
+}
+
 Result<> Database::run(const char* sql) {
+  budget_->renew();
   if (sqlite3_exec(handle_.get(), sql, nullptr, nullptr, nullptr) != SQLITE_OK) {
     return failure(handle_.get(), file_);
   }
@@ -161,7 +228,7 @@ Result<Statement> Database::prepare(std::string_view sql) {
                          SQLITE_PREPARE_PERSISTENT, &statement, nullptr) != SQLITE_OK) {
     return failure(handle_.get(), file_);
   }
-  return Statement(statement, file_);
+  return Statement(statement, file_, *budget_);
 }
 
 Result<std::string> Database::value(std::string_view sql) {
@@ -181,6 +248,17 @@ void Database::rollback() {
   if (sqlite3_get_autocommit(handle_.get()) == 0) {
     sqlite3_exec(handle_.get(), "ROLLBACK", nullptr, nullptr, nullptr);
   }
+}
+
+bool Database::is_in_place() const {
+  int moved = 0;
+  const int known = sqlite3_file_control(handle_.get(), "main", SQLITE_FCNTL_HAS_MOVED, &moved);
+  return known != SQLITE_OK || moved == 0;
+}
+
+void Database::leave_files() {
+  static_cast<void>(run("PRAGMA wal_checkpoint(TRUNCATE)"));
+  sqlite3_db_config(handle_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
 }
 
 }  // namespace posed::log

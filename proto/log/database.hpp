@@ -1,4 +1,7 @@
 // Wraps SQLite for the log's writer and reader, with Result for errors. One thread; cold.
+//
+// A log is data from anywhere. What SQLite could run of it is off or refused, no statement may take
+// longer than the size of the file explains, and the memory of all logs of the process is limited.
 #pragma once
 
 #include <cstddef>
@@ -8,6 +11,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "proto/frame/result.hpp"
 #include "proto/log/checksum.hpp"
@@ -17,11 +21,25 @@ struct sqlite3_stmt;
 
 namespace posed::log {
 
+// The work that one step of a statement, or one run of statements, may cost: what the size of the
+// file explains.
+class Budget {
+ public:
+  explicit Budget(std::string file) : file_(std::move(file)) {}
+  void renew() { spent_ = 0; }
+  // SQLite's progress handler; not 0: too much.
+  static int spend(void* budget);
+
+ private:
+  std::string file_;
+  std::uint64_t spent_ = 0;  // calls of the handler
+};
+
 // A prepared statement; must not outlive its Database. Bound text and bytes are not copied and must
 // stay valid until the next reset().
 class Statement {
  public:
-  Statement(sqlite3_stmt* statement, std::string file);
+  Statement(sqlite3_stmt* statement, std::string file, Budget& budget);
 
   // Binds the next parameter; the first one after each reset().
   Statement& bind(std::int64_t value);
@@ -51,6 +69,7 @@ class Statement {
   };
   std::unique_ptr<sqlite3_stmt, Finalize> statement_;
   std::string file_;
+  Budget* budget_;
   int next_parameter_ = 1;
   Checksum bound_;
   bool done_ = false;
@@ -58,8 +77,13 @@ class Statement {
 
 class Database {
  public:
-  enum class Mode : std::uint8_t { kCreate, kReadWrite, kRead };
+  enum class Mode : std::uint8_t { kReadWrite, kRead };
+  // The file must be there.
   static Result<Database> open(const std::filesystem::path& path, Mode mode);
+
+  // Refuses a file whose tables are not exactly those of kSchema: a view, a trigger or a constraint
+  // would be a program that a log brings along. Call it before anything is read of a table.
+  Result<> check_schema();
 
   // Runs any number of statements without parameters and discards their rows.
   Result<> run(const char* sql);
@@ -72,13 +96,20 @@ class Database {
   void set_busy_timeout_ms(int patience_ms);
   // Discards everything written since the last commit; harmless when there is nothing.
   void rollback();
+  // False when the file was deleted, moved or replaced since it was opened.
+  [[nodiscard]] bool is_in_place() const;
+  // Moves what is in the -wal into the file, and then leaves all files where they are when this is
+  // destroyed.
+  void leave_files();
 
  private:
   struct Close {
     void operator()(sqlite3* handle) const;
   };
-  Database(sqlite3* handle, std::string file) : handle_(handle), file_(std::move(file)) {}
+  Database(sqlite3* handle, std::string file);
+  Result<std::string> schema();
 
+  std::unique_ptr<Budget> budget_;  // SQLite has its address
   std::unique_ptr<sqlite3, Close> handle_;
   std::string file_;
 };

@@ -65,6 +65,7 @@ Result<Database> open_whole(const std::filesystem::path& path) {
   const std::string file = path.string();
   auto database = TRY(Database::open(path, Database::Mode::kReadWrite));
   TRY(check_marks(database, file));
+  TRY(database.check_schema());
   merge_wal(database);
   database.set_busy_timeout_ms(kReadPatience_ms);
   TRY(check_whole(database, file));

@@ -1,8 +1,13 @@
 #include "proto/log/writer.hpp"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <algorithm>
 #include <array>
-#include <vector>
+#include <cerrno>
+#include <optional>
+#include <utility>
 
 #include "proto/log/database.hpp"
 #include "proto/log/digest.hpp"
@@ -12,6 +17,9 @@ namespace posed::log {
 namespace {
 
 constexpr int kPatience_ms = 2000;  // merging the -wal takes a reader less time than this
+constexpr std::string_view kTakenWords =
+    "exists already, or a -wal or -journal of this name does; choose another name or say "
+    "--overwrite";
 
 // The tables whose ids the writer assigns, in the order of the row types.
 enum Table : std::size_t { kChunk, kDecision, kFrame, kGap, kNumbered };
@@ -35,14 +43,20 @@ constexpr std::array<std::string_view, kSqlCount> kSql{
 // SQLite has only signed integers; the bits of a sequence number are kept.
 std::int64_t stored(std::uint64_t value) { return static_cast<std::int64_t>(value); }
 
-Result<> make_room_for(const std::filesystem::path& path, bool overwrite) {
-  std::error_code error;
-  if (std::filesystem::exists(path, error) && !overwrite) {
-    return fail("exists already; choose another name or say --overwrite", path.string());
-  }
-  for (const char* suffix : kFileSuffixes) {
-    std::filesystem::remove(path.string() + suffix, error);
-    if (error) return fail("cannot be replaced: " + error.message(), path.string());
+Statement& bind(Statement& insert, const SourceRow& row) {
+  return insert.bind(std::int64_t{row.id})
+      .bind(row.name)
+      .bind(row.driver)
+      .bind(row.text)
+      .bind(row.identity)
+      .bind(row.config)
+      .bind_checksum();
+}
+
+Result<> write_sources(Database& database, const std::vector<SourceRow>& sources) {
+  auto insert = TRY(database.prepare(kSql[kSource]));
+  for (const SourceRow& row : sources) {
+    TRY(bind(insert, row).execute());
   }
   return {};
 }
@@ -55,32 +69,41 @@ Result<> write_meta(Database& database, const std::map<std::string, std::string>
   return {};
 }
 
-// Writes tables, marks and meta in one transaction, so that a log exists complete or not at all.
-Result<> write_birth(Database& database, const std::map<std::string, std::string>& meta) {
+// Writes tables, marks and beginning in one transaction, so that a log exists complete or not at
+// all.
+Result<> write_birth(Database& database, const Beginning& beginning) {
   const std::string tables = "BEGIN;" + std::string(kSchema) +
                              "PRAGMA application_id=" + std::to_string(kApplicationId) +
                              ";PRAGMA user_version=" + std::to_string(kFormatVersion) + ";";
   TRY(database.run(tables.c_str()));
-  TRY(write_meta(database, meta));
+  TRY(write_meta(database, beginning.meta));
+  TRY(write_sources(database, beginning.sources));
   return database.run("COMMIT");
 }
 
-Result<> make_durable(Database& database) {
-  database.set_busy_timeout_ms(kPatience_ms);
-  return database.run("PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL;");
+// Another log may have got the name while this one was closed.
+Result<> check_meta(Database& database, const Beginning& beginning, const std::string& file) {
+  auto select = TRY(database.prepare("SELECT key, value FROM meta"));
+  std::map<std::string, std::string> meta;
+  for (;;) {
+    const auto row = TRY(select.step());
+    if (!row) break;
+    meta.emplace(select.text(0), select.text(1));
+  }
+  if (meta == beginning.meta) return {};
+  return fail("another recording has this name now; end this one and begin it again", file);
 }
 
 }  // namespace
 
-struct Writer::State {
-  using Ids = std::array<std::int64_t, kNumbered>;
-
+// An open log. SQLite closes its files only after the statements, which stand behind them.
+struct Writer::Connection {
   Database database;
-  std::vector<Statement> statements;
+  std::vector<Statement> statements{};
   bool in_transaction = false;
-  Ids last_id{};
-  Ids committed_id{};
-  std::vector<std::byte> sequences;  // of the chunk being written
+  std::array<std::int64_t, kNumbered> last_id{};
+
+  static Result<Connection> on(Database database);
 
   // Returns the table's statement with the id of the next row bound.
   Statement& numbered(Table table) { return statements[table].bind(last_id[table] + 1); }
@@ -104,66 +127,127 @@ struct Writer::State {
   }
 };
 
-Writer::Writer(std::unique_ptr<State> state) : state_(std::move(state)) {}
-Writer::Writer(Writer&&) noexcept = default;
-Writer& Writer::operator=(Writer&&) noexcept = default;
-Writer::~Writer() = default;
-
-Result<Writer> Writer::on(Database database) {
-  auto state = std::make_unique<State>(
-      State{.database = std::move(database), .statements = {}, .sequences = {}});
+Result<Writer::Connection> Writer::Connection::on(Database database) {
+  Connection connection{.database = std::move(database)};
   for (const std::string_view sql : kSql) {
-    auto statement = TRY(state->database.prepare(sql));
-    state->statements.push_back(std::move(statement));
+    auto statement = TRY(connection.database.prepare(sql));
+    connection.statements.push_back(std::move(statement));
   }
   for (std::size_t table = 0; table < kNumbered; ++table) {
-    const auto last =
-        TRY(state->database.value("SELECT ifnull(max(id),0) FROM " + std::string(kNames[table])));
-    state->last_id[table] = state->committed_id[table] = std::stoll(last);
+    const auto last = TRY(
+        connection.database.value("SELECT ifnull(max(id),0) FROM " + std::string(kNames[table])));
+    connection.last_id[table] = std::stoll(last);
   }
-  return Writer(std::move(state));
+  return connection;
 }
 
-Result<Writer> Writer::create(const std::filesystem::path& path,
-                              const std::map<std::string, std::string>& meta, bool overwrite) {
-  TRY(make_room_for(path, overwrite));
-  auto database = TRY(Database::open(path, Database::Mode::kCreate));
-  TRY(make_durable(database));
-  TRY(write_birth(database, meta));
-  return on(std::move(database));
-}
+struct Writer::State {
+  std::filesystem::path path;
+  Beginning beginning;
+  bool reserved = false, begun = false;
+  std::optional<Connection> open{};
+  std::vector<std::byte> sequences{};  // of the chunk being written
 
-Result<Writer> Writer::reopen(const std::filesystem::path& path) {
+  Result<Connection> connect();
+};
+
+Result<Writer::Connection> Writer::State::connect() {
+  if (!reserved) {
+    const auto name = TRY(reserve(path));
+    if (name == Reserved::kNoRoom) return fail("no room left on the disk", path.string());
+    if (name == Reserved::kTaken) return fail(std::string(kTakenWords), path.string());
+    reserved = true;
+  }
   auto database = TRY(Database::open(path, Database::Mode::kReadWrite));
-  TRY(make_durable(database));
-  return on(std::move(database));
+  database.set_busy_timeout_ms(kPatience_ms);
+  // An attempt to begin it may have failed, as it seemed, and yet have been kept.
+  const auto version = TRY(database.value("PRAGMA user_version"));
+  if (version == "0" && !begun) {
+    TRY(write_birth(database, beginning));
+  } else {
+    TRY(check_meta(database, beginning, path.string()));
+  }
+  begun = true;
+  TRY(database.run("PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL;"));
+  return Connection::on(std::move(database));
 }
+
+Result<Reserved> reserve(const std::filesystem::path& path) {
+  const int file = ::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+  if (file < 0) {
+    if (errno == EEXIST) return Reserved::kTaken;
+    if (errno == ENOSPC || errno == EDQUOT) return Reserved::kNoRoom;
+    return fail("cannot be written: " + errno_text(), path.string());
+  }
+  ::close(file);
+  // SQLite would take what lies beside for parts of this log, and remove it.
+  for (const char* suffix : kFileSuffixes) {
+    std::error_code ignored;
+    if (*suffix == '\0' || !std::filesystem::exists(path.string() + suffix, ignored)) continue;
+    std::filesystem::remove(path, ignored);
+    return Reserved::kTaken;
+  }
+  return Reserved::kYes;
+}
+
+Writer::Writer(std::filesystem::path path, Beginning beginning, bool reserved)
+    : state_(std::make_unique<State>(State{
+          .path = std::move(path), .beginning = std::move(beginning), .reserved = reserved})) {}
+Writer::Writer(Writer&&) noexcept = default;
+Writer& Writer::operator=(Writer&&) noexcept = default;
+
+Writer::~Writer() {
+  if (state_ == nullptr || !state_->reserved || state_->begun) return;
+  state_->open.reset();
+  std::error_code error;
+  const bool is_empty = std::filesystem::file_size(state_->path, error) == 0;
+  if (is_empty && !error) std::filesystem::remove(state_->path, error);
+}
+
+Result<Writer> Writer::create(const std::filesystem::path& path, Beginning beginning) {
+  Writer writer(path, std::move(beginning), false);
+  TRY(writer.resume());
+  return writer;
+}
+
+Result<> Writer::resume() {
+  auto connection = TRY(state_->connect());
+  state_->open.emplace(std::move(connection));
+  return {};
+}
+
+void Writer::interrupt() {
+  if (!state_->open) return;
+  state_->open->statements.clear();
+  state_->open->database.rollback();
+  // What lies at the name now may be of somebody else, and stays. The log gets all that is in its
+  // -wal, so that whoever has moved it away has it whole.
+  if (!is_in_place()) state_->open->database.leave_files();
+  state_->open.reset();
+}
+
+bool Writer::is_open() const { return state_->open.has_value(); }
+
+bool Writer::is_in_place() const { return state_->open && state_->open->database.is_in_place(); }
 
 Result<> Writer::add(const SourceRow& row) {
-  return state_->insert(state_->statements[kSource]
-                            .bind(std::int64_t{row.id})
-                            .bind(row.name)
-                            .bind(row.driver)
-                            .bind(row.text)
-                            .bind(row.identity)
-                            .bind(row.config)
-                            .bind_checksum());
+  return state_->open->insert(bind(state_->open->statements[kSource], row));
 }
 
 Result<> Writer::add(const StreamRow& row) {
-  return state_->insert(state_->statements[kStream]
-                            .bind(std::int64_t{row.id})
-                            .bind(std::int64_t{row.source})
-                            .bind(row.body)
-                            .bind(row.name)
-                            .bind(row.stages_json)
-                            .bind(stored(row.first_item))
-                            .bind_checksum());
+  return state_->open->insert(state_->open->statements[kStream]
+                                  .bind(std::int64_t{row.id})
+                                  .bind(std::int64_t{row.source})
+                                  .bind(row.body)
+                                  .bind(row.name)
+                                  .bind(row.stages_json)
+                                  .bind(stored(row.first_item))
+                                  .bind_checksum());
 }
 
 Result<> Writer::add(const ChunkRow& row) {
   pack_positions(row.places, state_->sequences);
-  state_->numbered(kChunk)
+  state_->open->numbered(kChunk)
       .bind(std::int64_t{row.source})
       .bind(std::int64_t{row.socket})
       .bind(std::int64_t{row.direction})
@@ -171,58 +255,58 @@ Result<> Writer::add(const ChunkRow& row) {
       .bind(stored(row.first_item))
       .bind(std::span<const std::byte>(state_->sequences))
       .bind(row.bytes);
-  return state_->insert(kChunk);
+  return state_->open->insert(kChunk);
 }
 
 Result<> Writer::add(const DecisionRow& row) {
-  state_->numbered(kDecision)
+  state_->open->numbered(kDecision)
       .bind(stored(row.item))
       .bind(std::int64_t{row.stream})
       .bind(row.stage)
       .bind(row.name)
       .bind(std::as_bytes(std::span(row.value)))
       .bind(row.now_ns);
-  return state_->insert(kDecision);
+  return state_->open->insert(kDecision);
 }
 
 Result<> Writer::add(const FrameRow& row) {
-  state_->numbered(kFrame)
+  state_->open->numbered(kFrame)
       .bind(std::int64_t{row.stream})
       .bind(stored(row.sequence))
       .bind(std::int64_t{row.raw})
       .bind(row.bytes);
-  return state_->insert(kFrame);
+  return state_->open->insert(kFrame);
 }
 
 Result<> Writer::add(const GapRow& row) {
-  state_->numbered(kGap)
+  state_->open->numbered(kGap)
       .bind(static_cast<std::int64_t>(row.kind))
       .bind(std::int64_t{row.owner})
       .bind(row.after_chunk)
       .bind(stored(row.lost))
       .bind(row.time_ns);
-  return state_->insert(kGap);
+  return state_->open->insert(kGap);
 }
 
 Result<> Writer::add(const TakeRow& row) {
-  return state_->insert(state_->statements[kTake]
-                            .bind(row.id)
-                            .bind(row.name)
-                            .bind(stored(row.first_item))
-                            .bind(stored(row.last_item))
-                            .bind_checksum());
+  return state_->open->insert(state_->open->statements[kTake]
+                                  .bind(row.id)
+                                  .bind(row.name)
+                                  .bind(stored(row.first_item))
+                                  .bind(stored(row.last_item))
+                                  .bind_checksum());
 }
 
 Result<std::string> Writer::add_blob(std::span<const std::byte> bytes) {
   std::string hash = sha256_hex(bytes);
-  TRY(state_->insert(state_->statements[kBlob].bind(hash).bind(bytes)));
+  TRY(state_->open->insert(state_->open->statements[kBlob].bind(hash).bind(bytes)));
   return hash;
 }
 
 Result<std::int64_t> Writer::chunk_before_frame(std::uint32_t source, std::uint32_t stream,
                                                 std::uint64_t frame) const {
-  auto backwards = TRY(
-      state_->database.prepare("SELECT id, sequences FROM chunk WHERE source=? ORDER BY id DESC"));
+  auto backwards = TRY(state_->open->database.prepare(
+      "SELECT id, sequences FROM chunk WHERE source=? ORDER BY id DESC"));
   backwards.bind(std::int64_t{source});
   std::vector<StreamPosition> places;
   for (bool holds_frame = false;;) {
@@ -235,28 +319,21 @@ Result<std::int64_t> Writer::chunk_before_frame(std::uint32_t source, std::uint3
   }
 }
 
-std::int64_t Writer::last_chunk_id() const { return state_->last_id[kChunk]; }
-
-Result<> Writer::commit() {
-  if (!state_->in_transaction) return {};
-  auto done = state_->statements[kCommit].execute();
-  if (done) {
-    state_->in_transaction = false;
-    state_->committed_id = state_->last_id;
-  }
-  return done;
+std::int64_t Writer::last_chunk_id() const {
+  return state_->open ? state_->open->last_id[kChunk] : 0;
 }
 
-void Writer::rollback() {
-  state_->database.rollback();
-  state_->in_transaction = false;
-  state_->last_id = state_->committed_id;
+Result<> Writer::commit() {
+  if (!state_->open->in_transaction) return {};
+  auto done = state_->open->statements[kCommit].execute();
+  if (done) state_->open->in_transaction = false;
+  return done;
 }
 
 Result<> Writer::close() {
   TRY(commit());
-  state_->statements.clear();  // an open statement would keep the log in WAL mode
-  return state_->database.run("PRAGMA wal_checkpoint(TRUNCATE); PRAGMA journal_mode=DELETE;");
+  state_->open->statements.clear();  // an open statement would keep the log in WAL mode
+  return state_->open->database.run("PRAGMA wal_checkpoint(TRUNCATE); PRAGMA journal_mode=DELETE;");
 }
 
 }  // namespace posed::log

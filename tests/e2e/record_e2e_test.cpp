@@ -5,9 +5,13 @@
 #include <filesystem>
 #include <fstream>
 #include <set>
+#include <thread>
 
+#include <netinet/in.h>
 #include <sched.h>
+#include <sys/socket.h>
 #include <time.h>
+#include <unistd.h>
 
 #include <nlohmann/json.hpp>
 
@@ -205,6 +209,48 @@ TEST_CASE("record counts people who have left, and names a source that no body c
   }
 }
 
+TEST_CASE("rubbish in large datagrams fills a log slowly, and the device beside it is recorded") {
+  Stage stage;
+  const std::uint16_t port = free_port();
+  stage.folder.write("posed.toml",
+                     std::string(Stage::kEndpoints) +
+                         "[[source]]\nname = \"room\"\ndriver = \"template_mocap\"\n"
+                         "streams = \"all\"\n[source.template_mocap]\nlisten = \"127.0.0.1:" +
+                         std::to_string(port) + "\"\n");
+  stage.record();
+  const auto start = std::chrono::steady_clock::now();
+  const int fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  to.sin_port = htons(port);
+  const std::string rubbish(60'000, 'r');
+  MocapRoom room(port);
+  std::uint64_t sent = 0;
+  for (int frame = 0; frame < 300; ++frame) {
+    if (frame % 30 == 0) room.describe();
+    for (int i = 0; i < 4; ++i) {
+      sent += ::sendto(fd, rubbish.data(), rubbish.size(), 0,
+                       reinterpret_cast<const sockaddr*>(&to), sizeof to) > 0
+                  ? rubbish.size()
+                  : 0;
+    }
+    room.frame();
+    std::this_thread::sleep_for(5ms);
+  }
+  ::close(fd);
+  stage.daemon->send(SIGTERM);
+  REQUIRE(stage.daemon->exit_code() == 0);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  CHECK(sent > 50'000'000);
+  const std::string log = stage.path("take.plog");
+  CHECK(static_cast<double>(std::filesystem::file_size(log)) < 1e6 * (took.count() + 2.0));
+  const ProgramOutcome replay = posed({"replay", log, "--speed", "max", "--expect", "--json"});
+  INFO(replay.err << stage.daemon->errors());
+  CHECK(replay.code == 0);
+  CHECK(json::parse(replay.out).at("compared") > 100);
+}
+
 TEST_CASE("a log is replaced only once its replacement is being written") {
   Walkers busy;
   busy.launch("run");
@@ -225,6 +271,81 @@ TEST_CASE("a log is replaced only once its replacement is being written") {
   REQUIRE(stage.daemon->exit_code() == 0);
   CHECK(file_text(stage.path("take.plog")) != before);
   CHECK_FALSE(std::filesystem::exists(stage.path("take.plog.replaced")));
+}
+
+TEST_CASE("of two recordings with one name one is refused, and the other's log replays") {
+  Walkers stage;
+  const std::vector<std::string> arguments{"record", "--config",           stage.path("posed.toml"),
+                                           "--out",  stage.path("x.plog"), "--frames"};
+  Process one(arguments), two(arguments);
+  const auto first = one.line(), second = two.line();
+  REQUIRE(first.has_value() != second.has_value());
+  Process& refused = first ? two : one;
+  Process& recorded = first ? one : two;
+  CHECK(refused.exit_code().value_or(0) > 0);
+  CHECK(refused.errors().find("exists already") != std::string::npos);
+  std::this_thread::sleep_for(500ms);
+  SECTION("also with --overwrite") {
+    const ProgramOutcome third = posed({"record", "--config", stage.path("posed.toml"), "--out",
+                                        stage.path("x.plog"), "--overwrite"});
+    CHECK(third.code == 1);
+    CHECK(third.err.find("in use") != std::string::npos);
+  }
+  SECTION("undisturbed") {}
+  recorded.send(SIGTERM);
+  CHECK(recorded.exit_code() == 0);
+  const ProgramOutcome replay =
+      posed({"replay", stage.path("x.plog"), "--speed", "max", "--expect"});
+  INFO(replay.err);
+  CHECK(replay.code == 0);
+}
+
+TEST_CASE(
+    "a log that is deleted is reported while it is recorded, and its name need not be UTF-8") {
+  Walkers stage;
+  const std::string file = stage.path("latin\xdc.plog");
+  stage.launch("record", {"--out", file});
+  const auto status = [&] {
+    const ProgramOutcome asked = stage.ctl({"status", "--json"});
+    INFO(asked.err);
+    REQUIRE(asked.code == 0);
+    return json::parse(asked.out).at("status");
+  };
+  const json before = status();
+  CHECK(before.at("recorderFile").get<std::string>().ends_with("latin\\xdc.plog"));
+  CHECK(before.value("recorderTrouble", "").empty());
+  CHECK(posed({"top", "--connect", stage.publish, "--count", "1", "--timeout", "20"}).code == 0);
+  std::filesystem::remove(file);
+  std::string trouble;
+  for (int i = 0; i < 100 && trouble.empty(); ++i) {
+    std::this_thread::sleep_for(100ms);
+    trouble = status().value("recorderTrouble", "");
+  }
+  CHECK(trouble.find("deleted, moved or replaced") != std::string::npos);
+  stage.daemon->send(SIGTERM);
+  CHECK(stage.daemon->exit_code() == 1);
+  CHECK(stage.daemon->errors().find("recording stopped") != std::string::npos);
+}
+
+TEST_CASE("a replay that is interrupted leaves the file that was there") {
+  Walkers stage;
+  stage.record();
+  stage.await_frames("walker", 100);
+  stage.daemon->send(SIGTERM);
+  REQUIRE(stage.daemon->exit_code() == 0);
+  const std::string out = stage.folder.write("frames.bin", "before").string();
+  Process replay({"replay", stage.path("take.plog"), "--speed", "0.2", "--publish", "--endpoint",
+                  "tcp://127.0.0.1:*", "--out", out, "--overwrite"});
+  REQUIRE(replay.line());
+  replay.send(SIGINT);
+  CHECK(replay.exit_code() == 1);
+  CHECK(file_text(out) == "before");
+  CHECK(posed({"replay", stage.path("take.plog"), "--speed", "max", "--out", out, "--overwrite"})
+            .code == 0);
+  CHECK(file_text(out).size() > 1000);
+  for (const auto& file : std::filesystem::directory_iterator(stage.folder.path())) {
+    CHECK(file.path().extension() != ".part");
+  }
 }
 
 }  // namespace posed::test

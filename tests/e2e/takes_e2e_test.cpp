@@ -3,6 +3,8 @@
 
 #include <chrono>
 #include <filesystem>
+#include <memory>
+#include <set>
 #include <string>
 #include <thread>
 #include <vector>
@@ -198,6 +200,44 @@ TEST_CASE("a [record] table makes `run` record into a folder, and without one ta
   for (const std::string take : {"1", "2"}) {
     const std::string clip = file_text(stem + "-" + take + "-walker.bvh");
     CHECK(clip.ends_with(stage.frames_of(log, take)));
+  }
+}
+
+TEST_CASE("daemons that begin at once with one folder each have a whole log") {
+  constexpr int kDaemons = 4;
+  Takes stage;
+  stage.write_config("[record]\nframes = true\n");
+  std::vector<std::unique_ptr<Process>> daemons;
+  for (int i = 0; i < kDaemons; ++i) {
+    daemons.push_back(std::make_unique<Process>(
+        std::vector<std::string>{"run", "--config", stage.path("posed.toml")}));
+  }
+  std::set<std::string> files;
+  for (const auto& daemon : daemons) {
+    const auto line = daemon->line();
+    INFO(daemon->errors());
+    REQUIRE(line);
+    const json ready = json::parse(*line);
+    CHECK(posed({"monitor", "--connect", ready.at("publish"), "--count", "20"}).code == 0);
+    const ProgramOutcome status =
+        posed({"ctl", "--connect", ready.at("control"), "status", "--json"});
+    REQUIRE(status.code == 0);
+    const json stats = json::parse(status.out).at("status");
+    CHECK(stats.value("recorderErrors", "0") == "0");
+    files.insert(stats.at("recorderFile"));
+  }
+  CHECK(files.size() == kDaemons);
+  for (const auto& daemon : daemons) {
+    daemon->send(SIGTERM);
+    CHECK(daemon->exit_code() == 0);
+  }
+  for (const std::string& file : files) {
+    const ProgramOutcome replay = posed({"replay", file, "--speed", "max", "--expect"});
+    INFO(replay.err);
+    CHECK(replay.code == 0);
+  }
+  for (const auto& file : std::filesystem::directory_iterator(stage.path("takes"))) {
+    CHECK(file.path().extension() == ".plog");
   }
 }
 

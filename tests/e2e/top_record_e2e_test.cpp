@@ -10,8 +10,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "proto/zmq/zmq_handle.hpp"
 #include "tests/e2e/served.hpp"
 #include "tests/support/file_text.hpp"
+#include "tests/support/free_port.hpp"
 #include "tests/support/has.hpp"
 
 namespace posed::test {
@@ -89,6 +91,43 @@ TEST_CASE("top refuses a file that is something else") {
   CHECK(refused("no/such.jsonl").code == 2);
   CHECK(posed({"top", "--record", "/dev/full"}).code == 2);
   CHECK(posed({"top", "--overwrite"}).code == 2);
+}
+
+TEST_CASE("top and monitor give up at stats that cannot be read, as at silence") {
+  const auto context = net::open_context().value();
+  const auto socket = net::open_socket(context.get(), ZMQ_PUB).value();
+  const std::string endpoint = "tcp://127.0.0.1:" + std::to_string(free_port());
+  REQUIRE(zmq_bind(socket.get(), endpoint.c_str()) == 0);
+  const std::jthread sender([&](const std::stop_token& stop) {
+    for (; !stop.stop_requested(); std::this_thread::sleep_for(50ms)) {
+      static_cast<void>(net::send_part(socket.get(), "stats", true));
+      static_cast<void>(net::send_part(socket.get(), "\xff\xff no stats", false));
+    }
+  });
+  for (std::vector<std::string> command :
+       {std::vector<std::string>{"top"}, {"monitor", "--topic", "stats"}, {"monitor"}}) {
+    command.insert(command.end(), {"--connect", endpoint, "--count", "1", "--timeout", "2"});
+    const ProgramOutcome outcome = posed(std::move(command));
+    CHECK(outcome.code == 1);
+    CHECK(has(outcome.err, "gave up after"));
+  }
+}
+
+TEST_CASE("top keeps a file that came while it waited") {
+  Served served;
+  const std::string path = served.path("show.jsonl");
+  const std::uint16_t port = free_port();
+  Process top(
+      {"top", "--connect", "tcp://127.0.0.1:" + std::to_string(port), "--record", path, "--json"});
+  std::this_thread::sleep_for(500ms);  // it has looked at the path
+  served.folder.write("show.jsonl", "of somebody else\n");
+  std::string config = file_text(served.path("posed.toml"));
+  config.replace(config.find("tcp://127.0.0.1:*"), 17, "tcp://127.0.0.1:" + std::to_string(port));
+  served.folder.write("posed.toml", config);
+  served.start();
+  CHECK(top.exit_code().value_or(0) != 0);
+  CHECK(has(top.errors(), "exists already"));
+  CHECK(file_text(path) == "of somebody else\n");
 }
 
 }  // namespace

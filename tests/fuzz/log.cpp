@@ -1,6 +1,7 @@
 // A device log with valid tables, types and checksums and arbitrary contents: it is refused with an
 // error message or replayed to its end; nothing crashes, hangs or takes unbounded memory. The input
-// chooses the streams, their settings and models, and then each row.
+// chooses the streams, their settings and models, and then each row; now and then also the schema,
+// and then the log must be refused.
 #include <cstdint>
 #include <cstdlib>
 #include <filesystem>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include <fuzzer/FuzzedDataProvider.h>
+#include <sqlite3.h>
 #include <unistd.h>
 
 #include "daemon/pipeline/description_row.hpp"
@@ -20,6 +22,7 @@
 #include "posed/v1/log.pb.h"
 #include "proto/log/digest.hpp"
 #include "proto/log/reader.hpp"
+#include "proto/log/schema.hpp"
 #include "proto/log/writer.hpp"
 #include "proto/message/frame_message.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
@@ -43,7 +46,7 @@ std::span<const std::byte> bytes_of(const std::string& text) {
 class FuzzedLog {
  public:
   FuzzedLog(const std::uint8_t* data, std::size_t size, const std::filesystem::path& path)
-      : input_(data, size), writer_(log::Writer::create(path, {}, true).value()) {}
+      : input_(data, size), path_(path), writer_(log::Writer::create(path, {}).value()) {}
 
   bool write() {
     static const std::string style = style::serialize_model(test::toy_model(1));
@@ -63,7 +66,59 @@ class FuzzedLog {
     return writer_.close().has_value();
   }
 
+  // Makes the log bring something to run along, or a table that is not posed's. Returns whether it
+  // does.
+  bool twist_schema() {
+    if (input_.ConsumeProbability<double>() < 0.8) return false;
+    const std::string table = input_.PickValueInArray<std::string>(
+        {"meta", "source", "stream", "blob", "chunk", "decision", "frame", "gap", "take"});
+    const std::string endless =
+        "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i+1 FROM n) SELECT ";
+    const std::string text = input_.ConsumeRandomLengthString(100);
+    const std::string expression = input_.PickValueInArray<std::string>(
+        {"hex(zeroblob(60000000))", "(SELECT max(i) FROM n)", "randomblob(100000000)", "1", text});
+    switch (input_.ConsumeIntegralInRange(0, 6)) {
+      case 0:
+        return change("DROP TABLE " + table + "; CREATE VIEW " + table + " AS " + endless +
+                      expression + " FROM n");
+      case 1:
+        return change("CREATE TRIGGER t AFTER INSERT ON " + table + " BEGIN SELECT " + expression +
+                      "; END");
+      case 2:
+        return change("CREATE INDEX i ON " + table + "(" + expression + ")");
+      case 3:
+        return change("ALTER TABLE " + table + " ADD COLUMN c TEXT AS (" + expression + ")");
+      case 4:
+        return change("DROP TABLE " + table + "; CREATE TABLE " + table +
+                      "(id INTEGER PRIMARY KEY, crc CHECK(" + expression + "))");
+      case 5:
+        return change("CREATE VIRTUAL TABLE v USING fts5(a)");
+      default:  // what no statement of SQLite would write
+        return change("PRAGMA writable_schema=1; UPDATE sqlite_master SET " +
+                      input_.PickValueInArray<std::string>({"sql", "name", "tbl_name", "type"}) +
+                      "=CAST(x'" + hex(text) + "' AS TEXT) WHERE name='" + table + "'");
+    }
+  }
+
  private:
+  static std::string hex(const std::string& text) {
+    std::string digits;
+    for (const unsigned char c : text) {
+      digits += "0123456789abcdef"[c / 16];
+      digits += "0123456789abcdef"[c % 16];
+    }
+    return digits;
+  }
+
+  [[nodiscard]] bool change(const std::string& sql) const {
+    sqlite3* handle = nullptr;
+    bool changed = sqlite3_open(path_.c_str(), &handle) == SQLITE_OK;
+    sqlite3_limit(handle, SQLITE_LIMIT_LENGTH, 1'000'000);
+    changed = changed && sqlite3_exec(handle, sql.c_str(), nullptr, nullptr, nullptr) == SQLITE_OK;
+    sqlite3_close(handle);
+    return changed;
+  }
+
   void add_stream(std::uint32_t i) {
     const std::uint32_t id = input_.ConsumeBool() ? i : (1U << 16U | i);
     std::string driver =
@@ -292,6 +347,7 @@ class FuzzedLog {
   static void keep(const Result<>& done) { static_cast<void>(done); }
 
   FuzzedDataProvider input_;
+  std::filesystem::path path_;
   log::Writer writer_;
   std::array<std::string, 7> hashes_;
   std::vector<std::uint32_t> ids_;
@@ -335,8 +391,15 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       std::filesystem::exists("/dev/shm") ? "/dev/shm" : std::filesystem::temp_directory_path();
   static const std::filesystem::path path =
       folder / ("posed_fuzz_log_" + std::to_string(getpid()) + ".plog");
-  if (FuzzedLog(data, size, path).write()) replay_log(path);
+  FuzzedLog log(data, size, path);
+  if (log.write()) {
+    const bool is_twisted = log.twist_schema();
+    if (is_twisted && posed::log::Reader::open(path)) std::abort();
+    replay_log(path);
+  }
   std::error_code ignored;
-  std::filesystem::remove(path, ignored);
+  for (const char* suffix : posed::log::kFileSuffixes) {
+    std::filesystem::remove(path.string() + suffix, ignored);
+  }
   return 0;
 }

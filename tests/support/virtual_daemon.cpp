@@ -102,13 +102,13 @@ void VirtualDaemon::Parts::open_log() {
   record::RecorderOptions recorder;
   recorder.file = options.log;
   recorder.clock = virtual_clock;
-  auto writer = record::begin_log(recorder, setup);
-  REQUIRE(writer);
+  log::Writer writer = record::log_writer(recorder, setup);
+  REQUIRE(writer.resume());
   record_sink = std::make_unique<record::RecordRings>(record::RingSizes{
       .chunk_bytes = std::vector<std::size_t>(setup.sources.size(), options.chunk_bytes),
       .slots = std::vector<record::SlotSizes>(setup.slots, options.record_slot)});
-  log_writer = std::make_unique<record::LogWriterLoop>(
-      *record_sink, std::move(*writer), options.log, [](const record::RecorderEvent&) {});
+  log_writer = std::make_unique<record::LogWriterLoop>(*record_sink, std::move(writer), options.log,
+                                                       [](const record::RecorderEvent&) {});
 }
 
 void VirtualDaemon::Parts::open() {

@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "proto/clip/format.hpp"
+#include "proto/frame/whole_file.hpp"
 
 namespace posed::tools {
 namespace {
@@ -102,6 +103,9 @@ Result<> OutputFiles::check() const {
       return same_file(other.path, output->path);
     });
     if (twice) return misuse("would be written twice; name two files", output->path.string());
+  }
+  for (const Output& output : outputs_) {
+    if (!overwrite_) never_replace(output.path);
   }
   return {};
 }

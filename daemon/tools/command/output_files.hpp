@@ -1,6 +1,6 @@
 // The rules for every file that a command writes: its extension must not be that of another format,
 // it must not be a file that the command reads, and an existing file is replaced only with
-// --overwrite. Checked before any work is done.
+// --overwrite, also one that comes while the command works. Checked before any work is done.
 #pragma once
 
 #include <filesystem>

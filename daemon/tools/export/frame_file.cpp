@@ -6,9 +6,8 @@
 namespace posed::tools {
 
 Result<FrameFile> FrameFile::create(const std::filesystem::path& path) {
-  std::ofstream file(path, std::ios::binary | std::ios::trunc);
-  if (!file) return fail("cannot be written: " + errno_text(), path.string());
-  return FrameFile(std::move(file), path);
+  auto file = TRY(WholeFile::open(path));
+  return FrameFile(std::move(file));
 }
 
 void FrameFile::add(const v1::Frame& frame) {
@@ -16,14 +15,8 @@ void FrameFile::add(const v1::Frame& frame) {
   const auto size = static_cast<std::uint32_t>(bytes_.size());
   std::array<char, 4> length{};
   for (std::size_t i = 0; i < length.size(); ++i) length[i] = static_cast<char>(size >> (8 * i));
-  file_.write(length.data(), length.size());
-  file_.write(bytes_.data(), static_cast<std::streamsize>(bytes_.size()));
-}
-
-Result<> FrameFile::close() {
-  file_.close();
-  if (!file_) return fail("could not be written whole; is the disk full?", path_.string());
-  return {};
+  file_.out().write(length.data(), length.size());
+  file_.out().write(bytes_.data(), static_cast<std::streamsize>(bytes_.size()));
 }
 
 }  // namespace posed::tools

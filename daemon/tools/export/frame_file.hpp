@@ -3,11 +3,12 @@
 #pragma once
 
 #include <filesystem>
-#include <fstream>
 #include <string>
+#include <utility>
 
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/result.hpp"
+#include "proto/frame/whole_file.hpp"
 
 namespace posed::tools {
 
@@ -16,15 +17,14 @@ class FrameFile {
   static Result<FrameFile> create(const std::filesystem::path& path);
 
   void add(const v1::Frame& frame);
-  // Returns whether everything was written.
-  Result<> close();
+  // Gives the file its name, if everything was written. Without it there is no file, or the old
+  // one.
+  Result<> close() { return file_.keep(); }
 
  private:
-  FrameFile(std::ofstream file, std::filesystem::path path)
-      : file_(std::move(file)), path_(std::move(path)) {}
+  explicit FrameFile(WholeFile file) : file_(std::move(file)) {}
 
-  std::ofstream file_;
-  std::filesystem::path path_;
+  WholeFile file_;
   std::string bytes_;
 };
 

@@ -3,6 +3,7 @@
 #include <cerrno>
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/types.h>
 #include <unistd.h>
 
@@ -13,8 +14,16 @@ LineFile::~LineFile() {
 }
 
 Result<> LineFile::open() {
-  fd_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (fd_ >= 0) return {};
+  fd_ = ::open(path_.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | (overwrite_ ? 0 : O_EXCL), 0666);
+  if (fd_ < 0 && errno == EEXIST) {
+    return fail("exists already; name another file, or add --overwrite to replace it",
+                path_.string());
+  }
+  if (fd_ >= 0 && ::flock(fd_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    ::close(std::exchange(fd_, -1));
+    return fail("is being written by another posed; name another file", path_.string());
+  }
+  if (fd_ >= 0 && ::ftruncate(fd_, 0) == 0) return {};
   return fail("cannot be written (" + errno_text() + "); name a file elsewhere", path_.string());
 }
 

@@ -1,4 +1,5 @@
-// LineFile: a text file that grows by whole lines, whenever its writer ends. Cold.
+// LineFile: a text file that grows by whole lines, whenever its writer ends. It has one writer.
+// Cold.
 #pragma once
 
 #include <cstdint>
@@ -12,8 +13,10 @@ namespace posed::tools {
 
 class LineFile {
  public:
-  // The file is made, or an old one emptied, by the first line.
-  explicit LineFile(std::filesystem::path path) : path_(std::move(path)) {}
+  // The file is made by the first line; `overwrite`: an old one is emptied by it, which otherwise
+  // is an error.
+  LineFile(std::filesystem::path path, bool overwrite)
+      : path_(std::move(path)), overwrite_(overwrite) {}
   ~LineFile();
   LineFile(const LineFile&) = delete;
   LineFile& operator=(const LineFile&) = delete;
@@ -26,6 +29,7 @@ class LineFile {
   Result<> open();
 
   std::filesystem::path path_;
+  bool overwrite_ = false;
   int fd_ = -1;
   std::uint64_t size_ = 0;  // bytes of whole lines
 };

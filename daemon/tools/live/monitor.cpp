@@ -98,14 +98,15 @@ class Monitor {
   Result<> receive() {
     net::Message topic, body;
     if (!connection_.receive(topic, body)) return {};
-    watch_.beat();
     if (topic.text() == "stats") {
       TRY(look_at(body.bytes()));
     }
     // A subscription is a prefix: walker also matches walker-raw.
     const bool all = options_.stream.empty() && topic.text() != "stats";
     if (!all && std::ranges::find(asked_, topic.text()) == asked_.end()) return {};
-    if (!show_topic(topic.text(), body.bytes(), options_.json)) {
+    if (show_topic(topic.text(), body.bytes(), options_.json)) {
+      watch_.beat();
+    } else {
       finished_ = std::ferror(stdout) != 0;  // the reader of stdout has gone
       if (finished_) shown_ = options_.count;
       return {};
@@ -118,7 +119,9 @@ class Monitor {
   // there is an error, unless streams come and go here, as bodies of sources do.
   Result<> look_at(std::span<const std::byte> bytes) {
     v1::Stats stats;
-    if (looked_ || !message::parse_bounded(stats, bytes) || stats.stream().empty()) return {};
+    if (!message::parse_bounded(stats, bytes)) return {};
+    watch_.beat();
+    if (looked_ || stats.stream().empty()) return {};
     looked_ = true;
     if (!stats.replay_file().empty()) {
       std::fprintf(stderr, "posed: %s\n", replay_words(stats).c_str());

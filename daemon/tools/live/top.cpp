@@ -49,7 +49,7 @@ class Top {
         chosen_(connection_, {.endpoint = options.control,
                               .key = options.client.key,
                               .server_key = options.client.server_key}) {
-    if (!options.record.empty()) record_.emplace(options.record);
+    if (!options.record.empty()) record_.emplace(options.record, options.overwrite);
   }
 
   Result<> run() {
@@ -101,9 +101,11 @@ class Top {
   bool receive(bool drawn) {
     net::Message topic, body;
     if (!connection_.receive(topic, body)) return false;
-    watch_.beat();
     if (topic.text() == "stats") {
-      if (!message::parse_bounded(stats_, body.bytes())) return false;
+      v1::Stats stats;
+      if (!message::parse_bounded(stats, body.bytes())) return false;
+      watch_.beat();  // nothing else is a sign of life: without stats there is nothing to show
+      stats_ = std::move(stats);
       if (drawn) chosen_.update(stats_);
       return true;
     }

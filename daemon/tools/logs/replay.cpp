@@ -354,7 +354,7 @@ Result<> open_outputs(const ReplayOptions& options, double speed, const log::Rea
   }
   if (!options.out.empty()) {
     auto file = TRY(FrameFile::create(options.out));
-    outputs.file = std::move(file);
+    outputs.file.emplace(std::move(file));
   }
   if (!options.publish) return {};
   const auto meta = reader.meta().find("publish_endpoint");
@@ -381,7 +381,7 @@ Result<> open_outputs(const ReplayOptions& options, double speed, const log::Rea
 Result<> ended_early(const ReplayOptions& options, const ReplayOutputs& outputs) {
   const std::string what = fmt::format("interrupted after {} frames", outputs.frames);
   if (options.expect) return fail(what + ": those after them were not compared");
-  if (!options.out.empty()) return fail(what + ": " + options.out + " holds only those");
+  if (!options.out.empty()) return fail(what + ": " + options.out + " was not written");
   spdlog::info("{}", what);
   return {};
 }
@@ -398,11 +398,13 @@ Result<> replay(const ReplayOptions& options) {
   replay::Replay& replay = *opened;
   ReplayOutcome outcome{.missing = missing_from(reader, replay)};
   for (const std::string& missing : outcome.missing) spdlog::warn("{}", missing);
-  ReplayOutputs outputs(replay);
-  TRY(open_outputs(options, speed, reader, replay, outputs));
   const auto extent = TRY(reader.extent());
   ReplayProgress progress(extent);
-  const Interrupt interrupt;  // after the progress bar, because it takes over Ctrl-C
+  // After the progress bar, because it takes over Ctrl-C, and before a file is begun that Ctrl-C
+  // would leave.
+  const Interrupt interrupt;
+  ReplayOutputs outputs(replay);
+  TRY(open_outputs(options, speed, reader, replay, outputs));
   Pacer pacer(options.log, speed);
   const auto pace = [&](const log::ChunkRow& chunk) {
     if (!pacer(chunk)) return false;

@@ -1,14 +1,16 @@
 #include "daemon/tools/run/recording.hpp"
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <array>
 #include <atomic>
-#include <chrono>
+#include <cerrno>
 #include <csignal>
 #include <ctime>
 #include <memory>
 #include <set>
 #include <system_error>
-#include <thread>
 #include <utility>
 #include <variant>
 
@@ -23,7 +25,9 @@
 #include "daemon/tools/export/log_clip.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/frames_clip.hpp"
+#include "proto/frame/whole_file.hpp"
 #include "proto/log/schema.hpp"
+#include "proto/log/writer.hpp"
 
 namespace posed::tools {
 namespace {
@@ -32,6 +36,7 @@ Result<> write_clip(Result<clip::Clip> clip, const std::filesystem::path& path) 
   if (!clip) return std::unexpected(clip.error());
   std::error_code error;
   if (std::filesystem::exists(path, error)) return fail("exists already", path.string());
+  never_replace(path);
   clip::hold_missing(*clip);
   for (const std::string& warning : clip->warnings) {
     spdlog::warn("{}: {}", path.string(), warning);
@@ -62,65 +67,70 @@ Result<> write_take_clips(const std::filesystem::path& log) {
 // been started successfully.
 class SetAside {
  public:
-  // Renames `file`, if it exists, to <file>.replaced. The error says why that is impossible.
+  // Renames the files of the log `file`, if there are any, to <file>.<pid>.replaced. The error says
+  // why that is impossible. An empty path: nothing is replaced.
   static Result<SetAside> move(const std::filesystem::path& file);
-  SetAside(SetAside&& other) noexcept;
+  SetAside(SetAside&& other) noexcept : file_(std::exchange(other.file_, {})) {}
   SetAside& operator=(SetAside&&) = delete;
-  ~SetAside();  // restores the file over the new one, unless release() was called
+  // Gives the old log its name back, unless release() was called, or the name is somebody else's by
+  // now.
+  ~SetAside();
 
   // The replacement has succeeded: deletes the old file.
   void release() noexcept;
 
  private:
   explicit SetAside(std::filesystem::path file) : file_(std::move(file)) {}
-  static void rename(const std::filesystem::path& from, const std::filesystem::path& to,
-                     const char* suffix);
-  static void remove(const std::filesystem::path& file, const char* suffix);
-  [[nodiscard]] std::filesystem::path aside() const { return file_.string() + ".replaced"; }
+  [[nodiscard]] std::string aside() const {
+    return file_.string() + "." + std::to_string(::getpid()) + ".replaced";
+  }
 
   std::filesystem::path file_;  // empty: nothing to restore
 };
 
+// Whether another process holds a lock of SQLite's, as its writer does all the time.
+bool is_in_use(const std::filesystem::path& file) {
+  const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
+  if (fd < 0) return false;
+  struct flock lock {};
+  lock.l_type = F_WRLCK;
+  lock.l_whence = SEEK_SET;
+  const bool known = ::fcntl(fd, F_GETLK, &lock) == 0;
+  ::close(fd);
+  return known && lock.l_type != F_UNLCK;
+}
+
 Result<SetAside> SetAside::move(const std::filesystem::path& file) {
-  std::error_code error;
-  if (!std::filesystem::exists(file, error)) return SetAside({});
-  SetAside kept(file);
-  std::filesystem::rename(file, kept.aside(), error);
-  if (error) {
-    kept.file_.clear();
-    return fail("cannot be replaced: " + error.message(), file.string());
+  if (is_in_use(file)) {
+    return fail("is in use by another process; end that, or name another file", file.string());
   }
-  for (const char* suffix : log::kFileSuffixes) kept.rename(file, kept.aside(), suffix);
+  SetAside kept(file);
+  for (const char* suffix : log::kFileSuffixes) {
+    std::error_code error;  // for most suffixes there is no file
+    if (file.empty()) break;
+    std::filesystem::rename(file.string() + suffix, kept.aside() + suffix, error);
+    if (error && error != std::errc::no_such_file_or_directory) {
+      return fail("cannot be replaced: " + error.message(), file.string() + suffix);
+    }
+  }
   return kept;
 }
 
-SetAside::SetAside(SetAside&& other) noexcept : file_(std::exchange(other.file_, {})) {}
-
-// Files that the failed replacement left beside its log must not be mistaken for files of the old
-// log.
 SetAside::~SetAside() {
-  if (file_.empty()) return;
   for (const char* suffix : log::kFileSuffixes) {
-    remove(file_, suffix);
-    rename(aside(), file_, suffix);
+    if (file_.empty() || rename_to_new(aside() + suffix, file_.string() + suffix)) continue;
+    if (errno == ENOENT) continue;
+    spdlog::error("the old {} is now {}: {}", file_.string() + suffix, aside() + suffix,
+                  errno_text());
   }
 }
 
 void SetAside::release() noexcept {
-  if (file_.empty()) return;
-  for (const char* suffix : log::kFileSuffixes) remove(aside(), suffix);
+  for (const char* suffix : log::kFileSuffixes) {
+    std::error_code ignored;
+    if (!file_.empty()) std::filesystem::remove(aside() + suffix, ignored);
+  }
   file_.clear();
-}
-
-void SetAside::rename(const std::filesystem::path& from, const std::filesystem::path& to,
-                      const char* suffix) {
-  std::error_code ignored;  // for most suffixes there is no file
-  std::filesystem::rename(from.string() + suffix, to.string() + suffix, ignored);
-}
-
-void SetAside::remove(const std::filesystem::path& file, const char* suffix) {
-  std::error_code ignored;
-  std::filesystem::remove(file.string() + suffix, ignored);
 }
 
 // Publishes what the recorder reports on event/<stream> of the streams that it concerns.
@@ -168,8 +178,9 @@ std::string missing_words(const record::Recorder& recorder, std::uint64_t droppe
 void print_result(const RecordingPlan& options, const assembly::Daemon& daemon,
                   const record::Recorder& recorder, double took_s) {
   const v1::Stats stats = daemon.stats();
+  const std::string file = recorder.file().string();
   std::error_code gone;  // somebody deleted the log meanwhile
-  const auto size = std::filesystem::file_size(options.out, gone);
+  const auto size = std::filesystem::file_size(file, gone);
   const std::uintmax_t bytes = gone ? 0 : size;
   std::uint64_t frames = stats.left_frames(), samples = stats.left_samples();
   const bool some_left = frames + samples > 0;
@@ -186,7 +197,7 @@ void print_result(const RecordingPlan& options, const assembly::Daemon& daemon,
   const std::uint64_t dropped = kernel_dropped(daemon);
   if (options.json) {
     Findings()
-        .add("file", options.out)
+        .add("file", file)
         .add("seconds", took_s)
         .add("bytes", bytes)
         .add("frames", frames)
@@ -202,7 +213,7 @@ void print_result(const RecordingPlan& options, const assembly::Daemon& daemon,
   }
   spdlog::log(lost + recorder.errors() + dropped > 0 ? spdlog::level::warn : spdlog::level::info,
               "{}: {:.1f} s of {} stream{}{}, {} frames and {} samples published, {:.1f} MB; {}",
-              options.out, took_s, stats.stream_size(), stats.stream_size() == 1 ? "" : "s",
+              file, took_s, stats.stream_size(), stats.stream_size() == 1 ? "" : "s",
               some_left ? " and those that have left" : "", frames, samples,
               static_cast<double>(bytes) / 1e6, missing_words(recorder, dropped));
 }
@@ -234,32 +245,46 @@ Result<> check_out(const RecordingPlan& options, const config::DaemonConfig& con
   return files.check();
 }
 
-}  // namespace
+// The name of a log, and whether its file is there already and ours.
+struct LogName {
+  std::filesystem::path path;
+  bool reserved = false;
+};
 
-Result<std::string> new_log(const std::filesystem::path& folder) {
+// Takes a name in the folder, after the present time, that no file has:
+// <folder>/20261123T013005Z.plog, and with .2, .3 where other daemons were first. A full disk stops
+// recording and not streaming, so then the name is to be taken later.
+Result<LogName> new_log(const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) {
     return fail("this folder for recordings cannot be made: " + error.message(), folder.string());
   }
-  while (true) {
-    const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
-    const auto path = folder / fmt::format("{:%Y%m%dT%H%M%SZ}.plog",
-                                           fmt::gmtime(std::chrono::system_clock::to_time_t(now)));
-    if (!std::filesystem::exists(path, error)) return path.string();
-    std::this_thread::sleep_until(now + std::chrono::seconds(1));  // another daemon's
+  const std::string time = fmt::format("{:%Y%m%dT%H%M%SZ}", fmt::gmtime(std::time(nullptr)));
+  for (int number = 1;; ++number) {
+    const auto path = folder / (time + (number > 1 ? fmt::format(".{}", number) : "") + ".plog");
+    const auto name = TRY(log::reserve(path));
+    if (name != log::Reserved::kTaken) return LogName{path, name == log::Reserved::kYes};
   }
 }
 
+}  // namespace
+
 Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig& config) {
-  TRY(check_out(plan, config));
+  if (!plan.out.empty()) {
+    TRY(check_out(plan, config));
+  }
   auto opened = TRY(assembly::Daemon::open(config));
   assembly::Daemon& daemon = *opened;
   TRY(check_end(daemon, plan.serve));
   auto started = std::make_shared<std::atomic<bool>>(false);
+  auto replaced = TRY(SetAside::move(plan.overwrite ? plan.out : ""));
+  const auto name = plan.out.empty() ? new_log(plan.folder) : LogName{plan.out};
+  if (!name) return std::unexpected(name.error());
   record::RecorderOptions recorder_options{
-      .file = plan.out,
-      .overwrite = plan.overwrite,
+      .file = name->path,
+      .reserved = name->reserved,
+      .may_begin_later = plan.out.empty(),
       .frames = plan.frames,
       .config_text = config.text,
       .publish_endpoint = config.publish_endpoint,
@@ -267,7 +292,6 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
       .report = [&daemon, started](const record::RecorderEvent& event) {
         if (*started) post(daemon, event);
       }};
-  auto replaced = TRY(SetAside::move(plan.out));
   std::set<std::uint32_t> with_body;  // sources, by number
   auto recorder = TRY(record::Recorder::open(
       std::move(recorder_options), record::recorded_setup(daemon.sources(), daemon.slots())));
@@ -280,8 +304,8 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
   hooks.more_stats = [&recorder](v1::Stats& stats) {
     stats.set_recorder_lost_chunks(recorder->lost_chunks());
     stats.set_recorder_errors(recorder->errors());
-    stats.set_recorder_file(recorder->file().string());
-    stats.set_recorder_trouble(recorder->trouble());
+    stats.set_recorder_file(clean(recorder->file().string()));
+    stats.set_recorder_trouble(clean(recorder->trouble()));
     if (const auto take = recorder->running_take()) {
       *stats.mutable_take() = pipeline::stats_of(*take);
     }
@@ -291,8 +315,10 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
     daemon.stop();
     // The error is what failed at the start, not what follows from it.
     [[maybe_unused]] const auto closed = recorder->finish();
-    std::error_code ignored;
-    std::filesystem::remove(plan.out, ignored);  // nothing was recorded
+    for (const char* suffix : log::kFileSuffixes) {  // nothing was recorded
+      std::error_code ignored;
+      std::filesystem::remove(name->path.string() + suffix, ignored);
+    }
     return done;
   }
   replaced.release();
@@ -307,7 +333,7 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
     if (!with_body.contains(source->number)) warn_of_no_body(source->config.name);
   }
   print_result(plan, daemon, *recorder, took_s);
-  if (finished && plan.clips) return write_take_clips(plan.out);
+  if (finished && plan.clips) return write_take_clips(name->path);
   return finished;
 }
 

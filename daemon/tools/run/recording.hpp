@@ -23,17 +23,14 @@ namespace posed::tools {
 inline void warn_of_no_body(const std::string& source) { spdlog::warn("{}", no_body_of(source)); }
 
 struct RecordingPlan {
-  std::string out;         // the log
-  bool frames = false;     // keep the published frames, too
+  std::string out;               // the log; empty: one in `folder`
+  std::filesystem::path folder;  // made if it is not there; the log is named after the present time
+  bool frames = false;           // keep the published frames, too
   bool clips = false;      // at the end, write each take of each stream as a BVH beside the log
-  bool overwrite = false;  // replace the log if it is there already
+  bool overwrite = false;  // replace the log `out` if it is there already
   bool json = false;       // at the end, print what was written as JSON
   ServeOptions serve;
 };
-
-// A path in the folder, named after the present time, that no file has: "<folder>/<utc>.plog", like
-// 20261123T013005Z.plog. Makes the folder if it is not there.
-Result<std::string> new_log(const std::filesystem::path& folder);
 
 // Call prepare_to_serve() first. Returns when the daemon has ended and the log is complete.
 Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig& config);

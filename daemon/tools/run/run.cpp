@@ -16,8 +16,8 @@ Result<> run(const ServeOptions& options) {
   prepare_to_serve();
   auto config = TRY(config::load_config(options.config, drivers::registry()));
   if (config.record) {
-    auto log = TRY(new_log(config.record->folder));
-    return stream_and_record({.out = std::move(log),
+    return stream_and_record({.out = {},
+                              .folder = config.record->folder,
                               .frames = config.record->frames,
                               .clips = config.record->clips,
                               .serve = options},

@@ -43,12 +43,14 @@ class TakeKeeper final : public DaemonControl {
   bool recording = true;
 };
 
+std::int64_t trigger_now_ns = 42;
+
 struct Triggered {
   void handle(const std::string& datagram, const std::string& sender = "192.168.1.5") {
     trigger.handle(datagram, sender);
   }
   TakeKeeper daemon;
-  Trigger trigger{daemon, []() noexcept { return std::int64_t{42}; }};
+  Trigger trigger{daemon, []() noexcept { return trigger_now_ns; }};
 };
 
 }  // namespace
@@ -137,6 +139,21 @@ TEST_CASE("a trigger's name is made printable and short rather than refused") {
   const std::string& name = triggered.daemon.marks[0].name;
   CHECK(name.starts_with("a\\x1b[2Jxx"));
   CHECK(name.size() <= pipeline::kMaxTakeName);
+}
+
+TEST_CASE("a flood of triggers begins few takes, and the next one by hand begins again") {
+  Triggered triggered;
+  const auto start = [&](int number) {
+    triggered.handle(
+        start_text("<Name VALUE=\"a\"/><PacketID VALUE=\"" + std::to_string(number) + "\"/>"));
+  };
+  for (int i = 0; i < 100; ++i) start(i);
+  CHECK(triggered.daemon.marks.size() == Trigger::kAtOnce);
+  CHECK(triggered.trigger.refused() == 100 - Trigger::kAtOnce);
+  const std::size_t before = triggered.daemon.marks.size();
+  trigger_now_ns += Trigger::kStartEvery_ns;
+  start(100);
+  CHECK(triggered.daemon.marks.size() == before + 1);
 }
 
 }  // namespace posed::control

@@ -153,8 +153,23 @@ TEST_CASE("a performance continues while the device is silent, at the stream's r
   CHECK(shown >= 40);
   CHECK(shown <= 52);
   CHECK(hand.out.frames.back().source == Source::kLabels);
-  CHECK(hand.out.frames.back().header.sequence == 20);
   CHECK(hand.engine->state() == StreamState::kStale);
+}
+
+TEST_CASE("every frame has its own number, also those performed while the device is silent") {
+  Hand hand;
+  hand.frames(20);
+  static_cast<void>(hand.play("g p"));
+  hand.silence(kNanosPerSecond);
+  CHECK(hand.out.frames.size() > 60);
+  const Ack ack = hand.play("1");
+  CHECK(ack.sequence == hand.out.frames.size() + 1);
+  hand.frames(300);
+  hand.silence(300 * kMs);  // all that waits has left
+  for (std::size_t i = 0; i < hand.out.frames.size(); ++i) {
+    REQUIRE(hand.out.frames[i].header.sequence == i + 1);
+  }
+  for (const Decision& decision : hand.out.decisions) CHECK(decision.sequence <= hand.sequence + 1);
 }
 
 TEST_CASE("the recorded ticks and plays give the same frames again") {
@@ -188,6 +203,7 @@ TEST_CASE("the recorded ticks and plays give the same frames again") {
   for (std::size_t i = 0; i < live.out.frames.size(); ++i) {
     CHECK(again.out.frames[i].angle_rad == live.out.frames[i].angle_rad);
     CHECK(again.out.frames[i].header.arrival_ns == live.out.frames[i].header.arrival_ns);
+    CHECK(again.out.frames[i].header.sequence == live.out.frames[i].header.sequence);
   }
 }
 

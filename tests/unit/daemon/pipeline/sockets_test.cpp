@@ -144,7 +144,7 @@ TEST_CASE("a log's device sends each datagram to the socket that it came to") {
   const test::TempFolder folder;
   const std::string file = (folder.path() / "take.plog").string();
   {
-    auto log = log::Writer::create(file, {}, false).value();
+    auto log = log::Writer::create(file, {}).value();
     REQUIRE(log.add(log::SourceRow{0, "room", "template_mocap", "", "", "{}"}));
     REQUIRE(log.add(log::StreamRow{0, 0, "Ann", "room-ann", "{}", 1}));
     const std::array<std::byte, 1> byte{};

@@ -12,6 +12,7 @@
 #include "models/style/live/style_type.hpp"
 #include "proto/log/digest.hpp"
 #include "tests/support/file_limit.hpp"
+#include "tests/support/file_text.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/daemon/record/toy_recording.hpp"
 
@@ -257,4 +258,72 @@ TEST_CASE("the recorder's thread writes by its own timer and leaves one file") {
   const auto again = Recorder::open(options, setup);
   REQUIRE(!again);
   CHECK(again.error().message.find("exists already") != std::string::npos);
+}
+
+TEST_CASE("a log that is deleted or replaced while it is written is reported at once") {
+  const TempFolder dir;
+  const auto path = dir.path() / "a.plog", moved = dir.path() / "moved.plog";
+  RecordRings rings(ring_sizes_of(1, 1 << 16, {.frame_bytes = 0, .decisions = 64}));
+  std::vector<RecorderEvent> events;
+  add_one_body_streams(rings, 1);
+  LogWriterLoop log_writer(rings, make_writer(path, 1), path,
+                           [&](const RecorderEvent& event) { events.push_back(event); });
+  std::int64_t now_ns = 0;
+  std::uint64_t sequence = 0;
+  const auto turns = [&](int count) {
+    for (int i = 0; i < count; ++i) {
+      put_chunk(rings, 0, ++sequence, "1\n");
+      log_writer.turn(now_ns += kTurn_ns);
+    }
+  };
+  turns(20);
+  CHECK(rings.state().trouble.empty());
+  std::filesystem::rename(path, moved);
+  std::string there;
+  SECTION("deleted") {}
+  SECTION("replaced") { there = dir.write("a.plog", "of somebody else"); }
+  turns(6);
+  REQUIRE(events.size() == 1);
+  CHECK(events[0].kind == RecorderEvent::Kind::kError);
+  CHECK(rings.state().trouble.find("deleted, moved or replaced") != std::string::npos);
+  turns(100);
+  CHECK_FALSE(rings.state().trouble.empty());
+  CHECK(events.size() == 1);
+  if (!there.empty()) CHECK(file_text(there) == "of somebody else");
+  std::filesystem::rename(moved, path);  // put back
+  turns(400);
+  CHECK(rings.state().trouble.empty());
+  REQUIRE(log_writer.finish(now_ns));
+  const auto found = sequences(path);
+  CHECK(found[0].back() == sequence);
+  CHECK(found[0].size() + lost(gaps(path), 0, GapKind::kChunks) == sequence);
+}
+
+TEST_CASE("a log that a full disk keeps from beginning begins when there is room") {
+  const TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  RecordRings rings(ring_sizes_of(1, 1 << 16, {.frame_bytes = 0, .decisions = 64}));
+  std::vector<RecorderEvent> events;
+  add_one_body_streams(rings, 1);
+  LogWriterLoop log_writer(rings, log::Writer(path, {.sources = {toy_source("s0")}}, false), path,
+                           [&](const RecorderEvent& event) { events.push_back(event); });
+  std::int64_t now_ns = 0;
+  std::uint64_t sequence = 0;
+  const auto turns = [&](int count) {
+    for (int i = 0; i < count; ++i) {
+      put_chunk(rings, 0, ++sequence, "1\n");
+      log_writer.turn(now_ns += kTurn_ns);
+    }
+  };
+  {
+    const FileLimit limit(100);
+    turns(40);
+    REQUIRE(events.size() == 1);
+    CHECK(events[0].text.find("streaming continues") != std::string::npos);
+  }
+  turns(100);
+  REQUIRE(log_writer.finish(now_ns));
+  const auto found = sequences(path);
+  CHECK(found[0].back() == sequence);
+  CHECK(found[0].size() + lost(gaps(path), 0, GapKind::kChunks) == sequence);
 }

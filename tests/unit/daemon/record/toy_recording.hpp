@@ -45,7 +45,7 @@ inline log::SourceRow toy_source(const std::string& name, std::uint32_t id = 0) 
 }
 
 inline log::Writer make_writer(const std::filesystem::path& path, std::uint32_t sources) {
-  auto writer = log::Writer::create(path, {}, false);
+  auto writer = log::Writer::create(path, {});
   REQUIRE(writer);
   for (std::uint32_t id = 0; id < sources; ++id) {
     REQUIRE(writer->add(toy_source("s" + std::to_string(id), id)));
@@ -104,7 +104,7 @@ inline record::RecordedStream body_stream(std::uint32_t id, const std::string& b
 }
 
 inline log::Writer writer_of_many(const std::filesystem::path& path) {
-  auto writer = log::Writer::create(path, {}, false);
+  auto writer = log::Writer::create(path, {});
   REQUIRE(writer);
   REQUIRE(writer->add(toy_source("mocap", 0)));
   REQUIRE(writer->commit());

@@ -35,7 +35,7 @@ class BodyRun final : private pipeline::IntakeOut {
   static constexpr std::uint32_t kSource = 0;
 
   explicit BodyRun(const std::filesystem::path& path)
-      : writer_(log::Writer::create(path, {}, false).value()),
+      : writer_(log::Writer::create(path, {}).value()),
         driver_(*drivers::find_driver("template_mocap")),
         intake_(next_item_, *this) {
     const drivers::Description device = driver_.describe("template_mocap rate=100", "udp").value();

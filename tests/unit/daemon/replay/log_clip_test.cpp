@@ -9,6 +9,7 @@
 #include "daemon/tools/export/log_clip.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/log/writer.hpp"
+#include "tests/support/log_surgery.hpp"
 #include "tests/unit/daemon/replay/staged_run.hpp"
 
 namespace posed::test {
@@ -109,14 +110,8 @@ TEST_CASE("takes are cut out of a log's stream by number or name, each frame onc
   const TempFolder folder;
   const auto path = folder.path() / "take.plog";
   write_staged_log(path, kFrames);
-  auto writer = log::Writer::reopen(path);
-  REQUIRE(writer);
-  REQUIRE(writer->add(log::TakeRow{1, "walk", 1, 60}));
-  REQUIRE(writer->add(log::TakeRow{2, "walk", 61, log::kToTheEnd}));  // before it has ended
-  REQUIRE(writer->add(log::TakeRow{2, "walk", 61, 130}));
-  REQUIRE(writer->add(log::TakeRow{3, "late", 131, log::kToTheEnd}));
-  REQUIRE(writer->add(log::TakeRow{4, "none", 131, 130}));
-  REQUIRE(writer->close());
+  forge(path, "INSERT INTO take VALUES(1,'walk',1,60,0),(2,'walk',61,130,0),(3,'late',131," +
+                  std::to_string(log::kToTheEnd) + ",0),(4,'none',131,130,0)");
   std::vector<Frame> cut;
   for (const char* take : {"1", "2", "late"}) {
     const auto clip = tools::clip_of_log(path, "b", take);

@@ -34,6 +34,41 @@ TEST_CASE("a file that cannot be written to its end leaves what was there, and n
   CHECK(files_in(folder.path()) == 1);
 }
 
+TEST_CASE("a file that somebody else made meanwhile is kept, and so is what was to be written") {
+  const test::TempFolder folder;
+  const auto path = folder.path() / "take.bvh";
+  never_replace(path);
+  folder.write("take.bvh", "theirs");
+  const auto refused = write_whole_file(path, [](std::ostream& out) { out << "ours"; });
+  REQUIRE_FALSE(refused);
+  CHECK(test::file_text(path) == "theirs");
+  const std::string& sentence = refused.error().message;
+  CHECK(test::file_text(sentence.substr(sentence.rfind(' ') + 1)) == "ours");
+  std::filesystem::remove(path);
+  for (const char* text : {"first", "second"}) {  // its own file it may write again
+    REQUIRE(write_whole_file(path, [&](std::ostream& out) { out << text; }));
+    CHECK(test::file_text(path) == text);
+  }
+}
+
+TEST_CASE("a file that is written piece by piece has its name when it is whole") {
+  const test::TempFolder folder;
+  const auto path = folder.write("frames.bin", "before");
+  {
+    auto file = WholeFile::open(path);
+    REQUIRE(file);
+    file->out() << "half" << std::flush;
+    CHECK(test::file_text(path) == "before");
+  }
+  CHECK(test::file_text(path) == "before");
+  CHECK(files_in(folder.path()) == 1);
+  auto file = WholeFile::open(path);
+  REQUIRE(file);
+  file->out() << "whole";
+  REQUIRE(file->keep());
+  CHECK(test::file_text(path) == "whole");
+}
+
 TEST_CASE("a symbolic link is kept: the file that it names is replaced") {
   const test::TempFolder folder;
   const auto path = folder.write("take.bvh", "before");

@@ -2,16 +2,21 @@
 // file that is not a complete log gives one error message.
 #include <catch2/catch.hpp>
 
+#include <atomic>
+#include <barrier>
 #include <fstream>
 #include <map>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "posed/v1/log.pb.h"
+#include "proto/log/database.hpp"
 #include "proto/log/digest.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/log/writer.hpp"
 #include "tests/support/file_limit.hpp"
+#include "tests/support/file_text.hpp"
 #include "tests/support/log_surgery.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -173,15 +178,90 @@ TEST_CASE("a log of a development version or of a newer posed is refused by its 
   }
 }
 
-TEST_CASE("an existing file is kept unless the caller insists") {
+TEST_CASE("a file that is there, or a part of a log, is never touched by a new log") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
-  write_whole_log(path, 3);
-  const auto refused = Writer::create(path, {}, false);
+  std::string there = "a.plog";
+  SECTION("a log") { write_whole_log(path, 3); }
+  SECTION("an empty file, which another writer has just made") { std::ofstream{path}; }
+  SECTION("a dangling link") { std::filesystem::create_symlink("nowhere", path); }
+  SECTION("what a crash has left of a log that was moved away") {
+    there = dir.write("a.plog-wal", "the last second").filename();
+  }
+  const auto before = test::file_text(dir.path() / there);
+  const auto refused = Writer::create(path, {});
   REQUIRE(!refused);
   CHECK(refused.error().text().find("exists already") != std::string::npos);
-  REQUIRE(Writer::create(path, {}, true));
-  CHECK(Reader::open(path)->streams().empty());
+  CHECK(test::file_text(dir.path() / there) == before);
+  CHECK(std::distance(std::filesystem::directory_iterator(dir.path()), {}) == 1);
+}
+
+TEST_CASE("of many that begin a log of one name at once one has it, whole") {
+  constexpr int kWriters = 8, kRounds = 10;
+  const test::TempFolder dir;
+  for (int round = 0; round < kRounds; ++round) {
+    const auto path = dir.path() / (std::to_string(round) + ".plog");
+    std::atomic<int> begun = 0;
+    std::barrier start(kWriters);
+    std::vector<std::jthread> threads;
+    for (int i = 0; i < kWriters; ++i) {
+      threads.emplace_back([&, i] {
+        start.arrive_and_wait();
+        auto writer = Writer::create(path, {.meta = {{"writer", std::to_string(i)}}});
+        if (!writer) return;
+        ++begun;
+        if (!writer->close()) begun = kWriters;
+      });
+    }
+    threads.clear();
+    REQUIRE(begun == 1);
+    REQUIRE(Reader::open(path));
+  }
+}
+
+TEST_CASE("a log that could not be begun is begun later, or leaves nothing") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  REQUIRE(log::reserve(path) == log::Reserved::kYes);
+  {
+    Writer writer(path, {.sources = {{0, "s", "file", "", "", "{}"}}}, true);
+    {
+      const test::FileLimit full(100);
+      REQUIRE(!writer.resume());
+    }
+    CHECK_FALSE(writer.is_open());
+    SECTION("later") {
+      REQUIRE(writer.resume());
+      REQUIRE(writer.close());
+      CHECK(Reader::open(path)->sources().size() == 1);
+    }
+  }
+  if (!Reader::open(path)) CHECK(std::filesystem::is_empty(dir.path()));
+}
+
+TEST_CASE("a writer goes on with its own log only, and leaves what has taken its name") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "a.plog", moved = dir.path() / "moved.plog";
+  auto writer = Writer::create(path, {.meta = {{"writer", "1"}}});
+  REQUIRE(writer);
+  REQUIRE(writer->add(log::SourceRow{0, "s", "file", "", "", "{}"}));
+  REQUIRE(writer->commit());
+  CHECK(writer->is_in_place());
+  std::filesystem::rename(path, moved);
+  CHECK_FALSE(writer->is_in_place());
+  for (const char* suffix : {"-wal", "-shm"}) std::filesystem::remove(path.string() + suffix);
+  auto other = Writer::create(path, {.meta = {{"writer", "2"}}});
+  REQUIRE(other);
+  CHECK_FALSE(writer->is_in_place());
+  writer->interrupt();
+  REQUIRE(other->add(log::SourceRow{7, "other", "file", "", "", "{}"}));
+  REQUIRE(other->commit());
+  const auto refused = writer->resume();
+  REQUIRE(!refused);
+  CHECK(refused.error().text().find("another recording has this name") != std::string::npos);
+  REQUIRE(other->close());
+  CHECK(Reader::open(path)->sources().front().id == 7);
+  CHECK(Reader::open(moved)->sources().front().id == 0);
 }
 
 TEST_CASE("after a crash the log opens with everything that was committed, as one file") {
@@ -244,7 +324,7 @@ TEST_CASE("a file that is not a complete log is refused with one error message")
   SECTION("another table") {
     write_whole_log(path, 3);
     run_sql(path, "DROP TABLE chunk; CREATE TABLE chunk(id, other);");
-    CHECK(log_refusal(path).find("no such column") != std::string::npos);
+    CHECK(log_refusal(path).find("tables are not those") != std::string::npos);
   }
   SECTION("a newer format") {
     write_whole_log(path, 3);
@@ -301,8 +381,9 @@ TEST_CASE("a full disk is an error that ends with the cause: writing goes on aft
     }
     REQUIRE(!outcome);
     CHECK(outcome.error().file == path.string());
-    writer.rollback();
+    writer.interrupt();
   }
+  REQUIRE(writer.resume());
   const auto before = writer.last_chunk_id();
   CHECK(before >= 1);
   REQUIRE(writer.add(chunk_row(0, 200, big)));
@@ -310,4 +391,51 @@ TEST_CASE("a full disk is an error that ends with the cause: writing goes on aft
   auto reader = Reader::open(path);
   REQUIRE(reader);
   CHECK(count_chunks(*reader) == static_cast<std::size_t>(before) + 1);
+}
+
+// What a log's tables can be replaced with or get added, so that reading runs for ever, or takes
+// all memory.
+TEST_CASE("a log whose tables are a program is refused before any of it runs") {
+  const std::string endless =
+      "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i+1 FROM n) SELECT ";
+  const std::vector<std::string> programs{
+      "DROP TABLE meta; CREATE VIEW meta AS " + endless +
+          "i AS key, hex(zeroblob(i)) AS value FROM n",
+      "DROP TABLE source; CREATE VIEW source AS " + endless +
+          "i AS id,'' AS name,'' AS driver,'' AS text,'' AS identity,'' AS config,0 AS crc FROM n",
+      "DROP TABLE gap; CREATE VIEW gap AS " + endless +
+          "i AS id,0 AS kind,0 AS owner,0 AS after_chunk,0 AS lost,0 AS time_ns,0 AS crc FROM n",
+      "CREATE VIEW other AS SELECT 1",
+      "CREATE TRIGGER t AFTER INSERT ON meta BEGIN DELETE FROM chunk; END",
+      "CREATE INDEX again ON chunk(arrival_ns)",
+      "CREATE TABLE other(a)",
+      "DROP TABLE take; CREATE TABLE take(id INTEGER PRIMARY KEY, name TEXT NOT NULL, first_item "
+      "INTEGER NOT NULL, last_item INTEGER NOT NULL, crc INTEGER NOT NULL, "
+      "CHECK(length(replace(hex(zeroblob(60000000)),'0','aa')) > 0)) STRICT",
+      "DROP TABLE take; CREATE TABLE take(id INTEGER PRIMARY KEY, name TEXT NOT NULL, first_item "
+      "INTEGER NOT NULL, last_item INTEGER NOT NULL, crc INTEGER AS (hex(zeroblob(60000000))))",
+      "ALTER TABLE frame ADD COLUMN more TEXT AS (hex(zeroblob(60000000)))",
+  };
+  const test::TempFolder dir;
+  for (const std::string& program : programs) {
+    INFO(program);
+    const auto path = dir.path() / "a.plog";
+    std::filesystem::remove(path);
+    write_whole_log(path, 3);
+    run_sql(path, program);
+    CHECK(log_refusal(path).find("tables are not those") != std::string::npos);
+  }
+}
+
+TEST_CASE("no statement on a log works for longer than the size of the log explains") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  write_whole_log(path, 3);
+  auto database = log::Database::open(path, log::Database::Mode::kReadWrite);
+  REQUIRE(database);
+  const auto endless = database->value(
+      "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i+1 FROM n) SELECT max(i) FROM n");
+  REQUIRE(!endless);
+  CHECK(endless.error().message.find("than its size explains") != std::string::npos);
+  CHECK(database->value("SELECT count(*) FROM meta"));
 }

@@ -42,7 +42,7 @@ inline log::ChunkRow chunk_row(std::uint32_t source, std::uint64_t sequence,
 }
 
 inline log::Writer writer_with_two_streams(const std::filesystem::path& path) {
-  auto writer = log::Writer::create(path, {{"posed_version", "0.1.0"}, {"isa", "avx2"}}, false);
+  auto writer = log::Writer::create(path, {.meta = {{"posed_version", "0.1.0"}, {"isa", "avx2"}}});
   REQUIRE(writer);
   for (const std::uint32_t id : {0U, 1U}) {
     REQUIRE(writer->add(source_row(id, id == 0 ? "a" : "b")));

@@ -6,9 +6,9 @@
 #include <fstream>
 
 #include "daemon/tools/doctor/doctor.hpp"
-#include "proto/log/database.hpp"
 #include "proto/model/model_file.hpp"
 #include "tests/support/has.hpp"
+#include "tests/support/log_surgery.hpp"
 #include "tests/unit/daemon/tools/doctor/sound_machine.hpp"
 
 namespace posed::doctor {
@@ -20,11 +20,8 @@ using test::HealthyMachine;
 
 // A log's file as far as its marks, of this format.
 void write_marks(const std::filesystem::path& path, int format) {
-  auto database = log::Database::open(path, log::Database::Mode::kCreate);
-  REQUIRE(database);
-  const std::string sql =
-      "CREATE TABLE t(a); PRAGMA application_id=1347375941; PRAGMA user_version=";
-  REQUIRE(database->run((sql + std::to_string(format)).c_str()));
+  test::run_sql(path, "CREATE TABLE t(a); PRAGMA application_id=1347375941; PRAGMA user_version=" +
+                          std::to_string(format));
 }
 
 TEST_CASE("doctor: without a config the checks of what it names are not made, which is right") {

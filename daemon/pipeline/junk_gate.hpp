@@ -1,0 +1,63 @@
+// JunkGate: how much rubbish of a source's datagrams a recording takes. Up to kJunkPerSecond of
+// bytes that the decoder had no use for are recorded, so that a log shows what came. Beyond that
+// only those are heard of whom the decoder has lately used something: what is not recorded must not
+// be decoded either, or a replay would not do the same. RT-safe; one thread.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "proto/frame/rt_safe.hpp"
+#include "proto/frame/time.hpp"
+
+namespace posed::pipeline {
+
+class JunkGate {
+ public:
+  static constexpr std::int64_t kJunkPerSecond = 500'000;  // bytes, and the most that is saved up
+  static constexpr std::int64_t kKnownFor_ns = 2 * kNanosPerSecond;
+
+  // Whether the chunk is to be recorded and decoded. `sender`: as in drivers::Chunk; 0 always is.
+  // `cost`: its bytes in the log; so beside large rubbish a device that is new is soon heard.
+  RT_SAFE [[nodiscard]] bool admits(std::uint64_t sender, std::int64_t cost,
+                                    std::int64_t now_ns) noexcept {
+    const std::int64_t passed_ns =
+        std::clamp<std::int64_t>(now_ns - filled_ns_, 0, kNanosPerSecond);
+    filled_ns_ = std::max(filled_ns_, now_ns);
+    left_ = std::min(left_ + passed_ns * kJunkPerSecond / kNanosPerSecond, kJunkPerSecond);
+    return sender == 0 || left_ >= cost || is_known(sender, now_ns);
+  }
+
+  // What became of a chunk that was admitted.
+  RT_SAFE void decoded(std::uint64_t sender, bool used, std::int64_t cost,
+                       std::int64_t now_ns) noexcept {
+    if (sender == 0) return;
+    if (used) return remember(sender, now_ns);
+    left_ = std::max(left_ - cost, -kJunkPerSecond);
+  }
+
+ private:
+  struct Known {
+    std::uint64_t sender = 0;
+    std::int64_t used_ns = 0;
+  };
+
+  RT_SAFE [[nodiscard]] bool is_known(std::uint64_t sender, std::int64_t now_ns) const noexcept {
+    const auto known = std::ranges::find(known_, sender, &Known::sender);
+    return known != known_.end() && now_ns - known->used_ns <= kKnownFor_ns;
+  }
+  RT_SAFE void remember(std::uint64_t sender, std::int64_t now_ns) noexcept {
+    auto place = std::ranges::find(known_, sender, &Known::sender);
+    if (place == known_.end()) place = std::ranges::min_element(known_, {}, &Known::used_ns);
+    *place = {sender, now_ns};
+  }
+
+  // Bytes of rubbish that may come; below 0 by those of known senders.
+  std::int64_t left_ = kJunkPerSecond;
+  std::int64_t filled_ns_ = 0;
+  std::array<Known, 8> known_{};
+};
+
+}  // namespace posed::pipeline
