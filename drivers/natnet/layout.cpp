@@ -9,6 +9,7 @@
 #include "drivers/natnet/axes.hpp"
 #include "drivers/natnet/model_def.hpp"
 #include "drivers/pose_values.hpp"
+#include "proto/rig/live.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::drivers::natnet {
@@ -123,15 +124,16 @@ Result<std::vector<std::size_t>> order_of(const BodyDef& body) {
   return order;
 }
 
-// In T-pose all bones of Motive's skeletons have the rotation identity, whatever their names. Names
-// of the other conventions (FBX, BVH) are left to the recogniser.
+// In T-pose all bones of Motive's skeletons have the rotation identity, whatever their names, so T
+// stays identity. The recogniser knows the other conventions (FBX, BVH).
 void name_joints(Skeleton& skeleton) {
   for (Joint& joint : skeleton.joints) {
     const auto bone = motive_bone(joint.name);
     if (bone && skeleton.joint_of(*bone) < 0) joint.bone = bone;
   }
   if (skeleton.joint_of(Bone::kHips) >= 0) return;
-  for (Joint& joint : skeleton.joints) joint.bone.reset();
+  const rig::Rig rig = rig::recognise(skeleton);
+  for (std::size_t j = 0; j < rig.bone.size(); ++j) skeleton.joints[j].bone = rig.bone[j];
 }
 
 Result<std::shared_ptr<const Skeleton>> skeleton_of(const BodyDef& body, bool z_up,

@@ -170,7 +170,8 @@ Result<std::vector<double>> recognise_draft(const ReadOptions& options,
   const std::vector<char> stays = leave_out_joints(skeleton);
   std::vector<double> factors = turn_axes(up_turn(rig.up), skeleton);
   if (stays.empty()) return factors;
-  draft.warnings.push_back("has " + std::to_string(joints) + " joints; of those that are no bones, " +
+  draft.warnings.push_back("has " + std::to_string(joints) +
+                           " joints; of those that are no bones, " +
                            std::to_string(joints - skeleton.joints.size()) + " were left out");
   std::vector<double> of_file;
   auto next = factors.begin();

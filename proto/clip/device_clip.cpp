@@ -128,8 +128,8 @@ Result<FrameCoding> parse_text(const Format& format, const Facts& facts, double 
   }
   if (!known.empty()) {
     auto skeleton = TRY(skeleton_from_json(known, name));
-    const bool same = std::ranges::equal(skeleton.joints, draft.skeleton.joints, {}, &Joint::name,
-                                         &Joint::name);
+    const bool same =
+        std::ranges::equal(skeleton.joints, draft.skeleton.joints, {}, &Joint::name, &Joint::name);
     if (!same || skeleton.channels.size() != draft.skeleton.channels.size()) return damaged(name);
     draft.skeleton = std::move(skeleton);
     draft.skeleton_is_known = true;

@@ -3,8 +3,8 @@
 // format:
 //
 // - BVH, AMC and hand CSV (Format::sends_text): a frame is its piece of the file's text, ended by a
-//   line end; the description is the file's header, its first frame and the facts that need the
-//   whole clip.
+//   line end; the description is the skeleton as JSON, the file's header and its first frame. Logs
+//   of posed 0.1 have facts of the whole clip in the place of the skeleton.
 // - every other format: a frame is its time, if the clip has times, and its channel values, as
 //   little-endian doubles (FrameParser::numbers); the description is the skeleton as JSON.
 //

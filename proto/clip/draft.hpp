@@ -49,8 +49,8 @@ struct Draft {
 Result<> read_frames(const TextFrames& text, const std::string& name, std::vector<double>& values,
                      std::vector<double>& time_s);
 
-// Facts that only all frames show, supplied when only the first frame is available (the device
-// description in a log).
+// Facts that only all frames show, supplied when only the first frame is available (the description
+// in a log of posed 0.1).
 struct Hints {
   std::optional<int> root_joint;
   std::vector<std::optional<Eigen::Quaterniond>> T;  // [joint]

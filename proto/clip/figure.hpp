@@ -33,8 +33,8 @@ void apply(const rig::Rig& rig, Skeleton& skeleton);
 Result<> add_profile(const Profile& profile, const Skeleton& skeleton, rig::RigInput& known);
 
 // Leaves out joints of a figure that has more than posed carries: those that are no bones and have
-// none below them, the last first. Returns which channels stay [channel]; empty when all do, or when
-// the bones alone are too many.
+// none below them, the last first. Returns which channels stay [channel]; empty when all do, or
+// when the bones alone are too many.
 std::vector<char> leave_out_joints(Skeleton& skeleton);
 
 // Expresses the figure in axes turned by `turn`, which maps axes to axes. Returns the factor, 1 or

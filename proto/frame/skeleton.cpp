@@ -6,7 +6,7 @@
 
 #include <zlib.h>
 
-#include "proto/rig/recognise.hpp"
+#include "proto/rig/live.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed {
@@ -117,21 +117,6 @@ Result<> check_channels(const Skeleton& skeleton) {
   return {};
 }
 
-void recognise(Skeleton& skeleton) {
-  rig::RigInput input;
-  for (const Joint& joint : skeleton.joints) {
-    input.joints.push_back({.name = joint.name,
-                            .parent = joint.parent,
-                            .offset = joint.offset_m,
-                            .end_site = joint.end_site_m});
-  }
-  const rig::Rig rig = rig::recognise(input);
-  for (std::size_t j = 0; j < skeleton.joints.size(); ++j) {
-    skeleton.joints[j].bone = rig.bone[j];
-    skeleton.joints[j].T_world_joint = rig.T[j];
-  }
-}
-
 // q * v, bit for bit as Eigen computes it, but inlined: Eigen's call would take a sixth of the time
 // of a glove's packet.
 RT_SAFE Eigen::Vector3d turned(const Eigen::Quaterniond& q, const Eigen::Vector3d& v) noexcept {
@@ -220,7 +205,11 @@ Result<> Skeleton::finish() {
   TRY(check_joints(*this));
   TRY(check_channels(*this));
   if (std::ranges::none_of(joints, [](const Joint& j) { return j.bone.has_value(); })) {
-    recognise(*this);
+    const rig::Rig rig = rig::recognise(*this);
+    for (std::size_t j = 0; j < joints.size(); ++j) {
+      joints[j].bone = rig.bone[j];
+      joints[j].T_world_joint = rig.T[j];
+    }
   }
   id = content_id(*this);
   return {};

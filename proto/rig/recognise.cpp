@@ -40,7 +40,8 @@ void set_unit(double length, double true_m, bool is_cmu, std::string_view what, 
   }
   const double length_m = length * *rig.metres_per_unit;
   rig.why_unit = std::string(what) + ' ' + short_text(length_m, 2) + " m long";
-  if (length_m < 0.73 * true_m || length_m > 1.34 * true_m) {
+  const bool likely = length_m > 0.73 * true_m && length_m < 1.34 * true_m;
+  if (rig.kind == Kind::kPerson && !likely) {
     rig.notes.push_back(rig.why_unit + ": is the unit of length right?");
   }
 }
@@ -65,7 +66,12 @@ FoundBones known_bones(const std::vector<std::optional<Bone>>& bones) {
   for (std::size_t j = 0; j < bones.size(); ++j) {
     if (bones[j]) out.joint.set(*bones[j], static_cast<int>(j));
   }
-  if (out.joint.has_limbs()) out.kind = Kind::kPerson;
+  const bool has_hand = out.joint.has(Bone::kLeftHand) || out.joint.has(Bone::kRightHand);
+  if (out.joint.has_limbs()) {
+    out.kind = Kind::kPerson;
+  } else if (has_hand && !out.joint.has(Bone::kHips)) {
+    out.kind = Kind::kHand;
+  }
   return out;
 }
 
@@ -120,6 +126,9 @@ Rig recognise(const RigInput& input) {
   rig.bone = found.joint.by_joint(figure.size());
   std::vector<std::string> notes = found.notes;
   Frames frames(figure, names, found.joint, motion, notes);
+  for (std::size_t j = 0; j < std::min(input.T.size(), rig.bone.size()); ++j) {
+    if (rig.bone[j] && input.T[j]) frames.know(*rig.bone[j], input.T[j]->toRotationMatrix());
+  }
   if (found.kind == Kind::kPerson && frames.can_find_person()) {
     frames.find_person();
     const bool is_cmu = std::ranges::any_of(names, [](const JointName& name) {

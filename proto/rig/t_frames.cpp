@@ -40,7 +40,7 @@ void Frames::find_person() {
 }
 
 void Frames::set(Bone bone, const Mat& T, double sure, std::string why) {
-  T_[index(bone)] = T;
+  T_[index(bone)] = known_[index(bone)].value_or(T);
   evidence_[index(bone)] = {.sure = sure, .why = std::move(why)};
 }
 

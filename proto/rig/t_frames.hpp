@@ -37,6 +37,8 @@ class Frames {
   Frames(const Figure& figure, const std::vector<JointName>& names, const BoneJoints& joint,
          const Motion& motion, std::vector<std::string>& notes);
 
+  // The bone's T is known; the bones that go with it follow. Before finding any.
+  void know(Bone bone, const Mat& T) { known_[index(bone)] = T; }
   void find_person();  // needs limbs of some length (can_find_person)
   void find_hand(Side side);
   void lay_parts();  // for an incomplete figure: from a zero pose near the T-pose
@@ -105,6 +107,7 @@ class Frames {
   const BoneJoints& joint_;
   const Motion& motion_;
   std::vector<std::string>& notes_;
+  std::array<std::optional<Mat>, kBones> known_;
   std::array<std::optional<Mat>, kBones> T_;
   std::array<Evidence, kBones> evidence_;
   double size_ = 0.0;  // of the thigh; lengths below a millionth of it are none

@@ -318,6 +318,14 @@ bool is_head(const JointName& name) {
 }
 
 std::optional<int> finger_of(const JointName& name) {
+  // Anatomists count the fingers, and their middle phalanges are no middle fingers.
+  constexpr std::array<std::string_view, 5> kOrdinals{"first", "second", "third", "fourth",
+                                                      "fifth"};
+  if (name.has("phalange") || name.has("phalanx") || name.has("metacarpal")) {
+    for (std::size_t i = 0; i < kOrdinals.size(); ++i) {
+      if (name.has(kOrdinals[i])) return static_cast<int>(i);
+    }
+  }
   for (const std::string& word : name.words) {
     const auto at = finger_words().find(word);
     if (at != finger_words().end()) return at->second;

@@ -126,7 +126,7 @@ TEST_CASE("the verdict of eval natural is a page, too", "[eval_natural]") {
   std::ifstream file(page);
   const std::string html{std::istreambuf_iterator<char>(file), {}};
   CHECK(has(html, "natural"));
-  CHECK(has(html, "slide_cm_s"));
+  CHECK(has(html, "beyond_deg"));
   CHECK(marchers.judge("another.bvh", {"--report", page}).code == 2);  // it is there already
 }
 

@@ -110,17 +110,14 @@ TEST_CASE("mvn: the skeleton is the emulator's, with and without type 13") {
   }
 }
 
-TEST_CASE("mvn: the T-pose lies on the axes of the canonical humanoid") {
+TEST_CASE("mvn: in the T-pose no joint of the canonical humanoid is turned") {
   const auto skeleton = skeleton_of(emulated_walker());
   REQUIRE(skeleton);
   int bones = 0;
   for (const Joint& joint : (*skeleton)->joints) {
     bones += joint.bone ? 1 : 0;
-    const bool foot = joint.name.ends_with("Foot") || joint.name.ends_with("Toe");
-    const double angle_rad = angle_between_rad(joint.T_world_joint, Eigen::Quaterniond::Identity());
-    if (!foot) CHECK(angle_rad < 1e-9);
-    // The line from ankle to toes slopes by atan(0.08 / 0.18).
-    if (foot) CHECK(angle_rad == Approx(std::atan2(0.08, 0.18)).margin(1e-6));
+    // Feet, too: the line from ankle to toes slopes, but the sole is flat.
+    CHECK(angle_between_rad(joint.T_world_joint, Eigen::Quaterniond::Identity()) < 1e-9);
   }
   CHECK(bones == kBones);  // all of them
   const auto& joints = (*skeleton)->joints;

@@ -103,7 +103,7 @@ TEST_CASE("whole messages before it gain a message without an end no room") {
   std::size_t sent = 0;
   for (int i = 0; i < 10; ++i) {
     REQUIRE(linked.next().size() == 10'000);
-    for (int more = 0; more < 40 && peer.send(parts); ++more) sent += parts.size();
+    for (int more = 0; more < 40 && peer.send(parts, 200ms); ++more) sent += parts.size();
   }
   CHECK(sent < 12'000'000);  // far fewer than all, with what the kernel keeps for the sender
   static_cast<void>(linked.link->next_refusal());

@@ -151,6 +151,21 @@ TEST_CASE("a written BVH reads back the same") {
   CHECK((again->channels - first->channels).cwiseAbs().maxCoeff() < 1e-10);
 }
 
+TEST_CASE("position channels of a joint replace its OFFSET, but nearly nothing is added to it") {
+  const std::string header = replaced(kHeader, "CHANNELS 3 Zrotation Xrotation Yrotation",
+                                      "CHANNELS 6 Xposition Yposition Zposition Zrotation "
+                                      "Xrotation Yrotation");
+  const auto arm_m = [&header](const std::string& position) {
+    const auto clip =
+        parse_bvh(header + "Frames: 1\nFrame Time: .03\n0 100 0 0 0 0 " + position + " 0 0 0\n");
+    REQUIRE(clip.has_value());
+    return clip->skeleton->joints[1].offset_m;
+  };
+  CHECK(arm_m("0 70 5").isApprox(Eigen::Vector3d(0, .7, .05)));
+  CHECK(arm_m("0 0 0").isApprox(Eigen::Vector3d(0, .8, 0)));  // as Blender writes MakeHuman's
+  CHECK(arm_m("0 0 1").isApprox(Eigen::Vector3d(0, .8, 0)));
+}
+
 TEST_CASE("the real recordings are read") {
   const auto cmu = test::shared("data/cmu/07_01.bvh");
   const auto bandai = test::shared("data/styles/dataset-2_walk_feminine_001.bvh");

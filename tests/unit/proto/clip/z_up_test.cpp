@@ -5,9 +5,9 @@
 
 #include <catch2/catch.hpp>
 
-#include <unistd.h>
-
 #include "proto/clip/device_clip.hpp"
+#include "tests/support/file_text.hpp"
+#include "tests/support/temp_folder.hpp"
 #include "tests/unit/proto/rig/maker.hpp"
 
 namespace posed::clip {
@@ -38,7 +38,10 @@ Clip walker() {
   }
   REQUIRE(skeleton->finish().has_value());
   const auto& poses = made.input.poses;
-  Clip clip{.path = "walk", .skeleton = skeleton, .frame_rate_hz = 30.0};
+  Clip clip;
+  clip.path = "walk";
+  clip.skeleton = skeleton;
+  clip.frame_rate_hz = 30.0;
   clip.channels.resize(poses.count, std::ssize(skeleton->channels));
   for (int i = 0; i < poses.count; ++i) {
     for (int j = 0; j < test::kMakerJoints; ++j) {
@@ -53,33 +56,19 @@ Clip walker() {
   return clip;
 }
 
-std::string bytes_of(const std::filesystem::path& path) {
-  std::ostringstream out;
-  out << std::ifstream(path, std::ios::binary).rdbuf();
-  return out.str();
-}
-
-struct TemporaryBvh {
-  std::filesystem::path path = std::filesystem::temp_directory_path() /
-                               ("posed_z_up_" + std::to_string(::getpid()) + ".bvh");
-  TemporaryBvh() = default;
-  ~TemporaryBvh() { std::filesystem::remove(path); }
-  TemporaryBvh(const TemporaryBvh&) = delete;
-  TemporaryBvh& operator=(const TemporaryBvh&) = delete;
-};
-
 }  // namespace
 
 TEST_CASE("a BVH with another axis up is turned to Y up and written back as it was") {
   for (const UpAxis up : {UpAxis::kPlusZ, UpAxis::kMinusY, UpAxis::kMinusZ, UpAxis::kPlusX}) {
     INFO(up_text(up));
-    const TemporaryBvh file;
+    const test::TempFolder folder;
+    const auto file = folder.path() / "walk.bvh";
     Clip walk = walker();
     walk.up = up;
     walk.metres_per_unit = 0.0254;
-    REQUIRE(write_bvh(walk, file.path).has_value());
-    const std::string bytes = bytes_of(file.path);
-    const auto read = read_clip(file.path);
+    REQUIRE(write_bvh(walk, file).has_value());
+    const std::string bytes = test::file_text(file);
+    const auto read = read_clip(file);
     if (!read) FAIL(read.error().text());
     CHECK(up_text(read->up) == up_text(up));
     CHECK(read->metres_per_unit == 0.0254);
@@ -94,18 +83,19 @@ TEST_CASE("a BVH with another axis up is turned to Y up and written back as it w
       CHECK((is.offset_m - was.offset_m).norm() < 1e-9);
       CHECK(angle_between_rad(is.T_world_joint, was.T_world_joint) < 1e-6);
     }
-    REQUIRE(write_bvh(*read, file.path).has_value());
-    CHECK(bytes_of(file.path) == bytes);
+    REQUIRE(write_bvh(*read, file).has_value());
+    CHECK(test::file_text(file) == bytes);
   }
 }
 
 TEST_CASE("the description of a Z-up clip decodes as the clip, from its first frame alone") {
-  const TemporaryBvh file;
+  const test::TempFolder folder;
+  const auto file = folder.path() / "walk.bvh";
   Clip walk = walker();
   walk.up = UpAxis::kPlusZ;
-  REQUIRE(write_bvh(walk, file.path).has_value());
-  const auto device = open_device_clip(file.path);
-  const auto read = read_clip(file.path);
+  REQUIRE(write_bvh(walk, file).has_value());
+  const auto device = open_device_clip(file);
+  const auto read = read_clip(file);
   REQUIRE(device.has_value());
   REQUIRE(read.has_value());
   const auto coding = parse_description(device->description, "log");
@@ -119,14 +109,15 @@ TEST_CASE("the description of a Z-up clip decodes as the clip, from its first fr
   const std::string damaged =
       "posed-clip bvh rate_hz=30 metres_per_unit=1 root_joint=0 asf_bytes=0 skeleton_bytes=";
   CHECK_FALSE(parse_description(damaged + "1e9\n", "log").has_value());
-  CHECK_FALSE(parse_description(damaged + "2\n{}" + bytes_of(file.path), "log").has_value());
+  CHECK_FALSE(parse_description(damaged + "2\n{}" + test::file_text(file), "log").has_value());
 }
 
 TEST_CASE("of a figure with too many joints, those that are no bones are left out") {
-  const TemporaryBvh file;
+  const test::TempFolder folder;
+  const auto file = folder.path() / "walk.bvh";
   const Clip walk = walker();
-  REQUIRE(write_bvh(walk, file.path).has_value());
-  std::string text = bytes_of(file.path);
+  REQUIRE(write_bvh(walk, file).has_value());
+  std::string text = test::file_text(file);
   std::string face;
   for (int i = 0; i < 100; ++i) {
     face += "JOINT face" + std::to_string(i) + "\n{\nOFFSET 1 2 3\nCHANNELS 1 Xrotation\n}\n";
@@ -145,8 +136,8 @@ TEST_CASE("of a figure with too many joints, those that are no bones are left ou
     moves = moves || line.starts_with("Frame Time");
     text += line + '\n';
   }
-  std::ofstream(file.path, std::ios::binary) << text;
-  const auto read = read_clip(file.path);
+  std::ofstream(file, std::ios::binary) << text;
+  const auto read = read_clip(file);
   if (!read) FAIL(read.error().text());
   CHECK(read->skeleton->joints.size() == kMaxJoints);
   CHECK_THAT(read->warnings.back(), Catch::Contains("has 122 joints") && Catch::Contains("26"));
@@ -159,7 +150,7 @@ TEST_CASE("of a figure with too many joints, those that are no bones are left ou
         (to_eigen(is.rotation_xyzw[j]).coeffs() - to_eigen(was.rotation_xyzw[b]).coeffs()).norm() <
         1e-5);
   }
-  const auto device = open_device_clip(file.path);
+  const auto device = open_device_clip(file);
   REQUIRE(device.has_value());
   const auto coding = parse_description(device->description, "log");
   REQUIRE(coding.has_value());

@@ -108,9 +108,9 @@ TEST_CASE("the recogniser finds the shipped frames of the Bandai figure by itsel
       INFO(name << " " << skeleton.joints[j].name);
       CHECK(found.bone[j] == skeleton.joints[j].bone);
       const bool foot = skeleton.joints[j].name.starts_with("Foot") ||
-                        skeleton.joints[j].name.starts_with("Toes");  // their slope differs
+                        skeleton.joints[j].name.starts_with("Toes");  // their slope is measured
       const double off_rad = angle_between_rad(found.T[j], skeleton.joints[j].T_world_joint);
-      CHECK(off_rad < (foot ? 60 : 2) * kDegree);
+      CHECK(off_rad < (foot ? 8 : 2) * kDegree);
     }
   }
 }

@@ -12,6 +12,8 @@ using rig::Mat;
 using rig::Vec;
 using test::ZeroPose;
 
+int below(std::mt19937& random, unsigned limit) { return static_cast<int>(random() % limit); }
+
 Mat yaw(double deg) { return Eigen::AngleAxisd(deg * kDegree, rig::kY).toRotationMatrix(); }
 
 double worst_deg(const rig::Rig& rig, const test::Made& made) {
@@ -47,7 +49,7 @@ TEST_CASE("rig: a person is recognised in every maker's names, zero pose, axes a
       const double metres = kUnits[random() % kUnits.size()];
       const UpAxis up = random() % 2 == 0 ? UpAxis::kPlusY : UpAxis::kPlusZ;
       // A folded zero pose has bones along its local axes, so it is not turned by odd angles.
-      const double turned_deg = zero == ZeroPose::kFolded ? 0.0 : 30.0 * (random() % 12);
+      const double turned_deg = zero == ZeroPose::kFolded ? 0.0 : 30.0 * below(random, 12);
       INFO(scheme.names[0] << ", zero pose " << static_cast<int>(zero) << ", " << metres << " m, "
                            << up_text(up) << " up, turned by " << turned_deg);
       const Mat axes = up_turn(up).transpose() * yaw(turned_deg);
@@ -92,6 +94,33 @@ TEST_CASE("rig: eyes, tips, twists and zero-length hips are no bones and move no
     CHECK_FALSE(rig.bone[j].has_value());
   }
   CHECK(worst_deg(rig, made) < 1.0);
+}
+
+TEST_CASE("rig: fingers are known by their words, by numbers and as anatomists count them") {
+  const std::vector<std::array<std::string, 4>> makers{
+      {"LeftHandIndex1", "LeftHandIndex2", "LeftHandIndex3", "LeftHandIndex4"},
+      {"LeftInHandIndex", "LeftHandIndex1", "LeftHandIndex2", "LeftHandIndex3"},
+      {"LeftFinger10", "LeftFinger11", "LeftFinger12", "LeftFinger1Nub"},
+      {"LeftSecondMetacarpal", "LeftSecondProximalPhalange", "LeftSecondMiddlePhalange",
+       "LeftSecondDistalPhalange"}};
+  for (const auto& names : makers) {
+    auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+    made.input.poses = {};
+    auto& joints = made.input.joints;
+    joints.push_back({.name = "LeftFinger0", .parent = 9, .offset = {1, 0, 3}, .end_site = {}});
+    int parent = static_cast<int>(Bone::kLeftHand);
+    for (const std::string& name : names) {
+      joints.push_back({.name = name, .parent = parent, .offset = {3, 0, 0}, .end_site = {}});
+      parent = static_cast<int>(joints.size()) - 1;
+    }
+    const rig::Rig rig = rig::recognise(made.input);
+    const bool in_palm = names[3] != "LeftHandIndex4" && names[3] != "LeftFinger1Nub";
+    for (int i = 0; i < 3; ++i) {
+      const std::size_t j = test::kMakerJoints + 1 + i + (in_palm ? 1 : 0);
+      INFO(joints[j].name);
+      CHECK(rig.bone[j] == static_cast<Bone>(static_cast<int>(Bone::kLeftIndexProximal) + i));
+    }
+  }
 }
 
 TEST_CASE("rig: without names the shape tells the limbs, and the feet which side is left") {
@@ -159,7 +188,7 @@ TEST_CASE("rig: any input ends in an answer") {
   for (int round = 0; round < 50; ++round) {
     auto some = test::make(test::kSchemes[round % 12], ZeroPose::kT, Mat::Identity(), 1.0);
     for (auto& joint : some.input.joints) {
-      joint.offset = Vec(random() % 3, random() % 3, random() % 3) - Vec::Ones();
+      joint.offset = Vec(below(random, 3) - 1, below(random, 3) - 1, below(random, 3) - 1);
     }
     answer(some.input);
   }
