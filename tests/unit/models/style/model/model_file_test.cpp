@@ -172,16 +172,10 @@ TEST_CASE("Numbers that no training gives are refused", "[model_file]") {
   refused(with([](auto& m) { m.process.b = 1e20; }), "b");
   refused(with([](auto& m) { m.process.noise = 1e20; }), "the noise");
   refused(with([](auto& m) { m.limit_rad[0] = 1e4; }), "the limits");
-  refused(with([](auto& m) {
-            m.gate = {Eigen::VectorXd::Constant(6, 1e4), 0.5, 1.0};
-          }),
+  refused(with([](auto& m) { m.gate = {Eigen::VectorXd::Constant(6, 1e4), 0.5, 1.0}; }),
           "the neutral pose");
-  refused(with([](auto& m) {
-            m.axis = {Eigen::VectorXd::Constant(6, 1e20), 0.0};
-          }),
+  refused(with([](auto& m) { m.axis = {Eigen::VectorXd::Constant(6, 1e20), 0.0}; }),
           "the style's axis");
-  refused(with([](auto& m) {
-            m.axis = {Eigen::VectorXd::Constant(6, 1.0), 1e20};
-          }),
+  refused(with([](auto& m) { m.axis = {Eigen::VectorXd::Constant(6, 1.0), 1e20}; }),
           "the style's offset");
 }
