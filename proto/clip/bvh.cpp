@@ -149,9 +149,7 @@ Result<std::vector<double>> recognise_draft(const ReadOptions& options,
     }
   }
   const bool unit_is_known = known.metres_per_unit.has_value();
-  draft.rig = std::make_shared<const rig::Rig>(
-      recognise(skeleton, sample_of(skeleton, frames), std::move(known)));
-  const rig::Rig& rig = *draft.rig;
+  rig::Rig rig = recognise(skeleton, sample_of(skeleton, frames), std::move(known));
   if (!rig.metres_per_unit) {
     draft.metres_per_unit = guess_unit(skeleton, draft.warnings);
   } else {
@@ -167,7 +165,8 @@ Result<std::vector<double>> recognise_draft(const ReadOptions& options,
   apply(rig, skeleton);
   scale_lengths(skeleton, draft.metres_per_unit);
   const std::size_t joints = skeleton.joints.size();
-  const std::vector<char> stays = leave_out_joints(skeleton);
+  const std::vector<char> stays = leave_out_joints(skeleton, rig);
+  draft.rig = std::make_shared<const rig::Rig>(rig);
   std::vector<double> factors = turn_axes(up_turn(rig.up), skeleton);
   if (stays.empty()) return factors;
   draft.warnings.push_back("has " + std::to_string(joints) +

@@ -89,7 +89,7 @@ Result<> add_profile(const Profile& profile, const Skeleton& skeleton, rig::RigI
   return {};
 }
 
-std::vector<char> leave_out_joints(Skeleton& skeleton) {
+std::vector<char> leave_out_joints(Skeleton& skeleton, rig::Rig& rig) {
   const std::size_t count = skeleton.joints.size();
   std::vector<char> stays(count, 0);
   for (std::size_t j = count; j-- > 0;) {
@@ -109,6 +109,10 @@ std::vector<char> leave_out_joints(Skeleton& skeleton) {
   for (std::size_t j = 0; j < count; ++j) {
     if (stays[j] == 0) continue;
     place[j] = static_cast<int>(joints.size());
+    const std::size_t to = joints.size();
+    rig.bone[to] = rig.bone[j];
+    rig.T[to] = rig.T[j];
+    rig.evidence[to] = rig.evidence[j];
     joints.push_back(std::move(skeleton.joints[j]));
     if (j > 0) joints.back().parent = place[joints.back().parent];
   }
@@ -120,6 +124,9 @@ std::vector<char> leave_out_joints(Skeleton& skeleton) {
     channel.joint = static_cast<std::uint16_t>(place[channel.joint]);
     channels.push_back(channel);
   }
+  rig.bone.resize(joints.size());
+  rig.T.resize(joints.size());
+  rig.evidence.resize(joints.size());
   skeleton.joints = std::move(joints);
   skeleton.channels = std::move(channels);
   return channel_stays;

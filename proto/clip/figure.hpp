@@ -33,9 +33,10 @@ void apply(const rig::Rig& rig, Skeleton& skeleton);
 Result<> add_profile(const Profile& profile, const Skeleton& skeleton, rig::RigInput& known);
 
 // Leaves out joints of a figure that has more than posed carries: those that are no bones and have
-// none below them, the last first. Returns which channels stay [channel]; empty when all do, or
+// none below them, the last first, from the skeleton and from what is known of its joints. Returns
+// which channels stay [channel]; empty when all do, or
 // when the bones alone are too many.
-std::vector<char> leave_out_joints(Skeleton& skeleton);
+std::vector<char> leave_out_joints(Skeleton& skeleton, rig::Rig& rig);
 
 // Expresses the figure in axes turned by `turn`, which maps axes to axes. Returns the factor, 1 or
 // -1, by which the values of each channel change; channels keep their order.

@@ -51,7 +51,7 @@ TEST_CASE("a profile that nobody named gives way where a joint of its bones is m
   std::vector<std::string> names;
   for (const auto& [joint, bone] : profiles()[0].bones) names.push_back(joint);
   names.insert(names.end(), profiles()[0].match.begin(), profiles()[0].match.end());
-  CHECK(find_profile(named(names), "").value() == &profiles()[0]);
+  CHECK(find_profile(named(names), "").value().get() == &profiles()[0]);
   std::erase(names, profiles()[0].bones.begin()->first);
   CHECK(find_profile(named(names), "").value() == nullptr);
 }
