@@ -130,7 +130,10 @@ Result<std::vector<std::string>> mend_flips(const motion::PoseSpaceSpec& spec,
     }
     if (is_short) {
       fill_in(flips.bad, d, q);
-      what += "; " + std::to_string(flips.bad_frames) + " frames are filled in from those beside";
+      what += "; " +
+              (flips.bad_frames == 1 ? "one frame is"
+                                     : std::to_string(flips.bad_frames) + " frames are") +
+              std::string(" filled in from those beside");
     } else {
       leave_out(flips.bad, d, q);
       what += " and stays so; the joint is left out of this clip";
