@@ -63,16 +63,22 @@ class Flood {
   std::thread thread_;
 };
 
+std::string many_of(const std::string& text, int count) {
+  std::string all;
+  all.reserve(text.size() * static_cast<std::size_t>(count));
+  for (int i = 0; i < count; ++i) all += text;
+  return all;
+}
+
 std::string bomb_of_stats() {
-  return zmtp::frame("stats", 1) + zmtp::frame(repeated(std::string("\x1a\x00", 2), 1'000'000));
+  return zmtp::frame("stats", 1) + zmtp::frame(many_of(std::string("\x1a\x00", 2), 1'000'000));
 }
 
 TEST_CASE("whoever has the daemon's port cannot fill the memory of those that connect to it") {
   const TempFolder folder;
   folder.write("index.html", "<p>the page");
   const std::vector<std::pair<std::string, std::string>> floods{
-      {"empty parts", repeated(zmtp::frame("", 1), 64'000)},
-      {"parts of 200 bytes", repeated(zmtp::frame(std::string(200, 'x'), 1), 64'000)},
+      {"empty parts", many_of(zmtp::frame("", 1), 64'000)},
       {"stats of empty parts", bomb_of_stats()}};
   for (const auto& [what, bytes] : floods) {
     for (const std::string command : {"run", "relay", "view", "monitor", "top", "ctl"}) {
@@ -97,7 +103,7 @@ TEST_CASE("whoever has the daemon's port cannot fill the memory of those that co
         arguments.insert(arguments.end(), {"--port", "0", "--page", folder.path().string()});
       }
       Process process(arguments);
-      const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(4);
+      const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(2);
       double most_MB = 0.0;
       while (std::chrono::steady_clock::now() < end) {
         most_MB = std::max(most_MB, memory_MB(process.pid()));
