@@ -149,6 +149,7 @@ Result<std::vector<double>> recognise_draft(const ReadOptions& options,
     }
   }
   const bool unit_is_known = known.metres_per_unit.has_value();
+  const bool up_is_known = known.up.has_value();
   rig::Rig rig = recognise(skeleton, sample_of(skeleton, frames), std::move(known));
   if (!rig.metres_per_unit) {
     draft.metres_per_unit = guess_unit(skeleton, draft.warnings);
@@ -156,7 +157,7 @@ Result<std::vector<double>> recognise_draft(const ReadOptions& options,
     draft.metres_per_unit = *rig.metres_per_unit;
     if (!unit_is_known) draft.warnings.push_back(taken_as(rig));
   }
-  if (unit_is_known && rig.up != UpAxis::kPlusY && !options.up) {
+  if (unit_is_known && rig.up != UpAxis::kPlusY && !up_is_known) {
     draft.warnings.push_back("does not name its upward axis; taken as " +
                              std::string(up_text(rig.up)) + ": " + rig.why_up);
   }

@@ -1,0 +1,66 @@
+// `posed inspect` and `posed compare`: what a figure is taken for, and the profile that says so.
+#include <catch2/catch.hpp>
+
+#include <nlohmann/json.hpp>
+
+#include "models/motion/synthetic_walker.hpp"
+#include "proto/text/load_file.hpp"
+#include "tests/e2e/served.hpp"
+
+namespace posed::test {
+namespace {
+
+using nlohmann::json;
+
+TEST_CASE("inspect names the bones, and its profile gives the same figure back") {
+  const Stage stage;
+  const auto walk = motion::make_walker({.seconds = 1.0});
+  REQUIRE(walk.has_value());
+  REQUIRE(clip::write_bvh(*walk, stage.folder.path() / "walk.bvh"));
+  const std::string clip = stage.path("walk.bvh");
+  const std::string map = stage.path("map.toml");
+  const auto shown = posed({"inspect", clip, "--write", map, "--json"});
+  INFO(shown.err);
+  REQUIRE(shown.code == 0);
+  const json found = json::parse(shown.out);
+  CHECK(found.at("person") == true);
+  CHECK(found.at("up") == "+y");
+  CHECK(found.at("metres_per_unit") == 0.01);
+  REQUIRE(found.at("bones").size() >= 20);
+  for (const json& bone : found.at("bones")) CHECK(bone.at("sure").get<double>() > 0.5);
+  CHECK(has(posed({"inspect", clip}).out, "T-pose ... first frame ... leftUpperLeg"));
+
+  const auto again = posed({"inspect", clip, "--profile", map, "--json"});
+  REQUIRE(again.code == 0);
+  const json mapped = json::parse(again.out);
+  CHECK(mapped.at("bones").size() == found.at("bones").size());
+  CHECK(mapped.at("bones")[3].at("why") == "a profile says so");
+  // A profile that does not fit is refused by the joint that is missing.
+  std::string text = load_file(map, {.what = "profile", .max_bytes = 1 << 20}).value();
+  const std::string hips = found.at("bones")[0].at("joint");
+  text.replace(text.find(hips), hips.size(), "nobody");
+  stage.folder.write("wrong.toml", text);
+  const auto refused = posed({"inspect", clip, "--profile", stage.path("wrong.toml")});
+  CHECK(refused.code != 0);
+  CHECK(has(refused.err, "nobody"));
+}
+
+TEST_CASE("compare tells figures and persons apart") {
+  const Stage stage;
+  const auto write = [&](const std::string& name, std::uint32_t person) {
+    const auto walk = motion::make_walker({.person = person, .seconds = 1.0});
+    REQUIRE(walk.has_value());
+    REQUIRE(clip::write_bvh(*walk, stage.folder.path() / name));
+  };
+  write("a.bvh", 1);
+  write("b.bvh", 2);
+  const auto same = posed({"compare", stage.path("a.bvh"), stage.path("a.bvh")});
+  CHECK(same.code == 0);
+  CHECK(has(same.err, "one figure"));
+  const auto taller = posed({"compare", stage.path("a.bvh"), stage.path("b.bvh")});
+  CHECK(taller.code == 0);
+  CHECK(has(taller.err, "two persons"));
+}
+
+}  // namespace
+}  // namespace posed::test
