@@ -80,6 +80,9 @@ class Transport {
   // read.
   [[nodiscard]] virtual Chunk read(std::int64_t now_ns) noexcept = 0;
 
+  // Is told whether the decoder had a use for the bytes of the last chunk.
+  RT_SAFE virtual void decoded(bool /*used*/) noexcept {}
+
   // Sends bytes to the device, all or none; returns false when the link does not accept them now.
   // RT-safe except for its write.
   [[nodiscard]] virtual bool send(std::span<const std::byte> /*bytes*/,

@@ -192,12 +192,14 @@ class Reader::Source final : private IntakeOut {
     const auto cost = static_cast<std::int64_t>(kRowBytes + places_ * sizeof(StreamPosition) +
                                                 chunk.bytes.size());
     if (ports_.record_sink != nullptr && !gate_.admits(chunk.sender, cost, arrival_ns_)) {
+      device_->transport->decoded(false);
       return outcome(Outcome::kForeign);
     }
     record(Direction::kFromDevice, chunk.bytes, chunk.socket);
     used_chunk_ = false;
     device_->decoder->feed_socket(chunk.socket, chunk.bytes, arrival_ns_, intake_);
     gate_.decoded(chunk.sender, used_chunk_, cost, arrival_ns_);
+    device_->transport->decoded(used_chunk_);
   }
 
   // A source without a descriptor is driven by time alone, so it needs no system call.

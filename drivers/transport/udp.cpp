@@ -254,12 +254,19 @@ RT_SAFE bool UdpTransport::owns(Socket& socket, const Address& address) noexcept
   if (!same_port) {
     socket.port_before = same_host && !free ? socket.port : std::uint16_t{0};
     socket.datagrams = 0;
+    socket.is_of_use = false;
   }
   ++socket.datagrams;
   socket.sender = host;
   socket.port = port;
   socket.received_ns = batch_ns_;
   return true;
+}
+
+RT_SAFE void UdpTransport::decoded(bool used) noexcept {
+  Socket& socket = sockets_[socket_];
+  socket.is_of_use = socket.is_of_use || used;
+  if (!socket.is_of_use) socket.received_ns = kNoTime_ns;
 }
 
 std::string UdpTransport::consume_note() {

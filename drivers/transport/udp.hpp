@@ -58,6 +58,8 @@ class UdpTransport final : public Transport, public Upkeep {
   // Discards what came since open(): it is old by now.
   Result<> start(std::int64_t now_ns) override;
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
+  // Who has sent nothing of use yet loses the socket to the next one.
+  RT_SAFE void decoded(bool used) noexcept override;
   // While nothing comes of a group, joins it again every two seconds.
   void upkeep(std::int64_t now_ns) noexcept override;
   [[nodiscard]] std::string consume_note() override;
@@ -74,6 +76,7 @@ class UdpTransport final : public Transport, public Upkeep {
     Host sender{};                            // whose datagrams are accepted
     std::uint16_t port = 0, port_before = 0;  // of that sender, and the one it had before
     std::uint64_t datagrams = 0;              // that came from its port
+    bool is_of_use = false;                   // the decoder has used one of them
     std::int64_t received_ns = kNoTime_ns;    // when it sent the last; kNoTime_ns: nobody has yet
   };
   struct Batch;  // the buffers of one recvmmsg

@@ -12,7 +12,7 @@
 namespace posed::tidy {
 namespace {
 
-constexpr std::size_t kMaxColumns = 100;
+constexpr std::ptrdiff_t kMaxColumns = 100;
 
 // Replaces comments and the contents of string and character literals by blanks, keeping all
 // columns.
@@ -205,8 +205,10 @@ std::vector<Finding> check_sizes(const SourceFile& file) {
   const std::regex mark(std::string("\\b(TO") + "DO|FIX" + "ME|XX" + "X)\\b");
   for (std::size_t i = 0; i < file.lines.size(); ++i) {
     const int line = static_cast<int>(i) + 1;
-    if (file.lines[i].size() > kMaxColumns)
-      findings.push_back({file.path, line, "over 100 columns"});
+    // Bytes that continue a character (10xxxxxx in UTF-8) take no column.
+    const auto columns = std::ranges::count_if(
+        file.lines[i], [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; });
+    if (columns > kMaxColumns) findings.push_back({file.path, line, "over 100 columns"});
     if (std::regex_search(file.lines[i], mark))
       findings.push_back({file.path, line, "left-over mark"});
   }

@@ -24,6 +24,7 @@ using motion::WalkerFamily;
 using test::ReceivedPose;
 
 constexpr double kWithin_rad = 0.1 * kDegree;
+constexpr double kLacking_rad = 5.0 * kDegree;
 constexpr std::int64_t kLength_ns = 2 * kNanosPerSecond;
 
 // Rotation of each bone in the world relative to its T-pose.
@@ -151,6 +152,7 @@ std::vector<ReceivedPose> styled(const style::StyleModel& model, std::vector<Rec
 void check(const Walk& walk) {
   const style::StyleModel model = humanoid_model();
   std::vector<std::string_view> without_style;
+  std::vector<std::string_view> lacking;
   for (const drivers::Driver& driver : drivers::registry()) {
     if (driver.make_layout == nullptr || driver.emulate == nullptr) continue;
     INFO(driver.name);
@@ -166,10 +168,15 @@ void check(const Walk& walk) {
     CHECK(Walk::difference(styled_walker, walker).rms_rad() > 5 * kDegree);
     const Difference off = Walk::difference(styled_walker, styled(model, file));
     INFO(off.rms_rad() / kDegree << " deg rms, at most " << off.most_rad / kDegree);
-    CHECK(off.rms_rad() < kWithin_rad);
+    // Where the figure lacks bones of the model, it cannot know the pose quite as well.
+    const bool whole =
+        style::bind_model(model, *walker[0].skeleton, "sway").value()->remark.empty();
+    CHECK(off.rms_rad() < (whole ? kWithin_rad : kLacking_rad));
+    if (!whole) lacking.push_back(driver.name);
   }
-  // Their figures have no legs.
-  CHECK(without_style == std::vector<std::string_view>{"posed", "template_mocap"});
+  // The one figure has no legs, the other no feet, hands and shoulders.
+  CHECK(without_style == std::vector<std::string_view>{"posed"});
+  CHECK(lacking == std::vector<std::string_view>{"template_mocap"});
 }
 
 }  // namespace

@@ -15,7 +15,6 @@ using namespace posed::motion;
 
 namespace {
 
-constexpr double kRate_hz = 30.0;
 constexpr Eigen::Index kFrames = 90;
 
 struct Poses {
@@ -58,7 +57,7 @@ TEST_CASE("A joint that flips for a moment is filled in and named", "[flips]") {
   const Eigen::MatrixXd right = poses.q;
   poses.flip("leftHand", 40, 44);
   poses.flip("rightUpperLeg", 86, kFrames);  // up to the end
-  const auto mended = style::mend_flips(poses.spec, poses.space, kRate_hz, poses.q);
+  const auto mended = style::mend_flips(poses.spec, poses.space, 30.0, poses.q);
   REQUIRE(mended.has_value());
   REQUIRE(mended->size() == 2);
   CHECK((poses.q - right).cwiseAbs().maxCoeff() < 0.1);
@@ -68,13 +67,13 @@ TEST_CASE("A joint that flips for a moment is filled in and named", "[flips]") {
   CHECK(all.find("4 frames") != std::string::npos);
   // What does not flip keeps its bits.
   CHECK((poses.q.leftCols(3).array() == right.leftCols(3).array()).all());
-  CHECK(style::mend_flips(poses.spec, poses.space, kRate_hz, poses.q)->empty());
+  CHECK(style::mend_flips(poses.spec, poses.space, 30.0, poses.q)->empty());
 }
 
 TEST_CASE("A joint that stays flipped is left out, or refuses the clip by name", "[flips]") {
   Poses poses = small_swings();
   poses.flip("leftHand", 40, 70);
-  const auto mended = style::mend_flips(poses.spec, poses.space, kRate_hz, poses.q);
+  const auto mended = style::mend_flips(poses.spec, poses.space, 30.0, poses.q);
   REQUIRE(mended.has_value());
   REQUIRE(mended->size() == 1);
   CHECK(mended->front().find("left out") != std::string::npos);
@@ -82,7 +81,7 @@ TEST_CASE("A joint that stays flipped is left out, or refuses the clip by name",
 
   Poses legs = small_swings();
   legs.flip("rightUpperLeg", 40, 70);
-  const auto refused = style::mend_flips(legs.spec, legs.space, kRate_hz, legs.q);
+  const auto refused = style::mend_flips(legs.spec, legs.space, 30.0, legs.q);
   REQUIRE_FALSE(refused.has_value());
   CHECK(refused.error().message.find("rightUpperLeg") != std::string::npos);
 }
