@@ -22,7 +22,7 @@ struct Listener {
 // The text of an option; empty if the driver has no such option.
 [[nodiscard]] std::string text_option(const drivers::Options& options, std::string_view name);
 
-// Whether the system does not choose the port (":0", ":*").
+// True when the endpoint names its port; with ":0" or ":*" the system chooses one.
 [[nodiscard]] bool has_fixed_port(std::string_view endpoint);
 
 // The sockets that `posed run` would bind to fixed ports. Addresses that are not numbers (the name

@@ -25,7 +25,7 @@ namespace posed::pipeline {
 struct ReadBody {
   std::uint32_t stream = kNoStream;    // kNoStream: frames of this body are left out
   StreamCounters* counters = nullptr;  // its numbers go on after those that are counted there
-  // how many slots of `out` it may fill
+  // how many slots of ReaderPorts::out its frames may fill at once
   std::size_t slots = std::numeric_limits<std::size_t>::max();
 };
 
@@ -45,7 +45,8 @@ struct BodyExchange {
 
   system::EventFd& builder;
   std::optional<DescriptionBox> descriptions;  // empty: a device with one body
-  // An update comes back in `taken` when it is in use, which ends the use of the one before it.
+  // The reader puts an update into `taken` once it uses it; the one before it is then free, and
+  // the builder deletes it.
   Ring<const SourceUpdate*> updates{kUpdates}, taken{kUpdates};
   static constexpr std::size_t kUpdates = 4;
 };

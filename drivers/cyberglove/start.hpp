@@ -10,14 +10,15 @@
 
 namespace posed::drivers::cyberglove {
 
-// The settings that the options request. A device info keeps only hand, layout and ticks.
+// The settings that the options request. A device info keeps hand, layout and ticks of them.
 struct RequestedConfig {
   Side hand = Side::kRight;
   int sensors = 0;  // 0: accept any number
-  Layout layout{};  // without the mask
+  Layout layout{};  // as requested; its sensor mask is not used, the glove's own counts
   bool filter = true;
-  Period period{};         // for the 8-bit form
-  int divider = 1;         // for the 16-bit form
+  // The rate: `period` in the 8-bit form, `divider` in the 16-bit form; `ticks` says what it gives.
+  Period period{};
+  int divider = 1;
   bool over_tcp = false;   // Wi-Fi of a III
   std::int64_t baud = 0;   // for the error message about a wrong one
   std::int64_t ticks = 0;  // of 1/115200 s between samples; 0: unknown

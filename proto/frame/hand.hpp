@@ -1,7 +1,8 @@
 // hand45: one hand as 45 angles, the pose of Takamido et al. (models/gesture/README.md,
 // "References"). Five fingers from thumb to little, three joints each from the palm outwards, three
-// angles a joint: x flexion (positive when closing), y spread (positive away from the middle
-// finger; the middle's own: towards the thumb), z twist. A joint's rotation is R = Rz(twist)
+// angles a joint: x flexion (positive when closing), y spread, z twist. Spread is positive where
+// the finger leaves the middle finger: index and thumb then go towards the thumb's side, ring and
+// little towards the little finger's; the middle's own is positive towards the thumb. R = Rz(twist)
 // Rx(flexion) Ry(spread), right hand palm down, fingers along +Z; a left hand is the mirror image
 // with the same signs. Angles in radians.
 #pragma once

@@ -9,11 +9,12 @@ namespace posed::style {
 
 class StyleEstimate {
  public:
-  // The pose's place on the model's axis, for `dt_s`.
+  // Adds a pose that stood for `dt_s`; `place` is its place on the model's style axis.
   void update(double place, double dt_s) noexcept;
   void forget() noexcept { *this = {}; }
 
-  // 0: none of it, 1: all of it; NaN until half a second is known.
+  // The mean place of the last second: 0 none of the style, 1 all of it, and beyond either, for it
+  // is not clamped. NaN until half a second is known.
   [[nodiscard]] double value() const noexcept;
 
  private:

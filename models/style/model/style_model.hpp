@@ -32,11 +32,11 @@ struct MoreStyle {
 struct GateData {
   Eigen::VectorXd
       neutral{};  // mean pose of the neutral walk in training [dims]; empty: no gate data
-  // LiveStride's, the least mean of a training clip, and the period of the fastest clip. Both are
-  // 0 where the training shows no strides.
+  // The smallest mean swing of the legs (LiveStride) of any training clip, and the stride of the
+  // fastest one. Both are 0 where the training shows no strides.
   double swing_rad = 0.0;
   double fastest_stride_s = 0.0;
-  // LiveGait's mean in the clip where it is highest; NaN: unknown.
+  // The highest mean that LiveGait has over a training clip; NaN: unknown.
   double gait_correlation = std::numeric_limits<double>::quiet_NaN();
 
   [[nodiscard]] bool present() const { return neutral.size() > 0; }
@@ -67,9 +67,11 @@ struct StyleModel {
   [[nodiscard]] std::vector<std::string> names() const;  // of its styles, in order
 };
 
-// The model with one style alone: the sum of all, each times its share [styles()].
+// Returns a model of a single style, which is the sum of all styles, each times its share; `shares`
+// has styles() numbers.
 [[nodiscard]] StyleModel mixture_of(const StyleModel& model, std::span<const double> shares);
 
+// Reads a file that save_model() wrote. Errors name the file and what is wrong with it.
 Result<StyleModel> load_model(const std::filesystem::path& path);
 // Reads a model as load_model() does, from bytes (control message, device log). `name` is only for
 // error messages. Any bytes give a model or an Error, never a crash.
