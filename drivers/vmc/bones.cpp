@@ -68,7 +68,13 @@ constexpr std::array<BoneEntry, kBoneCount> kVmcBones{
 RT_SAFE const std::array<BoneEntry, kBoneCount>& bone_table() noexcept { return kVmcBones; }
 
 RT_SAFE std::size_t find_bone(std::string_view name) noexcept {
-  return std::ranges::find(kVmcBones, name, &BoneEntry::name) - kVmcBones.begin();
+  const auto matches = [name](const BoneEntry& entry) {
+    constexpr char kSmall = 'a' - 'A';
+    return name.size() == entry.name.size() && !name.empty() &&
+           name.substr(1) == entry.name.substr(1) &&
+           (name[0] == entry.name[0] || name[0] == entry.name[0] + kSmall);
+  };
+  return std::ranges::find_if(kVmcBones, matches) - kVmcBones.begin();
 }
 
 }  // namespace posed::drivers::vmc

@@ -24,7 +24,7 @@ inline constexpr std::size_t kHips = 0;
 // [bone]
 [[nodiscard]] const std::array<BoneEntry, kBoneCount>& bone_table() noexcept;
 
-// kBoneCount when there is no such bone. Upper and lower case differ, as in the protocol.
+// kBoneCount when there is no such bone. The first letter may be small, as in VRM 1's names.
 RT_SAFE [[nodiscard]] std::size_t find_bone(std::string_view name) noexcept;
 
 }  // namespace posed::drivers::vmc

@@ -17,8 +17,8 @@ constexpr std::string_view kTimeAddress = "/VMC/Ext/T";
 constexpr std::string_view kAvatarAddress = "/VMC/Ext/VRM";
 constexpr std::string_view kNoBone = "LastBone";  // the end of Unity's list, which some send, too
 
-// The tolerance of the squared length: some senders round the components.
-constexpr double kLengthTolerance = 0.01;
+// The tolerance of the squared length: some senders round the components, or are 1 % too long.
+constexpr double kLengthTolerance = 0.05;
 
 struct Transform {
   std::string_view name;
@@ -38,6 +38,10 @@ RT_SAFE bool read_transform(OscArguments& arguments, Transform& transform) noexc
   transform.position_m = mirrored(transform.position_m);
   transform.rotation_xyzw = mirrored(transform.rotation_xyzw);
   return true;
+}
+
+RT_SAFE bool is_metacarpal(std::string_view name) noexcept {
+  return name.ends_with("ThumbMetacarpal");
 }
 
 }  // namespace
@@ -78,6 +82,18 @@ RT_SAFE Outcome VmcDecoder::accept_packet(std::span<const std::byte> packet, Sin
   return worst_;
 }
 
+// The thumb's first joint is Proximal in VRM 0, as in Unity, and Metacarpal in VRM 1, where
+// Proximal is the second. Who names a Metacarpal once has VRM 1's names.
+RT_SAFE std::size_t VmcDecoder::bone_of(std::string_view name) const noexcept {
+  if (!has_vrm1_names_) return find_bone(name);
+  const bool is_left = name.starts_with("Left") || name.starts_with("left");
+  if (is_metacarpal(name)) return find_bone(is_left ? "LeftThumbProximal" : "RightThumbProximal");
+  if (name.ends_with("ThumbProximal")) {
+    return find_bone(is_left ? "LeftThumbIntermediate" : "RightThumbIntermediate");
+  }
+  return find_bone(name);
+}
+
 RT_SAFE VmcDecoder::Survey VmcDecoder::survey(std::span<const std::byte> packet) noexcept {
   Survey found;
   each_message(packet, [&](const OscMessage& message) noexcept {
@@ -85,7 +101,9 @@ RT_SAFE VmcDecoder::Survey VmcDecoder::survey(std::span<const std::byte> packet)
     found.of_vmc = found.of_vmc || message.address.starts_with(kAddressPrefix);
     OscArguments arguments(message);
     if (message.address == kBoneAddress) {
-      const std::size_t bone = find_bone(arguments.text());
+      const std::string_view name = arguments.text();
+      has_vrm1_names_ = has_vrm1_names_ || is_metacarpal(name);
+      const std::size_t bone = bone_of(name);
       if (bone < kBoneCount) found.received.add(bone);
     } else if (message.address == kStatusAddress) {
       found.received.add(kOkMessage);
@@ -116,7 +134,7 @@ RT_SAFE bool VmcDecoder::accept_bone(OscArguments& arguments) noexcept {
   Transform transform;
   const bool valid = read_transform(arguments, transform);
   if (transform.name == kNoBone) return true;
-  const std::size_t bone = find_bone(transform.name);
+  const std::size_t bone = bone_of(transform.name);
   if (!valid || bone == kBoneCount || received_[bone]) return false;
   received_.set(bone);
   set_.set(bone);
@@ -157,9 +175,10 @@ RT_SAFE bool VmcDecoder::accept_device(ValueKind kind, OscArguments& arguments) 
 RT_SAFE bool VmcDecoder::accept_status(OscArguments& arguments) noexcept {
   constexpr std::size_t kWithTracking = 4;
   const bool with_tracking = arguments.left() >= kWithTracking;
-  const bool loaded = arguments.i32() != 0;
+  const bool loaded = arguments.number() != 0.0;
   bool tracking = true;
-  for (std::size_t i = 1; i < kWithTracking && with_tracking; ++i) tracking = arguments.i32() != 0;
+  for (std::size_t i = 1; i < kWithTracking && with_tracking; ++i)
+    tracking = arguments.number() != 0.0;
   if (!arguments.ok()) return false;
   loaded_ = loaded;
   tracking_ = tracking;

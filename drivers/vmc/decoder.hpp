@@ -42,6 +42,7 @@ class VmcDecoder final : public Decoder {
     Outcome time = Outcome::kOk;
   };
   [[nodiscard]] Survey survey(std::span<const std::byte> packet) noexcept;
+  [[nodiscard]] std::size_t bone_of(std::string_view name) const noexcept;
   [[nodiscard]] Outcome accept_packet(std::span<const std::byte> packet, Sink& sink) noexcept;
   // Each takes the arguments of one message; false if they are wrong.
   [[nodiscard]] bool accept_message(const OscMessage& message) noexcept;
@@ -61,6 +62,7 @@ class VmcDecoder final : public Decoder {
   const VmcLayout* layout_ = nullptr;  // null until the performer was described
   FrameEnd end_;
   SenderClock clock_;
+  bool has_vrm1_names_ = false;
   Values values_;
   Describer describer_;
   ActiveTime active_time_;

@@ -83,8 +83,31 @@ RT_SAFE bool is_valid_packet(std::span<const std::byte> packet, int depth) noexc
 
 }  // namespace
 
+RT_SAFE double OscArguments::number() noexcept {
+  switch (next()) {
+    case 'f':
+      return static_cast<double>(reader_.f32());
+    case 'd':
+      return reader_.f64();
+    case 'i':
+      return static_cast<double>(reader_.i32());
+    case 'h':
+      return static_cast<double>(static_cast<std::int64_t>(reader_.u64()));
+    case 'T':
+      return 1.0;
+    case 'F':
+      return 0.0;
+    default:
+      ok_ = false;
+      return 0.0;
+  }
+}
+
 RT_SAFE std::string_view OscArguments::text() noexcept {
-  if (!next('s')) return {};
+  if (next() != 's') {
+    ok_ = false;
+    return {};
+  }
   BigEndianReader ahead = reader_;
   const std::string_view all = ahead.text(reader_.left());
   const std::string_view text = all.substr(0, all.find('\0'));

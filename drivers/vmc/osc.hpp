@@ -30,8 +30,9 @@ struct OscMessage {
   std::span<const std::byte> arguments;
 };
 
-// Takes the arguments in order. One that is missing or has another type gives zero or empty text
-// and clears ok().
+// Takes the arguments in order. One that is missing or is neither a number nor a text, as wanted,
+// gives zero or empty text and clears ok(). Any type of number is taken for a number: some senders
+// write doubles, and 0 and 1 as integers (node-osc) or as T and F.
 class OscArguments {
  public:
   explicit OscArguments(const OscMessage& message) noexcept
@@ -39,15 +40,18 @@ class OscArguments {
 
   [[nodiscard]] bool ok() const noexcept { return ok_; }
   [[nodiscard]] std::size_t left() const noexcept { return types_.size(); }
-  [[nodiscard]] std::int32_t i32() noexcept { return next('i') ? reader_.i32() : 0; }
-  [[nodiscard]] float f32() noexcept { return next('f') ? reader_.f32() : 0.0F; }
+  [[nodiscard]] double number() noexcept;
+  [[nodiscard]] float f32() noexcept { return static_cast<float>(number()); }
   [[nodiscard]] std::string_view text() noexcept;
 
  private:
-  [[nodiscard]] bool next(char type) noexcept {
-    ok_ = ok_ && !types_.empty() && types_.front() == type;
-    if (ok_) types_.remove_prefix(1);
-    return ok_;
+  // The type of the next argument, which then counts as taken; 0 when there is none.
+  [[nodiscard]] char next() noexcept {
+    ok_ = ok_ && !types_.empty();
+    if (!ok_) return 0;
+    const char type = types_.front();
+    types_.remove_prefix(1);
+    return type;
   }
 
   std::string_view types_;

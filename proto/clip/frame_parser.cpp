@@ -176,7 +176,11 @@ FrameOutcome FrameParser::parse_fields(std::string_view text,
       ++outcome.found;
       return add_error(FrameFault::kTooMany, {});
     }
-    const auto value = field.empty() ? std::optional(kMissing) : parse_number(field);
+    // numpy writes nan where a value is missing.
+    const bool missing = field.empty() || field == "nan" || field == "NaN";
+    const auto value = missing              ? std::optional(kMissing)
+                       : outcome.found == 0 ? parse_number(field, kMaxTime_s)
+                                            : parse_number(field);
     if (!value) return add_error(FrameFault::kNotANumber, field);
     if (outcome.found == 0) {
       outcome.time_s = *value;
@@ -202,7 +206,7 @@ FrameOutcome FrameParser::parse_numbers(std::string_view bytes,
     return value;
   };
   if (timed_) outcome.time_s = next();
-  if (std::isinf(outcome.time_s) || std::abs(outcome.time_s) > kMaxValue) {
+  if (std::isinf(outcome.time_s) || std::abs(outcome.time_s) > kMaxTime_s) {
     outcome.fault = FrameFault::kImplausible;
     return outcome;
   }

@@ -16,6 +16,7 @@ namespace posed::clip {
 namespace {
 
 constexpr double kSameTime_s = 1e-6;      // times closer than this count as the same
+constexpr double kUnixTime_s = 1e8;       // no recording lasts three years
 constexpr double kMinRate_hz = 1.0;       // slower times are counted in another unit
 constexpr double kUntimedRate_hz = 30.0;  // of a file without times
 constexpr double kEven = 0.01;            // relative difference below which steps count as equal
@@ -135,6 +136,11 @@ Result<> settle_times(Draft& draft, const std::string& name) {
                 name, frames.front().line);
   }
   interpolate(time_s, 1.0 / rate_hz);
+  // Unix time, as loggers write it, counts from the first frame.
+  const double first_s = time_s.front();
+  if (first_s > kUnixTime_s) {
+    for (double& t : time_s) t -= first_s;
+  }
   return {};
 }
 

@@ -23,13 +23,13 @@ std::string number_text(double value) {
   return {text.data(), std::to_chars(text.data(), text.data() + text.size(), value).ptr};
 }
 
-std::optional<double> parse_number(std::string_view word) noexcept {
+std::optional<double> parse_number(std::string_view word, double max) noexcept {
   if (word.size() > 1 && word[0] == '+' && word[1] != '-') word.remove_prefix(1);
   double value = 0.0;
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   if (end != word.data() + word.size()) return std::nullopt;
   if (error == std::errc::result_out_of_range && underflows(word)) return 0.0;
-  if (error != std::errc() || !std::isfinite(value) || std::abs(value) > kMaxValue) {
+  if (error != std::errc() || !std::isfinite(value) || std::abs(value) > max) {
     return std::nullopt;
   }
   return value;

@@ -11,15 +11,17 @@
 
 namespace posed::clip {
 
-// Parses a finite number of at most kMaxValue in size, with or without an exponent. A leading '+'
-// is allowed; a number too small for a double becomes 0.
-RT_SAFE [[nodiscard]] std::optional<double> parse_number(std::string_view word) noexcept;
+// Largest |value| of a joint angle or length, and of a time: loggers write Unix seconds.
+inline constexpr double kMaxValue = 1e9;
+inline constexpr double kMaxTime_s = 1e11;
+
+// Parses a finite number of at most `max` in size, with or without an exponent. A leading '+' is
+// allowed; a number too small for a double becomes 0.
+RT_SAFE [[nodiscard]] std::optional<double> parse_number(std::string_view word,
+                                                         double max = kMaxValue) noexcept;
 
 // The shortest text that reads back as the same number.
 [[nodiscard]] std::string number_text(double value);
-
-// Largest |value| of a joint angle or length that parse_number() accepts.
-inline constexpr double kMaxValue = 1e9;
 
 RT_SAFE [[nodiscard]] constexpr bool is_space(char c) noexcept {
   return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\v' || c == '\f';

@@ -5,6 +5,7 @@
 #include <random>
 #include <string>
 
+#include <oscpack/osc/OscOutboundPacketStream.h>
 #include <oscpack/osc/OscReceivedElements.h>
 
 #include "drivers/vmc/emulator.hpp"
@@ -63,7 +64,7 @@ std::string read_by_posed(std::span<const std::byte> packet) {
       if (type != 's' && type != 'i' && type != 'f') break;
       text += ' ';
       if (type == 's') text += arguments.text();
-      if (type == 'i') text += std::to_string(arguments.i32());
+      if (type == 'i') text += std::to_string(static_cast<int>(arguments.number()));
       if (type == 'f') text += std::to_string(arguments.f32());
     }
     CHECK(arguments.ok());
@@ -115,7 +116,8 @@ TEST_CASE("the VMC bones are Unity's, parents first") {
     if (bones[i].bone) ++named;
   }
   CHECK(named == kBones);
-  CHECK(vmc::find_bone("hips") == vmc::kBoneCount);
+  CHECK(vmc::find_bone("hips") == vmc::kHips);
+  CHECK(vmc::find_bone("HIPS") == vmc::kBoneCount);
   CHECK(vmc::find_bone("LastBone") == vmc::kBoneCount);
   CHECK(bones[vmc::find_bone("LeftThumbProximal")].bone == Bone::kLeftThumbMetacarpal);
   CHECK(bones[vmc::find_bone("RightLittleDistal")].bone == Bone::kRightLittleDistal);
@@ -225,6 +227,25 @@ TEST_CASE("OSC sizes and bundles that make no sense are refused") {
         Outcome::kOk);
   CHECK(vmc::check_packet(bytes_from_hex("2f 61 62 00 ")) == Outcome::kOk);  // without types
   CHECK(vmc::check_packet(bytes_from_hex("01 02 03 04 ")) == Outcome::kForeign);
+}
+
+TEST_CASE("OSC: any number is a number, a text is none, and what is missing is told") {
+  std::array<char, 256> memory{};
+  osc::OutboundPacketStream packet(memory.data(), memory.size());
+  packet << osc::BeginMessage("/VMC/Ext/Bone/Pos") << "hips" << 1.5 << osc::int32{-2}
+         << osc::int64{7} << 0.25F << true << false << "end" << osc::EndMessage;
+  const std::span bytes(reinterpret_cast<const std::byte*>(packet.Data()), packet.Size());
+  REQUIRE(vmc::check_packet(bytes) == Outcome::kOk);
+  vmc::each_message(bytes, [](const vmc::OscMessage& message) {
+    vmc::OscArguments arguments(message);
+    CHECK(arguments.text() == "hips");
+    for (const double expected : {1.5, -2.0, 7.0, 0.25, 1.0, 0.0}) {
+      CHECK(arguments.number() == expected);
+    }
+    CHECK(arguments.ok());
+    CHECK(arguments.number() == 0.0);  // a text
+    CHECK_FALSE(arguments.ok());
+  });
 }
 
 }  // namespace posed::drivers

@@ -66,6 +66,16 @@ HandClip closing_hand(Side side) {
 
 }  // namespace
 
+TEST_CASE("Unix time counts from the first frame, and nan is a missing value") {
+  std::string late = row("1700000000.75", 1.0);
+  late.replace(late.rfind(','), std::string::npos, ",nan\n");
+  const HandClip clip = read(header() + row("1700000000.5", 0.0) + late);
+  CHECK(clip.time_s[0] == 0.0);
+  CHECK(clip.time_s[1] == Approx(0.25));
+  CHECK(std::isnan(clip.angles[1][kHandChannels - 1]));
+  CHECK(clip.angles[1][0] == Approx(1.0));
+}
+
 TEST_CASE("a hand CSV is read: times, angles in hand45 order, missing values") {
   std::string text = header() + row("0.5", 0.0) + row("0.6", 1.0);
   const std::size_t field = text.rfind(",1.01");
@@ -133,7 +143,7 @@ TEST_CASE("an invalid hand CSV is refused with its line") {
   extra.insert(extra.size() - 1, ",1");
   CHECK(
       error_of(header() + extra).starts_with("h.csv:2: frame 1: the frame has 47 values or more"));
-  for (const std::string bad : {"nan", "inf", "1e300", "0x1", "one", "1;2"}) {
+  for (const std::string bad : {"inf", "1e300", "0x1", "one", "1;2"}) {
     std::string line = row("0", 0);
     line.replace(line.find("0.000000"), 8, bad);
     CHECK(error_of(header() + row("0", 0) + line) ==
