@@ -28,10 +28,8 @@ Result<std::vector<config::StageConfig>> stages_of(const config::StreamConfig& c
     if (named != config.stages.end()) {
       stages.push_back(*named);
     } else if (!off && type->is_default != nullptr && type->is_default(*skeleton)) {
-      // Not TRY: GCC 12 then warns of freeing what was not allocated.
-      auto parameters = complete_parameters(type->parameters, {});
-      if (!parameters) return std::unexpected(std::move(parameters.error()));
-      stages.push_back({.type = type, .parameters = std::move(*parameters)});
+      auto parameters = TRY(complete_parameters(type->parameters, {}));
+      stages.push_back({.type = type, .parameters = std::move(parameters)});
     }
   }
   return stages;
