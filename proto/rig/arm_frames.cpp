@@ -11,7 +11,7 @@ Vec mirrored_x(const Vec& v) { return {-v.x(), v.y(), v.z()}; }
 }  // namespace
 
 void Frames::arms() {
-  const Mat Tc = *T(top_);
+  const Mat Tc = *t_frame(top_);
   Both way;
   std::array<std::optional<Vec>, 2> palms;
   for (const Side side : kSides) {
@@ -34,7 +34,7 @@ void Frames::arms() {
 
 // Whether the arms of the zero pose hang or reach as a person's do.
 bool Frames::arms_are_real(const Both& way, const std::array<std::optional<Vec>, 2>& palms) const {
-  const Mat Tc = *T(top_);
+  const Mat Tc = *t_frame(top_);
   const Vec left = Tc * direction(way[0]);
   const Vec right = Tc * direction(way[1]);
   if (angle_deg(mirrored_x(left), right) >= 25) return false;
@@ -138,11 +138,11 @@ void Frames::arm(Side side, const Mat& T_arm, double sure_arm, const std::string
   const Vec out = outwards(side);
   if (joint_.has(shoulder)) {
     const auto collar = rest(shoulder, {on(side, Bone::kLeftUpperArm)});
-    const bool lies = collar && angle_deg(*T(top_) * *collar, out) <= 65;
+    const bool lies = collar && angle_deg(*t_frame(top_) * *collar, out) <= 65;
     if (folded && collar && !lies) {
       set(shoulder, minimal(T_arm * *collar, out) * T_arm, sure_arm, why);
     } else {
-      set(shoulder, *T(top_), sure_arm, "goes with the chest");
+      set(shoulder, *t_frame(top_), sure_arm, "goes with the chest");
     }
   }
   set(on(side, Bone::kLeftUpperArm), T_arm, sure_arm, why);
@@ -168,10 +168,10 @@ void Frames::fingers(Side side) {
                                           kFingerJoints * finger + k));
       };
       const Bone bone = bone_at(i);
-      if (!joint_.has(bone) || !T(before)) continue;
+      if (!joint_.has(bone) || !t_frame(before)) continue;
       std::optional<Vec> way;
       for (int k = i + 1; k < kFingerJoints && !way; ++k) way = rest(bone, {bone_at(k)});
-      Mat now = *T(before);
+      Mat now = *t_frame(before);
       if (finger > 0 && way) now = minimal(now * *way, outwards(side)) * now;
       set(bone, now, sure(before), finger > 0 ? "straight fingers" : "goes with the hand");
       before = bone;

@@ -10,7 +10,7 @@ Vec mirror(const Vec& v) { return {-v.x(), v.y(), v.z()}; }
 }  // namespace
 
 void Frames::legs() {
-  const Mat Th = *T(Bone::kHips);
+  const Mat Th = *t_frame(Bone::kHips);
   Both thigh;
   Both world;
   for (const Side side : kSides) {
@@ -37,7 +37,7 @@ void Frames::legs() {
 
 // Feet that both point aside say where forward is in the legs' own frames.
 bool Frames::legs_by_feet(const Both& thigh) {
-  const Mat Th = *T(Bone::kHips);
+  const Mat Th = *t_frame(Bone::kHips);
   const auto toes = std::array{toe_way(Side::kLeft), toe_way(Side::kRight)};
   if (!toes[0] || !toes[1]) return false;
   std::array<double, 2> aside_deg{};
@@ -90,7 +90,7 @@ void Frames::folded_legs(const Both& thigh) {
 std::vector<Frames::Lateral> Frames::laterals(Side side, const Vec& thigh) const {
   const int hips = joint_[Bone::kHips];
   const int joint = joint_[on(side, Bone::kLeftUpperLeg)];
-  const Vec left = T(Bone::kHips)->transpose() * kX;
+  const Vec left = t_frame(Bone::kHips)->transpose() * kX;
   const Bend knee =
       bend(on(side, Bone::kLeftUpperLeg), on(side, Bone::kLeftLowerLeg), on(side, Bone::kLeftFoot));
   const double trust = std::clamp((knee.flex_deg - 5) / 15, 0.0, 1.0) *
@@ -121,8 +121,8 @@ void Frames::real_foot(Side side, double sure_foot, const std::string& why, bool
   const Bone foot = on(side, Bone::kLeftFoot);
   const Bone lower = on(side, Bone::kLeftLowerLeg);
   if (!joint_.has(foot)) return;
-  const Mat Tl = *T(lower);
-  const Mat Th = by_feet ? *T(on(side, Bone::kLeftUpperLeg)) : *T(Bone::kHips);
+  const Mat Tl = *t_frame(lower);
+  const Mat Th = by_feet ? *t_frame(on(side, Bone::kLeftUpperLeg)) : *t_frame(Bone::kHips);
   const auto way = rest(lower, {foot});
   const bool stands = !way || angle_deg(Th * *way, -kY) < 15;
   Mat Tf = stands ? Th : Tl;
@@ -145,7 +145,7 @@ void Frames::folded_foot(Side side, double sure_leg) {
   const Bone foot = on(side, Bone::kLeftFoot);
   const int shin = joint_[on(side, Bone::kLeftLowerLeg)];
   if (!joint_.has(foot)) return;
-  const Mat Tl = *T(on(side, Bone::kLeftLowerLeg));
+  const Mat Tl = *t_frame(on(side, Bone::kLeftLowerLeg));
   Mat Tf = Tl;
   double sure_foot = 0.3;
   std::string why = "a foot without length: goes with the shin";

@@ -82,14 +82,14 @@ Eigen::Quaterniond rotation_of(const Mat& m) {
 
 // Joints that are no bones go with their parent; those above the hips go with the hips.
 void collect(const RigInput& input, const Frames& frames, Rig& rig) {
-  const auto& hips = frames.T(Bone::kHips);
+  const auto& hips = frames.t_frame(Bone::kHips);
   for (std::size_t j = 0; j < input.joints.size(); ++j) {
     const int parent = input.joints[j].parent;
     Eigen::Quaterniond T = parent >= 0 ? rig.T[parent]
                            : hips      ? rotation_of(*hips)
                                        : Eigen::Quaterniond::Identity();
     if (rig.bone[j]) {
-      if (const auto& found = frames.T(*rig.bone[j])) T = rotation_of(*found);
+      if (const auto& found = frames.t_frame(*rig.bone[j])) T = rotation_of(*found);
       rig.evidence[j] = frames.evidence(*rig.bone[j]);
     }
     if (j < input.T.size() && input.T[j]) {

@@ -116,7 +116,7 @@ void Frames::check_hinges() {
   const auto check = [this](Bone upper, Bone lower, Bone end, const Vec& to) {
     if (!joint_.has(end)) return;
     const Bend bent = bend(upper, lower, end);
-    const double off_deg = angle_deg(*T(upper) * bent.axis, to);
+    const double off_deg = angle_deg(*t_frame(upper) * bent.axis, to);
     if (bent.flex_deg <= 20 || bent.agree <= 0.7 || off_deg <= 60) return;
     notes_.push_back(std::string(bone_name(lower)) + " bends about an axis " +
                      short_text(off_deg, 0) + " degrees from a person's: is its zero pose right?");
@@ -127,7 +127,7 @@ void Frames::check_hinges() {
     check(on(side, Bone::kLeftUpperArm), on(side, Bone::kLeftLowerArm), on(side, Bone::kLeftHand),
           side == Side::kLeft ? Vec(-kY) : kY);
   }
-  const Vec pelvis = T(Bone::kHips)->transpose() * kY;
+  const Vec pelvis = t_frame(Bone::kHips)->transpose() * kY;
   std::vector<double> lean_deg;
   for (int i = 0; i < motion_.poses(); ++i) {
     const Vec up = motion_.world(i, joint_[Bone::kHips]) * pelvis;

@@ -44,7 +44,7 @@ class Frames {
   void lay_parts();  // for an incomplete figure: from a zero pose near the T-pose
   [[nodiscard]] bool can_find_person() const;
 
-  [[nodiscard]] const std::optional<Mat>& T(Bone bone) const { return T_[index(bone)]; }
+  [[nodiscard]] const std::optional<Mat>& t_frame(Bone bone) const { return T_[index(bone)]; }
   [[nodiscard]] const Evidence& evidence(Bone bone) const { return evidence_[index(bone)]; }
   [[nodiscard]] UpAxis up() const { return up_; }
   [[nodiscard]] const std::string& why_up() const { return why_up_; }

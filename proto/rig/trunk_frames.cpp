@@ -136,7 +136,7 @@ void Frames::trunk() {
 }
 
 void Frames::trunk_bone(Bone before, Bone bone, const std::optional<Vec>& way) {
-  const Mat& Tp = *T(before);
+  const Mat& Tp = *t_frame(before);
   Mat now = Tp;
   double sure_now = sure(before);
   std::string why(kContinues);
@@ -173,7 +173,7 @@ void Frames::trunk_bone(Bone before, Bone bone, const std::optional<Vec>& way) {
 // In a folded zero pose the head may have a frame of its own. It is looked for only where it shows:
 // where the head would be turned by more than 60 degrees on the average.
 void Frames::head(Bone before, const Mat& T_now, double sure_now, const std::string& why) {
-  const Mat T_before = *T(before);
+  const Mat T_before = *t_frame(before);
   if (upright_ || bent_deg(before, Bone::kHead, T_before) < 60) {
     set(Bone::kHead, T_now, sure_now, why);
     return;
@@ -198,7 +198,7 @@ void Frames::find_up() {
     double mean = 0.0;   // of the trunk's part along the axis
   };
   const int hips = joint_[Bone::kHips];
-  const Vec pelvis = T(Bone::kHips)->transpose() * kY;
+  const Vec pelvis = t_frame(Bone::kHips)->transpose() * kY;
   const auto foot = [this](Side side) {
     const Bone bone = on(side, Bone::kLeftFoot);
     return joint_[joint_.has(bone) ? bone : on(side, Bone::kLeftLowerLeg)];

@@ -119,6 +119,7 @@ HopParts hop_parts(std::span<const Arrival> arrivals, std::int64_t start_ns, std
 
 Findings findings_of(const HopParts& parts) {
   std::vector<Findings> threads;
+  threads.reserve(parts.threads.size());
   for (const ThreadShare& thread : parts.threads) {
     threads.push_back(Findings()
                           .add("thread", thread.name)

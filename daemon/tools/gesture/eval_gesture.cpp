@@ -379,6 +379,7 @@ Findings findings_of(const GestureEvaluation& evaluation, const gesture::Gesture
       .say(fmt::format("{:>10} {:>10} {:>10} {:>10}", "look-ahead", "rms deg", "max deg",
                        "jerk ratio"));
   std::vector<Findings> curve;
+  curve.reserve(evaluation.curve.size());
   for (const report::LagError& point : evaluation.curve) {
     curve.push_back(Findings()
                         .add("lookahead", point.frames)
