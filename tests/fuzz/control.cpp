@@ -37,7 +37,7 @@ class DaemonControl final : public control::DaemonControl {
   bool send(const pipeline::DeviceCommand& command) override {
     if (command.size > command.bytes.size()) std::abort();
     if (command.ticket == 0) return true;
-    acks.push_back({.ticket = command.ticket, .stream = command.stream, .sequence = 1});
+    acks.push_back({.ticket = command.ticket, .stream = command.source, .sequence = 1});
     return true;
   }
   void keep_model(std::span<const std::byte>) override {}

@@ -41,7 +41,7 @@ class DaemonControl final : public control::DaemonControl {
   bool send(const pipeline::DeviceCommand& command) override {
     demand(command.size <= command.bytes.size());
     if (command.ticket != 0) {
-      acks.push_back({.ticket = command.ticket, .stream = command.stream, .sequence = 1});
+      acks.push_back({.ticket = command.ticket, .stream = command.source, .sequence = 1});
     }
     return true;
   }

@@ -43,7 +43,7 @@ std::string statuses(const std::vector<std::vector<std::byte>>& datagrams) {
     drivers::vmc::each_message(datagram, [&](const drivers::vmc::OscMessage& message) {
       if (message.address != "/VMC/Ext/OK") return;
       drivers::vmc::OscArguments arguments(message);
-      for (int i = 0; i < 4; ++i) text += std::to_string(arguments.i32());
+      for (int i = 0; i < 4; ++i) text += std::to_string(static_cast<int>(arguments.number()));
       text += ' ';
     });
   }

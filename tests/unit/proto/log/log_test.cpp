@@ -222,7 +222,7 @@ TEST_CASE("of many that begin a log of one name at once one has it, whole") {
 TEST_CASE("a log that could not be begun is begun later, or leaves nothing") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog";
-  REQUIRE(log::reserve(path) == log::Reserved::kYes);
+  REQUIRE(log::reserve(path).value() == log::Reserved::kYes);
   {
     Writer writer(path, {.sources = {{0, "s", "file", "", "", "{}"}}}, true);
     {

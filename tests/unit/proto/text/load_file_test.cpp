@@ -32,7 +32,8 @@ TEST_CASE("a whole file is read, up to its limit", "[load_file]") {
   CHECK(load_refusal(folder.write("large", std::string(1001, 'x')))
             .contains("that is no calibration"));
   const std::string large(300'000, 'y');
-  CHECK(load_file(folder.write("large", large), {.what = "clip", .max_bytes = 300'000}) == large);
+  CHECK(load_file(folder.write("large", large), {.what = "clip", .max_bytes = 300'000}).value() ==
+        large);
 }
 
 TEST_CASE("a file in /proc, which states no size, is read and bounded, too", "[load_file]") {

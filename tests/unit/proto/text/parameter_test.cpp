@@ -29,7 +29,7 @@ std::string parameter_refusal(const ParameterSpec& spec, const ParameterValue& v
 }
 
 TEST_CASE("a value is checked against its type and its range, in the units of people") {
-  CHECK(from_display(kTable[0], std::int64_t{2}, "gain") == ParameterValue(2.0));
+  CHECK(from_display(kTable[0], std::int64_t{2}, "gain").value() == ParameterValue(2.0));
   CHECK(parameter_refusal(kTable[0], 2.5) ==
         "gain = 2.5 is out of range: it takes a number from -2 to 2");
   CHECK(parameter_refusal(kTable[0], std::numeric_limits<double>::quiet_NaN())

@@ -179,7 +179,7 @@ TEST_CASE("the error for an unknown key says what was meant", "[toml_table]") {
 
 TEST_CASE("a single error is that of the smallest line, however many there are", "[toml_table]") {
   Findings findings{.file = "a.toml", .exit_code = ExitCode::kWrongUse};
-  CHECK(findings.result(7) == 7);
+  CHECK(findings.result(7).value() == 7);
   for (int line = 1000; line > 0; --line) findings.add_error(line, "wrong");
   REQUIRE(findings.errors.size() == kMaxErrors + 1);
   CHECK(findings.errors.back().message.starts_with("and there are more"));
