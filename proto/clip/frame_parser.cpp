@@ -47,7 +47,8 @@ std::string FrameOutcome::sentence() const {
     case FrameFault::kNone:
       return "the frame is good";
     case FrameFault::kNotANumber:
-      return in_quotes(where) + " is not a number a pose can have";
+      return in_quotes(where) + " is not a number a pose can have" +
+             (where == "nan" ? "; leave a missing value empty" : "");
     case FrameFault::kImplausible:
       return in_quotes(where) +
              " is beyond what a pose can have: a position lies within 1 km, a joint turns by at "
@@ -176,9 +177,7 @@ FrameOutcome FrameParser::parse_fields(std::string_view text,
       ++outcome.found;
       return add_error(FrameFault::kTooMany, {});
     }
-    // numpy writes nan where a value is missing.
-    const bool missing = field.empty() || field == "nan" || field == "NaN";
-    const auto value = missing              ? std::optional(kMissing)
+    const auto value = field.empty()        ? std::optional(kMissing)
                        : outcome.found == 0 ? parse_number(field, kMaxTime_s)
                                             : parse_number(field);
     if (!value) return add_error(FrameFault::kNotANumber, field);
