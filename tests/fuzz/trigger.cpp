@@ -31,7 +31,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   AnyTake daemon;
   posed::control::Trigger trigger(daemon, []() noexcept { return std::int64_t{1}; });
   const std::string_view datagram(reinterpret_cast<const char*>(data), size);
-  trigger.take(datagram, "127.0.0.1");
+  trigger.handle(datagram, "127.0.0.1");
   if (trigger.marked() + trigger.refused() != 1) std::abort();
   return 0;
 }
