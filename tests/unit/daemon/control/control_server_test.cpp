@@ -38,6 +38,7 @@ class Booth final : public DaemonControl {
     server_ =
         *ControlServer::start(context == nullptr ? context_.get() : context, "tcp://127.0.0.1:*",
                               {&acks_, wake_.get(), authenticator, std::move(secret)}, handler_);
+    started_ = server_.get();
   }
   bool send(const pipeline::DeviceCommand&) override { return true; }
   bool send(const Command& command) override {
@@ -61,7 +62,7 @@ class Booth final : public DaemonControl {
     while (hold_status) std::this_thread::sleep_for(1ms);
     stats.set_rss_bytes(42);
     const std::scoped_lock lock(mutex);
-    if (server_) beats_at_status.insert(server_->pulse().beats());
+    if (const ControlServer* server = started_) beats_at_status.insert(server->pulse().beats());
   }
   void stop() override { stopped = true; }
   [[nodiscard]] const std::string& endpoint() const { return server_->endpoint(); }
@@ -79,6 +80,7 @@ class Booth final : public DaemonControl {
   pipeline::Ring<Ack> acks_feed_{kMaxUnderWay};
   HandlerRig rig_{three_streams(), *this};
   RequestHandler& handler_ = rig_.handler;
+  std::atomic<ControlServer*> started_{nullptr};  // for fill(), on the server's thread
   std::unique_ptr<ControlServer> server_;
 };
 
