@@ -28,7 +28,7 @@ std::uint64_t lost(const pipeline::StreamCounters& counters) {
 
 }  // namespace
 
-TEST_CASE("on the virtual clock every frame and sample arrives, in order") {
+TEST_CASE("on the virtual clock every frame and sample arrives, in order", "[virtual]") {
   VirtualDaemon daemon({.seed = 1, .log = {}, .holdups = false});
   daemon.add(walking_stream("walker", 3.0));
   daemon.add(glove_stream("hand", 3.0));
@@ -45,7 +45,7 @@ TEST_CASE("on the virtual clock every frame and sample arrives, in order") {
   }
 }
 
-TEST_CASE("a device that sends without a pause does not affect another stream") {
+TEST_CASE("a device that sends without a pause does not affect another stream", "[virtual]") {
   for (const std::uint64_t seed : {1U, 2U, 3U}) {
     INFO("seed " << seed);
     VirtualDaemon daemon({.seed = seed, .log = {}, .holdups = false, .turn_us = 1000.0});
@@ -58,7 +58,7 @@ TEST_CASE("a device that sends without a pause does not affect another stream") 
   }
 }
 
-TEST_CASE("every command is acknowledged, however full the rings are") {
+TEST_CASE("every command is acknowledged, however full the rings are", "[virtual]") {
   VirtualDaemon daemon({.seed = 5, .log = {}, .ack_slots = 4});
   daemon.add(walking_stream("walker", 4.0));
   daemon.add(flooding_glove());

@@ -266,7 +266,7 @@ void check_world(std::uint64_t seed, const std::filesystem::path& log, Lived& me
 
 }  // namespace
 
-TEST_CASE("whatever happens in the world, the daemon keeps its promises", "[property]") {
+TEST_CASE("whatever happens in the world, the daemon keeps its promises", "[property][virtual]") {
   const TempFolder folder;
   const auto [first, last] = seeds(1);
   Lived met;

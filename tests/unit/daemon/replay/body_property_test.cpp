@@ -91,7 +91,8 @@ Met record_rooms(std::uint64_t seed, const std::filesystem::path& path, VirtualO
 
 }  // namespace
 
-TEST_CASE("whatever bodies do while it is recorded, a log replays bit for bit", "[property]") {
+TEST_CASE("whatever bodies do while it is recorded, a log replays bit for bit",
+          "[property][virtual]") {
   const TempFolder folder;
   const auto path = folder.path() / "rooms.plog";
   const auto [first, last] = seeds(1);
@@ -119,7 +120,7 @@ TEST_CASE("whatever bodies do while it is recorded, a log replays bit for bit", 
 
 // A log may lack chunks, decisions, frames and the rows that say which bodies there are.
 TEST_CASE("a log of bodies with gaps replays what it contains and reports what is missing",
-          "[property]") {
+          "[property][virtual]") {
   check_gapped_logs(2, [](Dice& dice, std::uint64_t seed, const std::filesystem::path& path) {
     VirtualOptions scarce;
     scarce.chunk_bytes = static_cast<std::size_t>(1000 * dice.below(60) + 2000);
@@ -131,7 +132,8 @@ TEST_CASE("a log of bodies with gaps replays what it contains and reports what i
 
 // Without holdups and with space in the rings, no stream has a reason to lose anything. Only a
 // device that sends many frames at once, as a disturbed one does, may have some shed.
-TEST_CASE("bodies that come and go cost no frame, neither their own nor of others", "[property]") {
+TEST_CASE("bodies that come and go cost no frame, neither their own nor of others",
+          "[property][virtual]") {
   const auto [first, last] = seeds(4);
   std::uint64_t frames = 0;
   for (std::uint64_t seed = first; seed <= last; ++seed) {
@@ -167,7 +169,7 @@ TEST_CASE("bodies that come and go cost no frame, neither their own nor of other
 // What went wrong while the parts could not keep up is over when they can: a stream that took the
 // slot of another with items on their way has its whole share of the rings.
 TEST_CASE("when nothing is held up any more, every body is streamed to its last frame",
-          "[property]") {
+          "[property][virtual]") {
   const auto [first, last] = seeds(1);
   std::size_t present = 0;
   for (std::uint64_t seed = first; seed <= last; ++seed) {

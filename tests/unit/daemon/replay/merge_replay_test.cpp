@@ -205,7 +205,8 @@ void record_merged(std::uint64_t seed, const std::filesystem::path& path, Virtua
 
 }  // namespace
 
-TEST_CASE("two people get the hands of the gloves, no frame is lost, and the log replays") {
+TEST_CASE("two people get the hands of the gloves, no frame is lost, and the log replays",
+          "[virtual]") {
   const TempFolder folder;
   const auto path = folder.path() / "merged.plog";
   VirtualDaemon daemon({.seed = 3, .log = path, .holdups = false});
@@ -244,7 +245,8 @@ TEST_CASE("two people get the hands of the gloves, no frame is lost, and the log
   CHECK(seen.size() > 50);  // the motion repeats every second, the second half backwards
 }
 
-TEST_CASE("a body that comes late gives its hand to streams that were there before, and again") {
+TEST_CASE("a body that comes late gives its hand to streams that were there before, and again",
+          "[virtual]") {
   const TempFolder folder;
   const auto path = folder.path() / "late.plog";
   VirtualDaemon daemon({.seed = 5, .log = path, .holdups = false});
@@ -281,7 +283,7 @@ TEST_CASE("a body that comes late gives its hand to streams that were there befo
 }
 
 TEST_CASE("whatever happens to a partner that comes and goes, the log replays bit for bit",
-          "[property]") {
+          "[property][virtual]") {
   const TempFolder folder;
   const auto path = folder.path() / "late.plog";
   const auto [first, last] = seeds(8);
@@ -299,7 +301,8 @@ TEST_CASE("whatever happens to a partner that comes and goes, the log replays bi
   CHECK(compared > 0);
 }
 
-TEST_CASE("whatever happens to bodies and gloves, a merged log replays bit for bit", "[property]") {
+TEST_CASE("whatever happens to bodies and gloves, a merged log replays bit for bit",
+          "[property][virtual]") {
   const TempFolder folder;
   const auto path = folder.path() / "merged.plog";
   const auto [first, last] = seeds(8);
@@ -318,7 +321,7 @@ TEST_CASE("whatever happens to bodies and gloves, a merged log replays bit for b
 
 // What a glove's gap hides is unknown for the bodies that have its hand, too.
 TEST_CASE("a merged log with gaps replays what it contains and reports what is missing",
-          "[property]") {
+          "[property][virtual]") {
   check_gapped_logs(8, [](Dice& dice, std::uint64_t seed, const std::filesystem::path& path) {
     VirtualOptions scarce;
     scarce.chunk_bytes = static_cast<std::size_t>(1000 * dice.below(60) + 2000);

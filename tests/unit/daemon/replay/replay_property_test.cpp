@@ -60,7 +60,8 @@ std::uint64_t check_seed(std::uint64_t seed, const std::filesystem::path& path) 
 
 }  // namespace
 
-TEST_CASE("whatever happens while it is recorded, a log replays bit for bit", "[property]") {
+TEST_CASE("whatever happens while it is recorded, a log replays bit for bit",
+          "[property][virtual]") {
   const TempFolder folder;
   const auto path = folder.path() / "run.plog";
   const auto [first, last] = seeds(1);
@@ -70,7 +71,8 @@ TEST_CASE("whatever happens while it is recorded, a log replays bit for bit", "[
 }
 
 // A recorder that is held up loses chunks, decisions and frames.
-TEST_CASE("a log with gaps replays what it contains and reports what is missing", "[property]") {
+TEST_CASE("a log with gaps replays what it contains and reports what is missing",
+          "[property][virtual]") {
   check_gapped_logs(4, [](Dice& dice, std::uint64_t seed, const std::filesystem::path& path) {
     VirtualOptions scarce;
     scarce.chunk_bytes = static_cast<std::size_t>(1000 * dice.below(40) + 2000);
@@ -82,7 +84,8 @@ TEST_CASE("a log with gaps replays what it contains and reports what is missing"
 
 // The decoder gives a sample before its frame. A replay that passes on the sample before the tick
 // that ended the silence would differ from the live run.
-TEST_CASE("a glove that was silent, with frames waiting in the generate stage, replays") {
+TEST_CASE("a glove that was silent, with frames waiting in the generate stage, replays",
+          "[virtual]") {
   for (const int lag : {0, 1, 2, 3}) {
     INFO("lag " << lag);
     const TempFolder folder;
