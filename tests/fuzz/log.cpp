@@ -14,8 +14,8 @@
 
 #include "daemon/pipeline/description_row.hpp"
 #include "daemon/pipeline/messages.hpp"
-#include "daemon/replay/expectation.hpp"
-#include "daemon/replay/replay.hpp"
+#include "daemon/tools/replay/expectation.hpp"
+#include "daemon/tools/replay/replay.hpp"
 #include "drivers/template_mocap/protocol.hpp"
 #include "models/gesture/model_file.hpp"
 #include "models/style/model/style_model.hpp"

@@ -9,8 +9,8 @@
 
 #include <catch2/catch.hpp>
 
-#include "daemon/replay/expectation.hpp"
-#include "daemon/replay/replay.hpp"
+#include "daemon/tools/replay/expectation.hpp"
+#include "daemon/tools/replay/replay.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/message/frame_message.hpp"
 

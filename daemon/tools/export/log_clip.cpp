@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "daemon/pipeline/take.hpp"
-#include "daemon/replay/replay.hpp"
+#include "daemon/tools/replay/replay.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/frame/time.hpp"
 #include "proto/text/clean.hpp"

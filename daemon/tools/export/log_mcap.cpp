@@ -15,8 +15,8 @@
 
 #include "daemon/publish/event_text.hpp"
 #include "daemon/publish/published_stream.hpp"
-#include "daemon/replay/replay.hpp"
-#include "daemon/replay/stream_info.hpp"
+#include "daemon/tools/replay/replay.hpp"
+#include "daemon/tools/replay/stream_info.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"

@@ -19,9 +19,6 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/logging/log_output.hpp"
-#include "daemon/replay/broadcast.hpp"
-#include "daemon/replay/pace.hpp"
-#include "daemon/replay/replay.hpp"
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/findings.hpp"
@@ -29,6 +26,9 @@
 #include "daemon/tools/command/progress.hpp"
 #include "daemon/tools/command/ranks.hpp"
 #include "daemon/tools/logs/replay_outputs.hpp"
+#include "daemon/tools/replay/broadcast.hpp"
+#include "daemon/tools/replay/pace.hpp"
+#include "daemon/tools/replay/replay.hpp"
 #include "models/gp/isa.hpp"
 #include "models/task_numbers.hpp"
 #include "proto/log/reader.hpp"

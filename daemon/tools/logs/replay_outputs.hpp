@@ -10,11 +10,11 @@
 #include <vector>
 
 #include "daemon/pipeline/messages.hpp"
-#include "daemon/replay/broadcast.hpp"
-#include "daemon/replay/expectation.hpp"
-#include "daemon/replay/replay.hpp"
 #include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/export/frame_file.hpp"
+#include "daemon/tools/replay/broadcast.hpp"
+#include "daemon/tools/replay/expectation.hpp"
+#include "daemon/tools/replay/replay.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/message/frame_message.hpp"

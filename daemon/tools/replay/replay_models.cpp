@@ -1,4 +1,4 @@
-#include "daemon/replay/replay_models.hpp"
+#include "daemon/tools/replay/replay_models.hpp"
 
 #include <utility>
 

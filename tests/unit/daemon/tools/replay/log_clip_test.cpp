@@ -5,12 +5,12 @@
 #include <cmath>
 #include <fstream>
 
-#include "daemon/replay/replay.hpp"
 #include "daemon/tools/export/log_clip.hpp"
+#include "daemon/tools/replay/replay.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/log/writer.hpp"
 #include "tests/support/log_surgery.hpp"
-#include "tests/unit/daemon/replay/staged_run.hpp"
+#include "tests/unit/daemon/tools/replay/staged_run.hpp"
 
 namespace posed::test {
 namespace {

@@ -12,8 +12,8 @@
 #include "proto/log/reader.hpp"
 #include "tests/support/file_text.hpp"
 #include "tests/support/has.hpp"
-#include "tests/unit/daemon/replay/mcap_reader.hpp"
-#include "tests/unit/daemon/replay/staged_run.hpp"
+#include "tests/unit/daemon/tools/replay/mcap_reader.hpp"
+#include "tests/unit/daemon/tools/replay/staged_run.hpp"
 
 namespace posed::test {
 namespace {

@@ -13,7 +13,7 @@
 
 #include "daemon/devices/calibration.hpp"
 #include "daemon/pipeline/intake.hpp"
-#include "daemon/replay/replay_stream_context.hpp"
+#include "daemon/tools/replay/replay_stream_context.hpp"
 #include "drivers/driver.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/log/rows.hpp"

@@ -1,8 +1,8 @@
 // The pace of a replay: that of the recording, except for long silences.
 #include <catch2/catch.hpp>
 
-#include "daemon/replay/pace.hpp"
-#include "daemon/replay/shed_ranges.hpp"
+#include "daemon/tools/replay/pace.hpp"
+#include "daemon/tools/replay/shed_ranges.hpp"
 
 using namespace posed;
 using replay::Pace;

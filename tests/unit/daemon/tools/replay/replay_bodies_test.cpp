@@ -4,14 +4,14 @@
 #include <algorithm>
 #include <map>
 
-#include "daemon/replay/replay.hpp"
 #include "daemon/tools/export/log_clip.hpp"
+#include "daemon/tools/replay/replay.hpp"
 #include "posed/v1/posed.pb.h"
 #include "tests/support/log_surgery.hpp"
 #include "tests/support/replayed.hpp"
 #include "tests/support/temp_folder.hpp"
-#include "tests/unit/daemon/replay/body_run.hpp"
-#include "tests/unit/daemon/replay/staged_run.hpp"
+#include "tests/unit/daemon/tools/replay/body_run.hpp"
+#include "tests/unit/daemon/tools/replay/staged_run.hpp"
 
 namespace posed::test {
 namespace {

@@ -5,15 +5,15 @@
 #include <cstdlib>
 #include <set>
 
-#include "daemon/replay/replay.hpp"
 #include "daemon/tools/export/frame_file.hpp"
 #include "daemon/tools/export/log_clip.hpp"
+#include "daemon/tools/replay/replay.hpp"
 #include "posed/v1/log.pb.h"
 #include "tests/support/has.hpp"
 #include "tests/support/log_surgery.hpp"
 #include "tests/support/replayed.hpp"
 #include "tests/support/shared.hpp"
-#include "tests/unit/daemon/replay/staged_run.hpp"
+#include "tests/unit/daemon/tools/replay/staged_run.hpp"
 
 using namespace posed;
 using namespace posed::test;

@@ -15,8 +15,8 @@
 #include "daemon/pipeline/messages.hpp"
 #include "daemon/pipeline/ring.hpp"
 #include "daemon/publish/publisher.hpp"
-#include "daemon/replay/replay.hpp"
 #include "daemon/system/event_fd.hpp"
+#include "daemon/tools/replay/replay.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/zmq/zmq_handle.hpp"
 

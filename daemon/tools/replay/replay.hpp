@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "daemon/pipeline/messages.hpp"
-#include "daemon/replay/replay_models.hpp"
-#include "daemon/replay/replay_source.hpp"
-#include "daemon/replay/replay_stream_context.hpp"
-#include "daemon/replay/schedule.hpp"
+#include "daemon/tools/replay/replay_models.hpp"
+#include "daemon/tools/replay/replay_source.hpp"
+#include "daemon/tools/replay/replay_stream_context.hpp"
+#include "daemon/tools/replay/schedule.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/log/reader.hpp"
 

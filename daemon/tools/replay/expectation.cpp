@@ -1,4 +1,4 @@
-#include "daemon/replay/expectation.hpp"
+#include "daemon/tools/replay/expectation.hpp"
 
 #include <algorithm>
 #include <bit>

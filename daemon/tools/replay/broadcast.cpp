@@ -1,4 +1,4 @@
-#include "daemon/replay/broadcast.hpp"
+#include "daemon/tools/replay/broadcast.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "daemon/net/security.hpp"
-#include "daemon/replay/pace.hpp"
-#include "daemon/replay/stream_info.hpp"
 #include "daemon/system/clock.hpp"
+#include "daemon/tools/replay/pace.hpp"
+#include "daemon/tools/replay/stream_info.hpp"
 #include "models/stage_type.hpp"
 #include "proto/text/clean.hpp"
 

@@ -1,7 +1,7 @@
 // The clock of a recording that is replayed, with which the ages of its frames are measured.
 #include <catch2/catch.hpp>
 
-#include "daemon/replay/broadcast.hpp"
+#include "daemon/tools/replay/broadcast.hpp"
 
 namespace posed::replay {
 namespace {

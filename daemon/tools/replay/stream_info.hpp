@@ -5,7 +5,7 @@
 
 #include "daemon/pipeline/stream_settings.hpp"
 #include "daemon/publish/publisher.hpp"
-#include "daemon/replay/replay.hpp"
+#include "daemon/tools/replay/replay.hpp"
 
 namespace posed::replay {
 

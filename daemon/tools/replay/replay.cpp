@@ -1,4 +1,4 @@
-#include "daemon/replay/replay.hpp"
+#include "daemon/tools/replay/replay.hpp"
 
 #include <algorithm>
 #include <limits>

@@ -1,4 +1,4 @@
-#include "daemon/replay/replay_source.hpp"
+#include "daemon/tools/replay/replay_source.hpp"
 
 #include <algorithm>
 #include <utility>

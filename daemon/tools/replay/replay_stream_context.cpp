@@ -1,4 +1,4 @@
-#include "daemon/replay/replay_stream_context.hpp"
+#include "daemon/tools/replay/replay_stream_context.hpp"
 
 #include <algorithm>
 #include <utility>
