@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cstring>
 #include <filesystem>
 
 #include <malloc.h>
@@ -54,35 +53,20 @@ int source_of(const Message& message) {
 
 Result<std::unique_ptr<PeerGuard>> PeerGuard::open(void* context, void* socket,
                                                    const PeerLimits& limits) {
-  // unique names, because a context may have several guards
-  static std::atomic<unsigned> number{0};
-  const std::string endpoint = fmt::format("inproc://posed.peers.{}", ++number);
-  if (zmq_socket_monitor(socket, endpoint.c_str(), ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED) !=
-      0) {
-    return fail(std::string("cannot watch connections: ") + zmq_strerror(zmq_errno()));
-  }
-  auto monitor = TRY(open_socket(context, ZMQ_PAIR));
-  // No limit: otherwise libzmq's own thread would wait here until this guard reads.
-  TRY(set_option(monitor.get(), ZMQ_RCVHWM, 0));
-  TRY(connect_socket(monitor.get(), endpoint));
-  int fd = -1;
-  std::size_t size = sizeof fd;
-  if (zmq_getsockopt(monitor.get(), ZMQ_FD, &fd, &size) != 0) {
-    return fail("ZeroMQ names no descriptor to wait for");
-  }
+  auto events =
+      TRY(SocketEvents::open(context, socket, ZMQ_EVENT_ACCEPTED | ZMQ_EVENT_DISCONNECTED));
   auto wake = TRY(system::EventFd::open());
   auto poller = TRY(system::Poller::open());
-  for (const Result<>& added : {poller->add(*wake), poller->add(fd, 0)}) {
+  for (const Result<>& added : {poller->add(*wake), poller->add(events.fd(), 0)}) {
     if (!added) return std::unexpected(added.error());
   }
   return std::unique_ptr<PeerGuard>(
-      new PeerGuard(socket, std::move(monitor), std::move(wake), std::move(poller), limits));
+      new PeerGuard(std::move(events), std::move(wake), std::move(poller), limits));
 }
 
-PeerGuard::PeerGuard(void* socket, Socket monitor, std::unique_ptr<system::EventFd> wake,
+PeerGuard::PeerGuard(SocketEvents events, std::unique_ptr<system::EventFd> wake,
                      std::unique_ptr<system::Poller> poller, const PeerLimits& limits)
-    : socket_(socket),
-      monitor_(std::move(monitor)),
+    : events_(std::move(events)),
       wake_(std::move(wake)),
       poller_(std::move(poller)),
       limits_(limits),
@@ -93,7 +77,6 @@ PeerGuard::~PeerGuard() {
   stop_.store(true);
   wake_->notify();
   thread_.join();
-  zmq_socket_monitor(socket_, nullptr, 0);
 }
 
 void PeerGuard::serve() {
@@ -113,7 +96,7 @@ void PeerGuard::serve() {
 }
 
 std::int64_t PeerGuard::turn(std::int64_t now_ns) {
-  receive_monitor();
+  receive_events();
   if (peers_.empty()) return system::kForever_ns;
   if (is_inspection_due(now_ns)) {
     inspected_ns_ = now_ns;
@@ -135,23 +118,11 @@ bool PeerGuard::is_inspection_due(std::int64_t now_ns) {
   return due;
 }
 
-// A monitor event has two parts: the event number (16 bits) with the descriptor (32 bits), then the
-// endpoint.
-void PeerGuard::receive_monitor() {
-  Message part;
-  while (part.receive(monitor_.get())) {
-    std::uint16_t event = 0;
-    std::int32_t fd = -1;
-    const std::string_view text = part.text();
-    if (text.size() == sizeof event + sizeof fd) {
-      std::memcpy(&event, text.data(), sizeof event);
-      std::memcpy(&fd, text.data() + sizeof event, sizeof fd);
-    }
-    while (part.more() && part.receive(monitor_.get(), 0)) {
-    }
-    if (event != ZMQ_EVENT_ACCEPTED && event != ZMQ_EVENT_DISCONNECTED) continue;
+void PeerGuard::receive_events() {
+  while (const auto event = events_.next()) {
+    const int fd = event->value;
     if (peers_.erase(fd) > 0) gone_.push_back(fd);
-    if (event == ZMQ_EVENT_ACCEPTED) admit(fd);
+    if (event->number == ZMQ_EVENT_ACCEPTED) admit(fd);
   }
 }
 
@@ -183,7 +154,7 @@ void PeerGuard::inspect_all() {
 bool PeerGuard::knows(int fd) {
   const std::scoped_lock lock(mutex_);
   if (fd < 0 || peers_.contains(fd)) return fd >= 0;
-  receive_monitor();  // its connection event may still be waiting
+  receive_events();  // its connection event may still be waiting
   wake_->notify();
   return peers_.contains(fd);
 }
@@ -236,7 +207,7 @@ void PeerGuard::cut_now(int fd, const char* why) {
 
 void PeerGuard::cut_unless(const std::function<bool(std::string_view user)>& allowed) {
   const std::scoped_lock lock(mutex_);
-  receive_monitor();
+  receive_events();
   for (const auto& [fd, peer] : peers_) {
     if (!peer.spoke || !allowed(peer.user)) {
       cut_now(fd, "has lost its right, or has not identified itself");

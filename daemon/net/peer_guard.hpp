@@ -28,7 +28,7 @@
 
 #include "daemon/system/event_fd.hpp"
 #include "proto/frame/result.hpp"
-#include "proto/zmq/zmq_handle.hpp"
+#include "proto/zmq/socket_events.hpp"
 
 namespace posed::net {
 
@@ -84,12 +84,12 @@ class PeerGuard {
     bool spoke = false;
     bool is_cut = false;
   };
-  PeerGuard(void* socket, Socket monitor, std::unique_ptr<system::EventFd> wake,
+  PeerGuard(SocketEvents events, std::unique_ptr<system::EventFd> wake,
             std::unique_ptr<system::Poller> poller, const PeerLimits& limits);
   void serve();
   // Each function below must be called with mutex_ held.
   [[nodiscard]] std::int64_t turn(std::int64_t now_ns);  // returns when the next turn is due
-  void receive_monitor();
+  void receive_events();
   void admit(int fd);
   [[nodiscard]] bool is_inspection_due(std::int64_t now_ns);
   void inspect_all();
@@ -97,8 +97,7 @@ class PeerGuard {
   void cut_offender(int fd, const char* why);  // and slows down the next handshakes
   void log_cut(const char* why);
 
-  void* socket_;
-  Socket monitor_;
+  SocketEvents events_;
   std::unique_ptr<system::EventFd> wake_;
   std::unique_ptr<system::Poller> poller_;
   PeerLimits limits_;

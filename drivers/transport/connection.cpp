@@ -7,12 +7,17 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <future>
+#include <limits>
 #include <system_error>
 #include <thread>
 #include <utility>
+
+#include "drivers/transport/upkeep.hpp"
+#include "proto/frame/time.hpp"
 
 namespace posed::drivers {
 namespace {
@@ -24,6 +29,7 @@ constexpr std::size_t kRead = 4096;  // bytes; enough for a HID report or a term
 constexpr milliseconds kWritePatience{1000};
 constexpr milliseconds kDrainPatience{1000};
 constexpr milliseconds kClosePatience{50};
+constexpr std::int64_t kOfNoUse_ns = 5 * kNanosPerSecond;
 constexpr int kMaxWaiting = 256;  // reads; hidraw keeps 64 reports
 
 bool not_now(int error) noexcept {
@@ -53,19 +59,28 @@ std::string gone(const std::string& name, int error) {
          "); plug it in again or switch it on";
 }
 
-class LinkTransport final : public Transport {
+class LinkTransport final : public Transport, public Upkeep {
  public:
   explicit LinkTransport(Connection link) : link_(std::move(link)) {}
 
   [[nodiscard]] int poll_fd() const noexcept override { return link_.fd(); }
   Result<> start(std::int64_t now_ns) override;
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
+  RT_SAFE void decoded(bool used) noexcept override {
+    if (used) used_ns_.store(read_ns_, std::memory_order_relaxed);
+  }
   [[nodiscard]] bool send(std::span<const std::byte> bytes, std::uint8_t socket) noexcept override;
+  void upkeep(std::int64_t now_ns) noexcept override;
+  [[nodiscard]] std::string consume_note() override;
 
  private:
   bool flush() noexcept;
 
   Connection link_;
+  std::int64_t read_ns_ = 0;
+  // When the last bytes of use were read; before start() there is nothing to wait for.
+  std::atomic<std::int64_t> used_ns_{std::numeric_limits<std::int64_t>::max()};
+  bool is_given_up_ = false, is_reported_ = false;  // of the upkeep's thread
   std::array<std::byte, kRead> buffer_;
   // The rest of a message that the device accepted only in part; no other bytes may come between.
   std::array<std::byte, kRead> unsent_;
@@ -74,7 +89,8 @@ class LinkTransport final : public Transport {
 
 // Discards bytes that came while other devices were being opened: they are old, and all would get
 // one arrival time. Bounded, because a device may send without pause.
-Result<> LinkTransport::start(std::int64_t /*now_ns*/) {
+Result<> LinkTransport::start(std::int64_t now_ns) {
+  used_ns_.store(now_ns);
   for (int i = 0; i < kMaxWaiting && link_.receive(buffer_) > 0; ++i) {
   }
   return {};
@@ -82,12 +98,28 @@ Result<> LinkTransport::start(std::int64_t /*now_ns*/) {
 
 // One read per call, so that one HID report is one chunk. All devices are opened such that 0 bytes
 // mean a hang-up (VMIN is 1). RT-safe except for the read.
-Chunk LinkTransport::read(std::int64_t /*now_ns*/) noexcept {
+Chunk LinkTransport::read(std::int64_t now_ns) noexcept {
+  read_ns_ = now_ns;
   flush();
   const ssize_t got = link_.receive(buffer_);
   if (got > 0) return {.bytes = {buffer_.data(), static_cast<std::size_t>(got)}};
   if (got < 0 && not_now(errno)) return {};
   return {.bytes = {}, .lost = true, .foreign = link_.was_browser() ? 1U : 0U};
+}
+
+// The reader then finds the link hung up, and the next one is accepted.
+void LinkTransport::upkeep(std::int64_t now_ns) noexcept {
+  if (link_.listener() < 0 || is_given_up_ || now_ns - used_ns_.load() < kOfNoUse_ns) return;
+  pollfd next{.fd = link_.listener(), .events = POLLIN, .revents = 0};
+  if (::poll(&next, 1, 0) != 1) return;
+  is_given_up_ = true;
+  ::shutdown(link_.fd(), SHUT_RDWR);
+}
+
+std::string LinkTransport::consume_note() {
+  if (!is_given_up_ || is_reported_) return {};
+  is_reported_ = true;
+  return link_.name() + " has sent nothing of use for 5 s, and another device waits: it is cut";
 }
 
 // RT-safe except for the write.
@@ -145,6 +177,7 @@ void Connection::close() noexcept {
 
 Connection::Connection(Connection&& other) noexcept
     : fd_(std::exchange(other.fd_, -1)),
+      listener_(other.listener_),
       name_(std::move(other.name_)),
       identity_(std::move(other.identity_)),
       cancel_(std::move(other.cancel_)),
@@ -157,6 +190,7 @@ Connection& Connection::operator=(Connection&& other) noexcept {
   if (this == &other) return *this;
   close();
   fd_ = std::exchange(other.fd_, -1);
+  listener_ = other.listener_;
   name_ = std::move(other.name_);
   identity_ = std::move(other.identity_);
   cancel_ = std::move(other.cancel_);

@@ -41,9 +41,14 @@ class Connection {
   // waits no more.
   void heed(std::shared_ptr<const Cancel> cancel) noexcept { cancel_ = std::move(cancel); }
 
-  // From now on the link ends, as if hung up, if what comes begins as what a web browser sends. For
-  // links that others have made.
-  void refuse_browsers() noexcept { undecided_ = true; }
+  // A link that somebody else has made, through this listening socket, which outlives the link. It
+  // ends, as if hung up, if what comes begins as what a web browser sends; and make_link_transport
+  // gives it up if it is of no use while another one waits.
+  void came_through(int listener) noexcept {
+    listener_ = listener;
+    undecided_ = true;
+  }
+  [[nodiscard]] int listener() const noexcept { return listener_; }  // -1: posed made the link
   [[nodiscard]] bool was_browser() const noexcept { return was_browser_; }
   // Reads what is there into the buffer, which has room for more than kMaxBeginning bytes: as
   // ::read(). Bytes that do not yet tell a browser from a device are kept back until they do.
@@ -64,7 +69,7 @@ class Connection {
   void wait_for(short events, std::chrono::milliseconds patience) const;
   [[nodiscard]] bool cancelled() const noexcept { return cancel_ && cancel_->fired(); }
 
-  int fd_ = -1;
+  int fd_ = -1, listener_ = -1;
   std::string name_, identity_;
   std::shared_ptr<const Cancel> cancel_;
   bool undecided_ = false, was_browser_ = false;
@@ -73,7 +78,9 @@ class Connection {
 };
 
 // Reads the available bytes, at most 4 KB per call; a hang-up or an error of the descriptor sets
-// `lost`. For serial ports and sockets, whose writes do not block.
+// `lost`. For serial ports and sockets, whose writes do not block. The transport is an Upkeep,
+// which hangs up on who has sent nothing of use for five seconds while another device waits to
+// connect.
 [[nodiscard]] std::unique_ptr<Transport> make_link_transport(Connection link);
 // Makes the transport of a link from TransportFactory::hid(), whose writes block: it is also a
 // ColdWriter.

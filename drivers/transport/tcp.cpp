@@ -81,7 +81,7 @@ Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
       ++refused_;
       continue;
     }
-    link.refuse_browsers();
+    link.came_through(listener->second);
     keep_alive(fd);
     newest = std::move(link);
   }

@@ -34,25 +34,6 @@ constexpr std::uint64_t kUnseen = 384 * 1024;
 
 constexpr int kTick_ms = 10;  // a flood of empty parts fills about 0.7 GB a second
 
-struct MonitorEvent {
-  std::uint16_t number = 0;
-  std::int32_t value = 0;  // a descriptor, or a reason
-};
-
-// Reads a monitor message (zmq_socket_monitor): number and value, then the endpoint.
-MonitorEvent read_event(void* monitor) {
-  Message part;
-  MonitorEvent event;
-  if (!part.receive(monitor)) return event;
-  if (part.text().size() == sizeof event.number + sizeof event.value) {
-    std::memcpy(&event.number, part.text().data(), sizeof event.number);
-    std::memcpy(&event.value, part.text().data() + sizeof event.number, sizeof event.value);
-  }
-  while (part.more() && part.receive(monitor, 0)) {
-  }
-  return event;
-}
-
 // Bytes that a part took on the wire (ZMTP 3): the header of its frame, and of CURVE's box.
 std::uint64_t wire_bytes(std::size_t part, bool with_key) {
   constexpr std::uint64_t kBox = 33, kShortFrame = 255, kShortHeader = 2, kLongHeader = 9;
@@ -66,22 +47,8 @@ Result<std::unique_ptr<LinkMonitor>> LinkMonitor::open(void* context, void* sock
   const std::string_view largest(reinterpret_cast<const char*>(&kMaxReceivedPart),
                                  sizeof kMaxReceivedPart);
   TRY(set_option(socket, ZMQ_MAXMSGSIZE, largest));
-  // unique names, because a context may have several
-  static std::atomic<unsigned> number{0};
-  const std::string endpoint = "inproc://posed.link." + std::to_string(++number);
-  if (zmq_socket_monitor(socket, endpoint.c_str(), kEvents) != 0) {
-    return fail(std::string("cannot watch the connection: ") + zmq_strerror(zmq_errno()));
-  }
-  auto monitor = TRY(open_socket(context, ZMQ_PAIR));
-  // No limit: otherwise libzmq's own thread would wait here until the events are read.
-  TRY(set_option(monitor.get(), ZMQ_RCVHWM, 0));
-  TRY(connect_socket(monitor.get(), endpoint));
-  int fd = -1;
-  std::size_t size = sizeof fd;
-  if (zmq_getsockopt(monitor.get(), ZMQ_FD, &fd, &size) != 0) {
-    return fail("ZeroMQ names no descriptor to wait for");
-  }
-  std::unique_ptr<LinkMonitor> link(new LinkMonitor(socket, std::move(monitor), fd, with_key));
+  auto events = TRY(SocketEvents::open(context, socket, kEvents));
+  std::unique_ptr<LinkMonitor> link(new LinkMonitor(socket, std::move(events), with_key));
   if (link->news_.fd() < 0 || link->wake_.fd() < 0) {
     return fail("posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
   }
@@ -89,14 +56,13 @@ Result<std::unique_ptr<LinkMonitor>> LinkMonitor::open(void* context, void* sock
   return link;
 }
 
-LinkMonitor::LinkMonitor(void* socket, Socket monitor, int monitor_fd, bool with_key)
-    : socket_(socket), with_key_(with_key), monitor_fd_(monitor_fd), monitor_(std::move(monitor)) {}
+LinkMonitor::LinkMonitor(void* socket, SocketEvents events, bool with_key)
+    : socket_(socket), with_key_(with_key), events_(std::move(events)) {}
 
 LinkMonitor::~LinkMonitor() {
   stop_.store(true);
   wake_.signal();
   if (thread_.joinable()) thread_.join();
-  zmq_socket_monitor(socket_, nullptr, 0);
 }
 
 void LinkMonitor::watch() {
@@ -104,7 +70,7 @@ void LinkMonitor::watch() {
   sigset_t all;
   sigfillset(&all);
   pthread_sigmask(SIG_BLOCK, &all, nullptr);
-  std::array<pollfd, 2> items{{{.fd = monitor_fd_, .events = POLLIN, .revents = 0},
+  std::array<pollfd, 2> items{{{.fd = events_.fd(), .events = POLLIN, .revents = 0},
                                {.fd = wake_.fd(), .events = POLLIN, .revents = 0}}};
   while (!stop_.load()) {
     int wait_ms = -1;
@@ -150,10 +116,8 @@ bool LinkMonitor::is_empty() noexcept {
 }
 
 void LinkMonitor::handle_events() {
-  for (;;) {
-    const MonitorEvent event = read_event(monitor_.get());
-    if (event.number == 0) return;
-    const Refusal refusal = handle(event.number, event.value);
+  while (const auto event = events_.next()) {
+    const Refusal refusal = handle(event->number, event->value);
     if (refusal_ == Refusal::kNone) refusal_ = refusal;
     news_.signal();
   }

@@ -19,7 +19,7 @@
 
 #include "proto/frame/event_fd.hpp"
 #include "proto/frame/result.hpp"
-#include "proto/zmq/zmq_handle.hpp"
+#include "proto/zmq/socket_events.hpp"
 
 namespace posed::net {
 
@@ -71,7 +71,7 @@ class LinkMonitor {
     std::uint64_t ends = 0;
     std::uint64_t cuts = 0;
   };
-  LinkMonitor(void* socket, Socket monitor, int monitor_fd, bool with_key);
+  LinkMonitor(void* socket, SocketEvents events, bool with_key);
   void watch();
   // Whether no message waits; if so, notes it.
   [[nodiscard]] bool is_empty() noexcept;
@@ -83,11 +83,10 @@ class LinkMonitor {
 
   void* socket_;
   const bool with_key_;
-  const int monitor_fd_;
   RawEventFd news_, wake_;
   State told_;  // of the owner's thread
   std::mutex mutex_;
-  Socket monitor_;
+  SocketEvents events_;
   State state_;
   Refusal refusal_ = Refusal::kNone;  // not told yet
   int hang_ups_ = 0;                  // in a row, before the handshake

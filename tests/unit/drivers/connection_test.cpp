@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "drivers/transport/transport_factory.hpp"
+#include "drivers/transport/upkeep.hpp"
 #include "tests/support/free_port.hpp"
 #include "tests/unit/drivers/chunk_text.hpp"
 #include "tests/unit/drivers/pseudo_terminal.hpp"
@@ -371,6 +372,39 @@ TEST_CASE("an endpoint that is invalid or taken is refused with an error message
   const auto taken = baseline.accept({.endpoint = loopback(port)});
   REQUIRE_FALSE(taken);
   CHECK(taken.error().message.find("cannot listen") != std::string::npos);
+}
+
+TEST_CASE("who sends nothing of use gives way to the device that waits") {
+  const std::uint16_t port = free_port();
+  TransportFactory ports;
+  const ListenSettings settings{.endpoint = loopback(port), .peers = {}, .device = "glove"};
+  CHECK_FALSE(ports.accept(settings));
+  const Client silent(port);
+  auto link = ports.accept(settings);
+  REQUIRE(link);
+  const auto transport = make_link_transport(std::move(*link));
+  auto* upkeep = dynamic_cast<Upkeep*>(transport.get());
+  REQUIRE(upkeep != nullptr);
+  REQUIRE(transport->start(0));
+  upkeep->upkeep(9 * kNanosPerSecond);
+  CHECK(transport->read(9 * kNanosPerSecond).bytes.empty());
+  CHECK_FALSE(transport->read(9 * kNanosPerSecond).lost);  // nobody else waits
+  const Client device(port);
+  SECTION("unless it was of use just now") {
+    transport->decoded(true);
+    upkeep->upkeep(13 * kNanosPerSecond);
+    CHECK_FALSE(transport->read(13 * kNanosPerSecond).lost);
+    upkeep->upkeep(14 * kNanosPerSecond);
+  }
+  SECTION("also when it sends rubbish") {
+    transport->decoded(false);
+    upkeep->upkeep(10 * kNanosPerSecond);
+  }
+  CHECK(upkeep->consume_note().find("another device waits") != std::string::npos);
+  CHECK(upkeep->consume_note().empty());
+  REQUIRE(readable(*transport));
+  CHECK(transport->read(15 * kNanosPerSecond).lost);
+  CHECK(ports.accept(settings));
 }
 
 }  // namespace posed::drivers

@@ -172,32 +172,36 @@ TEST_CASE("a flood of skipped frames is one event, and its sum when the stream e
   CHECK(texts.size() < 50);  // three, unless the machine was very slow
 }
 
-TEST_CASE("a glove counts as unplugged only after the reader has started") {
+// The stream of a glove that may be unplugged.
+struct Right {
   pipeline::StreamCounters counters;
   pipeline::SourceCounters source;
-  StreamInfo info;
-  info.name = "right";
-  info.comes_and_goes = true;
-  info.counters = &counters;
-  info.source_counters = &source;
-  PublishedStream published(std::move(info));
+  PublishedStream published{info()};
+
+  StreamInfo info() {
+    StreamInfo info;
+    info.name = "right";
+    info.comes_and_goes = true;
+    info.counters = &counters;
+    info.source_counters = &source;
+    return info;
+  }
+};
+
+TEST_CASE("a glove counts as unplugged only after the reader has started") {
+  Right glove;
+  PublishedStream& published = glove.published;
   CHECK_FALSE(published.stats().away());
-  source.link_ns = 7;
+  glove.source.link_ns = 7;
   CHECK(published.stats().away());
   CHECK(published.report(1.0).link_ns() == 7);
-  source.connected = true;
+  glove.source.connected = true;
   CHECK_FALSE(published.stats().away());
 }
 
 TEST_CASE("of a hand that is away no gesture is recognised") {
-  pipeline::StreamCounters counters;
-  pipeline::SourceCounters source;
-  StreamInfo info;
-  info.name = "right";
-  info.comes_and_goes = true;
-  info.counters = &counters;
-  info.source_counters = &source;
-  PublishedStream published(std::move(info));
+  Right glove;
+  auto& [counters, source, published] = glove;
   source.connected = true;
   source.link_ns = 7;
   counters.pipeline.state = pipeline::StreamState::kLive;

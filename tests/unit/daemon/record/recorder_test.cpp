@@ -260,38 +260,48 @@ TEST_CASE("the recorder's thread writes by its own timer and leaves one file") {
   CHECK(again.error().message.find("exists already") != std::string::npos);
 }
 
-TEST_CASE("a log that is deleted or replaced while it is written is reported at once") {
-  const TempFolder dir;
-  const auto path = dir.path() / "a.plog", moved = dir.path() / "moved.plog";
-  RecordRings rings(ring_sizes_of(1, 1 << 16, {.frame_bytes = 0, .decisions = 64}));
+// A source whose chunks are written one a turn.
+struct OneSource {
+  RecordRings rings{ring_sizes_of(1, 1 << 16, {.frame_bytes = 0, .decisions = 64})};
   std::vector<RecorderEvent> events;
-  add_one_body_streams(rings, 1);
-  LogWriterLoop log_writer(rings, make_writer(path, 1), path,
-                           [&](const RecorderEvent& event) { events.push_back(event); });
+  LogWriterLoop log_writer;
   std::int64_t now_ns = 0;
   std::uint64_t sequence = 0;
-  const auto turns = [&](int count) {
+
+  OneSource(const std::filesystem::path& path, log::Writer writer)
+      : log_writer(rings, std::move(writer), path,
+                   [this](const RecorderEvent& event) { events.push_back(event); }) {
+    add_one_body_streams(rings, 1);
+  }
+  void turns(int count) {
     for (int i = 0; i < count; ++i) {
       put_chunk(rings, 0, ++sequence, "1\n");
       log_writer.turn(now_ns += kTurn_ns);
     }
-  };
-  turns(20);
+  }
+};
+
+TEST_CASE("a log that is deleted or replaced while it is written is reported at once") {
+  const TempFolder dir;
+  const auto path = dir.path() / "a.plog", moved = dir.path() / "moved.plog";
+  OneSource recorder(path, make_writer(path, 1));
+  auto& [rings, events, log_writer, now_ns, sequence] = recorder;
+  recorder.turns(20);
   CHECK(rings.state().trouble.empty());
   std::filesystem::rename(path, moved);
   std::string there;
   SECTION("deleted") {}
   SECTION("replaced") { there = dir.write("a.plog", "of somebody else"); }
-  turns(6);
+  recorder.turns(6);
   REQUIRE(events.size() == 1);
   CHECK(events[0].kind == RecorderEvent::Kind::kError);
   CHECK(rings.state().trouble.find("deleted, moved or replaced") != std::string::npos);
-  turns(100);
+  recorder.turns(100);
   CHECK_FALSE(rings.state().trouble.empty());
   CHECK(events.size() == 1);
   if (!there.empty()) CHECK(file_text(there) == "of somebody else");
   std::filesystem::rename(moved, path);  // put back
-  turns(400);
+  recorder.turns(400);
   CHECK(rings.state().trouble.empty());
   REQUIRE(log_writer.finish(now_ns));
   const auto found = sequences(path);
@@ -302,26 +312,15 @@ TEST_CASE("a log that is deleted or replaced while it is written is reported at 
 TEST_CASE("a log that a full disk keeps from beginning begins when there is room") {
   const TempFolder dir;
   const auto path = dir.path() / "a.plog";
-  RecordRings rings(ring_sizes_of(1, 1 << 16, {.frame_bytes = 0, .decisions = 64}));
-  std::vector<RecorderEvent> events;
-  add_one_body_streams(rings, 1);
-  LogWriterLoop log_writer(rings, log::Writer(path, {.sources = {toy_source("s0")}}, false), path,
-                           [&](const RecorderEvent& event) { events.push_back(event); });
-  std::int64_t now_ns = 0;
-  std::uint64_t sequence = 0;
-  const auto turns = [&](int count) {
-    for (int i = 0; i < count; ++i) {
-      put_chunk(rings, 0, ++sequence, "1\n");
-      log_writer.turn(now_ns += kTurn_ns);
-    }
-  };
+  OneSource recorder(path, log::Writer(path, {.sources = {toy_source("s0")}}, false));
+  auto& [rings, events, log_writer, now_ns, sequence] = recorder;
   {
     const FileLimit limit(100);
-    turns(40);
+    recorder.turns(40);
     REQUIRE(events.size() == 1);
     CHECK(events[0].text.find("streaming continues") != std::string::npos);
   }
-  turns(100);
+  recorder.turns(100);
   REQUIRE(log_writer.finish(now_ns));
   const auto found = sequences(path);
   CHECK(found[0].back() == sequence);
