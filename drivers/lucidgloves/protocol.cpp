@@ -82,9 +82,12 @@ std::optional<std::size_t> info_place(std::string_view key) noexcept {
 Outcome store_pair(std::string_view key, int number, int max, Line& line) noexcept {
   if (const auto place = value_place(key)) {
     if (number < 0 || line.has[*place]) return Outcome::kForeign;
-    if (number > max) return Outcome::kOutOfRange;
+    // The firmware takes twice the upper half of the index finger for the trigger, which is a
+    // little more than max where the finger is closed (AlphaEncoding.cpp).
+    const bool over = *place == kTrigger && number <= 2 * max;
+    if (number > max && !over) return Outcome::kOutOfRange;
     line.has[*place] = true;
-    line.value[*place] = number;
+    line.value[*place] = std::min(number, max);
   } else if (const auto button = button_place(key)) {
     if (line.pressed[*button]) return Outcome::kForeign;
     line.pressed[*button] = number != 0;

@@ -8,7 +8,7 @@
 //     (AAB)       one joint of finger A: AAA is its joint 0, AAD its joint 3; a missing joint
 //                 takes its finger's curl
 //     (AB)        splay of finger A: 0, max/2 in the middle, max
-//     F G P       joystick X and Y, analog trigger
+//     F G P       joystick X and Y, analog trigger (a closed finger sends max + 1)
 //     H I J K L M N O   pressed: joystick, trigger, A, B, grab, pinch, menu, calibrate
 //     Z(ZV)5(ZG)0(ZH)1  device info: firmware, kind of device, hand (0 left, 1 right)
 //   legacy   thumb&index&middle&ring&pinky&joyX&joyY&joyClick&trigger&A&B&grab&pinch

@@ -96,6 +96,9 @@ TEST_CASE("lines that real LucidGloves sent are read") {
   CHECK(line.pressed.to_string() == "00110010");  // I, L, M
   REQUIRE(parse("A2816B4037C3596D4095E1115F469G56ILM", line) == Outcome::kOk);
   CHECK(line.value[lucidgloves::kJoyY] == 56);
+  // The firmware's own encoder with the index finger closed: the trigger is one above the range.
+  REQUIRE(parse("A0B4095C0D0E0F2048G2048P4096", line) == Outcome::kOk);
+  CHECK(line.value[lucidgloves::kTrigger] == 4095);
   REQUIRE(parse("511&511&511&511&511&232&164&0&0&0&0&0&0", line, 1023) == Outcome::kOk);
   CHECK(line.value[lucidgloves::kJoyX] == 232);
   CHECK(line.pressed.none());
@@ -126,6 +129,7 @@ TEST_CASE("lines that no glove sends are classified") {
   CHECK(outcome_of("A1B2()5") == Outcome::kForeign);
   CHECK(outcome_of("A1B23329999999999999999999") == Outcome::kOutOfRange);
   CHECK(outcome_of("A1024", 1023) == Outcome::kOutOfRange);
+  CHECK(outcome_of("A1P8191") == Outcome::kOutOfRange);
   CHECK(outcome_of("X5") == Outcome::kShort);
   CHECK(outcome_of("IL") == Outcome::kShort);
   CHECK(outcome_of("1&2&3") == Outcome::kShort);
