@@ -72,7 +72,8 @@ Requests::Requests(bool unicast)
       alive_{.datagram = encode_message(MessageId::kKeepAlive, {}), .wanted = unicast} {}
 
 // A server that says who it is may have restarted, with other bodies.
-RT_SAFE void Requests::accept_server_info() noexcept {
+RT_SAFE void Requests::accept_server_info(const ServerInfo& info) noexcept {
+  if (info.data_port != 0 && !info.multicast) alive_.wanted = true;
   connect_.wanted = false;
   rate_.wanted = true;
   bodies_.wanted = true;
@@ -156,7 +157,7 @@ RT_SAFE Outcome NatNetDecoder::accept_server_info(std::span<const std::byte> pay
   if (said != version_) has_reading_ = false;
   version_ = said;
   clock_hz_ = info.clock_hz;
-  requests_.accept_server_info();
+  requests_.accept_server_info(info);
   return Outcome::kOk;
 }
 

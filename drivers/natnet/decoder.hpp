@@ -56,7 +56,7 @@ class Requests {
 
   // Each of these is called when such a packet of the server has come.
   RT_SAFE void received(std::int64_t arrival_ns) noexcept { received_ns_ = arrival_ns; }
-  void accept_server_info() noexcept;
+  void accept_server_info(const ServerInfo& info) noexcept;
   void accept_rate() noexcept { rate_.wanted = false; }
   void accept_bodies() noexcept { bodies_.wanted = false; }
   void bodies_changed() noexcept { bodies_.wanted = true; }

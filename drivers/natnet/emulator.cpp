@@ -71,7 +71,11 @@ void NatNetEmulator::receive(std::span<const std::byte> bytes, std::int64_t now_
   switch (message.id) {
     case MessageId::kConnect:
     case MessageId::kDiscovery:
-      datagram = encode_server_info({.version = settings_.version, .clock_hz = kEmulatedClock_hz});
+      datagram = encode_server_info({.version = settings_.version,
+                                     .clock_hz = kEmulatedClock_hz,
+                                     .data_port = kDataPort,
+                                     .multicast = !settings_.unicast,
+                                     .group = kGroup});
       break;
     case MessageId::kRequestModelDef:
       datagram = encode_model_def(model(), settings_.version);

@@ -64,6 +64,24 @@ void write_channel(ByteWriter& writer) {
   writer.f32(1.5F);
 }
 
+// An asset (from 4.1: a trained marker set) with one bone and one marker, as the vendor's Python
+// client of NatNet SDK 4.1 reads it. posed skips assets, other clients do not.
+void write_asset(ByteWriter& writer) {
+  writer.i32(7);  // its id
+  writer.i32(1);  // bones: id, place, rotation, mean error, tracked
+  writer.i32(1);
+  write_vector(writer, {1.0F, 1.0F, 1.0F});
+  for (const float x : kIdentity) writer.f32(x);
+  writer.f32(0.0005F);
+  writer.i16(1);
+  writer.i32(1);  // markers: id, place, size, flags, residual
+  writer.i32(1);
+  write_vector(writer, {1.0F, 1.0F, 1.0F});
+  writer.f32(0.014F);
+  writer.i16(0xa);
+  writer.f32(0.0002F);
+}
+
 void write_parts(ByteWriter& writer, const FramePacket& frame, const Reading& reading) {
   const Version version = reading.version;
   write_part(writer, version, 1, [](ByteWriter& to) {
@@ -82,8 +100,7 @@ void write_parts(ByteWriter& writer, const FramePacket& frame, const Reading& re
       for (const RigidBody& bone : skeleton.bones) write_rigid_body(to, bone, reading, true);
     }
   });
-  // An asset; how it looks does not matter, because it is skipped.
-  if (version >= Version{4, 1}) write_part(writer, version, 1, [](ByteWriter& to) { to.u64(7); });
+  if (version >= Version{4, 1}) write_part(writer, version, 1, write_asset);
   write_part(writer, version, count_of(frame.labelled), [&](ByteWriter& to) {
     for (const LabelledMarker& marker : frame.labelled) write_labelled(to, marker, version);
   });

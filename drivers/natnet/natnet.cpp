@@ -35,6 +35,16 @@ Result<Address> server_of(const Options& options) {
       "192.168.1.20, or with its command port, 192.168.1.20:1510");
 }
 
+RT_SAFE std::optional<DataPlace> data_place(std::span<const std::byte> datagram) noexcept {
+  Message message;
+  ServerInfo info;
+  const bool says = decode_message(datagram, message) == Outcome::kOk &&
+                    message.id == MessageId::kServerInfo &&
+                    decode_server_info(message.payload, info) && info.data_port != 0;
+  if (!says) return std::nullopt;
+  return DataPlace{.group = info.multicast ? info.group : 0, .port = info.data_port};
+}
+
 // The command socket and the data socket. Only the server may send to them.
 Result<UdpSettings> sockets_of(const Options& options) {
   const auto server = TRY(server_of(options));
@@ -47,6 +57,7 @@ Result<UdpSettings> sockets_of(const Options& options) {
   }
   UdpSettings settings{
       .sockets = {{.listen = command_listen, .to = endpoint_text(server)}, {.listen = listen}},
+      .data_place = data_place,
       .interface = option<std::string>(options, "interface"),
       .peers = {host_text(server)}};
   if (here && settings.interface.empty()) settings.interface = host_text(server);
@@ -70,7 +81,7 @@ std::vector<OptionSpec> options() {
        .help = "address and port for the server's answers; left out: any port"},
       {.name = "group",
        .default_value = std::string("239.255.42.99"),
-       .help = "multicast group of the frames; empty: none"},
+       .help = "multicast group of the frames, until the server names its own; empty: none"},
       {.name = "interface",
        .default_value = std::string(),
        .help = "network interface of the group, by name or address; left out: the system's "

@@ -62,6 +62,10 @@ RT_SAFE bool decode_server_info(std::span<const std::byte> payload, ServerInfo& 
   static_cast<void>(reader.u16());
   if (!reader.ok()) return false;
   info.clock_hz = reader.u64();
+  info.data_port = reader.u16();
+  info.multicast = reader.u8() != 0;
+  for (int i = 0; i < 4; ++i) info.group = info.group << 8 | reader.u8();
+  if (!reader.ok()) info.data_port = 0;
   return true;
 }
 
@@ -114,9 +118,11 @@ std::vector<std::byte> encode_server_info(const ServerInfo& info) {
   write_program(writer, kServerName, info.version);
   if (info.version >= Version{3, 0}) {
     writer.u64(info.clock_hz);
-    writer.u16(1511);
-    writer.u8(1);
-    for (const int part : {239, 255, 42, 99}) writer.u8(static_cast<std::uint8_t>(part));
+    writer.u16(info.data_port);
+    writer.u8(info.multicast ? 1 : 0);
+    for (const int shift : {24, 16, 8, 0}) {
+      writer.u8(static_cast<std::uint8_t>(info.group >> shift & 0xFFU));
+    }
   }
   return encode_message(MessageId::kServerInfo, writer.finish());
 }

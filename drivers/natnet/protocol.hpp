@@ -86,7 +86,13 @@ RT_SAFE [[nodiscard]] Outcome decode_message(std::span<const std::byte> bytes,
 struct ServerInfo {
   Version version;
   std::uint64_t clock_hz = 0;  // of its ticks; 0 before 3.0
+  // Where it sends its frames, from 3.0 on; port 0: it does not say.
+  std::uint16_t data_port = 0;
+  bool multicast = true;
+  std::uint32_t group = 0;  // the first number in the highest byte
 };
+inline constexpr std::uint16_t kDataPort = 1511;
+inline constexpr std::uint32_t kGroup = 0xEFFF2A63;  // 239.255.42.99
 
 // False when the payload is too short.
 RT_SAFE [[nodiscard]] bool decode_server_info(std::span<const std::byte> payload,

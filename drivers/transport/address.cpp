@@ -67,6 +67,16 @@ RT_SAFE bool is_loopback(const Host& host) noexcept {
   return is_v4(host) ? host[kMappedBytes] == 127 : host == kLoopback6;
 }
 
+Address ipv4_address(std::uint32_t numbers) noexcept {
+  sockaddr_in v4{};
+  v4.sin_family = AF_INET;
+  v4.sin_addr.s_addr = htonl(numbers);
+  Address address;
+  std::memcpy(&address.storage, &v4, sizeof v4);
+  address.size = sizeof v4;
+  return address;
+}
+
 bool is_multicast(const Host& host) noexcept {
   return is_v4(host) ? host[kMappedBytes] >> 4 == 14 : host[0] == 0xFF;
 }

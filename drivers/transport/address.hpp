@@ -44,6 +44,9 @@ RT_SAFE [[nodiscard]] bool is_loopback(const Host& host) noexcept;
 [[nodiscard]] std::string endpoint_text(
     const Address& address);  // "192.168.1.20:1511", "[::1]:1511"
 
+// The IPv4 address with the first number in the highest byte; the port is 0.
+[[nodiscard]] Address ipv4_address(std::uint32_t numbers) noexcept;
+
 // Parses "127.0.0.1:5200" or "[::1]:5200". Cold.
 Result<Address> parse_endpoint(const std::string& endpoint);
 

@@ -85,6 +85,12 @@ Result<Membership> Membership::join(int fd, const Address& group, const std::str
   return joined;
 }
 
+void Membership::change_to(int fd, const Address& group) noexcept {
+  static_cast<void>(change(fd, group_, index_, false));
+  group_ = group;
+  static_cast<void>(change(fd, group_, index_, true));
+}
+
 void Membership::renew(int fd) noexcept {
   const unsigned now = name_[0] == '\0' ? 0 : ::if_nametoindex(name_.data());
   if (name_[0] != '\0' && now == 0) return;

@@ -22,6 +22,10 @@ class Membership {
   // the socket meanwhile. Cold.
   void renew(int fd) noexcept;
 
+  // Leaves, and joins this group on the same interface. Cold.
+  void change_to(int fd, const Address& group) noexcept;
+  [[nodiscard]] const Address& group() const noexcept { return group_; }
+
  private:
   Address group_;
   std::array<char, IF_NAMESIZE> name_{};  // of the interface; empty: the system's choice

@@ -142,6 +142,7 @@ UdpTransport::~UdpTransport() {
 Result<std::unique_ptr<UdpTransport>> UdpTransport::open(const UdpSettings& settings) {
   TRY(check_udp(settings));
   std::unique_ptr<UdpTransport> self(new UdpTransport());
+  self->data_place_ = settings.data_place;
   for (const std::string& peer : settings.peers) self->peers_.push_back(host_of(*parse_host(peer)));
   self->epoll_ = ::epoll_create1(EPOLL_CLOEXEC);
   if (self->epoll_ < 0) {
@@ -227,10 +228,30 @@ Result<> UdpTransport::start(std::int64_t now_ns) {
 }
 
 void UdpTransport::upkeep(std::int64_t now_ns) noexcept {
+  if (const DataPlace said = said_.load(); said != followed_) follow(said);
   if (now_ns < std::max(joined_ns_, group_received_ns_.load()) + kRejoin_ns) return;
   joined_ns_ = now_ns;
   for (Socket& socket : sockets_) {
     if (socket.membership) socket.membership->renew(socket.fd);
+  }
+}
+
+void UdpTransport::follow(const DataPlace& said) {
+  followed_ = said;
+  const Address group = ipv4_address(said.group);
+  for (Socket& socket : sockets_) {
+    if (!socket.membership) continue;
+    const Address bound = bound_address(socket.fd);
+    if (port_of(bound) != said.port) {
+      note_ = "the device sends to port " + std::to_string(said.port) + ", but posed listens on " +
+              endpoint_text(bound) + "; give the other port in \"listen\"";
+    }
+    const bool is_joined = host_of(group) == host_of(socket.membership->group());
+    if (is_joined || !is_multicast(host_of(group))) continue;
+    socket.membership->change_to(socket.fd, group);
+    if (note_.empty()) {
+      note_ = "the device sends to the group " + host_text(group) + ", which is joined now";
+    }
   }
 }
 
@@ -270,6 +291,7 @@ RT_SAFE void UdpTransport::decoded(bool used) noexcept {
 }
 
 std::string UdpTransport::consume_note() {
+  if (!note_.empty()) return std::exchange(note_, {});
   if (second_sender_.load() != SecondSender::kSeen) return {};
   second_sender_.store(SecondSender::kTold);
   return "two programs on one computer send to this port: the first is heard until it is silent for"
@@ -306,6 +328,9 @@ Chunk UdpTransport::read(std::int64_t now_ns) noexcept {
     chunk.bytes = std::span(batch_->bytes[i]).first(message.msg_len);
     chunk.socket = static_cast<std::uint8_t>(socket_);
     chunk.sender = number_of(sender);
+    if (socket_ == 0 && data_place_ != nullptr) {
+      if (const auto said = data_place_(chunk.bytes)) said_.store(*said);
+    }
     break;
   }
   return chunk;

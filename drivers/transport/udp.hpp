@@ -31,8 +31,19 @@ struct UdpSocketSettings {
   std::string to{};      // where send() goes; empty: to the last sender
 };
 
+// Where a device says that it sends its data: an IPv4 group with the first number in the highest
+// byte (0: to one address only), and a port.
+struct DataPlace {
+  std::uint32_t group = 0;
+  std::uint32_t port = 0;
+  bool operator==(const DataPlace&) const = default;
+};
+
 struct UdpSettings {
   std::vector<UdpSocketSettings> sockets{};  // [Chunk::socket]
+  // Reads it from a datagram to socket 0; nullopt: it says nothing of it. RT-safe. Null: none does.
+  // The other sockets then join that group instead of their own.
+  std::optional<DataPlace> (*data_place)(std::span<const std::byte> datagram) noexcept = nullptr;
   // On which the groups are joined: its name or one of its addresses; empty: the system's choice.
   std::string interface{};
   std::vector<std::string> peers{};  // addresses that may send; empty: loopback only
@@ -61,6 +72,7 @@ class UdpTransport final : public Transport, public Upkeep {
   // Who has sent nothing of use yet loses the socket to the next one.
   RT_SAFE void decoded(bool used) noexcept override;
   // While nothing comes of a group, joins it again every two seconds.
+  // Joins the group that the device names.
   void upkeep(std::int64_t now_ns) noexcept override;
   [[nodiscard]] std::string consume_note() override;
   using Transport::send;
@@ -83,6 +95,7 @@ class UdpTransport final : public Transport, public Upkeep {
 
   UdpTransport();
   Result<> add(const UdpSocketSettings& settings, const UdpSettings& all);
+  void follow(const DataPlace& said);
   // Fills the batch from the next socket that has datagrams; false when none has.
   [[nodiscard]] bool receive(std::int64_t now_ns) noexcept;
   [[nodiscard]] bool may_send(const Host& host) const noexcept;
@@ -103,6 +116,10 @@ class UdpTransport final : public Transport, public Upkeep {
   enum class SecondSender : std::uint8_t { kNone, kSeen, kTold };
   std::atomic<SecondSender> second_sender_{SecondSender::kNone};
   std::int64_t joined_ns_ = kNoTime_ns;  // of upkeep: when the groups were last joined
+  decltype(UdpSettings::data_place) data_place_ = nullptr;
+  std::atomic<DataPlace> said_{};  // by the device
+  DataPlace followed_{};           // of upkeep
+  std::string note_{};             // the same: for consume_note()
 };
 
 }  // namespace posed::drivers

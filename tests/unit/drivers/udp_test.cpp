@@ -378,6 +378,46 @@ TEST_CASE("a multicast group is received on the chosen interface") {
   }
 }
 
+TEST_CASE("the group that a device names is joined instead, and a wrong port is said") {
+  const UdpSettings settings{
+      .sockets = {{.listen = "127.0.0.1:0"}, {.listen = "0.0.0.0:0", .group = "239.255.42.99"}},
+      .data_place = [](std::span<const std::byte> bytes) noexcept -> std::optional<DataPlace> {
+        if (text_of(bytes).size() != 2) return std::nullopt;
+        const auto number = [&](std::size_t i) { return std::to_integer<std::uint32_t>(bytes[i]); };
+        return DataPlace{.group = 0xEFFF2A00U | number(0), .port = number(1)};
+      },
+      .interface = "lo",
+      .peers = {"127.0.0.1"}};
+  const auto opened = UdpTransport::open(settings);
+  if (!opened) {
+    WARN("SKIPPED: no multicast on loopback here: " + opened.error().text());
+    return;
+  }
+  UdpTransport& transport = **opened;
+  const Peer peer("127.0.0.1:0");
+  const in_addr loopback{.s_addr = htonl(INADDR_LOOPBACK)};
+  REQUIRE(::setsockopt(peer.fd(), IPPROTO_IP, IP_MULTICAST_IF, &loopback, sizeof loopback) == 0);
+  const std::string endpoint = transport.endpoint(1);
+  const std::string port = endpoint.substr(endpoint.rfind(':'));
+  REQUIRE(peer.send(transport.endpoint(0), "what is this?"));
+  CHECK(next(transport) == "what is this?");
+  transport.upkeep(0);
+  CHECK(transport.consume_note().empty());
+  REQUIRE(peer.send(transport.endpoint(0), "b!"));
+  CHECK(next(transport) == "b!");
+  transport.upkeep(0);
+  CHECK(transport.consume_note().find("sends to port 33, but posed listens on") !=
+        std::string::npos);
+  CHECK(transport.consume_note().empty());
+  if (!peer.send("239.255.42.98" + port, "to all")) {
+    WARN("SKIPPED: this machine does not send multicast on loopback");
+    return;
+  }
+  CHECK(next(transport) == "to all");
+  REQUIRE(peer.send("239.255.42.99" + port, "the group of before"));
+  CHECK(next(transport) == "nothing");
+}
+
 TEST_CASE("settings that open posed to the network or make no sense are refused") {
   check_refused({}, "name an address to listen on");
   check_refused({.sockets = {{.listen = "0.0.0.0:0"}}}, "name the senders' addresses in peers");
