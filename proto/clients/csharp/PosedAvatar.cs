@@ -76,7 +76,7 @@ namespace Posed {
         }
 
         // VRM's names are Unity's with a small first letter, but for the thumbs and the little fingers' "Little".
-        private static int BoneNamed(string vrm) {
+        internal static int BoneNamed(string vrm) {
             if (vrm.Length == 0) return -1;
             string name = char.ToUpperInvariant(vrm[0]) + vrm.Substring(1);
             bool thumb = name.Contains("Thumb");

@@ -42,9 +42,9 @@ public static class Watch
             avatar.Apply(frame, skeleton);
             foreach (string bone in skeleton.Bones)
             {
-                if (bone.Length == 0) continue;
-                string name = char.ToUpperInvariant(bone[0]) + bone.Substring(1);
-                Quaternion q = avatar.animator.bones[(int)Enum.Parse(typeof(HumanBodyBones), name)].rotation;
+                int place = PosedAvatar.BoneNamed(bone);
+                if (place < 0) continue;
+                Quaternion q = avatar.animator.bones[place].rotation;
                 Console.WriteLine("{0} {1:R} {2:R} {3:R} {4:R}", bone, q.x, q.y, q.z, q.w);
             }
             Vector3 hips = avatar.animator.bones[(int)HumanBodyBones.Hips].position;
