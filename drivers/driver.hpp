@@ -104,6 +104,7 @@ struct Body {
   std::shared_ptr<const Skeleton> skeleton;  // null for a body with samples only
   SampleLayout samples{};
   double rate_hz = 0.0;  // nominal; 0 when unknown
+  std::string remark{};  // what people should know about it, for the log; may be empty
 };
 
 // The bodies of a source, compiled from the device's description. A driver derives from it to add

@@ -224,6 +224,7 @@ void Streams::add(devices::NewStream stream) {
                          .source_counters = &source.counters,
                          .source = source_name,
                          .body = stream.body.name,
+                         .remark = stream.body.remark,
                          .refusal = stream.refusal});
   if (!stream.engine) return;
   if (!stream.stages.remark.empty()) {

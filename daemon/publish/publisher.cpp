@@ -285,7 +285,8 @@ void Publisher::announce_new() {
     connect_outputs(published);
     if (info.source.empty()) return;
     send_event(published, v1::Event::KIND_FOUND, options_.data_clock(), 0,
-               body_words(info.source, info.body) + " has come");
+               body_words(info.source, info.body) + " has come" +
+                   (info.remark.empty() ? "" : ": " + info.remark));
   });
 }
 

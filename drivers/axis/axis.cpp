@@ -16,6 +16,7 @@ constexpr std::string_view kName = "axis";
 constexpr std::string_view kConnect = "127.0.0.1:7001";
 constexpr std::string_view kListen = "127.0.0.1:7002";
 constexpr std::array<std::string_view, 2> kLinks{"tcp", "udp"};
+constexpr std::array<std::string_view, 3> kFigures{"auto", kFigureNames[0], kFigureNames[1]};
 constexpr double kEmulatedRate_hz = 60.0;
 constexpr double kMinRate_hz = 1.0;
 constexpr double kMaxSplit = 64 * 1024;
@@ -28,7 +29,16 @@ bool is_rate(double rate_hz) {
 std::string device_info_of(const StreamSettings& settings) {
   return std::string(kName) + " link=" + std::string(kLinks[settings.datagrams ? 1 : 0]) +
          " order=" + std::string(kOrderNames[settings.order]) +
-         " rate=" + clip::number_text(settings.rate_hz);
+         " rate=" + clip::number_text(settings.rate_hz) +
+         (settings.figure
+              ? " figure=" + std::string(kFigureNames[static_cast<std::size_t>(*settings.figure)])
+              : "");
+}
+
+// "auto" is none.
+std::optional<Figure> figure_named(std::size_t index) {
+  if (index == 0) return std::nullopt;
+  return static_cast<Figure>(index - 1);
 }
 
 Result<StreamSettings> read_device_info(const std::string& text, const std::string& identity) {
@@ -37,6 +47,8 @@ Result<StreamSettings> read_device_info(const std::string& text, const std::stri
   settings.datagrams = reader.choice("link", kLinks) == 1;
   settings.order = static_cast<std::uint8_t>(reader.choice("order", kOrderNames));
   const auto rate_hz = clip::parse_number(reader.word("rate"));
+  if (text.contains(" figure="))
+    settings.figure = figure_named(1 + reader.choice("figure", kFigureNames));
   TRY(reader.finish());
   if (!rate_hz || !is_rate(*rate_hz)) {
     return fail("the device info of 'axis' has a rate that cannot be; the log is damaged",
@@ -63,6 +75,11 @@ std::vector<OptionSpec> all_options() {
                    .default_value = std::string(kOrderNames[0]),
                    .help = "order of rotations that is set in the application",
                    .words = kOrderNames});
+  specs.push_back({.name = "figure",
+                   .default_value = std::string(kFigures[0]),
+                   .help = "whose bones the stream has: pro of Axis Neuron, studio of Axis Studio; "
+                           "auto: by their lengths",
+                   .words = kFigures});
   specs.push_back({.name = "rate_hz",
                    .default_value = 0.0,
                    .help = "frames a second that the application sends, so that its frame numbers "
@@ -104,7 +121,8 @@ struct AxisSource : SourceType<AxisSource> {
     return Settings{
         .order = static_cast<std::uint8_t>(choice_option(options, "order", kOrderNames)),
         .datagrams = option<std::string>(options, "link") == "udp",
-        .rate_hz = rate_hz};
+        .rate_hz = rate_hz,
+        .figure = figure_named(choice_option(options, "figure", kFigures))};
   }
   static Result<std::string> check(const Options& options, const Settings& /*settings*/) {
     TRY(check_network(options));
@@ -122,7 +140,8 @@ struct AxisSource : SourceType<AxisSource> {
                     .reference = option<bool>(options, "reference")},
         .order = settings.order,
         .rate_hz = settings.rate_hz > 0.0 ? settings.rate_hz : kEmulatedRate_hz,
-        .split_bytes = static_cast<std::size_t>(option<std::int64_t>(options, "split_bytes"))});
+        .split_bytes = static_cast<std::size_t>(option<std::int64_t>(options, "split_bytes")),
+        .figure = settings.figure});
   }
 };
 

@@ -15,7 +15,8 @@ struct Row {
   Vec3f end_cm{};
 };
 
-constexpr int kTopOfTrunk = 10;  // Spine3, which carries neck and shoulders
+constexpr int kTopOfTrunk =
+    10;  // Spine3, which carries neck and shoulders; in Axis Studio 9, Spine2
 constexpr Vec3f kFootEnd_cm{0, -8, 18};
 
 constexpr std::array<Row, 13> kBody{{{"", "Hips", -1, {0, 96, 0}},
@@ -82,6 +83,18 @@ constexpr Proportions kProportions = [] {
   return all;
 }();
 
+// The same person: shoulders, base of the neck and head are where they are in the other figure.
+constexpr Proportions kStudioProportions = [] {
+  Proportions all = kProportions;
+  const float trunk_cm = all[kTopOfTrunk][1], neck_cm = all[kTopOfTrunk + 2][1];
+  for (std::size_t b = kTopOfTrunk + 1; b < kBones; ++b) {
+    if (kRows[b].parent == kTopOfTrunk) all[b][1] += trunk_cm;
+  }
+  all[kTopOfTrunk] = all[kTopOfTrunk + 1];
+  all[kTopOfTrunk + 1] = all[kTopOfTrunk + 2] = {0, neck_cm / 2, 0};
+  return all;
+}();
+
 // The axis along which a bone points in T-pose; 3 for other bones.
 RT_SAFE std::size_t axis_of(const Vec3f& offset) noexcept {
   std::size_t found = 3;
@@ -95,15 +108,31 @@ RT_SAFE std::size_t axis_of(const Vec3f& offset) noexcept {
 
 }  // namespace
 
-std::string bone_name(std::size_t bone) {
+std::string bone_name(std::size_t bone, Figure figure) {
+  if (figure == Figure::kStudio && bone == kTopOfTrunk) return "Neck";
+  if (figure == Figure::kStudio && bone == kTopOfTrunk + 1) return "Neck1";
   return std::string(kRows[bone].side) + std::string(kRows[bone].name);
 }
 
-int bone_parent(std::size_t bone) noexcept { return kRows[bone].parent; }
+int bone_parent(std::size_t bone, Figure figure) noexcept {
+  const int parent = kRows[bone].parent;
+  const bool on_trunk = figure == Figure::kStudio && parent == kTopOfTrunk;
+  return on_trunk && bone != kTopOfTrunk + 1 ? parent - 1 : parent;
+}
 
 Vec3f bone_end_cm(std::size_t bone) noexcept { return kRows[bone].end_cm; }
 
-const Proportions& default_proportions() noexcept { return kProportions; }
+const Proportions& default_proportions(Figure figure) noexcept {
+  return figure == Figure::kStudio ? kStudioProportions : kProportions;
+}
+
+// On the vendor's own files ("PN Pro.bvh", "PNS.bvh") 10 and 19 cm.
+Figure figure_with(const Proportions& offset_cm) noexcept {
+  constexpr float kNeck_cm = 13.0F;
+  const Vec3f& offset = offset_cm[kTopOfTrunk];
+  const float length_cm = std::hypot(offset[0], offset[1], offset[2]);
+  return length_cm > kNeck_cm ? Figure::kStudio : Figure::kPro;
+}
 
 RT_SAFE Vec3f offset_from(std::size_t bone, const Vec3f& displacement_cm) noexcept {
   constexpr float kNear = 0.966F;  // cosine of 15 degrees; the shifts turn a bone by less than 5

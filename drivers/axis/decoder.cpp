@@ -40,6 +40,15 @@ std::string body_name(const Avatar& avatar, const std::vector<Body>& bodies) {
   return name;
 }
 
+std::string remark_about(const AvatarEntry& entry) {
+  const bool is_studio = figure_of(entry) == Figure::kStudio;
+  const std::string figure = is_studio ? "the figure of Axis Studio" : "the figure of Axis Neuron";
+  if (entry.figure) return figure;
+  return figure + (entry.measured ? ", by the length of its bones"
+                                  : ", because the stream has no displacement; is it Axis Studio? "
+                                    "then give figure = \"studio\"");
+}
+
 }  // namespace
 
 Result<std::shared_ptr<const Skeleton>> skeleton_of(const AvatarEntry& entry, std::uint8_t order) {
@@ -51,10 +60,11 @@ Result<std::shared_ptr<const Skeleton>> skeleton_of(const AvatarEntry& entry, st
     add_channels(*skeleton, true, order);
   }
   skeleton->root_joint = above;
+  const Figure figure = figure_of(entry);
   for (std::size_t b = 0; b < kBones; ++b) {
     Joint& joint = skeleton->joints.emplace_back();
-    joint.name = bone_name(b);
-    joint.parent = b == kHips ? above - 1 : bone_parent(b) + above;
+    joint.name = bone_name(b, figure);
+    joint.parent = b == kHips ? above - 1 : bone_parent(b, figure) + above;
     joint.offset_m = metres(entry.offset_cm[b]);
     if (const Vec3f end_cm = bone_end_cm(b); end_cm != Vec3f{}) joint.end_site_m = metres(end_cm);
     add_channels(*skeleton, b == kHips, order);
@@ -72,8 +82,9 @@ Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byt
   auto layout = std::make_unique<AxisLayout>();
   for (const AvatarEntry& entry : list.avatars) {
     auto skeleton = TRY(skeleton_of(entry, list.order));
-    layout->bodies.push_back(
-        {.name = body_name(entry.avatar, layout->bodies), .skeleton = std::move(skeleton)});
+    layout->bodies.push_back({.name = body_name(entry.avatar, layout->bodies),
+                              .skeleton = std::move(skeleton),
+                              .remark = remark_about(entry)});
     layout->known.push_back({.avatar = entry.avatar, .reference = entry.reference});
   }
   return layout;

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -39,15 +40,16 @@ Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byt
 
 // The settings that only the options say, because the streams do not.
 struct StreamSettings {
-  std::uint8_t order = 0;  // of the rotations, an index of kOrderNames
-  bool datagrams = false;  // over UDP, where messages come late or twice
-  double rate_hz = 0.0;    // of the frame numbers; 0: unknown
+  std::uint8_t order = 0;          // of the rotations, an index of kOrderNames
+  bool datagrams = false;          // over UDP, where messages come late or twice
+  double rate_hz = 0.0;            // of the frame numbers; 0: unknown
+  std::optional<Figure> figure{};  // nullopt: as the lengths of the bones say
 };
 
 class AxisDecoder final : public Decoder, private Messages {
  public:
   explicit AxisDecoder(const StreamSettings& settings) noexcept
-      : settings_(settings), roster_(settings.order) {}
+      : settings_(settings), roster_(settings.order, settings.figure) {}
 
   // Takes bytes cut at any position.
   RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,

@@ -11,6 +11,8 @@ namespace {
 
 constexpr unsigned kReference = 1;
 constexpr unsigned kMeasured = 2;
+constexpr unsigned kPro = 4;
+constexpr unsigned kStudio = 8;
 constexpr float kMetre_cm = 100.0F;
 
 std::unexpected<Error> wrong(const std::string& what) {
@@ -26,20 +28,36 @@ Result<AvatarEntry> read_entry(ByteReader& reader) {
   entry.reference = (flags & kReference) != 0;
   entry.measured = (flags & kMeasured) != 0;
   if (!reader.ok()) return wrong("ends too early");
-  if (number > kMaxAvatar || (flags & ~(kReference | kMeasured)) != 0) {
+  const bool two_figures = (flags & kPro) != 0 && (flags & kStudio) != 0;
+  if (number > kMaxAvatar || two_figures || flags > (kReference | kMeasured | kPro | kStudio)) {
     return wrong("has an avatar that cannot be");
   }
+  if ((flags & kPro) != 0) entry.figure = Figure::kPro;
+  if ((flags & kStudio) != 0) entry.figure = Figure::kStudio;
+  entry.offset_cm = default_proportions(figure_of(entry));
   for (std::size_t b = 1; b < kBones && entry.measured; ++b) {
     for (float& x_cm : entry.offset_cm[b]) x_cm = reader.f32();
     Vec3f offset_m = entry.offset_cm[b];
     for (float& x : offset_m) x /= kMetre_cm;
-    if (!is_plausible(offset_m)) return wrong("puts bone " + bone_name(b) + " out of the room");
+    if (!is_plausible(offset_m))
+      return wrong("puts bone " + bone_name(b, figure_of(entry)) + " out of the room");
   }
   if (!reader.ok()) return wrong("ends too early");
   return entry;
 }
 
+RT_SAFE unsigned flags_of(const AvatarEntry& entry) noexcept {
+  unsigned flags = (entry.reference ? kReference : 0) | (entry.measured ? kMeasured : 0);
+  if (entry.figure) flags |= *entry.figure == Figure::kStudio ? kStudio : kPro;
+  return flags;
+}
+
 }  // namespace
+
+Figure figure_of(const AvatarEntry& entry) noexcept {
+  if (entry.figure) return *entry.figure;
+  return entry.measured ? figure_with(entry.offset_cm) : Figure::kPro;
+}
 
 RT_SAFE std::size_t write_list_head(std::uint8_t order, std::size_t avatars,
                                     std::span<std::byte> out) noexcept {
@@ -52,7 +70,7 @@ RT_SAFE std::size_t write_list_head(std::uint8_t order, std::size_t avatars,
 RT_SAFE std::size_t write_entry(const AvatarEntry& entry, std::span<std::byte> out) noexcept {
   Packer packer(out);
   packer.number(entry.avatar.number, 4);
-  packer.number((entry.reference ? kReference : 0) | (entry.measured ? kMeasured : 0), 1);
+  packer.number(flags_of(entry), 1);
   packer.text(entry.avatar.name);
   for (std::size_t b = 1; b < kBones && entry.measured; ++b) {
     for (const float x_cm : entry.offset_cm[b]) packer.f32(x_cm);

@@ -8,7 +8,8 @@
 //                               |
 //                               +--------------+------------+-----------+-------------------------+
 //    order     of the rotations, an index of kOrderNames
-//    flags     1: the values begin with a reference; 2: the offsets are there
+//    flags     1: the values begin with a reference; 2: the offsets are there; 4, 8: the options
+//              say that the figure is Axis Neuron's, Axis Studio's
 //    name      zeros fill it
 //    offsets   3 x f32 [cm]
 #pragma once
@@ -16,6 +17,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -35,8 +37,12 @@ struct AvatarEntry {
   Avatar avatar;
   bool reference = false;
   bool measured = false;  // the stream carries displacement; otherwise the default proportions
+  std::optional<Figure> figure{};  // that the options say
   Proportions offset_cm = default_proportions();
 };
+
+// What the options say; otherwise by measured offsets; otherwise Axis Neuron's.
+[[nodiscard]] Figure figure_of(const AvatarEntry& entry) noexcept;
 
 struct AvatarList {
   std::uint8_t order = 0;

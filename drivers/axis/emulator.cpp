@@ -55,6 +55,7 @@ AxisEmulator::AxisEmulator(const EmulatorSettings& settings)
         make_avatar(static_cast<std::uint32_t>(body), body == 0 ? "Walker" : "Waver");
     person.entry.reference = settings.content.reference;
     person.entry.measured = settings.content.displacement;
+    person.entry.figure = settings.figure;
     person.message.avatar = person.entry.avatar;
     person.message.content = settings.content;
     person.rotation_xyzw.fill(kIdentity);
@@ -63,7 +64,10 @@ AxisEmulator::AxisEmulator(const EmulatorSettings& settings)
     const AvatarEntry as_sent =
         person.entry.measured
             ? person.entry
-            : AvatarEntry{.avatar = person.entry.avatar, .reference = person.entry.reference};
+            : AvatarEntry{.avatar = person.entry.avatar,
+                          .reference = person.entry.reference,
+                          .figure = settings.figure,
+                          .offset_cm = default_proportions(figure_of(person.entry))};
     person.skeleton = skeleton_of(as_sent, settings.order).value();
   }
   frames_.start(0);
@@ -71,7 +75,7 @@ AxisEmulator::AxisEmulator(const EmulatorSettings& settings)
 
 void AxisEmulator::set_scale(std::size_t body, float scale) {
   Person& person = people_[body];
-  person.entry.offset_cm = default_proportions();
+  person.entry.offset_cm = default_proportions(settings_.figure.value_or(Figure::kPro));
   for (Vec3f& offset : person.entry.offset_cm) {
     for (float& x_cm : offset) x_cm *= scale;
   }

@@ -22,6 +22,7 @@ struct EmulatorSettings {
   // 0: a record holds the messages of both avatars, as over TCP. Otherwise a record is a datagram:
   // one message, or a piece of it with at most so many bytes.
   std::size_t split_bytes = 0;
+  std::optional<Figure> figure{};  // nullopt: Axis Neuron's
 };
 
 class AxisEmulator final : public Emulator {

@@ -48,6 +48,7 @@ RT_SAFE Present* Roster::find(const Avatar& avatar) noexcept {
   if (free == nullptr) return nullptr;
   *free = {};
   free->entry.avatar = avatar;
+  free->entry.figure = figure_;
   free->first_tick = newest_tick_;
   free->used = changed_ = true;
   return free;

@@ -31,8 +31,9 @@ struct Present {
 
 class Roster {
  public:
-  // `order` of the rotations, an index of kOrderNames.
-  explicit Roster(std::uint8_t order) noexcept : order_(order) {}
+  // `order` of the rotations, an index of kOrderNames; `figure` that the options say.
+  Roster(std::uint8_t order, std::optional<Figure> figure) noexcept
+      : order_(order), figure_(figure) {}
 
   // The place of an avatar, a new one if needed; null when all are taken.
   RT_SAFE [[nodiscard]] Present* find(const Avatar& avatar) noexcept;
@@ -50,6 +51,7 @@ class Roster {
   void forget_gone(std::int64_t now_ns) noexcept;
 
   std::uint8_t order_;
+  std::optional<Figure> figure_;
   std::array<Present, kMaxBodies> all_;
   std::int64_t newest_tick_ = 0;  // of all avatars
   bool changed_ = false;

@@ -200,6 +200,31 @@ TEST_CASE("an Axis stream without displacement gives the same rotations and defa
   }
 }
 
+TEST_CASE("the figure of Axis Studio has a longer neck, told by its bones or by the options") {
+  const std::string said = GENERATE("auto", "pro", "studio");
+  const bool displacement = GENERATE(true, false);
+  INFO(said << (displacement ? ", displacement" : ""));
+  axis::AxisEmulator emulator({.content = {.displacement = displacement, .reference = false},
+                               .figure = axis::Figure::kStudio});
+  AxisRig rig({{"figure", said}});
+  for (int i = 0; i < 3; ++i) rig.step(emulator);
+  REQUIRE_FALSE(rig.layouts.empty());
+  const Body& walker = rig.layouts[0]->bodies[0];
+  const Skeleton& skeleton = *walker.skeleton;
+  const bool studio = said == "studio" || (said == "auto" && displacement);
+  CHECK(skeleton.joints[10].name == (studio ? "Neck" : "Spine3"));
+  CHECK(skeleton.joint_of(Bone::kNeck) == (studio ? 10 : 11));
+  const int shoulder = skeleton.joint_of(Bone::kLeftShoulder);
+  CHECK(skeleton.joints[static_cast<std::size_t>(shoulder)].parent == (studio ? 9 : 10));
+  CHECK(walker.remark.contains(studio ? "of Axis Studio" : "of Axis Neuron"));
+  if (said == "pro" && displacement) return;  // a wrong word of the user's
+  double above_hips_m = 0.0;
+  for (int j = shoulder; j > skeleton.root_joint; j = skeleton.joints[std::size_t(j)].parent) {
+    above_hips_m += skeleton.joints[std::size_t(j)].offset_m.y();
+  }
+  CHECK(above_hips_m == Approx(0.47));
+}
+
 TEST_CASE("Axis avatars come, go and change their proportions, each described in time") {
   AxisEmulator emulator({.rate_hz = 100.0});
   AxisRig rig;

@@ -314,7 +314,8 @@ TEST_CASE("any Axis description is refused or becomes bodies") {
   refused(1, 65, "65 avatars");
   refused(1, 1, "goes on");
   refused(5, 1, "cannot be");
-  refused(6, 7, "cannot be");
+  refused(6, 12, "cannot be");
+  refused(6, 16, "cannot be");
   refused(42, 0xFF, "RightUpLeg");
   refused(axis::kListHeadBytes + axis::kMaxEntryBytes, 0, "twice");
   std::mt19937 random(23);
