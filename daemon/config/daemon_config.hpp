@@ -3,6 +3,8 @@
 // a lower folder that has a use for it, too.
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -72,11 +74,12 @@ struct SourceConfig {
   return source;
 }
 
-enum class OutputKind : std::uint8_t { kVmc, kBvh };
+enum class OutputKind : std::uint8_t { kVmc, kBvh, kAxis };
+inline constexpr std::array<std::string_view, 3> kOutputKinds{"vmc", "bvh", "axis"};
 
 // As in the config.
 [[nodiscard]] constexpr std::string_view kind_name(OutputKind kind) noexcept {
-  return kind == OutputKind::kVmc ? "vmc" : "bvh";
+  return kOutputKinds[static_cast<std::size_t>(kind)];
 }
 
 // Another way out for the frames of some streams, beside ZeroMQ.
@@ -85,12 +88,14 @@ struct OutputConfig {
   OutputKind kind = OutputKind::kVmc;
   std::string body, left_hand, right_hand;  // streams; at least one is not empty
   double rate_hz = 0.0;                     // at most so many frames a second; 0: all
+  std::vector<std::string> to;              // addresses and ports, over UDP
   // vmc
-  std::vector<std::string> to;  // addresses and ports
-  bool vrm1_names = false;      // of blend shapes; false: those of VRM 0
-  bool assistant = false;       // sends hands only
-  // bvh
-  std::string listen = "127.0.0.1:7002";  // address and port that clients connect to
+  bool vrm1_names = false;         // of blend shapes; false: those of VRM 0
+  bool assistant = false;          // sends hands only
+  std::filesystem::path avatar{};  // whose proportions are sent; empty: the performer's
+  // bvh, axis
+  bool binary = false;                    // messages of Axis Neuron; false: lines of text
+  std::string listen = "127.0.0.1:7002";  // where clients connect over TCP, unless `to` names some
   std::vector<std::string> peers;         // addresses that may connect; empty: this machine
   bool header = false;                    // clients get a BVH's HIERARCHY first
   int line = 0;                           // of its table, for errors; 0: nowhere

@@ -68,7 +68,7 @@ std::vector<Listener> listeners_of(const DaemonConfig& config) {
   add("control", false, tcp_address(config.control_endpoint));
   if (config.trigger) add("trigger", true, config.trigger->listen);
   for (const OutputConfig& output : config.outputs) {
-    if (output.kind != OutputKind::kBvh) continue;
+    if (!output.to.empty()) continue;
     all.push_back({.who = "output " + in_quotes(output.name),
                    .endpoint = output.listen,
                    .key = "output",

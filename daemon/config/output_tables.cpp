@@ -25,13 +25,24 @@ namespace {
 constexpr std::size_t kMaxOutputs = 16;
 constexpr std::size_t kMaxReceivers = 64;
 constexpr Range kOutputRate{0.0, 1000.0};  // frames a second
-constexpr std::array<std::string_view, 2> kKindWords{"vmc", "bvh"};
 constexpr std::array<std::string_view, 2> kNamesWords{"vrm0", "vrm1"};
 constexpr std::array<std::string_view, 2> kRoleWords{"performer", "assistant"};
+constexpr std::array<std::string_view, 2> kFormatWords{"binary", "text"};
 
-constexpr std::array<std::string_view, 3> kBvhKeys{"listen", "peers", "header"};
-constexpr std::array<std::string_view, 5> kVmcKeys{"left_hand", "right_hand", "to", "names",
-                                                   "role"};
+// The keys that some kinds do not have, with those that do.
+struct KindsKey {
+  std::string_view key;
+  std::vector<OutputKind> kinds;
+};
+const std::vector<KindsKey>& kinds_keys() {
+  using enum OutputKind;
+  static const std::vector<KindsKey> keys{{"left_hand", {kVmc}},     {"right_hand", {kVmc}},
+                                          {"to", {kVmc, kAxis}},     {"names", {kVmc}},
+                                          {"role", {kVmc}},          {"avatar", {kVmc}},
+                                          {"listen", {kBvh, kAxis}}, {"peers", {kBvh, kAxis}},
+                                          {"header", {kBvh}},        {"format", {kAxis}}};
+  return keys;
+}
 
 class OutputReader {
  public:
@@ -41,12 +52,13 @@ class OutputReader {
 
  private:
   void read_vmc(TableReader& table, OutputConfig& output) const;
-  void read_bvh(TableReader& table, OutputConfig& output) const;
+  void read_axis(TableReader& table, OutputConfig& output) const;
+  void read_receivers(TableReader& table, OutputConfig& output) const;
+  void read_clients(TableReader& table, OutputConfig& output) const;
   void read_streams(TableReader& table, OutputConfig& output) const;
   void check_stream(TableReader& table, const char* key, const std::string& name) const;
   void check_hand(TableReader& table, const char* key, const std::string& name) const;
-  void refuse_keys(TableReader& table, std::string_view kind,
-                   std::span<const std::string_view> keys) const;
+  static void refuse_keys(TableReader& table, OutputKind kind);
   void name_it(TableReader& table, OutputConfig& output);
   [[nodiscard]] bool may_be_stream(const std::string& name) const;
   [[nodiscard]] std::set<std::string> stream_names() const;
@@ -131,10 +143,17 @@ bool has_port(std::string_view endpoint) {
 void OutputReader::read_vmc(TableReader& table, OutputConfig& output) const {
   output.vrm1_names = table.choice("names", kNamesWords) == 1;
   output.assistant = table.choice("role", kRoleWords) == 1;
-  const std::size_t errors = file_.findings.errors.size();
+  std::string avatar;
+  table.read("avatar", avatar);
+  if (!avatar.empty()) output.avatar = file_.resolve(avatar);
   if (table.need("to", "name the receivers, like to = [\"127.0.0.1:39539\"]")) {
-    table.read("to", output.to);
+    read_receivers(table, output);
   }
+}
+
+void OutputReader::read_receivers(TableReader& table, OutputConfig& output) const {
+  const std::size_t errors = file_.findings.errors.size();
+  table.read("to", output.to);
   if (file_.findings.errors.size() > errors) return;
   std::set<std::string> seen;
   for (const std::string& endpoint : output.to) {
@@ -153,10 +172,25 @@ void OutputReader::read_vmc(TableReader& table, OutputConfig& output) const {
   }
 }
 
-void OutputReader::read_bvh(TableReader& table, OutputConfig& output) const {
+void OutputReader::read_axis(TableReader& table, OutputConfig& output) const {
+  if (output.kind == OutputKind::kBvh) {
+    table.read("header", output.header);
+  } else {
+    output.binary = table.choice("format", kFormatWords) == 0;
+  }
+  if (!table.has("to")) return read_clients(table, output);
+  read_receivers(table, output);
+  for (const std::string_view key : {"listen", "peers"}) {
+    table.skip(key);
+    if (table.has(key)) {
+      table.add_error(key, "clients connect over TCP, but \"to\" sends over UDP: leave one out");
+    }
+  }
+}
+
+void OutputReader::read_clients(TableReader& table, OutputConfig& output) const {
   table.read("listen", output.listen);
   table.read("peers", output.peers);
-  table.read("header", output.header);
   for (const std::string& peer : output.peers) {
     if (const auto host = drivers::parse_host(peer); !host) {
       table.add_error("peers", host.error().message);
@@ -170,14 +204,17 @@ void OutputReader::read_bvh(TableReader& table, OutputConfig& output) const {
   }
 }
 
-// Keys that only the other kind has.
-void OutputReader::refuse_keys(TableReader& table, std::string_view kind,
-                               std::span<const std::string_view> keys) const {
-  for (const std::string_view key : keys) {
+// Keys that only other kinds have.
+void OutputReader::refuse_keys(TableReader& table, OutputKind kind) {
+  for (const auto& [key, kinds] : kinds_keys()) {
+    if (std::ranges::find(kinds, kind) != kinds.end()) continue;
     table.skip(key);
     if (!table.has(key)) continue;
-    table.add_error(key,
-                    fmt::format("{} is for outputs of kind = \"{}\"; leave it out", key, kind));
+    std::string words;
+    for (const OutputKind other : kinds) {
+      words += (words.empty() ? "" : " or ") + fmt::format("\"{}\"", kind_name(other));
+    }
+    table.add_error(key, fmt::format("{} is for outputs of kind = {}; leave it out", key, words));
   }
 }
 
@@ -203,18 +240,16 @@ void OutputReader::read(TableReader& table) {
   OutputConfig& output = config_.outputs.emplace_back();
   output.line = table.line();
   const std::size_t errors = file_.findings.errors.size();
-  const bool there = table.need("kind", "write kind = \"vmc\" or \"bvh\"");
-  output.kind = static_cast<OutputKind>(table.choice("kind", kKindWords));
+  const bool there = table.need("kind", "write kind = \"vmc\", \"bvh\" or \"axis\"");
+  output.kind = static_cast<OutputKind>(table.choice("kind", kOutputKinds));
   if (!there || file_.findings.errors.size() > errors) return;
   table.read("rate_hz", output.rate_hz, kOutputRate);
+  refuse_keys(table, output.kind);
+  read_streams(table, output);
   if (output.kind == OutputKind::kVmc) {
-    refuse_keys(table, "bvh", kBvhKeys);
-    read_streams(table, output);
     read_vmc(table, output);
   } else {
-    refuse_keys(table, "vmc", kVmcKeys);
-    read_streams(table, output);
-    read_bvh(table, output);
+    read_axis(table, output);
   }
   name_it(table, output);
   table.finish();

@@ -51,7 +51,8 @@ Result<> Avatar::set_skeleton(Part part, std::shared_ptr<const Skeleton> skeleto
   Source& source = sources_[index_of(part)];
   source = {};
   if (skeleton == nullptr) return {};
-  auto canonical = TRY(motion::canonical_skeleton(*skeleton, top_of(part)));
+  auto canonical =
+      TRY(motion::canonical_skeleton(figure_ == nullptr ? *skeleton : *figure_, top_of(part)));
   const std::string name = in_quotes(skeleton->name);
   auto bound = TRY(motion::Retarget::bind(std::move(skeleton), canonical));
   for (std::size_t j = 0; j < canonical->joints.size(); ++j) {

@@ -1,12 +1,13 @@
 // Avatar: one pose of the VMC protocol's humanoid, put together from a stream with the body and
 // streams with single hands. Each stream is brought onto the canonical humanoid with its own
-// proportions; the fingers of a hand's stream replace those of the body.
+// proportions, or with an avatar's; the fingers of a hand's stream replace those of the body.
 #pragma once
 
 #include <array>
 #include <cstddef>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "daemon/output/part.hpp"
@@ -23,7 +24,9 @@ class Avatar {
  public:
   // With `hands_only` only the body's wrists and fingers are written, as VMC's role "assistant"
   // does.
-  explicit Avatar(bool hands_only) : hands_only_(hands_only) {}
+  // `figure` has the proportions that are sent; null: each part's own.
+  explicit Avatar(bool hands_only, std::shared_ptr<const Skeleton> figure = nullptr)
+      : hands_only_(hands_only), figure_(std::move(figure)) {}
 
   // Sets the skeleton of a part whose stream has come; null when the stream has left. The part has
   // no pose until the next set_pose(). An error says why the skeleton cannot move this part. Cold.
@@ -51,6 +54,7 @@ class Avatar {
   [[nodiscard]] bool writes(Part part, Bone bone) const noexcept;
 
   bool hands_only_;
+  std::shared_ptr<const Skeleton> figure_;
   std::array<Source, kParts> sources_;  // [part]
 };
 

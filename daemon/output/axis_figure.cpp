@@ -32,10 +32,22 @@ Result<AxisFigure> AxisFigure::make(std::shared_ptr<const Skeleton> skeleton,
   return made;
 }
 
-std::string_view AxisFigure::line(const Frame& frame) noexcept {
+void AxisFigure::fill(const Frame& frame) noexcept {
   to_figure_.apply(frame, pose_);
+  message_.frame_number = static_cast<std::uint32_t>(frame.header.sequence);
   axis::fill_values(*to_figure_.target(), offset_cm_, pose_.rotation_xyzw, pose_.root_position_m,
                     near_rad_, message_);
+}
+
+std::string_view AxisFigure::message(const Frame& frame) noexcept {
+  fill(frame);
+  const std::size_t size =
+      axis::encode_binary(message_, axis::Form::kBinary, std::as_writable_bytes(std::span(text_)));
+  return {text_.data(), size};
+}
+
+std::string_view AxisFigure::line(const Frame& frame) noexcept {
+  fill(frame);
   const std::size_t size = axis::encode_text(message_, std::span(text_).first(axis::kMaxText));
   text_[size] = '\n';
   return {text_.data(), size + 1};

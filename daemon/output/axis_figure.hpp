@@ -1,5 +1,5 @@
-// AxisFigure: poses of any person as lines of text in the form in which Axis Neuron sends them (the
-// line of a BVH, drivers/axis/protocol.hpp), and the BVH header that describes the figure.
+// AxisFigure: poses of any person in the forms in which Axis Neuron sends them (binary, or text:
+// the line of a BVH; drivers/axis/protocol.hpp), and the BVH header that describes the figure.
 #pragma once
 
 #include <array>
@@ -30,10 +30,14 @@ class AxisFigure {
   // joint that was not measured keeps its rotation of the T-pose relative to its parent.
   [[nodiscard]] std::string_view line(const Frame& frame) noexcept;
 
+  // Returns it as the bytes of a binary message, in the same way.
+  [[nodiscard]] std::string_view message(const Frame& frame) noexcept;
+
   // Returns the HIERARCHY of a BVH whose channels are the values of a line.
   [[nodiscard]] std::string hierarchy() const;
 
  private:
+  void fill(const Frame& frame) noexcept;
   AxisFigure(motion::Retarget retarget, const drivers::axis::Proportions& offset_cm)
       : to_figure_(std::move(retarget)), offset_cm_(offset_cm) {}
 

@@ -70,11 +70,10 @@ void BlendShapes::update(const Sample& sample) noexcept {
 }
 
 void BlendShapes::write(drivers::vmc::DatagramWriter& writer) const noexcept {
-  bool any = false;
   for (const Shape& shape : shapes_) {
-    if (shape.known) any = writer.blend(shape.name, shape.value) || any;
+    if (shape.known) writer.blend(shape.name, shape.value);
   }
-  if (any) writer.apply();
+  writer.apply();
 }
 
 }  // namespace posed::output

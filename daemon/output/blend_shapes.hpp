@@ -32,7 +32,8 @@ class BlendShapes {
 
   void update(const Sample& sample) noexcept;
 
-  // Writes the values that were measured and the message that ends them; nothing if there are none.
+  // Writes the values that were measured, and the message that ends a frame: some receivers move
+  // their bones only when it comes.
   void write(drivers::vmc::DatagramWriter& writer) const noexcept;
 
  private:

@@ -2,7 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
-#include "daemon/output/bvh_output.hpp"
+#include "daemon/output/axis_output.hpp"
 #include "daemon/output/vmc_output.hpp"
 #include "posed/v1/posed.pb.h"
 
@@ -47,8 +47,8 @@ void Output::notify(const std::string& text) const {
 
 Result<std::unique_ptr<Output>> open_output(const config::OutputConfig& config) {
   auto wake = TRY(system::EventFd::open());
-  auto opened = config.kind == config::OutputKind::kBvh ? BvhOutput::open(config, std::move(wake))
-                                                        : VmcOutput::open(config, std::move(wake));
+  auto opened = config.kind == config::OutputKind::kVmc ? VmcOutput::open(config, std::move(wake))
+                                                        : AxisOutput::open(config, std::move(wake));
   if (!opened) return fail("output " + config.name + ": " + opened.error().message);
   return opened;
 }

@@ -3,6 +3,8 @@
 #include <string>
 #include <utility>
 
+#include "models/motion/canonical_skeleton.hpp"
+#include "proto/clip/clip.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::output {
@@ -13,19 +15,30 @@ namespace vmc = drivers::vmc;
 // A part that has been silent for longer no longer leads.
 constexpr std::int64_t kLeads_ns = kNanosPerSecond / 4;
 
+// The humanoid with the avatar's bones, as its file rests.
+Result<std::shared_ptr<const Skeleton>> avatar_figure(const std::filesystem::path& path) {
+  const auto clip = TRY(clip::read_clip(path));
+  auto figure = motion::canonical_skeleton(*clip.skeleton);
+  if (!figure) return fail("has no humanoid: " + figure.error().message, path.string());
+  return figure;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<Output>> VmcOutput::open(const config::OutputConfig& config,
                                                 std::unique_ptr<system::EventFd> wake) {
+  std::shared_ptr<const Skeleton> figure;
+  if (!config.avatar.empty()) figure = TRY(avatar_figure(config.avatar));
   auto receivers = TRY(UdpReceivers::open(config.to));
-  return std::make_unique<VmcOutput>(config, std::move(wake), std::move(receivers));
+  return std::make_unique<VmcOutput>(config, std::move(wake), std::move(figure),
+                                     std::move(receivers));
 }
 
 VmcOutput::VmcOutput(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake,
-                     UdpReceivers receivers)
+                     std::shared_ptr<const Skeleton> figure, UdpReceivers receivers)
     : Output(config, std::move(wake)),
       assistant_(config.assistant),
-      avatar_(config.assistant),
+      avatar_(config.assistant, std::move(figure)),
       shapes_(config.vrm1_names ? VrmNames::kVrm1 : VrmNames::kVrm0),
       limit_(config.rate_hz),
       receivers_(std::move(receivers)),

@@ -20,7 +20,7 @@ class VmcOutput final : public Output {
   static Result<std::unique_ptr<Output>> open(const config::OutputConfig& config,
                                               std::unique_ptr<system::EventFd> wake);
   VmcOutput(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake,
-            UdpReceivers receivers);
+            std::shared_ptr<const Skeleton> figure, UdpReceivers receivers);
 
   [[nodiscard]] std::int64_t turn(std::int64_t now_ns) override;
 

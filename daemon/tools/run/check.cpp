@@ -143,13 +143,16 @@ Findings findings_of(const config::OutputConfig& output) {
     findings.add(part, stream);
     line += std::string(", ") + part + " " + stream;
   }
-  if (output.kind == config::OutputKind::kBvh) {
+  if (output.to.empty()) {
     findings.add("listen", output.listen);
     line += ", on " + output.listen;
-  }
-  if (output.kind == config::OutputKind::kVmc) {
+  } else {
     findings.add("to", output.to);
     for (const std::string& to : output.to) line += ", to " + to;
+  }
+  if (!output.avatar.empty()) {
+    findings.add("avatar", output.avatar.string());
+    line += ", with the bones of " + output.avatar.string();
   }
   if (output.rate_hz > 0.0) {
     findings.add("rate_hz", output.rate_hz);

@@ -181,7 +181,8 @@ TEST_CASE("blend shapes go out under the names of the wanted version") {
   vmc::DatagramWriter writer(vmc::Packing::kMessages);
   writer.start();
   shapes.write(writer);
-  CHECK(writer.datagrams() == 0);
+  CHECK(writer.datagrams() == 1);  // some receivers move their bones only at Apply
+  writer.start();
   Sample sample;
   sample.value_count = 5;
   sample.value = {0.25F, 9.0F, 9.0F, 0.5F, 0.75F};

@@ -1,8 +1,10 @@
 // The BVH output from frames to lines on real sockets, on a virtual clock.
-#include "daemon/output/bvh_output.hpp"
+#include "daemon/output/axis_output.hpp"
 
+#include <algorithm>
 #include <iterator>
 #include <optional>
+#include <span>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -37,7 +39,7 @@ struct BvhRig : OutputRig {
     output->stream_comes(info_of(0, "ann", walk.skeleton));
   }
   [[nodiscard]] test::RawPeer connect() {
-    test::RawPeer peer(static_cast<const BvhOutput&>(*output).endpoint());
+    test::RawPeer peer(static_cast<const AxisOutput&>(*output).endpoint());
     now_ns += LineClients::kLook_ns;  // it is let in at the next look
     static_cast<void>(output->turn(now_ns));
     return peer;
@@ -123,6 +125,34 @@ TEST_CASE("a recorded walk arrives through the BVH output as it was") {
   const auto path = test::shared("data/cmu/07_01.amc");
   if (!path) SKIP_WITHOUT_SHARED();
   check_lines(clip::read_clip(*path).value(), 200);
+}
+
+TEST_CASE("a walk goes out in binary, over TCP and UDP, as the same values") {
+  config::OutputConfig config = bvh_config();
+  config.kind = config::OutputKind::kAxis;
+  config.binary = true;
+  BvhRig tcp(config);
+  const test::RawPeer peer = tcp.connect();
+  UdpReceiver receiver;
+  config.to = {receiver.endpoint()};
+  BvhRig udp(config);
+  BvhRig text(bvh_config());
+  const test::RawPeer reader = text.connect();
+  for (int i = 0; i < 3; ++i) {
+    for (BvhRig* rig : {&tcp, &udp, &text}) rig->step(i);
+    drivers::axis::Message expected, got;
+    const std::string line = next_lines(reader);
+    REQUIRE(drivers::axis::decode_text(std::string_view(line).substr(0, line.size() - 3),
+                                       expected) == Outcome::kOk);
+    const std::string bytes = peer.receive(1 << 12, std::chrono::milliseconds(1000));
+    REQUIRE(drivers::axis::decode_binary(std::as_bytes(std::span(bytes)), got) == Outcome::kOk);
+    for (std::size_t v = 0; v < drivers::axis::value_count(got.content); ++v) {
+      CHECK(got.values[v] == Approx(expected.values[v]).margin(1e-4));
+    }
+    const auto datagrams = receiver.received(static_cast<std::uint64_t>(i) + 1);
+    REQUIRE(datagrams.size() == 1);
+    CHECK(std::ranges::equal(datagrams[0], std::as_bytes(std::span(bytes))));
+  }
 }
 
 TEST_CASE("a client that wants it gets the BVH header, whose channels are the values of a line") {
