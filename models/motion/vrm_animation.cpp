@@ -9,6 +9,7 @@
 
 #include "models/motion/canonical_skeleton.hpp"
 #include "models/motion/retarget.hpp"
+#include "proto/clip/draft.hpp"
 #include "proto/clip/gltf.hpp"
 #include "proto/text/clean.hpp"
 
@@ -81,7 +82,10 @@ Result<> write_vrm_animation(const clip::Clip& clip, const std::filesystem::path
 }
 
 clip::Format vrm_animation_format() {
-  return {.name = "VRM animation", .extensions = {".vrma"}, .write = write_vrm_animation};
+  return {.name = "VRM animation",
+          .extensions = {".vrma"},
+          .read = clip::read_gltf,
+          .write = write_vrm_animation};
 }
 
 }  // namespace posed::motion

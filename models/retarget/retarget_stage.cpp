@@ -54,8 +54,8 @@ std::vector<ParameterSpec> parameters() {
   return {{.name = "to",
            .default_value = std::string(kHumanoid),
            .is_path = true,
-           .help = "humanoid: VRM bones without axes of their own; or a BVH whose skeleton is "
-                   "wanted"}};
+           .help = "humanoid: VRM bones without axes of their own; or a clip or an avatar "
+                   "(.vrm) whose skeleton is wanted"}};
 }
 
 }  // namespace

@@ -170,9 +170,7 @@ Result<std::vector<double>> recognise_draft(const ReadOptions& options,
   draft.rig = std::make_shared<const rig::Rig>(rig);
   std::vector<double> factors = turn_axes(up_turn(rig.up), skeleton);
   if (stays.empty()) return factors;
-  draft.warnings.push_back("has " + std::to_string(joints) +
-                           " joints; of those that are no bones, " +
-                           std::to_string(joints - skeleton.joints.size()) + " were left out");
+  draft.warnings.push_back(left_out(joints, skeleton.joints.size()));
   std::vector<double> of_file;
   auto next = factors.begin();
   for (const char stay : stays) of_file.push_back(stay != 0 ? *next++ : 0.0);

@@ -72,25 +72,39 @@ Result<> check_values(const Clip& clip) {
 }
 
 // For formats that state their unit and have +Y up.
-Result<> recognise_clip(Clip& clip, Skeleton& skeleton, const Profile* profile,
-                        const Hints& hints) {
+Result<> recognise_clip(Clip& clip, Skeleton& skeleton, const Draft& draft, const Hints& hints) {
   rig::RigInput known;
   known.T = hints.T;
+  known.bones = draft.bones;
+  if (draft.rests_in_t) known.T.resize(skeleton.joints.size());
+  for (std::size_t j = 0; draft.rests_in_t && j < known.T.size(); ++j) {
+    if (draft.bones[j]) known.T[j] = Eigen::Quaterniond::Identity();
+  }
   known.up = UpAxis::kPlusY;
   known.metres_per_unit = 1.0;
-  if (profile != nullptr) TRY(add_profile(*profile, skeleton, known));
+  if (draft.profile != nullptr) TRY(add_profile(*draft.profile, skeleton, known));
   const auto picked = sample_frames(clip.frames(), static_cast<int>(skeleton.joints.size()));
   const ChannelMatrix sample = clip.channels(picked, Eigen::all);
-  auto rig = std::make_shared<const rig::Rig>(recognise(skeleton, sample, std::move(known)));
-  apply(*rig, skeleton);
-  clip.warnings.insert(clip.warnings.end(), rig->notes.begin(), rig->notes.end());
-  clip.rig = std::move(rig);
+  rig::Rig rig = recognise(skeleton, sample, std::move(known));
+  apply(rig, skeleton);
+  clip.warnings.insert(clip.warnings.end(), rig.notes.begin(), rig.notes.end());
+  const std::size_t joints = skeleton.joints.size();
+  const std::vector<char> stays = leave_out_joints(skeleton, rig);
+  if (!stays.empty()) {
+    std::vector<int> columns;
+    for (std::size_t c = 0; c < stays.size(); ++c) {
+      if (stays[c] != 0) columns.push_back(static_cast<int>(c));
+    }
+    clip.channels = ChannelMatrix(clip.channels(Eigen::all, columns));
+    clip.warnings.push_back(left_out(joints, skeleton.joints.size()));
+  }
+  clip.rig = std::make_shared<const rig::Rig>(std::move(rig));
   return {};
 }
 
 // Sets bones, T frames, root joint and offsets.
 Result<> complete(Clip& clip, Skeleton& skeleton, const Draft& draft, const Hints& hints) {
-  if (!draft.rig) TRY(recognise_clip(clip, skeleton, draft.profile.get(), hints));
+  if (!draft.rig) TRY(recognise_clip(clip, skeleton, draft, hints));
   for (std::size_t j = 0; j < std::min(hints.T.size(), skeleton.joints.size()); ++j) {
     if (hints.T[j]) skeleton.joints[j].T_world_joint = *hints.T[j];
   }

@@ -35,6 +35,8 @@ struct Draft {
   bool skeleton_is_known = false;       // posed's own: it has bones, root joint and T frames
   std::shared_ptr<const rig::Rig> rig;  // what set bones and T frames; null: not set yet
   std::shared_ptr<const Profile> profile;
+  std::vector<std::optional<Bone>> bones{};  // [joint] as the file says; empty: it does not
+  bool rests_in_t = false;                   // those bones stand in the T-pose, in the zero pose
   double frame_rate_hz = 0.0;
   double metres_per_unit = 1.0;
   UpAxis up = UpAxis::kPlusY;    // of the file; the skeleton has +Y up

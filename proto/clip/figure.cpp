@@ -132,6 +132,11 @@ std::vector<char> leave_out_joints(Skeleton& skeleton, rig::Rig& rig) {
   return channel_stays;
 }
 
+std::string left_out(std::size_t before, std::size_t now) {
+  return "has " + std::to_string(before) + " joints; of those that are no bones, " +
+         std::to_string(before - now) + " were left out";
+}
+
 std::vector<double> turn_axes(const Eigen::Matrix3d& turn, Skeleton& skeleton) {
   for (Joint& joint : skeleton.joints) {
     joint.offset_m = turn * joint.offset_m;

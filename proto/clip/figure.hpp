@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -37,6 +38,9 @@ Result<> add_profile(const Profile& profile, const Skeleton& skeleton, rig::RigI
 // which channels stay [channel]; empty when all do, or
 // when the bones alone are too many.
 std::vector<char> leave_out_joints(Skeleton& skeleton, rig::Rig& rig);
+
+// The sentence about it, for a figure that had so many joints and has fewer now.
+[[nodiscard]] std::string left_out(std::size_t before, std::size_t now);
 
 // Expresses the figure in axes turned by `turn`, which maps axes to axes. Returns the factor, 1 or
 // -1, by which the values of each channel change; channels keep their order.

@@ -18,7 +18,8 @@ constexpr std::uintmax_t kMaxSkeletonFile = 16'000'000;  // bytes; real files ha
 constexpr std::size_t kSniffedBytes = 4096;
 
 std::vector<Format>& table() {
-  static std::vector<Format> all{bvh_format(), amc_format(), hand_csv_format(), glb_format()};
+  static std::vector<Format> all{bvh_format(), amc_format(), hand_csv_format(), glb_format(),
+                                 gltf_format()};
   return all;
 }
 

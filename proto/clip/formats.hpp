@@ -10,5 +10,6 @@ namespace posed::clip {
 [[nodiscard]] Format amc_format();
 [[nodiscard]] Format hand_csv_format();
 [[nodiscard]] Format glb_format();
+[[nodiscard]] Format gltf_format();
 
 }  // namespace posed::clip

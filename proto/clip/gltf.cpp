@@ -13,6 +13,7 @@
 
 #include <tiny_gltf.h>
 
+#include "proto/clip/draft.hpp"
 #include "proto/clip/formats.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
@@ -260,6 +261,13 @@ Result<> write_glb(const Clip& clip, const std::filesystem::path& path) {
   return write_gltf(motion, GltfKind::kSkin, path);
 }
 
-Format glb_format() { return {.name = "GLB", .extensions = {".glb"}, .write = write_glb}; }
+Format glb_format() {
+  return {.name = "GLB",
+          .extensions = {".glb"},
+          .options = {ReadOption::kProfile},
+          .sniff = [](std::string_view begin) { return begin.starts_with("glTF"); },
+          .read = read_gltf,
+          .write = write_glb};
+}
 
 }  // namespace posed::clip

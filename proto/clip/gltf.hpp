@@ -16,6 +16,8 @@
 
 namespace posed::clip {
 
+struct Draft;
+
 struct GltfNode {
   std::string name;
   int parent = -1;
@@ -54,5 +56,9 @@ Result<> write_gltf(const GltfMotion& motion, GltfKind kind, const std::filesyst
 // Writes `clip` as .glb: a node for each joint and each end site, where the skeleton has them at
 // rest, and their motion at the clip's own times.
 Result<> write_glb(const Clip& clip, const std::filesystem::path& path);
+
+// Format::read of all kinds of glTF: the bones that a VRM names, otherwise the joints of the skins;
+// the first animation, otherwise the rest pose. Of the numbers in other files nothing is read.
+Result<Draft> read_gltf(const ClipFile& file, const ReadOptions& options);
 
 }  // namespace posed::clip

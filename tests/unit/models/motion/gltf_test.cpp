@@ -10,6 +10,7 @@
 #include "models/motion/kinematics.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "models/motion/vrm_animation.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/clip/gltf.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "tests/support/file_text.hpp"
@@ -223,6 +224,181 @@ TEST_CASE("a .vrma needs the bones that VRM requires, and names those that are m
   REQUIRE_FALSE(written);
   CHECK(test::has(written.error().message, "spine, leftHand;"));
   CHECK_FALSE(std::filesystem::exists(folder.path() / "out.vrma"));
+}
+
+namespace {
+
+// How far the joints of a clip are from those of the same names in another one, frame by frame.
+void check_read_back(const clip::Clip& clip, const clip::Clip& back) {
+  REQUIRE(back.frames() == clip.frames());
+  CHECK(back.frame_rate_hz == Approx(clip.frame_rate_hz));
+  for (int i = 0; i < clip.frames(); ++i) {
+    const WorldPose truth = world_pose(*clip.skeleton, clip.frame(i));
+    const WorldPose got = world_pose(*back.skeleton, back.frame(i));
+    for (std::size_t j = 0; j < clip.skeleton->joints.size(); ++j) {
+      const int k = back.skeleton->joint_index(clip.skeleton->joints[j].name);
+      REQUIRE(k >= 0);
+      CHECK((got.position_m[static_cast<std::size_t>(k)] - truth.position_m[j]).norm() < 1e-4);
+      CHECK(angle_between_rad(got.rotation[static_cast<std::size_t>(k)], truth.rotation[j]) < 2e-4);
+    }
+  }
+}
+
+// A figure of VRM's required bones. `backwards`: it looks along -Z, as VRM 0 does; `twisted`: its
+// nodes have rotations at rest, below an armature that is turned and scaled.
+struct AvatarFile {
+  struct Bone_ {
+    const char* name;
+    int parent;
+    Eigen::Vector3d at_m;
+  };
+  static const std::vector<Bone_>& bones() {
+    static const std::vector<Bone_> all{{"hips", -1, {0, 0.9, 0}},
+                                        {"spine", 0, {0, 1.0, -0.02}},
+                                        {"head", 1, {0, 1.45, 0}},
+                                        {"leftUpperArm", 1, {0.15, 1.3, 0}},
+                                        {"leftLowerArm", 3, {0.4, 1.28, 0}},
+                                        {"leftHand", 4, {0.63, 1.27, 0}},
+                                        {"rightUpperArm", 1, {-0.15, 1.3, 0}},
+                                        {"rightLowerArm", 6, {-0.4, 1.28, 0}},
+                                        {"rightHand", 7, {-0.63, 1.27, 0}},
+                                        {"leftUpperLeg", 0, {0.09, 0.85, 0}},
+                                        {"leftLowerLeg", 9, {0.09, 0.45, 0.01}},
+                                        {"leftFoot", 10, {0.09, 0.08, -0.02}},
+                                        {"rightUpperLeg", 0, {-0.09, 0.85, 0}},
+                                        {"rightLowerLeg", 12, {-0.09, 0.45, 0.01}},
+                                        {"rightFoot", 13, {-0.09, 0.08, -0.02}}};
+    return all;
+  }
+
+  static std::string text(bool backwards, bool twisted) {
+    const auto numbers = [](const auto& values) {
+      std::string list;
+      for (const double x : values) list += (list.empty() ? "" : ",") + std::to_string(x);
+      return "[" + list + "]";
+    };
+    const double scale = twisted ? 0.01 : 1.0;
+    const Eigen::Quaterniond above(twisted ? axis_rotation(Axis::kX, -1.2)
+                                           : Eigen::Quaterniond::Identity());
+    std::string nodes =
+        "{\"name\":\"Armature\",\"children\":[1],\"rotation\":" + numbers(above.coeffs()) +
+        ",\"scale\":" + numbers(std::vector<double>(3, scale)) + "}";
+    std::string named;
+    std::vector<Eigen::Quaterniond> world;
+    for (std::size_t b = 0; b < bones().size(); ++b) {
+      const Bone_& bone = bones()[b];
+      world.push_back(twisted ? axis_rotation(Axis::kZ, 0.3 * double(b)) *
+                                    axis_rotation(Axis::kY, 1.0 + double(b))
+                              : Eigen::Quaterniond::Identity());
+      const auto turned = [&](Eigen::Vector3d v) {
+        return backwards ? Eigen::Vector3d(-v.x(), v.y(), -v.z()) : v;
+      };
+      const bool root = bone.parent < 0;
+      const Eigen::Quaterniond parent = root ? above : world[std::size_t(bone.parent)];
+      Eigen::Vector3d from = turned(bone.at_m);
+      if (!root) from -= turned(bones()[std::size_t(bone.parent)].at_m);
+      std::string children;
+      for (std::size_t c = 0; c < bones().size(); ++c) {
+        if (bones()[c].parent != int(b)) continue;
+        children += (children.empty() ? "" : ",") + std::to_string(c + 1);
+      }
+      nodes += ",{\"name\":\"b" + std::to_string(b) +
+               "\",\"translation\":" + numbers(Eigen::Vector3d(parent.conjugate() * from / scale)) +
+               ",\"rotation\":" + numbers((parent.conjugate() * world[b]).coeffs()) +
+               (children.empty() ? "" : ",\"children\":[" + children + "]") + "}";
+      const std::string node = "\"node\":" + std::to_string(b + 1);
+      named += (named.empty() ? "" : ",") +
+               (backwards ? "{\"bone\":\"" + std::string(bone.name) + "\"," + node + "}"
+                          : "\"" + std::string(bone.name) + "\":{" + node + "}");
+    }
+    const std::string humanoid =
+        backwards ? "\"VRM\":{\"humanoid\":{\"humanBones\":[" + named + "]}}"
+                  : "\"VRMC_vrm\":{\"humanoid\":{\"humanBones\":{" + named + "}}}";
+    return "{\"asset\":{\"version\":\"2.0\"},\"scene\":0,\"scenes\":[{\"nodes\":[0]}],\"nodes\":[" +
+           nodes + "],\"extensions\":{" + humanoid + "}}";
+  }
+};
+
+}  // namespace
+
+TEST_CASE("a .glb is read back as the clip that was written") {
+  const test::TempFolder folder;
+  const auto path = folder.path() / "walk.glb";
+  const clip::Clip walk = walker_clip();
+  REQUIRE(clip::write_glb(walk, path));
+  const auto back = clip::read_clip(path);
+  if (!back) FAIL(back.error().text());
+  check_read_back(walk, *back);
+  CHECK(back->skeleton->joints.size() == walk.skeleton->joints.size());
+  for (std::size_t j = 0; j < walk.skeleton->joints.size(); ++j) {
+    CHECK(back->skeleton->joints[j].bone == walk.skeleton->joints[j].bone);
+    CHECK(back->skeleton->joints[j].end_site_m.has_value() ==
+          walk.skeleton->joints[j].end_site_m.has_value());
+  }
+}
+
+TEST_CASE("a .vrma is read back as the same turns of the same bones") {
+  clip::add_format(vrm_animation_format());
+  const test::TempFolder folder;
+  const auto path = folder.path() / "walk.vrma";
+  const clip::Clip walk = walker_clip();
+  REQUIRE(write_vrm_animation(walk, path));
+  const auto back = clip::read_clip(path);
+  if (!back) FAIL(back.error().text());
+  REQUIRE(back->frames() == walk.frames());
+  for (int i = 0; i < walk.frames(); ++i) {
+    const WorldPose truth = world_pose(*walk.skeleton, walk.frame(i));
+    const WorldPose got = world_pose(*back->skeleton, back->frame(i));
+    for (std::size_t k = 0; k < back->skeleton->joints.size(); ++k) {
+      const Joint& joint = back->skeleton->joints[k];
+      REQUIRE(joint.bone);
+      const auto j = static_cast<std::size_t>(walk.skeleton->joint_of(*joint.bone));
+      const Eigen::Quaterniond is = got.rotation[k] * joint.T_world_joint.conjugate();
+      const Eigen::Quaterniond was =
+          truth.rotation[j] * walk.skeleton->joints[j].T_world_joint.conjugate();
+      CHECK(angle_between_rad(is, was) < 2e-4);
+    }
+  }
+}
+
+TEST_CASE("an avatar of VRM 0 or 1 faces forward, rests in T and has the lengths of its bones") {
+  const bool backwards = GENERATE(false, true);
+  const bool twisted = GENERATE(false, true);
+  INFO((backwards ? "VRM 0" : "VRM 1") << (twisted ? ", twisted" : ""));
+  const auto avatar =
+      clip::parse_clip({.name = "me.vrm", .bytes = AvatarFile::text(backwards, twisted)});
+  if (!avatar) FAIL(avatar.error().text());
+  CHECK(avatar->frames() == 1);
+  const Skeleton& skeleton = *avatar->skeleton;
+  REQUIRE(skeleton.joints.size() == AvatarFile::bones().size());
+  const WorldPose rest = world_pose(skeleton, avatar->frame(0));
+  for (const AvatarFile::Bone_& bone : AvatarFile::bones()) {
+    INFO(bone.name);
+    const int joint = skeleton.joint_of(bone_from_name(bone.name).value());
+    REQUIRE(joint >= 0);
+    const auto j = static_cast<std::size_t>(joint);
+    CHECK((rest.position_m[j] - bone.at_m).norm() < 1e-5);
+    CHECK(angle_between_rad(skeleton.joints[j].T_world_joint, Eigen::Quaterniond::Identity()) <
+          1e-6);
+  }
+}
+
+TEST_CASE("what is no glTF, or a damaged one, is refused with a reason") {
+  const auto refused = [](const std::string& bytes) {
+    const auto clip = clip::parse_clip({.name = "x.gltf", .bytes = bytes});
+    INFO(bytes.substr(0, 80));
+    REQUIRE_FALSE(clip);
+    return clip.error().text();
+  };
+  CHECK(test::has(refused("glTF and nothing more"), "no glTF that can be read"));
+  CHECK(test::has(refused("{"), "no glTF that can be read"));
+  const std::string asset = "{\"asset\":{\"version\":\"2.0\"}";
+  CHECK(test::has(refused(asset + "}"), "no nodes"));
+  CHECK(test::has(refused(asset + ",\"nodes\":[{\"children\":[1]},{\"children\":[0]}]}"),
+                  "in a circle"));
+  CHECK(test::has(refused(asset + ",\"buffers\":[{\"uri\":\"/etc/passwd\",\"byteLength\":4}]"
+                                  ",\"nodes\":[{}]}"),
+                  "no glTF that can be read"));
 }
 
 }  // namespace posed::motion
