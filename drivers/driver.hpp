@@ -212,7 +212,7 @@ struct Driver {
   Result<Description> (*expect)(const Options& options) = nullptr;
   // Compiles the bytes of Sink::description, which are untrusted. Null: the device has one body,
   // described above. Cold.
-  Result<std::unique_ptr<const SourceLayout>> (*make_layout)(
+  Result<std::unique_ptr<SourceLayout>> (*make_layout)(
       std::span<const std::byte> description) = nullptr;
   // The functions that only gloves have; null for other devices.
   const glove::GloveTraits* glove = nullptr;

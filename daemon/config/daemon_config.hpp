@@ -55,6 +55,7 @@ struct SourceConfig {
   std::string driver;
   drivers::Options options;  // complete
   double rate_hz = 0.0;      // frames a second of each body; 0: what the driver says, or else 120
+  std::filesystem::path skeleton{};  // the user's mapping of its bodies' joints; empty: none
   std::vector<NamedBody> named;
   // Whether the other bodies are streamed, too (streams = "all"), as <source>-<body>. `every` is
   // what is common to them: a stream without name, driver, options and calibration.

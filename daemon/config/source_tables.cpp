@@ -69,6 +69,9 @@ void read_source(TableReader& table, const ConfigFile& file, SourceConfig& sourc
   table.require("name", source.name);
   table.require("driver", source.driver);
   table.read("rate_hz", source.rate_hz, kSourceRate);
+  std::string skeleton;
+  table.read("skeleton", skeleton);
+  source.skeleton = file.resolve(skeleton);
   read_which_bodies(table, source);
   read_settings(table, file, source.every);
   if (!table.has("streams")) refuse_settings(table);

@@ -87,6 +87,14 @@ void StreamReader::read_stream(TableReader& table) {
   if (!stream.name.empty() && !is_stream_name(stream.name)) {
     table.add_error("name", "a stream's name has 1 to 32 of the letters a-z, digits, '-' and '_'");
   }
+  if (table.has("skeleton")) {
+    table.skip("skeleton");
+    table.add_error("skeleton",
+                    of_source
+                        ? "the mapping of a body's joints stands in its [[source]] table"
+                        : "the mapping of a clip's joints stands in [stream.file], as profile;"
+                          " other devices with one body have a skeleton of posed's own");
+  }
   names_.push_back({.name = stream.name, .line = table.line(), .publish_raw = stream.publish_raw});
   if (of_source) {
     read_body(table, std::move(stream));

@@ -60,6 +60,12 @@ Result<> open_calibration(OpenSource& source) {
   return {};
 }
 
+Result<> open_mapping(OpenSource& source) {
+  if (source.config.skeleton.empty()) return {};
+  source.mapping = TRY(drivers::load_mapping(source.config.skeleton.string()));
+  return {};
+}
+
 Result<> open_slot(OpenSource& source) {
   if (source.driver->expect == nullptr) return {};
   source.slot = std::make_unique<pipeline::DeviceSlot>();
@@ -89,6 +95,7 @@ Result<std::unique_ptr<OpenSource>> open_source(config::SourceConfig config, Mod
   source->ports = std::make_unique<drivers::TransportFactory>();
   Result<> opened = open_device(*source);
   if (opened && !source->has_several()) opened = open_calibration(*source);
+  if (opened) opened = open_mapping(*source);
   if (opened) opened = open_slot(*source);
   if (opened) opened = load_models(source->config, files);
   if (opened) return source;

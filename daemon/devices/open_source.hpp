@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <expected>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "daemon/config/daemon_config.hpp"
@@ -14,6 +15,7 @@
 #include "daemon/pipeline/reader.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/glove/calibration_file.hpp"
+#include "drivers/mapping.hpp"
 #include "drivers/transport/transport_factory.hpp"
 #include "proto/frame/result.hpp"
 
@@ -28,6 +30,7 @@ struct OpenSource {
   drivers::Device device;
   std::shared_ptr<PresentDevice> present = std::make_shared<PresentDevice>();
   std::unique_ptr<drivers::TransportFactory> ports;
+  std::optional<drivers::Mapping> mapping{};  // the user's word about the joints of its bodies
   // null: use the device's default
   std::unique_ptr<const drivers::glove::OwnedCalibration> calibration;
   std::unique_ptr<pipeline::DeviceSlot> slot;  // null for a device that cannot come back

@@ -135,6 +135,7 @@ void SourceBodies::build(std::vector<std::byte> description) {
                       " they are",
                       (*layout)->bodies.size(), kMaxBodies));
     }
+    use_mapping_on(**layout);
     update->layout = std::move(*layout);
   }
   description_ = std::move(description);
@@ -158,6 +159,14 @@ void SourceBodies::build(std::vector<std::byte> description) {
   assert(sent);  // the next update waits until the reader has accepted this one
   shared_.host.call_reader();
   report_oddities();
+}
+
+// The user's word about the joints of the bodies, or a sentence, once, why it is not theirs.
+void SourceBodies::use_mapping_on(drivers::SourceLayout& layout) {
+  if (!source_.mapping) return;
+  std::string misfit = drivers::use_mapping(*source_.mapping, layout);
+  if (!misfit.empty() && misfit != misfit_) shared_.host.warn(source_, misfit);
+  misfit_ = std::move(misfit);
 }
 
 // What is odd about a description that is in use.

@@ -80,6 +80,7 @@ class SourceBodies {
   [[nodiscard]] bool may_have_slot() const;
   void take_back();
   void build(std::vector<std::byte> description);
+  void use_mapping_on(drivers::SourceLayout& layout);
   void report_oddities();
   void warn(const std::string& sentence);
   [[nodiscard]] std::vector<Stream> streams_of(const std::vector<drivers::Body>& bodies,
@@ -111,6 +112,7 @@ class SourceBodies {
   std::uint64_t freed_ = 0;     // StreamSlots::freed() when it was built
   std::uint64_t replaced_ = 0;  // descriptions, as of the last look
   std::string warned_;          // the last sentence
+  std::string misfit_;          // the last one about the user's mapping
 };
 
 }  // namespace posed::devices

@@ -16,7 +16,8 @@ log::SourceRow row_of(const devices::OpenSource& source) {
           .driver = description.driver,
           .text = description.text,
           .identity = description.identity,
-          .config = to_json(source.config.options)};
+          .config = to_json(source.config.options,
+                            source.mapping ? source.mapping->text : std::string())};
 }
 
 }  // namespace

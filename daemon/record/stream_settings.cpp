@@ -16,6 +16,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 using pipeline::StageSettings;
 
+constexpr const char* kMapping = "skeleton mapping";  // no option has a blank in its name
+
 Json to_json_value(const ParameterValue& value) {
   return std::visit([](const auto& it) { return Json(it); }, value);
 }
@@ -114,12 +116,21 @@ Result<StreamSettings> settings_from_json(const std::string& json, const std::st
   }
 }
 
-std::string to_json(const drivers::Options& options) {
+std::string to_json(const drivers::Options& options, const std::string& mapping) {
   Json json = Json::object();
   for (const auto& [name, value] : options) {
     json[name] = to_json_value(value);
   }
+  if (!mapping.empty()) json[kMapping] = mapping;
   return json_text(json);
+}
+
+Result<std::string> mapping_from_json(const std::string& json, const std::string& file) {
+  const Json root = Json::parse(json, nullptr, false);
+  const auto found = root.find(kMapping);
+  if (found == root.end()) return std::string();
+  if (found->is_string()) return found->get<std::string>();
+  return fail("the log is damaged (a source's mapping is no text); use another copy of it", file);
 }
 
 }  // namespace posed::record

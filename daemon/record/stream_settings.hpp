@@ -17,7 +17,9 @@ using pipeline::StreamSettings;
 // log names them. Refuses stages that this version of posed does not have.
 Result<StreamSettings> settings_from_json(const std::string& json, const std::string& file);
 
-// source.config: the options with which a driver was opened.
-[[nodiscard]] std::string to_json(const drivers::Options& options);
+// source.config: the options with which a driver was opened, and the text of the user's mapping of
+// its bodies' joints, empty for none.
+[[nodiscard]] std::string to_json(const drivers::Options& options, const std::string& mapping);
+Result<std::string> mapping_from_json(const std::string& json, const std::string& file);
 
 }  // namespace posed::record

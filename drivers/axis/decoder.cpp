@@ -77,7 +77,7 @@ RT_SAFE std::size_t AxisLayout::body_of(const Avatar& avatar) const noexcept {
   return std::ranges::find(known, avatar, &Known::avatar) - known.begin();
 }
 
-Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description) {
+Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description) {
   const auto list = TRY(parse_list(description));
   auto layout = std::make_unique<AxisLayout>();
   for (const AvatarEntry& entry : list.avatars) {

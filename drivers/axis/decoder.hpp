@@ -36,7 +36,7 @@ class AxisLayout final : public SourceLayout {
 Result<std::shared_ptr<const Skeleton>> skeleton_of(const AvatarEntry& entry, std::uint8_t order);
 
 // Driver::make_layout. Cold.
-Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description);
+Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description);
 
 // The settings that only the options say, because the streams do not.
 struct StreamSettings {

@@ -12,7 +12,7 @@
 
 namespace posed::drivers::chain {
 
-Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description) {
+Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description) {
   v1::Skeleton message;
   if (!message.ParseFromArray(description.data(), static_cast<int>(description.size()))) {
     return fail("the upstream's skeleton is damaged; is it a posed of another version?");

@@ -68,7 +68,8 @@ std::vector<OptionSpec> all_options() {
        .default_value = std::string(),
        .required = true,
        .is_path = true,
-       .help = "what it is: vmg30, opencyberglove, bebop_forte, or a description's path (.toml)"}};
+       .help = "what it is: vmg30, opencyberglove, bebop_forte, or a description's path (.toml)",
+       .path_ending = kDeviceEnding}};
   for (OptionSpec& spec : glove::serial_options(0)) options.push_back(std::move(spec));
   options.push_back({.name = "listen",
                      .default_value = std::string(),

@@ -104,17 +104,16 @@ std::vector<std::string> shipped_devices() {
 }
 
 Result<std::string> device_text(const std::string& device) {
-  if (device.ends_with(".toml")) {
+  if (device.ends_with(kDeviceEnding)) {
     return load_file(device, {.what = kWhat, .max_bytes = kMaxDeviceFile});
   }
-  // The config reader makes every path absolute, including a plain name: the name is its last part.
-  const std::string name = std::filesystem::path(device).filename().string();
   for (const ProfileText& text : device_texts()) {
-    if (text.file == name + ".toml" && describes_packets(text.toml)) return std::string(text.toml);
+    if (text.file == device + ".toml" && describes_packets(text.toml))
+      return std::string(text.toml);
   }
   std::string known;
   for (const std::string& shipped : shipped_devices()) known += " " + shipped;
-  return misuse("posed knows no device " + in_quotes(name) + ", only" + known +
+  return misuse("posed knows no device " + in_quotes(device) + ", only" + known +
                 "; a description of your own is a path that ends in .toml");
 }
 

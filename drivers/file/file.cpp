@@ -6,6 +6,7 @@
 #include "proto/clip/device_clip.hpp"
 #include "proto/clip/figure.hpp"
 #include "proto/clip/format.hpp"
+#include "proto/frame/profile.hpp"
 
 namespace posed::drivers {
 namespace file {
@@ -103,8 +104,10 @@ std::vector<OptionSpec> options() {
        .help = "frames a second of an .amc, which does not say; 0 is 120"},
       {.name = "profile",
        .default_value = std::string(),
+       .is_path = true,
        .help = "skeleton profile: a name, or a file that `posed inspect --write` made; left out, "
-               "the figure is recognised"},
+               "the figure is recognised",
+       .path_ending = kProfileEnding},
       {.name = "up",
        .default_value = std::string(),
        .help = "the axis of a .bvh that points up, such as +z; left out, recognised"},

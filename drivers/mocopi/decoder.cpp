@@ -43,7 +43,7 @@ RT_SAFE std::size_t MocopiLayout::joint_of(std::uint16_t bone) const noexcept {
   return std::ranges::find(id, bone) - id.begin();
 }
 
-Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description) {
+Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description) {
   auto bones = TRY(parse_skeleton(description));
   const BoneEntry* root = nullptr;
   for (BoneEntry& bone : bones) {

@@ -25,7 +25,7 @@ class MocopiLayout final : public SourceLayout {
 };
 
 // Driver::make_layout. Cold.
-Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description);
+Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description);
 
 class MocopiDecoder final : public Decoder {
  public:

@@ -108,7 +108,7 @@ Result<std::shared_ptr<const Skeleton>> skeleton_of(const Character& character) 
   return skeleton;
 }
 
-Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description) {
+Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description) {
   ByteReader reader(description);
   const std::uint8_t version = reader.u8();
   const std::size_t count = reader.u8();

@@ -66,7 +66,7 @@ class MvnLayout final : public SourceLayout {
 };
 
 // Driver::make_layout. Cold.
-Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description);
+Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description);
 
 // "Factory", or "character-0" for one without a name. Cold.
 [[nodiscard]] std::string body_name(const Character& character);

@@ -214,7 +214,7 @@ RT_SAFE std::size_t NatNetLayout::body_of(bool is_skeleton, std::int32_t id) con
   return at - tables.begin();
 }
 
-Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description) {
+Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description) {
   if (description.size() < kDescriptionHeadBytes) {
     return fail("the description of the NatNet server's bodies is cut; record the log again");
   }

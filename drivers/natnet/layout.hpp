@@ -41,6 +41,6 @@ class NatNetLayout final : public SourceLayout {
 };
 
 // Driver::make_layout. Cold.
-Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description);
+Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description);
 
 }  // namespace posed::drivers::natnet

@@ -66,7 +66,7 @@ RT_SAFE std::size_t StudioLayout::body_of(const BodyKey& key) const noexcept {
   return std::ranges::find(plans, key, &BodyPlan::key) - plans.begin();
 }
 
-Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description) {
+Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description) {
   const auto described = TRY(parse_description(description));
   auto layout = std::make_unique<StudioLayout>();
   for (const DescribedBody& body : described) {

@@ -41,7 +41,7 @@ Result<std::shared_ptr<const Skeleton>> skeleton_of(const DescribedBody& body,
                                                     const std::string& name);
 
 // Driver::make_layout. Cold.
-Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description);
+Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description);
 
 class StudioDecoder final : public Decoder {
  public:

@@ -26,7 +26,7 @@ class MocapLayout final : public SourceLayout {
   }
 };
 
-Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description) {
+Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description) {
   const auto entries = TRY(parse_description(description));
   auto layout = std::make_unique<MocapLayout>();
   for (const BodyEntry& entry : entries) {

@@ -85,7 +85,7 @@ RT_SAFE int VmcLayout::place_of(ValueKind kind, std::string_view name) const noe
   return kNone;
 }
 
-Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description) {
+Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description) {
   const auto described = TRY(parse_description(description));
   auto layout = std::make_unique<VmcLayout>();
   layout->joint_of.fill(VmcLayout::kNone);

@@ -36,6 +36,6 @@ class VmcLayout final : public SourceLayout {
 };
 
 // Driver::make_layout. Cold.
-Result<std::unique_ptr<const SourceLayout>> make_layout(std::span<const std::byte> description);
+Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description);
 
 }  // namespace posed::drivers::vmc

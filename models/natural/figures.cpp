@@ -1,8 +1,11 @@
 #include "models/natural/figures.hpp"
 
+#include <algorithm>
+#include <array>
 #include <limits>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "models/feet/foot_score.hpp"
 #include "proto/frame/degree.hpp"
@@ -21,7 +24,69 @@ std::optional<double> there(double number) {
   return number == number ? std::optional(number) : std::nullopt;  // not NaN
 }
 
+// From the hips outwards.
+constexpr std::array kCompared{Bone::kHips,          Bone::kChest,         Bone::kHead,
+                               Bone::kLeftUpperArm,  Bone::kLeftLowerArm,  Bone::kLeftHand,
+                               Bone::kRightUpperArm, Bone::kRightLowerArm, Bone::kRightHand,
+                               Bone::kLeftUpperLeg,  Bone::kLeftLowerLeg,  Bone::kLeftFoot,
+                               Bone::kRightUpperLeg, Bone::kRightLowerLeg, Bone::kRightFoot};
+
+// A limb is what lies between a joint and the next of these bones above it.
+constexpr std::array kLimbEnds{Bone::kLeftLowerArm,  Bone::kLeftHand,     Bone::kRightLowerArm,
+                               Bone::kRightHand,     Bone::kLeftLowerLeg, Bone::kLeftFoot,
+                               Bone::kRightLowerLeg, Bone::kRightFoot};
+
+Eigen::VectorXd limbs_of(const Skeleton& skeleton) {
+  Eigen::VectorXd limbs_m = Eigen::VectorXd::Zero(kLimbEnds.size());
+  for (std::size_t i = 0; i < kLimbEnds.size(); ++i) {
+    int joint = skeleton.joint_of(kLimbEnds[i]);
+    while (joint > 0) {
+      limbs_m[static_cast<Eigen::Index>(i)] += skeleton.joints[joint].offset_m.norm();
+      joint = skeleton.joints[joint].parent;
+      if (skeleton.joints[joint].bone) break;
+    }
+  }
+  return limbs_m;
+}
+
 }  // namespace
+
+std::shared_ptr<const Skeleton> with_one_trunk(std::shared_ptr<const Skeleton> skeleton) {
+  if (!motion::is_person(*skeleton)) return skeleton;
+  auto one = std::make_shared<Skeleton>(*skeleton);
+  int last = -1;
+  for (const Bone bone : {Bone::kSpine, Bone::kChest, Bone::kUpperChest}) {
+    const int joint = skeleton->joint_of(bone);
+    if (joint < 0) continue;
+    one->joints[joint].bone.reset();
+    last = joint;
+  }
+  if (last >= 0) one->joints[last].bone = Bone::kChest;
+  return one;
+}
+
+Result<motion::PoseSpaceSpec> compared_space(const Skeleton& skeleton) {
+  if (!motion::is_person(skeleton)) return describe_space(motion::Space::kNative, skeleton);
+  auto spec = TRY(describe_space(motion::Space::kHumanoid, skeleton));
+  std::vector<std::string> others;
+  for (const std::string& joint : spec.joints) {
+    const auto bone = bone_from_name(joint);
+    if (!bone || std::ranges::find(kCompared, *bone) == kCompared.end()) others.push_back(joint);
+  }
+  remove_joints(others, spec);
+  return spec;
+}
+
+void remove_joints(const std::vector<std::string>& joints, motion::PoseSpaceSpec& spec) {
+  const std::string root = spec.joints[static_cast<std::size_t>(spec.root)];
+  for (const std::string& joint : joints) {
+    const auto found = std::ranges::find(spec.joints, joint);
+    if (found == spec.joints.end() || joint == root) continue;
+    spec.mean.erase(spec.mean.begin() + (found - spec.joints.begin()));
+    spec.joints.erase(found);
+  }
+  spec.root = static_cast<int>(std::ranges::find(spec.joints, root) - spec.joints.begin());
+}
 
 Result<Figures> figures_of(const motion::Rows& angles_deg, double rate_hz) {
   Figures figures;
@@ -40,7 +105,7 @@ Result<Figures> figures_of(const motion::Rows& angles_deg, double rate_hz) {
 }
 
 Result<Figures> figures_of(const motion::Motion& motion, const motion::PoseSpaceSpec& spec) {
-  const auto space = motion::PoseSpace::bind(spec, *motion.skeleton);
+  const auto space = motion::PoseSpace::bind_person(spec, *motion.skeleton);
   if (!space) return fail("its skeleton lacks joints of the clip");
   const motion::Rows angles_deg =
       motion::pose_vectors(motion, *space, motion::walk_heading_rad(motion)) / kDegree;
@@ -48,6 +113,15 @@ Result<Figures> figures_of(const motion::Motion& motion, const motion::PoseSpace
   // The root turns against the world, which no joint limits.
   for (int d = 0; d < space->dims(); ++d) {
     if (space->joint_of_dim(d) == spec.root) figures.low_deg[d] = figures.high_deg[d] = 0.0;
+  }
+  if (spec.space == motion::Space::kHumanoid) {
+    figures.limbs_m = limbs_of(*motion.skeleton);
+    figures.lacks = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(spec.joints.size()));
+    for (std::size_t j = 0; j < spec.joints.size(); ++j) {
+      if (std::ranges::count(space->missing(), spec.joints[j]) > 0) {
+        figures.lacks[static_cast<Eigen::Index>(j)] = 1.0;
+      }
+    }
   }
   figures.slide_cm_s = in_cm(feet::slide_m_s(motion, motion));
   figures.sink_cm = in_cm(feet::below_standing_m(motion));
@@ -59,6 +133,7 @@ void write(const Figures& figures, NumberWriter& numbers) {
   numbers.add(figures.windows.count).add(figures.windows.first).add(figures.windows.second);
   numbers.add(figures.low_deg).add(figures.high_deg);
   numbers.add(figures.slide_cm_s.value_or(kNone)).add(figures.sink_cm.value_or(kNone));
+  numbers.add(figures.limbs_m).add(figures.lacks);
 }
 
 Figures figures_from(NumberReader& numbers) {
@@ -72,6 +147,8 @@ Figures figures_from(NumberReader& numbers) {
   figures.high_deg = numbers.vector();
   figures.slide_cm_s = there(numbers.number());
   figures.sink_cm = there(numbers.number());
+  figures.limbs_m = numbers.vector();
+  figures.lacks = numbers.vector();
   return figures;
 }
 

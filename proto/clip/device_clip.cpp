@@ -11,6 +11,7 @@
 #include "proto/clip/skeleton_json.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/frame/axes_text.hpp"
+#include "proto/frame/profile.hpp"
 #include "proto/rig/up.hpp"
 
 namespace posed::clip {
@@ -114,7 +115,7 @@ Result<FrameCoding> parse_text(const Format& format, const Facts& facts, double 
   options.metres_per_unit = metres;
   // A log names no file: only a built-in profile.
   options.profile = word_of(facts, "profile", "");
-  if (options.profile.ends_with(".toml")) return damaged(name);
+  if (options.profile.ends_with(kProfileEnding)) return damaged(name);
   options.up = up_from_text(word_of(facts, "up", "+y"));
   options.hand_shape = word_of(facts, "shape", kDefaultHandShape);
   options.hand = word_of(facts, "hand", "right") == "left" ? Side::kLeft : Side::kRight;

@@ -102,6 +102,10 @@ Result<Profile> parse_profile(std::string_view text, const std::string& name) {
   return findings.result(std::move(profile));
 }
 
+Result<std::string> load_profile_text(const std::string& file) {
+  return load_file(file, {.what = "skeleton profile", .max_bytes = kMaxProfileBytes});
+}
+
 std::span<const Profile> profiles() {
   static const std::vector<Profile> all = [] {
     std::vector<Profile> read;
@@ -120,9 +124,8 @@ std::span<const Profile> profiles() {
 
 Result<std::shared_ptr<const Profile>> find_profile(const Skeleton& skeleton,
                                                     const std::string& name) {
-  if (name.ends_with(".toml")) {
-    const std::string text =
-        TRY(load_file(name, {.what = "skeleton profile", .max_bytes = kMaxProfileBytes}));
+  if (name.ends_with(kProfileEnding)) {
+    const std::string text = TRY(load_profile_text(name));
     return std::make_shared<const Profile>(TRY(parse_profile(text, name)));
   }
   std::string known;
@@ -139,16 +142,16 @@ Result<std::shared_ptr<const Profile>> find_profile(const Skeleton& skeleton,
 Result<std::vector<std::optional<Bone>>> named_bones(const Profile& profile,
                                                      const Skeleton& skeleton) {
   std::vector<std::optional<Bone>> bones(skeleton.joints.size());
+  constexpr int kListed = 5;
   std::string missing;
+  int count = 0;
   for (const auto& [joint, bone] : profile.bones) {
     const int index = skeleton.joint_index(joint);
-    if (index < 0) {
-      missing += (missing.empty() ? "" : ", ") + joint;
-    } else {
-      bones[index] = bone;
-    }
+    if (index >= 0) bones[index] = bone;
+    if (index < 0 && ++count <= kListed) missing += (missing.empty() ? "" : ", ") + joint;
   }
-  if (!missing.empty()) {
+  if (count > kListed) missing += " and " + std::to_string(count - kListed) + " more";
+  if (count > 0) {
     return fail("the skeleton is not of profile " + in_quotes(profile.name) + ": it has no joint " +
                 missing);
   }

@@ -17,6 +17,9 @@
 
 namespace posed {
 
+// What the name of a user's own file ends in; any other name is that of a built-in profile.
+inline constexpr std::string_view kProfileEnding = ".toml";
+
 struct Profile {
   std::string name;
   std::optional<double> metres_per_unit;  // of a file that does not state its unit
@@ -35,6 +38,8 @@ struct Profile {
 
 // `text` is TOML; `name` is used in error messages. Cold.
 Result<Profile> parse_profile(std::string_view text, const std::string& name);
+// The text of a user's own file. Cold.
+Result<std::string> load_profile_text(const std::string& file);
 
 // Returns the profile called `name`, or the one in the file of this name if it ends in .toml; with
 // an empty name, the first that matches the skeleton and whose bones are all there, or null. An

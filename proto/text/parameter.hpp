@@ -35,6 +35,9 @@ struct ParameterSpec {
   double display_scale = 1.0;
   // A text that is one of these. Where it is live, a number stands for it: its place here.
   std::span<const std::string_view> words{};
+  // What a path ends in, where any other text is the name of what is built in; empty: all are
+  // paths.
+  std::string_view path_ending{};
 
   [[nodiscard]] std::string_view shown_name() const noexcept {
     return display_name.empty() ? name : display_name;

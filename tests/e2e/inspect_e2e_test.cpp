@@ -6,6 +6,7 @@
 #include "models/motion/synthetic_walker.hpp"
 #include "proto/text/load_file.hpp"
 #include "tests/e2e/served.hpp"
+#include "tests/support/free_port.hpp"
 
 namespace posed::test {
 namespace {
@@ -43,6 +44,60 @@ TEST_CASE("inspect names the bones, and its profile gives the same figure back")
   const auto refused = posed({"inspect", clip, "--profile", stage.path("wrong.toml")});
   CHECK(refused.code != 0);
   CHECK(has(refused.err, "nobody"));
+}
+
+TEST_CASE("a running stream is inspected, and its source takes the corrected mapping") {
+  Stage stage;
+  const std::string port = "127.0.0.1:" + std::to_string(free_port());
+  const std::string config = std::string(Stage::kEndpoints) +
+                             "[[source]]\nname = \"room\"\ndriver = \"template_mocap\"\n"
+                             "streams = \"all\"\nMAP[source.template_mocap]\nlisten = \"" +
+                             port + "\"\n";
+  const auto write_config = [&](const std::string& map) {
+    std::string text = config;
+    stage.folder.write("posed.toml", text.replace(text.find("MAP"), 3, map));
+  };
+  const auto inspect = [&](std::vector<std::string> more) {
+    more.insert(more.begin(), {"inspect", "room-walker", "--connect", stage.publish, "--timeout",
+                               "60", "--json"});
+    auto shown = posed(std::move(more));
+    INFO(shown.err);
+    REQUIRE(shown.code == 0);
+    return json::parse(shown.out);
+  };
+  const auto joint_of = [](const json& found, const std::string& bone) {
+    for (const json& one : found.at("bones")) {
+      if (one.at("bone") == bone) return one.at("joint").get<std::string>();
+    }
+    return std::string();
+  };
+  write_config("");
+  stage.launch("run");
+  const Process room({"emulate", "template_mocap", "--udp", port});
+  const std::string map = stage.path("map.toml");
+  const json found = inspect({"--write", map});
+  CHECK(joint_of(found, "head") == "head");
+  CHECK(joint_of(found, "leftUpperLeg") == "leftUpperLeg");
+  CHECK(posed({"inspect", "room-walker", "--up", "+z", "--connect", stage.publish}).code == 2);
+  stage.daemon->send(SIGTERM);
+  REQUIRE(stage.daemon->exit_code() == 0);
+
+  std::string text = load_file(map, {.what = "profile", .max_bytes = 1 << 20}).value();
+  text.replace(text.find("\nhead = "), 5, "\nneck");
+  stage.folder.write("mine.toml", text);
+  write_config("skeleton = \"mine.toml\"\n");
+  stage.record();
+  const json mapped = inspect({});
+  CHECK(joint_of(mapped, "head").empty());
+  CHECK(joint_of(mapped, "neck") == "head");
+  stage.await_frames("room-walker", 20);
+  stage.daemon->send(SIGTERM);
+  REQUIRE(stage.daemon->exit_code() == 0);
+  // The waver has no legs.
+  CHECK(has(stage.daemon->errors(), "mine.toml does not fit its body ... no joint"));
+  const auto replay = posed({"replay", stage.path("take.plog"), "--speed", "max", "--expect"});
+  INFO(replay.err);
+  CHECK(replay.code == 0);
 }
 
 TEST_CASE("compare tells figures and persons apart") {

@@ -66,6 +66,7 @@ void StreamFigure::take_skeleton(std::span<const std::byte> body) {
   skeleton_ = std::move(*skeleton);
   shape_ = std::make_unique<picture::FigureShape>(skeleton_);
   camera_.reset();
+  pose_.reset();
   figure_.reset();
   room_.reset();
 }
@@ -76,13 +77,14 @@ void StreamFigure::take_pose(std::span<const std::byte> body) {
       message.skeleton_id() != wire_id_) {
     return;
   }
-  const auto frame = frame_from(message, *skeleton_);
-  if (!frame) return;
+  auto pose = frame_from(message, *skeleton_);
+  if (!pose) return;
+  pose_ = std::move(pose);
   if (!camera_) {
-    const motion::Motion still{.skeleton = skeleton_, .rate_hz = 1.0, .frames = {*frame}};
+    const motion::Motion still{.skeleton = skeleton_, .rate_hz = 1.0, .frames = {*pose_}};
     camera_.emplace(picture::View::kThreeQuarter, shape_->facing(motion::walk_heading_rad(still)));
   }
-  figure_ = shape_->pose(*frame);
+  figure_ = shape_->pose(*pose_);
 }
 
 void StreamFigure::fit_room() {

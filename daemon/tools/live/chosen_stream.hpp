@@ -34,6 +34,9 @@ class StreamFigure {
   explicit StreamFigure(std::string stream) : stream_(std::move(stream)) {}
 
   [[nodiscard]] const std::string& stream() const { return stream_; }
+  // The stream's skeleton and its last pose; null and empty before the first pose.
+  [[nodiscard]] const std::shared_ptr<const Skeleton>& skeleton() const { return skeleton_; }
+  [[nodiscard]] const std::optional<Frame>& pose() const { return pose_; }
 
   // Takes a message of the daemon; those of other topics than skeleton/ and pose/ of the stream,
   // and what cannot be parsed, change nothing.
@@ -54,6 +57,7 @@ class StreamFigure {
   std::shared_ptr<const Skeleton> skeleton_{};
   std::unique_ptr<picture::FigureShape> shape_{};
   std::optional<picture::Camera> camera_{};
+  std::optional<Frame> pose_{};  // of skeleton_
   std::optional<picture::Figure> figure_{};
   std::optional<picture::StripLayout> room_{};
 };

@@ -1,6 +1,8 @@
-// `posed inspect`: what posed takes a clip's figure for, bone by bone, drawn in T-pose beside the
-// first frame, and the file that corrects it. `posed compare`: whether two clips show one figure.
+// `posed inspect`: what posed takes the figure of a clip or a running stream for, bone by bone,
+// drawn in T-pose beside the first frame, and the file that corrects it. `posed compare`: whether
+// two clips show one figure.
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -13,18 +15,24 @@
 #include <toml++/toml.h>
 #include <CLI/CLI.hpp>
 
+#include "daemon/config/config.hpp"
+#include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
+#include "daemon/tools/live/chosen_stream.hpp"
 #include "daemon/tools/picture/braille.hpp"
 #include "daemon/tools/picture/picture_file.hpp"
 #include "daemon/tools/picture/strip.hpp"
 #include "models/motion/motion.hpp"
+#include "posed/v1/posed.pb.h"
 #include "proto/clip/format.hpp"
 #include "proto/clip/formats.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/whole_file.hpp"
+#include "proto/message/bounded_parse.hpp"
+#include "proto/rig/live.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::tools {
@@ -37,7 +45,15 @@ struct InspectArguments {
   std::string in;
   std::filesystem::path write, out;
   clip::ReadOptions read;
+  ClientOptions client;
+  double timeout_s = 0.0;
   bool overwrite = false, json = false;
+};
+
+// What is inspected: of a stream the clip has no frames, and the motion its one pose.
+struct Inspected {
+  clip::Clip clip;
+  motion::Motion motion;
 };
 
 Result<clip::Clip> read_figure(const std::string& path, const clip::ReadOptions& options) {
@@ -46,10 +62,104 @@ Result<clip::Clip> read_figure(const std::string& path, const clip::ReadOptions&
   return misuse("holds the angles of a known hand; there is no figure to recognise", path);
 }
 
-// The frame in which the figure stands in the T-pose, where the clip's first one stands.
-Frame t_pose(const clip::Clip& clip) {
-  Frame frame = clip.frame(0);
-  const Skeleton& skeleton = *clip.skeleton;
+Result<Inspected> read_file(const InspectArguments& options) {
+  auto clip = TRY(read_figure(options.in, options.read));
+  auto motion = TRY(motion::motion_of(clip));
+  return Inspected{.clip = std::move(clip), .motion = std::move(motion)};
+}
+
+// A file's name has a dot, a slash or a capital, or the file is there.
+bool is_stream(const std::string& in) {
+  std::error_code ignored;
+  return config::is_stream_name(in) && !std::filesystem::exists(in, ignored);
+}
+
+// Fails if the daemon has streams, but not this one, and none can come. Streams of bodies come and
+// go.
+Result<> look_for(const std::string& stream, std::span<const std::byte> bytes) {
+  v1::Stats stats;
+  if (!message::parse_bounded(stats, bytes) || stats.stream().empty() || !stats.source().empty()) {
+    return {};
+  }
+  std::string names;
+  for (const v1::StreamStats& one : stats.stream()) {
+    if (one.stream() == stream) return {};
+    names += (names.empty() ? "" : ", ") + one.stream();
+  }
+  return fail("there is no file and no stream " + in_quotes(stream) + "; the daemon has " +
+              clean(names));
+}
+
+// Waits for the stream's skeleton and a pose of it.
+Result<StreamFigure> await_figure(const InspectArguments& options) {
+  const Interrupt interrupt;
+  const auto begin = std::chrono::steady_clock::now();
+  auto connection = TRY(Connection::open(options.client, ZMQ_SUB));
+  SilenceWatch watch(connection, options.timeout_s);
+  StreamFigure figure(options.in);
+  for (const std::string& topic :
+       {"skeleton/" + options.in, "pose/" + options.in, std::string("stats")}) {
+    TRY(net::set_option(connection.socket(), ZMQ_SUBSCRIBE, topic));
+  }
+  while (!figure.pose()) {
+    if (Interrupt::came()) return fail("interrupted before a pose of " + options.in + " came");
+    if (auto refused = connection.refusal()) return std::unexpected(*refused);
+    if (auto given_up = watch.report()) return std::unexpected(*given_up);
+    const std::chrono::duration<double> waited = std::chrono::steady_clock::now() - begin;
+    if (options.timeout_s > 0.0 && waited.count() >= options.timeout_s) {
+      return fail(
+          fmt::format("no pose of {} came in {} s (--timeout)", options.in, options.timeout_s));
+    }
+    net::Message topic, body;
+    if (!connection.wait(kLookAround) || !connection.receive(topic, body)) continue;
+    watch.beat();
+    figure.handle(topic.text(), body.bytes());
+    if (topic.text() == "stats") TRY(look_for(options.in, body.bytes()));
+  }
+  return figure;
+}
+
+// The recogniser is asked again, for how sure it is. Where it found another bone, somebody who
+// knows has said so.
+std::shared_ptr<const rig::Rig> evidence_of(const Skeleton& skeleton) {
+  rig::Rig rig = rig::recognise(skeleton);
+  for (std::size_t j = 0; j < skeleton.joints.size(); ++j) {
+    const Joint& joint = skeleton.joints[j];
+    if (joint.bone && rig.bone[j] != joint.bone) {
+      rig.evidence[j] = {1.0, "the stream's driver or mapping says so"};
+    }
+    rig.bone[j] = joint.bone;
+    rig.T[j] = joint.T_world_joint;
+  }
+  rig.up = UpAxis::kPlusY;
+  rig.why_up = "as all streams of posed";
+  rig.unit = "m";
+  rig.why_unit.clear();
+  rig.notes.clear();
+  return std::make_shared<const rig::Rig>(std::move(rig));
+}
+
+Result<Inspected> take_stream(const InspectArguments& options) {
+  const clip::ReadOptions& read = options.read;
+  if (!read.profile.empty() || read.up || read.metres_per_unit) {
+    return misuse(options.in +
+                  " is a stream, whose source says what it is; for --profile, --up and --unit name"
+                  " a file");
+  }
+  const auto figure = TRY(await_figure(options));
+  Inspected taken;
+  taken.clip.path = options.in;
+  taken.clip.skeleton = figure.skeleton();
+  taken.clip.metres_per_unit = 1.0;
+  taken.motion = {.skeleton = figure.skeleton(), .rate_hz = 1.0, .frames = {*figure.pose()}};
+  taken.clip.rig = evidence_of(*figure.skeleton());
+  return taken;
+}
+
+// The frame in which the figure stands in the T-pose, where the first one stands.
+Frame t_pose(const motion::Motion& motion) {
+  Frame frame = motion.frames[0];
+  const Skeleton& skeleton = *motion.skeleton;
   for (std::size_t j = 0; j < skeleton.joints.size(); ++j) {
     const Joint& joint = skeleton.joints[j];
     const Eigen::Quaterniond parent = joint.parent < 0
@@ -71,13 +181,12 @@ struct Drawing {
   }
 };
 
-Result<Drawing> drawing_of(const clip::Clip& clip) {
-  const auto motion = TRY(motion::motion_of(clip));
-  Drawing drawing{.shape = picture::FigureShape(clip.skeleton),
+Drawing drawing_of(const motion::Motion& motion) {
+  Drawing drawing{.shape = picture::FigureShape(motion.skeleton),
                   .rows = {},
                   .heading_rad = motion::walk_heading_rad(motion)};
   drawing.rows.push_back({.title = "", .poses = {}});
-  drawing.rows[0].poses.push_back({drawing.shape.pose(t_pose(clip)), "T-pose"});
+  drawing.rows[0].poses.push_back({drawing.shape.pose(t_pose(motion)), "T-pose"});
   drawing.rows[0].poses.push_back({drawing.shape.pose(motion.frames[0]), "first frame"});
   return drawing;
 }
@@ -199,13 +308,14 @@ std::string profile_text(const clip::Clip& clip) {
 }
 
 Result<> run_inspect(const InspectArguments& options) {
+  const bool live = is_stream(options.in);
   TRY(OutputFiles(options.overwrite)
-          .reads(options.in)
+          .reads(live ? std::string() : options.in)
           .writes(options.write, {".toml"})
           .writes(options.out, {".svg", ".png"})
           .check());
-  const auto clip = TRY(read_figure(options.in, options.read));
-  const auto drawing = TRY(drawing_of(clip));
+  const auto [clip, motion] = TRY(live ? take_stream(options) : read_file(options));
+  const Drawing drawing = drawing_of(motion);
   if (!options.write.empty()) TRY(write_whole_file(options.write, profile_text(clip)));
   if (!options.out.empty()) {
     const auto camera = drawing.camera(picture::View::kThreeQuarter, 0.0);
@@ -283,16 +393,22 @@ Result<int> run_compare(const std::string& a, const std::string& b, bool json) {
 
 void add_inspect(CLI::App& app, int& exit_code) {
   CLI::App* command =
-      app.add_subcommand("inspect", "Show what posed takes a clip's figure for, bone by bone");
+      app.add_subcommand("inspect", "Show what posed takes a figure for, bone by bone");
   const auto options = std::make_shared<InspectArguments>();
-  command->add_option("IN", options->in, "The clip: " + clip::listed(clip::Use::kRead))->required();
+  command
+      ->add_option("IN", options->in,
+                   "A stream of a running daemon, or a clip: " + clip::listed(clip::Use::kRead))
+      ->required();
   command
       ->add_option("--write", options->write,
-                   "Write it as a profile to correct, which --profile and [stream.file] take")
+                   "Write it as a profile to correct, which --profile, [stream.file] and a "
+                   "source's skeleton take")
       ->type_name("MAP.toml");
   command->add_option("--out", options->out, "Draw T-pose and first frame")
       ->type_name("OUT.svg|png");
   add_figure_options(*command, options->read);
+  add_client_options(*command, options->client, kOwnPublish);
+  add_timeout_option(*command, options->timeout_s);
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "Print the findings as JSON on stdout");
   command->callback([options, &exit_code] {

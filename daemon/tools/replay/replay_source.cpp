@@ -54,7 +54,7 @@ Result<> ReplaySource::open_device() {
   auto decoder = TRY(driver_.make_decoder(description));
   device_ = std::move(description);
   decoder_ = std::move(decoder);
-  if (has_several()) return {};
+  if (has_several()) return open_mapping();
   // Its stream may have been built several times, in one slot.
   const auto is_other = [this](const ReplayStreamContext* stream) {
     return pipeline::slot_of(stream->log_id()) != pipeline::slot_of(streams_[0]->log_id());
@@ -74,6 +74,12 @@ Result<> ReplaySource::open_device() {
   return places_[0]->describe(device_, false);
 }
 
+Result<> ReplaySource::open_mapping() {
+  auto text = TRY(record::mapping_from_json(source_.config, file_));
+  if (!text.empty()) mapping_ = TRY(drivers::parse_mapping(std::move(text), file_));
+  return {};
+}
+
 ReplayStreamContext* ReplaySource::find(std::uint32_t log_id) const {
   const auto found = std::ranges::lower_bound(streams_, log_id, {}, &ReplayStreamContext::log_id);
   return found == streams_.end() || (*found)->log_id() != log_id ? nullptr : *found;
@@ -88,6 +94,8 @@ Result<std::shared_ptr<const drivers::SourceLayout>> ReplaySource::layout_of(
   std::string hash = log::sha256_hex(description);
   if (const auto known = layouts_.find(hash); known != layouts_.end()) return known->second;
   auto made = TRY(driver_.make_layout(description));
+  // The live run has said what does not fit.
+  if (mapping_) static_cast<void>(drivers::use_mapping(*mapping_, *made));
   if (layouts_.size() == kKeptLayouts) layouts_.clear();
   return layouts_.emplace(std::move(hash), std::move(made)).first->second;
 }

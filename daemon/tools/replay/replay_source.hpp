@@ -15,6 +15,7 @@
 #include "daemon/pipeline/intake.hpp"
 #include "daemon/tools/replay/replay_stream_context.hpp"
 #include "drivers/driver.hpp"
+#include "drivers/mapping.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/log/rows.hpp"
 
@@ -48,6 +49,7 @@ class ReplaySource final : private pipeline::IntakeOut {
   };
 
   Result<> open_device();
+  Result<> open_mapping();
   Result<Bodies> bodies_of(const log::ChunkRow& row);
   Result<std::shared_ptr<const drivers::SourceLayout>> layout_of(
       std::span<const std::byte> description);
@@ -79,6 +81,7 @@ class ReplaySource final : private pipeline::IntakeOut {
   std::string file_;
   drivers::Description device_;  // from its latest device info
   std::unique_ptr<drivers::Decoder> decoder_;
+  std::optional<drivers::Mapping> mapping_;  // the user's word about the joints of its bodies
   std::unique_ptr<const devices::OwnedCalibration> calibration_;  // null: use the device's default
   drivers::Body only_;  // of a device that does not describe its bodies
   // Cache of recent layouts, keyed by the SHA-256 of their description; a recording has few

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -112,6 +113,19 @@ Result<Findings> try_stream(const config::StreamConfig& config,
   return findings;
 }
 
+// The models that the bodies of a source will have.
+std::set<std::string> models_of(const config::SourceConfig& source) {
+  std::set<std::string> models;
+  const auto add = [&models](const config::StreamConfig& stream) {
+    for (const config::StageConfig& stage : stream.stages) {
+      if (!stage.model.empty()) models.insert(stage.model.filename().string());
+    }
+  };
+  add(source.every);
+  for (const auto& named : source.named) add(named.stream);
+  return models;
+}
+
 // What is known about a source before its device describes its bodies. The line is like "optitrack:
 // template_mocap, body 'Ann' as ann, all other bodies".
 Findings findings_of(const config::SourceConfig& source) {
@@ -122,12 +136,21 @@ Findings findings_of(const config::SourceConfig& source) {
     line += ", body " + in_quotes(named.body) + " as " + named.stream.name;
   }
   if (source.all) line += streams.empty() ? ", all bodies" : ", all other bodies";
-  return Findings()
-      .add("name", source.name)
+  const std::set<std::string> models = models_of(source);
+  Findings findings;
+  findings.add("name", source.name)
       .add("driver", source.driver)
       .add("all", source.all)
       .add("streams", streams)
+      .add("models", std::vector(models.begin(), models.end()))
       .say(line);
+  if (!models.empty()) {
+    findings.say(
+        fmt::format("  note: each body is asked whether {} can serve it when it comes; "
+                    "`posed top` shows one that is refused, and why",
+                    clean(fmt::format("{}", fmt::join(models, ", ")))));
+  }
+  return findings;
 }
 
 // The line is like "output vmc-ann: vmc, body ann, to 127.0.0.1:39539".

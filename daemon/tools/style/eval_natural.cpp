@@ -19,6 +19,7 @@
 #include "daemon/tools/style/natural_clips.hpp"
 #include "models/natural/compare.hpp"
 #include "proto/clip/format.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::tools {
 namespace {
@@ -42,27 +43,53 @@ most; of bodies also slide_cm_s: speed over the ground of ankles and toes slower
 sink_cm: how far the lowest toe is below the height at which toes stand. Angles are the components
 of the joints' rotation vectors about the clip's mean pose; of hands, the 45 angles.
 
-Clips without the joints of this one, and clips shorter than 49 frames, are left out and listed.)";
+Persons are compared by the bones of hips, trunk, head, arms and legs that all clips have, whatever
+their joints are called; other figures by the names of their joints. Clips without them, and clips
+shorter than 49 frames, are left out and listed. Each clip of a corpus of several persons, who are
+told apart by the lengths of their limbs, is measured against those of the others. Fewer than ten
+persons do not show how much people differ, so at least a usual difference is allowed.)";
 
 struct EvalNaturalOptions : NaturalOptions {
   ReportFile report;
   bool json = false;
 };
 
-std::string natural_verdict(const natural::Comparison& comparison, std::size_t clips) {
+// What makes the spread of this corpus a rough one; empty: nothing.
+std::string doubts(const natural::Comparison& comparison, std::size_t clips) {
+  constexpr std::size_t kFewClips = 10;
+  std::string out;
+  if (comparison.persons > 0 && comparison.persons < natural::kMinPersons) {
+    out = fmt::format(
+        "the corpus is of {}, so people may differ by a usual amount, too",
+        comparison.persons == 1 ? "one person" : fmt::format("{} persons", comparison.persons));
+  }
+  if (clips >= kFewClips) return out;
+  return fmt::format("{}{}the corpus has {} clips, and fewer than {} have a rough spread", out,
+                     out.empty() ? "" : "; ", clips, kFewClips);
+}
+
+// " (leftHand)": the joint that goes beyond its range.
+std::string furthest_joint(const natural::Placed& placed, const NaturalClips& clips,
+                           const natural::Comparison& comparison) {
+  const auto joint = static_cast<std::size_t>(comparison.furthest / 3);
+  if (placed.name != "beyond_deg" || joint >= clips.joints.size()) return {};
+  return " (" + clean_name(clips.joints[joint]) + ")";
+}
+
+std::string natural_verdict(const natural::Comparison& comparison, const NaturalClips& clips) {
   std::string out;
   for (const natural::Placed& placed : comparison.figures) {
     if (placed.natural) continue;
     const std::string value = std::isfinite(placed.value)
                                   ? fmt::format("is {:.3g}", placed.value)
                                   : "cannot be measured (feet that never stand, or a still figure)";
-    out += fmt::format("{}{} {}, the corpus has {:.3g} to {:.3g}",
-                       out.empty() ? "not natural: " : "; ", placed.name, value, placed.p5,
-                       placed.p95);
+    out += fmt::format("{}{} {}{}, the corpus has {:.3g} to {:.3g}",
+                       out.empty() ? "not natural: " : "; ", placed.name, value,
+                       furthest_joint(placed, clips, comparison), placed.p5, placed.p95);
   }
   if (!out.empty()) return out;
   return fmt::format("natural by all {} figures, beside {} clips", comparison.figures.size(),
-                     clips);
+                     clips.corpus.size());
 }
 
 Findings findings_of(const EvalNaturalOptions& options, const NaturalClips& clips,
@@ -89,11 +116,13 @@ Findings findings_of(const EvalNaturalOptions& options, const NaturalClips& clip
     left_out.push_back(Findings().add("file", file.file).add("why", file.why));
   }
   const bool natural = std::ranges::all_of(comparison.figures, &natural::Placed::natural);
-  const std::string verdict = natural_verdict(comparison, clips.corpus.size());
+  const std::string verdict = natural_verdict(comparison, clips);
   Findings findings;
   findings.add("clip", options.clip.string())
       .add("corpus", options.corpus.string())
       .add("clips", clips.corpus.size())
+      .add("persons", comparison.persons)
+      .add("doubts", doubts(comparison, clips.corpus.size()))
       .add("left_out", left_out)
       .add("rate_hz", options.rate_hz)
       .add("dimensions", comparison.dimensions)
@@ -105,6 +134,8 @@ Findings findings_of(const EvalNaturalOptions& options, const NaturalClips& clip
     findings.note(fmt::format("warning: {} clips left out: {} ({}){}", left_out.size(), first.file,
                               first.why, left_out.size() > 1 ? ", ...; --json lists them" : ""));
   }
+  const std::string rough = doubts(comparison, clips.corpus.size());
+  if (!rough.empty()) findings.note("note: " + rough);
   return findings.verdict(verdict, natural);
 }
 
@@ -112,7 +143,7 @@ Result<> write_natural_report(const natural::Comparison& comparison, const Natur
                               const Findings& findings, const std::filesystem::path& path) {
   report::Page page("Whether people move so", "posed eval natural");
   const bool natural = std::ranges::all_of(comparison.figures, &natural::Placed::natural);
-  page.verdict(natural_verdict(comparison, clips.corpus.size()), natural);
+  page.verdict(natural_verdict(comparison, clips), natural);
   report::Table table{
       .columns =
           {{"figure", false}, {"clip"}, {"p5"}, {"median"}, {"p95"}, {"below, %"}, {"", false}},

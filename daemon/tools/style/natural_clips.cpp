@@ -31,7 +31,7 @@ class Measure {
     Measure measure(options);
     if (measure.of_hands()) return measure;
     const auto motion = TRY(measure.body(options.clip));
-    auto spec = TRY(motion::describe_space(motion::Space::kNative, *motion.skeleton));
+    auto spec = TRY(natural::compared_space(*motion.skeleton));
     const std::array<const motion::Motion*, 1> one{&motion};
     TRY(motion::set_mean_rotations(one, spec));
     measure.spec_ = std::move(spec);
@@ -48,6 +48,20 @@ class Measure {
     if (format->is_hand) return of_hands();
     // A body holds two hands, so only --hand says which.
     return !of_hands() || !options_.hand.empty();
+  }
+
+  [[nodiscard]] const std::vector<std::string>& joints() const { return spec_.joints; }
+  // Compares from now on without the bones that one of these lacks. Returns whether there are such.
+  bool leave_out_lacking(const std::vector<natural::Figures>& corpus) {
+    std::vector<std::string> lacking;
+    for (std::size_t j = 0; j < spec_.joints.size(); ++j) {
+      const auto lacks = [j](const natural::Figures& figures) {
+        return figures.lacks.size() > 0 && figures.lacks[static_cast<Eigen::Index>(j)] > 0.0;
+      };
+      if (std::ranges::any_of(corpus, lacks)) lacking.push_back(spec_.joints[j]);
+    }
+    natural::remove_joints(lacking, spec_);
+    return !lacking.empty();
   }
 
   Result<natural::Figures> operator()(const Path& path) const {
@@ -70,6 +84,7 @@ class Measure {
     const auto read = TRY(clip::read_clip(path, how(path)));
     auto motion = TRY(motion::motion_of(read));
     if (motion::begins_with_added_pose(motion)) motion::drop_first_frame(motion);
+    motion.skeleton = natural::with_one_trunk(motion.skeleton);
     return motion::resample(motion, options_.rate_hz);
   }
   Result<natural::Figures> body_figures(const Path& path) const {
@@ -157,11 +172,8 @@ void add_clip(const Path& file, const TaskResult& numbers, NaturalClips& clips) 
   }
 }
 
-}  // namespace
-
-Result<NaturalClips> read_natural_clips(const NaturalOptions& options, TaskRunner& tasks,
-                                        const ReadProgress& progress) {
-  const auto measure = TRY(Measure::of(options));
+Result<NaturalClips> read_all(const NaturalOptions& options, const Measure& measure,
+                              TaskRunner& tasks, const ReadProgress& progress) {
   NaturalClips clips;
   clips.clip = TRY(measure(options.clip));
   const auto files = TRY(files_of(options.corpus, measure));
@@ -179,6 +191,19 @@ Result<NaturalClips> read_natural_clips(const NaturalOptions& options, TaskRunne
       add_clip(files[first + i], (*found)[i], clips);
     }
   }
+  return clips;
+}
+
+}  // namespace
+
+Result<NaturalClips> read_natural_clips(const NaturalOptions& options, TaskRunner& tasks,
+                                        const ReadProgress& progress) {
+  auto measure = TRY(Measure::of(options));
+  auto clips = TRY(read_all(options, measure, tasks, progress));
+  if (measure.leave_out_lacking(clips.corpus)) {
+    clips = TRY(read_all(options, measure, tasks, progress));
+  }
+  clips.joints = measure.joints();
   TRY(check_enough(clips, options.corpus));
   return clips;
 }

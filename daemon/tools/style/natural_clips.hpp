@@ -28,6 +28,7 @@ struct NaturalClips {
   natural::Figures clip;
   std::vector<natural::Figures> corpus;
   std::vector<LeftOut> left_out;
+  std::vector<std::string> joints;  // of bodies, that are compared: three channels each
 };
 
 // Receives the fraction done; returning false stops.

@@ -413,6 +413,23 @@ TEST_CASE("a config that is missing or not text gives one sentence") {
   }
 }
 
+TEST_CASE("a file that an option may name beside built-in names lies in the config's folder") {
+  const auto option_of = [](const std::string& driver, const std::string& options,
+                            const std::string& name) {
+    const Reading reading = read_config("[[stream]]\nname = \"a\"\ndriver = \"" + driver +
+                                            "\"\n[stream." + driver + "]\n" + options,
+                                        "stage/posed.toml", drivers::registry());
+    for (const Error& error : reading.errors) FAIL_CHECK(error.text());
+    return std::get<std::string>(reading.config.streams.at(0).options.at(name));
+  };
+  CHECK(option_of("file", "path = \"a.bvh\"\nprofile = \"map.toml\"\n", "profile") ==
+        "stage/map.toml");
+  CHECK(option_of("file", "path = \"a.bvh\"\nprofile = \"cmu\"\n", "profile") == "cmu");
+  CHECK(option_of("file", "path = \"a.bvh\"\n", "profile").empty());
+  CHECK(option_of("described", "device = \"mine.toml\"\n", "device") == "stage/mine.toml");
+  CHECK(option_of("described", "device = \"vmg30\"\n", "device") == "vmg30");
+}
+
 // The shipped file with every "#key = value" and "#[table]" line uncommented.
 std::string shipped(bool with_commented_defaults) {
   std::ifstream file(test::source_dir() / "config/posed.toml");

@@ -5,7 +5,7 @@
 namespace posed::config {
 namespace {
 
-Result<std::unique_ptr<const drivers::SourceLayout>> no_bodies(std::span<const std::byte>) {
+Result<std::unique_ptr<drivers::SourceLayout>> no_bodies(std::span<const std::byte>) {
   return fail("not used here");
 }
 

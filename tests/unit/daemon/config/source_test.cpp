@@ -6,7 +6,7 @@
 namespace posed::config {
 namespace {
 
-Result<std::unique_ptr<const drivers::SourceLayout>> no_layout(std::span<const std::byte>) {
+Result<std::unique_ptr<drivers::SourceLayout>> no_layout(std::span<const std::byte>) {
   return fail("not used here");
 }
 
@@ -45,6 +45,16 @@ name = "ann"
 source = "optitrack"
 body = "Ann"
 )";
+
+TEST_CASE("the mapping of joints belongs to a source and lies in the config's folder") {
+  const Reading reading =
+      read_sources(std::string(kOptitrack) + "streams = \"all\"\nskeleton = \"map.toml\"\n");
+  for (const Error& error : reading.errors) FAIL_CHECK(error.text());
+  CHECK(reading.config.sources.at(0).skeleton == "stage/map.toml");
+  const Reading body = read_sources(std::string(kOptitrack) + kAnn + "skeleton = \"map.toml\"\n");
+  REQUIRE(body.errors.size() == 1);
+  CHECK(body.errors[0].text().contains("in its [[source]] table"));
+}
 
 // The only error for this text, with its line.
 std::string source_complaint(const std::string& text) {

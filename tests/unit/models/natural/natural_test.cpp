@@ -14,11 +14,13 @@ namespace {
 using motion::WalkerFamily;
 
 motion::Motion walker(const motion::WalkerOptions& options) {
-  return motion::motion_of(motion::make_walker(options).value()).value();
+  auto motion = motion::motion_of(motion::make_walker(options).value()).value();
+  motion.skeleton = with_one_trunk(motion.skeleton);
+  return motion;
 }
 
 motion::PoseSpaceSpec spec_of(const motion::Motion& motion) {
-  auto spec = motion::describe_space(motion::Space::kNative, *motion.skeleton).value();
+  auto spec = compared_space(*motion.skeleton).value();
   const std::array<const motion::Motion*, 1> one{&motion};
   REQUIRE(motion::set_mean_rotations(one, spec));
   return spec;
@@ -72,6 +74,50 @@ TEST_CASE("another style is far by its poses, not by its roughness", "[natural]"
   CHECK_FALSE(figure(sway, "frechet_deg2").natural);
   CHECK(figure(sway, "beyond_deg").value > figure(sway, "beyond_deg").p95);
   CHECK(figure(sway, "jerk").natural);
+}
+
+TEST_CASE("persons are compared by their bones, whatever their joints are called") {
+  const auto motion = walker({.family = WalkerFamily::kMarch, .person = 3});
+  const auto spec = spec_of(motion);
+  CHECK(spec.joints.size() <= 15);
+  auto other = motion;
+  auto renamed = std::make_shared<Skeleton>(*motion.skeleton);
+  for (Joint& joint : renamed->joints) joint.name = "rig:" + joint.name;
+  other.skeleton = renamed;
+  const Figures figures = figures_of(motion, spec).value();
+  const Figures same = figures_of(other, spec).value();
+  CHECK(same.jerk == figures.jerk);
+  CHECK(same.low_deg == figures.low_deg);
+  CHECK(same.limbs_m == figures.limbs_m);
+  CHECK(same.lacks.sum() == 0.0);
+
+  renamed->joints[renamed->joint_of(Bone::kHead)].bone.reset();
+  const Figures headless = figures_of(other, spec).value();
+  CHECK(headless.lacks.sum() == 1.0);
+  auto reduced = spec;
+  remove_joints({"head", "hips"}, reduced);  // not the root
+  CHECK(reduced.joints.size() == spec.joints.size() - 1);
+  CHECK(reduced.joints[reduced.root] == "hips");
+  CHECK(reduced.mean.size() == reduced.joints.size());
+  CHECK(figures_of(motion, reduced).value().jerk == figures_of(other, reduced).value().jerk);
+}
+
+TEST_CASE("a corpus of few persons leaves room for another one, a large one says how much") {
+  Figures clip = figures_of(motion::Rows(motion::Rows::Random(200, 3) * 10.0), 30.0).value();
+  clip.limbs_m = Eigen::VectorXd::Constant(8, 0.3);
+  Figures near = clip;
+  near.jerk *= 1.4;
+  std::vector<Figures> corpus(12, clip);
+  SerialTasks tasks;
+  const auto alone = compare(near, corpus, tasks, {}).value();
+  CHECK(alone.persons == 1);
+  CHECK(figure(alone, "jerk").natural);
+  for (std::size_t i = 0; i < corpus.size(); ++i) {
+    corpus[i].limbs_m *= 1.0 + 0.1 * static_cast<double>(i);
+  }
+  const auto several = compare(near, corpus, tasks, {}).value();
+  CHECK(several.persons == 12);
+  CHECK_FALSE(figure(several, "jerk").natural);
 }
 
 TEST_CASE("figures keep their bits as a task's numbers, in any order of tasks", "[natural]") {

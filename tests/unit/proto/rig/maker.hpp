@@ -84,8 +84,14 @@ inline int maker_parent(int b) {
   return leg ? 0 : b - 1;
 }
 
+// How a person differs from the usual one: factors on lengths, and how far an A-pose's arms hang.
+struct Build {
+  double height = 1.0, trunk = 1.0, arms = 1.0, legs = 1.0, shoulders = 1.0;
+  double arms_down_deg = 45.0;
+};
+
 // From each joint's parent to it in the T-pose [m].
-inline Vec maker_offset(int b) {
+inline Vec maker_offset(int b, const Build& build = {}) {
   static const std::array<Vec, 14> kOffsets{{{0, .93, 0},
                                              {0, .1, 0},
                                              {0, .12, 0},
@@ -100,18 +106,20 @@ inline Vec maker_offset(int b) {
                                              {0, -.42, 0},
                                              {0, -.4, 0},
                                              {0, -.07, .13}}};
-  if (b < 6) return kOffsets[b];
+  if (b < 6) return build.height * (b == 0 ? build.legs : build.trunk) * kOffsets[b];
   const int limb = (b - 6) % 8;
   const bool right = limb >= 4;
-  Vec offset = kOffsets[(b < 14 ? 6 : 10) + limb % 4];
+  const bool arm = b < 14;
+  Vec offset = kOffsets[(arm ? 6 : 10) + limb % 4];
   if (right) offset.x() = -offset.x();
-  return offset;
+  const bool at_trunk = limb % 4 == 0 || (arm && limb % 4 == 1);
+  return build.height * (at_trunk ? build.shoulders : arm ? build.arms : build.legs) * offset;
 }
 
 enum class ZeroPose { kT, kA, kArmsDown, kFolded };
 
 // T of the joint in the figure's own axes.
-inline Mat maker_t(int b, ZeroPose zero) {
+inline Mat maker_t(int b, ZeroPose zero, const Build& build = {}) {
   const bool arm = b > 6 && b < 14 && b != 10;
   const bool left = b < 10 || (b >= 14 && b < 18);
   if (zero == ZeroPose::kFolded) {  // every bone along its own +x, as LaFAN1
@@ -126,13 +134,14 @@ inline Mat maker_t(int b, ZeroPose zero) {
     return rig::frame(rig::kX, to, rig::kZ, lateral);
   }
   if (!arm || zero == ZeroPose::kT) return Mat::Identity();
-  const double raise = (zero == ZeroPose::kA ? 45 : 88) * kDegree;
+  const double raise = (zero == ZeroPose::kA ? build.arms_down_deg : 88.0) * kDegree;
   return Eigen::AngleAxisd(left ? raise : -raise, rig::kZ).toRotationMatrix();
 }
 
 struct Made {
   rig::RigInput input;
-  std::vector<Mat> T;  // [joint], the truth
+  std::vector<Mat> T;      // [joint], the truth
+  std::vector<Bone> bone;  // [joint]; empty: in the order of the enum
 };
 
 // Canonical local rotation of each joint in frame `i` of a walk: knees, elbows and shoulders move,
@@ -157,22 +166,24 @@ inline std::vector<Mat> walk_pose(int i) {
 
 // `from_figure` turns the figure's axes into the file's.
 inline Made make(const Scheme& scheme, ZeroPose zero, const Mat& from_figure,
-                 double metres_per_unit, int first_frame = 0, int frames = 40) {
+                 double metres_per_unit, int first_frame = 0, int frames = 40,
+                 const Build& build = {}) {
   Made made;
   std::vector<Vec> offsets;
   for (int b = 0; b < kMakerJoints; ++b) {
     const int parent = b == 0 ? -1 : maker_parent(b);
-    const Mat T_parent = parent < 0 ? Mat(Mat::Identity()) : maker_t(parent, zero);
-    const Vec offset = from_figure * T_parent.transpose() * maker_offset(b) / metres_per_unit;
+    const Mat T_parent = parent < 0 ? Mat(Mat::Identity()) : maker_t(parent, zero, build);
+    const Vec offset =
+        from_figure * T_parent.transpose() * maker_offset(b, build) / metres_per_unit;
     made.input.joints.push_back({.name = maker_name(scheme, static_cast<Bone>(b)),
                                  .parent = parent,
                                  .offset = offset,
                                  .end_site = {}});
     if (b == static_cast<int>(Bone::kHead)) {
       made.input.joints.back().end_site =
-          from_figure * maker_t(b, zero).transpose() * Vec(0, .18, 0) / metres_per_unit;
+          from_figure * maker_t(b, zero, build).transpose() * Vec(0, .18, 0) / metres_per_unit;
     }
-    made.T.push_back(maker_t(b, zero) * from_figure.transpose());
+    made.T.push_back(maker_t(b, zero, build) * from_figure.transpose());
   }
   auto& poses = made.input.poses;
   poses.count = frames;

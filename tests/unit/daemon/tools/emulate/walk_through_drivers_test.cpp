@@ -11,6 +11,7 @@
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/live/style_filter.hpp"
 #include "models/style/train/train.hpp"
+#include "proto/clip/frames_clip.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/shared.hpp"
@@ -149,6 +150,41 @@ std::vector<ReceivedPose> styled(const style::StyleModel& model, std::vector<Rec
   return walker;
 }
 
+// What `convert` writes of a recording is read again as the same figure and the same poses.
+void check_read_back(const std::vector<ReceivedPose>& walker) {
+  const test::TempFolder folder;
+  const auto path = folder.path() / "recorded.bvh";
+  const Skeleton& sent = *walker[0].skeleton;
+  clip::FramesClip frames(walker[0].skeleton);
+  std::vector<double> time_s;
+  for (const ReceivedPose& received : walker) {
+    frames.add(received.frame);
+    time_s.push_back(0.01 * static_cast<double>(time_s.size()));
+  }
+  auto recorded = frames.finish("recorded", 100.0, std::move(time_s));
+  REQUIRE(recorded);
+  clip::hold_missing(*recorded);
+  REQUIRE(clip::write_bvh(*recorded, path));
+  const auto read = clip::read_clip(path);
+  REQUIRE(read);
+  for (int b = 0; b < kBones; ++b) {
+    const auto bone = static_cast<Bone>(b);
+    const int from = sent.joint_of(bone), to = read->skeleton->joint_of(bone);
+    INFO(bone_name(bone));
+    CHECK((from < 0) == (to < 0));
+    if (from < 0 || to < 0) continue;
+    CHECK(read->skeleton->joints[to].name == sent.joints[from].name);
+    CHECK((read->skeleton->joints[to].offset_m - sent.joints[from].offset_m).norm() < 1e-4);
+    CHECK(angle_between_rad(read->skeleton->joints[to].T_world_joint,
+                            sent.joints[from].T_world_joint) < kWithin_rad);
+  }
+  for (std::size_t i = 0; i < walker.size(); i += 10) {
+    Difference off;
+    off.add(Turns(sent, walker[i].frame), Turns(*read->skeleton, read->frame(static_cast<int>(i))));
+    CHECK(off.most_rad < kWithin_rad);
+  }
+}
+
 void check(const Walk& walk) {
   const style::StyleModel model = humanoid_model();
   std::vector<std::string_view> without_style;
@@ -160,6 +196,7 @@ void check(const Walk& walk) {
     REQUIRE(walker.size() > 100);
     const auto file = walk.from_file(walker);
     CHECK(Walk::difference(walker, file).most_rad < kWithin_rad);
+    check_read_back(walker);
     const auto styled_walker = styled(model, walker);
     if (styled_walker.empty()) {
       without_style.push_back(driver.name);

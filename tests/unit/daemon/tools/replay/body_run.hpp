@@ -24,6 +24,7 @@
 #include "daemon/record/decision_code.hpp"
 #include "daemon/record/stream_settings.hpp"
 #include "drivers/driver.hpp"
+#include "drivers/mapping.hpp"
 #include "drivers/template_mocap/emulator.hpp"
 #include "proto/log/writer.hpp"
 #include "proto/message/frame_message.hpp"
@@ -34,13 +35,16 @@ class BodyRun final : private pipeline::IntakeOut {
  public:
   static constexpr std::uint32_t kSource = 0;
 
-  explicit BodyRun(const std::filesystem::path& path)
+  // `mapping`: the text of the user's mapping of the joints; empty: none.
+  explicit BodyRun(const std::filesystem::path& path, const std::string& mapping = {})
       : writer_(log::Writer::create(path, {}).value()),
         driver_(*drivers::find_driver("template_mocap")),
         intake_(next_item_, *this) {
     const drivers::Description device = driver_.describe("template_mocap rate=100", "udp").value();
     decoder_ = driver_.make_decoder(device).value();
-    REQUIRE(writer_.add(log::SourceRow{kSource, "room", device.driver, device.text, "udp", "{}"}));
+    REQUIRE(writer_.add(log::SourceRow{kSource, "room", device.driver, device.text, "udp",
+                                       record::to_json(drivers::Options{}, mapping)}));
+    if (!mapping.empty()) mapping_ = drivers::parse_mapping(mapping, "map.toml").value();
   }
 
   // What the emulator sends until this time [s].
@@ -169,6 +173,7 @@ class BodyRun final : private pipeline::IntakeOut {
   void use(const std::vector<std::byte>& description) {
     auto layout = driver_.make_layout(description);
     REQUIRE(layout);
+    if (mapping_) static_cast<void>(drivers::use_mapping(*mapping_, **layout));
     for (const auto& stream : streams_) {
       if (stream->place < 0) continue;
       const drivers::Body* same = nullptr;
@@ -226,6 +231,7 @@ class BodyRun final : private pipeline::IntakeOut {
   log::Writer writer_;
   const drivers::Driver& driver_;
   std::unique_ptr<drivers::Decoder> decoder_;
+  std::optional<drivers::Mapping> mapping_;
   std::unique_ptr<const drivers::SourceLayout> layout_;
   std::uint64_t next_item_ = 1;
   pipeline::Intake intake_;

@@ -90,6 +90,25 @@ TEST_CASE("bodies that come, go and change replay bit for bit", "[replay]") {
   CHECK(replayed(path, false).frames == result.frames);
 }
 
+TEST_CASE("what the user said of a source's joints replays with it", "[replay]") {
+  const TempFolder folder;
+  const auto path = folder.path() / "mapped.plog";
+  BodyRun run(path, "name = \"room\"\n[bones]\nhips = \"hips\"\nspine = \"leftUpperLeg\"\n");
+  drivers::mocap::MocapEmulator room(100.0);
+  run.follow(room, 1.0);
+  run.finish();
+  const Replayed result = replayed(path);
+  INFO((result.difference ? result.difference->text() : ""));
+  CHECK_FALSE(result.difference);
+  CHECK(result.counts.compared == run.published());
+  auto reader = log::Reader::open(path).value();
+  const auto replay = replay::Replay::open(reader).value();
+  const Skeleton& walker = *replay->stream(0).description.skeleton;
+  REQUIRE(walker.joint_of(Bone::kSpine) >= 0);
+  CHECK(walker.joints[walker.joint_of(Bone::kSpine)].name == "leftUpperLeg");
+  CHECK(replay->stream(1).description.skeleton->joint_of(Bone::kSpine) >= 0);  // as it was
+}
+
 TEST_CASE("a body that comes back goes on with its numbers, and its first stream has ended",
           "[replay]") {
   const TempFolder folder;
