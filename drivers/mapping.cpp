@@ -1,6 +1,5 @@
 #include "drivers/mapping.hpp"
 
-#include <map>
 #include <utility>
 
 #include "proto/text/clean.hpp"
@@ -9,12 +8,7 @@ namespace posed::drivers {
 namespace {
 
 // A live figure has +Y up, whatever its file would have, so T frames of other axes are not its own.
-// Of two persons of one source only one may wear gloves, so fingers may be missing.
-Result<std::shared_ptr<const Skeleton>> mapped(Profile profile, const Skeleton& skeleton) {
-  std::erase_if(profile.bones, [&skeleton](const auto& entry) {
-    return entry.second >= Bone::kLeftThumbMetacarpal && skeleton.joint_index(entry.first) < 0;
-  });
-  if (profile.bones.empty()) return fail("it has none of the joints");
+Result<std::shared_ptr<const Skeleton>> mapped(const Profile& profile, const Skeleton& skeleton) {
   const auto bones = TRY(named_bones(profile, skeleton));
   if (!profile.T.empty() && profile.up != UpAxis::kPlusY) {
     return fail("its T frames are those of a file in which " + std::string(up_text(profile.up)) +

@@ -53,12 +53,20 @@ bool points_along(const Joint& joint, std::string_view axis) {
   return sign * joint.offset_m[axis[1] - 'x'] > 0.9 * joint.offset_m.norm();
 }
 
+// Of a body fingers may be missing, because not everybody wears gloves.
+bool may_lack(const Profile& profile, Bone bone) {
+  const auto is_hips = [](const auto& entry) { return entry.second == Bone::kHips; };
+  return bone >= Bone::kLeftThumbMetacarpal && std::ranges::any_of(profile.bones, is_hips);
+}
+
 bool matches(const Profile& profile, const Skeleton& skeleton) {
   const auto has = [&skeleton](const std::string& joint) {
     return skeleton.joint_index(joint) >= 0;
   };
   if (profile.match.empty() || !std::ranges::all_of(profile.match, has)) return false;
-  const auto has_joint = [&has](const auto& entry) { return has(entry.first); };
+  const auto has_joint = [&](const auto& entry) {
+    return has(entry.first) || may_lack(profile, entry.second);
+  };
   if (!std::ranges::all_of(profile.bones, has_joint)) return false;
   return std::ranges::all_of(profile.along, [&skeleton](const auto& entry) {
     const int joint = skeleton.joint_index(entry.first);
@@ -148,7 +156,8 @@ Result<std::vector<std::optional<Bone>>> named_bones(const Profile& profile,
   for (const auto& [joint, bone] : profile.bones) {
     const int index = skeleton.joint_index(joint);
     if (index >= 0) bones[index] = bone;
-    if (index < 0 && ++count <= kListed) missing += (missing.empty() ? "" : ", ") + joint;
+    if (index >= 0 || may_lack(profile, bone)) continue;
+    if (++count <= kListed) missing += (missing.empty() ? "" : ", ") + joint;
   }
   if (count > kListed) missing += " and " + std::to_string(count - kListed) + " more";
   if (count > 0) {

@@ -1,6 +1,9 @@
 #include "proto/rig/bones.hpp"
 
+#include <algorithm>
+#include <array>
 #include <map>
+#include <string_view>
 
 namespace posed::rig {
 namespace {
@@ -84,7 +87,38 @@ void keep_if_any(std::vector<int>& joints, const auto& is_wanted) {
   if (!kept.empty()) joints = std::move(kept);
 }
 
-void set_trunk(const std::vector<int>& trunk, BoneJoints& bones) {
+// Vertebrae of makers who say which of them stand for spine, chest and upper chest: the numbers in
+// their names, and the places of those three.
+struct Vertebrae {
+  std::array<std::string_view, 7> digits;
+  std::array<std::size_t, 3> bones;
+};
+constexpr std::array kVertebrae{
+    Vertebrae{{"5", "3", "12", "8"}, {0, 1, 3}},                // Xsens: L5, L3, T12, T8
+    Vertebrae{{"1", "2", "3", "4", "5", "6", "7"}, {2, 4, 5}},  // mocopi: torso_1 to torso_7
+};
+
+bool set_vertebrae(const std::vector<int>& trunk, const std::vector<JointName>& names,
+                   BoneJoints& bones) {
+  for (const Vertebrae& known : kVertebrae) {
+    const auto count = static_cast<std::size_t>(
+        std::ranges::find(known.digits, std::string_view()) - known.digits.begin());
+    if (trunk.size() != count) continue;
+    std::size_t same = 0;
+    while (same < count && names[trunk[same]].digits == known.digits[same]) ++same;
+    const bool is_mocopi = names[trunk.back()].stem == "torso";
+    if (same < count || (count == known.digits.size() && !is_mocopi)) continue;
+    bones.set(Bone::kSpine, trunk[known.bones[0]]);
+    bones.set(Bone::kChest, trunk[known.bones[1]]);
+    bones.set(Bone::kUpperChest, trunk[known.bones[2]]);
+    return true;
+  }
+  return false;
+}
+
+void set_trunk(const std::vector<int>& trunk, const std::vector<JointName>& names,
+               BoneJoints& bones) {
+  if (set_vertebrae(trunk, names, bones)) return;
   const std::size_t n = trunk.size();
   if (n > 0) bones.set(Bone::kSpine, trunk[0]);
   if (n == 2) bones.set(Bone::kChest, trunk[1]);
@@ -106,7 +140,7 @@ void find_parts(const Figure& figure, const std::vector<JointName>& names, BoneJ
     if (is_head(names[j])) take(Bone::kHead);
     if (is_trunk(names[j])) trunk.push_back(j);
   }
-  set_trunk(trunk, bones);
+  set_trunk(trunk, names, bones);
   if (bones.has(Bone::kHips) || trunk.empty() || figure[trunk[0]].parent != 0) return;
   if (names[0].stem == "root") bones.set(Bone::kHips, 0);
 }
@@ -207,7 +241,7 @@ void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJ
     trunk.push_back(neck.front());
     neck.erase(neck.begin());
   }
-  set_trunk(trunk, bones);
+  set_trunk(trunk, names, bones);
   if (!neck.empty()) bones.set(Bone::kNeck, neck.front());
   if (head >= 0) bones.set(Bone::kHead, head);
 }

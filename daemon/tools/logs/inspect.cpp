@@ -119,13 +119,14 @@ Result<StreamFigure> await_figure(const InspectArguments& options) {
   return figure;
 }
 
-// The recogniser is asked again, for how sure it is. Where it found another bone, somebody who
-// knows has said so.
+// The recogniser is asked again, for how sure it is. Where it finds another bone or T frame, one
+// who knows has said so.
 std::shared_ptr<const rig::Rig> evidence_of(const Skeleton& skeleton) {
   rig::Rig rig = rig::recognise(skeleton);
   for (std::size_t j = 0; j < skeleton.joints.size(); ++j) {
     const Joint& joint = skeleton.joints[j];
-    if (joint.bone && rig.bone[j] != joint.bone) {
+    const double off_rad = angle_between_rad(rig.T[j], joint.T_world_joint);
+    if (joint.bone && (rig.bone[j] != joint.bone || off_rad > kDegree)) {
       rig.evidence[j] = {1.0, "the stream's driver or mapping says so"};
     }
     rig.bone[j] = joint.bone;

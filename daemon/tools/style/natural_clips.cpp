@@ -60,8 +60,9 @@ class Measure {
       };
       if (std::ranges::any_of(corpus, lacks)) lacking.push_back(spec_.joints[j]);
     }
+    if (lacking.empty()) return false;  // as of hands, which have no space
     natural::remove_joints(lacking, spec_);
-    return !lacking.empty();
+    return true;
   }
 
   Result<natural::Figures> operator()(const Path& path) const {
