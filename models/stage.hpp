@@ -24,6 +24,12 @@ inline constexpr std::size_t kMaxStages = std::tuple_size_v<decltype(Frame::stag
 
 // A frame on its way from stage to stage. It borrows: everything is valid during the call that
 // passes it on.
+// What a style asks of the pelvis beside the performer's own motion.
+struct RootChange {
+  float height_m = 0.0F;                         // up
+  std::array<float, 3> velocity_m_s{};           // over the ground, in the world
+};
+
 struct StageFrame {
   const Frame& frame;
   // Posterior variance of the pose, one a rotation channel in the order of Frame::angle_rad
@@ -32,6 +38,8 @@ struct StageFrame {
   // This frame before its style was changed: as the source gave it, or as merge joined it. Null
   // behind a stage that holds frames back or makes its own: the source's frame is gone by then.
   const Frame* input = nullptr;
+  // From a style that has learnt it, for a stage that moves the root; else null.
+  const RootChange* root = nullptr;
 };
 
 // Where a stage puts its frames: none, one or several a call. RT-safe.
@@ -73,7 +81,7 @@ struct StageNotice {
 // A command to a stage, with whatever belongs to it, small enough for a ring.
 struct StageCommand {
   std::uint16_t size = 0;
-  std::array<std::byte, 640> bytes{};
+  std::array<std::byte, 1408> bytes{};
 
   template <typename T>
   [[nodiscard]] static StageCommand of(const T& value) noexcept {

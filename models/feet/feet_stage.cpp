@@ -41,10 +41,10 @@ RT_SAFE void move_root(const Eigen::Vector3d& root_m, const Eigen::Vector3d& off
   }
 }
 
-// A root that strides leaves little to hold, and a half is enough of it: more would cost style.
+// A root that strides leaves little to hold; all of it would cost style.
 HoldOptions hold_of(RootMode mode) {
   return mode == RootMode::kActor ? HoldOptions{.share = 1.0, .ahead = true}
-                                  : HoldOptions{.share = 0.5, .ahead = false};
+                                  : HoldOptions{.share = 0.8, .ahead = false};
 }
 
 struct FeetOptions {
@@ -78,7 +78,7 @@ class FeetStage final : public Stage {
   void forget() noexcept;
   [[nodiscard]] double lowest_sole_m(const Eigen::Vector3d& root_m) const noexcept;
   void hold(std::size_t leg, const Eigen::Vector3d& root_m, const Eigen::Vector3d& offset_m,
-            double gone, double dt_s, Frame& frame) noexcept;
+            bool learnt, double gone, double dt_s, Frame& frame) noexcept;
 
   const Table& table_ = table();
   std::shared_ptr<const Skeleton> skeleton_;
@@ -191,10 +191,11 @@ RT_SAFE double FeetStage::lowest_sole_m(const Eigen::Vector3d& root_m) const noe
   return lowest_m;
 }
 
-// Bends a leg so that its foot stands. `root_m` is the performer's.
+// Bends a leg so that its foot stands. `root_m` is the performer's; above the ground a style whose
+// height is `learnt` may keep its feet lower than his.
 RT_SAFE void FeetStage::hold(std::size_t leg, const Eigen::Vector3d& root_m,
-                             const Eigen::Vector3d& offset_m, double gone, double dt_s,
-                             Frame& frame) noexcept {
+                             const Eigen::Vector3d& offset_m, bool learnt, double gone,
+                             double dt_s, Frame& frame) noexcept {
   const Leg& bones = legs_.leg(leg);
   FootHold& hold = holds_[leg];
   if (!performer_.measured[leg] || !avatar_.measured[leg]) return hold.restart();
@@ -212,12 +213,14 @@ RT_SAFE void FeetStage::hold(std::size_t leg, const Eigen::Vector3d& root_m,
       hold.update(pair, contact, hold_of(options_.root.mode), gone, dt_s);
   const Eigen::Quaterniond turn(rotation_exp(change.turn_rad));
   const std::array<Eigen::Vector3d, kPoints>& avatar_m = pair.avatar.point_m;
+  const double lowest_m = lowest_sole_m(root_m);
+  const double floor_m = (learnt ? std::min(lowest_m, 0.0) : lowest_m) - kSink_m;
   double sunk_m = 0.0;
   for (std::size_t p = 0; p < kPoints; ++p) {
     if (!bones.has(p)) continue;
     const Eigen::Vector3d at_m =
         avatar_m[kAnkle] + change.ankle_m + turn * (avatar_m[p] - avatar_m[kAnkle]);
-    sunk_m = std::max(sunk_m, lowest_sole_m(root_m) - kSink_m - (at_m.y() - contacts_.ground_m(p)));
+    sunk_m = std::max(sunk_m, floor_m - (at_m.y() - contacts_.ground_m(p)));
   }
   sunk_m *= 1.0 - gone;
   if (change.none() && sunk_m < FootHold::Change::kNone) return;
@@ -247,12 +250,15 @@ RT_SAFE void FeetStage::process(const StageFrame& in, StageOut& out) noexcept {
   const double dt_s = step_s(in.frame, root_m);
   const double gone_now = gone(dt_s);
   contacts_.update(performer_, root_m, dt_s);
-  const PosePair pair{.performer = performer_, .avatar = avatar_, .root_m = root_m};
+  const PosePair pair{
+      .performer = performer_, .avatar = avatar_, .root_m = root_m, .learnt = in.root};
   const Eigen::Vector3d offset_m = root_.update(pair, contacts_, gone_now, dt_s, options_.root);
   Frame frame = in.frame;
   move_root(root_m, offset_m, frame);
   const double released = options_.root.mode == RootMode::kOff ? 1.0 : gone_now;
-  for (std::size_t leg = 0; leg < kLegs; ++leg) hold(leg, root_m, offset_m, released, dt_s, frame);
+  for (std::size_t leg = 0; leg < kLegs; ++leg) {
+    hold(leg, root_m, offset_m, in.root != nullptr, released, dt_s, frame);
+  }
   out.frame({.frame = frame, .variance_rad2 = in.variance_rad2, .input = in.input});
 }
 

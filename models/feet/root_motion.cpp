@@ -11,6 +11,7 @@ namespace posed::feet {
 namespace {
 
 constexpr double kFlight = 1e-3;       // weight of going on as before where no foot stands
+constexpr double kStands = 4.0;        // times the weight of the points is all of standing
 constexpr double kDriftTau_s = 0.3;    // over which the offset's own speed is averaged
 constexpr double kForgetTau_s = 1.0;   // over which it ends where no foot stands
 constexpr double kMaxDrift_m_s = 3.0;  // no style changes the speed of a walk by more
@@ -43,8 +44,8 @@ RT_SAFE void RootMotion::forget() noexcept {
 
 // The offset moves so that standing points move over the ground as the performer's do: the weighted
 // mean of what each of them asks for.
-RT_SAFE void RootMotion::walk(const OfPoints<Placed>& now, const Contacts& contacts,
-                              double dt_s) noexcept {
+RT_SAFE void RootMotion::walk(const OfPoints<Placed>& now, const Contacts& contacts, double dt_s,
+                              const RootChange* learnt) noexcept {
   double weight = 0.0;
   Eigen::Vector3d wanted_m = Eigen::Vector3d::Zero();
   for (std::size_t leg = 0; leg < kLegs; ++leg) {
@@ -58,6 +59,13 @@ RT_SAFE void RootMotion::walk(const OfPoints<Placed>& now, const Contacts& conta
     }
   }
   Eigen::Vector3d step_m = (wanted_m + kFlight * dt_s * drift_m_s_) / (weight + kFlight);
+  if (learnt != nullptr) {
+    // In flight the style's own speed.
+    const double stands = std::min(1.0, kStands * weight);
+    const Eigen::Vector3f flight_m_s(learnt->velocity_m_s.data());
+    step_m = stands * wanted_m / std::max(weight, kFlight) +
+             (1.0 - stands) * dt_s * flight_m_s.cast<double>();
+  }
   step_m.y() = 0.0;
   step_m = shortened(step_m, kMaxDrift_m_s * scale_ * dt_s);
   const double trust = weight / (weight + kFlight);
@@ -145,18 +153,23 @@ RT_SAFE Eigen::Vector3d RootMotion::update(const PosePair& pair, const Contacts&
     drift_m_s_.setZero();
     pending_m_.setZero();
   } else {
-    if (started_) walk(now, contacts, dt_s);
+    if (started_) walk(now, contacts, dt_s, pair.learnt);
     come_back(gone, dt_s, options.mode);
-    lift(now, contacts, gone, dt_s);
+    if (pair.learnt != nullptr) {
+      offset_m_.y() = static_cast<double>(pair.learnt->height_m);
+    } else {
+      lift(now, contacts, gone, dt_s);
+    }
     if (options.mode == RootMode::kActor) offset_m_ = shortened(offset_m_, options.limit_m);
   }
   const bool limited = options.mode == RootMode::kActor && options.limit_m != last_.limit_m;
-  const bool jumps =
-      options.mode != last_.mode || limited || (started_ && !off && !same_points(now));
+  const bool learnt = pair.learnt != nullptr;
+  const bool jumps = options.mode != last_.mode || limited || learnt != learnt_ || (started_ && !off && !same_points(now));
   if (jumps && !fresh_) rest_m_ = emitted_m_ - offset_m_;
   rest_m_ = approached(rest_m_, dt_s / kReturnTau_s, kReturn_m_s * scale_ * dt_s);
   emitted_m_ = offset_m_ + rest_m_;
   last_ = options;
+  learnt_ = learnt;
   before_ = now;
   started_ = true;
   fresh_ = false;

@@ -11,6 +11,7 @@
 
 #include "models/feet/contacts.hpp"
 #include "models/feet/legs.hpp"
+#include "models/stage.hpp"
 
 namespace posed::feet {
 
@@ -45,6 +46,7 @@ struct PosePair {
   const LegPose& performer;
   const LegPose& avatar;
   Eigen::Vector3d root_m;  // of both, as the source has it
+  const RootChange* learnt = nullptr;  // what the style asks of the root; null: nobody knows
 };
 
 class RootMotion {
@@ -70,7 +72,8 @@ class RootMotion {
   };
 
   [[nodiscard]] OfPoints<Placed> placed(const PosePair& pair) const noexcept;
-  void walk(const OfPoints<Placed>& now, const Contacts& contacts, double dt_s) noexcept;
+  void walk(const OfPoints<Placed>& now, const Contacts& contacts, double dt_s,
+            const RootChange* learnt) noexcept;
   void come_back(double gone, double dt_s, RootMode mode) noexcept;
   [[nodiscard]] double lowest_m(const OfPoints<Placed>& now, const Contacts& contacts,
                                 Eigen::Vector3d Placed::* body) const noexcept;
@@ -83,6 +86,7 @@ class RootMotion {
   OfPoints<Placed> before_{};
   RootOptions last_{.mode = RootMode::kOff};            // of the frame before
   bool started_ = false;                                // before_ is of the frame before
+  bool learnt_ = false;                                 // the frame before had a learnt root
   bool fresh_ = true;                                   // there was no frame
   Eigen::Vector3d offset_m_ = Eigen::Vector3d::Zero();  // the offset that the mode asks for
   Eigen::Vector3d pending_m_ =

@@ -32,6 +32,10 @@ Result<> validate(const Trained& t) {
   if (t.weights.rows() != points || t.offset.size() != t.weights.cols()) {
     return fail("the model's inputs, weights and offset differ in shape");
   }
+  const bool scales = t.scale.size() == 0 || (t.scale.size() == t.inputs.cols() &&
+                                              (t.scale.array() > 0.0).all() &&
+                                              (t.scale.array() <= 1.0).all());
+  if (!scales) return fail("the model's kernel counts a dimension less than nothing or above 1");
   const bool finite = t.inputs.allFinite() && t.weights.allFinite() && t.offset.allFinite();
   if (!finite || !std::isfinite(t.lambda) || !std::isfinite(t.b) || !std::isfinite(t.noise)) {
     return fail("the model's process holds a value that is not a number");
@@ -84,7 +88,8 @@ void lay_out(const Trained& t, int points, int outputs_padded, float* out) {
     for (int d = 0; d < dims; ++d) {
       for (int i = 0; i < width; ++i) {
         const bool is_point = first + i < real;
-        *out++ = is_point ? static_cast<float>(t.inputs(first + i, d)) : 0.0F;
+        const double scale = t.scale.size() == 0 ? 1.0 : t.scale[d];
+        *out++ = is_point ? static_cast<float>(scale * t.inputs(first + i, d)) : 0.0F;
       }
     }
     out = lay_out_weights(t.weights, signal, first, width, outputs_padded, out);
@@ -122,6 +127,7 @@ struct Predictor::Parts {
   int outputs = 0;
   int points = 0;  // padded
   float exponent = 0.0F;
+  std::vector<float> scale;  // of the query's dimensions; empty: all 1
   std::array<float, kMaxDims> constant{};
   hwy::AlignedFreeUniquePtr<float[]> data;  // the tiles
   // With several functions: the weights of each, and the constants. The tiles and `constant` hold
@@ -147,6 +153,8 @@ Result<Predictor> Predictor::build(const Trained& trained, std::span<const Funct
   parts->dims = static_cast<int>(trained.inputs.cols());
   parts->outputs = static_cast<int>(trained.weights.cols());
   parts->points = padded(static_cast<int>(trained.inputs.rows()));
+  const Eigen::VectorXf scale = trained.scale.cast<float>();
+  parts->scale.assign(scale.begin(), scale.end());
   parts->exponent = static_cast<float>(-0.5 * trained.mu * std::numbers::log2e);
   const int outputs_padded = padded(parts->outputs);
   const auto tile_floats = static_cast<std::size_t>(parts->points) *
@@ -233,6 +241,11 @@ RT_SAFE void Predictor::mean(std::span<const float> q, std::span<const std::uint
   assert(q.size() >= static_cast<std::size_t>(p.dims));
   std::array<std::uint16_t, kMaxDims> present;
   kernel::Query query{q.data(), nullptr, p.dims, p.exponent};
+  alignas(64) std::array<float, kMaxDims> scaled;
+  if (!p.scale.empty()) {
+    for (int d = 0; d < p.dims; ++d) scaled[d] = p.scale[d] * q[d];
+    query.q = scaled.data();
+  }
   if (!available.empty()) {
     int count = 0;
     for (int d = 0; d < p.dims; ++d) {

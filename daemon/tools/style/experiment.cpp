@@ -41,6 +41,7 @@ void read_clip_table(TableReader& table, const std::filesystem::path& folder,
   clip.file = folder / file;
   clip.subject = kOnePerson;
   table.read("subject", clip.subject);
+  table.read("day", clip.day);
   experiment.clips.push_back(std::move(clip));
 }
 
@@ -101,18 +102,48 @@ ExperimentClip named_clip(const std::string& argument, const std::string& group,
   return clip;
 }
 
+namespace {
+
+// NAME=REST apart, where no file has the whole name and the part before the first '=' holds no '/',
+// which only a file's name does.
+std::optional<std::pair<std::string, std::string>> name_apart(const std::string& argument) {
+  const auto equals = argument.find('=');
+  std::error_code ignored;
+  if (equals == std::string::npos || equals == 0 ||
+      std::filesystem::exists(argument, ignored) || argument.substr(0, equals).contains('/')) {
+    return std::nullopt;
+  }
+  return std::pair(argument.substr(0, equals), argument.substr(equals + 1));
+}
+
+}  // namespace
+
+Result<> add_days(const std::vector<std::string>& arguments, Experiment& experiment) {
+  std::string day = "first";
+  for (const std::string& argument : arguments) {
+    const auto named = name_apart(argument);
+    if (named) day = named->first;
+    const std::filesystem::path file = named ? named->second : argument;
+    bool found = false;
+    for (ExperimentClip& clip : experiment.clips) {
+      if (clip.file != file) continue;
+      clip.day = day;
+      found = true;
+    }
+    if (found) continue;
+    return misuse("this file of --day is no clip of --from or --to; name it there as well",
+                  file.string());
+  }
+  return {};
+}
+
 Result<> add_target_clips(const std::vector<std::string>& arguments, const std::string& motion,
                           Experiment& experiment) {
   std::string group;
   for (const std::string& argument : arguments) {
-    const auto equals = argument.find('=');
-    std::error_code ignored;
-    const bool named = equals != std::string::npos && equals > 0 &&
-                       !std::filesystem::exists(argument, ignored) &&
-                       !argument.substr(0, equals).contains('/');
-    if (named) group = argument.substr(0, equals);
-    experiment.clips.push_back(
-        named_clip(named ? argument.substr(equals + 1) : argument, group, motion));
+    const auto named = name_apart(argument);
+    if (named) group = named->first;
+    experiment.clips.push_back(named_clip(named ? named->second : argument, group, motion));
     if (named && std::ranges::find(experiment.targets, group) == experiment.targets.end()) {
       experiment.targets.push_back(group);
     }
@@ -139,7 +170,7 @@ Result<std::vector<style::TrainingClip>> load_clips(const Experiment& experiment
   for (const ExperimentClip& entry : experiment.clips) {
     auto clip = TRY(clip::read_clip(
         entry.file, clip::accepted_options(entry.file, {.skeleton = experiment.asf})));
-    clips.push_back({std::move(clip), entry.group, entry.subject, entry.motion});
+    clips.push_back({std::move(clip), entry.group, entry.subject, entry.motion, entry.day});
   }
   return clips;
 }

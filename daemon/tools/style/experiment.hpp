@@ -18,7 +18,8 @@ inline constexpr const char* kOnePerson = "one person";
 struct ExperimentClip {
   std::filesystem::path file;  // absolute; relative paths start at the experiment file's folder
   std::string group, subject, motion;
-  int line = 0;  // of its [[clip]] header
+  int line = 0;       // of its [[clip]] header
+  std::string day{};  // of the recording; clips without one are of one day
 };
 
 struct Experiment {
@@ -45,6 +46,10 @@ Result<Experiment> read_experiment(const std::filesystem::path& path);
 // the targets. The error is for clips before the first NAME.
 Result<> add_target_clips(const std::vector<std::string>& arguments, const std::string& motion,
                           Experiment& experiment);
+
+// The days of the command line, [NAME=]FILE: a NAME, told as above, begins the files of a day, which
+// must be among the clips. Files before the first NAME are of a day of their own.
+Result<> add_days(const std::vector<std::string>& arguments, Experiment& experiment);
 
 // Reads the clips themselves.
 Result<std::vector<style::TrainingClip>> load_clips(const Experiment& experiment);

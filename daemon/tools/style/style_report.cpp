@@ -17,7 +17,7 @@
 #include "models/motion/symmetric_eigen.hpp"
 #include "models/style/train/dataset.hpp"
 #include "models/style/train/difference_process.hpp"
-#include "models/style/train/harmonics.hpp"
+#include "models/style/model/harmonics.hpp"
 #include "models/style/train/train_report.hpp"
 #include "models/style/train/training_check.hpp"
 #include "models/style/train/training_pairs.hpp"

@@ -33,7 +33,10 @@ Several styles in one model, mixed live by weights: NAME= begins the clips of ea
   posed apply --model two.style --weights feminine=0.6,elderly=0.4 plain_3.bvh --out mixed.bvh
 
 Several files are takes of one person, unless PERSON: before a name tells them apart. Differences
-are learnt within people who show both styles; who shows one adds walks to start from only.
+are learnt within people who show both styles; who shows one adds walks to start from only. On
+another day a person walks and acts otherwise, so say which takes are of which day:
+  posed train style --from m1.bvh t1.bvh --to m2.bvh t2.bvh --day mon=m1.bvh m2.bvh \
+      tue=t1.bvh t2.bvh --out days.style
 
 An experiment file lists clips with their group, subject and motion; several sources and motions
 make one model:
@@ -47,6 +50,7 @@ make one model:
   group = "plain"            # every group that is no target is a source
   subject = "ann"            # who it is, in any group; without it, one person shows all
   motion = "walk"
+  day = "monday"             # when it was recorded; without it, all are of one day
 
 The last line says how much of the way to the target the model closes on clips that were held out,
 and how much a constant offset would. An unusable model (the groups do not differ, a clip is not a
@@ -54,7 +58,7 @@ walk, a held-out walker becomes worse) is not written, and the exit code is 1.)"
 
 // Options that are not given keep the value of the experiment file, or the default.
 struct TrainStyleOptions {
-  std::vector<std::string> from, to;
+  std::vector<std::string> from, to, day;
   std::string experiment, skeleton, out, report;
   std::optional<std::string> motion, pose_space, mode;
   std::optional<double> rate_hz;
@@ -67,6 +71,9 @@ Result<Experiment> clips_of(const TrainStyleOptions& options) {
   if (!options.experiment.empty()) {
     if (!options.from.empty() || !options.to.empty()) {
       return misuse("--experiment names the clips itself; leave out --from and --to");
+    }
+    if (!options.day.empty()) {
+      return misuse("--experiment names each clip's day itself (day =); leave out --day");
     }
     if (options.motion) {
       return misuse("--experiment names each clip's motion itself; leave out --motion");
@@ -83,6 +90,7 @@ Result<Experiment> clips_of(const TrainStyleOptions& options) {
     experiment.clips.push_back(named_clip(file, "from", motion));
   }
   TRY(add_target_clips(options.to, motion, experiment));
+  TRY(add_days(options.day, experiment));
   return experiment;
 }
 
@@ -255,6 +263,8 @@ void add_train_style(CLI::App& train_command, int& exit_code, const std::shared_
   const auto options = std::make_shared<TrainStyleOptions>();
   style->add_option("--from", options->from, "Clips of the style to change: [PERSON:]FILE");
   style->add_option("--to", options->to, "Clips of the style to give: [NAME=][PERSON:]FILE");
+  style->add_option("--day", options->day,
+                    "Which of the clips were recorded on another day: [NAME=]FILE ...");
   style->add_option(
       "--motion", options->motion,
       "What all clips show (default: walk); walk, run, jog, march and gait need strides");

@@ -3,12 +3,17 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
+#include <numbers>
 #include <utility>
+#include <vector>
 
 #include "models/feet/feet_stage.hpp"
 #include "models/motion/heading.hpp"
 #include "models/motion/turn_sum.hpp"
+#include "models/style/model/harmonics.hpp"
+#include "models/style/model/stride_phase.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::style {
@@ -158,6 +163,47 @@ class ChannelWriter {
 
 }  // namespace
 
+namespace {
+
+// The walker's mean cycle, by the strides of the whole clip; without columns where it shows none.
+// NaN where a joint was not always measured.
+PoseCycle cycle_of_clip(const BoundModel& model, const clip::Clip& clip, double heading_rad) {
+  const auto& legs = model.known->legs();
+  const Eigen::Index dims = model.space.dims();
+  if (!legs || !has_stride(clip.frames(), clip.frame_rate_hz)) return {};
+  motion::LiveHeading heading;
+  heading.settle(heading_rad, heading_rad);
+  Eigen::MatrixXd q(clip.frames(), dims);
+  Eigen::VectorXd leg(clip.frames());
+  std::vector<std::uint8_t> available(static_cast<std::size_t>(dims));
+  std::vector<float> pose(static_cast<std::size_t>(dims));
+  Eigen::VectorXi gaps = Eigen::VectorXi::Zero(dims);
+  for (int i = 0; i < clip.frames(); ++i) {
+    const Frame frame = clip.frame(i);
+    if (!legs->measured(frame) || !model.space.has_heading(frame)) return {};
+    heading.update(model.space.heading_rad(frame), 1.0 / clip.frame_rate_hz);
+    model.space.to_vector(frame, heading.value_rad(), pose, available);
+    leg[i] = legs->value_rad(frame);
+    for (Eigen::Index d = 0; d < dims; ++d) {
+      q(i, d) = pose[static_cast<std::size_t>(d)];
+      gaps[d] += available[static_cast<std::size_t>(d)] == 0 ? 1 : 0;
+    }
+  }
+  const StridePhase strides = follow_strides(leg, clip.frame_rate_hz);
+  Eigen::VectorXd phase = strides.phase(strides.strides);
+  if (static_cast<double>(phase.size()) * strides.dtheta < 2.0 * std::numbers::pi) return {};
+  phase.array() -= first_harmonic_phase(phase, leg(strides.strides));
+  const Eigen::MatrixXd kept = q(strides.strides, Eigen::all);
+  PoseCycle cycle =
+      (grid_basis() * fit_harmonics(phase, kept, kCycleHarmonics)).cast<float>();
+  for (Eigen::Index d = 0; d < dims; ++d) {
+    if (gaps[d] > 0) cycle.col(d).setConstant(std::numeric_limits<float>::quiet_NaN());
+  }
+  return cycle;
+}
+
+}  // namespace
+
 Result<Walker> measure_walker(const StyleModel& model, const std::string& model_name,
                               const clip::Clip& clip) {
   TRY(check_clip(clip));
@@ -167,7 +213,8 @@ Result<Walker> measure_walker(const StyleModel& model, const std::string& model_
                 model_name);
   }
   StyleFilter filter(bound.get(), {.alpha = 0.0});
-  settle(filter, clip, settled_heading_rad(clip, bound->space));
+  const double heading_rad = settled_heading_rad(clip, bound->space);
+  settle(filter, clip, heading_rad);
   const double seconds = (clip.frames() - 1.5) / clip.frame_rate_hz;  // ends at the last frame
   Catch ignored;
   for (int i = 0; i < clip.frames(); ++i) {
@@ -175,7 +222,11 @@ Result<Walker> measure_walker(const StyleModel& model, const std::string& model_
     if (i == 1) static_cast<void>(filter.command(StyleFilter::kWarmUp, StageCommand::of(seconds)));
     filter.process({.frame = in, .input = &in}, ignored);
   }
-  if (filter.walker()) return *filter.walker();
+  if (filter.walker()) {
+    Walker walker = *filter.walker();
+    walker.cycle = cycle_of_clip(*bound, clip, heading_rad);
+    return walker;
+  }
   return fail(
       "shows no walk for most of its time, so it does not say how the walker holds itself;"
       " give a clip of the walker's usual walk",

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "models/feet/legs.hpp"
+
 namespace posed::style {
 namespace {
 
@@ -16,7 +18,17 @@ Result<> check_fit(const StyleModel& model, int dims, const std::string& name) {
     return v.size() == 0 || (v.size() == dims && v.allFinite());
   };
   const bool limits_fit = fits(model.limit_rad) && (model.limit_rad.array() >= 0.0).all();
-  if (process_fits && limits_fit && fits(model.gate.neutral) && fits(model.axis.direction)) {
+  const bool usual_fit = std::ranges::all_of(model.gate.usual, [dims](const auto& cycle) {
+    return cycle.rows() == kCycleRows && cycle.cols() == dims && cycle.allFinite();
+  });
+  const bool roots_fit =
+      (model.roots.empty() || model.roots.size() == model.styles()) &&
+      std::ranges::all_of(model.roots, [&](const RootFunction& root) {
+        return root.function.weights.rows() == model.process.weights.rows() &&
+               root.function.weights.cols() == RootFunction::kDims &&
+               root.function.offset.size() == RootFunction::kDims;
+      });
+  if (process_fits && limits_fit && usual_fit && roots_fit && fits(model.gate.neutral) && fits(model.axis.direction)) {
     return {};
   }
   return fail("the model's process, limits, neutral pose and axis do not fit the " +
@@ -64,7 +76,42 @@ BoundModel::BoundModel(const StyleModel& model, motion::PoseSpace bound_space,
     more_limits_rad.emplace_back(style.limit_rad.cast<float>());
   }
   if (model.gate.present()) known.emplace(model, space.skeleton());
+  for (int d = 0; d < space.dims(); ++d) {
+    const BodyPart part = parts[static_cast<std::size_t>(d)];
+    const bool is_leg = part == BodyPart::kLeftLeg || part == BodyPart::kRightLeg;
+    if (is_leg || space.joint_of_dim(d) == model.space.root) {
+      leg_dims.push_back(static_cast<std::uint16_t>(d));
+      loose_parts.push_back(TrainedMotion::kNoPart);
+    } else {
+      loose_parts.push_back(static_cast<std::uint8_t>(part));
+    }
+  }
+  for (const Eigen::MatrixXd& cycle : model.gate.usual) {
+    Usual& one = usual.emplace_back();
+    one.cycle = (grid_basis() * cycle).cast<float>();
+    one.does.fit(leg_dims, one.cycle, one.cycle);
+  }
+  if (usual.empty()) return;
+  Usual& all = anyone.emplace();
+  all.cycle = usual.front().cycle;
+  for (std::size_t u = 1; u < usual.size(); ++u) all.cycle += usual[u].cycle;
+  all.cycle /= static_cast<float>(usual.size());
+  all.does.fit(leg_dims, all.cycle, all.cycle);
 }
+
+namespace {
+
+// The function of the pose with that of the root behind it.
+gp::Function with_root(const Eigen::MatrixXd& weights, const Eigen::VectorXd& offset,
+                       const RootFunction& root) {
+  gp::Function both{Eigen::MatrixXd(weights.rows(), weights.cols() + RootFunction::kDims),
+                    Eigen::VectorXd(offset.size() + RootFunction::kDims)};
+  both.weights << weights, root.function.weights;
+  both.offset << offset, root.function.offset;
+  return both;
+}
+
+}  // namespace
 
 Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
                                                      const Skeleton& skeleton, std::string name) {
@@ -78,14 +125,33 @@ Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
   std::vector<gp::Function> more;
   more.reserve(model.more.size());
   for (const MoreStyle& style : model.more) more.push_back(style.function);
-  auto predictor = gp::Predictor::build(model.process, more);
+  gp::Trained process = model.process;
+  const auto legs = feet::Legs::find(skeleton);
+  const bool has_root =
+      legs && !model.roots.empty() && space->dims() + RootFunction::kDims <= motion::kMaxPoseDims;
+  if (has_root) {
+    gp::Function first = with_root(process.weights, process.offset, model.roots.front());
+    process.weights = std::move(first.weights);
+    process.offset = std::move(first.offset);
+    for (std::size_t s = 0; s < more.size(); ++s) {
+      more[s] = with_root(more[s].weights, more[s].offset, model.roots[s + 1]);
+    }
+  }
+  auto predictor = gp::Predictor::build(process, more);
   if (!predictor) {
     Error error = predictor.error();
     error.file = name;
     return std::unexpected(std::move(error));
   }
-  return std::make_unique<const BoundModel>(model, std::move(*space), std::move(*predictor),
+  auto bound = std::make_unique<BoundModel>(model, std::move(*space), std::move(*predictor),
                                             std::move(name));
+  bound->has_root = has_root;
+  if (!has_root) return bound;
+  bound->leg_m = legs->length_m();
+  for (const RootFunction& root : model.roots) {
+    bound->root_limits.emplace_back(root.limit.cast<float>());
+  }
+  return bound;
 }
 
 }  // namespace posed::style

@@ -12,6 +12,7 @@
 #include "models/motion/pose_space.hpp"
 #include "models/stage.hpp"
 #include "models/style/live/body_mask.hpp"
+#include "models/style/live/leg_map.hpp"
 #include "models/style/live/trained_motion.hpp"
 #include "models/style/model/style_model.hpp"
 
@@ -36,6 +37,20 @@ struct BoundModel final : StageModel {
   std::vector<Eigen::VectorXf> more_limits_rad;  // of the others
   std::vector<BodyPart> parts;                   // [dims]
   std::vector<std::uint8_t> served;              // [dims], 0 where the skeleton lacks the joint
+  // With roots the predictor has RootFunction::kDims outputs after those of the pose.
+  bool has_root = false;
+  double leg_m = 0.0;                         // of the skeleton
+  std::vector<Eigen::Vector3f> root_limits;  // of each style
+  std::vector<std::uint16_t> leg_dims;           // those of the hips and the legs
+  std::vector<std::uint8_t> loose_parts;         // [dims] the others' BodyPart, else kNoPart
+
+  // A neutral walk of training: its cycle, and what it does at the legs' instant.
+  struct Usual {
+    PoseCycle cycle;
+    LegMap does;
+  };
+  std::vector<Usual> usual;     // by person and day; empty: a model without them
+  std::optional<Usual> anyone;  // their mean, for a walker who is not known
 };
 
 // Returns an error for a skeleton that cannot serve the model's pose space

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace posed::style {
 namespace {
@@ -13,6 +14,7 @@ constexpr double kSame_deg = 7.0, kOther_deg = 9.5;         // either; so near a
 constexpr double kStill_deg_s = 8.0, kMoving_deg_s = 16.0;  // PoseSpeed
 constexpr double kRest = 0.25, kSwing = 0.4;                // of the training's least swing
 constexpr double kTooSlow = 0.3, kSlow = 0.45;              // of the training's fastest cadence
+constexpr double kFirstStep_rad = 3.0;                      // of a stride after rest
 constexpr double kFast = 1.2, kTooFast = 1.32;
 constexpr double kOfGait = 0.5;    // what LiveGait's correlation counts, in shares of that cadence,
 constexpr double kWalk = 0.2;      // above the training's highest, which counts as at least this
@@ -31,11 +33,12 @@ double rise(double value, double low, double high) noexcept {
 }  // namespace
 
 RT_SAFE void Gate::update(const TrainedMotion* known, bool on, const Frame& frame,
-                          std::span<const float> q, std::span<const std::uint8_t> available,
+                          std::span<const float> q, std::span<const float> whole,
+                          std::span<const std::uint8_t> available,
                           const std::optional<Walker>& walker, double dt_s) noexcept {
   wanted_ = 1.0;
   if (known != nullptr) {
-    see_pose(*known, q, available, walker.has_value(), dt_s);
+    see_pose(*known, q, whole, available, walker.has_value(), dt_s);
     see_legs(*known, frame, walker, dt_s);
     if (on) wanted_ = of_pose_ * of_legs_;
   }
@@ -45,22 +48,29 @@ RT_SAFE void Gate::update(const TrainedMotion* known, bool on, const Frame& fram
 }
 
 RT_SAFE void Gate::see_pose(const TrainedMotion& known, std::span<const float> q,
-                            std::span<const std::uint8_t> available, bool is_own,
-                            double dt_s) noexcept {
+                            std::span<const float> whole, std::span<const std::uint8_t> available,
+                            bool is_own, double dt_s) noexcept {
   speed_.update(known, q, available, dt_s);
-  const double distance_deg = known.distance_deg(q, available);
-  if (std::isnan(distance_deg)) return;
+  // The arms and the trunk of a run are none of a walk's, so what replaces them must not count where
+  // the legs do not tell the two apart.
+  const bool replaced = q.data() != whole.data();
+  const double kernel_deg = known.distance_deg(q, available);
+  const double whole_deg = replaced ? known.distance_deg(whole, available) : kernel_deg;
+  if (std::isnan(kernel_deg)) return;
+  const bool legs_tell = is_own || !known.legs() || !std::isnan(stride_.cadence_rad_s());
+  const double distance_deg = legs_tell ? kernel_deg : whole_deg;
   of_pose_ = is_own ? 1.0 - rise(distance_deg, kOwnNear_deg, kOwnFar_deg)
                     : 1.0 - rise(distance_deg, kNear_deg, kFar_deg);
-  of_near_pose_ = 1.0 - rise(distance_deg, kSame_deg, kOther_deg);
+  of_near_pose_ = 1.0 - rise(whole_deg, kSame_deg, kOther_deg);
 }
 
 // How far the legs stride as in training; all the way where that cannot be told.
 RT_SAFE void Gate::see_legs(const TrainedMotion& known, const Frame& frame,
                             const std::optional<Walker>& walker, double dt_s) noexcept {
+  leg_rad_ = std::numeric_limits<double>::quiet_NaN();
   if (!known.legs()) of_legs_ = 1.0;
   if (!known.legs() || !known.legs()->measured(frame)) return;
-  const double leg_rad = known.legs()->value_rad(frame);
+  const double leg_rad = leg_rad_ = known.legs()->value_rad(frame);
   stride_.update(leg_rad, dt_s, known.cadence_rad_s());
   const double height_m = known.height_m(frame);
   if (std::isfinite(height_m)) gait_.update(height_m, leg_rad, dt_s);
@@ -70,6 +80,7 @@ RT_SAFE void Gate::see_legs(const TrainedMotion& known, const Frame& frame,
     stride_.forget_cadence();
     gait_.forget();
     cadence_rad_s_ = 0.0;
+    rest_rad_ = stride_.angle_rad();
     of_cadence_ = 1.0;
   }
   double usual_rad_s = known.cadence_rad_s();
@@ -81,7 +92,10 @@ RT_SAFE void Gate::see_legs(const TrainedMotion& known, const Frame& frame,
     const double part = cadence_rad_s_ == 0.0 ? 1.0 : -std::expm1(-dt_s / kCadence_s);
     cadence_rad_s_ += part * (cadence_rad_s - cadence_rad_s_);
     const double ratio = cadence_rad_s_ / usual_rad_s;
-    of_cadence_ = rise(ratio, kTooSlow, kSlow) * (1.0 - of_run(known, ratio));
+    // A first step begins slowly.
+    const bool begins = std::abs(stride_.angle_rad() - rest_rad_) < kFirstStep_rad;
+    const double of_slow = begins ? 1.0 : rise(ratio, kTooSlow, kSlow);
+    of_cadence_ = of_slow * (1.0 - of_run(known, ratio));
   }
   of_legs_ = (1.0 - rest) * of_cadence_;
 }

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 
@@ -16,25 +17,30 @@ namespace posed::style {
 
 class Gate {
  public:
-  // Advances by a frame, `dt_s` after the last one. `q` is the pose that the kernel sees; `walker`:
-  // seen from its own neutral pose. Where the gate is not `on`, or the model has no data for it
+  // Advances by a frame, `dt_s` after the last one. `q` is the pose that the kernel sees, `whole` the
+  // same with what busy limbs do; `walker`: seen from its own neutral walk. Where the gate is not `on`, or the model has no data for it
   // (`known` is null), it opens: at once if it has never been on.
   void update(const TrainedMotion* known, bool on, const Frame& frame, std::span<const float> q,
-              std::span<const std::uint8_t> available, const std::optional<Walker>& walker,
-              double dt_s) noexcept;
+              std::span<const float> whole, std::span<const std::uint8_t> available,
+              const std::optional<Walker>& walker, double dt_s) noexcept;
 
   // How much style passes: 1 all, exactly, to 0 none, exactly; 0 before the first frame. It takes
   // about 0.17 s half of the way, and its third derivative is finite.
   [[nodiscard]] float open() const noexcept { return static_cast<float>(stage_.back()); }
   // Whether the legs stride as in training; true where that is unknown.
   [[nodiscard]] bool strides() const noexcept { return of_legs_ >= 0.5; }
-  [[nodiscard]] double cadence_rad_s() const noexcept { return stride_.cadence_rad_s(); }
+  // Of the stride, without what a single frame adds; 0: not known.
+  [[nodiscard]] double smooth_cadence_rad_s() const noexcept { return cadence_rad_s_; }
+  // What a warm-up needs to know of the legs at this frame.
+  [[nodiscard]] LegMotion legs() const noexcept {
+    return {strides(), stride_.cadence_rad_s(), stride_.angle_rad(), leg_rad_};
+  }
   // The next frame is the first of a clip, whose beginning it has seen backwards; open if it has
   // seen nothing.
   void settle() noexcept;
 
  private:
-  void see_pose(const TrainedMotion& known, std::span<const float> q,
+  void see_pose(const TrainedMotion& known, std::span<const float> q, std::span<const float> whole,
                 std::span<const std::uint8_t> available, bool is_own, double dt_s) noexcept;
   void see_legs(const TrainedMotion& known, const Frame& frame, const std::optional<Walker>& walker,
                 double dt_s) noexcept;
@@ -47,6 +53,8 @@ class Gate {
   LiveGait gait_;
   PoseSpeed speed_;
   double cadence_rad_s_ = 0.0;  // smoothed; 0: not known
+  double rest_rad_ = 0.0;       // the stride's angle when the legs last rested
+  double leg_rad_ = std::numeric_limits<double>::quiet_NaN();  // the leg signal; NaN: not measured
   // The last evidence; it stays where a frame has none.
   double of_pose_ = 0.0, of_near_pose_ = 0.0, of_cadence_ = 0.0, of_legs_ = 1.0;
   double wanted_ = 0.0;

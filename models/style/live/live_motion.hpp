@@ -68,6 +68,10 @@ class LiveStride {
   // The cadence over about the last half second [rad/s]; NaN until 0.3 s are known.
   [[nodiscard]] double cadence_rad_s() const noexcept;
 
+  // Where in the stride the legs are, unwrapped: 0 where the right thigh is farthest in front. It
+  // lags by the low-pass and goes round unevenly.
+  [[nodiscard]] double angle_rad() const noexcept { return angle_rad_; }
+
   // Starts the cadence anew: cadence_rad_s() is unknown until 0.3 s from now.
   void forget_cadence() noexcept { turns_ = 0; }
 

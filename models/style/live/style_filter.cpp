@@ -4,6 +4,7 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <span>
 #include <utility>
 
@@ -225,12 +226,18 @@ RT_SAFE void StyleFilter::process(const StageFrame& in, StageOut& out) noexcept 
     mix_limits();
   }
   const bool served = model_ != nullptr && frame.skeleton == model_->space.skeleton().id;
+  root_.setZero();
   if (served) {
     style(frame, dt_s);
   } else {
     last_joints_ = 0;  // the pose is that of another body, so there is nothing to blend from
   }
-  out.frame({.frame = frame, .variance_rad2 = in.variance_rad2, .input = in.input});
+  const bool roots = served && model_->has_root;
+  if (roots) change_root();
+  out.frame({.frame = frame,
+             .variance_rad2 = in.variance_rad2,
+             .input = in.input,
+             .root = roots ? &root_change_ : nullptr});
 }
 
 // What the model sees of a frame. Returns whether that has changed suddenly.
@@ -279,26 +286,60 @@ RT_SAFE void StyleFilter::mix_limits() noexcept {
     }
     limit_rad_[d] = limit;
   }
+  limit_root_.setZero();
+  for (std::size_t s = 0; s < model_->root_limits.size(); ++s) {
+    limit_root_ += shares[s] * model_->root_limits[s];
+  }
 }
 
 // The model delta: alpha times the mixture of styles, gated, clamped and masked.
 RT_SAFE void StyleFilter::answer(const Pose& pose, Dims& delta) noexcept {
   const gp::Predictor& predictor = model_->predictor;
   const std::size_t dims = predictor.inputs();
-  predictor.mean({pose.input.data(), dims}, {pose.available.data(), dims}, {delta.data(), dims},
-                 shares_to_ask());
+  const auto outputs = static_cast<std::size_t>(predictor.outputs());  // the pose and the root
+  predictor.mean({pose.input.data(), dims}, {pose.available.data(), dims},
+                 {delta.data(), outputs}, shares_to_ask());
   const float open = tracker_.open();
   if (open < 1.0F) {
     const float rest = (1.0F - open) * static_cast<float>(options_.gate_fallback);
     Dims constant;
-    predictor.constant(weights_.shares(), {constant.data(), dims});
-    for (std::size_t d = 0; d < dims; ++d) delta[d] = open * delta[d] + rest * constant[d];
+    predictor.constant(weights_.shares(), {constant.data(), outputs});
+    for (std::size_t d = 0; d < outputs; ++d) delta[d] = open * delta[d] + rest * constant[d];
   }
   const bool limited = model_->limit_rad.size() > 0;
   for (std::size_t d = 0; d < dims; ++d) {
     if (limited) delta[d] = std::clamp(delta[d], -limit_rad_[d], limit_rad_[d]);
     delta[d] *= static_cast<float>(alpha_) * mask_.factor(model_->parts[d]);
+    const std::uint8_t part = model_->loose_parts[d];
+    if (part != TrainedMotion::kNoPart) delta[d] *= tracker_.trust(static_cast<BodyPart>(part));
   }
+  if (model_->has_root) limit_root(&delta[dims]);
+}
+
+// The legs carry the pelvis: where the mask holds them, it stays.
+RT_SAFE void StyleFilter::limit_root(const float* change) noexcept {
+  const float legs =
+      std::min(mask_.factor(BodyPart::kLeftLeg), mask_.factor(BodyPart::kRightLeg));
+  for (Eigen::Index i = 0; i < root_.size(); ++i) {
+    root_[i] = static_cast<float>(alpha_) * legs *
+               std::clamp(change[i], -limit_root_[i], limit_root_[i]);
+  }
+}
+
+// From lengths of a leg, and such lengths a stride, to metres and seconds.
+RT_SAFE void StyleFilter::change_root() noexcept {
+  const Root root = root_ + static_cast<float>(blend_weight_) * root_from_;
+  last_root_ = root;
+  const auto leg_m = static_cast<float>(model_->leg_m);
+  const auto strides_s =
+      static_cast<float>(tracker_.cadence_rad_s(*model_) / (2.0 * std::numbers::pi));
+  const auto sine = static_cast<float>(std::sin(heading_.value_rad()));
+  const auto cosine = static_cast<float>(std::cos(heading_.value_rad()));
+  const float forward_m_s = leg_m * strides_s * root[1];
+  const float left_m_s = leg_m * strides_s * root[2];
+  root_change_ = {.height_m = leg_m * root[0],
+                  .velocity_m_s = {forward_m_s * sine + left_m_s * cosine, 0.0F,
+                                   forward_m_s * cosine - left_m_s * sine}};
 }
 
 // Per joint c = log(D_new^T D_old), so that R_styled exp(c) is what the old model delta would have
@@ -308,6 +349,7 @@ RT_SAFE void StyleFilter::begin_blend(const Rotations& in, const Frame& styled,
   const int joints = std::min<int>(last_joints_, styled.joint_count);
   blend_weight_ = joints > 0 ? std::max(0.0, 1.0 - options_.alpha_slew_per_s * dt_s) : 0.0;
   blend_from_.fill({});
+  root_from_ = joints > 0 ? Root(last_root_ - root_) : Root::Zero();
   for (std::size_t j = 0; j < static_cast<std::size_t>(joints); ++j) {
     const Quaterniond new_delta =
         to_eigen_double(in[j]).conjugate() * to_eigen_double(styled.rotation_xyzw[j]);

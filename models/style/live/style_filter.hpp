@@ -122,6 +122,7 @@ class StyleFilter final : public Stage {
   using Dims = std::array<float, motion::kMaxPoseDims>;
   using Flags = std::array<std::uint8_t, motion::kMaxPoseDims>;
   using Rotations = std::array<Quatf, kMaxJoints>;
+  using Root = Eigen::Vector3f;  // RootFunction
 
   // A frame in the model's pose space, and as its kernel sees it.
   struct Pose {
@@ -134,6 +135,8 @@ class StyleFilter final : public Stage {
   void mix_limits() noexcept;
   bool read_pose(const Frame& frame, double dt_s, Pose& pose) noexcept;
   void answer(const Pose& pose, Dims& delta) noexcept;
+  void limit_root(const float* change) noexcept;
+  void change_root() noexcept;
   void set_alpha_number(double value) noexcept { set_alpha(static_cast<float>(value)); }
   [[nodiscard]] ParameterState alpha_state() const noexcept { return {alpha_, wanted_alpha()}; }
   void set_gate(double on) noexcept { tracker_.set_gate(on != 0.0); }
@@ -154,6 +157,11 @@ class StyleFilter final : public Stage {
   StyleWeights weights_;
   BodyMask mask_;
   Dims limit_rad_{};  // of the mixture
+  Root limit_root_ = Root::Zero();
+  Root root_ = Root::Zero();       // the model's change at this frame
+  Root root_from_ = Root::Zero();  // what a blend begins with, less the model's change
+  Root last_root_ = Root::Zero();  // as it was emitted
+  RootChange root_change_;         // the same, in metres and the world
   Elapsed elapsed_;
   motion::LiveHeading heading_;
   double gap_s_ = 0.0;  // between the last two frames

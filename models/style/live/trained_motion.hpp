@@ -3,6 +3,7 @@
 // shareable.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -10,6 +11,7 @@
 #include <Eigen/Core>
 
 #include "models/motion/leg_signal.hpp"
+#include "models/style/live/body_mask.hpp"
 #include "models/style/model/style_model.hpp"
 
 namespace posed::style {
@@ -23,6 +25,14 @@ class TrainedMotion {
   // Missing dimensions count as those that are there; NaN where none is.
   RT_SAFE [[nodiscard]] double distance_deg(std::span<const float> q,
                                             std::span<const std::uint8_t> available) const noexcept;
+
+  // The same for each part of the body alone: `parts` [dims] numbers them, kNoPart belongs to none.
+  // 0 where none of a part was measured.
+  using PartDistances = std::array<float, kBodyParts>;
+  static constexpr std::uint8_t kNoPart = kBodyParts;
+  [[nodiscard]] PartDistances part_distances_deg(
+      std::span<const float> q, std::span<const std::uint8_t> available,
+      std::span<const std::uint8_t> parts) const noexcept;
 
   // The rotation from one pose to another [dims], rms over joints [deg]; missing dimensions as
   // above.

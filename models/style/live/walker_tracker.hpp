@@ -22,8 +22,9 @@ class WalkerTracker {
   enum Notice : std::size_t { kNoGateData, kWarmedUp, kStood, kInterrupted, kOtherJoints, kNoAxis };
 
   // Advances by a frame's q, `gap_s` after the last one, of which `dt_s` count, and writes what the
-  // kernel shall see of it: q as if the walker's neutral pose were the training's. Returns whether
-  // that has changed suddenly.
+  // kernel shall see of it: q as if the walker's neutral walk were the training's, and where a part
+  // of the body does something else, what it does in a walk at this instant. Returns whether that
+  // has changed suddenly.
   bool see(const BoundModel& model, const Frame& frame, std::span<const float> q,
            std::span<const std::uint8_t> available, double gap_s, double dt_s,
            std::span<float> input) noexcept;
@@ -31,6 +32,12 @@ class WalkerTracker {
   void set_gate(bool on) noexcept { gate_on_ = on; }
   void set_auto_alpha(bool on) noexcept { auto_alpha_ = on; }
   [[nodiscard]] float open() const noexcept { return gate_.open(); }
+  // How far each part of the body walks: 1 all, 0 it does something else.
+  [[nodiscard]] float trust(BodyPart part) const noexcept {
+    return trust_[static_cast<std::size_t>(part)];
+  }
+  // Of the walker now; a usual one where that is not known.
+  [[nodiscard]] double cadence_rad_s(const BoundModel& model) const noexcept;
   // See Gate::settle().
   void settle() noexcept { gate_.settle(); }
 
@@ -45,7 +52,10 @@ class WalkerTracker {
   // Nothing more comes to measure on.
   void interrupt() noexcept;
   // In the place of a warm-up; empty: none.
-  void set_walker(const std::optional<Walker>& walker) noexcept { walker_ = walker; }
+  void set_walker(const std::optional<Walker>& walker) noexcept {
+    walker_ = walker;
+    adapted_ = false;
+  }
   [[nodiscard]] const std::optional<Walker>& walker() const noexcept { return walker_; }
 
   // The model is exchanged. What is known of the walker is kept where both see the same joints.
@@ -57,8 +67,11 @@ class WalkerTracker {
  private:
   [[nodiscard]] bool serves(const BoundModel* model) noexcept;
   void report_missing_data(const BoundModel& model) noexcept;
+  void adapt(const BoundModel& model) noexcept;
   void relate(const BoundModel& model, std::span<const float> q,
-              std::span<float> input) const noexcept;
+              std::span<const std::uint8_t> available, std::span<float> input) noexcept;
+  void replace_untrusted(const BoundModel& model, std::span<const std::uint8_t> available,
+                         std::span<float> input) noexcept;
   bool measure(const BoundModel& model, std::span<const float> q,
                std::span<const std::uint8_t> available, double gap_s, double dt_s) noexcept;
 
@@ -66,6 +79,14 @@ class WalkerTracker {
   Gate gate_;
   WarmUp warm_up_;
   std::optional<Walker> walker_;
+  // Of the walker and the model, once they are adapted to each other.
+  bool adapted_ = false;
+  bool shifts_ = false;                        // by the walker's cycle; else by its mean
+  LegMap shift_;                               // from the walker's neutral walk to the model's
+  const BoundModel::Usual* usual_ = nullptr;   // the neutral walk that is nearest to the walker's
+  bool replaced_ = false;                         // something of the last frame
+  std::array<float, motion::kMaxPoseDims> whole_{};  // its input before
+  std::array<float, kBodyParts> trust_ = {1.0F, 1.0F, 1.0F, 1.0F, 1.0F, 1.0F};
   StyleEstimate estimate_;
   std::uint32_t pending_ = 0;
   bool reported_no_gate_ = false, reported_no_axis_ = false;

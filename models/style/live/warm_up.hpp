@@ -10,6 +10,7 @@
 
 #include "models/motion/pose_space.hpp"
 #include "models/stage.hpp"
+#include "models/style/live/leg_map.hpp"
 
 namespace posed::v1 {
 class DecisionValue;
@@ -22,6 +23,19 @@ struct Walker {
   std::array<float, motion::kMaxPoseDims> neutral{};          // mean of q [dims]
   std::array<std::uint8_t, motion::kMaxPoseDims> measured{};  // 0: this joint was never measured
   double cadence_rad_s = std::numeric_limits<double>::quiet_NaN();  // NaN: not known
+  // The mean cycle [kGridFrames x dims], NaN where it is not known; without columns there is none.
+  PoseCycle cycle{};
+
+  // From one space to another of the same joints; false, and nothing changes, for other joints.
+  [[nodiscard]] bool convert(const motion::PoseSpace& from, const motion::PoseSpace& to) noexcept;
+};
+
+// The legs at a frame, as the gate sees them.
+struct LegMotion {
+  bool walk = false;
+  double cadence_rad_s = std::numeric_limits<double>::quiet_NaN();
+  double angle_rad = 0.0;                                    // LiveStride::angle_rad
+  double leg_rad = std::numeric_limits<double>::quiet_NaN();  // the leg signal
 };
 
 class WarmUp {
@@ -36,16 +50,32 @@ class WarmUp {
   // A frame `dt_s` after the last one; only those on which the walker walks count. Not kNone at the
   // frame that ends it: kStood where the walker walked for less than half of the time.
   [[nodiscard]] Outcome update(std::span<const float> q, std::span<const std::uint8_t> available,
-                               bool walks, double cadence_rad_s, double dt_s) noexcept;
+                               const LegMotion& legs, double dt_s) noexcept;
   // After kDone.
   [[nodiscard]] Walker walker() const noexcept;
 
  private:
   using Sums = std::array<double, motion::kMaxPoseDims>;
+  using Basis = Eigen::Matrix<double, kCycleRows, 1>;
+
+  void follow(const LegMotion& legs, double dt_s) noexcept;
+  void add_to_cycle(std::span<const float> q, std::span<const std::uint8_t> available,
+                    double leg_rad, double dt_s) noexcept;
+  [[nodiscard]] PoseCycle cycle() const noexcept;
 
   double seconds_ = 0.0, left_s_ = 0.0, walked_s_ = 0.0;
   double turned_rad_ = 0.0, turned_s_ = 0.0;
   Sums sum_{}, time_s_{};
+
+  // The cycle, by least squares of harmonics at an even phase that follows the legs' angle.
+  std::size_t dims_ = 0;
+  double phase_rad_ = 0.0, rate_rad_s_ = 0.0;  // no rate: not begun
+  double cycle_s_ = 0.0, cycle_rad_ = 0.0;     // seen so far
+  Eigen::Matrix<double, kCycleRows, kCycleRows> gram_ =
+      Eigen::Matrix<double, kCycleRows, kCycleRows>::Zero();
+  Basis leg_moment_ = Basis::Zero();
+  std::array<std::array<double, kCycleRows>, motion::kMaxPoseDims> moment_{};
+  Sums cycle_time_s_{};
 };
 
 // A walker as a command of the style stage, and as the device log keeps that command: so a walker

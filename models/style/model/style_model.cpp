@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "models/style/model/harmonics.hpp"
 #include "proto/frame/plausible.hpp"
 #include "proto/model/model_file.hpp"
 #include "proto/model/validator.hpp"
@@ -17,6 +18,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 constexpr int kMaxInputs = 20'000;
+constexpr int kMaxUsual = 4000;
 
 // The numbers of a process. Training gives weights below 1e9 and variances below 1; with these even
 // the sum of kMaxInputs terms, each a weight times a kernel's value, stays within the hot path's
@@ -95,6 +97,9 @@ gp::Trained read_process(const v1::GaussianProcess& from, int dims, Reader& read
   process.mu = reader.number(from.mu(), 1e-12, 1e12, "mu");
   process.b = reader.number(from.b(), 0.0, kMaxVariance, "b");
   process.noise = reader.number(from.noise(), 0.0, kMaxVariance, "the noise");
+  if (from.scale_size() > 0) {
+    process.scale = reader.vector(from.scale(), dims, 1e-3, 1.0, "the kernel's scale");
+  }
   return process;
 }
 
@@ -118,6 +123,12 @@ GateData read_gate(const v1::StyleGate& from, int dims, Reader& reader) {
     gate.gait_correlation =
         reader.number(from.gait_correlation(), -1.0, 1.0, "the correlation of the gait");
   }
+  reader.want(from.usual_size() <= kMaxUsual, "the number of usual walks");
+  for (const v1::Matrix& cycle : from.usual()) {
+    if (!reader.valid()) break;
+    gate.usual.push_back(reader.matrix(cycle, dims, kMaxAngle_rad, "a usual walk"));
+    reader.want(gate.usual.back().rows() == kCycleRows, "the harmonics of a usual walk");
+  }
   return gate;
 }
 
@@ -127,6 +138,20 @@ StyleAxis read_axis(const v1::StyleAxis& from, int dims, Reader& reader) {
   const double most = kMaxSlope * kMaxAngle_rad * dims;
   axis.offset = reader.number(from.offset(), -most, most, "the style's offset");
   return axis;
+}
+
+RootFunction read_root(const v1::StyleRoot& from, Eigen::Index points, Reader& reader) {
+  constexpr double kMaxLegs = 100.0;
+  RootFunction root;
+  root.function.weights =
+      reader.matrix(from.weights(), RootFunction::kDims, kMaxWeight, "the root's weights");
+  reader.want(root.function.weights.rows() == points, "the number of the root's weights");
+  root.function.offset =
+      reader.vector(from.offset(), RootFunction::kDims, -kMaxLegs, kMaxLegs, "the root's mean");
+  const VectorXd limit =
+      reader.vector(from.limit(), RootFunction::kDims, 0.0, kMaxLegs, "the root's limits");
+  if (reader.valid()) root.limit = limit;
+  return root;
 }
 
 StyleModel read_model(const v1::StyleModel& from, Reader& reader) {
@@ -140,6 +165,12 @@ StyleModel read_model(const v1::StyleModel& from, Reader& reader) {
     if (!reader.valid()) break;
     model.more.push_back(read_style(style, model.process.inputs.rows(), dims, reader));
   }
+  for (const v1::StyleRoot& root : from.root()) {
+    if (!reader.valid()) break;
+    model.roots.push_back(read_root(root, model.process.inputs.rows(), reader));
+  }
+  reader.want(model.roots.empty() || model.roots.size() == model.styles(),
+              "the number of the styles' roots");
   const auto names = model.names();
   reader.want(names.size() <= kMaxStyles, "the number of styles");
   reader.want(std::set<std::string>(names.begin(), names.end()).size() == names.size(),
@@ -199,6 +230,7 @@ std::string serialize_model(const StyleModel& model) {
   process.set_mu(model.process.mu);
   process.set_b(model.process.b);
   process.set_noise(model.process.noise);
+  write_vector(model.process.scale, *process.mutable_scale());
   write_vector(model.limit_rad, *style.mutable_limit_rad());
   style.set_rate_hz(model.rate_hz);
   style.set_from(model.from);
@@ -211,6 +243,12 @@ std::string serialize_model(const StyleModel& model) {
     write_vector(one.function.offset, *target.mutable_offset());
     write_vector(one.limit_rad, *target.mutable_limit_rad());
   }
+  for (const RootFunction& one : model.roots) {
+    v1::StyleRoot& root = *style.add_root();
+    write_matrix(one.function.weights, *root.mutable_weights());
+    write_vector(one.function.offset, *root.mutable_offset());
+    write_vector(one.limit, *root.mutable_limit());
+  }
   if (model.gate.present()) {
     write_vector(model.gate.neutral, *style.mutable_gate()->mutable_neutral());
     style.mutable_gate()->set_swing_rad(model.gate.swing_rad);
@@ -218,6 +256,9 @@ std::string serialize_model(const StyleModel& model) {
     if (!std::isnan(model.gate.gait_correlation)) {
       style.mutable_gate()->set_gait_correlation(model.gate.gait_correlation);
     }
+  }
+  for (const MatrixXd& cycle : model.gate.usual) {
+    write_matrix(cycle, *style.mutable_gate()->add_usual());
   }
   if (model.axis.present()) {
     write_vector(model.axis.direction, *style.mutable_axis()->mutable_direction());
@@ -242,6 +283,18 @@ StyleModel mixture_of(const StyleModel& model, std::span<const double> shares) {
   mixture.process.weights *= shares[0];
   mixture.process.offset *= shares[0];
   mixture.limit_rad *= shares[0];
+  if (!model.roots.empty()) {
+    mixture.roots.resize(1);
+    RootFunction& root = mixture.roots.front();
+    root.function.weights *= shares[0];
+    root.function.offset *= shares[0];
+    root.limit *= shares[0];
+    for (std::size_t s = 1; s < model.styles(); ++s) {
+      root.function.weights += shares[s] * model.roots[s].function.weights;
+      root.function.offset += shares[s] * model.roots[s].function.offset;
+      root.limit += shares[s] * model.roots[s].limit;
+    }
+  }
   for (std::size_t s = 1; s < model.styles(); ++s) {
     const MoreStyle& style = model.more[s - 1];
     mixture.process.weights += shares[s] * style.function.weights;

@@ -38,6 +38,10 @@ struct GateData {
   double fastest_stride_s = 0.0;
   // The highest mean that LiveGait has over a training clip; NaN: unknown.
   double gait_correlation = std::numeric_limits<double>::quiet_NaN();
+  // The mean cycle of each person and day in the neutral walk, harmonic coefficients
+  // [kCycleRows x dims]; phase 0 is where the right thigh is farthest in front. Empty without
+  // strides and in models of older versions of posed.
+  std::vector<Eigen::MatrixXd> usual{};
 
   [[nodiscard]] bool present() const { return neutral.size() > 0; }
   [[nodiscard]] bool strides() const { return swing_rad > 0.0; }
@@ -52,6 +56,14 @@ struct StyleAxis {
   [[nodiscard]] bool present() const { return direction.size() > 0; }
 };
 
+// What a style does to the pelvis, by the process's inputs and kernel: its height [lengths of a leg],
+// its speed forward and to the left [such lengths a stride].
+struct RootFunction {
+  static constexpr int kDims = 3;
+  gp::Function function;  // weights [N x 3], offset [3]
+  Eigen::Vector3d limit = Eigen::Vector3d::Zero();
+};
+
 struct StyleModel {
   motion::PoseSpaceSpec space;
   gp::Trained process;        // q -> difference of q at alpha = 1
@@ -61,6 +73,7 @@ struct StyleModel {
   std::string report_json;    // what `train --json` printed
   GateData gate{};
   StyleAxis axis{};
+  std::vector<RootFunction> roots{};  // of each style; empty in models of older versions of posed
   std::vector<MoreStyle> more{};  // `process`, `limit_rad` and `to` are the first style's
 
   [[nodiscard]] std::size_t styles() const { return 1 + more.size(); }

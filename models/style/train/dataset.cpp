@@ -5,11 +5,15 @@
 #include <numbers>
 #include <utility>
 
+#include "models/feet/legs.hpp"
 #include "models/motion/motion.hpp"
 #include "models/motion/symmetric_eigen.hpp"
+#include "models/style/live/body_mask.hpp"
+#include "models/style/model/style_model.hpp"
 #include "models/style/train/flips.hpp"
-#include "models/style/train/harmonics.hpp"
-#include "models/style/train/stride_phase.hpp"
+#include "models/style/model/harmonics.hpp"
+#include "models/style/model/stride_phase.hpp"
+#include "models/task_numbers.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::style {
@@ -78,6 +82,20 @@ Result<std::vector<Source>> read_sources(const std::vector<TrainingClip>& clips,
   return sources;
 }
 
+Result<VectorXd> kernel_scale_of(const motion::PoseSpaceSpec& spec, const Source& source) {
+  constexpr double kTrunk = 0.5, kHeadAndArms = 0.25;
+  const auto space = motion::PoseSpace::bind(spec, *source.motion.skeleton);
+  if (!space) return std::unexpected(in_clip(space.error(), source.clip->clip.path));
+  const std::vector<BodyPart> parts = parts_of(*space, spec);
+  VectorXd scale = VectorXd::Ones(space->dims());
+  for (int d = 0; d < space->dims(); ++d) {
+    const BodyPart part = parts[static_cast<std::size_t>(d)];
+    if (space->joint_of_dim(d) == spec.root || part >= BodyPart::kLeftLeg) continue;
+    scale[d] = std::sqrt(part == BodyPart::kTrunk ? kTrunk : kHeadAndArms);
+  }
+  return scale;
+}
+
 // The pose vectors of a clip, without flips, and what was mended.
 struct Vectors {
   MatrixXd q;
@@ -114,11 +132,12 @@ void keep_common_bones(const std::vector<Source>& sources, motion::PoseSpaceSpec
 int subject_index(Dataset& dataset, const TrainingClip& clip) {
   for (std::size_t s = 0; s < dataset.subjects.size(); ++s) {
     const Subject& known = dataset.subjects[s];
-    if (known.name == clip.subject && known.group == clip.group && known.motion == clip.motion) {
+    if (known.name == clip.subject && known.group == clip.group && known.motion == clip.motion &&
+        known.day == clip.day) {
       return static_cast<int>(s);
     }
   }
-  dataset.subjects.push_back({clip.subject, clip.group, clip.motion, {}});
+  dataset.subjects.push_back({clip.subject, clip.group, clip.motion, clip.day, {}});
   return static_cast<int>(dataset.subjects.size()) - 1;
 }
 
@@ -138,6 +157,11 @@ AlignedClip aligned_clip(const Source& source, MatrixXd q, double rate_hz) {
   if (auto leg = motion::leg_signal(source.motion)) {
     clip.leg = std::move(*leg);
     clip.has_legs = true;
+    if (const auto legs = feet::Legs::find(*source.motion.skeleton)) {
+      clip.root.resize(root_m.rows(), RootFunction::kDims);
+      clip.root << root_m.col(1), velocity.col(2), velocity.col(0);
+      clip.root /= legs->length_m();
+    }
   }
   return clip;
 }
@@ -192,13 +216,24 @@ MgpmData stack_states(Dataset& dataset, const std::vector<int>& members,
   return data;
 }
 
+// Whoever stands, starts or stops shows no style of walking.
+void keep_frames(const Eigen::Matrix<Eigen::Index, Eigen::Dynamic, 1>& kept, AlignedClip& clip) {
+  clip.q = MatrixXd(clip.q(kept, Eigen::all));
+  if (clip.root.rows() > 0) clip.root = MatrixXd(clip.root(kept, Eigen::all));
+  clip.state = MatrixXd(clip.state(kept, Eigen::all));
+  clip.leg = VectorXd(clip.leg(kept));
+  clip.height_m = VectorXd(clip.height_m(kept));
+  clip.local_phase = VectorXd(clip.local_phase(kept));
+}
+
 // Strides of all clips, each a task: the score, the mean cadence and the phase of every frame.
 Result<> follow_clips(Dataset& dataset, const DatasetOptions& options) {
   const Task task = [&](std::size_t c) {
     const StridePhase found = follow_strides(dataset.clips[c].leg, dataset.rate_hz);
-    TaskResult numbers{found.score, found.dtheta};
-    numbers.insert(numbers.end(), found.phase.begin(), found.phase.end());
-    return numbers;
+    const VectorXd kept = Eigen::Map<const Eigen::Matrix<Eigen::Index, Eigen::Dynamic, 1>>(
+                              found.strides.data(), std::ssize(found.strides))
+                              .cast<double>();
+    return NumberWriter().add(found.score).add(found.dtheta).add(found.phase).add(kept).take();
   };
   const auto count = dataset.clips.size();
   const TaskProgress progress = [&](std::size_t done) {
@@ -210,11 +245,16 @@ Result<> follow_clips(Dataset& dataset, const DatasetOptions& options) {
   const auto found = tasks.run(count, task, progress);
   if (!found) return training_stopped();
   for (std::size_t c = 0; c < count; ++c) {
-    const TaskResult& numbers = (*found)[c];
+    NumberReader numbers((*found)[c]);
     AlignedClip& clip = dataset.clips[c];
-    clip.stride_score = numbers[0];
-    clip.dtheta = numbers[1];
-    clip.local_phase = VectorXd::Map(numbers.data() + 2, clip.q.rows());
+    clip.stride_score = numbers.number();
+    clip.dtheta = numbers.number();
+    clip.local_phase = numbers.vector();
+    if (clip.root.rows() > 0) {  // a second to a stride
+      clip.root.rightCols(2) *= 2.0 * std::numbers::pi / (clip.dtheta * dataset.rate_hz);
+    }
+    // The MGPM has one cadence a clip, so that its frames must follow one another.
+    if (!options.mgpm && clip.has_legs) keep_frames(numbers.vector().cast<Eigen::Index>(), clip);
   }
   return {};
 }
@@ -273,6 +313,11 @@ VectorXd AlignedClip::phase() const {
   return clip_phase(theta0, dtheta, static_cast<int>(q.rows()));
 }
 
+std::string Dataset::unit_of(const AlignedClip& clip) const {
+  const Subject& subject = subjects[static_cast<std::size_t>(clip.subject)];
+  return subject.day.empty() ? subject.name : subject.name + " on " + subject.day;
+}
+
 std::vector<int> Dataset::clips_of(const std::string& motion) const {
   std::vector<int> found;
   for (int c = 0; c < std::ssize(clips); ++c) {
@@ -299,6 +344,7 @@ Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips,
     source_motions.push_back(&source.motion);
   }
   TRY(motion::set_mean_rotations(source_motions, dataset.spec));
+  dataset.kernel_scale = TRY(kernel_scale_of(dataset.spec, sources.front()));
   for (const Source& source : sources) {
     auto seen = TRY(vectors(dataset.spec, source, options.rate_hz));
     AlignedClip clip = aligned_clip(source, std::move(seen.q), options.rate_hz);

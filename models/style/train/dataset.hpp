@@ -22,6 +22,7 @@ struct TrainingClip {
   std::string group;    // "masculine"
   std::string subject;  // who; the same name is one person, in any group, motion or file
   std::string motion;   // "walk"
+  std::string day{};    // of the recording, any word; clips without one are of one day
 };
 
 // Receives the current step and its fraction done, 0 to 1; returning false stops the training.
@@ -46,6 +47,9 @@ struct AlignedClip {
   Eigen::MatrixXd state;     // y = (v, q, dq/dt) [T x 3 + 2D]; 89 for cmu43, as in Sato et al.
   Eigen::VectorXd leg;       // the stride's reference signal [T]
   Eigen::VectorXd height_m;  // of the root [T]
+  // Its height [lengths of a leg], its speed forward and to the left [such lengths a stride] [T x 3];
+  // no rows without legs.
+  Eigen::MatrixXd root;
   bool has_legs = false;     // else `leg` is the first principal component of q
   double theta0 = 0.0, dtheta = 0.0;  // phase of the first frame, mean phase per frame
   Eigen::VectorXd local_phase;  // of every frame, from theta0 = 0; empty: the cadence is constant
@@ -54,15 +58,18 @@ struct AlignedClip {
   [[nodiscard]] Eigen::VectorXd phase() const;
 };
 
-// One person in one group and one motion: one style point.
+// One person in one group, one motion and one day: one style point.
 struct Subject {
-  std::string name, group, motion;
+  std::string name, group, motion, day;
   Eigen::VectorXd xi;
 };
 
 struct Dataset {
   motion::PoseSpaceSpec spec;
   double rate_hz = 30.0;
+  // How much each dimension counts in the kernel [D]: the legs, whose pose tells where in the stride
+  // a walker is, more than what may do something else (README.md, "Choice of the kernel").
+  Eigen::VectorXd kernel_scale;
   std::vector<std::string> motions;  // in order of appearance
   std::vector<AlignedClip> clips;
   std::vector<Subject> subjects;
@@ -76,6 +83,9 @@ struct Dataset {
 
   [[nodiscard]] int dims() const { return motion::space_dims(spec); }
   [[nodiscard]] std::vector<int> clips_of(const std::string& motion) const;
+  // Whose own difference a clip shows: the person on that day, because on another day a person's
+  // walk and acting are others.
+  [[nodiscard]] std::string unit_of(const AlignedClip& clip) const;
 };
 
 // Reads poses and strides. Phases have no common origin yet: theta0 is each clip's own leg phase.

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "models/gp/inducing.hpp"
-#include "models/style/train/harmonics.hpp"
+#include "models/style/model/harmonics.hpp"
 #include "proto/frame/degree.hpp"
 
 namespace posed::style {
@@ -52,9 +52,24 @@ gp::Hyper paper_start(const MatrixXd& Y) {
 
 }  // namespace
 
-MatrixXd grid_basis() { return harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics); }
+MatrixXd scaled(const MatrixXd& poses, const VectorXd& scale) {
+  return scale.size() == 0 ? poses : MatrixXd(poses * scale.asDiagonal());
+}
 
-MatrixXd grid_inputs(const TrainingPairs& pairs) { return on_grid(pairs.inputs); }
+MatrixXd grid_inputs(const TrainingPairs& pairs) {
+  return scaled(on_grid(pairs.inputs), pairs.scale);
+}
+
+namespace {
+
+// Inputs as they are, with the scale that they were learnt at.
+void unscale(const VectorXd& scale, gp::Trained& process) {
+  if (scale.size() == 0) return;
+  process.inputs *= scale.cwiseInverse().asDiagonal();
+  process.scale = scale;
+}
+
+}  // namespace
 
 MatrixXd grid_outputs(const Outputs& outputs) {
   const MatrixXd basis = grid_basis();
@@ -74,8 +89,10 @@ Result<gp::Trained> fit_difference(const TrainingPairs& pairs, const Kernel& ker
   const MatrixXd residual = Y.rowwise() - offset.transpose();
   const gp::Hyper hyper =
       hyper_of(kernel, residual.squaredNorm() / static_cast<double>(residual.size()));
-  return X.rows() <= kMaxPoses ? gp::fit(X, Y, offset, hyper)
-                               : gp::fit_inducing(X, Y, offset, hyper, kMaxPoses);
+  auto process = TRY(X.rows() <= kMaxPoses ? gp::fit(X, Y, offset, hyper)
+                                           : gp::fit_inducing(X, Y, offset, hyper, kMaxPoses));
+  unscale(pairs.scale, process);
+  return process;
 }
 
 Result<std::vector<gp::Trained>> fit_differences(std::span<const StylePairs> styles,
@@ -96,8 +113,12 @@ Result<std::vector<gp::Trained>> fit_differences(std::span<const StylePairs> sty
     count += static_cast<double>(function.Y.size());
     poses = std::max(poses, function.rows.size());
   }
-  return gp::fit_functions(on_grid(cycles), functions, hyper_of(kernel, squares / count),
-                           std::min(static_cast<int>(poses), kMaxPoses));
+  const VectorXd& scale = styles.front().pairs.scale;
+  auto processes = TRY(gp::fit_functions(scaled(on_grid(cycles), scale), functions,
+                                         hyper_of(kernel, squares / count),
+                                         std::min(static_cast<int>(poses), kMaxPoses)));
+  for (gp::Trained& process : processes) unscale(scale, process);
+  return processes;
 }
 
 gp::Hyper paper_kernel(const MatrixXd& X, const MatrixXd& Y, const std::function<bool()>& stop) {

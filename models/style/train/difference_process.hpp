@@ -9,16 +9,10 @@
 #include <Eigen/Core>
 
 #include "models/gp/regression.hpp"
+#include "models/style/model/harmonics.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::style {
-
-inline constexpr int kCycleHarmonics =
-    4;                                  // mean and 4 harmonics describe a cycle down to its noise
-inline constexpr int kGridFrames = 28;  // points of a cycle that the process is trained on
-
-// Harmonic coefficients of a cycle to its kGridFrames points.
-[[nodiscard]] Eigen::MatrixXd grid_basis();
 
 // The most poses that a process keeps; above it they are inducing poses (models/gp/inducing.hpp).
 inline constexpr int kMaxPoses = 800;
@@ -37,7 +31,7 @@ struct Outputs {
 struct TrainingPairs {
   std::vector<Eigen::MatrixXd> inputs;  // cycles
   Outputs outputs;
-  bool follows_days = false;  // some outputs are those of a clip's own day (recording_days.hpp)
+  Eigen::VectorXd scale{};  // of the inputs' dimensions in the kernel [D]; empty: all 1
 };
 
 // Length of the kernel [rad] and noise over signal variance.
@@ -65,7 +59,9 @@ struct Way {
                          const Eigen::MatrixXd& goal, const Eigen::MatrixXd& change,
                          const Eigen::RowVectorXd& constant);
 
-// The inputs' poses on the cycle's grid [kGridFrames * inputs x D], and what to add to each.
+// The inputs' poses on the cycle's grid [kGridFrames * inputs x D] as the kernel measures them, and
+// what to add to each.
+[[nodiscard]] Eigen::MatrixXd scaled(const Eigen::MatrixXd& poses, const Eigen::VectorXd& scale);
 [[nodiscard]] Eigen::MatrixXd grid_inputs(const TrainingPairs& pairs);
 [[nodiscard]] Eigen::MatrixXd grid_outputs(const Outputs& outputs);
 

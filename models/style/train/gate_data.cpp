@@ -5,7 +5,9 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <set>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -53,6 +55,22 @@ VectorXd neutral_of(const Dataset& dataset, const std::vector<std::string>& targ
     }
   }
   return sum / std::max(count, 1);
+}
+
+// Of each person and day in the reference groups, motion by motion.
+std::vector<MatrixXd> usual_of(const Dataset& dataset, const std::vector<std::string>& targets) {
+  const auto cycles = clip_cycles(dataset);
+  const auto groups = reference_groups(dataset, targets);
+  std::vector<MatrixXd> usual;
+  std::set<std::tuple<std::string, std::string, std::string>> seen;  // motion, group, unit
+  for (const std::string& motion : dataset.motions) {
+    for (const AlignedClip& clip : dataset.clips) {
+      if (clip.motion != motion || !is_in(groups, clip.group)) continue;
+      if (!seen.emplace(motion, clip.group, dataset.unit_of(clip)).second) continue;
+      usual.push_back(group_cycle(dataset, cycles, clip.group, motion, dataset.unit_of(clip)));
+    }
+  }
+  return usual;
 }
 
 double mean_swing_rad(const AlignedClip& clip, double rate_hz) {
@@ -135,6 +153,7 @@ GateData gate_data_of(const Dataset& dataset, const std::vector<std::string>& ta
   }
   gate.swing_rad = swing_rad;
   gate.fastest_stride_s = fastest_s;
+  gate.usual = usual_of(dataset, targets);
   return gate;
 }
 

@@ -9,7 +9,7 @@
 #include <Eigen/Cholesky>
 
 #include "models/gp/inducing.hpp"
-#include "models/style/train/harmonics.hpp"
+#include "models/style/model/harmonics.hpp"
 #include "proto/frame/degree.hpp"
 
 namespace posed::style {
@@ -32,7 +32,8 @@ constexpr std::size_t kNumbers = 4;  // that a task gives for a fold and a noise
 // The process of one length on its inducing poses, ready to be asked without some of its inputs.
 class Folded {
  public:
-  Folded(const MatrixXd& X, double length_rad) : mu_(1.0 / (length_rad * length_rad)) {
+  Folded(const MatrixXd& X, const VectorXd& scale, double length_rad)
+      : mu_(1.0 / (length_rad * length_rad)), scale_(scale) {
     gp::Inducing chosen =
         gp::choose_inducing(X, mu_, kFoldPoses, [](double worst) { return worst < kExplained; });
     poses_ = X(chosen.chosen(), Eigen::all);
@@ -51,7 +52,7 @@ class Folded {
       residual.middleRows(input * kGridFrames, kGridFrames).setZero();
     }
     const MatrixXd moments = factor_.transpose() * residual;
-    const MatrixXd near = gp::rbf(fold.q, poses_, 0.0, mu_);
+    const MatrixXd near = gp::rbf(scaled(fold.q, scale_), poses_, 0.0, mu_);
     const MatrixXd truth = harmonic_basis(fold.phase, kCycleHarmonics) * fold.truth;
     for (const double noise : kNoises) {
       MatrixXd ridged = gram;
@@ -70,12 +71,16 @@ class Folded {
 
  private:
   double mu_;
+  VectorXd scale_;
   MatrixXd poses_, root_, factor_;
   MatrixXd gram_;  // of all inputs
 };
 
-double scaled_rad(double length_deg, Eigen::Index dims) {
-  return length_deg * kDegree * std::sqrt(static_cast<double>(dims) / 63.0);
+double scaled_rad(double length_deg, const TrainingPairs& pairs) {
+  const double dims = pairs.scale.size() == 0
+                          ? static_cast<double>(pairs.inputs.front().cols())
+                          : pairs.scale.squaredNorm();
+  return length_deg * kDegree * std::sqrt(dims / 63.0);
 }
 
 // Folds of one style that share a task.
@@ -107,7 +112,8 @@ class Search {
   bool try_lengths(const std::vector<double>& lengths_deg) {
     const Task task = [&](std::size_t t) {
       const Chunk& chunk = chunks_[t % chunks_.size()];
-      const Folded process(X_[chunk.style], rad(lengths_deg[t / chunks_.size()]));
+      const Folded process(X_[chunk.style], styles_[chunk.style].pairs.scale,
+                           rad(lengths_deg[t / chunks_.size()]));
       TaskResult numbers;
       const LeaveOut& style = styles_[chunk.style];
       for (std::size_t f = chunk.first; f < chunk.end && !tasks_.stopping(); ++f) {
@@ -136,7 +142,7 @@ class Search {
 
  private:
   [[nodiscard]] double rad(double length_deg) const {
-    return scaled_rad(length_deg, X_.front().cols());
+    return scaled_rad(length_deg, styles_.front().pairs);
   }
 
   // `found`: one result a chunk.
@@ -183,8 +189,7 @@ Way ChosenKernel::way(std::size_t style) const {
 std::optional<ChosenKernel> choose_kernel(std::span<const LeaveOut> styles, TaskRunner& tasks,
                                           const FoldProgress& progress) {
   if (std::ranges::all_of(styles, [](const LeaveOut& style) { return style.folds == 0; })) {
-    const auto dims = styles.front().pairs.inputs.front().cols();
-    return ChosenKernel{{scaled_rad(50.0, dims), kNoises.front()},
+    return ChosenKernel{{scaled_rad(50.0, styles.front().pairs), kNoises.front()},
                         0.0,
                         std::vector<std::vector<Way>>(styles.size()),
                         {}};

@@ -11,7 +11,7 @@
 
 #include "models/gp/lbfgs.hpp"
 #include "models/motion/symmetric_eigen.hpp"
-#include "models/style/train/harmonics.hpp"
+#include "models/style/model/harmonics.hpp"
 #include "models/task_numbers.hpp"
 
 namespace posed::style {

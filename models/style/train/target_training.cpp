@@ -6,7 +6,7 @@
 #include <set>
 #include <utility>
 
-#include "models/style/train/harmonics.hpp"
+#include "models/style/model/harmonics.hpp"
 #include "models/style/train/training_pairs.hpp"
 
 namespace posed::style {
@@ -51,6 +51,29 @@ MatrixXd mgpm_group_cycle(const Dataset& dataset, std::size_t motion, const std:
   return all.middleCols(3, dataset.dims());
 }
 
+// The same inputs and kernel with the pelvis as output, whose differences are found as those of the
+// pose.
+Result<> learn_roots(const Dataset& all, const std::vector<Lesson>& lessons,
+                     std::vector<TrainingPairs> pairs, const Kernel& kernel,
+                     std::vector<Learnt>& learnt) {
+  const auto lacks_root = [](const AlignedClip& clip) { return clip.root.rows() == 0; };
+  if (std::ranges::any_of(all.clips, lacks_root)) return {};
+  for (std::size_t i = 0; i < lessons.size(); ++i) {
+    Dataset roots = *lessons[i].data;
+    for (AlignedClip& clip : roots.clips) clip.q = clip.root;
+    pairs[i].outputs =
+        make_training_pairs(roots, clip_cycles(roots), lessons[i].target).outputs;
+    learnt[i].root.emplace().limit =
+        kLimitFactor * grid_outputs(pairs[i].outputs).cwiseAbs().colwise().maxCoeff().transpose();
+  }
+  const auto fitted = TRY(fit_styles(all, lessons, std::move(pairs), kernel));
+  for (std::size_t i = 0; i < lessons.size(); ++i) {
+    const double scale = std::exp(fitted[i].lambda - learnt[i].process.lambda);
+    learnt[i].root->function = {scale * fitted[i].weights, fitted[i].offset};
+  }
+  return {};
+}
+
 }  // namespace
 
 bool is_in(const std::vector<std::string>& names, const std::string& name) {
@@ -75,6 +98,7 @@ std::vector<Lesson> lessons_of(const Dataset& all, const std::vector<std::string
     lesson.data = &lesson.own;
     lesson.own.spec = all.spec;
     lesson.own.rate_hz = all.rate_hz;
+    lesson.own.kernel_scale = all.kernel_scale;
     lesson.own.motions = all.motions;
     lesson.own.subjects = all.subjects;
     for (int c = 0; c < std::ssize(all.clips); ++c) {
@@ -107,14 +131,14 @@ Result<std::vector<Learnt>> learn_default(const Dataset& all, const std::vector<
     learnt.push_back({.process = {},
                       .differences = grid_outputs(pairs[i].outputs),
                       .length_chosen_by = how,
-                      .follows_days = pairs[i].follows_days,
                       .way = chosen->way(i),
                       .held_out = std::move(leave_outs[i].held_out),
                       .ways = chosen->folds[i],
                       .tried = chosen->tried});
   }
-  auto processes = TRY(fit_styles(all, lessons, std::move(pairs), chosen->kernel));
+  auto processes = TRY(fit_styles(all, lessons, pairs, chosen->kernel));
   for (std::size_t i = 0; i < lessons.size(); ++i) learnt[i].process = std::move(processes[i]);
+  TRY(learn_roots(all, lessons, std::move(pairs), chosen->kernel, learnt));
   return learnt;
 }
 

@@ -2,14 +2,18 @@
 // and poses (README.md, "Several styles"). Cold.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "models/style/model/style_model.hpp"
 #include "models/style/train/dataset.hpp"
 #include "models/style/train/difference_process.hpp"
 #include "models/style/train/kernel_choice.hpp"
 
 namespace posed::style {
+
+inline constexpr double kLimitFactor = 1.5;  // of the largest difference in training
 
 [[nodiscard]] bool is_in(const std::vector<std::string>& names, const std::string& name);
 
@@ -33,12 +37,12 @@ struct Learnt {
   gp::Trained process;
   Eigen::MatrixXd differences;   // all differences in the training pairs [N x D]
   std::string length_chosen_by;  // "leave-out", "default" or "evidence"
-  bool follows_days = false;
   Way way{};  // error on held-out walkers; unset if none could be held out
   // That error for each walker, and all kernels that were tried; empty where none was held out.
   std::vector<HeldOut> held_out{};
   std::vector<Way> ways{};  // [held_out]
   std::vector<TriedKernel> tried{};
+  std::optional<RootFunction> root{};  // what the style does to the pelvis; unset without legs
 };
 
 // One process a lesson; they share kernel and poses.

@@ -17,8 +17,6 @@ namespace {
 
 using Eigen::VectorXd;
 
-constexpr double kLimitFactor = 1.5;  // of the largest difference in training
-
 // Of each of a model's styles.
 std::vector<std::string> targets_of(const TrainOptions& options) {
   std::vector<std::string> targets{options.target};
@@ -105,6 +103,9 @@ StyleModel model_of(Dataset dataset, const std::vector<std::string>& targets,
   model.rate_hz = dataset.rate_hz;
   model.limit_rad = limit_of(learnt.front());
   model.space = std::move(dataset.spec);
+  if (std::ranges::all_of(learnt, [](const Learnt& one) { return one.root.has_value(); })) {
+    for (Learnt& one : learnt) model.roots.push_back(std::move(*one.root));
+  }
   for (std::size_t i = 1; i < learnt.size(); ++i) {
     gp::Trained& process = learnt[i].process;
     model.more.push_back(

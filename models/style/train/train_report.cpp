@@ -59,8 +59,8 @@ json check_json(const TrainingCheck& check, const std::string& target) {
 }
 
 // What training found out about one of several styles.
-json style_json(const TrainingCheck& check, const Learnt& learnt, const std::string& target) {
-  json report{{"name", target}, {"follows_days", learnt.follows_days}};
+json style_json(const TrainingCheck& check, const std::string& target) {
+  json report{{"name", target}};
   report.update(check_json(check, target));
   return report;
 }
@@ -88,6 +88,7 @@ json report_of(const Dataset& dataset, const Learnt& learnt, bool alone) {
     report["clips"].push_back({{"file", clip.file},
                                {"group", clip.group},
                                {"subject", dataset.subjects[clip.subject].name},
+                               {"day", dataset.subjects[clip.subject].day},
                                {"motion", clip.motion},
                                {"frames", clip.q.rows()},
                                {"dropped_first_frame", clip.dropped_first},
@@ -113,13 +114,12 @@ json report_of(const Dataset& dataset, const Learnt& learnt, bool alone) {
   report["kernel"]["mu"] = p.mu;
   report["kernel"]["b"] = p.b;
   report["kernel"]["length_deg"] = 1.0 / (kDegree * std::sqrt(p.mu));
-  report["follows_days"] = learnt.follows_days;
   report["noise"] = p.noise;
   if (alone &&
       p.inputs.rows() == learnt.differences.rows()) {  // with inducing poses there is no evidence
     const MatrixXd residual = learnt.differences.rowwise() - p.offset.transpose();
     const gp::Hyper hyper{p.lambda, std::log(p.mu), std::log(p.b), std::log(p.noise)};
-    report["log_likelihood"]["gp"] = gp::log_marginal(p.inputs, residual, hyper).log_likelihood;
+    report["log_likelihood"]["gp"] = gp::log_marginal(p.scaled(p.inputs), residual, hyper).log_likelihood;
   }
   report["pose_space"] = motion::space_name(dataset.spec.space);
   report["dims"] = dataset.dims();
@@ -169,9 +169,8 @@ json whole_report(const Findings& findings) {
   }
   json styles = json::array();
   for (std::size_t i = 0; i < lessons.size(); ++i) {
-    styles.push_back(style_json(checks[i], learnt[i], lessons[i].target));
+    styles.push_back(style_json(checks[i], lessons[i].target));
   }
-  report.erase("follows_days");
   report.update({{"targets", styles},
                  {"usable", verdict.usable},
                  {"problems", verdict.problems},

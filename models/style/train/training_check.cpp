@@ -8,7 +8,7 @@
 #include <set>
 #include <string_view>
 
-#include "models/style/train/harmonics.hpp"
+#include "models/style/model/harmonics.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/text/nearest_word.hpp"
 
@@ -54,20 +54,23 @@ void measure_cycles(const Dataset& dataset, const std::string& target, TrainingC
   double apart = 0.0;
   double scatter = 0.0;
   int companions = 0;
+  int pairs = 0;
   for (const ClipCycle& cycle : cycles) {
     const AlignedClip& clip = dataset.clips[cycle.clip];
-    const std::string& person = dataset.subjects[clip.subject].name;
     const double from_own = difference_squares(
-        dataset,
-        cycle.coefficients - group_cycle(dataset, cycles, clip.group, clip.motion, person));
-    if (from_own == 0.0) continue;  // the person's only clip
+        dataset, cycle.coefficients - group_cycle(dataset, cycles, clip.group, clip.motion,
+                                                  dataset.unit_of(clip)));
+    if (from_own == 0.0) continue;  // the unit's only clip
     scatter += from_own;
     ++companions;
   }
   const auto differences = differences_of(dataset, cycles, target);
   for (const Difference& d : differences) {
-    apart += difference_squares(dataset, d.delta);
-    if (d.people == 0) {
+    for (const auto& [unit, delta] : d.own) apart += difference_squares(dataset, delta);
+    pairs += static_cast<int>(d.own.size());
+    if (d.own.empty()) {
+      apart += difference_squares(dataset, d.delta);
+      ++pairs;
       check.warnings.push_back("nobody shows both '" + d.group + "' and '" + target +
                                "' in motion " + d.motion +
                                ", so what sets the people apart is learnt with the "
@@ -75,7 +78,6 @@ void measure_cycles(const Dataset& dataset, const std::string& target, TrainingC
                                "where it is one person");
     }
   }
-  const int pairs = static_cast<int>(std::ssize(differences));
   check.difference_deg = degrees_rms(apart, pairs);
   check.scatter_deg = degrees_rms(scatter, companions);
 }

@@ -6,8 +6,7 @@
 #include <numbers>
 #include <utility>
 
-#include "models/style/train/harmonics.hpp"
-#include "models/style/train/recording_days.hpp"
+#include "models/style/model/harmonics.hpp"
 
 namespace posed::style {
 namespace {
@@ -24,34 +23,35 @@ const std::string& person_of(const Dataset& dataset, const AlignedClip& clip) {
   return dataset.subjects[clip.subject].name;
 }
 
-// Everybody with a clip of this group and motion, in the clips' order.
-std::vector<std::string> people_in(const Dataset& dataset, const Cycles& cycles,
-                                   const std::string& group, const std::string& motion) {
-  std::vector<std::string> people;
+// Every unit with a clip of this group and motion, in the clips' order.
+std::vector<std::string> units_in(const Dataset& dataset, const Cycles& cycles,
+                                  const std::string& group, const std::string& motion) {
+  std::vector<std::string> units;
   for (const ClipCycle& cycle : cycles) {
     const AlignedClip& clip = clip_of(dataset, cycle);
     if (clip.group != group || clip.motion != motion) continue;
-    const std::string& name = person_of(dataset, clip);
-    if (std::ranges::find(people, name) == people.end()) people.push_back(name);
+    std::string name = dataset.unit_of(clip);
+    if (std::ranges::find(units, name) == units.end()) units.push_back(std::move(name));
   }
-  return people;
+  return units;
 }
 
 Difference difference_of(const Dataset& dataset, const Cycles& cycles, const std::string& target,
                          const std::string& group, const std::string& motion) {
-  Difference found{motion, group, {}, 0};
-  for (const std::string& person : people_in(dataset, cycles, group, motion)) {
-    const MatrixXd goal = group_cycle(dataset, cycles, target, motion, person);
+  Difference found{motion, group, {}};
+  MatrixXd sum = MatrixXd::Zero(cycles.front().coefficients.rows(), cycles.front().coefficients.cols());
+  for (const std::string& unit : units_in(dataset, cycles, group, motion)) {
+    const MatrixXd goal = group_cycle(dataset, cycles, target, motion, unit);
     if (goal.size() == 0) continue;
-    const MatrixXd own = goal - group_cycle(dataset, cycles, group, motion, person);
-    found.delta = found.people == 0 ? own : MatrixXd(found.delta + own);
-    ++found.people;
+    MatrixXd own = goal - group_cycle(dataset, cycles, group, motion, unit);
+    sum += own;
+    found.own.emplace(unit, std::move(own));
   }
-  if (found.people > 0) {
-    found.delta /= found.people;
-  } else {
+  if (found.own.empty()) {
     found.delta =
         group_cycle(dataset, cycles, target, motion) - group_cycle(dataset, cycles, group, motion);
+  } else {
+    found.delta = sum / static_cast<double>(found.own.size());
   }
   return found;
 }
@@ -65,6 +65,13 @@ int index_of(const std::vector<Difference>& differences, const AlignedClip& clip
   return kNoDifference;
 }
 
+// What the clip's own unit shows; what all show where it shows none.
+const MatrixXd& own_difference(const Dataset& dataset, const Difference& difference,
+                               const AlignedClip& clip) {
+  const auto own = difference.own.find(dataset.unit_of(clip));
+  return own == difference.own.end() ? difference.delta : own->second;
+}
+
 // The clips without those at these indices.
 Cycles without(const Cycles& cycles, const std::vector<int>& left_out) {
   Cycles kept;
@@ -76,53 +83,61 @@ Cycles without(const Cycles& cycles, const std::vector<int>& left_out) {
   return kept;
 }
 
-bool same_differences(const std::vector<Difference>& a, const std::vector<Difference>& b) {
-  return std::ranges::equal(a, b, [](const Difference& x, const Difference& y) {
-    return x.group == y.group && x.motion == y.motion && (x.people > 0) == (y.people > 0);
-  });
-}
+// What is asked of a clip, and which clips are not learnt from then.
+struct FoldPlan {
+  std::size_t asked;  // index of a clip
+  std::vector<int> left_out;
+  bool whole_person = false;
+};
 
-// The fold that asks for the difference on the frames of one clip, learnt without some. What it
-// should get is what the others show; where days are followed, what it shows itself.
-Fold fold_of(const Dataset& dataset, const Cycles& cycles, std::size_t asked,
-             std::vector<int> left_out, const TrainingPairs& all, const std::string& target) {
-  const AlignedClip& clip = clip_of(dataset, cycles[asked]);
-  const auto differences = differences_of(dataset, without(cycles, left_out), target);
+// The fold that asks for the difference on the frames of one clip, learnt without some: what the
+// clip's own unit shows in its other clips, or all others.
+Fold fold_of(const Dataset& dataset, const Cycles& cycles, const FoldPlan& plan,
+             const std::string& target) {
+  const AlignedClip& clip = clip_of(dataset, cycles[plan.asked]);
+  const auto differences = differences_of(dataset, without(cycles, plan.left_out), target);
   const Difference& shown = differences[index_of(differences, clip)];
-  const std::size_t own = all.outputs.of_input[asked];
   Fold fold;
-  fold.truth = own < differences.size() ? shown.delta : all.outputs.differences[own];
-  fold.goal = goal_of(dataset, cycles, clip, shown, target);
-  fold.outputs = make_training_pairs(dataset, cycles, target, left_out).outputs;
-  fold.left_out = std::move(left_out);
+  fold.truth = own_difference(dataset, shown, clip);
+  fold.goal = plan.whole_person ? MatrixXd(cycles[plan.asked].coefficients + shown.delta)
+                                : goal_of(dataset, cycles, clip, shown, target);
+  fold.outputs = make_training_pairs(dataset, cycles, target, plan.left_out).outputs;
+  fold.left_out = plan.left_out;
   fold.q = clip.q;
   fold.phase = clip.phase();
   return fold;
 }
 
-// What to leave out to ask for this clip: all of its person, else the clip alone; nothing where
-// either would leave too little to learn the same differences from.
-std::vector<int> leave_out_for(const Dataset& dataset, const Cycles& cycles,
-                               const std::string& target, std::size_t asked,
-                               const std::vector<Difference>& all) {
-  const AlignedClip& clip = clip_of(dataset, cycles[asked]);
-  std::vector<int> person;
-  for (int i = 0; i < std::ssize(cycles); ++i) {
-    const AlignedClip& other = clip_of(dataset, cycles[i]);
-    if (person_of(dataset, other) == person_of(dataset, clip)) person.push_back(i);
-  }
-  for (auto& left_out : {person, std::vector<int>{static_cast<int>(asked)}}) {
-    const Cycles kept = without(cycles, left_out);
-    if (same_differences(differences_of(dataset, kept, target), all)) return left_out;
-  }
-  return {};
+// Whether what is kept shows every motion and group's difference still.
+bool all_shown(const std::vector<Difference>& kept, const std::vector<Difference>& all) {
+  return std::ranges::equal(kept, all, [](const Difference& a, const Difference& b) {
+    return a.group == b.group && a.motion == b.motion && a.own.empty() == b.own.empty();
+  });
 }
 
-// What one fold asks for and leaves out; the fold itself is built from it.
-struct FoldPlan {
-  std::size_t asked;  // index of a clip
-  std::vector<int> left_out;
-};
+// Left out alone where its unit still shows what is asked, else with all of its person.
+FoldPlan plan_for(const Dataset& dataset, const Cycles& cycles, const std::string& target,
+                  std::size_t asked, const std::vector<Difference>& all) {
+  constexpr std::size_t kOthers = 2;
+  const AlignedClip& clip = clip_of(dataset, cycles[asked]);
+  const std::string unit = dataset.unit_of(clip);
+  const bool shows_both = all[index_of(all, clip)].own.contains(unit);
+  const FoldPlan alone{asked, {static_cast<int>(asked)}};
+  const auto kept = differences_of(dataset, without(cycles, alone.left_out), target);
+  if (all_shown(kept, all)) {
+    const auto left = group_cycle(dataset, without(cycles, alone.left_out), clip.group,
+                                  clip.motion, unit);
+    if (left.size() > 0 || !shows_both) return alone;
+  }
+  FoldPlan person{asked, {}, true};
+  for (int i = 0; i < std::ssize(cycles); ++i) {
+    const AlignedClip& other = clip_of(dataset, cycles[i]);
+    if (person_of(dataset, other) == person_of(dataset, clip)) person.left_out.push_back(i);
+  }
+  const auto others = differences_of(dataset, without(cycles, person.left_out), target);
+  if (!all_shown(others, all) || others[index_of(others, clip)].own.size() < kOthers) return {};
+  return person;
+}
 
 std::vector<FoldPlan> clip_folds(const Dataset& dataset, const Cycles& cycles,
                                  const std::string& target) {
@@ -131,9 +146,8 @@ std::vector<FoldPlan> clip_folds(const Dataset& dataset, const Cycles& cycles,
   for (std::size_t i = 0; i < cycles.size(); ++i) {
     const AlignedClip& clip = clip_of(dataset, cycles[i]);
     if (index_of(all, clip) == kNoDifference) continue;
-    std::vector<int> left_out = leave_out_for(dataset, cycles, target, i, all);
-    if (left_out.empty()) continue;
-    folds.push_back({i, std::move(left_out)});
+    FoldPlan plan = plan_for(dataset, cycles, target, i, all);
+    if (!plan.left_out.empty()) folds.push_back(std::move(plan));
   }
   return folds;
 }
@@ -146,10 +160,9 @@ LeaveOut planned(std::shared_ptr<const Dataset> dataset, Cycles cycles, Training
     result.held_out.push_back(
         {clip.file, person_of(*dataset, clip), static_cast<int>(plan.left_out.size())});
   }
-  result.fold = [dataset = std::move(dataset), cycles = std::move(cycles), pairs = result.pairs,
+  result.fold = [dataset = std::move(dataset), cycles = std::move(cycles),
                  plans = std::move(plans), target](std::size_t index) {
-    const FoldPlan& plan = plans[index];
-    return fold_of(*dataset, cycles, plan.asked, plan.left_out, pairs, target);
+    return fold_of(*dataset, cycles, plans[index], target);
   };
   return result;
 }
@@ -171,6 +184,7 @@ LeaveOut half_folds(const Dataset& dataset, const std::string& target) {
   const auto parts = std::make_shared<Dataset>();
   parts->motions = dataset.motions;
   parts->subjects = dataset.subjects;
+  parts->kernel_scale = dataset.kernel_scale;
   std::vector<int> halves[2];  // of the source clips: which parts are first and second ones
   for (const AlignedClip& clip : dataset.clips) {
     const Eigen::Index frames = clip.q.rows();
@@ -210,24 +224,22 @@ Cycles clip_cycles(const Dataset& dataset) {
 }
 
 MatrixXd group_cycle(const Dataset& dataset, const Cycles& cycles, const std::string& group,
-                     const std::string& motion, const std::string& person) {
-  if (person.empty()) {
-    MatrixXd sum;
-    const auto people = people_in(dataset, cycles, group, motion);
-    for (const std::string& name : people) {
-      const MatrixXd own = group_cycle(dataset, cycles, group, motion, name);
-      sum = sum.size() == 0 ? own : MatrixXd(sum + own);
-    }
-    return people.empty() ? sum : MatrixXd(sum / static_cast<double>(people.size()));
-  }
+                     const std::string& motion, const std::string& unit) {
   MatrixXd sum;
   int count = 0;
-  for (const ClipCycle& cycle : cycles) {
-    const AlignedClip& clip = clip_of(dataset, cycle);
-    if (clip.group != group || clip.motion != motion || person_of(dataset, clip) != person)
-      continue;
-    sum = count == 0 ? cycle.coefficients : MatrixXd(sum + cycle.coefficients);
-    ++count;
+  const auto add = [&](const MatrixXd& one) {
+    sum = count++ == 0 ? one : MatrixXd(sum + one);
+  };
+  if (unit.empty()) {
+    for (const std::string& name : units_in(dataset, cycles, group, motion)) {
+      add(group_cycle(dataset, cycles, group, motion, name));
+    }
+  } else {
+    for (const ClipCycle& cycle : cycles) {
+      const AlignedClip& clip = clip_of(dataset, cycle);
+      if (clip.group != group || clip.motion != motion || dataset.unit_of(clip) != unit) continue;
+      add(cycle.coefficients);
+    }
   }
   return count == 0 ? sum : MatrixXd(sum / count);
 }
@@ -238,7 +250,7 @@ std::vector<Difference> differences_of(const Dataset& dataset, const Cycles& cyc
   for (const ClipCycle& cycle : cycles) {
     const AlignedClip& clip = clip_of(dataset, cycle);
     if (clip.group == target || index_of(found, clip) != kNoDifference) continue;
-    if (people_in(dataset, cycles, target, clip.motion).empty()) continue;
+    if (units_in(dataset, cycles, target, clip.motion).empty()) continue;
     found.push_back(difference_of(dataset, cycles, target, clip.group, clip.motion));
   }
   return found;
@@ -246,9 +258,9 @@ std::vector<Difference> differences_of(const Dataset& dataset, const Cycles& cyc
 
 MatrixXd goal_of(const Dataset& dataset, const Cycles& cycles, const AlignedClip& clip,
                  const Difference& difference, const std::string& target) {
-  MatrixXd own = group_cycle(dataset, cycles, target, clip.motion, person_of(dataset, clip));
+  MatrixXd own = group_cycle(dataset, cycles, target, clip.motion, dataset.unit_of(clip));
   if (own.size() > 0) return own;
-  if (difference.people == 0) return group_cycle(dataset, cycles, target, clip.motion);
+  if (difference.own.empty()) return group_cycle(dataset, cycles, target, clip.motion);
   return fit_harmonics(clip.phase(), clip.q, kCycleHarmonics) + difference.delta;
 }
 
@@ -256,22 +268,30 @@ TrainingPairs make_training_pairs(const Dataset& dataset, const Cycles& cycles,
                                   const std::string& target, const std::vector<int>& left_out) {
   const auto differences = differences_of(dataset, without(cycles, left_out), target);
   TrainingPairs pairs;
+  pairs.scale = dataset.kernel_scale;
   Outputs& outputs = pairs.outputs;
   outputs.offset = Eigen::RowVectorXd::Zero(cycles.front().coefficients.cols());
+  std::vector<std::map<std::string, int>> own(differences.size());  // [difference][unit]
   for (const Difference& d : differences) {
     outputs.differences.push_back(d.delta);
     outputs.offset += d.delta.row(0) / static_cast<double>(differences.size());
   }
+  for (std::size_t d = 0; d < differences.size(); ++d) {
+    if (differences[d].own.size() < 2) continue;  // the only one is what all show
+    for (const auto& [unit, delta] : differences[d].own) {
+      own[d][unit] = static_cast<int>(std::ssize(outputs.differences));
+      outputs.differences.push_back(delta);
+    }
+  }
   for (const ClipCycle& cycle : cycles) {
     pairs.inputs.push_back(cycle.coefficients);
-    outputs.of_input.push_back(index_of(differences, clip_of(dataset, cycle)));
-  }
-  for (auto& [clip, day] : day_changes(dataset, cycles, left_out, target)) {
-    pairs.follows_days = true;
-    int& index = outputs.of_input[clip];
-    day += outputs.differences[index];
-    index = static_cast<int>(std::ssize(outputs.differences));
-    outputs.differences.push_back(std::move(day));
+    int index = index_of(differences, clip_of(dataset, cycle));
+    if (index != kNoDifference) {
+      const auto& units = own[static_cast<std::size_t>(index)];
+      const auto found = units.find(dataset.unit_of(clip_of(dataset, cycle)));
+      if (found != units.end()) index = found->second;
+    }
+    outputs.of_input.push_back(index);
   }
   return pairs;
 }

@@ -3,6 +3,7 @@
 // Cold.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -20,28 +21,28 @@ struct ClipCycle {
 // Cycles of all clips by harmonic regression at their phases.
 [[nodiscard]] std::vector<ClipCycle> clip_cycles(const Dataset& dataset);
 
-// The mean over a group's people in one motion, a person's clips first; equal weights. Empty where
-// there is none. With a name, this person's alone.
+// The mean over a group's units (Dataset::unit_of) in one motion, a unit's clips first; equal
+// weights. Empty where there is none. With a name, this unit's alone.
 [[nodiscard]] Eigen::MatrixXd group_cycle(const Dataset& dataset,
                                           const std::vector<ClipCycle>& cycles,
                                           const std::string& group, const std::string& motion,
-                                          const std::string& person = {});
+                                          const std::string& unit = {});
 
 // What the target adds to one source group in one motion.
 struct Difference {
   std::string motion, group;
   Eigen::MatrixXd delta;  // harmonic coefficients
-  int people = 0;         // who walk in both styles; 0: the difference of the groups' means
+  std::map<std::string, Eigen::MatrixXd> own{};  // of each unit that walks in both styles
 };
 
-// In the clips' order. The mean over the people who have both styles of what sets their own two
-// apart; where nobody has both, what sets the two groups apart.
+// In the clips' order. The mean over the units that have both styles of what sets their own two
+// apart; where none has both, what sets the two groups apart.
 [[nodiscard]] std::vector<Difference> differences_of(const Dataset& dataset,
                                                      const std::vector<ClipCycle>& cycles,
                                                      const std::string& target);
 
-// The cycle that this clip should reach: its own person's in the target's style; where the person
-// has none, its own cycle and the difference, or, if nobody shows both styles, the target's mean.
+// The cycle that this clip should reach: its own unit's in the target's style; where the unit has
+// none, its own cycle and the difference, or, if nobody shows both styles, the target's mean.
 [[nodiscard]] Eigen::MatrixXd goal_of(const Dataset& dataset, const std::vector<ClipCycle>& cycles,
                                       const AlignedClip& clip, const Difference& difference,
                                       const std::string& target);
@@ -53,9 +54,10 @@ struct Difference {
                                                 const std::string& target,
                                                 const std::vector<int>& left_out = {});
 
-// Folds for the choice of the kernel: a person left out where others show the difference, else a
-// clip where its person has several, else one half of each source clip against the other half; none
-// where clips are too short. They refer to `dataset`.
+// Folds for the choice of the kernel: a clip left out where its unit still shows its difference,
+// else a person where at least two others show one, else one half of each source clip against the
+// other half; none where clips are too short. A person who is left out is asked for the others'
+// difference, because nobody knows how another one acts. They refer to `dataset`.
 [[nodiscard]] LeaveOut make_folds(const Dataset& dataset, const std::string& target);
 
 }  // namespace posed::style

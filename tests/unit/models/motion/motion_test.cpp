@@ -8,7 +8,7 @@
 
 #include "models/motion/low_pass.hpp"
 #include "models/motion/synthetic_walker.hpp"
-#include "models/style/train/harmonics.hpp"
+#include "models/style/model/harmonics.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/shared.hpp"
 

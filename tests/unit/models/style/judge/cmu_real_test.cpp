@@ -12,7 +12,7 @@
 
 #include "models/style/train/dataset.hpp"
 #include "models/style/train/difference_process.hpp"
-#include "models/style/train/harmonics.hpp"
+#include "models/style/model/harmonics.hpp"
 #include "models/style/train/training_pairs.hpp"
 #include "tests/support/shared.hpp"
 

@@ -32,7 +32,7 @@ class ToyGate {
     for (std::size_t d = 0; d < q.size(); ++d) {
       q[d] = static_cast<float>(model.process.inputs(3, static_cast<Eigen::Index>(d)) + away_rad);
     }
-    gate.update(&known, true, {}, q, std::vector<std::uint8_t>(15, 1), {}, dt_s);
+    gate.update(&known, true, {}, q, q, std::vector<std::uint8_t>(15, 1), {}, dt_s);
     return gate.open();
   }
   style::StyleModel model = gated_toy_model(1);
@@ -86,7 +86,7 @@ class WalkingGate {
     for (float& angle : q_) angle += static_cast<float>(how.away_deg * kDegree / std::sqrt(3.0));
     const double apart_rad = std::abs(known_->legs()->value_rad(in));
     in.root_position_m[1] = static_cast<float>(1.0 + how.rise_m_rad * apart_rad);
-    gate.update(&*known_, on, in, q_, available_, walker, kStep_s);
+    gate.update(&*known_, on, in, q_, q_, available_, walker, kStep_s);
   }
   [[nodiscard]] const style::TrainedMotion& known() const { return *known_; }
 
@@ -162,7 +162,7 @@ TEST_CASE("a gate that is off is open and still measures the cadence, for warm-u
   WalkingGate walk;
   style::Gate gate;
   CHECK(walk.walk(gate, {.speed = 1.6}, false) == 1.0F);
-  CHECK(gate.cadence_rad_s() == Approx(1.6 * walk.known().cadence_rad_s()).epsilon(0.1));
+  CHECK(gate.legs().cadence_rad_s == Approx(1.6 * walk.known().cadence_rad_s()).epsilon(0.1));
 }
 
 TEST_CASE("the correlation of height and legs is low in a walk, high in a run", "[style]") {
@@ -254,12 +254,12 @@ TEST_CASE("the gate is half open or closed within 0.3 s, at any rate, without a 
 TEST_CASE("a gate that was never on is open at once, one that is switched off opens", "[style]") {
   ToyGate toy;
   style::Gate never;
-  never.update(nullptr, true, {}, {}, {}, {}, 0.0);
+  never.update(nullptr, true, {}, {}, {}, {}, {}, 0.0);
   CHECK(never.open() == 1.0F);
   for (int i = 0; i < 60; ++i) toy.step(1.0);
-  toy.gate.update(nullptr, true, {}, {}, {}, {}, 1.0 / kGateRate_hz);
+  toy.gate.update(nullptr, true, {}, {}, {}, {}, {}, 1.0 / kGateRate_hz);
   CHECK(toy.gate.open() < 0.1F);
-  for (int i = 0; i < 120; ++i) toy.gate.update(nullptr, true, {}, {}, {}, {}, 1.0 / kGateRate_hz);
+  for (int i = 0; i < 120; ++i) toy.gate.update(nullptr, true, {}, {}, {}, {}, {}, 1.0 / kGateRate_hz);
   CHECK(toy.gate.open() == 1.0F);
 }
 

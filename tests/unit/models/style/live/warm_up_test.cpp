@@ -74,9 +74,10 @@ TEST_CASE("a warm-up is the mean of the frames on which the walker walks", "[sty
   for (int i = 0; i < 9; ++i) {
     const bool walks = i % 3 != 0;
     const std::vector<float> q{walks ? 2.0F : 100.0F, static_cast<float>(i), 7.0F};
-    REQUIRE(warm_up.update(q, available, walks, 6.0, 0.1) == WarmUp::Outcome::kNone);
+    REQUIRE(warm_up.update(q, available, {.walk = walks, .cadence_rad_s = 6.0}, 0.1) == WarmUp::Outcome::kNone);
   }
-  CHECK(warm_up.update(std::vector<float>(3, 2.0F), available, true, 6.0, 0.11) ==
+  CHECK(warm_up.update(std::vector<float>(3, 2.0F), available,
+                       {.walk = true, .cadence_rad_s = 6.0}, 0.11) ==
         WarmUp::Outcome::kDone);
   const style::Walker walker = warm_up.walker();
   CHECK(walker.neutral[0] == Approx(2.0F));
@@ -86,7 +87,7 @@ TEST_CASE("a warm-up is the mean of the frames on which the walker walks", "[sty
   CHECK_FALSE(warm_up.running());
   warm_up.begin(0.5);
   CHECK(warm_up.update(available.size() == 3 ? std::vector<float>(3) : std::vector<float>(),
-                       available, false, 6.0, 0.6) == WarmUp::Outcome::kStood);
+                       available, {.cadence_rad_s = 6.0}, 0.6) == WarmUp::Outcome::kStood);
 }
 
 TEST_CASE("after a warm-up the kernel sees the walker as if its neutral pose were the training's",

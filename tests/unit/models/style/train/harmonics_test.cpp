@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "models/style/train/harmonics.hpp"
+#include "models/style/model/harmonics.hpp"
 
 using namespace posed::style;
 using Eigen::VectorXd;

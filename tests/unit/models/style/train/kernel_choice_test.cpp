@@ -5,7 +5,7 @@
 
 #include <random>
 
-#include "models/style/train/harmonics.hpp"
+#include "models/style/model/harmonics.hpp"
 
 using namespace posed;
 

@@ -2,19 +2,25 @@
 // and linked in time (README.md, "Stride"). Cold; thread-safe.
 #pragma once
 
+#include <vector>
+
 #include <Eigen/Core>
 
 namespace posed::style {
 
 struct StridePhase {
   Eigen::VectorXd phase;  // rad, one a frame, increasing: signal ~ A cos(phase)
-  double dtheta = 0.0;    // mean cadence, rad per frame
+  double dtheta = 0.0;    // mean cadence of `strides`, rad per frame
   // Share of the signal that three harmonics of this phase leave, plus find_stride's penalty on a
   // weak first harmonic: 0 is a perfect stride, 1 and more none.
   double score = 0.0;
+  // The frames on which the legs stride, in order: without those that stand, start or stop, and
+  // without a third of a second at either end, where a recording begins and ends. All frames where
+  // less than a stride would be left.
+  std::vector<Eigen::Index> strides;
 };
 
-// Follows the strides of a leg signal sampled at `rate_hz`: periods 0.6 to 1.7 s, no longer than
+// Follows the strides of a leg signal sampled at `rate_hz`: periods 0.6 to 2.6 s, no longer than
 // the signal. Needs has_stride() (harmonics.hpp).
 [[nodiscard]] StridePhase follow_strides(const Eigen::VectorXd& signal, double rate_hz);
 

@@ -20,6 +20,14 @@ namespace posed::style {
 [[nodiscard]] Eigen::MatrixXd fit_harmonics(const Eigen::VectorXd& theta, const Eigen::MatrixXd& y,
                                             int harmonics);
 
+inline constexpr int kCycleHarmonics =
+    4;  // mean and 4 harmonics describe the cycle of a pose down to its noise
+inline constexpr int kCycleRows = 2 * kCycleHarmonics + 1;  // coefficients
+inline constexpr int kGridFrames = 28;                      // points that stand for a cycle
+
+// Harmonic coefficients of a cycle to its kGridFrames points.
+[[nodiscard]] Eigen::MatrixXd grid_basis();
+
 // Phase of the first harmonic of `signal` under the phases `theta`: signal ~ A cos(theta - phase).
 [[nodiscard]] double first_harmonic_phase(const Eigen::VectorXd& theta,
                                           const Eigen::VectorXd& signal);
@@ -37,7 +45,7 @@ struct Stride {
   double score = 0.0;   // relative residual of the fit, plus the penalty; 0 is a perfect stride
 };
 
-// The stride frequency of a leg signal sampled at `rate_hz`: the period from 0.6 to 1.7 s (and no
+// The stride frequency of a leg signal sampled at `rate_hz`: the period from 0.6 to 2.6 s (and no
 // longer than the signal) that three harmonics fit best, with a penalty on a weak first harmonic,
 // which prevents two strides from being taken for one (README.md, "Stride"). Needs has_stride().
 [[nodiscard]] Stride find_stride(const Eigen::VectorXd& signal, double rate_hz);
@@ -45,6 +53,6 @@ struct Stride {
 // Whether `frames` at `rate_hz` can hold a stride at all.
 [[nodiscard]] bool has_stride(int frames, double rate_hz);
 inline constexpr double kMinStride_s = 0.6;
-inline constexpr double kMaxStride_s = 1.7;
+inline constexpr double kMaxStride_s = 2.6;
 
 }  // namespace posed::style

@@ -1,15 +1,16 @@
-#include "models/style/train/stride_phase.hpp"
+#include "models/style/model/stride_phase.hpp"
 
 #include <algorithm>
 #include <cassert>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <vector>
 
 #include <Eigen/Cholesky>
 
-#include "models/style/train/harmonics.hpp"
+#include "models/style/model/harmonics.hpp"
 
 namespace posed::style {
 namespace {
@@ -26,6 +27,13 @@ constexpr double kStepCost = 0.02;     // of one such step
 constexpr double kMismatchCost = 0.5;  // of phases that do not follow from one another
 constexpr double kMinAdvance = 0.5;    // of the slowest cadence's
 constexpr double kQuiet = 0.05;        // of the signal's variance: a quieter window says little
+
+// What counts as striding.
+constexpr double kSwingWindow = 1.25;  // strides that the local swing is of
+constexpr double kMinSwing = 0.6;      // of the clip's median swing: standing and starting have less
+constexpr double kEnd_s = 0.33;        // left out at either end,
+constexpr double kShortEnd_s = 0.1;    // of clips of
+constexpr double kShort_s = 2.2;       // no more than this
 
 // Least squares of [1, 3 harmonics] of one cadence on a window with Hann weights.
 struct Candidate {
@@ -167,6 +175,66 @@ VectorXd between(const std::vector<double>& at_places, Eigen::Index hop, Eigen::
   return phase;
 }
 
+// How far the legs swing about each frame: the first harmonic's amplitude in a fit with the local
+// mean, under Hann weights.
+VectorXd local_swing(const VectorXd& signal, const VectorXd& phase, Eigen::Index half) {
+  VectorXd swing(signal.size());
+  for (Eigen::Index t = 0; t < signal.size(); ++t) {
+    const Eigen::Index first = std::max<Eigen::Index>(0, t - half);
+    const Eigen::Index count = std::min(signal.size(), t + half + 1) - first;
+    const VectorXd offset = VectorXd::LinSpaced(count, static_cast<double>(first - t),
+                                                static_cast<double>(first + count - 1 - t));
+    const VectorXd weights =
+        0.5 + 0.5 * (0.5 * kFullTurn / static_cast<double>(half + 1) * offset.array()).cos();
+    const MatrixXd basis = harmonic_basis(phase.segment(first, count), 1);
+    const MatrixXd weighted = basis.transpose() * weights.asDiagonal();
+    MatrixXd gram = weighted * basis;
+    gram.diagonal().array() += 1e-2 / 3.0 * gram.trace();  // of a window that is mostly outside
+    const VectorXd fitted = gram.llt().solve(weighted * signal.segment(first, count));
+    swing[t] = std::hypot(fitted[1], fitted[2]);
+  }
+  return swing;
+}
+
+double median_of(const VectorXd& values) {
+  std::vector<double> sorted(values.begin(), values.end());
+  const auto middle = sorted.begin() + std::ssize(sorted) / 2;
+  std::ranges::nth_element(sorted, middle);
+  return *middle;
+}
+
+std::vector<Eigen::Index> striding_frames(const VectorXd& signal, const StridePhase& found,
+                                          double rate_hz) {
+  const Eigen::Index frames = signal.size();
+  const double stride = kFullTurn / found.dtheta;
+  const VectorXd centred = signal.array() - median_of(signal);
+  const VectorXd swing = local_swing(
+      centred, found.phase, std::max<Eigen::Index>(1, std::lround(0.5 * kSwingWindow * stride)));
+  const double least = kMinSwing * median_of(swing);
+  const bool is_short = static_cast<double>(frames) <= kShort_s * rate_hz;
+  const auto end = static_cast<Eigen::Index>((is_short ? kShortEnd_s : kEnd_s) * rate_hz);
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index t = end; t < frames - end; ++t) {
+    if (swing[t] > least) kept.push_back(t);
+  }
+  if (static_cast<double>(kept.size()) >= stride) return kept;
+  kept.resize(static_cast<std::size_t>(frames));
+  std::iota(kept.begin(), kept.end(), Eigen::Index{0});
+  return kept;
+}
+
+// The mean over neighbours that both stride.
+double cadence_of(const StridePhase& found) {
+  double turned = 0.0;
+  int steps = 0;
+  for (std::size_t i = 1; i < found.strides.size(); ++i) {
+    if (found.strides[i] != found.strides[i - 1] + 1) continue;
+    turned += found.phase[found.strides[i]] - found.phase[found.strides[i - 1]];
+    ++steps;
+  }
+  return steps > 0 ? turned / steps : found.dtheta;
+}
+
 }  // namespace
 
 StridePhase follow_strides(const VectorXd& signal, double rate_hz) {
@@ -184,6 +252,8 @@ StridePhase follow_strides(const VectorXd& signal, double rate_hz) {
   const VectorXd fitted = fit_harmonics(found.phase, centred, kStrideHarmonics);
   found.score = (centred - basis * fitted).squaredNorm() / std::max(centred.squaredNorm(), 1e-300) +
                 weak_first_penalty(fitted);
+  found.strides = striding_frames(signal, found, rate_hz);
+  found.dtheta = cadence_of(found);
   return found;
 }
 

@@ -1,4 +1,4 @@
-#include "models/style/train/harmonics.hpp"
+#include "models/style/model/harmonics.hpp"
 
 #include <algorithm>
 #include <cassert>
@@ -51,6 +51,8 @@ MatrixXd fit_harmonics(const VectorXd& theta, const MatrixXd& y, int harmonics) 
   coefficients.row(0) += mean;
   return coefficients;
 }
+
+MatrixXd grid_basis() { return harmonic_basis(cycle_phases(kGridFrames), kCycleHarmonics); }
 
 double first_harmonic_phase(const VectorXd& theta, const VectorXd& signal) {
   const MatrixXd c = fit_harmonics(theta, signal, kStrideHarmonics);
