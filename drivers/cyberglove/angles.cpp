@@ -15,15 +15,16 @@ constexpr double kDefaultBias = 0.248;
 // Radians per count in the library's formula -gain * (raw - offset), recovered from the steps in
 // real recordings: GraspDB14, and for the distal joints of 22-sensor gloves the LIBRAS poses. The
 // sensor between index and middle counts in the opposite direction. The offsets are chosen for
-// posed, in the range where the logs of other drivers show extended fingers.
+// posed, in the range where the logs of other drivers show extended fingers; those of the thumb so
+// that a count of 70 to 90 is a thumb beside the index finger, which is not the library's zero.
 struct DefaultSensor {
   std::string_view name;
   double gain;
   double offset;
 };
 constexpr std::array<DefaultSensor, kSensors> kDefaults{{
-    {"thumb_roll", 0.01584, 70},   {"thumb_mcp", 0.01459, 90},   {"thumb_ip", 0.01427, 90},
-    {"thumb_abd", 0.00502, 90},    {"index_mcp", 0.01616, 80},   {"index_pip", 0.01459, 70},
+    {"thumb_roll", 0.01584, -2.5}, {"thumb_mcp", 0.01459, 99},   {"thumb_ip", 0.01427, 78},
+    {"thumb_abd", 0.00502, 22.5},  {"index_mcp", 0.01616, 80},   {"index_pip", 0.01459, 70},
     {"index_dip", 0.00753, 70},    {"index_abd", 0.00449, 128},  {"middle_mcp", 0.01725, 80},
     {"middle_pip", 0.01804, 70},   {"middle_dip", 0.01051, 70},  {"middle_abd", -0.00449, 120},
     {"ring_mcp", 0.01757, 80},     {"ring_pip", 0.01788, 70},    {"ring_dip", 0.01051, 70},

@@ -29,12 +29,11 @@ HandAngles hand_in(Pose pose) {
       bend(hand, finger + "3_x", 60);
     }
   } else if (pose == Pose::kThumb) {
-    bend(hand, "thumb1_x", 30);
-    bend(hand, "thumb1_z", 60);
+    bend(hand, "thumb1_z", 45);
     bend(hand, "thumb2_x", 50);
     bend(hand, "thumb3_x", 70);
   } else if (pose == Pose::kSpread) {
-    bend(hand, "thumb1_y", 45);
+    bend(hand, "thumb1_y", 25);
     bend(hand, "index1_y", 15);
     bend(hand, "ring1_y", 12);
     bend(hand, "little1_y", 25);

@@ -17,18 +17,40 @@
 
 namespace posed::drivers::glove {
 
-enum class Pose : std::uint8_t { kFlat, kFist, kThumb, kSpread };
-inline constexpr std::size_t kPoses = 4;
-inline constexpr std::array<std::string_view, kPoses> kPoseNames{"flat", "fist", "thumb", "spread"};
+// The first four fit the sensors. The others are contacts, of which not the angles are known but
+// what the thumb touches: they fit the thumb, and are asked for on request.
+enum class Pose : std::uint8_t {
+  kFlat,
+  kFist,
+  kThumb,
+  kSpread,
+  kTouchIndex,
+  kTouchMiddle,
+  kTouchRing,
+  kTouchLittle
+};
+inline constexpr std::size_t kPoses = 8;
+inline constexpr std::size_t kSensorPoses = 4;
+inline constexpr std::array<std::string_view, kPoses> kPoseNames{
+    "flat", "fist", "thumb", "spread", "touch-index", "touch-middle", "touch-ring", "touch-little"};
+// The finger that the thumb touches, 1 the index; 0: not a contact.
+[[nodiscard]] constexpr int touched_finger(Pose pose) noexcept {
+  const auto index = static_cast<std::size_t>(pose);
+  return index < kSensorPoses ? 0 : static_cast<int>(index - kSensorPoses) + 1;
+}
 // Instructions to the user.
 inline constexpr std::array<std::string_view, kPoses> kPoseHints{
     "lay the hand flat on the table, fingers together and straight, thumb beside the index",
     "make a fist, tight, with the thumb outside",
     "fingers straight, the thumb bent across the palm to the root of the little finger",
-    "spread all fingers as far as they go, hand flat"};
+    "spread all fingers as far as they go, hand flat",
+    "touch the tip of the index finger with the tip of the thumb",
+    "touch the tip of the middle finger with the tip of the thumb",
+    "touch the tip of the ring finger with the tip of the thumb",
+    "touch the tip of the little finger with the tip of the thumb"};
 
 // Joint angles of a hand in a pose [rad]: an average over people, so the fitted angles are only as
-// accurate as the user's poses.
+// accurate as the user's poses. All 0 for a contact, so that it fits no sensor.
 [[nodiscard]] HandAngles hand_in(Pose pose);
 
 // The raw values of one sensor while a pose was held.

@@ -60,14 +60,15 @@ PoseFinding find(const Model& model, const Recorded& recorded, Pose pose,
   PoseFinding finding{.pose = pose, .moved = {}, .stuck = {}};
   std::vector<double> unrest;
   for (const SensorPoses& at : sensors) {
-    if (pose != Pose::kFlat && at.pose != pose) continue;
+    const bool all = pose == Pose::kFlat || touched_finger(pose) != 0;
+    if (!all && at.pose != pose) continue;
     const Sensor& sensor = model.sensors[at.sensor];
     ++finding.sensors;
     const double way = std::max(at.span(), kMinTravel * range_of(sensor));
     unrest.push_back(recorded[static_cast<std::size_t>(pose)][at.sensor].deviation() / way);
     if (unrest.back() > kMovedShare) {
       finding.moved.push_back(sensor.name);
-    } else if (pose != Pose::kFlat && is_stuck(sensor, at)) {
+    } else if (!all && is_stuck(sensor, at)) {
       finding.stuck.push_back(sensor.name);
     }
   }

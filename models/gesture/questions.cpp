@@ -243,4 +243,15 @@ Label label_like(const LabelPose& shown, const std::vector<LabelPose>& trained,
   return label;
 }
 
+double composed_off_rad(const LabelPose& shown, const std::vector<LabelPose>& trained,
+                        const std::vector<ChannelGroup>& groups) {
+  double sum = 0.0;
+  for (const ChannelGroup& group : groups) {
+    double best = std::numeric_limits<double>::infinity();
+    for (const LabelPose& pose : trained) best = std::min(best, distance(pose, shown, group));
+    sum += best * best;
+  }
+  return std::sqrt(sum / static_cast<double>(shown.angles_rad.size()));
+}
+
 }  // namespace posed::gesture

@@ -50,4 +50,9 @@ void propose_body_labels(const std::vector<LabelPose>& poses, Vocabulary& vocabu
                                const std::vector<Label>& labels,
                                const std::vector<ChannelGroup>& groups = finger_groups());
 
+// How far the shown pose lies from the one that its classes compose: rms over all channels [rad],
+// each group beside the nearest of the trained poses. Infinite without any.
+[[nodiscard]] double composed_off_rad(const LabelPose& shown, const std::vector<LabelPose>& trained,
+                                      const std::vector<ChannelGroup>& groups = finger_groups());
+
 }  // namespace posed::gesture

@@ -10,9 +10,8 @@ namespace {
 RT_SAFE void place_bones(const FingerGeometry& finger, const double* angles,
                          Eigen::Vector3d* from_m, Eigen::Vector3d* to_m,
                          Eigen::Vector3d* axis) noexcept {
-  Eigen::Matrix3d turned = finger.frame;  // columns: the channels' axes in the wrist's frame
+  Eigen::Matrix3d turned = finger.root;  // columns: the channels' axes in the wrist's frame
   Eigen::Vector3d at_m = finger.base_m;
-  const Eigen::Vector3d along = finger.frame.transpose() * finger.along;
   for (int j = 0; j < kFingerJoints; ++j) {
     const double* const q = angles + 3 * j;  // x, y, z
     const auto turn = [&turned](int u, int v, double angle_rad) {
@@ -29,8 +28,9 @@ RT_SAFE void place_bones(const FingerGeometry& finger, const double* angles,
     turn(1, 2, q[0]);
     axis[3 * j + 1] = turned.col(1);
     turn(2, 0, q[1]);
+    if (j == 0) turned = turned * finger.bones;
     from_m[j] = at_m;
-    at_m += turned * along * finger.length_m[j];
+    at_m += turned * finger.along * finger.length_m[j];
     to_m[j] = at_m;
   }
 }
@@ -41,9 +41,12 @@ HandGeometry hand_geometry(const HandShape& shape) {
   HandGeometry geometry;
   for (int f = 0; f < kFingers; ++f) {
     const FingerShape& form = shape.fingers[f];
+    const Eigen::Quaterniond root = channel_frame(Side::kRight, shape, f, 0);
+    const Eigen::Quaterniond bones = channel_frame(Side::kRight, shape, f, 1);
     geometry.fingers[f] = {.base_m = form.base_m,
-                           .frame = channel_frame(Side::kRight, shape, f).toRotationMatrix(),
-                           .along = form.frame * Eigen::Vector3d::UnitZ(),
+                           .root = root.toRotationMatrix(),
+                           .bones = (root.conjugate() * bones).toRotationMatrix(),
+                           .along = bones.conjugate() * form.frame * Eigen::Vector3d::UnitZ(),
                            .length_m = form.length_m,
                            .radius_m = form.radius_m};
     for (int c = 0; c < kFingerChannels; ++c) {

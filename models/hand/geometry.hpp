@@ -15,8 +15,9 @@ namespace posed::hand {
 
 struct FingerGeometry {
   Eigen::Vector3d base_m = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d frame = Eigen::Matrix3d::Identity();  // in which the channels are defined
-  Eigen::Vector3d along = Eigen::Vector3d::UnitZ();  // direction of the bones of a straight finger
+  Eigen::Matrix3d root = Eigen::Matrix3d::Identity();   // in which the first joint's channels turn
+  Eigen::Matrix3d bones = Eigen::Matrix3d::Identity();  // from `root` to the others' frame
+  Eigen::Vector3d along = Eigen::Vector3d::UnitZ();  // direction of the bones in the others' frame
   std::array<double, kFingerJoints> length_m{};
   std::array<double, kFingerJoints> radius_m{};
 };

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "models/feet/feet_stage.hpp"
+#include "models/gate/gate_stage.hpp"
 #include "models/generate/generate_stage.hpp"
 #include "models/hand/constrain_stage.hpp"
 #include "models/merge/merge_stage.hpp"
@@ -15,8 +16,9 @@ namespace posed {
 
 std::span<const StageType* const> stage_types() {
   static const std::array types{
-      &merge::merge_type(),       &style::style_type(),    &feet::feet_type(),
-      &generate::generate_type(), &hand::constrain_type(), &retarget::retarget_type(),
+      &gate::gate_type(),         &merge::merge_type(),       &style::style_type(),
+      &feet::feet_type(),         &generate::generate_type(), &hand::constrain_type(),
+      &retarget::retarget_type(),
   };
   return types;
 }

@@ -49,11 +49,16 @@ void read_finger(TableReader& table, FingerShape& finger) {
   finger.base_m = Eigen::Vector3d(in_metres("base_mm", kPoint_mm).data());
   finger.length_m = in_metres("length_mm", kLength_mm);
   finger.radius_m = in_metres("radius_mm", kLength_mm);
-  if (const auto angle_deg = table.numbers<3>("frame_deg", kAngle_deg)) {
+  const auto read_frame = [&](std::string_view key, Eigen::Quaterniond& frame) {
+    const auto angle_deg = table.numbers<3>(key, kAngle_deg);
+    if (!angle_deg) return;
     const auto [x, y, z] = *angle_deg;
-    finger.frame = axis_rotation(Axis::kY, y * kDegree) * axis_rotation(Axis::kX, x * kDegree) *
-                   axis_rotation(Axis::kZ, z * kDegree);
-  }
+    frame = axis_rotation(Axis::kY, y * kDegree) * axis_rotation(Axis::kX, x * kDegree) *
+            axis_rotation(Axis::kZ, z * kDegree);
+  };
+  read_frame("frame_deg", finger.frame);
+  finger.root = finger.frame;
+  read_frame("root_deg", finger.root);
   read_limits(table, "x_deg", 0, finger);
   read_limits(table, "y_deg", 1, finger);
   read_limits(table, "z_deg", 2, finger);

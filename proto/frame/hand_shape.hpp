@@ -26,6 +26,10 @@ struct FingerShape {
   // Orientation of the straight finger: its bones point along frame * Z and its channels turn in
   // `frame`. Identity for all fingers except the thumb.
   Eigen::Quaterniond frame = Eigen::Quaterniond::Identity();
+  // In which the first joint's channels turn, `frame` unless the file says otherwise. A thumb's
+  // first joint twists about an axis that lies askew to the bone, so that the whole ray swings
+  // around it: that is how a thumb comes to face the fingers.
+  Eigen::Quaterniond root = Eigen::Quaterniond::Identity();
   std::array<double, kFingerJoints> length_m{};
   std::array<double, kFingerJoints> radius_m{};                  // of the capsule around each bone
   std::array<std::array<AngleRange, 3>, kFingerJoints> range{};  // [joint][x, y, z]

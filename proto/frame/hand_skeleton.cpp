@@ -31,7 +31,7 @@ void add_finger(Side side, const HandShape& shape, int finger, Skeleton& skeleto
     Joint joint = named_joint(side, hand_bone(side, index - 1), j == 0 ? 0 : index - 1);
     joint.offset_m = j == 0 ? mirrored(side, form.base_m) : along(form.length_m[j - 1]);
     if (j + 1 == kFingerJoints) joint.end_site_m = along(form.length_m[j]);
-    joint.channel_frame = channel_frame(side, shape, finger);
+    joint.channel_frame = channel_frame(side, shape, finger, j);
     skeleton.joints.push_back(std::move(joint));
     for (const Axis axis : {Axis::kZ, Axis::kX, Axis::kY}) {
       const AngleRange& range = form.range[j][static_cast<std::size_t>(axis)];
@@ -50,9 +50,9 @@ Eigen::Vector3d mirrored(Side side, const Eigen::Vector3d& right_m) noexcept {
 
 // With the mirror M = diag(-1, 1, 1) and F a half turn about x, M R(x, y, z) M = R(x, -y, -z) =
 // F R F^-1: a mirrored joint is the same joint in the frame (M C M) F.
-Eigen::Quaterniond channel_frame(Side side, const HandShape& shape, int finger) {
+Eigen::Quaterniond channel_frame(Side side, const HandShape& shape, int finger, int joint) {
   const Eigen::Quaterniond half_turn = axis_rotation(Axis::kX, std::numbers::pi);
-  Eigen::Quaterniond frame = shape.fingers[finger].frame;
+  Eigen::Quaterniond frame = joint == 0 ? shape.fingers[finger].root : shape.fingers[finger].frame;
   bool turned = finger >= kFirstMirroredFinger;
   if (side == Side::kLeft) {
     frame = Eigen::Quaterniond(frame.w(), frame.x(), -frame.y(), -frame.z());

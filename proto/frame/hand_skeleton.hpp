@@ -50,8 +50,10 @@ inline constexpr std::array<std::size_t, kHandChannels> kChannelOfAngle = [] {
 // Cold.
 [[nodiscard]] Skeleton hand_skeleton(Side side, const HandShape& shape = default_hand_shape());
 
-// The frame in which a finger's channels turn, and the joints' offsets; mirrored for a left hand.
-[[nodiscard]] Eigen::Quaterniond channel_frame(Side side, const HandShape& shape, int finger);
+// The frame in which the channels of a finger's joint (0 to 2) turn, and the joints' offsets;
+// mirrored for a left hand.
+[[nodiscard]] Eigen::Quaterniond channel_frame(Side side, const HandShape& shape, int finger,
+                                               int joint);
 [[nodiscard]] Eigen::Vector3d mirrored(Side side, const Eigen::Vector3d& right_m) noexcept;
 
 // The side of a skeleton made by hand_skeleton() (of any shape); empty for other skeletons.

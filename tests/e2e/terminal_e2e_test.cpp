@@ -185,7 +185,7 @@ TEST_CASE("calibrate on a terminal ends with a verdict and the calibrated hand",
   OnTerminal calibrate({"calibrate", "--driver", "cyberglove", "--port", glove.port(), "--user",
                         "ann", "--seconds", "0.5", "--ready", "1", "--out", out},
                        80, 24);
-  for (std::size_t p = 0; p < drivers::glove::kPoses; ++p) {
+  for (std::size_t p = 0; p < drivers::glove::kSensorPoses; ++p) {
     REQUIRE(calibrate.comes_to_show("[" + std::string(drivers::glove::kPoseNames[p]) + "]"));
     glove.hold(static_cast<drivers::glove::Pose>(p));
   }

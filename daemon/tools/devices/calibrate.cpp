@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
 #include "daemon/tools/command/command.hpp"
@@ -18,6 +20,7 @@
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/devices/calibrate_poses.hpp"
 #include "daemon/tools/devices/driver_options.hpp"
+#include "daemon/tools/devices/thumb_contacts.hpp"
 #include "daemon/tools/live/live_view.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/device_info.hpp"
@@ -267,7 +270,7 @@ Result<drivers::Options> driver_options(const drivers::Driver& driver,
 Result<PosePlan> plan_of(const CalibrateOptions& options) {
   PosePlan plan;
   if (options.seconds > 0.0) {
-    plan.seconds.fill(options.seconds);
+    std::fill_n(plan.seconds.begin(), drivers::glove::kSensorPoses, options.seconds);
     plan.ready_s = options.ready_s;
   }
   for (const std::string& word : options.poses) {
@@ -280,7 +283,8 @@ Result<PosePlan> plan_of(const CalibrateOptions& options) {
       if (error != std::errc() || stop != end) seconds = -1.0;
     }
     if (name == kPoseNames.end() || !(seconds >= 0.0 && seconds <= kMaxSeconds)) {
-      return misuse("'" + word + "': --pose is flat, fist, thumb or spread =SECONDS, 0 to 60");
+      return misuse("'" + word + "': --pose is POSE=SECONDS, 0 to 60; the poses are " +
+                    fmt::format("{}", fmt::join(kPoseNames, ", ")));
     }
     plan.seconds[name - kPoseNames.begin()] = seconds;
   }
@@ -362,6 +366,8 @@ Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
   }
   CalibrationFile file = blank_file(*source);
   file.sensors = std::move(fitted.sensors);
+  const auto contacts = TRY(fit_contacts(source->model(), recorded, source->hand(), file));
+  for (const std::string& line : contacts) std::fprintf(stderr, "posed: %s\n", line.c_str());
   TRY(show_hand(*source, file, recorded));
   return file;
 }
@@ -457,7 +463,8 @@ void add_calibrate(CLI::App& app, int& exit_code) {
       ->type_name("C.toml")
       ->required();
   command->footer(
-      R"(Poses: flat, fist, thumb, spread. On a terminal a screen shows what to do; elsewhere
+      R"(Poses: flat, fist, thumb, spread; with --pose touch-index=2, touch-middle, touch-ring and
+touch-little also contacts, by which the thumb is fitted to what it touches. On a terminal a screen shows what to do; elsewhere
 a line on stdout names each pose and a line on stdin begins it, or --seconds does. A pose in which
 the hand moved, or whose sensors hardly moved from the flat hand, fails: the screen asks for it
 again, a script gets exit code 1 and no file. Examples:

@@ -58,7 +58,8 @@ struct CalibrateView {
 // The part of `posed calibrate` that records pose after pose. A PoseGuide leads the user through
 // it: a screen (pose_screen.hpp), lines of text for scripts, or a test.
 struct PosePlan {
-  // How long each pose is recorded [s]; 0: skip it. The flat hand is never skipped.
+  // How long each pose is recorded [s]; 0: skip it, as contacts unless they are asked for. The flat
+  // hand is never skipped.
   std::array<double, drivers::glove::kPoses> seconds{2.0, 2.0, 2.0, 2.0};
   // How long the user has to take a pose that starts by itself [s]; empty: the guide starts it.
   std::optional<double> ready_s{};

@@ -1,5 +1,7 @@
 #include "daemon/tools/gesture/gesture_data.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <utility>
 
@@ -10,7 +12,9 @@
 #include "proto/clip/format.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/clip/label_file.hpp"
+#include "proto/frame/degree.hpp"
 #include "proto/frame/label.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::tools {
 namespace {
@@ -78,7 +82,30 @@ Result<> read_hands(const GestureSources& sources, GestureData& data) {
   return {};
 }
 
-// "ok=ok_pose.csv": the pose is the mean of the clip.
+// The median of each angle that the file has, so that one row is enough and a slip does no harm.
+Result<std::vector<double>> shown_hand(const std::string& file, const clip::ReadOptions& read) {
+  const auto hand = TRY(clip::read_hand_clip(file, read));
+  print_warnings(file, hand.warnings);
+  std::vector<double> pose;
+  for (std::size_t c = 0; c < kHandChannels; ++c) {
+    std::vector<double> values;
+    for (const HandAngles& angles : hand.angles) {
+      if (std::isfinite(angles[c])) values.push_back(angles[c]);
+    }
+    if (values.empty()) {
+      return fail(
+          "the shown pose lacks an angle in every row; fill it, with 0 where nothing measures "
+          "the joint",
+          file);
+    }
+    const auto middle = values.begin() + std::ssize(values) / 2;
+    std::ranges::nth_element(values, middle);
+    pose.push_back(*middle);
+  }
+  return pose;
+}
+
+// "ok=ok_pose.csv": the pose of a clip that holds it; of a body its mean.
 Result<gesture::LabelPose> shown_pose(const std::string& show, const GestureSources& sources,
                                       const gesture::Vocabulary& vocabulary) {
   const auto equals = show.find('=');
@@ -87,11 +114,11 @@ Result<gesture::LabelPose> shown_pose(const std::string& show, const GestureSour
                   "' shows no pose; write --show NAME=POSE.csv, NAME of 1 to 15 signs");
   }
   const std::string file = show.substr(equals + 1);
-  const auto recording = TRY([&]() -> Result<gesture::Recording> {
-    if (vocabulary.is_hand()) return read_hand(file, sources.rate_hz, sources.read);
-    const auto clip = TRY(read_body(file, sources.read));
-    return gesture::body_recording(clip, sources.rate_hz, vocabulary);
-  }());
+  if (vocabulary.is_hand()) {
+    return gesture::LabelPose{show.substr(0, equals), TRY(shown_hand(file, sources.read))};
+  }
+  const auto clip = TRY(read_body(file, sources.read));
+  const auto recording = TRY(gesture::body_recording(clip, sources.rate_hz, vocabulary));
   const Eigen::RowVectorXd mean = recording.angles_rad.colwise().mean();
   return gesture::LabelPose{show.substr(0, equals), {mean.begin(), mean.end()}};
 }
@@ -126,6 +153,10 @@ Result<> complete_labels(const GestureSources& sources, bool writes, GestureData
   }
   for (const std::string& show : sources.shows) {
     const auto shown = TRY(shown_pose(show, sources, vocabulary));
+    std::fprintf(stderr,
+                 "posed: '%s' is composed of poses that lie %.0f degrees rms from the shown one\n",
+                 clean(shown.name).c_str(),
+                 gesture::composed_off_rad(shown, poses, vocabulary.groups) / kDegree);
     put_last(gesture::label_like(shown, poses, vocabulary.labels, vocabulary.groups), vocabulary);
   }
   return {};

@@ -256,6 +256,10 @@ std::string stages_row(const v1::StreamStats& stream) {
       add(fmt::format("{}.{} {}", clean_name(one.name()), parameter.name(), value));
     }
   }
+  if (stream.gate_dropped() >= 0.001F) {
+    add(fmt::format("{}: {:.1f} % dropped", clean_name(stream.gate_joint()),
+                    100.0F * stream.gate_dropped()));
+  }
   if (stream.has_style_gate()) add(fmt::format("gate {:.2f}", stream.style_gate()));
   if (stream.has_style_estimate()) add(fmt::format("style {:.2f}", stream.style_estimate()));
   // As far as the column shows, alpha has reached its target.

@@ -87,6 +87,7 @@ HandAngles closing_hand(std::size_t index, std::size_t count) {
       angles[f * kFingerChannels + 3 * j] = closed * (f == 0 && j == 0 ? 0.0 : 1.0);
     }
     angles[f * kFingerChannels + 1] = 0.2 * (1.0 - closed);
+    if (f == 0) angles[2] = 0.75 * closed;  // a thumb that bends goes across the palm
   }
   return angles;
 }

@@ -75,6 +75,8 @@ export const StreamStats = {
   34: ['style_estimate', 'float', '?'],
   35: ['style_gate', 'float', '?'],
   36: ['lossy', 'bool'],
+  37: ['gate_dropped', 'float', '?'],
+  38: ['gate_joint', 'string'],
 };
 
 export const TakeStats = {

@@ -75,6 +75,10 @@ TEST_CASE("Proposals sort fingers from closed to open", "[questions]") {
 TEST_CASE("A pose shown once takes each finger's class from the nearest pose", "[questions]") {
   auto shown = toy_pose("new", {0, 2, 1, 0, 2});
   for (double& angle : shown.angles_rad) angle += 0.02;
+  CHECK(composed_off_rad(toy_poses()[0], toy_poses()) == 0.0);
+  LabelPose off = toy_poses()[0];
+  for (double& angle : off.angles_rad) angle += 0.01;
+  CHECK(composed_off_rad(off, toy_poses()) == Approx(0.01).margin(1e-9));
   const Label label = label_like(shown, toy_poses(), built_in_labels());
   CHECK(label.name == "new");
   CHECK(label.group_class == std::vector<int>{0, 2, 1, 0, 2});

@@ -27,9 +27,10 @@ HandGeometry fixture_hand(const nlohmann::json& fixture) {
     FingerGeometry& finger = hand.fingers[static_cast<std::size_t>(f)];
     finger.base_m = f < 2 ? Eigen::Vector3d(fixture["base"][f][1].get<double>() * kCentimetre, 0, 0)
                           : Eigen::Vector3d(f, 0, 0);
-    finger.frame.col(0) = Eigen::Vector3d::UnitX();
-    finger.frame.col(1) = -Eigen::Vector3d::UnitZ();
-    finger.frame.col(2) = Eigen::Vector3d::UnitY();
+    finger.root.col(0) = Eigen::Vector3d::UnitX();
+    finger.root.col(1) = -Eigen::Vector3d::UnitZ();
+    finger.root.col(2) = Eigen::Vector3d::UnitY();
+    finger.along = finger.root.transpose() * Eigen::Vector3d::UnitZ();
     for (std::size_t j = 0; j < 3; ++j) {
       finger.length_m[j] = fixture["lengths"][j].get<double>() * kCentimetre;
       finger.radius_m[j] = fixture["radius"].get<double>() * kCentimetre;

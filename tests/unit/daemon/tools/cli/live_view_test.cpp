@@ -251,6 +251,11 @@ TEST_CASE("the live view shows performed and recognised gestures, a moving alpha
   CHECK(below().ends_with("gate_fallback 0.25, gate 0.00, style 0.40, alpha slides to 1.00"));
   stream.clear_style_gate();
   stream.clear_style_estimate();
+  stream.set_gate_dropped(0.03F);
+  stream.set_gate_joint("rightIndexIntermediate");
+  CHECK(below().contains(", rightIndexIntermediate: 3.0 % dropped, alpha"));
+  stream.set_gate_dropped(0.0004F);
+  CHECK_FALSE(below().contains("dropped"));
   stats.set_replay_file("take1.plog");
   stats.set_replay_speed(1.0);
   CHECK(below() == "  a replay of take1.plog, 1 x its pace; all times are the recording's");

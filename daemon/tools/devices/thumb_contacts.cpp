@@ -1,0 +1,114 @@
+#include "daemon/tools/devices/thumb_contacts.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <span>
+
+#include <fmt/format.h>
+
+#include "drivers/glove/angle_map.hpp"
+#include "models/hand/geometry.hpp"
+#include "models/hand/thumb_fit.hpp"
+
+namespace posed::tools {
+namespace {
+
+using drivers::glove::CalibrationFile;
+using drivers::glove::Model;
+using drivers::glove::Pose;
+using drivers::glove::Recorded;
+using drivers::glove::touched_finger;
+
+bool is_held(const Recorded& recorded, Pose pose) {
+  return std::ranges::any_of(recorded[static_cast<std::size_t>(pose)],
+                             [](const auto& sensor) { return sensor.count > 0; });
+}
+
+// The poses of which it is known what the thumb touches; the flat hand has it beside the index.
+std::vector<hand::ThumbPose> contacts_of(const Model& model,
+                                         const drivers::glove::Calibration& calibration,
+                                         const Recorded& recorded) {
+  std::vector<hand::ThumbPose> poses;
+  for (std::size_t p = 0; p < drivers::glove::kPoses; ++p) {
+    const auto pose = static_cast<Pose>(p);
+    if (!is_held(recorded, pose) || (pose != Pose::kFlat && touched_finger(pose) == 0)) continue;
+    hand::ThumbPose contact{.angles = drivers::glove::angles_of(model, calibration, recorded[p]),
+                            .touched = {},
+                            .beside = pose == Pose::kFlat};
+    // A joint that no sensor measures is straight.
+    for (double& angle_rad : contact.angles) {
+      if (!std::isfinite(angle_rad)) angle_rad = 0.0;
+    }
+    if (pose != Pose::kFlat) contact.touched.set(static_cast<std::size_t>(touched_finger(pose)));
+    poses.push_back(contact);
+  }
+  return poses;
+}
+
+// The row of the map that alone gives this angle, from a sensor that gives nothing else.
+std::optional<drivers::glove::MapRow> only_row(std::span<const drivers::glove::MapRow> rows,
+                                               std::size_t angle) {
+  const auto of_angle = [&](const auto& row) { return row.channel == angle; };
+  const auto row = std::ranges::find_if(rows, of_angle);
+  if (row == rows.end() || std::ranges::count_if(rows, of_angle) != 1) return std::nullopt;
+  const auto shares = std::ranges::count(rows, row->sensor, &drivers::glove::MapRow::sensor);
+  return shares == 1 ? std::optional(*row) : std::nullopt;
+}
+
+// With angle = k value + b, the angle's gain g and offset o are gain g and this offset of the
+// value.
+void change_sensor(const drivers::glove::MapRow& row, const drivers::glove::Sensor& sensor,
+                   double g, double o, CalibrationFile& file) {
+  const auto points = file.sensors.find(sensor.name);
+  const double k = static_cast<double>(row.gain) * sensor.map_sign;
+  if (points == file.sensors.end() || k == 0.0) return;
+  const auto b = static_cast<double>(row.offset_rad);
+  for (auto& point : points->second) point[1] = g * point[1] + (g * b + o - b) / k;
+}
+
+double gap_mm(const hand::HandGeometry& geometry, const hand::ThumbPose& pose, int finger) {
+  return 1e3 * hand::thumb_gap_m(geometry, pose.angles, finger);
+}
+
+}  // namespace
+
+Result<std::vector<std::string>> fit_contacts(const Model& model, const Recorded& recorded,
+                                              Side hand, CalibrationFile& file) {
+  const auto calibration =
+      TRY(drivers::glove::make_calibration(model, file, hand, /*identity=*/""));
+  const auto poses = contacts_of(model, *calibration, recorded);
+  const bool touches =
+      std::ranges::any_of(poses, [](const auto& pose) { return pose.touched.any(); });
+  std::vector<std::string> sentences;
+  if (!touches) return sentences;
+  const std::span rows(calibration->map.data(), calibration->map_rows);
+  if (!only_row(rows, hand::kThumbAngles[0])) {
+    sentences.emplace_back(
+        "this glove does not measure how far the thumb opposes: contacts change "
+        "nothing");
+    return sentences;
+  }
+  const HandShape& shape = default_hand_shape();
+  const hand::HandGeometry geometry = hand::hand_geometry(shape);
+  const hand::ThumbFit fit = hand::fit_thumb(shape, poses);
+  for (std::size_t i = 0; i < hand::kThumbAngles.size(); ++i) {
+    const auto row = only_row(rows, hand::kThumbAngles[i]);
+    if (!row) continue;
+    change_sensor(*row, model.sensors[row->sensor], fit.map.gain[i], fit.map.offset_rad[i], file);
+  }
+  const auto fitted = TRY(drivers::glove::make_calibration(model, file, hand, /*identity=*/""));
+  const auto after = contacts_of(model, *fitted, recorded);
+  for (std::size_t p = 0; p < poses.size(); ++p) {
+    for (int finger = 1; finger < kFingers; ++finger) {
+      if (!poses[p].touched[static_cast<std::size_t>(finger)]) continue;
+      sentences.push_back(fmt::format("thumb to {} {:.0f} mm, without contacts {:.0f} mm",
+                                      kFingerNames[static_cast<std::size_t>(finger)],
+                                      gap_mm(geometry, after[p], finger),
+                                      gap_mm(geometry, poses[p], finger)));
+    }
+  }
+  return sentences;
+}
+
+}  // namespace posed::tools

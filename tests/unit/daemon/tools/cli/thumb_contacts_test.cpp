@@ -1,0 +1,101 @@
+// `posed calibrate` with contacts: the thumb touches where the user's did.
+#include "daemon/tools/devices/thumb_contacts.hpp"
+
+#include <catch2/catch.hpp>
+
+#include <cmath>
+
+#include "drivers/cyberglove/angles.hpp"
+#include "models/hand/geometry.hpp"
+#include "models/hand/thumb_fit.hpp"
+#include "proto/frame/degree.hpp"
+
+namespace posed::tools {
+namespace {
+
+using namespace drivers::glove;
+
+// What a glove with default curves sends while the hand is in this pose, its thumb's zeros off.
+void hold(const Model& model, const HandAngles& hand, std::array<Held, kMaxSensors>& held) {
+  std::vector<double> values = values_of(model, hand).value();
+  for (std::size_t i = 0; i < model.sensors.size(); ++i) {
+    if (!std::isfinite(values[i])) continue;
+    const Curve& curve = model.sensors[i].curve;
+    const double slope =
+        static_cast<double>((curve.value[1] - curve.value[0]) / (curve.raw[1] - curve.raw[0]));
+    const double raw = static_cast<double>(curve.raw[0]) +
+                       (values[i] - static_cast<double>(curve.value[0])) / slope;
+    held[i].add(static_cast<float>(raw));
+  }
+}
+
+// The gap that the calibrated hand shows between thumb and finger while they touch [mm].
+double shown_mm(const Model& model, const CalibrationFile& file, const Recorded& recorded,
+                Pose pose) {
+  const auto calibration = make_calibration(model, file, Side::kRight, "").value();
+  HandAngles angles = angles_of(model, *calibration, recorded[static_cast<std::size_t>(pose)]);
+  for (double& angle : angles) angle = std::isfinite(angle) ? angle : 0.0;
+  return 1e3 *
+         hand::thumb_gap_m(hand::hand_geometry(default_hand_shape()), angles, touched_finger(pose));
+}
+
+}  // namespace
+
+TEST_CASE("a thumb calibrated with contacts touches where it touched") {
+  const Model model = drivers::cyberglove::glove_model(Side::kRight).value();
+  Recorded recorded{};
+  for (std::size_t p = 0; p < kSensorPoses; ++p)
+    hold(model, hand_in(static_cast<Pose>(p)), recorded[p]);
+  // What this hand does to touch: with the default map the thumb is centimetres away, or inside.
+  for (const auto& [pose, roll, spread, bend] : {std::tuple{Pose::kTouchIndex, 20.0, -6.0, 40.0},
+                                                 {Pose::kTouchMiddle, 30.0, -10.0, 40.0},
+                                                 {Pose::kTouchRing, 40.0, -15.0, 45.0},
+                                                 {Pose::kTouchLittle, 48.0, -20.0, 50.0}}) {
+    HandAngles hand{};
+    const auto finger = static_cast<std::size_t>(touched_finger(pose));
+    for (std::size_t joint = 0; joint < 3; ++joint) {
+      hand[kFingerChannels * finger + 3 * joint] = bend * kDegree;
+    }
+    hand[2] = roll * kDegree;
+    hand[1] = spread * kDegree;
+    hand[6] = 20 * kDegree;
+    hold(model, hand, recorded[static_cast<std::size_t>(pose)]);
+  }
+  CalibrationFile file{.driver = "cyberglove",
+                       .glove = {},
+                       .user = "ann",
+                       .hand = Side::kRight,
+                       .parameters = {},
+                       .sensors = fit_poses(model, recorded).value().sensors};
+  const CalibrationFile before = file;
+  const auto sentences = fit_contacts(model, recorded, Side::kRight, file).value();
+  REQUIRE(sentences.size() == 4);
+  CHECK(sentences[0].starts_with("thumb to index "));
+  double sum_before = 0.0, sum_after = 0.0;
+  for (const Pose pose :
+       {Pose::kTouchIndex, Pose::kTouchMiddle, Pose::kTouchRing, Pose::kTouchLittle}) {
+    sum_before += std::abs(shown_mm(model, before, recorded, pose));
+    sum_after += std::abs(shown_mm(model, file, recorded, pose));
+  }
+  CHECK(sum_after < 0.5 * sum_before);
+  CHECK(sum_after < 4 * 8.0);
+  CHECK(file.sensors.at("index_mcp") == before.sensors.at("index_mcp"));
+}
+
+TEST_CASE("without contacts a calibration stays as it is") {
+  const Model model = drivers::cyberglove::glove_model(Side::kRight).value();
+  Recorded recorded{};
+  for (std::size_t p = 0; p < kSensorPoses; ++p)
+    hold(model, hand_in(static_cast<Pose>(p)), recorded[p]);
+  CalibrationFile file{.driver = "cyberglove",
+                       .glove = {},
+                       .user = "ann",
+                       .hand = Side::kRight,
+                       .parameters = {},
+                       .sensors = fit_poses(model, recorded).value().sensors};
+  const auto before = file.sensors;
+  CHECK(fit_contacts(model, recorded, Side::kRight, file).value().empty());
+  CHECK(file.sensors == before);
+}
+
+}  // namespace posed::tools

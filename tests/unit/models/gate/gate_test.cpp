@@ -1,0 +1,229 @@
+// The stage `gate`: what it drops, what it believes, and what that does for the smoother behind it.
+#include "models/gate/gate_stage.hpp"
+
+#include <catch2/catch.hpp>
+
+#include <cmath>
+#include <cstring>
+#include <memory>
+#include <random>
+
+#include "proto/frame/rotation.hpp"
+#include "tests/bench/baselines.hpp"
+#include "tests/support/shared.hpp"
+#include "tests/support/smoothed.hpp"
+#include "tests/support/synthetic_hand.hpp"
+
+namespace posed::gate {
+namespace {
+
+std::unique_ptr<Stage> make_gate(const Skeleton& skeleton, double rate_hz) {
+  const StageType& type = gate_type();
+  Parameters parameters;
+  for (const ParameterSpec& spec : type.parameters) {
+    parameters[std::string(spec.name)] = spec.default_value;
+  }
+  StageContext context{.skeleton = std::make_shared<const Skeleton>(skeleton),
+                       .rate_hz = rate_hz,
+                       .parameters = parameters};
+  return type.make(context, nullptr).value();
+}
+
+Skeleton toy(int channels) {
+  Skeleton skeleton = test::body_with_channels(channels);
+  skeleton.finish().value();
+  return skeleton;
+}
+
+// The motion as the gate lets it through [deg]; NaN where it drops.
+test::Motion gated(const test::Motion& measured, double rate_hz) {
+  const Skeleton skeleton = toy(static_cast<int>(measured.cols()));
+  const auto gate = make_gate(skeleton, rate_hz);
+  test::Frames out;
+  for (Eigen::Index t = 0; t < measured.rows(); ++t) {
+    gate->process(
+        {.frame = test::frame_of(skeleton, measured.row(t), static_cast<std::uint64_t>(t + 1),
+                                 nanoseconds(static_cast<double>(t) / rate_hz))},
+        out);
+  }
+  REQUIRE(std::ssize(out.all) == measured.rows());
+  test::Motion result(measured.rows(), measured.cols());
+  for (std::size_t t = 0; t < out.all.size(); ++t) {
+    for (Eigen::Index c = 0; c < measured.cols(); ++c) {
+      result(static_cast<Eigen::Index>(t), c) =
+          static_cast<double>(out.all[t].angle_rad[static_cast<std::size_t>(c)]) / kDegree;
+    }
+  }
+  return result;
+}
+
+// `share` of the values are off by 25 degrees, as those of a flaky connector.
+test::Motion spoilt(test::Motion motion, double share, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> any(0.0, 1.0);
+  for (double& value : motion.reshaped()) {
+    if (any(random) < share) value += any(random) < 0.5 ? 25.0 : -25.0;
+  }
+  return motion;
+}
+
+long missing(const test::Motion& motion) { return (motion.array() != motion.array()).count(); }
+
+// Through the gate, where there is one, and the smoother; as a glove sends it.
+double error_deg(const test::Motion& truth, const test::Motion& measured, double rate_hz, int lag,
+                 double noise_deg, bool with_gate) {
+  const Skeleton skeleton = toy(static_cast<int>(measured.cols()));
+  const auto gate = make_gate(skeleton, rate_hz);
+  smooth::LiveSmoother smoother(skeleton, test::live_options(lag, noise_deg));
+  struct Behind final : StageOut {
+    Stage& next;
+    StageOut& out;
+    Behind(Stage& to, StageOut& end) : next(to), out(end) {}
+    void frame(const StageFrame& made) noexcept override { next.process(made, out); }
+  };
+  test::Frames out;
+  Behind behind(smoother, out);
+  for (Eigen::Index t = 0; t < measured.rows(); ++t) {
+    const Frame frame = test::frame_of(skeleton, measured.row(t), static_cast<std::uint64_t>(t + 1),
+                                       nanoseconds(static_cast<double>(t) / rate_hz));
+    if (with_gate) {
+      gate->process({.frame = frame}, behind);
+    } else {
+      smoother.process({.frame = frame}, out);
+    }
+  }
+  smoother.flush(out);
+  test::Motion result(measured.rows(), measured.cols());
+  for (std::size_t t = 0; t < out.all.size(); ++t) {
+    for (Eigen::Index c = 0; c < measured.cols(); ++c) {
+      result(static_cast<Eigen::Index>(t), c) =
+          static_cast<double>(out.all[t].angle_rad[static_cast<std::size_t>(c)]) / kDegree;
+    }
+  }
+  return bench::rms_deg(result, truth);
+}
+
+}  // namespace
+
+TEST_CASE("the gate drops a value that contradicts its motion, and only that") {
+  test::Motion motion(60, 3);
+  for (Eigen::Index t = 0; t < motion.rows(); ++t) {
+    motion.row(t) << 3.0 * static_cast<double>(t), 40.0 * std::sin(0.2 * static_cast<double>(t)),
+        10.0;
+  }
+  motion(30, 0) += 25.0;
+  motion(40, 2) -= 25.0;
+  const test::Motion through = gated(motion, 60.0);
+  CHECK(missing(through) == 2);
+  CHECK(std::isnan(through(30, 0)));
+  CHECK(std::isnan(through(40, 2)));
+  CHECK(through(30, 1) == Approx(motion(30, 1)).margin(1e-4));
+}
+
+TEST_CASE("the gate believes what persists") {
+  test::Motion motion = test::Motion::Zero(60, 3);
+  motion.block(20, 0, 40, 1).array() += 90.0;  // a calibration, or a glove put on
+  const test::Motion through = gated(motion, 60.0);
+  CHECK(std::isnan(through(20, 0)));
+  CHECK(missing(through) == 1);
+  CHECK(through(21, 0) == Approx(90.0));
+}
+
+TEST_CASE("the gate lets a fast hand, repeats and steps of a coarse sensor through") {
+  // 90 degrees in 0.2 s: 840 degrees a second at the most.
+  test::Motion motion(120, 3);
+  for (Eigen::Index t = 0; t < motion.rows(); ++t) {
+    const double phase = static_cast<double>(t % 60) / 12.0 - 1.0;  // closes, holds, opens
+    const double x = std::clamp(phase < 1.5 ? phase : 3.0 - phase, 0.0, 1.0);
+    const double way = 90.0 * x * x * x * (10.0 - 15.0 * x + 6.0 * x * x);
+    motion.row(t) << way, 1.6 * std::round(way / 1.6), t % 3 == 2 ? motion(t - 1, 0) : way;
+  }
+  const test::Motion through = gated(motion, 60.0);
+  for (Eigen::Index c = 0; c < 3; ++c) {
+    INFO("channel " << c);
+    CHECK(missing(through.col(c)) == 0);
+  }
+}
+
+TEST_CASE("a body's joint that flips for a frame is missing in it, and its root stays") {
+  Skeleton skeleton;
+  skeleton.name = "two joints";
+  skeleton.joints.emplace_back().name = "root";
+  skeleton.joints.emplace_back().name = "arm";
+  skeleton.joints[1].parent = 0;
+  skeleton.finish().value();
+  const auto gate = make_gate(skeleton, 60.0);
+  test::Frames out;
+  for (int t = 0; t < 30; ++t) {
+    Frame frame;
+    frame.skeleton = skeleton.id;
+    frame.joint_count = 2;
+    frame.valid[0] = frame.valid[1] = true;
+    frame.rotation_xyzw[0] = kIdentity;
+    const double angle = 0.05 * t + (t == 20 ? 3.0 : 0.0);
+    frame.rotation_xyzw[1] = from_eigen(axis_rotation(Axis::kX, angle));
+    frame.root_position_m = {0.02F * static_cast<float>(t), 1.0F, t == 25 ? 3.0F : 0.0F};
+    frame.header.device_ns = nanoseconds(t / 60.0);
+    gate->process({.frame = frame}, out);
+  }
+  for (std::size_t t = 0; t < out.all.size(); ++t) {
+    INFO(t);
+    CHECK(out.all[t].valid[1] == (t != 20));
+    CHECK(out.all[t].root_position_m[2] == 0.0F);
+  }
+  CHECK(gate->reading(0) > 0.0);
+  CHECK(gate->reading(1) == 1.0);  // the arm
+}
+
+TEST_CASE("a flaky connector costs the smoother behind the gate little") {
+  const test::SyntheticHand hand = test::synthetic_hand(18, 123);
+  const test::Motion clean = test::noisy(hand.angles, 1.0, 5);
+  const double without = error_deg(hand.angles, clean, 30.0, 0, 1.0, false);
+  CHECK(error_deg(hand.angles, clean, 30.0, 0, 1.0, true) < 1.02 * without);
+  const test::Motion bad = spoilt(clean, 0.005, 7);
+  CHECK(error_deg(hand.angles, bad, 30.0, 0, 1.0, false) > 1.5 * without);
+  CHECK(error_deg(hand.angles, bad, 30.0, 0, 1.0, true) < 1.2 * without);
+}
+
+// The figures of models/gate/README.md: `unit_generate "a flaky connector spoils no real grasp"`.
+TEST_CASE("a flaky connector spoils no real grasp") {
+  const auto folder = test::shared("data/gloves/graspdb14_cyberglove");
+  if (!folder) SKIP_WITHOUT_SHARED();
+  const test::Motion truth = test::grasp_reference(*folder / "01_ex01-rad-002-grasp-su01.txt");
+  const test::Motion clean = test::noisy(truth, 1.0, 11);
+  std::ostringstream table;
+  for (const int lag : {0, 1, 2}) {
+    const double before = error_deg(truth, clean, 60.0, lag, 1.0, false);
+    for (const auto& [share, most] :
+         {std::pair{0.0, 1.01}, {0.001, 1.1}, {0.005, 1.1}, {0.02, 1.3}}) {
+      const test::Motion bad = spoilt(clean, share, 3);
+      const double gated_deg = error_deg(truth, bad, 60.0, lag, 1.0, true);
+      table << "lag " << lag << ", " << 100 * share
+            << " %: " << error_deg(truth, bad, 60.0, lag, 1.0, false) << " -> " << gated_deg
+            << " (clean " << before << ")\n";
+      CHECK(gated_deg < most * before);
+    }
+  }
+  WARN(table.str());
+}
+
+TEST_CASE("what the gate does to a frame takes no microsecond", "[.bench]") {
+  const Skeleton skeleton = toy(45);
+  const auto gate = make_gate(skeleton, 100.0);
+  test::Frames out;
+  const Frame frame = test::frame_of(skeleton, Eigen::RowVectorXd::Zero(45), 1, 0);
+  struct None final : StageOut {
+    void frame(const StageFrame& /*made*/) noexcept override {}
+  } none;
+  timespec a{}, b{};
+  constexpr int kFrames = 100000;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &a);
+  for (int i = 0; i < kFrames; ++i) gate->process({.frame = frame}, none);
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &b);
+  WARN((1e9 * static_cast<double>(b.tv_sec - a.tv_sec) +
+        static_cast<double>(b.tv_nsec - a.tv_nsec)) /
+           kFrames
+       << " ns a frame");
+}
+
+}  // namespace posed::gate

@@ -1,0 +1,120 @@
+// The fit of a thumb to what it touches: on simulated hands, and on real signs left out of the fit.
+#include "models/hand/thumb_fit.hpp"
+
+#include <catch2/catch.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <sstream>
+
+#include "models/hand/geometry.hpp"
+#include "tests/support/hand_signs.hpp"
+#include "tests/support/shared.hpp"
+#include "tests/unit/models/hand/hand_poses.hpp"
+
+namespace posed::hand {
+namespace {
+
+using test::angle;
+
+// The thumb's frames before anybody fitted them: it points outwards and rolls about its own length.
+HandShape unfitted_shape() {
+  HandShape shape = default_hand_shape();
+  FingerShape& thumb = shape.fingers[0];
+  thumb.frame = axis_rotation(Axis::kY, 40 * kDegree) * axis_rotation(Axis::kX, 10 * kDegree) *
+                axis_rotation(Axis::kZ, -45 * kDegree);
+  thumb.root = thumb.frame;
+  return shape;
+}
+
+std::vector<ThumbPose> poses_of_sign(const std::filesystem::path& folder,
+                                     const test::ThumbSign& sign) {
+  std::vector<ThumbPose> poses;
+  for (const HandAngles& angles : test::sign_poses(folder, sign.name)) {
+    poses.push_back({.angles = angles,
+                     .touched = sign.touched,
+                     .beside = sign.name == "A",
+                     .stretched = sign.name == "Y"});
+  }
+  return poses;
+}
+
+ThumbFit fit_without(const std::filesystem::path& folder, const HandShape& shape, char twins) {
+  std::vector<ThumbPose> poses;
+  for (const test::ThumbSign& sign : test::kThumbSigns) {
+    if (sign.twins != twins)
+      std::ranges::copy(poses_of_sign(folder, sign), std::back_inserter(poses));
+  }
+  for (const std::string away : {"A", "Y"}) {
+    std::ranges::copy(poses_of_sign(folder, {away, {}, ' '}), std::back_inserter(poses));
+  }
+  return fit_thumb(shape, poses, true);
+}
+
+}  // namespace
+
+// Minutes: `unit_hand "[.judge]"`.
+TEST_CASE("thumbs touch what they touch in real signs that the fit has not seen", "[.judge]") {
+  const auto folder = test::shared("data/gloves/libras_cyberglove");
+  if (!folder) SKIP_WITHOUT_SHARED();
+  const HandShape shape = unfitted_shape();
+  std::ostringstream table;
+  double sum_mm = 0.0;
+  int contacts = 0;
+  for (const test::ThumbSign& sign : test::kThumbSigns) {
+    const ThumbFit fit = fit_without(*folder, shape, sign.twins);
+    HandShape fitted = shape;
+    fitted.fingers[0] = fit.thumb;
+    const HandGeometry geometry = hand_geometry(fitted);
+    const auto poses = poses_of_sign(*folder, sign);
+    for (int finger = 1; finger < kFingers; ++finger) {
+      if (!sign.touched[static_cast<std::size_t>(finger)]) continue;
+      double gap_mm = 0.0;
+      for (ThumbPose pose : poses) {
+        fit.map.apply(pose.angles);
+        gap_mm += 1e3 * thumb_gap_m(geometry, pose.angles, finger) / static_cast<double>(poses.size());
+      }
+      table << sign.name << ' ' << kFingerNames[static_cast<std::size_t>(finger)] << ' ' << gap_mm
+            << " mm\n";
+      sum_mm += std::abs(gap_mm);
+      ++contacts;
+    }
+  }
+  WARN(table.str() << "mean " << sum_mm / contacts << " mm");
+  CHECK(sum_mm / contacts < 8.0);
+}
+
+TEST_CASE("a thumb's fit closes the gaps of a glove whose zeros and gains are off") {
+  const HandGeometry geometry = hand_geometry(default_hand_shape());
+  // From opposition with bent fingers to the index finger's side; what touches is measured.
+  std::vector<ThumbPose> poses;
+  const ThumbMap glove{.gain = {0.85, 1.2, 1.0, 1.0},
+                       .offset_rad = {-20 * kDegree, 8 * kDegree, 4 * kDegree, 0.0}};
+  for (int finger = 1; finger < kFingers; ++finger) {
+    ThumbPose pose;
+    for (int joint = 0; joint < kFingerJoints; ++joint) {
+      pose.angles[angle(finger, joint, 0)] = 45 * kDegree;
+    }
+    pose.touched.set(static_cast<std::size_t>(finger));
+    poses.push_back(pose);
+  }
+  poses.push_back({.beside = true});
+  const ThumbFit true_fit = fit_thumb(default_hand_shape(), poses);  // some thumb that does so
+  std::vector<ThumbPose> measured = poses;
+  for (ThumbPose& pose : measured) glove.apply(pose.angles);
+  const auto worst_mm = [&](const ThumbMap& map, const std::vector<ThumbPose>& of) {
+    double worst = 0.0;
+    for (ThumbPose pose : of) {
+      map.apply(pose.angles);
+      for (int finger = 1; finger < kFingers; ++finger) {
+        if (!pose.touched[static_cast<std::size_t>(finger)]) continue;
+        worst = std::max(worst, std::abs(1e3 * thumb_gap_m(geometry, pose.angles, finger)));
+      }
+    }
+    return worst;
+  };
+  CHECK(worst_mm(true_fit.map, poses) < worst_mm({}, poses));
+}
+
+}  // namespace posed::hand
