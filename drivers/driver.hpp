@@ -212,8 +212,8 @@ struct Driver {
   Result<Description> (*expect)(const Options& options) = nullptr;
   // Compiles the bytes of Sink::description, which are untrusted. Null: the device has one body,
   // described above. Cold.
-  Result<std::unique_ptr<SourceLayout>> (*make_layout)(
-      std::span<const std::byte> description) = nullptr;
+  Result<std::unique_ptr<SourceLayout>> (*make_layout)(std::span<const std::byte> description) =
+      nullptr;
   // The functions that only gloves have; null for other devices.
   const glove::GloveTraits* glove = nullptr;
   // Emulates the device, for tests, `posed emulate` and the demo; null when there is no emulator.

@@ -26,8 +26,8 @@ inline constexpr std::size_t kMaxStages = std::tuple_size_v<decltype(Frame::stag
 // passes it on.
 // What a style asks of the pelvis beside the performer's own motion.
 struct RootChange {
-  float height_m = 0.0F;                         // up
-  std::array<float, 3> velocity_m_s{};           // over the ground, in the world
+  float height_m = 0.0F;                // up
+  std::array<float, 3> velocity_m_s{};  // over the ground, in the world
 };
 
 struct StageFrame {

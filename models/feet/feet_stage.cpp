@@ -194,8 +194,8 @@ RT_SAFE double FeetStage::lowest_sole_m(const Eigen::Vector3d& root_m) const noe
 // Bends a leg so that its foot stands. `root_m` is the performer's; above the ground a style whose
 // height is `learnt` may keep its feet lower than his.
 RT_SAFE void FeetStage::hold(std::size_t leg, const Eigen::Vector3d& root_m,
-                             const Eigen::Vector3d& offset_m, bool learnt, double gone,
-                             double dt_s, Frame& frame) noexcept {
+                             const Eigen::Vector3d& offset_m, bool learnt, double gone, double dt_s,
+                             Frame& frame) noexcept {
   const Leg& bones = legs_.leg(leg);
   FootHold& hold = holds_[leg];
   if (!performer_.measured[leg] || !avatar_.measured[leg]) return hold.restart();

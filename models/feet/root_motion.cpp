@@ -164,7 +164,8 @@ RT_SAFE Eigen::Vector3d RootMotion::update(const PosePair& pair, const Contacts&
   }
   const bool limited = options.mode == RootMode::kActor && options.limit_m != last_.limit_m;
   const bool learnt = pair.learnt != nullptr;
-  const bool jumps = options.mode != last_.mode || limited || learnt != learnt_ || (started_ && !off && !same_points(now));
+  const bool jumps = options.mode != last_.mode || limited || learnt != learnt_ ||
+                     (started_ && !off && !same_points(now));
   if (jumps && !fresh_) rest_m_ = emitted_m_ - offset_m_;
   rest_m_ = approached(rest_m_, dt_s / kReturnTau_s, kReturn_m_s * scale_ * dt_s);
   emitted_m_ = offset_m_ + rest_m_;

@@ -45,7 +45,7 @@ struct RootOptions {
 struct PosePair {
   const LegPose& performer;
   const LegPose& avatar;
-  Eigen::Vector3d root_m;  // of both, as the source has it
+  Eigen::Vector3d root_m;              // of both, as the source has it
   const RootChange* learnt = nullptr;  // what the style asks of the root; null: nobody knows
 };
 

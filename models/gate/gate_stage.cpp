@@ -195,10 +195,9 @@ const StageType& gate_type() {
             return Result<std::unique_ptr<Stage>>(std::make_unique<GateStage>(
                 context.skeleton, context.rate_hz, GateStage::table().options(context.parameters)));
           },
-      .readings = {
-          {.name = "gate_dropped",
-           .help = "share of the samples of a joint that were dropped lately"},
-          {.name = "gate_joint", .help = "the joint of which most were dropped"}}};
+      .readings = {{.name = "gate_dropped",
+                    .help = "share of the samples of a joint that were dropped lately"},
+                   {.name = "gate_joint", .help = "the joint of which most were dropped"}}};
   return type;
 }
 

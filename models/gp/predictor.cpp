@@ -32,9 +32,9 @@ Result<> validate(const Trained& t) {
   if (t.weights.rows() != points || t.offset.size() != t.weights.cols()) {
     return fail("the model's inputs, weights and offset differ in shape");
   }
-  const bool scales = t.scale.size() == 0 || (t.scale.size() == t.inputs.cols() &&
-                                              (t.scale.array() > 0.0).all() &&
-                                              (t.scale.array() <= 1.0).all());
+  const bool scales =
+      t.scale.size() == 0 || (t.scale.size() == t.inputs.cols() && (t.scale.array() > 0.0).all() &&
+                              (t.scale.array() <= 1.0).all());
   if (!scales) return fail("the model's kernel counts a dimension less than nothing or above 1");
   const bool finite = t.inputs.allFinite() && t.weights.allFinite() && t.offset.allFinite();
   if (!finite || !std::isfinite(t.lambda) || !std::isfinite(t.b) || !std::isfinite(t.noise)) {

@@ -106,15 +106,15 @@ Result<Trained> fit(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
 }
 
 Eigen::MatrixXd posterior_mean(const Trained& process, const Eigen::MatrixXd& queries) {
-  const Eigen::MatrixXd E = rbf(process.scaled(process.inputs), process.scaled(queries), process.lambda,
-                                process.mu);
+  const Eigen::MatrixXd E =
+      rbf(process.scaled(process.inputs), process.scaled(queries), process.lambda, process.mu);
   const Eigen::MatrixXd k = E.array() + process.b;
   return (k.transpose() * process.weights).rowwise() + process.offset.transpose();
 }
 
 Posterior posterior(const Trained& process, const Eigen::MatrixXd& queries) {
-  const Eigen::MatrixXd E = rbf(process.scaled(process.inputs), process.scaled(queries), process.lambda,
-                                process.mu);
+  const Eigen::MatrixXd E =
+      rbf(process.scaled(process.inputs), process.scaled(queries), process.lambda, process.mu);
   const Eigen::MatrixXd k = E.array() + process.b;
   const Eigen::MatrixXd X = process.scaled(process.inputs);
   const Eigen::MatrixXd E_xx = rbf(X, X, process.lambda, process.mu);

@@ -109,8 +109,8 @@ namespace {
 std::optional<std::pair<std::string, std::string>> name_apart(const std::string& argument) {
   const auto equals = argument.find('=');
   std::error_code ignored;
-  if (equals == std::string::npos || equals == 0 ||
-      std::filesystem::exists(argument, ignored) || argument.substr(0, equals).contains('/')) {
+  if (equals == std::string::npos || equals == 0 || std::filesystem::exists(argument, ignored) ||
+      argument.substr(0, equals).contains('/')) {
     return std::nullopt;
   }
   return std::pair(argument.substr(0, equals), argument.substr(equals + 1));

@@ -47,8 +47,8 @@ Result<Experiment> read_experiment(const std::filesystem::path& path);
 Result<> add_target_clips(const std::vector<std::string>& arguments, const std::string& motion,
                           Experiment& experiment);
 
-// The days of the command line, [NAME=]FILE: a NAME, told as above, begins the files of a day, which
-// must be among the clips. Files before the first NAME are of a day of their own.
+// The days of the command line, [NAME=]FILE: a NAME, told as above, begins the files of a day,
+// which must be among the clips. Files before the first NAME are of a day of their own.
 Result<> add_days(const std::vector<std::string>& arguments, Experiment& experiment);
 
 // Reads the clips themselves.

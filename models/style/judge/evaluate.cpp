@@ -8,8 +8,8 @@
 
 #include "models/feet/foot_score.hpp"
 #include "models/motion/motion.hpp"
-#include "models/style/train/difference_process.hpp"
 #include "models/style/model/harmonics.hpp"
+#include "models/style/train/difference_process.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 

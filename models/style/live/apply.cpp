@@ -194,8 +194,7 @@ PoseCycle cycle_of_clip(const BoundModel& model, const clip::Clip& clip, double 
   if (static_cast<double>(phase.size()) * strides.dtheta < 2.0 * std::numbers::pi) return {};
   phase.array() -= first_harmonic_phase(phase, leg(strides.strides));
   const Eigen::MatrixXd kept = q(strides.strides, Eigen::all);
-  PoseCycle cycle =
-      (grid_basis() * fit_harmonics(phase, kept, kCycleHarmonics)).cast<float>();
+  PoseCycle cycle = (grid_basis() * fit_harmonics(phase, kept, kCycleHarmonics)).cast<float>();
   for (Eigen::Index d = 0; d < dims; ++d) {
     if (gaps[d] > 0) cycle.col(d).setConstant(std::numeric_limits<float>::quiet_NaN());
   }

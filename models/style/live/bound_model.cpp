@@ -21,14 +21,14 @@ Result<> check_fit(const StyleModel& model, int dims, const std::string& name) {
   const bool usual_fit = std::ranges::all_of(model.gate.usual, [dims](const auto& cycle) {
     return cycle.rows() == kCycleRows && cycle.cols() == dims && cycle.allFinite();
   });
-  const bool roots_fit =
-      (model.roots.empty() || model.roots.size() == model.styles()) &&
-      std::ranges::all_of(model.roots, [&](const RootFunction& root) {
-        return root.function.weights.rows() == model.process.weights.rows() &&
-               root.function.weights.cols() == RootFunction::kDims &&
-               root.function.offset.size() == RootFunction::kDims;
-      });
-  if (process_fits && limits_fit && usual_fit && roots_fit && fits(model.gate.neutral) && fits(model.axis.direction)) {
+  const bool roots_fit = (model.roots.empty() || model.roots.size() == model.styles()) &&
+                         std::ranges::all_of(model.roots, [&](const RootFunction& root) {
+                           return root.function.weights.rows() == model.process.weights.rows() &&
+                                  root.function.weights.cols() == RootFunction::kDims &&
+                                  root.function.offset.size() == RootFunction::kDims;
+                         });
+  if (process_fits && limits_fit && usual_fit && roots_fit && fits(model.gate.neutral) &&
+      fits(model.axis.direction)) {
     return {};
   }
   return fail("the model's process, limits, neutral pose and axis do not fit the " +

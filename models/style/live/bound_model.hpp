@@ -39,10 +39,10 @@ struct BoundModel final : StageModel {
   std::vector<std::uint8_t> served;              // [dims], 0 where the skeleton lacks the joint
   // With roots the predictor has RootFunction::kDims outputs after those of the pose.
   bool has_root = false;
-  double leg_m = 0.0;                         // of the skeleton
+  double leg_m = 0.0;                        // of the skeleton
   std::vector<Eigen::Vector3f> root_limits;  // of each style
-  std::vector<std::uint16_t> leg_dims;           // those of the hips and the legs
-  std::vector<std::uint8_t> loose_parts;         // [dims] the others' BodyPart, else kNoPart
+  std::vector<std::uint16_t> leg_dims;       // those of the hips and the legs
+  std::vector<std::uint8_t> loose_parts;     // [dims] the others' BodyPart, else kNoPart
 
   // A neutral walk of training: its cycle, and what it does at the legs' instant.
   struct Usual {

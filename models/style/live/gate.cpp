@@ -51,8 +51,8 @@ RT_SAFE void Gate::see_pose(const TrainedMotion& known, std::span<const float> q
                             std::span<const float> whole, std::span<const std::uint8_t> available,
                             bool is_own, double dt_s) noexcept {
   speed_.update(known, q, available, dt_s);
-  // The arms and the trunk of a run are none of a walk's, so what replaces them must not count where
-  // the legs do not tell the two apart.
+  // The arms and the trunk of a run are none of a walk's, so what replaces them must not count
+  // where the legs do not tell the two apart.
   const bool replaced = q.data() != whole.data();
   const double kernel_deg = known.distance_deg(q, available);
   const double whole_deg = replaced ? known.distance_deg(whole, available) : kernel_deg;

@@ -17,8 +17,9 @@ namespace posed::style {
 
 class Gate {
  public:
-  // Advances by a frame, `dt_s` after the last one. `q` is the pose that the kernel sees, `whole` the
-  // same with what busy limbs do; `walker`: seen from its own neutral walk. Where the gate is not `on`, or the model has no data for it
+  // Advances by a frame, `dt_s` after the last one. `q` is the pose that the kernel sees, `whole`
+  // the same with what busy limbs do; `walker`: seen from its own neutral walk. Where the gate is
+  // not `on`, or the model has no data for it
   // (`known` is null), it opens: at once if it has never been on.
   void update(const TrainedMotion* known, bool on, const Frame& frame, std::span<const float> q,
               std::span<const float> whole, std::span<const std::uint8_t> available,

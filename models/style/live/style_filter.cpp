@@ -297,8 +297,8 @@ RT_SAFE void StyleFilter::answer(const Pose& pose, Dims& delta) noexcept {
   const gp::Predictor& predictor = model_->predictor;
   const std::size_t dims = predictor.inputs();
   const auto outputs = static_cast<std::size_t>(predictor.outputs());  // the pose and the root
-  predictor.mean({pose.input.data(), dims}, {pose.available.data(), dims},
-                 {delta.data(), outputs}, shares_to_ask());
+  predictor.mean({pose.input.data(), dims}, {pose.available.data(), dims}, {delta.data(), outputs},
+                 shares_to_ask());
   const float open = tracker_.open();
   if (open < 1.0F) {
     const float rest = (1.0F - open) * static_cast<float>(options_.gate_fallback);
@@ -318,11 +318,10 @@ RT_SAFE void StyleFilter::answer(const Pose& pose, Dims& delta) noexcept {
 
 // The legs carry the pelvis: where the mask holds them, it stays.
 RT_SAFE void StyleFilter::limit_root(const float* change) noexcept {
-  const float legs =
-      std::min(mask_.factor(BodyPart::kLeftLeg), mask_.factor(BodyPart::kRightLeg));
+  const float legs = std::min(mask_.factor(BodyPart::kLeftLeg), mask_.factor(BodyPart::kRightLeg));
   for (Eigen::Index i = 0; i < root_.size(); ++i) {
-    root_[i] = static_cast<float>(alpha_) * legs *
-               std::clamp(change[i], -limit_root_[i], limit_root_[i]);
+    root_[i] =
+        static_cast<float>(alpha_) * legs * std::clamp(change[i], -limit_root_[i], limit_root_[i]);
   }
 }
 

@@ -11,8 +11,8 @@ namespace {
 
 constexpr double kInterruption_s = 1.0;  // of the frames
 
-// A part of the body walks up to the first of these distances from every training pose [deg rms over
-// its joints], and does something else from the second on: README.md, "Busy limbs".
+// A part of the body walks up to the first of these distances from every training pose [deg rms
+// over its joints], and does something else from the second on: README.md, "Busy limbs".
 struct Limits {
   float walks, other;
 };
@@ -24,8 +24,7 @@ constexpr std::array<Limits, kBodyParts> kKnownWalker{
     {{7.0F, 13.0F}, {8.0F, 14.0F}, {12.0F, 20.0F}, {12.0F, 20.0F}, kNone, kNone}};
 
 float share_below(float value, const Limits& limits) noexcept {
-  const float part =
-      std::clamp((limits.other - value) / (limits.other - limits.walks), 0.0F, 1.0F);
+  const float part = std::clamp((limits.other - value) / (limits.other - limits.walks), 0.0F, 1.0F);
   return part * part * (3.0F - 2.0F * part);
 }
 

@@ -81,10 +81,10 @@ class WalkerTracker {
   std::optional<Walker> walker_;
   // Of the walker and the model, once they are adapted to each other.
   bool adapted_ = false;
-  bool shifts_ = false;                        // by the walker's cycle; else by its mean
-  LegMap shift_;                               // from the walker's neutral walk to the model's
-  const BoundModel::Usual* usual_ = nullptr;   // the neutral walk that is nearest to the walker's
-  bool replaced_ = false;                         // something of the last frame
+  bool shifts_ = false;                       // by the walker's cycle; else by its mean
+  LegMap shift_;                              // from the walker's neutral walk to the model's
+  const BoundModel::Usual* usual_ = nullptr;  // the neutral walk that is nearest to the walker's
+  bool replaced_ = false;                     // something of the last frame
   std::array<float, motion::kMaxPoseDims> whole_{};  // its input before
   std::array<float, kBodyParts> trust_ = {1.0F, 1.0F, 1.0F, 1.0F, 1.0F, 1.0F};
   StyleEstimate estimate_;

@@ -44,9 +44,9 @@ struct Packed {
   static constexpr std::size_t kSwings = 2 * kCycleHarmonics;
   static constexpr std::size_t kSwingDims = 96;  // a body's; fingers of large figures hang still
 
-  std::array<std::int16_t, kDims> neutral{};  // in steps
+  std::array<std::int16_t, kDims> neutral{};                         // in steps
   std::array<std::array<std::int8_t, kSwings>, kSwingDims> swing{};  // harmonics, in swing steps
-  float swing_step_rad = 0.0F;                                      // 0: there is no cycle
+  float swing_step_rad = 0.0F;                                       // 0: there is no cycle
   std::array<std::uint8_t, (kDims + 7) / 8> measured{};
   float cadence_rad_s = std::numeric_limits<float>::quiet_NaN();
 
@@ -231,9 +231,8 @@ RT_SAFE void WarmUp::follow(const LegMotion& legs, double dt_s) noexcept {
   }
 }
 
-RT_SAFE void WarmUp::add_to_cycle(std::span<const float> q,
-                                  std::span<const std::uint8_t> available, double leg_rad,
-                                  double dt_s) noexcept {
+RT_SAFE void WarmUp::add_to_cycle(std::span<const float> q, std::span<const std::uint8_t> available,
+                                  double leg_rad, double dt_s) noexcept {
   if (rate_rad_s_ == 0.0) return;
   const Basis basis = basis_at(phase_rad_);
   cycle_s_ += dt_s;

@@ -34,7 +34,7 @@ struct Walker {
 struct LegMotion {
   bool walk = false;
   double cadence_rad_s = std::numeric_limits<double>::quiet_NaN();
-  double angle_rad = 0.0;                                    // LiveStride::angle_rad
+  double angle_rad = 0.0;                                     // LiveStride::angle_rad
   double leg_rad = std::numeric_limits<double>::quiet_NaN();  // the leg signal
 };
 

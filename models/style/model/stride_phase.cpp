@@ -30,10 +30,10 @@ constexpr double kQuiet = 0.05;        // of the signal's variance: a quieter wi
 
 // What counts as striding.
 constexpr double kSwingWindow = 1.25;  // strides that the local swing is of
-constexpr double kMinSwing = 0.6;      // of the clip's median swing: standing and starting have less
-constexpr double kEnd_s = 0.33;        // left out at either end,
-constexpr double kShortEnd_s = 0.1;    // of clips of
-constexpr double kShort_s = 2.2;       // no more than this
+constexpr double kMinSwing = 0.6;    // of the clip's median swing: standing and starting have less
+constexpr double kEnd_s = 0.33;      // left out at either end,
+constexpr double kShortEnd_s = 0.1;  // of clips of
+constexpr double kShort_s = 2.2;     // no more than this
 
 // Least squares of [1, 3 harmonics] of one cadence on a window with Hann weights.
 struct Candidate {

@@ -56,8 +56,8 @@ struct StyleAxis {
   [[nodiscard]] bool present() const { return direction.size() > 0; }
 };
 
-// What a style does to the pelvis, by the process's inputs and kernel: its height [lengths of a leg],
-// its speed forward and to the left [such lengths a stride].
+// What a style does to the pelvis, by the process's inputs and kernel: its height [lengths of a
+// leg], its speed forward and to the left [such lengths a stride].
 struct RootFunction {
   static constexpr int kDims = 3;
   gp::Function function;  // weights [N x 3], offset [3]
@@ -74,7 +74,7 @@ struct StyleModel {
   GateData gate{};
   StyleAxis axis{};
   std::vector<RootFunction> roots{};  // of each style; empty in models of older versions of posed
-  std::vector<MoreStyle> more{};  // `process`, `limit_rad` and `to` are the first style's
+  std::vector<MoreStyle> more{};      // `process`, `limit_rad` and `to` are the first style's
 
   [[nodiscard]] std::size_t styles() const { return 1 + more.size(); }
   [[nodiscard]] std::vector<std::string> names() const;  // of its styles, in order

@@ -9,10 +9,10 @@
 #include "models/motion/motion.hpp"
 #include "models/motion/symmetric_eigen.hpp"
 #include "models/style/live/body_mask.hpp"
-#include "models/style/model/style_model.hpp"
-#include "models/style/train/flips.hpp"
 #include "models/style/model/harmonics.hpp"
 #include "models/style/model/stride_phase.hpp"
+#include "models/style/model/style_model.hpp"
+#include "models/style/train/flips.hpp"
 #include "models/task_numbers.hpp"
 #include "proto/text/clean.hpp"
 

@@ -47,10 +47,10 @@ struct AlignedClip {
   Eigen::MatrixXd state;     // y = (v, q, dq/dt) [T x 3 + 2D]; 89 for cmu43, as in Sato et al.
   Eigen::VectorXd leg;       // the stride's reference signal [T]
   Eigen::VectorXd height_m;  // of the root [T]
-  // Its height [lengths of a leg], its speed forward and to the left [such lengths a stride] [T x 3];
-  // no rows without legs.
+  // Its height [lengths of a leg], its speed forward and to the left [such lengths a stride] [T x
+  // 3]; no rows without legs.
   Eigen::MatrixXd root;
-  bool has_legs = false;     // else `leg` is the first principal component of q
+  bool has_legs = false;              // else `leg` is the first principal component of q
   double theta0 = 0.0, dtheta = 0.0;  // phase of the first frame, mean phase per frame
   Eigen::VectorXd local_phase;  // of every frame, from theta0 = 0; empty: the cadence is constant
   double stride_score = 0.0;    // of the leg signal under its own strides (stride_phase.hpp)
@@ -67,8 +67,8 @@ struct Subject {
 struct Dataset {
   motion::PoseSpaceSpec spec;
   double rate_hz = 30.0;
-  // How much each dimension counts in the kernel [D]: the legs, whose pose tells where in the stride
-  // a walker is, more than what may do something else (README.md, "Choice of the kernel").
+  // How much each dimension counts in the kernel [D]: the legs, whose pose tells where in the
+  // stride a walker is, more than what may do something else (README.md, "Choice of the kernel").
   Eigen::VectorXd kernel_scale;
   std::vector<std::string> motions;  // in order of appearance
   std::vector<AlignedClip> clips;

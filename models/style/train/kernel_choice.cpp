@@ -77,9 +77,8 @@ class Folded {
 };
 
 double scaled_rad(double length_deg, const TrainingPairs& pairs) {
-  const double dims = pairs.scale.size() == 0
-                          ? static_cast<double>(pairs.inputs.front().cols())
-                          : pairs.scale.squaredNorm();
+  const double dims = pairs.scale.size() == 0 ? static_cast<double>(pairs.inputs.front().cols())
+                                              : pairs.scale.squaredNorm();
   return length_deg * kDegree * std::sqrt(dims / 63.0);
 }
 

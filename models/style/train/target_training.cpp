@@ -61,8 +61,7 @@ Result<> learn_roots(const Dataset& all, const std::vector<Lesson>& lessons,
   for (std::size_t i = 0; i < lessons.size(); ++i) {
     Dataset roots = *lessons[i].data;
     for (AlignedClip& clip : roots.clips) clip.q = clip.root;
-    pairs[i].outputs =
-        make_training_pairs(roots, clip_cycles(roots), lessons[i].target).outputs;
+    pairs[i].outputs = make_training_pairs(roots, clip_cycles(roots), lessons[i].target).outputs;
     learnt[i].root.emplace().limit =
         kLimitFactor * grid_outputs(pairs[i].outputs).cwiseAbs().colwise().maxCoeff().transpose();
   }

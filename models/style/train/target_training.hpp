@@ -37,7 +37,7 @@ struct Learnt {
   gp::Trained process;
   Eigen::MatrixXd differences;   // all differences in the training pairs [N x D]
   std::string length_chosen_by;  // "leave-out", "default" or "evidence"
-  Way way{};  // error on held-out walkers; unset if none could be held out
+  Way way{};                     // error on held-out walkers; unset if none could be held out
   // That error for each walker, and all kernels that were tried; empty where none was held out.
   std::vector<HeldOut> held_out{};
   std::vector<Way> ways{};  // [held_out]

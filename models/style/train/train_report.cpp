@@ -119,7 +119,8 @@ json report_of(const Dataset& dataset, const Learnt& learnt, bool alone) {
       p.inputs.rows() == learnt.differences.rows()) {  // with inducing poses there is no evidence
     const MatrixXd residual = learnt.differences.rowwise() - p.offset.transpose();
     const gp::Hyper hyper{p.lambda, std::log(p.mu), std::log(p.b), std::log(p.noise)};
-    report["log_likelihood"]["gp"] = gp::log_marginal(p.scaled(p.inputs), residual, hyper).log_likelihood;
+    report["log_likelihood"]["gp"] =
+        gp::log_marginal(p.scaled(p.inputs), residual, hyper).log_likelihood;
   }
   report["pose_space"] = motion::space_name(dataset.spec.space);
   report["dims"] = dataset.dims();

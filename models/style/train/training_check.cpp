@@ -58,8 +58,8 @@ void measure_cycles(const Dataset& dataset, const std::string& target, TrainingC
   for (const ClipCycle& cycle : cycles) {
     const AlignedClip& clip = dataset.clips[cycle.clip];
     const double from_own = difference_squares(
-        dataset, cycle.coefficients - group_cycle(dataset, cycles, clip.group, clip.motion,
-                                                  dataset.unit_of(clip)));
+        dataset, cycle.coefficients -
+                     group_cycle(dataset, cycles, clip.group, clip.motion, dataset.unit_of(clip)));
     if (from_own == 0.0) continue;  // the unit's only clip
     scatter += from_own;
     ++companions;

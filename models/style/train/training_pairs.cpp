@@ -39,7 +39,8 @@ std::vector<std::string> units_in(const Dataset& dataset, const Cycles& cycles,
 Difference difference_of(const Dataset& dataset, const Cycles& cycles, const std::string& target,
                          const std::string& group, const std::string& motion) {
   Difference found{motion, group, {}};
-  MatrixXd sum = MatrixXd::Zero(cycles.front().coefficients.rows(), cycles.front().coefficients.cols());
+  MatrixXd sum =
+      MatrixXd::Zero(cycles.front().coefficients.rows(), cycles.front().coefficients.cols());
   for (const std::string& unit : units_in(dataset, cycles, group, motion)) {
     const MatrixXd goal = group_cycle(dataset, cycles, target, motion, unit);
     if (goal.size() == 0) continue;
@@ -125,8 +126,8 @@ FoldPlan plan_for(const Dataset& dataset, const Cycles& cycles, const std::strin
   const FoldPlan alone{asked, {static_cast<int>(asked)}};
   const auto kept = differences_of(dataset, without(cycles, alone.left_out), target);
   if (all_shown(kept, all)) {
-    const auto left = group_cycle(dataset, without(cycles, alone.left_out), clip.group,
-                                  clip.motion, unit);
+    const auto left =
+        group_cycle(dataset, without(cycles, alone.left_out), clip.group, clip.motion, unit);
     if (left.size() > 0 || !shows_both) return alone;
   }
   FoldPlan person{asked, {}, true};
@@ -160,8 +161,8 @@ LeaveOut planned(std::shared_ptr<const Dataset> dataset, Cycles cycles, Training
     result.held_out.push_back(
         {clip.file, person_of(*dataset, clip), static_cast<int>(plan.left_out.size())});
   }
-  result.fold = [dataset = std::move(dataset), cycles = std::move(cycles),
-                 plans = std::move(plans), target](std::size_t index) {
+  result.fold = [dataset = std::move(dataset), cycles = std::move(cycles), plans = std::move(plans),
+                 target](std::size_t index) {
     return fold_of(*dataset, cycles, plans[index], target);
   };
   return result;
@@ -227,9 +228,7 @@ MatrixXd group_cycle(const Dataset& dataset, const Cycles& cycles, const std::st
                      const std::string& motion, const std::string& unit) {
   MatrixXd sum;
   int count = 0;
-  const auto add = [&](const MatrixXd& one) {
-    sum = count++ == 0 ? one : MatrixXd(sum + one);
-  };
+  const auto add = [&](const MatrixXd& one) { sum = count++ == 0 ? one : MatrixXd(sum + one); };
   if (unit.empty()) {
     for (const std::string& name : units_in(dataset, cycles, group, motion)) {
       add(group_cycle(dataset, cycles, group, motion, name));

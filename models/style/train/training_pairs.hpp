@@ -31,7 +31,7 @@ struct ClipCycle {
 // What the target adds to one source group in one motion.
 struct Difference {
   std::string motion, group;
-  Eigen::MatrixXd delta;  // harmonic coefficients
+  Eigen::MatrixXd delta;                         // harmonic coefficients
   std::map<std::string, Eigen::MatrixXd> own{};  // of each unit that walks in both styles
 };
 

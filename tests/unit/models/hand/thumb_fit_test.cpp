@@ -73,7 +73,8 @@ TEST_CASE("thumbs touch what they touch in real signs that the fit has not seen"
       double gap_mm = 0.0;
       for (ThumbPose pose : poses) {
         fit.map.apply(pose.angles);
-        gap_mm += 1e3 * thumb_gap_m(geometry, pose.angles, finger) / static_cast<double>(poses.size());
+        gap_mm +=
+            1e3 * thumb_gap_m(geometry, pose.angles, finger) / static_cast<double>(poses.size());
       }
       table << sign.name << ' ' << kFingerNames[static_cast<std::size_t>(finger)] << ' ' << gap_mm
             << " mm\n";

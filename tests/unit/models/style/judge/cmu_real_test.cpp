@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "models/style/model/harmonics.hpp"
 #include "models/style/train/dataset.hpp"
 #include "models/style/train/difference_process.hpp"
-#include "models/style/model/harmonics.hpp"
 #include "models/style/train/training_pairs.hpp"
 #include "tests/support/shared.hpp"
 

@@ -10,14 +10,14 @@
 #include <string>
 #include <vector>
 
+#include "models/feet/foot_score.hpp"
+#include "models/feet/legs.hpp"
+#include "models/motion/motion.hpp"
 #include "models/style/judge/evaluate.hpp"
 #include "models/style/live/apply.hpp"
 #include "models/style/live/body_mask.hpp"
 #include "models/style/model/harmonics.hpp"
 #include "models/style/model/stride_phase.hpp"
-#include "models/feet/foot_score.hpp"
-#include "models/feet/legs.hpp"
-#include "models/motion/motion.hpp"
 #include "models/style/train/train.hpp"
 #include "tests/support/shared.hpp"
 
@@ -102,8 +102,8 @@ std::vector<MatrixXd> cycles_of(const std::vector<clip::Clip>& clips, bool last_
   for (const clip::Clip& one : clips) {
     motions.push_back(motion::resample(motion::motion_of(one).value(), 30.0));
   }
-  const auto kind = motion::is_person(*clips[0].skeleton) ? motion::Space::kHumanoid
-                                                          : motion::Space::kNative;
+  const auto kind =
+      motion::is_person(*clips[0].skeleton) ? motion::Space::kHumanoid : motion::Space::kNative;
   auto spec = motion::describe_space(kind, *clips[0].skeleton).value();
   const motion::Motion* const reference[] = {motions.data()};
   REQUIRE(motion::set_mean_rotations(reference, spec));
@@ -220,8 +220,8 @@ TEST_CASE("figures: six styles", "[.][figures][six]") {
   std::vector<double> other;
   std::vector<double> both;
   for (const std::string name : {"feminine", "youthful"}) {
-    other.push_back(cycle_error(walks(name, {1, 2}).model(),
-                                clips_of(takes("normal", {13, 14})), takes(name, {13, 14})));
+    other.push_back(cycle_error(walks(name, {1, 2}).model(), clips_of(takes("normal", {13, 14})),
+                                takes(name, {13, 14})));
     auto lessons = Lessons()
                        .add(takes("normal", {1, 2, 4, 5}), "from", "ann", "monday")
                        .add(takes(name, {1, 2, 4, 5}), "to", "ann", "monday")
@@ -261,8 +261,8 @@ TEST_CASE("figures: two people with both styles", "[.][figures][two]") {
                              .add(part(normal, 0.0, 0.5), "from", "bob")
                              .add(part(acted, 0.0, 0.5), "to", "bob");
     const auto model = lessons.model();
-    a.push_back(cycle_error(model, clips_of(takes("normal", {4, 5, 6})),
-                            takes(name, {3, 4, 5, 6})));
+    a.push_back(
+        cycle_error(model, clips_of(takes("normal", {4, 5, 6})), takes(name, {3, 4, 5, 6})));
     b.push_back(cycle_error(model, {part(normal, 0.5, 1.0)}, {file}));
     const auto alone =
         Lessons().add(part(normal, 0.0, 0.5), "from").add(part(acted, 0.0, 0.5), "to").model();
@@ -390,7 +390,8 @@ TEST_CASE("figures: the rest of the body while a part is busy", "[.][figures][bu
   for (const auto& gesture : gestures) {
     for (const bool warm : {false, true}) {
       for (const bool acts : {false, true}) {
-        const std::string row = gesture.what + (warm ? ", warm" : ", cold") + (acts ? "" : " (plain)");
+        const std::string row =
+            gesture.what + (warm ? ", warm" : ", cold") + (acts ? "" : " (plain)");
         show(row.c_str(), of_styles([&](const std::string& name) {
                std::vector<clip::Clip> sources = clips_of(takes("normal", {4, 5}));
                const clip::Clip neutral = recording(take("normal", 1));
@@ -407,7 +408,8 @@ TEST_CASE("figures: the rest of the body while a part is busy", "[.][figures][bu
 
 namespace {
 
-// Of clips of one rig: the cycle of the pelvis' height [28], in cm of a leg of 83 cm, and its speed.
+// Of clips of one rig: the cycle of the pelvis' height [28], in cm of a leg of 83 cm, and its
+// speed.
 struct Pelvis {
   Eigen::VectorXd height_cm;
   double speed_m_s = 0.0;
@@ -457,8 +459,9 @@ TEST_CASE("figures: height and speed of the pelvis, and sliding feet", "[.][figu
       Pelvis goal;
       for (const auto& target : targets) {
         const Pelvis one = pelvis_of(recording(target), recording(target));
-        goal.height_cm = goal.height_cm.size() == 0 ? one.height_cm
-                                                    : Eigen::VectorXd(goal.height_cm + one.height_cm);
+        goal.height_cm = goal.height_cm.size() == 0
+                             ? one.height_cm
+                             : Eigen::VectorXd(goal.height_cm + one.height_cm);
         goal.speed_m_s += one.speed_m_s / static_cast<double>(targets.size());
       }
       goal.height_cm /= static_cast<double>(targets.size());

@@ -259,7 +259,8 @@ TEST_CASE("a gate that was never on is open at once, one that is switched off op
   for (int i = 0; i < 60; ++i) toy.step(1.0);
   toy.gate.update(nullptr, true, {}, {}, {}, {}, {}, 1.0 / kGateRate_hz);
   CHECK(toy.gate.open() < 0.1F);
-  for (int i = 0; i < 120; ++i) toy.gate.update(nullptr, true, {}, {}, {}, {}, {}, 1.0 / kGateRate_hz);
+  for (int i = 0; i < 120; ++i)
+    toy.gate.update(nullptr, true, {}, {}, {}, {}, {}, 1.0 / kGateRate_hz);
   CHECK(toy.gate.open() == 1.0F);
 }
 

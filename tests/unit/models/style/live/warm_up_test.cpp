@@ -74,11 +74,11 @@ TEST_CASE("a warm-up is the mean of the frames on which the walker walks", "[sty
   for (int i = 0; i < 9; ++i) {
     const bool walks = i % 3 != 0;
     const std::vector<float> q{walks ? 2.0F : 100.0F, static_cast<float>(i), 7.0F};
-    REQUIRE(warm_up.update(q, available, {.walk = walks, .cadence_rad_s = 6.0}, 0.1) == WarmUp::Outcome::kNone);
+    REQUIRE(warm_up.update(q, available, {.walk = walks, .cadence_rad_s = 6.0}, 0.1) ==
+            WarmUp::Outcome::kNone);
   }
-  CHECK(warm_up.update(std::vector<float>(3, 2.0F), available,
-                       {.walk = true, .cadence_rad_s = 6.0}, 0.11) ==
-        WarmUp::Outcome::kDone);
+  CHECK(warm_up.update(std::vector<float>(3, 2.0F), available, {.walk = true, .cadence_rad_s = 6.0},
+                       0.11) == WarmUp::Outcome::kDone);
   const style::Walker walker = warm_up.walker();
   CHECK(walker.neutral[0] == Approx(2.0F));
   CHECK(walker.measured[1] == 1);

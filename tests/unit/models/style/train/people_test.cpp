@@ -209,8 +209,7 @@ TEST_CASE("takes of two days that are said, in any order", "[people][real]") {
     style::TrainOptions options;
     options.target = "feminine";
     const auto model = style::train_style(clips, options).value();
-    const auto styled =
-        style::apply_to_clip(model, "m", recorded("2_walk_normal_014"), {}).value();
+    const auto styled = style::apply_to_clip(model, "m", recorded("2_walk_normal_014"), {}).value();
     return style::evaluate_style(recorded("2_walk_normal_014"), styled.clip,
                                  recorded("2_walk_feminine_014"))
         .value()
