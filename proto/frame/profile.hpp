@@ -48,7 +48,7 @@ Result<std::shared_ptr<const Profile>> find_profile(const Skeleton& skeleton,
                                                     const std::string& name);
 
 // The bones of the skeleton's joints as the profile defines them [joint]. An error names the joints
-// that are missing. Cold.
+// that are missing; those of fingers may be, in a profile of a body. Cold.
 Result<std::vector<std::optional<Bone>>> named_bones(const Profile& profile,
                                                      const Skeleton& skeleton);
 

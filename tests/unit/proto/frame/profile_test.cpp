@@ -42,7 +42,7 @@ TEST_CASE("every built-in profile is valid, and an invalid one is refused with i
   REQUIRE_FALSE(none.has_value());
   CHECK(none.error().text() ==
         "there is no skeleton profile 'bandy'; there are bandai, cmu-asf, cmu-axes, cmu-bvh, "
-        "hand-left, hand-right");
+        "hand-left, hand-right, rokoko");
   CHECK(none.error().exit_code == ExitCode::kWrongUse);
   CHECK_FALSE(named_bones(profiles()[0], named({"Hips"})).has_value());
 }
