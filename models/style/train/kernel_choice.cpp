@@ -20,6 +20,7 @@ using Eigen::VectorXd;
 
 constexpr std::array kNoises{1e-3, 1e-2, 1e-1};
 constexpr std::array kFirstLengths_deg{30.0, 50.0, 75.0, 100.0};
+constexpr double kUsualLength_deg = 50.0;
 constexpr double kWiden = 1.5;            // from one length to the next beyond the first ones
 constexpr double kMinLength_deg = 10.0;   // a frame's own noise is of this size
 constexpr double kMaxLength_deg = 400.0;  // a straight line over all poses
@@ -107,6 +108,9 @@ class Search {
     for (const LeaveOut& style : styles) X_.push_back(grid_inputs(style.pairs));
   }
 
+  // Only the usual noise from now on.
+  void keep_noise() { noises_ = 1; }
+
   // False when it was stopped.
   bool try_lengths(const std::vector<double>& lengths_deg) {
     const Task task = [&](std::size_t t) {
@@ -148,7 +152,7 @@ class Search {
   void keep_best(double length_deg, std::span<const TaskResult> found) {
     std::size_t folds = 0;
     for (const LeaveOut& style : styles_) folds += style.folds;
-    for (std::size_t n = 0; n < kNoises.size(); ++n) {
+    for (std::size_t n = 0; n < noises_; ++n) {
       ChosenKernel tried{
           {rad(length_deg), kNoises[n]}, 0.0, std::vector<std::vector<Way>>(styles_.size()), {}};
       for (std::size_t c = 0; c < found.size(); ++c) {
@@ -170,8 +174,9 @@ class Search {
   TaskRunner& tasks_;
   const FoldProgress& progress_;
   std::vector<Chunk> chunks_;
-  std::vector<MatrixXd> X_;  // of each style
-  double reported_ = 0.0;    // progress at the end of the last round
+  std::vector<MatrixXd> X_;              // of each style
+  std::size_t noises_ = kNoises.size();  // that are tried, from the first on
+  double reported_ = 0.0;                // progress at the end of the last round
   double best_deg_ = 0.0;
   ChosenKernel best_{{}, std::numeric_limits<double>::infinity(), {}, {}};
   std::vector<TriedKernel> tried_;
@@ -188,12 +193,17 @@ Way ChosenKernel::way(std::size_t style) const {
 std::optional<ChosenKernel> choose_kernel(std::span<const LeaveOut> styles, TaskRunner& tasks,
                                           const FoldProgress& progress) {
   if (std::ranges::all_of(styles, [](const LeaveOut& style) { return style.folds == 0; })) {
-    return ChosenKernel{{scaled_rad(50.0, styles.front().pairs), kNoises.front()},
+    return ChosenKernel{{scaled_rad(kUsualLength_deg, styles.front().pairs), kNoises.front()},
                         0.0,
                         std::vector<std::vector<Way>>(styles.size()),
                         {}};
   }
   Search search(styles, tasks, progress);
+  if (std::ranges::all_of(styles, [](const LeaveOut& s) { return s.halves || s.folds == 0; })) {
+    search.keep_noise();
+    if (!search.try_lengths({kUsualLength_deg})) return std::nullopt;
+    return std::move(search).best();
+  }
   std::vector<double> lengths_deg(kFirstLengths_deg.begin(), kFirstLengths_deg.end());
   double shortest = lengths_deg.front();
   double longest = lengths_deg.back();

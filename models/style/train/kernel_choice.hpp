@@ -39,6 +39,7 @@ struct LeaveOut {
   // thread.
   std::function<Fold(std::size_t index)> fold{};
   std::vector<HeldOut> held_out{};  // [fold]
+  bool halves = false;  // of clips: they measure a kernel, but one take each chooses none
 };
 
 // A kernel, and the mean squared error of a frame's difference, rad^2 summed over dimensions.
@@ -63,8 +64,8 @@ using FoldProgress = std::function<bool(double fraction)>;
 
 // The best of all combinations of lengths and noises: 30 to 100 degrees, and on while the best is
 // at an edge; noise over signal 1e-3 to 0.1. `styles` share the kernel: each asks its own folds,
-// all of which count alike. Without folds, 50 degrees and 1e-3. Nothing when `progress` asked to
-// stop.
+// all of which count alike. Without folds, and where all are halves, 50 degrees and 1e-3. Nothing
+// when `progress` asked to stop.
 [[nodiscard]] std::optional<ChosenKernel> choose_kernel(std::span<const LeaveOut> styles,
                                                         TaskRunner& tasks,
                                                         const FoldProgress& progress);

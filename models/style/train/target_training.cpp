@@ -118,7 +118,7 @@ Result<std::vector<Learnt>> learn_default(const Dataset& all, const std::vector<
   for (const Lesson& lesson : lessons) {
     pairs.push_back(make_training_pairs(*lesson.data, clip_cycles(*lesson.data), lesson.target));
     leave_outs.push_back(make_folds(*lesson.data, lesson.target));
-    held_out = held_out || leave_outs.back().folds > 0;
+    held_out = held_out || (leave_outs.back().folds > 0 && !leave_outs.back().halves);
     if (leave_outs.back().folds == 0) leave_outs.back().pairs = pairs.back();
   }
   const auto chosen = choose_kernel(leave_outs, tasks, progress);

@@ -155,7 +155,7 @@ std::vector<FoldPlan> clip_folds(const Dataset& dataset, const Cycles& cycles,
 
 LeaveOut planned(std::shared_ptr<const Dataset> dataset, Cycles cycles, TrainingPairs pairs,
                  std::vector<FoldPlan> plans, const std::string& target) {
-  LeaveOut result{std::move(pairs), plans.size(), {}, {}};
+  LeaveOut result{.pairs = std::move(pairs), .folds = plans.size()};
   for (const FoldPlan& plan : plans) {
     const AlignedClip& clip = clip_of(*dataset, cycles[plan.asked]);
     result.held_out.push_back(
@@ -210,7 +210,9 @@ LeaveOut half_folds(const Dataset& dataset, const std::string& target) {
       if (pairs.outputs.of_input[i] != kNoDifference) folds.push_back({i, tested});
     }
   }
-  return planned(parts, std::move(cycles), std::move(pairs), std::move(folds), target);
+  LeaveOut halved = planned(parts, std::move(cycles), std::move(pairs), std::move(folds), target);
+  halved.halves = true;
+  return halved;
 }
 
 }  // namespace

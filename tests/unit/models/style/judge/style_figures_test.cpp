@@ -2,6 +2,7 @@
 // them: unit_models "[figures]". Takes that train are never judged.
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <functional>
@@ -24,6 +25,7 @@
 using namespace posed;
 using Eigen::MatrixXd;
 
+namespace style_figures {  // files are joined, and others have takes and recordings, too
 namespace {
 
 const std::vector<std::string> kStyles{"active",   "elderly",   "exhausted",
@@ -406,6 +408,27 @@ TEST_CASE("figures: the rest of the body while a part is busy", "[.][figures][bu
   }
 }
 
+TEST_CASE("a stranger's walk gets what was taught, and a raised arm leaves the rest its style",
+          "[style][real]") {
+  if (!recorded("aalto_k_walk_regular")) SKIP_WITHOUT_SHARED();
+  const std::vector<std::string> from{"aalto_k_walk_regular"};
+  const std::vector<std::string> to{"aalto_k_walk_slow"};
+  const auto taught = Lessons().add(from, "from").add(to, "to").model();
+  const clip::Clip& stranger = recording("aalto_t_walk_regular");
+  CHECK(missing(taught, from, to, recording(from[0]), nullptr) <= 0.1);
+  CHECK(missing(taught, from, to, stranger, &stranger) <= 0.15);
+  const auto model = walks("active", {1, 2}).model();
+  const clip::Clip& plain = recording(take("normal", 4));
+  const clip::Clip raised = with_arm(plain, "L", take("normal", 1, "raise-up-left-hand"));
+  const clip::Clip& neutral = recording(take("normal", 1));
+  const auto targets = takes("active", {4, 5, 6});
+  const auto rest = [&](const clip::Clip& source) {
+    return cycle_error(model, {source}, targets, &neutral, style::BodyPart::kLeftArm);
+  };
+  CHECK(rest(raised) <= rest(plain) + 0.04);
+  CHECK(model.roots.size() == 1);
+}
+
 namespace {
 
 // Of clips of one rig: the cycle of the pelvis' height [28], in cm of a leg of 83 cm, and its
@@ -502,3 +525,5 @@ TEST_CASE("figures: height and speed of the pelvis, and sliding feet", "[.][figu
     show((motion + ": cycle, feet standing").c_str(), cycle);
   }
 }
+
+}  // namespace style_figures

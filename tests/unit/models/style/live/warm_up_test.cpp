@@ -90,6 +90,46 @@ TEST_CASE("a warm-up is the mean of the frames on which the walker walks", "[sty
                        available, {.cadence_rad_s = 6.0}, 0.6) == WarmUp::Outcome::kStood);
 }
 
+TEST_CASE("legs tell what belongs to their instant, and elsewhere the mean", "[style]") {
+  const std::vector<std::uint16_t> legs{0, 1};
+  style::PoseCycle cycle(style::kGridFrames, 3);
+  for (int t = 0; t < style::kGridFrames; ++t) {
+    const double phase = 2.0 * kPi * t / style::kGridFrames;
+    cycle.row(t) << static_cast<float>(std::cos(phase)), static_cast<float>(std::sin(phase)),
+        static_cast<float>(0.2 + 0.1 * std::cos(2.0 * phase));
+  }
+  style::LegMap map;
+  map.fit(legs, cycle, cycle);
+  const std::vector<std::uint8_t> all(3, 1);
+  std::vector<float> does(3);
+  for (const Eigen::Index t : {0, 9, 20}) {
+    map.get(std::vector<float>{cycle(t, 0), cycle(t, 1), 9.0F}, all, does);
+    CHECK(does[2] == Approx(cycle(t, 2)).margin(0.01));
+  }
+  map.get(std::vector<float>{50.0F, 50.0F, 0.0F}, all, does);
+  CHECK(does[2] == Approx(0.2).margin(1e-3));
+  map.get(std::vector<float>(3), std::vector<std::uint8_t>{0, 0, 1}, does);
+  CHECK(does[2] == Approx(0.2).margin(1e-3));
+}
+
+TEST_CASE("a walker's cycle survives the command and its log", "[style]") {
+  style::Walker walker;
+  walker.cycle.resize(style::kGridFrames, 3);
+  for (int d = 0; d < 3; ++d) {
+    walker.measured[static_cast<std::size_t>(d)] = 1;
+    for (int t = 0; t < style::kGridFrames; ++t) {
+      walker.cycle(t, d) = static_cast<float>(0.5 * std::cos(2.0 * kPi * t / 28 + d));
+    }
+  }
+  v1::DecisionValue logged;
+  style::walker_to_log(style::command_of(walker), logged);
+  const auto read = style::walker_from_log(logged);
+  REQUIRE(read);
+  const style::Walker back = style::walker_of(*read);
+  CHECK((back.cycle.leftCols(3) - walker.cycle).cwiseAbs().maxCoeff() < 0.01F);
+  CHECK(std::isnan(back.cycle(0, 3)));
+}
+
 TEST_CASE("after a warm-up the kernel sees the walker as if its neutral pose were the training's",
           "[style]") {
   const auto ready = warm_bound(gated_toy_model(1));
