@@ -79,23 +79,25 @@ class Track {
       usual_ += kLearn * (std::min(off, kUnusual * usual_ + 0.25F * bounds.jump) - usual_);
       return true;
     }
-    // Two samples that agree against the past are a motion, and no two faults.
-    if (doubted_ && Space::distance(doubt_, value) < kAgree * moved) {
-      step_s_ = 0.0F;
+    // Samples that agree against the past are a motion: two of one that goes on, three of a step,
+    // because a fault may last for two.
+    const bool agrees = doubts_ > 0 && Space::distance(doubt_, value) < kAgree * moved;
+    const bool goes_on = agrees && moved > kGoesOn * Space::distance(last_, doubt_);
+    if (goes_on || (agrees && doubts_ >= 2)) {
       last_ = value;
-      since_s_ = 0.0F;
-      doubted_ = false;
+      step_s_ = since_s_ = 0.0F;
+      doubts_ = 0;
       return true;
     }
+    doubts_ = agrees ? doubts_ + 1 : 1;
     doubt_ = value;
-    doubted_ = true;
     return false;
   }
 
   // There was no sample in a frame `dt_s` after the one before.
   RT_SAFE void skip(float dt_s) noexcept {
     since_s_ += dt_s;
-    doubted_ = false;
+    doubts_ = 0;
   }
   RT_SAFE void forget() noexcept { *this = {}; }
   RT_SAFE [[nodiscard]] const Value& last() const noexcept { return last_; }
@@ -105,6 +107,7 @@ class Track {
   static constexpr float kUnusual = 6.0F;     // times the mean distance from the prediction
   static constexpr float kLearn = 0.03F;
   static constexpr float kAgree = 0.75F;
+  static constexpr float kGoesOn = 1.2F;
   static constexpr float kRepeats = 2.5F;
 
   RT_SAFE [[nodiscard]] float distance_to_prediction(const Value& value) const noexcept {
@@ -115,7 +118,7 @@ class Track {
   RT_SAFE bool begin(const Value& value) noexcept {
     last_ = value;
     known_ = true;
-    doubted_ = false;
+    doubts_ = 0;
     step_s_ = since_s_ = 0.0F;
     return true;
   }
@@ -124,7 +127,7 @@ class Track {
     last_ = value;
     step_s_ = since_s_;
     since_s_ = 0.0F;
-    doubted_ = false;
+    doubts_ = 0;
   }
 
   Value before_{}, last_{}, doubt_{};
@@ -132,7 +135,7 @@ class Track {
   float since_s_ = 0.0F;  // since last_
   float usual_ = 0.0F;    // mean distance from the prediction
   bool known_ = false;
-  bool doubted_ = false;  // the last sample was doubt_, and dropped
+  int doubts_ = 0;  // samples dropped in a row that agree; the last was doubt_
 };
 
 }  // namespace posed::gate

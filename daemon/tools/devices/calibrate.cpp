@@ -464,10 +464,10 @@ void add_calibrate(CLI::App& app, int& exit_code) {
       ->required();
   command->footer(
       R"(Poses: flat, fist, thumb, spread; with --pose touch-index=2, touch-middle, touch-ring and
-touch-little also contacts, by which the thumb is fitted to what it touches. On a terminal a screen shows what to do; elsewhere
-a line on stdout names each pose and a line on stdin begins it, or --seconds does. A pose in which
-the hand moved, or whose sensors hardly moved from the flat hand, fails: the screen asks for it
-again, a script gets exit code 1 and no file. Examples:
+touch-little also contacts, by which the thumb is fitted to what it touches. On a terminal a screen
+shows what to do; elsewhere a line on stdout names each pose and a line on stdin begins it, or
+--seconds does. A pose in which the hand moved, or whose sensors hardly moved from the flat hand,
+fails: the screen asks for it again, a script gets exit code 1 and no file. Examples:
   posed calibrate --driver cyberglove --port /dev/ttyUSB0 --user ann --out ann.toml
   posed calibrate --connect tcp://127.0.0.1:5570 --stream right --user ann --out ann.toml
   posed calibrate --driver cyberglove --import old.cal --user ann --out ann.toml)");
