@@ -1,5 +1,7 @@
 #include "daemon/output/avatar.hpp"
 
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <string>
 
@@ -94,6 +96,34 @@ TEST_CASE("a flat hand is sent with identity rotations, a bent one turned about 
     CHECK(bent.rotation_xyzw[1] == Approx(0.0F).margin(1e-3));
     CHECK(bent.rotation_xyzw[2] == Approx(left ? half : -half).margin(1e-3));
   }
+}
+
+TEST_CASE("with an avatar the lengths of its bones are sent, turned as the performer's are") {
+  const clip::Clip walk = motion::make_walker({.seconds = 0.2}).value();
+  const clip::Clip other = motion::make_walker({.person = 9, .seconds = 0.2}).value();
+  const auto figure = motion::canonical_skeleton(*other.skeleton).value();
+  Avatar plain(false), with_figure(false, figure);
+  for (Avatar* avatar : {&plain, &with_figure}) {
+    REQUIRE(avatar->set_skeleton(Part::kBody, walk.skeleton));
+    REQUIRE(avatar->set_pose(Part::kBody, walk.frame(5)));
+  }
+  const auto own = written(plain), sent = written(with_figure);
+  REQUIRE(sent.size() == own.size());
+  double changed_m = 0.0;
+  for (const auto& [name, bone] : sent) {
+    INFO(name);
+    CHECK(angle_between_rad(to_eigen_double(bone.rotation_xyzw),
+                            to_eigen_double(own.at(name).rotation_xyzw)) < 1e-5);
+    const Vec3f& before_m = own.at(name).position_m;
+    for (std::size_t i = 0; i < 3; ++i) {
+      changed_m =
+          std::max(changed_m, std::abs(static_cast<double>(bone.position_m[i] - before_m[i])));
+    }
+  }
+  const int shin = figure->joint_of(Bone::kLeftLowerLeg);
+  const Eigen::Vector3d thigh_m = figure->joints[static_cast<std::size_t>(shin)].offset_m;
+  CHECK(sent.at("LeftLowerLeg").position_m[1] == Approx(thigh_m.y()).margin(1e-5));
+  CHECK(changed_m > 0.01);
 }
 
 TEST_CASE("a hand's stream replaces the fingers of the body and leaves its wrist alone") {
