@@ -156,7 +156,7 @@ TEST_CASE("wrong use of eval natural is one sentence", "[eval_natural]") {
   CHECK(marchers.judge("corpus/1.bvh", {"--hand", "third"}).code == 2);
   CHECK(marchers.judge("nothing.bvh").code != 0);
   std::filesystem::create_directory(marchers.path("empty"));
-  CHECK(says(marchers.judge("corpus/1.bvh", {}, "empty"), 1, "holds no clip (.bvh or .amc)"));
+  CHECK(says(marchers.judge("corpus/1.bvh", {}, "empty"), 1, "holds no clip (.bvh, .amc"));
 }
 
 TEST_CASE("hands are judged beside hands, those of bodies with --hand", "[eval_natural]") {

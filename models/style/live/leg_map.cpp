@@ -16,7 +16,7 @@ constexpr float kNoise = 1e-2F;  // over the signal's variance
 RT_SAFE void LegMap::fit(std::span<const std::uint16_t> legs, const PoseCycle& at,
                          const PoseCycle& values) noexcept {
   legs_ = legs;
-  at_.resize(kGridFrames, std::ssize(legs));
+  at_ = PoseCycle::Zero(kGridFrames, std::ssize(legs));
   for (Eigen::Index i = 0; i < at_.cols(); ++i) at_.col(i) = at.col(legs[i]);
   // The length is the cycle's radius.
   float radius2 = 0.0F;
@@ -35,7 +35,7 @@ RT_SAFE void LegMap::fit(std::span<const std::uint16_t> legs, const PoseCycle& a
   }
   const Eigen::LLT<Eigen::Matrix<float, kGridFrames, kGridFrames>> factor(gram);
   mean_ = values.colwise().mean();
-  weights_.resize(kGridFrames, values.cols());
+  weights_ = PoseCycle::Zero(kGridFrames, values.cols());
   for (Eigen::Index d = 0; d < values.cols(); ++d) {
     Eigen::Matrix<float, kGridFrames, 1> column = values.col(d).array() - mean_[d];
     factor.solveInPlace(column);

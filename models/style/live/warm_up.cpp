@@ -255,7 +255,7 @@ RT_SAFE PoseCycle WarmUp::cycle() const noexcept {
   const Eigen::LLT<Eigen::Matrix<double, kCycleRows, kCycleRows>> factor(ridged);
   const Basis leg = factor.solve(leg_moment_);
   const double late_rad = std::atan2(leg[1 + kCycleHarmonics], leg[1]);
-  found.resize(kGridFrames, static_cast<Eigen::Index>(dims_));
+  found = PoseCycle::Zero(kGridFrames, static_cast<Eigen::Index>(dims_));
   std::array<Basis, kGridFrames> at;
   for (int t = 0; t < kGridFrames; ++t) at[t] = basis_at(kTurn * t / kGridFrames + late_rad);
   for (std::size_t d = 0; d < dims_; ++d) {

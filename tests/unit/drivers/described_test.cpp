@@ -355,7 +355,7 @@ TEST_CASE("an unknown device is refused with the known ones, a missing file by i
   const auto unknown =
       find_driver("described")->expect({{"device", std::string("/somewhere/vmg31")}});
   REQUIRE_FALSE(unknown);
-  CHECK(unknown.error().message.find("'vmg31', only bebop_forte opencyberglove vmg30") !=
+  CHECK(unknown.error().message.find("vmg31', only bebop_forte opencyberglove vmg30") !=
         std::string::npos);
   const auto missing =
       find_driver("described")->expect({{"device", std::string("/nowhere/own.toml")}});

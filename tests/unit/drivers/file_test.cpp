@@ -156,7 +156,7 @@ TEST_CASE("a clip that cannot be played is refused with one error message and it
       {"infinite.bvh", replaced(bvh, last, replaced(last, "-24", "inf")),
        ":28: frame 5: 'inf' is not a number a pose can have"},
       {"letters.bvh", replaced(bvh, last, "hello\n"), ":28: frame 5: 'hello'"},
-      {"clip.fbx", "Kaydara", ": is no clip posed can read; a clip is .bvh, .amc or a hand's .csv"},
+      {"clip.fbx", "Kaydara", ": is no clip posed can read; a clip is .bvh, .amc, a hand's .csv"},
   };
   for (const Case& bad : cases) {
     const auto path = test::scratch_file(bad.file, bad.text);

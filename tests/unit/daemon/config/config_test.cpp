@@ -500,7 +500,7 @@ TEST_CASE("the shipped config contains every key with its default") {
     INFO("config/posed.toml: " << b.sources[0].driver << "." << option.name);
     CHECK((b.sources[0].options.at(std::string(option.name)) == option.default_value));
   }
-  REQUIRE(b.outputs.size() == 2);
+  REQUIRE(b.outputs.size() == 3);
   const OutputConfig no_output;
   CHECK(b.outputs[0].left_hand == no_output.left_hand);
   CHECK(b.outputs[0].right_hand == no_output.right_hand);

@@ -89,7 +89,7 @@ role = "assistant"
 
 TEST_CASE("a wrong output is one sentence with its line") {
   CHECK(output_complaint("[[output]]\nbody = \"ann\"\n" + kTo) ==
-        "posed.toml:12: output.kind is missing; write kind = \"vmc\" or \"bvh\"");
+        "posed.toml:12: output.kind is missing; write kind = \"vmc\", \"bvh\" or \"axis\"");
   CHECK(output_complaint("[[output]]\nkind = \"vcm\"\nbody = \"ann\"\n" + kTo)
             .find("posed.toml:13: output.kind must be one of these words") == 0);
   CHECK(output_complaint("[[output]]\nkind = \"vmc\"\n" + kTo) ==
@@ -165,7 +165,7 @@ header = true
   CHECK(output_complaint(bvh + "peers = [\"studio\"]\n").find("'studio' should be an address") !=
         std::string::npos);
   CHECK(output_complaint(bvh + "to = [\"127.0.0.1:39539\"]\n") ==
-        "posed.toml:15: to is for outputs of kind = \"vmc\"; leave it out");
+        "posed.toml:15: to is for outputs of kind = \"vmc\" or \"axis\"; leave it out");
   CHECK(output_complaint(bvh + "left_hand = \"left\"\n").find("is for outputs of kind = \"vmc\"") !=
         std::string::npos);
   CHECK(

@@ -25,7 +25,7 @@ TEST_CASE("what listens over TCP has a port of its own") {
   CHECK(clashes[1].message ==
         "publish and metrics cannot share the TCP endpoint 127.0.0.1:5570; give"
         " metrics another port");
-  output.kind = OutputKind::kVmc;          // sends, and does not listen
+  output.to = {"127.0.0.1:39539"};         // sends, and does not listen
   config.metrics->listen = "127.0.0.1:0";  // any free one
   CHECK(port_clashes(config).empty());
 }

@@ -162,8 +162,12 @@ TEST_CASE("the VMC output sends bundles of the protocol's bytes") {
       "2f564d432f4578742f4f4b00"
       "2c69000000000001");
   REQUIRE(bone.size() == 4 + 72);
-  CHECK(text.find(bone + status) != std::string::npos);
-  CHECK(contents(datagrams) == "root Hips LeftHand OK T ");
+  const std::string apply = bytes_of_hex(
+      "0000001c"
+      "2f564d432f4578742f426c656e642f4170706c7900000000"
+      "2c000000");
+  CHECK(text.find(bone + apply + status) != std::string::npos);
+  CHECK(contents(datagrams) == "root Hips LeftHand Apply OK T ");
 }
 
 TEST_CASE("the VMC output keeps its rate and says when a pose is old") {

@@ -230,10 +230,10 @@ TEST_CASE("every built-in hand is valid, and an invalid one is refused with its 
     return error(text.replace(at, from.size(), to));
   };
   CHECK(changed("name =", "claw = 3\nname =") ==
-        "h.toml:4: unknown key 'claw'; known here: index, little, middle, name, ring, thumb");
-  CHECK(changed("base_mm", "bass_mm").starts_with("h.toml:6: thumb.base_mm is missing"));
+        "h.toml:5: unknown key 'claw'; known here: index, little, middle, name, ring, thumb");
+  CHECK(changed("base_mm", "bass_mm").starts_with("h.toml:7: thumb.base_mm is missing"));
   CHECK(changed("length_mm = [44, 33, 27]", "length_mm = [44, -3, 27]") ==
-        "h.toml:9: thumb.length_mm = -3 is out of range: it takes a number from 0.1 to 1000");
+        "h.toml:11: thumb.length_mm = -3 is out of range: it takes a number from 0.1 to 1000");
   CHECK(changed("[-60, 90], ", "")
             .ends_with("limits are three pairs, [least, most] of joints 1 to 3"));
   CHECK(changed("[-60, 90]", "[10, 90]").ends_with("with 0 between them"));
