@@ -25,6 +25,7 @@ TEST_CASE("the examples of CONTRIBUTING.md apply", "[examples]") {
   CHECK(applies("examples", "stage.diff model.diff"));
   CHECK(applies("examples", "format.diff"));
   CHECK(applies("examples", "glove.diff"));
+  CHECK(applies("examples", "parameter.diff"));
   CHECK_FALSE(applies("examples", "model.diff"));  // it changes what stage.diff adds
 }
 
