@@ -140,17 +140,17 @@ TEST_CASE("a walk goes out in binary, over TCP and UDP, as the same values") {
   const test::RawPeer reader = text.connect();
   for (int i = 0; i < 3; ++i) {
     for (BvhRig* rig : {&tcp, &udp, &text}) rig->step(i);
+    const auto datagrams = receiver.received(static_cast<std::uint64_t>(i) + 1);
+    REQUIRE(datagrams.size() == 1);
     drivers::axis::Message expected, got;
     const std::string line = next_lines(reader);
     REQUIRE(drivers::axis::decode_text(std::string_view(line).substr(0, line.size() - 3),
                                        expected) == Outcome::kOk);
-    const std::string bytes = peer.receive(1 << 12, std::chrono::milliseconds(1000));
+    const std::string bytes = peer.receive(datagrams[0].size(), std::chrono::milliseconds(1000));
     REQUIRE(drivers::axis::decode_binary(std::as_bytes(std::span(bytes)), got) == Outcome::kOk);
     for (std::size_t v = 0; v < drivers::axis::value_count(got.content); ++v) {
       CHECK(got.values[v] == Approx(expected.values[v]).margin(1e-4));
     }
-    const auto datagrams = receiver.received(static_cast<std::uint64_t>(i) + 1);
-    REQUIRE(datagrams.size() == 1);
     CHECK(std::ranges::equal(datagrams[0], std::as_bytes(std::span(bytes))));
   }
 }
