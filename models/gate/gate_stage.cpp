@@ -24,6 +24,15 @@ constexpr double kCounted_s = 10.0;                  // over which the shares ar
 constexpr double kFastest_rad_s2 = 15000 * kDegree;  // of joints: a flick of a finger
 constexpr double kFastest_m_s2 = 60.0;               // of a root: a jump's landing
 
+RT_SAFE Bounds bounds_of(double jump, double acceleration) noexcept {
+  return {.jump = static_cast<float>(jump), .acceleration = static_cast<float>(acceleration)};
+}
+
+RT_SAFE void drop(std::size_t joint, Frame& frame) noexcept {
+  frame.valid[joint] = false;
+  frame.rotation_xyzw[joint] = kIdentity;
+}
+
 struct GateOptions {
   double jump_rad = 8.0 * kDegree;
   double jump_m = 0.5;
@@ -103,8 +112,7 @@ GateStage::GateStage(std::shared_ptr<const Skeleton> skeleton, double rate_hz,
 
 // An angle that is dropped is missing in its joint; the joint's other angles stay.
 RT_SAFE bool GateStage::gate_angles(float dt_s, Frame& frame) noexcept {
-  const Bounds bounds{.jump = static_cast<float>(options_.jump_rad),
-                      .acceleration = static_cast<float>(kFastest_rad_s2)};
+  const Bounds bounds = bounds_of(options_.jump_rad, kFastest_rad_s2);
   bool any = false;
   for (std::size_t c = 0; c < joint_.size(); ++c) {
     const std::size_t joint = joint_[c];
@@ -118,16 +126,14 @@ RT_SAFE bool GateStage::gate_angles(float dt_s, Frame& frame) noexcept {
     if (first || !accepted) count(joint, !accepted);
     if (accepted) continue;
     angle_rad = std::numeric_limits<float>::quiet_NaN();
-    frame.valid[joint] = false;
-    frame.rotation_xyzw[joint] = kIdentity;
+    drop(joint, frame);
     any = true;
   }
   return any;
 }
 
 RT_SAFE bool GateStage::gate_turns(float dt_s, Frame& frame) noexcept {
-  const Bounds bounds{.jump = static_cast<float>(options_.jump_rad),
-                      .acceleration = static_cast<float>(kFastest_rad_s2)};
+  const Bounds bounds = bounds_of(options_.jump_rad, kFastest_rad_s2);
   bool any = false;
   const std::size_t joints = std::min<std::size_t>(turn_.size(), frame.joint_count);
   for (std::size_t j = 0; j < joints; ++j) {
@@ -139,8 +145,7 @@ RT_SAFE bool GateStage::gate_turns(float dt_s, Frame& frame) noexcept {
     const bool accepted = turn_[j].accept(Eigen::Quaternionf(q[3], q[0], q[1], q[2]), dt_s, bounds);
     count(j, !accepted);
     if (accepted) continue;
-    frame.valid[j] = false;
-    frame.rotation_xyzw[j] = kIdentity;
+    drop(j, frame);
     any = true;
   }
   return any;
@@ -148,8 +153,7 @@ RT_SAFE bool GateStage::gate_turns(float dt_s, Frame& frame) noexcept {
 
 // A root has no sample that could be missing: for a frame it stays where it was.
 RT_SAFE bool GateStage::gate_root(float dt_s, Frame& frame) noexcept {
-  const Bounds bounds{.jump = static_cast<float>(options_.jump_m),
-                      .acceleration = static_cast<float>(kFastest_m_s2)};
+  const Bounds bounds = bounds_of(options_.jump_m, kFastest_m_s2);
   const Eigen::Vector3f at_m(frame.root_position_m.data());
   if (!at_m.allFinite()) {
     root_.skip(dt_s);

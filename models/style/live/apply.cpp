@@ -161,10 +161,6 @@ class ChannelWriter {
   clip::Clip& clip_;
 };
 
-}  // namespace
-
-namespace {
-
 // The walker's mean cycle, by the strides of the whole clip; without columns where it shows none.
 // NaN where a joint was not always measured.
 PoseCycle cycle_of_clip(const BoundModel& model, const clip::Clip& clip, double heading_rad) {

@@ -39,6 +39,16 @@ double shown_mm(const Model& model, const CalibrationFile& file, const Recorded&
          hand::thumb_gap_m(hand::hand_geometry(default_hand_shape()), angles, touched_finger(pose));
 }
 
+// As `posed calibrate` has it before it looks at contacts.
+CalibrationFile fitted(const Model& model, const Recorded& recorded) {
+  return {.driver = "cyberglove",
+          .glove = {},
+          .user = "ann",
+          .hand = Side::kRight,
+          .parameters = {},
+          .sensors = fit_poses(model, recorded).value().sensors};
+}
+
 }  // namespace
 
 TEST_CASE("a thumb calibrated with contacts touches where it touched") {
@@ -61,12 +71,7 @@ TEST_CASE("a thumb calibrated with contacts touches where it touched") {
     hand[6] = 20 * kDegree;
     hold(model, hand, recorded[static_cast<std::size_t>(pose)]);
   }
-  CalibrationFile file{.driver = "cyberglove",
-                       .glove = {},
-                       .user = "ann",
-                       .hand = Side::kRight,
-                       .parameters = {},
-                       .sensors = fit_poses(model, recorded).value().sensors};
+  CalibrationFile file = fitted(model, recorded);
   const CalibrationFile before = file;
   const auto sentences = fit_contacts(model, recorded, Side::kRight, file).value();
   REQUIRE(sentences.size() == 4);
@@ -87,12 +92,7 @@ TEST_CASE("without contacts a calibration stays as it is") {
   Recorded recorded{};
   for (std::size_t p = 0; p < kSensorPoses; ++p)
     hold(model, hand_in(static_cast<Pose>(p)), recorded[p]);
-  CalibrationFile file{.driver = "cyberglove",
-                       .glove = {},
-                       .user = "ann",
-                       .hand = Side::kRight,
-                       .parameters = {},
-                       .sensors = fit_poses(model, recorded).value().sensors};
+  CalibrationFile file = fitted(model, recorded);
   const auto before = file.sensors;
   CHECK(fit_contacts(model, recorded, Side::kRight, file).value().empty());
   CHECK(file.sensors == before);
