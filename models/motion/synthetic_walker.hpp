@@ -1,8 +1,7 @@
-// Synthetic walkers of two families, for the demo and for tests that must run without recordings.
-// Each joint turns by a short Fourier series of the walking phase; a person differs from the family
-// by a few degrees of posture, by cadence, by leg length and by sensor noise. The walkers are not
-// anatomically correct, but they give a style filter something to learn whose truth is known
-// (README.md, "Synthetic walkers").
+// Synthetic walkers, for the demo and for tests that must run without recordings. Feet stand where
+// they land (synthetic_gait.hpp); pelvis, trunk, head and arms follow the mean curves of real
+// walks, and the legs reach for the feet. A person differs from others by sex, size, cadence,
+// vigour and posture (README.md, "Synthetic walkers").
 #pragma once
 
 #include <cstdint>
@@ -12,20 +11,24 @@
 namespace posed::motion {
 
 enum class WalkerFamily : std::uint8_t {
-  kMarch,  // upright, wide arm swing, feet apart
-  kSway,   // hips roll and turn, knees and feet close, arms quiet and held out
+  kMarch,  // upright, arms swing wide and straight, knees high
+  kSway,   // hips roll and turn, feet on one line, arms quiet and held out
+  kWalk,   // as people walk
+  kSneak,  // bent knees and back, feet lifted with care, hands before the chest
+  kTired,  // small slow steps, head and shoulders hang
 };
 
 struct WalkerOptions {
   WalkerFamily family = WalkerFamily::kMarch;
-  std::uint32_t person = 1;  // seeds everything personal; one person can walk in either family
+  std::uint32_t person = 1;  // seeds everything personal; one person can walk in every family
   double seconds = 6.0;
   double rate_hz = 30.0;
-  double noise_deg = 0.3;  // of each rotation channel, white
+  double noise_deg = 0.3;  // white, of each rotation channel above the hips
+  bool round = false;      // once round a circle in whole strides, so that the clip can be looped
 };
 
-// A clip of one walk along +Z. Skeleton with BVH-style ZXY channels and canonical names;
-// deterministic.
+// A clip of one walk that begins towards +Z. Skeleton with BVH-style ZXY channels and canonical
+// names; deterministic.
 Result<clip::Clip> make_walker(const WalkerOptions& options);
 
 }  // namespace posed::motion

@@ -57,7 +57,7 @@ TEST_CASE("render draws a clip as a strip, as a pose and refuses what it cannot 
   };
   refused("no.svg", {"--frame", "120"}, "0 to 119, not 120");
   refused("no.mp4", {}, "add --video");
-  refused("no.svg", {"--video"}, "a video is an .mp4");
+  refused("no.svg", {"--video"}, "a video is ... .webp");
   refused("no.svg", {"--raw-beside"}, "is a clip");
   refused("no.svg", {"--from", "7"}, "7 s ... lasts ");
   refused("strip.svg", {}, "--overwrite");

@@ -75,7 +75,7 @@ old_cpu() {
   dpkg-deb -x "$packages"/posed_*.deb "$folder/unpacked"
   "${emulated[@]}" demo --prepare "$folder/demo" >"$folder/log" 2>&1 || { tail "$folder/log" >&2; fail "no demo without AVX2"; }
   "${emulated[@]}" check --config "$folder/demo/demo.toml" >"$folder/log" 2>&1 || { tail "$folder/log" >&2; fail "no check without AVX2"; }
-  local model=$folder/demo/march-to-sway.style walker=$folder/demo/new_walker.bvh
+  local model=$folder/demo/walk-to-sneak.style walker=$folder/demo/new_walker.bvh
   "${emulated[@]}" apply --model "$model" "$walker" --out "$folder/old.bvh" &>"$folder/log" || fail "no style without AVX2"
   "$posed" apply --model "$model" "$walker" --out "$folder/new.bvh" &>"$folder/log"
   same_clip "$folder/old.bvh" "$folder/new.bvh" || fail "the style on a CPU without AVX2 differs"

@@ -41,7 +41,7 @@ set_up_stage() {
   local stage=$root/etc/posed name
   inside posed demo --prepare /root/demo >"$work/demo.log" 2>&1 ||
     { tail "$work/demo.log" >&2; fail "posed demo failed"; }
-  cp "$root"/root/demo/{new_walker.bvh,march-to-sway.style} "$here/service/stage.toml" "$stage/"
+  cp "$root"/root/demo/{new_walker.bvh,walk-to-sneak.style} "$here/service/stage.toml" "$stage/"
   chmod 644 "$stage"/*.*
   rm -rf "$stage/keys"
   for name in server viewer late; do inside posed keygen $name --out /etc/posed/keys; done >"$work/keys.log"

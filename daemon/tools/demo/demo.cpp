@@ -185,15 +185,15 @@ Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
                folder.c_str());
   TRY(kept.begin());
   const auto clips = TRY(make_demo_clips(folder));
-  std::fprintf(stderr, "2/4 learning the style march -> sway from %zu clips\n",
+  std::fprintf(stderr, "2/4 learning the style walk -> sneak from %zu clips\n",
                clips.from.size() + clips.to.size());
   Experiment experiment;
-  experiment.targets = {"sway"};
+  experiment.targets = {"sneak"};
   // The same number is the same person in both families.
   for (std::size_t i = 0; i < clips.from.size(); ++i) {
     const std::string person = std::to_string(i + 1);
-    experiment.clips.push_back({clips.from[i], "march", person, "walk", 0});
-    experiment.clips.push_back({clips.to[i], "sway", person, "walk", 0});
+    experiment.clips.push_back({clips.from[i], "walk", person, "walk", 0});
+    experiment.clips.push_back({clips.to[i], "sneak", person, "walk", 0});
   }
   OneRank alone;
   const auto trained = TRY(train_and_save(experiment, 0, {.model = folder / kDemoModel}, alone));
@@ -243,7 +243,7 @@ std::unique_ptr<view::Bridge> serve_page_of(const assembly::Daemon& daemon,
 // Shows the running daemon until Ctrl-C or until `seconds` after the first frame. `url`: the page's
 // address; empty: there is none.
 Result<> watch(const assembly::Daemon& daemon, const DemoOptions& options, const std::string& url,
-               Watcher& watcher, DemoHand& hand) {
+               Watcher& watcher, DemoStyle& style, DemoHand& hand) {
   ClientOptions client;
   client.endpoint = daemon.publish_endpoint();
   auto connection = TRY(Connection::open(client, ZMQ_SUB));
@@ -256,12 +256,14 @@ Result<> watch(const assembly::Daemon& daemon, const DemoOptions& options, const
     if (!first_frame && watcher.styled() > 0) first_frame = SteadyClock::now();
     if (first_frame && options.seconds && seconds_since(*first_frame) >= *options.seconds) break;
     if (first_frame) {
-      TRY(hand.tend(seconds_since(*first_frame)));
+      const double seconds = seconds_since(*first_frame);
+      TRY(style.tend(seconds, [&daemon] { return daemon.stats(); }));
+      TRY(hand.tend(seconds));
     }
     if (!first_frame && seconds_since(start) > kFirstFrameWithin_s) {
       return fail("no styled frame arrived within 10 s; the log above says why");
     }
-    screen.show(watcher, hand);
+    screen.show(watcher, style, hand);
   }
   return {};
 }
@@ -309,10 +311,11 @@ Result<> stream(const DemoOptions& options, const std::filesystem::path& folder)
   const auto bridge = serve_page_of(*daemon, options);
   std::fprintf(stderr, "4/4 streaming %s (not learnt from) on %s\n", kDemoWalker,
                daemon->publish_endpoint().c_str());
+  auto style = TRY(DemoStyle::open(daemon->control_endpoint()));
   auto hand = TRY(DemoHand::open(daemon->control_endpoint()));
   Watcher watcher(hand);
   const std::string url = bridge ? bridge->url() : "";
-  const auto watched = watch(*daemon, options, url, watcher, hand);
+  const auto watched = watch(*daemon, options, url, watcher, style, hand);
   const v1::Stats stats = daemon->stats();
   daemon->stop();
   if (!watched) return watched;

@@ -41,8 +41,8 @@ std::vector<std::string> demo_file_names() {
   std::vector<std::string> names{kDemoModel,  kDemoWalker, kDemoHand,
                                  kDemoSigner, kGlove,      kGloveLabels};
   for (std::uint32_t person = 1; person <= kPeople; ++person) {
-    names.push_back(fmt::format("march_{}.bvh", person));
-    names.push_back(fmt::format("sway_{}.bvh", person));
+    names.push_back(fmt::format("walk_{}.bvh", person));
+    names.push_back(fmt::format("sneak_{}.bvh", person));
   }
   return names;
 }
@@ -53,18 +53,17 @@ Result<DemoClips> make_demo_clips(const std::filesystem::path& folder) {
   if (made) return fail("cannot make the folder: " + made.message(), folder.string());
   DemoClips clips;
   for (std::uint32_t person = 1; person <= kPeople; ++person) {
-    // The two families have different people, as with real actors.
-    auto march = TRY(write_walker(folder / fmt::format("march_{}.bvh", person),
-                                  {.family = motion::WalkerFamily::kMarch, .person = person}));
-    auto sway =
-        TRY(write_walker(folder / fmt::format("sway_{}.bvh", person),
-                         {.family = motion::WalkerFamily::kSway, .person = kPeople + person}));
-    clips.from.push_back(march);
-    clips.to.push_back(sway);
+    clips.from.push_back(
+        TRY(write_walker(folder / fmt::format("walk_{}.bvh", person),
+                         {.family = motion::WalkerFamily::kWalk, .person = person})));
+    clips.to.push_back(
+        TRY(write_walker(folder / fmt::format("sneak_{}.bvh", person),
+                         {.family = motion::WalkerFamily::kSneak, .person = person})));
   }
-  TRY(write_walker(
-      folder / kDemoWalker,
-      {.family = motion::WalkerFamily::kMarch, .person = kNewPerson, .seconds = kNewWalkSeconds}));
+  TRY(write_walker(folder / kDemoWalker, {.family = motion::WalkerFamily::kWalk,
+                                          .person = kNewPerson,
+                                          .seconds = kNewWalkSeconds,
+                                          .round = true}));
   TRY(write_hands(folder, clips));
   return clips;
 }

@@ -11,7 +11,7 @@
 namespace posed::tools {
 
 // The style model's file name in the demo's folder; config/demo.toml names it, too.
-inline constexpr const char* kDemoModel = "march-to-sway.style";
+inline constexpr const char* kDemoModel = "walk-to-sneak.style";
 // The walker that is streamed; it is not in the training data.
 inline constexpr const char* kDemoWalker = "new_walker.bvh";
 

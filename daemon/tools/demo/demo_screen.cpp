@@ -20,6 +20,7 @@ namespace {
 constexpr std::array kLabels{"g", "1", "c", "3", "4", "p"};
 // a performance takes about 12 s; the rest shows the live hand
 constexpr double kAgainAfter_s = 25.0;
+constexpr double kStyled_s = 12.0, kPlain_s = 6.0;
 
 std::string joined(const auto& labels) {
   std::string text;
@@ -33,11 +34,56 @@ bool is_performed(const v1::Frame& frame) {
 
 }  // namespace
 
-Result<DemoHand> DemoHand::open(const std::string& control) {
+Result<DemoRequests> DemoRequests::open(const std::string& control) {
   ClientOptions client;
   client.endpoint = control;
-  auto connection = TRY(Connection::open(client, ZMQ_DEALER));
-  return DemoHand(std::move(connection));
+  return DemoRequests(TRY(Connection::open(client, ZMQ_DEALER)));
+}
+
+Result<> DemoRequests::send(const v1::ControlRequest& request) {
+  if (net::send_part(connection_.socket(), request.SerializeAsString(), false)) return {};
+  return fail("the demo's own request cannot be sent");
+}
+
+Result<> DemoRequests::read_reply(std::string_view what) {
+  net::Message message;
+  if (!connection_.receive(message)) return {};
+  v1::ControlReply reply;
+  if (message::parse_bounded(reply, message.bytes()) && reply.ok()) return {};
+  return fail(fmt::format("the demo's own {} was refused: {}", what, reply.error()));
+}
+
+Result<DemoStyle> DemoStyle::open(const std::string& control) {
+  return DemoStyle(TRY(DemoRequests::open(control)));
+}
+
+Result<> DemoStyle::tend(double seconds, const std::function<v1::Stats()>& stats) {
+  TRY(requests_.read_reply("change of alpha"));
+  if (left_alone_ || seconds < next_s_) return {};
+  const v1::Stats now = stats();
+  const auto walker = std::ranges::find(now.stream(), kDemoWalkerStream, &v1::StreamStats::stream);
+  if (walker == now.stream().end() || walker->alpha_target() != asked_) {
+    left_alone_ = true;
+    return {};
+  }
+  asked_ = 1.0F - asked_;
+  next_s_ = seconds + (asked_ > 0.0F ? kStyled_s : kPlain_s);
+  v1::ControlRequest request;
+  auto& set = *request.mutable_set_parameter();
+  set.set_stream(kDemoWalkerStream);
+  set.set_name("alpha");
+  set.set_number(asked_);
+  return requests_.send(request);
+}
+
+std::string DemoStyle::note() const {
+  if (left_alone_) return "walker: alpha stays as you set it";
+  return asked_ > 0.0F ? "walker: sneaks; in a moment the style goes off, and comes again"
+                       : "walker: as he was captured; in a moment the style comes again";
+}
+
+Result<DemoHand> DemoHand::open(const std::string& control) {
+  return DemoHand(TRY(DemoRequests::open(control)));
 }
 
 void DemoHand::handle(const v1::Frame& frame) {
@@ -60,17 +106,9 @@ Result<> DemoHand::tend(double seconds) {
     wanted.set_stream(kDemoHandStream);
     wanted.set_name("play");
     for (const char* label : kLabels) wanted.add_word(label);
-    if (!net::send_part(connection_.socket(), request.SerializeAsString(), false)) {
-      return fail("the demo's own play command cannot be sent");
-    }
+    TRY(requests_.send(request));
   }
-  net::Message message;
-  if (!connection_.receive(message)) return {};
-  v1::ControlReply reply;
-  if (!message::parse_bounded(reply, message.bytes()) || !reply.ok()) {
-    return fail("the demo's own play command was refused: " + reply.error());
-  }
-  return {};
+  return requests_.read_reply("play command");
 }
 
 std::string DemoHand::note() const {
@@ -139,7 +177,7 @@ bool DemoScreen::quits() {
 }
 
 // Renews the numbers.
-void DemoScreen::look(Watcher& watcher, const DemoHand& hand) {
+void DemoScreen::look(Watcher& watcher, const DemoStyle& style, const DemoHand& hand) {
   const bool first = stats_.time_ns() == 0;
   stats_ = daemon_.stats();
   if (screen_.is_terminal() && is_due(taken_, kStatsEvery)) chosen_.update(stats_);
@@ -152,13 +190,14 @@ void DemoScreen::look(Watcher& watcher, const DemoHand& hand) {
   view_.notes.push_back(
       fmt::format("received {} styled frames, {} missing; {:.1f} deg rms from the raw pose",
                   watcher.styled(), watcher.gaps(), watcher.change_lately_deg()));
+  view_.notes.push_back(style.note());
   view_.notes.push_back(hand.note());
   if (answer_) view_.notes.push_back(*answer_);
 }
 
-void DemoScreen::show(Watcher& watcher, const DemoHand& hand) {
+void DemoScreen::show(Watcher& watcher, const DemoStyle& style, const DemoHand& hand) {
   if (!is_due(drawn_, screen_.is_terminal() ? kDrawEvery : kPlainLinesEvery)) return;
-  if (!screen_.is_terminal() || is_due(looked_, kLookEvery)) look(watcher, hand);
+  if (!screen_.is_terminal() || is_due(looked_, kLookEvery)) look(watcher, style, hand);
   screen_.measure(view_);
   view_.chosen = screen_.is_terminal() ? chosen_.name() : "";
   // Elsewhere than on a terminal the address was printed once, before the first of many views.

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <span>
@@ -28,6 +29,43 @@ namespace posed::tools {
 
 inline constexpr const char* kDemoHandStream = "hand";
 
+inline constexpr const char* kDemoWalkerStream = "walker";
+
+// What the demo asks of its daemon, as any client would.
+class DemoRequests {
+ public:
+  // `control` is the daemon's control endpoint.
+  static Result<DemoRequests> open(const std::string& control);
+
+  Result<> send(const v1::ControlRequest& request);
+  // Reads the reply that waits. The error is a refusal; `what` names the request in it.
+  Result<> read_reply(std::string_view what);
+
+ private:
+  explicit DemoRequests(Connection connection) : connection_(std::move(connection)) {}
+  Connection connection_;
+};
+
+// Switches the walker's style off and on by itself, so that a visitor sees what posed does. It ends
+// for good when somebody else has changed alpha.
+class DemoStyle {
+ public:
+  static Result<DemoStyle> open(const std::string& control);
+
+  // `seconds` since the start; call it often. `stats` is asked when a change is due.
+  Result<> tend(double seconds, const std::function<v1::Stats()>& stats);
+
+  [[nodiscard]] std::string note() const;  // what the walker does now, one line
+
+ private:
+  explicit DemoStyle(DemoRequests requests) : requests_(std::move(requests)) {}
+
+  DemoRequests requests_;
+  double next_s_ = 8.0;
+  float asked_ = 1.0F;  // alpha
+  bool left_alone_ = false;
+};
+
 // The hand of the demo, watched and controlled as by any client: a signer performs g, c and p, and
 // from time to time the daemon performs labels in an order that was not in the training data.
 class DemoHand {
@@ -44,9 +82,9 @@ class DemoHand {
   [[nodiscard]] std::string summary() const;  // what it has done; empty if no hand was seen
 
  private:
-  explicit DemoHand(Connection connection) : connection_(std::move(connection)) {}
+  explicit DemoHand(DemoRequests requests) : requests_(std::move(requests)) {}
 
-  Connection connection_;
+  DemoRequests requests_;
   double next_play_s_ = 3.0;
   std::uint64_t frames_ = 0;
   v1::Frame last_;
@@ -126,11 +164,11 @@ class DemoScreen {
   // Obeys the keys that wait; returns whether the user wants to end.
   [[nodiscard]] bool quits();
   // Draws, if it is time.
-  void show(Watcher& watcher, const DemoHand& hand);
+  void show(Watcher& watcher, const DemoStyle& style, const DemoHand& hand);
 
  private:
   using SteadyClock = std::chrono::steady_clock;
-  void look(Watcher& watcher, const DemoHand& hand);
+  void look(Watcher& watcher, const DemoStyle& style, const DemoHand& hand);
 
   const assembly::Daemon& daemon_;
   std::string first_line_;  // empty: none

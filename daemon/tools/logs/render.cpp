@@ -66,16 +66,17 @@ Result<> check_render(const RenderArguments& options) {
         "recorded with `publish_raw = true`",
         options.in);
   }
-  const bool moves = clip::extension_of(options.out) == ".mp4";
+  const std::string extension = clip::extension_of(options.out);
+  const bool moves = extension == ".mp4" || extension == ".webp";
   if (moves != options.video) {
-    return misuse(
-        moves ? "a .mp4 is a video: add --video" : "a video is an .mp4: name one by --out",
-        options.out.string());
+    return misuse(moves ? "a " + extension + " is a video: add --video"
+                        : "a video is a .mp4 or an animated .webp: name one by --out",
+                  options.out.string());
   }
   return OutputFiles(options.overwrite)
       .reads(options.in)
       .reads(options.read.skeleton)
-      .writes(options.out, {".svg", ".png", ".mp4"})
+      .writes(options.out, {".svg", ".png", ".mp4", ".webp"})
       .check();
 }
 
@@ -273,12 +274,14 @@ void add_render(CLI::App& app, int& exit_code) {
       ->add_option("IN", options->in,
                    "To draw: " + clip::listed(clip::Use::kRead) + "; or a log (.plog)")
       ->required();
-  command->add_option("--out", options->out, "To write: .svg or .png; .mp4 with --video")
+  command->add_option("--out", options->out, "To write: .svg or .png; .mp4 or .webp with --video")
       ->required();
   auto* strip = command->add_flag("--strip", options->strip, "Poses side by side (the default)");
   auto* frame = command->add_option("--frame", options->frame, "One pose: this frame, from 0")
                     ->excludes(strip);
-  auto* video = command->add_flag("--video", options->video, "The motion as an .mp4 (needs ffmpeg)")
+  auto* video = command
+                    ->add_flag("--video", options->video,
+                               "The motion as an .mp4, or a .webp that repeats (needs ffmpeg)")
                     ->excludes(strip)
                     ->excludes(frame);
   command->add_option("--view", options->view, "From where the figure is seen")
@@ -313,7 +316,8 @@ void add_render(CLI::App& app, int& exit_code) {
       "  posed render walk.bvh --out walk.png\n"
       "  posed render walk.bvh --view side --from 1 --to 2.2 --count 6 --out stride.svg\n"
       "  posed render glove.csv --hand left --frame 40 --out sign.png\n"
-      "  posed render take1.plog --stream walker --raw-beside --video --out walker.mp4");
+      "  posed render take1.plog --stream walker --raw-beside --video --out walker.mp4\n"
+      "  posed render walk.bvh --video --from 1 --to 3 --out walk.webp   # for a page");
   command->callback([options, &exit_code] {
     if (!options->hand.empty()) {
       options->read.hand = side_named(options->hand);

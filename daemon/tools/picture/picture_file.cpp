@@ -129,14 +129,23 @@ Result<> write_video(const Video& video, const std::filesystem::path& path) {
     const std::string name = folder->file(frame_name(frame));
     TRY(write_whole_file(name, video.draw(frame)));
   }
-  const std::string encoded = folder->file("video.mp4");
+  const std::string encoded = folder->file("video" + path.extension().string());
+  std::vector<std::string> call{"ffmpeg",
+                                "-loglevel",
+                                "error",
+                                "-framerate",
+                                std::to_string(video.rate_hz),
+                                "-i",
+                                folder->file("%06d.svg")};
   // H.264 with half as many colour samples, which every player shows, needs an even width and
   // height.
-  const auto made =
-      run_program({"ffmpeg", "-loglevel", "error", "-framerate", std::to_string(video.rate_hz),
-                   "-i", folder->file("%06d.svg"), "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v",
-                   "libx264", "-pix_fmt", "yuv420p", encoded},
-                  "ffmpeg");
+  static const std::vector<std::string> kMp4{
+      "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-pix_fmt", "yuv420p"};
+  static const std::vector<std::string> kWebp{"-c:v", "libwebp", "-loop", "0", "-quality", "60"};
+  const std::vector<std::string>& codec = clip::extension_of(path) == ".webp" ? kWebp : kMp4;
+  call.insert(call.end(), codec.begin(), codec.end());
+  call.push_back(encoded);
+  const auto made = run_program(call, "ffmpeg");
   if (!made) return fail("a video " + made.error().message, path.string());
   return copy_whole(encoded, path);
 }

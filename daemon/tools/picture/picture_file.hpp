@@ -25,7 +25,7 @@ struct Video {
   std::function<std::string(int frame)> draw;  // SVG files of one size
   std::function<bool(int done)> progress;      // called before each frame; false interrupts
 };
-// `path` ends in .mp4.
+// `path` ends in .mp4 or in .webp, which repeats for ever.
 Result<> write_video(const Video& video, const std::filesystem::path& path);
 
 }  // namespace posed::picture

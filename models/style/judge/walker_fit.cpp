@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "models/gp/regression.hpp"
+#include "models/motion/heading.hpp"
 #include "models/motion/motion.hpp"
 #include "proto/frame/degree.hpp"
 
@@ -20,6 +21,21 @@ MatrixXd evenly_taken(const MatrixXd& rows) {
   return rows(Eigen::seq(0, rows.rows() - 1, step), Eigen::all);
 }
 
+// q of every frame [frames x dims] as the live filter sees it: a walker may turn.
+MatrixXd live_vectors(const motion::Motion& motion, const motion::PoseSpace& space) {
+  motion::LiveHeading heading;
+  MatrixXd q(motion.size(), space.dims());
+  std::vector<float> row(static_cast<std::size_t>(space.dims()));
+  std::vector<std::uint8_t> available(row.size());
+  for (int t = 0; t < motion.size(); ++t) {
+    const Frame& frame = motion.frames[t];
+    if (space.has_heading(frame)) heading.update(space.heading_rad(frame), 1.0 / motion.rate_hz);
+    space.to_vector(frame, heading.value_rad(), row, available);
+    q.row(t) = Eigen::Map<const Eigen::RowVectorXf>(row.data(), q.cols()).cast<double>();
+  }
+  return q;
+}
+
 }  // namespace
 
 Result<WalkerFit> fit_of_walker(const StyleModel& model, const std::string& model_name,
@@ -32,8 +48,7 @@ Result<WalkerFit> fit_of_walker(const StyleModel& model, const std::string& mode
     if (error.file.empty()) error.file = model_name;
     return std::unexpected(std::move(error));
   }
-  const MatrixXd q =
-      evenly_taken(motion::pose_vectors(motion, *space, motion::walk_heading_rad(motion)));
+  const MatrixXd q = evenly_taken(live_vectors(motion, *space));
   if (q.cols() != model.process.inputs.cols()) {
     return fail("the model's parts do not fit each other", model_name);
   }

@@ -111,11 +111,11 @@ test(
     await page.locator('.recording', { hasText: 'take 1 “page”' }).waitFor(PATIENCE);
     await page.getByRole('button', { name: 'End take' }).click();
     await acknowledged(page, 'take ends');
-    await page.getByLabel('Model', { exact: true }).selectOption('march-to-sway.style');
+    await page.getByLabel('Model', { exact: true }).selectOption('walk-to-sneak.style');
     await page
       .locator('input[type=file]')
-      .setInputFiles(join(BUILD, 'demo', 'march-to-sway.style'));
-    await acknowledged(page, 'model march-to-sway.style: applied');
+      .setInputFiles(join(BUILD, 'demo', 'walk-to-sneak.style'));
+    await acknowledged(page, 'model walk-to-sneak.style: applied');
     await page.locator('.stream', { hasText: 'hand' }).click();
     await page.getByLabel('Gestures to perform').fill('g 1 c 3 4 p');
     await page.getByRole('button', { name: 'Play' }).click();

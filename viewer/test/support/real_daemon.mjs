@@ -24,7 +24,7 @@ publish_raw = true
 path = "${DEMO}/new_walker.bvh"
 loop = true
 [stream.style]
-model = "${DEMO}/march-to-sway.style"
+model = "${DEMO}/walk-to-sneak.style"
 [stream.feet]
 [[stream]]
 name = "hand"

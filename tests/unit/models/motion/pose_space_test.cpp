@@ -68,7 +68,7 @@ TEST_CASE("Adding a change moves q by exactly that change, in every space", "[po
     }
     const auto space = PoseSpace::bind(*spec, *walk.skeleton);
     REQUIRE(space.has_value());
-    CHECK(space->dims() == 3 * 19);
+    CHECK(space->dims() == 3 * 21);
     Frame frame = walk.frames[11];
     const auto before = vector_of(*space, frame, 0.4);
     std::vector<float> delta(space->dims());

@@ -36,3 +36,16 @@ TEST_CASE("a synthetic walker has the legs that the phase is found by", "[walker
   CHECK(walk->skeleton->joint_of(posed::Bone::kRightUpperLeg) > 0);
   CHECK(walk->skeleton->joint_of(posed::Bone::kLeftHand) > 0);
 }
+
+// The last frame of a round is one step before the first: a loop shows no jump.
+TEST_CASE("a walker who goes round a circle ends where it began", "[walker]") {
+  const auto walk = make_walker(
+      {.family = WalkerFamily::kWalk, .seconds = 20.0, .noise_deg = 0.0, .round = true});
+  REQUIRE(walk);
+  const Eigen::Index last = walk->frames() - 1;
+  const auto step_m = [&](Eigen::Index from, Eigen::Index to) {
+    return (walk->channels.row(to) - walk->channels.row(from)).head<3>().norm();
+  };
+  CHECK(step_m(last, 0) == Approx(step_m(0, 1)).epsilon(0.1));
+  CHECK(step_m(last, last / 2) > 2.0);
+}

@@ -91,18 +91,17 @@ class WalkingGate {
   [[nodiscard]] const style::TrainedMotion& known() const { return *known_; }
 
  private:
-  // From one greatest lead of the right leg to the next.
+  // From one instant at which the right leg passes the left one to the next.
   [[nodiscard]] double stride_s() const {
     const auto legs = motion::LegSignal::find(*clip_.skeleton);
-    std::vector<int> peaks;
-    for (int i = 1; i + 1 < clip_.channels.rows(); ++i) {
-      const double now = legs->value_rad(clip_.frame(i));
-      if (now > legs->value_rad(clip_.frame(i - 1)) && now >= legs->value_rad(clip_.frame(i + 1))) {
-        peaks.push_back(i);
+    std::vector<int> passes;
+    for (int i = 1; i < clip_.frames(); ++i) {
+      if (legs->value_rad(clip_.frame(i - 1)) < 0.0 && legs->value_rad(clip_.frame(i)) >= 0.0) {
+        passes.push_back(i);
       }
     }
-    return static_cast<double>(peaks.back() - peaks.front()) /
-           (static_cast<double>(peaks.size() - 1) * clip_.frame_rate_hz);
+    return static_cast<double>(passes.back() - passes.front()) /
+           (static_cast<double>(passes.size() - 1) * clip_.frame_rate_hz);
   }
 
   clip::Clip clip_;
