@@ -20,6 +20,7 @@
 #include "daemon/publish/publisher.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/system/realtime.hpp"
+#include "daemon/teach/teacher.hpp"
 #include "proto/zmq/keys.hpp"
 
 namespace posed::assembly {
@@ -80,6 +81,8 @@ class Daemon::Parts final : public control::DaemonControl {
   std::unique_ptr<pipeline::Ring<pipeline::DeviceCommand>> device_commands;
   std::unique_ptr<pipeline::Ring<pipeline::Ack>> acks;
   std::unique_ptr<Streams> streams;
+  control::ModelFolder models;
+  std::unique_ptr<teach::Teacher> teacher;           // null: there is no folder of models
   std::unique_ptr<control::RequestHandler> handler;  // owns the models
   std::unique_ptr<OutputThreads> outputs;
   std::unique_ptr<publish::Publisher> publisher;
@@ -119,11 +122,17 @@ Result<> Daemon::Parts::open() {
     auto opened = TRY(system::EventFd::open());
     *wake = std::move(opened);
   }
+  models = TRY(control::ModelFolder::open(config.models));
   return {};
 }
 
 Result<> Daemon::Parts::start(DaemonHooks wanted) {
   hooks = std::move(wanted);
+  if (!config.models.empty()) {
+    teacher = std::make_unique<teach::Teacher>(
+        [this](const std::string& name, std::string_view bytes) { return models.add(name, bytes); },
+        [this] { control_wake->notify(); });
+  }
   TRY(open_sockets());
   TRY(open_engines());
   return start_threads();
@@ -150,6 +159,7 @@ Result<> Daemon::Parts::open_publisher() {
                                     .secret_z85 = secret_z85,
                                     .more_stats = hooks.more_stats,
                                     .record_sink = hooks.record_sink,
+                                    .raw_tap = teacher.get(),
                                     .clock = system::monotonic_ns,
                                     .slots = streams->slots(),
                                     .messages_per_s = streams->messages_per_s(),
@@ -182,8 +192,8 @@ Result<> Daemon::Parts::open_engines() {
                                        .record_sink = hooks.record_sink,
                                        .clock = system::monotonic_ns,
                                        .commands = device_commands.get()}));
-  auto models = TRY(control::ModelFolder::open(config.models));
-  handler = std::make_unique<control::RequestHandler>(*this, streams->kept(), std::move(models));
+  handler = std::make_unique<control::RequestHandler>(*this, streams->kept(), models,
+                                                      system::monotonic_ns, teacher.get());
   streams->begin({.publisher = publisher.get(),
                   .handler = handler.get(),
                   .worker = worker.get(),

@@ -84,6 +84,7 @@ void ControlServer::serve() {
       busy = true;
     }
     while (handle_ack()) busy = true;
+    handler_.use_taught();
     const std::int64_t due_ns = handler_.forget_old(system::monotonic_ns());
     if (!busy) sleep(milliseconds_until(due_ns));
   }
@@ -91,6 +92,7 @@ void ControlServer::serve() {
 
 void ControlServer::sleep(long longest_ms) {
   ports_.wake->going_to_sleep();
+  handler_.use_taught();  // here, too: a call that came before going_to_sleep() wakes nobody
   if (ports_.acks->empty() && !stop_.load(std::memory_order_acquire)) {
     std::array<zmq_pollitem_t, 2> wait{
         {{router_.get(), 0, ZMQ_POLLIN, 0}, {nullptr, ports_.wake->fd(), ZMQ_POLLIN, 0}}};

@@ -1,11 +1,15 @@
 #include "daemon/control/model_folder.hpp"
 
 #include <algorithm>
+#include <cerrno>
 #include <system_error>
+
+#include <unistd.h>
 
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/control/uploads.hpp"
+#include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
 
@@ -13,10 +17,11 @@ namespace posed::control {
 namespace {
 
 constexpr std::size_t kMaxModels = 256;
+constexpr std::string_view kStyle = ".style";
 
 // Empty: no model file.
 std::string_view kind_of(const std::filesystem::path& file) {
-  if (file.extension() == ".style") return "style";
+  if (file.extension() == kStyle) return "style";
   return file.extension() == ".gesture" ? "generate" : "";
 }
 
@@ -51,6 +56,38 @@ Result<std::vector<FolderModel>> ModelFolder::list() const {
   std::ranges::sort(models, {}, &FolderModel::name);
   if (models.size() > kMaxModels) models.resize(kMaxModels);
   return models;
+}
+
+Result<> ModelFolder::check_writable() const {
+  if (folder_.empty()) {
+    return fail(
+        "the daemon has no folder to keep a model in: name one in its config ([control] models ="
+        " \"models\") and start again");
+  }
+  if (access(folder_.c_str(), W_OK) == 0) return {};
+  return fail("the daemon may not write into the folder of models; let its user do so",
+              folder_.string());
+}
+
+Result<std::string> ModelFolder::add(const std::string& name, std::string_view bytes) const {
+  TRY(check_writable());
+  const auto models = TRY(list());
+  if (models.size() >= kMaxModels) {
+    return fail("the folder of models is full; move some of its models elsewhere",
+                folder_.string());
+  }
+  const std::filesystem::path whole = folder_ / ("." + name + ".new");
+  TRY(write_whole_file(whole, bytes));
+  for (std::size_t number = 1; number <= kMaxModels + 1; ++number) {
+    const std::string file =
+        name + (number == 1 ? "" : "-" + std::to_string(number)) + std::string(kStyle);
+    if (rename_to_new(whole, folder_ / file)) return file;
+    if (errno != EEXIST) break;
+  }
+  std::error_code error(errno, std::generic_category());
+  std::error_code ignored;
+  std::filesystem::remove(whole, ignored);
+  return fail("the model cannot be kept: " + error.message(), folder_.string());
 }
 
 Result<std::string> ModelFolder::read(std::string_view name) const {

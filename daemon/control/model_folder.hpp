@@ -25,6 +25,12 @@ class ModelFolder {
 
   // Regular files that end in .style or .gesture, by name; the first 256.
   Result<std::vector<FolderModel>> list() const;
+  // Whether add() can work.
+  Result<> check_writable() const;
+  // Keeps a style under this name and the ending of styles, with a number behind it if there is one
+  // of this name: nothing is ever replaced. Returns the file's name. `name` is one of a stream
+  // (config::is_stream_name()).
+  Result<std::string> add(const std::string& name, std::string_view bytes) const;
   // The bytes of a model of the list.
   Result<std::string> read(std::string_view name) const;
 

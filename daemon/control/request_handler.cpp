@@ -9,11 +9,14 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "daemon/config/config.hpp"
 #include "daemon/control/stage_requests.hpp"
 #include "daemon/devices/about_stream.hpp"
 #include "daemon/devices/calibration.hpp"
+#include "daemon/teach/teacher.hpp"
 #include "drivers/glove/traits.hpp"
 #include "models/stage_type.hpp"
+#include "models/stages/registry.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
 #include "proto/text/clean.hpp"
@@ -87,8 +90,12 @@ ControlledStream known_stream(const config::StreamConfig& config, const std::str
 }
 
 RequestHandler::RequestHandler(DaemonControl& daemon_control, devices::KeptSettings& kept,
-                               ModelFolder models, Clock clock)
-    : daemon_control_(daemon_control), kept_(kept), models_(std::move(models)), clock_(clock) {}
+                               ModelFolder models, Clock clock, teach::Teacher* teacher)
+    : daemon_control_(daemon_control),
+      kept_(kept),
+      models_(std::move(models)),
+      clock_(clock),
+      teacher_(teacher) {}
 
 RequestHandler::~RequestHandler() = default;
 
@@ -109,6 +116,7 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
   }
   if (request.has_take()) return mark_take(request, std::move(requester));
   if (request.has_list_models()) return list_models(std::move(requester));
+  if (request.has_teach()) return teach(request, std::move(requester));
   std::string model;  // read without the lock: a disk may be slow
   if (request.has_use_model()) {
     auto read = models_.read(request.use_model().name());
@@ -134,7 +142,8 @@ Result<RequestHandler::Done> RequestHandler::apply(const v1::ControlRequest& req
     case v1::ControlRequest::kModelPart:
       return add_model_part(request, requester);
     case v1::ControlRequest::kUseModel:
-      return set_model(request.use_model().stream(), model, request.use_model().name(), requester);
+      return set_model(request.use_model().stream(), model, request.use_model().name(),
+                       {.requester = requester});
     case v1::ControlRequest::kCalibrate:
       return calibrate(request, requester);
     case v1::ControlRequest::kHaptics:
@@ -173,6 +182,72 @@ Reply RequestHandler::list_models(Requester requester) const {
     entry.set_kind(std::string(model.kind));
   }
   return make_reply(std::move(requester), reply);
+}
+
+Reply RequestHandler::teach(const v1::ControlRequest& request, Requester requester) {
+  const std::scoped_lock lock(mutex_);
+  if (auto done = teach_step(request); !done) {
+    return refusal(std::move(requester), done.error().text());
+  }
+  v1::ControlReply reply;
+  reply.set_ok(true);
+  *reply.mutable_teaching() = teacher_->state();
+  return make_reply(std::move(requester), reply);
+}
+
+Result<> RequestHandler::teach_step(const v1::ControlRequest& request) {
+  const auto& wanted = request.teach();
+  TRY(models_.check_writable());
+  if (teacher_ == nullptr) return fail("this daemon teaches no styles");
+  switch (wanted.step_case()) {
+    case v1::ControlRequest::Teach::kMark: {
+      const auto pupil = TRY(find_pupil(wanted.stream()));
+      return teacher_->mark(pupil,
+                            wanted.mark().style() ? teach::Walk::kStyle : teach::Walk::kNeutral,
+                            wanted.mark().seconds());
+    }
+    case v1::ControlRequest::Teach::kTrain:
+      if (config::is_stream_name(wanted.train().name())) {
+        return teacher_->train(wanted.stream(), wanted.train().name());
+      }
+      return fail(in_quotes(wanted.train().name()) +
+                  " cannot be a style's name; it has a-z, digits, '-' and '_', 1 to 32");
+    case v1::ControlRequest::Teach::kCancel:
+      return teacher_->cancel(wanted.stream());
+    default:
+      return {};
+  }
+}
+
+// What a stream lacks that cannot be taught is told before somebody has walked.
+Result<teach::Pupil> RequestHandler::find_pupil(const std::string& name) {
+  const ControlledStream& stream = *TRY(find_stream(name));
+  const StageType* const style = find_stage_type("style");
+  const auto& stages = stream.settings.stages;
+  if (std::ranges::find(stages, style, &pipeline::StageSettings::type) == stages.end()) {
+    return in_stream(name, fail("it has no style stage to teach; give it a [stream.style] table in"
+                                " the config (model = \"\" while there is none) and start again")
+                               .error());
+  }
+  if (!stream.publishes_raw) {
+    return in_stream(name, fail("teaching needs its frames as they were before the stages; set"
+                                " publish_raw = true for it in the config and start again")
+                               .error());
+  }
+  if (!stream.is_there() || stream.skeleton == nullptr) {
+    return in_stream(name, fail("no body is there now; wait until it comes").error());
+  }
+  return teach::Pupil{.stream = stream.stream, .name = stream.name, .skeleton = stream.skeleton};
+}
+
+void RequestHandler::use_taught() {
+  const auto model = teacher_ != nullptr ? teacher_->take_model() : std::nullopt;
+  if (!model) return;
+  const std::scoped_lock lock(mutex_);
+  const auto bytes = std::as_bytes(std::span(model->bytes));
+  const auto done = set_model(model->stream, bytes, model->file, {.requester = {}, .taught = true});
+  if (!done) return teacher_->not_started(done.error().text());
+  if (!done->under_way) teacher_->started(0);  // when the stream comes
 }
 
 bool RequestHandler::is_earlier(Streams::iterator stream) const {
@@ -262,20 +337,21 @@ Result<RequestHandler::Done> RequestHandler::add_model_part(const v1::ControlReq
                                 clock_()));
   if (!whole) return Done{};
   const std::string name = part.name().empty() ? "unnamed model" : clean_name(part.name());
-  return set_model(part.stream(), std::as_bytes(std::span(std::as_const(*whole))), name, requester);
+  return set_model(part.stream(), std::as_bytes(std::span(std::as_const(*whole))), name,
+                   {.requester = requester});
 }
 
 // The file itself says for which stage it is.
 Result<RequestHandler::Done> RequestHandler::set_model(const std::string& stream_name,
                                                        std::span<const std::byte> bytes,
                                                        const std::string& name,
-                                                       const Requester& requester) {
+                                                       UnderWay under_way) {
   const auto found = TRY(find_stream(stream_name));
   const ControlledStream& stream = *found;
   const auto stage = stage_for_model(stream.settings, bytes, name);
   if (!stage) return in_stream(stream.name, stage.error());
   const StageType& type = *stream.settings.stages[*stage].type;
-  UnderWay under_way{.requester = requester, .stage = *stage};
+  under_way.stage = *stage;
   under_way.file = {.stage = &type, .name = name, .bytes = {bytes.begin(), bytes.end()}};
   if (!stream.is_there()) return keep(stream.name, under_way);
   if (stream.skeleton == nullptr) return fail(stream.name + " has no skeleton to bind a model to");
@@ -337,7 +413,10 @@ std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
     std::string_view why = done.refusal.empty() ? "the stage refused this" : done.refusal;
     if (ack.gone) why = "its body changes just now; try again";
     if (gone || is_earlier(stream)) why = "it has left before this took effect";
-    return refusal(std::move(done.requester), devices::about_stream(done.name, why));
+    const std::string sentence = devices::about_stream(done.name, why);
+    if (!done.taught) return refusal(std::move(done.requester), sentence);
+    teacher_->not_started(sentence);
+    return std::nullopt;
   }
   if (done.calibration) {
     done.device->calibrated({.toml = done.calibration->text, .file = "the calibration sent last"});
@@ -345,6 +424,10 @@ std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
   }
   static_cast<void>(keep(done.name, done));
   if (!gone) apply(stream->second, done);
+  if (done.taught) {
+    teacher_->started(ack.sequence);
+    return std::nullopt;
+  }
   v1::ControlReply reply;
   reply.set_ok(true);
   reply.set_stream(done.name);

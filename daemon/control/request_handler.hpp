@@ -35,6 +35,11 @@ class ControlRequest;
 class Stats;
 }  // namespace posed::v1
 
+namespace posed::teach {
+class Teacher;
+struct Pupil;
+}  // namespace posed::teach
+
 namespace posed::control {
 
 inline constexpr std::size_t kMaxRequest = 64 * 1024;  // bytes
@@ -97,10 +102,12 @@ struct Reply {
 class RequestHandler {
  public:
   // `daemon_control` outlives the handler, as does `kept`, which gets what is set for a stream.
+  // `teacher`, which keeps models in that folder, outlives it, too; null: no style can be taught.
   // Destroy the handler after reader and pipeline thread have ended, because it owns the models and
   // calibrations in use.
   RequestHandler(DaemonControl& daemon_control, devices::KeptSettings& kept,
-                 ModelFolder models = {}, Clock clock = system::monotonic_ns);
+                 ModelFolder models = {}, Clock clock = system::monotonic_ns,
+                 teach::Teacher* teacher = nullptr);
   ~RequestHandler();
   RequestHandler(const RequestHandler&) = delete;
   RequestHandler& operator=(const RequestHandler&) = delete;
@@ -112,6 +119,10 @@ class RequestHandler {
 
   // Forgets uploads that have stalled. Returns when to call it next at the latest.
   [[nodiscard]] std::int64_t forget_old(std::int64_t now_ns);
+
+  // Gives a stream the model that it was taught, if there is one. The control thread, whenever the
+  // teacher calls.
+  void use_taught();
 
   // The pipeline has applied a command: returns its reply, and frees the model that it replaced.
   [[nodiscard]] std::optional<Reply> acknowledge(const pipeline::Ack& ack);
@@ -155,6 +166,7 @@ class RequestHandler {
     ModelFile file{};
     std::string_view refusal{};  // of a command: what the stage's refusal means
     std::optional<NewValue> value{};
+    bool taught = false;  // of a model: the teacher is told, as nobody has asked
     std::unique_ptr<const drivers::glove::OwnedCalibration> calibration{};
     // Of a calibration.
     std::shared_ptr<devices::PresentDevice> device{};
@@ -171,10 +183,13 @@ class RequestHandler {
   Result<Done> stage_command(const v1::ControlRequest& request, const Requester& requester);
   Result<Done> add_model_part(const v1::ControlRequest& request, const Requester& requester);
   Result<Done> set_model(const std::string& stream, std::span<const std::byte> bytes,
-                         const std::string& name, const Requester& requester);
+                         const std::string& name, UnderWay under_way);
   Result<Done> calibrate(const v1::ControlRequest& request, const Requester& requester);
   [[nodiscard]] Reply list_models(Requester requester) const;
   [[nodiscard]] Reply mark_take(const v1::ControlRequest& request, Requester requester);
+  [[nodiscard]] Reply teach(const v1::ControlRequest& request, Requester requester);
+  Result<> teach_step(const v1::ControlRequest& request);
+  Result<teach::Pupil> find_pupil(const std::string& name);
   Result<Done> send_haptics(const v1::ControlRequest& request);
   // Whether the slot has a later generation.
   [[nodiscard]] bool is_earlier(Streams::iterator stream) const;
@@ -197,6 +212,7 @@ class RequestHandler {
   devices::KeptSettings& kept_;
   const ModelFolder models_;
   Clock clock_;
+  teach::Teacher* const teacher_;
   std::mutex mutex_;  // guards all below
   Streams streams_;
   std::map<std::string, ControlledStream> known_;  // by name, also those that are there

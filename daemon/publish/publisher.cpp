@@ -225,7 +225,10 @@ void Publisher::handle_frame(PublishedStream& published, const Frame& frame, boo
   const bool timed = !raw && stamps.decoded_ns != kNoTime_ns;
   const std::size_t stages = timed ? published.info.stages.size() : 0;
   send(channel.pose_topic, channel.frames.stamp(stamps, std::span(frame.stage_us).first(stages)));
-  if (raw) return;
+  if (raw) {
+    if (options_.raw_tap != nullptr) options_.raw_tap->raw_frame(frame);
+    return;
+  }
   published.count(frame, stamps);
   for (FrameOutput* const output : published.outputs) output->frame(frame);
 }

@@ -16,6 +16,7 @@
 #include "daemon/devices/present_device.hpp"
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
+#include "daemon/pipeline/raw_tap.hpp"
 #include "daemon/pipeline/record_sink.hpp"
 #include "daemon/pipeline/ring.hpp"
 #include "daemon/pipeline/stream_settings.hpp"
@@ -80,6 +81,7 @@ struct PublisherOptions {
   std::string secret_z85;                       // the server's key; empty: no CURVE
   std::function<void(v1::Stats&)> more_stats;   // adds the recorder's counters; may be empty
   pipeline::RecordSink* record_sink = nullptr;  // null: no recording
+  pipeline::RawTap* raw_tap = nullptr;          // null: nobody else wants the frames before stages
   Clock clock = nullptr;                        // the host's; times what is sent every second
   // The clock for the times of published frames, events and stats. Empty: `clock`. A replay
   // publishes in the time of its recording.

@@ -8,6 +8,7 @@
 #include <spdlog/spdlog.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
+#include <sys/resource.h>
 
 namespace posed::system {
 namespace {
@@ -42,6 +43,11 @@ bool ask_for_realtime() {
 
 void name_thread(const std::string& name) {
   pthread_setname_np(pthread_self(), name.substr(0, 15).c_str());
+}
+
+void give_way() {
+  constexpr int kLowest = 19;
+  static_cast<void>(setpriority(PRIO_PROCESS, 0, kLowest));  // on Linux: of this thread alone
 }
 
 void enter_hot_thread(const char* name, int priority) {

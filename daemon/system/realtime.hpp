@@ -18,6 +18,9 @@ inline constexpr int kPublisherPriority = 10;
 // Names the calling thread; only the first 15 letters are kept.
 void name_thread(const std::string& name);
 
+// The calling thread works from now on only with what the others leave (nice 19).
+void give_way();
+
 // Names the calling thread and makes its timers exact; with `priority` > 0 the thread also becomes
 // SCHED_FIFO.
 void enter_hot_thread(const char* name, int priority);

@@ -154,6 +154,16 @@ Result<Clip> FramesClip::finish(const std::string& path, double rate_hz,
   return clip;
 }
 
+std::vector<double> FrameTimes::in_seconds() const {
+  const bool running = std::ranges::find(device_ns_, kNoTime_ns) == device_ns_.end() &&
+                       std::ranges::is_sorted(device_ns_, std::ranges::less_equal());
+  const std::vector<std::int64_t>& times_ns = running ? device_ns_ : arrival_ns_;
+  std::vector<double> times_s;
+  for (const std::int64_t time_ns : times_ns)
+    times_s.push_back(seconds(time_ns - times_ns.front()));
+  return times_s;
+}
+
 void hold_missing(Clip& clip) {
   std::size_t held = 0;
   for (Eigen::Index c = 0; c < clip.channels.cols(); ++c) {

@@ -3,6 +3,8 @@
 // of the skeleton keep the joint's offset.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -32,6 +34,22 @@ class FramesClip {
   int moving_;  // the joint (root_joint or above it) whose position channels are written
   std::vector<double> row_;  // [channel]
   std::vector<double> values_;
+};
+
+// FrameTimes: when the frames of such a clip were.
+class FrameTimes {
+ public:
+  void add(const Header& header) {
+    arrival_ns_.push_back(header.arrival_ns);
+    device_ns_.push_back(header.device_ns);
+  }
+  [[nodiscard]] std::size_t size() const { return arrival_ns_.size(); }
+  // Since the first one: device times if all frames have them and they increase, because a device's
+  // time restarts with each link; else arrival times.
+  [[nodiscard]] std::vector<double> in_seconds() const;
+
+ private:
+  std::vector<std::int64_t> arrival_ns_, device_ns_;
 };
 
 // Fills every missing value with the value before it, at the start with the channel's first one.

@@ -214,15 +214,14 @@ class Collector {
     if (header.sequence <= last_) return;  // repeated while the stream was stale
     missing_ += last_ == 0 ? 0 : header.sequence - last_ - 1;
     last_ = header.sequence;
-    arrival_ns_.push_back(header.arrival_ns);
-    device_ns_.push_back(header.device_ns);
+    times_.add(header);
     clip_.add(frame);
   }
 
-  [[nodiscard]] std::size_t frames() const { return arrival_ns_.size(); }
+  [[nodiscard]] std::size_t frames() const { return times_.size(); }
 
   Result<clip::Clip> finish(const std::string& path, double rate_hz) const {
-    auto clip = clip_.finish(path, rate_hz, times_s());
+    auto clip = clip_.finish(path, rate_hz, times_.in_seconds());
     if (clip && missing_ > 0) {
       clip->warnings.push_back(std::to_string(missing_) +
                                " frames were skipped while the daemon ran and are not in the clip");
@@ -235,23 +234,10 @@ class Collector {
   }
 
  private:
-  // Device times if all frames have them and they increase; a device's time restarts with each
-  // link.
-  [[nodiscard]] std::vector<double> times_s() const {
-    const bool running = std::ranges::find(device_ns_, kNoTime_ns) == device_ns_.end() &&
-                         std::ranges::is_sorted(device_ns_, std::ranges::less_equal());
-    std::vector<double> times_s;
-    for (const std::int64_t time_ns : running ? device_ns_ : arrival_ns_) {
-      const std::int64_t first_ns = running ? device_ns_.front() : arrival_ns_.front();
-      times_s.push_back(seconds(time_ns - first_ns));
-    }
-    return times_s;
-  }
-
   clip::FramesClip clip_;
   std::uint32_t part_ = pipeline::kNoStream;
   std::uint64_t last_ = 0, missing_ = 0, returns_ = 0;
-  std::vector<std::int64_t> arrival_ns_, device_ns_;
+  clip::FrameTimes times_;
 };
 
 // By stream, the name of its clip: that of the stream, or "walker#2" if its skeleton changes.

@@ -18,11 +18,13 @@
 
 #include "daemon/control/uploads.hpp"
 #include "daemon/pipeline/take.hpp"
+#include "daemon/teach/teacher.hpp"
 #include "daemon/tools/command/client.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/file_kind.hpp"
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/live/live_view.hpp"
+#include "daemon/tools/live/teach.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "models/gesture/play_order.hpp"
 #include "models/stages/registry.hpp"
@@ -50,6 +52,7 @@ struct CtlOptions {
   double seconds = 0.0;  // of a warm-up
   bool loop = false;
   std::string take;  // name
+  TeachOptions teach;
 };
 
 Result<v1::ControlReply> ask(Connection& connection, const CtlOptions& options,
@@ -204,6 +207,21 @@ int use_model(const CtlOptions& options) {
   request.mutable_use_model()->set_stream(options.stream);
   request.mutable_use_model()->set_name(options.model.string());
   return change(options, request, "model " + options.model.string());
+}
+
+int teach_style(const CtlOptions& options) {
+  const Interrupt interrupt;
+  auto connection = Connection::open(options.client, ZMQ_DEALER);
+  if (!connection) return report(connection.error());
+  TeachOptions lesson = options.teach;
+  lesson.stream = options.stream;
+  lesson.quiet = options.json;
+  const auto taught = teach(lesson, [&](const v1::ControlRequest& request) {
+    auto reply = ask(*connection, options, request);
+    if (reply && !reply->ok()) return Result<v1::ControlReply>(fail(reply->error()));
+    return reply;
+  });
+  return show(options, taught, [](const v1::ControlReply&) {});
 }
 
 int play(const CtlOptions& options) {
@@ -378,6 +396,26 @@ std::string live_parameters() {
   return lines;
 }
 
+void add_teach(Actions& actions, TeachOptions& options) {
+  CLI::App* lesson = actions.add_for_stream(
+      "teach", "Teach a stream a style: two walks, and it is in effect", teach_style, R"(Examples:
+  posed ctl teach walker --name proud    # walk as you are, 20 s; then as the character, 20 s
+  posed ctl teach walker --name proud --neutral 0   # the walk as usual was good: once more in the style
+The stream needs publish_raw = true and a [stream.style] table (model = "" while there is none), the
+daemon a folder to keep the model in: [control] models = "models". A walk of which nothing can be
+learnt is refused with the reason, and the stream stays as it is. Ctrl-C ends it.)");
+  lesson
+      ->add_option("--neutral", options.neutral_s,
+                   "Seconds of the walk as usual, 4 to 120; 0: the one that was marked before")
+      ->check(in_range(0.0, teach::kMaxWalk_s))
+      ->capture_default_str();
+  lesson->add_option("--style", options.style_s, "The same of the walk in the style")
+      ->check(in_range(0.0, teach::kMaxWalk_s))
+      ->capture_default_str();
+  lesson->add_option("--name", options.name, "Of the style, and of its file NAME.style")
+      ->required();
+}
+
 void add_style_actions(Actions& actions, CtlOptions& options) {
   CLI::App* set =
       actions.add_for_stream("set", "Change a parameter of a stream's stages", set_parameter,
@@ -414,6 +452,7 @@ void add_style_actions(Actions& actions, CtlOptions& options) {
                                          use_model, R"(Example:
   posed ctl use-model walker march.style   # nothing is sent: the daemon has the file)");
   use->add_option("model", options.model, "Its name, as `posed ctl models` prints it")->required();
+  add_teach(actions, options.teach);
 }
 
 void add_hand_actions(Actions& actions, CtlOptions& options) {

@@ -197,12 +197,7 @@ Result<StyleTraining> train_and_save(const Experiment& experiment, std::uint64_t
   options.target = experiment.targets.front();
   options.more_targets.assign(experiment.targets.begin() + 1, experiment.targets.end());
   options.mode = experiment.mode;
-  // A person's model then runs on any person's skeleton, whoever recorded it.
-  const bool are_people = std::ranges::all_of(clips, [](const style::TrainingClip& clip) {
-    return motion::is_person(*clip.clip.skeleton);
-  });
-  options.dataset.space =
-      experiment.space.value_or(are_people ? motion::Space::kHumanoid : motion::Space::kNative);
+  options.dataset.space = experiment.space.value_or(style::usual_space(clips));
   options.dataset.rate_hz = experiment.rate_hz;
   options.dataset.seed = seed;
   options.dataset.tasks = &ranks.tasks();

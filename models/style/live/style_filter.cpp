@@ -218,7 +218,8 @@ RT_SAFE void StyleFilter::process(const StageFrame& in, StageOut& out) noexcept 
   const double dt_s = std::min(gap_s_, kMaxStep_s);
   const double slew = options_.alpha_slew_per_s * dt_s;
   find_missing();
-  alpha_ += std::clamp(wanted_alpha() - alpha_, -slew, slew);
+  // Without a model there is no style yet, so that the first one fades in.
+  if (model_ != nullptr) alpha_ += std::clamp(wanted_alpha() - alpha_, -slew, slew);
   blend_weight_ = std::max(0.0, blend_weight_ - slew);
   mask_.move(slew);
   if (weights_.moving()) {

@@ -326,6 +326,12 @@ std::vector<int> Dataset::clips_of(const std::string& motion) const {
   return found;
 }
 
+motion::Space usual_space(const std::vector<TrainingClip>& clips) {
+  const bool are_people = std::ranges::all_of(
+      clips, [](const TrainingClip& clip) { return motion::is_person(*clip.clip.skeleton); });
+  return are_people ? motion::Space::kHumanoid : motion::Space::kNative;
+}
+
 Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips,
                              const std::vector<std::string>& targets,
                              const DatasetOptions& options) {

@@ -88,6 +88,10 @@ struct Dataset {
   [[nodiscard]] std::string unit_of(const AlignedClip& clip) const;
 };
 
+// The space of clips for which nobody names one: a person's model then runs on any person's
+// skeleton, whoever recorded it.
+[[nodiscard]] motion::Space usual_space(const std::vector<TrainingClip>& clips);
+
 // Reads poses and strides. Phases have no common origin yet: theta0 is each clip's own leg phase.
 // The training mean of the pose space is over the clips of every group but `targets`.
 Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips,

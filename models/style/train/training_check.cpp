@@ -86,17 +86,6 @@ double swing_deg(const VectorXd& leg) {
   return std::sqrt((leg.array() - leg.mean()).square().mean()) / kDegree;
 }
 
-// Why the clip's legs show no strides; empty where they do.
-std::string no_strides(const AlignedClip& clip) {
-  const double swing = swing_deg(clip.leg);
-  if (swing < kMinSwing_deg) {
-    return "the legs swing by " + with_digits(swing, 1) + " deg rms only";
-  }
-  if (clip.stride_score <= kNoStrides) return {};
-  return "the legs keep no rhythm (" + percent(std::min(1.0, clip.stride_score)) +
-         " of their motion fits no stride)";
-}
-
 // Phases are derived from strides; without strides a cycle is an average of unrelated poses.
 void check_strides(const Dataset& dataset, TrainingCheck& check) {
   for (const AlignedClip& clip : dataset.clips) {
@@ -156,6 +145,16 @@ void check_closing(const std::string& target, TrainingCheck& check) {
 }
 
 }  // namespace
+
+std::string no_strides(const AlignedClip& clip) {
+  const double swing = swing_deg(clip.leg);
+  if (swing < kMinSwing_deg) {
+    return "the legs swing by " + with_digits(swing, 1) + " deg rms only";
+  }
+  if (clip.stride_score <= kNoStrides) return {};
+  return "the legs keep no rhythm (" + percent(std::min(1.0, clip.stride_score)) +
+         " of their motion fits no stride)";
+}
 
 double cycle_residual_deg(const Dataset& dataset, const AlignedClip& clip) {
   const VectorXd phase = clip.phase();

@@ -41,6 +41,9 @@ struct TrainingCheck {
 // Whether a motion of this name is expected to have strides: walks and runs of all kinds.
 [[nodiscard]] bool is_gait(std::string_view motion);
 
+// Why the clip's legs show no strides; empty where they do.
+[[nodiscard]] std::string no_strides(const AlignedClip& clip);
+
 // Whether the clip's legs stride: they swing far enough, in a rhythm.
 [[nodiscard]] bool shows_strides(const AlignedClip& clip);
 

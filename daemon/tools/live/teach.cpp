@@ -1,0 +1,152 @@
+#include "daemon/tools/live/teach.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <thread>
+#include <utility>
+
+#include <unistd.h>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "daemon/tools/command/client.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::tools {
+namespace {
+
+constexpr int kGetReady_s = 3;  // between the announcement of a walk and its beginning
+constexpr std::chrono::milliseconds kLookAgain{100};
+
+class Lesson {
+ public:
+  Lesson(const TeachOptions& options, const Ask& ask) : options_(options), ask_(ask) {}
+
+  Result<> walk(bool style, double walk_s) {
+    const std::string how = style ? fmt::format("walk in the style ({})", clean_name(options_.name))
+                                  : "walk as you are";
+    for (int left = kGetReady_s; left > 0; --left) {
+      count_down(fmt::format("{} in {}", how, left));
+      TRY(pause(std::chrono::seconds(1)));
+    }
+    v1::ControlRequest request = about_stream();
+    auto& mark = *request.mutable_teach()->mutable_mark();
+    mark.set_style(style);
+    mark.set_seconds(walk_s);
+    TRY(ask_(request));
+    const auto reply = TRY(await([&](const v1::Teaching& now) {
+      count_down(fmt::format("{} ... {:.0f} s", how, std::ceil(now.seconds_left())));
+      return now.step() == v1::Teaching::STEP_MARKING || now.step() == v1::Teaching::STEP_CHECKING;
+    }));
+    const v1::Teaching& now = reply.teaching();
+    const v1::TaughtWalk& walked = style ? now.style_walk() : now.neutral_walk();
+    if (!walked.good()) {
+      // The walk may have been cancelled by another client.
+      const std::string why = walked.sentence().empty() ? "it was cancelled" : walked.sentence();
+      return fail(fmt::format("{}: {}{}", how, clean(why), again(style)));
+    }
+    say(fmt::format("{}: {}", how, clean(walked.sentence())));
+    return {};
+  }
+
+  Result<v1::ControlReply> train() {
+    v1::ControlRequest request = about_stream();
+    request.mutable_teach()->mutable_train()->set_name(options_.name);
+    TRY(ask_(request));
+    auto reply = TRY(await([&](const v1::Teaching& now) {
+      count_down("learning ...");
+      return now.step() == v1::Teaching::STEP_TRAINING || now.step() == v1::Teaching::STEP_STARTING;
+    }));
+    const v1::Teaching& now = reply.teaching();
+    if (now.step() != v1::Teaching::STEP_IN_USE) {
+      return fail("the style was not learnt: " +
+                  (now.problem().empty() ? "it was cancelled" : clean(now.problem())));
+    }
+    say(clean(now.verdict()));
+    if (now.sequence() == 0) {
+      say(fmt::format("{}: {} is in effect when it comes", options_.stream, clean(now.model())));
+    } else {
+      say(fmt::format("{}: {} is in effect from frame {}, {:.1f} s after the walks",
+                      options_.stream, clean(now.model()), now.sequence(), now.train_s()));
+    }
+    return reply;
+  }
+
+ private:
+  [[nodiscard]] v1::ControlRequest about_stream() const {
+    v1::ControlRequest request;
+    request.mutable_teach()->set_stream(options_.stream);
+    return request;
+  }
+
+  // Asks how it stands while `goes_on` says so.
+  template <typename GoesOn>
+  Result<v1::ControlReply> await(GoesOn&& goes_on) {
+    while (true) {
+      auto reply = TRY(ask_(about_stream()));
+      if (reply.teaching().stream() != options_.stream) {
+        return fail("another stream is taught now; begin again when that is over");
+      }
+      if (!goes_on(reply.teaching())) return reply;
+      TRY(pause(kLookAgain));
+    }
+  }
+
+  static Result<> pause(std::chrono::milliseconds time) {
+    const auto end = std::chrono::steady_clock::now() + time;
+    while (std::chrono::steady_clock::now() < end) {
+      if (Interrupt::came()) return fail("interrupted");
+      std::this_thread::sleep_for(std::min(time, kLookAgain));
+    }
+    return {};
+  }
+
+  // How to do it once more without the walk that is good already.
+  [[nodiscard]] std::string again(bool style) const {
+    return style ? "; the walk as usual is kept: once more with --neutral 0" : "; once more";
+  }
+
+  // On the line that is replaced by the next one; a log or a pipe gets none of them.
+  void count_down(const std::string& text) const {
+    if (options_.quiet || isatty(STDOUT_FILENO) == 0) return;
+    std::printf("\r\x1b[K%s", text.c_str());
+    std::fflush(stdout);
+  }
+  void say(const std::string& text) const {
+    if (options_.quiet) return;
+    count_down("");
+    std::puts(text.c_str());
+    std::fflush(stdout);
+  }
+
+  const TeachOptions& options_;
+  const Ask& ask_;
+};
+
+}  // namespace
+
+Result<v1::ControlReply> teach(const TeachOptions& options, const Ask& ask) {
+  Lesson lesson(options, ask);
+  const auto all = [&]() -> Result<v1::ControlReply> {
+    if (options.neutral_s > 0.0) {
+      TRY(lesson.walk(false, options.neutral_s));
+    }
+    if (options.style_s > 0.0) {
+      TRY(lesson.walk(true, options.style_s));
+    }
+    return lesson.train();
+  };
+  auto taught = all();
+  if (!taught && Interrupt::came()) {
+    v1::ControlRequest request;
+    request.mutable_teach()->set_stream(options.stream);
+    request.mutable_teach()->mutable_cancel();
+    static_cast<void>(ask(request));  // does not wait for the answer
+    std::this_thread::sleep_for(kLookAgain);
+  }
+  return taught;
+}
+
+}  // namespace posed::tools
