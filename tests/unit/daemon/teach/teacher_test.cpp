@@ -1,0 +1,164 @@
+// A teacher with frames of synthetic walkers: it learns as training from files does, one stream at
+// a time, and gives up when it is told.
+#include <atomic>
+#include <chrono>
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/teach/teacher.hpp"
+#include "models/gp/regression.hpp"
+#include "models/motion/synthetic_walker.hpp"
+#include "models/style/model/style_model.hpp"
+#include "models/style/train/train.hpp"
+#include "proto/frame/degree.hpp"
+#include "proto/frame/time.hpp"
+#include "tests/support/has.hpp"
+
+namespace posed::teach {
+namespace {
+
+using motion::WalkerFamily;
+using test::has;
+
+constexpr double kWalk_s = 10.0;
+constexpr std::uint32_t kStream = 7;
+
+std::atomic<std::int64_t> now_ns{kNanosPerSecond};
+std::int64_t clock_of_test() noexcept { return now_ns; }
+
+clip::Clip walk_of(WalkerFamily family) {
+  return motion::make_walker({.family = family, .seconds = kWalk_s}).value();
+}
+
+struct School {
+  std::vector<std::string> kept;
+  std::atomic<int> calls{0};
+  Teacher teacher{[this](const std::string& name, std::string_view) {
+                    kept.push_back(name);
+                    return Result<std::string>(name + ".style");
+                  },
+                  [this] { ++calls; }, clock_of_test};
+
+  static Pupil pupil(const clip::Clip& clip, const std::string& name = "walker") {
+    return {.stream = kStream, .name = name, .skeleton = clip.skeleton};
+  }
+
+  // The state once what is under way is over.
+  v1::Teaching await() {
+    while (true) {
+      v1::Teaching now = teacher.state();
+      if (now.step() == v1::Teaching::STEP_IDLE || now.step() == v1::Teaching::STEP_STARTING) {
+        return now;
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+  }
+
+  // Marks this clip as a walk, among frames of others, and one behind its end.
+  v1::TaughtWalk mark(const clip::Clip& clip, Walk walk) {
+    REQUIRE(teacher.mark(pupil(clip), walk, kWalk_s));
+    const std::int64_t from_ns = now_ns;
+    for (int i = 0; i <= clip.frames(); ++i) {
+      Frame frame = clip.frame(std::min(i, clip.frames() - 1));
+      frame.skeleton = clip.skeleton->id;
+      frame.header.device_ns = kNoTime_ns;
+      frame.header.arrival_ns =
+          from_ns + static_cast<std::int64_t>(i * 1e9 / clip.frame_rate_hz + 0.5);
+      frame.header.stream = kStream + 1;
+      teacher.raw_frame(frame);
+      frame.header.stream = kStream;
+      teacher.raw_frame(frame);
+    }
+    const v1::Teaching done = await();
+    return walk == Walk::kNeutral ? done.neutral_walk() : done.style_walk();
+  }
+};
+
+style::TrainingClip lesson(clip::Clip clip, const std::string& group) {
+  return {.clip = std::move(clip), .group = group, .subject = "one person", .motion = "walk"};
+}
+
+}  // namespace
+
+TEST_CASE("a style that is taught live is the one that training on files learns", "[teach]") {
+  School school;
+  const clip::Clip march = walk_of(WalkerFamily::kMarch);
+  const clip::Clip sway = walk_of(WalkerFamily::kSway);
+  const auto early = school.teacher.train("walker", "sway");
+  REQUIRE_FALSE(early);
+  CHECK(has(early.error().message, "no good walk as usual"));
+  const auto usual = school.mark(march, Walk::kNeutral);
+  INFO(usual.sentence());
+  CHECK(usual.good());
+  CHECK_FALSE(school.teacher.train("walker", "sway"));
+  CHECK(school.mark(sway, Walk::kStyle).good());
+  REQUIRE(school.teacher.train("walker", "sway"));
+  const v1::Teaching learnt = school.await();
+  INFO(learnt.problem());
+  REQUIRE(learnt.step() == v1::Teaching::STEP_STARTING);
+  CHECK(school.calls == 1);
+  const auto taught = school.teacher.take_model();
+  REQUIRE(taught);
+  CHECK(taught->stream == "walker");
+  CHECK(taught->file == "sway.style");
+  CHECK_FALSE(school.teacher.take_model());
+  school.teacher.started(300);
+  CHECK(school.teacher.state().step() == v1::Teaching::STEP_IN_USE);
+  CHECK(school.teacher.state().sequence() == 300);
+
+  const auto live = style::parse_model(std::as_bytes(std::span(taught->bytes)), "live").value();
+  style::TrainOptions options;
+  options.target = "sway";
+  options.dataset.space = motion::Space::kHumanoid;
+  const auto offline =
+      style::train_style({lesson(march, "as usual"), lesson(sway, "sway")}, options).value();
+  REQUIRE(live.process.inputs.cols() == offline.process.inputs.cols());
+  const Eigen::MatrixXd asked = offline.process.inputs;
+  const Eigen::MatrixXd wanted = gp::posterior_mean(offline.process, asked);
+  const Eigen::MatrixXd got = gp::posterior_mean(live.process, asked);
+  CHECK((got - wanted).norm() < 0.02 * wanted.norm());
+}
+
+TEST_CASE("a spoilt walk is refused in words, and its stream can walk again", "[teach]") {
+  School school;
+  clip::Clip still = walk_of(WalkerFamily::kMarch);
+  for (int i = 1; i < still.frames(); ++i) still.channels.row(i) = still.channels.row(0);
+  const auto refused = school.mark(still, Walk::kNeutral);
+  CHECK_FALSE(refused.good());
+  CHECK(has(refused.sentence(), "no walk"));
+  CHECK(school.mark(walk_of(WalkerFamily::kMarch), Walk::kNeutral).good());
+  // Two takes of one style: there is nothing to learn, and nothing is kept.
+  const auto same = motion::make_walker({.seconds = kWalk_s, .noise_deg = 0.4}).value();
+  CHECK(school.mark(same, Walk::kStyle).good());
+  REQUIRE(school.teacher.train("walker", "same"));
+  const v1::Teaching state = school.await();
+  CHECK(state.step() == v1::Teaching::STEP_IDLE);
+  CHECK(has(state.problem(), "no difference to learn"));
+  CHECK(school.kept.empty());
+}
+
+TEST_CASE("one stream is taught at a time, until it is cancelled", "[teach]") {
+  School school;
+  const clip::Clip march = walk_of(WalkerFamily::kMarch);
+  for (const double seconds : {0.0, 3.9, 121.0, std::numeric_limits<double>::quiet_NaN()}) {
+    CHECK_FALSE(school.teacher.mark(School::pupil(march), Walk::kNeutral, seconds));
+  }
+  CHECK(school.mark(march, Walk::kNeutral).good());
+  REQUIRE(school.teacher.mark(School::pupil(march), Walk::kStyle, kWalk_s));
+  CHECK(school.teacher.state().seconds_left() == Approx(kWalk_s));
+  const auto second = school.teacher.mark(School::pupil(march, "other"), Walk::kNeutral, kWalk_s);
+  REQUIRE_FALSE(second);
+  CHECK(has(second.error().message, "stream walker is being taught"));
+  CHECK_FALSE(school.teacher.cancel("other"));
+  CHECK(school.teacher.cancel("walker"));
+  CHECK(school.teacher.state().neutral_walk().good());  // stays
+  CHECK(school.teacher.mark(School::pupil(march, "other"), Walk::kNeutral, kWalk_s));
+  CHECK(school.teacher.state().neutral_walk().sentence().empty());
+  // The daemon ends while a walk is marked.
+}
+
+}  // namespace posed::teach

@@ -1,0 +1,99 @@
+// A take that was recorded live is refused, in words, where training would learn nothing good.
+#include <limits>
+
+#include <catch2/catch.hpp>
+
+#include "models/motion/synthetic_walker.hpp"
+#include "models/style/train/take_check.hpp"
+#include "tests/support/has.hpp"
+
+namespace posed::style {
+namespace {
+
+using test::has;
+
+constexpr double kRate_hz = 60.0;
+
+// Twelve seconds of a walk, as clip::FramesClip makes it.
+TrainingClip walked() {
+  auto clip = motion::make_walker({.seconds = 12.0, .rate_hz = kRate_hz}).value();
+  for (int i = 0; i < clip.frames(); ++i) clip.time_s.push_back(i / kRate_hz);
+  return {.clip = std::move(clip), .group = "as usual", .subject = "ann", .motion = "walk"};
+}
+
+// Stands from one time to another; only the arms move on where they `wave`.
+void stand(clip::Clip& clip, double from_s, double to_s, bool wave = false) {
+  const auto first = static_cast<Eigen::Index>(from_s * kRate_hz);
+  const Eigen::RowVectorXd pose = clip.channels.row(first);
+  for (Eigen::Index i = first; i < static_cast<Eigen::Index>(to_s * kRate_hz); ++i) {
+    for (Eigen::Index c = 0; c < clip.channels.cols(); ++c) {
+      const Channel& channel = clip.skeleton->channels[static_cast<std::size_t>(c)];
+      const bool arm = has(clip.skeleton->joints[channel.joint].name, "Arm");
+      if (!(wave && arm)) clip.channels(i, c) = pose[c];
+    }
+  }
+}
+
+std::string refusal(TrainingClip take) { return check_take(take, 30.0).problem; }
+
+}  // namespace
+
+TEST_CASE("a live walk is told by its strides, without its standing", "[take_check]") {
+  TrainingClip take = walked();
+  const TakeCheck whole = check_take(take, 30.0);
+  REQUIRE(whole.problem.empty());
+  CHECK(whole.strides >= 9);
+  CHECK(whole.strides <= 12);
+  CHECK(whole.standing_s < 0.5);
+  stand(take.clip, 0.0, 3.0);
+  const TakeCheck late = check_take(take, 30.0);
+  INFO(late.sentence());
+  REQUIRE(late.good());
+  CHECK(late.standing_s > 1.5);
+  CHECK(late.strides < whole.strides);
+  CHECK(has(late.sentence(), "strides in 12.0 s; ... s of standing are left out"));
+}
+
+TEST_CASE("spoilt takes are refused with a reason", "[take_check]") {
+  TrainingClip take = walked();
+  stand(take.clip, 0.0, 12.0);
+  CHECK(has(refusal(take), "no walk ... keep walking"));
+
+  take = walked();
+  stand(take.clip, 0.0, 12.0, true);
+  CHECK(has(refusal(take), "no walk, because the legs swing by 0"));
+
+  take = walked();  // one stride, then he stands
+  stand(take.clip, 1.2, 12.0);
+  CHECK_FALSE(refusal(take).empty());
+
+  take = walked();
+  stand(take.clip, 4.0, 12.0);
+  CHECK(has(refusal(take), "the legs stood for ... of 12 s"));
+
+  take = walked();  // a dropout
+  take.clip.time_s.back() += 0.8;
+  CHECK(has(refusal(take), "silent for 0.8 s"));
+
+  take = walked();
+  take.clip.channels.resize(0, take.clip.channels.cols());
+  take.clip.time_s.clear();
+  CHECK(has(refusal(take), "no frames came"));
+}
+
+TEST_CASE("a joint that is missing for long spoils a take, one for a moment does not",
+          "[take_check]") {
+  TrainingClip take = walked();
+  const auto c = static_cast<Eigen::Index>(take.clip.skeleton->channels.size()) - 1;
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  take.clip.channels.col(c).segment(100, 20).setConstant(kNone);
+  TrainingClip held = take;
+  const TakeCheck checked = check_take(held, 30.0);
+  CHECK(checked.good());
+  CHECK(has(checked.sentence(), "missing: RightFoot (3 %)"));
+  CHECK(held.clip.channels.allFinite());
+  take.clip.channels.col(c).segment(100, 200).setConstant(kNone);
+  CHECK(has(refusal(take), "RightFoot was missing in 28 % of the frames"));
+}
+
+}  // namespace posed::style
