@@ -29,6 +29,7 @@ std::string refusal_of(const v1::ControlRequest& request) {
     case v1::ControlRequest::kTake:
     case v1::ControlRequest::kListModels:
     case v1::ControlRequest::kUseModel:
+    case v1::ControlRequest::kTeach:
       return {};
     case v1::ControlRequest::kStop:
       return "a page may not end the daemon: use `posed ctl stop`";

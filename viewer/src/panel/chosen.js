@@ -6,6 +6,7 @@ import { GloveLine, isGlove } from './glove.js';
 import { ModelControls } from './model_controls.js';
 import { Parameters } from './parameters.js';
 import { StyleControls } from './style_controls.js';
+import { TeachControls } from './teach_controls.js';
 
 // What the controls depend on.
 function shapeOf({ name, stats }) {
@@ -60,8 +61,9 @@ export class Chosen {
     const models = ['style', 'generate']
       .filter(find)
       .map((kind) => new ModelControls(stream, kind, this.context));
+    const teach = find('style') ? new TeachControls(stream, this.context) : null;
     const more = new Parameters(stream, control);
-    this.#parts = [this.style, this.gesture, ...models, more].filter((part) => part !== null);
+    this.#parts = [this.style, this.gesture, ...models, teach, more].filter((part) => part !== null);
     const glove = isGlove(stream) ? [new GloveLine(stream, this.endpoint())] : [];
     this.fields.replaceChildren(...this.#parts.map((part) => part.element));
     this.element.replaceChildren(

@@ -128,6 +128,15 @@ const Take = { 1: ['start', 'bool'], 2: ['name', 'string'] };
 const UseModel = { 1: ['stream', 'string'], 2: ['name', 'string'] };
 const Nothing = {};
 
+const Mark = { 1: ['style', 'bool'], 2: ['seconds', 'double'] };
+const Train = { 1: ['name', 'string'] };
+const Teach = {
+  1: ['stream', 'string'],
+  2: ['mark', Mark, '?'],
+  3: ['train', Train, '?'],
+  4: ['cancel', Nothing, '?'],
+};
+
 export const ControlRequest = {
   3: ['status', Nothing, '?'],
   9: ['model_part', ModelPart, '?'],
@@ -136,9 +145,25 @@ export const ControlRequest = {
   12: ['take', Take, '?'],
   13: ['list_models', Nothing, '?'],
   14: ['use_model', UseModel, '?'],
+  15: ['teach', Teach, '?'],
 };
 
 const KnownModel = { 1: ['name', 'string'], 2: ['kind', 'string'] };
+
+const TaughtWalk = { 1: ['good', 'bool'], 2: ['sentence', 'string'] };
+const Teaching = {
+  1: ['stream', 'string'],
+  2: ['step', 'uint'],
+  3: ['style', 'bool'],
+  4: ['seconds_left', 'double'],
+  5: ['neutral_walk', TaughtWalk, '?'],
+  6: ['style_walk', TaughtWalk, '?'],
+  7: ['model', 'string'],
+  8: ['sequence', 'uint'],
+  9: ['train_s', 'double'],
+  10: ['verdict', 'string'],
+  11: ['problem', 'string'],
+};
 
 export const ControlReply = {
   1: ['ok', 'bool'],
@@ -149,6 +174,7 @@ export const ControlReply = {
   6: ['take', TakeStats, '?'],
   7: ['model', KnownModel, '*'],
   8: ['recorder_trouble', 'string'],
+  9: ['teaching', Teaching, '?'],
 };
 
 // posed.v1.Event.Kind, by number.

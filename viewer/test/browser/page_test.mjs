@@ -133,6 +133,29 @@ pageTest(
   },
 );
 
+pageTest('a style is taught by two walks', { bodies: 1, hands: 0 }, async (page, bridge) => {
+  await unfold(page, 'Teach a style');
+  const lesson = page.locator('details', { hasText: 'Teach a style' });
+  const learn = lesson.getByRole('button', { name: 'Learn' });
+  const walk = (how) => lesson.getByLabel(`Walk ${how}`);
+  await walk('as usual').click();
+  await lesson.getByText(/^\d+ s …/).waitFor(PATIENCE);
+  assert.ok(await walk('in the style').isDisabled());
+  await lesson.getByText('✓ 18 strides in 20.0 s').waitFor(PATIENCE);
+  await walk('in the style').click();
+  await lesson.getByText('✗ this is no walk').waitFor(PATIENCE);
+  await lesson.getByLabel('Name').fill('proud');
+  assert.ok(await learn.isDisabled());
+  await walk('in the style').click();
+  await lesson.getByText('✓ 18 strides in 20.0 s').nth(1).waitFor(PATIENCE);
+  await lesson.getByLabel('Name').fill('../proud');
+  assert.ok(await learn.isDisabled());
+  await lesson.getByLabel('Name').fill('proud');
+  await learn.click();
+  await lesson.getByText('proud.style: from frame 900, 1.5 s later').waitFor(PATIENCE);
+  assert.equal(bridge.daemon.bodies[0].model, 'proud.style');
+});
+
 const rights = { may_control: false, read_only_reason: 'this key may watch only' };
 test(
   'a page that may only look says why; once it may control, it asks for the models again',

@@ -212,6 +212,7 @@ export class FakeDaemon {
     if (kind === 'set_parameter' && body) return this.#set(body, details, done);
     if (kind === 'stage_command' && hand) return this.#command(hand, details, done);
     if (kind === 'take') return this.#mark(details);
+    if (kind === 'teach' && body) return { ok: true, teaching: this.#teach(body, details) };
     if (kind === 'list_models')
       return {
         ok: true,
@@ -241,6 +242,26 @@ export class FakeDaemon {
     else if (name !== 'style.gate' || flag === undefined)
       return { ok: false, error: `${name}: give a number from -2 to 2` };
     return done;
+  }
+
+  // Each walk takes eleven questions, a training one; the first walk in the style is none.
+  #teach(body, { stream, mark, train, cancel }) {
+    this.teaching ??= { stream, step: 0 };
+    const { teaching } = this;
+    if (mark) Object.assign(teaching, { step: 1, style: mark.style, seconds_left: mark.seconds });
+    else if (train) Object.assign(teaching, { step: 3, model: `${train.name}.style` });
+    else if (cancel) teaching.step = 0;
+    else if (teaching.step === 3) {
+      body.model = teaching.model;
+      Object.assign(teaching, { step: 5, sequence: 900, train_s: 1.5, verdict: 'closes 90 %' });
+    } else if (teaching.step === 1 && (teaching.seconds_left -= 2) < 0) {
+      const good = !teaching.style || this.stumbled === true;
+      const sentence = good ? '18 strides in 20.0 s' : 'this is no walk';
+      this.stumbled ||= teaching.style;
+      teaching.step = 0;
+      teaching[teaching.style ? 'style_walk' : 'neutral_walk'] = { good, sentence };
+    }
+    return teaching;
   }
 
   #command(hand, { name, word, number }, done) {

@@ -214,4 +214,7 @@ test('requests are what protobufjs reads back', () => {
     [5e6, 3e6, 40000, 44],
   );
   check({ list_models: {} });
+  const { teach } = check({ teach: { stream: 'a', mark: { style: true, seconds: 20 } } });
+  assert.deepEqual([teach.mark.style, teach.mark.seconds, 'train' in teach], [true, 20, false]);
+  assert.ok('cancel' in check({ teach: { stream: 'a', cancel: {} } }).teach);
 });

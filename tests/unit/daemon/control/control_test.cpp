@@ -6,11 +6,13 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/control/request_handler.hpp"
+#include "daemon/teach/teacher.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
 #include "tests/support/has.hpp"
 #include "tests/support/parameter_index.hpp"
 #include "tests/support/stage_commands.hpp"
+#include "tests/support/temp_folder.hpp"
 #include "tests/unit/daemon/control/requests.hpp"
 #include "tests/unit/daemon/control/three_streams.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
@@ -101,6 +103,41 @@ struct Fixture {
         {.ticket = command.ticket, .stream = command.stream, .sequence = sequence}));
   }
 };
+
+TEST_CASE("teaching is refused, before anybody walks, where it could not end well") {
+  const test::TempFolder folder;
+  teach::Teacher teacher([](const std::string&, std::string_view) { return fail("never"); }, [] {});
+  FakeDaemonControl daemon_control;
+  HandlerRig rig(three_streams(), daemon_control, ModelFolder::open(folder.path()).value(),
+                 system::monotonic_ns, &teacher);
+  v1::ControlRequest request;
+  auto& wanted = *request.mutable_teach();
+  const auto answer = [&] {
+    const std::string bytes = request.SerializeAsString();
+    return reply_of(rig.handler.handle({"me"}, std::as_bytes(std::span(bytes))));
+  };
+  wanted.mutable_mark()->set_seconds(2.0);
+  for (const auto& [stream, why] : {std::pair{"plain", "plain: ... no style stage"},
+                                    {"runner", "runner: ... publish_raw = true"},
+                                    {"nobody", "no stream 'nobody'"},
+                                    {"walker", "4 to 120 s"}}) {
+    wanted.set_stream(stream);
+    CHECK(has(answer().error(), why));
+  }
+  wanted.mutable_train()->set_name("../walk");
+  CHECK(has(answer().error(), "'../walk' ... a-z"));
+  wanted.mutable_train()->set_name("walk");
+  CHECK(has(answer().error(), "no good walk"));
+  wanted.mutable_mark()->set_seconds(20.0);
+  const auto begun = answer();
+  CHECK(begun.ok());
+  CHECK(begun.teaching().step() == v1::Teaching::STEP_MARKING);
+  CHECK(begun.teaching().seconds_left() > 0.0);
+  CHECK(daemon_control.sent.empty());
+
+  Fixture without_folder;
+  CHECK(has(without_folder.refused(request), "no folder ... models = \"models\""));
+}
 
 TEST_CASE("a take is marked and answered with its number, or refused with a reason") {
   Fixture fixture;

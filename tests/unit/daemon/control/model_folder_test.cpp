@@ -56,4 +56,18 @@ TEST_CASE("without a folder the list is empty; a folder that is gone is told") {
   CHECK(gone.error().text().contains(folder.string()));
 }
 
+TEST_CASE("a model that is kept replaces none, and its name stays in the folder") {
+  const test::TempFolder folder;
+  const auto models = ModelFolder::open(folder.path()).value();
+  const auto keep = [&](const std::string& bytes) { return models.add("proud", bytes).value(); };
+  CHECK(keep("one") == "proud.style");
+  CHECK(keep("two") == "proud-2.style");
+  CHECK(keep("three") == "proud-3.style");
+  CHECK(models.read("proud.style").value() == "one");
+  CHECK(models.read("proud-2.style").value() == "two");
+  CHECK(models.list()->size() == 3);
+  CHECK(std::distance(std::filesystem::directory_iterator(folder.path()), {}) == 3);
+  CHECK_FALSE(ModelFolder().add("proud", "one"));
+}
+
 }  // namespace posed::control

@@ -31,8 +31,9 @@ inline std::vector<ControlledStream> three_streams() {
 // A handler of these streams, which get ids from 0 on, and what it keeps for them.
 struct HandlerRig {
   HandlerRig(std::vector<ControlledStream> streams, DaemonControl& daemon_control,
-             ModelFolder models = {}, Clock clock = system::monotonic_ns)
-      : handler(daemon_control, kept, std::move(models), clock) {
+             ModelFolder models = {}, Clock clock = system::monotonic_ns,
+             teach::Teacher* teacher = nullptr)
+      : handler(daemon_control, kept, std::move(models), clock, teacher) {
     for (std::uint32_t i = 0; i < streams.size(); ++i) {
       streams[i].stream = streams[i].source_number = i;
       handler.add_stream(std::move(streams[i]));

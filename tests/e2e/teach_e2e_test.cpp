@@ -1,0 +1,126 @@
+// A style is taught on the stage with the real binary: an emulated mocap system sends a performer
+// who walks as usual and then in a style; `posed ctl teach` does the rest.
+#include <atomic>
+#include <csignal>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include <catch2/catch.hpp>
+
+#include "daemon/tools/emulate/emulated_device.hpp"
+#include "daemon/tools/emulate/motions.hpp"
+#include "models/motion/synthetic_walker.hpp"
+#include "proto/clip/clip.hpp"
+#include "tests/e2e/logged_frames.hpp"
+#include "tests/e2e/outcome.hpp"
+#include "tests/e2e/stage.hpp"
+#include "tests/support/free_port.hpp"
+#include "tests/support/has.hpp"
+
+namespace posed::test {
+namespace {
+
+using motion::WalkerFamily;
+
+// The mocap system; its performer is on the stage of the daemon.
+class Performer {
+ public:
+  explicit Performer(const Stage& stage) {
+    auto emulator = drivers::find_driver("mvn")->emulate({}).value();
+    const emulate::Motion march = motion_of(stage, *emulator, "march", WalkerFamily::kMarch);
+    const emulate::Motion sway = motion_of(stage, *emulator, "sway", WalkerFamily::kSway);
+    device_ = std::make_unique<emulate::EmulatedDevice>(
+        std::move(emulator), emulate::EmulatedPort::open_udp({listen}, {0}).value(),
+        [this, march, sway](double time_s, drivers::Emulator& body) {
+          (sways ? sway : march)(time_s, body);
+        },
+        emulate::EmulatedDevice::Settings());
+    thread_ = std::jthread([this](const std::stop_token& stop) { device_->run(stop); });
+  }
+
+  const std::string listen = "127.0.0.1:" + std::to_string(free_port());
+  std::atomic<bool> sways{false};
+
+ private:
+  static emulate::Motion motion_of(const Stage& stage, const drivers::Emulator& emulator,
+                                   const std::string& name, WalkerFamily family) {
+    const auto walk = motion::make_walker({.family = family, .seconds = 60.0}).value();
+    REQUIRE(clip::write_bvh(walk, stage.path(name + ".bvh")));
+    return emulate::clip_motion(stage.path(name + ".bvh"), emulator).value();
+  }
+
+  std::unique_ptr<emulate::EmulatedDevice> device_;
+  std::jthread thread_;
+};
+
+}  // namespace
+
+TEST_CASE("a style is taught on the stage, and the log replays it bit for bit", "[teach]") {
+  const std::string name = "mvn-walker";
+  Stage stage;
+  Performer performer(stage);
+  std::filesystem::create_directory(stage.path("models"));
+  stage.folder.write("posed.toml", std::string(Stage::kEndpoints) +
+                                       "models = \"models\"\n[[source]]\nname = \"mvn\"\n"
+                                       "driver = \"mvn\"\nstreams = \"all\"\npublish_raw = true\n"
+                                       "[source.mvn]\nlisten = \"" +
+                                       performer.listen + "\"\n[source.style]\nmodel = \"\"\n");
+  stage.record();
+  stage.await_frames(name, 5);
+  const auto bad =
+      stage.ctl({"teach", name, "--name", "../sway", "--neutral", "0", "--style", "0"});
+  CHECK(bad.code == 1);
+  CHECK(has(bad.err, "cannot be a style's name"));
+
+  Process lesson({"ctl", "--connect", stage.control, "teach", name, "--name", "sway", "--neutral",
+                  "6", "--style", "6"});
+  const auto usual = lesson.line();
+  INFO(lesson.errors());
+  REQUIRE(usual);
+  CHECK(has(*usual, "walk as you are: ... strides in"));
+  performer.sways = true;  // before the countdown of the second walk is over
+  const auto styled = lesson.line();
+  REQUIRE(styled);
+  CHECK(has(*styled, "walk in the style (sway): ... strides in"));
+  REQUIRE(lesson.line());  // how much was learnt
+  const auto in_use = lesson.line();
+  REQUIRE(in_use);
+  CHECK(has(*in_use, name + ": sway.style is in effect from frame"));
+  CHECK(lesson.exit_code() == 0);
+  performer.sways = false;
+  stage.await_frames(name, 60);
+  CHECK(has(stage.ctl({"models"}).out, "style      sway.style"));
+  stage.daemon->send(SIGTERM);
+  REQUIRE(stage.daemon->exit_code() == 0);
+
+  // No frame is lost, and those before the model are as they were sent.
+  const std::uint64_t first = std::stoull(in_use->substr(in_use->find("frame ") + 6));
+  std::uint64_t changed_before = 0, changed_since = 0;
+  const std::string log = stage.path("take.plog");
+  auto reader = log::Reader::open(log);
+  REQUIRE(reader);
+  for (const log::StreamRow& row : reader->streams()) {
+    if (row.name != name) continue;
+    auto raw = reader->frames(row.id, true);
+    REQUIRE(raw);
+    auto input = raw->next();
+    check_frames_follow(log, name, [&](const v1::Frame& frame) {
+      while (input && *input && (*input)->sequence < frame.sequence()) input = raw->next();
+      if (!input || !*input || (*input)->sequence != frame.sequence()) return;
+      v1::Frame before;
+      const auto bytes = (*input)->bytes;
+      REQUIRE(before.ParseFromArray(bytes.data(), static_cast<int>(bytes.size())));
+      const bool same = std::ranges::equal(before.rotation_xyzw(), frame.rotation_xyzw());
+      if (!same) ++(frame.sequence() < first ? changed_before : changed_since);
+    });
+  }
+  CHECK(changed_before == 0);
+  CHECK(changed_since > 30);
+  const ProgramOutcome replay = posed({"replay", log, "--speed", "max", "--expect"});
+  INFO(replay.err);
+  CHECK(replay.code == 0);
+}
+
+}  // namespace posed::test
