@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "models/motion/motion.hpp"
+#include "models/style/train/straighten.hpp"
 #include "models/style/train/training_check.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/frame/degree.hpp"
@@ -161,6 +162,7 @@ TakeCheck check_take(TrainingClip& take, double rate_hz) {
   check.incomplete = missing_joints(clip, check.problem);
   if (!check.good()) return check;
   clip::hold_missing(clip);
+  straighten(clip);
   check_walk(take, rate_hz, check);
   return check;
 }

@@ -1,10 +1,16 @@
 // A take that was recorded live is refused, in words, where training would learn nothing good.
+#include <cmath>
 #include <limits>
+#include <numbers>
+#include <utility>
 
 #include <catch2/catch.hpp>
 
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/train/take_check.hpp"
+#include "proto/clip/frames_clip.hpp"
+#include "proto/frame/degree.hpp"
+#include "proto/frame/rotation.hpp"
 #include "tests/support/has.hpp"
 
 namespace posed::style {
@@ -34,6 +40,24 @@ void stand(clip::Clip& clip, double from_s, double to_s, bool wave = false) {
   }
 }
 
+// The same walk on a circle: it turns once in ten seconds.
+void walk_in_a_circle(clip::Clip& clip) {
+  clip::FramesClip circle(clip.skeleton);
+  Eigen::Vector3d before = Eigen::Vector3d::Zero(), at = before;
+  for (int i = 0; i < clip.frames(); ++i) {
+    Frame frame = clip.frame(i);
+    const auto turn = axis_rotation(Axis::kY, 0.2 * std::numbers::pi * i / kRate_hz);
+    auto root = Eigen::Map<Eigen::Vector3f>(frame.root_position_m.data());
+    const Eigen::Vector3d now = root.cast<double>();
+    at += turn * (now - std::exchange(before, now));
+    root = at.cast<float>();
+    frame.angle_count = 0;
+    frame.rotation_xyzw[0] = from_eigen(turn * to_eigen_double(frame.rotation_xyzw[0]));
+    circle.add(frame);
+  }
+  clip.channels = circle.finish("circle", kRate_hz, clip.time_s).value().channels;
+}
+
 std::string refusal(TrainingClip take) { return check_take(take, 30.0).problem; }
 
 }  // namespace
@@ -52,6 +76,26 @@ TEST_CASE("a live walk is told by its strides, without its standing", "[take_che
   CHECK(late.standing_s > 1.5);
   CHECK(late.strides < whole.strides);
   CHECK(has(late.sentence(), "strides in 12.0 s; ... s of standing are left out"));
+}
+
+TEST_CASE("a walk about the stage is learnt from as one that goes straight on", "[take_check]") {
+  TrainingClip straight = walked();
+  TrainingClip circle = straight;
+  walk_in_a_circle(circle.clip);
+  const clip::ChannelMatrix untouched = straight.clip.channels;
+  REQUIRE(check_take(straight, 30.0).good());
+  CHECK(straight.clip.channels == untouched);
+  const TakeCheck checked = check_take(circle, 30.0);
+  INFO(checked.sentence());
+  REQUIRE(checked.good());
+  DatasetOptions options;
+  options.space = motion::Space::kHumanoid;
+  const auto dataset = make_dataset({straight, circle}, {}, options).value();
+  const Eigen::MatrixXd& a = dataset.clips[0].q;
+  const Eigen::MatrixXd& b = dataset.clips[1].q;
+  REQUIRE(a.rows() == b.rows());
+  CHECK(std::sqrt((a - b).squaredNorm() / static_cast<double>(a.rows())) < 5.0 * kDegree);
+  CHECK((dataset.clips[0].root - dataset.clips[1].root).cwiseAbs().maxCoeff() < 0.3);
 }
 
 TEST_CASE("spoilt takes are refused with a reason", "[take_check]") {
