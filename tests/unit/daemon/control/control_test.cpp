@@ -117,8 +117,8 @@ TEST_CASE("teaching is refused, before anybody walks, where it could not end wel
     return reply_of(rig.handler.handle({"me"}, std::as_bytes(std::span(bytes))));
   };
   wanted.mutable_mark()->set_seconds(2.0);
-  for (const auto& [stream, why] : {std::pair{"plain", "plain: ... no style stage"},
-                                    {"runner", "runner: ... publish_raw = true"},
+  for (const auto& [stream, why] : {std::pair{"plain", "'plain': ... no style stage"},
+                                    {"runner", "'runner': ... publish_raw = true"},
                                     {"nobody", "no stream 'nobody'"},
                                     {"walker", "4 to 120 s"}}) {
     wanted.set_stream(stream);
