@@ -119,6 +119,18 @@ TEST_CASE("a stale frame keeps its quality", "[style]") {
   CHECK(largest_delta_rad(in, out) > 0.01);
 }
 
+TEST_CASE("the first model of a stream that runs fades in, too", "[style]") {
+  const auto ready = bound(1);
+  const clip::Clip walk = toy_walk(110, 50.0);
+  style::StyleFilter filter(nullptr, {});
+  for (int i = 0; i < 100; ++i) CHECK(same_pose(run(filter, walk.frame(i)), walk.frame(i)));
+  static_cast<void>(filter.set_model(ready.get()));
+  for (int i = 100; i < 110; ++i) {
+    run(filter, walk.frame(i));
+    CHECK(filter.alpha() == Approx(0.04 * (i - 99)).margin(1e-6));
+  }
+}
+
 TEST_CASE("a live start ramps alpha from 0 by the slew", "[style]") {
   const auto ready = bound(1);
   const clip::Clip walk = toy_walk(100, 50.0);
