@@ -399,8 +399,8 @@ std::string live_parameters() {
 void add_teach(Actions& actions, TeachOptions& options) {
   CLI::App* lesson = actions.add_for_stream(
       "teach", "Teach a stream a style: two walks, and it is in effect", teach_style, R"(Examples:
-  posed ctl teach walker --name proud    # walk as you are, 20 s; then as the character, 20 s
-  posed ctl teach walker --name proud --neutral 0   # the walk as usual was good: once more in the style
+  posed ctl teach walker --name proud               # walk as you are, then as the character
+  posed ctl teach walker --name proud --neutral 0   # once more as the character alone
 The stream needs publish_raw = true and a [stream.style] table (model = "" while there is none), the
 daemon a folder to keep the model in: [control] models = "models". A walk of which nothing can be
 learnt is refused with the reason, and the stream stays as it is. Ctrl-C ends it.)");
