@@ -185,8 +185,10 @@ Reply RequestHandler::list_models(Requester requester) const {
 }
 
 Reply RequestHandler::teach(const v1::ControlRequest& request, Requester requester) {
+  auto done = models_.check_writable();  // without the lock: a disk may be slow
   const std::scoped_lock lock(mutex_);
-  if (auto done = teach_step(request); !done) {
+  if (done) done = teach_step(request);
+  if (!done) {
     return refusal(std::move(requester), done.error().text());
   }
   v1::ControlReply reply;
@@ -197,7 +199,6 @@ Reply RequestHandler::teach(const v1::ControlRequest& request, Requester request
 
 Result<> RequestHandler::teach_step(const v1::ControlRequest& request) {
   const auto& wanted = request.teach();
-  TRY(models_.check_writable());
   if (teacher_ == nullptr) return fail("this daemon teaches no styles");
   switch (wanted.step_case()) {
     case v1::ControlRequest::Teach::kMark: {

@@ -89,12 +89,12 @@ v1::TaughtWalk& Teacher::words_of(Walk walk) {
 Result<> Teacher::check_free() const {
   if (state_.step() == Step::STEP_IDLE || state_.step() == Step::STEP_IN_USE) return {};
   return fail("stream " + state_.stream() +
-              " is being taught just now; wait for its end, or cancel it");
+              " is being taught just now; wait for its end, or cancel it where it was begun");
 }
 
 Result<> Teacher::mark(const Pupil& pupil, Walk walk, double seconds) {
   if (!(seconds >= kMinWalk_s && seconds <= kMaxWalk_s)) {
-    return fail("a walk has 4 to 120 s; 20 are enough");
+    return fail("a walk has 6 to 120 s; 20 are enough");
   }
   const std::scoped_lock lock(mutex_);
   TRY(check_free());

@@ -31,7 +31,7 @@
 
 namespace posed::teach {
 
-inline constexpr double kMinWalk_s = 4.0;
+inline constexpr double kMinWalk_s = 6.0;
 inline constexpr double kMaxWalk_s = 120.0;
 inline constexpr std::size_t kMaxWalkFrames = 28'800;  // two minutes at 240 Hz
 inline constexpr std::size_t kTapSlots = 1024;         // four seconds at 240 Hz

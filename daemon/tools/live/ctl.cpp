@@ -406,7 +406,7 @@ daemon a folder to keep the model in: [control] models = "models". A walk of whi
 learnt is refused with the reason, and the stream stays as it is. Ctrl-C ends it.)");
   lesson
       ->add_option("--neutral", options.neutral_s,
-                   "Seconds of the walk as usual, 4 to 120; 0: the one that was marked before")
+                   "Seconds of the walk as usual, 6 to 120; 0: the one that was marked before")
       ->check(in_range(0.0, teach::kMaxWalk_s))
       ->capture_default_str();
   lesson->add_option("--style", options.style_s, "The same of the walk in the style")

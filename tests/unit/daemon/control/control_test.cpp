@@ -120,7 +120,7 @@ TEST_CASE("teaching is refused, before anybody walks, where it could not end wel
   for (const auto& [stream, why] : {std::pair{"plain", "'plain': ... no style stage"},
                                     {"runner", "'runner': ... publish_raw = true"},
                                     {"nobody", "no stream 'nobody'"},
-                                    {"walker", "4 to 120 s"}}) {
+                                    {"walker", "6 to 120 s"}}) {
     wanted.set_stream(stream);
     CHECK(has(answer().error(), why));
   }

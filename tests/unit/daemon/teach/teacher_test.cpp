@@ -144,7 +144,7 @@ TEST_CASE("a spoilt walk is refused in words, and its stream can walk again", "[
 TEST_CASE("one stream is taught at a time, until it is cancelled", "[teach]") {
   School school;
   const clip::Clip march = walk_of(WalkerFamily::kMarch);
-  for (const double seconds : {0.0, 3.9, 121.0, std::numeric_limits<double>::quiet_NaN()}) {
+  for (const double seconds : {0.0, 5.9, 121.0, std::numeric_limits<double>::quiet_NaN()}) {
     CHECK_FALSE(school.teacher.mark(School::pupil(march), Walk::kNeutral, seconds));
   }
   CHECK(school.mark(march, Walk::kNeutral).good());
