@@ -53,9 +53,9 @@ struct Teacher::Collected {
   [[nodiscard]] style::TrainingClip clip() const {
     style::TrainingClip take{.clip = {}, .group = {}, .subject = "one person", .motion = "walk"};
     const std::string path = walk == Walk::kNeutral ? "the walk as usual" : "the walk in the style";
-    if (auto clip = frames->finish(path, kTrainRate_hz, times.in_seconds())) {
-      take.clip = std::move(*clip);
-    }
+    auto clip = frames->finish(path, kTrainRate_hz, times.in_seconds());
+    if (clip) take.clip = std::move(*clip);
+    take.clip.path = path;
     return take;
   }
 };

@@ -130,7 +130,11 @@ TEST_CASE("a spoilt walk is refused in words, and its stream can walk again", "[
   const auto refused = school.mark(still, Walk::kNeutral);
   CHECK_FALSE(refused.good());
   CHECK(has(refused.sentence(), "no walk"));
-  CHECK(school.mark(walk_of(WalkerFamily::kMarch), Walk::kNeutral).good());
+  const clip::Clip march = walk_of(WalkerFamily::kMarch);
+  REQUIRE(school.teacher.mark(School::pupil(march), Walk::kNeutral, kWalk_s));
+  now_ns += static_cast<std::int64_t>((kWalk_s + 1.0) * 1e9);  // the device is silent
+  CHECK(has(school.await().neutral_walk().sentence(), "no frames came"));
+  CHECK(school.mark(march, Walk::kNeutral).good());
   // Two takes of one style: there is nothing to learn, and nothing is kept.
   const auto same = motion::make_walker({.seconds = kWalk_s, .noise_deg = 0.4}).value();
   CHECK(school.mark(same, Walk::kStyle).good());
