@@ -1,7 +1,8 @@
 // ByteWriter builds packets of little-endian values, BigEndianWriter of big-endian ones: for
-// emulators and requests. Cold: allocates.
+// emulators, outputs and requests. Cold: allocates.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -35,10 +36,12 @@ class BasicByteWriter {
 
  private:
   void number(std::uint64_t value, std::size_t count) {
+    std::array<std::byte, sizeof value> bytes{};
     for (std::size_t i = 0; i < count; ++i) {
       const std::size_t place = order == std::endian::little ? i : count - 1 - i;
-      bytes_.push_back(static_cast<std::byte>(value >> 8 * place & 0xFF));
+      bytes[i] = static_cast<std::byte>(value >> 8 * place & 0xFF);
     }
+    bytes_.insert(bytes_.end(), bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(count));
   }
 
   std::vector<std::byte> bytes_;

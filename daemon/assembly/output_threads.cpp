@@ -20,6 +20,7 @@ Result<std::unique_ptr<OutputThreads>> OutputThreads::open(
     auto output = TRY(output::open_output(config));
     auto poller = TRY(system::Poller::open());
     TRY(poller->add(output->wake()));
+    if (output->poll_fd() >= 0) TRY(poller->add(output->poll_fd(), 0));
     threads->running_.push_back({.output = std::move(output),
                                  .poller = std::move(poller),
                                  .pulse = std::make_unique<system::Pulse>(),

@@ -75,8 +75,9 @@ struct SourceConfig {
   return source;
 }
 
-enum class OutputKind : std::uint8_t { kVmc, kBvh, kAxis };
-inline constexpr std::array<std::string_view, 3> kOutputKinds{"vmc", "bvh", "axis"};
+enum class OutputKind : std::uint8_t { kVmc, kBvh, kAxis, kMvn, kMocopi, kRokoko, kNatNet };
+inline constexpr std::array<std::string_view, 7> kOutputKinds{
+    "vmc", "bvh", "axis", "mvn", "mocopi", "rokoko", "natnet"};
 
 // As in the config.
 [[nodiscard]] constexpr std::string_view kind_name(OutputKind kind) noexcept {
@@ -87,7 +88,9 @@ inline constexpr std::array<std::string_view, 3> kOutputKinds{"vmc", "bvh", "axi
 struct OutputConfig {
   std::string name;  // [a-z0-9_-]{1,32}, or KIND-STREAM where the file does not say; unique
   OutputKind kind = OutputKind::kVmc;
-  std::string body, left_hand, right_hand;  // streams; at least one is not empty
+  std::string body, left_hand, right_hand;  // streams; at least one is not empty, or there are
+  std::vector<std::string> bodies;          // several people, of kinds that have them
+  [[nodiscard]] std::size_t people() const { return bodies.empty() ? 1 : bodies.size(); }
   double rate_hz = 0.0;                     // at most so many frames a second; 0: all
   std::vector<std::string> to;              // addresses and ports, over UDP
   // vmc
@@ -96,10 +99,16 @@ struct OutputConfig {
   std::filesystem::path avatar{};  // whose proportions are sent; empty: the performer's
   // bvh, axis
   bool binary = false;                    // messages of Axis Neuron; false: lines of text
-  std::string listen = "127.0.0.1:7002";  // where clients connect over TCP, unless `to` names some
+  std::string listen = "127.0.0.1:7002";  // where clients connect over TCP, unless `to` names some;
+                                          // of natnet where they ask, over UDP
   std::vector<std::string> peers;         // addresses that may connect; empty: this machine
   bool header = false;                    // clients get a BVH's HIERARCHY first
-  int line = 0;                           // of its table, for errors; 0: nowhere
+  bool euler = false;                     // mvn: angles instead of quaternions
+  bool lz4 = true;                        // rokoko: compressed
+  // natnet
+  std::string group;     // where everybody gets the frames, too; empty: nowhere
+  int data_port = 1511;  // of the group
+  int line = 0;          // of its table, for errors; 0: nowhere
 };
 
 // `posed run` records from its start.

@@ -70,6 +70,7 @@ std::vector<Listener> listeners_of(const DaemonConfig& config) {
   for (const OutputConfig& output : config.outputs) {
     if (!output.to.empty()) continue;
     all.push_back({.who = "output " + in_quotes(output.name),
+                   .udp = output.kind == OutputKind::kNatNet,
                    .endpoint = output.listen,
                    .key = "output",
                    .line = output.line});

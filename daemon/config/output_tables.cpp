@@ -27,7 +27,12 @@ constexpr std::size_t kMaxReceivers = 64;
 constexpr Range kOutputRate{0.0, 1000.0};  // frames a second
 constexpr std::array<std::string_view, 2> kNamesWords{"vrm0", "vrm1"};
 constexpr std::array<std::string_view, 2> kRoleWords{"performer", "assistant"};
-constexpr std::array<std::string_view, 2> kFormatWords{"binary", "text"};
+constexpr std::array<std::string_view, 2> kAxisFormats{"binary", "text"};
+constexpr std::array<std::string_view, 2> kMvnFormats{"quaternion", "euler"};
+constexpr std::array<std::string_view, 2> kRokokoFormats{"lz4", "json"};
+constexpr std::size_t kMaxBodies = 5;  // of an output; so many fit into a datagram of Rokoko's
+constexpr double kMaxPort = 65535.0;
+constexpr std::string_view kNatNetPort = ":1510";
 
 // The keys that some kinds do not have, with those that do.
 struct KindsKey {
@@ -36,11 +41,19 @@ struct KindsKey {
 };
 const std::vector<KindsKey>& kinds_keys() {
   using enum OutputKind;
-  static const std::vector<KindsKey> keys{{"left_hand", {kVmc}},     {"right_hand", {kVmc}},
-                                          {"to", {kVmc, kAxis}},     {"names", {kVmc}},
-                                          {"role", {kVmc}},          {"avatar", {kVmc}},
-                                          {"listen", {kBvh, kAxis}}, {"peers", {kBvh, kAxis}},
-                                          {"header", {kBvh}},        {"format", {kAxis}}};
+  static const std::vector<KindsKey> keys{{"left_hand", {kVmc}},
+                                          {"right_hand", {kVmc}},
+                                          {"bodies", {kAxis, kMvn, kRokoko, kNatNet}},
+                                          {"to", {kVmc, kAxis, kMvn, kMocopi, kRokoko}},
+                                          {"names", {kVmc}},
+                                          {"role", {kVmc}},
+                                          {"avatar", {kVmc}},
+                                          {"listen", {kBvh, kAxis, kNatNet}},
+                                          {"peers", {kBvh, kAxis, kNatNet}},
+                                          {"header", {kBvh}},
+                                          {"format", {kAxis, kMvn, kRokoko}},
+                                          {"group", {kNatNet}},
+                                          {"data_port", {kNatNet}}};
   return keys;
 }
 
@@ -53,6 +66,10 @@ class OutputReader {
  private:
   void read_vmc(TableReader& table, OutputConfig& output) const;
   void read_axis(TableReader& table, OutputConfig& output) const;
+  void read_push(TableReader& table, OutputConfig& output) const;
+  void read_natnet(TableReader& table, OutputConfig& output) const;
+  void read_kind(TableReader& table, OutputConfig& output) const;
+  void read_bodies(TableReader& table, OutputConfig& output) const;
   void read_receivers(TableReader& table, OutputConfig& output) const;
   void read_clients(TableReader& table, OutputConfig& output) const;
   void read_streams(TableReader& table, OutputConfig& output) const;
@@ -126,10 +143,35 @@ void OutputReader::read_streams(TableReader& table, OutputConfig& output) const 
                                      " stream of its own",
                                      in_quotes(*name)));
   }
-  if (any) return;
+  any = any || table.has("bodies");
+  if (any) return read_bodies(table, output);
   file_.findings.add_error(table.line(),
                            fmt::format("the output names no stream; add body = \"STREAM\"{}",
                                        hands ? ", left_hand or right_hand" : ""));
+}
+
+// Several people, instead of one.
+void OutputReader::read_bodies(TableReader& table, OutputConfig& output) const {
+  if (output.kind == OutputKind::kVmc || !table.has("bodies")) return;
+  const std::size_t errors = file_.findings.errors.size();
+  table.read("bodies", output.bodies);
+  if (file_.findings.errors.size() > errors) return;
+  if (!output.body.empty()) {
+    table.add_error("bodies", "body names one person and bodies several: leave one out");
+  }
+  if (output.bodies.empty() || output.bodies.size() > kMaxBodies) {
+    table.add_error("bodies", fmt::format("output.bodies takes 1 to {} streams", kMaxBodies));
+  }
+  std::set<std::string> taken;
+  for (const std::string& name : output.bodies) {
+    if (name.empty()) {
+      table.add_error("bodies", "a stream's name is empty; leave it out");
+    } else if (!taken.insert(name).second) {
+      table.add_error("bodies", fmt::format("{} is listed twice; it would be sent as two people",
+                                            in_quotes(name)));
+    }
+    check_stream(table, "bodies", name);
+  }
 }
 
 // Whether the port of an endpoint is one that a program can have.
@@ -176,7 +218,7 @@ void OutputReader::read_axis(TableReader& table, OutputConfig& output) const {
   if (output.kind == OutputKind::kBvh) {
     table.read("header", output.header);
   } else {
-    output.binary = table.choice("format", kFormatWords) == 0;
+    output.binary = table.choice("format", kAxisFormats) == 0;
   }
   if (!table.has("to")) return read_clients(table, output);
   read_receivers(table, output);
@@ -188,8 +230,53 @@ void OutputReader::read_axis(TableReader& table, OutputConfig& output) const {
   }
 }
 
+// Kinds that send to whom the config names, as their programs do.
+void OutputReader::read_push(TableReader& table, OutputConfig& output) const {
+  std::string_view port = "9763";
+  if (output.kind == OutputKind::kMvn) output.euler = table.choice("format", kMvnFormats) == 1;
+  if (output.kind == OutputKind::kMocopi) port = "12351";
+  if (output.kind == OutputKind::kRokoko) {
+    output.lz4 = table.choice("format", kRokokoFormats) == 0;
+    port = "14043";
+  }
+  if (table.need("to", fmt::format("name the receivers, like to = [\"127.0.0.1:{}\"]", port))) {
+    read_receivers(table, output);
+  }
+}
+
+void OutputReader::read_natnet(TableReader& table, OutputConfig& output) const {
+  output.listen = "127.0.0.1";
+  table.read("data_port", output.data_port, {1.0, kMaxPort});
+  table.read("group", output.group);
+  const auto group = drivers::parse_host(output.group);
+  if (!output.group.empty() && !(group && drivers::is_multicast(drivers::host_of(*group)))) {
+    table.add_error("group", fmt::format("{} should be a multicast group, like 239.255.42.99",
+                                         in_quotes(output.group)));
+  }
+  read_clients(table, output);
+}
+
+void OutputReader::read_kind(TableReader& table, OutputConfig& output) const {
+  switch (output.kind) {
+    case OutputKind::kVmc:
+      return read_vmc(table, output);
+    case OutputKind::kBvh:
+    case OutputKind::kAxis:
+      return read_axis(table, output);
+    case OutputKind::kNatNet:
+      return read_natnet(table, output);
+    default:
+      return read_push(table, output);
+  }
+}
+
 void OutputReader::read_clients(TableReader& table, OutputConfig& output) const {
   table.read("listen", output.listen);
+  // NatNet's clients know the port.
+  if (output.kind == OutputKind::kNatNet && drivers::parse_host(output.listen)) {
+    const bool v6 = output.listen.find(':') != std::string::npos;
+    output.listen = (v6 ? "[" + output.listen + "]" : output.listen) + std::string(kNatNetPort);
+  }
   table.read("peers", output.peers);
   for (const std::string& peer : output.peers) {
     if (const auto host = drivers::parse_host(peer); !host) {
@@ -225,8 +312,9 @@ void OutputReader::name_it(TableReader& table, OutputConfig& output) {
                            "an output's name has 1 to 32 of the letters a-z, digits, '-' and '_'");
   }
   if (output.name.empty()) {
-    for (const std::string* stream : {&output.right_hand, &output.left_hand, &output.body}) {
-      if (!stream->empty()) output.name = fmt::format("{}-{}", kind_name(output.kind), *stream);
+    const std::string first = output.bodies.empty() ? "" : output.bodies.front();
+    for (const std::string& stream : {first, output.right_hand, output.left_hand, output.body}) {
+      if (!stream.empty()) output.name = fmt::format("{}-{}", kind_name(output.kind), stream);
     }
   }
   const auto [first, is_new] = lines_.try_emplace(output.name, table.line());
@@ -240,17 +328,14 @@ void OutputReader::read(TableReader& table) {
   OutputConfig& output = config_.outputs.emplace_back();
   output.line = table.line();
   const std::size_t errors = file_.findings.errors.size();
-  const bool there = table.need("kind", "write kind = \"vmc\", \"bvh\" or \"axis\"");
+  const bool there =
+      table.need("kind", fmt::format("write kind = \"{}\"", fmt::join(kOutputKinds, "\" or \"")));
   output.kind = static_cast<OutputKind>(table.choice("kind", kOutputKinds));
   if (!there || file_.findings.errors.size() > errors) return;
   table.read("rate_hz", output.rate_hz, kOutputRate);
   refuse_keys(table, output.kind);
   read_streams(table, output);
-  if (output.kind == OutputKind::kVmc) {
-    read_vmc(table, output);
-  } else {
-    read_axis(table, output);
-  }
+  read_kind(table, output);
   name_it(table, output);
   table.finish();
 }

@@ -14,28 +14,30 @@ constexpr std::uint8_t kOrder = 0;  // YXZ, as the applications are set at first
 
 }  // namespace
 
-Result<AxisFigure> AxisFigure::make(std::shared_ptr<const Skeleton> skeleton,
+Result<AxisFigure> AxisFigure::make(std::shared_ptr<const Skeleton> skeleton, std::uint8_t number,
                                     std::string_view name) {
   axis::AvatarEntry entry;
-  entry.avatar = axis::make_avatar(0, name);
-  const auto average = TRY(axis::skeleton_of(entry, kOrder));
-  const auto to_average = TRY(motion::Retarget::bind(skeleton, average));
-  const auto scale = static_cast<float>(1.0 / to_average.scale());
-  for (Vec3f& offset_cm : entry.offset_cm) {
-    for (float& x_cm : offset_cm) x_cm *= scale;
-  }
-  auto figure = TRY(axis::skeleton_of(entry, kOrder));
-  auto to_figure = TRY(motion::Retarget::bind(std::move(skeleton), std::move(figure)));
-  AxisFigure made(std::move(to_figure), entry.offset_cm);
+  entry.avatar = axis::make_avatar(number, name);
+  const axis::Proportions average_cm = entry.offset_cm;
+  const auto figure = [&](double scale) {
+    for (std::size_t bone = 0; bone < average_cm.size(); ++bone) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        entry.offset_cm[bone][k] = average_cm[bone][k] * static_cast<float>(scale);
+      }
+    }
+    return axis::skeleton_of(entry, kOrder);
+  };
+  auto fit = TRY(Fit::make(std::move(skeleton), /*own=*/false, figure));
+  AxisFigure made(std::move(fit), entry.offset_cm);
   made.message_.avatar = entry.avatar;
   made.message_.content.displacement = true;
   return made;
 }
 
 void AxisFigure::fill(const Frame& frame) noexcept {
-  to_figure_.apply(frame, pose_);
+  const Frame& pose = fit_.apply(frame);
   message_.frame_number = static_cast<std::uint32_t>(frame.header.sequence);
-  axis::fill_values(*to_figure_.target(), offset_cm_, pose_.rotation_xyzw, pose_.root_position_m,
+  axis::fill_values(fit_.skeleton(), offset_cm_, pose.rotation_xyzw, pose.root_position_m,
                     near_rad_, message_);
 }
 
@@ -55,14 +57,14 @@ std::string_view AxisFigure::line(const Frame& frame) noexcept {
 
 std::string AxisFigure::hierarchy() const {
   // With displacement every joint has a position.
-  Skeleton figure = *to_figure_.target();
+  Skeleton figure = fit_.skeleton();
   figure.channels.clear();
   const auto joints = static_cast<std::uint16_t>(figure.joints.size());
   for (std::uint16_t joint = 0; joint < joints; ++joint) {
     for (const Axis along : {Axis::kX, Axis::kY, Axis::kZ}) {
       figure.channels.push_back({.joint = joint, .axis = along, .translation = true});
     }
-    for (const Channel& channel : to_figure_.target()->channels) {
+    for (const Channel& channel : fit_.skeleton().channels) {
       if (channel.joint == joint && !channel.translation) figure.channels.push_back(channel);
     }
   }

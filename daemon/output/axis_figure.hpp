@@ -7,11 +7,12 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 
+#include "daemon/output/fit.hpp"
 #include "drivers/axis/bones.hpp"
 #include "drivers/axis/pose_message.hpp"
 #include "drivers/axis/protocol.hpp"
-#include "models/motion/retarget.hpp"
 #include "proto/frame/frame.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/skeleton.hpp"
@@ -21,10 +22,9 @@ namespace posed::output {
 // One thread.
 class AxisFigure {
  public:
-  // Makes a figure that has the legs of `skeleton`, so that its feet stand where the person's do,
-  // and otherwise the proportions of an average person. Fails if the skeleton has no bone of a
-  // person. Cold.
-  static Result<AxisFigure> make(std::shared_ptr<const Skeleton> skeleton, std::string_view name);
+  // Makes the figure of a person (Fit::make) whose avatar has this number and name. Cold.
+  static Result<AxisFigure> make(std::shared_ptr<const Skeleton> skeleton, std::uint8_t number,
+                                 std::string_view name);
 
   // Returns a frame of the skeleton as "0 ann 0.000000 92.1... ||\n", valid until the next call. A
   // joint that was not measured keeps its rotation of the T-pose relative to its parent.
@@ -38,14 +38,13 @@ class AxisFigure {
 
  private:
   void fill(const Frame& frame) noexcept;
-  AxisFigure(motion::Retarget retarget, const drivers::axis::Proportions& offset_cm)
-      : to_figure_(std::move(retarget)), offset_cm_(offset_cm) {}
+  AxisFigure(Fit fit, const drivers::axis::Proportions& offset_cm)
+      : fit_(std::move(fit)), offset_cm_(offset_cm) {}
 
-  motion::Retarget to_figure_;
+  Fit fit_;
   drivers::axis::Proportions offset_cm_;
   drivers::axis::NearAngles near_rad_{};
   drivers::axis::Message message_;
-  Frame pose_{};
   std::array<char, drivers::axis::kMaxText + 1> text_{};
 };
 

@@ -5,8 +5,6 @@
 #include <string_view>
 #include <utility>
 
-#include "proto/text/clean.hpp"
-
 namespace posed::output {
 
 Result<std::unique_ptr<Output>> AxisOutput::open(const config::OutputConfig& config,
@@ -25,51 +23,53 @@ AxisOutput::AxisOutput(const config::OutputConfig& config, std::unique_ptr<syste
     : Output(config, std::move(wake)),
       header_(config.header),
       binary_(config.binary),
-      limit_(config.rate_hz),
       clients_(std::move(clients)),
-      receivers_(std::move(receivers)) {}
+      receivers_(std::move(receivers)),
+      people_(config.people()) {}
 
-std::int64_t AxisOutput::turn(std::int64_t now_ns) {
-  const Delivery& delivery = receive();
-  update_stream(delivery.streams[index_of(Part::kBody)]);
-  if (look_ns_ == kNoTime_ns || now_ns >= look_ns_) {
-    for (const std::string& news :
-         clients_ ? clients_->look(now_ns) : receivers_->drain_news(now_ns)) {
-      notify(news);
-    }
-    look_ns_ = now_ns + LineClients::kLook_ns;
+Result<> AxisOutput::set_stream(std::size_t place, const LiveStream* stream) {
+  Person& person = people_[place];
+  person.figure.reset();
+  person.waits = false;
+  if (stream == nullptr) return {};
+  auto figure = AxisFigure::make(stream->skeleton, static_cast<std::uint8_t>(place), stream->name);
+  if (!figure) return fail("cannot be sent: " + figure.error().message);
+  person.figure = std::make_unique<AxisFigure>(std::move(*figure));
+  if (header_) clients_->set_greeting(person.figure->hierarchy());
+  return {};
+}
+
+void AxisOutput::begin_turn(std::int64_t now_ns) {
+  if (look_ns_ != kNoTime_ns && now_ns < look_ns_) return;
+  for (const std::string& news :
+       clients_ ? clients_->look(now_ns) : receivers_->drain_news(now_ns)) {
+    notify(news);
   }
-  const Frame* newest = nullptr;
-  delivery.for_each([&](Part /*part*/, const Frame& frame) {
-    newest = &frame;
-    if (!limit_.limits()) send(frame, now_ns);
-  });
-  if (limit_.limits() && newest != nullptr && limit_.admit(now_ns)) send(*newest, now_ns);
+  look_ns_ = now_ns + LineClients::kLook_ns;
+}
+
+bool AxisOutput::take(std::size_t place, const Frame& frame, std::int64_t /*now_ns*/) {
+  Person& person = people_[place];
+  if (person.figure == nullptr) return false;
+  person.frame = frame;
+  person.waits = true;
+  return true;
+}
+
+void AxisOutput::send(std::int64_t now_ns) {
+  for (Person& person : people_) {
+    if (!std::exchange(person.waits, false) || (clients_ && clients_->size() == 0)) continue;
+    AxisFigure& figure = *person.figure;
+    const std::string_view message =
+        binary_ ? figure.message(person.frame) : figure.line(person.frame);
+    count(clients_ ? clients_->send(message, now_ns)
+                   : receivers_->send(std::as_bytes(std::span(message)), now_ns));
+  }
+}
+
+std::int64_t AxisOutput::end_turn(std::int64_t /*now_ns*/) {
   set_receivers(clients_ ? clients_->size() : receivers_->size());
   return look_ns_;
-}
-
-void AxisOutput::send(const Frame& frame, std::int64_t now_ns) {
-  if (figure_ == nullptr || (clients_ && clients_->size() == 0)) return;
-  const std::string_view message = binary_ ? figure_->message(frame) : figure_->line(frame);
-  count(clients_ ? clients_->send(message, now_ns)
-                 : receivers_->send(std::as_bytes(std::span(message)), now_ns));
-}
-
-void AxisOutput::update_stream(const std::shared_ptr<const PartStream>& stream) {
-  if (known_ == stream) return;
-  known_ = stream;
-  figure_.reset();
-  if (stream == nullptr) return;
-  if (stream->skeleton == nullptr)
-    return notify("stream " + in_quotes(stream->name) + " has no pose");
-  auto figure = AxisFigure::make(stream->skeleton, stream->name);
-  if (!figure) {
-    return notify("stream " + in_quotes(stream->name) +
-                  " cannot be sent: " + figure.error().message);
-  }
-  figure_ = std::make_unique<AxisFigure>(std::move(*figure));
-  if (header_) clients_->set_greeting(figure_->hierarchy());
 }
 
 }  // namespace posed::output

@@ -5,14 +5,14 @@
 
 namespace posed::output {
 
-bool Delivery::put(Part part, const Frame& frame) noexcept {
+bool Delivery::put(std::size_t place, const Frame& frame) noexcept {
   const bool full = count_ == kDepth;
   if (full) {
     first_ = (first_ + 1) % kDepth;
     --count_;
   }
   Entry& entry = frames_[(first_ + count_) % kDepth];
-  entry.part = part;
+  entry.place = place;
   entry.frame = frame;
   ++count_;
   return full;
@@ -24,11 +24,11 @@ void Delivery::swap_frames(Delivery& other) noexcept {
   std::swap(count_, other.count_);
 }
 
-std::size_t Delivery::remove(Part part) noexcept {
+std::size_t Delivery::remove(std::size_t place) noexcept {
   std::size_t kept = 0;
   for (std::size_t i = 0; i < count_; ++i) {
     const Entry& entry = frames_[(first_ + i) % kDepth];
-    if (entry.part == part) continue;
+    if (entry.place == place) continue;
     if (kept != i) frames_[(first_ + kept) % kDepth] = entry;
     ++kept;
   }
@@ -39,10 +39,10 @@ bool Inbox::wants(std::string_view stream) const noexcept {
   return !stream.empty() && std::ranges::find(names_, stream) != names_.end();
 }
 
-std::optional<Part> Inbox::part_of(std::uint32_t stream) const noexcept {
-  for (const Part part : kAllParts) {
-    const auto& there = waiting_.streams[index_of(part)];
-    if (there != nullptr && there->id == stream) return part;
+std::optional<std::size_t> Inbox::place_of(std::uint32_t stream) const noexcept {
+  for (std::size_t place = 0; place < waiting_.streams.size(); ++place) {
+    const auto& there = waiting_.streams[place];
+    if (there != nullptr && there->id == stream) return place;
   }
   return std::nullopt;
 }
@@ -50,17 +50,17 @@ std::optional<Part> Inbox::part_of(std::uint32_t stream) const noexcept {
 void Inbox::stream_comes(const publish::StreamInfo& stream) {
   const auto named = std::ranges::find(names_, stream.name);
   if (named == names_.end()) return;
-  auto coming =
-      std::make_shared<const PartStream>(PartStream{.id = stream.stream,
-                                                    .name = stream.name,
-                                                    .skeleton = stream.skeleton,
-                                                    .samples = stream.description.samples});
-  const auto part = static_cast<Part>(named - names_.begin());
+  auto coming = std::make_shared<const LiveStream>(LiveStream{.id = stream.stream,
+                                                              .name = stream.name,
+                                                              .skeleton = stream.skeleton,
+                                                              .samples = stream.description.samples,
+                                                              .rate_hz = stream.rate_hz});
+  const auto place = static_cast<std::size_t>(named - names_.begin());
   {
     const std::scoped_lock lock(mutex_);
-    waiting_.streams[index_of(part)].swap(coming);
-    dropped_ += waiting_.remove(part);  // they have another skeleton
-    if (part == Part::kBody) waiting_.sample.reset();
+    waiting_.streams[place].swap(coming);
+    dropped_ += waiting_.remove(place);  // they have another skeleton
+    if (place == 0) waiting_.sample.reset();
   }
   wake_.notify();
 }
@@ -68,10 +68,10 @@ void Inbox::stream_comes(const publish::StreamInfo& stream) {
 void Inbox::frame(const Frame& frame) noexcept {
   {
     const std::scoped_lock lock(mutex_);
-    const auto part = part_of(frame.header.stream);
-    if (!part) return;
+    const auto place = place_of(frame.header.stream);
+    if (!place) return;
     ++frames_;
-    if (waiting_.put(*part, frame)) ++dropped_;
+    if (waiting_.put(*place, frame)) ++dropped_;
   }
   wake_.notify();
 }
@@ -79,24 +79,24 @@ void Inbox::frame(const Frame& frame) noexcept {
 void Inbox::sample(const Sample& sample) noexcept {
   const std::scoped_lock lock(mutex_);
   // It goes out with the next frame, so nobody is woken.
-  if (part_of(sample.header.stream) == Part::kBody) waiting_.sample = sample;
+  if (place_of(sample.header.stream) == 0) waiting_.sample = sample;
 }
 
 void Inbox::stream_leaves(std::uint32_t stream) noexcept {
-  std::shared_ptr<const PartStream> leaving;  // freed behind the lock
+  std::shared_ptr<const LiveStream> leaving;  // freed behind the lock
   {
     const std::scoped_lock lock(mutex_);
-    const auto part = part_of(stream);
-    if (!part) return;
-    waiting_.streams[index_of(*part)].swap(leaving);
-    dropped_ += waiting_.remove(*part);
+    const auto place = place_of(stream);
+    if (!place) return;
+    waiting_.streams[*place].swap(leaving);
+    dropped_ += waiting_.remove(*place);
   }
   wake_.notify();
 }
 
 void Inbox::drain(Delivery& into) {
   into.count_ = 0;
-  into.streams = {};  // freed before the lock
+  into.streams.assign(names_.size(), nullptr);  // freed, and allocated, before the lock
   const std::scoped_lock lock(mutex_);
   waiting_.swap_frames(into);
   into.streams = waiting_.streams;

@@ -4,7 +4,6 @@
 // while frames are copied; nothing is freed and no thread is woken under it.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -15,7 +14,6 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/output/part.hpp"
 #include "daemon/publish/publisher.hpp"
 #include "daemon/system/event_fd.hpp"
 #include "daemon/system/priority_mutex.hpp"
@@ -24,13 +22,15 @@
 namespace posed::output {
 
 // A live stream. It is constant, and both threads share it.
-struct PartStream {
+struct LiveStream {
   std::uint32_t id = 0;
   std::string name{};
   std::shared_ptr<const Skeleton> skeleton{};  // null if it has samples only
   drivers::SampleLayout samples{};
+  double rate_hz = 0.0;  // expected frame rate; 0: unknown
 };
-using PartStreams = std::array<std::shared_ptr<const PartStream>, kParts>;  // null: absent
+// [place], in the order in which the output names its streams; null: absent.
+using LiveStreams = std::vector<std::shared_ptr<const LiveStream>>;
 
 // The content of an inbox at one moment.
 class Delivery {
@@ -39,29 +39,29 @@ class Delivery {
 
   Delivery() : frames_(kDepth) {}
 
-  PartStreams streams{};
-  std::optional<Sample> sample{};  // the newest sample of the body
+  LiveStreams streams{};
+  std::optional<Sample> sample{};  // the newest sample of the first stream
 
-  // Calls use(part, frame) for each frame, the oldest first.
+  // Calls use(place, frame) for each frame, the oldest first.
   template <typename Use>
   void for_each(Use&& use) const {
     for (std::size_t i = 0; i < count_; ++i) {
       const Entry& entry = frames_[(first_ + i) % kDepth];
-      use(entry.part, entry.frame);
+      use(entry.place, entry.frame);
     }
   }
 
  private:
   friend class Inbox;
   struct Entry {
-    Part part{};
+    std::size_t place = 0;
     Frame frame{};
   };
   // Returns whether the oldest frame was replaced.
-  bool put(Part part, const Frame& frame) noexcept;
+  bool put(std::size_t place, const Frame& frame) noexcept;
   void swap_frames(Delivery& other) noexcept;
-  // Removes the frames of a part; returns how many there were.
-  std::size_t remove(Part part) noexcept;
+  // Removes the frames of a stream; returns how many there were.
+  std::size_t remove(std::size_t place) noexcept;
 
   std::vector<Entry> frames_;
   std::size_t first_ = 0, count_ = 0;
@@ -69,10 +69,12 @@ class Delivery {
 
 class Inbox {
  public:
-  // `names` are the streams of the parts; an empty name means none. `wake` is notified of
-  // everything new and outlives the inbox.
-  Inbox(std::array<std::string, kParts> names, system::EventFd& wake)
-      : names_(std::move(names)), wake_(wake) {}
+  // `names` are the wanted streams; an empty name means none. `wake` is notified of everything new
+  // and outlives the inbox.
+  Inbox(std::vector<std::string> names, system::EventFd& wake)
+      : names_(std::move(names)), wake_(wake) {
+    waiting_.streams.resize(names_.size());
+  }
 
   [[nodiscard]] bool wants(std::string_view stream) const noexcept;
 
@@ -90,10 +92,10 @@ class Inbox {
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_.load(); }
 
  private:
-  // Returns the part whose live stream has this id. Call it with mutex_ held.
-  [[nodiscard]] std::optional<Part> part_of(std::uint32_t stream) const noexcept;
+  // Returns the place whose live stream has this id. Call it with mutex_ held.
+  [[nodiscard]] std::optional<std::size_t> place_of(std::uint32_t stream) const noexcept;
 
-  std::array<std::string, kParts> names_;  // [part]
+  std::vector<std::string> names_;  // [place]
   system::EventFd& wake_;
   system::PriorityMutex mutex_;
   Delivery waiting_;  // under mutex_

@@ -1,18 +1,86 @@
 #include "daemon/output/output.hpp"
 
+#include <algorithm>
+
 #include <spdlog/spdlog.h>
 
 #include "daemon/output/axis_output.hpp"
+#include "daemon/output/datagram_output.hpp"
+#include "daemon/output/natnet_output.hpp"
 #include "daemon/output/vmc_output.hpp"
 #include "posed/v1/posed.pb.h"
+#include "proto/text/clean.hpp"
 
 namespace posed::output {
+namespace {
 
-Output::Output(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake)
+std::vector<std::string> streams_of(const config::OutputConfig& config) {
+  if (!config.bodies.empty()) return config.bodies;
+  return {config.body, config.left_hand, config.right_hand};
+}
+
+Result<std::unique_ptr<Output>> open_kind(const config::OutputConfig& config,
+                                          std::unique_ptr<system::EventFd> wake) {
+  switch (config.kind) {
+    case config::OutputKind::kVmc:
+      return VmcOutput::open(config, std::move(wake));
+    case config::OutputKind::kBvh:
+    case config::OutputKind::kAxis:
+      return AxisOutput::open(config, std::move(wake));
+    case config::OutputKind::kNatNet:
+      return NatNetOutput::open(config, std::move(wake));
+    default:
+      return DatagramOutput::open(config, std::move(wake));
+  }
+}
+
+}  // namespace
+
+Output::Output(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake,
+               bool together)
     : name_(config.name),
       kind_(config::kind_name(config.kind)),
       wake_(std::move(wake)),
-      inbox_({config.body, config.left_hand, config.right_hand}, *wake_) {}
+      inbox_(streams_of(config), *wake_),
+      limit_(config.rate_hz) {
+  if (together) gathering_.emplace(config.people());
+}
+
+std::int64_t Output::turn(std::int64_t now_ns) {
+  inbox_.drain(delivery_);
+  update_streams();
+  begin_turn(now_ns);
+  pass_frames(now_ns);
+  const std::int64_t due_ns = end_turn(now_ns);
+  if (!gathering_ || gathering_->due_ns() == kNoTime_ns) return due_ns;
+  return std::min(due_ns, gathering_->due_ns());
+}
+
+void Output::update_streams() {
+  known_.resize(delivery_.streams.size());
+  for (std::size_t place = 0; place < known_.size(); ++place) {
+    const auto& stream = delivery_.streams[place];
+    if (known_[place] == stream) continue;
+    known_[place] = stream;
+    if (gathering_) gathering_->leaves(place);
+    const auto set = set_stream(place, stream.get());
+    if (!set) notify("stream " + in_quotes(stream->name) + " " + set.error().message);
+  }
+}
+
+// Without a limit every frame is sent; with one the newest of those that have come together.
+void Output::pass_frames(std::int64_t now_ns) {
+  bool newer = false;
+  delivery_.for_each([&](std::size_t place, const Frame& frame) {
+    if (!take(place, frame, now_ns)) return;
+    if (gathering_ && !gathering_->comes(place, now_ns)) return;
+    newer = true;
+    if (!limit_.limits()) send(now_ns);
+  });
+  const bool late = gathering_ && gathering_->is_late(now_ns);
+  if (late) gathering_->sent();
+  if ((late || (limit_.limits() && newer)) && limit_.admit(now_ns)) send(now_ns);
+}
 
 void Output::fill(v1::OutputStats& stats) const {
   stats.set_name(name_);
@@ -24,11 +92,6 @@ void Output::fill(v1::OutputStats& stats) const {
   stats.set_failures(failures_.load());
 }
 
-const Delivery& Output::receive() {
-  inbox_.drain(delivery_);
-  return delivery_;
-}
-
 void Output::count(const SendOutcome& outcome) noexcept {
   sent_ += outcome.sent;
   dropped_ += outcome.dropped;
@@ -37,7 +100,7 @@ void Output::count(const SendOutcome& outcome) noexcept {
 
 void Output::notify(const std::string& text) const {
   std::optional<std::uint32_t> concerned;
-  for (const auto& stream : streams()) {
+  for (const auto& stream : delivery_.streams) {
     if (stream != nullptr && !concerned) concerned = stream->id;
   }
   const std::string sentence = "output " + name_ + ": " + text;
@@ -47,8 +110,7 @@ void Output::notify(const std::string& text) const {
 
 Result<std::unique_ptr<Output>> open_output(const config::OutputConfig& config) {
   auto wake = TRY(system::EventFd::open());
-  auto opened = config.kind == config::OutputKind::kVmc ? VmcOutput::open(config, std::move(wake))
-                                                        : AxisOutput::open(config, std::move(wake));
+  auto opened = open_kind(config, std::move(wake));
   if (!opened) return fail("output " + config.name + ": " + opened.error().message);
   return opened;
 }

@@ -1,5 +1,6 @@
-// Output: the base of all outputs. It has an inbox with the frames of the wanted streams, counters,
-// and a way to report problems to users. assembly runs each output on a thread of its own.
+// Output: the base of all outputs. It has an inbox with the frames of the wanted streams, passes
+// them on at the rate that the config allows, counts, and has a way to report problems to users.
+// assembly runs each output on a thread of its own.
 #pragma once
 
 #include <atomic>
@@ -12,9 +13,12 @@
 #include <string_view>
 
 #include "daemon/config/daemon_config.hpp"
+#include "daemon/output/gathering.hpp"
 #include "daemon/output/inbox.hpp"
+#include "daemon/output/rate_limit.hpp"
 #include "daemon/output/send_outcome.hpp"
 #include "daemon/publish/frame_output.hpp"
+#include "daemon/system/clock.hpp"
 #include "daemon/system/event_fd.hpp"
 #include "proto/frame/result.hpp"
 
@@ -25,7 +29,9 @@ using Notify = std::function<void(std::optional<std::uint32_t> stream, const std
 
 class Output : public publish::FrameOutput {
  public:
-  Output(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake);
+  // `together`: the poses of all streams go out as one.
+  Output(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake,
+         bool together = false);
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
   // Call it before the first turn.
@@ -33,8 +39,10 @@ class Output : public publish::FrameOutput {
 
   // The output's thread calls it. It does everything that is due at `now_ns` and never waits.
   // Returns the latest time of the next call; call it earlier if wake() is notified.
-  [[nodiscard]] virtual std::int64_t turn(std::int64_t now_ns) = 0;
+  [[nodiscard]] std::int64_t turn(std::int64_t now_ns);
   [[nodiscard]] system::EventFd& wake() noexcept { return *wake_; }
+  // A descriptor that is readable when turn() should be called, too; -1: there is none.
+  [[nodiscard]] virtual int poll_fd() const noexcept { return -1; }
 
   // publish::FrameOutput
   [[nodiscard]] bool wants(std::string_view stream) const noexcept override {
@@ -47,10 +55,21 @@ class Output : public publish::FrameOutput {
   void fill(v1::OutputStats& stats) const override;
 
  protected:
-  // Returns everything that has come since the last call.
-  [[nodiscard]] const Delivery& receive();
-  // The streams as of the last receive().
-  [[nodiscard]] const PartStreams& streams() const noexcept { return delivery_.streams; }
+  // What an output does in a turn, in this order. The stream of a place has come, or has another
+  // skeleton; null: it has left. An error goes on "stream 'ann' ..." and is told to users.
+  [[nodiscard]] virtual Result<> set_stream(std::size_t place, const LiveStream* stream) = 0;
+  virtual void begin_turn(std::int64_t /*now_ns*/) {}
+  // Takes a frame of a stream that has come. Returns whether it makes the output send.
+  [[nodiscard]] virtual bool take(std::size_t place, const Frame& frame, std::int64_t now_ns) = 0;
+  // Sends what has been taken.
+  virtual void send(std::int64_t now_ns) = 0;
+  // Returns when the next turn is due, if nothing comes before.
+  [[nodiscard]] virtual std::int64_t end_turn(std::int64_t /*now_ns*/) {
+    return system::kForever_ns;
+  }
+
+  // The newest sample of the first stream that has come in this turn.
+  [[nodiscard]] const std::optional<Sample>& sample() const noexcept { return delivery_.sample; }
   void notify(const std::string& text) const;
   // These two set the values that fill() reports.
   void count(const SendOutcome& outcome) noexcept;
@@ -59,10 +78,16 @@ class Output : public publish::FrameOutput {
   }
 
  private:
+  void update_streams();
+  void pass_frames(std::int64_t now_ns);
+
   std::string name_, kind_;
   std::unique_ptr<system::EventFd> wake_;
   Inbox inbox_;
   Delivery delivery_;
+  LiveStreams known_;  // [place] what set_stream has got
+  RateLimit limit_;
+  std::optional<Gathering> gathering_;
   std::atomic<std::uint64_t> sent_{0}, dropped_{0}, failures_{0};
   std::atomic<std::uint32_t> receivers_now_{0};
   Notify notify_;

@@ -40,48 +40,38 @@ VmcOutput::VmcOutput(const config::OutputConfig& config, std::unique_ptr<system:
       assistant_(config.assistant),
       avatar_(config.assistant, std::move(figure)),
       shapes_(config.vrm1_names ? VrmNames::kVrm1 : VrmNames::kVrm0),
-      limit_(config.rate_hz),
       receivers_(std::move(receivers)),
       writer_(std::make_unique<vmc::DatagramWriter>(vmc::Packing::kBundles)) {
   measured_ns_.fill(kNoTime_ns);
   set_receivers(receivers_.size());
 }
 
-std::int64_t VmcOutput::turn(std::int64_t now_ns) {
-  if (begin_ns_ == kNoTime_ns) begin_ns_ = now_ns;
-  const Delivery& delivery = receive();
-  update_streams(delivery.streams);
-  if (delivery.sample && !assistant_) shapes_.update(*delivery.sample);
-  const Frame* newest = nullptr;
-  delivery.for_each([&](Part part, const Frame& frame) {
-    if (!accept(part, frame, now_ns)) return;
-    newest = &frame;
-    if (!limit_.limits()) send(frame, now_ns);
-  });
-  if (limit_.limits() && newest != nullptr && limit_.admit(now_ns)) send(*newest, now_ns);
-  for (const std::string& news : receivers_.drain_news(now_ns)) notify(news);
-  return system::kForever_ns;
-}
-
-void VmcOutput::update_streams(const PartStreams& streams) {
-  for (const Part part : kAllParts) {
-    const auto& stream = streams[index_of(part)];
-    if (known_[index_of(part)] == stream) continue;
-    known_[index_of(part)] = stream;
-    measured_ns_[index_of(part)] = kNoTime_ns;
-    const auto set = avatar_.set_skeleton(part, stream ? stream->skeleton : nullptr);
-    if (!set) {
-      notify("stream " + in_quotes(stream->name) + " cannot move its " +
-             std::string(words_for(part)) + ": " + set.error().message);
-    }
-    if (part != Part::kBody) continue;
+Result<> VmcOutput::set_stream(std::size_t place, const LiveStream* stream) {
+  const auto part = static_cast<Part>(place);
+  measured_ns_[place] = kNoTime_ns;
+  if (part == Part::kBody) {
     const std::size_t left_out =
-        shapes_.set_layout(stream ? stream->samples : drivers::SampleLayout{});
+        shapes_.set_layout(stream != nullptr ? stream->samples : drivers::SampleLayout{});
     if (left_out > 0) {
       notify(std::to_string(left_out) + " blend shapes of stream " + in_quotes(stream->name) +
              " are left out: their names are too long for a frame");
     }
   }
+  const auto set = avatar_.set_skeleton(part, stream != nullptr ? stream->skeleton : nullptr);
+  if (!set) {
+    return fail("cannot move its " + std::string(words_for(part)) + ": " + set.error().message);
+  }
+  return {};
+}
+
+void VmcOutput::begin_turn(std::int64_t now_ns) {
+  if (begin_ns_ == kNoTime_ns) begin_ns_ = now_ns;
+  if (sample() && !assistant_) shapes_.update(*sample());
+}
+
+std::int64_t VmcOutput::end_turn(std::int64_t now_ns) {
+  for (const std::string& news : receivers_.drain_news(now_ns)) notify(news);
+  return system::kForever_ns;
 }
 
 bool VmcOutput::leads(Part part, std::int64_t now_ns) const noexcept {
@@ -93,17 +83,21 @@ bool VmcOutput::leads(Part part, std::int64_t now_ns) const noexcept {
   return true;
 }
 
-bool VmcOutput::accept(Part part, const Frame& frame, std::int64_t now_ns) {
+// The frame goes into the avatar.
+bool VmcOutput::take(std::size_t place, const Frame& frame, std::int64_t now_ns) {
+  const auto part = static_cast<Part>(place);
   if (!avatar_.set_pose(part, frame)) return false;
-  if (frame.quality != Quality::kStale) measured_ns_[index_of(part)] = now_ns;
-  return leads(part, now_ns);
+  if (frame.quality != Quality::kStale) measured_ns_[place] = now_ns;
+  if (!leads(part, now_ns)) return false;
+  quality_ = frame.quality;
+  return true;
 }
 
-void VmcOutput::send(const Frame& frame, std::int64_t now_ns) {
+void VmcOutput::send(std::int64_t now_ns) {
   writer_->start();
   avatar_.write(*writer_);
   if (!assistant_) shapes_.write(*writer_);
-  if (frame.quality == Quality::kStale || frame.quality == Quality::kHeld) {
+  if (quality_ == Quality::kStale || quality_ == Quality::kHeld) {
     writer_->status({.tracking = false});
   } else {
     writer_->loaded();

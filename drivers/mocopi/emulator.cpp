@@ -1,10 +1,10 @@
 #include "drivers/mocopi/emulator.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
+#include "drivers/mocopi/encode.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::drivers::mocopi {
@@ -15,31 +15,10 @@ constexpr double kBegan_s = 1.7e9;  // Unix time of the first frame
 constexpr double kWave_hz = 0.9;
 constexpr std::uint16_t kLeftUpArm = 12, kRightUpArm = 16, kRightLowArm = 17;
 
-// The begin of a bone, from its parent, of a person of 1.7 m; the right side is the mirror image.
-constexpr std::array<Vec3f, kBones> kPlaces_m{
-    {{0, 0.93F, 0},  {0, 0.05F, 0},  {0, 0.05F, 0},      {0, 0.05F, 0},
-     {0, 0.06F, 0},  {0, 0.06F, 0},  {0, 0.07F, 0},      {0, 0.07F, 0},
-     {0, 0.1F, 0},   {0, 0.05F, 0},  {0, 0.05F, 0},      {0.03F, 0.06F, 0},
-     {0.14F, 0, 0},  {0.27F, 0, 0},  {0.25F, 0, 0},      {-0.03F, 0.06F, 0},
-     {-0.14F, 0, 0}, {-0.27F, 0, 0}, {-0.25F, 0, 0},     {0.09F, -0.04F, 0},
-     {0, -0.41F, 0}, {0, -0.4F, 0},  {0, -0.07F, 0.13F}, {-0.09F, -0.04F, 0},
-     {0, -0.41F, 0}, {0, -0.4F, 0},  {0, -0.07F, 0.13F}}};
-
-std::vector<BoneEntry> standing() {
-  std::vector<BoneEntry> bones;
-  bones.reserve(kBones);
-  for (std::uint16_t id = 0; id < kBones; ++id) {
-    bones.push_back({.id = id,
-                     .parent = usual_parent(id),
-                     .transform = {.rotation_xyzw = kIdentity, .position_m = kPlaces_m[id]}});
-  }
-  return bones;
-}
-
 }  // namespace
 
 MocopiEmulator::MocopiEmulator(double rate_hz)
-    : bones_(standing()),
+    : bones_(average_bones(1.0F)),
       pose_(bones_),
       frames_(nanoseconds(1.0 / rate_hz)),
       skeletons_(kSkeletonEvery_ns) {

@@ -2,16 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <limits>
-
-#include "drivers/byte_writer.hpp"
 
 namespace posed::drivers::mocopi {
 namespace {
-
-constexpr std::string_view kFormat = "sony motion format";
-constexpr std::uint8_t kFormatVersion = 1;
 
 struct BoneRow {
   std::string_view name;
@@ -70,50 +64,6 @@ RT_SAFE bool is_head(std::span<const std::byte> head) noexcept {
 
 std::unexpected<Error> wrong_skeleton(const std::string& what) {
   return fail("the skeleton that the mocopi app sends " + what + "; start its sending again");
-}
-
-using Bytes = std::vector<std::byte>;
-
-Bytes field(std::string_view name, std::span<const std::byte> value) {
-  ByteWriter writer;
-  writer.u32(static_cast<std::uint32_t>(value.size()));
-  writer.text(name);
-  writer.bytes(value);
-  return writer.finish();
-}
-
-Bytes together(std::initializer_list<Bytes> parts) {
-  ByteWriter writer;
-  for (const Bytes& part : parts) writer.bytes(part);
-  return writer.finish();
-}
-
-Bytes number_field(std::string_view name, std::uint64_t value, std::size_t size) {
-  ByteWriter writer;
-  for (std::size_t i = 0; i < size; ++i) writer.u8(static_cast<std::uint8_t>(value >> 8 * i));
-  return field(name, writer.finish());
-}
-
-Bytes bone_fields(std::span<const BoneEntry> bones, std::string_view name, bool with_parent) {
-  ByteWriter writer;
-  for (const BoneEntry& bone : bones) {
-    ByteWriter numbers;
-    for (const float x : bone.transform.rotation_xyzw) numbers.f32(x);
-    for (const float x_m : bone.transform.position_m) numbers.f32(x_m);
-    const Bytes parent = with_parent ? number_field("pbid", bone.parent, 2) : Bytes{};
-    writer.bytes(field(name, together({number_field("bnid", bone.id, 2), parent,
-                                       field("tran", numbers.finish())})));
-  }
-  return writer.finish();
-}
-
-Bytes whole_datagram(const Bytes& content) {
-  const auto format = std::as_bytes(std::span(kFormat));
-  return together(
-      {field("head", together({field("ftyp", format), number_field("vrsn", kFormatVersion, 1)})),
-       field("sndf",
-             together({number_field("ipad", 0x0100007F, 8), number_field("rcvp", 12351, 2)})),
-       content});
 }
 
 }  // namespace
@@ -187,19 +137,6 @@ Result<std::vector<BoneEntry>> parse_skeleton(std::span<const std::byte> content
   if (!fields.ok()) return wrong_skeleton("ends too early");
   if (bones.empty()) return wrong_skeleton("has no bones");
   return bones;
-}
-
-std::vector<std::byte> encode_skeleton(std::span<const BoneEntry> bones) {
-  return whole_datagram(field("skdf", field("bons", bone_fields(bones, "bndt", true))));
-}
-
-std::vector<std::byte> encode_frame(std::uint32_t number, double time_s, double unix_s,
-                                    std::span<const BoneEntry> bones) {
-  const auto time = std::bit_cast<std::uint32_t>(static_cast<float>(time_s));
-  return whole_datagram(
-      field("fram", together({number_field("fnum", number, 4), number_field("time", time, 4),
-                              number_field("uttm", std::bit_cast<std::uint64_t>(unix_s), 8),
-                              field("btrs", bone_fields(bones, "btdt", false))})));
 }
 
 std::string bone_name(std::uint16_t id) {

@@ -39,6 +39,9 @@
 
 namespace posed::drivers::mocopi {
 
+inline constexpr std::string_view kFormat = "sony motion format";
+inline constexpr std::uint8_t kFormatVersion = 1;
+
 // Reads the fields of a value one by one.
 class FieldReader {
  public:
@@ -87,17 +90,12 @@ struct FrameHead {
 // The bones of a skdf, which is untrusted: at most kMaxJoints, no number twice. Cold.
 Result<std::vector<BoneEntry>> parse_skeleton(std::span<const std::byte> content);
 
-// The datagrams as the app sends them. Cold.
-[[nodiscard]] std::vector<std::byte> encode_skeleton(std::span<const BoneEntry> bones);
-[[nodiscard]] std::vector<std::byte> encode_frame(std::uint32_t number, double time_s,
-                                                  double unix_s, std::span<const BoneEntry> bones);
-
 inline constexpr std::size_t kBones = 27;
 inline constexpr std::uint16_t kNoParent = 0xFFFF;
 // Sony's name of a bone, and which bone of the canonical humanoid it is. Cold.
 [[nodiscard]] std::string bone_name(std::uint16_t id);
 [[nodiscard]] std::optional<Bone> canonical_bone(std::uint16_t id);
-// The parent in Sony's technical specification, for the emulator. Cold.
+// The parent in Sony's technical specification. Cold.
 [[nodiscard]] std::uint16_t usual_parent(std::uint16_t id);
 
 }  // namespace posed::drivers::mocopi

@@ -17,12 +17,14 @@ void write_vector(BigEndianWriter& writer, const Vec3f& v) {
   for (const float x : v) writer.f32(x);
 }
 
-// Angles about the fixed axes X, Y, Z, in this order of turning [degrees].
+// Angles about the fixed axes X, Y, Z, in this order of turning [degrees]. Each is read after the
+// one before is undone, so that they make the rotation exactly even where X and Z are one axis.
 Vec3f to_euler(const Quatf& rotation) {
-  const Eigen::Matrix3d m = to_eigen_double(rotation).toRotationMatrix();
-  const double y = std::asin(std::clamp(-m(2, 0), -1.0, 1.0));
-  const double x = std::atan2(m(2, 1), m(2, 2));
+  const Eigen::Matrix3d m = to_eigen_double(rotation).normalized().toRotationMatrix();
   const double z = std::atan2(m(1, 0), m(0, 0));
+  const double c = std::cos(z), s = std::sin(z);
+  const double y = std::atan2(-m(2, 0), c * m(0, 0) + s * m(1, 0));
+  const double x = std::atan2(s * m(0, 2) - c * m(1, 2), c * m(1, 1) - s * m(0, 1));
   return {static_cast<float>(x / kDegree), static_cast<float>(y / kDegree),
           static_cast<float>(z / kDegree)};
 }

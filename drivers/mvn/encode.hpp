@@ -1,4 +1,4 @@
-// Builds MVN's datagrams, for the emulator and for tests. Cold: allocates.
+// Builds MVN's datagrams, for the emulator and for outputs. Cold: allocates.
 #pragma once
 
 #include <array>

@@ -128,6 +128,8 @@ void NatNetEmulator::emit(std::int64_t now_ns, Bytes& out) {
                        .timecode = emulate::timecode_at(time_ns),
                        .timestamp_s = seconds(time_ns),
                        .exposure_ticks = ticks_at(time_ns),
+                       .received_ticks = ticks_at(time_ns) + 1000,
+                       .sent_ticks = ticks_at(time_ns) + 2000,
                        .bodies_changed = std::exchange(changed_, false)};
     packet.skeletons.push_back(person());
     if (wand_) add_wand(packet);

@@ -30,17 +30,19 @@ void write_part(ByteWriter& writer, Version version, std::int32_t count, WriteEn
 }
 
 void write_rigid_body(ByteWriter& writer, const RigidBody& body, const Reading& reading,
-                      bool is_bone) {
+                      bool is_bone, bool invented) {
   const Version version = reading.version;
   writer.i32(body.id);
   write_vector(writer, body.position_m);
   for (const float x : body.rotation_xyzw) writer.f32(x);
   if (reading.padded) writer.u32(0);
   if (version < Version{3, 0}) {
-    writer.i32(1);  // one marker: position, id, size
-    write_vector(writer, body.position_m);
-    writer.i32(1);
-    writer.f32(0.02F);
+    writer.i32(invented ? 1 : 0);  // one marker: position, id, size
+    if (invented) {
+      write_vector(writer, body.position_m);
+      writer.i32(1);
+      writer.f32(0.02F);
+    }
   }
   writer.f32(0.0005F);  // mean error
   if (version >= Version{2, 6} && (!is_bone || reading.bones_have_params)) {
@@ -84,31 +86,39 @@ void write_asset(ByteWriter& writer) {
 
 void write_parts(ByteWriter& writer, const FramePacket& frame, const Reading& reading) {
   const Version version = reading.version;
-  write_part(writer, version, 1, [](ByteWriter& to) {
+  const auto write_invented = [&](auto write) {
+    if (frame.invented) return write_part(writer, version, 1, write);
+    write_part(writer, version, 0, [](ByteWriter&) {});
+  };
+  write_invented([](ByteWriter& to) {
     write_text(to, "all");
     to.i32(1);
     write_vector(to, {1.0F, 2.0F, 3.0F});
   });
-  write_part(writer, version, 1, [](ByteWriter& to) { write_vector(to, {3.0F, 2.0F, 1.0F}); });
+  write_invented([](ByteWriter& to) { write_vector(to, {3.0F, 2.0F, 1.0F}); });
   write_part(writer, version, count_of(frame.rigid_bodies), [&](ByteWriter& to) {
-    for (const RigidBody& body : frame.rigid_bodies) write_rigid_body(to, body, reading, false);
+    for (const RigidBody& body : frame.rigid_bodies) {
+      write_rigid_body(to, body, reading, false, frame.invented);
+    }
   });
   write_part(writer, version, count_of(frame.skeletons), [&](ByteWriter& to) {
     for (const SkeletonPacket& skeleton : frame.skeletons) {
       to.i32(skeleton.id);
       to.i32(count_of(skeleton.bones));
-      for (const RigidBody& bone : skeleton.bones) write_rigid_body(to, bone, reading, true);
+      for (const RigidBody& bone : skeleton.bones) {
+        write_rigid_body(to, bone, reading, true, frame.invented);
+      }
     }
   });
-  if (version >= Version{4, 1}) write_part(writer, version, 1, write_asset);
+  if (version >= Version{4, 1}) write_invented(write_asset);
   write_part(writer, version, count_of(frame.labelled), [&](ByteWriter& to) {
     for (const LabelledMarker& marker : frame.labelled) write_labelled(to, marker, version);
   });
-  if (version >= Version{2, 9}) write_part(writer, version, 1, write_channel);
-  if (version >= Version{2, 11}) write_part(writer, version, 1, write_channel);
+  if (version >= Version{2, 9}) write_invented(write_channel);
+  if (version >= Version{2, 11}) write_invented(write_channel);
   if (version >= Version{4, 5}) {  // two parts that posed does not know
-    write_part(writer, version, 1, write_channel);
-    write_part(writer, version, 1, [](ByteWriter& to) { to.u16(7); });
+    write_invented(write_channel);
+    write_invented([](ByteWriter& to) { to.u16(7); });
   }
 }
 
@@ -123,7 +133,10 @@ void write_suffix(ByteWriter& writer, const FramePacket& frame, const Reading& r
     writer.f32(static_cast<float>(frame.timestamp_s));
   }
   if (version >= Version{3, 0}) {
-    for (const std::uint64_t later : {0U, 1000U, 2000U}) writer.u64(frame.exposure_ticks + later);
+    for (const std::uint64_t ticks :
+         {frame.exposure_ticks, frame.received_ticks, frame.sent_ticks}) {
+      writer.u64(ticks);
+    }
   }
   if (version >= Version{4, 1}) writer.u64(0);
   if (version >= Version{2, 6}) writer.i16(frame.bodies_changed ? 2 : 0);

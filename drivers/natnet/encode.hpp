@@ -1,5 +1,5 @@
-// Builds the large packets of a NatNet server, for the emulator and for tests: the layouts drawn in
-// frame.hpp and model_def.hpp, in any version. Cold.
+// Builds the large packets of a NatNet server, for the emulator and for outputs: the layouts drawn
+// in frame.hpp and model_def.hpp, in any version. Cold.
 #pragma once
 
 #include <cstdint>
@@ -19,8 +19,11 @@ struct FramePacket {
   std::uint32_t number = 0;
   std::uint32_t timecode = 0;
   double timestamp_s = 0.0;
-  std::uint64_t exposure_ticks = 0;
+  std::uint64_t exposure_ticks = 0, received_ticks = 0, sent_ticks = 0;
   bool bodies_changed = false;
+  // Whether parts that posed does not know are filled with something, so that readers show that
+  // they skip it: marker sets, assets, force plates, devices. Otherwise they are empty.
+  bool invented = true;
   std::vector<RigidBody> rigid_bodies{};
   std::vector<SkeletonPacket> skeletons{};
   std::vector<LabelledMarker> labelled{};

@@ -1,8 +1,10 @@
 #include "drivers/natnet/figure.hpp"
 
-#include <string>
 #include <string_view>
 #include <utility>
+
+#include "drivers/natnet/encode.hpp"
+#include "drivers/natnet/layout.hpp"
 
 namespace posed::drivers::natnet {
 namespace {
@@ -52,12 +54,12 @@ void add_hand(Figure& figure, const std::string& letter, float side) {
   }
 }
 
-void add_arm(Figure& figure, const std::string& letter, float side) {
+void add_arm(Figure& figure, const std::string& letter, float side, bool fingers) {
   figure.add(letter + "Shoulder", "Chest", {side * 0.04F, 0.2F, 0.0F});
   figure.add(letter + "UArm", letter + "Shoulder", {side * 0.12F, 0.0F, 0.0F});
   figure.add(letter + "FArm", letter + "UArm", {side * 0.28F, 0.0F, 0.0F});
   figure.add(letter + "Hand", letter + "FArm", {side * 0.25F, 0.0F, 0.0F});
-  add_hand(figure, letter, side);
+  if (fingers) add_hand(figure, letter, side);
 }
 
 void add_leg(Figure& figure, const std::string& letter, float side) {
@@ -67,27 +69,38 @@ void add_leg(Figure& figure, const std::string& letter, float side) {
   figure.add(letter + "Toe", letter + "Foot", {0.0F, -0.06F, 0.14F});
 }
 
-BodyDef person() {
-  BodyDef body{.name = std::string(kPerson), .id = kPersonId, .is_skeleton = true, .bones = {}};
+}  // namespace
+
+BodyDef average_person(const std::string& name, std::int32_t id, float scale, bool fingers) {
+  BodyDef body{.name = name, .id = id, .is_skeleton = true, .bones = {}};
   Figure figure(body);
   figure.add("Hip", "", {0.0F, 0.95F, 0.0F});
   figure.add("Ab", "Hip", {0.0F, 0.08F, 0.0F});
   figure.add("Chest", "Ab", {0.0F, 0.2F, 0.0F});
   figure.add("Neck", "Chest", {0.0F, 0.25F, 0.0F});
   figure.add("Head", "Neck", {0.0F, 0.14F, 0.02F});
-  add_arm(figure, "L", 1.0F);
-  add_arm(figure, "R", -1.0F);
+  add_arm(figure, "L", 1.0F, fingers);
+  add_arm(figure, "R", -1.0F, fingers);
   add_leg(figure, "L", 1.0F);
   add_leg(figure, "R", -1.0F);
+  for (BoneDef& bone : body.bones) {
+    for (float& x_m : bone.offset_m) x_m *= scale;
+  }
   return body;
 }
 
-}  // namespace
+Result<std::shared_ptr<const Skeleton>> skeleton_of(const BodyDef& body) {
+  constexpr Version kAny{3, 0};
+  ModelDef model;
+  model.bodies.push_back(body);
+  const auto layout = TRY(make_layout(encode_description(model, kAny, {.version = kAny})));
+  return layout->bodies[0].skeleton;
+}
 
 ModelDef emulated_model() {
   const std::string wand(kWand);
   ModelDef model;
-  model.bodies.push_back(person());
+  model.bodies.push_back(average_person(std::string(kPerson), kPersonId, 1.0F, /*fingers=*/true));
   model.bodies.push_back(
       {.name = wand,
        .id = kWandId,

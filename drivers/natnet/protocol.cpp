@@ -14,7 +14,9 @@ namespace {
 constexpr std::size_t kNameBytes = 256;
 constexpr std::size_t kVersionBytes = 4;
 constexpr std::string_view kClientName = "posed";
-constexpr std::string_view kServerName = "posed emulator";
+// What a server sends; a layout holds until the next one.
+constexpr std::array<Version, 7> kSentVersions{
+    {{2, 9}, {2, 10}, {2, 11}, {3, 0}, {3, 1}, {4, 0}, {4, 1}}};
 
 bool is_known(std::uint16_t id) noexcept { return id <= 14 || id == 100; }
 
@@ -30,16 +32,19 @@ void write_program(ByteWriter& writer, std::string_view name, Version natnet) {
 
 }  // namespace
 
-Result<Version> parse_version(std::string_view text) {
+std::optional<Version> read_version(std::string_view text) noexcept {
   Version version;
-  const auto [point, bad_major] =
-      std::from_chars(text.data(), text.data() + text.size(), version.major);
   const char* const end = text.data() + text.size();
-  if (bad_major == std::errc() && point != end && *point == '.') {
-    const auto [stop, bad_minor] = std::from_chars(point + 1, end, version.minor);
-    const bool in_range = version >= Version{2, 5} && version.major <= 4;
-    if (bad_minor == std::errc() && stop == end && in_range) return version;
-  }
+  const auto [point, bad_major] = std::from_chars(text.data(), end, version.major);
+  if (bad_major != std::errc() || point == end || *point != '.') return std::nullopt;
+  const auto [stop, bad_minor] = std::from_chars(point + 1, end, version.minor);
+  if (bad_minor != std::errc() || stop != end) return std::nullopt;
+  return version;
+}
+
+Result<Version> parse_version(std::string_view text) {
+  const auto version = read_version(text);
+  if (version && *version >= Version{2, 5} && version->major <= 4) return *version;
   return misuse("version should be a NatNet version from 2.5 to 4.x, like \"3.0\"");
 }
 
@@ -91,6 +96,25 @@ RT_SAFE DescriptionHead read_description_head(std::span<const std::byte> bytes) 
   return head;
 }
 
+RT_SAFE Version nearest_version(Version asked) noexcept {
+  Version nearest = kSentVersions.front();
+  for (const Version version : kSentVersions) {
+    if (version <= asked) nearest = version;
+  }
+  return nearest;
+}
+
+RT_SAFE Version version_for(std::span<const std::byte> connect) noexcept {
+  constexpr std::size_t kOwn = kNameBytes + kVersionBytes, kWanted = kOwn + kVersionBytes + 1;
+  for (const std::size_t at : {kWanted, kOwn}) {
+    if (connect.size() < at + kVersionBytes) continue;
+    const Version version{.major = std::to_integer<std::uint8_t>(connect[at]),
+                          .minor = std::to_integer<std::uint8_t>(connect[at + 1])};
+    if (version.known()) return nearest_version(version);
+  }
+  return kSentVersions.back();
+}
+
 std::vector<std::byte> encode_message(MessageId id, std::span<const std::byte> payload) {
   ByteWriter writer;
   writer.u16(static_cast<std::uint16_t>(id));
@@ -115,7 +139,7 @@ std::vector<std::byte> encode_connect() {
 
 std::vector<std::byte> encode_server_info(const ServerInfo& info) {
   ByteWriter writer;
-  write_program(writer, kServerName, info.version);
+  write_program(writer, info.name, info.version);
   if (info.version >= Version{3, 0}) {
     writer.u64(info.clock_hz);
     writer.u16(info.data_port);

@@ -35,6 +35,7 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -55,6 +56,7 @@ enum class MessageId : std::uint16_t {
   kModelDef = 5,
   kFrame = 7,
   kMessageText = 8,
+  kDisconnect = 9,
   kKeepAlive = 10,
   kEchoRequest = 12,
   kEchoResponse = 13,
@@ -71,7 +73,9 @@ struct Version {
   constexpr auto operator<=>(const Version&) const = default;
 };
 
-// "3.0"; nullopt for other text.
+// "3.0", of any version; nullopt for other text.
+[[nodiscard]] std::optional<Version> read_version(std::string_view text) noexcept;
+// The same for an option: fails for a version that posed does not know.
 Result<Version> parse_version(std::string_view text);
 
 struct Message {
@@ -84,6 +88,7 @@ RT_SAFE [[nodiscard]] Outcome decode_message(std::span<const std::byte> bytes,
                                              Message& message) noexcept;
 
 struct ServerInfo {
+  std::string_view name = "posed emulator";  // only to encode it
   Version version;
   std::uint64_t clock_hz = 0;  // of its ticks; 0 before 3.0
   // Where it sends its frames, from 3.0 on; port 0: it does not say.
@@ -118,5 +123,12 @@ RT_SAFE [[nodiscard]] DescriptionHead read_description_head(
 [[nodiscard]] std::vector<std::byte> encode_text(MessageId id, std::string_view text);
 [[nodiscard]] std::vector<std::byte> encode_connect();
 [[nodiscard]] std::vector<std::byte> encode_server_info(const ServerInfo& info);
+
+// What a host says of itself in Connect (char[256] name, u8[4] its version, u8[4] its NatNet
+// version; clients of SDK 4 also u8 0, u8[4] the version that they want to be sent): the version to
+// send it, of 2.9 to 4.1. Short payloads say nothing, and get the newest.
+RT_SAFE [[nodiscard]] Version version_for(std::span<const std::byte> connect) noexcept;
+// The newest of these versions that is no newer than `asked`, or the oldest.
+RT_SAFE [[nodiscard]] Version nearest_version(Version asked) noexcept;
 
 }  // namespace posed::drivers::natnet

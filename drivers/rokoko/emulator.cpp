@@ -1,88 +1,15 @@
-// The emulated person: where the joints lie in T-pose.
 #include "drivers/rokoko/emulator.hpp"
 
-#include <lz4frame.h>
-
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <numbers>
 
 #include "drivers/rokoko/decoder.hpp"
+#include "drivers/rokoko/encode.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::drivers::rokoko {
-
-namespace {
-
-struct Place {
-  std::string_view joint;  // without "left": the right side is its mirror image
-  Vec3f from_parent_m;     // in T-pose, in posed's axes
-};
-
-constexpr std::array<Place, 34> kPlaces{{{"hip", {0.0F, 0.0F, 0.0F}},
-                                         {"spine", {0.0F, 0.1F, 0.0F}},
-                                         {"chest", {0.0F, 0.2F, 0.0F}},
-                                         {"neck", {0.0F, 0.24F, 0.0F}},
-                                         {"head", {0.0F, 0.1F, 0.02F}},
-                                         {"Shoulder", {0.04F, 0.18F, 0.0F}},
-                                         {"UpperArm", {0.14F, 0.0F, 0.0F}},
-                                         {"LowerArm", {0.28F, 0.0F, 0.0F}},
-                                         {"Hand", {0.26F, 0.0F, 0.0F}},
-                                         {"ThumbProximal", {0.025F, -0.01F, 0.025F}},
-                                         {"ThumbMedial", {0.032F, 0.0F, 0.032F}},
-                                         {"ThumbDistal", {0.023F, 0.0F, 0.023F}},
-                                         {"ThumbTip", {0.018F, 0.0F, 0.018F}},
-                                         {"IndexProximal", {0.09F, 0.0F, 0.027F}},
-                                         {"IndexMedial", {0.042F, 0.0F, 0.0F}},
-                                         {"IndexDistal", {0.025F, 0.0F, 0.0F}},
-                                         {"IndexTip", {0.02F, 0.0F, 0.0F}},
-                                         {"MiddleProximal", {0.093F, 0.0F, 0.004F}},
-                                         {"MiddleMedial", {0.046F, 0.0F, 0.0F}},
-                                         {"MiddleDistal", {0.028F, 0.0F, 0.0F}},
-                                         {"MiddleTip", {0.022F, 0.0F, 0.0F}},
-                                         {"RingProximal", {0.088F, 0.0F, -0.017F}},
-                                         {"RingMedial", {0.042F, 0.0F, 0.0F}},
-                                         {"RingDistal", {0.026F, 0.0F, 0.0F}},
-                                         {"RingTip", {0.021F, 0.0F, 0.0F}},
-                                         {"LittleProximal", {0.081F, 0.0F, -0.036F}},
-                                         {"LittleMedial", {0.033F, 0.0F, 0.0F}},
-                                         {"LittleDistal", {0.02F, 0.0F, 0.0F}},
-                                         {"LittleTip", {0.019F, 0.0F, 0.0F}},
-                                         {"UpLeg", {0.09F, -0.06F, 0.0F}},
-                                         {"Leg", {0.0F, -0.42F, 0.0F}},
-                                         {"Foot", {0.0F, -0.41F, 0.0F}},
-                                         {"Toe", {0.0F, -0.06F, 0.13F}},
-                                         {"ToeEnd", {0.0F, 0.0F, 0.07F}}}};
-
-Eigen::Vector3f from_parent_m(std::string_view joint) {
-  const bool right = joint.starts_with("right");
-  if (right) joint.remove_prefix(5);
-  if (joint.starts_with("left")) joint.remove_prefix(4);
-  for (const Place& place : kPlaces) {
-    if (place.joint != joint) continue;
-    const Vec3f& offset_m = right ? mirrored(place.from_parent_m) : place.from_parent_m;
-    return {offset_m[0], offset_m[1], offset_m[2]};
-  }
-  return Eigen::Vector3f::Zero();
-}
-
-}  // namespace
-
-DescribedBody emulated_person(std::string_view name, const JointSet& joints) {
-  DescribedBody body;
-  body.key.name.keep(name);
-  body.joints = joints;
-  for (std::size_t j = 0; j < kStudioJoints; ++j) {
-    const int parent = studio_joint(j).parent;
-    if (!joints[j] || parent < 0) continue;
-    const Eigen::Quaternionf T_parent = to_eigen(t_pose_rotation(static_cast<std::size_t>(parent)));
-    const Eigen::Vector3f offset_m = T_parent.conjugate() * from_parent_m(studio_joint(j).name);
-    body.offset_m[j] = {offset_m.x(), offset_m.y(), offset_m.z()};
-  }
-  return body;
-}
 
 namespace {
 
@@ -92,12 +19,6 @@ constexpr double kStep_hz = 0.9;  // double steps, waves and words a second
 constexpr double kLap_s = 12.0;   // of the circle that Anna walks
 constexpr std::array<std::string_view, 3> kVersionNumbers{"2", "3", "3"};
 
-JointSet without_fingers() {
-  JointSet joints;
-  joints.set();
-  return joints & ~fingers_of(kLeftHandJoint) & ~fingers_of(kRightHandJoint);
-}
-
 DescribedBody emulated_sword() {
   DescribedBody body;
   body.key.part = Part::kProp;
@@ -106,39 +27,16 @@ DescribedBody emulated_sword() {
   return body;
 }
 
-std::string shortest(float value) {
-  std::array<char, 32> text{};
-  const auto [end, error] = std::to_chars(text.data(), text.data() + text.size(), value);
-  return {text.data(), end};
-}
-
-// In Unity's axes, as members of a joint or prop.
-std::string transform_json(const Vec3f& position_m, const Quatf& rotation_xyzw) {
-  const Vec3f p = mirrored(position_m);
-  const Quatf q = mirrored(rotation_xyzw);
-  return "\"position\":{\"x\":" + shortest(p[0]) + ",\"y\":" + shortest(p[1]) +
-         ",\"z\":" + shortest(p[2]) + "},\"rotation\":{\"x\":" + shortest(q[0]) +
-         ",\"y\":" + shortest(q[1]) + ",\"z\":" + shortest(q[2]) + ",\"w\":" + shortest(q[3]) + "}";
-}
-
 std::string quoted_name(const DescribedBody& body) {
   return '"' + std::string(body.key.name.text()) + '"';
-}
-
-Emulator::Bytes compressed(const std::string& json) {
-  Emulator::Bytes bytes(LZ4F_compressFrameBound(json.size(), nullptr));
-  const std::size_t size =
-      LZ4F_compressFrame(bytes.data(), bytes.size(), json.data(), json.size(), nullptr);
-  bytes.resize(LZ4F_isError(size) != 0 ? 0 : size);
-  return bytes;
 }
 
 }  // namespace
 
 StudioEmulator::StudioEmulator(const StudioEmulatorSettings& settings)
     : settings_(settings), pace_(nanoseconds(1.0 / settings.rate_hz)) {
-  bodies_[kAnna].described = emulated_person("Anna", JointSet().set());
-  bodies_[kBen].described = emulated_person("Ben", without_fingers());
+  bodies_[kAnna].described = average_person("Anna", JointSet().set(), 1.0F);
+  bodies_[kBen].described = average_person("Ben", without_fingers(), 1.0F);
   bodies_[kSword].described = emulated_sword();
   for (EmulatedBody& body : bodies_) {
     body.skeleton =
@@ -222,7 +120,7 @@ void StudioEmulator::emit(std::int64_t now_ns, Bytes& out) {
   move(seconds(time_ns));
   const std::string json = frame_json(seconds(time_ns - began_ns_));
   if (settings_.lz4) {
-    const Bytes bytes = compressed(json);
+    const Bytes bytes = compress(json);
     out.insert(out.end(), bytes.begin(), bytes.end());
   } else {
     const auto bytes = std::as_bytes(std::span(json));
@@ -235,8 +133,9 @@ std::string StudioEmulator::frame_json(double time_s) const {
   for (const EmulatedBody& body : bodies_) {
     if (!body.present) continue;
     if (body.described.key.part == Part::kProp) {
-      props += "{\"name\":" + quoted_name(body.described) + ",\"color\":[128,128,128],\"type\":0," +
-               transform_json(body.frame.root_position_m, body.frame.rotation_xyzw[0]) + '}';
+      props += "{\"name\":" + quoted_name(body.described) + ",\"color\":[128,128,128],\"type\":0,";
+      append_transform(props, body.frame.root_position_m, body.frame.rotation_xyzw[0]);
+      props += '}';
     } else {
       actors += (actors.empty() ? "" : ",") + actor_json(body);
     }
@@ -269,31 +168,9 @@ std::string StudioEmulator::actor_json(const EmulatedBody& body) const {
          "},\"body\":{" + joints_json(body) + "}" + (anna ? ",\"face\":" + face_json() : "") + '}';
 }
 
-// The global pose from the one relative to the parents.
 std::string StudioEmulator::joints_json(const EmulatedBody& body) const {
   std::string json;
-  std::array<Eigen::Quaternionf, kStudioJoints> rotation;
-  std::array<Eigen::Vector3f, kStudioJoints> place;
-  std::size_t j = 0;
-  for (const Joint& joint : body.skeleton->joints) {
-    const Quatf& local = body.frame.rotation_xyzw[j];
-    const Eigen::Quaternionf turned =
-        body.frame.valid[j] ? to_eigen(local) : Eigen::Quaternionf::Identity();
-    if (joint.parent < 0) {
-      rotation[j] = turned;
-      place[j] = Eigen::Map<const Eigen::Vector3f>(body.frame.root_position_m.data());
-    } else {
-      const std::size_t parent = joint.parent;
-      rotation[j] = rotation[parent] * turned;
-      place[j] = place[parent] + rotation[parent] * joint.offset_m.cast<float>();
-    }
-    if (j > 0) json += ',';
-    json += '"' + joint.name + "\":{" +
-            transform_json({place[j].x(), place[j].y(), place[j].z()},
-                           body.frame.valid[j] ? from_eigen(rotation[j]) : Quatf{}) +
-            '}';
-    ++j;
-  }
+  append_joints(json, *body.skeleton, body.frame);
   return json;
 }
 
@@ -303,7 +180,8 @@ std::string StudioEmulator::face_json() const {
   for (std::size_t i = 0; i < kFaceValues; ++i) {
     const std::string_view value = face_value_name(i);
     json += ",\"" + std::string(value) + "\":";
-    json += value == "jawOpen" ? shortest(static_cast<float>(jaw_)) : "0";
+    json +=
+        value == "jawOpen" ? clip::number_text(static_cast<double>(static_cast<float>(jaw_))) : "0";
   }
   return json + '}';
 }

@@ -63,8 +63,4 @@ class StudioEmulator final : public Emulator {
   bool gloves_only_ = false;
 };
 
-// A person of 1.75 m in T-pose with these joints: what Studio would stream and the decoder would
-// describe. Cold.
-[[nodiscard]] DescribedBody emulated_person(std::string_view name, const JointSet& joints);
-
 }  // namespace posed::drivers::rokoko

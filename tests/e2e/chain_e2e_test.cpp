@@ -246,7 +246,7 @@ TEST_CASE("an emulated device is open to other machines only if that is wanted")
   }
 }
 
-TEST_CASE("the configs of a stage of three machines are sound") {
+TEST_CASE("the configs of stages are sound") {
   TempFolder folder;
   std::filesystem::copy(source_dir() / "config/stage", folder.path(),
                         std::filesystem::copy_options::recursive);
@@ -254,7 +254,7 @@ TEST_CASE("the configs of a stage of three machines are sound") {
     REQUIRE(posed({"keygen", name, "--out", (folder.path() / "keys").string()}).code == 0);
   }
   REQUIRE(style::save_model(toy_model(1, 0.3), folder.path() / "walk.style"));
-  for (const char* name : {"capture.toml", "stylist.toml"}) {
+  for (const char* name : {"capture.toml", "stylist.toml", "unreal.toml"}) {
     const auto checked = posed({"check", "--config", (folder.path() / name).string()});
     INFO(checked.out << checked.err);
     CHECK(checked.code == 0);

@@ -166,9 +166,17 @@ Findings findings_of(const config::OutputConfig& output) {
     findings.add(part, stream);
     line += std::string(", ") + part + " " + stream;
   }
+  if (!output.bodies.empty()) {
+    findings.add("bodies", output.bodies);
+    line += fmt::format(", bodies {}", fmt::join(output.bodies, " "));
+  }
   if (output.to.empty()) {
     findings.add("listen", output.listen);
     line += ", on " + output.listen;
+    if (!output.group.empty()) {
+      findings.add("group", output.group);
+      line += fmt::format(", to the group {}:{}", output.group, output.data_port);
+    }
   } else {
     findings.add("to", output.to);
     for (const std::string& to : output.to) line += ", to " + to;

@@ -7,6 +7,7 @@
 
 #include "drivers/driver.hpp"
 #include "drivers/mocopi/emulator.hpp"
+#include "drivers/mocopi/encode.hpp"
 #include "drivers/mocopi/protocol.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/allocations.hpp"

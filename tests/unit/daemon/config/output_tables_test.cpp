@@ -89,7 +89,9 @@ role = "assistant"
 
 TEST_CASE("a wrong output is one sentence with its line") {
   CHECK(output_complaint("[[output]]\nbody = \"ann\"\n" + kTo) ==
-        "posed.toml:12: output.kind is missing; write kind = \"vmc\", \"bvh\" or \"axis\"");
+        "posed.toml:12: output.kind is missing; write kind = \"vmc\" or \"bvh\" or \"axis\" or "
+        "\"mvn\""
+        " or \"mocopi\" or \"rokoko\" or \"natnet\"");
   CHECK(output_complaint("[[output]]\nkind = \"vcm\"\nbody = \"ann\"\n" + kTo)
             .find("posed.toml:13: output.kind must be one of these words") == 0);
   CHECK(output_complaint("[[output]]\nkind = \"vmc\"\n" + kTo) ==
@@ -165,7 +167,8 @@ header = true
   CHECK(output_complaint(bvh + "peers = [\"studio\"]\n").find("'studio' should be an address") !=
         std::string::npos);
   CHECK(output_complaint(bvh + "to = [\"127.0.0.1:39539\"]\n") ==
-        "posed.toml:15: to is for outputs of kind = \"vmc\" or \"axis\"; leave it out");
+        "posed.toml:15: to is for outputs of kind = \"vmc\" or \"axis\" or \"mvn\" or \"mocopi\" or"
+        " \"rokoko\"; leave it out");
   CHECK(output_complaint(bvh + "left_hand = \"left\"\n").find("is for outputs of kind = \"vmc\"") !=
         std::string::npos);
   CHECK(
@@ -173,6 +176,58 @@ header = true
       std::string::npos);
   CHECK(output_complaint("[[output]]\nkind = \"bvh\"\n") ==
         "posed.toml:12: the output names no stream; add body = \"STREAM\"");
+}
+
+TEST_CASE("outputs of a device's protocol name people and receivers, or listen") {
+  const Reading reading = read_with_outputs(R"([[output]]
+kind = "mvn"
+bodies = ["ann", "stage-bob"]
+to = ["127.0.0.1:9763"]
+format = "euler"
+[[output]]
+kind = "natnet"
+body = "ann"
+group = "239.255.42.99"
+data_port = 1600
+[[output]]
+kind = "rokoko"
+body = "ann"
+to = ["127.0.0.1:14043"]
+format = "json"
+)");
+  for (const Error& error : reading.errors) FAIL_CHECK(error.text());
+  REQUIRE(reading.config.outputs.size() == 3);
+  CHECK(reading.config.outputs[0].name == "mvn-ann");
+  CHECK(reading.config.outputs[0].bodies == std::vector<std::string>{"ann", "stage-bob"});
+  CHECK(reading.config.outputs[0].euler);
+  CHECK(reading.config.outputs[1].listen == "127.0.0.1:1510");
+  CHECK(reading.config.outputs[1].group == "239.255.42.99");
+  CHECK(reading.config.outputs[1].data_port == 1600);
+  CHECK_FALSE(reading.config.outputs[2].lz4);
+
+  const std::string mvn = "[[output]]\nkind = \"mvn\"\n", to = "to = [\"127.0.0.1:9763\"]\n";
+  const std::string natnet = "[[output]]\nkind = \"natnet\"\nbody = \"ann\"\n";
+  CHECK(output_complaint(mvn + "body = \"ann\"\n") ==
+        "posed.toml:12: output.to is missing; name the receivers, like to = [\"127.0.0.1:9763\"]");
+  CHECK(output_complaint(mvn + "bodies = [\"ann\", \"anne\"]\n" + to) ==
+        "posed.toml:14: there is no stream named 'anne'; the nearest is 'ann'");
+  CHECK(output_complaint(mvn + "bodies = [\"ann\", \"ann\"]\n" + to) ==
+        "posed.toml:14: 'ann' is listed twice; it would be sent as two people");
+  CHECK(output_complaint(mvn + "bodies = []\n" + to) ==
+        "posed.toml:14: output.bodies takes 1 to 5 streams");
+  CHECK(output_complaint(mvn + "body = \"ann\"\nbodies = [\"stage-bob\"]\n" + to) ==
+        "posed.toml:15: body names one person and bodies several: leave one out");
+  CHECK(output_complaint(mvn + "body = \"ann\"\nformat = \"unity\"\n" + to)
+            .find("quaternion, euler") != std::string::npos);
+  CHECK(output_complaint("[[output]]\nkind = \"mocopi\"\nbodies = [\"ann\"]\n" + to)
+            .find("bodies is for outputs of kind = \"axis\"") != std::string::npos);
+  CHECK(output_complaint(natnet + "group = \"192.168.1.1\"\n") ==
+        "posed.toml:15: '192.168.1.1' should be a multicast group, like 239.255.42.99");
+  CHECK(output_complaint(natnet + "data_port = 70000\n").find("out of range") != std::string::npos);
+  CHECK(output_complaint(natnet + "listen = \"0.0.0.0\"\n").find("in peers") != std::string::npos);
+  CHECK(output_complaint(natnet + natnet + "name = \"second\"\n") ==
+        "posed.toml:15: output 'natnet-ann' and output 'second' cannot share the UDP endpoint"
+        " 127.0.0.1:1510; give output 'second' another port");
 }
 
 TEST_CASE("the stream of a right hand is no left hand") {

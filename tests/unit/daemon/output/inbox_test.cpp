@@ -26,12 +26,12 @@ struct InboxRig {
   Inbox inbox{{"ann", "", "glove"}, *wake};
   Delivery delivery;
 
-  // "B1 B2 R7": parts and sequences.
+  // "B1 B2 R7": places and sequences.
   std::string taken() {
     inbox.drain(delivery);
     std::string text;
-    delivery.for_each([&](Part part, const Frame& frame) {
-      text += "BLR"[index_of(part)] + std::to_string(frame.header.sequence) + " ";
+    delivery.for_each([&](std::size_t place, const Frame& frame) {
+      text += "BLR"[place] + std::to_string(frame.header.sequence) + " ";
     });
     return text;
   }

@@ -1,0 +1,58 @@
+#include "daemon/output/fit.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "proto/frame/rotation.hpp"
+
+namespace posed::output {
+
+Result<Fit> Fit::make(std::shared_ptr<const Skeleton> person, bool own, const MakeFigure& figure) {
+  if (person == nullptr) return fail("it has no pose");
+  Fit fit;
+  if (own) {
+    for (std::size_t j = 0; j < person->joints.size(); ++j) {
+      fit.rest_xyzw_.push_back(rest_rotation(*person, j));
+    }
+    fit.skeleton_ = std::move(person);
+    return fit;
+  }
+  const auto average = TRY(figure(1.0));
+  const auto to_average = TRY(motion::Retarget::bind(person, average));
+  fit.skeleton_ = TRY(figure(1.0 / to_average.scale()));
+  fit.retarget_ = TRY(motion::Retarget::bind(std::move(person), fit.skeleton_));
+  return fit;
+}
+
+const Frame& Fit::apply(const Frame& frame) noexcept {
+  if (retarget_) {
+    retarget_->apply(frame, pose_);
+    return pose_;
+  }
+  pose_ = frame;
+  for (std::size_t j = 0; j < rest_xyzw_.size(); ++j) {
+    if (!frame.valid[j]) pose_.rotation_xyzw[j] = rest_xyzw_[j];
+  }
+  return pose_;
+}
+
+Quatf rest_rotation(const Skeleton& skeleton, std::size_t joint) noexcept {
+  const int parent = skeleton.joints[joint].parent;
+  const Eigen::Quaterniond& T = skeleton.joints[joint].T_world_joint;
+  return from_eigen(parent < 0 ? T : skeleton.joints[parent].T_world_joint.conjugate() * T);
+}
+
+bool has_fingers(const Skeleton& skeleton) {
+  return skeleton.joint_of(Bone::kLeftIndexProximal) >= 0 ||
+         skeleton.joint_of(Bone::kRightIndexProximal) >= 0;
+}
+
+bool rests_unturned(const Skeleton& skeleton) noexcept {
+  constexpr double kUnturned_rad = 1e-4;
+  return skeleton.root_joint == 0 && std::ranges::all_of(skeleton.joints, [](const Joint& joint) {
+           return joint.T_world_joint.angularDistance(Eigen::Quaterniond::Identity()) <
+                  kUnturned_rad;
+         });
+}
+
+}  // namespace posed::output

@@ -1,0 +1,53 @@
+// Fit: brings a person's frames onto the figure that a protocol sends. A person whose skeleton is
+// one of the protocol's goes out with its own bones; any other one moves an average figure with the
+// length of the person's legs, so that its feet stand where the person's do.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "models/motion/retarget.hpp"
+#include "proto/frame/frame.hpp"
+#include "proto/frame/result.hpp"
+#include "proto/frame/skeleton.hpp"
+
+namespace posed::output {
+
+// One thread.
+class Fit {
+ public:
+  // Makes the average figure, all lengths times `scale`.
+  using MakeFigure = std::function<Result<std::shared_ptr<const Skeleton>>(double scale)>;
+
+  // `own`: the skeleton is one of the protocol's. Fails for a stream without a skeleton, or with
+  // one that has no bone of a person. Cold.
+  static Result<Fit> make(std::shared_ptr<const Skeleton> person, bool own,
+                          const MakeFigure& figure);
+
+  [[nodiscard]] const Skeleton& skeleton() const noexcept { return *skeleton_; }
+  // Returns the frame on that skeleton, valid until the next call. A joint that was not measured
+  // keeps its rotation of the T-pose relative to its parent.
+  [[nodiscard]] const Frame& apply(const Frame& frame) noexcept;
+
+ private:
+  Fit() = default;
+
+  std::shared_ptr<const Skeleton> skeleton_;
+  std::optional<motion::Retarget> retarget_;  // none: the person's own bones
+  std::vector<Quatf> rest_xyzw_;              // [joint] of the own bones, in T-pose
+  Frame pose_{};
+};
+
+// A joint's rotation relative to its parent in T-pose.
+[[nodiscard]] Quatf rest_rotation(const Skeleton& skeleton, std::size_t joint) noexcept;
+
+// Whether it can move its fingers.
+[[nodiscard]] bool has_fingers(const Skeleton& skeleton);
+
+// Whether no joint is turned in T-pose, and the first one says where the person is.
+[[nodiscard]] bool rests_unturned(const Skeleton& skeleton) noexcept;
+
+}  // namespace posed::output

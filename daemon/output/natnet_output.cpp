@@ -1,0 +1,242 @@
+#include "daemon/output/natnet_output.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "drivers/byte_reader.hpp"
+#include "drivers/byte_writer.hpp"
+#include "drivers/transport/socket.hpp"
+
+namespace posed::output {
+namespace {
+
+namespace natnet = drivers::natnet;
+
+constexpr int kMaxRequests = 16;           // that are answered in one turn
+constexpr std::size_t kMaxRequest = 1024;  // bytes; Connect, the longest, has less than 300
+constexpr natnet::Version kNewest{4, 1};
+
+// Frames for a group leave by the interface that the server has.
+void choose_interface(int fd, const drivers::Address& listen) noexcept {
+  if (listen.storage.ss_family != AF_INET) return;
+  sockaddr_in address{};
+  std::memcpy(&address, listen.get(), sizeof address);
+  if (address.sin_addr.s_addr == htonl(INADDR_ANY)) return;
+  ::setsockopt(fd, IPPROTO_IP, IP_MULTICAST_IF, &address.sin_addr, sizeof address.sin_addr);
+}
+
+// A request as clients send it: some end with a byte more than they say.
+bool read_request(std::span<const std::byte> bytes, natnet::Message& message) noexcept {
+  drivers::ByteReader reader(bytes);
+  static_cast<void>(reader.u16());
+  const std::size_t length = reader.u16();
+  if (!reader.ok() || reader.left() < length) return false;
+  const std::size_t whole = bytes.size() - reader.left() + length;
+  return natnet::decode_message(bytes.first(whole), message) == Outcome::kOk;
+}
+
+std::vector<std::byte> number_response(float value) {
+  drivers::ByteWriter writer;
+  writer.f32(value);
+  return natnet::encode_message(natnet::MessageId::kResponse, writer.written());
+}
+
+}  // namespace
+
+Result<std::unique_ptr<Output>> NatNetOutput::open(const config::OutputConfig& config,
+                                                   std::unique_ptr<system::EventFd> wake) {
+  const auto address = TRY(drivers::listen_address(config.listen, config.peers, "the clients'"));
+  std::optional<drivers::Address> group;
+  if (!config.group.empty()) {
+    group = TRY(drivers::parse_endpoint(config.group + ":" + std::to_string(config.data_port)));
+  }
+  const int fd = drivers::bind_socket(address, SOCK_DGRAM, /*shared=*/false);
+  if (fd < 0) {
+    return fail("cannot listen on " + config.listen + " (" + errno_text() +
+                "); Motive or another program may have the port: end it, or choose another one");
+  }
+  choose_interface(fd, address);
+  return std::make_unique<NatNetOutput>(config, std::move(wake), fd, group);
+}
+
+NatNetOutput::NatNetOutput(const config::OutputConfig& config,
+                           std::unique_ptr<system::EventFd> wake, int fd,
+                           std::optional<drivers::Address> group)
+    : Output(config, std::move(wake), /*together=*/true),
+      fd_(fd),
+      peers_(config.peers),
+      data_port_(static_cast<std::uint16_t>(config.data_port)),
+      limit_hz_(config.rate_hz),
+      group_(group),
+      scene_(config.people()) {}
+
+NatNetOutput::~NatNetOutput() { ::close(fd_); }
+
+std::string NatNetOutput::endpoint() const {
+  return drivers::endpoint_text(drivers::bound_address(fd_));
+}
+
+Result<> NatNetOutput::set_stream(std::size_t place, const LiveStream* stream) {
+  const auto set = scene_.set_stream(place, stream);
+  if (!set) return fail("cannot be sent: " + set.error().message);
+  return {};
+}
+
+void NatNetOutput::begin_turn(std::int64_t now_ns) {
+  std::erase_if(clients_,
+                [&](const Client& client) { return now_ns - client.heard_ns > kSilent_ns; });
+  std::array<std::byte, kMaxRequest> buffer;
+  more_ = true;
+  for (int i = 0; i < kMaxRequests; ++i) {
+    drivers::Address from;
+    const ssize_t size = ::recvfrom(fd_, buffer.data(), buffer.size(), MSG_DONTWAIT | MSG_TRUNC,
+                                    from.get(), &from.size);
+    if (size < 0) {
+      if (errno == EAGAIN) more_ = false;
+      continue;  // another error belongs to an earlier answer: a client has gone
+    }
+    natnet::Message message;
+    const auto bytes = static_cast<std::size_t>(size);
+    // Nobody else gets an answer, so that nobody can be flooded with them.
+    if (bytes > buffer.size() || !drivers::may_connect(from, peers_)) continue;
+    if (read_request(std::span(buffer).first(bytes), message)) answer(from, message, now_ns);
+  }
+  set_receivers(clients_.size() + (group_ ? 1 : 0));
+}
+
+bool NatNetOutput::take(std::size_t place, const Frame& frame, std::int64_t /*now_ns*/) {
+  return scene_.take(place, frame);
+}
+
+std::int64_t NatNetOutput::end_turn(std::int64_t now_ns) {
+  return more_ ? now_ns : system::kForever_ns;
+}
+
+NatNetOutput::Client* NatNetOutput::find(const drivers::Address& address) noexcept {
+  const auto at = std::ranges::find_if(clients_, [&](const Client& client) {
+    return drivers::host_of(client.address) == drivers::host_of(address) &&
+           drivers::port_of(client.address) == drivers::port_of(address);
+  });
+  return at == clients_.end() ? nullptr : &*at;
+}
+
+void NatNetOutput::admit(const drivers::Address& address, Version version, std::int64_t now_ns) {
+  if (Client* known = find(address); known != nullptr) {
+    known->version = version;
+    return;
+  }
+  if (clients_.size() < kMaxClients) {
+    clients_.push_back({.address = address, .version = version, .heard_ns = now_ns});
+  } else if (refused_ns_ == kNoTime_ns || now_ns >= refused_ns_ + kNanosPerSecond) {
+    refused_ns_ = now_ns;
+    notify(drivers::host_text(address) + " was refused: there are " + std::to_string(kMaxClients) +
+           " clients, the most there may be");
+  }
+}
+
+void NatNetOutput::answer(const drivers::Address& from, const natnet::Message& message,
+                          std::int64_t now_ns) {
+  Client* client = find(from);
+  if (client != nullptr) client->heard_ns = now_ns;
+  const Version version = client == nullptr ? kNewest : client->version;
+  switch (message.id) {
+    case natnet::MessageId::kConnect:
+    case natnet::MessageId::kDiscovery: {
+      const Version wanted = natnet::version_for(message.payload);
+      // With a group a client gets the frames there, unless it says that it is alive here.
+      const bool connects = message.id == natnet::MessageId::kConnect;
+      if (connects && (!group_ || client != nullptr)) admit(from, wanted, now_ns);
+      natnet::ServerInfo info{.name = "posed",
+                              .version = group_ ? kNewest : wanted,
+                              .clock_hz = NatNetScene::kClock_hz,
+                              .data_port = data_port_,
+                              .multicast = group_.has_value()};
+      for (std::size_t i = 12; group_ && i < 16; ++i) {
+        info.group = info.group << 8 | drivers::host_of(*group_)[i];
+      }
+      return send_to(from, natnet::encode_server_info(info));
+    }
+    case natnet::MessageId::kKeepAlive:
+      if (client == nullptr) admit(from, kNewest, now_ns);
+      return;
+    case natnet::MessageId::kDisconnect:
+      if (client != nullptr) clients_.erase(clients_.begin() + (client - clients_.data()));
+      return;
+    case natnet::MessageId::kRequestModelDef:
+      return send_to(from, natnet::encode_model_def(scene_.model(), version));
+    case natnet::MessageId::kRequest:
+      return send_to(from, answer_request(message.payload, client));
+    case natnet::MessageId::kEchoRequest: {
+      if (message.payload.size() < sizeof(std::uint64_t)) return;
+      drivers::ByteWriter ticks;
+      ticks.u64(drivers::ByteReader(message.payload).u64());
+      ticks.u64(NatNetScene::ticks_at(now_ns));
+      return send_to(from,
+                     natnet::encode_message(natnet::MessageId::kEchoResponse, ticks.written()));
+    }
+    default:
+      return send_to(from, natnet::encode_message(natnet::MessageId::kUnrecognized, {}));
+  }
+}
+
+NatNetOutput::Bytes NatNetOutput::answer_request(std::span<const std::byte> payload,
+                                                 Client* client) const {
+  constexpr std::string_view kBitstream = "Bitstream";
+  std::string_view text(reinterpret_cast<const char*>(payload.data()), payload.size());
+  text = text.substr(0, text.find('\0'));
+  if (text == "FrameRate") {
+    return number_response(static_cast<float>(limit_hz_ > 0.0 ? limit_hz_ : scene_.rate_hz()));
+  }
+  if (text == "UnitsToMillimeters") return number_response(1000.0F);
+  if (!text.starts_with(kBitstream)) {
+    return natnet::encode_message(natnet::MessageId::kUnrecognized, {});
+  }
+  text.remove_prefix(kBitstream.size());
+  if (text.starts_with(',') && client != nullptr) {
+    const auto asked = natnet::read_version(text.substr(1));
+    if (asked) client->version = natnet::nearest_version(*asked);
+  }
+  const Version version = client == nullptr ? kNewest : client->version;
+  return natnet::encode_text(natnet::MessageId::kResponse, std::string(kBitstream) + "," +
+                                                               std::to_string(version.major) + "." +
+                                                               std::to_string(version.minor));
+}
+
+void NatNetOutput::send(std::int64_t now_ns) {
+  if (clients_.empty() && !group_) return;
+  const natnet::FramePacket& frame = scene_.next_frame(now_ns);
+  // Clients of one version get the same bytes.
+  std::ranges::stable_sort(clients_, {}, &Client::version);
+  Version encoded;
+  Bytes datagram;
+  const auto encode = [&](Version version) {
+    if (version != encoded) datagram = natnet::encode_frame(frame, {.version = version});
+    encoded = version;
+  };
+  for (const Client& client : clients_) {
+    encode(client.version);
+    send_to(client.address, datagram);
+  }
+  if (!group_) return;
+  encode(kNewest);
+  send_to(*group_, datagram);
+}
+
+void NatNetOutput::send_to(const drivers::Address& to,
+                           std::span<const std::byte> datagram) noexcept {
+  const ssize_t sent = ::sendto(fd_, datagram.data(), datagram.size(), MSG_NOSIGNAL | MSG_DONTWAIT,
+                                to.get(), to.size);
+  const bool slow = sent < 0 && (errno == EAGAIN || errno == ENOBUFS);
+  count({.sent = sent >= 0 ? 1U : 0U,
+         .dropped = slow ? 1U : 0U,
+         .failed = sent < 0 && !slow ? 1U : 0U});
+}
+
+}  // namespace posed::output

@@ -1,0 +1,71 @@
+// NatNetOutput: a NatNet server, as Motive is one. It answers who it is and what its bodies are,
+// and sends frames to each client that asks, in the version that it asks for, and to a multicast
+// group if the config names one.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "daemon/output/natnet_scene.hpp"
+#include "daemon/output/output.hpp"
+#include "drivers/natnet/protocol.hpp"
+#include "drivers/transport/address.hpp"
+
+namespace posed::output {
+
+class NatNetOutput final : public Output {
+ public:
+  static constexpr std::size_t kMaxClients = 16;
+  // A client that sends nothing for so long is gone; clients send KeepAlive about every second.
+  static constexpr std::int64_t kSilent_ns = 5 * kNanosPerSecond;
+
+  static Result<std::unique_ptr<Output>> open(const config::OutputConfig& config,
+                                              std::unique_ptr<system::EventFd> wake);
+  // Takes the socket, which is bound. `group`: where everybody gets the frames.
+  NatNetOutput(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake, int fd,
+               std::optional<drivers::Address> group);
+  ~NatNetOutput() override;
+
+  [[nodiscard]] int poll_fd() const noexcept override { return fd_; }
+  [[nodiscard]] std::string endpoint() const;
+
+ private:
+  using Bytes = std::vector<std::byte>;
+  using Version = drivers::natnet::Version;
+  struct Client {
+    drivers::Address address;
+    Version version;
+    std::int64_t heard_ns = 0;
+  };
+
+  [[nodiscard]] Result<> set_stream(std::size_t place, const LiveStream* stream) override;
+  void begin_turn(std::int64_t now_ns) override;
+  [[nodiscard]] bool take(std::size_t place, const Frame& frame, std::int64_t now_ns) override;
+  void send(std::int64_t now_ns) override;
+  [[nodiscard]] std::int64_t end_turn(std::int64_t now_ns) override;
+
+  void answer(const drivers::Address& from, const drivers::natnet::Message& message,
+              std::int64_t now_ns);
+  [[nodiscard]] Bytes answer_request(std::span<const std::byte> payload, Client* client) const;
+  // Null when it has not asked for frames.
+  [[nodiscard]] Client* find(const drivers::Address& address) noexcept;
+  // Lets a client in, if there is room.
+  void admit(const drivers::Address& address, Version version, std::int64_t now_ns);
+  void send_to(const drivers::Address& to, std::span<const std::byte> datagram) noexcept;
+
+  int fd_;
+  std::vector<std::string> peers_;
+  std::uint16_t data_port_;
+  double limit_hz_;
+  std::optional<drivers::Address> group_;
+  NatNetScene scene_;
+  std::vector<Client> clients_;
+  bool more_ = false;                     // requests wait
+  std::int64_t refused_ns_ = kNoTime_ns;  // when a refusal was last told
+};
+
+}  // namespace posed::output

@@ -1,0 +1,144 @@
+#include <array>
+#include <charconv>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <nlohmann/json.hpp>
+
+#include "daemon/output/datagram_encoder.hpp"
+#include "daemon/output/fit.hpp"
+#include "drivers/rokoko/decoder.hpp"
+#include "drivers/rokoko/encode.hpp"
+#include "proto/text/json_text.hpp"
+
+namespace posed::output {
+namespace {
+
+namespace rokoko = drivers::rokoko;
+
+bool is_studio_prop(const Skeleton& skeleton) {
+  return skeleton.joints.size() == 1 && !skeleton.joints[0].bone;
+}
+
+// Whether the joints are those that Studio would describe.
+bool is_studio_actor(const Skeleton& skeleton) {
+  rokoko::JointSet joints;
+  for (std::size_t j = 0; j < skeleton.joints.size(); ++j) {
+    const Joint& joint = skeleton.joints[j];
+    const std::size_t studio = rokoko::joint_named(joint.name);
+    if (studio == rokoko::kStudioJoints || (j == 0) != (studio == 0)) return false;
+    joints.set(studio);
+    const int parent = rokoko::parent_among(joints, studio);
+    const std::string_view above =
+        joint.parent < 0 ? "" : std::string_view(skeleton.joints[joint.parent].name);
+    if (above != (parent < 0 ? "" : rokoko::studio_joint(parent).name)) return false;
+  }
+  return skeleton.root_joint == 0;
+}
+
+class RokokoEncoder final : public DatagramEncoder {
+ public:
+  RokokoEncoder(std::size_t places, bool lz4) : lz4_(lz4), people_(places) {}
+
+  Result<> set_person(std::size_t place, const LiveStream* stream) override {
+    auto& person = people_[place];
+    person.reset();
+    if (stream == nullptr) return {};
+    const auto& skeleton = stream->skeleton;
+    const bool prop = skeleton != nullptr && is_studio_prop(*skeleton);
+    const bool own = skeleton != nullptr && (prop || is_studio_actor(*skeleton));
+    const std::string& name = own ? skeleton->name : stream->name;
+    auto fit = TRY(Fit::make(skeleton, own, [&](double scale) {
+      const rokoko::JointSet joints =
+          has_fingers(*skeleton) ? rokoko::JointSet().set() : rokoko::without_fingers();
+      return rokoko::skeleton_of(rokoko::average_person(name, joints, static_cast<float>(scale)),
+                                 name);
+    }));
+    std::string head = head_of(fit.skeleton(), name, prop);
+    person.emplace(std::move(fit), std::move(head), prop);
+    return {};
+  }
+
+  bool take(std::size_t place, const Frame& frame) override {
+    auto& person = people_[place];
+    if (!person) return false;
+    person->pose = person->fit.apply(frame);
+    person->pose.valid.set();  // what was not measured stands as in T-pose
+    person->posed = true;
+    time_ns_ = measured_ns(frame.header);
+    if (begin_ns_ == kNoTime_ns) begin_ns_ = time_ns_;
+    return true;
+  }
+
+  void describe(const SendDatagram& /*send*/) override {}
+  std::int64_t describe_every_ns() const noexcept override { return kNanosPerSecond; }
+
+  void encode(const SendDatagram& send) override {
+    json_ = R"({"version":"3.0","fps":60,"scene":{"timestamp":)";
+    std::array<char, 32> time{};
+    const auto [end, error] =
+        std::to_chars(time.data(), time.data() + time.size(), seconds(time_ns_ - begin_ns_),
+                      std::chars_format::fixed, 6);
+    json_.append(time.data(), end);
+    json_ += R"(,"actors":[)";
+    append_all(/*props=*/false);
+    json_ += R"(],"props":[)";
+    append_all(/*props=*/true);
+    json_ += "]}}";
+    if (lz4_) return send(rokoko::compress(json_));
+    send(std::as_bytes(std::span(json_)));
+  }
+
+ private:
+  struct Person {
+    Person(Fit fitted, std::string named, bool is_prop)
+        : fit(std::move(fitted)), head(std::move(named)), prop(is_prop) {}
+    Fit fit;
+    std::string head;  // the JSON up to the joints
+    bool prop;
+    Frame pose{};
+    bool posed = false;
+  };
+
+  static std::string head_of(const Skeleton& skeleton, const std::string& name, bool prop) {
+    const std::string head = "{\"name\":" + json_text(nlohmann::json(name)) + ",\"color\":[128,128,128],";
+    if (prop) return head + "\"type\":0,";
+    const std::string gloves = has_fingers(skeleton) ? "true" : "false";
+    return head + "\"meta\":{\"hasGloves\":" + gloves + ",\"hasLeftGlove\":" + gloves +
+           ",\"hasRightGlove\":" + gloves +
+           ",\"hasBody\":true,\"hasFace\":false},\"dimensions\":{\"totalHeight\":1.75,"
+           "\"hipHeight\":0.96},\"body\":{";
+  }
+
+  void append_all(bool props) {
+    bool first = true;
+    for (const auto& person : people_) {
+      if (!person || !person->posed || person->prop != props) continue;
+      if (!std::exchange(first, false)) json_ += ',';
+      json_ += person->head;
+      if (props) {
+        rokoko::append_transform(json_, person->pose.root_position_m,
+                                 person->pose.rotation_xyzw[0]);
+      } else {
+        rokoko::append_joints(json_, person->fit.skeleton(), person->pose);
+        json_ += '}';
+      }
+      json_ += '}';
+    }
+  }
+
+  bool lz4_;
+  std::vector<std::optional<Person>> people_;  // [place]
+  std::int64_t time_ns_ = 0, begin_ns_ = kNoTime_ns;
+  std::string json_;
+};
+
+}  // namespace
+
+std::unique_ptr<DatagramEncoder> rokoko_encoder(const config::OutputConfig& config) {
+  return std::make_unique<RokokoEncoder>(config.people(), config.lz4);
+}
+
+}  // namespace posed::output

@@ -1,0 +1,166 @@
+// The outputs that only send, as the programs of the protocols do: from frames to datagrams on real
+// sockets, on a virtual clock, to posed's own decoders.
+#include "daemon/output/datagram_output.hpp"
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include <catch2/catch.hpp>
+
+#include "models/motion/canonical_skeleton.hpp"
+#include "models/motion/retarget.hpp"
+#include "models/motion/synthetic_walker.hpp"
+#include "tests/unit/daemon/output/protocol_link.hpp"
+
+namespace posed::output {
+namespace {
+
+using config::OutputKind;
+
+struct Protocol {
+  OutputKind kind{};
+  std::vector<std::string> people{};  // of the emulator
+  drivers::Options options{};
+  bool euler = false, lz4 = false;
+};
+
+config::OutputConfig protocol_config(const Protocol& protocol, const UdpReceiver& receiver) {
+  config::OutputConfig config;
+  config.kind = protocol.kind;
+  config.bodies = protocol.people;
+  config.to = {receiver.endpoint()};
+  config.euler = protocol.euler;
+  config.lz4 = protocol.lz4;
+  return config;
+}
+
+// The protocol's emulator -> posed -> the same protocol -> posed.
+void check_round_trip(const Protocol& protocol) {
+  const std::string driver(config::kind_name(protocol.kind));
+  INFO(driver);
+  const auto emulator = drivers::find_driver(driver)->emulate(protocol.options).value();
+  ProtocolReader first(driver), second(driver);
+  UdpReceiver receiver;
+  const OutputRig rig(protocol_config(protocol, receiver));
+  std::vector<std::shared_ptr<const Skeleton>> known(protocol.people.size());
+  Apart worst;
+  int compared = 0;
+  while (emulator->next_due_ns() < 3 * kNanosPerSecond) {
+    const std::int64_t now_ns = emulator->next_due_ns();
+    std::vector<std::byte> bytes;
+    emulator->emit(now_ns, bytes);
+    first.feed(bytes, now_ns);
+    for (std::size_t i = 0; i < protocol.people.size(); ++i) {
+      const std::string& name = protocol.people[i];
+      const auto id = static_cast<std::uint32_t>(i);
+      if (const auto skeleton = first.skeleton(name); skeleton != nullptr && skeleton != known[i]) {
+        rig.output->stream_comes(info_of(id, name, skeleton));
+        known[i] = skeleton;
+      }
+      if (!first.newest.contains(name)) continue;
+      Frame frame = frame_of(id, first.newest[name]);
+      frame.header.arrival_ns = now_ns;
+      rig.pass(frame, now_ns);
+      for (const auto& datagram : receiver.received(rig.sent())) second.feed(datagram, now_ns);
+      if (!second.newest.contains(name)) continue;
+      const auto there = second.skeleton(name);
+      if (!same_figure(*known[i], *there, worst)) continue;  // its fingers are not known yet
+      compare(*known[i], frame, second.newest[name], worst);
+      ++compared;
+    }
+    first.newest.clear();
+  }
+  CHECK(compared > 100 * static_cast<int>(protocol.people.size()));
+  CHECK(worst.rad < 1e-5);
+  CHECK(worst.m < 1e-5);
+  CHECK(second.damaged == 0);
+  CHECK(rig.reported.empty());
+}
+
+// Another person: each bone that both have points to where the walker's does.
+void check_walker(const Protocol& protocol) {
+  const std::string driver(config::kind_name(protocol.kind));
+  INFO(driver);
+  const auto walk = motion::make_walker({.seconds = 2.0, .rate_hz = 60.0}).value();
+  const auto canonical = motion::canonical_skeleton(*walk.skeleton).value();
+  const auto to_canonical = motion::Retarget::bind(walk.skeleton, canonical).value();
+  ProtocolReader reader(driver);
+  UdpReceiver receiver;
+  Protocol one = protocol;
+  one.people = {"ann"};
+  const OutputRig rig(protocol_config(one, receiver));
+  rig.output->stream_comes(info_of(0, "ann", walk.skeleton));
+  double worst_rad = 0.0, worst_m = 0.0;
+  int compared = 0;
+  for (int i = 0; i < 120; ++i) {
+    const std::int64_t now_ns = i * kNanosPerSecond / 60;
+    Frame frame = frame_of(0, walk.frame(i));
+    frame.header.arrival_ns = now_ns;
+    frame.header.sequence = static_cast<std::uint64_t>(i) + 1;
+    rig.pass(frame, now_ns);
+    for (const auto& datagram : receiver.received(rig.sent())) reader.feed(datagram, now_ns);
+    if (reader.newest.empty()) continue;
+    const auto& [name, got] = *reader.newest.begin();
+    Frame expected, arrived;
+    to_canonical.apply(frame, expected);
+    const auto back = motion::Retarget::bind(reader.skeleton(name), canonical).value();
+    back.apply(got, arrived);
+    for (std::size_t j = 0; j < canonical->joints.size(); ++j) {
+      if (!arrived.valid[j]) continue;
+      worst_rad =
+          std::max(worst_rad, angle_between_rad(to_eigen_double(arrived.rotation_xyzw[j]),
+                                                to_eigen_double(expected.rotation_xyzw[j])));
+      ++compared;
+    }
+    for (std::size_t k = 0; k < 3; ++k) {
+      worst_m = std::max(worst_m, std::abs(static_cast<double>(arrived.root_position_m[k]) -
+                                           static_cast<double>(expected.root_position_m[k])));
+    }
+  }
+  CHECK(compared > 1000);
+  CHECK(worst_rad < 1e-5);
+  CHECK(worst_m < 1e-3);
+}
+
+}  // namespace
+
+TEST_CASE("people of MVN arrive through the MVN output as they were") {
+  check_round_trip({.kind = OutputKind::kMvn, .people = {"Walker", "Waver"}});
+  check_round_trip({.kind = OutputKind::kMvn, .people = {"Walker", "Waver"}, .euler = true});
+}
+
+TEST_CASE("any other person arrives through the MVN output with their bones' directions") {
+  check_walker({.kind = OutputKind::kMvn});
+  check_walker({.kind = OutputKind::kMvn, .euler = true});
+}
+
+TEST_CASE("a person of mocopi arrives through the mocopi output as they were") {
+  check_round_trip({.kind = OutputKind::kMocopi, .people = {"mocopi"}});
+}
+
+TEST_CASE("actors and props of Rokoko Studio arrive through its output as they were") {
+  for (const bool lz4 : {false, true}) {
+    check_round_trip({.kind = OutputKind::kRokoko, .people = {"Anna", "Ben", "Sword"}, .lz4 = lz4});
+  }
+}
+
+TEST_CASE("any other person arrives through the outputs of mocopi and Rokoko") {
+  check_walker({.kind = OutputKind::kMocopi});
+  check_walker({.kind = OutputKind::kRokoko, .lz4 = true});
+}
+
+TEST_CASE("a stream without a person is named, and the others are sent") {
+  UdpReceiver receiver;
+  Protocol protocol{.kind = OutputKind::kMvn, .people = {"values", "ann"}};
+  OutputRig rig(protocol_config(protocol, receiver));
+  const auto walk = motion::make_walker({.seconds = 1.0}).value();
+  rig.output->stream_comes(info_of(4, "values", nullptr));
+  rig.output->stream_comes(info_of(5, "ann", walk.skeleton));
+  rig.pass(frame_of(5, walk.frame(0)), 0);
+  REQUIRE(rig.reported.size() == 1);
+  CHECK(rig.reported[0] == "4: output test: stream 'values' cannot be sent: it has no pose");
+  CHECK(receiver.received(1).size() == 3);  // name, T-pose, pose
+}
+
+}  // namespace posed::output
