@@ -22,6 +22,7 @@ class Gathering {
 
   // A pose has come. Returns whether all that are due have: then the next ones are gathered.
   [[nodiscard]] bool comes(std::size_t stream, std::int64_t now_ns) noexcept {
+    if (is_late(now_ns)) sent();  // what has waited for too long goes with the next
     const bool again = streams_[stream].waits;
     streams_[stream] = {.waits = true, .came_ns = now_ns};
     if (due_ns_ == kNoTime_ns) due_ns_ = now_ns + kMoment_ns;

@@ -46,6 +46,7 @@ class MvnEncoder final : public DatagramEncoder {
   Result<> set_person(std::size_t place, const LiveStream* stream) override {
     auto& person = people_[place];
     person.reset();
+    begin_sample();
     if (stream == nullptr) return {};
     const auto id = static_cast<std::uint8_t>(place);
     const bool own = stream->skeleton != nullptr && is_mvn_character(*stream->skeleton);
@@ -93,10 +94,9 @@ class MvnEncoder final : public DatagramEncoder {
   void encode(const SendDatagram& send) override {
     const bool again = std::ranges::any_of(
         people_, [](const auto& person) { return person && person->waits && person->sent; });
-    if (again) ++sample_;
+    if (again) begin_sample();
     for (auto& person : people_) {
       if (!person) continue;
-      if (again) person->sent = false;
       if (!std::exchange(person->waits, false)) continue;
       person->sent = true;
       encode_person(*person, send);
@@ -115,6 +115,13 @@ class MvnEncoder final : public DatagramEncoder {
     Timecode timecode{};
     bool waits = false, sent = false;  // sent: in the sample of this number
   };
+
+  void begin_sample() {
+    ++sample_;
+    for (auto& person : people_) {
+      if (person) person->sent = false;
+    }
+  }
 
   [[nodiscard]] mvn::Head head_of(const Person& person, mvn::Type type) const {
     const mvn::Character& character = person.character;

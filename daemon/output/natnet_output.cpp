@@ -22,6 +22,7 @@ namespace natnet = drivers::natnet;
 constexpr int kMaxRequests = 16;           // that are answered in one turn
 constexpr std::size_t kMaxRequest = 1024;  // bytes; Connect, the longest, has less than 300
 constexpr natnet::Version kNewest{4, 1};
+constexpr double kUsualRate_hz = 120.0;  // where the stream does not know its own
 
 // Frames for a group leave by the interface that the server has.
 void choose_interface(int fd, const drivers::Address& listen) noexcept {
@@ -192,7 +193,8 @@ NatNetOutput::Bytes NatNetOutput::answer_request(std::span<const std::byte> payl
   std::string_view text(reinterpret_cast<const char*>(payload.data()), payload.size());
   text = text.substr(0, text.find('\0'));
   if (text == "FrameRate") {
-    return number_response(static_cast<float>(limit_hz_ > 0.0 ? limit_hz_ : scene_.rate_hz()));
+    const double streams_hz = scene_.rate_hz() > 0.0 ? scene_.rate_hz() : kUsualRate_hz;
+    return number_response(static_cast<float>(limit_hz_ > 0.0 ? limit_hz_ : streams_hz));
   }
   if (text == "UnitsToMillimeters") return number_response(1000.0F);
   if (!text.starts_with(kBitstream)) {

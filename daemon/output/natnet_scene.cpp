@@ -15,10 +15,18 @@ bool is_prop(const Skeleton& skeleton) {
   return skeleton.joints.size() == 1 && !skeleton.joints[0].bone;
 }
 
-// Whether it is one of Motive's: its own first bone, or that of its names for FBX and BVH.
+// Whether it is one of Motive's: with its own names, or with those that it gives for FBX and BVH.
+// Files of such names have channels.
 bool is_of_motive(const Skeleton& skeleton) {
-  const Joint& first = skeleton.joints[0];
-  return first.bone == Bone::kHips && (first.name == "Hip" || first.name == "Hips") &&
+  const auto is_named = [&](Bone bone, std::string_view name) {
+    const int joint = skeleton.joint_of(bone);
+    return joint >= 0 && skeleton.joints[joint].name == name;
+  };
+  const bool named =
+      is_named(Bone::kHips, "Hip") ||
+      (is_named(Bone::kHips, "Hips") &&
+       (is_named(Bone::kLeftUpperArm, "LeftArm") || is_named(Bone::kLeftUpperArm, "LeftShoulder")));
+  return named && skeleton.channels.empty() && skeleton.joints[0].bone == Bone::kHips &&
          rests_unturned(skeleton);
 }
 

@@ -103,7 +103,8 @@ class RokokoEncoder final : public DatagramEncoder {
   };
 
   static std::string head_of(const Skeleton& skeleton, const std::string& name, bool prop) {
-    const std::string head = "{\"name\":" + json_text(nlohmann::json(name)) + ",\"color\":[128,128,128],";
+    const std::string head =
+        "{\"name\":" + json_text(nlohmann::json(name)) + ",\"color\":[128,128,128],";
     if (prop) return head + "\"type\":0,";
     const std::string gloves = has_fingers(skeleton) ? "true" : "false";
     return head + "\"meta\":{\"hasGloves\":" + gloves + ",\"hasLeftGlove\":" + gloves +

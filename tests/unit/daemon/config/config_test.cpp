@@ -500,7 +500,7 @@ TEST_CASE("the shipped config contains every key with its default") {
     INFO("config/posed.toml: " << b.sources[0].driver << "." << option.name);
     CHECK((b.sources[0].options.at(std::string(option.name)) == option.default_value));
   }
-  REQUIRE(b.outputs.size() == 3);
+  REQUIRE(b.outputs.size() == 7);
   const OutputConfig no_output;
   CHECK(b.outputs[0].left_hand == no_output.left_hand);
   CHECK(b.outputs[0].right_hand == no_output.right_hand);
@@ -510,6 +510,11 @@ TEST_CASE("the shipped config contains every key with its default") {
   CHECK(b.outputs[1].listen == no_output.listen);
   CHECK(b.outputs[1].peers == no_output.peers);
   CHECK(b.outputs[1].header == no_output.header);
+  CHECK(b.outputs[3].euler == no_output.euler);
+  CHECK(b.outputs[5].lz4 == no_output.lz4);
+  CHECK(b.outputs[6].peers == no_output.peers);
+  CHECK(b.outputs[6].group == no_output.group);
+  CHECK(b.outputs[6].data_port == no_output.data_port);
 }
 
 }  // namespace

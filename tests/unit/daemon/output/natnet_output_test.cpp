@@ -163,7 +163,7 @@ TEST_CASE("people and props of Motive arrive through the NatNet output as they w
   CHECK(compared > 200);
   CHECK(worst.rad < 1e-5);
   CHECK(worst.m < 1e-5);
-  CHECK(second.damaged == 0);
+  CHECK(second.damage == "");
   CHECK(rig.reported.empty());
 }
 
@@ -277,17 +277,19 @@ TEST_CASE("a NatNet server answers nobody whom the config does not name") {
 }
 
 TEST_CASE("poses of two streams that come together go out as one, and nobody waits for long") {
+  constexpr std::int64_t kPeriod_ns = 10'000'000;
   Gathering gathering(2);
   CHECK(gathering.comes(0, 0));  // the other one has never come
-  CHECK(gathering.comes(1, 1'000));
-  CHECK_FALSE(gathering.comes(0, 10'000'000));
-  CHECK(gathering.due_ns() == 10'000'000 + Gathering::kMoment_ns);
-  CHECK(gathering.comes(1, 10'001'000));
+  CHECK_FALSE(gathering.comes(1, 1000));
+  CHECK(gathering.due_ns() == 1000 + Gathering::kMoment_ns);
+  CHECK(gathering.is_late(1000 + Gathering::kMoment_ns));
+  gathering.sent();
+  CHECK_FALSE(gathering.comes(0, kPeriod_ns));
+  CHECK(gathering.comes(1, kPeriod_ns + 1000));
   CHECK(gathering.due_ns() == kNoTime_ns);
-  CHECK_FALSE(gathering.comes(0, 20'000'000));
-  CHECK(gathering.is_late(20'000'000 + Gathering::kMoment_ns));
-  CHECK(gathering.comes(0, 20'500'000));                    // again: it waits no longer
-  CHECK(gathering.comes(0, 20'000'000 + kNanosPerSecond));  // the other one is silent
+  CHECK_FALSE(gathering.comes(0, 2 * kPeriod_ns));
+  CHECK(gathering.comes(0, 2 * kPeriod_ns + 1000));                 // again: it waits no longer
+  CHECK(gathering.comes(0, 2 * kPeriod_ns + kNanosPerSecond / 2));  // the other one is silent
 }
 
 }  // namespace posed::output

@@ -35,9 +35,11 @@ class ProtocolReader {
       newest[bodies()[sink_.bodies[i]].name] = sink_.frames[i];
       ++frames;
     }
-    for (int i = 1; i < kOutcomes; ++i) {
-      if (static_cast<Outcome>(i) != Outcome::kForeign)
-        damaged += sink_.count(static_cast<Outcome>(i));
+    for (const Outcome outcome : {Outcome::kShort, Outcome::kBadChecksum, Outcome::kOutOfRange,
+                                  Outcome::kLate, Outcome::kDuplicate}) {
+      if (sink_.count(outcome) == 0) continue;
+      damage += std::string(kOutcomeNames[static_cast<std::size_t>(outcome)]) + " at frame " +
+                std::to_string(frames) + ", ";
     }
     if (sink_.descriptions == before) return;
     auto layout = driver_.make_layout(sink_.described);
@@ -58,7 +60,8 @@ class ProtocolReader {
   }
 
   std::map<std::string, Frame> newest;  // [body] since the last description
-  int frames = 0, damaged = 0;
+  int frames = 0;
+  std::string damage;  // what was wrong with datagrams
 
  private:
   const drivers::Driver& driver_;
