@@ -152,6 +152,7 @@ void Tracked::set_scale(const std::array<Vec3f, kBodySegments>& position_m) noex
 }
 
 void Tracked::look_at(const CharacterPose& pose, std::int64_t now_ns) noexcept {
+  looked_ = true;
   const bool new_fingers = pose.fingers && !character.fingers;
   const bool look = now_ns - look_ns_ >= kLookEvery_ns;
   if (has_body_ && !new_fingers && !look) return;
@@ -178,7 +179,7 @@ void Tracked::look_at(const CharacterPose& pose, std::int64_t now_ns) noexcept {
 }
 
 bool Tracked::belongs(std::int64_t now_ns) const noexcept {
-  if (!has_body_ || !posed_ || now_ns - received_ns >= kPatience_ns) return false;
+  if (!has_body_ || !looked_ || now_ns - received_ns >= kPatience_ns) return false;
   return described || (named_ && scaled_) || now_ns - first_ns >= kPatience_ns;
 }
 

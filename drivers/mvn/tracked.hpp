@@ -60,7 +60,8 @@ class Tracked {
   DatagramOrder order_{32};
   Assembly assembly_;
   Type type_ = Type::kEuler;  // of its poses
-  bool posed_ = false;        // a pose has come
+  bool posed_ = false;        // a part of a pose has come
+  bool looked_ = false;       // a whole one has
   bool other_done_ = false;   // the sample `done_` came from another type
   std::uint32_t done_ = 0;    // the newest sample accepted
   std::int64_t type_ns_ = 0;  // arrival of the newest pose of that type

@@ -38,7 +38,7 @@ std::optional<Version> read_version(std::string_view text) noexcept {
   const auto [point, bad_major] = std::from_chars(text.data(), end, version.major);
   if (bad_major != std::errc() || point == end || *point != '.') return std::nullopt;
   const auto [stop, bad_minor] = std::from_chars(point + 1, end, version.minor);
-  if (bad_minor != std::errc() || stop != end) return std::nullopt;
+  if (bad_minor != std::errc() || (stop != end && *stop != '.')) return std::nullopt;
   return version;
 }
 

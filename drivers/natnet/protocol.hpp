@@ -73,7 +73,7 @@ struct Version {
   constexpr auto operator<=>(const Version&) const = default;
 };
 
-// "3.0", of any version; nullopt for other text.
+// "3.0", of any version, with a revision ("3.0.0") or without; nullopt for other text.
 [[nodiscard]] std::optional<Version> read_version(std::string_view text) noexcept;
 // The same for an option: fails for a version that posed does not know.
 Result<Version> parse_version(std::string_view text);
