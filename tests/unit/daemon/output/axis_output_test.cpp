@@ -155,6 +155,30 @@ TEST_CASE("a walk goes out in binary, over TCP and UDP, as the same values") {
   }
 }
 
+TEST_CASE("several people go out as avatars of one Axis output, also at a limited rate") {
+  UdpReceiver receiver;
+  config::OutputConfig config;
+  config.kind = config::OutputKind::kAxis;
+  config.bodies = {"ann", "bob"};
+  config.to = {receiver.endpoint()};
+  config.rate_hz = 60.0;
+  const OutputRig rig(config);
+  const auto walk = motion::make_walker({.seconds = 1.0, .rate_hz = 60.0}).value();
+  rig.output->stream_comes(info_of(4, "ann", walk.skeleton));
+  rig.output->stream_comes(info_of(7, "bob", walk.skeleton));
+  for (const std::uint32_t stream : {4U, 7U, 4U}) {  // the newest of each is sent
+    rig.output->frame(frame_of(stream, walk.frame(0)));
+  }
+  static_cast<void>(rig.output->turn(0));
+  const auto datagrams = receiver.received(2);
+  REQUIRE(datagrams.size() == 2);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const std::string_view line(reinterpret_cast<const char*>(datagrams[i].data()),
+                                datagrams[i].size());
+    CHECK(line.starts_with(i == 0 ? "0 ann " : "1 bob "));
+  }
+}
+
 TEST_CASE("a client that wants it gets the BVH header, whose channels are the values of a line") {
   config::OutputConfig config = bvh_config();
   config.header = true;
