@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <numbers>
 
 #include "tests/support/pcapng.hpp"
 #include "tests/unit/drivers/mvn_rig.hpp"
@@ -190,6 +191,20 @@ TEST_CASE("mvn: type 01 turns about X, then Y, then Z, in centimetres and degree
   const Eigen::Quaterniond q = to_eigen_double(pose.segments[0].rotation_xyzw);
   CHECK((q * Eigen::Vector3d::UnitY() - Eigen::Vector3d::UnitZ()).norm() < 1e-6);
   CHECK((q * Eigen::Vector3d::UnitX() - Eigen::Vector3d::UnitY()).norm() < 1e-6);
+}
+
+TEST_CASE("mvn: the angles of type 01 make the rotation also where X and Z are nearly one axis") {
+  CharacterPose pose, back;
+  for (const double off_rad : {0.0, 1e-7, 1e-5, 1e-3}) {
+    pose.segments[0].rotation_xyzw = from_eigen(
+        axis_rotation(Axis::kZ, 0.7) * axis_rotation(Axis::kY, 0.5 * std::numbers::pi - off_rad) *
+        axis_rotation(Axis::kX, -0.4));
+    const Head head = test::mvn_head(Type::kEuler, 1, false);
+    const auto payload = encode_pose(Type::kEuler, pose);
+    REQUIRE(decode_pose(head, payload, back) == Outcome::kOk);
+    CHECK(test::mvn_apart_rad(back.segments[0].rotation_xyzw, pose.segments[0].rotation_xyzw) <
+          1e-6);
+  }
 }
 
 TEST_CASE("mvn: every datagram that is cut is short, and one that goes on, too") {

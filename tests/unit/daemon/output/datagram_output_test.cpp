@@ -11,6 +11,8 @@
 #include "models/motion/canonical_skeleton.hpp"
 #include "models/motion/retarget.hpp"
 #include "models/motion/synthetic_walker.hpp"
+#include "tests/support/pcapng.hpp"
+#include "tests/support/shared.hpp"
 #include "tests/unit/daemon/output/protocol_link.hpp"
 
 namespace posed::output {
@@ -131,6 +133,35 @@ void check_walker(const Protocol& protocol) {
 TEST_CASE("people of MVN arrive through the MVN output as they were") {
   check_round_trip({.kind = OutputKind::kMvn, .people = {"Walker", "Waver"}});
   check_round_trip({.kind = OutputKind::kMvn, .people = {"Walker", "Waver"}, .euler = true});
+}
+
+TEST_CASE("a recorded person of MVN arrives through the MVN output as they were") {
+  const auto recorded = [](const char* type) {
+    return test::shared(std::string("data/streams/xsens_mxtp/mxtp") + type + ".bin");
+  };
+  if (!recorded("02") || !recorded("12") || !recorded("13")) SKIP_WITHOUT_SHARED();
+  for (const bool euler : {false, true}) {
+    ProtocolReader first("mvn"), second("mvn");
+    for (const char* type : {"12", "13", "02"}) first.feed(test::file_bytes(*recorded(type)), 0);
+    auto again = test::file_bytes(*recorded("02"));
+    again[9] = static_cast<std::byte>(std::to_integer<unsigned>(again[9]) + 1);  // the next sample
+    first.feed(again, 0);
+    REQUIRE(first.newest.contains("Factory"));
+    UdpReceiver receiver;
+    const OutputRig rig(protocol_config(
+        {.kind = OutputKind::kMvn, .people = {"performer"}, .euler = euler}, receiver));
+    rig.output->stream_comes(info_of(0, "performer", first.skeleton("Factory")));
+    for (int i = 0; i < 2; ++i) {  // the first pose is part of the description
+      rig.pass(frame_of(0, first.newest["Factory"]), i);
+      for (const auto& datagram : receiver.received(rig.sent())) second.feed(datagram, i);
+    }
+    REQUIRE(second.newest.contains("Factory"));
+    Apart worst;
+    CHECK(same_figure(*first.skeleton("Factory"), *second.skeleton("Factory"), worst));
+    compare(*first.skeleton("Factory"), first.newest["Factory"], second.newest["Factory"], worst);
+    CHECK(worst.rad < 1e-5);
+    CHECK(worst.m < 1e-5);
+  }
 }
 
 TEST_CASE("any other person arrives through the MVN output with their bones' directions") {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include <catch2/catch.hpp>
@@ -15,6 +16,8 @@
 #include "drivers/natnet/emulator.hpp"
 #include "models/motion/canonical_skeleton.hpp"
 #include "models/motion/synthetic_walker.hpp"
+#include "tests/support/pcapng.hpp"
+#include "tests/support/shared.hpp"
 #include "tests/unit/daemon/output/protocol_link.hpp"
 
 namespace posed::output {
@@ -219,6 +222,29 @@ TEST_CASE("each NatNet client gets frames of the version that it asks for, or th
   CHECK(is_frame_of(changing.next(), {4, 0}));
   CHECK(is_frame_of(plain.next(), {4, 1}));
   CHECK(rig.stats().receivers() == 4);
+}
+
+TEST_CASE("a NatNet server answers the recorded requests of the vendor's client as Motive did") {
+  const auto recorded = [](const std::string& name) {
+    return test::shared("data/streams/natnet_python_natnet/" + name + "_packet_v3.bin");
+  };
+  if (!recorded("connect")) SKIP_WITHOUT_SHARED();
+  NatNetServerRig rig(natnet_config({"ann"}));
+  const NatNetClient client(rig);
+  for (const auto& [asked, answered] : {std::pair{"discovery", "serverinfo"},
+                                        {"connect", "serverinfo"},
+                                        {"echorequest", "echoresponse"},
+                                        {"requestmodeldef", "modeldef"}}) {
+    INFO(asked);
+    const Datagram expected = test::file_bytes(*recorded(answered));
+    const Datagram answer = client.ask(test::file_bytes(*recorded(asked)));
+    CHECK(id_of(answer) == id_of(expected));
+    if (answered != std::string_view("modeldef")) CHECK(answer.size() == expected.size());
+  }
+  const auto walk = motion::make_walker({.seconds = 1.0}).value();
+  rig.output->stream_comes(info_of(0, "ann", walk.skeleton));
+  rig.pass(frame_of(0, walk.frame(0)), rig.now_ns);
+  CHECK(is_frame_of(client.next(), {3, 0}));  // the client's own version
 }
 
 TEST_CASE("a NatNet client that leaves or is silent gets nothing any more") {
