@@ -248,12 +248,16 @@ void OutputReader::read_natnet(TableReader& table, OutputConfig& output) const {
   output.listen = "127.0.0.1";
   table.read("data_port", output.data_port, {1.0, kMaxPort});
   table.read("group", output.group);
+  read_clients(table, output);
+  if (output.group.empty()) return;
   const auto group = drivers::parse_host(output.group);
-  if (!output.group.empty() && !(group && drivers::is_multicast(drivers::host_of(*group)))) {
+  const bool v4 = group && group->storage.ss_family == AF_INET;
+  if (!v4 || !drivers::is_multicast(drivers::host_of(*group))) {
     table.add_error("group", fmt::format("{} should be a multicast group, like 239.255.42.99",
                                          in_quotes(output.group)));
+  } else if (output.listen.starts_with('[')) {
+    table.add_error("group", "to send to a group, listen must be an IPv4 address");
   }
-  read_clients(table, output);
 }
 
 void OutputReader::read_kind(TableReader& table, OutputConfig& output) const {

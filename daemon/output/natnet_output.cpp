@@ -194,7 +194,8 @@ NatNetOutput::Bytes NatNetOutput::answer_request(std::span<const std::byte> payl
   text = text.substr(0, text.find('\0'));
   if (text == "FrameRate") {
     const double streams_hz = scene_.rate_hz() > 0.0 ? scene_.rate_hz() : kUsualRate_hz;
-    return number_response(static_cast<float>(limit_hz_ > 0.0 ? limit_hz_ : streams_hz));
+    return number_response(
+        static_cast<float>(limit_hz_ > 0.0 ? std::min(limit_hz_, streams_hz) : streams_hz));
   }
   if (text == "UnitsToMillimeters") return number_response(1000.0F);
   if (!text.starts_with(kBitstream)) {

@@ -79,6 +79,7 @@ void check_round_trip(const Protocol& protocol) {
   CHECK(compared > 100 * static_cast<int>(protocol.people.size()));
   CHECK(worst.rad < 1e-5);
   CHECK(worst.m < 1e-5);
+  CHECK(worst.timecodes == 0);
   CHECK(second.damage == "");
   CHECK(rig.reported.empty());
 }
@@ -131,7 +132,9 @@ void check_walker(const Protocol& protocol) {
 }  // namespace
 
 TEST_CASE("people of MVN arrive through the MVN output as they were") {
-  check_round_trip({.kind = OutputKind::kMvn, .people = {"Walker", "Waver"}});
+  check_round_trip({.kind = OutputKind::kMvn,
+                    .people = {"Walker", "Waver"},
+                    .options = {{"types", std::string("25 02 12 13")}}});
   check_round_trip({.kind = OutputKind::kMvn, .people = {"Walker", "Waver"}, .euler = true});
 }
 

@@ -166,6 +166,7 @@ TEST_CASE("people and props of Motive arrive through the NatNet output as they w
   CHECK(compared > 200);
   CHECK(worst.rad < 1e-5);
   CHECK(worst.m < 1e-5);
+  CHECK(worst.timecodes == 0);
   CHECK(second.damage == "");
   CHECK(rig.reported.empty());
 }

@@ -73,9 +73,11 @@ class ProtocolReader {
 // How far two poses of one skeleton are apart at most.
 struct Apart {
   double rad = 0.0, m = 0.0;
+  int timecodes = 0;  // that differ
 };
 
 inline void compare(const Skeleton& skeleton, const Frame& a, const Frame& b, Apart& worst) {
+  if (a.timecode != b.timecode) ++worst.timecodes;
   for (std::size_t j = 0; j < skeleton.joints.size(); ++j) {
     worst.rad = std::max(worst.rad, angle_between_rad(to_eigen_double(a.rotation_xyzw[j]),
                                                       to_eigen_double(b.rotation_xyzw[j])));
