@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <array>
 #include <charconv>
 #include <optional>
@@ -11,6 +12,7 @@
 #include "daemon/output/fit.hpp"
 #include "drivers/rokoko/decoder.hpp"
 #include "drivers/rokoko/encode.hpp"
+#include "proto/clip/text.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::output {
@@ -38,6 +40,25 @@ bool is_studio_actor(const Skeleton& skeleton) {
   return skeleton.root_joint == 0;
 }
 
+// How high an actor and the hip stand in T-pose, which receivers scale by.
+struct Heights {
+  double total_m = 0.0, hip_m = 0.0;
+};
+Heights heights_of(const Skeleton& skeleton) {
+  constexpr double kHeadTop_m = 0.15;  // above the last joint
+  std::vector<double> y_m;
+  for (const Joint& joint : skeleton.joints) {
+    if (joint.parent < 0) {
+      y_m.push_back(0.0);
+      continue;
+    }
+    const Eigen::Vector3d offset_m = skeleton.joints[joint.parent].T_world_joint * joint.offset_m;
+    y_m.push_back(y_m[joint.parent] + offset_m.y());
+  }
+  const auto [lowest_m, highest_m] = std::ranges::minmax(y_m);
+  return {.total_m = highest_m - lowest_m + kHeadTop_m, .hip_m = -lowest_m};
+}
+
 class RokokoEncoder final : public DatagramEncoder {
  public:
   RokokoEncoder(std::size_t places, bool lz4) : lz4_(lz4), people_(places) {}
@@ -56,6 +77,7 @@ class RokokoEncoder final : public DatagramEncoder {
       return rokoko::skeleton_of(rokoko::average_person(name, joints, static_cast<float>(scale)),
                                  name);
     }));
+    if (stream->rate_hz > 0.0) rate_hz_ = stream->rate_hz;
     std::string head = head_of(fit.skeleton(), name, prop);
     person.emplace(std::move(fit), std::move(head), prop);
     return {};
@@ -76,7 +98,8 @@ class RokokoEncoder final : public DatagramEncoder {
   std::int64_t describe_every_ns() const noexcept override { return kNanosPerSecond; }
 
   void encode(const SendDatagram& send) override {
-    json_ = R"({"version":"3.0","fps":60,"scene":{"timestamp":)";
+    json_ =
+        R"({"version":"3.0","fps":)" + clip::number_text(rate_hz_) + R"(,"scene":{"timestamp":)";
     std::array<char, 32> time{};
     const auto [end, error] =
         std::to_chars(time.data(), time.data() + time.size(), seconds(time_ns_ - begin_ns_),
@@ -107,10 +130,12 @@ class RokokoEncoder final : public DatagramEncoder {
         "{\"name\":" + json_text(nlohmann::json(name)) + ",\"color\":[128,128,128],";
     if (prop) return head + "\"type\":0,";
     const std::string gloves = has_fingers(skeleton) ? "true" : "false";
+    const Heights heights = heights_of(skeleton);
     return head + "\"meta\":{\"hasGloves\":" + gloves + ",\"hasLeftGlove\":" + gloves +
            ",\"hasRightGlove\":" + gloves +
-           ",\"hasBody\":true,\"hasFace\":false},\"dimensions\":{\"totalHeight\":1.75,"
-           "\"hipHeight\":0.96},\"body\":{";
+           ",\"hasBody\":true,\"hasFace\":false},\"dimensions\":{\"totalHeight\":" +
+           clip::number_text(heights.total_m) +
+           ",\"hipHeight\":" + clip::number_text(heights.hip_m) + "},\"body\":{";
   }
 
   void append_all(bool props) {
@@ -132,6 +157,7 @@ class RokokoEncoder final : public DatagramEncoder {
 
   bool lz4_;
   std::vector<std::optional<Person>> people_;  // [place]
+  double rate_hz_ = 60.0;                      // until a stream says it
   std::int64_t time_ns_ = 0, begin_ns_ = kNoTime_ns;
   std::string json_;
 };

@@ -7,7 +7,10 @@
 #include <vector>
 
 #include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
 
+#include "drivers/rokoko/decoder.hpp"
+#include "drivers/rokoko/encode.hpp"
 #include "models/motion/canonical_skeleton.hpp"
 #include "models/motion/retarget.hpp"
 #include "models/motion/synthetic_walker.hpp"
@@ -180,6 +183,24 @@ TEST_CASE("actors and props of Rokoko Studio arrive through its output as they w
   for (const bool lz4 : {false, true}) {
     check_round_trip({.kind = OutputKind::kRokoko, .people = {"Anna", "Ben", "Sword"}, .lz4 = lz4});
   }
+}
+
+TEST_CASE("Rokoko's receivers are told how high an actor stands, by which they scale") {
+  namespace rokoko = drivers::rokoko;
+  UdpReceiver receiver;
+  const OutputRig rig(
+      protocol_config({.kind = OutputKind::kRokoko, .people = {"ann \"A\""}}, receiver));
+  const auto person = rokoko::average_person("ann", rokoko::without_fingers(), 2.0F);
+  rig.output->stream_comes(info_of(0, "ann \"A\"", rokoko::skeleton_of(person, "ann").value()));
+  rig.pass(frame_of(0, {}), 0);
+  const auto datagrams = receiver.received(1);
+  REQUIRE(datagrams.size() == 1);
+  const std::string_view text(reinterpret_cast<const char*>(datagrams[0].data()),
+                              datagrams[0].size());
+  const auto actor = nlohmann::json::parse(text)["scene"]["actors"][0];
+  CHECK(actor["dimensions"]["hipHeight"].get<double>() == Approx(1.9).margin(0.01));
+  CHECK(actor["dimensions"]["totalHeight"].get<double>() == Approx(3.33).margin(0.1));
+  CHECK(actor["meta"]["hasGloves"] == false);
 }
 
 TEST_CASE("any other person arrives through the outputs of mocopi and Rokoko") {
