@@ -33,16 +33,6 @@ void choose_interface(int fd, const drivers::Address& listen) noexcept {
   ::setsockopt(fd, IPPROTO_IP, IP_MULTICAST_IF, &address.sin_addr, sizeof address.sin_addr);
 }
 
-// A request as clients send it: some end with a byte more than they say.
-bool read_request(std::span<const std::byte> bytes, natnet::Message& message) noexcept {
-  drivers::ByteReader reader(bytes);
-  static_cast<void>(reader.u16());
-  const std::size_t length = reader.u16();
-  if (!reader.ok() || reader.left() < length) return false;
-  const std::size_t whole = bytes.size() - reader.left() + length;
-  return natnet::decode_message(bytes.first(whole), message) == Outcome::kOk;
-}
-
 std::vector<std::byte> number_response(float value) {
   drivers::ByteWriter writer;
   writer.f32(value);
@@ -107,7 +97,9 @@ void NatNetOutput::begin_turn(std::int64_t now_ns) {
     const auto bytes = static_cast<std::size_t>(size);
     // Nobody else gets an answer, so that nobody can be flooded with them.
     if (bytes > buffer.size() || !drivers::may_connect(from, peers_)) continue;
-    if (read_request(std::span(buffer).first(bytes), message)) answer(from, message, now_ns);
+    const auto request = std::span(buffer).first(bytes);
+    if (natnet::decode_request(request, message) != Outcome::kOk) continue;
+    answer(from, message, now_ns);
   }
   set_receivers(clients_.size() + (group_ ? 1 : 0));
 }

@@ -59,6 +59,14 @@ RT_SAFE Outcome decode_message(std::span<const std::byte> bytes, Message& messag
   return Outcome::kOk;
 }
 
+Outcome decode_request(std::span<const std::byte> bytes, Message& message) noexcept {
+  ByteReader reader(bytes);
+  static_cast<void>(reader.u16());
+  const std::size_t length = reader.u16();
+  if (!reader.ok() || reader.left() < length) return Outcome::kShort;
+  return decode_message(bytes.first(bytes.size() - reader.left() + length), message);
+}
+
 RT_SAFE bool decode_server_info(std::span<const std::byte> payload, ServerInfo& info) noexcept {
   ByteReader reader(payload);
   static_cast<void>(reader.bytes(kNameBytes + kVersionBytes));
@@ -96,7 +104,7 @@ RT_SAFE DescriptionHead read_description_head(std::span<const std::byte> bytes) 
   return head;
 }
 
-RT_SAFE Version nearest_version(Version asked) noexcept {
+Version nearest_version(Version asked) noexcept {
   Version nearest = kSentVersions.front();
   for (const Version version : kSentVersions) {
     if (version <= asked) nearest = version;
@@ -104,7 +112,7 @@ RT_SAFE Version nearest_version(Version asked) noexcept {
   return nearest;
 }
 
-RT_SAFE Version version_for(std::span<const std::byte> connect) noexcept {
+Version version_for(std::span<const std::byte> connect) noexcept {
   constexpr std::size_t kOwn = kNameBytes + kVersionBytes, kWanted = kOwn + kVersionBytes + 1;
   for (const std::size_t at : {kWanted, kOwn}) {
     if (connect.size() < at + kVersionBytes) continue;

@@ -86,6 +86,8 @@ struct Message {
 // kOk fills `message`; kForeign: no id of NatNet; kShort: cut, or longer than it says.
 RT_SAFE [[nodiscard]] Outcome decode_message(std::span<const std::byte> bytes,
                                              Message& message) noexcept;
+// The same for what a client asks: some end a request with a byte more than its head says.
+[[nodiscard]] Outcome decode_request(std::span<const std::byte> bytes, Message& message) noexcept;
 
 struct ServerInfo {
   std::string_view name = "posed emulator";  // only to encode it
@@ -127,8 +129,8 @@ RT_SAFE [[nodiscard]] DescriptionHead read_description_head(
 // What a host says of itself in Connect (char[256] name, u8[4] its version, u8[4] its NatNet
 // version; clients of SDK 4 also u8 0, u8[4] the version that they want to be sent): the version to
 // send it, of 2.9 to 4.1. Short payloads say nothing, and get the newest.
-RT_SAFE [[nodiscard]] Version version_for(std::span<const std::byte> connect) noexcept;
+[[nodiscard]] Version version_for(std::span<const std::byte> connect) noexcept;
 // The newest of these versions that is no newer than `asked`, or the oldest.
-RT_SAFE [[nodiscard]] Version nearest_version(Version asked) noexcept;
+[[nodiscard]] Version nearest_version(Version asked) noexcept;
 
 }  // namespace posed::drivers::natnet

@@ -48,6 +48,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     (void)decoder->next_request(0);
   }
   check(sink, **bodies);
+  // What a client sends to the server.
+  natnet::Message request;
+  (void)natnet::decode_request(bytes, request);
+  const natnet::Version wanted = natnet::version_for(bytes);
+  demand(wanted >= natnet::Version{2, 9} && wanted <= natnet::Version{4, 1});
+  (void)natnet::read_version({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
   const auto any = driver.make_layout(bytes);
   if (!any) return 0;
   demand((*any)->bodies.size() <= posed::kMaxBodies);
