@@ -94,9 +94,11 @@ struct StageType {
   std::vector<std::string_view> partners{};
   StageInput input = StageInput::kHandsOn;
   bool needs_input = false;  // without StageFrame::input it does nothing
+  bool bridges = false;      // fills in values that are missing
 
-  // Whether a stream without a table for this stage has it all the same; null: never.
-  bool (*is_default)(const Skeleton& skeleton) = nullptr;
+  // Whether a stream without a table for this stage has it all the same; null: never. `bridged`:
+  // the config names a stage that fills in values that are missing.
+  bool (*is_default)(const Skeleton& skeleton, bool bridged) = nullptr;
   // Checks what the range of a single parameter cannot, before the stage is made; live parameters
   // must be valid in any combination. Null: nothing.
   std::optional<ParameterFault> (*check)(const Parameters& parameters, bool has_model) = nullptr;

@@ -15,6 +15,11 @@ bool is_prop(const Skeleton& skeleton) {
   return skeleton.joints.size() == 1 && !skeleton.joints.front().bone;
 }
 
+bool has_bridge(const config::StreamConfig& config) {
+  return std::ranges::any_of(config.stages,
+                             [](const config::StageConfig& stage) { return stage.type->bridges; });
+}
+
 // The stages that the config names, and those that a stream of this skeleton has by default.
 // All stages are for people and hands, so a prop passes unchanged.
 Result<std::vector<config::StageConfig>> stages_of(const config::StreamConfig& config,
@@ -27,7 +32,8 @@ Result<std::vector<config::StageConfig>> stages_of(const config::StreamConfig& c
     const bool off = std::ranges::find(config.off, type) != config.off.end();
     if (named != config.stages.end()) {
       stages.push_back(*named);
-    } else if (!off && type->is_default != nullptr && type->is_default(*skeleton)) {
+    } else if (!off && type->is_default != nullptr &&
+               type->is_default(*skeleton, has_bridge(config))) {
       auto parameters = TRY(complete_parameters(type->parameters, {}));
       stages.push_back({.type = type, .parameters = std::move(parameters)});
     }

@@ -13,6 +13,7 @@
 #include "models/gate/track.hpp"
 #include "models/parameter_table.hpp"
 #include "proto/frame/degree.hpp"
+#include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::gate {
@@ -194,6 +195,10 @@ const StageType& gate_type() {
       .summary = "drops values that contradict the motion around them",
       .parameters = GateStage::table().specs(),
       .input = StageInput::kRenews,
+      // Where nothing bridges what is dropped, a false value is better than none: receivers that
+      // do not look at `valid` would see the finger stretched.
+      .is_default = [](const Skeleton& skeleton,
+                       bool bridged) { return bridged && hand_side(skeleton).has_value(); },
       .make =
           [](const StageContext& context, const StageModel* /*model*/) {
             return Result<std::unique_ptr<Stage>>(std::make_unique<GateStage>(

@@ -375,6 +375,7 @@ const StageType& generate_type() {
           "smooths joint angles, and performs labels from a gesture model on a hand or a body",
       .parameters = parameter_table().specs(),
       .input = StageInput::kLoses,
+      .bridges = true,
       .check = check,
       .make = make,
       .takes = takes,

@@ -77,7 +77,7 @@ const StageType& constrain_type() {
   static const StageType type{
       .name = "constrain",
       .summary = "keeps the fingers of a hand apart and its joints within their limits",
-      .is_default = is_hand,
+      .is_default = [](const Skeleton& skeleton, bool /*bridged*/) { return is_hand(skeleton); },
       .make = make};
   return type;
 }

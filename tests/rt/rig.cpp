@@ -7,6 +7,7 @@
 #include "daemon/pipeline/stream_context.hpp"
 #include "daemon/system/clock.hpp"
 #include "models/feet/feet_stage.hpp"
+#include "models/gate/gate_stage.hpp"
 #include "tests/rt/contract.hpp"
 
 namespace posed::rt {
@@ -52,12 +53,19 @@ Rig::Rig(std::vector<RigStream> streams, pipeline::RecordSink* record_sink)
           {&feet::feet_type(), feet::feet_type().make(context, nullptr).value()});
     }
     if (stream.gesture != nullptr) {
-      const StageContext context{.skeleton = device.skeleton, .rate_hz = device.rate_hz};
+      const StageContext context{
+          .skeleton = device.skeleton,
+          .rate_hz = device.rate_hz,
+          .parameters = complete_parameters(gate::gate_type().parameters, {}).value()};
+      if (gate::gate_type().is_default(*device.skeleton, true)) {
+        options.stages.push_back(
+            {&gate::gate_type(), gate::gate_type().make(context, nullptr).value()});
+      }
       options.stages.push_back({&generate::generate_type(),
                                 std::make_unique<generate::GenerateStage>(
                                     device.skeleton, smooth::LiveOptions{},
                                     generate::stream_rate_hz(device.rate_hz), stream.gesture)});
-      if (hand::constrain_type().is_default(*device.skeleton)) {
+      if (hand::constrain_type().is_default(*device.skeleton, true)) {
         options.stages.push_back(
             {&hand::constrain_type(), hand::constrain_type().make(context, nullptr).value()});
       }

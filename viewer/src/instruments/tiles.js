@@ -46,6 +46,14 @@ export const TILES = [
     ({ stats }) => (stats.kernel_dropped > 0 ? count(stats.kernel_dropped) : ''),
   ],
   [
+    'False values',
+    'of the joint of which the gate drops most, the share of the last ten seconds that it dropped',
+    ({ stats }) =>
+      stats.gate_dropped >= 0.001
+        ? `${stats.gate_joint}: ${(100 * stats.gate_dropped).toFixed(1)} %`
+        : '',
+  ],
+  [
     'Device clock',
     'the device’s clock beside the host’s: offset and drift',
     ({ stats }) =>

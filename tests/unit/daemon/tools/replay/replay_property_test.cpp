@@ -6,6 +6,9 @@
 #include <cstdint>
 #include <string>
 
+#include "daemon/devices/stream_stages.hpp"
+#include "models/gate/gate_stage.hpp"
+#include "models/generate/generate_stage.hpp"
 #include "tests/support/dice.hpp"
 #include "tests/support/gapped_logs.hpp"
 #include "tests/support/random_streams.hpp"
@@ -103,6 +106,54 @@ TEST_CASE("a glove that was silent, with frames waiting in the generate stage, r
     CHECK_FALSE(result.difference);
     CHECK(result.counts.compared >= 200);
     CHECK(result.counts.lost + result.counts.after_gap + result.counts.past_end == 0);
+  }
+}
+
+// Every angle jumps and comes back, by whole movements of the hand.
+TEST_CASE("a smoothed hand has the gate by default, and its log replays the drops", "[virtual]") {
+  const TempFolder folder;
+  const auto path = folder.path() / "spikes.plog";
+  VirtualStream hand = glove_stream("hand", 2.0);
+  config::StreamConfig config;
+  config.name = "hand";
+  config.stages.push_back(
+      {.type = &generate::generate_type(),
+       .parameters = complete_parameters(generate::generate_type().parameters, {}).value()});
+  devices::ModelFiles files;
+  const auto stages = [&] {
+    const auto loaded =
+        devices::load_stages(config, hand.description.skeleton, 100.0, files, {});
+    REQUIRE(loaded);
+    return loaded->settings.stages;
+  };
+  const std::vector<std::string> model_files = hand.model_files;
+  for (const bool gated : {true, false}) {
+    INFO("gate " << gated);
+    hand.settings.stages = stages();
+    CHECK((hand.settings.stages.front().type == &gate::gate_type()) == gated);
+    hand.model_files = model_files;
+    if (gated) hand.model_files.insert(hand.model_files.begin(), "");
+    REQUIRE(hand.model_files.size() == hand.settings.stages.size());
+    VirtualStream spiky = hand;
+    for (const std::size_t spike : {30U, 50U, 70U, 110U, 150U}) {
+      spiky.links[0].chunks[spike].bytes = hand.links[0].chunks[(spike + 50) % 100].bytes;
+    }
+    VirtualDaemon daemon({.seed = 1, .log = path, .holdups = false});
+    daemon.add(std::move(spiky));
+    daemon.run(2.5);
+    const Replayed result = replayed(path);
+    INFO((result.difference ? result.difference->text() : ""));
+    CHECK_FALSE(result.difference);
+    CHECK(result.counts.compared >= 190);
+    long bridged = 0;
+    for (const std::string& bytes : result.frames) {
+      v1::Frame frame;
+      REQUIRE(frame.ParseFromString(bytes));
+      if (frame.quality() == v1::QUALITY_PREDICTED) ++bridged;
+    }
+    CHECK(bridged == (gated ? 5 : 0));
+    config.off.push_back(&gate::gate_type());  // enabled = false
+    std::filesystem::remove(path);
   }
 }
 
