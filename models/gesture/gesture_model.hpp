@@ -10,6 +10,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -56,11 +57,21 @@ struct Tree {
   std::vector<double> occupancy;  // [leaf] training frames in the leaf (duration tree: gestures)
 };
 
+// Where the recorded labels are held, and how far from there a held pose still is that gesture
+// (models/gesture/README.md, "None"). The distance of a pose x from a label is |W (x - mean)|^2.
+struct HeldPoses {
+  std::vector<std::vector<double>> mean;  // [recorded label][channel] rad
+  std::vector<double> whitening;          // W, a lower triangle row by row [1/rad]
+  std::vector<double> limit;              // [recorded label] of the distance
+  int people = 1;  // left out of training one at a time for the limits; 1: one person's takes were
+};
+
 struct GestureModel : Vocabulary {
   double rate_hz = 30.0;
   std::array<std::vector<Tree<GroupGaussian>>, kStates> trees;  // [state][group]
   Tree<DurationGaussian> durations;                             // asks what kDurations states
   std::vector<double> low, high;  // [channel] range of the training recordings [rad]
+  std::optional<HeldPoses> held;  // of a model of hands that tells what is none
   std::string report_json;        // report of the training, for people
 };
 

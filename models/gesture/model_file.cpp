@@ -83,6 +83,12 @@ std::vector<Label> read_labels(const v1::GestureModel& from,
                  "a label's class");
       read.group_class.push_back(static_cast<int>(label.finger_class(g)));
     }
+    if (label.shown_rad_size() > 0) {
+      const int channels = groups.back().first + groups.back().channels;
+      check.want(label.shown_rad_size() == channels, "the number of angles of a shown pose");
+      check.numbers(label.shown_rad(), -kMaxAngle_rad, kMaxAngle_rad, "an angle of a shown pose");
+      read.shown.assign(label.shown_rad().begin(), label.shown_rad().end());
+    }
     labels.push_back(std::move(read));
   }
   return labels;
@@ -137,6 +143,7 @@ void write_vocabulary(const Vocabulary& vocabulary, v1::GestureModel& out) {
       written.add_finger_class(static_cast<std::uint32_t>(group_class));
     }
     written.set_trained(label.trained);
+    written.mutable_shown_rad()->Add(label.shown.begin(), label.shown.end());
   }
   if (vocabulary.body) write_body(vocabulary, out);
   for (const int label : vocabulary.named) out.add_named(static_cast<std::uint32_t>(label));
@@ -259,6 +266,39 @@ void read_range(const v1::GestureModel& from, GestureModel& model, Validator& ch
   }
 }
 
+// Rows of a lower triangle are found by its index alone, so its length must be right.
+void read_held(const v1::GestureHeld& from, GestureModel& model, Validator& check) {
+  constexpr double kMaxPeople = 1e6;
+  const int channels = model.channels();
+  const auto labels = static_cast<int>(std::ranges::count(model.labels, true, &Label::trained));
+  check.want(model.is_hand(), "held poses, which only a hand's model has");
+  check.want(from.mean_rad_size() == labels * channels && from.limit_size() == labels,
+             "the number of held poses");
+  check.want(from.whitening_size() == channels * (channels + 1) / 2,
+             "the size of the held poses' spread");
+  check.numbers(from.mean_rad(), -kMaxAngle_rad, kMaxAngle_rad, "an angle of a held pose");
+  check.numbers(from.whitening(), -1.0 / kMinDeviation, 1.0 / kMinDeviation,
+                "the held poses' spread");
+  check.numbers(from.limit(), 1e-6, 1e12, "how far a held pose may be");
+  const double people = check.number(from.people(), 1.0, kMaxPeople, "the number of people");
+  if (!check.valid()) return;
+  HeldPoses& held = model.held.emplace();
+  for (int l = 0; l < labels; ++l) {
+    const auto* const row = from.mean_rad().data() + l * channels;
+    held.mean.emplace_back(row, row + channels);
+  }
+  held.whitening.assign(from.whitening().begin(), from.whitening().end());
+  held.limit.assign(from.limit().begin(), from.limit().end());
+  held.people = static_cast<int>(people);
+}
+
+void write_held(const HeldPoses& held, v1::GestureHeld& out) {
+  for (const auto& mean : held.mean) out.mutable_mean_rad()->Add(mean.begin(), mean.end());
+  out.mutable_whitening()->Add(held.whitening.begin(), held.whitening.end());
+  out.mutable_limit()->Add(held.limit.begin(), held.limit.end());
+  out.set_people(static_cast<std::uint32_t>(held.people));
+}
+
 GestureModel read_model(const v1::GestureModel& from, Validator& check) {
   GestureModel model;
   model.rate_hz = check.number(from.rate_hz(), 1.0, 10'000.0, "the frame rate");
@@ -276,6 +316,7 @@ GestureModel read_model(const v1::GestureModel& from, Validator& check) {
   const GaussianRange frames{0.0, kMaxState_s * model.rate_hz};
   model.durations = read_tree<DurationGaussian>(from.duration(), shape, frames, check);
   read_range(from, model, check);
+  if (from.has_held()) read_held(from.held(), model, check);
   model.report_json = from.report_json();
   return model;
 }
@@ -324,6 +365,7 @@ std::string serialize_model(const GestureModel& model) {
   write_tree(model.durations, *gesture.mutable_duration());
   gesture.mutable_low_rad()->Add(model.low.begin(), model.low.end());
   gesture.mutable_high_rad()->Add(model.high.begin(), model.high.end());
+  if (model.held) write_held(*model.held, *gesture.mutable_held());
   gesture.set_report_json(model.report_json);
   return model_file::wrap(std::move(file));
 }

@@ -25,7 +25,8 @@ struct Segment {
 }
 
 struct Recording {
-  std::string file;  // for errors
+  std::string file;      // for errors
+  std::string person{};  // whose hand it is; the same name is one person
   double rate_hz = 0.0;
   FeatureMatrix angles_rad;  // [frame][group][joint][x, y, z]
   std::vector<Segment> segments;

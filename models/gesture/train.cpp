@@ -8,6 +8,7 @@
 
 #include "models/gesture/context_models.hpp"
 #include "models/gesture/grow_tree.hpp"
+#include "models/gesture/held_poses.hpp"
 #include "models/gesture/train_report.hpp"
 #include "proto/text/clean.hpp"
 
@@ -176,6 +177,7 @@ Result<GestureModel> train_gesture(const std::vector<Recording>& recordings,
   }
   model.durations = tree_of<DurationGaussian>(grow_durations(contexts, model, options.mdl_factor));
   set_range(recordings, model);
+  if (model.is_hand() && model.tells_none) model.held = held_poses(recordings, model.labels);
   model.report_json = report.json_of(model);
   if (options.look) options.look(report.findings());
   return model;

@@ -53,11 +53,13 @@ void clamp_to(const double* before, const double* last, int channels, const doub
 LabelSequencePlayer::LabelSequencePlayer(double rate_hz, int channels, const PlayerOptions& options)
     : options_(options),
       look_ahead_(std::max(kSettling, frames_in(options.look_ahead_s, rate_hz))),
-      script_(options.capacity) {
+      script_(options.capacity),
+      shown_pose_(channels) {
   const int stride = trajectory::padded(channels);
   const int most = frames_in(kMaxLead_s, rate_hz) + look_ahead_ + 1;
   before_ = zero_rows(1, stride);
   last_ = zero_rows(1, stride);
+  out_ = zero_rows(1, stride);
   states_ = zero_rows((2 + look_ahead_) * kRows, stride);
   carry_ = zero_rows(trajectory::kernel::kCarryRows, stride);
   factor_rows_ = zero_rows(most * trajectory::kernel::kFactorRows, stride);
@@ -106,6 +108,7 @@ RT_SAFE void LabelSequencePlayer::start() noexcept {
   assert(script_.empty() || information_ != nullptr);
   started_ = !script_.empty();
   carries_ = false;
+  shown_pose_.restart(true);
   lead_left_ = shown_ = 0;
   if (started_) cursor_ = enter(script_, *information_, script_.first(), tempo_);
 }
@@ -114,6 +117,7 @@ RT_SAFE void LabelSequencePlayer::start(std::span<const double> before,
                                         std::span<const double> last) noexcept {
   start();
   if (!started_) return;
+  shown_pose_.restart(false);
   std::copy_n(before.begin(), channels_, before_.get());
   std::copy_n(last.begin(), channels_, last_.get());
   glide();
@@ -196,10 +200,15 @@ RT_SAFE bool LabelSequencePlayer::next(PlayedFrame& out) noexcept {
   trajectory::kernel::variance(factors_.data(), frames, shown_, stride_, variance_.get(), 0);
   std::swap(before_, last_);
   std::copy_n(x_.get(), channels_, last_.get());
+  const gesture::Context context = script_.context(shown.position);
+  if (lead_left_ <= shown_) {
+    shown_pose_.advance(*information_, shown.position, context, tempo_);
+  }
+  for (int c = 0; c < channels_; ++c) out_[c] = last_[c] + shown_pose_.offset_rad(c);
   const std::size_t channels = channels_;
-  out.angle = {last_.get(), channels};
+  out.angle = {out_.get(), channels};
   out.variance = {variance_.get(), channels};
-  out.label = script_.context(shown.position).current;
+  out.label = context.current;
   out.state = lead_left_ > shown_ || shown.frames_left == 0 ? -1 : shown.state;
   advance(frames);
   return true;

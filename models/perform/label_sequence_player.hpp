@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "models/perform/label_sequence.hpp"
+#include "models/perform/shown_pose.hpp"
 #include "models/trajectory/information_form.hpp"
 
 namespace posed::perform {
@@ -73,6 +74,7 @@ class LabelSequencePlayer {
   PlayerOptions options_;
   int look_ahead_;  // frames
   LabelSequence script_;
+  ShownPose shown_pose_;
   double tempo_ = 1.0;
   bool started_ = false, carries_ = false;
   Cursor cursor_;      // of the first frame that is not final
@@ -80,7 +82,8 @@ class LabelSequencePlayer {
   int shown_ = 0;      // frames already shown but not final (only at the end of a sequence)
   int channels_ = 0, stride_ = 0;  // of the model in use
   // All of these are allocated for the most channels, and used with the model's stride.
-  trajectory::Rows before_, last_;  // the last two poses
+  trajectory::Rows before_, last_;  // the last two poses, without the offset of a shown one
+  trajectory::Rows out_;            // with it
   trajectory::Rows states_;         // slots of information, 0: lead-in; then one a state ahead
   trajectory::Rows carry_, factor_rows_, x_, variance_;
   std::vector<const double*> frames_;

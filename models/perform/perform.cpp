@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "models/perform/label_sequence.hpp"
+#include "models/perform/shown_pose.hpp"
 #include "models/trajectory/fixed_lag.hpp"
 #include "models/trajectory/sliding_window.hpp"
 #include "proto/frame/plausible.hpp"
@@ -78,6 +79,21 @@ Result<std::vector<PerformedState>> plan(const trajectory::StateInformation& inf
     cursor.frames_left = 1;  // so that the next step is into the next state
   }
   return states;
+}
+
+void hold_as_shown(const trajectory::StateInformation& information, double tempo,
+                   Performance& performance) {
+  ShownPose shown(information.model().channels());
+  shown.restart(true);
+  long position = -1;
+  for (const PerformedState& state : performance.states) {
+    if (state.state == 0) ++position;
+    for (int t = state.start; t < state.start + state.frames; ++t) {
+      shown.advance(information, position, state.context, tempo);
+      Pose& pose = performance.angles[static_cast<std::size_t>(t)];
+      for (int c = 0; c < static_cast<int>(pose.size()); ++c) pose[c] += shown.offset_rad(c);
+    }
+  }
 }
 
 void solve_all(const std::vector<const double*>& frames, int channels, Performance& performance) {
@@ -165,6 +181,7 @@ Result<Performance> perform(const trajectory::StateInformation& information,
     solve_all(frames, channels, performance);
   }
   if (options.global_variance) restore_variance(information.model(), performance);
+  hold_as_shown(information, options.tempo, performance);
   const auto plausible = [](double angle_rad) { return std::abs(angle_rad) <= kMaxAngle_rad; };
   for (const Pose& pose : performance.angles) {
     if (!std::ranges::all_of(pose, plausible)) {

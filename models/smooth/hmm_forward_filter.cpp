@@ -6,6 +6,8 @@
 #include <limits>
 #include <numeric>
 
+#include "proto/frame/degree.hpp"
+
 namespace posed::smooth {
 namespace {
 
@@ -18,6 +20,11 @@ const double kLogRestart = std::log(1e-4);
 // The same for what is none of the labels.
 constexpr double kLost = 1e-4;
 const double kLogLost = std::log(kLost);
+// By how much, at the model's rate, a frame is more probable as none of the labels (as a logarithm)
+// where the pose is twice as far as a label's limit; less while the hand moves this fast.
+constexpr double kSure = 2.0;
+constexpr double kMoving = 0.25;
+constexpr double kSlow_rad_s = 40.0 * kDegree;  // rms over the channels that move
 constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 constexpr double kMinStay_frames = 1.5;  // frames
 constexpr double kNever = -std::numeric_limits<double>::infinity();
@@ -42,6 +49,7 @@ HmmForwardFilter::HmmForwardFilter(int max_window, int max_channels)
     : max_window_(max_window),
       feature_(padded_features(max_channels)),
       weight_(feature_.size()),
+      known_(max_channels, kMissing),
       tables_(kMaxLiveChains * kStates + 1),
       rows_(tables_.size() * kTableRows * feature_.size()),
       forward_(max_window),
@@ -63,6 +71,7 @@ RT_SAFE void HmmForwardFilter::reset() noexcept {
   swept_frames_ = 0;
   even_frames_ = 0;
   for (auto& row : past_) std::ranges::fill(row, kMissing);
+  std::ranges::fill(known_, kMissing);
   if (states_ == 0) return;
   std::fill_n(log_now_.begin(), all(), -std::log(static_cast<double>(all())));
   const auto labels = static_cast<double>(model_->labels.size());
@@ -111,9 +120,14 @@ RT_SAFE void HmmForwardFilter::push(std::span<const double> measured_rad, bool e
   even_frames_ = even ? std::min(even_frames_ + 1, 2) : 0;
   Row log_emission;
   weigh(measured_rad, log_emission);
+  if (model_->held) {
+    const auto states = log_emission.begin() + states_;
+    *states = *std::max_element(log_emission.begin(), states) + none_margin(measured_rad);
+  }
   for (std::size_t c = 0; c < measured_rad.size(); ++c) {
     past_[1][c] = past_[0][c];
     past_[0][c] = measured_rad[c];
+    if (std::isfinite(measured_rad[c])) known_[c] = measured_rad[c];
   }
   advance(log_emission);
 }
@@ -150,6 +164,45 @@ RT_SAFE void HmmForwardFilter::weigh(std::span<const double> measured_rad, Row& 
     }
     out[s] = -std::accumulate(sum.begin(), sum.end(), 0.0);
   }
+}
+
+RT_SAFE double HmmForwardFilter::off_labels() noexcept {
+  const LiveHeld& held = *model_->held;
+  const std::size_t channels = model_->channels;
+  std::array<double, kMaxLiveChains> distance;
+  std::fill_n(distance.begin(), held.limit.size(), 0.0);
+  const double* weight = held.whitening.data();
+  for (std::size_t row = 0; row < channels; ++row) {
+    double value = 0.0;
+    for (std::size_t c = 0; c <= row; ++c) value += *weight++ * known_[held.channel[c]];
+    for (std::size_t l = 0; l < held.limit.size(); ++l) {
+      const double off = value - held.mean[l * channels + row];
+      distance[l] += off * off;
+    }
+  }
+  const double noise = held.noise_gain * noise_rad_ * noise_rad_;
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t l = 0; l < held.limit.size(); ++l) {
+    nearest = std::min(nearest, (distance[l] - noise) / held.limit[l]);
+  }
+  return std::isfinite(nearest) ? std::max(nearest, 0.0) : kMissing;
+}
+
+// On the way from pose to pose a hand is far from all of them; what it was before counts then.
+RT_SAFE double HmmForwardFilter::none_margin(std::span<const double> measured_rad) noexcept {
+  const double off = off_labels();
+  double sum = 0.0, count = 0.0;
+  for (std::size_t c = 0; c < measured_rad.size(); ++c) {
+    const double step = 0.5 * (measured_rad[c] - past_[1][c]);
+    if (model_->moves[c] == 0 || !std::isfinite(step)) continue;
+    sum += step * step;
+    ++count;
+  }
+  const double noise = kNoiseGain[1] * noise_rad_ * noise_rad_;
+  const double speed2 = std::max(sum / std::max(count, 1.0) - noise, 0.0) / (period_s_ * period_s_);
+  const double still = 1.0 / (1.0 + speed2 / (kSlow_rad_s * kSlow_rad_s));
+  const double sure = std::isnan(off) ? 0.0 : std::clamp(off - 1.0, -1.0, 1.0);
+  return kSure / pace_ * (sure > 0.0 ? still * sure - (1.0 - still) * kMoving : sure);
 }
 
 // One step of the forward filter.

@@ -88,6 +88,11 @@ class HmmForwardFilter {
   }
   void renew_table(std::size_t state) noexcept;
   void weigh(std::span<const double> measured_rad, Row& out) noexcept;
+  // How far the pose of the frame before is from the nearest label, as a share of the label's
+  // limit; NaN: not known.
+  [[nodiscard]] double off_labels() noexcept;
+  // How much more probable than the best state it is that the hand makes none of the gestures.
+  [[nodiscard]] double none_margin(std::span<const double> measured_rad) noexcept;
   void advance(const Row& log_emission) noexcept;
   void step_back(const Row& ahead, Row& backward) const noexcept;
 
@@ -104,6 +109,7 @@ class HmmForwardFilter {
   std::array<std::vector<double>, 2> past_;  // [channel] the last measured frames
   std::size_t features_ = 0;                 // of the model, padded to whole lanes
   std::vector<double> feature_, weight_;     // [features] of the frame that comes
+  std::vector<double> known_;                // [channel] newest measured value; NaN: none yet
   std::vector<Table> tables_;                // [states]
   std::vector<double> rows_;                 // [states][kTableRows][features]
   Row log_now_{};                            // forward filter, sums to 1

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 #include <span>
 #include <utility>
 
@@ -127,6 +128,24 @@ LiveState none_of(const LiveModel& model) {
   return none;
 }
 
+LiveHeld held_of(const GestureModel& model) {
+  const gesture::HeldPoses& from = *model.held;
+  const std::size_t channels = model.channels();
+  LiveHeld held{.channel = std::vector<std::size_t>(channels),
+                .whitening = from.whitening,
+                .mean = {},
+                .limit = from.limit};
+  for (std::size_t c = 0; c < channels; ++c) held.channel[model_channel(model, c)] = c;
+  for (const auto& mean : from.mean) {
+    for (std::size_t row = 0, at = 0; row < channels; at += ++row) {
+      held.mean.push_back(std::inner_product(mean.begin(), mean.begin() + row + 1,
+                                             from.whitening.begin() + at, 0.0));
+    }
+  }
+  for (const double value : from.whitening) held.noise_gain += value * value;
+  return held;
+}
+
 }  // namespace
 
 Result<std::unique_ptr<const LiveModel>> bind_live_model(const GestureModel& model,
@@ -173,6 +192,7 @@ Result<std::unique_ptr<const LiveModel>> bind_live_model(const GestureModel& mod
   }
   const bool tells_none = live->body || model.tells_none;
   if (tells_none && model.label_index(kNoneName) < 0) live->none = none_of(*live);
+  if (live->none && model.held) live->held = held_of(model);
   return live;
 }
 

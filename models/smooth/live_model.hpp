@@ -40,6 +40,15 @@ struct LiveChain {
 };
 inline constexpr int kAny = -1;
 
+// gesture::HeldPoses for the channels of the stream, whitened: W times a pose.
+struct LiveHeld {
+  std::vector<std::size_t> channel;  // [row] the stream's channel
+  std::vector<double> whitening;     // W, row by row as far as the diagonal
+  std::vector<double> mean;          // [label][row] W mean
+  std::vector<double> limit;         // [label]
+  double noise_gain = 0.0;           // what a variance of 1 in each channel adds to a distance
+};
+
 struct LiveModel {
   double rate_hz = 30.0;
   std::vector<std::array<char, kMaxLabel>> labels;
@@ -47,6 +56,8 @@ struct LiveModel {
   std::vector<LiveState> states;  // [chain][kStates]
   // What is none of the labels (models/smooth/README.md, "None"); empty: always one of them.
   std::optional<LiveState> none;
+  // By which a hand's model tells what is none; empty: by the Gaussian `none`.
+  std::optional<LiveHeld> held;
   // Where the channels of a body are in a frame; empty: a hand, whose channels are the skeleton's
   // in their order.
   std::optional<gesture::PoseChannels> body;

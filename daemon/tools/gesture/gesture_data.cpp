@@ -154,10 +154,13 @@ Result<> complete_labels(const GestureSources& sources, bool writes, GestureData
   for (const std::string& show : sources.shows) {
     const auto shown = TRY(shown_pose(show, sources, vocabulary));
     std::fprintf(stderr,
-                 "posed: '%s' is composed of poses that lie %.0f degrees rms from the shown one\n",
+                 "posed: '%s' is held as shown; the poses that compose it lie %.0f degrees rms from "
+                 "there\n",
                  clean(shown.name).c_str(),
                  gesture::composed_off_rad(shown, poses, vocabulary.groups) / kDegree);
-    put_last(gesture::label_like(shown, poses, vocabulary.labels, vocabulary.groups), vocabulary);
+    auto label = gesture::label_like(shown, poses, vocabulary.labels, vocabulary.groups);
+    label.shown = shown.angles_rad;
+    put_last(std::move(label), vocabulary);
   }
   return {};
 }
@@ -179,6 +182,7 @@ Result<GestureData> read_gesture_data(const GestureSources& sources, bool writes
   TRY(body ? read_bodies(sources, data) : read_hands(sources, data));
   for (std::size_t i = 0; i < sources.clips.size(); ++i) {
     TRY(cut_at(data.recordings[i], sources.labels[i]));
+    if (i < sources.people.size()) data.recordings[i].person = sources.people[i];
   }
   TRY(complete_labels(sources, writes, data));
   return data;

@@ -16,6 +16,7 @@ namespace posed::tools {
 
 struct GestureSources {
   std::vector<std::string> clips, labels;  // one label file for each clip
+  std::vector<std::string> people{};       // one for each clip, or none: whose hand it is
   std::vector<std::string> shows;          // NAME=CLIP: labels that were not recorded
   std::string questions, propose;          // a file to read, or to write; at most one
   bool body = false;                       // without questions: the clips are of a body

@@ -11,6 +11,7 @@
 #include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
+#include "daemon/tools/command/person_clip.hpp"
 #include "daemon/tools/command/progress.hpp"
 #include "daemon/tools/gesture/gesture_data.hpp"
 #include "daemon/tools/gesture/gesture_report.hpp"
@@ -79,6 +80,7 @@ constexpr const char* kTrainGestureFooter = R"(Examples:
   posed train gesture --clip take1.csv --labels take1.lab --out hand.gesture
   posed train gesture --clip a.csv b.csv --labels a.lab b.lab --questions mine.toml --out h.gesture
   posed train gesture --clip take1.csv --labels take1.lab --show ok=ok_pose.csv --out h.gesture
+  posed train gesture --none --clip ann:a.csv bob:b.csv --labels a.lab b.lab --out hand.gesture
   posed train gesture --clip take1.csv --labels take1.lab --out hand.gesture \
       --tree-svg tree.svg --trees middle:4
   posed train gesture --clip take1.csv --labels take1.lab --out hand.gesture --report hand.html
@@ -103,7 +105,8 @@ struct TrainGestureOptions : GestureSources {
   std::shared_ptr<TreeOptions> trees = std::make_shared<TreeOptions>();
 };
 
-constexpr int kWide = 10;  // letters of a column
+constexpr int kWide = 10;       // letters of a column
+constexpr int kFewPeople = 10;  // fewer do not show how much people differ
 
 // --auto-label trains nothing, so options about the training are refused.
 Result<> check_auto_label(const TrainGestureOptions& options) {
@@ -205,6 +208,17 @@ void add_summary(const GestureTraining& training, const std::vector<gesture::Rec
           model.is_hand() ? "hand.csv" : "body.bvh --body A_CLIP.bvh"));
 }
 
+// Whom the model may be trusted with.
+std::string none_words(const gesture::HeldPoses& held) {
+  if (held.people == 1) {
+    return "'none' was tried on takes of one person, and a stranger's gestures may be none; name "
+           "the people of the clips, PERSON:FILE";
+  }
+  return fmt::format(
+      "'none' was tried on {} people, each left out of training once{}", held.people,
+      held.people < kFewPeople ? "; of so few, a stranger's gestures may be none" : "");
+}
+
 Result<Findings> train_gesture(const TrainGestureOptions& options, Ranks& ranks) {
   auto data = TRY(read_gesture_data(options, ranks.leads()));
   const std::vector<gesture::Recording>& recordings = data.recordings;
@@ -235,6 +249,10 @@ Result<Findings> train_gesture(const TrainGestureOptions& options, Ranks& ranks)
       .add("groups", groups)
       .add("verdict", verdict);
   add_summary(training, recordings, options.out, findings);
+  if (training.model.held) {
+    findings.add("people", training.model.held->people)
+        .remark(none_words(*training.model.held));
+  }
   findings.warn(warnings).remark(verdict);
   if (!options.report.empty() && ranks.leads()) {
     auto body = TRY(figure_of(training.model, options.clips.front(), options.read));
@@ -302,7 +320,8 @@ void add_train_gesture(CLI::App& train_command, int& exit_code,
   const auto options = std::make_shared<TrainGestureOptions>();
   command
       ->add_option("--clip", options->clips,
-                   "Recordings of a hand (CSV, or BVH with fingers) or a body (BVH, AMC)")
+                   "Recordings of a hand (CSV, or BVH with fingers) or a body (BVH, AMC): "
+                   "[PERSON:]FILE")
       ->required();
   command->add_option("--labels", options->labels, "Their label files, in the same order");
   command->add_option("--questions", options->questions,
@@ -341,6 +360,11 @@ void add_train_gesture(CLI::App& train_command, int& exit_code,
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, ranks, &exit_code] {
+    for (std::string& clip : options->clips) {
+      auto [person, file] = person_clip(clip);
+      options->people.push_back(std::move(person));
+      clip = std::move(file);
+    }
     if (!options->hand.empty()) options->read.hand = side_named(options->hand);
     exit_code = train_or_report(*options, *ranks);
   });

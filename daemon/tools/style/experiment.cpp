@@ -4,6 +4,7 @@
 #include <system_error>
 #include <utility>
 
+#include "daemon/tools/command/person_clip.hpp"
 #include "proto/clip/format.hpp"
 #include "proto/text/toml.hpp"
 #include "proto/text/toml_table.hpp"
@@ -89,17 +90,9 @@ Result<Experiment> read_experiment(const std::filesystem::path& path) {
 
 ExperimentClip named_clip(const std::string& argument, const std::string& group,
                           const std::string& motion) {
-  ExperimentClip clip{argument, group, kOnePerson, motion, 0};
-  const auto colon = argument.find(':');
-  std::error_code ignored;
-  if (colon == std::string::npos || colon == 0 || std::filesystem::exists(argument, ignored)) {
-    return clip;
-  }
-  const std::string person = argument.substr(0, colon);
-  if (person.contains('/')) return clip;
-  clip.subject = person;
-  clip.file = argument.substr(colon + 1);
-  return clip;
+  auto [person, file] = person_clip(argument);
+  if (person.empty()) person = kOnePerson;
+  return {std::move(file), group, std::move(person), motion, 0};
 }
 
 namespace {

@@ -53,6 +53,26 @@ TEST_CASE("A gesture model reads back as it was written", "[gesture_file]") {
   CHECK(parse(serialize_model(with_none))->tells_none);
 }
 
+TEST_CASE("Held and shown poses read back, and wrong ones are refused", "[gesture_file]") {
+  GestureModel model = test::toy_gesture_model();
+  model.labels[3].shown.assign(kHandChannels, 0.25);
+  model.held = HeldPoses{.mean = std::vector(3, std::vector<double>(kHandChannels, 0.5)),
+                         .whitening = std::vector<double>(kHandChannels * (kHandChannels + 1) / 2),
+                         .limit = {1.0, 2.0, 3.0},
+                         .people = 20};
+  const auto parsed = parse(serialize_model(model));
+  REQUIRE(parsed.has_value());
+  CHECK(serialize_model(*parsed) == serialize_model(model));
+  CHECK(parsed->labels[3].shown == model.labels[3].shown);
+  CHECK(parsed->held->limit == model.held->limit);
+  GestureModel wrong = model;
+  wrong.held->whitening.pop_back();
+  CHECK_FALSE(parse(serialize_model(wrong)).has_value());
+  wrong = model;
+  wrong.labels[3].shown.pop_back();
+  CHECK_FALSE(parse(serialize_model(wrong)).has_value());
+}
+
 TEST_CASE("A gesture model is saved completely and loaded again", "[gesture_file]") {
   const test::TempFolder folder;
   REQUIRE(save_model(test::toy_gesture_model(), folder.path() / "a.gesture").has_value());

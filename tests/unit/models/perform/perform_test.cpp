@@ -2,13 +2,19 @@
 // not recorded, global variance.
 #include "models/perform/perform.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <iostream>
+#include <map>
+#include <string>
+#include <vector>
 
 #include <catch2/catch.hpp>
 
 #include "models/gesture/train.hpp"
 #include "models/perform/constrain.hpp"
+#include "models/random.hpp"
 #include "proto/frame/degree.hpp"
 #include "tests/support/real_pose_corpus.hpp"
 #include "tests/support/shared.hpp"
@@ -178,6 +184,69 @@ TEST_CASE("gestures of a real hand that were not recorded are near the real ones
         static_cast<double>(fast.angles.size()) * tempo / static_cast<double>(p.angles.size());
     CHECK(std::abs(length - 1.0) <= 0.05);
   }
+}
+
+// The hold is the shown pose; how far that is from the sign's mean is the floor.
+TEST_CASE("a gesture that was shown once is held as it was shown", "[real]") {
+  const auto folder = test::shared("data/gloves/libras_cyberglove");
+  if (!folder) SKIP_WITHOUT_SHARED();
+  constexpr std::uint32_t kFirst = 20, kCorpora = 4;
+  constexpr std::size_t kMost = 5;  // rows that are shown
+  std::map<std::string, std::array<double, 4>> off;  // composed, once, five times, the floor
+  double jerk = 0.0, jerk_composed = 0.0;
+  for (std::uint32_t seed = kFirst; seed < kFirst + kCorpora; ++seed) {
+    auto model = gesture::train_gesture({test::real_pose_corpus(*folder, seed)}, {});
+    REQUIRE(model.has_value());
+    const auto composed = performed(information_of(*model), "g 1 c 3 4 p");
+    PortableRandom random(seed);
+    std::map<std::string, Eigen::MatrixXd> shown;
+    for (const char* const label : {"1", "3", "4"}) {
+      const auto poses = test::libras_poses(*folder, test::kSignOf.at(label));
+      Eigen::MatrixXd& rows = shown[label];
+      rows.resize(kMost, kHandChannels);
+      for (std::size_t i = 0; i < kMost; ++i) {
+        rows.row(static_cast<Eigen::Index>(i)) =
+            poses.row(random.below(static_cast<int>(poses.rows())));
+      }
+    }
+    for (const std::size_t count : {std::size_t{1}, kMost}) {
+      for (gesture::Label& label : model->labels) {
+        if (!shown.contains(label.name)) continue;
+        label.shown.clear();
+        for (Eigen::Index c = 0; c < kHandChannels; ++c) {
+          std::vector<double> column;
+          for (std::size_t i = 0; i < count; ++i) {
+            column.push_back(shown[label.name](static_cast<Eigen::Index>(i), c));
+          }
+          std::ranges::sort(column);
+          label.shown.push_back(column[count / 2]);
+        }
+      }
+      const auto p = performed(information_of(*model), "g 1 c 3 4 p");
+      CHECK(p.angles.size() == composed.angles.size());
+      jerk += jerk_deg(p);
+      jerk_composed += jerk_deg(composed);
+      for (auto& [name, rows] : shown) {
+        const int label = model->label_index(name);
+        const Eigen::VectorXd real =
+            test::libras_poses(*folder, test::kSignOf.at(name)).colwise().mean();
+        Performance as_shown = p;  // every frame the shown pose
+        as_shown.angles.assign(p.angles.size(), model->labels[static_cast<std::size_t>(label)].shown);
+        off[name][0] += held_off_deg(composed, label, real) / (2 * kCorpora);
+        off[name][count == 1 ? 1 : 2] += held_off_deg(p, label, real) / kCorpora;
+        if (count == 1) off[name][3] += held_off_deg(as_shown, label, real) / kCorpora;
+      }
+    }
+  }
+  for (const auto& [name, deg] : off) {
+    std::cout << name << ": composed " << deg[0] << ", shown once " << deg[1] << ", five times "
+              << deg[2] << ", the shown pose itself " << deg[3] << " deg off\n";
+    CHECK(deg[1] < 1.1 * deg[3] + 1.5);
+    CHECK(deg[1] < 0.7 * deg[0]);
+    CHECK(deg[2] < 4.5);
+  }
+  std::cout << "jerk " << jerk / jerk_composed << " of the composed one's\n";
+  CHECK(jerk < 1.15 * jerk_composed);
 }
 
 // `posed_bench generate` runs all 1,296 sequences of four labels.
