@@ -201,8 +201,10 @@ RT_SAFE double HmmForwardFilter::none_margin(std::span<const double> measured_ra
   const double noise = kNoiseGain[1] * noise_rad_ * noise_rad_;
   const double speed2 = std::max(sum / std::max(count, 1.0) - noise, 0.0) / (period_s_ * period_s_);
   const double still = 1.0 / (1.0 + speed2 / (kSlow_rad_s * kSlow_rad_s));
-  const double sure = std::isnan(off) ? 0.0 : std::clamp(off - 1.0, -1.0, 1.0);
-  return kSure / pace_ * (sure > 0.0 ? still * sure - (1.0 - still) * kMoving : sure);
+  if (std::isnan(off)) return 0.0;
+  const double sure = off > 1.0 ? still * std::min(off - 1.0, 1.0) - (1.0 - still) * kMoving
+                                : std::max(2.0 * (off - 1.0), -1.0);
+  return kSure / pace_ * sure;
 }
 
 // One step of the forward filter.
