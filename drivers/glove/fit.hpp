@@ -27,14 +27,17 @@ enum class Pose : std::uint8_t {
   kTouchIndex,
   kTouchMiddle,
   kTouchRing,
-  kTouchLittle
+  kTouchLittle,
+  kTouchFist
 };
-inline constexpr std::size_t kPoses = 8;
+inline constexpr std::size_t kPoses = 9;
 inline constexpr std::size_t kSensorPoses = 4;
 inline constexpr std::array<std::string_view, kPoses> kPoseNames{
-    "flat", "fist", "thumb", "spread", "touch-index", "touch-middle", "touch-ring", "touch-little"};
+    "flat",         "fist",       "thumb",        "spread",    "touch-index",
+    "touch-middle", "touch-ring", "touch-little", "touch-fist"};
 // The finger that the thumb touches, 1 the index; 0: not a contact.
 [[nodiscard]] constexpr int touched_finger(Pose pose) noexcept {
+  if (pose == Pose::kTouchFist) return 2;
   const auto index = static_cast<std::size_t>(pose);
   return index < kSensorPoses ? 0 : static_cast<int>(index - kSensorPoses) + 1;
 }
@@ -47,7 +50,8 @@ inline constexpr std::array<std::string_view, kPoses> kPoseHints{
     "touch the tip of the index finger with the tip of the thumb",
     "touch the tip of the middle finger with the tip of the thumb",
     "touch the tip of the ring finger with the tip of the thumb",
-    "touch the tip of the little finger with the tip of the thumb"};
+    "touch the tip of the little finger with the tip of the thumb",
+    "make a fist with the thumb across it, its tip on the middle finger"};
 
 // Joint angles of a hand in a pose [rad]: an average over people, so the fitted angles are only as
 // accurate as the user's poses. All 0 for a contact, so that it fits no sensor.

@@ -2,28 +2,25 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 #include <vector>
 
 #include <Eigen/Cholesky>
 
 #include "models/hand/geometry.hpp"
 #include "models/hand/segments.hpp"
+#include "models/random.hpp"
 #include "proto/frame/degree.hpp"
-#include "proto/frame/rotation.hpp"
 
 namespace posed::hand {
 namespace {
 
-constexpr int kMapParameters = 8;
-constexpr int kParameters = kMapParameters + 6;  // turns of the root's frame and of the bones'
+constexpr int kParameters = 8;  // gain and offset of each angle
 constexpr int kIndex = 1;
 
 // Prior standard deviations. The abduction's sensor is the least linear one; the joints beyond it
 // bend as they say.
 constexpr std::array<double, kThumbAngles.size()> kGainSigma{0.2, 0.4, 0.15, 0.15};
 constexpr std::array<double, kThumbAngles.size()> kOffsetSigma_deg{40.0, 20.0, 12.0, 12.0};
-constexpr std::array<double, 6> kFrameSigma_deg{25.0, 25.0, 40.0, 20.0, 20.0, 20.0};
 constexpr double kPriorWeight = 1.0;
 
 // What a thumb's joints can do, in the order of kThumbAngles; a pose beyond it is not believed.
@@ -42,23 +39,14 @@ constexpr double kMaxOverlap_m = 3e-3;  // pads give way by this much
 // [parameter] in units of its prior standard deviation.
 using Parameters = Eigen::Vector<double, kParameters>;
 
-ThumbFit fit_of(const HandShape& shape, const Parameters& u) {
-  ThumbFit fit{.map = {}, .thumb = shape.fingers[0]};
+ThumbMap map_of(const Parameters& u) {
+  ThumbMap map;
   for (std::size_t i = 0; i < kThumbAngles.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(2 * i);
-    fit.map.gain[i] += kGainSigma[i] * u[at];
-    fit.map.offset_rad[i] = kOffsetSigma_deg[i] * kDegree * u[at + 1];
+    map.gain[i] += kGainSigma[i] * u[at];
+    map.offset_rad[i] = kOffsetSigma_deg[i] * kDegree * u[at + 1];
   }
-  const auto turn = [&](std::size_t i) {
-    return kFrameSigma_deg[i] * kDegree * u[kMapParameters + static_cast<Eigen::Index>(i)];
-  };
-  const auto turned = [&](const Eigen::Quaterniond& frame, std::size_t i) {
-    return frame * axis_rotation(Axis::kX, turn(i)) * axis_rotation(Axis::kY, turn(i + 1)) *
-           axis_rotation(Axis::kZ, turn(i + 2));
-  };
-  fit.thumb.root = turned(fit.thumb.root, 0);
-  fit.thumb.frame = turned(fit.thumb.frame, 3);
-  return fit;
+  return map;
 }
 
 double gap_of_bones(const HandGeometry& geometry, const HandPose& pose, int first_bone,
@@ -120,37 +108,33 @@ void add_pose(const HandGeometry& geometry, const ThumbMap& map, const ThumbPose
   }
 }
 
-Eigen::VectorXd residuals_at(const HandShape& shape, std::span<const ThumbPose> poses,
+Eigen::VectorXd residuals_at(const HandGeometry& geometry, std::span<const ThumbPose> poses,
                              const Parameters& u) {
-  const ThumbFit fit = fit_of(shape, u);
-  HandShape turned = shape;
-  turned.fingers[0] = fit.thumb;
-  const HandGeometry geometry = hand_geometry(turned);
+  const ThumbMap map = map_of(u);
   std::vector<double> residuals;
-  for (const ThumbPose& pose : poses) add_pose(geometry, fit.map, pose, residuals);
+  for (const ThumbPose& pose : poses) add_pose(geometry, map, pose, residuals);
   for (const double one : u) residuals.push_back(kPriorWeight * one);
   return Eigen::Map<const Eigen::VectorXd>(residuals.data(), std::ssize(residuals));
 }
 
-// Levenberg and Marquardt from `u`, over the parameters `free`; returns half of the sum of squares.
-double descend(const HandShape& shape, std::span<const ThumbPose> poses,
-               const std::vector<int>& free, Parameters& u) {
+// Levenberg and Marquardt from `u`; returns half of the sum of squares.
+double descend(const HandGeometry& geometry, std::span<const ThumbPose> poses, Parameters& u) {
   constexpr int kMaxSteps = 60;
   constexpr double kDelta = 1e-5;
-  Eigen::VectorXd r = residuals_at(shape, poses, u);
+  Eigen::VectorXd r = residuals_at(geometry, poses, u);
   double damping = 1e-2;
   for (int step = 0; step < kMaxSteps && damping < 1e8; ++step) {
-    Eigen::MatrixXd slope(r.size(), std::ssize(free));
-    for (Eigen::Index i = 0; i < slope.cols(); ++i) {
+    Eigen::MatrixXd slope(r.size(), kParameters);
+    for (Eigen::Index i = 0; i < kParameters; ++i) {
       Parameters moved = u;
-      moved[free[i]] += kDelta;
-      slope.col(i) = (residuals_at(shape, poses, moved) - r) / kDelta;
+      moved[i] += kDelta;
+      slope.col(i) = (residuals_at(geometry, poses, moved) - r) / kDelta;
     }
     Eigen::MatrixXd normal = slope.transpose() * slope;
     normal.diagonal() *= 1.0 + damping;
     Parameters next = u;
-    next(free) -= normal.ldlt().solve(slope.transpose() * r);
-    const Eigen::VectorXd there = residuals_at(shape, poses, next);
+    next -= normal.ldlt().solve(slope.transpose() * r);
+    const Eigen::VectorXd there = residuals_at(geometry, poses, next);
     const double won = r.squaredNorm() - there.squaredNorm();
     damping *= won > 0.0 ? 0.3 : 8.0;
     if (!(won > 0.0)) continue;
@@ -170,25 +154,24 @@ void ThumbMap::apply(HandAngles& angles) const noexcept {
   }
 }
 
-ThumbFit fit_thumb(const HandShape& shape, std::span<const ThumbPose> poses, bool fit_frame) {
+ThumbMap fit_thumb(const HandShape& shape, std::span<const ThumbPose> poses) {
   // Descents end in one of several valleys: a thumb on the wrong side finds no way back over the
   // palm.
   constexpr int kStarts = 12;
-  std::vector<int> free{0, 1, 2, 3, 4, 5, 6, 7};
-  // The offsets of roll and abduction are the same as turns of the frames.
-  if (fit_frame) free = {0, 2, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13};
-  ThumbFit best;
-  std::mt19937 random(1);
-  std::normal_distribution<double> any(0.0, 0.8);
+  constexpr double kSpread = 0.8;
+  const HandGeometry geometry = hand_geometry(shape);
+  ThumbMap best;
+  double least = 0.0;
+  PortableRandom random(1);
   for (int start = 0; start < kStarts; ++start) {
     Parameters u = Parameters::Zero();
     if (start > 0) {
-      for (const int i : free) u[i] = any(random);
+      for (double& one : u) one = kSpread * random.normal();
     }
-    const double cost = descend(shape, poses, free, u);
-    if (start > 0 && cost >= best.cost) continue;
-    best = fit_of(shape, u);
-    best.cost = cost;
+    const double cost = descend(geometry, poses, u);
+    if (start > 0 && cost >= least) continue;
+    best = map_of(u);
+    least = cost;
   }
   return best;
 }

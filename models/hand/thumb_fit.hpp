@@ -31,17 +31,8 @@ struct ThumbMap {
   void apply(HandAngles& angles) const noexcept;
 };
 
-struct ThumbFit {
-  ThumbMap map;
-  FingerShape thumb;  // as in `shape`, unless the frame was fitted
-  double cost = 0.0;  // half of the sum of squares that is left
-};
-
 // Least squares with a prior on each parameter: contacts alone would leave gains that no joint has.
-// `fit_frame` fits the thumb's two frames too, for the shape of a hand; the offsets of roll and
-// abduction, which are the same as turns of the frames, are then 0.
-[[nodiscard]] ThumbFit fit_thumb(const HandShape& shape, std::span<const ThumbPose> poses,
-                                 bool fit_frame = false);
+[[nodiscard]] ThumbMap fit_thumb(const HandShape& shape, std::span<const ThumbPose> poses);
 
 // From the thumb's last two bones to a finger [m]; below zero they overlap.
 [[nodiscard]] double thumb_gap_m(const HandGeometry& geometry, const HandAngles& angles,

@@ -19,6 +19,7 @@
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/devices/calibrate_poses.hpp"
+#include "daemon/tools/devices/calibration_check.hpp"
 #include "daemon/tools/devices/driver_options.hpp"
 #include "daemon/tools/devices/thumb_contacts.hpp"
 #include "daemon/tools/live/live_view.hpp"
@@ -356,6 +357,31 @@ Result<> show_hand(const GloveSource& source, const CalibrationFile& file,
   return {};
 }
 
+// What is odd about the new calibration, and how it differs from the one that the file holds so far,
+// if that is of this glove, user and hand.
+Result<> judge(const GloveSource& source, const CalibrateOptions& options,
+               const CalibrationFile& file, const drivers::glove::Recorded& recorded) {
+  const auto& model = source.model();
+  const auto now =
+      TRY(drivers::glove::make_calibration(model, file, source.hand(), source.identity()));
+  for (const std::string& line : impossible_angles(model, *now, recorded)) {
+    std::fprintf(stderr, "posed: warning: %s\n", line.c_str());
+  }
+  std::error_code ignored;
+  if (!std::filesystem::exists(options.out, ignored)) return {};
+  const auto text = drivers::glove::load_calibration_text(options.out);
+  if (!text) return {};
+  const auto last = drivers::glove::parse_calibration(*text, options.out);
+  if (!last || last->user != options.user) return {};
+  const auto before =
+      drivers::glove::make_calibration(model, *last, source.hand(), source.identity());
+  if (!before) return {};
+  for (const std::string& line : differences(model, **before, *now, recorded)) {
+    std::fprintf(stderr, "posed: %s\n", line.c_str());
+  }
+  return {};
+}
+
 Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
   const auto plan = TRY(plan_of(options));
   const auto source = TRY(open_glove(options));
@@ -368,6 +394,7 @@ Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
   file.sensors = std::move(fitted.sensors);
   const auto contacts = TRY(fit_contacts(source->model(), recorded, source->hand(), file));
   for (const std::string& line : contacts) std::fprintf(stderr, "posed: %s\n", line.c_str());
+  TRY(judge(*source, options, file, recorded));
   TRY(show_hand(*source, file, recorded));
   return file;
 }
@@ -463,10 +490,11 @@ void add_calibrate(CLI::App& app, int& exit_code) {
       ->type_name("C.toml")
       ->required();
   command->footer(
-      R"(Poses: flat, fist, thumb, spread; with --pose touch-index=2, touch-middle, touch-ring and
-touch-little also contacts, by which the thumb is fitted to what it touches. On a terminal a screen
-shows what to do; elsewhere a line on stdout names each pose and a line on stdin begins it, or
---seconds does. A pose in which the hand moved, or whose sensors hardly moved from the flat hand,
+      R"(Poses: flat, fist, thumb, spread; with --pose touch-index=2, touch-middle, touch-ring,
+touch-little and touch-fist also contacts, by which the thumb is fitted to what it touches; the flat
+and the spread hand then say where it lies beside the hand and how far it reaches. On a terminal a
+screen shows what to do; elsewhere a line on stdout names each pose and a line on stdin begins it,
+or --seconds does. A pose in which the hand moved, or whose sensors hardly moved from the flat hand,
 fails: the screen asks for it again, a script gets exit code 1 and no file. Examples:
   posed calibrate --driver cyberglove --port /dev/ttyUSB0 --user ann --out ann.toml
   posed calibrate --connect tcp://127.0.0.1:5570 --stream right --user ann --out ann.toml

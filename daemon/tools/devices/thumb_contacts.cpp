@@ -25,22 +25,26 @@ bool is_held(const Recorded& recorded, Pose pose) {
                              [](const auto& sensor) { return sensor.count > 0; });
 }
 
-// The poses of which it is known what the thumb touches; the flat hand has it beside the index.
+// The poses of which it is known where the thumb is: what it touches, beside the index finger in
+// the flat hand, away from the hand where all is spread.
 std::vector<hand::ThumbPose> contacts_of(const Model& model,
                                          const drivers::glove::Calibration& calibration,
                                          const Recorded& recorded) {
   std::vector<hand::ThumbPose> poses;
   for (std::size_t p = 0; p < drivers::glove::kPoses; ++p) {
     const auto pose = static_cast<Pose>(p);
-    if (!is_held(recorded, pose) || (pose != Pose::kFlat && touched_finger(pose) == 0)) continue;
+    const int touched = touched_finger(pose);
+    const bool known = touched != 0 || pose == Pose::kFlat || pose == Pose::kSpread;
+    if (!known || !is_held(recorded, pose)) continue;
     hand::ThumbPose contact{.angles = drivers::glove::angles_of(model, calibration, recorded[p]),
                             .touched = {},
-                            .beside = pose == Pose::kFlat};
+                            .beside = pose == Pose::kFlat,
+                            .stretched = pose == Pose::kSpread};
     // A joint that no sensor measures is straight.
     for (double& angle_rad : contact.angles) {
       if (!std::isfinite(angle_rad)) angle_rad = 0.0;
     }
-    if (pose != Pose::kFlat) contact.touched.set(static_cast<std::size_t>(touched_finger(pose)));
+    if (touched != 0) contact.touched.set(static_cast<std::size_t>(touched));
     poses.push_back(contact);
   }
   return poses;
@@ -91,11 +95,11 @@ Result<std::vector<std::string>> fit_contacts(const Model& model, const Recorded
   }
   const HandShape& shape = default_hand_shape();
   const hand::HandGeometry geometry = hand::hand_geometry(shape);
-  const hand::ThumbFit fit = hand::fit_thumb(shape, poses);
+  const hand::ThumbMap fit = hand::fit_thumb(shape, poses);
   for (std::size_t i = 0; i < hand::kThumbAngles.size(); ++i) {
     const auto row = only_row(rows, hand::kThumbAngles[i]);
     if (!row) continue;
-    change_sensor(*row, model.sensors[row->sensor], fit.map.gain[i], fit.map.offset_rad[i], file);
+    change_sensor(*row, model.sensors[row->sensor], fit.gain[i], fit.offset_rad[i], file);
   }
   const auto fitted = TRY(drivers::glove::make_calibration(model, file, hand, /*identity=*/""));
   const auto after = contacts_of(model, *fitted, recorded);

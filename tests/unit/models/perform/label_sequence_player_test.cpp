@@ -6,6 +6,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "models/perform/perform.hpp"
 #include "models/perform/state_duration.hpp"
 #include "models/trajectory/sliding_window.hpp"
 #include "proto/frame/degree.hpp"
@@ -94,6 +95,30 @@ TEST_CASE("a sequence at tempo 0.5 to 2 lasts its natural length divided by the 
       CHECK(std::abs(frames * tempo / natural - 1.0) < 0.05);
     }
   }
+}
+
+TEST_CASE("a shown pose is held live as it is at once, and led into without a jump", "[generate]") {
+  gesture::GestureModel model = test::toy_gesture_model();
+  const int one = model.label_index("1");
+  model.labels[static_cast<std::size_t>(one)].shown.assign(kHandChannels, 0.4);
+  const StateInformation information(std::make_shared<const gesture::GestureModel>(model), 30.0);
+  const auto composed = played(toy(), "g1p");
+  const auto frames = played(information, "g1p");
+  const std::vector<int> labels{model.label_index("g"), one, model.label_index("p")};
+  const auto whole = perform::perform(information, labels, {}).value();
+  REQUIRE(frames.size() == composed.size());
+  REQUIRE(frames.size() == whole.angles.size());
+  double before = 0.0;
+  for (std::size_t t = 0; t < frames.size(); ++t) {
+    const std::size_t c = kFingerChannels;  // flexion of the index finger's first joint
+    CHECK(frames[t].angle[c] == Approx(whole.angles[t][c]).margin(0.5 * kDegree));
+    const double offset = frames[t].angle[c] - composed[t].angle[c];
+    CHECK(std::abs(offset - before) < 5.0 * kDegree);
+    before = offset;
+    if (frames[t].label != one || frames[t].state != 3) continue;
+    CHECK(frames[t].angle[c] == Approx(0.4).margin(3.0 * kDegree));
+  }
+  CHECK(std::abs(before) < 1e-9);  // gone in the last label
 }
 
 TEST_CASE("a played sequence equals the full solve except for the look-ahead", "[generate]") {

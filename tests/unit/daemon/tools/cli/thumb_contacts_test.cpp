@@ -60,7 +60,8 @@ TEST_CASE("a thumb calibrated with contacts touches where it touched") {
   for (const auto& [pose, roll, spread, bend] : {std::tuple{Pose::kTouchIndex, 20.0, -6.0, 40.0},
                                                  {Pose::kTouchMiddle, 30.0, -10.0, 40.0},
                                                  {Pose::kTouchRing, 40.0, -15.0, 45.0},
-                                                 {Pose::kTouchLittle, 48.0, -20.0, 50.0}}) {
+                                                 {Pose::kTouchLittle, 48.0, -20.0, 50.0},
+                                                 {Pose::kTouchFist, 45.0, -10.0, 80.0}}) {
     HandAngles hand{};
     const auto finger = static_cast<std::size_t>(touched_finger(pose));
     for (std::size_t joint = 0; joint < 3; ++joint) {
@@ -74,7 +75,7 @@ TEST_CASE("a thumb calibrated with contacts touches where it touched") {
   CalibrationFile file = fitted(model, recorded);
   const CalibrationFile before = file;
   const auto sentences = fit_contacts(model, recorded, Side::kRight, file).value();
-  REQUIRE(sentences.size() == 4);
+  REQUIRE(sentences.size() == 5);
   CHECK(sentences[0].starts_with("thumb to index "));
   double sum_before = 0.0, sum_after = 0.0;
   for (const Pose pose :

@@ -10,6 +10,7 @@
 #include "proto/clip/frames_clip.hpp"
 #include "proto/log/writer.hpp"
 #include "tests/support/log_surgery.hpp"
+#include "tests/support/virtual_daemon.hpp"
 #include "tests/unit/daemon/tools/replay/staged_run.hpp"
 
 namespace posed::test {
@@ -131,6 +132,22 @@ TEST_CASE("takes are cut out of a log's stream by number or name, each frame onc
   CHECK(refusal("5") ==
         "has no take '5', but take 1 'walk', take 2 'walk', take 3 'late', take 4 'none'");
   CHECK(refusal("none") == "take 4 has 0 frames of stream 'b', and a clip needs two");
+}
+
+TEST_CASE("a clip has every frame that was performed while the glove was unplugged", "[virtual]") {
+  const TempFolder folder;
+  const auto path = folder.path() / "performed.plog";
+  VirtualDaemon daemon({.seed = 1, .log = path, .holdups = false});
+  VirtualStream hand = glove_stream("hand", 1.0);
+  hand.links[0].until_s = 1.0;
+  daemon.add(std::move(hand));
+  daemon.command({.at_s = 0.5, .kind = VirtualCommand::Kind::kPlay, .labels = "g p", .loop = true});
+  daemon.run(3.0);
+  const auto numbers = daemon.published(0).numbers;
+  CHECK(numbers > 250);  // 100 of the glove
+  const auto clip = tools::clip_of_log(path, "hand");
+  if (!clip) FAIL(clip.error().text());
+  CHECK(static_cast<std::uint64_t>(clip->frames()) == numbers);
 }
 
 TEST_CASE("the stream of a log must be named if there are several, and must exist") {
