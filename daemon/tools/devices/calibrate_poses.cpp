@@ -267,11 +267,11 @@ using drivers::glove::Recorded;
 constexpr int kGap = 2;              // blanks between the hands
 constexpr int kMaxHandColumns = 18;  // of a hand
 
+}  // namespace
+
 bool was_held(const Recorded& recorded, std::size_t pose) {
   return std::ranges::any_of(recorded[pose], [](const auto& sensor) { return sensor.count > 0; });
 }
-
-}  // namespace
 
 std::vector<std::string> calibrated_hand(const drivers::glove::Model& model,
                                          const drivers::glove::Calibration& calibration, Side hand,

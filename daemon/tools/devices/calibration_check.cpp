@@ -8,6 +8,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "daemon/tools/devices/calibrate_poses.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/hand.hpp"
 
@@ -47,10 +48,6 @@ const PossibleRange* possible(std::size_t channel) {
   const std::size_t joint = channel % kFingerChannels / 3;
   if (channel % 3 == 0) return finger == 0 ? &kThumbRange[joint] : &kFingerRange[joint];
   return channel % 3 == 1 && finger > 0 && joint == 0 ? &kSpreadRange : nullptr;
-}
-
-bool was_held(const Recorded& recorded, std::size_t pose) {
-  return std::ranges::any_of(recorded[pose], [](const auto& sensor) { return sensor.count > 0; });
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "daemon/tools/devices/calibrate_poses.hpp"
 #include "drivers/glove/angle_map.hpp"
 #include "models/hand/geometry.hpp"
 #include "models/hand/thumb_fit.hpp"
@@ -20,11 +21,6 @@ using drivers::glove::Pose;
 using drivers::glove::Recorded;
 using drivers::glove::touched_finger;
 
-bool is_held(const Recorded& recorded, Pose pose) {
-  return std::ranges::any_of(recorded[static_cast<std::size_t>(pose)],
-                             [](const auto& sensor) { return sensor.count > 0; });
-}
-
 // The poses of which it is known where the thumb is: what it touches, beside the index finger in
 // the flat hand, away from the hand where all is spread.
 std::vector<hand::ThumbPose> contacts_of(const Model& model,
@@ -35,7 +31,7 @@ std::vector<hand::ThumbPose> contacts_of(const Model& model,
     const auto pose = static_cast<Pose>(p);
     const int touched = touched_finger(pose);
     const bool known = touched != 0 || pose == Pose::kFlat || pose == Pose::kSpread;
-    if (!known || !is_held(recorded, pose)) continue;
+    if (!known || !was_held(recorded, p)) continue;
     hand::ThumbPose contact{.angles = drivers::glove::angles_of(model, calibration, recorded[p]),
                             .touched = {},
                             .beside = pose == Pose::kFlat,

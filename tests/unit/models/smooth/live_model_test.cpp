@@ -119,8 +119,11 @@ TEST_CASE("a hand that makes none of the gestures is told so where the model doe
     CHECK(with.accuracy() == without.accuracy());
   }
   // Real poses of the three signs with their whole spread, then of all others.
-  for (const char* sign : {"A", "V"}) CHECK(none_percent(sign) == 0);
-  CHECK(none_percent("4") <= 10);
+  for (const char* sign : {"A", "V", "4"}) {
+    const int percent = none_percent(sign);
+    std::cout << "sign " << sign << ", learnt: " << percent << " % of the frames none\n";
+    CHECK(percent <= 10);
+  }
   int others = 0, mostly_none = 0;
   for (const auto& entry : std::filesystem::directory_iterator(*shared(kLibras))) {
     const std::string sign = entry.path().stem().string();
