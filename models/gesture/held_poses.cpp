@@ -109,9 +109,10 @@ std::vector<std::vector<double>> distances_left_out(const std::vector<HeldPose>&
   return distances;
 }
 
+// Of few values the second largest, because one gesture that was labelled wrongly would make the
+// largest any number.
 double share_below(std::vector<double> values, double share) {
-  const auto at = std::min(static_cast<std::size_t>(share * static_cast<double>(values.size())),
-                           values.size() - 1);
+  const auto at = static_cast<std::size_t>(share * static_cast<double>(values.size() - 1));
   std::ranges::nth_element(values, values.begin() + static_cast<std::ptrdiff_t>(at));
   return values[at];
 }

@@ -1,8 +1,9 @@
-// `posed smooth`: runs a recorded hand through the live smoother, as a stream would have been.
+// `posed smooth`: runs a recorded hand through gate and live smoother, as a stream would have been.
 #include <cmath>
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
@@ -13,6 +14,7 @@
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
+#include "models/gate/gate_stage.hpp"
 #include "models/gesture/model_file.hpp"
 #include "models/smooth/live_smoother.hpp"
 #include "proto/clip/format.hpp"
@@ -57,6 +59,26 @@ class Rows final : public StageOut {
 };
 
 // The recognised gestures, one entry for each run of frames.
+// Passes what the gate lets through to the smoother.
+class Gated final : public StageOut {
+ public:
+  Gated(smooth::LiveSmoother& smoother, StageOut& rows) : smoother_(smoother), rows_(rows) {}
+  void frame(const StageFrame& made) noexcept override { smoother_.process(made, rows_); }
+
+ private:
+  smooth::LiveSmoother& smoother_;
+  StageOut& rows_;
+};
+
+Result<std::unique_ptr<Stage>> make_gate(const Skeleton& skeleton, double rate_hz) {
+  const StageType& type = gate::gate_type();
+  auto parameters = TRY(complete_parameters(type.parameters, {}));
+  return type.make({.skeleton = std::make_shared<const Skeleton>(skeleton),
+                    .rate_hz = rate_hz,
+                    .parameters = std::move(parameters)},
+                   nullptr);
+}
+
 std::vector<Findings> recognised(const Rows& rows, const clip::HandClip& clip) {
   std::vector<Findings> runs;
   for (std::size_t begin = 0, end = 0; begin < rows.labels.size(); begin = end) {
@@ -110,8 +132,10 @@ Result<> smooth(const SmoothOptions& options) {
   }
 
   smooth::LiveSmoother smoother(skeleton, live, model.get());
+  const auto gate = TRY(make_gate(skeleton, clip.rate_hz));
   const std::vector<HandAngles> measured = clip.angles;
   Rows rows(clip);
+  Gated gated(smoother, rows);
   ProgressBar bar(kQuietFor_s);
   for (std::size_t t = 0; t < measured.size(); ++t) {
     const bool shows = t % kProgressEvery == 0;
@@ -123,7 +147,7 @@ Result<> smooth(const SmoothOptions& options) {
     set_hand_angles(skeleton, measured[t], frame);
     frame.header.sequence = t + 1;
     frame.header.device_ns = nanoseconds(clip.time_s[t] - clip.time_s[0]);
-    smoother.process({.frame = frame}, rows);
+    gate->process({.frame = frame}, gated);
   }
   smoother.flush(rows);
   TRY(clip::write_hand_csv(clip, options.out));
