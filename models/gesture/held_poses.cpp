@@ -17,7 +17,7 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
 constexpr double kSlack_rad = 4.0 * kDegree;  // in every angle, beside the spread over people
-constexpr double kKept = 0.98;                // of the poses of people who are left out
+constexpr double kKept = 0.975;               // of the poses of people who are left out
 // Takes of one person are more alike than people are: the limit is so many times as far.
 constexpr double kWidened = 6.0;
 
