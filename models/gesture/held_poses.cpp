@@ -136,8 +136,7 @@ HeldPoses held_poses(const std::vector<Recording>& recordings, const std::vector
   std::vector<PoseSums> sums(recorded.size(), PoseSums(channels));
   for (const HeldPose& pose : poses) sums[pose.label].add(pose.angles_rad, 1.0);
   const Whitening learnt = whitening_of(sums);
-  const MatrixXd inverse =
-      learnt.spread.matrixL().solve(MatrixXd::Identity(channels, channels));
+  const MatrixXd inverse = learnt.spread.matrixL().solve(MatrixXd::Identity(channels, channels));
   for (Index row = 0; row < channels; ++row) {
     for (Index c = 0; c <= row; ++c) held.whitening.push_back(inverse(row, c));
   }
@@ -149,8 +148,7 @@ HeldPoses held_poses(const std::vector<Recording>& recordings, const std::vector
   for (const auto& of : distances) {
     const auto& shown = of.empty() ? all : of;
     // As many squared unit deviations as there are channels, where nothing was left out.
-    const double limit =
-        shown.empty() ? static_cast<double>(channels) : share_below(shown, kKept);
+    const double limit = shown.empty() ? static_cast<double>(channels) : share_below(shown, kKept);
     held.limit.push_back(widened * limit);
   }
   return held;

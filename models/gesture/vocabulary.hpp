@@ -33,7 +33,7 @@ struct Label {
   std::string name;                // see proto/frame/label.hpp
   std::vector<int> group_class{};  // [group] from 0
   bool trained = false;            // it occurs in the training recordings
-  std::vector<double> shown{};     // [channel] the held pose as it was shown [rad]; empty: it was not
+  std::vector<double> shown{};  // [channel] the held pose as it was shown [rad]; empty: it was not
 };
 
 // The class of a finger's label that most fingers have, the lowest one in a tie.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 namespace posed::perform {
 namespace {
@@ -38,7 +39,7 @@ RT_SAFE void ShownPose::restart(bool poses) noexcept {
 // The offset from where the label is held to what was shown.
 RT_SAFE void ShownPose::aim(const trajectory::StateInformation& information,
                             const gesture::Context& context, double tempo) noexcept {
-  const std::vector<double>& shown =
+  const std::span<const double> shown =
       information.model().labels[static_cast<std::size_t>(context.current)].shown;
   const int channels = information.model().channels();
   const int stride = trajectory::padded(channels);

@@ -1,6 +1,6 @@
-// ShownPose: a label whose pose was shown is held as it was shown, with the timing and transitions of
-// the trees: an offset on the performed pose that comes and goes smoothly (models/perform/README.md,
-// "Shown poses"). Hot: no heap after construction.
+// ShownPose: a label whose pose was shown is held as it was shown, with the timing and transitions
+// of the trees: an offset on the performed pose that comes and goes smoothly
+// (models/perform/README.md, "Shown poses"). Hot: no heap after construction.
 #pragma once
 
 #include "models/trajectory/information_form.hpp"
@@ -13,12 +13,12 @@ class ShownPose {
   // For models of at most `channels` channels.
   explicit ShownPose(int channels);
 
-  // No label is performed yet. `poses`: the motion begins in the first label's pose; false: it comes
-  // from a pose of its own, which has no offset.
+  // No label is performed yet. `poses`: the motion begins in the first label's pose; false: it
+  // comes from a pose of its own, which has no offset.
   RT_SAFE void restart(bool poses) noexcept;
 
-  // Once a frame, in order: moves on to the offset of the next frame. `position` is the place of its
-  // label among those that are performed, `context` the label between its neighbours.
+  // Once a frame, in order: moves on to the offset of the next frame. `position` is the place of
+  // its label among those that are performed, `context` the label between its neighbours.
   RT_SAFE void advance(const trajectory::StateInformation& information, long position,
                        const gesture::Context& context, double tempo) noexcept;
 

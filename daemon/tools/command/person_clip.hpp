@@ -1,5 +1,5 @@
-// [PERSON:]FILE on the command line. The person is the part before the first colon where no file has
-// the whole name and that part holds no '/', which only a file's name does. Cold.
+// [PERSON:]FILE on the command line. The person is the part before the first colon where no file
+// has the whole name and that part holds no '/', which only a file's name does. Cold.
 #pragma once
 
 #include <filesystem>

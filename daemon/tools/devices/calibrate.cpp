@@ -357,8 +357,8 @@ Result<> show_hand(const GloveSource& source, const CalibrationFile& file,
   return {};
 }
 
-// What is odd about the new calibration, and how it differs from the one that the file holds so far,
-// if that is of this glove, user and hand.
+// What is odd about the new calibration, and how it differs from the one that the file holds so
+// far, if that is of this glove, user and hand.
 Result<> judge(const GloveSource& source, const CalibrateOptions& options,
                const CalibrationFile& file, const drivers::glove::Recorded& recorded) {
   const auto& model = source.model();

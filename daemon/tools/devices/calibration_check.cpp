@@ -105,9 +105,10 @@ std::vector<std::string> differences(const Model& model, const Calibration& befo
                                     joint_words(channel), off_rad / kDegree));
   }
   if (far.empty()) {
-    sentences.push_back(fmt::format("no joint differs by more than {:.0f} degrees from the last "
-                                    "calibration",
-                                    std::ceil(std::ranges::max(apart_rad) / kDegree)));
+    sentences.push_back(
+        fmt::format("no joint differs by more than {:.0f} degrees from the last "
+                    "calibration",
+                    std::ceil(std::ranges::max(apart_rad) / kDegree)));
   }
   return sentences;
 }

@@ -153,11 +153,12 @@ Result<> complete_labels(const GestureSources& sources, bool writes, GestureData
   }
   for (const std::string& show : sources.shows) {
     const auto shown = TRY(shown_pose(show, sources, vocabulary));
-    std::fprintf(stderr,
-                 "posed: '%s' is held as shown; the poses that compose it lie %.0f degrees rms from "
-                 "there\n",
-                 clean(shown.name).c_str(),
-                 gesture::composed_off_rad(shown, poses, vocabulary.groups) / kDegree);
+    std::fprintf(
+        stderr,
+        "posed: '%s' is held as shown; the poses that compose it lie %.0f degrees rms from "
+        "there\n",
+        clean(shown.name).c_str(),
+        gesture::composed_off_rad(shown, poses, vocabulary.groups) / kDegree);
     auto label = gesture::label_like(shown, poses, vocabulary.labels, vocabulary.groups);
     label.shown = shown.angles_rad;
     put_last(std::move(label), vocabulary);

@@ -250,8 +250,7 @@ Result<Findings> train_gesture(const TrainGestureOptions& options, Ranks& ranks)
       .add("verdict", verdict);
   add_summary(training, recordings, options.out, findings);
   if (training.model.held) {
-    findings.add("people", training.model.held->people)
-        .remark(none_words(*training.model.held));
+    findings.add("people", training.model.held->people).remark(none_words(*training.model.held));
   }
   findings.warn(warnings).remark(verdict);
   if (!options.report.empty() && ranks.leads()) {

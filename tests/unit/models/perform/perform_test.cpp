@@ -191,7 +191,7 @@ TEST_CASE("a gesture that was shown once is held as it was shown", "[real]") {
   const auto folder = test::shared("data/gloves/libras_cyberglove");
   if (!folder) SKIP_WITHOUT_SHARED();
   constexpr std::uint32_t kFirst = 20, kCorpora = 4;
-  constexpr std::size_t kMost = 5;  // rows that are shown
+  constexpr std::size_t kMost = 5;                   // rows that are shown
   std::map<std::string, std::array<double, 4>> off;  // composed, once, five times, the floor
   double jerk = 0.0, jerk_composed = 0.0;
   for (std::uint32_t seed = kFirst; seed < kFirst + kCorpora; ++seed) {
@@ -231,7 +231,8 @@ TEST_CASE("a gesture that was shown once is held as it was shown", "[real]") {
         const Eigen::VectorXd real =
             test::libras_poses(*folder, test::kSignOf.at(name)).colwise().mean();
         Performance as_shown = p;  // every frame the shown pose
-        as_shown.angles.assign(p.angles.size(), model->labels[static_cast<std::size_t>(label)].shown);
+        as_shown.angles.assign(p.angles.size(),
+                               model->labels[static_cast<std::size_t>(label)].shown);
         off[name][0] += held_off_deg(composed, label, real) / (2 * kCorpora);
         off[name][count == 1 ? 1 : 2] += held_off_deg(p, label, real) / kCorpora;
         if (count == 1) off[name][3] += held_off_deg(as_shown, label, real) / kCorpora;

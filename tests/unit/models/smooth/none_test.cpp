@@ -1,6 +1,6 @@
 // Whether a hand that makes none of the gestures is told so, for people who were never seen.
-#include <iostream>
 #include <cmath>
+#include <iostream>
 #include <map>
 #include <memory>
 #include <numeric>
@@ -54,8 +54,7 @@ struct Told {
 void follow(const PersonsHands& person, std::uint32_t seed, const smooth::LiveModel& model,
             std::map<std::string, Told>& told) {
   const gesture::Recording truth = strung(person, kAsked, seed, 1.5);
-  const auto reported =
-      followed(truth.angles_rad / kDegree, 30.0, live_options(1, 0.3), &model);
+  const auto reported = followed(truth.angles_rad / kDegree, 30.0, live_options(1, 0.3), &model);
   for (const gesture::Segment& segment : truth.segments) {
     Told& of = told[segment.label];
     for (int t = segment.begin + 24; t < segment.end; ++t) {
@@ -103,7 +102,8 @@ TEST_CASE("strangers and people taught in every division", "[.judge]") {
     for (std::size_t fold = 0; fold < folds; ++fold) {
       std::vector<std::size_t> taught, asked;
       for (std::size_t i = 0; i < people.size(); ++i) {
-        const std::size_t place = (i + people.size() - fold * std::min(strangers, 10U)) % people.size();
+        const std::size_t place =
+            (i + people.size() - fold * std::min(strangers, 10U)) % people.size();
         (place < strangers ? asked : taught).push_back(i);
       }
       const auto model = model_of_people(people, taught);

@@ -1,4 +1,5 @@
-// What `posed calibrate` says about a calibration: odd angles, and the difference from the last one.
+// What `posed calibrate` says about a calibration: odd angles, and the difference from the last
+// one.
 #include "daemon/tools/devices/calibration_check.hpp"
 
 #include <catch2/catch.hpp>

@@ -121,8 +121,7 @@ TEST_CASE("a smoothed hand has the gate by default, and its log replays the drop
        .parameters = complete_parameters(generate::generate_type().parameters, {}).value()});
   devices::ModelFiles files;
   const auto stages = [&] {
-    const auto loaded =
-        devices::load_stages(config, hand.description.skeleton, 100.0, files, {});
+    const auto loaded = devices::load_stages(config, hand.description.skeleton, 100.0, files, {});
     REQUIRE(loaded);
     return loaded->settings.stages;
   };
