@@ -76,8 +76,8 @@ struct SourceConfig {
 }
 
 enum class OutputKind : std::uint8_t { kVmc, kBvh, kAxis, kMvn, kMocopi, kRokoko, kNatNet };
-inline constexpr std::array<std::string_view, 7> kOutputKinds{
-    "vmc", "bvh", "axis", "mvn", "mocopi", "rokoko", "natnet"};
+inline constexpr std::array<std::string_view, 7> kOutputKinds{"vmc",    "bvh",    "axis",  "mvn",
+                                                              "mocopi", "rokoko", "natnet"};
 
 // As in the config.
 [[nodiscard]] constexpr std::string_view kind_name(OutputKind kind) noexcept {
@@ -91,8 +91,8 @@ struct OutputConfig {
   std::string body, left_hand, right_hand;  // streams; at least one is not empty, or there are
   std::vector<std::string> bodies;          // several people, of kinds that have them
   [[nodiscard]] std::size_t people() const { return bodies.empty() ? 1 : bodies.size(); }
-  double rate_hz = 0.0;                     // at most so many frames a second; 0: all
-  std::vector<std::string> to;              // addresses and ports, over UDP
+  double rate_hz = 0.0;         // at most so many frames a second; 0: all
+  std::vector<std::string> to;  // addresses and ports, over UDP
   // vmc
   bool vrm1_names = false;         // of blend shapes; false: those of VRM 0
   bool assistant = false;          // sends hands only
