@@ -6,6 +6,7 @@
 #include "daemon/devices/kept_settings.hpp"
 #include "models/stage_type.hpp"
 #include "models/stages/registry.hpp"
+#include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::devices {
 namespace {
@@ -27,6 +28,8 @@ Result<std::vector<config::StageConfig>> stages_of(const config::StreamConfig& c
   if (skeleton != nullptr && is_prop(*skeleton)) return std::vector<config::StageConfig>();
   if (!config.default_stages || skeleton == nullptr) return config.stages;
   std::vector<config::StageConfig> stages;
+  // Only hands have stages by default.
+  const Skeleton hand = hand_skeleton(Side::kRight);
   for (const StageType* type : stage_types()) {
     const auto named = std::ranges::find(config.stages, type, &config::StageConfig::type);
     const bool off = std::ranges::find(config.off, type) != config.off.end();
@@ -88,12 +91,14 @@ Result<LoadedStages> load_stages(const config::StreamConfig& config,
 pipeline::StreamSettings possible_settings(const config::StreamConfig& config) {
   pipeline::StreamSettings settings{.publish_raw = config.publish_raw,
                                     .stale_after_s = config.stale_after_s};
+  const Skeleton hand = hand_skeleton(Side::kRight);  // only hands have stages by default
   for (const StageType* type : stage_types()) {
     const auto named = std::ranges::find(config.stages, type, &config::StageConfig::type);
     const bool off = std::ranges::find(config.off, type) != config.off.end();
     if (named != config.stages.end()) {
       settings.stages.push_back({.type = type, .parameters = named->parameters});
-    } else if (config.default_stages && !off && type->is_default != nullptr) {
+    } else if (config.default_stages && !off && type->is_default != nullptr &&
+               type->is_default(hand, has_bridge(config))) {
       settings.stages.push_back(pipeline::stage_settings(*type));
     }
   }

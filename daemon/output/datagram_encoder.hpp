@@ -1,6 +1,7 @@
 // DatagramEncoder: people in the form of one protocol whose program only sends, in datagrams.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -42,6 +43,12 @@ class DatagramEncoder {
 [[nodiscard]] inline std::int64_t measured_ns(const Header& header) noexcept {
   const bool mapped = header.device_ns != kNoTime_ns && header.clock.valid;
   return mapped ? to_host_ns(header.clock, header.device_ns) : header.arrival_ns;
+}
+
+// Brings the time of what is sent up to a frame's. It never goes back: people come with different
+// delays, a silent one's last pose is repeated, and a device's clock is known only after a while.
+inline void advance(std::int64_t& time_ns, const Header& header) noexcept {
+  time_ns = std::max(time_ns, measured_ns(header));
 }
 
 // The encoders of the kinds.

@@ -81,7 +81,7 @@ class MocopiEncoder final : public DatagramEncoder {
       pose_[j].transform.rotation_xyzw = pose.rotation_xyzw[j];
     }
     pose_[0].transform.position_m = pose.root_position_m;
-    time_ns_ = measured_ns(frame.header);
+    advance(time_ns_, frame.header);
     if (begin_ns_ == kNoTime_ns) begin_ns_ = time_ns_;
     return true;
   }

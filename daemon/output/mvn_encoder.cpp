@@ -71,7 +71,7 @@ class MvnEncoder final : public DatagramEncoder {
       person->rotations[table.segment[j]] = pose.rotation_xyzw[j];
     }
     person->root_m = pose.root_position_m;
-    person->time_ns = measured_ns(frame.header);
+    advance(person->time_ns, frame.header);
     person->timecode = frame.timecode;
     person->waits = true;
     return true;

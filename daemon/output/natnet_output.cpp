@@ -81,8 +81,6 @@ Result<> NatNetOutput::set_stream(std::size_t place, const LiveStream* stream) {
 }
 
 void NatNetOutput::begin_turn(std::int64_t now_ns) {
-  std::erase_if(clients_,
-                [&](const Client& client) { return now_ns - client.heard_ns > kSilent_ns; });
   std::array<std::byte, kMaxRequest> buffer;
   more_ = true;
   for (int i = 0; i < kMaxRequests; ++i) {
@@ -90,8 +88,10 @@ void NatNetOutput::begin_turn(std::int64_t now_ns) {
     const ssize_t size = ::recvfrom(fd_, buffer.data(), buffer.size(), MSG_DONTWAIT | MSG_TRUNC,
                                     from.get(), &from.size);
     if (size < 0) {
-      if (errno == EAGAIN) more_ = false;
-      continue;  // another error belongs to an earlier answer: a client has gone
+      // A refusal belongs to an earlier answer: a client has gone.
+      if (errno == EINTR || errno == ECONNREFUSED) continue;
+      more_ = false;
+      break;
     }
     natnet::Message message;
     const auto bytes = static_cast<std::size_t>(size);
@@ -101,7 +101,10 @@ void NatNetOutput::begin_turn(std::int64_t now_ns) {
     if (natnet::decode_request(request, message) != Outcome::kOk) continue;
     answer(from, message, now_ns);
   }
-  set_receivers(clients_.size() + (group_ ? 1 : 0));
+  const auto live = std::ranges::count_if(
+      clients_, [&](const Client& client) { return is_live(client, now_ns); });
+  live_ = static_cast<std::size_t>(live);
+  set_receivers(live_ + (group_ ? 1 : 0));
 }
 
 bool NatNetOutput::take(std::size_t place, const Frame& frame, std::int64_t /*now_ns*/) {
@@ -109,7 +112,8 @@ bool NatNetOutput::take(std::size_t place, const Frame& frame, std::int64_t /*no
 }
 
 std::int64_t NatNetOutput::end_turn(std::int64_t now_ns) {
-  return more_ ? now_ns : system::kForever_ns;
+  if (more_) return now_ns;
+  return live_ > 0 ? now_ns + kSilent_ns : system::kForever_ns;
 }
 
 NatNetOutput::Client* NatNetOutput::find(const drivers::Address& address) noexcept {
@@ -124,6 +128,10 @@ void NatNetOutput::admit(const drivers::Address& address, Version version, std::
   if (Client* known = find(address); known != nullptr) {
     known->version = version;
     return;
+  }
+  if (clients_.size() == kMaxClients) {
+    const auto silent = std::ranges::min_element(clients_, {}, &Client::heard_ns);
+    if (!is_live(*silent, now_ns)) clients_.erase(silent);
   }
   if (clients_.size() < kMaxClients) {
     clients_.push_back({.address = address, .version = version, .heard_ns = now_ns});
@@ -145,7 +153,9 @@ void NatNetOutput::answer(const drivers::Address& from, const natnet::Message& m
       const Version wanted = natnet::version_for(message.payload);
       // With a group a client gets the frames there, unless it says that it is alive here.
       const bool connects = message.id == natnet::MessageId::kConnect;
-      if (connects && (!group_ || client != nullptr)) admit(from, wanted, now_ns);
+      if (connects && (!group_ || client != nullptr)) {
+        admit(from, group_ ? kNewest : wanted, now_ns);
+      }
       natnet::ServerInfo info{.name = "posed",
                               .version = group_ ? kNewest : wanted,
                               .clock_hz = NatNetScene::kClock_hz,
@@ -157,7 +167,8 @@ void NatNetOutput::answer(const drivers::Address& from, const natnet::Message& m
       return send_to(from, natnet::encode_server_info(info));
     }
     case natnet::MessageId::kKeepAlive:
-      if (client == nullptr) admit(from, kNewest, now_ns);
+      // Without a group a client says first which version it reads.
+      if (client == nullptr && group_) admit(from, kNewest, now_ns);
       return;
     case natnet::MessageId::kDisconnect:
       if (client != nullptr) clients_.erase(clients_.begin() + (client - clients_.data()));
@@ -205,7 +216,7 @@ NatNetOutput::Bytes NatNetOutput::answer_request(std::span<const std::byte> payl
 }
 
 void NatNetOutput::send(std::int64_t now_ns) {
-  if (clients_.empty() && !group_) return;
+  if (live_ == 0 && !group_) return;
   const natnet::FramePacket& frame = scene_.next_frame(now_ns);
   // Clients of one version get the same bytes.
   std::ranges::stable_sort(clients_, {}, &Client::version);
@@ -216,6 +227,7 @@ void NatNetOutput::send(std::int64_t now_ns) {
     encoded = version;
   };
   for (const Client& client : clients_) {
+    if (!is_live(client, now_ns)) continue;
     encode(client.version);
     send_to(client.address, datagram);
   }

@@ -20,7 +20,8 @@ namespace posed::output {
 class NatNetOutput final : public Output {
  public:
   static constexpr std::size_t kMaxClients = 16;
-  // A client that sends nothing for so long is gone; clients send KeepAlive about every second.
+  // A client that sends nothing for so long gets nothing; clients send KeepAlive about every
+  // second.
   static constexpr std::int64_t kSilent_ns = 5 * kNanosPerSecond;
 
   static Result<std::unique_ptr<Output>> open(const config::OutputConfig& config,
@@ -41,6 +42,10 @@ class NatNetOutput final : public Output {
     Version version;
     std::int64_t heard_ns = 0;
   };
+  // One that is silent keeps its place, with its version, until another needs it.
+  [[nodiscard]] static bool is_live(const Client& client, std::int64_t now_ns) noexcept {
+    return now_ns - client.heard_ns <= kSilent_ns;
+  }
 
   [[nodiscard]] Result<> set_stream(std::size_t place, const LiveStream* stream) override;
   void begin_turn(std::int64_t now_ns) override;
@@ -64,6 +69,7 @@ class NatNetOutput final : public Output {
   std::optional<drivers::Address> group_;
   NatNetScene scene_;
   std::vector<Client> clients_;
+  std::size_t live_ = 0;                  // of clients_, as of the beginning of the turn
   bool more_ = false;                     // requests wait
   std::int64_t refused_ns_ = kNoTime_ns;  // when a refusal was last told
 };

@@ -108,11 +108,11 @@ bool NatNetScene::take(std::size_t place, const Frame& frame) {
   auto& bones = body->packet.bones;
   for (std::size_t j = 0; j < bones.size(); ++j) {
     bones[j].rotation_xyzw = pose.rotation_xyzw[j];
-    bones[j].tracked = !body->own || frame.valid[j];
+    bones[j].tracked = frame.quality != Quality::kStale && (!body->own || frame.valid[j]);
   }
   bones[0].position_m = pose.root_position_m;
   body->posed = true;
-  time_ns_ = measured_ns(frame.header);
+  advance(time_ns_, frame.header);
   if (begin_ns_ == kNoTime_ns) begin_ns_ = time_ns_;
   timecode_ = frame.timecode;
   return true;

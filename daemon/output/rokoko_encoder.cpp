@@ -89,7 +89,7 @@ class RokokoEncoder final : public DatagramEncoder {
     person->pose = person->fit.apply(frame);
     person->pose.valid.set();  // what was not measured stands as in T-pose
     person->posed = true;
-    time_ns_ = measured_ns(frame.header);
+    advance(time_ns_, frame.header);
     if (begin_ns_ == kNoTime_ns) begin_ns_ = time_ns_;
     return true;
   }

@@ -1,9 +1,13 @@
 #include "daemon/teach/teacher.hpp"
 
+#include <algorithm>
 #include <chrono>
+#include <memory>
+#include <new>
 #include <utility>
 #include <vector>
 
+#include <spdlog/fmt/fmt.h>
 #include <spdlog/spdlog.h>
 
 #include "daemon/pipeline/messages.hpp"
@@ -79,7 +83,7 @@ Teacher::~Teacher() {
 
 RT_SAFE void Teacher::raw_frame(const Frame& frame) noexcept {
   if (frame.header.stream != tapped_.load(std::memory_order_relaxed)) return;
-  static_cast<void>(tap_.push(frame));
+  if (!tap_.push(frame)) lost_.fetch_add(1, std::memory_order_relaxed);
 }
 
 v1::TaughtWalk& Teacher::words_of(Walk walk) {
@@ -87,6 +91,7 @@ v1::TaughtWalk& Teacher::words_of(Walk walk) {
 }
 
 Result<> Teacher::check_free() const {
+  if (working_) return fail("what was cancelled is still ending; ask again in a moment");
   if (state_.step() == Step::STEP_IDLE || state_.step() == Step::STEP_IN_USE) return {};
   return fail("stream " + state_.stream() +
               " is being taught just now; wait for its end, or cancel it where it was begun");
@@ -107,8 +112,13 @@ Result<> Teacher::mark(const Pupil& pupil, Walk walk, double seconds) {
   state_.set_step(Step::STEP_MARKING);
   state_.set_style(walk == Walk::kStyle);
   state_.clear_problem();
+  state_.clear_verdict();
+  state_.clear_model();
+  state_.clear_sequence();
+  state_.clear_train_s();
   words_of(walk).Clear();
   walks_[at(walk)].reset();
+  lost_ = 0;
   pupil_ = pupil;
   walk_ = walk;
   from_ns_ = clock_();
@@ -133,6 +143,9 @@ Result<> Teacher::train(const std::string& stream, const std::string& name) {
   ++job_;
   state_.clear_problem();
   state_.clear_verdict();
+  state_.clear_model();
+  state_.clear_sequence();
+  state_.clear_train_s();
   state_.set_step(Step::STEP_TRAINING);
   changed_.notify_all();
   return {};
@@ -142,7 +155,10 @@ Result<> Teacher::cancel(const std::string& stream) {
   const std::scoped_lock lock(mutex_);
   if (state_.stream() != stream)
     return fail("stream " + in_quotes(stream) + " is not being taught");
-  if (check_free()) return {};
+  if (state_.step() == Step::STEP_IDLE || state_.step() == Step::STEP_IN_USE) return {};
+  if (state_.step() == Step::STEP_STARTING && !model_) {
+    return fail("the style is coming on just now; alpha = 0 or another model takes it off again");
+  }
   model_.reset();
   finish(Step::STEP_IDLE, {});
   changed_.notify_all();
@@ -190,13 +206,20 @@ void Teacher::run() {
   Collected collected;
   Lock lock(mutex_);
   while (!stop_) {
-    if (state_.step() == Step::STEP_MARKING) {
-      collect(lock, collected);
-    } else if (state_.step() == Step::STEP_TRAINING) {
-      train_now(lock);
-    } else {
-      changed_.wait(lock);
+    try {
+      if (state_.step() == Step::STEP_MARKING) {
+        collect(lock, collected);
+      } else if (state_.step() == Step::STEP_TRAINING) {
+        train_now(lock);
+      } else {
+        changed_.wait(lock);
+      }
+    } catch (const std::bad_alloc&) {
+      collected = {};
+      if (!lock.owns_lock()) lock.lock();
+      finish(Step::STEP_IDLE, "there is too little memory for this; mark shorter walks");
     }
+    working_ = false;
   }
 }
 
@@ -225,6 +248,7 @@ void Teacher::check(Lock& lock, Collected& collected) {
   if (collected.job != job_) return;
   tapped_.store(pipeline::kNoStream, std::memory_order_relaxed);
   state_.set_step(Step::STEP_CHECKING);
+  working_ = true;
   lock.unlock();
   style::TrainingClip take = collected.clip();
   const style::TakeCheck checked = style::check_take(take, kTrainRate_hz);
@@ -232,19 +256,31 @@ void Teacher::check(Lock& lock, Collected& collected) {
   if (collected.job != job_) return;
   v1::TaughtWalk& words = words_of(collected.walk);
   words.set_good(checked.good());
-  words.set_sentence(clean(checked.sentence()));
-  spdlog::info("{}: {}: {}", collected.pupil.name, take.clip.path, words.sentence());
-  if (checked.good()) walks_[at(collected.walk)] = std::move(take);
+  std::string sentence = clean(checked.sentence());
+  if (const std::uint64_t lost = lost_; lost > 0) {
+    sentence += fmt::format("; {} frames came faster than this computer could keep them", lost);
+  }
+  words.set_sentence(sentence);
+  const std::string path = take.clip.path;
+  if (checked.good()) {
+    walks_[at(collected.walk)] = std::make_shared<const style::TrainingClip>(std::move(take));
+  }
   finish(Step::STEP_IDLE, {});
+  lock.unlock();
+  spdlog::info("{}: {}: {}", collected.pupil.name, path, sentence);
   collected = {};
+  lock.lock();
 }
 
 void Teacher::train_now(Lock& lock) {
   const std::uint64_t job = job_;
-  std::vector<style::TrainingClip> clips{*walks_[at(Walk::kNeutral)], *walks_[at(Walk::kStyle)]};
+  const auto walks = walks_;
   const std::string name = name_;
   const std::string stream = state_.stream();
+  working_ = true;
   lock.unlock();
+  std::vector<style::TrainingClip> clips;
+  for (const auto& walk : walks) clips.push_back(*walk);
   clips.front().group = kUsual;
   clips.back().group = name;
   style::TrainingVerdict verdict;
@@ -275,9 +311,11 @@ void Teacher::train_now(Lock& lock) {
   state_.set_verdict(clean(verdict.sentence));
   state_.set_model(*file);
   state_.set_step(Step::STEP_STARTING);
-  spdlog::info("{}: learnt style {}: {}", stream, *file, state_.verdict());
   model_ = {.stream = stream, .file = *file, .bytes = std::move(bytes)};
   call_();
+  lock.unlock();
+  spdlog::info("{}: learnt style {}: {}", stream, *file, clean(verdict.sentence));
+  lock.lock();
 }
 
 }  // namespace posed::teach

@@ -75,6 +75,7 @@ class Teacher final : public pipeline::RawTap {
   void started(std::uint64_t sequence);  // of the first frame with it
   void not_started(const std::string& why);
 
+  // The publisher's thread.
   RT_SAFE void raw_frame(const Frame& frame) noexcept override;
 
  private:
@@ -95,20 +96,23 @@ class Teacher final : public pipeline::RawTap {
 
   // Between the publisher and the thread.
   pipeline::Ring<Frame> tap_{kTapSlots};
-  std::atomic<std::uint32_t> tapped_;  // the stream that is marked
+  std::atomic<std::uint32_t> tapped_;   // the stream that is marked
+  std::atomic<std::uint64_t> lost_{0};  // frames of this walk for which the ring had no room
 
   mutable std::mutex mutex_;  // guards all below, of which job_ is read without it, too
   std::condition_variable changed_;
   bool stop_ = false;
+  bool working_ = false;  // the thread checks or trains, perhaps what was cancelled meanwhile
   std::atomic<std::uint64_t> job_{0};  // what is under way; another number: it was cancelled
   v1::Teaching state_;
   Pupil pupil_;
   Walk walk_ = Walk::kNeutral;  // that is marked
   std::int64_t from_ns_ = 0, until_ns_ = 0;
-  std::int64_t asked_ns_ = 0;                                // for the training
-  std::string name_;                                         // of the style
-  std::array<std::optional<style::TrainingClip>, 2> walks_;  // by Walk; those that serve
-  std::optional<TaughtModel> model_;                         // for take_model()
+  std::int64_t asked_ns_ = 0;  // for the training
+  std::string name_;           // of the style
+  // By Walk; null: there is none that serves.
+  std::array<std::shared_ptr<const style::TrainingClip>, 2> walks_;
+  std::optional<TaughtModel> model_;  // for take_model()
 
   std::thread thread_;
 };

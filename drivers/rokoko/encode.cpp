@@ -71,7 +71,8 @@ Eigen::Vector3f from_parent_m(std::string_view joint) {
 char* put_number(char* at, float value) noexcept {
   constexpr std::int64_t kParts = 10'000'000;  // of one
   constexpr double kMost = 1e9;
-  const double inside = std::clamp(static_cast<double>(value), -kMost, kMost);
+  const double inside =
+      std::isfinite(value) ? std::clamp(static_cast<double>(value), -kMost, kMost) : 0.0;
   const std::int64_t parts = std::llround(inside * static_cast<double>(kParts));
   if (parts < 0) *at++ = '-';
   const std::int64_t size = std::abs(parts);

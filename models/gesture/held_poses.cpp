@@ -20,6 +20,7 @@ constexpr double kSlack_rad = 4.0 * kDegree;  // in every angle, beside the spre
 constexpr double kKept = 0.975;               // of the poses of people who are left out
 // Takes of one person are more alike than people are: the limit is so many times as far.
 constexpr double kWidened = 6.0;
+constexpr double kMinLimit = 1e-3;  // of a limit, for each channel
 
 // The mean of one gesture's held part.
 struct HeldPose {
@@ -149,7 +150,8 @@ HeldPoses held_poses(const std::vector<Recording>& recordings, const std::vector
     const auto& shown = of.empty() ? all : of;
     // As many squared unit deviations as there are channels, where nothing was left out.
     const double limit = shown.empty() ? static_cast<double>(channels) : share_below(shown, kKept);
-    held.limit.push_back(widened * limit);
+    // Poses that are the same to the bit have no spread to learn from.
+    held.limit.push_back(widened * std::max(limit, kMinLimit * static_cast<double>(channels)));
   }
   return held;
 }

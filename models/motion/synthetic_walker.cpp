@@ -387,6 +387,9 @@ Instant Walker::at(double time_s) const {
 }  // namespace
 
 Result<clip::Clip> make_walker(const WalkerOptions& options) {
+  if (!(options.seconds > 0.0 && options.rate_hz > 0.0)) {
+    return fail("a walk has a length and a rate above 0");
+  }
   const Walker walker(options);
   clip::Clip walk;
   walk.path = "synthetic";

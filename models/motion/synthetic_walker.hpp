@@ -23,8 +23,9 @@ struct WalkerOptions {
   std::uint32_t person = 1;  // seeds everything personal; one person can walk in every family
   double seconds = 6.0;
   double rate_hz = 30.0;
-  double noise_deg = 0.3;  // white, of each rotation channel above the hips
-  bool round = false;      // once round a circle in whole strides, so that the clip can be looped
+  double noise_deg = 0.3;  // white, of each rotation channel above the hips; feet do not tremble
+  bool round = false;  // at least three seconds; once round a circle in whole strides, so that the
+                       // clip can be looped
 };
 
 // A clip of one walk that begins towards +Z. Skeleton with BVH-style ZXY channels and canonical

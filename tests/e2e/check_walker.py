@@ -1,6 +1,6 @@
 """Judges a walk's feet by its own forward kinematics: check_walker.py WALK.bvh ...
 
-Prints a line for each clip and fails where a person would see that the walker is not real: feet that
+Prints a line for each clip and ends with 3 where a person would see that the walker is not real: feet that
 hover or sink, a standing foot that slides, a knee that bends the other way. Lengths are scaled to a
 person of 170 cm; the floor is the 5th percentile of the lowest points of the feet.
 """
@@ -105,4 +105,4 @@ def judge(path):
 
 if __name__ == "__main__":
     verdicts = [judge(path) for path in sys.argv[1:]]
-    sys.exit(0 if verdicts and all(verdicts) else 1)
+    sys.exit(0 if verdicts and all(verdicts) else 3)

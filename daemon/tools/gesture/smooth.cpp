@@ -58,7 +58,6 @@ class Rows final : public StageOut {
   std::size_t next_ = 0;
 };
 
-// The recognised gestures, one entry for each run of frames.
 // Passes what the gate lets through to the smoother.
 class Gated final : public StageOut {
  public:
@@ -79,6 +78,7 @@ Result<std::unique_ptr<Stage>> make_gate(const Skeleton& skeleton, double rate_h
                    nullptr);
 }
 
+// The recognised gestures, one entry for each run of frames.
 std::vector<Findings> recognised(const Rows& rows, const clip::HandClip& clip) {
   std::vector<Findings> runs;
   for (std::size_t begin = 0, end = 0; begin < rows.labels.size(); begin = end) {

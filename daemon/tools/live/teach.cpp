@@ -36,6 +36,7 @@ class Lesson {
     mark.set_style(style);
     mark.set_seconds(walk_s);
     TRY(ask_(request));
+    begun_ = true;
     const auto reply = TRY(await([&](const v1::Teaching& now) {
       count_down(fmt::format("{} ... {:.0f} s", how, std::ceil(now.seconds_left())));
       return now.step() == v1::Teaching::STEP_MARKING || now.step() == v1::Teaching::STEP_CHECKING;
@@ -55,6 +56,7 @@ class Lesson {
     v1::ControlRequest request = about_stream();
     request.mutable_teach()->mutable_train()->set_name(options_.name);
     TRY(ask_(request));
+    begun_ = true;
     auto reply = TRY(await([&](const v1::Teaching& now) {
       count_down("learning ...");
       return now.step() == v1::Teaching::STEP_TRAINING || now.step() == v1::Teaching::STEP_STARTING;
@@ -73,6 +75,9 @@ class Lesson {
     }
     return reply;
   }
+
+  // Whether the daemon was asked for a walk or a training: only that is ours to cancel.
+  [[nodiscard]] bool begun() const { return begun_; }
 
  private:
   [[nodiscard]] v1::ControlRequest about_stream() const {
@@ -123,6 +128,7 @@ class Lesson {
 
   const TeachOptions& options_;
   const Ask& ask_;
+  bool begun_ = false;
 };
 
 }  // namespace
@@ -139,7 +145,7 @@ Result<v1::ControlReply> teach(const TeachOptions& options, const Ask& ask) {
     return lesson.train();
   };
   auto taught = all();
-  if (!taught && Interrupt::came()) {
+  if (!taught && lesson.begun() && Interrupt::came()) {
     v1::ControlRequest request;
     request.mutable_teach()->set_stream(options.stream);
     request.mutable_teach()->mutable_cancel();

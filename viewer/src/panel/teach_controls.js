@@ -66,7 +66,7 @@ export class TeachControls {
       this.#now = teaching.stream === this.name ? teaching : { step: STEP.idle };
     }
     this.#show(reply.ok ? '' : reply.error);
-    if (reply.ok && this.#busy && this.element.isConnected)
+    if (this.#busy && this.element.isConnected)
       this.timer = setTimeout(() => this.#ask({}), LOOK_MS);
   }
 

@@ -114,6 +114,14 @@ bool is_frame_of(const Datagram& datagram, Version version) {
          natnet::read_frame(message.payload, {.version = version}, view);
 }
 
+double timestamp_of(const Datagram& datagram) {
+  natnet::Message message;
+  natnet::FrameView view;
+  REQUIRE(natnet::decode_message(datagram, message) == Outcome::kOk);
+  REQUIRE(natnet::read_frame(message.payload, {.version = {4, 1}}, view));
+  return view.timestamp_s;
+}
+
 }  // namespace
 
 TEST_CASE("people and props of Motive arrive through the NatNet output as they were") {
@@ -253,8 +261,8 @@ TEST_CASE("a NatNet client that leaves or is silent gets nothing any more") {
   NatNetServerRig rig(natnet_config({"ann"}));
   rig.output->stream_comes(info_of(0, "ann", walk.skeleton));
   const NatNetClient polite(rig), silent(rig), alive(rig);
-  for (const NatNetClient* client : {&polite, &silent}) (void)client->connect({4, 1});
-  alive.send(natnet::encode_message(MessageId::kKeepAlive, {}));
+  for (const NatNetClient* client : {&polite, &alive}) (void)client->connect({4, 1});
+  (void)silent.connect({3, 0});
   polite.send(natnet::encode_message(MessageId::kDisconnect, {}));
   rig.now_ns += NatNetOutput::kSilent_ns / 2;
   alive.send(natnet::encode_message(MessageId::kKeepAlive, {}));
@@ -264,6 +272,32 @@ TEST_CASE("a NatNet client that leaves or is silent gets nothing any more") {
   CHECK(polite.next(0).empty());
   CHECK(silent.next(0).empty());
   CHECK(rig.stats().receivers() == 1);
+  // One that is heard again goes on in its version; one that never said a version gets nothing.
+  const NatNetClient stranger(rig);
+  for (const NatNetClient* client : {&silent, &stranger}) {
+    client->send(natnet::encode_message(MessageId::kKeepAlive, {}));
+  }
+  rig.pass(frame_of(0, walk.frame(1)), rig.now_ns);
+  CHECK(is_frame_of(silent.next(), {3, 0}));
+  CHECK(stranger.next(0).empty());
+}
+
+TEST_CASE("what a NatNet server sends never goes back in time") {
+  const auto walk = motion::make_walker({.seconds = 1.0}).value();
+  NatNetServerRig rig(natnet_config({"ann"}));
+  rig.output->stream_comes(info_of(0, "ann", walk.skeleton));
+  const NatNetClient client(rig);
+  (void)client.connect({4, 1});
+  Frame newer = frame_of(0, walk.frame(1)), older = frame_of(0, walk.frame(0));
+  newer.header.arrival_ns = rig.now_ns + kNanosPerSecond;
+  older.header.arrival_ns = rig.now_ns;
+  older.quality = Quality::kStale;
+  const auto time_s = [&](const Frame& frame) {
+    rig.pass(frame, rig.now_ns);
+    return timestamp_of(client.next());
+  };
+  const double first_s = time_s(newer);
+  CHECK(time_s(older) >= first_s);
 }
 
 TEST_CASE("a NatNet server limits its clients, and answers no damaged request") {

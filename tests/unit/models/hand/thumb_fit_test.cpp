@@ -45,7 +45,7 @@ ThumbMap fit_without(const std::filesystem::path& folder, char twins) {
 }  // namespace
 
 // Minutes: `unit_hand "[.judge]"`.
-TEST_CASE("thumbs touch what they touch in real signs that the fit has not seen", "[.judge]") {
+TEST_CASE("thumbs touch what they touch in real signs that the map was not fitted to", "[.judge]") {
   const auto folder = test::shared("data/gloves/libras_cyberglove");
   if (!folder) SKIP_WITHOUT_SHARED();
   const HandGeometry geometry = hand_geometry(default_hand_shape());

@@ -45,6 +45,9 @@ double worst_angle_rad(const Motion& a, const Motion& b) {
   REQUIRE(a.size() == b.size());
   for (int t = 0; t < a.size(); ++t) {
     for (int j = 0; j < a.frames[t].joint_count; ++j) {
+      // A heel that lands turns its foot faster than 30 frames a second can show.
+      const std::string& name = a.skeleton->joints[j].name;
+      if (name.contains("Foot") || name.contains("Toes")) continue;
       worst = std::max(worst, angle_between_rad(to_eigen_double(a.frames[t].rotation_xyzw[j]),
                                                 to_eigen_double(b.frames[t].rotation_xyzw[j])));
     }
@@ -106,13 +109,12 @@ TEST_CASE("Resampling keeps the walk: same rate untouched, 120 to 30 and 30 to 1
   CHECK(worst_angle_rad(resample(at_30, 30.0), at_30) == 0.0);
   const Motion down = resample(at_120, 30.0);
   CHECK(down.size() == at_30.size());
-  // A heel that lands turns its foot faster than 30 frames a second can show.
-  CHECK(worst_angle_rad(down, at_30) < 0.12);
+  CHECK(worst_angle_rad(down, at_30) < 0.05);
   const Motion up = resample(at_30, 120.0);
   CHECK(up.rate_hz == 120.0);
   Motion cut = at_120;
   cut.frames.resize(up.frames.size());
-  CHECK(worst_angle_rad(up, cut) < 0.15);
+  CHECK(worst_angle_rad(up, cut) < 0.06);
   CHECK(resample(walker(100.0), 30.0).size() == 150);
 }
 

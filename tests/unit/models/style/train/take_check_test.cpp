@@ -134,10 +134,10 @@ TEST_CASE("a joint that is missing for long spoils a take, one for a moment does
   TrainingClip held = take;
   const TakeCheck checked = check_take(held, 30.0);
   CHECK(checked.good());
-  CHECK(has(checked.sentence(), "missing: RightFoot (3 %)"));
+  CHECK(has(checked.sentence(), "missing: RightToes (3 %)"));
   CHECK(held.clip.channels.allFinite());
   take.clip.channels.col(c).segment(100, 200).setConstant(kNone);
-  CHECK(has(refusal(take), "RightFoot was missing in 28 % of the frames"));
+  CHECK(has(refusal(take), "RightToes was missing in 28 % of the frames"));
 }
 
 }  // namespace posed::style
