@@ -28,8 +28,6 @@ Result<std::vector<config::StageConfig>> stages_of(const config::StreamConfig& c
   if (skeleton != nullptr && is_prop(*skeleton)) return std::vector<config::StageConfig>();
   if (!config.default_stages || skeleton == nullptr) return config.stages;
   std::vector<config::StageConfig> stages;
-  // Only hands have stages by default.
-  const Skeleton hand = hand_skeleton(Side::kRight);
   for (const StageType* type : stage_types()) {
     const auto named = std::ranges::find(config.stages, type, &config::StageConfig::type);
     const bool off = std::ranges::find(config.off, type) != config.off.end();

@@ -86,8 +86,8 @@ def judge(path):
     frames = [positions(joints, row) for row in rows]
     feet = [s + b for s in ("Left", "Right") for b in ("Foot", "Toes")]
     feet += ["End LeftToes", "End RightToes"]
-    height = max(f["End Head"][1] for f in frames) - min(f[n][1] for f in frames for n in feet)
-    cm = 170 / height
+    upright = positions(joints, [0] * len(rows[0]))  # T-pose, whatever the style crouches
+    cm = 170 / (upright["End Head"][1] - min(upright[n][1] for n in feet))
     lowest = sorted(min(f[n][1] for n in feet) * cm for f in frames)
     floor = lowest[len(lowest) // 20]
     near = sum(abs(low - floor) <= 1 for low in lowest) / len(lowest)

@@ -85,10 +85,11 @@ TEST_CASE("monitor and top show the daemon, to people and to scripts") {
 TEST_CASE("completion is generated from the existing commands") {
   const auto bash = posed({"completion", "bash"});
   CHECK(bash.code == 0);
-  CHECK(has(bash.out,
-            "'posed ctl') words='set warm-up model models use-model play stop-playing calibrate "
-            "haptics take "
-            "status stop --help --connect"));
+  CHECK(has(
+      bash.out,
+      "'posed ctl') words='set warm-up model models use-model teach play stop-playing calibrate "
+      "haptics take "
+      "status stop --help --connect"));
   CHECK(has(posed({"completion", "zsh"}).out, "#compdef posed"));
   CHECK(has(posed({"completion", "fish"}).out, "-l 'connect'"));
   CHECK(posed({"completion", "tcsh"}).code == 2);

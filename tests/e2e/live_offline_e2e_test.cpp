@@ -191,8 +191,15 @@ TEST_CASE("live is offline: a clip played once equals what apply --cold writes")
     if (*pace == '0') CHECK(end == kClipFrames + 1);  // a lossless source is never shed
     std::vector<v1::Frame> live = published(*reader);
     std::erase_if(live, [end](const v1::Frame& frame) { return frame.sequence() >= end; });
-    REQUIRE(live.size() == end - 1);
-    for (std::size_t i = 0; i < live.size(); ++i) CHECK(live[i].sequence() == i + 1);
+    // A recorder that gets no time while an unpaced clip runs leaves frames to the replay, and says
+    // how many.
+    const std::size_t missing = end - 1 - live.size();
+    if (missing > 0) {
+      CHECK(record.err.contains("lacks " + std::to_string(missing) + " published frames"));
+    }
+    REQUIRE_FALSE(live.empty());
+    for (std::size_t i = 1; i < live.size(); ++i)
+      CHECK(live[i].sequence() > live[i - 1].sequence());
     WARN("pace " << pace << ": " << live.size() << " frames, at most "
                  << largest_distance_rad(live, offline) << " rad from apply --cold");
     CHECK(largest_distance_rad(live, offline) <= kSame_rad);

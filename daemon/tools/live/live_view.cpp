@@ -244,8 +244,10 @@ std::string stages_row(const v1::StreamStats& stream) {
     add(fmt::format("lag {} frame{} ({:.1f} ms)", stream.lag_frames(),
                     stream.lag_frames() == 1 ? "" : "s", stream.lag_ms()));
   }
-  // Parameters that differ from their defaults; alpha has its own column.
+  // Parameters that differ from their defaults; alpha has its own column. Before the first frame
+  // nobody has reported them.
   for (const v1::StageStats& one : stream.stage()) {
+    if (stream.frames() == 0) break;
     const StageType* type = find_stage_type(one.name());
     for (const v1::ParameterStats& parameter : one.parameter()) {
       const ParameterSpec* spec =

@@ -237,6 +237,8 @@ TEST_CASE("the live view shows performed and recognised gestures, a moving alpha
   parameter.set_value(0.0);
   CHECK_FALSE(below().contains("gate_fallback"));  // as usual
   parameter.set_value(0.25);
+  CHECK_FALSE(below().contains("gate_fallback"));  // no frame has come
+  stream.set_frames(1);
   CHECK(below() == "  walker0: performs g, style.gate_fallback 0.25, alpha slides to 1.00");
   v1::ParameterStats& text = *style.add_parameter();
   text.set_name("weights");
