@@ -217,9 +217,9 @@ void Teacher::run() {
     } catch (const std::bad_alloc&) {
       collected = {};
       if (!lock.owns_lock()) lock.lock();
+      working_ = false;
       finish(Step::STEP_IDLE, "there is too little memory for this; mark shorter walks");
     }
-    working_ = false;
   }
 }
 
@@ -253,6 +253,7 @@ void Teacher::check(Lock& lock, Collected& collected) {
   style::TrainingClip take = collected.clip();
   const style::TakeCheck checked = style::check_take(take, kTrainRate_hz);
   lock.lock();
+  working_ = false;
   if (collected.job != job_) return;
   v1::TaughtWalk& words = words_of(collected.walk);
   words.set_good(checked.good());
@@ -306,6 +307,7 @@ void Teacher::train_now(Lock& lock) {
   if (!bytes.empty() && job_ == job) file = keep_(name, bytes);
   if (!file) problem = file.error().text();
   lock.lock();
+  working_ = false;
   if (job_ != job) return;
   if (!problem.empty()) return finish(Step::STEP_IDLE, problem);
   state_.set_verdict(clean(verdict.sentence));
