@@ -281,6 +281,7 @@ void Teacher::train_now(Lock& lock) {
   working_ = true;
   lock.unlock();
   std::vector<style::TrainingClip> clips;
+  clips.reserve(walks.size());
   for (const auto& walk : walks) clips.push_back(*walk);
   clips.front().group = kUsual;
   clips.back().group = name;

@@ -57,10 +57,12 @@ std::string missing_joints(const clip::Clip& clip, std::string& problem) {
     const std::string joint = clean_name(skeleton.joints[channel.joint].name);
     const std::string percent = number(std::ceil(100.0 * share), 0) + " %";
     if (share > kMaxMissing && share < 1.0 && problem.empty()) {
-      problem = joint + " was missing in " + percent +
-                " of the frames: see to its sensor or marker, and walk again";
+      problem = joint;
+      problem.append(" was missing in ").append(percent);
+      problem.append(" of the frames: see to its sensor or marker, and walk again");
     }
-    words += (words.empty() ? "" : ", ") + joint + (share < 1.0 ? " (" + percent + ")" : "");
+    words.append(words.empty() ? "" : ", ").append(joint);
+    if (share < 1.0) words.append(" (").append(percent).append(")");
   }
   return words;
 }
