@@ -10,7 +10,6 @@
 #include <cerrno>  // program_invocation_name
 
 #include "daemon/assembly/daemon.hpp"
-#include "posed/v1/control.pb.h"
 #include "proto/message/bounded_parse.hpp"
 #include "proto/text/clean.hpp"
 

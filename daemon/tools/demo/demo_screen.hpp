@@ -17,6 +17,7 @@
 #include "daemon/tools/live/chosen_stream.hpp"
 #include "daemon/tools/live/live_view.hpp"
 #include "models/motion/turn_sum.hpp"
+#include "posed/v1/control.pb.h"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/result.hpp"
 #include "proto/text/stream_name.hpp"
