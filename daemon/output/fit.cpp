@@ -47,6 +47,10 @@ bool has_fingers(const Skeleton& skeleton) {
          skeleton.joint_of(Bone::kRightIndexProximal) >= 0;
 }
 
+bool is_prop(const Skeleton& skeleton) noexcept {
+  return skeleton.joints.size() == 1 && !skeleton.joints[0].bone;
+}
+
 bool rests_unturned(const Skeleton& skeleton) noexcept {
   constexpr double kUnturned_rad = 1e-4;
   return skeleton.root_joint == 0 && std::ranges::all_of(skeleton.joints, [](const Joint& joint) {

@@ -47,6 +47,9 @@ class Fit {
 // Whether it can move its fingers.
 [[nodiscard]] bool has_fingers(const Skeleton& skeleton);
 
+// A rigid body, such as a sword that a performer holds.
+[[nodiscard]] bool is_prop(const Skeleton& skeleton) noexcept;
+
 // Whether no joint is turned in T-pose, and the first one says where the person is.
 [[nodiscard]] bool rests_unturned(const Skeleton& skeleton) noexcept;
 

@@ -11,10 +11,6 @@ namespace {
 
 namespace natnet = drivers::natnet;
 
-bool is_prop(const Skeleton& skeleton) {
-  return skeleton.joints.size() == 1 && !skeleton.joints[0].bone;
-}
-
 // Whether it is one of Motive's: with its own names, or with those that it gives for FBX and BVH.
 // Files of such names have channels.
 bool is_of_motive(const Skeleton& skeleton) {

@@ -20,10 +20,6 @@ namespace {
 
 namespace rokoko = drivers::rokoko;
 
-bool is_studio_prop(const Skeleton& skeleton) {
-  return skeleton.joints.size() == 1 && !skeleton.joints[0].bone;
-}
-
 // Whether the joints are those that Studio would describe.
 bool is_studio_actor(const Skeleton& skeleton) {
   rokoko::JointSet joints;
@@ -68,7 +64,7 @@ class RokokoEncoder final : public DatagramEncoder {
     person.reset();
     if (stream == nullptr) return {};
     const auto& skeleton = stream->skeleton;
-    const bool prop = skeleton != nullptr && is_studio_prop(*skeleton);
+    const bool prop = skeleton != nullptr && is_prop(*skeleton);
     const bool own = skeleton != nullptr && (prop || is_studio_actor(*skeleton));
     const std::string& name = own ? skeleton->name : stream->name;
     auto fit = TRY(Fit::make(skeleton, own, [&](double scale) {
@@ -116,8 +112,8 @@ class RokokoEncoder final : public DatagramEncoder {
 
  private:
   struct Person {
-    Person(Fit fitted, std::string named, bool is_prop)
-        : fit(std::move(fitted)), head(std::move(named)), prop(is_prop) {}
+    Person(Fit fitted, std::string named, bool is_a_prop)
+        : fit(std::move(fitted)), head(std::move(named)), prop(is_a_prop) {}
     Fit fit;
     std::string head;  // the JSON up to the joints
     bool prop;

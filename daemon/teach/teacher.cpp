@@ -90,9 +90,21 @@ v1::TaughtWalk& Teacher::words_of(Walk walk) {
   return walk == Walk::kNeutral ? *state_.mutable_neutral_walk() : *state_.mutable_style_walk();
 }
 
+bool Teacher::is_under_way() const {
+  return state_.step() != Step::STEP_IDLE && state_.step() != Step::STEP_IN_USE;
+}
+
+void Teacher::forget_outcome() {
+  state_.clear_problem();
+  state_.clear_verdict();
+  state_.clear_model();
+  state_.clear_sequence();
+  state_.clear_train_s();
+}
+
 Result<> Teacher::check_free() const {
   if (working_) return fail("what was cancelled is still ending; ask again in a moment");
-  if (state_.step() == Step::STEP_IDLE || state_.step() == Step::STEP_IN_USE) return {};
+  if (!is_under_way()) return {};
   return fail("stream " + state_.stream() +
               " is being taught just now; wait for its end, or cancel it where it was begun");
 }
@@ -111,11 +123,7 @@ Result<> Teacher::mark(const Pupil& pupil, Walk walk, double seconds) {
   state_.set_stream(pupil.name);
   state_.set_step(Step::STEP_MARKING);
   state_.set_style(walk == Walk::kStyle);
-  state_.clear_problem();
-  state_.clear_verdict();
-  state_.clear_model();
-  state_.clear_sequence();
-  state_.clear_train_s();
+  forget_outcome();
   words_of(walk).Clear();
   walks_[at(walk)].reset();
   lost_ = 0;
@@ -141,11 +149,7 @@ Result<> Teacher::train(const std::string& stream, const std::string& name) {
   asked_ns_ = clock_();
   name_ = name;
   ++job_;
-  state_.clear_problem();
-  state_.clear_verdict();
-  state_.clear_model();
-  state_.clear_sequence();
-  state_.clear_train_s();
+  forget_outcome();
   state_.set_step(Step::STEP_TRAINING);
   changed_.notify_all();
   return {};
@@ -155,7 +159,7 @@ Result<> Teacher::cancel(const std::string& stream) {
   const std::scoped_lock lock(mutex_);
   if (state_.stream() != stream)
     return fail("stream " + in_quotes(stream) + " is not being taught");
-  if (state_.step() == Step::STEP_IDLE || state_.step() == Step::STEP_IN_USE) return {};
+  if (!is_under_way()) return {};
   if (state_.step() == Step::STEP_STARTING && !model_) {
     return fail("the style is coming on just now; alpha = 0 or another model takes it off again");
   }

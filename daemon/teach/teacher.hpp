@@ -86,6 +86,9 @@ class Teacher final : public pipeline::RawTap {
   void collect(Lock& lock, Collected& collected);
   void check(Lock& lock, Collected& collected);
   void train_now(Lock& lock);
+  // These need mutex_.
+  [[nodiscard]] bool is_under_way() const;
+  void forget_outcome();  // of the lesson before
   [[nodiscard]] Result<> check_free() const;
   [[nodiscard]] v1::TaughtWalk& words_of(Walk walk);
   void finish(v1::Teaching::Step step, const std::string& problem);
