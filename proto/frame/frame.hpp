@@ -18,6 +18,7 @@ namespace posed {
 inline constexpr int kMaxJoints = 96;
 inline constexpr int kMaxChannels = 288;  // three per joint
 inline constexpr int kMaxSampleValues = 512;
+inline constexpr int kMaxRobotJoints = 64;
 inline constexpr int kMaxLabel = 16;  // bytes, including the closing zero
 
 using Vec3f = std::array<float, 3>;
@@ -26,6 +27,14 @@ inline constexpr Quatf kIdentity{0.0F, 0.0F, 0.0F, 1.0F};
 
 enum class Quality : std::uint8_t { kMeasured, kPredicted, kHeld, kStale };
 enum class Source : std::uint8_t { kDevice, kFile, kReplay, kLabels };
+
+// What a robot may do with the frame, whose channels are its joints.
+enum class RobotState : std::uint8_t {
+  kNone,      // the stream is no robot's
+  kReleased,  // nobody has engaged it: the frame is not a command
+  kEngaged,   // it follows the hand
+  kHolding,   // engaged, but the hand cannot be trusted: it brakes, then stands
+};
 
 // Host time [ns] at which each step finished with the frame; kNoTime_ns before that.
 struct StageStamps {
@@ -62,6 +71,8 @@ struct Frame {
   std::bitset<kMaxJoints> valid;
   std::array<Quatf, kMaxJoints> rotation_xyzw{};  // [joint], parent-relative
   std::array<float, kMaxChannels> angle_rad{};    // [rotation channel], in Skeleton::channels order
+  RobotState robot = RobotState::kNone;
+  std::array<float, kMaxRobotJoints> velocity_rad_s{};  // [rotation channel] of a robot's stream
 };
 static_assert(std::is_trivially_copyable_v<Frame>);
 

@@ -25,6 +25,9 @@ const v1::Frame& FrameEncoder::encode(const Frame& frame) {
   assign(*message_.mutable_rotation_xyzw(), {frame.rotation_xyzw.front().data(), joints * 4});
   assign_flags(*message_.mutable_validity(), frame.valid, joints);
   assign(*message_.mutable_angle_rad(), {frame.angle_rad.data(), frame.angle_count});
+  message_.set_robot_state(static_cast<v1::RobotState>(frame.robot));
+  const std::size_t robot_joints = frame.robot == RobotState::kNone ? 0 : frame.angle_count;
+  assign(*message_.mutable_velocity_rad_s(), {frame.velocity_rad_s.data(), robot_joints});
   message_.set_quality(static_cast<v1::Quality>(frame.quality));
   message_.set_source(static_cast<v1::Source>(frame.source));
   message_.mutable_label()->assign(frame.label.begin(), std::ranges::find(frame.label, '\0'));
