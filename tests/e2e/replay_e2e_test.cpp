@@ -76,7 +76,7 @@ TEST_CASE("one wrong time in a log does not stop a timed replay: it is skipped a
   const std::string log = staged_log(folder);
   forge(log, "UPDATE chunk SET arrival_ns = arrival_ns + 86400000000000 WHERE id = 20");
   const ProgramOutcome paced =
-      posed({"replay", log, "--out", (folder.path() / "paced.bin").string()});
+      posed({"replay", log, "--speed", "1", "--out", (folder.path() / "paced.bin").string()});
   INFO(paced.err);
   CHECK(paced.code == 0);
   CHECK(has(paced.err, "staged.plog: ... 86400 s ... chunk 20"));

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <nlohmann/json.hpp>
+#include <pugixml.hpp>
 
 #include "tests/e2e/outcome.hpp"
 #include "tests/support/has.hpp"
@@ -150,6 +151,28 @@ TEST_CASE("what the logs lack is told, and nothing compared is a failure", "[far
   CHECK(has(found[1].at("missing").dump(), "5 decisions ... chunk 0"));
 }
 
+TEST_CASE("a JUnit report has a case for each log, failed where it differs", "[farm]") {
+  const KeptLogs kept;
+  const std::string path = (kept.folder.path() / "replay.xml").string();
+  const auto done = farm({kept.good[0], kept.bad}, {"--expect", "--json", "--junit", path});
+  CHECK(done.code == 1);
+  pugi::xml_document document;
+  REQUIRE(document.load_file(path.c_str()));
+  const auto suite = document.child("testsuites").child("testsuite");
+  const std::vector<json> found = lines_of(done);
+  REQUIRE(found.size() == 2);
+  const int failed = found[0]["same"] == true ? 1 : 2;  // the last bits may differ on this CPU
+  CHECK(suite.attribute("tests").as_int() == 2);
+  CHECK(suite.attribute("failures").as_int() == failed);
+  const auto good = suite.child("testcase");
+  CHECK(std::string(good.attribute("name").value()) == kept.good[0]);
+  CHECK((good.child("failure").empty()) == (failed == 1));
+  const auto bad = good.next_sibling("testcase");
+  CHECK(std::string(bad.attribute("name").value()) == kept.bad);
+  CHECK(has(bad.child("failure").attribute("message").value(), "bad.plog"));
+  CHECK(farm({kept.good[0]}, {"--expect", "--junit", path}).code == 2);  // there is one already
+}
+
 TEST_CASE("Ctrl-C ends the farm, which says that not all was compared", "[farm]") {
   const KeptLogs kept;
   std::vector<std::string> arguments{"replay", "--expect", "--json"};
@@ -172,8 +195,9 @@ TEST_CASE("options that make no sense for several logs are refused", "[farm]") {
     return done.code == 2 && has(done.err, why);
   };
   CHECK(refused({}, "add --expect"));
-  CHECK(refused({"--expect", "--publish"}, "for one log"));
-  CHECK(refused({"--expect", "--out", "x.bin"}, "for one log"));
+  CHECK(refused({"--expect", "--publish"}, "leave out --publish and --out"));
+  CHECK(refused({"--expect", "--out", "x.bin"}, "leave out --publish and --out"));
+  CHECK(refused({"--expect", "--junit", kept.good[0]}, ".xml"));
   CHECK(refused({"--expect", "--speed", "2"}, "leave out --speed"));
 }
 

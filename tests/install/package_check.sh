@@ -33,6 +33,32 @@ use_clients() {
   [ -n "$(find "$root/usr/include/posed/v1" -name posed.pb.h)" ] || fail "libposed-dev has no messages"
 }
 
+# The steps of config/ci/gitlab.yml, as a runner runs them, on a log that this posed has recorded.
+use_gitlab_recipe() {
+  local project=$root/root/project steps
+  steps=$(awk '/^  (before_)?script:/ { on = 1; next } /^  [a-z]/ { on = 0 } on { sub(/^    - /, ""); print }' \
+    config/ci/gitlab.yml)
+  mkdir -p "$project/takes"
+  cp "$packages"/posed_*.deb "$project/posed.deb"
+  alone posed demo --prepare /root/demo &>"$packages/ci.log" || fail "no demo for the recipe"
+  alone posed record --config /root/demo/demo.toml --seconds 3 --frames --out /root/project/takes/a.plog \
+    &>"$packages/ci.log" || { cat "$packages/ci.log" >&2; fail "no log for the recipe"; }
+  inside sh -ec "cd /root/project; $steps" &>"$packages/ci.log" ||
+    { cat "$packages/ci.log" >&2; fail "the steps of config/ci/gitlab.yml fail"; }
+  grep -q 'tests="1" failures="0"' "$project/replay.xml" || fail "the recipe's report lacks its test case"
+  printf 'x' | dd of="$project/takes/a.plog" bs=1 seek=40000 conv=notrunc status=none
+  ! inside sh -ec "cd /root/project; posed replay --expect takes/*.plog" &>"$packages/ci.log" ||
+    fail "the recipe does not see a damaged log"
+}
+
+# The step of config/ci/Containerfile: there is no registry here to take its base image from.
+use_containerfile() {
+  cp "$packages"/posed_*.deb "$root/tmp/posed.deb"
+  inside sh -ec "$(sed -n 's/^RUN //p' config/ci/Containerfile)" &>"$packages/ci.log" ||
+    { cat "$packages/ci.log" >&2; fail "the step of config/ci/Containerfile fails"; }
+  inside posed --version || fail "the image has no posed"
+}
+
 # An older number in use, the newer one over it, removed, purged.
 life_of_packages() {
   local version left
@@ -47,6 +73,7 @@ life_of_packages() {
   inside getent passwd posed >/dev/null || fail "there is no account posed"
   use_demo
   use_clients
+  use_gitlab_recipe
   inside apt-get remove -y -qq posed >"$packages/apt.log" 2>&1 || fail "apt cannot remove"
   [ ! -e "$root/usr/bin/posed" ] || fail "removed, but /usr/bin/posed is still there"
   inside apt-get purge -y -qq posed libposed-dev python3-posed >"$packages/apt.log" 2>&1 || fail "apt cannot purge"
@@ -55,7 +82,8 @@ life_of_packages() {
   [ "$left" = ./etc/posed ] || fail "purge left more than the user's config: $left"
   [ "$(ls "$root/etc/posed")" = mine.toml ] || fail "purge took the user's config, or left more: $(ls "$root/etc/posed")"
   ! inside getent passwd posed >/dev/null || fail "purge left the account posed"
-  echo "installed, used, upgraded to $version, removed, purged"
+  use_containerfile
+  echo "installed, used, upgraded to $version, replayed as config/ci says, removed, purged"
 }
 
 # The values of two BVH files differ by less than 0.001 degrees or centimetres.

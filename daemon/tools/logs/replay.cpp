@@ -25,6 +25,7 @@
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
 #include "daemon/tools/command/ranks.hpp"
+#include "daemon/tools/logs/junit.hpp"
 #include "daemon/tools/logs/replay_outputs.hpp"
 #include "daemon/tools/replay/broadcast.hpp"
 #include "daemon/tools/replay/pace.hpp"
@@ -40,7 +41,8 @@ namespace {
 // does with all the logs that it keeps.
 struct FarmOptions {
   std::vector<std::string> logs;
-  std::string isa;  // empty: each log's own
+  std::string isa;    // empty: each log's own
+  std::string junit;  // a file to write; empty: none
   bool json = false;
 };
 
@@ -185,6 +187,16 @@ std::string what_happened(const FarmLog& log, const ReplayOutcome& outcome) {
   return text;
 }
 
+std::vector<JUnitCase> cases_of(const std::vector<FarmLog>& logs,
+                                const std::vector<ReplayOutcome>& outcomes) {
+  std::vector<JUnitCase> cases;
+  for (std::size_t i = 0; i < logs.size(); ++i) {
+    cases.push_back(
+        {.name = logs[i].path, .took_s = outcomes[i].took_s, .problem = outcomes[i].problem});
+  }
+  return cases;
+}
+
 // Prints one line for each log on stdout, in their order, and one sentence for all on stderr.
 // Returns the exit code: 1 if a log differs or cannot be replayed, or after Ctrl-C, which ends it
 // within a second.
@@ -194,6 +206,10 @@ int replay_farm(const FarmOptions& options) {
   for (const std::string& path : options.logs) logs.push_back(look_at(path));
   const auto outcomes = replay_all(logs, options.isa);
   if (!outcomes) return report(outcomes.error());
+  if (!options.junit.empty()) {
+    const auto written = write_junit(options.junit, cases_of(logs, *outcomes));
+    if (!written) return report(written.error());
+  }
   std::size_t differ = 0;
   replay::Expectation::Counts all;
   for (std::size_t i = 0; i < logs.size(); ++i) {
@@ -211,8 +227,10 @@ int replay_farm(const FarmOptions& options) {
   std::fflush(stdout);
   if (differ == 0) {
     const std::string rest = all.not_compared();
-    logging::say(fmt::format("posed: all {} logs give what was published, bit for bit{}",
-                             logs.size(), rest.empty() ? rest : "; not compared: " + rest));
+    const std::string which =
+        logs.size() == 1 ? "the log gives" : fmt::format("all {} logs give", logs.size());
+    logging::say(fmt::format("posed: {} what was published, bit for bit{}", which,
+                             rest.empty() ? rest : "; not compared: " + rest));
     return static_cast<int>(ExitCode::kDone);
   }
   return report(fail(fmt::format("{} of {} logs do not give what was published, or nothing of them "
@@ -224,8 +242,9 @@ int replay_farm(const FarmOptions& options) {
 struct ReplayOptions {
   std::vector<std::string> logs;  // several: replay_farm
   std::string log;                // the first
-  std::string speed = "1";
+  std::string speed;              // empty: 1 for a replay that is published, else max
   std::string out;
+  std::string junit;
   std::string endpoint;
   std::string isa;
   bool publish = false;
@@ -289,7 +308,10 @@ class ReplayProgress {
   ProgressBar bar_;
 };
 
-Result<double> speed_of(const std::string& text) {
+// Only a replay that somebody watches keeps the recording's pace by itself.
+Result<double> speed_of(const ReplayOptions& options) {
+  std::string text = options.speed;
+  if (text.empty()) text = options.publish ? "1" : "max";
   if (text == "max") return 0.0;
   char* end = nullptr;
   const double speed = std::strtod(text.c_str(), &end);
@@ -387,7 +409,7 @@ Result<> ended_early(const ReplayOptions& options, const ReplayOutputs& outputs)
 }
 
 Result<> replay(const ReplayOptions& options) {
-  const auto speed = TRY(speed_of(options.speed));
+  const auto speed = TRY(speed_of(options));
   TRY(OutputFiles(options.overwrite)
           .reads(options.log)
           .writes_any_but_other(options.out, {".bin"})
@@ -429,20 +451,24 @@ Result<> replay(const ReplayOptions& options) {
   return done;
 }
 
-// Several logs are only compared.
-int replay_several(const ReplayOptions& options, bool speed_given) {
+// Several logs, and those that a report is written about, are only compared.
+int replay_several(const ReplayOptions& options) {
+  const std::string what = options.junit.empty() ? "several logs are" : "with --junit logs are";
+  Result<> usable{};
   if (!options.expect) {
-    return report(
-        misuse("several logs are replayed at once to compare them: add --expect").error());
+    usable = misuse(what + " replayed to compare them: add --expect");
+  } else if (options.publish || !options.out.empty()) {
+    usable = misuse(what + " only compared; leave out --publish and --out");
+  } else if (!options.speed.empty() && options.speed != "max") {
+    usable = misuse(what + " replayed as fast as possible; leave out --speed");
+  } else {
+    usable = OutputFiles(options.overwrite)
+                 .reads_all(options.logs)
+                 .writes(options.junit, {".xml"})
+                 .check();
   }
-  if (options.publish || !options.out.empty()) {
-    return report(misuse("--publish and --out are for one log; leave them out").error());
-  }
-  if (speed_given && options.speed != "max") {
-    return report(
-        misuse("several logs are replayed as fast as possible; leave out --speed").error());
-  }
-  return replay_farm({options.logs, options.isa, options.json});
+  if (!usable) return report(usable.error());
+  return replay_farm({options.logs, options.isa, options.junit, options.json});
 }
 
 }  // namespace
@@ -451,11 +477,9 @@ void add_replay(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("replay", "Compute a device log's frames again");
   auto options = std::make_shared<ReplayOptions>();
   command->add_option("log", options->logs, "The device log, or several with --expect")->required();
-  auto* speed =
-      command
-          ->add_option("--speed", options->speed,
-                       "Times the recording's pace: 1 as it came; max: as fast as possible")
-          ->capture_default_str();
+  command->add_option("--speed", options->speed,
+                      "Times the recording's pace, or max: as fast as possible; default: 1 with "
+                      "--publish, else max");
   auto* publish =
       command->add_flag("--publish", options->publish, "Publish where the recorded run did");
   command->add_option("--endpoint", options->endpoint, "With --publish: publish there instead")
@@ -465,6 +489,10 @@ void add_replay(CLI::App& app, int& exit_code) {
       ->type_name("FILE");
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--expect", options->expect, "Compare with the frames in the log, bit for bit");
+  command
+      ->add_option("--junit", options->junit,
+                   "With --expect: write a test case for each log, as CI systems show them")
+      ->type_name("FILE.xml");
   command->add_option("--isa", options->isa, "portable, avx2 or avx512; default: the log's own");
   command->add_flag("--json", options->json, "Print the counts as JSON");
   command->footer(
@@ -473,13 +501,13 @@ and every decision. On one instruction set the same log gives the same bits. --e
 with 1 and names stream, sequence and field of the first difference; also where nothing could
 be compared, as after a gap at the log's start. A published replay says in its stats that it is
 one; its times are the recording's, on the recording's clock. Nobody can control it. Examples:
-  posed replay take1.plog --speed max --expect
-  posed replay --expect takes/*.plog --json   # all at once, on all cores; 1 if one differs
-  posed replay take1.plog --speed max --out FRAMES.bin
+  posed replay take1.plog --expect
+  posed replay --expect takes/*.plog --junit replay.xml   # on all cores; 1 if one differs
+  posed replay take1.plog --out FRAMES.bin
   posed replay take1.plog --publish     # and watch it: posed top)");
-  command->callback([options, speed, &exit_code] {
-    if (options->logs.size() > 1) {
-      exit_code = replay_several(*options, speed->count() > 0);
+  command->callback([options, &exit_code] {
+    if (options->logs.size() > 1 || !options->junit.empty()) {
+      exit_code = replay_several(*options);
       return;
     }
     options->log = options->logs.front();
