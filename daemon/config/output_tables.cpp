@@ -201,7 +201,7 @@ void OutputReader::read_receivers(TableReader& table, OutputConfig& output) cons
   for (const std::string& endpoint : output.to) {
     const auto address = drivers::parse_endpoint(endpoint);
     if (!address || !has_port(endpoint)) {
-      table.add_error("to", fmt::format("{} should be an address in numbers and a port from 1 to"
+      table.add_error("to", fmt::format("{} should be an address and a port from 1 to"
                                         " 65535, like 127.0.0.1:39539",
                                         in_quotes(endpoint)));
     } else if (!seen.insert(drivers::endpoint_text(*address)).second) {

@@ -24,11 +24,7 @@ Result<std::unique_ptr<TriggerServer>> TriggerServer::start(const std::string& l
                                                             const std::vector<std::string>& peers,
                                                             DaemonControl& daemon_control) {
   const auto address = TRY(drivers::listen_address(listen, peers, "the senders'"));
-  std::vector<drivers::Host> hosts;
-  for (const std::string& peer : peers) {
-    const auto host = TRY(drivers::parse_host(peer));
-    hosts.push_back(drivers::host_of(host));
-  }
+  auto allowed = TRY(drivers::Peers::parse(peers));
   auto wake = TRY(system::EventFd::open());
   const int fd = drivers::bind_socket(address, SOCK_DGRAM, false);
   if (fd < 0) {
@@ -37,11 +33,11 @@ Result<std::unique_ptr<TriggerServer>> TriggerServer::start(const std::string& l
   }
   spdlog::info("trigger: listening on {}", listen);
   return std::unique_ptr<TriggerServer>(
-      new TriggerServer(fd, std::move(wake), std::move(hosts), daemon_control));
+      new TriggerServer(fd, std::move(wake), std::move(allowed), daemon_control));
 }
 
-TriggerServer::TriggerServer(int fd, std::unique_ptr<system::EventFd> wake,
-                             std::vector<drivers::Host> peers, DaemonControl& daemon_control)
+TriggerServer::TriggerServer(int fd, std::unique_ptr<system::EventFd> wake, drivers::Peers peers,
+                             DaemonControl& daemon_control)
     : fd_(fd),
       wake_(std::move(wake)),
       peers_(std::move(peers)),
@@ -80,7 +76,7 @@ bool TriggerServer::handle_datagram() {
   drivers::Address sender;
   const ssize_t size = ::recvfrom(fd_, bytes.data(), bytes.size(), 0, sender.get(), &sender.size);
   if (size < 0) return false;
-  if (!may_send(sender)) {
+  if (!peers_.allow(drivers::host_of(sender))) {
     spdlog::warn(
         "trigger: a datagram from {} is ignored ({} so far); to obey this address, name it"
         " in [trigger] peers",
@@ -89,12 +85,6 @@ bool TriggerServer::handle_datagram() {
   }
   trigger_.handle({bytes.data(), static_cast<std::size_t>(size)}, drivers::host_text(sender));
   return true;
-}
-
-bool TriggerServer::may_send(const drivers::Address& sender) const {
-  const drivers::Host host = drivers::host_of(sender);
-  if (peers_.empty()) return drivers::is_loopback(host);
-  return std::ranges::find(peers_, host) != peers_.end();
 }
 
 }  // namespace posed::control

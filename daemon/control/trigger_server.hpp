@@ -31,16 +31,15 @@ class TriggerServer {
   [[nodiscard]] const system::Pulse& pulse() const noexcept { return pulse_; }
 
  private:
-  TriggerServer(int fd, std::unique_ptr<system::EventFd> wake, std::vector<drivers::Host> peers,
+  TriggerServer(int fd, std::unique_ptr<system::EventFd> wake, drivers::Peers peers,
                 DaemonControl& daemon_control);
   void serve();
   // Returns false if none waits.
   [[nodiscard]] bool handle_datagram();
-  [[nodiscard]] bool may_send(const drivers::Address& sender) const;
 
   int fd_;
   std::unique_ptr<system::EventFd> wake_;
-  std::vector<drivers::Host> peers_;
+  drivers::Peers peers_;
   Trigger trigger_;
   std::uint64_t strangers_ = 0;  // datagrams of others
   system::Pulse pulse_;

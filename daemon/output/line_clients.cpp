@@ -29,10 +29,11 @@ bool has_closed(int fd) noexcept {
 
 Result<LineClients> LineClients::open(const std::string& listen, std::vector<std::string> peers) {
   const auto address = TRY(drivers::listen_address(listen, peers, "the clients'"));
+  auto allowed = TRY(drivers::Peers::parse(peers));
   const auto fd = TRY(drivers::listen_on(address, listen, kWaiting));
   LineClients clients;
   clients.listener_ = fd;
-  clients.peers_ = std::move(peers);
+  clients.peers_ = std::move(allowed);
   drivers::Address bound;
   ::getsockname(fd, bound.get(), &bound.size);
   clients.endpoint_ = drivers::endpoint_text(bound);
@@ -108,7 +109,7 @@ void LineClients::let_in(std::int64_t now_ns, std::vector<std::string>& news) {
     drivers::Address peer;
     const int fd = ::accept4(listener_, peer.get(), &peer.size, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (fd < 0) return;  // also without a descriptor: then it waits
-    if (!drivers::may_connect(peer, peers_)) {
+    if (!peers_.allow(drivers::host_of(peer))) {
       ::close(fd);
       refuse(peer, "it is not among the peers", now_ns, news);
     } else if (clients_.size() == kMaxClients) {

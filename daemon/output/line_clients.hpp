@@ -65,7 +65,7 @@ class LineClients {
 
   int listener_ = -1;
   std::string endpoint_, greeting_;
-  std::vector<std::string> peers_;
+  drivers::Peers peers_;
   std::vector<Client> clients_;
   std::int64_t reported_ns_ = kNoTime_ns;  // when a refusal was last told
 };

@@ -48,21 +48,22 @@ Result<std::unique_ptr<Output>> NatNetOutput::open(const config::OutputConfig& c
   if (!config.group.empty()) {
     group = TRY(drivers::parse_endpoint(config.group + ":" + std::to_string(config.data_port)));
   }
+  auto peers = TRY(drivers::Peers::parse(config.peers));
   const int fd = drivers::bind_socket(address, SOCK_DGRAM, /*shared=*/false);
   if (fd < 0) {
     return fail("cannot listen on " + config.listen + " (" + errno_text() +
                 "); Motive or another program may have the port: end it, or choose another one");
   }
   choose_interface(fd, address);
-  return std::make_unique<NatNetOutput>(config, std::move(wake), fd, group);
+  return std::make_unique<NatNetOutput>(config, std::move(wake), fd, std::move(peers), group);
 }
 
 NatNetOutput::NatNetOutput(const config::OutputConfig& config,
-                           std::unique_ptr<system::EventFd> wake, int fd,
+                           std::unique_ptr<system::EventFd> wake, int fd, drivers::Peers peers,
                            std::optional<drivers::Address> group)
     : Output(config, std::move(wake), /*together=*/true),
       fd_(fd),
-      peers_(config.peers),
+      peers_(std::move(peers)),
       data_port_(static_cast<std::uint16_t>(config.data_port)),
       limit_hz_(config.rate_hz),
       group_(group),
@@ -96,7 +97,7 @@ void NatNetOutput::begin_turn(std::int64_t now_ns) {
     natnet::Message message;
     const auto bytes = static_cast<std::size_t>(size);
     // Nobody else gets an answer, so that nobody can be flooded with them.
-    if (bytes > buffer.size() || !drivers::may_connect(from, peers_)) continue;
+    if (bytes > buffer.size() || !peers_.allow(drivers::host_of(from))) continue;
     const auto request = std::span(buffer).first(bytes);
     if (natnet::decode_request(request, message) != Outcome::kOk) continue;
     answer(from, message, now_ns);

@@ -28,7 +28,7 @@ class NatNetOutput final : public Output {
                                               std::unique_ptr<system::EventFd> wake);
   // Takes the socket, which is bound. `group`: where everybody gets the frames.
   NatNetOutput(const config::OutputConfig& config, std::unique_ptr<system::EventFd> wake, int fd,
-               std::optional<drivers::Address> group);
+               drivers::Peers peers, std::optional<drivers::Address> group);
   ~NatNetOutput() override;
 
   [[nodiscard]] int poll_fd() const noexcept override { return fd_; }
@@ -63,7 +63,7 @@ class NatNetOutput final : public Output {
   void send_to(const drivers::Address& to, std::span<const std::byte> datagram) noexcept;
 
   int fd_;
-  std::vector<std::string> peers_;
+  drivers::Peers peers_;
   std::uint16_t data_port_;
   double limit_hz_;
   std::optional<drivers::Address> group_;

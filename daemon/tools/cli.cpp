@@ -21,6 +21,7 @@
 #include "daemon/system/last_words.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/ranks.hpp"
+#include "drivers/transport/address.hpp"
 #include "models/motion/vrm_animation.hpp"
 #include "proto/clip/format.hpp"
 #include "proto/text/clean.hpp"
@@ -160,6 +161,7 @@ int main_of(int argc, char** argv) {
   system::end_with_a_sentence();
   logging::protect_standard_descriptors();
   const logging::LogOutput log;
+  drivers::use_resolver(drivers::look_up);
   CLI::App app{"posed: live poses in, another style out", "posed"};
   int exit_code = 0;
   add_commands(app, exit_code);

@@ -31,8 +31,9 @@ Result<Address> server_of(const Options& options) {
                           ':' + std::to_string(kCommandPort));
   }
   return misuse(
-      "server should be the address in numbers of the computer with Motive, like "
-      "192.168.1.20, or with its command port, 192.168.1.20:1510");
+      "server should be the address of the computer with Motive in numbers, like "
+      "192.168.1.20, its name if this computer knows it, or one of them with the command port, "
+      "192.168.1.20:1510");
 }
 
 RT_SAFE std::optional<DataPlace> data_place(std::span<const std::byte> datagram) noexcept {

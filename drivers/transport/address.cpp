@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cstdlib>
 #include <cstring>
+#include <map>
+#include <mutex>
 #include <optional>
 #include <system_error>
 
@@ -26,10 +29,11 @@ bool is_port(std::string_view text) noexcept {
   return error == std::errc() && end == text.data() + text.size() && port <= 65535;
 }
 
-std::optional<Address> parse_numbers(const std::string& host, const char* port) {
-  if (port != nullptr && !is_port(port)) return std::nullopt;
+std::optional<Address> first_address(const std::string& host, const char* port, int flags,
+                                     int family) {
   addrinfo wish{};
-  wish.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV | AI_PASSIVE;
+  wish.ai_flags = flags;
+  wish.ai_family = family;
   wish.ai_socktype = SOCK_STREAM;
   addrinfo* found = nullptr;
   if (::getaddrinfo(host.c_str(), port, &wish, &found) != 0) return std::nullopt;
@@ -38,6 +42,51 @@ std::optional<Address> parse_numbers(const std::string& host, const char* port) 
   address.size = found->ai_addrlen;
   ::freeaddrinfo(found);
   return address;
+}
+
+// As RFC 1123 allows them, with a letter, so that no number is asked of a name server.
+bool is_host_name(std::string_view text) {
+  const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); };
+  constexpr std::size_t kMaxHostName = 253;
+  return text.size() <= kMaxHostName && std::ranges::any_of(text, is_letter) &&
+         std::ranges::all_of(text, [&](char c) {
+           return is_letter(c) || (c >= '0' && c <= '9') || c == '-' || c == '.';
+         });
+}
+
+// What was asked so far; a name without an address is not asked again either.
+struct Names {
+  std::mutex mutex;
+  Resolver resolver = nullptr;
+  std::map<std::string, std::optional<Address>> asked;
+};
+
+Names& names() {
+  static Names instance;
+  return instance;
+}
+
+std::optional<Address> find_name(const std::string& name) {
+  Names& all = names();
+  const std::scoped_lock lock(all.mutex);
+  if (all.resolver == nullptr || !is_host_name(name)) return std::nullopt;
+  const auto [at, is_new] = all.asked.try_emplace(name);
+  if (is_new) at->second = all.resolver(name);
+  return at->second;
+}
+
+void set_port(Address& address, const char* port) {
+  const std::uint16_t network_order = htons(static_cast<std::uint16_t>(std::atoi(port)));
+  std::memcpy(reinterpret_cast<char*>(&address.storage) + 2, &network_order, sizeof network_order);
+}
+
+std::optional<Address> find_address(const std::string& host, const char* port) {
+  if (port != nullptr && !is_port(port)) return std::nullopt;
+  constexpr int kNumbers = AI_NUMERICHOST | AI_NUMERICSERV | AI_PASSIVE;
+  if (const auto numbers = first_address(host, port, kNumbers, AF_UNSPEC)) return numbers;
+  auto named = find_name(host);
+  if (named && port != nullptr) set_port(*named, port);
+  return named;
 }
 
 }  // namespace
@@ -114,16 +163,56 @@ Result<Address> parse_endpoint(const std::string& endpoint) {
   std::string host = split ? endpoint.substr(0, colon) : "";
   if (host.starts_with('[') && host.ends_with(']')) host = host.substr(1, host.size() - 2);
   const auto address =
-      split ? parse_numbers(host, endpoint.c_str() + colon + 1) : std::optional<Address>();
+      split ? find_address(host, endpoint.c_str() + colon + 1) : std::optional<Address>();
   if (address) return *address;
-  return misuse("'" + endpoint + "' should be an address and a port, like 127.0.0.1:5200");
+  return misuse("'" + endpoint +
+                "' should be an address and a port, like 127.0.0.1:5200, or the "
+                "name of a computer that this one knows and a port");
 }
 
 Result<Address> parse_host(const std::string& host) {
   // An empty text would mean any address.
-  const auto address = host.empty() ? std::optional<Address>() : parse_numbers(host, nullptr);
+  const auto address = host.empty() ? std::optional<Address>() : find_address(host, nullptr);
   if (address) return *address;
-  return misuse("'" + host + "' should be an address in numbers, like 192.168.1.20");
+  return misuse("'" + host +
+                "' should be an address in numbers, like 192.168.1.20, or the name "
+                "of a computer that this one knows");
+}
+
+std::optional<Address> look_up(const std::string& name) {
+  if (const auto v4 = first_address(name, nullptr, 0, AF_INET)) return v4;
+  return first_address(name, nullptr, 0, AF_INET6);
+}
+
+void use_resolver(Resolver resolver) {
+  Names& all = names();
+  const std::scoped_lock lock(all.mutex);
+  all.resolver = resolver;
+  all.asked.clear();
+}
+
+std::vector<std::pair<std::string, std::string>> resolved_names() {
+  Names& all = names();
+  const std::scoped_lock lock(all.mutex);
+  std::vector<std::pair<std::string, std::string>> found;
+  for (const auto& [name, address] : all.asked) {
+    if (address) found.emplace_back(name, host_text(*address));
+  }
+  return found;
+}
+
+Result<Peers> Peers::parse(const std::vector<std::string>& hosts) {
+  Peers peers;
+  for (const std::string& text : hosts) {
+    const auto host = TRY(parse_host(text));
+    peers.hosts_.push_back(host_of(host));
+  }
+  return peers;
+}
+
+RT_SAFE bool Peers::allow(const Host& host) const noexcept {
+  if (hosts_.empty()) return is_loopback(host);
+  return std::ranges::find(hosts_, host) != hosts_.end();
 }
 
 Result<Address> listen_address(const std::string& endpoint, const std::vector<std::string>& peers,

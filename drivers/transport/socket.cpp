@@ -40,14 +40,6 @@ Result<int> listen_on(const Address& address, const std::string& endpoint, int b
               "); use an address of this machine and a port that is free");
 }
 
-bool may_connect(const Address& peer, const std::vector<std::string>& peers) {
-  if (peers.empty()) return is_loopback(host_of(peer));
-  return std::ranges::any_of(peers, [&](const std::string& text) {
-    const auto named = parse_host(text);
-    return named && host_of(*named) == host_of(peer);
-  });
-}
-
 void keep_alive(int fd) noexcept {
   const int yes = 1, idle_s = 2, interval_s = 1, tries = 3;
   ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);

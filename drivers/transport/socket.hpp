@@ -26,9 +26,6 @@ namespace posed::drivers {
 // Binds a TCP socket and lets it listen. `endpoint` is the address for sentences.
 Result<int> listen_on(const Address& address, const std::string& endpoint, int backlog);
 
-// Returns whether the list names the peer's address; an empty list names this machine.
-[[nodiscard]] bool may_connect(const Address& peer, const std::vector<std::string>& peers);
-
 // Sets a TCP connection to a device up: small packets are sent at once, and a device that has lost
 // its network, which sends nothing, is noticed within five seconds.
 void keep_alive(int fd) noexcept;

@@ -45,9 +45,7 @@ std::unexpected<Error> no_descriptor(const ListenSettings& settings) {
 }  // namespace
 
 Result<> check_listen(const ListenSettings& settings) {
-  for (const std::string& peer : settings.peers) {
-    TRY(parse_host(peer));
-  }
+  TRY(Peers::parse(settings.peers));
   TRY(address_of(settings));
   return {};
 }
@@ -60,6 +58,7 @@ Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
     listener = listeners_.emplace(settings.endpoint, fd).first;
   }
   if (only_prepare_) return not_opened();
+  const auto peers = TRY(Peers::parse(settings.peers));
   std::array<pollfd, 2> wanted{{{.fd = listener->second, .events = POLLIN, .revents = 0},
                                 {.fd = cancel_->fd(), .events = POLLIN, .revents = 0}}};
   ::poll(wanted.data(), wanted.size(), kPatience_ms);
@@ -77,7 +76,7 @@ Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
     const std::string host = host_text(peer);
     Connection link(fd, settings.endpoint + " from " + host, "tcp " + host);
     link.heed(cancel_);
-    if (!may_connect(peer, settings.peers) || begins_like_a_browser(fd)) {
+    if (!peers.allow(host_of(peer)) || begins_like_a_browser(fd)) {
       ++refused_;
       continue;
     }

@@ -121,9 +121,7 @@ struct UdpTransport::Batch {
 
 Result<> check_udp(const UdpSettings& settings) {
   if (settings.sockets.empty()) return misuse("name an address to listen on, like 127.0.0.1:1511");
-  for (const std::string& peer : settings.peers) {
-    TRY(parse_host(peer));
-  }
+  TRY(Peers::parse(settings.peers));
   for (const UdpSocketSettings& socket : settings.sockets) {
     TRY(wanted_of(socket, settings));
   }
@@ -143,7 +141,7 @@ Result<std::unique_ptr<UdpTransport>> UdpTransport::open(const UdpSettings& sett
   TRY(check_udp(settings));
   std::unique_ptr<UdpTransport> self(new UdpTransport());
   self->data_place_ = settings.data_place;
-  for (const std::string& peer : settings.peers) self->peers_.push_back(host_of(*parse_host(peer)));
+  self->peers_ = TRY(Peers::parse(settings.peers));
   self->epoll_ = ::epoll_create1(EPOLL_CLOEXEC);
   if (self->epoll_ < 0) {
     return fail("posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
@@ -178,11 +176,6 @@ Result<> UdpTransport::add(const UdpSocketSettings& settings, const UdpSettings&
 
 std::string UdpTransport::endpoint(std::size_t socket) const {
   return endpoint_text(bound_address(sockets_[socket].fd));
-}
-
-RT_SAFE bool UdpTransport::may_send(const Host& host) const noexcept {
-  if (peers_.empty()) return is_loopback(host);
-  return std::ranges::find(peers_, host) != peers_.end();
 }
 
 // RT-safe except for its reads.
@@ -310,7 +303,7 @@ Chunk UdpTransport::read(std::int64_t now_ns) noexcept {
     sender.size = message.msg_hdr.msg_namelen;
     read_control(i, chunk);
     Socket& socket = sockets_[socket_];
-    if (!may_send(host_of(sender)) || !owns(socket, sender)) {
+    if (!peers_.allow(host_of(sender)) || !owns(socket, sender)) {
       ++chunk.foreign;
       continue;
     }

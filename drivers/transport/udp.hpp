@@ -98,7 +98,6 @@ class UdpTransport final : public Transport, public Upkeep {
   void follow(const DataPlace& said);
   // Fills the batch from the next socket that has datagrams; false when none has.
   [[nodiscard]] bool receive(std::int64_t now_ns) noexcept;
-  [[nodiscard]] bool may_send(const Host& host) const noexcept;
   // Returns whether the socket accepts datagrams of this sender, which it then belongs to.
   [[nodiscard]] bool owns(Socket& socket, const Address& sender) noexcept;
   // Reads the ancillary data of a datagram: its arrival time, and what the kernel dropped.
@@ -106,7 +105,7 @@ class UdpTransport final : public Transport, public Upkeep {
 
   int epoll_ = -1;
   std::vector<Socket> sockets_;
-  std::vector<Host> peers_;
+  Peers peers_;
   std::unique_ptr<Batch> batch_;
   std::size_t received_ = 0, next_ = 0;  // datagrams in the batch, and those handed out
   std::size_t socket_ = 0;               // that the batch came from

@@ -18,6 +18,7 @@
 #include "daemon/devices/stream_stages.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/findings.hpp"
+#include "drivers/transport/address.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::tools {
@@ -263,6 +264,9 @@ int check(const CheckOptions& options) {
         Findings().add("file", error.file).add("line", error.line).add("message", error.message));
   }
   Findings findings;
+  for (const auto& [name, address] : drivers::resolved_names()) {
+    findings.say(fmt::format("{} is {}", name, address));
+  }
   findings.add("ok", errors.empty())
       .add("publish", config.publish_endpoint)
       .add("control", config.control_endpoint)

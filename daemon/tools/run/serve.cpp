@@ -17,6 +17,7 @@
 #include "daemon/service/service.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/tools/command/findings.hpp"
+#include "drivers/transport/address.hpp"
 
 namespace posed::tools {
 namespace {
@@ -107,6 +108,9 @@ Result<> check_end(const assembly::Daemon& daemon, const ServeOptions& options) 
 }
 
 void print_ready(const assembly::Daemon& daemon) {
+  for (const auto& [name, address] : drivers::resolved_names()) {
+    spdlog::info("{} is {}, until this daemon is started again", name, address);
+  }
   std::vector<std::string> sources;
   for (const auto& source : daemon.sources()) {
     if (source->has_several()) sources.push_back(source->config.name);
