@@ -126,6 +126,7 @@ Findings findings_of(const ApplyArguments& options, const style::StyleModel& mod
       .add("weights", mixture_findings(model.names(), shares))
       .add("mask", options.mask)
       .add("alpha", options.apply.filter.alpha)
+      .add("alpha_used", applied.alpha)
       .add("auto_alpha", options.apply.filter.auto_alpha)
       .add("style_estimate", applied.estimate_mean)
       .add("cold", options.apply.cold)
@@ -191,6 +192,13 @@ Result<> run(ApplyArguments options) {
   TRY(clip::write_clip(applied.clip, options.out));
   bar.finish();
   if (!applied.remark.empty()) std::fprintf(stderr, "posed: %s\n", applied.remark.c_str());
+  if (applied.alpha != options.apply.filter.alpha) {
+    std::fprintf(
+        stderr,
+        "posed: --alpha %s is held at %.1f: more would put arms into the head or the trunk "
+        "of this figure\n",
+        options.alpha.c_str(), applied.alpha);
+  }
   findings_of(options, model, shares, clip, applied, fit).show(options.json);
   return {};
 }

@@ -39,7 +39,10 @@ as `apply` reports it; component_rms_deg: the same change per component of the r
 source_component_rms_deg: what 1.0 of cycle_ratio is, in the same measure;
 gate_mean: how far the model knows the motion, 1 all of it, 0 nothing, which is not styled;
 slide_cm_s: speed over the ground of ankles and toes that stand (slower than 10 cm/s in the
-unstyled walk; of the target: in itself); sink_cm: how far the lowest styled toe is below the
+unstyled walk; of the target: in itself); height_error_cm, speed_error_m_s: how far the mean cycle
+of the hips' height above the ground and of their speed is from the target's, in the size of the
+source's figure; direction_error_deg: the same of the directions of arms, legs and trunk; their
+floor is how far the two halves of the target are from each other; sink_cm: how far the lowest styled toe is below the
 lowest unstyled one; root_speed_m_s: of the root over the ground, median over a stride's time.
 The last line is the verdict; the exit code is 1 when the model is no better than nothing.)";
 
@@ -111,6 +114,16 @@ Findings of_clips(const style::StyleScore::Clips& clips, double scale) {
       .add("target", scaled(clips.target, scale));
 }
 
+// One of the errors of the body, of all who have it.
+Findings body_error(const std::optional<style::BodyErrors>& body, double style::BodyError::* error,
+                    double scale) {
+  Findings findings;
+  if (!body) return findings;
+  findings.add("source", scale * body->source.*error).add("styled", scale * body->styled.*error);
+  return findings.add("floor", body->floor ? std::optional(scale * (*body->floor).*error)
+                                           : std::optional<double>());
+}
+
 Findings findings_of(const Evaluation& e, const EvalOptions& options) {
   const style::StyleScore& score = e.score;
   const std::string judged = verdict(e);
@@ -119,9 +132,13 @@ Findings findings_of(const Evaluation& e, const EvalOptions& options) {
       .add("component_rms_deg", score.component_rms_deg)
       .add("constant_cycle_ratio", e.constant.cycle_ratio)
       .add("cycle_ratio", score.cycle_ratio)
+      .add("direction_error_deg",
+           body_error(score.body, &style::BodyError::direction_rad, kDegrees))
       .add("distance_deg", e.fit.distance_deg)
       .add("far_from_training", e.fit.is_far())
       .add("gate_mean", e.gate_mean)
+      .add("height_error_cm", body_error(score.body, &style::BodyError::height,
+                                         score.body ? score.body->leg_m * kCentimetres : 1.0))
       .add("helps", e.helps())
       .add("jerk_ratio", score.jerk_ratio)
       .add("moved_rms_deg", e.moved_rms_deg)
@@ -132,6 +149,8 @@ Findings findings_of(const Evaluation& e, const EvalOptions& options) {
       .add("slide_cm_s", of_clips(score.slide_m_s, kCentimetres))
       .add("source_component_rms_deg", score.source_component_rms_deg)
       .add("source_period_s", score.source_period_s)
+      .add("speed_error_m_s",
+           body_error(score.body, &style::BodyError::speed_s, score.body ? score.body->leg_m : 1.0))
       .add("target_period_s", score.target_period_s)
       .add("weights", e.weights)
       .say_numbers()

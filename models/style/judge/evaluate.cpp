@@ -129,6 +129,7 @@ Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& st
                           .styled = feet::root_speed_m_s(styled_motion, before.period_s),
                           .target = feet::root_speed_m_s(target_motion, goal.period_s)};
   score.sink_m = feet::sink_m(source_motion, styled_motion);
+  score.body = body_errors(source_motion, styled_motion, target_motion);
   return score;
 }
 

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "models/motion/pose_space.hpp"
+#include "models/style/judge/body_cycle.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/frame/result.hpp"
 
@@ -27,9 +28,10 @@ struct StyleScore {
   struct Clips {
     std::optional<double> source{}, styled{}, target{};
   };
-  Clips slide_m_s;                 // of standing feet
-  Clips root_speed_m_s;            // over the ground
-  std::optional<double> sink_m{};  // of the toes
+  Clips slide_m_s;                   // of standing feet
+  Clips root_speed_m_s;              // over the ground
+  std::optional<double> sink_m{};    // of the toes
+  std::optional<BodyErrors> body{};  // empty without legs
 };
 
 // `styled` is `source` after the filter, with the same skeleton names, rate and frames. Phases come

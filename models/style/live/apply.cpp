@@ -239,6 +239,7 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
 
   auto feet = TRY(feet_stage(clip, options));
   Applied applied{.clip = clip::is_acclaim(*clip.skeleton) ? clip::with_zyx_channels(clip) : clip,
+                  .alpha = filter.held_alpha(),
                   .remark = ready.remark};
   ChannelWriter writer(applied.clip);
   auto root = RootWriter::open(applied.clip);

@@ -146,6 +146,7 @@ Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
   auto bound = std::make_unique<BoundModel>(model, std::move(*space), std::move(*predictor),
                                             std::move(name));
   bound->has_root = has_root;
+  bound->reach = alpha_reach(*bound);
   if (!has_root) return bound;
   bound->leg_m = legs->length_m();
   for (const RootFunction& root : model.roots) {

@@ -11,6 +11,7 @@
 #include "models/gp/predictor.hpp"
 #include "models/motion/pose_space.hpp"
 #include "models/stage.hpp"
+#include "models/style/live/alpha_reach.hpp"
 #include "models/style/live/body_mask.hpp"
 #include "models/style/live/leg_map.hpp"
 #include "models/style/live/trained_motion.hpp"
@@ -49,8 +50,9 @@ struct BoundModel final : StageModel {
     PoseCycle cycle;
     LegMap does;
   };
-  std::vector<Usual> usual;     // by person and day; empty: a model without them
-  std::optional<Usual> anyone;  // their mean, for a walker who is not known
+  std::vector<Usual> usual;       // by person and day; empty: a model without them
+  std::optional<Usual> anyone;    // their mean, for a walker who is not known
+  std::vector<AlphaReach> reach;  // of each style
 };
 
 // Returns an error for a skeleton that cannot serve the model's pose space

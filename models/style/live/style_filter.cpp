@@ -177,7 +177,7 @@ RT_SAFE void StyleFilter::set_gate_fallback(double value) noexcept {
 }
 
 // Who shows the style already gets the rest of it.
-RT_SAFE double StyleFilter::wanted_alpha() const noexcept { return alpha_target_ * missing_; }
+RT_SAFE double StyleFilter::wanted_alpha() const noexcept { return held_alpha() * missing_; }
 
 // While nothing is known of how much the walker shows, it stays as it was.
 RT_SAFE void StyleFilter::find_missing() noexcept {
@@ -218,6 +218,7 @@ RT_SAFE void StyleFilter::process(const StageFrame& in, StageOut& out) noexcept 
   const double dt_s = std::min(gap_s_, kMaxStep_s);
   const double slew = options_.alpha_slew_per_s * dt_s;
   find_missing();
+  look_at_reach();
   // Without a model there is no style yet, so that the first one fades in.
   if (model_ != nullptr) alpha_ += std::clamp(wanted_alpha() - alpha_, -slew, slew);
   blend_weight_ = std::max(0.0, blend_weight_ - slew);
@@ -291,6 +292,22 @@ RT_SAFE void StyleFilter::mix_limits() noexcept {
   for (std::size_t s = 0; s < model_->root_limits.size(); ++s) {
     limit_root_ += shares[s] * model_->root_limits[s];
   }
+  reach_ = model_->reach.empty() ? AlphaReach{} : AlphaReach{.low = 0.0, .high = 0.0};
+  for (std::size_t s = 0; s < model_->reach.size(); ++s) {
+    reach_.low += static_cast<double>(shares[s]) * model_->reach[s].low;
+    reach_.high += static_cast<double>(shares[s]) * model_->reach[s].high;
+  }
+}
+
+// Told once each time that it begins.
+RT_SAFE void StyleFilter::look_at_reach() noexcept {
+  const bool was_held = std::exchange(is_held_, held_alpha() != alpha_target_);
+  tell_held_ = tell_held_ || (is_held_ && !was_held);
+}
+
+RT_SAFE std::optional<StageNotice> StyleFilter::take_notice() noexcept {
+  if (std::exchange(tell_held_, false)) return StageNotice{.index = kAlphaHeld};
+  return tracker_.take_notice();
 }
 
 // The model delta: alpha times the mixture of styles, gated, clamped and masked.

@@ -19,6 +19,7 @@
 // step back in time counts as 0 s, a gap as at most 0.1 s.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -33,6 +34,7 @@
 #include "models/motion/pose_space.hpp"
 #include "models/parameter_table.hpp"
 #include "models/stage.hpp"
+#include "models/style/live/alpha_reach.hpp"
 #include "models/style/live/body_mask.hpp"
 #include "models/style/live/bound_model.hpp"
 #include "models/style/live/style_weights.hpp"
@@ -52,7 +54,6 @@ struct FilterOptions {
 inline constexpr double kUsualWarmUp_s = 10.0;
 inline constexpr double kMinWarmUp_s = 2.0;
 inline constexpr double kMaxWarmUp_s = 600.0;
-inline constexpr double kMaxAlpha = 2.0;
 
 class StyleFilter final : public Stage {
  public:
@@ -88,12 +89,12 @@ class StyleFilter final : public Stage {
   void set_walker(const Walker& walker) noexcept { tracker_.set_walker(walker); }
   [[nodiscard]] const std::optional<Walker>& walker() const noexcept { return tracker_.walker(); }
 
-  // Readings, notices and commands, as style_type() numbers them (notices: WalkerTracker). RT-safe.
+  // Readings, notices and commands, as style_type() numbers them. RT-safe.
   enum Reading : std::size_t { kStyleEstimate, kStyleGate };
   [[nodiscard]] double reading(std::size_t reading) const noexcept override;
-  [[nodiscard]] std::optional<StageNotice> take_notice() noexcept override {
-    return tracker_.take_notice();
-  }
+  static constexpr std::size_t kAlphaHeld =
+      WalkerTracker::kNoAxis + 1;  // after the tracker's notices
+  [[nodiscard]] std::optional<StageNotice> take_notice() noexcept override;
   enum Command : std::size_t { kWarmUp, kWeights, kMask, kNeutral };
   [[nodiscard]] bool command(std::size_t index, const StageCommand& command) noexcept override;
   void flush(StageOut& /*out*/) noexcept override { tracker_.interrupt(); }
@@ -117,6 +118,10 @@ class StyleFilter final : public Stage {
   [[nodiscard]] const StyleWeights& weights() const noexcept { return weights_; }
   [[nodiscard]] const BodyMask& mask() const noexcept { return mask_; }
   [[nodiscard]] float alpha_target() const noexcept { return static_cast<float>(alpha_target_); }
+  // The same within what the arms allow (alpha_reach.hpp).
+  [[nodiscard]] double held_alpha() const noexcept {
+    return std::clamp(alpha_target_, reach_.low, reach_.high);
+  }
 
  private:
   using Dims = std::array<float, motion::kMaxPoseDims>;
@@ -133,6 +138,7 @@ class StyleFilter final : public Stage {
   void style(Frame& frame, double dt_s) noexcept;
   [[nodiscard]] std::span<const float> shares_to_ask() noexcept;
   void mix_limits() noexcept;
+  void look_at_reach() noexcept;
   bool read_pose(const Frame& frame, double dt_s, Pose& pose) noexcept;
   void answer(const Pose& pose, Dims& delta) noexcept;
   void limit_root(const float* change) noexcept;
@@ -157,6 +163,8 @@ class StyleFilter final : public Stage {
   StyleWeights weights_;
   BodyMask mask_;
   Dims limit_rad_{};  // of the mixture
+  AlphaReach reach_;  // the same
+  bool is_held_ = false, tell_held_ = false;
   Root limit_root_ = Root::Zero();
   Root root_ = Root::Zero();       // the model's change at this frame
   Root root_from_ = Root::Zero();  // what a blend begins with, less the model's change

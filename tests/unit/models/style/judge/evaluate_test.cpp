@@ -22,6 +22,18 @@ TEST_CASE("a walk left alone scores one, the target's own walk scores zero", "[s
   REQUIRE(reached);
   CHECK(reached->cycle_ratio == Approx(0.0).margin(1e-9));
   CHECK(reached->component_rms_deg > 1.0);
+  // Seen from outside: the target's own walk differs from it by nothing, and the march by much more
+  // than the halves of a walk from each other.
+  REQUIRE(reached->body);
+  REQUIRE(reached->body->floor);
+  const auto& [source, styled, floor, leg_m] = *reached->body;
+  CHECK(leg_m > 0.6);
+  CHECK(styled.direction_rad < 0.02);
+  CHECK(styled.height < 0.002);
+  CHECK(source.direction_rad > 0.15);
+  CHECK(source.direction_rad > 3.0 * floor->direction_rad);
+  CHECK(source.height > 2.0 * floor->height);
+  CHECK(alone->body->styled.speed_s == alone->body->source.speed_s);
 }
 
 TEST_CASE("a target that is the source itself, or a source that stands still, has no score",

@@ -1,0 +1,161 @@
+#include "models/style/judge/body_cycle.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "models/feet/legs.hpp"
+#include "models/motion/kinematics.hpp"
+#include "models/style/model/harmonics.hpp"
+#include "models/style/model/stride_phase.hpp"
+
+namespace posed::style {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::Vector3d;
+using Eigen::VectorXd;
+
+// A limb's bone ends at the next one; the trunk goes from the hips to the head.
+constexpr std::array<std::pair<Bone, Bone>, 9> kBones{{{Bone::kLeftUpperArm, Bone::kLeftLowerArm},
+                                                       {Bone::kLeftLowerArm, Bone::kLeftHand},
+                                                       {Bone::kRightUpperArm, Bone::kRightLowerArm},
+                                                       {Bone::kRightLowerArm, Bone::kRightHand},
+                                                       {Bone::kLeftUpperLeg, Bone::kLeftLowerLeg},
+                                                       {Bone::kLeftLowerLeg, Bone::kLeftFoot},
+                                                       {Bone::kRightUpperLeg, Bone::kRightLowerLeg},
+                                                       {Bone::kRightLowerLeg, Bone::kRightFoot},
+                                                       {Bone::kHips, Bone::kHead}}};
+// The ground is where the lower foot is in its lowest twentieth of the time.
+constexpr double kGroundShare = 0.05;
+
+MatrixXd mean_cycle(const WalkPhases& walk, const MatrixXd& values) {
+  const MatrixXd kept = values(walk.frames, Eigen::all);
+  return grid_basis() * fit_harmonics(walk.phase, kept, kCycleHarmonics);
+}
+
+double rms_of(const MatrixXd& values) {
+  return std::sqrt(values.squaredNorm() /
+                   static_cast<double>(std::max<Eigen::Index>(1, values.size())));
+}
+
+double ground_m(VectorXd feet_m) {
+  const auto at = feet_m.begin() +
+                  static_cast<std::ptrdiff_t>(kGroundShare * static_cast<double>(feet_m.size()));
+  std::nth_element(feet_m.begin(), at, feet_m.end());
+  return *at;
+}
+
+// The frames from a share of the walk to another.
+std::optional<WalkPhases> part_of(const WalkPhases& walk, double from, double to) {
+  const auto size = static_cast<double>(walk.frames.size());
+  const auto first = static_cast<std::size_t>(from * size);
+  const auto count = static_cast<std::size_t>(to * size) - first;
+  if (count < 2) return std::nullopt;
+  const auto begin = static_cast<Eigen::Index>(first);
+  const VectorXd phase = walk.phase.segment(begin, static_cast<Eigen::Index>(count));
+  if (phase[phase.size() - 1] - phase[0] < 2.0 * std::numbers::pi) return std::nullopt;
+  return WalkPhases{.frames = {walk.frames.begin() + static_cast<std::ptrdiff_t>(first),
+                               walk.frames.begin() + static_cast<std::ptrdiff_t>(first + count)},
+                    .phase = phase};
+}
+
+}  // namespace
+
+std::optional<WalkPhases> walk_phases(const motion::Motion& motion) {
+  const auto leg = motion::leg_signal(motion);
+  if (!leg || !has_stride(motion.size(), motion.rate_hz)) return std::nullopt;
+  StridePhase strides = follow_strides(*leg, motion.rate_hz);
+  VectorXd phase = strides.phase(strides.strides);
+  if (phase.size() < 2 || phase[phase.size() - 1] - phase[0] < 2.0 * std::numbers::pi) {
+    return std::nullopt;
+  }
+  phase.array() -= first_harmonic_phase(phase, (*leg)(strides.strides));
+  return WalkPhases{.frames = std::move(strides.strides), .phase = std::move(phase)};
+}
+
+std::optional<BodyCycle> body_cycle(const motion::Motion& motion, const WalkPhases& walk) {
+  const Skeleton& skeleton = *motion.skeleton;
+  const auto legs = feet::Legs::find(skeleton);
+  const int hips = skeleton.joint_of(Bone::kHips);
+  const std::array ankles{skeleton.joint_of(Bone::kLeftFoot), skeleton.joint_of(Bone::kRightFoot)};
+  if (!legs || hips < 0 || ankles[0] < 0 || ankles[1] < 0) return std::nullopt;
+  BodyCycle cycle;
+  std::vector<std::pair<int, int>> ends;
+  for (const auto& [from, to] : kBones) {
+    const std::pair joints{skeleton.joint_of(from), skeleton.joint_of(to)};
+    if (joints.first < 0 || joints.second < 0) continue;
+    cycle.bones.push_back(from);
+    ends.push_back(joints);
+  }
+  MatrixXd hips_m(motion.size(), 3);
+  MatrixXd direction(motion.size(), 3 * std::ssize(ends));
+  VectorXd feet_m(motion.size());
+  const Eigen::AngleAxisd seen(-motion::walk_heading_rad(motion), Vector3d::UnitY());
+  for (int i = 0; i < motion.size(); ++i) {
+    const auto pose = motion::world_pose(skeleton, motion.frames[static_cast<std::size_t>(i)]);
+    const auto at = [&](int j) { return pose.position_m[static_cast<std::size_t>(j)]; };
+    hips_m.row(i) = (seen * at(hips)).transpose();
+    feet_m[i] = std::min(at(ankles[0]).y(), at(ankles[1]).y());
+    for (std::size_t b = 0; b < ends.size(); ++b) {
+      const Vector3d along = seen * (at(ends[b].second) - at(ends[b].first));
+      direction.block<1, 3>(i, 3 * static_cast<Eigen::Index>(b)) = along.normalized().transpose();
+    }
+  }
+  const double leg_m = legs->length_m();
+  cycle.height = mean_cycle(walk, (hips_m.col(1).array() - ground_m(feet_m)).matrix() / leg_m);
+  cycle.speed_s = mean_cycle(walk, motion::time_derivative(hips_m, motion.rate_hz).col(2) / leg_m);
+  cycle.direction = mean_cycle(walk, direction);
+  for (Eigen::Index i = 0; i < cycle.direction.rows(); ++i) {
+    for (Eigen::Index d = 0; d < cycle.direction.cols(); d += 3) {
+      cycle.direction.block<1, 3>(i, d).normalize();
+    }
+  }
+  return cycle;
+}
+
+BodyError apart(const BodyCycle& a, const BodyCycle& b) {
+  BodyError error{.height = rms_of(a.height - b.height), .speed_s = rms_of(a.speed_s - b.speed_s)};
+  double sum = 0.0;
+  Eigen::Index count = 0;
+  for (std::size_t i = 0; i < a.bones.size(); ++i) {
+    const auto other = std::ranges::find(b.bones, a.bones[i]);
+    if (other == b.bones.end()) continue;
+    const Eigen::Index in_a = 3 * static_cast<Eigen::Index>(i);
+    const Eigen::Index in_b = 3 * (other - b.bones.begin());
+    for (Eigen::Index t = 0; t < a.direction.rows(); ++t) {
+      const Vector3d one = a.direction.block<1, 3>(t, in_a).transpose();
+      const Vector3d two = b.direction.block<1, 3>(t, in_b).transpose();
+      const double turn_rad = std::atan2(one.cross(two).norm(), one.dot(two));
+      sum += turn_rad * turn_rad;
+      ++count;
+    }
+  }
+  error.direction_rad = count > 0 ? std::sqrt(sum / static_cast<double>(count)) : 0.0;
+  return error;
+}
+
+std::optional<BodyErrors> body_errors(const motion::Motion& source, const motion::Motion& styled,
+                                      const motion::Motion& target) {
+  const auto walk = walk_phases(source);
+  const auto styled_walk = walk_phases(styled);
+  const auto goal_walk = walk_phases(target);
+  const auto legs = feet::Legs::find(*source.skeleton);
+  if (!walk || !styled_walk || !goal_walk || !legs) return std::nullopt;
+  const auto before = body_cycle(source, *walk);
+  const auto after = body_cycle(styled, *styled_walk);
+  const auto goal = body_cycle(target, *goal_walk);
+  if (!before || !after || !goal) return std::nullopt;
+  BodyErrors errors{.source = apart(*before, *goal),
+                    .styled = apart(*after, *goal),
+                    .floor = {},
+                    .leg_m = legs->length_m()};
+  const auto begin = part_of(*goal_walk, 0.0, 0.5);
+  const auto end = part_of(*goal_walk, 0.5, 1.0);
+  if (begin && end) errors.floor = apart(*body_cycle(target, *begin), *body_cycle(target, *end));
+  return errors;
+}
+
+}  // namespace posed::style
