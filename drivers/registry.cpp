@@ -8,26 +8,16 @@ namespace posed::drivers {
 
 using Entry = const Driver&();
 Entry axis_driver, cyberglove_driver, described_driver, file_driver, fivedt_driver, labels_driver,
-    lucidgloves_driver, mocopi_driver, mvn_driver, natnet_driver, p5_driver, posed_driver,
-    rokoko_driver, template_glove_driver, template_mocap_driver, vmc_driver;
+    landmarks_driver, lucidgloves_driver, mocopi_driver, mvn_driver, natnet_driver, p5_driver,
+    posed_driver, rokoko_driver, template_glove_driver, template_mocap_driver, vmc_driver;
 
 std::span<const Driver> registry() {
-  static const std::array drivers{axis_driver(),
-                                  cyberglove_driver(),
-                                  described_driver(),
-                                  file_driver(),
-                                  fivedt_driver(),
-                                  labels_driver(),
-                                  lucidgloves_driver(),
-                                  mocopi_driver(),
-                                  mvn_driver(),
-                                  natnet_driver(),
-                                  p5_driver(),
-                                  posed_driver(),
-                                  rokoko_driver(),
-                                  template_glove_driver(),
-                                  template_mocap_driver(),
-                                  vmc_driver()};
+  static const std::array drivers{
+      axis_driver(),   cyberglove_driver(), described_driver(),      file_driver(),
+      fivedt_driver(), labels_driver(),     landmarks_driver(),      lucidgloves_driver(),
+      mocopi_driver(), mvn_driver(),        natnet_driver(),         p5_driver(),
+      posed_driver(),  rokoko_driver(),     template_glove_driver(), template_mocap_driver(),
+      vmc_driver()};
   return drivers;
 }
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "drivers/json_reader.hpp"
 #include "drivers/pose_values.hpp"
-#include "drivers/rokoko/json_reader.hpp"
 
 namespace posed::drivers::rokoko {
 namespace {

@@ -117,6 +117,7 @@ std::vector<DeviceFixture> make_specimens() {
       reports(fivedt("ultra-usb-5", left)),
       reports(fivedt("ultra-usb-14", right)),
       {.name = "labels", .driver = "labels", .options = {}, .loop_chunks = 1, .chunk_frames = 1},
+      source("landmarks", "landmarks", 24, 2),
       glove("lucidgloves-alpha", "lucidgloves"),
       glove("lucidgloves-legacy", "lucidgloves",
             {{"encoding", std::string("legacy")},

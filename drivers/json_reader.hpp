@@ -17,7 +17,7 @@
 
 #include "proto/frame/rt_safe.hpp"
 
-namespace posed::drivers::rokoko {
+namespace posed::drivers {
 
 // All calls are RT-safe. After `next` exactly one value must be read: each of the calls below it
 // reads one, whatever it is. After a fault all of them return false.
@@ -79,4 +79,4 @@ class JsonReader {
 RT_SAFE [[nodiscard]] std::size_t unescape_json(std::string_view raw,
                                                 std::span<char> room) noexcept;
 
-}  // namespace posed::drivers::rokoko
+}  // namespace posed::drivers

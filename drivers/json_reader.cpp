@@ -1,11 +1,11 @@
-#include "drivers/rokoko/json_reader.hpp"
+#include "drivers/json_reader.hpp"
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <limits>
 
-namespace posed::drivers::rokoko {
+namespace posed::drivers {
 namespace {
 
 constexpr double kNotFinite = std::numeric_limits<double>::quiet_NaN();
@@ -272,4 +272,4 @@ RT_SAFE std::size_t unescape_json(std::string_view raw, std::span<char> room) no
   return used;
 }
 
-}  // namespace posed::drivers::rokoko
+}  // namespace posed::drivers

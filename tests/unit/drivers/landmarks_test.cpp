@@ -1,0 +1,246 @@
+// The landmarks driver: its messages, what is refused, its bodies, and the angles of hands whose
+// points are known.
+#include <catch2/catch.hpp>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <string>
+
+#include "drivers/driver.hpp"
+#include "drivers/landmarks/emulator.hpp"
+#include "drivers/landmarks/fit.hpp"
+#include "drivers/landmarks/protocol.hpp"
+#include "proto/frame/hand_skeleton.hpp"
+#include "tests/support/allocations.hpp"
+#include "tests/unit/drivers/collect_sink.hpp"
+
+namespace posed::drivers::landmarks {
+namespace {
+
+using test::CollectSink;
+using Bytes = std::vector<std::byte>;
+using Layout = std::unique_ptr<const SourceLayout>;
+
+Bytes bytes_of(const std::string& text) {
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+std::string points_text(std::size_t numbers, const std::string& one = "0.01") {
+  std::string text;
+  for (std::size_t i = 0; i < numbers; ++i) text += (i == 0 ? "" : ",") + one;
+  return "[" + text + "]";
+}
+
+// Points of a flat hand, written as a tracker writes them.
+std::string flat_hand(const std::string& side = "right", const std::string& score = "0.9") {
+  LandmarksEmulator emulator(10.0);
+  Bytes bytes;
+  emulator.emit(0, bytes);
+  const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  const auto at = text.find("\"points\":", text.find(side));
+  const auto points = text.substr(at, text.find(']', at) + 1 - at);
+  return R"({"side":")" + side + R"(","score":)" + score + "," + points + "}";
+}
+
+std::string message_of(const std::string& hands, const std::string& head = R"("version":1)") {
+  return R"({"posed":"landmarks",)" + head + R"(,"hands":[)" + hands + "]}";
+}
+
+// A decoder that knows both hands.
+struct LandmarksRig {
+  const Driver& driver = *find_driver("landmarks");
+  std::unique_ptr<Decoder> decoder = driver.make_decoder(driver.expect({}).value()).value();
+  Layout layout = driver.make_layout(std::array{std::byte{3}}).value();
+  CollectSink sink;
+
+  LandmarksRig() { decoder->use(*layout); }
+  // What it is counted as.
+  Outcome feed(const std::string& text) {
+    sink.clear();
+    decoder->feed(bytes_of(text), 0, sink);
+    for (int i = 0; i < kOutcomes; ++i) {
+      if (sink.outcomes[static_cast<std::size_t>(i)] != 0) return static_cast<Outcome>(i);
+    }
+    return Outcome::kCount;
+  }
+};
+
+// Angles of a hand that 21 points can tell, anywhere within its limits but their ends.
+HandAngles random_angles(std::mt19937& random) {
+  const HandShape& shape = default_hand_shape();
+  HandAngles angles{};
+  const auto set = [&](std::size_t f, std::size_t j, std::size_t axis) {
+    const AngleRange& range = shape.fingers[f].range[j][axis];
+    std::uniform_real_distribution<double> any(0.98 * range.min_rad, 0.98 * range.max_rad);
+    angles[f * kFingerChannels + 3 * j + axis] = any(random);
+  };
+  for (std::size_t f = 0; f < kFingers; ++f) {
+    set(f, 0, f == 0 ? 2 : 0);
+    set(f, 0, 1);
+    set(f, 1, 0);
+    set(f, 2, 0);
+  }
+  return angles;
+}
+
+// The points anywhere before the camera, turned in any way, of a hand of any size.
+Landmarks moved(const Landmarks& point_m, std::mt19937& random) {
+  std::normal_distribution<double> normal;
+  const Eigen::Quaterniond turn =
+      Eigen::Quaterniond(normal(random), normal(random), normal(random), normal(random))
+          .normalized();
+  const Eigen::Vector3d place_m =
+      0.1 * Eigen::Vector3d(normal(random), normal(random), normal(random));
+  const double size = std::uniform_real_distribution<double>(0.5, 1.3)(random);
+  Landmarks there{};
+  for (std::size_t k = 0; k < kLandmarks; ++k) {
+    const Eigen::Vector3d p =
+        place_m + size * (turn * Eigen::Vector3f(point_m[k].data()).cast<double>());
+    for (int i = 0; i < 3; ++i) there[k][i] = static_cast<float>(p[i]);
+  }
+  return there;
+}
+
+}  // namespace
+
+TEST_CASE("the landmarks of a posed hand give its angles back") {
+  const HandFit fit;
+  std::mt19937 random(7);
+  double worst_deg = 0.0;
+  int thumbs = 0;  // further off, where a float's last digit is a hundredth of a degree
+  constexpr int kSeeds = 4000;
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    const Side side = seed % 2 == 0 ? Side::kLeft : Side::kRight;
+    const Skeleton skeleton = hand_skeleton(side);
+    const HandAngles given = random_angles(random);
+    Frame frame;
+    set_hand_angles(skeleton, given, frame);
+    HandAngles got{};
+    REQUIRE(fit.angles_of(side, moved(landmarks_of(skeleton, frame), random), got));
+    double thumb_deg = 0.0;
+    for (std::size_t i = 0; i < given.size(); ++i) {
+      const double off_deg = std::abs(got[i] - given[i]) * 180.0 / std::numbers::pi;
+      double& worst = i < kFingerChannels ? thumb_deg : worst_deg;
+      worst = std::max(worst, off_deg);
+    }
+    // A thumb that stands along its own axis of opposition has one spread for two points.
+    CHECK(thumb_deg < 0.1);
+    thumbs += thumb_deg < 0.01 ? 0 : 1;
+  }
+  CHECK(worst_deg < 0.01);
+  CHECK(thumbs < kSeeds / 200);
+}
+
+TEST_CASE("whatever points come, the angles are finite and within the limits") {
+  const HandFit fit;
+  const HandShape& shape = default_hand_shape();
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> any(-0.2F, 0.2F);
+  std::uniform_int_distribution<std::size_t> which(0, kLandmarks - 1);
+  int fitted = 0;
+  for (int seed = 0; seed < 5000; ++seed) {
+    Landmarks point_m{};
+    for (Vec3f& p : point_m) p = {any(random), any(random), any(random)};
+    for (int same = 0; same < seed % 20; ++same) point_m[which(random)] = point_m[which(random)];
+    HandAngles angles{};
+    if (!fit.angles_of(Side::kRight, point_m, angles)) continue;
+    ++fitted;
+    for (std::size_t i = 0; i < angles.size(); ++i) {
+      const AngleRange& range = shape.fingers[i / kFingerChannels].range[i / 3 % 3][i % 3];
+      CHECK((angles[i] >= range.min_rad && angles[i] <= range.max_rad));  // false for NaN
+    }
+  }
+  CHECK(fitted > 3000);
+  HandAngles angles{};
+  CHECK_FALSE(fit.angles_of(Side::kRight, Landmarks{}, angles));
+}
+
+TEST_CASE("a hand tracker's hands become bodies of hand45") {
+  LandmarksRig rig;
+  REQUIRE(rig.feed(message_of(flat_hand("left") + "," + flat_hand("right"),
+                              R"("version":1,"time_ns":5,"age_ms":110)")) == Outcome::kOk);
+  REQUIRE(rig.sink.frames.size() == 2);
+  CHECK(rig.sink.bodies == std::vector<std::size_t>{0, 1});
+  CHECK(rig.sink.frames[0].lag_ms == 110.0F);
+  CHECK(hand_side(*rig.layout->bodies[0].skeleton) == Side::kLeft);
+  CHECK(rig.layout->bodies[1].name == "right");
+  for (const double angle_rad : hand_angles(rig.sink.frames[1])) CHECK(std::abs(angle_rad) < 1e-3);
+  // Nothing is seen, and the tracker says so.
+  CHECK(rig.feed(message_of("")) == Outcome::kOk);
+  CHECK(rig.sink.frames.empty());
+  CHECK(rig.feed(message_of(flat_hand("left", "0.3"))) == Outcome::kOk);
+  CHECK(rig.sink.frames.empty());
+  // One hand is damaged, the other is kept.
+  CHECK(rig.feed(message_of(R"({"side":"left","points":[]},)" + flat_hand())) == Outcome::kShort);
+  CHECK(rig.sink.frames.size() == 1);
+}
+
+TEST_CASE("what is no hand of a tracker is refused and counted") {
+  LandmarksRig rig;
+  const auto hand = [](const std::string& points) {
+    return message_of(R"({"side":"right","points":)" + points + "}");
+  };
+  const std::string good = flat_hand();
+  const auto with = [&](const std::string& number) {
+    std::string text = good;
+    const auto at = text.find('[') + 1;
+    return message_of(text.replace(at, text.find(',', at) - at, number));
+  };
+  CHECK(rig.feed(with("NaN")) == Outcome::kOutOfRange);
+  CHECK(rig.feed(with("1e39")) == Outcome::kOutOfRange);
+  CHECK(rig.feed(with("2000")) == Outcome::kOutOfRange);
+  CHECK(rig.feed(with("true")) == Outcome::kOutOfRange);
+  CHECK(rig.feed(hand(points_text(63))) == Outcome::kOutOfRange);  // all in one place
+  CHECK(rig.feed(hand(points_text(62))) == Outcome::kShort);
+  CHECK(rig.feed(hand(points_text(64))) == Outcome::kShort);
+  CHECK(rig.feed(hand(points_text(4000, "1"))) == Outcome::kShort);
+  CHECK(rig.feed(hand(points_text(30'000, "1"))) == Outcome::kOutOfRange);  // 10,000 points
+  CHECK(rig.feed(message_of(good + "," + good)) == Outcome::kOutOfRange);
+  CHECK(rig.feed(message_of(good + "," + good + "," + good)) == Outcome::kOutOfRange);
+  CHECK(rig.feed(message_of(flat_hand("right", "1.5"))) == Outcome::kOutOfRange);
+  CHECK(rig.feed(message_of(flat_hand("right", "NaN"))) == Outcome::kOutOfRange);
+  CHECK(rig.feed(message_of(good, R"("version":2)")) == Outcome::kForeign);
+  CHECK(rig.feed(message_of(good, R"("version":"1")")) == Outcome::kForeign);
+  CHECK(rig.feed(message_of(good, R"("version":1,"age_ms":-1)")) == Outcome::kOutOfRange);
+  CHECK(rig.feed(R"({"posed":"other","version":1})") == Outcome::kForeign);
+  CHECK(rig.feed("[1,2]") == Outcome::kForeign);
+  CHECK(rig.feed(message_of(good) + "x") == Outcome::kShort);
+  CHECK(rig.feed(message_of(good).substr(0, 300)) == Outcome::kShort);
+  CHECK(rig.sink.frames.empty());
+  // Time: the same again, and one that was overtaken.
+  CHECK(rig.feed(message_of(good, R"("version":1,"time_ns":2000000000)")) == Outcome::kOk);
+  CHECK(rig.feed(message_of(good, R"("version":1,"time_ns":2000000000)")) == Outcome::kDuplicate);
+  CHECK(rig.feed(message_of(good, R"("version":1,"time_ns":1900000000)")) == Outcome::kLate);
+}
+
+TEST_CASE(
+    "a tracker's hand is described when it has been seen three times, and nothing allocates") {
+  LandmarksRig rig;
+  const auto fresh = rig.driver.make_decoder(rig.driver.expect({}).value()).value();
+  LandmarksEmulator emulator(10.0);
+  std::vector<Bytes> messages(40);
+  for (std::size_t i = 0; i < messages.size(); ++i) {
+    emulator.set_seen(0, i == 5 || i > 20);
+    emulator.emit(emulator.next_due_ns(), messages[i]);
+  }
+  for (std::size_t i = 0; i < messages.size(); ++i) {
+    const int earlier = rig.sink.descriptions;
+    const auto before = test::allocations();
+    fresh->feed(messages[i], static_cast<std::int64_t>(i) * 100'000'000, rig.sink);
+    CHECK(test::allocations() == before);
+    if (rig.sink.descriptions == earlier) continue;
+    CHECK((i == 2 || i == 23));
+    CHECK(rig.sink.described == std::vector{i == 2 ? std::byte{2} : std::byte{3}});
+    if (i == 2) fresh->use(*rig.layout);
+  }
+  CHECK(rig.sink.descriptions == 2);
+  CHECK(rig.sink.count(Outcome::kForeign) == 3);
+  CHECK_FALSE(rig.driver.make_layout(std::array{std::byte{0}}));
+  CHECK_FALSE(rig.driver.make_layout(std::array{std::byte{4}}));
+  CHECK_FALSE(rig.driver.make_layout(std::array{std::byte{1}, std::byte{1}}));
+}
+
+}  // namespace posed::drivers::landmarks
