@@ -3,6 +3,7 @@ import { build } from 'esbuild';
 import { copyFile, mkdir, writeFile } from 'node:fs/promises';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
+import { buildCamera } from './camera.mjs';
 import { mannequin } from './mannequin/mannequin.mjs';
 
 const here = dirname(fileURLToPath(import.meta.url));
@@ -21,3 +22,4 @@ await build({
 });
 for (const name of ['index.html', 'icon.svg']) await copyFile(join(here, name), join(folder, name));
 await writeFile(join(folder, 'mannequin.vrm'), mannequin());
+if (!process.argv.includes('--no-camera')) await buildCamera(here, folder);

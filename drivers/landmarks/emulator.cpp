@@ -55,7 +55,7 @@ void LandmarksEmulator::emit(std::int64_t now_ns, Bytes& out) {
     if (!hand.posed) set_hand_angles(*hand.skeleton, closing(message.time_s), hand.frame);
     TrackedHand& tracked = message.hands[message.count++];
     tracked.side = static_cast<Side>(body);
-    tracked.seen = true;
+    tracked.score = 1.0;
     tracked.point_m = landmarks_of(*hand.skeleton, hand.frame);
     for (Vec3f& point_m : tracked.point_m) point_m = before_camera(point_m);
   }

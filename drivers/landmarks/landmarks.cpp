@@ -87,7 +87,7 @@ RT_SAFE Outcome LandmarksDecoder::accept(Sink& sink) noexcept {
   for (std::size_t i = 0; i < message_.count; ++i) {
     const TrackedHand& hand = message_.hands[i];
     Outcome outcome = hand.outcome;
-    if (outcome == Outcome::kOk && hand.seen) {
+    if (outcome == Outcome::kOk && hand.seen()) {
       seen[static_cast<std::size_t>(hand.side)] = true;
       outcome = emit(hand, sink);
     }
@@ -131,7 +131,7 @@ struct LandmarksSource : RateSource<LandmarksSource> {
       "hands that a tracker finds in a camera's picture, as JSON over UDP: the page's own camera, "
       "OpenXR, Leap Motion, scripts (experimental)";
   static constexpr std::string_view kWhat = "a hand tracker";
-  static constexpr std::string_view kListen = "127.0.0.1:7420";
+  static constexpr std::string_view kListen = "127.0.0.1:7420";  // kUsualPort
   static constexpr double kRate_hz = 10.0;
   static constexpr std::string_view kRateHelp =
       "about how many messages a second the tracker sends";

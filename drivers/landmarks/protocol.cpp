@@ -63,14 +63,14 @@ RT_SAFE void read_side(JsonReader& json, TrackedHand& hand, bool& sided) noexcep
 }
 
 RT_SAFE void read_hand(JsonReader& json, TrackedHand& hand) noexcept {
-  double score = 1.0;
   bool whole = false, sided = false;
+  hand.score = 1.0;
   if (json.enter_object()) {
     for (std::string_view key; json.next(key);) {
       if (key == "side") {
         read_side(json, hand, sided);
       } else if (key == "score") {
-        score = number_or(json, kNone);
+        hand.score = number_or(json, kNone);
       } else if (key == "points") {
         whole = read_points(json, hand.point_m);
       } else {
@@ -79,12 +79,11 @@ RT_SAFE void read_hand(JsonReader& json, TrackedHand& hand) noexcept {
     }
   }
   const bool near = std::ranges::all_of(hand.point_m, is_plausible);
-  const bool sound = sided && score >= 0.0 && score <= 1.0 && near;  // false for NaN
-  hand.seen = score >= kMinScore;
+  const bool sound = sided && hand.score >= 0.0 && hand.score <= 1.0 && near;  // false for NaN
   hand.outcome = Outcome::kOk;
   if (!whole) {
     hand.outcome = Outcome::kShort;
-  } else if (!sound || (hand.seen && !has_size_of_hand(hand.point_m))) {
+  } else if (!sound || (hand.seen() && !has_size_of_hand(hand.point_m))) {
     hand.outcome = Outcome::kOutOfRange;
   }
 }
@@ -156,7 +155,7 @@ std::string write_message(const Message& message) {
     const TrackedHand& hand = message.hands[i];
     text += std::string(i == 0 ? "" : ",") + R"({"side":")" +
             (hand.side == Side::kLeft ? "left" : "right") + R"(","score":)" +
-            (hand.seen ? "1" : "0") + R"(,"points":[)";
+            clip::number_text(hand.score) + R"(,"points":[)";
     for (std::size_t k = 0; k < 3 * kLandmarks; ++k) {
       const double x_m = static_cast<double>(hand.point_m[k / 3][k % 3]);
       text += (k == 0 ? "" : ",") + clip::number_text(std::round(x_m * 1e7) * 1e-7);

@@ -22,6 +22,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -31,6 +32,7 @@
 
 namespace posed::drivers::landmarks {
 
+inline constexpr std::uint16_t kUsualPort = 7420;
 inline constexpr std::size_t kLandmarks = 21;
 inline constexpr std::size_t kMaxHands = 2;
 inline constexpr std::size_t kMaxMessage = 16 * 1024;  // bytes; two hands with all digits have 3 KB
@@ -44,9 +46,11 @@ using Landmarks = std::array<Vec3f, kLandmarks>;
 
 struct TrackedHand {
   Side side = Side::kRight;
-  bool seen = false;               // the score is high enough
+  double score = 0.0;
   Outcome outcome = Outcome::kOk;  // of this hand alone
   Landmarks point_m{};
+
+  RT_SAFE [[nodiscard]] bool seen() const noexcept { return score >= kMinScore; }
 };
 
 struct Message {
@@ -61,7 +65,7 @@ struct Message {
 // points, kOutOfRange with numbers that are no hand.
 RT_SAFE [[nodiscard]] Outcome read_message(std::string_view json, Message& message) noexcept;
 
-// The message as a tracker sends it. Cold.
+// The message as a tracker sends it; its time is finite. Cold.
 [[nodiscard]] std::string write_message(const Message& message);
 
 }  // namespace posed::drivers::landmarks

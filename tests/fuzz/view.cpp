@@ -48,7 +48,7 @@ void check_request(std::string_view bytes) {
   const bool is_page = answer.status == 200 && answer.body == "/index.html";
   if ((is_page || answer.upgrades()) && (!knows || request.host != "127.0.0.1:5580")) std::abort();
   if (answer.upgrades() && request.origin != "http://127.0.0.1:5580") std::abort();
-  for (const posed::http::Header& header : safety_headers(request.host)) {
+  for (const posed::http::Header& header : safety_headers(request.host, true)) {
     if (header.value.find_first_of("\r\n") != std::string::npos) std::abort();
   }
 }

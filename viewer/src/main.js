@@ -8,6 +8,7 @@ import { Store } from './streams/store.js';
 import { World } from './scene/world.js';
 import { Avatars } from './scene/avatars.js';
 import { Acks, controlWith } from './panel/acks.js';
+import { CameraPanel } from './panel/camera.js';
 import { Chosen } from './panel/chosen.js';
 import { Header } from './panel/header.js';
 import { Help } from './panel/help.js';
@@ -77,6 +78,8 @@ class Page {
       () => this.hello?.connect ?? '',
     );
     this.takes = new Takes(find('.takes'), control);
+    this.camera = new CameraPanel((message) => this.connection.sendText(message));
+    find('.side').append(this.camera.element);
     this.help = new Help(find('#help'), find('#help-button'));
     this.avatars = new Avatars(
       world,
@@ -187,6 +190,9 @@ class Page {
       if (this.hello?.same_machine)
         this.clock.add(message.t0, performance.now(), Number(message.monotonic_ns) / 1e6);
       return;
+    } else if (type === 'landmarks') {
+      this.camera.told(message);
+      return;
     } else if (type === 'no_reply') {
       this.requests.refused(message.request, message.error);
       return;
@@ -214,6 +220,7 @@ class Page {
     this.list.update(this.chosen);
     this.panel.update(this.chosen, this.readOnly);
     this.takes.update(store.stats, this.readOnly);
+    this.camera.update(this.hello, this.readOnly);
     this.header.update(this.hello && this.daemon.alive ? store.stats : null);
     this.instruments.heading.textContent = this.chosen
       ? `Instruments: ${this.chosenName}`

@@ -15,6 +15,7 @@
 #include "daemon/http/server.hpp"
 #include "daemon/net/security.hpp"
 #include "daemon/system/clock.hpp"
+#include "daemon/tools/view/hand_feed.hpp"
 #include "proto/frame/time.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/zmq/zmq_handle.hpp"
@@ -140,11 +141,13 @@ class Bridge::Parts {
   static Result<std::unique_ptr<Parts>> open(const BridgeOptions& options) {
     auto page = TRY(PageFiles::load(options.page));
     auto context = TRY(net::open_context());
+    const bool camera = page.has_camera();
     std::unique_ptr<Parts> parts(
         new Parts(std::move(context), {.files = std::move(page), .token = random_token()},
                   {.version = POSED_VERSION,
                    .connect = options.link.publish.endpoint,
-                   .same_machine = net::is_loopback(options.link.publish.endpoint)}));
+                   .same_machine = net::is_loopback(options.link.publish.endpoint),
+                   .camera = camera}));
     parts->link_ =
         TRY(DaemonLink::open(parts->io_, parts->context_.get(), options.link, parts->hub_));
     const auto address = TRY(address_of(options.address));
@@ -182,10 +185,12 @@ class Bridge::Parts {
  private:
   Parts(net::Context context, Site site, Greeting greeting)
       : context_(std::move(context)),
-        hub_(std::move(greeting),
-             [this](std::uint64_t ticket, std::string_view request) {
-               return link_->ask(ticket, request);
-             }),
+        hub_(
+            std::move(greeting),
+            [this](std::uint64_t ticket, std::string_view request) {
+              return link_->ask(ticket, request);
+            },
+            [this](std::string_view json) { return hands_.send(json); }),
         room_(std::move(site), hub_),
         timer_(io_) {}
 
@@ -202,6 +207,7 @@ class Bridge::Parts {
   }
 
   net::Context context_;
+  HandFeed hands_;
   Hub hub_;
   WebRoom room_;
   http::Connections connections_{.service = room_};

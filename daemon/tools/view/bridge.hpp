@@ -37,7 +37,7 @@ class WebRoom final : public http::Service {
 
   [[nodiscard]] http::Answer answer(const http::Request& request) override;
   [[nodiscard]] std::vector<http::Header> headers(std::string_view host) const override {
-    return safety_headers(host);
+    return safety_headers(host, site.files.has_camera());
   }
   void upgrade(boost::beast::tcp_stream stream, const http::Message& request) override;
   [[nodiscard]] std::size_t upgraded() const override { return tabs.size(); }

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
+#include <span>
 #include <utility>
 
 #include <nlohmann/json.hpp>
 
-#include "proto/frame/time.hpp"
+#include "drivers/landmarks/protocol.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::view {
@@ -40,7 +42,28 @@ std::string refusal_of(const v1::ControlRequest& request) {
 
 }  // namespace
 
+namespace {
+
+// Empty for what is no sound message of a hand tracker that tells the time.
+std::string checked_landmarks(std::string_view text) {
+  namespace landmarks = drivers::landmarks;
+  constexpr double kMaxTime_s = 9e9;
+  landmarks::Message message;
+  if (text.size() > kMaxLandmarksWord) return {};
+  const bool sound = landmarks::read_message(text, message) == Outcome::kOk &&
+                     std::abs(message.time_s) <= kMaxTime_s;  // false for NaN
+  const auto all = std::span(message.hands).first(message.count);
+  const bool hands =
+      std::ranges::all_of(all, [](const auto& hand) { return hand.outcome == Outcome::kOk; });
+  return sound && hands ? landmarks::write_message(message) : std::string();
+}
+
+}  // namespace
+
 PageWord read_word(std::string_view text) {
+  if (text.starts_with(R"({"posed":"landmarks")")) {
+    return LandmarksWord{.json = checked_landmarks(text)};
+  }
   if (text.size() > kMaxWord) return UnknownWord{};
   const json value = json::parse(text, nullptr, false);
   if (!value.is_object()) return UnknownWord{};
@@ -97,6 +120,7 @@ Parcel hello_word(const Greeting& greeting, const ControlRight& right) {
                {"version", greeting.version},
                {"connect", greeting.connect},
                {"same_machine", greeting.same_machine},
+               {"camera", greeting.camera},
                {"may_control", right.may},
                {"read_only_reason", right.reason}});
 }
@@ -112,6 +136,10 @@ Parcel daemon_word(const DaemonState& state) {
 
 Parcel clock_word(double t0, std::int64_t monotonic_ns) {
   return word({{"type", "clock"}, {"t0", t0}, {"monotonic_ns", std::to_string(monotonic_ns)}});
+}
+
+Parcel landmarks_word(const std::string& refusal) {
+  return word({{"type", "landmarks"}, {"refusal", refusal}});
 }
 
 Parcel no_reply_word(std::uint32_t number, const std::string& sentence) {
@@ -149,6 +177,7 @@ void Hub::join(Tab& tab) {
 void Hub::leave(Tab& tab) {
   tabs_.erase(&tab);
   if (uploader_ == &tab) uploader_ = nullptr;
+  if (camera_ == &tab) camera_ = nullptr;
   std::erase_if(under_way_, [&](const auto& entry) { return entry.second.tab == &tab; });
 }
 
@@ -158,6 +187,9 @@ void Hub::handle(Tab& tab, std::string_view bytes, bool text, std::int64_t now_n
     if (std::holds_alternative<ReadyWord>(word)) tab.outbox.ready();
     if (const auto* clock = std::get_if<ClockWord>(&word)) {
       tab.outbox.put_answer(clock_word(clock->t0, now_ns));
+    }
+    if (const auto* landmarks = std::get_if<LandmarksWord>(&word)) {
+      feed(tab, landmarks->json, now_ns);
     }
   } else if (const auto asked = read_request(bytes)) {
     ask(tab, *asked, now_ns);
@@ -178,6 +210,40 @@ std::string Hub::reason_against(const Tab& tab, const PageRequest& asked,
     return "another page is sending a model; try again in some seconds";
   }
   return {};
+}
+
+std::string Hub::reason_against_landmarks(const Tab& tab, const std::string& json,
+                                          std::int64_t now_ns) {
+  if (!right_.may) return right_.reason;
+  if (!feed_ || !greeting_.same_machine) {
+    return "the camera's hands go only to a daemon on this computer: open the page of `posed view`"
+           " there";
+  }
+  if (json.empty()) return "this is not a message of landmarks (drivers/landmarks/README.md)";
+  if (camera_ != nullptr && camera_ != &tab && now_ns - camera_ns_ < kNanosPerSecond) {
+    return "another page is using its camera; stop that one first";
+  }
+  if (now_ns - second_ns_ >= kNanosPerSecond) {
+    second_ns_ = now_ns;
+    this_second_ = 0;
+  }
+  if (this_second_ >= kMaxLandmarks_hz) return "too many messages a second";
+  ++this_second_;
+  camera_ = &tab;
+  camera_ns_ = now_ns;
+  return feed_(json);
+}
+
+void Hub::feed(Tab& tab, const std::string& json, std::int64_t now_ns) {
+  const std::string reason = reason_against_landmarks(tab, json, now_ns);
+  if (reason.empty()) {
+    ++counts_.landmarks;
+    return;
+  }
+  ++counts_.refused_landmarks;
+  if (tab.told_ns != kNoTime_ns && now_ns - tab.told_ns < kNanosPerSecond) return;
+  tab.told_ns = now_ns;
+  tab.outbox.put_answer(landmarks_word(reason));
 }
 
 void Hub::note_upload(Tab& tab, const v1::ControlRequest& request, std::int64_t now_ns) {

@@ -16,6 +16,7 @@
 #include "daemon/tools/view/outbox.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/frame/result.hpp"
+#include "proto/frame/time.hpp"
 
 namespace posed::view {
 
@@ -27,13 +28,21 @@ namespace posed::view {
 // Bytes of a message of the page: a request of the largest size that a daemon takes, numbered.
 inline constexpr std::size_t kMaxPageMessage = 64 * 1024 + 4;
 inline constexpr std::size_t kMaxWord = 1024;  // bytes of its JSON
+inline constexpr std::size_t kMaxLandmarksWord = 8 * 1024;
+// Of all pages together: no camera is faster.
+inline constexpr int kMaxLandmarks_hz = 120;
 
 struct ReadyWord {};  // the page can show one more pose of each stream
 struct ClockWord {    // asks for the bridge's clock
   double t0 = 0.0;    // the page's own time, given back
 };
+// Hands that the page finds in its camera's picture (drivers/landmarks/protocol.hpp), written anew,
+// so that only what was checked passes; empty if they are none.
+struct LandmarksWord {
+  std::string json;
+};
 struct UnknownWord {};  // of a newer page, or nonsense: ignored
-using PageWord = std::variant<UnknownWord, ReadyWord, ClockWord>;
+using PageWord = std::variant<UnknownWord, ReadyWord, ClockWord, LandmarksWord>;
 
 [[nodiscard]] PageWord read_word(std::string_view text);
 
@@ -70,12 +79,14 @@ struct Greeting {
   std::string version{};
   std::string connect{};      // the daemon's endpoint
   bool same_machine = false;  // the daemon's clock is the bridge's
+  bool camera = false;        // the page has what finds hands in a picture
 };
 
 [[nodiscard]] Parcel hello_word(const Greeting& greeting, const ControlRight& right);
 [[nodiscard]] Parcel control_word(const ControlRight& right);
 [[nodiscard]] Parcel daemon_word(const DaemonState& state);
 [[nodiscard]] Parcel clock_word(double t0, std::int64_t monotonic_ns);
+[[nodiscard]] Parcel landmarks_word(const std::string& refusal);
 [[nodiscard]] Parcel no_reply_word(std::uint32_t number, const std::string& sentence);
 
 inline constexpr std::size_t kMaxViewStreams = 1024;  // more are not shown
@@ -90,6 +101,8 @@ struct Tab {
   // Sends what is in the outbox, if it can. Called when something may have come into it.
   std::function<void()> wake{};
   std::size_t under_way = 0;  // requests without a reply
+  // When it was told last why its landmarks do not pass: once a second is enough.
+  std::int64_t told_ns = kNoTime_ns;
 };
 
 struct HubCounts {
@@ -97,6 +110,7 @@ struct HubCounts {
   std::uint64_t passed = 0;    // requests to the daemon
   std::uint64_t refused = 0;   // requests that the bridge did not pass on
   std::uint64_t no_reply = 0;  // requests that the daemon did not answer in time
+  std::uint64_t landmarks = 0, refused_landmarks = 0;  // messages passed on, and not
 };
 
 // The daemon's messages go to every open page, the pages' requests to the daemon, and each reply
@@ -107,7 +121,11 @@ class Hub {
   // sent now.
   using Ask = std::function<bool(std::uint64_t ticket, std::string_view request)>;
 
-  Hub(Greeting greeting, Ask ask) : greeting_(std::move(greeting)), ask_(std::move(ask)) {}
+  // Sends landmarks to the daemon's source; returns why they did not go, empty if they did.
+  using Feed = std::function<std::string(std::string_view json)>;
+
+  Hub(Greeting greeting, Ask ask, Feed feed = {})
+      : greeting_(std::move(greeting)), ask_(std::move(ask)), feed_(std::move(feed)) {}
 
   // The tab gets what is known, and everything that comes until it leaves; it stays where it is.
   void join(Tab& tab);
@@ -150,6 +168,9 @@ class Hub {
   // Why this request may not pass now; empty: it may.
   [[nodiscard]] std::string reason_against(const Tab& tab, const PageRequest& asked,
                                            std::int64_t now_ns) const;
+  void feed(Tab& tab, const std::string& json, std::int64_t now_ns);
+  [[nodiscard]] std::string reason_against_landmarks(const Tab& tab, const std::string& json,
+                                                     std::int64_t now_ns);
   void note_upload(Tab& tab, const v1::ControlRequest& request, std::int64_t now_ns);
   // The message behind its topic, counted in kept_ for as long as anybody has it.
   [[nodiscard]] Bytes counted(std::string_view topic, std::string_view body) const;
@@ -159,6 +180,7 @@ class Hub {
 
   Greeting greeting_;
   Ask ask_;
+  Feed feed_;
   std::set<Tab*> tabs_;
   DaemonState daemon_;
   ControlRight right_;
@@ -169,6 +191,11 @@ class Hub {
   // The daemon sees one client, which may send one model at a time.
   const Tab* uploader_ = nullptr;
   std::int64_t upload_ns_ = 0;
+  // The page whose camera is used: hands of two would be mixed.
+  const Tab* camera_ = nullptr;
+  std::int64_t camera_ns_ = 0;
+  std::int64_t second_ns_ = 0;  // since when landmarks are counted
+  int this_second_ = 0;
   std::shared_ptr<std::size_t> kept_ = std::make_shared<std::size_t>(0);  // bytes
   HubCounts counts_;
 };

@@ -61,6 +61,8 @@ Result<PageFiles> PageFiles::load(const fs::path& folder) {
     }
     std::error_code gone;  // since the folder was listed
     if (at->is_symlink(gone) || !at->is_regular_file(gone)) continue;
+    std::string name = "/" + at->path().lexically_relative(folder).generic_string();
+    const bool on_demand = name.starts_with(kCameraFolder);
     auto read =
         TRY(load_file(at->path(), {.what = "file of the page", .max_bytes = kMaxPageBytes}));
     bytes += read.size();
@@ -70,10 +72,14 @@ Result<PageFiles> PageFiles::load(const fs::path& folder) {
                               kMaxPageFiles, kMaxPageBytes / (1024 * 1024)),
                   folder.string());
     }
-    std::string name = "/" + at->path().lexically_relative(folder).generic_string();
     const std::string_view type = type_of_name(name);
-    std::string etag = etag_of(read);
-    page.files_.emplace(std::move(name), PageFile{std::move(read), type, std::move(etag)});
+    PageFile file{.bytes = {}, .path = {}, .type = type, .etag = etag_of(read)};
+    if (on_demand) {
+      file.path = at->path();
+    } else {
+      file.bytes = std::move(read);
+    }
+    page.files_.emplace(std::move(name), std::move(file));
   }
   if (error) return fail("the folder of the page cannot be read: " + error.message(), folder);
   if (page.find("/") == nullptr) {
@@ -134,6 +140,16 @@ http::Answer answer_to_upgrade(const http::Request& request, const Site& site,
   return {.status = 101};
 }
 
+// The bytes belong to the answer. The file has been there at the start.
+http::Answer answer_on_demand(const PageFile& file) {
+  auto read = load_file(file.path, {.what = "file of the page", .max_bytes = kMaxPageBytes});
+  if (!read || etag_of(*read) != file.etag) {
+    return http::refuse(404, "this file has changed: start posed view again\n");
+  }
+  const auto bytes = std::make_shared<const std::string>(std::move(*read));
+  return {.body = *bytes, .type = file.type, .etag = file.etag, .keeps = bytes};
+}
+
 }  // namespace
 
 http::Answer answer_to(const http::Request& request, const Site& site) {
@@ -154,23 +170,26 @@ http::Answer answer_to(const http::Request& request, const Site& site) {
   if (request.if_none_match == file->etag) {
     return {.status = 304, .type = file->type, .etag = file->etag};
   }
+  if (!file->path.empty()) return answer_on_demand(*file);
   return {.body = file->bytes, .type = file->type, .etag = file->etag};
 }
 
-std::vector<http::Header> safety_headers(std::string_view host) {
+std::vector<http::Header> safety_headers(std::string_view host, bool camera) {
   // three.js reads the textures of a model from blob: addresses, which the page makes itself. Older
   // browsers do not count the WebSocket as 'self'.
   const std::string socket = http::is_host(host) ? " ws://" + std::string(host) : "";
-  return {{"Content-Security-Policy",
-           "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
-           "connect-src 'self' blob: data:" +
-               socket + "; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"},
-          {"X-Content-Type-Options", "nosniff"},
-          {"X-Frame-Options", "DENY"},
-          // The token is part of the page's URL.
-          {"Referrer-Policy", "no-referrer"},
-          {"Cross-Origin-Resource-Policy", "same-origin"},
-          {"Cross-Origin-Opener-Policy", "same-origin"}};
+  return {
+      {"Content-Security-Policy",
+       "default-src 'none'; script-src 'self'" + std::string(camera ? " 'wasm-unsafe-eval'" : "") +
+           "; style-src 'self'; img-src 'self' blob: data:; connect-src 'self' blob: data:" +
+           socket + "; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"},
+      {"Permissions-Policy", camera ? "camera=(self)" : "camera=()"},
+      {"X-Content-Type-Options", "nosniff"},
+      {"X-Frame-Options", "DENY"},
+      // The token is part of the page's URL.
+      {"Referrer-Policy", "no-referrer"},
+      {"Cross-Origin-Resource-Policy", "same-origin"},
+      {"Cross-Origin-Opener-Policy", "same-origin"}};
 }
 
 std::string random_token() {

@@ -16,15 +16,21 @@
 
 namespace posed::view {
 
-// PageFiles: the files of the page, read into memory at the start. What the network names is only
-// looked up in this list and never becomes a path. Does not change afterwards.
+// PageFiles: the files of the page, read into memory at the start, but for those of the camera.
+// What the network names is only looked up in this list and never becomes a path. Does not change
+// afterwards.
 inline constexpr std::size_t kMaxPageFiles = 256;
 inline constexpr std::size_t kMaxPageBytes = 64 * 1024 * 1024;  // of all files together
 
+// The folder of what finds hands in a camera's picture. It is large and few people use it: its
+// files are read when they are asked for. It is optional; pages without it may use no camera.
+inline constexpr std::string_view kCameraFolder = "/camera/";
+
 struct PageFile {
-  std::string bytes;
-  std::string_view type;  // MIME type, by the extension
-  std::string etag;       // with its quotes; changes when the bytes do
+  std::string bytes;             // empty if it is read when it is asked for
+  std::filesystem::path path{};  // of such a file
+  std::string_view type;         // MIME type, by the extension
+  std::string etag;              // with its quotes; changes when the bytes do
 };
 
 class PageFiles {
@@ -36,6 +42,7 @@ class PageFiles {
   // The file of a target without its query, such as "/page.js"; "/" is index.html. Null: there is
   // none. Valid as long as this object.
   [[nodiscard]] const PageFile* find(std::string_view path) const;
+  [[nodiscard]] bool has_camera() const { return find("/camera/finder.js") != nullptr; }
 
  private:
   std::map<std::string, PageFile, std::less<>> files_;  // by "/name"
@@ -55,8 +62,8 @@ struct Site {
 [[nodiscard]] http::Answer answer_to(const http::Request& request, const Site& site);
 
 // Headers of every answer: they forbid the browser to run, load, send or frame anything but the
-// page itself.
-[[nodiscard]] std::vector<http::Header> safety_headers(std::string_view host);
+// page itself. Only with `camera` may it open one and compile WebAssembly.
+[[nodiscard]] std::vector<http::Header> safety_headers(std::string_view host, bool camera);
 
 // 128 random bits as 22 characters for a URL.
 [[nodiscard]] std::string random_token();

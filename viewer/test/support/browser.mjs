@@ -17,6 +17,14 @@ const FLAGS = [
   '--enable-unsafe-swiftshader',
 ];
 
+// A camera that shows this film, and a user who lets the page use it.
+export const withCamera = (film) => [
+  ...FLAGS,
+  '--use-fake-device-for-media-stream',
+  '--use-fake-ui-for-media-stream',
+  `--use-file-for-fake-video-capture=${film}`,
+];
+
 export const launch = (flags = FLAGS) =>
   chromium.launch({ executablePath: CHROMIUM, args: ['--no-sandbox', ...flags] });
 

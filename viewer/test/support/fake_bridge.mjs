@@ -1,7 +1,7 @@
 // A bridge for the tests of the page alone, without posed: it serves the page's folder and speaks
 // the protocol of `posed view`. By hand: node test/support/fake_bridge.mjs [PORT]
 import { createServer } from 'node:http';
-import { readFileSync } from 'node:fs';
+import { readFileSync, readdirSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { WebSocketServer } from 'ws';
@@ -16,6 +16,7 @@ const TYPES = {
   css: 'text/css',
   svg: 'image/svg+xml',
   vrm: 'model/gltf-binary',
+  wasm: 'application/wasm',
 };
 const FILES = ['index.html', 'page.js', 'page.css', 'icon.svg', 'mannequin.vrm'];
 const POLICY =
@@ -38,6 +39,7 @@ class Tab {
       version: 'fake',
       connect: 'tcp://127.0.0.1:5570',
       same_machine: bridge.same_machine,
+      camera: bridge.camera,
       ...bridge.rights,
     });
     this.say({ type: 'daemon', alive: true, sentence: '' });
@@ -57,6 +59,7 @@ class Tab {
   }
 
   #text(message) {
+    if (message.posed === 'landmarks') this.bridge.landmarks.push(message);
     if (message.type === 'ready') this.credits = 1;
     if (message.type === 'clock')
       this.say({ ...message, monotonic_ns: String(process.hrtime.bigint()) });
@@ -81,6 +84,7 @@ class Tab {
 
 export class FakeBridge {
   requests = [];
+  landmarks = []; // messages of the page's camera
   #tabs = new Set();
   #timers = [];
   silent = false;
@@ -92,13 +96,17 @@ export class FakeBridge {
       rights = { may_control: true, read_only_reason: '' },
       same_machine = true,
       folder = PAGE,
+      camera = false,
     } = {},
   ) {
-    Object.assign(this, { daemon, token, rights, same_machine, folder });
+    Object.assign(this, { daemon, token, rights, same_machine, folder, camera });
   }
 
   async start(port = 0) {
-    const files = new Map(FILES.map((name) => [`/${name}`, readFileSync(join(this.folder, name))]));
+    const names = this.camera
+      ? [...FILES, ...readdirSync(join(this.folder, 'camera')).map((name) => `camera/${name}`)]
+      : FILES;
+    const files = new Map(names.map((name) => [`/${name}`, readFileSync(join(this.folder, name))]));
     this.http = createServer((request, response) => this.#serve(files, request, response));
     const sockets = new WebSocketServer({
       server: this.http,
@@ -127,7 +135,10 @@ export class FakeBridge {
     const body = files.get(pathname === '/' ? '/index.html' : pathname);
     const status = !body ? 404 : pathname === '/' && !this.#knows(request) ? 403 : 200;
     const type = TYPES[pathname === '/' ? 'html' : pathname.split('.').pop()] ?? 'text/plain';
-    response.writeHead(status, { 'content-type': type, 'content-security-policy': POLICY });
+    const policy = this.camera
+      ? POLICY.replace("script-src 'self'", "script-src 'self' 'wasm-unsafe-eval'")
+      : POLICY;
+    response.writeHead(status, { 'content-type': type, 'content-security-policy': policy });
     response.end(status === 200 ? body : 'refused: open the URL that posed view printed');
   }
 

@@ -36,6 +36,18 @@ loop = true
 model = "${DEMO}/hand.gesture"
 `;
 
+// Only the hands of a page's camera.
+export const cameraConfig = ({ publish, control }) => `
+[publish]
+endpoint = "${publish}"
+[control]
+endpoint = "${control}"
+[[source]]
+name = "camera"
+driver = "landmarks"
+streams = "all"
+`;
+
 // The endpoint of a port that is free now; a daemon that restarts needs the same again.
 async function freeEndpoint() {
   const server = createServer();
@@ -72,8 +84,9 @@ async function end(child) {
 }
 
 export class RealDaemon {
-  constructor(program) {
+  constructor(program, config = configOf) {
     this.program = program;
+    this.config = config;
     this.folder = mkdtempSync(join(tmpdir(), 'posed-page-'));
   }
 
@@ -81,7 +94,7 @@ export class RealDaemon {
     if (!this.publish) {
       this.publish = await freeEndpoint();
       this.control = await freeEndpoint();
-      writeFileSync(join(this.folder, 'page.toml'), configOf(this));
+      writeFileSync(join(this.folder, 'page.toml'), this.config(this));
     }
     const args = [
       'record',

@@ -56,6 +56,7 @@ struct HubRig {
   }
 
   std::vector<std::pair<std::uint64_t, std::string>> asked;
+  std::vector<std::string> fed;  // hands of a camera
   bool reachable = true;
   int wakes = 0;
   std::int64_t now_ns = 0;
@@ -64,6 +65,10 @@ struct HubRig {
           [this](std::uint64_t ticket, std::string_view request) {
             if (reachable) asked.emplace_back(ticket, request);
             return reachable;
+          },
+          [this](std::string_view landmarks) {
+            fed.emplace_back(landmarks);
+            return std::string();
           }};
 };
 
@@ -153,6 +158,49 @@ TEST_CASE("a skeleton is passed on when it changes, a pose with each credit, an 
   got = all_of(tab);
   REQUIRE(got.size() == 1);
   CHECK(got[0].topic == "pose/a");
+}
+
+// A message of a camera's hands; `members` replaces the time.
+std::string hands_word(const std::string& members = R"("time_ns":1000000)", int numbers = 63) {
+  std::string text = R"({"posed":"landmarks","version":1,)" + members +
+                     R"(,"more":"than posed knows","hands":[{"side":"left","points":[)";
+  for (int i = 0; i < numbers; ++i) text += (i == 0 ? "" : ",") + std::to_string(0.003 * i);
+  return text + "]}]}";
+}
+
+TEST_CASE(
+    "a camera's hands pass if they are sound, with the right to control, at a camera's rate") {
+  HubRig rig;
+  Tab tab;
+  Tab other;
+  rig.join(tab);
+  rig.join(other);
+  const auto feed = [&](Tab& from, const std::string& text, std::int64_t now_ns) {
+    rig.hub.handle(from, text, true, now_ns);
+  };
+  feed(tab, hands_word(), 0);
+  REQUIRE(rig.fed.size() == 1);
+  CHECK(rig.fed[0].find("more") == std::string::npos);  // written anew
+  CHECK(rig.fed[0].find(R"("time_ns":1000000)") != std::string::npos);
+  feed(other, hands_word(), 1000);  // while the first page's camera runs
+  feed(tab, hands_word(R"("time_ns":NaN)"), 0);
+  feed(tab, hands_word(R"("time_ns":1e300)"), 0);
+  feed(tab, hands_word(R"("version":2,"time_ns":1)"), 0);
+  feed(tab, hands_word(R"("time_ns":1)", 30'000), 0);  // 10,000 points
+  feed(tab, hands_word(R"("time_ns":1)", 62), 0);
+  feed(tab, R"({"posed":"landmarks",)", 0);
+  CHECK(rig.fed.size() == 1);
+  static_cast<void>(all_of(tab));
+  for (int i = 0; i < 1000; ++i) feed(tab, hands_word(), 2 * kNanosPerSecond + i * 1'000'000);
+  CHECK(rig.fed.size() <= 1 + kMaxLandmarks_hz);
+  CHECK(rig.hub.counts().refused_landmarks == 7 + 1000 - kMaxLandmarks_hz);
+  CHECK(all_of(tab).size() == 1);  // it is told once
+  rig.hub.control_is({.may = false, .reason = "only looking"});
+  static_cast<void>(all_of(tab));
+  rig.fed.clear();
+  feed(tab, hands_word(), 9 * kNanosPerSecond);
+  CHECK(rig.fed.empty());
+  CHECK(json::parse(all_of(tab).at(0).body).at("refusal") == "only looking");
 }
 
 TEST_CASE("a request gets its own reply, whatever the order") {

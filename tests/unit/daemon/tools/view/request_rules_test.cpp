@@ -65,6 +65,33 @@ TEST_CASE("what the network names is looked up in the list of files, and nowhere
   }
 }
 
+TEST_CASE("a camera may be used where its files are, which are read when they are asked for") {
+  SiteRig rig;
+  const auto headers = [&] {
+    std::string all;
+    for (const auto& header : safety_headers(kOwnHost, rig.site.files.has_camera())) {
+      all += header.value + "\n";
+    }
+    return all;
+  };
+  CHECK(headers().find("wasm") == std::string::npos);
+  CHECK(headers().find("camera=()") != std::string::npos);
+  std::filesystem::create_directory(rig.folder.path() / "camera");
+  rig.folder.write("camera/finder.js", "find()");
+  rig.folder.write("camera/hands.wasm", "\1");
+  rig.site.files = PageFiles::load(rig.folder.path()).value();
+  CHECK(headers().find("script-src 'self' 'wasm-unsafe-eval';") != std::string::npos);
+  CHECK(headers().find("camera=(self)") != std::string::npos);
+  CHECK(rig.site.files.find("/camera/finder.js")->bytes.empty());
+  const http::Answer answer = rig.get("/camera/finder.js");
+  CHECK(answer.body == "find()");
+  CHECK(answer.keeps != nullptr);
+  CHECK(rig.get("/camera/hands.wasm").type == "application/wasm");
+  rig.folder.write("camera/finder.js", "other()");  // not what was there at the start
+  CHECK(rig.get("/camera/finder.js").status == 404);
+  CHECK(rig.get("/camera/../page.js").status == 404);
+}
+
 TEST_CASE("a file that the browser has is not sent again, and only GET and HEAD are answered") {
   const SiteRig rig;
   const http::Answer first = rig.get("/page.js");
@@ -118,7 +145,7 @@ TEST_CASE("a name that somebody else points at this machine is refused") {
 
 TEST_CASE("every answer forbids the browser what is not the page's own") {
   std::set<std::string_view> names;
-  for (const http::Header& header : safety_headers(kOwnHost)) {
+  for (const http::Header& header : safety_headers(kOwnHost, false)) {
     names.insert(header.name);
     if (header.name != "Content-Security-Policy") continue;
     for (const char* part : {"default-src 'none'", "script-src 'self';", "style-src 'self';",
@@ -131,7 +158,7 @@ TEST_CASE("every answer forbids the browser what is not the page's own") {
   CHECK(names.contains("Referrer-Policy"));
   CHECK(names.contains("X-Content-Type-Options"));
   // A host cannot add words of its own.
-  CHECK(safety_headers("a; script-src *").front().value.find('*') == std::string::npos);
+  CHECK(safety_headers("a; script-src *", true).front().value.find('*') == std::string::npos);
 }
 
 TEST_CASE("tokens are long and differ") {

@@ -1,0 +1,120 @@
+// The camera and the worker that finds hands in its pictures. Nothing is opened or loaded before
+// start(); stop() ends the camera's tracks and the worker at once.
+
+const WORKER = '/camera/finder.js';
+const WIDTH = 640;
+const HEIGHT = 480;
+
+const WORDS = {
+  NotAllowedError: 'the browser may not use the camera: allow it beside the address of this page',
+  NotFoundError: 'this computer has no camera',
+  NotReadableError: 'another program uses the camera',
+  OverconstrainedError: 'this camera is gone: choose another one',
+};
+
+export const wordsOf = (error) => WORDS[error?.name] ?? error?.message ?? String(error);
+
+export class Camera {
+  #stream = null;
+  #worker = null;
+  #ready = false;
+  #busy = false;
+  #run = 0; // counts starts and stops: what an earlier one has begun is no more wanted
+
+  // handlers: found({hands, time_ms}), ended(sentence)
+  constructor(video, handlers) {
+    this.video = video;
+    this.handlers = handlers;
+  }
+
+  get running() {
+    return this.#stream !== null;
+  }
+
+  async start(deviceId) {
+    this.stop();
+    const run = this.#run;
+    const stream = await navigator.mediaDevices.getUserMedia({
+      audio: false,
+      video: {
+        width: { ideal: WIDTH },
+        height: { ideal: HEIGHT },
+        ...(deviceId ? { deviceId: { exact: deviceId } } : {}),
+      },
+    });
+    if (run !== this.#run) return end(stream);
+    this.#stream = stream;
+    stream.getVideoTracks()[0].onended = () => this.#end('the camera is gone');
+    this.#load();
+    this.video.srcObject = stream;
+    await this.video.play();
+    this.#next(run);
+    return undefined;
+  }
+
+  stop() {
+    this.#run += 1;
+    if (this.#stream) end(this.#stream);
+    this.#stream = null;
+    this.video.srcObject = null;
+    this.#worker?.terminate();
+    this.#worker = null;
+    this.#ready = false;
+    this.#busy = false;
+  }
+
+  #end(sentence) {
+    if (!this.running) return;
+    this.stop();
+    this.handlers.ended(sentence);
+  }
+
+  #load() {
+    const worker = new Worker(WORKER);
+    worker.onerror = () => this.#end('what finds hands cannot be loaded');
+    worker.onmessage = ({ data }) => {
+      if (worker !== this.#worker) return;
+      this.#busy = false;
+      if (data.error) this.#end(`no hands can be found: ${data.error}`);
+      else if (data.ready) this.#ready = true;
+      else this.handlers.found(data);
+    };
+    this.#worker = worker;
+  }
+
+  // One picture after the other: a slow computer gets fewer of them, none waits.
+  #next(run) {
+    if (run !== this.#run) return;
+    const { video } = this;
+    const seen = (now_ms, about) => {
+      this.#send(run, about?.captureTime ?? now_ms);
+      this.#next(run);
+    };
+    if (video.requestVideoFrameCallback) video.requestVideoFrameCallback(seen);
+    else setTimeout(() => seen(performance.now()), 33);
+  }
+
+  async #send(run, time_ms) {
+    if (!this.#ready || this.#busy || this.video.readyState < 2) return;
+    this.#busy = true;
+    try {
+      const picture = await createImageBitmap(this.video);
+      if (run === this.#run) this.#worker.postMessage({ picture, time_ms }, [picture]);
+      else picture.close();
+    } catch {
+      this.#busy = false; // no picture yet
+    }
+  }
+}
+
+function end(stream) {
+  for (const track of stream.getTracks()) {
+    track.onended = null;
+    track.stop();
+  }
+}
+
+export async function cameras() {
+  const devices = (await navigator.mediaDevices?.enumerateDevices()) ?? [];
+  return devices.filter(({ kind, deviceId }) => kind === 'videoinput' && deviceId !== '');
+}

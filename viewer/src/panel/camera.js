@@ -1,0 +1,166 @@
+// "Use my camera": hands without a glove. The browser finds them; 21 points a hand go to posed.
+import { Camera, cameras, wordsOf } from '../camera/camera.js';
+import { landmarksMessage } from '../camera/hands_of.js';
+import { el, write } from './dom.js';
+
+const CONSENT =
+  'The picture stays in this browser; only 21 points a hand are sent to posed on this computer.';
+const LOADING = 'loading what finds hands (13 MB, once)';
+const NO_HAND = 'no hand is seen: hold one up, palm to the camera';
+const HIDDEN = 'stopped, because the page was hidden';
+const SECOND_MS = 1000;
+const FINGERS = [0, 1, 2, 3, 4].map((f) => [0, 1, 2, 3, 4].map((j) => (j ? 4 * f + j : 0)));
+const SIDES = [
+  ['', 'as seen'],
+  ['left', 'left'],
+  ['right', 'right'],
+];
+
+export class CameraPanel {
+  #refusal = '';
+  #times_ms = []; // of the pictures of the last second
+  #said = '';
+  readOnly = '';
+  frames = 0;
+  found = 0;
+
+  // send(message): gives it to posed
+  constructor(send) {
+    this.send = send;
+    this.video = el('video', { muted: true, playsInline: true, aria: { hidden: 'true' } });
+    this.canvas = el('canvas', { role: 'img', aria: { label: 'The points that were found' } });
+    this.preview = el('div.camera-preview', { hidden: true }, this.video, this.canvas);
+    this.button = el('button', { type: 'button', onclick: () => this.toggle() }, 'Use my camera');
+    this.device = el('select', { aria: { label: 'Camera' }, hidden: true });
+    this.side = el(
+      'select',
+      { aria: { label: 'Which hand it is' } },
+      ...SIDES.map(([value, text]) => el('option', { value }, text)),
+    );
+    this.words = el('p.camera-words', { role: 'status' });
+    this.options = el(
+      'p.camera-options',
+      { hidden: true },
+      this.device,
+      el('label', {}, 'hand: ', this.side),
+    );
+    this.element = el(
+      'section.camera',
+      { hidden: true, aria: { label: 'Camera' } },
+      el('h2', {}, 'No glove?'),
+      this.button,
+      el('p.camera-consent', {}, `${CONSENT} Experimental.`),
+      this.options,
+      this.preview,
+      this.words,
+    );
+    this.device.onchange = () => this.#start();
+    this.camera = new Camera(this.video, {
+      found: (found) => this.#found(found),
+      ended: (sentence) => this.#show(sentence),
+    });
+    document.addEventListener('visibilitychange', () => document.hidden && this.stop(HIDDEN));
+    addEventListener('pagehide', () => this.stop());
+  }
+
+  // hello: the bridge's greeting; null while there is no connection.
+  update(hello, readOnly) {
+    if (hello) this.element.hidden = !hello.camera || !navigator.mediaDevices;
+    this.readOnly = readOnly;
+    this.button.disabled = readOnly !== '';
+    this.button.title = readOnly;
+    if (readOnly) this.stop(readOnly);
+  }
+
+  // The bridge does not pass the hands on.
+  told({ refusal }) {
+    this.#refusal = refusal;
+    setTimeout(() => this.#refusal === refusal && (this.#refusal = ''), 2 * SECOND_MS);
+  }
+
+  toggle() {
+    if (this.camera.running) this.stop('');
+    else this.#start();
+  }
+
+  stop(sentence = '') {
+    if (!this.camera.running) return;
+    this.camera.stop();
+    this.#show(sentence);
+  }
+
+  async #start() {
+    this.#said = '';
+    this.#refusal = '';
+    this.frames = 0;
+    this.found = 0;
+    write(this.words, LOADING);
+    this.button.disabled = true;
+    try {
+      await this.camera.start(this.device.value);
+      await this.#listDevices();
+      this.#show(LOADING);
+    } catch (error) {
+      this.camera.stop();
+      this.#show(wordsOf(error));
+    }
+    this.button.disabled = this.readOnly !== '';
+  }
+
+  // Their names are known once a camera is in use.
+  async #listDevices() {
+    const chosen = this.device.value;
+    const all = await cameras();
+    this.device.replaceChildren(
+      ...all.map(({ deviceId, label }, i) =>
+        el('option', { value: deviceId }, label || `camera ${i + 1}`),
+      ),
+    );
+    if (chosen) this.device.value = chosen;
+    this.device.hidden = all.length < 2;
+  }
+
+  #show(sentence) {
+    const { running } = this.camera;
+    this.preview.hidden = !running;
+    this.options.hidden = !running;
+    write(this.button, running ? 'Stop the camera' : 'Use my camera');
+    write(this.words, sentence);
+  }
+
+  #found({ hands, time_ms }) {
+    const now_ms = performance.now();
+    this.frames += 1;
+    if (hands.length > 0) this.found += 1;
+    this.send(landmarksMessage(hands, { time_ms, now_ms, side: this.side.value }));
+    this.#draw(hands);
+    this.#times_ms = this.#times_ms.filter((then_ms) => now_ms - then_ms < SECOND_MS);
+    this.#times_ms.push(now_ms);
+    const rate = `${this.#times_ms.length} pictures a second, ${Math.round(now_ms - time_ms)} ms old`;
+    const sides = hands.map(({ side }) => side).join(' and ');
+    const words = this.#refusal || (sides ? `${sides}: ${rate}` : `${NO_HAND} (${rate})`);
+    if (words !== this.#said) write(this.words, words);
+    this.#said = words;
+  }
+
+  #draw(hands) {
+    const { canvas, video } = this;
+    if (canvas.width !== video.videoWidth) canvas.width = video.videoWidth;
+    if (canvas.height !== video.videoHeight) canvas.height = video.videoHeight;
+    const pen = canvas.getContext('2d');
+    pen.clearRect(0, 0, canvas.width, canvas.height);
+    pen.lineWidth = canvas.width / 160;
+    for (const { side, picture } of hands) {
+      pen.strokeStyle = side === 'left' ? '#e69f00' : '#56b4e9'; // Okabe and Ito
+      pen.beginPath();
+      for (const finger of FINGERS) {
+        finger.forEach((at, i) => {
+          const [x, y] = picture[at];
+          if (i === 0) pen.moveTo(x * canvas.width, y * canvas.height);
+          else pen.lineTo(x * canvas.width, y * canvas.height);
+        });
+      }
+      pen.stroke();
+    }
+  }
+}

@@ -1,0 +1,154 @@
+// "Use my camera" with a camera that shows a drawn hand: on a fake bridge, and (POSED=build/posed)
+// with the real daemon, whose stream it becomes.
+import assert from 'node:assert/strict';
+import { existsSync } from 'node:fs';
+import { after, before, test } from 'node:test';
+import { join } from 'node:path';
+import { FakeBridge, PAGE } from '../support/fake_bridge.mjs';
+import { FakeDaemon } from '../support/fake_daemon.mjs';
+import { RealDaemon, cameraConfig } from '../support/real_daemon.mjs';
+import { handFilm } from '../support/rendered_hand.mjs';
+import { launch, openPage, PATIENCE, withCamera } from '../support/browser.mjs';
+
+const skip = existsSync(join(PAGE, 'camera'))
+  ? false
+  : 'SKIPPED without build/viewer/camera (`./run page` makes it)';
+const options = { skip, timeout: 600000 };
+const ENOUGH = 40; // pictures
+
+let browser;
+before(async () => {
+  if (!skip) browser = await launch(withCamera(handFilm()));
+});
+after(() => browser?.close());
+
+// The page, and the addresses that it asked for elsewhere.
+async function opened(context, url) {
+  const page = await openPage(browser, 'about:blank');
+  page.foreign = [];
+  const own = new URL(url).origin;
+  page.on('request', (request) => {
+    const asked = request.url();
+    if (!asked.startsWith(own) && !/^(blob|data):/.test(asked)) page.foreign.push(asked);
+  });
+  await page.goto(url);
+  context.after(() => page.context().close());
+  return page;
+}
+
+const button = (page) => page.getByRole('button', { name: /my camera|the camera/ });
+const panelOf = (page) =>
+  page.evaluate(() => {
+    const { camera } = globalThis.posedPage;
+    return { running: camera.camera.running, frames: camera.frames, found: camera.found };
+  });
+const enough = (page, count) =>
+  page.waitForFunction((n) => globalThis.posedPage.camera.frames >= n, count, PATIENCE);
+// What happens to the camera's track, which the browser shows as a light.
+const keepTrack = (page) =>
+  page.evaluate(() => {
+    [globalThis.track] = globalThis.posedPage.camera.video.srcObject.getTracks();
+  });
+const trackState = (page) => page.evaluate(() => globalThis.track.readyState);
+
+test('the camera is used after a click, its hand is found and sent', options, async (context) => {
+  const bridge = await new FakeBridge(new FakeDaemon(), { camera: true }).start();
+  context.after(() => bridge.stop());
+  const page = await opened(context, bridge.url);
+  await button(page).waitFor(PATIENCE);
+  await page.getByText('The picture stays in this browser').waitFor(PATIENCE);
+  assert.deepEqual(await panelOf(page), { running: false, frames: 0, found: 0 });
+  await button(page).click();
+  await enough(page, ENOUGH);
+  await keepTrack(page);
+  const { frames, found } = await panelOf(page);
+  assert.ok(found >= 0.95 * frames, `${found} of ${frames}`);
+  const right = bridge.landmarks.filter(({ hands }) => hands[0]?.side === 'right').length;
+  assert.ok(right >= 0.9 * bridge.landmarks.length, `right ${right} of ${bridge.landmarks.length}`);
+  const [ages, first] = [
+    bridge.landmarks.map((message) => message.age_ms).sort((a, b) => a - b),
+    bridge.landmarks[0],
+  ];
+  assert.equal(first.version, 1);
+  assert.ok(first.hands.every(({ points }) => points.length === 63));
+  const rate =
+    (1e9 * (bridge.landmarks.length - 1)) / (bridge.landmarks.at(-1).time_ns - first.time_ns);
+  context.diagnostic(`found ${found} of ${frames}, right ${right}, ${rate.toFixed(1)} a second`);
+  context.diagnostic(`age p50 ${ages[ages.length >> 1]} p95 ${ages[(ages.length * 0.95) | 0]} ms`);
+  await page.locator('.camera').screenshot({ path: join(PAGE, '../camera.png') });
+  await button(page).click();
+  assert.equal(await trackState(page), 'ended');
+  const sent = bridge.landmarks.length;
+  await page.waitForTimeout(500);
+  assert.equal(bridge.landmarks.length, sent);
+  assert.deepEqual(page.foreign, []);
+  assert.deepEqual(page.errors, []);
+});
+
+test('a hidden page stops the camera, a page that may only look has none', options, async (context) => {
+  const bridge = await new FakeBridge(new FakeDaemon(), { camera: true }).start();
+  context.after(() => bridge.stop());
+  const page = await opened(context, bridge.url);
+  await button(page).click();
+  await enough(page, 1);
+  await keepTrack(page);
+  await page.evaluate(() => {
+    Object.defineProperty(document, 'hidden', { value: true, configurable: true });
+    document.dispatchEvent(new Event('visibilitychange'));
+    delete document.hidden;
+  });
+  assert.equal(await trackState(page), 'ended');
+  await page.getByText('stopped, because the page was hidden').waitFor(PATIENCE);
+  await button(page).click();
+  await enough(page, 1);
+  await keepTrack(page);
+  bridge.say({ type: 'control', may_control: false, read_only_reason: 'only looking' });
+  await page.waitForFunction(() => globalThis.track.readyState === 'ended', undefined, PATIENCE);
+  assert.ok(await button(page).isDisabled());
+});
+
+test('without its files the page offers no camera', options, async (context) => {
+  const bridge = await new FakeBridge(new FakeDaemon()).start();
+  context.after(() => bridge.stop());
+  const page = await opened(context, bridge.url);
+  await page.locator('.link[data-tone="good"]').waitFor(PATIENCE);
+  assert.ok(await page.locator('.camera').isHidden());
+});
+
+test(
+  "the camera's hand becomes a stream of the daemon",
+  { ...options, skip: skip || (process.env.POSED ? false : 'SKIPPED without POSED') },
+  async (context) => {
+    const daemon = new RealDaemon(process.env.POSED, cameraConfig);
+    await daemon.start();
+    context.after(() => daemon.stop());
+    const page = await opened(context, await daemon.view(PAGE));
+    await button(page).click();
+    await enough(page, 1);
+    const began_ms = performance.now();
+    await page.waitForFunction(
+      () => globalThis.posedPage.store.streams.get('camera-right')?.drawable,
+      undefined,
+      PATIENCE,
+    );
+    context.diagnostic(`first hand to stream ${Math.round(performance.now() - began_ms)} ms`);
+    await enough(page, ENOUGH);
+    const pace = await page.evaluate(
+      () =>
+        new Promise((done) => {
+          let count = 0;
+          const began = performance.now();
+          const next = (now) => {
+            count += 1;
+            if (now - began < 2000) requestAnimationFrame(next);
+            else done((1000 * count) / (now - began));
+          };
+          requestAnimationFrame(next);
+        }),
+    );
+    context.diagnostic(`page ${pace.toFixed(0)} animation frames a second`);
+    await page.screenshot({ path: join(PAGE, '../camera_page.png') });
+    assert.deepEqual(page.foreign, []);
+    assert.deepEqual(page.errors, []);
+  },
+);
