@@ -66,7 +66,7 @@ function capsulesOf(shape, { bend, spread, turn }) {
     let at = base;
     let before = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]; // prettier-ignore
     for (let j = 0; j < 3; j += 1) {
-      const angles = f === 0 ? [j && 30 * bend, 0, j ? 0 : 30 * bend] : [75 * bend, 0, 0];
+      const angles = f === 0 ? [j && 45 * bend, 0, j ? 0 : 60 * bend] : [75 * bend, 0, 0];
       if (j === 0) angles[1] = f === 0 ? 15 : [0, 1, 0, 1, 1.6][f] * spread;
       const sign = f > 2 ? -1 : 1; // ring and little spread the other way
       const channel = j === 0 ? root : frame;
@@ -86,7 +86,8 @@ function capsulesOf(shape, { bend, spread, turn }) {
     if (i > 0) put(knuckles[i - 1], knuckle, 10, 10);
   }
   put([14, -6, 12], shape[0].base, 13, 13);
-  put(shape[0].base, [24, -3, 70], 13, 9); // the ball of the thumb
+  put([16, -14, 22], [20, -12, 58], 15, 11); // the balls of thumb and hand: which side is the palm
+  put([-22, -9, 22], [-29, -9, 62], 14, 11);
   put([0, -2, 8], [0, -4, -130], 21, 27); // the forearm
   return all;
 }
@@ -146,7 +147,7 @@ function picture(shape, i) {
   const phase = (2 * Math.PI * i) / FRAMES;
   const turn = product(rotation('y', 12 * Math.sin(phase)), rotation('z', 6 * Math.cos(phase)));
   const capsules = capsulesOf(shape, {
-    bend: 0.4 * (0.5 - 0.5 * Math.cos(phase)),
+    bend: 0.2 + 0.35 * (0.5 - 0.5 * Math.cos(phase)),
     spread: 9,
     turn,
   });
