@@ -1,5 +1,5 @@
-# What `cmake --install` puts where. The components posed, dev and python are the packages posed, libposed-dev and
-# python3-posed (package.cmake); posed-mpi is in none of them, so that nobody has to install MPI.
+# What `cmake --install` puts where. The components posed, camera, dev and python are the packages posed,
+# posed-camera, libposed-dev and python3-posed (package.cmake); posed-mpi is in none of them, so that nobody has to install MPI.
 include(GNUInstallDirs)
 set(POSED_PYTHON_DIR lib/python3/dist-packages CACHE STRING "Where the Python client is installed, below the prefix")
 
@@ -41,7 +41,10 @@ install_files(posed share/posed/config/metrics ${config}/metrics/README.md ${con
   ${config}/metrics/dashboard.json ${config}/metrics/prometheus.yml)
 install_tree(posed lib/udev/rules.d ${config}/udev *.rules)
 install_tree(posed lib/systemd/system ${config}/systemd *.service)
-install_tree(posed share/posed/viewer ${CMAKE_SOURCE_DIR}/build/viewer *)  # by `./run page`; without it, none
+# Both by `./run page`; without it, none. What finds hands in a camera's picture is a package of its own.
+install(DIRECTORY ${CMAKE_SOURCE_DIR}/build/viewer/ DESTINATION share/posed/viewer COMPONENT posed OPTIONAL
+  PATTERN camera EXCLUDE)
+install_tree(camera share/posed/viewer/camera ${CMAKE_SOURCE_DIR}/build/viewer/camera *)
 if(TARGET posed-mpi)
   install(TARGETS posed-mpi DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT mpi)
 endif()

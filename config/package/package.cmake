@@ -1,4 +1,4 @@
-# Debian packages by CPack (`./run package`): posed, libposed-dev and python3-posed, one for each component of
+# Debian packages by CPack (`./run package`): posed, posed-camera, libposed-dev and python3-posed, one for each component of
 # install.cmake. What a package has beyond `cmake --install` is in debian/.
 set(POSED_MAINTAINER "The posed authors <posed@example.org>" CACHE STRING
   "Name and address in the packages; whoever gives them to others names their own")
@@ -6,7 +6,7 @@ set(debian ${CMAKE_CURRENT_LIST_DIR}/debian)
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_CONTACT ${POSED_MAINTAINER})
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "")  # each package has its own, the first line of its description
-set(CPACK_COMPONENTS_ALL posed dev python)
+set(CPACK_COMPONENTS_ALL posed camera dev python)
 set(CPACK_COMPONENTS_GROUPING IGNORE)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
@@ -22,7 +22,7 @@ set(CPACK_DEBIAN_POSED_PACKAGE_NAME posed)
 set(CPACK_DEBIAN_POSED_PACKAGE_SECTION utils)
 set(CPACK_DEBIAN_POSED_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_POSED_PACKAGE_DEPENDS adduser)
-set(CPACK_DEBIAN_POSED_PACKAGE_SUGGESTS "ffmpeg, librsvg2-bin, python3-posed, xdg-utils")
+set(CPACK_DEBIAN_POSED_PACKAGE_SUGGESTS "ffmpeg, librsvg2-bin, posed-camera, python3-posed, xdg-utils")
 set(CPACK_DEBIAN_POSED_PACKAGE_CONTROL_EXTRA ${debian}/posed/postinst ${debian}/posed/prerm
   ${debian}/posed/postrm)
 set(CPACK_DEBIAN_POSED_DESCRIPTION "pose daemon: live poses in, another style out
@@ -30,6 +30,14 @@ posed receives live poses from data gloves and motion capture systems,
 changes their style, smooths them and publishes them over ZeroMQ. The style
 is learned from a few clips of two groups. It shows the streams in a web
 page, records and replays them, and performs gestures on a hand.")
+
+set(CPACK_DEBIAN_CAMERA_PACKAGE_NAME posed-camera)
+set(CPACK_DEBIAN_CAMERA_PACKAGE_SECTION utils)
+set(CPACK_DEBIAN_CAMERA_PACKAGE_ARCHITECTURE all)
+set(CPACK_DEBIAN_CAMERA_PACKAGE_DEPENDS posed)
+set(CPACK_DEBIAN_CAMERA_DESCRIPTION "hands from a webcam for the page of posed
+MediaPipe Hands, with which the page that posed view serves finds hands in
+the picture of a camera, in the browser.")
 
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libposed-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
@@ -64,6 +72,7 @@ function(package_documents component package)
 endfunction()
 if(POSED_PACKAGE)
   package_documents(posed posed)
+  package_documents(camera posed-camera)
   package_documents(dev libposed-dev)
   package_documents(python python3-posed)
 endif()

@@ -3,6 +3,8 @@
 #include <catch2/catch.hpp>
 
 #include <cmath>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 #include <numbers>
 #include <random>
@@ -14,7 +16,9 @@
 #include "drivers/landmarks/protocol.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "tests/support/allocations.hpp"
+#include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
+#include "tests/unit/drivers/recorded_log.hpp"
 
 namespace posed::drivers::landmarks {
 namespace {
@@ -241,6 +245,38 @@ TEST_CASE(
   CHECK_FALSE(rig.driver.make_layout(std::array{std::byte{0}}));
   CHECK_FALSE(rig.driver.make_layout(std::array{std::byte{4}}));
   CHECK_FALSE(rig.driver.make_layout(std::array{std::byte{1}, std::byte{1}}));
+}
+
+namespace {
+
+// A hand that comes before it is described, both hands, damage, times, and a hand that leaves.
+std::string emulated_log() {
+  std::string text =
+      "# Not a recording: made by posed's emulator of a hand tracker, with damage put in.\n"
+      "driver landmarks\nidentity udp 127.0.0.1:7420\ntext landmarks rate=10\n";
+  LandmarksEmulator emulator(10.0);
+  emulator.set_seen(0, false);
+  for (int i = 0; i <= 16; ++i) {
+    const std::int64_t at_ns = 1'000'000 + i * 100'000'000;
+    if (i == 4 || i == 12) emulator.set_seen(0, i == 4);
+    Bytes bytes;
+    emulator.emit(emulator.next_due_ns(), bytes);
+    if (i == 9) bytes[300] = std::byte{'x'};
+    if (i == 10) bytes.resize(bytes.size() / 2);
+    if (i == 11) bytes[31] = std::byte{'2'};  // the version
+    text += test::recorded_row(at_ns, "hex", bytes);
+    if (i == 13) text += test::recorded_row(at_ns, "hex", bytes);
+    if (i == 2) text += test::recorded_row(at_ns, "bodies", std::array{std::byte{2}});
+    if (i == 6) text += test::recorded_row(at_ns, "bodies", std::array{std::byte{3}});
+  }
+  return text;
+}
+
+}  // namespace
+
+TEST_CASE("write the log of the emulated hand tracker", "[.write-logs]") {
+  const auto path = test::golden("devices") / "landmarks.log";
+  if (!std::filesystem::exists(path)) std::ofstream(path) << emulated_log();
 }
 
 }  // namespace posed::drivers::landmarks
