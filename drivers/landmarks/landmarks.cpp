@@ -109,7 +109,6 @@ RT_SAFE Outcome LandmarksDecoder::emit(const TrackedHand& hand, Sink& sink) noex
   Frame frame;
   set_hand_angles(*layout_->bodies[body].skeleton, angles, frame);
   frame.header.device_ns = clock_.device_ns();
-  frame.lag_ms = message_.age_ms;
   sink.frame(body, frame);
   return Outcome::kOk;
 }

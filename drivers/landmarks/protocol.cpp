@@ -116,10 +116,6 @@ RT_SAFE void read_member(JsonReader& json, std::string_view key, Head& head,
     head.version = number_or(json, 0.0);
   } else if (key == "time_ns") {
     message.time_s = number_or(json, kNone) * 1e-9;
-  } else if (key == "age_ms") {
-    const double age_ms = number_or(json, kNone);
-    head.in_range = head.in_range && age_ms >= 0.0 && age_ms <= kMaxAge_ms;  // false for NaN
-    message.age_ms = narrow(age_ms);
   } else if (key == "hands") {
     head.in_range = read_hands(json, message) && head.in_range;
   } else {
@@ -133,7 +129,6 @@ RT_SAFE Outcome read_message(std::string_view json, Message& message) noexcept {
   if (json.size() > kMaxMessage) return Outcome::kOutOfRange;
   JsonReader reader(json);
   message.time_s = kNone;
-  message.age_ms = 0.0F;
   message.count = 0;
   Head head;
   if (!reader.enter_object()) return Outcome::kForeign;
@@ -148,9 +143,7 @@ RT_SAFE Outcome read_message(std::string_view json, Message& message) noexcept {
 
 std::string write_message(const Message& message) {
   std::string text = R"({"posed":"landmarks","version":1,"time_ns":)" +
-                     std::to_string(std::llround(message.time_s * 1e9)) +
-                     ",\"age_ms\":" + clip::number_text(static_cast<double>(message.age_ms)) +
-                     ",\"hands\":[";
+                     std::to_string(std::llround(message.time_s * 1e9)) + ",\"hands\":[";
   for (std::size_t i = 0; i < message.count; ++i) {
     const TrackedHand& hand = message.hands[i];
     text += std::string(i == 0 ? "" : ",") + R"({"side":")" +

@@ -2,12 +2,11 @@
 // format is posed's own, so that any program with landmarks of hands can send them: a page with a
 // webcam, OpenXR, Leap Motion, a script. No I/O here; README.md has an example.
 //
-//   {"posed": "landmarks", "version": 1, "time_ns": 1234567890, "age_ms": 111,
+//   {"posed": "landmarks", "version": 1, "time_ns": 1234567890,
 //    "hands": [{"side": "right", "score": 0.97, "points": [x0, y0, z0, ... x20, y20, z20]}]}
 //
 //    time_ns   when the picture was taken, on a clock of the sender's own; without it the arrival
 //              counts. The same time again is a duplicate, up to 0.25 s before it is late
-//    age_ms    how old the picture was when this was sent, 0 to 1000; without it 0
 //    hands     at most two, no side twice; an empty list: no hand is seen
 //    side      the person's own hand, "left" or "right"
 //    score     0 to 1, how sure the tracker is; without it 1. Below kMinScore no hand is seen
@@ -37,7 +36,6 @@ inline constexpr std::size_t kLandmarks = 21;
 inline constexpr std::size_t kMaxHands = 2;
 inline constexpr std::size_t kMaxMessage = 16 * 1024;  // bytes; two hands with all digits have 3 KB
 inline constexpr double kMinScore = 0.5;
-inline constexpr double kMaxAge_ms = 1000.0;
 // Length of a hand, from the wrist along the middle finger to its tip.
 inline constexpr double kMinHand_m = 0.05;
 inline constexpr double kMaxHand_m = 0.30;
@@ -55,7 +53,6 @@ struct TrackedHand {
 
 struct Message {
   double time_s = 0.0;  // NaN if it has none
-  float age_ms = 0.0F;
   std::array<TrackedHand, kMaxHands> hands{};
   std::size_t count = 0;
 };

@@ -19,13 +19,12 @@ export function handsOf(found) {
 const rounded = (value, digits) => Number(value.toFixed(digits));
 
 // The message to posed (drivers/landmarks/README.md). `side`: the user's own word, or ''.
-export function landmarksMessage(hands, { time_ms, now_ms, side = '' }) {
+export function landmarksMessage(hands, { time_ms, side = '' }) {
   const sent = side === '' ? hands : best(hands).map((hand) => ({ ...hand, side }));
   return {
     posed: 'landmarks',
     version: 1,
     time_ns: Math.round(time_ms * 1e6),
-    age_ms: rounded(Math.min(1000, Math.max(0, now_ms - time_ms)), 1),
     hands: sent.map((hand) => ({
       side: hand.side,
       score: rounded(hand.score, 3),

@@ -9,6 +9,7 @@ const LOADING = 'loading what finds hands (13 MB, once)';
 const NO_HAND = 'no hand is seen: hold one up, palm to the camera';
 const HIDDEN = 'stopped, because the page was hidden';
 const SECOND_MS = 1000;
+const KEPT_AGES = 100;
 const FINGERS = [0, 1, 2, 3, 4].map((f) => [0, 1, 2, 3, 4].map((j) => (j ? 4 * f + j : 0)));
 const SIDES = [
   ['', 'as seen'],
@@ -21,8 +22,10 @@ export class CameraPanel {
   #times_ms = []; // of the pictures of the last second
   #said = '';
   readOnly = '';
+  // Of the pictures since the start; the ages are those of the last ones.
   frames = 0;
   found = 0;
+  ages_ms = [];
 
   // send(message): gives it to posed
   constructor(send) {
@@ -132,7 +135,8 @@ export class CameraPanel {
     const now_ms = performance.now();
     this.frames += 1;
     if (hands.length > 0) this.found += 1;
-    this.send(landmarksMessage(hands, { time_ms, now_ms, side: this.side.value }));
+    this.ages_ms = [...this.ages_ms, now_ms - time_ms].slice(-KEPT_AGES);
+    this.send(landmarksMessage(hands, { time_ms, side: this.side.value }));
     this.#draw(hands);
     this.#times_ms = this.#times_ms.filter((then_ms) => now_ms - then_ms < SECOND_MS);
     this.#times_ms.push(now_ms);
