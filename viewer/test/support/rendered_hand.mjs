@@ -36,7 +36,7 @@ const frameOf = ([x, y, z]) =>
   product(product(rotation('y', y), rotation('x', x)), rotation('z', z));
 
 // The right hand's fingers, in mm and degrees, from the file that posed reads.
-function readShape() {
+export function readShape() {
   const text = readFileSync(join(ROOT, 'config/hands/adult.toml'), 'utf8');
   return FINGERS.map((name) => {
     const part = text.split(`[${name}]`)[1].split(/\n\[[a-z]/)[0];
@@ -56,8 +56,9 @@ function readShape() {
 }
 
 // Capsules [from, to, radius from, radius to] in mm, before the camera (x right, y down, z away):
-// `bend` closes the fingers, 0 to 1; `turn` is the camera's view of the palm.
-function capsulesOf(shape, { bend, spread, turn }) {
+// `angles` are degrees [finger][joint] [flexion, spread, twist] of hand45; `turn` is the camera's view
+// of the palm.
+function capsulesOf(shape, { angles: hand, turn }) {
   const all = [];
   const view = product(turn, [[1, 0, 0], [0, 0, -1], [0, 1, 0]]); // prettier-ignore
   const put = (from, to, r0, r1) => all.push([times(view, from), times(view, to), r0, r1]);
@@ -66,8 +67,7 @@ function capsulesOf(shape, { bend, spread, turn }) {
     let at = base;
     let before = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]; // prettier-ignore
     for (let j = 0; j < 3; j += 1) {
-      const angles = f === 0 ? [j && 45 * bend, 0, j ? 0 : 60 * bend] : [75 * bend, 0, 0];
-      if (j === 0) angles[1] = f === 0 ? 15 : [0, 1, 0, 1, 1.6][f] * spread;
+      const angles = hand[f][j];
       const sign = f > 2 ? -1 : 1; // ring and little spread the other way
       const channel = j === 0 ? root : frame;
       const own = product(
@@ -143,14 +143,25 @@ function lit(capsules, p) {
   return [235 * light, 178 * light, 148 * light];
 }
 
-function picture(shape, i) {
+// A hand that closes a little and opens, `bend` 0 to 1.
+function closing(bend) {
+  const finger = (spread) => [0, 1, 2].map((j) => [75 * bend, j === 0 ? spread : 0, 0]);
+  const thumb = [0, 1, 2].map((j) => (j === 0 ? [0, 15, 60 * bend] : [45 * bend, 0, 0]));
+  return [thumb, finger(9), finger(0), finger(9), finger(14)];
+}
+
+export const view = (y_deg, z_deg) => product(rotation('y', y_deg), rotation('z', z_deg));
+
+function poseOf(i) {
   const phase = (2 * Math.PI * i) / FRAMES;
-  const turn = product(rotation('y', 12 * Math.sin(phase)), rotation('z', 6 * Math.cos(phase)));
-  const capsules = capsulesOf(shape, {
-    bend: 0.2 + 0.35 * (0.5 - 0.5 * Math.cos(phase)),
-    spread: 9,
-    turn,
-  });
+  return {
+    angles: closing(0.2 + 0.35 * (0.5 - 0.5 * Math.cos(phase))),
+    turn: view(12 * Math.sin(phase), 6 * Math.cos(phase)),
+  };
+}
+
+export function picture(shape, pose) {
+  const capsules = capsulesOf(shape, pose);
   const rgb = [];
   for (let y = 0; y < HEIGHT; y += 1)
     for (let x = 0; x < WIDTH; x += 1) rgb.push(shade(capsules, x, y));
@@ -176,12 +187,12 @@ function yuv(rgb) {
   return bytes;
 }
 
-// The film's file, made once.
-export function handFilm(file = FILM) {
+// The film's file, made once. `poses`: of its pictures.
+export function handFilm(file = FILM, poses = Array.from({ length: FRAMES }, (_, i) => poseOf(i))) {
   if (existsSync(file)) return file;
   const shape = readShape();
   const parts = [`YUV4MPEG2 W${WIDTH} H${HEIGHT} F${RATE_HZ}:1 Ip A1:1 C420jpeg\n`];
-  for (let i = 0; i < FRAMES; i += 1) parts.push('FRAME\n', yuv(picture(shape, i)));
+  for (const pose of poses) parts.push('FRAME\n', yuv(picture(shape, pose)));
   mkdirSync(dirname(file), { recursive: true });
   writeFileSync(`${file}.part`, Buffer.concat(parts.map((part) => Buffer.from(part))));
   renameSync(`${file}.part`, file);
