@@ -21,6 +21,7 @@ export class CameraPanel {
   #refusal = '';
   #times_ms = []; // of the pictures of the last second
   #said = '';
+  #starting = false;
   readOnly = '';
   // Of the pictures since the start; the ages are those of the last ones.
   frames = 0;
@@ -68,7 +69,7 @@ export class CameraPanel {
 
   // hello: the bridge's greeting; null while there is no connection.
   update(hello, readOnly) {
-    if (hello) this.element.hidden = !hello.camera || !navigator.mediaDevices;
+    if (hello) this.element.hidden = !hello.camera || !hello.same_machine || !navigator.mediaDevices;
     this.readOnly = readOnly;
     this.button.disabled = readOnly !== '';
     this.button.title = readOnly;
@@ -87,8 +88,8 @@ export class CameraPanel {
   }
 
   stop(sentence = '') {
-    if (!this.camera.running) return;
-    this.camera.stop();
+    if (!this.camera.running && !this.#starting) return;
+    this.camera.stop(); // also while the browser asks the user
     this.#show(sentence);
   }
 
@@ -99,14 +100,18 @@ export class CameraPanel {
     this.found = 0;
     write(this.words, LOADING);
     this.button.disabled = true;
+    this.#starting = true;
     try {
       await this.camera.start(this.device.value);
-      await this.#listDevices();
-      this.#show(LOADING);
+      if (this.camera.running) {
+        this.#show(LOADING);
+        await this.#listDevices();
+      }
     } catch (error) {
       this.camera.stop();
       this.#show(wordsOf(error));
     }
+    this.#starting = false;
     this.button.disabled = this.readOnly !== '';
   }
 

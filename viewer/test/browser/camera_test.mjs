@@ -98,6 +98,17 @@ test('a hidden page stops the camera, a page that may only look has none', optio
   });
   assert.equal(await trackState(page), 'ended');
   await page.getByText('stopped, because the page was hidden').waitFor(PATIENCE);
+  // While the browser asks, too.
+  const asked = await page.evaluate(async () => {
+    const { camera } = globalThis.posedPage;
+    camera.toggle();
+    camera.stop('enough');
+    await new Promise((done) => {
+      setTimeout(done, 2000);
+    });
+    return { running: camera.camera.running, words: camera.words.textContent };
+  });
+  assert.deepEqual(asked, { running: false, words: 'enough' });
   await button(page).click();
   await enough(page, 1);
   await keepTrack(page);
