@@ -114,7 +114,27 @@ const FOCAL = 1.05 * WIDTH;
 const UP = 70; // the middle of the hand above the wrist
 const LIGHT = unit([-0.4, -0.6, -0.75]);
 
-function shade(capsules, x, y) {
+// A circle of the picture that holds all of the capsule.
+function shadowOf([from, to, r0, r1]) {
+  const [a, b] = [from, to].map(([x, y, z]) => {
+    const scale = FOCAL / (z + AWAY);
+    return [WIDTH / 2 + scale * x, HEIGHT / 2 + scale * (y + UP), scale];
+  });
+  const reach = Math.hypot(a[0] - b[0], a[1] - b[1]) / 2;
+  const round = 1.15 * Math.max(a[2], b[2]) * (Math.max(r0, r1) + BLEND);
+  return { x: (a[0] + b[0]) / 2, y: (a[1] + b[1]) / 2, squared: (reach + round) ** 2 };
+}
+
+const wall = (x, y) => {
+  const grey = 150 + 40 * (y / HEIGHT) + 12 * Math.sin(x / 37);
+  return [grey, grey * 1.02, grey * 1.06];
+};
+
+function shade(all, shadows, x, y) {
+  const capsules = all.filter(
+    (_, i) => (shadows[i].x - x) ** 2 + (shadows[i].y - y) ** 2 < shadows[i].squared,
+  );
+  if (capsules.length === 0) return wall(x, y);
   const ray = unit([(x - WIDTH / 2) / FOCAL, (y - HEIGHT / 2) / FOCAL, 1]);
   const origin = [0, -UP, -AWAY];
   let far = AWAY - 160;
@@ -124,8 +144,7 @@ function shade(capsules, x, y) {
     if (d < 0.3) return lit(capsules, p);
     far += d;
   }
-  const wall = 150 + 40 * (y / HEIGHT) + 12 * Math.sin(x / 37);
-  return [wall, wall * 1.02, wall * 1.06];
+  return wall(x, y);
 }
 
 function lit(capsules, p) {
@@ -162,9 +181,10 @@ function poseOf(i) {
 
 export function picture(shape, pose) {
   const capsules = capsulesOf(shape, pose);
+  const shadows = capsules.map(shadowOf);
   const rgb = [];
   for (let y = 0; y < HEIGHT; y += 1)
-    for (let x = 0; x < WIDTH; x += 1) rgb.push(shade(capsules, x, y));
+    for (let x = 0; x < WIDTH; x += 1) rgb.push(shade(capsules, shadows, x, y));
   return rgb;
 }
 
