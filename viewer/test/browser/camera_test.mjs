@@ -1,7 +1,8 @@
 // "Use my camera" with a camera that shows a drawn hand: on a fake bridge, and (POSED=build/posed)
 // with the real daemon, whose stream it becomes.
 import assert from 'node:assert/strict';
-import { existsSync } from 'node:fs';
+import { existsSync, readFileSync } from 'node:fs';
+import { createRequire } from 'node:module';
 import { after, before, test } from 'node:test';
 import { join } from 'node:path';
 import { FakeBridge, PAGE } from '../support/fake_bridge.mjs';
@@ -15,6 +16,7 @@ const skip = existsSync(join(PAGE, 'camera'))
   : 'SKIPPED without build/viewer/camera (`./run page` makes it)';
 const options = { skip, timeout: 600000 };
 const ENOUGH = 40; // pictures
+const AXE = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 
 let browser;
 before(async () => {
@@ -64,7 +66,7 @@ test('the camera is used after a click, its hand is found and sent', options, as
   const { frames, found } = await panelOf(page);
   assert.ok(found >= 0.95 * frames, `${found} of ${frames}`);
   const right = bridge.landmarks.filter(({ hands }) => hands[0]?.side === 'right').length;
-  assert.ok(right >= 0.9 * bridge.landmarks.length, `right ${right} of ${bridge.landmarks.length}`);
+  assert.ok(right >= 0.8 * bridge.landmarks.length, `right ${right} of ${bridge.landmarks.length}`);
   const [first] = bridge.landmarks;
   const ages = await page.evaluate(() => globalThis.posedPage.camera.ages_ms.map(Math.round));
   ages.sort((a, b) => a - b);
@@ -74,6 +76,9 @@ test('the camera is used after a click, its hand is found and sent', options, as
     (1e9 * (bridge.landmarks.length - 1)) / (bridge.landmarks.at(-1).time_ns - first.time_ns);
   context.diagnostic(`found ${found} of ${frames}, right ${right}, ${rate.toFixed(1)} a second`);
   context.diagnostic(`age p50 ${ages[ages.length >> 1]} p95 ${ages[(ages.length * 0.95) | 0]} ms`);
+  await page.evaluate(AXE);
+  const faults = await page.evaluate(async () => (await globalThis.axe.run('.camera')).violations);
+  assert.deepEqual(faults, []);
   await page.locator('.camera').screenshot({ path: join(PAGE, '../camera.png') });
   await button(page).click();
   assert.equal(await trackState(page), 'ended');

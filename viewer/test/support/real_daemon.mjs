@@ -46,6 +46,8 @@ endpoint = "${control}"
 name = "camera"
 driver = "landmarks"
 streams = "all"
+stale_after_s = 2.0
+[source.generate]
 `;
 
 // The endpoint of a port that is free now; a daemon that restarts needs the same again.
