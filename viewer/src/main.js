@@ -79,7 +79,7 @@ class Page {
     );
     this.takes = new Takes(find('.takes'), control);
     this.camera = new CameraPanel((message) => this.connection.sendText(message));
-    find('.side').append(this.camera.element);
+    find('.streams').after(this.camera.element);
     this.help = new Help(find('#help'), find('#help-button'));
     this.avatars = new Avatars(
       world,
