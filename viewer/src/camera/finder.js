@@ -4,7 +4,7 @@
 // what it needs of a page.
 //
 // From the page: {picture: ImageBitmap, time_ms}. To it: {ready}, {time_ms, hands}, {error}.
-import { handsOf } from './hands_of.js';
+import { HandFinder } from './hands_of.js';
 
 const FOLDER = '/camera/';
 
@@ -28,6 +28,7 @@ self.document = {
 };
 
 const LITE = 0;
+const hands = new HandFinder();
 let results = null;
 
 async function start() {
@@ -60,7 +61,7 @@ self.onmessage = async ({ data: { picture, time_ms } }) => {
     const one = await finder;
     await one.send({ image: picture });
     results?.image?.close?.();
-    self.postMessage({ time_ms, hands: handsOf(results) });
+    self.postMessage({ time_ms, hands: hands.handsOf(results) });
   } catch (error) {
     self.postMessage({ error: String(error?.message ?? error) });
   } finally {

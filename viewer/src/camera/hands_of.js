@@ -2,18 +2,42 @@
 
 const flat = (points) => points.flatMap(({ x, y, z }) => [x, y, z]);
 
-// [{side, score, points: 63 metres (x right, y down, z away), picture: 21 [x, y] of 0 to 1}]
-export function handsOf(found) {
-  const best = new Map();
-  (found?.multiHandWorldLandmarks ?? []).forEach((points, i) => {
-    const { label, score } = found.multiHandedness[i];
-    // It is made for mirrored pictures, as those of a selfie: there a left hand looks like a right.
-    const side = label === 'Left' ? 'right' : 'left';
-    if (points.length !== 21 || (best.get(side)?.score ?? 0) >= score) return;
-    const picture = found.multiHandLandmarks[i].map(({ x, y }) => [x, y]);
-    best.set(side, { side, score: Math.min(1, score), points: flat(points), picture });
-  });
-  return [...best.values()];
+const NEAR = 0.25; // of the picture: the wrist of the same hand in the next one
+const KEPT = 0.9; // of the votes before
+
+// Keeps hands apart from picture to picture: which side a hand is, many pictures decide, because a
+// single one is often wrong.
+export class HandFinder {
+  #before = []; // [{wrist, vote}]: above 0 it is a right hand
+
+  // [{side, score, points: 63 metres (x right, y down, z away), picture: 21 [x, y] of 0 to 1}], at
+  // most one a side: the surer one.
+  handsOf(found) {
+    const seen = (found?.multiHandWorldLandmarks ?? []).flatMap((points, i) => {
+      const picture = found.multiHandLandmarks[i].map(({ x, y }) => [x, y]);
+      const { label, score } = found.multiHandedness[i];
+      if (points.length !== 21) return [];
+      // It is made for mirrored pictures, as those of a selfie: there a left hand looks like a right.
+      const vote = (label === 'Left' ? score : -score) + KEPT * this.#voteNear(picture[0]);
+      return [{ vote, score: Math.min(1, score), points: flat(points), picture }];
+    });
+    this.#before = seen.map(({ vote, picture }) => ({ vote, wrist: picture[0] }));
+    const best = new Map();
+    for (const { vote, ...hand } of seen) {
+      const side = vote > 0 ? 'right' : 'left';
+      if ((best.get(side)?.score ?? 0) < hand.score) best.set(side, { side, ...hand });
+    }
+    return [...best.values()];
+  }
+
+  #voteNear([x, y]) {
+    let nearest = { distance: NEAR, vote: 0 };
+    for (const { wrist, vote } of this.#before) {
+      const distance = Math.hypot(wrist[0] - x, wrist[1] - y);
+      if (distance < nearest.distance) nearest = { distance, vote };
+    }
+    return nearest.vote;
+  }
 }
 
 const rounded = (value, digits) => Number(value.toFixed(digits));

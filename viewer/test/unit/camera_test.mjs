@@ -1,7 +1,8 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { handsOf, landmarksMessage } from '../../src/camera/hands_of.js';
+import { HandFinder, landmarksMessage } from '../../src/camera/hands_of.js';
 
+const handsOf = (found) => new HandFinder().handsOf(found);
 const points = (x) => Array.from({ length: 21 }, (_, i) => ({ x: x + i / 7, y: 0, z: -1e-9 }));
 const found = (...hands) => ({
   multiHandLandmarks: hands.map(() => points(0.5)),
@@ -21,6 +22,16 @@ test('of two hands of one side the surer one is sent', () => {
   const hands = handsOf(found(['Left', 0.7], ['Left', 0.9], ['Right', 0.6]));
   assert.deepEqual(hands.map(({ side, score }) => [side, score]), [['right', 0.9], ['left', 0.6]]); // prettier-ignore
   assert.equal(hands[0].points[0], 1);
+});
+
+test('which side a hand is, many pictures decide', () => {
+  const finder = new HandFinder();
+  const sides = (...labels) =>
+    labels.map((label) => finder.handsOf(found([label, 0.9]))[0]?.side ?? '');
+  assert.deepEqual(sides('Left', 'Left', 'Right', 'Left'), Array(4).fill('right'));
+  assert.equal(sides(...Array(8).fill('Right')).at(-1), 'left');
+  finder.handsOf(found());
+  assert.deepEqual(sides('Left'), ['right']); // another hand
 });
 
 test('the message has whole nanoseconds, micrometres and the side that the user chose', () => {
