@@ -77,9 +77,7 @@ class Page {
       { control, requests, acks },
       () => this.hello?.connect ?? '',
     );
-    this.takes = new Takes(find('.takes'), control);
-    this.camera = new CameraPanel((message) => this.connection.sendText(message));
-    find('.streams').after(this.camera.element);
+    this.takes = new Takes(find('.takes'), control, (...words) => acks.say(...words));
     this.help = new Help(find('#help'), find('#help-button'));
     this.avatars = new Avatars(
       world,
@@ -217,6 +215,7 @@ class Page {
     const { store } = this;
     const mains = store.main();
     if (!this.chosen || !mains.includes(this.chosen)) this.chosenName = mains[0]?.name ?? null;
+    this.world.choose(this.chosenName);
     this.list.update(this.chosen);
     this.panel.update(this.chosen, this.readOnly);
     this.takes.update(store.stats, this.readOnly);

@@ -12,11 +12,11 @@ export const TILES = [
     ({ stats }) => `${stats.rate_hz.toFixed(1)} Hz`,
   ],
   [
-    'In posed, half / 99 %',
-    'half and 99 % of the last second’s frames took at most this from arrival to handed out',
+    'Time in posed',
+    'the usual time of a frame from arrival to handed out; 99 % of the last second’s took at most the second one',
     ({ stats }) =>
       stats.publish?.p99_us > 0
-        ? `${ms(stats.publish.p50_us / 1000)} / ${ms(stats.publish.p99_us / 1000)}`
+        ? `${ms(stats.publish.p50_us / 1000)} (99 %: ${ms(stats.publish.p99_us / 1000)})`
         : '',
   ],
   [
@@ -39,7 +39,7 @@ export const TILES = [
   ],
   ['Jitter', 'how unevenly frames arrive', ({ stream }) => ms(stream.jitter.ms)],
   ['Dropped', 'frames that found a queue full', ({ stats }) => count(stats.dropped)],
-  ['Shed', 'frames skipped for newer ones', ({ stats }) => count(stats.shed)],
+  ['Skipped', 'frames skipped for newer ones', ({ stats }) => count(stats.shed)],
   [
     'Lost in the kernel',
     'datagrams that were not read in time',
@@ -54,12 +54,12 @@ export const TILES = [
         : '',
   ],
   [
-    'Device clock',
-    'the device’s clock beside the host’s: offset and drift',
+    'Clock drift',
+    'how much faster the device’s clock goes than this computer’s, in millionths',
     ({ stats }) =>
       stats.clock_offset_ns === undefined
         ? ''
-        : `${signed(stats.clock_offset_ns / 1e6, 1)} ms, ${signed(stats.clock_drift_ppm, 1)} ppm`,
+        : `${signed(stats.clock_drift_ppm, 1)} ppm`,
   ],
   [
     'Connected',

@@ -6,17 +6,18 @@ const KEYS = [
   ['↑ ↓', 'choose a stream'],
   ['← →', 'less or more style'],
   ['0', 'no style'],
-  ['1 – 5', 'view: follow, orbit, front, side, top'],
+  ['1 2', 'view: follow the chosen one, turn round it'],
+  ['3 4 5', 'view of everybody: front, side, top'],
   ['r', 'raw pose: beside, as ghost, off'],
   ['t', 'trails of the feet'],
   ['g', 'write gestures to perform; Enter plays them'],
-  ['s', 'start or end a take'],
+  ['s', 'start or end a take, while posed records'],
   ['d', 'dark or light'],
   ['?', 'this help'],
 ];
 
 const SEEN = [
-  ['Coloured figure', 'what posed publishes: styled, smoothed, performed'],
+  ['Coloured figure', 'what posed publishes: styled, smoothed, performed; each performer has a colour'],
   ['Grey, translucent figure', 'the raw pose, as it was captured'],
   ['Green ring', 'a foot that stands; prints stay where it stood'],
   ['Orange, purple, grey', 'a pose that is predicted, held or stale; the name says so, too'],

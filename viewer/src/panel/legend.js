@@ -1,9 +1,9 @@
-// What the colours mean: only those that are seen now.
-import { el } from './dom.js';
+// What the colours mean: only those that are seen now. First the performers, each in its own.
+import { el, write } from './dom.js';
+
+const MOST_NAMES = 6; // of more, colours come twice
 
 const ENTRIES = [
-  ['styled', 'styled by posed'],
-  ['shown', 'published by posed'],
   ['raw', 'raw, as captured'],
   ['contact', 'foot stands'],
   ['predicted', 'predicted'],
@@ -13,19 +13,39 @@ const ENTRIES = [
 ];
 const QUALITY = [null, 'predicted', 'held', 'stale'];
 
+// An avatar of one's own keeps its colours, whatever the pose says.
+const showsQuality = ({ avatar }) => !avatar || avatar.isPainted;
+
 function seen(world) {
   const keys = new Set();
-  for (const { stream, ghost, shown } of world.performers.values()) {
+  for (const performer of world.performers.values()) {
+    const { stream, ghost, shown } = performer;
     if (shown === false || !stream.drawable) continue;
     if (ghost) keys.add('raw');
-    else keys.add(stream.stage('style') ? 'styled' : 'shown');
     if (!stream.isHand && world.options.trails) keys.add('contact');
+    if (!showsQuality(performer)) continue;
     const performsAtRest = stream.pose.performed && stream.pose.quality === 2;
     if (QUALITY[stream.pose.quality] && !performsAtRest) keys.add(QUALITY[stream.pose.quality]);
     if (stream.partsWithoutValue()) keys.add('no-value');
   }
-  if (keys.has('styled')) keys.delete('shown');
   return keys;
+}
+
+// What posed did to the stream, in a word.
+function done({ stats, pose }) {
+  const names = new Set(stats?.stage.map(({ name }) => name));
+  if (names.has('style')) return 'styled';
+  if (pose.performed) return 'performed';
+  if (names.has('generate')) return 'smoothed';
+  return names.size > 0 ? 'cleaned' : 'as captured';
+}
+
+function performersOf(world) {
+  const mains = [...world.performers.values()].filter(
+    ({ ghost, stream, shown }) => !ghost && shown !== false && stream.drawable,
+  );
+  if (mains.length > MOST_NAMES) return [];
+  return mains.map(({ stream, colour }) => ({ text: `${stream.name}: ${done(stream)}`, colour }));
 }
 
 // Returns the function that keeps `list` right.
@@ -34,8 +54,24 @@ export function legend(list) {
     ENTRIES.map(([key, text]) => [key, el('li', { data: { key }, hidden: true }, text)]),
   );
   list.append(...items.values());
+  const own = [];
+  const grow = () => {
+    const item = el('li', { data: { key: 'performer' } });
+    own.push(item);
+    items.get('raw').before(item);
+    return item;
+  };
   return (world) => {
     const keys = seen(world);
     for (const [key, item] of items) item.hidden = !keys.has(key);
+    const performers = performersOf(world);
+    performers.forEach(({ text, colour }, i) => {
+      const item = own[i] ?? grow();
+      item.style.setProperty('--own', colour);
+      write(item, text);
+    });
+    own.forEach((item, i) => {
+      item.hidden = i >= performers.length;
+    });
   };
 }

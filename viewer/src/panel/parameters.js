@@ -7,6 +7,18 @@ const FLAGS = new Set(['gate', 'auto_alpha', 'enabled']);
 // Parameters with a few words: the statistics give the number of the word in the daemon's list.
 const WORDS = { 'feet.root': ['off', 'stride', 'actor'] };
 
+const LABELS = {
+  'gate.jump_deg': 'Drop an angle that jumps by (°)',
+  'gate.jump_m': 'Hold a root that jumps by (m)',
+  'style.alpha_slew_per_s': 'Style changes per second by',
+  'style.gate': 'Fade out in unknown motion',
+  'style.gate_fallback': 'There keep of the constant part',
+  'style.auto_alpha': 'Less for who shows it already',
+  'feet.root': 'Where the body is',
+  'feet.limit_cm': 'Off the performer at most (cm)',
+};
+const plainWords = (whole) => LABELS[whole] ?? whole;
+
 function makeField(whole, name, text) {
   if (WORDS[whole])
     return el('select', {}, ...WORDS[whole].map((word) => el('option', { value: word }, word)));
@@ -23,6 +35,7 @@ function valueOf(field) {
 
 export class Parameters {
   #fields = new Map();
+  #values = new Map(); // the daemon's, as they were heard last
 
   constructor(stream, control) {
     this.name = stream.name;
@@ -43,36 +56,44 @@ export class Parameters {
   }
 
   #row(whole, field) {
-    field.onchange = () => {
-      const value = valueOf(field);
-      if (Number.isNaN(value.number)) {
-        field.value = field.defaultValue; // emptied: the last value again
-        return;
-      }
-      this.control(
-        { set_parameter: { stream: this.name, name: whole, ...value } },
-        `${this.name}: ${whole} ${Object.values(value)[0]}`,
-      );
-    };
+    field.onchange = () => this.#changed(whole, field);
+    field.title = whole; // as `posed ctl set` and the config name it
     this.#fields.set(whole, field);
-    return labelled(whole, field);
+    return labelled(plainWords(whole), field);
   }
 
-  #showNumber(field, text) {
-    field.defaultValue = text;
-    field.value = text;
+  async #changed(whole, field) {
+    const value = valueOf(field);
+    if (Number.isNaN(value.number)) {
+      field.value = field.defaultValue; // emptied: the last value again
+      return;
+    }
+    const reply = await this.control(
+      { set_parameter: { stream: this.name, name: whole, ...value } },
+      `${this.name}: ${plainWords(whole)} ${Object.values(value)[0]}`,
+    );
+    if (!reply.ok) this.#show(whole, field); // refused: what the daemon has
+  }
+
+  #show(whole, field) {
+    const { target, text } = this.#values.get(whole);
+    if (field.type === 'checkbox') field.checked = target !== 0;
+    else if (WORDS[whole]) field.value = WORDS[whole][target] ?? '';
+    else if (field.type === 'text') field.value = text;
+    else {
+      field.defaultValue = String(Number(target.toPrecision(6)));
+      field.value = field.defaultValue;
+    }
   }
 
   update(stream) {
     for (const stage of stream.stats.stage) {
-      for (const { name, target, text } of stage.parameter) {
-        const whole = `${stage.name}.${name}`;
+      for (const parameter of stage.parameter) {
+        const whole = `${stage.name}.${parameter.name}`;
         const field = this.#fields.get(whole);
-        if (!field || document.activeElement === field) continue;
-        if (field.type === 'checkbox') field.checked = target !== 0;
-        else if (WORDS[whole]) field.value = WORDS[whole][target] ?? '';
-        else if (field.type === 'text') field.value = text;
-        else this.#showNumber(field, String(Number(target.toPrecision(6))));
+        if (!field) continue;
+        this.#values.set(whole, parameter);
+        if (document.activeElement !== field) this.#show(whole, field);
       }
     }
   }

@@ -7,11 +7,16 @@ const QUIET_MS = 1200; // after the last move: the daemon's statistics may be ol
 
 export class Slider {
   #moved_ms = -Infinity;
+  #target = 0; // the daemon's, as it was heard last
   #value = 0; // the last that was a number: an emptied field is none
 
-  // limits: the field's {min, max}; shown: the slider's, within them; send(number): a promise
+  // limits: the field's {min, max}; shown: the slider's, within them; send(number): a promise of
+  // the reply
   constructor(text, { min, max, shown = [min, max], step = 0.01, send, hint = '' }) {
-    this.latest = new Latest(send);
+    this.latest = new Latest(async (value) => {
+      const reply = await send(value);
+      if (reply?.ok === false) this.#goBack();
+    });
     this.range = el('input', { type: 'range', min: shown[0], max: shown[1], step, title: hint });
     this.range.setAttribute('value', '0');
     this.field = el('input', {
@@ -44,6 +49,19 @@ export class Slider {
     this.latest.put(value);
   }
 
+  // The daemon has refused: what is shown is what it has.
+  #goBack() {
+    this.#moved_ms = -Infinity;
+    this.#show(this.#target);
+  }
+
+  #show(target) {
+    const text = target.toFixed(2);
+    this.#value = Number(text);
+    if (this.field.value !== text) this.field.value = text;
+    if (this.range.value !== String(target)) this.range.value = String(target);
+  }
+
   // By the keyboard.
   nudge(step) {
     const value = Math.min(
@@ -57,12 +75,10 @@ export class Slider {
   // The daemon's target, and its present value while it glides there.
   follow(target, value = target) {
     const glides = Math.abs(target - value) >= 0.005;
+    this.#target = target;
     write(this.note, glides ? `now ${value.toFixed(2)}` : '');
     if (this.latest.busy || performance.now() - this.#moved_ms < QUIET_MS) return;
     if (document.activeElement === this.field) return;
-    const text = target.toFixed(2);
-    this.#value = Number(text);
-    if (this.field.value !== text) this.field.value = text;
-    if (this.range.value !== String(target)) this.range.value = String(target);
+    this.#show(target);
   }
 }

@@ -3,8 +3,9 @@
 import { MASK_WORDS, PARTS, maskText, parseMask } from '../motion/body_parts.js';
 import { el, write } from './dom.js';
 import { Slider } from './slider.js';
-import { signed } from './numbers.js';
+import { percent, signed } from './numbers.js';
 
+const LEAST_TOLD = 0.1; // of what the input has of the style; less is within the error
 const LARGEST_ALPHA = 2;
 const SHOWN_ALPHA = [-0.5, 1.5];
 
@@ -123,8 +124,8 @@ export class StyleControls {
           : `the model knows this motion to ${Math.round(100 * style_gate)} %: the style is faded`,
       );
     }
-    if (style_estimate !== undefined) {
-      facts.push(`the input shows ${signed(style_estimate, 2)} of the style by itself`);
+    if (style_estimate >= LEAST_TOLD) {
+      facts.push(`as captured it already has ${percent(style_estimate)} of the style`);
     }
     write(this.facts, facts.join('; '));
   }

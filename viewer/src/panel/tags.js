@@ -28,7 +28,7 @@ function words(stream, main) {
 }
 
 export function writeTags(world, chosenName) {
-  for (const { stream, ghost } of world.performers.values()) {
+  for (const { stream, ghost, colour } of world.performers.values()) {
     const base = ghost ? stream.name.slice(0, -RAW_SUFFIX.length) : stream.name;
     const main = world.store.streams.get(base);
     world.tags.write(stream.name, {
@@ -36,6 +36,7 @@ export function writeTags(world, chosenName) {
       detail: words(stream, main),
       kind: ghost ? 'raw' : 'styled',
       chosen: base === chosenName,
+      colour,
     });
   }
 }

@@ -12,9 +12,9 @@ export class Takes {
   #asking = false;
   #stats = null; // the last that were read: an answer is newer than those
 
-  constructor(form, control) {
-    this.form = form;
-    this.control = control;
+  // say(sentence, tone): for who asks for a take where none can be
+  constructor(form, control, say) {
+    Object.assign(this, { form, control, say });
     this.name = el('input', {
       type: 'text',
       maxLength: LONGEST_NAME,
@@ -33,7 +33,9 @@ export class Takes {
 
   // The answer says whether a take runs: the next statistics come up to a second later.
   async toggle() {
-    if (this.form.hidden || this.fields.hidden || this.fields.disabled || this.#asking) return;
+    const obstacle = this.#obstacle();
+    if (obstacle) this.say(obstacle, 'bad');
+    if (obstacle || this.#asking) return;
     this.#asking = true;
     const start = !this.#running;
     const name = start ? this.name.value.trim() : '';
@@ -43,6 +45,12 @@ export class Takes {
     );
     this.#asking = false;
     if (reply.ok) this.#run(start);
+  }
+
+  #obstacle() {
+    if (this.form.hidden) return 'no take begins: a replay is not recorded, and without posed nothing is';
+    if (this.fields.hidden) return `no take begins, because posed does not record. ${HOW}`;
+    return this.fields.disabled ? `no take begins: ${this.fields.title}` : '';
   }
 
   update(stats, readOnlyReason) {

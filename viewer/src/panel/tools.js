@@ -49,7 +49,7 @@ export class Tools {
     this.#mark(world.views.name);
     this.setRaw(RAW.includes(kept('raw')) ? kept('raw') : 'beside');
     this.#setTrails(kept('trails') !== 'off');
-    this.setAvatars(['mannequin'], '');
+    this.setAvatars(['mannequin'], 'mannequin');
   }
 
   #mark(name) {

@@ -1,9 +1,12 @@
 // A VRM avatar that moves as a stream does. Rotations are those of VRM's bones relative to the bone
 // above, all identity in the T-pose; the hips move in proportion to the avatar's leg length.
-import { Group } from 'three';
+import { Group, MeshLambertMaterial } from 'three';
 import { GLTFLoader } from 'three/addons/loaders/GLTFLoader.js';
 import { VRMLoaderPlugin, VRMUtils } from '@pixiv/three-vrm';
 import { rotate } from '../motion/quaternion.js';
+import { JointPaint } from './joint_paint.js';
+
+const MANNEQUIN = 'posed mannequin'; // the name in its file
 
 function loader() {
   const gltf = new GLTFLoader();
@@ -26,10 +29,11 @@ export async function loadAvatar(bytes, name) {
 
 export class Avatar {
   group = new Group();
-  #bones = []; // {node, joint}: of the figure that it was fitted to
+  #bones = []; // {bone, node, joint}: of the figure that it was fitted to
   #boneAbove = []; // the next joint above, by joint, whose bone the avatar has
   #scale = 1;
   #hips = -1;
+  #paints = []; // of the mannequin: another avatar keeps its own colours
 
   constructor(vrm, name) {
     this.vrm = vrm;
@@ -50,7 +54,7 @@ export class Avatar {
     this.#bones = [];
     kinematics.bones.forEach((bone, joint) => {
       const node = nodeOf(bone);
-      if (node) this.#bones.push({ node, joint });
+      if (node) this.#bones.push({ bone, node, joint });
     });
     // The turn of a bone that the avatar lacks, like upperChest, goes to the bones below it.
     this.#boneAbove = kinematics.bonesAbove((bone) => Boolean(nodeOf(bone)));
@@ -58,6 +62,39 @@ export class Avatar {
     const own_m = humanoid.getNormalizedBoneNode('hips').position.y;
     const legs_m = hipsHeight(kinematics);
     this.#scale = legs_m > 0 ? own_m / legs_m : 1;
+    if (this.vrm.meta?.name === MANNEQUIN) this.#becomePainted();
+  }
+
+  // How much taller it is than the figure.
+  get scale() {
+    return this.#scale;
+  }
+
+  // Each vertex belongs to the figure's joint that moves it, or to one above where it has none.
+  #becomePainted() {
+    const jointOf = new Map();
+    const { humanoid } = this.vrm;
+    for (const { bone, joint } of this.#bones) jointOf.set(humanoid.getRawBoneNode(bone), joint);
+    const moving = (node) => (!node || jointOf.has(node) ? (jointOf.get(node) ?? 0) : moving(node.parent));
+    this.#paints = [];
+    this.vrm.scene.traverse((mesh) => {
+      if (!mesh.isSkinnedMesh) return;
+      const joints = mesh.skeleton.bones.map(moving);
+      const { skinIndex } = mesh.geometry.attributes;
+      const owner = Array.from({ length: skinIndex.count }, (_, i) => joints[skinIndex.getX(i)]);
+      for (const material of [mesh.material].flat()) material.dispose();
+      mesh.material = new MeshLambertMaterial({ vertexColors: true });
+      this.#paints.push(new JointPaint(mesh.geometry, owner));
+    });
+  }
+
+  // In the performer's colour, and by what the pose says of each joint.
+  paint(own, pose) {
+    for (const paint of this.#paints) paint.paint(own, pose);
+  }
+
+  get isPainted() {
+    return this.#paints.length > 0;
   }
 
   pose(kinematics) {

@@ -1,4 +1,5 @@
-// The avatars that bodies may wear: the mannequin, and files that were dropped on the scene. Each
+// The avatars that bodies may wear: the mannequin, which they begin with, and files that were
+// dropped on the scene. Each
 // body needs an avatar of its own, loaded from the same bytes. The loader comes when it is needed.
 
 const MANNEQUIN = 'mannequin';
@@ -11,7 +12,7 @@ async function load(bytes, name) {
 
 export class Avatars {
   #files = new Map([[MANNEQUIN, null]]); // name: its bytes, once they are here
-  #chosen = null;
+  #chosen = MANNEQUIN;
 
   // say(sentence, tone); changed(names, chosen)
   constructor(world, say, changed) {

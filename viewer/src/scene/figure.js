@@ -13,8 +13,9 @@ import {
   SkinnedMesh,
 } from 'three';
 import { bodyShape } from './body_shape.js';
+import { performerColour } from './palette.js';
 import { rigid } from './rigid_skin.js';
-import { jointColour } from './palette.js';
+import { JointPaint } from './joint_paint.js';
 
 // A skeleton whose matrices the page writes itself: three.js then walks no tree of bones.
 class DirectSkeleton extends Skeleton {
@@ -41,7 +42,6 @@ function geometryOf(shape) {
   geometry.setAttribute('normal', new BufferAttribute(shape.normal, 3));
   geometry.setAttribute('skinIndex', new BufferAttribute(skinIndex, 4));
   geometry.setAttribute('skinWeight', new BufferAttribute(skinWeight, 4));
-  geometry.setAttribute('color', new BufferAttribute(new Float32Array(3 * vertices), 3));
   geometry.setIndex(shape.index);
   return geometry;
 }
@@ -56,15 +56,16 @@ function skinned(geometry, material, skeleton) {
 
 export class Figure {
   group = new Group(); // moved by the lane
-  #colours = ''; // what the vertices are coloured for
 
-  constructor(kinematics, { ghost, theme, detail }) {
+  // number: of the performer's colour
+  constructor(kinematics, { ghost, theme, detail, number }) {
     this.kinematics = kinematics;
     this.ghost = ghost;
+    this.number = number;
     const shape = bodyShape(kinematics, detail);
-    this.owner = shape.owner;
     this.scale = shape.scale;
     this.geometry = geometryOf(shape);
+    this.joints = new JointPaint(this.geometry, shape.owner);
     this.skeleton = new DirectSkeleton(kinematics.count);
     this.skeleton.computeBoneTexture();
     this.#makeMeshes();
@@ -89,9 +90,8 @@ export class Figure {
   }
 
   setTheme(theme) {
-    this.own = this.ghost ? theme.raw : theme.styled;
+    this.own = this.ghost ? theme.raw : performerColour(theme, this.number);
     if (this.ghost) this.material.opacity = theme.rawOpacity;
-    this.#colours = '';
   }
 
   // Moves the joints to where `kinematics` has placed them.
@@ -103,21 +103,9 @@ export class Figure {
     this.skeleton.boneTexture.needsUpdate = true;
   }
 
-  // Colours the joints by what the pose says about them; the vertices are written on a change only.
+  // Colours the joints by what the pose says about them.
   colour(pose) {
-    const atRest = pose.performed && pose.quality === 2;
-    let key = `${pose.quality}${atRest}`;
-    for (let joint = 0; joint < pose.validJoints; joint += 1) {
-      if (pose.validity[joint] === 0) key += `,${joint}`;
-    }
-    if (key === this.#colours) return;
-    this.#colours = key;
-    const { array } = this.geometry.attributes.color;
-    this.owner.forEach((joint, i) => {
-      const hasValue = joint >= pose.validJoints || pose.validity[joint] !== 0;
-      jointColour(this.own, pose.quality, hasValue, atRest).toArray(array, 3 * i);
-    });
-    this.geometry.attributes.color.needsUpdate = true;
+    this.joints.paint(this.own, pose);
   }
 
   dispose() {

@@ -5,7 +5,7 @@ import { Lights } from './lights.js';
 
 const FIELD_DEG = 28;
 const APART_M = 0.2; // from hand to hand
-const HEIGHT_M = 0.29; // that is seen
+const HEIGHT_M = 0.32; // that is seen
 
 export class HandsView {
   scene = new Scene();
@@ -81,7 +81,7 @@ export class HandsView {
       across_m / Math.max(this.camera.aspect, 0.2),
     );
     const far = high_m / (2 * half);
-    this.controls.target.set(0, 0.068 + 0.5 * (1 - this.#free) * high_m, 0);
+    this.controls.target.set(0, 0.06 + 0.5 * (1 - this.#free) * high_m, 0);
     this.camera.position
       .set(0.3, 0.11, 1)
       .normalize()
@@ -99,7 +99,7 @@ export class HandsView {
     wrist.fromArray(kinematics.position, i).applyEuler(group.rotation);
     group.position.copy(wrist).negate();
     point.copy(entry.holder.position);
-    point.y -= 0.05;
+    point.y -= 0.04;
   }
 }
 

@@ -1,6 +1,5 @@
 // Names above the figures, as text of the page: sharp at any size, read by screen readers. One that
 // would cover another stands above it, or below where there is no room.
-import { Vector3 } from 'three';
 
 const GAP_PX = 3;
 
@@ -19,10 +18,11 @@ export class NameTags {
   }
 
   // Writes a tag's text; it appears with the first `place`.
-  write(key, { title, detail, kind, chosen }) {
+  write(key, { title, detail, kind, chosen, colour }) {
     const tag = this.#tags.get(key) ?? this.#make(key);
     tag.element.dataset.kind = kind;
     tag.element.dataset.chosen = chosen;
+    tag.element.style.setProperty('--own', colour);
     if (tag.title.textContent !== title) tag.title.textContent = title;
     if (tag.detail.textContent !== detail) tag.detail.textContent = detail;
   }
@@ -47,18 +47,18 @@ export class NameTags {
     this.#placed.length = 0;
   }
 
-  // point: in the scene. area: of the viewport in CSS pixels {left, top, width, height, covered}:
+  // point: in the picture, -1 to 1; the name stands above it, or hangs below. area: of the viewport in CSS pixels {left, top, width, height, covered}:
   // `covered` pixels at its upper edge stay free.
-  place(key, point, camera, area) {
+  place(key, at, area, below = false) {
     const tag = this.#tags.get(key);
     if (!tag) return;
-    at.copy(point).project(camera);
     const shown = at.z < 1 && Math.abs(at.x) < 1.1 && Math.abs(at.y) < 1.1;
     if (tag.element.hidden === shown) tag.element.hidden = !shown;
     if (!shown) return;
     // Whole pixels, and only when they change: each move costs the browser a layer.
     const x = Math.round(area.left + (0.5 + 0.5 * at.x) * area.width);
-    const wanted = area.top + (0.5 - 0.5 * at.y) * area.height;
+    const edge = area.top + (0.5 - 0.5 * at.y) * area.height;
+    const wanted = below ? Math.min(edge + tag.high, area.top + area.height) : edge;
     const top = area.top + area.covered + tag.high;
     const y = Math.round(this.#freeFrom(tag, x, Math.max(wanted, top), top));
     this.#placed.push(tag);
@@ -96,5 +96,3 @@ export class NameTags {
     this.#tags.delete(key);
   }
 }
-
-const at = new Vector3();

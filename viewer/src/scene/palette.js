@@ -10,7 +10,7 @@ const THEMES = {
     ground: colour('#eef1f4'),
     line: colour('#c3cad2'),
     strong: colour('#98a3af'),
-    styled: colour('#2f7fc1'),
+    performers: ['#2f7fc1', '#b08d00', '#7a5bd0', '#12929c', '#8a5a34', '#4d5b8c'].map(colour),
     raw: colour('#7d8793'),
     rawOpacity: 0.42,
     sky: colour('#ffffff'),
@@ -25,7 +25,7 @@ const THEMES = {
     ground: colour('#11151a'),
     line: colour('#2b333c'),
     strong: colour('#46525e'),
-    styled: colour('#58b0ea'),
+    performers: ['#58b0ea', '#e0c33c', '#a990f5', '#3fc4cd', '#c08a5a', '#93a4e0'].map(colour),
     raw: colour('#b4bdc8'),
     rawOpacity: 0.55,
     sky: colour('#dfe9f5'),
@@ -43,6 +43,9 @@ const NO_VALUE = colour('#d55e00');
 const CONTACT = colour('#009e73');
 
 export const themeColours = (name) => THEMES[name];
+
+// Performers have a colour each, in their order; a seventh has that of the first again.
+export const performerColour = (theme, number) => theme.performers[number % theme.performers.length];
 
 // The colour of a joint: without a value, or as current as the pose is.
 export function jointColour(own, quality, hasValue, performedAtRest) {

@@ -4,16 +4,19 @@ import { feetOf } from '../motion/feet.js';
 import { Figure } from './figure.js';
 import { Trail } from './trail.js';
 
+const ABOVE_JOINTS_M = 0.27; // what a head has above its joint
+const joint = new Vector3();
+
 export class Performer {
   avatar = null; // an Avatar in place of the capsules
   centre = new Vector3(); // of the hips, in the scene
-  top_m = 0; // the height of its highest joint
   #trails = [];
 
-  constructor(stream, scene, theme, detail) {
+  // number: of its colour; a raw one is grey
+  constructor(stream, scene, theme, detail, number) {
     this.stream = stream;
     this.ghost = stream.isRaw;
-    this.figure = new Figure(stream.kinematics, { ghost: this.ghost, theme, detail });
+    this.figure = new Figure(stream.kinematics, { ghost: this.ghost, theme, detail, number });
     this.figure.group.visible = false;
     scene.add(this.figure.group);
     const { own } = this.figure;
@@ -28,7 +31,7 @@ export class Performer {
   setTheme(theme) {
     this.figure.setTheme(theme);
     for (const trail of this.#trails) trail.setColour(this.figure.own);
-    this.figure.colour(this.stream.pose);
+    this.#colour();
   }
 
   // Shows the newest pose; false when there is none.
@@ -41,14 +44,22 @@ export class Performer {
       trail.group.visible = showTrails;
     }
     figure.group.visible = true;
-    if (this.avatar) {
-      this.avatar.pose(stream.kinematics);
-    } else {
-      figure.place();
-      figure.colour(stream.pose);
-    }
+    if (this.avatar) this.avatar.pose(stream.kinematics);
+    else figure.place();
+    this.#colour();
     this.#measure();
     return true;
+  }
+
+  #colour() {
+    const { avatar, figure } = this;
+    if (avatar) avatar.paint(figure.own, this.stream.pose);
+    else figure.colour(this.stream.pose);
+  }
+
+  // Its colour for the page's own parts.
+  get colour() {
+    return `#${this.figure.own.getHexString()}`;
   }
 
   get jumped() {
@@ -61,9 +72,25 @@ export class Performer {
     this.centre
       .set(position[at], position[at + 1], position[at + 2])
       .add(this.figure.group.position);
+  }
+
+  // The point above whatever of the body is highest in this camera's picture, so that a name there
+  // covers none of it.
+  highest(camera, point) {
+    const { position } = this.stream.kinematics;
+    const { group } = this.figure;
+    const scale = this.avatar?.scale ?? 1;
     let top = -Infinity;
-    for (let i = 1; i < position.length; i += 3) top = Math.max(top, position[i]);
-    this.top_m += (this.top_m === 0 ? 1 : 0.05) * (top - this.top_m);
+    for (let i = 0; i < position.length; i += 3) {
+      joint.set(position[i], scale * position[i + 1], position[i + 2]).add(group.position);
+      top = Math.max(top, joint.project(camera).y);
+    }
+    point.copy(this.centre);
+    point.y *= scale;
+    const depth = joint.copy(point).applyMatrix4(camera.matrixWorldInverse).z;
+    const room = (ABOVE_JOINTS_M * this.figure.scale * camera.projectionMatrix.elements[5]) / -depth;
+    point.project(camera);
+    point.y = top + room;
   }
 
   // Capsules again, or an avatar in their place.
@@ -77,6 +104,7 @@ export class Performer {
     this.figure.group.add(avatar.group);
     avatar.fit(this.stream.kinematics);
     if (this.stream.drawable) avatar.pose(this.stream.kinematics);
+    this.#colour();
   }
 
   dispose() {

@@ -1,11 +1,14 @@
-// The camera: free, or with what moves, from the front, the side or above. It glides, never cuts.
+// The camera: with the chosen body, turning round it, or with everybody from the front, the side or
+// above. It glides, never cuts.
 import { PerspectiveCamera, Vector3 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 
 export const VIEWS = ['follow', 'orbit', 'front', 'side', 'top'];
 
 const FIELD_DEG = 34;
+const TURNS_PER_MIN = 1.5; // of orbit
 const DIRECTIONS = {
+  orbit: [0.62, 0.3, 1],
   follow: [0.62, 0.3, 1],
   front: [0, 0.12, 1],
   side: [1, 0.12, 0.001],
@@ -32,7 +35,9 @@ export class Views {
   #free = { wide: 1, high: 1 }; // the part that is not covered, in heights of the picture
   #yaw = 0; // where the figures face
 
-  constructor(element, onChange) {
+  // turns: whether orbit turns by itself, which not everybody bears
+  constructor(element, onChange, turns = true) {
+    this.turns = turns;
     this.controls = new OrbitControls(this.camera, element);
     this.controls.enableDamping = true;
     this.controls.dampingFactor = 0.12;
@@ -44,6 +49,7 @@ export class Views {
     // Who takes the camera in hand keeps it: from the fixed views it goes on from there, following.
     this.controls.addEventListener('start', () => {
       this.#far_m = 0;
+      this.controls.autoRotate = false;
       if (this.name !== 'orbit' && this.name !== 'follow') this.#become('follow');
     });
     this.#turnTo('follow');
@@ -52,14 +58,21 @@ export class Views {
   set(name) {
     if (!VIEWS.includes(name)) return;
     this.#become(name);
-    if (name !== 'orbit') this.#turnTo(name);
+    this.controls.autoRotate = name === 'orbit' && this.turns;
+    this.controls.autoRotateSpeed = TURNS_PER_MIN;
+    this.#turnTo(name);
+  }
+
+  // Whether it looks at one body, not at everybody.
+  get isOfOne() {
+    return this.name === 'orbit' || this.name === 'follow';
   }
 
   // The figures face another way, in radians about Y from +Z.
   face(yaw) {
     if (yaw === this.#yaw) return;
     this.#yaw = yaw;
-    if (this.name !== 'orbit') this.#turnTo(this.name);
+    this.#turnTo(this.name);
   }
 
   #become(name) {
@@ -71,6 +84,7 @@ export class Views {
     const direction = new Vector3(...DIRECTIONS[name]).normalize();
     const flat = Math.hypot(direction.x, direction.z);
     this.#seen = { row: direction.z / flat, way: direction.x / flat, down: direction.y, flat };
+    if (name === 'orbit') Object.assign(this.#seen, { row: 1, way: 1 }); // in turn
     direction.applyAxisAngle(UP, this.#yaw);
     this.#far_m = this.#fitting();
     this.camera.position.copy(this.controls.target).addScaledVector(direction, this.#far_m);
@@ -112,8 +126,8 @@ export class Views {
       this.#way_m = way_m;
       if (this.#far_m > 0) this.#far_m = this.#fitting();
     }
-    if (this.name !== 'orbit') this.#follow(centre, far, passed_s);
-    this.controls.update();
+    this.#follow(centre, far, passed_s);
+    this.controls.update(passed_s);
   }
 
   #follow(centre, far, passed_s) {

@@ -13,6 +13,7 @@ import { Views } from './views.js';
 import { makeRenderer } from './renderer.js';
 import { themeColours } from './palette.js';
 import { facing } from './facing.js';
+import { RAW_SUFFIX } from '../streams/stream.js';
 
 const MOST_PIXELS = 2; // per CSS pixel
 const TOOLS_PX = 46; // at the top of the scene, covered by the buttons
@@ -26,6 +27,8 @@ export class World {
   options = { raw: 'beside', trails: true };
   #dirty = CALM_FRAMES;
   #yaw = null;
+  #numbers = new Map(); // of the performers' colours, by name
+  #chosen = null; // the stream whose body follow and orbit look at
   #pace = new Pace();
   #areas = { bodies: null, hands: null };
   #arranged = ''; // the streams of the last statistics that moved somebody
@@ -42,7 +45,8 @@ export class World {
     this.ground = new Ground(this.theme);
     this.lights = new Lights(this.theme, true);
     this.scene.add(this.ground.group, this.lights.group);
-    this.views = new Views(this.canvas, (name) => this.onView?.(name));
+    const turns = !matchMedia('(prefers-reduced-motion: reduce)').matches;
+    this.views = new Views(this.canvas, (name) => this.onView?.(name), turns);
     this.views.controls.addEventListener('change', () => this.touch());
     this.hands = new HandsView(this.inset.querySelector('.hands-area'), this.theme, () =>
       this.touch(),
@@ -74,10 +78,41 @@ export class World {
 
   #enter(stream) {
     this.#leave(stream.name);
-    const performer = new Performer(stream, this.scene, this.theme, this.fine ? FINE : COARSE);
+    const detail = this.fine ? FINE : COARSE;
+    const number = this.#numberOf(stream);
+    const performer = new Performer(stream, this.scene, this.theme, detail, number);
     this.performers.set(stream.name, performer);
     if (stream.isHand) this.hands.add(performer);
     this.arrange();
+  }
+
+  // A colour stays with its name; a new one gets the first that nobody has.
+  #numberOf({ name, isRaw }) {
+    if (isRaw) return 0;
+    if (!this.#numbers.has(name)) {
+      for (const other of this.#numbers.keys())
+        if (!this.performers.has(other)) this.#numbers.delete(other);
+      const taken = new Set(this.#numbers.values());
+      let number = 0;
+      while (taken.has(number)) number += 1;
+      this.#numbers.set(name, number);
+    }
+    return this.#numbers.get(name);
+  }
+
+  // Whom follow and orbit keep in the picture; everybody where it is no body.
+  choose(name) {
+    if (this.#chosen === name) return;
+    this.#chosen = name;
+    this.touch();
+  }
+
+  // Whether the view looks at this performer: of follow and orbit the chosen body and its raw twin.
+  #isLookedAt({ stream, figure }) {
+    if (stream.isHand || !figure.group.visible) return false;
+    const one = this.performers.get(this.#chosen);
+    if (!this.views.isOfOne || !one || one.stream.isHand) return true;
+    return stream.name === this.#chosen || stream.name === `${this.#chosen}${RAW_SUFFIX}`;
   }
 
   #leave(name) {
@@ -233,7 +268,7 @@ export class World {
     let [count, jumped] = [0, false];
     middle.set(0, 0, 0);
     for (const performer of this.performers.values()) {
-      if (performer.stream.isHand || !performer.figure.group.visible) continue;
+      if (!this.#isLookedAt(performer)) continue;
       middle.add(performer.centre);
       count += 1;
       jumped ||= performer.jumped;
@@ -243,7 +278,7 @@ export class World {
     extent.row_m = 0;
     extent.way_m = 0;
     for (const performer of this.performers.values()) {
-      if (performer.stream.isHand || !performer.figure.group.visible) continue;
+      if (!this.#isLookedAt(performer)) continue;
       const [x, z] = [performer.centre.x - middle.x, performer.centre.z - middle.z];
       extent.row_m = Math.max(extent.row_m, Math.abs(c * x - s * z));
       extent.way_m = Math.max(extent.way_m, Math.abs(s * x + c * z));
@@ -281,16 +316,16 @@ export class World {
       return;
     }
     if (isHand) {
-      this.hands.hold(performer, above);
-      this.tags.place(name, above, this.hands.camera, this.#areas.hands ?? this.#areas.bodies);
+      this.hands.hold(performer, at);
+      at.project(this.hands.camera);
+      this.tags.place(name, at, this.#areas.hands ?? this.#areas.bodies, true);
     } else {
-      above.copy(performer.centre);
-      above.y = performer.top_m + 0.2;
-      this.tags.place(name, above, this.views.camera, this.#areas.bodies);
+      performer.highest(this.views.camera, at);
+      this.tags.place(name, at, this.#areas.bodies);
     }
   }
 }
 
 const middle = new Vector3();
-const above = new Vector3();
+const at = new Vector3();
 const extent = { row_m: 0, way_m: 0 };

@@ -15,7 +15,7 @@ export function stateOf(stats) {
   if (stats.state === 'waiting') return state('waiting', 'busy', 'nothing came yet');
   if (stats.state === 'stale') return state('stale', 'busy', 'fell silent: the last pose is shown');
   if (stats.state === 'ended') return state('ended', 'off', 'its source has ended');
-  if (stats.state === 'unknown') return state('unknown', 'off', 'there is no word of it any more');
+  if (stats.state === 'unknown') return state('unknown', 'off', 'posed does not report on it now: what is shown is the last that came');
   if (stats.state !== 'live') return state(stats.state, 'busy');
   const lost = stats.dropped + stats.shed + stats.kernel_dropped;
   if (stats.lossy) return state('lossy', 'bad', `${lost} frames were lost so far, the last just now`);

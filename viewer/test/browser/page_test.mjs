@@ -133,6 +133,31 @@ pageTest(
   },
 );
 
+pageTest(
+  'follow and orbit keep the chosen one in the picture, alone; each performer has a colour',
+  { bodies: 3, hands: 1 },
+  async (page) => {
+    const entries = await page.locator('.legend li[data-key="performer"]').evaluateAll((items) =>
+      items.map((item) => [item.textContent, item.style.getPropertyValue('--own')]),
+    );
+    const words = ['walker', 'walker2', 'walker3'].map((name) => `${name}: styled`);
+    assert.deepEqual(entries.map(([text]) => text).sort(), ['hand: smoothed', ...words].sort());
+    assert.equal(new Set(entries.map(([, colour]) => colour)).size, 4);
+    await page.locator('.stream', { hasText: 'walker3' }).click();
+    for (const view of ['Follow', 'Orbit']) {
+      await page.getByRole('button', { name: view, exact: true }).click();
+      await page.waitForTimeout(3000); // he walks on, and the view with him
+      const off_m = await page.evaluate(() => {
+        const { world } = globalThis.posedPage;
+        const [one, raw] = ['walker3', 'walker3-raw'].map((name) => world.performers.get(name));
+        const middle = one.centre.clone().lerp(raw.centre, 0.5);
+        return Math.hypot(world.views.target.x - middle.x, world.views.target.z - middle.z);
+      });
+      assert.ok(off_m < 1, `${view}: ${off_m} m`);
+    }
+  },
+);
+
 pageTest('a style is taught by two walks', { bodies: 1, hands: 0 }, async (page, bridge) => {
   await unfold(page, 'Teach a style');
   const lesson = page.locator('details', { hasText: 'Teach a style' });
@@ -299,7 +324,7 @@ pageTests(
       await unfold(page, 'More parameters');
       for (const [label, shown] of [
         ['Amount of style, α, number', '1.00'],
-        ['feet.limit_cm', '8'],
+        ['Off the performer at most (cm)', '8'],
       ]) {
         const field = page.getByLabel(label);
         await field.fill('');
@@ -310,16 +335,22 @@ pageTests(
     },
     'each field of More parameters sends what the daemon takes': async (page, bridge) => {
       await unfold(page, 'More parameters');
-      assert.equal(await page.getByLabel('feet.root').inputValue(), 'stride');
-      await page.getByLabel('feet.root').selectOption('actor');
-      await acknowledged(page, 'feet.root actor: applied');
+      const root = page.getByLabel('Where the body is');
+      assert.equal(await root.inputValue(), 'stride');
+      await root.selectOption('actor');
+      await acknowledged(page, 'Where the body is actor: applied');
       assert.equal(bridge.daemon.bodies[0].root, 2);
-      await page.getByLabel('feet.limit_cm').fill('5.5');
-      await page.getByLabel('feet.limit_cm').press('Enter');
-      await acknowledged(page, 'feet.limit_cm 5.5: applied');
-      await page.getByLabel('style.gate').click();
-      await acknowledged(page, 'style.gate ');
+      const limit = page.getByLabel('Off the performer at most (cm)');
+      await limit.fill('5.5');
+      await limit.press('Enter');
+      await acknowledged(page, 'at most (cm) 5.5: applied');
+      await page.getByLabel('Fade out in unknown motion').click();
+      await acknowledged(page, 'Fade out in unknown motion ');
       assert.equal(await page.locator('.ack[data-tone="bad"]').count(), 0);
+      await limit.fill('-3');
+      await limit.press('Enter');
+      await acknowledged(page, 'at most (cm) -3: refused');
+      assert.equal(await limit.inputValue(), '5.5');
     },
     'the slider sets alpha, and the answer is shown; a refusal, too': async (page, bridge) => {
       const field = page.getByLabel('Amount of style, α, number');
@@ -330,6 +361,11 @@ pageTests(
       await field.fill('7');
       await field.press('Enter');
       await acknowledged(page, 'refused: style.alpha');
+      await page.waitForFunction(
+        (input) => input.value === '0.35',
+        await field.elementHandle(),
+        PATIENCE,
+      );
     },
     'keys: arrows choose and change, ? explains, fields type': async (page, bridge) => {
       await page.locator('.stage canvas').focus();
@@ -392,6 +428,7 @@ pageTests(
         await page.keyboard.down('s'); // again without up: the key repeats
         await page.waitForTimeout(200);
       }
+      await page.keyboard.up('s');
       await acknowledged(page, 'take ends');
       assert.deepEqual(takes(), [true, false]);
     },
@@ -404,6 +441,7 @@ pageTests(
       assert.equal(await page.getByLabel('Take name').isVisible(), false);
       await page.locator('.stage canvas').focus();
       await page.keyboard.press('s');
+      await acknowledged(page, 'no take begins, because posed does not record');
       assert.ok(bridge.requests.every((request) => !request.take));
     },
     "the hands' view stays as turned, and a still scene rests": async (page, bridge) => {
@@ -474,8 +512,7 @@ pageTests(
   { hands: 0, replay_file: 'take1.plog' },
   {
     'instruments: all but the times of the page': withoutTimes,
-    'a body may wear the mannequin': async (page) => {
-      await page.getByLabel('Figure').selectOption('mannequin');
+    'a body wears the mannequin, in its colour': async (page) => {
       await page.waitForFunction(
         () => globalThis.posedPage.world.performers.get('walker').avatar !== null,
         undefined,
@@ -489,6 +526,17 @@ pageTests(
         return Math.abs(head.matrixWorld.elements[13] - stream.kinematics.position[3 * joint + 1]);
       });
       assert.ok(gap_m < 0.15, String(gap_m));
+      const swatch = page.locator('.legend li', { hasText: 'walker: styled' });
+      const own = await swatch.evaluate((item) => item.style.getPropertyValue('--own'));
+      const painted = await page.evaluate(() => {
+        const { avatar, colour } = globalThis.posedPage.world.performers.get('walker');
+        let seen = '';
+        avatar.vrm.scene.traverse(({ isSkinnedMesh, geometry, material }) => {
+          if (isSkinnedMesh) seen = material.color.clone().fromArray(geometry.attributes.color.array);
+        });
+        return [`#${seen.getHexString()}`, colour];
+      });
+      assert.deepEqual(painted, [own, own]);
     },
     'a dropped avatar is worn, another file refused with a sentence': async (page) => {
       await drop(page, '/mannequin.vrm', 'Ann.vrm');
