@@ -83,6 +83,7 @@ class DemoFolder {
 
 namespace fs = std::filesystem;
 constexpr const char* kStamp = "demo.json";
+constexpr const char* kPageToken = "page.token";
 constexpr std::uintmax_t kMaxStamp = 64 * 1024;      // bytes of the stamp file
 constexpr std::uintmax_t kMaxBytes = 1'000'000'000;  // of the program, or of a file that it wrote
 
@@ -223,7 +224,7 @@ double seconds_since(SteadyClock::time_point then) {
 // Serves the page for the browser. Null if it cannot be, which a line says: the terminal shows the
 // streams, too.
 std::unique_ptr<view::Bridge> serve_page_of(const assembly::Daemon& daemon,
-                                            const DemoOptions& options) {
+                                            const DemoOptions& options, const fs::path& folder) {
   const auto why_not = [](const Error& error) {
     logging::say("posed: no page beside this terminal: " + error.text());
     return nullptr;
@@ -233,7 +234,8 @@ std::unique_ptr<view::Bridge> serve_page_of(const assembly::Daemon& daemon,
   auto bridge = view::Bridge::start({.link = {.publish = {.endpoint = daemon.publish_endpoint()},
                                               .control = daemon.control_endpoint()},
                                      .page = *page,
-                                     .or_any_port = true});
+                                     .or_any_port = true,
+                                     .token = view::kept_token(folder / kPageToken)});
   if (!bridge) return why_not(bridge.error());
   std::fprintf(stderr, "see it: %s\n", (*bridge)->url().c_str());
   if (!options.no_browser) open_browser((*bridge)->url());
@@ -308,7 +310,7 @@ Result<> stream(const DemoOptions& options, const std::filesystem::path& folder)
   TRY(put_on_gloves(config, folder / kDemoSigner));
   auto daemon = TRY(assembly::Daemon::open(config));
   TRY(daemon->start());
-  const auto bridge = serve_page_of(*daemon, options);
+  const auto bridge = serve_page_of(*daemon, options, folder);
   std::fprintf(stderr, "4/4 streaming %s (not learnt from) on %s\n", kDemoWalker,
                daemon->publish_endpoint().c_str());
   auto style = TRY(DemoStyle::open(daemon->control_endpoint()));

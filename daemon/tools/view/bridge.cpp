@@ -143,7 +143,9 @@ class Bridge::Parts {
     auto context = TRY(net::open_context());
     const bool camera = page.has_camera();
     std::unique_ptr<Parts> parts(
-        new Parts(std::move(context), {.files = std::move(page), .token = random_token()},
+        new Parts(std::move(context),
+                  {.files = std::move(page),
+                   .token = options.token.empty() ? random_token() : options.token},
                   {.version = POSED_VERSION,
                    .connect = options.link.publish.endpoint,
                    .same_machine = net::is_loopback(options.link.publish.endpoint),

@@ -87,6 +87,7 @@ struct BridgeOptions {
   std::string address = "127.0.0.1";  // where the page is served
   std::uint16_t port = kUsualPort;    // 0: any free one
   bool or_any_port = false;           // if the port is in use, any free one
+  std::string token{};                // empty: a new one
 };
 
 // Whether an address is this machine's own, which no other machine reaches.

@@ -1,9 +1,14 @@
 #include "daemon/tools/view/request_rules.hpp"
 
+#include <fcntl.h>
 #include <sodium.h>
+#include <sys/stat.h>
+#include <unistd.h>
 #include <zlib.h>
 
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstdlib>
 #include <system_error>
 #include <utility>
@@ -96,12 +101,13 @@ const PageFile* PageFiles::find(std::string_view path) const {
 namespace {
 
 constexpr std::size_t kTokenBytes = 16;
+constexpr std::size_t kTokenText = 22;  // of base64 without padding
 
 constexpr std::string_view kWithoutToken = R"(<!doctype html>
 <html lang="en"><meta charset="utf-8"><title>posed: no access</title>
 <h1>This page needs its whole address</h1>
 <p>posed prints it in the terminal: <code>http://.../?token=...</code>. Open that one; each start
-of posed has a new token.</p></html>
+of <code>posed view</code> has a new token.</p></html>
 )";
 
 // In a time that does not depend on where the two differ.
@@ -200,6 +206,39 @@ std::string random_token() {
   std::array<char, sodium_base64_ENCODED_LEN(kTokenBytes, kUrl)> text{};
   sodium_bin2base64(text.data(), text.size(), bits.data(), bits.size(), kUrl);
   return text.data();
+}
+
+namespace {
+
+// Empty: there is none, or others could know it.
+std::string read_token(const std::filesystem::path& file) {
+  const int fd = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+  if (fd < 0) return {};
+  struct stat about{};
+  std::array<char, kTokenText + 1> text{};
+  const bool own = fstat(fd, &about) == 0 && S_ISREG(about.st_mode) && about.st_uid == geteuid() &&
+                   (about.st_mode & 077) == 0;
+  const ssize_t size = own ? read(fd, text.data(), text.size()) : 0;
+  close(fd);
+  if (size != ssize_t{kTokenText}) return {};
+  const bool is_token = std::all_of(text.begin(), text.begin() + kTokenText, [](unsigned char c) {
+    return std::isalnum(c) != 0 || c == '-' || c == '_';
+  });
+  return is_token ? std::string(text.data(), kTokenText) : std::string();
+}
+
+}  // namespace
+
+std::string kept_token(const std::filesystem::path& file) {
+  if (std::string kept = read_token(file); !kept.empty()) return kept;
+  std::string token = random_token();
+  unlink(file.c_str());
+  const int fd = open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  if (fd < 0) return token;
+  const bool written = write(fd, token.data(), token.size()) == std::ssize(token);
+  close(fd);
+  if (!written) unlink(file.c_str());
+  return token;
 }
 
 }  // namespace posed::view

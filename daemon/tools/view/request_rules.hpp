@@ -68,4 +68,9 @@ struct Site {
 // 128 random bits as 22 characters for a URL.
 [[nodiscard]] std::string random_token();
 
+// The token in this file, so that a page that is open survives a restart of who serves it; made
+// (mode 0600), where there is none that its user alone may read. Never fails: where nothing can be
+// kept, the token is one for this time.
+[[nodiscard]] std::string kept_token(const std::filesystem::path& file);
+
 }  // namespace posed::view

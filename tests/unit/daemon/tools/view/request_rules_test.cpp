@@ -171,6 +171,21 @@ TEST_CASE("tokens are long and differ") {
   }
 }
 
+TEST_CASE("a kept token outlives who serves the page, unless others could know it") {
+  const test::TempFolder folder;
+  const auto file = folder.path() / "page.token";
+  const std::string token = kept_token(file);
+  CHECK(token.size() == 22);
+  CHECK(kept_token(file) == token);
+  CHECK(std::filesystem::status(file).permissions() == std::filesystem::perms(0600));
+  std::filesystem::permissions(file, std::filesystem::perms(0644));
+  CHECK(kept_token(file) != token);
+  const auto link = folder.path() / "link.token";
+  std::filesystem::create_symlink(file, link);
+  CHECK(kept_token(link) != kept_token(file));
+  CHECK(kept_token(folder.path() / "missing" / "page.token").size() == 22);
+}
+
 TEST_CASE("a folder without a page, and one that is none of a page, are errors") {
   const test::TempFolder folder;
   CHECK(PageFiles::load(folder.path()).error().message.contains("./run page"));
