@@ -193,7 +193,8 @@ Result<> Daemon::Parts::open_engines() {
                                        .clock = system::monotonic_ns,
                                        .commands = device_commands.get()}));
   handler = std::make_unique<control::RequestHandler>(*this, streams->kept(), models,
-                                                      system::monotonic_ns, teacher.get());
+                                                      system::monotonic_ns, teacher.get(),
+                                                      control::RecordingFolder(config.recordings));
   streams->begin({.publisher = publisher.get(),
                   .handler = handler.get(),
                   .worker = worker.get(),

@@ -59,6 +59,9 @@ void read_control(TableReader table, const ConfigFile& file, bool secured, Daemo
   std::string models;
   table.read("models", models);
   if (!models.empty()) config.models = file.resolve(models);
+  std::string recordings;
+  table.read("recordings", recordings);
+  if (!recordings.empty()) config.recordings = file.resolve(recordings);
   table.finish();
 }
 
@@ -146,6 +149,11 @@ void read_tables(const toml::table& root_table, const ConfigFile& file, DaemonCo
   read_streams(root, file, config);
   read_outputs(root, file, config);
   read_record(root, file, config);
+  // What is shown is recorded: each take with its clips, which a page can fetch.
+  if (!config.recordings.empty() && !config.record) {
+    config.record.emplace().folder = config.recordings;
+    config.record->clips = true;
+  }
   read_trigger(root, config);
   read_metrics(root, config);
   for (const PortClash& clash : port_clashes(config)) {

@@ -8,6 +8,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "daemon/config/config.hpp"
 #include "daemon/control/uploads.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
@@ -48,7 +49,10 @@ Result<std::vector<FolderModel>> ModelFolder::list() const {
     const std::string_view kind = kind_of(entries->path());
     // Control characters in a name would reach people's terminals.
     if (kind.empty() || clean(name) != name || !entries->is_regular_file(ignored)) continue;
-    models.push_back({.name = name, .kind = kind});
+    const auto changed = entries->last_write_time(ignored).time_since_epoch().count();
+    models.push_back({.name = name,
+                      .kind = kind,
+                      .stamp = fmt::format("{} {}", changed, entries->file_size(ignored))});
   }
   if (error) {
     return fail("the folder of models cannot be read: " + error.message(), folder_.string());
@@ -90,13 +94,37 @@ Result<std::string> ModelFolder::add(const std::string& name, std::string_view b
   return fail("the model cannot be kept: " + error.message(), folder_.string());
 }
 
-Result<std::string> ModelFolder::read(std::string_view name) const {
+Result<FolderModel> ModelFolder::find(std::string_view name) const {
   const auto models = TRY(list());
-  if (std::ranges::find(models, name, &FolderModel::name) == models.end()) {
-    return fail(fmt::format(
-        "there is no model {} in the daemon's list; `posed ctl models` shows it", in_quotes(name)));
+  const auto found = std::ranges::find(models, name, &FolderModel::name);
+  if (found != models.end()) return *found;
+  return fail(fmt::format("there is no model {} in the daemon's list; `posed ctl models` shows it",
+                          in_quotes(name)));
+}
+
+Result<std::string> ModelFolder::rename(std::string_view name, const std::string& to) const {
+  TRY(check_writable());
+  const auto model = TRY(find(name));
+  if (!config::is_stream_name(to)) {
+    return misuse("a model's name has 1 to 32 of a-z, digits, '-' and '_', and no ending");
   }
-  return load_file(folder_ / name, {.what = "model", .max_bytes = kMaxModel});
+  const std::string file = to + std::filesystem::path(model.name).extension().string();
+  if (rename_to_new(folder_ / model.name, folder_ / file)) return file;
+  if (errno == EEXIST) return fail("there is a model " + in_quotes(file) + " already");
+  return fail("the model cannot be renamed: " + errno_text(), folder_.string());
+}
+
+Result<> ModelFolder::remove(std::string_view name) const {
+  TRY(check_writable());
+  const auto model = TRY(find(name));
+  std::error_code error;
+  if (std::filesystem::remove(folder_ / model.name, error)) return {};
+  return fail("the model cannot be deleted: " + error.message(), folder_.string());
+}
+
+Result<std::string> ModelFolder::read(std::string_view name) const {
+  const auto model = TRY(find(name));
+  return load_file(folder_ / model.name, {.what = "model", .max_bytes = kMaxModel});
 }
 
 }  // namespace posed::control

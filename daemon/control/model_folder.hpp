@@ -14,6 +14,7 @@ namespace posed::control {
 struct FolderModel {
   std::string name;       // of the file
   std::string_view kind;  // the stage that uses it, as the name's ending says: "style", "generate"
+  std::string stamp{};    // another one when the file has changed
 };
 
 // Reads the folder at each call, so that models may come and go. Any thread; cold.
@@ -31,10 +32,16 @@ class ModelFolder {
   // of this name: nothing is ever replaced. Returns the file's name. `name` is one of a stream
   // (config::is_stream_name()).
   Result<std::string> add(const std::string& name, std::string_view bytes) const;
+  // Gives a model of the list the name `to`, one of a stream, and its own ending. Never replaces a
+  // file. Returns the file's new name.
+  Result<std::string> rename(std::string_view name, const std::string& to) const;
+  // Deletes a model of the list.
+  Result<> remove(std::string_view name) const;
   // The bytes of a model of the list.
   Result<std::string> read(std::string_view name) const;
 
  private:
+  Result<FolderModel> find(std::string_view name) const;
   explicit ModelFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   std::filesystem::path folder_;

@@ -26,6 +26,7 @@ namespace posed::control {
 namespace {
 
 using devices::in_stream;
+constexpr std::size_t kMaxKnownWords = 512;
 using pipeline::Command;
 using pipeline::DeviceCommand;
 using pipeline::StageChange;
@@ -90,10 +91,12 @@ ControlledStream known_stream(const config::StreamConfig& config, const std::str
 }
 
 RequestHandler::RequestHandler(DaemonControl& daemon_control, devices::KeptSettings& kept,
-                               ModelFolder models, Clock clock, teach::Teacher* teacher)
+                               ModelFolder models, Clock clock, teach::Teacher* teacher,
+                               RecordingFolder recordings)
     : daemon_control_(daemon_control),
       kept_(kept),
       models_(std::move(models)),
+      recordings_(std::move(recordings)),
       clock_(clock),
       teacher_(teacher) {}
 
@@ -117,6 +120,11 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
   if (request.has_take()) return mark_take(request, std::move(requester));
   if (request.has_list_models()) return list_models(std::move(requester));
   if (request.has_teach()) return teach(request, std::move(requester));
+  if (request.has_rename_model() || request.has_delete_model()) {
+    return change_models(request, std::move(requester));
+  }
+  if (request.has_list_recordings()) return list_recordings(std::move(requester));
+  if (request.has_fetch_recording()) return fetch_recording(request, std::move(requester));
   std::string model;  // read without the lock: a disk may be slow
   if (request.has_use_model()) {
     auto read = models_.read(request.use_model().name());
@@ -171,7 +179,7 @@ Reply RequestHandler::mark_take(const v1::ControlRequest& request, Requester req
   return make_reply(std::move(requester), reply);
 }
 
-Reply RequestHandler::list_models(Requester requester) const {
+Reply RequestHandler::list_models(Requester requester) {
   const auto known = models_.list();
   if (!known) return refusal(std::move(requester), known.error().text());
   v1::ControlReply reply;
@@ -180,7 +188,86 @@ Reply RequestHandler::list_models(Requester requester) const {
     v1::KnownModel& entry = *reply.add_model();
     entry.set_name(model.name);
     entry.set_kind(std::string(model.kind));
+    const ModelWords words = words_of(model);
+    entry.set_learnt(words.learnt);
+    entry.set_skeleton(words.skeleton);
+    entry.set_verdict(words.verdict);
   }
+  return make_reply(std::move(requester), reply);
+}
+
+// A model is read again only when its file has changed: a page asks often.
+ModelWords RequestHandler::words_of(const FolderModel& model) {
+  const std::scoped_lock lock(words_mutex_);
+  if (words_.size() > kMaxKnownWords) words_.clear();  // of models that have gone, too
+  auto& [stamp, words] = words_[model.name];
+  if (stamp == model.stamp) return words;
+  const auto bytes = models_.read(model.name);
+  words = bytes ? words_of_model(*bytes, model.kind, model.name)
+                : ModelWords{.verdict = clean(bytes.error().text())};
+  stamp = model.stamp;
+  return words;
+}
+
+// A stream that uses the model would go on with it, and fail at its next start.
+Result<> RequestHandler::check_unused(const std::string& model) {
+  const std::scoped_lock lock(mutex_);
+  const auto uses = [&](const ControlledStream& stream) {
+    return std::ranges::any_of(stream.settings.stages, [&](const pipeline::StageSettings& stage) {
+      return stage.model_name == model;
+    });
+  };
+  for (const auto& [id, stream] : streams_) {
+    if (uses(stream)) {
+      return fail(fmt::format("{} uses it; give {} another model first", in_quotes(stream.name),
+                              in_quotes(stream.name)));
+    }
+  }
+  for (const auto& [name, stream] : known_) {
+    if (uses(stream)) return fail(in_quotes(name) + " begins with it; change its config first");
+  }
+  return {};
+}
+
+Reply RequestHandler::change_models(const v1::ControlRequest& request, Requester requester) {
+  const bool renames = request.has_rename_model();
+  const std::string& name = renames ? request.rename_model().name() : request.delete_model().name();
+  Result<> done = check_unused(name);
+  if (done && renames) {
+    const auto renamed = models_.rename(name, request.rename_model().to());
+    if (!renamed) done = std::unexpected(renamed.error());
+  } else if (done) {
+    done = models_.remove(name);
+  }
+  if (!done) return refusal(std::move(requester), done.error().text());
+  v1::ControlReply reply;
+  reply.set_ok(true);
+  return make_reply(std::move(requester), reply);
+}
+
+Reply RequestHandler::list_recordings(Requester requester) const {
+  const auto files = recordings_.list();
+  if (!files) return refusal(std::move(requester), files.error().text());
+  v1::ControlReply reply;
+  reply.set_ok(true);
+  for (const FolderRecording& file : *files) {
+    v1::KnownRecording& entry = *reply.add_recording();
+    entry.set_name(file.name);
+    entry.set_bytes(file.bytes);
+    entry.set_changed_unix_s(file.changed_unix_s);
+    entry.set_in_use(file.in_use);
+  }
+  return make_reply(std::move(requester), reply);
+}
+
+Reply RequestHandler::fetch_recording(const v1::ControlRequest& request,
+                                      Requester requester) const {
+  const auto& wanted = request.fetch_recording();
+  auto piece = recordings_.piece(wanted.name(), wanted.offset());
+  if (!piece) return refusal(std::move(requester), piece.error().text());
+  v1::ControlReply reply;
+  reply.set_ok(true);
+  reply.set_piece(std::move(*piece));
   return make_reply(std::move(requester), reply);
 }
 

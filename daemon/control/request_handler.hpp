@@ -17,6 +17,8 @@
 
 #include "daemon/config/daemon_config.hpp"
 #include "daemon/control/model_folder.hpp"
+#include "daemon/control/model_words.hpp"
+#include "daemon/control/recording_folder.hpp"
 #include "daemon/control/uploads.hpp"
 #include "daemon/devices/kept_settings.hpp"
 #include "daemon/devices/present_device.hpp"
@@ -107,7 +109,7 @@ class RequestHandler {
   // calibrations in use.
   RequestHandler(DaemonControl& daemon_control, devices::KeptSettings& kept,
                  ModelFolder models = {}, Clock clock = system::monotonic_ns,
-                 teach::Teacher* teacher = nullptr);
+                 teach::Teacher* teacher = nullptr, RecordingFolder recordings = {});
   ~RequestHandler();
   RequestHandler(const RequestHandler&) = delete;
   RequestHandler& operator=(const RequestHandler&) = delete;
@@ -185,7 +187,12 @@ class RequestHandler {
   Result<Done> set_model(const std::string& stream, std::span<const std::byte> bytes,
                          const std::string& name, UnderWay under_way);
   Result<Done> calibrate(const v1::ControlRequest& request, const Requester& requester);
-  [[nodiscard]] Reply list_models(Requester requester) const;
+  [[nodiscard]] Reply list_models(Requester requester);
+  ModelWords words_of(const FolderModel& model);
+  [[nodiscard]] Reply change_models(const v1::ControlRequest& request, Requester requester);
+  Result<> check_unused(const std::string& model);
+  [[nodiscard]] Reply list_recordings(Requester requester) const;
+  [[nodiscard]] Reply fetch_recording(const v1::ControlRequest& request, Requester requester) const;
   [[nodiscard]] Reply mark_take(const v1::ControlRequest& request, Requester requester);
   [[nodiscard]] Reply teach(const v1::ControlRequest& request, Requester requester);
   Result<> teach_step(const v1::ControlRequest& request);
@@ -211,8 +218,12 @@ class RequestHandler {
   DaemonControl& daemon_control_;
   devices::KeptSettings& kept_;
   const ModelFolder models_;
+  const RecordingFolder recordings_;
   Clock clock_;
   teach::Teacher* const teacher_;
+  // What the models of the folder say, by name, with what tells whether a file has changed since.
+  std::mutex words_mutex_;
+  std::map<std::string, std::pair<std::string, ModelWords>> words_;
   std::mutex mutex_;  // guards all below
   Streams streams_;
   std::map<std::string, ControlledStream> known_;  // by name, also those that are there

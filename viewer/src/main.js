@@ -7,14 +7,17 @@ import { Requests } from './link/requests.js';
 import { Store } from './streams/store.js';
 import { World } from './scene/world.js';
 import { Avatars } from './scene/avatars.js';
+import { Capture } from './scene/capture.js';
 import { Acks, controlWith } from './panel/acks.js';
 import { CameraPanel } from './panel/camera.js';
 import { Chosen } from './panel/chosen.js';
 import { Header } from './panel/header.js';
 import { Help } from './panel/help.js';
+import { ModelLibrary, Recordings } from './panel/library.js';
 import { StreamList } from './panel/stream_list.js';
 import { Takes } from './panel/takes.js';
 import { Theme } from './panel/theme.js';
+import { TimeControls } from './panel/time_controls.js';
 import { Tools } from './panel/tools.js';
 import { listenToKeys } from './panel/keyboard.js';
 import { Instruments } from './instruments/instruments.js';
@@ -84,7 +87,13 @@ class Page {
       (...words) => acks.say(...words),
       (...list) => this.tools.setAvatars(...list),
     );
-    this.tools = new Tools(find('.tools'), world, this.avatars);
+    const say = (...words) => acks.say(...words);
+    this.capture = new Capture(world, say);
+    this.tools = new Tools(find('.tools'), world, this.avatars, this.capture);
+    this.time = new TimeControls(find('.tools'), store, world);
+    this.library = new ModelLibrary({ control, requests, acks });
+    this.recordings = new Recordings({ control, requests, acks });
+    find('.shelves').append(this.library.element, this.recordings.element);
     this.legend = legend(find('.legend'));
   }
 
@@ -101,6 +110,7 @@ class Page {
       ArrowLeft: style((alpha) => alpha.nudge(-0.05)),
       ArrowRight: style((alpha) => alpha.nudge(0.05)),
       0: style((alpha) => alpha.nudge(-alpha.value)),
+      p: () => this.time.toggle(),
       r: () => this.tools.nextRaw(),
       t: () => this.tools.toggleTrails(),
       g: () => this.panel.gesture?.line.focus(),
@@ -218,6 +228,7 @@ class Page {
     this.world.choose(this.chosenName);
     this.list.update(this.chosen);
     this.panel.update(this.chosen, this.readOnly);
+    this.library.update(this.chosen);
     this.takes.update(store.stats, this.readOnly);
     this.camera.update(this.hello, this.readOnly);
     this.header.update(this.hello && this.daemon.alive ? store.stats : null);
@@ -243,6 +254,8 @@ class Page {
     this.fresh = [];
     const drawn = this.world.frame((performer) => this.fresh.push(performer.stream));
     const done_ms = performance.now();
+    // What is shown of the past is no measure of the present.
+    if (this.store.rewind.paused) this.fresh.length = 0;
     for (const stream of this.fresh) this.instruments.add(stream, done_ms, this.#poseClock);
     if (drawn && this.chosen) this.panel.mark(this.chosen);
     if (now_ms - this.#tagged_ms > TAGS_EVERY_MS) {

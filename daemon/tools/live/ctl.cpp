@@ -52,6 +52,7 @@ struct CtlOptions {
   double seconds = 0.0;  // of a warm-up
   bool loop = false;
   std::string take;  // name
+  std::string new_name;  // of a model
   TeachOptions teach;
 };
 
@@ -198,7 +199,38 @@ int list_models(const CtlOptions& options) {
     }
     for (const v1::KnownModel& model : reply.model()) {
       std::printf("%-10s %s\n", model.kind().c_str(), clean(model.name()).c_str());
+      for (const std::string& words : {model.learnt(), model.verdict()}) {
+        if (!words.empty()) std::printf("           %s\n", clean(words).c_str());
+      }
     }
+  });
+}
+
+int list_recordings(const CtlOptions& options) {
+  v1::ControlRequest request;
+  request.mutable_list_recordings();
+  return ask_and_print(options, request, [](const v1::ControlReply& reply) {
+    for (const v1::KnownRecording& file : reply.recording()) {
+      std::printf("%10.1f MB  %s%s\n", static_cast<double>(file.bytes()) / 1e6,
+                  clean(file.name()).c_str(), file.in_use() ? "  (is being written)" : "");
+    }
+  });
+}
+
+int rename_model(const CtlOptions& options) {
+  v1::ControlRequest request;
+  request.mutable_rename_model()->set_name(options.model.string());
+  request.mutable_rename_model()->set_to(options.new_name);
+  return ask_and_print(options, request, [&](const v1::ControlReply&) {
+    std::printf("%s is named %s now\n", options.model.c_str(), options.new_name.c_str());
+  });
+}
+
+int delete_model(const CtlOptions& options) {
+  v1::ControlRequest request;
+  request.mutable_delete_model()->set_name(options.model.string());
+  return ask_and_print(options, request, [&](const v1::ControlReply&) {
+    std::printf("%s is deleted\n", options.model.c_str());
   });
 }
 
@@ -452,6 +484,17 @@ void add_style_actions(Actions& actions, CtlOptions& options) {
                                          use_model, R"(Example:
   posed ctl use-model walker march.style   # nothing is sent: the daemon has the file)");
   use->add_option("model", options.model, "Its name, as `posed ctl models` prints it")->required();
+  CLI::App* rename = actions.add("rename-model", "Give a model of the daemon's list another name",
+                                 rename_model, "Example:\n  posed ctl rename-model proud.style proud-ann");
+  rename->add_option("model", options.model, "Its name, as `posed ctl models` prints it")->required();
+  rename->add_option("name", options.new_name, "The new one, without the ending")->required();
+  CLI::App* gone = actions.add("delete-model", "Delete a model of the daemon's list for good",
+                               delete_model, "Example:\n  posed ctl delete-model proud-2.style");
+  gone->add_option("model", options.model, "Its name, as `posed ctl models` prints it")->required();
+  static_cast<void>(actions.add("recordings", "List the logs and clips that the daemon shows",
+                                list_recordings,
+                                "Example:\n  posed ctl recordings\nThe config names their folder: "
+                                "[control] recordings = \"takes\"."));
   add_teach(actions, options.teach);
 }
 

@@ -22,46 +22,13 @@
 #include "daemon/system/clock.hpp"
 #include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/command/output_files.hpp"
-#include "daemon/tools/export/log_clip.hpp"
-#include "proto/clip/clip.hpp"
-#include "proto/clip/frames_clip.hpp"
+#include "daemon/tools/run/take_clips.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/log/schema.hpp"
 #include "proto/log/writer.hpp"
 
 namespace posed::tools {
 namespace {
-
-Result<> write_clip(Result<clip::Clip> clip, const std::filesystem::path& path) {
-  if (!clip) return std::unexpected(clip.error());
-  std::error_code error;
-  if (std::filesystem::exists(path, error)) return fail("exists already", path.string());
-  never_replace(path);
-  clip::hold_missing(*clip);
-  for (const std::string& warning : clip->warnings) {
-    spdlog::warn("{}: {}", path.string(), warning);
-  }
-  TRY(clip::write_bvh(*clip, path));
-  spdlog::info("wrote {}: {} frames", path.string(), clip->frames());
-  return {};
-}
-
-// Writes each take of each stream with a pose as <log without .plog>-<take>-<stream>.bvh. A clip
-// that cannot be written is a warning; the log is not changed. An end signal that comes meanwhile
-// ends the work with an error: block end_signals() before.
-Result<> write_take_clips(const std::filesystem::path& log) {
-  const std::string stem = (log.parent_path() / log.stem()).string();
-  const auto write = [&](const log::TakeRow& take, const std::string& stream,
-                         Result<clip::Clip> clip) {
-    const std::string path = stem + "-" + std::to_string(take.id) + "-" + stream + ".bvh";
-    if (auto written = write_clip(std::move(clip), path); !written) {
-      spdlog::warn("take {} of stream {} is no clip: {}", take.id, stream, written.error().text());
-    }
-  };
-  const sigset_t signals = end_signals();
-  constexpr timespec kAtOnce{};
-  return each_take_clip(log, write, [&] { return sigtimedwait(&signals, nullptr, &kAtOnce) <= 0; });
-}
 
 // SetAside keeps a device log that is about to be replaced under another name until the new log has
 // been started successfully.
@@ -281,6 +248,8 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
   auto replaced = TRY(SetAside::move(plan.overwrite ? plan.out : ""));
   const auto name = plan.out.empty() ? new_log(plan.folder) : LogName{plan.out};
   if (!name) return std::unexpected(name.error());
+  std::unique_ptr<TakeClips> clips;
+  if (plan.clips) clips = std::make_unique<TakeClips>(name->path);
   record::RecorderOptions recorder_options{
       .file = name->path,
       .reserved = name->reserved,
@@ -289,8 +258,9 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
       .config_text = config.text,
       .publish_endpoint = config.publish_endpoint,
       .clock = system::monotonic_ns,
-      .report = [&daemon, started](const record::RecorderEvent& event) {
+      .report = [&daemon, &clips, started](const record::RecorderEvent& event) {
         if (*started) post(daemon, event);
+        if (clips && event.kind == record::RecorderEvent::Kind::kTake) clips->take_changed();
       }};
   std::set<std::uint32_t> with_body;  // sources, by number
   auto recorder = TRY(record::Recorder::open(
@@ -333,7 +303,7 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
     if (!with_body.contains(source->number)) warn_of_no_body(source->config.name);
   }
   print_result(plan, daemon, *recorder, took_s);
-  if (finished && plan.clips) return write_take_clips(name->path);
+  if (finished && clips) return clips->finish();
   return finished;
 }
 

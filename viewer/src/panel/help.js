@@ -8,6 +8,7 @@ const KEYS = [
   ['0', 'no style'],
   ['1 2', 'view: follow the chosen one, turn round it'],
   ['3 4 5', 'view of everybody: front, side, top'],
+  ['p', 'pause, and go back over the last 30 s; again: live'],
   ['r', 'raw pose: beside, as ghost, off'],
   ['t', 'trails of the feet'],
   ['g', 'write gestures to perform; Enter plays them'],

@@ -1,21 +1,28 @@
 // The model of a stage: one of the daemon's list, or a file of one's own.
 import { sendModel } from '../link/upload.js';
-import { el, labelled } from './dom.js';
+import { el, labelled, write } from './dom.js';
 
 const ASK_AGAIN_MS = 5000; // for a list that was refused or did not come
 const NO_LIST = 'the daemon offers no list: [control] models names a folder';
 
 export class ModelControls {
+  static #used = new Map(); // by stream and stage: {now, before}, also when the controls are made again
   element = el('div.group');
 
   // kind: the stage that uses it, style or generate
   constructor(stream, kind, { control, requests, acks }) {
     Object.assign(this, { name: stream.name, kind, control, requests, acks });
-    this.choice = el('select', { onchange: () => this.#use() });
+    this.choice = el('select', { onchange: () => this.#use(this.choice.value) });
     this.file = el('input', { type: 'file', hidden: true, onchange: () => this.#send() });
     this.progress = el('progress', { max: 1, value: 0, hidden: true });
     const pick = el('button', { type: 'button', onclick: () => this.file.click() }, 'Send a file…');
-    this.element.append(labelled('Model', this.choice, pick), this.file, this.progress);
+    this.back = el('button', {
+      type: 'button',
+      hidden: true,
+      title: 'The model before; again: this one. So they are compared',
+      onclick: () => this.#use(this.back.value),
+    });
+    this.element.append(labelled('Model', this.choice, pick), this.back, this.file, this.progress);
     this.list();
   }
 
@@ -37,10 +44,23 @@ export class ModelControls {
     this.choice.value = this.current ?? '';
     this.choice.disabled = names.length === 0;
     this.choice.title = names.length === 0 ? this.refusal || NO_LIST : '';
+    const { before = '' } = ModelControls.#used.get(this.#key) ?? {};
+    this.back.hidden = !names.includes(before); // a file that was sent is nowhere to be had again
+    this.back.value = before;
+    write(this.back, `Back to ${before}`);
   }
 
-  async #use() {
-    const { value } = this.choice;
+  get #key() {
+    return `${this.kind} ${this.name}`;
+  }
+
+  #remember(model) {
+    const used = ModelControls.#used.get(this.#key);
+    if (used?.now !== model)
+      ModelControls.#used.set(this.#key, { now: model, before: used?.now ?? '' });
+  }
+
+  async #use(value) {
     const reply = await this.control(
       { use_model: { stream: this.name, name: value } },
       `${this.name}: model ${value}`,
@@ -69,6 +89,8 @@ export class ModelControls {
     const model = stream.stage(this.kind)?.model ?? '';
     if (model === this.current) return;
     this.current = model;
+    this.#remember(model);
     this.#fill();
+    if (model && !this.names?.includes(model)) this.list(); // it may be one that was just taught
   }
 }

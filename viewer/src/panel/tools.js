@@ -10,8 +10,8 @@ const word = (name) => name[0].toUpperCase() + name.slice(1);
 export class Tools {
   #views = new Map();
 
-  // avatars: {wear(name | null), load(file)}
-  constructor(element, world, avatars) {
+  // avatars: {wear(name | null), load(file)}; capture: of pictures
+  constructor(element, world, avatars, capture) {
     this.world = world;
     this.raw = el('button', {
       type: 'button',
@@ -40,10 +40,26 @@ export class Tools {
       title: 'How bodies look; drop a .vrm file on the scene for your own',
     });
     this.avatar.onchange = () => avatars.wear(this.avatar.value || null);
+    const picture = el(
+      'button',
+      { type: 'button', onclick: () => capture.picture(), title: 'Keep the scene as PNG' },
+      'Picture',
+    );
+    const video = el(
+      'button',
+      { type: 'button', title: 'Keep ten seconds of the scene as WebM', aria: { pressed: 'false' } },
+      'Video 10 s',
+    );
+    video.onclick = () =>
+      capture.video((records) => {
+        write(video, records ? 'Stop video' : 'Video 10 s');
+        video.setAttribute('aria-pressed', String(records));
+      });
     element.append(
       el('div.joined', {}, ...this.#views.values()),
       el('div.joined', {}, this.raw, this.trails),
       this.avatar,
+      el('div.joined', {}, picture, video),
     );
     world.onView = (name) => this.#mark(name);
     this.#mark(world.views.name);

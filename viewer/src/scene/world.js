@@ -31,6 +31,7 @@ export class World {
   #chosen = null; // the stream whose body follow and orbit look at
   #pace = new Pace();
   #areas = { bodies: null, hands: null };
+  #wanted = []; // who waits for a picture
   #arranged = ''; // the streams of the last statistics that moved somebody
 
   // stage: the element with the canvas, the hands' inset and the names' layer.
@@ -231,6 +232,14 @@ export class World {
     return { left: left - outer.left, top: top - outer.top, width, height, covered };
   }
 
+  // A PNG of the next picture, which is drawn for it.
+  picture() {
+    this.touch();
+    return new Promise((done) => {
+      this.#wanted.push(done);
+    });
+  }
+
   // Shows the newest poses. shown(performer) is called for each that is new. Returns whether
   // anything was drawn.
   frame(shown) {
@@ -242,6 +251,8 @@ export class World {
     this.#dirty -= 1;
     this.#look();
     this.#draw();
+    // At once: what was drawn is gone after this task.
+    for (const done of this.#wanted.splice(0)) this.canvas.toBlob(done, 'image/png');
     if (!this.fine && this.#pace.drawn(performance.now())) this.resize();
     return true;
   }

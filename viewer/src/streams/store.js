@@ -3,6 +3,7 @@ import { Event, Skeleton, Stats, EVENT_KINDS } from '../wire/schema.js';
 import { Pose, readPose } from '../wire/pose.js';
 import { decode } from '../wire/message.js';
 import { Words } from '../wire/words.js';
+import { Rewind } from './rewind.js';
 import { RAW_SUFFIX, Stream } from './stream.js';
 
 const MOST_STREAMS = 256;
@@ -15,6 +16,7 @@ export class Store extends EventTarget {
   stats_at_ms = NaN; // performance.now() when they came
   events = []; // {stream, kind, text, sequence}, oldest first
   damaged = 0; // messages that could not be read
+  rewind = new Rewind();
   #topics = new Words();
   #spare = new Pose();
 
@@ -42,10 +44,30 @@ export class Store extends EventTarget {
   #pose(topic, bytes, from) {
     const stream = this.#byTopic.get(topic) ?? this.#named(topic);
     if (!stream) return;
+    const now_ms = performance.now();
+    if (this.rewind.paused) {
+      stream.absent = 0; // it is there; what is shown is the past
+      return;
+    }
+    this.#exchange(stream, bytes, from);
+    this.rewind.keep(topic, bytes, from, now_ms); // only what could be read
+    stream.posed(now_ms);
+  }
+
+  #exchange(stream, bytes, from) {
     const pose = readPose(bytes, from, this.#spare);
     this.#spare = stream.pose;
     stream.pose = pose;
-    stream.posed(performance.now());
+  }
+
+  // Shows the scene as it was so long before the pause.
+  look(ago_ms) {
+    this.rewind.at(ago_ms, (topic, bytes, from) => {
+      const stream = this.#byTopic.get(topic);
+      if (!stream) return;
+      this.#exchange(stream, bytes, from);
+      stream.version += 1;
+    });
   }
 
   #byTopic = new Map();

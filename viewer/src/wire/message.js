@@ -19,6 +19,11 @@ function defaults(table) {
 }
 
 function value(reader, type) {
+  if (type === 'bytes') {
+    const size = reader.length();
+    reader.at += size;
+    return reader.bytes.subarray(reader.at - size, reader.at);
+  }
   if (typeof type === 'string') return reader[type]();
   const size = reader.length();
   const { end } = reader;

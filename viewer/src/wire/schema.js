@@ -126,6 +126,9 @@ const ModelPart = {
 
 const Take = { 1: ['start', 'bool'], 2: ['name', 'string'] };
 const UseModel = { 1: ['stream', 'string'], 2: ['name', 'string'] };
+const FetchRecording = { 1: ['name', 'string'], 2: ['offset', 'uint'] };
+const RenameModel = { 1: ['name', 'string'], 2: ['to', 'string'] };
+const DeleteModel = { 1: ['name', 'string'] };
 const Nothing = {};
 
 const Mark = { 1: ['style', 'bool'], 2: ['seconds', 'double'] };
@@ -146,9 +149,26 @@ export const ControlRequest = {
   13: ['list_models', Nothing, '?'],
   14: ['use_model', UseModel, '?'],
   15: ['teach', Teach, '?'],
+  20: ['list_recordings', Nothing, '?'],
+  21: ['fetch_recording', FetchRecording, '?'],
+  22: ['rename_model', RenameModel, '?'],
+  23: ['delete_model', DeleteModel, '?'],
 };
 
-const KnownModel = { 1: ['name', 'string'], 2: ['kind', 'string'] };
+const KnownModel = {
+  1: ['name', 'string'],
+  2: ['kind', 'string'],
+  3: ['learnt', 'string'],
+  4: ['skeleton', 'string'],
+  5: ['verdict', 'string'],
+};
+
+const KnownRecording = {
+  1: ['name', 'string'],
+  2: ['bytes', 'uint'],
+  3: ['changed_unix_s', 'int'],
+  4: ['in_use', 'bool'],
+};
 
 const TaughtWalk = { 1: ['good', 'bool'], 2: ['sentence', 'string'] };
 const Teaching = {
@@ -175,6 +195,8 @@ export const ControlReply = {
   7: ['model', KnownModel, '*'],
   8: ['recorder_trouble', 'string'],
   9: ['teaching', Teaching, '?'],
+  20: ['recording', KnownRecording, '*'],
+  21: ['piece', 'bytes', '?'],
 };
 
 // posed.v1.Event.Kind, by number.

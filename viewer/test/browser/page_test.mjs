@@ -405,6 +405,90 @@ pageTests(
       await acknowledged(page, 'sway=0.40');
       assert.equal(bridge.daemon.bodies[0].weights, 'sway=0.40,march=0.30');
     },
+    'the model before is one click away, and back again': async (page, bridge) => {
+      await page.getByLabel('Model', { exact: true }).selectOption('tired.style');
+      await acknowledged(page, 'model tired.style: applied');
+      await page.getByRole('button', { name: 'Back to march-to-sway.style' }).click();
+      await page.getByRole('button', { name: 'Back to tired.style' }).waitFor(PATIENCE);
+      assert.equal(bridge.daemon.bodies[0].model, 'march-to-sway.style');
+    },
+    "the daemon's models are used, renamed, and deleted when that is confirmed": async (
+      page,
+      bridge,
+    ) => {
+      await unfold(page, 'Library of models');
+      const shelf = page.locator('.shelves');
+      const button = (name) => shelf.getByRole('button', { name, exact: true });
+      await shelf.getByText('march -> sway, from 12 clips of ann').waitFor(PATIENCE);
+      await button('Delete: march-to-sway.style').click();
+      await button('Delete').click();
+      await acknowledged(page, "refused: 'walker' uses it");
+      await button('Use: tired.style').click();
+      await acknowledged(page, 'model tired.style: applied');
+      await button('Use: hand.gesture').click();
+      await acknowledged(page, 'choose a stream that has the stage generate');
+      await button('Delete: march-to-sway.style').click();
+      await button('Keep as it is').click();
+      await button('Rename: march-to-sway.style').click();
+      await shelf.getByLabel('New name of march-to-sway.style').fill('sway');
+      await button('Rename').click();
+      await shelf.getByText('sway.style', { exact: true }).waitFor(PATIENCE);
+      await button('Delete: sway.style').click();
+      assert.equal(bridge.daemon.models.length, 3);
+      await button('Delete').click();
+      await acknowledged(page, 'sway.style: deleted');
+      assert.equal(bridge.daemon.models.length, 2);
+      await page.locator('summary', { hasText: 'Library of models' }).click();
+    },
+    'a recording is downloaded whole; one that is being written is not offered': async (page) => {
+      await unfold(page, 'Recordings');
+      assert.ok(await page.getByLabel('being written: 20261126T065505Z.plog').isDisabled());
+      const [download] = await Promise.all([
+        page.waitForEvent('download', PATIENCE),
+        page.getByLabel('Download: 20261126T065505Z-1-walker.bvh').click(),
+      ]);
+      assert.equal(download.suggestedFilename(), '20261126T065505Z-1-walker.bvh');
+      const bytes = readFileSync(await download.path());
+      assert.equal(bytes.length, 70000);
+      assert.ok(bytes.every((byte, i) => byte === i % 251));
+      await page.locator('summary', { hasText: 'Recordings' }).click();
+    },
+    'a picture and a video of the scene are files': async (page) => {
+      const [picture] = await Promise.all([
+        page.waitForEvent('download', PATIENCE),
+        page.getByRole('button', { name: 'Picture' }).click(),
+      ]);
+      assert.match(picture.suggestedFilename(), /^posed-\d{8}T\d{6}\.png$/);
+      assert.equal(readFileSync(await picture.path()).toString('latin1', 1, 4), 'PNG');
+      const [video] = await Promise.all([
+        page.waitForEvent('download', PATIENCE),
+        page.evaluate(() => globalThis.posedPage.capture.video(() => {}, 1)),
+      ]);
+      assert.match(video.suggestedFilename(), /\.webm$/);
+      assert.ok(readFileSync(await video.path()).length > 1000);
+    },
+    'the scene stops, goes back, and is live again': async (page) => {
+      const first = await places(page, 'walker');
+      await page.waitForTimeout(1500);
+      await page.locator('.stage canvas').focus();
+      await page.keyboard.press('p');
+      const range = page.getByLabel('Seconds before the pause');
+      await page.waitForTimeout(500);
+      const stopped = await places(page, 'walker');
+      await page.waitForTimeout(500);
+      assert.deepEqual(await places(page, 'walker'), stopped);
+      await range.fill('-1.5');
+      const back = ([stream, was]) =>
+        globalThis.posedPage.store.streams
+          .get(stream)
+          .kinematics.position.some((value, i) => Math.abs(value - was[i]) > 0.01);
+      await page.waitForFunction(back, ['walker', stopped], PATIENCE);
+      const past = await places(page, 'walker');
+      assert.notDeepEqual(past, first);
+      await page.getByRole('button', { name: 'Live' }).click();
+      await page.waitForFunction(back, ['walker', past], PATIENCE);
+      assert.ok(await range.isHidden());
+    },
     'who starts a take while the disk is full is told so': async (page, bridge) => {
       bridge.daemon.recorder_trouble = 'take1.plog: the disk is full';
       await page.getByLabel('Take name').fill('');

@@ -6,11 +6,21 @@ import { encode } from './messages.mjs';
 const BODY_JOINTS = bodySkeleton({ stage: [] }).parent;
 const ALPHA_PER_S = 2;
 const GESTURE_S = 0.7;
+const RECORDED = Uint8Array.from({ length: 70000 }, (_, i) => i % 251); // bytes of a clip
 const ROOTS = ['off', 'stride', 'actor'];
 
 export class FakeDaemon {
   frames = 0;
   take = null;
+  models = [
+    { name: 'march-to-sway.style', kind: 'style', learnt: 'march -> sway, from 12 clips of ann' },
+    { name: 'tired.style', kind: 'style', verdict: 'closes 90 % of the way to tired' },
+    { name: 'hand.gesture', kind: 'generate', learnt: 'gestures g 1 c' },
+  ];
+  recordings = [
+    { name: '20261126T065505Z.plog', bytes: 9e6, changed_unix_s: 1795590000, in_use: true },
+    { name: '20261126T065505Z-1-walker.bvh', bytes: RECORDED.length, changed_unix_s: 1795580000 },
+  ];
   takes = 0;
 
   // bodies, hands: how many; rate_hz: of all of them; missing: joints of styled bodies without a
@@ -213,15 +223,11 @@ export class FakeDaemon {
     if (kind === 'stage_command' && hand) return this.#command(hand, details, done);
     if (kind === 'take') return this.#mark(details);
     if (kind === 'teach' && body) return { ok: true, teaching: this.#teach(body, details) };
-    if (kind === 'list_models')
-      return {
-        ok: true,
-        model: [
-          { name: 'march-to-sway.style', kind: 'style' },
-          { name: 'tired.style', kind: 'style' },
-          { name: 'hand.gesture', kind: 'generate' },
-        ],
-      };
+    if (kind === 'list_models') return { ok: true, model: this.models };
+    if (kind === 'rename_model' || kind === 'delete_model') return this.#keep(kind, details);
+    if (kind === 'list_recordings') return { ok: true, recording: this.recordings };
+    if (kind === 'fetch_recording')
+      return { ok: true, piece: RECORDED.subarray(details.offset ?? 0, (details.offset ?? 0) + 32768) };
     if (kind === 'use_model' && body) {
       body.model = details.name;
       return done;
@@ -230,6 +236,15 @@ export class FakeDaemon {
       return done;
     if (kind === 'model_part') return { ok: true };
     return { ok: false, error: `there is no stream "${details.stream}" that can do this` };
+  }
+
+  #keep(kind, { name, to }) {
+    const model = this.models.find((one) => one.name === name);
+    if (this.bodies.some((body) => body.model === name))
+      return { ok: false, error: `'walker' uses it; give 'walker' another model first` };
+    if (kind === 'delete_model') this.models = this.models.filter((one) => one !== model);
+    else model.name = `${to}.style`;
+    return { ok: true };
   }
 
   #set(body, { name, number, text, flag }, done) {

@@ -62,7 +62,8 @@ test('requests are matched with their answers by number', async () => {
     reference.encode('ControlReply', { ok: true, model: [{ name: 'a.style', kind: 'style' }] }),
     0,
   );
-  assert.deepEqual((await second).model, [{ name: 'a.style', kind: 'style' }]);
+  const [model] = (await second).model;
+  assert.deepEqual([model.name, model.kind], ['a.style', 'style']);
   requests.refused(1, 'it does not answer');
   assert.deepEqual([(await first).ok, (await first).error], [false, 'it does not answer']);
   requests.reply(99, new Uint8Array(), 0); // nobody asked

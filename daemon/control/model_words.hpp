@@ -1,0 +1,19 @@
+// What a model file says of itself, for lists that people read. Any thread; cold.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace posed::control {
+
+struct ModelWords {
+  std::string learnt{};    // "walk -> sneak, from 12 clips of 6 people"; empty: it does not say
+  std::string skeleton{};  // whom it serves
+  std::string verdict{};   // of the training; of bytes that are no model: what is wrong with them
+};
+
+// `kind` as FolderModel has it. Never fails: bytes that are no model get a verdict that says so.
+[[nodiscard]] ModelWords words_of_model(std::string_view bytes, std::string_view kind,
+                                        const std::string& name);
+
+}  // namespace posed::control

@@ -1,0 +1,43 @@
+// RecordingFolder: the logs and clips that a client may list and fetch by name. Nothing from the
+// network names a path: a name counts only if it is exactly one of the list. Reads the folder at
+// each call. Any thread; cold.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "proto/frame/result.hpp"
+
+namespace posed::control {
+
+inline constexpr std::size_t kMaxRecordingPiece = 32 * 1024;  // bytes
+
+struct FolderRecording {
+  std::string name;  // of the file
+  std::uint64_t bytes = 0;
+  std::int64_t changed_unix_s = 0;
+  bool in_use = false;  // a log that has not become a single file yet
+};
+
+class RecordingFolder {
+ public:
+  RecordingFolder() = default;  // no folder: each call says how to name one
+  // The folder need not be there yet.
+  explicit RecordingFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
+
+  // Regular files that end in .plog or .bvh, the newest first; at most 256.
+  Result<std::vector<FolderRecording>> list() const;
+  // At most kMaxRecordingPiece bytes of a file of the list from `offset` on; empty at its end. A log
+  // that is in use is refused.
+  Result<std::string> piece(std::string_view name, std::uint64_t offset) const;
+
+ private:
+  std::filesystem::path folder_;
+};
+
+}  // namespace posed::control

@@ -1,0 +1,158 @@
+// The folders of the daemon: its models, to use, rename and delete, and its recordings, to download.
+// A list is asked for when it is unfolded, and again after each change.
+import { fetchRecording, keepFile } from '../link/download.js';
+import { el, write } from './dom.js';
+import { megabytes } from './numbers.js';
+
+class List {
+  // context: {control, requests, acks}
+  constructor(title, context) {
+    Object.assign(this, context);
+    this.words = el('p.note', { role: 'status' });
+    this.items = el('ul.shelf');
+    const again = el('button.quiet', { type: 'button', onclick: () => this.list() }, 'Look again');
+    this.element = el(
+      'details',
+      { ontoggle: () => this.element.open && this.list() },
+      el('summary', {}, title),
+      this.words,
+      this.items,
+      again,
+    );
+  }
+
+  // request: that lists; field: of the reply
+  async show(request, field, none) {
+    const reply = await this.requests.ask(request);
+    const entries = reply.ok ? reply[field] : [];
+    write(this.words, reply.ok ? (entries.length === 0 ? none : '') : reply.error);
+    this.items.replaceChildren(...entries.map((entry) => this.item(entry)));
+  }
+}
+
+export class ModelLibrary extends List {
+  constructor(context) {
+    super('Library of models', context);
+  }
+
+  list() {
+    return this.show({ list_models: {} }, 'model', 'The folder of models is empty.');
+  }
+
+  // stream: the chosen one, which a model is given to
+  update(stream) {
+    this.stream = stream;
+  }
+
+  item({ name, kind, learnt, skeleton, verdict }) {
+    const buttons = el('div.buttons');
+    const row = el(
+      'li',
+      {},
+      el('strong', {}, name),
+      ...[learnt, skeleton && `skeleton: ${skeleton}`, verdict]
+        .filter(Boolean)
+        .map((text) => el('p.note', {}, text)),
+      buttons,
+    );
+    this.#offer(buttons, name, kind);
+    return row;
+  }
+
+  #offer(buttons, name, kind) {
+    const button = (text, onclick) =>
+      el('button', { type: 'button', onclick, aria: { label: `${text}: ${name}` } }, text);
+    buttons.replaceChildren(
+      button('Use', () => this.#use(name, kind)),
+      button('Rename', () => this.#rename(buttons, name, kind)),
+      button('Delete', () => this.#delete(buttons, name, kind)),
+    );
+  }
+
+  #use(name, kind) {
+    if (this.stream?.stage(kind))
+      this.control(
+        { use_model: { stream: this.stream.name, name } },
+        `${this.stream.name}: model ${name}`,
+      );
+    else this.acks.say(`choose a stream that has the stage ${kind}: only it uses ${name}`, 'bad');
+  }
+
+  // Asks in the row itself.
+  #ask(buttons, name, kind, { field, what, doIt }) {
+    const keep = () => this.#offer(buttons, name, kind);
+    const yes = el('button.strong', { type: 'submit' }, what);
+    const no = el('button', { type: 'button', onclick: keep }, 'Keep as it is');
+    const form = el('form.buttons', {}, field, yes, no);
+    form.onsubmit = async (event) => {
+      event.preventDefault();
+      const reply = await doIt();
+      if (reply.ok) this.list();
+      else keep();
+    };
+    buttons.replaceChildren(form);
+    (field.focus ? form.querySelector('input, button') : yes).focus();
+  }
+
+  #rename(buttons, name, kind) {
+    const field = el('input', {
+      type: 'text',
+      value: name.replace(/\.[a-z]+$/, ''),
+      maxLength: 32,
+      aria: { label: `New name of ${name}` },
+    });
+    const doIt = () =>
+      this.control(
+        { rename_model: { name, to: field.value } },
+        `${name}: its name is ${field.value}`,
+      );
+    this.#ask(buttons, name, kind, { field, what: 'Rename', doIt });
+  }
+
+  #delete(buttons, name, kind) {
+    const field = el('span', {}, `Delete ${name} for good?`);
+    const doIt = () => this.control({ delete_model: { name } }, `${name}: deleted`);
+    this.#ask(buttons, name, kind, { field, what: 'Delete', doIt });
+  }
+}
+
+export class Recordings extends List {
+  constructor(context) {
+    super('Recordings', context);
+  }
+
+  list() {
+    return this.show(
+      { list_recordings: {} },
+      'recording',
+      'Nothing is recorded yet. A take is here as BVH soon after it ends.',
+    );
+  }
+
+  item(file) {
+    const { name, bytes, changed_unix_s: changed, in_use: inUse } = file;
+    const when = new Date(1000 * changed).toLocaleString();
+    const size = bytes < 1e5 ? `${Math.ceil(bytes / 1000)} kB` : megabytes(bytes);
+    const words = el('span.note', {}, `${size}, ${when}`);
+    const text = inUse ? 'being written' : 'Download';
+    const save = el(
+      'button',
+      { type: 'button', disabled: inUse, aria: { label: `${text}: ${name}` } },
+      text,
+    );
+    save.onclick = () => this.#save(file, save);
+    return el('li', {}, el('strong', {}, name), el('div.buttons', {}, words, save));
+  }
+
+  async #save(file, button) {
+    button.disabled = true;
+    const ask = (request) => this.requests.ask(request);
+    const { blob, error } = await fetchRecording(ask, file, (share) =>
+      write(button, `${Math.round(100 * share)} %`),
+    );
+    button.disabled = false;
+    write(button, 'Download');
+    if (blob) keepFile(blob, file.name);
+    else this.acks.say(`${file.name}: refused: ${error}`, 'bad');
+  }
+}
