@@ -79,11 +79,10 @@ Result<> TakeClips::finish() {
 // A clip that cannot be written is a warning; the log is not changed.
 Result<> TakeClips::write(bool all, const std::stop_token& stop) {
   const std::string stem = (log_.parent_path() / log_.stem()).string();
-  std::set<std::int64_t> done;
   const auto each = [&](const log::TakeRow& take, const std::string& stream,
                         Result<clip::Clip> clip) {
-    if (written_.contains(take.id) || (!all && take.last_item == log::kToTheEnd)) return;
-    done.insert(take.id);
+    if (!all && take.last_item == log::kToTheEnd) return;
+    if (!written_.emplace(take.id, stream).second) return;
     const std::string path = stem + "-" + std::to_string(take.id) + "-" + stream + ".bvh";
     if (auto written = write_clip(std::move(clip), path); !written) {
       spdlog::warn("take {} of stream {} is no clip: {}", take.id, stream, written.error().text());
@@ -91,9 +90,7 @@ Result<> TakeClips::write(bool all, const std::stop_token& stop) {
   };
   // During the run the signals are for who serves.
   const auto goes_on = [&] { return all ? !end_signal_came() : !stop.stop_requested(); };
-  auto replayed = each_take_clip(log_, each, goes_on);
-  written_.merge(done);
-  return replayed;
+  return each_take_clip(log_, each, goes_on);
 }
 
 }  // namespace posed::tools

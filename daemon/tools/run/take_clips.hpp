@@ -2,11 +2,14 @@
 #pragma once
 
 #include <condition_variable>
+#include <cstdint>
 #include <filesystem>
 #include <mutex>
 #include <set>
 #include <stop_token>
+#include <string>
 #include <thread>
+#include <utility>
 
 #include "proto/frame/result.hpp"
 
@@ -32,7 +35,8 @@ class TakeClips {
   Result<> write(bool all, const std::stop_token& stop);
 
   std::filesystem::path log_;
-  std::set<std::int64_t> written_;  // takes; of the thread, then of finish()
+  // Takes and streams; of the thread, then of finish().
+  std::set<std::pair<std::int64_t, std::string>> written_;
   std::mutex mutex_;
   std::condition_variable_any wake_;
   bool changed_ = false;

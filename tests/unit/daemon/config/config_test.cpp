@@ -271,6 +271,17 @@ TEST_CASE("the tables of recordings and triggers are checked") {
   CHECK(reading.config.record->folder == "/logs");
   CHECK(reading.config.record->clips);
   CHECK(reading.config.trigger->peers.size() == 1);
+  // What clients may fetch is recorded, unless [record] says otherwise.
+  const std::string shows = "[control]\nrecordings = \"/takes\"\n";
+  const Reading shown = read(shows + std::string(kWalker));
+  REQUIRE(shown.errors.empty());
+  CHECK(shown.config.recordings == "/takes");
+  CHECK(shown.config.record->folder == "/takes");
+  CHECK(shown.config.record->clips);
+  const Reading both = read(shows + "[record]\nfolder = \"/logs\"\n" + std::string(kWalker));
+  REQUIRE(both.errors.empty());
+  CHECK(both.config.record->folder == "/logs");
+  CHECK_FALSE(both.config.record->clips);
 }
 
 TEST_CASE("metrics are for this machine only, whatever else the config permits") {

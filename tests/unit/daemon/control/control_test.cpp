@@ -8,6 +8,7 @@
 #include "daemon/control/request_handler.hpp"
 #include "daemon/teach/teacher.hpp"
 #include "posed/v1/control.pb.h"
+#include "proto/frame/whole_file.hpp"
 #include "proto/log/digest.hpp"
 #include "tests/support/has.hpp"
 #include "tests/support/parameter_index.hpp"
@@ -137,6 +138,39 @@ TEST_CASE("teaching is refused, before anybody walks, where it could not end wel
 
   Fixture without_folder;
   CHECK(has(without_folder.refused(request), "no folder ... models = \"models\""));
+}
+
+TEST_CASE("a model that a stream uses is neither renamed nor deleted") {
+  const test::TempFolder folder;
+  for (const char* name : {"used.style", "free.style"}) {
+    REQUIRE(write_whole_file(folder.path() / name, "no model"));
+  }
+  auto streams = three_streams();
+  streams[0].settings.stages.front().model_name = "used.style";
+  FakeDaemonControl daemon_control;
+  HandlerRig rig(std::move(streams), daemon_control, ModelFolder::open(folder.path()).value());
+  const auto answer = [&](const v1::ControlRequest& request) {
+    const std::string bytes = request.SerializeAsString();
+    return reply_of(rig.handler.handle({"me"}, std::as_bytes(std::span(bytes))));
+  };
+  v1::ControlRequest request;
+  request.mutable_delete_model()->set_name("used.style");
+  CHECK(has(answer(request).error(), "'walker' uses it"));
+  request.mutable_rename_model()->set_name("used.style");
+  request.mutable_rename_model()->set_to("other");
+  CHECK(has(answer(request).error(), "'walker' uses it"));
+  request.mutable_rename_model()->set_name("free.style");
+  CHECK(answer(request).ok());
+  request.mutable_list_models();
+  const auto listed = answer(request);
+  REQUIRE(listed.model_size() == 2);
+  CHECK(listed.model(0).name() == "other.style");
+  CHECK(has(listed.model(0).verdict(), "other.style"));  // what is wrong with the file
+  request.mutable_delete_model()->set_name("other.style");
+  CHECK(answer(request).ok());
+  CHECK_FALSE(answer(request).ok());
+  request.mutable_list_recordings();
+  CHECK(has(answer(request).error(), "recordings ="));
 }
 
 TEST_CASE("a take is marked and answered with its number, or refused with a reason") {

@@ -5,7 +5,10 @@
 
 #include <catch2/catch.hpp>
 
+#include "daemon/control/model_words.hpp"
+#include "daemon/control/recording_folder.hpp"
 #include "models/style/model/style_model.hpp"
+#include "proto/frame/whole_file.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
@@ -54,6 +57,75 @@ TEST_CASE("without a folder the list is empty; a folder that is gone is told") {
   const auto gone = models->list();
   REQUIRE_FALSE(gone);
   CHECK(gone.error().text().contains(folder.string()));
+}
+
+TEST_CASE("a model gets another name or is deleted; nothing else is touched") {
+  const test::TempFolder home;
+  const auto folder = home.path() / "models";
+  create_directory(folder);
+  for (const auto& path : {folder / "a.style", folder / "b.style", home.path() / "c.style"}) {
+    REQUIRE(style::save_model(test::toy_model(1, 0.3), path));
+  }
+  const auto models = ModelFolder::open(folder).value();
+  CHECK(models.rename("a.style", "walk-2").value() == "walk-2.style");
+  for (const std::string& to : std::vector<std::string>{"../c", "", ".hidden", "UP", "a/b", "b.x"}) {
+    CHECK_FALSE(models.rename("walk-2.style", to));
+  }
+  CHECK(models.rename("walk-2.style", "b").error().message.contains("already"));
+  CHECK_FALSE(models.rename("../c.style", "d"));
+  CHECK_FALSE(models.remove("../c.style"));
+  CHECK_FALSE(models.remove("."));
+  CHECK(models.remove("b.style"));
+  CHECK_FALSE(models.remove("b.style"));
+  CHECK(models.list().value().size() == 1);
+  CHECK(exists(home.path() / "c.style"));
+  CHECK_FALSE(ModelFolder().remove("b.style"));
+}
+
+TEST_CASE("a model tells what it was learnt from; what is no model tells that") {
+  auto model = test::toy_model(1, 0.3);
+  model.from = "walk";
+  model.to = "sneak";
+  model.report_json =
+      R"({"clips":[{"subject":"ann","day":"1"},{"subject":"ann","day":"1"},7],"verdict":"closes 9 %"})";
+  const auto words = words_of_model(style::serialize_model(model), "style", "a.style");
+  CHECK(words.learnt == "walk -> sneak, from 2 clips of ann on day 1");
+  CHECK(words.verdict == "closes 9 %");
+  CHECK(words.skeleton.contains("joint"));
+  for (const char* report : {"", "[1]", "{\"clips\":3,\"verdict\":[]}", "{"}) {
+    model.report_json = report;
+    CHECK(words_of_model(style::serialize_model(model), "style", "a").learnt == "walk -> sneak");
+  }
+  CHECK(words_of_model("nonsense", "style", "a.style").verdict.contains("a.style"));
+  CHECK_FALSE(words_of_model("nonsense", "generate", "a.gesture").verdict.empty());
+}
+
+TEST_CASE("recordings are listed and read by their names in the folder, and by nothing else") {
+  const test::TempFolder home;
+  const auto folder = home.path() / "takes";
+  CHECK(RecordingFolder(folder).list().value().empty());  // it is made by the first recording
+  CHECK(RecordingFolder().list().error().message.contains("recordings ="));
+  create_directory(folder);
+  const std::string large(kMaxRecordingPiece + 5, 'x');
+  for (const auto& path : {folder / "a.bvh", folder / "b.plog", folder / "b.plog-wal",
+                           folder / "notes.txt", folder / ".c.bvh", home.path() / "d.bvh"}) {
+    REQUIRE(write_whole_file(path, large));
+  }
+  std::filesystem::create_symlink(home.path() / "d.bvh", folder / "e.bvh");
+  const RecordingFolder recordings(folder);
+  const auto list = recordings.list().value();
+  REQUIRE(list.size() == 2);
+  const bool log_first = list.front().name == "b.plog";
+  CHECK(list[log_first ? 1 : 0].name == "a.bvh");
+  CHECK(list[log_first ? 0 : 1].in_use);
+  CHECK(recordings.piece("a.bvh", 0).value() == large.substr(5));
+  CHECK(recordings.piece("a.bvh", kMaxRecordingPiece).value() == "xxxxx");
+  CHECK(recordings.piece("a.bvh", ~std::uint64_t{0}).value().empty());
+  CHECK(recordings.piece("b.plog", 0).error().message.contains("being written"));
+  for (const std::string& name : std::vector<std::string>{"../d.bvh", "e.bvh", "notes.txt", ".c.bvh",
+                                                          (folder / "a.bvh").string(), "", "."}) {
+    CHECK_FALSE(recordings.piece(name, 0));
+  }
 }
 
 TEST_CASE("a model that is kept replaces none, and its name stays in the folder") {
