@@ -65,7 +65,7 @@ constexpr auto kCommands = std::to_array<AddCommand>({
     add_demo,   add_run,        add_check,   add_doctor, add_devices, add_calibrate, add_record,
     add_replay, add_train,      add_apply,   add_smooth, add_synth,   add_convert,   add_render,
     add_eval,   add_ctl,        add_monitor, add_top,    add_view,    add_relay,     add_emulate,
-    add_keygen, add_completion, add_man,     add_bench,  add_inspect, add_compare,
+    add_keygen, add_completion, add_man,     add_bench,  add_inspect, add_compare,   add_models,
 });
 
 // Whether the reader of stdout has gone (`posed monitor | head`).

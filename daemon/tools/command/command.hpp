@@ -35,6 +35,7 @@ void add_devices(CLI::App& app, int& exit_code);
 void add_doctor(CLI::App& app, int& exit_code);
 void add_ctl(CLI::App& app, int& exit_code);
 void add_monitor(CLI::App& app, int& exit_code);
+void add_models(CLI::App& app, int& exit_code);
 void add_top(CLI::App& app, int& exit_code);
 void add_view(CLI::App& app, int& exit_code);
 void add_keygen(CLI::App& app, int& exit_code);

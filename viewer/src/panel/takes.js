@@ -4,8 +4,8 @@ import { el, write } from './dom.js';
 
 const LONGEST_NAME = 128;
 const HOW =
-  'To keep takes, start the daemon with `posed record` in place of `posed run`, or with a [record]' +
-  ' table in its config.';
+  'To keep takes, name a folder for them in its config ([control] recordings = "takes") and start' +
+  ' it again, or use `posed record` in place of `posed run`.';
 
 export class Takes {
   #running = false;
