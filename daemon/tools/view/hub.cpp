@@ -32,6 +32,10 @@ std::string refusal_of(const v1::ControlRequest& request) {
     case v1::ControlRequest::kListModels:
     case v1::ControlRequest::kUseModel:
     case v1::ControlRequest::kTeach:
+    case v1::ControlRequest::kListRecordings:
+    case v1::ControlRequest::kFetchRecording:
+    case v1::ControlRequest::kRenameModel:
+    case v1::ControlRequest::kDeleteModel:
       return {};
     case v1::ControlRequest::kStop:
       return "a page may not end the daemon: use `posed ctl stop`";
