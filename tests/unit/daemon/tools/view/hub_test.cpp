@@ -228,6 +228,22 @@ TEST_CASE("a request gets its own reply, whatever the order") {
   CHECK(to_two[0].body == "to two");
 }
 
+TEST_CASE("a page reaches the daemon's folders of models and recordings") {
+  HubRig rig;
+  Tab tab;
+  rig.join(tab);
+  v1::ControlRequest request;
+  request.mutable_list_recordings();
+  rig.send(tab, 1, request);
+  request.mutable_fetch_recording()->set_name("a.bvh");
+  rig.send(tab, 2, request);
+  request.mutable_rename_model()->set_name("a.style");
+  rig.send(tab, 3, request);
+  request.mutable_delete_model()->set_name("a.style");
+  rig.send(tab, 4, request);
+  CHECK(rig.asked.size() == 4);
+}
+
 TEST_CASE("requests that a page may not make are refused in a reply") {
   HubRig rig;
   Tab tab;
