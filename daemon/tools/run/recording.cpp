@@ -298,6 +298,7 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
   serve(daemon, plan.serve,
         {{.thread = record::Recorder::kThreadName, .pulse = &recorder->pulse()}});
   const double took_s = seconds(system::monotonic_ns() - start_ns);
+  if (clips) clips->stop();
   auto finished = recorder->finish();
   for (const auto& source : daemon.sources()) {
     if (!with_body.contains(source->number)) warn_of_no_body(source->config.name);

@@ -70,11 +70,12 @@ void TakeClips::run(const std::stop_token& stop) {
   }
 }
 
-Result<> TakeClips::finish() {
+void TakeClips::stop() {
   thread_.request_stop();
   thread_.join();
-  return write(true, {});
 }
+
+Result<> TakeClips::finish() { return write(true, {}); }
 
 // A clip that cannot be written is a warning; the log is not changed.
 Result<> TakeClips::write(bool all, const std::stop_token& stop) {
