@@ -5,6 +5,7 @@ import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { buildCamera } from './camera.mjs';
 import { mannequin } from './mannequin/mannequin.mjs';
+import { COARSE } from './src/scene/capsule.js';
 
 const here = dirname(fileURLToPath(import.meta.url));
 const folder = process.argv[2] ?? join(here, '..', 'build', 'viewer');
@@ -22,4 +23,4 @@ await build({
 });
 for (const name of ['index.html', 'icon.svg']) await copyFile(join(here, name), join(folder, name));
 await writeFile(join(folder, 'mannequin.vrm'), mannequin());
-if (!process.argv.includes('--no-camera')) await buildCamera(here, folder);
+await writeFile(join(folder, 'mannequin-coarse.vrm'), mannequin(COARSE));

@@ -1,6 +1,6 @@
 // The mannequin: a VRM 1.0 avatar of capsules, made from a list of bones. `mannequin()` returns the
 // bytes of the file.
-import { Mesh, addCapsule } from '../src/scene/capsule.js';
+import { FINE, Mesh, addCapsule } from '../src/scene/capsule.js';
 import { figure } from './bones.mjs';
 import { glb } from './glb.mjs';
 
@@ -16,8 +16,8 @@ function joints(node, parent, above, list) {
   return list;
 }
 
-function shape(list) {
-  const mesh = new Mesh();
+function shape(list, detail) {
+  const mesh = new Mesh(detail);
   list.forEach((joint, i) => {
     const above = list[joint.parent];
     if (above) {
@@ -47,12 +47,13 @@ const META = {
   creditNotation: 'unnecessary',
 };
 
-export function mannequin() {
+// detail: FINE, or COARSE for where the processor draws
+export function mannequin(detail = FINE) {
   const list = joints(figure, -1, [0, 0, 0], []);
   const humanBones = Object.fromEntries(list.map(({ bone }, node) => [bone, { node }]));
   return glb({
     joints: list,
-    mesh: shape(list),
+    mesh: shape(list, detail),
     colour: SKIN,
     extensions: { VRMC_vrm: { specVersion: '1.0', meta: META, humanoid: { humanBones } } },
   });

@@ -80,7 +80,8 @@ export class Avatars {
 
   async #bytes(name) {
     if (!this.#files.get(name)) {
-      const answer = await fetch(`/${MANNEQUIN}.vrm`);
+      const coarse = this.world.fine ? '' : '-coarse'; // fewer vertices for the processor
+      const answer = await fetch(`/${MANNEQUIN}${coarse}.vrm`);
       if (!answer.ok) throw new Error(`the ${MANNEQUIN} is not in the page's folder`);
       this.#files.set(name, await answer.arrayBuffer());
     }
