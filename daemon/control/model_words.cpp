@@ -4,9 +4,9 @@
 #include <span>
 #include <utility>
 
-#include <nlohmann/json.hpp>
 #include <spdlog/fmt/fmt.h>
 #include <spdlog/fmt/ranges.h>
+#include <nlohmann/json.hpp>
 
 #include "models/gesture/model_file.hpp"
 #include "models/style/model/style_model.hpp"
@@ -65,7 +65,8 @@ ModelWords words_of_style(const style::StyleModel& model) {
   const json report = report_of(model.report_json);
   ModelWords words;
   words.learnt = fmt::format("{} -> {}", model.from, fmt::join(model.names(), ", "));
-  if (const auto sources = sources_of(report); !sources.empty()) words.learnt += ", from " + sources;
+  if (const auto sources = sources_of(report); !sources.empty())
+    words.learnt += ", from " + sources;
   words.skeleton = model.space.space == motion::Space::kHumanoid
                        ? "any person's"
                        : fmt::format("its own: {} joints from {} on", model.space.joints.size(),

@@ -43,10 +43,11 @@ Result<std::vector<FolderRecording>> RecordingFolder::list() const {
       continue;
     }
     std::error_code ignored;
-    files.push_back({.name = name,
-                     .bytes = static_cast<std::uint64_t>(about.st_size),
-                     .changed_unix_s = about.st_mtim.tv_sec,
-                     .in_use = std::filesystem::exists(entries->path().string() + "-wal", ignored)});
+    files.push_back(
+        {.name = name,
+         .bytes = static_cast<std::uint64_t>(about.st_size),
+         .changed_unix_s = about.st_mtim.tv_sec,
+         .in_use = std::filesystem::exists(entries->path().string() + "-wal", ignored)});
   }
   if (error) {
     return fail("the folder of recordings cannot be read: " + error.message(), folder_.string());

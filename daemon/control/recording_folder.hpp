@@ -32,8 +32,8 @@ class RecordingFolder {
 
   // Regular files that end in .plog or .bvh, the newest first; at most 256.
   Result<std::vector<FolderRecording>> list() const;
-  // At most kMaxRecordingPiece bytes of a file of the list from `offset` on; empty at its end. A log
-  // that is in use is refused.
+  // At most kMaxRecordingPiece bytes of a file of the list from `offset` on; empty at its end. A
+  // log that is in use is refused.
   Result<std::string> piece(std::string_view name, std::uint64_t offset) const;
 
  private:

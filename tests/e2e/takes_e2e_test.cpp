@@ -61,8 +61,8 @@ json takes_of(const std::string& log) {
   return json::parse(outcome.out);
 }
 
-// A daemon that has written the clips of a first take, and of a second one writes them at its end: of
-// streams fast enough that this takes a while.
+// A daemon that has written the clips of a first take, and of a second one writes them at its end:
+// of streams fast enough that this takes a while.
 class ClipTakes : public Takes {
  public:
   ClipTakes() {

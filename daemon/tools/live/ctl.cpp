@@ -51,7 +51,7 @@ struct CtlOptions {
   double tempo = 1.0;
   double seconds = 0.0;  // of a warm-up
   bool loop = false;
-  std::string take;  // name
+  std::string take;      // name
   std::string new_name;  // of a model
   TeachOptions teach;
 };
@@ -484,9 +484,11 @@ void add_style_actions(Actions& actions, CtlOptions& options) {
                                          use_model, R"(Example:
   posed ctl use-model walker march.style   # nothing is sent: the daemon has the file)");
   use->add_option("model", options.model, "Its name, as `posed ctl models` prints it")->required();
-  CLI::App* rename = actions.add("rename-model", "Give a model of the daemon's list another name",
-                                 rename_model, "Example:\n  posed ctl rename-model proud.style proud-ann");
-  rename->add_option("model", options.model, "Its name, as `posed ctl models` prints it")->required();
+  CLI::App* rename =
+      actions.add("rename-model", "Give a model of the daemon's list another name", rename_model,
+                  "Example:\n  posed ctl rename-model proud.style proud-ann");
+  rename->add_option("model", options.model, "Its name, as `posed ctl models` prints it")
+      ->required();
   rename->add_option("name", options.new_name, "The new one, without the ending")->required();
   CLI::App* gone = actions.add("delete-model", "Delete a model of the daemon's list for good",
                                delete_model, "Example:\n  posed ctl delete-model proud-2.style");

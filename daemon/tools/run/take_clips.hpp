@@ -25,11 +25,11 @@ class TakeClips {
 
   // A take has begun or ended. Any thread; returns at once.
   void take_changed();
-  // Ends the thread, which may be reading the log: before the log becomes a single file, because that
-  // needs it alone.
+  // Ends the thread, which may be reading the log: before the log becomes a single file, because
+  // that needs it alone.
   void stop();
-  // After stop(), when the log is complete: writes those that are not written yet, also of a take that
-  // was never ended. Call once. An end signal that comes meanwhile ends the work with an
+  // After stop(), when the log is complete: writes those that are not written yet, also of a take
+  // that was never ended. Call once. An end signal that comes meanwhile ends the work with an
   // error: block end_signals() before.
   Result<> finish();
 

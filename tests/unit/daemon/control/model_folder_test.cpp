@@ -68,7 +68,8 @@ TEST_CASE("a model gets another name or is deleted; nothing else is touched") {
   }
   const auto models = ModelFolder::open(folder).value();
   CHECK(models.rename("a.style", "walk-2").value() == "walk-2.style");
-  for (const std::string& to : std::vector<std::string>{"../c", "", ".hidden", "UP", "a/b", "b.x"}) {
+  for (const std::string& to :
+       std::vector<std::string>{"../c", "", ".hidden", "UP", "a/b", "b.x"}) {
     CHECK_FALSE(models.rename("walk-2.style", to));
   }
   CHECK(models.rename("walk-2.style", "b").error().message.contains("already"));
@@ -122,8 +123,8 @@ TEST_CASE("recordings are listed and read by their names in the folder, and by n
   CHECK(recordings.piece("a.bvh", kMaxRecordingPiece).value() == "xxxxx");
   CHECK(recordings.piece("a.bvh", ~std::uint64_t{0}).value().empty());
   CHECK(recordings.piece("b.plog", 0).error().message.contains("being written"));
-  for (const std::string& name : std::vector<std::string>{"../d.bvh", "e.bvh", "notes.txt", ".c.bvh",
-                                                          (folder / "a.bvh").string(), "", "."}) {
+  for (const std::string& name : std::vector<std::string>{
+           "../d.bvh", "e.bvh", "notes.txt", ".c.bvh", (folder / "a.bvh").string(), "", "."}) {
     CHECK_FALSE(recordings.piece(name, 0));
   }
 }
