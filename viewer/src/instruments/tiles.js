@@ -13,7 +13,7 @@ export const TILES = [
   ],
   [
     'Time in posed',
-    'the usual time of a frame from arrival to handed out; 99 % of the last second’s took at most the second one',
+    'from arrival to handed out: half of the last second’s frames took at most this; 99 % that',
     ({ stats }) =>
       stats.publish?.p99_us > 0
         ? `${ms(stats.publish.p50_us / 1000)} (99 %: ${ms(stats.publish.p99_us / 1000)})`

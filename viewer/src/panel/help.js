@@ -18,7 +18,7 @@ const KEYS = [
 ];
 
 const SEEN = [
-  ['Coloured figure', 'what posed publishes: styled, smoothed, performed; each performer has a colour'],
+  ['Coloured figure', 'what posed publishes, each performer in a colour of its own'],
   ['Grey, translucent figure', 'the raw pose, as it was captured'],
   ['Green ring', 'a foot that stands; prints stay where it stood'],
   ['Orange, purple, grey', 'a pose that is predicted, held or stale; the name says so, too'],

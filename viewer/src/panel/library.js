@@ -1,5 +1,5 @@
-// The folders of the daemon: its models, to use, rename and delete, and its recordings, to download.
-// A list is asked for when it is unfolded, and again after each change.
+// The folders of the daemon: its models, to use, rename and delete, and its recordings, to
+// download. A list is asked for when it is unfolded, and again after each change.
 import { fetchRecording, keepFile } from '../link/download.js';
 import { el, write } from './dom.js';
 import { megabytes } from './numbers.js';

@@ -6,7 +6,8 @@ const ASK_AGAIN_MS = 5000; // for a list that was refused or did not come
 const NO_LIST = 'the daemon offers no list: [control] models names a folder';
 
 export class ModelControls {
-  static #used = new Map(); // by stream and stage: {now, before}, also when the controls are made again
+  // By stream and stage {now, before}, also when the controls are made again.
+  static #used = new Map();
   element = el('div.group');
 
   // kind: the stage that uses it, style or generate

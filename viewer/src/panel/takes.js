@@ -48,7 +48,7 @@ export class Takes {
   }
 
   #obstacle() {
-    if (this.form.hidden) return 'no take begins: a replay is not recorded, and without posed nothing is';
+    if (this.form.hidden) return 'no take begins: a replay is not recorded';
     if (this.fields.hidden) return `no take begins, because posed does not record. ${HOW}`;
     return this.fields.disabled ? `no take begins: ${this.fields.title}` : '';
   }

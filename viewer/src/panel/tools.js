@@ -47,7 +47,11 @@ export class Tools {
     );
     const video = el(
       'button',
-      { type: 'button', title: 'Keep ten seconds of the scene as WebM', aria: { pressed: 'false' } },
+      {
+        type: 'button',
+        title: 'Keep ten seconds of the scene as WebM',
+        aria: { pressed: 'false' },
+      },
       'Video 10 s',
     );
     video.onclick = () =>

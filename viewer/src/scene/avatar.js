@@ -75,7 +75,10 @@ export class Avatar {
     const jointOf = new Map();
     const { humanoid } = this.vrm;
     for (const { bone, joint } of this.#bones) jointOf.set(humanoid.getRawBoneNode(bone), joint);
-    const moving = (node) => (!node || jointOf.has(node) ? (jointOf.get(node) ?? 0) : moving(node.parent));
+    const moving = (node) => {
+      if (!node) return 0;
+      return jointOf.get(node) ?? moving(node.parent);
+    };
     this.#paints = [];
     this.vrm.scene.traverse((mesh) => {
       if (!mesh.isSkinnedMesh) return;

@@ -26,7 +26,8 @@ export class Capture {
       this.recorder.stop();
       return;
     }
-    const mimeType = globalThis.MediaRecorder && TYPES.find((t) => MediaRecorder.isTypeSupported(t));
+    const { MediaRecorder } = globalThis;
+    const mimeType = TYPES.find((type) => MediaRecorder?.isTypeSupported(type));
     if (!mimeType) {
       this.say('this browser records no video (WebM)', 'bad');
       return;

@@ -1,5 +1,5 @@
-// The colours of a mesh whose vertices each belong to a joint: its performer's own, and what the pose
-// says of each joint in its place. The vertices are written on a change only.
+// The colours of a mesh whose vertices each belong to a joint: its performer's own, and what the
+// pose says of each joint in its place. The vertices are written on a change only.
 import { BufferAttribute } from 'three';
 import { jointColour } from './palette.js';
 

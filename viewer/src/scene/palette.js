@@ -45,7 +45,7 @@ const CONTACT = colour('#009e73');
 export const themeColours = (name) => THEMES[name];
 
 // Performers have a colour each, in their order; a seventh has that of the first again.
-export const performerColour = (theme, number) => theme.performers[number % theme.performers.length];
+export const performerColour = ({ performers }, number) => performers[number % performers.length];
 
 // The colour of a joint: without a value, or as current as the pose is.
 export function jointColour(own, quality, hasValue, performedAtRest) {

@@ -88,7 +88,8 @@ export class Performer {
     point.copy(this.centre);
     point.y *= scale;
     const depth = joint.copy(point).applyMatrix4(camera.matrixWorldInverse).z;
-    const room = (ABOVE_JOINTS_M * this.figure.scale * camera.projectionMatrix.elements[5]) / -depth;
+    const above_m = ABOVE_JOINTS_M * this.figure.scale;
+    const room = (above_m * camera.projectionMatrix.elements[5]) / -depth;
     point.project(camera);
     point.y = top + room;
   }

@@ -43,8 +43,8 @@ export class Rewind {
     return Math.max(0, this.paused_ms - this.#kept[this.#first].at_ms);
   }
 
-  // Calls show(topic, bytes, from) with the message of each topic that was the newest `ago_ms` before
-  // the pause.
+  // Calls show(topic, bytes, from) with the message of each topic that was the newest `ago_ms`
+  // before the pause.
   at(ago_ms, show) {
     const until_ms = this.paused_ms - ago_ms;
     const done = new Set();

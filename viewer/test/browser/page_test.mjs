@@ -616,7 +616,8 @@ pageTests(
         const { avatar, colour } = globalThis.posedPage.world.performers.get('walker');
         let seen = '';
         avatar.vrm.scene.traverse(({ isSkinnedMesh, geometry, material }) => {
-          if (isSkinnedMesh) seen = material.color.clone().fromArray(geometry.attributes.color.array);
+          const { color } = geometry?.attributes ?? {};
+          if (isSkinnedMesh) seen = material.color.clone().fromArray(color.array);
         });
         return [`#${seen.getHexString()}`, colour];
       });

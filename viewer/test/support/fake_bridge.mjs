@@ -18,7 +18,8 @@ const TYPES = {
   vrm: 'model/gltf-binary',
   wasm: 'application/wasm',
 };
-const FILES = ['index.html', 'page.js', 'page.css', 'icon.svg', 'mannequin.vrm', 'mannequin-coarse.vrm'];
+const AVATARS = ['mannequin.vrm', 'mannequin-coarse.vrm'];
+const FILES = ['index.html', 'page.js', 'page.css', 'icon.svg', ...AVATARS];
 const POLICY =
   "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self' blob: data:";
 

@@ -226,8 +226,10 @@ export class FakeDaemon {
     if (kind === 'list_models') return { ok: true, model: this.models };
     if (kind === 'rename_model' || kind === 'delete_model') return this.#keep(kind, details);
     if (kind === 'list_recordings') return { ok: true, recording: this.recordings };
-    if (kind === 'fetch_recording')
-      return { ok: true, piece: RECORDED.subarray(details.offset ?? 0, (details.offset ?? 0) + 32768) };
+    if (kind === 'fetch_recording') {
+      const { offset = 0 } = details;
+      return { ok: true, piece: RECORDED.subarray(offset, offset + 32768) };
+    }
     if (kind === 'use_model' && body) {
       body.model = details.name;
       return done;
