@@ -90,7 +90,6 @@ ModelWords words_of_gesture(const gesture::GestureModel& model) {
   if (count != report.end() && count->is_number_unsigned()) {
     words.learnt += ", from " + some(count->get<std::size_t>(), "recorded one", "recorded ones");
   }
-  words.skeleton = "with its channels";
   words.verdict = text_of(report, "verdict");
   return words;
 }

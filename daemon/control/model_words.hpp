@@ -8,7 +8,7 @@ namespace posed::control {
 
 struct ModelWords {
   std::string learnt{};    // "walk -> sneak, from 12 clips of 6 people"; empty: it does not say
-  std::string skeleton{};  // whom it serves
+  std::string skeleton{};  // whom it serves; empty: it does not say
   std::string verdict{};   // of the training; of bytes that are no model: what is wrong with them
 };
 

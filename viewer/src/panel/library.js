@@ -132,7 +132,7 @@ export class Recordings extends List {
   item(file) {
     const { name, bytes, changed_unix_s: changed, in_use: inUse } = file;
     const when = new Date(1000 * changed).toLocaleString();
-    const size = bytes < 1e5 ? `${Math.ceil(bytes / 1000)} kB` : megabytes(bytes);
+    const size = bytes < 1e6 ? `${Math.ceil(bytes / 1000)} kB` : megabytes(bytes);
     const words = el('span.note', {}, `${size}, ${when}`);
     const text = inUse ? 'being written' : 'Download';
     const save = el(
