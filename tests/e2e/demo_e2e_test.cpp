@@ -55,6 +55,14 @@ TEST_CASE("the demo streams from any folder and trains only once", "[demo]") {
   CHECK((streamed.err.contains("see it: http://127.0.0.1:") ||
          streamed.err.contains("`./run page` builds it")));
 
+  // A page that is open goes on with the next demo.
+  const auto token = [](const std::string& text) {
+    const auto at = text.find("?token=");
+    return at == std::string::npos ? std::string() : text.substr(at, 7 + 22);
+  };
+  CHECK(token(streamed.err) == token(first.err));
+  CHECK(file_text(kept / "demo.toml").contains("models = \".\""));
+
   // A model that was modified is trained again, with the same bits.
   std::ofstream(kept / "walk-to-sneak.style") << "not a model";
   CHECK(prepare().code == 0);

@@ -112,6 +112,11 @@ std::string config_text() {
         "before you change it.\n" +
         std::string(text.toml);
     constexpr std::string_view kInSourceTree = "../build/demo/";
+    // The folder itself, of models: an empty text would name none.
+    const std::string whole = "\"" + std::string(kInSourceTree) + "\"";
+    if (const auto at = toml.find(whole); at != std::string::npos) {
+      toml.replace(at, whole.size(), "\".\"");
+    }
     for (auto at = toml.find(kInSourceTree); at != std::string::npos;
          at = toml.find(kInSourceTree)) {
       toml.erase(at, kInSourceTree.size());
