@@ -42,6 +42,11 @@ export class NameTags {
     return tag;
   }
 
+  // In CSS pixels.
+  widthOf(key) {
+    return this.#tags.get(key)?.wide ?? 0;
+  }
+
   // Before the first `place` of a picture.
   begin() {
     this.#placed.length = 0;

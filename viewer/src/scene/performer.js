@@ -10,6 +10,8 @@ const joint = new Vector3();
 export class Performer {
   avatar = null; // an Avatar in place of the capsules
   centre = new Vector3(); // of the hips, in the scene
+  above = new Vector3();
+  head = { middle: 0, half: 0 };
   #trails = [];
 
   // number: of its colour; a raw one is grey
@@ -74,24 +76,29 @@ export class Performer {
       .add(this.figure.group.position);
   }
 
-  // The point above whatever of the body is highest in this camera's picture, so that a name there
-  // covers none of it.
-  highest(camera, point) {
+  // Finds `above`, a point in this camera's picture above whatever of the body is highest there,
+  // and `head`, how far that reaches to the left and right: a name there covers none of it.
+  findTop(camera) {
+    const { above, head } = this;
     const { position } = this.stream.kinematics;
     const { group } = this.figure;
     const scale = this.avatar?.scale ?? 1;
     let top = -Infinity;
     for (let i = 0; i < position.length; i += 3) {
       joint.set(position[i], scale * position[i + 1], position[i + 2]).add(group.position);
-      top = Math.max(top, joint.project(camera).y);
+      if (joint.project(camera).y <= top) continue;
+      top = joint.y;
+      head.middle = joint.x;
     }
-    point.copy(this.centre);
-    point.y *= scale;
-    const depth = joint.copy(point).applyMatrix4(camera.matrixWorldInverse).z;
+    above.copy(this.centre);
+    above.y *= scale;
+    const depth = joint.copy(above).applyMatrix4(camera.matrixWorldInverse).z;
     const above_m = ABOVE_JOINTS_M * this.figure.scale;
     const room = (above_m * camera.projectionMatrix.elements[5]) / -depth;
-    point.project(camera);
-    point.y = top + room;
+    above.project(camera);
+    above.y = top + room;
+    const [across, , , , , up] = camera.projectionMatrix.elements;
+    head.half = (0.5 * room * across) / up;
   }
 
   // Capsules again, or an avatar in their place.

@@ -19,7 +19,7 @@ const MOST_PIXELS = 2; // per CSS pixel
 const TOOLS_PX = 46; // at the top of the scene, covered by the buttons
 const NAMES_PX = 90; // the same, by buttons and names
 const LEGEND_PX = 36; // the same at the bottom of the bodies, by the colours' meaning
-const CROWD = 5; // figures; of more only the styled ones have names
+const CROWD = 4; // figures; of more only the styled ones have names
 const CALM_FRAMES = 90; // drawn after the last change, while the camera glides
 
 export class World {
@@ -92,13 +92,24 @@ export class World {
     if (isRaw) return 0;
     if (!this.#numbers.has(name)) {
       for (const other of this.#numbers.keys())
-        if (!this.performers.has(other)) this.#numbers.delete(other);
+        if (!this.store.streams.has(other)) this.#numbers.delete(other);
       const taken = new Set(this.#numbers.values());
       let number = 0;
       while (taken.has(number)) number += 1;
       this.#numbers.set(name, number);
     }
     return this.#numbers.get(name);
+  }
+
+  // Skeletons come before the first statistics, in any order.
+  #numberInOrder() {
+    this.#numbers.clear();
+    for (const stream of this.store.main()) {
+      const number = this.#numberOf(stream);
+      const performer = this.performers.get(stream.name);
+      if (performer) performer.figure.number = number;
+    }
+    for (const performer of this.performers.values()) performer.setTheme(this.theme);
   }
 
   // Whom follow and orbit keep in the picture; everybody where it is no body.
@@ -132,6 +143,7 @@ export class World {
     const streams = this.store.main().map(({ name, stats }) => [name, stats.source_name]);
     const now = JSON.stringify(streams);
     if (now === this.#arranged) return;
+    if (this.#arranged === '') this.#numberInOrder();
     this.#arranged = now;
     this.arrange();
   }
@@ -309,7 +321,11 @@ export class World {
       this.#render(this.hands.scene, this.hands.camera, hands, bodies.height);
     }
     this.tags.begin();
-    for (const performer of this.performers.values()) this.#tag(performer);
+    const standing = [...this.performers.values()].filter(
+      ({ stream, figure }) => !stream.isHand && figure.group.visible,
+    );
+    for (const body of standing) body.findTop(this.views.camera);
+    for (const performer of this.performers.values()) this.#tag(performer, standing);
   }
 
   #render(scene, camera, { left, top, width, height }, whole) {
@@ -319,7 +335,7 @@ export class World {
     this.renderer.render(scene, camera);
   }
 
-  #tag(performer) {
+  #tag(performer, bodies) {
     if (!performer.figure.group.visible) return;
     const { name, isHand } = performer.stream;
     if (performer.ghost && this.performers.size > CROWD) {
@@ -331,11 +347,18 @@ export class World {
       at.project(this.hands.camera);
       this.tags.place(name, at, this.#areas.hands ?? this.#areas.bodies, true);
     } else {
-      performer.highest(this.views.camera, at);
+      at.copy(performer.above);
+      const half = this.tags.widthOf(name) / this.#areas.bodies.width; // of -1 to 1
+      for (const { above, head } of bodies)
+        if (Math.abs(head.middle - at.x) < half + head.half && isNear(above, at))
+          at.y = Math.max(at.y, above.y); // nobody's head is covered
       this.tags.place(name, at, this.#areas.bodies);
     }
   }
 }
+
+// Of a crowd in the distance each name stays with its own.
+const isNear = (a, b) => Math.abs(a.y - b.y) < 0.3;
 
 const middle = new Vector3();
 const at = new Vector3();

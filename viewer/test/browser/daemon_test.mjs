@@ -1,6 +1,6 @@
 // The page with the real bridge and the real daemon: POSED=path/to/posed node daemon_test.mjs
 import assert from 'node:assert/strict';
-import { statSync } from 'node:fs';
+import { readFileSync, statSync } from 'node:fs';
 import { after, before, test } from 'node:test';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
@@ -111,6 +111,15 @@ test(
     await page.locator('.recording', { hasText: 'take 1 “page”' }).waitFor(PATIENCE);
     await page.getByRole('button', { name: 'End take' }).click();
     await acknowledged(page, 'take ends');
+    await page.locator('summary', { hasText: 'Recordings' }).click();
+    const clip = page.getByLabel('Download: take-1-walker.bvh');
+    const again = page.getByRole('button', { name: 'Look again' });
+    for (let i = 0; i < 300 && (await clip.count()) === 0; i += 1) {
+      await page.waitForTimeout(400); // while the daemon runs
+      await again.click();
+    }
+    const [download] = await Promise.all([page.waitForEvent('download', PATIENCE), clip.click()]);
+    assert.match(readFileSync(await download.path(), 'utf8'), /^HIERARCHY[^]*MOTION/);
     await page.getByLabel('Model', { exact: true }).selectOption('walk-to-sneak.style');
     await page
       .locator('input[type=file]')

@@ -10,12 +10,13 @@ import { createInterface } from 'node:readline';
 const DEMO = join(dirname(fileURLToPath(import.meta.url)), '../../../build/demo');
 export const hasDemo = () => existsSync(join(DEMO, 'hand.gesture'));
 
-const configOf = ({ publish, control }) => `
+const configOf = ({ publish, control, folder }) => `
 [publish]
 endpoint = "${publish}"
 [control]
 endpoint = "${control}"
 models = "${DEMO}"
+recordings = "${folder}"
 [[stream]]
 name = "walker"
 driver = "file"
