@@ -41,9 +41,10 @@ function done({ stats, pose }) {
 }
 
 function performersOf(world) {
-  const mains = [...world.performers.values()].filter(
-    ({ ghost, stream, shown }) => !ghost && shown !== false && stream.drawable,
-  );
+  const mains = world.store
+    .main()
+    .map(({ name }) => world.performers.get(name))
+    .filter((one) => one && one.shown !== false && one.stream.drawable);
   if (mains.length > MOST_NAMES) return [];
   return mains.map(({ stream, colour }) => ({ text: `${stream.name}: ${done(stream)}`, colour }));
 }

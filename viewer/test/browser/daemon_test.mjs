@@ -114,8 +114,8 @@ test(
     await page.locator('summary', { hasText: 'Recordings' }).click();
     const clip = page.getByLabel('Download: take-1-walker.bvh');
     const again = page.getByRole('button', { name: 'Look again' });
-    for (let i = 0; i < 300 && (await clip.count()) === 0; i += 1) {
-      await page.waitForTimeout(400); // while the daemon runs
+    while ((await clip.count()) === 0) {
+      await page.waitForTimeout(400); // while the daemon runs, on a thread that others go before
       await again.click();
     }
     const [download] = await Promise.all([page.waitForEvent('download', PATIENCE), clip.click()]);
