@@ -142,10 +142,10 @@ struct DaemonConfig {
   std::string control_endpoint = "tcp://127.0.0.1:5571";
   bool control_insecure = false;
   std::filesystem::path models;  // the folder whose models control may use by name; empty: none
-  // The folder whose logs and clips control may list and fetch by name; empty: none. Without [record]
-  // `posed run` records there.
+  // The folder whose logs and clips control may list and fetch by name; empty: none. Without
+  // [record] `posed run` records there.
   std::filesystem::path recordings;
-  bool realtime = true;          // ask for SCHED_FIFO and mlockall; a refusal is only a warning
+  bool realtime = true;   // ask for SCHED_FIFO and mlockall; a refusal is only a warning
   bool share_cpu = true;  // with real-time rights the hot threads share a CPU (system/hot_cpu.hpp)
   SecurityConfig security;
   std::vector<StreamConfig> streams;  // of devices with one body
