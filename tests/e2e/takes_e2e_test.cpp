@@ -247,7 +247,7 @@ TEST_CASE("daemons that begin at once with one folder each have a whole log") {
   }
 }
 
-TEST_CASE("a signal that already waits when clips of takes would be written leaves none") {
+TEST_CASE("a signal that already waits when clips of takes would be written leaves no more") {
   ClipTakes stage;
   stage.daemon->send(SIGSTOP);  // so that the daemon gets both at once
   stage.daemon->send(SIGINT);
