@@ -10,13 +10,6 @@
 namespace posed::hand {
 namespace {
 
-// "hand45 right adult" -> adult; the default shape where no built-in shape has that name.
-const HandShape& shape_of(const Skeleton& skeleton) {
-  const std::string name = skeleton.name.substr(skeleton.name.rfind(' ') + 1);
-  const auto shape = find_hand_shape(name);
-  return shape ? **shape : default_hand_shape();
-}
-
 bool differ(const HandAngles& a, const HandAngles& b) noexcept {
   for (std::size_t c = 0; c < a.size(); ++c) {
     if (a[c] != b[c]) return true;  // true also where one of them is NaN

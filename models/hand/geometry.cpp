@@ -37,6 +37,11 @@ RT_SAFE void place_bones(const FingerGeometry& finger, const double* angles,
 
 }  // namespace
 
+const HandShape& shape_of(const Skeleton& skeleton) {
+  const auto shape = find_hand_shape(skeleton.name.substr(skeleton.name.rfind(' ') + 1));
+  return shape ? **shape : default_hand_shape();
+}
+
 HandGeometry hand_geometry(const HandShape& shape) {
   HandGeometry geometry;
   for (int f = 0; f < kFingers; ++f) {

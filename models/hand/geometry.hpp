@@ -10,6 +10,7 @@
 #include "proto/frame/hand.hpp"
 #include "proto/frame/hand_shape.hpp"
 #include "proto/frame/rt_safe.hpp"
+#include "proto/frame/skeleton.hpp"
 
 namespace posed::hand {
 
@@ -27,6 +28,10 @@ struct HandGeometry {
   HandAngles low_rad{};
   HandAngles high_rad{};
 };
+
+// The built-in shape that a skeleton of hand_skeleton() names, "hand45 right adult"; else the
+// default one. Cold.
+[[nodiscard]] const HandShape& shape_of(const Skeleton& skeleton);
 
 // Cold.
 [[nodiscard]] HandGeometry hand_geometry(const HandShape& shape);

@@ -10,6 +10,7 @@
 #include "models/hand/constrain_stage.hpp"
 #include "models/merge/merge_stage.hpp"
 #include "models/retarget/retarget_stage.hpp"
+#include "models/robot/robot_stage.hpp"
 #include "models/style/live/style_type.hpp"
 
 namespace posed {
@@ -18,7 +19,7 @@ std::span<const StageType* const> stage_types() {
   static const std::array types{
       &gate::gate_type(),         &merge::merge_type(),       &style::style_type(),
       &feet::feet_type(),         &generate::generate_type(), &hand::constrain_type(),
-      &retarget::retarget_type(),
+      &retarget::retarget_type(), &robot::robot_type(),
   };
   return types;
 }

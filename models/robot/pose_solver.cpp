@@ -1,0 +1,161 @@
+#include "models/robot/pose_solver.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace posed::robot {
+namespace {
+
+constexpr double kDamping = 1e-4;  // m^2/rad^2, towards the pose of now
+constexpr double kToMiddle = 1e-5;  // towards the middle of the limits: frees the null space
+constexpr double kMaxStep_rad = 0.35;
+constexpr double kFar_m = 0.03;  // from here on a tip pulls no harder
+constexpr double kPinchPoint = 1.0;
+constexpr double kPinchGap = 10.0;
+constexpr double kSolverNear_m = 0.02;
+constexpr int kBacktracks = 3;
+
+}  // namespace
+
+PoseSolver::PoseSolver(const RobotHand& robot, double margin_m)
+    : robot_(robot), margin_m_(margin_m), placed_(robot.links.size()) {
+  pose_ = robot.start();
+  middle_.setZero();
+  program_.size = robot.size();
+  for (int i = 0; i < robot.size(); ++i) {
+    middle_[i] = 0.5 * (robot.driven[i].low + robot.driven[i].high);
+  }
+}
+
+double PoseSolver::add_residual(const Drive& slope, double residual, double weight,
+                                bool slopes) noexcept {
+  if (slopes) {
+    for (int i = 0; i < program_.size; ++i) {
+      if (slope[i] == 0.0) continue;
+      program_.g[i] += weight * residual * slope[i];
+      for (int j = 0; j <= i; ++j) program_.H(i, j) += weight * slope[i] * slope[j];
+    }
+  }
+  return weight * residual * residual;
+}
+
+// Tips at their places, and thumb and finger apart in the person's direction.
+double PoseSolver::add_points(const HandTarget& target, bool slopes) noexcept {
+  double sum = 0.0;
+  for (std::size_t f = 0; f < robot_.fingers.size(); ++f) {
+    const Finger& finger = robot_.fingers[f];
+    const Eigen::Vector3d& tip_m = placed_.at_m[finger.tip];
+    const Eigen::Vector3d off = tip_m - target.tip_m[f];
+    const double far = off.norm();
+    const double weight = target.tip_weight[f] * std::min(1.0, kFar_m / std::max(far, 1e-9));
+    for (int k = 0; k < 3; ++k) {
+      Drive slope = Drive::Zero();
+      if (slopes) {
+        add_slope(robot_, placed_, finger.tip, tip_m, Eigen::Vector3d::Unit(k), slope);
+        add_residual(slope, off[k], weight, true);
+      }
+    }
+    // Huber, so that the cost falls where the weighted squares say so.
+    sum += target.tip_weight[f] * (far < kFar_m ? far * far : kFar_m * (2.0 * far - kFar_m));
+    if (f == 0 || target.pinch[f] <= 0.0) continue;
+    const Finger& thumb = robot_.fingers[0];
+    const double apart_m = target.gap_m[f] + thumb.tip_radius_m + finger.tip_radius_m;
+    const Eigen::Vector3d error =
+        placed_.at_m[thumb.tip] - tip_m - apart_m * target.direction[f];
+    for (int k = 0; k < 3; ++k) {
+      Drive slope = Drive::Zero();
+      const Eigen::Vector3d axis = Eigen::Vector3d::Unit(k);
+      if (slopes) {
+        add_slope(robot_, placed_, thumb.tip, placed_.at_m[thumb.tip], axis, slope);
+        add_slope(robot_, placed_, finger.tip, tip_m, -axis, slope);
+      }
+      sum += add_residual(slope, error[k], kPinchPoint * target.pinch[f], slopes);
+    }
+  }
+  return sum;
+}
+
+// The gap between the surfaces of thumb and finger as the person's is.
+double PoseSolver::add_pinches(const HandTarget& target, bool slopes) noexcept {
+  double sum = 0.0;
+  for (std::size_t f = 1; f < robot_.fingers.size(); ++f) {
+    if (target.pinch[f] <= 0.0) continue;
+    const auto shaped = [&](const Finger& finger) {
+      int link = finger.tip;
+      while (link > 0 && link != finger.last && robot_.balls[link].count == 0) {
+        link = robot_.links[link].parent;
+      }
+      return link;
+    };
+    const Gap gap = gap_between(robot_, placed_, shaped(robot_.fingers[0]),
+                                shaped(robot_.fingers[f]));
+    if (!std::isfinite(gap.gap_m)) continue;
+    const double wanted_m = std::max(target.gap_m[f], margin_m_);
+    sum += add_residual(gap.slope, gap.gap_m - wanted_m, kPinchGap * target.pinch[f], slopes);
+  }
+  return sum;
+}
+
+double PoseSolver::cost(const HandTarget& target, const Drive& pose, bool slopes) noexcept {
+  place(robot_, pose, placed_);
+  if (slopes) {
+    program_.H.setZero();
+    program_.g.setZero();
+    for (int i = 0; i < program_.size; ++i) {
+      program_.H(i, i) = kDamping + kToMiddle;
+      program_.g[i] = kToMiddle * (pose[i] - middle_[i]);
+    }
+  }
+  double sum = kToMiddle * (pose - middle_).squaredNorm();
+  sum += add_points(target, slopes);
+  sum += add_pinches(target, slopes);
+  if (slopes) {
+    for (int i = 0; i < program_.size; ++i) {
+      for (int j = 0; j < i; ++j) program_.H(j, i) = program_.H(i, j);
+    }
+  }
+  return sum;
+}
+
+bool PoseSolver::step(const HandTarget& target) noexcept {
+  const double before = cost(target, pose_, true);
+  const auto gaps = find_gaps(robot_, placed_, kSolverNear_m, true, gaps_);
+  double overlap_m = 0.0;
+  for (std::size_t r = 0; r < gaps.size(); ++r) {
+    overlap_m = std::min(overlap_m, gaps[r].gap_m);
+    // What overlaps comes apart a little a step.
+    rows_[r] = {.slope = gaps[r].slope, .least = std::min(margin_m_ - gaps[r].gap_m, 2e-3)};
+  }
+  program_.rows = {rows_.data(), gaps.size()};
+  for (int i = 0; i < program_.size; ++i) {
+    program_.low[i] = std::max(robot_.driven[i].low - pose_[i], -kMaxStep_rad);
+    program_.high[i] = std::min(robot_.driven[i].high - pose_[i], kMaxStep_rad);
+  }
+  Drive wanted;
+  (void)robot::solve(program_, wanted);
+  for (int halving = 0; halving <= kBacktracks; ++halving, wanted *= 0.5) {
+    const Drive there = pose_ + wanted;
+    const double after = cost(target, there, false);
+    if (!std::isfinite(after)) continue;
+    double deepest_m = 0.0;
+    for (const Gap& gap : find_gaps(robot_, placed_, 0.0, false, gaps_)) {
+      deepest_m = std::min(deepest_m, gap.gap_m);
+    }
+    const bool parts = overlap_m < -1e-5 && deepest_m > overlap_m;
+    if (deepest_m < overlap_m - 1e-5 || (after > before && !parts)) continue;
+    pose_ = there;
+    return true;
+  }
+  return false;
+}
+
+const Drive& PoseSolver::solve(const HandTarget& target, int rounds) noexcept {
+  for (int round = 0; round < rounds && step(target); ++round) {
+  }
+  for (int i = 0; i < program_.size; ++i) {
+    pose_[i] = std::clamp(pose_[i], robot_.driven[i].low, robot_.driven[i].high);
+  }
+  return pose_;
+}
+
+}  // namespace posed::robot

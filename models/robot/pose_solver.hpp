@@ -1,0 +1,39 @@
+// PoseSolver: the pose of the robot that fits a target best, by damped Gauss-Newton steps within
+// the joints' limits and with its links apart; no speeds here (models/robot/README.md, "Pose").
+// Follows its own last pose. RT-safe, no heap.
+#pragma once
+
+#include "models/robot/hand_target.hpp"
+#include "models/robot/shapes.hpp"
+#include "models/robot/step_program.hpp"
+
+namespace posed::robot {
+
+class PoseSolver {
+ public:
+  // `robot` must outlive it.
+  PoseSolver(const RobotHand& robot, double margin_m);
+
+  RT_SAFE const Drive& solve(const HandTarget& target, int rounds) noexcept;
+  RT_SAFE void restart(const Drive& pose) noexcept { pose_ = pose; }
+  [[nodiscard]] const Drive& pose() const noexcept { return pose_; }
+
+ private:
+  // The cost of the pose that `placed_` shows; with H and g if wanted.
+  RT_SAFE double cost(const HandTarget& target, const Drive& pose, bool slopes) noexcept;
+  RT_SAFE double add_residual(const Drive& slope, double residual, double weight,
+                              bool slopes) noexcept;
+  RT_SAFE double add_points(const HandTarget& target, bool slopes) noexcept;
+  RT_SAFE double add_pinches(const HandTarget& target, bool slopes) noexcept;
+  RT_SAFE bool step(const HandTarget& target) noexcept;
+
+  const RobotHand& robot_;
+  double margin_m_;
+  Placed placed_;
+  Gaps gaps_{};
+  std::array<StepRow, kMaxGaps> rows_{};
+  StepProgram program_;
+  Drive pose_, middle_;
+};
+
+}  // namespace posed::robot

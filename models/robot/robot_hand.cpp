@@ -1,0 +1,519 @@
+#include "models/robot/robot_hand.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+
+#include "models/robot/shapes.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::robot {
+namespace {
+
+constexpr double kDefaultSpeed_rad_s = 8.0;
+constexpr double kGuessedTip_m = 8e-3;  // radius of a finger tip without a shape
+
+// Rounded into the range, so that no angle of a frame is beyond a limit by its rounding.
+double low_float(double value) {
+  auto f = static_cast<float>(value);
+  if (static_cast<double>(f) < value) f = std::nextafter(f, std::numeric_limits<float>::infinity());
+  return static_cast<double>(f);
+}
+double high_float(double value) { return -low_float(-value); }
+
+std::vector<std::string> split(std::string_view text) {
+  std::vector<std::string> words;
+  while (!text.empty()) {
+    const auto comma = std::min(text.find(','), text.size());
+    std::string_view word = text.substr(0, comma);
+    while (!word.empty() && word.front() == ' ') word.remove_prefix(1);
+    while (!word.empty() && word.back() == ' ') word.remove_suffix(1);
+    if (!word.empty()) words.emplace_back(word);
+    text.remove_prefix(std::min(comma + 1, text.size()));
+  }
+  return words;
+}
+
+class Builder {
+ public:
+  Builder(Urdf urdf, const RobotOptions& options, const std::string& file)
+      : options_(options), file_(file) {
+    hand_.name = urdf.name;
+    hand_.links = std::move(urdf.links);
+  }
+
+  Result<RobotHand> build() {
+    TRY(list_joints());
+    TRY(list_fingers());
+    hold_shared();
+    TRY(hold_named());
+    TRY(connect());
+    TRY(derive_frame());
+    add_shapes(hand_);
+    for (Finger& finger : hand_.fingers) finger.tip_radius_m = tip_radius(finger);
+    return std::move(hand_);
+  }
+
+ private:
+  [[nodiscard]] std::unexpected<Error> refuse(const std::string& sentence) const {
+    return misuse(sentence, file_);
+  }
+  [[nodiscard]] int find_joint(const std::string& name) const {
+    const auto at = std::ranges::find(hand_.joints, name, &RobotJoint::name);
+    return at == hand_.joints.end() ? -1 : static_cast<int>(at - hand_.joints.begin());
+  }
+  [[nodiscard]] bool is_above(int above, int link) const {
+    for (; link >= 0; link = hand_.links[link].parent) {
+      if (link == above) return true;
+    }
+    return false;
+  }
+
+  Result<> list_joints() {
+    if (hand_.links.size() > static_cast<std::size_t>(kMaxJoints)) {
+      return refuse("the robot has " + std::to_string(hand_.links.size()) +
+                    " links; posed drives hands of at most 96");
+    }
+    hand_.joint_of_link.assign(hand_.links.size(), -1);
+    for (int l = 1; l < std::ssize(hand_.links); ++l) {
+      const Link& link = hand_.links[l];
+      if (!link.turns) continue;
+      const bool given = options_.speed > 0.0;
+      const double speed = given ? options_.speed : std::min(link.speed, kDefaultSpeed_rad_s);
+      if (!(speed > 0.0)) {
+        return refuse("joint " + in_quotes(link.joint) +
+                      " has no velocity limit; set speed in [stream.robot]");
+      }
+      hand_.joint_of_link[l] = static_cast<int>(hand_.joints.size());
+      hand_.joints.push_back({.link = l,
+                              .name = link.joint,
+                              .low = low_float(link.low),
+                              .high = high_float(link.high),
+                              .speed = speed,
+                              .speed_given = given});
+      RobotJoint& joint = hand_.joints.back();
+      joint.high = std::max(joint.high, joint.low);
+    }
+    if (hand_.joints.empty()) return refuse("the URDF has no joint that turns: it is no hand");
+    if (hand_.joints.size() > static_cast<std::size_t>(kMaxRobotJoints)) {
+      return refuse("the robot has more than 64 joints that turn: it is no hand");
+    }
+    return {};
+  }
+
+  // A finger is a joint that carries no other one that turns, with all between it and the palm.
+  Result<> list_fingers() {
+    std::vector<int> lasts;
+    for (const RobotJoint& joint : hand_.joints) {
+      const bool carries = std::ranges::any_of(hand_.joints, [&](const RobotJoint& other) {
+        return other.link != joint.link && is_above(joint.link, other.link);
+      });
+      if (!carries) lasts.push_back(joint.link);
+    }
+    place_open();
+    for (const int last : lasts) {
+      Finger finger{.last = last, .tip = last};
+      double far_m = -1.0;
+      for (int l = last; l < std::ssize(hand_.links); ++l) {
+        if (!is_above(last, l)) continue;
+        const double away_m = (placed_.at_m[l] - placed_.at_m[last]).norm();
+        if (away_m > far_m) {
+          far_m = away_m;
+          finger.tip = l;
+        }
+      }
+      hand_.fingers.push_back(finger);
+    }
+    TRY(choose_tips());
+    if (hand_.fingers.size() < 3 || hand_.fingers.size() > 5) {
+      return refuse("the robot has " + std::to_string(hand_.fingers.size()) +
+                    " fingers; a hand has a thumb and two to four fingers, and `tips` can name "
+                    "their last links, thumb first");
+    }
+    for (Finger& finger : hand_.fingers) finger.base = base_of(finger);
+    for (const Finger& finger : hand_.fingers) {
+      if (finger.base == 0) return refuse("one finger of the robot has no joint of its own");
+    }
+    if (options_.tips.empty()) order_fingers();
+    for (std::size_t f = 0; f < hand_.fingers.size(); ++f) {
+      hand_.fingers[f].human = static_cast<int>(f);
+    }
+    return {};
+  }
+
+  Result<> choose_tips() {
+    if (options_.tips.empty()) return {};
+    std::vector<Finger> chosen;
+    for (const std::string& name : split(options_.tips)) {
+      const auto at = std::ranges::find(hand_.links, name, &Link::name);
+      const int tip = static_cast<int>(at - hand_.links.begin());
+      if (at == hand_.links.end()) {
+        return refuse("`tips` names the link " + in_quotes(name) + ", which the URDF does not have");
+      }
+      const auto finger = std::ranges::find_if(
+          hand_.fingers, [&](const Finger& one) { return is_above(one.last, tip); });
+      if (finger == hand_.fingers.end()) {
+        return refuse("`tips` names the link " + in_quotes(name) + ", which ends no finger");
+      }
+      chosen.push_back(*finger);
+      chosen.back().tip = tip;
+    }
+    hand_.fingers = std::move(chosen);
+    return {};
+  }
+
+  // The first link from the palm that turns and carries no other finger.
+  [[nodiscard]] int base_of(const Finger& finger) const {
+    int base = 0;
+    for (int l = finger.last; l > 0; l = hand_.links[l].parent) {
+      const bool shared = std::ranges::any_of(hand_.fingers, [&](const Finger& other) {
+        return other.last != finger.last && is_above(l, other.last);
+      });
+      if (shared) break;
+      if (hand_.links[l].turns) base = l;
+    }
+    return base;
+  }
+
+  [[nodiscard]] Eigen::Vector3d direction(const Finger& finger) const {
+    return (placed_.at_m[finger.tip] - placed_.at_m[finger.base]).normalized();
+  }
+
+  [[nodiscard]] bool is_named_thumb(const Finger& finger) const {
+    for (int l = finger.tip; l > 0 && is_above(finger.base, l); l = hand_.links[l].parent) {
+      std::string names = hand_.links[l].name + " " + hand_.links[l].joint;
+      std::ranges::transform(names, names.begin(), [](unsigned char c) { return std::tolower(c); });
+      if (names.find("thumb") != names.npos || names.starts_with("th")) return true;
+    }
+    return false;
+  }
+
+  // The thumb has the name, or else points away from the others. They are in a row whose end near
+  // the thumb is the index finger.
+  void order_fingers() {
+    std::vector<Finger>& fingers = hand_.fingers;
+    auto thumb = std::ranges::find_if(fingers, [&](const Finger& f) { return is_named_thumb(f); });
+    if (thumb == fingers.end()) {
+      thumb = std::ranges::min_element(fingers, {}, [&](const Finger& finger) {
+        double sum = 0.0;
+        for (const Finger& other : fingers) sum += direction(finger).dot(direction(other));
+        return sum;
+      });
+    }
+    std::iter_swap(thumb, fingers.begin());
+    const Eigen::Vector3d thumb_m = placed_.at_m[fingers[0].base];
+    std::sort(fingers.begin() + 1, fingers.end(), [&](const Finger& a, const Finger& b) {
+      return (placed_.at_m[a.base] - thumb_m).norm() < (placed_.at_m[b.base] - thumb_m).norm();
+    });
+    // The row is straight, so that its order is that along its own line.
+    const Eigen::Vector3d row = placed_.at_m[fingers.back().base] - placed_.at_m[fingers[1].base];
+    std::sort(fingers.begin() + 1, fingers.end(), [&](const Finger& a, const Finger& b) {
+      return placed_.at_m[a.base].dot(row) < placed_.at_m[b.base].dot(row);
+    });
+  }
+
+  // A joint that moves all fingers is a wrist's, and one that moves none is none of the hand's.
+  void hold_shared() {
+    held_.assign(hand_.joints.size(), std::numeric_limits<double>::quiet_NaN());
+    for (std::size_t j = 0; j < hand_.joints.size(); ++j) {
+      const auto moved = std::ranges::count_if(hand_.fingers, [&](const Finger& finger) {
+        return is_above(hand_.joints[j].link, finger.tip);
+      });
+      if (moved == 0 || moved == std::ssize(hand_.fingers)) {
+        held_[j] = std::clamp(0.0, hand_.joints[j].low, hand_.joints[j].high);
+      }
+    }
+  }
+
+  Result<std::map<int, double>> angles(const std::string& text, const std::string& what) const {
+    std::map<int, double> angles;
+    for (const std::string& word : split(text)) {
+      const auto equals = word.find('=');
+      const int joint = find_joint(word.substr(0, equals));
+      char* end = nullptr;
+      const std::string number = equals == word.npos ? "" : word.substr(equals + 1);
+      const double value = std::strtod(number.c_str(), &end);
+      if (joint < 0 || number.empty() || *end != '\0') {
+        return refuse(what + " = " + in_quotes(word) + " is no joint and angle; write \"JOINT=0.5\"");
+      }
+      const RobotJoint& at = hand_.joints[joint];
+      if (!(value >= at.low && value <= at.high)) {
+        return refuse(what + " puts joint " + in_quotes(at.name) + " beyond its limits");
+      }
+      angles[joint] = value;
+    }
+    return angles;
+  }
+
+  Result<> hold_named() {
+    const auto held = TRY(angles(options_.hold, "hold"));
+    for (const auto& [joint, value] : held) held_[joint] = value;
+    starts_ = TRY(angles(options_.start, "start"));
+    return {};
+  }
+
+  // Gives each joint its driven one, and cuts that one's limits by those who follow.
+  Result<> connect() {
+    for (std::size_t j = 0; j < hand_.joints.size(); ++j) {
+      RobotJoint& joint = hand_.joints[j];
+      if (hand_.links[joint.link].leader >= 0) continue;
+      if (std::isfinite(held_[j])) {
+        joint.multiplier = 0.0;
+        joint.offset = held_[j];
+        continue;
+      }
+      joint.driven = hand_.size();
+      hand_.driven.push_back({.joint = static_cast<int>(j),
+                              .low = joint.low,
+                              .high = joint.high,
+                              .speed = joint.speed,
+                              .acceleration = options_.acceleration});
+    }
+    if (hand_.driven.empty() || hand_.driven.size() > static_cast<std::size_t>(kMaxDriven)) {
+      return refuse("the robot has " + std::to_string(hand_.driven.size()) +
+                    " joints to drive; posed drives 1 to 24: let others stand by `hold`");
+    }
+    for (RobotJoint& joint : hand_.joints) {
+      const Link& link = hand_.links[joint.link];
+      if (link.leader < 0) continue;
+      const RobotJoint& leader = hand_.joints[hand_.joint_of_link[link.leader]];
+      joint.follows = true;
+      joint.driven = leader.driven;
+      joint.multiplier = link.multiplier;
+      joint.offset = link.offset;
+      if (leader.driven < 0) {
+        joint.offset += link.multiplier * leader.offset;
+        joint.multiplier = 0.0;
+      }
+      TRY(cut_limits(joint));
+    }
+    for (DrivenJoint& driven : hand_.driven) {
+      if (driven.low > driven.high) {
+        return refuse("joint " + in_quotes(hand_.joints[driven.joint].name) +
+                      " has no angle at which all its followers are within their limits");
+      }
+      const auto start = starts_.find(driven.joint);
+      driven.start = std::clamp(start == starts_.end() ? 0.0 : start->second, driven.low,
+                                driven.high);
+    }
+    fill_turns();
+    return {};
+  }
+
+  Result<> cut_limits(const RobotJoint& joint) {
+    const double inside = 1e-7;  // rounding of the follower's angle
+    if (joint.driven < 0 || joint.multiplier == 0.0) {
+      if (joint.offset >= joint.low && joint.offset <= joint.high) return {};
+      return refuse("joint " + in_quotes(joint.name) + " stands beyond its limits");
+    }
+    DrivenJoint& leader = hand_.driven[joint.driven];
+    double low = (joint.low + inside - joint.offset) / joint.multiplier;
+    double high = (joint.high - inside - joint.offset) / joint.multiplier;
+    if (low > high) std::swap(low, high);
+    leader.low = std::max(leader.low, low_float(low));
+    leader.high = std::min(leader.high, high_float(high));
+    const double gain = std::abs(joint.multiplier);
+    leader.speed = std::min(leader.speed, joint.speed / gain);
+    leader.acceleration = std::min(leader.acceleration, options_.acceleration / gain);
+    return {};
+  }
+
+  void fill_turns() {
+    hand_.turns.resize(hand_.links.size());
+    for (int l = 0; l < std::ssize(hand_.links); ++l) {
+      for (int above = l; above > 0; above = hand_.links[above].parent) {
+        if (!hand_.links[above].turns) continue;
+        const RobotJoint& joint = hand_.joints[hand_.joint_of_link[above]];
+        if (joint.driven < 0 || joint.multiplier == 0.0) continue;
+        hand_.turns[l].push_back(
+            {.link = above, .driven = joint.driven, .multiplier = joint.multiplier});
+      }
+    }
+  }
+
+  // All joints at zero within their limits, before it is known who is driven.
+  void place_open() {
+    for (std::size_t l = 0; l < hand_.links.size(); ++l) {
+      const Link& link = hand_.links[l];
+      Eigen::Isometry3d at = link.at;
+      if (link.turns)
+        at = at * Eigen::AngleAxisd(std::clamp(0.0, link.low, link.high), link.axis);
+      if (link.parent >= 0) {
+        at.translation() = placed_.at_m[link.parent] + placed_.turn[link.parent] * at.translation();
+        at.linear() = placed_.turn[link.parent] * at.linear();
+      }
+      placed_.at_m[l] = at.translation();
+      placed_.turn[l] = at.linear();
+      placed_.axis[l] = at.linear() * link.axis;
+    }
+  }
+
+  Drive open_pose() const {
+    Drive drive = Drive::Zero();
+    for (int i = 0; i < hand_.size(); ++i) {
+      drive[i] = std::clamp(0.0, hand_.driven[i].low, hand_.driven[i].high);
+    }
+    return drive;
+  }
+
+  // models/robot/README.md, "Frame".
+  Result<> derive_frame() {
+    place(hand_, open_pose(), placed_);
+    Eigen::Vector3d z = Eigen::Vector3d::Zero();
+    for (std::size_t f = 1; f < hand_.fingers.size(); ++f) z += direction(hand_.fingers[f]);
+    Eigen::Vector3d y = placed_.at_m[hand_.fingers[1].tip] - placed_.at_m[hand_.fingers.back().tip];
+    z.normalize();
+    y -= y.dot(z) * z;
+    if (!(y.norm() > 1e-3) || !z.allFinite()) {
+      return refuse("the robot's fingers are not side by side when open; `tips` names their last "
+                    "links, thumb first");
+    }
+    y.normalize();
+    for (Finger& finger : hand_.fingers) {
+      finger.knuckle = finger.base;
+      for (int l = finger.last; finger.human > 0 && l > 0 && is_above(finger.base, l);
+           l = hand_.links[l].parent) {
+        if (hand_.links[l].turns && std::abs(placed_.axis[l].dot(y)) > 0.8) finger.knuckle = l;
+      }
+      finger.knuckle_m = placed_.at_m[finger.knuckle];
+      for (int l = finger.tip; l != finger.knuckle; l = hand_.links[l].parent) {
+        finger.length_m += hand_.links[l].at.translation().norm();
+      }
+      if (!(finger.length_m > 5e-3)) {
+        return refuse("the finger that ends in " + in_quotes(hand_.links[finger.tip].name) +
+                      " is shorter than 5 mm; name its last link by `tips`");
+      }
+    }
+    const Eigen::Vector3d out = y.cross(z);  // of a right hand's palm
+    const double bends = bend_along(out);
+    hand_.side = bends >= 0.0 ? Side::kRight : Side::kLeft;
+    if (options_.side && *options_.side != hand_.side) {
+      const bool left = hand_.side == Side::kLeft;
+      return refuse(std::string("the URDF is a ") + (left ? "left" : "right") +
+                    " hand, and a " + (left ? "right" : "left") +
+                    " one drives it; name the other URDF, or `tips` thumb first");
+    }
+    hand_.palm << (hand_.side == Side::kRight ? out : Eigen::Vector3d(-out)), y, z;
+    return {};
+  }
+
+  // How far the fingers' tips go along `out` when their joints turn where they can turn further.
+  [[nodiscard]] double bend_along(const Eigen::Vector3d& out) const {
+    double sum = 0.0;
+    const Drive open = open_pose();
+    for (std::size_t f = 1; f < hand_.fingers.size(); ++f) {
+      const Finger& finger = hand_.fingers[f];
+      Drive slope = Drive::Zero();
+      add_slope(hand_, placed_, finger.tip, placed_.at_m[finger.tip], out, slope);
+      for (int i = 0; i < hand_.size(); ++i) {
+        const DrivenJoint& driven = hand_.driven[i];
+        sum += slope[i] * (driven.high + driven.low - 2.0 * open[i]);
+      }
+    }
+    return sum;
+  }
+
+  // The shape at the end of the finger; a guess where it has none.
+  [[nodiscard]] double tip_radius(const Finger& finger) const {
+    double radius_m = 0.0;
+    for (int l = finger.tip; l != hand_.links[finger.last].parent; l = hand_.links[l].parent) {
+      const Ball& ball = hand_.balls[l];
+      for (int c = ball.first; c < ball.first + ball.count; ++c) {
+        radius_m = std::max(radius_m, hand_.capsules[c].radius_m);
+      }
+      if (radius_m > 0.0) return radius_m;
+    }
+    return kGuessedTip_m;
+  }
+
+  RobotHand hand_;
+  RobotOptions options_;
+  std::string file_;
+  Placed placed_{static_cast<std::size_t>(kMaxJoints)};
+  std::vector<double> held_;  // [joint]; NaN: not held
+  std::map<int, double> starts_;
+};
+
+}  // namespace
+
+Drive RobotHand::start() const {
+  Drive drive = Drive::Zero();
+  for (int i = 0; i < size(); ++i) drive[i] = driven[i].start;
+  return drive;
+}
+
+Result<RobotHand> robot_hand(Urdf urdf, const RobotOptions& options, const std::string& file) {
+  return Builder(std::move(urdf), options, file).build();
+}
+
+// At zero all joints of a posed skeleton have the root's axes, so that a URDF's fixed turns go into
+// the offsets and the channels' frames.
+Result<Skeleton> robot_skeleton(const RobotHand& hand) {
+  Skeleton skeleton;
+  skeleton.name = hand.name.empty() ? "robot" : hand.name;
+  Eigen::Matrix3d to_posed;  // URDF: x forwards, y left, z up; posed: z forwards, x left, y up
+  to_posed << 0, 1, 0, 0, 0, 1, 1, 0, 0;
+  std::vector<Eigen::Matrix3d> turn(hand.links.size());
+  for (std::size_t l = 0; l < hand.links.size(); ++l) {
+    const Link& link = hand.links[l];
+    const Eigen::Matrix3d before = link.parent < 0 ? to_posed : turn[link.parent];
+    turn[l] = before * link.at.linear();
+    Joint joint;
+    joint.name = link.parent < 0 ? link.name : link.joint;
+    joint.parent = link.parent;
+    joint.offset_m = link.parent < 0 ? Eigen::Vector3d::Zero()
+                                     : Eigen::Vector3d(before * link.at.translation());
+    if (link.turns) {
+      const Eigen::Vector3d axis = turn[l] * link.axis;
+      joint.channel_frame = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), axis);
+      const RobotJoint& turns = hand.joints[hand.joint_of_link[l]];
+      skeleton.channels.push_back({.joint = static_cast<std::uint16_t>(l),
+                                   .axis = Axis::kX,
+                                   .min = static_cast<float>(turns.low),
+                                   .max = static_cast<float>(turns.high)});
+    }
+    skeleton.joints.push_back(std::move(joint));
+  }
+  // The root's link may have a joint's name.
+  while (std::ranges::count(skeleton.joints, skeleton.joints[0].name, &Joint::name) > 1) {
+    skeleton.joints[0].name += " root";
+  }
+  TRY(skeleton.finish());
+  return skeleton;
+}
+
+double angle_of(const RobotJoint& joint, const Drive& drive) noexcept {
+  return joint.driven < 0 ? joint.offset : joint.multiplier * drive[joint.driven] + joint.offset;
+}
+
+void place(const RobotHand& hand, const Drive& drive, Placed& placed) noexcept {
+  for (std::size_t l = 0; l < hand.links.size(); ++l) {
+    const Link& link = hand.links[l];
+    Eigen::Matrix3d turn = link.at.linear();
+    Eigen::Vector3d at_m = link.at.translation();
+    if (link.parent >= 0) {
+      at_m = placed.at_m[link.parent] + placed.turn[link.parent] * at_m;
+      turn = placed.turn[link.parent] * turn;
+    }
+    placed.at_m[l] = at_m;
+    if (hand.joint_of_link[l] >= 0) {
+      placed.axis[l] = turn * link.axis;
+      const double angle = angle_of(hand.joints[hand.joint_of_link[l]], drive);
+      turn = turn * Eigen::AngleAxisd(angle, link.axis).toRotationMatrix();
+    }
+    placed.turn[l] = turn;
+  }
+}
+
+void add_slope(const RobotHand& hand, const Placed& placed, int link,
+               const Eigen::Vector3d& point_m, const Eigen::Vector3d& direction,
+               Drive& slope) noexcept {
+  for (const Turn& turn : hand.turns[link]) {
+    const Eigen::Vector3d moves = placed.axis[turn.link].cross(point_m - placed.at_m[turn.link]);
+    slope[turn.driven] += turn.multiplier * direction.dot(moves);
+  }
+}
+
+}  // namespace posed::robot

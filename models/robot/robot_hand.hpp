@@ -1,0 +1,121 @@
+// RobotHand: what posed derives from a URDF, so that nobody has to type it: which joints are
+// driven, follow or stand, their limits, the fingers, the palm's frame, and capsules that hold each
+// link's collision shapes. Built cold, then constant; place() and slope() are RT-safe.
+// models/robot/README.md has the definitions.
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "models/robot/urdf.hpp"
+#include "proto/frame/hand.hpp"
+#include "proto/frame/rt_safe.hpp"
+#include "proto/frame/skeleton.hpp"
+
+namespace posed::robot {
+
+inline constexpr int kMaxDriven = 24;
+
+using Drive = Eigen::Matrix<double, kMaxDriven, 1>;  // [driven joint]; zero behind the last one
+
+struct RobotOptions {
+  std::string tips;         // names of links, thumb first; empty: derived
+  std::string hold;         // "joint=rad, ...": these stand
+  std::string start;        // "joint=rad, ...": the first command; else zero within the limits
+  double speed = 0.0;       // rad/s; 0: 8, or what the URDF says where that is less
+  double acceleration = 120.0;  // rad/s^2
+  std::optional<Side> side;     // of the hand that drives it; empty: as the URDF bends
+};
+
+// A joint that turns, in the order of Frame::angle_rad.
+struct RobotJoint {
+  int link = 0;  // that it carries
+  std::string name;
+  double low = 0.0, high = 0.0;  // rad, both are floats
+  double speed = 0.0;            // rad/s
+  bool speed_given = false;      // by the config, else by the URDF or the default
+  int driven = -1;               // angle = multiplier * drive[driven] + offset; -1: stands at offset
+  double multiplier = 1.0, offset = 0.0;
+  bool follows = false;
+};
+
+// A joint that the hand drives, with what those that follow it leave of its limits.
+struct DrivenJoint {
+  int joint = 0;
+  double low = 0.0, high = 0.0, start = 0.0;  // rad
+  double speed = 0.0, acceleration = 0.0;     // rad/s, rad/s^2
+};
+
+struct Finger {
+  int human = 0;          // which finger drives it: 0 is the thumb
+  int base = 0;           // link of its first joint
+  int knuckle = 0;        // link of the joint from which its length is measured
+  int last = 0;           // link of its last joint
+  int tip = 0;            // link at its end
+  double length_m = 0.0;  // along the chain
+  double tip_radius_m = 0.0;
+  Eigen::Vector3d knuckle_m = Eigen::Vector3d::Zero();  // in the root's frame, when open
+};
+
+struct Capsule {
+  int link = 0;
+  Eigen::Vector3d from_m = Eigen::Vector3d::Zero();  // in the link's frame
+  Eigen::Vector3d to_m = Eigen::Vector3d::Zero();
+  double radius_m = 0.0;
+};
+
+struct Ball {  // that holds all capsules of a link, in its frame
+  Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();
+  double radius_m = -1.0;  // below zero: the link has no shape
+  int first = 0, count = 0;  // its capsules
+};
+
+struct Turn {  // of a link by a driven joint above it
+  int link = 0, driven = 0;
+  double multiplier = 1.0;
+};
+
+struct RobotHand {
+  std::string name;
+  Side side = Side::kRight;
+  std::vector<Link> links;
+  std::vector<RobotJoint> joints;
+  std::vector<DrivenJoint> driven;
+  std::vector<Finger> fingers;  // thumb first, then from its side on
+  // Columns: out of the palm, to the thumb's side, to the fingers. A left hand's is a mirror image.
+  Eigen::Matrix3d palm = Eigen::Matrix3d::Identity();
+  std::vector<Capsule> capsules;             // by link
+  std::vector<Ball> balls;                   // [link]
+  std::vector<std::pair<int, int>> pairs;    // of links that must not touch
+  std::vector<std::pair<int, int>> left_out;  // that touch anyway
+  std::vector<std::vector<Turn>> turns;      // [link]
+  std::vector<int> joint_of_link;            // [link]; -1: it does not turn
+
+  [[nodiscard]] int size() const noexcept { return static_cast<int>(driven.size()); }
+  [[nodiscard]] Drive start() const;
+};
+
+// An error says why this is no hand that posed can drive. The links are those of a parsed URDF.
+Result<RobotHand> robot_hand(Urdf urdf, const RobotOptions& options, const std::string& file);
+
+// The robot as a skeleton: a joint a link, in tree order, Y up, and a channel a joint that turns.
+Result<Skeleton> robot_skeleton(const RobotHand& hand);
+
+// All links in one pose, in the root's frame.
+struct Placed {
+  explicit Placed(std::size_t links) : turn(links), at_m(links), axis(links) {}
+  std::vector<Eigen::Matrix3d> turn;
+  std::vector<Eigen::Vector3d> at_m;
+  std::vector<Eigen::Vector3d> axis;  // of the joint that carries the link
+};
+RT_SAFE [[nodiscard]] double angle_of(const RobotJoint& joint, const Drive& drive) noexcept;
+RT_SAFE void place(const RobotHand& hand, const Drive& drive, Placed& placed) noexcept;
+// Adds to `slope` how much `point_m`, fixed to `link`, moves along `direction` [m/rad].
+RT_SAFE void add_slope(const RobotHand& hand, const Placed& placed, int link,
+                       const Eigen::Vector3d& point_m, const Eigen::Vector3d& direction,
+                       Drive& slope) noexcept;
+
+}  // namespace posed::robot

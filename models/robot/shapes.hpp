@@ -1,0 +1,33 @@
+// The collision shapes of a robot as capsules that hold them, and the gaps between links.
+#pragma once
+
+#include <span>
+
+#include "models/robot/robot_hand.hpp"
+
+namespace posed::robot {
+
+// Fills in capsules, balls, and which pairs of links can be kept apart: those that touch when the
+// hand is open, or in most poses, are left out. Cold.
+void add_shapes(RobotHand& hand);
+
+// Two links and how their gap changes with each driven joint.
+struct Gap {
+  int a = 0, b = 0;
+  double gap_m = 0.0;  // below zero: they overlap
+  Drive slope = Drive::Zero();  // m/rad
+};
+
+inline constexpr int kMaxGaps = 32;
+using Gaps = std::array<Gap, kMaxGaps>;
+
+// The pairs that are nearer than `near_m`, the nearest ones where there are more than fit. Without
+// slopes for whoever does not need them.
+RT_SAFE [[nodiscard]] std::span<const Gap> find_gaps(const RobotHand& hand, const Placed& placed,
+                                                     double near_m, bool slopes,
+                                                     Gaps& gaps) noexcept;
+
+// The gap of one pair of links, infinite where one has no shape.
+RT_SAFE [[nodiscard]] Gap gap_between(const RobotHand& hand, const Placed& placed, int a,
+                                      int b) noexcept;
+}  // namespace posed::robot

@@ -1,0 +1,166 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <sstream>
+#include <vector>
+
+#include <Eigen/Eigenvalues>
+#include <pugixml.hpp>
+
+#include "models/robot/urdf.hpp"
+#include "proto/text/load_file.hpp"
+
+namespace posed::robot {
+namespace {
+
+constexpr std::uintmax_t kMaxMeshBytes = std::uintmax_t{16} << 20;
+
+std::vector<Eigen::Vector3d> corners_of(const std::string& text) {
+  std::vector<Eigen::Vector3d> corners;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with("v ")) continue;
+    std::istringstream numbers(line.substr(2));
+    Eigen::Vector3d corner;
+    if (numbers >> corner.x() >> corner.y() >> corner.z() && corner.allFinite() &&
+        corner.norm() < 1e4) {
+      corners.push_back(corner);
+    }
+  }
+  return corners;
+}
+
+// "package://name/meshes/a.obj" and "meshes/a.obj" are looked for beside the URDF.
+std::filesystem::path beside(const std::filesystem::path& urdf, std::string name) {
+  constexpr std::string_view kPackage = "package://";
+  const std::filesystem::path folder = urdf.parent_path();
+  if (name.starts_with("file://")) return {};
+  if (name.starts_with(kPackage)) {
+    name = name.substr(kPackage.size());
+    const auto slash = name.find('/');
+    name = slash == name.npos ? name : name.substr(slash + 1);
+  }
+  const std::filesystem::path relative(name);
+  // Nothing outside of the URDF's own folder is read.
+  if (relative.is_absolute() || std::ranges::find(relative, "..") != relative.end()) return {};
+  return folder / relative;
+}
+
+struct Fit {
+  Eigen::Isometry3d at = Eigen::Isometry3d::Identity();
+  double radius_m = 0.0, length_m = 0.0;
+};
+
+// A capsule along the corners' longest direction that holds all of them.
+Fit fit_capsule(const std::vector<Eigen::Vector3d>& corners) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const auto& corner : corners) mean += corner / static_cast<double>(corners.size());
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const auto& corner : corners) spread += (corner - mean) * (corner - mean).transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
+  Eigen::Matrix3d axes = solver.eigenvectors();  // the longest last, so it becomes z
+  if (axes.determinant() < 0.0) axes.col(0) = -axes.col(0);
+  Eigen::Vector3d low = Eigen::Vector3d::Constant(1e9);
+  Eigen::Vector3d high = -low;
+  for (const auto& corner : corners) {
+    const Eigen::Vector3d local = axes.transpose() * (corner - mean);
+    low = low.cwiseMin(local);
+    high = high.cwiseMax(local);
+  }
+  const Eigen::Vector3d middle = 0.5 * (low + high);
+  Fit fit;
+  for (const auto& corner : corners) {
+    const Eigen::Vector3d local = axes.transpose() * (corner - mean) - middle;
+    fit.radius_m = std::max(fit.radius_m, std::hypot(local.x(), local.y()));
+  }
+  // As long as the corners at the ends need.
+  double half_m = 0.0;
+  for (const auto& corner : corners) {
+    const Eigen::Vector3d local = axes.transpose() * (corner - mean) - middle;
+    const double aside = std::hypot(local.x(), local.y());
+    const double cap = std::sqrt(std::max(0.0, fit.radius_m * fit.radius_m - aside * aside));
+    half_m = std::max(half_m, std::abs(local.z()) - cap);
+  }
+  fit.length_m = 2.0 * half_m;
+  fit.at.linear() = axes;
+  fit.at.translation() = mean + axes * middle;
+  return fit;
+}
+
+Eigen::Vector3d three(const char* text, double otherwise) {
+  Eigen::Vector3d value = Eigen::Vector3d::Constant(otherwise);
+  std::istringstream numbers(text);
+  Eigen::Vector3d read;
+  if (numbers >> read.x() >> read.y() >> read.z() && read.allFinite()) value = read;
+  return value;
+}
+
+std::string words(const Eigen::Vector3d& v) {
+  std::ostringstream out;
+  out.precision(9);
+  out << v.x() << ' ' << v.y() << ' ' << v.z();
+  return out.str();
+}
+
+void replace_mesh(pugi::xml_node collision, const std::filesystem::path& urdf) {
+  pugi::xml_node geometry = collision.child("geometry");
+  const pugi::xml_node mesh = geometry.child("mesh");
+  const auto path = beside(urdf, mesh.attribute("filename").value());
+  std::error_code ignored;
+  if (path.extension() != ".obj" || !std::filesystem::exists(path, ignored)) return;
+  const auto text = load_file(path, {.what = "mesh", .max_bytes = kMaxMeshBytes});
+  if (!text) return;
+  auto corners = corners_of(*text);
+  const Eigen::Vector3d scale = three(mesh.attribute("scale").value(), 1.0);
+  for (auto& corner : corners) corner = corner.cwiseProduct(scale);
+  if (corners.size() < 4) return;
+  const Fit fit = fit_capsule(corners);
+  if (!(fit.radius_m > 0.0) || fit.radius_m + fit.length_m > 1.0) return;
+  pugi::xml_node origin = collision.child("origin");
+  if (!origin) origin = collision.append_child("origin");
+  const Eigen::Vector3d rpy = three(origin.attribute("rpy").value(), 0.0);
+  Eigen::Isometry3d at = Eigen::Isometry3d::Identity();
+  at.translation() = three(origin.attribute("xyz").value(), 0.0);
+  at.linear() = (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
+                 Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
+                 Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
+                    .toRotationMatrix();
+  at = at * fit.at;
+  const Eigen::Vector3d zyx = at.linear().eulerAngles(2, 1, 0);
+  origin.remove_attributes();
+  origin.append_attribute("xyz") = words(at.translation()).c_str();
+  origin.append_attribute("rpy") = words({zyx.z(), zyx.y(), zyx.x()}).c_str();
+  geometry.remove_children();
+  pugi::xml_node capsule = geometry.append_child("capsule");
+  capsule.append_attribute("radius") = std::to_string(fit.radius_m + 1e-6).c_str();
+  capsule.append_attribute("length") = std::to_string(fit.length_m + 1e-6).c_str();
+}
+
+}  // namespace
+
+Result<std::string> load_urdf(const std::string& path) {
+  const auto text = TRY(load_file(path, {.what = "URDF", .max_bytes = kMaxUrdfBytes}));
+  TRY(parse_urdf(text, path));
+  pugi::xml_document document;
+  document.load_buffer(text.data(), text.size());
+  pugi::xml_node robot = document.child("robot");
+  for (const char* other : {"material", "gazebo", "transmission", "mujoco"}) {
+    while (robot.remove_child(other)) {
+    }
+  }
+  for (pugi::xml_node link : robot.children("link")) {
+    for (const char* other : {"visual", "inertial"}) {
+      while (link.remove_child(other)) {
+      }
+    }
+    for (const pugi::xml_node collision : link.children("collision")) {
+      if (collision.child("geometry").child("mesh")) replace_mesh(collision, path);
+    }
+  }
+  std::ostringstream out;
+  document.save(out, "", pugi::format_raw);
+  return out.str();
+}
+
+}  // namespace posed::robot
