@@ -26,7 +26,7 @@ RT_SAFE double stopping_speed(double left, double a, double dt) noexcept {
 }  // namespace
 
 Command::Command(const RobotHand& robot, double margin_m)
-    : robot_(robot), margin_m_(margin_m), placed_(robot.links.size()), pose_(robot.start()) {
+    : robot_(robot), margin_m_(margin_m), placed_(robot.links.size(), robot.capsules.size()), pose_(robot.start()) {
   program_.size = robot.size();
 }
 

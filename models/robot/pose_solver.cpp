@@ -18,7 +18,7 @@ constexpr int kBacktracks = 3;
 }  // namespace
 
 PoseSolver::PoseSolver(const RobotHand& robot, double margin_m)
-    : robot_(robot), margin_m_(margin_m), placed_(robot.links.size()) {
+    : robot_(robot), margin_m_(margin_m), placed_(robot.links.size(), robot.capsules.size()) {
   pose_ = robot.start();
   middle_.setZero();
   program_.size = robot.size();
@@ -128,11 +128,12 @@ bool PoseSolver::step(const HandTarget& target) noexcept {
   }
   program_.rows = {rows_.data(), gaps.size()};
   for (int i = 0; i < program_.size; ++i) {
-    program_.low[i] = std::max(robot_.driven[i].low - pose_[i], -kMaxStep_rad);
-    program_.high[i] = std::min(robot_.driven[i].high - pose_[i], kMaxStep_rad);
+    program_.low[i] = robot_.driven[i].low - pose_[i];
+    program_.high[i] = robot_.driven[i].high - pose_[i];
   }
   Drive wanted;
   (void)robot::solve(program_, wanted);
+  wanted *= std::min(1.0, kMaxStep_rad / std::max(wanted.cwiseAbs().maxCoeff(), 1e-9));
   for (int halving = 0; halving <= kBacktracks; ++halving, wanted *= 0.5) {
     const Drive there = pose_ + wanted;
     const double after = cost(target, there, false);

@@ -65,6 +65,7 @@ struct Capsule {
   Eigen::Vector3d from_m = Eigen::Vector3d::Zero();  // in the link's frame
   Eigen::Vector3d to_m = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
+  double reach_m = 0.0;  // radius of the ball around all of it
 };
 
 struct Ball {  // that holds all capsules of a link, in its frame
@@ -106,10 +107,12 @@ Result<Skeleton> robot_skeleton(const RobotHand& hand);
 
 // All links in one pose, in the root's frame.
 struct Placed {
-  explicit Placed(std::size_t links) : turn(links), at_m(links), axis(links) {}
+  explicit Placed(std::size_t links, std::size_t capsules = 0)
+      : turn(links), at_m(links), axis(links), from_m(capsules), to_m(capsules) {}
   std::vector<Eigen::Matrix3d> turn;
   std::vector<Eigen::Vector3d> at_m;
   std::vector<Eigen::Vector3d> axis;  // of the joint that carries the link
+  std::vector<Eigen::Vector3d> from_m, to_m;  // [capsule]; none where no gap is asked for
 };
 RT_SAFE [[nodiscard]] double angle_of(const RobotJoint& joint, const Drive& drive) noexcept;
 RT_SAFE void place(const RobotHand& hand, const Drive& drive, Placed& placed) noexcept;

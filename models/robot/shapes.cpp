@@ -16,7 +16,11 @@ constexpr double kMostly = 0.7;
 void add_capsule(RobotHand& hand, int link, const Eigen::Isometry3d& at,
                  const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m, double radius_m) {
   hand.capsules.push_back(
-      {.link = link, .from_m = at * from_m, .to_m = at * to_m, .radius_m = radius_m});
+      {.link = link,
+       .from_m = at * from_m,
+       .to_m = at * to_m,
+       .radius_m = radius_m,
+       .reach_m = 0.5 * (to_m - from_m).norm() + radius_m});
 }
 
 // Capsules along the longest edge, side by side across the middle one. Each reaches its strip's
@@ -119,12 +123,15 @@ RT_SAFE Nearest nearest(const RobotHand& hand, const Placed& placed, int a, int 
   const Ball& all_b = hand.balls[b];
   for (int i = all_a.first; i < all_a.first + all_a.count; ++i) {
     const Capsule& one = hand.capsules[i];
-    const Eigen::Vector3d from = world(placed, a, one.from_m);
-    const Eigen::Vector3d to = world(placed, a, one.to_m);
+    const Eigen::Vector3d& from = placed.from_m[i];
+    const Eigen::Vector3d& to = placed.to_m[i];
     for (int j = all_b.first; j < all_b.first + all_b.count; ++j) {
       const Capsule& other = hand.capsules[j];
-      const Eigen::Vector3d begin = world(placed, b, other.from_m);
-      const Eigen::Vector3d end = world(placed, b, other.to_m);
+      const Eigen::Vector3d& begin = placed.from_m[j];
+      const Eigen::Vector3d& end = placed.to_m[j];
+      const double reach_m = one.reach_m + other.reach_m + best.gap_m;
+      const double middles_m2 = 0.25 * (from + to - begin - end).squaredNorm();
+      if (reach_m > 0.0 && middles_m2 >= reach_m * reach_m) continue;
       const auto closest = hand::closest_points(from, to, begin, end);
       const double distance_m = closest.apart.norm();
       const double gap_m = distance_m - one.radius_m - other.radius_m;
@@ -162,7 +169,7 @@ void add_shapes(RobotHand& hand) {
     for (const Shape& shape : hand.links[l].shapes) add_shape(hand, l, shape);
     hand.balls.push_back(ball_around(hand, first));
   }
-  Placed placed(hand.links.size());
+  Placed placed(hand.links.size(), hand.capsules.size());
   std::vector<std::pair<int, int>> all;
   for (int a = 0; a < std::ssize(hand.links); ++a) {
     for (int b = a + 1; b < std::ssize(hand.links); ++b) {

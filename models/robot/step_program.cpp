@@ -12,7 +12,7 @@ namespace {
 constexpr int kMaxActive = hand::kMaxUnknowns;
 constexpr int kJoinAtOnce = 6;
 constexpr int kMaxRounds = 24;
-constexpr double kRidge = 1e-9;   // rows that say the same share their force
+constexpr double kRidge = 1e-6;   // rows that say the same share their force
 constexpr double kKept = 1e-7;    // of a row scaled to a step of one
 constexpr double kBroken = 1e-5;  // no rounding any more
 
