@@ -108,7 +108,7 @@ Drive some_pose(const RobotHand& hand, int number) {
 }
 
 struct Nearest {
-  double gap_m = std::numeric_limits<double>::infinity();
+  double gap_m = 0.0;
   Eigen::Vector3d at_a = Eigen::Vector3d::Zero(), at_b = Eigen::Vector3d::Zero();
   Eigen::Vector3d apart = Eigen::Vector3d::UnitX();  // from b to a
 };
@@ -117,21 +117,26 @@ RT_SAFE Eigen::Vector3d world(const Placed& placed, int link, const Eigen::Vecto
   return placed.at_m[link] + placed.turn[link] * m;
 }
 
-RT_SAFE Nearest nearest(const RobotHand& hand, const Placed& placed, int a, int b) noexcept {
-  Nearest best;
+// The least gap below `near_m`; that itself where none is.
+RT_SAFE Nearest nearest(const RobotHand& hand, const Placed& placed, int a, int b,
+                        double near_m) noexcept {
+  Nearest best{.gap_m = near_m};
   const Ball& all_a = hand.balls[a];
   const Ball& all_b = hand.balls[b];
+  const Eigen::Vector3d middle_b = world(placed, b, all_b.middle_m);
   for (int i = all_a.first; i < all_a.first + all_a.count; ++i) {
     const Capsule& one = hand.capsules[i];
     const Eigen::Vector3d& from = placed.from_m[i];
     const Eigen::Vector3d& to = placed.to_m[i];
+    const double all_m = one.reach_m + all_b.radius_m + best.gap_m;
+    if (all_m <= 0.0 || (0.5 * (from + to) - middle_b).squaredNorm() >= all_m * all_m) continue;
     for (int j = all_b.first; j < all_b.first + all_b.count; ++j) {
       const Capsule& other = hand.capsules[j];
       const Eigen::Vector3d& begin = placed.from_m[j];
       const Eigen::Vector3d& end = placed.to_m[j];
       const double reach_m = one.reach_m + other.reach_m + best.gap_m;
       const double middles_m2 = 0.25 * (from + to - begin - end).squaredNorm();
-      if (reach_m > 0.0 && middles_m2 >= reach_m * reach_m) continue;
+      if (reach_m <= 0.0 || middles_m2 >= reach_m * reach_m) continue;
       const auto closest = hand::closest_points(from, to, begin, end);
       const double distance_m = closest.apart.norm();
       const double gap_m = distance_m - one.radius_m - other.radius_m;
@@ -182,7 +187,7 @@ void add_shapes(RobotHand& hand) {
     place(hand, number < 0 ? hand.start() : some_pose(hand, number), placed);
     for (std::size_t p = 0; p < all.size(); ++p) {
       const auto [a, b] = all[p];
-      if (!may_be_near(hand, placed, a, b, 0.0) || nearest(hand, placed, a, b).gap_m >= 0.0) continue;
+      if (!may_be_near(hand, placed, a, b, 0.0) || nearest(hand, placed, a, b, 0.0).gap_m >= 0.0) continue;
       touching[p] += number < 0 ? kTries : 1;
     }
   }
@@ -197,7 +202,7 @@ std::span<const Gap> find_gaps(const RobotHand& hand, const Placed& placed, doub
   std::size_t count = 0;
   for (const auto& [a, b] : hand.pairs) {
     if (!may_be_near(hand, placed, a, b, near_m)) continue;
-    const Nearest at = nearest(hand, placed, a, b);
+    const Nearest at = nearest(hand, placed, a, b, near_m);
     if (at.gap_m >= near_m) continue;
     std::size_t into = count;
     if (count == gaps.size()) {
@@ -215,7 +220,7 @@ std::span<const Gap> find_gaps(const RobotHand& hand, const Placed& placed, doub
 }
 
 Gap gap_between(const RobotHand& hand, const Placed& placed, int a, int b) noexcept {
-  const Nearest at = nearest(hand, placed, a, b);
+  const Nearest at = nearest(hand, placed, a, b, std::numeric_limits<double>::infinity());
   Gap gap{.a = a, .b = b, .gap_m = at.gap_m};
   if (std::isfinite(at.gap_m)) add_slopes(hand, placed, at, gap);
   return gap;
