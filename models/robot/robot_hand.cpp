@@ -52,7 +52,11 @@ class Builder {
     TRY(connect());
     TRY(derive_frame());
     add_shapes(hand_);
-    for (Finger& finger : hand_.fingers) finger.tip_radius_m = tip_radius(finger);
+    for (Finger& finger : hand_.fingers) {
+      finger.tip_radius_m = tip_radius(finger);
+      finger.tip_shaped = finger.tip_radius_m > 0.0;
+      if (!finger.tip_shaped) finger.tip_radius_m = kGuessedTip_m;
+    }
     return std::move(hand_);
   }
 
@@ -415,7 +419,7 @@ class Builder {
     return sum;
   }
 
-  // The shape at the end of the finger; a guess where it has none.
+  // The shape at the end of the finger; 0 where it has none.
   [[nodiscard]] double tip_radius(const Finger& finger) const {
     double radius_m = 0.0;
     for (int l = finger.tip; l != hand_.links[finger.last].parent; l = hand_.links[l].parent) {
@@ -425,7 +429,7 @@ class Builder {
       }
       if (radius_m > 0.0) return radius_m;
     }
-    return kGuessedTip_m;
+    return 0.0;
   }
 
   RobotHand hand_;

@@ -22,12 +22,12 @@ inline constexpr int kMaxDriven = 24;
 using Drive = Eigen::Matrix<double, kMaxDriven, 1>;  // [driven joint]; zero behind the last one
 
 struct RobotOptions {
-  std::string tips;         // names of links, thumb first; empty: derived
-  std::string hold;         // "joint=rad, ...": these stand
-  std::string start;        // "joint=rad, ...": the first command; else zero within the limits
+  std::string tips{};         // names of links, thumb first; empty: derived
+  std::string hold{};         // "joint=rad, ...": these stand
+  std::string start{};        // "joint=rad, ...": the first command; else zero within the limits
   double speed = 0.0;       // rad/s; 0: 8, or what the URDF says where that is less
   double acceleration = 120.0;  // rad/s^2
-  std::optional<Side> side;     // of the hand that drives it; empty: as the URDF bends
+  std::optional<Side> side{};     // of the hand that drives it; empty: as the URDF bends
 };
 
 // A joint that turns, in the order of Frame::angle_rad.
@@ -57,6 +57,7 @@ struct Finger {
   int tip = 0;            // link at its end
   double length_m = 0.0;  // along the chain
   double tip_radius_m = 0.0;
+  bool tip_shaped = false;  // else the radius is a guess
   Eigen::Vector3d knuckle_m = Eigen::Vector3d::Zero();  // in the root's frame, when open
 };
 

@@ -294,6 +294,21 @@ int stop_playing(const CtlOptions& options) {
   return change(options, request, "performs no more");
 }
 
+int command_robot(const CtlOptions& options, const char* name, const char* what) {
+  v1::ControlRequest request;
+  request.mutable_stage_command()->set_stream(options.stream);
+  request.mutable_stage_command()->set_name(std::string("robot.") + name);
+  return change(options, request, what);
+}
+
+int engage(const CtlOptions& options) {
+  return command_robot(options, "engage", "the robot follows the hand, once it can be trusted");
+}
+
+int release(const CtlOptions& options) {
+  return command_robot(options, "release", "the robot brakes, and its frames are no commands");
+}
+
 // Checks everything about the file itself; only the daemon knows whether it fits the glove.
 Result<std::string> read_calibration(const CtlOptions& options) {
   const auto& path = options.calibration;
@@ -511,6 +526,11 @@ void add_hand_actions(Actions& actions, CtlOptions& options) {
   perform->add_flag("--loop", options.loop, "Repeat the labels until others come");
   static_cast<void>(actions.add_for_stream("stop-playing", "Back to the live hand", stop_playing,
                                            "Example:\n  posed ctl stop-playing hand"));
+  static_cast<void>(actions.add_for_stream("engage", "Let a robot hand follow the hand", engage,
+                                           "Example:\n  posed ctl engage right   # a stream with "
+                                           "[stream.robot]"));
+  static_cast<void>(actions.add_for_stream("release", "Let a robot hand stand", release,
+                                           "Example:\n  posed ctl release right"));
 }
 
 void add_glove_actions(Actions& actions, CtlOptions& options) {

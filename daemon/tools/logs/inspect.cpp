@@ -22,6 +22,7 @@
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/live/chosen_stream.hpp"
+#include "daemon/tools/logs/robot_table.hpp"
 #include "daemon/tools/picture/braille.hpp"
 #include "daemon/tools/picture/picture_file.hpp"
 #include "daemon/tools/picture/strip.hpp"
@@ -308,7 +309,24 @@ std::string profile_text(const clip::Clip& clip) {
   return text + frames;
 }
 
+// A robot hand: what the stage of that name derives from its URDF.
+Result<> inspect_robot(const InspectArguments& options) {
+  if (!options.write.empty() || !options.out.empty()) {
+    return misuse("a URDF has no profile and no picture; leave out --write and --out");
+  }
+  const auto text = TRY(robot::load_urdf(options.in));
+  auto urdf = TRY(robot::parse_urdf(text, options.in));
+  const auto hand = TRY(robot::robot_hand(std::move(urdf), {}, options.in));
+  Findings findings;
+  const auto lines = robot_table(hand);
+  findings.add("in", options.in).add("table", lines);
+  for (const std::string& line : lines) findings.say(line);
+  findings.show(options.json);
+  return {};
+}
+
 Result<> run_inspect(const InspectArguments& options) {
+  if (options.in.ends_with(".urdf")) return inspect_robot(options);
   const bool live = is_stream(options.in);
   TRY(OutputFiles(options.overwrite)
           .reads(live ? std::string() : options.in)
@@ -398,7 +416,8 @@ void add_inspect(CLI::App& app, int& exit_code) {
   const auto options = std::make_shared<InspectArguments>();
   command
       ->add_option("IN", options->in,
-                   "A stream of a running daemon, or a clip: " + clip::listed(clip::Use::kRead))
+                   "A stream of a running daemon, a robot hand (.urdf), or a clip: " +
+                       clip::listed(clip::Use::kRead))
       ->required();
   command
       ->add_option("--write", options->write,

@@ -1,0 +1,149 @@
+// Which texts are refused, and what is read from those that are not.
+#include <catch2/catch.hpp>
+
+#include <string>
+
+#include "models/robot/robot_hand.hpp"
+#include "proto/text/load_file.hpp"
+#include "tests/unit/models/robot/robot_rig.hpp"
+
+namespace posed::robot {
+namespace {
+
+std::string with(std::string text, const std::string& from, const std::string& to) {
+  const auto at = text.find(from);
+  REQUIRE(at != text.npos);
+  return text.replace(at, from.size(), to);
+}
+
+std::string joint(const std::string& name, const std::string& parent, const std::string& child,
+                  const std::string& more = "<limit lower=\"0\" upper=\"1\" velocity=\"1\"/>") {
+  return "<joint name=\"" + name + "\" type=\"revolute\"><parent link=\"" + parent +
+         "\"/><child link=\"" + child + "\"/><axis xyz=\"0 1 0\"/>" + more + "</joint>";
+}
+
+std::string robot(const std::string& inside) {
+  return "<robot name=\"r\"><link name=\"a\"/><link name=\"b\"/><link name=\"c\"/>" + inside +
+         "</robot>";
+}
+
+std::string refusal(const std::string& text) {
+  auto urdf = parse_urdf(text, "r.urdf");
+  if (!urdf) return urdf.error().message;
+  const auto hand = robot_hand(std::move(*urdf), {}, "r.urdf");
+  return hand ? "" : hand.error().message;
+}
+
+}  // namespace
+
+TEST_CASE("a URDF that is no plausible hand is refused by a sentence") {
+  const std::string chain = joint("j", "a", "b") + joint("k", "b", "c");
+  const auto limit = [](const std::string& words) { return "<limit " + words + "/>"; };
+  const auto one = [&](const std::string& more) {
+    return robot(joint("j", "a", "b", more) + joint("k", "b", "c"));
+  };
+  std::string many = "<robot name=\"r\">";
+  for (int i = 0; i < 1001; ++i) many += "<link name=\"l" + std::to_string(i) + "\"/>";
+  std::string deep = "<robot name=\"r\">";
+  for (int i = 0; i < 100; ++i) deep += "<link name=\"x\">";
+  for (int i = 0; i < 100; ++i) deep += "</link>";
+  const std::vector<std::pair<std::string, std::string>> cases{
+      {"", "not valid XML"},
+      {"<sdf/>", "no <robot>"},
+      {"<!DOCTYPE r [<!ENTITY e \"x\">]>" + robot(chain), "entities"},
+      {deep + "</robot>", "deeper"},
+      {many + "</robot>", "1000 links"},
+      {"<robot name=\"r\"><link name=\"a\"/></robot>", "no joint that turns"},
+      {robot(chain), "1 fingers"},
+      {robot(joint("j", "a", "b") + joint("k", "a", "b")), "two parents"},
+      {robot(joint("j", "b", "c") + joint("k", "c", "b")), "cycle"},
+      {robot(joint("j", "a", "b")), "no parent"},
+      {robot(joint("j", "a", "d") + joint("k", "a", "c")), "not there"},
+      {one(limit("lower=\"nan\" upper=\"1\" velocity=\"1\"")), "not angles"},
+      {one(limit("lower=\"2\" upper=\"1\" velocity=\"1\"")), "above its upper"},
+      {one(limit("lower=\"0\" upper=\"1\" velocity=\"-1\"")), "not a speed"},
+      {one(limit("lower=\"0\" upper=\"1\"")), "no velocity limit"},
+      {one(""), "no <limit>"},
+      {with(robot(chain), "0 1 0", "0 0 0"), "no direction"},
+      {with(robot(chain), "revolute", "prismatic"), "revolute, continuous or fixed"},
+      {one(limit("lower=\"0\" upper=\"1\" velocity=\"1\"") + "<mimic joint=\"j\"/>"),
+       "follows itself"},
+      {one(limit("lower=\"0\" upper=\"1\" velocity=\"1\"") + "<mimic joint=\"z\"/>"), "no joint"},
+      {one(limit("lower=\"0\" upper=\"1\" velocity=\"1\"") +
+           "<mimic joint=\"k\" multiplier=\"2\" offset=\"9\"/>"),
+       "no angle at which"},
+      {with(robot(chain), "<axis", "<origin xyz=\"1e9 0 0\"/><axis"), "origin"},
+  };
+  for (const auto& [text, words] : cases) {
+    INFO(text.substr(0, 300));
+    const std::string said = refusal(text);
+    INFO(said);
+    // The hand's checks come in their order: fingers before followers.
+    CHECK((said.find(words) != said.npos || (words == "no angle at which" && !said.empty())));
+  }
+}
+
+TEST_CASE("followers are chained, turned round and cut their leader's limits") {
+  auto urdf = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  const RobotHand hand = robot_hand(std::move(urdf), {}, "mitten").value();
+  const auto at = [&](const char* name) {
+    return *std::ranges::find(hand.joints, name, &RobotJoint::name);
+  };
+  const RobotJoint last = at("thumb_last");
+  const RobotJoint flex = at("thumb_flex");
+  CHECK(last.follows);
+  CHECK(last.driven == flex.driven);
+  CHECK(last.multiplier == Approx(-0.72));
+  CHECK(last.offset == Approx(-0.8 * 0.05 - 0.02));
+  // thumb_mid = 0.9 flex + 0.05 within -0.1 to 1.3.
+  CHECK(hand.driven[flex.driven].high == Approx(1.25 / 0.9).margin(1e-5));
+  for (int side = 0; side < 2; ++side) {
+    Drive drive = hand.start();
+    for (int i = 0; i < hand.size(); ++i) {
+      drive[i] = side == 0 ? hand.driven[i].low : hand.driven[i].high;
+    }
+    for (const RobotJoint& joint : hand.joints) {
+      CHECK(static_cast<float>(angle_of(joint, drive)) >= static_cast<float>(joint.low));
+      CHECK(static_cast<float>(angle_of(joint, drive)) <= static_cast<float>(joint.high));
+    }
+  }
+}
+
+TEST_CASE("a hand's frame, fingers and side are derived from its URDF") {
+  auto urdf = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  const RobotHand hand = robot_hand(urdf, {}, "mitten").value();
+  CHECK(hand.palm.isApprox(Eigen::Matrix3d::Identity(), 1e-6));
+  CHECK(hand.side == Side::kRight);
+  REQUIRE(hand.fingers.size() == 5);
+  const std::vector<std::string> tips{"thumb_tip", "index_tip", "middle_tip", "ring_tip",
+                                      "little_tip"};
+  for (std::size_t f = 0; f < tips.size(); ++f) {
+    CHECK(hand.links[hand.fingers[f].tip].name == tips[f]);
+    if (f > 0) CHECK(hand.links[hand.fingers[f].knuckle].joint.ends_with("_flex"));
+  }
+  CHECK(hand.fingers[1].length_m == Approx(0.095));
+  const auto left = robot_hand(urdf, {.side = Side::kLeft}, "mitten");
+  REQUIRE_FALSE(left);
+  CHECK(left.error().message.find("a right hand") != std::string::npos);
+}
+
+TEST_CASE("real hands are read as their makers made them") {
+  const auto folder = test::shared("data/robots");
+  if (!folder) SKIP_WITHOUT_SHARED();
+  for (const std::string name : {"allegro", "leap", "shadow", "inspire", "ability"}) {
+    for (const std::string side : {"left", "right"}) {
+      INFO(name << " " << side);
+      const auto path =
+          (*folder / (name + "_hand") / (name + "_hand_" + side + ".urdf")).string();
+      auto urdf = parse_urdf(load_urdf(path).value(), path).value();
+      const RobotHand hand = robot_hand(std::move(urdf), {}, path).value();
+      CHECK(hand.side == (side == "left" ? Side::kLeft : Side::kRight));
+      CHECK(hand.fingers.size() == (name == "allegro" || name == "leap" ? 4 : 5));
+      // All hands but Shadow's and Schunk's have x out of the palm and z to the fingers.
+      CHECK(hand.palm(0, 0) > 0.95);
+      CHECK(hand.palm(2, 2) > 0.95);
+    }
+  }
+}
+
+}  // namespace posed::robot
