@@ -37,6 +37,7 @@ install_files(posed share/posed/config ${config}/posed.toml ${config}/README.md)
 foreach(folder gestures experiments stage skeletons hands devices)
   install_tree(posed share/posed/config/${folder} ${config}/${folder} *.toml)
 endforeach()
+install_tree(posed share/posed/config/robots ${config}/robots *.urdf)
 install_files(posed share/posed/config/metrics ${config}/metrics/README.md ${config}/metrics/alerts.yml
   ${config}/metrics/dashboard.json ${config}/metrics/prometheus.yml)
 install_tree(posed lib/udev/rules.d ${config}/udev *.rules)

@@ -247,21 +247,23 @@ TEST_CASE("an emulated device is open to other machines only if that is wanted")
 }
 
 TEST_CASE("the configs of stages are sound") {
-  TempFolder folder;
-  std::filesystem::copy(source_dir() / "config/stage", folder.path(),
+  const TempFolder top;
+  const std::filesystem::path folder = top.path() / "stage";
+  std::filesystem::copy(source_dir() / "config/stage", folder,
                         std::filesystem::copy_options::recursive);
+  std::filesystem::copy(source_dir() / "config/robots", top.path() / "robots");
   for (const char* name : {"capture", "stylist", "relay", "avatar"}) {
-    REQUIRE(posed({"keygen", name, "--out", (folder.path() / "keys").string()}).code == 0);
+    REQUIRE(posed({"keygen", name, "--out", (folder / "keys").string()}).code == 0);
   }
-  REQUIRE(style::save_model(toy_model(1, 0.3), folder.path() / "walk.style"));
-  for (const char* name : {"capture.toml", "stylist.toml", "unreal.toml"}) {
-    const auto checked = posed({"check", "--config", (folder.path() / name).string()});
+  REQUIRE(style::save_model(toy_model(1, 0.3), folder / "walk.style"));
+  for (const char* name : {"capture.toml", "stylist.toml", "unreal.toml", "robot.toml"}) {
+    const auto checked = posed({"check", "--config", (folder / name).string()});
     INFO(checked.out << checked.err);
     CHECK(checked.code == 0);
   }
   const auto relay =
       posed({"relay", "--from", "tcp://127.0.0.1:9", "--bind", "tcp://127.0.0.1:*", "--security",
-             (folder.path() / "relay.toml").string(), "--seconds", "0.2"});
+             (folder / "relay.toml").string(), "--seconds", "0.2"});
   INFO(relay.err);
   CHECK(relay.code == 0);
 }

@@ -22,7 +22,8 @@ std::string limits_of(const robot::RobotHand& hand, const robot::RobotJoint& joi
   if (link.endless) text += " (continuous)";
   if (joint.driven < 0 || joint.follows) return text;
   const robot::DrivenJoint& driven = hand.driven[joint.driven];
-  if (driven.low > joint.low || driven.high < joint.high) {
+  constexpr double kShown_rad = 0.05 * kDegree;
+  if (driven.low > joint.low + kShown_rad || driven.high < joint.high - kShown_rad) {
     text += fmt::format(", followers leave {:.1f} to {:.1f}", driven.low / kDegree,
                         driven.high / kDegree);
   }
@@ -38,7 +39,9 @@ std::string speed_of(const robot::RobotHand& hand, const robot::RobotJoint& join
 }
 
 std::string direction(const Eigen::Vector3d& v) {
-  return fmt::format("({:.2f} {:.2f} {:.2f})", v.x() + 0.0, v.y() + 0.0, v.z() + 0.0);
+  // Rounded first: -0.001 would be shown as -0.00.
+  const auto shown = [&v](int k) { return std::round(100.0 * v[k]) / 100.0 + 0.0; };
+  return fmt::format("({:g} {:g} {:g})", shown(0), shown(1), shown(2));
 }
 
 }  // namespace
@@ -50,7 +53,7 @@ std::vector<std::string> robot_table(const robot::RobotHand& hand) {
                               hand.links.size(), hand.joints.size(), hand.size()));
   lines.emplace_back("joints, in the order of the stream's values");
   for (const robot::RobotJoint& joint : hand.joints) {
-    lines.push_back(fmt::format("  {:<24} {:<28} {:<20} {}", joint.name, limits_of(hand, joint),
+    lines.push_back(fmt::format("  {:<24} {:<26} {:<20} {}", joint.name, limits_of(hand, joint),
                                 speed_of(hand, joint), does(hand, joint)));
   }
   lines.emplace_back("fingers");
