@@ -10,7 +10,7 @@ namespace posed::robot {
 namespace {
 
 constexpr int kMaxCapsulesABox = 4;
-constexpr int kTries = 200;
+constexpr int kTries = 100;
 constexpr double kMostly = 0.7;
 
 void add_capsule(RobotHand& hand, int link, const Eigen::Isometry3d& at,

@@ -130,7 +130,7 @@ TEST_CASE("a hand's frame, fingers and side are derived from its URDF") {
 TEST_CASE("real hands are read as their makers made them") {
   const auto folder = test::shared("data/robots");
   if (!folder) SKIP_WITHOUT_SHARED();
-  for (const std::string name : {"allegro", "leap", "shadow", "inspire", "ability"}) {
+  for (const std::string name : {"allegro", "shadow", "ability"}) {
     for (const std::string side : {"left", "right"}) {
       INFO(name << " " << side);
       const auto path =
