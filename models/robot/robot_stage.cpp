@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -20,6 +21,7 @@ constexpr double kUnknownRate_hz = 60.0;
 constexpr double kSilent_s = 0.2;
 constexpr std::int64_t kJumpsBack_ns = kNanosPerSecond;
 constexpr std::int64_t kToldEvery_ns = kNanosPerSecond;
+constexpr std::int64_t kMaxTime_ns = std::numeric_limits<std::int64_t>::max() / 2;
 constexpr double kMaxFingerAngle_rad = 7.0;  // beyond a turn no finger's angle is one
 constexpr int kRounds = 2;
 constexpr std::array<std::string_view, 3> kSides{"hand", "left", "right"};
@@ -51,7 +53,7 @@ class RobotStage final : public Stage {
   [[nodiscard]] std::optional<StageNotice> take_notice() noexcept override;
 
  private:
-  RT_SAFE double elapsed_s(std::int64_t now_ns, bool& jumped) noexcept;
+  RT_SAFE double elapsed_s(std::int64_t now_ns) noexcept;
   RT_SAFE bool trusts(const Frame& frame, HandAngles& angles) const noexcept;
   RT_SAFE void hold(double dt_s, Notice why) noexcept;
   RT_SAFE void follow(double dt_s) noexcept;
@@ -135,9 +137,7 @@ RobotStage::RobotStage(RobotHand robot, Skeleton skeleton, const StageContext& c
 
 // Since the command before, at most two periods: a stall authorises no jump. A step back in time is
 // waited out, unless it is long.
-RT_SAFE double RobotStage::elapsed_s(std::int64_t now_ns, bool& jumped) noexcept {
-  jumped = false;
-  if (now_ns == kNoTime_ns) return 0.0;
+RT_SAFE double RobotStage::elapsed_s(std::int64_t now_ns) noexcept {
   if (time_ns_ == kNoTime_ns) {
     time_ns_ = now_ns;
     return 0.0;
@@ -145,7 +145,6 @@ RT_SAFE double RobotStage::elapsed_s(std::int64_t now_ns, bool& jumped) noexcept
   if (now_ns <= time_ns_) {
     const auto back_ns =
         static_cast<std::uint64_t>(time_ns_) - static_cast<std::uint64_t>(now_ns);
-    jumped = back_ns > 0;
     if (back_ns > static_cast<std::uint64_t>(kJumpsBack_ns)) time_ns_ = now_ns;
     return 0.0;
   }
@@ -188,10 +187,13 @@ RT_SAFE void RobotStage::follow(double dt_s) noexcept {
 }
 
 RT_SAFE void RobotStage::process(const StageFrame& in, StageOut& out) noexcept {
+  // A frame that waited in a queue is older than the latest tick, but not than the frame before it.
+  const std::int64_t now_ns = in.frame.header.arrival_ns;
+  const bool sane = now_ns >= 0 && now_ns <= kMaxTime_ns;
+  const bool jumped = !sane || now_ns < arrival_ns_;
   last_ = in.frame;
-  arrival_ns_ = in.frame.header.arrival_ns;
-  bool jumped = false;
-  const double dt_s = elapsed_s(arrival_ns_, jumped);
+  if (sane) arrival_ns_ = now_ns;
+  const double dt_s = sane ? elapsed_s(now_ns) : 0.0;
   HandAngles angles{};
   const bool trusted = trusts(in.frame, angles);
   if (!engaged_) {
@@ -217,8 +219,7 @@ std::int64_t RobotStage::next_due_ns() const noexcept {
 }
 
 RT_SAFE void RobotStage::tick(std::int64_t now_ns, StageOut& out) noexcept {
-  bool jumped = false;
-  const double dt_s = elapsed_s(now_ns, jumped);
+  const double dt_s = elapsed_s(now_ns);
   if (engaged_ && follows_ && now_ns - arrival_ns_ < silent_ns_) {
     follow(dt_s);
     last_.quality = Quality::kPredicted;

@@ -6,6 +6,7 @@
 #include "models/hand/constraint_solver.hpp"
 #include "models/robot/hand_target.hpp"
 #include "models/robot/pose_solver.hpp"
+#include "tests/support/allocations.hpp"
 #include "tests/unit/models/robot/robot_rig.hpp"
 
 namespace posed::robot {
@@ -107,6 +108,36 @@ TEST_CASE("a robot's command is sent between the hand's frames where a rate is g
   CHECK(rig.out.frames.size() - before == 4);
   CHECK(rig.last().quality == Quality::kPredicted);
   CHECK(rig.last().robot == RobotState::kEngaged);
+}
+
+TEST_CASE("frames that waited in a queue are no step back in time") {
+  test::RobotRig rig({{"rate_hz", 500.0}});
+  rig.engage();
+  rig.send(test::fist(1.0), kStep_ns);
+  rig.send(test::fist(1.0), 2 * kStep_ns);
+  rig.tick_until(5 * kStep_ns);
+  rig.send(test::fist(1.0), 3 * kStep_ns);
+  CHECK(rig.last().robot == RobotState::kEngaged);
+  CHECK_FALSE(rig.stage->take_notice());
+  rig.send(test::fist(1.0), 2 * kStep_ns);
+  CHECK(rig.last().robot == RobotState::kHolding);
+}
+
+TEST_CASE("a robot stage does not allocate") {
+  test::RobotRig rig({{"rate_hz", 500.0}});
+  rig.engage();
+  rig.out.frames.reserve(500);
+  std::int64_t now_ns = kStep_ns;
+  rig.send(test::fist(1.0), now_ns);
+  const std::uint64_t before = test::allocations();
+  for (int i = 0; i < 30; ++i) {
+    HandAngles angles = test::fist(i % 2);
+    angles[0] = 0.02 * i;
+    rig.send(angles, now_ns += kStep_ns);
+    rig.tick_until(now_ns + kStep_ns - 1);
+  }
+  rig.tick_until(now_ns + 1'000'000'000);
+  CHECK(test::allocations() == before);
 }
 
 TEST_CASE("a robot's finger and thumb meet where the hand's do") {
