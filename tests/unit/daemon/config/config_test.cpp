@@ -499,6 +499,7 @@ TEST_CASE("the shipped config contains every key with its default") {
   REQUIRE(b.streams[0].stages.size() == stage_types().size());
   for (const StageConfig& stage : b.streams[0].stages) {
     for (const ParameterSpec& spec : stage.type->parameters) {
+      if (spec.required) continue;  // the file has an example
       INFO("config/posed.toml: " << stage.type->name << "." << spec.shown_name());
       CHECK((stage.parameters.at(std::string(spec.name)) == spec.default_value));
     }
