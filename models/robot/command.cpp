@@ -26,7 +26,10 @@ RT_SAFE double stopping_speed(double left, double a, double dt) noexcept {
 }  // namespace
 
 Command::Command(const RobotHand& robot, double margin_m)
-    : robot_(robot), margin_m_(margin_m), placed_(robot.links.size(), robot.capsules.size()), pose_(robot.start()) {
+    : robot_(robot),
+      margin_m_(margin_m),
+      placed_(robot.links.size(), robot.capsules.size()),
+      pose_(robot.start()) {
   program_.size = robot.size();
 }
 
@@ -49,13 +52,12 @@ void Command::find_box(double dt_s) noexcept {
 // Whether links would overlap more than they do: `gaps` are those of now.
 bool Command::would_enter(const Drive& pose, std::span<const Gap> gaps) noexcept {
   place(robot_, pose, placed_);
-  return std::ranges::any_of(
-      find_gaps(robot_, placed_, 0.0, false, there_), [&](const Gap& there) {
-        const auto now = std::ranges::find_if(
-            gaps, [&](const Gap& gap) { return gap.a == there.a && gap.b == there.b; });
-        const double allowed_m = now == gaps.end() ? 0.0 : std::min(now->gap_m, 0.0);
-        return !(there.gap_m >= allowed_m - kSame_m);
-      });
+  return std::ranges::any_of(find_gaps(robot_, placed_, 0.0, false, there_), [&](const Gap& there) {
+    const auto now = std::ranges::find_if(
+        gaps, [&](const Gap& gap) { return gap.a == there.a && gap.b == there.b; });
+    const double allowed_m = now == gaps.end() ? 0.0 : std::min(now->gap_m, 0.0);
+    return !(there.gap_m >= allowed_m - kSame_m);
+  });
 }
 
 // The step nearest to `aim` that keeps the links apart. False: only by breaking an acceleration.
@@ -71,8 +73,8 @@ bool Command::keep_apart(std::span<const Gap> gaps, const Drive& aim, double dt_
                                           : std::min(kPart_m_s, -left_m / (10.0 * dt_s));
     rows_[r] = {.slope = gaps[r].slope, .least = least_m_s * dt_s};
   }
-  in_contact_ = std::ranges::any_of(
-      gaps, [&](const Gap& gap) { return gap.gap_m < margin_m_ + 1e-4; });
+  in_contact_ =
+      std::ranges::any_of(gaps, [&](const Gap& gap) { return gap.gap_m < margin_m_ + 1e-4; });
   program_.rows = {rows_.data(), gaps.size()};
   program_.g = -aim;
   program_.H.setIdentity();

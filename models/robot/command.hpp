@@ -20,7 +20,7 @@ class Command {
   // The same on its way to a stand.
   RT_SAFE void brake(double dt_s) noexcept;
 
-  [[nodiscard]] const Drive& pose() const noexcept { return pose_; }         // rad
+  [[nodiscard]] const Drive& pose() const noexcept { return pose_; }          // rad
   [[nodiscard]] const Drive& velocity() const noexcept { return velocity_; }  // rad/s
   [[nodiscard]] bool stands() const noexcept { return velocity_.isZero(0.0); }
   [[nodiscard]] std::uint64_t hard_stops() const noexcept { return hard_stops_; }

@@ -6,7 +6,7 @@
 namespace posed::robot {
 namespace {
 
-constexpr double kDamping = 1e-4;  // m^2/rad^2, towards the pose of now
+constexpr double kDamping = 1e-4;   // m^2/rad^2, towards the pose of now
 constexpr double kToMiddle = 1e-5;  // towards the middle of the limits: frees the null space
 constexpr double kMaxStep_rad = 0.35;
 constexpr double kFar_m = 0.03;  // from here on a tip pulls no harder
@@ -60,8 +60,7 @@ double PoseSolver::add_points(const HandTarget& target, bool slopes) noexcept {
     if (f == 0 || target.pinch[f] <= 0.0) continue;
     const Finger& thumb = robot_.fingers[0];
     const double apart_m = target.gap_m[f] + thumb.tip_radius_m + finger.tip_radius_m;
-    const Eigen::Vector3d error =
-        placed_.at_m[thumb.tip] - tip_m - apart_m * target.direction[f];
+    const Eigen::Vector3d error = placed_.at_m[thumb.tip] - tip_m - apart_m * target.direction[f];
     for (int k = 0; k < 3; ++k) {
       Drive slope = Drive::Zero();
       const Eigen::Vector3d axis = Eigen::Vector3d::Unit(k);
@@ -87,8 +86,8 @@ double PoseSolver::add_pinches(const HandTarget& target, bool slopes) noexcept {
       }
       return link;
     };
-    const Gap gap = gap_between(robot_, placed_, shaped(robot_.fingers[0]),
-                                shaped(robot_.fingers[f]));
+    const Gap gap =
+        gap_between(robot_, placed_, shaped(robot_.fingers[0]), shaped(robot_.fingers[f]));
     if (!std::isfinite(gap.gap_m)) continue;
     const double wanted_m = std::max(target.gap_m[f], margin_m_);
     sum += add_residual(gap.slope, gap.gap_m - wanted_m, kPinchGap * target.pinch[f], slopes);

@@ -154,7 +154,8 @@ class Builder {
       const auto at = std::ranges::find(hand_.links, name, &Link::name);
       const int tip = static_cast<int>(at - hand_.links.begin());
       if (at == hand_.links.end()) {
-        return refuse("`tips` names the link " + in_quotes(name) + ", which the URDF does not have");
+        return refuse("`tips` names the link " + in_quotes(name) +
+                      ", which the URDF does not have");
       }
       const auto finger = std::ranges::find_if(
           hand_.fingers, [&](const Finger& one) { return is_above(one.last, tip); });
@@ -240,7 +241,8 @@ class Builder {
       const std::string number = equals == word.npos ? "" : word.substr(equals + 1);
       const double value = std::strtod(number.c_str(), &end);
       if (joint < 0 || number.empty() || *end != '\0') {
-        return refuse(what + " = " + in_quotes(word) + " is no joint and angle; write \"JOINT=0.5\"");
+        return refuse(what + " = " + in_quotes(word) +
+                      " is no joint and angle; write \"JOINT=0.5\"");
       }
       const RobotJoint& at = hand_.joints[joint];
       if (!(value >= at.low && value <= at.high)) {
@@ -299,8 +301,8 @@ class Builder {
                       " has no angle at which all its followers are within their limits");
       }
       const auto start = starts_.find(driven.joint);
-      driven.start = std::clamp(start == starts_.end() ? 0.0 : start->second, driven.low,
-                                driven.high);
+      driven.start =
+          std::clamp(start == starts_.end() ? 0.0 : start->second, driven.low, driven.high);
     }
     fill_turns();
     return {};
@@ -342,8 +344,7 @@ class Builder {
     for (std::size_t l = 0; l < hand_.links.size(); ++l) {
       const Link& link = hand_.links[l];
       Eigen::Isometry3d at = link.at;
-      if (link.turns)
-        at = at * Eigen::AngleAxisd(std::clamp(0.0, link.low, link.high), link.axis);
+      if (link.turns) at = at * Eigen::AngleAxisd(std::clamp(0.0, link.low, link.high), link.axis);
       if (link.parent >= 0) {
         at.translation() = placed_.at_m[link.parent] + placed_.turn[link.parent] * at.translation();
         at.linear() = placed_.turn[link.parent] * at.linear();
@@ -371,8 +372,9 @@ class Builder {
     z.normalize();
     y -= y.dot(z) * z;
     if (!(y.norm() > 1e-3) || !z.allFinite()) {
-      return refuse("the robot's fingers are not side by side when open; `tips` names their last "
-                    "links, thumb first");
+      return refuse(
+          "the robot's fingers are not side by side when open; `tips` names their last "
+          "links, thumb first");
     }
     y.normalize();
     for (Finger& finger : hand_.fingers) {
@@ -395,8 +397,8 @@ class Builder {
     hand_.side = bends >= 0.0 ? Side::kRight : Side::kLeft;
     if (options_.side && *options_.side != hand_.side) {
       const bool left = hand_.side == Side::kLeft;
-      return refuse(std::string("the URDF is a ") + (left ? "left" : "right") +
-                    " hand, and a " + (left ? "right" : "left") +
+      return refuse(std::string("the URDF is a ") + (left ? "left" : "right") + " hand, and a " +
+                    (left ? "right" : "left") +
                     " one drives it; name the other URDF, or `tips` thumb first");
     }
     hand_.palm << (hand_.side == Side::kRight ? out : Eigen::Vector3d(-out)), y, z;
@@ -467,8 +469,8 @@ Result<Skeleton> robot_skeleton(const RobotHand& hand) {
     Joint joint;
     joint.name = link.parent < 0 ? link.name : link.joint;
     joint.parent = link.parent;
-    joint.offset_m = link.parent < 0 ? Eigen::Vector3d::Zero()
-                                     : Eigen::Vector3d(before * link.at.translation());
+    joint.offset_m =
+        link.parent < 0 ? Eigen::Vector3d::Zero() : Eigen::Vector3d(before * link.at.translation());
     if (link.turns) {
       const Eigen::Vector3d axis = turn[l] * link.axis;
       joint.channel_frame = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitX(), axis);

@@ -22,12 +22,12 @@ inline constexpr int kMaxDriven = 24;
 using Drive = Eigen::Matrix<double, kMaxDriven, 1>;  // [driven joint]; zero behind the last one
 
 struct RobotOptions {
-  std::string tips{};         // names of links, thumb first; empty: derived
-  std::string hold{};         // "joint=rad, ...": these stand
-  std::string start{};        // "joint=rad, ...": the first command; else zero within the limits
-  double speed = 0.0;       // rad/s; 0: 8, or what the URDF says where that is less
+  std::string tips{};           // names of links, thumb first; empty: derived
+  std::string hold{};           // "joint=rad, ...": these stand
+  std::string start{};          // "joint=rad, ...": the first command; else zero within the limits
+  double speed = 0.0;           // rad/s; 0: 8, or what the URDF says where that is less
   double acceleration = 120.0;  // rad/s^2
-  std::optional<Side> side{};     // of the hand that drives it; empty: as the URDF bends
+  std::optional<Side> side{};   // of the hand that drives it; empty: as the URDF bends
 };
 
 // A joint that turns, in the order of Frame::angle_rad.
@@ -37,7 +37,7 @@ struct RobotJoint {
   double low = 0.0, high = 0.0;  // rad, both are floats
   double speed = 0.0;            // rad/s
   bool speed_given = false;      // by the config, else by the URDF or the default
-  int driven = -1;               // angle = multiplier * drive[driven] + offset; -1: stands at offset
+  int driven = -1;  // angle = multiplier * drive[driven] + offset; -1: stands at offset
   double multiplier = 1.0, offset = 0.0;
   bool follows = false;
 };
@@ -57,7 +57,7 @@ struct Finger {
   int tip = 0;            // link at its end
   double length_m = 0.0;  // along the chain
   double tip_radius_m = 0.0;
-  bool tip_shaped = false;  // else the radius is a guess
+  bool tip_shaped = false;                              // else the radius is a guess
   Eigen::Vector3d knuckle_m = Eigen::Vector3d::Zero();  // in the root's frame, when open
 };
 
@@ -71,7 +71,7 @@ struct Capsule {
 
 struct Ball {  // that holds all capsules of a link, in its frame
   Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();
-  double radius_m = -1.0;  // below zero: the link has no shape
+  double radius_m = -1.0;    // below zero: the link has no shape
   int first = 0, count = 0;  // its capsules
 };
 
@@ -89,12 +89,12 @@ struct RobotHand {
   std::vector<Finger> fingers;  // thumb first, then from its side on
   // Columns: out of the palm, to the thumb's side, to the fingers. A left hand's is a mirror image.
   Eigen::Matrix3d palm = Eigen::Matrix3d::Identity();
-  std::vector<Capsule> capsules;             // by link
-  std::vector<Ball> balls;                   // [link]
-  std::vector<std::pair<int, int>> pairs;    // of links that must not touch
+  std::vector<Capsule> capsules;              // by link
+  std::vector<Ball> balls;                    // [link]
+  std::vector<std::pair<int, int>> pairs;     // of links that must not touch
   std::vector<std::pair<int, int>> left_out;  // that touch anyway
-  std::vector<std::vector<Turn>> turns;      // [link]
-  std::vector<int> joint_of_link;            // [link]; -1: it does not turn
+  std::vector<std::vector<Turn>> turns;       // [link]
+  std::vector<int> joint_of_link;             // [link]; -1: it does not turn
 
   [[nodiscard]] int size() const noexcept { return static_cast<int>(driven.size()); }
   [[nodiscard]] Drive start() const;
@@ -112,7 +112,7 @@ struct Placed {
       : turn(links), at_m(links), axis(links), from_m(capsules), to_m(capsules) {}
   std::vector<Eigen::Matrix3d> turn;
   std::vector<Eigen::Vector3d> at_m;
-  std::vector<Eigen::Vector3d> axis;  // of the joint that carries the link
+  std::vector<Eigen::Vector3d> axis;          // of the joint that carries the link
   std::vector<Eigen::Vector3d> from_m, to_m;  // [capsule]; none where no gap is asked for
 };
 RT_SAFE [[nodiscard]] double angle_of(const RobotJoint& joint, const Drive& drive) noexcept;

@@ -69,11 +69,11 @@ class RobotStage final : public Stage {
   HandTarget target_{};
   Frame last_{};  // the latest of the hand, for ticks
   std::int64_t period_ns_, silent_ns_;
-  bool ticks_;                              // between the frames, too
-  std::int64_t time_ns_ = kNoTime_ns;       // of the latest command
-  std::int64_t arrival_ns_ = kNoTime_ns;    // of the latest frame
-  bool engaged_ = false;                    // somebody wants it
-  bool follows_ = false;                    // and the hand is trusted
+  bool ticks_;                            // between the frames, too
+  std::int64_t time_ns_ = kNoTime_ns;     // of the latest command
+  std::int64_t arrival_ns_ = kNoTime_ns;  // of the latest frame
+  bool engaged_ = false;                  // somebody wants it
+  bool follows_ = false;                  // and the hand is trusted
   std::uint64_t hard_stops_ = 0;
   std::array<bool, kNotices> notice_{};
   std::array<std::int64_t, kNotices> told_ns_{};
@@ -97,10 +97,8 @@ const RobotStage::Table& RobotStage::table() {
            .help = "of each joint, rad/s; 0: 8, or what the URDF says where that is less",
            .min = 0.0,
            .max = 100.0}),
-      Table::row<&StageOptions::acceleration>({.name = "acceleration",
-                                               .help = "of each joint, rad/s^2",
-                                               .min = 1.0,
-                                               .max = 10000.0}),
+      Table::row<&StageOptions::acceleration>(
+          {.name = "acceleration", .help = "of each joint, rad/s^2", .min = 1.0, .max = 10000.0}),
       Table::row<&StageOptions::margin_mm>({.name = "margin_mm",
                                             .help = "how far the robot's links stay apart",
                                             .min = 0.1,
@@ -143,8 +141,7 @@ RT_SAFE double RobotStage::elapsed_s(std::int64_t now_ns) noexcept {
     return 0.0;
   }
   if (now_ns <= time_ns_) {
-    const auto back_ns =
-        static_cast<std::uint64_t>(time_ns_) - static_cast<std::uint64_t>(now_ns);
+    const auto back_ns = static_cast<std::uint64_t>(time_ns_) - static_cast<std::uint64_t>(now_ns);
     if (back_ns > static_cast<std::uint64_t>(kJumpsBack_ns)) time_ns_ = now_ns;
     return 0.0;
   }
@@ -248,9 +245,9 @@ RT_SAFE void RobotStage::emit(const Frame& like, StageOut& out) noexcept {
     frame.velocity_rad_s[j] =
         static_cast<float>(joint.multiplier * command_.velocity()[joint.driven]);
   }
-  frame.robot = follows_                              ? RobotState::kEngaged
+  frame.robot = follows_                         ? RobotState::kEngaged
                 : engaged_ || !command_.stands() ? RobotState::kHolding
-                                                      : RobotState::kReleased;
+                                                 : RobotState::kReleased;
   if (command_.hard_stops() != hard_stops_) {
     hard_stops_ = command_.hard_stops();
     tell(kHardStop);

@@ -15,12 +15,11 @@ constexpr double kMostly = 0.7;
 
 void add_capsule(RobotHand& hand, int link, const Eigen::Isometry3d& at,
                  const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m, double radius_m) {
-  hand.capsules.push_back(
-      {.link = link,
-       .from_m = at * from_m,
-       .to_m = at * to_m,
-       .radius_m = radius_m,
-       .reach_m = 0.5 * (to_m - from_m).norm() + radius_m});
+  hand.capsules.push_back({.link = link,
+                           .from_m = at * from_m,
+                           .to_m = at * to_m,
+                           .radius_m = radius_m,
+                           .reach_m = 0.5 * (to_m - from_m).norm() + radius_m});
 }
 
 // Capsules along the longest edge, side by side across the middle one. Each reaches its strip's
@@ -31,8 +30,8 @@ void add_box(RobotHand& hand, int link, const Shape& shape) {
   const double long_m = 0.5 * shape.size_m[order[0]];
   const double middle_m = 0.5 * shape.size_m[order[1]];
   const double thin_m = std::max(0.5 * shape.size_m[order[2]], 1e-6);
-  const int count = std::clamp(static_cast<int>(std::ceil(middle_m / thin_m - 1e-9)), 1,
-                               kMaxCapsulesABox);
+  const int count =
+      std::clamp(static_cast<int>(std::ceil(middle_m / thin_m - 1e-9)), 1, kMaxCapsulesABox);
   const double strip_m = middle_m / count;
   const double across_m = std::hypot(strip_m, thin_m);
   const double shorter_m = std::min(0.5 * across_m, long_m);
@@ -59,8 +58,7 @@ void add_shape(RobotHand& hand, int link, const Shape& shape) {
     case Shape::Kind::kCylinder: {
       const double shorter_m = std::min(0.5 * shape.size_m.x(), half.z());
       const Eigen::Vector3d end(0.0, 0.0, half.z() - shorter_m);
-      return add_capsule(hand, link, shape.at, -end, end,
-                         std::hypot(shape.size_m.x(), shorter_m));
+      return add_capsule(hand, link, shape.at, -end, end, std::hypot(shape.size_m.x(), shorter_m));
     }
   }
 }
@@ -78,8 +76,9 @@ Ball ball_around(const RobotHand& hand, int first) {
   ball.middle_m = 0.5 * (low + high);
   for (int c = first; c < first + ball.count; ++c) {
     const Capsule& capsule = hand.capsules[c];
-    ball.radius_m = std::max({ball.radius_m, (capsule.from_m - ball.middle_m).norm() + capsule.radius_m,
-                              (capsule.to_m - ball.middle_m).norm() + capsule.radius_m});
+    ball.radius_m =
+        std::max({ball.radius_m, (capsule.from_m - ball.middle_m).norm() + capsule.radius_m,
+                  (capsule.to_m - ball.middle_m).norm() + capsule.radius_m});
   }
   return ball;
 }
@@ -93,7 +92,9 @@ int body_of(const RobotHand& hand, int link) {
 bool neighbours(const RobotHand& hand, int a, int b) {
   const int body_a = body_of(hand, a);
   const int body_b = body_of(hand, b);
-  const auto above = [&](int body) { return body == 0 ? -1 : body_of(hand, hand.links[body].parent); };
+  const auto above = [&](int body) {
+    return body == 0 ? -1 : body_of(hand, hand.links[body].parent);
+  };
   return body_a == body_b || above(body_a) == body_b || above(body_b) == body_a;
 }
 
@@ -187,7 +188,8 @@ void add_shapes(RobotHand& hand) {
     place(hand, number < 0 ? hand.start() : some_pose(hand, number), placed);
     for (std::size_t p = 0; p < all.size(); ++p) {
       const auto [a, b] = all[p];
-      if (!may_be_near(hand, placed, a, b, 0.0) || nearest(hand, placed, a, b, 0.0).gap_m >= 0.0) continue;
+      if (!may_be_near(hand, placed, a, b, 0.0) || nearest(hand, placed, a, b, 0.0).gap_m >= 0.0)
+        continue;
       touching[p] += number < 0 ? kTries : 1;
     }
   }
@@ -206,7 +208,8 @@ std::span<const Gap> find_gaps(const RobotHand& hand, const Placed& placed, doub
     if (at.gap_m >= near_m) continue;
     std::size_t into = count;
     if (count == gaps.size()) {
-      into = static_cast<std::size_t>(std::ranges::max_element(gaps, {}, &Gap::gap_m) - gaps.begin());
+      into =
+          static_cast<std::size_t>(std::ranges::max_element(gaps, {}, &Gap::gap_m) - gaps.begin());
       if (gaps[into].gap_m <= at.gap_m) continue;
     } else {
       ++count;

@@ -14,7 +14,7 @@ void add_shapes(RobotHand& hand);
 // Two links and how their gap changes with each driven joint.
 struct Gap {
   int a = 0, b = 0;
-  double gap_m = 0.0;  // below zero: they overlap
+  double gap_m = 0.0;           // below zero: they overlap
   Drive slope = Drive::Zero();  // m/rad
 };
 

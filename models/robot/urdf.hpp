@@ -26,8 +26,8 @@ struct Shape {
 // A link and the joint that carries it. Angles in rad; a follower's are those of the file.
 struct Link {
   std::string name;
-  std::string joint;  // empty: the root
-  int parent = -1;    // an earlier link
+  std::string joint;                                     // empty: the root
+  int parent = -1;                                       // an earlier link
   Eigen::Isometry3d at = Eigen::Isometry3d::Identity();  // in the parent's frame, at zero
   bool turns = false;
   bool endless = false;  // a "continuous" joint: its limits are half a turn to each side

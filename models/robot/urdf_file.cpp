@@ -59,7 +59,9 @@ Fit fit_along(const std::vector<Eigen::Vector3d>& corners, const Eigen::Matrix3d
   std::vector<Eigen::Vector3d> local;
   for (const auto& corner : corners) local.emplace_back(axes.transpose() * corner);
   Eigen::Vector2d circle = local.front().head<2>();
-  const auto away = [&](const Eigen::Vector3d& corner) { return (corner.head<2>() - circle).norm(); };
+  const auto away = [&](const Eigen::Vector3d& corner) {
+    return (corner.head<2>() - circle).norm();
+  };
   for (int i = 1; i <= kSteps; ++i) {
     const auto& farthest = *std::ranges::max_element(local, {}, away);
     circle += (farthest.head<2>() - circle) / (i + 1.0);
@@ -68,7 +70,8 @@ Fit fit_along(const std::vector<Eigen::Vector3d>& corners, const Eigen::Matrix3d
   fit.radius_m = away(*std::ranges::max_element(local, {}, away));
   double low = 1e9, high = -1e9;
   for (const auto& corner : local) {
-    const double cap = std::sqrt(std::max(0.0, fit.radius_m * fit.radius_m - away(corner) * away(corner)));
+    const double cap =
+        std::sqrt(std::max(0.0, fit.radius_m * fit.radius_m - away(corner) * away(corner)));
     low = std::min(low, corner.z() + cap);
     high = std::max(high, corner.z() - cap);
   }
@@ -96,8 +99,7 @@ Fit fit_capsule(const std::vector<Eigen::Vector3d>& corners) {
       Eigen::Matrix3d axes;
       axes << frame.col((k + 1) % 3), frame.col((k + 2) % 3), frame.col(k);
       const Fit fit = fit_along(corners, axes);
-      const double volume =
-          fit.radius_m * fit.radius_m * (fit.length_m + 4.0 / 3.0 * fit.radius_m);
+      const double volume = fit.radius_m * fit.radius_m * (fit.length_m + 4.0 / 3.0 * fit.radius_m);
       if (volume >= least) continue;
       least = volume;
       best = fit;

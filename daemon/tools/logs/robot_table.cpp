@@ -1,7 +1,7 @@
 #include "daemon/tools/logs/robot_table.hpp"
 
-#include <cmath>
 #include <spdlog/fmt/fmt.h>
+#include <cmath>
 
 #include "proto/frame/degree.hpp"
 
@@ -32,9 +32,7 @@ std::string limits_of(const robot::RobotHand& hand, const robot::RobotJoint& joi
 
 std::string speed_of(const robot::RobotHand& hand, const robot::RobotJoint& joint) {
   const double urdf = hand.links[joint.link].speed;
-  const char* const from = joint.speed_given      ? "config"
-                           : joint.speed == urdf ? "URDF"
-                                                 : "default";
+  const char* const from = joint.speed_given ? "config" : joint.speed == urdf ? "URDF" : "default";
   return fmt::format("{:.2f} rad/s ({})", joint.speed, from);
 }
 
@@ -58,11 +56,11 @@ std::vector<std::string> robot_table(const robot::RobotHand& hand) {
   }
   lines.emplace_back("fingers");
   for (const robot::Finger& finger : hand.fingers) {
-    lines.push_back(fmt::format("  {:<24} from joint {} to link {}, {:.0f} mm, tip of radius {:.0f} mm{}",
-                                kFingerNames[static_cast<std::size_t>(finger.human)],
-                                hand.links[finger.knuckle].joint, hand.links[finger.tip].name,
-                                1e3 * finger.length_m, 1e3 * finger.tip_radius_m,
-                                finger.tip_shaped ? "" : " (guessed: it has no shape)"));
+    lines.push_back(fmt::format(
+        "  {:<24} from joint {} to link {}, {:.0f} mm, tip of radius {:.0f} mm{}",
+        kFingerNames[static_cast<std::size_t>(finger.human)], hand.links[finger.knuckle].joint,
+        hand.links[finger.tip].name, 1e3 * finger.length_m, 1e3 * finger.tip_radius_m,
+        finger.tip_shaped ? "" : " (guessed: it has no shape)"));
   }
   lines.push_back(fmt::format("palm: {} out of it, {} to the thumb, {} to the fingers",
                               direction(hand.palm.col(0)), direction(hand.palm.col(1)),
@@ -75,14 +73,16 @@ std::vector<std::string> robot_table(const robot::RobotHand& hand) {
                              link.missing_shapes, link.missing_shapes + std::ssize(link.shapes));
     }
   }
-  lines.push_back(fmt::format("shapes: {} capsules hold those of the links, {} pairs of links are kept apart",
-                              hand.capsules.size(), hand.pairs.size()));
+  lines.push_back(
+      fmt::format("shapes: {} capsules hold those of the links, {} pairs of links are kept apart",
+                  hand.capsules.size(), hand.pairs.size()));
   if (!without.empty()) lines.push_back("  without a shape: " + without.substr(2));
   std::string out;
   for (const auto& [a, b] : hand.left_out) {
     out += fmt::format(", {} and {}", hand.links[a].name, hand.links[b].name);
   }
-  if (!out.empty()) lines.push_back("  not kept apart, because they touch anyway: " + out.substr(2));
+  if (!out.empty())
+    lines.push_back("  not kept apart, because they touch anyway: " + out.substr(2));
   return lines;
 }
 

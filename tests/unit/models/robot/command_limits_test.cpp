@@ -34,8 +34,8 @@ Broken judge(const Skeleton& skeleton, const std::vector<Frame>& frames, double 
       if (!(speed <= a * kSpeed)) ++broken.speed;
       if (i == 0) continue;
       const Frame& before = frames[i - 1];
-      const double dt_s =
-          std::max(0.0, 1e-9 * static_cast<double>(frame.header.arrival_ns - before.header.arrival_ns));
+      const double dt_s = std::max(
+          0.0, 1e-9 * static_cast<double>(frame.header.arrival_ns - before.header.arrival_ns));
       const double moved = std::abs(static_cast<double>(angle - before.angle_rad[j]));
       if (moved > a * kSpeed * dt_s + 1e-6) ++broken.jump;
       const double faster =
@@ -49,7 +49,8 @@ Broken judge(const Skeleton& skeleton, const std::vector<Frame>& frames, double 
 HandAngles random_hand(std::mt19937_64& random) {
   HandAngles angles;
   const double width = std::uniform_int_distribution<int>(0, 3)(random) == 0 ? 10.0 : 1.5;
-  for (double& angle : angles) angle = std::uniform_real_distribution<double>(-width, width)(random);
+  for (double& angle : angles)
+    angle = std::uniform_real_distribution<double>(-width, width)(random);
   if (std::uniform_int_distribution<int>(0, 20)(random) == 0) {
     angles[std::uniform_int_distribution<std::size_t>(0, 44)(random)] = std::nan("");
   }
@@ -64,7 +65,8 @@ TEST_CASE("no input takes a robot's command beyond its limits") {
     INFO("seed " << seed);
     std::mt19937_64 random(seed);
     // No two links can touch where none has a shape, so that no stop is hard.
-    Parameters parameters{{"acceleration", kAcceleration}, {"rate_hz", seed % 3 == 0 ? 250.0 : 0.0}};
+    Parameters parameters{{"acceleration", kAcceleration},
+                          {"rate_hz", seed % 3 == 0 ? 250.0 : 0.0}};
     test::RobotRig rig(parameters);
     std::int64_t now_ns = 1'000'000'000;
     HandAngles angles{};

@@ -170,8 +170,7 @@ TEST_CASE("a robot's finger and thumb meet where the hand's do") {
 
 TEST_CASE("a robot stage says what it cannot serve") {
   const StageType& type = robot_type();
-  Parameters parameters =
-      complete_parameters(type.parameters, {{"urdf", test::mitten()}}).value();
+  Parameters parameters = complete_parameters(type.parameters, {{"urdf", test::mitten()}}).value();
   REQUIRE(type.read_files(parameters));
   Skeleton person;
   person.name = "person";

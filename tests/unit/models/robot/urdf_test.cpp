@@ -133,8 +133,7 @@ TEST_CASE("real hands are read as their makers made them") {
   for (const std::string name : {"allegro", "shadow", "ability"}) {
     for (const std::string side : {"left", "right"}) {
       INFO(name << " " << side);
-      const auto path =
-          (*folder / (name + "_hand") / (name + "_hand_" + side + ".urdf")).string();
+      const auto path = (*folder / (name + "_hand") / (name + "_hand_" + side + ".urdf")).string();
       auto urdf = parse_urdf(load_urdf(path).value(), path).value();
       const RobotHand hand = robot_hand(std::move(urdf), {}, path).value();
       CHECK(hand.side == (side == "left" ? Side::kLeft : Side::kRight));
