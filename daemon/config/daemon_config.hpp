@@ -75,9 +75,9 @@ struct SourceConfig {
   return source;
 }
 
-enum class OutputKind : std::uint8_t { kVmc, kBvh, kAxis, kMvn, kMocopi, kRokoko, kNatNet };
-inline constexpr std::array<std::string_view, 7> kOutputKinds{"vmc",    "bvh",    "axis",  "mvn",
-                                                              "mocopi", "rokoko", "natnet"};
+enum class OutputKind : std::uint8_t { kVmc, kBvh, kAxis, kMvn, kMocopi, kRokoko, kNatNet, kRos2 };
+inline constexpr std::array<std::string_view, 8> kOutputKinds{"vmc",    "bvh",    "axis",   "mvn",
+                                                              "mocopi", "rokoko", "natnet", "ros2"};
 
 // As in the config.
 [[nodiscard]] constexpr std::string_view kind_name(OutputKind kind) noexcept {
@@ -89,7 +89,7 @@ struct OutputConfig {
   std::string name;  // [a-z0-9_-]{1,32}, or KIND-STREAM where the file does not say; unique
   OutputKind kind = OutputKind::kVmc;
   std::string body, left_hand, right_hand;  // streams; at least one is not empty, or there are
-  std::vector<std::string> bodies;          // several people, of kinds that have them
+  std::vector<std::string> bodies;          // several people, of kinds that have them; of ros2 all
   [[nodiscard]] std::size_t people() const { return bodies.empty() ? 1 : bodies.size(); }
   double rate_hz = 0.0;         // at most so many frames a second; 0: all
   std::vector<std::string> to;  // addresses and ports, over UDP
@@ -108,6 +108,11 @@ struct OutputConfig {
   // natnet
   std::string group;     // where everybody gets the frames, too; empty: nowhere
   int data_port = 1511;  // of the group
+  // ros2; peers are other computers
+  int domain = 0;
+  std::string interface = "lo";
+  std::string topic;        // of a robot's commands; empty: posed/STREAM/joint_commands
+  bool trajectory = false;  // commands are trajectories of one point, for controllers
   int line = 0;          // of its table, for errors; 0: nowhere
 };
 

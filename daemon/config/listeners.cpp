@@ -68,7 +68,8 @@ std::vector<Listener> listeners_of(const DaemonConfig& config) {
   add("control", false, tcp_address(config.control_endpoint));
   if (config.trigger) add("trigger", true, config.trigger->listen);
   for (const OutputConfig& output : config.outputs) {
-    if (!output.to.empty()) continue;
+    // The ports of ros2 are DDS's, which takes others if they are not free.
+    if (!output.to.empty() || output.kind == OutputKind::kRos2) continue;
     all.push_back({.who = "output " + in_quotes(output.name),
                    .udp = output.kind == OutputKind::kNatNet,
                    .endpoint = output.listen,

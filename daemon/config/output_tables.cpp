@@ -32,6 +32,9 @@ constexpr std::array<std::string_view, 2> kMvnFormats{"quaternion", "euler"};
 constexpr std::array<std::string_view, 2> kRokokoFormats{"lz4", "json"};
 constexpr std::size_t kMaxBodies = 5;  // of an output; so many fit into a datagram of Rokoko's
 constexpr double kMaxPort = 65535.0;
+constexpr std::size_t kMaxRos2Streams = 16;
+constexpr Range kDdsDomain{0.0, 232.0};  // those above have no ports
+constexpr std::size_t kMaxTopic = 128, kMaxInterface = 15;
 constexpr std::string_view kNatNetPort = ":1510";
 
 // The keys that some kinds do not have, with those that do.
@@ -41,7 +44,8 @@ struct KindsKey {
 };
 const std::vector<KindsKey>& kinds_keys() {
   using enum OutputKind;
-  static const std::vector<KindsKey> keys{{"left_hand", {kVmc}},
+  static const std::vector<KindsKey> keys{{"body", {kVmc, kBvh, kAxis, kMvn, kMocopi, kRokoko, kNatNet}},
+                                          {"left_hand", {kVmc}},
                                           {"right_hand", {kVmc}},
                                           {"bodies", {kAxis, kMvn, kRokoko, kNatNet}},
                                           {"to", {kVmc, kAxis, kMvn, kMocopi, kRokoko}},
@@ -49,11 +53,16 @@ const std::vector<KindsKey>& kinds_keys() {
                                           {"role", {kVmc}},
                                           {"avatar", {kVmc}},
                                           {"listen", {kBvh, kAxis, kNatNet}},
-                                          {"peers", {kBvh, kAxis, kNatNet}},
+                                          {"peers", {kBvh, kAxis, kNatNet, kRos2}},
                                           {"header", {kBvh}},
                                           {"format", {kAxis, kMvn, kRokoko}},
                                           {"group", {kNatNet}},
-                                          {"data_port", {kNatNet}}};
+                                          {"data_port", {kNatNet}},
+                                          {"streams", {kRos2}},
+                                          {"domain", {kRos2}},
+                                          {"interface", {kRos2}},
+                                          {"topic", {kRos2}},
+                                          {"trajectory", {kRos2}}};
   return keys;
 }
 
@@ -69,7 +78,9 @@ class OutputReader {
   void read_push(TableReader& table, OutputConfig& output) const;
   void read_natnet(TableReader& table, OutputConfig& output) const;
   void read_kind(TableReader& table, OutputConfig& output) const;
+  void read_ros2(TableReader& table, OutputConfig& output) const;
   void read_bodies(TableReader& table, OutputConfig& output) const;
+  void read_list(TableReader& table, const char* key, std::size_t most, OutputConfig& output) const;
   void read_receivers(TableReader& table, OutputConfig& output) const;
   void read_clients(TableReader& table, OutputConfig& output) const;
   void read_streams(TableReader& table, OutputConfig& output) const;
@@ -125,6 +136,10 @@ void OutputReader::check_hand(TableReader& table, const char* key, const std::st
 }
 
 void OutputReader::read_streams(TableReader& table, OutputConfig& output) const {
+  if (output.kind == OutputKind::kRos2) {
+    if (!table.need("streams", "name what is sent, like streams = [\"actor1\"]")) return;
+    return read_list(table, "streams", kMaxRos2Streams, output);
+  }
   const std::array<std::pair<const char*, std::string*>, 3> parts{
       {{"body", &output.body},
        {"left_hand", &output.left_hand},
@@ -153,24 +168,29 @@ void OutputReader::read_streams(TableReader& table, OutputConfig& output) const 
 // Several people, instead of one.
 void OutputReader::read_bodies(TableReader& table, OutputConfig& output) const {
   if (output.kind == OutputKind::kVmc || !table.has("bodies")) return;
-  const std::size_t errors = file_.findings.errors.size();
-  table.read("bodies", output.bodies);
-  if (file_.findings.errors.size() > errors) return;
   if (!output.body.empty()) {
     table.add_error("bodies", "body names one person and bodies several: leave one out");
   }
-  if (output.bodies.empty() || output.bodies.size() > kMaxBodies) {
-    table.add_error("bodies", fmt::format("output.bodies takes 1 to {} streams", kMaxBodies));
+  read_list(table, "bodies", kMaxBodies, output);
+}
+
+void OutputReader::read_list(TableReader& table, const char* key, std::size_t most,
+                             OutputConfig& output) const {
+  const std::size_t errors = file_.findings.errors.size();
+  table.read(key, output.bodies);
+  if (file_.findings.errors.size() > errors) return;
+  if (output.bodies.empty() || output.bodies.size() > most) {
+    table.add_error(key, fmt::format("output.{} takes 1 to {} streams", key, most));
   }
   std::set<std::string> taken;
   for (const std::string& name : output.bodies) {
     if (name.empty()) {
-      table.add_error("bodies", "a stream's name is empty; leave it out");
+      table.add_error(key, "a stream's name is empty; leave it out");
     } else if (!taken.insert(name).second) {
-      table.add_error("bodies", fmt::format("{} is listed twice; it would be sent as two people",
-                                            in_quotes(name)));
+      table.add_error(key, fmt::format("{} is listed twice; it would be sent as two people",
+                                       in_quotes(name)));
     }
-    check_stream(table, "bodies", name);
+    check_stream(table, key, name);
   }
 }
 
@@ -260,6 +280,64 @@ void OutputReader::read_natnet(TableReader& table, OutputConfig& output) const {
   }
 }
 
+// Words of letters, digits and '_' with '/' between them, none of which begins with a digit.
+bool is_topic(std::string_view text) {
+  bool begins = true;
+  for (const char c : text) {
+    const bool letter = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
+    const bool digit = c >= '0' && c <= '9';
+    if (begins ? !letter : !letter && !digit && c != '/') return false;
+    begins = c == '/';
+  }
+  return !begins && text.size() <= kMaxTopic;
+}
+
+// It becomes a part of Cyclone's own settings.
+bool is_interface(std::string_view text) {
+  return !text.empty() && text.size() <= kMaxInterface && std::ranges::all_of(text, [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           c == '_' || c == '.' || c == '@';
+  });
+}
+
+void OutputReader::read_ros2(TableReader& table, OutputConfig& output) const {
+  table.read("domain", output.domain, kDdsDomain);
+  table.read("interface", output.interface);
+  table.read("topic", output.topic);
+  table.read("trajectory", output.trajectory);
+  table.read("peers", output.peers);
+  if (!is_interface(output.interface)) {
+    table.add_error("interface", "name one network interface, as `ip -4 address` does");
+  }
+  if (table.has("topic") && !is_topic(output.topic)) {
+    table.add_error("topic", "a topic is words of letters, digits and '_' with '/' between them,"
+                             " like hand_controller/joint_trajectory");
+  } else if (!output.topic.empty() && output.bodies.size() > 1) {
+    table.add_error("topic", "one topic is for one robot; give each an [[output]] of its own");
+  }
+  for (const std::string& peer : output.peers) {
+    const auto host = drivers::parse_host(peer);
+    if (!host || host->storage.ss_family != AF_INET) {
+      table.add_error("peers", fmt::format("{} should be an IPv4 address", in_quotes(peer)));
+    }
+  }
+  if (output.peers.size() > kMaxReceivers) {
+    table.add_error("peers", fmt::format("output.peers takes at most {}", kMaxReceivers));
+  }
+  if (!output.peers.empty() && output.interface == "lo") {
+    table.add_error("peers", "other computers are not on \"lo\"; name the interface to them");
+  }
+  for (const OutputConfig& other : config_.outputs) {
+    if (&other == &output || other.kind != OutputKind::kRos2 || other.domain != output.domain ||
+        (other.interface == output.interface && other.peers == output.peers)) {
+      continue;
+    }
+    table.add_error("domain", fmt::format("the output in line {} has domain {} with another interface or"
+                                          " other peers; write the same in both",
+                                          other.line, other.domain));
+  }
+}
+
 void OutputReader::read_kind(TableReader& table, OutputConfig& output) const {
   switch (output.kind) {
     case OutputKind::kVmc:
@@ -269,6 +347,8 @@ void OutputReader::read_kind(TableReader& table, OutputConfig& output) const {
       return read_axis(table, output);
     case OutputKind::kNatNet:
       return read_natnet(table, output);
+    case OutputKind::kRos2:
+      return read_ros2(table, output);
     default:
       return read_push(table, output);
   }

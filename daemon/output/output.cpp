@@ -7,6 +7,7 @@
 #include "daemon/output/axis_output.hpp"
 #include "daemon/output/datagram_output.hpp"
 #include "daemon/output/natnet_output.hpp"
+#include "daemon/output/ros2/ros2_output.hpp"
 #include "daemon/output/vmc_output.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/text/clean.hpp"
@@ -29,6 +30,8 @@ Result<std::unique_ptr<Output>> open_kind(const config::OutputConfig& config,
       return AxisOutput::open(config, std::move(wake));
     case config::OutputKind::kNatNet:
       return NatNetOutput::open(config, std::move(wake));
+    case config::OutputKind::kRos2:
+      return Ros2Output::open(config, std::move(wake));
     default:
       return DatagramOutput::open(config, std::move(wake));
   }
