@@ -8,7 +8,6 @@
 #include <map>
 #include <mutex>
 #include <optional>
-#include <set>
 #include <string_view>
 
 #include <ifaddrs.h>
@@ -37,8 +36,9 @@ const Ros2Type kTfMessage{
 
 namespace {
 
-// DDS's rule for ports; a participant has two above the first of its domain.
+// DDS's rule for ports.
 constexpr int kFirstPort = 7400, kPortsOfDomain = 250;
+constexpr int kSockets = 2;  // on which a domain listens
 constexpr int kMaxNeighbours = 32;  // programs in the domain on one computer that are looked for
 
 std::unexpected<Error> dds_error(const std::string& what, dds_return_t code) {
@@ -84,10 +84,13 @@ Result<> fence(int socket, const std::vector<std::uint32_t>& allowed) {
   return fail("the kernel does not filter what DDS receives (" + errno_text() + ")");
 }
 
-std::set<int> open_files() {
-  std::set<int> files;
+// What is open: the descriptors by the names that are never used again, like socket:[1234].
+std::map<std::string, int> open_files() {
+  std::map<std::string, int> files;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
-    files.insert(std::atoi(entry.path().filename().c_str()));
+    std::error_code gone;  // the folder's own descriptor
+    const auto name = std::filesystem::read_symlink(entry.path(), gone);
+    if (!gone) files.emplace(name, std::atoi(entry.path().filename().c_str()));
   }
   return files;
 }
@@ -102,7 +105,8 @@ bool listens_for(int file, int domain) {
 }
 
 // The sockets that a new domain has opened; `before` were open already.
-Result<> fence_all(const DdsPlace& place, std::uint32_t own, const std::set<int>& before) {
+Result<> fence_all(const DdsPlace& place, std::uint32_t own,
+                   const std::map<std::string, int>& before) {
   std::vector<std::uint32_t> allowed{own};
   for (const std::string& peer : place.peers) {
     const auto host = TRY(drivers::parse_host(peer));
@@ -111,12 +115,12 @@ Result<> fence_all(const DdsPlace& place, std::uint32_t own, const std::set<int>
     allowed.push_back(address.sin_addr.s_addr);
   }
   int fenced = 0;
-  for (const int file : open_files()) {
-    if (before.contains(file) || !listens_for(file, place.domain)) continue;
+  for (const auto& [name, file] : open_files()) {
+    if (before.contains(name) || !listens_for(file, place.domain)) continue;
     TRY(fence(file, allowed));
     ++fenced;
   }
-  if (fenced == 0) return fail("the sockets of DDS were not found");
+  if (fenced < kSockets) return fail("the sockets of DDS were not found");
   return {};
 }
 
@@ -174,7 +178,7 @@ Result<std::shared_ptr<DdsDomain>> DdsDomain::join(const DdsPlace& place) {
                 " with an IPv4 address; `ip -4 address` lists them");
   }
   ::dds_set_log_sink(&log_dds, nullptr);
-  const std::set<int> before = open_files();
+  const auto before = open_files();
   const std::string text = drivers::host_text(drivers::ipv4_address(ntohl(*own)));
   const auto id = static_cast<dds_domainid_t>(place.domain);
   const dds_entity_t domain = ::dds_create_domain(id, settings_of(place, text).c_str());
