@@ -318,7 +318,7 @@ TEST_CASE("Commands at 500 Hz", "[.][figures]") {
   std::vector<std::int64_t> ages_ns;
   const auto read_until = [&](auto due) {
     while (std::chrono::steady_clock::now() < due) {
-      const Json line = reader.line("name", 1ms);
+      const Json line = reader.line("name", 2ms);
       if (!line.is_null()) ages_ns.push_back(line["age_ns"].get<std::int64_t>());
     }
   };
