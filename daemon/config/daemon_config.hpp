@@ -113,7 +113,7 @@ struct OutputConfig {
   std::string interface = "lo";
   std::string topic;        // of a robot's commands; empty: posed/STREAM/joint_commands
   bool trajectory = false;  // commands are trajectories of one point, for controllers
-  int line = 0;          // of its table, for errors; 0: nowhere
+  int line = 0;             // of its table, for errors; 0: nowhere
 };
 
 // `posed run` records from its start.

@@ -44,25 +44,26 @@ struct KindsKey {
 };
 const std::vector<KindsKey>& kinds_keys() {
   using enum OutputKind;
-  static const std::vector<KindsKey> keys{{"body", {kVmc, kBvh, kAxis, kMvn, kMocopi, kRokoko, kNatNet}},
-                                          {"left_hand", {kVmc}},
-                                          {"right_hand", {kVmc}},
-                                          {"bodies", {kAxis, kMvn, kRokoko, kNatNet}},
-                                          {"to", {kVmc, kAxis, kMvn, kMocopi, kRokoko}},
-                                          {"names", {kVmc}},
-                                          {"role", {kVmc}},
-                                          {"avatar", {kVmc}},
-                                          {"listen", {kBvh, kAxis, kNatNet}},
-                                          {"peers", {kBvh, kAxis, kNatNet, kRos2}},
-                                          {"header", {kBvh}},
-                                          {"format", {kAxis, kMvn, kRokoko}},
-                                          {"group", {kNatNet}},
-                                          {"data_port", {kNatNet}},
-                                          {"streams", {kRos2}},
-                                          {"domain", {kRos2}},
-                                          {"interface", {kRos2}},
-                                          {"topic", {kRos2}},
-                                          {"trajectory", {kRos2}}};
+  static const std::vector<KindsKey> keys{
+      {"body", {kVmc, kBvh, kAxis, kMvn, kMocopi, kRokoko, kNatNet}},
+      {"left_hand", {kVmc}},
+      {"right_hand", {kVmc}},
+      {"bodies", {kAxis, kMvn, kRokoko, kNatNet}},
+      {"to", {kVmc, kAxis, kMvn, kMocopi, kRokoko}},
+      {"names", {kVmc}},
+      {"role", {kVmc}},
+      {"avatar", {kVmc}},
+      {"listen", {kBvh, kAxis, kNatNet}},
+      {"peers", {kBvh, kAxis, kNatNet, kRos2}},
+      {"header", {kBvh}},
+      {"format", {kAxis, kMvn, kRokoko}},
+      {"group", {kNatNet}},
+      {"data_port", {kNatNet}},
+      {"streams", {kRos2}},
+      {"domain", {kRos2}},
+      {"interface", {kRos2}},
+      {"topic", {kRos2}},
+      {"trajectory", {kRos2}}};
   return keys;
 }
 
@@ -187,8 +188,8 @@ void OutputReader::read_list(TableReader& table, const char* key, std::size_t mo
     if (name.empty()) {
       table.add_error(key, "a stream's name is empty; leave it out");
     } else if (!taken.insert(name).second) {
-      table.add_error(key, fmt::format("{} is listed twice; it would be sent as two people",
-                                       in_quotes(name)));
+      table.add_error(
+          key, fmt::format("{} is listed twice; it would be sent as two people", in_quotes(name)));
     }
     check_stream(table, key, name);
   }
@@ -310,8 +311,9 @@ void OutputReader::read_ros2(TableReader& table, OutputConfig& output) const {
     table.add_error("interface", "name one network interface, as `ip -4 address` does");
   }
   if (table.has("topic") && !is_topic(output.topic)) {
-    table.add_error("topic", "a topic is words of letters, digits and '_' with '/' between them,"
-                             " like hand_controller/joint_trajectory");
+    table.add_error("topic",
+                    "a topic is words of letters, digits and '_' with '/' between them,"
+                    " like hand_controller/joint_trajectory");
   } else if (!output.topic.empty() && output.bodies.size() > 1) {
     table.add_error("topic", "one topic is for one robot; give each an [[output]] of its own");
   }
@@ -332,9 +334,10 @@ void OutputReader::read_ros2(TableReader& table, OutputConfig& output) const {
         (other.interface == output.interface && other.peers == output.peers)) {
       continue;
     }
-    table.add_error("domain", fmt::format("the output in line {} has domain {} with another interface or"
-                                          " other peers; write the same in both",
-                                          other.line, other.domain));
+    table.add_error("domain",
+                    fmt::format("the output in line {} has domain {} with another interface or"
+                                " other peers; write the same in both",
+                                other.line, other.domain));
   }
 }
 

@@ -9,12 +9,12 @@
 #include <thread>
 #include <vector>
 
-#include <catch2/catch.hpp>
 #include <ifaddrs.h>
 #include <netinet/in.h>
-#include <nlohmann/json.hpp>
 #include <sys/socket.h>
 #include <unistd.h>
+#include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
 
 #include "daemon/output/ros2/dds.hpp"
 #include "tests/support/process.hpp"
@@ -76,8 +76,8 @@ class Reader {
   // The next line that has this key; null if none comes in time.
   [[nodiscard]] Json line(const std::string& key, std::chrono::milliseconds patience = 60s) {
     while (true) {
-      const auto found = std::ranges::find_if(
-          lines_, [&](const Json& line) { return line.contains(key); });
+      const auto found =
+          std::ranges::find_if(lines_, [&](const Json& line) { return line.contains(key); });
       if (found != lines_.end()) {
         Json line = std::move(*found);
         lines_.erase(found);
@@ -305,7 +305,8 @@ TEST_CASE("The hashes in the code are those of the IDL") {
   test::Process python(test::Command({"python3", test::source_dir() / "tests/ros2/type_hashes.py",
                                       test::source_dir() / "daemon/output/ros2/messages.idl"}));
   CHECK(python.line() == std::string("sensor_msgs/msg/JointState ") + kJointState.hash);
-  CHECK(python.line() == std::string("trajectory_msgs/msg/JointTrajectory ") + kJointTrajectory.hash);
+  CHECK(python.line() ==
+        std::string("trajectory_msgs/msg/JointTrajectory ") + kJointTrajectory.hash);
   CHECK(python.line() == std::string("tf2_msgs/msg/TFMessage ") + kTfMessage.hash);
 }
 

@@ -38,7 +38,7 @@ namespace {
 
 // DDS's rule for ports.
 constexpr int kFirstPort = 7400, kPortsOfDomain = 250;
-constexpr int kSockets = 2;  // on which a domain listens
+constexpr int kSockets = 2;         // on which a domain listens
 constexpr int kMaxNeighbours = 32;  // programs in the domain on one computer that are looked for
 
 std::unexpected<Error> dds_error(const std::string& what, dds_return_t code) {
@@ -182,7 +182,8 @@ Result<std::shared_ptr<DdsDomain>> DdsDomain::join(const DdsPlace& place) {
   const std::string text = drivers::host_text(drivers::ipv4_address(ntohl(*own)));
   const auto id = static_cast<dds_domainid_t>(place.domain);
   const dds_entity_t domain = ::dds_create_domain(id, settings_of(place, text).c_str());
-  if (domain < 0) return dds_error("cannot join DDS domain " + std::to_string(place.domain), domain);
+  if (domain < 0)
+    return dds_error("cannot join DDS domain " + std::to_string(place.domain), domain);
   std::shared_ptr<DdsDomain> made(new DdsDomain(place, domain));
   TRY(fence_all(place, *own, before));
   made->participant_ = ::dds_create_participant(id, nullptr, nullptr);
@@ -197,11 +198,10 @@ Result<DdsWriter> DdsWriter::open(std::shared_ptr<DdsDomain> domain, const Ros2T
                                   const std::string& topic) {
   const Qos qos = quality_of(type);
   const std::string name = "rt/" + topic;  // ROS 2's prefix of topics
-  const dds_entity_t made = ::dds_create_topic(domain->participant(), type.descriptor, name.c_str(),
-                                               nullptr, nullptr);
+  const dds_entity_t made =
+      ::dds_create_topic(domain->participant(), type.descriptor, name.c_str(), nullptr, nullptr);
   if (made < 0) return dds_error("cannot be sent as topic " + topic, made);
-  const dds_entity_t writer =
-      ::dds_create_writer(domain->participant(), made, qos.get(), nullptr);
+  const dds_entity_t writer = ::dds_create_writer(domain->participant(), made, qos.get(), nullptr);
   if (writer >= 0) return DdsWriter(std::move(domain), made, writer);
   ::dds_delete(made);
   return dds_error("cannot be sent as topic " + topic, writer);

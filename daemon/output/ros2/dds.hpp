@@ -1,6 +1,6 @@
-// DdsDomain, DdsWriter: a place in a DDS domain by Eclipse Cyclone DDS, and what publishes one topic
-// there as nodes of ROS 2 expect it: reliable, volatile, the last sample only, and none that is
-// older than kLifespan_ns.
+// DdsDomain, DdsWriter: a place in a DDS domain by Eclipse Cyclone DDS, and what publishes one
+// topic there as nodes of ROS 2 expect it: reliable, volatile, the last sample only, and none that
+// is older than kLifespan_ns.
 #pragma once
 
 #include <cstdint>

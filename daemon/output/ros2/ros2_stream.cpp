@@ -80,8 +80,8 @@ Ros2Stream::Ros2Stream(const config::OutputConfig& config, std::shared_ptr<DdsDo
       period_s_(1.0 / (stream.rate_hz > 0.0 ? stream.rate_hz : kAssumedRate_hz)),
       joint_names_(names_of_angles(*stream.skeleton)) {
   if (topic_.empty()) {
-    topic_ = "posed/" + ros_word(stream.name) +
-             (trajectory_ ? "/joint_trajectory" : "/joint_commands");
+    topic_ =
+        "posed/" + ros_word(stream.name) + (trajectory_ ? "/joint_trajectory" : "/joint_commands");
   }
   for (const Joint& joint : skeleton_->joints) {
     frame_names_.push_back(stream.name + "/" + joint.name);
@@ -172,8 +172,9 @@ SendOutcome Ros2Stream::send_view(Stamp stamp) {
   if (frames_->readers() > 0) {
     fill_transforms(stamp);
     const auto size = static_cast<std::uint32_t>(transforms_.size());
-    const tf2_msgs_msg_dds__TFMessage_ message{.transforms = {
-        ._maximum = size, ._length = size, ._buffer = transforms_.data(), ._release = false}};
+    const tf2_msgs_msg_dds__TFMessage_ message{
+        .transforms = {
+            ._maximum = size, ._length = size, ._buffer = transforms_.data(), ._release = false}};
     add(outcome, frames_->write(&message));
   }
   if (joints_ && frame_.angle_count == positions_.size()) {

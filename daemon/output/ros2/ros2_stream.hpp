@@ -49,7 +49,7 @@ class Ros2Stream {
   std::shared_ptr<const Skeleton> skeleton_;
   std::string view_topic_;
   double period_s_;
-  std::optional<bool> robot_;       // unknown before the first frame
+  std::optional<bool> robot_;        // unknown before the first frame
   std::optional<DdsWriter> joints_;  // a robot's commands, or a viewer's angles
   std::optional<DdsWriter> frames_;  // for viewers
 
@@ -59,7 +59,7 @@ class Ros2Stream {
   std::vector<std::string> joint_names_, frame_names_;
   std::string world_ = "world";
   std::vector<char*> joint_texts_;
-  std::vector<double> positions_, velocities_;  // [rotation channel]
+  std::vector<double> positions_, velocities_;                        // [rotation channel]
   std::vector<geometry_msgs_msg_dds__TransformStamped_> transforms_;  // [joint]
 };
 

@@ -154,6 +154,15 @@ Findings findings_of(const config::SourceConfig& source) {
   return findings;
 }
 
+void add_ros2(const config::OutputConfig& output, Findings& findings, std::string& line) {
+  findings.add("streams", output.bodies).add("domain", output.domain);
+  findings.add("interface", output.interface);
+  line += fmt::format(", streams {}, DDS domain {} on {}", fmt::join(output.bodies, " "),
+                      output.domain, output.interface);
+  if (!output.peers.empty()) line += fmt::format(", with {}", fmt::join(output.peers, " "));
+  if (!output.topic.empty()) line += ", topic " + output.topic;
+}
+
 // The line is like "output vmc-ann: vmc, body ann, to 127.0.0.1:39539".
 Findings findings_of(const config::OutputConfig& output) {
   const std::string kind(config::kind_name(output.kind));
@@ -167,11 +176,16 @@ Findings findings_of(const config::OutputConfig& output) {
     findings.add(part, stream);
     line += std::string(", ") + part + " " + stream;
   }
-  if (!output.bodies.empty()) {
+  const bool ros2 = output.kind == config::OutputKind::kRos2;
+  if (ros2) {
+    add_ros2(output, findings, line);
+  } else if (!output.bodies.empty()) {
     findings.add("bodies", output.bodies);
     line += fmt::format(", bodies {}", fmt::join(output.bodies, " "));
   }
-  if (output.to.empty()) {
+  if (ros2) {
+    // Nobody connects to it, and it finds its readers by itself.
+  } else if (output.to.empty()) {
     findings.add("listen", output.listen);
     line += ", on " + output.listen;
     if (!output.group.empty()) {

@@ -12,6 +12,7 @@
 
 #include <unistd.h>
 
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
@@ -20,7 +21,6 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/TopicDataType.hpp>
-#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <nlohmann/json.hpp>
 
 namespace {
@@ -218,13 +218,13 @@ int main(int count, char** arguments) {
   const fast::TypeSupport support(
       new RawType(std::string(package_of(type)) + "::msg::dds_::" + type + "_"));
   support.register_type(participant);
-  auto* there =
-      participant->create_topic(topic, support.get_type_name(), fast::TOPIC_QOS_DEFAULT);
+  auto* there = participant->create_topic(topic, support.get_type_name(), fast::TOPIC_QOS_DEFAULT);
   auto* subscriber = participant->create_subscriber(fast::SUBSCRIBER_QOS_DEFAULT);
   fast::DataReaderQos qos;
   qos.reliability().kind = fast::RELIABLE_RELIABILITY_QOS;
   qos.history().depth = 10;
-  if (count > 4) qos.lifespan().duration = eprosima::fastrtps::Duration_t(std::stod(words[4]) / 1000.0L);
+  if (count > 4)
+    qos.lifespan().duration = eprosima::fastrtps::Duration_t(std::stod(words[4]) / 1000.0L);
   Printer printer(type);
   subscriber->create_datareader(there, qos, &printer);
   while (true) pause();  // whoever started it ends it

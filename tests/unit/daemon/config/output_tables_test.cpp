@@ -232,6 +232,37 @@ format = "json"
         " 127.0.0.1:1510; give output 'second' another port");
 }
 
+TEST_CASE("an output to ROS 2 names its streams, its domain and who else may hear") {
+  const std::string ros2 = "[[output]]\nkind = \"ros2\"\n", ann = "streams = [\"ann\"]\n";
+  const Reading reading =
+      read_with_outputs(ros2 + ann + "trajectory = true\ndomain = 42\ntopic = \"a/b_1\"\n" +
+                        "interface = \"eth0\"\npeers = [\"192.168.1.20\"]\n");
+  for (const Error& error : reading.errors) FAIL_CHECK(error.text());
+  REQUIRE(reading.config.outputs.size() == 1);
+  const OutputConfig& output = reading.config.outputs[0];
+  CHECK(output.name == "ros2-ann");
+  CHECK(output.bodies == std::vector<std::string>{"ann"});
+  CHECK(output.trajectory);
+  CHECK(output.interface == "eth0");
+
+  CHECK(output_complaint(ros2) ==
+        "posed.toml:12: output.streams is missing; name what is sent, like streams = [\"actor1\"]");
+  CHECK(output_complaint(ros2 + "body = \"ann\"\n" + ann).find("leave it out") !=
+        std::string::npos);
+  CHECK(output_complaint(ros2 + ann + "peers = [\"192.168.1.20\"]\n") ==
+        "posed.toml:15: other computers are not on \"lo\"; name the interface to them");
+  CHECK(output_complaint(ros2 + ann + "interface = \"lo\\\"/>\"\n") ==
+        "posed.toml:15: name one network interface, as `ip -4 address` does");
+  for (const std::string topic : {"", "/cmd", "a//b", "a/", "1a", "a b", "a-b", "a/2"}) {
+    CHECK(output_complaint(ros2 + ann + "topic = \"" + topic + "\"\n").find("a topic is words") !=
+          std::string::npos);
+  }
+  CHECK(output_complaint(ros2 + "streams = [\"ann\", \"stage-bob\"]\ntopic = \"a\"\n")
+            .find("give each an [[output]] of its own") != std::string::npos);
+  CHECK(output_complaint(ros2 + ann + ros2 + "streams = [\"stage-bob\"]\ninterface = \"eth0\"\n")
+            .find("write the same in both") != std::string::npos);
+}
+
 TEST_CASE("the stream of a right hand is no left hand") {
   const auto errors_of = [](const std::string& stream, const std::string& hands) {
     return read_config("[[stream]]\nname = \"glove\"\ndriver = \"cyberglove\"\n" + stream +
