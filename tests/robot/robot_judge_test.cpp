@@ -13,10 +13,10 @@
 namespace posed::test {
 namespace {
 
-// A palm of 80 x 20 x 80 mm, above it a finger of two links that bends over its front, the second
+// A palm of 80 x 40 x 80 mm, above it a finger of two links that bends over its front, the second
 // by -1.5 times the first and 0.1 more; the tip is a mesh that is not there.
 constexpr const char* kHand = R"(<robot name="hand">
-  <link name="palm"><collision><geometry><box size="0.08 0.02 0.08"/></geometry></collision></link>
+  <link name="palm"><collision><geometry><box size="0.08 0.04 0.08"/></geometry></collision></link>
   <joint name="distal" type="revolute">
     <parent link="first"/><child link="second"/><origin xyz="0 0 0.05"/><axis xyz="1 0 0"/>
     <limit lower="-0.1" upper="2.6" velocity="1" effort="1"/>

@@ -18,8 +18,8 @@
 #include <spdlog/spdlog.h>
 
 #include "drivers/transport/address.hpp"
+#include "posed/ros2/messages.h"
 #include "proto/text/clean.hpp"
-#include "ros2/messages.h"
 
 namespace posed::output {
 
@@ -87,10 +87,12 @@ Result<> fence(int socket, const std::vector<std::uint32_t>& allowed) {
 // What is open: the descriptors by the names that are never used again, like socket:[1234].
 std::map<std::string, int> open_files() {
   std::map<std::string, int> files;
-  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
-    std::error_code gone;  // the folder's own descriptor
-    const auto name = std::filesystem::read_symlink(entry.path(), gone);
-    if (!gone) files.emplace(name, std::atoi(entry.path().filename().c_str()));
+  std::error_code none;
+  for (std::filesystem::directory_iterator file("/proc/self/fd", none), end; !none && file != end;
+       file.increment(none)) {
+    std::error_code gone;  // closed meanwhile
+    const auto name = std::filesystem::read_symlink(file->path(), gone);
+    if (!gone) files.emplace(name, std::atoi(file->path().filename().c_str()));
   }
   return files;
 }

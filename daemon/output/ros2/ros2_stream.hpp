@@ -15,9 +15,9 @@
 #include "daemon/output/inbox.hpp"
 #include "daemon/output/ros2/dds.hpp"
 #include "daemon/output/send_outcome.hpp"
+#include "posed/ros2/messages.h"
 #include "proto/frame/frame.hpp"
 #include "proto/frame/result.hpp"
-#include "ros2/messages.h"
 
 namespace posed::output {
 
