@@ -27,6 +27,10 @@ int run(const char* urdf, const char* csv) {
   list("pairs touch in the start pose and are not judged", judge->touching_at_start());
   const RobotVerdict verdict = judge->judge(*poses);
   list("columns are no joints", verdict.unknown_columns);
+  if (verdict.unknown_columns.size() == poses->joints.size() || verdict.frames == 0) {
+    std::cerr << "no column names a joint of the hand, or there is no frame: nothing was judged\n";
+    return 2;
+  }
   list("joints have no column and stay", verdict.still_joints);
   std::cout << verdict.frames << " frames, " << verdict.in_contact
             << " with a contact deeper than 1 mm, " << verdict.beyond_limits << " beyond a limit\n";
