@@ -48,7 +48,7 @@ class Performer {
                                    const std::string& name, WalkerFamily family) {
     const auto walk = motion::make_walker({.family = family, .seconds = 60.0}).value();
     REQUIRE(clip::write_bvh(walk, stage.path(name + ".bvh")));
-    return emulate::clip_motion(stage.path(name + ".bvh"), emulator).value();
+    return emulate::clip_motion({stage.path(name + ".bvh")}, emulator).value();
   }
 
   std::unique_ptr<emulate::EmulatedDevice> device_;

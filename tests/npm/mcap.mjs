@@ -78,7 +78,7 @@ export async function checkMcap(program, folder, clip) {
   await checkStream(file);
   await file.close();
   assert.deepEqual([...topics.keys()].sort(), ['event/plain', 'event/walker', 'pose/plain', 'pose/walker',
-    'skeleton/plain', 'skeleton/walker']);
+    'skeleton/plain', 'skeleton/walker', 'tf/plain', 'tf/walker']);
   const { joints, frames } = readBvh(clip);
   let worst = 0;
   for (const name of ['plain', 'walker']) {

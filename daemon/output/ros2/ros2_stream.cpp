@@ -7,7 +7,7 @@
 #include <span>
 #include <utility>
 
-#include "models/motion/kinematics.hpp"
+#include "models/motion/ros_frames.hpp"
 
 namespace posed::output {
 namespace {
@@ -48,13 +48,6 @@ dds_sequence_string sequence(std::vector<char*>& texts) noexcept {
   return {._maximum = size, ._length = size, ._buffer = texts.data(), ._release = false};
 }
 
-// posed's x is left, y up, z forward: ROS's y, z, x.
-geometry_msgs_msg_dds__Transform_ in_ros_axes(const Eigen::Vector3d& position_m,
-                                              const Eigen::Quaterniond& turn) noexcept {
-  return {.translation = {.x = position_m.z(), .y = position_m.x(), .z = position_m.y()},
-          .rotation = {.x = turn.z(), .y = turn.x(), .z = turn.y(), .w = turn.w()}};
-}
-
 void add(SendOutcome& sum, const SendOutcome& one) noexcept {
   sum.sent += one.sent;
   sum.dropped += one.dropped;
@@ -78,13 +71,11 @@ Ros2Stream::Ros2Stream(const config::OutputConfig& config, std::shared_ptr<DdsDo
       skeleton_(stream.skeleton),
       view_topic_("posed/" + ros_word(stream.name) + "/joint_states"),
       period_s_(1.0 / (stream.rate_hz > 0.0 ? stream.rate_hz : kAssumedRate_hz)),
-      joint_names_(names_of_angles(*stream.skeleton)) {
+      joint_names_(names_of_angles(*stream.skeleton)),
+      frame_names_(motion::ros_frame_names(stream.name, *stream.skeleton)) {
   if (topic_.empty()) {
     topic_ =
         "posed/" + ros_word(stream.name) + (trajectory_ ? "/joint_trajectory" : "/joint_commands");
-  }
-  for (const Joint& joint : skeleton_->joints) {
-    frame_names_.push_back(stream.name + "/" + joint.name);
   }
   for (std::string& name : joint_names_) joint_texts_.push_back(name.data());
   positions_.resize(joint_names_.size());
@@ -156,14 +147,13 @@ SendOutcome Ros2Stream::send_command(Stamp stamp) {
 }
 
 void Ros2Stream::fill_transforms(Stamp stamp) {
-  const motion::WorldPose pose = motion::world_pose(*skeleton_, frame_);
+  const auto frames = motion::ros_frames(*skeleton_, frame_);
   for (std::size_t j = 0; j < transforms_.size(); ++j) {
-    const Joint& joint = skeleton_->joints[j];
+    const auto& [at, turn] = frames[j];
     transforms_[j].header.stamp = stamp;
-    const bool top = joint.parent < 0;
-    const Eigen::Quaterniond turn =
-        top ? pose.rotation[j] : pose.rotation[joint.parent].conjugate() * pose.rotation[j];
-    transforms_[j].transform = in_ros_axes(top ? pose.position_m[j] : joint.offset_m, turn);
+    transforms_[j].transform = {
+        .translation = {.x = at.x(), .y = at.y(), .z = at.z()},
+        .rotation = {.x = turn.x(), .y = turn.y(), .z = turn.z(), .w = turn.w()}};
   }
 }
 

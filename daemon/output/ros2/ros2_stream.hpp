@@ -15,6 +15,7 @@
 #include "daemon/output/inbox.hpp"
 #include "daemon/output/ros2/dds.hpp"
 #include "daemon/output/send_outcome.hpp"
+#include "models/motion/ros_frames.hpp"
 #include "posed/ros2/messages.h"
 #include "proto/frame/frame.hpp"
 #include "proto/frame/result.hpp"
@@ -57,7 +58,7 @@ class Ros2Stream {
   bool waits_ = false;
   // What messages point to, so that a frame allocates nothing here.
   std::vector<std::string> joint_names_, frame_names_;
-  std::string world_ = "world";
+  std::string world_ = motion::kRosWorld;
   std::vector<char*> joint_texts_;
   std::vector<double> positions_, velocities_;                        // [rotation channel]
   std::vector<geometry_msgs_msg_dds__TransformStamped_> transforms_;  // [joint]

@@ -33,7 +33,8 @@ struct EmulateOptions {
   std::string stream;
   std::string tcp, listen, publish;
   std::vector<std::string> udp;
-  std::filesystem::path link, clip;
+  std::filesystem::path link;
+  std::vector<std::filesystem::path> clips;
   std::vector<std::string> set;     // KEY=VALUE
   std::vector<std::string> faults;  // KIND:RATE
   std::uint64_t seed = 1;
@@ -53,12 +54,13 @@ struct Emulated {
 // or move by themselves.
 Result<emulate::Motion> motion(const EmulateOptions& options, const Emulated& emulated) {
   if (emulated.driver == nullptr || emulated.driver->glove == nullptr) {
-    if (options.clip.empty()) return emulate::Motion();
-    return emulate::clip_motion(options.clip, *emulated.emulator);
+    if (options.clips.empty()) return emulate::Motion();
+    return emulate::clip_motion(options.clips, *emulated.emulator);
   }
+  if (options.clips.size() > 1) return misuse("a glove performs one clip: name one");
   auto clip = std::make_shared<clip::HandClip>();
-  if (!options.clip.empty()) {
-    auto read = TRY(clip::read_hand_clip(options.clip));
+  if (!options.clips.empty()) {
+    auto read = TRY(clip::read_hand_clip(options.clips.front()));
     *clip = std::move(read);
   } else {
     auto made = TRY(gesture::make_performance({.script = {"p", "g", "c", "p", "1", "3", "4", "p"},
@@ -94,7 +96,7 @@ Result<Emulated> open_emulator(const EmulateOptions& options) {
     auto made = TRY(make_emulator(options.what, options.set));
     return Emulated{.emulator = std::move(made), .driver = drivers::find_driver(options.what)};
   }
-  if (!options.clip.empty()) return misuse("a log has its own motion: leave out --clip");
+  if (!options.clips.empty()) return misuse("a log has its own motion: leave out --clip");
   const std::size_t addresses = std::max<std::size_t>(options.udp.size(), 1);
   auto device = TRY(emulate::read_logged_device(options.what, options.stream, addresses));
   std::unique_ptr<drivers::Emulator> speaker;
@@ -255,10 +257,11 @@ void add_emulate(CLI::App& app, int& exit_code) {
       ->capture_default_str()
       ->check(in_range(0.01, 1000.0));
   command
-      ->add_option("--clip", options->clip,
+      ->add_option("--clip", options->clips,
                    "The motion: a hand CSV for a glove (default: synthetic gestures), a BVH or AMC "
-                   "for bodies (default: their own)")
-      ->type_name("FILE");
+                   "for bodies (default: their own); once for each person")
+      ->type_name("FILE")
+      ->allow_extra_args(false);  // the device's name may come behind it
   command->add_option("--set", options->set, "An option of the driver, like hand=left")
       ->type_name("KEY=VALUE");
   auto* fault = command

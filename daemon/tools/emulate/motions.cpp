@@ -45,24 +45,34 @@ void pose_bodies(Performance& performance, double time_s, drivers::Emulator& emu
 
 }  // namespace
 
-Result<Motion> clip_motion(const std::filesystem::path& path, const drivers::Emulator& emulator) {
-  auto clip = TRY(clip::read_clip(path));
-  auto performance = std::make_shared<Performance>();
-  performance->clip = std::move(clip);
+Result<Motion> clip_motion(const std::vector<std::filesystem::path>& paths,
+                           const drivers::Emulator& emulator) {
+  auto performances = std::make_shared<std::vector<Performance>>();
+  for (const auto& path : paths) {
+    auto clip = TRY(clip::read_clip(path));
+    performances->emplace_back().clip = std::move(clip);
+  }
+  std::size_t people = 0;
   for (std::size_t body = 0; body < kMaxBodies; ++body) {
     const Skeleton* skeleton = emulator.skeleton(body);
     if (skeleton == nullptr) continue;
-    auto retarget = motion::Retarget::bind(performance->clip.skeleton,
+    Performance& performance = (*performances)[people % performances->size()];
+    auto retarget = motion::Retarget::bind(performance.clip.skeleton,
                                            std::make_shared<const Skeleton>(*skeleton));
     if (!retarget) continue;  // a prop
-    performance->performers.push_back({.body = body, .retarget = std::move(*retarget), .pose = {}});
+    performance.performers.push_back({.body = body, .retarget = std::move(*retarget), .pose = {}});
+    ++people;
   }
-  if (performance->performers.empty()) {
+  if (people == 0) {
     return misuse("no body of the device has a bone of the clip; choose a clip of a person",
-                  path.string());
+                  paths.front().string());
   }
-  return Motion([performance](double time_s, drivers::Emulator& moved) {
-    pose_bodies(*performance, time_s, moved);
+  if (people < paths.size()) {
+    return misuse("the device has fewer people than there are clips: name " +
+                  std::to_string(people) + (people == 1 ? " clip" : " clips"));
+  }
+  return Motion([performances](double time_s, drivers::Emulator& moved) {
+    for (Performance& performance : *performances) pose_bodies(performance, time_s, moved);
   });
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "daemon/tools/emulate/emulated_device.hpp"
 #include "drivers/emulator.hpp"
@@ -12,10 +13,12 @@
 
 namespace posed::emulate {
 
-// Every person of `emulator` performs the clip, retargeted to its skeleton, interpolated
-// between frames and repeated in a loop; bodies that share no bone with the clip, such as props,
-// move as before. Without any person it is an error. Cold.
-Result<Motion> clip_motion(const std::filesystem::path& path, const drivers::Emulator& emulator);
+// The people of `emulator` perform the clips, the first person the first clip, and those behind the
+// last clip begin with the first again: retargeted to their skeletons, interpolated between frames
+// and repeated in a loop. Bodies that share no bone with their clip, such as props, move as before.
+// Fewer people than clips are an error. Cold.
+Result<Motion> clip_motion(const std::vector<std::filesystem::path>& paths,
+                           const drivers::Emulator& emulator);
 
 // SyntheticSigner: an emulated glove with a clip as its hand motion, on its own thread; the live
 // hand of the demo. It goes from labels through angles to the glove's bytes on a pseudo-terminal;

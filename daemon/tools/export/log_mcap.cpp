@@ -17,6 +17,8 @@
 #include "daemon/publish/published_stream.hpp"
 #include "daemon/tools/replay/replay.hpp"
 #include "daemon/tools/replay/stream_info.hpp"
+#include "models/motion/ros_frames.hpp"
+#include "posed/foxglove/frame_transforms.pb.h"
 #include "proto/frame/whole_file.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
@@ -294,6 +296,7 @@ class LogToMcap {
         skeleton_schema_(add_schema(*v1::Skeleton::descriptor())),
         sample_schema_(add_schema(*v1::Sample::descriptor())),
         event_schema_(add_schema(*v1::Event::descriptor())),
+        transforms_schema_(add_schema(*foxglove::FrameTransforms::descriptor())),
         parts_(replay.streams()) {}
 
   void add(const pipeline::Item& item) {
@@ -321,8 +324,15 @@ class LogToMcap {
   // A stream of the log under one of its two names.
   struct Named {
     Named(const std::string& name, const publish::StreamInfo& info, bool unstyled)
-        : channel(name, info, unstyled) {}
+        : channel(name, info, unstyled),
+          skeleton(unstyled ? info.description.skeleton : info.skeleton),
+          tf_topic("tf/" + name) {
+      if (skeleton != nullptr) frame_names = motion::ros_frame_names(name, *skeleton);
+    }
     publish::Channel channel;
+    std::shared_ptr<const Skeleton> skeleton;  // null if it has none
+    std::string tf_topic;
+    std::vector<std::string> frame_names;  // [joint]
     std::uint64_t last_frame = 0, last_sample = 0;
   };
   struct Part {
@@ -354,10 +364,12 @@ class LogToMcap {
       found = topics_.emplace(topic, writer_.add_channel(schema, topic)).first;
     }
     message.SerializeToString(&bytes_);
-    const std::int64_t utc_ns =
-        replay::is_possible_time(time_ns) ? time_ns + offset_ns_ : offset_ns_;
     writer_.add(found->second, static_cast<std::uint32_t>(sequence),
-                static_cast<std::uint64_t>(utc_ns), bytes_);
+                static_cast<std::uint64_t>(utc_of(time_ns)), bytes_);
+  }
+
+  [[nodiscard]] std::int64_t utc_of(std::int64_t time_ns) const {
+    return replay::is_possible_time(time_ns) ? time_ns + offset_ns_ : offset_ns_;
   }
 
   void take_frame(const Frame& frame, bool raw) {
@@ -371,6 +383,31 @@ class LogToMcap {
     from.last_frame = header.sequence;
     add(from.channel.pose_topic, frame_schema_, header.sequence, header.arrival_ns,
         from.channel.frames.encode(frame));
+    if (from.skeleton == nullptr || frame.joint_count != from.frame_names.size()) return;
+    fill_transforms(from, frame);
+    add(from.tf_topic, transforms_schema_, header.sequence, header.arrival_ns, transforms_);
+  }
+
+  void fill_transforms(const Named& from, const Frame& frame) {
+    const auto frames = motion::ros_frames(*from.skeleton, frame);
+    const std::int64_t utc_ns = utc_of(frame.header.arrival_ns);
+    transforms_.Clear();  // keeps its memory
+    for (std::size_t j = 0; j < frames.size(); ++j) {
+      foxglove::FrameTransform& one = *transforms_.add_transforms();
+      one.mutable_timestamp()->set_seconds(utc_ns / kNanosPerSecond);
+      one.mutable_timestamp()->set_nanos(static_cast<std::int32_t>(utc_ns % kNanosPerSecond));
+      const int parent = from.skeleton->joints[j].parent;
+      one.set_parent_frame_id(parent < 0 ? motion::kRosWorld : from.frame_names[parent]);
+      one.set_child_frame_id(from.frame_names[j]);
+      const auto& [at, turn] = frames[j];
+      one.mutable_translation()->set_x(at.x());
+      one.mutable_translation()->set_y(at.y());
+      one.mutable_translation()->set_z(at.z());
+      one.mutable_rotation()->set_x(turn.x());
+      one.mutable_rotation()->set_y(turn.y());
+      one.mutable_rotation()->set_z(turn.z());
+      one.mutable_rotation()->set_w(turn.w());
+    }
   }
 
   void take_sample(const Sample& sample) {
@@ -401,10 +438,11 @@ class LogToMcap {
   const replay::Replay& replay_;
   std::int64_t offset_ns_;
   McapWriter writer_;
-  std::uint16_t frame_schema_, skeleton_schema_, sample_schema_, event_schema_;
+  std::uint16_t frame_schema_, skeleton_schema_, sample_schema_, event_schema_, transforms_schema_;
   std::vector<Part> parts_;  // [stream]
   std::map<std::string, std::uint16_t> topics_;
   std::string bytes_;
+  foxglove::FrameTransforms transforms_;
   std::uint64_t left_out_ = 0;
 };
 

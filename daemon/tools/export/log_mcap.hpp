@@ -87,7 +87,8 @@ struct McapSummary {
 };
 
 // Writes pose/<stream>, skeleton/<stream>, sensor/<stream> and event/<stream> of every stream, in
-// the order in which they were published, as protobuf messages whose schema is in the file. The
+// the order in which they were published, as protobuf messages whose schema is in the file; and
+// tf/<stream>, the poses again as foxglove.FrameTransforms, which a 3D view shows (ros_frames). The
 // time of a message is its arrival or that of the event, in UTC if the log knows how its clock
 // relates to it. A pose that was repeated while its stream was stale is left out, and so are events
 // that no pipeline made: takes, devices that come and go, the recorder's own. Frames go to the file

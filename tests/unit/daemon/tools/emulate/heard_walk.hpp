@@ -64,10 +64,10 @@ class EmulatedHost {
 
 // The frames of all bodies during this time; nothing may be damaged or out of order.
 inline std::vector<ReceivedPose> receive_walk(const drivers::Driver& driver,
-                                              const std::filesystem::path& bvh,
+                                              const std::vector<std::filesystem::path>& clips,
                                               std::int64_t length_ns) {
   const auto emulator = driver.emulate({}).value();
-  const emulate::Motion motion = emulate::clip_motion(bvh, *emulator).value();
+  const emulate::Motion motion = emulate::clip_motion(clips, *emulator).value();
   EmulatedHost host(driver);
   std::vector<ReceivedPose> all;
   std::int64_t posed_ns = 0, posed_before_ns = 0;

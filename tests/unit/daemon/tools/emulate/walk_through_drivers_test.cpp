@@ -72,7 +72,7 @@ class Walk {
 
   // The frames of the first person, with a time for the filter.
   [[nodiscard]] std::vector<ReceivedPose> through(const drivers::Driver& driver) const {
-    std::vector<ReceivedPose> all = test::receive_walk(driver, path(), kLength_ns);
+    std::vector<ReceivedPose> all = test::receive_walk(driver, {path()}, kLength_ns);
     std::erase_if(all, [](const ReceivedPose& received) {  // props
       return Turns(*received.skeleton, received.frame).there.count() < 5;
     });
@@ -238,6 +238,36 @@ TEST_CASE("a recorded walk passes through every mocap system as it was, and take
   const auto recording = test::shared("data/cmu/07_01.amc");
   if (!recording) SKIP_WITHOUT_SHARED();
   check(Walk(clip::read_clip(*recording).value()));
+}
+
+TEST_CASE("each person of a device performs a clip of its own") {
+  const test::TempFolder folder;
+  const auto one = folder.path() / "one.bvh", two = folder.path() / "two.bvh";
+  REQUIRE(clip::write_bvh(motion::make_walker({.seconds = 3.0}).value(), one));
+  REQUIRE(clip::write_bvh(
+      motion::make_walker({.family = WalkerFamily::kSway, .seconds = 3.0}).value(), two));
+  const drivers::Driver& mvn = *drivers::find_driver("mvn");
+  const auto both = test::receive_walk(mvn, {one, two}, kNanosPerSecond);
+  const auto same = test::receive_walk(mvn, {two}, kNanosPerSecond);
+  REQUIRE(both.size() == same.size());
+  REQUIRE(both.front().body != both.back().body);
+  int first = 0, second = 0;
+  for (std::size_t i = 0; i < both.size(); ++i) {
+    REQUIRE(both[i].body == same[i].body);
+    const bool equal = both[i].frame.rotation_xyzw == same[i].frame.rotation_xyzw;
+    if (both[i].body == both.front().body) {
+      first += equal ? 0 : 1;
+    } else {
+      second += equal ? 0 : 1;
+    }
+  }
+  CHECK(first > 0);    // it performs the first clip, not the second
+  CHECK(second == 0);  // it performs the second clip in both
+
+  const auto emulator = mvn.emulate({}).value();
+  const auto crowd = clip_motion({one, one, one, one, one, one}, *emulator);
+  REQUIRE_FALSE(crowd);
+  CHECK(crowd.error().message == "the device has fewer people than there are clips: name 2 clips");
 }
 
 }  // namespace posed::emulate

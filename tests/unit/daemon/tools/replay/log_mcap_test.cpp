@@ -9,6 +9,7 @@
 #include <google/protobuf/dynamic_message.h>
 
 #include "daemon/tools/export/log_mcap.hpp"
+#include "posed/foxglove/frame_transforms.pb.h"
 #include "proto/log/reader.hpp"
 #include "tests/support/file_text.hpp"
 #include "tests/support/has.hpp"
@@ -59,7 +60,8 @@ TEST_CASE("an MCAP holds every published frame of a log, byte for byte") {
   CHECK(summary->warnings.empty());
   const McapReader mcap(file_text(out));
   CHECK(mcap.messages.size() == summary->messages);
-  CHECK(summary->topics == 10);  // pose and skeleton of two streams, styled and raw; their events
+  // Pose, skeleton and transforms of two streams, styled and raw; their events.
+  CHECK(summary->topics == 14);
   const auto reader = log::Reader::open(log);
   REQUIRE(reader);
   const std::int64_t offset_ns = std::stoll(reader->meta().at("monotonic_to_utc_ns"));
@@ -88,6 +90,20 @@ TEST_CASE("an MCAP holds every published frame of a log, byte for byte") {
       REQUIRE(first.ParseFromString(made.front()->data));
       CHECK(skeleton.id() == first.skeleton_id());
       CHECK(skeletons.front() < made.front());
+      const auto shown = of_topic(mcap, "tf/" + name);
+      REQUIRE(shown.size() == made.size());
+      foxglove::FrameTransforms transforms;
+      REQUIRE(transforms.ParseFromString(shown.back()->data));
+      REQUIRE(transforms.transforms_size() == skeleton.joint_name_size());
+      CHECK(shown.back()->schema == "foxglove.FrameTransforms");
+      CHECK(shown.back()->log_ns == made.back()->log_ns);
+      const auto& root = transforms.transforms(0);
+      CHECK(root.parent_frame_id() == "world");
+      CHECK(root.child_frame_id() == name + "/" + skeleton.joint_name(0));
+      v1::Frame last;
+      REQUIRE(last.ParseFromString(made.back()->data));
+      CHECK(root.rotation().x() == Approx(last.rotation_xyzw(2)).margin(1e-6));
+      CHECK(root.rotation().y() == Approx(last.rotation_xyzw(0)).margin(1e-6));
     }
   }
 }
