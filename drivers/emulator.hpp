@@ -26,6 +26,9 @@ class Emulator {
   // body that it does not have. It never changes.
   [[nodiscard]] virtual const Skeleton* skeleton(std::size_t /*body*/) const { return nullptr; }
 
+  // Adds a person behind its bodies, if the device can have one more; only before the first record.
+  virtual bool add_person() { return false; }
+
   // Sets the pose of one of its bodies from now on: a frame of that skeleton, or of a hand
   // (proto/frame/hand_skeleton.hpp). A body that it does not have is ignored.
   virtual void pose(std::size_t body, const Frame& frame) = 0;

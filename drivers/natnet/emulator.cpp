@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <string>
+#include <utility>
 
 #include "drivers/byte_reader.hpp"
 #include "drivers/byte_writer.hpp"
@@ -18,6 +20,9 @@ constexpr std::uint64_t kEmulatedClock_hz = 10'000'000;
 constexpr double kEmulatedStep_hz = 0.9;  // double steps a second
 constexpr double kEmulatedPath_m = 1.0;   // radius of the circle
 constexpr double kEmulatedLap_s = 12.0;
+constexpr std::size_t kWandBody = 1;
+constexpr std::size_t kMaxAdded = 4;  // people
+constexpr std::int32_t kFirstAddedId = 100;
 
 // The server's computer has been on for an hour.
 std::uint64_t ticks_at(std::int64_t time_ns) {
@@ -39,13 +44,35 @@ Quatf about(Axis axis, double angle_rad) { return from_eigen(axis_rotation(axis,
 NatNetEmulator::NatNetEmulator(const Settings& settings)
     : settings_(settings), frames_(nanoseconds(1.0 / settings.rate_hz)) {
   if (!settings_.version.known()) settings_.version = {3, 1};
-  layout_ = layout_of(emulated_model(), settings_.version);
+  poses_.resize(emulated_model().bodies.size());
+  learn_bodies();
+  frames_.start(0);
+}
+
+void NatNetEmulator::learn_bodies() {
+  layout_ = layout_of(bodies(), settings_.version);
   for (std::size_t body = 0; body < poses_.size(); ++body) {
     const std::size_t joints = layout_->bodies[body].skeleton->joints.size();
     poses_[body].rotation_xyzw.assign(joints, kIdentity);
     poses_[body].valid.assign(joints, true);
   }
-  frames_.start(0);
+}
+
+bool NatNetEmulator::add_person() {
+  if (poses_.size() > kMaxAdded + kWandBody) return false;
+  poses_.emplace_back().root_m = {0.0F, 0.95F, 0.0F};
+  learn_bodies();
+  return true;
+}
+
+ModelDef NatNetEmulator::bodies() const {
+  ModelDef all = emulated_model();
+  for (std::size_t body = all.bodies.size(); body < poses_.size(); ++body) {
+    const auto number = static_cast<std::int32_t>(body);
+    all.bodies.push_back(average_person("Person" + std::to_string(number), kFirstAddedId + number,
+                                        1.0F, /*fingers=*/true));
+  }
+  return all;
 }
 
 const Skeleton* NatNetEmulator::skeleton(std::size_t body) const {
@@ -107,8 +134,8 @@ void NatNetEmulator::set_wand(bool present) {
 }
 
 ModelDef NatNetEmulator::model() const {
-  ModelDef model = emulated_model();
-  if (!wand_) model.bodies.resize(1);
+  ModelDef model = bodies();
+  if (!wand_) model.bodies.erase(model.bodies.begin() + kWandBody);
   for (BodyDef& body : model.bodies) {
     for (BoneDef& bone : body.bones) bone.offset_m = to_motive(bone.offset_m, settings_.z_up);
   }
@@ -131,7 +158,9 @@ void NatNetEmulator::emit(std::int64_t now_ns, Bytes& out) {
                        .received_ticks = ticks_at(time_ns) + 1000,
                        .sent_ticks = ticks_at(time_ns) + 2000,
                        .bodies_changed = std::exchange(changed_, false)};
-    packet.skeletons.push_back(person());
+    for (std::size_t body = 0; body < poses_.size(); ++body) {
+      if (body != kWandBody) packet.skeletons.push_back(person(body));
+    }
     if (wand_) add_wand(packet);
     const bool timestamp = settings_.version >= Version{2, 6};  // Motive 1.5 sends none
     datagram = encode_frame(packet, {.version = settings_.version, .timestamp = timestamp});
@@ -161,15 +190,15 @@ void NatNetEmulator::move(double time_s) {
     turn(Bone::kRightLowerLeg, about(Axis::kX, std::max(0.0, -swing)));
     turn(Bone::kLeftIndexProximal, about(Axis::kZ, -std::abs(swing)));
   }
-  if (Pose& pose = poses_[1]; !pose.posed) {
+  if (Pose& pose = poses_[kWandBody]; !pose.posed) {
     pose.root_m = {0.5F, 1.2F, -0.5F};
     pose.rotation_xyzw[0] = about(Axis::kY, -lap);
   }
 }
 
-SkeletonPacket NatNetEmulator::person() const {
-  const Pose& pose = poses_[0];
-  const auto& table = static_cast<const NatNetLayout&>(*layout_).tables[0];
+SkeletonPacket NatNetEmulator::person(std::size_t body) const {
+  const Pose& pose = poses_[body];
+  const auto& table = static_cast<const NatNetLayout&>(*layout_).tables[body];
   const bool local = settings_.coordinates == Coordinates::kLocal;
   SkeletonPacket packet{.id = table.id};
   std::vector<Eigen::Vector3d> at_m;
@@ -197,7 +226,7 @@ SkeletonPacket NatNetEmulator::person() const {
 }
 
 void NatNetEmulator::add_wand(FramePacket& packet) const {
-  const Pose& pose = poses_[1];
+  const Pose& pose = poses_[kWandBody];
   packet.rigid_bodies.push_back({.id = kWandId,
                                  .position_m = to_motive(pose.root_m, settings_.z_up),
                                  .rotation_xyzw = to_motive(pose.rotation_xyzw[0], settings_.z_up),

@@ -2,7 +2,6 @@
 // host's command socket (0) and streams to its data socket (1), as over multicast to all.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -20,8 +19,10 @@ class NatNetEmulator final : public Emulator {
   // An unknown version is 3.1, automatic coordinates are global.
   explicit NatNetEmulator(const Settings& settings);
 
-  // Body 0 is the person, 1 the wand. A posed body no longer moves by itself.
+  // Body 0 is the person, 1 the wand, then come those that were added, who stand until they are
+  // posed. A posed body no longer moves by itself.
   [[nodiscard]] const Skeleton* skeleton(std::size_t body) const override;
+  bool add_person() override;
   void pose(std::size_t body, const Frame& frame) override;
   void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
   [[nodiscard]] std::int64_t next_due_ns() const override { return frames_.due_ns(); }
@@ -42,14 +43,18 @@ class NatNetEmulator final : public Emulator {
     bool posed = false;  // by pose()
   };
 
+  // All bodies, in posed's axes.
+  [[nodiscard]] ModelDef bodies() const;
+  // Those that are there, in Motive's.
   [[nodiscard]] ModelDef model() const;
+  void learn_bodies();
   void move(double time_s);
-  [[nodiscard]] SkeletonPacket person() const;
+  [[nodiscard]] SkeletonPacket person(std::size_t body) const;
   void add_wand(FramePacket& packet) const;
 
   Settings settings_;
   std::unique_ptr<const SourceLayout> layout_;
-  std::array<Pose, 2> poses_;
+  std::vector<Pose> poses_;  // [body]
   emulate::Pace frames_;
   bool described_ = false;
   bool wand_ = true;

@@ -44,7 +44,7 @@ class Performer {
   std::atomic<bool> sways{false};
 
  private:
-  static emulate::Motion motion_of(const Stage& stage, const drivers::Emulator& emulator,
+  static emulate::Motion motion_of(const Stage& stage, drivers::Emulator& emulator,
                                    const std::string& name, WalkerFamily family) {
     const auto walk = motion::make_walker({.family = family, .seconds = 60.0}).value();
     REQUIRE(clip::write_bvh(walk, stage.path(name + ".bvh")));

@@ -46,7 +46,7 @@ void pose_bodies(Performance& performance, double time_s, drivers::Emulator& emu
 }  // namespace
 
 Result<Motion> clip_motion(const std::vector<std::filesystem::path>& paths,
-                           const drivers::Emulator& emulator) {
+                           drivers::Emulator& emulator) {
   auto performances = std::make_shared<std::vector<Performance>>();
   for (const auto& path : paths) {
     auto clip = TRY(clip::read_clip(path));
@@ -54,11 +54,12 @@ Result<Motion> clip_motion(const std::vector<std::filesystem::path>& paths,
   }
   std::size_t people = 0;
   for (std::size_t body = 0; body < kMaxBodies; ++body) {
-    const Skeleton* skeleton = emulator.skeleton(body);
-    if (skeleton == nullptr) continue;
+    const bool more = people < paths.size();
+    if (emulator.skeleton(body) == nullptr && !(more && emulator.add_person())) continue;
     Performance& performance = (*performances)[people % performances->size()];
+    const Skeleton& skeleton = *emulator.skeleton(body);
     auto retarget = motion::Retarget::bind(performance.clip.skeleton,
-                                           std::make_shared<const Skeleton>(*skeleton));
+                                           std::make_shared<const Skeleton>(skeleton));
     if (!retarget) continue;  // a prop
     performance.performers.push_back({.body = body, .retarget = std::move(*retarget), .pose = {}});
     ++people;

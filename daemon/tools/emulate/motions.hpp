@@ -16,9 +16,9 @@ namespace posed::emulate {
 // The people of `emulator` perform the clips, the first person the first clip, and those behind the
 // last clip begin with the first again: retargeted to their skeletons, interpolated between frames
 // and repeated in a loop. Bodies that share no bone with their clip, such as props, move as before.
-// Fewer people than clips are an error. Cold.
+// With more clips than people it gets more, if the device can have them. Cold.
 Result<Motion> clip_motion(const std::vector<std::filesystem::path>& paths,
-                           const drivers::Emulator& emulator);
+                           drivers::Emulator& emulator);
 
 // SyntheticSigner: an emulated glove with a clip as its hand motion, on its own thread; the live
 // hand of the demo. It goes from labels through angles to the glove's bytes on a pseudo-terminal;
