@@ -24,3 +24,4 @@ await build({
 for (const name of ['index.html', 'icon.svg']) await copyFile(join(here, name), join(folder, name));
 await writeFile(join(folder, 'mannequin.vrm'), mannequin());
 await writeFile(join(folder, 'mannequin-coarse.vrm'), mannequin(COARSE));
+if (!process.argv.includes('--no-camera')) await buildCamera(here, folder);

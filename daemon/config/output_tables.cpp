@@ -310,7 +310,7 @@ void OutputReader::read_ros2(TableReader& table, OutputConfig& output) const {
   if (!is_interface(output.interface)) {
     table.add_error("interface", "name one network interface, as `ip -4 address` does");
   }
-  if (table.has("topic") && !is_topic(output.topic)) {
+  if (!output.topic.empty() && !is_topic(output.topic)) {
     table.add_error("topic",
                     "a topic is words of letters, digits and '_' with '/' between them,"
                     " like hand_controller/joint_trajectory");

@@ -261,9 +261,8 @@ TEST_CASE("the configs of stages are sound") {
     INFO(checked.out << checked.err);
     CHECK(checked.code == 0);
   }
-  const auto relay =
-      posed({"relay", "--from", "tcp://127.0.0.1:9", "--bind", "tcp://127.0.0.1:*", "--security",
-             (folder / "relay.toml").string(), "--seconds", "0.2"});
+  const auto relay = posed({"relay", "--from", "tcp://127.0.0.1:9", "--bind", "tcp://127.0.0.1:*",
+                            "--security", (folder / "relay.toml").string(), "--seconds", "0.2"});
   INFO(relay.err);
   CHECK(relay.code == 0);
 }

@@ -87,8 +87,8 @@ TEST_CASE("completion is generated from the existing commands") {
   CHECK(bash.code == 0);
   CHECK(has(
       bash.out,
-      "'posed ctl') words='set warm-up model models use-model teach play stop-playing "
-      "engage release calibrate haptics take "
+      "'posed ctl') words='set warm-up model models use-model rename-model delete-model recordings "
+      "teach play stop-playing engage release calibrate haptics take "
       "status stop --help --connect"));
   CHECK(has(posed({"completion", "zsh"}).out, "#compdef posed"));
   CHECK(has(posed({"completion", "fish"}).out, "-l 'connect'"));

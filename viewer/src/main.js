@@ -81,6 +81,8 @@ class Page {
       () => this.hello?.connect ?? '',
     );
     this.takes = new Takes(find('.takes'), control, (...words) => acks.say(...words));
+    this.camera = new CameraPanel((message) => this.connection.sendText(message));
+    find('.streams').after(this.camera.element);
     this.help = new Help(find('#help'), find('#help-button'));
     this.avatars = new Avatars(
       world,

@@ -128,7 +128,10 @@ Result<> fence_all(const DdsPlace& place, std::uint32_t own,
 
 std::string settings_of(const DdsPlace& place, const std::string& own) {
   std::string peers;
-  for (const std::string& peer : place.peers) peers += "<Peer address=\"" + peer + "\"/>";
+  for (const std::string& peer : place.peers) {
+    const auto host = drivers::parse_host(peer);  // in numbers, so that names mean one computer
+    if (host) peers += "<Peer address=\"" + drivers::host_text(*host) + "\"/>";
+  }
   return "<CycloneDDS><Domain Id=\"any\"><General><Interfaces><NetworkInterface name=\"" +
          place.interface +
          "\" multicast=\"false\"/></Interfaces><AllowMulticast>false</AllowMulticast></General>"

@@ -42,8 +42,9 @@ slide_cm_s: speed over the ground of ankles and toes that stand (slower than 10 
 unstyled walk; of the target: in itself); height_error_cm, speed_error_m_s: how far the mean cycle
 of the hips' height above the ground and of their speed is from the target's, in the size of the
 source's figure; direction_error_deg: the same of the directions of arms, legs and trunk; their
-floor is how far the two halves of the target are from each other; sink_cm: how far the lowest styled toe is below the
-lowest unstyled one; root_speed_m_s: of the root over the ground, median over a stride's time.
+floor is how far the two halves of the target are from each other; sink_cm: how far the lowest
+styled toe is below the lowest unstyled one; root_speed_m_s: of the root over the ground, median
+over a stride's time.
 The last line is the verdict; the exit code is 1 when the model is no better than nothing.)";
 
 constexpr double kCentimetres = 100.0;  // of a metre

@@ -141,12 +141,14 @@ class Bridge::Parts {
   static Result<std::unique_ptr<Parts>> open(const BridgeOptions& options) {
     auto page = TRY(PageFiles::load(options.page));
     auto context = TRY(net::open_context());
+    const bool camera = page.has_camera();
     std::unique_ptr<Parts> parts(new Parts(
         std::move(context),
         {.files = std::move(page), .token = options.token.empty() ? random_token() : options.token},
         {.version = POSED_VERSION,
          .connect = options.link.publish.endpoint,
-         .same_machine = net::is_loopback(options.link.publish.endpoint)}));
+         .same_machine = net::is_loopback(options.link.publish.endpoint),
+         .camera = camera}));
     parts->link_ =
         TRY(DaemonLink::open(parts->io_, parts->context_.get(), options.link, parts->hub_));
     const auto address = TRY(address_of(options.address));

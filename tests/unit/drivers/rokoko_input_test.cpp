@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "drivers/driver.hpp"
+#include "drivers/json_reader.hpp"
 #include "drivers/rokoko/decoder.hpp"
 #include "drivers/rokoko/emulator.hpp"
-#include "drivers/json_reader.hpp"
 #include "drivers/rokoko/lz4_frame.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"

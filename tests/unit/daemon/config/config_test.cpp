@@ -512,7 +512,7 @@ TEST_CASE("the shipped config contains every key with its default") {
     INFO("config/posed.toml: " << b.sources[0].driver << "." << option.name);
     CHECK((b.sources[0].options.at(std::string(option.name)) == option.default_value));
   }
-  REQUIRE(b.outputs.size() == 7);
+  REQUIRE(b.outputs.size() == 8);
   const OutputConfig no_output;
   CHECK(b.outputs[0].left_hand == no_output.left_hand);
   CHECK(b.outputs[0].right_hand == no_output.right_hand);
@@ -527,6 +527,11 @@ TEST_CASE("the shipped config contains every key with its default") {
   CHECK(b.outputs[6].peers == no_output.peers);
   CHECK(b.outputs[6].group == no_output.group);
   CHECK(b.outputs[6].data_port == no_output.data_port);
+  CHECK(b.outputs[7].domain == no_output.domain);
+  CHECK(b.outputs[7].interface == no_output.interface);
+  CHECK(b.outputs[7].peers == no_output.peers);
+  CHECK(b.outputs[7].topic == no_output.topic);
+  CHECK(b.outputs[7].trajectory == no_output.trajectory);
 }
 
 }  // namespace

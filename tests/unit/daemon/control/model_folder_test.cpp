@@ -87,8 +87,8 @@ TEST_CASE("a model tells what it was learnt from; what is no model tells that") 
   auto model = test::toy_model(1, 0.3);
   model.from = "walk";
   model.to = "sneak";
-  model.report_json =
-      R"({"clips":[{"subject":"ann","day":"1"},{"subject":"ann","day":"1"},7],"verdict":"closes 9 %"})";
+  model.report_json = R"({"clips":[{"subject":"ann","day":"1"},{"subject":"ann","day":"1"},7],)"
+                      R"("verdict":"closes 9 %"})";
   const auto words = words_of_model(style::serialize_model(model), "style", "a.style");
   CHECK(words.learnt == "walk -> sneak, from 2 clips of ann on day 1");
   CHECK(words.verdict == "closes 9 %");
