@@ -13,7 +13,8 @@ namespace posed::robot {
 namespace {
 
 constexpr double kDefaultSpeed_rad_s = 8.0;
-constexpr double kGuessedTip_m = 8e-3;  // radius of a finger tip without a shape
+constexpr std::size_t kMaxShapes = 256;  // each becomes up to four capsules, which all are compared
+constexpr double kGuessedTip_m = 8e-3;   // radius of a finger tip without a shape
 
 // Rounded into the range, so that no angle of a frame is beyond a limit by its rounding.
 double low_float(double value) {
@@ -79,6 +80,12 @@ class Builder {
     if (hand_.links.size() > static_cast<std::size_t>(kMaxJoints)) {
       return refuse("the robot has " + std::to_string(hand_.links.size()) +
                     " links; posed drives hands of at most 96");
+    }
+    std::size_t shapes = 0;
+    for (const Link& link : hand_.links) shapes += link.shapes.size();
+    if (shapes > kMaxShapes) {
+      return refuse("its links have " + std::to_string(shapes) +
+                    " collision shapes; posed keeps at most 256 apart: simplify them");
     }
     hand_.joint_of_link.assign(hand_.links.size(), -1);
     for (int l = 1; l < std::ssize(hand_.links); ++l) {
