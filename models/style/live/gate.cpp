@@ -131,7 +131,7 @@ RT_SAFE void Gate::follow(double dt_s) noexcept {
 
 RT_SAFE void Gate::settle() noexcept {
   if (fresh_) stage_.fill(1.0);
-  stride_.forget_cadence();
+  stride_.turn_back();
 }
 
 }  // namespace posed::style

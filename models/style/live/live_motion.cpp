@@ -94,6 +94,11 @@ RT_SAFE void LiveStride::keep_turn(double dt_s) noexcept {
   turns_ = turns_ + 1 < 2 * kTurns ? turns_ + 1 : kTurns;
 }
 
+RT_SAFE void LiveStride::turn_back() noexcept {
+  forget_cadence();
+  fastest_rad_.fill(*std::ranges::max_element(fastest_rad_));
+}
+
 // A pose of long steps that is held has a level but no speed.
 double LiveStride::swing_rad() const noexcept {
   return std::min(std::hypot(level_rad_, speed_rad_), *std::ranges::max_element(fastest_rad_));

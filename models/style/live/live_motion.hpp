@@ -74,6 +74,9 @@ class LiveStride {
 
   // Starts the cadence anew: cadence_rad_s() is unknown until 0.3 s from now.
   void forget_cadence() noexcept { turns_ = 0; }
+  // From the next value on time runs the other way. Legs that turn round with it are slow for twice
+  // as long as those that walk, and must not seem to rest.
+  void turn_back() noexcept;
 
  private:
   struct Turn {
