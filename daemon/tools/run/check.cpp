@@ -29,11 +29,15 @@ struct CheckOptions {
   bool json = false;
 };
 
-// A parameter as the config writes it.
+// A parameter as the config writes it. Of a file that has been read only the size is shown.
 template <typename T>
 void add_parameter(const ParameterSpec& spec, const T& value, Findings& parameters) {
   if constexpr (std::is_same_v<T, double>) {
     parameters.add(std::string(spec.shown_name()), value * spec.display_scale);
+  } else if constexpr (std::is_same_v<T, std::string>) {
+    const bool is_read = spec.is_path && value.contains('\n');
+    parameters.add(std::string(spec.shown_name()),
+                   is_read ? fmt::format("a file of {} bytes", value.size()) : value);
   } else {
     parameters.add(std::string(spec.shown_name()), value);
   }
