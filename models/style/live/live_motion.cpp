@@ -66,6 +66,7 @@ double LiveGait::correlation() const noexcept {
 RT_SAFE void LiveStride::update(double leg_rad, double dt_s, double cadence_rad_s) noexcept {
   if (!started_) level_rad_ = leg_rad;
   started_ = true;
+  leg_rad_ = leg_rad;
   if (dt_s <= 0.0) return;
   const double step_rad = -std::expm1(-dt_s / kSmooth_s) * (leg_rad - level_rad_);
   level_rad_ += step_rad;
@@ -97,6 +98,8 @@ RT_SAFE void LiveStride::keep_turn(double dt_s) noexcept {
 RT_SAFE void LiveStride::turn_back() noexcept {
   forget_cadence();
   fastest_rad_.fill(*std::ranges::max_element(fastest_rad_));
+  level_rad_ = 2.0 * leg_rad_ - level_rad_;  // as if the low-pass had come from the other side
+  speed_rad_ = -speed_rad_;
 }
 
 // A pose of long steps that is held has a level but no speed.

@@ -89,7 +89,8 @@ class LiveStride {
   void keep_turn(double dt_s) noexcept;
 
   bool started_ = false;
-  double level_rad_ = 0.0;  // the signal, smoothed
+  double leg_rad_ = 0.0;    // the signal
+  double level_rad_ = 0.0;  // smoothed
   double speed_rad_ = 0.0;  // its speed over the cadence
   std::array<double, kParts> fastest_rad_{};
   double part_s_ = 0.0;  // of the newest part

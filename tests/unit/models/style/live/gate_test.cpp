@@ -284,3 +284,26 @@ TEST_CASE("live strides: swing and cadence of a walk, none of rest, held steps o
     CHECK(std::isnan(walk.cadence_rad_s()));
   }
 }
+
+TEST_CASE("legs do not rest where time turns round, in any phase and at any rate",
+          "[style][gate]") {
+  const double cadence = kTurn_rad / 1.1;
+  for (const int rate_hz : {30, 60, 120}) {
+    for (int eighth = 0; eighth < 8; ++eighth) {
+      INFO(rate_hz << " Hz, " << eighth << " eighths");
+      const auto leg_rad = [&](int frame) {
+        return 0.6 * std::cos(kTurn_rad * eighth / 8.0 + cadence * frame / rate_hz);
+      };
+      style::LiveStride walk;
+      const double dt_s = 1.0 / rate_hz;
+      for (int i = 3 * rate_hz / 2; i >= 0; --i) walk.update(leg_rad(i), dt_s, cadence);
+      walk.turn_back();
+      double least_rad = 1.0;
+      for (int i = 1; i < rate_hz; ++i) {
+        walk.update(leg_rad(i), dt_s, cadence);
+        least_rad = std::min(least_rad, walk.swing_rad());
+      }
+      CHECK(least_rad > 0.35);
+    }
+  }
+}
