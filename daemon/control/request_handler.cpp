@@ -542,7 +542,7 @@ void RequestHandler::apply(ControlledStream& stream, UnderWay& done) {
 }
 
 Result<ControlledStream*> RequestHandler::find_device(const std::string& name) {
-  const auto found = find_stream(name);
+  auto found = find_stream(name);
   if (found && !(*found)->source.empty()) {
     return fail(
         fmt::format("stream {} is a body of source {}; calibrations and haptics are for gloves",
