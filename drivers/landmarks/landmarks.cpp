@@ -116,7 +116,8 @@ RT_SAFE Outcome LandmarksDecoder::emit(const TrackedHand& hand, Sink& sink) noex
 // Also again while what was described is not in use, because somebody may not have heard it.
 RT_SAFE void LandmarksDecoder::describe(std::int64_t now_ns, Sink& sink) noexcept {
   if (sides_ == std::byte{}) return;
-  const bool waits = layout_ == nullptr && now_ns - described_ns_ >= kAgain_ns;
+  const bool waits =
+      layout_ == nullptr && (described_ns_ == kNoTime_ns || now_ns - described_ns_ >= kAgain_ns);
   if (sides_ == described_ && !waits) return;
   described_ = sides_;
   described_ns_ = now_ns;
