@@ -8,12 +8,14 @@
 
 #include "models/robot/shapes.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/named_numbers.hpp"
 
 namespace posed::robot {
 namespace {
 
 constexpr double kDefaultSpeed_rad_s = 8.0;
 constexpr std::size_t kMaxShapes = 256;  // each becomes up to four capsules, which all are compared
+constexpr double kMaxNamed_rad = 100.0;  // that a text may name
 constexpr double kGuessedTip_m = 8e-3;   // radius of a finger tip without a shape
 
 // Rounded into the range, so that no angle of a frame is beyond a limit by its rounding.
@@ -241,21 +243,18 @@ class Builder {
 
   Result<std::map<int, double>> angles(const std::string& text, const std::string& what) const {
     std::map<int, double> angles;
-    for (const std::string& word : split(text)) {
-      const auto equals = word.find('=');
-      const int joint = find_joint(word.substr(0, equals));
-      char* end = nullptr;
-      const std::string number = equals == word.npos ? "" : word.substr(equals + 1);
-      const double value = std::strtod(number.c_str(), &end);
-      if (joint < 0 || number.empty() || *end != '\0') {
-        return refuse(what + " = " + in_quotes(word) +
+    const auto read = TRY(parse_named_numbers(text, what, -kMaxNamed_rad, kMaxNamed_rad));
+    for (const NamedNumber& one : read) {
+      const int joint = find_joint(one.name);
+      if (joint < 0) {
+        return refuse(what + " = " + in_quotes(one.name) +
                       " is no joint and angle; write \"JOINT=0.5\"");
       }
       const RobotJoint& at = hand_.joints[joint];
-      if (!(value >= at.low && value <= at.high)) {
+      if (!(one.number >= at.low && one.number <= at.high)) {
         return refuse(what + " puts joint " + in_quotes(at.name) + " beyond its limits");
       }
-      angles[joint] = value;
+      angles[joint] = one.number;
     }
     return angles;
   }

@@ -117,10 +117,7 @@ class Reader {
     }
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     pose.translation() = Eigen::Vector3d(xyz->data());
-    pose.linear() = (Eigen::AngleAxisd((*rpy)[2], Eigen::Vector3d::UnitZ()) *
-                     Eigen::AngleAxisd((*rpy)[1], Eigen::Vector3d::UnitY()) *
-                     Eigen::AngleAxisd((*rpy)[0], Eigen::Vector3d::UnitX()))
-                        .toRotationMatrix();
+    pose.linear() = turn_of_rpy(Eigen::Vector3d(rpy->data()));
     return pose;
   }
 

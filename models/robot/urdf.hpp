@@ -56,4 +56,12 @@ Result<Urdf> parse_urdf(std::string_view text, const std::string& file);
 // the text says all.
 Result<std::string> load_urdf(const std::string& path);
 
+// The rotation of a URDF's roll, pitch and yaw [rad]: about the fixed x, then y, then z.
+[[nodiscard]] inline Eigen::Matrix3d turn_of_rpy(const Eigen::Vector3d& rpy) {
+  return (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
+          Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
+          Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+
 }  // namespace posed::robot

@@ -142,10 +142,7 @@ void replace_mesh(pugi::xml_node collision, const std::filesystem::path& urdf) {
   const Eigen::Vector3d rpy = three(origin.attribute("rpy").value(), 0.0);
   Eigen::Isometry3d at = Eigen::Isometry3d::Identity();
   at.translation() = three(origin.attribute("xyz").value(), 0.0);
-  at.linear() = (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *
-                 Eigen::AngleAxisd(rpy.y(), Eigen::Vector3d::UnitY()) *
-                 Eigen::AngleAxisd(rpy.x(), Eigen::Vector3d::UnitX()))
-                    .toRotationMatrix();
+  at.linear() = turn_of_rpy(rpy);
   at = at * fit.at;
   const Eigen::Vector3d zyx = at.linear().eulerAngles(2, 1, 0);
   origin.remove_attributes();

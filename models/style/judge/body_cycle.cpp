@@ -9,7 +9,6 @@
 #include "models/feet/legs.hpp"
 #include "models/motion/kinematics.hpp"
 #include "models/style/model/harmonics.hpp"
-#include "models/style/model/stride_phase.hpp"
 
 namespace posed::style {
 namespace {
@@ -66,14 +65,7 @@ std::optional<WalkPhases> part_of(const WalkPhases& walk, double from, double to
 
 std::optional<WalkPhases> walk_phases(const motion::Motion& motion) {
   const auto leg = motion::leg_signal(motion);
-  if (!leg || !has_stride(motion.size(), motion.rate_hz)) return std::nullopt;
-  StridePhase strides = follow_strides(*leg, motion.rate_hz);
-  VectorXd phase = strides.phase(strides.strides);
-  if (phase.size() < 2 || phase[phase.size() - 1] - phase[0] < 2.0 * std::numbers::pi) {
-    return std::nullopt;
-  }
-  phase.array() -= first_harmonic_phase(phase, (*leg)(strides.strides));
-  return WalkPhases{.frames = std::move(strides.strides), .phase = std::move(phase)};
+  return leg ? walk_phases(*leg, motion.rate_hz) : std::nullopt;
 }
 
 std::optional<BodyCycle> body_cycle(const motion::Motion& motion, const WalkPhases& walk) {

@@ -9,16 +9,12 @@
 #include <Eigen/Core>
 
 #include "models/motion/motion.hpp"
+#include "models/style/model/stride_phase.hpp"
 #include "proto/frame/humanoid.hpp"
 
 namespace posed::style {
 
-// Frames of a walk and their phases, in which the leg signal is A cos(phase).
-struct WalkPhases {
-  std::vector<Eigen::Index> frames;
-  Eigen::VectorXd phase;  // [frames]
-};
-// Those that stride. Empty for a clip without legs, and for one without a whole stride.
+// Empty for a clip without legs, and for one without a whole stride.
 [[nodiscard]] std::optional<WalkPhases> walk_phases(const motion::Motion& motion);
 
 struct BodyCycle {

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -185,12 +184,11 @@ PoseCycle cycle_of_clip(const BoundModel& model, const clip::Clip& clip, double 
       gaps[d] += available[static_cast<std::size_t>(d)] == 0 ? 1 : 0;
     }
   }
-  const StridePhase strides = follow_strides(leg, clip.frame_rate_hz);
-  Eigen::VectorXd phase = strides.phase(strides.strides);
-  if (static_cast<double>(phase.size()) * strides.dtheta < 2.0 * std::numbers::pi) return {};
-  phase.array() -= first_harmonic_phase(phase, leg(strides.strides));
-  const Eigen::MatrixXd kept = q(strides.strides, Eigen::all);
-  PoseCycle cycle = (grid_basis() * fit_harmonics(phase, kept, kCycleHarmonics)).cast<float>();
+  const auto walk = walk_phases(leg, clip.frame_rate_hz);
+  if (!walk) return {};
+  const Eigen::MatrixXd kept = q(walk->frames, Eigen::all);
+  PoseCycle cycle =
+      (grid_basis() * fit_harmonics(walk->phase, kept, kCycleHarmonics)).cast<float>();
   for (Eigen::Index d = 0; d < dims; ++d) {
     if (gaps[d] > 0) cycle.col(d).setConstant(std::numeric_limits<float>::quiet_NaN());
   }

@@ -4,8 +4,8 @@
 #include <charconv>
 #include <string>
 
-#include "models/style/live/named_numbers.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/named_numbers.hpp"
 
 namespace posed::style {
 namespace {
@@ -47,7 +47,7 @@ bool set_part(Mask& mask, std::string_view name, double factor) {
 }  // namespace
 
 Result<Mask> mask_of(std::string_view text) {
-  const auto numbers = TRY(parse_named_numbers(text, "mask", 1.0));
+  const auto numbers = TRY(parse_named_numbers(text, "mask", 0.0, 1.0));
   Mask mask = whole_body();
   for (const NamedNumber& one : numbers) {
     if (set_part(mask, one.name, one.number)) continue;

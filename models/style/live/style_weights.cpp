@@ -5,8 +5,8 @@
 #include <cmath>
 #include <numeric>
 
-#include "models/style/live/named_numbers.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/named_numbers.hpp"
 
 namespace posed::style {
 namespace {
@@ -29,7 +29,7 @@ std::string listed_names(std::span<const std::string> names) {
 }
 
 Result<std::vector<NamedNumber>> parsed(std::string_view weights) {
-  auto numbers = TRY(parse_named_numbers(weights, "weights", kMaxWeight));
+  auto numbers = TRY(parse_named_numbers(weights, "weights", 0.0, kMaxWeight));
   const auto is_zero = [](const NamedNumber& one) { return one.number == 0.0; };
   if (!numbers.empty() && std::ranges::all_of(numbers, is_zero)) {
     return misuse("weights: all are 0, so there is nothing to mix; for no style, set alpha to 0");

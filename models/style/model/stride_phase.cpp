@@ -6,6 +6,8 @@
 #include <limits>
 #include <numbers>
 #include <numeric>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -255,6 +257,17 @@ StridePhase follow_strides(const VectorXd& signal, double rate_hz) {
   found.strides = striding_frames(signal, found, rate_hz);
   found.dtheta = cadence_of(found);
   return found;
+}
+
+std::optional<WalkPhases> walk_phases(const Eigen::VectorXd& signal, double rate_hz) {
+  if (!has_stride(static_cast<int>(signal.size()), rate_hz)) return std::nullopt;
+  StridePhase strides = follow_strides(signal, rate_hz);
+  WalkPhases walk{.frames = std::move(strides.strides), .phase = {}};
+  walk.phase = strides.phase(walk.frames);
+  const double turned_rad = static_cast<double>(walk.phase.size()) * strides.dtheta;
+  if (turned_rad < kFullTurn) return std::nullopt;
+  walk.phase.array() -= first_harmonic_phase(walk.phase, signal(walk.frames));
+  return walk;
 }
 
 }  // namespace posed::style

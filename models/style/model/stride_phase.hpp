@@ -2,6 +2,7 @@
 // and linked in time (README.md, "Stride"). Cold; thread-safe.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -23,5 +24,13 @@ struct StridePhase {
 // Follows the strides of a leg signal sampled at `rate_hz`: periods 0.6 to 2.6 s, no longer than
 // the signal. Needs has_stride() (harmonics.hpp).
 [[nodiscard]] StridePhase follow_strides(const Eigen::VectorXd& signal, double rate_hz);
+
+// The frames of a walk that stride and their phases, turned so that the signal is A cos(phase).
+struct WalkPhases {
+  std::vector<Eigen::Index> frames;
+  Eigen::VectorXd phase;  // [frames]
+};
+// Empty where the signal does not hold a whole stride.
+[[nodiscard]] std::optional<WalkPhases> walk_phases(const Eigen::VectorXd& signal, double rate_hz);
 
 }  // namespace posed::style

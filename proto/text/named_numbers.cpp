@@ -1,4 +1,4 @@
-#include "models/style/live/named_numbers.hpp"
+#include "proto/text/named_numbers.hpp"
 
 #include <algorithm>
 #include <charconv>
@@ -6,7 +6,7 @@
 
 #include "proto/text/clean.hpp"
 
-namespace posed::style {
+namespace posed {
 namespace {
 
 constexpr std::size_t kMaxText = 2048;  // bytes: sixteen names of any sensible length
@@ -18,20 +18,20 @@ std::string_view trimmed(std::string_view text) {
 }
 
 Result<double> number_in(std::string_view text, std::string_view entry, std::string_view what,
-                         double max) {
+                         double low, double high) {
   double number = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   const bool whole = error == std::errc() && end == text.data() + text.size();
-  if (whole && number >= 0.0 && number <= max) return number;  // false for NaN
-  std::string limit = std::to_string(static_cast<int>(max));
-  return misuse(std::string(what) + ": " + in_quotes(std::string(entry)) +
-                " needs a number from 0 to " + limit + " after the '='");
+  if (whole && number >= low && number <= high) return number;  // false for NaN
+  const auto whole_text = [](double limit) { return std::to_string(static_cast<int>(limit)); };
+  return misuse(std::string(what) + ": " + in_quotes(std::string(entry)) + " needs a number from " +
+                whole_text(low) + " to " + whole_text(high) + " after the '='");
 }
 
 }  // namespace
 
 Result<std::vector<NamedNumber>> parse_named_numbers(std::string_view text, std::string_view what,
-                                                     double max) {
+                                                     double low, double high) {
   if (text.size() > kMaxText) {
     return misuse(std::string(what) + ": the text has more than " + std::to_string(kMaxText) +
                   " bytes");
@@ -47,7 +47,7 @@ Result<std::vector<NamedNumber>> parse_named_numbers(std::string_view text, std:
       return misuse(std::string(what) + ": " + in_quotes(std::string(entry)) +
                     " is not NAME=NUMBER; write, for example, one=0.6,other=0.4");
     }
-    const auto number = TRY(number_in(trimmed(entry.substr(equals + 1)), entry, what, max));
+    const auto number = TRY(number_in(trimmed(entry.substr(equals + 1)), entry, what, low, high));
     if (std::ranges::find(found, name, &NamedNumber::name) != found.end()) {
       return misuse(std::string(what) + ": " + in_quotes(name) + " is named twice");
     }
@@ -57,4 +57,4 @@ Result<std::vector<NamedNumber>> parse_named_numbers(std::string_view text, std:
   }
 }
 
-}  // namespace posed::style
+}  // namespace posed

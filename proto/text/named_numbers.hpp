@@ -7,7 +7,7 @@
 
 #include "proto/frame/result.hpp"
 
-namespace posed::style {
+namespace posed {
 
 struct NamedNumber {
   std::string name;
@@ -15,9 +15,9 @@ struct NamedNumber {
 };
 
 // In the order of the text; blanks around names and numbers do not count, empty text has none.
-// `what` names the text in the error: "weights". Numbers are from 0 to `max`, and no name comes
-// twice.
+// `what` names the text in the error: "weights". Numbers are from `low` to `high`, which are
+// whole, and no name comes twice.
 Result<std::vector<NamedNumber>> parse_named_numbers(std::string_view text, std::string_view what,
-                                                     double max);
+                                                     double low, double high);
 
-}  // namespace posed::style
+}  // namespace posed
