@@ -49,6 +49,10 @@ Result<clip::ReadOptions> read_options(const Options& options) {
     read.up = up_from_text(up);
     if (!read.up) return misuse("up is +y, +z, -y, -z or +x");
   }
+  if (const auto facing = option<std::string>(options, "facing"); !facing.empty()) {
+    read.facing = axis_from_text(facing);
+    if (!read.facing) return misuse("facing is +x, -x, +y, -y, +z or -z");
+  }
   if (const auto unit = option<std::string>(options, "unit"); !unit.empty()) {
     read.metres_per_unit = clip::metres_of_unit(unit);
     if (!read.metres_per_unit) {
@@ -111,6 +115,9 @@ std::vector<OptionSpec> options() {
       {.name = "up",
        .default_value = std::string(),
        .help = "the axis of a .bvh that points up, such as +z; left out, recognised"},
+      {.name = "facing",
+       .default_value = std::string(),
+       .help = "the axis of a .bvh that its zero pose faces, such as +z; left out, recognised"},
       {.name = "unit",
        .default_value = std::string(),
        .help = "of a .bvh: m, dm, cm, mm, inch, foot or a number of metres; left out, recognised"},

@@ -129,9 +129,10 @@ ChannelMatrix sample_of(const Skeleton& skeleton, std::span<const FrameSpan> fra
 
 // One line that says what was taken for granted.
 std::string taken_as(const rig::Rig& rig) {
-  std::string text = "names neither its unit nor its upward axis; taken as " + rig.unit + " (" +
+  std::string text = "names neither its unit nor its axes; taken as " + rig.unit + " (" +
                      rig.why_unit + ") and " + std::string(up_text(rig.up));
-  return rig.why_up.empty() ? text : text + " (" + rig.why_up + ")";
+  if (!rig.why_up.empty()) text += " (" + rig.why_up + ")";
+  return rig.facing.empty() ? text : text + ", facing " + rig.facing + " (" + rig.why_facing + ")";
 }
 
 // Finds bones, T frames, unit and upward axis, and brings the skeleton into metres and +Y up.
@@ -141,6 +142,7 @@ Result<std::vector<double>> recognise_draft(const ReadOptions& options,
   Skeleton& skeleton = draft.skeleton;
   rig::RigInput known;
   known.up = options.up;
+  known.facing = options.facing;
   known.metres_per_unit = options.metres_per_unit;
   if (draft.profile != nullptr) {
     TRY(add_profile(*draft.profile, skeleton, known));
@@ -431,14 +433,15 @@ Result<> HeaderReader::motion() {
 }  // namespace
 
 Format bvh_format() {
-  return {.name = "BVH",
-          .extensions = {".bvh"},
-          .evenly_spaced = true,
-          .sends_text = true,
-          .options = {ReadOption::kUnit, ReadOption::kUp, ReadOption::kProfile},
-          .sniff = [](std::string_view begin) { return has_line(begin, "HIERARCHY"); },
-          .read = read_bvh,
-          .write = write_bvh};
+  return {
+      .name = "BVH",
+      .extensions = {".bvh"},
+      .evenly_spaced = true,
+      .sends_text = true,
+      .options = {ReadOption::kUnit, ReadOption::kUp, ReadOption::kFacing, ReadOption::kProfile},
+      .sniff = [](std::string_view begin) { return has_line(begin, "HIERARCHY"); },
+      .read = read_bvh,
+      .write = write_bvh};
 }
 
 Result<BvhHeader> parse_bvh_header(std::string_view text, const std::string& name) {

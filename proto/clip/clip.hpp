@@ -54,6 +54,9 @@ struct ReadOptions {
   std::optional<double> metres_per_unit{};
   // Axis that points up in a format that does not state it; empty: recognised by the figure.
   std::optional<UpAxis> up{};
+  // Axis that the zero pose faces, where neither names nor feet say which side is left; empty:
+  // recognised.
+  std::optional<Eigen::Vector3d> facing{};
   // Name of a skeleton profile, or a file (.toml) that `posed inspect --write` made; empty: found
   // by the joints' names.
   std::string profile{};

@@ -18,7 +18,16 @@ namespace posed::clip {
 struct Draft;
 
 // The fields of ReadOptions that only some formats accept.
-enum class ReadOption : std::uint8_t { kSkeleton, kRate, kUnit, kUp, kProfile, kHand, kHandShape };
+enum class ReadOption : std::uint8_t {
+  kSkeleton,
+  kRate,
+  kUnit,
+  kUp,
+  kFacing,
+  kProfile,
+  kHand,
+  kHandShape
+};
 
 // The files of one clip in memory.
 struct ClipFile {

@@ -39,11 +39,12 @@ struct GivenOption {
   bool given;
 };
 
-std::array<GivenOption, 7> given(const ReadOptions& options) {
+std::array<GivenOption, 8> given(const ReadOptions& options) {
   return {{{ReadOption::kSkeleton, "a skeleton", !options.skeleton.empty()},
            {ReadOption::kRate, "a rate", options.rate_hz.has_value()},
            {ReadOption::kUnit, "a unit of length", options.metres_per_unit.has_value()},
            {ReadOption::kUp, "an upward axis", options.up.has_value()},
+           {ReadOption::kFacing, "a facing", options.facing.has_value()},
            {ReadOption::kProfile, "a profile", !options.profile.empty()},
            {ReadOption::kHand, "a hand", options.hand.has_value()},
            {ReadOption::kHandShape, "a hand shape", options.hand_shape != kDefaultHandShape}}};
@@ -152,6 +153,7 @@ ReadOptions accepted_options(const std::filesystem::path& path, ReadOptions opti
   if (!accepts(path, ReadOption::kRate)) options.rate_hz = none.rate_hz;
   if (!accepts(path, ReadOption::kUnit)) options.metres_per_unit = none.metres_per_unit;
   if (!accepts(path, ReadOption::kUp)) options.up = none.up;
+  if (!accepts(path, ReadOption::kFacing)) options.facing = none.facing;
   if (!accepts(path, ReadOption::kProfile)) options.profile = none.profile;
   if (!accepts(path, ReadOption::kHand)) options.hand = none.hand;
   if (!accepts(path, ReadOption::kHandShape)) options.hand_shape = none.hand_shape;

@@ -266,7 +266,7 @@ FoundBones find_bones(const Figure& figure, const std::vector<JointName>& names)
       out.joint = *hand;
       return out;
     }
-    if (const auto limbs = limbs_by_shape(figure, names, out.notes)) out.joint = *limbs;
+    if (const auto limbs = limbs_by_shape(figure, names, out.sides_by)) out.joint = *limbs;
   }
   if (out.joint.has_limbs()) {
     out.kind = Kind::kPerson;
@@ -278,6 +278,25 @@ FoundBones find_bones(const Figure& figure, const std::vector<JointName>& names)
     if (out.joint.has(on(side, Bone::kLeftHand))) find_fingers(figure, names, side, out.joint);
   }
   return out;
+}
+
+bool turn_to_face(const Vec& facing, const Figure& figure, BoneJoints& bones) {
+  const auto at = [&](Bone bone) { return figure.between(0, bones[bone]).value_or(Vec::Zero()); };
+  const Vec left = at(Bone::kLeftUpperLeg) - at(Bone::kRightUpperLeg);
+  const Vec up = at(Bone::kLeftUpperArm) + at(Bone::kRightUpperArm) - at(Bone::kLeftLowerLeg) -
+                 at(Bone::kRightLowerLeg);
+  if (left.cross(up).dot(facing) >= 0.0) return false;
+  for (const auto& [first, count] : {std::pair{Bone::kLeftShoulder, 4},
+                                     {Bone::kLeftUpperLeg, 4},
+                                     {Bone::kLeftThumbMetacarpal, kFingerBones}}) {
+    for (int i = 0; i < count; ++i) {
+      const auto bone = static_cast<Bone>(static_cast<int>(first) + i);
+      const int joint = bones[bone];
+      bones.set(bone, bones[on(Side::kRight, bone)]);
+      bones.set(on(Side::kRight, bone), joint);
+    }
+  }
+  return true;
 }
 
 }  // namespace posed::rig

@@ -38,13 +38,21 @@ enum class Kind : std::uint8_t {
   kHand,    // a hand without a body
 };
 
+// What says which side of a person is left.
+enum class SidesBy : std::uint8_t { kNames, kFeet, kNothing };
+
 struct FoundBones {
   Kind kind = Kind::kPart;
   BoneJoints joint;
+  SidesBy sides_by = SidesBy::kNames;
   std::vector<std::string> notes;  // sentences
 };
 
 [[nodiscard]] FoundBones find_bones(const Figure& figure, const std::vector<JointName>& names);
+
+// Swaps the sides of a person whose zero pose, by them, does not face `facing`. Returns whether it
+// did.
+bool turn_to_face(const Vec& facing, const Figure& figure, BoneJoints& bones);
 
 // Legs and arms by names: along each path from the root the words that fit best, in the order of
 // the limb.
@@ -54,7 +62,7 @@ void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJ
 // else the feet, say which side is left. Empty when the tree has no such pairs.
 [[nodiscard]] std::optional<BoneJoints> limbs_by_shape(const Figure& figure,
                                                        const std::vector<JointName>& names,
-                                                       std::vector<std::string>& notes);
+                                                       SidesBy& sides_by);
 
 // Pelvis, trunk, neck and head from where the limbs begin.
 void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones,

@@ -100,6 +100,39 @@ void collect(const RigInput& input, const Frames& frames, Rig& rig) {
   }
 }
 
+// Which side of the person is left, and so where it faces: by the caller's word, the names or the
+// feet.
+void settle_facing(const RigInput& input, const Figure& figure, FoundBones& found, Rig& rig) {
+  const bool by_profile = !input.bones.empty();
+  if (input.facing && !by_profile) {
+    const bool turned = turn_to_face(*input.facing, figure, found.joint);
+    if (turned && found.sides_by == SidesBy::kNames) {
+      found.notes.emplace_back("left and right are not as the names say, so that it faces " +
+                               std::string(axis_text(*input.facing)));
+    }
+  } else if (found.sides_by == SidesBy::kNothing) {
+    found.notes.emplace_back(
+        "which side is left is not known: neither the names nor the feet say it; say which axis "
+        "the zero pose faces (facing)");
+  }
+  rig.why_facing = by_profile                          ? "by the bones of the profile"
+                   : input.facing                      ? "as you say"
+                   : found.sides_by == SidesBy::kNames ? "by the names of left and right"
+                   : found.sides_by == SidesBy::kFeet  ? "by the feet"
+                                                       : "a guess";
+}
+
+// The axis that the zero pose faces, from the T frame of its hips.
+void set_facing(const RigInput& input, const Frames& frames, Rig& rig) {
+  const auto& hips = frames.t_frame(Bone::kHips);
+  if (!hips) return;
+  rig.facing = axis_text(hips->transpose() * kZ);
+  if (input.facing && rig.facing != axis_text(*input.facing)) {
+    rig.notes.push_back("the zero pose faces " + rig.facing + ", not " +
+                        std::string(axis_text(*input.facing)) + " as was said");
+  }
+}
+
 bool knows_all_frames(const RigInput& input) {
   if (input.T.size() < input.bones.size() || input.bones.empty()) return false;
   for (std::size_t j = 0; j < input.bones.size(); ++j) {
@@ -119,10 +152,10 @@ Rig recognise(const RigInput& input) {
   if (!is_sane(input.joints)) return rig;
   const Figure figure(input.joints);
   const auto names = parse_names(names_of(input.joints));
-  const FoundBones found =
-      input.bones.empty() ? find_bones(figure, names) : known_bones(input.bones);
+  FoundBones found = input.bones.empty() ? find_bones(figure, names) : known_bones(input.bones);
   const Motion motion(figure, input.poses);
   rig.kind = found.kind;
+  if (found.kind == Kind::kPerson) settle_facing(input, figure, found, rig);
   rig.bone = found.joint.by_joint(figure.size());
   std::vector<std::string> notes = found.notes;
   Frames frames(figure, names, found.joint, motion, notes);
@@ -134,6 +167,7 @@ Rig recognise(const RigInput& input) {
     const bool is_cmu = std::ranges::any_of(names, [](const JointName& name) {
       return name.stem.find("hipjoint") != std::string::npos;
     });
+    set_facing(input, frames, rig);
     set_unit(frames.leg_length(), kAdultLeg_m, is_cmu, "thigh and shin are", rig);
   } else if (found.kind == Kind::kHand) {
     const Side side = found.joint.has(Bone::kLeftHand) ? Side::kLeft : Side::kRight;

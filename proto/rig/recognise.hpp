@@ -24,6 +24,7 @@ struct RigInput {
   std::vector<std::optional<Bone>> bones;            // [joint]; empty: not known
   std::vector<std::optional<Eigen::Quaterniond>> T;  // [joint], in the file's axes; may be empty
   std::optional<UpAxis> up;
+  std::optional<Eigen::Vector3d> facing;  // the axis of the file that the zero pose faces
   std::optional<double> metres_per_unit;
 };
 
@@ -35,6 +36,8 @@ struct Rig {
   std::vector<Evidence> evidence;  // [joint] of T; empty for joints that are no bones
   UpAxis up = UpAxis::kPlusY;
   std::string why_up;
+  std::string facing;  // "+z": the axis that the zero pose faces; empty when it is no person
+  std::string why_facing;
   // Empty when nothing tells the unit: the figure is no person, and none was given.
   std::optional<double> metres_per_unit;
   std::string unit;  // "cm", for sentences

@@ -90,7 +90,7 @@ void set_limb(const Figure& figure, const Pair& pair, bool arm, BoneJoints& bone
 // Whether `bones` has a limb's sides right: by its names, else by the line from right to left.
 bool sides_are_right(const std::vector<JointName>& names, const BoneJoints& bones,
                      const std::array<Bone, 4>& limb, const Vec& line, const Vec& left, bool sure,
-                     std::vector<std::string>& notes) {
+                     SidesBy& sides_by) {
   int votes = 0;
   for (const Side side : kSides) {
     for (const Bone bone : limb) {
@@ -101,9 +101,8 @@ bool sides_are_right(const std::vector<JointName>& names, const BoneJoints& bone
   if (votes != 0) return votes > 0;
   const bool unclear =
       !sure || line.norm() < 1e-9 || std::abs(direction(line).dot(direction(left))) < 0.5;
-  if (unclear) {
-    notes.emplace_back("which side is left is not known: neither the names nor the feet say it");
-  }
+  if (unclear) sides_by = SidesBy::kNothing;
+  if (sides_by == SidesBy::kNames) sides_by = SidesBy::kFeet;
   return line.dot(left) >= 0.0;
 }
 
@@ -116,7 +115,7 @@ void swap_sides(BoneJoints& bones, const std::array<Bone, 4>& limb) {
 }
 
 void settle_sides(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones,
-                  std::vector<std::string>& notes) {
+                  SidesBy& sides_by) {
   std::vector<int> all;
   for (int b = 0; b < kBones; ++b) {
     if (bones.has(static_cast<Bone>(b))) all.push_back(bones[static_cast<Bone>(b)]);
@@ -141,18 +140,14 @@ void settle_sides(const Figure& figure, const std::vector<JointName>& names, Bon
     const auto& limb = arm ? kArm : kLeg;
     const Bone first = arm ? Bone::kLeftUpperArm : Bone::kLeftLowerLeg;
     const Vec line = at(Side::kLeft, first) - at(Side::kRight, first);
-    if (!sides_are_right(names, bones, limb, line, left, sure, notes)) swap_sides(bones, limb);
-  }
-  if (std::ranges::none_of(names, [](const JointName& n) { return n.side != NameSide::kNone; })) {
-    notes.emplace_back(
-        "bones are known by shape only; left and right by the direction of the feet");
+    if (!sides_are_right(names, bones, limb, line, left, sure, sides_by)) swap_sides(bones, limb);
   }
 }
 
 }  // namespace
 
 std::optional<BoneJoints> limbs_by_shape(const Figure& figure, const std::vector<JointName>& names,
-                                         std::vector<std::string>& notes) {
+                                         SidesBy& sides_by) {
   const std::vector<Pair> pairs = find_pairs(figure);
   double best = -1e300;
   const Pair* legs = nullptr;
@@ -172,7 +167,7 @@ std::optional<BoneJoints> limbs_by_shape(const Figure& figure, const std::vector
   set_limb(figure, *legs, false, bones);
   set_limb(figure, *arms, true, bones);
   if (!bones.has_limbs()) return std::nullopt;
-  settle_sides(figure, names, bones, notes);
+  settle_sides(figure, names, bones, sides_by);
   return bones;
 }
 

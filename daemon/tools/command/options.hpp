@@ -81,7 +81,7 @@ inline constexpr double kDegrees = 1.0 / kDegree;  // degrees in a radian
   return word == "left" ? Side::kLeft : Side::kRight;
 }
 
-// The options that say what a clip's figure is: --profile, --up and --unit.
+// The options that say what a clip's figure is: --profile, --up, --facing and --unit.
 inline void add_figure_options(CLI::App& command, clip::ReadOptions& read) {
   command.add_option("--profile", read.profile,
                      "Skeleton profile: a name, or a file that `posed inspect --write` made "
@@ -91,6 +91,11 @@ inline void add_figure_options(CLI::App& command, clip::ReadOptions& read) {
           "--up", [&read](const std::string& text) { read.up = up_from_text(text); },
           "The axis of a BVH that points up (default: recognised)")
       ->check(CLI::IsMember({"+y", "+z", "-y", "-z", "+x"}));
+  command
+      .add_option_function<std::string>(
+          "--facing", [&read](const std::string& text) { read.facing = axis_from_text(text); },
+          "The axis that the zero pose of a BVH faces (default: recognised by left and right)")
+      ->check(CLI::IsMember({"+x", "-x", "+y", "-y", "+z", "-z"}));
   command
       .add_option_function<std::string>(
           "--unit",

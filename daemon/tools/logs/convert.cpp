@@ -115,7 +115,7 @@ Result<> check_options(const Convert& convert) {
   const bool of_log = is_log(convert.in);
   const bool reads_clip_options = !convert.read.skeleton.empty() || !convert.read.profile.empty() ||
                                   convert.read.rate_hz || convert.read.metres_per_unit ||
-                                  convert.read.up;
+                                  convert.read.up || convert.read.facing;
   for (const auto& checked :
        {useless(!convert.stream.empty(), of_log,
                 "is not a device log (.plog), so --stream has no effect"),

@@ -143,10 +143,11 @@ std::shared_ptr<const rig::Rig> evidence_of(const Skeleton& skeleton) {
 
 Result<Inspected> take_stream(const InspectArguments& options) {
   const clip::ReadOptions& read = options.read;
-  if (!read.profile.empty() || read.up || read.metres_per_unit) {
-    return misuse(options.in +
-                  " is a stream, whose source says what it is; for --profile, --up and --unit name"
-                  " a file");
+  if (!read.profile.empty() || read.up || read.facing || read.metres_per_unit) {
+    return misuse(
+        options.in +
+        " is a stream, whose source says what it is; for --profile, --up, --facing and --unit name"
+        " a file");
   }
   const auto figure = TRY(await_figure(options));
   Inspected taken;
@@ -263,6 +264,11 @@ void add_bones(const clip::Clip& clip, Findings& findings) {
   if (others > 0) findings.say(fmt::format("  {} joints are no bones of a person", others));
 }
 
+std::string facing_words(const rig::Rig& rig) {
+  if (rig.facing.empty()) return {};
+  return fmt::format(", the zero pose faces {} ({})", rig.facing, rig.why_facing);
+}
+
 Findings findings_of(const InspectArguments& options, const clip::Clip& clip,
                      const Drawing& drawing) {
   Findings findings;
@@ -272,9 +278,11 @@ Findings findings_of(const InspectArguments& options, const clip::Clip& clip,
       .add("person", motion::is_person(*clip.skeleton))
       .add("up", up_text(clip.up))
       .add("metres_per_unit", clip.metres_per_unit)
-      .say(fmt::format("{}: {}; {} points up{}, lengths in {}{}", options.in,
+      .add("facing", clip.rig->facing)
+      .say(fmt::format("{}: {}; {} points up{}{}, lengths in {}{}", options.in,
                        kind_words(*clip.skeleton), up_text(clip.up),
-                       clip.rig->why_up.empty() ? "" : " (" + clip.rig->why_up + ")", unit,
+                       clip.rig->why_up.empty() ? "" : " (" + clip.rig->why_up + ")",
+                       facing_words(*clip.rig), unit,
                        clip.rig->why_unit.empty() ? "" : " (" + clip.rig->why_unit + ")"));
   for (const std::string& line : terminal_drawing(drawing)) findings.say(line);
   add_bones(clip, findings);

@@ -182,6 +182,42 @@ TEST_CASE("rig: without names the shape tells the limbs, and the feet which side
   CHECK_FALSE(rig.notes.empty());
 }
 
+TEST_CASE("rig: where neither names nor feet say which side is left, the axis that it faces does") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kA, Mat::Identity(), 0.01);
+  auto& joints = made.input.joints;
+  for (std::size_t j = 0; j < joints.size(); ++j) joints[j].name = "J" + std::to_string(j);
+  for (const Bone bone : {Bone::kLeftToes, Bone::kRightToes}) {
+    joints[static_cast<std::size_t>(bone)].offset = {0, -1, 0};
+  }
+  const auto asks = [](const rig::Rig& rig) {
+    return std::ranges::any_of(rig.notes, [](const std::string& note) {
+      return note.find("facing") != std::string::npos;
+    });
+  };
+  CHECK(asks(rig::recognise(made.input)));
+  const auto left_arm = static_cast<std::size_t>(Bone::kLeftUpperArm);
+  const auto right_arm = static_cast<std::size_t>(Bone::kRightUpperArm);
+  for (const bool ahead : {true, false}) {
+    made.input.facing = Vec(0, 0, ahead ? 1 : -1);
+    const rig::Rig rig = rig::recognise(made.input);
+    CHECK_FALSE(asks(rig));
+    CHECK(rig.facing == (ahead ? "+z" : "-z"));
+    CHECK(rig.bone[ahead ? left_arm : right_arm] == Bone::kLeftUpperArm);
+  }
+}
+
+TEST_CASE("rig: the user's word on where it faces goes before the names, and that is said") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  CHECK(rig::recognise(made.input).facing == "+z");
+  made.input.facing = Vec(0, 0, -1);
+  const rig::Rig rig = rig::recognise(made.input);
+  CHECK(rig.facing == "-z");
+  CHECK(rig.bone[static_cast<std::size_t>(Bone::kLeftHand)] == Bone::kRightHand);
+  CHECK_FALSE(rig.notes.empty());
+  made.input.facing = Vec(1, 0, 0);  // across it: said, and nothing changes
+  CHECK_FALSE(rig::recognise(made.input).notes.empty());
+}
+
 TEST_CASE("rig: what a caller knows goes before what is recognised") {
   auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
   made.input.bones.resize(test::kMakerJoints);
