@@ -26,7 +26,7 @@ struct RecordingPlan {
   std::string out;               // the log; empty: one in `folder`
   std::filesystem::path folder;  // made if it is not there; the log is named after the present time
   bool frames = false;           // keep the published frames, too
-  bool clips = false;      // at the end, write each take of each stream as a BVH beside the log
+  bool clips = false;      // write each take of each stream as a BVH beside the log when it ends
   bool overwrite = false;  // replace the log `out` if it is there already
   bool json = false;       // at the end, print what was written as JSON
   ServeOptions serve;

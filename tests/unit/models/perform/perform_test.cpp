@@ -129,7 +129,7 @@ TEST_CASE("empty sequences and unknown labels are refused by name", "[generate]"
   CHECK_FALSE(perform::labels_of(model, "  "));
 }
 
-// The table in models/trajectory/README.md, "Look-ahead", is of one corpus; corpora differ by a
+// The figures of models/trajectory/README.md, "Look-ahead"; corpora differ by a
 // factor of two, so ten are used.
 TEST_CASE("a look-ahead of 15 or 20 frames is nearly the full solve", "[generate]") {
   constexpr int kCorpora = 10;
