@@ -130,7 +130,9 @@ Result<> Daemon::Parts::start(DaemonHooks wanted) {
   hooks = std::move(wanted);
   if (!config.models.empty()) {
     teacher = std::make_unique<teach::Teacher>(
-        [this](const std::string& name, std::string_view bytes) { return models.add(name, bytes); },
+        [this](teach::Subject subject, const std::string& name, std::string_view bytes) {
+          return models.add(name, subject == teach::Subject::kSigns ? "generate" : "style", bytes);
+        },
         [this] { control_wake->notify(); });
   }
   TRY(open_sockets());

@@ -18,12 +18,20 @@ namespace posed::control {
 namespace {
 
 constexpr std::size_t kMaxModels = 256;
-constexpr std::string_view kStyle = ".style";
+constexpr std::string_view kStyle = "style";
+constexpr std::string_view kGenerate = "generate";
+
+// The ending of the files of a kind.
+std::string_view ending_of(std::string_view kind) {
+  return kind == kGenerate ? ".gesture" : ".style";
+}
 
 // Empty: no model file.
 std::string_view kind_of(const std::filesystem::path& file) {
-  if (file.extension() == kStyle) return "style";
-  return file.extension() == ".gesture" ? "generate" : "";
+  for (const std::string_view kind : {kStyle, kGenerate}) {
+    if (file.extension() == ending_of(kind)) return kind;
+  }
+  return "";
 }
 
 }  // namespace
@@ -73,7 +81,8 @@ Result<> ModelFolder::check_writable() const {
               folder_.string());
 }
 
-Result<std::string> ModelFolder::add(const std::string& name, std::string_view bytes) const {
+Result<std::string> ModelFolder::add(const std::string& name, std::string_view kind,
+                                     std::string_view bytes) const {
   TRY(check_writable());
   const auto models = TRY(list());
   if (models.size() >= kMaxModels) {
@@ -84,7 +93,7 @@ Result<std::string> ModelFolder::add(const std::string& name, std::string_view b
   TRY(write_whole_file(whole, bytes));
   for (std::size_t number = 1; number <= kMaxModels + 1; ++number) {
     const std::string file =
-        name + (number == 1 ? "" : "-" + std::to_string(number)) + std::string(kStyle);
+        name + (number == 1 ? "" : "-" + std::to_string(number)) + std::string(ending_of(kind));
     if (rename_to_new(whole, folder_ / file)) return file;
     if (errno != EEXIST) break;
   }

@@ -28,10 +28,11 @@ class ModelFolder {
   Result<std::vector<FolderModel>> list() const;
   // Whether add() can work.
   Result<> check_writable() const;
-  // Keeps a style under this name and the ending of styles, with a number behind it if there is one
-  // of this name: nothing is ever replaced. Returns the file's name. `name` is one of a stream
-  // (config::is_stream_name()).
-  Result<std::string> add(const std::string& name, std::string_view bytes) const;
+  // Keeps a model under this name and the ending of its kind (as in FolderModel), with a number
+  // between them if there is one of this name: nothing is ever replaced. Returns the file's name.
+  // `name` is one of a stream (config::is_stream_name()).
+  Result<std::string> add(const std::string& name, std::string_view kind,
+                          std::string_view bytes) const;
   // Gives a model of the list the name `to`, one of a stream, and its own ending. Never replaces a
   // file. Returns the file's new name.
   Result<std::string> rename(std::string_view name, const std::string& to) const;

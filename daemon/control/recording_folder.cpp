@@ -18,18 +18,40 @@ namespace {
 
 constexpr std::size_t kMaxRecordings = 256;
 
-bool is_recording(const std::filesystem::path& file) {
-  return file.extension() == ".plog" || file.extension() == ".bvh";
+// A name in the folder; control characters in it would reach people's terminals.
+bool is_recording(const std::string& name) {
+  const std::filesystem::path file(name);
+  return (file.extension() == ".plog" || file.extension() == ".bvh") && file.filename() == file &&
+         name.front() != '.' && clean(name) == name;
+}
+
+// A log that is being written has another file beside it.
+bool is_in_use(const std::filesystem::path& file) {
+  std::error_code ignored;
+  return std::filesystem::exists(file.string() + "-wal", ignored);
+}
+
+Error no_folder() {
+  return fail(
+             "the daemon shows no recordings: name their folder in its config ([control]"
+             " recordings = \"takes\") and start again")
+      .error();
+}
+
+// -1 with errno; links are not followed, and what is no file is not opened.
+int open_recording(const std::filesystem::path& path) {
+  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
+  struct stat about{};
+  if (file < 0 || (fstat(file, &about) == 0 && S_ISREG(about.st_mode))) return file;
+  close(file);
+  errno = ENOENT;
+  return -1;
 }
 
 }  // namespace
 
 Result<std::vector<FolderRecording>> RecordingFolder::list() const {
-  if (folder_.empty()) {
-    return fail(
-        "the daemon shows no recordings: name their folder in its config ([control] recordings ="
-        " \"takes\") and start again");
-  }
+  if (folder_.empty()) return std::unexpected(no_folder());
   std::vector<FolderRecording> files;
   std::error_code error;
   std::filesystem::directory_iterator entries(folder_, error);
@@ -37,17 +59,15 @@ Result<std::vector<FolderRecording>> RecordingFolder::list() const {
   for (; !error && entries != std::filesystem::directory_iterator(); entries.increment(error)) {
     const std::string name = entries->path().filename().string();
     struct stat about{};
-    // Links are not followed; control characters in a name would reach people's terminals.
-    if (!is_recording(name) || name.front() == '.' || clean(name) != name ||
-        lstat(entries->path().c_str(), &about) != 0 || !S_ISREG(about.st_mode)) {
+    // Links are not followed.
+    if (!is_recording(name) || lstat(entries->path().c_str(), &about) != 0 ||
+        !S_ISREG(about.st_mode)) {
       continue;
     }
-    std::error_code ignored;
-    files.push_back(
-        {.name = name,
-         .bytes = static_cast<std::uint64_t>(about.st_size),
-         .changed_unix_s = about.st_mtim.tv_sec,
-         .in_use = std::filesystem::exists(entries->path().string() + "-wal", ignored)});
+    files.push_back({.name = name,
+                     .bytes = static_cast<std::uint64_t>(about.st_size),
+                     .changed_unix_s = about.st_mtim.tv_sec,
+                     .in_use = is_in_use(entries->path())});
   }
   if (error) {
     return fail("the folder of recordings cannot be read: " + error.message(), folder_.string());
@@ -59,25 +79,28 @@ Result<std::vector<FolderRecording>> RecordingFolder::list() const {
   return files;
 }
 
+// Without the list: a folder of many files would be read for every piece of one.
 Result<std::string> RecordingFolder::piece(std::string_view name, std::uint64_t offset) const {
-  const auto files = TRY(list());
-  const auto found = std::ranges::find(files, name, &FolderRecording::name);
-  if (found == files.end()) {
+  if (folder_.empty()) return std::unexpected(no_folder());
+  const std::string wanted(name);
+  const auto path = folder_ / wanted;
+  const int file = is_recording(wanted) ? open_recording(path) : -1;
+  if (file < 0 && (!is_recording(wanted) || errno == ENOENT || errno == ELOOP)) {
     return fail(fmt::format("there is no recording {} in the daemon's list", in_quotes(name)));
   }
-  if (found->in_use) {
+  if (file < 0) return fail("the recording cannot be read: " + errno_text(), wanted);
+  if (is_in_use(path)) {
+    close(file);
     return fail(fmt::format("{} is still being written; it can be fetched when posed has ended",
                             in_quotes(name)));
   }
-  if (offset > std::uint64_t{std::numeric_limits<off_t>::max()}) return std::string();
-  const auto path = folder_ / found->name;
-  const int file = open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
-  if (file < 0) return fail("the recording cannot be read: " + errno_text(), found->name);
+  constexpr std::uint64_t kFarthest = std::numeric_limits<off_t>::max() / 2;  // past any end
+  offset = std::min(offset, kFarthest);
   std::string bytes(kMaxRecordingPiece, '\0');
   const ssize_t size = pread(file, bytes.data(), bytes.size(), static_cast<off_t>(offset));
   const std::string why = size < 0 ? errno_text() : "";
   close(file);
-  if (size < 0) return fail("the recording cannot be read: " + why, found->name);
+  if (size < 0) return fail("the recording cannot be read: " + why, wanted);
   bytes.resize(static_cast<std::size_t>(size));
   return bytes;
 }

@@ -1,6 +1,6 @@
 // RecordingFolder: the logs and clips that a client may list and fetch by name. Nothing from the
-// network names a path: a name counts only if it is exactly one of the list. Reads the folder at
-// each call. Any thread; cold.
+// network names a path: a name counts only if it is that of a recording in this folder. list()
+// reads the folder each time, piece() that file alone. Any thread; cold.
 #pragma once
 
 #include <cstddef>
@@ -32,8 +32,8 @@ class RecordingFolder {
 
   // Regular files that end in .plog or .bvh, the newest first; at most 256.
   Result<std::vector<FolderRecording>> list() const;
-  // At most kMaxRecordingPiece bytes of a file of the list from `offset` on; empty at its end. A
-  // log that is in use is refused.
+  // At most kMaxRecordingPiece bytes of a recording in the folder from `offset` on; empty at its
+  // end. A log that is in use is refused.
   Result<std::string> piece(std::string_view name, std::uint64_t offset) const;
 
  private:

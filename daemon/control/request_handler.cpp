@@ -285,21 +285,32 @@ Reply RequestHandler::teach(const v1::ControlRequest& request, Requester request
 }
 
 Result<> RequestHandler::teach_step(const v1::ControlRequest& request) {
+  using teach::Walk;
   const auto& wanted = request.teach();
-  if (teacher_ == nullptr) return fail("this daemon teaches no styles");
+  if (teacher_ == nullptr) return fail("this daemon teaches nothing");
   switch (wanted.step_case()) {
     case v1::ControlRequest::Teach::kMark: {
-      const auto pupil = TRY(find_pupil(wanted.stream()));
-      return teacher_->mark(pupil,
-                            wanted.mark().style() ? teach::Walk::kStyle : teach::Walk::kNeutral,
-                            wanted.mark().seconds());
+      const auto pupil = TRY(find_pupil(wanted.stream(), teach::Subject::kStyle));
+      const auto& mark = wanted.mark();
+      return teacher_->mark(pupil, mark.style() ? Walk::kStyle : Walk::kNeutral, mark.seconds(),
+                            mark.more());
     }
-    case v1::ControlRequest::Teach::kTrain:
-      if (config::is_stream_name(wanted.train().name())) {
-        return teacher_->train(wanted.stream(), wanted.train().name());
+    case v1::ControlRequest::Teach::kShow: {
+      const auto pupil = TRY(find_pupil(wanted.stream(), teach::Subject::kSigns));
+      return teacher_->show(pupil, wanted.show().label(), wanted.show().seconds());
+    }
+    case v1::ControlRequest::Teach::kForget:
+      return teacher_->forget(wanted.stream(), wanted.forget().label());
+    case v1::ControlRequest::Teach::kTrain: {
+      const auto& train = wanted.train();
+      if (config::is_stream_name(train.name())) {
+        return teacher_->train(wanted.stream(), train.name(),
+                               train.signs() ? teach::Subject::kSigns : teach::Subject::kStyle);
       }
-      return fail(in_quotes(wanted.train().name()) +
-                  " cannot be a style's name; it has a-z, digits, '-' and '_', 1 to 32");
+      return fail(in_quotes(train.name()) + " cannot be the name of " +
+                  (train.signs() ? "signs" : "a style") +
+                  "; it has a-z, digits, '-' and '_', 1 to 32");
+    }
     case v1::ControlRequest::Teach::kCancel:
       return teacher_->cancel(wanted.stream());
     default:
@@ -308,14 +319,17 @@ Result<> RequestHandler::teach_step(const v1::ControlRequest& request) {
 }
 
 // What a stream lacks that cannot be taught is told before somebody has walked.
-Result<teach::Pupil> RequestHandler::find_pupil(const std::string& name) {
+Result<teach::Pupil> RequestHandler::find_pupil(const std::string& name, teach::Subject subject) {
   const ControlledStream& stream = *TRY(find_stream(name));
-  const StageType* const style = find_stage_type("style");
+  const bool signs = subject == teach::Subject::kSigns;
+  const StageType* const taught = find_stage_type(signs ? "generate" : "style");
   const auto& stages = stream.settings.stages;
-  if (std::ranges::find(stages, style, &pipeline::StageSettings::type) == stages.end()) {
-    return in_stream(name, fail("it has no style stage to teach; give it a [stream.style] table in"
-                                " the config (model = \"\" while there is none) and start again")
-                               .error());
+  if (std::ranges::find(stages, taught, &pipeline::StageSettings::type) == stages.end()) {
+    return in_stream(
+        name, fail(fmt::format("it has no {0} stage to teach; give it a [stream.{0}] table in"
+                               " the config (model = \"\" while there is none) and start again",
+                               taught->name))
+                  .error());
   }
   if (!stream.publishes_raw) {
     return in_stream(name, fail("teaching needs its frames as they were before the stages; set"
@@ -323,7 +337,9 @@ Result<teach::Pupil> RequestHandler::find_pupil(const std::string& name) {
                                .error());
   }
   if (!stream.is_there() || stream.skeleton == nullptr) {
-    return in_stream(name, fail("no body is there now; wait until it comes").error());
+    return in_stream(
+        name, fail(fmt::format("no {} is there now; wait until it comes", signs ? "hand" : "body"))
+                  .error());
   }
   return teach::Pupil{.stream = stream.stream, .name = stream.name, .skeleton = stream.skeleton};
 }

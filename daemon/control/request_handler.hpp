@@ -39,6 +39,7 @@ class Stats;
 
 namespace posed::teach {
 class Teacher;
+enum class Subject : std::uint8_t;
 struct Pupil;
 }  // namespace posed::teach
 
@@ -104,7 +105,7 @@ struct Reply {
 class RequestHandler {
  public:
   // `daemon_control` outlives the handler, as does `kept`, which gets what is set for a stream.
-  // `teacher`, which keeps models in that folder, outlives it, too; null: no style can be taught.
+  // `teacher`, which keeps models in that folder, outlives it, too; null: nothing can be taught.
   // Destroy the handler after reader and pipeline thread have ended, because it owns the models and
   // calibrations in use.
   RequestHandler(DaemonControl& daemon_control, devices::KeptSettings& kept,
@@ -196,7 +197,7 @@ class RequestHandler {
   [[nodiscard]] Reply mark_take(const v1::ControlRequest& request, Requester requester);
   [[nodiscard]] Reply teach(const v1::ControlRequest& request, Requester requester);
   Result<> teach_step(const v1::ControlRequest& request);
-  Result<teach::Pupil> find_pupil(const std::string& name);
+  Result<teach::Pupil> find_pupil(const std::string& name, teach::Subject subject);
   Result<Done> send_haptics(const v1::ControlRequest& request);
   // Whether the slot has a later generation.
   [[nodiscard]] bool is_earlier(Streams::iterator stream) const;

@@ -16,6 +16,8 @@
 #include "models/style/train/train.hpp"
 #include "models/style/train/train_report.hpp"
 #include "proto/clip/frames_clip.hpp"
+#include "proto/clip/hand_clip.hpp"
+#include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/time.hpp"
 #include "proto/text/clean.hpp"
 
@@ -35,33 +37,47 @@ std::size_t at(Walk walk) { return static_cast<std::size_t>(walk); }
 
 }  // namespace
 
-// The walk that is being marked; the thread's own.
+// The walk or show that is being marked; the thread's own.
 struct Teacher::Collected {
   std::uint64_t job = 0;  // 0: none
   Pupil pupil{};
-  Walk walk = Walk::kNeutral;
-  std::int64_t from_ns = 0, until_ns = 0;
-  std::optional<clip::FramesClip> frames{};
+  Marked marked{};
+  std::optional<clip::FramesClip> frames{};  // of a walk
+  clip::HandClip hand{};                     // of a show
   clip::FrameTimes times{};
 
-  // Returns whether the frame is behind the end of the walk.
+  // Returns whether the frame is behind the end.
   bool add(const Frame& frame) {
     const Header& header = frame.header;
-    if (header.stream != pupil.stream || header.arrival_ns < from_ns) return false;
-    if (header.arrival_ns >= until_ns) return true;
+    if (header.stream != pupil.stream || header.arrival_ns < marked.from_ns) return false;
+    if (header.arrival_ns >= marked.until_ns) return true;
     if (times.size() == kMaxWalkFrames || frame.skeleton != pupil.skeleton->id) return false;
-    frames->add(frame);
+    if (marked.label.empty()) {
+      frames->add(frame);
+    } else {
+      hand.angles.push_back(hand_angles(frame));
+    }
     times.add(header);
     return false;
   }
   [[nodiscard]] style::TrainingClip clip() const {
     style::TrainingClip take{.clip = {}, .group = {}, .subject = "one person", .motion = "walk"};
-    const std::string path = walk == Walk::kNeutral ? "the walk as usual" : "the walk in the style";
+    const std::string path = what();
     auto clip = frames->finish(path, kTrainRate_hz, times.in_seconds());
     if (clip) take.clip = std::move(*clip);
     take.clip.path = path;
     return take;
   }
+  [[nodiscard]] std::string what() const {
+    if (!marked.label.empty()) return "the sign " + clean(marked.label);
+    return marked.walk == Walk::kNeutral ? "the walk as usual" : "the walk in the style";
+  }
+};
+
+struct Teacher::Outcome {
+  std::string bytes{};    // of the model's file; empty: there is none
+  std::string verdict{};  // of the training
+  std::string problem{};  // why there is no model
 };
 
 Teacher::Teacher(Keep keep, std::function<void()> call, Clock clock)
@@ -109,45 +125,112 @@ Result<> Teacher::check_free() const {
               " is being taught just now; wait for its end, or cancel it where it was begun");
 }
 
-Result<> Teacher::mark(const Pupil& pupil, Walk walk, double seconds) {
+bool Teacher::is_known(const Pupil& pupil) const {
+  return state_.stream() == pupil.name && pupil_.skeleton->id == pupil.skeleton->id;
+}
+
+// Call it with mutex_ held, and nothing under way.
+void Teacher::begin(const Pupil& pupil, Marked marked, double seconds) {
+  state_.set_stream(pupil.name);
+  state_.set_step(Step::STEP_MARKING);
+  state_.set_style(marked.label.empty() && marked.walk == Walk::kStyle);
+  state_.set_label(marked.label);
+  forget_outcome();
+  lost_ = 0;
+  pupil_ = pupil;
+  marked_ = std::move(marked);
+  marked_.from_ns = clock_();
+  marked_.until_ns = marked_.from_ns + static_cast<std::int64_t>(seconds * 1e9);
+  ++job_;
+  tapped_.store(pupil.stream, std::memory_order_relaxed);
+  changed_.notify_all();
+}
+
+Result<> Teacher::mark(const Pupil& pupil, Walk walk, double seconds, bool more) {
   if (!(seconds >= kMinWalk_s && seconds <= kMaxWalk_s)) {
     return fail("a walk has 6 to 120 s; 20 are enough");
   }
   const std::scoped_lock lock(mutex_);
   TRY(check_free());
-  const bool same = state_.stream() == pupil.name && pupil_.skeleton->id == pupil.skeleton->id;
-  if (!same) {
-    state_.Clear();
-    walks_ = {};
+  if (!is_known(pupil)) forget_all();
+  auto& walks = walks_[at(walk)];
+  std::size_t frames = 0;
+  for (const auto& kept : walks) frames += static_cast<std::size_t>(kept->clip.frames());
+  if (more && (walks.size() >= kMaxWalks || frames > kMaxKeptFrames)) {
+    return fail(fmt::format("{} walks of this kind are enough", walks.size()));
   }
-  state_.set_stream(pupil.name);
-  state_.set_step(Step::STEP_MARKING);
-  state_.set_style(walk == Walk::kStyle);
-  forget_outcome();
+  if (!more) walks.clear();
   words_of(walk).Clear();
-  walks_[at(walk)].reset();
-  lost_ = 0;
-  pupil_ = pupil;
-  walk_ = walk;
-  from_ns_ = clock_();
-  until_ns_ = from_ns_ + static_cast<std::int64_t>(seconds * 1e9);
-  ++job_;
-  tapped_.store(pupil.stream, std::memory_order_relaxed);
-  changed_.notify_all();
+  words_of(walk).set_takes(static_cast<std::uint32_t>(walks.size()));
+  begin(pupil, {.walk = walk}, seconds);
   return {};
 }
 
-Result<> Teacher::train(const std::string& stream, const std::string& name) {
+Result<> Teacher::show(const Pupil& pupil, const std::string& label, double seconds) {
+  if (!hand_side(*pupil.skeleton)) {
+    return fail("stream " + pupil.name + " is no hand; signs are taught to hands");
+  }
+  if (!(seconds >= kMinShow_s && seconds <= kMaxShow_s)) {
+    return fail("a show has 3 to 15 s; 5 are enough");
+  }
   const std::scoped_lock lock(mutex_);
   TRY(check_free());
+  if (!is_known(pupil)) forget_all();
+  TRY(signs_.check_label(label));
+  state_.mutable_show()->Clear();
+  begin(pupil, {.label = label}, seconds);
+  return {};
+}
+
+Result<> Teacher::forget(const std::string& stream, const std::string& label) {
+  const std::scoped_lock lock(mutex_);
+  TRY(check_free());
+  if (state_.stream() != stream || !signs_.signs().contains(label)) {
+    return fail("no sign " + in_quotes(label) + " was shown to stream " + in_quotes(stream));
+  }
+  signs_.forget(label);
+  state_.clear_show();
+  tell_signs();
+  return {};
+}
+
+// Call it with mutex_ held.
+void Teacher::forget_all() {
+  state_.Clear();
+  walks_ = {};
+  signs_ = {};
+}
+
+void Teacher::tell_signs() {
+  state_.clear_sign();
+  for (const auto& [label, shows] : signs_.signs()) {
+    v1::TaughtSign& sign = *state_.add_sign();
+    sign.set_label(label);
+    sign.set_shows(static_cast<std::uint32_t>(shows.size()));
+  }
+}
+
+Result<> Teacher::check_ready(const std::string& stream, Subject subject) const {
+  const bool here = state_.stream() == stream;
+  if (subject == Subject::kSigns) {
+    return here ? signs_.check_ready() : SignLesson().check_ready();
+  }
   for (const Walk walk : {Walk::kNeutral, Walk::kStyle}) {
-    if (state_.stream() == stream && walks_[at(walk)]) continue;
+    if (here && !walks_[at(walk)].empty()) continue;
     return fail(std::string("there is no good walk ") +
                 (walk == Walk::kNeutral ? "as usual" : "in the style") + " of stream " +
                 in_quotes(stream) + " yet; mark it first");
   }
+  return {};
+}
+
+Result<> Teacher::train(const std::string& stream, const std::string& name, Subject subject) {
+  const std::scoped_lock lock(mutex_);
+  TRY(check_free());
+  TRY(check_ready(stream, subject));
   asked_ns_ = clock_();
   name_ = name;
+  subject_ = subject;
   ++job_;
   forget_outcome();
   state_.set_step(Step::STEP_TRAINING);
@@ -173,7 +256,7 @@ v1::Teaching Teacher::state() const {
   const std::scoped_lock lock(mutex_);
   v1::Teaching state = state_;
   if (state.step() == Step::STEP_MARKING) {
-    state.set_seconds_left(std::max(0.0, seconds(until_ns_ - clock_())));
+    state.set_seconds_left(std::max(0.0, seconds(marked_.until_ns - clock_())));
   }
   return state;
 }
@@ -227,18 +310,16 @@ void Teacher::run() {
   }
 }
 
-// A turn of collecting the walk.
+// A turn of collecting the walk or show.
 void Teacher::collect(Lock& lock, Collected& collected) {
   if (collected.job != job_) {
     collected = {.job = job_,
                  .pupil = pupil_,
-                 .walk = walk_,
-                 .from_ns = from_ns_,
-                 .until_ns = until_ns_,
+                 .marked = marked_,
                  .frames = clip::FramesClip(pupil_.skeleton)};
   }
   lock.unlock();
-  bool over = clock_() >= collected.until_ns + kLate_ns;
+  bool over = clock_() >= collected.marked.until_ns + kLate_ns;
   while (tap_.consume([&](const Frame& frame) { over = collected.add(frame) || over; })) {
   }
   if (over) return check(lock, collected);
@@ -246,82 +327,115 @@ void Teacher::collect(Lock& lock, Collected& collected) {
   if (!stop_ && collected.job == job_) changed_.wait_for(lock, kLookAtTap);
 }
 
-// The walk is over; called without the lock, returns with it.
+// The walk or show is over; called without the lock, returns with it.
 void Teacher::check(Lock& lock, Collected& collected) {
   lock.lock();
   if (collected.job != job_) return;
   tapped_.store(pipeline::kNoStream, std::memory_order_relaxed);
   state_.set_step(Step::STEP_CHECKING);
   working_ = true;
-  lock.unlock();
-  style::TrainingClip take = collected.clip();
-  const style::TakeCheck checked = style::check_take(take, kTrainRate_hz);
-  lock.lock();
+  const Judged judged =
+      collected.marked.label.empty() ? check_walk(lock, collected) : check_show(lock, collected);
   working_ = false;
   if (collected.job != job_) return;
-  v1::TaughtWalk& words = words_of(collected.walk);
-  words.set_good(checked.good());
-  std::string sentence = clean(checked.sentence());
+  v1::TaughtWalk& words =
+      collected.marked.label.empty() ? words_of(collected.marked.walk) : *state_.mutable_show();
+  std::string sentence = clean(judged.sentence);
   if (const std::uint64_t lost = lost_; lost > 0) {
     sentence += fmt::format("; {} frames came faster than this computer could keep them", lost);
   }
+  words.set_good(judged.good);
   words.set_sentence(sentence);
-  const std::string path = take.clip.path;
-  if (checked.good()) {
-    walks_[at(collected.walk)] = std::make_shared<const style::TrainingClip>(std::move(take));
+  if (collected.marked.label.empty()) {
+    words.set_takes(static_cast<std::uint32_t>(walks_[at(collected.marked.walk)].size()));
   }
+  tell_signs();
   finish(Step::STEP_IDLE, {});
   lock.unlock();
-  spdlog::info("{}: {}: {}", collected.pupil.name, path, sentence);
+  spdlog::info("{}: {}: {}", collected.pupil.name, collected.what(), sentence);
   collected = {};
   lock.lock();
 }
 
-void Teacher::train_now(Lock& lock) {
-  const std::uint64_t job = job_;
-  const auto walks = walks_;
-  const std::string name = name_;
-  const std::string stream = state_.stream();
-  working_ = true;
+// Both are called with the lock, let go of it meanwhile, and keep what is good unless it was
+// cancelled.
+Teacher::Judged Teacher::check_walk(Lock& lock, const Collected& collected) {
   lock.unlock();
+  auto take = std::make_shared<style::TrainingClip>(collected.clip());
+  const style::TakeCheck checked = style::check_take(*take, kTrainRate_hz);
+  lock.lock();
+  if (checked.good() && collected.job == job_) {
+    walks_[at(collected.marked.walk)].push_back(std::move(take));
+  }
+  return {checked.good(), checked.sentence()};
+}
+
+Teacher::Judged Teacher::check_show(Lock& lock, Collected& collected) {
+  SignLesson signs = signs_;
+  lock.unlock();
+  collected.hand.time_s = collected.times.in_seconds();
+  const auto added = signs.add(collected.marked.label, std::move(collected.hand));
+  lock.lock();
+  if (added && collected.job == job_) signs_ = std::move(signs);
+  return {added.has_value(), added ? *added : added.error().text()};
+}
+
+Teacher::Outcome Teacher::learn_style(const Walks& walks, const std::string& name,
+                                      const std::function<bool()>& go_on) {
   std::vector<style::TrainingClip> clips;
-  clips.reserve(walks.size());
-  for (const auto& walk : walks) clips.push_back(*walk);
-  clips.front().group = kUsual;
-  clips.back().group = name;
+  for (const Walk walk : {Walk::kNeutral, Walk::kStyle}) {
+    for (const auto& take : walks[at(walk)]) {
+      clips.push_back(*take);
+      clips.back().group = walk == Walk::kNeutral ? kUsual : name;
+    }
+  }
   style::TrainingVerdict verdict;
   style::TrainOptions options;
   options.target = name;
   options.dataset.space = style::usual_space(clips);
   options.dataset.rate_hz = kTrainRate_hz;
-  options.dataset.progress = [&](std::string_view, double) { return job_ == job; };
+  options.dataset.progress = [&](std::string_view, double) { return go_on(); };
   options.look = [&](const style::Findings& learnt) { verdict = learnt.verdict; };
   // Without FixedProducts, which are for the whole process: here others compute meanwhile. The log
   // keeps the model itself, so that nothing depends on making the same bits again.
   const auto model = style::train_style(clips, options);
-  std::string problem;
-  std::string bytes;
-  if (!model) {
-    problem = model.error().text();
-  } else if (!verdict.usable) {
-    problem = verdict.sentence;
-  } else {
-    bytes = style::serialize_model(*model);
-  }
+  if (!model) return {.problem = model.error().text()};
+  if (!verdict.usable) return {.problem = verdict.sentence};
+  return {.bytes = style::serialize_model(*model), .verdict = verdict.sentence};
+}
+
+Teacher::Outcome Teacher::learn_signs(const SignLesson& signs, const std::function<bool()>& go_on) {
+  auto learnt = signs.train(go_on);
+  if (!learnt) return {.problem = learnt.error().text()};
+  return {.bytes = std::move(learnt->bytes), .verdict = std::move(learnt->verdict)};
+}
+
+void Teacher::train_now(Lock& lock) {
+  const std::uint64_t job = job_;
+  const auto walks = walks_;
+  const SignLesson signs = signs_;
+  const Subject subject = subject_;
+  const std::string name = name_;
+  const std::string stream = state_.stream();
+  working_ = true;
+  lock.unlock();
+  const auto go_on = [&] { return job_ == job; };
+  Outcome outcome =
+      subject == Subject::kSigns ? learn_signs(signs, go_on) : learn_style(walks, name, go_on);
   Result<std::string> file = std::string();
-  if (!bytes.empty() && job_ == job) file = keep_(name, bytes);
-  if (!file) problem = file.error().text();
+  if (!outcome.bytes.empty() && job_ == job) file = keep_(subject, name, outcome.bytes);
+  if (!file) outcome.problem = file.error().text();
   lock.lock();
   working_ = false;
   if (job_ != job) return;
-  if (!problem.empty()) return finish(Step::STEP_IDLE, problem);
-  state_.set_verdict(clean(verdict.sentence));
+  if (!outcome.problem.empty()) return finish(Step::STEP_IDLE, outcome.problem);
+  state_.set_verdict(clean(outcome.verdict));
   state_.set_model(*file);
   state_.set_step(Step::STEP_STARTING);
-  model_ = {.stream = stream, .file = *file, .bytes = std::move(bytes)};
+  model_ = {.stream = stream, .file = *file, .bytes = std::move(outcome.bytes)};
   call_();
   lock.unlock();
-  spdlog::info("{}: learnt style {}: {}", stream, *file, clean(verdict.sentence));
+  spdlog::info("{}: learnt {}: {}", stream, *file, clean(outcome.verdict));
   lock.lock();
 }
 

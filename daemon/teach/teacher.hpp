@@ -1,11 +1,13 @@
-// Teacher: teaches one stream at a time a style while it runs. It keeps the frames of two walks, as
-// the publisher hands them over, checks each with what training itself asks of a clip, and trains
-// on both with the code of `posed train style`, on a thread that gives way to all others. Whoever
-// controls the stream then gives it the model (control::RequestHandler).
+// Teacher: teaches one stream at a time a style, or the signs of a hand, while it runs. It keeps
+// the frames of walks and of shows, as the publisher hands them over, checks each with what
+// training itself asks of a clip, and trains with the code of `posed train`, on a thread that gives
+// way to all others. Whoever controls the stream then gives it the model
+// (control::RequestHandler).
 //
-// Bounds: one teaching at a time, two walks of at most kMaxWalk_s and kMaxWalkFrames each, and a
-// ring of kTapSlots frames between the publisher and the thread. What the thread cannot take in
-// time is missing from the walk, never from the stream.
+// Bounds: one teaching at a time, kMaxWalks walks of each kind of at most kMaxWalk_s and
+// kMaxWalkFrames each, the shows of a SignLesson, and a ring of kTapSlots frames between the
+// publisher and the thread. What the thread cannot take in time is missing from the walk, never
+// from the stream.
 #pragma once
 
 #include <array>
@@ -20,10 +22,12 @@
 #include <string>
 #include <string_view>
 #include <thread>
+#include <vector>
 
 #include "daemon/pipeline/raw_tap.hpp"
 #include "daemon/pipeline/ring.hpp"
 #include "daemon/system/clock.hpp"
+#include "daemon/teach/sign_lesson.hpp"
 #include "models/style/train/dataset.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/frame/result.hpp"
@@ -33,10 +37,15 @@ namespace posed::teach {
 
 inline constexpr double kMinWalk_s = 6.0;
 inline constexpr double kMaxWalk_s = 120.0;
+inline constexpr std::size_t kMaxWalks = 8;  // of each kind
+inline constexpr std::size_t kMaxKeptFrames = 57'600;  // of a kind; then no further walk
+inline constexpr double kMinShow_s = 3.0;
+inline constexpr double kMaxShow_s = 15.0;
 inline constexpr std::size_t kMaxWalkFrames = 28'800;  // two minutes at 240 Hz
 inline constexpr std::size_t kTapSlots = 1024;         // four seconds at 240 Hz
 
 enum class Walk : std::uint8_t { kNeutral, kStyle };
+enum class Subject : std::uint8_t { kStyle, kSigns };
 
 // The stream that is taught, as it is there now.
 struct Pupil {
@@ -54,7 +63,8 @@ struct TaughtModel {
 class Teacher final : public pipeline::RawTap {
  public:
   // Keeps a model under a name that is like this one and not taken; returns the file's name.
-  using Keep = std::function<Result<std::string>(const std::string& name, std::string_view bytes)>;
+  using Keep = std::function<Result<std::string>(Subject subject, const std::string& name,
+                                                 std::string_view bytes)>;
 
   // Starts the thread, which calls both functions. `call` tells that take_model() has one.
   Teacher(Keep keep, std::function<void()> call, Clock clock = system::monotonic_ns);
@@ -62,11 +72,16 @@ class Teacher final : public pipeline::RawTap {
   ~Teacher() override;
 
   // All below: any cold thread. Errors are sentences for the client.
-  // Begins to keep a walk of the stream. A walk of another stream or skeleton is forgotten.
-  Result<> mark(const Pupil& pupil, Walk walk, double seconds);
-  // Begins to train on the stream's two walks.
-  Result<> train(const std::string& stream, const std::string& name);
-  // Ends what is under way; walks that are marked stay.
+  // Begins to keep a walk of the stream, beside the earlier ones of its kind (`more`) or in their
+  // place. What was marked of another stream or skeleton is forgotten.
+  Result<> mark(const Pupil& pupil, Walk walk, double seconds, bool more = false);
+  // Begins to keep a show of a sign of a hand. What was marked of another stream is forgotten.
+  Result<> show(const Pupil& pupil, const std::string& label, double seconds);
+  Result<> forget(const std::string& stream, const std::string& label);
+  // Begins to train on the stream's walks, or on the signs that were shown.
+  Result<> train(const std::string& stream, const std::string& name,
+                 Subject subject = Subject::kStyle);
+  // Ends what is under way; what is marked stays.
   Result<> cancel(const std::string& stream);
   [[nodiscard]] v1::Teaching state() const;
 
@@ -80,16 +95,39 @@ class Teacher final : public pipeline::RawTap {
 
  private:
   struct Collected;
+  struct Outcome;
+  struct Judged {
+    bool good = false;
+    std::string sentence;
+  };
   using Lock = std::unique_lock<std::mutex>;
+  // What is being kept.
+  struct Marked {
+    Walk walk = Walk::kNeutral;
+    std::string label{};  // of a sign; empty: it is a walk
+    std::int64_t from_ns = 0, until_ns = 0;
+  };
+  // By Walk: those that serve.
+  using Walks = std::array<std::vector<std::shared_ptr<const style::TrainingClip>>, 2>;
+  static Outcome learn_style(const Walks& walks, const std::string& name,
+                             const std::function<bool()>& go_on);
+  static Outcome learn_signs(const SignLesson& signs, const std::function<bool()>& go_on);
 
   void run();
   void collect(Lock& lock, Collected& collected);
   void check(Lock& lock, Collected& collected);
+  Judged check_walk(Lock& lock, const Collected& collected);
+  Judged check_show(Lock& lock, Collected& collected);
   void train_now(Lock& lock);
   // These need mutex_.
   [[nodiscard]] bool is_under_way() const;
   void forget_outcome();  // of the lesson before
   [[nodiscard]] Result<> check_free() const;
+  Result<> check_ready(const std::string& stream, Subject subject) const;
+  void begin(const Pupil& pupil, Marked marked, double seconds);
+  void forget_all();
+  void tell_signs();
+  [[nodiscard]] bool is_known(const Pupil& pupil) const;
   [[nodiscard]] v1::TaughtWalk& words_of(Walk walk);
   void finish(v1::Teaching::Step step, const std::string& problem);
 
@@ -109,12 +147,12 @@ class Teacher final : public pipeline::RawTap {
   std::atomic<std::uint64_t> job_{0};  // what is under way; another number: it was cancelled
   v1::Teaching state_;
   Pupil pupil_;
-  Walk walk_ = Walk::kNeutral;  // that is marked
-  std::int64_t from_ns_ = 0, until_ns_ = 0;
+  Marked marked_;
   std::int64_t asked_ns_ = 0;  // for the training
-  std::string name_;           // of the style
-  // By Walk; null: there is none that serves.
-  std::array<std::shared_ptr<const style::TrainingClip>, 2> walks_;
+  Subject subject_ = Subject::kStyle;
+  std::string name_;  // of what is learnt
+  Walks walks_;
+  SignLesson signs_;
   std::optional<TaughtModel> model_;  // for take_model()
 
   std::thread thread_;

@@ -1,5 +1,7 @@
-// A style is taught on the stage with the real binary: an emulated mocap system sends a performer
-// who walks as usual and then in a style; `posed ctl teach` does the rest.
+// A style and signs are taught on the stage with the real binary: an emulated mocap system sends a
+// performer who walks as usual and then in a style, an emulated glove a hand that makes a sign;
+// `posed ctl teach` does the rest.
+#include <algorithm>
 #include <atomic>
 #include <csignal>
 #include <filesystem>
@@ -13,6 +15,7 @@
 #include "daemon/tools/emulate/motions.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "proto/clip/clip.hpp"
+#include "proto/frame/hand_skeleton.hpp"
 #include "tests/e2e/logged_frames.hpp"
 #include "tests/e2e/outcome.hpp"
 #include "tests/e2e/stage.hpp"
@@ -55,7 +58,97 @@ class Performer {
   std::jthread thread_;
 };
 
+// An emulated glove on a hand that rests open, and closes to a fist when it is told.
+class Hand {
+ public:
+  static constexpr double kWay_s = 0.5, kHold_s = 1.6;
+
+  Hand() {
+    auto emulator = drivers::find_driver("cyberglove")->emulate({}).value();
+    auto port = emulate::EmulatedPort::open_pty().value();
+    device_ = std::make_unique<emulate::EmulatedDevice>(
+        std::move(emulator), std::move(port),
+        [this](double time_s, drivers::Emulator& glove) {
+          now_s_ = time_s;
+          Frame frame;
+          set_hand_angles(hand_, angles_at(time_s - fist_s_), frame);
+          glove.pose(0, frame);
+        },
+        emulate::EmulatedDevice::Settings());
+    thread_ = std::jthread([this](const std::stop_token& stop) { device_->run(stop); });
+  }
+  // A fist, so long from now.
+  void fist_in(double seconds) { fist_s_ = now_s_ + seconds; }
+  [[nodiscard]] std::string port() const { return device_->port(); }
+
+ private:
+  static HandAngles angles_at(double since_s) {
+    const double in = std::clamp(since_s / kWay_s, 0.0, 1.0);
+    const double out = std::clamp((since_s - kWay_s - kHold_s) / kWay_s, 0.0, 1.0);
+    const auto smooth = [](double t) { return t * t * t * (10.0 + t * (6.0 * t - 15.0)); };
+    HandAngles angles{};
+    for (std::size_t c = 0; c < angles.size(); c += 3) {
+      angles[c] = (0.1 + smooth(in) - smooth(out));  // flexions [rad]
+    }
+    return angles;
+  }
+
+  const Skeleton hand_ = hand_skeleton(Side::kRight);
+  std::atomic<double> now_s_{0.0}, fist_s_{-100.0};
+  std::unique_ptr<emulate::EmulatedDevice> device_;
+  std::jthread thread_;
+};
+
 }  // namespace
+
+TEST_CASE("signs are taught on the stage, played, and replayed bit for bit", "[teach]") {
+  Stage stage;
+  Hand hand;
+  std::filesystem::create_directory(stage.path("models"));
+  stage.folder.write("posed.toml", std::string(Stage::kEndpoints) +
+                                       "models = \"models\"\n[[stream]]\nname = \"hand\"\n"
+                                       "driver = \"cyberglove\"\npublish_raw = true\nport = \"" +
+                                       hand.port() + "\"\n[stream.generate]\nmodel = \"\"\n");
+  stage.record();
+  stage.await_frames("hand", 5);
+  Process lesson({"ctl", "--connect", stage.control, "teach", "hand", "--name", "mine", "--signs",
+                  "fist", "--show", "6"});
+  // The countdown has three seconds; a show that a busy machine cut is asked for once more.
+  for (std::string heard; !has(heard, "fist: show 3");) {
+    hand.fist_in(3.0 + 1.6);
+    const auto line = lesson.line();
+    INFO(lesson.errors());
+    REQUIRE(line);
+    heard = *line;
+  }
+  const auto learnt = lesson.line();
+  REQUIRE(learnt);
+  CHECK(has(*learnt, "knows fist, rest from 3 shows"));
+  const auto in_use = lesson.line();
+  REQUIRE(in_use);
+  CHECK(has(*in_use, "hand: mine.gesture is in effect from frame"));
+  CHECK(lesson.exit_code() == 0);
+  CHECK(has(stage.ctl({"models"}).out, "generate   mine.gesture"));
+  stage.await_frames("hand", 60);
+  hand.fist_in(0.0);
+  stage.await_frames("hand", 200);
+  CHECK(stage.ctl({"play", "hand", "fist rest"}).code == 0);
+  stage.await_frames("hand", 60);
+  stage.daemon->send(SIGTERM);
+  REQUIRE(stage.daemon->exit_code() == 0);
+
+  int recognised = 0, performed = 0;
+  check_frames_follow(stage.path("take.plog"), "hand", [&](const v1::Frame& frame) {
+    if (frame.label() != "fist") return;
+    ++(frame.source() == v1::SOURCE_LABELS ? performed : recognised);
+  });
+  CHECK(recognised > 10);
+  CHECK(performed > 10);
+  const ProgramOutcome replay =
+      posed({"replay", stage.path("take.plog"), "--speed", "max", "--expect"});
+  INFO(replay.err);
+  CHECK(replay.code == 0);
+}
 
 TEST_CASE("a style is taught on the stage, and the log replays it bit for bit", "[teach]") {
   const std::string name = "mvn-walker";

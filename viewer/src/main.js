@@ -4,6 +4,7 @@ import '../style/page.css';
 import { Connection } from './link/connection.js';
 import { ClockMapping } from './link/clock.js';
 import { Requests } from './link/requests.js';
+import { Played } from './streams/played.js';
 import { Store } from './streams/store.js';
 import { World } from './scene/world.js';
 import { Avatars } from './scene/avatars.js';
@@ -94,7 +95,8 @@ class Page {
     this.tools = new Tools(find('.tools'), world, this.avatars, this.capture);
     this.time = new TimeControls(find('.tools'), store, world);
     this.library = new ModelLibrary({ control, requests, acks });
-    this.recordings = new Recordings({ control, requests, acks });
+    this.played = new Played(store);
+    this.recordings = new Recordings({ control, requests, acks, played: this.played });
     find('.shelves').append(this.library.element, this.recordings.element);
     this.legend = legend(find('.legend'));
   }
@@ -254,7 +256,8 @@ class Page {
     const began_ms = performance.now();
     this.connection.sendText(READY);
     this.fresh = [];
-    const drawn = this.world.frame((performer) => this.fresh.push(performer.stream));
+    this.played.frame(performance.now());
+    const drawn = this.world.frame(({ stream }) => stream.isTake || this.fresh.push(stream));
     const done_ms = performance.now();
     // What is shown of the past is no measure of the present.
     if (this.store.rewind.paused) this.fresh.length = 0;

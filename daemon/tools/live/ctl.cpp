@@ -241,7 +241,7 @@ int use_model(const CtlOptions& options) {
   return change(options, request, "model " + options.model.string());
 }
 
-int teach_style(const CtlOptions& options) {
+int teach_stream(const CtlOptions& options) {
   const Interrupt interrupt;
   auto connection = Connection::open(options.client, ZMQ_DEALER);
   if (!connection) return report(connection.error());
@@ -444,13 +444,17 @@ std::string live_parameters() {
 }
 
 void add_teach(Actions& actions, TeachOptions& options) {
-  CLI::App* lesson = actions.add_for_stream(
-      "teach", "Teach a stream a style: two walks, and it is in effect", teach_style, R"(Examples:
+  CLI::App* lesson =
+      actions.add_for_stream("teach", "Teach a body a style, or a hand signs, and it is in effect",
+                             teach_stream, R"(Examples:
   posed ctl teach walker --name proud               # walk as you are, then as the character
   posed ctl teach walker --name proud --neutral 0   # once more as the character alone
-The stream needs publish_raw = true and a [stream.style] table (model = "" while there is none), the
-daemon a folder to keep the model in: [control] models = "models". A walk of which nothing can be
-learnt is refused with the reason, and the stream stays as it is. Ctrl-C ends it.)");
+  posed ctl teach walker --name proud --more        # further walks beside those before
+  posed ctl teach hand --name signs --signs ok flat # show each sign three times
+The stream needs publish_raw = true and a [stream.style] or [stream.generate] table (model = ""
+while there is none), the daemon a folder to keep the model in: [control] models = "models". A walk
+or a show of which nothing can be learnt is refused with the reason, and the stream stays as it is.
+A show begins at rest, makes the sign, holds it and comes back to rest. Ctrl-C ends it.)");
   lesson
       ->add_option("--neutral", options.neutral_s,
                    "Seconds of the walk as usual, 6 to 120; 0: the one that was marked before")
@@ -459,7 +463,15 @@ learnt is refused with the reason, and the stream stays as it is. Ctrl-C ends it
   lesson->add_option("--style", options.style_s, "The same of the walk in the style")
       ->check(in_range(0.0, teach::kMaxWalk_s))
       ->capture_default_str();
-  lesson->add_option("--name", options.name, "Of the style, and of its file NAME.style")
+  lesson->add_option("--signs", options.signs, "Signs to show, instead of walks");
+  lesson->add_option("--show", options.show_s, "Seconds of a show, 3 to 15")
+      ->check(in_range(teach::kMinShow_s, teach::kMaxShow_s))
+      ->capture_default_str();
+  lesson->add_flag("--more", options.more, "Learn these walks beside those before")
+      ->excludes("--signs");
+  lesson
+      ->add_option("--name", options.name,
+                   "Of what is learnt, and of its file NAME.style or NAME.gesture")
       ->required();
 }
 

@@ -19,6 +19,7 @@ namespace {
 
 constexpr int kGetReady_s = 3;  // between the announcement of a walk and its beginning
 constexpr std::chrono::milliseconds kLookAgain{100};
+constexpr int kMostRefused = 4;  // shows of a sign
 
 class Lesson {
  public:
@@ -27,34 +28,46 @@ class Lesson {
   Result<> walk(bool style, double walk_s) {
     const std::string how = style ? fmt::format("walk in the style ({})", clean_name(options_.name))
                                   : "walk as you are";
-    for (int left = kGetReady_s; left > 0; --left) {
-      count_down(fmt::format("{} in {}", how, left));
-      TRY(pause(std::chrono::seconds(1)));
-    }
     v1::ControlRequest request = about_stream();
     auto& mark = *request.mutable_teach()->mutable_mark();
     mark.set_style(style);
     mark.set_seconds(walk_s);
-    TRY(ask_(request));
-    begun_ = true;
-    const auto reply = TRY(await([&](const v1::Teaching& now) {
-      count_down(fmt::format("{} ... {:.0f} s", how, std::ceil(now.seconds_left())));
-      return now.step() == v1::Teaching::STEP_MARKING || now.step() == v1::Teaching::STEP_CHECKING;
-    }));
-    const v1::Teaching& now = reply.teaching();
+    mark.set_more(options_.more);
+    const auto now = TRY(marked(how, request));
     const v1::TaughtWalk& walked = style ? now.style_walk() : now.neutral_walk();
     if (!walked.good()) {
-      // The walk may have been cancelled by another client.
-      const std::string why = walked.sentence().empty() ? "it was cancelled" : walked.sentence();
-      return fail(fmt::format("{}: {}{}", how, clean(why), again(style)));
+      return fail(fmt::format("{}: {}{}", how, why_not(walked), again(style)));
     }
     say(fmt::format("{}: {}", how, clean(walked.sentence())));
+    return {};
+  }
+
+  // Until the sign was shown well often enough; nobody shows one that is refused again and again.
+  Result<> show(const std::string& label) {
+    int refused = 0;
+    for (int shown = 0; shown < options_.shows;) {
+      const std::string how = fmt::format("show {} ({} of {}): rest, the sign, held, rest",
+                                          clean_name(label), shown + 1, options_.shows);
+      v1::ControlRequest request = about_stream();
+      request.mutable_teach()->mutable_show()->set_label(label);
+      request.mutable_teach()->mutable_show()->set_seconds(options_.show_s);
+      const auto now = TRY(marked(how, request));
+      if (now.show().good()) {
+        ++shown;
+        say(clean(now.show().sentence()));
+      } else if (++refused > kMostRefused) {
+        return fail(fmt::format("show {}: {}", clean_name(label), why_not(now.show())));
+      } else {
+        say(fmt::format("once more: {}", why_not(now.show())));
+      }
+    }
     return {};
   }
 
   Result<v1::ControlReply> train() {
     v1::ControlRequest request = about_stream();
     request.mutable_teach()->mutable_train()->set_name(options_.name);
+    request.mutable_teach()->mutable_train()->set_signs(!options_.signs.empty());
     TRY(ask_(request));
     begun_ = true;
     auto reply = TRY(await([&](const v1::Teaching& now) {
@@ -63,15 +76,16 @@ class Lesson {
     }));
     const v1::Teaching& now = reply.teaching();
     if (now.step() != v1::Teaching::STEP_IN_USE) {
-      return fail("the style was not learnt: " +
-                  (now.problem().empty() ? "it was cancelled" : clean(now.problem())));
+      return fail(
+          std::string(options_.signs.empty() ? "the style was" : "the signs were") +
+          " not learnt: " + (now.problem().empty() ? "it was cancelled" : clean(now.problem())));
     }
     say(clean(now.verdict()));
     if (now.sequence() == 0) {
       say(fmt::format("{}: {} is in effect when it comes", options_.stream, clean(now.model())));
     } else {
-      say(fmt::format("{}: {} is in effect from frame {}, {:.1f} s after the walks",
-                      options_.stream, clean(now.model()), now.sequence(), now.train_s()));
+      say(fmt::format("{}: {} is in effect from frame {}, {:.1f} s later", options_.stream,
+                      clean(now.model()), now.sequence(), now.train_s()));
     }
     return reply;
   }
@@ -84,6 +98,26 @@ class Lesson {
     v1::ControlRequest request;
     request.mutable_teach()->set_stream(options_.stream);
     return request;
+  }
+
+  // Counts down, asks for a walk or a show and waits for its end.
+  Result<v1::Teaching> marked(const std::string& how, const v1::ControlRequest& request) {
+    for (int left = kGetReady_s; left > 0; --left) {
+      count_down(fmt::format("{} in {}", how, left));
+      TRY(pause(std::chrono::seconds(1)));
+    }
+    TRY(ask_(request));
+    begun_ = true;
+    const auto reply = TRY(await([&](const v1::Teaching& now) {
+      count_down(fmt::format("{} ... {:.0f} s", how, std::ceil(now.seconds_left())));
+      return now.step() == v1::Teaching::STEP_MARKING || now.step() == v1::Teaching::STEP_CHECKING;
+    }));
+    return reply.teaching();
+  }
+
+  // It may have been cancelled by another client.
+  static std::string why_not(const v1::TaughtWalk& marked) {
+    return marked.sentence().empty() ? "it was cancelled" : clean(marked.sentence());
   }
 
   // Asks how it stands while `goes_on` says so.
@@ -136,6 +170,10 @@ class Lesson {
 Result<v1::ControlReply> teach(const TeachOptions& options, const Ask& ask) {
   Lesson lesson(options, ask);
   const auto all = [&]() -> Result<v1::ControlReply> {
+    for (const std::string& sign : options.signs) {
+      TRY(lesson.show(sign));
+    }
+    if (!options.signs.empty()) return lesson.train();
     if (options.neutral_s > 0.0) {
       TRY(lesson.walk(false, options.neutral_s));
     }

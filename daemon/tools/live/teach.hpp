@@ -1,8 +1,10 @@
-// The steps of `posed ctl teach`: two walks with a countdown, and the training. Cold.
+// The steps of `posed ctl teach`: walks, or shows of signs, with a
+// countdown, and the training. Cold.
 #pragma once
 
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "posed/v1/control.pb.h"
 #include "proto/frame/result.hpp"
@@ -11,8 +13,12 @@ namespace posed::tools {
 
 struct TeachOptions {
   std::string stream, name;                 // of the style
-  double neutral_s = 20.0, style_s = 20.0;  // of the walks; 0: the one that was marked before
-  bool quiet = false;                       // prints nothing
+  double neutral_s = 20.0, style_s = 20.0;  // of the walks; 0: those that were marked before
+  bool more = false;                        // the walks are learnt beside those before
+  std::vector<std::string> signs{};         // to show one after the other; none: walks
+  int shows = 3;                            // good ones of each
+  double show_s = 5.0;
+  bool quiet = false;  // prints nothing
 };
 
 // Sends a request and returns the daemon's answer; a refusal is an error.

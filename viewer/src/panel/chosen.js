@@ -5,6 +5,7 @@ import { GestureControls } from './gesture_controls.js';
 import { GloveLine, isGlove } from './glove.js';
 import { ModelControls } from './model_controls.js';
 import { Parameters } from './parameters.js';
+import { SignLesson } from './sign_lesson.js';
 import { StyleControls } from './style_controls.js';
 import { TeachControls } from './teach_controls.js';
 
@@ -62,8 +63,11 @@ export class Chosen {
       .filter(find)
       .map((kind) => new ModelControls(stream, kind, this.context));
     const teach = find('style') ? new TeachControls(stream, this.context) : null;
+    const signs = find('generate') && stream.isHand ? new SignLesson(stream, this.context) : null;
     const more = new Parameters(stream, control);
-    this.#parts = [this.style, this.gesture, ...models, teach, more].filter((part) => part !== null);
+    this.#parts = [this.style, this.gesture, ...models, teach, signs, more].filter(
+      (part) => part !== null,
+    );
     const glove = isGlove(stream) ? [new GloveLine(stream, this.endpoint())] : [];
     this.fields.replaceChildren(...this.#parts.map((part) => part.element));
     this.element.replaceChildren(

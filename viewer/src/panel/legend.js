@@ -32,17 +32,18 @@ function seen(world) {
 }
 
 // What posed did to the stream, in a word.
-function done({ stats, pose }) {
+function done({ stats, pose, isTake }) {
   const names = new Set(stats?.stage.map(({ name }) => name));
   if (names.has('style')) return 'styled';
   if (pose.performed) return 'performed';
   if (names.has('generate')) return 'smoothed';
+  if (isTake) return 'recorded';
   return names.size > 0 ? 'cleaned' : 'as captured';
 }
 
 function performersOf(world) {
   const mains = world.store
-    .main()
+    .shown()
     .map(({ name }) => world.performers.get(name))
     .filter((one) => one && one.shown !== false && one.stream.drawable);
   if (mains.length > MOST_NAMES) return [];

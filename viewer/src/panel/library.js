@@ -1,8 +1,7 @@
-// The folders of the daemon: its models, to use, rename and delete, and its recordings, to
+// The folders of the daemon: its models, to use, rename and delete, and its recordings, to play and
 // download. A list is asked for when it is unfolded, and again after each change.
-import { fetchRecording, keepFile } from '../link/download.js';
 import { el, write } from './dom.js';
-import { megabytes } from './numbers.js';
+import { Take } from './take.js';
 
 class List {
   // context: {control, requests, acks}
@@ -117,42 +116,33 @@ export class ModelLibrary extends List {
 }
 
 export class Recordings extends List {
+  #takes = new Map(); // by name: also while it plays and the list is made again
+
   constructor(context) {
     super('Recordings', context);
+    this.context = context;
   }
 
-  list() {
-    return this.show(
+  async list() {
+    await this.show(
       { list_recordings: {} },
       'recording',
       'Nothing is recorded yet. A take is here as BVH soon after it ends.',
     );
+    for (const [name, take] of this.#takes) {
+      if (take.element.isConnected) continue;
+      take.stop(); // its file has gone
+      this.#takes.delete(name);
+    }
   }
 
   item(file) {
-    const { name, bytes, changed_unix_s: changed, in_use: inUse } = file;
-    const when = new Date(1000 * changed).toLocaleString();
-    const size = bytes < 1e6 ? `${Math.ceil(bytes / 1000)} kB` : megabytes(bytes);
-    const words = el('span.note', {}, `${size}, ${when}`);
-    const text = inUse ? 'being written' : 'Download';
-    const save = el(
-      'button',
-      { type: 'button', disabled: inUse, aria: { label: `${text}: ${name}` } },
-      text,
-    );
-    save.onclick = () => this.#save(file, save);
-    return el('li', {}, el('strong', {}, name), el('div.buttons', {}, words, save));
-  }
-
-  async #save(file, button) {
-    button.disabled = true;
-    const ask = (request) => this.requests.ask(request);
-    const { blob, error } = await fetchRecording(ask, file, (share) =>
-      write(button, `${Math.round(100 * share)} %`),
-    );
-    button.disabled = false;
-    write(button, 'Download');
-    if (blob) keepFile(blob, file.name);
-    else this.acks.say(`${file.name}: refused: ${error}`, 'bad');
+    let take = this.#takes.get(file.name);
+    if (!take?.isOf(file)) {
+      take?.stop();
+      take = new Take(file, this.context);
+      this.#takes.set(file.name, take);
+    }
+    return take.element;
   }
 }

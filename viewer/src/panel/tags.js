@@ -13,6 +13,7 @@ const labelWords = ({ verb, label, probability }) =>
   verb === 'performs' ? `performs ${label}` : `recognised ${label}, ${percent(probability)} sure`;
 
 function words(stream, main) {
+  if (stream.isTake) return 'recorded';
   const parts = [];
   if (stream.isRaw) parts.push('raw, as captured');
   else if (styledWords(stream)) parts.push(styledWords(stream));

@@ -119,12 +119,13 @@ export class World {
     this.touch();
   }
 
-  // Whether the view looks at this performer: of follow and orbit the chosen body and its raw twin.
+  // Whether the view looks at this performer: of follow and orbit the chosen body, its raw twin and
+  // what is played beside it.
   #isLookedAt({ stream, figure }) {
     if (stream.isHand || !figure.group.visible) return false;
     const one = this.performers.get(this.#chosen);
     if (!this.views.isOfOne || !one || one.stream.isHand) return true;
-    return stream.name === this.#chosen || stream.name === `${this.#chosen}${RAW_SUFFIX}`;
+    return stream.isTake || stream.name === this.#chosen || stream.name === `${this.#chosen}${RAW_SUFFIX}`;
   }
 
   #leave(name) {
@@ -152,7 +153,7 @@ export class World {
   arrange() {
     this.touch();
     const { raw } = this.options;
-    const mains = this.store.main().filter(({ name }) => this.performers.has(name));
+    const mains = this.store.shown().filter(({ name }) => this.performers.has(name));
     const twin = (stream) => this.performers.get(`${stream.name}-raw`);
     const bodies = mains.filter(({ isHand }) => !isHand);
     const hands = mains.filter(({ isHand }) => isHand);

@@ -116,6 +116,7 @@ export class Store extends EventTarget {
   // the statistics may be older than a skeleton, which comes only once.
   #forget(names) {
     for (const [name, stream] of this.streams) {
+      if (stream.isTake) continue;
       const base = stream.isRaw ? name.slice(0, -RAW_SUFFIX.length) : name;
       if (names.has(name) || names.has(base)) stream.absent = 0;
       else stream.absent += 1;
@@ -137,6 +138,26 @@ export class Store extends EventTarget {
     return (this.stats?.stream ?? [])
       .map(({ stream }) => this.streams.get(stream))
       .filter((stream) => stream !== undefined);
+  }
+
+  // Those that stand in the scene: these, and recordings that are played beside them.
+  shown() {
+    return [...this.main(), ...[...this.streams.values()].filter(({ isTake }) => isTake)];
+  }
+
+  // A recording to play; null where there is no room. message: posed.v1.Skeleton, sound
+  addTake(name, message) {
+    if (this.streams.size >= MOST_STREAMS) return null;
+    const stream = new Stream(name, true);
+    stream.setSkeleton(message);
+    this.streams.set(name, stream);
+    this.#tell('skeleton', stream);
+    return stream;
+  }
+
+  removeTake(stream) {
+    this.streams.delete(stream.name);
+    this.#tell('gone', stream);
   }
 
   raw(stream) {

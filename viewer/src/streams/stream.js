@@ -17,12 +17,14 @@ export class Stream {
   absent = 0; // statistics in a row that do not have it, without a pose between them
   callback_ms = NaN; // performance.now() when the newest pose came
 
-  constructor(name) {
+  // isTake: a recording that is played, which the daemon does not have
+  constructor(name, isTake = false) {
     this.name = name;
+    this.isTake = isTake;
   }
 
   get isRaw() {
-    return this.name.endsWith(RAW_SUFFIX);
+    return !this.isTake && this.name.endsWith(RAW_SUFFIX);
   }
 
   // Returns whether it is another skeleton than before.

@@ -131,13 +131,17 @@ const RenameModel = { 1: ['name', 'string'], 2: ['to', 'string'] };
 const DeleteModel = { 1: ['name', 'string'] };
 const Nothing = {};
 
-const Mark = { 1: ['style', 'bool'], 2: ['seconds', 'double'] };
-const Train = { 1: ['name', 'string'] };
+const Mark = { 1: ['style', 'bool'], 2: ['seconds', 'double'], 3: ['more', 'bool'] };
+const Train = { 1: ['name', 'string'], 2: ['signs', 'bool'] };
+const Show = { 1: ['label', 'string'], 2: ['seconds', 'double'] };
+const Forget = { 1: ['label', 'string'] };
 const Teach = {
   1: ['stream', 'string'],
   2: ['mark', Mark, '?'],
   3: ['train', Train, '?'],
   4: ['cancel', Nothing, '?'],
+  5: ['show', Show, '?'],
+  6: ['forget', Forget, '?'],
 };
 
 export const ControlRequest = {
@@ -170,7 +174,8 @@ const KnownRecording = {
   4: ['in_use', 'bool'],
 };
 
-const TaughtWalk = { 1: ['good', 'bool'], 2: ['sentence', 'string'] };
+const TaughtWalk = { 1: ['good', 'bool'], 2: ['sentence', 'string'], 3: ['takes', 'uint'] };
+const TaughtSign = { 1: ['label', 'string'], 2: ['shows', 'uint'] };
 const Teaching = {
   1: ['stream', 'string'],
   2: ['step', 'uint'],
@@ -183,6 +188,9 @@ const Teaching = {
   9: ['train_s', 'double'],
   10: ['verdict', 'string'],
   11: ['problem', 'string'],
+  12: ['label', 'string'],
+  13: ['show', TaughtWalk, '?'],
+  14: ['sign', TaughtSign, '*'],
 };
 
 export const ControlReply = {

@@ -179,6 +179,35 @@ pageTest('a style is taught by two walks', { bodies: 1, hands: 0 }, async (page,
   await learn.click();
   await lesson.getByText('proud.style: from frame 900, 1.5 s later').waitFor(PATIENCE);
   assert.equal(bridge.daemon.bodies[0].model, 'proud.style');
+  await lesson.getByRole('button', { name: 'One more' }).first().click();
+  await lesson.getByText('; 2 walks are kept').waitFor(PATIENCE);
+  assert.ok(await learn.isEnabled());
+});
+
+pageTest('a hand is taught signs', { bodies: 0, hands: 1 }, async (page, bridge) => {
+  await unfold(page, 'Teach signs');
+  const lesson = page.locator('details', { hasText: 'Teach signs' });
+  const learn = lesson.getByRole('button', { name: 'Learn' });
+  const begin = lesson.getByRole('button', { name: 'Show 5 s' });
+  await lesson.getByLabel('Sign', { exact: true }).fill('two words');
+  assert.ok(await begin.isDisabled());
+  await lesson.getByLabel('Sign', { exact: true }).fill('ok');
+  await lesson.getByLabel('Name').fill('mine');
+  for (const verdict of ['✓ held', '✗ the hand moved too much', '✓ held', '✓ held']) {
+    assert.ok(await learn.isDisabled());
+    await begin.click();
+    await lesson.getByText(/^\d+ s …/).waitFor(PATIENCE);
+    await begin.waitFor(PATIENCE);
+    await lesson.getByText(verdict).waitFor(PATIENCE);
+  }
+  await lesson.getByRole('button', { name: 'ok 3/3' }).waitFor(PATIENCE);
+  await learn.click();
+  await lesson.getByText('mine.gesture: from frame 900, 0.5 s later').waitFor(PATIENCE);
+  assert.ok(bridge.requests.some(({ teach }) => teach?.train?.signs === true));
+  const gestures = page.getByLabel('Gestures of the model');
+  await gestures.getByRole('button', { name: 'ok', exact: true }).waitFor(PATIENCE);
+  await lesson.getByRole('button', { name: 'ok 3/3' }).click();
+  await lesson.getByRole('button', { name: 'ok 3/3' }).waitFor({ state: 'detached' });
 });
 
 const rights = { may_control: false, read_only_reason: 'this key may watch only' };
@@ -451,6 +480,44 @@ pageTests(
       const bytes = readFileSync(await download.path());
       assert.equal(bytes.length, 70000);
       assert.ok(bytes.every((byte, i) => byte === i % 251));
+      await page.locator('summary', { hasText: 'Recordings' }).click();
+    },
+    'a take plays beside the live ones, as a whole or a part of it': async (page) => {
+      await unfold(page, 'Recordings');
+      const file = '20261126T065505Z-2-walker.bvh';
+      await page.getByLabel('Play: 20261126T065505Z-1-walker.bvh').click();
+      await acknowledged(page, 'cannot be played: it is no BVH');
+      await page.getByLabel(`Play: ${file}`).click();
+      const entry = page.locator('.legend li', { hasText: 'take 2: walker: recorded' });
+      await entry.waitFor(PATIENCE);
+      const own = (text) =>
+        page
+          .locator('.legend li', { hasText: text })
+          .first()
+          .evaluate((item) => item.style.getPropertyValue('--own'));
+      assert.notEqual(await own('take 2: walker'), await own('walker: styled'));
+      const before = await places(page, 'take 2: walker');
+      const moved = ([name, was]) =>
+        globalThis.posedPage.store.streams
+          .get(name)
+          .kinematics.position.some((value, i) => Math.abs(value - was[i]) > 0.01);
+      await page.waitForFunction(moved, ['take 2: walker', before], PATIENCE);
+      await page.waitForFunction(moved, ['walker', await places(page, 'walker')], PATIENCE);
+      assert.equal(await page.locator('.stream', { hasText: 'take 2' }).count(), 0);
+      await page.getByLabel('From, s').fill('0.5');
+      await page.getByLabel('To, s').fill('99');
+      await page.getByLabel('From, s').focus();
+      assert.equal(await page.getByLabel('To, s').inputValue(), '2.00');
+      const [part] = await Promise.all([
+        page.waitForEvent('download', PATIENCE),
+        page.getByRole('button', { name: 'Download this part' }).click(),
+      ]);
+      assert.equal(part.suggestedFilename(), '20261126T065505Z-2-walker-0.5s-2s.bvh');
+      const lines = readFileSync(await part.path(), 'utf8').split('\n');
+      const head = lines.findIndex((line) => line === 'Frames: 45');
+      assert.equal(lines.length, head + 2 + 45 + 1);
+      await page.getByLabel(`Stop: ${file}`).click();
+      await entry.waitFor({ state: 'hidden', ...PATIENCE });
       await page.locator('summary', { hasText: 'Recordings' }).click();
     },
     'a picture and a video of the scene are files': async (page) => {

@@ -1,12 +1,13 @@
 // What the fake bridge publishes and how it answers: a daemon of a few lines. Styled walkers with
 // their raw twins, hands that sign.
-import { SIGNS, bodySkeleton, handSkeleton, hold, walk } from './figures.mjs';
+import { SIGNS, bodySkeleton, handSkeleton, hold, walk, walkBvh } from './figures.mjs';
 import { encode } from './messages.mjs';
 
 const BODY_JOINTS = bodySkeleton({ stage: [] }).parent;
 const ALPHA_PER_S = 2;
 const GESTURE_S = 0.7;
 const RECORDED = Uint8Array.from({ length: 70000 }, (_, i) => i % 251); // bytes of a clip
+const TAKE = new TextEncoder().encode(walkBvh(60, 30));
 const ROOTS = ['off', 'stride', 'actor'];
 
 export class FakeDaemon {
@@ -20,6 +21,7 @@ export class FakeDaemon {
   recordings = [
     { name: '20261126T065505Z.plog', bytes: 9e6, changed_unix_s: 1795590000, in_use: true },
     { name: '20261126T065505Z-1-walker.bvh', bytes: RECORDED.length, changed_unix_s: 1795580000 },
+    { name: '20261126T065505Z-2-walker.bvh', bytes: TAKE.length, changed_unix_s: 1795580000 },
   ];
   takes = 0;
 
@@ -55,6 +57,8 @@ export class FakeDaemon {
     this.hands = names('hand', hands).map((name, i) => ({
       name,
       id: 200 + i,
+      model: 'hand.gesture',
+      labels: Object.keys(SIGNS),
       play: [],
       began_s: 0,
       loop: false,
@@ -187,7 +191,7 @@ export class FakeDaemon {
         },
       ],
     }));
-    const hands = this.hands.map(({ name }) => ({
+    const hands = this.hands.map(({ name, model, labels }) => ({
       ...common(name, 'cyberglove'),
       lag_frames: 1,
       lag_ms: 1000 / this.rate_hz,
@@ -196,7 +200,7 @@ export class FakeDaemon {
       clock_offset_ns: -4200000,
       clock_drift_ppm: 3.1,
       stage: [
-        { name: 'generate', model: 'hand.gesture', word: Object.keys(SIGNS) },
+        { name: 'generate', model, word: labels },
         { name: 'constrain' },
       ],
     }));
@@ -222,13 +226,15 @@ export class FakeDaemon {
     if (kind === 'set_parameter' && body) return this.#set(body, details, done);
     if (kind === 'stage_command' && hand) return this.#command(hand, details, done);
     if (kind === 'take') return this.#mark(details);
+    if (kind === 'teach' && hand) return { ok: true, teaching: this.#teachSigns(hand, details) };
     if (kind === 'teach' && body) return { ok: true, teaching: this.#teach(body, details) };
     if (kind === 'list_models') return { ok: true, model: this.models };
     if (kind === 'rename_model' || kind === 'delete_model') return this.#keep(kind, details);
     if (kind === 'list_recordings') return { ok: true, recording: this.recordings };
     if (kind === 'fetch_recording') {
-      const { offset = 0 } = details;
-      return { ok: true, piece: RECORDED.subarray(offset, offset + 32768) };
+      const { name, offset = 0 } = details;
+      const bytes = name.includes('-2-') ? TAKE : RECORDED;
+      return { ok: true, piece: bytes.subarray(offset, offset + 32768) };
     }
     if (kind === 'use_model' && body) {
       body.model = details.name;
@@ -265,8 +271,10 @@ export class FakeDaemon {
   #teach(body, { stream, mark, train, cancel }) {
     this.teaching ??= { stream, step: 0 };
     const { teaching } = this;
-    if (mark) Object.assign(teaching, { step: 1, style: mark.style, seconds_left: mark.seconds });
-    else if (train) Object.assign(teaching, { step: 3, model: `${train.name}.style` });
+    if (mark) {
+      Object.assign(teaching, { step: 1, style: mark.style, seconds_left: mark.seconds });
+      this.more = mark.more;
+    } else if (train) Object.assign(teaching, { step: 3, model: `${train.name}.style` });
     else if (cancel) teaching.step = 0;
     else if (teaching.step === 3) {
       body.model = teaching.model;
@@ -276,9 +284,34 @@ export class FakeDaemon {
       const sentence = good ? '18 strides in 20.0 s' : 'this is no walk';
       this.stumbled ||= teaching.style;
       teaching.step = 0;
-      teaching[teaching.style ? 'style_walk' : 'neutral_walk'] = { good, sentence };
+      const kind = teaching.style ? 'style_walk' : 'neutral_walk';
+      const before = this.more ? (teaching[kind]?.takes ?? 0) : 0;
+      teaching[kind] = { good, sentence, takes: before + Number(good) };
     }
     return teaching;
+  }
+
+  // Each show takes three questions, a training one; the second show is refused.
+  #teachSigns(hand, { stream, show, forget, train }) {
+    this.lesson ??= { stream, step: 0, sign: [] };
+    const { lesson } = this;
+    if (show) Object.assign(lesson, { step: 1, label: show.label, seconds_left: show.seconds });
+    else if (forget) lesson.sign = lesson.sign.filter(({ label }) => label !== forget.label);
+    else if (train) Object.assign(lesson, { step: 3, model: `${train.name}.gesture` });
+    else if (lesson.step === 3) {
+      hand.model = lesson.model;
+      hand.labels = ['rest', ...lesson.sign.map(({ label }) => label)];
+      Object.assign(lesson, { step: 5, sequence: 900, train_s: 0.5, verdict: 'knows ok, rest' });
+    } else if (lesson.step === 1 && (lesson.seconds_left -= 2) < 0) {
+      this.shown = (this.shown ?? 0) + 1;
+      const good = this.shown !== 2;
+      lesson.step = 0;
+      lesson.show = { good, sentence: good ? 'held within 2 degrees' : 'the hand moved too much' };
+      const sign = lesson.sign.find(({ label }) => label === lesson.label);
+      if (good && sign) sign.shows += 1;
+      else if (good) lesson.sign.push({ label: lesson.label, shows: 1 });
+    }
+    return lesson;
   }
 
   #command(hand, { name, word, number }, done) {

@@ -149,3 +149,42 @@ export function hold(sign, waver) {
   });
   return { root_position_m: [0, 0, 0], rotation_xyzw };
 }
+
+// The walk as a BVH in centimetres, as posed writes a take.
+export function walkBvh(frames, rate_hz) {
+  const lines = [];
+  const write = (joint) => {
+    const [name, above, offset_m, tip_m] = BODY[joint];
+    const at = (offset) => `OFFSET ${offset.map((value) => 100 * value).join(' ')}`;
+    const turns = 'Zrotation Yrotation Xrotation';
+    lines.push(`${above < 0 ? 'ROOT' : 'JOINT'} ${name}`, '{', at(offset_m));
+    if (above < 0) lines.push(`CHANNELS 6 Xposition Yposition Zposition ${turns}`);
+    else lines.push(`CHANNELS 3 ${turns}`);
+    BODY.forEach(([, parent], child) => parent === joint && write(child));
+    if (tip_m) lines.push('End Site', '{', at(tip_m), '}');
+    lines.push('}');
+  };
+  lines.push('HIERARCHY');
+  write(0);
+  lines.push('MOTION', `Frames: ${frames}`, `Frame Time: ${1 / rate_hz}`);
+  for (let i = 0; i < frames; i += 1) {
+    const { rotation_xyzw: all, root_position_m: root_m } = walk(i / rate_hz, 0);
+    const row = Array.from(root_m, (value) => 100 * value);
+    for (const joint of writtenOrder(0)) {
+      const [x, y, z, w] = all.slice(4 * joint, 4 * joint + 4);
+      row.push(
+        Math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)) / D,
+        Math.asin(2 * (w * y - z * x)) / D,
+        Math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)) / D,
+      );
+    }
+    lines.push(row.map((value) => value.toFixed(6)).join(' '));
+  }
+  return `${lines.join('\n')}\n`;
+}
+
+// Depth first, as a BVH has its joints.
+function writtenOrder(joint) {
+  const children = BODY.flatMap(([, parent], child) => (parent === joint ? [child] : []));
+  return [joint, ...children.flatMap(writtenOrder)];
+}

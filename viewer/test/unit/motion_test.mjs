@@ -1,11 +1,12 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { Quaternion, Vector3 } from 'three';
+import { Bvh, cutBvh } from '../../src/motion/bvh.js';
 import { Kinematics, isSound } from '../../src/motion/kinematics.js';
 import { isHand, maskText, parseMask, partWords } from '../../src/motion/body_parts.js';
 import { Foot, feetOf } from '../../src/motion/feet.js';
 import { facing } from '../../src/scene/facing.js';
-import { bodySkeleton, handSkeleton, walk } from '../support/figures.mjs';
+import { bodySkeleton, handSkeleton, walk, walkBvh } from '../support/figures.mjs';
 import { random } from '../support/random.mjs';
 
 const H = Math.SQRT1_2;
@@ -145,4 +146,44 @@ test('three.js and the page turn vectors in the same way', () => {
   const q = new Quaternion(0.1, -0.4, 0.2, 0.6).normalize();
   kinematics.pose([...q.toArray(), 0, 0, 0, 1, 0, 0, 0, 1], [0, 0, 0]);
   close(kinematics.position.subarray(3, 6), new Vector3(0, 1, 0).applyQuaternion(q).toArray());
+});
+
+test('a BVH poses a figure as the stream that it was recorded from', () => {
+  const text = walkBvh(30, 30);
+  const bvh = new Bvh(text);
+  assert.deepEqual([bvh.frames, bvh.unit_m, bvh.seconds.toFixed(3)], [30, 0.01, '1.000']);
+  const live = bodySkeleton({ stage: [] });
+  const message = bvh.skeleton(live);
+  assert.ok(isSound(message));
+  const [recorded, streamed] = [new Kinematics(message), new Kinematics(live)];
+  const [rotation, root_m] = [new Float32Array(4 * bvh.joints.length), new Float32Array(3)];
+  for (const index of [0, 7, 29]) {
+    bvh.frame(index, rotation, root_m);
+    recorded.pose(rotation, root_m);
+    const { rotation_xyzw, root_position_m } = walk(index / 30, 0);
+    streamed.pose(Float32Array.from(rotation_xyzw), root_position_m);
+    for (const bone of ['head', 'leftHand', 'rightToes'])
+      for (let i = 0; i < 3; i += 1) {
+        const [a, b] = [recorded, streamed].map((of) => of.position[3 * of.jointOf(bone) + i]);
+        assert.ok(Math.abs(a - b) < 1e-4, `${bone} ${index}: ${a} ${b}`);
+      }
+  }
+  const part = new Bvh(cutBvh(text, bvh, 0.5, 0.8));
+  assert.equal(part.frames, 9);
+  assert.deepEqual(part.values.slice(0, 6), bvh.values.slice(15 * bvh.width, 15 * bvh.width + 6));
+});
+
+test('what is no sound BVH is refused in words', () => {
+  const text = walkBvh(3, 30);
+  for (const [broken, why] of [
+    ['', 'it is no BVH'],
+    ['PNG', 'it is no BVH'],
+    [text.slice(0, 300), 'it is no BVH|no number|unknown channel|has no'],
+    [text.replace('Frames: 3', 'Frames: 4'), 'no number'],
+    [text.replace('Frames: 3', 'Frames: 1e12'), 'too long'],
+    [text.replace('Frame Time: 0', 'Frame Time: -'), 'no frames|no number'],
+    [text.replace('OFFSET 0', 'OFFSET NaN'), 'no number'],
+    [`HIERARCHY ${'ROOT a { '.repeat(600)}`, 'too many joints'],
+  ])
+    assert.throws(() => new Bvh(broken), new RegExp(why));
 });

@@ -107,7 +107,8 @@ struct Fixture {
 
 TEST_CASE("teaching is refused, before anybody walks, where it could not end well") {
   const test::TempFolder folder;
-  teach::Teacher teacher([](const std::string&, std::string_view) { return fail("never"); }, [] {});
+  teach::Teacher teacher(
+      [](teach::Subject, const std::string&, std::string_view) { return fail("never"); }, [] {});
   FakeDaemonControl daemon_control;
   HandlerRig rig(three_streams(), daemon_control, ModelFolder::open(folder.path()).value(),
                  system::monotonic_ns, &teacher);

@@ -1,5 +1,7 @@
 #include "daemon/control/model_folder.hpp"
 
+#include <chrono>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -113,6 +115,7 @@ TEST_CASE("recordings are listed and read by their names in the folder, and by n
     REQUIRE(write_whole_file(path, large));
   }
   std::filesystem::create_symlink(home.path() / "d.bvh", folder / "e.bvh");
+  create_directory(folder / "f.bvh");
   const RecordingFolder recordings(folder);
   const auto list = recordings.list().value();
   REQUIRE(list.size() == 2);
@@ -124,15 +127,25 @@ TEST_CASE("recordings are listed and read by their names in the folder, and by n
   CHECK(recordings.piece("a.bvh", ~std::uint64_t{0}).value().empty());
   CHECK(recordings.piece("b.plog", 0).error().message.contains("being written"));
   for (const std::string& name : std::vector<std::string>{
-           "../d.bvh", "e.bvh", "notes.txt", ".c.bvh", (folder / "a.bvh").string(), "", "."}) {
+           "../d.bvh", "e.bvh", "f.bvh", "g.bvh", "notes.txt", ".c.bvh",
+           (folder / "a.bvh").string(), "./a.bvh", "", ".", std::string("a.bvh\0.bvh", 10)}) {
     CHECK_FALSE(recordings.piece(name, 0));
   }
+  // However many others there are, which the list leaves out.
+  for (int i = 0; i < 300; ++i) {
+    REQUIRE(write_whole_file(folder / (std::to_string(i) + ".bvh"), "later"));
+  }
+  const auto now = std::filesystem::file_time_type::clock::now();
+  last_write_time(folder / "a.bvh", now - std::chrono::hours(1));
+  CHECK(recordings.piece("a.bvh", kMaxRecordingPiece).value() == "xxxxx");
 }
 
 TEST_CASE("a model that is kept replaces none, and its name stays in the folder") {
   const test::TempFolder folder;
   const auto models = ModelFolder::open(folder.path()).value();
-  const auto keep = [&](const std::string& bytes) { return models.add("proud", bytes).value(); };
+  const auto keep = [&](const std::string& bytes) {
+    return models.add("proud", "style", bytes).value();
+  };
   CHECK(keep("one") == "proud.style");
   CHECK(keep("two") == "proud-2.style");
   CHECK(keep("three") == "proud-3.style");
@@ -140,7 +153,7 @@ TEST_CASE("a model that is kept replaces none, and its name stays in the folder"
   CHECK(models.read("proud-2.style").value() == "two");
   CHECK(models.list()->size() == 3);
   CHECK(std::distance(std::filesystem::directory_iterator(folder.path()), {}) == 3);
-  CHECK_FALSE(ModelFolder().add("proud", "one"));
+  CHECK_FALSE(ModelFolder().add("proud", "style", "one"));
 }
 
 }  // namespace posed::control

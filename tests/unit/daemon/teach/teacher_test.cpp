@@ -8,13 +8,16 @@
 #include <vector>
 
 #include <catch2/catch.hpp>
+#include <nlohmann/json.hpp>
 
 #include "daemon/teach/teacher.hpp"
+#include "models/gesture/synthetic_signer.hpp"
 #include "models/gp/regression.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/model/style_model.hpp"
 #include "models/style/train/train.hpp"
 #include "proto/frame/degree.hpp"
+#include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/time.hpp"
 #include "tests/support/has.hpp"
 
@@ -37,11 +40,30 @@ clip::Clip walk_of(WalkerFamily family) {
 struct School {
   std::vector<std::string> kept;
   std::atomic<int> calls{0};
-  Teacher teacher{[this](const std::string& name, std::string_view) {
-                    kept.push_back(name);
-                    return Result<std::string>(name + ".style");
-                  },
-                  [this] { ++calls; }, clock_of_test};
+  Teacher teacher{
+      [this](Subject subject, const std::string& name, std::string_view) {
+        kept.push_back(name);
+        return Result<std::string>(name + (subject == Subject::kStyle ? ".style" : ".gesture"));
+      },
+      [this] { ++calls; }, clock_of_test};
+
+  // Marks this take of a hand as a show.
+  v1::Teaching show(const clip::HandClip& take, const std::string& label) {
+    const Skeleton hand = hand_skeleton(Side::kRight);
+    const Pupil pupil{kStream, "hand", std::make_shared<const Skeleton>(hand)};
+    REQUIRE(teacher.show(pupil, label, kMaxShow_s));
+    for (std::size_t i = 0; i < take.angles.size(); ++i) {
+      Frame frame;
+      set_hand_angles(hand, take.angles[i], frame);
+      frame.skeleton = hand.id;
+      frame.header.stream = kStream;
+      frame.header.device_ns = kNoTime_ns;
+      frame.header.arrival_ns = now_ns + static_cast<std::int64_t>(take.time_s[i] * 1e9);
+      teacher.raw_frame(frame);
+    }
+    now_ns += static_cast<std::int64_t>((kMaxShow_s + 1.0) * 1e9);
+    return await();
+  }
 
   static Pupil pupil(const clip::Clip& clip, const std::string& name = "walker") {
     return {.stream = kStream, .name = name, .skeleton = clip.skeleton};
@@ -59,8 +81,8 @@ struct School {
   }
 
   // Marks this clip as a walk, among frames of others, and one behind its end.
-  v1::TaughtWalk mark(const clip::Clip& clip, Walk walk) {
-    REQUIRE(teacher.mark(pupil(clip), walk, kWalk_s));
+  v1::TaughtWalk mark(const clip::Clip& clip, Walk walk, bool more = false) {
+    REQUIRE(teacher.mark(pupil(clip), walk, kWalk_s, more));
     const std::int64_t from_ns = now_ns;
     for (int i = 0; i <= clip.frames(); ++i) {
       Frame frame = clip.frame(std::min(i, clip.frames() - 1));
@@ -84,7 +106,7 @@ style::TrainingClip lesson(clip::Clip clip, const std::string& group) {
 
 }  // namespace
 
-TEST_CASE("a style that is taught live is the one that training on files learns", "[teach]") {
+TEST_CASE("a style that is taught live is the one that training on its walks learns", "[teach]") {
   School school;
   const clip::Clip march = walk_of(WalkerFamily::kMarch);
   const clip::Clip sway = walk_of(WalkerFamily::kSway);
@@ -96,6 +118,8 @@ TEST_CASE("a style that is taught live is the one that training on files learns"
   CHECK(usual.good());
   CHECK_FALSE(school.teacher.train("walker", "sway"));
   CHECK(school.mark(sway, Walk::kStyle).good());
+  const clip::Clip more = motion::make_walker({.person = 2, .seconds = kWalk_s}).value();
+  CHECK(school.mark(more, Walk::kNeutral, true).takes() == 2);
   REQUIRE(school.teacher.train("walker", "sway"));
   const v1::Teaching learnt = school.await();
   INFO(learnt.problem());
@@ -115,7 +139,11 @@ TEST_CASE("a style that is taught live is the one that training on files learns"
   options.target = "sway";
   options.dataset.space = motion::Space::kHumanoid;
   const auto offline =
-      style::train_style({lesson(march, "as usual"), lesson(sway, "sway")}, options).value();
+      style::train_style(
+          {lesson(march, "as usual"), lesson(more, "as usual"), lesson(sway, "sway")}, options)
+          .value();
+  const auto report = nlohmann::json::parse(live.report_json);
+  CHECK(report.at("clips").size() == 3);
   REQUIRE(live.process.inputs.cols() == offline.process.inputs.cols());
   const Eigen::MatrixXd asked = offline.process.inputs;
   const Eigen::MatrixXd wanted = gp::posterior_mean(offline.process, asked);
@@ -143,6 +171,48 @@ TEST_CASE("a spoilt walk is refused in words, and its stream can walk again", "[
   CHECK(state.step() == v1::Teaching::STEP_IDLE);
   CHECK(has(state.problem(), "no difference to learn"));
   CHECK(school.kept.empty());
+}
+
+TEST_CASE("more walks are learnt beside those before, and a refused one spoils none", "[teach]") {
+  School school;
+  const clip::Clip march = walk_of(WalkerFamily::kMarch);
+  CHECK(school.mark(march, Walk::kNeutral).takes() == 1);
+  CHECK(school.mark(walk_of(WalkerFamily::kSway), Walk::kStyle).takes() == 1);
+  CHECK(school.mark(march, Walk::kNeutral, true).takes() == 2);
+  clip::Clip still = march;
+  for (int i = 1; i < still.frames(); ++i) still.channels.row(i) = still.channels.row(0);
+  const auto refused = school.mark(still, Walk::kNeutral, true);
+  CHECK_FALSE(refused.good());
+  CHECK(refused.takes() == 2);
+  CHECK(school.mark(march, Walk::kNeutral).takes() == 1);  // in the place of both
+}
+
+TEST_CASE("a hand is taught signs, and keeps those that were shown well", "[teach]") {
+  School school;
+  const auto take = gesture::make_performance({.script = {"p", "1", "p"}}).value().clip;
+  CHECK(has(school.teacher.train("hand", "signs", Subject::kSigns).error().message, "no sign"));
+  for (std::size_t i = 0; i < kMinShows; ++i) {
+    const auto shown = school.show(take, "one");
+    INFO(shown.show().sentence());
+    REQUIRE(shown.show().good());
+    REQUIRE(shown.sign_size() == 1);
+    CHECK(shown.sign(0).shows() == i + 1);
+  }
+  const auto alike = school.show(take, "uno");
+  CHECK_FALSE(alike.show().good());
+  CHECK(has(alike.show().sentence(), "like 'one'"));
+  CHECK(alike.sign_size() == 1);
+  const Pupil body = School::pupil(walk_of(WalkerFamily::kMarch));
+  CHECK(has(school.teacher.show(body, "one", 5.0).error().message, "is no hand"));
+  REQUIRE(school.teacher.train("hand", "signs", Subject::kSigns));
+  const auto learnt = school.await();
+  INFO(learnt.problem());
+  REQUIRE(learnt.step() == v1::Teaching::STEP_STARTING);
+  CHECK(has(learnt.verdict(), "knows one, rest from 3 shows"));
+  CHECK(school.teacher.take_model()->file == "signs.gesture");
+  school.teacher.started(1);
+  CHECK(school.teacher.forget("hand", "one"));
+  CHECK(school.teacher.state().sign_size() == 0);
 }
 
 TEST_CASE("one stream is taught at a time, until it is cancelled", "[teach]") {

@@ -1,0 +1,90 @@
+// What teaching a style and teaching signs have in common: a fold with a name, "Learn" and
+// "Cancel". All of it is known by the daemon; the page asks while something is under way.
+import { el, labelled, write } from './dom.js';
+
+const LOOK_MS = 250;
+const NAME = /^[a-z0-9_-]{1,32}$/;
+export const STEP = { idle: 0, marking: 1, checking: 2, training: 3, starting: 4, inUse: 5 }; // Teaching.Step
+
+export class Lesson {
+  static #open = {}; // by title; also when the controls are made again for the model that was learnt
+
+  now = { step: STEP.idle };
+
+  // train: what is learnt, beside its name, as the request has it; rows: elements above the name
+  constructor(stream, { control, requests }, title, train = {}) {
+    Object.assign(this, { name: stream.name, control, requests, title });
+    this.called = el('input', {
+      type: 'text',
+      maxLength: 32,
+      placeholder: 'a-z, digits, - and _',
+      oninput: () => this.show(),
+    });
+    const button = (text, step, what) =>
+      el('button', { type: 'button', onclick: () => this.ask(step(), what()) }, text);
+    this.learn = button(
+      'Learn',
+      () => ({ train: { name: this.called.value, ...train } }),
+      () => `${this.name}: learns ${this.called.value}`,
+    );
+    this.cancel = button(
+      'Cancel',
+      () => ({ cancel: {} }),
+      () => `${this.name}: teaching is cancelled`,
+    );
+    this.words = el('p.note', { role: 'status' });
+  }
+
+  fold(...rows) {
+    this.element = el(
+      'details',
+      { open: Lesson.#open[this.title] ?? false, ontoggle: () => this.#toggled() },
+      el('summary', {}, this.title),
+      ...rows,
+      labelled('Name', this.called, this.learn, this.cancel),
+      this.words,
+    );
+    this.show();
+  }
+
+  #toggled() {
+    Lesson.#open[this.title] = this.element.open;
+    if (this.element.open) this.ask({});
+  }
+
+  async ask(step, what) {
+    clearTimeout(this.timer);
+    const request = { teach: { stream: this.name, ...step } };
+    const reply = await (what ? this.control(request, what) : this.requests.ask(request));
+    if (reply.ok) {
+      const { teaching } = reply;
+      this.now = teaching.stream === this.name ? teaching : { step: STEP.idle };
+    }
+    this.show(reply.ok ? '' : reply.error);
+    if (this.busy && this.element.isConnected) this.timer = setTimeout(() => this.ask({}), LOOK_MS);
+  }
+
+  get busy() {
+    return this.now.step !== STEP.idle && this.now.step !== STEP.inUse;
+  }
+
+  // ready: enough was marked to learn from
+  showLesson(ready, refusal) {
+    this.learn.disabled = this.busy || !ready || !NAME.test(this.called.value);
+    this.cancel.hidden = !this.busy;
+    write(this.words, refusal || this.#sentence());
+  }
+
+  #sentence() {
+    const { step, problem, verdict, model, sequence, train_s } = this.now;
+    if (step === STEP.training || step === STEP.starting) return 'learning …';
+    if (step !== STEP.inUse) return problem ?? '';
+    const from = sequence > 0 ? `from frame ${sequence}, ${train_s.toFixed(1)} s later` : 'kept';
+    return `${model}: ${from}; ${verdict}`;
+  }
+}
+
+// How it went: what is shown below the button that began it.
+export function verdictOf({ good = false, sentence = '' } = {}) {
+  return sentence && `${good ? '✓' : '✗'} ${sentence}`;
+}

@@ -1,0 +1,67 @@
+// Teaches the chosen hand signs: each is shown three times, from rest into the sign and back, and
+// the daemon learns them all; then they are gestures to perform and to be recognised.
+import { el, labelled, write } from './dom.js';
+import { Lesson, STEP, verdictOf } from './lesson.js';
+
+const SHOW_S = 5;
+const SHOWS = 3; // that a sign needs
+const LABEL = /^[!-~]{1,15}$/;
+
+export class SignLesson extends Lesson {
+  #listed = '';
+
+  constructor(stream, context) {
+    super(stream, context, 'Teach signs', { signs: true });
+    this.sign = el('input', {
+      type: 'text',
+      maxLength: 15,
+      placeholder: 'ok',
+      autocomplete: 'off',
+      oninput: () => this.show(),
+    });
+    this.begin = el('button', { type: 'button', onclick: () => this.#begin() });
+    this.verdict = el('p.note');
+    this.signs = el('div.chips', { aria: { label: 'Signs that were shown' } });
+    this.fold(
+      el(
+        'p.note',
+        {},
+        `Rest, make the sign, hold it still, rest again; ${SHOWS} times for each sign. Rest is learnt from all of them.`,
+      ),
+      labelled('Sign', this.sign, this.begin),
+      this.verdict,
+      this.signs,
+    );
+  }
+
+  #begin() {
+    const label = this.sign.value;
+    this.ask({ show: { label, seconds: SHOW_S } }, `${this.name}: show ${label}`);
+  }
+
+  #chip({ label, shows }) {
+    const text = `${label} ${shows}/${SHOWS}`;
+    const forget = () => this.ask({ forget: { label } }, `${this.name}: ${label} is forgotten`);
+    return el(
+      'button.chip',
+      { type: 'button', disabled: this.busy, onclick: forget, title: `Forget ${label}` },
+      `${text} ✕`,
+    );
+  }
+
+  show(refusal = '') {
+    const { step, seconds_left, show, sign = [] } = this.now;
+    const marked = step === STEP.marking;
+    write(this.begin, marked ? `${Math.ceil(seconds_left)} s …` : `Show ${SHOW_S} s`);
+    this.begin.disabled = this.busy || !LABEL.test(this.sign.value);
+    write(this.verdict, verdictOf(show));
+    const listed = JSON.stringify([sign, this.busy]);
+    if (listed !== this.#listed)
+      this.signs.replaceChildren(...sign.map((one) => this.#chip(one)));
+    this.#listed = listed;
+    this.showLesson(
+      sign.length > 0 && sign.every(({ shows }) => shows >= SHOWS),
+      refusal,
+    );
+  }
+}
