@@ -390,9 +390,7 @@ class Builder {
         if (hand_.links[l].turns && std::abs(placed_.axis[l].dot(y)) > 0.8) finger.knuckle = l;
       }
       finger.knuckle_m = placed_.at_m[finger.knuckle];
-      for (int l = finger.tip; l != finger.knuckle; l = hand_.links[l].parent) {
-        finger.length_m += hand_.links[l].at.translation().norm();
-      }
+      finger.length_m = reach_m(finger);
       if (!(finger.length_m > 5e-3)) {
         return refuse("the finger that ends in " + in_quotes(hand_.links[finger.tip].name) +
                       " is shorter than 5 mm; name its last link by `tips`");
@@ -409,6 +407,35 @@ class Builder {
     }
     hand_.palm << (hand_.side == Side::kRight ? out : Eigen::Vector3d(-out)), y, z;
     return {};
+  }
+
+  // The longest way from knuckle to tip: where links are not in a row, the sum of their lengths is
+  // more than a finger can reach. Joint after joint, because each changes it by itself.
+  double reach_m(const Finger& finger) {
+    constexpr int kAngles = 32, kRounds = 3;
+    Drive drive = open_pose();
+    const auto length_m = [&] {
+      place(hand_, drive, placed_);
+      return (placed_.at_m[finger.tip] - placed_.at_m[finger.knuckle]).norm();
+    };
+    double longest_m = length_m();
+    for (int round = 0; round < kRounds; ++round) {
+      for (const Turn& turn : hand_.turns[finger.tip]) {
+        if (!is_above(finger.knuckle, turn.link)) continue;
+        const DrivenJoint& joint = hand_.driven[turn.driven];
+        double best = drive[turn.driven];
+        for (int k = 0; k <= kAngles; ++k) {
+          drive[turn.driven] = joint.low + (joint.high - joint.low) * k / kAngles;
+          const double found_m = length_m();
+          if (found_m <= longest_m) continue;
+          longest_m = found_m;
+          best = drive[turn.driven];
+        }
+        drive[turn.driven] = best;
+      }
+    }
+    place(hand_, open_pose(), placed_);
+    return longest_m;
   }
 
   // How far the fingers' tips go along `out` when their joints turn where they can turn further.

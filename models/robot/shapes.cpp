@@ -5,11 +5,14 @@
 #include <limits>
 
 #include "models/hand/segments.hpp"
+#include "models/robot/capsule_fit.hpp"
 
 namespace posed::robot {
 namespace {
 
-constexpr int kMaxCapsulesABox = 4;
+constexpr int kMaxStripsABox = 4;
+constexpr std::size_t kMaxJoined = 40;     // of a link: more would take long
+constexpr double kJoinedFat_m = 4e-3;
 constexpr int kTries = 100;
 constexpr double kMostly = 0.7;
 
@@ -22,26 +25,105 @@ void add_capsule(RobotHand& hand, int link, const Eigen::Isometry3d& at,
                            .reach_m = 0.5 * (to_m - from_m).norm() + radius_m});
 }
 
-// Capsules along the longest edge, side by side across the middle one. Each reaches its strip's
-// corners: radius^2 = across^2 + (what the axis is shorter than the edge)^2.
-void add_box(RobotHand& hand, int link, const Shape& shape) {
+// What one capsule holds of a link's boxes.
+struct Cover {
+  std::vector<Eigen::Vector3d> corners;
+  CapsuleFit fit;
+  double fat_m = 0.0;  // how far the capsule reaches beyond the boxes
+};
+
+double to_box_m(const Shape& box, const Eigen::Vector3d& point_m) {
+  const Eigen::Vector3d local = box.at.inverse(Eigen::Isometry) * point_m;
+  return (local.cwiseAbs() - 0.5 * box.size_m).cwiseMax(0.0).norm();
+}
+
+// At the points of its surface that are farthest from its axis in 14 directions.
+double fat_of(const CapsuleFit& fit, const std::vector<Shape>& boxes) {
+  double fat_m = 0.0;
+  for (int n = 0; n < 27; ++n) {
+    const Eigen::Vector3d towards(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+    if (towards.isZero()) continue;
+    const Eigen::Vector3d out = fit.radius_m * towards.normalized();
+    const double end = 0.5 * fit.length_m;
+    for (const double z : {-end, 0.0, end}) {
+      if (z * out.z() < 0.0) continue;  // inside it
+      const Eigen::Vector3d point_m = fit.at * Eigen::Vector3d(out.x(), out.y(), z + out.z());
+      double least_m = std::numeric_limits<double>::infinity();
+      for (const Shape& box : boxes) {
+        if (box.kind == Shape::Kind::kBox) least_m = std::min(least_m, to_box_m(box, point_m));
+      }
+      fat_m = std::max(fat_m, least_m);
+    }
+  }
+  return fat_m;
+}
+
+Cover cover(std::vector<Eigen::Vector3d> corners, const std::vector<Shape>& boxes) {
+  Cover cover{.corners = std::move(corners)};
+  cover.fit = fit_capsule(cover.corners, [&](const CapsuleFit& fit) { return fat_of(fit, boxes); });
+  cover.fat_m = fat_of(cover.fit, boxes);
+  return cover;
+}
+
+// Strips along the longest edge, side by side across the middle one.
+void add_strips(const Shape& box, const std::vector<Shape>& boxes, std::vector<Cover>& covers) {
   std::array<int, 3> order{0, 1, 2};
-  std::ranges::sort(order, [&](int a, int b) { return shape.size_m[a] > shape.size_m[b]; });
-  const double long_m = 0.5 * shape.size_m[order[0]];
-  const double middle_m = 0.5 * shape.size_m[order[1]];
-  const double thin_m = std::max(0.5 * shape.size_m[order[2]], 1e-6);
+  std::ranges::sort(order, [&](int a, int b) { return box.size_m[a] > box.size_m[b]; });
+  const double middle_m = 0.5 * box.size_m[order[1]];
+  const double thin_m = std::max(0.5 * box.size_m[order[2]], 1e-6);
   const int count =
-      std::clamp(static_cast<int>(std::ceil(middle_m / thin_m - 1e-9)), 1, kMaxCapsulesABox);
-  const double strip_m = middle_m / count;
-  const double across_m = std::hypot(strip_m, thin_m);
-  const double shorter_m = std::min(0.5 * across_m, long_m);
-  const double radius_m = std::hypot(across_m, shorter_m);
+      std::clamp(static_cast<int>(std::ceil(middle_m / thin_m - 1e-9)), 1, kMaxStripsABox);
   for (int i = 0; i < count; ++i) {
-    Eigen::Vector3d aside = Eigen::Vector3d::Zero();
-    aside[order[1]] = -middle_m + strip_m * (2 * i + 1);
-    Eigen::Vector3d along = Eigen::Vector3d::Zero();
-    along[order[0]] = long_m - shorter_m;
-    add_capsule(hand, link, shape.at, aside - along, aside + along, radius_m);
+    std::vector<Eigen::Vector3d> corners;
+    for (int n = 0; n < 8; ++n) {
+      Eigen::Vector3d corner;
+      corner[order[0]] = (n % 2 - 0.5) * box.size_m[order[0]];
+      corner[order[1]] = middle_m * (2.0 * (i + n / 2 % 2) / count - 1.0);
+      corner[order[2]] = (n / 4 - 0.5) * box.size_m[order[2]];
+      corners.emplace_back(box.at * corner);
+    }
+    covers.push_back(cover(std::move(corners), boxes));
+  }
+}
+
+// Two that one capsule holds without reaching much farther beyond the boxes become one, those that
+// cost least first.
+void join(const std::vector<Shape>& boxes, std::vector<Cover>& covers) {
+  while (covers.size() > 1 && covers.size() <= kMaxJoined) {
+    double least = std::numeric_limits<double>::infinity();
+    Cover best;
+    std::size_t into = 0, from = 0;
+    for (std::size_t a = 0; a < covers.size(); ++a) {
+      for (std::size_t b = a + 1; b < covers.size(); ++b) {
+        const double allowed_m = std::max({kJoinedFat_m, covers[a].fat_m, covers[b].fat_m});
+        std::vector<Eigen::Vector3d> corners = covers[a].corners;
+        corners.insert(corners.end(), covers[b].corners.begin(), covers[b].corners.end());
+        Cover both = cover(std::move(corners), boxes);
+        const double cost = both.fat_m - allowed_m;
+        if (cost > 0.0 || cost >= least) continue;
+        least = cost;
+        best = std::move(both);
+        into = a;
+        from = b;
+      }
+    }
+    if (!std::isfinite(least)) return;
+    covers[into] = std::move(best);
+    covers.erase(covers.begin() + static_cast<long>(from));
+  }
+}
+
+// Few capsules that hold all boxes of a link.
+void add_boxes(RobotHand& hand, int link) {
+  const std::vector<Shape>& shapes = hand.links[link].shapes;
+  std::vector<Cover> covers;
+  for (const Shape& shape : shapes) {
+    if (shape.kind == Shape::Kind::kBox) add_strips(shape, shapes, covers);
+  }
+  join(shapes, covers);
+  for (const Cover& cover : covers) {
+    const Eigen::Vector3d half(0.0, 0.0, 0.5 * cover.fit.length_m);
+    add_capsule(hand, link, cover.fit.at, -half, half, cover.fit.radius_m);
   }
 }
 
@@ -49,7 +131,7 @@ void add_shape(RobotHand& hand, int link, const Shape& shape) {
   const Eigen::Vector3d half(0.0, 0.0, 0.5 * shape.size_m.y());
   switch (shape.kind) {
     case Shape::Kind::kBox:
-      return add_box(hand, link, shape);
+      return;  // add_boxes() does
     case Shape::Kind::kSphere:
       return add_capsule(hand, link, shape.at, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
                          shape.size_m.x());
@@ -172,6 +254,7 @@ RT_SAFE bool may_be_near(const RobotHand& hand, const Placed& placed, int a, int
 void add_shapes(RobotHand& hand) {
   for (int l = 0; l < std::ssize(hand.links); ++l) {
     const int first = static_cast<int>(hand.capsules.size());
+    add_boxes(hand, l);
     for (const Shape& shape : hand.links[l].shapes) add_shape(hand, l, shape);
     hand.balls.push_back(ball_around(hand, first));
   }

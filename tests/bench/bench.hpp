@@ -14,6 +14,7 @@ void add_bench_generate(CLI::App& app, int& exit_code);
 void add_bench_json(CLI::App& app);
 void add_bench_predict(CLI::App& app, int& exit_code);
 void add_bench_relay(CLI::App& app, int& exit_code);
+void add_bench_robot(CLI::App& app, int& exit_code);
 void add_bench_smooth(CLI::App& app, int& exit_code);
 void add_bench_stage(CLI::App& app, int& exit_code);
 

@@ -2,6 +2,7 @@
 // `posed bench pipeline`.
 #include <CLI/CLI.hpp>
 
+#include "proto/frame/result.hpp"
 #include "tests/bench/bench.hpp"
 
 int main(int argc, char** argv) {
@@ -15,6 +16,7 @@ int main(int argc, char** argv) {
   posed::bench::add_bench_json(app);
   posed::bench::add_bench_predict(app, exit_code);
   posed::bench::add_bench_relay(app, exit_code);
+  posed::bench::add_bench_robot(app, exit_code);
   posed::bench::add_bench_smooth(app, exit_code);
   posed::bench::add_bench_stage(app, exit_code);
   try {
