@@ -225,6 +225,14 @@ TEST_CASE("train, apply and eval end in a verdict; all degrees rms are one figur
   CHECK(score["constant_cycle_ratio"] > score["cycle_ratio"]);
   CHECK(has(judged.err, "of the way ... constant offset"));
 
+  // For people the verdict comes first; a walker who was not taught gets most of what was.
+  const auto told = posed({"eval", "style", "--model", studio.path("m.style"), "--source",
+                           studio.path("march_1.bvh"), "--target", studio.path("sway_1.bvh"),
+                           "--neutral", studio.path("march_2.bvh")});
+  CHECK(told.code == 0);
+  CHECK(has(told.out.substr(0, told.out.find('\n')), "a walker who was not taught misses"));
+  CHECK_FALSE(has(told.out, "cycle_ratio"));
+
   // Compared with another march, the sway style only increases the distance.
   const auto worse = studio.eval("march_1.bvh", "march_2.bvh");
   CHECK(worse.code == 1);

@@ -153,15 +153,6 @@ Findings& Findings::say(std::string line) {
   return put({.kind = Kind::kLine, .text = std::move(line)});
 }
 
-Findings& Findings::say_numbers() {
-  std::vector<std::string> lines;
-  for_each_number(*this, "", [&](const std::string& name, const Finding& finding) {
-    lines.push_back(fmt::format("{:<24} {:8.3f}", name, *number_of(finding)));
-  });
-  for (std::string& line : lines) say(std::move(line));
-  return *this;
-}
-
 Findings& Findings::note(std::string sentence) {
   return put({.kind = Kind::kNote, .text = std::move(sentence)});
 }
@@ -178,6 +169,11 @@ Findings& Findings::warn(const std::vector<std::string>& sentences) {
 Findings& Findings::verdict(std::string sentence, bool good) {
   good_ = good_ && good;
   return remark(std::move(sentence));
+}
+
+Findings& Findings::headline(std::string sentence, bool good) {
+  good_ = good_ && good;
+  return put({.kind = Finding::Kind::kHeadline, .text = std::move(sentence)});
 }
 
 std::optional<double> Findings::number(std::string_view name) const {
@@ -204,11 +200,16 @@ int Findings::show(bool as_json, int indent) const {
   if (as_json) {
     std::printf("%s\n", json(indent).c_str());
   } else {
+    for (const Finding& finding : list_) {
+      if (finding.kind == Kind::kHeadline) std::printf("%s\n", finding.text.c_str());
+    }
     print_lines(*this);
   }
   std::fflush(stdout);
   for (const Finding& finding : list_) {
-    if (finding.kind == Kind::kRemark || (finding.kind == Kind::kNote && !as_json)) {
+    const bool headline = finding.kind == Kind::kHeadline && as_json;
+    const bool note = finding.kind == Kind::kNote && !as_json;
+    if (finding.kind == Kind::kRemark || headline || note) {
       std::fprintf(stderr, "posed: %s\n", finding.text.c_str());
     }
   }

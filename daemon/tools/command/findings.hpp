@@ -27,8 +27,8 @@ class Findings {
 
   // Adds a bool, a number, a text, other findings, or a list of these. JSON shows the value under
   // `name`, which ends in the unit of a quantity; an empty optional and a number that is not finite
-  // are null there. People see it only in a sentence, or by say_numbers(). A name that is there
-  // already gets the new value.
+  // are null there. People see it only in a sentence. A name that is there already gets the new
+  // value.
   template <typename T>
   Findings& add(std::string name, const T& value);
   // Adds every finding of `others`.
@@ -38,8 +38,6 @@ class Findings {
 
   // Adds a line for people, on stdout. The lines of a list's findings stand where the list does.
   Findings& say(std::string line);
-  // Adds a line for each number so far, "NAME  1.234"; before those of an object stands its name.
-  Findings& say_numbers();
   // Adds a sentence on stderr, after all that stdout shows: a note is not shown with --json, a
   // remark is, and a warning is a remark that begins so.
   Findings& note(std::string sentence);
@@ -47,6 +45,8 @@ class Findings {
   Findings& warn(const std::vector<std::string>& sentences);
   // Adds the remark that judges. Bad news makes the exit code of the command kFailed.
   Findings& verdict(std::string sentence, bool good);
+  // The same, but the first line of stdout for people; with --json a remark.
+  Findings& headline(std::string sentence, bool good);
 
   // The number of this name, if there is one.
   [[nodiscard]] std::optional<double> number(std::string_view name) const;
@@ -74,7 +74,7 @@ class Findings {
 };
 
 struct Finding {
-  enum class Kind : std::uint8_t { kScalar, kObject, kList, kLine, kNote, kRemark };
+  enum class Kind : std::uint8_t { kScalar, kObject, kList, kHeadline, kLine, kNote, kRemark };
   Kind kind = Kind::kScalar;
   std::string text{};  // a value's name, or the sentence
   Findings::Scalar value{};

@@ -1,4 +1,5 @@
 // `posed eval style`: how near a styled clip comes to the target.
+#include <algorithm>
 #include <cmath>
 #include <memory>
 
@@ -12,6 +13,8 @@
 #include "daemon/tools/command/progress.hpp"
 #include "daemon/tools/style/style_options.hpp"
 #include "daemon/tools/style/style_report.hpp"
+#include "models/motion/motion.hpp"
+#include "models/style/judge/body_cycle.hpp"
 #include "models/style/judge/evaluate.hpp"
 #include "models/style/judge/walker_fit.hpp"
 #include "models/style/live/apply.hpp"
@@ -28,6 +31,7 @@ constexpr const char* kEvalFooter = R"(Examples:
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --report proud.html
   posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --root stride
   posed eval style --model two.style --weights sad=1 --source plain_3.bvh --target sad_3.bvh
+  posed eval style --model proud.style --source plain_3.bvh --target proud_3.bvh --neutral bob.bvh
 
 The source goes through the same stage as live, and is compared in the model's pose space.
 cycle_ratio: how far the styled walk's average cycle
@@ -41,11 +45,16 @@ gate_mean: how far the model knows the motion, 1 all of it, 0 nothing, which is 
 slide_cm_s: speed over the ground of ankles and toes that stand (slower than 10 cm/s in the
 unstyled walk; of the target: in itself); height_error_cm, speed_error_m_s: how far the mean cycle
 of the hips' height above the ground and of their speed is from the target's, in the size of the
-source's figure; direction_error_deg: the same of the directions of arms, legs and trunk; their
-floor is how far the two halves of the target are from each other; sink_cm: how far the lowest
-styled toe is below the lowest unstyled one; root_speed_m_s: of the root over the ground, median
-over a stride's time.
-The last line is the verdict; the exit code is 1 when the model is no better than nothing.)";
+source's figure; direction_error_deg: the same of the directions of arms, legs and trunk;
+tempo_error: the share by which the cadence is off the target's; their floor is how far the two
+halves of the target are from each other; sink_cm: how far the lowest styled toe is below the lowest
+unstyled one; root_speed_m_s: of the root over the ground, median over a stride's time.
+With --neutral, for each clip of a person who was not taught, after a warm-up on it: missing: the
+part of what source and target teach, in directions of bones, that the walk does not get (1 if
+unstyled; floor: what the halves of source and target differ by in it); arm_error_deg,
+worst_arm_error_deg, lean_error_deg: how far the change of the arms and of the trunk's lean is from
+the taught one.
+The first line is the verdict; the exit code is 1 when the model is no better than nothing.)";
 
 constexpr double kCentimetres = 100.0;  // of a metre
 constexpr double kShown = 0.005;        // a smaller share of the way reads as 0 %
@@ -53,6 +62,7 @@ constexpr double kRough = 1.5;          // a jerk_ratio above this is visible
 
 struct EvalOptions {
   std::string model, source, target, skeleton, weights;
+  std::vector<std::string> neutral;
   double alpha = 1.0;
   std::optional<feet::RootOptions> feet;
   ReportFile report;
@@ -68,12 +78,19 @@ struct Evaluation {
   double moved_rms_deg = 0.0;
   std::optional<double> gate_mean{};
   style::WalkerFit fit;
-  Findings weights{};                     // of the styles
+  Findings weights{};  // of the styles
+  std::vector<style::Arrival> strangers{};
   std::optional<EvaluatedClips> clips{};  // for the report
 
   // By what the verdict shows: one that closes 0 % is no better than nothing.
   [[nodiscard]] bool helps() const { return score.cycle_ratio < 1.0 - kShown; }
 };
+
+double mean_missing(const std::vector<style::Arrival>& strangers) {
+  double sum = 0.0;
+  for (const style::Arrival& one : strangers) sum += one.missing;
+  return sum / static_cast<double>(strangers.size());
+}
 
 std::string verdict(const Evaluation& e) {
   const double closes = 1.0 - e.score.cycle_ratio;
@@ -95,6 +112,13 @@ std::string verdict(const Evaluation& e) {
   if (e.fit.is_far()) {
     text +=
         fmt::format("; this walker is far from the training ({:.1f} deg rms)", e.fit.distance_deg);
+  }
+  if (!e.strangers.empty()) {
+    text += fmt::format("; a walker who was not taught misses {:.0f} % of what was taught",
+                        100.0 * mean_missing(e.strangers));
+    const auto& floor = e.strangers.front().floor;
+    if (floor)
+      text += fmt::format(" (two takes of the teacher differ by {:.0f} %)", 100.0 * *floor);
   }
   return text;
 }
@@ -125,11 +149,67 @@ Findings body_error(const std::optional<style::BodyErrors>& body, double style::
                                            : std::optional<double>());
 }
 
+// In the order of --neutral.
+std::vector<Findings> of_strangers(const Evaluation& e, const EvalOptions& options) {
+  std::vector<Findings> found;
+  for (std::size_t i = 0; i < e.strangers.size(); ++i) {
+    const style::Arrival& one = e.strangers[i];
+    const auto pair = [](double styled_rad, double unstyled_rad) {
+      return Findings().add("source", unstyled_rad * kDegrees).add("styled", styled_rad * kDegrees);
+    };
+    found.push_back(Findings()
+                        .add("arm_error_deg", pair(one.arms_rad, one.unstyled_arms_rad))
+                        .add("clip", options.neutral[i])
+                        .add("floor", one.floor)
+                        .add("lean_error_deg", pair(one.lean_rad, one.unstyled_lean_rad))
+                        .add("missing", one.missing)
+                        .add("worst_arm_error_deg", one.worst_arm_rad * kDegrees));
+  }
+  return found;
+}
+
+std::string number_text(const std::optional<double>& value) {
+  return value ? fmt::format("{:10.2f}", *value) : fmt::format("{:>10}", "-");
+}
+
+// For people: what --json has, without its names.
+void say_table(const Evaluation& e, Findings& findings) {
+  const auto row = [&](const std::string& what, const std::optional<double>& styled,
+                       const std::optional<double>& unstyled, const std::optional<double>& floor) {
+    findings.say(fmt::format("{:<44}{}{}{}", what, number_text(styled), number_text(unstyled),
+                             number_text(floor)));
+  };
+  const auto& score = e.score;
+  findings.say(
+      fmt::format("{:<44}{:>10}{:>10}{:>10}", "off the target by", "styled", "unstyled", "floor"));
+  row("pose, mean cycle", score.cycle_ratio, 1.0, {});
+  row("the same with a constant offset", e.constant.cycle_ratio, 1.0, {});
+  row("roughness", score.jerk_ratio, 1.0, {});
+  if (score.body) {
+    const style::BodyErrors& body = *score.body;
+    const auto error = [&](const std::string& what, double style::BodyError::* part, double scale) {
+      row(what, scale * body.styled.*part, scale * body.source.*part,
+          body.floor ? std::optional(scale * (*body.floor).*part) : std::optional<double>());
+    };
+    error("height of the hips [cm]", &style::BodyError::height, body.leg_m * kCentimetres);
+    error("speed of the hips [m/s]", &style::BodyError::speed_s, body.leg_m);
+    error("directions of bones [deg]", &style::BodyError::direction_rad, kDegrees);
+    error("tempo [%]", &style::BodyError::tempo, 100.0);
+  }
+  row("slide of standing feet [cm/s]", scaled(score.slide_m_s.styled, kCentimetres),
+      scaled(score.slide_m_s.source, kCentimetres), scaled(score.slide_m_s.target, kCentimetres));
+  for (const style::Arrival& one : e.strangers) {
+    row("not taught: missing of what was taught", one.missing, 1.0, one.floor);
+    row("  arms [deg]", one.arms_rad * kDegrees, one.unstyled_arms_rad * kDegrees, {});
+    row("  lean [deg]", one.lean_rad * kDegrees, one.unstyled_lean_rad * kDegrees, {});
+  }
+}
+
 Findings findings_of(const Evaluation& e, const EvalOptions& options) {
   const style::StyleScore& score = e.score;
   const std::string judged = verdict(e);
-  return Findings()
-      .add("alpha", options.alpha)
+  Findings findings;
+  findings.add("alpha", options.alpha)
       .add("component_rms_deg", score.component_rms_deg)
       .add("constant_cycle_ratio", e.constant.cycle_ratio)
       .add("cycle_ratio", score.cycle_ratio)
@@ -152,24 +232,61 @@ Findings findings_of(const Evaluation& e, const EvalOptions& options) {
       .add("source_period_s", score.source_period_s)
       .add("speed_error_m_s",
            body_error(score.body, &style::BodyError::speed_s, score.body ? score.body->leg_m : 1.0))
+      .add("strangers", of_strangers(e, options))
       .add("target_period_s", score.target_period_s)
-      .add("weights", e.weights)
-      .say_numbers()
+      .add("tempo_error", body_error(score.body, &style::BodyError::tempo, 1.0))
       .add("verdict", judged)
-      .verdict(judged, e.helps());
+      .add("weights", e.weights)
+      .headline(judged, e.helps());
+  say_table(e, findings);
+  return findings;
 }
 
 Result<> check_files(const EvalOptions& options) {
   return OutputFiles(options.report.overwrite)
       .reads_all(std::vector{options.model, options.source, options.target, options.skeleton})
+      .reads_all(options.neutral)
       .writes(options.report.path, {".html"})
       .check();
 }
 
+// Without the pose that some converters put in front.
+Result<motion::Motion> motion_of(const clip::Clip& clip) {
+  auto motion = TRY(motion::motion_of(clip));
+  if (motion::begins_with_added_pose(motion)) motion::drop_first_frame(motion);
+  return motion;
+}
+
+// What the clips of people who were not taught get of what source and target teach.
+Result<std::vector<style::Arrival>> look_at_strangers(const EvalOptions& options,
+                                                      const style::StyleModel& model,
+                                                      const clip::Clip& source,
+                                                      const clip::Clip& target) {
+  std::vector<style::Arrival> found;
+  if (options.neutral.empty()) return found;
+  const auto from = TRY(motion_of(source));
+  const auto to = TRY(motion_of(target));
+  for (const std::string& path : options.neutral) {
+    const auto clip = TRY(read(path, options.skeleton));
+    style::ApplyOptions apply;
+    apply.filter.alpha = options.alpha;
+    apply.filter.weights = options.weights;
+    apply.walker = TRY(style::measure_walker(model, options.model, clip));
+    const auto styled = TRY(style::apply_to_clip(model, options.model, clip, apply));
+    const auto one = style::arrival(TRY(motion_of(clip)), TRY(motion_of(styled.clip)), from, to);
+    if (!one) return fail("shows no walk with legs, as the source or the target", path);
+    found.push_back(*one);
+  }
+  return found;
+}
+
 Result<Evaluation> evaluate(const EvalOptions& options) {
   TRY(check_files(options));
-  const bool any = clip::accepts(options.source, clip::ReadOption::kSkeleton) ||
-                   clip::accepts(options.target, clip::ReadOption::kSkeleton);
+  const auto takes_skeleton = [](const std::string& path) {
+    return clip::accepts(path, clip::ReadOption::kSkeleton);
+  };
+  const bool any = takes_skeleton(options.source) || takes_skeleton(options.target) ||
+                   std::ranges::any_of(options.neutral, takes_skeleton);
   if (!options.skeleton.empty() && !any) {
     return misuse("--skeleton is only for AMC clips; leave it out");
   }
@@ -205,6 +322,7 @@ Result<Evaluation> evaluate(const EvalOptions& options) {
                           .rate_hz = model.rate_hz};
     }
   }
+  evaluation.strangers = TRY(look_at_strangers(options, model, source, target));
   return evaluation;
 }
 
@@ -239,6 +357,7 @@ void add_eval_style(CLI::App& eval, int& exit_code) {
   style->add_option("--model", options->model, "Model from `posed train style`")->required();
   style->add_option("--source", options->source, "Clip to be styled")->required();
   style->add_option("--target", options->target, "Clip in the target style")->required();
+  style->add_option("--neutral", options->neutral, "Usual walks of people who were not taught");
   style->add_option("--skeleton", options->skeleton, "NN.asf of AMC clips, if not beside them");
   style->add_option("--weights", options->weights, "Mixes the model's styles: A=0.6,B=0.4")
       ->type_name("WEIGHTS");

@@ -17,16 +17,29 @@ using Eigen::MatrixXd;
 using Eigen::Vector3d;
 using Eigen::VectorXd;
 
-// A limb's bone ends at the next one; the trunk goes from the hips to the head.
-constexpr std::array<std::pair<Bone, Bone>, 9> kBones{{{Bone::kLeftUpperArm, Bone::kLeftLowerArm},
-                                                       {Bone::kLeftLowerArm, Bone::kLeftHand},
-                                                       {Bone::kRightUpperArm, Bone::kRightLowerArm},
-                                                       {Bone::kRightLowerArm, Bone::kRightHand},
-                                                       {Bone::kLeftUpperLeg, Bone::kLeftLowerLeg},
-                                                       {Bone::kLeftLowerLeg, Bone::kLeftFoot},
-                                                       {Bone::kRightUpperLeg, Bone::kRightLowerLeg},
-                                                       {Bone::kRightLowerLeg, Bone::kRightFoot},
-                                                       {Bone::kHips, Bone::kHead}}};
+using BoneEnds = std::pair<Bone, Bone>;
+
+// A limb's bone ends at the next one. The chest is the highest of two.
+constexpr std::ptrdiff_t kArmBones = 4;  // the first ones
+constexpr std::array<BoneEnds, 13> kBones{{{Bone::kLeftUpperArm, Bone::kLeftLowerArm},
+                                           {Bone::kLeftLowerArm, Bone::kLeftHand},
+                                           {Bone::kRightUpperArm, Bone::kRightLowerArm},
+                                           {Bone::kRightLowerArm, Bone::kRightHand},
+                                           {Bone::kLeftUpperLeg, Bone::kLeftLowerLeg},
+                                           {Bone::kLeftLowerLeg, Bone::kLeftFoot},
+                                           {Bone::kRightUpperLeg, Bone::kRightLowerLeg},
+                                           {Bone::kRightLowerLeg, Bone::kRightFoot},
+                                           {Bone::kRightUpperLeg, Bone::kLeftUpperLeg},
+                                           {Bone::kRightUpperArm, Bone::kLeftUpperArm},
+                                           {Bone::kHips, Bone::kChest},
+                                           {Bone::kChest, Bone::kNeck},
+                                           {Bone::kNeck, Bone::kHead}}};
+
+int joint_of(const Skeleton& skeleton, Bone bone) {
+  const int upper = bone == Bone::kChest ? skeleton.joint_of(Bone::kUpperChest) : -1;
+  return upper >= 0 ? upper : skeleton.joint_of(bone);
+}
+
 // The ground is where the lower foot is in its lowest twentieth of the time.
 constexpr double kGroundShare = 0.05;
 
@@ -76,13 +89,15 @@ std::optional<BodyCycle> body_cycle(const motion::Motion& motion, const WalkPhas
   if (!legs || hips < 0 || ankles[0] < 0 || ankles[1] < 0) return std::nullopt;
   BodyCycle cycle;
   std::vector<std::pair<int, int>> ends;
-  for (const auto& [from, to] : kBones) {
-    const std::pair joints{skeleton.joint_of(from), skeleton.joint_of(to)};
+  for (const BoneEnds& bone : kBones) {
+    const std::pair joints{joint_of(skeleton, bone.first), joint_of(skeleton, bone.second)};
     if (joints.first < 0 || joints.second < 0) continue;
-    cycle.bones.push_back(from);
+    cycle.bones.push_back(bone);
     ends.push_back(joints);
   }
+  const int head = skeleton.joint_of(Bone::kHead);
   MatrixXd hips_m(motion.size(), 3);
+  MatrixXd trunk_m = MatrixXd::Zero(motion.size(), 3);
   MatrixXd direction(motion.size(), 3 * std::ssize(ends));
   VectorXd feet_m(motion.size());
   const Eigen::AngleAxisd seen(-motion::walk_heading_rad(motion), Vector3d::UnitY());
@@ -90,6 +105,7 @@ std::optional<BodyCycle> body_cycle(const motion::Motion& motion, const WalkPhas
     const auto pose = motion::world_pose(skeleton, motion.frames[static_cast<std::size_t>(i)]);
     const auto at = [&](int j) { return pose.position_m[static_cast<std::size_t>(j)]; };
     hips_m.row(i) = (seen * at(hips)).transpose();
+    if (head >= 0) trunk_m.row(i) = (seen * (at(head) - at(hips))).transpose();
     feet_m[i] = std::min(at(ankles[0]).y(), at(ankles[1]).y());
     for (std::size_t b = 0; b < ends.size(); ++b) {
       const Vector3d along = seen * (at(ends[b].second) - at(ends[b].first));
@@ -99,6 +115,10 @@ std::optional<BodyCycle> body_cycle(const motion::Motion& motion, const WalkPhas
   const double leg_m = legs->length_m();
   cycle.height = mean_cycle(walk, (hips_m.col(1).array() - ground_m(feet_m)).matrix() / leg_m);
   cycle.speed_s = mean_cycle(walk, motion::time_derivative(hips_m, motion.rate_hz).col(2) / leg_m);
+  const Eigen::RowVector3d trunk = trunk_m(walk.frames, Eigen::all).colwise().mean();
+  cycle.lean_rad = std::atan2(trunk.z(), trunk.y());
+  cycle.cadence_rad_s = (walk.phase[walk.phase.size() - 1] - walk.phase[0]) * motion.rate_hz /
+                        static_cast<double>(walk.frames.back() - walk.frames.front());
   cycle.direction = mean_cycle(walk, direction);
   for (Eigen::Index i = 0; i < cycle.direction.rows(); ++i) {
     for (Eigen::Index d = 0; d < cycle.direction.cols(); d += 3) {
@@ -109,7 +129,9 @@ std::optional<BodyCycle> body_cycle(const motion::Motion& motion, const WalkPhas
 }
 
 BodyError apart(const BodyCycle& a, const BodyCycle& b) {
-  BodyError error{.height = rms_of(a.height - b.height), .speed_s = rms_of(a.speed_s - b.speed_s)};
+  BodyError error{.height = rms_of(a.height - b.height),
+                  .speed_s = rms_of(a.speed_s - b.speed_s),
+                  .tempo = std::abs(a.cadence_rad_s / b.cadence_rad_s - 1.0)};
   double sum = 0.0;
   Eigen::Index count = 0;
   for (std::size_t i = 0; i < a.bones.size(); ++i) {
@@ -148,6 +170,88 @@ std::optional<BodyErrors> body_errors(const motion::Motion& source, const motion
   const auto end = part_of(*goal_walk, 0.5, 1.0);
   if (begin && end) errors.floor = apart(*body_cycle(target, *begin), *body_cycle(target, *end));
   return errors;
+}
+
+namespace {
+
+// The directions of some bones, which the cycle has [28 x 3 a bone].
+MatrixXd directions(const BodyCycle& cycle, const std::vector<BoneEnds>& bones) {
+  MatrixXd found(cycle.direction.rows(), 3 * std::ssize(bones));
+  for (std::size_t b = 0; b < bones.size(); ++b) {
+    const auto at = std::ranges::find(cycle.bones, bones[b]) - cycle.bones.begin();
+    found.middleCols<3>(3 * static_cast<Eigen::Index>(b)) =
+        cycle.direction.middleCols<3>(3 * static_cast<Eigen::Index>(at));
+  }
+  return found;
+}
+
+double norm_per_phase(const MatrixXd& values) {
+  return std::sqrt(values.squaredNorm() / static_cast<double>(values.rows()));
+}
+
+// Rms over the arms' bones, which stand first, and of the worst one. A difference of unit vectors
+// is the angle, where that is small.
+std::pair<double, double> arms_off_rad(const MatrixXd& off, const std::vector<BoneEnds>& bones) {
+  double sum = 0.0;
+  double worst = 0.0;
+  Eigen::Index arms = 0;
+  for (const BoneEnds& bone : bones) {
+    if (std::ranges::find(kBones, bone) - kBones.begin() >= kArmBones) break;
+    const double one = norm_per_phase(off.middleCols<3>(3 * arms));
+    sum += one * one;
+    worst = std::max(worst, one);
+    ++arms;
+  }
+  return {arms > 0 ? std::sqrt(sum / static_cast<double>(arms)) : 0.0, worst};
+}
+
+// What the halves of two clips teach differs by, over what they teach.
+std::optional<double> floor_of(const motion::Motion& source, const WalkPhases& from,
+                               const motion::Motion& target, const WalkPhases& to,
+                               const std::vector<BoneEnds>& bones, double taught) {
+  std::array<MatrixXd, 2> halves;
+  for (const int half : {0, 1}) {
+    const auto one = part_of(from, 0.5 * half, 0.5 + 0.5 * half);
+    const auto other = part_of(to, 0.5 * half, 0.5 + 0.5 * half);
+    if (!one || !other) return std::nullopt;
+    halves.at(static_cast<std::size_t>(half)) = directions(*body_cycle(target, *other), bones) -
+                                                directions(*body_cycle(source, *one), bones);
+  }
+  return (halves[1] - halves[0]).norm() / taught;
+}
+
+}  // namespace
+
+std::optional<Arrival> arrival(const motion::Motion& before, const motion::Motion& after,
+                               const motion::Motion& source, const motion::Motion& target) {
+  const auto walk = walk_phases(before);
+  const auto from = walk_phases(source);
+  const auto to = walk_phases(target);
+  if (!walk || !from || !to) return std::nullopt;
+  const auto own = body_cycle(before, *walk);
+  const auto got = body_cycle(after, *walk);
+  const auto plain = body_cycle(source, *from);
+  const auto goal = body_cycle(target, *to);
+  if (!own || !got || !plain || !goal) return std::nullopt;
+  std::vector<BoneEnds> bones;
+  for (const BoneEnds& bone : own->bones) {
+    const auto has = [&](const BodyCycle& cycle) {
+      return std::ranges::find(cycle.bones, bone) != cycle.bones.end();
+    };
+    if (has(*plain) && has(*goal)) bones.push_back(bone);
+  }
+  const MatrixXd taught = directions(*goal, bones) - directions(*plain, bones);
+  const MatrixXd off = directions(*got, bones) - directions(*own, bones) - taught;
+  if (!(taught.norm() > 0.0)) return std::nullopt;
+  const double taught_lean_rad = goal->lean_rad - plain->lean_rad;
+  const auto [arms_rad, worst_rad] = arms_off_rad(off, bones);
+  return Arrival{.missing = off.norm() / taught.norm(),
+                 .arms_rad = arms_rad,
+                 .worst_arm_rad = worst_rad,
+                 .lean_rad = got->lean_rad - own->lean_rad - taught_lean_rad,
+                 .unstyled_arms_rad = arms_off_rad(taught, bones).first,
+                 .unstyled_lean_rad = -taught_lean_rad,
+                 .floor = floor_of(source, *from, target, *to, bones, taught.norm())};
 }
 
 }  // namespace posed::style

@@ -13,6 +13,7 @@
 #include "models/stage.hpp"
 #include "models/style/live/alpha_reach.hpp"
 #include "models/style/live/body_mask.hpp"
+#include "models/style/live/bone_turns.hpp"
 #include "models/style/live/leg_map.hpp"
 #include "models/style/live/trained_motion.hpp"
 #include "models/style/model/style_model.hpp"
@@ -50,9 +51,10 @@ struct BoundModel final : StageModel {
     PoseCycle cycle;
     LegMap does;
   };
-  std::vector<Usual> usual;       // by person and day; empty: a model without them
-  std::optional<Usual> anyone;    // their mean, for a walker who is not known
-  std::vector<AlphaReach> reach;  // of each style
+  std::vector<Usual> usual;        // by person and day; empty: a model without them
+  std::optional<Usual> anyone;     // their mean, for a walker who is not known
+  std::vector<AlphaReach> reach;   // of each style
+  std::optional<BoneTurns> turns;  // for a figure that is none of training
 };
 
 // Returns an error for a skeleton that cannot serve the model's pose space

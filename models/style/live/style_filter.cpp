@@ -259,17 +259,26 @@ RT_SAFE void StyleFilter::style(Frame& frame, double dt_s) noexcept {
   const Rotations in = frame.rotation_xyzw;
   Pose pose;
   if (read_pose(frame, dt_s, pose)) discontinuity_ = true;
-  if (alpha_ != 0.0) {
-    Dims delta;
-    const std::size_t dims = space.dims();
-    answer(pose, delta);
-    space.add(frame, heading_.value_rad(), {pose.q.data(), dims}, {delta.data(), dims});
-  }
+  if (alpha_ != 0.0) change(frame, pose);
   if (std::exchange(discontinuity_, false)) begin_blend(in, frame, dt_s);
   blend(frame);
   last_joints_ = frame.joint_count;
   last_in_ = in;
   last_out_ = frame.rotation_xyzw;
+}
+
+// A walker of another build gets the change that the walk of training gets, bone by bone.
+RT_SAFE void StyleFilter::change(Frame& frame, const Pose& pose) noexcept {
+  const std::size_t dims = model_->space.dims();
+  Dims delta, shares;
+  answer(pose, delta, shares);
+  if (model_->turns && tracker_.shifts()) {
+    model_->turns->add(frame, heading_.value_rad(), {pose.input.data(), dims}, {delta.data(), dims},
+                       {shares.data(), dims});
+    return;
+  }
+  for (std::size_t d = 0; d < dims; ++d) delta[d] *= shares[d];
+  model_->space.add(frame, heading_.value_rad(), {pose.q.data(), dims}, {delta.data(), dims});
 }
 
 // Empty while the predictor has the mixture ready.
@@ -310,8 +319,9 @@ RT_SAFE std::optional<StageNotice> StyleFilter::take_notice() noexcept {
   return tracker_.take_notice();
 }
 
-// The model delta: alpha times the mixture of styles, gated, clamped and masked.
-RT_SAFE void StyleFilter::answer(const Pose& pose, Dims& delta) noexcept {
+// The model delta: alpha times the mixture of styles, gated and clamped; `shares`: how much of it
+// the mask lets pass, and what a part does that walks.
+RT_SAFE void StyleFilter::answer(const Pose& pose, Dims& delta, Dims& shares) noexcept {
   const gp::Predictor& predictor = model_->predictor;
   const std::size_t dims = predictor.inputs();
   const auto outputs = static_cast<std::size_t>(predictor.outputs());  // the pose and the root
@@ -327,9 +337,10 @@ RT_SAFE void StyleFilter::answer(const Pose& pose, Dims& delta) noexcept {
   const bool limited = model_->limit_rad.size() > 0;
   for (std::size_t d = 0; d < dims; ++d) {
     if (limited) delta[d] = std::clamp(delta[d], -limit_rad_[d], limit_rad_[d]);
-    delta[d] *= static_cast<float>(alpha_) * mask_.factor(model_->parts[d]);
+    delta[d] *= static_cast<float>(alpha_);
+    shares[d] = mask_.factor(model_->parts[d]);
     const std::uint8_t part = model_->loose_parts[d];
-    if (part != TrainedMotion::kNoPart) delta[d] *= tracker_.trust(static_cast<BodyPart>(part));
+    if (part != TrainedMotion::kNoPart) shares[d] *= tracker_.trust(static_cast<BodyPart>(part));
   }
   if (model_->has_root) limit_root(&delta[dims]);
 }

@@ -140,7 +140,8 @@ class StyleFilter final : public Stage {
   void mix_limits() noexcept;
   void look_at_reach() noexcept;
   bool read_pose(const Frame& frame, double dt_s, Pose& pose) noexcept;
-  void answer(const Pose& pose, Dims& delta) noexcept;
+  void change(Frame& frame, const Pose& pose) noexcept;
+  void answer(const Pose& pose, Dims& delta, Dims& shares) noexcept;
   void limit_root(const float* change) noexcept;
   void change_root() noexcept;
   void set_alpha_number(double value) noexcept { set_alpha(static_cast<float>(value)); }

@@ -36,6 +36,8 @@ class WalkerTracker {
   [[nodiscard]] float trust(BodyPart part) const noexcept {
     return trust_[static_cast<std::size_t>(part)];
   }
+  // Whether `input` of see() is a pose of training that stands for the walker's.
+  [[nodiscard]] bool shifts() const noexcept { return shifts_; }
   // Of the walker now; a usual one where that is not known.
   [[nodiscard]] double cadence_rad_s(const BoundModel& model) const noexcept;
   // See Gate::settle().

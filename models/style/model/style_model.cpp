@@ -129,6 +129,8 @@ GateData read_gate(const v1::StyleGate& from, int dims, Reader& reader) {
     gate.usual.push_back(reader.matrix(cycle, dims, kMaxAngle_rad, "a usual walk"));
     reader.want(gate.usual.back().rows() == kCycleRows, "the harmonics of a usual walk");
   }
+  reader.want(from.rigs_size() <= kMaxUsual, "the number of figures");
+  if (reader.valid()) gate.rigs.assign(from.rigs().begin(), from.rigs().end());
   return gate;
 }
 
@@ -260,6 +262,7 @@ std::string serialize_model(const StyleModel& model) {
   for (const MatrixXd& cycle : model.gate.usual) {
     write_matrix(cycle, *style.mutable_gate()->add_usual());
   }
+  for (const std::uint32_t rig : model.gate.rigs) style.mutable_gate()->add_rigs(rig);
   if (model.axis.present()) {
     write_vector(model.axis.direction, *style.mutable_axis()->mutable_direction());
     style.mutable_axis()->set_offset(model.axis.offset);
@@ -275,6 +278,16 @@ std::vector<std::string> StyleModel::names() const {
   std::vector<std::string> names{to};
   for (const MoreStyle& style : more) names.push_back(style.name);
   return names;
+}
+
+std::uint32_t rig_id(const Skeleton& skeleton) {
+  std::uint32_t hash = 2166136261U;  // FNV-1a
+  const auto add = [&hash](std::uint32_t byte) { hash = (hash ^ byte) * 16777619U; };
+  for (const Joint& joint : skeleton.joints) {
+    for (const char letter : joint.name) add(static_cast<unsigned char>(letter));
+    add(static_cast<std::uint32_t>(joint.parent + 1));
+  }
+  return hash;
 }
 
 StyleModel mixture_of(const StyleModel& model, std::span<const double> shares) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <memory>
@@ -42,6 +43,8 @@ struct GateData {
   // [kCycleRows x dims]; phase 0 is where the right thigh is farthest in front. Empty without
   // strides and in models of older versions of posed.
   std::vector<Eigen::MatrixXd> usual{};
+  // rig_id() of the figures of training; empty in models of older versions of posed.
+  std::vector<std::uint32_t> rigs{};
 
   [[nodiscard]] bool present() const { return neutral.size() > 0; }
   [[nodiscard]] bool strides() const { return swing_rad > 0.0; }
@@ -79,6 +82,9 @@ struct StyleModel {
   [[nodiscard]] std::size_t styles() const { return 1 + more.size(); }
   [[nodiscard]] std::vector<std::string> names() const;  // of its styles, in order
 };
+
+// The same for figures of the same joints, of any size. Cold.
+[[nodiscard]] std::uint32_t rig_id(const Skeleton& skeleton);
 
 // Returns a model of a single style, which is the sum of all styles, each times its share; `shares`
 // has styles() numbers.

@@ -157,6 +157,10 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
   if (options.look) options.look(findings);
   const std::string report = json_text(whole_report(findings));
   GateData gate = gate_data_of(dataset, targets);
+  for (const TrainingClip& clip : clips) {
+    const std::uint32_t rig = rig_id(*clip.clip.skeleton);
+    if (std::ranges::find(gate.rigs, rig) == gate.rigs.end()) gate.rigs.push_back(rig);
+  }
   StyleAxis axis;  // of a mixture there is none
   if (targets.size() == 1) axis = style_axis_of(dataset, options.target);
   StyleModel model = model_of(std::move(dataset), targets, std::move(learnt));

@@ -27,6 +27,7 @@ TEST_CASE("a walk left alone scores one, the target's own walk scores zero", "[s
   REQUIRE(reached->body);
   REQUIRE(reached->body->floor);
   const auto& [source, styled, floor, leg_m] = *reached->body;
+  CHECK(styled.tempo == 0.0);
   CHECK(leg_m > 0.6);
   CHECK(styled.direction_rad < 0.02);
   CHECK(styled.height < 0.002);
@@ -34,6 +35,30 @@ TEST_CASE("a walk left alone scores one, the target's own walk scores zero", "[s
   CHECK(source.direction_rad > 3.0 * floor->direction_rad);
   CHECK(source.height > 2.0 * floor->height);
   CHECK(alone->body->styled.speed_s == alone->body->source.speed_s);
+}
+
+TEST_CASE(
+    "a walker who was not taught misses all of a style that it does not get, and none of one"
+    " that it gets",
+    "[style][evaluate]") {
+  const auto walk = [](WalkerFamily family, int person) {
+    return motion::motion_of(make_walker({.family = family, .person = person}).value()).value();
+  };
+  const auto march = walk(WalkerFamily::kMarch, 1);
+  const auto sway = walk(WalkerFamily::kSway, 1);
+  const auto stranger = walk(WalkerFamily::kMarch, 2);
+  const auto nothing = style::arrival(stranger, stranger, march, sway);
+  REQUIRE(nothing);
+  CHECK(nothing->missing == Approx(1.0));
+  CHECK(nothing->arms_rad == Approx(nothing->unstyled_arms_rad));
+  CHECK(nothing->lean_rad == Approx(nothing->unstyled_lean_rad));
+  CHECK(nothing->worst_arm_rad > nothing->arms_rad);
+  REQUIRE(nothing->floor);
+  CHECK(*nothing->floor < 0.3);
+  const auto all = style::arrival(march, sway, march, sway);
+  REQUIRE(all);
+  CHECK(all->missing < 0.05);
+  CHECK(all->arms_rad < 0.02);
 }
 
 TEST_CASE("a target that is the source itself, or a source that stands still, has no score",

@@ -14,6 +14,7 @@
 #include "models/feet/foot_score.hpp"
 #include "models/feet/legs.hpp"
 #include "models/motion/motion.hpp"
+#include "models/style/judge/body_cycle.hpp"
 #include "models/style/judge/evaluate.hpp"
 #include "models/style/live/apply.hpp"
 #include "models/style/live/body_mask.hpp"
@@ -84,9 +85,10 @@ struct Lessons {
     for (const std::string& name : names) add(recording(name), group, who, day, motion);
     return *this;
   }
-  [[nodiscard]] style::StyleModel model() const {
+  [[nodiscard]] style::StyleModel model(motion::Space space = motion::Space::kHumanoid) const {
     style::TrainOptions options;
     options.target = "to";
+    options.dataset.space = space;
     auto trained = style::train_style(clips, options);
     if (!trained) UNSCOPED_INFO(trained.error().message);
     REQUIRE(trained);
@@ -523,6 +525,165 @@ TEST_CASE("figures: height and speed of the pelvis, and sliding feet", "[.][figu
     show((motion + ": slide over the source's").c_str(), slide);
     show((motion + ": sink [cm]").c_str(), sink);
     show((motion + ": cycle, feet standing").c_str(), cycle);
+  }
+}
+
+namespace {
+
+clip::Clip walker_of(const std::string& file) {
+  const auto path = test::shared("data/cmu/" + file);
+  INFO(file);
+  REQUIRE(path);
+  return clip::read_clip(*path).value();
+}
+
+motion::Motion motion_without_t_pose(const clip::Clip& clip) {
+  auto motion = motion::motion_of(clip).value();
+  if (motion::begins_with_added_pose(motion)) motion::drop_first_frame(motion);
+  return motion;
+}
+
+}  // namespace
+
+TEST_CASE("figures: what other skeletons get of the directions of bones", "[.][figures][rigs]") {
+  if (!recorded(take("normal", 1))) SKIP_WITHOUT_SHARED();
+  const std::vector<std::string> walkers{"07_01.bvh", "16_16.bvh", "35_02.bvh", "39_01.amc",
+                                         "08_01.amc"};
+  for (const std::string& name : kStyles) {
+    const auto model = walks(name, {1, 2}).model();
+    const auto source = motion::motion_of(recording(take("normal", 1))).value();
+    const auto target = motion::motion_of(recording(take(name, 1))).value();
+    std::vector<double> missing;
+    std::vector<double> arms;
+    std::vector<double> worst;
+    std::vector<double> lean;
+    for (const std::string& file : walkers) {
+      const clip::Clip walker = walker_of(file);
+      const auto got =
+          style::arrival(motion_without_t_pose(walker),
+                         motion_without_t_pose(styled(model, walker, &walker)), source, target)
+              .value();
+      missing.push_back(got.missing);
+      arms.push_back(got.arms_rad * 180.0 / 3.14159265);
+      worst.push_back(got.worst_arm_rad * 180.0 / 3.14159265);
+      lean.push_back(got.lean_rad * 180.0 / 3.14159265);
+    }
+    show((name + ": missing of the directions").c_str(), missing);
+    show((name + ": arms off [deg]").c_str(), arms);
+    show((name + ": worst arm [deg]").c_str(), worst);
+    show((name + ": lean beyond [deg]").c_str(), lean);
+  }
+}
+
+TEST_CASE("figures: the gate", "[.][figures][gates]") {
+  if (!recorded(take("normal", 1))) SKIP_WITHOUT_SHARED();
+  const auto gate = [](const style::StyleModel& model, const std::string& name,
+                       const clip::Clip* neutral = nullptr, bool cold = false) {
+    style::ApplyOptions options;
+    options.cold = cold;
+    if (neutral != nullptr) options.walker = style::measure_walker(model, "m", *neutral).value();
+    return style::apply_to_clip(model, "m", recording(name), options).value().gate_mean.value();
+  };
+  const clip::Clip& other = recording("dataset-1_walk_normal_001");
+  const clip::Clip& own = recording(take("normal", 1));
+  for (const std::string& name : kStyles) {
+    const auto model = walks(name, {1, 2}).model();
+    std::vector<double> strangers;
+    std::vector<double> warm;
+    std::vector<double> runs;
+    std::vector<double> warm_runs;
+    std::vector<double> days;
+    for (const std::string manner : {"normal", "feminine", "masculinity", "active"}) {
+      strangers.push_back(gate(model, "dataset-1_walk_" + manner + "_001"));
+      warm.push_back(gate(model, "dataset-1_walk_" + manner + "_001", &other));
+    }
+    for (const std::string group :
+         {"normal", "active", "elderly", "exhausted", "feminine", "masculine", "youthful"}) {
+      runs.push_back(gate(model, take(group, 4, "run")));
+      warm_runs.push_back(gate(model, take(group, 4, "run"), &own));
+    }
+    for (const std::string group : {"normal", "feminine", "youthful"}) {
+      days.push_back(gate(model, take(group, 13)));
+      days.push_back(gate(model, take(group, 14)));
+    }
+    show((name + ": gate, dataset-1 walks").c_str(), strangers);
+    show((name + ": the same, warmed up").c_str(), warm);
+    show((name + ": gate, another day").c_str(), days);
+    show((name + ": gate, runs").c_str(), runs);
+    show((name + ": the same, warmed up").c_str(), warm_runs);
+  }
+}
+
+namespace {
+
+// The same walk with so many frames for each of the clip's, straight between them.
+clip::Clip with_frames(const clip::Clip& slow, int times) {
+  clip::Clip fast = slow;
+  fast.frame_rate_hz *= times;
+  const Eigen::Index last = slow.channels.rows() - 1;
+  fast.channels.resize(last * times + 1, Eigen::NoChange);
+  for (Eigen::Index i = 0; i < fast.channels.rows(); ++i) {
+    const Eigen::Index at = std::min(i / times, last - 1);
+    const double part = static_cast<double>(i - at * times) / times;
+    const auto from = slow.channels.row(at);
+    Eigen::RowVectorXd step = slow.channels.row(at + 1) - from;
+    for (std::size_t c = 0; c < slow.skeleton->channels.size(); ++c) {
+      if (slow.skeleton->channels[c].translation) continue;
+      double& turn = step[static_cast<Eigen::Index>(c)];
+      turn = std::remainder(turn, 2.0 * 3.14159265358979);
+    }
+    fast.channels.row(i) = from + part * step;
+  }
+  return fast;
+}
+
+// The largest angle between the poses of the same instants at two rates, in degrees.
+double apart_at_rates(const style::StyleModel& model, const clip::Clip& walk, int times,
+                      bool cold) {
+  style::ApplyOptions options;
+  options.cold = cold;
+  const auto slow = style::apply_to_clip(model, "m", walk, options).value().clip;
+  const auto fast =
+      style::apply_to_clip(model, "m", with_frames(walk, times), options).value().clip;
+  double furthest = 0.0;
+  for (int i = 0; i < slow.frames(); ++i) {
+    const Frame one = slow.frame(i);
+    const Frame other = fast.frame(i * times);
+    for (std::size_t j = 0; j < one.joint_count; ++j) {
+      furthest = std::max(furthest, angle_between_rad(to_eigen_double(one.rotation_xyzw[j]),
+                                                      to_eigen_double(other.rotation_xyzw[j])));
+    }
+  }
+  return furthest * 180.0 / 3.14159265358979;
+}
+
+}  // namespace
+
+TEST_CASE("figures: the same pose at any rate", "[.][figures][rates]") {
+  if (!recorded(take("normal", 1))) SKIP_WITHOUT_SHARED();
+  for (const std::string& name : kStyles) {
+    const auto model = walks(name, {1, 2}).model();
+    for (const bool cold : {false, true}) {
+      std::vector<double> apart;
+      for (const int take_number : {4, 5, 6}) {
+        for (const int times : {2, 4}) {
+          apart.push_back(
+              apart_at_rates(model, recording(take("normal", take_number)), times, cold));
+        }
+      }
+      show((name + (cold ? ": rates apart, cold [deg]" : ": rates apart, warm [deg]")).c_str(),
+           apart);
+    }
+  }
+}
+
+TEST_CASE("a walk gets the same pose at any rate of frames", "[style][real]") {
+  if (!recorded(take("normal", 1))) SKIP_WITHOUT_SHARED();
+  const auto model = walks("active", {1, 2}).model();
+  for (const bool cold : {false, true}) {
+    for (const int times : {2, 4}) {
+      CHECK(apart_at_rates(model, recording(take("normal", 4)), times, cold) <= 0.5);
+    }
   }
 }
 

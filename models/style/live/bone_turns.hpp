@@ -1,0 +1,61 @@
+// BoneTurns: gives a walker of another build the change of a style (README.md, "Other builds").
+// What the style does to the walk of training is carried over as turns of bones in the world, for
+// arms as a change of their direction, because the same angles of joints bring an arm that hangs
+// another way to another place. Const and shareable; RT-safe after make().
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <Eigen/Geometry>
+
+#include "models/motion/pose_space.hpp"
+#include "proto/frame/frame.hpp"
+#include "proto/frame/skeleton.hpp"
+
+namespace posed::style {
+
+class BoneTurns {
+ public:
+  // Empty for a space other than humanoid. `skeleton` has the bones of a person.
+  static std::optional<BoneTurns> make(const motion::PoseSpaceSpec& spec, const Skeleton& skeleton);
+
+  // Turns the joints of `frame` as the bones turn from the pose `from` of training to
+  // from + change [rad, dims]. `shares` [dims] is how far a bone takes part: at 0 it rides on the
+  // bone above it. Joints that were not measured stay.
+  RT_SAFE void add(Frame& frame, double heading_rad, std::span<const float> from,
+                   std::span<const float> change, std::span<const float> shares) const noexcept;
+
+ private:
+  // Of the training's figure.
+  struct Taught {
+    int parent = -1;  // among these
+    int first_dim = 0;
+    Eigen::Quaterniond mean;
+  };
+  // Of the walker's.
+  struct Part {
+    int bone = -1;  // among the taught ones
+    bool rides = true;
+    // An arm's direction in its joint's frame, and in the T-pose.
+    std::optional<Eigen::Vector3d> along{};
+    Eigen::Vector3d in_t_pose = Eigen::Vector3d::Zero();
+  };
+  using Turns = std::array<Eigen::Quaterniond, kMaxJoints>;
+
+  BoneTurns() = default;
+  RT_SAFE void find_taught(std::span<const float> from, std::span<const float> change,
+                           Turns& before, Turns& after) const noexcept;
+  RT_SAFE [[nodiscard]] Eigen::Quaterniond turn_of(const Part& part, const Eigen::Quaterniond& own,
+                                                   const Eigen::Quaterniond& before,
+                                                   const Eigen::Quaterniond& after) const noexcept;
+
+  Skeleton skeleton_;
+  std::vector<Taught> taught_;  // the one above before the one below
+  std::vector<Part> parts_;     // [joint]
+};
+
+}  // namespace posed::style

@@ -1,0 +1,115 @@
+// A style's change on a walker of another build: bones turn as those of training do, arms point
+// where they are told to.
+#include "models/style/live/bone_turns.hpp"
+
+#include <catch2/catch.hpp>
+
+#include <vector>
+
+#include "models/motion/kinematics.hpp"
+#include "models/motion/motion.hpp"
+#include "models/motion/synthetic_walker.hpp"
+
+using namespace posed;
+using Eigen::Vector3d;
+
+namespace {
+
+struct Build {
+  clip::Clip walk =
+      motion::make_walker({.family = motion::WalkerFamily::kMarch, .person = 1}).value();
+  motion::PoseSpaceSpec spec =
+      motion::describe_space(motion::Space::kHumanoid, *walk.skeleton).value();
+  motion::PoseSpace space = motion::PoseSpace::bind(spec, *walk.skeleton).value();
+  style::BoneTurns turns = style::BoneTurns::make(spec, *walk.skeleton).value();
+  std::size_t dims = static_cast<std::size_t>(space.dims());
+  std::vector<float> all = std::vector<float>(dims, 1.0F);
+
+  [[nodiscard]] std::vector<float> vector_of(const Frame& frame) const {
+    std::vector<float> q(dims);
+    std::vector<std::uint8_t> available(dims);
+    space.to_vector(frame, 0.4, q, available);
+    return q;
+  }
+  // A change of one bone.
+  [[nodiscard]] std::vector<float> change_of(Bone bone, const Vector3d& turn_rad) const {
+    std::vector<float> change(dims, 0.0F);
+    for (std::size_t d = 0; d < dims; ++d) {
+      const auto joint = space.skeleton_joint_of_dim(static_cast<int>(d));
+      if (joint != walk.skeleton->joint_of(bone)) continue;
+      for (std::size_t i = 0; i < 3; ++i) {
+        change[d + i] = static_cast<float>(turn_rad[static_cast<int>(i)]);
+      }
+      break;
+    }
+    return change;
+  }
+  // From one bone to another, seen from the heading.
+  [[nodiscard]] Vector3d direction(const Frame& frame, Bone from, Bone to) const {
+    const auto pose = motion::world_pose(*walk.skeleton, frame);
+    const auto at = [&](Bone bone) {
+      return pose.position_m[static_cast<std::size_t>(walk.skeleton->joint_of(bone))];
+    };
+    return axis_rotation(Axis::kY, -0.4) * (at(to) - at(from)).normalized();
+  }
+};
+
+}  // namespace
+
+TEST_CASE("who walks as the training does gets the same turns of joints", "[style][bone_turns]") {
+  const Build build;
+  const Frame plain = build.walk.frame(20);
+  const auto q = build.vector_of(plain);
+  const auto change = build.change_of(Bone::kSpine, {0.3, 0.1, -0.2});
+  Frame own = plain;
+  build.space.add(own, 0.4, q, change);
+  Frame carried = plain;
+  std::vector<float> without_arms = build.all;
+  build.turns.add(carried, 0.4, q, change, without_arms);
+  for (const Bone bone : {Bone::kHips, Bone::kSpine, Bone::kHead, Bone::kLeftUpperLeg}) {
+    const auto j = static_cast<std::size_t>(build.walk.skeleton->joint_of(bone));
+    CHECK(angle_between_rad(to_eigen_double(own.rotation_xyzw[j]),
+                            to_eigen_double(carried.rotation_xyzw[j])) < 1e-5);
+  }
+}
+
+TEST_CASE("an arm that hangs another way than in training gets the taught change of direction",
+          "[style][bone_turns]") {
+  const Build build;
+  const Frame taught = build.walk.frame(20);
+  const auto from = build.vector_of(taught);
+  const auto change = build.change_of(Bone::kLeftUpperArm, {0.0, 0.5, 0.3});
+  Frame goal = taught;
+  build.space.add(goal, 0.4, from, change);
+  // The walker's forearm is twisted by much and its arm a little away from the training's.
+  Frame walker = taught;
+  build.space.add(walker, 0.4, from, build.change_of(Bone::kLeftUpperArm, {1.2, 0.2, 0.3}));
+  Frame styled = walker;
+  build.turns.add(styled, 0.4, build.vector_of(taught), change, build.all);
+  const auto arm = [&](const Frame& frame) {
+    return build.direction(frame, Bone::kLeftUpperArm, Bone::kLeftLowerArm);
+  };
+  const Vector3d wanted = (arm(walker) + arm(goal) - arm(taught)).normalized();
+  CHECK((arm(styled) - wanted).norm() < 0.02);
+  CHECK((arm(styled) - arm(walker)).norm() > 0.3);
+  // By turns of joints it would end somewhere else.
+  Frame by_turns = walker;
+  build.space.add(by_turns, 0.4, build.vector_of(walker), change);
+  CHECK((arm(by_turns) - wanted).norm() > 0.1);
+}
+
+TEST_CASE("what takes no part rides on the bone above it", "[style][bone_turns]") {
+  const Build build;
+  const Frame plain = build.walk.frame(20);
+  const auto q = build.vector_of(plain);
+  std::vector<float> change(build.dims, 0.2F);
+  Frame still = plain;
+  build.turns.add(still, 0.4, q, change, std::vector<float>(build.dims, 0.0F));
+  CHECK(still.rotation_xyzw == plain.rotation_xyzw);
+  Frame unmeasured = plain;
+  const auto head = static_cast<std::size_t>(build.walk.skeleton->joint_of(Bone::kHead));
+  unmeasured.valid[head] = false;
+  build.turns.add(unmeasured, 0.4, q, change, build.all);
+  CHECK(unmeasured.rotation_xyzw[head] == plain.rotation_xyzw[head]);
+  CHECK(unmeasured.rotation_xyzw != plain.rotation_xyzw);
+}
