@@ -27,6 +27,7 @@ function(install_tree component destination folder pattern)
 endfunction()
 
 install(TARGETS posed DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT posed)
+install(TARGETS posed-fbx DESTINATION libexec/posed COMPONENT posed)
 install_tree(posed ${CMAKE_INSTALL_MANDIR}/man1 ${generated} *.1.gz)
 install(FILES ${generated}/posed.bash RENAME posed DESTINATION share/bash-completion/completions COMPONENT posed)
 install_files(posed share/zsh/vendor-completions ${generated}/_posed)

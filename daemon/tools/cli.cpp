@@ -23,6 +23,7 @@
 #include "daemon/tools/command/ranks.hpp"
 #include "drivers/transport/address.hpp"
 #include "models/motion/vrm_animation.hpp"
+#include "proto/clip/fbx.hpp"
 #include "proto/clip/format.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/nearest_word.hpp"
@@ -154,6 +155,7 @@ int parse_and_run(int argc, char** argv, CLI::App& app, const int& exit_code) {
 
 void add_commands(CLI::App& app, int& exit_code) {
   clip::add_format(motion::vrm_animation_format());
+  clip::add_format(clip::fbx_format());
   for (const AddCommand add : kCommands) add(app, exit_code);
 }
 

@@ -15,6 +15,7 @@
 
 #include "proto/clip/draft.hpp"
 #include "proto/clip/formats.hpp"
+#include "proto/clip/mannequin.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
 
@@ -22,6 +23,11 @@ namespace posed::clip {
 namespace {
 
 constexpr std::size_t kMaxBytes = std::numeric_limits<std::uint32_t>::max() / 2;
+
+template <typename Number>
+constexpr int kComponent = TINYGLTF_COMPONENT_TYPE_FLOAT;
+template <>
+constexpr int kComponent<std::uint16_t> = TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT;
 
 // Fills a tinygltf model: all numbers go into one buffer, which becomes the binary part of the
 // file.
@@ -36,33 +42,45 @@ class ModelBuilder {
   [[nodiscard]] tinygltf::Model build(GltfKind kind) {
     add_nodes();
     add_animation();
-    if (kind == GltfKind::kSkin) add_skin();
+    if (kind == GltfKind::kSkin) {
+      add_skin();
+      add_mannequin();
+    }
     if (kind == GltfKind::kVrmAnimation) add_humanoid();
     return std::move(model_);
   }
 
  private:
-  // Returns the number of the accessor. glTF wants the bounds of times.
-  int add_numbers(const std::vector<float>& values, int type, bool bounds = false) {
+  // Returns the number of the accessor. glTF wants the bounds of times and places.
+  template <typename Number>
+  int add_numbers(const std::vector<Number>& values, int type, bool bounds = false) {
     auto& data = model_.buffers.front().data;
     tinygltf::BufferView view;
     view.buffer = 0;
     view.byteOffset = data.size();
-    view.byteLength = values.size() * sizeof(float);
+    view.byteLength = values.size() * sizeof(Number);
     static_assert(std::endian::native == std::endian::little, "glTF's numbers are little-endian");
     const auto bytes = std::as_bytes(std::span(values));
     for (const std::byte byte : bytes) data.push_back(static_cast<unsigned char>(byte));
+    data.resize((data.size() + 3) / 4 * 4);  // the next numbers may be floats
     model_.bufferViews.push_back(std::move(view));
     tinygltf::Accessor accessor;
     accessor.bufferView = static_cast<int>(model_.bufferViews.size()) - 1;
-    accessor.componentType = TINYGLTF_COMPONENT_TYPE_FLOAT;
+    accessor.componentType = kComponent<Number>;
     accessor.type = type;
-    const int parts = tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(type));
-    accessor.count = values.size() / static_cast<std::size_t>(parts);
+    const auto parts = static_cast<std::size_t>(
+        tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(type)));
+    accessor.count = values.size() / parts;
     if (bounds) {
-      const auto [least, most] = std::ranges::minmax(values);
-      accessor.minValues = {least};
-      accessor.maxValues = {most};
+      accessor.minValues.assign(values.begin(),
+                                values.begin() + static_cast<std::ptrdiff_t>(parts));
+      accessor.maxValues = accessor.minValues;
+      for (std::size_t i = parts; i < values.size(); ++i) {
+        double& least = accessor.minValues[i % parts];
+        double& most = accessor.maxValues[i % parts];
+        least = std::min<double>(least, values[i]);
+        most = std::max<double>(most, values[i]);
+      }
     }
     model_.accessors.push_back(std::move(accessor));
     return static_cast<int>(model_.accessors.size()) - 1;
@@ -133,6 +151,43 @@ class ModelBuilder {
     }
     skin.inverseBindMatrices = add_numbers(matrices, TINYGLTF_TYPE_MAT4);
     model_.skins.push_back(std::move(skin));
+  }
+
+  // Viewers show a skin only where a mesh has it. The mesh is no part of the figure: glTF ignores
+  // the place of a node with a skin.
+  void add_mannequin() {
+    const Mannequin body = mannequin_of(motion_.nodes);
+    if (body.node.empty()) return;
+    std::vector<std::uint16_t> joints;
+    std::vector<float> weights;
+    for (const std::uint16_t node : body.node) {
+      joints.insert(joints.end(), {node, 0, 0, 0});
+      weights.insert(weights.end(), {1.0F, 0.0F, 0.0F, 0.0F});
+    }
+    tinygltf::Primitive triangles;
+    triangles.mode = TINYGLTF_MODE_TRIANGLES;
+    triangles.attributes = {{"POSITION", add_numbers(body.position_m, TINYGLTF_TYPE_VEC3, true)},
+                            {"NORMAL", add_numbers(body.normal, TINYGLTF_TYPE_VEC3)},
+                            {"JOINTS_0", add_numbers(joints, TINYGLTF_TYPE_VEC4)},
+                            {"WEIGHTS_0", add_numbers(weights, TINYGLTF_TYPE_VEC4)}};
+    triangles.indices = add_numbers(body.corner, TINYGLTF_TYPE_SCALAR);
+    triangles.material = 0;
+    tinygltf::Material skin;
+    skin.name = "mannequin";
+    skin.pbrMetallicRoughness.baseColorFactor = {0.55, 0.6, 0.68, 1.0};
+    skin.pbrMetallicRoughness.metallicFactor = 0.0;
+    skin.pbrMetallicRoughness.roughnessFactor = 0.8;
+    model_.materials.push_back(std::move(skin));
+    tinygltf::Mesh mesh;
+    mesh.name = "mannequin";
+    mesh.primitives.push_back(std::move(triangles));
+    model_.meshes.push_back(std::move(mesh));
+    tinygltf::Node node;
+    node.name = "mannequin";
+    node.mesh = 0;
+    node.skin = 0;
+    model_.scenes.front().nodes.push_back(static_cast<int>(model_.nodes.size()));
+    model_.nodes.push_back(std::move(node));
   }
 
   void add_humanoid() {

@@ -35,7 +35,7 @@ struct GltfMotion {
 };
 
 enum class GltfKind : std::uint8_t {
-  kSkin,          // all nodes are joints of a skin, which makes them an armature in Blender
+  kSkin,          // all nodes are joints of the skin of a mannequin: an armature in Blender
   kVrmAnimation,  // VRMC_vrm_animation 1.0: nodes with a bone are the humanoid's
 };
 
@@ -54,7 +54,7 @@ void add_position(GltfNode& node, const Eigen::Vector3d& position_m);
 Result<> write_gltf(const GltfMotion& motion, GltfKind kind, const std::filesystem::path& path);
 
 // Writes `clip` as .glb: a node for each joint and each end site, where the skeleton has them at
-// rest, and their motion at the clip's own times.
+// rest, and their motion at the clip's own times; and a mannequin that they move.
 Result<> write_glb(const Clip& clip, const std::filesystem::path& path);
 
 // Format::read of all kinds of glTF: the bones that a VRM names, otherwise the joints of the skins;

@@ -430,7 +430,7 @@ Times times_of(const std::vector<Track>& tracks) {
   }
   const double whole_hz = std::round(rate_hz);
   times.rate_hz = !even                                            ? kUnevenRate_hz
-                  : std::abs(rate_hz - whole_hz) < 1e-3 * whole_hz ? whole_hz
+                  : std::abs(rate_hz - whole_hz) < 1e-4 * whole_hz ? whole_hz
                                                                    : rate_hz;
   const double frames = (last_s - times.first_s) * times.rate_hz + 1e-6;
   times.frames = frames < kMaxFramesAKey * (steps + 1.0) ? static_cast<std::size_t>(frames) + 1

@@ -110,6 +110,8 @@ def main(build):
                      "share/posed/config/stage/capture.toml", "share/posed/config/metrics/alerts.yml",
                      "share/posed/config/metrics/dashboard.json", "share/posed/proto/posed/v1/posed.proto"):
             assert (prefix / path).stat().st_size > 0, path
+        # What reads FBX is a program of its own.
+        output(posed, "convert", Path(__file__).parents[1] / "golden/fbx/arm.fbx", "--out", folder / "arm.bvh")
         check_page(posed, prefix)
         check_clients(prefix, folder)
         print(f"{len(options)} options in {len(list(pages.glob('*')))} manual pages")

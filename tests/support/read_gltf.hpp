@@ -52,7 +52,8 @@ class ReadGltf {
     std::vector<Eigen::Vector3d> position(model.nodes.size());
     std::vector<Eigen::Quaterniond> rotation(model.nodes.size(), Eigen::Quaterniond::Identity());
     for (std::size_t i = 0; i < model.nodes.size(); ++i) {
-      position[i] = Eigen::Map<const Eigen::Vector3d>(model.nodes[i].translation.data());
+      const std::vector<double>& place = model.nodes[i].translation;  // a mesh's node has none
+      position[i] = place.empty() ? Eigen::Vector3d::Zero() : Eigen::Vector3d(place.data());
     }
     for (const tinygltf::AnimationChannel& channel : model.animations[0].channels) {
       const auto& sampler =

@@ -255,7 +255,9 @@ void add_convert(CLI::App& app, int& exit_code) {
       "one.\n"
       "A log gives the frames that were published, styled as they were; its BVH is in "
       "centimetres.\n"
-      "A .glb is glTF: the figure as an armature, for Blender and game engines. A .vrma moves any\n"
+      "A .glb is glTF: the figure as an armature with a mannequin, for Blender and game engines. "
+      "An\n"
+      ".fbx is read only; its first animation with keys is the clip. A .vrma moves any\n"
       "VRM avatar and needs a person's bones. Both keep the clip's times. A .mcap has pose/,\n"
       "skeleton/ and sensor/ of all streams of a log, with the protobuf schema, in UTC.\n\n"
       "Examples:\n"
@@ -265,6 +267,7 @@ void add_convert(CLI::App& app, int& exit_code) {
       "  posed convert take1.plog --stream walker --out walker.bvh\n"
       "  posed convert take1.plog --takes\n"
       "  posed convert take1.plog --take 2 --stream walker --out walker-2.bvh\n"
+      "  posed convert mixamo.fbx --out walk.bvh\n"
       "  posed convert walk.bvh --out walk.vrma\n"
       "  posed convert take1.plog --out take1.mcap");
   command->callback([convert, shape, &exit_code] {

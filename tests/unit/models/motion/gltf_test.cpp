@@ -16,6 +16,7 @@
 #include "tests/support/file_text.hpp"
 #include "tests/support/has.hpp"
 #include "tests/support/read_gltf.hpp"
+#include "tests/support/same_motion.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -34,7 +35,8 @@ void check_glb(const clip::Clip& clip) {
   const Skeleton& skeleton = *clip.skeleton;
   REQUIRE(std::ssize(read.time_s) == clip.frames());
   REQUIRE(read.model.skins.size() == 1);
-  CHECK(read.model.skins[0].joints.size() == read.model.nodes.size());
+  const std::size_t nodes = read.model.nodes.size() - 1;  // without the mannequin's
+  CHECK(read.model.skins[0].joints.size() == nodes);
   for (int i = 0; i < clip.frames(); ++i) {
     const WorldPose truth = world_pose(skeleton, clip.frame(i));
     const auto shown = read.at(static_cast<std::size_t>(i));
@@ -46,7 +48,7 @@ void check_glb(const clip::Clip& clip) {
       const Eigen::Vector3d at = truth.position_m[j] + truth.rotation[j] * *end;
       CHECK((shown[tip++].translation() - at).norm() < kSame_m);
     }
-    CHECK(tip == read.model.nodes.size());
+    CHECK(tip == nodes);
   }
 }
 
@@ -96,6 +98,30 @@ void check_vrma(const clip::Clip& clip) {
 
 TEST_CASE("a .glb shows the joints and end sites where the clip has them") {
   check_glb(walker_clip());
+}
+
+TEST_CASE("a .glb shows a mannequin whose bones lie between the joints") {
+  const test::TempFolder folder;
+  const clip::Clip walk = walker_clip();
+  REQUIRE(clip::write_glb(walk, folder.path() / "out.glb"));
+  const test::ReadGltf read(folder.path() / "out.glb");
+  REQUIRE(read.model.meshes.size() == 1);
+  CHECK(read.model.nodes.back().skin == 0);
+  const auto& mesh = read.model.meshes[0].primitives.at(0);
+  const auto& corners = read.model.accessors.at(static_cast<std::size_t>(mesh.indices));
+  CHECK(corners.count % 3 == 0);
+  const auto places = read.numbers(mesh.attributes.at("POSITION"));
+  const std::size_t vertices = places.size() / 3;
+  CHECK(vertices == 26 * (read.model.nodes.size() - 2));  // a capsule for each node but the root
+  double highest_m = 0.0, lowest_m = 9.0, widest_m = 0.0;
+  for (std::size_t v = 0; v < vertices; ++v) {
+    widest_m = std::max<double>(widest_m, std::abs(places[3 * v + 2]));
+    highest_m = std::max<double>(highest_m, places[3 * v + 1]);
+    lowest_m = std::min<double>(lowest_m, places[3 * v + 1]);
+  }
+  CHECK(highest_m - lowest_m > 1.4);  // a grown person
+  CHECK(highest_m - lowest_m < 2.2);
+  CHECK(widest_m < 0.4);
 }
 
 TEST_CASE("a joint below the root moves in a .glb if it has position channels") {
@@ -228,22 +254,6 @@ TEST_CASE("a .vrma needs the bones that VRM requires, and names those that are m
 
 namespace {
 
-// How far the joints of a clip are from those of the same names in another one, frame by frame.
-void check_read_back(const clip::Clip& clip, const clip::Clip& back) {
-  REQUIRE(back.frames() == clip.frames());
-  CHECK(back.frame_rate_hz == Approx(clip.frame_rate_hz));
-  for (int i = 0; i < clip.frames(); ++i) {
-    const WorldPose truth = world_pose(*clip.skeleton, clip.frame(i));
-    const WorldPose got = world_pose(*back.skeleton, back.frame(i));
-    for (std::size_t j = 0; j < clip.skeleton->joints.size(); ++j) {
-      const int k = back.skeleton->joint_index(clip.skeleton->joints[j].name);
-      REQUIRE(k >= 0);
-      CHECK((got.position_m[static_cast<std::size_t>(k)] - truth.position_m[j]).norm() < 1e-4);
-      CHECK(angle_between_rad(got.rotation[static_cast<std::size_t>(k)], truth.rotation[j]) < 2e-4);
-    }
-  }
-}
-
 // A figure of VRM's required bones. `backwards`: it looks along -Z, as VRM 0 does; `twisted`: its
 // nodes have rotations at rest, below an armature that is turned and scaled.
 struct AvatarFile {
@@ -328,7 +338,7 @@ TEST_CASE("a .glb is read back as the clip that was written") {
   REQUIRE(clip::write_glb(walk, path));
   const auto back = clip::read_clip(path);
   if (!back) FAIL(back.error().text());
-  check_read_back(walk, *back);
+  test::check_same_motion(walk, *back);
   CHECK(back->skeleton->joints.size() == walk.skeleton->joints.size());
   for (std::size_t j = 0; j < walk.skeleton->joints.size(); ++j) {
     CHECK(back->skeleton->joints[j].bone == walk.skeleton->joints[j].bone);
