@@ -302,10 +302,6 @@ class Builder {
       TRY(cut_limits(joint));
     }
     for (DrivenJoint& driven : hand_.driven) {
-      if (driven.low > driven.high) {
-        return refuse("joint " + in_quotes(hand_.joints[driven.joint].name) +
-                      " has no angle at which all its followers are within their limits");
-      }
       const auto start = starts_.find(driven.joint);
       driven.start =
           std::clamp(start == starts_.end() ? 0.0 : start->second, driven.low, driven.high);
@@ -326,6 +322,12 @@ class Builder {
     if (low > high) std::swap(low, high);
     leader.low = std::max(leader.low, low_float(low));
     leader.high = std::min(leader.high, high_float(high));
+    if (leader.low > leader.high) {
+      return refuse("joint " + in_quotes(hand_.joints[leader.joint].name) +
+                    " has no angle at which joint " + in_quotes(joint.name) +
+                    ", which follows it, is within its limits; often the sign of its <mimic> "
+                    "multiplier is wrong: mend it as the robot turns");
+    }
     const double gain = std::abs(joint.multiplier);
     leader.speed = std::min(leader.speed, joint.speed / gain);
     leader.acceleration = std::min(leader.acceleration, options_.acceleration / gain);
@@ -544,11 +546,7 @@ void place(const RobotHand& hand, const Drive& drive, Placed& placed) noexcept {
     }
     placed.turn[l] = turn;
   }
-  for (std::size_t c = 0; c < placed.from_m.size(); ++c) {
-    const Capsule& capsule = hand.capsules[c];
-    placed.from_m[c] = placed.at_m[capsule.link] + placed.turn[capsule.link] * capsule.from_m;
-    placed.to_m[c] = placed.at_m[capsule.link] + placed.turn[capsule.link] * capsule.to_m;
-  }
+  std::ranges::fill(placed.shaped, 0);
 }
 
 void add_slope(const RobotHand& hand, const Placed& placed, int link,

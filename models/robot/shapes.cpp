@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "models/hand/segments.hpp"
 #include "models/robot/capsule_fit.hpp"
@@ -11,8 +12,8 @@ namespace posed::robot {
 namespace {
 
 constexpr int kMaxStripsABox = 4;
-constexpr std::size_t kMaxJoined = 40;     // of a link: more would take long
-constexpr double kJoinedFat_m = 4e-3;
+constexpr double kJoinedFat_m = 6e-3;
+constexpr std::size_t kMaxJoined = 48;  // of a link: more would take long
 constexpr int kTries = 100;
 constexpr double kMostly = 0.7;
 
@@ -86,30 +87,29 @@ void add_strips(const Shape& box, const std::vector<Shape>& boxes, std::vector<C
   }
 }
 
-// Two that one capsule holds without reaching much farther beyond the boxes become one, those that
-// cost least first.
+// What holds both, where it does not reach much farther beyond the boxes.
+std::optional<Cover> joined(const Cover& a, const Cover& b, const std::vector<Shape>& boxes) {
+  std::vector<Eigen::Vector3d> corners = a.corners;
+  corners.insert(corners.end(), b.corners.begin(), b.corners.end());
+  Cover both = cover(std::move(corners), boxes);
+  if (both.fat_m > std::max({kJoinedFat_m, a.fat_m, b.fat_m})) return std::nullopt;
+  return both;
+}
+
+// Those of which one can hold two become one, until there are none.
 void join(const std::vector<Shape>& boxes, std::vector<Cover>& covers) {
-  while (covers.size() > 1 && covers.size() <= kMaxJoined) {
-    double least = std::numeric_limits<double>::infinity();
-    Cover best;
-    std::size_t into = 0, from = 0;
-    for (std::size_t a = 0; a < covers.size(); ++a) {
-      for (std::size_t b = a + 1; b < covers.size(); ++b) {
-        const double allowed_m = std::max({kJoinedFat_m, covers[a].fat_m, covers[b].fat_m});
-        std::vector<Eigen::Vector3d> corners = covers[a].corners;
-        corners.insert(corners.end(), covers[b].corners.begin(), covers[b].corners.end());
-        Cover both = cover(std::move(corners), boxes);
-        const double cost = both.fat_m - allowed_m;
-        if (cost > 0.0 || cost >= least) continue;
-        least = cost;
-        best = std::move(both);
-        into = a;
-        from = b;
+  if (covers.size() > kMaxJoined) return;
+  for (std::size_t a = 0; a < covers.size(); ++a) {
+    for (std::size_t b = a + 1; b < covers.size();) {
+      auto both = joined(covers[a], covers[b], boxes);
+      if (!both) {
+        ++b;
+        continue;
       }
+      covers[a] = std::move(*both);
+      covers.erase(covers.begin() + static_cast<long>(b));
+      b = a + 1;
     }
-    if (!std::isfinite(least)) return;
-    covers[into] = std::move(best);
-    covers.erase(covers.begin() + static_cast<long>(from));
   }
 }
 
@@ -145,6 +145,33 @@ void add_shape(RobotHand& hand, int link, const Shape& shape) {
   }
 }
 
+// One capsule around all of a link's: as long as their ends are apart along each axis of the link,
+// the smallest of the three.
+void hold_all(const RobotHand& hand, Ball& ball) {
+  const auto capsules = std::span(hand.capsules).subspan(ball.first, ball.count);
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k < 3; ++k) {
+    CapsuleFit fit;
+    double low = 1e9, high = -1e9;
+    for (const Capsule& one : capsules) {
+      low = std::min({low, one.from_m[k], one.to_m[k]});
+      high = std::max({high, one.from_m[k], one.to_m[k]});
+      for (const Eigen::Vector3d& end : {one.from_m, one.to_m}) {
+        Eigen::Vector3d across = end - ball.middle_m;
+        across[k] = 0.0;
+        fit.radius_m = std::max(fit.radius_m, across.norm() + one.radius_m);
+      }
+    }
+    fit.length_m = high - low;
+    if (volume(fit) >= least) continue;
+    least = volume(fit);
+    ball.from_m = ball.to_m = ball.middle_m;
+    ball.from_m[k] = low;
+    ball.to_m[k] = high;
+    ball.thick_m = fit.radius_m;
+  }
+}
+
 Ball ball_around(const RobotHand& hand, int first) {
   Ball ball{.first = first, .count = static_cast<int>(hand.capsules.size()) - first};
   if (ball.count == 0) return ball;
@@ -162,6 +189,7 @@ Ball ball_around(const RobotHand& hand, int first) {
         std::max({ball.radius_m, (capsule.from_m - ball.middle_m).norm() + capsule.radius_m,
                   (capsule.to_m - ball.middle_m).norm() + capsule.radius_m});
   }
+  hold_all(hand, ball);
   return ball;
 }
 
@@ -200,9 +228,21 @@ RT_SAFE Eigen::Vector3d world(const Placed& placed, int link, const Eigen::Vecto
   return placed.at_m[link] + placed.turn[link] * m;
 }
 
+RT_SAFE void place_capsules(const RobotHand& hand, Placed& placed, int link) noexcept {
+  if (placed.shaped[link]) return;
+  placed.shaped[link] = true;
+  const Ball& all = hand.balls[link];
+  for (int c = all.first; c < all.first + all.count; ++c) {
+    placed.from_m[c] = world(placed, link, hand.capsules[c].from_m);
+    placed.to_m[c] = world(placed, link, hand.capsules[c].to_m);
+  }
+}
+
 // The least gap below `near_m`; that itself where none is.
-RT_SAFE Nearest nearest(const RobotHand& hand, const Placed& placed, int a, int b,
+RT_SAFE Nearest nearest(const RobotHand& hand, Placed& placed, int a, int b,
                         double near_m) noexcept {
+  place_capsules(hand, placed, a);
+  place_capsules(hand, placed, b);
   Nearest best{.gap_m = near_m};
   const Ball& all_a = hand.balls[a];
   const Ball& all_b = hand.balls[b];
@@ -245,8 +285,15 @@ RT_SAFE bool may_be_near(const RobotHand& hand, const Placed& placed, int a, int
   const Ball& one = hand.balls[a];
   const Ball& other = hand.balls[b];
   const double reach_m = one.radius_m + other.radius_m + near_m;
-  return (world(placed, a, one.middle_m) - world(placed, b, other.middle_m)).squaredNorm() <
-         reach_m * reach_m;
+  if ((world(placed, a, one.middle_m) - world(placed, b, other.middle_m)).squaredNorm() >=
+      reach_m * reach_m) {
+    return false;
+  }
+  const auto closest =
+      hand::closest_points(world(placed, a, one.from_m), world(placed, a, one.to_m),
+                           world(placed, b, other.from_m), world(placed, b, other.to_m));
+  const double thick_m = one.thick_m + other.thick_m + near_m;
+  return closest.apart.squaredNorm() < thick_m * thick_m;
 }
 
 }  // namespace
@@ -282,8 +329,8 @@ void add_shapes(RobotHand& hand) {
   }
 }
 
-std::span<const Gap> find_gaps(const RobotHand& hand, const Placed& placed, double near_m,
-                               bool slopes, Gaps& gaps) noexcept {
+std::span<const Gap> find_gaps(const RobotHand& hand, Placed& placed, double near_m, bool slopes,
+                               Gaps& gaps) noexcept {
   std::size_t count = 0;
   for (const auto& [a, b] : hand.pairs) {
     if (!may_be_near(hand, placed, a, b, near_m)) continue;
@@ -305,7 +352,7 @@ std::span<const Gap> find_gaps(const RobotHand& hand, const Placed& placed, doub
   return {gaps.data(), count};
 }
 
-Gap gap_between(const RobotHand& hand, const Placed& placed, int a, int b) noexcept {
+Gap gap_between(const RobotHand& hand, Placed& placed, int a, int b) noexcept {
   const Nearest at = nearest(hand, placed, a, b, std::numeric_limits<double>::infinity());
   Gap gap{.a = a, .b = b, .gap_m = at.gap_m};
   if (std::isfinite(at.gap_m)) add_slopes(hand, placed, at, gap);

@@ -20,7 +20,8 @@ URDF says where that is less, and 120 rad/s^2. Gaps are those of capsules that h
 shapes; a mean that has nothing to average is a dash. CPU time needs a build with -O2.
 
   posed_bench robot config/robots/mitten.urdf
-  posed_bench robot hand.urdf take.csv --out poses.csv     # for posed_robot_judge)";
+  posed_bench robot hand.urdf take.csv --out poses    # the commands, judged by MuJoCo:
+  posed_robot_judge hand.urdf poses/posed-command.csv)";
 
 struct BenchRobotOptions {
   std::string urdf, take, signs, out;
@@ -56,7 +57,7 @@ void print_figures(const std::vector<RobotTrack>& tracks, const std::vector<Robo
   print_row("extension error, %", all, &RobotFigures::extension_percent, 1);
   print_row("frames beyond a joint's limit, %", all, &RobotFigures::beyond_percent, 1);
   print_row("  farthest, rad", all, &RobotFigures::beyond_rad, 4);
-  print_row("frames with links in each other, %", all, &RobotFigures::overlap_percent, 1);
+  print_row("frames with capsules in each other, %", all, &RobotFigures::overlap_percent, 1);
   print_row("  deepest, mm", all, &RobotFigures::overlap_mm, 1);
   print_row("fastest joint, rad/s", all, &RobotFigures::speed_rad_s, 1);
   print_row("jerk, rms, rad/s^3", all, &RobotFigures::jerk_rad_s3, 0);
@@ -84,7 +85,13 @@ Result<> bench(const BenchRobotOptions& options) {
   std::printf("the command: %d hard stops, the longest stop %.3f s\n", tracks[1].hard_stops,
               tracks[1].longest_stop_s);
   if (options.out.empty()) return {};
-  return write_poses(robot, tracks[1].poses, options.out);
+  const std::filesystem::path folder(options.out);
+  std::error_code failed;
+  std::filesystem::create_directories(folder, failed);
+  for (const RobotTrack& track : tracks) {
+    TRY(write_poses(robot, track.poses, folder / (track.name + ".csv")));
+  }
+  return {};
 }
 
 }  // namespace
@@ -100,7 +107,7 @@ void add_bench_robot(CLI::App& bench_app, int& exit_code) {
       ->excludes(take);
   command->add_option("--speed", options->speed, "Of each joint, rad/s, as in [stream.robot]")
       ->check(CLI::Range(0.0, 100.0));
-  command->add_option("--out", options->out, "Writes the commands, a column a joint");
+  command->add_option("--out", options->out, "A folder for the poses of each, a column a joint");
   command->callback([options, &exit_code] {
     const auto done = bench(*options);
     exit_code = done ? 0 : tools::report(done.error());

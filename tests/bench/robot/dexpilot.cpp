@@ -16,33 +16,25 @@ constexpr double kToLast = 4e-3;
 constexpr double kWiden_rad = 1e-3;
 constexpr int kMaxSteps = 30;
 
-// The link that its configurations call the wrist.
-int wrist_of(const robot::RobotHand& robot) {
-  const auto at = std::ranges::find(robot.links, "wrist", &robot::Link::name);
-  return at == robot.links.end() ? 0 : static_cast<int>(at - robot.links.begin());
-}
-
-// Its configurations' scale, or else that of the longest reach from wrist to tip.
-double scale_of(const robot::RobotHand& robot, const hand::HandGeometry& person, int wrist) {
-  if (robot.name.contains("allegro") || robot.name.contains("leap")) return 1.6;
-  if (robot.name.contains("shadow") || robot.name.contains("schunk")) return 1.2;
-  if (robot.name.contains("inspire")) return 1.15;
-  if (robot.name.contains("ability")) return 1.0;
-  robot::Placed placed(robot.links.size());
-  place(robot, robot.start(), placed);
-  hand::HandPose open;
-  place(person, HandAngles{}, open);
-  return (placed.at_m[robot.fingers[2].tip] - placed.at_m[wrist]).norm() /
-         open.to_m[3 * robot.fingers[2].human + 2].norm();
+// Its configurations' scale; 0: it has none for this robot.
+double known_scale(const std::string& robot) {
+  if (robot.contains("allegro") || robot.contains("leap")) return 1.6;
+  if (robot.contains("shadow") || robot.contains("schunk")) return 1.2;
+  if (robot.contains("inspire")) return 1.15;
+  if (robot.contains("ability")) return 1.0;
+  return 0.0;
 }
 
 }  // namespace
 
 DexPilot::DexPilot(const robot::RobotHand& robot, const hand::HandGeometry& person)
     : robot_(robot), person_(person), placed_(robot.links.size()) {
-  const int wrist = wrist_of(robot);
-  scale_ = scale_of(robot, person, wrist);
   const auto fingers = static_cast<int>(robot.fingers.size());
+  scale_ = known_scale(robot.name);
+  const auto wrist = std::ranges::find(robot.links, "wrist", &robot::Link::name);
+  place(robot, robot.start(), placed_);
+  if (wrist != robot.links.end()) wrist_m_ = placed_.at_m[wrist - robot.links.begin()];
+  if (scale_ == 0.0) guess_wrist();
   for (int a = 0; a < fingers; ++a) {
     for (int b = a + 1; b < fingers; ++b) {
       vectors_.push_back(
@@ -51,7 +43,7 @@ DexPilot::DexPilot(const robot::RobotHand& robot, const hand::HandGeometry& pers
   }
   const double tips = static_cast<double>(vectors_.size()) + fingers;
   for (int f = 0; f < fingers; ++f) {
-    vectors_.push_back({.from = wrist, .to = robot.fingers[f].tip, .b = f, .weight = tips});
+    vectors_.push_back({.to = robot.fingers[f].tip, .b = f, .weight = tips});
   }
   program_.size = robot.size();
   pose_ = Drive::Zero();
@@ -60,6 +52,27 @@ DexPilot::DexPilot(const robot::RobotHand& robot, const hand::HandGeometry& pers
     pose_[i] = 0.5 * (joint.low + joint.high);
   }
   last_ = pose_;
+}
+
+// For a robot without a configuration: the scale of its fingers, and the wrist where the knuckles
+// then fit best.
+void DexPilot::guess_wrist() {
+  hand::HandPose open;
+  place(person_, HandAngles{}, open);
+  const double count = static_cast<double>(robot_.fingers.size()) - 1.0;
+  Eigen::Vector3d knuckles = Eigen::Vector3d::Zero(), human = Eigen::Vector3d::Zero();
+  for (const robot::Finger& finger : robot_.fingers) {
+    if (finger.human == 0) continue;
+    const Eigen::Vector3d& base_m = open.from_m[3 * finger.human];
+    scale_ += finger.length_m / (open.to_m[3 * finger.human + 2] - base_m).norm() / count;
+    knuckles += finger.knuckle_m / count;
+    human += base_m / count;
+  }
+  wrist_m_ = knuckles - scale_ * to_robot(human);
+}
+
+Eigen::Vector3d DexPilot::to_robot(const Eigen::Vector3d& person) const {
+  return robot_.palm * Eigen::Vector3d(-person.y(), person.x(), person.z());
 }
 
 void DexPilot::find_targets(const HandAngles& angles) {
@@ -83,8 +96,7 @@ void DexPilot::find_targets(const HandAngles& angles) {
       vector.weight = apart ? kFingersWeight : 1.0;
       if (apart) target_m = kApart_m;
     }
-    vector.target_m = robot_.palm * Eigen::Vector3d(-human.y(), human.x(), human.z()) *
-                      (target_m / std::max(length_m, 1e-9));
+    vector.target_m = to_robot(human) * (target_m / std::max(length_m, 1e-9));
   }
 }
 
@@ -97,7 +109,7 @@ double DexPilot::cost(const Drive& pose, bool slopes) {
   double sum = kToLast * (pose - last_).squaredNorm();
   for (const Vector& vector : vectors_) {
     const Eigen::Vector3d& to_m = placed_.at_m[vector.to];
-    const Eigen::Vector3d& from_m = placed_.at_m[vector.from];
+    const Eigen::Vector3d& from_m = vector.a < 0 ? wrist_m_ : placed_.at_m[vector.from];
     const Eigen::Vector3d off = to_m - from_m - vector.target_m;
     const double far = off.norm();
     const double share = vector.weight / static_cast<double>(vectors_.size());
@@ -105,7 +117,9 @@ double DexPilot::cost(const Drive& pose, bool slopes) {
     for (int k = 0; slopes && k < 3; ++k) {
       Drive slope = Drive::Zero();
       add_slope(robot_, placed_, vector.to, to_m, Eigen::Vector3d::Unit(k), slope);
-      add_slope(robot_, placed_, vector.from, from_m, -Eigen::Vector3d::Unit(k), slope);
+      if (vector.a >= 0) {
+        add_slope(robot_, placed_, vector.from, from_m, -Eigen::Vector3d::Unit(k), slope);
+      }
       const double weight = share / std::max(far, kHuber_m);
       program_.g += weight * off[k] * slope;
       program_.H += weight * slope * slope.transpose();

@@ -29,12 +29,15 @@ class DexPilot {
     Eigen::Vector3d target_m = Eigen::Vector3d::Zero();
   };
   void find_targets(const HandAngles& angles);
+  void guess_wrist();
+  [[nodiscard]] Eigen::Vector3d to_robot(const Eigen::Vector3d& person) const;
   double cost(const robot::Drive& pose, bool slopes);
   bool step();
 
   const robot::RobotHand& robot_;
   hand::HandGeometry person_;
-  double scale_ = 1.0;
+  double scale_ = 0.0;
+  Eigen::Vector3d wrist_m_ = Eigen::Vector3d::Zero();  // in the root's frame
   std::vector<Vector> vectors_;
   robot::Placed placed_;
   robot::StepProgram program_;

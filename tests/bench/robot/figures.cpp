@@ -25,6 +25,7 @@ constexpr double kPinched_m = 15e-3;
 constexpr double kStill_rad = 1.0 * kDegree;
 constexpr int kHeld = static_cast<int>(0.2 * kTakeRate_hz);
 constexpr double kLowPass = 0.2;
+constexpr std::size_t kFirst = 60;  // the way from the start pose is no motion of the take's
 
 struct Mean {
   double sum = 0.0;
@@ -76,7 +77,7 @@ void judge_joints(const robot::RobotHand& robot, const std::vector<Drive>& poses
     }
     beyond += by > 1e-5 ? 1 : 0;
     figures.beyond_rad = std::max(figures.beyond_rad, by);
-    for (int i = 0; i < robot.size() && t >= 3; ++i) {
+    for (int i = 0; i < robot.size() && t >= kFirst; ++i) {
       const double speed = (poses[t][i] - poses[t - 1][i]) / kDt_s;
       figures.speed_rad_s = std::max(figures.speed_rad_s, std::abs(speed));
       const double third =
@@ -93,8 +94,8 @@ void judge_joints(const robot::RobotHand& robot, const std::vector<Drive>& poses
 std::array<RobotTrack, 2> our_tracks(const robot::RobotHand& robot, const HandTake& take) {
   const hand::HandGeometry person = hand::hand_geometry(default_hand_shape());
   RobotTrack pose, command;
-  pose.name = "posed, pose";
-  command.name = "posed, command";
+  pose.name = "posed-pose";
+  command.name = "posed-command";
   robot::HandTargets targets(robot, person);
   robot::HandTarget target;
   robot::PoseSolver solver(robot, kMargin_m);
@@ -122,7 +123,7 @@ std::array<RobotTrack, 2> rival_tracks(const robot::RobotHand& robot, const Hand
   const hand::HandGeometry person = hand::hand_geometry(default_hand_shape());
   RobotTrack bare, filtered;
   bare.name = "DexPilot";
-  filtered.name = "DexPilot, low-pass";
+  filtered.name = "DexPilot-low-pass";
   DexPilot solver(robot, person);
   for (const HandAngles& angles : take.angles) {
     bare.us.push_back(timed_us([&] { bare.poses.push_back(solver.solve(angles)); }));

@@ -26,6 +26,37 @@ std::vector<std::string> split(const std::string& line) {
   return words;
 }
 
+// MuJoCo's URDF knows no capsule: a cylinder and two balls.
+void split_capsule(pugi::xml_node link, pugi::xml_node collision) {
+  pugi::xml_node geometry = collision.child("geometry");
+  const pugi::xml_node capsule = geometry.child("capsule");
+  if (!capsule) return;
+  const std::string radius = capsule.attribute("radius").value();
+  const double half = 0.5 * capsule.attribute("length").as_double();
+  geometry.remove_child(capsule);
+  pugi::xml_node cylinder = geometry.append_child("cylinder");
+  cylinder.append_attribute("radius") = radius.c_str();
+  cylinder.append_attribute("length") = std::to_string(2.0 * half).c_str();
+  const pugi::xml_node at = collision.child("origin");
+  std::istringstream xyz(at.attribute("xyz").as_string("0 0 0"));
+  std::istringstream rpy(at.attribute("rpy").as_string("0 0 0"));
+  double x = 0, y = 0, z = 0, roll = 0, pitch = 0, yaw = 0;
+  xyz >> x >> y >> z;
+  rpy >> roll >> pitch >> yaw;
+  const double along[]{
+      std::cos(yaw) * std::sin(pitch) * std::cos(roll) + std::sin(yaw) * std::sin(roll),
+      std::sin(yaw) * std::sin(pitch) * std::cos(roll) - std::cos(yaw) * std::sin(roll),
+      std::cos(pitch) * std::cos(roll)};
+  for (const double end : {-half, half}) {
+    pugi::xml_node ball = link.append_child("collision");
+    std::ostringstream place;
+    place << x + end * along[0] << ' ' << y + end * along[1] << ' ' << z + end * along[2];
+    ball.append_child("origin").append_attribute("xyz") = place.str().c_str();
+    ball.append_child("geometry").append_child("sphere").append_attribute("radius") =
+        radius.c_str();
+  }
+}
+
 // Makes the shapes of a link such that MuJoCo finds them. Returns how many there are.
 int mend_shapes(pugi::xml_node link, const fs::path& folder, std::vector<std::string>& missing) {
   while (link.remove_child("visual")) {
@@ -33,6 +64,7 @@ int mend_shapes(pugi::xml_node link, const fs::path& folder, std::vector<std::st
   int shapes = 0;
   for (pugi::xml_node next, one = link.child("collision"); one; one = next) {
     next = one.next_sibling("collision");
+    split_capsule(link, one);
     pugi::xml_node mesh = one.child("geometry").child("mesh");
     std::string name = mesh.attribute("filename").value();
     const auto scheme = name.find("://");  // package://NAME/ or file://

@@ -136,6 +136,81 @@ TEST_CASE("a hand's frame, fingers and side are derived from its URDF") {
   CHECK(left.error().message.find("a right hand") != std::string::npos);
 }
 
+TEST_CASE("a follower that can nowhere be within its limits is named") {
+  auto urdf = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  Link& last = *std::ranges::find(urdf.links, "thumb_last", &Link::joint);
+  last.low = 0.2;  // it is turned the other way
+  last.high = 1.4;
+  const auto hand = robot_hand(std::move(urdf), {}, "mitten");
+  REQUIRE_FALSE(hand);
+  CHECK(hand.error().message.find("thumb_last") != std::string::npos);
+  CHECK(hand.error().message.find("multiplier") != std::string::npos);
+}
+
+TEST_CASE("a finger is as long as it can reach, though its links are not in a row") {
+  auto urdf = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  const auto link = [&](const char* joint) {
+    return std::ranges::find(urdf.links, joint, &Link::joint);
+  };
+  link("index_bend")->at.translation().x() += 0.03;
+  link("index_far")->at.translation().x() += 0.03;
+  const RobotHand hand = robot_hand(std::move(urdf), {}, "mitten").value();
+  const Finger& index = hand.fingers[1];
+  Placed placed(hand.links.size());
+  double longest_m = 0.0;
+  for (int i = 0; i <= 1000; ++i) {
+    Drive drive = hand.start();
+    for (int d = 0; d < hand.size(); ++d) {
+      drive[d] = hand.driven[d].low + (hand.driven[d].high - hand.driven[d].low) * i / 1000.0;
+    }
+    place(hand, drive, placed);
+    longest_m = std::max(longest_m, (placed.at_m[index.tip] - placed.at_m[index.knuckle]).norm());
+  }
+  CHECK(index.length_m == Approx(longest_m).margin(2e-4));
+}
+
+TEST_CASE("few capsules hold all boxes of a link") {
+  auto urdf = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  // A motor, its horn and four plates of a frame [edges, middle; mm].
+  const std::vector<std::array<double, 6>> boxes{{34, 22, 26, 0, 0, 0},  {20, 24, 8, 0, 0, 14},
+                                                 {14, 20, 4, 6, 0, 15},  {14, 20, 4, 6, 0, -15},
+                                                 {20, 4, 30, 12, 12, 0}, {20, 4, 30, 12, -12, 0}};
+  std::vector<Shape>& shapes = urdf.links[0].shapes;
+  shapes.clear();
+  for (const auto& box : boxes) {
+    Shape& shape = shapes.emplace_back();
+    shape.size_m = 1e-3 * Eigen::Vector3d(box[0], box[1], box[2]);
+    shape.at.translation() = 1e-3 * Eigen::Vector3d(box[3], box[4], box[5] - 60.0);
+  }
+  const std::vector<Shape> all = shapes;
+  const RobotHand hand = robot_hand(std::move(urdf), {}, "mitten").value();
+  int outside = 0, points = 0;
+  double farthest_m = 0.0;
+  for (const Shape& box : all) {
+    for (int n = 0; n < 125; ++n) {  // over the box, its corners too
+      const Eigen::Vector3d share(n % 5 / 4.0 - 0.5, n / 5 % 5 / 4.0 - 0.5, n / 25 / 4.0 - 0.5);
+      const Eigen::Vector3d point = box.at * share.cwiseProduct(box.size_m);
+      bool inside = false;
+      for (const Capsule& one : hand.capsules) {
+        const Eigen::Vector3d along = one.to_m - one.from_m;
+        const double t = std::clamp(
+            (point - one.from_m).dot(along) / std::max(along.squaredNorm(), 1e-12), 0.0, 1.0);
+        const double away_m = (point - one.from_m - t * along).norm();
+        inside = inside || (one.link == 0 && away_m <= one.radius_m + 1e-9);
+      }
+      outside += inside ? 0 : 1;
+      ++points;
+    }
+  }
+  for (const Capsule& one : hand.capsules) {
+    if (one.link == 0) farthest_m = std::max(farthest_m, one.radius_m);
+  }
+  CHECK(outside == 0);
+  CHECK(points == 750);
+  CHECK(hand.balls[0].count <= 10);  // 18 if each box had its own
+  CHECK(farthest_m < 0.022);
+}
+
 TEST_CASE("real hands are read as their makers made them") {
   const auto folder = test::shared("data/robots");
   if (!folder) SKIP_WITHOUT_SHARED();
