@@ -13,6 +13,7 @@
 
 #include "daemon/tools/emulate/emulated_device.hpp"
 #include "daemon/tools/emulate/motions.hpp"
+#include "drivers/driver.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/frame/hand_skeleton.hpp"

@@ -118,7 +118,7 @@ TEST_CASE("a style that is taught live is the one that training on its walks lea
   CHECK(usual.good());
   CHECK_FALSE(school.teacher.train("walker", "sway"));
   CHECK(school.mark(sway, Walk::kStyle).good());
-  const clip::Clip more = motion::make_walker({.person = 2, .seconds = kWalk_s}).value();
+  const clip::Clip more = motion::make_walker({.seconds = kWalk_s, .noise_deg = 0.4}).value();
   CHECK(school.mark(more, Walk::kNeutral, true).takes() == 2);
   REQUIRE(school.teacher.train("walker", "sway"));
   const v1::Teaching learnt = school.await();
