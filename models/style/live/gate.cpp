@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 namespace posed::style {
 namespace {
@@ -22,6 +23,7 @@ constexpr double kOwnFast = 1.15;  // a walker's own cadence above this counts i
 
 constexpr double kCadence_s = 0.1;  // time constant of the low-pass on the cadence
 constexpr double kStage_s = 0.045;  // time constant of each of the four low-passes
+constexpr double kStep_s = 0.005;   // of their integration
 constexpr double kThere = 1e-5;     // nearer is there
 
 // 0 below `low`, 1 above `high`, without a kink between.
@@ -119,13 +121,20 @@ RT_SAFE double Gate::of_run(const TrainedMotion& known, double cadence) const no
   return rise(cadence, kFast, kTooFast) * (1.0 - of_near_pose_);
 }
 
+// In small steps, while what is wanted goes straight from frame to frame: at any rate of frames the
+// same.
 RT_SAFE void Gate::follow(double dt_s) noexcept {
-  const double part = -std::expm1(-dt_s / kStage_s);
-  double towards = wanted_;
-  for (double& stage : stage_) {
-    stage += part * (towards - stage);
-    if (std::abs(towards - stage) < kThere) stage = towards;
-    towards = stage;
+  const int steps = std::max(1, static_cast<int>(std::ceil(dt_s / kStep_s)));
+  const double part = -std::expm1(-dt_s / steps / kStage_s);
+  const double from = std::exchange(followed_, wanted_);
+  for (int i = 1; i <= steps; ++i) {
+    double towards = from + (wanted_ - from) * (i - 0.5) / steps;
+    if (from == wanted_) towards = wanted_;
+    for (double& stage : stage_) {
+      stage += part * (towards - stage);
+      if (std::abs(towards - stage) < kThere) stage = towards;
+      towards = stage;
+    }
   }
 }
 

@@ -58,7 +58,7 @@ class Gate {
   double leg_rad_ = std::numeric_limits<double>::quiet_NaN();  // the leg signal; NaN: not measured
   // The last evidence; it stays where a frame has none.
   double of_pose_ = 0.0, of_near_pose_ = 0.0, of_cadence_ = 0.0, of_legs_ = 1.0;
-  double wanted_ = 0.0;
+  double wanted_ = 0.0, followed_ = 0.0;
   std::array<double, 4> stage_{};  // low-passes in a row, the first follows wanted_
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 namespace posed::style {
 namespace {
@@ -12,9 +13,15 @@ constexpr double kMemory_s = 0.4;        // time constant of means, variances an
 constexpr double kMinSeen_s = 0.4;       // about a step
 constexpr double kMinHeight_m = 1e-3, kMinApart_rad = 1e-2;  // standard deviations
 constexpr double kSmooth_s = 0.05;  // time constant of the signal's low-pass
-constexpr double kPart_s = 0.075;   // four of them: the legs rest for less within a stride
-constexpr double kBetweenTurns_s = 0.06;
+constexpr double kPart_s = 0.1;     // four of them: the legs rest for less within a stride
+constexpr double kFirstTurn_s = 1.0 / 30.0, kBetweenTurns_s = 1.0 / 15.0;
 constexpr double kMinSpan_s = 0.3;  // for a cadence
+constexpr double kRounding_s = 1e-6;
+
+// What happens at times that do not depend on the rate of the frames.
+int part_at(double time_s, double length_s) noexcept {
+  return static_cast<int>(std::floor((time_s + kRounding_s) / length_s));
+}
 
 }  // namespace
 
@@ -64,33 +71,39 @@ double LiveGait::correlation() const noexcept {
 }
 
 RT_SAFE void LiveStride::update(double leg_rad, double dt_s, double cadence_rad_s) noexcept {
-  if (!started_) level_rad_ = leg_rad;
+  if (!started_) level_rad_ = leg_rad_ = leg_rad;
   started_ = true;
+  if (dt_s <= 0.0) {
+    leg_rad_ = leg_rad;
+    return;
+  }
+  // The low-pass of a signal that goes straight from frame to frame, and its speed at this instant,
+  // so that neither depends on the rate.
+  const double slope_rad = kSmooth_s * (leg_rad - leg_rad_) / dt_s;
+  level_rad_ =
+      leg_rad - slope_rad + (level_rad_ - leg_rad_ + slope_rad) * std::exp(-dt_s / kSmooth_s);
   leg_rad_ = leg_rad;
-  if (dt_s <= 0.0) return;
-  const double step_rad = -std::expm1(-dt_s / kSmooth_s) * (leg_rad - level_rad_);
-  level_rad_ += step_rad;
-  speed_rad_ = step_rad / (dt_s * cadence_rad_s);
-  keep_speed(dt_s);
-  keep_turn(dt_s);
+  speed_rad_ = (leg_rad_ - level_rad_) / (kSmooth_s * cadence_rad_s);
+  const double before_s = std::exchange(time_s_, time_s_ + dt_s);
+  keep_speed(before_s);
+  keep_turn(before_s);
 }
 
-RT_SAFE void LiveStride::keep_speed(double dt_s) noexcept {
-  part_s_ += dt_s;
-  if (part_s_ > kPart_s) {
+RT_SAFE void LiveStride::keep_speed(double before_s) noexcept {
+  const int begun = part_at(time_s_, kPart_s) - part_at(before_s, kPart_s);
+  for (int i = 0; i < std::min<int>(begun, kParts); ++i) {
     std::ranges::copy_backward(fastest_rad_.begin(), fastest_rad_.end() - 1, fastest_rad_.end());
     fastest_rad_[0] = 0.0;
-    part_s_ = 0.0;
   }
   fastest_rad_[0] = std::max(fastest_rad_[0], std::abs(speed_rad_));
 }
 
-RT_SAFE void LiveStride::keep_turn(double dt_s) noexcept {
+RT_SAFE void LiveStride::keep_turn(double before_s) noexcept {
   const double now_rad = std::atan2(-speed_rad_, level_rad_);
   angle_rad_ += std::remainder(now_rad - angle_rad_, 2.0 * std::numbers::pi);
-  time_s_ += dt_s;
-  const Turn newest = turn_[(turns_ + kTurns - 1) % kTurns];
-  if (turns_ > 0 && time_s_ - newest.time_s < kBetweenTurns_s) return;
+  const int part = part_at(time_s_ - kFirstTurn_s, kBetweenTurns_s);
+  const bool begins = part > part_at(before_s - kFirstTurn_s, kBetweenTurns_s);
+  if (part < 0 || (turns_ > 0 && !begins)) return;
   turn_[turns_ % kTurns] = {time_s_, angle_rad_};
   turns_ = turns_ + 1 < 2 * kTurns ? turns_ + 1 : kTurns;
 }

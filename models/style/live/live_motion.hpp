@@ -85,15 +85,14 @@ class LiveStride {
   static constexpr std::size_t kParts = 4;  // of the window that the largest speed is of
   static constexpr std::size_t kTurns = 9;  // angles that are kept
 
-  void keep_speed(double dt_s) noexcept;
-  void keep_turn(double dt_s) noexcept;
+  void keep_speed(double before_s) noexcept;
+  void keep_turn(double before_s) noexcept;
 
   bool started_ = false;
   double leg_rad_ = 0.0;    // the signal
   double level_rad_ = 0.0;  // smoothed
   double speed_rad_ = 0.0;  // its speed over the cadence
   std::array<double, kParts> fastest_rad_{};
-  double part_s_ = 0.0;  // of the newest part
   double time_s_ = 0.0, angle_rad_ = 0.0;
   std::array<Turn, kTurns> turn_{};  // turn_[turns_ % kTurns] is the oldest or not there yet
   std::size_t turns_ = 0;
