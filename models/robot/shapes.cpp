@@ -3,17 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 #include "models/hand/segments.hpp"
-#include "models/robot/capsule_fit.hpp"
 
 namespace posed::robot {
 namespace {
 
-constexpr int kMaxStripsABox = 4;
-constexpr double kJoinedFat_m = 6e-3;
-constexpr std::size_t kMaxJoined = 48;  // of a link: more would take long
+constexpr int kMaxCapsulesABox = 4;
 constexpr int kTries = 100;
 constexpr double kMostly = 0.7;
 
@@ -26,104 +22,26 @@ void add_capsule(RobotHand& hand, int link, const Eigen::Isometry3d& at,
                            .reach_m = 0.5 * (to_m - from_m).norm() + radius_m});
 }
 
-// What one capsule holds of a link's boxes.
-struct Cover {
-  std::vector<Eigen::Vector3d> corners;
-  CapsuleFit fit;
-  double fat_m = 0.0;  // how far the capsule reaches beyond the boxes
-};
-
-double to_box_m(const Shape& box, const Eigen::Vector3d& point_m) {
-  const Eigen::Vector3d local = box.at.inverse(Eigen::Isometry) * point_m;
-  return (local.cwiseAbs() - 0.5 * box.size_m).cwiseMax(0.0).norm();
-}
-
-// At the points of its surface that are farthest from its axis in 14 directions.
-double fat_of(const CapsuleFit& fit, const std::vector<Shape>& boxes) {
-  double fat_m = 0.0;
-  for (int n = 0; n < 27; ++n) {
-    const Eigen::Vector3d towards(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-    if (towards.isZero()) continue;
-    const Eigen::Vector3d out = fit.radius_m * towards.normalized();
-    const double end = 0.5 * fit.length_m;
-    for (const double z : {-end, 0.0, end}) {
-      if (z * out.z() < 0.0) continue;  // inside it
-      const Eigen::Vector3d point_m = fit.at * Eigen::Vector3d(out.x(), out.y(), z + out.z());
-      double least_m = std::numeric_limits<double>::infinity();
-      for (const Shape& box : boxes) {
-        if (box.kind == Shape::Kind::kBox) least_m = std::min(least_m, to_box_m(box, point_m));
-      }
-      fat_m = std::max(fat_m, least_m);
-    }
-  }
-  return fat_m;
-}
-
-Cover cover(std::vector<Eigen::Vector3d> corners, const std::vector<Shape>& boxes) {
-  Cover cover{.corners = std::move(corners)};
-  cover.fit = fit_capsule(cover.corners, [&](const CapsuleFit& fit) { return fat_of(fit, boxes); });
-  cover.fat_m = fat_of(cover.fit, boxes);
-  return cover;
-}
-
-// Strips along the longest edge, side by side across the middle one.
-void add_strips(const Shape& box, const std::vector<Shape>& boxes, std::vector<Cover>& covers) {
+// Capsules along the longest edge, side by side across the middle one. Each reaches its strip's
+// corners: radius^2 = across^2 + (what the axis is shorter than the edge)^2.
+void add_box(RobotHand& hand, int link, const Shape& shape) {
   std::array<int, 3> order{0, 1, 2};
-  std::ranges::sort(order, [&](int a, int b) { return box.size_m[a] > box.size_m[b]; });
-  const double middle_m = 0.5 * box.size_m[order[1]];
-  const double thin_m = std::max(0.5 * box.size_m[order[2]], 1e-6);
+  std::ranges::sort(order, [&](int a, int b) { return shape.size_m[a] > shape.size_m[b]; });
+  const double long_m = 0.5 * shape.size_m[order[0]];
+  const double middle_m = 0.5 * shape.size_m[order[1]];
+  const double thin_m = std::max(0.5 * shape.size_m[order[2]], 1e-6);
   const int count =
-      std::clamp(static_cast<int>(std::ceil(middle_m / thin_m - 1e-9)), 1, kMaxStripsABox);
+      std::clamp(static_cast<int>(std::ceil(middle_m / thin_m - 1e-9)), 1, kMaxCapsulesABox);
+  const double strip_m = middle_m / count;
+  const double across_m = std::hypot(strip_m, thin_m);
+  const double shorter_m = std::min(0.5 * across_m, long_m);
+  const double radius_m = std::hypot(across_m, shorter_m);
   for (int i = 0; i < count; ++i) {
-    std::vector<Eigen::Vector3d> corners;
-    for (int n = 0; n < 8; ++n) {
-      Eigen::Vector3d corner;
-      corner[order[0]] = (n % 2 - 0.5) * box.size_m[order[0]];
-      corner[order[1]] = middle_m * (2.0 * (i + n / 2 % 2) / count - 1.0);
-      corner[order[2]] = (n / 4 - 0.5) * box.size_m[order[2]];
-      corners.emplace_back(box.at * corner);
-    }
-    covers.push_back(cover(std::move(corners), boxes));
-  }
-}
-
-// What holds both, where it does not reach much farther beyond the boxes.
-std::optional<Cover> joined(const Cover& a, const Cover& b, const std::vector<Shape>& boxes) {
-  std::vector<Eigen::Vector3d> corners = a.corners;
-  corners.insert(corners.end(), b.corners.begin(), b.corners.end());
-  Cover both = cover(std::move(corners), boxes);
-  if (both.fat_m > std::max({kJoinedFat_m, a.fat_m, b.fat_m})) return std::nullopt;
-  return both;
-}
-
-// Those of which one can hold two become one, until there are none.
-void join(const std::vector<Shape>& boxes, std::vector<Cover>& covers) {
-  if (covers.size() > kMaxJoined) return;
-  for (std::size_t a = 0; a < covers.size(); ++a) {
-    for (std::size_t b = a + 1; b < covers.size();) {
-      auto both = joined(covers[a], covers[b], boxes);
-      if (!both) {
-        ++b;
-        continue;
-      }
-      covers[a] = std::move(*both);
-      covers.erase(covers.begin() + static_cast<long>(b));
-      b = a + 1;
-    }
-  }
-}
-
-// Few capsules that hold all boxes of a link.
-void add_boxes(RobotHand& hand, int link) {
-  const std::vector<Shape>& shapes = hand.links[link].shapes;
-  std::vector<Cover> covers;
-  for (const Shape& shape : shapes) {
-    if (shape.kind == Shape::Kind::kBox) add_strips(shape, shapes, covers);
-  }
-  join(shapes, covers);
-  for (const Cover& cover : covers) {
-    const Eigen::Vector3d half(0.0, 0.0, 0.5 * cover.fit.length_m);
-    add_capsule(hand, link, cover.fit.at, -half, half, cover.fit.radius_m);
+    Eigen::Vector3d aside = Eigen::Vector3d::Zero();
+    aside[order[1]] = -middle_m + strip_m * (2 * i + 1);
+    Eigen::Vector3d along = Eigen::Vector3d::Zero();
+    along[order[0]] = long_m - shorter_m;
+    add_capsule(hand, link, shape.at, aside - along, aside + along, radius_m);
   }
 }
 
@@ -131,7 +49,7 @@ void add_shape(RobotHand& hand, int link, const Shape& shape) {
   const Eigen::Vector3d half(0.0, 0.0, 0.5 * shape.size_m.y());
   switch (shape.kind) {
     case Shape::Kind::kBox:
-      return;  // add_boxes() does
+      return add_box(hand, link, shape);
     case Shape::Kind::kSphere:
       return add_capsule(hand, link, shape.at, Eigen::Vector3d::Zero(), Eigen::Vector3d::Zero(),
                          shape.size_m.x());
@@ -151,24 +69,23 @@ void hold_all(const RobotHand& hand, Ball& ball) {
   const auto capsules = std::span(hand.capsules).subspan(ball.first, ball.count);
   double least = std::numeric_limits<double>::infinity();
   for (int k = 0; k < 3; ++k) {
-    CapsuleFit fit;
-    double low = 1e9, high = -1e9;
+    double radius_m = 0.0, low = 1e9, high = -1e9;
     for (const Capsule& one : capsules) {
       low = std::min({low, one.from_m[k], one.to_m[k]});
       high = std::max({high, one.from_m[k], one.to_m[k]});
       for (const Eigen::Vector3d& end : {one.from_m, one.to_m}) {
         Eigen::Vector3d across = end - ball.middle_m;
         across[k] = 0.0;
-        fit.radius_m = std::max(fit.radius_m, across.norm() + one.radius_m);
+        radius_m = std::max(radius_m, across.norm() + one.radius_m);
       }
     }
-    fit.length_m = high - low;
-    if (volume(fit) >= least) continue;
-    least = volume(fit);
+    const double volume = radius_m * radius_m * (high - low + 4.0 / 3.0 * radius_m);
+    if (volume >= least) continue;
+    least = volume;
     ball.from_m = ball.to_m = ball.middle_m;
     ball.from_m[k] = low;
     ball.to_m[k] = high;
-    ball.thick_m = fit.radius_m;
+    ball.thick_m = radius_m;
   }
 }
 
@@ -301,7 +218,6 @@ RT_SAFE bool may_be_near(const RobotHand& hand, const Placed& placed, int a, int
 void add_shapes(RobotHand& hand) {
   for (int l = 0; l < std::ssize(hand.links); ++l) {
     const int first = static_cast<int>(hand.capsules.size());
-    add_boxes(hand, l);
     for (const Shape& shape : hand.links[l].shapes) add_shape(hand, l, shape);
     hand.balls.push_back(ball_around(hand, first));
   }

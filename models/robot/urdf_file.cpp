@@ -5,9 +5,9 @@
 #include <sstream>
 #include <vector>
 
+#include <Eigen/Eigenvalues>
 #include <pugixml.hpp>
 
-#include "models/robot/capsule_fit.hpp"
 #include "models/robot/urdf.hpp"
 #include "proto/text/load_file.hpp"
 
@@ -47,6 +47,67 @@ std::filesystem::path beside(const std::filesystem::path& urdf, std::string name
   return folder / relative;
 }
 
+struct Fit {
+  Eigen::Isometry3d at = Eigen::Isometry3d::Identity();
+  double radius_m = 0.0, length_m = 0.0;
+};
+
+// A capsule along z of `axes` that holds all corners: around the smallest circle that holds them
+// across (Badoiu and Clarkson's steps), as long as those at the ends need.
+Fit fit_along(const std::vector<Eigen::Vector3d>& corners, const Eigen::Matrix3d& axes) {
+  constexpr int kSteps = 100;
+  std::vector<Eigen::Vector3d> local;
+  for (const auto& corner : corners) local.emplace_back(axes.transpose() * corner);
+  Eigen::Vector2d circle = local.front().head<2>();
+  const auto away = [&](const Eigen::Vector3d& corner) {
+    return (corner.head<2>() - circle).norm();
+  };
+  for (int i = 1; i <= kSteps; ++i) {
+    const auto& farthest = *std::ranges::max_element(local, {}, away);
+    circle += (farthest.head<2>() - circle) / (i + 1.0);
+  }
+  Fit fit;
+  fit.radius_m = away(*std::ranges::max_element(local, {}, away));
+  double low = 1e9, high = -1e9;
+  for (const auto& corner : local) {
+    const double cap =
+        std::sqrt(std::max(0.0, fit.radius_m * fit.radius_m - away(corner) * away(corner)));
+    low = std::min(low, corner.z() + cap);
+    high = std::max(high, corner.z() - cap);
+  }
+  // Where the caps hold all, it is a ball.
+  if (low > high) low = high = 0.5 * (low + high);
+  fit.length_m = high - low;
+  fit.at.linear() = axes;
+  fit.at.translation() = axes * Eigen::Vector3d(circle.x(), circle.y(), 0.5 * (low + high));
+  return fit;
+}
+
+// The smallest of those along the corners' three main directions and along the file's.
+Fit fit_capsule(const std::vector<Eigen::Vector3d>& corners) {
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const auto& corner : corners) mean += corner / static_cast<double>(corners.size());
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const auto& corner : corners) spread += (corner - mean) * (corner - mean).transpose();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
+  Eigen::Matrix3d main = solver.eigenvectors();
+  if (main.determinant() < 0.0) main.col(0) = -main.col(0);
+  Fit best;
+  double least = 1e9;
+  for (const Eigen::Matrix3d& frame : {main, Eigen::Matrix3d(Eigen::Matrix3d::Identity())}) {
+    for (int k = 0; k < 3; ++k) {
+      Eigen::Matrix3d axes;
+      axes << frame.col((k + 1) % 3), frame.col((k + 2) % 3), frame.col(k);
+      const Fit fit = fit_along(corners, axes);
+      const double volume = fit.radius_m * fit.radius_m * (fit.length_m + 4.0 / 3.0 * fit.radius_m);
+      if (volume >= least) continue;
+      least = volume;
+      best = fit;
+    }
+  }
+  return best;
+}
+
 Eigen::Vector3d three(const char* text, double otherwise) {
   Eigen::Vector3d value = Eigen::Vector3d::Constant(otherwise);
   std::istringstream numbers(text);
@@ -74,7 +135,7 @@ void replace_mesh(pugi::xml_node collision, const std::filesystem::path& urdf) {
   const Eigen::Vector3d scale = three(mesh.attribute("scale").value(), 1.0);
   for (auto& corner : corners) corner = corner.cwiseProduct(scale);
   if (corners.size() < 4) return;
-  const CapsuleFit fit = fit_capsule(corners);
+  const Fit fit = fit_capsule(corners);
   if (!(fit.radius_m > 0.0) || fit.radius_m + fit.length_m > 1.0) return;
   pugi::xml_node origin = collision.child("origin");
   if (!origin) origin = collision.append_child("origin");
