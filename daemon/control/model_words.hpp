@@ -10,6 +10,7 @@ struct ModelWords {
   std::string learnt{};    // "walk -> sneak, from 12 clips of 6 people"; empty: it does not say
   std::string skeleton{};  // whom it serves; empty: it does not say
   std::string verdict{};   // of the training; of bytes that are no model: what is wrong with them
+  std::string strip{};     // a drawn thumbnail, as strip_of() has it
 };
 
 // `kind` as FolderModel has it. Never fails: bytes that are no model get a verdict that says so.

@@ -192,6 +192,7 @@ Reply RequestHandler::list_models(Requester requester) {
     entry.set_learnt(words.learnt);
     entry.set_skeleton(words.skeleton);
     entry.set_verdict(words.verdict);
+    entry.set_strip(words.strip);
   }
   return make_reply(std::move(requester), reply);
 }

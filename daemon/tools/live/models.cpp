@@ -52,7 +52,8 @@ Result<> list_models_at(const ModelsOptions& options) {
                            .add("stage", kind)
                            .add("learnt", words.learnt)
                            .add("skeleton", words.skeleton)
-                           .add("verdict", words.verdict));
+                           .add("verdict", words.verdict)
+                           .add("strip", words.strip));
       models.back().say(clean(file.string()));
       for (const auto& [what, text] : {std::pair{"learnt", words.learnt},
                                        {"skeleton", words.skeleton},

@@ -13,7 +13,8 @@ function reader(text) {
 
 function number(word) {
   const value = Number(word);
-  if (word === '' || !Number.isFinite(value)) throw new Error(`“${word.slice(0, 20)}” is no number`);
+  if (word === '' || !Number.isFinite(value))
+    throw new Error(`“${word.slice(0, 20)}” is no number`);
   return value;
 }
 
@@ -110,8 +111,8 @@ export class Bvh {
   }
 
   // posed.v1.Skeleton of the file: bones where a joint is called so, as those of posed's own hands
-  // are. `like`: of the stream that the take is of; its T-pose and bones count if the joints are the
-  // same.
+  // are. `like`: of the stream that the take is of; its T-pose and bones count if its joints are
+  // the same.
   skeleton(like) {
     const { joints, unit_m } = this;
     const named = (name) => name.charAt(0).toLowerCase() + name.slice(1);

@@ -4,10 +4,11 @@ import { el, labelled, write } from './dom.js';
 
 const LOOK_MS = 250;
 const NAME = /^[a-z0-9_-]{1,32}$/;
-export const STEP = { idle: 0, marking: 1, checking: 2, training: 3, starting: 4, inUse: 5 }; // Teaching.Step
+// Teaching.Step
+export const STEP = { idle: 0, marking: 1, checking: 2, training: 3, starting: 4, inUse: 5 };
 
 export class Lesson {
-  static #open = {}; // by title; also when the controls are made again for the model that was learnt
+  static #open = {}; // by title; also when the controls are made again for a new model
 
   now = { step: STEP.idle };
 

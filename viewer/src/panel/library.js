@@ -29,6 +29,22 @@ class List {
   }
 }
 
+const NAMESPACE = 'http://www.w3.org/2000/svg';
+
+// A style's mean cycle: six poses beside each other. Of what is no such drawing there is none.
+function stripOf(path, name) {
+  if (!/^(M-?\d+ -?\d+(L-?\d+ -?\d+)*)+$/.test(path ?? '')) return [];
+  const svg = document.createElementNS(NAMESPACE, 'svg');
+  const lines = document.createElementNS(NAMESPACE, 'path');
+  lines.setAttribute('d', path);
+  svg.setAttribute('viewBox', '0 0 570 185');
+  svg.setAttribute('class', 'strip');
+  svg.setAttribute('role', 'img');
+  svg.setAttribute('aria-label', `Six moments of a stride as ${name} has it`);
+  svg.append(lines);
+  return [svg];
+}
+
 export class ModelLibrary extends List {
   constructor(context) {
     super('Library of models', context);
@@ -43,12 +59,13 @@ export class ModelLibrary extends List {
     this.stream = stream;
   }
 
-  item({ name, kind, learnt, skeleton, verdict }) {
+  item({ name, kind, learnt, skeleton, verdict, strip }) {
     const buttons = el('div.buttons');
     const row = el(
       'li',
       {},
       el('strong', {}, name),
+      ...stripOf(strip, name),
       ...[learnt, skeleton && `skeleton: ${skeleton}`, verdict]
         .filter(Boolean)
         .map((text) => el('p.note', {}, text)),

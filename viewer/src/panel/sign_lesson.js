@@ -26,7 +26,8 @@ export class SignLesson extends Lesson {
       el(
         'p.note',
         {},
-        `Rest, make the sign, hold it still, rest again; ${SHOWS} times for each sign. Rest is learnt from all of them.`,
+        `Rest, make the sign, hold it still, rest again; ${SHOWS} times for each sign. ` +
+          'Rest is learnt from all of them.',
       ),
       labelled('Sign', this.sign, this.begin),
       this.verdict,

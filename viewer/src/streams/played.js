@@ -1,4 +1,4 @@
-// Recordings that are played in the scene beside the live streams, again and again until they are
+// Recordings that are played in the scene beside the live streams, over and over until they are
 // stopped. Each is a stream of the store that nobody but this sends; the daemon knows nothing of it.
 import { isSound } from '../motion/kinematics.js';
 

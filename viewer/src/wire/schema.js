@@ -165,6 +165,7 @@ const KnownModel = {
   3: ['learnt', 'string'],
   4: ['skeleton', 'string'],
   5: ['verdict', 'string'],
+  6: ['strip', 'string'],
 };
 
 const KnownRecording = {

@@ -452,6 +452,9 @@ pageTests(
       await button('Delete: march-to-sway.style').click();
       await button('Delete').click();
       await acknowledged(page, "refused: 'walker' uses it");
+      const strips = shelf.getByRole('img'); // of the model that has a sound one
+      assert.equal(await strips.count(), 1);
+      assert.match(await strips.getAttribute('aria-label'), /march-to-sway.style/);
       await button('Use: tired.style').click();
       await acknowledged(page, 'model tired.style: applied');
       await button('Use: hand.gesture').click();

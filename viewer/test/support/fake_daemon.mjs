@@ -7,6 +7,24 @@ const BODY_JOINTS = bodySkeleton({ stage: [] }).parent;
 const ALPHA_PER_S = 2;
 const GESTURE_S = 0.7;
 const RECORDED = Uint8Array.from({ length: 70000 }, (_, i) => i % 251); // bytes of a clip
+// Six moments of a stride, as posed draws them.
+const STRIP = [
+  'M47 93L46 67L45 44L44 34M45 44L47 50L54 76L79 85',
+  'M45 44L43 50L37 77L48 98M47 93L37 138L16 174L30 180',
+  'M47 93L76 131L78 173L93 172M142 93L141 66L140 43L139 34',
+  'M140 43L141 49L147 75L171 85M140 43L139 49L134 77L145 99',
+  'M142 93L136 139L103 165L107 179M142 93L166 134L159 175L174 180',
+  'M237 91L236 65L235 42L235 32M235 42L234 48L233 76L251 94',
+  'M235 42L237 47L238 74L257 90M237 91L262 131L236 165L244 177',
+  'M237 91L243 136L230 176L245 180M332 93L331 67L330 44L330 35',
+  'M330 44L327 52L322 81L333 103M330 44L333 48L340 72L364 81',
+  'M332 93L362 131L363 173L378 172M332 93L321 137L302 174L316 180',
+  'M427 93L427 66L425 43L425 34M425 43L423 52L418 81L429 104',
+  'M425 43L428 46L433 70L457 80M427 93L450 134L444 175L459 180',
+  'M427 93L421 140L387 165L392 179M522 91L521 65L520 42L519 32',
+  'M520 42L520 50L522 78L541 95M520 42L520 46L519 72L537 88',
+  'M522 91L528 136L514 176L529 180M522 91L546 131L521 165L529 177',
+].join('');
 const TAKE = new TextEncoder().encode(walkBvh(60, 30));
 const ROOTS = ['off', 'stride', 'actor'];
 
@@ -14,8 +32,13 @@ export class FakeDaemon {
   frames = 0;
   take = null;
   models = [
-    { name: 'march-to-sway.style', kind: 'style', learnt: 'march -> sway, from 12 clips of ann' },
-    { name: 'tired.style', kind: 'style', verdict: 'closes 90 % of the way to tired' },
+    {
+      name: 'march-to-sway.style',
+      kind: 'style',
+      learnt: 'march -> sway, from 12 clips of ann',
+      strip: STRIP,
+    },
+    { name: 'tired.style', kind: 'style', verdict: 'closes 90 % of the way to tired', strip: 'M1' },
     { name: 'hand.gesture', kind: 'generate', learnt: 'gestures g 1 c' },
   ];
   recordings = [

@@ -100,6 +100,7 @@ TEST_CASE("a model tells what it was learnt from; what is no model tells that") 
     CHECK(words_of_model(style::serialize_model(model), "style", "a").learnt == "walk -> sneak");
   }
   CHECK(words_of_model("nonsense", "style", "a.style").verdict.contains("a.style"));
+  CHECK(words.strip.empty());  // it knows no cycle
   CHECK_FALSE(words_of_model("nonsense", "generate", "a.gesture").verdict.empty());
 }
 

@@ -1,0 +1,107 @@
+#include "daemon/control/model_strip.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <memory>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "models/gp/regression.hpp"
+#include "models/motion/kinematics.hpp"
+#include "models/motion/synthetic_walker.hpp"
+#include "models/style/model/harmonics.hpp"
+#include "proto/frame/humanoid.hpp"
+
+namespace posed::control {
+namespace {
+
+using Eigen::MatrixXd;
+
+constexpr double kCentimetres = 100.0;
+constexpr int kGround_cm = 180;        // below the top of the drawing
+constexpr double kMost_cm = 20'000.0;  // of a place in it; a broken model's may be anywhere
+
+// The lines of a figure, each from joint to joint.
+const std::vector<std::vector<Bone>>& limbs() {
+  static const std::vector<std::vector<Bone>> all{
+      {Bone::kHips, Bone::kChest, Bone::kNeck, Bone::kHead},
+      {Bone::kNeck, Bone::kLeftUpperArm, Bone::kLeftLowerArm, Bone::kLeftHand},
+      {Bone::kNeck, Bone::kRightUpperArm, Bone::kRightLowerArm, Bone::kRightHand},
+      {Bone::kHips, Bone::kLeftLowerLeg, Bone::kLeftFoot, Bone::kLeftToes},
+      {Bone::kHips, Bone::kRightLowerLeg, Bone::kRightFoot, Bone::kRightToes}};
+  return all;
+}
+
+// Poses of the style [kStripPoses x dims]: the mean cycle of everybody it was learnt from, and what
+// the style makes of it. Empty: not known.
+MatrixXd cycle_of(const style::StyleModel& model, int dims) {
+  if (model.gate.usual.empty()) return {};
+  MatrixXd mean = MatrixXd::Zero(style::kCycleRows, dims);
+  for (const MatrixXd& one : model.gate.usual) {
+    if (one.rows() != mean.rows() || one.cols() != mean.cols()) return {};
+    mean += one / static_cast<double>(model.gate.usual.size());
+  }
+  const MatrixXd grid = style::grid_basis() * mean;
+  MatrixXd poses(kStripPoses, dims);
+  for (int i = 0; i < kStripPoses; ++i) {
+    poses.row(i) = grid.row(i * static_cast<int>(grid.rows()) / kStripPoses);
+  }
+  if (model.process.inputs.cols() != dims) return {};
+  const MatrixXd change = gp::posterior_mean(model.process, poses);
+  if (change.cols() < dims) return {};
+  return poses + change.leftCols(dims);
+}
+
+void draw(const Skeleton& figure, const motion::WorldPose& pose, int left_cm, std::string& path) {
+  const auto place = [&](Bone bone) -> const Eigen::Vector3d* {
+    const int joint = figure.joint_of(bone);
+    return joint < 0 ? nullptr : &pose.position_m[static_cast<std::size_t>(joint)];
+  };
+  const Eigen::Vector3d* const hips = place(Bone::kHips);
+  if (hips == nullptr) return;
+  double lowest_m = hips->y();
+  for (const Eigen::Vector3d& joint : pose.position_m) lowest_m = std::min(lowest_m, joint.y());
+  const auto whole = [](double value) {
+    return std::isfinite(value)
+               ? static_cast<int>(std::lround(std::clamp(value, -kMost_cm, kMost_cm)))
+               : 0;
+  };
+  for (const auto& limb : limbs()) {
+    char pen = 'M';
+    for (const Bone bone : limb) {
+      const Eigen::Vector3d* const joint = place(bone);
+      if (joint == nullptr) continue;
+      fmt::format_to(std::back_inserter(path), "{}{} {}", pen,
+                     left_cm + whole(kCentimetres * (joint->z() - hips->z())),
+                     kGround_cm - whole(kCentimetres * (joint->y() - lowest_m)));
+      pen = 'L';
+    }
+  }
+}
+
+}  // namespace
+
+std::string strip_of(const style::StyleModel& model) {
+  if (model.space.space != motion::Space::kHumanoid) return {};
+  const auto walker = motion::make_walker({.seconds = 1.0});
+  if (!walker) return {};
+  const Skeleton& figure = *walker->skeleton;
+  const auto space = motion::PoseSpace::bind_person(model.space, figure);
+  if (!space) return {};
+  const MatrixXd poses = cycle_of(model, space->dims());
+  std::string path;
+  for (int i = 0; i < static_cast<int>(poses.rows()); ++i) {
+    Frame frame = walker->frame(0);
+    const Eigen::VectorXd q = poses.row(i);
+    space->put(frame, 0.0, {q.data(), static_cast<std::size_t>(q.size())});
+    draw(figure, motion::world_pose(figure, frame), kStripPose_cm * i + kStripPose_cm / 2, path);
+  }
+  return path;
+}
+
+}  // namespace posed::control
