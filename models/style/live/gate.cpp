@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <utility>
 
 namespace posed::style {
 namespace {
@@ -15,7 +14,8 @@ constexpr double kSame_deg = 7.0, kOther_deg = 9.5;         // either; so near a
 constexpr double kStill_deg_s = 8.0, kMoving_deg_s = 16.0;  // PoseSpeed
 constexpr double kRest = 0.25, kSwing = 0.4;                // of the training's least swing
 constexpr double kTooSlow = 0.3, kSlow = 0.45;              // of the training's fastest cadence
-constexpr double kFirstStep_rad = 3.0;                      // of a stride after rest
+constexpr double kFirstStep_rad =
+    4.0;  // of a stride after rest, as the cadence lags by half a second
 constexpr double kFast = 1.2, kTooFast = 1.32;
 constexpr double kOfGait = 0.5;    // what LiveGait's correlation counts, in shares of that cadence,
 constexpr double kWalk = 0.2;      // above the training's highest, which counts as at least this
@@ -38,15 +38,17 @@ RT_SAFE void Gate::update(const TrainedMotion* known, bool on, const Frame& fram
                           std::span<const float> q, std::span<const float> whole,
                           std::span<const std::uint8_t> available,
                           const std::optional<Walker>& walker, double dt_s) noexcept {
-  wanted_ = 1.0;
+  const Evidence before = seen_;
+  seen_.knows = 1.0;
   if (known != nullptr) {
     see_pose(*known, q, whole, available, walker.has_value(), dt_s);
     see_legs(*known, frame, walker, dt_s);
-    if (on) wanted_ = of_pose_ * of_legs_;
+    if (on) seen_.knows = of_pose_ * of_cadence_;
   }
-  fresh_ = fresh_ && (known == nullptr || !on);
+  const bool closes = known != nullptr && on;
+  fresh_ = fresh_ && !closes;
   if (fresh_) return stage_.fill(1.0);
-  follow(dt_s);
+  follow(closes ? known : nullptr, before, dt_s);
 }
 
 RT_SAFE void Gate::see_pose(const TrainedMotion& known, std::span<const float> q,
@@ -70,13 +72,18 @@ RT_SAFE void Gate::see_pose(const TrainedMotion& known, std::span<const float> q
 RT_SAFE void Gate::see_legs(const TrainedMotion& known, const Frame& frame,
                             const std::optional<Walker>& walker, double dt_s) noexcept {
   leg_rad_ = std::numeric_limits<double>::quiet_NaN();
-  if (!known.legs()) of_legs_ = 1.0;
+  if (!known.legs()) {
+    of_legs_ = of_cadence_ = 1.0;
+    seen_.swing_rad = std::numeric_limits<double>::quiet_NaN();
+  }
   if (!known.legs() || !known.legs()->measured(frame)) return;
   const double leg_rad = leg_rad_ = known.legs()->value_rad(frame);
   stride_.update(leg_rad, dt_s, known.cadence_rad_s());
   const double height_m = known.height_m(frame);
   if (std::isfinite(height_m)) gait_.update(height_m, leg_rad, dt_s);
-  const double rest = of_rest(known);
+  seen_.swing_rad = stride_.swing_rad();
+  seen_.speed_deg_s = speed_.value_deg_s();
+  const double rest = of_rest(known, seen_);
   if (rest == 1.0) {
     // The phase of legs that rest says nothing: the first steps count by their swing alone.
     stride_.forget_cadence();
@@ -103,12 +110,10 @@ RT_SAFE void Gate::see_legs(const TrainedMotion& known, const Frame& frame,
 }
 
 // 1 where legs or body rest.
-RT_SAFE double Gate::of_rest(const TrainedMotion& known) const noexcept {
-  const double swing =
-      rise(stride_.swing_rad(), kRest * known.swing_rad(), kSwing * known.swing_rad());
-  const double speed_deg_s = speed_.value_deg_s();
-  if (std::isnan(speed_deg_s)) return 1.0 - swing;
-  return 1.0 - swing * rise(speed_deg_s, kStill_deg_s, kMoving_deg_s);
+RT_SAFE double Gate::of_rest(const TrainedMotion& known, const Evidence& seen) noexcept {
+  const double swing = rise(seen.swing_rad, kRest * known.swing_rad(), kSwing * known.swing_rad());
+  if (std::isnan(seen.speed_deg_s)) return 1.0 - swing;
+  return 1.0 - swing * rise(seen.speed_deg_s, kStill_deg_s, kMoving_deg_s);
 }
 
 // 1 where the legs run and did not in training: they are quicker, or the pelvis is higher while
@@ -121,15 +126,19 @@ RT_SAFE double Gate::of_run(const TrainedMotion& known, double cadence) const no
   return rise(cadence, kFast, kTooFast) * (1.0 - of_near_pose_);
 }
 
-// In small steps, while what is wanted goes straight from frame to frame: at any rate of frames the
-// same.
-RT_SAFE void Gate::follow(double dt_s) noexcept {
+// In small steps, while the evidence goes straight from frame to frame: the same at any rate of
+// frames, also where legs that begin to stride open the gate within one.
+RT_SAFE void Gate::follow(const TrainedMotion* known, const Evidence& from, double dt_s) noexcept {
   const int steps = std::max(1, static_cast<int>(std::ceil(dt_s / kStep_s)));
   const double part = -std::expm1(-dt_s / steps / kStage_s);
-  const double from = std::exchange(followed_, wanted_);
-  for (int i = 1; i <= steps; ++i) {
-    double towards = from + (wanted_ - from) * (i - 0.5) / steps;
-    if (from == wanted_) towards = wanted_;
+  const auto between = [](double a, double b, double share) { return a + share * (b - a); };
+  for (int i = 0; i < steps; ++i) {
+    const double share = (i + 0.5) / steps;
+    const Evidence now{.knows = between(from.knows, seen_.knows, share),
+                       .swing_rad = between(from.swing_rad, seen_.swing_rad, share),
+                       .speed_deg_s = between(from.speed_deg_s, seen_.speed_deg_s, share)};
+    double towards = now.knows;
+    if (known != nullptr && std::isfinite(now.swing_rad)) towards *= 1.0 - of_rest(*known, now);
     for (double& stage : stage_) {
       stage += part * (towards - stage);
       if (std::abs(towards - stage) < kThere) stage = towards;

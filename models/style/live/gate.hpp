@@ -45,9 +45,15 @@ class Gate {
                 std::span<const std::uint8_t> available, bool is_own, double dt_s) noexcept;
   void see_legs(const TrainedMotion& known, const Frame& frame, const std::optional<Walker>& walker,
                 double dt_s) noexcept;
-  [[nodiscard]] double of_rest(const TrainedMotion& known) const noexcept;
+  // Of what the gate follows: all but rest, and what tells rest; NaN: not known.
+  struct Evidence {
+    double knows = 0.0;
+    double swing_rad = std::numeric_limits<double>::quiet_NaN();
+    double speed_deg_s = std::numeric_limits<double>::quiet_NaN();
+  };
+  [[nodiscard]] static double of_rest(const TrainedMotion& known, const Evidence& seen) noexcept;
   [[nodiscard]] double of_run(const TrainedMotion& known, double cadence) const noexcept;
-  void follow(double dt_s) noexcept;
+  void follow(const TrainedMotion* known, const Evidence& from, double dt_s) noexcept;
 
   bool fresh_ = true;  // was never on
   LiveStride stride_;
@@ -57,9 +63,9 @@ class Gate {
   double rest_rad_ = 0.0;       // the stride's angle when the legs last rested
   double leg_rad_ = std::numeric_limits<double>::quiet_NaN();  // the leg signal; NaN: not measured
   // The last evidence; it stays where a frame has none.
-  double of_pose_ = 0.0, of_near_pose_ = 0.0, of_cadence_ = 0.0, of_legs_ = 1.0;
-  double wanted_ = 0.0, followed_ = 0.0;
-  std::array<double, 4> stage_{};  // low-passes in a row, the first follows wanted_
+  double of_pose_ = 0.0, of_near_pose_ = 0.0, of_cadence_ = 1.0, of_legs_ = 1.0;
+  Evidence seen_;
+  std::array<double, 4> stage_{};  // low-passes in a row, the first follows seen_
 };
 
 }  // namespace posed::style
