@@ -321,6 +321,13 @@ const Table& parameter_table() {
              .max = kMaxNoise_rad,
              .display_name = "noise_deg",
              .display_scale = 1.0 / kDegree}),
+        Table::row<&smooth::LiveOptions::error_rad>(
+            {.name = "error_rad",
+             .help = "how far off the device's angles are, beside noise; for naming gestures",
+             .min = 0.0,
+             .max = kMaxNoise_rad,
+             .display_name = "error_deg",
+             .display_scale = 1.0 / kDegree}),
         {.spec = {.name = "labels",
                   .default_value = std::string(),
                   .help = "performed from the start: \"g 1 c\""}}};

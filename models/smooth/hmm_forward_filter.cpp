@@ -31,6 +31,8 @@ constexpr double kNever = -std::numeric_limits<double>::infinity();
 constexpr double kVanished = 1e-200;
 // Variance that sensor noise adds to a feature, relative to the noise variance of a value.
 constexpr std::array<double, kDeltaWindows> kNoiseGain{1.0, 0.5, 6.0};
+// The same for a source's errors: they last, and so much of their variance is new in each frame.
+constexpr double kNewError = 0.1;
 
 std::size_t padded_features(int channels) noexcept {
   return trajectory::padded(kDeltaWindows * channels);
@@ -45,8 +47,9 @@ double log_sum(double a, double b) noexcept {
 
 }  // namespace
 
-HmmForwardFilter::HmmForwardFilter(int max_window, int max_channels)
+HmmForwardFilter::HmmForwardFilter(int max_window, int max_channels, double error_rad)
     : max_window_(max_window),
+      error_rad_(error_rad),
       feature_(padded_features(max_channels)),
       weight_(feature_.size()),
       known_(max_channels, kMissing),
@@ -80,6 +83,11 @@ RT_SAFE void HmmForwardFilter::reset() noexcept {
   log_chains_ = std::log(static_cast<double>(model_->chains.size()));
 }
 
+RT_SAFE double HmmForwardFilter::added_variance(std::size_t window) const noexcept {
+  const double lasting = window == 0 ? 1.0 : kNewError;
+  return kNoiseGain[window] * (noise_rad_ * noise_rad_ + lasting * error_rad_ * error_rad_);
+}
+
 // Recomputes a state's Gaussian for this stream's rate and sensor noise.
 RT_SAFE void HmmForwardFilter::renew_table(std::size_t s) noexcept {
   const LiveState& from = state(s);
@@ -91,9 +99,9 @@ RT_SAFE void HmmForwardFilter::renew_table(std::size_t s) noexcept {
   double* const half_log = features_of(s, kHalfLog);
   std::size_t k = 0;
   for (std::size_t w = 0; w < kDeltaWindows; ++w) {
-    const double noise = kNoiseGain[w] * noise_rad_ * noise_rad_;
+    const double added = added_variance(w);
     for (std::size_t c = 0; c < channels; ++c, ++k) {
-      const double variance = from.variance[k] * rule.variance[w] + noise;
+      const double variance = from.variance[k] * rule.variance[w] + added;
       mean[k] = from.mean[k] * rule.mean[w];
       half_precision[k] = 0.5 / variance;
       half_log[k] = 0.5 * std::log(variance);
@@ -180,7 +188,7 @@ RT_SAFE double HmmForwardFilter::off_labels() noexcept {
       distance[l] += off * off;
     }
   }
-  const double noise = held.noise_gain * noise_rad_ * noise_rad_;
+  const double noise = held.noise_gain * added_variance(0);
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t l = 0; l < held.limit.size(); ++l) {
     nearest = std::min(nearest, (distance[l] - noise) / held.limit[l]);
@@ -198,7 +206,7 @@ RT_SAFE double HmmForwardFilter::none_margin(std::span<const double> measured_ra
     sum += step * step;
     ++count;
   }
-  const double noise = kNoiseGain[1] * noise_rad_ * noise_rad_;
+  const double noise = added_variance(1);
   const double speed2 = std::max(sum / std::max(count, 1.0) - noise, 0.0) / (period_s_ * period_s_);
   const double still = 1.0 / (1.0 + speed2 / (kSlow_rad_s * kSlow_rad_s));
   if (std::isnan(off)) return 0.0;

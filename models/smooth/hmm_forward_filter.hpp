@@ -22,8 +22,8 @@ namespace posed::smooth {
 
 class HmmForwardFilter {
  public:
-  // For models of at most `max_channels` channels.
-  HmmForwardFilter(int max_window, int max_channels);
+  // For models of at most `max_channels` channels. `error_rad`: LiveOptions::error_rad.
+  HmmForwardFilter(int max_window, int max_channels, double error_rad = 0.0);
 
   // Restarts with this model, which is not owned; with null, no gesture is recognised.
   RT_SAFE void set_model(const LiveModel* model) noexcept;
@@ -87,6 +87,8 @@ class HmmForwardFilter {
     return static_cast<std::size_t>(states_) + (model_->none ? 1U : 0U);
   }
   void renew_table(std::size_t state) noexcept;
+  // The variance that the source's noise and errors add to a feature of this window.
+  [[nodiscard]] double added_variance(std::size_t window) const noexcept;
   void weigh(std::span<const double> measured_rad, Row& out) noexcept;
   // How far the pose of the frame before is from the nearest label, as a share of the label's
   // limit; NaN: not known.
@@ -98,6 +100,7 @@ class HmmForwardFilter {
 
   const LiveModel* model_ = nullptr;
   int max_window_;
+  double error_rad_;
   int states_ = 0;
   double log_choices_ = 0.0;  // of the number of labels that may follow a label
   double log_chains_ = 0.0;   // of the number of chains

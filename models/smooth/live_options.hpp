@@ -32,6 +32,9 @@ struct LiveOptions {
   LiveLag lag;
   // Standard deviation of a channel's sensor noise [rad]; 0: estimated from the stream itself.
   double noise_rad = 0.0;
+  // How far off the device's angles are while the hand is held, beside their noise: the standard
+  // deviation of an angle [rad]. Only the recogniser makes allowance for it.
+  double error_rad = 0.0;
 };
 
 }  // namespace posed::smooth

@@ -154,7 +154,8 @@ RT_SAFE void FrameClock::learn(double step_s) noexcept {
 // Unwrap: removes jumps from a skeleton's rotation channels (models/smooth/README.md, "Unwrap").
 // Each channel takes the multiple of a full turn that is nearest to its previous value. Three Euler
 // angles describe a rotation in two ways, (x, y, z) and (x + pi, pi - y, z + pi); the one nearer to
-// the previous frame is used. One thread.
+// the previous frame is used. A joint with limits, as of a hand, is left alone: its angles have one
+// way only, and a source that errs may jump by more than half a turn. One thread.
 class Unwrap {
  public:
   explicit Unwrap(const Skeleton& skeleton);
@@ -165,8 +166,11 @@ class Unwrap {
   RT_SAFE void reset() noexcept;
 
  private:
-  std::vector<int>
-      joint_channels_;            // number of channels of each joint that has any, in channel order
+  struct Joint {
+    int channels = 0;
+    bool limited = true;  // all of them
+  };
+  std::vector<Joint> joints_;     // that have any, in channel order
   std::vector<double> last_rad_;  // [rotation channels]; NaN before the first value
 };
 
@@ -174,9 +178,10 @@ Unwrap::Unwrap(const Skeleton& skeleton) {
   int joint = -1;
   for (const Channel& channel : skeleton.channels) {
     if (channel.translation) continue;
-    if (channel.joint != joint) joint_channels_.push_back(0);
+    if (channel.joint != joint) joints_.emplace_back();
     joint = channel.joint;
-    ++joint_channels_.back();
+    ++joints_.back().channels;
+    if (!(channel.max - channel.min < 2.0 * kPi)) joints_.back().limited = false;
     last_rad_.push_back(0.0);
   }
   reset();
@@ -189,8 +194,10 @@ RT_SAFE void Unwrap::reset() noexcept {
 RT_SAFE void Unwrap::apply(std::span<double> values_rad) noexcept {
   double* values = values_rad.data();
   double* last = last_rad_.data();
-  for (const int count : joint_channels_) {
-    if (count == 3 && all_finite(values) && all_finite(last)) {
+  for (const auto& [count, limited] : joints_) {
+    if (limited) {
+      // as it is
+    } else if (count == 3 && all_finite(values) && all_finite(last)) {
       unwrap_joint(values, last);
     } else {
       for (int i = 0; i < count; ++i) {
@@ -217,7 +224,7 @@ struct LiveSmoother::State {
         unwrap(figure),
         noise(columns),
         window(columns),
-        filter(kMaxWindow, gesture::most_channels(figure)),
+        filter(kMaxWindow, gesture::most_channels(figure), wanted.error_rad),
         model_prior(filter, gesture::most_channels(figure)),
         measured(static_cast<std::size_t>(columns)),
         angle(static_cast<std::size_t>(angles)),

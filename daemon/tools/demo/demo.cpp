@@ -34,6 +34,7 @@
 #include "daemon/tools/live/page.hpp"
 #include "daemon/tools/style/train_style.hpp"
 #include "daemon/tools/view/bridge.hpp"
+#include "models/gesture/camera_takes.hpp"
 #include "proto/frame/profile_texts.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/whole_file.hpp"
@@ -179,6 +180,17 @@ struct DemoOptions {
   bool no_browser = false;
 };
 
+Result<> learn_gestures(const std::vector<LabelledClip>& clips, double rate_hz,
+                        const fs::path& model) {
+  std::vector<gesture::Recording> recordings;
+  for (const LabelledClip& files : clips) {
+    recordings.push_back(TRY(load_recording(files.clip, files.labels, rate_hz)));
+  }
+  OneRank alone;
+  TRY(train_gesture_and_save(recordings, {}, model, alone));
+  return {};
+}
+
 // Makes the demo's files, unless this program has made them before.
 Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
   const DemoFolder kept(folder);
@@ -207,8 +219,10 @@ Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
   if (!trained.written) return fail("the demo's own model is " + verdict);
   std::fprintf(stderr, "    %s\n", verdict.c_str());
   std::fprintf(stderr, "3/4 learning the gestures g, c and p from a labelled glove recording\n");
-  const auto recording = TRY(load_recording(clips.glove, clips.labels, kHandRate_hz));
-  TRY(train_gesture_and_save({recording}, {}, folder / kDemoHand, alone));
+  TRY(learn_gestures({clips.glove}, kHandRate_hz, folder / kDemoHand));
+  std::fprintf(stderr, "    and g, c, p, 1, 3 and 4 from %zu takes of hands before a camera\n",
+               clips.camera.size());
+  TRY(learn_gestures(clips.camera, gesture::kCameraRate_hz, folder / kDemoCamera));
   return kept.finish();
 }
 

@@ -2,6 +2,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "models/gesture/camera_takes.hpp"
 #include "models/gesture/synthetic_signer.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "proto/clip/hand_clip.hpp"
@@ -13,8 +14,8 @@ namespace {
 constexpr std::uint32_t kPeople = 6;  // of each family
 constexpr std::uint32_t kNewPerson = 21;
 constexpr double kNewWalkSeconds = 20.0;
-constexpr const char* kGlove = "glove_train.csv";
-constexpr const char* kGloveLabels = "glove_train.lab";
+constexpr const char* kGlove = "glove_train";
+constexpr std::size_t kCameraTakes = 10;
 
 Result<std::filesystem::path> write_walker(const std::filesystem::path& path,
                                            const motion::WalkerOptions& options) {
@@ -23,13 +24,23 @@ Result<std::filesystem::path> write_walker(const std::filesystem::path& path,
   return path;
 }
 
-// Writes the glove recording for training, with labels, and a new person who performs g, c, p.
+std::string camera_take(std::size_t take) { return fmt::format("camera_train_{}", take + 1); }
+
+Result<LabelledClip> write_performance(const gesture::Performance& performance,
+                                       const std::filesystem::path& folder,
+                                       const std::string& name) {
+  LabelledClip files{.clip = folder / (name + ".csv"), .labels = folder / (name + ".lab")};
+  TRY(clip::write_hand_csv(performance.clip, files.clip));
+  TRY(clip::write_labels(performance.labels, files.labels));
+  return files;
+}
+
+// Writes the recordings for training, with labels, and a new person who performs g, c, p.
 Result<> write_hands(const std::filesystem::path& folder, DemoClips& clips) {
-  clips.glove = folder / kGlove;
-  clips.labels = folder / kGloveLabels;
-  const auto learnt = TRY(gesture::make_performance({}));
-  TRY(clip::write_hand_csv(learnt.clip, clips.glove));
-  TRY(clip::write_labels(learnt.labels, clips.labels));
+  clips.glove = TRY(write_performance(TRY(gesture::make_performance({})), folder, kGlove));
+  for (const gesture::Performance& take : gesture::camera_takes()) {
+    clips.camera.push_back(TRY(write_performance(take, folder, camera_take(clips.camera.size()))));
+  }
   const auto signer = TRY(gesture::make_performance(
       {.person = kNewPerson, .script = {"g", "c", "p", "g", "c", "p", "c", "g", "p", "c"}}));
   return clip::write_hand_csv(signer.clip, folder / kDemoSigner);
@@ -38,8 +49,13 @@ Result<> write_hands(const std::filesystem::path& folder, DemoClips& clips) {
 }  // namespace
 
 std::vector<std::string> demo_file_names() {
-  std::vector<std::string> names{kDemoModel,  kDemoWalker, kDemoHand,
-                                 kDemoSigner, kGlove,      kGloveLabels};
+  std::vector<std::string> names{kDemoModel, kDemoWalker, kDemoHand, kDemoSigner, kDemoCamera};
+  const auto add_hand = [&names](const std::string& name) {
+    names.push_back(name + ".csv");
+    names.push_back(name + ".lab");
+  };
+  add_hand(kGlove);
+  for (std::size_t take = 0; take < kCameraTakes; ++take) add_hand(camera_take(take));
   for (std::uint32_t person = 1; person <= kPeople; ++person) {
     names.push_back(fmt::format("walk_{}.bvh", person));
     names.push_back(fmt::format("sneak_{}.bvh", person));

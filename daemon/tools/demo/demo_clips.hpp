@@ -19,9 +19,17 @@ inline constexpr const char* kDemoWalker = "new_walker.bvh";
 inline constexpr const char* kDemoHand = "hand.gesture";
 inline constexpr const char* kDemoSigner = "new_performer.csv";
 
+// The model for a camera's hands, trained with g, c, p, 1, 3 and 4 as a camera sees them.
+inline constexpr const char* kDemoCamera = "camera.gesture";
+
+struct LabelledClip {
+  std::filesystem::path clip, labels;
+};
+
 struct DemoClips {
   std::vector<std::filesystem::path> from, to;  // walks of the two families
-  std::filesystem::path glove, labels;          // 100 gestures of one signer
+  LabelledClip glove;                           // 100 gestures of one signer
+  std::vector<LabelledClip> camera;             // takes of drawn hands
 };
 
 // The files that make_demo_clips() and the training write into the folder.

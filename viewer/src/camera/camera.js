@@ -21,7 +21,7 @@ export class Camera {
   #busy = false;
   #run = 0; // counts starts and stops: what an earlier one has begun is no more wanted
 
-  // handlers: found({hands, time_ms}), ended(sentence)
+  // handlers: found({hands, time_ms, picture}), ended(sentence). The picture is found()'s to close.
   constructor(video, handlers) {
     this.video = video;
     this.handlers = handlers;
@@ -73,7 +73,10 @@ export class Camera {
     const worker = new Worker(WORKER);
     worker.onerror = () => this.#end('what finds hands cannot be loaded');
     worker.onmessage = ({ data }) => {
-      if (worker !== this.#worker) return;
+      if (worker !== this.#worker) {
+        data.picture?.close();
+        return;
+      }
       this.#busy = false;
       if (data.error) this.#end(`no hands can be found: ${data.error}`);
       else if (data.ready) this.#ready = true;

@@ -3,7 +3,7 @@
 // way is the one that works (in a worker's way it loads its model as a script), so this gives it
 // what it needs of a page.
 //
-// From the page: {picture: ImageBitmap, time_ms}. To it: {ready}, {time_ms, hands}, {error}.
+// From the page: {picture: ImageBitmap, time_ms}. To it: {ready}, {picture, time_ms, hands}, {error}.
 import { HandFinder } from './hands_of.js';
 
 const FOLDER = '/camera/';
@@ -61,10 +61,8 @@ self.onmessage = async ({ data: { picture, time_ms } }) => {
     const one = await finder;
     await one.send({ image: picture });
     results?.image?.close?.();
-    self.postMessage({ time_ms, hands: hands.handsOf(results) });
+    self.postMessage({ picture, time_ms, hands: hands.handsOf(results) }, [picture]);
   } catch (error) {
     self.postMessage({ error: String(error?.message ?? error) });
-  } finally {
-    picture.close();
   }
 };

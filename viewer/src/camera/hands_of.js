@@ -2,13 +2,16 @@
 
 const flat = (points) => points.flatMap(({ x, y, z }) => [x, y, z]);
 
+const apart = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]); // points of the picture
+
 const NEAR = 0.25; // of the picture: the wrist of the same hand in the next one
-const KEPT = 0.9; // of the votes before
+const KEPT = 0.97; // of the votes before: a fist from the palm looks like a flat hand's back for long
+const FORGOTTEN = 10; // pictures without the hand
 
 // Keeps hands apart from picture to picture: which side a hand is, many pictures decide, because a
 // single one is often wrong.
 export class HandFinder {
-  #before = []; // [{wrist, vote}]: above 0 it is a right hand
+  #before = []; // [{wrist, vote, lost}]: above 0 it is a right hand; lost for so many pictures
 
   // [{side, score, points: 63 metres (x right, y down, z away), picture: 21 [x, y] of 0 to 1}], at
   // most one a side: the surer one.
@@ -21,7 +24,10 @@ export class HandFinder {
       const vote = (label === 'Left' ? score : -score) + KEPT * this.#voteNear(picture[0]);
       return [{ vote, score: Math.min(1, score), points: flat(points), picture }];
     });
-    this.#before = seen.map(({ vote, picture }) => ({ vote, wrist: picture[0] }));
+    const now = seen.map(({ vote, picture }) => ({ vote, wrist: picture[0], lost: 0 }));
+    const lost = this.#before.filter(({ wrist }) => now.every((hand) => apart(hand.wrist, wrist) > NEAR));
+    const kept = lost.map((hand) => ({ ...hand, lost: hand.lost + 1 }));
+    this.#before = [...now, ...kept.filter((hand) => hand.lost < FORGOTTEN)];
     const best = new Map();
     for (const { vote, ...hand } of seen) {
       const side = vote > 0 ? 'right' : 'left';
@@ -30,10 +36,10 @@ export class HandFinder {
     return [...best.values()];
   }
 
-  #voteNear([x, y]) {
+  #voteNear(place) {
     let nearest = { distance: NEAR, vote: 0 };
     for (const { wrist, vote } of this.#before) {
-      const distance = Math.hypot(wrist[0] - x, wrist[1] - y);
+      const distance = apart(wrist, place);
       if (distance < nearest.distance) nearest = { distance, vote };
     }
     return nearest.vote;

@@ -136,13 +136,14 @@ export class CameraPanel {
     write(this.words, sentence);
   }
 
-  #found({ hands, time_ms }) {
+  #found({ hands, time_ms, picture }) {
     const now_ms = performance.now();
     this.frames += 1;
     if (hands.length > 0) this.found += 1;
     this.ages_ms = [...this.ages_ms, now_ms - time_ms].slice(-KEPT_AGES);
     this.send(landmarksMessage(hands, { time_ms, side: this.side.value }));
-    this.#draw(hands);
+    this.#draw(picture, hands);
+    picture.close();
     this.#times_ms = this.#times_ms.filter((then_ms) => now_ms - then_ms < SECOND_MS);
     this.#times_ms.push(now_ms);
     const rate = `${this.#times_ms.length} pictures a second, ${Math.round(now_ms - time_ms)} ms old`;
@@ -152,12 +153,13 @@ export class CameraPanel {
     this.#said = words;
   }
 
-  #draw(hands) {
-    const { canvas, video } = this;
-    if (canvas.width !== video.videoWidth) canvas.width = video.videoWidth;
-    if (canvas.height !== video.videoHeight) canvas.height = video.videoHeight;
+  // The picture in which these points were found.
+  #draw(picture, hands) {
+    const { canvas } = this;
+    if (canvas.width !== picture.width) canvas.width = picture.width;
+    if (canvas.height !== picture.height) canvas.height = picture.height;
     const pen = canvas.getContext('2d');
-    pen.clearRect(0, 0, canvas.width, canvas.height);
+    pen.drawImage(picture, 0, 0);
     pen.lineWidth = canvas.width / 160;
     for (const { side, picture } of hands) {
       pen.strokeStyle = side === 'left' ? '#e69f00' : '#56b4e9'; // Okabe and Ito

@@ -7,7 +7,7 @@ import { Ground } from './ground.js';
 import { HandsView } from './hands_view.js';
 import { Lights } from './lights.js';
 import { NameTags } from './name_tags.js';
-import { Pace } from './pace.js';
+import { COARSEST, Pace } from './pace.js';
 import { Performer } from './performer.js';
 import { Views } from './views.js';
 import { makeRenderer } from './renderer.js';
@@ -21,6 +21,7 @@ const NAMES_PX = 90; // the same, by buttons and names
 const LEGEND_PX = 36; // the same at the bottom of the bodies, by the colours' meaning
 const CROWD = 4; // figures; of more only the styled ones have names
 const CALM_FRAMES = 90; // drawn after the last change, while the camera glides
+const EASED = 4; // the page's frames for a picture, where the processor finds hands, too
 
 export class World {
   performers = new Map();
@@ -30,6 +31,8 @@ export class World {
   #numbers = new Map(); // of the performers' colours, by name
   #chosen = null; // the stream whose body follow and orbit look at
   #pace = new Pace();
+  #waited = 0; // frames since the last picture
+  #eased = false;
   #areas = { bodies: null, hands: null };
   #wanted = []; // who waits for a picture
   #arranged = ''; // the streams of the last statistics that moved somebody
@@ -204,12 +207,21 @@ export class World {
     this.resize();
   }
 
+  // While the processor has more to do than to draw: without a graphics card it draws coarser and
+  // less often.
+  ease(eased) {
+    if (this.fine || eased === this.#eased) return;
+    this.#eased = eased;
+    this.resize();
+  }
+
   resize() {
     const { width, height } = this.stage.getBoundingClientRect();
     if (width === 0) return;
-    this.renderer.setPixelRatio(this.#pace.now.pixels * Math.min(devicePixelRatio, MOST_PIXELS));
-    this.lights.sun.castShadow = this.#pace.now.shadows;
-    this.ground.setShadows(this.#pace.now.shadows);
+    const { pixels, shadows } = this.#eased ? COARSEST : this.#pace.now;
+    this.renderer.setPixelRatio(pixels * Math.min(devicePixelRatio, MOST_PIXELS));
+    this.lights.sun.castShadow = shadows;
+    this.ground.setShadows(shadows);
     this.renderer.setSize(width, height, false);
     this.#areas.bodies = { left: 0, top: 0, width, height, covered: TOOLS_PX };
     const show = this.stage.dataset.show;
@@ -257,10 +269,13 @@ export class World {
   // anything was drawn.
   frame(shown) {
     this.#update(shown);
-    if (this.#dirty === 0 || this.stage.dataset.show === 'none') {
+    this.#waited += 1;
+    const early = this.#eased && this.#waited < EASED;
+    if (this.#dirty === 0 || this.stage.dataset.show === 'none' || early) {
       this.#pace.rest();
       return false;
     }
+    this.#waited = 0;
     this.#dirty -= 1;
     this.#look();
     this.#draw();

@@ -31,6 +31,8 @@ test('which side a hand is, many pictures decide', () => {
   assert.deepEqual(sides('Left', 'Left', 'Right', 'Left'), Array(4).fill('right'));
   assert.equal(sides(...Array(8).fill('Right')).at(-1), 'left');
   finder.handsOf(found());
+  assert.deepEqual(sides('Left'), ['left']); // lost for a moment
+  for (let i = 0; i < 20; i += 1) finder.handsOf(found());
   assert.deepEqual(sides('Left'), ['right']); // another hand
 });
 
