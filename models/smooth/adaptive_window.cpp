@@ -49,6 +49,7 @@ AdaptiveWindow::AdaptiveWindow(int channels)
       ring_time_s_(kMaxWindow),
       last_measured_(channels),
       held_rad_(channels),
+      variance_rad2_(channels),
       active_(trajectory::make_rows(1, information_.stride())),
       speeds_(trajectory::make_rows(kMaxWindow + 1, information_.stride())),
       density_(trajectory::make_rows(1, information_.stride())),
@@ -82,18 +83,23 @@ RT_SAFE bool AdaptiveWindow::known(int channel) const noexcept {
 }
 
 RT_SAFE void AdaptiveWindow::push(double time_s, std::span<const double> measured_rad,
-                                  double noise_rad) noexcept {
+                                  const Sensors& sensors) noexcept {
   const int at = static_cast<int>(pushed_ % kMaxWindow);
   ring_time_s_[at] = time_s;
   information_.clear(at);
   whole_[at] = 1;
   double* const position = sensed_.data() + static_cast<std::ptrdiff_t>(2 * at) * stride();
   double* const mean = position + stride();
-  const double precision = 1.0 / (noise_rad * noise_rad);
   for (std::size_t c = 0; c < static_cast<std::size_t>(channels_); ++c) {
+    const double rounding_rad = sensors.rounding_rad.empty() ? 0.0 : sensors.rounding_rad[c];
+    const double noise_rad = std::max(sensors.noise_rad, rounding_rad);
+    const double precision = 1.0 / (noise_rad * noise_rad);
+    variance_rad2_[c] = 1.0 / precision;
     const bool measured = std::isfinite(measured_rad[c]);
-    // A sensor with a dead band repeats its value while the joint moves on within the band.
+    // A sensor with a dead band repeats its value while the joint moves on within the band. What
+    // rounding makes of a slow motion is as near as its other values are.
     const bool repeats = last_measured_[c] >= 0 && measured_rad[c] == held_rad_[c];
+    const double share = repeats && rounding_rad == 0.0 ? 1.0 / kRepeats : 1.0;
     if (!measured) whole_[at] = 0;
     if (measured) {
       if (last_measured_[c] < 0 && pushed_ > 0) adopt(c, measured_rad[c]);
@@ -102,14 +108,16 @@ RT_SAFE void AdaptiveWindow::push(double time_s, std::span<const double> measure
       last_measured_[c] = pushed_;
     }
     // With zero precision, a channel that is missing in the whole window would have no value.
-    position[c] = measured ? precision / (repeats ? kRepeats : 1.0) : kNothing;
+    position[c] = measured && !sensors.repeated ? share * precision : kNothing;
     mean[c] = position[c] * held_rad_[c];
   }
   copy_sensed(at);
   ++pushed_;
-  steady_.push(
-      time_s, measured_rad,
-      {.variance_rad2 = 1.0 / precision, .density = density_.get(), .active = active_.get()});
+  steady_.push(time_s, measured_rad,
+               {.variance_rad2 = variance_rad2_.data(),
+                .density = density_.get(),
+                .active = active_.get(),
+                .repeated = sensors.repeated});
 }
 
 RT_SAFE void AdaptiveWindow::copy_sensed(int slot) noexcept {

@@ -37,12 +37,19 @@ class InformationSource {
   virtual void add(AdaptiveWindow& window) noexcept = 0;
 };
 
+// What is known of the sensors whose values a frame shows.
+struct Sensors {
+  double noise_rad = 0.0;
+  std::span<const double> rounding_rad{};  // [channels] error of rounding; empty: none
+  bool repeated = false;  // the frame shows the samples of the one before once more: none is new
+};
+
 class AdaptiveWindow {
  public:
   explicit AdaptiveWindow(int channels);
 
   // The next frame: [channels] rad, NaN where a channel is missing. Times increase.
-  void push(double time_s, std::span<const double> measured_rad, double noise_rad) noexcept;
+  void push(double time_s, std::span<const double> measured_rad, const Sensors& sensors) noexcept;
 
   // Solves the last frames: window_frames(period_s) of them, or up to an eighth more, because a
   // period that grows by less does not shorten the window.
@@ -111,6 +118,7 @@ class AdaptiveWindow {
   std::vector<double> ring_time_s_;             // [kMaxWindow]
   std::vector<long> last_measured_;             // [channels] number of the frame; -1: never
   std::vector<double> held_rad_;                // [channels] the last measured value
+  std::vector<double> variance_rad2_;           // [channels] of the newest measurement
   trajectory::Rows active_;                     // [stride] 1 for channels that have ever changed
   trajectory::Rows speeds_;                     // [kMaxWindow + 1][stride]
   trajectory::Rows density_;                    // [stride] of the newest frames, see Prior

@@ -393,8 +393,15 @@ RT_SAFE void LiveSmoother::process(const StageFrame& in, StageOut& out) noexcept
   if (s.received - s.emitted >= window_frames(period_s)) flush(out);  // the beat became much slower
   s.receive(in.frame, step_s);
   const bool even = step_s < kEvenStep * period_s;
-  if (s.options.noise_rad <= 0.0) s.noise.push(s.measured, even);
-  s.window.push(now_s, s.measured, noise_rad());
+  if (s.options.noise_rad > 0.0) {
+    s.window.push(now_s, s.measured, {.noise_rad = s.options.noise_rad});
+  } else {
+    s.noise.push(s.measured, even, period_s);
+    s.window.push(now_s, s.measured,
+                  {.noise_rad = s.noise.noise_rad(),
+                   .rounding_rad = s.noise.rounding_rad(),
+                   .repeated = s.noise.repeated()});
+  }
   if (s.filter.model() != nullptr) {
     const std::size_t modelled = s.filter.model()->channels;
     s.filter.push(std::span(s.measured).first(modelled), even, period_s, noise_rad());

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
+#include <utility>
 
 #include "proto/frame/degree.hpp"
 
@@ -17,53 +19,59 @@ constexpr double kMemory = 12000.0;   // values; when reached, all counts are ha
 constexpr double kLowSide = 0.97;
 // The median of |third difference| of white noise is 0.6745 standard deviations, and that standard
 // deviation is sqrt(20) times the noise.
-constexpr double kToNoise = kLowSide / (0.6745 * 4.47213595499958);
+constexpr double kMedian = 0.6745;
+constexpr double kToNoise = kLowSide / (kMedian * 4.47213595499958);
+
+// Correlation of the noise.
+constexpr double kFew = 400.0;                    // differences before a correlation is believed
+constexpr double kMinCorrelation = 0.3;           // less is taken for white noise
+constexpr double kMaxCorrelation = 0.85;          // more cannot be told apart
+constexpr double kMotion_Hz = 5.0;                // up to which hands move; the noise there counts
+constexpr double kSlowest_Hz = 8.0 * kMotion_Hz;  // of samples whose noise differs from motion
+constexpr double kOverRounding = 2.0;  // a weaker noise is that of the steps, and not random
+
+// Steps of quantisation.
+constexpr double kSmallest_rad = 1e-5;  // float values differ by less
+constexpr double kSame = 0.02;          // tolerance, of a step
+constexpr double kStepForget = 0.02;    // of a change
+constexpr int kStepChanges = 12;        // before a step is believed
+constexpr double kStepShare = 0.9;      // of the changes that are multiples of the step
+constexpr double kRounding = 0.8 * 0.28867513459481287;  // of a step: slightly below 1/sqrt(12)
+
+// Repeated samples.
+constexpr double kSamples = 100.0;     // that the shares are means of
+constexpr double kFirstSamples = 8.0;  // before repeats are believed
+constexpr double kAlone = 0.2;         // most channels that repeat while others change
+constexpr double kCommon = 0.3;        // least share of samples that are shown so often
+constexpr int kFewChannels = 3;        // fewer may well repeat by chance
+
+// Variance of the fifth difference of noise of variance 1 whose samples have the correlation r,
+// r^2, r^3, ...
+double fifth_variance(double r) noexcept {
+  return 252.0 + r * (-420.0 + r * (240.0 + r * (-90.0 + r * (20.0 - 2.0 * r))));
+}
 
 }  // namespace
 
-NoiseEstimate::NoiseEstimate(int channels)
-    : channels_(channels), past_(kOrder * channels), first_(channels), moved_(channels) {
-  reset();
-}
-
-RT_SAFE void NoiseEstimate::reset() noexcept {
-  std::ranges::fill(first_, std::numeric_limits<double>::quiet_NaN());
-  std::fill(moved_.begin(), moved_.end(), false);
-  even_frames_ = 0;
-  bins_.fill(0.0);
-  total_ = 0.0;
-  noise_rad_ = kFirstGuess_rad;
-}
-
-RT_SAFE void NoiseEstimate::push(std::span<const double> measured_rad, bool even) noexcept {
-  even_frames_ = even ? std::min(even_frames_ + 1, kOrder) : 0;
-  const std::size_t channels = channels_;
-  for (std::size_t c = 0; c < channels; ++c) {
-    const double now = measured_rad[c];
-    if (std::isnan(first_[c])) first_[c] = now;
-    if (std::isfinite(now) && now != first_[c]) moved_[c] = true;
-    double* const past = past_.data() + c * kOrder;
-    const double third = now - 3.0 * past[0] + 3.0 * past[1] - past[2];
-    if (even_frames_ == kOrder && moved_[c] && std::isfinite(third)) count(std::abs(third));
-    past[2] = past[1];
-    past[1] = past[0];
-    past[0] = now;
-  }
-  if (total_ >= kEnough) noise_rad_ = std::max(kMinNoise_rad, kToNoise * median_rad());
-  if (total_ >= kMemory) {
-    for (double& bin : bins_) bin *= 0.5;
-    total_ *= 0.5;
-  }
-}
-
-RT_SAFE void NoiseEstimate::count(double size_rad) noexcept {
+RT_SAFE void MedianSize::count(double size_rad) noexcept {
   const double octaves = size_rad > kMinBin_rad ? std::log2(size_rad / kMinBin_rad) : 0.0;
   const int bin = std::min(static_cast<int>(octaves * kBinsAnOctave), kBins - 1);
   bins_[static_cast<std::size_t>(bin)] += 1.0;
   total_ += 1.0;
 }
 
-RT_SAFE double NoiseEstimate::median_rad() const noexcept {
+RT_SAFE void MedianSize::fade() noexcept {
+  if (total_ < kMemory) return;
+  for (double& bin : bins_) bin *= 0.5;
+  total_ *= 0.5;
+}
+
+RT_SAFE void MedianSize::reset() noexcept {
+  bins_.fill(0.0);
+  total_ = 0.0;
+}
+
+RT_SAFE double MedianSize::median_rad() const noexcept {
   double below = 0.0;
   int bin = 0;
   for (; bin < kBins - 1; ++bin) {
@@ -74,6 +82,146 @@ RT_SAFE double NoiseEstimate::median_rad() const noexcept {
   const double here = bins_[static_cast<std::size_t>(bin)];
   const double inside = here > 0.0 ? (0.5 * total_ - below) / here : 0.5;
   return kMinBin_rad * std::exp2((bin + inside) / kBinsAnOctave);
+}
+
+NoiseEstimate::NoiseEstimate(int channels)
+    : past_(kPast * channels),
+      first_(channels),
+      moved_(channels),
+      steps_(channels),
+      rounding_rad_(channels) {
+  reset();
+}
+
+RT_SAFE void NoiseEstimate::reset() noexcept {
+  std::ranges::fill(first_, std::numeric_limits<double>::quiet_NaN());
+  std::fill(moved_.begin(), moved_.end(), false);
+  std::ranges::fill(steps_, Step());
+  std::ranges::fill(rounding_rad_, 0.0);
+  forget_differences();
+  number_ = 0;
+  samples_ = alone_ = 0.0;
+  longer_.fill(0.0);
+  run_ = 0;
+  repeats_ = repeated_ = false;
+  noise_rad_ = kFirstGuess_rad;
+}
+
+// A device that is read more often than it samples repeats all its channels at once, and regularly.
+// Channels that stay within their step or dead band repeat alone, and a hand that rests is still
+// for long.
+RT_SAFE void NoiseEstimate::judge_repeat(std::span<const double> measured_rad) noexcept {
+  int moving = 0;
+  int same = 0;
+  for (std::size_t c = 0; c < measured_rad.size(); ++c) {
+    if (!moved_[c] || !std::isfinite(measured_rad[c])) continue;
+    ++moving;
+    if (measured_rad[c] == past_[c * kPast]) ++same;
+  }
+  repeated_ = false;
+  if (moving < kFewChannels) return;
+  if (same == moving) {
+    run_ = std::min(run_ + 1, kMaxRepeats + 1);
+    repeated_ = repeats_ && run_ <= kMaxRepeats && longer_[run_ - 1] > kCommon;
+    return;
+  }
+  samples_ = std::min(samples_ + 1.0, kSamples);
+  alone_ += (static_cast<double>(same) / moving - alone_) / samples_;
+  for (int i = 0; i < kMaxRepeats; ++i) {
+    longer_[i] += ((run_ > i ? 1.0 : 0.0) - longer_[i]) / samples_;
+  }
+  run_ = 0;
+  const bool repeats = samples_ > kFirstSamples && alone_ < kAlone && longer_[0] > kCommon;
+  if (std::exchange(repeats_, repeats) != repeats) forget_differences();
+}
+
+RT_SAFE void NoiseEstimate::forget_differences() noexcept {
+  third_.reset();
+  fifth_.reset();
+  far_fifth_.reset();
+  even_samples_ = 0;
+}
+
+RT_SAFE void NoiseEstimate::learn_step(std::size_t c, double change_rad) noexcept {
+  const double size_rad = std::abs(change_rad);
+  if (!(size_rad > kSmallest_rad)) return;
+  Step& step = steps_[c];
+  if (step.changes == 0 || size_rad < (1.0 - kSame) * step.least_rad) {
+    step = {.least_rad = size_rad, .multiples = 1.0, .changes = 0};
+  }
+  const double multiple = size_rad / step.least_rad;
+  const bool whole = std::abs(multiple - std::round(multiple)) < 2.0 * kSame;
+  step.changes = std::min(step.changes + 1, kStepChanges);
+  step.multiples += kStepForget * ((whole ? 1.0 : 0.0) - step.multiples);
+  const bool believed = step.changes == kStepChanges && step.multiples > kStepShare;
+  rounding_rad_[c] = believed ? kRounding * step.least_rad : 0.0;
+}
+
+RT_SAFE void NoiseEstimate::learn_differences(std::size_t c, double now_rad) noexcept {
+  const double* const past = past_.data() + c * kPast;
+  const double third = now_rad - 3.0 * past[0] + 3.0 * past[1] - past[2];
+  if (even_samples_ >= 3 && std::isfinite(third)) third_.count(std::abs(third));
+  const auto fifth = [&](int apart) {
+    const auto at = [&](int back) { return past[back * apart - 1]; };
+    return std::abs(now_rad - 5.0 * at(1) + 10.0 * at(2) - 10.0 * at(3) + 5.0 * at(4) - at(5));
+  };
+  const double near = fifth(1);
+  const double far = fifth(2);
+  // Differences of samples that follow each other say nearly the same: every second one counts.
+  if (even_samples_ < kPast || number_ % 2 != 0 || !std::isfinite(near + far)) return;
+  fifth_.count(near);
+  far_fifth_.count(far);
+}
+
+RT_SAFE void NoiseEstimate::push(std::span<const double> measured_rad, bool even,
+                                 double period_s) noexcept {
+  judge_repeat(measured_rad);
+  if (repeated_) return;
+  ++number_;
+  even_samples_ = even ? std::min(even_samples_ + 1, kPast) : 0;
+  for (std::size_t c = 0; c < measured_rad.size(); ++c) {
+    const double now = measured_rad[c];
+    if (std::isnan(first_[c])) first_[c] = now;
+    if (std::isfinite(now) && now != first_[c]) moved_[c] = true;
+    double* const past = past_.data() + c * kPast;
+    learn_step(c, now - past[0]);
+    if (moved_[c]) learn_differences(c, now);
+    std::copy_backward(past, past + kPast - 1, past + kPast);
+    past[0] = now;
+  }
+  if (third_.total() >= kEnough) {
+    const double white_rad = kToNoise * third_.median_rad();
+    noise_rad_ = std::max({kMinNoise_rad, white_rad, correlated_rad(white_rad, period_s)});
+  }
+  third_.fade();
+  fifth_.fade();
+  far_fifth_.fade();
+}
+
+// White noise of this strength has, up to the frequencies of motions, as much power as the noise;
+// 0 for noise that is not correlated.
+RT_SAFE double NoiseEstimate::correlated_rad(double white_rad, double period_s) const noexcept {
+  double frames = 1.0;  // for each sample
+  for (const double share : longer_) frames += repeats_ ? share : 0.0;
+  const double sample_s = period_s * frames;
+  const double rounding_rad = std::ranges::max(rounding_rad_);
+  if (fifth_.total() < kFew || sample_s * kSlowest_Hz > 1.0 ||
+      white_rad < kOverRounding * rounding_rad) {
+    return 0.0;
+  }
+  const double near_rad = fifth_.median_rad() / kMedian;
+  const double far_rad = far_fifth_.median_rad() / kMedian;
+  const double ratio = far_rad * far_rad / (near_rad * near_rad);
+  double low = 0.0;  // between these correlations the variances have this ratio
+  double high = kMaxCorrelation;
+  for (int i = 0; i < 12; ++i) {
+    const double r = 0.5 * (low + high);
+    (fifth_variance(r * r) < ratio * fifth_variance(r) ? low : high) = r;
+  }
+  if (low < kMinCorrelation) return 0.0;
+  const double turn = 2.0 * std::numbers::pi * kMotion_Hz * sample_s;
+  const double power = (1.0 - low * low) / (1.0 - 2.0 * low * std::cos(turn) + low * low);
+  return near_rad * std::sqrt(power / fifth_variance(low));
 }
 
 }  // namespace posed::smooth

@@ -1,8 +1,7 @@
-// NoiseEstimate: estimates the sensors' noise from the measured values. The third difference of a
-// smooth motion is almost zero; that of white noise of variance R has variance 20 R. Its median
-// over channels and the last 12,000 values is little affected by the remaining motion
-// (models/smooth/README.md, "Noise estimate"). Channels that never changed are left out. One
-// thread.
+// NoiseEstimate: learns from the measured values what noise the sensors have: how strong it is, how
+// far it is correlated from sample to sample, in which steps each channel is quantised, and which
+// frames show a sample a second time (models/smooth/README.md, "Noise estimate"). Channels that
+// never changed are left out. One thread.
 #pragma once
 
 #include <array>
@@ -13,36 +12,76 @@
 
 namespace posed::smooth {
 
+// The median of sizes, from a histogram of their logarithms; its counts are halved when it is full,
+// so that it follows the last values.
+class MedianSize {
+ public:
+  RT_SAFE void count(double size_rad) noexcept;
+  RT_SAFE void fade() noexcept;  // to be called once a frame
+  RT_SAFE void reset() noexcept;
+  RT_SAFE [[nodiscard]] double total() const noexcept { return total_; }
+  RT_SAFE [[nodiscard]] double median_rad() const noexcept;
+
+ private:
+  static constexpr int kBinsAnOctave = 16;
+  static constexpr int kOctaves = 24;
+  static constexpr int kBins = kBinsAnOctave * kOctaves;
+
+  std::array<double, kBins> bins_{};  // counts by the logarithm
+  double total_ = 0.0;
+};
+
 class NoiseEstimate {
  public:
   explicit NoiseEstimate(int channels);
 
   // The next frame's channels [rad], NaN where missing. `even`: it follows the previous frame by
-  // one period.
-  RT_SAFE void push(std::span<const double> measured_rad, bool even) noexcept;
+  // one period; `period_s` of the stream.
+  RT_SAFE void push(std::span<const double> measured_rad, bool even, double period_s) noexcept;
 
-  // The assumed noise [rad]: slightly below the estimate, because an assumed noise that is too low
-  // costs less accuracy than one that is too high.
+  // The assumed noise [rad], as white noise that disturbs a motion as much as the sensors' does:
+  // slightly below the estimate, because an assumed noise that is too low costs less accuracy than
+  // one that is too high.
   RT_SAFE [[nodiscard]] double noise_rad() const noexcept { return noise_rad_; }
+  // The error of rounding [rad], for each channel; 0 where the values have no steps.
+  RT_SAFE [[nodiscard]] std::span<const double> rounding_rad() const noexcept {
+    return rounding_rad_;
+  }
+  // Whether the last frame shows the sample of the frame before once more.
+  RT_SAFE [[nodiscard]] bool repeated() const noexcept { return repeated_; }
 
   RT_SAFE void reset() noexcept;
 
  private:
-  void count(double size_rad) noexcept;
-  [[nodiscard]] double median_rad() const noexcept;
+  void judge_repeat(std::span<const double> measured_rad) noexcept;
+  void learn_step(std::size_t c, double change_rad) noexcept;
+  void learn_differences(std::size_t c, double now_rad) noexcept;
+  void forget_differences() noexcept;
+  [[nodiscard]] double correlated_rad(double white_rad, double period_s) const noexcept;
 
-  static constexpr int kOrder = 3;
-  static constexpr int kBinsAnOctave = 16;
-  static constexpr int kOctaves = 24;
-  static constexpr int kBins = kBinsAnOctave * kOctaves;
+  static constexpr int kPast = 10;       // samples: the fifth difference of every second one
+  static constexpr int kMaxRepeats = 4;  // of one sample
 
-  int channels_;
-  std::vector<double> past_;          // [kOrder x channels], newest first
+  struct Step {
+    double least_rad = 0.0;  // the smallest change since it was found
+    double multiples = 0.0;  // share of the changes that are multiples of it
+    int changes = 0;
+  };
+
+  std::vector<double> past_;          // [channels][kPast] samples, newest first
   std::vector<double> first_;         // [channels] the first value of each
   std::vector<bool> moved_;           // [channels]
-  int even_frames_ = 0;               // consecutive even frames, up to kOrder
-  std::array<double, kBins> bins_{};  // counts of |third difference|, by its logarithm
-  double total_ = 0.0;
+  std::vector<Step> steps_;           // [channels]
+  std::vector<double> rounding_rad_;  // [channels]
+  long number_ = 0;                   // of samples
+  int even_samples_ = 0;              // in a row, up to kPast
+  MedianSize third_, fifth_, far_fifth_;
+  bool repeats_ = false;   // the device shows samples more than once
+  bool repeated_ = false;  // the last frame was such
+  int run_ = 0;            // frames without any change
+  double samples_ = 0.0;   // that the shares are means of
+  double alone_ = 0.0;     // share of the channels that repeat while others change
+  std::array<double, kMaxRepeats> longer_{};  // share of the samples repeated more than i times
   double noise_rad_;
 };
 

@@ -136,21 +136,21 @@ RT_SAFE void SteadyMotion::follow(double step_s, std::span<const double> measure
   double count = 0.0;
   for (std::size_t c = 0; c < models_.size(); ++c) {
     InteractingModels& model = models_[c];
-    const bool measured = std::isfinite(measured_rad[c]);
+    const bool measured = std::isfinite(measured_rad[c]) && !known.repeated;
     evidence_[c] = 0.0;
     if (model.started()) {
       model.predict(step_s, stay, {.loose = known.density[c], .tight = kSteadyDensity});
       if (!measured) continue;
-      evidence_[c] = model.surprise(measured_rad[c], known.variance_rad2);
+      evidence_[c] = model.surprise(measured_rad[c], known.variance_rad2[c]);
       sum += known.active[c] * evidence_[c];
       count += known.active[c];
     } else if (measured) {
-      model.start(measured_rad[c], known.variance_rad2);
+      model.start(measured_rad[c], known.variance_rad2[c]);
     }
   }
   const double hand = count > 0.0 ? kHandEvidence * sum / count : 0.0;
   for (std::size_t c = 0; c < models_.size(); ++c) {
-    if (std::isfinite(measured_rad[c])) models_[c].weigh(evidence_[c] + hand);
+    if (std::isfinite(measured_rad[c]) && !known.repeated) models_[c].weigh(evidence_[c] + hand);
   }
 }
 

@@ -79,9 +79,10 @@ class SteadyMotion {
 
   // What is known of the next frame's channels besides their values.
   struct Channels {
-    double variance_rad2;   // of a measurement
-    const double* density;  // [channels] that the speed-adaptive prior expects [rad^2/s^3]
-    const double* active;   // [channels] 1 for those whose evidence counts for the whole hand
+    const double* variance_rad2;  // [channels] of a measurement
+    const double* density;        // [channels] that the speed-adaptive prior expects [rad^2/s^3]
+    const double* active;         // [channels] 1 for those whose evidence counts for the whole hand
+    bool repeated = false;        // the values are those of the frame before once more
   };
   // The next frame: [channels] rad, NaN where missing. Times increase.
   void push(double time_s, std::span<const double> measured_rad, const Channels& known) noexcept;

@@ -90,7 +90,7 @@ Tuned best_one_euro(std::span<const Trial> trials, int lag) {
 
 Tuned best_kalman(std::span<const Trial> trials, int lag, double noise_deg) {
   Best best("Kalman, constant velocity", trials);
-  for (int step = -20; step <= 4; ++step) {
+  for (int step = -20; step <= 16; ++step) {
     const double q = std::pow(10.0, 0.25 * step);
     best.consider(text("q %.2g deg^2", q), [&](const Trial& trial) {
       return kalman_velocity(trial.measured, lag, q, noise_deg);

@@ -1,8 +1,10 @@
 // posed_bench smooth: the cost of the live smoother and its error, beside baselines that are tuned
 // on the very motion on which they are evaluated.
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <memory>
 #include <random>
 #include <string>
@@ -21,6 +23,7 @@
 #include "proto/text/json_text.hpp"
 #include "tests/bench/baselines.hpp"
 #include "tests/bench/percentiles.hpp"
+#include "tests/bench/smooth_inputs.hpp"
 
 namespace posed::bench {
 namespace {
@@ -37,10 +40,12 @@ run.
 
   posed_bench smooth
   posed_bench smooth --clip glove1.csv glove2.csv     # recordings taken as the truth
+  posed_bench smooth --inputs FOLDER --half judge     # many motions and noises of devices, lag 1
   posed_bench smooth --cost                           # only what a frame costs)";
 
 struct BenchSmoothOptions {
   std::vector<std::string> clips;
+  std::string inputs, half = "judge";
   unsigned seed = 11;
   bool cost = false, json = false;
 };
@@ -101,7 +106,8 @@ ChannelMatrix live(const Trial& trial, int lag, double noise_deg) {
     for (int c = 0; c < channels; ++c) {
       row[static_cast<std::size_t>(c)] = trial.measured(t, c) / tools::kDegrees;
     }
-    window.push(static_cast<double>(t) / trial.rate_hz, row, noise_deg / tools::kDegrees);
+    window.push(static_cast<double>(t) / trial.rate_hz, row,
+                {.noise_rad = noise_deg / tools::kDegrees});
     window.solve(1.0 / trial.rate_hz);
     if (t < lag) continue;
     made.row(t - lag) =
@@ -207,7 +213,7 @@ json cost(unsigned seed) {
     Frame frame;
     set_hand_angles(skeleton, angles, frame);
     frame.header.device_ns = nanoseconds(now_s);
-    window.push(now_s, angles, 1.0 / tools::kDegrees);
+    window.push(now_s, angles, {.noise_rad = 1.0 / tools::kDegrees});
     timed(bare_us, [&] { window.solve_once(1.0 / 60.0); });
     timed(solve_us, [&] { window.solve(1.0 / 60.0); });
     timed(stage_us, [&] { stage.process({.frame = frame}, last); });
@@ -252,7 +258,49 @@ void print(const json& report) {
   for (const auto& [title, rows] : accuracy["where_not"].items()) print_table(title, rows);
 }
 
+// The stage with the noise that it learns itself, over the better of the two rivals at lag 1.
+json many_inputs(const BenchSmoothOptions& options) {
+  constexpr int kLag = 1;
+  json report = json::object();
+  for (const SmoothInput& input :
+       smooth_inputs(options.inputs, options.half == "tune" ? Half::kTune : Half::kJudge)) {
+    double square = 0.0;
+    for (const Trial& trial : input.trials) {
+      square += std::pow(bench::rms_deg(live_stage(trial, kLag), trial.truth), 2);
+    }
+    const double live_deg = std::sqrt(square / static_cast<double>(input.trials.size()));
+    double rival_deg = std::numeric_limits<double>::infinity();
+    for (const auto& rival : bench::tuned_baselines(input.trials, kLag, input.noise_deg)) {
+      const bool counts = rival.name.starts_with("One-Euro") || rival.name.starts_with("Kalman");
+      if (counts) rival_deg = std::min(rival_deg, rival.rms_deg);
+    }
+    report[input.motion][input.noise] = {
+        {"live_deg", live_deg}, {"rival_deg", rival_deg}, {"ratio", live_deg / rival_deg}};
+  }
+  return report;
+}
+
+void print_inputs(const json& report) {
+  std::printf("rms error [deg] at lag 1: live stage, best tuned One-Euro or Kalman, ratio\n");
+  for (const auto& [motion, noises] : report.items()) {
+    for (const auto& [noise, row] : noises.items()) {
+      std::printf("  %-20s %-12s %7.3f %7.3f %6.3f\n", motion.c_str(), noise.c_str(),
+                  row["live_deg"].get<double>(), row["rival_deg"].get<double>(),
+                  row["ratio"].get<double>());
+    }
+  }
+}
+
 Result<> bench_smooth(const BenchSmoothOptions& options) {
+  if (!options.inputs.empty()) {
+    const json made = many_inputs(options);
+    if (options.json) {
+      std::printf("%s\n", json_text(made, 2).c_str());
+    } else {
+      print_inputs(made);
+    }
+    return {};
+  }
   json report{{"cost", cost(options.seed)}};
   if (!options.cost) {
     const auto truths = TRY(truths_of(options));
@@ -274,6 +322,11 @@ void add_bench_smooth(CLI::App& bench, int& exit_code) {
   command->footer(kBenchSmoothFooter);
   command->add_option("--clip", options->clips, "Hand CSVs taken as the truth")
       ->type_name("REC.csv");
+  command->add_option("--inputs", options->inputs, "Folder of public glove recordings")
+      ->type_name("FOLDER");
+  command->add_option("--half", options->half, "Of the inputs: those to tune on, or to judge by")
+      ->check(CLI::IsMember({"tune", "judge"}))
+      ->capture_default_str();
   command->add_option("--seed", options->seed, "Of the noise")->capture_default_str();
   command->add_flag("--cost", options->cost, "Only the cost of a frame");
   command->add_flag("--json", options->json, "One JSON object on stdout");

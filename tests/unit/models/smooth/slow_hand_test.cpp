@@ -93,7 +93,7 @@ TEST_CASE("jitter of the frames' times does not cost the window its past", "[liv
         std::ranges::nth_element(recent, recent.begin() + std::ssize(recent) / 2);
         std::array<double, 4> measured_rad{};
         for (double& value : measured_rad) value = kDegree * normal(random);
-        window.push(time_s, measured_rad, kDegree);
+        window.push(time_s, measured_rad, {.noise_rad = kDegree});
         window.solve(recent[recent.size() / 2]);
         for (std::size_t c = 0; c < 4; ++c) {
           const double step_deg =

@@ -36,7 +36,7 @@ class Follower {
       const auto before = test::allocations();
       motion.push(
           now_s, measured_,
-          {.variance_rad2 = kNoise * kNoise, .density = density.data(), .active = active.data()});
+          {.variance_rad2 = variance.data(), .density = density.data(), .active = active.data()});
       if (test::allocations() != before) FAIL("push takes memory");
     }
   }
@@ -50,6 +50,7 @@ class Follower {
   // As the speed-adaptive prior expects of some 10 deg/s.
   std::vector<double> density = std::vector<double>(kFollowed, 2000.0 * kDegree * kDegree);
   std::vector<double> active = std::vector<double>(kFollowed, 1.0);
+  std::vector<double> variance = std::vector<double>(kFollowed, kNoise* kNoise);
 
  private:
   std::function<double(int, double)> truth_;
@@ -108,9 +109,10 @@ TEST_CASE("steady motion is forgotten completely", "[live]") {
   Follower once(ramp);
   Follower again(ramp);
   once.go_on(1.0);
-  again.motion.push(
-      0.0, std::vector<double>(kFollowed, 2.0),
-      {.variance_rad2 = 1.0, .density = again.density.data(), .active = again.active.data()});
+  again.motion.push(0.0, std::vector<double>(kFollowed, 2.0),
+                    {.variance_rad2 = again.variance.data(),
+                     .density = again.density.data(),
+                     .active = again.active.data()});
   again.motion.reset();
   again.go_on(1.0);
   for (int c = 0; c < kFollowed; ++c) CHECK(once.motion.loose(3)[c] == again.motion.loose(3)[c]);
