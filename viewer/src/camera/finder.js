@@ -3,7 +3,8 @@
 // way is the one that works (in a worker's way it loads its model as a script), so this gives it
 // what it needs of a page.
 //
-// From the page: {picture: ImageBitmap, time_ms}. To it: {ready}, {picture, time_ms, hands}, {error}.
+// From the page: {picture: ImageBitmap, time_ms}. To it: {ready}, {picture, time_ms, hands},
+// {error}.
 import { HandFinder } from './hands_of.js';
 
 const FOLDER = '/camera/';

@@ -5,7 +5,7 @@ const flat = (points) => points.flatMap(({ x, y, z }) => [x, y, z]);
 const apart = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]); // points of the picture
 
 const NEAR = 0.25; // of the picture: the wrist of the same hand in the next one
-const KEPT = 0.97; // of the votes before: a fist from the palm looks like a flat hand's back for long
+const KEPT = 0.97; // of the votes before: a fist looks like a flat hand's back for long
 const FORGOTTEN = 10; // pictures without the hand
 
 // Keeps hands apart from picture to picture: which side a hand is, many pictures decide, because a
@@ -25,7 +25,8 @@ export class HandFinder {
       return [{ vote, score: Math.min(1, score), points: flat(points), picture }];
     });
     const now = seen.map(({ vote, picture }) => ({ vote, wrist: picture[0], lost: 0 }));
-    const lost = this.#before.filter(({ wrist }) => now.every((hand) => apart(hand.wrist, wrist) > NEAR));
+    const gone = ({ wrist }) => now.every((hand) => apart(hand.wrist, wrist) > NEAR);
+    const lost = this.#before.filter(gone);
     const kept = lost.map((hand) => ({ ...hand, lost: hand.lost + 1 }));
     this.#before = [...now, ...kept.filter((hand) => hand.lost < FORGOTTEN)];
     const best = new Map();
