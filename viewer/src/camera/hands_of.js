@@ -5,7 +5,7 @@ const flat = (points) => points.flatMap(({ x, y, z }) => [x, y, z]);
 const apart = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]); // points of the picture
 
 const NEAR = 0.25; // of the picture: the wrist of the same hand in the next one
-const KEPT = 0.97; // of the votes before: a fist looks like a flat hand's back for long
+const KEPT = 0.9; // of the votes before
 const FORGOTTEN = 10; // pictures without the hand
 
 // Keeps hands apart from picture to picture: which side a hand is, many pictures decide, because a
