@@ -6,20 +6,7 @@
 #include <cmath>
 
 namespace posed::test {
-namespace {
-
-using tools::Finding;
 using tools::Findings;
-
-std::vector<std::string> lines_of(const Findings& findings) {
-  std::vector<std::string> lines;
-  for (const Finding& finding : findings.all()) {
-    if (finding.kind == Finding::Kind::kLine) lines.push_back(finding.text);
-  }
-  return lines;
-}
-
-}  // namespace
 
 TEST_CASE("findings are JSON in the order in which they were added", "[findings]") {
   Findings findings;
