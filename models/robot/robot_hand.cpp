@@ -546,7 +546,11 @@ void place(const RobotHand& hand, const Drive& drive, Placed& placed) noexcept {
     }
     placed.turn[l] = turn;
   }
-  std::ranges::fill(placed.shaped, 0);
+  for (std::size_t c = 0; c < placed.from_m.size(); ++c) {
+    const Capsule& capsule = hand.capsules[c];
+    placed.from_m[c] = placed.at_m[capsule.link] + placed.turn[capsule.link] * capsule.from_m;
+    placed.to_m[c] = placed.at_m[capsule.link] + placed.turn[capsule.link] * capsule.to_m;
+  }
 }
 
 void add_slope(const RobotHand& hand, const Placed& placed, int link,

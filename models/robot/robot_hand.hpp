@@ -69,12 +69,10 @@ struct Capsule {
   double reach_m = 0.0;  // radius of the ball around all of it
 };
 
-struct Ball {  // that holds all capsules of a link, in its frame, and a capsule that does, too
+struct Ball {  // that holds all capsules of a link, in its frame
   Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();
   double radius_m = -1.0;    // below zero: the link has no shape
   int first = 0, count = 0;  // its capsules
-  Eigen::Vector3d from_m = Eigen::Vector3d::Zero(), to_m = Eigen::Vector3d::Zero();
-  double thick_m = 0.0;  // that capsule's radius
 };
 
 struct Turn {  // of a link by a driven joint above it
@@ -111,11 +109,10 @@ Result<Skeleton> robot_skeleton(const RobotHand& hand);
 // All links in one pose, in the root's frame.
 struct Placed {
   explicit Placed(std::size_t links, std::size_t capsules = 0)
-      : turn(links), at_m(links), axis(links), shaped(links), from_m(capsules), to_m(capsules) {}
+      : turn(links), at_m(links), axis(links), from_m(capsules), to_m(capsules) {}
   std::vector<Eigen::Matrix3d> turn;
   std::vector<Eigen::Vector3d> at_m;
   std::vector<Eigen::Vector3d> axis;          // of the joint that carries the link
-  std::vector<char> shaped;                   // [link]: its capsules are where they belong
   std::vector<Eigen::Vector3d> from_m, to_m;  // [capsule]; none where no gap is asked for
 };
 RT_SAFE [[nodiscard]] double angle_of(const RobotJoint& joint, const Drive& drive) noexcept;

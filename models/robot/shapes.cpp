@@ -63,32 +63,6 @@ void add_shape(RobotHand& hand, int link, const Shape& shape) {
   }
 }
 
-// One capsule around all of a link's: as long as their ends are apart along each axis of the link,
-// the smallest of the three.
-void hold_all(const RobotHand& hand, Ball& ball) {
-  const auto capsules = std::span(hand.capsules).subspan(ball.first, ball.count);
-  double least = std::numeric_limits<double>::infinity();
-  for (int k = 0; k < 3; ++k) {
-    double radius_m = 0.0, low = 1e9, high = -1e9;
-    for (const Capsule& one : capsules) {
-      low = std::min({low, one.from_m[k], one.to_m[k]});
-      high = std::max({high, one.from_m[k], one.to_m[k]});
-      for (const Eigen::Vector3d& end : {one.from_m, one.to_m}) {
-        Eigen::Vector3d across = end - ball.middle_m;
-        across[k] = 0.0;
-        radius_m = std::max(radius_m, across.norm() + one.radius_m);
-      }
-    }
-    const double volume = radius_m * radius_m * (high - low + 4.0 / 3.0 * radius_m);
-    if (volume >= least) continue;
-    least = volume;
-    ball.from_m = ball.to_m = ball.middle_m;
-    ball.from_m[k] = low;
-    ball.to_m[k] = high;
-    ball.thick_m = radius_m;
-  }
-}
-
 Ball ball_around(const RobotHand& hand, int first) {
   Ball ball{.first = first, .count = static_cast<int>(hand.capsules.size()) - first};
   if (ball.count == 0) return ball;
@@ -106,7 +80,6 @@ Ball ball_around(const RobotHand& hand, int first) {
         std::max({ball.radius_m, (capsule.from_m - ball.middle_m).norm() + capsule.radius_m,
                   (capsule.to_m - ball.middle_m).norm() + capsule.radius_m});
   }
-  hold_all(hand, ball);
   return ball;
 }
 
@@ -145,21 +118,9 @@ RT_SAFE Eigen::Vector3d world(const Placed& placed, int link, const Eigen::Vecto
   return placed.at_m[link] + placed.turn[link] * m;
 }
 
-RT_SAFE void place_capsules(const RobotHand& hand, Placed& placed, int link) noexcept {
-  if (placed.shaped[link]) return;
-  placed.shaped[link] = true;
-  const Ball& all = hand.balls[link];
-  for (int c = all.first; c < all.first + all.count; ++c) {
-    placed.from_m[c] = world(placed, link, hand.capsules[c].from_m);
-    placed.to_m[c] = world(placed, link, hand.capsules[c].to_m);
-  }
-}
-
 // The least gap below `near_m`; that itself where none is.
-RT_SAFE Nearest nearest(const RobotHand& hand, Placed& placed, int a, int b,
+RT_SAFE Nearest nearest(const RobotHand& hand, const Placed& placed, int a, int b,
                         double near_m) noexcept {
-  place_capsules(hand, placed, a);
-  place_capsules(hand, placed, b);
   Nearest best{.gap_m = near_m};
   const Ball& all_a = hand.balls[a];
   const Ball& all_b = hand.balls[b];
@@ -202,15 +163,8 @@ RT_SAFE bool may_be_near(const RobotHand& hand, const Placed& placed, int a, int
   const Ball& one = hand.balls[a];
   const Ball& other = hand.balls[b];
   const double reach_m = one.radius_m + other.radius_m + near_m;
-  if ((world(placed, a, one.middle_m) - world(placed, b, other.middle_m)).squaredNorm() >=
-      reach_m * reach_m) {
-    return false;
-  }
-  const auto closest =
-      hand::closest_points(world(placed, a, one.from_m), world(placed, a, one.to_m),
-                           world(placed, b, other.from_m), world(placed, b, other.to_m));
-  const double thick_m = one.thick_m + other.thick_m + near_m;
-  return closest.apart.squaredNorm() < thick_m * thick_m;
+  return (world(placed, a, one.middle_m) - world(placed, b, other.middle_m)).squaredNorm() <
+         reach_m * reach_m;
 }
 
 }  // namespace
@@ -245,8 +199,8 @@ void add_shapes(RobotHand& hand) {
   }
 }
 
-std::span<const Gap> find_gaps(const RobotHand& hand, Placed& placed, double near_m, bool slopes,
-                               Gaps& gaps) noexcept {
+std::span<const Gap> find_gaps(const RobotHand& hand, const Placed& placed, double near_m,
+                               bool slopes, Gaps& gaps) noexcept {
   std::size_t count = 0;
   for (const auto& [a, b] : hand.pairs) {
     if (!may_be_near(hand, placed, a, b, near_m)) continue;
@@ -268,7 +222,7 @@ std::span<const Gap> find_gaps(const RobotHand& hand, Placed& placed, double nea
   return {gaps.data(), count};
 }
 
-Gap gap_between(const RobotHand& hand, Placed& placed, int a, int b) noexcept {
+Gap gap_between(const RobotHand& hand, const Placed& placed, int a, int b) noexcept {
   const Nearest at = nearest(hand, placed, a, b, std::numeric_limits<double>::infinity());
   Gap gap{.a = a, .b = b, .gap_m = at.gap_m};
   if (std::isfinite(at.gap_m)) add_slopes(hand, placed, at, gap);
