@@ -37,7 +37,7 @@ namespace posed::teach {
 
 inline constexpr double kMinWalk_s = 6.0;
 inline constexpr double kMaxWalk_s = 120.0;
-inline constexpr std::size_t kMaxWalks = 8;  // of each kind
+inline constexpr std::size_t kMaxWalks = 8;            // of each kind
 inline constexpr std::size_t kMaxKeptFrames = 57'600;  // of a kind; then no further walk
 inline constexpr double kMinShow_s = 3.0;
 inline constexpr double kMaxShow_s = 15.0;
