@@ -166,7 +166,9 @@ TEST_CASE("a finger is as long as it can reach, though its links are not in a ro
     place(hand, drive, placed);
     longest_m = std::max(longest_m, (placed.at_m[index.tip] - placed.at_m[index.knuckle]).norm());
   }
-  CHECK(index.length_m == Approx(longest_m).margin(2e-4));
+  // These poses move all joints together, so that a little may be missing.
+  CHECK(index.length_m >= longest_m - 1e-6);
+  CHECK(index.length_m <= longest_m + 1e-3);
 }
 
 TEST_CASE("capsules hold all boxes of a link") {
