@@ -5,7 +5,7 @@
 
 #include "drivers/described/packet_reader.hpp"
 #include "drivers/glove/angle_map.hpp"
-#include "proto/frame/profile_texts.hpp"
+#include "proto/frame/config_texts.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
 #include "proto/text/toml.hpp"
@@ -96,8 +96,8 @@ Result<Table> parse_device(const std::string& toml, const std::string& file) {
 
 std::vector<std::string> shipped_devices() {
   std::vector<std::string> names;
-  for (const ProfileText& text : device_texts()) {
-    if (!describes_packets(text.toml)) continue;  // an angle map for another driver
+  for (const ConfigText& text : device_texts()) {
+    if (!describes_packets(text.content)) continue;  // an angle map for another driver
     names.emplace_back(text.file.substr(0, text.file.find('.')));
   }
   return names;
@@ -107,9 +107,9 @@ Result<std::string> device_text(const std::string& device) {
   if (device.ends_with(kDeviceEnding)) {
     return load_file(device, {.what = kWhat, .max_bytes = kMaxDeviceFile});
   }
-  for (const ProfileText& text : device_texts()) {
-    if (text.file == device + ".toml" && describes_packets(text.toml))
-      return std::string(text.toml);
+  for (const ConfigText& text : device_texts()) {
+    if (text.file == device + ".toml" && describes_packets(text.content))
+      return std::string(text.content);
   }
   std::string known;
   for (const std::string& shipped : shipped_devices()) known += " " + shipped;

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "proto/frame/degree.hpp"
-#include "proto/frame/profile_texts.hpp"
+#include "proto/frame/config_texts.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/toml.hpp"
 #include "proto/text/toml_table.hpp"
@@ -53,9 +53,9 @@ void read_angles(TableReader& angles, const std::vector<Sensor>& sensors, Findin
 
 Result<Model> with_device_table(Model model, std::string_view name) {
   const std::string file = std::string(name) + ".toml";
-  for (const ProfileText& text : device_texts()) {
+  for (const ConfigText& text : device_texts()) {
     if (text.file != file) continue;
-    model.map_toml = text.toml;
+    model.map_toml = text.content;
     return model;
   }
   return fail("this posed was built without config/devices/" + file);

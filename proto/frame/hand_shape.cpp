@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "proto/frame/config_texts.hpp"
 #include "proto/frame/degree.hpp"
-#include "proto/frame/profile_texts.hpp"
 #include "proto/frame/rotation.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/toml.hpp"
@@ -84,8 +84,8 @@ Result<HandShape> parse_hand_shape(std::string_view text, const std::string& fil
 std::span<const HandShape> hand_shapes() {
   static const std::vector<HandShape> all = [] {
     std::vector<HandShape> read;
-    for (const ProfileText& text : hand_texts()) {
-      auto shape = parse_hand_shape(text.toml, std::string(text.file));
+    for (const ConfigText& text : hand_texts()) {
+      auto shape = parse_hand_shape(text.content, std::string(text.file));
       if (!shape) {  // a bug in posed: the text is built into the program
         std::fprintf(stderr, "posed: %s\n", shape.error().text().c_str());
         std::abort();

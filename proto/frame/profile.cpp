@@ -6,8 +6,8 @@
 #include <utility>
 
 #include "proto/frame/axes_text.hpp"
+#include "proto/frame/config_texts.hpp"
 #include "proto/frame/degree.hpp"
-#include "proto/frame/profile_texts.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
 #include "proto/text/toml.hpp"
@@ -117,8 +117,8 @@ Result<std::string> load_profile_text(const std::string& file) {
 std::span<const Profile> profiles() {
   static const std::vector<Profile> all = [] {
     std::vector<Profile> read;
-    for (const ProfileText& text : profile_texts()) {
-      auto profile = parse_profile(text.toml, std::string(text.file));
+    for (const ConfigText& text : profile_texts()) {
+      auto profile = parse_profile(text.content, std::string(text.file));
       if (!profile) {  // a bug in posed: the text is built into the program
         std::fprintf(stderr, "posed: %s\n", profile.error().text().c_str());
         std::abort();

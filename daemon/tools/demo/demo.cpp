@@ -35,14 +35,14 @@
 #include "daemon/tools/style/train_style.hpp"
 #include "daemon/tools/view/bridge.hpp"
 #include "models/gesture/camera_takes.hpp"
-#include "proto/frame/profile_texts.hpp"
+#include "proto/frame/config_texts.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/log/digest.hpp"
 #include "proto/text/load_file.hpp"
 
 namespace posed {
-std::span<const ProfileText> config_texts();  // config/*.toml, which CMake writes
+std::span<const ConfigText> config_texts();  // config/*.toml, which CMake writes
 }
 
 namespace posed::tools {
@@ -106,12 +106,12 @@ std::string stamp_of(const fs::path& folder) {
 }
 
 std::string config_text() {
-  for (const ProfileText& text : config_texts()) {
+  for (const ConfigText& text : config_texts()) {
     if (text.file != kDemoConfig) continue;
     std::string toml =
         "# `posed demo` writes this file, and again when it makes new models: copy it "
         "before you change it.\n" +
-        std::string(text.toml);
+        std::string(text.content);
     constexpr std::string_view kInSourceTree = "../build/demo/";
     // The folder itself, of models: an empty text would name none.
     const std::string whole = "\"" + std::string(kInSourceTree) + "\"";

@@ -1,7 +1,7 @@
 // Films of hands that nobody has photographed, with their true angles: the hand of
 // rendered_hand.mjs in other shapes, sizes, colours, lights and views, drawn fast. With them the
-// takes of models/gesture/camera_takes.cpp (mode signs, seeds 1 to 3, 4 with wildness 0, 21 to 26)
-// and those of tests/golden/camera (seeds 201, 203, 204, 205) were made.
+// takes of config/camera (mode signs, seeds 1 to 3, 4 with wildness 0, 21 to 26) and those of
+// tests/golden/camera (seeds 201, 203, 204, 205) were made.
 //
 //   g++ -O3 -ffast-math -std=c++20 drawn_hands.cpp -o drawn_hands
 //   ./drawn_hands signs|random SEED PICTURES OUT [WILDNESS]   OUT.rgba, OUT.truth: ten a second

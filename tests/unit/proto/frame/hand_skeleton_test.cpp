@@ -5,7 +5,7 @@
 
 #include "proto/frame/degree.hpp"
 #include "proto/frame/hand_skeleton.hpp"
-#include "proto/frame/profile_texts.hpp"
+#include "proto/frame/config_texts.hpp"
 #include "tests/support/allocations.hpp"
 
 namespace posed {
@@ -224,7 +224,7 @@ TEST_CASE("every built-in hand is valid, and an invalid one is refused with its 
   CHECK(error("").starts_with("h.toml:1: name is missing"));
   CHECK(error("name = \"h\"\n") == "h.toml:1: thumb is missing; a hand has five fingers");
   const auto changed = [&](const std::string& from, const std::string& to) {
-    std::string text(hand_texts()[0].toml);
+    std::string text(hand_texts()[0].content);
     const std::size_t at = text.find(from);
     REQUIRE(at != std::string::npos);
     return error(text.replace(at, from.size(), to));
