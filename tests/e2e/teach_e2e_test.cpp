@@ -166,7 +166,7 @@ TEST_CASE("a style is taught on the stage, and the log replays it bit for bit", 
   const auto bad =
       stage.ctl({"teach", name, "--name", "../sway", "--neutral", "0", "--style", "0"});
   CHECK(bad.code == 1);
-  CHECK(has(bad.err, "cannot be a style's name"));
+  CHECK(has(bad.err, "cannot be the name of a style"));
 
   Process lesson({"ctl", "--connect", stage.control, "teach", name, "--name", "sway", "--neutral",
                   "6", "--style", "6"});

@@ -11,6 +11,7 @@
 #include "models/gesture/camera_takes.hpp"
 #include "models/gesture/train.hpp"
 #include "tests/support/live_hand.hpp"
+#include "tests/support/shared.hpp"
 
 namespace posed::test {
 namespace {
@@ -29,7 +30,7 @@ struct TrackedTake {
 TrackedTake tracked_take(int number) {
   constexpr std::array<int, 19> kAngle{2,  3,  6,  1,  9,  12, 15, 10, 18, 21,
                                        24, 27, 30, 33, 28, 36, 39, 42, 37};
-  std::ifstream file("tests/golden/camera/judge_" + std::to_string(number) + ".txt");
+  std::ifstream file(golden("camera/judge_" + std::to_string(number) + ".txt"));
   std::vector<Eigen::RowVectorXd> rows;
   TrackedTake take;
   for (std::string line; std::getline(file, line);) {
