@@ -21,7 +21,7 @@ export class SignLesson extends Lesson {
     });
     this.begin = el('button', { type: 'button', onclick: () => this.#begin() });
     this.verdict = el('p.note');
-    this.signs = el('div.chips', { aria: { label: 'Signs that were shown' } });
+    this.signs = el('div.chips', { role: 'group', aria: { label: 'Signs that were shown' } });
     this.fold(
       el(
         'p.note',

@@ -127,7 +127,7 @@ test(
     await acknowledged(page, 'model walk-to-sneak.style: applied');
     await page.locator('.stream', { hasText: 'hand' }).click();
     await page.getByLabel('Gestures to perform').fill('g 1 c 3 4 p');
-    await page.getByRole('button', { name: 'Play' }).click();
+    await page.getByRole('button', { name: 'Play', exact: true }).click();
     await acknowledged(page, 'performs g 1 c 3 4 p: applied');
     await page.locator('.name-tag', { hasText: 'performs' }).waitFor(PATIENCE);
 
