@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "proto/frame/degree.hpp"
 #include "proto/frame/config_texts.hpp"
+#include "proto/frame/degree.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/toml.hpp"
 #include "proto/text/toml_table.hpp"

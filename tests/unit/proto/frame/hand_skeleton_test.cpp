@@ -3,9 +3,9 @@
 #include <array>
 #include <limits>
 
+#include "proto/frame/config_texts.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/hand_skeleton.hpp"
-#include "proto/frame/config_texts.hpp"
 #include "tests/support/allocations.hpp"
 
 namespace posed {
