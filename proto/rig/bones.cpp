@@ -4,6 +4,7 @@
 #include <array>
 #include <map>
 #include <string_view>
+#include <utility>
 
 namespace posed::rig {
 namespace {
@@ -195,6 +196,14 @@ Bone on(Side side, Bone left) {
   return static_cast<Bone>(static_cast<std::size_t>(left) + step);
 }
 
+void BoneJoints::swap_sides(Bone first_left, int count) {
+  for (int i = 0; i < count; ++i) {
+    const auto left = static_cast<Bone>(static_cast<int>(first_left) + i);
+    const Bone right = on(Side::kRight, left);
+    std::swap(joint_[static_cast<std::size_t>(left)], joint_[static_cast<std::size_t>(right)]);
+  }
+}
+
 bool BoneJoints::has_limbs() const {
   return std::ranges::all_of(kSides, [this](Side side) {
     return has(on(side, Bone::kLeftUpperLeg)) && has(on(side, Bone::kLeftLowerLeg)) &&
@@ -289,12 +298,7 @@ bool turn_to_face(const Vec& facing, const Figure& figure, BoneJoints& bones) {
   for (const auto& [first, count] : {std::pair{Bone::kLeftShoulder, 4},
                                      {Bone::kLeftUpperLeg, 4},
                                      {Bone::kLeftThumbMetacarpal, kFingerBones}}) {
-    for (int i = 0; i < count; ++i) {
-      const auto bone = static_cast<Bone>(static_cast<int>(first) + i);
-      const int joint = bones[bone];
-      bones.set(bone, bones[on(Side::kRight, bone)]);
-      bones.set(on(Side::kRight, bone), joint);
-    }
+    bones.swap_sides(first, count);
   }
   return true;
 }

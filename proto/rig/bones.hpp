@@ -25,6 +25,8 @@ class BoneJoints {
   [[nodiscard]] int operator[](Bone bone) const { return joint_[static_cast<std::size_t>(bone)]; }
   [[nodiscard]] bool has(Bone bone) const { return (*this)[bone] >= 0; }
   void set(Bone bone, int joint) { joint_[static_cast<std::size_t>(bone)] = joint; }
+  // Of `count` bones from a left one on, with their right counterparts.
+  void swap_sides(Bone first_left, int count);
   [[nodiscard]] bool has_limbs() const;  // both sides' upper and lower arms and legs
   [[nodiscard]] std::vector<std::optional<Bone>> by_joint(int joints) const;
 

@@ -110,6 +110,9 @@ void settle_facing(const RigInput& input, const Figure& figure, FoundBones& foun
       found.notes.emplace_back("left and right are not as the names say, so that it faces " +
                                std::string(axis_text(*input.facing)));
     }
+  } else if (found.sides_by == SidesBy::kFeet) {
+    found.notes.emplace_back(
+        "bones are known by shape only; left and right by the direction of the feet");
   } else if (found.sides_by == SidesBy::kNothing) {
     found.notes.emplace_back(
         "which side is left is not known: neither the names nor the feet say it; say which axis "

@@ -106,14 +106,6 @@ bool sides_are_right(const std::vector<JointName>& names, const BoneJoints& bone
   return line.dot(left) >= 0.0;
 }
 
-void swap_sides(BoneJoints& bones, const std::array<Bone, 4>& limb) {
-  for (const Bone bone : limb) {
-    const int left = bones[bone];
-    bones.set(bone, bones[on(Side::kRight, bone)]);
-    bones.set(on(Side::kRight, bone), left);
-  }
-}
-
 void settle_sides(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones,
                   SidesBy& sides_by) {
   std::vector<int> all;
@@ -140,7 +132,9 @@ void settle_sides(const Figure& figure, const std::vector<JointName>& names, Bon
     const auto& limb = arm ? kArm : kLeg;
     const Bone first = arm ? Bone::kLeftUpperArm : Bone::kLeftLowerLeg;
     const Vec line = at(Side::kLeft, first) - at(Side::kRight, first);
-    if (!sides_are_right(names, bones, limb, line, left, sure, sides_by)) swap_sides(bones, limb);
+    if (!sides_are_right(names, bones, limb, line, left, sure, sides_by)) {
+      bones.swap_sides(limb.front(), static_cast<int>(limb.size()));
+    }
   }
 }
 
