@@ -1,7 +1,6 @@
 #include "proto/clip/gltf.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <limits>
 #include <ostream>
@@ -15,6 +14,7 @@
 
 #include "proto/clip/draft.hpp"
 #include "proto/clip/formats.hpp"
+#include "proto/clip/gltf_numbers.hpp"
 #include "proto/clip/mannequin.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
@@ -23,11 +23,6 @@ namespace posed::clip {
 namespace {
 
 constexpr std::size_t kMaxBytes = std::numeric_limits<std::uint32_t>::max() / 2;
-
-template <typename Number>
-constexpr int kComponent = TINYGLTF_COMPONENT_TYPE_FLOAT;
-template <>
-constexpr int kComponent<std::uint16_t> = TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT;
 
 // Fills a tinygltf model: all numbers go into one buffer, which becomes the binary part of the
 // file.
@@ -51,41 +46,6 @@ class ModelBuilder {
   }
 
  private:
-  // Returns the number of the accessor. glTF wants the bounds of times and places.
-  template <typename Number>
-  int add_numbers(const std::vector<Number>& values, int type, bool bounds = false) {
-    auto& data = model_.buffers.front().data;
-    tinygltf::BufferView view;
-    view.buffer = 0;
-    view.byteOffset = data.size();
-    view.byteLength = values.size() * sizeof(Number);
-    static_assert(std::endian::native == std::endian::little, "glTF's numbers are little-endian");
-    const auto bytes = std::as_bytes(std::span(values));
-    for (const std::byte byte : bytes) data.push_back(static_cast<unsigned char>(byte));
-    data.resize((data.size() + 3) / 4 * 4);  // the next numbers may be floats
-    model_.bufferViews.push_back(std::move(view));
-    tinygltf::Accessor accessor;
-    accessor.bufferView = static_cast<int>(model_.bufferViews.size()) - 1;
-    accessor.componentType = kComponent<Number>;
-    accessor.type = type;
-    const auto parts = static_cast<std::size_t>(
-        tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(type)));
-    accessor.count = values.size() / parts;
-    if (bounds) {
-      accessor.minValues.assign(values.begin(),
-                                values.begin() + static_cast<std::ptrdiff_t>(parts));
-      accessor.maxValues = accessor.minValues;
-      for (std::size_t i = parts; i < values.size(); ++i) {
-        double& least = accessor.minValues[i % parts];
-        double& most = accessor.maxValues[i % parts];
-        least = std::min<double>(least, values[i]);
-        most = std::max<double>(most, values[i]);
-      }
-    }
-    model_.accessors.push_back(std::move(accessor));
-    return static_cast<int>(model_.accessors.size()) - 1;
-  }
-
   void add_nodes() {
     for (const GltfNode& from : motion_.nodes) {
       tinygltf::Node node;
@@ -102,30 +62,17 @@ class ModelBuilder {
     model_.defaultScene = 0;
   }
 
-  void add_track(tinygltf::Animation& animation, int times, int node, const char* path,
-                 const std::vector<float>& values, int type) {
-    if (values.empty()) return;
-    tinygltf::AnimationSampler sampler;
-    sampler.input = times;
-    sampler.output = add_numbers(values, type);
-    sampler.interpolation = "LINEAR";
-    tinygltf::AnimationChannel channel;
-    channel.sampler = static_cast<int>(animation.samplers.size());
-    channel.target_node = node;
-    channel.target_path = path;
-    animation.samplers.push_back(std::move(sampler));
-    animation.channels.push_back(std::move(channel));
-  }
-
   void add_animation() {
     tinygltf::Animation animation;
     animation.name = clean(motion_.name);
-    const int times = add_numbers(motion_.time_s, TINYGLTF_TYPE_SCALAR, true);
+    const int times = add_accessor(model_, motion_.time_s, TINYGLTF_TYPE_SCALAR, true);
     for (std::size_t i = 0; i < motion_.nodes.size(); ++i) {
       const GltfNode& node = motion_.nodes[i];
       const int index = static_cast<int>(i);
-      add_track(animation, times, index, "translation", node.position_m, TINYGLTF_TYPE_VEC3);
-      add_track(animation, times, index, "rotation", node.rotation_xyzw, TINYGLTF_TYPE_VEC4);
+      add_track(model_, animation, times, index, "translation", node.position_m,
+                TINYGLTF_TYPE_VEC3);
+      add_track(model_, animation, times, index, "rotation", node.rotation_xyzw,
+                TINYGLTF_TYPE_VEC4);
     }
     // glTF does not allow an animation of nothing: a figure without channels stands still.
     if (!animation.channels.empty()) model_.animations.push_back(std::move(animation));
@@ -149,7 +96,7 @@ class ModelBuilder {
             -static_cast<float>(place_m.back()[i]);
       }
     }
-    skin.inverseBindMatrices = add_numbers(matrices, TINYGLTF_TYPE_MAT4);
+    skin.inverseBindMatrices = add_accessor(model_, matrices, TINYGLTF_TYPE_MAT4);
     model_.skins.push_back(std::move(skin));
   }
 
@@ -166,11 +113,12 @@ class ModelBuilder {
     }
     tinygltf::Primitive triangles;
     triangles.mode = TINYGLTF_MODE_TRIANGLES;
-    triangles.attributes = {{"POSITION", add_numbers(body.position_m, TINYGLTF_TYPE_VEC3, true)},
-                            {"NORMAL", add_numbers(body.normal, TINYGLTF_TYPE_VEC3)},
-                            {"JOINTS_0", add_numbers(joints, TINYGLTF_TYPE_VEC4)},
-                            {"WEIGHTS_0", add_numbers(weights, TINYGLTF_TYPE_VEC4)}};
-    triangles.indices = add_numbers(body.corner, TINYGLTF_TYPE_SCALAR);
+    triangles.attributes = {
+        {"POSITION", add_accessor(model_, body.position_m, TINYGLTF_TYPE_VEC3, true)},
+        {"NORMAL", add_accessor(model_, body.normal, TINYGLTF_TYPE_VEC3)},
+        {"JOINTS_0", add_accessor(model_, joints, TINYGLTF_TYPE_VEC4)},
+        {"WEIGHTS_0", add_accessor(model_, weights, TINYGLTF_TYPE_VEC4)}};
+    triangles.indices = add_accessor(model_, body.corner, TINYGLTF_TYPE_SCALAR);
     triangles.material = 0;
     tinygltf::Material skin;
     skin.name = "mannequin";

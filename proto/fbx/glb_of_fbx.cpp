@@ -21,6 +21,7 @@
 #include <Eigen/Geometry>
 #include <assimp/Importer.hpp>
 
+#include "proto/clip/gltf_numbers.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::fbx {
@@ -288,11 +289,8 @@ class Builder {
   }
 
  private:
-  int add_numbers(const std::vector<float>& values, int type, std::size_t parts);
   void add_nodes();
   Result<> add_animation(const aiAnimation& animation);
-  void add_track(tinygltf::Animation& animation, int times, int node, const char* path,
-                 const std::vector<float>& values, std::size_t parts);
   void add_skin();
   [[nodiscard]] std::map<std::string, int> numbers_of_names() const;
   [[nodiscard]] std::vector<std::optional<Eigen::Matrix4d>> bound(
@@ -304,24 +302,6 @@ class Builder {
   std::set<int> animated_;
   tinygltf::Model model_;
 };
-
-int Builder::add_numbers(const std::vector<float>& values, int type, std::size_t parts) {
-  auto& data = model_.buffers.front().data;
-  tinygltf::BufferView view;
-  view.buffer = 0;
-  view.byteOffset = data.size();
-  view.byteLength = values.size() * sizeof(float);
-  data.resize(view.byteOffset + view.byteLength);
-  std::memcpy(data.data() + view.byteOffset, values.data(), view.byteLength);
-  model_.bufferViews.push_back(std::move(view));
-  tinygltf::Accessor accessor;
-  accessor.bufferView = static_cast<int>(model_.bufferViews.size()) - 1;
-  accessor.componentType = TINYGLTF_COMPONENT_TYPE_FLOAT;
-  accessor.type = type;
-  accessor.count = values.size() / parts;
-  model_.accessors.push_back(std::move(accessor));
-  return static_cast<int>(model_.accessors.size()) - 1;
-}
 
 std::map<std::string, int> Builder::numbers_of_names() const {
   std::map<std::string, int> numbers;
@@ -386,19 +366,6 @@ void Builder::add_nodes() {
   }
 }
 
-void Builder::add_track(tinygltf::Animation& animation, int times, int node, const char* path,
-                        const std::vector<float>& values, std::size_t parts) {
-  tinygltf::AnimationSampler sampler;
-  sampler.input = times;
-  sampler.output = add_numbers(values, parts == 4 ? TINYGLTF_TYPE_VEC4 : TINYGLTF_TYPE_VEC3, parts);
-  tinygltf::AnimationChannel channel;
-  channel.sampler = static_cast<int>(animation.samplers.size());
-  channel.target_node = node;
-  channel.target_path = path;
-  animation.samplers.push_back(std::move(sampler));
-  animation.channels.push_back(std::move(channel));
-}
-
 Result<> Builder::add_animation(const aiAnimation& from) {
   const Channels channels = channels_of(from);
   const auto ticks = TRY(ticks_of(from));
@@ -418,7 +385,7 @@ Result<> Builder::add_animation(const aiAnimation& from) {
   if (moving.size() * ticks.size() > kMaxNumbers / 7) {
     return fail("its animation is longer than a clip can be; cut it");
   }
-  const int times = add_numbers(time_s, TINYGLTF_TYPE_SCALAR, 1);
+  const int times = clip::add_accessor(model_, time_s, TINYGLTF_TYPE_SCALAR);
   for (const int n : moving) {
     std::vector<float> places, turns;
     Eigen::Quaterniond before = Eigen::Quaterniond::Identity();
@@ -431,8 +398,8 @@ Result<> Builder::add_animation(const aiAnimation& from) {
       for (const double x : place) places.push_back(static_cast<float>(x));
       for (const double x : turn.coeffs()) turns.push_back(static_cast<float>(x));
     }
-    add_track(animation, times, n, "translation", places, 3);
-    add_track(animation, times, n, "rotation", turns, 4);
+    clip::add_track(model_, animation, times, n, "translation", places, TINYGLTF_TYPE_VEC3);
+    clip::add_track(model_, animation, times, n, "rotation", turns, TINYGLTF_TYPE_VEC4);
   }
   animated_.merge(moving);
   model_.animations.push_back(std::move(animation));
