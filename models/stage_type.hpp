@@ -115,6 +115,8 @@ struct StageType {
   // A stage with a model; all null for one without.
   bool model_required = false;
   bool (*takes)(const v1::ModelFile& file) = nullptr;  // whether the file is for this stage
+  // Streams of one skeleton and rate may share what is bound, so it depends on nothing else of the
+  // context.
   Result<std::unique_ptr<const StageModel>> (*bind_model)(std::span<const std::byte> file,
                                                           const StageContext& context,
                                                           const std::string& name) = nullptr;

@@ -57,7 +57,7 @@ struct ControlledStream {
   pipeline::StreamSettings settings{};       // with the stages
   // The models in use, one for each stage, null while there is none. The cold side owns every
   // model; the pipeline only borrows it.
-  std::vector<std::unique_ptr<const StageModel>> models{};
+  std::vector<std::shared_ptr<const StageModel>> models{};
   // The device that calibrations must fit.
   std::shared_ptr<devices::PresentDevice> device = std::make_shared<devices::PresentDevice>();
   drivers::Options options;  // of its driver
@@ -165,7 +165,7 @@ class RequestHandler {
     std::uint32_t stream = 0;
     std::string name{};  // of the stream, for when it has left
     std::size_t stage = 0;
-    std::unique_ptr<const StageModel> model{};  // the stage's new model, of this file:
+    std::shared_ptr<const StageModel> model{};  // the stage's new model, of this file:
     ModelFile file{};
     std::string_view refusal{};  // of a command: what the stage's refusal means
     std::optional<NewValue> value{};

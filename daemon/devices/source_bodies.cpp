@@ -320,7 +320,7 @@ Result<> SourceBodies::make_engine_of(NewStream& stream) const {
   auto stages = TRY(load_stages(stream.config, stream.body.skeleton, rate_hz, shared_.models,
                                 shared_.partners, &shared_.kept));
   stream.stages = std::move(stages);
-  auto bound = TRY(bind_stages(stream.stages));
+  auto bound = TRY(bind_stages(stream.stages, shared_.models));
   stream.bound = std::move(bound);
   auto engine = TRY(make_engine(stream.id, stream.stages, stream.bound));
   stream.engine = std::move(engine);

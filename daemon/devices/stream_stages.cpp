@@ -135,7 +135,7 @@ std::vector<const StageModel*> BoundStages::borrowed() const {
   return pointers;
 }
 
-Result<BoundStages> bind_stages(LoadedStages& stages) {
+Result<BoundStages> bind_stages(LoadedStages& stages, ModelFiles& files) {
   BoundStages bound;
   for (std::size_t i = 0; i < stages.settings.stages.size(); ++i) {
     pipeline::StageSettings& stage = stages.settings.stages[i];
@@ -144,7 +144,7 @@ Result<BoundStages> bind_stages(LoadedStages& stages) {
     if (stages.skeleton && stages.model_files[i]) {
       file = std::as_bytes(std::span(*stages.model_files[i]));
       const auto context = TRY(pipeline::stage_context(stages.settings, i, stages.skeleton));
-      model = TRY(stage.type->bind_model(file, context, stage.model_name));
+      model = TRY(files.bind(*stage.type, stages.model_files[i], context, stage.model_name));
       stage.model_words = model->words;
       if (stages.with_set_model.contains(stage.type)) forget_texts(*model, stage);
     }

@@ -55,14 +55,14 @@ void forget_texts(const StageModel& model, pipeline::StageSettings& settings);
 // What the stages of a stream start with.
 struct BoundStages {
   // One for each stage, bound to the stream's skeleton and rate; null for a stage without a model.
-  std::vector<std::unique_ptr<const StageModel>> models;
+  std::vector<std::shared_ptr<const StageModel>> models;
   // What the stages do from the start on; without stream and ticket.
   std::vector<pipeline::Command> first_commands;
 
   [[nodiscard]] std::vector<const StageModel*> borrowed() const;
 };
 // Checks and binds the models, and fills in the words that they know.
-Result<BoundStages> bind_stages(LoadedStages& stages);
+Result<BoundStages> bind_stages(LoadedStages& stages, ModelFiles& files);
 
 // The engine of the stream with this id, untimed. `bound` outlives it.
 Result<pipeline::EngineOptions> make_engine(std::uint32_t stream, const LoadedStages& stages,

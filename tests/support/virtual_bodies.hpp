@@ -92,7 +92,7 @@ class VirtualBodies final : public devices::StreamHost {
   struct Stream {
     VirtualBody about;
     PublishedStream published;
-    std::vector<std::unique_ptr<const StageModel>> models;
+    std::vector<std::shared_ptr<const StageModel>> models;
     std::unique_ptr<pipeline::StreamContext> context{};  // null for a refused body
   };
   void open_only(VirtualStreamContext& context);

@@ -79,7 +79,7 @@ Result<Findings> try_stream(const config::StreamConfig& config,
       .about = {.skeleton = stages->published, .rate_hz = stages->settings.rate_hz}};
   const auto missing = devices::try_kept_device(*source);
   if (!missing) return devices::in_stream(config.name, missing.error());
-  const auto bound = devices::bind_stages(*stages);
+  const auto bound = devices::bind_stages(*stages, files);
   if (!bound) return devices::in_stream(config.name, bound.error());
   const auto engine = devices::make_engine(0, *stages, *bound);
   if (!engine) return devices::in_stream(config.name, engine.error());

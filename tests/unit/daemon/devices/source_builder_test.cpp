@@ -110,10 +110,11 @@ class Room final : private StreamHost {
   }
 
   KeptSettings kept;
-  std::map<std::uint32_t, std::string> running;                // names by stream
-  std::map<std::uint32_t, pipeline::StreamSettings> settings;  // of all that ran
-  std::map<std::uint32_t, std::string> refused;                // sentences by stream
-  const pipeline::SourceUpdate* update = nullptr;              // of the room
+  std::map<std::uint32_t, std::string> running;                     // names by stream
+  std::map<std::uint32_t, pipeline::StreamSettings> settings;       // of all that ran
+  std::map<std::uint32_t, std::string> refused;                     // sentences by stream
+  std::map<std::uint32_t, std::weak_ptr<const StageModel>> models;  // of their first stage
+  const pipeline::SourceUpdate* update = nullptr;                   // of the room
   std::vector<std::string> warnings;
   int alive = 0;                // signs of life
   std::set<int> alive_at_adds;  // as many as there had been when each stream was added
@@ -143,6 +144,9 @@ class Room final : private StreamHost {
     ++adds;
     if (stream.engine) running[stream.id] = stream.config.name;
     settings[stream.id] = stream.stages.settings;
+    if (!stream.bound.models.empty()) {
+      models[stream.id] = bound_[stream.id] = stream.bound.models.front();
+    }
     source_of_[stream.id] = stream.source.number;
     if (!stream.engine) refused[stream.id] = stream.refusal;
     if (stop_at > 0 && running.size() == stop_at) builder_->stop();
@@ -155,6 +159,7 @@ class Room final : private StreamHost {
   }
   void remove(std::uint32_t stream) override {
     CHECK(running.erase(stream) + refused.erase(stream) == 1);
+    bound_.erase(stream);
   }
   void call_reader() override {}
   void warn(const OpenSource&, const std::string& sentence) override {
@@ -164,6 +169,7 @@ class Room final : private StreamHost {
   std::unique_ptr<system::EventFd> wake_ = system::EventFd::open().value();
   std::vector<std::unique_ptr<OpenSource>> sources_;
   std::map<std::uint32_t, std::uint32_t> source_of_;  // by stream
+  std::map<std::uint32_t, std::shared_ptr<const StageModel>> bound_;
   std::array<pipeline::StreamCounters, 16> counters_;
   std::vector<std::uint32_t> gone_;
   ModelFiles models_;
@@ -431,6 +437,35 @@ TEST_CASE(
   REQUIRE(room.id_of("room-ann") != pipeline::kNoStream);
   CHECK(parameter<double>(room.settings[room.id_of("room-ann")].stages[0].parameters, "alpha") ==
         0.25);
+}
+
+TEST_CASE("a model is bound once for all who come with one skeleton") {
+  const StageType& style = style::style_type();
+  const test::TempFolder folder;
+  config::SourceConfig config;
+  config.every.stages.push_back(
+      {.type = &style,
+       .parameters = complete_parameters(style.parameters, {}).value(),
+       .model = folder.write("sway.style", style::serialize_model(test::toy_model(1)))});
+  Room room(3, std::move(config));
+  std::vector<std::pair<std::string, int>> joints;
+  for (const Joint& joint : test::toy_skeleton().joints) {
+    joints.emplace_back(joint.name, joint.parent);
+  }
+  const BodyEntry ann = with_joints(1, "Ann", joints), bob = with_joints(2, "Bob", joints);
+  BodyEntry tall = with_joints(3, "Cay", joints);
+  tall.joints[1].offset_m = {0.2F, 0.0F, 0.0F};
+  room.describe({ann, bob, tall});
+  REQUIRE(room.running.size() == 3);
+  const auto model_of = [&](const std::string& name) {
+    const auto model = room.models.at(room.id_of(name)).lock();
+    REQUIRE(model);
+    return model.get();
+  };
+  CHECK(model_of("room-ann") == model_of("room-bob"));
+  CHECK(model_of("room-cay") != model_of("room-bob"));
+  room.describe({bob, tall});
+  CHECK(model_of("room-bob") != nullptr);
 }
 
 TEST_CASE("names of bodies are plain, short and not those of other streams") {
