@@ -65,10 +65,13 @@ RT_SAFE void read_side(JsonReader& json, TrackedHand& hand, bool& sided) noexcep
 RT_SAFE void read_hand(JsonReader& json, TrackedHand& hand) noexcept {
   bool whole = false, sided = false;
   hand.score = 1.0;
+  hand.sure = false;
   if (json.enter_object()) {
     for (std::string_view key; json.next(key);) {
       if (key == "side") {
         read_side(json, hand, sided);
+      } else if (key == "sure") {
+        if (!json.boolean(hand.sure)) hand.sure = false;
       } else if (key == "score") {
         hand.score = number_or(json, kNone);
       } else if (key == "points") {
@@ -88,7 +91,7 @@ RT_SAFE void read_hand(JsonReader& json, TrackedHand& hand) noexcept {
   }
 }
 
-// False when there are more than two, or two of a side.
+// False when there are more than two, or two that are surely of one side.
 RT_SAFE bool read_hands(JsonReader& json, Message& message) noexcept {
   if (!json.enter_array()) return true;
   while (json.next()) {
@@ -97,7 +100,7 @@ RT_SAFE bool read_hands(JsonReader& json, Message& message) noexcept {
   }
   const auto& [first, second] = message.hands;
   return message.count < kMaxHands || first.outcome != Outcome::kOk ||
-         second.outcome != Outcome::kOk || first.side != second.side;
+         second.outcome != Outcome::kOk || !first.sure || !second.sure || first.side != second.side;
 }
 
 // What the members besides the hands say.
@@ -116,6 +119,8 @@ RT_SAFE void read_member(JsonReader& json, std::string_view key, Head& head,
     head.version = number_or(json, 0.0);
   } else if (key == "time_ns") {
     message.time_s = number_or(json, kNone) * 1e-9;
+  } else if (key == "end") {
+    if (!json.boolean(message.end)) message.end = false;
   } else if (key == "hands") {
     head.in_range = read_hands(json, message) && head.in_range;
   } else {
@@ -130,6 +135,7 @@ RT_SAFE Outcome read_message(std::string_view json, Message& message) noexcept {
   JsonReader reader(json);
   message.time_s = kNone;
   message.count = 0;
+  message.end = false;
   Head head;
   if (!reader.enter_object()) return Outcome::kForeign;
   for (std::string_view key; head.in_range && reader.next(key);) {
@@ -143,12 +149,14 @@ RT_SAFE Outcome read_message(std::string_view json, Message& message) noexcept {
 
 std::string write_message(const Message& message) {
   std::string text = R"({"posed":"landmarks","version":1,"time_ns":)" +
-                     std::to_string(std::llround(message.time_s * 1e9)) + ",\"hands\":[";
+                     std::to_string(std::llround(message.time_s * 1e9)) +
+                     (message.end ? R"(,"end":true)" : "") + R"(,"hands":[)";
   for (std::size_t i = 0; i < message.count; ++i) {
     const TrackedHand& hand = message.hands[i];
     text += std::string(i == 0 ? "" : ",") + R"({"side":")" +
-            (hand.side == Side::kLeft ? "left" : "right") + R"(","score":)" +
-            clip::number_text(hand.score) + R"(,"points":[)";
+            (hand.side == Side::kLeft ? "left" : "right") + '"' +
+            (hand.sure ? R"(,"sure":true)" : "") + R"(,"score":)" + clip::number_text(hand.score) +
+            R"(,"points":[)";
     for (std::size_t k = 0; k < 3 * kLandmarks; ++k) {
       const double x_m = static_cast<double>(hand.point_m[k / 3][k % 3]);
       text += (k == 0 ? "" : ",") + clip::number_text(std::round(x_m * 1e7) * 1e-7);

@@ -314,9 +314,13 @@ std::string body_row(const v1::StreamStats& stream) {
   return text + (text.empty() ? "" : ": ") + clean(stream.refusal());
 }
 
+// What feeds it is switched on by whoever likes, so silence is no fault.
+bool is_camera(const v1::SourceStats& source) { return source.driver() == "landmarks"; }
+
 // Why nothing comes of a device with several bodies.
 std::string without_body(const v1::SourceStats& source) {
   if (source.away()) return "the device is away";
+  if (is_camera(source)) return "no hand: its camera is off, or sees none";
   std::string text = "no body is streamed";
   const auto count = [&](Outcome outcome) {
     const int i = static_cast<int>(outcome);
@@ -333,6 +337,8 @@ std::string without_body(const v1::SourceStats& source) {
 // A line below the streams' rows about a device with several bodies; empty if there is nothing to
 // report.
 std::string source_row(const v1::SourceStats& source) {
+  const bool silent = std::ranges::all_of(source.outcome(), [](auto count) { return count == 0; });
+  if (is_camera(source) && silent) return {};  // nobody has asked for it
   std::string text = source.streams() == 0 ? without_body(source) : "";
   const std::string dropped = kernel_words(source.kernel_dropped());
   if (!text.empty() && !dropped.empty()) text += ", ";
@@ -403,7 +409,8 @@ std::vector<std::string> rows_below(const v1::Stats& stats, const LiveViewOption
   }
   for (const v1::SourceStats& source : stats.source()) {
     const std::string text = source_row(source);
-    if (!text.empty()) add(kYellow, clean_name(source.name()) + ": " + text);
+    const bool fault = !is_camera(source) || source.streams() > 0;
+    if (!text.empty()) add(fault ? kYellow : "", clean_name(source.name()) + ": " + text);
   }
   for (const v1::StreamStats& stream : stats.stream()) {
     const bool only_wrong = !options.chosen.empty() && stream.stream() != options.chosen;

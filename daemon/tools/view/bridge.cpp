@@ -191,7 +191,9 @@ class Bridge::Parts {
             [this](std::uint64_t ticket, std::string_view request) {
               return link_->ask(ticket, request);
             },
-            [this](std::string_view json) { return hands_.send(json); }),
+            [this](std::string_view source, std::string_view json) {
+              return hands_.send(source, json);
+            }),
         room_(std::move(site), hub_),
         timer_(io_) {}
 

@@ -9,6 +9,8 @@
 #include <nlohmann/json.hpp>
 
 #include "drivers/landmarks/protocol.hpp"
+#include "posed/v1/posed.pb.h"
+#include "proto/message/bounded_parse.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::view {
@@ -47,6 +49,19 @@ std::string refusal_of(const v1::ControlRequest& request) {
 }  // namespace
 
 namespace {
+
+// A page that is closed or has stopped its camera says nothing more.
+constexpr std::string_view kCameraEnds =
+    R"({"posed":"landmarks","version":1,"end":true,"hands":[]})";
+constexpr std::int64_t kCameraSilent_ns = 2 * kNanosPerSecond;
+
+// The identity of the first source for hands of any tracker.
+std::string hands_source_of(std::string_view stats) {
+  v1::Stats message;
+  if (!message::parse_bounded(message, std::as_bytes(std::span(stats)))) return {};
+  const auto found = std::ranges::find(message.source(), "landmarks", &v1::SourceStats::driver);
+  return found == message.source().end() ? std::string() : found->identity();
+}
 
 // Empty for what is no sound message of a hand tracker that tells the time.
 std::string checked_landmarks(std::string_view text) {
@@ -181,7 +196,7 @@ void Hub::join(Tab& tab) {
 void Hub::leave(Tab& tab) {
   tabs_.erase(&tab);
   if (uploader_ == &tab) uploader_ = nullptr;
-  if (camera_ == &tab) camera_ = nullptr;
+  if (camera_ == &tab) end_camera();
   std::erase_if(under_way_, [&](const auto& entry) { return entry.second.tab == &tab; });
 }
 
@@ -235,7 +250,12 @@ std::string Hub::reason_against_landmarks(const Tab& tab, const std::string& jso
   ++this_second_;
   camera_ = &tab;
   camera_ns_ = now_ns;
-  return feed_(json);
+  return feed_(hands_source_, json);
+}
+
+void Hub::end_camera() {
+  camera_ = nullptr;
+  static_cast<void>(feed_(hands_source_, kCameraEnds));
 }
 
 void Hub::feed(Tab& tab, const std::string& json, std::int64_t now_ns) {
@@ -289,6 +309,7 @@ void Hub::receive(std::string_view topic, std::string_view body, std::int64_t no
     ++counts_.foreign;
   } else if (topic == "stats") {
     stats_ = with_topic(topic, body);
+    hands_source_ = hands_source_of(body);
     for (Tab* tab : tabs_) tab->outbox.put_newest(topic, stats_);
   } else {
     receive_stream(topic, body, now_ns);
@@ -352,6 +373,7 @@ void Hub::daemon_is(DaemonState state) {
     // What the next one has may differ, and poses of this one would be old.
     streams_.clear();
     stats_ = nullptr;
+    hands_source_.clear();
     for (Tab* tab : tabs_) tab->outbox.forget_all();
   }
   daemon_ = std::move(state);
@@ -390,6 +412,7 @@ void Hub::expire(std::int64_t now_ns) {
         asked.number, "the daemon has not answered for 5 s; the change may still take effect"));
     asked.tab->wake();
   }
+  if (camera_ != nullptr && now_ns - camera_ns_ > kCameraSilent_ns) end_camera();
   std::erase_if(streams_, [&](const auto& entry) {
     if (now_ns - entry.second.received_ns < kGone_ns) return false;
     forget(entry.first);

@@ -121,8 +121,9 @@ class Hub {
   // sent now.
   using Ask = std::function<bool(std::uint64_t ticket, std::string_view request)>;
 
-  // Sends landmarks to the daemon's source; returns why they did not go, empty if they did.
-  using Feed = std::function<std::string(std::string_view json)>;
+  // Sends landmarks to the daemon's source with this identity (empty: it has none); returns why
+  // they did not go, empty if they did.
+  using Feed = std::function<std::string(std::string_view source, std::string_view json)>;
 
   Hub(Greeting greeting, Ask ask, Feed feed = {})
       : greeting_(std::move(greeting)), ask_(std::move(ask)), feed_(std::move(feed)) {}
@@ -171,6 +172,8 @@ class Hub {
   void feed(Tab& tab, const std::string& json, std::int64_t now_ns);
   [[nodiscard]] std::string reason_against_landmarks(const Tab& tab, const std::string& json,
                                                      std::int64_t now_ns);
+  // Tells the daemon that the page's camera is off.
+  void end_camera();
   void note_upload(Tab& tab, const v1::ControlRequest& request, std::int64_t now_ns);
   // The message behind its topic, counted in kept_ for as long as anybody has it.
   [[nodiscard]] Bytes counted(std::string_view topic, std::string_view body) const;
@@ -194,6 +197,7 @@ class Hub {
   // The page whose camera is used: hands of two would be mixed.
   const Tab* camera_ = nullptr;
   std::int64_t camera_ns_ = 0;
+  std::string hands_source_;    // identity of the daemon's landmarks source; empty: it has none
   std::int64_t second_ns_ = 0;  // since when landmarks are counted
   int this_second_ = 0;
   std::shared_ptr<std::size_t> kept_ = std::make_shared<std::size_t>(0);  // bytes

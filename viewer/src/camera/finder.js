@@ -5,7 +5,7 @@
 //
 // From the page: {picture: ImageBitmap, time_ms}. To it: {ready}, {picture, time_ms, hands},
 // {error}.
-import { HandFinder } from './hands_of.js';
+import { handsOf } from './hands_of.js';
 
 const FOLDER = '/camera/';
 
@@ -29,7 +29,6 @@ self.document = {
 };
 
 const LITE = 0;
-const hands = new HandFinder();
 let results = null;
 
 async function start() {
@@ -62,7 +61,8 @@ self.onmessage = async ({ data: { picture, time_ms } }) => {
     const one = await finder;
     await one.send({ image: picture });
     results?.image?.close?.();
-    self.postMessage({ picture, time_ms, hands: hands.handsOf(results) }, [picture]);
+    const hands = handsOf(results, picture.width / picture.height);
+    self.postMessage({ picture, time_ms, hands }, [picture]);
   } catch (error) {
     self.postMessage({ error: String(error?.message ?? error) });
   }

@@ -4,11 +4,13 @@
 // tests/golden/camera (seeds 201, 203, 204, 205) were made.
 //
 //   g++ -O3 -ffast-math -std=c++20 drawn_hands.cpp -o drawn_hands
-//   ./drawn_hands signs|random SEED PICTURES OUT [WILDNESS]   OUT.rgba, OUT.truth: ten a second
-//   node find_hands.mjs OUT...                                OUT.hands: what MediaPipe finds
+//   ./drawn_hands signs|random SEED PICTURES OUT [WILDNESS [left]]   OUT.rgba, OUT.truth: ten a
+//   second node find_hands.mjs OUT...                                       OUT.hands: what
+//   MediaPipe finds
 //
 // A row of OUT.truth has the 45 angles of hand45 [deg], the gesture, and whether it is held (since
 // 0.2 s). "signs" performs g c p 1 3 4 as the synthetic signer does, "random" any poses.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -293,6 +295,11 @@ int main(int c, char** v) {
     M turn = mm(mm(rot('y', ry + 8 * sin(t * .7 + drift)), rot('x', rx + 5 * sin(t * .5))),
                 rot('z', rz + 5 * cos(t * .6 + drift)));
     draw(caps(sh, p, turn, L), L, buf.data());
+    if (c > 6)  // a left hand is the mirror image
+      for (int y = 0; y < H; y++)
+        for (int x = 0; x < W / 2; x++)
+          std::swap_ranges(&buf[4 * (y * W + x)], &buf[4 * (y * W + x) + 4],
+                           &buf[4 * (y * W + W - 1 - x)]);
     fwrite(buf.data(), 1, buf.size(), fr);
     for (int f = 0; f < 5; f++)
       for (int j = 0; j < 3; j++)
