@@ -66,10 +66,11 @@ struct StageCommandType {
 
 // A number that a stage measures while it runs. It goes into the field of posed.v1.StreamStats that
 // has its name, which no other stage's reading has. Where that field is a text the number is the
-// index of a joint of the skeleton that enters the stream, and the text its name.
+// index of a joint of the skeleton that enters or leaves the stream, and the text its name.
 struct StageReadingType {
   std::string_view name;
   std::string_view help;
+  bool of_leaving = false;
 };
 
 // A sentence that a stage reports by itself, as an event of its stream.

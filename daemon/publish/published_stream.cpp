@@ -79,22 +79,29 @@ void fill_stages(const std::vector<StageInfo>& stages, const pipeline::PipelineC
 }
 
 // Each reading into the field that has its name, where it is known. A reading whose field is a text
-// is the index of a joint of the source.
-void fill_readings(const std::vector<StageInfo>& stages, const pipeline::PipelineCounters& counters,
-                   const Skeleton* skeleton, v1::StreamStats& stats) {
+// is the index of a joint.
+void fill_readings(const StreamInfo& info, v1::StreamStats& stats) {
+  using google::protobuf::FieldDescriptor;
+  const auto* reflection = v1::StreamStats::GetReflection();
   std::size_t next = 0;
-  for (const StageInfo& stage : stages) {
+  for (const StageInfo& stage : info.stages) {
     for (const StageReadingType& reading : stage.type->readings) {
       const auto* field = v1::StreamStats::descriptor()->FindFieldByName(std::string(reading.name));
-      const auto value = static_cast<float>(counters.reading[next++].now.load());
-      v1::StreamStats::GetReflection()->ClearField(&stats, field);
+      const double value = info.counters->pipeline.reading[next++].now.load();
+      reflection->ClearField(&stats, field);
       if (std::isnan(value)) continue;
-      if (field->cpp_type() == google::protobuf::FieldDescriptor::CPPTYPE_FLOAT) {
-        v1::StreamStats::GetReflection()->SetFloat(&stats, field, value);
-      } else if (const auto joint = static_cast<std::size_t>(value);
-                 skeleton != nullptr && joint < skeleton->joints.size()) {
-        v1::StreamStats::GetReflection()->SetString(&stats, field,
-                                                    clean(skeleton->joints[joint].name));
+      if (field->cpp_type() == FieldDescriptor::CPPTYPE_FLOAT) {
+        reflection->SetFloat(&stats, field, static_cast<float>(value));
+        continue;
+      }
+      const auto number = static_cast<std::uint64_t>(value);
+      if (field->cpp_type() == FieldDescriptor::CPPTYPE_UINT64) {
+        reflection->SetUInt64(&stats, field, number);
+        continue;
+      }
+      const auto& skeleton = reading.of_leaving ? info.skeleton : info.description.skeleton;
+      if (skeleton != nullptr && number < skeleton->joints.size()) {
+        reflection->SetString(&stats, field, clean(skeleton->joints[number].name));
       }
     }
   }
@@ -221,7 +228,7 @@ void PublishedStream::fill(v1::StreamStats& stats) const {
                       : "refused");
   stats.set_dropped(info.counters->reader.dropped.load() + pipeline.dropped.load());
   stats.set_shed(pipeline.shed.load());
-  fill_readings(info.stages, pipeline, info.description.skeleton.get(), stats);
+  fill_readings(info, stats);
   fill_device(stats);
   const std::scoped_lock lock(mutex_);
   stats.set_frames(now_.published.frames);

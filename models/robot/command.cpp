@@ -13,6 +13,8 @@ constexpr double kPart_m_s = 0.06;   // at which links come apart that are neare
 constexpr double kGapShare = 0.5;    // of the joints' braking that a gap counts on
 constexpr double kRounding = 0.995;  // of the limits: what is sent is a float
 constexpr double kSame_m = 1e-6;
+constexpr double kAway_rad = 0.05;   // from here on a pose is another one
+constexpr double kStands_rad_s = 0.05;
 constexpr int kHalvings = 5;
 
 // The speed at which `left` may be approached in the next step, and be stopped before by braking at
@@ -60,6 +62,18 @@ bool Command::would_enter(const Drive& pose, std::span<const Gap> gaps) noexcept
   });
 }
 
+// Counts an aim that a row forbids, and remembers whose gap does most.
+void Command::find_in_the_way(std::span<const Gap> gaps, const Drive& aim) noexcept {
+  double most = kSame_m;
+  for (std::size_t r = 0; r < gaps.size(); ++r) {
+    const double forbidden_m = rows_[r].least - rows_[r].slope.dot(aim);
+    if (forbidden_m <= most) continue;
+    most = forbidden_m;
+    in_the_way_ = {gaps[r].a, gaps[r].b};
+  }
+  if (most > kSame_m) ++limited_;
+}
+
 // The step nearest to `aim` that keeps the links apart. False: only by breaking an acceleration.
 bool Command::keep_apart(std::span<const Gap> gaps, const Drive& aim, double dt_s,
                          Drive& step) noexcept {
@@ -75,6 +89,7 @@ bool Command::keep_apart(std::span<const Gap> gaps, const Drive& aim, double dt_
   }
   in_contact_ =
       std::ranges::any_of(gaps, [&](const Gap& gap) { return gap.gap_m < margin_m_ + 1e-4; });
+  find_in_the_way(gaps, aim);
   program_.rows = {rows_.data(), gaps.size()};
   program_.g = -aim;
   program_.H.setIdentity();
@@ -111,6 +126,16 @@ void Command::move(const Drive& aim, double dt_s) noexcept {
   }
 }
 
+// Once told it is forgotten: what is wanted next may be reached.
+void Command::find_blocked(const Drive& wanted, double dt_s) noexcept {
+  if (blocked()) blocked_s_ = 0.0;
+  const bool stands = velocity_.cwiseAbs().maxCoeff() < kStands_rad_s;
+  const bool away = (wanted - pose_).cwiseAbs().maxCoeff() > kAway_rad;
+  blocked_s_ = stands && away ? blocked_s_ + dt_s : 0.0;
+  if (blocked() && !is_stopped_) ++stops_;
+  is_stopped_ = stands && away && (is_stopped_ || blocked());
+}
+
 void Command::follow(const Drive& wanted, double dt_s) noexcept {
   if (!wanted.allFinite() || !(dt_s > kNoNeed_s)) return brake(dt_s);
   dt_s = std::min(dt_s, kMaxStep_s);
@@ -123,9 +148,11 @@ void Command::follow(const Drive& wanted, double dt_s) noexcept {
     aim[i] = std::clamp(aim[i], program_.low[i], program_.high[i]);
   }
   move(aim, dt_s);
+  find_blocked(wanted, dt_s);
 }
 
 void Command::brake(double dt_s) noexcept {
+  blocked_s_ = 0.0;
   if (!(dt_s > 0.0) || stands()) return;
   dt_s = std::min(dt_s, kMaxStep_s);
   find_box(dt_s);

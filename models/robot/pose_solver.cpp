@@ -13,6 +13,7 @@ constexpr double kFar_m = 0.03;  // from here on a tip pulls no harder
 constexpr double kPinchPoint = 1.0;
 constexpr double kPinchGap = 10.0;
 constexpr double kSolverNear_m = 0.02;
+constexpr double kMissing = 1.0;  // of what links miss of their margin [m]: more than tips gain by it
 constexpr int kBacktracks = 3;
 
 }  // namespace
@@ -116,13 +117,21 @@ double PoseSolver::cost(const HandTarget& target, const Drive& pose, bool slopes
   return sum;
 }
 
+PoseSolver::Nearness PoseSolver::nearness(std::span<const Gap> gaps) const noexcept {
+  Nearness nearness;
+  for (const Gap& gap : gaps) {
+    nearness.overlap_m = std::max(nearness.overlap_m, -gap.gap_m);
+    nearness.missing_m += std::max(0.0, margin_m_ - gap.gap_m);
+  }
+  return nearness;
+}
+
 bool PoseSolver::step(const HandTarget& target) noexcept {
   const double before = cost(target, pose_, true);
   const auto gaps = find_gaps(robot_, placed_, kSolverNear_m, true, gaps_);
-  double overlap_m = 0.0;
+  const Nearness now = nearness(gaps);
   for (std::size_t r = 0; r < gaps.size(); ++r) {
-    overlap_m = std::min(overlap_m, gaps[r].gap_m);
-    // What overlaps comes apart a little a step.
+    // What is too near comes apart a little a step.
     rows_[r] = {.slope = gaps[r].slope, .least = std::min(margin_m_ - gaps[r].gap_m, 2e-3)};
   }
   program_.rows = {rows_.data(), gaps.size()};
@@ -137,12 +146,10 @@ bool PoseSolver::step(const HandTarget& target) noexcept {
     const Drive there = pose_ + wanted;
     const double after = cost(target, there, false);
     if (!std::isfinite(after)) continue;
-    double deepest_m = 0.0;
-    for (const Gap& gap : find_gaps(robot_, placed_, 0.0, false, gaps_)) {
-      deepest_m = std::min(deepest_m, gap.gap_m);
-    }
-    const bool parts = overlap_m < -1e-5 && deepest_m > overlap_m;
-    if (deepest_m < overlap_m - 1e-5 || (after > before && !parts)) continue;
+    const Nearness then = nearness(find_gaps(robot_, placed_, margin_m_, false, gaps_));
+    if (then.overlap_m > std::max(now.overlap_m, 1e-5)) continue;
+    // Where the command would not keep its margin it would stand: the margin is part of the cost.
+    if (after + kMissing * then.missing_m > before + kMissing * now.missing_m) continue;
     pose_ = there;
     return true;
   }

@@ -25,6 +25,11 @@ class PoseSolver {
                               bool slopes) noexcept;
   RT_SAFE double add_points(const HandTarget& target, bool slopes) noexcept;
   RT_SAFE double add_pinches(const HandTarget& target, bool slopes) noexcept;
+  struct Nearness {
+    double overlap_m = 0.0;  // of the links that are deepest in each other
+    double missing_m = 0.0;  // what pairs miss of their margin, together
+  };
+  RT_SAFE Nearness nearness(std::span<const Gap> gaps) const noexcept;
   RT_SAFE bool step(const HandTarget& target) noexcept;
 
   const RobotHand& robot_;

@@ -521,6 +521,12 @@ Result<Skeleton> robot_skeleton(const RobotHand& hand) {
   while (std::ranges::count(skeleton.joints, skeleton.joints[0].name, &Joint::name) > 1) {
     skeleton.joints[0].name += " root";
   }
+  for (const Capsule& capsule : hand.capsules) {
+    skeleton.capsules.push_back({.joint = static_cast<std::uint16_t>(capsule.link),
+                                 .from_m = turn[capsule.link] * capsule.from_m,
+                                 .to_m = turn[capsule.link] * capsule.to_m,
+                                 .radius_m = capsule.radius_m});
+  }
   TRY(skeleton.finish());
   return skeleton;
 }
@@ -550,6 +556,7 @@ void place(const RobotHand& hand, const Drive& drive, Placed& placed) noexcept {
     const Capsule& capsule = hand.capsules[c];
     placed.from_m[c] = placed.at_m[capsule.link] + placed.turn[capsule.link] * capsule.from_m;
     placed.to_m[c] = placed.at_m[capsule.link] + placed.turn[capsule.link] * capsule.to_m;
+    placed.middle_m[c] = 0.5 * (placed.from_m[c] + placed.to_m[c]);
   }
 }
 

@@ -66,7 +66,6 @@ struct Capsule {
   Eigen::Vector3d from_m = Eigen::Vector3d::Zero();  // in the link's frame
   Eigen::Vector3d to_m = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
-  double reach_m = 0.0;  // radius of the ball around all of it
 };
 
 struct Ball {  // that holds all capsules of a link, in its frame
@@ -90,6 +89,7 @@ struct RobotHand {
   // Columns: out of the palm, to the thumb's side, to the fingers. A left hand's is a mirror image.
   Eigen::Matrix3d palm = Eigen::Matrix3d::Identity();
   std::vector<Capsule> capsules;              // by link
+  std::vector<double> reach_m;                // [capsule], radius of the ball around it
   std::vector<Ball> balls;                    // [link]
   std::vector<std::pair<int, int>> pairs;     // of links that must not touch
   std::vector<std::pair<int, int>> left_out;  // that touch anyway
@@ -109,11 +109,18 @@ Result<Skeleton> robot_skeleton(const RobotHand& hand);
 // All links in one pose, in the root's frame.
 struct Placed {
   explicit Placed(std::size_t links, std::size_t capsules = 0)
-      : turn(links), at_m(links), axis(links), from_m(capsules), to_m(capsules) {}
+      : turn(links),
+        at_m(links),
+        axis(links),
+        from_m(capsules),
+        to_m(capsules),
+        middle_m(capsules),
+        nearest(capsules == 0 ? 0 : links * links, std::pair(-1, -1)) {}
   std::vector<Eigen::Matrix3d> turn;
   std::vector<Eigen::Vector3d> at_m;
   std::vector<Eigen::Vector3d> axis;          // of the joint that carries the link
-  std::vector<Eigen::Vector3d> from_m, to_m;  // [capsule]; none where no gap is asked for
+  std::vector<Eigen::Vector3d> from_m, to_m, middle_m;  // [capsule]; none where no gap is asked for
+  std::vector<std::pair<int, int>> nearest;  // [link * links + link]: capsules, when last looked at
 };
 RT_SAFE [[nodiscard]] double angle_of(const RobotJoint& joint, const Drive& drive) noexcept;
 RT_SAFE void place(const RobotHand& hand, const Drive& drive, Placed& placed) noexcept;

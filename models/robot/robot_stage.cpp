@@ -21,13 +21,15 @@ constexpr double kUnknownRate_hz = 60.0;
 constexpr double kSilent_s = 0.2;
 constexpr std::int64_t kJumpsBack_ns = kNanosPerSecond;
 constexpr std::int64_t kToldEvery_ns = kNanosPerSecond;
+constexpr std::int64_t kShownFor_ns = 2 * kNanosPerSecond;  // stats are told once a second
 constexpr std::int64_t kMaxTime_ns = std::numeric_limits<std::int64_t>::max() / 2;
 constexpr double kMaxFingerAngle_rad = 7.0;  // beyond a turn no finger's angle is one
 constexpr int kRounds = 2;
 constexpr std::array<std::string_view, 3> kSides{"hand", "left", "right"};
 
 enum class RobotSide : std::uint8_t { kHand, kLeft, kRight };
-enum Notice : std::size_t { kSilent, kDistrusted, kTimeJump, kHardStop, kNotices };
+enum Reading : std::size_t { kLimited, kStops, kHardStops, kHolds, kStopJoint, kStopOther };
+enum Notice : std::size_t { kSilent, kDistrusted, kTimeJump, kHardStop, kStop, kNotices };
 
 struct StageOptions {
   std::string urdf, tips, hold, start;
@@ -51,12 +53,14 @@ class RobotStage final : public Stage {
   RT_SAFE void tick(std::int64_t now_ns, StageOut& out) noexcept override;
   [[nodiscard]] bool command(std::size_t index, const StageCommand& command) noexcept override;
   [[nodiscard]] std::optional<StageNotice> take_notice() noexcept override;
+  [[nodiscard]] double reading(std::size_t reading) const noexcept override;
 
  private:
   RT_SAFE double elapsed_s(std::int64_t now_ns) noexcept;
   RT_SAFE bool trusts(const Frame& frame, HandAngles& angles) const noexcept;
   RT_SAFE void hold(double dt_s, Notice why) noexcept;
   RT_SAFE void follow(double dt_s) noexcept;
+  RT_SAFE void find_stops() noexcept;
   RT_SAFE void emit(const Frame& like, StageOut& out) noexcept;
   RT_SAFE void tell(Notice notice) noexcept;
 
@@ -74,7 +78,9 @@ class RobotStage final : public Stage {
   std::int64_t arrival_ns_ = kNoTime_ns;  // of the latest frame
   bool engaged_ = false;                  // somebody wants it
   bool follows_ = false;                  // and the hand is trusted
-  std::uint64_t hard_stops_ = 0;
+  std::uint64_t hard_stops_ = 0, holds_ = 0;
+  std::int64_t stopped_ns_ = kNoTime_ns;  // when links were last in the way of it
+  std::pair<int, int> stopped_by_{-1, -1};
   std::array<bool, kNotices> notice_{};
   std::array<std::int64_t, kNotices> told_ns_{};
 };
@@ -172,13 +178,16 @@ RT_SAFE void RobotStage::tell(Notice notice) noexcept {
 }
 
 RT_SAFE void RobotStage::hold(double dt_s, Notice why) noexcept {
-  if (follows_) tell(why);
+  if (follows_) {
+    tell(why);
+    ++holds_;
+  }
   follows_ = false;
   command_.brake(dt_s);
 }
 
 RT_SAFE void RobotStage::follow(double dt_s) noexcept {
-  if (!follows_) solver_.restart(command_.pose());
+  if (!follows_ || command_.blocked()) solver_.restart(command_.pose());
   follows_ = true;
   command_.follow(solver_.solve(target_, kRounds), dt_s);
 }
@@ -232,6 +241,17 @@ RT_SAFE void RobotStage::tick(std::int64_t now_ns, StageOut& out) noexcept {
   emit(last_, out);
 }
 
+RT_SAFE void RobotStage::find_stops() noexcept {
+  const bool hard = command_.hard_stops() != hard_stops_;
+  const bool stopped = command_.blocked();
+  hard_stops_ = command_.hard_stops();
+  if (hard) tell(kHardStop);
+  if (stopped) tell(kStop);
+  if (!hard && !stopped) return;
+  stopped_ns_ = time_ns_;
+  stopped_by_ = command_.in_the_way();
+}
+
 RT_SAFE void RobotStage::emit(const Frame& like, StageOut& out) noexcept {
   std::array<double, kMaxRobotJoints> values{};
   const std::size_t count = robot_.joints.size();
@@ -248,10 +268,7 @@ RT_SAFE void RobotStage::emit(const Frame& like, StageOut& out) noexcept {
   frame.robot = follows_                         ? RobotState::kEngaged
                 : engaged_ || !command_.stands() ? RobotState::kHolding
                                                  : RobotState::kReleased;
-  if (command_.hard_stops() != hard_stops_) {
-    hard_stops_ = command_.hard_stops();
-    tell(kHardStop);
-  }
+  find_stops();
   out.frame({.frame = frame});
 }
 
@@ -267,6 +284,16 @@ std::optional<StageNotice> RobotStage::take_notice() noexcept {
   if (at == notice_.end()) return std::nullopt;
   *at = false;
   return StageNotice{.index = static_cast<std::size_t>(at - notice_.begin())};
+}
+
+double RobotStage::reading(std::size_t reading) const noexcept {
+  if (reading == kLimited) return static_cast<double>(command_.limited());
+  if (reading == kStops) return static_cast<double>(command_.stops());
+  if (reading == kHardStops) return static_cast<double>(command_.hard_stops());
+  if (reading == kHolds) return static_cast<double>(holds_);
+  const int link = reading == kStopJoint ? stopped_by_.first : stopped_by_.second;
+  const bool lately = stopped_ns_ != kNoTime_ns && time_ns_ - stopped_ns_ < kShownFor_ns;
+  return lately && link >= 0 ? link : std::numeric_limits<double>::quiet_NaN();
 }
 
 Result<RobotHand> robot_of(const StageContext& context) {
@@ -327,10 +354,17 @@ const StageType& robot_type() {
       .read_files = read_urdf,
       .leaves = leaves,
       .make = make_stage,
+      .readings = {{.name = "robot_limited", .help = "commands that links in the way changed"},
+                   {.name = "robot_stops", .help = "times it stood because of them"},
+                   {.name = "robot_hard_stops", .help = "commands beyond the acceleration"},
+                   {.name = "robot_holds", .help = "times it braked because of the hand"},
+                   {.name = "robot_stop_joint", .help = "that stopped it", .of_leaving = true},
+                   {.name = "robot_stop_other", .help = "and that one", .of_leaving = true}},
       .notices = {{.sentence = "no frame of the hand comes: the robot brakes and holds"},
                   {.sentence = "the hand cannot be trusted: the robot brakes and holds"},
                   {.sentence = "the hand's time went back: the robot holds"},
-                  {.sentence = "the robot was stopped at once, because links would have met"}},
+                  {.sentence = "the robot was stopped at once, because links would have met"},
+                  {.sentence = "links are in the way: the robot stands short of the hand"}},
       .commands = {{.name = "engage",
                     .help = "the robot follows the hand, from where it is",
                     .encode = no_words},

@@ -18,8 +18,8 @@ void add_capsule(RobotHand& hand, int link, const Eigen::Isometry3d& at,
   hand.capsules.push_back({.link = link,
                            .from_m = at * from_m,
                            .to_m = at * to_m,
-                           .radius_m = radius_m,
-                           .reach_m = 0.5 * (to_m - from_m).norm() + radius_m});
+                           .radius_m = radius_m});
+  hand.reach_m.push_back(0.5 * (to_m - from_m).norm() + radius_m);
 }
 
 // Capsules along the longest edge, side by side across the middle one. Each reaches its strip's
@@ -118,34 +118,42 @@ RT_SAFE Eigen::Vector3d world(const Placed& placed, int link, const Eigen::Vecto
   return placed.at_m[link] + placed.turn[link] * m;
 }
 
-// The least gap below `near_m`; that itself where none is.
-RT_SAFE Nearest nearest(const RobotHand& hand, const Placed& placed, int a, int b,
+// The least gap below `near_m`; that itself where none is. The capsules that were nearest before are
+// tried first: most others are then too far to be looked at.
+RT_SAFE Nearest nearest(const RobotHand& hand, Placed& placed, int a, int b,
                         double near_m) noexcept {
   Nearest best{.gap_m = near_m};
+  auto& before = placed.nearest[static_cast<std::size_t>(a) * hand.links.size() + b];
+  const auto look = [&](int i, int j) {
+    const Eigen::Vector3d& from = placed.from_m[i];
+    const Eigen::Vector3d& begin = placed.from_m[j];
+    const auto closest = hand::closest_points(from, placed.to_m[i], begin, placed.to_m[j]);
+    const double distance_m = closest.apart.norm();
+    const double gap_m = distance_m - hand.capsules[i].radius_m - hand.capsules[j].radius_m;
+    if (gap_m >= best.gap_m) return;
+    best.gap_m = gap_m;
+    best.at_a = from + closest.s * (placed.to_m[i] - from);
+    best.at_b = begin + closest.t * (placed.to_m[j] - begin);
+    if (distance_m > 1e-9) best.apart = closest.apart / distance_m;
+    before = {i, j};
+  };
   const Ball& all_a = hand.balls[a];
   const Ball& all_b = hand.balls[b];
+  if (all_a.count == 0 || all_b.count == 0) return best;
+  const auto [first_i, first_j] = before;
+  if (first_i >= 0) look(first_i, first_j);
   const Eigen::Vector3d middle_b = world(placed, b, all_b.middle_m);
   for (int i = all_a.first; i < all_a.first + all_a.count; ++i) {
-    const Capsule& one = hand.capsules[i];
-    const Eigen::Vector3d& from = placed.from_m[i];
-    const Eigen::Vector3d& to = placed.to_m[i];
-    const double all_m = one.reach_m + all_b.radius_m + best.gap_m;
-    if (all_m <= 0.0 || (0.5 * (from + to) - middle_b).squaredNorm() >= all_m * all_m) continue;
+    const Eigen::Vector3d middle = placed.middle_m[i];
+    const double all_m = hand.reach_m[i] + all_b.radius_m + best.gap_m;
+    if (all_m <= 0.0 || (middle - middle_b).squaredNorm() >= all_m * all_m) continue;
     for (int j = all_b.first; j < all_b.first + all_b.count; ++j) {
-      const Capsule& other = hand.capsules[j];
-      const Eigen::Vector3d& begin = placed.from_m[j];
-      const Eigen::Vector3d& end = placed.to_m[j];
-      const double reach_m = one.reach_m + other.reach_m + best.gap_m;
-      const double middles_m2 = 0.25 * (from + to - begin - end).squaredNorm();
-      if (reach_m <= 0.0 || middles_m2 >= reach_m * reach_m) continue;
-      const auto closest = hand::closest_points(from, to, begin, end);
-      const double distance_m = closest.apart.norm();
-      const double gap_m = distance_m - one.radius_m - other.radius_m;
-      if (gap_m >= best.gap_m) continue;
-      best.gap_m = gap_m;
-      best.at_a = from + closest.s * (to - from);
-      best.at_b = begin + closest.t * (end - begin);
-      if (distance_m > 1e-9) best.apart = closest.apart / distance_m;
+      const double reach_m = hand.reach_m[i] + hand.reach_m[j] + best.gap_m;
+      if (reach_m <= 0.0 || (middle - placed.middle_m[j]).squaredNorm() >= reach_m * reach_m ||
+          (i == first_i && j == first_j)) {
+        continue;
+      }
+      look(i, j);
     }
   }
   return best;
@@ -199,7 +207,7 @@ void add_shapes(RobotHand& hand) {
   }
 }
 
-std::span<const Gap> find_gaps(const RobotHand& hand, const Placed& placed, double near_m,
+std::span<const Gap> find_gaps(const RobotHand& hand, Placed& placed, double near_m,
                                bool slopes, Gaps& gaps) noexcept {
   std::size_t count = 0;
   for (const auto& [a, b] : hand.pairs) {
@@ -222,7 +230,7 @@ std::span<const Gap> find_gaps(const RobotHand& hand, const Placed& placed, doub
   return {gaps.data(), count};
 }
 
-Gap gap_between(const RobotHand& hand, const Placed& placed, int a, int b) noexcept {
+Gap gap_between(const RobotHand& hand, Placed& placed, int a, int b) noexcept {
   const Nearest at = nearest(hand, placed, a, b, std::numeric_limits<double>::infinity());
   Gap gap{.a = a, .b = b, .gap_m = at.gap_m};
   if (std::isfinite(at.gap_m)) add_slopes(hand, placed, at, gap);

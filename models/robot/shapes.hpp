@@ -23,11 +23,10 @@ using Gaps = std::array<Gap, kMaxGaps>;
 
 // The pairs that are nearer than `near_m`, the nearest ones where there are more than fit. Without
 // slopes for whoever does not need them.
-RT_SAFE [[nodiscard]] std::span<const Gap> find_gaps(const RobotHand& hand, const Placed& placed,
+RT_SAFE [[nodiscard]] std::span<const Gap> find_gaps(const RobotHand& hand, Placed& placed,
                                                      double near_m, bool slopes,
                                                      Gaps& gaps) noexcept;
 
 // The gap of one pair of links, infinite where one has no shape.
-RT_SAFE [[nodiscard]] Gap gap_between(const RobotHand& hand, const Placed& placed, int a,
-                                      int b) noexcept;
+RT_SAFE [[nodiscard]] Gap gap_between(const RobotHand& hand, Placed& placed, int a, int b) noexcept;
 }  // namespace posed::robot

@@ -61,6 +61,12 @@ std::uint32_t content_id(const Skeleton& skeleton) {
     content.add(channel.joint);
     content.add(static_cast<int>(channel.axis) + (channel.translation ? 3 : 0));
   }
+  for (const JointCapsule& capsule : skeleton.capsules) {
+    content.add(capsule.joint);
+    for (const double value : capsule.from_m) content.add(value);
+    for (const double value : capsule.to_m) content.add(value);
+    content.add(capsule.radius_m);
+  }
   return content.crc();
 }
 

@@ -48,6 +48,14 @@ struct Joint {
   Eigen::Quaterniond T_world_joint = Eigen::Quaterniond::Identity();
 };
 
+// A shape that a robot's joint carries, in the joint's frame.
+struct JointCapsule {
+  std::uint16_t joint = 0;
+  Eigen::Vector3d from_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d to_m = Eigen::Vector3d::Zero();
+  double radius_m = 0.0;
+};
+
 struct Skeleton {
   std::string name;           // profile or file of origin, shown to users
   std::vector<Joint> joints;  // at most kMaxJoints
@@ -55,6 +63,7 @@ struct Skeleton {
   // the dof of an Acclaim joint are reversed, because there the last is outermost. Position
   // channels replace the joint's offset.
   std::vector<Channel> channels;
+  std::vector<JointCapsule> capsules{};  // of a robot, which looks like them
   int root_joint = 0;    // the joint whose world position a Frame carries (usually the hips)
   std::uint32_t id = 0;  // CRC-32 of the content; set by finish()
 

@@ -13,6 +13,7 @@ namespace posed::message {
 namespace {
 
 constexpr std::size_t kMaxNameBytes = 128;
+constexpr int kMaxCapsules = 4096;
 constexpr double kUnitTolerance = 1e-3;  // of the squared length of a rotation
 
 std::unexpected<Error> wrong(const std::string& what) {
@@ -26,6 +27,8 @@ bool lists_fit(const v1::Skeleton& message) {
          message.humanoid_bone_size() == joints &&
          message.t_world_joint_xyzw_size() == 4 * joints &&
          (message.end_site_m_size() == 3 * joints || message.end_site_m().empty()) &&
+         message.capsule_joint_size() <= kMaxCapsules &&
+         message.capsule_m_size() == 7 * message.capsule_joint_size() &&
          std::cmp_equal(message.channel_axis().size(), message.channel_joint_size());
 }
 
@@ -82,6 +85,23 @@ Result<> read_channels(const v1::Skeleton& message, Skeleton& skeleton) {
   return {};
 }
 
+Result<> read_capsules(const v1::Skeleton& message, Skeleton& skeleton) {
+  for (int c = 0; c < message.capsule_joint_size(); ++c) {
+    const auto value = [&](int k) { return static_cast<double>(message.capsule_m(7 * c + k)); };
+    const std::uint32_t joint = message.capsule_joint(c);
+    const JointCapsule capsule{.joint = static_cast<std::uint16_t>(joint),
+                               .from_m = {value(0), value(1), value(2)},
+                               .to_m = {value(3), value(4), value(5)},
+                               .radius_m = value(6)};
+    if (joint >= skeleton.joints.size() || !is_length(capsule.from_m) || !is_length(capsule.to_m) ||
+        !(capsule.radius_m > 0.0 && capsule.radius_m <= kMaxPosition_m)) {
+      return wrong("has a capsule of no joint or size");
+    }
+    skeleton.capsules.push_back(capsule);
+  }
+  return {};
+}
+
 }  // namespace
 
 v1::Skeleton skeleton_message(const std::string& stream, const Skeleton& skeleton, double rate_hz) {
@@ -107,6 +127,12 @@ v1::Skeleton skeleton_message(const std::string& stream, const Skeleton& skeleto
     message.add_channel_joint(channel.joint);
     message.mutable_channel_axis()->push_back("xyz"[static_cast<std::size_t>(channel.axis)]);
   }
+  for (const JointCapsule& capsule : skeleton.capsules) {
+    message.add_capsule_joint(capsule.joint);
+    for (const double value : capsule.from_m) message.add_capsule_m(static_cast<float>(value));
+    for (const double value : capsule.to_m) message.add_capsule_m(static_cast<float>(value));
+    message.add_capsule_m(static_cast<float>(capsule.radius_m));
+  }
   return message;
 }
 
@@ -126,6 +152,7 @@ Result<std::shared_ptr<const Skeleton>> skeleton_from(const v1::Skeleton& messag
     TRY(read_joint(message, j, skeleton->joints[j]));
   }
   TRY(read_channels(message, *skeleton));
+  TRY(read_capsules(message, *skeleton));
   TRY(skeleton->finish());
   return skeleton;
 }

@@ -232,6 +232,20 @@ std::string unusual_value(const ParameterSpec& spec, const v1::ParameterStats& p
   return display_text(spec, parameter.value() / spec.display_scale);
 }
 
+// How often a robot was stopped, and by what just now; empty if never.
+std::string robot_words(const v1::StreamStats& stream) {
+  const std::uint64_t stops = stream.robot_stops() + stream.robot_hard_stops();
+  if (stops + stream.robot_holds() + stream.robot_limited() == 0) return {};
+  std::string text = fmt::format("robot: {} stops ({} hard), {} holds, {} commands limited", stops,
+                                 stream.robot_hard_stops(), stream.robot_holds(),
+                                 stream.robot_limited());
+  if (!stream.robot_stop_joint().empty()) {
+    text += fmt::format(", stopped by {} and {}", clean_name(stream.robot_stop_joint()),
+                        clean_name(stream.robot_stop_other()));
+  }
+  return text;
+}
+
 // A line below the stream's row about its stages; empty if there is nothing to report.
 std::string stages_row(const v1::StreamStats& stream) {
   std::string text = label_words(stream);
@@ -262,6 +276,7 @@ std::string stages_row(const v1::StreamStats& stream) {
     add(fmt::format("{}: {:.1f} % dropped", clean_name(stream.gate_joint()),
                     100.0F * stream.gate_dropped()));
   }
+  if (const std::string words = robot_words(stream); !words.empty()) add(words);
   if (stream.has_style_gate()) add(fmt::format("gate {:.2f}", stream.style_gate()));
   if (stream.has_style_estimate()) add(fmt::format("style {:.2f}", stream.style_estimate()));
   // As far as the column shows, alpha has reached its target.

@@ -73,6 +73,15 @@ std::string_view colour_of(const Skeleton& skeleton, int joint) {
   return side_colour(at.bone, at.parent < 0 ? kMiddle : colour_of(skeleton, at.parent));
 }
 
+// Which of the root's children a joint hangs on, from 1 on; 0: it is the root.
+std::size_t branch_of(const Skeleton& skeleton, int joint) {
+  while (joint > 0 && skeleton.joints[joint].parent > 0) joint = skeleton.joints[joint].parent;
+  if (joint <= 0) return 0;
+  return 1 + static_cast<std::size_t>(
+                 std::count_if(skeleton.joints.begin(), skeleton.joints.begin() + joint,
+                               [](const Joint& other) { return other.parent == 0; }));
+}
+
 double reach_m(const Skeleton& skeleton) {
   std::vector<double> way_m(skeleton.joints.size(), 0.0);
   double longest_m = 0.0;
@@ -102,6 +111,7 @@ FigureShape::FigureShape(std::shared_ptr<const Skeleton> skeleton)
       hand_(hand_side(*skeleton_)),
       reach_m_(std::max(reach_m(*skeleton_), 1e-6)) {
   for (int j = 0; j < static_cast<int>(skeleton_->joints.size()); ++j) {
+    if (!skeleton_->capsules.empty()) break;  // a robot looks like them
     if (!is_part_of_body(*skeleton_, j)) continue;
     if (j != skeleton_->root_joint) add_limb(j, false);
     if (skeleton_->joints[j].end_site_m) add_limb(j, true);
@@ -146,6 +156,14 @@ Figure FigureShape::pose(const Frame& frame) const {
                              .width_m = limb.width_m,
                              .colour = limb.colour});
   }
+  for (const JointCapsule& capsule : skeleton_->capsules) {
+    const std::size_t j = capsule.joint;
+    figure.sticks.push_back(
+        {.from_m = world.position_m[j] + world.rotation[j] * capsule.from_m,
+         .to_m = world.position_m[j] + world.rotation[j] * capsule.to_m,
+         .width_m = 2.0 * capsule.radius_m,
+         .colour = kFingerColours[branch_of(*skeleton_, capsule.joint) % kFingers]});
+  }
   const int head = hand_ ? -1 : skeleton_->joint_of(Bone::kHead);
   if (head >= 0) {
     const std::size_t j = head;
@@ -171,6 +189,7 @@ Facing FigureShape::facing(double heading_rad) const {
 }
 
 std::string_view FigureShape::legend() const {
+  if (!skeleton_->capsules.empty()) return "each branch of the robot has its colour";
   return hand_ ? "thumb dark orange, index light orange, middle green, ring blue, little pink"
                : "left limbs are blue, right ones orange";
 }

@@ -54,7 +54,7 @@ class Camera {
 };
 
 // FigureShape: what a pose looks like in a picture: a body as sticks with a head, a hand as
-// capsules. Left and right limbs, or the five fingers, have colours that colour-blind people can
+// capsules, a robot as those that it is kept apart by. Left and right limbs, or the five fingers, have colours that colour-blind people can
 // tell apart (Okabe and Ito).
 struct Stick {
   Eigen::Vector3d from_m, to_m;  // world

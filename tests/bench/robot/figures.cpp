@@ -104,6 +104,7 @@ std::array<RobotTrack, 2> our_tracks(const robot::RobotHand& robot, const HandTa
   for (const HandAngles& angles : take.angles) {
     const double start_us = cpu_us();
     targets.find(angles, target);
+    if (follows.blocked()) solver.restart(follows.pose());
     const Drive& wanted = solver.solve(target, kRounds);
     const double solved_us = cpu_us();
     follows.follow(wanted, kDt_s);

@@ -1,6 +1,7 @@
 // The figures of the chosen stream. One that it does not have is not shown.
 import { el, write } from '../panel/dom.js';
 import { ms, signed } from '../panel/numbers.js';
+import { ROBOT_TILES } from './robot_tiles.js';
 
 const count = (number) => number.toLocaleString('en');
 
@@ -53,6 +54,7 @@ export const TILES = [
         ? `${stats.gate_joint}: ${(100 * stats.gate_dropped).toFixed(1)} %`
         : '',
   ],
+  ...ROBOT_TILES,
   [
     'Clock drift',
     'how much faster the device’s clock goes than this computer’s, in millionths',

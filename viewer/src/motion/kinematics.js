@@ -1,5 +1,6 @@
 // A skeleton's forward kinematics, its T-pose and the rotations of VRM's bones. Right-handed, Y up,
 // metres. The arrays belong to the object and are overwritten by the next pose.
+import { capsulesOf } from './capsules.js';
 import { invert, multiply, rotate } from './quaternion.js';
 
 const IDENTITY = [0, 0, 0, 1];
@@ -32,6 +33,7 @@ export class Kinematics {
     this.tip =
       tips.length === 3 * count ? Float32Array.from(tips) : new Float32Array(3 * count).fill(NaN);
     this.root = message.root_joint;
+    this.capsules = capsulesOf(message); // of a robot
     this.rotation = new Float32Array(4 * count); // in the world
     this.position = new Float32Array(3 * count); // in the world [m]
     this.boneAbove = this.bonesAbove(Boolean);

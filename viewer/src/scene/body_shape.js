@@ -3,6 +3,7 @@
 import { invert, rotate } from '../motion/quaternion.js';
 import { isHand } from '../motion/body_parts.js';
 import { FINE, Mesh, addCapsule } from './capsule.js';
+import { robotShape } from './robot_shape.js';
 
 const USUAL_HEIGHT_M = 1.7;
 const USUAL_HAND_M = 0.19; // from the wrist to the tip of the longest finger
@@ -168,6 +169,7 @@ class Builder {
 
 // Flat arrays of the figure's mesh; each vertex is in the frame of its joint.
 export function bodyShape(kinematics, detail = FINE) {
+  if (kinematics.capsules.length > 0) return robotShape(kinematics);
   const builder = new Builder(kinematics, detail);
   const mesh = builder.build();
   const position = Float32Array.from(mesh.position);

@@ -16,6 +16,7 @@ import { bodyShape } from './body_shape.js';
 import { performerColour } from './palette.js';
 import { rigid } from './rigid_skin.js';
 import { JointPaint } from './joint_paint.js';
+import { stoppedJoints } from './robot_shape.js';
 
 // A skeleton whose matrices the page writes itself: three.js then walks no tree of bones.
 class DirectSkeleton extends Skeleton {
@@ -104,8 +105,8 @@ export class Figure {
   }
 
   // Colours the joints by what the pose says about them.
-  colour(pose) {
-    this.joints.paint(this.own, pose);
+  colour(pose, stats) {
+    this.joints.paint(this.own, pose, stoppedJoints(this.kinematics, stats));
   }
 
   dispose() {

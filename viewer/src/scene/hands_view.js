@@ -30,13 +30,13 @@ export class HandsView {
     this.lights.setTheme(theme);
   }
 
-  // Turns the hand upright: its fingers, along +Z with the palm down, point up. It is held at the
-  // wrist: a hand's own place in the world counts for nothing here.
+  // Turns the hand upright: its fingers, along +Z with the palm down, point up; a robot's do. It is
+  // held at the wrist: a hand's own place in the world counts for nothing here.
   add(performer) {
     const holder = new Group();
     const { group } = performer.figure;
     group.removeFromParent();
-    group.rotation.x = -Math.PI / 2;
+    group.rotation.x = performer.stream.isRobot ? 0 : -Math.PI / 2;
     holder.add(group);
     this.scene.add(holder);
     this.#performers.set(performer.stream.name, { performer, holder });

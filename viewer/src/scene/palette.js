@@ -41,6 +41,7 @@ const THEMES = {
 const QUALITY = [null, colour('#e69f00'), colour('#cc79a7'), colour('#8f969e')];
 const NO_VALUE = colour('#d55e00');
 const CONTACT = colour('#009e73');
+const STOPPED = colour('#d1242f'); // links of a robot; the instruments name them
 
 export const themeColours = (name) => THEMES[name];
 
@@ -54,4 +55,4 @@ export function jointColour(own, quality, hasValue, performedAtRest) {
   return QUALITY[quality] ?? own;
 }
 
-export { CONTACT };
+export { CONTACT, STOPPED };

@@ -56,7 +56,7 @@ export class Performer {
   #colour() {
     const { avatar, figure } = this;
     if (avatar) avatar.paint(figure.own, this.stream.pose);
-    else figure.colour(this.stream.pose);
+    else figure.colour(this.stream.pose, this.stream.stats);
   }
 
   // Its colour for the page's own parts.

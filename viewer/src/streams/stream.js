@@ -32,7 +32,8 @@ export class Stream {
     if (this.message?.id === message.id || !isSound(message)) return false;
     this.message = message;
     this.kinematics = new Kinematics(message);
-    this.isHand = isHand(this.kinematics);
+    this.isRobot = this.kinematics.capsules.length > 0; // a hand; bodies are none yet
+    this.isHand = this.isRobot || isHand(this.kinematics);
     this.partWords = partWords(this.kinematics);
     this.placed = 0;
     return true;

@@ -15,6 +15,8 @@ export const Skeleton = {
   12: ['rate_hz', 'double'],
   13: ['stage', 'string', '*'],
   14: ['end_site_m', 'float', '*'],
+  15: ['capsule_joint', 'uint', '*'],
+  16: ['capsule_m', 'float', '*'],
 };
 
 export const Event = {
@@ -77,6 +79,12 @@ export const StreamStats = {
   36: ['lossy', 'bool'],
   37: ['gate_dropped', 'float', '?'],
   38: ['gate_joint', 'string'],
+  39: ['robot_limited', 'uint', '?'],
+  40: ['robot_stops', 'uint', '?'],
+  41: ['robot_hard_stops', 'uint', '?'],
+  42: ['robot_holds', 'uint', '?'],
+  43: ['robot_stop_joint', 'string'],
+  44: ['robot_stop_other', 'string'],
 };
 
 export const TakeStats = {
