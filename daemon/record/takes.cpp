@@ -53,7 +53,8 @@ void Takes::end(const pipeline::TakeMark& mark, std::uint64_t next_item) {
   changes_.push_back({.row = {.id = take.number,
                               .name = take.name,
                               .first_item = first_item_,
-                              .last_item = next_item - 1},
+                              .last_item = next_item - 1,
+                              .timecode = take.timecode},
                       .time_ns = mark.time_ns,
                       .text = std::move(sentence)});
 }
@@ -68,7 +69,8 @@ void Takes::begin(const pipeline::TakeMark& mark, std::uint64_t next_item) {
   changes_.push_back({.row = {.id = last_number_,
                               .name = mark.name,
                               .first_item = next_item,
-                              .last_item = log::kToTheEnd},
+                              .last_item = log::kToTheEnd,
+                              .timecode = mark.timecode},
                       .time_ns = mark.time_ns,
                       .text = with_remark(pipeline::words_of(*running_) + " begins", mark.remark)});
 }

@@ -69,6 +69,7 @@ Result<> write_vrm_animation(const clip::Clip& clip, const std::filesystem::path
   const auto retarget = TRY(Retarget::bind(clip.skeleton, humanoid));
   clip::GltfMotion motion{
       .name = path.stem().string(), .time_s = std::move(time_s), .nodes = nodes_of(*humanoid)};
+  motion.timecode = clip.timecode;
   Frame pose;
   for (int i = 0; i < clip.frames(); ++i) {
     retarget.apply(clip.frame(i), pose);

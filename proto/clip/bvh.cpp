@@ -139,11 +139,19 @@ std::string taken_as(const rig::Rig& rig) {
 // Returns the factors of the file's channels (FrameParser::bvh).
 Result<std::vector<double>> recognise_draft(const ReadOptions& options,
                                             std::span<const FrameSpan> frames, Draft& draft) {
+  const auto mark = find_bvh_mark(draft.text->header);
   Skeleton& skeleton = draft.skeleton;
   rig::RigInput known;
   known.up = options.up;
   known.facing = options.facing;
   known.metres_per_unit = options.metres_per_unit;
+  if (mark) {
+    if (!known.up) known.up = mark->up;
+    if (!known.metres_per_unit) known.metres_per_unit = mark->metres_per_unit;
+    if (mark->rests_in_t && draft.profile == nullptr && known.up == mark->up) {
+      known.T.assign(skeleton.joints.size(), Eigen::Quaterniond::Identity());
+    }
+  }
   if (draft.profile != nullptr) {
     TRY(add_profile(*draft.profile, skeleton, known));
     if (!known.metres_per_unit) {

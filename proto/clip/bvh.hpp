@@ -6,6 +6,7 @@
 // stated.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -25,6 +26,18 @@ struct BvhHeader {
 
 // `name` is used in error messages. Views in the result point into `text`.
 Result<BvhHeader> parse_bvh_header(std::string_view text, const std::string& name);
+
+// What a BVH cannot say and posed's own say nevertheless, by blanks behind the frame time, which
+// every reader skips: unit, upward axis, and whether the zero pose is the T-pose.
+struct BvhMark {
+  double metres_per_unit = 0.0;
+  UpAxis up = UpAxis::kPlusY;
+  bool rests_in_t = false;
+};
+// Empty for a unit that is not usual.
+[[nodiscard]] std::string bvh_mark(const BvhMark& mark);
+// `header`: everything before the first motion line.
+[[nodiscard]] std::optional<BvhMark> find_bvh_mark(std::string_view header);
 
 // The first section of a file, "HIERARCHY" to the last "}", with the skeleton's own channels. Of an
 // Acclaim skeleton it would be wrong: convert that first (with_zyx_channels in clip.hpp).

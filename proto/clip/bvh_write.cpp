@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <ostream>
 #include <string>
 #include <vector>
@@ -28,10 +30,19 @@ void append(std::string& out, double value) {
   out += text == "-0" || text.empty() ? "0" : text;
 }
 
+// Whoever knows no bone of the figure knows no T-pose of it.
+bool rests_in_t(const Clip& clip) {
+  const auto has_bone = [](const Joint& joint) { return joint.bone.has_value(); };
+  return clip.up == UpAxis::kPlusY && std::ranges::any_of(clip.skeleton->joints, has_bone) &&
+         std::ranges::all_of(clip.skeleton->joints, [](const Joint& joint) {
+           return joint.T_world_joint.isApprox(Eigen::Quaterniond::Identity(), 1e-9);
+         });
+}
+
 std::string motion_head(const Clip& clip) {
   std::string out = "MOTION\nFrames: " + std::to_string(clip.frames()) + "\nFrame Time: ";
   append(out, 1.0 / clip.frame_rate_hz);
-  return out + "\n";
+  return out + bvh_mark({clip.metres_per_unit, clip.up, rests_in_t(clip)}) + "\n";
 }
 
 std::string motion_line(const Clip& clip, int index) {
@@ -53,9 +64,11 @@ Clip in_file_axes(Clip clip) {
     clip.channels.col(static_cast<Eigen::Index>(c)) *= factors[c];
   }
   clip.skeleton = std::move(skeleton);
-  clip.up = UpAxis::kPlusY;
   return clip;
 }
+
+// Of the mark: the counts of blanks between tabulators.
+constexpr std::array kMarkedUnits{1.0, 0.1, 0.01, 0.001, 0.0254, 0.3048, 0.0254 / 0.45, 2.4384};
 
 class HierarchyWriter {
  public:
@@ -126,17 +139,58 @@ class HierarchyWriter {
 
 }  // namespace
 
+std::string bvh_mark(const BvhMark& mark) {
+  const auto unit = std::ranges::find_if(kMarkedUnits, [&mark](double metres) {
+    return std::abs(metres - mark.metres_per_unit) < 1e-9 * metres;
+  });
+  if (unit == kMarkedUnits.end()) return {};
+  const auto up = std::ranges::find(kUpAxes, mark.up);
+  std::string out = "\t";
+  for (const auto count : {unit - kMarkedUnits.begin(), up - kUpAxes.begin(),
+                           std::ptrdiff_t{mark.rests_in_t ? 1 : 0}}) {
+    out.append(static_cast<std::size_t>(count) + 1, ' ').append("\t");
+  }
+  return out;
+}
+
+std::optional<BvhMark> find_bvh_mark(std::string_view header) {
+  while (header.ends_with('\n') || header.ends_with('\r')) header.remove_suffix(1);
+  header.remove_prefix(std::min(header.find_last_not_of(" \t") + 1, header.size()));
+  std::vector<std::size_t> counts;
+  while (header.starts_with('\t')) {
+    header.remove_prefix(1);
+    const std::size_t blanks = std::min(header.find('\t'), header.size());
+    if (blanks == 0 || blanks == header.size()) break;
+    counts.push_back(blanks - 1);
+    header.remove_prefix(blanks);
+  }
+  const bool whole = counts.size() == 3 && header.empty();
+  if (!whole || counts[0] >= kMarkedUnits.size() || counts[1] >= kUpAxes.size()) {
+    return std::nullopt;
+  }
+  return BvhMark{kMarkedUnits[counts[0]], kUpAxes[counts[1]], counts[2] > 0};
+}
+
 std::string bvh_hierarchy(const Skeleton& skeleton, double metres_per_unit) {
   return HierarchyWriter(skeleton, metres_per_unit).text();
 }
 
-Result<> write_bvh(const Clip& clip, const std::filesystem::path& path) {
-  if (is_acclaim(*clip.skeleton)) return write_bvh(with_zyx_channels(clip), path);
-  if (clip.up != UpAxis::kPlusY) return write_bvh(in_file_axes(clip), path);
+namespace {
+
+// `clip` has the axes of the file, but `up` still says which of them is up.
+Result<> write_turned(const Clip& clip, const std::filesystem::path& path) {
   return write_whole_file(path, [&clip](std::ostream& file) {
     file << bvh_hierarchy(*clip.skeleton, clip.metres_per_unit) << motion_head(clip);
     for (int i = 0; i < clip.frames() && file; ++i) file << motion_line(clip, i);
   });
+}
+
+}  // namespace
+
+Result<> write_bvh(const Clip& clip, const std::filesystem::path& path) {
+  if (is_acclaim(*clip.skeleton)) return write_bvh(with_zyx_channels(clip), path);
+  if (clip.up != UpAxis::kPlusY) return write_turned(in_file_axes(clip), path);
+  return write_turned(clip, path);
 }
 
 }  // namespace posed::clip

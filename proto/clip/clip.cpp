@@ -89,6 +89,7 @@ Clip with_zyx_channels(const Clip& clip) {
            .frame_rate_hz = clip.frame_rate_hz,
            .channels = ChannelMatrix(clip.frames(), std::ssize(skeleton->channels)),
            .time_s = clip.time_s,
+           .timecode = clip.timecode,
            .warnings = {},
            .metres_per_unit = kCentimetre_m};
   std::vector<std::array<double, 3>> near(skeleton->joints.size());

@@ -13,6 +13,7 @@
 #include "proto/frame/hand_shape.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/skeleton.hpp"
+#include "proto/frame/timecode.hpp"
 #include "proto/rig/recognise.hpp"
 #include "proto/rig/up.hpp"
 
@@ -28,7 +29,9 @@ struct Clip {
   double frame_rate_hz = 0.0;
   // [frames x Skeleton::channels], rad and m; NaN where a hand CSV has no value.
   ChannelMatrix channels;
-  std::vector<double> time_s{};       // [frame], increasing; empty: evenly spaced, from 0
+  std::vector<double> time_s{};  // [frame], increasing; empty: evenly spaced, from 0
+  // [frame], empty where a frame's is not known; empty vector: no frame has one.
+  std::vector<Timecode> timecode{};
   std::vector<std::string> warnings;  // one sentence for each thing that was read leniently
   // Unit and upward axis of the file, kept so that the clip can be written back in them. Skeleton
   // and channels have +Y up.

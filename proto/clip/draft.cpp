@@ -163,6 +163,7 @@ Result<Clip> clip_of(Draft draft, const std::string& name, const Hints& hints) {
   clip.rig = draft.rig;
   clip.warnings = std::move(draft.warnings);
   clip.time_s = std::move(draft.time_s);
+  clip.timecode = std::move(draft.timecode);
   clip.channels = Eigen::Map<const ChannelMatrix>(
       draft.values.data(), static_cast<Eigen::Index>(draft.values.size() / channels),
       static_cast<Eigen::Index>(channels));

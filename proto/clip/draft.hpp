@@ -39,9 +39,10 @@ struct Draft {
   bool rests_in_t = false;                   // those bones stand in the T-pose, in the zero pose
   double frame_rate_hz = 0.0;
   double metres_per_unit = 1.0;
-  UpAxis up = UpAxis::kPlusY;    // of the file; the skeleton has +Y up
-  std::vector<double> values;    // [frame x channel], rad and m
-  std::vector<double> time_s{};  // [frame], increasing; empty: evenly spaced, from 0
+  UpAxis up = UpAxis::kPlusY;        // of the file; the skeleton has +Y up
+  std::vector<double> values;        // [frame x channel], rad and m
+  std::vector<double> time_s{};      // [frame], increasing; empty: evenly spaced, from 0
+  std::vector<Timecode> timecode{};  // as Clip::timecode
   std::vector<std::string> warnings;
   std::optional<TextFrames> text{};  // set exactly where the format sends text
 };

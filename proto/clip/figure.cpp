@@ -85,7 +85,7 @@ void apply(const rig::Rig& rig, Skeleton& skeleton) {
 Result<> add_profile(const Profile& profile, const Skeleton& skeleton, rig::RigInput& known) {
   known.bones = TRY(named_bones(profile, skeleton));
   known.T = known_t(profile, skeleton);
-  known.up = profile.up;
+  if (!known.up) known.up = profile.up;
   return {};
 }
 

@@ -77,10 +77,11 @@ FramesClip::FramesClip(const std::shared_ptr<const Skeleton>& skeleton)
   }
 }
 
-void FramesClip::add(const Frame& frame) {
+void FramesClip::add(const Frame& frame, const Timecode& timecode) {
   add_angles(frame);
   add_root_position(frame);
   values_.insert(values_.end(), row_.begin(), row_.end());
+  timecode_.push_back(timecode);
 }
 
 void FramesClip::add_angles(const Frame& frame) {
@@ -151,6 +152,9 @@ Result<Clip> FramesClip::finish(const std::string& path, double rate_hz,
   clip.channels =
       Eigen::Map<const ChannelMatrix>(values_.data(), std::ssize(time_s), std::ssize(row_));
   clip.time_s = std::move(time_s);
+  if (std::ranges::any_of(timecode_, [](const Timecode& code) { return code != Timecode{}; })) {
+    clip.timecode = timecode_;
+  }
   return clip;
 }
 

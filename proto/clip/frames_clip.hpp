@@ -19,7 +19,8 @@ class FramesClip {
   explicit FramesClip(const std::shared_ptr<const Skeleton>& skeleton);
 
   // Adds a frame of the skeleton. A channel without a value becomes NaN.
-  void add(const Frame& frame);
+  void add(const Frame& frame) { add(frame, frame.timecode); }
+  void add(const Frame& frame, const Timecode& timecode);
 
   // `time_s` holds the time of every frame, increasing. `rate_hz` is the rate of the clip; 0: one
   // over the median step. Fails with fewer than two frames.
@@ -34,6 +35,7 @@ class FramesClip {
   int moving_;  // the joint (root_joint or above it) whose position channels are written
   std::vector<double> row_;  // [channel]
   std::vector<double> values_;
+  std::vector<Timecode> timecode_;  // [frame]
 };
 
 // FrameTimes: when the frames of such a clip were.

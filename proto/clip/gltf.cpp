@@ -24,6 +24,16 @@ namespace {
 
 constexpr std::size_t kMaxBytes = std::numeric_limits<std::uint32_t>::max() / 2;
 
+// An animation's "timecode" is that of its first key, "timecodes" those of all; no extension of
+// glTF has a place for them.
+tinygltf::Value timecode_extras(const std::vector<Timecode>& all) {
+  if (all.empty()) return {};
+  tinygltf::Value::Array each;
+  for (const Timecode& code : all) each.emplace_back(std::string(view_of(code)));
+  return tinygltf::Value(
+      tinygltf::Value::Object{{"timecode", each.front()}, {"timecodes", tinygltf::Value(each)}});
+}
+
 // Fills a tinygltf model: all numbers go into one buffer, which becomes the binary part of the
 // file.
 class ModelBuilder {
@@ -74,6 +84,7 @@ class ModelBuilder {
       add_track(model_, animation, times, index, "rotation", node.rotation_xyzw,
                 TINYGLTF_TYPE_VEC4);
     }
+    animation.extras = timecode_extras(motion_.timecode);
     // glTF does not allow an animation of nothing: a figure without channels stands still.
     if (!animation.channels.empty()) model_.animations.push_back(std::move(animation));
   }
@@ -261,6 +272,7 @@ Result<> write_glb(const Clip& clip, const std::filesystem::path& path) {
       motion.nodes.push_back(end_site_of(skeleton.joints[j], j));
     }
   }
+  motion.timecode = clip.timecode;
   return write_gltf(motion, GltfKind::kSkin, path);
 }
 

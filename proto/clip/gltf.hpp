@@ -32,6 +32,7 @@ struct GltfMotion {
   std::string name;
   std::vector<float> time_s;    // [frame], from 0, increasing
   std::vector<GltfNode> nodes;  // parents come before their children; the first one is the root
+  std::vector<Timecode> timecode{};  // as Clip::timecode
 };
 
 enum class GltfKind : std::uint8_t {

@@ -438,6 +438,26 @@ Times times_of(const std::vector<Track>& tracks) {
   return times;
 }
 
+// Those that gltf.cpp writes: a frame has that of the newest key. Empty for other files.
+std::vector<Timecode> timecodes_of(const tinygltf::Model& model, const std::vector<Track>& tracks,
+                                   const Times& times) {
+  if (model.animations.empty() || tracks.empty()) return {};
+  const tinygltf::Value& extras = model.animations.front().extras;
+  if (!extras.IsObject() || !extras.Has("timecodes")) return {};
+  const tinygltf::Value& keys = extras.Get("timecodes");
+  const std::vector<double>& key_s = tracks.front().time_s;
+  if (!keys.IsArray() || keys.ArrayLen() != key_s.size()) return {};
+  std::vector<Timecode> out;
+  for (std::size_t i = 0; i < times.frames; ++i) {
+    constexpr double kNear_s = 1e-4;  // the keys' times are floats
+    const double time_s = times.first_s + static_cast<double>(i) / times.rate_hz + kNear_s;
+    const auto next = std::ranges::upper_bound(key_s, time_s) - key_s.begin();
+    const tinygltf::Value& code = keys.Get(static_cast<int>(std::max(next - 1, std::ptrdiff_t{0})));
+    out.push_back(code.IsString() ? to_timecode(code.Get<std::string>()) : Timecode{});
+  }
+  return out;
+}
+
 // --- the clip
 
 class Reader {
@@ -567,6 +587,7 @@ Result<Draft> Reader::read() {
     draft.warnings.push_back("has " + std::to_string(model_.animations.size()) +
                              " animations; the first one is read");
   }
+  draft.timecode = timecodes_of(model_, tracks, times);
   std::vector<std::array<double, 3>> near(figure_.nodes.size());
   std::vector<Pose> own = rest_;
   for (std::size_t i = 0; i < times.frames; ++i) {

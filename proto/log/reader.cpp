@@ -326,14 +326,17 @@ Result<std::vector<GapRow>> Reader::gaps() const {
 }
 
 Result<std::vector<TakeRow>> Reader::takes() const {
+  const bool timed = TRY(state_->database.value("PRAGMA user_version")) != "3";
   auto select = TRY(state_->database.prepare(
-      "SELECT id, name, first_item, last_item, crc FROM take ORDER BY id"));
+      timed ? "SELECT id, name, first_item, last_item, timecode, crc FROM take ORDER BY id"
+            : "SELECT id, name, first_item, last_item, crc FROM take ORDER BY id"));
   std::vector<TakeRow> takes;
   for (;;) {
     const auto stepped = TRY(state_->step(select, "take"));
     if (!stepped) return takes;
     takes.push_back({select.integer(0), std::string(select.text(1)), unsigned_of(select.integer(2)),
-                     unsigned_of(select.integer(3))});
+                     unsigned_of(select.integer(3)),
+                     timed ? std::string(select.text(4)) : std::string()});
   }
 }
 

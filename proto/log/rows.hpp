@@ -99,6 +99,7 @@ struct TakeRow {
   std::string name;
   std::uint64_t first_item = 0;
   std::uint64_t last_item = 0;  // below first_item: nothing came; kToTheEnd: it was never ended
+  std::string timecode{};       // at its beginning, where another system told it
 };
 
 // Spelling of the (stage, name) of decisions.

@@ -13,9 +13,11 @@
 namespace posed::log {
 
 inline constexpr std::int32_t kApplicationId = 0x504F5345;  // "POSE" in the SQLite header
-inline constexpr std::int32_t kFormatVersion = 3;  // user_version; increases when the tables change
+inline constexpr std::int32_t kFormatVersion = 4;  // user_version; increases when the tables change
 inline constexpr std::int32_t kMinFormatVersion = 3;  // the oldest that is read
 
+// Format 3 has no timecode of a take.
+//
 // STRICT: SQLite rejects values of the wrong type, so a reader need not check each row.
 inline constexpr const char* kSchema = R"sql(
 CREATE TABLE meta(key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
@@ -39,7 +41,8 @@ CREATE TABLE gap(id INTEGER PRIMARY KEY, kind INTEGER NOT NULL, owner INTEGER NO
                  after_chunk INTEGER NOT NULL, lost INTEGER NOT NULL, time_ns INTEGER NOT NULL,
                  crc INTEGER NOT NULL) STRICT;
 CREATE TABLE take(id INTEGER PRIMARY KEY, name TEXT NOT NULL, first_item INTEGER NOT NULL,
-                  last_item INTEGER NOT NULL, crc INTEGER NOT NULL) STRICT;
+                  last_item INTEGER NOT NULL, timecode TEXT NOT NULL,
+                  crc INTEGER NOT NULL) STRICT;
 CREATE INDEX frame_of_stream ON frame(stream, raw);
 )sql";
 

@@ -34,7 +34,7 @@ constexpr std::array<std::string_view, kSqlCount> kSql{
     "INSERT INTO gap VALUES(?,?,?,?,?,?,?)",
     "INSERT INTO source VALUES(?,?,?,?,?,?,?)",
     "INSERT OR REPLACE INTO stream VALUES(?,?,?,?,?,?,?)",
-    "INSERT OR REPLACE INTO take VALUES(?,?,?,?,?)",
+    "INSERT OR REPLACE INTO take VALUES(?,?,?,?,?,?)",
     "INSERT OR IGNORE INTO blob VALUES(?,?)",
     "BEGIN IMMEDIATE",
     "COMMIT",
@@ -294,6 +294,7 @@ Result<> Writer::add(const TakeRow& row) {
                                   .bind(row.name)
                                   .bind(stored(row.first_item))
                                   .bind(stored(row.last_item))
+                                  .bind(row.timecode)
                                   .bind_checksum());
 }
 

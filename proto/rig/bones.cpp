@@ -30,6 +30,10 @@ std::optional<BoneJoints> find_hand(const Figure& figure, const std::vector<Join
   return bones;
 }
 
+// From a neck to its head at most, as part of the way from the chest to the head: a joint without
+// an end site behind the first one is a head if it is as near, else the end of one.
+constexpr double kNeck = 0.4;
+
 // The chain above the arms that holds no arm: neck and head where neither is named.
 std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>& names,
                              const BoneJoints& bones, int chest) {
@@ -54,8 +58,15 @@ std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>&
   };
   const int first = *std::ranges::max_element(rest, {}, length);
   std::vector<int> chain;
+  Vec way = Vec::Zero();
   for (const int j : figure.main_chain(first)) {
-    const bool tip = figure.children(j).empty() && figure.end_length(j) <= 0.0;
+    const Vec step = figure.between(chest, j).value_or(Vec::Zero()) - way;
+    constexpr double kBack = -0.3;
+    const bool turns_back = !chain.empty() && direction(step).dot(direction(way)) < kBack;
+    if (turns_back) break;  // hair
+    way += step;
+    const bool tip = figure.children(j).empty() && figure.end_length(j) <= 0.0 &&
+                     (chain.size() != 1 || step.norm() > kNeck * way.norm());
     if (!tip && !names[j].has("end") && !names[j].has("nub")) chain.push_back(j);
   }
   return chain.empty() ? std::vector{first} : chain;
@@ -74,7 +85,12 @@ Upper find_head(const Figure& figure, const std::vector<JointName>& names, const
     if (is_neck(names[j])) necks.push_back(j);
   }
   if (!necks.empty()) {
-    return {.head = necks.size() > 1 ? necks.back() : -1, .top = necks.back()};
+    const int neck = necks.back();
+    if (necks.size() > 1) return {.head = neck, .top = neck};
+    const auto above = chain_above(figure, names, bones, neck);
+    const int head =
+        above.empty() || names[above.back()].side != NameSide::kNone ? -1 : above.back();
+    return {.head = head, .top = head < 0 ? neck : head};
   }
   const auto chain = chain_above(figure, names, bones, chest);
   if (chain.empty()) return {.top = chest};

@@ -54,6 +54,21 @@ std::array<int, kSlots> best_chain(const Figure& figure,
 
 }  // namespace
 
+// Hand, foot and toes that the names do not say are the next joints of the limb, where such a joint
+// is far enough to be no twist: `chain` ends before them.
+int next_of_limb(const Figure& figure, const std::vector<JointName>& names, int last, int known) {
+  constexpr double kFar = 0.5;  // of the segment before
+  int next = -1;
+  for (const int child : figure.children(last)) {
+    const bool leads = known < 0 || (child != known && figure.below(child, known));
+    const bool far = figure[child].offset.norm() > kFar * figure[last].offset.norm();
+    if (!leads || !far || names[child].helper || finger_of(names[child])) continue;
+    if (next >= 0) return -1;
+    next = child;
+  }
+  return next;
+}
+
 void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones) {
   const auto find = [&](Side side, Bone first, auto fit_of,
                         const std::array<bool, kSlots>& needed) {
@@ -62,7 +77,11 @@ void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJ
     for (std::size_t j = 0; j < names.size(); ++j) {
       if (names[j].side == wanted) fits[j] = fit_of(names[j]);
     }
-    const auto chain = best_chain(figure, fits, needed);
+    auto chain = best_chain(figure, fits, needed);
+    const std::size_t end = first == Bone::kLeftUpperLeg ? 2 : 3;  // foot or hand
+    if (chain[end - 1] >= 0 && chain[end] < 0) {
+      chain[end] = next_of_limb(figure, names, chain[end - 1], end == 2 ? chain[3] : -1);
+    }
     for (std::size_t k = 0; k < kSlots; ++k) {
       bones.set(on(side, static_cast<Bone>(static_cast<std::size_t>(first) + k)), chain[k]);
     }

@@ -94,7 +94,7 @@ void collect(const RigInput& input, const Frames& frames, Rig& rig) {
     }
     if (j < input.T.size() && input.T[j]) {
       T = *input.T[j];
-      rig.evidence[j] = {1.0, "a profile says so"};
+      rig.evidence[j] = {1.0, "the file or a profile says so"};
     }
     rig.T[j] = T;
   }

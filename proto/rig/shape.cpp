@@ -8,13 +8,15 @@ namespace {
 
 constexpr std::size_t kMaxPairs = 400;  // the longest; a person has a dozen
 constexpr int kMaxSiblings = 64;
+constexpr int kLimbJoints = 4;
 
 constexpr std::array kLeg{Bone::kLeftUpperLeg, Bone::kLeftLowerLeg, Bone::kLeftFoot,
                           Bone::kLeftToes};
 constexpr std::array kArm{Bone::kLeftShoulder, Bone::kLeftUpperArm, Bone::kLeftLowerArm,
                           Bone::kLeftHand};
 
-// Two chains that begin at one joint and are as long as each other.
+// Two chains that begin at one joint and are as long as each other, as far as a limb goes: a hand
+// may hold a prop.
 struct Pair {
   double length = 0.0;
   int parent = 0;
@@ -23,12 +25,16 @@ struct Pair {
 
 std::optional<Pair> mirrored(const Figure& figure, int parent, int one, int other) {
   const int joints = figure.main_chain_length(one);
-  if (joints < 3 || joints != figure.main_chain_length(other)) return std::nullopt;
+  const int others = figure.main_chain_length(other);
+  const bool whole = std::min(joints, others) >= kLimbJoints;
+  if (std::min(joints, others) < 3 || (joints != others && !whole)) return std::nullopt;
   const auto a = figure.segments(figure.main_chain(one));
   const auto b = figure.segments(figure.main_chain(other));
   double length = 0.0;
   double gap = 0.0;
-  for (std::size_t i = 0; i < std::min<std::size_t>(a.size(), 4); ++i) {
+  const std::size_t compared =
+      joints == others ? std::min<std::size_t>(a.size(), kLimbJoints) : kLimbJoints - 1;
+  for (std::size_t i = 0; i < compared; ++i) {
     length += a[i];
     gap += std::abs(a[i] - b[i]);
   }
@@ -77,7 +83,9 @@ std::size_t long_bones(const std::vector<double>& segments, bool arm) {
 }
 
 void set_limb(const Figure& figure, const Pair& pair, bool arm, BoneJoints& bones) {
-  const std::size_t first = long_bones(figure.segments(figure.main_chain(pair.one)), arm);
+  const auto one = figure.segments(figure.main_chain(pair.one));
+  const auto other = figure.segments(figure.main_chain(pair.other));
+  const std::size_t first = long_bones(one.size() < other.size() ? one : other, arm);
   for (const Side side : kSides) {
     const auto chain = figure.main_chain(side == Side::kLeft ? pair.one : pair.other);
     for (std::size_t k = 0; k < 4; ++k) {
@@ -149,7 +157,9 @@ std::optional<BoneJoints> limbs_by_shape(const Figure& figure, const std::vector
   for (const Pair& leg : pairs) {
     for (const Pair& arm : pairs) {
       if (&leg == &arm || !fit_together(figure, leg, arm)) continue;
-      const double score = leg.length + arm.length - 0.01 * figure.depth(leg.parent);
+      // Arms begin above the legs: strands of a skirt do not.
+      const double beside = leg.parent == arm.parent ? 0.3 * leg.length : 0.0;
+      const double score = leg.length + arm.length - beside - 0.01 * figure.depth(leg.parent);
       if (score <= best + 1e-9) continue;
       best = score;
       legs = &leg;

@@ -233,8 +233,9 @@ JointName parse_one(const Tokens& tokens) {
   return name;
 }
 
-// Drops the first or the last token where at least four of five joints share it.
-void drop_common(std::vector<Tokens>& all, bool first) {
+// Drops the first or the last token where at least four of five joints share it. Returns whether
+// there was one.
+bool drop_common(std::vector<Tokens>& all, bool first) {
   std::map<std::string_view, std::size_t> count;
   const auto at = [first](const Tokens& t) -> const std::string& {
     return first ? t.front() : t.back();
@@ -244,13 +245,14 @@ void drop_common(std::vector<Tokens>& all, bool first) {
   }
   const auto most = std::ranges::max_element(
       count, {}, [](const auto& entry) { return std::pair(entry.second, entry.first); });
-  if (most == count.end() || 5 * most->second < 4 * all.size()) return;
+  if (most == count.end() || 5 * most->second < 4 * all.size()) return false;
   const std::string common(most->first);
-  if (side_word(common) != NameSide::kNone || is_anatomical(common)) return;
+  if (side_word(common) != NameSide::kNone || is_anatomical(common)) return false;
   for (Tokens& tokens : all) {
     if (tokens.empty() || at(tokens) != common) continue;
     tokens.erase(first ? tokens.begin() : tokens.end() - 1);
   }
+  return true;
 }
 
 std::string joined(const std::vector<std::string>& words, std::size_t from, std::size_t to) {
@@ -259,7 +261,8 @@ std::string joined(const std::vector<std::string>& words, std::size_t from, std:
   return out;
 }
 
-// Looks up the whole stem, then the stem without its first or its last words.
+// Looks up the whole stem, then the stem without its first or its last words, which fits less: the
+// joint "collar" is more a shoulder than a "collar p" beside it.
 std::optional<Fit> fit_of(const JointName& name, const FitTable& table) {
   if (name.helper) return std::nullopt;
   const auto look = [&table](std::string_view word) {
@@ -271,10 +274,14 @@ std::optional<Fit> fit_of(const JointName& name, const FitTable& table) {
     if (const auto fit = look(name.stem.substr(0, name.stem.size() - 4))) return fit;
   }
   if (finger_of(name) || name.has("finger")) return std::nullopt;
+  constexpr double kPart = 0.98;
   constexpr std::size_t kMaxWords = 8;  // longer names say something else
   for (std::size_t i = 1; i < std::min(name.words.size(), kMaxWords); ++i) {
-    if (const auto fit = look(joined(name.words, i, name.words.size()))) return fit;
-    if (const auto fit = look(joined(name.words, 0, i))) return fit;
+    auto fit = look(joined(name.words, i, name.words.size()));
+    if (!fit) fit = look(joined(name.words, 0, i));
+    if (!fit) continue;
+    for (double& slot : *fit) slot *= kPart;
+    return fit;
   }
   return std::nullopt;
 }
@@ -290,7 +297,10 @@ std::vector<JointName> parse_names(const std::vector<std::string_view>& names) {
   for (const std::string_view name : names) all.push_back(tokens_of(name));
   constexpr std::size_t kMinJoints = 6;  // fewer may well share a word that matters
   if (all.size() >= kMinJoints) {
-    for (const bool first : {true, true, false}) drop_common(all, first);
+    constexpr int kMaxMakerTokens = 6;  // "Rig|ValveBiped.Bip01_"
+    for (int i = 0; i < kMaxMakerTokens && drop_common(all, true); ++i) {
+    }
+    drop_common(all, false);
   }
   std::vector<JointName> out;
   for (const Tokens& tokens : all) out.push_back(parse_one(tokens));

@@ -35,7 +35,7 @@ TEST_CASE("inspect names the bones, and its profile gives the same figure back")
   REQUIRE(again.code == 0);
   const json mapped = json::parse(again.out);
   CHECK(mapped.at("bones").size() == found.at("bones").size());
-  CHECK(mapped.at("bones")[3].at("why") == "a profile says so");
+  CHECK(mapped.at("bones")[3].at("why") == "the file or a profile says so");
   // A profile that does not fit is refused by the joint that is missing.
   std::string text = load_file(map, {.what = "profile", .max_bytes = 1 << 20}).value();
   const std::string hips = found.at("bones")[0].at("joint");

@@ -204,7 +204,8 @@ class Collector {
  public:
   explicit Collector(const std::shared_ptr<const Skeleton>& skeleton) : clip_(skeleton) {}
 
-  void add(const Frame& frame) {
+  // `timecode` is that of the moment, where the frame has none of its own; empty: not known.
+  void add(const Frame& frame, const Timecode& timecode = {}) {
     const Header& header = frame.header;
     if (part_ != header.stream) {
       if (last_ != 0) ++returns_;
@@ -215,7 +216,7 @@ class Collector {
     missing_ += last_ == 0 ? 0 : header.sequence - last_ - 1;
     last_ = header.sequence;
     times_.add(header);
-    clip_.add(frame);
+    clip_.add(frame, frame.timecode == Timecode{} ? timecode : frame.timecode);
   }
 
   [[nodiscard]] std::size_t frames() const { return times_.size(); }
@@ -238,6 +239,24 @@ class Collector {
   std::uint32_t part_ = pipeline::kNoStream;
   std::uint64_t last_ = 0, missing_ = 0, returns_ = 0;
   clip::FrameTimes times_;
+};
+
+// The timecodes that a trigger told of the beginnings of takes: each for the first frame behind it.
+class TakeStarts {
+ public:
+  explicit TakeStarts(std::vector<log::TakeRow> takes) : takes_(std::move(takes)) {}
+
+  Timecode at(std::uint64_t item) {
+    Timecode timecode{};
+    for (; next_ < takes_.size() && item >= takes_[next_].first_item; ++next_) {
+      timecode = holds(takes_[next_], item) ? to_timecode(takes_[next_].timecode) : Timecode{};
+    }
+    return timecode;
+  }
+
+ private:
+  std::vector<log::TakeRow> takes_;  // in their order
+  std::size_t next_ = 0;
 };
 
 // By stream, the name of its clip: that of the stream, or "walker#2" if its skeleton changes.
@@ -311,10 +330,11 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
   const replay::ReplayStream& first = replay.stream(chosen.ids.front());
   Collector collector(skeleton_of(replay, chosen.ids.front(), chosen.raw));
   const auto kind = chosen.raw ? pipeline::Item::Kind::kRawFrame : pipeline::Item::Kind::kFrame;
+  TakeStarts starts(wanted_take.empty() ? TRY(reader.takes()) : std::vector{interval});
   const auto take = [&](const pipeline::Item& item) {
     if (item.kind == kind && holds(interval, replay.position()) &&
         std::ranges::find(chosen.ids, item.frame.header.stream) != chosen.ids.end()) {
-      collector.add(item.frame);
+      collector.add(item.frame, starts.at(replay.position()));
     }
   };
   TRY(replay.run(take,

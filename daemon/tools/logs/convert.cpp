@@ -19,6 +19,7 @@
 #include "proto/clip/format.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/clip/hand_clip.hpp"
+#include "proto/clip/timecode_cut.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
@@ -45,6 +46,8 @@ Findings findings_of(const LoggedTake& take) {
     findings.add("begin_s", *take.begin_s).add("length_s", length_s);
     time = fmt::format("from {:.2f} s, {:.2f} s long", *take.begin_s, length_s);
   }
+  findings.add("timecode", take.row.timecode);
+  if (!take.row.timecode.empty()) time += ", timecode " + clean(take.row.timecode);
   return findings.say(fmt::format("{}  {}  {}{}", take.row.id, clean(take.row.name), time, end));
 }
 
@@ -92,6 +95,7 @@ struct Convert {
   std::string hand;    // "left", "right" or not given
   std::string stream;  // of a log; empty: the only one
   std::string take;    // of a log, a number or a name; empty: all
+  std::string from_timecode, to_timecode;
   bool takes = false;  // list those of a log
   bool overwrite = false, json = false;
   bool shape_given = false;
@@ -113,6 +117,7 @@ Result<> check_options(const Convert& convert) {
     return misuse(what, convert.in);
   };
   const bool of_log = is_log(convert.in);
+  const bool cuts = !convert.from_timecode.empty() || !convert.to_timecode.empty();
   const bool reads_clip_options = !convert.read.skeleton.empty() || !convert.read.profile.empty() ||
                                   convert.read.rate_hz || convert.read.metres_per_unit ||
                                   convert.read.up || convert.read.facing;
@@ -121,8 +126,8 @@ Result<> check_options(const Convert& convert) {
                 "is not a device log (.plog), so --stream has no effect"),
         useless(!convert.take.empty(), of_log,
                 "is not a device log (.plog), so --take has no effect"),
-        useless(!convert.stream.empty() || !convert.take.empty(), !is_mcap(convert.out),
-                "is written as a whole log, so --stream and --take have no effect"),
+        useless(!convert.stream.empty() || !convert.take.empty() || cuts, !is_mcap(convert.out),
+                "is written as a whole log, so --stream, --take and timecodes have no effect"),
         useless(is_mcap(convert.out), of_log,
                 "is not a device log (.plog), and only a log becomes a .mcap; name a .glb"),
         useless(reads_clip_options, !of_log,
@@ -191,10 +196,12 @@ int run(Convert& convert) {
   if (!convert.hand.empty()) {
     convert.read.hand = side_named(convert.hand);
   }
-  const auto clip = [&] {
+  auto clip = [&] {
     const Waiting waiting("reading " + convert.in);
     return read(convert);
   }();
+  if (clip)
+    clip = clip::cut_by_timecode(*std::move(clip), convert.from_timecode, convert.to_timecode);
   if (!clip) return report(clip.error());
   Findings findings;
   for (const std::string& warning : clip->warnings) findings.remark(convert.in + ": " + warning);
@@ -205,6 +212,7 @@ int run(Convert& convert) {
       .add("rate_hz", clip->frame_rate_hz)
       .add("joints", clip->skeleton->joints.size())
       .add("metres_per_unit", clip->metres_per_unit)
+      .add("timecode", clip->timecode.empty() ? "" : view_of(clip->timecode.front()))
       .add("warnings", clip->warnings)
       .note(fmt::format("wrote {}: {} frame{} at {:g} Hz, {} joints", convert.out, clip->frames(),
                         clip->frames() == 1 ? "" : "s", clip->frame_rate_hz,
@@ -241,6 +249,10 @@ void add_convert(CLI::App& app, int& exit_code) {
       ->excludes(out)
       ->excludes(stream)
       ->excludes(take);
+  command->add_option("--from-timecode", convert->from_timecode,
+                      "Begin at this timecode: hh:mm:ss:ff, ;ff (drop frame) or .mmm; @25 behind"
+                      " it: its rate");
+  command->add_option("--to-timecode", convert->to_timecode, "End with this timecode");
   command->add_option("--hand", convert->hand, "The hand of a hand CSV, or which hand to take")
       ->check(CLI::IsMember({"left", "right"}));
   auto* shape = command->add_option("--hand-shape", convert->read.hand_shape,
@@ -267,6 +279,7 @@ void add_convert(CLI::App& app, int& exit_code) {
       "  posed convert take1.plog --stream walker --out walker.bvh\n"
       "  posed convert take1.plog --takes\n"
       "  posed convert take1.plog --take 2 --stream walker --out walker-2.bvh\n"
+      "  posed convert take1.plog --from-timecode 10:20:30:05 --out walker.glb\n"
       "  posed convert mixamo.fbx --out walk.bvh\n"
       "  posed convert walk.bvh --out walk.vrma\n"
       "  posed convert take1.plog --out take1.mcap");

@@ -27,7 +27,7 @@ struct Protocol {
   OutputKind kind{};
   std::vector<std::string> people{};  // of the emulator
   drivers::Options options{};
-  bool euler = false, lz4 = false;
+  bool euler = false, lz4 = false, binary = false;
 };
 
 config::OutputConfig protocol_config(const Protocol& protocol, const UdpReceiver& receiver) {
@@ -84,6 +84,36 @@ void check_round_trip(const Protocol& protocol) {
   CHECK(worst.m < 1e-5);
   CHECK(worst.timecodes == 0);
   CHECK(second.damage == "");
+  CHECK(rig.reported.empty());
+}
+
+// Sixteen people at 120 Hz for three seconds, on a virtual clock.
+void check_crowd(const Protocol& protocol, const std::string& what, int people = kCrowd) {
+  const std::string driver(config::kind_name(protocol.kind));
+  const Crowd crowd(driver, protocol.options);
+  ProtocolReader reader(driver);
+  UdpReceiver receiver;
+  Protocol many = protocol;
+  many.people = Crowd::names(people);
+  config::OutputConfig config = protocol_config(many, receiver);
+  config.binary = protocol.binary;
+  const OutputRig rig(config);
+  for (int i = 0; i < people; ++i) {
+    rig.output->stream_comes(
+        info_of(static_cast<std::uint32_t>(i), many.people[i], crowd.named(many.people[i])));
+  }
+  // mocopi's one performer has no name.
+  const auto names = people == 1 ? std::vector<std::string>{"mocopi"} : many.people;
+  CrowdCheck check;
+  constexpr int kStart = 120;  // describes the people: some protocols do so each second only
+  for (int step = 0; step < kStart + 360; ++step) {
+    const std::int64_t now_ns = kNanosPerSecond + step * kNanosPerSecond / 120;
+    check.pass(rig, crowd, people, step, now_ns);
+    for (const auto& datagram : receiver.received(rig.sent())) reader.feed(datagram, now_ns);
+    if (step >= kStart) check.compare_with(crowd, reader, people, step, names);
+  }
+  check.show(what);
+  CHECK(reader.damage == "");
   CHECK(rig.reported.empty());
 }
 
@@ -206,6 +236,18 @@ TEST_CASE("Rokoko's receivers are told how high an actor stands, by which they s
 TEST_CASE("any other person arrives through the outputs of mocopi and Rokoko") {
   check_walker({.kind = OutputKind::kMocopi});
   check_walker({.kind = OutputKind::kRokoko, .lz4 = true});
+}
+
+TEST_CASE("sixteen people at 120 Hz arrive through each output as they were", "[.crowd]") {
+  check_crowd({.kind = OutputKind::kMvn}, "mvn quaternion");
+  check_crowd({.kind = OutputKind::kMvn, .euler = true}, "mvn Euler");
+  check_crowd({.kind = OutputKind::kAxis}, "axis text");
+  check_crowd({.kind = OutputKind::kAxis, .binary = true}, "axis binary");
+  check_crowd({.kind = OutputKind::kRokoko}, "rokoko");
+  check_crowd({.kind = OutputKind::kRokoko, .lz4 = true}, "rokoko LZ4");
+  for (int i = 0; i < kCrowd; ++i) {
+    check_crowd({.kind = OutputKind::kMocopi}, "mocopi " + std::to_string(i + 1), 1);
+  }
 }
 
 TEST_CASE("a stream without a person is named, and the others are sent") {

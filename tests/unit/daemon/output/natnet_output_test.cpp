@@ -179,6 +179,39 @@ TEST_CASE("people and props of Motive arrive through the NatNet output as they w
   CHECK(rig.reported.empty());
 }
 
+TEST_CASE("sixteen people at 120 Hz arrive through NatNet of each version", "[.crowd]") {
+  const Crowd crowd("natnet", {});
+  const auto names = Crowd::names();
+  for (const Version version : {Version{2, 9}, {2, 10}, {3, 0}, {3, 1}, {4, 0}, {4, 1}}) {
+    const std::string text = std::to_string(version.major) + "." + std::to_string(version.minor);
+    NatNetServerRig rig(natnet_config(names));
+    const NatNetClient client(rig);
+    ProtocolReader reader("natnet", {{"version", text}});
+    for (int i = 0; i < kCrowd; ++i) {
+      rig.output->stream_comes(
+          info_of(static_cast<std::uint32_t>(i), names[i], crowd.named(names[i])));
+    }
+    CHECK(client.connect(version) == version);
+    reader.feed(client.ask(natnet::encode_message(MessageId::kRequestModelDef, {})), rig.now_ns);
+    REQUIRE(reader.bodies().size() == kCrowd);
+    CrowdCheck check;
+    for (int step = 0; step < 360; ++step) {
+      rig.now_ns += kNanosPerSecond / 120;
+      const auto before = rig.stats().sent();
+      check.pass(rig, crowd, kCrowd, step, rig.now_ns);
+      for (auto sent = rig.stats().sent(); sent > before; --sent) {
+        reader.feed(client.next(), rig.now_ns);
+      }
+      // The first frame goes out with the first person that is there.
+      if (step > 0) check.compare_with(crowd, reader, kCrowd, step, names);
+      reader.newest.clear();
+    }
+    check.show("natnet " + text);
+    CHECK(reader.damage == "");
+    CHECK(rig.reported.empty());
+  }
+}
+
 TEST_CASE("any other person is sent by the NatNet output as Motive's figure") {
   const auto walk = motion::make_walker({.seconds = 1.0, .rate_hz = 60.0}).value();
   const auto canonical = motion::canonical_skeleton(*walk.skeleton).value();

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdio>
+#include <ctime>
 #include <map>
 #include <memory>
 #include <span>
@@ -87,6 +89,99 @@ inline void compare(const Skeleton& skeleton, const Frame& a, const Frame& b, Ap
                                          static_cast<double>(b.root_position_m[k])));
   }
 }
+
+// Sixteen people of a system: one person's poses, each a little later than the last one's.
+inline constexpr int kCrowd = 16;
+class Crowd {
+ public:
+  // From two seconds of the protocol's emulator.
+  Crowd(const std::string& driver, const drivers::Options& options) {
+    const auto emulator = drivers::find_driver(driver)->emulate(options).value();
+    ProtocolReader first(driver);
+    while (emulator->next_due_ns() < 2 * kNanosPerSecond) {
+      const std::int64_t now_ns = emulator->next_due_ns();
+      std::vector<std::byte> bytes;
+      emulator->emit(now_ns, bytes);
+      first.feed(bytes, now_ns);
+      if (first.bodies().empty()) continue;
+      const std::string& name = first.bodies()[0].name;
+      if (first.skeleton(name) != skeleton) poses_.clear();
+      skeleton = first.skeleton(name);
+      if (first.newest.contains(name)) poses_.push_back(first.newest[name]);
+      first.newest.clear();
+    }
+    REQUIRE(poses_.size() > 30);
+  }
+  [[nodiscard]] Frame pose(int person, int step) const {
+    Frame pose = frame_of(static_cast<std::uint32_t>(person),
+                          poses_[static_cast<std::size_t>(step + 7 * person) % poses_.size()]);
+    pose.header.sequence = static_cast<std::uint64_t>(step) + 1;
+    return pose;
+  }
+  // The skeleton of a person of this name.
+  [[nodiscard]] std::shared_ptr<const Skeleton> named(const std::string& name) const {
+    auto copy = std::make_shared<Skeleton>(*skeleton);
+    copy->name = name;
+    REQUIRE(copy->finish());
+    return copy;
+  }
+  [[nodiscard]] static std::vector<std::string> names(int people = kCrowd) {
+    std::vector<std::string> all;
+    for (int i = 0; i < people; ++i) all.push_back("p" + std::to_string(i));
+    return all;
+  }
+
+  std::shared_ptr<const Skeleton> skeleton;
+
+ private:
+  std::vector<Frame> poses_;
+};
+
+// What the figures print: frames that did not arrive, how far the others are off, and how long the
+// output's own thread works for the pose of one person.
+struct CrowdCheck {
+  Apart worst;
+  int sent = 0, arrived = 0;
+  std::vector<double> us{};
+
+  void show(const std::string& what) {
+    std::ranges::sort(us);
+    std::printf("%-24s %5d poses, %d lost, %.1g rad, %.1g m, p50 %.1f us, p99 %.1f us a pose\n",
+                what.c_str(), sent, sent - arrived, worst.rad, worst.m, us[us.size() / 2],
+                us[us.size() * 99 / 100]);
+    CHECK(sent == arrived);
+    CHECK(worst.rad < 1e-5);
+    CHECK(worst.m < 1e-5);
+  }
+  // Hands over one step's poses, and counts the thread's own time.
+  void pass(const OutputRig& rig, const Crowd& crowd, int people, int step, std::int64_t now_ns) {
+    const auto cpu_us = [] {
+      timespec time{};
+      ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+      return 1e6 * static_cast<double>(time.tv_sec) + 1e-3 * static_cast<double>(time.tv_nsec);
+    };
+    std::vector<Frame> poses;
+    for (int i = 0; i < people; ++i) {
+      poses.push_back(crowd.pose(i, step));
+      poses.back().header.arrival_ns = now_ns;
+    }
+    const double before_us = cpu_us();
+    for (const Frame& pose : poses) rig.output->frame(pose);
+    static_cast<void>(rig.output->turn(now_ns));
+    us.push_back((cpu_us() - before_us) / people);
+  }
+  void compare_with(const Crowd& crowd, ProtocolReader& reader, int people, int step,
+                    const std::vector<std::string>& names) {
+    for (int i = 0; i < people; ++i) {
+      ++sent;
+      const auto& name = names[static_cast<std::size_t>(i)];
+      if (!reader.newest.contains(name)) continue;
+      ++arrived;
+      compare(*crowd.skeleton, crowd.pose(i, step), reader.newest[name], worst);
+    }
+    reader.newest.clear();
+  }
+};
 
 // Returns whether both have the same joints; `worst.m` grows to how far their bones differ.
 inline bool same_figure(const Skeleton& a, const Skeleton& b, Apart& worst) {

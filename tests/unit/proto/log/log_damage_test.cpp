@@ -59,7 +59,7 @@ TEST_CASE("a flipped bit in any column of any row is detected, and log, table an
     REQUIRE(writer.add(log::GapRow{log::GapRow::Kind::kChunks, 0, 2, 11, 99}));
   }
   REQUIRE(writer.close());
-  forge(whole, "INSERT INTO take VALUES(2, 'jump', 12, 40, 0)");
+  forge(whole, "INSERT INTO take VALUES(2, 'jump', 12, 40, '', 0)");
   CHECK(complaint(whole).empty());
   const auto check = [&](const std::string& table, const std::string& column,
                          const std::string& flipped) {

@@ -101,7 +101,7 @@ TEST_CASE("a log gives back every row it was given") {
   CHECK(*writer.add_blob(bytes_of("model")) == *hash);
   REQUIRE(writer.close());
   CHECK(!std::filesystem::exists(path.string() + "-wal"));
-  forge(path, "INSERT INTO take VALUES(1, 'jump', 12, 40, 0)");
+  forge(path, "INSERT INTO take VALUES(1, 'jump', 12, 40, '', 0)");
 
   auto reader = Reader::open(path);
   REQUIRE(reader);
@@ -166,7 +166,7 @@ TEST_CASE("a log gives back every row it was given") {
 TEST_CASE("a log of a development version or of a newer posed is refused by its format") {
   const test::TempFolder dir;
   for (const auto& [format, words] : {std::pair("2", "development version"),
-                                      {"4", "newer posed"},
+                                      {"5", "newer posed"},
                                       {"0", "development version"}}) {
     const auto path = dir.path() / (std::string(format) + ".plog");
     std::filesystem::copy_file(test::golden("replay/staged.plog"), path);
@@ -328,7 +328,7 @@ TEST_CASE("a file that is not a complete log is refused with one error message")
   }
   SECTION("a newer format") {
     write_whole_log(path, 3);
-    run_sql(path, "PRAGMA user_version=4;");
+    run_sql(path, "PRAGMA user_version=5;");
     CHECK(log_refusal(path).find("update posed") != std::string::npos);
   }
   SECTION("a source that is not described") {

@@ -19,7 +19,7 @@ struct Scheme {
   std::array<const char*, 14> names;  // '*' is the side; the limbs' begin at the sixth
 };
 
-inline constexpr std::array<Scheme, 12> kSchemes{{
+inline constexpr std::array<Scheme, 15> kSchemes{{
     {{"Left", "Right"},
      {"mixamorig:Hips", "mixamorig:Spine", "mixamorig:Spine1", "mixamorig:Spine2", "mixamorig:Neck",
       "mixamorig:Head", "mixamorig:*Shoulder", "mixamorig:*Arm", "mixamorig:*ForeArm",
@@ -60,6 +60,19 @@ inline constexpr std::array<Scheme, 12> kSchemes{{
     {{"L", "R"},
      {"Hip", "Ab", "Chest", "UpperChest", "Neck", "Head", "*Shoulder", "*UArm", "*FArm", "*Hand",
       "*Thigh", "*Shin", "*Foot", "*Toe"}},
+    {{"L", "R"},
+     {"ValveBiped.Bip01_Pelvis", "ValveBiped.Bip01_Spine", "ValveBiped.Bip01_Spine1",
+      "ValveBiped.Bip01_Spine2", "ValveBiped.Bip01_Neck1", "ValveBiped.Bip01_Head1",
+      "ValveBiped.Bip01_*_Clavicle", "ValveBiped.Bip01_*_UpperArm", "ValveBiped.Bip01_*_Forearm",
+      "ValveBiped.Bip01_*_Hand", "ValveBiped.Bip01_*_Thigh", "ValveBiped.Bip01_*_Calf",
+      "ValveBiped.Bip01_*_Foot", "ValveBiped.Bip01_*_Toe0"}},
+    // A hand and a foot of names that no table has, between others that are known.
+    {{"l", "r"},
+     {"pelvis", "lumbar", "torso", "thorax", "cervical", "skull", "clavicle_*", "humerus_*",
+      "radius_*", "carpals_*", "femur_*", "tibia_*", "talus_*", "toes_*"}},
+    {{"Links", "Rechts"},
+     {"Becken", "Wirbel1", "Wirbel2", "Brust", "Hals", "Kopf", "Schluesselbein*", "Oberarm*",
+      "Unterarm*", "Hand*", "Oberschenkel*", "Unterschenkel*", "Fuss*", "Zehen*"}},
 }};
 
 inline constexpr int kMakerJoints = 22;  // the first bones of the enum, which are depth first

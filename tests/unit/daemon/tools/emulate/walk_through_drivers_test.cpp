@@ -29,7 +29,6 @@ using test::ReceivedPose;
 
 constexpr double kWithin_rad = 0.1 * kDegree;
 constexpr double kLacking_rad = 5.0 * kDegree;
-constexpr double kRestPose_rad = 3.1 * kDegree;
 constexpr std::int64_t kLength_ns = 2 * kNanosPerSecond;
 
 // Rotation of each bone in the world relative to its T-pose.
@@ -154,9 +153,8 @@ std::vector<ReceivedPose> styled(const style::StyleModel& model, std::vector<Rec
   return walker;
 }
 
-// What `convert` writes of a recording is read again as the same figure and the same poses, up to
-// `within_rad`.
-void check_read_back(const std::vector<ReceivedPose>& walker, double within_rad) {
+// What `convert` writes of a recording is read again as the same figure and the same poses.
+void check_read_back(const std::vector<ReceivedPose>& walker) {
   const test::TempFolder folder;
   const auto path = folder.path() / "recorded.bvh";
   const Skeleton& sent = *walker[0].skeleton;
@@ -172,6 +170,7 @@ void check_read_back(const std::vector<ReceivedPose>& walker, double within_rad)
   REQUIRE(clip::write_bvh(*recorded, path));
   const auto read = clip::read_clip(path);
   REQUIRE(read);
+  CHECK(read->warnings == std::vector<std::string>{});
   for (int b = 0; b < kBones; ++b) {
     const auto bone = static_cast<Bone>(b);
     const int from = sent.joint_of(bone), to = read->skeleton->joint_of(bone);
@@ -181,12 +180,12 @@ void check_read_back(const std::vector<ReceivedPose>& walker, double within_rad)
     CHECK(read->skeleton->joints[to].name == sent.joints[from].name);
     CHECK((read->skeleton->joints[to].offset_m - sent.joints[from].offset_m).norm() < 1e-4);
     CHECK(angle_between_rad(read->skeleton->joints[to].T_world_joint,
-                            sent.joints[from].T_world_joint) < within_rad);
+                            sent.joints[from].T_world_joint) < kWithin_rad);
   }
   for (std::size_t i = 0; i < walker.size(); i += 10) {
     Difference off;
     off.add(Turns(sent, walker[i].frame), Turns(*read->skeleton, read->frame(static_cast<int>(i))));
-    CHECK(off.most_rad < within_rad);
+    CHECK(off.most_rad < kWithin_rad);
   }
 }
 
@@ -209,8 +208,7 @@ void check(const Walk& walk) {
     REQUIRE(walker.size() > 100);
     const auto file = walk.from_file(walker);
     CHECK(Walk::difference(walker, file).most_rad < kWithin_rad);
-    // A VRM's rest pose is its T-pose, whatever its shins are like; a BVH cannot say so.
-    check_read_back(walker, driver.name == "vmc" ? kRestPose_rad : kWithin_rad);
+    check_read_back(walker);
     const auto styled_walker = styled(model, walker);
     if (styled_walker.empty()) {
       without_style.push_back(driver.name);
