@@ -23,6 +23,7 @@ constexpr std::string_view kGenerate = "generate";
 
 // The ending of the files of a kind.
 std::string_view ending_of(std::string_view kind) {
+  if (kind == kCalibration) return ".toml";
   return kind == kGenerate ? ".gesture" : ".style";
 }
 

@@ -11,6 +11,9 @@
 
 namespace posed::control {
 
+// The kind of a calibration, which lies beside the models but is none of their list.
+inline constexpr std::string_view kCalibration = "calibration";
+
 struct FolderModel {
   std::string name;       // of the file
   std::string_view kind;  // the stage that uses it, as the name's ending says: "style", "generate"
@@ -28,7 +31,7 @@ class ModelFolder {
   Result<std::vector<FolderModel>> list() const;
   // Whether add() can work.
   Result<> check_writable() const;
-  // Keeps a model under this name and the ending of its kind (as in FolderModel), with a number
+  // Keeps a model or a calibration under this name and the ending of its kind, with a number
   // between them if there is one of this name: nothing is ever replaced. Returns the file's name.
   // `name` is one of a stream (config::is_stream_name()).
   Result<std::string> add(const std::string& name, std::string_view kind,

@@ -15,6 +15,7 @@
 #include "models/motion/kinematics.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/model/harmonics.hpp"
+#include "proto/frame/frame.hpp"
 #include "proto/frame/humanoid.hpp"
 
 namespace posed::control {
@@ -57,12 +58,26 @@ MatrixXd cycle_of(const style::StyleModel& model, int dims) {
   return poses + change.leftCols(dims);
 }
 
-void draw(const Skeleton& figure, const motion::WorldPose& pose, int left_cm, std::string& path) {
-  const auto place = [&](Bone bone) -> const Eigen::Vector3d* {
-    const int joint = figure.joint_of(bone);
-    return joint < 0 ? nullptr : &pose.position_m[static_cast<std::size_t>(joint)];
-  };
-  const Eigen::Vector3d* const hips = place(Bone::kHips);
+const Eigen::Vector3d* place_of(const Skeleton& figure, const motion::WorldPose& pose, Bone bone) {
+  const int joint = figure.joint_of(bone);
+  return joint < 0 ? nullptr : &pose.position_m[static_cast<std::size_t>(joint)];
+}
+
+// Where the figure faces over all poses, level; a skeleton of its own may face anywhere.
+Eigen::Vector3d forward_of(const Skeleton& figure, const std::vector<motion::WorldPose>& poses) {
+  Eigen::Vector3d left = Eigen::Vector3d::Zero();
+  for (const motion::WorldPose& pose : poses) {
+    const auto* const to = place_of(figure, pose, Bone::kLeftUpperLeg);
+    const auto* const from = place_of(figure, pose, Bone::kRightUpperLeg);
+    if (to != nullptr && from != nullptr) left += *to - *from;
+  }
+  const Eigen::Vector3d forward(-left.z(), 0.0, left.x());  // left x up
+  return forward.norm() > 0.0 ? Eigen::Vector3d(forward.normalized()) : Eigen::Vector3d::UnitZ();
+}
+
+void draw(const Skeleton& figure, const motion::WorldPose& pose, const Eigen::Vector3d& forward,
+          int left_cm, std::string& path) {
+  const Eigen::Vector3d* const hips = place_of(figure, pose, Bone::kHips);
   if (hips == nullptr) return;
   double lowest_m = hips->y();
   for (const Eigen::Vector3d& joint : pose.position_m) lowest_m = std::min(lowest_m, joint.y());
@@ -74,32 +89,59 @@ void draw(const Skeleton& figure, const motion::WorldPose& pose, int left_cm, st
   for (const auto& limb : limbs()) {
     char pen = 'M';
     for (const Bone bone : limb) {
-      const Eigen::Vector3d* const joint = place(bone);
+      const Eigen::Vector3d* const joint = place_of(figure, pose, bone);
       if (joint == nullptr) continue;
       fmt::format_to(std::back_inserter(path), "{}{} {}", pen,
-                     left_cm + whole(kCentimetres * (joint->z() - hips->z())),
+                     left_cm + whole(kCentimetres * (*joint - *hips).dot(forward)),
                      kGround_cm - whole(kCentimetres * (joint->y() - lowest_m)));
       pen = 'L';
     }
   }
 }
 
+// Who is drawn, in no pose yet; null: the model does not say how its figures look.
+std::shared_ptr<const Skeleton> figure_of(const style::StyleModel& model,
+                                          std::span<const std::shared_ptr<const Skeleton>> known) {
+  const auto walker = motion::make_walker({.seconds = 1.0});
+  if (walker && model.space.space == motion::Space::kHumanoid) return walker->skeleton;
+  const auto learnt_from = [&](const std::shared_ptr<const Skeleton>& figure) {
+    return figure &&
+           std::ranges::find(model.gate.rigs, style::rig_id(*figure)) != model.gate.rigs.end();
+  };
+  const auto found = std::ranges::find_if(known, learnt_from);
+  if (found != known.end()) return *found;
+  return walker && learnt_from(walker->skeleton) ? walker->skeleton : nullptr;
+}
+
+Frame at_rest(const Skeleton& figure) {
+  Frame frame;
+  frame.skeleton = figure.id;
+  frame.joint_count = static_cast<std::uint16_t>(figure.joints.size());
+  for (std::size_t j = 0; j < figure.joints.size(); ++j) frame.valid.set(j);
+  return frame;
+}
+
 }  // namespace
 
-std::string strip_of(const style::StyleModel& model) {
-  if (model.space.space != motion::Space::kHumanoid) return {};
-  const auto walker = motion::make_walker({.seconds = 1.0});
-  if (!walker) return {};
-  const Skeleton& figure = *walker->skeleton;
-  const auto space = motion::PoseSpace::bind_person(model.space, figure);
+std::string strip_of(const style::StyleModel& model,
+                     std::span<const std::shared_ptr<const Skeleton>> known) {
+  const auto figure = figure_of(model, known);
+  if (!figure) return {};
+  const auto space = motion::PoseSpace::bind_person(model.space, *figure);
   if (!space) return {};
-  const MatrixXd poses = cycle_of(model, space->dims());
-  std::string path;
-  for (int i = 0; i < static_cast<int>(poses.rows()); ++i) {
-    Frame frame = walker->frame(0);
-    const Eigen::VectorXd q = poses.row(i);
+  const MatrixXd cycle = cycle_of(model, space->dims());
+  std::vector<motion::WorldPose> poses;
+  for (int i = 0; i < static_cast<int>(cycle.rows()); ++i) {
+    Frame frame = at_rest(*figure);
+    const Eigen::VectorXd q = cycle.row(i);
     space->put(frame, 0.0, {q.data(), static_cast<std::size_t>(q.size())});
-    draw(figure, motion::world_pose(figure, frame), kStripPose_cm * i + kStripPose_cm / 2, path);
+    poses.push_back(motion::world_pose(*figure, frame));
+  }
+  const Eigen::Vector3d forward = forward_of(*figure, poses);
+  std::string path;
+  for (int i = 0; i < static_cast<int>(poses.size()); ++i) {
+    draw(*figure, poses[static_cast<std::size_t>(i)], forward,
+         kStripPose_cm * i + kStripPose_cm / 2, path);
   }
   return path;
 }

@@ -2,9 +2,12 @@
 // side. Any thread; cold.
 #pragma once
 
+#include <memory>
+#include <span>
 #include <string>
 
 #include "models/style/model/style_model.hpp"
+#include "proto/frame/skeleton.hpp"
 
 namespace posed::control {
 
@@ -14,8 +17,10 @@ inline constexpr int kStripPose_cm = 95;  // the room of a pose
 inline constexpr int kStripHeight_cm = 185;
 
 // What the `d` of an SVG path has: only M, L, digits, '-' and blanks; walking to the right, the
-// ground below. Empty for a model that knows no cycle, or whose joints are a device's own, of which
-// the model does not say how long the bones are.
-[[nodiscard]] std::string strip_of(const style::StyleModel& model);
+// ground below. A model of a skeleton's own joints does not say how long the bones are: it is drawn
+// on the first of `known` that it was trained on, or on that of the demo's walkers. Empty where
+// none is, and for a model that knows no cycle.
+[[nodiscard]] std::string strip_of(const style::StyleModel& model,
+                                   std::span<const std::shared_ptr<const Skeleton>> known = {});
 
 }  // namespace posed::control

@@ -62,7 +62,8 @@ std::string sources_of(const json& report) {
   return words;
 }
 
-ModelWords words_of_style(const style::StyleModel& model) {
+ModelWords words_of_style(const style::StyleModel& model,
+                          std::span<const std::shared_ptr<const Skeleton>> known) {
   const json report = report_of(model.report_json);
   ModelWords words;
   words.learnt = fmt::format("{} -> {}", model.from, fmt::join(model.names(), ", "));
@@ -73,7 +74,7 @@ ModelWords words_of_style(const style::StyleModel& model) {
                        : fmt::format("its own: {} joints from {} on", model.space.joints.size(),
                                      model.space.joints.empty() ? "" : model.space.joints.front());
   words.verdict = text_of(report, "verdict");
-  words.strip = strip_of(model);
+  words.strip = strip_of(model, known);
   return words;
 }
 
@@ -98,12 +99,13 @@ ModelWords words_of_gesture(const gesture::GestureModel& model) {
 
 }  // namespace
 
-ModelWords words_of_model(std::string_view bytes, std::string_view kind, const std::string& name) {
+ModelWords words_of_model(std::string_view bytes, std::string_view kind, const std::string& name,
+                          std::span<const std::shared_ptr<const Skeleton>> known) {
   const auto data = std::as_bytes(std::span(bytes));
   ModelWords words;
   if (kind == "style") {
     const auto model = style::parse_model(data, name);
-    words = model ? words_of_style(*model) : ModelWords{.verdict = model.error().text()};
+    words = model ? words_of_style(*model, known) : ModelWords{.verdict = model.error().text()};
   } else {
     const auto model = gesture::parse_model(data, name);
     words = model ? words_of_gesture(*model) : ModelWords{.verdict = model.error().text()};

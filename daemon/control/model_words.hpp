@@ -1,8 +1,12 @@
 // What a model file says of itself, for lists that people read. Any thread; cold.
 #pragma once
 
+#include <memory>
+#include <span>
 #include <string>
 #include <string_view>
+
+#include "proto/frame/skeleton.hpp"
 
 namespace posed::control {
 
@@ -13,8 +17,10 @@ struct ModelWords {
   std::string strip{};     // a drawn thumbnail, as strip_of() has it
 };
 
-// `kind` as FolderModel has it. Never fails: bytes that are no model get a verdict that says so.
-[[nodiscard]] ModelWords words_of_model(std::string_view bytes, std::string_view kind,
-                                        const std::string& name);
+// `kind` as FolderModel has it; `known` as strip_of() has it. Never fails: bytes that are no model
+// get a verdict that says so.
+[[nodiscard]] ModelWords words_of_model(
+    std::string_view bytes, std::string_view kind, const std::string& name,
+    std::span<const std::shared_ptr<const Skeleton>> known = {});
 
 }  // namespace posed::control

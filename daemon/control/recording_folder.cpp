@@ -6,17 +6,25 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cmath>
 #include <limits>
 #include <system_error>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "models/motion/vrm_animation.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/clip/format.hpp"
+#include "proto/clip/gltf.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/load_file.hpp"
 
 namespace posed::control {
 namespace {
 
 constexpr std::size_t kMaxRecordings = 256;
+constexpr std::size_t kMaxConverted = 64UL * 1024 * 1024;  // bytes, before and after
+constexpr int kMaxConvertedFrames = 36'000;
 
 // A name in the folder; control characters in it would reach people's terminals.
 bool is_recording(const std::string& name) {
@@ -102,6 +110,46 @@ Result<std::string> RecordingFolder::piece(std::string_view name, std::uint64_t 
   close(file);
   if (size < 0) return fail("the recording cannot be read: " + why, wanted);
   bytes.resize(static_cast<std::size_t>(size));
+  return bytes;
+}
+
+Result<std::string> RecordingFolder::converted(const Part& part) const {
+  if (part.as != "glb" && part.as != "vrma") {
+    return fail("a clip is had as glb or vrma, not as " + in_quotes(part.as));
+  }
+  if (!std::isfinite(part.from_s) || !std::isfinite(part.to_s)) {
+    return fail("from and to are seconds");
+  }
+  if (!part.name.ends_with(".bvh")) {
+    return fail(in_quotes(part.name) + " is no BVH, which alone becomes another kind of file");
+  }
+  clip::ClipFile file{.name = part.name, .bytes = {}};
+  for (;;) {
+    const std::string more = TRY(piece(part.name, file.bytes.size()));
+    if (more.empty()) break;
+    file.bytes += more;
+    if (file.bytes.size() > kMaxConverted) break;
+  }
+  clip::Clip clip = TRY(clip::parse_clip(file));
+  const auto frame_at = [&](double at_s) {
+    const double frame = std::round(at_s * clip.frame_rate_hz);
+    return static_cast<int>(std::clamp(frame, 0.0, static_cast<double>(clip.frames())));
+  };
+  const int first = frame_at(part.from_s);
+  const int end = part.to_s > 0.0 ? frame_at(part.to_s) : clip.frames();
+  if (!(end > first)) return fail("there are no frames from here to there in " + part.name);
+  if (file.bytes.size() > kMaxConverted || end - first > kMaxConvertedFrames) {
+    return fail(part.name +
+                " is too long for this; `posed convert` on the daemon's computer does it");
+  }
+  clip.channels = clip::ChannelMatrix(clip.channels.middleRows(first, end - first));
+  const auto made = folder_ / ("." + part.name + "." + part.as);
+  const auto written =
+      part.as == "glb" ? clip::write_glb(clip, made) : motion::write_vrm_animation(clip, made);
+  auto bytes = written ? load_file(made, {.what = "clip", .max_bytes = kMaxConverted})
+                       : Result<std::string>(std::unexpected(written.error()));
+  std::error_code ignored;
+  std::filesystem::remove(made, ignored);
   return bytes;
 }
 

@@ -36,6 +36,17 @@ class RecordingFolder {
   // end. A log that is in use is refused.
   Result<std::string> piece(std::string_view name, std::uint64_t offset) const;
 
+  // A part of a clip that ends in .bvh as another kind of file.
+  struct Part {
+    std::string name{};
+    std::string as{};                 // "glb" or "vrma"
+    double from_s = 0.0, to_s = 0.0;  // to 0: to its end
+    bool operator==(const Part&) const = default;
+  };
+  // The whole file, which lies in the folder under a hidden name while it is made. Takes seconds
+  // for a long clip; longer ones than ten minutes at 60 Hz are refused.
+  Result<std::string> converted(const Part& part) const;
+
  private:
   std::filesystem::path folder_;
 };

@@ -10,6 +10,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "daemon/config/config.hpp"
+#include "daemon/control/glove_fit.hpp"
 #include "daemon/control/stage_requests.hpp"
 #include "daemon/devices/about_stream.hpp"
 #include "daemon/devices/calibration.hpp"
@@ -120,6 +121,7 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
   if (request.has_take()) return mark_take(request, std::move(requester));
   if (request.has_list_models()) return list_models(std::move(requester));
   if (request.has_teach()) return teach(request, std::move(requester));
+  if (request.has_fit_glove()) return fit_glove(request, requester);
   if (request.has_rename_model() || request.has_delete_model()) {
     return change_models(request, std::move(requester));
   }
@@ -153,7 +155,8 @@ Result<RequestHandler::Done> RequestHandler::apply(const v1::ControlRequest& req
       return set_model(request.use_model().stream(), model, request.use_model().name(),
                        {.requester = requester});
     case v1::ControlRequest::kCalibrate:
-      return calibrate(request, requester);
+      return calibrate(request.calibrate().stream(), request.calibrate().toml(),
+                       request.calibrate().name(), {.requester = requester});
     case v1::ControlRequest::kHaptics:
       return send_haptics(request);
     default:
@@ -182,13 +185,14 @@ Reply RequestHandler::mark_take(const v1::ControlRequest& request, Requester req
 Reply RequestHandler::list_models(Requester requester) {
   const auto known = models_.list();
   if (!known) return refusal(std::move(requester), known.error().text());
+  const Figures there = figures();
   v1::ControlReply reply;
   reply.set_ok(true);
   for (const FolderModel& model : *known) {
     v1::KnownModel& entry = *reply.add_model();
     entry.set_name(model.name);
     entry.set_kind(std::string(model.kind));
-    const ModelWords words = words_of(model);
+    const ModelWords words = words_of(model, there);
     entry.set_learnt(words.learnt);
     entry.set_skeleton(words.skeleton);
     entry.set_verdict(words.verdict);
@@ -197,14 +201,28 @@ Reply RequestHandler::list_models(Requester requester) {
   return make_reply(std::move(requester), reply);
 }
 
-// A model is read again only when its file has changed: a page asks often.
-ModelWords RequestHandler::words_of(const FolderModel& model) {
+RequestHandler::Figures RequestHandler::figures() {
+  const std::scoped_lock lock(mutex_);
+  Figures all;
+  for (const auto& [id, stream] : streams_) {
+    if (stream.skeleton) all.push_back(stream.skeleton);
+  }
+  return all;
+}
+
+// A model is read again only when its file has changed, or another body may show it: a page asks
+// often.
+ModelWords RequestHandler::words_of(const FolderModel& model, const Figures& figures) {
   const std::scoped_lock lock(words_mutex_);
-  if (words_.size() > kMaxKnownWords) words_.clear();  // of models that have gone, too
+  std::vector<std::uint32_t> ids;
+  for (const auto& figure : figures) ids.push_back(figure->id);
+  // Of models that have gone, too.
+  if (words_.size() > kMaxKnownWords || ids != drawn_on_) words_.clear();
+  drawn_on_ = std::move(ids);
   auto& [stamp, words] = words_[model.name];
   if (stamp == model.stamp) return words;
   const auto bytes = models_.read(model.name);
-  words = bytes ? words_of_model(*bytes, model.kind, model.name)
+  words = bytes ? words_of_model(*bytes, model.kind, model.name, figures)
                 : ModelWords{.verdict = clean(bytes.error().text())};
   stamp = model.stamp;
   return words;
@@ -261,10 +279,27 @@ Reply RequestHandler::list_recordings(Requester requester) const {
   return make_reply(std::move(requester), reply);
 }
 
-Reply RequestHandler::fetch_recording(const v1::ControlRequest& request,
-                                      Requester requester) const {
+Result<std::string> RequestHandler::piece_of(const v1::ControlRequest& request) {
   const auto& wanted = request.fetch_recording();
-  auto piece = recordings_.piece(wanted.name(), wanted.offset());
+  if (wanted.as().empty()) return recordings_.piece(wanted.name(), wanted.offset());
+  const RecordingFolder::Part part{
+      .name = wanted.name(), .as = wanted.as(), .from_s = wanted.from_s(), .to_s = wanted.to_s()};
+  const std::scoped_lock lock(converted_mutex_);
+  if (part != part_ || wanted.offset() == 0) {
+    part_ = {};
+    converted_ = TRY(recordings_.converted(part));
+    part_ = part;
+  }
+  if (wanted.offset() < converted_.size()) {
+    return converted_.substr(static_cast<std::size_t>(wanted.offset()), kMaxRecordingPiece);
+  }
+  part_ = {};  // nobody needs it any more
+  converted_ = {};
+  return std::string();
+}
+
+Reply RequestHandler::fetch_recording(const v1::ControlRequest& request, Requester requester) {
+  auto piece = piece_of(request);
   if (!piece) return refusal(std::move(requester), piece.error().text());
   v1::ControlReply reply;
   reply.set_ok(true);
@@ -537,6 +572,7 @@ std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
   reply.set_ok(true);
   reply.set_stream(done.name);
   reply.set_sequence(ack.sequence);
+  if (done.fit) *reply.mutable_fit() = *done.fit;
   return make_reply(std::move(done.requester), reply);
 }
 
@@ -571,13 +607,13 @@ Result<ControlledStream*> RequestHandler::find_device(const std::string& name) {
   return found;
 }
 
-Result<RequestHandler::Done> RequestHandler::calibrate(const v1::ControlRequest& request,
-                                                       const Requester& requester) {
-  const auto& wanted = request.calibrate();
-  const auto found = TRY(find_device(wanted.stream()));
+Result<RequestHandler::Done> RequestHandler::calibrate(const std::string& stream_name,
+                                                       const std::string& toml,
+                                                       const std::string& name,
+                                                       UnderWay under_way) {
+  const auto found = TRY(find_device(stream_name));
   const ControlledStream& stream = *found;
-  auto compiled = TRY(
-      devices::compile_calibration(*stream.device->description(), wanted.toml(), wanted.name()));
+  auto compiled = TRY(devices::compile_calibration(*stream.device->description(), toml, name));
   const DeviceCommand command{.kind = DeviceCommand::Kind::kCalibrate,
                               .source = stream.source_number,
                               .ticket = last_ticket_ + 1,
@@ -587,13 +623,45 @@ Result<RequestHandler::Done> RequestHandler::calibrate(const v1::ControlRequest&
   if (under_way_.size() >= kMaxUnderWay || !daemon_control_.send(command)) {
     return fail("too many changes are under way; wait for their answers and try again");
   }
-  under_way_.emplace(++last_ticket_, UnderWay{.requester = requester,
-                                              .stream = stream.stream,
-                                              .name = stream.name,
-                                              .calibration = std::move(compiled),
-                                              .device = stream.device,
-                                              .source_number = stream.source_number});
+  under_way.stream = stream.stream;
+  under_way.name = stream.name;
+  under_way.calibration = std::move(compiled);
+  under_way.device = stream.device;
+  under_way.source_number = stream.source_number;
+  under_way_.emplace(++last_ticket_, std::move(under_way));
   return Done{.under_way = true};
+}
+
+std::optional<Reply> RequestHandler::fit_glove(const v1::ControlRequest& request,
+                                               const Requester& requester) {
+  const auto fit = judge_or_use(request, requester);
+  if (!fit) return refusal(requester, fit.error().text());
+  if (!(*fit)->file().empty()) return std::nullopt;
+  v1::ControlReply reply;
+  reply.set_ok(true);
+  *reply.mutable_fit() = **fit;
+  return make_reply(requester, reply);
+}
+
+// The fit is computed, and the file written, without the lock.
+Result<std::shared_ptr<const v1::GloveFit>> RequestHandler::judge_or_use(
+    const v1::ControlRequest& request, const Requester& requester) {
+  const auto& wanted = request.fit_glove();
+  if (!wanted.name().empty() && !config::is_stream_name(wanted.name())) {
+    return fail(in_quotes(wanted.name()) +
+                " cannot be the name of a calibration; it has a-z, digits, '-' and '_', 1 to 32");
+  }
+  std::unique_lock lock(mutex_);
+  const auto device = TRY(find_device(wanted.stream()))->device->description();
+  lock.unlock();
+  auto fitted = control::fit_glove(*device, wanted);
+  if (!fitted) return in_stream(wanted.stream(), fitted.error());
+  const auto fit = std::make_shared<v1::GloveFit>(std::move(fitted->words));
+  if (fitted->toml.empty()) return fit;
+  fit->set_file(TRY(models_.add(wanted.name(), kCalibration, fitted->toml)));
+  lock.lock();
+  TRY(calibrate(wanted.stream(), fitted->toml, fit->file(), {.requester = requester, .fit = fit}));
+  return fit;
 }
 
 Result<RequestHandler::Done> RequestHandler::send_haptics(const v1::ControlRequest& request) {

@@ -34,6 +34,7 @@
 namespace posed::v1 {
 class ControlReply;
 class ControlRequest;
+class GloveFit;
 class Stats;
 }  // namespace posed::v1
 
@@ -174,6 +175,7 @@ class RequestHandler {
     // Of a calibration.
     std::shared_ptr<devices::PresentDevice> device{};
     std::uint32_t source_number = 0;
+    std::shared_ptr<const v1::GloveFit> fit{};  // of a FitGlove request; null: of another
   };
   // What has come of a request.
   struct Done {
@@ -187,13 +189,22 @@ class RequestHandler {
   Result<Done> add_model_part(const v1::ControlRequest& request, const Requester& requester);
   Result<Done> set_model(const std::string& stream, std::span<const std::byte> bytes,
                          const std::string& name, UnderWay under_way);
-  Result<Done> calibrate(const v1::ControlRequest& request, const Requester& requester);
+  Result<Done> calibrate(const std::string& stream, const std::string& toml,
+                         const std::string& name, UnderWay under_way);
+  // Nothing: acknowledge() makes the reply.
+  [[nodiscard]] std::optional<Reply> fit_glove(const v1::ControlRequest& request,
+                                               const Requester& requester);
+  Result<std::shared_ptr<const v1::GloveFit>> judge_or_use(const v1::ControlRequest& request,
+                                                           const Requester& requester);
   [[nodiscard]] Reply list_models(Requester requester);
-  ModelWords words_of(const FolderModel& model);
+  using Figures = std::vector<std::shared_ptr<const Skeleton>>;
+  [[nodiscard]] Figures figures();  // of the bodies that are there
+  ModelWords words_of(const FolderModel& model, const Figures& figures);
   [[nodiscard]] Reply change_models(const v1::ControlRequest& request, Requester requester);
   Result<> check_unused(const std::string& model);
   [[nodiscard]] Reply list_recordings(Requester requester) const;
-  [[nodiscard]] Reply fetch_recording(const v1::ControlRequest& request, Requester requester) const;
+  [[nodiscard]] Reply fetch_recording(const v1::ControlRequest& request, Requester requester);
+  Result<std::string> piece_of(const v1::ControlRequest& request);
   [[nodiscard]] Reply mark_take(const v1::ControlRequest& request, Requester requester);
   [[nodiscard]] Reply teach(const v1::ControlRequest& request, Requester requester);
   Result<> teach_step(const v1::ControlRequest& request);
@@ -223,9 +234,14 @@ class RequestHandler {
   Clock clock_;
   teach::Teacher* const teacher_;
   // What the models of the folder say, by name, with what tells whether a file has changed since.
+  // The clip that was had last as another kind of file, for its further pieces.
+  std::mutex converted_mutex_;
+  RecordingFolder::Part part_;
+  std::string converted_;
   std::mutex words_mutex_;
   std::map<std::string, std::pair<std::string, ModelWords>> words_;
-  std::mutex mutex_;  // guards all below
+  std::vector<std::uint32_t> drawn_on_;  // ids of the figures that were known for them
+  std::mutex mutex_;                     // guards all below
   Streams streams_;
   std::map<std::string, ControlledStream> known_;  // by name, also those that are there
   // Those that were sent last and are in use by the reader, by number of the source.

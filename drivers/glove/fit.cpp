@@ -89,6 +89,10 @@ double Held::deviation() const {
   return std::sqrt(std::max(0.0, squares / static_cast<double>(count) - mean() * mean()));
 }
 
+bool was_held(std::span<const Held> pose) {
+  return std::ranges::any_of(pose, [](const Held& sensor) { return sensor.count > 0; });
+}
+
 double SensorPoses::span() const { return std::abs(pose_raw - flat_raw); }
 
 Result<std::vector<SensorPoses>> poses_of_sensors(const Model& model, const Recorded& recorded) {

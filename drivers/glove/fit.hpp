@@ -73,6 +73,9 @@ struct Held {
 };
 using Recorded = std::array<std::array<Held, kMaxSensors>, kPoses>;  // [pose][sensor]
 
+// Whether a pose with these sensors was recorded.
+[[nodiscard]] bool was_held(std::span<const Held> pose);
+
 // The two poses that define a sensor's calibration: the flat hand and the pose that moves it most.
 struct SensorPoses {
   std::size_t sensor = 0;

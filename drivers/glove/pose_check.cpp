@@ -123,9 +123,8 @@ Result<PoseCheck> check_poses(const Model& model, const Recorded& recorded) {
   PoseCheck check;
   check.sensors = static_cast<int>(sensors.size());
   for (std::size_t p = 0; p < kPoses; ++p) {
-    const bool held =
-        std::ranges::any_of(recorded[p], [](const Held& sensor) { return sensor.count > 0; });
-    if (held) check.poses.push_back(find(model, recorded, static_cast<Pose>(p), sensors));
+    if (was_held(recorded[p]))
+      check.poses.push_back(find(model, recorded, static_cast<Pose>(p), sensors));
   }
   return check;
 }

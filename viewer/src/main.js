@@ -15,6 +15,7 @@ import { Chosen } from './panel/chosen.js';
 import { Header } from './panel/header.js';
 import { Help } from './panel/help.js';
 import { ModelLibrary, Recordings } from './panel/library.js';
+import { SettingsPanel } from './panel/settings_panel.js';
 import { StreamList } from './panel/stream_list.js';
 import { Takes } from './panel/takes.js';
 import { Theme } from './panel/theme.js';
@@ -78,21 +79,23 @@ class Page {
     this.list = new StreamList(find('.stream-list'), store, (name) => this.choose(name));
     this.panel = new Chosen(
       find('.chosen'),
-      { control, requests, acks },
+      { control, requests, acks, store },
       () => this.hello?.connect ?? '',
     );
     this.takes = new Takes(find('.takes'), control, (...words) => acks.say(...words));
     this.camera = new CameraPanel((message) => this.connection.sendText(message));
     find('.streams').after(this.camera.element);
     this.help = new Help(find('#help'), find('#help-button'));
-    this.avatars = new Avatars(
-      world,
-      (...words) => acks.say(...words),
-      (...list) => this.tools.setAvatars(...list),
-    );
     const say = (...words) => acks.say(...words);
+    this.avatars = new Avatars(world, say, () => this.settings?.update());
     this.capture = new Capture(world, say);
-    this.tools = new Tools(find('.tools'), world, this.avatars, this.capture);
+    this.tools = new Tools(find('.tools'), world, this.capture);
+    this.settings = new SettingsPanel(
+      find('#settings'),
+      find('#settings-button'),
+      world,
+      this.avatars,
+    );
     this.time = new TimeControls(find('.tools'), store, world);
     this.library = new ModelLibrary({ control, requests, acks });
     this.played = new Played(store);
@@ -120,6 +123,7 @@ class Page {
       g: () => this.panel.gesture?.line.focus(),
       s: () => this.takes.toggle(),
       d: () => this.theme.toggle(),
+      o: () => this.settings.toggle(),
       '?': () => this.help.toggle(),
       ...Object.fromEntries(
         ['follow', 'orbit', 'front', 'side', 'top'].map((view, i) => [
@@ -233,6 +237,7 @@ class Page {
     this.list.update(this.chosen);
     this.panel.update(this.chosen, this.readOnly);
     this.library.update(this.chosen);
+    this.settings.update();
     this.takes.update(store.stats, this.readOnly);
     this.camera.update(this.hello, this.readOnly);
     this.header.update(this.hello && this.daemon.alive ? store.stats : null);

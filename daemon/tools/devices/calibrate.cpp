@@ -15,13 +15,13 @@
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
+#include "daemon/devices/thumb_contacts.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/devices/calibrate_poses.hpp"
 #include "daemon/tools/devices/calibration_check.hpp"
 #include "daemon/tools/devices/driver_options.hpp"
-#include "daemon/tools/devices/thumb_contacts.hpp"
 #include "daemon/tools/live/live_view.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/device_info.hpp"
@@ -392,7 +392,7 @@ Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
   }
   CalibrationFile file = blank_file(*source);
   file.sensors = std::move(fitted.sensors);
-  const auto contacts = TRY(fit_contacts(source->model(), recorded, source->hand(), file));
+  const auto contacts = TRY(devices::fit_contacts(source->model(), recorded, source->hand(), file));
   for (const std::string& line : contacts) std::fprintf(stderr, "posed: %s\n", line.c_str());
   TRY(judge(*source, options, file, recorded));
   TRY(show_hand(*source, file, recorded));

@@ -269,10 +269,6 @@ constexpr int kMaxHandColumns = 18;  // of a hand
 
 }  // namespace
 
-bool was_held(const Recorded& recorded, std::size_t pose) {
-  return std::ranges::any_of(recorded[pose], [](const auto& sensor) { return sensor.count > 0; });
-}
-
 std::vector<std::string> calibrated_hand(const drivers::glove::Model& model,
                                          const drivers::glove::Calibration& calibration, Side hand,
                                          const Recorded& recorded, int columns, int rows) {
@@ -281,7 +277,7 @@ std::vector<std::string> calibrated_hand(const drivers::glove::Model& model,
   const picture::Camera camera(picture::View::kThreeQuarter, shape.facing(0.0));
   picture::StripRow poses;
   for (std::size_t p = 0; p < drivers::glove::kPoses; ++p) {
-    if (!was_held(recorded, p)) continue;
+    if (!drivers::glove::was_held(recorded[p])) continue;
     HandAngles angles = drivers::glove::angles_of(model, calibration, recorded[p]);
     for (double& angle_rad : angles) angle_rad = std::isfinite(angle_rad) ? angle_rad : 0.0;
     Frame frame;

@@ -95,9 +95,6 @@ class PoseGuide {
 Result<drivers::glove::Recorded> record_poses(GloveSource& source, const PosePlan& plan,
                                               PoseGuide& guide);
 
-// Whether this pose was recorded.
-[[nodiscard]] bool was_held(const drivers::glove::Recorded& recorded, std::size_t pose);
-
 // The recorded poses beside each other with their names below, at one scale: `rows` lines of UTF-8
 // of at most `columns` characters. A joint that no sensor measures is straight.
 [[nodiscard]] std::vector<std::string> calibrated_hand(

@@ -60,7 +60,7 @@ std::vector<std::string> impossible_angles(const Model& model, const Calibration
   };
   std::array<Worst, kHandChannels> worst{};
   for (std::size_t pose = 0; pose < recorded.size(); ++pose) {
-    if (!was_held(recorded, pose)) continue;
+    if (!drivers::glove::was_held(recorded[pose])) continue;
     const HandAngles angles = drivers::glove::angles_of(model, calibration, recorded[pose]);
     for (std::size_t c = 0; c < angles.size(); ++c) {
       const PossibleRange* const range = possible(c);
@@ -86,7 +86,7 @@ std::vector<std::string> differences(const Model& model, const Calibration& befo
                                      const Calibration& now, const Recorded& recorded) {
   std::array<double, kHandChannels> apart_rad{};
   for (std::size_t pose = 0; pose < recorded.size(); ++pose) {
-    if (!was_held(recorded, pose)) continue;
+    if (!drivers::glove::was_held(recorded[pose])) continue;
     const HandAngles a = drivers::glove::angles_of(model, before, recorded[pose]);
     const HandAngles b = drivers::glove::angles_of(model, now, recorded[pose]);
     for (std::size_t c = 0; c < a.size(); ++c) {

@@ -34,6 +34,7 @@ std::string refusal_of(const v1::ControlRequest& request) {
     case v1::ControlRequest::kListModels:
     case v1::ControlRequest::kUseModel:
     case v1::ControlRequest::kTeach:
+    case v1::ControlRequest::kFitGlove:
     case v1::ControlRequest::kListRecordings:
     case v1::ControlRequest::kFetchRecording:
     case v1::ControlRequest::kRenameModel:

@@ -1,12 +1,13 @@
 // Fetches a file of the daemon in pieces, each after the answer to the one before, and gives it to
 // the browser to keep.
 
-// ask(request): a promise of the reply. progress(share): 0 to 1. Resolves to {blob} or {error}.
-export async function fetchRecording(ask, { name, bytes }, progress) {
+// ask(request): a promise of the reply. progress(share): 0 to 1. part: {as, from_s, to_s}, to have
+// that part as another kind of file. Resolves to {blob} or {error}.
+export async function fetchRecording(ask, { name, bytes }, progress, part = {}) {
   const pieces = [];
   let offset = 0;
   for (;;) {
-    const reply = await ask({ fetch_recording: { name, offset } });
+    const reply = await ask({ fetch_recording: { name, offset, ...part } });
     if (!reply.ok) return { error: reply.error };
     const size = reply.piece?.length ?? 0;
     if (size === 0) return { blob: new Blob(pieces) };

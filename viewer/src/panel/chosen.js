@@ -3,6 +3,7 @@
 import { el, write } from './dom.js';
 import { GestureControls } from './gesture_controls.js';
 import { GloveLine, isGlove } from './glove.js';
+import { GloveLesson } from './glove_lesson.js';
 import { ModelControls } from './model_controls.js';
 import { Parameters } from './parameters.js';
 import { SignLesson } from './sign_lesson.js';
@@ -23,7 +24,7 @@ export class Chosen {
   #shape = '';
   #parts = [];
 
-  // context: {control, requests, acks}; endpoint(): the daemon's, for commands
+  // context: {control, requests, acks, store}; endpoint(): the daemon's, for commands
   constructor(element, context, endpoint) {
     this.element = element;
     this.context = context;
@@ -64,8 +65,9 @@ export class Chosen {
       .map((kind) => new ModelControls(stream, kind, this.context));
     const teach = find('style') ? new TeachControls(stream, this.context) : null;
     const signs = find('generate') && stream.isHand ? new SignLesson(stream, this.context) : null;
+    this.glove = isGlove(stream) ? new GloveLesson(stream, this.context) : null;
     const more = new Parameters(stream, control);
-    this.#parts = [this.style, this.gesture, ...models, teach, signs, more].filter(
+    this.#parts = [this.style, this.gesture, ...models, teach, signs, this.glove, more].filter(
       (part) => part !== null,
     );
     const glove = isGlove(stream) ? [new GloveLine(stream, this.endpoint())] : [];

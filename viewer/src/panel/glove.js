@@ -1,4 +1,4 @@
-// The line that calibrates a glove: it needs a person and a terminal, so the page only shows it.
+// The line that calibrates a glove in a terminal.
 import { el, write } from './dom.js';
 
 export class GloveLine {
@@ -11,7 +11,7 @@ export class GloveLine {
     this.element = el(
       'div.group',
       {},
-      el('p.note', {}, 'Calibrate this glove in a terminal:'),
+      el('p.note', {}, 'The same in a terminal:'),
       el('div.copy', {}, this.line, this.button),
     );
   }

@@ -14,6 +14,7 @@ const KEYS = [
   ['g', 'write gestures to perform; Enter plays them'],
   ['s', 'start or end a take, while posed records'],
   ['d', 'dark or light'],
+  ['o', 'settings: floor, background, names, figures'],
   ['?', 'this help'],
 ];
 
@@ -50,7 +51,7 @@ export class Help {
       el(
         'p.note',
         {},
-        'Drag to turn, scroll to come closer. Drop a .vrm file on the scene to see your avatar move.',
+        'Drag to turn, scroll to come closer. Drop a .vrm file on the scene: all bodies wear it.',
       ),
       close,
     );

@@ -1,17 +1,21 @@
-// What a person chose, kept in the browser where it allows that.
+// What a person chose, kept in the browser; where that may keep nothing, until the page closes.
+const here = {};
 
 export function kept(name) {
   try {
     return localStorage.getItem(`posed.${name}`);
   } catch {
-    return null;
+    return here[name] ?? null;
   }
 }
 
+// value: null forgets the choice
 export function keep(name, value) {
+  here[name] = value;
   try {
-    localStorage.setItem(`posed.${name}`, value);
+    if (value === null) localStorage.removeItem(`posed.${name}`);
+    else localStorage.setItem(`posed.${name}`, value);
   } catch {
-    // a private window: the choice holds until it closes
+    // a private window
   }
 }

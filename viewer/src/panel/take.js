@@ -128,8 +128,30 @@ export class Take {
     this.part.append(
       labelled('From, s', this.from),
       labelled('To, s', this.to),
-      el('div.buttons', {}, save),
+      el('div.buttons', {}, save, this.#kind('glb'), this.#kind('vrma')),
     );
+  }
+
+  // The part as another kind of file, which the daemon makes.
+  #kind(as) {
+    const text = `As ${as.toUpperCase()}`;
+    const button = el('button', { type: 'button' }, text);
+    button.onclick = async () => {
+      const [from_s, to_s] = [Number(this.from.value), Number(this.to.value)];
+      button.disabled = true;
+      const ask = (request) => this.requests.ask(request);
+      const part = { as, from_s, to_s };
+      const { blob, error } = await fetchRecording(ask, this.file, () => {}, part);
+      button.disabled = false;
+      if (blob) keepFile(blob, this.#partName(as));
+      else this.#refused(`refused: ${error}`);
+    };
+    return button;
+  }
+
+  #partName(ending) {
+    const [from_s, to_s] = [Number(this.from.value), Number(this.to.value)];
+    return this.file.name.replace(/\.bvh$/, `-${from_s}s-${to_s}s.${ending}`);
   }
 
   #trim() {
@@ -143,7 +165,6 @@ export class Take {
 
   #savePart() {
     const [from_s, to_s] = [Number(this.from.value), Number(this.to.value)];
-    const name = this.file.name.replace(/\.bvh$/, `-${from_s}s-${to_s}s.bvh`);
-    keepFile(new Blob([cutBvh(this.text, this.bvh, from_s, to_s)]), name);
+    keepFile(new Blob([cutBvh(this.text, this.bvh, from_s, to_s)]), this.#partName('bvh'));
   }
 }

@@ -1,4 +1,4 @@
-// The buttons above the scene: views, the raw figures, trails, avatars.
+// The buttons above the scene: views, the raw figures, trails, pictures.
 import { VIEWS } from '../scene/views.js';
 import { el, write } from './dom.js';
 import { keep, kept } from './settings.js';
@@ -10,8 +10,8 @@ const word = (name) => name[0].toUpperCase() + name.slice(1);
 export class Tools {
   #views = new Map();
 
-  // avatars: {wear(name | null), load(file)}; capture: of pictures
-  constructor(element, world, avatars, capture) {
+  // capture: of pictures
+  constructor(element, world, capture) {
     this.world = world;
     this.raw = el('button', {
       type: 'button',
@@ -35,11 +35,6 @@ export class Tools {
       );
       this.#views.set(view, button);
     }
-    this.avatar = el('select', {
-      aria: { label: 'Figure' },
-      title: 'How bodies look; drop a .vrm file on the scene for your own',
-    });
-    this.avatar.onchange = () => avatars.wear(this.avatar.value || null);
     const picture = el(
       'button',
       { type: 'button', onclick: () => capture.picture(), title: 'Keep the scene as PNG' },
@@ -62,27 +57,17 @@ export class Tools {
     element.append(
       el('div.joined', {}, ...this.#views.values()),
       el('div.joined', {}, this.raw, this.trails),
-      this.avatar,
       el('div.joined', {}, picture, video),
     );
     world.onView = (name) => this.#mark(name);
     this.#mark(world.views.name);
     this.setRaw(RAW.includes(kept('raw')) ? kept('raw') : 'beside');
     this.#setTrails(kept('trails') !== 'off');
-    this.setAvatars(['mannequin'], 'mannequin');
   }
 
   #mark(name) {
     for (const [view, button] of this.#views)
       button.setAttribute('aria-pressed', String(view === name));
-  }
-
-  setAvatars(names, chosen) {
-    this.avatar.replaceChildren(
-      el('option', { value: '' }, 'Capsules'),
-      ...names.map((name) => el('option', { value: name }, word(name))),
-    );
-    this.avatar.value = chosen;
   }
 
   nextRaw() {

@@ -9,6 +9,7 @@ const STEPS = [
   { pixels: 0.75, shadows: false },
   { pixels: 0.5, shadows: false },
 ];
+export const [FINEST] = STEPS;
 export const COARSEST = STEPS.at(-1);
 
 export class Pace {

@@ -43,7 +43,15 @@ const NO_VALUE = colour('#d55e00');
 const CONTACT = colour('#009e73');
 const STOPPED = colour('#d1242f'); // links of a robot; the instruments name them
 
-export const themeColours = (name) => THEMES[name];
+// Of one colour, in bodies' and hands' view: plain, or to be cut out by a video mixer.
+const SINGLE = { plain: colour('#9aa0a6'), green: colour('#00b140') };
+
+// The colours of the page's theme, or of what was chosen in its place for the scene.
+export function sceneColours(theme, background) {
+  const single = SINGLE[background];
+  const colours = THEMES[background] ?? THEMES[theme];
+  return single ? { ...colours, background: single, hands: single } : colours;
+}
 
 // Performers have a colour each, in their order; a seventh has that of the first again.
 export const performerColour = ({ performers }, number) => performers[number % performers.length];

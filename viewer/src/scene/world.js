@@ -7,11 +7,11 @@ import { Ground } from './ground.js';
 import { HandsView } from './hands_view.js';
 import { Lights } from './lights.js';
 import { NameTags } from './name_tags.js';
-import { COARSEST, Pace } from './pace.js';
+import { COARSEST, FINEST, Pace } from './pace.js';
 import { Performer } from './performer.js';
 import { Views } from './views.js';
 import { makeRenderer } from './renderer.js';
-import { themeColours } from './palette.js';
+import { sceneColours } from './palette.js';
 import { facing } from './facing.js';
 import { RAW_SUFFIX } from '../streams/stream.js';
 
@@ -25,7 +25,14 @@ const EASED = 4; // the page's frames for a picture, where the processor finds h
 
 export class World {
   performers = new Map();
-  options = { raw: 'beside', trails: true };
+  options = {
+    raw: 'beside',
+    trails: true,
+    floor: true,
+    names: true,
+    background: 'page', // or a name of sceneColours()
+    quality: 'auto', // or 'sharp', 'quick'
+  };
   #dirty = CALM_FRAMES;
   #yaw = null;
   #numbers = new Map(); // of the performers' colours, by name
@@ -44,7 +51,7 @@ export class World {
     this.canvas = stage.querySelector('canvas');
     this.inset = stage.querySelector('.hands');
     Object.assign(this, makeRenderer(this.canvas));
-    this.theme = themeColours(theme);
+    this.theme = sceneColours(theme);
     this.scene = new Scene();
     this.ground = new Ground(this.theme);
     this.lights = new Lights(this.theme, true);
@@ -68,7 +75,8 @@ export class World {
   }
 
   setTheme(name) {
-    this.theme = themeColours(name);
+    this.themeName = name;
+    this.theme = sceneColours(name, this.options.background);
     this.scene.background = this.theme.background;
     for (const part of [this.ground, this.lights, this.hands, ...this.performers.values()])
       part.setTheme(this.theme);
@@ -77,6 +85,12 @@ export class World {
 
   setOption(name, value) {
     this.options[name] = value;
+    const { floor, names, background } = this.options;
+    this.stage.dataset.names = names ? 'on' : 'off';
+    // Its lines are not of the one colour that is cut out.
+    this.ground.group.visible = floor && background !== 'green';
+    if (name === 'background') this.setTheme(this.themeName);
+    if (name === 'quality') this.resize();
     this.arrange();
   }
 
@@ -215,10 +229,16 @@ export class World {
     this.resize();
   }
 
+  get #detail() {
+    const { quality } = this.options;
+    if (this.#eased || quality === 'quick') return COARSEST;
+    return quality === 'sharp' ? FINEST : this.#pace.now;
+  }
+
   resize() {
     const { width, height } = this.stage.getBoundingClientRect();
     if (width === 0) return;
-    const { pixels, shadows } = this.#eased ? COARSEST : this.#pace.now;
+    const { pixels, shadows } = this.#detail;
     this.renderer.setPixelRatio(pixels * Math.min(devicePixelRatio, MOST_PIXELS));
     this.lights.sun.castShadow = shadows;
     this.ground.setShadows(shadows);

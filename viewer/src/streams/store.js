@@ -1,5 +1,5 @@
 // All streams, by name, as the messages of the bridge bring them.
-import { Event, Skeleton, Stats, EVENT_KINDS } from '../wire/schema.js';
+import { Event, Sample, Skeleton, Stats, EVENT_KINDS } from '../wire/schema.js';
 import { Pose, readPose } from '../wire/pose.js';
 import { decode } from '../wire/message.js';
 import { Words } from '../wire/words.js';
@@ -19,6 +19,7 @@ export class Store extends EventTarget {
   rewind = new Rewind();
   #topics = new Words();
   #spare = new Pose();
+  #listening = null;
 
   // A binary message of the bridge. reply(number, bytes, from): an answer to a request.
   receive(bytes, reply) {
@@ -35,9 +36,20 @@ export class Store extends EventTarget {
   #read(topic, bytes, from, reply) {
     if (topic.startsWith('pose/')) this.#pose(topic, bytes, from);
     else if (topic.startsWith('skeleton/')) this.#skeleton(decode(Skeleton, bytes, from));
+    else if (topic.startsWith('sensor/')) this.#sensors(topic, bytes, from);
     else if (topic.startsWith('event/')) this.#event(decode(Event, bytes, from));
     else if (topic === 'stats') this.#stats(decode(Stats, bytes, from));
     else if (topic.startsWith('reply/')) reply(Number(topic.slice(6)), bytes, from);
+  }
+
+  // take(sample): gets what the sensors of this stream say from now on; null: no longer.
+  listen(stream, take) {
+    this.#listening = take && { topic: `sensor/${stream}`, take };
+  }
+
+  // They come as often as poses and are read only for who listens.
+  #sensors(topic, bytes, from) {
+    if (topic === this.#listening?.topic) this.#listening.take(decode(Sample, bytes, from));
   }
 
   // Read into a spare pose first, so that a damaged message leaves the stream's as it was.

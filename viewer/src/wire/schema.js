@@ -19,6 +19,13 @@ export const Skeleton = {
   16: ['capsule_m', 'float', '*'],
 };
 
+export const Sample = {
+  1: ['stream', 'string'],
+  5: ['name', 'string', '*'],
+  7: ['value', 'float', '*'],
+  8: ['validity', 'bytes'],
+};
+
 export const Event = {
   1: ['stream', 'string'],
   2: ['kind', 'uint'],
@@ -134,7 +141,13 @@ const ModelPart = {
 
 const Take = { 1: ['start', 'bool'], 2: ['name', 'string'] };
 const UseModel = { 1: ['stream', 'string'], 2: ['name', 'string'] };
-const FetchRecording = { 1: ['name', 'string'], 2: ['offset', 'uint'] };
+const FetchRecording = {
+  1: ['name', 'string'],
+  2: ['offset', 'uint'],
+  3: ['as', 'string'],
+  4: ['from_s', 'double'],
+  5: ['to_s', 'double'],
+};
 const RenameModel = { 1: ['name', 'string'], 2: ['to', 'string'] };
 const DeleteModel = { 1: ['name', 'string'] };
 const Nothing = {};
@@ -152,6 +165,15 @@ const Teach = {
   6: ['forget', Forget, '?'],
 };
 
+const Held = {
+  1: ['sensor', 'string'],
+  2: ['count', 'uint'],
+  3: ['sum', 'double'],
+  4: ['squares', 'double'],
+};
+const HeldPose = { 1: ['name', 'string'], 2: ['held', Held, '*'] };
+const FitGlove = { 1: ['stream', 'string'], 2: ['pose', HeldPose, '*'], 3: ['name', 'string'] };
+
 export const ControlRequest = {
   3: ['status', Nothing, '?'],
   9: ['model_part', ModelPart, '?'],
@@ -165,6 +187,7 @@ export const ControlRequest = {
   21: ['fetch_recording', FetchRecording, '?'],
   22: ['rename_model', RenameModel, '?'],
   23: ['delete_model', DeleteModel, '?'],
+  24: ['fit_glove', FitGlove, '?'],
 };
 
 const KnownModel = {
@@ -202,6 +225,13 @@ const Teaching = {
   14: ['sign', TaughtSign, '*'],
 };
 
+const FitVerdict = { 1: ['pose', 'string'], 2: ['good', 'bool'], 3: ['sentence', 'string'] };
+const GloveFit = {
+  1: ['verdict', FitVerdict, '*'],
+  2: ['sentence', 'string', '*'],
+  3: ['file', 'string'],
+};
+
 export const ControlReply = {
   1: ['ok', 'bool'],
   2: ['error', 'string'],
@@ -214,6 +244,7 @@ export const ControlReply = {
   9: ['teaching', Teaching, '?'],
   20: ['recording', KnownRecording, '*'],
   21: ['piece', 'bytes', '?'],
+  22: ['fit', GloveFit, '?'],
 };
 
 // posed.v1.Event.Kind, by number.

@@ -6,7 +6,7 @@ import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { PAGE } from '../support/fake_bridge.mjs';
 import { RealDaemon, hasDemo } from '../support/real_daemon.mjs';
-import { askedAgain, launch, openPage, PATIENCE } from '../support/browser.mjs';
+import { askedAgain, opened, PATIENCE } from '../support/browser.mjs';
 
 const BUILD = join(dirname(fileURLToPath(import.meta.url)), '../../../build');
 const LARGEST_PICTURE = 400_000;
@@ -15,23 +15,19 @@ const skip = hasDemo()
   : 'SKIPPED without build/demo (`build/posed demo --prepare build/demo` makes it)';
 const options = { skip, timeout: 900000 };
 
-let browser;
 let daemon;
-before(async () => {
-  if (skip) return;
-  browser = await launch();
-  daemon = new RealDaemon(process.env.POSED);
-  await daemon.start();
-});
-after(async () => {
-  await browser?.close();
-  await daemon?.stop();
-});
+const tests = [];
+const told = (...one) => tests.push(one);
 
-async function opened(context, url, size) {
-  const page = await openPage(browser, url, size);
-  context.after(() => page.context().close());
-  return page;
+// For main.mjs: the tests in a row, because one daemon serves them all.
+export function daemonTests() {
+  before(async () => {
+    if (skip) return;
+    daemon = new RealDaemon(process.env.POSED);
+    await daemon.start();
+  });
+  after(() => daemon?.stop());
+  for (const one of tests) test(...one);
 }
 
 const drawn = (page) => page.locator('.name-tag:visible').first().waitFor(PATIENCE);
@@ -60,7 +56,7 @@ async function moves(page, name) {
   );
 }
 
-test(
+told(
   "the demo's walker and hand move, and a picture of them is small",
   options,
   async (context) => {
@@ -81,7 +77,7 @@ test(
   },
 );
 
-test(
+told(
   'alpha, mask, gestures and takes reach the daemon, which is live again when it restarts',
   options,
   async (context) => {
@@ -146,18 +142,17 @@ test(
   },
 );
 
-test('a page of --read-only can change nothing and says so', options, async (context) => {
+told('a page of --read-only can change nothing and says so', options, async (context) => {
   const page = await opened(context, await daemon.view(PAGE, '--read-only'));
   await drawn(page);
   await page.getByText('Controls are off: this page was opened with --read-only').waitFor(PATIENCE);
   assert.ok(await page.getByLabel('Amount of style, α, number').isDisabled());
 });
 
-test('without the right token there is no page and no stream', options, async (context) => {
+told('without the right token there is no page and no stream', options, async (context) => {
   const url = new URL(await daemon.view(PAGE));
   assert.equal((await fetch(url.origin)).status, 403);
   url.searchParams.set('token', 'guess');
-  const page = await openPage(browser, url.href);
-  context.after(() => page.context().close());
+  const page = await opened(context, url.href);
   assert.match(await page.locator('body').innerText(), /URL|address/);
 });

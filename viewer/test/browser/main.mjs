@@ -1,10 +1,17 @@
 // node main.mjs: the tests of the page in a browser; with POSED=path/to/posed also with the daemon.
-import { hasBrowser } from '../support/browser.mjs';
+// They mostly wait, so three go on side by side.
+import { after, describe, test } from 'node:test';
+import { closeBrowser, hasBrowser } from '../support/browser.mjs';
 
 if (hasBrowser()) {
-  await import('./page_test.mjs');
-  await import('./camera_test.mjs');
-  if (process.env.POSED) await import('./daemon_test.mjs');
+  const { tests: pageTests } = await import('./page_test.mjs');
+  const { tests: cameraTests } = await import('./camera_test.mjs');
+  const { daemonTests } = await import('./daemon_test.mjs');
+  after(closeBrowser);
+  describe('the page in a browser', { concurrency: 3 }, () => {
+    if (process.env.POSED) describe('with the daemon', daemonTests);
+    for (const one of [...cameraTests, ...pageTests]) test(...one);
+  });
 } else {
   console.log('SKIPPED without chromium');
 }

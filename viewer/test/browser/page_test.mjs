@@ -2,31 +2,22 @@
 import assert from 'node:assert/strict';
 import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
-import { after, before, test } from 'node:test';
 import { FakeBridge } from '../support/fake_bridge.mjs';
 import { FakeDaemon } from '../support/fake_daemon.mjs';
-import { askedAgain, launch, openPage, PATIENCE } from '../support/browser.mjs';
+import { askedAgain, opened, PATIENCE } from '../support/browser.mjs';
 
 const HANGS = { timeout: 900000 };
 const AXE = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 
-let browser;
-before(async () => {
-  browser = await launch();
-});
-after(() => browser.close());
+export const tests = []; // what node's test() takes, for main.mjs
+const test = (...one) => tests.push(one);
 
-// A bridge and a page that end with the test, however that ends.
+// A bridge that ends with the test, however that ends.
 async function started(context, options = {}, port = 0) {
-  const bridge = await new FakeBridge(new FakeDaemon(options), options).start(port);
+  const daemon = new FakeDaemon({ rate_hz: 30, ...options });
+  const bridge = await new FakeBridge(daemon, options).start(port);
   context.after(() => bridge.stop());
   return bridge;
-}
-
-async function opened(context, url, options) {
-  const page = await openPage(browser, url, options);
-  context.after(() => page.context().close());
-  return page;
 }
 
 // Tests that share a page, because opening one takes seconds where the processor draws. Each begins
@@ -36,7 +27,6 @@ function pageTests(name, options, parts) {
     const bridge = await started(context, options);
     const page = await opened(context, bridge.url, options);
     await drawn(page);
-    await drawLess(page);
     for (const [what, use] of Object.entries(parts)) {
       await context.test(what, async () => {
         await begin(page, bridge, options);
@@ -47,25 +37,10 @@ function pageTests(name, options, parts) {
   });
 }
 
-const pageTest = (name, options, use) => pageTests(name, options, { 'as it should': use });
-
-// Draws one picture of four. Where the processor draws, the tests would mostly wait for pictures
-// that they do not look at.
-const drawLess = (page) =>
-  page.evaluate(() => {
-    const { world } = globalThis.posedPage;
-    let count = 0;
-    const { frame } = Object.getPrototypeOf(world);
-    world.frame = (shown) => {
-      count += 1;
-      return count % 4 === 0 && frame.call(world, shown);
-    };
-  });
-
 // A new daemon with nothing set, for a page that forgets what the last test has left on it.
 async function begin(page, bridge, options) {
   const { frames, began } = bridge.daemon;
-  bridge.daemon = Object.assign(new FakeDaemon(options), { frames, began });
+  bridge.daemon = Object.assign(new FakeDaemon({ rate_hz: 30, ...options }), { frames, began });
   bridge.requests = [];
   delete bridge.publishStats; // of a test that had one of its own
   const before_ms = await page.evaluate(() => {
@@ -106,109 +81,58 @@ const places = (page, name) =>
 const tile = (page, name) =>
   page.locator('.tile', { has: page.locator('dt', { hasText: new RegExp(`^${name}$`) }) });
 
-pageTest(
-  'names cover neither each other nor the buttons, whatever the view',
+pageTests(
+  'a page of four bodies and two hands',
   { bodies: 4, hands: 2, missing: [5, 6, 7, 8] },
-  async (page) => {
-    for (const view of ['Side', 'Front', 'Follow']) {
-      await page.getByRole('button', { name: view, exact: true }).click();
-      await page.waitForTimeout(2000); // the view is there, the texts have their sizes
-      const boxes = await page.locator('.name-tag:visible').evaluateAll((tags) =>
-        tags.map((tag) => {
-          const { left, right, top, bottom } = tag.getBoundingClientRect();
-          return { left, right, top, bottom };
-        }),
-      );
-      assert.ok(boxes.length >= 4, `${view}: ${boxes.length} names`);
-      const tools = await page.locator('.tools').boundingBox();
-      for (const [i, a] of boxes.entries()) {
-        assert.ok(a.top >= tools.y + tools.height, `${view}: a name below the buttons`);
-        for (const b of boxes.slice(i + 1)) {
-          const apart =
-            a.right <= b.left || b.right <= a.left || a.bottom <= b.top || b.bottom <= a.top;
-          assert.ok(apart, `${view}: ${JSON.stringify([a, b])}`);
+  {
+    'names cover neither each other nor the buttons, whatever the view': async (page) => {
+      for (const view of ['Side', 'Front', 'Follow']) {
+        await page.getByRole('button', { name: view, exact: true }).click();
+        await page.waitForTimeout(1200); // the view is there, the texts have their sizes
+        const boxes = await page.locator('.name-tag:visible').evaluateAll((tags) =>
+          tags.map((tag) => {
+            const { left, right, top, bottom } = tag.getBoundingClientRect();
+            return { left, right, top, bottom };
+          }),
+        );
+        assert.ok(boxes.length >= 4, `${view}: ${boxes.length} names`);
+        const tools = await page.locator('.tools').boundingBox();
+        for (const [i, a] of boxes.entries()) {
+          assert.ok(a.top >= tools.y + tools.height, `${view}: a name below the buttons`);
+          for (const b of boxes.slice(i + 1)) {
+            const apart =
+              a.right <= b.left || b.right <= a.left || a.bottom <= b.top || b.bottom <= a.top;
+            assert.ok(apart, `${view}: ${JSON.stringify([a, b])}`);
+          }
         }
       }
-    }
+    },
+    'each performer has a colour; follow and orbit keep the chosen one in the picture, alone':
+      async (page) => {
+        const entries = await page
+          .locator('.legend li[data-key="performer"]')
+          .evaluateAll((items) =>
+            items.map((item) => [item.textContent, item.style.getPropertyValue('--own')]),
+          );
+        const bodies = ['walker', 'walker2', 'walker3', 'walker4'].map((name) => `${name}: styled`);
+        const hands = ['hand', 'hand2'].map((name) => `${name}: smoothed`);
+        assert.deepEqual(entries.map(([text]) => text).sort(), [...hands, ...bodies].sort());
+        assert.equal(new Set(entries.map(([, colour]) => colour)).size, 6);
+        await page.locator('.stream', { hasText: 'walker3' }).click();
+        for (const view of ['Follow', 'Orbit']) {
+          await page.getByRole('button', { name: view, exact: true }).click();
+          await page.waitForTimeout(1500); // he walks on, and the view with him
+          const off_m = await page.evaluate(() => {
+            const { world } = globalThis.posedPage;
+            const [one, raw] = ['walker3', 'walker3-raw'].map((name) => world.performers.get(name));
+            const middle = one.centre.clone().lerp(raw.centre, 0.5);
+            return Math.hypot(world.views.target.x - middle.x, world.views.target.z - middle.z);
+          });
+          assert.ok(off_m < 1, `${view}: ${off_m} m`);
+        }
+      },
   },
 );
-
-pageTest(
-  'follow and orbit keep the chosen one in the picture, alone; each performer has a colour',
-  { bodies: 3, hands: 1 },
-  async (page) => {
-    const entries = await page.locator('.legend li[data-key="performer"]').evaluateAll((items) =>
-      items.map((item) => [item.textContent, item.style.getPropertyValue('--own')]),
-    );
-    const words = ['walker', 'walker2', 'walker3'].map((name) => `${name}: styled`);
-    assert.deepEqual(entries.map(([text]) => text).sort(), ['hand: smoothed', ...words].sort());
-    assert.equal(new Set(entries.map(([, colour]) => colour)).size, 4);
-    await page.locator('.stream', { hasText: 'walker3' }).click();
-    for (const view of ['Follow', 'Orbit']) {
-      await page.getByRole('button', { name: view, exact: true }).click();
-      await page.waitForTimeout(3000); // he walks on, and the view with him
-      const off_m = await page.evaluate(() => {
-        const { world } = globalThis.posedPage;
-        const [one, raw] = ['walker3', 'walker3-raw'].map((name) => world.performers.get(name));
-        const middle = one.centre.clone().lerp(raw.centre, 0.5);
-        return Math.hypot(world.views.target.x - middle.x, world.views.target.z - middle.z);
-      });
-      assert.ok(off_m < 1, `${view}: ${off_m} m`);
-    }
-  },
-);
-
-pageTest('a style is taught by two walks', { bodies: 1, hands: 0 }, async (page, bridge) => {
-  await unfold(page, 'Teach a style');
-  const lesson = page.locator('details', { hasText: 'Teach a style' });
-  const learn = lesson.getByRole('button', { name: 'Learn' });
-  const walk = (how) => lesson.getByLabel(`Walk ${how}`);
-  await walk('as usual').click();
-  await lesson.getByText(/^\d+ s …/).waitFor(PATIENCE);
-  assert.ok(await walk('in the style').isDisabled());
-  await lesson.getByText('✓ 18 strides in 20.0 s').waitFor(PATIENCE);
-  await walk('in the style').click();
-  await lesson.getByText('✗ this is no walk').waitFor(PATIENCE);
-  await lesson.getByLabel('Name').fill('proud');
-  assert.ok(await learn.isDisabled());
-  await walk('in the style').click();
-  await lesson.getByText('✓ 18 strides in 20.0 s').nth(1).waitFor(PATIENCE);
-  await lesson.getByLabel('Name').fill('../proud');
-  assert.ok(await learn.isDisabled());
-  await lesson.getByLabel('Name').fill('proud');
-  await learn.click();
-  await lesson.getByText('proud.style: from frame 900, 1.5 s later').waitFor(PATIENCE);
-  assert.equal(bridge.daemon.bodies[0].model, 'proud.style');
-  await lesson.getByRole('button', { name: 'One more' }).first().click();
-  await lesson.getByText('; 2 walks are kept').waitFor(PATIENCE);
-  assert.ok(await learn.isEnabled());
-});
-
-pageTest('a hand is taught signs', { bodies: 0, hands: 1 }, async (page, bridge) => {
-  await unfold(page, 'Teach signs');
-  const lesson = page.locator('details', { hasText: 'Teach signs' });
-  const learn = lesson.getByRole('button', { name: 'Learn' });
-  const begin = lesson.getByRole('button', { name: 'Show 5 s' });
-  await lesson.getByLabel('Sign', { exact: true }).fill('two words');
-  assert.ok(await begin.isDisabled());
-  await lesson.getByLabel('Sign', { exact: true }).fill('ok');
-  await lesson.getByLabel('Name').fill('mine');
-  for (const verdict of ['✓ held', '✗ the hand moved too much', '✓ held', '✓ held']) {
-    assert.ok(await learn.isDisabled());
-    await begin.click();
-    await lesson.getByText(/^\d+ s …/).waitFor(PATIENCE);
-    await begin.waitFor(PATIENCE);
-    await lesson.getByText(verdict).waitFor(PATIENCE);
-  }
-  await lesson.getByRole('button', { name: 'ok 3/3' }).waitFor(PATIENCE);
-  await learn.click();
-  await lesson.getByText('mine.gesture: from frame 900, 0.5 s later').waitFor(PATIENCE);
-  assert.ok(bridge.requests.some(({ teach }) => teach?.train?.signs === true));
-  const gestures = page.getByLabel('Gestures of the model');
-  await gestures.getByRole('button', { name: 'ok', exact: true }).waitFor(PATIENCE);
-  await lesson.getByRole('button', { name: 'ok 3/3' }).click();
-  await lesson.getByRole('button', { name: 'ok 3/3' }).waitFor({ state: 'detached' });
-});
 
 const rights = { may_control: false, read_only_reason: 'this key may watch only' };
 test(
@@ -239,11 +163,18 @@ test(
   },
 );
 
+// As where a virtual machine or a policy has it switched off.
+const withoutWebGL = (page) =>
+  page.addInitScript(() => {
+    const { getContext } = HTMLCanvasElement.prototype;
+    HTMLCanvasElement.prototype.getContext = function of(kind, ...more) {
+      return kind.startsWith('webgl') ? null : getContext.call(this, kind, ...more);
+    };
+  });
+
 test('without WebGL the page says what to do', HANGS, async (context) => {
-  const blind = await launch(['--disable-gpu', '--disable-3d-apis']);
-  context.after(() => blind.close());
   const bridge = await started(context);
-  const page = await openPage(blind, bridge.url);
+  const page = await opened(context, bridge.url, { before: withoutWebGL });
   await page.locator('.link-text', { hasText: 'this browser draws no WebGL' }).waitFor(PATIENCE);
   bridge.publishStats();
   await page.waitForTimeout(500); // what the bridge sends is no error
@@ -297,6 +228,13 @@ const drop = (page, path, name) =>
     [path, name],
   );
 
+const wears = (page, name) =>
+  page.waitForFunction(
+    (avatar) => globalThis.posedPage?.world.performers.get('walker')?.avatar?.name === avatar,
+    name,
+    PATIENCE,
+  );
+
 const TIMES = ['Glass to glass', 'Arrival to callback'];
 
 async function withoutTimes(page) {
@@ -348,6 +286,57 @@ pageTests(
     },
     'instruments of a live daemon have its times': async (page) => {
       for (const name of TIMES) await tile(page, name).waitFor(PATIENCE);
+    },
+    'a style is taught by two walks': async (page, bridge) => {
+      await unfold(page, 'Teach a style');
+      const lesson = page.locator('details', { hasText: 'Teach a style' });
+      const learn = lesson.getByRole('button', { name: 'Learn' });
+      const walk = (how) => lesson.getByLabel(`Walk ${how}`);
+      await walk('as usual').click();
+      await lesson.getByText(/^\d+ s …/).waitFor(PATIENCE);
+      assert.ok(await walk('in the style').isDisabled());
+      await lesson.getByText('✓ 18 strides in 20.0 s').waitFor(PATIENCE);
+      await walk('in the style').click();
+      await lesson.getByText('✗ this is no walk').waitFor(PATIENCE);
+      await lesson.getByLabel('Name').fill('proud');
+      assert.ok(await learn.isDisabled());
+      await walk('in the style').click();
+      await lesson.getByText('✓ 18 strides in 20.0 s').nth(1).waitFor(PATIENCE);
+      await lesson.getByLabel('Name').fill('../proud');
+      assert.ok(await learn.isDisabled());
+      await lesson.getByLabel('Name').fill('proud');
+      await learn.click();
+      await lesson.getByText('proud.style: from frame 900, 1.5 s later').waitFor(PATIENCE);
+      assert.equal(bridge.daemon.bodies[0].model, 'proud.style');
+      await lesson.getByRole('button', { name: 'One more' }).first().click();
+      await lesson.getByText('; 2 walks are kept').waitFor(PATIENCE);
+      assert.ok(await learn.isEnabled());
+    },
+    'a hand is taught signs': async (page, bridge) => {
+      await page.locator('.stream', { hasText: 'hand' }).click();
+      await unfold(page, 'Teach signs');
+      const lesson = page.locator('details', { hasText: 'Teach signs' });
+      const learn = lesson.getByRole('button', { name: 'Learn' });
+      const begin = lesson.getByRole('button', { name: 'Show 5 s' });
+      await lesson.getByLabel('Sign', { exact: true }).fill('two words');
+      assert.ok(await begin.isDisabled());
+      await lesson.getByLabel('Sign', { exact: true }).fill('ok');
+      await lesson.getByLabel('Name').fill('mine');
+      for (const verdict of ['✓ held', '✗ the hand moved too much', '✓ held', '✓ held']) {
+        assert.ok(await learn.isDisabled());
+        await begin.click();
+        await lesson.getByText(/^\d+ s …/).waitFor(PATIENCE);
+        await begin.waitFor(PATIENCE);
+        await lesson.getByText(verdict).waitFor(PATIENCE);
+      }
+      await lesson.getByRole('button', { name: 'ok 3/3' }).waitFor(PATIENCE);
+      await learn.click();
+      await lesson.getByText('mine.gesture: from frame 900, 0.5 s later').waitFor(PATIENCE);
+      assert.ok(bridge.requests.some(({ teach }) => teach?.train?.signs === true));
+      const gestures = page.getByLabel('Gestures of the model');
+      await gestures.getByRole('button', { name: 'ok', exact: true }).waitFor(PATIENCE);
+      await lesson.getByRole('button', { name: 'ok 3/3' }).click();
+      await lesson.getByRole('button', { name: 'ok 3/3' }).waitFor({ state: 'detached' });
     },
     'an emptied number field changes nothing': async (page, bridge) => {
       await unfold(page, 'More parameters');
@@ -519,6 +508,14 @@ pageTests(
       const lines = readFileSync(await part.path(), 'utf8').split('\n');
       const head = lines.findIndex((line) => line === 'Frames: 45');
       assert.equal(lines.length, head + 2 + 45 + 1);
+      for (const kind of ['glb', 'vrma']) {
+        const [made] = await Promise.all([
+          page.waitForEvent('download', PATIENCE),
+          page.getByRole('button', { name: `As ${kind.toUpperCase()}` }).click(),
+        ]);
+        assert.equal(made.suggestedFilename(), `20261126T065505Z-2-walker-0.5s-2s.${kind}`);
+        assert.equal(readFileSync(await made.path(), 'utf8'), `${kind} from 0.5 to 2`);
+      }
       await page.getByLabel(`Stop: ${file}`).click();
       await entry.waitFor({ state: 'hidden', ...PATIENCE });
       await page.locator('summary', { hasText: 'Recordings' }).click();
@@ -622,7 +619,7 @@ pageTests(
         async () => {
           const { render } = globalThis.posedPage.world.renderer.info;
           const before = render.frame;
-          for (let i = 0; i < 60; i += 1) await new Promise(requestAnimationFrame);
+          for (let i = 0; i < 8; i += 1) await new Promise(requestAnimationFrame);
           return render.frame === before;
         },
         undefined,
@@ -656,6 +653,36 @@ pageTests(
       await page.getByRole('button', { name: 'Stop' }).click();
       await acknowledged(page, 'performs no more');
       assert.match(await page.locator('code').innerText(), /posed calibrate .*--stream hand/);
+    },
+    'a glove is calibrated by poses that are held, and by what the thumb touches': async (
+      page,
+      bridge,
+    ) => {
+      await unfold(page, 'Calibrate this glove');
+      const lesson = page.locator('details', { hasText: 'Calibrate this glove' });
+      const use = lesson.getByRole('button', { name: 'Use' });
+      await lesson.getByLabel('Whose hand').fill('ann');
+      assert.ok(await lesson.getByLabel('Hold: Fist', { exact: true }).isDisabled());
+      const hold = async (pose, name, verdict) => {
+        assert.ok(await use.isDisabled());
+        await lesson.getByLabel(`Hold: ${pose}`, { exact: true }).click();
+        await lesson.locator(`[data-pose='${name}']`, { hasText: verdict }).waitFor(PATIENCE);
+      };
+      await page.evaluate(() => {
+        globalThis.posedPage.panel.glove.constructor.seconds = { ready: 0, hold: 1 };
+      });
+      await hold('Flat hand', 'flat', '✓ held still');
+      await hold('Fist', 'fist', '✗ fist failed');
+      await hold('Fist', 'fist', '✓ held still');
+      await hold('Thumb across', 'thumb', '✓ held still');
+      await hold('Touch thumb and index', 'touch-index', '✓ held still');
+      await hold('Spread hand', 'spread', '✓ held still');
+      await use.click();
+      await lesson.getByText('ann.toml is kept and in use. thumb to index 3 mm').waitFor(PATIENCE);
+      const { fit_glove: fit } = bridge.requests.findLast((one) => one.fit_glove);
+      const [{ held }] = fit.pose;
+      assert.deepEqual([fit.name, held.length, held[0].sensor], ['ann', 1, 'index']);
+      assert.equal(held[0].squares, 1e4 * held[0].count);
     },
     'axe-core finds no fault': accessible,
   },
@@ -700,11 +727,52 @@ pageTests(
         undefined,
         PATIENCE,
       );
-      assert.equal(await page.getByLabel('Figure').inputValue(), 'Ann');
       await drop(page, '/page.css', 'notes.txt');
       await acknowledged(page, 'notes.txt cannot be read as VRM');
-      assert.equal(await page.getByLabel('Figure').inputValue(), 'Ann');
+      await page.getByRole('button', { name: 'Settings' }).click();
+      assert.equal(await page.getByLabel('All bodies', { exact: true }).inputValue(), 'Ann');
     },
+    'settings change the scene, and are remembered with the avatar of each performer': async (
+      page,
+    ) => {
+      await page.reload();
+      await drawn(page);
+      await wears(page, 'Ann');
+      await page.getByRole('button', { name: 'Settings' }).click();
+      const settings = page.locator('#settings');
+      await settings.getByLabel('walker', { exact: true }).selectOption('bones');
+      await wears(page, undefined);
+      await settings.getByLabel('Floor').uncheck();
+      await settings.getByLabel('Names').uncheck();
+      await settings.getByLabel('Background').selectOption('green, to cut figures out');
+      await settings.getByLabel('Picture').selectOption('always quick');
+      const seen = () =>
+        page.evaluate(() => {
+          const { world } = globalThis.posedPage;
+          return [
+            world.ground.group.visible,
+            world.scene.background.getHexString(),
+            world.renderer.getPixelRatio(),
+            getComputedStyle(document.querySelector('.name-tags')).display,
+          ];
+        });
+      assert.deepEqual(await seen(), [false, '00b140', 0.5, 'none']);
+      await settings.getByRole('button', { name: 'Close' }).click();
+      await page.reload();
+      await page.waitForFunction(
+        () => globalThis.posedPage?.world.performers.get('walker'),
+        undefined,
+        PATIENCE,
+      );
+      assert.deepEqual(await seen(), [false, '00b140', 0.5, 'none']);
+      await page.keyboard.press('o');
+      assert.equal(await settings.getByLabel('walker', { exact: true }).inputValue(), '');
+      await settings.getByRole('button', { name: 'Forget Ann' }).click();
+      await settings.getByText('Ann is kept').waitFor({ state: 'detached', ...PATIENCE });
+      await settings.getByLabel('walker', { exact: true }).selectOption('as all');
+      await wears(page, 'mannequin');
+    },
+    'axe-core finds no fault': accessible,
   },
 );
 

@@ -1,6 +1,7 @@
 // Headless Chromium for the tests, as Debian has it.
 import { existsSync } from 'node:fs';
 import { chromium } from 'playwright-core';
+import { handFilm } from './rendered_hand.mjs';
 
 export const CHROMIUM = process.env.POSED_CHROMIUM ?? '/usr/bin/chromium';
 export const hasBrowser = () => existsSync(CHROMIUM);
@@ -18,7 +19,7 @@ const FLAGS = [
 ];
 
 // A camera that shows this film, and a user who lets the page use it.
-export const withCamera = (film) => [
+const withCamera = (film) => [
   ...FLAGS,
   '--use-fake-device-for-media-stream',
   '--use-fake-ui-for-media-stream',
@@ -36,6 +37,28 @@ export async function askedAgain(ask, good) {
   let answer = await ask();
   for (let i = 0; i < 3 && !good(answer); i += 1) answer = await ask();
   return answer;
+}
+
+// One browser for all tests, whose camera shows a drawn hand.
+let shared = null;
+export const browserOfAll = () => {
+  shared ??= launch(withCamera(handFilm()));
+  return shared;
+};
+export const closeBrowser = async () => (await shared)?.close();
+
+// A page of that browser that ends with the test, however that ends. It draws three pictures a second:
+// where the processor draws, all tests would else wait for pictures that none looks at.
+export async function opened(context, url, options) {
+  const page = await openPage(await browserOfAll(), 'about:blank', options);
+  context.after(() => page.context().close());
+  await page.addInitScript(() => {
+    const { requestAnimationFrame: next } = globalThis;
+    globalThis.requestAnimationFrame = (draw) => setTimeout(() => next(draw), 300);
+  });
+  await options?.before?.(page);
+  await page.goto(url);
+  return page;
 }
 
 // A page that keeps the errors that it says on the console.

@@ -131,8 +131,12 @@ export class FakeDaemon {
       );
       list.push(this.#frame(`${body.name}-raw`, body.id + 50, walk(time_s + 0.3 * i, 0), {}));
     });
-    for (const hand of this.hands)
+    for (const hand of this.hands) {
       list.push(this.#frame(hand.name, hand.id, ...this.#sign(hand, time_s)));
+      const sample = { stream: hand.name, sequence: this.frames, name: ['raw_index', 'index'] };
+      Object.assign(sample, { value: [100, 0.5], validity: new Uint8Array([1, 1]) });
+      list.push([`sensor/${hand.name}`, encode('Sample', sample)]);
+    }
     return list;
   }
 
@@ -251,12 +255,14 @@ export class FakeDaemon {
     if (kind === 'take') return this.#mark(details);
     if (kind === 'teach' && hand) return { ok: true, teaching: this.#teachSigns(hand, details) };
     if (kind === 'teach' && body) return { ok: true, teaching: this.#teach(body, details) };
+    if (kind === 'fit_glove' && hand) return { ...done, fit: this.#fit(details) };
     if (kind === 'list_models') return { ok: true, model: this.models };
     if (kind === 'rename_model' || kind === 'delete_model') return this.#keep(kind, details);
     if (kind === 'list_recordings') return { ok: true, recording: this.recordings };
     if (kind === 'fetch_recording') {
-      const { name, offset = 0 } = details;
-      const bytes = name.includes('-2-') ? TAKE : RECORDED;
+      const { name, offset = 0, as = '', from_s, to_s } = details;
+      const made = () => new TextEncoder().encode(`${as} from ${from_s} to ${to_s}`);
+      const bytes = as ? made() : name.includes('-2-') ? TAKE : RECORDED;
       return { ok: true, piece: bytes.subarray(offset, offset + 32768) };
     }
     if (kind === 'use_model' && body) {
@@ -288,6 +294,18 @@ export class FakeDaemon {
     else if (name !== 'style.gate' || flag === undefined)
       return { ok: false, error: `${name}: give a number from -2 to 2` };
     return done;
+  }
+
+  // The first fist is no good one.
+  #fit({ pose, name = '' }) {
+    const first = !this.fisted;
+    this.fisted ||= pose.some((one) => one.name === 'fist');
+    const verdict = pose.map((one) => ({
+      pose: one.name,
+      good: one.name !== 'fist' || !first,
+      sentence: one.name === 'fist' && first ? 'fist failed: hold it again' : 'held still',
+    }));
+    return name ? { verdict, sentence: ['thumb to index 3 mm'], file: `${name}.toml` } : { verdict };
   }
 
   // Each walk takes eleven questions, a training one; the first walk in the style is none.

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import { test } from 'node:test';
 import { Quaternion, Vector3 } from 'three';
 import { loadAvatar, hipsHeight } from '../../src/scene/avatar.js';
-import { Avatars } from '../../src/scene/avatars.js';
+import { Avatars, BONES, MANNEQUIN } from '../../src/scene/avatars.js';
 import { Kinematics } from '../../src/motion/kinematics.js';
 import { mannequin } from '../../mannequin/mannequin.mjs';
 import { bodySkeleton, walk } from '../support/figures.mjs';
@@ -88,33 +88,48 @@ function dressing(context) {
     globalThis.fetch = fetch;
   });
   const worn = [];
-  const body = { stream: { name: 'a' }, wear: (avatar) => worn.push(avatar?.name ?? null) };
+  const wear = (avatar) => {
+    body.avatar = avatar;
+    worn.push(avatar?.name ?? BONES);
+  };
+  const body = { stream: { name: 'a' }, avatar: null, wear };
   const said = [];
   const world = { performers: new Map([['a', body]]), stage: new EventTarget(), touch() {} };
   world.stage.dataset = {};
-  const names = [];
   const avatars = new Avatars(
     world,
     (sentence) => said.push(sentence),
-    (list) => names.splice(0, Infinity, ...list),
+    () => {},
   );
-  return { avatars, world, worn, said, names };
+  return { avatars, world, worn, said, body };
 }
 
 test('an avatar that is no longer chosen, or whose body has left, is not worn', async (context) => {
-  const { avatars, world, worn } = dressing(context);
-  const first = avatars.wear('mannequin');
-  await avatars.wear(null);
+  const { avatars, world, worn, body } = dressing(context);
+  const first = avatars.wear(MANNEQUIN);
+  await avatars.wear(BONES);
   await first;
-  assert.deepEqual(worn, [null]);
-  const second = avatars.wear('mannequin');
+  assert.equal(body.avatar, null);
+  const second = avatars.wear(MANNEQUIN);
   world.performers.clear();
   await second;
-  assert.deepEqual(worn, [null]);
+  assert.ok(!worn.includes(MANNEQUIN));
+});
+
+test('a body wears what was chosen for it, the others what all wear', async (context) => {
+  const { avatars, body } = dressing(context);
+  await avatars.wear(BONES);
+  await avatars.wear(MANNEQUIN, 'a');
+  assert.equal(body.avatar.name, MANNEQUIN);
+  await avatars.wear(null, 'a');
+  assert.equal(body.avatar, null);
+  assert.equal(avatars.chosen('a'), null);
+  await avatars.wear(MANNEQUIN);
+  assert.equal(body.avatar.name, MANNEQUIN);
 });
 
 test('a dropped file that is no avatar is not listed, whoever is there', async (context) => {
-  const { avatars, world, said, names } = dressing(context);
+  const { avatars, world, said } = dressing(context);
   world.performers.clear();
   const drop = new Event('drop');
   const file = { name: 'notes.vrm', arrayBuffer: async () => new ArrayBuffer(10) };
@@ -122,8 +137,7 @@ test('a dropped file that is no avatar is not listed, whoever is there', async (
   world.stage.dispatchEvent(drop);
   while (said.length === 0) await new Promise(setImmediate);
   assert.match(said[0], /notes cannot be read as VRM/);
-  await avatars.wear(null);
-  assert.deepEqual(names, ['mannequin']);
+  assert.deepEqual(avatars.names, [MANNEQUIN]);
 });
 
 test('a file that is no avatar is refused with a sentence', async () => {

@@ -1,7 +1,9 @@
 #include "daemon/control/model_folder.hpp"
 
 #include <chrono>
+#include <cmath>
 #include <filesystem>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -9,7 +11,10 @@
 
 #include "daemon/control/model_words.hpp"
 #include "daemon/control/recording_folder.hpp"
+#include "models/motion/synthetic_walker.hpp"
 #include "models/style/model/style_model.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
@@ -102,6 +107,28 @@ TEST_CASE("a model tells what it was learnt from; what is no model tells that") 
   CHECK(words_of_model("nonsense", "style", "a.style").verdict.contains("a.style"));
   CHECK(words.strip.empty());  // it knows no cycle
   CHECK_FALSE(words_of_model("nonsense", "generate", "a.gesture").verdict.empty());
+}
+
+TEST_CASE("a part of a take is had as .glb and .vrma, which leave nothing in the folder") {
+  const test::TempFolder folder;
+  const auto walk = motion::make_walker({.seconds = 2.0}).value();
+  REQUIRE(clip::write_clip(walk, folder.path() / "walk.bvh"));
+  const RecordingFolder recordings(folder.path());
+  const RecordingFolder::Part part{.name = "walk.bvh", .as = "glb", .from_s = 0.5, .to_s = 1.5};
+  const auto glb = clip::parse_clip({.name = "a.glb", .bytes = recordings.converted(part).value()});
+  CHECK(glb.value().frames() == 30);
+  auto other = part;
+  other.as = "vrma";
+  CHECK(recordings.converted(other).value().starts_with("glTF"));
+  CHECK(recordings.list().value().size() == 1);
+  CHECK(std::distance(std::filesystem::directory_iterator(folder.path()), {}) == 1);
+  for (const RecordingFolder::Part& wrong :
+       {RecordingFolder::Part{.name = "walk.bvh", .as = "exe"},
+        RecordingFolder::Part{.name = "../walk.bvh", .as = "glb"},
+        RecordingFolder::Part{.name = "walk.bvh", .as = "glb", .from_s = 3.0},
+        RecordingFolder::Part{.name = "walk.bvh", .as = "glb", .from_s = std::nan("")}}) {
+    CHECK_FALSE(recordings.converted(wrong));
+  }
 }
 
 TEST_CASE("recordings are listed and read by their names in the folder, and by nothing else") {

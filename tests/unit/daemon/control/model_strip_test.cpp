@@ -2,8 +2,11 @@
 #include "daemon/control/model_strip.hpp"
 
 #include <algorithm>
+#include <memory>
 #include <regex>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <catch2/catch.hpp>
 
@@ -49,13 +52,33 @@ TEST_CASE("the thumbnail of a style has six people who stride to the right", "[s
   CHECK(left >= 0);
   CHECK(right <= kStripPoses * kStripPose_cm);
 
-  model.space.space = motion::Space::kNative;
-  CHECK(strip_of(model).empty());
-  model.space.space = motion::Space::kHumanoid;
   model.gate.usual.front().resize(3, 2);
   CHECK(strip_of(model).empty());
   model.gate.usual.clear();
   CHECK(strip_of(model).empty());
+}
+
+TEST_CASE("a style of a skeleton's own joints is drawn on whom it was trained on", "[strip]") {
+  const auto walkers = [](bool others) {
+    std::vector<style::TrainingClip> takes{take(motion::WalkerFamily::kMarch, "march"),
+                                           take(motion::WalkerFamily::kSway, "sway")};
+    for (auto& one : takes) {
+      auto own = std::make_shared<Skeleton>(*one.clip.skeleton);
+      if (others) own->joints.back().name = "another";
+      one.clip.skeleton = std::move(own);
+    }
+    return takes;
+  };
+  style::TrainOptions options;
+  options.target = "sway";
+  options.dataset.space = motion::Space::kNative;
+  const auto of_demo = style::train_style(walkers(false), options).value();
+  CHECK(std::ranges::count(strip_of(of_demo), 'M') == 5 * kStripPoses);
+  const auto own = walkers(true);
+  const auto of_another = style::train_style(own, options).value();
+  CHECK(strip_of(of_another).empty());
+  const std::vector known{own.front().clip.skeleton};
+  CHECK(std::ranges::count(strip_of(of_another, known), 'M') == 5 * kStripPoses);
 }
 
 }  // namespace posed::control

@@ -1,5 +1,5 @@
 // `posed calibrate` with contacts: the thumb touches where the user's did.
-#include "daemon/tools/devices/thumb_contacts.hpp"
+#include "daemon/devices/thumb_contacts.hpp"
 
 #include <catch2/catch.hpp>
 
@@ -14,6 +14,7 @@ namespace posed::tools {
 namespace {
 
 using namespace drivers::glove;
+using devices::fit_contacts;
 
 // What a glove with default curves sends while the hand is in this pose, its thumb's zeros off.
 void hold(const Model& model, const HandAngles& hand, std::array<Held, kMaxSensors>& held) {

@@ -1,4 +1,4 @@
-#include "daemon/tools/devices/thumb_contacts.hpp"
+#include "daemon/devices/thumb_contacts.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,12 +7,11 @@
 
 #include <fmt/format.h>
 
-#include "daemon/tools/devices/calibrate_poses.hpp"
 #include "drivers/glove/angle_map.hpp"
 #include "models/hand/geometry.hpp"
 #include "models/hand/thumb_fit.hpp"
 
-namespace posed::tools {
+namespace posed::devices {
 namespace {
 
 using drivers::glove::CalibrationFile;
@@ -31,7 +30,7 @@ std::vector<hand::ThumbPose> contacts_of(const Model& model,
     const auto pose = static_cast<Pose>(p);
     const int touched = touched_finger(pose);
     const bool known = touched != 0 || pose == Pose::kFlat || pose == Pose::kSpread;
-    if (!known || !was_held(recorded, p)) continue;
+    if (!known || !drivers::glove::was_held(recorded[p])) continue;
     hand::ThumbPose contact{.angles = drivers::glove::angles_of(model, calibration, recorded[p]),
                             .touched = {},
                             .beside = pose == Pose::kFlat,
@@ -111,4 +110,4 @@ Result<std::vector<std::string>> fit_contacts(const Model& model, const Recorded
   return sentences;
 }
 
-}  // namespace posed::tools
+}  // namespace posed::devices

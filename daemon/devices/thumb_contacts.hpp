@@ -1,4 +1,4 @@
-// The part of `posed calibrate` that fits a thumb to what it touched. Cold.
+// The part of a calibration by poses that fits a thumb to what it touched. Cold.
 #pragma once
 
 #include <string>
@@ -9,7 +9,7 @@
 #include "drivers/glove/model.hpp"
 #include "proto/frame/result.hpp"
 
-namespace posed::tools {
+namespace posed::devices {
 
 // Changes the values of the thumb's sensors in `file`, which fit_poses() has made from the same
 // poses, so that the hand touches where the user's did. Returns sentences with the gaps before and
@@ -19,4 +19,4 @@ Result<std::vector<std::string>> fit_contacts(const drivers::glove::Model& model
                                               const drivers::glove::Recorded& recorded, Side hand,
                                               drivers::glove::CalibrationFile& file);
 
-}  // namespace posed::tools
+}  // namespace posed::devices

@@ -1,0 +1,97 @@
+#include "daemon/control/glove_fit.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <spdlog/fmt/fmt.h>
+
+#include "daemon/devices/thumb_contacts.hpp"
+#include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/fit.hpp"
+#include "drivers/glove/pose_check.hpp"
+#include "drivers/glove/traits.hpp"
+#include "proto/frame/hand_skeleton.hpp"
+#include "proto/text/clean.hpp"
+
+namespace posed::control {
+namespace {
+
+using drivers::glove::kPoseNames;
+using drivers::glove::Model;
+using drivers::glove::Recorded;
+
+constexpr std::uint32_t kMinValues = 3;          // of a sensor in a pose: a page may be slow
+constexpr std::uint32_t kMaxValues = 1'000'000;  // the same; hours
+
+// Whether such values can have come from a sensor.
+bool is_sound(const v1::ControlRequest::FitGlove::Held& held) {
+  return held.count() >= kMinValues && held.count() <= kMaxValues && std::isfinite(held.sum()) &&
+         std::isfinite(held.squares()) && held.squares() >= 0.0;
+}
+
+Result<Recorded> recorded_of(const Model& model, const v1::ControlRequest::FitGlove& wanted) {
+  Recorded recorded{};
+  for (const auto& pose : wanted.pose()) {
+    const auto name = std::ranges::find(kPoseNames, pose.name());
+    if (name == kPoseNames.end()) return fail("there is no pose " + in_quotes(pose.name()));
+    auto& sensors = recorded[static_cast<std::size_t>(name - kPoseNames.begin())];
+    for (const auto& held : pose.held()) {
+      const auto sensor =
+          std::ranges::find(model.sensors, held.sensor(), &drivers::glove::Sensor::name);
+      if (sensor == model.sensors.end()) continue;  // measured, but not calibrated
+      if (!is_sound(held)) {
+        return fail(fmt::format("too few values of {} came while {} was held; is the glove on?",
+                                sensor->name, *name));
+      }
+      sensors[static_cast<std::size_t>(sensor - model.sensors.begin())] = {
+          .sum = held.sum(), .count = held.count(), .squares = held.squares()};
+    }
+  }
+  return recorded;
+}
+
+void tell(const drivers::glove::PoseFinding& finding, v1::GloveFit& words) {
+  v1::GloveFit::Verdict& verdict = *words.add_verdict();
+  verdict.set_pose(std::string(kPoseNames[static_cast<std::size_t>(finding.pose)]));
+  verdict.set_good(!finding.failed());
+  verdict.set_sentence(
+      finding.failed() ? clean(finding.sentence())
+      : finding.sensors == 0
+          ? "held; the next poses show how still"
+          : fmt::format("held still, to {:.0f} % of the sensors' way", 100.0 * finding.unrest));
+}
+
+}  // namespace
+
+Result<FittedGlove> fit_glove(const drivers::Description& device,
+                              const v1::ControlRequest::FitGlove& wanted) {
+  const drivers::Driver* const driver = drivers::find_driver(device.driver);
+  const auto hand = device.skeleton ? hand_side(*device.skeleton) : std::nullopt;
+  if (driver == nullptr || driver->glove == nullptr || !hand) {
+    return fail("it is no glove that can be calibrated");
+  }
+  const Model model = TRY(driver->glove->glove_model(device));
+  const Recorded recorded = TRY(recorded_of(model, wanted));
+  const auto check = TRY(drivers::glove::check_poses(model, recorded));
+  FittedGlove made;
+  for (const auto& finding : check.poses) tell(finding, made.words);
+  if (wanted.name().empty()) return made;
+  if (!check.usable()) return fail(check.verdict());
+  auto fitted = TRY(drivers::glove::fit_poses(model, recorded));
+  drivers::glove::CalibrationFile file{
+      .driver = model.driver,
+      .glove = device.identity.starts_with('/') ? std::string() : device.identity,
+      .user = wanted.name(),
+      .hand = *hand,
+      .parameters = {},
+      .sensors = std::move(fitted.sensors)};
+  auto sentences = TRY(devices::fit_contacts(model, recorded, *hand, file));
+  sentences.insert(sentences.end(), fitted.warnings.begin(), fitted.warnings.end());
+  sentences.push_back(check.verdict());
+  for (const std::string& sentence : sentences) made.words.add_sentence(clean(sentence));
+  made.toml = drivers::glove::format_calibration(file);
+  return made;
+}
+
+}  // namespace posed::control

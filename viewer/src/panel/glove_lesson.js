@@ -1,0 +1,128 @@
+// Calibrates the chosen glove to a hand: each pose is held once and judged at once, the contacts
+// fit the thumb to what it touches. The page adds up what the sensors say, the daemon does the rest.
+import { el, labelled, write } from './dom.js';
+
+const NAME = /^[a-z0-9_-]{1,32}$/;
+const NEEDED = 4; // poses; the others are contacts
+const POSES = [
+  ['flat', 'Flat hand', 'on the table, fingers together and straight, thumb beside the index'],
+  ['fist', 'Fist', 'tight, with the thumb outside'],
+  ['thumb', 'Thumb across', 'fingers straight, the thumb at the root of the little finger'],
+  ['spread', 'Spread hand', 'flat, all fingers as far apart as they go'],
+  ['touch-index', 'Touch thumb and index', 'tip on tip'],
+  ['touch-middle', 'Touch thumb and middle', 'tip on tip'],
+  ['touch-ring', 'Touch thumb and ring finger', 'tip on tip'],
+  ['touch-little', 'Touch thumb and little finger', 'tip on tip'],
+  ['touch-fist', 'Fist, thumb across', 'its tip on the middle finger'],
+];
+
+// What was held, by stream: also when the controls are made again.
+const kept = {};
+
+function add(sums, { name, value, validity }) {
+  name.forEach((sensor, i) => {
+    if (!sensor.startsWith('raw_') || !validity[i]) return;
+    const key = sensor.slice(4);
+    const sum = sums.get(key) ?? { sensor: key, count: 0, sum: 0, squares: 0 };
+    sum.count += 1;
+    sum.sum += value[i];
+    sum.squares += value[i] ** 2;
+    sums.set(key, sum);
+  });
+}
+
+export class GloveLesson {
+  static seconds = { ready: 2, hold: 2 };
+  static #open = false;
+
+  constructor({ name }, { control, requests, store }) {
+    Object.assign(this, { name, control, requests, store });
+    this.held = kept[name] ??= { poses: new Map(), verdicts: new Map() };
+    this.rows = POSES.map(([pose, text, hint]) => this.#row(pose, text, hint));
+    this.called = el('input', {
+      type: 'text',
+      maxLength: 32,
+      placeholder: 'a-z, digits, - and _',
+      oninput: () => this.#show(),
+    });
+    this.use = el('button', { type: 'button', onclick: () => this.#use() }, 'Use');
+    this.words = el('p.note', { role: 'status' });
+    this.element = el(
+      'details',
+      {
+        open: GloveLesson.#open,
+        ontoggle: () => {
+          GloveLesson.#open = this.element.open;
+        },
+      },
+      el('summary', {}, 'Calibrate this glove'),
+      el('p.note', {}, 'Press, take the pose at once, and hold still until it is judged.'),
+      ...this.rows.flatMap(({ row, words }) => [row, words]),
+      labelled('Whose hand', this.called, this.use),
+      this.words,
+    );
+    this.#show();
+  }
+
+  #row(pose, text, hint) {
+    const hold = el('button', { type: 'button', onclick: () => this.#hold(pose, hold) }, 'Hold');
+    const row = labelled(text, el('span.note', {}, hint), hold);
+    hold.setAttribute('aria-label', `Hold: ${text}`);
+    return { pose, hold, row, words: el('p.note', { data: { pose } }) };
+  }
+
+  async #wait(seconds, button, text) {
+    for (let left = seconds; left > 0; left -= 1) {
+      write(button, `${text} ${left}`);
+      await new Promise((done) => {
+        setTimeout(done, 1000);
+      });
+    }
+  }
+
+  async #hold(pose, button) {
+    const { poses, verdicts } = this.held;
+    this.busy = true;
+    this.#show();
+    await this.#wait(GloveLesson.seconds.ready, button, 'Ready …');
+    const sums = new Map();
+    this.store.listen(this.name, (sample) => add(sums, sample));
+    await this.#wait(GloveLesson.seconds.hold, button, 'Still …');
+    this.store.listen(this.name, null);
+    write(button, 'Hold');
+    const before = poses.get(pose);
+    poses.set(pose, [...sums.values()]);
+    const reply = await this.requests.ask({ fit_glove: this.#message() });
+    this.busy = false;
+    if (reply.ok) for (const one of reply.fit.verdict) verdicts.set(one.pose, one);
+    else if (before) poses.set(pose, before);
+    else poses.delete(pose);
+    this.#show(reply.ok ? '' : reply.error);
+  }
+
+  #message(name = '') {
+    const pose = [...this.held.poses].map(([one, held]) => ({ name: one, held }));
+    return { stream: this.name, pose, name };
+  }
+
+  async #use() {
+    const called = this.called.value;
+    const request = { fit_glove: this.#message(called) };
+    const { ok, error, fit } = await this.control(request, `${this.name}: calibration ${called}`);
+    const always = ok && `at each start: calibration = "${fit.file}" in the stream's table`;
+    this.#show(ok ? `${fit.file} is kept and in use. ${fit.sentence.join('; ')}; ${always}` : error);
+  }
+
+  #show(words = '') {
+    const { poses, verdicts } = this.held;
+    for (const { pose, hold, words: said } of this.rows) {
+      hold.disabled = this.busy || (pose !== 'flat' && !poses.has('flat'));
+      const { good, sentence } = (poses.has(pose) && verdicts.get(pose)) || {};
+      write(said, sentence ? `${good ? '✓' : '✗'} ${sentence}` : '');
+    }
+    const whole = POSES.slice(0, NEEDED).every(([pose]) => poses.has(pose));
+    const good = [...poses.keys()].every((pose) => verdicts.get(pose)?.good);
+    this.use.disabled = this.busy || !whole || !good || !NAME.test(this.called.value);
+    write(this.words, words);
+  }
+}
