@@ -40,6 +40,8 @@ int joint_of(const Skeleton& skeleton, Bone bone) {
   return upper >= 0 ? upper : skeleton.joint_of(bone);
 }
 
+constexpr double kShortest_m = 1e-3;  // of a bone that has a direction
+
 // The ground is where the lower foot is in its lowest twentieth of the time.
 constexpr double kGroundShare = 0.05;
 
@@ -89,9 +91,14 @@ std::optional<BodyCycle> body_cycle(const motion::Motion& motion, const WalkPhas
   if (!legs || hips < 0 || ankles[0] < 0 || ankles[1] < 0) return std::nullopt;
   BodyCycle cycle;
   std::vector<std::pair<int, int>> ends;
+  const auto first = motion::world_pose(skeleton, motion.frames.front());
   for (const BoneEnds& bone : kBones) {
     const std::pair joints{joint_of(skeleton, bone.first), joint_of(skeleton, bone.second)};
     if (joints.first < 0 || joints.second < 0) continue;
+    // Some files have the neck in the chest, from where it points nowhere.
+    const Vector3d along = first.position_m[static_cast<std::size_t>(joints.second)] -
+                           first.position_m[static_cast<std::size_t>(joints.first)];
+    if (!(along.norm() > kShortest_m)) continue;
     cycle.bones.push_back(bone);
     ends.push_back(joints);
   }

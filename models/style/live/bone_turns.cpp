@@ -12,7 +12,9 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kClear = 0.3;  // shorter sums of directions point nowhere
+constexpr double kClear = 0.3;       // shorter sums of directions point nowhere
+constexpr double kNeckByName = 0.5;  // the rest by its place (README.md, "Other builds")
+constexpr double kThinnest = 1e-3;   // a joint whose bone has no length, on the way to the head
 
 // The bones of the arms that have a direction, and the one that each leads to.
 constexpr std::array<std::pair<Bone, Bone>, 4> kArms{{{Bone::kLeftUpperArm, Bone::kLeftLowerArm},
@@ -39,10 +41,67 @@ std::optional<Vector3d> direction_of(const Skeleton& skeleton, int joint, Bone n
   return to_m.normalized();
 }
 
+// The taught bones between two places, each by its share of `whole`.
+std::vector<std::pair<int, double>> between(const std::vector<std::pair<double, int>>& taught,
+                                            double from, double to, double whole) {
+  from = std::min(from, 1.0 - kThinnest);
+  to = std::max(to, from + kThinnest);
+  std::vector<std::pair<int, double>> found;
+  for (std::size_t i = 0; i < taught.size(); ++i) {
+    const double end = i + 1 < taught.size() ? taught[i + 1].first : 1.0;
+    const double both = std::min(to, end) - std::max(from, taught[i].first);
+    if (both > 0.0) found.emplace_back(taught[i].second, whole * both / (to - from));
+  }
+  return found;
+}
+
 }  // namespace
 
+std::vector<double> trunk_places(const Skeleton& skeleton) {
+  std::vector<double> places(skeleton.joints.size(), -1.0);
+  const int hips = skeleton.joint_of(Bone::kHips);
+  std::vector<std::size_t> way;  // down from the head
+  int j = skeleton.joint_of(Bone::kHead);
+  for (; j >= 0 && j != hips; j = skeleton.joints[way.back()].parent) {
+    way.push_back(static_cast<std::size_t>(j));
+  }
+  double whole_m = 0.0;
+  for (const std::size_t joint : way) whole_m += skeleton.joints[joint].offset_m.norm();
+  if (j < 0 || !(whole_m > 0.0)) return places;
+  double at = 1.0;
+  for (const std::size_t joint : way) {
+    places[joint] = std::max(0.0, at);
+    at -= skeleton.joints[joint].offset_m.norm() / whole_m;
+  }
+  places[static_cast<std::size_t>(hips)] = 0.0;
+  return places;
+}
+
+// Two figures divide a trunk at other places and give the same names to other parts of it, so a
+// joint between the hips and the head turns as what of the taught trunk lies where its own bone
+// does. `taught`: places, upwards, and bones.
+void BoneTurns::match_trunk(const std::vector<std::pair<double, int>>& taught) {
+  const std::vector<double> places = trunk_places(skeleton_);
+  const int hips = skeleton_.joint_of(Bone::kHips);
+  const int neck = skeleton_.joint_of(Bone::kNeck);
+  const int head = skeleton_.joint_of(Bone::kHead);
+  const auto place = [&](int j) { return j < 0 ? -1.0 : places[static_cast<std::size_t>(j)]; };
+  if (taught.size() < 2 || place(head) < 0.0) return;
+  // What lies between the neck and the head rides on the neck.
+  int j = place(neck) >= 0.0 ? neck : skeleton_.joints[static_cast<std::size_t>(head)].parent;
+  for (double to = 1.0; j != hips; j = skeleton_.joints[static_cast<std::size_t>(j)].parent) {
+    Part& part = parts_[static_cast<std::size_t>(j)];
+    const bool is_known_neck = j == neck && part.bone >= 0;
+    part.turns_as = between(taught, place(j), to, is_known_neck ? 1.0 - kNeckByName : 1.0);
+    if (is_known_neck) part.turns_as.emplace_back(part.bone, kNeckByName);
+    if (part.bone < 0) part.bone = taught[1].second;
+    part.rides = false;
+    to = place(j);
+  }
+}
+
 std::optional<BoneTurns> BoneTurns::make(const motion::PoseSpaceSpec& spec,
-                                         const Skeleton& skeleton) {
+                                         std::span<const double> places, const Skeleton& skeleton) {
   if (spec.space != motion::Space::kHumanoid) return std::nullopt;
   std::vector<std::pair<Bone, int>> order;  // with the place in the spec
   for (std::size_t i = 0; i < spec.joints.size(); ++i) {
@@ -56,12 +115,15 @@ std::optional<BoneTurns> BoneTurns::make(const motion::PoseSpaceSpec& spec,
   };
   BoneTurns turns;
   turns.skeleton_ = skeleton;
+  std::vector<std::pair<double, int>> trunk;
   for (const auto& [bone, place] : order) {
+    const auto i = static_cast<std::size_t>(place);
+    if (i < places.size() && places[i] >= 0.0) {
+      trunk.emplace_back(places[i], static_cast<int>(turns.taught_.size()));
+    }
     auto above = parent_of(bone);
     while (above && find(above) < 0) above = parent_of(*above);
-    turns.taught_.push_back({.parent = find(above),
-                             .first_dim = 3 * place,
-                             .mean = spec.mean[static_cast<std::size_t>(place)]});
+    turns.taught_.push_back({.parent = find(above), .first_dim = 3 * place, .mean = spec.mean[i]});
   }
   for (int j = 0; j < static_cast<int>(skeleton.joints.size()); ++j) {
     Part& part = turns.parts_.emplace_back();
@@ -69,11 +131,14 @@ std::optional<BoneTurns> BoneTurns::make(const motion::PoseSpaceSpec& spec,
     if (!bone || skeleton.joint_of(*bone) != j) continue;
     part.bone = find(bone);
     part.rides = part.bone < 0 || is_of_hand(*bone);
+    if (!part.rides) part.turns_as = {{part.bone, 1.0}};
     const auto arm = std::ranges::find(kArms, *bone, [](const auto& one) { return one.first; });
     if (arm == kArms.end()) continue;
     part.along = direction_of(skeleton, j, arm->second);
     part.in_t_pose = arm - kArms.begin() < 2 ? Vector3d::UnitX() : Vector3d(-Vector3d::UnitX());
   }
+  std::ranges::sort(trunk);
+  turns.match_trunk(trunk);
   return turns;
 }
 
@@ -96,14 +161,21 @@ RT_SAFE void BoneTurns::find_taught(std::span<const float> from, std::span<const
 // Where the walker's joint is turned as `own`. An arm's direction gets the taught change of
 // direction, and its twist follows.
 RT_SAFE Quaterniond BoneTurns::turn_of(const Part& part, const Quaterniond& own,
-                                       const Quaterniond& before,
-                                       const Quaterniond& after) const noexcept {
+                                       const Turns& before, const Turns& after) const noexcept {
+  const auto b = static_cast<std::size_t>(part.bone);
   if (part.along) {
     const Vector3d now = own * *part.along;
-    const Vector3d then = now + after * part.in_t_pose - before * part.in_t_pose;
+    const Vector3d then = now + after[b] * part.in_t_pose - before[b] * part.in_t_pose;
     if (then.norm() > kClear) return minimal_rotation(now, then.normalized());
   }
-  return after * before.conjugate();
+  const auto turned = [&](int bone) {
+    const auto i = static_cast<std::size_t>(bone);
+    return Quaterniond(after[i] * before[i].conjugate());
+  };
+  if (part.turns_as.size() == 1) return turned(part.turns_as.front().first);
+  Vector3d sum = Vector3d::Zero();
+  for (const auto& [bone, share] : part.turns_as) sum += share * rotation_log(turned(bone));
+  return rotation_exp(sum);
 }
 
 RT_SAFE void BoneTurns::add(Frame& frame, double heading_rad, std::span<const float> from,
@@ -125,7 +197,7 @@ RT_SAFE void BoneTurns::add(Frame& frame, double heading_rad, std::span<const fl
     const auto b = static_cast<std::size_t>(part.bone);
     const double share = shares[static_cast<std::size_t>(taught_[b].first_dim)];
     if (share == 0.0) continue;
-    turn[j] = turn_of(part, pose[j], before[b], after[b]);
+    turn[j] = turn_of(part, pose[j], before, after);
     const Quaterniond own = carried.conjugate() * turn[j];
     if (share < 1.0) turn[j] = carried * rotation_exp(Vector3d(share * rotation_log(own)));
     const Quaterniond base = above < 0 ? seen : pose[p];

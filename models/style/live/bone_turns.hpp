@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <Eigen/Geometry>
@@ -18,10 +19,17 @@
 
 namespace posed::style {
 
+// Where each joint lies on the way from the hips (0) to the head (1), by the lengths of the bones;
+// -1 aside of it. Cold.
+[[nodiscard]] std::vector<double> trunk_places(const Skeleton& skeleton);
+
 class BoneTurns {
  public:
-  // Empty for a space other than humanoid. `skeleton` has the bones of a person.
-  static std::optional<BoneTurns> make(const motion::PoseSpaceSpec& spec, const Skeleton& skeleton);
+  // Empty for a space other than humanoid. `skeleton` has the bones of a person; `places` [joints
+  // of the spec] are GateData::places, without which trunks are matched by the names of their
+  // bones.
+  static std::optional<BoneTurns> make(const motion::PoseSpaceSpec& spec,
+                                       std::span<const double> places, const Skeleton& skeleton);
 
   // Turns the joints of `frame` as the bones turn from the pose `from` of training to
   // from + change [rad, dims]. `shares` [dims] is how far a bone takes part: at 0 it rides on the
@@ -38,8 +46,10 @@ class BoneTurns {
   };
   // Of the walker's.
   struct Part {
-    int bone = -1;  // among the taught ones
+    int bone = -1;  // among the taught ones: whose share counts
     bool rides = true;
+    // The taught bones whose turns it gets, each by a share of 1; mostly the one of its name.
+    std::vector<std::pair<int, double>> turns_as{};
     // An arm's direction in its joint's frame, and in the T-pose.
     std::optional<Eigen::Vector3d> along{};
     Eigen::Vector3d in_t_pose = Eigen::Vector3d::Zero();
@@ -47,11 +57,12 @@ class BoneTurns {
   using Turns = std::array<Eigen::Quaterniond, kMaxJoints>;
 
   BoneTurns() = default;
+  void match_trunk(const std::vector<std::pair<double, int>>& taught);
   RT_SAFE void find_taught(std::span<const float> from, std::span<const float> change,
                            Turns& before, Turns& after) const noexcept;
   RT_SAFE [[nodiscard]] Eigen::Quaterniond turn_of(const Part& part, const Eigen::Quaterniond& own,
-                                                   const Eigen::Quaterniond& before,
-                                                   const Eigen::Quaterniond& after) const noexcept;
+                                                   const Turns& before,
+                                                   const Turns& after) const noexcept;
 
   Skeleton skeleton_;
   std::vector<Taught> taught_;  // the one above before the one below

@@ -113,7 +113,7 @@ MoreStyle read_style(const v1::StyleTarget& from, Eigen::Index points, int dims,
   return style;
 }
 
-GateData read_gate(const v1::StyleGate& from, int dims, Reader& reader) {
+GateData read_gate(const v1::StyleGate& from, int dims, int joints, Reader& reader) {
   GateData gate;
   gate.neutral = reader.angles(from.neutral(), dims, "the neutral pose");
   if (from.swing_rad() == 0.0 && from.fastest_stride_s() == 0.0) return gate;
@@ -131,6 +131,9 @@ GateData read_gate(const v1::StyleGate& from, int dims, Reader& reader) {
   }
   reader.want(from.rigs_size() <= kMaxUsual, "the number of figures");
   if (reader.valid()) gate.rigs.assign(from.rigs().begin(), from.rigs().end());
+  if (from.places_size() == 0) return gate;
+  const VectorXd places = reader.vector(from.places(), joints, -1.0, 1.0, "the trunk's places");
+  if (reader.valid()) gate.places.assign(places.begin(), places.end());
   return gate;
 }
 
@@ -180,7 +183,10 @@ StyleModel read_model(const v1::StyleModel& from, Reader& reader) {
   model.rate_hz = reader.number(from.rate_hz(), 1.0, 10'000.0, "the frame rate");
   model.from = from.from();
   model.report_json = from.report_json();
-  if (from.has_gate()) model.gate = read_gate(from.gate(), dims, reader);
+  if (from.has_gate()) {
+    const auto joints = static_cast<int>(model.space.joints.size());
+    model.gate = read_gate(from.gate(), dims, joints, reader);
+  }
   if (from.has_axis()) model.axis = read_axis(from.axis(), dims, reader);
   return model;
 }
@@ -263,6 +269,7 @@ std::string serialize_model(const StyleModel& model) {
     write_matrix(cycle, *style.mutable_gate()->add_usual());
   }
   for (const std::uint32_t rig : model.gate.rigs) style.mutable_gate()->add_rigs(rig);
+  for (const double place : model.gate.places) style.mutable_gate()->add_places(place);
   if (model.axis.present()) {
     write_vector(model.axis.direction, *style.mutable_axis()->mutable_direction());
     style.mutable_axis()->set_offset(model.axis.offset);

@@ -45,6 +45,9 @@ struct GateData {
   std::vector<Eigen::MatrixXd> usual{};
   // rig_id() of the figures of training; empty in models of older versions of posed.
   std::vector<std::uint32_t> rigs{};
+  // Where each joint of a humanoid space lies on the way from the hips (0) to the head (1) in
+  // training; -1 aside of it. Empty in models of older versions of posed.
+  std::vector<double> places{};
 
   [[nodiscard]] bool present() const { return neutral.size() > 0; }
   [[nodiscard]] bool strides() const { return swing_rad > 0.0; }

@@ -5,10 +5,12 @@
 #include <set>
 #include <utility>
 
+#include "models/style/live/bone_turns.hpp"
 #include "models/style/train/gate_data.hpp"
 #include "models/style/train/target_training.hpp"
 #include "models/style/train/train_report.hpp"
 #include "models/style/train/training_check.hpp"
+#include "proto/frame/humanoid.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 
@@ -95,6 +97,17 @@ VectorXd limit_of(const Learnt& learnt) {
   return kLimitFactor * learnt.differences.cwiseAbs().colwise().maxCoeff().transpose();
 }
 
+std::vector<double> places_of(const motion::PoseSpaceSpec& spec, const Skeleton& skeleton) {
+  std::vector<double> places;
+  if (spec.space != motion::Space::kHumanoid) return places;
+  const std::vector<double> of_figure = trunk_places(skeleton);
+  for (const std::string& name : spec.joints) {
+    const int joint = skeleton.joint_of(*bone_from_name(name));
+    places.push_back(joint < 0 ? -1.0 : of_figure[static_cast<std::size_t>(joint)]);
+  }
+  return places;
+}
+
 StyleModel model_of(Dataset dataset, const std::vector<std::string>& targets,
                     std::vector<Learnt> learnt) {
   StyleModel model;
@@ -161,6 +174,7 @@ Result<StyleModel> train_style(const std::vector<TrainingClip>& clips,
     const std::uint32_t rig = rig_id(*clip.clip.skeleton);
     if (std::ranges::find(gate.rigs, rig) == gate.rigs.end()) gate.rigs.push_back(rig);
   }
+  gate.places = places_of(dataset.spec, *clips.front().clip.skeleton);
   StyleAxis axis;  // of a mixture there is none
   if (targets.size() == 1) axis = style_axis_of(dataset, options.target);
   StyleModel model = model_of(std::move(dataset), targets, std::move(learnt));
