@@ -1,5 +1,6 @@
 // A style and signs are taught on the stage with the real binary: an emulated mocap system sends a
-// performer who walks as usual and then in a style, an emulated glove a hand that makes a sign;
+// performer who walks as usual and then in a style, an emulated glove or camera a hand that makes a
+// sign;
 // `posed ctl teach` does the rest.
 #include <algorithm>
 #include <atomic>
@@ -59,21 +60,20 @@ class Performer {
   std::jthread thread_;
 };
 
-// An emulated glove on a hand that rests open, and closes to a fist when it is told.
+// An emulated device with a right hand that rests open, and closes to a fist when it is told.
 class Hand {
  public:
   static constexpr double kWay_s = 0.5, kHold_s = 1.6;
 
-  Hand() {
-    auto emulator = drivers::find_driver("cyberglove")->emulate({}).value();
-    auto port = emulate::EmulatedPort::open_pty().value();
+  Hand(const std::string& driver, const drivers::Options& options, emulate::EmulatedPort port,
+       std::size_t body) {
     device_ = std::make_unique<emulate::EmulatedDevice>(
-        std::move(emulator), std::move(port),
-        [this](double time_s, drivers::Emulator& glove) {
+        drivers::find_driver(driver)->emulate(options).value(), std::move(port),
+        [this, body](double time_s, drivers::Emulator& device) {
           now_s_ = time_s;
           Frame frame;
           set_hand_angles(hand_, angles_at(time_s - fist_s_), frame);
-          glove.pose(0, frame);
+          device.pose(body, frame);
         },
         emulate::EmulatedDevice::Settings());
     thread_ = std::jthread([this](const std::stop_token& stop) { device_->run(stop); });
@@ -100,19 +100,14 @@ class Hand {
   std::jthread thread_;
 };
 
-}  // namespace
-
-TEST_CASE("signs are taught on the stage, played, and replayed bit for bit", "[teach]") {
-  Stage stage;
-  Hand hand;
+// A fist is taught to the stream, recognised and performed, and all of it is replayed.
+void teach_fist(Stage& stage, Hand& hand, const std::string& stream, const std::string& source) {
   std::filesystem::create_directory(stage.path("models"));
-  stage.folder.write("posed.toml", std::string(Stage::kEndpoints) +
-                                       "models = \"models\"\n[[stream]]\nname = \"hand\"\n"
-                                       "driver = \"cyberglove\"\npublish_raw = true\nport = \"" +
-                                       hand.port() + "\"\n[stream.generate]\nmodel = \"\"\n");
+  stage.folder.write("posed.toml",
+                     std::string(Stage::kEndpoints) + "models = \"models\"\n" + source);
   stage.record();
-  stage.await_frames("hand", 5);
-  Process lesson({"ctl", "--connect", stage.control, "teach", "hand", "--name", "mine", "--signs",
+  stage.await_frames(stream, 5);
+  Process lesson({"ctl", "--connect", stage.control, "teach", stream, "--name", "mine", "--signs",
                   "fist", "--show", "6"});
   // The countdown has three seconds; a show that a busy machine cut is asked for once more.
   for (std::string heard; !has(heard, "fist: show 3");) {
@@ -127,19 +122,19 @@ TEST_CASE("signs are taught on the stage, played, and replayed bit for bit", "[t
   CHECK(has(*learnt, "knows fist, rest from 3 shows"));
   const auto in_use = lesson.line();
   REQUIRE(in_use);
-  CHECK(has(*in_use, "hand: mine.gesture is in effect from frame"));
+  CHECK(has(*in_use, stream + ": mine.gesture is in effect from frame"));
   CHECK(lesson.exit_code() == 0);
   CHECK(has(stage.ctl({"models"}).out, "generate   mine.gesture"));
-  stage.await_frames("hand", 60);
+  stage.await_frames(stream, 60);
   hand.fist_in(0.0);
-  stage.await_frames("hand", 200);
-  CHECK(stage.ctl({"play", "hand", "fist rest"}).code == 0);
-  stage.await_frames("hand", 60);
+  stage.await_frames(stream, 200);
+  CHECK(stage.ctl({"play", stream, "fist rest"}).code == 0);
+  stage.await_frames(stream, 60);
   stage.daemon->send(SIGTERM);
   REQUIRE(stage.daemon->exit_code() == 0);
 
   int recognised = 0, performed = 0;
-  check_frames_follow(stage.path("take.plog"), "hand", [&](const v1::Frame& frame) {
+  check_frames_follow(stage.path("take.plog"), stream, [&](const v1::Frame& frame) {
     if (frame.label() != "fist") return;
     ++(frame.source() == v1::SOURCE_LABELS ? performed : recognised);
   });
@@ -149,6 +144,28 @@ TEST_CASE("signs are taught on the stage, played, and replayed bit for bit", "[t
       posed({"replay", stage.path("take.plog"), "--speed", "max", "--expect"});
   INFO(replay.err);
   CHECK(replay.code == 0);
+}
+
+}  // namespace
+
+TEST_CASE("signs are taught on the stage, played, and replayed bit for bit", "[teach]") {
+  Stage stage;
+  Hand hand("cyberglove", {}, emulate::EmulatedPort::open_pty().value(), 0);
+  teach_fist(stage, hand, "hand",
+             "[[stream]]\nname = \"hand\"\ndriver = \"cyberglove\"\npublish_raw = true\nport = \"" +
+                 hand.port() + "\"\n[stream.generate]\nmodel = \"\"\n");
+}
+
+// A visitor's minute without a browser.
+TEST_CASE("a hand before a camera is taught a sign of its own and performs it", "[teach]") {
+  Stage stage;
+  const std::string listen = "127.0.0.1:" + std::to_string(free_port());
+  Hand hand("landmarks", {{"rate_hz", 30.0}},
+            emulate::EmulatedPort::open_udp({listen}, {0}).value(), 1);
+  teach_fist(stage, hand, "camera-right",
+             "[[source]]\nname = \"camera\"\ndriver = \"landmarks\"\nstreams = \"all\"\n"
+             "stale_after_s = 2.0\npublish_raw = true\n[source.landmarks]\nlisten = \"" +
+                 listen + "\"\nrate_hz = 30\n[source.generate]\nmodel = \"\"\n");
 }
 
 TEST_CASE("a style is taught on the stage, and the log replays it bit for bit", "[teach]") {

@@ -2,6 +2,7 @@
 // points are known.
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <fstream>
@@ -59,18 +60,21 @@ struct LandmarksRig {
   std::unique_ptr<Decoder> decoder = driver.make_decoder(driver.expect({}).value()).value();
   Layout layout = driver.make_layout(std::array{std::byte{3}}).value();
   CollectSink sink;
+  std::int64_t now_ns = 0;
 
   LandmarksRig() { decoder->use(*layout); }
   // What it is counted as.
   Outcome feed(const std::string& text) {
     sink.clear();
-    decoder->feed(bytes_of(text), 0, sink);
+    decoder->feed(bytes_of(text), now_ns, sink);
     for (int i = 0; i < kOutcomes; ++i) {
       if (sink.outcomes[static_cast<std::size_t>(i)] != 0) return static_cast<Outcome>(i);
     }
     return Outcome::kCount;
   }
 };
+
+bool is_finite(double value) { return std::isfinite(value); }
 
 // Angles of a hand that 21 points can tell, anywhere within its limits but their ends.
 HandAngles random_angles(std::mt19937& random) {
@@ -171,14 +175,70 @@ TEST_CASE("a hand tracker's hands become bodies of hand45") {
   CHECK(hand_side(*rig.layout->bodies[0].skeleton) == Side::kLeft);
   CHECK(rig.layout->bodies[1].name == "right");
   for (const double angle_rad : hand_angles(rig.sink.frames[1])) CHECK(std::abs(angle_rad) < 1e-3);
-  // Nothing is seen, and the tracker says so.
+  // Nothing is seen, and the tracker says so: for a second the hands are somewhere.
+  rig.now_ns += kNanosPerSecond;
+  for (const std::string& none : {std::string(), flat_hand("left", "0.3")}) {
+    CHECK(rig.feed(message_of(none)) == Outcome::kOk);
+    REQUIRE(rig.sink.frames.size() == 2);
+    CHECK(std::ranges::none_of(hand_angles(rig.sink.frames[0]), is_finite));
+  }
+  rig.now_ns += 1;
   CHECK(rig.feed(message_of("")) == Outcome::kOk);
-  CHECK(rig.sink.frames.empty());
-  CHECK(rig.feed(message_of(flat_hand("left", "0.3"))) == Outcome::kOk);
   CHECK(rig.sink.frames.empty());
   // One hand is damaged, the other is kept.
   CHECK(rig.feed(message_of(R"({"side":"left","points":[]},)" + flat_hand())) == Outcome::kShort);
   CHECK(rig.sink.frames.size() == 1);
+}
+
+TEST_CASE("a hand keeps its side whatever single pictures say, until somebody tells another") {
+  LandmarksRig rig;
+  const auto bodies = [&](const std::string& hand, int messages) {
+    std::vector<std::size_t> all;
+    for (int i = 0; i < messages; ++i) {
+      rig.now_ns += kNanosPerSecond / 10;
+      CHECK(rig.feed(message_of(hand)) == Outcome::kOk);
+      REQUIRE(rig.sink.frames.size() == 1);
+      all.push_back(rig.sink.bodies[0]);
+    }
+    return all;
+  };
+  const std::string right = flat_hand("right"), left = flat_hand("left");
+  CHECK(bodies(right, 20) == std::vector<std::size_t>(20, 1));
+  // It is taken for the other hand: first without angles, after a second with what there is.
+  CHECK(bodies(left, 9) == std::vector<std::size_t>(9, 1));
+  CHECK(std::ranges::none_of(hand_angles(rig.sink.frames[0]), is_finite));
+  CHECK(bodies(left, 3) == std::vector<std::size_t>(3, 1));
+  CHECK(std::ranges::all_of(hand_angles(rig.sink.frames[0]), is_finite));
+  rig.now_ns += kNanosPerSecond / 2;  // lost for a moment
+  CHECK(bodies(left, 1) == std::vector<std::size_t>(1, 1));
+  CHECK(bodies(left, 60).back() == 0);  // most pictures count
+  std::string sure = right;
+  CHECK(bodies(sure.insert(1, R"("sure":true,)"), 1) == std::vector<std::size_t>(1, 1));
+  CHECK(bodies(left, 20) == std::vector<std::size_t>(20, 1));
+  rig.now_ns += 2 * kNanosPerSecond;
+  CHECK(bodies(left, 1) == std::vector<std::size_t>(1, 0));  // another hand
+}
+
+TEST_CASE("a tracker's messages are lines over TCP, and one that stops takes its hands away") {
+  const Driver& driver = *find_driver("landmarks");
+  const auto decoder =
+      driver.make_decoder(driver.expect({{"link", std::string("tcp")}}).value()).value();
+  CollectSink sink;
+  std::string text;
+  for (int i = 0; i < 3; ++i) text += message_of(flat_hand()) + "\r\n";
+  text +=
+      std::string(kMaxMessage + 1, 'x') + "\n" + message_of("", R"("version":1,"end":true)") + "\n";
+  const Bytes bytes = bytes_of(text);
+  for (std::size_t at = 0; at < bytes.size(); at += 100) {
+    decoder->feed(std::span(bytes).subspan(at, std::min<std::size_t>(100, bytes.size() - at)), 0,
+                  sink);
+  }
+  CHECK(sink.count(Outcome::kForeign) == 3);  // not described yet
+  CHECK(sink.count(Outcome::kOutOfRange) == 1);
+  CHECK(sink.count(Outcome::kOk) == 1);
+  CHECK(sink.descriptions == 2);
+  CHECK(sink.described == std::vector{std::byte{0}});
+  CHECK(driver.make_layout(sink.described).value()->bodies.empty());
 }
 
 TEST_CASE("what is no hand of a tracker is refused and counted") {
@@ -240,7 +300,6 @@ TEST_CASE(
   }
   CHECK(rig.sink.descriptions == 2);
   CHECK(rig.sink.count(Outcome::kForeign) == 3);
-  CHECK_FALSE(rig.driver.make_layout(std::array{std::byte{0}}));
   CHECK_FALSE(rig.driver.make_layout(std::array{std::byte{4}}));
   CHECK_FALSE(rig.driver.make_layout(std::array{std::byte{1}, std::byte{1}}));
 }

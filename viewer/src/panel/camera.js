@@ -8,6 +8,7 @@ const CONSENT =
 const LOADING = 'loading what finds hands (13 MB, once)';
 const NO_HAND = 'no hand is seen: hold one up, palm to the camera';
 const HIDDEN = 'stopped, because the page was hidden';
+const OFF = 'the camera is off: posed gets no hand of it';
 const SECOND_MS = 1000;
 const KEPT_AGES = 100;
 const FINGERS = [0, 1, 2, 3, 4].map((f) => [0, 1, 2, 3, 4].map((j) => (j ? 4 * f + j : 0)));
@@ -83,7 +84,7 @@ export class CameraPanel {
   }
 
   toggle() {
-    if (this.camera.running) this.stop('');
+    if (this.camera.running) this.stop(OFF);
     else this.#start();
   }
 

@@ -1,39 +1,29 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { HandFinder, landmarksMessage } from '../../src/camera/hands_of.js';
+import { handsOf as handsOfPicture, landmarksMessage } from '../../src/camera/hands_of.js';
 
-const handsOf = (found) => new HandFinder().handsOf(found);
-const points = (x) => Array.from({ length: 21 }, (_, i) => ({ x: x + i / 7, y: 0, z: -1e-9 }));
+const handsOf = (found) => handsOfPicture(found, 4 / 3);
+const points = (x) => Array.from({ length: 21 }, (_, i) => ({ x: x + i / 70, y: 0, z: -1e-9 }));
+// Hands side by side, each as [label, score, where its wrist is in the picture].
 const found = (...hands) => ({
-  multiHandLandmarks: hands.map(() => points(0.5)),
-  multiHandWorldLandmarks: hands.map((_, i) => points(i)),
+  multiHandLandmarks: hands.map(([, , x = 0.2], i) => points(x + i / 2)),
+  multiHandWorldLandmarks: hands.map(() => points(0)),
   multiHandedness: hands.map(([label, score]) => ({ label, score })),
 });
 
-test('in an unmirrored picture MediaPipe means the other hand', () => {
-  const [hand] = handsOf(found(['Left', 0.9]));
-  assert.equal(hand.side, 'right');
+test('in an unmirrored picture MediaPipe means the other hand, and its points are where it is', () => {
+  const [hand, other] = handsOf(found(['Left', 0.9], ['Left', 0.8]));
+  assert.deepEqual([hand.side, other.side], ['right', 'right']);
   assert.equal(hand.points.length, 63);
+  assert.ok(Math.abs(hand.points[0] - -0.3) < 1e-9); // a metre is a width of this picture
+  assert.ok(Math.abs(other.points[0] - 0.2) < 1e-9);
   assert.deepEqual(handsOf(found()), []);
   assert.deepEqual(handsOf(null), []);
 });
 
-test('of two hands of one side the surer one is sent', () => {
-  const hands = handsOf(found(['Left', 0.7], ['Left', 0.9], ['Right', 0.6]));
-  assert.deepEqual(hands.map(({ side, score }) => [side, score]), [['right', 0.9], ['left', 0.6]]); // prettier-ignore
-  assert.equal(hands[0].points[0], 1);
-});
-
-test('which side a hand is, many pictures decide', () => {
-  const finder = new HandFinder();
-  const sides = (...labels) =>
-    labels.map((label) => finder.handsOf(found([label, 0.9]))[0]?.side ?? '');
-  assert.deepEqual(sides('Left', 'Left', 'Right', 'Left'), Array(4).fill('right'));
-  assert.equal(sides(...Array(8).fill('Right')).at(-1), 'left');
-  finder.handsOf(found());
-  assert.deepEqual(sides('Left'), ['left']); // lost for a moment
-  for (let i = 0; i < 20; i += 1) finder.handsOf(found());
-  assert.deepEqual(sides('Left'), ['right']); // another hand
+test('of a hand that was found twice the surer one is sent', () => {
+  const hands = handsOf(found(['Left', 0.7, 0.21], ['Right', 0.9, -0.3]));
+  assert.deepEqual(hands.map(({ side, score }) => [side, score]), [['left', 0.9]]); // prettier-ignore
 });
 
 test('the message has whole nanoseconds, micrometres and the side that the user chose', () => {
@@ -43,9 +33,9 @@ test('the message has whole nanoseconds, micrometres and the side that the user 
   assert.ok(JSON.stringify(both).startsWith('{"posed":"landmarks","version":1,'));
   assert.equal(both.time_ns, 1234567890);
   assert.equal(both.hands.length, 2);
-  assert.equal(both.hands[1].score, 1);
-  assert.equal(both.hands[0].points[3], 0.142857);
+  assert.equal(both.hands[0].score, 1);
+  assert.equal(both.hands[0].sure, undefined);
   assert.ok(JSON.stringify(both).length < 4096);
   const mine = landmarksMessage(hands, { time_ms: 0, side: 'right' });
-  assert.deepEqual(mine.hands.map(({ side, score }) => [side, score]), [['right', 1]]); // prettier-ignore
+  assert.deepEqual(mine.hands.map(({ side, sure }) => [side, sure]), [['right', true]]); // prettier-ignore
 });

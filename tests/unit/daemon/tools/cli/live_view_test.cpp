@@ -1,5 +1,7 @@
 #include "daemon/tools/live/live_view.hpp"
 
+#include <algorithm>
+
 #include <catch2/catch.hpp>
 
 #include "daemon/tools/command/client.hpp"
@@ -163,6 +165,21 @@ TEST_CASE("the live view shows what the kernel dropped of a device's datagrams")
         "  vicon: the device is away, the kernel dropped 3 datagrams (machine too slow)");
   CHECK(lines[6] == "  walker0: the kernel dropped 7 datagrams (machine too slow)");
   CHECK(lines[7] == "  walker1: body 'Ann' of optitrack");
+}
+
+TEST_CASE("a camera that nobody switched on is not spoken of, one that is off is no fault") {
+  v1::Stats stats = stats_of(1);
+  v1::SourceStats& camera = *stats.add_source();
+  camera.set_name("camera");
+  camera.set_driver("landmarks");
+  camera.add_outcome(0);
+  const LiveViewOptions options{.title = "posed", .width = 0, .height = 0};
+  const auto before = live_view(stats, options);
+  camera.set_outcome(0, 90);
+  const auto after = live_view(stats, options);
+  REQUIRE(after.size() == before.size() + 1);
+  CHECK(std::ranges::find(after, "  camera: no hand: its camera is off, or sees none") !=
+        after.end());
 }
 
 TEST_CASE("the live view has a line for each output, with what went wrong if anything did") {

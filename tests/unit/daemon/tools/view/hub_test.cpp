@@ -1,3 +1,4 @@
+#include "daemon/tools/view/hand_feed.hpp"
 #include "daemon/tools/view/hub.hpp"
 
 #include <catch2/catch.hpp>
@@ -57,6 +58,7 @@ struct HubRig {
 
   std::vector<std::pair<std::uint64_t, std::string>> asked;
   std::vector<std::string> fed;  // hands of a camera
+  std::string fed_to;
   bool reachable = true;
   int wakes = 0;
   std::int64_t now_ns = 0;
@@ -66,7 +68,8 @@ struct HubRig {
             if (reachable) asked.emplace_back(ticket, request);
             return reachable;
           },
-          [this](std::string_view landmarks) {
+          [this](std::string_view source, std::string_view landmarks) {
+            fed_to = source;
             fed.emplace_back(landmarks);
             return std::string();
           }};
@@ -201,6 +204,41 @@ TEST_CASE(
   feed(tab, hands_word(), 9 * kNanosPerSecond);
   CHECK(rig.fed.empty());
   CHECK(json::parse(all_of(tab).at(0).body).at("refusal") == "only looking");
+}
+
+TEST_CASE("hands go where the daemon listens, and a page that leaves or is silent ends them") {
+  HubRig rig;
+  Tab tab;
+  rig.join(tab);
+  const auto feed = [&] { rig.hub.handle(tab, hands_word(), true, rig.now_ns); };
+  feed();
+  CHECK(rig.fed_to.empty());  // the daemon has told of no source
+  v1::Stats stats;
+  stats.add_source()->set_driver("natnet");
+  auto& source = *stats.add_source();
+  source.set_driver("landmarks");
+  source.set_identity("udp 127.0.0.1:7421");
+  rig.hub.receive("stats", stats.SerializeAsString(), 0);
+  feed();
+  CHECK(rig.fed_to == "udp 127.0.0.1:7421");
+  rig.hub.expire(kNanosPerSecond);
+  REQUIRE(rig.fed.size() == 2);
+  rig.hub.expire(3 * kNanosPerSecond);
+  REQUIRE(rig.fed.size() == 3);
+  CHECK(rig.fed.back().find(R"("end":true)") != std::string::npos);
+  rig.hub.expire(9 * kNanosPerSecond);
+  feed();
+  REQUIRE(rig.fed.size() == 4);
+  rig.hub.leave(tab);
+  CHECK(rig.fed.size() == 5);
+}
+
+TEST_CASE("a page's hands reach a source on this machine, or it is told that nobody gets them") {
+  HandFeed feed;
+  CHECK(feed.send("", "{}").find("no source") != std::string::npos);
+  for (const char* elsewhere : {"tcp 127.0.0.1:7420", "udp 192.0.2.1:7420", "udp nonsense"}) {
+    CHECK(feed.send(elsewhere, "{}").find("nobody gets the hands") != std::string::npos);
+  }
 }
 
 TEST_CASE("a request gets its own reply, whatever the order") {
