@@ -145,6 +145,8 @@ RT_SAFE Nearest nearest(const RobotHand& hand, Placed& placed, int a, int b,
   const Eigen::Vector3d middle_b = world(placed, b, all_b.middle_m);
   for (int i = all_a.first; i < all_a.first + all_a.count; ++i) {
     const Eigen::Vector3d middle = placed.middle_m[i];
+    const Eigen::Vector3d half = placed.to_m[i] - middle;
+    const double half_m2 = std::max(half.squaredNorm(), 1e-18);
     const double all_m = hand.reach_m[i] + all_b.radius_m + best.gap_m;
     if (all_m <= 0.0 || (middle - middle_b).squaredNorm() >= all_m * all_m) continue;
     for (int j = all_b.first; j < all_b.first + all_b.count; ++j) {
@@ -153,6 +155,11 @@ RT_SAFE Nearest nearest(const RobotHand& hand, Placed& placed, int a, int b,
           (i == first_i && j == first_j)) {
         continue;
       }
+      // Not the ball around i, but i itself: most of those that are left are too far from it.
+      const Eigen::Vector3d to_j = placed.middle_m[j] - middle;
+      const double share = std::clamp(to_j.dot(half) / half_m2, -1.0, 1.0);
+      const double thin_m = hand.capsules[i].radius_m + hand.reach_m[j] + best.gap_m;
+      if (thin_m <= 0.0 || (to_j - share * half).squaredNorm() >= thin_m * thin_m) continue;
       look(i, j);
     }
   }

@@ -2,6 +2,7 @@
 import { Group, PerspectiveCamera, Scene, Vector3 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { Lights } from './lights.js';
+import { robotPlace } from './robot_shape.js';
 
 const FIELD_DEG = 28;
 const APART_M = 0.2; // from hand to hand
@@ -36,10 +37,13 @@ export class HandsView {
     const holder = new Group();
     const { group } = performer.figure;
     group.removeFromParent();
-    group.rotation.x = performer.stream.isRobot ? 0 : -Math.PI / 2;
+    const { stream } = performer;
+    const robot = stream.isRobot ? robotPlace(stream.kinematics) : null;
+    group.rotation.x = robot ? 0 : -Math.PI / 2;
+    holder.scale.setScalar(robot?.scale ?? 1);
     holder.add(group);
     this.scene.add(holder);
-    this.#performers.set(performer.stream.name, { performer, holder });
+    this.#performers.set(stream.name, { performer, holder, heel: robot?.heel });
   }
 
   remove(name) {
@@ -98,9 +102,11 @@ export class HandsView {
     const { group } = performer.figure;
     wrist.fromArray(kinematics.position, i).applyEuler(group.rotation);
     group.position.copy(wrist).negate();
+    if (entry.heel) group.position.sub(heel.fromArray(entry.heel));
     point.copy(entry.holder.position);
     point.y -= 0.04;
   }
 }
 
 const wrist = new Vector3();
+const heel = new Vector3();

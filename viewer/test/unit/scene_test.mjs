@@ -1,9 +1,11 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { Vector3 } from 'three';
+import { BufferGeometry, Vector3 } from 'three';
 import { Kinematics } from '../../src/motion/kinematics.js';
 import { bodyShape } from '../../src/scene/body_shape.js';
 import { COARSE, FINE } from '../../src/scene/capsule.js';
+import { JointPaint } from '../../src/scene/joint_paint.js';
+import { stoppedJoints } from '../../src/scene/robot_shape.js';
 import { Views } from '../../src/scene/views.js';
 import { bodySkeleton } from '../support/figures.mjs';
 
@@ -73,4 +75,31 @@ test('a coarse figure has the size of the fine one, and less than half of its ve
   assert.equal(coarse.scale, fine.scale);
   const reach = ({ position }) => Math.max(...position.map(Math.abs));
   assert.ok(Math.abs(reach(coarse) - reach(fine)) < 0.01);
+});
+
+test('a robot looks like its capsules, and what stopped it is red', () => {
+  const message = {
+    ...bodySkeleton({ id: 1 }),
+    capsule_joint: [1, 4],
+    capsule_m: [0, 0, 0, 0, 0.1, 0, 0.02, 0, 0, 0.05, 0, 0, 0.05, 0.01],
+  };
+  const robot = new Kinematics(message);
+  const { position, owner } = bodyShape(robot);
+  assert.deepEqual([...new Set(owner)], [1, 4]);
+  owner.forEach((joint, i) => {
+    const [x, y, z] = position.subarray(3 * i, 3 * i + 3);
+    const from_m =
+      joint === 1
+        ? Math.hypot(x, y - Math.min(Math.max(y, 0), 0.1), z)
+        : Math.hypot(x, y, z - 0.05);
+    assert.ok(Math.abs(from_m - (joint === 1 ? 0.02 : 0.01)) < 1e-6);
+  });
+  const stopped = stoppedJoints(robot, { robot_stop_joint: robot.names[4], robot_stop_other: '' });
+  const paint = new JointPaint(new BufferGeometry(), owner);
+  const own = { getHex: () => 1, toArray: (array, i) => array.fill(0, i, i + 3) };
+  paint.paint(own, { quality: 0, validJoints: 0, validity: [] }, stopped);
+  owner.forEach((joint, i) => assert.equal(paint.colours.array[3 * i] > 0.5, joint === 4));
+  // Lists that do not fit are nobody's.
+  for (const wrong of [{ capsule_joint: [1] }, { capsule_joint: [1, 99] }, { capsule_m: [NaN] }])
+    assert.equal(new Kinematics({ ...message, ...wrong }).capsules.length, 0);
 });
