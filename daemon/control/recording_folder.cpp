@@ -23,7 +23,8 @@ namespace posed::control {
 namespace {
 
 constexpr std::size_t kMaxRecordings = 256;
-constexpr std::size_t kMaxConverted = 64UL * 1024 * 1024;  // bytes, before and after
+constexpr std::size_t kMaxConverted =
+    24UL * 1024 * 1024;  // bytes, before and after: a second's work
 constexpr int kMaxConvertedFrames = 36'000;
 
 // A name in the folder; control characters in it would reach people's terminals.

@@ -233,11 +233,11 @@ class RequestHandler {
   const RecordingFolder recordings_;
   Clock clock_;
   teach::Teacher* const teacher_;
-  // What the models of the folder say, by name, with what tells whether a file has changed since.
   // The clip that was had last as another kind of file, for its further pieces.
   std::mutex converted_mutex_;
   RecordingFolder::Part part_;
   std::string converted_;
+  // What the models of the folder say, by name, with what tells whether a file has changed since.
   std::mutex words_mutex_;
   std::map<std::string, std::pair<std::string, ModelWords>> words_;
   std::vector<std::uint32_t> drawn_on_;  // ids of the figures that were known for them

@@ -6,6 +6,16 @@
 #include "proto/frame/rotation.hpp"
 
 namespace posed::output {
+namespace {
+
+// Frames of a figure with channels get the angles of all of them, which no output reads.
+std::shared_ptr<const Skeleton> without_channels(const Skeleton& figure) {
+  auto bare = std::make_shared<Skeleton>(figure);
+  bare->channels.clear();
+  return bare;
+}
+
+}  // namespace
 
 Result<Fit> Fit::make(std::shared_ptr<const Skeleton> person, bool own, const MakeFigure& figure) {
   if (person == nullptr) return fail("it has no pose");
@@ -20,7 +30,7 @@ Result<Fit> Fit::make(std::shared_ptr<const Skeleton> person, bool own, const Ma
   const auto average = TRY(figure(1.0));
   const auto to_average = TRY(motion::Retarget::bind(person, average));
   fit.skeleton_ = TRY(figure(1.0 / to_average.scale()));
-  fit.retarget_ = TRY(motion::Retarget::bind(std::move(person), fit.skeleton_));
+  fit.retarget_ = TRY(motion::Retarget::bind(std::move(person), without_channels(*fit.skeleton_)));
   return fit;
 }
 
@@ -40,6 +50,13 @@ Quatf rest_rotation(const Skeleton& skeleton, std::size_t joint) noexcept {
   const int parent = skeleton.joints[joint].parent;
   const Eigen::Quaterniond& T = skeleton.joints[joint].T_world_joint;
   return from_eigen(parent < 0 ? T : skeleton.joints[parent].T_world_joint.conjugate() * T);
+}
+
+std::string distinct_name(const std::string& own, const std::string& stream, std::size_t place,
+                          std::vector<std::string>& names) {
+  names[place].clear();
+  names[place] = std::ranges::find(names, own) == names.end() ? own : stream;
+  return names[place];
 }
 
 bool has_fingers(const Skeleton& skeleton) {

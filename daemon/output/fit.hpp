@@ -7,6 +7,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "models/motion/retarget.hpp"
@@ -43,6 +44,11 @@ class Fit {
 
 // A joint's rotation relative to its parent in T-pose.
 [[nodiscard]] Quatf rest_rotation(const Skeleton& skeleton, std::size_t joint) noexcept;
+
+// The name under which the person at `place` goes out: its own, or its stream's where another
+// person of the output has that. `names`: [place], of all of them; it is set here.
+[[nodiscard]] std::string distinct_name(const std::string& own, const std::string& stream,
+                                        std::size_t place, std::vector<std::string>& names);
 
 // Whether it can move its fingers.
 [[nodiscard]] bool has_fingers(const Skeleton& skeleton);

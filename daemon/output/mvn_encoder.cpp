@@ -41,17 +41,21 @@ void set_offsets(const Skeleton& skeleton, mvn::Character& character) {
 class MvnEncoder final : public DatagramEncoder {
  public:
   MvnEncoder(std::size_t places, bool euler)
-      : type_(euler ? mvn::Type::kEuler : mvn::Type::kQuaternion), people_(places) {}
+      : type_(euler ? mvn::Type::kEuler : mvn::Type::kQuaternion),
+        people_(places),
+        names_(places) {}
 
   Result<> set_person(std::size_t place, const LiveStream* stream) override {
     auto& person = people_[place];
     person.reset();
+    names_[place].clear();
     begin_sample();
     if (stream == nullptr) return {};
     const auto id = static_cast<std::uint8_t>(place);
     const bool own = stream->skeleton != nullptr && is_mvn_character(*stream->skeleton);
     const bool fingers = stream->skeleton != nullptr && has_fingers(*stream->skeleton);
-    const std::string& name = own ? stream->skeleton->name : stream->name;
+    const std::string name =
+        distinct_name(own ? stream->skeleton->name : stream->name, stream->name, place, names_);
     auto fit = TRY(Fit::make(stream->skeleton, own, [&](double scale) {
       return mvn::skeleton_of(mvn::average_character(id, name, static_cast<float>(scale), fingers));
     }));
@@ -152,6 +156,7 @@ class MvnEncoder final : public DatagramEncoder {
 
   mvn::Type type_;
   std::vector<std::optional<Person>> people_;  // [place], which is the character's number
+  std::vector<std::string> names_;             // [place]
   std::uint32_t sample_ = 0;
   std::int64_t begin_ns_ = kNoTime_ns;  // the zero of the time that is sent
 };

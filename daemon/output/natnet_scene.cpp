@@ -62,13 +62,15 @@ Result<> NatNetScene::set_stream(std::size_t place, const LiveStream* stream) {
   auto& body = bodies_[place];
   const bool was = body.has_value();
   body.reset();
+  names_[place].clear();
   if (was) describe();
   if (stream == nullptr) return {};
   const auto& skeleton = stream->skeleton;
   const auto id = static_cast<std::int32_t>(place + 1);
   const bool prop = skeleton != nullptr && is_prop(*skeleton);
   const bool own = skeleton != nullptr && (prop || is_of_motive(*skeleton));
-  const std::string name = own ? skeleton->name : stream->name;
+  const std::string name =
+      distinct_name(own ? skeleton->name : stream->name, stream->name, place, names_);
   auto fit = TRY(Fit::make(skeleton, own, [&](double scale) {
     return natnet::skeleton_of(
         natnet::average_person(name, id, static_cast<float>(scale), has_fingers(*skeleton)));

@@ -22,7 +22,7 @@ class NatNetScene {
   static constexpr std::uint64_t kClock_hz = 10'000'000;
   [[nodiscard]] static std::uint64_t ticks_at(std::int64_t time_ns) noexcept;
 
-  explicit NatNetScene(std::size_t places) : bodies_(places) {}
+  explicit NatNetScene(std::size_t places) : bodies_(places), names_(places) {}
 
   // The stream of a place comes, or has another skeleton; null: has left. A skeleton that Motive
   // could have, or a prop, goes out as it is; anybody else as Motive's figure. Cold.
@@ -48,6 +48,7 @@ class NatNetScene {
   void describe();
 
   std::vector<std::optional<Body>> bodies_;  // [place]
+  std::vector<std::string> names_;           // the same
   drivers::natnet::ModelDef model_;
   drivers::natnet::FramePacket packet_{.invented = false};
   double rate_hz_ = 0.0;

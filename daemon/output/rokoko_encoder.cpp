@@ -57,16 +57,18 @@ Heights heights_of(const Skeleton& skeleton) {
 
 class RokokoEncoder final : public DatagramEncoder {
  public:
-  RokokoEncoder(std::size_t places, bool lz4) : lz4_(lz4), people_(places) {}
+  RokokoEncoder(std::size_t places, bool lz4) : lz4_(lz4), people_(places), names_(places) {}
 
   Result<> set_person(std::size_t place, const LiveStream* stream) override {
     auto& person = people_[place];
     person.reset();
+    names_[place].clear();
     if (stream == nullptr) return {};
     const auto& skeleton = stream->skeleton;
     const bool prop = skeleton != nullptr && is_prop(*skeleton);
     const bool own = skeleton != nullptr && (prop || is_studio_actor(*skeleton));
-    const std::string& name = own ? skeleton->name : stream->name;
+    const std::string name =
+        distinct_name(own ? skeleton->name : stream->name, stream->name, place, names_);
     auto fit = TRY(Fit::make(skeleton, own, [&](double scale) {
       const rokoko::JointSet joints =
           has_fingers(*skeleton) ? rokoko::JointSet().set() : rokoko::without_fingers();
@@ -153,6 +155,7 @@ class RokokoEncoder final : public DatagramEncoder {
 
   bool lz4_;
   std::vector<std::optional<Person>> people_;  // [place]
+  std::vector<std::string> names_;             // the same
   double rate_hz_ = 60.0;                      // until a stream says it
   std::int64_t time_ns_ = 0, begin_ns_ = kNoTime_ns;
   std::string json_;

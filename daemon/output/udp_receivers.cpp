@@ -26,6 +26,9 @@ Result<int> open_socket(const drivers::Address& address) {
 std::string why(int error) {
   if (error == ECONNREFUSED) return "nobody listens there; start the receiver, or correct its port";
   if (error == EAGAIN || error == ENOBUFS) return "the network takes no more at this rate";
+  if (error == EMSGSIZE) {
+    return "so many people do not fit into one datagram; name fewer, or of rokoko lz4 = true";
+  }
   return errno_text(error);
 }
 

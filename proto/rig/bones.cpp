@@ -63,7 +63,10 @@ std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>&
     const Vec step = figure.between(chest, j).value_or(Vec::Zero()) - way;
     constexpr double kBack = -0.3;
     const bool turns_back = !chain.empty() && direction(step).dot(direction(way)) < kBack;
-    if (turns_back) break;  // hair
+    if (turns_back) {  // hair, which begins on the head
+      if (chain.size() > 2) chain.pop_back();
+      break;
+    }
     way += step;
     const bool tip = figure.children(j).empty() && figure.end_length(j) <= 0.0 &&
                      (chain.size() != 1 || step.norm() > kNeck * way.norm());

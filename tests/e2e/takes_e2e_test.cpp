@@ -308,6 +308,19 @@ TEST_CASE("datagrams of a capture system mark takes, once each, and rubbish mark
   REQUIRE(takes.size() == 1);
   CHECK(takes[0].at("ended") == true);
   CHECK(stage.frames_of(stage.path("take.plog"), "walk").size() > 1000);
+  CHECK(takes[0].at("timecode") == "10:20:30:05");
+  const auto from = [&stage](const std::string& timecode) {
+    return posed({"convert", stage.path("take.plog"), "--stream", "walker", "--take", "1",
+                  "--from-timecode", timecode, "--out", stage.path("part.glb"), "--overwrite",
+                  "--json"});
+  };
+  const auto frames = [&from](const std::string& timecode) {
+    return json::parse(from(timecode).out).at("frames").get<int>();
+  };
+  const int all = frames("10:20:30:05@25");
+  CHECK(frames("10:20:30:07@25") < all);
+  CHECK(has(from("10:20:30:07").err, "say how many frames a second has"));
+  CHECK(has(from("23:00:00:00@25").err, "has no frame"));
 }
 
 }  // namespace posed::test

@@ -238,12 +238,34 @@ TEST_CASE("any other person arrives through the outputs of mocopi and Rokoko") {
   check_walker({.kind = OutputKind::kRokoko, .lz4 = true});
 }
 
+TEST_CASE("two people of one name go out under two names") {
+  for (const OutputKind kind : {OutputKind::kMvn, OutputKind::kRokoko}) {
+    const std::string driver(config::kind_name(kind));
+    INFO(driver);
+    const Crowd crowd(driver, {});
+    ProtocolReader reader(driver);
+    UdpReceiver receiver;
+    const OutputRig rig(protocol_config({.kind = kind, .people = {"one", "two"}}, receiver));
+    for (const std::uint32_t id : {0U, 1U}) {
+      rig.output->stream_comes(info_of(id, id == 0 ? "one" : "two", crowd.skeleton));
+    }
+    for (int step = 0; step < 3; ++step) {
+      for (const int person : {0, 1}) rig.output->frame(crowd.pose(person, step));
+      static_cast<void>(rig.output->turn(step * kNanosPerSecond / 60));
+      for (const auto& datagram : receiver.received(rig.sent())) reader.feed(datagram, step);
+    }
+    CHECK(reader.newest.size() == 2);
+    CHECK(reader.newest.contains(crowd.skeleton->name));
+    CHECK(reader.newest.contains("two"));
+  }
+}
+
 TEST_CASE("sixteen people at 120 Hz arrive through each output as they were", "[.crowd]") {
   check_crowd({.kind = OutputKind::kMvn}, "mvn quaternion");
   check_crowd({.kind = OutputKind::kMvn, .euler = true}, "mvn Euler");
   check_crowd({.kind = OutputKind::kAxis}, "axis text");
   check_crowd({.kind = OutputKind::kAxis, .binary = true}, "axis binary");
-  check_crowd({.kind = OutputKind::kRokoko}, "rokoko");
+  check_crowd({.kind = OutputKind::kRokoko}, "rokoko", 8);  // plain text of 16 is no datagram
   check_crowd({.kind = OutputKind::kRokoko, .lz4 = true}, "rokoko LZ4");
   for (int i = 0; i < kCrowd; ++i) {
     check_crowd({.kind = OutputKind::kMocopi}, "mocopi " + std::to_string(i + 1), 1);
