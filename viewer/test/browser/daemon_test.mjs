@@ -118,7 +118,7 @@ told(
     assert.match(readFileSync(await download.path(), 'utf8'), /^HIERARCHY[^]*MOTION/);
     await page.getByLabel('Model', { exact: true }).selectOption('walk-to-sneak.style');
     await page
-      .locator('input[type=file]')
+      .locator('.side input[type=file]')
       .setInputFiles(join(BUILD, 'demo', 'walk-to-sneak.style'));
     await acknowledged(page, 'model walk-to-sneak.style: applied');
     await page.locator('.stream', { hasText: 'hand' }).click();

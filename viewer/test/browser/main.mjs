@@ -10,7 +10,7 @@ if (hasBrowser()) {
   after(closeBrowser);
   describe('the page in a browser', { concurrency: 3 }, () => {
     if (process.env.POSED) describe('with the daemon', daemonTests);
-    for (const one of [...cameraTests, ...pageTests]) test(...one);
+    for (const one of [...pageTests, ...cameraTests]) test(...one);
   });
 } else {
   console.log('SKIPPED without chromium');

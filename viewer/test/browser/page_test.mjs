@@ -81,187 +81,7 @@ const places = (page, name) =>
 const tile = (page, name) =>
   page.locator('.tile', { has: page.locator('dt', { hasText: new RegExp(`^${name}$`) }) });
 
-pageTests(
-  'a page of four bodies and two hands',
-  { bodies: 4, hands: 2, missing: [5, 6, 7, 8] },
-  {
-    'names cover neither each other nor the buttons, whatever the view': async (page) => {
-      for (const view of ['Side', 'Front', 'Follow']) {
-        await page.getByRole('button', { name: view, exact: true }).click();
-        await page.waitForTimeout(1200); // the view is there, the texts have their sizes
-        const boxes = await page.locator('.name-tag:visible').evaluateAll((tags) =>
-          tags.map((tag) => {
-            const { left, right, top, bottom } = tag.getBoundingClientRect();
-            return { left, right, top, bottom };
-          }),
-        );
-        assert.ok(boxes.length >= 4, `${view}: ${boxes.length} names`);
-        const tools = await page.locator('.tools').boundingBox();
-        for (const [i, a] of boxes.entries()) {
-          assert.ok(a.top >= tools.y + tools.height, `${view}: a name below the buttons`);
-          for (const b of boxes.slice(i + 1)) {
-            const apart =
-              a.right <= b.left || b.right <= a.left || a.bottom <= b.top || b.bottom <= a.top;
-            assert.ok(apart, `${view}: ${JSON.stringify([a, b])}`);
-          }
-        }
-      }
-    },
-    'each performer has a colour; follow and orbit keep the chosen one in the picture, alone':
-      async (page) => {
-        const entries = await page
-          .locator('.legend li[data-key="performer"]')
-          .evaluateAll((items) =>
-            items.map((item) => [item.textContent, item.style.getPropertyValue('--own')]),
-          );
-        const bodies = ['walker', 'walker2', 'walker3', 'walker4'].map((name) => `${name}: styled`);
-        const hands = ['hand', 'hand2'].map((name) => `${name}: smoothed`);
-        assert.deepEqual(entries.map(([text]) => text).sort(), [...hands, ...bodies].sort());
-        assert.equal(new Set(entries.map(([, colour]) => colour)).size, 6);
-        await page.locator('.stream', { hasText: 'walker3' }).click();
-        for (const view of ['Follow', 'Orbit']) {
-          await page.getByRole('button', { name: view, exact: true }).click();
-          await page.waitForTimeout(1500); // he walks on, and the view with him
-          const off_m = await page.evaluate(() => {
-            const { world } = globalThis.posedPage;
-            const [one, raw] = ['walker3', 'walker3-raw'].map((name) => world.performers.get(name));
-            const middle = one.centre.clone().lerp(raw.centre, 0.5);
-            return Math.hypot(world.views.target.x - middle.x, world.views.target.z - middle.z);
-          });
-          assert.ok(off_m < 1, `${view}: ${off_m} m`);
-        }
-      },
-  },
-);
-
-const rights = { may_control: false, read_only_reason: 'this key may watch only' };
-test(
-  'a page that may only look says why; once it may control, it asks for the models again',
-  HANGS,
-  async (context) => {
-    const bridge = await started(context, { rights });
-    const { daemon } = bridge;
-    const { answer } = daemon;
-    daemon.answer = () => ({ ok: false, error: 'this key may watch only' });
-    const page = await opened(context, bridge.url);
-    await drawn(page);
-    const models = page.getByLabel('Model', { exact: true });
-    await page.locator('select[title*="this key may watch only"]').waitFor(PATIENCE);
-    await page.getByText('Controls are off: this key may watch only').waitFor(PATIENCE);
-    assert.ok(await page.getByLabel('Amount of style, α, number').isDisabled());
-    await page.locator('.stage canvas').focus();
-    await page.keyboard.press('ArrowLeft');
-    await page.keyboard.press('s');
-    assert.deepEqual(
-      bridge.requests.filter((request) => !request.list_models),
-      [],
-    );
-    daemon.answer = answer;
-    bridge.say({ type: 'control', may_control: true, read_only_reason: '' });
-    await models.locator('option[value="tired.style"]').waitFor({ state: 'attached', ...PATIENCE });
-    assert.ok(await models.isEnabled());
-  },
-);
-
-// As where a virtual machine or a policy has it switched off.
-const withoutWebGL = (page) =>
-  page.addInitScript(() => {
-    const { getContext } = HTMLCanvasElement.prototype;
-    HTMLCanvasElement.prototype.getContext = function of(kind, ...more) {
-      return kind.startsWith('webgl') ? null : getContext.call(this, kind, ...more);
-    };
-  });
-
-test('without WebGL the page says what to do', HANGS, async (context) => {
-  const bridge = await started(context);
-  const page = await opened(context, bridge.url, { before: withoutWebGL });
-  await page.locator('.link-text', { hasText: 'this browser draws no WebGL' }).waitFor(PATIENCE);
-  bridge.publishStats();
-  await page.waitForTimeout(500); // what the bridge sends is no error
-  assert.match(await page.locator('.link-text').innerText(), /hardware acceleration/);
-  assert.ok(
-    page.errors.every((text) => text.includes('WebGL')),
-    page.errors.join(),
-  );
-});
-
-test('a page that loses its bridge says so, and finds it again', HANGS, async (context) => {
-  let bridge = await started(context);
-  const page = await opened(context, bridge.url.replace('secret', 'guess'));
-  assert.match(await page.locator('body').innerText(), /refused/); // without the token nothing
-  await page.goto(bridge.url);
-  await drawn(page);
-  bridge.silence();
-  await page.locator('.link[data-tone="bad"]', { hasText: 'does not answer' }).waitFor(PATIENCE);
-  await page.locator('.stream .state', { hasText: 'unknown' }).first().waitFor(PATIENCE);
-  const { port } = bridge;
-  const back_ms = async () => {
-    await bridge.stop();
-    await page.locator('.link[data-tone="busy"]').waitFor(PATIENCE);
-    await page.getByText('Controls are off: there is no connection').waitFor(PATIENCE);
-    assert.equal(await page.locator('.machine').innerText(), '');
-    const began_ms = performance.now();
-    bridge = await started(context, {}, port);
-    await page.locator('.link[data-tone="good"]').waitFor(PATIENCE);
-    return performance.now() - began_ms;
-  };
-  const took_ms = await askedAgain(back_ms, (ms) => ms < 3000);
-  assert.ok(took_ms < 3000, `${took_ms} ms`);
-  await bridge.stop();
-  await started(context, { token: 'another' }, port);
-  await page
-    .locator('.link-text', { hasText: 'refused this page: open the URL' })
-    .waitFor(PATIENCE);
-});
-
-// Drops a file of the page's own address on the scene, under another name.
-const drop = (page, path, name) =>
-  page.evaluate(
-    async ([source, as]) => {
-      const bytes = await (await fetch(source)).arrayBuffer();
-      const dataTransfer = new DataTransfer();
-      dataTransfer.items.add(new File([bytes], as));
-      document
-        .querySelector('.stage')
-        .dispatchEvent(new DragEvent('drop', { dataTransfer, bubbles: true, cancelable: true }));
-    },
-    [path, name],
-  );
-
-const wears = (page, name) =>
-  page.waitForFunction(
-    (avatar) => globalThis.posedPage?.world.performers.get('walker')?.avatar?.name === avatar,
-    name,
-    PATIENCE,
-  );
-
-const TIMES = ['Glass to glass', 'Arrival to callback'];
-
-async function withoutTimes(page) {
-  await page.getByText('Time in each stage').waitFor(PATIENCE);
-  await tile(page, 'Rate').waitFor(PATIENCE);
-  for (const name of TIMES) await tile(page, name).waitFor({ state: 'hidden', ...PATIENCE });
-}
-
-// axe-core looks at contrast, names for screen readers, and the reach of the keyboard; not at what
-// is drawn, so nothing is drawn meanwhile.
-async function accessible(page) {
-  await page.evaluate(() => {
-    globalThis.posedPage.world.frame = () => false;
-  });
-  for (const part of await page.locator('summary:visible').all()) await part.click();
-  await page.evaluate(AXE);
-  const faults = (part) =>
-    page.evaluate(async (selector) => {
-      const { violations } = await globalThis.axe.run(selector);
-      return violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target)}`);
-    }, part);
-  assert.deepEqual(await faults('html'), []);
-  await page.locator('#help-button').click();
-  await page.locator('#help summary').click();
-  assert.deepEqual(await faults('#help'), []);
-}
-
+// Long ones first: they begin at once.
 pageTests(
   'a page of a body and a hand',
   {},
@@ -286,57 +106,6 @@ pageTests(
     },
     'instruments of a live daemon have its times': async (page) => {
       for (const name of TIMES) await tile(page, name).waitFor(PATIENCE);
-    },
-    'a style is taught by two walks': async (page, bridge) => {
-      await unfold(page, 'Teach a style');
-      const lesson = page.locator('details', { hasText: 'Teach a style' });
-      const learn = lesson.getByRole('button', { name: 'Learn' });
-      const walk = (how) => lesson.getByLabel(`Walk ${how}`);
-      await walk('as usual').click();
-      await lesson.getByText(/^\d+ s …/).waitFor(PATIENCE);
-      assert.ok(await walk('in the style').isDisabled());
-      await lesson.getByText('✓ 18 strides in 20.0 s').waitFor(PATIENCE);
-      await walk('in the style').click();
-      await lesson.getByText('✗ this is no walk').waitFor(PATIENCE);
-      await lesson.getByLabel('Name').fill('proud');
-      assert.ok(await learn.isDisabled());
-      await walk('in the style').click();
-      await lesson.getByText('✓ 18 strides in 20.0 s').nth(1).waitFor(PATIENCE);
-      await lesson.getByLabel('Name').fill('../proud');
-      assert.ok(await learn.isDisabled());
-      await lesson.getByLabel('Name').fill('proud');
-      await learn.click();
-      await lesson.getByText('proud.style: from frame 900, 1.5 s later').waitFor(PATIENCE);
-      assert.equal(bridge.daemon.bodies[0].model, 'proud.style');
-      await lesson.getByRole('button', { name: 'One more' }).first().click();
-      await lesson.getByText('; 2 walks are kept').waitFor(PATIENCE);
-      assert.ok(await learn.isEnabled());
-    },
-    'a hand is taught signs': async (page, bridge) => {
-      await page.locator('.stream', { hasText: 'hand' }).click();
-      await unfold(page, 'Teach signs');
-      const lesson = page.locator('details', { hasText: 'Teach signs' });
-      const learn = lesson.getByRole('button', { name: 'Learn' });
-      const begin = lesson.getByRole('button', { name: 'Show 5 s' });
-      await lesson.getByLabel('Sign', { exact: true }).fill('two words');
-      assert.ok(await begin.isDisabled());
-      await lesson.getByLabel('Sign', { exact: true }).fill('ok');
-      await lesson.getByLabel('Name').fill('mine');
-      for (const verdict of ['✓ held', '✗ the hand moved too much', '✓ held', '✓ held']) {
-        assert.ok(await learn.isDisabled());
-        await begin.click();
-        await lesson.getByText(/^\d+ s …/).waitFor(PATIENCE);
-        await begin.waitFor(PATIENCE);
-        await lesson.getByText(verdict).waitFor(PATIENCE);
-      }
-      await lesson.getByRole('button', { name: 'ok 3/3' }).waitFor(PATIENCE);
-      await learn.click();
-      await lesson.getByText('mine.gesture: from frame 900, 0.5 s later').waitFor(PATIENCE);
-      assert.ok(bridge.requests.some(({ teach }) => teach?.train?.signs === true));
-      const gestures = page.getByLabel('Gestures of the model');
-      await gestures.getByRole('button', { name: 'ok', exact: true }).waitFor(PATIENCE);
-      await lesson.getByRole('button', { name: 'ok 3/3' }).click();
-      await lesson.getByRole('button', { name: 'ok 3/3' }).waitFor({ state: 'detached' });
     },
     'an emptied number field changes nothing': async (page, bridge) => {
       await unfold(page, 'More parameters');
@@ -409,7 +178,7 @@ pageTests(
       await page.getByLabel('Model', { exact: true }).selectOption('tired.style');
       await acknowledged(page, 'model tired.style: applied');
       await page
-        .locator('input[type=file]')
+        .locator('.side input[type=file]')
         .setInputFiles({ name: 'own.style', mimeType: '', buffer: Buffer.alloc(70000, 1) });
       await acknowledged(page, 'model own.style: applied');
       assert.equal(bridge.requests.filter((request) => request.model_part).length, 3);
@@ -631,33 +400,65 @@ pageTests(
 );
 
 pageTests(
-  'a page of a hand of another machine, in the dark',
-  { dark: true, bodies: 0, same_machine: false },
+  'a page of a body and a hand that are taught',
+  {},
   {
-    'instruments: all but the times of the page': withoutTimes,
-    'a line of gestures is performed, an unknown one refused; chips write the line': async (
-      page,
-      bridge,
-    ) => {
-      const line = page.getByLabel('Gestures to perform');
-      await line.fill('g 1 x');
-      await page.getByRole('button', { name: 'Play' }).click();
-      await acknowledged(page, 'does not know');
-      await line.fill('g 1');
-      await page.locator('.chip', { hasText: 'c' }).click();
-      await page.getByRole('button', { name: 'Play' }).click();
-      await acknowledged(page, 'performs g 1 c');
-      assert.deepEqual(bridge.daemon.hands[0].play, ['g', '1', 'c']);
-      bridge.daemon.hands[0].loop = true; // until it is stopped, however slowly the page draws
-      await page.locator('.name-tag', { hasText: 'performs' }).waitFor(PATIENCE);
-      await page.getByRole('button', { name: 'Stop' }).click();
-      await acknowledged(page, 'performs no more');
-      assert.match(await page.locator('code').innerText(), /posed calibrate .*--stream hand/);
+    'a style is taught by two walks': async (page, bridge) => {
+      await unfold(page, 'Teach a style');
+      const lesson = page.locator('details', { hasText: 'Teach a style' });
+      const learn = lesson.getByRole('button', { name: 'Learn' });
+      const walk = (how) => lesson.getByLabel(`Walk ${how}`);
+      await walk('as usual').click();
+      await lesson.getByText(/^\d+ s …/).waitFor(PATIENCE);
+      assert.ok(await walk('in the style').isDisabled());
+      await lesson.getByText('✓ 18 strides in 20.0 s').waitFor(PATIENCE);
+      await walk('in the style').click();
+      await lesson.getByText('✗ this is no walk').waitFor(PATIENCE);
+      await lesson.getByLabel('Name').fill('proud');
+      assert.ok(await learn.isDisabled());
+      await walk('in the style').click();
+      await lesson.getByText('✓ 18 strides in 20.0 s').nth(1).waitFor(PATIENCE);
+      await lesson.getByLabel('Name').fill('../proud');
+      assert.ok(await learn.isDisabled());
+      await lesson.getByLabel('Name').fill('proud');
+      await learn.click();
+      await lesson.getByText('proud.style: from frame 900, 1.5 s later').waitFor(PATIENCE);
+      assert.equal(bridge.daemon.bodies[0].model, 'proud.style');
+      await lesson.getByRole('button', { name: 'One more' }).first().click();
+      await lesson.getByText('; 2 walks are kept').waitFor(PATIENCE);
+      assert.ok(await learn.isEnabled());
+    },
+    'a hand is taught signs': async (page, bridge) => {
+      await page.locator('.stream', { hasText: 'hand' }).click();
+      await unfold(page, 'Teach signs');
+      const lesson = page.locator('details', { hasText: 'Teach signs' });
+      const learn = lesson.getByRole('button', { name: 'Learn' });
+      const begin = lesson.getByRole('button', { name: 'Show 5 s' });
+      await lesson.getByLabel('Sign', { exact: true }).fill('two words');
+      assert.ok(await begin.isDisabled());
+      await lesson.getByLabel('Sign', { exact: true }).fill('ok');
+      await lesson.getByLabel('Name').fill('mine');
+      for (const verdict of ['✓ held', '✗ the hand moved too much', '✓ held', '✓ held']) {
+        assert.ok(await learn.isDisabled());
+        await begin.click();
+        await lesson.getByText(/^\d+ s …/).waitFor(PATIENCE);
+        await begin.waitFor(PATIENCE);
+        await lesson.getByText(verdict).waitFor(PATIENCE);
+      }
+      await lesson.getByRole('button', { name: 'ok 3/3' }).waitFor(PATIENCE);
+      await learn.click();
+      await lesson.getByText('mine.gesture: from frame 900, 0.5 s later').waitFor(PATIENCE);
+      assert.ok(bridge.requests.some(({ teach }) => teach?.train?.signs === true));
+      const gestures = page.getByLabel('Gestures of the model');
+      await gestures.getByRole('button', { name: 'ok', exact: true }).waitFor(PATIENCE);
+      await lesson.getByRole('button', { name: 'ok 3/3' }).click();
+      await lesson.getByRole('button', { name: 'ok 3/3' }).waitFor({ state: 'detached' });
     },
     'a glove is calibrated by poses that are held, and by what the thumb touches': async (
       page,
       bridge,
     ) => {
+      await page.locator('.stream', { hasText: 'hand' }).click();
       await unfold(page, 'Calibrate this glove');
       const lesson = page.locator('details', { hasText: 'Calibrate this glove' });
       const use = lesson.getByRole('button', { name: 'Use' });
@@ -683,6 +484,214 @@ pageTests(
       const [{ held }] = fit.pose;
       assert.deepEqual([fit.name, held.length, held[0].sensor], ['ann', 1, 'index']);
       assert.equal(held[0].squares, 1e4 * held[0].count);
+    },
+  },
+);
+
+pageTests(
+  'a page of four bodies and two hands',
+  { bodies: 4, hands: 2, missing: [5, 6, 7, 8], width: 1440, height: 900 },
+  {
+    'names cover neither each other nor the buttons, whatever the view': async (page) => {
+      for (const view of ['Side', 'Front', 'Follow']) {
+        await page.getByRole('button', { name: view, exact: true }).click();
+        await page.waitForTimeout(1200); // the view is there, the texts have their sizes
+        const boxes = await page.locator('.name-tag:visible').evaluateAll((tags) =>
+          tags.map((tag) => {
+            const { left, right, top, bottom } = tag.getBoundingClientRect();
+            return { left, right, top, bottom };
+          }),
+        );
+        assert.ok(boxes.length >= 4, `${view}: ${boxes.length} names`);
+        const tools = await page.locator('.tools').boundingBox();
+        for (const [i, a] of boxes.entries()) {
+          assert.ok(a.top >= tools.y + tools.height, `${view}: a name below the buttons`);
+          for (const b of boxes.slice(i + 1)) {
+            const apart =
+              a.right <= b.left || b.right <= a.left || a.bottom <= b.top || b.bottom <= a.top;
+            assert.ok(apart, `${view}: ${JSON.stringify([a, b])}`);
+          }
+        }
+      }
+    },
+    'each performer has a colour; follow and orbit keep the chosen one in the picture, alone':
+      async (page) => {
+        const entries = await page
+          .locator('.legend li[data-key="performer"]')
+          .evaluateAll((items) =>
+            items.map((item) => [item.textContent, item.style.getPropertyValue('--own')]),
+          );
+        const bodies = ['walker', 'walker2', 'walker3', 'walker4'].map((name) => `${name}: styled`);
+        const hands = ['hand', 'hand2'].map((name) => `${name}: smoothed`);
+        assert.deepEqual(entries.map(([text]) => text).sort(), [...hands, ...bodies].sort());
+        assert.equal(new Set(entries.map(([, colour]) => colour)).size, 6);
+        await page.locator('.stream', { hasText: 'walker3' }).click();
+        for (const view of ['Follow', 'Orbit']) {
+          await page.getByRole('button', { name: view, exact: true }).click();
+          await page.waitForTimeout(1500); // he walks on, and the view with him
+          const off_m = await page.evaluate(() => {
+            const { world } = globalThis.posedPage;
+            const [one, raw] = ['walker3', 'walker3-raw'].map((name) => world.performers.get(name));
+            const middle = one.centre.clone().lerp(raw.centre, 0.5);
+            return Math.hypot(world.views.target.x - middle.x, world.views.target.z - middle.z);
+          });
+          assert.ok(off_m < 1, `${view}: ${off_m} m`);
+        }
+      },
+  },
+);
+
+const rights = { may_control: false, read_only_reason: 'this key may watch only' };
+test(
+  'a page that may only look says why; once it may control, it asks for the models again',
+  HANGS,
+  async (context) => {
+    const bridge = await started(context, { rights });
+    const { daemon } = bridge;
+    const { answer } = daemon;
+    daemon.answer = () => ({ ok: false, error: 'this key may watch only' });
+    const page = await opened(context, bridge.url);
+    await drawn(page);
+    const models = page.getByLabel('Model', { exact: true });
+    await page.locator('select[title*="this key may watch only"]').waitFor(PATIENCE);
+    await page.getByText('Controls are off: this key may watch only').waitFor(PATIENCE);
+    assert.ok(await page.getByLabel('Amount of style, α, number').isDisabled());
+    await page.locator('.stage canvas').focus();
+    await page.keyboard.press('ArrowLeft');
+    await page.keyboard.press('s');
+    assert.deepEqual(
+      bridge.requests.filter((request) => !request.list_models),
+      [],
+    );
+    daemon.answer = answer;
+    bridge.say({ type: 'control', may_control: true, read_only_reason: '' });
+    await models.locator('option[value="tired.style"]').waitFor({ state: 'attached', ...PATIENCE });
+    assert.ok(await models.isEnabled());
+  },
+);
+
+// As where a virtual machine or a policy has it switched off.
+const withoutWebGL = (page) =>
+  page.addInitScript(() => {
+    const { getContext } = HTMLCanvasElement.prototype;
+    HTMLCanvasElement.prototype.getContext = function of(kind, ...more) {
+      return kind.startsWith('webgl') ? null : getContext.call(this, kind, ...more);
+    };
+  });
+
+test('without WebGL the page says what to do', HANGS, async (context) => {
+  const bridge = await started(context);
+  const page = await opened(context, bridge.url, { before: withoutWebGL });
+  await page.locator('.link-text', { hasText: 'this browser draws no WebGL' }).waitFor(PATIENCE);
+  bridge.publishStats();
+  await page.waitForTimeout(500); // what the bridge sends is no error
+  assert.match(await page.locator('.link-text').innerText(), /hardware acceleration/);
+  assert.ok(
+    page.errors.every((text) => text.includes('WebGL')),
+    page.errors.join(),
+  );
+});
+
+test('a page that loses its bridge says so, and finds it again', HANGS, async (context) => {
+  let bridge = await started(context);
+  const page = await opened(context, bridge.url.replace('secret', 'guess'));
+  assert.match(await page.locator('body').innerText(), /refused/); // without the token nothing
+  await page.goto(bridge.url);
+  await drawn(page);
+  bridge.silence();
+  await page.locator('.link[data-tone="bad"]', { hasText: 'does not answer' }).waitFor(PATIENCE);
+  await page.locator('.stream .state', { hasText: 'unknown' }).first().waitFor(PATIENCE);
+  const { port } = bridge;
+  const back_ms = async () => {
+    await bridge.stop();
+    await page.locator('.link[data-tone="busy"]').waitFor(PATIENCE);
+    await page.getByText('Controls are off: there is no connection').waitFor(PATIENCE);
+    assert.equal(await page.locator('.machine').innerText(), '');
+    const began_ms = performance.now();
+    bridge = await started(context, {}, port);
+    await page.locator('.link[data-tone="good"]').waitFor(PATIENCE);
+    return performance.now() - began_ms;
+  };
+  const took_ms = await askedAgain(back_ms, (ms) => ms < 3000);
+  assert.ok(took_ms < 3000, `${took_ms} ms`);
+  await bridge.stop();
+  await started(context, { token: 'another' }, port);
+  await page
+    .locator('.link-text', { hasText: 'refused this page: open the URL' })
+    .waitFor(PATIENCE);
+});
+
+// Drops a file of the page's own address on the scene, under another name.
+const drop = (page, path, name) =>
+  page.evaluate(
+    async ([source, as]) => {
+      const bytes = await (await fetch(source)).arrayBuffer();
+      const dataTransfer = new DataTransfer();
+      dataTransfer.items.add(new File([bytes], as));
+      document
+        .querySelector('.stage')
+        .dispatchEvent(new DragEvent('drop', { dataTransfer, bubbles: true, cancelable: true }));
+    },
+    [path, name],
+  );
+
+const wears = (page, name) =>
+  page.waitForFunction(
+    (avatar) => globalThis.posedPage?.world.performers.get('walker')?.avatar?.name === avatar,
+    name,
+    PATIENCE,
+  );
+
+const TIMES = ['Glass to glass', 'Arrival to callback'];
+
+async function withoutTimes(page) {
+  await page.getByText('Time in each stage').waitFor(PATIENCE);
+  await tile(page, 'Rate').waitFor(PATIENCE);
+  for (const name of TIMES) await tile(page, name).waitFor({ state: 'hidden', ...PATIENCE });
+}
+
+// axe-core looks at contrast, names for screen readers, and the reach of the keyboard; not at what
+// is drawn, so nothing is drawn meanwhile.
+async function accessible(page) {
+  await page.evaluate(() => {
+    globalThis.posedPage.world.frame = () => false;
+  });
+  for (const part of await page.locator('summary:visible').all()) await part.click();
+  await page.evaluate(AXE);
+  const faults = (part) =>
+    page.evaluate(async (selector) => {
+      const { violations } = await globalThis.axe.run(selector);
+      return violations.map(({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target)}`);
+    }, part);
+  assert.deepEqual(await faults('html'), []);
+  await page.locator('#help-button').click();
+  await page.locator('#help summary').click();
+  assert.deepEqual(await faults('#help'), []);
+}
+
+pageTests(
+  'a page of a hand of another machine, in the dark',
+  { dark: true, bodies: 0, same_machine: false },
+  {
+    'instruments: all but the times of the page': withoutTimes,
+    'a line of gestures is performed, an unknown one refused; chips write the line': async (
+      page,
+      bridge,
+    ) => {
+      const line = page.getByLabel('Gestures to perform');
+      await line.fill('g 1 x');
+      await page.getByRole('button', { name: 'Play' }).click();
+      await acknowledged(page, 'does not know');
+      await line.fill('g 1');
+      await page.locator('.chip', { hasText: 'c' }).click();
+      await page.getByRole('button', { name: 'Play' }).click();
+      await acknowledged(page, 'performs g 1 c');
+      assert.deepEqual(bridge.daemon.hands[0].play, ['g', '1', 'c']);
+      bridge.daemon.hands[0].loop = true; // until it is stopped, however slowly the page draws
+      await page.locator('.name-tag', { hasText: 'performs' }).waitFor(PATIENCE);
+      await page.getByRole('button', { name: 'Stop' }).click();
+      await acknowledged(page, 'performs no more');
+      assert.match(await page.locator('code').innerText(), /posed calibrate .*--stream hand/);
     },
     'axe-core finds no fault': accessible,
   },

@@ -47,16 +47,24 @@ export const browserOfAll = () => {
 };
 export const closeBrowser = async () => (await shared)?.close();
 
-// A page of that browser that ends with the test, however that ends. It draws three pictures a second:
-// where the processor draws, all tests would else wait for pictures that none looks at.
-export async function opened(context, url, options) {
-  const page = await openPage(await browserOfAll(), 'about:blank', options);
-  context.after(() => page.context().close());
-  await page.addInitScript(() => {
-    const { requestAnimationFrame: next } = globalThis;
-    globalThis.requestAnimationFrame = (draw) => setTimeout(() => next(draw), 300);
+// In the page, before all else: three frames a second, drawn coarsely. Where the processor draws, all
+// tests would else wait for pictures that none looks at.
+function drawLittle() {
+  const { requestAnimationFrame: next } = globalThis;
+  globalThis.requestAnimationFrame = (frame) => setTimeout(() => next(frame), 300);
+  if (location.protocol === 'http:') localStorage['posed.quality'] ??= 'quick';
+}
+
+// A page of that browser that ends with the test, however that ends. With `&fine` it draws all.
+export async function opened(context, url, { before, ...options } = {}) {
+  const page = await openPage(await browserOfAll(), 'about:blank', {
+    width: 1100,
+    height: 750,
+    ...options,
   });
-  await options?.before?.(page);
+  context.after(() => page.context().close());
+  if (!url.includes('&fine')) await page.addInitScript(drawLittle);
+  await before?.(page);
   await page.goto(url);
   return page;
 }

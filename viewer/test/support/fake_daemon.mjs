@@ -308,7 +308,7 @@ export class FakeDaemon {
     return name ? { verdict, sentence: ['thumb to index 3 mm'], file: `${name}.toml` } : { verdict };
   }
 
-  // Each walk takes eleven questions, a training one; the first walk in the style is none.
+  // Each walk takes five questions, a training one; the first walk in the style is none.
   #teach(body, { stream, mark, train, cancel }) {
     this.teaching ??= { stream, step: 0 };
     const { teaching } = this;
@@ -320,7 +320,7 @@ export class FakeDaemon {
     else if (teaching.step === 3) {
       body.model = teaching.model;
       Object.assign(teaching, { step: 5, sequence: 900, train_s: 1.5, verdict: 'closes 90 %' });
-    } else if (teaching.step === 1 && (teaching.seconds_left -= 2) < 0) {
+    } else if (teaching.step === 1 && (teaching.seconds_left -= 5) < 0) {
       const good = !teaching.style || this.stumbled === true;
       const sentence = good ? '18 strides in 20.0 s' : 'this is no walk';
       this.stumbled ||= teaching.style;
