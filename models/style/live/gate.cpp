@@ -17,8 +17,10 @@ constexpr double kTooSlow = 0.3, kSlow = 0.45;              // of the training's
 constexpr double kFirstStep_rad =
     4.0;  // of a stride after rest, as the cadence lags by half a second
 constexpr double kFast = 1.2, kTooFast = 1.32;
-constexpr double kOfGait = 0.5;    // what LiveGait's correlation counts, in shares of that cadence,
-constexpr double kWalk = 0.2;      // above the training's highest, which counts as at least this
+constexpr double kOfGait = 0.5;  // what LiveGait's correlation counts, in shares of that cadence,
+constexpr double kWalk = 0.2;    // above the training's highest, which counts as at least this
+constexpr double kOfWide = 0.5;  // the more where the legs swing wide, in shares of the training's
+constexpr double kUsual = 1.6, kWide = 2.1;  // least swing
 constexpr double kOwnFast = 1.15;  // a walker's own cadence above this counts in its place
 
 constexpr double kCadence_s = 0.1;  // time constant of the low-pass on the cadence
@@ -117,12 +119,13 @@ RT_SAFE double Gate::of_rest(const TrainedMotion& known, const Evidence& seen) n
 }
 
 // 1 where the legs run and did not in training: they are quicker, or the pelvis is higher while
-// they are apart. `cadence` is in shares of a usual one. The very poses of training are none of a
-// run.
+// they are apart, which tells most of long steps. `cadence` is in shares of a usual one. The very
+// poses of training are none of a run.
 RT_SAFE double Gate::of_run(const TrainedMotion& known, double cadence) const noexcept {
   const double taught = known.gait_correlation();
   const double higher = gait_.correlation() - std::max(taught, kWalk);
-  if (!std::isnan(taught) && !std::isnan(higher)) cadence += kOfGait * higher;
+  const double wide = rise(stride_.swing_rad() / known.swing_rad(), kUsual, kWide);
+  if (!std::isnan(taught) && !std::isnan(higher)) cadence += (kOfGait + kOfWide * wide) * higher;
   return rise(cadence, kFast, kTooFast) * (1.0 - of_near_pose_);
 }
 
