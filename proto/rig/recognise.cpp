@@ -136,10 +136,10 @@ void set_facing(const RigInput& input, const Frames& frames, Rig& rig) {
   }
 }
 
-bool knows_all_frames(const RigInput& input) {
-  if (input.T.size() < input.bones.size() || input.bones.empty()) return false;
-  for (std::size_t j = 0; j < input.bones.size(); ++j) {
-    if (input.bones[j] && !input.T[j]) return false;
+bool knows_all_frames(const RigInput& input, const std::vector<std::optional<Bone>>& bones) {
+  if (input.T.size() < bones.size()) return false;
+  for (std::size_t j = 0; j < bones.size(); ++j) {
+    if (bones[j] && !input.T[j]) return false;
   }
   return true;
 }
@@ -182,7 +182,7 @@ Rig recognise(const RigInput& input) {
   }
   rig.up = input.up.value_or(frames.up());
   rig.why_up = frames.why_up();
-  if (!knows_all_frames(input)) {
+  if (!knows_all_frames(input, rig.bone)) {
     rig.notes.insert(rig.notes.begin(), notes.begin(), notes.end());
   }
   collect(input, frames, rig);

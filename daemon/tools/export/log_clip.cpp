@@ -204,9 +204,10 @@ class Collector {
  public:
   explicit Collector(const std::shared_ptr<const Skeleton>& skeleton) : clip_(skeleton) {}
 
-  // `timecode` is that of the moment, where the frame has none of its own; empty: not known.
+  // `timecode` is that of the moment, for frames that have none of their own; empty: not known.
   void add(const Frame& frame, const Timecode& timecode = {}) {
     const Header& header = frame.header;
+    if (timecode != Timecode{}) moment_ = timecode;
     if (part_ != header.stream) {
       if (last_ != 0) ++returns_;
       last_ = 0;
@@ -216,7 +217,8 @@ class Collector {
     missing_ += last_ == 0 ? 0 : header.sequence - last_ - 1;
     last_ = header.sequence;
     times_.add(header);
-    clip_.add(frame, frame.timecode == Timecode{} ? timecode : frame.timecode);
+    clip_.add(frame, frame.timecode == Timecode{} ? moment_ : frame.timecode);
+    moment_ = {};
   }
 
   [[nodiscard]] std::size_t frames() const { return times_.size(); }
@@ -239,6 +241,7 @@ class Collector {
   std::uint32_t part_ = pipeline::kNoStream;
   std::uint64_t last_ = 0, missing_ = 0, returns_ = 0;
   clip::FrameTimes times_;
+  Timecode moment_{};  // of the next frame
 };
 
 // The timecodes that a trigger told of the beginnings of takes: each for the first frame behind it.

@@ -24,6 +24,8 @@
 #include "proto/clip/format.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/clip/hand_clip.hpp"
+#include "proto/clip/text.hpp"
+#include "proto/clip/timecode_cut.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/text/stream_name.hpp"
 
@@ -43,6 +45,7 @@ struct RenderArguments {
   int count = 8;
   double row_px = 260.0;
   std::optional<double> from_s, to_s;
+  std::string from_timecode, to_timecode;  // instead of them
 };
 
 // A motion ready to be drawn; a hand's gaps are filled.
@@ -98,6 +101,9 @@ Result<clip::Clip> read_motion(const RenderArguments& options, const std::string
   const Waiting waiting("reading " + options.in);
   auto clip = reads_log(options) ? clip_of_log(options.in, stream, options.take)
                                  : clip::read_clip(options.in, in_options(options));
+  if (clip) {
+    clip = clip::cut_by_timecode(*std::move(clip), options.from_timecode, options.to_timecode);
+  }
   if (clip && clip->skeleton->joint_of(Bone::kHips) < 0 && !hand_side(*clip->skeleton)) {
     if (auto hand = as_hand(*clip, options.read)) clip = std::move(hand);
   }
@@ -242,6 +248,23 @@ Result<> render_video(const RenderArguments& options, const std::vector<Drawn>& 
   return done;
 }
 
+// Seconds, or what has a ':'.
+void add_moment(CLI::App& command, const std::string& name, const std::string& help,
+                std::optional<double>& time_s, std::string& timecode) {
+  const auto set = [&time_s, &timecode](const std::string& text) {
+    if (text.contains(':')) {
+      timecode = text;
+    } else {
+      time_s = clip::parse_number(text);
+    }
+  };
+  command.add_option_function<std::string>(name, set, help)->check([](const std::string& text) {
+    const auto number = clip::parse_number(text);
+    const bool possible = text.contains(':') || (number && *number >= 0.0);
+    return possible ? std::string() : text + " is neither seconds from 0 on nor hh:mm:ss:ff";
+  });
+}
+
 Result<> run_render(const RenderArguments& options) {
   TRY(check_render(options));
   const auto view = TRY(picture::view_from_name(options.view));
@@ -295,8 +318,10 @@ void add_render(CLI::App& app, int& exit_code) {
   command->add_option("--height", options->row_px, "Height of a strip's poses [px]")
       ->check(CLI::Range(40, 4000))
       ->capture_default_str();
-  command->add_option("--from", options->from_s, "Begin at this time [s]")->check(zero_or_more());
-  command->add_option("--to", options->to_s, "End at this time [s]")->check(zero_or_more());
+  add_moment(*command, "--from", "Begin at this time [s] or timecode", options->from_s,
+             options->from_timecode);
+  add_moment(*command, "--to", "End at this time [s] or timecode", options->to_s,
+             options->to_timecode);
   command->add_flag("--raw-beside", options->raw_beside,
                     "The unstyled motion of a log, too, in grey");
   command->add_option("--stream", options->stream,

@@ -249,10 +249,15 @@ TEST_CASE("two people of one name go out under two names") {
     for (const std::uint32_t id : {0U, 1U}) {
       rig.output->stream_comes(info_of(id, id == 0 ? "one" : "two", crowd.skeleton));
     }
-    for (int step = 0; step < 3; ++step) {
-      for (const int person : {0, 1}) rig.output->frame(crowd.pose(person, step));
-      static_cast<void>(rig.output->turn(step * kNanosPerSecond / 60));
-      for (const auto& datagram : receiver.received(rig.sent())) reader.feed(datagram, step);
+    for (int step = 0; step < 90; ++step) {  // people are described each second
+      const std::int64_t now_ns = step * kNanosPerSecond / 60;
+      for (const int person : {0, 1}) {
+        Frame pose = crowd.pose(person, step);
+        pose.header.arrival_ns = now_ns;
+        rig.output->frame(pose);
+      }
+      static_cast<void>(rig.output->turn(now_ns));
+      for (const auto& datagram : receiver.received(rig.sent())) reader.feed(datagram, now_ns);
     }
     CHECK(reader.newest.size() == 2);
     CHECK(reader.newest.contains(crowd.skeleton->name));
