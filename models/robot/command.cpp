@@ -13,7 +13,7 @@ constexpr double kPart_m_s = 0.06;   // at which links come apart that are neare
 constexpr double kGapShare = 0.5;    // of the joints' braking that a gap counts on
 constexpr double kRounding = 0.995;  // of the limits: what is sent is a float
 constexpr double kSame_m = 1e-6;
-constexpr double kAway_rad = 0.05;   // from here on a pose is another one
+constexpr double kAway_rad = 0.05;  // from here on a pose is another one
 constexpr double kStands_rad_s = 0.05;
 constexpr int kHalvings = 5;
 

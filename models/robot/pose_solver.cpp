@@ -13,7 +13,7 @@ constexpr double kFar_m = 0.03;  // from here on a tip pulls no harder
 constexpr double kPinchPoint = 1.0;
 constexpr double kPinchGap = 10.0;
 constexpr double kSolverNear_m = 0.02;
-constexpr double kMissing = 1.0;  // of what links miss of their margin [m]: more than tips gain by it
+constexpr double kMissing = 1.0;  // [m], of what links miss of their margin: tips gain less by it
 constexpr int kBacktracks = 3;
 
 }  // namespace

@@ -118,7 +118,7 @@ struct Placed {
         nearest(capsules == 0 ? 0 : links * links, std::pair(-1, -1)) {}
   std::vector<Eigen::Matrix3d> turn;
   std::vector<Eigen::Vector3d> at_m;
-  std::vector<Eigen::Vector3d> axis;          // of the joint that carries the link
+  std::vector<Eigen::Vector3d> axis;                    // of the joint that carries the link
   std::vector<Eigen::Vector3d> from_m, to_m, middle_m;  // [capsule]; none where no gap is asked for
   std::vector<std::pair<int, int>> nearest;  // [link * links + link]: capsules, when last looked at
 };

@@ -15,10 +15,8 @@ constexpr double kMostly = 0.7;
 
 void add_capsule(RobotHand& hand, int link, const Eigen::Isometry3d& at,
                  const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m, double radius_m) {
-  hand.capsules.push_back({.link = link,
-                           .from_m = at * from_m,
-                           .to_m = at * to_m,
-                           .radius_m = radius_m});
+  hand.capsules.push_back(
+      {.link = link, .from_m = at * from_m, .to_m = at * to_m, .radius_m = radius_m});
   hand.reach_m.push_back(0.5 * (to_m - from_m).norm() + radius_m);
 }
 
@@ -118,8 +116,8 @@ RT_SAFE Eigen::Vector3d world(const Placed& placed, int link, const Eigen::Vecto
   return placed.at_m[link] + placed.turn[link] * m;
 }
 
-// The least gap below `near_m`; that itself where none is. The capsules that were nearest before are
-// tried first: most others are then too far to be looked at.
+// The least gap below `near_m`; that itself where none is. The capsules that were nearest before
+// are tried first: most others are then too far to be looked at.
 RT_SAFE Nearest nearest(const RobotHand& hand, Placed& placed, int a, int b,
                         double near_m) noexcept {
   Nearest best{.gap_m = near_m};
@@ -214,8 +212,8 @@ void add_shapes(RobotHand& hand) {
   }
 }
 
-std::span<const Gap> find_gaps(const RobotHand& hand, Placed& placed, double near_m,
-                               bool slopes, Gaps& gaps) noexcept {
+std::span<const Gap> find_gaps(const RobotHand& hand, Placed& placed, double near_m, bool slopes,
+                               Gaps& gaps) noexcept {
   std::size_t count = 0;
   for (const auto& [a, b] : hand.pairs) {
     if (!may_be_near(hand, placed, a, b, near_m)) continue;

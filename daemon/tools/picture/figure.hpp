@@ -54,8 +54,8 @@ class Camera {
 };
 
 // FigureShape: what a pose looks like in a picture: a body as sticks with a head, a hand as
-// capsules, a robot as those that it is kept apart by. Left and right limbs, or the five fingers, have colours that colour-blind people can
-// tell apart (Okabe and Ito).
+// capsules, a robot as those that it is kept apart by. Left and right limbs, or the five fingers,
+// have colours that colour-blind people can tell apart (Okabe and Ito).
 struct Stick {
   Eigen::Vector3d from_m, to_m;  // world
   double width_m;

@@ -18,7 +18,11 @@ export const ROBOT_TILES = [
     ({ stats }) =>
       stats.robot_stop_joint ? `${stats.robot_stop_joint}, ${stats.robot_stop_other}` : '',
   ],
-  ['Robot limited', 'commands that links in the way changed', ({ stats }) => since(stats.robot_limited)],
+  [
+    'Robot limited',
+    'commands that links in the way changed',
+    ({ stats }) => since(stats.robot_limited),
+  ],
   [
     'Robot held',
     'how often it braked because the hand could not be trusted',

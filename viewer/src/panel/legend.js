@@ -10,6 +10,7 @@ const ENTRIES = [
   ['held', 'held'],
   ['stale', 'stale'],
   ['no-value', 'no value'],
+  ['stopped', 'stopped the robot'],
 ];
 const QUALITY = [null, 'predicted', 'held', 'stale'];
 
@@ -27,6 +28,7 @@ function seen(world) {
     const performsAtRest = stream.pose.performed && stream.pose.quality === 2;
     if (QUALITY[stream.pose.quality] && !performsAtRest) keys.add(QUALITY[stream.pose.quality]);
     if (stream.partsWithoutValue()) keys.add('no-value');
+    if (stream.isRobot && stream.stats?.robot_stop_joint) keys.add('stopped');
   }
   return keys;
 }
@@ -36,6 +38,7 @@ function done({ stats, pose, isTake }) {
   const names = new Set(stats?.stage.map(({ name }) => name));
   if (names.has('style')) return 'styled';
   if (pose.performed) return 'performed';
+  if (names.has('robot')) return 'robot';
   if (names.has('generate')) return 'smoothed';
   if (isTake) return 'recorded';
   return names.size > 0 ? 'cleaned' : 'as captured';

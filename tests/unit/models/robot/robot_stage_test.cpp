@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "models/hand/constraint_solver.hpp"
+#include "models/robot/command.hpp"
 #include "models/robot/hand_target.hpp"
 #include "models/robot/pose_solver.hpp"
 #include "tests/support/allocations.hpp"
@@ -166,6 +167,67 @@ TEST_CASE("a robot's finger and thumb meet where the hand's do") {
     CHECK(gap_m >= 0.0);
     CHECK(gap_m < 3e-3);
   }
+}
+
+TEST_CASE("a solver's pose keeps the margin that the command keeps") {
+  auto urdf = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  const RobotHand robot = robot_hand(std::move(urdf), {}, "mitten").value();
+  HandTargets targets(robot, hand::hand_geometry(default_hand_shape()));
+  PoseSolver solver(robot, 1e-3);
+  Placed placed(robot.links.size(), robot.capsules.size());
+  Gaps gaps;
+  HandTarget target;
+  int nearer = 0;
+  // Whatever hands: fingers through each other, the thumb in the palm.
+  for (int number = 0; number < 60; ++number) {
+    HandAngles angles{};
+    for (std::size_t c = 0; c < angles.size(); ++c) {
+      angles[c] =
+          3.0 * std::fmod((number + 1) * std::sqrt(2.0 + 3.0 * static_cast<double>(c)), 1.0) - 1.5;
+    }
+    targets.find(angles, target);
+    for (int i = 0; i < 40; ++i) solver.solve(target, 2);
+    place(robot, solver.pose(), placed);
+    double least_m = 1.0;
+    for (const Gap& gap : find_gaps(robot, placed, 1e-3, false, gaps)) {
+      least_m = std::min(least_m, gap.gap_m);
+    }
+    nearer += least_m < 0.8e-3 ? 1 : 0;
+  }
+  CHECK(nearer == 0);
+}
+
+TEST_CASE("a command that links stop is counted once, names them, and lets go of the pose") {
+  auto urdf = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  const RobotHand robot = robot_hand(std::move(urdf), {}, "mitten").value();
+  Command command(robot, 1e-3);
+  Placed placed(robot.links.size(), robot.capsules.size());
+  Gaps gaps;
+  int blocked_poses = 0;
+  for (int number = 0; number < 40; ++number) {
+    Drive wanted = Drive::Zero();
+    for (int i = 0; i < robot.size(); ++i) {
+      const double share = std::fmod((number + 1) * std::sqrt(2.0 + 3.0 * i), 1.0);
+      wanted[i] = robot.driven[i].low + share * (robot.driven[i].high - robot.driven[i].low);
+    }
+    const std::uint64_t before = command.stops();
+    int times = 0;
+    for (int t = 0; t < 300; ++t) {
+      command.follow(wanted, 0.01);
+      times += command.blocked() ? 1 : 0;
+    }
+    const double away = (wanted - command.pose()).cwiseAbs().maxCoeff();
+    CHECK((away < 0.05 || command.stops() > before));
+    if (times < 10) continue;
+    ++blocked_poses;
+    // It stands for seconds: told again and again, counted when it came to that.
+    CHECK(command.stops() - before < static_cast<std::uint64_t>(times));
+    const auto [a, b] = command.in_the_way();
+    place(robot, command.pose(), placed);
+    CHECK(gap_between(robot, placed, a, b).gap_m < 2e-3);
+  }
+  CHECK(blocked_poses > 0);
+  CHECK(command.limited() > command.stops());
 }
 
 TEST_CASE("a robot stage says what it cannot serve") {

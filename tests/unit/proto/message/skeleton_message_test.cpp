@@ -25,6 +25,8 @@ Skeleton toy() {
   skeleton.channels = {{.joint = 0, .axis = Axis::kX, .translation = true},
                        {.joint = 0, .axis = Axis::kZ},
                        {.joint = 2, .axis = Axis::kY}};
+  skeleton.capsules = {
+      {.joint = 2, .from_m = {0.0, 0.5, 0.0}, .to_m = {0.25, 0.0, 0.0}, .radius_m = 0.125}};
   REQUIRE(skeleton.finish());
   return skeleton;
 }
@@ -45,6 +47,11 @@ TEST_CASE("a skeleton comes back from its message") {
     CHECK(got->joints[j].bone == sent.joints[j].bone);
     CHECK(got->joints[j].T_world_joint.angularDistance(sent.joints[j].T_world_joint) < 1e-6);
   }
+  REQUIRE(got->capsules.size() == 1);
+  CHECK(got->capsules[0].joint == 2);
+  CHECK(got->capsules[0].from_m == sent.capsules[0].from_m);
+  CHECK(got->capsules[0].to_m == sent.capsules[0].to_m);
+  CHECK(got->capsules[0].radius_m == 0.125);
   REQUIRE(got->channels.size() == 2);  // of rotations alone
   CHECK(got->channels[1].joint == 2);
   CHECK(got->channels[1].axis == Axis::kY);
@@ -64,6 +71,10 @@ TEST_CASE("a damaged skeleton message is refused in one sentence") {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   const std::vector<std::function<void(v1::Skeleton&)>> damages{
       [](v1::Skeleton& m) { m.clear_joint_name(); },
+      [](v1::Skeleton& m) { m.add_capsule_joint(0); },
+      [](v1::Skeleton& m) { m.set_capsule_joint(0, 3); },
+      [&](v1::Skeleton& m) { m.set_capsule_m(0, nan); },
+      [&](v1::Skeleton& m) { m.set_capsule_m(6, nan); },
       [](v1::Skeleton& m) { m.add_joint_name("more"); },
       [](v1::Skeleton& m) { m.add_parent(0); },
       [](v1::Skeleton& m) { m.set_parent(1, 1); },

@@ -275,6 +275,13 @@ TEST_CASE("the live view shows performed and recognised gestures, a moving alpha
   CHECK(below().contains(", rightIndexIntermediate: 3.0 % dropped, alpha"));
   stream.set_gate_dropped(0.0004F);
   CHECK_FALSE(below().contains("dropped"));
+  stream.set_robot_stops(2);
+  stream.set_robot_hard_stops(1);
+  stream.set_robot_stop_joint("thumb_far");
+  stream.set_robot_stop_other("index_far");
+  CHECK(
+      below().contains(", robot: 3 stops (1 hard), 0 holds, 0 commands limited, stopped by "
+                       "thumb_far and index_far"));
   stats.set_replay_file("take1.plog");
   stats.set_replay_speed(1.0);
   CHECK(below() == "  a replay of take1.plog, 1 x its pace; all times are the recording's");
