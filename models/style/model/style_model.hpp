@@ -63,7 +63,7 @@ struct StyleAxis {
 };
 
 // What a style does to the pelvis, by the process's inputs and kernel: its height [lengths of a
-// leg], its speed forward and to the left [such lengths a stride].
+// leg], its speed forward and to the left [such lengths a mean stride of the source].
 struct RootFunction {
   static constexpr int kDims = 3;
   gp::Function function;  // weights [N x 3], offset [3]

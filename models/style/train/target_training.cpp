@@ -51,6 +51,21 @@ MatrixXd mgpm_group_cycle(const Dataset& dataset, std::size_t motion, const std:
   return all.middleCols(3, dataset.dims());
 }
 
+// Speeds count in strides of the sources' mean, not of each clip: what the performer's own stride
+// brings back is then the style's speed, where the style strides at another cadence.
+void in_strides_of_sources(const std::string& target, Dataset& dataset) {
+  for (AlignedClip& clip : dataset.clips) {
+    double sum = 0.0;
+    int count = 0;
+    for (const AlignedClip& other : dataset.clips) {
+      if (other.motion != clip.motion || other.group == target) continue;
+      sum += 1.0 / other.dtheta;
+      ++count;
+    }
+    clip.root.rightCols(2) *= clip.dtheta * sum / count;
+  }
+}
+
 // The same inputs and kernel with the pelvis as output, whose differences are found as those of the
 // pose.
 Result<> learn_roots(const Dataset& all, const std::vector<Lesson>& lessons,
@@ -60,6 +75,7 @@ Result<> learn_roots(const Dataset& all, const std::vector<Lesson>& lessons,
   if (std::ranges::any_of(all.clips, lacks_root)) return {};
   for (std::size_t i = 0; i < lessons.size(); ++i) {
     Dataset roots = *lessons[i].data;
+    in_strides_of_sources(lessons[i].target, roots);
     for (AlignedClip& clip : roots.clips) clip.q = clip.root;
     pairs[i].outputs = make_training_pairs(roots, clip_cycles(roots), lessons[i].target).outputs;
     learnt[i].root.emplace().limit =

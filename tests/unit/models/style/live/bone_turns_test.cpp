@@ -4,6 +4,7 @@
 
 #include <catch2/catch.hpp>
 
+#include <string>
 #include <vector>
 
 #include "models/motion/kinematics.hpp"
@@ -21,7 +22,7 @@ struct Build {
   motion::PoseSpaceSpec spec =
       motion::describe_space(motion::Space::kHumanoid, *walk.skeleton).value();
   motion::PoseSpace space = motion::PoseSpace::bind(spec, *walk.skeleton).value();
-  style::BoneTurns turns = style::BoneTurns::make(spec, *walk.skeleton).value();
+  style::BoneTurns turns = style::BoneTurns::make(spec, {}, *walk.skeleton).value();
   std::size_t dims = static_cast<std::size_t>(space.dims());
   std::vector<float> all = std::vector<float>(dims, 1.0F);
 
@@ -112,4 +113,40 @@ TEST_CASE("what takes no part rides on the bone above it", "[style][bone_turns]"
   build.turns.add(unmeasured, 0.4, q, change, build.all);
   CHECK(unmeasured.rotation_xyzw[head] == plain.rotation_xyzw[head]);
   CHECK(unmeasured.rotation_xyzw != plain.rotation_xyzw);
+}
+
+TEST_CASE("a trunk that is divided elsewhere turns as what of the taught one lies there",
+          "[style][bone_turns]") {
+  Build build;
+  const Skeleton& skeleton = *build.walk.skeleton;
+  const auto place = [places = style::trunk_places(skeleton), &skeleton](Bone bone) {
+    return places[static_cast<std::size_t>(skeleton.joint_of(bone))];
+  };
+  REQUIRE(place(Bone::kHips) == 0.0);
+  REQUIRE(place(Bone::kSpine) < place(Bone::kChest));
+  CHECK(place(Bone::kHead) == 1.0);
+  CHECK(place(Bone::kLeftUpperArm) == -1.0);
+  // Where the walker's chest is, the figure of training had its spine.
+  std::vector<double> taught;
+  for (const std::string& name : build.spec.joints) {
+    const Bone bone = *bone_from_name(name);
+    taught.push_back(bone == Bone::kSpine   ? place(Bone::kChest)
+                     : bone == Bone::kChest ? place(Bone::kNeck)
+                                            : place(bone));
+  }
+  build.turns = style::BoneTurns::make(build.spec, taught, skeleton).value();
+  const Frame plain = build.walk.frame(20);
+  const Vector3d bow_rad(0.4, 0.0, 0.0);
+  Frame styled = plain;
+  build.turns.add(styled, 0.4, build.vector_of(plain), build.change_of(Bone::kSpine, bow_rad),
+                  build.all);
+  const auto before = motion::world_pose(skeleton, plain);
+  const auto after = motion::world_pose(skeleton, styled);
+  const auto turned_rad = [&](Bone bone) {
+    const auto j = static_cast<std::size_t>(skeleton.joint_of(bone));
+    return angle_between_rad(before.rotation[j], after.rotation[j]);
+  };
+  CHECK(turned_rad(Bone::kSpine) < 1e-5);
+  CHECK(turned_rad(Bone::kChest) == Approx(0.4).margin(1e-3));
+  CHECK(turned_rad(Bone::kHead) == Approx(0.4).margin(1e-3));
 }

@@ -174,6 +174,13 @@ TEST_CASE("Numbers that no training gives are refused", "[model_file]") {
   refused(with([](auto& m) { m.limit_rad[0] = 1e4; }), "the limits");
   refused(with([](auto& m) { m.gate = {Eigen::VectorXd::Constant(6, 1e4), 0.5, 1.0}; }),
           "the neutral pose");
+  for (const std::vector<double>& places : {std::vector{0.0, 2.0}, std::vector{0.0}}) {
+    refused(with([&](auto& m) {
+              m.gate = {Eigen::VectorXd::Zero(6), 0.5, 1.0};
+              m.gate.places = places;
+            }),
+            "the trunk's places");
+  }
   refused(with([](auto& m) { m.axis = {Eigen::VectorXd::Constant(6, 1e20), 0.0}; }),
           "the style's axis");
   refused(with([](auto& m) { m.axis = {Eigen::VectorXd::Constant(6, 1.0), 1e20}; }),
