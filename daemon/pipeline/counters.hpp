@@ -44,7 +44,7 @@ struct ParameterCounter {
   std::atomic<double> target{0.0};
 };
 
-inline constexpr std::size_t kMaxReadings = 8;  // of one stream
+inline constexpr std::size_t kMaxReadings = 16;  // of one stream
 
 struct ReadingCounter {
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
