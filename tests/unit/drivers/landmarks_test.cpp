@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <limits>
 #include <numbers>
 #include <random>
+#include <sstream>
 #include <string>
 
 #include "drivers/driver.hpp"
@@ -176,8 +178,8 @@ TEST_CASE("a hand tracker's hands become bodies of hand45") {
   CHECK(rig.layout->bodies[1].name == "right");
   for (const double angle_rad : hand_angles(rig.sink.frames[1])) CHECK(std::abs(angle_rad) < 1e-3);
   // Nothing is seen, and the tracker says so: for a second the hands are somewhere.
-  rig.now_ns += kNanosPerSecond;
   for (const std::string& none : {std::string(), flat_hand("left", "0.3")}) {
+    rig.now_ns += kNanosPerSecond / 2;
     CHECK(rig.feed(message_of(none)) == Outcome::kOk);
     REQUIRE(rig.sink.frames.size() == 2);
     CHECK(std::ranges::none_of(hand_angles(rig.sink.frames[0]), is_finite));
@@ -215,7 +217,10 @@ TEST_CASE("a hand keeps its side whatever single pictures say, until somebody te
   std::string sure = right;
   CHECK(bodies(sure.insert(1, R"("sure":true,)"), 1) == std::vector<std::size_t>(1, 1));
   CHECK(bodies(left, 20) == std::vector<std::size_t>(20, 1));
-  rig.now_ns += 2 * kNanosPerSecond;
+  for (int i = 0; i < 3; ++i) {
+    rig.now_ns += kNanosPerSecond / 2;
+    CHECK(rig.feed(message_of("")) == Outcome::kOk);
+  }
   CHECK(bodies(left, 1) == std::vector<std::size_t>(1, 0));  // another hand
 }
 
@@ -334,6 +339,40 @@ std::string emulated_log() {
 TEST_CASE("write the log of the emulated hand tracker", "[.write-logs]") {
   const auto path = test::golden("devices") / "landmarks.log";
   if (!std::filesystem::exists(path)) std::ofstream(path) << emulated_log();
+}
+
+// viewer/test/support/drawn_hands.cpp: each row the gesture, whether it is held, and 19 angles
+// [deg] of the hand's own side, or - where there are none. A film whose name ends in "left" has a
+// left hand.
+TEST_CASE("what the driver makes of a drawn hand", "[.takes]") {
+  constexpr std::array<std::size_t, 19> kAngle{2,  3,  6,  1,  9,  12, 15, 10, 18, 21,
+                                               24, 27, 30, 33, 28, 36, 39, 42, 37};
+  const char* const film = std::getenv("POSED_FILM");
+  REQUIRE(film != nullptr);
+  const std::string base = film;
+  const std::size_t body = base.ends_with("left") ? 0 : 1;
+  std::ifstream hands(base + ".hands"), truth(base + ".truth");
+  std::ofstream take(base + ".take");
+  LandmarksRig rig;
+  for (std::string message, row; std::getline(hands, message) && std::getline(truth, row);) {
+    std::istringstream words(row);
+    std::string word, label, held;
+    for (std::size_t i = 0; i < kHandChannels; ++i) words >> word;
+    words >> label >> held;
+    take << label << ' ' << held;
+    static_cast<void>(rig.feed(message));
+    rig.now_ns += kNanosPerSecond / 10;
+    HandAngles angles{};
+    angles.fill(std::numeric_limits<double>::quiet_NaN());
+    for (std::size_t i = 0; i < rig.sink.frames.size(); ++i) {
+      if (rig.sink.bodies[i] == body) angles = hand_angles(rig.sink.frames[i]);
+    }
+    if (!is_finite(angles[2])) take << " -";
+    for (const std::size_t at : kAngle) {
+      if (is_finite(angles[2])) take << ' ' << std::lround(angles[at] * 180.0 / std::numbers::pi);
+    }
+    take << '\n';
+  }
 }
 
 }  // namespace posed::drivers::landmarks

@@ -1,5 +1,5 @@
-// What MediaPipe found in an unmirrored picture, as posed wants it. Which hand is which from picture
-// to picture, and what side it is of, posed decides: a single picture is often wrong.
+// What MediaPipe found in an unmirrored picture, as posed wants it. Which hand is one of the picture
+// before, and of what side it is, posed decides: a single picture is often wrong.
 
 const apart = (a, b) => Math.hypot(a.x - b.x, a.y - b.y);
 
@@ -41,7 +41,7 @@ export function handsOf(found, aspect) {
       y: ((picture[0].y - 0.5) / aspect) * width_m - points[0].y,
     };
     return {
-      // It is made for mirrored pictures, as those of a selfie: there a left hand looks like a right.
+      // It is made for the mirrored pictures of a selfie: there a left hand looks like a right one.
       side: label === 'Left' ? 'right' : 'left',
       score: Math.min(1, score),
       points: points.flatMap(({ x, y, z }) => [x + shift.x, y + shift.y, z]),

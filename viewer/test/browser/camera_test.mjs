@@ -141,6 +141,12 @@ test(
     context.diagnostic(`first hand to stream ${Math.round(performance.now() - began_ms)} ms`);
     await enough(page, ENOUGH);
     await page.screenshot({ path: join(PAGE, '../camera_page.png') });
+    await button(page).click(); // the hand leaves
+    await page.waitForFunction(
+      () => !globalThis.posedPage.store.streams.has('camera-right'),
+      undefined,
+      PATIENCE,
+    );
     assert.deepEqual(page.foreign, []);
     assert.deepEqual(page.errors, []);
   },

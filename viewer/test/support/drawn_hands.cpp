@@ -1,12 +1,12 @@
 // Films of hands that nobody has photographed, with their true angles: the hand of
 // rendered_hand.mjs in other shapes, sizes, colours, lights and views, drawn fast. With them the
 // takes of config/camera (mode signs, seeds 1 to 3, 4 with wildness 0, 21 to 26) and those of
-// tests/golden/camera (seeds 201, 203, 204, 205) were made.
+// tests/golden/camera (seeds 603, 606, 609, 612, the even ones left) were made.
 //
 //   g++ -O3 -ffast-math -std=c++20 drawn_hands.cpp -o drawn_hands
-//   ./drawn_hands signs|random SEED PICTURES OUT [WILDNESS [left]]   OUT.rgba, OUT.truth: ten a
-//   second node find_hands.mjs OUT...                                       OUT.hands: what
-//   MediaPipe finds
+//   ./drawn_hands signs|random SEED PICTURES OUT [WILDNESS [left]]   OUT.rgba, OUT.truth: 10 Hz
+//   node find_hands.mjs OUT                                          OUT.hands: what is found
+//   POSED_FILM=OUT build/bin/unit_drivers "[.takes]"                 OUT.take: what posed sees
 //
 // A row of OUT.truth has the 45 angles of hand45 [deg], the gesture, and whether it is held (since
 // 0.2 s). "signs" performs g c p 1 3 4 as the synthetic signer does, "random" any poses.

@@ -1,10 +1,11 @@
 // What the page's own worker finds in films of drawn_hands.cpp: node find_hands.mjs BASE...
-// BASE.rgba becomes BASE.hands, a line of JSON a picture. Needs build/viewer (./run page).
+// BASE.rgba becomes BASE.hands, a message of landmarks a picture. Needs build/viewer (./run page).
 import { createServer } from 'node:http';
 import { openSync, readFileSync, readSync, statSync, writeFileSync } from 'node:fs';
 import { extname, join } from 'node:path';
 import { PAGE } from './fake_bridge.mjs';
 import { launch } from './browser.mjs';
+import { landmarksMessage } from '../../src/camera/hands_of.js';
 
 const [WIDTH, HEIGHT] = [320, 240];
 const PICTURE = WIDTH * HEIGHT * 4; // bytes
@@ -59,7 +60,9 @@ for (const base of process.argv.slice(2)) {
   await page.goto(`http://127.0.0.1:${server.address().port}/`);
   const count = statSync(`${base}.rgba`).size / PICTURE;
   const all = await page.evaluate(find, { count, width: WIDTH, height: HEIGHT });
-  writeFileSync(`${base}.hands`, all.map((line) => `${JSON.stringify(line)}\n`).join(''));
+  const messages = all.map(({ hands, time_ms }) => landmarksMessage(hands, { time_ms }));
+  const lines = messages.map((message) => `${JSON.stringify(message)}\n`);
+  writeFileSync(`${base}.hands`, lines.join(''));
   const found = all.filter(({ hands }) => hands.length > 0).length;
   console.log(`${base}: found in ${found} of ${count}`);
   await page.close();

@@ -38,7 +38,7 @@ model = "${DEMO}/hand.gesture"
 `;
 
 // Only the hands of a page's camera.
-export const cameraConfig = ({ publish, control }) => `
+export const cameraConfig = ({ publish, control, device }) => `
 [publish]
 endpoint = "${publish}"
 [control]
@@ -48,6 +48,8 @@ name = "camera"
 driver = "landmarks"
 streams = "all"
 stale_after_s = 2.0
+[source.landmarks]
+listen = "${device}"
 [source.generate]
 `;
 
@@ -97,6 +99,7 @@ export class RealDaemon {
     if (!this.publish) {
       this.publish = await freeEndpoint();
       this.control = await freeEndpoint();
+      this.device = (await freeEndpoint()).slice('tcp://'.length);
       writeFileSync(join(this.folder, 'page.toml'), this.config(this));
     }
     const args = [

@@ -18,13 +18,13 @@ namespace {
 
 constexpr double kTracked_hz = 10.0;
 
-// Drawn hands that no model was taught (viewer/test/support/drawn_hands.cpp, mode signs, seeds 201,
-// 203, 204 and 205: of six those that the tracker took for right hands): gesture, whether it is
-// held, 19 angles [deg] or - where no hand was found.
+// Drawn hands that no model was taught (viewer/test/support/drawn_hands.cpp, mode signs, seeds 603,
+// 606, 609 and 612, the even ones left hands): gesture, whether it is held, 19 angles [deg] or -
+// where the driver could not read the hand on its own side.
 struct TrackedTake {
   Motion angles;  // [frames x 45] deg; of pictures without a hand NaN
   std::vector<std::string> label;
-  std::vector<bool> judged;  // held, and a hand was found
+  std::vector<bool> judged;  // held
 };
 
 TrackedTake tracked_take(int number) {
@@ -46,7 +46,7 @@ TrackedTake tracked_take(int number) {
     for (std::size_t i = 1; found && i < kAngle.size(); ++i) words >> row[kAngle[i]];
     rows.push_back(row);
     take.label.push_back(label);
-    take.judged.push_back(held && found);
+    take.judged.push_back(held);
   }
   take.angles.resize(static_cast<Eigen::Index>(rows.size()), kHandChannels);
   for (std::size_t t = 0; t < rows.size(); ++t) {
@@ -90,7 +90,7 @@ TEST_CASE("a model that a camera taught names the gestures of other hands before
   const auto model = taught(gesture::camera_takes(), gesture::kCameraRate_hz);
   const double share = named(*model, 10.0, "gcp134");
   INFO(share);
-  CHECK(share >= 0.9);
+  CHECK(share >= 0.7);
 }
 
 TEST_CASE(
