@@ -19,7 +19,7 @@ let daemon;
 const tests = [];
 const told = (...one) => tests.push(one);
 
-// For main.mjs: the tests in a row, because one daemon serves them all.
+// For main.mjs.
 export function daemonTests() {
   before(async () => {
     if (skip) return;

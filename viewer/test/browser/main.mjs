@@ -9,7 +9,8 @@ if (hasBrowser()) {
   const { daemonTests } = await import('./daemon_test.mjs');
   after(closeBrowser);
   describe('the page in a browser', { concurrency: 3 }, () => {
-    if (process.env.POSED) describe('with the daemon', daemonTests);
+    // In a row: one daemon serves them all.
+    if (process.env.POSED) describe('with the daemon', { concurrency: 1 }, daemonTests);
     for (const one of [...pageTests, ...cameraTests]) test(...one);
   });
 } else {

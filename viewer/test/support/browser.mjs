@@ -47,15 +47,16 @@ export const browserOfAll = () => {
 };
 export const closeBrowser = async () => (await shared)?.close();
 
-// In the page, before all else: three frames a second, drawn coarsely. Where the processor draws, all
-// tests would else wait for pictures that none looks at.
+// In the page, before all else: three frames a second, drawn coarsely unless its address says
+// `fine`. Where the processor draws, all tests would else wait for pictures that none looks at.
 function drawLittle() {
   const { requestAnimationFrame: next } = globalThis;
   globalThis.requestAnimationFrame = (frame) => setTimeout(() => next(frame), 300);
-  if (location.protocol === 'http:') localStorage['posed.quality'] ??= 'quick';
+  if (location.protocol === 'http:' && !location.search.includes('fine'))
+    localStorage['posed.quality'] ??= 'quick';
 }
 
-// A page of that browser that ends with the test, however that ends. With `&fine` it draws all.
+// A page of that browser that ends with the test, however that ends.
 export async function opened(context, url, { before, ...options } = {}) {
   const page = await openPage(await browserOfAll(), 'about:blank', {
     width: 1100,
@@ -63,7 +64,7 @@ export async function opened(context, url, { before, ...options } = {}) {
     ...options,
   });
   context.after(() => page.context().close());
-  if (!url.includes('&fine')) await page.addInitScript(drawLittle);
+  await page.addInitScript(drawLittle);
   await before?.(page);
   await page.goto(url);
   return page;

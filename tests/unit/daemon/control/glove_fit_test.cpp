@@ -9,6 +9,7 @@
 #include <catch2/catch.hpp>
 
 #include "drivers/cyberglove/angles.hpp"
+#include "drivers/cyberglove/protocol.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/fit.hpp"
 #include "tests/support/has.hpp"
@@ -21,8 +22,12 @@ using drivers::glove::kSensorPoses;
 using test::has;
 
 drivers::Description right_glove() {
-  const drivers::Driver* const driver = drivers::find_driver("cyberglove");
-  return driver->describe("cyberglove hand=right", "").value();
+  return drivers::find_driver("cyberglove")
+      ->describe(
+          "cyberglove hand=right sensors=22 mask=" + std::to_string(drivers::cyberglove::kMask22) +
+              " form=8bit mode=stream time=1 status=1 ticks=1280 multiplier=1",
+          "")
+      .value();
 }
 
 // What a glove with default curves sends while the hand holds the pose; it trembles by `unrest` of
@@ -98,7 +103,9 @@ TEST_CASE("a glove whose poses were not held is not calibrated", "[glove]") {
   auto broken = poses(0.5);
   broken.mutable_pose(2)->mutable_held(0)->set_sum(std::numeric_limits<double>::quiet_NaN());
   CHECK_FALSE(refusal_of(broken).empty());
-  CHECK_FALSE(refusal_of({}).empty());
+  v1::ControlRequest::FitGlove none;
+  none.set_name("ann");
+  CHECK_FALSE(refusal_of(none).empty());
 }
 
 }  // namespace posed::control
