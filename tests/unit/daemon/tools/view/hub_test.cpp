@@ -1,5 +1,5 @@
-#include "daemon/tools/view/hand_feed.hpp"
 #include "daemon/tools/view/hub.hpp"
+#include "daemon/tools/view/hand_feed.hpp"
 
 #include <catch2/catch.hpp>
 
