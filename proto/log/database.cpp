@@ -204,7 +204,8 @@ Result<std::string> Database::schema() {
 
 Result<> Database::check_schema() {
   auto fresh = TRY(open(":memory:", Mode::kReadWrite));
-  TRY(fresh.run(kSchema));
+  const auto format = TRY(value("PRAGMA user_version"));
+  TRY(fresh.run(schema_of(format == "3" ? 3 : kFormatVersion).c_str()));
   const auto ours = TRY(fresh.schema());
   const auto found = TRY(schema());
   if (found == ours) return {};

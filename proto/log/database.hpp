@@ -81,8 +81,9 @@ class Database {
   // The file must be there.
   static Result<Database> open(const std::filesystem::path& path, Mode mode);
 
-  // Refuses a file whose tables are not exactly those of kSchema: a view, a trigger or a constraint
-  // would be a program that a log brings along. Call it before anything is read of a table.
+  // Refuses a file whose tables are not exactly those of its format: a view, a trigger or a
+  // constraint would be a program that a log brings along. Call it before anything is read of a
+  // table.
   Result<> check_schema();
 
   // Runs any number of statements without parameters and discards their rows.

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "proto/log/rows.hpp"
@@ -16,8 +18,6 @@ inline constexpr std::int32_t kApplicationId = 0x504F5345;  // "POSE" in the SQL
 inline constexpr std::int32_t kFormatVersion = 4;  // user_version; increases when the tables change
 inline constexpr std::int32_t kMinFormatVersion = 3;  // the oldest that is read
 
-// Format 3 has no timecode of a take.
-//
 // STRICT: SQLite rejects values of the wrong type, so a reader need not check each row.
 inline constexpr const char* kSchema = R"sql(
 CREATE TABLE meta(key TEXT PRIMARY KEY, value TEXT NOT NULL) STRICT;
@@ -41,10 +41,17 @@ CREATE TABLE gap(id INTEGER PRIMARY KEY, kind INTEGER NOT NULL, owner INTEGER NO
                  after_chunk INTEGER NOT NULL, lost INTEGER NOT NULL, time_ns INTEGER NOT NULL,
                  crc INTEGER NOT NULL) STRICT;
 CREATE TABLE take(id INTEGER PRIMARY KEY, name TEXT NOT NULL, first_item INTEGER NOT NULL,
-                  last_item INTEGER NOT NULL, timecode TEXT NOT NULL,
-                  crc INTEGER NOT NULL) STRICT;
+                  last_item INTEGER NOT NULL, timecode TEXT NOT NULL, crc INTEGER NOT NULL) STRICT;
 CREATE INDEX frame_of_stream ON frame(stream, raw);
 )sql";
+
+// The same for a format that is read: in format 3 a take has no timecode.
+inline std::string schema_of(std::int32_t format) {
+  constexpr std::string_view kTimecode = " timecode TEXT NOT NULL,";
+  std::string tables = kSchema;
+  if (format == 3) tables.erase(tables.find(kTimecode), kTimecode.size());
+  return tables;
+}
 
 // The column `sequences` of a chunk: for each stream of its source {u32 stream id, u64 number of
 // its next frame, u64 number of its next sample}, little-endian, one after the other.

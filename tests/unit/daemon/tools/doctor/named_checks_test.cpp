@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "daemon/tools/doctor/doctor.hpp"
+#include "proto/log/schema.hpp"
 #include "proto/model/model_file.hpp"
 #include "tests/support/has.hpp"
 #include "tests/support/log_surgery.hpp"
@@ -171,7 +172,7 @@ TEST_CASE("doctor: logs are of a version that this one reads") {
   write_marks(healthy.folder.path() / "good.plog", 3);
   CHECK(check_logs(&config).found == "1 that this version reads");
   for (const auto& [version, why] :
-       {std::pair{2, "development version"}, std::pair{4, "newer posed"}}) {
+       {std::pair{2, "development version"}, std::pair{log::kFormatVersion + 1, "newer posed"}}) {
     const auto path = healthy.folder.path() / "other.plog";
     write_marks(path, version);
     const Check bad = check_logs(&config);

@@ -111,8 +111,8 @@ TEST_CASE("takes are cut out of a log's stream by number or name, each frame onc
   const TempFolder folder;
   const auto path = folder.path() / "take.plog";
   write_staged_log(path, kFrames);
-  forge(path, "INSERT INTO take VALUES(1,'walk',1,60,0),(2,'walk',61,130,0),(3,'late',131," +
-                  std::to_string(log::kToTheEnd) + ",0),(4,'none',131,130,0)");
+  forge(path, "INSERT INTO take VALUES(1,'walk',1,60,'',0),(2,'walk',61,130,'',0),(3,'late',131," +
+                  std::to_string(log::kToTheEnd) + ",'',0),(4,'none',131,130,'',0)");
   std::vector<Frame> cut;
   for (const char* take : {"1", "2", "late"}) {
     const auto clip = tools::clip_of_log(path, "b", take);

@@ -152,8 +152,8 @@ TEST_CASE("a take during which the log lacks chunks is said to have gaps", "[rep
     return "(SELECT min(first_item) FROM chunk WHERE source=0 AND " + frame + "=x'" + byte + "')";
   };
   const auto take = [&](int id, const std::string& first, const std::string& last) {
-    return "INSERT INTO take(id,name,first_item,last_item,crc) SELECT " + std::to_string(id) +
-           ",'walk'," + first + "," + last + ",0;";
+    return "INSERT INTO take(id,name,first_item,last_item,timecode,crc) SELECT " +
+           std::to_string(id) + ",'walk'," + first + "," + last + ",'',0;";
   };
   forge(path, take(1, item_at("02"), item_at("10")) + take(2, item_at("12"), item_at("1a")) +
                   take(3, item_at("1c"), item_at("20")) +
