@@ -184,8 +184,11 @@ Tokens tokens_of(std::string_view joint_name) {
 }
 
 NameSide side_word(std::string_view token) {
-  static const Words left = words_of("l left lf lft lt");
-  static const Words right = words_of("r right rt rgt");
+  // English, then German, French, Spanish, Italian and Portuguese.
+  static const Words left = words_of(
+      "l left lf lft lt links gauche izquierda izquierdo sinistra sinistro esquerda esquerdo");
+  static const Words right =
+      words_of("r right rt rgt rechts droite droit derecha derecho destra destro direita direito");
   if (left.contains(token)) return NameSide::kLeft;
   return right.contains(token) ? NameSide::kRight : NameSide::kNone;
 }
