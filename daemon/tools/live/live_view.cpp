@@ -237,7 +237,7 @@ std::string robot_words(const v1::StreamStats& stream) {
   const std::uint64_t stops = stream.robot_stops() + stream.robot_hard_stops();
   if (stops + stream.robot_holds() + stream.robot_limited() == 0) return {};
   std::string text =
-      fmt::format("robot: {} stops ({} hard), {} holds, {} commands limited", stops,
+      fmt::format("robot: stops {} (hard {}), holds {}, limited commands {}", stops,
                   stream.robot_hard_stops(), stream.robot_holds(), stream.robot_limited());
   if (!stream.robot_stop_joint().empty()) {
     text += fmt::format(", stopped by {} and {}", clean_name(stream.robot_stop_joint()),

@@ -73,13 +73,20 @@ std::string_view colour_of(const Skeleton& skeleton, int joint) {
   return side_colour(at.bone, at.parent < 0 ? kMiddle : colour_of(skeleton, at.parent));
 }
 
-// Which of the root's children a joint hangs on, from 1 on; 0: it is the root.
-std::size_t branch_of(const Skeleton& skeleton, int joint) {
-  while (joint > 0 && skeleton.joints[joint].parent > 0) joint = skeleton.joints[joint].parent;
-  if (joint <= 0) return 0;
-  return 1 + static_cast<std::size_t>(
-                 std::count_if(skeleton.joints.begin(), skeleton.joints.begin() + joint,
-                               [](const Joint& other) { return other.parent == 0; }));
+// Which finger of a robot a joint is part of, from 1 on: fingers begin where the skeleton branches
+// first. 0: none, it is part of the palm.
+std::size_t finger_of(const Skeleton& skeleton, int joint) {
+  const auto& joints = skeleton.joints;
+  const auto children_until = [&](int parent, int end) {
+    return std::count_if(joints.begin(), joints.begin() + end,
+                         [&](const Joint& other) { return other.parent == parent; });
+  };
+  const int all = static_cast<int>(joints.size());
+  int palm = 0;
+  while (palm + 1 < all && children_until(palm, all) == 1) ++palm;
+  if (joint <= palm) return 0;
+  while (joints[joint].parent > palm) joint = joints[joint].parent;
+  return 1 + static_cast<std::size_t>(children_until(palm, joint));
 }
 
 double reach_m(const Skeleton& skeleton) {
@@ -162,7 +169,7 @@ Figure FigureShape::pose(const Frame& frame) const {
         {.from_m = world.position_m[j] + world.rotation[j] * capsule.from_m,
          .to_m = world.position_m[j] + world.rotation[j] * capsule.to_m,
          .width_m = 2.0 * capsule.radius_m,
-         .colour = kFingerColours[branch_of(*skeleton_, capsule.joint) % kFingers]});
+         .colour = kFingerColours[finger_of(*skeleton_, capsule.joint) % kFingers]});
   }
   const int head = hand_ ? -1 : skeleton_->joint_of(Bone::kHead);
   if (head >= 0) {
@@ -189,7 +196,7 @@ Facing FigureShape::facing(double heading_rad) const {
 }
 
 std::string_view FigureShape::legend() const {
-  if (!skeleton_->capsules.empty()) return "each branch of the robot has its colour";
+  if (!skeleton_->capsules.empty()) return "each finger of the robot has its colour";
   return hand_ ? "thumb dark orange, index light orange, middle green, ring blue, little pink"
                : "left limbs are blue, right ones orange";
 }

@@ -35,7 +35,7 @@ void add_parameter(const ParameterSpec& spec, const T& value, Findings& paramete
   if constexpr (std::is_same_v<T, double>) {
     parameters.add(std::string(spec.shown_name()), value * spec.display_scale);
   } else if constexpr (std::is_same_v<T, std::string>) {
-    const bool is_read = spec.is_path && value.contains('\n');
+    const bool is_read = spec.is_path && value.find_first_of("\n<") != std::string::npos;
     parameters.add(std::string(spec.shown_name()),
                    is_read ? fmt::format("a file of {} bytes", value.size()) : value);
   } else {

@@ -280,7 +280,7 @@ TEST_CASE("the live view shows performed and recognised gestures, a moving alpha
   stream.set_robot_stop_joint("thumb_far");
   stream.set_robot_stop_other("index_far");
   CHECK(
-      below().contains(", robot: 3 stops (1 hard), 0 holds, 0 commands limited, stopped by "
+      below().contains(", robot: stops 3 (hard 1), holds 0, limited commands 0, stopped by "
                        "thumb_far and index_far"));
   stats.set_replay_file("take1.plog");
   stats.set_replay_speed(1.0);
