@@ -265,7 +265,7 @@ Result<Clip> cut_by_timecode(Clip clip, std::string_view from, std::string_view 
   while (begin && first < frames && ruler.at(first) < ruler.of(*begin)) ++first;
   std::size_t last = first;
   while (last < frames && (!end || ruler.at(last) <= ruler.of(*end))) ++last;
-  const auto known = [&clip](const Timecode& code) { return !view_of(code).empty(); };
+  const auto known = [](const Timecode& code) { return !view_of(code).empty(); };
   if (first == last) {
     const auto begins = std::ranges::find_if(clip.timecode, known);
     const auto ends = std::ranges::find_if(clip.timecode.rbegin(), clip.timecode.rend(), known);

@@ -104,6 +104,7 @@ std::optional<BoneTurns> BoneTurns::make(const motion::PoseSpaceSpec& spec,
                                          std::span<const double> places, const Skeleton& skeleton) {
   if (spec.space != motion::Space::kHumanoid) return std::nullopt;
   std::vector<std::pair<Bone, int>> order;  // with the place in the spec
+  order.reserve(spec.joints.size());
   for (std::size_t i = 0; i < spec.joints.size(); ++i) {
     order.emplace_back(*bone_from_name(spec.joints[i]), static_cast<int>(i));
   }
