@@ -1,6 +1,7 @@
 // Bases for the `Type` of DriverOf for devices with several bodies (drivers/driver_of.hpp).
 // SourceType has what they all share, RateSource what those over UDP share that say nothing about
-// themselves: their device info, "vmc rate=60", repeats the options. Cold.
+// themselves: their device info, "vmc rate=60", repeats the options. NetworkRateSource is the same
+// for those over UDP or TCP. Cold.
 #pragma once
 
 #include <memory>
@@ -93,6 +94,34 @@ struct RateSource : SourceType<Self> {
   static Result<std::unique_ptr<Transport>> connect(const Options& options,
                                                     TransportFactory& ports) {
     return ports.udp(udp_settings(options));
+  }
+};
+
+// `Self` has kWhat, kExample (a device info), link_prefix(stream) (what is before its rate),
+// option_specs, settings, make_layout and emulator, Settings with `stream` (over TCP) and
+// `rate_hz`, and a DecoderType that is made with `stream`.
+template <typename Self>
+struct NetworkRateSource : SourceType<Self> {
+  static constexpr auto connect = open_network;
+
+  static Result<std::string> check(const Options& options, const auto& /*settings*/) {
+    TRY(check_network(options));
+    return network_identity(options);
+  }
+  static std::string device_info(const auto& settings) {
+    return rate_text(Self::link_prefix(settings.stream), settings.rate_hz);
+  }
+  static auto parse_device_info(const std::string& text, const std::string& identity) {
+    using Parsed = Result<typename Self::Settings>;
+    for (const bool stream : {false, true}) {
+      const auto rate_hz = parse_rate(text, Self::link_prefix(stream));
+      if (rate_hz) return Parsed({.stream = stream, .rate_hz = *rate_hz});
+    }
+    return Parsed(another_device(Self::kWhat, std::string(Self::kExample), identity));
+  }
+  static Result<std::unique_ptr<Decoder>> decoder(const auto& settings,
+                                                  const Description& /*description*/) {
+    return std::make_unique<typename Self::DecoderType>(settings.stream);
   }
 };
 

@@ -170,14 +170,17 @@ std::string link_prefix(bool stream) {
   return stream ? "landmarks link=tcp rate=" : "landmarks rate=";
 }
 
-struct LandmarksSource : SourceType<LandmarksSource> {
+struct LandmarksSource : NetworkRateSource<LandmarksSource> {
   using Settings = LandmarksSettings;
   static constexpr std::string_view kName = "landmarks";
   static constexpr std::string_view kSummary =
       "hands that a tracker finds in a camera's picture, as JSON over UDP or TCP: the page's own "
       "camera, OpenXR, Leap Motion, scripts (experimental)";
+  static constexpr std::string_view kWhat = "a hand tracker";
+  static constexpr std::string_view kExample = "landmarks rate=10";
+  using DecoderType = LandmarksDecoder;
+  static constexpr auto link_prefix = landmarks::link_prefix;
   static constexpr auto make_layout = landmarks::make_layout;
-  static constexpr auto connect = open_network;
 
   static std::vector<OptionSpec> option_specs() {
     auto specs = network_options("udp", "127.0.0.1:7420");
@@ -188,25 +191,6 @@ struct LandmarksSource : SourceType<LandmarksSource> {
   static Result<Settings> settings(const Options& options) {
     return Settings{.stream = option<std::string>(options, "link") == "tcp",
                     .rate_hz = option<double>(options, "rate_hz")};
-  }
-  static Result<std::string> check(const Options& options, const Settings& /*settings*/) {
-    TRY(check_network(options));
-    return network_identity(options);
-  }
-  // A tracker says nothing about itself, so the device info repeats the options.
-  static std::string device_info(const Settings& settings) {
-    return rate_text(link_prefix(settings.stream), settings.rate_hz);
-  }
-  static Result<Settings> parse_device_info(const std::string& text, const std::string& identity) {
-    for (const bool stream : {false, true}) {
-      const auto rate_hz = parse_rate(text, link_prefix(stream));
-      if (rate_hz) return Settings{.stream = stream, .rate_hz = *rate_hz};
-    }
-    return another_device("a hand tracker", "landmarks rate=10", identity);
-  }
-  static Result<std::unique_ptr<Decoder>> decoder(const Settings& settings,
-                                                  const Description& /*description*/) {
-    return std::make_unique<LandmarksDecoder>(settings.stream);
   }
   static Result<std::unique_ptr<Emulator>> emulator(const Options& /*options*/,
                                                     const Settings& settings) {

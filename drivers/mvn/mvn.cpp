@@ -64,14 +64,17 @@ std::vector<OptionSpec> options() {
   return specs;
 }
 
-struct Mvn : SourceType<Mvn> {
+struct Mvn : NetworkRateSource<Mvn> {
   using Settings = MvnSettings;
   static constexpr std::string_view kName = "mvn";
   static constexpr std::string_view kSummary =
       "Xsens MVN (Movella): people in suits, with or without gloves, over UDP or TCP";
   static constexpr auto option_specs = mvn::options;
+  static constexpr std::string_view kWhat = "Xsens MVN";
+  static constexpr std::string_view kExample = "mvn link=udp rate=60";
+  using DecoderType = MvnDecoder;
+  static constexpr auto link_prefix = mvn::link_prefix;
   static constexpr auto make_layout = mvn::make_layout;
-  static constexpr auto connect = open_network;
 
   static Result<Settings> settings(const Options& options) {
     auto types = TRY(types_of(options));
@@ -84,25 +87,6 @@ struct Mvn : SourceType<Mvn> {
             .types = std::move(types),
             .characters = static_cast<std::size_t>(option<std::int64_t>(options, "characters")),
             .longest = static_cast<std::size_t>(option<std::int64_t>(options, "datagram_bytes"))}};
-  }
-  static Result<std::string> check(const Options& options, const Settings& /*settings*/) {
-    TRY(check_network(options));
-    return network_identity(options);
-  }
-  // MVN says nothing about itself, so the device info repeats the options.
-  static std::string device_info(const Settings& settings) {
-    return rate_text(link_prefix(settings.stream), settings.rate_hz);
-  }
-  static Result<Settings> parse_device_info(const std::string& text, const std::string& identity) {
-    for (const bool stream : {false, true}) {
-      const auto rate_hz = parse_rate(text, link_prefix(stream));
-      if (rate_hz) return Settings{.stream = stream, .rate_hz = *rate_hz};
-    }
-    return another_device("Xsens MVN", "mvn link=udp rate=60", identity);
-  }
-  static Result<std::unique_ptr<Decoder>> decoder(const Settings& settings,
-                                                  const Description& /*description*/) {
-    return std::make_unique<MvnDecoder>(settings.stream);
   }
   static Result<std::unique_ptr<Emulator>> emulator(const Options& /*options*/, Settings settings) {
     return std::make_unique<MvnEmulator>(std::move(settings.emulated));
