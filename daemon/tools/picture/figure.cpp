@@ -123,6 +123,9 @@ FigureShape::FigureShape(std::shared_ptr<const Skeleton> skeleton)
     if (j != skeleton_->root_joint) add_limb(j, false);
     if (skeleton_->joints[j].end_site_m) add_limb(j, true);
   }
+  for (const JointCapsule& capsule : skeleton_->capsules) {
+    capsule_colours_.push_back(kFingerColours[finger_of(*skeleton_, capsule.joint) % kFingers]);
+  }
 }
 
 void FigureShape::add_limb(int joint, bool tip) {
@@ -163,13 +166,13 @@ Figure FigureShape::pose(const Frame& frame) const {
                              .width_m = limb.width_m,
                              .colour = limb.colour});
   }
-  for (const JointCapsule& capsule : skeleton_->capsules) {
+  for (std::size_t i = 0; i < skeleton_->capsules.size(); ++i) {
+    const JointCapsule& capsule = skeleton_->capsules[i];
     const std::size_t j = capsule.joint;
-    figure.sticks.push_back(
-        {.from_m = world.position_m[j] + world.rotation[j] * capsule.from_m,
-         .to_m = world.position_m[j] + world.rotation[j] * capsule.to_m,
-         .width_m = 2.0 * capsule.radius_m,
-         .colour = kFingerColours[finger_of(*skeleton_, capsule.joint) % kFingers]});
+    figure.sticks.push_back({.from_m = world.position_m[j] + world.rotation[j] * capsule.from_m,
+                             .to_m = world.position_m[j] + world.rotation[j] * capsule.to_m,
+                             .width_m = 2.0 * capsule.radius_m,
+                             .colour = capsule_colours_[i]});
   }
   const int head = hand_ ? -1 : skeleton_->joint_of(Bone::kHead);
   if (head >= 0) {

@@ -101,6 +101,7 @@ class FigureShape {
   std::optional<Side> hand_;
   double reach_m_ = 0.0;  // the longest way along the bones from the root to a leaf's tip
   std::vector<Limb> limbs_;
+  std::vector<std::string_view> capsule_colours_;  // of the skeleton's capsules
 };
 
 }  // namespace posed::picture
