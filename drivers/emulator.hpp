@@ -54,7 +54,7 @@ class Emulator {
   // whatever it is.
   [[nodiscard]] virtual std::vector<std::uint16_t> ports() const { return {0}; }
 
-  // Adds the record that is due now to `out`: one packet of the device.
+  // Adds what is due now to `out`: one packet of the device, or one of each kind if it has several.
   virtual void emit(std::int64_t now_ns, Bytes& out) = 0;
 };
 

@@ -12,13 +12,13 @@ namespace posed::control {
 
 struct ModelWords {
   std::string learnt{};    // "walk -> sneak, from 12 clips of 6 people"; empty: it does not say
-  std::string skeleton{};  // whom it serves; empty: it does not say
+  std::string skeleton{};  // whom it serves; empty for gestures, or if it does not say
   std::string verdict{};   // of the training; of bytes that are no model: what is wrong with them
-  std::string strip{};     // a drawn thumbnail, as strip_of() has it
+  std::string strip{};     // SVG path data of a thumbnail; empty for gestures
 };
 
-// `kind` as FolderModel has it; `known` as strip_of() has it. Never fails: bytes that are no model
-// get a verdict that says so.
+// `kind`: "style" or "gesture". `known`: skeletons that a style in its own space is drawn on. Never
+// fails: bytes that are no model get a verdict that says so.
 [[nodiscard]] ModelWords words_of_model(
     std::string_view bytes, std::string_view kind, const std::string& name,
     std::span<const std::shared_ptr<const Skeleton>> known = {});

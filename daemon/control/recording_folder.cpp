@@ -143,7 +143,7 @@ Result<std::string> RecordingFolder::converted(const Part& part) const {
     return fail(part.name +
                 " is too long for this; `posed convert` on the daemon's computer does it");
   }
-  clip.channels = clip::ChannelMatrix(clip.channels.middleRows(first, end - first));
+  clip::keep_frames(clip, first, end);
   const auto made = folder_ / ("." + part.name + "." + part.as);
   const auto written =
       part.as == "glb" ? clip::write_glb(clip, made) : motion::write_vrm_animation(clip, made);

@@ -21,12 +21,12 @@ struct FolderRecording {
   std::string name;  // of the file
   std::uint64_t bytes = 0;
   std::int64_t changed_unix_s = 0;
-  bool in_use = false;  // a log that has not become a single file yet
+  bool in_use = false;  // a log that is still written, beside which lies a -wal file
 };
 
 class RecordingFolder {
  public:
-  RecordingFolder() = default;  // no folder: each call says how to name one
+  RecordingFolder() = default;  // no folder: each call fails and says how to name one
   // The folder need not be there yet.
   explicit RecordingFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
@@ -44,7 +44,8 @@ class RecordingFolder {
     bool operator==(const Part&) const = default;
   };
   // The whole file, which lies in the folder under a hidden name while it is made. Takes seconds
-  // for a long clip; longer ones than ten minutes at 60 Hz are refused.
+  // for a long clip; parts of more than ten minutes at 60 Hz are refused. One
+  // call at a time.
   Result<std::string> converted(const Part& part) const;
 
  private:

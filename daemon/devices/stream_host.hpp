@@ -17,8 +17,8 @@ namespace posed::devices {
 // A body on its way to becoming a stream.
 struct NewStream {
   std::uint32_t id = 0;
-  const OpenSource& source;
-  const drivers::Body& body;
+  const OpenSource& source;     // outlives the stream
+  const drivers::Body& body;    // valid during add() only
   config::StreamConfig config;  // with its name
   double rate_hz = 0.0;         // expected; never 0
   LoadedStages stages{};
@@ -29,7 +29,8 @@ struct NewStream {
   ExitCode exit_code = ExitCode::kFailed;  // with which a refusal ends the start
 };
 
-// All calls come from the builder's thread, or from the one that begins.
+// All calls come from the builder's thread or, before that runs, from the thread that opens the
+// sources.
 class StreamHost {
  public:
   StreamHost() = default;
@@ -37,15 +38,16 @@ class StreamHost {
   StreamHost& operator=(const StreamHost&) = delete;
   virtual ~StreamHost() = default;
 
-  // The builder's thread goes on: called before each stream that it builds, because many with large
-  // models need seconds together.
+  // A sign of life for the watchdog: called before each stream that the builder makes, because many
+  // with large models need seconds together.
   virtual void is_alive() noexcept = 0;
-  // Of the slot of this stream; they outlive the host.
+  // The counters of this stream's slot; they live as long as the host.
   virtual pipeline::StreamCounters& counters(std::uint32_t stream) = 0;
-  // Makes the stream known to publisher, control, log and worker, so that its first item may come.
+  // Makes the stream known to publisher, control, log and worker, so that its first item may come;
+  // a refused stream, which has no engine, to publisher and control only.
   virtual void add(NewStream stream) = 0;
-  // The next stream that the worker has ended and does not use any more, each once; empty: none
-  // now.
+  // A stream that the worker has ended and does not use any more; each is returned once. Empty: no
+  // other at the moment.
   virtual std::optional<std::uint32_t> next_gone() = 0;
   // Removes what add() made. Returns when nothing uses it any more.
   virtual void remove(std::uint32_t stream) = 0;

@@ -4,11 +4,11 @@
 // libzmq 4.3.4 limits neither how many parts a message has (a part of two bytes on the wire takes
 // 64 in memory, and the high-water mark counts whole messages only) nor how many peers there are,
 // and it cannot disconnect a peer. But it reports the descriptor of each connection (socket
-// monitor, ZMQ_SRCFD). The guard asks the kernel how many bytes have arrived there since the last
-// whole message, and shuts the connection down when there are too many; libzmq then closes it like
-// a lost connection. An honest client reconnects by itself within about 0.1 s. (ZMTP heartbeats
-// never become a message either: a client that sends one a second is disconnected about every 45
-// minutes.)
+// monitor, ZMQ_SRCFD). The guard asks the kernel how many bytes have arrived there since received()
+// was last called for it, and shuts the connection down when there are too many; libzmq then closes
+// it like a lost connection. An honest client reconnects by itself within about 0.1 s. (ZMTP
+// heartbeats never become a message either: a client that sends one a second is disconnected now
+// and then, from a limit of 24 KiB about every 45 minutes.)
 //
 // The kernel has no such byte count for ipc:// connections; they are protected by the file's
 // permissions. The guard has its own thread, because libzmq processes subscriptions for as long as
@@ -42,13 +42,14 @@ Result<> set_receive_limits(void* socket, std::int64_t part_bytes, int messages,
 class ZapAuthenticator;
 
 struct PeerLimits {
-  const char* name = "";      // the socket's name in log lines
+  const char* name = "";      // the socket's name in log lines; outlives the guard
   std::size_t max_peers = 0;  // further connections are cut at once
   // Limits of the bytes that have not yet become a whole message: of one peer, and of all peers
-  // together.
+  // together, of which the one with most is then cut.
   std::uint64_t max_unfinished = 0;
   std::uint64_t max_unfinished_of_all = 0;
-  ZapAuthenticator* authenticator = nullptr;  // slowed down when a peer is cut for what it sent
+  ZapAuthenticator* authenticator = nullptr;  // slowed down when a peer is cut for what it
+                                              // sent; outlives the guard
 };
 
 class PeerGuard {
@@ -63,7 +64,8 @@ class PeerGuard {
 
   // A whole message came through the connection `fd`, from the peer with this User-Id.
   void received(int fd, std::string_view user);
-  // Closes the connection; `why` completes the sentence "a connection was cut: it ...".
+  // Closes the connection and slows down the next handshakes; `why` completes the sentence "a
+  // connection was cut: it ...".
   void cut(int fd, const char* why);
   // Closes every connection whose User-Id is no longer allowed, and those that have not sent a
   // message yet: their user is unknown, and one that is still allowed reconnects.
@@ -114,7 +116,7 @@ class PeerGuard {
 };
 
 // How many connections each socket may have within the process's limit of open files; some files
-// stay reserved for devices, logs and models.
+// stay reserved for devices, logs and models. Call raise_file_limit() first.
 struct PeerShares {
   std::size_t publish = 0, control = 0;
 };

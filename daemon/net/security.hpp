@@ -29,7 +29,7 @@ class AccessList {
   explicit AccessList(std::vector<AllowedClient> clients) : clients_(std::move(clients)) {}
 
   // The client with this public key if it has the right; null if it does not, or if the key is
-  // unknown.
+  // unknown. Valid as long as the list.
   [[nodiscard]] const AllowedClient* find(std::string_view public_z85, Domain domain) const;
   // Whether `newer` revokes a right that some key has now; such clients must be disconnected.
   [[nodiscard]] bool revokes_any(const AccessList& newer, Domain domain) const;
@@ -38,12 +38,13 @@ class AccessList {
   std::vector<AllowedClient> clients_;
 };
 
-// Makes `socket` a CURVE server of this domain. Call before bind. A ZapAuthenticator must be
-// running in the same context, or every client is refused.
+// Makes `socket` a CURVE server of this domain; with an empty key it stays unencrypted, and only
+// the authenticator decides who may connect. Call before bind. A ZapAuthenticator must be running
+// in the same context, or every client is refused.
 Result<> secure_server(void* socket, Domain domain, const std::string& secret_z85);
 
-// Whether an endpoint that binds there can be reached from this machine only: tcp to 127.*, ::1 or
-// localhost, ipc and inproc.
+// Whether an endpoint that binds there can be reached from this machine only: tcp to 127.*, [::1]
+// or localhost, ipc and inproc.
 [[nodiscard]] bool is_loopback(std::string_view endpoint);
 
 // The beginning of the sentence that refuses to listen beyond loopback without keys.

@@ -12,8 +12,8 @@ namespace posed::net {
 struct ZapRequest {
   std::string id;                // returned in the reply
   std::string mechanism;         // "NULL", "CURVE", ...
-  std::string key_z85;           // the client's public key; empty without CURVE
-  std::optional<Domain> domain;  // the socket that it is for; empty: none of the daemon's
+  std::string key_z85;           // the client's public key; empty without CURVE or if it is no key
+  std::optional<Domain> domain;  // of the socket it is for; empty: of no socket of ours
 };
 
 // Parses the parts; empty if they are not a request of version 1.0.

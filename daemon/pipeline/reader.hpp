@@ -23,9 +23,10 @@ namespace posed::pipeline {
 
 // A body of a source on its way to the pipeline.
 struct ReadBody {
-  std::uint32_t stream = kNoStream;    // kNoStream: frames of this body are left out
-  StreamCounters* counters = nullptr;  // its numbers go on after those that are counted there
-  // how many slots of ReaderPorts::out its frames may fill at once
+  std::uint32_t stream = kNoStream;  // kNoStream: frames of this body are left out
+  // The numbers of the body's frames and samples continue from these; null with kNoStream only.
+  StreamCounters* counters = nullptr;
+  // how many slots of ReaderPorts::out its frames, samples and events may fill at once
   std::size_t slots = std::numeric_limits<std::size_t>::max();
 };
 
@@ -33,7 +34,7 @@ struct ReadBody {
 struct SourceUpdate {
   std::shared_ptr<const drivers::SourceLayout> layout;  // null: of a device with one body
   std::vector<ReadBody> bodies;                         // [body]
-  std::vector<std::byte> log;  // the row that the log keeps (pipeline/description_row.hpp)
+  std::vector<std::byte> log;  // bytes of the log's description row (pipeline/description_row.hpp)
 };
 
 // What the reader and the cold thread that builds streams exchange about a source.
@@ -52,8 +53,8 @@ struct BodyExchange {
 };
 
 // Passes a device that may be unplugged between its supervisor (daemon/devices) and the reader.
-// Every device that went in comes back once: when its link is lost, or when the supervisor asks for
-// it.
+// A device comes back once, also the one that the source began with: when its link is lost, or when
+// the supervisor asks for it. While the reader is stopped none comes back.
 struct DeviceSlot {
   Ring<drivers::Device*> in{kSlots}, out{kSlots};  // to and from the reader
   std::atomic<bool> give_back{false};              // the supervisor asks for the device in use
@@ -61,7 +62,8 @@ struct DeviceSlot {
   static constexpr std::size_t kSlots = 4;
 };
 
-// What the reader is connected to; all of it outlives the reader.
+// What the reader is connected to; all of it outlives the reader. `out`, `pipeline` and `clock` are
+// required.
 struct ReaderPorts {
   Ring<Item>* out = nullptr;
   system::EventFd* pipeline = nullptr;          // notified when `out` has something
@@ -85,15 +87,15 @@ class Reader {
   static Result<std::unique_ptr<Reader>> open(const ReaderPorts& ports);
   ~Reader();
 
-  // Sources are numbered in the order in which they are added. Cold, before run().
+  // Sources are numbered in the order in which they are added. Cold, before begin().
   void add(const ReadSource& source);
 
-  // Takes over the first devices; call before the first turn. RT-safe, except for one epoll_ctl for
-  // each device.
+  // Starts to use the devices that add() gave; call before the first turn(), unless run() is used.
+  // RT-safe, except for one epoll_ctl for each device.
   void begin() noexcept;
-  // One round: applies commands, then reads a limited amount from each device, so that none delays
-  // the others. Returns the latest time at which the next turn is due [ns]; kForever_ns: only when
-  // call() was used or a device is ready.
+  // One round: applies commands, then reads a limited amount from each device that is due by the
+  // clock or that run() found readable, so that none delays the others. Returns the latest time at
+  // which the next turn is due [ns]; kForever_ns: only when call() was used or a device is ready.
   RT_SAFE std::int64_t turn(std::int64_t now_ns) noexcept;
 
   // begin(), then one turn after another until stop(). The calling thread becomes the reader
@@ -102,7 +104,7 @@ class Reader {
   void stop() noexcept;  // any thread
   // Of the thread in run(). Any thread.
   [[nodiscard]] const system::Pulse& pulse() const noexcept { return pulse_; }
-  // Wakes the reader because a slot or the command ring has something. Any thread.
+  // Wakes the reader because a slot, the command ring or a BodyExchange has something. Any thread.
   void call() noexcept;
 
  private:
@@ -111,7 +113,8 @@ class Reader {
          std::unique_ptr<system::Poller> poller);
   // Reads the sources that are due by the clock; returns when the next one is.
   std::int64_t serve_timed(std::int64_t now_ns) noexcept;
-  bool handle_requests() noexcept;  // of slots and commands; false: some wait for space in the ring
+  // Those of slots, commands and bodies; false: some wait for space in the ring.
+  bool handle_requests() noexcept;
   [[nodiscard]] bool called() const noexcept { return called_.load(std::memory_order_acquire); }
 
   ReaderPorts ports_;

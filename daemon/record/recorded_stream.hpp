@@ -1,4 +1,5 @@
-// What the device log says about a source and about a stream, before their first chunk.
+// What the recorder is told about a source and about a stream before their first chunk: the log's
+// rows, and what sizes its rings.
 #pragma once
 
 #include <cstddef>
@@ -25,7 +26,8 @@ namespace posed::record {
 struct RecordedSource {
   log::SourceRow row{};  // its id is the source's number
   double rate_hz = 0.0;  // nominal, of its frames; 0: unknown
-  // The most that it can have at once, each with a chunk's position; 0: one, from the start on.
+  // The most bodies it can have at once: every recorded chunk has one position for each of them. 0:
+  // a source with exactly one body.
   std::size_t bodies = 0;
 };
 
@@ -35,25 +37,27 @@ struct RecordedStream {
   std::string body{};        // the device's name for it; empty if the source has only one body
   bool from_start = false;   // it is there before the first item
   std::string name{};
-  StreamSettings settings{};                       // without the hashes of its models
-  std::vector<devices::ModelBytes> model_files{};  // one for each stage, null without a model
+  StreamSettings settings{};  // without the hashes of its models
+  // [stage] as in `settings`; null without a model
+  std::vector<devices::ModelBytes> model_files{};
 };
 
-// What the log begins with.
+// What is known when the log begins.
 struct RecordedSetup {
-  std::vector<RecordedSource> sources{};  // by number; those with one body first
+  std::vector<RecordedSource> sources{};  // in the order of `sources`
   // How many streams there may be at once. Those of sources with one body have the first slots.
   std::size_t slots = 0;
 };
 
-// `slots`: how many streams there may be at once.
+// `sources`: by number, those with one body first. `slots`: how many streams there may be at once.
 [[nodiscard]] RecordedSetup recorded_setup(
     std::span<const std::unique_ptr<devices::OpenSource>> sources, std::size_t slots);
 
 // For a body that has become a stream.
 [[nodiscard]] RecordedStream recorded_stream(const devices::NewStream& stream);
 
-// Adds the stream's models and then its row. A row that is there already is replaced.
+// Adds the stream's models and then its row; replaces a row that is there already. `first_item`:
+// the number of the stream's first item, 0 if it is not known.
 Result<> add_stream_row(log::Writer& writer, const RecordedStream& stream,
                         std::uint64_t first_item);
 

@@ -1,5 +1,6 @@
-// Emulates any table-driven device: sends all its packets at the rate in its description, from its
-// start bytes to its stop bytes (from power-on if it has no start bytes).
+// Emulates any table-driven device: sends each of its packets that has fields, at the rate in its
+// description or else at 100 Hz. It begins when it receives its start bytes (at power-on if there
+// are none) and ends when it receives its stop bytes.
 #pragma once
 
 #include <array>
@@ -18,15 +19,18 @@ class DescribedEmulator final : public glove::GloveEmulator {
   DescribedEmulator(std::shared_ptr<const Table> table,
                     std::shared_ptr<const glove::Calibration> calibration);
 
-  // Sets each sensor from the pose, by its first entry in the angle map.
+  // Sets each sensor from the pose, by its first entry in the angle map; one without keeps its
+  // value.
   void pose_hand(const HandAngles& angles) override;
   void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
   [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }
   void emit(std::int64_t now_ns, Bytes& out) override;
 
   // Sets the content of the next packets: raw values of sensors, values of extras in their units.
+  // An index beyond the arrays throws.
   void set_sensor(std::size_t sensor, double raw) { raw_.at(sensor) = raw; }
   void set_extra(std::size_t extra, double value) { extra_.at(extra) = value; }
+  // Sets the device's clock, in Table::tick_s.
   void set_ticks(std::uint64_t ticks);
 
  private:

@@ -1,17 +1,20 @@
 // Reads the payload of a ModelDef: what the server calls its rigid bodies and skeletons.
 //
-//   i32 count, then each: i32 type, from 4.1 an i32 with the bytes that follow, and
+// Little-endian; a text is its bytes and a zero, at most 1,023 of them.
+//
+//   i32 count, then each: i32 type, from 4.1 an i32: the size in bytes of what follows, and
 //   0 marker set   text name, i32 count, count texts
 //   1 rigid body   text name, i32 id, i32 parent, f32[3] offset [m],
 //                  from 3.0: i32 count, count f32[3], count i32 labels, from 4.0: count texts
-//   2 skeleton     text name, i32 id, i32 count, count rigid bodies (with 3.0 the sources do not
-//                  agree whether these bones carry markers)
+//   2 skeleton     text name, i32 id, i32 count, count rigid bodies (public
+//                  descriptions do not agree whether these bones carry markers from 3.0 on, so
+//                  both are tried)
 //   3 force plate  i32 id, text serial number, 173 words (size, origin, calibration, corners,
 //                  type, kind of data), i32 count, count texts
 //   4 device       i32 id, text name, text serial number, i32 type, i32 kind of data, i32 count,
 //                  count texts
 //   5 camera       text name, f32[3], f32[4]
-//   others         from 4.1, skipped by their size
+//   others         from 4.1, skipped by their size, as are 3 to 5; before, an error
 #pragma once
 
 #include <cstddef>
@@ -30,9 +33,9 @@ namespace posed::drivers::natnet {
 struct BoneDef {
   std::string name{};
   std::int32_t id = 0;
-  std::int32_t parent = -1;  // the id of another bone; anything else for the first one
+  std::int32_t parent = -1;  // id of the parent bone; of the root, an id that no bone has
   Vec3f offset_m{};          // in the server's axes
-  std::size_t markers = 0;
+  std::size_t markers = 0;   // how many
 };
 
 struct BodyDef {
@@ -44,11 +47,13 @@ struct BodyDef {
 
 struct ModelDef {
   std::vector<BodyDef> bodies;
-  std::map<std::string, std::size_t, std::less<>> markers;  // of each marker set, by its name
+  // How many a marker set has, by its name.
+  std::map<std::string, std::size_t, std::less<>> markers;
 };
 
-// Reads it as this version, and if that does not use up the payload exactly, as each other one; the
-// version may be unknown. The bytes are untrusted. Cold.
+// Tries this version if it is known, then 3.0, 4.1, 4.0 and 2.9: the first reading that uses up the
+// payload exactly is taken; an error if none does. The bytes are untrusted; names are not checked
+// for being text. Cold.
 Result<ModelDef> parse_model_def(std::span<const std::byte> payload, Version version);
 
 }  // namespace posed::drivers::natnet

@@ -11,7 +11,7 @@
 
 namespace posed::drivers {
 
-// The chunks of one stream in log order.
+// The chunks of one stream in the order of the log; arrival times may step back.
 class Recording {
  public:
   void add(std::int64_t arrival_ns, std::span<const std::byte> bytes, std::uint8_t socket = 0) {
@@ -20,6 +20,7 @@ class Recording {
     socket_.push_back(socket);
   }
   [[nodiscard]] std::size_t count() const noexcept { return chunks_.count(); }
+  // Valid until the next add().
   [[nodiscard]] std::span<const std::byte> bytes(std::size_t i) const noexcept {
     return chunks_[i];
   }
@@ -32,12 +33,12 @@ class Recording {
   std::vector<std::uint8_t> socket_;      // [chunk], as Chunk::socket
 };
 
-// A chunk is due (arrival - origin) / speed after start(). Streams of one log share an origin, the
-// log's first arrival, so the time between them is kept.
+// A chunk is due (arrival - origin) / speed after start(), and at once if that is negative. Streams
+// of one log share an origin, the log's first arrival, so the time between them is kept.
 class ReplayTransport final : public Transport {
  public:
-  // `speed` 1 is the recorded pace, 0 as fast as possible. An empty recording ends at once. A chunk
-  // longer than kMaxChunk or an invalid speed is an error.
+  // `speed` 1 is the recorded pace, 0 as fast as possible. An empty recording ends with its first
+  // read(). A chunk longer than kMaxChunk or an invalid speed is an error.
   static Result<std::unique_ptr<Transport>> open(Recording recording, std::int64_t origin_ns,
                                                  double speed);
 
@@ -45,7 +46,8 @@ class ReplayTransport final : public Transport {
   [[nodiscard]] std::int64_t next_due_ns() const noexcept override;
   [[nodiscard]] bool lossless() const noexcept override { return speed_ == 0.0; }
   Result<> start(std::int64_t now_ns) override;
-  // Ends with an empty chunk after the last. RT-safe: no system call at all.
+  // After the last chunk it returns an empty one that says `end`; that is due at once. RT-safe: no
+  // system call at all.
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
 
  private:

@@ -52,11 +52,12 @@ inline constexpr std::size_t kValueKinds = 4;
 }
 
 // The most values of a performer's Sample: far more than the blend shapes of an avatar and the
-// devices of a person. Their count is a byte of the description.
+// devices of a person. The description's byte counts its entries, of which a device has seven
+// values.
 inline constexpr std::size_t kMaxVmcValues = 128;
 static_assert(kMaxVmcValues <= 255 && kMaxVmcValues <= kMaxSampleValues);
 
-// A description without memory of its own.
+// A description; its texts are views.
 struct Described {
   struct Value {
     ValueKind kind{};
@@ -71,7 +72,8 @@ struct Described {
 inline constexpr std::size_t kMaxDescribed =
     4 + kMaxVmcName + kBoneCount * 13 + kMaxVmcValues * (2 + kMaxVmcName);
 
-// The bytes of a description, written into `room`.
+// The bytes of a description, written into `room`. Title and names have at most kMaxVmcName bytes,
+// names at least one; `value_count` is at most kMaxVmcValues.
 RT_SAFE [[nodiscard]] std::span<const std::byte> write_description(
     const Described& described, std::array<std::byte, kMaxDescribed>& room) noexcept;
 

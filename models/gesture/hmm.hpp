@@ -19,12 +19,12 @@ struct StateModel {
 
 using Frames = Eigen::Ref<const FeatureMatrix>;  // consecutive frames of a recording's features
 
-// ln N(o_t; mean_j, variance_j): [frame][state].
+// ln N(o_t; mean_j, variance_j): [frame][state]. Variances are positive.
 [[nodiscard]] Eigen::MatrixXd log_density(const Frames& frames, const StateModel& model);
 
 // A chain of states and the frames that it is aligned with. Frame t may only be in the states
-// [first[t], first[t] + width), `first` rising; column k of a row stands for state first[t] + k.
-// When one model is aligned with one example, the band covers all states.
+// [first[t], first[t] + width), `first` never falling; column k of a row stands for state first[t]
+// + k. When one model is aligned with one example, the band covers all states.
 struct Band {
   std::vector<int> first;  // [frame]
   int width = 0;
@@ -37,7 +37,8 @@ struct Posterior {
   double log_likelihood{};  // -infinity when no path exists; gamma and stays are then zero
 };
 
-// `density` is [frame][band column], `stay` [state].
+// `density` is [frame][band column] of at least one frame, `stay` [state]; first[t] + width is at
+// most the number of states.
 [[nodiscard]] Posterior forward_backward(const Eigen::MatrixXd& density,
                                          const Eigen::VectorXd& stay, const Band& band);
 
@@ -46,7 +47,7 @@ struct Path {
   double score{};          // log probability of the path with its frames
 };
 
-// The best path through one model; needs at least as many frames as states.
+// The best path through one model; its score is -infinity with fewer frames than states.
 [[nodiscard]] Path viterbi(const Eigen::MatrixXd& density, const Eigen::VectorXd& stay);
 
 }  // namespace posed::gesture

@@ -14,17 +14,18 @@ namespace posed::motion {
 // The signal on one skeleton. Const and shareable after find().
 class LegSignal {
  public:
-  // Empty for a skeleton that names no upper legs. Cold.
+  // Empty for a skeleton that does not name both upper legs. Cold.
   [[nodiscard]] static std::optional<LegSignal> find(const Skeleton& skeleton);
 
   // Whether this frame measured both thighs.
   RT_SAFE [[nodiscard]] bool measured(const Frame& frame) const noexcept;
 
-  // Right minus left flexion of the thigh against the pelvis [rad], forward positive.
+  // Right minus left flexion of the thigh against its parent joint [rad], forward positive.
+  // Meaningless unless measured(). Not unwrapped: a thigh that passes straight up jumps.
   RT_SAFE [[nodiscard]] double value_rad(const Frame& frame) const noexcept;
 
  private:
-  // The rotation of the joint in canonical axes is before L after.
+  // The joint's rotation in canonical axes is before * L * after; L is its rotation in the frame.
   struct Thigh {
     std::size_t joint = 0;
     Eigen::Quaterniond before, after;

@@ -1,8 +1,9 @@
-// ModelPrior: the information that a gesture model adds to the live window
+// ModelPrior: the terms of position and motion that a gesture model adds to the live window
 // (models/smooth/README.md, "Model prior"). Measured channels get a robust pull towards the poses
-// that the model considers probable, with so little weight that a hand which is elsewhere is not
-// affected. In gaps it adds how the gestures move, weighted by how well the hand fitted the model
-// before the gap. RT-safe except for construction; one thread.
+// that the model considers probable; its weight vanishes for a pose that is far from them. In gaps,
+// but for the newest frame, the gestures' own motion takes the place of the adaptive one, the more
+// the better the window's measured frames fit the model. RT-safe except for construction; one
+// thread.
 #pragma once
 
 #include <array>
@@ -14,7 +15,8 @@ namespace posed::smooth {
 
 class ModelPrior final : public InformationSource {
  public:
-  // For models of at most `max_channels` channels.
+  // For models of at most `max_channels` channels; channel c of the model is column c of the
+  // window. `filter` outlives this, and has a model and has swept the window when add() is called.
   ModelPrior(const HmmForwardFilter& filter, int max_channels);
 
   void add(AdaptiveWindow& window) noexcept override;
@@ -34,7 +36,7 @@ class ModelPrior final : public InformationSource {
   void bridge(AdaptiveWindow& window, int back, std::size_t c) noexcept;
 
   const HmmForwardFilter& filter_;
-  double some_ = 1.0;  // the probability that the frame is one of the labels
+  double some_ = 1.0;  // the probability that the frame shows one of the model's gestures
   Belief belief_;
   // How well each group fits over the window's measured frames, from 0 (unlike the model) to 1.
   std::array<double, gesture::kMaxGroups> fit_{};

@@ -26,6 +26,19 @@ Frame Clip::frame(int index) const {
   return frame;
 }
 
+void keep_frames(Clip& clip, int first, int end) {
+  clip.channels = ChannelMatrix(clip.channels.middleRows(first, end - first));
+  const auto keep = [&](auto& values) {
+    if (values.empty()) return;
+    values.erase(values.begin() + end, values.end());
+    values.erase(values.begin(), values.begin() + first);
+  };
+  keep(clip.time_s);
+  keep(clip.timecode);
+  const double begin_s = clip.time_s.empty() ? 0.0 : clip.time_s.front();
+  for (double& time_s : clip.time_s) time_s -= begin_s;
+}
+
 bool has_uneven_times(const std::vector<double>& time_s, double rate_hz) {
   for (std::size_t i = 0; i < time_s.size(); ++i) {
     const double even_s = time_s.front() + static_cast<double>(i) / rate_hz;

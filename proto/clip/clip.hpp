@@ -74,6 +74,9 @@ Result<Clip> read_clip(const std::filesystem::path& path, const ReadOptions& opt
 // Reads a clip from memory. The extension of its name says the format.
 Result<Clip> parse_clip(const ClipFile& file, const ReadOptions& options = {});
 
+// Keeps frames [first, end) of the clip, with their times from 0 on and their timecodes.
+void keep_frames(Clip& clip, int first, int end);
+
 // Writes a clip in the format that the extension of `path` says. An error leaves no file.
 Result<> write_clip(const Clip& clip, const std::filesystem::path& path);
 

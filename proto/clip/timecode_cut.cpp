@@ -207,20 +207,6 @@ class Ruler {
   std::vector<double> at_;  // [frame]
 };
 
-void keep(Clip& clip, std::size_t first, std::size_t end) {
-  const auto rows = static_cast<Eigen::Index>(end - first);
-  clip.channels = ChannelMatrix(clip.channels.middleRows(static_cast<Eigen::Index>(first), rows));
-  const auto cut = [&](auto& values) {
-    if (values.empty()) return;
-    values.erase(values.begin() + static_cast<std::ptrdiff_t>(end), values.end());
-    values.erase(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(first));
-  };
-  cut(clip.time_s);
-  cut(clip.timecode);
-  const double begin_s = clip.time_s.empty() ? 0.0 : clip.time_s.front();
-  for (double& time_s : clip.time_s) time_s -= begin_s;
-}
-
 }  // namespace
 
 Result<TimecodeMoment> parse_timecode(std::string_view text) {
@@ -277,7 +263,7 @@ Result<Clip> cut_by_timecode(Clip clip, std::string_view from, std::string_view 
   if (begin && ruler.of(*begin) < 0.0) {
     clip.warnings.push_back("begins later than timecode " + std::string(from));
   }
-  keep(clip, first, last);
+  keep_frames(clip, static_cast<int>(first), static_cast<int>(last));
   return clip;
 }
 

@@ -144,8 +144,8 @@ GateData gate_data_of(const Dataset& dataset, const std::vector<std::string>& ta
   GateData gate{.neutral = neutral_of(dataset, targets)};
   double swing_rad = std::numeric_limits<double>::infinity();
   double fastest_s = std::numeric_limits<double>::infinity();
+  if (!std::ranges::all_of(dataset.clips, shows_strides)) return gate;
   for (const AlignedClip& clip : dataset.clips) {
-    if (!shows_strides(clip)) return gate;
     swing_rad = std::min(swing_rad, mean_swing_rad(clip, dataset.rate_hz));
     gate.gait_correlation =  // where any clip tells
         std::fmax(gate.gait_correlation, mean_gait_correlation(clip, dataset.rate_hz));
