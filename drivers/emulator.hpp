@@ -34,8 +34,9 @@ class Emulator {
   virtual void pose(std::size_t body, const Frame& frame) = 0;
 
   // Receives bytes from the host: of a byte stream cut at any position, of UDP one datagram.
-  // Immediate answers are added to `answer`.
-  virtual void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) = 0;
+  // Immediate answers are added to `answer`. Most devices take nothing.
+  virtual void receive(std::span<const std::byte> /*bytes*/, std::int64_t /*now_ns*/,
+                       Bytes& /*answer*/) {}
 
   // Receives bytes as receive() does, for a device with several sockets: they come from this socket
   // of the host, and the answer goes there.

@@ -75,7 +75,6 @@ Result<std::unique_ptr<Server>> Server::open(asio::io_context& io, Connections& 
   std::unique_ptr<Server> server(new Server(io, connections, std::move(acceptor)));
   const std::uint16_t port = server->acceptor_.local_endpoint().port();
   const auto shown = address.is_unspecified() ? asio::ip::make_address("127.0.0.1") : address;
-  server->port_ = port;
   server->url_ = "http://" + host_of(shown, port) + "/";
   server->hosts_ = hosts_of(address, port);
   server->accept();

@@ -33,7 +33,6 @@ class Server {
   static Result<std::unique_ptr<Server>> open(boost::asio::io_context& io, Connections& connections,
                                               const Options& options);
 
-  [[nodiscard]] std::uint16_t port() const noexcept { return port_; }
   // "http://127.0.0.1:5580/". A server that listens on all addresses gives the loopback address.
   [[nodiscard]] const std::string& url() const noexcept { return url_; }
   // Lists the Host headers of its own addresses, for is_own_host().
@@ -48,7 +47,6 @@ class Server {
   Connections& connections_;
   boost::asio::ip::tcp::acceptor acceptor_;
   boost::asio::steady_timer pause_;
-  std::uint16_t port_ = 0;
   std::string url_;
   std::vector<std::string> hosts_;
 };

@@ -49,10 +49,6 @@ void Worker::put(std::uint32_t slot, StreamContext& context) noexcept {
   context.join(routes_);
 }
 
-const StreamEngine& Worker::engine(std::uint32_t stream) const {
-  return contexts_[slot_of(stream)]->engine();
-}
-
 std::int64_t Worker::turn(std::int64_t now_ns) noexcept {
   send_acks();
   accept_streams();

@@ -72,9 +72,6 @@ class Worker {
   // Of the thread in run(). Any thread.
   [[nodiscard]] const system::Pulse& pulse() const noexcept { return pulse_; }
 
-  // Call after run() has returned.
-  [[nodiscard]] const StreamEngine& engine(std::uint32_t stream) const;
-
  private:
   Worker(const WorkerPorts& ports, std::unique_ptr<system::Poller> poller);
   void apply_commands() noexcept;

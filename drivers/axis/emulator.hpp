@@ -33,8 +33,6 @@ class AxisEmulator final : public Emulator {
   // Body 0 walks, 1 waves. A posed body no longer moves by itself.
   void pose(std::size_t body, const Frame& frame) override;
   // The application takes nothing.
-  void receive(std::span<const std::byte> /*bytes*/, std::int64_t /*now_ns*/,
-               Bytes& /*answer*/) override {}
   [[nodiscard]] std::int64_t next_due_ns() const override { return frames_.due_ns(); }
   void emit(std::int64_t now_ns, Bytes& out) override;
 

@@ -20,8 +20,6 @@ class UpstreamEmulator final : public Emulator {
     return body == 0 ? &skeleton_ : nullptr;
   }
   void pose(std::size_t body, const Frame& frame) override;
-  void receive(std::span<const std::byte> /*bytes*/, std::int64_t /*now_ns*/,
-               Bytes& /*answer*/) override {}  // ZeroMQ takes care of subscriptions
   [[nodiscard]] std::int64_t next_due_ns() const override {
     return std::min(frames_.due_ns(), skeletons_.due_ns());
   }

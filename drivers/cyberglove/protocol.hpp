@@ -106,7 +106,6 @@ RT_SAFE [[nodiscard]] bool decode_stamp(std::span<const std::byte, kStampBytes> 
 
 inline constexpr std::size_t kRecordBytes = 61;
 inline constexpr std::size_t kRecordHead = 14;  // "HH:MM:SS:ff:n" and 'S'
-inline constexpr std::size_t kRecordSensors = 22;
 inline constexpr int kFrames_hz = 30;
 inline constexpr int kMaxMultiplier = 4;
 inline constexpr std::array<std::byte, 3> kRecordEnd{std::byte{0x0D}, std::byte{0x0A},

@@ -26,8 +26,6 @@ std::byte at_half_rate(std::byte first, std::byte second) {
 
 }  // namespace
 
-std::vector<std::string_view> fault_names() { return {kNames.begin(), kNames.end()}; }
-
 Result<Fault> parse_fault(std::string_view text) {
   const std::size_t colon = std::min(text.find(':'), text.size());
   const auto kind = std::ranges::find(kNames, text.substr(0, colon));

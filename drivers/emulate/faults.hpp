@@ -34,7 +34,6 @@ struct Fault {
 
 // "KIND:RATE", such as "drop:0.01". An error names the kinds. Cold.
 Result<Fault> parse_fault(std::string_view text);
-[[nodiscard]] std::vector<std::string_view> fault_names();
 
 class FaultInjector {
  public:

@@ -1,5 +1,4 @@
-#include "drivers/file/file.hpp"
-
+// The file driver: a clip of any format that posed reads, played as if it were a device.
 #include "drivers/file/decoder.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/file.hpp"
@@ -9,6 +8,9 @@
 #include "proto/frame/profile.hpp"
 
 namespace posed::drivers {
+
+const Driver& file_driver();
+
 namespace file {
 namespace {
 

@@ -82,8 +82,6 @@ class TextEmulator final : public GloveEmulator {
       reading_.raw[s] = static_cast<float>(std::round(std::clamp(raw, 0.0, Self::kRawMax)));
     }
   }
-  void receive(std::span<const std::byte> /*bytes*/, std::int64_t /*now_ns*/,
-               Bytes& /*answer*/) override {}
   [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }
   void emit(std::int64_t now_ns, Bytes& out) override {
     pace_.step(now_ns);

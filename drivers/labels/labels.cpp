@@ -1,5 +1,4 @@
-#include "drivers/labels/labels.hpp"
-
+// A stream without a device: a hand or a body that performs gesture labels only.
 #include <algorithm>
 #include <optional>
 #include <span>
@@ -15,6 +14,9 @@
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::drivers {
+
+const Driver& labels_driver();
+
 namespace labels {
 namespace {
 

@@ -20,9 +20,6 @@ class LandmarksEmulator final : public Emulator {
     return body < hands_.size() ? hands_[body].skeleton.get() : nullptr;
   }
   void pose(std::size_t body, const Frame& frame) override;
-  // A tracker receives nothing.
-  void receive(std::span<const std::byte> /*bytes*/, std::int64_t /*now_ns*/,
-               Bytes& /*answer*/) override {}
   [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }
   void emit(std::int64_t now_ns, Bytes& out) override;
 

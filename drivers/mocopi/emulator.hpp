@@ -19,8 +19,6 @@ class MocopiEmulator final : public Emulator {
   [[nodiscard]] const Skeleton* skeleton(std::size_t body) const override;
   // A joint that is not valid is sent as all zero.
   void pose(std::size_t body, const Frame& frame) override;
-  void receive(std::span<const std::byte> /*bytes*/, std::int64_t /*now_ns*/,
-               Bytes& /*answer*/) override {}  // the app only sends
   [[nodiscard]] std::int64_t next_due_ns() const override {
     return std::min(frames_.due_ns(), skeletons_.due_ns());
   }

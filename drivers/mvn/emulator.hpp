@@ -28,8 +28,6 @@ class MvnEmulator final : public Emulator {
   // Body 0 walks, 1 waves. A posed body no longer moves by itself.
   void pose(std::size_t body, const Frame& frame) override;
   // MVN takes nothing from its host.
-  void receive(std::span<const std::byte> /*bytes*/, std::int64_t /*now_ns*/,
-               Bytes& /*answer*/) override {}
   [[nodiscard]] std::int64_t next_due_ns() const override;
   // The next datagram. Types 12 and 13 come at the start and every second.
   void emit(std::int64_t now_ns, Bytes& out) override;

@@ -19,7 +19,7 @@ void write_vector(ByteWriter& writer, const Vec3f& v) {
 
 std::int32_t count_of(const auto& entries) { return static_cast<std::int32_t>(entries.size()); }
 
-// A part: its count, from 4.1 its size, and its entries.
+// A part of a frame or an entry of a ModelDef: its count or kind, from 4.1 its size, and its content.
 template <typename WriteEntries>
 void write_part(ByteWriter& writer, Version version, std::int32_t count, WriteEntries write) {
   writer.i32(count);
@@ -164,27 +164,17 @@ void write_body(ByteWriter& writer, const BodyDef& body, Version version) {
   for (const BoneDef& bone : body.bones) write_bone(writer, bone, version);
 }
 
-// One entry of a ModelDef.
-template <typename Write>
-void write_entry(ByteWriter& writer, Version version, std::int32_t kind, Write write) {
-  writer.i32(kind);
-  ByteWriter content;
-  write(content);
-  if (version >= Version{4, 1}) writer.i32(static_cast<std::int32_t>(content.size()));
-  writer.bytes(content.written());
-}
-
 void write_model_def(ByteWriter& writer, const ModelDef& model, Version version) {
   writer.i32(static_cast<std::int32_t>(model.markers.size() + model.bodies.size()));
   for (const auto& [name, count] : model.markers) {
-    write_entry(writer, version, 0, [&](ByteWriter& to) {
+    write_part(writer, version, 0, [&](ByteWriter& to) {
       write_text(to, name);
       to.i32(static_cast<std::int32_t>(count));
       for (std::size_t i = 1; i <= count; ++i) write_text(to, "Marker" + std::to_string(i));
     });
   }
   for (const BodyDef& body : model.bodies) {
-    write_entry(writer, version, body.is_skeleton ? 2 : 1,
+    write_part(writer, version, body.is_skeleton ? 2 : 1,
                 [&](ByteWriter& to) { write_body(to, body, version); });
   }
 }

@@ -29,8 +29,6 @@ class StudioEmulator final : public Emulator {
   [[nodiscard]] const Skeleton* skeleton(std::size_t body) const override;
   // Body 0 is Anna, 1 Ben, 2 the prop. A joint that is not valid is sent as all zero.
   void pose(std::size_t body, const Frame& frame) override;
-  void receive(std::span<const std::byte> /*bytes*/, std::int64_t /*now_ns*/,
-               Bytes& /*answer*/) override {}  // Studio takes nothing on this socket
   [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }
   void emit(std::int64_t now_ns, Bytes& out) override;
 

@@ -22,9 +22,6 @@ class VmcEmulator final : public Emulator {
     return body == 0 ? skeleton_.get() : nullptr;
   }
   void pose(std::size_t body, const Frame& frame) override;
-  // A performer receives nothing on this port.
-  void receive(std::span<const std::byte> /*bytes*/, std::int64_t /*now_ns*/,
-               Bytes& /*answer*/) override {}
   [[nodiscard]] std::int64_t next_due_ns() const override;
   // The next datagram of a frame, in the protocol's usual order: root, bones, devices, blend
   // shapes, status and time.

@@ -73,7 +73,6 @@ class HandMap {
 
   // A hand at rest: its fingers are a little bent, its wrist is straight. Cold.
   [[nodiscard]] HandPose relaxed() const;
-  [[nodiscard]] bool has_wrist() const noexcept { return turn_[kWrist].joint >= 0; }
 
  private:
   // Canonical = before * (rotation relative to `above`) * after.

@@ -120,15 +120,6 @@ double spectral_arc_length(std::span<const double> speed, double rate_hz) {
   return -length;
 }
 
-Result<Gaussian> gaussian_of(const Rows& rows) {
-  if (rows.rows() < 2) return fail("a Gaussian needs at least two rows");
-  Gaussian out;
-  out.mean = rows.colwise().mean().transpose();
-  const Eigen::MatrixXd centred = rows.rowwise() - out.mean.transpose();
-  out.covariance = centred.transpose() * centred / static_cast<double>(rows.rows() - 1);
-  return out;
-}
-
 double frechet_distance(const Gaussian& a, const Gaussian& b) {
   // tr((S1 S2)^(1/2)) = tr((R S2 R)^(1/2)) with R = S1^(1/2), which is symmetric.
   const Eigen::MatrixXd root = square_root(a.covariance);

@@ -37,7 +37,6 @@ struct Gaussian {
   Eigen::VectorXd mean;
   Eigen::MatrixXd covariance;
 };
-Result<Gaussian> gaussian_of(const Rows& rows);
 
 // |m1 - m2|^2 + tr(S1 + S2 - 2 (S1 S2)^(1/2)), at least 0.
 [[nodiscard]] double frechet_distance(const Gaussian& a, const Gaussian& b);

@@ -1,5 +1,5 @@
 // The rotation functions that posed needs: conversion between Frame's plain quaternions and Eigen,
-// rotation vectors, swing and twist, rotations about one axis and minimal rotations. All are pure
+// rotation vectors, twist angles, rotations about one axis and minimal rotations. All are pure
 // functions, RT-safe, in float or double according to their argument.
 #pragma once
 
@@ -48,25 +48,6 @@ template <typename T>
   // sin(angle / 2) / angle; the series is exact to rounding for these small angles
   const T scale = angle < T(1e-3) ? T(0.5) - angle * angle / T(48) : std::sin(angle / T(2)) / angle;
   return {std::cos(angle / T(2)), v.x() * scale, v.y() * scale, v.z() * scale};
-}
-
-template <typename T>
-struct SwingTwist {
-  Eigen::Quaternion<T> swing;  // rotates `axis` along the shortest arc
-  Eigen::Quaternion<T> twist;  // rotates about `axis`
-};
-
-// q = swing * twist about the unit vector `axis`. For a half turn, which leaves the twist
-// undetermined, the twist is identity.
-template <typename T>
-[[nodiscard]] SwingTwist<T> swing_twist(const Eigen::Quaternion<T>& q,
-                                        const Eigen::Matrix<T, 3, 1>& axis) noexcept {
-  const T along = q.vec().dot(axis);
-  const T norm = std::hypot(q.w(), along);
-  if (norm < T(1e-9)) return {q, Eigen::Quaternion<T>::Identity()};
-  const Eigen::Matrix<T, 3, 1> v = axis * (along / norm);
-  const Eigen::Quaternion<T> twist(q.w() / norm, v.x(), v.y(), v.z());
-  return {q * twist.conjugate(), twist};
 }
 
 // Angle of the twist about the unit vector `axis`, in (-pi, pi].

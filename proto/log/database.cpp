@@ -134,7 +134,6 @@ std::int64_t Statement::integer(int column) const {
   return sqlite3_column_int64(statement_.get(), column);
 }
 
-double Statement::real(int column) const { return sqlite3_column_double(statement_.get(), column); }
 
 std::string_view Statement::text(int column) const {
   const auto* data = reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), column));
@@ -237,8 +236,6 @@ Result<std::string> Database::value(std::string_view sql) {
   const auto row = TRY(statement.step());
   return std::string(row ? statement.text(0) : std::string_view{});
 }
-
-std::int64_t Database::last_insert_id() const { return sqlite3_last_insert_rowid(handle_.get()); }
 
 void Database::set_busy_timeout_ms(int patience_ms) {
   sqlite3_busy_timeout(handle_.get(), patience_ms);

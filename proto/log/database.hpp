@@ -56,7 +56,6 @@ class Statement {
 
   // Columns of the current row; views are valid until the next step() or reset().
   [[nodiscard]] std::int64_t integer(int column) const;
-  [[nodiscard]] double real(int column) const;
   [[nodiscard]] std::string_view text(int column) const;
   [[nodiscard]] std::span<const std::byte> bytes(int column) const;
   // True when the row's last column is the checksum of all columns before it. Call it before
@@ -92,7 +91,6 @@ class Database {
   // Returns the first column of the first row of `sql`, as SQLite prints it.
   Result<std::string> value(std::string_view sql);
 
-  [[nodiscard]] std::int64_t last_insert_id() const;
   // Sets how long to wait for another process that holds the file.
   void set_busy_timeout_ms(int patience_ms);
   // Discards everything written since the last commit; harmless when there is nothing.

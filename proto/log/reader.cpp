@@ -241,16 +241,6 @@ Result<std::vector<std::byte>> Reader::blob(std::string_view sha256) const {
   return std::vector<std::byte>(bytes.begin(), bytes.end());
 }
 
-Result<std::vector<std::string>> Reader::blobs() const {
-  auto select = TRY(state_->database.prepare("SELECT sha256 FROM blob ORDER BY sha256"));
-  std::vector<std::string> hashes;
-  for (;;) {
-    const auto row = TRY(select.step());
-    if (!row) return hashes;
-    hashes.emplace_back(select.text(0));
-  }
-}
-
 Result<std::optional<ChunkRow>> Reader::next_chunk() {
   Statement& select = *state_->chunks;
   const auto stepped = TRY(state_->step(select, "chunk"));

@@ -50,8 +50,6 @@ class Reader {
 
   // The bytes stored under a hash; an error when they are missing or do not match it.
   Result<std::vector<std::byte>> blob(std::string_view sha256) const;
-  // The hashes of all that are stored.
-  Result<std::vector<std::string>> blobs() const;
 
   // The next chunk of all sources in log order; empty after the last. Its bytes and places are
   // valid until the next call.

@@ -109,13 +109,7 @@ inline constexpr const char* kShed = "shed";                 // a range of frame
 inline constexpr const char* kShedSamples = "shed-samples";  // a range of samples
 inline constexpr const char* kTick = "tick";                 // at now_ns
 inline constexpr const char* kEnd = "end";                   // the stream has ended, at now_ns
-inline constexpr const char* kStyle = "style";
-inline constexpr const char* kAlpha = "alpha";  // a parameter of style: a number
 inline constexpr const char* kModel = "model";  // a new model of style or generate: its SHA-256
-inline constexpr const char* kGenerate = "generate";
-inline constexpr const char* kPlay = "play";  // a command of generate: a play order
-inline constexpr const char* kStopPlaying = "stop-playing";
-inline constexpr const char* kConstrain = "constrain";
 }  // namespace words
 
 }  // namespace posed::log

@@ -9,7 +9,7 @@
 
 namespace posed::emulate {
 
-LogEmulator::LogEmulator(drivers::Recording recording, std::unique_ptr<drivers::Emulator> speaker)
+LogEmulator::LogEmulator(Recording recording, std::unique_ptr<drivers::Emulator> speaker)
     : recording_(std::move(recording)), speaker_(std::move(speaker)) {}
 
 void LogEmulator::receive_socket(std::uint8_t socket, std::span<const std::byte> bytes,

@@ -142,26 +142,20 @@ std::optional<std::uint64_t> Replay::broken_at(std::uint32_t stream) const {
 
 void Replay::before(const pipeline::Item& item, std::uint32_t /*stream*/) noexcept {
   while (const Schedule::Entry* entry = schedule_.due(item.number)) {
-    apply(*entry, item.number);
+    apply(*entry);
   }
   position_ = item.number;
 }
 
 void Replay::reach(std::uint64_t item) noexcept {
-  while (const Schedule::Entry* entry = schedule_.due(item)) apply(*entry, item);
+  while (const Schedule::Entry* entry = schedule_.due(item)) apply(*entry);
 }
 
-void Replay::apply(const Schedule::Entry& entry, std::uint64_t item) noexcept {
-  decided_(entry.row, item);
+void Replay::apply(const Schedule::Entry& entry) noexcept {
   // The row was already checked; decoding it again here saves several times the memory of keeping
   // all decoded decisions.
   if (const auto decision = record::decision_of(entry.row, {}))
     contexts_[entry.stream]->apply(*decision);
-}
-
-std::uint64_t Replay::next_sample(std::uint32_t stream) const noexcept {
-  const ReplaySource* const source = source_of(reader_.streams()[stream].source);
-  return source == nullptr ? 0 : source->next_sample(stream);
 }
 
 const pipeline::StreamEngine* Replay::engine(std::uint32_t stream) const {
@@ -181,7 +175,7 @@ Result<> Replay::run(const Out& out, const Pace& pace) {
     if (error_) return std::unexpected(*error_);
   }
   apply_gaps(std::numeric_limits<std::int64_t>::max());
-  while (const Schedule::Entry* entry = schedule_.rest()) apply(*entry, next_item());
+  while (const Schedule::Entry* entry = schedule_.rest()) apply(*entry);
   for (const auto& context : contexts_) context->finish();
   if (error_) return std::unexpected(*error_);
   return {};

@@ -45,15 +45,8 @@ class Replay final : private ReplayHost {
   using Pace = std::function<bool(const log::ChunkRow&)>;
   Result<> run(const Out& out, const Pace& pace);
 
-  // Call before run(): `decided` receives each decision as it takes effect, with the number of the
-  // item before which it does.
-  using Decided = std::function<void(const log::DecisionRow&, std::uint64_t item)>;
-  void watch_decisions(Decided decided) { decided_ = std::move(decided); }
-
-  // During run() and afterwards: the numbers that the next item, and the next sample of a stream,
-  // will get.
+  // During run() and afterwards: the number that the next item will get.
   [[nodiscard]] std::uint64_t next_item() const noexcept { return ReplayHost::next_item; }
-  [[nodiscard]] std::uint64_t next_sample(std::uint32_t stream) const noexcept;
 
   // During run() and afterwards: the number of the item that is handled, or of the last one. What
   // the stages emit between two items, such as by a tick, counts to the one before. 0: before the
@@ -76,7 +69,7 @@ class Replay final : private ReplayHost {
   Result<> load_gaps();
   void set_gap(std::size_t stream, std::int64_t after_chunk);
   void apply_gaps(std::int64_t chunk);
-  void apply(const Schedule::Entry& entry, std::uint64_t item) noexcept;
+  void apply(const Schedule::Entry& entry) noexcept;
   // Null if nothing is to be replayed of it.
   [[nodiscard]] ReplaySource* source_of(std::uint32_t log_id) const;
 
@@ -95,7 +88,6 @@ class Replay final : private ReplayHost {
   std::vector<ReplayStreamContext*> gapped_;            // whose gap is still to come
   Schedule schedule_;
   const Out* out_ = nullptr;  // of the current run()
-  Decided decided_ = [](const log::DecisionRow&, std::uint64_t) {};
   std::uint64_t position_ = 0;
   std::optional<Error> error_;
 };

@@ -181,7 +181,6 @@ class Bridge::Parts {
     pthread_setname_np(thread_.native_handle(), "posed-view");
   }
   [[nodiscard]] const std::string& url() const noexcept { return url_; }
-  [[nodiscard]] std::uint16_t port() const noexcept { return server_->port(); }
 
  private:
   Parts(net::Context context, Site site, Greeting greeting)
@@ -232,6 +231,5 @@ Bridge::Bridge(std::unique_ptr<Parts> parts) : parts_(std::move(parts)) {}
 Bridge::~Bridge() = default;
 
 const std::string& Bridge::url() const noexcept { return parts_->url(); }
-std::uint16_t Bridge::port() const noexcept { return parts_->port(); }
 
 }  // namespace posed::view

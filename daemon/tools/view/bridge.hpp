@@ -107,7 +107,6 @@ class Bridge {
 
   // The page's address with the token that opens it. Any thread.
   [[nodiscard]] const std::string& url() const noexcept;
-  [[nodiscard]] std::uint16_t port() const noexcept;
 
  private:
   class Parts;

@@ -8,6 +8,7 @@
 #include "drivers/axis/description.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/unit/drivers/axis_rig.hpp"
+#include "tests/unit/drivers/refused.hpp"
 
 namespace posed::drivers {
 namespace {
@@ -331,32 +332,25 @@ TEST_CASE("any Axis description is refused or becomes bodies") {
 
 TEST_CASE("wrong options of the Axis driver are refused at once") {
   const Driver& driver = *find_driver("axis");
-  const std::vector<std::pair<Options, std::string>> wrong{
-      {{{"order", std::string("XYX")}}, "order"},
-      {{{"format", std::string("json")}}, "format"},
-      {{{"rate_hz", -1.0}}, "rate_hz"},
-      {{{"rate_hz", 1e-9}}, "rate_hz"},
-      {{{"split_bytes", std::int64_t{-1}}}, "split_bytes"},
-      {{{"link", std::string("serial")}}, "link"},
-      {{{"connect", std::string("nonsense")}}, "an address and a port"},
-      {{{"link", std::string("udp")}, {"listen", std::string("x")}}, "an address and a port"},
-      {{{"link", std::string("udp")}, {"connect", std::string("10.0.0.1:7001")}}, "connect"}};
-  for (const auto& [options, word] : wrong) {
-    const auto expected = driver.expect(options);
-    REQUIRE_FALSE(expected);
-    INFO(expected.error().message);
-    CHECK(expected.error().exit_code == ExitCode::kWrongUse);
-    CHECK(expected.error().message.find(word) != std::string::npos);
-  }
+  test::check_refused(
+      driver,
+      {{{{"order", std::string("XYX")}}, "order"},
+       {{{"format", std::string("json")}}, "format"},
+       {{{"rate_hz", -1.0}}, "rate_hz"},
+       {{{"rate_hz", 1e-9}}, "rate_hz"},
+       {{{"split_bytes", std::int64_t{-1}}}, "split_bytes"},
+       {{{"link", std::string("serial")}}, "link"},
+       {{{"connect", std::string("nonsense")}}, "an address and a port"},
+       {{{"link", std::string("udp")}, {"listen", std::string("x")}}, "an address and a port"},
+       {{{"link", std::string("udp")}, {"connect", std::string("10.0.0.1:7001")}}, "connect"}});
   CHECK(driver.expect({}).value().identity == "tcp 127.0.0.1:7001");
   CHECK(driver.expect({{"link", std::string("udp")}}).value().identity == "udp 127.0.0.1:7002");
   CHECK(driver.expect({{"listen", std::string("127.0.0.1:7009")}}).value().identity ==
         "tcp 127.0.0.1:7009");
-  for (const char* text : {"axis", "axis link=tcp order=YXZ", "axis link=tcp order=YXZ rate=x",
+  test::check_undescribed(driver,
+                          {"axis", "axis link=tcp order=YXZ", "axis link=tcp order=YXZ rate=x",
                            "axis link=tcp order=YXZ rate=-1", "axis link=tcp order=YYY rate=0",
-                           "axis link=tcp order=YXZ rate=0 more=1"}) {
-    CHECK_FALSE(driver.describe(text, "x"));
-  }
+                           "axis link=tcp order=YXZ rate=0 more=1"});
 }
 
 }  // namespace posed::drivers

@@ -19,7 +19,6 @@ namespace posed::drivers {
 namespace {
 
 using fivedt::FiveDtEmulator;
-using fivedt::Form;
 using fivedt::Reading;
 using test::Bytes;
 using test::CollectSink;
@@ -31,7 +30,7 @@ Bytes bytes_of(std::initializer_list<int> numbers) {
   return bytes;
 }
 
-Reading decoded(Form form, const Bytes& bytes) {
+Reading decoded(fivedt::Form form, const Bytes& bytes) {
   Reading reading;
   REQUIRE(fivedt::packet_length(form, bytes) == bytes.size());
   REQUIRE(fivedt::decode_packet(form, bytes, reading) == Outcome::kOk);
@@ -70,7 +69,7 @@ const test::DeviceFixture& fixture(const std::string& name) {
 
 TEST_CASE("a Data Glove 5's packet is XOR checked, and its start may be data, too") {
   const Bytes packet = bytes_of({0x80, 0x80, 1, 2, 3, 0xFF, 0x80, 0, 0xFF});
-  const Reading reading = decoded(Form::kFive, packet);
+  const Reading reading = decoded(fivedt::Form::kFive, packet);
   CHECK(reading.value[0] == 0x80);
   CHECK(reading.value[4] == 0xFF);
   CHECK(reading.pitch == 0x80);
@@ -121,13 +120,13 @@ TEST_CASE("one byte may follow a Data Glove 5's packet: ready if wired, the hand
 
 TEST_CASE("a Data Glove 16's data and info packets follow each other as they like") {
   const std::vector<std::byte> info =
-      fivedt::encode_packet(Form::kSixteen, {.kind = Reading::Kind::kInfo}, Side::kRight);
+      fivedt::encode_packet(fivedt::Form::kSixteen, {.kind = Reading::Kind::kInfo}, Side::kRight);
   Reading sent;
   for (std::size_t i = 0; i < 16; ++i) sent.value[i] = static_cast<std::uint16_t>(4095 - 200 * i);
-  const Bytes data = fivedt::encode_packet(Form::kSixteen, sent, Side::kRight);
+  const Bytes data = fivedt::encode_packet(fivedt::Form::kSixteen, sent, Side::kRight);
   CHECK(data.size() == 36);
-  CHECK(decoded(Form::kSixteen, data).value == sent.value);
-  CHECK(decoded(Form::kSixteen, info).kind == Reading::Kind::kInfo);
+  CHECK(decoded(fivedt::Form::kSixteen, data).value == sent.value);
+  CHECK(decoded(fivedt::Form::kSixteen, info).kind == Reading::Kind::kInfo);
   const auto decoder = decoder_of(*find_driver("fivedt"), {{"model", std::string("16")}});
   CollectSink sink;
   for (const Bytes& bytes : {info, data, info, info, data}) decoder->feed(bytes, 0, sink);
@@ -140,16 +139,16 @@ TEST_CASE("an Ultra Wireless record holds fourteen values of twelve bits, of eit
   Reading sent{.port_b = true};
   for (std::size_t i = 0; i < 14; ++i)
     sent.value[i] = static_cast<std::uint16_t>(0x123 + 0x111 * i);
-  const Bytes record = fivedt::encode_packet(Form::kUltraWireless, sent, Side::kRight);
+  const Bytes record = fivedt::encode_packet(fivedt::Form::kUltraWireless, sent, Side::kRight);
   REQUIRE(record.size() == 29);
   CHECK(record[3] == std::byte{0x12});
   CHECK(record[4] == std::byte{0x32});
   CHECK(record[5] == std::byte{0x34});
-  const Reading got = decoded(Form::kUltraWireless, record);
+  const Reading got = decoded(fivedt::Form::kUltraWireless, record);
   CHECK(got.value == sent.value);
   CHECK(got.port_b);
   const Bytes other =
-      fivedt::encode_packet(Form::kUltraWireless, {.value = sent.value}, Side::kRight);
+      fivedt::encode_packet(fivedt::Form::kUltraWireless, {.value = sent.value}, Side::kRight);
   const auto decoder = decoder_of(*find_driver("fivedt"), {{"model", std::string("ultra-wireless")},
                                                            {"kit_port", std::string("b")}});
   CollectSink sink;
@@ -166,7 +165,7 @@ TEST_CASE("an Ultra Wireless record after damage is found by the next one's star
       decoder_of(*find_driver("fivedt"), {{"model", std::string("ultra-wireless")}});
   Reading reading;
   reading.value.fill(0x3C3);  // its start byte also occurs in the data
-  const Bytes record = fivedt::encode_packet(Form::kUltraWireless, reading, Side::kRight);
+  const Bytes record = fivedt::encode_packet(fivedt::Form::kUltraWireless, reading, Side::kRight);
   CollectSink sink;
   decoder->feed(record, 0, sink);
   decoder->feed(std::span(record).subspan(10), 0, sink);
@@ -179,7 +178,7 @@ TEST_CASE("an Ultra Wireless record after damage is found by the next one's star
 TEST_CASE("a USB glove with five sensors has every third value") {
   Reading sent;
   for (std::size_t i = 0; i < 16; ++i) sent.value[i] = static_cast<std::uint16_t>(1500 + 100 * i);
-  const Bytes report = fivedt::encode_packet(Form::kUltraUsb5, sent, Side::kRight);
+  const Bytes report = fivedt::encode_packet(fivedt::Form::kUltraUsb5, sent, Side::kRight);
   REQUIRE(report.size() == 64);
   const auto decoder = decoder_of(*find_driver("fivedt"), {{"model", std::string("ultra-usb-5")}});
   CollectSink sink;
@@ -203,7 +202,7 @@ TEST_CASE("emulated 5DT gloves' poses come back as exactly as their sensors allo
 }
 
 TEST_CASE("a Data Glove 5 is asked who it is, then streams or is polled") {
-  FiveDtEmulator glove({.hand = Side::kRight, .form = Form::kFive});
+  FiveDtEmulator glove({.hand = Side::kRight, .form = fivedt::Form::kFive});
   const test::ServedEmulator served(glove);
   TransportFactory ports;
   const auto other =
@@ -235,7 +234,7 @@ TEST_CASE("a Data Glove 5 is asked who it is, then streams or is polled") {
 }
 
 TEST_CASE("a 5DT glove that only sends is identified by its packets") {
-  FiveDtEmulator glove({.hand = Side::kLeft, .form = Form::kFiveWireless});
+  FiveDtEmulator glove({.hand = Side::kLeft, .form = fivedt::Form::kFiveWireless});
   const test::ServedEmulator served(glove);
   TransportFactory ports;
   const auto open = [&](const std::string& model, const std::string& hand) {
@@ -248,7 +247,7 @@ TEST_CASE("a 5DT glove that only sends is identified by its packets") {
 }
 
 TEST_CASE("a 5DT glove of another hand or model is refused with an error message") {
-  FiveDtEmulator glove({.hand = Side::kLeft, .form = Form::kFiveWireless});
+  FiveDtEmulator glove({.hand = Side::kLeft, .form = fivedt::Form::kFiveWireless});
   const test::ServedEmulator served(glove);
   TransportFactory ports;
   const auto open = [&](const std::string& model, const std::string& hand) {

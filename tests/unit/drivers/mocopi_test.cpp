@@ -14,6 +14,7 @@
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/recorded_log.hpp"
+#include "tests/unit/drivers/refused.hpp"
 
 namespace posed::drivers::mocopi {
 namespace {
@@ -262,15 +263,9 @@ TEST_CASE("write the log of the emulated mocopi", "[.write-logs]") {
 
 TEST_CASE("wrong options of mocopi are refused at once") {
   const Driver& driver = *find_driver("mocopi");
-  for (const Options& options :
-       {Options{{"listen", std::string("0.0.0.0:12351")}}, Options{{"rate_hz", 0.0}}}) {
-    const auto expected = driver.expect(options);
-    REQUIRE_FALSE(expected);
-    CHECK(expected.error().exit_code == ExitCode::kWrongUse);
-  }
-  for (const char* text : {"", "mocopi", "mocopi rate=", "mocopi rate=0"}) {
-    CHECK_FALSE(driver.describe(text, "x"));
-  }
+  test::check_refused(driver, {{{{"listen", std::string("0.0.0.0:12351")}}, "peers"},
+                               {{{"rate_hz", 0.0}}, "rate_hz"}});
+  test::check_undescribed(driver, {"", "mocopi", "mocopi rate=", "mocopi rate=0"});
 }
 
 }  // namespace posed::drivers::mocopi

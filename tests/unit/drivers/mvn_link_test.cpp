@@ -8,6 +8,7 @@
 #include "tests/support/allocations.hpp"
 #include "tests/unit/drivers/mvn_rig.hpp"
 #include "tests/unit/drivers/recorded_log.hpp"
+#include "tests/unit/drivers/refused.hpp"
 
 namespace posed::drivers::mvn {
 namespace {
@@ -187,32 +188,23 @@ TEST_CASE("mvn: learning and describing characters does not allocate") {
 
 TEST_CASE("mvn: wrong options are refused at once") {
   const Driver& driver = *find_driver("mvn");
-  const std::vector<std::pair<Options, std::string>> wrong{
-      {{{"listen", std::string("nonsense")}}, "an address and a port"},
-      {{{"link", std::string("pigeon")}}, "link"},
-      {{{"connect", std::string("127.0.0.1:9763")}}, "connect is for link"},
-      {{{"rate_hz", 0.0}}, "rate_hz"},
-      {{{"types", std::string("02 03")}}, "types"},
-      {{{"types", std::string("two")}}, "types"},
-      {{{"types", std::string("12 13")}}, "01, 02 or 05"},
-      {{{"characters", std::int64_t{3}}}, "characters"},
-      {{{"datagram_bytes", std::int64_t{50}}}, "datagram_bytes"}};
-  for (const auto& [options, word] : wrong) {
-    const auto expected = driver.expect(options);
-    REQUIRE_FALSE(expected);
-    INFO(expected.error().message);
-    CHECK(expected.error().exit_code == ExitCode::kWrongUse);
-    CHECK(expected.error().message.find(word) != std::string::npos);
-  }
+  test::check_refused(driver,
+                      {{{{"listen", std::string("nonsense")}}, "an address and a port"},
+                       {{{"link", std::string("pigeon")}}, "link"},
+                       {{{"connect", std::string("127.0.0.1:9763")}}, "connect is for link"},
+                       {{{"rate_hz", 0.0}}, "rate_hz"},
+                       {{{"types", std::string("02 03")}}, "types"},
+                       {{{"types", std::string("two")}}, "types"},
+                       {{{"types", std::string("12 13")}}, "01, 02 or 05"},
+                       {{{"characters", std::int64_t{3}}}, "characters"},
+                       {{{"datagram_bytes", std::int64_t{50}}}, "datagram_bytes"}});
   const auto udp = driver.expect({}).value();
   CHECK(udp.text == "mvn link=udp rate=60");
   CHECK(udp.identity == "udp 127.0.0.1:9763");
   const auto tcp = driver.expect({{"link", std::string("tcp")}, {"rate_hz", 240.0}}).value();
   CHECK(tcp.text == "mvn link=tcp rate=240");
-  for (const char* text : {"", "mvn", "mvn link=udp rate=", "mvn link=usb rate=60",
-                           "mvn link=tcp rate=nan", "mvn link=udp rate=0"}) {
-    CHECK_FALSE(driver.describe(text, "x"));
-  }
+  test::check_undescribed(driver, {"", "mvn", "mvn link=udp rate=", "mvn link=usb rate=60",
+                                   "mvn link=tcp rate=nan", "mvn link=udp rate=0"});
 }
 
 namespace {

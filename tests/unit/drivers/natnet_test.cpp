@@ -15,6 +15,7 @@
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/natnet_rig.hpp"
 #include "tests/unit/drivers/recorded_log.hpp"
+#include "tests/unit/drivers/refused.hpp"
 
 namespace posed::drivers {
 namespace {
@@ -362,25 +363,17 @@ TEST_CASE("late and repeated NatNet frames are dropped, and device time never go
 
 TEST_CASE("wrong options of NatNet are refused at once") {
   const Driver& driver = *find_driver("natnet");
-  const std::vector<std::pair<Options, std::string>> wrong{
-      {{{"server", std::string("motive")}}, "in numbers"},
-      {{{"listen", std::string("nonsense")}}, "an address and a port"},
-      {{{"listen", std::string("127.0.0.1:1511")}}, "listen on 0.0.0.0:PORT"},
-      {{{"command_listen", std::string("x")}}, "an address and a port"},
-      {{{"group", std::string("10.0.0.1")}}, "multicast address"},
-      {{{"up", std::string("x")}}, "up"},
-      {{{"coordinates", std::string("world")}}, "coordinates"},
-      {{{"version", std::string("5.0")}}, "version"},
-      {{{"version", std::string("3")}}, "version"},
-      {{{"rate_hz", std::int64_t{0}}}, "rate_hz"}};
-  for (const auto& [options, word] : wrong) {
-    INFO(word);
-    const auto expected = driver.expect(options);
-    REQUIRE_FALSE(expected);
-    CHECK(expected.error().exit_code == ExitCode::kWrongUse);
-    INFO(expected.error().message);
-    CHECK(expected.error().message.find(word) != std::string::npos);
-  }
+  test::check_refused(driver,
+                      {{{{"server", std::string("motive")}}, "in numbers"},
+                       {{{"listen", std::string("nonsense")}}, "an address and a port"},
+                       {{{"listen", std::string("127.0.0.1:1511")}}, "listen on 0.0.0.0:PORT"},
+                       {{{"command_listen", std::string("x")}}, "an address and a port"},
+                       {{{"group", std::string("10.0.0.1")}}, "multicast address"},
+                       {{{"up", std::string("x")}}, "up"},
+                       {{{"coordinates", std::string("world")}}, "coordinates"},
+                       {{{"version", std::string("5.0")}}, "version"},
+                       {{{"version", std::string("3")}}, "version"},
+                       {{{"rate_hz", std::int64_t{0}}}, "rate_hz"}});
   const auto remote = driver.expect({{"server", std::string("192.168.1.20")},
                                      {"unicast", true},
                                      {"version", std::string("2.9")}});

@@ -21,6 +21,7 @@
 #include "proto/message/skeleton_message.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
+#include "tests/unit/drivers/refused.hpp"
 
 namespace posed::drivers::chain {
 namespace {
@@ -342,11 +343,9 @@ TEST_CASE("wrong options of posed are refused at once") {
   }
   CHECK_FALSE(driver.expect(
       {{"key", std::string("/nonexistent.key")}, {"server_key", std::string("/nonexistent.pub")}}));
-  for (const char* text :
-       {"", "posed stream=ann", "posed stream=ann rate=", "posed stream=ann rate=0",
-        "posed stream=A rate=60", "posed stream= rate=60"}) {
-    CHECK_FALSE(driver.describe(text, "x"));
-  }
+  test::check_undescribed(
+      driver, {"", "posed stream=ann", "posed stream=ann rate=", "posed stream=ann rate=0",
+               "posed stream=A rate=60", "posed stream= rate=60"});
   const auto again = driver.describe("posed stream=ann rate=60", "tcp://127.0.0.1:5570");
   REQUIRE(again);
   CHECK(again->rate_hz == 60.0);

@@ -14,6 +14,7 @@
 #include "drivers/rokoko/lz4_frame.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
+#include "tests/unit/drivers/refused.hpp"
 
 namespace posed::drivers::rokoko {
 namespace {
@@ -300,19 +301,11 @@ TEST_CASE("any description of Studio's bodies is refused or becomes bodies") {
 
 TEST_CASE("wrong options of Rokoko Studio are refused at once") {
   const Driver& driver = *find_driver("rokoko");
-  const std::vector<std::pair<Options, std::string>> wrong{
-      {{{"listen", std::string("0.0.0.0:14043")}}, "peers"},
-      {{{"version", std::string("1")}}, "2, 2.5 or 3"},
-      {{{"rate_hz", 0.0}}, "rate_hz"}};
-  for (const auto& [options, word] : wrong) {
-    const auto expected = driver.expect(options);
-    REQUIRE_FALSE(expected);
-    CHECK(expected.error().exit_code == ExitCode::kWrongUse);
-    CHECK(expected.error().message.find(word) != std::string::npos);
-  }
-  for (const char* text : {"", "rokoko", "rokoko rate=", "rokoko rate=nan", "rokoko rate=0"}) {
-    CHECK_FALSE(driver.describe(text, "x"));
-  }
+  test::check_refused(driver, {{{{"listen", std::string("0.0.0.0:14043")}}, "peers"},
+                               {{{"version", std::string("1")}}, "2, 2.5 or 3"},
+                               {{{"rate_hz", 0.0}}, "rate_hz"}});
+  test::check_undescribed(driver,
+                          {"", "rokoko", "rokoko rate=", "rokoko rate=nan", "rokoko rate=0"});
 }
 
 }  // namespace posed::drivers::rokoko

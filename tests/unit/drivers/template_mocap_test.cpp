@@ -14,6 +14,7 @@
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/recorded_log.hpp"
+#include "tests/unit/drivers/refused.hpp"
 
 namespace posed::drivers::mocap {
 namespace {
@@ -337,22 +338,14 @@ TEST_CASE("any description is refused or becomes bodies, and decoding it does no
 
 TEST_CASE("wrong options of the mocap system are refused at once") {
   const Driver& driver = *find_driver("template_mocap");
-  const std::vector<std::pair<Options, std::string>> wrong{
-      {{{"listen", std::string("nonsense")}}, "an address and a port"},
-      {{{"listen", std::string("0.0.0.0:7400")}}, "peers"},
-      {{{"peers", std::string("studio")}}, "an address in numbers"},
-      {{{"group", std::string("239.1.1.1")}}, "listen on 0.0.0.0:PORT"},
-      {{{"rate_hz", 0.0}}, "rate_hz"}};
-  for (const auto& [options, word] : wrong) {
-    const auto expected = driver.expect(options);
-    REQUIRE_FALSE(expected);
-    CHECK(expected.error().exit_code == ExitCode::kWrongUse);
-    CHECK(expected.error().message.find(word) != std::string::npos);
-  }
-  for (const char* text : {"", "template_mocap", "template_mocap rate=", "template_mocap rate=nan",
-                           "template_mocap rate=0", "template_mocap rate=1e9"}) {
-    CHECK_FALSE(driver.describe(text, "x"));
-  }
+  test::check_refused(driver, {{{{"listen", std::string("nonsense")}}, "an address and a port"},
+                               {{{"listen", std::string("0.0.0.0:7400")}}, "peers"},
+                               {{{"peers", std::string("studio")}}, "an address in numbers"},
+                               {{{"group", std::string("239.1.1.1")}}, "listen on 0.0.0.0:PORT"},
+                               {{{"rate_hz", 0.0}}, "rate_hz"}});
+  test::check_undescribed(driver,
+                          {"", "template_mocap", "template_mocap rate=", "template_mocap rate=nan",
+                           "template_mocap rate=0", "template_mocap rate=1e9"});
 }
 
 namespace {

@@ -1,4 +1,4 @@
-// The transports that play recordings: schedule, order, loop, end.
+// The transport that plays a clip: schedule, order, loop, end.
 #include <catch2/catch.hpp>
 
 #include <algorithm>
@@ -6,7 +6,6 @@
 #include <string>
 
 #include "drivers/transport/file.hpp"
-#include "drivers/transport/replay.hpp"
 #include "tests/unit/drivers/chunk_text.hpp"
 
 namespace posed::drivers {
@@ -48,12 +47,6 @@ std::unique_ptr<Transport> must(Result<std::unique_ptr<Transport>> transport) {
   if (!transport) FAIL(transport.error().text());
   REQUIRE((*transport)->start(kStart_ns));
   return std::move(*transport);
-}
-
-Recording recording(const std::vector<std::pair<std::int64_t, std::string>>& chunks) {
-  Recording out;
-  for (const auto& [arrival_ns, text] : chunks) out.add(arrival_ns, std::as_bytes(std::span(text)));
-  return out;
 }
 
 }  // namespace
@@ -125,34 +118,6 @@ TEST_CASE("a file that cannot be played is refused with a reason") {
   Chunks large;
   large.add(std::string(kMaxChunk + 1, 'x'));
   CHECK(reason(std::move(large), {.rate_hz = 100}).starts_with("frame 1 is longer"));
-}
-
-TEST_CASE("a recording replays with its own gaps, faster, or at once") {
-  const std::vector<std::pair<std::int64_t, std::string>> chunks{
-      {1'000'000'000, "a"}, {1'004'000'000, "b"}, {1'004'000'000, "c"}, {1'020'000'000, "d"}};
-  for (const double speed : {1.0, 4.0}) {
-    const auto transport = must(ReplayTransport::open(recording(chunks), 1'000'000'000, speed));
-    const Played played = play(*transport, 100);
-    CHECK(played.text == "abcd");
-    CHECK(played.ended);
-    REQUIRE(played.at_ns.size() == 4);
-    for (std::size_t i = 0; i < 4; ++i) {
-      const auto after_ns = static_cast<double>(chunks[i].first - 1'000'000'000) / speed;
-      CHECK(static_cast<double>(played.at_ns[i] - kStart_ns) == after_ns);
-    }
-  }
-  const auto transport = must(ReplayTransport::open(recording(chunks), 1'000'000'000, 0));
-  CHECK(play(*transport, 100).text == "abcd");
-}
-
-TEST_CASE("a recording's odd arrival times neither stop nor crash its replay") {
-  constexpr auto kMin = std::numeric_limits<std::int64_t>::min();
-  const auto transport =
-      must(ReplayTransport::open(recording({{kMin, "a"}, {5, "b"}, {3, "c"}, {-7, "d"}}), 5, 1));
-  CHECK(play(*transport, 100).text == "abcd");
-  CHECK(must(ReplayTransport::open({}, 0, 1))->read(0).end);
-  CHECK_FALSE(ReplayTransport::open({}, 0, -1).has_value());
-  CHECK_FALSE(ReplayTransport::open({}, 0, std::numeric_limits<double>::quiet_NaN()).has_value());
 }
 
 }  // namespace posed::drivers

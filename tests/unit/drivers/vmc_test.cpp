@@ -12,6 +12,7 @@
 #include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/recorded_log.hpp"
+#include "tests/unit/drivers/refused.hpp"
 #include "tests/unit/drivers/vmc_rig.hpp"
 
 namespace posed::drivers {
@@ -289,20 +290,11 @@ TEST_CASE("a VMC frame that another overtook is late") {
 
 TEST_CASE("wrong options of the VMC driver are refused at once") {
   const Driver& driver = *find_driver("vmc");
-  const std::vector<std::pair<Options, std::string>> wrong{
-      {{{"listen", std::string("nonsense")}}, "an address and a port"},
-      {{{"listen", std::string("0.0.0.0:39539")}}, "peers"},
-      {{{"packing", std::string("box")}}, "packing"},
-      {{{"rate_hz", 0.0}}, "rate_hz"}};
-  for (const auto& [options, word] : wrong) {
-    const auto expected = driver.expect(options);
-    REQUIRE_FALSE(expected);
-    CHECK(expected.error().exit_code == ExitCode::kWrongUse);
-    CHECK(expected.error().message.find(word) != std::string::npos);
-  }
-  for (const char* text : {"", "vmc", "vmc rate=", "vmc rate=nan", "vmc rate=0"}) {
-    CHECK_FALSE(driver.describe(text, "x"));
-  }
+  test::check_refused(driver, {{{{"listen", std::string("nonsense")}}, "an address and a port"},
+                               {{{"listen", std::string("0.0.0.0:39539")}}, "peers"},
+                               {{{"packing", std::string("box")}}, "packing"},
+                               {{{"rate_hz", 0.0}}, "rate_hz"}});
+  test::check_undescribed(driver, {"", "vmc", "vmc rate=", "vmc rate=nan", "vmc rate=0"});
 }
 
 namespace {
