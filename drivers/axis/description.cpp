@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "drivers/axis/packer.hpp"
 #include "drivers/byte_reader.hpp"
+#include "drivers/packer.hpp"
 #include "drivers/pose_values.hpp"
 
 namespace posed::drivers::axis {
@@ -63,7 +63,7 @@ RT_SAFE std::size_t write_list_head(std::uint8_t order, std::size_t avatars,
                                     std::span<std::byte> out) noexcept {
   Packer packer(out);
   packer.number(order, 1);
-  packer.number(static_cast<std::uint32_t>(avatars), 1);
+  packer.number(avatars, 1);
   return packer.size();
 }
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <optional>
 
-#include "drivers/axis/packer.hpp"
 #include "drivers/byte_reader.hpp"
+#include "drivers/packer.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/plausible.hpp"
@@ -179,7 +179,7 @@ RT_SAFE std::size_t encode_binary(const Message& message, Form form,
   Packer packer(out);
   packer.number(kStart, 2);
   packer.number(old ? 0x01000000 : 0x01010000, 4);
-  packer.number(static_cast<std::uint32_t>(count), old ? 4 : 2);
+  packer.number(count, old ? 4 : 2);
   packer.number(message.content.displacement ? 1 : 0, old ? 4 : 1);
   packer.number(message.content.reference ? 1 : 0, old ? 4 : 1);
   packer.number(message.avatar.number, 4);

@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "drivers/byte_reader.hpp"
+#include "drivers/packer.hpp"
 #include "drivers/pose_values.hpp"
 #include "proto/text/clean.hpp"
 
@@ -15,24 +16,6 @@ namespace {
 constexpr std::uint8_t kDescriptionVersion = 1;
 constexpr std::uint8_t kWithFingers = 1;
 constexpr std::uint8_t kMaxFlags = (1U << (1 + kValueGroups)) - 1;
-
-// RT-safe.
-class FixedWriter {
- public:
-  explicit FixedWriter(std::span<std::byte> to) noexcept : to_(to) {}
-  void u8(std::size_t value) noexcept {
-    if (used_ < to_.size()) to_[used_++] = static_cast<std::byte>(value);
-  }
-  void f32(float value) noexcept {
-    const auto bits = std::bit_cast<std::uint32_t>(value);
-    for (unsigned shift = 0; shift < 32; shift += 8) u8(bits >> shift & 0xFFU);
-  }
-  [[nodiscard]] std::size_t used() const noexcept { return used_; }
-
- private:
-  std::span<std::byte> to_;
-  std::size_t used_ = 0;
-};
 
 std::unexpected<Error> mvn_wrong(const std::string& what) {
   return fail("the description of the MVN characters " + what +
@@ -62,24 +45,21 @@ Result<Character> read_character(ByteReader& reader) {
 }  // namespace
 
 std::size_t write_description_head(std::size_t characters, std::span<std::byte> to) noexcept {
-  FixedWriter writer(to);
+  Packer writer(to);
   writer.u8(kDescriptionVersion);
   writer.u8(characters);
-  return writer.used();
+  return writer.size();
 }
 
 std::size_t write_character(const Character& character, std::span<std::byte> to) noexcept {
-  FixedWriter writer(to);
+  Packer writer(to);
   writer.u8(character.id);
   writer.u8((character.fingers ? kWithFingers : 0U) | character.values.to_ulong() << 1);
-  writer.u8(character.name_bytes);
-  for (std::size_t i = 0; i < character.name_bytes; ++i) {
-    writer.u8(static_cast<unsigned char>(character.name[i]));
-  }
+  writer.counted(std::span(character.name).first(character.name_bytes));
   for (std::size_t i = 0; i < character.segments(); ++i) {
     for (const float x_m : character.offset_m[i]) writer.f32(x_m);
   }
-  return writer.used();
+  return writer.size();
 }
 
 std::size_t MvnLayout::body_of(std::uint8_t character) const noexcept {

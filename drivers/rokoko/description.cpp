@@ -5,29 +5,11 @@
 #include <string_view>
 
 #include "drivers/byte_reader.hpp"
+#include "drivers/packer.hpp"
 #include "drivers/pose_values.hpp"
 
 namespace posed::drivers::rokoko {
 namespace {
-
-// Writes little-endian numbers into bytes that are there. RT-safe.
-class FixedWriter {
- public:
-  explicit FixedWriter(std::span<std::byte> room) noexcept : room_(room) {}
-  void number(std::uint64_t value, std::size_t bytes) noexcept {
-    for (std::size_t i = 0; i < bytes; ++i) {
-      room_[used_++] = static_cast<std::byte>(value >> 8 * i & 0xFFU);
-    }
-  }
-  void text(std::string_view value) noexcept {
-    for (const char c : value) room_[used_++] = static_cast<std::byte>(c);
-  }
-  [[nodiscard]] std::size_t used() const noexcept { return used_; }
-
- private:
-  std::span<std::byte> room_;
-  std::size_t used_ = 0;
-};
 
 std::unexpected<Error> wrong_description(const std::string& what) {
   return fail("the description of Studio's bodies " + what +
@@ -71,21 +53,20 @@ Result<DescribedBody> read_described_body(ByteReader& reader) {
 }  // namespace
 
 RT_SAFE std::size_t write_body(const DescribedBody& body, std::span<std::byte> room) noexcept {
-  FixedWriter writer(room);
+  Packer writer(room);
   writer.number(static_cast<std::uint64_t>(body.key.part), 1);
   writer.number(body.face ? 1 : 0, 1);
-  writer.number(body.key.name.text().size(), 1);
-  writer.text(body.key.name.text());
+  writer.counted(body.key.name.text());
   writer.number(body.joints.to_ullong(), 8);
   bool root = true;
   for (std::size_t j = 0; j < kStudioJoints; ++j) {
     if (!body.joints[j]) continue;
     for (const float x_m : body.offset_m[j]) {
-      if (!root) writer.number(std::bit_cast<std::uint32_t>(x_m), 4);
+      if (!root) writer.f32(x_m);
     }
     root = false;
   }
-  return writer.used();
+  return writer.size();
 }
 
 Result<std::vector<DescribedBody>> parse_description(std::span<const std::byte> bytes) {

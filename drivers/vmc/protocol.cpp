@@ -4,32 +4,13 @@
 #include <bit>
 
 #include "drivers/byte_reader.hpp"
+#include "drivers/packer.hpp"
 #include "drivers/pose_values.hpp"
 
 namespace posed::drivers::vmc {
 namespace {
 
 constexpr std::uint8_t kVersion = 1;
-
-// Little-endian values into memory that is large enough.
-class RoomWriter {
- public:
-  explicit RoomWriter(std::span<std::byte> room) noexcept : room_(room) {}
-  void u8(std::size_t value) noexcept { room_[size_++] = static_cast<std::byte>(value); }
-  void f32(float value) noexcept {
-    const auto bits = std::bit_cast<std::uint32_t>(value);
-    for (int shift = 0; shift < 32; shift += 8) u8(bits >> shift & 0xFF);
-  }
-  void name(std::string_view text) noexcept {
-    u8(text.size());
-    for (const char c : text) u8(static_cast<unsigned char>(c));
-  }
-  [[nodiscard]] std::span<const std::byte> written() const noexcept { return room_.first(size_); }
-
- private:
-  std::span<std::byte> room_;
-  std::size_t size_ = 0;
-};
 
 std::unexpected<Error> wrong(const std::string& what) {
   return fail("the description of the VMC performer " + what +
@@ -76,9 +57,9 @@ Result<> read_values(ByteReader& reader, Described& described) {
 
 RT_SAFE std::span<const std::byte> write_description(
     const Described& described, std::array<std::byte, kMaxDescribed>& room) noexcept {
-  RoomWriter writer(room);
+  Packer writer(room);
   writer.u8(kVersion);
-  writer.name(described.title);
+  writer.counted(described.title);
   writer.u8(described.bones.count());
   for (std::size_t bone = 0; bone < kBoneCount; ++bone) {
     if (!described.bones[bone]) continue;
@@ -88,7 +69,7 @@ RT_SAFE std::span<const std::byte> write_description(
   writer.u8(described.value_count);
   for (const Described::Value& value : std::span(described.values).first(described.value_count)) {
     writer.u8(static_cast<std::size_t>(value.kind));
-    writer.name(value.name);
+    writer.counted(value.name);
   }
   return writer.written();
 }
