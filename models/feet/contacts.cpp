@@ -51,6 +51,16 @@ RT_SAFE void Contacts::judge(const Track& track, std::size_t point,
   contact.weight = near * bell(contact.speed_m_s / (kWeight_m_s * scale_));
 }
 
+RT_SAFE double Contacts::both_stand() const noexcept {
+  double least = 1.0;
+  for (const auto& leg : contact_) {
+    double most = 0.0;
+    for (const PointContact& point : leg) most = std::max(most, point.weight);
+    least = std::min(least, most);
+  }
+  return least;
+}
+
 RT_SAFE void Contacts::update(const LegPose& pose, const Eigen::Vector3d& root_m,
                               double dt_s) noexcept {
   assert(dt_s > 0.0);

@@ -32,6 +32,8 @@ class Contacts {
   [[nodiscard]] const PointContact& point(std::size_t leg, std::size_t point) const noexcept {
     return contact_[leg][point];
   }
+  // 1 while both legs stand, 0 while one moves or is not measured.
+  RT_SAFE [[nodiscard]] double both_stand() const noexcept;
   // Height at which a point of this kind stands [m].
   RT_SAFE [[nodiscard]] double ground_m(std::size_t point) const noexcept {
     return ground_m_[point];

@@ -149,9 +149,12 @@ RT_SAFE double FeetStage::step_s(const Frame& frame, const Eigen::Vector3d& root
   return dt_s;
 }
 
-// 0 while the style moves the feet, 1 where it does not.
+// 0 while the style moves the feet, 1 where it does not. Who rests on both feet is not known to
+// walk on without the style, and his avatar does not glide back: that waits for his next steps.
 RT_SAFE double FeetStage::gone(double dt_s) noexcept {
-  change_m_ *= std::exp(-dt_s / kChangeTau_s);
+  const bool strides = options_.root.mode == RootMode::kStride;
+  const double moves = strides ? 1.0 - contacts_.both_stand() : 1.0;
+  change_m_ *= std::exp(-moves * dt_s / kChangeTau_s);
   for (std::size_t leg = 0; leg < kLegs; ++leg) {
     if (!performer_.measured[leg] || !avatar_.measured[leg]) continue;
     for (std::size_t p = 0; p < kPoints; ++p) {
@@ -161,7 +164,7 @@ RT_SAFE double FeetStage::gone(double dt_s) noexcept {
       change_m_ = std::max(change_m_, change_m.norm());
     }
   }
-  return std::clamp(1.0 - change_m_ / kNoChange_m, 0.0, 1.0);
+  return moves * std::clamp(1.0 - change_m_ / kNoChange_m, 0.0, 1.0);
 }
 
 RT_SAFE void FeetStage::restart() noexcept {
@@ -248,8 +251,8 @@ RT_SAFE void FeetStage::process(const StageFrame& in, StageOut& out) noexcept {
   legs_.pose(*in.input, performer_);
   legs_.pose(in.frame, avatar_);
   const double dt_s = step_s(in.frame, root_m);
-  const double gone_now = gone(dt_s);
   contacts_.update(performer_, root_m, dt_s);
+  const double gone_now = gone(dt_s);
   const PosePair pair{
       .performer = performer_, .avatar = avatar_, .root_m = root_m, .learnt = in.root};
   const Eigen::Vector3d offset_m = root_.update(pair, contacts_, gone_now, dt_s, options_.root);

@@ -12,11 +12,16 @@ namespace {
 // Parts of a stride, from the landing of the heel, as in the usual description of gait (Perry,
 // "Gait Analysis", 1992): foot flat, heel rise, toes off.
 constexpr double kFlat = 0.04, kRise = 0.216, kOff = 0.545;
-constexpr double kOver = 0.218;  // the pelvis passes over the standing foot
 
-double smooth_step(double x) {
-  x = std::clamp(x, 0.0, 1.0);
-  return x * x * (3.0 - 2.0 * x);
+// How far a foot goes from this step to the next, of a usual stride: what stands does not roll.
+double share_of_stride(const Gait& gait, double time_s) {
+  if (!gait.round) return 1.0;
+  const double ahead_m = (path_m(gait, time_s + gait.stride_s) - path_m(gait, time_s)).norm();
+  return std::min(1.0, ahead_m / gait.stride_m);
+}
+
+double passes_over_s(const Gait& gait, int side, double step) {
+  return (step + (side == 0 ? 0.5 : 0.0) + kOver) * gait.stride_s;
 }
 
 // The cubic through two values with given slopes, at `x` from 0 to 1.
@@ -32,22 +37,25 @@ Eigen::Quaterniond turned(double yaw_rad, double pitch_rad) {
   return axis_rotation(Axis::kY, yaw_rad) * axis_rotation(Axis::kX, -pitch_rad);
 }
 
-double standing_pitch(const Gait& gait, double part) {
-  if (part < kFlat) return gait.strike_rad * (1.0 - smooth_step(part / kFlat));
+double standing_pitch(const Gait& gait, double time_s, double part) {
+  if (part < kFlat) {
+    return share_of_stride(gait, time_s - gait.stride_s) * gait.strike_rad *
+           (1.0 - smooth_step(part / kFlat));
+  }
   const double rise = std::max(0.0, (part - kRise) / (kOff - kRise));
-  return -gait.push_rad * std::pow(rise, 5.0);
+  return -share_of_stride(gait, time_s) * gait.push_rad * std::pow(rise, 5.0);
 }
 
 // A foot of this step while it touches the floor.
 FootPose standing(const Gait& gait, int side, double step, double part) {
-  const double over_s = (step + (side == 0 ? 0.5 : 0.0) + kOver) * gait.stride_s;
-  const double heading = heading_rad(gait, over_s);
+  const double time_s = passes_over_s(gait, side, step);
+  const double heading = heading_rad(gait, time_s);
   const LegLengths& leg = gait.leg;
   FootPose foot;
   foot.yaw_rad = heading + kSideSign[side] * gait.toe_out_rad;
-  foot.pitch_rad = standing_pitch(gait, part);
+  foot.pitch_rad = standing_pitch(gait, time_s, part);
   foot.toes_rad = std::max(0.0, -foot.pitch_rad);
-  const Eigen::Vector3d flat_m = path_m(gait, over_s) +
+  const Eigen::Vector3d flat_m = path_m(gait, time_s) +
                                  axis_rotation(Axis::kY, heading) *
                                      Eigen::Vector3d(kSideSign[side] * gait.half_width_m, 0, 0) +
                                  Eigen::Vector3d(0, leg.ankle_m, 0);
@@ -62,14 +70,13 @@ FootPose standing(const Gait& gait, int side, double step, double part) {
 
 }  // namespace
 
-double heading_rad(const Gait& gait, double time_s) { return gait.turn_rad_s * time_s; }
+double heading_rad(const Gait& gait, double time_s) {
+  return gait.round ? gait.round->heading_rad(time_s / gait.stride_s) : 0.0;
+}
 
 Eigen::Vector3d path_m(const Gait& gait, double time_s) {
-  const double speed_m_s = gait.stride_m / gait.stride_s;
-  const double angle = heading_rad(gait, time_s);
-  if (gait.turn_rad_s == 0.0) return {0.0, 0.0, speed_m_s * time_s};
-  const double radius_m = speed_m_s / gait.turn_rad_s;
-  return {radius_m * (1.0 - std::cos(angle)), 0.0, radius_m * std::sin(angle)};
+  if (gait.round) return gait.round->at_m(time_s / gait.stride_s);
+  return {0.0, 0.0, gait.stride_m / gait.stride_s * time_s};
 }
 
 FootPose foot_at(const Gait& gait, int side, double stride) {
@@ -88,7 +95,9 @@ FootPose foot_at(const Gait& gait, int side, double stride) {
   foot.ankle_m =
       cubic<Eigen::Vector3d>(from.ankle_m, kPerSwing * (from.ankle_m - before.ankle_m), to.ankle_m,
                              kPerSwing * (after.ankle_m - to.ankle_m), swing);
-  foot.ankle_m.y() += gait.lift_m * std::pow(std::sin(std::numbers::pi * swing), 2.0);
+  const double share = share_of_stride(gait, passes_over_s(gait, side, step));
+  foot.ankle_m.y() +=
+      std::sqrt(share) * gait.lift_m * std::pow(std::sin(std::numbers::pi * swing), 2.0);
   foot.yaw_rad = from.yaw_rad + (to.yaw_rad - from.yaw_rad) * smooth_step(swing);
   foot.pitch_rad = cubic(from.pitch_rad, kPerSwing * (from.pitch_rad - before.pitch_rad),
                          to.pitch_rad, kPerSwing * (after.pitch_rad - to.pitch_rad), swing);

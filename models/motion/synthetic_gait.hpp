@@ -4,8 +4,11 @@
 #pragma once
 
 #include <array>
+#include <optional>
 
 #include <Eigen/Geometry>
+
+#include "models/motion/synthetic_round.hpp"
 
 namespace posed::motion {
 
@@ -27,12 +30,12 @@ struct Gait {
   LegLengths leg;
   double stride_s = 1.1;  // both steps
   double stride_m = 1.5;
-  double turn_rad_s = 0.0;     // of the path, to the left
   double half_width_m = 0.05;  // from the path to a foot
   double toe_out_rad = 0.1;
-  double lift_m = 0.02;     // of a swinging ankle, beyond the straight way
-  double strike_rad = 0.5;  // the foot's pitch when the heel lands
-  double push_rad = 0.65;   // and, the other way, when the toes leave the floor
+  double lift_m = 0.02;             // of a swinging ankle, beyond the straight way
+  double strike_rad = 0.5;          // the foot's pitch when the heel lands
+  double push_rad = 0.65;           // and, the other way, when the toes leave the floor
+  std::optional<Round> round = {};  // where the walk goes; none: straight on
 };
 
 struct FootPose {
@@ -45,6 +48,9 @@ struct FootPose {
 struct LegPose {
   Eigen::Quaterniond thigh, shin, foot, toes;  // local, of a leg that hangs straight down in T
 };
+
+// The pelvis passes over a standing foot at this part of its stride.
+inline constexpr double kOver = 0.218;
 
 // The middle of the walk at a time, on the floor, and its heading about +Y.
 [[nodiscard]] Eigen::Vector3d path_m(const Gait& gait, double time_s);

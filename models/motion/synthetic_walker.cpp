@@ -44,15 +44,21 @@ enum JointName : int {
   kJointCount
 };
 
+// Where in a stride, and how much of the usual movement.
+struct Beat {
+  double phase = 0.0, swing = 1.0;
+};
+
 // A curve over a stride: mean + c1 cos + s1 sin + c2 cos 2 + s2 sin 2 of the phase, which is 0 when
 // the right heel lands. The coefficients are means over nine walks of six people of the CMU motion
 // capture database, each expressed in degrees or in lengths of the leg; the left side is half a
 // stride later.
 struct Curve {
   double mean, c1, s1, c2, s2;
-  [[nodiscard]] double wave(double phase) const {
-    return c1 * std::cos(phase) + s1 * std::sin(phase) + c2 * std::cos(2.0 * phase) +
-           s2 * std::sin(2.0 * phase);
+  [[nodiscard]] double wave(Beat beat) const {
+    const double phase = beat.phase;
+    return beat.swing * (c1 * std::cos(phase) + s1 * std::sin(phase) + c2 * std::cos(2.0 * phase) +
+                         s2 * std::sin(2.0 * phase));
   }
 };
 constexpr Curve kPelvisTurn_deg{0.0, 5.0, 1.0, 0.0, -0.1};
@@ -248,7 +254,6 @@ Gait make_gait(const WalkerOptions& options, const Person& person, const Manner&
   gait.strike_rad *= manner.stride * manner.stride;
   if (options.round) {
     gait.stride_s = options.seconds / std::max(1.0, std::round(options.seconds / gait.stride_s));
-    gait.turn_rad_s = kFullTurn / options.seconds;
   }
   return gait;
 }
@@ -270,44 +275,57 @@ class Walker {
       : person_(make_person(options.person)),
         manner_(manner_of(options.family)),
         gait_(make_gait(options, person_, manner_)) {
-    height_m_ = standing_height_m() - manner_.crouch * gait_.leg.length_m();
+    walking_height_m_ = walking_height_m() - manner_.crouch * gait_.leg.length_m();
+    if (options.round) {
+      gait_.round.emplace(gait_.stride_m, strides_in(options.seconds), kOver);
+    }
   }
 
   [[nodiscard]] const Person& person() const { return person_; }
+  [[nodiscard]] double strides_in(double seconds) const {
+    return std::round(seconds / gait_.stride_s);
+  }
   [[nodiscard]] Instant at(double time_s) const;
 
  private:
-  [[nodiscard]] double phase(double stride) const { return kFullTurn * stride; }
-  [[nodiscard]] double standing_height_m() const;
+  [[nodiscard]] Beat beat(double stride) const {
+    return {kFullTurn * stride, gait_.round ? gait_.round->swing(stride) : 1.0};
+  }
+  [[nodiscard]] double walking_height_m() const;
+  [[nodiscard]] double height_m(double swing) const;
+  [[nodiscard]] double into_turn_rad(double stride) const;
   [[nodiscard]] Eigen::Quaterniond pelvis(double stride) const;
   [[nodiscard]] Eigen::Vector3d root_m(double stride) const;  // but for the height
-  void set_trunk(double phase, Instant& now) const;
-  void set_arm(int side, double phase, Instant& now) const;
+  void set_trunk(Beat beat, Instant& now) const;
+  void look_into_turn(double stride, Instant& now) const;
+  void set_arm(int side, Beat beat, Instant& now) const;
 
   Person person_;
   Manner manner_;
   Gait gait_;
-  double height_m_ = 0.0;  // of the root, without its bounce
+  double walking_height_m_ = 0.0;  // of the root, without its bounce
 };
 
 Eigen::Quaterniond Walker::pelvis(double stride) const {
-  const double p = phase(stride);
+  const Beat p = beat(stride);
   return axis_rotation(Axis::kY, heading_rad(gait_, stride * gait_.stride_s)) *
          euler_zxy(manner_.roll * kPelvisRoll_deg.wave(p), 0.35 * manner_.lean_deg + 1.0,
                    manner_.turn * kPelvisTurn_deg.wave(p));
 }
 
 Eigen::Vector3d Walker::root_m(double stride) const {
-  const double p = phase(stride), leg_m = gait_.leg.length_m();
+  const Beat p = beat(stride);
+  const double leg_m = gait_.leg.length_m();
   const double time_s = stride * gait_.stride_s;
-  const Eigen::Vector3d beside(leg_m * manner_.sway * kPelvisLeft.wave(p),
+  const Eigen::Vector3d beside(leg_m * (manner_.sway * kPelvisLeft.wave(p) + into_turn_rad(stride)),
                                leg_m * manner_.bounce * kPelvisUp.wave(p),
                                leg_m * kPelvisAhead.wave(p));
   return path_m(gait_, time_s) + axis_rotation(Axis::kY, heading_rad(gait_, time_s)) * beside;
 }
 
-// The greatest height at which both legs reach the floor all the time with knees a little bent.
-double Walker::standing_height_m() const {
+// The greatest height at which both legs reach the floor all the time with knees a little bent, as
+// he goes straight on.
+double Walker::walking_height_m() const {
   constexpr int kInstants = 200;
   const double far_m = 0.995 * gait_.leg.length_m();
   double height_m = std::numeric_limits<double>::max();
@@ -326,33 +344,64 @@ double Walker::standing_height_m() const {
   return height_m;
 }
 
-// Pelvis and chest are turned against the walk's direction; the spine shares the way between them,
-// and the head looks ahead.
-void Walker::set_trunk(double phase, Instant& now) const {
-  const auto half = [](double chest, double pelvis) { return 0.5 * (chest - pelvis); };
-  const double roll =
-      half(manner_.chest * kChestRoll_deg.wave(phase), manner_.roll * kPelvisRoll_deg.wave(phase));
-  const double turn =
-      half(manner_.chest * kChestTurn_deg.wave(phase), manner_.turn * kPelvisTurn_deg.wave(phase));
-  const double lean = 0.5 * (kLean_deg.mean + kLean_deg.wave(phase)) + 0.325 * manner_.lean_deg;
-  now.turn[kSpine] = euler_zxy(roll, lean, turn);
-  now.turn[kChest] = euler_zxy(roll, lean, turn);
-  const double head = manner_.head_deg + kHeadLean_deg.wave(phase) - 1.5 * lean * 0.5;
-  const double chest_turn = manner_.chest * kChestTurn_deg.wave(phase);
-  now.turn[kNeck] = euler_zxy(0.0, 0.5 * head, -0.4 * chest_turn);
-  now.turn[kHead] =
-      euler_zxy(-0.5 * manner_.chest * kChestRoll_deg.wave(phase), 0.5 * head, -0.4 * chest_turn);
+// Who stands straightens his legs.
+double Walker::height_m(double swing) const {
+  constexpr double kStraight = 0.995;
+  const LegLengths& leg = gait_.leg;
+  const double standing_m =
+      leg.ankle_m + (kStraight - manner_.crouch) * leg.length_m() + leg.hips_below_m;
+  return standing_m + swing * (walking_height_m_ - standing_m);
 }
 
-void Walker::set_arm(int side, double phase, Instant& now) const {
+// How far the body leans into a turn, to the left: the centrifugal force over the weight.
+double Walker::into_turn_rad(double stride) const {
+  if (!gait_.round) return 0.0;
+  constexpr double kGravity_m_s2 = 9.81;
+  const double speed_m_s = gait_.round->pace(stride) * gait_.stride_m / gait_.stride_s;
+  return gait_.round->turn_rad_per_stride(stride) / gait_.stride_s * speed_m_s / kGravity_m_s2;
+}
+
+// The head looks where the walk goes next, and the trunk leans there.
+void Walker::look_into_turn(double stride, Instant& now) const {
+  constexpr double kAhead = 0.6, kMostLook_rad = 0.5;  // strides
+  const double look_rad =
+      std::clamp(gait_.round->heading_rad(stride + kAhead) - gait_.round->heading_rad(stride),
+                 -kMostLook_rad, kMostLook_rad);
+  const auto lean = axis_rotation(Axis::kZ, -0.35 * into_turn_rad(stride));
+  for (const int joint : {kSpine, kChest}) now.turn[joint] = lean * now.turn[joint];
+  const auto look = axis_rotation(Axis::kY, 0.4 * look_rad);
+  for (const int joint : {kNeck, kHead}) now.turn[joint] = look * now.turn[joint];
+}
+
+// Pelvis and chest are turned against the walk's direction; the spine shares the way between them,
+// and the head looks ahead.
+void Walker::set_trunk(Beat beat, Instant& now) const {
+  const auto half = [](double chest, double pelvis) { return 0.5 * (chest - pelvis); };
+  const double roll =
+      half(manner_.chest * kChestRoll_deg.wave(beat), manner_.roll * kPelvisRoll_deg.wave(beat));
+  const double turn =
+      half(manner_.chest * kChestTurn_deg.wave(beat), manner_.turn * kPelvisTurn_deg.wave(beat));
+  const double lean = 0.5 * (kLean_deg.mean + kLean_deg.wave(beat)) + 0.325 * manner_.lean_deg;
+  now.turn[kSpine] = euler_zxy(roll, lean, turn);
+  now.turn[kChest] = euler_zxy(roll, lean, turn);
+  const double head = manner_.head_deg + kHeadLean_deg.wave(beat) - 1.5 * lean * 0.5;
+  const double chest_turn = manner_.chest * kChestTurn_deg.wave(beat);
+  now.turn[kNeck] = euler_zxy(0.0, 0.5 * head, -0.4 * chest_turn);
+  now.turn[kHead] =
+      euler_zxy(-0.5 * manner_.chest * kChestRoll_deg.wave(beat), 0.5 * head, -0.4 * chest_turn);
+}
+
+void Walker::set_arm(int side, Beat beat, Instant& now) const {
   const double sign = kSideSign[side];
-  const double own = phase + (side == 0 ? std::numbers::pi : 0.0);
+  const Beat own{beat.phase + (side == 0 ? std::numbers::pi : 0.0), beat.swing};
   const double swing = manner_.swing * person_.vigour;
   // In T-pose an arm points to its side: turned about Y it swings, then Z lets it hang.
   const double ahead = kArmAhead_deg.mean + manner_.arm_ahead_deg + swing * kArmAhead_deg.wave(own);
   const double out = kArmOut_deg.mean + manner_.arm_out_deg + kArmOut_deg.wave(own);
-  const double elbow = std::max(
-      4.0, kElbow_deg.mean + manner_.elbow_deg + std::min(1.2, swing) * kElbow_deg.wave(own));
+  constexpr double kHangs_deg = 12.0;  // an arm that does not swing is straighter
+  const double elbow =
+      std::max(4.0, kElbow_deg.mean - (1.0 - beat.swing) * kHangs_deg + manner_.elbow_deg +
+                        std::min(1.2, swing) * kElbow_deg.wave(own));
   const int shoulder = side == 0 ? kLeftShoulder : kRightShoulder;
   now.turn[shoulder] = euler_zxy(sign * 0.5 * manner_.shoulder_deg, 0.0, 0.0);
   now.turn[shoulder + 1] =
@@ -365,10 +414,11 @@ Instant Walker::at(double time_s) const {
   const double stride = person_.phase + time_s / gait_.stride_s;
   Instant now;
   now.turn[kHips] = pelvis(stride);
-  now.root_m = root_m(stride) + Eigen::Vector3d(0, height_m_, 0);
-  set_trunk(phase(stride), now);
+  now.root_m = root_m(stride) + Eigen::Vector3d(0, height_m(beat(stride).swing), 0);
+  set_trunk(beat(stride), now);
+  if (gait_.round) look_into_turn(stride, now);
   for (int side = 0; side < 2; ++side) {
-    set_arm(side, phase(stride), now);
+    set_arm(side, beat(stride), now);
     const LegPose leg =
         reach(gait_.leg, side, now.root_m, now.turn[kHips], foot_at(gait_, side, stride));
     const int thigh = side == 0 ? kLeftUpperLeg : kRightUpperLeg;
@@ -391,6 +441,9 @@ Result<clip::Clip> make_walker(const WalkerOptions& options) {
     return fail("a walk has a length and a rate above 0");
   }
   const Walker walker(options);
+  if (options.round && walker.strides_in(options.seconds) < Round::kMinStrides) {
+    return fail("a walker's round takes at least 12 strides, about 16 s");
+  }
   clip::Clip walk;
   walk.path = "synthetic";
   walk.skeleton = std::make_shared<const Skeleton>(TRY(make_skeleton(walker.person())));

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::uint32_t kPeople = 6;  // of each family
 constexpr std::uint32_t kNewPerson = 21;
-constexpr double kNewWalkSeconds = 20.0;
+constexpr double kNewWalkSeconds = 24.0;
 constexpr const char* kGlove = "glove_train";
 constexpr std::size_t kCameraTakes = 10;
 

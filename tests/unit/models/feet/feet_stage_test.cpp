@@ -136,6 +136,26 @@ TEST_CASE("when the style fades out, the output becomes the input again", "[feet
   }
 }
 
+// A resting avatar would glide by metres: a gate closes where a performer stops.
+TEST_CASE("the avatar of a performer who stops stays where it is, without the style, too",
+          "[feet]") {
+  const auto walk = styled_walk(60.0, 7.0);
+  const auto stage = feet_stage(walk.source, "stride");
+  constexpr std::size_t kStops = 393, kRests = kStops + 60, kEnd = kStops + 300;  // both feet stand
+  Frame rests;
+  for (std::size_t t = 0; t < kEnd; ++t) {
+    Frame source = walk.source.frames[std::min(t, kStops)];
+    source.header.device_ns = static_cast<std::int64_t>(t) * 1'000'000'000 / 60;
+    Frame styled = source;
+    const double style = std::clamp((kStops + 30.0 - static_cast<double>(t)) / 30.0, 0.0, 1.0);
+    if (style > 0.0) test::restyle(*walk.source.skeleton, style, styled);
+    const Frame out = through(*stage, source, styled);
+    if (t == kRests) rests = out;
+    if (t > kRests) REQUIRE(test::root_apart_m(out, rests) < 0.005);
+  }
+  CHECK(test::root_apart_m(rests, walk.source.frames[kStops]) > 0.3);
+}
+
 TEST_CASE("the root can change while it runs, without a jump", "[feet]") {
   const auto walk = styled_walk(60.0, 12.0);
   const auto stage = feet_stage(walk.source, "stride");

@@ -40,7 +40,7 @@ TEST_CASE("a synthetic walker has the legs that the phase is found by", "[walker
 }
 
 // The last frame of a round is one step before the first: a loop shows no jump, of no joint.
-TEST_CASE("a walker who goes round a circle ends where it began", "[walker]") {
+TEST_CASE("a walker's round turns, stops, starts and ends where it began", "[walker]") {
   const auto walk = make_walker(
       {.family = WalkerFamily::kTired, .seconds = 20.0, .noise_deg = 0.0, .round = true});
   REQUIRE(walk);
@@ -58,9 +58,23 @@ TEST_CASE("a walker who goes round a circle ends where it began", "[walker]") {
     return most;
   };
   double usual_rad = 0.0;
-  for (int i = 0; i < last; ++i) usual_rad = std::max(usual_rad, turned_rad(i, i + 1));
-  CHECK(moved_m(last, 0) == Approx(moved_m(0, 1)).epsilon(0.1));
+  int stands = 0, walks = 0;
+  for (int i = 0; i < last; ++i) {
+    usual_rad = std::max(usual_rad, turned_rad(i, i + 1));
+    const double speed_m_s = moved_m(i, i + 1) * walk->frame_rate_hz;
+    stands += speed_m_s < 0.01 && turned_rad(i, i + 1) < 0.002;
+    walks += speed_m_s > 0.4;
+  }
+  CHECK(moved_m(last, 0) == Approx(moved_m(0, 1)).epsilon(0.15));
   CHECK(moved_m(last, last / 2) > 1.0);
   CHECK(turned_rad(last, 0) <= usual_rad);
+  CHECK(stands > 45);  // twice a second
+  CHECK(walks > 360);
+  // Half a round later he goes the other way.
+  const Eigen::Vector3d ahead = (walk->channels.row(1) - walk->channels.row(0)).head<3>();
+  const Eigen::Vector3d back = (walk->channels.row(301) - walk->channels.row(300)).head<3>();
+  CHECK(ahead.z() > 0.01);
+  CHECK((ahead + back).norm() == Approx(0.0).margin(0.01));
+  CHECK_FALSE(make_walker({.seconds = 5.0, .round = true}));
   CHECK_FALSE(make_walker({.seconds = 0.0, .round = true}));
 }
