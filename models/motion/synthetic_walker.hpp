@@ -24,9 +24,9 @@ struct WalkerOptions {
   double seconds = 6.0;
   double rate_hz = 30.0;
   double noise_deg = 0.3;  // white, of each rotation channel above the hips; feet do not tremble
-  bool round =
-      false;  // in `seconds`, at least 12 strides of his: walks, turns about, stops, stands
-              // and starts, twice, and is back where he began, so that it can be looped
+  // In `seconds`, at least 12 strides of his: walks, turns about, stops, stands and starts, twice,
+  // and is back where he began, so that the clip can be looped.
+  bool round = false;
 };
 
 // A clip of one walk that begins towards +Z. Skeleton with BVH-style ZXY channels and canonical
