@@ -96,8 +96,9 @@ class RokokoEncoder final : public DatagramEncoder {
   std::int64_t describe_every_ns() const noexcept override { return kNanosPerSecond; }
 
   void encode(const SendDatagram& send) override {
-    json_ =
-        R"({"version":"3.0","fps":)" + clip::number_text(rate_hz_) + R"(,"scene":{"timestamp":)";
+    json_ = R"({"version":"3.0","fps":)";  // keeps the memory of the frame before
+    json_ += clip::number_text(rate_hz_);
+    json_ += R"(,"scene":{"timestamp":)";
     std::array<char, 32> time{};
     const auto [end, error] =
         std::to_chars(time.data(), time.data() + time.size(), seconds(time_ns_ - begin_ns_),
@@ -108,7 +109,7 @@ class RokokoEncoder final : public DatagramEncoder {
     json_ += R"(],"props":[)";
     append_all(/*props=*/true);
     json_ += "]}}";
-    if (lz4_) return send(rokoko::compress(json_));
+    if (lz4_) return send(lz4_writer_.compress(json_));
     send(std::as_bytes(std::span(json_)));
   }
 
@@ -159,6 +160,7 @@ class RokokoEncoder final : public DatagramEncoder {
   double rate_hz_ = 60.0;                      // until a stream says it
   std::int64_t time_ns_ = 0, begin_ns_ = kNoTime_ns;
   std::string json_;
+  rokoko::Lz4Writer lz4_writer_;
 };
 
 }  // namespace

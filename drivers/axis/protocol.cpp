@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "drivers/byte_reader.hpp"
+#include "drivers/decimals.hpp"
 #include "drivers/packer.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/frame/degree.hpp"
@@ -118,6 +119,25 @@ RT_SAFE Outcome read_text(std::string_view text, std::size_t words, Message& mes
                                                                    : Outcome::kOutOfRange;
 }
 
+// Writes a value as std::to_chars does, with kDecimals; null where there is no room. A number that
+// is small, as all of a pose are, and lies clearly on one side of the half is rounded here.
+RT_SAFE char* put_value(char* at, char* end, double value) noexcept {
+  constexpr std::ptrdiff_t kLongest = 16;  // "-999999.999999"
+  constexpr double kClear = 1e-3;          // the product is off by a tenth of this
+  const double parts = std::abs(value) * 1e6;
+  if (end - at >= kLongest && parts < 1e12) {
+    const auto whole = static_cast<std::int64_t>(parts);
+    const double rest = parts - static_cast<double>(whole);
+    if (std::abs(rest - 0.5) > kClear) {
+      *at = '-';
+      at += std::signbit(value) ? 1 : 0;
+      return put_decimals<kDecimals>(at, whole + (rest > 0.5 ? 1 : 0));
+    }
+  }
+  const auto put = std::to_chars(at, end, value, std::chars_format::fixed, kDecimals);
+  return put.ec == std::errc() ? put.ptr : nullptr;
+}
+
 RT_SAFE bool fits_a_name(char c) noexcept {
   const auto code = static_cast<unsigned char>(c);
   return code > 0x20 && code != 0x7F && code != 0xFF && c != '|';
@@ -207,10 +227,8 @@ RT_SAFE std::size_t encode_text(const Message& message, std::span<char> out) noe
   for (const char c : name.empty() ? std::string_view("_") : name) put(fits_a_name(c) ? c : '_');
   for (std::size_t i = 0; i < value_count(message.content); ++i) {
     put(' ');
-    const auto value =
-        std::to_chars(at, end, message.values[i], std::chars_format::fixed, kDecimals);
-    if (value.ec != std::errc()) return 0;
-    at = value.ptr;
+    at = put_value(at, end, message.values[i]);
+    if (at == nullptr) return 0;
   }
   if (end - at < 3) return 0;
   for (const char c : {' ', kTextEnd[0], kTextEnd[1]}) put(c);

@@ -122,6 +122,7 @@ RT_SAFE void ClipDecoder::finish_frame(Sink& sink) noexcept {
   Frame frame;
   frame.header.device_ns = next_time_ns(parsed.time_s);
   frame.source = Source::kFile;
+  frame.timecode = parsed.timecode;
   pose_from_channels(*coding_.skeleton, values_, frame);
   size_ = line_begin_ = lines_ = 0;
   sink.outcome(Outcome::kOk);

@@ -1,6 +1,11 @@
 #include "drivers/mvn/encode.hpp"
 
 #include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <span>
 #include <string>
 
 #include "drivers/byte_writer.hpp"
@@ -13,16 +18,24 @@ namespace {
 
 constexpr int kTextDigits = 10;
 
+// In one piece, because most of a datagram is vectors.
 void write_vector(BigEndianWriter& writer, const Vec3f& v) {
-  for (const float x : v) writer.f32(x);
+  std::array<std::uint32_t, 3> bits{};
+  for (std::size_t i = 0; i < bits.size(); ++i) {
+    bits[i] = std::bit_cast<std::uint32_t>(v[i]);
+    if (std::endian::native == std::endian::little) bits[i] = std::byteswap(bits[i]);
+  }
+  writer.bytes(std::as_bytes(std::span(bits)));
 }
 
 // Angles about the fixed axes X, Y, Z, in this order of turning [degrees]. Each is read after the
 // one before is undone, so that they make the rotation exactly even where X and Z are one axis.
 Vec3f to_euler(const Quatf& rotation) {
-  const Eigen::Matrix3d m = to_eigen_double(rotation).normalized().toRotationMatrix();
+  const Eigen::Matrix3d m = to_eigen_double(rotation).toRotationMatrix();
   const double z = std::atan2(m(1, 0), m(0, 0));
-  const double c = std::cos(z), s = std::sin(z);
+  const double length = std::sqrt(m(0, 0) * m(0, 0) + m(1, 0) * m(1, 0));
+  const double c = length > 0.0 ? m(0, 0) / length : 1.0;
+  const double s = length > 0.0 ? m(1, 0) / length : 0.0;
   const double y = std::atan2(-m(2, 0), c * m(0, 0) + s * m(1, 0));
   const double x = std::atan2(s * m(0, 2) - c * m(1, 2), c * m(1, 1) - s * m(0, 1));
   return {static_cast<float>(x / kDegree), static_cast<float>(y / kDegree),
@@ -96,6 +109,7 @@ std::vector<std::byte> encode_pose(Type type, const CharacterPose& pose) {
   const bool unity = type == Type::kUnity;
   const std::size_t count = pose.fingers && !unity ? kSegments : kBodySegments;
   BigEndianWriter writer;
+  writer.written().reserve(count * item_bytes(type));
   for (std::size_t i = 0; i < count; ++i) {
     writer.i32(static_cast<std::int32_t>(i + 1));
     write_segment(writer, type, pose.segments.at(unity ? kUnitySegments.at(i) : i));

@@ -119,13 +119,8 @@ void StudioEmulator::emit(std::int64_t now_ns, Bytes& out) {
   pace_.step(now_ns);
   move(seconds(time_ns));
   const std::string json = frame_json(seconds(time_ns - began_ns_));
-  if (settings_.lz4) {
-    const Bytes bytes = compress(json);
-    out.insert(out.end(), bytes.begin(), bytes.end());
-  } else {
-    const auto bytes = std::as_bytes(std::span(json));
-    out.insert(out.end(), bytes.begin(), bytes.end());
-  }
+  const auto bytes = settings_.lz4 ? lz4_writer_.compress(json) : std::as_bytes(std::span(json));
+  out.insert(out.end(), bytes.begin(), bytes.end());
 }
 
 std::string StudioEmulator::frame_json(double time_s) const {

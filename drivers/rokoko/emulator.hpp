@@ -11,6 +11,7 @@
 #include "drivers/emulate/pace.hpp"
 #include "drivers/emulator.hpp"
 #include "drivers/rokoko/description.hpp"
+#include "drivers/rokoko/encode.hpp"
 
 namespace posed::drivers::rokoko {
 
@@ -59,6 +60,7 @@ class StudioEmulator final : public Emulator {
   std::int64_t began_ns_ = 0;
   double jaw_ = 0.0;  // how far Anna's is open, 0 to 100
   bool gloves_only_ = false;
+  Lz4Writer lz4_writer_;
 };
 
 }  // namespace posed::drivers::rokoko

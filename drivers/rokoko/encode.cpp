@@ -7,8 +7,9 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
+#include <cstring>
 
+#include "drivers/decimals.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::drivers::rokoko {
@@ -69,29 +70,24 @@ Eigen::Vector3f from_parent_m(std::string_view joint) {
 // Writes a number with seven decimals, which is faster than the shortest text; a place that lies
 // beyond all rooms is cut. At most 19 characters.
 char* put_number(char* at, float value) noexcept {
-  constexpr std::int64_t kParts = 10'000'000;  // of one
   constexpr double kMost = 1e9;
-  const double inside =
-      std::isfinite(value) ? std::clamp(static_cast<double>(value), -kMost, kMost) : 0.0;
-  const std::int64_t parts = std::llround(inside * static_cast<double>(kParts));
-  if (parts < 0) *at++ = '-';
-  const std::int64_t size = std::abs(parts);
-  at = std::to_chars(at, at + 11, size / kParts).ptr;
-  *at++ = '.';
-  auto rest = static_cast<std::uint32_t>(size % kParts);
-  for (int digit = 6; digit >= 0; --digit) {
-    at[digit] = static_cast<char>('0' + rest % 10);
-    rest /= 10;
-  }
-  return at + 7;
+  const double size =
+      std::isfinite(value) ? std::min(std::abs(static_cast<double>(value)), kMost) : 0.0;
+  // Product and sum of a float are exact, so halves are rounded up.
+  const auto parts = static_cast<std::int64_t>(size * 1e7 + 0.5);
+  *at = '-';
+  at += value < 0.0F && parts > 0 ? 1 : 0;
+  return put_decimals<7>(at, parts);
 }
 
 char* put_text(char* at, std::string_view text) noexcept { return std::ranges::copy(text, at).out; }
 
 template <std::size_t count>
 char* put_numbers(char* at, const std::array<float, count>& values) noexcept {
-  constexpr std::array<std::string_view, 4> kNames{"{\"x\":", ",\"y\":", ",\"z\":", ",\"w\":"};
-  for (std::size_t i = 0; i < count; ++i) at = put_number(put_text(at, kNames[i]), values[i]);
+  for (std::size_t i = 0; i < count; ++i) {
+    std::memcpy(at, &"{\"x\":,\"y\":,\"z\":,\"w\":"[5 * i], 5);
+    at = put_number(at + 5, values[i]);
+  }
   *at++ = '}';
   return at;
 }
@@ -129,14 +125,39 @@ void append_joints(std::string& json, const Skeleton& skeleton, const Frame& fra
   }
 }
 
-std::vector<std::byte> compress(std::string_view json) {
+Lz4Writer::Lz4Writer() {
+  LZ4F_cctx* context = nullptr;
+  if (LZ4F_isError(LZ4F_createCompressionContext(&context, LZ4F_VERSION)) == 0) {
+    context_.reset(context);
+  }
+}
+
+void Lz4Writer::Free::operator()(LZ4F_cctx_s* context) const noexcept {
+  (void)LZ4F_freeCompressionContext(context);
+}
+
+std::span<const std::byte> Lz4Writer::compress(std::string_view json) {
+  constexpr std::size_t kBlockBytes = 64 * 1024;
   LZ4F_preferences_t preferences = LZ4F_INIT_PREFERENCES;
-  preferences.compressionLevel = -20;  // fast: digits hardly compress
-  std::vector<std::byte> bytes(LZ4F_compressFrameBound(json.size(), &preferences));
-  const std::size_t size =
-      LZ4F_compressFrame(bytes.data(), bytes.size(), json.data(), json.size(), &preferences);
-  bytes.resize(LZ4F_isError(size) != 0 ? 0 : size);
-  return bytes;
+  preferences.compressionLevel = -100;  // fast: digits hardly compress
+  preferences.autoFlush = 1;
+  if (json.size() <= kBlockBytes) preferences.frameInfo.blockMode = LZ4F_blockIndependent;
+  const std::size_t room = LZ4F_compressFrameBound(json.size(), &preferences);
+  if (bytes_.size() < room) bytes_.resize(room);
+  std::size_t size = 0;
+  const auto add = [&](std::size_t written) {
+    const bool ok = LZ4F_isError(written) == 0;
+    size += ok ? written : 0;
+    return ok;
+  };
+  const LZ4F_compressOptions_t options{.stableSrc = 1, .reserved = {}};
+  std::byte* const out = bytes_.data();
+  const bool ok = context_ != nullptr &&
+                  add(LZ4F_compressBegin(context_.get(), out, bytes_.size(), &preferences)) &&
+                  add(LZ4F_compressUpdate(context_.get(), out + size, bytes_.size() - size,
+                                          json.data(), json.size(), &options)) &&
+                  add(LZ4F_compressEnd(context_.get(), out + size, bytes_.size() - size, &options));
+  return {out, ok ? size : 0};
 }
 
 JointSet without_fingers() {

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,6 +12,8 @@
 #include "drivers/rokoko/description.hpp"
 #include "proto/frame/frame.hpp"
 #include "proto/frame/skeleton.hpp"
+
+struct LZ4F_cctx_s;  // of lz4frame.h
 
 namespace posed::drivers::rokoko {
 
@@ -19,8 +23,20 @@ void append_transform(std::string& json, const Vec3f& position_m, const Quatf& r
 // joint that is not valid is sent as all zero.
 void append_joints(std::string& json, const Skeleton& skeleton, const Frame& frame);
 
-// The JSON as an LZ4 frame.
-[[nodiscard]] std::vector<std::byte> compress(std::string_view json);
+// Makes LZ4 frames of the JSON, one after another in the same memory.
+class Lz4Writer {
+ public:
+  Lz4Writer();
+  // Empty where memory is short. The bytes live until the next call.
+  [[nodiscard]] std::span<const std::byte> compress(std::string_view json);
+
+ private:
+  struct Free {
+    void operator()(LZ4F_cctx_s* context) const noexcept;
+  };
+  std::unique_ptr<LZ4F_cctx_s, Free> context_;
+  std::vector<std::byte> bytes_;
+};
 
 // A person of 1.75 m times `scale` in T-pose with these joints: what Studio would stream and the
 // decoder would describe.

@@ -125,7 +125,7 @@ RT_SAFE void Retarget::apply(const Frame& in, Frame& out) const noexcept {
     }
     target[j] = C[j] * part.after;
     const Quaterniond local = above < 0 ? target[j] : target[parent].conjugate() * target[j];
-    set_rotation(*to_, static_cast<int>(j), local.normalized(), out);
+    set_rotation(*to_, static_cast<int>(j), local, out);  // which normalises it
     out.valid[j] = measured;
   }
   const int hips = from_->joint_of(Bone::kHips), hips_there = to_->joint_of(Bone::kHips);

@@ -35,6 +35,31 @@ Result<> check_bones(const Skeleton& skeleton, const std::string& path) {
               path);
 }
 
+// VRM knows no figure without a spine, but those of pose estimators have only a neck above the
+// hips: they get one that nothing turns, halfway up.
+Result<std::shared_ptr<const Skeleton>> with_spine(std::shared_ptr<const Skeleton> humanoid) {
+  const int neck = humanoid->joint_of(Bone::kNeck);
+  if (humanoid->joint_of(Bone::kSpine) >= 0 || neck < 0 || humanoid->joints[neck].parent != 0) {
+    return humanoid;
+  }
+  auto out = std::make_shared<Skeleton>(*humanoid);
+  const Eigen::Vector3d half_m = out->joints[neck].offset_m / 2.0;
+  for (Joint& joint : out->joints) {
+    const bool above = joint.parent == 0 && joint.bone != Bone::kLeftUpperLeg &&
+                       joint.bone != Bone::kRightUpperLeg;
+    if (above) joint.offset_m -= half_m;
+    if (joint.parent > 0 || above) ++joint.parent;
+  }
+  Joint spine;
+  spine.name = bone_name(Bone::kSpine);
+  spine.parent = 0;
+  spine.bone = Bone::kSpine;
+  spine.offset_m = half_m;
+  out->joints.insert(out->joints.begin() + 1, std::move(spine));
+  TRY(out->finish());
+  return out;
+}
+
 // How high the hips of the T-pose are above its lowest point, so that the figure stands on the
 // ground.
 double hips_height_m(const Skeleton& humanoid) {
@@ -63,9 +88,10 @@ std::vector<clip::GltfNode> nodes_of(const Skeleton& humanoid) {
 
 Result<> write_vrm_animation(const clip::Clip& clip, const std::filesystem::path& path) {
   auto time_s = TRY(clip::gltf_times(clip));
-  TRY(check_bones(*clip.skeleton, clip.path));
+  if (clip.skeleton->joint_of(Bone::kHips) < 0) TRY(check_bones(*clip.skeleton, clip.path));
   auto humanoid = TRY(canonical_skeleton(*clip.skeleton));
-  TRY(check_bones(*humanoid, clip.path));  // some hang beside the hips
+  humanoid = TRY(with_spine(std::move(humanoid)));
+  TRY(check_bones(*humanoid, clip.path));  // also of bones that hang beside the hips
   const auto retarget = TRY(Retarget::bind(clip.skeleton, humanoid));
   clip::GltfMotion motion{
       .name = path.stem().string(), .time_s = std::move(time_s), .nodes = nodes_of(*humanoid)};

@@ -21,6 +21,7 @@ Frame Clip::frame(int index) const {
   frame.header.sequence = static_cast<std::uint64_t>(index) + 1;
   frame.header.device_ns = nanoseconds(time_s.empty() ? index / frame_rate_hz : time_s[index]);
   frame.source = Source::kFile;
+  if (!timecode.empty()) frame.timecode = timecode[index];
   const auto row = channels.row(index);
   pose_from_channels(*skeleton, {row.data(), static_cast<std::size_t>(row.size())}, frame);
   return frame;

@@ -62,8 +62,8 @@ std::string describe_text(const LoadedClip& loaded, const TextFrames& text, cons
 }
 
 std::string describe_numbers(const Clip& clip) {
-  return first_line(kNumbers, clip) + " timed=" + (clip.time_s.empty() ? "0" : "1") + '\n' +
-         skeleton_json(*clip.skeleton);
+  return first_line(kNumbers, clip) + " timed=" + (clip.time_s.empty() ? "0" : "1") +
+         (clip.timecode.empty() ? "" : " timecoded=1") + '\n' + skeleton_json(*clip.skeleton);
 }
 
 using Facts = std::map<std::string, std::string, std::less<>>;
@@ -143,7 +143,8 @@ Result<FrameCoding> parse_text(const Format& format, const Facts& facts, double 
 Result<FrameCoding> parse_numbers(const Facts& facts, double rate_hz, std::string_view body,
                                   const std::string& name) {
   auto skeleton = TRY(skeleton_from_json(body, name));
-  auto parser = FrameParser::numbers(skeleton, fact(facts, "timed") == 1.0);
+  auto parser =
+      FrameParser::numbers(skeleton, fact(facts, "timed") == 1.0, fact(facts, "timecoded") == 1.0);
   if (parser.frame_bytes() == 0) return damaged(name);
   return FrameCoding{.skeleton = std::make_shared<const Skeleton>(std::move(skeleton)),
                      .frame_rate_hz = rate_hz,
@@ -161,12 +162,15 @@ void add_text(const LoadedClip& loaded, const TextFrames& text, const Clip& clip
 }
 
 void add_numbers(const Clip& clip, DeviceClip& out) {
-  out.coding.parser = FrameParser::numbers(*clip.skeleton, !clip.time_s.empty());
+  out.coding.parser =
+      FrameParser::numbers(*clip.skeleton, !clip.time_s.empty(), !clip.timecode.empty());
   out.description = describe_numbers(clip);
   for (int i = 0; i < clip.frames(); ++i) {
     const auto row = clip.channels.row(i);
     const auto time_s = clip.time_s.empty() ? std::nullopt : std::optional(clip.time_s[i]);
-    out.frames.push_back(frame_bytes(time_s, {row.data(), static_cast<std::size_t>(row.size())}));
+    const auto timecode = clip.timecode.empty() ? std::nullopt : std::optional(clip.timecode[i]);
+    out.frames.push_back(
+        frame_bytes(time_s, timecode, {row.data(), static_cast<std::size_t>(row.size())}));
   }
 }
 

@@ -5,8 +5,8 @@
 // - BVH, AMC and hand CSV (Format::sends_text): a frame is its piece of the file's text, ended by a
 //   line end; the description is the skeleton as JSON, the file's header and its first frame. Logs
 //   of posed 0.1 have facts of the whole clip in the place of the skeleton.
-// - every other format: a frame is its time, if the clip has times, and its channel values, as
-//   little-endian doubles (FrameParser::numbers); the description is the skeleton as JSON.
+// - every other format: a frame is its time and its timecode, if the clip has them, and its channel
+//   values (FrameParser::numbers); the description is the skeleton as JSON.
 //
 // Cold.
 #pragma once

@@ -106,11 +106,12 @@ FrameParser FrameParser::hand_csv() {
   return parser;
 }
 
-FrameParser FrameParser::numbers(const Skeleton& skeleton, bool timed) {
+FrameParser FrameParser::numbers(const Skeleton& skeleton, bool timed, bool timecoded) {
   FrameParser parser;
   parser.scale_ = scales(skeleton, 1.0, 1.0);
   parser.limit_ = limits(skeleton);
   parser.timed_ = timed;
+  parser.timecoded_ = timecoded;
   parser.is_text_ = false;
   return parser;
 }
@@ -209,6 +210,11 @@ FrameOutcome FrameParser::parse_numbers(std::string_view bytes,
     outcome.fault = FrameFault::kImplausible;
     return outcome;
   }
+  if (timecoded_) {
+    const std::string_view text = bytes.substr(0, sizeof(Timecode));
+    outcome.timecode = to_timecode(text.substr(0, text.find('\0')));
+    bytes.remove_prefix(sizeof(Timecode));
+  }
   for (; outcome.found < outcome.expected; ++outcome.found) {
     if (keep(next(), outcome.found, values)) continue;
     outcome.fault = FrameFault::kImplausible;
@@ -274,12 +280,14 @@ FrameOutcome FrameParser::parse_block(std::string_view text,
   return outcome;
 }
 
-std::string frame_bytes(std::optional<double> time_s, std::span<const double> values) {
+std::string frame_bytes(std::optional<double> time_s, const std::optional<Timecode>& timecode,
+                        std::span<const double> values) {
   std::string bytes;
   const auto add = [&bytes](double value) {
     bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
   };
   if (time_s) add(*time_s);
+  if (timecode) bytes.append(timecode->data(), timecode->size());
   for (const double value : values) add(value);
   return bytes;
 }

@@ -14,6 +14,7 @@
 
 #include "proto/clip/acclaim.hpp"
 #include "proto/frame/skeleton.hpp"
+#include "proto/frame/timecode.hpp"
 
 namespace posed::clip {
 
@@ -37,6 +38,7 @@ struct FrameOutcome {
   std::size_t found = 0;
   std::int64_t number = 0;                                   // AMC: the frame's own number
   double time_s = std::numeric_limits<double>::quiet_NaN();  // the frame's own time, if given
+  Timecode timecode{};                                       // empty where the frame has none
 
   [[nodiscard]] bool ok() const noexcept { return fault == FrameFault::kNone; }
   // Describes the outcome in one sentence. Cold.
@@ -58,13 +60,15 @@ class FrameParser {
   // is a missing value.
   [[nodiscard]] static FrameParser hand_csv();
 
-  // Copies a frame of frame_bytes(): the values of all channels, in radians and metres. `timed`:
-  // they stand behind the frame's time.
-  [[nodiscard]] static FrameParser numbers(const Skeleton& skeleton, bool timed);
+  // Copies a frame of frame_bytes(): the values of all channels, in radians and metres. They stand
+  // behind the frame's time, where frames have one, and its timecode, the same.
+  [[nodiscard]] static FrameParser numbers(const Skeleton& skeleton, bool timed, bool timecoded);
 
   // Length of a frame in bytes; 0 for a text, whose frames end with their line.
   [[nodiscard]] std::size_t frame_bytes() const noexcept {
-    return is_text_ ? 0 : sizeof(double) * (channels() + (timed_ ? 1 : 0));
+    return is_text_ ? 0
+                    : sizeof(double) * (channels() + (timed_ ? 1 : 0)) +
+                          (timecoded_ ? sizeof(Timecode) : 0);
   }
 
   // Number of values that parse() writes: the skeleton's channels.
@@ -102,11 +106,14 @@ class FrameParser {
   std::vector<AcclaimBone> bones_;  // AMC, sorted by name
   std::size_t lines_ = 1;
   bool timed_ = false;
+  bool timecoded_ = false;
   bool is_text_ = true;
 };
 
-// The bytes of a frame that FrameParser::numbers() reads: little-endian doubles. `time_s` is left
-// out where it is empty. Cold.
-[[nodiscard]] std::string frame_bytes(std::optional<double> time_s, std::span<const double> values);
+// The bytes of a frame that FrameParser::numbers() reads: little-endian doubles, and the text of a
+// timecode. `time_s` and `timecode` are left out where they are empty. Cold.
+[[nodiscard]] std::string frame_bytes(std::optional<double> time_s,
+                                      const std::optional<Timecode>& timecode,
+                                      std::span<const double> values);
 
 }  // namespace posed::clip

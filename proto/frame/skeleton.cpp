@@ -170,7 +170,10 @@ double distance(const std::array<double, 3>& a, const std::array<double, 3>& b) 
 }
 
 std::array<double, 3> unwrap_near(std::array<double, 3> angles, const std::array<double, 3>& near) {
-  for (std::size_t i = 0; i < 3; ++i) angles[i] = posed::unwrap_near(angles[i], near[i]);
+  for (std::size_t i = 0; i < 3; ++i) {
+    if (std::abs(angles[i] - near[i]) < 3.0) continue;  // within half a turn
+    angles[i] = posed::unwrap_near(angles[i], near[i]);
+  }
   return angles;
 }
 
@@ -180,7 +183,7 @@ std::array<double, 3> three_axes(const Eigen::Quaterniond& q, int i, int j, int 
                                  const std::array<double, 3>& near) {
   const Eigen::Matrix3d r = q.toRotationMatrix();
   const double e = (j - i + 3) % 3 == 1 ? 1.0 : -1.0;
-  const double cosine = std::hypot(r(i, i), r(i, j));
+  const double cosine = std::sqrt(r(i, i) * r(i, i) + r(i, j) * r(i, j));
   const double middle = std::atan2(e * r(i, k), cosine);
   if (cosine < 1e-9) {
     const Eigen::Quaterniond rest = axis_rotation(static_cast<Axis>(j), -middle) *
@@ -191,6 +194,8 @@ std::array<double, 3> three_axes(const Eigen::Quaterniond& q, int i, int j, int 
   const double z = std::atan2(-e * r(i, j), r(i, i));
   constexpr double kPi = std::numbers::pi;
   const auto one = unwrap_near(std::array{x, middle, z}, near);
+  // The other is half a turn away in two of them.
+  if (distance(one, near) < kPi) return one;
   const auto other = unwrap_near(std::array{x + kPi, kPi - middle, z + kPi}, near);
   return distance(one, near) <= distance(other, near) ? one : other;
 }
@@ -278,7 +283,8 @@ std::array<double, 3> channels_from_rotation(const Skeleton& skeleton, int joint
                                              const Eigen::Quaterniond& rotation,
                                              const std::array<double, 3>& near_rad) {
   const Eigen::Quaterniond& c = skeleton.joints[joint].channel_frame;
-  const Eigen::Quaterniond m = (c.conjugate() * rotation * c).normalized();
+  const bool own = c.w() == 1.0;  // the joint's
+  const Eigen::Quaterniond m = (own ? rotation : c.conjugate() * rotation * c).normalized();
   std::array<int, 3> axes{};
   std::size_t count = 0;
   for (const Channel& channel : channels_of(skeleton, joint)) {

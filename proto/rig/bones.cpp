@@ -72,6 +72,8 @@ std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>&
                      (chain.size() != 1 || step.norm() > kNeck * way.norm());
     if (!tip && !names[j].has("end") && !names[j].has("nub")) chain.push_back(j);
   }
+  // A face and a nose are on the head.
+  while (chain.size() > 1 && names[chain.back()].helper) chain.pop_back();
   return chain.empty() ? std::vector{first} : chain;
 }
 
@@ -175,12 +177,15 @@ FingerJoints finger_joints(const Figure& figure, const std::vector<JointName>& n
   const bool from_zero = std::ranges::any_of(below, [&names](int j) {
     return names[j].digits.starts_with('0') && names[j].has("finger");
   });
+  // Where the thumb has a name of its own, the first finger is the index.
+  const bool thumb_apart =
+      std::ranges::any_of(below, [&names](int j) { return finger_of(names[j]) == 0; });
   FingerJoints out;
   for (const int j : below) {
     const JointName& name = names[j];
     auto finger = finger_of(name);
     if (!finger && (name.has("finger") || name.has("fing")) && !name.digits.empty()) {
-      finger = name.digits.front() - '0' - (from_zero ? 0 : 1);
+      finger = name.digits.front() - '0' - (from_zero || thumb_apart ? 0 : 1);
     }
     if (finger && *finger >= 0 && *finger < kFingers) out[*finger].push_back(j);
   }
@@ -254,8 +259,8 @@ void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJ
       neck.push_back(j);
     }
   }
-  // Arms may begin at the neck, but a joint of that name is no trunk.
-  while (trunk.size() > 1 && is_neck(names[trunk.back()])) {
+  // Arms may begin at the neck, but a joint of that name is no trunk: some people have only that.
+  while (!trunk.empty() && is_neck(names[trunk.back()])) {
     neck.insert(neck.begin(), trunk.back());
     trunk.pop_back();
   }

@@ -7,6 +7,8 @@ constexpr std::size_t at(Side side) { return static_cast<std::size_t>(side); }
 
 Vec mirror(const Vec& v) { return {-v.x(), v.y(), v.z()}; }
 
+constexpr double kStraightShin_deg = 15;  // of a figure whose legs are together
+
 }  // namespace
 
 void Frames::legs() {
@@ -116,7 +118,8 @@ void Frames::leg(Side side, const Mat& T_thigh, double sure_leg, const std::stri
   set(lower, shin ? Mat(minimal(T_thigh * *shin, -kY) * T_thigh) : T_thigh, sure_leg, why);
 }
 
-// A shin that is upright in the zero pose stands on a flat sole; else the foot goes with the shin.
+// A figure that stands has flat soles, also where its legs are apart, unless the foot itself shows
+// that it was laid along the shin.
 void Frames::real_foot(Side side, double sure_foot, const std::string& why, bool by_feet) {
   const Bone foot = on(side, Bone::kLeftFoot);
   const Bone lower = on(side, Bone::kLeftLowerLeg);
@@ -124,9 +127,18 @@ void Frames::real_foot(Side side, double sure_foot, const std::string& why, bool
   const Mat Tl = *t_frame(lower);
   const Mat Th = by_feet ? *t_frame(on(side, Bone::kLeftUpperLeg)) : *t_frame(Bone::kHips);
   const auto way = rest(lower, {foot});
-  const bool stands = !way || angle_deg(Th * *way, -kY) < 15;
-  Mat Tf = stands ? Th : Tl;
-  std::string why_foot = stands ? "flat sole in the " + why : "goes with the shin";
+  Mat Tf = Th;
+  std::string why_foot = "flat sole in the " + why;
+  if (way && angle_deg(Th * *way, -kY) >= kStraightShin_deg) {
+    const Sole sole = sole_of(side, Th, Tl);
+    if (sole == Sole::kAlongShin) {
+      Tf = Tl;
+      why_foot = "goes with the shin";
+    } else if (sole == Sole::kUnclear) {
+      sure_foot = std::min(sure_foot, 0.5);
+      why_foot = "legs apart in the " + why + ": the sole is taken for flat";
+    }
+  }
   const auto toes = toe_way(side);
   if (toes && angle_deg(Tf * *toes, kZ) > 75) {
     Tf = minimal(Tf * *toes, kZ) * Tf;
@@ -177,6 +189,32 @@ std::optional<Vec> Frames::foot_way(Side side) const {
   auto way = rest(on(side, Bone::kLeftFoot), {on(side, Bone::kLeftToes)});
   if (!way) way = leaf(on(side, Bone::kLeftFoot));
   return way ? std::optional(direction(*way)) : std::nullopt;
+}
+
+// Of a foot below a slanting shin: is its sole flat, or did its maker lay it along the shin? Ankle,
+// toes and their one tip lie in the foot's upright plane, and the tip is level. A foot that does
+// not show this but lies exactly in the shin's plane was laid along it. Toes that are turned out a
+// little must not pass for either.
+Frames::Sole Frames::sole_of(Side side, const Mat& T_flat, const Mat& T_shin) const {
+  const auto way = foot_way(side);
+  if (!way) return Sole::kUnclear;
+  const auto tip = leaf(on(side, Bone::kLeftToes));
+  const int toes = joint_[on(side, Bone::kLeftToes)];
+  const bool one_tip = tip && figure_.children(toes).size() <= 1;
+  const Vec plane = one_tip ? Vec(way->cross(direction(*tip))) : Vec(Vec::Zero());
+  if (plane.norm() > std::sin(5 * kDegree)) {
+    const auto off_deg = [&](const Mat& T) {
+      return std::abs(90 - angle_deg(T * plane, kY)) + std::abs(90 - angle_deg(T * *tip, kY));
+    };
+    const double flat_deg = off_deg(T_flat);
+    const double shin_deg = off_deg(T_shin);
+    if (flat_deg < 3 && shin_deg > flat_deg + 5) return Sole::kFlat;
+    if (shin_deg < 3 && flat_deg > shin_deg + 5) return Sole::kAlongShin;
+  }
+  const double flat = std::abs((T_flat * *way).x());
+  const double shin = std::abs((T_shin * *way).x());
+  if (flat < 0.02 && shin > 0.04) return Sole::kFlat;
+  return shin < 0.005 && flat > 0.02 ? Sole::kAlongShin : Sole::kUnclear;
 }
 
 // From the ankle to the farthest point of the toes. An end site without a toe joint proves nothing.

@@ -52,8 +52,6 @@ std::array<int, kSlots> best_chain(const Figure& figure,
   return best.joint;
 }
 
-}  // namespace
-
 // Hand, foot and toes that the names do not say are the next joints of the limb, where such a joint
 // is far enough to be no twist: `chain` ends before them.
 int next_of_limb(const Figure& figure, const std::vector<JointName>& names, int last, int known) {
@@ -69,6 +67,33 @@ int next_of_limb(const Figure& figure, const std::vector<JointName>& names, int 
   return next;
 }
 
+// Of makers that call the ankle by its name, the "foot" below it is the ball, where the toes begin,
+// and "toe" is their tip.
+int ball_of_foot(const Figure& figure, const std::vector<std::optional<Fit>>& fits, int ankle,
+                 int toes) {
+  constexpr double kAtAnkle = 0.2;  // of the foot's length: a second joint there is no ball
+  const double length = figure.between(ankle, toes).value_or(Vec::Zero()).norm();
+  for (int j = figure[toes].parent; j != ankle; j = figure[j].parent) {
+    const bool is_foot = fits[j] && (*fits[j])[2] >= 0.9;  // by its whole name
+    const Vec way = figure.between(ankle, j).value_or(Vec::Zero());
+    if (is_foot && way.norm() > kAtAnkle * length) return j;
+  }
+  return toes;
+}
+
+// The joint between the trunk and an upper arm that no word names is the shoulder, if there is one.
+int shoulder_of(const Figure& figure, const std::vector<JointName>& names, int chest, int arm) {
+  int found = -1;
+  for (int j = figure[arm].parent; j > chest; j = figure[j].parent) {
+    if (names[j].helper || figure.between(j, arm).value_or(Vec::Zero()).isZero()) continue;
+    if (found >= 0) return -1;
+    found = j;
+  }
+  return found;
+}
+
+}  // namespace
+
 void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones) {
   const auto find = [&](Side side, Bone first, auto fit_of,
                         const std::array<bool, kSlots>& needed) {
@@ -82,6 +107,9 @@ void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJ
     if (chain[end - 1] >= 0 && chain[end] < 0) {
       chain[end] = next_of_limb(figure, names, chain[end - 1], end == 2 ? chain[3] : -1);
     }
+    if (end == 2 && chain[2] >= 0 && chain[3] >= 0) {
+      chain[3] = ball_of_foot(figure, fits, chain[2], chain[3]);
+    }
     for (std::size_t k = 0; k < kSlots; ++k) {
       bones.set(on(side, static_cast<Bone>(static_cast<std::size_t>(first) + k)), chain[k]);
     }
@@ -89,6 +117,13 @@ void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJ
   for (const Side side : kSides) {
     find(side, Bone::kLeftUpperLeg, leg_fit, {true, true, false, false});
     find(side, Bone::kLeftShoulder, arm_fit, {false, true, true, false});
+  }
+  if (!bones.has_limbs()) return;
+  const int chest = figure.common({bones[Bone::kLeftUpperArm], bones[Bone::kRightUpperArm]});
+  for (const Side side : kSides) {
+    const Bone shoulder = on(side, Bone::kLeftShoulder);
+    if (bones.has(shoulder)) continue;
+    bones.set(shoulder, shoulder_of(figure, names, chest, bones[on(side, Bone::kLeftUpperArm)]));
   }
 }
 

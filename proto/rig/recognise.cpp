@@ -15,25 +15,42 @@ struct LengthUnit {
   double doubt;  // how much worse the fit of a more usual unit may be
 };
 constexpr double kCmu_m = 0.0254 / 0.45;
-constexpr std::array<LengthUnit, 8> kLengthUnits{{{1.0, "metres", 0.0},
-                                                  {0.01, "centimetres", 0.0},
-                                                  {0.001, "millimetres", 0.1},
-                                                  {0.0254, "inches", 0.25},
-                                                  {0.1, "decimetres", 0.3},
-                                                  {0.3048, "feet", 0.35},
-                                                  {kCmu_m, "inches / 0.45", 0.6},
-                                                  {2.4384, "Poser's units of 8 feet", 0.45}}};
+constexpr double kMmd_m = 0.08;
+constexpr double kNever = 1e9;  // unless its maker's names say so: decimetres are too near
+constexpr std::array<LengthUnit, 9> kLengthUnits{
+    {{1.0, "metres", 0.0},
+     {0.01, "centimetres", 0.0},
+     {0.001, "millimetres", 0.1},
+     {0.0254, "inches", 0.25},
+     {0.1, "decimetres", 0.3},
+     {0.3048, "feet", 0.35},
+     {kCmu_m, "inches / 0.45", 0.6},
+     {2.4384, "Poser's units of 8 feet", 0.45},
+     {kMmd_m, "MikuMikuDance's units of 8 cm", kNever}}};
 
-const LengthUnit& unit_for(double length, double true_m, bool is_cmu) {
+// The unit of makers that have one of their own, known by names that only they give; else 0.
+double usual_unit_m(const std::vector<RigJoint>& joints, const std::vector<JointName>& names) {
+  const auto any_name = [&names](std::string_view part) {
+    return std::ranges::any_of(names,
+                               [part](const JointName& name) { return name.stem.contains(part); });
+  };
+  const bool is_mmd = (any_name("upperbody") && any_name("lowerbody")) ||
+                      std::ranges::any_of(joints, [](const RigJoint& joint) {
+                        return joint.name.contains("センター");
+                      });
+  return is_mmd ? kMmd_m : any_name("hipjoint") ? kCmu_m : 0.0;
+}
+
+const LengthUnit& unit_for(double length, double true_m, double usual_m) {
   return *std::ranges::min_element(kLengthUnits, {}, [&](const LengthUnit& unit) {
-    const bool usual = is_cmu && unit.metres == kCmu_m;
-    return std::abs(std::log(length * unit.metres / true_m)) + (usual ? 0.0 : unit.doubt);
+    const double doubt = unit.metres == usual_m ? 0.0 : unit.doubt;
+    return std::abs(std::log(length * unit.metres / true_m)) + doubt;
   });
 }
 
-void set_unit(double length, double true_m, bool is_cmu, std::string_view what, Rig& rig) {
+void set_unit(double length, double true_m, double usual_m, std::string_view what, Rig& rig) {
   if (!(length > 0.0)) return;
-  const LengthUnit& unit = unit_for(length, true_m, is_cmu);
+  const LengthUnit& unit = unit_for(length, true_m, usual_m);
   if (!rig.metres_per_unit) {
     rig.metres_per_unit = unit.metres;
     rig.unit = unit.name;
@@ -167,15 +184,13 @@ Rig recognise(const RigInput& input) {
   }
   if (found.kind == Kind::kPerson && frames.can_find_person()) {
     frames.find_person();
-    const bool is_cmu = std::ranges::any_of(names, [](const JointName& name) {
-      return name.stem.find("hipjoint") != std::string::npos;
-    });
     set_facing(input, frames, rig);
-    set_unit(frames.leg_length(), kAdultLeg_m, is_cmu, "thigh and shin are", rig);
+    set_unit(frames.leg_length(), kAdultLeg_m, usual_unit_m(input.joints, names),
+             "thigh and shin are", rig);
   } else if (found.kind == Kind::kHand) {
     const Side side = found.joint.has(Bone::kLeftHand) ? Side::kLeft : Side::kRight;
     frames.find_hand(side);
-    set_unit(frames.hand_length(side), kAdultHand_m, false, "the hand is", rig);
+    set_unit(frames.hand_length(side), kAdultHand_m, 0.0, "the hand is", rig);
   } else {
     rig.kind = Kind::kPart;
     frames.lay_parts();

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <initializer_list>
 #include <optional>
 #include <string>
@@ -85,6 +86,8 @@ class Frames {
   void leg(Side side, const Mat& T, double sure, const std::string& why);
   void real_foot(Side side, double sure, const std::string& why, bool by_feet);
   void folded_foot(Side side, double sure);
+  enum class Sole : std::uint8_t { kFlat, kAlongShin, kUnclear };
+  [[nodiscard]] Sole sole_of(Side side, const Mat& T_flat, const Mat& T_shin) const;
   [[nodiscard]] std::optional<Vec> foot_way(Side side) const;
   [[nodiscard]] std::optional<Vec> toe_way(Side side) const;
   [[nodiscard]] double foot_length(Side side) const;

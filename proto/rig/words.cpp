@@ -60,7 +60,8 @@ FitTable table_of(std::initializer_list<std::pair<Fit, std::string_view>> lines)
 // Shoulder, UpperArm, LowerArm, Hand.
 const FitTable& arm_words() {
   static const FitTable table =
-      table_of({{{1, 0, 0, 0}, "collar clavicle collarbone clav clavic scapula sako"},
+      table_of({{{1, 0, 0, 0}, "collar clavicle collarbone clav clavic sako"},
+                {{.8, 0, 0, 0}, "scapula"},
                 {{.8, .7, 0, 0}, "shoulder shol kata"},
                 {{.3, 1, 0, 0}, "shldr shoulderjoint"},
                 {{0, .8, .1, 0}, "arm ude"},
@@ -83,7 +84,8 @@ const FitTable& leg_words() {
                 {{0, 1, 0, 0}, "shin calf tibia lowerleg lowleg loleg leglower knee crus sune"},
                 {{0, 0, 1, 0}, "ankle"},
                 {{0, 0, .9, .5}, "foot"},
-                {{0, 0, 0, 1}, "toe toes toebase ball forefoot tsumasaki"}});
+                {{0, 0, 0, 1}, "toe toes toebase ball forefoot tsumasaki"},
+                {{0, 0, 0, .6}, "metatarsal metatarsals metatarsophalangeal hallux"}});
   return table;
 }
 
@@ -250,7 +252,9 @@ bool drop_common(std::vector<Tokens>& all, bool first) {
       count, {}, [](const auto& entry) { return std::pair(entry.second, entry.first); });
   if (most == count.end() || 5 * most->second < 4 * all.size()) return false;
   const std::string common(most->first);
-  if (side_word(common) != NameSide::kNone || is_anatomical(common)) return false;
+  // Nearly all joints are of a "body".
+  const bool matters = is_anatomical(common) && common != "body";
+  if (side_word(common) != NameSide::kNone || matters) return false;
   for (Tokens& tokens : all) {
     if (tokens.empty() || at(tokens) != common) continue;
     tokens.erase(first ? tokens.begin() : tokens.end() - 1);

@@ -63,11 +63,11 @@ void check_hand(const clip::Clip& clip) {
 void check_numbers(const clip::Clip& clip) {
   const auto skeleton = clip::skeleton_from_json(clip::skeleton_json(*clip.skeleton), "fuzz");
   if (!skeleton) return;  // names that are not UTF-8 may become two of the same name
-  const auto parser = clip::FrameParser::numbers(*skeleton, false);
+  const auto parser = clip::FrameParser::numbers(*skeleton, false, false);
   const auto row = clip.channels.row(0);
   const std::span<const double> sent(row.data(), static_cast<std::size_t>(row.size()));
   std::vector<double> received(sent.size());
-  const std::string bytes = clip::frame_bytes(std::nullopt, sent);
+  const std::string bytes = clip::frame_bytes(std::nullopt, std::nullopt, sent);
   demand(parser.parse(bytes, received).ok());
   demand(std::ranges::equal(sent, received,
                             [](double a, double b) { return a == b || (a != a && b != b); }));

@@ -115,6 +115,14 @@ Result<> OutputFiles::check(const Output& output) const {
   const bool right = std::ranges::find(output.extensions, extension) != output.extensions.end();
   const bool other = is_of_known_format(output.path);
   if (!right && (output.strict || other)) {
+    // What assimp writes Blender refuses, and posed has no writer of its own.
+    const bool takes_glb = std::ranges::find(output.extensions, ".glb") != output.extensions.end();
+    if (extension == ".fbx" && takes_glb) {
+      return misuse(
+          "is FBX, which posed reads but does not write; name a .glb, which Blender, Unity and "
+          "Unreal import",
+          output.path.string());
+    }
     return misuse("does not end in " + listed(output.extensions) + "; choose such a name",
                   output.path.string());
   }

@@ -63,7 +63,8 @@ void check_plays_like_clip(const std::filesystem::path& path, const Options& opt
     const Frame expected = clip->frame(i);
     const bool same =
         test::same_pose(sink.frames[static_cast<std::size_t>(i)], expected) &&
-        sink.frames[static_cast<std::size_t>(i)].header.device_ns == expected.header.device_ns;
+        sink.frames[static_cast<std::size_t>(i)].header.device_ns == expected.header.device_ns &&
+        sink.frames[static_cast<std::size_t>(i)].timecode == expected.timecode;
     different += same ? 0 : 1;
   }
   CHECK(different == 0);
@@ -79,6 +80,18 @@ TEST_CASE("a clip played live is the clip read offline, to the last bit") {
                         {.skeleton = asf, .rate_hz = 60.0});
   check_plays_like_clip(test::scratch_file("hand.csv", test::small_hand_csv()),
                         {{"hand", std::string("left")}}, {.hand = Side::kLeft});
+}
+
+TEST_CASE("a clip's timecodes are sent with its frames") {
+  auto clip = clip::read_clip(test::scratch_file("small.bvh", test::small_bvh())).value();
+  clip.timecode.assign(static_cast<std::size_t>(clip.frames()), to_timecode("10:20:30:04"));
+  clip.timecode.back() = to_timecode("10:20:30:05");
+  const auto path = test::scratch_file("coded.glb", "");
+  REQUIRE(clip::write_clip(clip, path));
+  const auto read = clip::read_clip(path);
+  REQUIRE(read);
+  CHECK(view_of(read->frame(read->frames() - 1).timecode) == "10:20:30:05");
+  check_plays_like_clip(path, {}, {});
 }
 
 TEST_CASE("a hand CSV is played by its own uneven times, round after round") {

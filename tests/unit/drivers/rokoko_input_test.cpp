@@ -192,6 +192,18 @@ TEST_CASE("datagrams that are not Studio's, too deep or too many") {
         Outcome::kForeign);
 }
 
+TEST_CASE("one writer's LZ4 frames hold their texts, of any size, one after another") {
+  Lz4Writer writer;
+  std::vector<std::byte> memory(300'000);
+  for (const std::size_t size : {9'000U, 1U, 200'000U, 65'536U, 65'537U, 500U}) {
+    std::string text(size, '0');
+    for (std::size_t i = 0; i < size; ++i) text[i] = static_cast<char>('0' + i * i % 13);
+    std::span<const std::byte> content;
+    REQUIRE(decode_lz4_frame(writer.compress(text), memory, content) == Outcome::kOk);
+    CHECK(std::ranges::equal(content, std::as_bytes(std::span(text))));
+  }
+}
+
 TEST_CASE("LZ4 frames of liblz4 in all forms are unpacked") {
   std::mt19937 random(5);
   std::string text;

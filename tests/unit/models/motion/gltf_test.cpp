@@ -252,6 +252,33 @@ TEST_CASE("a .vrma needs the bones that VRM requires, and names those that are m
   CHECK_FALSE(std::filesystem::exists(folder.path() / "out.vrma"));
 }
 
+TEST_CASE("a figure with a neck alone above its hips gets VRM's spine in its .vrma") {
+  clip::add_format(vrm_animation_format());
+  const test::TempFolder folder;
+  clip::Clip clip = walker_clip();
+  auto skeleton = std::make_shared<Skeleton>(*clip.skeleton);
+  for (Joint& joint : skeleton->joints) {
+    if (joint.bone >= Bone::kSpine && joint.bone <= Bone::kUpperChest) joint.bone.reset();
+  }
+  clip.skeleton = skeleton;
+  const auto path = folder.path() / "out.vrma";
+  REQUIRE(write_vrm_animation(clip, path));
+  const auto back = clip::read_clip(path);
+  if (!back) FAIL(back.error().text());
+  const Skeleton& figure = *back->skeleton;
+  REQUIRE(figure.joint_of(Bone::kSpine) >= 0);
+  CHECK(figure.joints[figure.joint_of(Bone::kNeck)].parent == figure.joint_of(Bone::kSpine));
+  CHECK(figure.joints[figure.joint_of(Bone::kLeftUpperLeg)].parent == 0);
+  const WorldPose truth = world_pose(*clip.skeleton, clip.frame(9));
+  const WorldPose got = world_pose(figure, back->frame(9));
+  const auto head = static_cast<std::size_t>(figure.joint_of(Bone::kHead));
+  const auto from = static_cast<std::size_t>(skeleton->joint_of(Bone::kHead));
+  const Eigen::Quaterniond was =
+      truth.rotation[from] * skeleton->joints[from].T_world_joint.conjugate();
+  const Eigen::Quaterniond is = got.rotation[head] * figure.joints[head].T_world_joint.conjugate();
+  CHECK(angle_between_rad(is, was) < 2e-4);
+}
+
 namespace {
 
 // A figure of VRM's required bones. `backwards`: it looks along -Z, as VRM 0 does; `twisted`: its

@@ -82,7 +82,108 @@ test::Made with_stick(test::Made made) {
   return made;
 }
 
+// A joint of a figure in T-pose that stands on the ground and faces +z.
+struct Placed {
+  const char* name;
+  int parent;
+  Vec place;  // in the world
+};
+
+rig::Rig recognise(const std::vector<Placed>& joints) {
+  rig::RigInput input;
+  for (const auto& [name, parent, place] : joints) {
+    const Vec above = parent < 0 ? Vec(Vec::Zero()) : joints[parent].place;
+    input.joints.push_back(
+        {.name = name, .parent = parent, .offset = place - above, .end_site = {}});
+  }
+  return rig::recognise(input);
+}
+
+std::string joint_of(const rig::Rig& rig, const std::vector<Placed>& joints, Bone bone) {
+  const auto at = std::ranges::find(rig.bone, bone);
+  return at == rig.bone.end() ? "" : joints[static_cast<std::size_t>(at - rig.bone.begin())].name;
+}
+
 }  // namespace
+
+TEST_CASE("rig: where the arms begin at the neck, it is the neck, and the nose is a head") {
+  const std::vector<Placed> joints{
+      {"MidHip", -1, {0, .95, 0}},       {"Neck", 0, {0, 1.42, 0}},
+      {"Nose", 1, {0, 1.6, .08}},        {"REye", 2, {-.03, 1.63, .06}},
+      {"REar", 3, {-.08, 1.61, 0}},      {"LEye", 2, {.03, 1.63, .06}},
+      {"LEar", 5, {.08, 1.61, 0}},       {"RShoulder", 1, {-.17, 1.42, 0}},
+      {"RElbow", 7, {-.45, 1.42, 0}},    {"RWrist", 8, {-.7, 1.42, 0}},
+      {"LShoulder", 1, {.17, 1.42, 0}},  {"LElbow", 10, {.45, 1.42, 0}},
+      {"LWrist", 11, {.7, 1.42, 0}},     {"RHip", 0, {-.09, .95, 0}},
+      {"RKnee", 13, {-.09, .49, 0}},     {"RAnkle", 14, {-.09, .09, 0}},
+      {"RBigToe", 15, {-.08, .01, .16}}, {"LHip", 0, {.09, .95, 0}},
+      {"LKnee", 17, {.09, .49, 0}},      {"LAnkle", 18, {.09, .09, 0}},
+      {"LBigToe", 19, {.08, .01, .16}}};
+  const rig::Rig rig = recognise(joints);
+  CHECK(rig.kind == rig::Kind::kPerson);
+  CHECK(joint_of(rig, joints, Bone::kNeck) == "Neck");
+  CHECK(joint_of(rig, joints, Bone::kHead) == "Nose");
+  CHECK(joint_of(rig, joints, Bone::kSpine).empty());
+  CHECK(joint_of(rig, joints, Bone::kLeftUpperArm) == "LShoulder");
+}
+
+// Also a prefix that is an anatomical word, and a shoulder that no word names.
+TEST_CASE("rig: a foot below an ankle is the ball, and the toe below it the tip") {
+  const std::vector<Placed> joints{
+      {"Body_Pelvis", -1, {0, .95, 0}},         {"Body_Torso", 0, {0, 1.2, 0}},
+      {"Body_Neck", 1, {0, 1.45, 0}},           {"Body_Head", 2, {0, 1.55, 0}},
+      {"Body_ThoraxLeft", 1, {.05, 1.4, 0}},    {"Body_ShoulderLeft", 4, {.17, 1.42, 0}},
+      {"Body_ElbowLeft", 5, {.45, 1.42, 0}},    {"Body_WristLeft", 6, {.7, 1.42, 0}},
+      {"Body_ThoraxRight", 1, {-.05, 1.4, 0}},  {"Body_ShoulderRight", 8, {-.17, 1.42, 0}},
+      {"Body_ElbowRight", 9, {-.45, 1.42, 0}},  {"Body_WristRight", 10, {-.7, 1.42, 0}},
+      {"Body_HipLeft", 0, {.09, .9, 0}},        {"Body_KneeLeft", 12, {.09, .49, 0}},
+      {"Body_AnkleLeft", 13, {.09, .09, 0}},    {"Body_FootLeft", 14, {.09, .02, .12}},
+      {"Body_ToeLeft", 15, {.09, .02, .23}},    {"Body_HipRight", 0, {-.09, .9, 0}},
+      {"Body_KneeRight", 17, {-.09, .49, 0}},   {"Body_AnkleRight", 18, {-.09, .09, 0}},
+      {"Body_FootRight", 19, {-.09, .02, .12}}, {"Body_ToeRight", 20, {-.09, .02, .23}}};
+  const rig::Rig rig = recognise(joints);
+  CHECK(joint_of(rig, joints, Bone::kLeftFoot) == "Body_AnkleLeft");
+  CHECK(joint_of(rig, joints, Bone::kLeftToes) == "Body_FootLeft");
+  CHECK(joint_of(rig, joints, Bone::kRightToes) == "Body_FootRight");
+  CHECK(joint_of(rig, joints, Bone::kLeftShoulder) == "Body_ThoraxLeft");
+  CHECK(joint_of(rig, joints, Bone::kNeck) == "Body_Neck");
+  CHECK(joint_of(rig, joints, Bone::kHead) == "Body_Head");
+}
+
+TEST_CASE("rig: soles are flat below legs that stand apart, unless they were laid along them") {
+  for (const bool flat : {true, false}) {
+    for (const double toes_out_deg : {0.0, 6.0}) {
+      auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+      made.input.poses = {};
+      auto& joints = made.input.joints;
+      const auto leg = [&](Bone of_left, double side) {
+        const auto first = static_cast<std::size_t>(of_left);
+        const Mat apart = Eigen::AngleAxisd(side * 20 * kDegree, rig::kZ).toRotationMatrix();
+        const Mat foot = (flat ? Mat(Mat::Identity()) : apart) * yaw(side * toes_out_deg);
+        for (const std::size_t j : {first + 1, first + 2}) {
+          joints[j].offset = apart * joints[j].offset;
+        }
+        joints[first + 3].offset = foot * joints[first + 3].offset;
+        joints[first + 3].end_site = foot * Vec(0, 0, 7);
+        for (const std::size_t j : {first, first + 1}) made.T[j] = apart.transpose();
+        for (const std::size_t j : {first + 2, first + 3}) {
+          made.T[j] = flat ? Mat(Mat::Identity()) : Mat(apart.transpose());
+        }
+      };
+      leg(Bone::kLeftUpperLeg, 1.0);
+      leg(Bone::kRightUpperLeg, -1.0);
+      INFO((flat ? "flat, " : "along the shin, ") << toes_out_deg);
+      CHECK(worst_deg(rig::recognise(made.input), made) < 1.0);
+    }
+  }
+}
+
+TEST_CASE("rig: the unit of MikuMikuDance's figures is 8 cm") {
+  auto made = test::make(test::kSchemes[9], ZeroPose::kA, Mat::Identity(), 0.08);
+  made.input.poses = {};
+  made.input.joints[0].name = "センター";
+  CHECK(rig::recognise(made.input).metres_per_unit == Approx(0.08));
+}
 
 // Many persons, in each maker's names and zero pose.
 TEST_CASE("rig: a person is recognised in every maker's names, zero pose, axes and unit") {

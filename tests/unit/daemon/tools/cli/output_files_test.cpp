@@ -23,6 +23,8 @@ TEST_CASE("an output must not have the extension of another format") {
   CHECK(OutputFiles(false).writes(path("a.BVH"), {".bvh"}).check());
   CHECK(refused(OutputFiles(false).writes(path("a.csv"), {".bvh"}).check(), "in .bvh"));
   CHECK(refused(OutputFiles(false).writes(path("a"), {".bvh", ".csv"}).check(), ".bvh or .csv"));
+  CHECK(refused(OutputFiles(false).writes(path("a.fbx"), {".bvh", ".glb"}).check(), "name a .glb"));
+  CHECK(refused(OutputFiles(false).writes(path("a.fbx"), {".style"}).check(), "in .style"));
   // A format that is recognised by its contents may have any extension except those of other
   // formats.
   CHECK(OutputFiles(false).writes_any_but_other(path("a.model"), {".style"}).check());

@@ -65,10 +65,12 @@ TEST_CASE("a settled start has the full style and the heading from frame one", "
                           delta_of(walk.frame(180), settled.clip.frame(180), 3)) < 0.01);
 }
 
-TEST_CASE("alpha 0 keeps every channel value", "[style][apply]") {
-  const clip::Clip walk = toy_walk(50);
+TEST_CASE("alpha 0 keeps every channel value, and the timecodes", "[style][apply]") {
+  clip::Clip walk = toy_walk(50);
+  walk.timecode.assign(50, to_timecode("10:20:30:04"));
   const style::Applied same = applied(walk, 0.0);
   CHECK(same.clip.channels == walk.channels);
+  CHECK(same.clip.timecode == walk.timecode);
   CHECK(same.joints_changed == 0);
   CHECK(same.rms_change_rad == 0.0);
 }
