@@ -20,8 +20,9 @@
 //
 // Axes: right-handed, for example x to the right, y down, z away from a camera. Origin and turn do
 // not matter, nor does the size: the shape of the hand counts, and two hands are told apart by
-// where they were. Points of a mirrored picture are not right-handed: the sender mirrors them back.
-// Members that are not named here are skipped.
+// where they were. Where z points away from a camera, what the tracker says of a palm counts more
+// for the side than what it says of a back. Points of a mirrored picture are not right-handed: the
+// sender mirrors them back. Members that are not named here are skipped.
 #pragma once
 
 #include <array>

@@ -17,8 +17,9 @@ constexpr double kOther_m = 0.05;   // a hand of the other side counts as so muc
 constexpr double kLongest_s = 0.2;  // what a message counts at most
 constexpr double kMost_s = 10.0;    // votes, so that a wrong beginning can be outvoted
 constexpr double kFlip_s = 0.2;     // votes that it takes to change the side
-// A hand that returns later is another one; a picture that contradicts is then better than none.
-constexpr std::int64_t kKnown_ns = kNanosPerSecond;
+constexpr std::int64_t kKnown_ns = kNanosPerSecond;  // a hand that returns later is another one
+// A picture that contradicts for longer is better than none.
+constexpr std::int64_t kDoubt_ns = kNanosPerSecond / 4;
 
 RT_SAFE Eigen::Vector3d place_m(const Vec3f& point_m) noexcept {
   return Eigen::Vector3f(point_m.data()).cast<double>();
@@ -28,22 +29,41 @@ RT_SAFE double apart_m(const Vec3f& a, const Vec3f& b) noexcept {
   return (place_m(a) - place_m(b)).norm();
 }
 
-RT_SAFE bool recent(std::int64_t then_ns, std::int64_t now_ns) noexcept {
-  return then_ns != kNoTime_ns && now_ns - then_ns <= kKnown_ns;
+RT_SAFE bool recent(std::int64_t then_ns, std::int64_t now_ns,
+                    std::int64_t within_ns = kKnown_ns) noexcept {
+  return then_ns != kNoTime_ns && now_ns - then_ns <= within_ns;
+}
+
+RT_SAFE Eigen::Vector3d between_m(const Landmarks& point_m, std::size_t a, std::size_t b) noexcept {
+  return place_m(point_m[b]) - place_m(point_m[a]);
+}
+
+// Out of the palm of a right hand, out of the back of a left one [m^2].
+RT_SAFE Eigen::Vector3d palm_of(const Landmarks& point_m) noexcept {
+  return between_m(point_m, 0, 5).cross(between_m(point_m, 0, 17));
+}
+
+// What the tracker's word is worth, 0 to 1. Hands show a camera their palm, so most of the backs
+// that it sees are palms of the other hand, above all fists. And where it takes a little finger for
+// an index finger, the palm is narrower than any hand's.
+RT_SAFE double worth(const TrackedHand& hand) noexcept {
+  constexpr double kBack = 0.05, kNarrow = 0.1;
+  constexpr double kBreadth = 0.6;  // of a palm, knuckle to knuckle, over its length
+  const double away = palm_of(hand.point_m).z() * (hand.side == Side::kRight ? 1.0 : -1.0);
+  const bool narrow =
+      between_m(hand.point_m, 5, 17).norm() < kBreadth * between_m(hand.point_m, 0, 9).norm();
+  return hand.score * (away > 0.0 ? kBack : 1.0) * (narrow ? kNarrow : 1.0);
 }
 
 }  // namespace
 
 RT_SAFE Side shape_of(const Landmarks& point_m, Side otherwise) noexcept {
   constexpr double kStraight = 0.1;  // of the digits' length
-  const auto from = [&](std::size_t a, std::size_t b) noexcept {
-    return Eigen::Vector3d(place_m(point_m[b]) - place_m(point_m[a]));
-  };
-  const Eigen::Vector3d palm = from(0, 5).cross(from(0, 17));
+  const Eigen::Vector3d palm = palm_of(point_m);
   double bent_m3 = 0.0, length_m = 0.0;
   for (std::size_t first = 1; first < kLandmarks; first += 4) {
-    bent_m3 += palm.dot(from(first, first + 3));
-    for (std::size_t k = first; k < first + 3; ++k) length_m += from(k, k + 1).norm();
+    bent_m3 += palm.dot(between_m(point_m, first, first + 3));
+    for (std::size_t k = first; k < first + 3; ++k) length_m += between_m(point_m, k, k + 1).norm();
   }
   if (!(std::abs(bent_m3) > kStraight * length_m * palm.norm())) return otherwise;
   return bent_m3 > 0.0 ? Side::kRight : Side::kLeft;
@@ -64,7 +84,7 @@ RT_SAFE void HandTracks::vote(Track& track, const TrackedHand& hand, std::int64_
   if (!known) track = {.side = hand.side, .seen_ns = now_ns};
   const double right = hand.side == Side::kRight ? 1.0 : -1.0;
   const double since_s = std::min(seconds(now_ns - track.seen_ns), kLongest_s);
-  track.votes_s = std::clamp(track.votes_s + right * hand.score * since_s, -kMost_s, kMost_s);
+  track.votes_s = std::clamp(track.votes_s + right * worth(hand) * since_s, -kMost_s, kMost_s);
   if (hand.sure) track.votes_s = right * kMost_s;
   if (std::abs(track.votes_s) >= kFlip_s) {
     track.side = track.votes_s > 0.0 ? Side::kRight : Side::kLeft;
@@ -78,7 +98,7 @@ RT_SAFE void HandTracks::judge(Track& track, TrackedHand& hand, std::int64_t now
   const bool agrees = hand.side == track.side || shape_of(hand.point_m, hand.side) == track.side;
   hand.shape = agrees ? track.side : hand.side;
   hand.side = track.side;
-  hand.doubtful = !agrees && recent(track.read_ns, now_ns);
+  hand.doubtful = !agrees && recent(track.read_ns, now_ns, kDoubt_ns);
   if (agrees) track.read_ns = now_ns;
 }
 

@@ -71,7 +71,7 @@ struct GestureModel : Vocabulary {
   std::array<std::vector<Tree<GroupGaussian>>, kStates> trees;  // [state][group]
   Tree<DurationGaussian> durations;                             // asks what kDurations states
   std::vector<double> low, high;  // [channel] range of the training recordings [rad]
-  std::optional<HeldPoses> held;  // of a model of hands that tells what is none
+  std::optional<HeldPoses> held;  // of a model of hands that tells what is none, or a camera's
   std::string report_json;        // report of the training, for people
 };
 

@@ -177,7 +177,9 @@ Result<GestureModel> train_gesture(const std::vector<Recording>& recordings,
   }
   model.durations = tree_of<DurationGaussian>(grow_durations(contexts, model, options.mdl_factor));
   set_range(recordings, model);
-  if (model.is_hand() && model.tells_none) model.held = held_poses(recordings, model.labels);
+  if (model.is_hand() && (model.tells_none || options.held)) {
+    model.held = held_poses(recordings, model.labels);
+  }
   model.report_json = report.json_of(model);
   if (options.look) options.look(report.findings());
   return model;

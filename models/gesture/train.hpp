@@ -34,6 +34,9 @@ struct TrainOptions {
   // Called with the step and how much of it is done; false stops the training.
   std::function<bool(std::string_view step, double fraction)> progress;
   std::function<void(TrainFindings)> look{};  // called once, when all is learnt
+  // A hand's held poses are learnt although nothing is none: for a source whose errors in one joint
+  // go with those in others, as a camera's do (models/smooth/README.md, "HMM forward filter").
+  bool held = false;
 };
 
 // All recordings are at one rate, which becomes the model's. Returns an error for recordings

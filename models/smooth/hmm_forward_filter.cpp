@@ -127,8 +127,14 @@ RT_SAFE void HmmForwardFilter::push(std::span<const double> measured_rad, bool e
   }
   even_frames_ = even ? std::min(even_frames_ + 1, 2) : 0;
   Row log_emission;
-  weigh(measured_rad, log_emission);
-  if (model_->held) {
+  if (model_->held) measure_held();
+  const bool by_poses = model_->held && !model_->none && error_rad_ > 0.0;
+  if (by_poses) {
+    weigh_held(log_emission);
+  } else {
+    weigh(measured_rad, log_emission);
+  }
+  if (model_->held && model_->none) {
     const auto states = log_emission.begin() + states_;
     *states = *std::max_element(log_emission.begin(), states) + none_margin(measured_rad);
   }
@@ -174,24 +180,36 @@ RT_SAFE void HmmForwardFilter::weigh(std::span<const double> measured_rad, Row& 
   }
 }
 
-RT_SAFE double HmmForwardFilter::off_labels() noexcept {
+// Errors of one joint go with those of others, which only the spread of the held poses knows; and
+// they jump, so that steps tell nothing.
+RT_SAFE void HmmForwardFilter::weigh_held(Row& out) const noexcept {
+  for (std::size_t s = 0; s < static_cast<std::size_t>(states_); ++s) {
+    const double off = off_held_[static_cast<std::size_t>(model_->chains[s / kStates].label)];
+    out[s] = std::isfinite(off) ? -0.5 * kTemper / pace_ * off : 0.0;
+  }
+}
+
+RT_SAFE void HmmForwardFilter::measure_held() noexcept {
   const LiveHeld& held = *model_->held;
   const std::size_t channels = model_->channels;
-  std::array<double, kMaxLiveChains> distance;
-  std::fill_n(distance.begin(), held.limit.size(), 0.0);
+  std::fill_n(off_held_.begin(), held.limit.size(), 0.0);
   const double* weight = held.whitening.data();
   for (std::size_t row = 0; row < channels; ++row) {
     double value = 0.0;
     for (std::size_t c = 0; c <= row; ++c) value += *weight++ * known_[held.channel[c]];
     for (std::size_t l = 0; l < held.limit.size(); ++l) {
       const double off = value - held.mean[l * channels + row];
-      distance[l] += off * off;
+      off_held_[l] += off * off;
     }
   }
+}
+
+RT_SAFE double HmmForwardFilter::off_labels() const noexcept {
+  const LiveHeld& held = *model_->held;
   const double noise = held.noise_gain * added_variance(0);
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t l = 0; l < held.limit.size(); ++l) {
-    nearest = std::min(nearest, (distance[l] - noise) / held.limit[l]);
+    nearest = std::min(nearest, (off_held_[l] - noise) / held.limit[l]);
   }
   return std::isfinite(nearest) ? std::max(nearest, 0.0) : kMissing;
 }

@@ -90,9 +90,13 @@ class HmmForwardFilter {
   // The variance that the source's noise and errors add to a feature of this window.
   [[nodiscard]] double added_variance(std::size_t window) const noexcept;
   void weigh(std::span<const double> measured_rad, Row& out) noexcept;
+  // The same of a source with errors, by the distances from held poses.
+  void weigh_held(Row& out) const noexcept;
+  // Fills off_held_ from the pose of the frame before.
+  void measure_held() noexcept;
   // How far the pose of the frame before is from the nearest label, as a share of the label's
   // limit; NaN: not known.
-  [[nodiscard]] double off_labels() noexcept;
+  [[nodiscard]] double off_labels() const noexcept;
   // How much more probable than the best state it is that the hand makes none of the gestures.
   [[nodiscard]] double none_margin(std::span<const double> measured_rad) noexcept;
   void advance(const Row& log_emission) noexcept;
@@ -112,6 +116,7 @@ class HmmForwardFilter {
   std::array<std::vector<double>, 2> past_;  // [channel] the last measured frames
   std::size_t features_ = 0;                 // of the model, padded to whole lanes
   std::vector<double> feature_, weight_;     // [features] of the frame that comes
+  LabelRow off_held_{};                      // squared distance from each label's held pose
   std::vector<double> known_;                // [channel] newest measured value; NaN: none yet
   std::vector<Table> tables_;                // [states]
   std::vector<double> rows_;                 // [states][kTableRows][features]

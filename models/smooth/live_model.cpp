@@ -192,7 +192,7 @@ Result<std::unique_ptr<const LiveModel>> bind_live_model(const GestureModel& mod
   }
   const bool tells_none = live->body || model.tells_none;
   if (tells_none && model.label_index(kNoneName) < 0) live->none = none_of(*live);
-  if (live->none && model.held) live->held = held_of(model);
+  if (model.held && (live->none || !tells_none)) live->held = held_of(model);
   return live;
 }
 

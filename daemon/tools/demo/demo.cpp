@@ -180,14 +180,14 @@ struct DemoOptions {
   bool no_browser = false;
 };
 
-Result<> learn_gestures(const std::vector<LabelledClip>& clips, double rate_hz,
+Result<> learn_gestures(const std::vector<LabelledClip>& clips, double rate_hz, bool held,
                         const fs::path& model) {
   std::vector<gesture::Recording> recordings;
   for (const LabelledClip& files : clips) {
     recordings.push_back(TRY(load_recording(files.clip, files.labels, rate_hz)));
   }
   OneRank alone;
-  TRY(train_gesture_and_save(recordings, {}, model, alone));
+  TRY(train_gesture_and_save(recordings, {.held = held}, model, alone));
   return {};
 }
 
@@ -219,10 +219,10 @@ Result<> prepare(const std::filesystem::path& folder, bool overwrite) {
   if (!trained.written) return fail("the demo's own model is " + verdict);
   std::fprintf(stderr, "    %s\n", verdict.c_str());
   std::fprintf(stderr, "3/4 learning the gestures g, c and p from a labelled glove recording\n");
-  TRY(learn_gestures({clips.glove}, kHandRate_hz, folder / kDemoHand));
+  TRY(learn_gestures({clips.glove}, kHandRate_hz, false, folder / kDemoHand));
   std::fprintf(stderr, "    and g, c, p, 1, 3 and 4 from %zu takes of hands before a camera\n",
                clips.camera.size());
-  TRY(learn_gestures(clips.camera, gesture::kCameraRate_hz, folder / kDemoCamera));
+  TRY(learn_gestures(clips.camera, gesture::kCameraRate_hz, true, folder / kDemoCamera));
   return kept.finish();
 }
 

@@ -15,7 +15,7 @@ constexpr std::uint32_t kPeople = 6;  // of each family
 constexpr std::uint32_t kNewPerson = 21;
 constexpr double kNewWalkSeconds = 24.0;
 constexpr const char* kGlove = "glove_train";
-constexpr std::size_t kCameraTakes = 10;
+constexpr std::size_t kCameraTakes = 32;
 
 Result<std::filesystem::path> write_walker(const std::filesystem::path& path,
                                            const motion::WalkerOptions& options) {

@@ -17,6 +17,7 @@
 #include "drivers/landmarks/emulator.hpp"
 #include "drivers/landmarks/fit.hpp"
 #include "drivers/landmarks/protocol.hpp"
+#include "drivers/landmarks/tracks.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
@@ -206,10 +207,10 @@ TEST_CASE("a hand keeps its side whatever single pictures say, until somebody te
   };
   const std::string right = flat_hand("right"), left = flat_hand("left");
   CHECK(bodies(right, 20) == std::vector<std::size_t>(20, 1));
-  // It is taken for the other hand: first without angles, after a second with what there is.
-  CHECK(bodies(left, 9) == std::vector<std::size_t>(9, 1));
+  // It is taken for the other hand: first without angles, then with what there is.
+  CHECK(bodies(left, 2) == std::vector<std::size_t>(2, 1));
   CHECK(std::ranges::none_of(hand_angles(rig.sink.frames[0]), is_finite));
-  CHECK(bodies(left, 3) == std::vector<std::size_t>(3, 1));
+  CHECK(bodies(left, 10) == std::vector<std::size_t>(10, 1));
   CHECK(std::ranges::all_of(hand_angles(rig.sink.frames[0]), is_finite));
   rig.now_ns += kNanosPerSecond / 2;  // lost for a moment
   CHECK(bodies(left, 1) == std::vector<std::size_t>(1, 1));
@@ -222,6 +223,39 @@ TEST_CASE("a hand keeps its side whatever single pictures say, until somebody te
     CHECK(rig.feed(message_of("")) == Outcome::kOk);
   }
   CHECK(bodies(left, 1) == std::vector<std::size_t>(1, 0));  // another hand
+}
+
+TEST_CASE("pictures of a palm decide a hand's side, not those of a back or of half a palm") {
+  HandTracks tracks;
+  std::int64_t now_ns = 0;
+  // The side after so many pictures; the palm is towards the camera, or the back.
+  const auto after = [&](Side side, int pictures, float breadth, bool back) {
+    const Skeleton skeleton = hand_skeleton(side);
+    Frame frame;
+    set_hand_angles(skeleton, HandAngles{}, frame);
+    TrackedHand hand{.side = side, .score = 1.0, .outcome = Outcome::kOk};
+    hand.point_m = landmarks_of(skeleton, frame);
+    const float turned = back ? -1.0F : 1.0F;
+    for (auto& [x, y, z] : hand.point_m) {
+      const Vec3f lying{x, y, z};
+      x = turned * breadth * lying[0];
+      y = -lying[2];
+      z = turned * lying[1];
+    }
+    Side known = side;
+    for (int i = 0; i < pictures; ++i) {
+      Message message{.count = 1};
+      message.hands[0] = hand;
+      tracks.follow(message, now_ns);
+      now_ns += kNanosPerSecond / 10;
+      known = message.hands[0].side;
+    }
+    return known;
+  };
+  CHECK(after(Side::kRight, 10, 1.0F, false) == Side::kRight);
+  CHECK(after(Side::kLeft, 30, 1.0F, true) == Side::kRight);
+  CHECK(after(Side::kLeft, 30, 0.7F, false) == Side::kRight);
+  CHECK(after(Side::kLeft, 20, 1.0F, false) == Side::kLeft);
 }
 
 TEST_CASE("a tracker's messages are lines over TCP, and one that stops takes its hands away") {
