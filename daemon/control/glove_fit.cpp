@@ -6,7 +6,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "daemon/devices/thumb_contacts.hpp"
+#include "daemon/devices/pose_calibration.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/fit.hpp"
 #include "drivers/glove/pose_check.hpp"
@@ -78,16 +78,9 @@ Result<FittedGlove> fit_glove(const drivers::Description& device,
   for (const auto& finding : check.poses) tell(finding, made.words);
   if (wanted.name().empty()) return made;
   if (!check.usable()) return fail(check.verdict());
-  auto fitted = TRY(drivers::glove::fit_poses(model, recorded));
-  drivers::glove::CalibrationFile file{
-      .driver = model.driver,
-      .glove = device.identity.starts_with('/') ? std::string() : device.identity,
-      .user = wanted.name(),
-      .hand = *hand,
-      .parameters = {},
-      .sensors = std::move(fitted.sensors)};
-  auto sentences = TRY(devices::fit_contacts(model, recorded, *hand, file));
-  sentences.insert(sentences.end(), fitted.warnings.begin(), fitted.warnings.end());
+  auto [file, sentences, warnings] = TRY(devices::calibrate_by_poses(
+      model, recorded, devices::blank_calibration(model, device.identity, *hand, wanted.name())));
+  sentences.insert(sentences.end(), warnings.begin(), warnings.end());
   sentences.push_back(check.verdict());
   for (const std::string& sentence : sentences) made.words.add_sentence(clean(sentence));
   made.toml = drivers::glove::format_calibration(file);

@@ -1,5 +1,6 @@
 #include "drivers/glove/calibration.hpp"
 
+#include <algorithm>
 #include <limits>
 
 namespace posed::drivers::glove {
@@ -19,6 +20,19 @@ RT_SAFE float Curve::value_at(float raw_value) const noexcept {
   while (piece + 1 < points && raw_value > raw[piece]) ++piece;
   const float share = (raw_value - raw[piece - 1]) / (raw[piece] - raw[piece - 1]);
   return value[piece - 1] + share * (value[piece] - value[piece - 1]);
+}
+
+RT_SAFE void Calibration::remove_crosstalk(std::span<float> value,
+                                           const std::bitset<kMaxSensors>& valid) const noexcept {
+  if (crosstalk_rows == 0) return;
+  std::array<float, kMaxSensors> shown{};
+  std::copy_n(value.begin(), std::min(value.size(), shown.size()), shown.begin());
+  for (std::size_t r = 0; r < crosstalk_rows; ++r) {
+    const Crosstalk& row = crosstalk[r];
+    if (std::max(row.sensor, row.of) < value.size() && valid[row.of]) {
+      value[row.sensor] -= row.share * shown[row.of];
+    }
+  }
 }
 
 RT_SAFE void Calibration::map_to_hand(std::span<const float> value,

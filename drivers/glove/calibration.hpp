@@ -21,6 +21,7 @@ inline constexpr std::size_t kMaxGloveValues = 64;
 inline constexpr std::size_t kMaxCurvePoints = 8;
 inline constexpr std::size_t kMaxMapRows = 96;
 inline constexpr std::size_t kMaxParameters = 8;
+inline constexpr std::size_t kMaxCrosstalk = 64;
 
 // Piecewise linear; beyond its ends it continues with the slope of the first or last piece. Raw
 // values increase.
@@ -41,12 +42,26 @@ struct MapRow {
   float offset_rad = 0.0F;
 };
 
+// How much of another sensor's value a sensor shows, because the glove's cloth or the hand itself
+// moves it along.
+struct Crosstalk {
+  std::uint8_t sensor = 0, of = 0;
+  float share = 0.0F;
+};
+
 struct Calibration {
   std::size_t sensors = 0;
   std::array<Curve, kMaxSensors> curve{};         // [sensor of the Model]
   std::array<float, kMaxParameters> parameter{};  // [parameter of the Model]
   std::array<MapRow, kMaxMapRows> map{};
   std::size_t map_rows = 0;
+  std::array<Crosstalk, kMaxCrosstalk> crosstalk{};
+  std::size_t crosstalk_rows = 0;
+
+  // Takes from the curves' values what they show of each other; the share of a value that is not
+  // valid stays.
+  RT_SAFE void remove_crosstalk(std::span<float> value,
+                                const std::bitset<kMaxSensors>& valid) const noexcept;
 
   // Sums the rows of the map. A channel without a row is zero; a channel with an invalid value is
   // not finite, so its joint is not valid.

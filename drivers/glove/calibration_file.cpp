@@ -28,6 +28,7 @@ constexpr TomlLimits kLimits{
 
 constexpr Range kNumbers{-1e6, 1e6};  // of raw values, calibrated values and parameters
 constexpr Range kAnyCount{0.0, 1e6};
+constexpr Range kShares{-2.0, 2.0};  // of another sensor's value
 constexpr std::array<std::string_view, 2> kHands{"right", "left"};
 
 void read_sensor(TableReader& table, const std::string& name, CalibrationFile& file) {
@@ -86,6 +87,15 @@ Result<CalibrationFile> parse_calibration(const std::string& toml,
   if (auto sensors = reader.table("sensors")) {
     for (const std::string& name : sensors->keys()) read_sensor(*sensors, name, read);
   }
+  if (auto crosstalk = reader.table("crosstalk")) {
+    for (const std::string& name : crosstalk->keys()) {
+      auto shares = crosstalk->table(name);
+      if (!shares) continue;
+      for (const std::string& other : shares->keys()) {
+        shares->read(other, read.crosstalk[name][other], kShares);
+      }
+    }
+  }
   reader.finish();
   if (findings.errors.empty()) check_complete(reader, sensor_count, read);
   return findings.result(std::move(read));
@@ -114,6 +124,12 @@ std::string format_calibration(const CalibrationFile& file) {
           << clip::number_text(points[i][1]) << ']';
     }
     out << "]\n";
+  }
+  for (const auto& [name, shares] : file.crosstalk) {
+    out << "\n[crosstalk." << name << "]  # shares of other sensors' values that it shows\n";
+    for (const auto& [other, share] : shares) {
+      out << other << " = " << clip::number_text(share) << '\n';
+    }
   }
   return out.str();
 }
@@ -199,6 +215,30 @@ Result<> set_curve(const Sensor& sensor, const std::vector<std::array<double, 2>
   return {};
 }
 
+Result<std::size_t> sensor_named(const Model& model, const std::string& name) {
+  const auto sensor = std::ranges::find(model.sensors, name, &Sensor::name);
+  if (sensor != model.sensors.end()) {
+    return static_cast<std::size_t>(sensor - model.sensors.begin());
+  }
+  return fail("the glove has no sensor " + in_quotes(name) + ": is the calibration another's?");
+}
+
+Result<> set_crosstalk(const Model& model, const CalibrationFile& file, Calibration& made) {
+  for (const auto& [name, shares] : file.crosstalk) {
+    const auto sensor = TRY(sensor_named(model, name));
+    for (const auto& [other, share] : shares) {
+      const auto of = TRY(sensor_named(model, other));
+      if (made.crosstalk_rows == kMaxCrosstalk) {
+        return fail("[crosstalk] has more than " + std::to_string(kMaxCrosstalk) + " shares");
+      }
+      made.crosstalk[made.crosstalk_rows++] = {.sensor = static_cast<std::uint8_t>(sensor),
+                                               .of = static_cast<std::uint8_t>(of),
+                                               .share = static_cast<float>(share)};
+    }
+  }
+  return {};
+}
+
 }  // namespace
 
 // A sensor that hardly moved during calibration would turn its noise into motion.
@@ -219,13 +259,10 @@ Result<std::shared_ptr<const Calibration>> make_calibration(const Model& model,
   TRY(check_owner(model, file, hand, identity));
   auto made = TRY(compile(model));
   for (const auto& [name, points] : file.sensors) {
-    const auto sensor = std::ranges::find(model.sensors, name, &Sensor::name);
-    if (sensor == model.sensors.end()) {
-      return fail("the glove has no sensor " + in_quotes(name) + ": is the calibration another's?");
-    }
-    const std::size_t index = sensor - model.sensors.begin();
-    TRY(set_curve(*sensor, points, made.curve[index]));
+    const auto index = TRY(sensor_named(model, name));
+    TRY(set_curve(model.sensors[index], points, made.curve[index]));
   }
+  TRY(set_crosstalk(model, file, made));
   for (const auto& [name, value] : file.parameters) {
     const auto at =
         std::ranges::find(model.parameters, name, &std::pair<std::string, double>::first);

@@ -10,6 +10,8 @@
 //   abduction_bias = 0.4
 //   [sensors]               # raw value, calibrated value; two points or more, raw ascending
 //   index_mcp = [[52, 0.0], [181, 1.57]]
+//   [crosstalk.index_abd]   # shares of other sensors' values that this one shows; may be left out
+//   index_mcp = 0.12
 #pragma once
 
 #include <array>
@@ -31,6 +33,8 @@ struct CalibrationFile {
   Side hand = Side::kRight;
   std::map<std::string, double> parameters;
   std::map<std::string, std::vector<std::array<double, 2>>> sensors;  // raw, calibrated
+  // [sensor][other sensor]: the share of the other's calibrated value that this one's shows
+  std::map<std::string, std::map<std::string, double>> crosstalk{};
 };
 
 // A compiled calibration with the text from which it was made; the log stores the text.

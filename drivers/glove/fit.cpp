@@ -78,6 +78,7 @@ HandAngles angles_of(const Model& model, const Calibration& calibration,
     valid[i] = std::isfinite(value[i]);
   }
   const std::span<float> values = std::span(value).first(calibration.sensors);
+  calibration.remove_crosstalk(values, valid);
   if (model.compute != nullptr) model.compute(calibration, values, valid);
   HandAngles angles{};
   calibration.map_to_hand(values, valid, angles);

@@ -94,6 +94,7 @@ RT_SAFE void GloveDecoder::emit(const Packet& packet, Sink& sink) noexcept {
   }
   const std::span<float> values = std::span(value).first(sensors);
   drop_what_is_no_number(values, valid);
+  calibration_->remove_crosstalk(values, valid);
   compute(values, valid);
   drop_what_is_no_number(values, valid);
 

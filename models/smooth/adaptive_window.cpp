@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "models/smooth/live_options.hpp"
@@ -25,11 +26,21 @@ constexpr double kHandShare = 0.1;      // of the mean speed of all channels
 constexpr int kPasses = 2;
 constexpr double kRepeats = 4.0;  // variance of a value equal to the one before, per variance
 
+constexpr double kWholeRounding = 1.25;  // rounding_rad is slightly below the error of rounding
+constexpr double kJump2 = 25.0;    // square of a change that is none of the noise, per variance
+constexpr double kOfTurn = 6.0;    // variance of a second difference of white noise
+constexpr int kSinceRepeated = 8;  // frames after which the device is taken to repeat no more
+
 constexpr double kEven = 1e-3;  // frames whose skew is below this count as evenly spaced
 
 constexpr int kEvenWindow = 26;
 constexpr double kWindow_s = 26.0 / kEvenRate_hz;
 constexpr int kLengthSlack = 8;  // the window's length over the loss that it does not follow
+
+RT_SAFE double rounded_rad2(const Sensors& sensors, std::size_t channel) noexcept {
+  const double rounding_rad = sensors.rounding_rad.empty() ? 0.0 : sensors.rounding_rad[channel];
+  return rounding_rad * rounding_rad;
+}
 
 }  // namespace
 
@@ -45,6 +56,9 @@ AdaptiveWindow::AdaptiveWindow(int channels)
       window_(channels, kMaxWindow),
       past_(information_.stride()),
       steady_(channels, information_.stride(), kMaxWindow),
+      jump_(trajectory::make_rows(kMaxWindow, information_.stride())),
+      jumps_(kMaxWindow),
+      recent_rad_(2 * static_cast<std::size_t>(channels)),
       whole_(kMaxWindow),
       ring_time_s_(kMaxWindow),
       last_measured_(channels),
@@ -63,11 +77,13 @@ AdaptiveWindow::AdaptiveWindow(int channels)
 
 RT_SAFE void AdaptiveWindow::reset() noexcept {
   pushed_ = 0;
+  since_repeated_ = 0;
   frames_ = length_ = 0;
   std::ranges::fill(last_measured_, -1);
   std::ranges::fill(held_rad_, 0.0);
   std::fill_n(active_.get(), stride(), 0.0);
   std::fill_n(density_.get(), stride(), kDensityBase);
+  std::ranges::fill(recent_rad_, std::numeric_limits<double>::quiet_NaN());
   past_.forget();
   steady_.reset();
 }
@@ -92,7 +108,10 @@ RT_SAFE void AdaptiveWindow::push(double time_s, std::span<const double> measure
   double* const mean = position + stride();
   for (std::size_t c = 0; c < static_cast<std::size_t>(channels_); ++c) {
     const double rounding_rad = sensors.rounding_rad.empty() ? 0.0 : sensors.rounding_rad[c];
-    const double noise_rad = std::max(sensors.noise_rad, rounding_rad);
+    const bool only_rounded =
+        !sensors.half_step_rad.empty() && std::isfinite(sensors.half_step_rad[c]);
+    const double noise_rad =
+        only_rounded ? kWholeRounding * rounding_rad : std::max(sensors.noise_rad, rounding_rad);
     const double precision = 1.0 / (noise_rad * noise_rad);
     variance_rad2_[c] = 1.0 / precision;
     const bool measured = std::isfinite(measured_rad[c]);
@@ -112,12 +131,50 @@ RT_SAFE void AdaptiveWindow::push(double time_s, std::span<const double> measure
     mean[c] = position[c] * held_rad_[c];
   }
   copy_sensed(at);
+  find_jumps(measured_rad, sensors);
   ++pushed_;
   steady_.push(time_s, measured_rad,
                {.variance_rad2 = variance_rad2_.data(),
                 .density = density_.get(),
                 .active = active_.get(),
                 .repeated = sensors.repeated});
+}
+
+// A change of speed from frame to frame that noise cannot explain is one of the joint, as bad
+// samples are left out before (models/gate). So the prior of the frame before has to allow for it:
+// its variance there is larger by the change's square. A value that repeats is that of a dead band,
+// whose changes say nothing.
+RT_SAFE void AdaptiveWindow::find_jumps(std::span<const double> measured_rad,
+                                        const Sensors& sensors) noexcept {
+  since_repeated_ = sensors.repeated ? 0 : std::min(since_repeated_ + 1, kSinceRepeated);
+  const double noise_rad2 = sensors.jitter_rad * sensors.jitter_rad;
+  const std::size_t before = (pushed_ + kMaxWindow - 1) % kMaxWindow;
+  double* const jump = jump_row(static_cast<int>(before));
+  jumps_[pushed_ % kMaxWindow] = 0;
+  std::fill_n(jump, stride(), 0.0);
+  for (std::size_t c = 0; c < static_cast<std::size_t>(channels_); ++c) {
+    const double now = measured_rad[c];
+    const double last = std::exchange(recent_rad_[2 * c], now);
+    const double first = std::exchange(recent_rad_[2 * c + 1], last);
+    const double turn_rad = now - 2.0 * last + first;
+    const double most_rad2 =
+        kJump2 * std::min(variance_rad2_[c], std::max(noise_rad2, rounded_rad2(sensors, c)));
+    const bool moves = now != last && last != first && since_repeated_ == kSinceRepeated &&
+                       sensors.jitter_rad > 0.0;
+    if (!(turn_rad * turn_rad > kOfTurn * most_rad2) || !moves) continue;
+    jump[c] = turn_rad * turn_rad;
+    jumps_[before] = 1;
+  }
+}
+
+RT_SAFE void AdaptiveWindow::allow_jumps(int index) noexcept {
+  const int at = slot(index);
+  if (jumps_[at] == 0) return;
+  const double* const jump = jump_row(at);
+  double* const curve = information_.row(at, trajectory::kDeltaDelta);
+  for (int c = 0; c < channels_; ++c) {
+    if (jump[c] > 0.0) curve[c] = 1.0 / (1.0 / curve[c] + jump[c]);
+  }
 }
 
 RT_SAFE void AdaptiveWindow::copy_sensed(int slot) noexcept {
@@ -178,6 +235,7 @@ RT_SAFE void AdaptiveWindow::loose_prior() noexcept {
     std::fill_n(information_.row(slot(i), trajectory::kDelta), 2 * stride(), 0.0);
     std::fill_n(information_.row(slot(i), trajectory::kDeltaDelta), stride(), curve);
     std::fill_n(information_.row(slot(i), trajectory::kDeltaDeltaMean), stride(), 0.0);
+    allow_jumps(i);
   }
 }
 
@@ -214,6 +272,7 @@ RT_SAFE void AdaptiveWindow::speed_prior() noexcept {
                           {.delta = information_.row(slot(i), trajectory::kDelta),
                            .delta_delta = information_.row(slot(i), trajectory::kDeltaDelta),
                            .density = density_.get()});
+    allow_jumps(i);
   }
 }
 

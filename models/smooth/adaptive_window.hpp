@@ -40,7 +40,10 @@ class InformationSource {
 // What is known of the sensors whose values a frame shows.
 struct Sensors {
   double noise_rad = 0.0;
-  std::span<const double> rounding_rad{};  // [channels] error of rounding; empty: none
+  double jitter_rad =
+      0.0;  // the noise as far as it shows from frame to frame; 0: no jumps are told
+  std::span<const double> rounding_rad{};   // [channels] error of rounding; empty: none
+  std::span<const double> half_step_rad{};  // [channels] finite where nothing but rounding disturbs
   bool repeated = false;  // the frame shows the samples of the one before once more: none is new
 };
 
@@ -93,6 +96,11 @@ class AdaptiveWindow {
   }
   void copy_sensed(int slot) noexcept;
   void forget_extra() noexcept;
+  void find_jumps(std::span<const double> measured_rad, const Sensors& sensors) noexcept;
+  void allow_jumps(int index) noexcept;
+  [[nodiscard]] double* jump_row(int slot) noexcept {
+    return jump_.get() + static_cast<std::ptrdiff_t>(slot) * stride();
+  }
   void adopt(std::size_t channel, double value_rad) noexcept;
   void begin(double period_s) noexcept;
   void loose_prior() noexcept;
@@ -114,6 +122,10 @@ class AdaptiveWindow {
   trajectory::SlidingWindow window_;
   trajectory::CarriedPast past_;
   SteadyMotion steady_;
+  trajectory::Rows jump_;                       // [kMaxWindow][stride] ring, see find_jumps
+  std::vector<std::uint8_t> jumps_;             // [kMaxWindow] ring: some channel's is above zero
+  int since_repeated_ = 0;                      // frames, up to kMaxSinceRepeated
+  std::vector<double> recent_rad_;              // [2][channels] values of the last two frames
   std::vector<std::uint8_t> whole_;             // [kMaxWindow] ring
   std::vector<double> ring_time_s_;             // [kMaxWindow]
   std::vector<long> last_measured_;             // [channels] number of the frame; -1: never

@@ -14,6 +14,7 @@
 #include "models/motion/heading.hpp"
 #include "models/smooth/adaptive_window.hpp"
 #include "models/smooth/model_prior.hpp"
+#include "models/smooth/motion_models.hpp"
 #include "models/smooth/noise_estimate.hpp"
 #include "proto/frame/frame.hpp"
 #include "proto/frame/hand_skeleton.hpp"
@@ -224,6 +225,7 @@ struct LiveSmoother::State {
         unwrap(figure),
         noise(columns),
         window(columns),
+        motions(columns),
         filter(kMaxWindow, gesture::most_channels(figure), wanted.error_rad),
         model_prior(filter, gesture::most_channels(figure)),
         measured(static_cast<std::size_t>(columns)),
@@ -231,6 +233,7 @@ struct LiveSmoother::State {
         posed(measured.size()),
         posed_now(measured.size()),
         column_variance(hwy::AllocateAligned<double>(static_cast<std::size_t>(window.stride()))),
+        solved(measured.size()),
         variance(static_cast<std::size_t>(angles), kUnknown),
         values(figure.channels.size()),
         pending(kMaxPending),
@@ -249,6 +252,8 @@ struct LiveSmoother::State {
   void lay_out(const LiveModel* model) noexcept;
   void receive(const Frame& frame, double step_s) noexcept;
   void receive_body(const Frame& frame, double step_s) noexcept;
+  void sense(double now_s, double step_s, double period_s) noexcept;
+  void solve(double period_s) noexcept;
   void emit_until(long last, StageOut& out) noexcept;
   void rebuild(Frame& frame, int back) noexcept;
   void turn_joints(Frame& frame) noexcept;
@@ -265,6 +270,7 @@ struct LiveSmoother::State {
   FrameClock clock;
   NoiseEstimate noise;
   AdaptiveWindow window;
+  MotionModels motions;
   HmmForwardFilter filter;
   ModelPrior model_prior;
   std::vector<double> measured;   // [columns] of the current frame
@@ -272,6 +278,7 @@ struct LiveSmoother::State {
   std::vector<double> posed;      // [columns] a body's channels, each as it was measured last
   std::vector<double> posed_now;  // the same as it is shown
   trajectory::Rows column_variance;
+  std::vector<double> solved;                   // [columns] of the emitted frame
   std::vector<double> variance;                 // [angles] of the emitted frame
   const gesture::PoseChannels* body = nullptr;  // of the model in use; null: none of a body
   std::size_t body_columns = 0;
@@ -371,8 +378,39 @@ RT_SAFE void LiveSmoother::State::receive_body(const Frame& frame, double step_s
 RT_SAFE void LiveSmoother::State::forget() noexcept {
   unwrap.reset();
   window.reset();
+  motions.reset();
   filter.reset();
   heading = motion::LiveHeading();
+}
+
+// Passes the frame's values on to whatever learns from them. With a stated noise the window alone
+// smooths.
+RT_SAFE void LiveSmoother::State::sense(double now_s, double step_s, double period_s) noexcept {
+  const bool even = step_s < kEvenStep * period_s;
+  const double stated_rad = options.noise_rad;
+  if (stated_rad > 0.0) {
+    window.push(now_s, measured, {.noise_rad = stated_rad});
+  } else {
+    noise.push(measured, even, period_s);
+    motions.push(step_s, measured, noise.noise_rad());
+    window.push(now_s, measured,
+                {.noise_rad = noise.noise_rad(),
+                 .jitter_rad = noise.jitter_rad(),
+                 .rounding_rad = noise.rounding_rad(),
+                 .half_step_rad = noise.half_step_rad(),
+                 .repeated = noise.repeated()});
+  }
+  const double noise_rad = stated_rad > 0.0 ? stated_rad : noise.noise_rad();
+  if (filter.model() == nullptr) return;
+  filter.push(std::span(measured).first(filter.model()->channels), even, period_s, noise_rad);
+  filter.sweep(window_frames(period_s));
+}
+
+RT_SAFE void LiveSmoother::State::solve(double period_s) noexcept {
+  window.solve(period_s, filter.model() != nullptr ? &model_prior : nullptr);
+  if (options.noise_rad > 0.0 || window.frames() < 2) return;
+  window.variance(1, column_variance.get());
+  motions.judge(window.x(1), column_variance.get());
 }
 
 RT_SAFE void LiveSmoother::process(const StageFrame& in, StageOut& out) noexcept {
@@ -392,22 +430,8 @@ RT_SAFE void LiveSmoother::process(const StageFrame& in, StageOut& out) noexcept
   const double period_s = s.clock.period_s();
   if (s.received - s.emitted >= window_frames(period_s)) flush(out);  // the beat became much slower
   s.receive(in.frame, step_s);
-  const bool even = step_s < kEvenStep * period_s;
-  if (s.options.noise_rad > 0.0) {
-    s.window.push(now_s, s.measured, {.noise_rad = s.options.noise_rad});
-  } else {
-    s.noise.push(s.measured, even, period_s);
-    s.window.push(now_s, s.measured,
-                  {.noise_rad = s.noise.noise_rad(),
-                   .rounding_rad = s.noise.rounding_rad(),
-                   .repeated = s.noise.repeated()});
-  }
-  if (s.filter.model() != nullptr) {
-    const std::size_t modelled = s.filter.model()->channels;
-    s.filter.push(std::span(s.measured).first(modelled), even, period_s, noise_rad());
-    s.filter.sweep(window_frames(period_s));
-  }
-  s.window.solve(period_s, s.filter.model() != nullptr ? &s.model_prior : nullptr);
+  s.sense(now_s, step_s, period_s);
+  s.solve(period_s);
   // Until the period is known, a lag in time cannot be converted into frames, so the first frames
   // wait.
   const bool in_time = s.options.lag.seconds > 0.0;
@@ -457,7 +481,12 @@ RT_SAFE void LiveSmoother::State::emit_until(long last, StageOut& out) noexcept 
 // Writes the solve's result into the frame `back` frames before the newest.
 RT_SAFE void LiveSmoother::State::rebuild(Frame& frame, int back) noexcept {
   window.variance(back, column_variance.get());
-  const double* const x = window.x(back);
+  std::copy_n(window.x(back), columns, solved.begin());
+  // The evidence of the motion models holds for white noise only.
+  if (noise.white() && back <= kMaxLagFrames) {
+    for (int c = 0; c < columns; ++c) solved[c] = motions.mixed(c, back, solved[c]);
+  }
+  const double* const x = solved.data();
   frame.lag_frames = static_cast<std::uint16_t>(back);
   frame.lag_ms = static_cast<float>(1e3 * window.age_s(back));
   for (std::size_t i = 0; i < free_angles; ++i) {
@@ -471,8 +500,15 @@ RT_SAFE void LiveSmoother::State::rebuild(Frame& frame, int back) noexcept {
     }
     const bool there = std::isfinite(value);
     if (!there) frame.quality = std::max(frame.quality, Quality::kPredicted);
-    value =
-        static_cast<float>(there ? unwrap_near(x[column], static_cast<double>(value)) : x[column]);
+    if (there) {
+      // A value that is only rounded is nowhere farther from the truth than half a step.
+      const double shown_rad = static_cast<double>(value);
+      const double half_rad = noise.half_step_rad()[column];
+      value = static_cast<float>(std::clamp(unwrap_near(x[column], shown_rad), shown_rad - half_rad,
+                                            shown_rad + half_rad));
+    } else {
+      value = static_cast<float>(x[column]);
+    }
   }
   turn_joints(frame);
   if (body != nullptr) {

@@ -23,20 +23,30 @@ constexpr double kMedian = 0.6745;
 constexpr double kToNoise = kLowSide / (kMedian * 4.47213595499958);
 
 // Correlation of the noise.
-constexpr double kFew = 400.0;                    // differences before a correlation is believed
-constexpr double kMinCorrelation = 0.3;           // less is taken for white noise
-constexpr double kMaxCorrelation = 0.85;          // more cannot be told apart
-constexpr double kMotion_Hz = 5.0;                // up to which hands move; the noise there counts
-constexpr double kSlowest_Hz = 8.0 * kMotion_Hz;  // of samples whose noise differs from motion
-constexpr double kOverRounding = 2.0;  // a weaker noise is that of the steps, and not random
+constexpr double kFew = 400.0;               // differences before a correlation is believed
+constexpr double kFewWhite = 120.0;          // the same before noise is called white
+constexpr double kMinCorrelation = 0.3;      // less is taken for white noise
+constexpr double kStillWhite = 0.4;          // and so much, what has been taken for white noise
+constexpr double kMaxCorrelation = 0.85;     // more cannot be told apart
+constexpr double kMotionShare = 1.0 / 15.0;  // of the rate: the noise up to there counts
+constexpr double kSlowest_Hz = 40.0;         // of samples whose noise differs from motion
+constexpr double kOverRounding = 2.0;        // a weaker noise is that of the steps, and not random
 
 // Steps of quantisation.
 constexpr double kSmallest_rad = 1e-5;  // float values differ by less
 constexpr double kSame = 0.02;          // tolerance, of a step
 constexpr double kStepForget = 0.02;    // of a change
-constexpr int kStepChanges = 12;        // before a step is believed
+constexpr int kStepChanges = 4;         // before a step is believed
+constexpr int kMostChanges = 100;       // that are counted
 constexpr double kStepShare = 0.9;      // of the changes that are multiples of the step
 constexpr double kRounding = 0.8 * 0.28867513459481287;  // of a step: slightly below 1/sqrt(12)
+
+// Noise beside the rounding.
+constexpr int kTurnFrames = 3;        // in which a change is taken back
+constexpr double kTurnForget = 0.05;  // of a change
+constexpr double kFirstTurns = 0.1;   // share of such changes that is assumed at first
+constexpr double kFewTurns = 0.15;    // share that motions have
+constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
 // Repeated samples.
 constexpr double kSamples = 100.0;     // that the shares are means of
@@ -89,7 +99,8 @@ NoiseEstimate::NoiseEstimate(int channels)
       first_(channels),
       moved_(channels),
       steps_(channels),
-      rounding_rad_(channels) {
+      rounding_rad_(channels),
+      half_step_rad_(channels) {
   reset();
 }
 
@@ -98,13 +109,15 @@ RT_SAFE void NoiseEstimate::reset() noexcept {
   std::fill(moved_.begin(), moved_.end(), false);
   std::ranges::fill(steps_, Step());
   std::ranges::fill(rounding_rad_, 0.0);
+  std::ranges::fill(half_step_rad_, kUnbounded);
   forget_differences();
   number_ = 0;
   samples_ = alone_ = 0.0;
   longer_.fill(0.0);
   run_ = 0;
   repeats_ = repeated_ = false;
-  noise_rad_ = kFirstGuess_rad;
+  noise_rad_ = jitter_rad_ = kFirstGuess_rad;
+  white_ = false;
 }
 
 // A device that is read more often than it samples repeats all its channels at once, and regularly.
@@ -142,19 +155,29 @@ RT_SAFE void NoiseEstimate::forget_differences() noexcept {
   even_samples_ = 0;
 }
 
+// Noise beside the rounding makes a value that lies between two steps go to and fro; a motion alone
+// hardly ever turns within a few frames.
 RT_SAFE void NoiseEstimate::learn_step(std::size_t c, double change_rad) noexcept {
   const double size_rad = std::abs(change_rad);
-  if (!(size_rad > kSmallest_rad)) return;
   Step& step = steps_[c];
+  step.frames = std::min(step.frames + 1, kTurnFrames + 1);
+  if (!(size_rad > kSmallest_rad)) return;
   if (step.changes == 0 || size_rad < (1.0 - kSame) * step.least_rad) {
-    step = {.least_rad = size_rad, .multiples = 1.0, .changes = 0};
+    step = {.least_rad = size_rad, .multiples = 1.0, .changes = 0, .turns = kFirstTurns};
   }
+  const bool turned = step.last_rad * change_rad < 0.0 && step.frames <= kTurnFrames;
+  step.turns += kTurnForget * ((turned ? 1.0 : 0.0) - step.turns);
+  step.last_rad = change_rad;
+  step.frames = 0;
   const double multiple = size_rad / step.least_rad;
   const bool whole = std::abs(multiple - std::round(multiple)) < 2.0 * kSame;
-  step.changes = std::min(step.changes + 1, kStepChanges);
-  step.multiples += kStepForget * ((whole ? 1.0 : 0.0) - step.multiples);
-  const bool believed = step.changes == kStepChanges && step.multiples > kStepShare;
+  step.changes = std::min(step.changes + 1, kMostChanges);
+  step.multiples +=
+      std::max(kStepForget, 1.0 / (step.changes + 1)) * ((whole ? 1.0 : 0.0) - step.multiples);
+  const bool believed = step.changes >= kStepChanges && step.multiples > kStepShare;
   rounding_rad_[c] = believed ? kRounding * step.least_rad : 0.0;
+  const bool only = believed && step.turns < kFewTurns;
+  half_step_rad_[c] = only ? 0.5 * step.least_rad : kUnbounded;
 }
 
 RT_SAFE void NoiseEstimate::learn_differences(std::size_t c, double now_rad) noexcept {
@@ -191,37 +214,40 @@ RT_SAFE void NoiseEstimate::push(std::span<const double> measured_rad, bool even
   }
   if (third_.total() >= kEnough) {
     const double white_rad = kToNoise * third_.median_rad();
-    noise_rad_ = std::max({kMinNoise_rad, white_rad, correlated_rad(white_rad, period_s)});
+    const bool random = white_rad > kOverRounding * std::ranges::max(rounding_rad_);
+    const double r = random && fifth_.total() >= kFewWhite ? correlation() : kMaxCorrelation;
+    jitter_rad_ = std::max(kMinNoise_rad, white_rad);
+    noise_rad_ = std::max(jitter_rad_, random ? correlated_rad(r, period_s) : 0.0);
+    // Once it is white it stays so until it is clearly not.
+    white_ = !repeats_ && r < (white_ ? kStillWhite : kMinCorrelation);
   }
   third_.fade();
   fifth_.fade();
   far_fifth_.fade();
 }
 
-// White noise of this strength has, up to the frequencies of motions, as much power as the noise;
-// 0 for noise that is not correlated.
-RT_SAFE double NoiseEstimate::correlated_rad(double white_rad, double period_s) const noexcept {
-  double frames = 1.0;  // for each sample
-  for (const double share : longer_) frames += repeats_ ? share : 0.0;
-  const double sample_s = period_s * frames;
-  const double rounding_rad = std::ranges::max(rounding_rad_);
-  if (fifth_.total() < kFew || sample_s * kSlowest_Hz > 1.0 ||
-      white_rad < kOverRounding * rounding_rad) {
-    return 0.0;
-  }
-  const double near_rad = fifth_.median_rad() / kMedian;
-  const double far_rad = far_fifth_.median_rad() / kMedian;
-  const double ratio = far_rad * far_rad / (near_rad * near_rad);
+// That of samples that follow each other, 0 to kMaxCorrelation, if it falls off as a first order's.
+RT_SAFE double NoiseEstimate::correlation() const noexcept {
+  const double ratio = far_fifth_.median_rad() / fifth_.median_rad();
   double low = 0.0;  // between these correlations the variances have this ratio
   double high = kMaxCorrelation;
   for (int i = 0; i < 12; ++i) {
     const double r = 0.5 * (low + high);
-    (fifth_variance(r * r) < ratio * fifth_variance(r) ? low : high) = r;
+    (fifth_variance(r * r) < ratio * ratio * fifth_variance(r) ? low : high) = r;
   }
-  if (low < kMinCorrelation) return 0.0;
-  const double turn = 2.0 * std::numbers::pi * kMotion_Hz * sample_s;
-  const double power = (1.0 - low * low) / (1.0 - 2.0 * low * std::cos(turn) + low * low);
-  return near_rad * std::sqrt(power / fifth_variance(low));
+  return low;
+}
+
+// White noise of this strength has, up to the frequencies of motions, as much power as the noise;
+// 0 for noise that is not correlated.
+RT_SAFE double NoiseEstimate::correlated_rad(double r, double period_s) const noexcept {
+  double frames = 1.0;  // for each sample
+  for (const double share : longer_) frames += repeats_ ? share : 0.0;
+  const double sample_s = period_s * frames;
+  if (fifth_.total() < kFew || sample_s * kSlowest_Hz > 1.0 || r < kMinCorrelation) return 0.0;
+  const double turn = 2.0 * std::numbers::pi * kMotionShare;
+  const double power = (1.0 - r * r) / (1.0 - 2.0 * r * std::cos(turn) + r * r);
+  return fifth_.median_rad() / kMedian * std::sqrt(power / fifth_variance(r));
 }
 
 }  // namespace posed::smooth

@@ -43,10 +43,20 @@ class NoiseEstimate {
   // slightly below the estimate, because an assumed noise that is too low costs less accuracy than
   // one that is too high.
   RT_SAFE [[nodiscard]] double noise_rad() const noexcept { return noise_rad_; }
+  // The same as far as it shows from sample to sample: less where the noise is correlated.
+  RT_SAFE [[nodiscard]] double jitter_rad() const noexcept { return jitter_rad_; }
   // The error of rounding [rad], for each channel; 0 where the values have no steps.
   RT_SAFE [[nodiscard]] std::span<const double> rounding_rad() const noexcept {
     return rounding_rad_;
   }
+  // For each channel half a step [rad] where values are off by rounding alone, so that none is
+  // farther from the truth; else infinite.
+  RT_SAFE [[nodiscard]] std::span<const double> half_step_rad() const noexcept {
+    return half_step_rad_;
+  }
+  // Whether the noise is known to be white: not correlated, without repeated samples. Needs some
+  // hundred values.
+  RT_SAFE [[nodiscard]] bool white() const noexcept { return white_; }
   // Whether the last frame shows the sample of the frame before once more.
   RT_SAFE [[nodiscard]] bool repeated() const noexcept { return repeated_; }
 
@@ -57,7 +67,8 @@ class NoiseEstimate {
   void learn_step(std::size_t c, double change_rad) noexcept;
   void learn_differences(std::size_t c, double now_rad) noexcept;
   void forget_differences() noexcept;
-  [[nodiscard]] double correlated_rad(double white_rad, double period_s) const noexcept;
+  [[nodiscard]] double correlation() const noexcept;
+  [[nodiscard]] double correlated_rad(double r, double period_s) const noexcept;
 
   static constexpr int kPast = 10;       // samples: the fifth difference of every second one
   static constexpr int kMaxRepeats = 4;  // of one sample
@@ -66,15 +77,19 @@ class NoiseEstimate {
     double least_rad = 0.0;  // the smallest change since it was found
     double multiples = 0.0;  // share of the changes that are multiples of it
     int changes = 0;
+    double turns = 1.0;  // share of the changes that take back one of the last frames'
+    double last_rad = 0.0;
+    int frames = 0;  // since that change
   };
 
-  std::vector<double> past_;          // [channels][kPast] samples, newest first
-  std::vector<double> first_;         // [channels] the first value of each
-  std::vector<bool> moved_;           // [channels]
-  std::vector<Step> steps_;           // [channels]
-  std::vector<double> rounding_rad_;  // [channels]
-  long number_ = 0;                   // of samples
-  int even_samples_ = 0;              // in a row, up to kPast
+  std::vector<double> past_;           // [channels][kPast] samples, newest first
+  std::vector<double> first_;          // [channels] the first value of each
+  std::vector<bool> moved_;            // [channels]
+  std::vector<Step> steps_;            // [channels]
+  std::vector<double> rounding_rad_;   // [channels]
+  std::vector<double> half_step_rad_;  // [channels]
+  long number_ = 0;                    // of samples
+  int even_samples_ = 0;               // in a row, up to kPast
   MedianSize third_, fifth_, far_fifth_;
   bool repeats_ = false;   // the device shows samples more than once
   bool repeated_ = false;  // the last frame was such
@@ -83,6 +98,8 @@ class NoiseEstimate {
   double alone_ = 0.0;     // share of the channels that repeat while others change
   std::array<double, kMaxRepeats> longer_{};  // share of the samples repeated more than i times
   double noise_rad_;
+  double jitter_rad_;
+  bool white_ = false;
 };
 
 }  // namespace posed::smooth

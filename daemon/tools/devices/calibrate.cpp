@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <string>
 #include <vector>
@@ -15,7 +16,7 @@
 #include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
-#include "daemon/devices/thumb_contacts.hpp"
+#include "daemon/devices/pose_calibration.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
@@ -24,6 +25,7 @@
 #include "daemon/tools/devices/driver_options.hpp"
 #include "daemon/tools/live/live_view.hpp"
 #include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/crosstalk.hpp"
 #include "drivers/glove/device_info.hpp"
 #include "drivers/glove/import.hpp"
 #include "drivers/glove/pose_check.hpp"
@@ -231,6 +233,63 @@ Result<drivers::glove::Recorded> good_poses(GloveSource& source, const PosePlan&
   return recorded;
 }
 
+// What the user does after the poses with --moves.
+struct GuidedMove {
+  const char *name, *hint;
+};
+constexpr GuidedMove kBend{
+    "bend",
+    "without spreading, bend and stretch one finger after the other, then all "
+    "of them; twice, slowly"};
+constexpr GuidedMove kSpreadMove{"spread",
+                                 "fingers straight, spread and close them; four times, slowly"};
+constexpr double kMove_s = 20.0;
+constexpr double kMovePatience_s = 5.0;  // for a glove that sends nothing while the user reads
+
+// By lines, on a terminal too: "move bend" on stdout, the hint on stderr; a line on stdin begins
+// it, or the time to get ready.
+Result<drivers::glove::Move> record_move(GloveSource& source, const PosePlan& plan,
+                                         const GuidedMove& wanted) {
+  std::printf("move %s\n", wanted.name);
+  std::fflush(stdout);
+  std::fprintf(stderr, "%s: %s, for %.0f s%s\n", wanted.name, wanted.hint, kMove_s,
+               plan.ready_s ? "" : "; then press Enter to begin");
+  PoseLines lines(plan);
+  auto word = PoseGuide::Word::kNothing;
+  const auto begun = SteadyClock::now();
+  const auto enough = [&] {
+    word = lines.receive();
+    const double past_s = std::chrono::duration<double>(SteadyClock::now() - begun).count();
+    if (plan.ready_s && past_s >= *plan.ready_s) word = PoseGuide::Word::kGo;
+    return word != PoseGuide::Word::kNothing;
+  };
+  while (word == PoseGuide::Word::kNothing) {
+    TRY(source.listen(kMovePatience_s, [](const auto&, const auto&) {}, enough));
+  }
+  if (word == PoseGuide::Word::kStop) return fail("stopped; no calibration was written");
+  drivers::glove::Move move;
+  const auto keep = [&move](const GloveSource::Raw& raw, const GloveSource::Valid& valid) {
+    auto& frame = move.emplace_back(raw);
+    for (std::size_t i = 0; i < frame.size(); ++i) {
+      if (!valid[i]) frame[i] = std::numeric_limits<float>::quiet_NaN();
+    }
+  };
+  TRY(source.listen(kMove_s, keep));
+  return move;
+}
+
+Result<> fit_moves(GloveSource& source, const PosePlan& plan, CalibrationFile& file) {
+  drivers::glove::Moves moves;
+  auto bend = TRY(record_move(source, plan, kBend));
+  auto spread = TRY(record_move(source, plan, kSpreadMove));
+  moves.bend = std::move(bend);
+  moves.spread = std::move(spread);
+  const auto said = TRY(drivers::glove::fit_crosstalk(source.model(), moves, source.hand(), file));
+  for (const std::string& line : said) std::fprintf(stderr, "posed: %s\n", line.c_str());
+  if (said.empty()) std::fprintf(stderr, "posed: no sensor shows another's movement\n");
+  return {};
+}
+
 constexpr double kMaxSeconds = 60.0;
 constexpr int kHandColumns = 60, kHandRows = 10;  // of the picture of the calibrated hand
 
@@ -246,6 +305,7 @@ struct CalibrateOptions {
   bool live = false;
   bool ready_given = false;
   bool overwrite = false;
+  bool moves = false;  // two moves after the poses
   bool force = false;  // write the file although the check calls it unusable
 };
 
@@ -330,18 +390,6 @@ Result<std::unique_ptr<GloveSource>> open_glove(const CalibrateOptions& options)
   return source;
 }
 
-// The glove that a calibration is for. A port's path does not identify it, because the same glove
-// may be plugged in elsewhere tomorrow.
-CalibrationFile blank_file(const GloveSource& source) {
-  const std::string& identity = source.identity();
-  return {.driver = source.model().driver,
-          .glove = identity.starts_with('/') ? std::string() : identity,
-          .user = {},
-          .hand = source.hand(),
-          .parameters = {},
-          .sensors = {}};
-}
-
 // Draws the calibrated hand for a user at a terminal. An error says that the file is none that a
 // driver would take.
 Result<> show_hand(const GloveSource& source, const CalibrationFile& file,
@@ -357,16 +405,13 @@ Result<> show_hand(const GloveSource& source, const CalibrationFile& file,
   return {};
 }
 
-// What is odd about the new calibration, and how it differs from the one that the file holds so
-// far, if that is of this glove, user and hand.
+// How the new calibration differs from the one that the file holds so far, if that is of this
+// glove, user and hand.
 Result<> judge(const GloveSource& source, const CalibrateOptions& options,
                const CalibrationFile& file, const drivers::glove::Recorded& recorded) {
   const auto& model = source.model();
   const auto now =
       TRY(drivers::glove::make_calibration(model, file, source.hand(), source.identity()));
-  for (const std::string& line : impossible_angles(model, *now, recorded)) {
-    std::fprintf(stderr, "posed: warning: %s\n", line.c_str());
-  }
   std::error_code ignored;
   if (!std::filesystem::exists(options.out, ignored)) return {};
   const auto text = drivers::glove::load_calibration_text(options.out);
@@ -386,14 +431,15 @@ Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
   const auto plan = TRY(plan_of(options));
   const auto source = TRY(open_glove(options));
   const auto recorded = TRY(good_poses(*source, plan, options.user, options.force));
-  auto fitted = TRY(drivers::glove::fit_poses(source->model(), recorded));
-  for (const std::string& warning : fitted.warnings) {
+  auto [file, said, warnings] = TRY(
+      devices::calibrate_by_poses(source->model(), recorded,
+                                  devices::blank_calibration(source->model(), source->identity(),
+                                                             source->hand(), options.user)));
+  for (const std::string& warning : warnings) {
     std::fprintf(stderr, "posed: warning: %s\n", warning.c_str());
   }
-  CalibrationFile file = blank_file(*source);
-  file.sensors = std::move(fitted.sensors);
-  const auto contacts = TRY(devices::fit_contacts(source->model(), recorded, source->hand(), file));
-  for (const std::string& line : contacts) std::fprintf(stderr, "posed: %s\n", line.c_str());
+  for (const std::string& line : said) std::fprintf(stderr, "posed: %s\n", line.c_str());
+  if (options.moves) TRY(fit_moves(*source, plan, file));
   TRY(judge(*source, options, file, recorded));
   TRY(show_hand(*source, file, recorded));
   return file;
@@ -405,7 +451,11 @@ Result<CalibrationFile> from_file(const CalibrateOptions& options) {
   if (options.live) {
     const auto source = TRY(connect(options));
     auto file = drivers::glove::import_calibration(options.import, source->model(), source->hand());
-    if (file) file->glove = blank_file(*source).glove;
+    if (file) {
+      file->glove = devices::blank_calibration(source->model(), source->identity(), source->hand(),
+                                               options.user)
+                        .glove;
+    }
     return file;
   }
   const auto driver = TRY(named_driver(options.driver.empty() ? "cyberglove" : options.driver));
@@ -423,8 +473,8 @@ Result<> check_options(const CalibrateOptions& options) {
   }
   if (!options.live && !options.stream.empty()) return misuse("--stream also needs --connect");
   const bool timed = options.seconds > 0.0;
-  if (!options.import.empty() && (timed || !options.poses.empty())) {
-    return misuse("--import goes through no poses; leave out --seconds and --pose");
+  if (!options.import.empty() && (timed || options.moves || !options.poses.empty())) {
+    return misuse("--import goes through no poses; leave out --seconds, --pose and --moves");
   }
   if (!timed && options.ready_given) {
     return misuse("--ready is the time between poses that begin by themselves; add --seconds");
@@ -484,6 +534,8 @@ void add_calibrate(CLI::App& app, int& exit_code) {
           ->check(in_range(0.0, kMaxSeconds));
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--force", options->force, "Write the calibration even if poses failed");
+  command->add_flag("--moves", options->moves,
+                    "After the poses two moves, which take out what sensors show of each other");
   command->add_option("--pose", options->poses, "How long one pose is held; 0 leaves it out")
       ->type_name("POSE=SECONDS");
   command->add_option("--out", options->out, "The calibration to write")
@@ -495,7 +547,8 @@ touch-little and touch-fist also contacts, by which the thumb is fitted to what 
 and the spread hand then say where it lies beside the hand and how far it reaches. On a terminal a
 screen shows what to do; elsewhere a line on stdout names each pose and a line on stdin begins it,
 or --seconds does. A pose in which the hand moved, or whose sensors hardly moved from the flat hand,
-fails: the screen asks for it again, a script gets exit code 1 and no file. Examples:
+fails: the screen asks for it again, a script gets exit code 1 and no file. --moves is tried in
+simulation only, not on a real glove. Examples:
   posed calibrate --driver cyberglove --port /dev/ttyUSB0 --user ann --out ann.toml
   posed calibrate --connect tcp://127.0.0.1:5570 --stream right --user ann --out ann.toml
   posed calibrate --driver cyberglove --import old.cal --user ann --out ann.toml)");

@@ -1,5 +1,5 @@
-// What `posed calibrate` says about a new calibration: angles that no hand can do, and how it
-// differs from the one that the file held before. Cold.
+// What `posed calibrate` says about a new calibration: how it differs from the one that the file
+// held before. Cold.
 #pragma once
 
 #include <string>
@@ -10,12 +10,6 @@
 #include "drivers/glove/model.hpp"
 
 namespace posed::tools {
-
-// A sentence for each joint that would be bent, in one of the poses, as no hand's is; the worst
-// pose of each.
-[[nodiscard]] std::vector<std::string> impossible_angles(
-    const drivers::glove::Model& model, const drivers::glove::Calibration& calibration,
-    const drivers::glove::Recorded& recorded);
 
 // A sentence for each joint that the two calibrations show by more than 5 degrees apart in one of
 // the poses, the largest difference first; else one that says how much they agree.

@@ -95,7 +95,7 @@ TEST_CASE("correlated noise counts as the white noise that has its power in a mo
   // Its third differences alone look like 0.35 deg of white noise.
   const Learnt learnt = learn(correlated(swings(), 1.0, 0.8));
   CHECK(learnt.noise_deg > 0.9);
-  CHECK(learnt.noise_deg < 1.5);
+  CHECK(learnt.noise_deg < 1.7);  // 1.42 of white noise has its power at a 15th of the rate
 }
 
 TEST_CASE("steps of quantisation are found, and are no dead band", "[live]") {

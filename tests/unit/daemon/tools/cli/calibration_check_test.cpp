@@ -1,9 +1,10 @@
-// What `posed calibrate` says about a calibration: odd angles, and the difference from the last
+// What `posed calibrate` makes of odd angles, and what it says about the difference from the last
 // one.
 #include "daemon/tools/devices/calibration_check.hpp"
 
 #include <catch2/catch.hpp>
 
+#include "daemon/devices/possible_angles.hpp"
 #include "drivers/cyberglove/angles.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "proto/frame/degree.hpp"
@@ -37,7 +38,7 @@ TEST_CASE("a calibration that no hand can have, or that differs from the last, i
     recorded[1][i].add(150.0F);
   }
   const auto last = calibration();
-  CHECK(impossible_angles(model, *last, recorded).empty());
+  CHECK(devices::keep_possible(model, recorded, Side::kRight, file).value().empty());
   CHECK(differences(model, *last, *last, recorded) ==
         std::vector<std::string>{
             "no joint differs by more than 0 degrees from the last calibration"});
@@ -45,9 +46,23 @@ TEST_CASE("a calibration that no hand can have, or that differs from the last, i
   CHECK(differences(model, *last, *calibration(), recorded) ==
         std::vector<std::string>{"index MCP differs by 14 degrees from the last calibration"});
   file.sensors["index_mcp"][1][1] = value(170.0);
-  const auto odd = impossible_angles(model, *calibration(), recorded);
+  const auto odd = devices::keep_possible(model, recorded, Side::kRight, file).value();
   REQUIRE(odd.size() == 1);
-  CHECK(odd[0].starts_with("index MCP would be at 170 degrees in the pose fist"));
+  CHECK(
+      odd[0].starts_with("index MCP would be at 170 degrees in the pose fist, which no hand "
+                         "can do: it stops at 110"));
+  const auto angle_deg = [&](float raw) {
+    std::array<Held, kMaxSensors> held = recorded[0];
+    for (auto& sensor : held) {
+      if (sensor.count == 0) continue;
+      sensor = {};
+      sensor.add(raw);
+    }
+    return angles_of(model, *calibration(), held)[kFingerChannels] / kDegree;
+  };
+  CHECK(angle_deg(100.0F) == Approx(85.0).margin(0.5));  // up to there as it was fitted
+  CHECK(angle_deg(150.0F) == Approx(110.0).margin(0.5));
+  CHECK(angle_deg(250.0F) == Approx(110.0).margin(0.5));
 }
 
 }  // namespace posed::tools

@@ -1,0 +1,38 @@
+#include "daemon/devices/pose_calibration.hpp"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "daemon/devices/possible_angles.hpp"
+#include "daemon/devices/thumb_contacts.hpp"
+
+namespace posed::devices {
+
+drivers::glove::CalibrationFile blank_calibration(const drivers::glove::Model& model,
+                                                  const std::string& identity, Side hand,
+                                                  std::string user) {
+  return {.driver = model.driver,
+          .glove = identity.starts_with('/') ? std::string() : identity,
+          .user = std::move(user),
+          .hand = hand,
+          .parameters = {},
+          .sensors = {}};
+}
+
+Result<PoseCalibration> calibrate_by_poses(const drivers::glove::Model& model,
+                                           const drivers::glove::Recorded& recorded,
+                                           drivers::glove::CalibrationFile blank) {
+  auto fitted = TRY(drivers::glove::fit_poses(model, recorded));
+  PoseCalibration made{
+      .file = std::move(blank), .said = {}, .warnings = std::move(fitted.warnings)};
+  made.file.sensors = std::move(fitted.sensors);
+  const Side hand = made.file.hand;
+  auto said = TRY(fit_contacts(model, recorded, hand, made.file));
+  made.said = std::move(said);
+  auto odd = TRY(keep_possible(model, recorded, hand, made.file));
+  std::ranges::move(odd, std::back_inserter(made.warnings));
+  return made;
+}
+
+}  // namespace posed::devices

@@ -1,0 +1,31 @@
+// A glove's calibration from the poses that its user held: what `posed calibrate` and the daemon's
+// page both make. Cold.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/fit.hpp"
+#include "drivers/glove/model.hpp"
+#include "proto/frame/result.hpp"
+
+namespace posed::devices {
+
+struct PoseCalibration {
+  drivers::glove::CalibrationFile file;
+  std::vector<std::string> said;      // what the contacts changed
+  std::vector<std::string> warnings;  // sensors that keep their default; what no hand can do
+};
+
+// The glove that a calibration is for: `identity` as its driver says it. A port's path does not
+// identify it, because the same glove may be plugged in elsewhere tomorrow.
+[[nodiscard]] drivers::glove::CalibrationFile blank_calibration(const drivers::glove::Model& model,
+                                                                const std::string& identity,
+                                                                Side hand, std::string user);
+
+Result<PoseCalibration> calibrate_by_poses(const drivers::glove::Model& model,
+                                           const drivers::glove::Recorded& recorded,
+                                           drivers::glove::CalibrationFile blank);
+
+}  // namespace posed::devices
