@@ -9,8 +9,10 @@ namespace {
 constexpr double kMaxStep_s = 0.1;
 constexpr double kNoNeed_s = 50e-6;  // a shorter step only brakes
 constexpr double kNear_m = 0.03;     // from which on a pair's approach is limited
+constexpr double kSeen_m = 1e-4;     // beyond the margin: links in contact
 constexpr double kPart_m_s = 0.06;   // at which links come apart that are nearer than the margin
 constexpr double kGapShare = 0.5;    // of the joints' braking that a gap counts on
+constexpr double kLastShare = 0.9;   // of a gap that one step may take at the last
 constexpr double kRounding = 0.995;  // of the limits: what is sent is a float
 constexpr double kSame_m = 1e-6;
 constexpr double kAway_rad = 0.05;  // from here on a pose is another one
@@ -28,10 +30,7 @@ RT_SAFE double stopping_speed(double left, double a, double dt) noexcept {
 }  // namespace
 
 Command::Command(const RobotHand& robot, double margin_m)
-    : robot_(robot),
-      margin_m_(margin_m),
-      placed_(robot.links.size(), robot.capsules.size()),
-      pose_(robot.start()) {
+    : robot_(robot), margin_m_(margin_m), placed_(robot), pose_(robot.start()) {
   program_.size = robot.size();
 }
 
@@ -54,7 +53,7 @@ void Command::find_box(double dt_s) noexcept {
 // Whether links would overlap more than they do: `gaps` are those of now.
 bool Command::would_enter(const Drive& pose, std::span<const Gap> gaps) noexcept {
   place(robot_, pose, placed_);
-  return std::ranges::any_of(find_gaps(robot_, placed_, 0.0, false, there_), [&](const Gap& there) {
+  return std::ranges::any_of(find_gaps(robot_, placed_, {}, false, there_), [&](const Gap& there) {
     const auto now = std::ranges::find_if(
         gaps, [&](const Gap& gap) { return gap.a == there.a && gap.b == there.b; });
     const double allowed_m = now == gaps.end() ? 0.0 : std::min(now->gap_m, 0.0);
@@ -74,29 +73,45 @@ void Command::find_in_the_way(std::span<const Gap> gaps, const Drive& aim) noexc
   if (most > kSame_m) ++limited_;
 }
 
-// The step nearest to `aim` that keeps the links apart. False: only by breaking an acceleration.
-bool Command::keep_apart(std::span<const Gap> gaps, const Drive& aim, double dt_s,
-                         Drive& step) noexcept {
+// Rows by which links keep `margin_m`, or come back to it.
+void Command::find_rows(std::span<const Gap> gaps, double margin_m, double dt_s) noexcept {
   for (std::size_t r = 0; r < gaps.size(); ++r) {
     double brakes = 0.0;  // of all joints together [m/s^2]
     for (int i = 0; i < robot_.size(); ++i) {
       brakes += std::abs(gaps[r].slope[i]) * robot_.driven[i].acceleration;
     }
-    const double left_m = gaps[r].gap_m - margin_m_;
+    const double left_m = gaps[r].gap_m - margin_m;
     const double least_m_s = left_m > 0.0 ? -stopping_speed(left_m, kGapShare * brakes, dt_s)
                                           : std::min(kPart_m_s, -left_m / (10.0 * dt_s));
     rows_[r] = {.slope = gaps[r].slope, .least = least_m_s * dt_s};
   }
-  in_contact_ =
-      std::ranges::any_of(gaps, [&](const Gap& gap) { return gap.gap_m < margin_m_ + 1e-4; });
-  find_in_the_way(gaps, aim);
   program_.rows = {rows_.data(), gaps.size()};
+}
+
+// The step nearest to `aim` that keeps the links apart. False: only by breaking an acceleration.
+bool Command::keep_apart(std::span<const Gap> gaps, const Drive& aim, double dt_s,
+                         Drive& step) noexcept {
+  find_rows(gaps, margin_m_, dt_s);
+  in_contact_ =
+      std::ranges::any_of(gaps, [&](const Gap& gap) { return gap.gap_m < margin_m_ + kSeen_m; });
+  find_in_the_way(gaps, aim);
   program_.g = -aim;
   program_.H.setIdentity();
   if (robot::solve(program_, step)) return true;
-  // Nothing comes nearer than it may: standing still is always allowed.
-  for (StepRow& row : rows_) row.least = std::min(row.least, 0.0);
+  const auto only_stand = [&] {
+    for (StepRow& row : rows_) row.least = std::min(row.least, 0.0);
+  };
+  only_stand();
   if (robot::solve(program_, step)) return true;
+  // An acceleration goes before the margin: it is there to be used up before links meet.
+  find_rows(gaps, 0.0, dt_s);
+  only_stand();
+  if (robot::solve(program_, step)) return true;
+  for (std::size_t r = 0; r < gaps.size(); ++r) {
+    rows_[r].least = std::min(rows_[r].least, -kLastShare * gaps[r].gap_m);
+  }
+  if (robot::solve(program_, step)) return true;
+  // Standing still is always allowed.
   for (int i = 0; i < robot_.size(); ++i) {
     program_.low[i] = std::min(program_.low[i], 0.0);
     program_.high[i] = std::max(program_.high[i], 0.0);
@@ -108,7 +123,15 @@ bool Command::keep_apart(std::span<const Gap> gaps, const Drive& aim, double dt_
 void Command::move(const Drive& aim, double dt_s) noexcept {
   Drive step = aim;
   place(robot_, pose_, placed_);
-  const auto gaps = find_gaps(robot_, placed_, kNear_m, true, gaps_);
+  // Which rows can bind: with all joints at v at most, theirs do from v dt + v^2 / 2a on, where a
+  // is what keep_apart() gives them.
+  Drive turn = Drive::Zero();
+  for (int i = 0; i < robot_.size(); ++i) {
+    const double most = std::max(-program_.low[i], program_.high[i]) / dt_s;
+    turn[i] = most * dt_s + most * most / (2.0 * kGapShare * robot_.driven[i].acceleration);
+  }
+  const Near near{.most_m = kNear_m, .least_m = margin_m_ + kSeen_m, .turn = &turn};
+  const auto gaps = find_gaps(robot_, placed_, near, true, gaps_);
   bool is_soft = keep_apart(gaps, aim, dt_s, step);
   // The rows are straight and the links' ways are not: what would overlap more goes less far.
   int halving = 0;

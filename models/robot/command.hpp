@@ -41,6 +41,7 @@ class Command {
   RT_SAFE void find_blocked(const Drive& wanted, double dt_s) noexcept;
   RT_SAFE void find_box(double dt_s) noexcept;
   RT_SAFE void move(const Drive& aim, double dt_s) noexcept;
+  RT_SAFE void find_rows(std::span<const Gap> gaps, double margin_m, double dt_s) noexcept;
   RT_SAFE bool keep_apart(std::span<const Gap> gaps, const Drive& aim, double dt_s,
                           Drive& step) noexcept;
   RT_SAFE void find_in_the_way(std::span<const Gap> gaps, const Drive& aim) noexcept;

@@ -15,11 +15,13 @@ constexpr double kPinchGap = 10.0;
 constexpr double kSolverNear_m = 0.02;
 constexpr double kMissing = 1.0;  // [m], of what links miss of their margin: tips gain less by it
 constexpr int kBacktracks = 3;
+constexpr double kTiny_rad = 1e-4;  // a further step would not show
+constexpr double kLarger = 2.0, kLarger_rad = 0.01, kForgets = 0.7;
 
 }  // namespace
 
 PoseSolver::PoseSolver(const RobotHand& robot, double margin_m)
-    : robot_(robot), margin_m_(margin_m), placed_(robot.links.size(), robot.capsules.size()) {
+    : robot_(robot), margin_m_(margin_m), placed_(robot) {
   pose_ = robot.start();
   middle_.setZero();
   program_.size = robot.size();
@@ -82,7 +84,7 @@ double PoseSolver::add_pinches(const HandTarget& target, bool slopes) noexcept {
     if (target.pinch[f] <= 0.0) continue;
     const auto shaped = [&](const Finger& finger) {
       int link = finger.tip;
-      while (link > 0 && link != finger.last && robot_.balls[link].count == 0) {
+      while (link > 0 && link != finger.last && robot_.covers[link].count == 0) {
         link = robot_.links[link].parent;
       }
       return link;
@@ -126,32 +128,47 @@ PoseSolver::Nearness PoseSolver::nearness(std::span<const Gap> gaps) const noexc
   return nearness;
 }
 
-bool PoseSolver::step(const HandTarget& target) noexcept {
-  const double before = cost(target, pose_, true);
-  const auto gaps = find_gaps(robot_, placed_, kSolverNear_m, true, gaps_);
-  const Nearness now = nearness(gaps);
+// The best step within the joints' limits that keeps links apart, of those that are so near that
+// turning the joints by `turn` could bring them together.
+PoseSolver::Nearness PoseSolver::find_step(const Drive& turn, Drive& wanted) noexcept {
+  const Near near{.most_m = kSolverNear_m, .least_m = margin_m_, .turn = &turn};
+  const auto gaps = find_gaps(robot_, placed_, near, true, gaps_);
   for (std::size_t r = 0; r < gaps.size(); ++r) {
     // What is too near comes apart a little a step.
     rows_[r] = {.slope = gaps[r].slope, .least = std::min(margin_m_ - gaps[r].gap_m, 2e-3)};
   }
   program_.rows = {rows_.data(), gaps.size()};
+  (void)robot::solve(program_, wanted);
+  return nearness(gaps);
+}
+
+bool PoseSolver::step(const HandTarget& target) noexcept {
+  const double before = cost(target, pose_, true);
   for (int i = 0; i < program_.size; ++i) {
     program_.low[i] = robot_.driven[i].low - pose_[i];
     program_.high[i] = robot_.driven[i].high - pose_[i];
   }
+  // Steps are mostly as large as those before: a larger one is found again, with more links.
+  Drive turn = (kLarger * lately_).array() + kLarger_rad;
   Drive wanted;
-  (void)robot::solve(program_, wanted);
+  Nearness now = find_step(turn, wanted);
+  if ((wanted.cwiseAbs().array() > turn.array()).any()) {
+    turn = turn.cwiseMax(kLarger * wanted.cwiseAbs());
+    now = find_step(turn, wanted);
+  }
+  lately_ = wanted.cwiseAbs().cwiseMax(kForgets * lately_);
   wanted *= std::min(1.0, kMaxStep_rad / std::max(wanted.cwiseAbs().maxCoeff(), 1e-9));
   for (int halving = 0; halving <= kBacktracks; ++halving, wanted *= 0.5) {
     const Drive there = pose_ + wanted;
     const double after = cost(target, there, false);
-    if (!std::isfinite(after)) continue;
-    const Nearness then = nearness(find_gaps(robot_, placed_, margin_m_, false, gaps_));
-    if (then.overlap_m > std::max(now.overlap_m, 1e-5)) continue;
     // Where the command would not keep its margin it would stand: the margin is part of the cost.
-    if (after + kMissing * then.missing_m > before + kMissing * now.missing_m) continue;
+    const double most = before + kMissing * now.missing_m;
+    if (!(after <= most)) continue;
+    const Nearness then = nearness(find_gaps(robot_, placed_, {.most_m = margin_m_}, false, gaps_));
+    if (then.overlap_m > std::max(now.overlap_m, 1e-5)) continue;
+    if (after + kMissing * then.missing_m > most) continue;
     pose_ = there;
-    return true;
+    return wanted.cwiseAbs().maxCoeff() > kTiny_rad;
   }
   return false;
 }

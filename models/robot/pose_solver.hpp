@@ -30,6 +30,7 @@ class PoseSolver {
     double missing_m = 0.0;  // what pairs miss of their margin, together
   };
   RT_SAFE Nearness nearness(std::span<const Gap> gaps) const noexcept;
+  RT_SAFE Nearness find_step(const Drive& turn, Drive& wanted) noexcept;
   RT_SAFE bool step(const HandTarget& target) noexcept;
 
   const RobotHand& robot_;
@@ -39,6 +40,7 @@ class PoseSolver {
   std::array<StepRow, kMaxGaps> rows_{};
   StepProgram program_;
   Drive pose_, middle_;
+  Drive lately_ = Drive::Zero();  // what each joint has turned in a step
 };
 
 }  // namespace posed::robot

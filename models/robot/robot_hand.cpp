@@ -460,8 +460,8 @@ class Builder {
   [[nodiscard]] double tip_radius(const Finger& finger) const {
     double radius_m = 0.0;
     for (int l = finger.tip; l != hand_.links[finger.last].parent; l = hand_.links[l].parent) {
-      const Ball& ball = hand_.balls[l];
-      for (int c = ball.first; c < ball.first + ball.count; ++c) {
+      const Cover& cover = hand_.covers[l];
+      for (int c = cover.first; c < cover.first + cover.count; ++c) {
         radius_m = std::max(radius_m, hand_.capsules[c].radius_m);
       }
       if (radius_m > 0.0) return radius_m;
@@ -529,44 +529,6 @@ Result<Skeleton> robot_skeleton(const RobotHand& hand) {
   }
   TRY(skeleton.finish());
   return skeleton;
-}
-
-double angle_of(const RobotJoint& joint, const Drive& drive) noexcept {
-  return joint.driven < 0 ? joint.offset : joint.multiplier * drive[joint.driven] + joint.offset;
-}
-
-void place(const RobotHand& hand, const Drive& drive, Placed& placed) noexcept {
-  for (std::size_t l = 0; l < hand.links.size(); ++l) {
-    const Link& link = hand.links[l];
-    Eigen::Matrix3d turn = link.at.linear();
-    Eigen::Vector3d at_m = link.at.translation();
-    if (link.parent >= 0) {
-      at_m = placed.at_m[link.parent] + placed.turn[link.parent] * at_m;
-      turn = placed.turn[link.parent] * turn;
-    }
-    placed.at_m[l] = at_m;
-    if (hand.joint_of_link[l] >= 0) {
-      placed.axis[l] = turn * link.axis;
-      const double angle = angle_of(hand.joints[hand.joint_of_link[l]], drive);
-      turn = turn * Eigen::AngleAxisd(angle, link.axis).toRotationMatrix();
-    }
-    placed.turn[l] = turn;
-  }
-  for (std::size_t c = 0; c < placed.from_m.size(); ++c) {
-    const Capsule& capsule = hand.capsules[c];
-    placed.from_m[c] = placed.at_m[capsule.link] + placed.turn[capsule.link] * capsule.from_m;
-    placed.to_m[c] = placed.at_m[capsule.link] + placed.turn[capsule.link] * capsule.to_m;
-    placed.middle_m[c] = 0.5 * (placed.from_m[c] + placed.to_m[c]);
-  }
-}
-
-void add_slope(const RobotHand& hand, const Placed& placed, int link,
-               const Eigen::Vector3d& point_m, const Eigen::Vector3d& direction,
-               Drive& slope) noexcept {
-  for (const Turn& turn : hand.turns[link]) {
-    const Eigen::Vector3d moves = placed.axis[turn.link].cross(point_m - placed.at_m[turn.link]);
-    slope[turn.driven] += turn.multiplier * direction.dot(moves);
-  }
 }
 
 }  // namespace posed::robot

@@ -66,17 +66,20 @@ struct Capsule {
   Eigen::Vector3d from_m = Eigen::Vector3d::Zero();  // in the link's frame
   Eigen::Vector3d to_m = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
+  double per_m2 = 0.0;  // 1 / length^2; 0: a ball
 };
 
-struct Ball {  // that holds all capsules of a link, in its frame
-  Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();
-  double radius_m = -1.0;    // below zero: the link has no shape
-  int first = 0, count = 0;  // its capsules
+struct Cover {  // the capsule that holds all those of a link, in its frame
+  Eigen::Vector3d from_m = Eigen::Vector3d::Zero();
+  Eigen::Vector3d to_m = Eigen::Vector3d::Zero();
+  double radius_m = 0.0, per_m2 = 0.0;
+  int first = 0, count = 0;  // its capsules; none: the link has no shape
 };
 
 struct Turn {  // of a link by a driven joint above it
   int link = 0, driven = 0;
   double multiplier = 1.0;
+  double swing_m = 0.0;  // the link's farthest point from the axis in any pose, by the multiplier
 };
 
 struct RobotHand {
@@ -90,7 +93,7 @@ struct RobotHand {
   Eigen::Matrix3d palm = Eigen::Matrix3d::Identity();
   std::vector<Capsule> capsules;              // by link
   std::vector<double> reach_m;                // [capsule], radius of the ball around it
-  std::vector<Ball> balls;                    // [link]
+  std::vector<Cover> covers;                  // [link]
   std::vector<std::pair<int, int>> pairs;     // of links that must not touch
   std::vector<std::pair<int, int>> left_out;  // that touch anyway
   std::vector<std::vector<Turn>> turns;       // [link]
@@ -106,21 +109,43 @@ Result<RobotHand> robot_hand(Urdf urdf, const RobotOptions& options, const std::
 // The robot as a skeleton: a joint a link, in tree order, Y up, and a channel a joint that turns.
 Result<Skeleton> robot_skeleton(const RobotHand& hand);
 
-// All links in one pose, in the root's frame.
+// All links in one pose, in the root's frame; and, with capsules, what makes finding gaps cheap.
 struct Placed {
-  explicit Placed(std::size_t links, std::size_t capsules = 0)
-      : turn(links),
-        at_m(links),
-        axis(links),
-        from_m(capsules),
-        to_m(capsules),
-        middle_m(capsules),
-        nearest(capsules == 0 ? 0 : links * links, std::pair(-1, -1)) {}
+  explicit Placed(std::size_t links) : turn(links), at_m(links), axis(links) {}
+  explicit Placed(const RobotHand& hand);  // with capsules
+
   std::vector<Eigen::Matrix3d> turn;
   std::vector<Eigen::Vector3d> at_m;
-  std::vector<Eigen::Vector3d> axis;                    // of the joint that carries the link
-  std::vector<Eigen::Vector3d> from_m, to_m, middle_m;  // [capsule]; none where no gap is asked for
-  std::vector<std::pair<int, int>> nearest;  // [link * links + link]: capsules, when last looked at
+  std::vector<Eigen::Vector3d> axis;  // of the joint that carries the link
+
+  // How far any point of a link has gone since the first pose, at most: what two links have gone
+  // is the most that their gap has shrunk.
+  std::vector<double> way_m;                              // [link]
+  std::vector<Eigen::Vector3d> cover_from_m, cover_to_m;  // [link]
+  std::vector<Eigen::Vector3d> from_m, to_m, middle_m;    // [capsule] of links that are shown
+  std::vector<char> shown;                                // [link]
+  std::vector<double> swing_m;                            // scratch: [link]
+  std::vector<int> near;                                  // scratch: capsules
+  struct Least {
+    double gap_m = -1.0, way_m = 0.0;  // when both together had gone that way
+  };
+  std::vector<Least> least;  // [pair of RobotHand::pairs]
+  // The capsules of two links that were nearest to each other when all were last looked at, the
+  // nearest first. All others were farther than `others_m`. Where the second link's cover was then,
+  // as the first one sees it.
+  struct Close {
+    static constexpr std::size_t kMost = 12;
+    struct Two {
+      double gap_m = 0.0;
+      int a = 0, b = 0;
+    };
+    std::array<Two, kMost> two;
+    std::size_t count = 0;
+    double others_m = -1.0;
+    Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+    Eigen::Vector3d from_m = Eigen::Vector3d::Zero(), to_m = Eigen::Vector3d::Zero();
+  };
+  std::vector<Close> close;  // [link * links + link]
 };
 RT_SAFE [[nodiscard]] double angle_of(const RobotJoint& joint, const Drive& drive) noexcept;
 RT_SAFE void place(const RobotHand& hand, const Drive& drive, Placed& placed) noexcept;

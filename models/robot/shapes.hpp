@@ -7,7 +7,7 @@
 
 namespace posed::robot {
 
-// Fills in capsules, balls, and which pairs of links can be kept apart: those that touch when the
+// Fills in capsules, covers, and which pairs of links can be kept apart: those that touch when the
 // hand is open, or in most poses, are left out. Cold.
 void add_shapes(RobotHand& hand);
 
@@ -21,10 +21,16 @@ struct Gap {
 inline constexpr int kMaxGaps = 32;
 using Gaps = std::array<Gap, kMaxGaps>;
 
-// The pairs that are nearer than `near_m`, the nearest ones where there are more than fit. Without
-// slopes for whoever does not need them.
+// Which pairs are wanted: those nearer than `most_m`; of these, where `turn` is given, only those
+// that turning each joint by at most that [rad] can bring nearer than `least_m`.
+struct Near {
+  double most_m = 0.0, least_m = 0.0;
+  const Drive* turn = nullptr;
+};
+
+// The nearest ones where there are more than fit. Without slopes for whoever does not need them.
 RT_SAFE [[nodiscard]] std::span<const Gap> find_gaps(const RobotHand& hand, Placed& placed,
-                                                     double near_m, bool slopes,
+                                                     const Near& near, bool slopes,
                                                      Gaps& gaps) noexcept;
 
 // The gap of one pair of links, infinite where one has no shape.

@@ -20,8 +20,8 @@ constexpr double kBroken = 1e-5;  // no rounding any more
 struct Active {
   int index = 0;
   double scale = 1.0, least = 0.0;
-  Drive slope = Drive::Zero();
-  Drive moves = Drive::Zero();  // H^-1 slope
+  Drive slope;
+  Drive moves;  // H^-1 slope
 };
 
 class Solver {
@@ -163,9 +163,9 @@ class Solver {
   }
 
   const StepProgram& p_;
-  Metric L_ = Metric::Zero();
+  Metric L_;  // its lower part alone
   Drive free_ = Drive::Zero();
-  std::array<Active, kMaxActive> active_{};
+  std::array<Active, kMaxActive> active_;  // no need to clear 17 kB
   std::array<double, kMaxActive> force_{};
   int count_ = 0;
 };

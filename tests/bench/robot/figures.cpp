@@ -48,7 +48,7 @@ double percentile(std::vector<double> values, double share) {
 // The link that has the shape at a finger's end.
 int shaped_end(const robot::RobotHand& robot, const robot::Finger& finger) {
   int link = finger.tip;
-  while (link != finger.last && robot.balls[link].count == 0) link = robot.links[link].parent;
+  while (link != finger.last && robot.covers[link].count == 0) link = robot.links[link].parent;
   return link;
 }
 
@@ -143,7 +143,7 @@ RobotFigures robot_figures(const robot::RobotHand& robot, const HandTake& take,
   const hand::HandGeometry person = hand::hand_geometry(default_hand_shape());
   robot::HandTargets targets(robot, person);
   robot::HandTarget target;
-  robot::Placed placed(robot.links.size(), robot.capsules.size());
+  robot::Placed placed(robot);
   robot::Gaps gaps;
   hand::HandPose hand;
   Mean pinch, held, direction, extension;
@@ -155,7 +155,7 @@ RobotFigures robot_figures(const robot::RobotHand& robot, const HandTake& take,
     place(robot, track.poses[static_cast<std::size_t>(t)], placed);
     const bool still = is_still(take, t);
     double deepest_m = 0.0;
-    for (const auto& gap : find_gaps(robot, placed, 0.0, false, gaps)) {
+    for (const auto& gap : find_gaps(robot, placed, {}, false, gaps)) {
       deepest_m = std::min(deepest_m, gap.gap_m);
     }
     overlaps += deepest_m < -1e-5 ? 1 : 0;

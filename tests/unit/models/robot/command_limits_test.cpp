@@ -1,6 +1,7 @@
 // Whatever comes in, what goes out keeps the limits of position, speed and acceleration.
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -142,7 +143,7 @@ TEST_CASE("links of a robot stay apart, whatever pose is wanted") {
   auto urdf = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
   const RobotHand hand = robot_hand(std::move(urdf), {}, "mitten").value();
   Command command(hand, 1e-3);
-  Placed placed(hand.links.size(), hand.capsules.size());
+  Placed placed(hand);
   Gaps gaps;
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> share(0.0, 1.0);
@@ -155,11 +156,11 @@ TEST_CASE("links of a robot stay apart, whatever pose is wanted") {
         wanted[d] = hand.driven[d].low + share(random) * (hand.driven[d].high - hand.driven[d].low);
       }
       place(hand, wanted, placed);
-      wanted_overlaps += find_gaps(hand, placed, 0.0, false, gaps).empty() ? 0 : 1;
+      wanted_overlaps += find_gaps(hand, placed, {}, false, gaps).empty() ? 0 : 1;
     }
     command.follow(wanted, 1.0 / 120.0);
     place(hand, command.pose(), placed);
-    for (const Gap& gap : find_gaps(hand, placed, 0.0, false, gaps)) {
+    for (const Gap& gap : find_gaps(hand, placed, {}, false, gaps)) {
       deepest_m = std::min(deepest_m, gap.gap_m);
     }
   }
@@ -167,6 +168,52 @@ TEST_CASE("links of a robot stay apart, whatever pose is wanted") {
   CHECK(deepest_m >= -1e-5);
   WARN("hard stops at " << command.hard_stops() << " of 1200 ticks");
   CHECK(command.hard_stops() < 60);
+}
+
+TEST_CASE("gaps that are found on the way are those of a first look") {
+  auto urdf = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  const RobotHand hand = robot_hand(std::move(urdf), {}, "mitten").value();
+  Placed on_the_way(hand);
+  Gaps gaps, first_gaps, there_gaps;
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> share(0.0, 1.0);
+  Drive pose = hand.start();
+  int other = 0, compared = 0, unforeseen = 0;
+  for (int i = 0; i < 300; ++i) {
+    const double step = std::pow(10.0, -4.0 + 4.0 * share(random));
+    Drive turn = Drive::Zero(), there = pose;
+    for (int d = 0; d < hand.size(); ++d) {
+      const DrivenJoint& joint = hand.driven[d];
+      pose[d] = std::clamp(pose[d] + step * (2.0 * share(random) - 1.0), joint.low, joint.high);
+      turn[d] = 0.1 * share(random);
+      there[d] = pose[d] + turn[d] * (2.0 * share(random) - 1.0);
+    }
+    const Near near{.most_m = i % 3 == 0 ? 1e-3 : 0.03};
+    place(hand, pose, on_the_way);
+    const auto found = find_gaps(hand, on_the_way, near, false, gaps);
+    Placed fresh(hand);
+    place(hand, pose, fresh);
+    const auto first = find_gaps(hand, fresh, near, false, first_gaps);
+    compared += static_cast<int>(first.size());
+    other +=
+        std::ranges::equal(found, first,
+                           [](const Gap& a, const Gap& b) {
+                             return a.a == b.a && a.b == b.b && std::abs(a.gap_m - b.gap_m) < 1e-12;
+                           })
+            ? 0
+            : 1;
+    // What the turns can bring near is among what is near by them.
+    const auto may = find_gaps(hand, on_the_way, {.most_m = 1.0, .turn = &turn}, false, gaps);
+    place(hand, there, fresh);
+    for (const Gap& gap : find_gaps(hand, fresh, {}, false, there_gaps)) {
+      const bool foreseen = std::ranges::any_of(
+          may, [&](const Gap& one) { return one.a == gap.a && one.b == gap.b; });
+      if (!foreseen && may.size() < gaps.size()) ++unforeseen;
+    }
+  }
+  CHECK(compared > 300);  // else the test says nothing
+  CHECK(other == 0);
+  CHECK(unforeseen == 0);
 }
 
 }  // namespace posed::robot

@@ -160,7 +160,7 @@ TEST_CASE("a robot's finger and thumb meet where the hand's do") {
     target.tip_m[f] = robot.fingers[f].knuckle_m + Eigen::Vector3d(0.06, 0.0, 0.035);
     target.tip_m[0] = target.tip_m[f];
     for (int i = 0; i < 60; ++i) solver.solve(target, 2);
-    Placed placed(robot.links.size(), robot.capsules.size());
+    Placed placed(robot);
     place(robot, solver.pose(), placed);
     const double gap_m =
         gap_between(robot, placed, robot.fingers[0].last, robot.fingers[f].last).gap_m;
@@ -174,7 +174,7 @@ TEST_CASE("a solver's pose keeps the margin that the command keeps") {
   const RobotHand robot = robot_hand(std::move(urdf), {}, "mitten").value();
   HandTargets targets(robot, hand::hand_geometry(default_hand_shape()));
   PoseSolver solver(robot, 1e-3);
-  Placed placed(robot.links.size(), robot.capsules.size());
+  Placed placed(robot);
   Gaps gaps;
   HandTarget target;
   int nearer = 0;
@@ -189,7 +189,7 @@ TEST_CASE("a solver's pose keeps the margin that the command keeps") {
     for (int i = 0; i < 40; ++i) solver.solve(target, 2);
     place(robot, solver.pose(), placed);
     double least_m = 1.0;
-    for (const Gap& gap : find_gaps(robot, placed, 1e-3, false, gaps)) {
+    for (const Gap& gap : find_gaps(robot, placed, {.most_m = 1e-3}, false, gaps)) {
       least_m = std::min(least_m, gap.gap_m);
     }
     nearer += least_m < 0.8e-3 ? 1 : 0;
@@ -201,7 +201,7 @@ TEST_CASE("a command that links stop is counted once, names them, and lets go of
   auto urdf = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
   const RobotHand robot = robot_hand(std::move(urdf), {}, "mitten").value();
   Command command(robot, 1e-3);
-  Placed placed(robot.links.size(), robot.capsules.size());
+  Placed placed(robot);
   Gaps gaps;
   int blocked_poses = 0;
   for (int number = 0; number < 40; ++number) {
