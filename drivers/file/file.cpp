@@ -1,7 +1,7 @@
 // The file driver: a clip of any format that posed reads, played as if it were a device.
+#include "drivers/transport/file.hpp"
 #include "drivers/file/decoder.hpp"
 #include "drivers/options.hpp"
-#include "drivers/transport/file.hpp"
 #include "proto/clip/device_clip.hpp"
 #include "proto/clip/figure.hpp"
 #include "proto/clip/format.hpp"

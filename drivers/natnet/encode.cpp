@@ -19,7 +19,8 @@ void write_vector(ByteWriter& writer, const Vec3f& v) {
 
 std::int32_t count_of(const auto& entries) { return static_cast<std::int32_t>(entries.size()); }
 
-// A part of a frame or an entry of a ModelDef: its count or kind, from 4.1 its size, and its content.
+// A part of a frame or an entry of a ModelDef: its count or kind, from 4.1 its size, and its
+// content.
 template <typename WriteEntries>
 void write_part(ByteWriter& writer, Version version, std::int32_t count, WriteEntries write) {
   writer.i32(count);
@@ -175,7 +176,7 @@ void write_model_def(ByteWriter& writer, const ModelDef& model, Version version)
   }
   for (const BodyDef& body : model.bodies) {
     write_part(writer, version, body.is_skeleton ? 2 : 1,
-                [&](ByteWriter& to) { write_body(to, body, version); });
+               [&](ByteWriter& to) { write_body(to, body, version); });
   }
 }
 

@@ -1,7 +1,7 @@
 // Films of hands that nobody has photographed, with their true angles: the hand of
 // rendered_hand.mjs in other shapes, sizes, colours, lights and views, drawn fast. With them the
-// takes of config/camera (mode signs, seeds 1 to 3, 4 with wildness 0, 21 to 26, 31 to 40, 701 to 712) and those of
-// tests/golden/camera (seeds 603, 606, 609, 612, the even ones left) were made.
+// takes of config/camera (mode signs, seeds 1 to 3, 4 with wildness 0, 21 to 26, 31 to 40, 701 to
+// 712) and those of tests/golden/camera (seeds 603, 606, 609, 612, the even ones left) were made.
 //
 //   g++ -O3 -ffast-math -std=c++20 drawn_hands.cpp -o drawn_hands
 //   ./drawn_hands signs|random SEED PICTURES OUT [WILDNESS [left]]   OUT.rgba, OUT.truth: 10 Hz
