@@ -32,7 +32,7 @@ struct TrainOptions {
   double mdl_factor = 1.0;        // factor on the trees' stopping threshold
   TaskRunner* tasks = nullptr;    // not owned; null: one task after another
   // Called with the step and how much of it is done; false stops the training.
-  std::function<bool(std::string_view step, double fraction)> progress;
+  std::function<bool(std::string_view step, double fraction)> progress{};
   std::function<void(TrainFindings)> look{};  // called once, when all is learnt
   // A hand's held poses are learnt although nothing is none: for a source whose errors in one joint
   // go with those in others, as a camera's do (models/smooth/README.md, "HMM forward filter").
