@@ -326,7 +326,7 @@ Result<> stream(const DemoOptions& options, const std::filesystem::path& folder)
       TRY(config::load_config(options.config.empty() ? own : options.config, drivers::registry()));
   logging::sum_up_repeats();
   const Interrupt interrupt;
-  TRY(put_on_gloves(config, folder / kDemoSigner));
+  const auto gloves = TRY(put_on_gloves(config, folder / kDemoSigner));
   auto daemon = TRY(assembly::Daemon::open(config));
   TRY(daemon->start());
   const auto bridge = serve_page_of(*daemon, options, folder);
