@@ -51,6 +51,7 @@ TEST_CASE("the demo streams from any folder and trains only once", "[demo]") {
   CHECK(streamed.code == 0);
   CHECK_FALSE(streamed.err.contains("learning the style"));
   CHECK(streamed.out.contains("styled frames over ZeroMQ"));
+  CHECK_FALSE(streamed.err.contains("plug the glove in"));  // the emulated one is there
   // The page's address, or how the page is built; the demo goes on either way.
   CHECK((streamed.err.contains("see it: http://127.0.0.1:") ||
          streamed.err.contains("`./run page` builds it")));
