@@ -205,7 +205,7 @@ RT_SAFE bool within(double distance2, double reach_m) noexcept {
 // Lists the capsules of two links that are nearer than both `near_m` and the nearest ones, and
 // kSlack_m. Most capsules are too far from the other link's cover to be looked at.
 RT_SAFE void find_close(const RobotHand& hand, const Placed& placed, int a, int b, double near_m,
-                        std::vector<int>& near_b, Placed::Close& close) noexcept {
+                        std::span<int> near_b, Placed::Close& close) noexcept {
   const Cover& all_a = hand.covers[a];
   const Cover& all_b = hand.covers[b];
   double within_m = near_m + kSlack_m;
