@@ -16,7 +16,7 @@ namespace posed::drivers::glove {
 using Move = std::vector<std::array<float, kMaxSensors>>;
 
 struct Moves {
-  Move bend;    // all fingers bend and stretch together, side by side: nothing spreads
+  Move bend;    // fingers bend and stretch one after the other, then all: nothing spreads
   Move spread;  // straight fingers spread and close: nothing bends
 };
 

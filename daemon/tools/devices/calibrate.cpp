@@ -280,10 +280,8 @@ Result<drivers::glove::Move> record_move(GloveSource& source, const PosePlan& pl
 
 Result<> fit_moves(GloveSource& source, const PosePlan& plan, CalibrationFile& file) {
   drivers::glove::Moves moves;
-  auto bend = TRY(record_move(source, plan, kBend));
-  auto spread = TRY(record_move(source, plan, kSpreadMove));
-  moves.bend = std::move(bend);
-  moves.spread = std::move(spread);
+  moves.bend = TRY(record_move(source, plan, kBend));
+  moves.spread = TRY(record_move(source, plan, kSpreadMove));
   const auto said = TRY(drivers::glove::fit_crosstalk(source.model(), moves, source.hand(), file));
   for (const std::string& line : said) std::fprintf(stderr, "posed: %s\n", line.c_str());
   if (said.empty()) std::fprintf(stderr, "posed: no sensor shows another's movement\n");
