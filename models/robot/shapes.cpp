@@ -14,7 +14,6 @@ constexpr int kTries = 100;
 constexpr double kMostly = 0.7;
 constexpr double kRounding_m = 1e-9;
 constexpr double kSlack_m = 6e-3;  // of what is remembered as close
-constexpr double kListed_m = 0.02;
 
 double per_length2(const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m) {
   const double length2 = (to_m - from_m).squaredNorm();
