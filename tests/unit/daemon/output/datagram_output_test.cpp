@@ -114,7 +114,7 @@ void check_crowd(const Protocol& protocol, const std::string& what, int people =
   }
   check.show(what);
   CHECK(reader.damage == "");
-  CHECK(rig.reported.empty());
+  CHECK(rig.reported == std::vector<std::string>{});
 }
 
 // Another person: each bone that both have points to where the walker's does.
@@ -270,7 +270,7 @@ TEST_CASE("sixteen people at 120 Hz arrive through each output as they were", "[
   check_crowd({.kind = OutputKind::kMvn, .euler = true}, "mvn Euler");
   check_crowd({.kind = OutputKind::kAxis}, "axis text");
   check_crowd({.kind = OutputKind::kAxis, .binary = true}, "axis binary");
-  check_crowd({.kind = OutputKind::kRokoko}, "rokoko", 8);  // plain text of 16 is no datagram
+  check_crowd({.kind = OutputKind::kRokoko}, "rokoko", 6);  // plain text of more is no datagram
   check_crowd({.kind = OutputKind::kRokoko, .lz4 = true}, "rokoko LZ4");
   for (int i = 0; i < kCrowd; ++i) {
     check_crowd({.kind = OutputKind::kMocopi}, "mocopi " + std::to_string(i + 1), 1);
