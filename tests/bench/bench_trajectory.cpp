@@ -69,7 +69,8 @@ InformationForm script_evidence(const trajectory::StateInformation& model, int f
   for (int i = 0; i < frames / 20; ++i) {
     labels.push_back(static_cast<int>(random() % model.model().labels.size()));
   }
-  for (const auto& state : perform::perform(model, labels, {})->states) {
+  const auto performance = perform::perform(model, labels, {}).value();
+  for (const auto& state : performance.states) {
     model.fill(state.context, state.state, hand.row(0, Row::kPosition));
     for (int t = state.start; t < std::min(frames, state.start + state.frames); ++t) {
       for (int r = 0; r < trajectory::kRows; ++r) {
