@@ -10,8 +10,7 @@ Placed::Placed(const RobotHand& hand)
       at_m(hand.links.size(), Eigen::Vector3d::Zero()),
       axis(hand.links.size(), Eigen::Vector3d::UnitX()),
       way_m(hand.links.size()),
-      cover_from_m(hand.links.size(), Eigen::Vector3d::Zero()),
-      cover_to_m(hand.links.size(), Eigen::Vector3d::Zero()),
+      cover(hand.links.size()),
       from_m(hand.capsules.size()),
       to_m(hand.capsules.size()),
       middle_m(hand.capsules.size()),
@@ -25,23 +24,26 @@ double angle_of(const RobotJoint& joint, const Drive& drive) noexcept {
   return joint.driven < 0 ? joint.offset : joint.multiplier * drive[joint.driven] + joint.offset;
 }
 
-namespace {
-
 // The way of a point is linear in its place, so that of a capsule's points is longest at an end,
 // and further by what the turn adds within its radius. The two singular values of a difference of
 // rotations are the same, the third is zero.
-RT_SAFE void move_cover(const Cover& cover, int link, const Eigen::Matrix3d& turn_before,
-                        Placed& placed) noexcept {
+double most_way_m(const Cover& cover, const CoverPose& then, const CoverPose& now) noexcept {
+  const double end_m = std::sqrt(
+      std::max((now.from_m - then.from_m).squaredNorm(), (now.to_m - then.to_m).squaredNorm()));
+  return end_m + cover.radius_m * std::sqrt(0.5) * (now.turn - then.turn).norm();
+}
+
+namespace {
+
+RT_SAFE void move_cover(const Cover& cover, int link, Placed& placed) noexcept {
   constexpr double kFar_m = 1e3;  // also for what is no number: whatever was known is void
-  const Eigen::Vector3d from_m = placed.at_m[link] + placed.turn[link] * cover.from_m;
-  const Eigen::Vector3d to_m = placed.at_m[link] + placed.turn[link] * cover.to_m;
-  const double end_m = std::sqrt(std::max((from_m - placed.cover_from_m[link]).squaredNorm(),
-                                          (to_m - placed.cover_to_m[link]).squaredNorm()));
-  const double turned = (placed.turn[link] - turn_before).norm() * std::sqrt(0.5);
-  const double way_m = end_m + cover.radius_m * turned;
+  const Eigen::Matrix3d& turn = placed.turn[link];
+  const CoverPose now{.turn = turn,
+                      .from_m = placed.at_m[link] + turn * cover.from_m,
+                      .to_m = placed.at_m[link] + turn * cover.to_m};
+  const double way_m = most_way_m(cover, placed.cover[link], now);
   placed.way_m[link] += way_m < kFar_m ? way_m : kFar_m;
-  placed.cover_from_m[link] = from_m;
-  placed.cover_to_m[link] = to_m;
+  placed.cover[link] = now;
   placed.shown[link] = 0;
 }
 
@@ -63,10 +65,9 @@ void place(const RobotHand& hand, const Drive& drive, Placed& placed) noexcept {
       const double angle = angle_of(hand.joints[hand.joint_of_link[l]], drive);
       turn = turn * Eigen::AngleAxisd(angle, link.axis).toRotationMatrix();
     }
-    const Eigen::Matrix3d before = placed.turn[l];
     placed.turn[l] = turn;
     if (covers && hand.covers[l].count > 0) {
-      move_cover(hand.covers[l], static_cast<int>(l), before, placed);
+      move_cover(hand.covers[l], static_cast<int>(l), placed);
     }
   }
 }

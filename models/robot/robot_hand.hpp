@@ -76,6 +76,14 @@ struct Cover {  // the capsule that holds all those of a link, in its frame
   int first = 0, count = 0;  // its capsules; none: the link has no shape
 };
 
+struct CoverPose {  // of a link's cover in some frame
+  Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  Eigen::Vector3d from_m = Eigen::Vector3d::Zero(), to_m = Eigen::Vector3d::Zero();
+};
+// The most that any of its points has gone between two poses.
+RT_SAFE [[nodiscard]] double most_way_m(const Cover& cover, const CoverPose& then,
+                                        const CoverPose& now) noexcept;
+
 struct Turn {  // of a link by a driven joint above it
   int link = 0, driven = 0;
   double multiplier = 1.0;
@@ -120,12 +128,12 @@ struct Placed {
 
   // How far any point of a link has gone since the first pose, at most: what two links have gone
   // is the most that their gap has shrunk.
-  std::vector<double> way_m;                              // [link]
-  std::vector<Eigen::Vector3d> cover_from_m, cover_to_m;  // [link]
-  std::vector<Eigen::Vector3d> from_m, to_m, middle_m;    // [capsule] of links that are shown
-  std::vector<char> shown;                                // [link]
-  std::vector<double> swing_m;                            // scratch: [link]
-  std::vector<int> near;                                  // scratch: capsules
+  std::vector<double> way_m;                            // [link]
+  std::vector<CoverPose> cover;                         // [link]
+  std::vector<Eigen::Vector3d> from_m, to_m, middle_m;  // [capsule] of links that are shown
+  std::vector<char> shown;                              // [link]
+  std::vector<double> swing_m;                          // scratch: [link]
+  std::vector<int> near;                                // scratch: capsules
   struct Least {
     double gap_m = -1.0, way_m = 0.0;  // when both together had gone that way
   };
@@ -134,16 +142,15 @@ struct Placed {
   // nearest first. All others were farther than `others_m`. Where the second link's cover was then,
   // as the first one sees it.
   struct Close {
-    static constexpr std::size_t kMost = 12;
+    static constexpr std::size_t kMaxPairs = 12;
     struct Two {
       double gap_m = 0.0;
       int a = 0, b = 0;
     };
-    std::array<Two, kMost> two;
+    std::array<Two, kMaxPairs> two;
     std::size_t count = 0;
     double others_m = -1.0;
-    Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
-    Eigen::Vector3d from_m = Eigen::Vector3d::Zero(), to_m = Eigen::Vector3d::Zero();
+    CoverPose seen;
   };
   std::vector<Close> close;  // [link * links + link]
 };

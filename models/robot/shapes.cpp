@@ -111,7 +111,7 @@ Cover cover_of(const RobotHand& hand, int first) {
     best.from_m = best.to_m = middle;
     best.from_m[axis] = begin;
     best.to_m[axis] = end;
-    best.radius_m = radius_m + 1e-9;
+    best.radius_m = radius_m + kRounding_m;
     best.per_m2 = per_length2(best.from_m, best.to_m);
   }
   return best;
@@ -177,24 +177,12 @@ RT_SAFE double away2(const Eigen::Vector3d& point, const Eigen::Vector3d& from,
   return (off - std::clamp(off.dot(along) * per_m2, 0.0, 1.0) * along).squaredNorm();
 }
 
-// Where the second link's cover is, as the first one sees it; and how far any of its points has
-// gone so at most (see place()).
-RT_SAFE void see(const Placed& placed, int a, int b, Placed::Close& close) noexcept {
+// Where the second link's cover is, as the first one sees it.
+RT_SAFE CoverPose seen(const Placed& placed, int a, int b) noexcept {
   const Eigen::Matrix3d to_a = placed.turn[a].transpose();
-  close.turn = to_a * placed.turn[b];
-  close.from_m = to_a * (placed.cover_from_m[b] - placed.at_m[a]);
-  close.to_m = to_a * (placed.cover_to_m[b] - placed.at_m[a]);
-}
-
-RT_SAFE double way_m(const RobotHand& hand, const Placed& placed, int a, int b,
-                     const Placed::Close& then) noexcept {
-  const Eigen::Matrix3d to_a = placed.turn[a].transpose();
-  const Eigen::Vector3d from_m = to_a * (placed.cover_from_m[b] - placed.at_m[a]);
-  const Eigen::Vector3d to_m = to_a * (placed.cover_to_m[b] - placed.at_m[a]);
-  const Eigen::Matrix3d turn = to_a * placed.turn[b];
-  return std::sqrt(
-             std::max((from_m - then.from_m).squaredNorm(), (to_m - then.to_m).squaredNorm())) +
-         hand.covers[b].radius_m * std::sqrt(0.5) * (turn - then.turn).norm() + kRounding_m;
+  return {.turn = to_a * placed.turn[b],
+          .from_m = to_a * (placed.cover[b].from_m - placed.at_m[a]),
+          .to_m = to_a * (placed.cover[b].to_m - placed.at_m[a])};
 }
 
 RT_SAFE bool within(double distance2, double reach_m) noexcept {
@@ -226,13 +214,13 @@ RT_SAFE void find_close(const RobotHand& hand, const Placed& placed, int a, int 
   int near = 0;
   for (int j = all_b.first; j < all_b.first + all_b.count; ++j) {
     const double off2 =
-        away2(placed.middle_m[j], placed.cover_from_m[a], placed.cover_to_m[a], all_a.per_m2);
+        away2(placed.middle_m[j], placed.cover[a].from_m, placed.cover[a].to_m, all_a.per_m2);
     if (within(off2, hand.reach_m[j] + all_a.radius_m + within_m)) near_b[near++] = j;
   }
   for (int i = all_a.first; near > 0 && i < all_a.first + all_a.count; ++i) {
     const Eigen::Vector3d& middle = placed.middle_m[i];
     const double all_m = hand.reach_m[i] + all_b.radius_m + within_m;
-    const double off2 = away2(middle, placed.cover_from_m[b], placed.cover_to_m[b], all_b.per_m2);
+    const double off2 = away2(middle, placed.cover[b].from_m, placed.cover[b].to_m, all_b.per_m2);
     if (!within(off2, all_m)) continue;
     for (int k = 0; k < near; ++k) {
       const int j = near_b[k];
@@ -249,7 +237,7 @@ RT_SAFE void find_close(const RobotHand& hand, const Placed& placed, int a, int 
     }
   }
   close.others_m = within_m;
-  see(placed, a, b, close);
+  close.seen = seen(placed, a, b);
 }
 
 // The least gap below `near_m`; that itself where none is. All capsules are looked at only where
@@ -261,10 +249,10 @@ RT_SAFE Nearest nearest(const RobotHand& hand, Placed& placed, int a, int b,
   show(hand, a, placed);
   show(hand, b, placed);
   Placed::Close& close = placed.close[static_cast<std::size_t>(a) * hand.links.size() + b];
-  const auto look = [&](double gone_m) {
+  const auto look = [&](double way_m) {
     for (std::size_t k = 0; k < close.count; ++k) {
       const auto& [then_m, i, j] = close.two[k];
-      if (then_m - gone_m >= best.gap_m) return true;
+      if (then_m - way_m >= best.gap_m) return true;
       const auto closest = apart(placed, i, j);
       const double distance_m = closest.apart.norm();
       const double gap_m = distance_m - hand.capsules[i].radius_m - hand.capsules[j].radius_m;
@@ -274,9 +262,10 @@ RT_SAFE Nearest nearest(const RobotHand& hand, Placed& placed, int a, int b,
       best.at_b = placed.from_m[j] + closest.t * (placed.to_m[j] - placed.from_m[j]);
       if (distance_m > 1e-9) best.apart = closest.apart / distance_m;
     }
-    return close.others_m - gone_m >= best.gap_m;
+    return close.others_m - way_m >= best.gap_m;
   };
-  if (look(way_m(hand, placed, a, b, close))) return best;
+  const double gone_m = most_way_m(hand.covers[b], close.seen, seen(placed, a, b)) + kRounding_m;
+  if (look(gone_m)) return best;
   double least_m = near_m;
   if (close.count > 0) {
     least_m = std::min(least_m, gap_m(hand, placed, close.two[0].a, close.two[0].b));
@@ -295,8 +284,8 @@ RT_SAFE void add_slopes(const RobotHand& hand, const Placed& placed, const Neare
 }
 
 RT_SAFE double cover_gap_m(const RobotHand& hand, const Placed& placed, int a, int b) noexcept {
-  const auto closest = hand::closest_points(placed.cover_from_m[a], placed.cover_to_m[a],
-                                            placed.cover_from_m[b], placed.cover_to_m[b]);
+  const auto closest = hand::closest_points(placed.cover[a].from_m, placed.cover[a].to_m,
+                                            placed.cover[b].from_m, placed.cover[b].to_m);
   return closest.apart.norm() - hand.covers[a].radius_m - hand.covers[b].radius_m;
 }
 

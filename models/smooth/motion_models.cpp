@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "proto/frame/degree.hpp"
 
@@ -121,8 +122,9 @@ RT_SAFE void MotionModels::push(double step_s, std::span<const double> measured_
   noise_before_rad2_ = noise_rad2_;
   noise_rad2_ = noise_rad * noise_rad;
   step_s_ = step_s;
-  for (Channel& channel : channels_) channel.before_rad = channel.now_rad;
-  for (std::size_t c = 0; c < channels_.size(); ++c) channels_[c].now_rad = measured_rad[c];
+  for (std::size_t c = 0; c < channels_.size(); ++c) {
+    channels_[c].before_rad = std::exchange(channels_[c].now_rad, measured_rad[c]);
+  }
   for (std::size_t m = 0; m < kModels; ++m) {
     if (pushed_ == 0) {
       spread_[m].start(noise_rad2_);
