@@ -78,7 +78,8 @@ class ClipTakes : public Takes {
     await_frames("walker", 200);
     take({"start", "run"});
     await_frames("walker", 2400);  // 2.5 s
-    for (int i = 0; i < 600'000 && files("-1-h.bvh").empty(); ++i) {
+    // Clips of a take are written in the order of the streams' names, so this one comes last.
+    for (int i = 0; i < 600'000 && files("-1-walker.bvh").empty(); ++i) {
       std::this_thread::sleep_for(1ms);
     }
     REQUIRE(files("-1-walker.bvh").size() == 1);  // while the daemon runs
