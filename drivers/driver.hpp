@@ -6,7 +6,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <memory>
 #include <span>
 #include <string>
@@ -155,6 +154,18 @@ class Decoder {
   RT_SAFE [[nodiscard]] virtual Request next_request(std::int64_t /*now_ns*/) noexcept {
     return {};
   }
+};
+
+// A decoder whose driver's make_layout makes an `L`.
+template <typename L>
+class LayoutDecoder : public Decoder {
+ public:
+  RT_SAFE void use(const SourceLayout& layout) noexcept override {
+    layout_ = static_cast<const L*>(&layout);
+  }
+
+ protected:
+  const L* layout_ = nullptr;  // null until the first description is in use
 };
 
 // The knowledge about a device before it streams. It is stored in the log; enough to decode its

@@ -2,7 +2,6 @@
 // list) and makes the device that a log rebuilds. Cold.
 #pragma once
 
-#include <memory>
 #include <span>
 #include <string>
 #include <string_view>

@@ -1,8 +1,7 @@
 #include "drivers/source_type.hpp"
 
-#include <charconv>
-
 #include "proto/clip/text.hpp"
+#include "proto/text/number.hpp"
 
 namespace posed::drivers {
 
@@ -20,11 +19,8 @@ std::string rate_text(std::string_view prefix, double rate_hz) {
 
 std::optional<double> parse_rate(std::string_view text, std::string_view prefix) {
   if (!text.starts_with(prefix)) return std::nullopt;
-  double rate_hz = 0.0;
-  const char* const end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data() + prefix.size(), end, rate_hz);
-  const bool valid = error == std::errc() && stop == end && rate_hz > 0.0 && rate_hz <= kMaxRate_hz;
-  return valid ? std::optional(rate_hz) : std::nullopt;
+  const auto rate_hz = exact_number<double>(text.substr(prefix.size()));
+  return rate_hz && *rate_hz > 0.0 && *rate_hz <= kMaxRate_hz ? rate_hz : std::nullopt;
 }
 
 std::unexpected<Error> another_device(std::string_view what, const std::string& example,

@@ -1,13 +1,13 @@
 #include "daemon/assembly/daemon.hpp"
 
-#include <algorithm>
 #include <atomic>
+#include <functional>
+#include <memory>
 #include <optional>
 #include <thread>
 
 #include <spdlog/spdlog.h>
 
-#include "daemon/assembly/hot_threads.hpp"
 #include "daemon/assembly/output_threads.hpp"
 #include "daemon/assembly/streams.hpp"
 #include "daemon/control/control_server.hpp"
@@ -19,6 +19,7 @@
 #include "daemon/pipeline/worker.hpp"
 #include "daemon/publish/publisher.hpp"
 #include "daemon/system/clock.hpp"
+#include "daemon/system/hot_cpu.hpp"
 #include "daemon/system/realtime.hpp"
 #include "daemon/teach/teacher.hpp"
 #include "proto/zmq/keys.hpp"
@@ -31,6 +32,35 @@ constexpr const char* kPipelineName = "posed-pipeline";
 constexpr const char* kPublisherName = "posed-publish";
 
 }  // namespace
+
+// How the reader, the pipeline and the publisher run: with real-time rights if these are wanted and
+// granted, and then on one CPU while it has room for them (system/hot_cpu.hpp).
+class HotThreads {
+ public:
+  // Asks the operating system for what is wanted; a refusal is only a warning.
+  HotThreads(bool realtime, bool share_cpu) : realtime_(realtime && system::ask_for_realtime()) {
+    if (realtime_ && share_cpu) cpu_ = system::HotCpu::open();
+  }
+
+  // Runs `run` in a thread of that name and, with real-time rights, of that priority.
+  [[nodiscard]] std::thread start(const char* name, int priority, std::function<void()> run) {
+    if (!realtime_) priority = 0;
+    return std::thread([cpu = cpu_, name, priority, run = std::move(run)] {
+      system::enter_hot_thread(name, priority);
+      if (cpu) cpu->join(priority);
+      run();
+    });
+  }
+
+  // Call before the first of these threads ends.
+  void ending() {
+    if (cpu_) cpu_->stop();
+  }
+
+ private:
+  bool realtime_;
+  std::shared_ptr<system::HotCpu> cpu_;  // null: not wanted, or not possible
+};
 
 // Members are declared in the order of their construction; each uses only those before it.
 class Daemon::Parts final : public control::DaemonControl {

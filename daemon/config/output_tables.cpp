@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstdint>
 #include <map>
 #include <set>
@@ -17,7 +16,9 @@
 #include "daemon/config/listeners.hpp"
 #include "drivers/transport/address.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 #include "proto/text/nearest_word.hpp"
+#include "proto/text/number.hpp"
 
 namespace posed::config {
 namespace {
@@ -197,10 +198,7 @@ void OutputReader::read_list(TableReader& table, const char* key, std::size_t mo
 
 // Whether the port of an endpoint is one that a program can have.
 bool has_port(std::string_view endpoint) {
-  const std::string_view port = endpoint.substr(endpoint.rfind(':') + 1);
-  std::uint16_t number = 0;
-  const auto [read_to, error] = std::from_chars(port.data(), port.data() + port.size(), number);
-  return error == std::errc() && read_to == port.data() + port.size() && number > 0;
+  return exact_number<std::uint16_t>(endpoint.substr(endpoint.rfind(':') + 1)).value_or(0) > 0;
 }
 
 void OutputReader::read_vmc(TableReader& table, OutputConfig& output) const {
@@ -386,7 +384,7 @@ void OutputReader::refuse_keys(TableReader& table, OutputKind kind) {
     if (!table.has(key)) continue;
     std::string words;
     for (const OutputKind other : kinds) {
-      words += (words.empty() ? "" : " or ") + fmt::format("\"{}\"", kind_name(other));
+      add_word(words, fmt::format("\"{}\"", kind_name(other)), " or ");
     }
     table.add_error(key, fmt::format("{} is for outputs of kind = {}; leave it out", key, words));
   }

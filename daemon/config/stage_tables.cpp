@@ -7,6 +7,7 @@
 
 #include "models/stages/registry.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::config {
 namespace {
@@ -20,10 +21,7 @@ std::vector<const StageType*> read_order(TableReader& table) {
   for (const std::string& name : names) {
     const StageType* type = find_stage_type(name);
     if (type == nullptr) {
-      std::string known;
-      for (const StageType* one : stage_types()) {
-        known += (known.empty() ? "" : ", ") + std::string(one->name);
-      }
+      const std::string known = joined(stage_types(), ", ", &StageType::name);
       table.add_error("stages",
                       fmt::format("there is no stage {}; there is: {}", in_quotes(name), known));
     } else if (std::ranges::find(order, type) != order.end()) {

@@ -1,6 +1,5 @@
 #include "daemon/control/control_server.hpp"
 
-#include <algorithm>
 #include <array>
 
 #include <unistd.h>

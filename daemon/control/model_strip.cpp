@@ -1,12 +1,10 @@
 #include "daemon/control/model_strip.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <iterator>
 #include <memory>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>

@@ -5,13 +5,13 @@
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
-#include <spdlog/fmt/ranges.h>
 #include <nlohmann/json.hpp>
 
 #include "daemon/control/model_strip.hpp"
 #include "models/gesture/model_file.hpp"
 #include "models/style/model/style_model.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::control {
 namespace {
@@ -66,7 +66,7 @@ ModelWords words_of_style(const style::StyleModel& model,
                           std::span<const std::shared_ptr<const Skeleton>> known) {
   const json report = report_of(model.report_json);
   ModelWords words;
-  words.learnt = fmt::format("{} -> {}", model.from, fmt::join(model.names(), ", "));
+  words.learnt = model.from + " -> " + joined(model.names());
   if (const auto sources = sources_of(report); !sources.empty())
     words.learnt += ", from " + sources;
   words.skeleton = model.space.space == motion::Space::kHumanoid
@@ -88,7 +88,7 @@ ModelWords words_of_gesture(const gesture::GestureModel& model) {
       if (label.is_object()) labels.push_back(text_of(label, "name"));
     }
   }
-  words.learnt = fmt::format("gestures {}", fmt::join(labels, " "));
+  words.learnt = "gestures " + joined(labels, " ");
   const auto count = report.find("gestures");
   if (count != report.end() && count->is_number_unsigned()) {
     words.learnt += ", from " + some(count->get<std::size_t>(), "recorded one", "recorded ones");

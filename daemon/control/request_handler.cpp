@@ -21,6 +21,7 @@
 #include "posed/v1/control.pb.h"
 #include "proto/log/digest.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 #include "proto/text/stream_name.hpp"
 
 namespace posed::control {
@@ -32,14 +33,15 @@ using pipeline::Command;
 using pipeline::DeviceCommand;
 using pipeline::StageChange;
 
-Reply make_reply(Requester to, const v1::ControlReply& reply) {
-  return {.to = std::move(to), .bytes = reply.SerializeAsString(), .refused = !reply.ok()};
+Reply make_reply(Requester to, v1::ControlReply reply) {
+  reply.set_ok(true);
+  return {.to = std::move(to), .bytes = reply.SerializeAsString()};
 }
 
 Reply refusal(Requester to, const std::string& sentence) {
   v1::ControlReply reply;
   reply.set_error(clean(sentence));
-  return make_reply(std::move(to), reply);
+  return {.to = std::move(to), .bytes = reply.SerializeAsString(), .refused = true};
 }
 
 constexpr float kMaxVibration_hz = 1000.0F;
@@ -111,34 +113,38 @@ std::optional<Reply> RequestHandler::handle(Requester requester, std::span<const
   if (!request.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()))) {
     return refusal(std::move(requester), "this is not a valid posed.v1.ControlRequest");
   }
+  auto answer = answer_to(request, requester);
+  if (!answer) return refusal(std::move(requester), answer.error().text());
+  if (!*answer) return std::nullopt;
+  return make_reply(std::move(requester), std::move(**answer));
+}
+
+RequestHandler::Answer RequestHandler::answer_to(const v1::ControlRequest& request,
+                                                 const Requester& requester) {
   v1::ControlReply reply;
-  reply.set_ok(true);
   if (request.has_status() || request.has_stop()) {  // without the lock: these need no stream
     if (request.has_stop()) daemon_control_.stop();
     if (request.has_status()) daemon_control_.fill(*reply.mutable_status());
-    return make_reply(std::move(requester), reply);
+    return reply;
   }
-  if (request.has_take()) return mark_take(request, std::move(requester));
-  if (request.has_list_models()) return list_models(std::move(requester));
-  if (request.has_teach()) return teach(request, std::move(requester));
+  if (request.has_take()) return mark_take(request);
+  if (request.has_list_models()) return list_models();
+  if (request.has_teach()) return teach(request);
   if (request.has_fit_glove()) return fit_glove(request, requester);
-  if (request.has_rename_model() || request.has_delete_model()) {
-    return change_models(request, std::move(requester));
+  if (request.has_rename_model() || request.has_delete_model()) return change_models(request);
+  if (request.has_list_recordings()) return list_recordings();
+  if (request.has_fetch_recording()) {
+    auto piece = TRY(piece_of(request));
+    reply.set_piece(std::move(piece));
+    return reply;
   }
-  if (request.has_list_recordings()) return list_recordings(std::move(requester));
-  if (request.has_fetch_recording()) return fetch_recording(request, std::move(requester));
   std::string model;  // read without the lock: a disk may be slow
-  if (request.has_use_model()) {
-    auto read = models_.read(request.use_model().name());
-    if (!read) return refusal(std::move(requester), read.error().text());
-    model = std::move(*read);
-  }
+  if (request.has_use_model()) model = TRY(models_.read(request.use_model().name()));
   const std::scoped_lock lock(mutex_);
-  const auto done = apply(request, std::as_bytes(std::span(std::as_const(model))), requester);
-  if (!done) return refusal(std::move(requester), done.error().text());
-  if (done->under_way) return std::nullopt;  // acknowledge() makes the reply
-  if (!done->stream.empty()) reply.set_stream(done->stream);
-  return make_reply(std::move(requester), reply);
+  const auto done = TRY(apply(request, std::as_bytes(std::span(std::as_const(model))), requester));
+  if (done.under_way) return std::nullopt;
+  if (!done.stream.empty()) reply.set_stream(done.stream);
+  return reply;
 }
 
 Result<RequestHandler::Done> RequestHandler::apply(const v1::ControlRequest& request,
@@ -164,31 +170,25 @@ Result<RequestHandler::Done> RequestHandler::apply(const v1::ControlRequest& req
   }
 }
 
-Reply RequestHandler::mark_take(const v1::ControlRequest& request, Requester requester) {
+RequestHandler::Answer RequestHandler::mark_take(const v1::ControlRequest& request) {
   const auto& wanted = request.take();
   if (!wanted.start() && !wanted.name().empty()) {
-    return refusal(std::move(requester), "a take gets its name when it begins; leave it out here");
+    return fail("a take gets its name when it begins; leave it out here");
   }
-  if (auto fine = pipeline::check_take_name(wanted.name()); !fine) {
-    return refusal(std::move(requester), fine.error().text());
-  }
-  const auto take = daemon_control_.mark_take(
-      {.start = wanted.start(), .time_ns = clock_(), .name = wanted.name()});
-  if (!take) return refusal(std::move(requester), take.error().text());
+  TRY(pipeline::check_take_name(wanted.name()));
+  const auto take = TRY(daemon_control_.mark_take(
+      {.start = wanted.start(), .time_ns = clock_(), .name = wanted.name()}));
   v1::ControlReply reply;
-  reply.set_ok(true);
-  *reply.mutable_take() = pipeline::stats_of(*take);
-  reply.set_recorder_trouble(clean(take->trouble));
-  return make_reply(std::move(requester), reply);
+  *reply.mutable_take() = pipeline::stats_of(take);
+  reply.set_recorder_trouble(clean(take.trouble));
+  return reply;
 }
 
-Reply RequestHandler::list_models(Requester requester) {
-  const auto known = models_.list();
-  if (!known) return refusal(std::move(requester), known.error().text());
+RequestHandler::Answer RequestHandler::list_models() {
+  const auto known = TRY(models_.list());
   const Figures there = figures();
   v1::ControlReply reply;
-  reply.set_ok(true);
-  for (const FolderModel& model : *known) {
+  for (const FolderModel& model : known) {
     v1::KnownModel& entry = *reply.add_model();
     entry.set_name(model.name);
     entry.set_kind(std::string(model.kind));
@@ -198,7 +198,7 @@ Reply RequestHandler::list_models(Requester requester) {
     entry.set_verdict(words.verdict);
     entry.set_strip(words.strip);
   }
-  return make_reply(std::move(requester), reply);
+  return reply;
 }
 
 RequestHandler::Figures RequestHandler::figures() {
@@ -248,35 +248,30 @@ Result<> RequestHandler::check_unused(const std::string& model) {
   return {};
 }
 
-Reply RequestHandler::change_models(const v1::ControlRequest& request, Requester requester) {
-  const bool renames = request.has_rename_model();
-  const std::string& name = renames ? request.rename_model().name() : request.delete_model().name();
-  Result<> done = check_unused(name);
-  if (done && renames) {
-    const auto renamed = models_.rename(name, request.rename_model().to());
-    if (!renamed) done = std::unexpected(renamed.error());
-  } else if (done) {
-    done = models_.remove(name);
+RequestHandler::Answer RequestHandler::change_models(const v1::ControlRequest& request) {
+  const auto& rename = request.rename_model();
+  const std::string& name =
+      request.has_rename_model() ? rename.name() : request.delete_model().name();
+  TRY(check_unused(name));
+  if (request.has_rename_model()) {
+    TRY(models_.rename(name, rename.to()));
+  } else {
+    TRY(models_.remove(name));
   }
-  if (!done) return refusal(std::move(requester), done.error().text());
-  v1::ControlReply reply;
-  reply.set_ok(true);
-  return make_reply(std::move(requester), reply);
+  return v1::ControlReply();
 }
 
-Reply RequestHandler::list_recordings(Requester requester) const {
-  const auto files = recordings_.list();
-  if (!files) return refusal(std::move(requester), files.error().text());
+RequestHandler::Answer RequestHandler::list_recordings() const {
+  const auto files = TRY(recordings_.list());
   v1::ControlReply reply;
-  reply.set_ok(true);
-  for (const FolderRecording& file : *files) {
+  for (const FolderRecording& file : files) {
     v1::KnownRecording& entry = *reply.add_recording();
     entry.set_name(file.name);
     entry.set_bytes(file.bytes);
     entry.set_changed_unix_s(file.changed_unix_s);
     entry.set_in_use(file.in_use);
   }
-  return make_reply(std::move(requester), reply);
+  return reply;
 }
 
 Result<std::string> RequestHandler::piece_of(const v1::ControlRequest& request) {
@@ -298,26 +293,13 @@ Result<std::string> RequestHandler::piece_of(const v1::ControlRequest& request) 
   return std::string();
 }
 
-Reply RequestHandler::fetch_recording(const v1::ControlRequest& request, Requester requester) {
-  auto piece = piece_of(request);
-  if (!piece) return refusal(std::move(requester), piece.error().text());
-  v1::ControlReply reply;
-  reply.set_ok(true);
-  reply.set_piece(std::move(*piece));
-  return make_reply(std::move(requester), reply);
-}
-
-Reply RequestHandler::teach(const v1::ControlRequest& request, Requester requester) {
-  auto done = models_.check_writable();  // without the lock: a disk may be slow
+RequestHandler::Answer RequestHandler::teach(const v1::ControlRequest& request) {
+  TRY(models_.check_writable());  // without the lock: a disk may be slow
   const std::scoped_lock lock(mutex_);
-  if (done) done = teach_step(request);
-  if (!done) {
-    return refusal(std::move(requester), done.error().text());
-  }
+  TRY(teach_step(request));
   v1::ControlReply reply;
-  reply.set_ok(true);
   *reply.mutable_teaching() = teacher_->state();
-  return make_reply(std::move(requester), reply);
+  return reply;
 }
 
 Result<> RequestHandler::teach_step(const v1::ControlRequest& request) {
@@ -415,7 +397,7 @@ Result<ControlledStream*> RequestHandler::find_stream(const std::string& name) {
                       " {}",
                       name, stream->name, stream->name));
     }
-    names += (names.empty() ? "" : ", ") + stream->name;
+    add_word(names, stream->name);
   }
   return fail(fmt::format("there is no stream {}; there is: {}", in_quotes(name),
                           names.empty() ? "none" : names));
@@ -517,10 +499,9 @@ const StageModel* RequestHandler::coming_model(const ControlledStream& stream,
   return stream.models[stage].get();
 }
 
-Result<RequestHandler::Done> RequestHandler::send(const ControlledStream& stream, Command command,
-                                                  UnderWay under_way) {
-  if (!stream.is_there()) return keep(stream.name, under_way);
-  command.stream = stream.stream;
+template <typename AnyCommand>
+Result<RequestHandler::Done> RequestHandler::put_under_way(const ControlledStream& stream,
+                                                           AnyCommand command, UnderWay under_way) {
   command.ticket = last_ticket_ + 1;
   if (under_way_.size() >= kMaxUnderWay || !daemon_control_.send(command)) {
     return fail("too many changes are under way; wait for their answers and try again");
@@ -529,6 +510,13 @@ Result<RequestHandler::Done> RequestHandler::send(const ControlledStream& stream
   under_way.name = stream.name;
   under_way_.emplace(++last_ticket_, std::move(under_way));
   return Done{.under_way = true};
+}
+
+Result<RequestHandler::Done> RequestHandler::send(const ControlledStream& stream, Command command,
+                                                  UnderWay under_way) {
+  if (!stream.is_there()) return keep(stream.name, under_way);
+  command.stream = stream.stream;
+  return put_under_way(stream, command, std::move(under_way));
 }
 
 RequestHandler::Done RequestHandler::keep(const std::string& stream, const UnderWay& change) {
@@ -569,11 +557,10 @@ std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
     return std::nullopt;
   }
   v1::ControlReply reply;
-  reply.set_ok(true);
   reply.set_stream(done.name);
   reply.set_sequence(ack.sequence);
   if (done.fit) *reply.mutable_fit() = *done.fit;
-  return make_reply(std::move(done.requester), reply);
+  return make_reply(std::move(done.requester), std::move(reply));
 }
 
 void RequestHandler::apply(ControlledStream& stream, UnderWay& done) {
@@ -616,31 +603,22 @@ Result<RequestHandler::Done> RequestHandler::calibrate(const std::string& stream
   auto compiled = TRY(devices::compile_calibration(*stream.device->description(), toml, name));
   const DeviceCommand command{.kind = DeviceCommand::Kind::kCalibrate,
                               .source = stream.source_number,
-                              .ticket = last_ticket_ + 1,
                               .calibration = compiled.get(),
                               .size = 0,
                               .bytes = {}};
-  if (under_way_.size() >= kMaxUnderWay || !daemon_control_.send(command)) {
-    return fail("too many changes are under way; wait for their answers and try again");
-  }
-  under_way.stream = stream.stream;
-  under_way.name = stream.name;
   under_way.calibration = std::move(compiled);
   under_way.device = stream.device;
   under_way.source_number = stream.source_number;
-  under_way_.emplace(++last_ticket_, std::move(under_way));
-  return Done{.under_way = true};
+  return put_under_way(stream, command, std::move(under_way));
 }
 
-std::optional<Reply> RequestHandler::fit_glove(const v1::ControlRequest& request,
-                                               const Requester& requester) {
-  const auto fit = judge_or_use(request, requester);
-  if (!fit) return refusal(requester, fit.error().text());
-  if (!(*fit)->file().empty()) return std::nullopt;
+RequestHandler::Answer RequestHandler::fit_glove(const v1::ControlRequest& request,
+                                                 const Requester& requester) {
+  const auto fit = TRY(judge_or_use(request, requester));
+  if (!fit->file().empty()) return std::nullopt;
   v1::ControlReply reply;
-  reply.set_ok(true);
-  *reply.mutable_fit() = **fit;
-  return make_reply(requester, reply);
+  *reply.mutable_fit() = *fit;
+  return reply;
 }
 
 // The fit is computed, and the file written, without the lock.

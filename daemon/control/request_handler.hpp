@@ -182,6 +182,9 @@ class RequestHandler {
     bool under_way = false;  // acknowledge() makes the reply
     std::string stream{};    // for whose next start it is kept; empty: it has taken effect
   };
+  // What is replied; nothing: acknowledge() makes the reply.
+  using Answer = Result<std::optional<v1::ControlReply>>;
+  Answer answer_to(const v1::ControlRequest& request, const Requester& requester);
   Result<Done> apply(const v1::ControlRequest& request, std::span<const std::byte> model,
                      const Requester& requester);
   Result<Done> set_parameter(const v1::ControlRequest& request, const Requester& requester);
@@ -191,22 +194,19 @@ class RequestHandler {
                          const std::string& name, UnderWay under_way);
   Result<Done> calibrate(const std::string& stream, const std::string& toml,
                          const std::string& name, UnderWay under_way);
-  // Nothing: acknowledge() makes the reply.
-  [[nodiscard]] std::optional<Reply> fit_glove(const v1::ControlRequest& request,
-                                               const Requester& requester);
+  Answer fit_glove(const v1::ControlRequest& request, const Requester& requester);
   Result<std::shared_ptr<const v1::GloveFit>> judge_or_use(const v1::ControlRequest& request,
                                                            const Requester& requester);
-  [[nodiscard]] Reply list_models(Requester requester);
+  Answer list_models();
   using Figures = std::vector<std::shared_ptr<const Skeleton>>;
   [[nodiscard]] Figures figures();  // of the bodies that are there
   ModelWords words_of(const FolderModel& model, const Figures& figures);
-  [[nodiscard]] Reply change_models(const v1::ControlRequest& request, Requester requester);
+  Answer change_models(const v1::ControlRequest& request);
   Result<> check_unused(const std::string& model);
-  [[nodiscard]] Reply list_recordings(Requester requester) const;
-  [[nodiscard]] Reply fetch_recording(const v1::ControlRequest& request, Requester requester);
+  Answer list_recordings() const;
   Result<std::string> piece_of(const v1::ControlRequest& request);
-  [[nodiscard]] Reply mark_take(const v1::ControlRequest& request, Requester requester);
-  [[nodiscard]] Reply teach(const v1::ControlRequest& request, Requester requester);
+  Answer mark_take(const v1::ControlRequest& request);
+  Answer teach(const v1::ControlRequest& request);
   Result<> teach_step(const v1::ControlRequest& request);
   Result<teach::Pupil> find_pupil(const std::string& name, teach::Subject subject);
   Result<Done> send_haptics(const v1::ControlRequest& request);
@@ -220,6 +220,10 @@ class RequestHandler {
   // The stage's model by the time that a command that is sent now takes effect.
   [[nodiscard]] const StageModel* coming_model(const ControlledStream& stream,
                                                std::size_t stage) const;
+  // The pipeline or the reader gets the command; acknowledge() makes the reply.
+  template <typename AnyCommand>
+  Result<Done> put_under_way(const ControlledStream& stream, AnyCommand command,
+                             UnderWay under_way);
   // Puts the command under way, or keeps the change for a stream that is not there.
   Result<Done> send(const ControlledStream& stream, pipeline::Command command, UnderWay under_way);
   // The stream has the new value or model from now on whenever it is built.

@@ -13,6 +13,7 @@
 #include "models/stages/registry.hpp"
 #include "proto/model/model_file.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::control {
 namespace {
@@ -85,7 +86,7 @@ Result<Place> find_place(const StreamSettings& settings, const std::string& name
                     in_quotes(name), what, type->name));
   }
   return fail(fmt::format("there is no {} {}; there is: {}", what, in_quotes(name),
-                          known.empty() ? "none" : fmt::format("{}", fmt::join(known, ", "))));
+                          known.empty() ? "none" : joined(known)));
 }
 
 ParameterValue value_in(const v1::ControlRequest::SetParameter& wanted) {
@@ -177,7 +178,7 @@ Result<FoundCommand> find_command(const StreamSettings& settings, const std::str
 }
 
 std::string joined_words(const v1::ControlRequest::StageCommand& wanted) {
-  return fmt::format("{}", fmt::join(wanted.word(), ","));
+  return joined(wanted.word(), ",");
 }
 
 Result<StageCommand> encode_command(const StageCommandType& type, const StageModel* model,

@@ -7,7 +7,6 @@
 
 #include "daemon/control/request_handler.hpp"
 #include "daemon/control/trigger_message.hpp"
-#include "proto/frame/result.hpp"
 #include "proto/frame/time.hpp"
 
 namespace posed::control {

@@ -1,6 +1,5 @@
 #include "daemon/control/trigger_server.hpp"
 
-#include <algorithm>
 #include <array>
 #include <utility>
 

@@ -1,7 +1,6 @@
 #include "daemon/devices/body_names.hpp"
 
 #include <algorithm>
-#include <string_view>
 
 #include "proto/text/stream_name.hpp"
 

@@ -1,6 +1,5 @@
 #include "daemon/devices/kept_settings.hpp"
 
-#include <algorithm>
 #include <memory>
 #include <string_view>
 

@@ -9,7 +9,6 @@
 #include <mutex>
 #include <span>
 #include <string>
-#include <utility>
 
 #include "daemon/devices/stream_stages.hpp"
 #include "daemon/system/event_fd.hpp"

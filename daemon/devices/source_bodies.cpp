@@ -8,7 +8,6 @@
 
 #include "daemon/devices/source_builder.hpp"
 #include "daemon/pipeline/description_row.hpp"
-#include "daemon/system/clock.hpp"
 #include "proto/frame/same_skeleton.hpp"
 
 namespace posed::devices {

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "daemon/devices/about_stream.hpp"
-#include "daemon/system/clock.hpp"
 
 namespace posed::devices {
 namespace {

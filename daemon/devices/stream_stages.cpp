@@ -11,11 +11,6 @@
 namespace posed::devices {
 namespace {
 
-// A rigid body, such as a sword that a performer holds.
-bool is_prop(const Skeleton& skeleton) {
-  return skeleton.joints.size() == 1 && !skeleton.joints.front().bone;
-}
-
 bool has_bridge(const config::StreamConfig& config) {
   return std::ranges::any_of(config.stages,
                              [](const config::StageConfig& stage) { return stage.type->bridges; });

@@ -7,7 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "drivers/glove/angle_map.hpp"
 #include "models/hand/geometry.hpp"
 #include "models/hand/thumb_fit.hpp"
 

@@ -3,7 +3,6 @@
 #include <chrono>
 #include <cstdint>
 #include <string_view>
-#include <type_traits>
 #include <utility>
 
 #include <boost/beast/core/bind_handler.hpp>

@@ -5,9 +5,7 @@
 #include <pthread.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
-#include <climits>
 #include <condition_variable>
 #include <csignal>
 #include <deque>

@@ -1,7 +1,5 @@
 #include "daemon/metrics/metrics_service.hpp"
 
-#include <string_view>
-
 #include "daemon/metrics/text_format.hpp"
 
 namespace posed::metrics {

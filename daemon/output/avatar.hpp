@@ -5,12 +5,13 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
+#include <string_view>
 #include <utility>
 #include <vector>
 
-#include "daemon/output/part.hpp"
 #include "drivers/vmc/messages.hpp"
 #include "models/motion/retarget.hpp"
 #include "proto/frame/frame.hpp"
@@ -18,6 +19,21 @@
 #include "proto/frame/skeleton.hpp"
 
 namespace posed::output {
+
+// The parts of an avatar that have streams of their own.
+enum class Part : std::uint8_t { kBody, kLeftHand, kRightHand };
+inline constexpr std::size_t kParts = 3;
+inline constexpr std::array<Part, kParts> kAllParts{Part::kBody, Part::kLeftHand, Part::kRightHand};
+
+[[nodiscard]] constexpr std::size_t index_of(Part part) noexcept {
+  return static_cast<std::size_t>(part);
+}
+
+// The name of the part in the config.
+[[nodiscard]] constexpr std::string_view words_for(Part part) noexcept {
+  constexpr std::array<std::string_view, kParts> kWords{"body", "left hand", "right hand"};
+  return kWords[index_of(part)];
+}
 
 // One thread.
 class Avatar {

@@ -1,6 +1,5 @@
 #include "daemon/output/blend_shapes.hpp"
 
-#include <algorithm>
 #include <array>
 
 #include "drivers/vmc/protocol.hpp"

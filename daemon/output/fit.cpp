@@ -22,7 +22,7 @@ Result<Fit> Fit::make(std::shared_ptr<const Skeleton> person, bool own, const Ma
   Fit fit;
   if (own) {
     for (std::size_t j = 0; j < person->joints.size(); ++j) {
-      fit.rest_xyzw_.push_back(rest_rotation(*person, j));
+      fit.rest_xyzw_.push_back(from_eigen(local_from_canonical(*person, j)));
     }
     fit.skeleton_ = std::move(person);
     return fit;
@@ -46,12 +46,6 @@ const Frame& Fit::apply(const Frame& frame) noexcept {
   return pose_;
 }
 
-Quatf rest_rotation(const Skeleton& skeleton, std::size_t joint) noexcept {
-  const int parent = skeleton.joints[joint].parent;
-  const Eigen::Quaterniond& T = skeleton.joints[joint].T_world_joint;
-  return from_eigen(parent < 0 ? T : skeleton.joints[parent].T_world_joint.conjugate() * T);
-}
-
 std::string distinct_name(const std::string& own, const std::string& stream, std::size_t place,
                           std::vector<std::string>& names) {
   names[place].clear();
@@ -62,10 +56,6 @@ std::string distinct_name(const std::string& own, const std::string& stream, std
 bool has_fingers(const Skeleton& skeleton) {
   return skeleton.joint_of(Bone::kLeftIndexProximal) >= 0 ||
          skeleton.joint_of(Bone::kRightIndexProximal) >= 0;
-}
-
-bool is_prop(const Skeleton& skeleton) noexcept {
-  return skeleton.joints.size() == 1 && !skeleton.joints[0].bone;
 }
 
 bool rests_unturned(const Skeleton& skeleton) noexcept {

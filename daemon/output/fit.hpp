@@ -42,9 +42,6 @@ class Fit {
   Frame pose_{};
 };
 
-// A joint's rotation relative to its parent in T-pose.
-[[nodiscard]] Quatf rest_rotation(const Skeleton& skeleton, std::size_t joint) noexcept;
-
 // The name under which the person at `place` goes out: its own, or its stream's where another
 // person of the output has that. `names`: [place], of all of them; it is set here.
 [[nodiscard]] std::string distinct_name(const std::string& own, const std::string& stream,
@@ -52,9 +49,6 @@ class Fit {
 
 // Whether it can move its fingers.
 [[nodiscard]] bool has_fingers(const Skeleton& skeleton);
-
-// A rigid body, such as a sword that a performer holds.
-[[nodiscard]] bool is_prop(const Skeleton& skeleton) noexcept;
 
 // Whether no joint is turned in T-pose, and the first one says where the person is.
 [[nodiscard]] bool rests_unturned(const Skeleton& skeleton) noexcept;

@@ -8,7 +8,6 @@
 #include "daemon/output/datagram_encoder.hpp"
 #include "daemon/output/fit.hpp"
 #include "daemon/system/clock.hpp"
-#include "drivers/mocopi/decoder.hpp"
 #include "drivers/mocopi/encode.hpp"
 #include "proto/frame/rotation.hpp"
 
@@ -41,7 +40,7 @@ std::vector<mocopi::BoneEntry> bones_of(const Skeleton& skeleton,
     mocopi::BoneEntry& bone = bones.emplace_back();
     bone.id = numbers[j];
     bone.parent = joint.parent < 0 ? mocopi::kNoParent : numbers[joint.parent];
-    bone.transform.rotation_xyzw = rest_rotation(skeleton, j);
+    bone.transform.rotation_xyzw = from_eigen(local_from_canonical(skeleton, j));
     const Eigen::Vector3f offset_m = joint.offset_m.cast<float>();
     bone.transform.position_m =
         joint.parent < 0 ? hips_m : Vec3f{offset_m.x(), offset_m.y(), offset_m.z()};

@@ -18,7 +18,6 @@
 #include "daemon/output/rate_limit.hpp"
 #include "daemon/output/send_outcome.hpp"
 #include "daemon/publish/frame_output.hpp"
-#include "daemon/system/clock.hpp"
 #include "daemon/system/event_fd.hpp"
 #include "proto/frame/result.hpp"
 

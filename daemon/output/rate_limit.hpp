@@ -3,7 +3,6 @@
 // Of frames that come together at most one is admitted; offer the newest.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 
 #include "proto/frame/time.hpp"

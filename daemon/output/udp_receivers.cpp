@@ -1,7 +1,6 @@
 #include "daemon/output/udp_receivers.hpp"
 
 #include <cerrno>
-#include <utility>
 
 #include <sys/socket.h>
 #include <unistd.h>

@@ -5,7 +5,6 @@
 
 #include <cassert>
 #include <cstddef>
-#include <cstdint>
 #include <vector>
 
 #include "daemon/pipeline/stream_engine.hpp"

@@ -6,7 +6,6 @@
 
 #include "daemon/net/peer_guard.hpp"
 #include "daemon/net/security.hpp"
-#include "daemon/net/zap_authenticator.hpp"
 
 namespace posed::publish {
 namespace {

@@ -8,15 +8,28 @@
 #include <vector>
 
 #include "daemon/publish/duration_buckets.hpp"
-#include "daemon/publish/encode.hpp"
 #include "daemon/publish/histogram.hpp"
 #include "daemon/publish/publisher.hpp"
 #include "daemon/publish/shed_tally.hpp"
 #include "daemon/publish/stream_figures.hpp"
 #include "daemon/system/priority_mutex.hpp"
+#include "drivers/driver.hpp"
+#include "posed/v1/posed.pb.h"
+#include "proto/frame/frame.hpp"
 #include "proto/message/frame_message.hpp"
 
 namespace posed::publish {
+
+// Converts samples to the wire format (proto/wire/posed/v1/posed.proto). The message is reused, so
+// encoding a sample allocates nothing.
+class SampleEncoder {
+ public:
+  SampleEncoder(const std::string& stream, const drivers::SampleLayout& layout);
+  [[nodiscard]] const v1::Sample& encode(const Sample& sample);
+
+ private:
+  v1::Sample message_;
+};
 
 // Whether a device that may be unplugged is.
 [[nodiscard]] bool is_away(const pipeline::SourceCounters& source, bool comes_and_goes) noexcept;

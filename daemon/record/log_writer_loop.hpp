@@ -4,7 +4,6 @@
 // can drive it.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstdint>
 #include <filesystem>

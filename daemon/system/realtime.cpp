@@ -1,8 +1,5 @@
 #include "daemon/system/realtime.hpp"
 
-#include <cerrno>
-#include <cstring>
-
 #include <pthread.h>
 #include <sched.h>
 #include <spdlog/spdlog.h>

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/tools/command/command.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::tools {
 namespace {
@@ -44,19 +45,13 @@ void collect(const CLI::App& app, const std::string& path, std::vector<Node>& no
   }
 }
 
-std::string joined(const std::vector<Word>& words) {
-  std::string out;
-  for (const Word& word : words) out += (out.empty() ? "" : " ") + word.text;
-  return out;
-}
-
 // Follows the words before the cursor down the command tree, then offers the words of that command.
 std::string bash(const std::vector<Node>& nodes) {
   std::string known, offers;
   for (const Node& node : nodes) {
     known += " '" + node.path + "'";
-    offers += "    '" + node.path + "') words='" + joined(node.commands) + " " +
-              joined(node.flags) + "' ;;\n";
+    offers += "    '" + node.path + "') words='" + joined(node.commands, " ", &Word::text) + " " +
+              joined(node.flags, " ", &Word::text) + "' ;;\n";
   }
   return "# bash completion of posed: eval \"$(posed completion bash)\"\n"
          "_posed() {\n"

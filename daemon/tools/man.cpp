@@ -3,7 +3,6 @@
 #include <cctype>
 #include <filesystem>
 #include <fstream>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -157,8 +156,7 @@ void add_man(CLI::App& app, int& exit_code) {
   mkdir pages && posed man --out pages && man pages/posed-train.1
 Packages and `cmake --install` bring these pages, which say what `--help` says.)help");
   command->callback([&app, options, &exit_code] {
-    const auto written = write_pages(app, options->out, options->overwrite);
-    exit_code = written ? 0 : report(written.error());
+    exit_code = report(write_pages(app, options->out, options->overwrite));
   });
 }
 

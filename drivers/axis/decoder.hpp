@@ -46,7 +46,7 @@ struct StreamSettings {
   std::optional<Figure> figure{};  // nullopt: as the lengths of the bones say
 };
 
-class AxisDecoder final : public Decoder, private Messages {
+class AxisDecoder final : public LayoutDecoder<AxisLayout>, private Messages {
  public:
   explicit AxisDecoder(const StreamSettings& settings) noexcept
       : settings_(settings), roster_(settings.order, settings.figure) {}
@@ -54,11 +54,6 @@ class AxisDecoder final : public Decoder, private Messages {
   // Takes bytes cut at any position.
   RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                     Sink& sink) noexcept override;
-
-  // Takes what make_layout made.
-  RT_SAFE void use(const SourceLayout& layout) noexcept override {
-    layout_ = static_cast<const AxisLayout*>(&layout);
-  }
 
  private:
   bool binary(std::span<const std::byte> bytes, bool in_damage) noexcept override;
@@ -72,9 +67,8 @@ class AxisDecoder final : public Decoder, private Messages {
   StreamSettings settings_;
   MessageReader reader_;
   Roster roster_;
-  Message message_;                     // the current one
-  const AxisLayout* layout_ = nullptr;  // null until the first description is in use
-  Sink* sink_ = nullptr;                // of the current call of feed()
+  Message message_;       // the current one
+  Sink* sink_ = nullptr;  // of the current call of feed()
   std::int64_t now_ns_ = 0;
 };
 

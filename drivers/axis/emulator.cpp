@@ -1,49 +1,15 @@
 #include "drivers/axis/emulator.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
 #include "drivers/axis/decoder.hpp"
+#include "drivers/emulate/motion.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::drivers::axis {
 namespace {
 
-constexpr double kStep_hz = 0.9;  // double steps and waves a second
-constexpr double kPath_m = 1.0;   // radius of the circle that the walker follows
-constexpr double kLap_s = 12.0;
 constexpr float kSmaller = 0.9F;  // the waver
-
-// Bones by their place in the list.
-constexpr std::size_t kRightUpLeg = 1, kRightLeg = 2, kLeftUpLeg = 4, kLeftLeg = 5, kRightArm = 14,
-                      kRightForeArm = 15, kLeftArm = 37;
-
-Quatf about(Axis axis, double angle_rad) { return from_eigen(axis_rotation(axis, angle_rad)); }
-
-double phase_rad(double time_s) { return 2.0 * std::numbers::pi * kStep_hz * time_s; }
-
-// Arms hang down and swing against the legs; the path is a circle, so the motion has no end.
-void walk(double time_s, Vec3f& root_m, std::span<Quatf> bones) {
-  const double lap = 2.0 * std::numbers::pi * time_s / kLap_s;
-  const double swing = 0.5 * std::sin(phase_rad(time_s));
-  root_m = {static_cast<float>(-kPath_m * std::cos(lap)), root_m[1],
-            static_cast<float>(kPath_m * std::sin(lap))};
-  bones[kHips] = about(Axis::kY, lap);
-  bones[kLeftArm] = from_eigen(axis_rotation(Axis::kX, swing) * axis_rotation(Axis::kZ, -1.3));
-  bones[kRightArm] = from_eigen(axis_rotation(Axis::kX, -swing) * axis_rotation(Axis::kZ, 1.3));
-  bones[kLeftUpLeg] = about(Axis::kX, -swing);
-  bones[kLeftLeg] = about(Axis::kX, std::max(0.0, swing));
-  bones[kRightUpLeg] = about(Axis::kX, swing);
-  bones[kRightLeg] = about(Axis::kX, std::max(0.0, -swing));
-}
-
-void wave(double time_s, Vec3f& root_m, std::span<Quatf> bones) {
-  root_m = {0.0F, root_m[1], 2.5F};
-  bones[kLeftArm] = about(Axis::kZ, -1.3);
-  bones[kRightArm] = about(Axis::kZ, -0.6);
-  bones[kRightForeArm] = about(Axis::kZ, -0.9 + 0.4 * std::sin(phase_rad(time_s)));
-}
 
 }  // namespace
 
@@ -103,8 +69,12 @@ void AxisEmulator::move(double time_s) {
   for (std::size_t body = 0; body < people_.size(); ++body) {
     Person& person = people_[body];
     if (person.posed) continue;
-    const std::span bones = std::span(person.rotation_xyzw).subspan(person.entry.reference ? 1 : 0);
-    (body == 0 ? walk : wave)(time_s, person.root_m, bones);
+    const auto turn = [&](Bone bone, const Eigen::Quaterniond& rotation) {
+      person.rotation_xyzw[person.skeleton->joint_of(bone)] = from_eigen(rotation);
+    };
+    const float hips_m = person.root_m[1];
+    person.root_m =
+        body == 0 ? emulate::walk(time_s, hips_m, turn) : emulate::wave(time_s, hips_m, turn);
   }
 }
 

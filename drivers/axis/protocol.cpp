@@ -1,7 +1,6 @@
 #include "drivers/axis/protocol.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <optional>
 
@@ -11,6 +10,7 @@
 #include "proto/clip/text.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/plausible.hpp"
+#include "proto/text/number.hpp"
 
 namespace posed::drivers::axis {
 namespace {
@@ -182,10 +182,9 @@ RT_SAFE Outcome decode_text(std::string_view text, Message& message) noexcept {
   const std::string_view number = clip::next_word(text);
   const std::size_t words = count_words(text);
   if (words == 0) return Outcome::kShort;
-  const auto [stop, error] =
-      std::from_chars(number.data(), number.data() + number.size(), message.avatar.number);
-  const bool known = error == std::errc() && stop == number.data() + number.size() &&
-                     message.avatar.number <= kMaxAvatar;
+  const auto avatar = exact_number<std::uint32_t>(number);
+  const bool known = avatar && *avatar <= kMaxAvatar;
+  if (avatar) message.avatar.number = *avatar;
   const Outcome outcome = read_text(text, words, message);
   return outcome == Outcome::kOk && !known ? Outcome::kOutOfRange : outcome;
 }

@@ -27,7 +27,7 @@ class UpstreamLayout final : public SourceLayout {
 // Driver::make_layout. Cold.
 Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description);
 
-class UpstreamDecoder final : public Decoder {
+class UpstreamDecoder final : public LayoutDecoder<UpstreamLayout> {
  public:
   explicit UpstreamDecoder(const std::string& stream)
       : stream_(stream), pose_topic_("pose/" + stream), skeleton_topic_("skeleton/" + stream) {}
@@ -36,17 +36,11 @@ class UpstreamDecoder final : public Decoder {
   RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                     Sink& sink) noexcept override;
 
-  // Takes what make_layout made.
-  RT_SAFE void use(const SourceLayout& layout) noexcept override {
-    layout_ = static_cast<const UpstreamLayout*>(&layout);
-  }
-
  private:
   [[nodiscard]] Outcome accept(std::span<const std::byte> bytes, Sink& sink) noexcept;
   [[nodiscard]] Outcome accept_pose(std::span<const std::byte> body, Sink& sink) noexcept;
 
   std::string stream_, pose_topic_, skeleton_topic_;
-  const UpstreamLayout* layout_ = nullptr;  // null until the upstream has sent a skeleton
   DatagramOrder order_{64};
   TimestampClock clock_;
   UpstreamFrame upstream_;

@@ -1,8 +1,6 @@
 #include "drivers/chain/emulator.hpp"
 
-#include <cmath>
-#include <numbers>
-
+#include "drivers/emulate/motion.hpp"
 #include "drivers/emulate/pace.hpp"
 #include "proto/frame/rotation.hpp"
 #include "proto/message/skeleton_message.hpp"
@@ -10,7 +8,6 @@
 namespace posed::drivers::chain {
 namespace {
 
-constexpr double kWave_hz = 0.9;
 // The emulated machine has been running for an hour.
 constexpr std::int64_t kBegan_ns = 3600 * kNanosPerSecond;
 constexpr int kRightArm = 3;
@@ -75,7 +72,7 @@ void UpstreamEmulator::emit(std::int64_t now_ns, Bytes& out) {
     frames_.step(now_ns);
     ++pose_.header.sequence;
     if (!posed_) {
-      const double swing_rad = 0.4 * std::sin(2.0 * std::numbers::pi * kWave_hz * time_s);
+      const double swing_rad = emulate::swing_rad(time_s, 0.4);
       pose_.rotation_xyzw[kRightArm] = from_eigen(axis_rotation(Axis::kZ, -0.6 + swing_rad));
     }
     chunk = join_message("pose/" + info_.stream, encoder_.encode(pose_).SerializeAsString());

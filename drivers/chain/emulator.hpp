@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <string>
 
 #include "drivers/chain/protocol.hpp"
 #include "drivers/emulate/pace.hpp"

@@ -1,7 +1,6 @@
 #include "drivers/chain/protocol.hpp"
 
 #include <algorithm>
-#include <charconv>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -10,6 +9,7 @@
 #include <string_view>
 
 #include "proto/message/wire_reader.hpp"
+#include "proto/text/number.hpp"
 #include "proto/text/stream_name.hpp"
 
 namespace posed::drivers::chain {
@@ -160,11 +160,9 @@ Result<UpstreamInfo> parse_device_info(const std::string& text, const std::strin
   const auto rate = text.find(" rate=");
   if (text.starts_with(kPrefix) && rate != std::string::npos) {
     info.stream = text.substr(kPrefix.size(), rate - kPrefix.size());
-    const char* const end = text.data() + text.size();
-    const auto [stop, error] = std::from_chars(text.data() + rate + 6, end, info.rate_hz);
-    const bool valid = error == std::errc() && stop == end && info.rate_hz > 0.0 &&
-                       info.rate_hz <= kMaxRate_hz && is_upstream_stream(info.stream);
-    if (valid) return info;
+    info.rate_hz = exact_number<double>(std::string_view(text).substr(rate + 6)).value_or(0.0);
+    const bool valid = info.rate_hz > 0.0 && info.rate_hz <= kMaxRate_hz;
+    if (valid && is_upstream_stream(info.stream)) return info;
   }
   return fail(
       "is not described as a posed stream ('posed stream=ann rate=60'); is it another"

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "proto/frame/degree.hpp"
-#include "proto/frame/frame.hpp"
 
 namespace posed::drivers::described {
 namespace {

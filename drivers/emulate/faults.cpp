@@ -1,8 +1,9 @@
 #include "drivers/emulate/faults.hpp"
+#include "proto/text/list.hpp"
+#include "proto/text/number.hpp"
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 
 namespace posed::drivers::emulate {
 namespace {
@@ -29,17 +30,12 @@ std::byte at_half_rate(std::byte first, std::byte second) {
 Result<Fault> parse_fault(std::string_view text) {
   const std::size_t colon = std::min(text.find(':'), text.size());
   const auto kind = std::ranges::find(kNames, text.substr(0, colon));
-  const std::string_view digits = text.substr(std::min(colon + 1, text.size()));
-  double rate = 0.0;
-  const auto [stop, error] = std::from_chars(digits.data(), digits.data() + digits.size(), rate);
-  const bool number = error == std::errc() && stop == digits.data() + digits.size();
-  if (kind != kNames.end() && number && rate >= 0.0 && rate <= 1.0) {
-    return Fault{.kind = static_cast<FaultKind>(kind - kNames.begin()), .rate = rate};
+  const auto rate = exact_number<double>(text.substr(std::min(colon + 1, text.size())));
+  if (kind != kNames.end() && rate && *rate >= 0.0 && *rate <= 1.0) {
+    return Fault{.kind = static_cast<FaultKind>(kind - kNames.begin()), .rate = *rate};
   }
-  std::string names;
-  for (const std::string_view name : kNames)
-    names += (names.empty() ? "" : ", ") + std::string(name);
-  return misuse("a fault is KIND:RATE, the rate from 0 to 1, as drop:0.01; kinds: " + names);
+  return misuse("a fault is KIND:RATE, the rate from 0 to 1, as drop:0.01; kinds: " +
+                joined(kNames));
 }
 
 bool FaultInjector::strikes() {

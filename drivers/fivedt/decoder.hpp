@@ -3,8 +3,6 @@
 
 #include <array>
 #include <memory>
-#include <string>
-#include <vector>
 
 #include "drivers/fivedt/framer.hpp"
 #include "drivers/glove/glove_decoder.hpp"

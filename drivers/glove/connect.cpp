@@ -1,6 +1,5 @@
 #include "drivers/glove/connect.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <utility>
 

@@ -1,11 +1,9 @@
 #include "drivers/glove/crosstalk.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <optional>
 #include <span>
-#include <utility>
 
 #include <Eigen/Cholesky>
 

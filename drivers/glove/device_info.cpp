@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <sstream>
 
 #include "proto/text/clean.hpp"
+#include "proto/text/number.hpp"
 
 namespace posed::drivers::glove {
 namespace {
@@ -59,11 +59,8 @@ std::string DeviceInfoReader::word(std::string_view key) {
 }
 
 int DeviceInfoReader::whole(std::string_view key, int least, int most) {
-  const std::string text = word(key);
-  int value = 0;
-  const char* const end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, value);
-  if (error == std::errc() && stop == end && value >= least && value <= most) return value;
+  const auto value = exact_number<int>(word(key));
+  if (value && *value >= least && *value <= most) return *value;
   add_error("has " + in_quotes(key) + " outside " + std::to_string(least) + " to " +
             std::to_string(most));
   return least;

@@ -1,7 +1,9 @@
 #include "drivers/glove/pose_check.hpp"
+#include "proto/text/list.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 namespace posed::drivers::glove {
 namespace {
@@ -36,10 +38,7 @@ bool is_stuck(const Sensor& sensor, const SensorPoses& at) {
 }
 
 std::string named(const std::vector<std::string>& sensors) {
-  std::string text;
-  for (std::size_t i = 0; i < std::min(sensors.size(), kNamed); ++i) {
-    text += (i > 0 ? ", " : "") + sensors[i];
-  }
+  const std::string text = joined(std::span(sensors).first(std::min(sensors.size(), kNamed)));
   return sensors.size() > kNamed ? text + ", ..." : text;
 }
 
@@ -87,8 +86,8 @@ std::string PoseFinding::sentence() const {
     why = std::to_string(moved.size()) + of_all + "moved while it was held (" + named(moved) + ")";
   }
   if (!stuck.empty()) {
-    why += (why.empty() ? "" : ", ") + std::to_string(stuck.size()) + of_all +
-           "hardly moved from the flat hand (" + named(stuck) + ")";
+    add_word(why, std::to_string(stuck.size()) + of_all + "hardly moved from the flat hand (" +
+                      named(stuck) + ")");
   }
   return std::string(kPoseNames[static_cast<std::size_t>(pose)]) + " failed: " + why +
          ": hold it again";
@@ -109,7 +108,7 @@ std::string PoseCheck::verdict() const {
   for (const PoseFinding& finding : poses) {
     unrest = std::max(unrest, finding.unrest);
     std::ranges::copy(finding.moved, std::back_inserter(restless));
-    if (finding.failed()) text += (text.empty() ? "" : "; ") + finding.sentence();
+    if (finding.failed()) add_word(text, finding.sentence(), "; ");
   }
   if (!text.empty()) return text;
   return "good: the hand was still in every pose (to " +

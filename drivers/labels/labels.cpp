@@ -1,17 +1,20 @@
 // A stream without a device: a hand or a body that performs gesture labels only.
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <sstream>
 #include <string_view>
 #include <utility>
 
+#include "drivers/driver.hpp"
 #include "drivers/file/decoder.hpp"
-#include "drivers/labels/decoder.hpp"
 #include "drivers/options.hpp"
 #include "drivers/transport/file.hpp"
 #include "proto/clip/device_clip.hpp"
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/frame/time.hpp"
 
 namespace posed::drivers {
 
@@ -19,6 +22,40 @@ const Driver& labels_driver();
 
 namespace labels {
 namespace {
+
+// Turns the clock ticks of a stream without a device into frames of its rest pose, held, to be
+// filled with synthesised poses. Device time follows the ticks: frame n is at n / rate.
+class LabelsDecoder final : public Decoder {
+ public:
+  static constexpr std::string_view kBeat = "\n";
+
+  // `rest` is posed for the stream's skeleton; its header does not matter.
+  LabelsDecoder(const Frame& rest, double rate_hz) : rest_(rest), rate_hz_(rate_hz) {
+    rest_.header = {};
+    rest_.source = Source::kLabels;
+    rest_.quality = Quality::kHeld;
+  }
+
+  RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,
+                    Sink& sink) noexcept override {
+    for (const std::byte byte : bytes) {
+      if (static_cast<char>(byte) != kBeat.front()) {
+        if (!std::exchange(foreign_, true)) sink.outcome(Outcome::kForeign);
+        continue;
+      }
+      foreign_ = false;
+      rest_.header.device_ns = nanoseconds(static_cast<double>(beats_++) / rate_hz_);
+      sink.outcome(Outcome::kOk);
+      sink.frame(rest_);
+    }
+  }
+
+ private:
+  Frame rest_;
+  double rate_hz_;
+  std::int64_t beats_ = 0;
+  bool foreign_ = false;  // inside foreign bytes, which are already counted
+};
 
 constexpr double kMaxRate_hz = 1000.0;
 

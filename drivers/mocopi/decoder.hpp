@@ -27,21 +27,15 @@ class MocopiLayout final : public SourceLayout {
 // Driver::make_layout. Cold.
 Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description);
 
-class MocopiDecoder final : public Decoder {
+class MocopiDecoder final : public LayoutDecoder<MocopiLayout> {
  public:
   // Takes one datagram per call.
   RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                     Sink& sink) noexcept override;
 
-  // Takes what make_layout made.
-  RT_SAFE void use(const SourceLayout& layout) noexcept override {
-    layout_ = static_cast<const MocopiLayout*>(&layout);
-  }
-
  private:
   [[nodiscard]] Outcome accept_frame(std::span<const std::byte> content, Sink& sink) noexcept;
 
-  const MocopiLayout* layout_ = nullptr;  // null until the app has sent its skeleton
   DatagramOrder order_{32};
   TimestampClock clock_;
 };

@@ -1,9 +1,8 @@
 #include "drivers/mocopi/emulator.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
+#include "drivers/emulate/motion.hpp"
 #include "drivers/mocopi/encode.hpp"
 #include "proto/frame/rotation.hpp"
 
@@ -12,7 +11,6 @@ namespace {
 
 constexpr std::int64_t kSkeletonEvery_ns = 2 * kNanosPerSecond;
 constexpr double kBegan_s = 1.7e9;  // Unix time of the first frame
-constexpr double kWave_hz = 0.9;
 constexpr std::uint16_t kLeftUpArm = 12, kRightUpArm = 16, kRightLowArm = 17;
 
 }  // namespace
@@ -53,7 +51,7 @@ void MocopiEmulator::emit(std::int64_t now_ns, Bytes& out) {
     const double time_s = seconds(frames_.due_ns());
     frames_.step(now_ns);
     if (!posed_) {
-      const double swing = 0.4 * std::sin(2.0 * std::numbers::pi * kWave_hz * time_s);
+      const double swing = emulate::swing_rad(time_s, 0.4);
       const auto turn = [this](std::uint16_t bone, double angle_rad) {
         pose_[bone].transform.rotation_xyzw = from_eigen(axis_rotation(Axis::kZ, angle_rad));
       };

@@ -1,7 +1,6 @@
 #include "drivers/mocopi/encode.hpp"
 
 #include <array>
-#include <bit>
 
 #include "drivers/byte_writer.hpp"
 #include "drivers/mocopi/decoder.hpp"

@@ -6,7 +6,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <string_view>
 
 #include "drivers/active_time.hpp"
 #include "drivers/driver.hpp"
@@ -17,18 +16,13 @@
 
 namespace posed::drivers::mvn {
 
-class MvnDecoder final : public Decoder {
+class MvnDecoder final : public LayoutDecoder<MvnLayout> {
  public:
   // `stream`: the bytes come over TCP, cut anywhere; otherwise each call gets one datagram.
   explicit MvnDecoder(bool stream) noexcept : stream_(stream) {}
 
   RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                     Sink& sink) noexcept override;
-
-  // Takes what make_layout made.
-  RT_SAFE void use(const SourceLayout& layout) noexcept override {
-    layout_ = static_cast<const MvnLayout*>(&layout);
-  }
 
  private:
   [[nodiscard]] Outcome accept(std::span<const std::byte> bytes, Sink& sink) noexcept;
@@ -46,9 +40,8 @@ class MvnDecoder final : public Decoder {
   void describe(Sink& sink) noexcept;
 
   bool stream_;
-  const MvnLayout* layout_ = nullptr;  // null until the first description is in use
-  ActiveTime active_time_;             // MVN may pause: that makes nobody leave
-  std::int64_t now_ns_ = kNoTime_ns;   // arrival of the bytes, in that time
+  ActiveTime active_time_;            // MVN may pause: that makes nobody leave
+  std::int64_t now_ns_ = kNoTime_ns;  // arrival of the bytes, in that time
   std::int64_t arrival_ns_ = kNoTime_ns;
   std::int64_t described_ns_ = kNoTime_ns;
   std::array<Tracked, kMaxCharacters> characters_;

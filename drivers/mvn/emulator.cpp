@@ -1,11 +1,10 @@
 #include "drivers/mvn/emulator.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
-#include <numbers>
 #include <utility>
 
+#include "drivers/emulate/motion.hpp"
 #include "drivers/mvn/encode.hpp"
 #include "drivers/mvn/figure.hpp"
 #include "proto/frame/rotation.hpp"
@@ -17,42 +16,6 @@ Character emulated_walker() { return average_character(0, "Walker", 1.0F, /*fing
 Character emulated_waver() { return average_character(1, "Waver", 0.9F, /*fingers=*/false); }
 
 namespace {
-
-constexpr double kStep_hz = 0.9;  // double steps and waves a second
-constexpr double kPath_m = 1.0;   // radius of the circle that the walker follows
-constexpr double kLap_s = 12.0;
-
-Quatf turned(Axis axis, double angle_rad) { return from_eigen(axis_rotation(axis, angle_rad)); }
-
-// Arms hang down and swing against the legs, the fingers open and close; the path is a circle, so
-// the motion has no end.
-void walk(double time_s, Vec3f& root_m, Rotations& q) {
-  const double lap = 2.0 * std::numbers::pi * time_s / kLap_s;
-  const double swing = 0.5 * std::sin(2.0 * std::numbers::pi * kStep_hz * time_s);
-  root_m = {static_cast<float>(-kPath_m * std::cos(lap)), 0.98F,
-            static_cast<float>(kPath_m * std::sin(lap))};
-  q[0] = turned(Axis::kY, lap);
-  q[4] = turned(Axis::kY, 0.1 * swing);
-  q[12] = from_eigen(axis_rotation(Axis::kX, swing) * axis_rotation(Axis::kZ, -1.3));
-  q[8] = from_eigen(axis_rotation(Axis::kX, -swing) * axis_rotation(Axis::kZ, 1.3));
-  q[19] = turned(Axis::kX, -swing);
-  q[20] = turned(Axis::kX, std::max(0.0, swing));
-  q[15] = turned(Axis::kX, swing);
-  q[16] = turned(Axis::kX, std::max(0.0, -swing));
-  for (std::size_t i = 5; i < kHandSegments; ++i) {
-    if (i % 4 == 0) continue;  // metacarpals
-    q[kLeftFingers + i] = turned(Axis::kZ, -0.5 + swing);
-    q[kRightFingers + i] = turned(Axis::kZ, 0.5 - swing);
-  }
-}
-
-void wave(double time_s, Vec3f& root_m, Rotations& q) {
-  const double swing = 0.4 * std::sin(2.0 * std::numbers::pi * kStep_hz * time_s);
-  root_m = {0.0F, 0.88F, 2.5F};
-  q[12] = turned(Axis::kZ, -1.3);
-  q[8] = turned(Axis::kZ, -0.6);
-  q[9] = turned(Axis::kZ, -0.9 + swing);
-}
 
 std::vector<std::byte> time_text(std::int64_t time_ns) {
   const std::int64_t ms = time_ns / 1'000'000;
@@ -108,10 +71,7 @@ void MvnEmulator::fill_queue(std::int64_t now_ns) {
   queued_ns_ = samples_.due_ns();
   samples_.step(now_ns);
   const double time_s = seconds(queued_ns_);
-  if (!people_[0].posed) walk(time_s, people_[0].root_m, people_[0].rotation_xyzw);
-  if (people_.size() > 1 && !people_[1].posed) {
-    wave(time_s, people_[1].root_m, people_[1].rotation_xyzw);
-  }
+  for (std::size_t body = 0; body < people_.size(); ++body) move(body, time_s);
   const bool notify = reported_ns_ == kNoTime_ns || queued_ns_ - reported_ns_ >= kNanosPerSecond;
   if (notify) reported_ns_ = queued_ns_;
   for (const Person& person : people_) {
@@ -121,6 +81,29 @@ void MvnEmulator::fill_queue(std::int64_t now_ns) {
     }
   }
   ++sample_;
+}
+
+void MvnEmulator::move(std::size_t body, double time_s) {
+  Person& person = people_[body];
+  if (person.posed) return;
+  const auto& segment = joint_table(person.character.fingers).segment;
+  auto& q = person.rotation_xyzw;
+  const auto turn = [&](Bone bone, const Eigen::Quaterniond& rotation) {
+    q[segment[person.skeleton->joint_of(bone)]] = from_eigen(rotation);
+  };
+  if (body == 1) {
+    person.root_m = emulate::wave(time_s, 0.88F, turn);
+    return;
+  }
+  person.root_m = emulate::walk(time_s, 0.98F, turn);
+  const double swing = emulate::swing_rad(time_s, 0.5);
+  q[4] = from_eigen(axis_rotation(Axis::kY, 0.1 * swing));
+  // The fingers open and close.
+  for (std::size_t i = 5; i < kHandSegments; ++i) {
+    if (i % 4 == 0) continue;  // metacarpals
+    q[kLeftFingers + i] = from_eigen(axis_rotation(Axis::kZ, -0.5 + swing));
+    q[kRightFingers + i] = from_eigen(axis_rotation(Axis::kZ, 0.5 - swing));
+  }
 }
 
 void MvnEmulator::add_sample(const Person& person, Type type, std::int64_t time_ns) {

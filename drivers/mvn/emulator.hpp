@@ -45,6 +45,7 @@ class MvnEmulator final : public Emulator {
     bool posed = false;  // by pose()
   };
   void fill_queue(std::int64_t now_ns);
+  void move(std::size_t body, double time_s);
   void add_sample(const Person& person, Type type, std::int64_t time_ns);
 
   Settings settings_;

@@ -1,9 +1,7 @@
 // Builds MVN's datagrams, for the emulator and for outputs. Cold: allocates.
 #pragma once
 
-#include <array>
 #include <cstddef>
-#include <cstdint>
 #include <span>
 #include <string_view>
 #include <vector>

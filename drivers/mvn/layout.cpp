@@ -1,9 +1,7 @@
 #include "drivers/mvn/layout.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <bitset>
-#include <cstring>
 
 #include "drivers/byte_reader.hpp"
 #include "drivers/packer.hpp"

@@ -1,11 +1,11 @@
 // The mvn driver: people in Xsens suits from MVN's Network Streamer, over UDP or TCP.
 #include <algorithm>
-#include <charconv>
 
 #include "drivers/mvn/decoder.hpp"
 #include "drivers/mvn/emulator.hpp"
 #include "drivers/mvn/layout.hpp"
 #include "drivers/source_type.hpp"
+#include "proto/text/number.hpp"
 
 namespace posed::drivers {
 namespace mvn {
@@ -28,12 +28,10 @@ std::string link_prefix(bool stream) {
 Result<std::vector<Type>> types_of(const Options& options) {
   std::vector<Type> types;
   for (const std::string& word : words_option(options, "types")) {
-    int number = 0;
-    const char* const end = word.data() + word.size();
-    const auto [stop, error] = std::from_chars(word.data(), end, number);
+    const int number = exact_number<int>(word).value_or(0);
     const bool known = number == 1 || number == 2 || number == 5 || number == 12 || number == 13 ||
                        (number >= 20 && number <= 25);
-    if (error != std::errc() || stop != end || !known) {
+    if (!known) {
       return misuse("types should be a list of 01, 02, 05, 12, 13 and 20 to 25");
     }
     types.push_back(static_cast<Type>(number));

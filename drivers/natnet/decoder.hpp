@@ -80,18 +80,13 @@ class Requests {
   std::int64_t received_ns_ = kNoTime_ns;
 };
 
-class NatNetDecoder final : public Decoder {
+class NatNetDecoder final : public LayoutDecoder<NatNetLayout> {
  public:
   explicit NatNetDecoder(const Settings& settings);
 
   // Takes one datagram per call, of either socket.
   RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                     Sink& sink) noexcept override;
-
-  // Takes what make_layout made.
-  RT_SAFE void use(const SourceLayout& layout) noexcept override {
-    layout_ = static_cast<const NatNetLayout*>(&layout);
-  }
 
   RT_SAFE [[nodiscard]] Request next_request(std::int64_t now_ns) noexcept override {
     return {.bytes = requests_.next(now_ns), .socket = 0};
@@ -120,8 +115,7 @@ class NatNetDecoder final : public Decoder {
   [[nodiscard]] Outcome emit(std::size_t body, Frame& frame, Sink& sink) noexcept;
 
   const Settings settings_;
-  const NatNetLayout* layout_ = nullptr;  // null until the server has described its bodies
-  Version version_;                       // unknown: not said yet
+  Version version_;  // unknown: not said yet
   Reading reading_;
   bool has_reading_ = false;
   int misfits_ = 0;  // frames since reading_ fitted

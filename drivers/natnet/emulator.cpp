@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <string>
 #include <utility>
 
 #include "drivers/byte_reader.hpp"
 #include "drivers/byte_writer.hpp"
+#include "drivers/emulate/motion.hpp"
 #include "drivers/emulate/pace.hpp"
 #include "drivers/natnet/axes.hpp"
 #include "drivers/natnet/figure.hpp"
@@ -17,9 +17,6 @@ namespace posed::drivers::natnet {
 namespace {
 
 constexpr std::uint64_t kEmulatedClock_hz = 10'000'000;
-constexpr double kEmulatedStep_hz = 0.9;  // double steps a second
-constexpr double kEmulatedPath_m = 1.0;   // radius of the circle
-constexpr double kEmulatedLap_s = 12.0;
 constexpr std::size_t kWandBody = 1;
 constexpr std::size_t kMaxAdded = 4;  // people
 constexpr std::int32_t kFirstAddedId = 100;
@@ -36,8 +33,6 @@ std::unique_ptr<const SourceLayout> layout_of(const ModelDef& model, Version ver
   const auto description = encode_description(model, version, {.version = version});
   return make_layout(description).value();
 }
-
-Quatf about(Axis axis, double angle_rad) { return from_eigen(axis_rotation(axis, angle_rad)); }
 
 }  // namespace
 
@@ -168,31 +163,19 @@ void NatNetEmulator::emit(std::int64_t now_ns, Bytes& out) {
   out.insert(out.end(), datagram.begin(), datagram.end());
 }
 
-// Arms hang down and swing against the legs.
 void NatNetEmulator::move(double time_s) {
-  const double lap = 2.0 * std::numbers::pi * time_s / kEmulatedLap_s;
-  const double swing = 0.5 * std::sin(2.0 * std::numbers::pi * kEmulatedStep_hz * time_s);
   if (Pose& pose = poses_[0]; !pose.posed) {
     const Skeleton& skeleton = *layout_->bodies[0].skeleton;
-    const auto turn = [&](Bone bone, const Quatf& rotation) {
-      pose.rotation_xyzw[skeleton.joint_of(bone)] = rotation;
+    const auto turn = [&](Bone bone, const Eigen::Quaterniond& rotation) {
+      pose.rotation_xyzw[skeleton.joint_of(bone)] = from_eigen(rotation);
     };
-    pose.root_m = {static_cast<float>(-kEmulatedPath_m * std::cos(lap)), 0.95F,
-                   static_cast<float>(kEmulatedPath_m * std::sin(lap))};
-    turn(Bone::kHips, about(Axis::kY, lap));
-    turn(Bone::kLeftUpperArm,
-         from_eigen(axis_rotation(Axis::kX, swing) * axis_rotation(Axis::kZ, -1.3)));
-    turn(Bone::kRightUpperArm,
-         from_eigen(axis_rotation(Axis::kX, -swing) * axis_rotation(Axis::kZ, 1.3)));
-    turn(Bone::kLeftUpperLeg, about(Axis::kX, -swing));
-    turn(Bone::kRightUpperLeg, about(Axis::kX, swing));
-    turn(Bone::kLeftLowerLeg, about(Axis::kX, std::max(0.0, swing)));
-    turn(Bone::kRightLowerLeg, about(Axis::kX, std::max(0.0, -swing)));
-    turn(Bone::kLeftIndexProximal, about(Axis::kZ, -std::abs(swing)));
+    pose.root_m = emulate::walk(time_s, 0.95F, turn);
+    turn(Bone::kLeftIndexProximal,
+         axis_rotation(Axis::kZ, -std::abs(emulate::swing_rad(time_s, 0.5))));
   }
   if (Pose& pose = poses_[kWandBody]; !pose.posed) {
     pose.root_m = {0.5F, 1.2F, -0.5F};
-    pose.rotation_xyzw[0] = about(Axis::kY, -lap);
+    pose.rotation_xyzw[0] = from_eigen(axis_rotation(Axis::kY, -emulate::heading_rad(time_s)));
   }
 }
 

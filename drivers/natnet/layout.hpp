@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "drivers/driver.hpp"
-#include "drivers/natnet/protocol.hpp"
 #include "proto/frame/humanoid.hpp"
 
 namespace posed::drivers::natnet {

@@ -1,6 +1,5 @@
 #include "drivers/natnet/model_def.hpp"
 
-#include <optional>
 #include <utility>
 
 #include "drivers/byte_reader.hpp"

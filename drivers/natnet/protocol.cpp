@@ -3,7 +3,6 @@
 #include <array>
 #include <bit>
 #include <charconv>
-#include <string>
 
 #include "drivers/byte_reader.hpp"
 #include "drivers/byte_writer.hpp"

@@ -1,7 +1,6 @@
 #include "drivers/natnet/skeleton_pose.hpp"
 
 #include <array>
-#include <cmath>
 
 #include "drivers/pose_values.hpp"
 #include "proto/frame/rotation.hpp"

@@ -1,8 +1,6 @@
 // Emulates a P5: its input reports and its answers to feature requests.
 #pragma once
 
-#include <vector>
-
 #include "drivers/emulate/pace.hpp"
 #include "drivers/glove/glove_emulator.hpp"
 #include "drivers/p5/camera_rig.hpp"

@@ -43,16 +43,11 @@ Result<std::shared_ptr<const Skeleton>> skeleton_of(const DescribedBody& body,
 // Driver::make_layout. Cold.
 Result<std::unique_ptr<SourceLayout>> make_layout(std::span<const std::byte> description);
 
-class StudioDecoder final : public Decoder {
+class StudioDecoder final : public LayoutDecoder<StudioLayout> {
  public:
   // Takes one datagram per call.
   RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                     Sink& sink) noexcept override;
-
-  // Takes what make_layout made.
-  RT_SAFE void use(const SourceLayout& layout) noexcept override {
-    layout_ = static_cast<const StudioLayout*>(&layout);
-  }
 
  private:
   static constexpr std::size_t kMaxJson = 256 * 1024;  // bytes that a datagram may unpack to
@@ -63,7 +58,6 @@ class StudioDecoder final : public Decoder {
   [[nodiscard]] Outcome emit(const SeenBody& seen, Sink& sink) noexcept;
   void emit_face(std::size_t body, const Subject& subject, Sink& sink) noexcept;
 
-  const StudioLayout* layout_ = nullptr;  // null until the first description is in use
   ActiveTime active_time_;
   TimestampClock clock_;
   StudioFrame frame_;

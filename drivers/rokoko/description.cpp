@@ -1,7 +1,6 @@
 #include "drivers/rokoko/description.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <string_view>
 
 #include "drivers/byte_reader.hpp"

@@ -1,9 +1,9 @@
 #include "drivers/rokoko/emulator.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
+#include <utility>
 
+#include "drivers/emulate/motion.hpp"
 #include "drivers/rokoko/decoder.hpp"
 #include "drivers/rokoko/encode.hpp"
 #include "proto/clip/text.hpp"
@@ -15,8 +15,6 @@ namespace {
 
 constexpr std::size_t kAnna = 0, kBen = 1, kSword = 2;
 constexpr double kHipHeight_m = 0.96;
-constexpr double kStep_hz = 0.9;  // double steps, waves and words a second
-constexpr double kLap_s = 12.0;   // of the circle that Anna walks
 constexpr std::array<std::string_view, 3> kVersionNumbers{"2", "3", "3"};
 
 DescribedBody emulated_sword() {
@@ -45,10 +43,7 @@ StudioEmulator::StudioEmulator(const StudioEmulatorSettings& settings)
     body.frame.joint_count = static_cast<std::uint16_t>(joints.size());
     body.frame.valid.set();
     for (std::size_t j = 0; j < joints.size(); ++j) {
-      const auto& T = joints[j].T_world_joint;
-      const int parent = joints[j].parent;
-      body.frame.rotation_xyzw[j] =
-          from_eigen(parent < 0 ? T : joints[parent].T_world_joint.conjugate() * T);
+      body.frame.rotation_xyzw[j] = from_eigen(local_from_canonical(*body.skeleton, j));
     }
   }
   pace_.start(0);
@@ -70,47 +65,38 @@ void StudioEmulator::pose(std::size_t body, const Frame& frame) {
 }
 
 // Turns a joint away from T-pose by a rotation in the axes of the canonical humanoid.
-void StudioEmulator::turn(std::size_t body, std::string_view joint,
-                          const Eigen::Quaterniond& canonical) {
+void StudioEmulator::turn(std::size_t body, Bone bone, const Eigen::Quaterniond& canonical) {
   const Skeleton& skeleton = *bodies_[body].skeleton;
-  const int j = skeleton.joint_index(joint);
-  const int parent = skeleton.joints[j].parent;
-  const Eigen::Quaterniond T_parent =
-      parent < 0 ? Eigen::Quaterniond::Identity() : skeleton.joints[parent].T_world_joint;
-  bodies_[body].frame.rotation_xyzw[j] =
-      from_eigen(T_parent.conjugate() * canonical * skeleton.joints[j].T_world_joint);
+  const int j = skeleton.joint_of(bone);
+  bodies_[body].frame.rotation_xyzw[j] = from_eigen(local_from_canonical(skeleton, j, canonical));
 }
 
 void StudioEmulator::move(double time_s) {
-  const double swing = 0.5 * std::sin(2.0 * std::numbers::pi * kStep_hz * time_s);
-  const double lap = 2.0 * std::numbers::pi * time_s / kLap_s;
-  const auto about = [](Axis axis, double angle_rad) { return axis_rotation(axis, angle_rad); };
+  const double swing = emulate::swing_rad(time_s, 0.5);
+  const auto hips_m = static_cast<float>(kHipHeight_m);
+  const auto turner = [this](std::size_t body) {
+    return [this, body](Bone bone, const Eigen::Quaterniond& canonical) {
+      turn(body, bone, canonical);
+    };
+  };
   if (!bodies_[kAnna].posed) {
-    bodies_[kAnna].frame.root_position_m = {static_cast<float>(-std::cos(lap)),
-                                            static_cast<float>(kHipHeight_m),
-                                            static_cast<float>(std::sin(lap))};
-    turn(kAnna, "hip", about(Axis::kY, lap));
-    turn(kAnna, "leftUpperArm", about(Axis::kX, swing) * about(Axis::kZ, -1.3));
-    turn(kAnna, "rightUpperArm", about(Axis::kX, -swing) * about(Axis::kZ, 1.3));
-    turn(kAnna, "leftUpLeg", about(Axis::kX, -swing));
-    turn(kAnna, "leftLeg", about(Axis::kX, std::max(0.0, swing)));
-    turn(kAnna, "rightUpLeg", about(Axis::kX, swing));
-    turn(kAnna, "rightLeg", about(Axis::kX, std::max(0.0, -swing)));
-    for (const char* finger : {"Index", "Middle", "Ring", "Little"}) {
-      turn(kAnna, std::string("left") + finger + "Proximal", about(Axis::kZ, -0.5 - swing));
-      turn(kAnna, std::string("right") + finger + "Proximal", about(Axis::kZ, 0.5 + swing));
+    bodies_[kAnna].frame.root_position_m = emulate::walk(time_s, hips_m, turner(kAnna));
+    for (const auto& [left, right] :
+         {std::pair{Bone::kLeftIndexProximal, Bone::kRightIndexProximal},
+          {Bone::kLeftMiddleProximal, Bone::kRightMiddleProximal},
+          {Bone::kLeftRingProximal, Bone::kRightRingProximal},
+          {Bone::kLeftLittleProximal, Bone::kRightLittleProximal}}) {
+      turn(kAnna, left, axis_rotation(Axis::kZ, -0.5 - swing));
+      turn(kAnna, right, axis_rotation(Axis::kZ, 0.5 + swing));
     }
     jaw_ = 50.0 + 100.0 * swing;
   }
   if (!bodies_[kBen].posed) {
-    bodies_[kBen].frame.root_position_m = {0.0F, static_cast<float>(kHipHeight_m), 2.5F};
-    turn(kBen, "leftUpperArm", about(Axis::kZ, -1.3));
-    turn(kBen, "rightUpperArm", about(Axis::kZ, -0.6));
-    turn(kBen, "rightLowerArm", about(Axis::kZ, -0.9 + swing));
+    bodies_[kBen].frame.root_position_m = emulate::wave(time_s, hips_m, turner(kBen), 0.5);
   }
   if (!bodies_[kSword].posed) {
     bodies_[kSword].frame.root_position_m = {0.8F, static_cast<float>(1.0 + swing), 2.5F};
-    bodies_[kSword].frame.rotation_xyzw[0] = from_eigen(about(Axis::kX, swing));
+    bodies_[kSword].frame.rotation_xyzw[0] = from_eigen(axis_rotation(Axis::kX, swing));
   }
 }
 

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "drivers/emulate/pace.hpp"
 #include "drivers/emulator.hpp"
@@ -48,7 +47,7 @@ class StudioEmulator final : public Emulator {
     bool present = true, posed = false;
   };
   void move(double time_s);
-  void turn(std::size_t body, std::string_view joint, const Eigen::Quaterniond& canonical);
+  void turn(std::size_t body, Bone bone, const Eigen::Quaterniond& canonical);
   [[nodiscard]] std::string frame_json(double time_s) const;
   [[nodiscard]] std::string actor_json(const EmulatedBody& body) const;
   [[nodiscard]] std::string joints_json(const EmulatedBody& body) const;

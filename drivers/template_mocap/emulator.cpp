@@ -1,22 +1,19 @@
 #include "drivers/template_mocap/emulator.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
+#include "drivers/emulate/motion.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::drivers::mocap {
 namespace {
 
 constexpr std::int64_t kDescribeEvery_ns = kNanosPerSecond;
-constexpr double kStep_hz = 0.9;  // double steps and waves a second
-constexpr double kPath_m = 1.0;   // radius of the circle that the walker follows
-constexpr double kLap_s = 12.0;
+constexpr float kHips_m = 0.95F;  // above the floor
 
 // A person of 1.7 m in T-pose.
 std::vector<JointEntry> upper_body() {
-  return {{"hips", -1, {0.0F, 0.95F, 0.0F}},         {"chest", 0, {0.0F, 0.3F, 0.0F}},
+  return {{"hips", -1, {0.0F, kHips_m, 0.0F}},       {"chest", 0, {0.0F, 0.3F, 0.0F}},
           {"head", 1, {0.0F, 0.3F, 0.0F}},           {"leftUpperArm", 1, {0.18F, 0.2F, 0.0F}},
           {"leftLowerArm", 3, {0.28F, 0.0F, 0.0F}},  {"rightUpperArm", 1, {-0.18F, 0.2F, 0.0F}},
           {"rightLowerArm", 5, {-0.28F, 0.0F, 0.0F}}};
@@ -29,33 +26,6 @@ std::vector<JointEntry> whole_body() {
   joints.push_back({"rightUpperLeg", 0, {-0.1F, -0.05F, 0.0F}});
   joints.push_back({"rightLowerLeg", 9, {0.0F, -0.45F, 0.0F}});
   return joints;
-}
-
-Quatf turned(Axis axis, double angle_rad) { return from_eigen(axis_rotation(axis, angle_rad)); }
-
-// Arms hang down and swing against the legs; the path is a circle, so the motion has no end.
-void walk(double time_s, BodyPose& pose) {
-  const double lap = 2.0 * std::numbers::pi * time_s / kLap_s;
-  const double swing = 0.5 * std::sin(2.0 * std::numbers::pi * kStep_hz * time_s);
-  pose.root_m = {static_cast<float>(-kPath_m * std::cos(lap)), 0.95F,
-                 static_cast<float>(kPath_m * std::sin(lap))};
-  auto& q = pose.rotation_xyzw;
-  q[0] = turned(Axis::kY, lap);
-  q[3] = from_eigen(axis_rotation(Axis::kX, swing) * axis_rotation(Axis::kZ, -1.3));
-  q[5] = from_eigen(axis_rotation(Axis::kX, -swing) * axis_rotation(Axis::kZ, 1.3));
-  q[7] = turned(Axis::kX, -swing);
-  q[8] = turned(Axis::kX, std::max(0.0, swing));
-  q[9] = turned(Axis::kX, swing);
-  q[10] = turned(Axis::kX, std::max(0.0, -swing));
-}
-
-void wave(double time_s, BodyPose& pose) {
-  const double swing = 0.4 * std::sin(2.0 * std::numbers::pi * kStep_hz * time_s);
-  pose.root_m = {0.0F, 0.95F, 2.5F};
-  auto& q = pose.rotation_xyzw;
-  q[3] = turned(Axis::kZ, -1.3);
-  q[5] = turned(Axis::kZ, -0.6);
-  q[6] = turned(Axis::kZ, -0.9 + swing);
 }
 
 }  // namespace
@@ -127,8 +97,15 @@ void MocapEmulator::emit(std::int64_t now_ns, Bytes& out) {
 }
 
 void MocapEmulator::move(double time_s) {
-  if (!people_[0].posed) walk(time_s, people_[0].pose);
-  if (!people_[1].posed) wave(time_s, people_[1].pose);
+  for (std::size_t body = 0; body < people_.size(); ++body) {
+    Person& person = people_[body];
+    if (person.posed) continue;
+    const auto turn = [&](Bone bone, const Eigen::Quaterniond& rotation) {
+      person.pose.rotation_xyzw[person.skeleton->joint_of(bone)] = from_eigen(rotation);
+    };
+    person.pose.root_m =
+        body == 0 ? emulate::walk(time_s, kHips_m, turn) : emulate::wave(time_s, kHips_m, turn);
+  }
 }
 
 void MocapEmulator::describe(Bytes& out) const {

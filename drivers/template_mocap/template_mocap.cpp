@@ -49,26 +49,20 @@ bool read_rotation(ByteReader& reader, Quatf& rotation, bool& seen) noexcept {
 
 // Decodes each datagram: a description is passed on, and a frame becomes one Frame for each body
 // that the layout names.
-class MocapDecoder final : public Decoder {
+class MocapDecoder final : public LayoutDecoder<MocapLayout> {
  public:
   // Each call decodes one datagram.
   RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                     Sink& sink) noexcept override;
-
-  // `layout` is one that make_layout made.
-  RT_SAFE void use(const SourceLayout& layout) noexcept override {
-    layout_ = static_cast<const MocapLayout*>(&layout);
-  }
 
  private:
   [[nodiscard]] Outcome read_frame(std::span<const std::byte> content, Sink& sink) noexcept;
   // Reads one body and emits it if it fits the layout.
   [[nodiscard]] Outcome read_body(ByteReader& reader, std::int64_t device_ns, Sink& sink) noexcept;
 
-  const MocapLayout* layout_ = nullptr;  // null until the device has described itself
-  UnrolledCounter clock_{32};            // [us]
-  std::bitset<kMaxBodies> emitted_;      // the bodies of the present frame so far
-  DatagramOrder order_{32};              // the clock sees only frames that are new
+  UnrolledCounter clock_{32};        // [us]
+  std::bitset<kMaxBodies> emitted_;  // the bodies of the present frame so far
+  DatagramOrder order_{32};          // the clock sees only frames that are new
 };
 
 RT_SAFE void MocapDecoder::feed(std::span<const std::byte> bytes, std::int64_t /*arrival_ns*/,

@@ -3,13 +3,13 @@
 #include <netdb.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstdlib>
 #include <cstring>
 #include <map>
 #include <mutex>
 #include <optional>
-#include <system_error>
+
+#include "proto/text/number.hpp"
 
 namespace posed::drivers {
 namespace {
@@ -24,9 +24,7 @@ bool is_v4(const Host& host) noexcept {
 
 // The C library would take "-1" for 65535, and 65536 for 0.
 bool is_port(std::string_view text) noexcept {
-  unsigned port = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
-  return error == std::errc() && end == text.data() + text.size() && port <= 65535;
+  return exact_number<std::uint16_t>(text).has_value();
 }
 
 std::optional<Address> first_address(const std::string& host, const char* port, int flags,

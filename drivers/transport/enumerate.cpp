@@ -16,6 +16,7 @@
 #include <mutex>
 
 #include "drivers/transport/node.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::drivers {
 namespace {
@@ -93,7 +94,7 @@ std::string numbers_of(const DeviceInfo& device) {
 std::string all_of(const std::vector<DeviceInfo>& device) {
   std::string text;
   for (const DeviceInfo& one : device) {
-    text += (text.empty() ? "" : ", ") + one.node + (one.is_usb ? " (" + one.identity() + ")" : "");
+    add_word(text, one.node + (one.is_usb ? " (" + one.identity() + ")" : ""));
   }
   return text;
 }

@@ -5,7 +5,6 @@
 #include <sys/socket.h>
 
 #include <string>
-#include <vector>
 
 #include "drivers/transport/address.hpp"
 #include "proto/frame/result.hpp"

@@ -3,7 +3,6 @@
 // open().
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>

@@ -19,7 +19,7 @@
 
 namespace posed::drivers::vmc {
 
-class VmcDecoder final : public Decoder {
+class VmcDecoder final : public LayoutDecoder<VmcLayout> {
  public:
   VmcDecoder() noexcept { rotation_xyzw_.fill(kIdentity); }
 
@@ -29,7 +29,7 @@ class VmcDecoder final : public Decoder {
 
   // Takes what make_layout made.
   RT_SAFE void use(const SourceLayout& layout) noexcept override {
-    layout_ = static_cast<const VmcLayout*>(&layout);
+    LayoutDecoder::use(layout);
     values_.use(*layout_);
   }
 
@@ -59,7 +59,6 @@ class VmcDecoder final : public Decoder {
     if (outcome != Outcome::kOk) worst_ = outcome;
   }
 
-  const VmcLayout* layout_ = nullptr;  // null until the performer was described
   FrameEnd end_;
   SenderClock clock_;
   bool has_vrm1_names_ = false;

@@ -8,7 +8,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
-#include <utility>
 
 #include "drivers/vmc/protocol.hpp"
 #include "drivers/vmc/values.hpp"

@@ -1,18 +1,14 @@
 #include "drivers/vmc/emulator.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
+#include "drivers/emulate/motion.hpp"
 #include "drivers/vmc/layout.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::drivers::vmc {
 namespace {
 
-constexpr double kVmcStep_hz = 0.9;  // double steps a second
-constexpr double kVmcPath_m = 1.0;   // radius of the circle that it follows
-constexpr double kVmcLap_s = 12.0;
 constexpr float kHipHeight_m = 0.86F;
 
 struct Rest {
@@ -73,8 +69,6 @@ std::shared_ptr<const Skeleton> rest_skeleton() {
   return make_layout(write_description(described, room)).value()->bodies.front().skeleton;
 }
 
-Quatf turned(Axis axis, double angle_rad) { return from_eigen(axis_rotation(axis, angle_rad)); }
-
 }  // namespace
 
 VmcEmulator::VmcEmulator(double rate_hz, Packing packing)
@@ -110,24 +104,15 @@ void VmcEmulator::emit(std::int64_t now_ns, Bytes& out) {
   out.insert(out.end(), datagram.begin(), datagram.end());
 }
 
-// Arms hang down and swing against the legs; the path is a circle, so the motion has no end.
 void VmcEmulator::move(double time_s) {
-  const double lap = 2.0 * std::numbers::pi * time_s / kVmcLap_s;
-  const double swing = 0.5 * std::sin(2.0 * std::numbers::pi * kVmcStep_hz * time_s);
-  hips_m_ = {static_cast<float>(-kVmcPath_m * std::cos(lap)), kHipHeight_m,
-             static_cast<float>(kVmcPath_m * std::sin(lap))};
-  const auto turn = [this](std::string_view bone, const Quatf& rotation) {
-    rotation_xyzw_[find_bone(bone)] = rotation;
+  const auto turn = [this](Bone bone, const Eigen::Quaterniond& rotation) {
+    rotation_xyzw_[skeleton_->joint_of(bone)] = from_eigen(rotation);
   };
-  turn("Hips", turned(Axis::kY, lap));
-  turn("LeftUpperArm", from_eigen(axis_rotation(Axis::kX, swing) * axis_rotation(Axis::kZ, -1.3)));
-  turn("RightUpperArm", from_eigen(axis_rotation(Axis::kX, -swing) * axis_rotation(Axis::kZ, 1.3)));
-  turn("LeftUpperLeg", turned(Axis::kX, -swing));
-  turn("LeftLowerLeg", turned(Axis::kX, std::max(0.0, swing)));
-  turn("RightUpperLeg", turned(Axis::kX, swing));
-  turn("RightLowerLeg", turned(Axis::kX, std::max(0.0, -swing)));
-  turn("LeftEye", turned(Axis::kY, 0.2 * swing));
-  turn("RightEye", turned(Axis::kY, 0.2 * swing));
+  hips_m_ = emulate::walk(time_s, kHipHeight_m, turn);
+  const double look_rad = 0.2 * emulate::swing_rad(time_s, 0.5);
+  for (const char* eye : {"LeftEye", "RightEye"}) {
+    rotation_xyzw_[find_bone(eye)] = from_eigen(axis_rotation(Axis::kY, look_rad));
+  }
 }
 
 void VmcEmulator::write_frame(double time_s) {

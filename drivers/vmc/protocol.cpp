@@ -1,8 +1,5 @@
 #include "drivers/vmc/protocol.hpp"
 
-#include <algorithm>
-#include <bit>
-
 #include "drivers/byte_reader.hpp"
 #include "drivers/packer.hpp"
 #include "drivers/pose_values.hpp"

@@ -22,9 +22,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <string>
 #include <string_view>
-#include <vector>
 
 #include "drivers/vmc/bones.hpp"
 #include "proto/frame/frame.hpp"

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cassert>
-#include <cmath>
 
 #include "models/feet/smoothing.hpp"
 #include "proto/frame/rotation.hpp"

@@ -1,7 +1,6 @@
 #include "models/feet/legs.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "proto/frame/rotation.hpp"
 

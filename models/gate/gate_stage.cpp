@@ -1,7 +1,6 @@
 #include "models/gate/gate_stage.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -14,7 +13,6 @@
 #include "models/parameter_table.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/hand_skeleton.hpp"
-#include "proto/frame/rotation.hpp"
 
 namespace posed::gate {
 namespace {

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <memory>
 #include <string>
-#include <utility>
 
 #include "models/gesture/gesture_model.hpp"
 #include "models/smooth/live_model.hpp"

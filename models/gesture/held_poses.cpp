@@ -1,7 +1,6 @@
 #include "models/gesture/held_poses.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <string>
 

@@ -3,14 +3,13 @@
 #include <sstream>
 
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::gesture {
 namespace {
 
 std::string known_labels(const GestureModel& model) {
-  std::string names;
-  for (const Label& label : model.labels) names += (names.empty() ? "" : " ") + label.name;
-  return names;
+  return joined(model.labels, " ", &Label::name);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include "proto/frame/degree.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
+#include "proto/text/list.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -151,7 +152,7 @@ std::string TrainReport::mixed_warning() const {
   int leaves = 0;
   for (std::size_t g = 0; g < astray_.size(); ++g) {
     leaves += astray_[g];
-    if (astray_[g] > 0) parts += (parts.empty() ? "" : ", ") + vocabulary_.groups[g].name;
+    if (astray_[g] > 0) add_word(parts, vocabulary_.groups[g].name);
   }
   if (leaves == 0) return {};
   return std::to_string(leaves) +

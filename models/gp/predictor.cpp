@@ -4,8 +4,6 @@
 #include <array>
 #include <cassert>
 #include <cmath>
-#include <cstring>
-#include <limits>
 #include <numbers>
 #include <vector>
 

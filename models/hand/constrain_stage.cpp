@@ -1,7 +1,6 @@
 #include "models/hand/constrain_stage.hpp"
 
 #include <memory>
-#include <string>
 #include <utility>
 
 #include "models/hand/constraint_solver.hpp"

@@ -1,7 +1,6 @@
 #include "models/hand/contacts.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "models/hand/segments.hpp"
 

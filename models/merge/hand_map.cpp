@@ -22,12 +22,6 @@ constexpr std::array<double, kFingerJoints> kFingerAtRest_rad{20 * kRadian, 30 *
 
 const Joint& joint_at(const Skeleton& skeleton, int joint) { return skeleton.joints[joint]; }
 
-// T of the joint above; identity above the root.
-Quaterniond T_above(const Skeleton& skeleton, int joint) {
-  const int parent = joint_at(skeleton, joint).parent;
-  return parent < 0 ? Quaterniond::Identity() : joint_at(skeleton, parent).T_world_joint;
-}
-
 bool has_rotations(const Skeleton& skeleton, int joint) {
   return std::ranges::any_of(skeleton.channels, [joint](const Channel& channel) {
     return channel.joint == joint && is_rotation(channel);
@@ -87,7 +81,7 @@ Result<> HandMap::bind_finger(Side side, int finger, const Skeleton& glove) {
   const int above = merged_->joint_of(bone_above(side, finger));
   int j = joint_at(*merged_, turning.joint).parent;
   for (; j >= 0 && j != above; j = joint_at(*merged_, j).parent) {
-    stiff_.emplace_back(j, T_above(*merged_, j).conjugate() * joint_at(*merged_, j).T_world_joint);
+    stiff_.emplace_back(j, local_from_canonical(*merged_, j));
   }
   if (j == above) return {};
   return fail("joint " + in_quotes(joint_at(*merged_, turning.joint).name) + " of skeleton " +

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <string>
-#include <utility>
 
 #include "models/motion/leg_signal.hpp"
 #include "models/motion/low_pass.hpp"

@@ -5,7 +5,6 @@
 #include <bit>
 #include <cmath>
 #include <span>
-#include <utility>
 
 #include "models/motion/cmu43.hpp"
 #include "proto/frame/rotation.hpp"

@@ -3,7 +3,6 @@
 // he stands they have no length. Cold.
 #pragma once
 
-#include <array>
 #include <vector>
 
 #include <Eigen/Core>

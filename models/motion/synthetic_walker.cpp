@@ -5,9 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <span>
 #include <utility>
-#include <vector>
 
 #include "models/motion/synthetic_gait.hpp"
 #include "models/random.hpp"

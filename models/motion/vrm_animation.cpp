@@ -9,7 +9,6 @@
 
 #include "models/motion/canonical_skeleton.hpp"
 #include "models/motion/retarget.hpp"
-#include "proto/clip/draft.hpp"
 #include "proto/clip/gltf.hpp"
 #include "proto/text/clean.hpp"
 

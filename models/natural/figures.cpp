@@ -5,7 +5,6 @@
 #include <limits>
 #include <span>
 #include <string>
-#include <utility>
 
 #include "models/feet/foot_score.hpp"
 #include "proto/frame/degree.hpp"

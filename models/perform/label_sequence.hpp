@@ -4,7 +4,6 @@
 // takes effect from the next state on. Hot: no heap after construction; one thread.
 #pragma once
 
-#include <array>
 #include <vector>
 
 #include "models/trajectory/state_information.hpp"

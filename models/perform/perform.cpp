@@ -12,6 +12,7 @@
 #include "models/trajectory/fixed_lag.hpp"
 #include "models/trajectory/sliding_window.hpp"
 #include "proto/frame/plausible.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::perform {
 namespace {
@@ -146,15 +147,9 @@ Result<std::vector<int>> labels_of(const gesture::GestureModel& model, std::stri
     labels.push_back(model.label_index(word));
     if (labels.back() < 0) unknown.insert(word);
   }
-  const auto listed = [](const auto& items, const auto& name_of) {
-    std::string all;
-    for (const auto& item : items) all += (all.empty() ? "" : " ") + name_of(item);
-    return all;
-  };
   if (!unknown.empty()) {
-    return misuse("unknown label(s) " + listed(unknown, [](const std::string& s) { return s; }) +
-                  "; the model knows " +
-                  listed(model.labels, [](const gesture::Label& l) { return l.name; }));
+    return misuse("unknown label(s) " + joined(unknown, " ") + "; the model knows " +
+                  joined(model.labels, " ", &gesture::Label::name));
   }
   if (labels.empty()) return misuse("name at least one label, as in \"g c p\"");
   return labels;

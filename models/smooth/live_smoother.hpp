@@ -17,7 +17,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <span>
 
 #include "models/smooth/live_model.hpp"
 #include "models/smooth/live_options.hpp"

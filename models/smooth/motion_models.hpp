@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "models/smooth/live_options.hpp"
-#include "proto/frame/rt_safe.hpp"
 
 namespace posed::smooth {
 

@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
-#include <optional>
 #include <utility>
 
 #include "proto/clip/draft.hpp"
 #include "proto/clip/text.hpp"
+#include "proto/text/list.hpp"
 #include "proto/text/load_file.hpp"
 
 namespace posed::clip {
@@ -48,16 +48,6 @@ std::array<GivenOption, 8> given(const ReadOptions& options) {
            {ReadOption::kProfile, "a profile", !options.profile.empty()},
            {ReadOption::kHand, "a hand", options.hand.has_value()},
            {ReadOption::kHandShape, "a hand shape", options.hand_shape != kDefaultHandShape}}};
-}
-
-// "a, b or c".
-std::string enumerated(const std::vector<std::string>& words) {
-  std::string text;
-  for (std::size_t i = 0; i < words.size(); ++i) {
-    if (i > 0) text += i + 1 == words.size() ? " or " : ", ";
-    text += words[i];
-  }
-  return text;
 }
 
 // The first bytes of a regular file; empty if it cannot be read, which load_file() then reports.
@@ -130,7 +120,7 @@ std::string listed(Use use) {
       words.push_back((format.is_hand ? "a hand's " : "") + std::string(extension));
     }
   }
-  return enumerated(words);
+  return alternatives(words);
 }
 
 std::vector<std::string_view> extensions(Use use) {
@@ -168,8 +158,8 @@ Result<> check_options(const Format& format, const ReadOptions& options, const s
       if (has(other, option.option)) others.emplace_back(other.name);
     }
     return misuse("is " + std::string(format.article) + " " + std::string(format.name) +
-                      ", and only " + enumerated(others) + " accepts " + std::string(option.words) +
-                      "; leave it out",
+                      ", and only " + alternatives(others) + " accepts " +
+                      std::string(option.words) + "; leave it out",
                   file);
   }
   return {};

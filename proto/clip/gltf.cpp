@@ -12,7 +12,6 @@
 
 #include <tiny_gltf.h>
 
-#include "proto/clip/draft.hpp"
 #include "proto/clip/formats.hpp"
 #include "proto/clip/gltf_numbers.hpp"
 #include "proto/clip/mannequin.hpp"

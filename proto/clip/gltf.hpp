@@ -2,7 +2,6 @@
 // own axes and unit: right-handed, Y up, a figure that faces +Z, metres. Cold.
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
 #include <optional>
 #include <string>

@@ -40,13 +40,9 @@ Result<Side> side_of(const Clip& clip, const ReadOptions& options) {
 // The rotation of a joint of our hand when it has the same canonical pose as the clip's joint.
 Eigen::Quaterniond ours(const Skeleton& theirs, int joint, const Skeleton& hand, int hand_joint,
                         const Eigen::Quaterniond& local) {
-  const auto T_parent = [](const Skeleton& skeleton, int of) {
-    const int parent = skeleton.joints[of].parent;
-    return parent < 0 ? Eigen::Quaterniond::Identity() : skeleton.joints[parent].T_world_joint;
-  };
   const Eigen::Quaterniond canonical =
-      T_parent(theirs, joint) * local * theirs.joints[joint].T_world_joint.conjugate();
-  return T_parent(hand, hand_joint).conjugate() * canonical * hand.joints[hand_joint].T_world_joint;
+      T_above(theirs, joint) * local * theirs.joints[joint].T_world_joint.conjugate();
+  return local_from_canonical(hand, hand_joint, canonical);
 }
 
 }  // namespace

@@ -1,7 +1,6 @@
 #include "proto/clip/timecode_cut.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <string>

@@ -1,7 +1,6 @@
 #include "proto/fbx/glb_of_fbx.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstring>
 #include <exception>

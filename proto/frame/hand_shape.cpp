@@ -10,6 +10,7 @@
 #include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 #include "proto/text/toml.hpp"
 #include "proto/text/toml_table.hpp"
 
@@ -101,7 +102,7 @@ Result<const HandShape*> find_hand_shape(const std::string& name) {
   std::string known;
   for (const HandShape& shape : hand_shapes()) {
     if (shape.name == name) return &shape;
-    known += (known.empty() ? "" : ", ") + shape.name;
+    add_word(known, shape.name);
   }
   return misuse("there is no hand " + in_quotes(name) + "; there are " + known);
 }

@@ -1,6 +1,5 @@
 #include "proto/frame/hand_skeleton.hpp"
 
-#include <algorithm>
 #include <numbers>
 
 namespace posed {

@@ -9,6 +9,7 @@
 #include "proto/frame/config_texts.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 #include "proto/text/load_file.hpp"
 #include "proto/text/toml.hpp"
 #include "proto/text/toml_table.hpp"
@@ -141,7 +142,7 @@ Result<std::shared_ptr<const Profile>> find_profile(const Skeleton& skeleton,
     const bool is_it = name.empty() ? matches(profile, skeleton) : profile.name == name;
     // Built-in profiles are never freed.
     if (is_it) return std::shared_ptr<const Profile>(std::shared_ptr<void>(), &profile);
-    known += (known.empty() ? "" : ", ") + profile.name;
+    add_word(known, profile.name);
   }
   if (name.empty()) return nullptr;
   return misuse("there is no skeleton profile " + in_quotes(name) + "; there are " + known);
@@ -157,7 +158,7 @@ Result<std::vector<std::optional<Bone>>> named_bones(const Profile& profile,
     const int index = skeleton.joint_index(joint);
     if (index >= 0) bones[index] = bone;
     if (index >= 0 || may_lack(profile, bone)) continue;
-    if (++count <= kListed) missing += (missing.empty() ? "" : ", ") + joint;
+    if (++count <= kListed) add_word(missing, joint);
   }
   if (count > kListed) missing += " and " + std::to_string(count - kListed) + " more";
   if (count > 0) {

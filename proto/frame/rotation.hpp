@@ -3,7 +3,6 @@
 // functions, RT-safe, in float or double according to their argument.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <numbers>

@@ -75,6 +75,27 @@ struct Skeleton {
   Result<> finish();
 };
 
+// T of the joint above; identity above the root.
+RT_SAFE [[nodiscard]] inline Eigen::Quaterniond T_above(const Skeleton& skeleton,
+                                                        std::size_t joint) noexcept {
+  const int parent = skeleton.joints[joint].parent;
+  if (parent < 0) return Eigen::Quaterniond::Identity();
+  return skeleton.joints[static_cast<std::size_t>(parent)].T_world_joint;
+}
+
+// The joint's rotation relative to its parent when its canonical local rotation is this one:
+// L = T_above^-1 Lc T_joint; in T-pose without one.
+RT_SAFE [[nodiscard]] inline Eigen::Quaterniond local_from_canonical(
+    const Skeleton& skeleton, std::size_t joint,
+    const Eigen::Quaterniond& canonical = Eigen::Quaterniond::Identity()) noexcept {
+  return T_above(skeleton, joint).conjugate() * canonical * skeleton.joints[joint].T_world_joint;
+}
+
+// Whether it is a rigid body, such as a sword that a performer holds.
+[[nodiscard]] inline bool is_prop(const Skeleton& skeleton) noexcept {
+  return skeleton.joints.size() == 1 && !skeleton.joints.front().bone;
+}
+
 // A part of Skeleton::channels, so the joint's values have the same place among those of a frame.
 RT_SAFE [[nodiscard]] inline std::span<const Channel> channels_of(const Skeleton& skeleton,
                                                                   int joint) noexcept {

@@ -2,8 +2,6 @@
 
 #include <cstdint>
 #include <cstring>
-#include <fstream>
-#include <system_error>
 
 #include <google/protobuf/descriptor.h>
 #include <zlib.h>

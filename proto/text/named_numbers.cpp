@@ -1,10 +1,9 @@
 #include "proto/text/named_numbers.hpp"
 
 #include <algorithm>
-#include <charconv>
-#include <cmath>
 
 #include "proto/text/clean.hpp"
+#include "proto/text/number.hpp"
 
 namespace posed {
 namespace {
@@ -19,10 +18,8 @@ std::string_view trimmed(std::string_view text) {
 
 Result<double> number_in(std::string_view text, std::string_view entry, std::string_view what,
                          double low, double high) {
-  double number = 0.0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  const bool whole = error == std::errc() && end == text.data() + text.size();
-  if (whole && number >= low && number <= high) return number;  // false for NaN
+  const auto number = exact_number<double>(text);
+  if (number && *number >= low && *number <= high) return *number;  // false for NaN
   const auto whole_text = [](double limit) { return std::to_string(static_cast<int>(limit)); };
   return misuse(std::string(what) + ": " + in_quotes(std::string(entry)) + " needs a number from " +
                 whole_text(low) + " to " + whole_text(high) + " after the '='");

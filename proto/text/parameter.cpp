@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed {
 namespace {
@@ -38,20 +39,11 @@ bool within(const ParameterSpec& spec, double value) {
   return value >= spec.min && value <= spec.max;  // false for NaN
 }
 
-// "off, stride or actor"
-std::string words_of(const ParameterSpec& spec) {
-  std::string text;
-  for (std::size_t i = 0; i < spec.words.size(); ++i) {
-    const bool last = i + 1 == spec.words.size();
-    text += (i == 0 ? "" : last ? " or " : ", ") + std::string(spec.words[i]);
-  }
-  return text;
-}
-
 Result<ParameterValue> one_of_words(const ParameterSpec& spec, const std::string& word,
                                     std::string_view place) {
   if (std::ranges::find(spec.words, std::string_view(word)) != spec.words.end()) return word;
-  return misuse(std::string(place) + " must be " + words_of(spec) + ", not " + in_quotes(word));
+  return misuse(std::string(place) + " must be " + alternatives(spec.words) + ", not " +
+                in_quotes(word));
 }
 
 }  // namespace

@@ -4,8 +4,6 @@
 #include <array>
 #include <cerrno>
 #include <csignal>
-#include <cstring>
-#include <string>
 #include <utility>
 
 #include <malloc.h>

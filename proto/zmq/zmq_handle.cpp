@@ -2,19 +2,17 @@
 
 #include <array>
 #include <cerrno>
-#include <charconv>
 #include <cstdint>
 #include <future>
 #include <string>
-#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "proto/text/number.hpp"
+
 namespace posed::net {
 namespace {
-
-constexpr std::uint32_t kMaxPort = 65535;
 
 std::string last_error() { return zmq_strerror(zmq_errno()); }
 
@@ -68,9 +66,7 @@ bool has_possible_port(std::string_view endpoint) noexcept {
   if (!endpoint.starts_with("tcp://")) return true;
   const std::string_view text = endpoint.substr(endpoint.rfind(':') + 1);
   if (text == "*" || text == "!") return true;
-  std::uint32_t port = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), port);
-  return error == std::errc() && end == text.data() + text.size() && port <= kMaxPort;
+  return exact_number<std::uint16_t>(text).has_value();
 }
 
 namespace {

@@ -2,10 +2,8 @@
 // there is no exception to catch, and EINTR reaches the caller; that is how Ctrl-C ends a client.
 #pragma once
 
-#include <chrono>
 #include <cstddef>
 #include <memory>
-#include <optional>
 #include <span>
 #include <string>
 #include <string_view>

@@ -13,8 +13,8 @@
 #include "models/style/live/style_filter.hpp"
 #include "proto/clip/clip.hpp"
 #include "tests/bench/bench.hpp"
-#include "tests/bench/cpu_time.hpp"
 #include "tests/bench/percentiles.hpp"
+#include "tests/support/processor_time.hpp"
 
 namespace posed::bench {
 namespace {
@@ -86,7 +86,7 @@ nlohmann::json measure(int points) {
     for (int round = 0; round < kRounds; ++round) {
       for (int t = 0; t < walk.frames(); ++t) {
         const Frame in = walk.frame(t);
-        us.push_back(timed_us([&] { style.process({.frame = in, .input = &in}, out); }));
+        us.push_back(test::timed_us([&] { style.process({.frame = in, .input = &in}, out); }));
       }
     }
     report[root] = percentiles(us);

@@ -12,8 +12,8 @@
 #include "drivers/rokoko/decoder.hpp"
 #include "drivers/rokoko/emulator.hpp"
 #include "tests/bench/bench.hpp"
-#include "tests/bench/cpu_time.hpp"
 #include "tests/bench/percentiles.hpp"
+#include "tests/support/processor_time.hpp"
 
 namespace posed::bench {
 namespace {
@@ -74,11 +74,11 @@ json measure(int rounds) {
   for (int round = 0; round < rounds; ++round) {
     for (std::size_t i = 0; i < kFrames; ++i) {
       const std::string_view text(reinterpret_cast<const char*>(plain[i].data()), plain[i].size());
-      ways[0].us.push_back(timed_us([&] { ways[0].decoder->feed(plain[i], 0, sink); }));
-      ways[1].us.push_back(timed_us([&] { ways[1].decoder->feed(packed[i], 0, sink); }));
+      ways[0].us.push_back(test::timed_us([&] { ways[0].decoder->feed(plain[i], 0, sink); }));
+      ways[1].us.push_back(test::timed_us([&] { ways[1].decoder->feed(packed[i], 0, sink); }));
       ways[2].us.push_back(
-          timed_us([&] { (void)drivers::rokoko::read_studio_frame(text, *read); }));
-      ways[3].us.push_back(timed_us([&] { parsed += json::parse(text).size(); }));
+          test::timed_us([&] { (void)drivers::rokoko::read_studio_frame(text, *read); }));
+      ways[3].us.push_back(test::timed_us([&] { parsed += json::parse(text).size(); }));
     }
   }
   json report{{"json_bytes", plain[kFrames / 2].size()},

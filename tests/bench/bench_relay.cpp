@@ -1,6 +1,5 @@
 // `posed_bench relay`: what many subscribers behind a relay cost the daemon, against one that
 // connects to it directly.
-#include <cstdio>
 #include <memory>
 #include <string>
 #include <thread>
@@ -221,9 +220,7 @@ void add_bench_relay(CLI::App& bench, int& exit_code) {
       ->capture_default_str();
   command->add_flag("--json", options->json, "JSON on stdout");
   command->footer(kBenchRelayFooter);
-  command->callback([options, &exit_code] {
-    if (auto done = bench_relay(*options); !done) exit_code = tools::report(done.error());
-  });
+  command->callback([options, &exit_code] { exit_code = tools::report(bench_relay(*options)); });
 }
 
 }  // namespace posed::bench

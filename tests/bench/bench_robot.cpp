@@ -108,10 +108,7 @@ void add_bench_robot(CLI::App& bench_app, int& exit_code) {
   command->add_option("--speed", options->speed, "Of each joint, rad/s, as in [stream.robot]")
       ->check(CLI::Range(0.0, 100.0));
   command->add_option("--out", options->out, "A folder for the poses of each, a column a joint");
-  command->callback([options, &exit_code] {
-    const auto done = bench(*options);
-    exit_code = done ? 0 : tools::report(done.error());
-  });
+  command->callback([options, &exit_code] { exit_code = tools::report(bench(*options)); });
 }
 
 }  // namespace posed::bench

@@ -330,9 +330,7 @@ void add_bench_smooth(CLI::App& bench, int& exit_code) {
   command->add_option("--seed", options->seed, "Of the noise")->capture_default_str();
   command->add_flag("--cost", options->cost, "Only the cost of a frame");
   command->add_flag("--json", options->json, "One JSON object on stdout");
-  command->callback([options, &exit_code] {
-    if (auto done = bench_smooth(*options); !done) exit_code = tools::report(done.error());
-  });
+  command->callback([options, &exit_code] { exit_code = tools::report(bench_smooth(*options)); });
 }
 
 }  // namespace posed::bench

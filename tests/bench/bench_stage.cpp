@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <atomic>
-#include <cstdio>
 #include <memory>
 #include <string>
 #include <thread>
@@ -297,9 +296,7 @@ void add_bench_stage(CLI::App& bench, int& exit_code) {
   command->add_flag("--realtime", options->realtime, "Ask for real-time rights, as `run` does");
   command->add_flag("--json", options->json, "JSON on stdout");
   command->footer(kBenchStageFooter);
-  command->callback([options, &exit_code] {
-    if (auto done = bench_stage(*options); !done) exit_code = tools::report(done.error());
-  });
+  command->callback([options, &exit_code] { exit_code = tools::report(bench_stage(*options)); });
 }
 
 }  // namespace posed::bench

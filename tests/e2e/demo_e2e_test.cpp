@@ -1,7 +1,6 @@
 // The demo in any folder: its files are in one folder, are created once, and are created again when
 // they differ from what this version creates.
 #include <csignal>
-#include <filesystem>
 #include <fstream>
 #include <string>
 

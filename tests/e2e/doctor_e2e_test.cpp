@@ -1,7 +1,6 @@
 // `posed doctor` on this machine, whatever it is like.
 #include <catch2/catch.hpp>
 
-#include <algorithm>
 #include <string>
 
 #include <nlohmann/json.hpp>

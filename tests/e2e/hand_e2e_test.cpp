@@ -1,7 +1,6 @@
 // Hands with the real binary: labels performed on a live hand and on a stream without a device, the
 // published frames, refusals, and a log that replays bit for bit.
 #include <algorithm>
-#include <set>
 #include <sstream>
 
 #include "models/gesture/model_file.hpp"

@@ -6,9 +6,7 @@
 #include <chrono>
 #include <csignal>
 #include <filesystem>
-#include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "tests/e2e/outcome.hpp"

@@ -1,7 +1,6 @@
 // Files that released versions wrote. Each folder of tests/golden/versions is a version's: a style
 // model, a gesture model, a log of a walker and a hand that use them, with frames, and the schema
 // of the wire. They are never written again; a release adds its own.
-#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <string>

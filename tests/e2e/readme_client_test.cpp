@@ -1,6 +1,5 @@
 // Runs the client from the top README, unchanged, with a running daemon.
 #include <cstdio>
-#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <memory>

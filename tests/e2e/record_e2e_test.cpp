@@ -1,7 +1,6 @@
 // Recorder and replay with the real binary: stopped, overloaded and killed.
 #include <catch2/catch.hpp>
 
-#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <set>

@@ -9,7 +9,6 @@
 #include "models/style/model/style_model.hpp"
 #include "proto/clip/clip.hpp"
 #include "tests/e2e/stage.hpp"
-#include "tests/support/has.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
 namespace posed::test {

@@ -20,7 +20,6 @@
 
 #include "daemon/tools/emulate/emulated_device.hpp"
 #include "drivers/driver.hpp"
-#include "drivers/options.hpp"
 #include "tests/e2e/served.hpp"
 #include "tests/support/emulated_glove.hpp"
 #include "tests/support/free_port.hpp"

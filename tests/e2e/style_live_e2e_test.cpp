@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <map>
 #include <string>
-#include <thread>
 
 #include <nlohmann/json.hpp>
 

@@ -2,7 +2,6 @@
 // that solves the same model file.
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <memory>
 #include <sstream>
 

@@ -2,7 +2,6 @@
 // in them. The first byte selects what the rest is, the second how it is cut.
 #include <algorithm>
 #include <cstdint>
-#include <string>
 #include <vector>
 
 #include "drivers/axis/protocol.hpp"

@@ -6,10 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
-#include <utility>
 #include <vector>
 
-#include "proto/clip/draft.hpp"
 #include "proto/clip/format.hpp"
 #include "proto/clip/frame_parser.hpp"
 #include "proto/clip/hand_clip.hpp"

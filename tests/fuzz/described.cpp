@@ -2,7 +2,6 @@
 // and any text as a device description. The first byte selects what is tested, the second one how
 // the rest is cut into chunks.
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <string>

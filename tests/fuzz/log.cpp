@@ -20,7 +20,6 @@
 #include "models/gesture/model_file.hpp"
 #include "models/style/model/style_model.hpp"
 #include "posed/v1/log.pb.h"
-#include "proto/log/digest.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/log/schema.hpp"
 #include "proto/log/writer.hpp"

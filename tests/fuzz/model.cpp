@@ -2,7 +2,6 @@
 // each input is also tested as the payload of a valid header. An accepted model styles a walk.
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <span>
 #include <string>
 

@@ -3,7 +3,6 @@
 // terminal escapes. Run with a small stack (ulimit -s 256) to check that no deep nesting gets
 // through.
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <string>
 

@@ -1,7 +1,6 @@
 // The lab's gloves and their configuration in posed, and the Speaker that makes them send.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <mutex>

@@ -1,6 +1,4 @@
 // The commands that posed gives robot hands, judged by MuJoCo with the hands' own shapes.
-#include <array>
-#include <set>
 
 #include <catch2/catch.hpp>
 

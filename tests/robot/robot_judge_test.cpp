@@ -1,7 +1,6 @@
 // The judge itself: it must see what is wrong, or its silence would mean nothing.
 #include "tests/robot/judge/robot_judge.hpp"
 
-#include <algorithm>
 #include <fstream>
 #include <string>
 

@@ -2,7 +2,6 @@
 // contract checked on both.
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <thread>
 #include <vector>

@@ -5,7 +5,6 @@
 #include <cstdint>
 #include <functional>
 #include <iomanip>
-#include <limits>
 #include <sstream>
 #include <string>
 

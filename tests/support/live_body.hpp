@@ -2,7 +2,6 @@
 // them; shared by tests on synthetic bodies and on recordings.
 #pragma once
 
-#include <memory>
 #include <string>
 #include <vector>
 

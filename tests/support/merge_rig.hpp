@@ -2,7 +2,6 @@
 // and the order of their frames as the test says.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <memory>

@@ -17,6 +17,13 @@ inline double processor_time_us() {
   return 1e6 * static_cast<double>(time.tv_sec) + 1e-3 * static_cast<double>(time.tv_nsec);
 }
 
+template <typename Work>
+double timed_us(const Work& work) {
+  const double start_us = processor_time_us();
+  work();
+  return processor_time_us() - start_us;
+}
+
 // "1000 frames: mean 1.0, p50 1.0, p99 2.0, p99.9 3.0, max 4 us"; at least one time.
 inline std::string time_figures(std::vector<double> us) {
   std::ranges::sort(us);

@@ -1,7 +1,6 @@
 // Passes a motion through the live smoother frame by frame, as a device would send it.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "models/smooth/live_smoother.hpp"

@@ -3,9 +3,6 @@
 
 #include <cstdint>
 #include <memory>
-#include <string>
-#include <string_view>
-#include <utility>
 
 #include "daemon/pipeline/stream_settings.hpp"
 #include "models/generate/bound_model.hpp"

@@ -1,6 +1,5 @@
 #include "daemon/output/ros2/dds.hpp"
 
-#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <expected>

@@ -1,6 +1,5 @@
 #include "daemon/output/ros2/ros2_output.hpp"
 
-#include <string>
 #include <utility>
 
 #include <spdlog/spdlog.h>

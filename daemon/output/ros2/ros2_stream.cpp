@@ -4,7 +4,6 @@
 #include <array>
 #include <cstddef>
 #include <ctime>
-#include <span>
 #include <utility>
 
 #include "models/motion/ros_frames.hpp"

@@ -5,7 +5,6 @@
 // ROS's axes: x forward, y left, z up; metres, radians.
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>

@@ -484,9 +484,7 @@ void add_bench(CLI::App& app, int& exit_code) {
   add_report_file(*command, options->report);
   command->add_flag("--json", options->json, "JSON on stdout");
   command->footer(kBenchPipelineFooter);
-  command->callback([options, &exit_code] {
-    if (auto done = bench_pipeline(*options); !done) exit_code = report(done.error());
-  });
+  command->callback([options, &exit_code] { exit_code = report(bench_pipeline(*options)); });
 }
 
 }  // namespace posed::tools

@@ -8,11 +8,9 @@
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 
-#include "daemon/net/refusal_words.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/tools/command/options.hpp"
 #include "proto/frame/time.hpp"
-#include "proto/zmq/keys.hpp"
 
 namespace posed::tools {
 namespace {

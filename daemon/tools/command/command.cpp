@@ -9,4 +9,8 @@ int report(const Error& error) {
   return static_cast<int>(error.exit_code);
 }
 
+int report(const Result<>& work) {
+  return work ? static_cast<int>(ExitCode::kDone) : report(work.error());
+}
+
 }  // namespace posed::tools

@@ -17,6 +17,8 @@ class Ranks;
 
 // Prints "posed: <sentence>" on stderr and returns the error's exit code.
 [[nodiscard]] int report(const Error& error);
+// The exit code of work: 0 when it is done, and as above when it failed.
+[[nodiscard]] int report(const Result<>& work);
 
 // Each adds one command.
 void add_demo(CLI::App& app, int& exit_code);

@@ -1,7 +1,6 @@
 // What options of several commands share: checks of numbers, the word of --hand, and degrees. Cold.
 #pragma once
 
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <string>
@@ -13,6 +12,7 @@
 #include "proto/clip/figure.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/hand.hpp"
+#include "proto/text/number.hpp"
 
 // Checks of options that take a number. CLI11's own ones compare only, so `nan` passes them and a
 // command computes with it.
@@ -24,10 +24,7 @@ namespace detail {
 // The number that all of the text is, or NaN.
 inline double number_of(std::string_view text) {
   if (text.starts_with('+')) text.remove_prefix(1);
-  double value = 0.0;
-  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool whole = error == std::errc() && stop == text.data() + text.size();
-  return whole ? value : std::nan("");
+  return exact_number<double>(text).value_or(std::nan(""));
 }
 
 // `takes` says which numbers, `help` is what --help shows.
@@ -63,10 +60,7 @@ inline CLI::Validator zero_or_more() {
 // A seed: digits alone, because the library would take -1 for 2^64 - 1.
 inline CLI::Validator whole_number() {
   return {[](const std::string& text) {
-            std::uint64_t value = 0;
-            const char* const end = text.data() + text.size();
-            const auto [stop, error] = std::from_chars(text.data(), end, value);
-            return error == std::errc() && stop == end
+            return exact_number<std::uint64_t>(text)
                        ? std::string()
                        : fmt::format("'{}' should be a whole number of 0 or more", text);
           },

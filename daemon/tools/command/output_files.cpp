@@ -9,6 +9,7 @@
 
 #include "proto/clip/format.hpp"
 #include "proto/frame/whole_file.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::tools {
 namespace {
@@ -24,15 +25,6 @@ bool is_of_known_format(const fs::path& path) {
   const std::string extension = clip::extension_of(path);
   return clip::format_of(path) != nullptr ||
          std::ranges::find(kOtherFormats, extension) != kOtherFormats.end();
-}
-
-std::string listed(const std::vector<std::string_view>& extensions) {
-  std::string text;
-  for (std::size_t i = 0; i < extensions.size(); ++i) {
-    if (i > 0) text += i + 1 == extensions.size() ? " or " : ", ";
-    text += extensions[i];
-  }
-  return text;
 }
 
 // Whether both names are the same file, whether or not it exists already.
@@ -123,7 +115,7 @@ Result<> OutputFiles::check(const Output& output) const {
           "Unreal import",
           output.path.string());
     }
-    return misuse("does not end in " + listed(output.extensions) + "; choose such a name",
+    return misuse("does not end in " + alternatives(output.extensions) + "; choose such a name",
                   output.path.string());
   }
   for (const fs::path& input : inputs_) {

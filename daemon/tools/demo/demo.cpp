@@ -409,9 +409,7 @@ void add_demo(CLI::App& app, int& exit_code) {
   posed demo --prepare build/demo # what ./run build does
 Clips and models are kept in $XDG_CACHE_HOME/posed/demo (~/.cache/posed/demo), with a demo.toml that
 `posed run --config` streams, too; another build of posed makes them again.)");
-  command->callback([options, &exit_code] {
-    if (auto done = demo(*options); !done) exit_code = report(done.error());
-  });
+  command->callback([options, &exit_code] { exit_code = report(demo(*options)); });
 }
 
 }  // namespace posed::tools

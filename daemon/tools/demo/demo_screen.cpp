@@ -7,11 +7,11 @@
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
-#include <cerrno>  // program_invocation_name
 
 #include "daemon/assembly/daemon.hpp"
 #include "proto/message/bounded_parse.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::tools {
 namespace {
@@ -20,12 +20,6 @@ constexpr std::array kLabels{"g", "1", "c", "3", "4", "p"};
 // a performance takes about 12 s; the rest shows the live hand
 constexpr double kAgainAfter_s = 25.0;
 constexpr double kStyled_s = 12.0, kPlain_s = 6.0;
-
-std::string joined(const auto& labels) {
-  std::string text;
-  for (const auto& label : labels) text += (text.empty() ? "" : " ") + std::string(label);
-  return text;
-}
 
 bool is_performed(const v1::Frame& frame) {
   return frame.source() == v1::SOURCE_LABELS && !frame.label().empty();
@@ -114,7 +108,7 @@ std::string DemoHand::note() const {
   if (frames_ == 0) return "hand: waiting";
   if (last_.source() == v1::SOURCE_LABELS) {
     return fmt::format("hand: performs {} (1, 3 and 4 are not in its training data): {}",
-                       joined(kLabels), clean_name(last_.label()));
+                       joined(kLabels, " "), clean_name(last_.label()));
   }
   const std::string label = last_.label().empty()
                                 ? "no gesture that it knows"
@@ -127,7 +121,7 @@ std::string DemoHand::note() const {
 std::string DemoHand::summary() const {
   if (frames_ == 0) return {};
   return fmt::format("received {} hand frames, {} of them performed from labels: {}", frames_,
-                     performed_frames_, performed_.empty() ? "none" : joined(performed_));
+                     performed_frames_, performed_.empty() ? "none" : joined(performed_, " "));
 }
 
 namespace {

@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
@@ -13,7 +12,6 @@
 #include <vector>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
 #include "daemon/devices/pose_calibration.hpp"
@@ -32,6 +30,8 @@
 #include "drivers/glove/traits.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
+#include "proto/text/number.hpp"
 
 namespace posed::tools {
 namespace {
@@ -312,7 +312,7 @@ Result<const drivers::Driver*> named_driver(const std::string& name) {
   if (driver != nullptr && driver->glove != nullptr) return driver;
   std::string known;
   for (const drivers::Driver& other : drivers::registry()) {
-    if (other.glove != nullptr) known += (known.empty() ? "" : ", ") + std::string(other.name);
+    if (other.glove != nullptr) add_word(known, other.name);
   }
   return misuse("--driver names the glove's driver, one of " + known);
 }
@@ -335,15 +335,12 @@ Result<PosePlan> plan_of(const CalibrateOptions& options) {
   for (const std::string& word : options.poses) {
     const auto equals = word.find('=');
     const auto name = std::ranges::find(kPoseNames, std::string_view(word).substr(0, equals));
-    double seconds = -1.0;
-    if (equals != std::string::npos) {
-      const char* const end = word.data() + word.size();
-      const auto [stop, error] = std::from_chars(word.data() + equals + 1, end, seconds);
-      if (error != std::errc() || stop != end) seconds = -1.0;
-    }
+    const std::string_view number =
+        equals == std::string::npos ? "" : std::string_view(word).substr(equals + 1);
+    const double seconds = exact_number<double>(number).value_or(-1.0);
     if (name == kPoseNames.end() || !(seconds >= 0.0 && seconds <= kMaxSeconds)) {
       return misuse("'" + word + "': --pose is POSE=SECONDS, 0 to 60; the poses are " +
-                    fmt::format("{}", fmt::join(kPoseNames, ", ")));
+                    joined(kPoseNames));
     }
     plan.seconds[name - kPoseNames.begin()] = seconds;
   }
@@ -553,7 +550,7 @@ simulation only, not on a real glove. Examples:
   command->callback([options, connect, ready, &exit_code] {
     options->live = connect->count() > 0;
     options->ready_given = ready->count() > 0;
-    if (auto done = calibrate(*options); !done) exit_code = report(done.error());
+    exit_code = report(calibrate(*options));
   });
 }
 

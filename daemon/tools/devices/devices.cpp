@@ -15,6 +15,7 @@
 #include "drivers/known_usb.hpp"
 #include "drivers/transport/enumerate.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::tools {
 namespace {
@@ -69,7 +70,7 @@ Findings describe(const DeviceInfo& one, const std::vector<DeviceInfo>& all) {
   for (const drivers::KnownUsb& known : drivers::known_usb()) {
     if (!known.fits(one)) continue;
     fitting.push_back(Findings().add("name", known.driver).add("certain", !known.adapter));
-    names += (names.empty() ? "" : ", ") + std::string(known.driver) + (known.adapter ? "?" : "");
+    add_word(names, std::string(known.driver) + (known.adapter ? "?" : ""));
     hand = known.hand(one);
   }
   const auto or_null = [](const std::string& text) {

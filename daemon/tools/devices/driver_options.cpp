@@ -6,6 +6,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "drivers/options.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::tools {
 namespace {
@@ -40,11 +41,7 @@ Result<drivers::Options> parse_driver_options(const drivers::Driver& driver,
     const auto spec =
         std::ranges::find(driver.options, std::string_view(key), &drivers::OptionSpec::name);
     if (spec == driver.options.end() || equals == std::string::npos) {
-      std::string known;
-      for (const auto& option : driver.options) {
-        if (!known.empty()) known += ", ";
-        known += option.name;
-      }
+      const std::string known = joined(driver.options, ", ", &drivers::OptionSpec::name);
       return misuse(fmt::format("'{}' is not an option of {}; KEY=VALUE with one of: {}", word,
                                 driver.name, known));
     }

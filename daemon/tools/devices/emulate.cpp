@@ -23,6 +23,7 @@
 #include "daemon/tools/emulate/motions.hpp"
 #include "models/gesture/synthetic_signer.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 #include "proto/text/load_file.hpp"
 
 namespace posed::tools {
@@ -77,7 +78,7 @@ Result<std::unique_ptr<drivers::Emulator>> make_emulator(const std::string& name
   if (driver == nullptr || driver->emulate == nullptr) {
     std::string known;
     for (const drivers::Driver& other : drivers::registry()) {
-      if (other.emulate != nullptr) known += (known.empty() ? "" : ", ") + std::string(other.name);
+      if (other.emulate != nullptr) add_word(known, other.name);
     }
     if (name.ends_with(".plog") || name.find('/') != std::string::npos) TRY(expect_there(name));
     return misuse("'" + name +
@@ -145,7 +146,7 @@ Result<> check_way(const EmulateOptions& options, const drivers::Driver* driver)
       Way{"--publish ENDPOINT", !options.publish.empty(), bodies && !has("listen")}};
   std::string used;
   for (const Way& way : ways) {
-    if (way.used) used += (used.empty() ? "" : " or ") + std::string(way.words);
+    if (way.used) add_word(used, way.words, " or ");
   }
   for (const Way& way : ways) {
     if (!way.chosen || way.used) continue;
@@ -285,9 +286,7 @@ void add_emulate(CLI::App& app, int& exit_code) {
   posed emulate cyberglove --fault drop:0.01 --fault burst:0.001
 Faults of so many bytes: drop, zero, flip, insert, noise (any of drop, flip, insert);
 of so many packets: duplicate, silence, baud, burst.)");
-  command->callback([options, &exit_code] {
-    if (auto done = emulate(*options); !done) exit_code = report(done.error());
-  });
+  command->callback([options, &exit_code] { exit_code = report(emulate(*options)); });
 }
 
 }  // namespace posed::tools

@@ -12,6 +12,7 @@
 #include "proto/frame/sink.hpp"
 #include "proto/message/bounded_parse.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::tools {
 namespace {
@@ -29,8 +30,7 @@ std::unexpected<Error> nothing_came() {
 std::unexpected<Error> gone() { return fail("the glove has gone: plug it in and begin again"); }
 
 std::unexpected<Error> no_such_stream(const std::string& stream, const v1::Stats& stats) {
-  std::string names;
-  for (const auto& other : stats.stream()) names += (names.empty() ? "" : ", ") + other.stream();
+  const std::string names = joined(stats.stream(), ", ", &v1::StreamStats::stream);
   return misuse("there is no stream " + in_quotes(stream) + "; there is: " + names);
 }
 

@@ -16,6 +16,7 @@
 #include "proto/log/reader.hpp"
 #include "proto/model/model_file.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 #include "proto/zmq/keys.hpp"
 
 namespace posed::doctor {
@@ -147,7 +148,7 @@ Check check_groups(const Machine& machine, Config config) {
     if (node.info.open_error.empty()) continue;
     add_word(closed, node.info.node);
     const bool joins = !node.group.empty() && !machine.groups.contains(node.group);
-    if (joins && !groups.contains(node.group)) groups += (groups.empty() ? "" : ",") + node.group;
+    if (joins && !groups.contains(node.group)) add_word(groups, node.group, ",");
   }
   const std::string join = "sudo usermod -aG " + (groups.empty() ? "dialout,plugdev" : groups) +
                            " " + machine.user + "  # then log in again";

@@ -32,11 +32,6 @@ struct Check {
   return {.name = std::move(name), .found = "not looked at: give --config FILE", .looked = false};
 }
 
-// "a, b": appends a word to a list in a sentence.
-inline void add_word(std::string& list, const std::string& word) {
-  list += (list.empty() ? "" : ", ") + word;
-}
-
 // Whether it has a glove on a serial, HID or USB port.
 [[nodiscard]] bool wants_gloves(const config::DaemonConfig& config);
 

@@ -21,6 +21,7 @@
 #include "drivers/glove/glove_emulator.hpp"
 #include "drivers/transport/address.hpp"
 #include "drivers/transport/socket.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::emulate {
 namespace {
@@ -118,7 +119,7 @@ Result<EmulatedPort> EmulatedPort::open_udp(const std::vector<std::string>& endp
       return fail("cannot send to " + endpoint + " (" + errno_text() +
                   "); name an address that this machine reaches");
     }
-    port.name_ += (port.name_.empty() ? "" : ", ") + endpoint;
+    add_word(port.name_, endpoint);
   }
   return port;
 }

@@ -6,6 +6,7 @@
 
 #include "daemon/pipeline/record_sink.hpp"
 #include "proto/log/reader.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::emulate {
 
@@ -36,7 +37,7 @@ Result<LoggedDevice> read_logged_device(const std::string& log, const std::strin
   const log::StreamRow* wanted = nullptr;
   std::string names;
   for (const log::StreamRow& row : reader.streams()) {
-    names += (names.empty() ? "" : ", ") + row.name;
+    add_word(names, row.name);
     if (row.name == stream || (stream.empty() && reader.streams().size() == 1)) wanted = &row;
   }
   if (wanted == nullptr) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <memory>
+#include <ranges>
 #include <utility>
 
 #include "daemon/pipeline/take.hpp"
@@ -10,6 +11,7 @@
 #include "proto/clip/frames_clip.hpp"
 #include "proto/frame/time.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 #include "proto/text/stream_name.hpp"
 
 namespace posed::tools {
@@ -22,7 +24,7 @@ std::string list_of(const std::vector<log::TakeRow>& takes) {
   for (std::size_t i = 0; i < takes.size() && i < kMaxListed; ++i) {
     const pipeline::Take take{.number = static_cast<std::uint32_t>(takes[i].id),
                               .name = takes[i].name};
-    list += (i == 0 ? "" : ", ") + pipeline::words_of(take);
+    add_word(list, pipeline::words_of(take));
   }
   if (takes.size() > kMaxListed) {
     list += " and " + std::to_string(takes.size() - kMaxListed) + " more";
@@ -155,8 +157,9 @@ Result<> check_same_skeleton(const replay::Replay& replay, const std::string& na
   if (std::ranges::none_of(ids, differs)) return {};
   std::string list;
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    list += (i == 0 ? "" : ", ") + name + "#" + std::to_string(i + 1) + " (" +
-            std::to_string(skeleton_of(replay, ids[i], raw)->joints.size()) + " joints)";
+    add_word(list, name + "#" + std::to_string(i + 1) + " (" +
+                       std::to_string(skeleton_of(replay, ids[i], raw)->joints.size()) +
+                       " joints)");
   }
   return misuse("stream " + in_quotes(name) +
                     " changed its skeleton, so its parts are clips of their own; name one by"
@@ -175,8 +178,7 @@ Result<Chosen> choose(const replay::Replay& replay, const std::string& wanted,
                       const std::string& path) {
   const auto parts = parts_by_name(replay);
   if (parts.empty()) return fail("has no stream with a skeleton", path);
-  std::string names;
-  for (const auto& [name, ids] : parts) names += (names.empty() ? "" : ", ") + name;
+  const std::string names = joined(std::views::keys(parts));
   const bool raw = wanted.ends_with(kRawSuffix) && !parts.contains(wanted);
   const std::string stream = raw ? wanted.substr(0, wanted.size() - kRawSuffix.size()) : wanted;
   if (stream.empty() && parts.size() > 1) {

@@ -3,7 +3,6 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <charconv>
 #include <limits>
 #include <memory>
 #include <optional>
@@ -22,6 +21,7 @@
 #include "proto/frame/whole_file.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/number.hpp"
 #include "proto/text/stream_name.hpp"
 
 namespace posed::tools {
@@ -275,14 +275,10 @@ std::string descriptors_of(const google::protobuf::Descriptor& message) {
 std::optional<std::int64_t> utc_offset_ns(const log::Reader& reader) {
   const auto found = reader.meta().find("monotonic_to_utc_ns");
   if (found == reader.meta().end()) return std::nullopt;
-  const std::string& text = found->second;
-  std::int64_t offset_ns = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), offset_ns);
+  const auto offset_ns = exact_number<std::int64_t>(found->second);
   // The sum with a time of the log must fit.
   constexpr std::int64_t kMaxTime_ns = std::numeric_limits<std::int64_t>::max() / 2;
-  const bool plausible = error == std::errc() && end == text.data() + text.size() &&
-                         offset_ns >= 0 && offset_ns <= kMaxTime_ns;
-  return plausible ? std::optional(offset_ns) : std::nullopt;
+  return offset_ns && *offset_ns >= 0 && *offset_ns <= kMaxTime_ns ? offset_ns : std::nullopt;
 }
 
 // Writes the items of a replay.

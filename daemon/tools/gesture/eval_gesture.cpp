@@ -11,7 +11,6 @@
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
-#include <spdlog/fmt/ranges.h>
 #include <CLI/CLI.hpp>
 
 #include "daemon/tools/command/command.hpp"
@@ -30,6 +29,7 @@
 #include "models/perform/constrain.hpp"
 #include "models/perform/perform.hpp"
 #include "proto/frame/whole_file.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::tools {
 namespace {
@@ -349,7 +349,7 @@ std::string gesture_verdict(const GestureEvaluation& evaluation) {
     parts.push_back(fmt::format("--reference RECORDING shows how close it is to a real {}",
                                 evaluation.gap ? "hand" : "body"));
   }
-  return fmt::format("{}", fmt::join(parts, "; "));
+  return joined(parts, "; ");
 }
 
 // All but the verdict.

@@ -15,7 +15,6 @@
 #include "daemon/tools/picture/figure.hpp"
 #include "models/gesture/pose_channels.hpp"
 #include "models/gesture/pose_distance.hpp"
-#include "models/gesture/train.hpp"
 #include "models/motion/naturalness.hpp"
 #include "models/perform/body_performance.hpp"
 #include "models/perform/constrain.hpp"
@@ -23,6 +22,7 @@
 #include "models/smooth/live_smoother.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/time.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::tools {
 namespace {
@@ -180,9 +180,7 @@ GestureFigures::GestureFigures(std::shared_ptr<const gesture::GestureModel> mode
 const std::string& GestureFigures::name(int label) const { return model_->labels[label].name; }
 
 std::string GestureFigures::label_text() const {
-  std::string text;
-  for (const int label : labels_) text += (text.empty() ? "" : " ") + name(label);
-  return text;
+  return joined(labels_, " ", [this](int label) { return name(label); });
 }
 
 picture::Figure GestureFigures::pose(const perform::Pose& angles_rad) const {
@@ -228,7 +226,7 @@ report::Figure GestureFigures::strip() const {
   const char* const part = model_->is_hand() ? "finger" : "group";
   std::string never;
   for (const gesture::Label& label : model_->labels) {
-    if (!label.trained) never += (never.empty() ? "" : ", ") + label.name;
+    if (!label.trained) add_word(never, label.name);
   }
   return strip_of(
       "\"" + label_text() + "\" as the model performs it",

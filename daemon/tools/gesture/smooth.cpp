@@ -207,9 +207,7 @@ void add_smooth(CLI::App& app, int& exit_code) {
   posed smooth --model H.gesture glove.csv --out smooth.csv --json   # recognises gestures, too
 The code is the live stream's: a row is estimated from what came up to the lag after it. An empty
 field is a missing value and is bridged; rows keep their times, even or not.)");
-  command->callback([options, &exit_code] {
-    if (auto done = smooth(*options); !done) exit_code = report(done.error());
-  });
+  command->callback([options, &exit_code] { exit_code = report(smooth(*options)); });
 }
 
 }  // namespace posed::tools

@@ -1,5 +1,4 @@
 // `posed synth`: performs a sequence of labels with a hand or a body and writes a file.
-#include <charconv>
 #include <cmath>
 #include <memory>
 
@@ -16,10 +15,10 @@
 #include "models/perform/constrain.hpp"
 #include "models/perform/perform.hpp"
 #include "models/perform/state_duration.hpp"
-#include "proto/clip/bvh.hpp"
 #include "proto/clip/format.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/hand_shape.hpp"
+#include "proto/text/number.hpp"
 
 namespace posed::tools {
 namespace {
@@ -48,13 +47,10 @@ Result<perform::PerformOptions> perform_options(const SynthOptions& options) {
   perform.tempo = options.tempo;
   perform.global_variance = options.global_variance;
   if (options.lookahead == "full") return perform;
-  int frames = -1;
-  const auto& text = options.lookahead;
-  const auto end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, frames);
+  const int frames = exact_number<int>(options.lookahead).value_or(-1);
   constexpr int kMaxFrames = 100'000;
-  if (error != std::errc{} || stop != end || frames < 0 || frames > kMaxFrames) {
-    return misuse("--lookahead is a number of frames or full, not '" + text + "'");
+  if (frames < 0 || frames > kMaxFrames) {
+    return misuse("--lookahead is a number of frames or full, not '" + options.lookahead + "'");
   }
   perform.look_ahead = frames;
   return perform;

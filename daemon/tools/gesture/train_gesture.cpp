@@ -22,6 +22,7 @@
 #include "models/gesture/movement_label.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/label_file.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::tools {
 namespace {
@@ -197,8 +198,7 @@ void add_summary(const GestureTraining& training, const std::vector<gesture::Rec
     }
     findings.say(line);
   }
-  std::string labels;
-  for (const auto& label : model.labels) labels += (labels.empty() ? "" : " ") + label.name;
+  const std::string labels = joined(model.labels, " ", &gesture::Label::name);
   findings
       .say(fmt::format("{} leaves in {} trees, {} of durations", leaves,
                        gesture::kStates * model.groups.size(), model.durations.leaves.size()))

@@ -1,9 +1,42 @@
 #include "daemon/tools/link/daemon_socket.hpp"
 
-#include "daemon/net/security.hpp"
 #include "proto/zmq/keys.hpp"
 
 namespace posed::link {
+namespace {
+
+std::string other_socket(net::Domain domain) {
+  return std::string("this is not its ") +
+         (domain == net::Domain::kPublish ? "publish" : "control") +
+         " endpoint (by default 5570 publishes, 5571 takes control)";
+}
+
+// The words that follow "the daemon at ENDPOINT ..."; empty for Refusal::kNone.
+std::string refusal_words(net::Refusal refusal, net::Domain domain,
+                          const std::filesystem::path& server_key) {
+  using net::Refusal;
+  switch (refusal) {
+    case Refusal::kNone:
+      break;
+    case Refusal::kKeyNotAllowed:
+      return std::string("refuses this key: it is not on its list, or may not ") +
+             (domain == net::Domain::kPublish ? "subscribe" : "control");
+    case Refusal::kTalksNoKeys:
+      return "does not use keys, or is not posed; leave out --key";
+    case Refusal::kHangsUp:
+      return "hangs up: --server-key " + server_key.string() + " is not its key, or it just ended";
+    case Refusal::kWantsKey:
+      return "wants a key; give --key NAME.key --server-key SERVER.pub";
+    case Refusal::kOtherSocket:
+      return "hangs up: " + other_socket(domain);
+    case Refusal::kHangsUpKeyless:
+      return "hangs up: it wants a key (--key NAME.key --server-key SERVER.pub), or " +
+             other_socket(domain);
+  }
+  return {};
+}
+
+}  // namespace
 
 Result<DaemonSocket> DaemonSocket::open(void* context, int type, Peer peer, const Limits& limits) {
   auto socket = TRY(net::open_socket(context, type));
@@ -34,7 +67,7 @@ Received DaemonSocket::receive(net::Message& first, net::Message& second) noexce
 }
 
 std::string DaemonSocket::refusal() {
-  return net::refusal_words(monitor_->next_refusal(), domain_, peer_.server_key);
+  return refusal_words(monitor_->next_refusal(), domain_, peer_.server_key);
 }
 
 }  // namespace posed::link

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "daemon/net/refusal_words.hpp"
+#include "daemon/net/security.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/zmq/link_monitor.hpp"
 #include "proto/zmq/zmq_handle.hpp"

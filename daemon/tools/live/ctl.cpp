@@ -33,6 +33,7 @@
 #include "proto/log/digest.hpp"
 #include "proto/message/bounded_parse.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 #include "proto/text/load_file.hpp"
 #include "proto/text/nearest_word.hpp"
 #include "proto/text/parameter.hpp"
@@ -435,7 +436,7 @@ std::string live_parameters() {
                                : fmt::format("{:g} to {:g}", spec.min * spec.display_scale,
                                              spec.max * spec.display_scale);
       if (!has_number(spec)) range = "a=0.6,b=0.4";
-      if (!spec.words.empty()) range = fmt::format("{}", fmt::join(spec.words, ", "));
+      if (!spec.words.empty()) range = joined(spec.words);
       lines += fmt::format("  {:<26} {:<14} {}\n",
                            fmt::format("{}.{}", stage->name, spec.shown_name()), range, spec.help);
     }

@@ -78,10 +78,7 @@ void add_models(CLI::App& app, int& exit_code) {
   posed models models                    # everything in the folder
   posed models walk-to-sneak.style
 What a running daemon has in its own folder: `posed ctl models`.)");
-  command->callback([options, &exit_code] {
-    const auto done = list_models_at(*options);
-    exit_code = done ? 0 : report(done.error());
-  });
+  command->callback([options, &exit_code] { exit_code = report(list_models_at(*options)); });
 }
 
 }  // namespace posed::tools

@@ -16,6 +16,7 @@
 #include "posed/v1/posed.pb.h"
 #include "proto/message/bounded_parse.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 #include "proto/text/stream_name.hpp"
 
 namespace posed::tools {
@@ -132,7 +133,7 @@ class Monitor {
       if (options_.stream.empty() || options_.stream == name || options_.stream == raw_name(name)) {
         return {};
       }
-      names += (names.empty() ? "" : ", ") + name;
+      add_word(names, name);
     }
     const std::string sentence =
         fmt::format("the daemon at {} has no stream '{}'; it has: {}", options_.client.endpoint,
@@ -205,9 +206,7 @@ from arrival in the daemon to its publishing; a replay as fast as possible has n
 slow for the stream misses frames; it never sees old ones. A daemon that falls silent is reported on
 stderr. With --count the exit code is 1 unless so many came. --timeout looks at the daemon, and at
 the stream named with --stream until it first comes.)");
-  command->callback([options, &exit_code] {
-    if (auto done = watch(*options); !done) exit_code = report(done.error());
-  });
+  command->callback([options, &exit_code] { exit_code = report(watch(*options)); });
 }
 
 }  // namespace posed::tools

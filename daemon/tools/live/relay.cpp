@@ -231,10 +231,7 @@ void add_relay(CLI::App& app, int& exit_code) {
 A subscriber gets the skeletons of its streams within 0.1 s. The relay never holds poses back: a
 subscriber too slow for the stream misses frames. Streams of one name come from the first daemon
 that sends them; the others' are counted as clashes. SIGHUP reads the clients again.)");
-  command->callback([options, &exit_code] {
-    const auto done = run_relay(*options);
-    exit_code = done ? 0 : report(done.error());
-  });
+  command->callback([options, &exit_code] { exit_code = report(run_relay(*options)); });
 }
 
 }  // namespace posed::tools

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdio>
 #include <thread>
-#include <utility>
 
 #include <unistd.h>
 

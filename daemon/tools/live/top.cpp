@@ -208,7 +208,7 @@ shown in red with the time since then, and values that may be outdated are hidde
     if (options->control.empty() && options->client.endpoint == kOwnPublish) {
       options->control = kOwnControl;
     }
-    if (auto done = top(*options); !done) exit_code = report(done.error());
+    exit_code = report(top(*options));
   });
 }
 

@@ -134,7 +134,7 @@ never slows the daemon down, and it reconnects when the daemon restarts. Ctrl-C 
     if (options->control.empty() && options->client.endpoint == kOwnPublish) {
       options->control = kOwnControl;
     }
-    if (auto done = serve_page(*options); !done) exit_code = report(done.error());
+    exit_code = report(serve_page(*options));
   });
 }
 

@@ -1,6 +1,5 @@
 // `posed convert`: converts a clip to another format, a stream of a device log to a clip, or a
 // whole log to MCAP.
-#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>

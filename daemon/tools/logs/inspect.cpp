@@ -3,10 +3,8 @@
 // two clips show one figure.
 #include <algorithm>
 #include <chrono>
-#include <cstdio>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -29,12 +27,12 @@
 #include "models/motion/motion.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/clip/format.hpp"
-#include "proto/clip/formats.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/message/bounded_parse.hpp"
 #include "proto/rig/live.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::tools {
 namespace {
@@ -85,7 +83,7 @@ Result<> look_for(const std::string& stream, std::span<const std::byte> bytes) {
   std::string names;
   for (const v1::StreamStats& one : stats.stream()) {
     if (one.stream() == stream) return {};
-    names += (names.empty() ? "" : ", ") + one.stream();
+    add_word(names, one.stream());
   }
   return fail("there is no file and no stream " + in_quotes(stream) + "; the daemon has " +
               clean(names));
@@ -164,11 +162,7 @@ Frame t_pose(const motion::Motion& motion) {
   Frame frame = motion.frames[0];
   const Skeleton& skeleton = *motion.skeleton;
   for (std::size_t j = 0; j < skeleton.joints.size(); ++j) {
-    const Joint& joint = skeleton.joints[j];
-    const Eigen::Quaterniond parent = joint.parent < 0
-                                          ? Eigen::Quaterniond::Identity()
-                                          : skeleton.joints[joint.parent].T_world_joint;
-    frame.rotation_xyzw[j] = from_eigen(parent.conjugate() * joint.T_world_joint);
+    frame.rotation_xyzw[j] = from_eigen(local_from_canonical(skeleton, j));
     frame.valid[j] = true;
   }
   return frame;
@@ -223,7 +217,7 @@ std::string missing_bones(const Skeleton& skeleton) {
   for (int b = 0; b < kBones; ++b) {
     const auto bone = static_cast<Bone>(b);
     if (!is_of_the_body(bone) || skeleton.joint_of(bone) >= 0) continue;
-    names += (names.empty() ? "" : ", ") + std::string(bone_name(bone));
+    add_word(names, bone_name(bone));
   }
   return names;
 }
@@ -381,7 +375,7 @@ Result<int> run_compare(const std::string& a, const std::string& b, bool json) {
     const int other = joint.bone ? second.skeleton->joint_of(*joint.bone)
                                  : second.skeleton->joint_index(joint.name);
     if (other < 0) {
-      missing += (missing.empty() ? "" : ", ") + clean_name(joint.name);
+      add_word(missing, clean_name(joint.name));
       continue;
     }
     const Joint& there = second.skeleton->joints[other];
@@ -439,10 +433,7 @@ void add_inspect(CLI::App& app, int& exit_code) {
   add_timeout_option(*command, options->timeout_s);
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--json", options->json, "Print the findings as JSON on stdout");
-  command->callback([options, &exit_code] {
-    const auto done = run_inspect(*options);
-    exit_code = done ? static_cast<int>(ExitCode::kDone) : report(done.error());
-  });
+  command->callback([options, &exit_code] { exit_code = report(run_inspect(*options)); });
 }
 
 void add_compare(CLI::App& app, int& exit_code) {

@@ -347,8 +347,7 @@ void add_render(CLI::App& app, int& exit_code) {
     if (!options->hand.empty()) {
       options->read.hand = side_named(options->hand);
     }
-    const auto done = run_render(*options);
-    exit_code = done ? static_cast<int>(ExitCode::kDone) : report(done.error());
+    exit_code = report(run_render(*options));
   });
 }
 

@@ -25,7 +25,6 @@
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
 #include "daemon/tools/command/ranks.hpp"
-#include "daemon/tools/logs/junit.hpp"
 #include "daemon/tools/logs/replay_outputs.hpp"
 #include "daemon/tools/replay/broadcast.hpp"
 #include "daemon/tools/replay/pace.hpp"
@@ -511,8 +510,7 @@ one; its times are the recording's, on the recording's clock. Nobody can control
       return;
     }
     options->log = options->logs.front();
-    const auto done = replay(*options);
-    exit_code = done ? 0 : report(done.error());
+    exit_code = report(replay(*options));
   });
 }
 

@@ -1,15 +1,35 @@
 #include "daemon/tools/logs/replay_outputs.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstdint>
+#include <ostream>
+#include <string_view>
 
 #include <spdlog/fmt/fmt.h>
+#include <pugixml.hpp>
 
 #include "daemon/tools/run/recording.hpp"
 #include "models/gp/isa.hpp"
+#include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/stream_name.hpp"
 
 namespace posed::tools {
+
+Result<FrameFile> FrameFile::create(const std::filesystem::path& path) {
+  auto file = TRY(WholeFile::open(path));
+  return FrameFile(std::move(file));
+}
+
+void FrameFile::add(const v1::Frame& frame) {
+  frame.SerializeToString(&bytes_);
+  const auto size = static_cast<std::uint32_t>(bytes_.size());
+  std::array<char, 4> length{};
+  for (std::size_t i = 0; i < length.size(); ++i) length[i] = static_cast<char>(size >> (8 * i));
+  file_.out().write(length.data(), length.size());
+  file_.out().write(bytes_.data(), static_cast<std::streamsize>(bytes_.size()));
+}
 
 Findings findings_of(const std::string& log, const std::string& recorded_isa,
                      const ReplayOutcome& outcome) {
@@ -119,6 +139,30 @@ std::vector<std::string> missing_from(const log::Reader& reader, const replay::R
   add_undescribed(replay, missing);
   add_without_body(reader, missing);
   return missing;
+}
+
+Result<> write_junit(const std::filesystem::path& path, std::span<const JUnitCase> cases) {
+  double took_s = 0.0;
+  for (const JUnitCase& one : cases) took_s += one.took_s;
+  pugi::xml_document document;
+  auto suite = document.append_child("testsuites").append_child("testsuite");
+  const auto set = [](pugi::xml_node node, const char* name, std::string_view value) {
+    node.append_attribute(name).set_value(clean(value).c_str());
+  };
+  set(suite, "name", "posed replay");
+  set(suite, "tests", fmt::format("{}", cases.size()));
+  set(suite, "failures", fmt::format("{}", std::ranges::count_if(cases, [](const JUnitCase& one) {
+                                       return !one.problem.empty();
+                                     })));
+  set(suite, "time", fmt::format("{:.3f}", took_s));
+  for (const JUnitCase& one : cases) {
+    auto test = suite.append_child("testcase");
+    set(test, "classname", "posed.replay");
+    set(test, "name", one.name);
+    set(test, "time", fmt::format("{:.3f}", one.took_s));
+    if (!one.problem.empty()) set(test.append_child("failure"), "message", one.problem);
+  }
+  return write_whole_file(path, [&](std::ostream& out) { document.save(out, "  "); });
 }
 
 }  // namespace posed::tools

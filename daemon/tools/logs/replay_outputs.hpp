@@ -4,22 +4,44 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "daemon/pipeline/messages.hpp"
 #include "daemon/tools/command/findings.hpp"
-#include "daemon/tools/export/frame_file.hpp"
 #include "daemon/tools/replay/broadcast.hpp"
 #include "daemon/tools/replay/expectation.hpp"
 #include "daemon/tools/replay/replay.hpp"
+#include "posed/v1/posed.pb.h"
 #include "proto/frame/result.hpp"
+#include "proto/frame/whole_file.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/message/frame_message.hpp"
 
 namespace posed::tools {
+
+// FRAMES.bin: repeated {u32 little-endian length, posed.v1.Frame}, in pipeline order, stage stamps
+// unset.
+class FrameFile {
+ public:
+  static Result<FrameFile> create(const std::filesystem::path& path);
+
+  void add(const v1::Frame& frame);
+  // Gives the file its name, if everything was written. Without it there is no file, or the old
+  // one.
+  Result<> close() { return file_.keep(); }
+
+ private:
+  explicit FrameFile(WholeFile file) : file_(std::move(file)) {}
+
+  WholeFile file_;
+  std::string bytes_;
+};
 
 // What became of a log that was replayed and compared.
 struct ReplayOutcome {
@@ -69,5 +91,17 @@ Result<> set_isa_or(const std::string& wanted, const std::string& recorded);
 // each body without a description and for each source without a stream.
 [[nodiscard]] std::vector<std::string> missing_from(const log::Reader& reader,
                                                     const replay::Replay& replay);
+
+// The report of compared logs in JUnit's XML, which GitHub, GitLab and Jenkins show as test cases:
+// one log as a test case. Schema: https://github.com/testmoapp/junitxml.
+struct JUnitCase {
+  std::string name;  // the log's path
+  double took_s = 0.0;
+  std::string problem;  // why it failed; empty: it passed
+};
+
+// Replaces the file at `path` by one suite named "posed replay" with these cases. Text that XML 1.0
+// cannot hold is replaced by '?'.
+Result<> write_junit(const std::filesystem::path& path, std::span<const JUnitCase> cases);
 
 }  // namespace posed::tools

@@ -15,7 +15,6 @@
 #include "daemon/system/event_fd.hpp"
 #include "proto/message/bounded_parse.hpp"
 #include "proto/text/clean.hpp"
-#include "proto/zmq/keys.hpp"
 
 namespace posed::relay {
 namespace {

@@ -3,7 +3,6 @@
 
 #include <cstdint>
 
-#include "daemon/pipeline/stream_settings.hpp"
 #include "daemon/publish/publisher.hpp"
 #include "daemon/tools/replay/replay.hpp"
 

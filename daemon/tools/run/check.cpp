@@ -20,6 +20,7 @@
 #include "daemon/tools/command/findings.hpp"
 #include "drivers/transport/address.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::tools {
 namespace {
@@ -59,7 +60,7 @@ Findings findings_of(const pipeline::StageSettings& stage, std::string& line) {
   }
   std::string values;
   for (const Finding& parameter : parameters.all()) {
-    values += (values.empty() ? "" : " ") + parameter.text + "=" + parameter.json();
+    add_word(values, parameter.text + "=" + parameter.json(), " ");
   }
   if (!values.empty()) line += " (" + clean(values) + ")";
   return findings.add("parameters", parameters);
@@ -153,7 +154,7 @@ Findings findings_of(const config::SourceConfig& source) {
     findings.say(
         fmt::format("  note: each body is asked whether {} can serve it when it comes; "
                     "`posed top` shows one that is refused, and why",
-                    clean(fmt::format("{}", fmt::join(models, ", ")))));
+                    clean(joined(models))));
   }
   return findings;
 }
@@ -224,8 +225,7 @@ Findings findings_of(const config::RecordConfig& record) {
 
 // The line is like "takes are triggered at 127.0.0.1:1512 by 192.168.1.20".
 Findings findings_of(const config::TriggerConfig& trigger) {
-  const std::string peers =
-      trigger.peers.empty() ? "this machine" : fmt::format("{}", fmt::join(trigger.peers, ", "));
+  const std::string peers = trigger.peers.empty() ? "this machine" : joined(trigger.peers);
   return Findings()
       .add("listen", trigger.listen)
       .add("peers", trigger.peers)

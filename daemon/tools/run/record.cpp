@@ -45,10 +45,7 @@ void add_record(CLI::App& app, int& exit_code) {
       "stop\n"
       "  posed convert take1.plog --take walk --stream walker --out walk.bvh\n"
       "With a [record] table in the config `posed run` records, too; here --out says where.");
-  command->callback([options, &exit_code] {
-    const auto done = record(*options);
-    exit_code = done ? 0 : report(done.error());
-  });
+  command->callback([options, &exit_code] { exit_code = report(record(*options)); });
 }
 
 }  // namespace posed::tools

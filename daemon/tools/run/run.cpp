@@ -1,5 +1,4 @@
 #include <memory>
-#include <utility>
 
 #include <CLI/CLI.hpp>
 
@@ -45,10 +44,7 @@ void add_run(CLI::App& app, int& exit_code) {
       "  posed run --config mine.toml --until-end     # for clips with loop = false\n"
       "  posed run --config mine.toml                 # with a [record] table it records, too\n"
       "  posed monitor --count 10                     # in another terminal: see the poses");
-  command->callback([options, &exit_code] {
-    const auto done = run(*options);
-    exit_code = done ? 0 : report(done.error());
-  });
+  command->callback([options, &exit_code] { exit_code = report(run(*options)); });
 }
 
 }  // namespace posed::tools

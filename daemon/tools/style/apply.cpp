@@ -1,5 +1,4 @@
 // `posed apply`: sends a clip through the style stage and writes the styled clip.
-#include <charconv>
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
@@ -21,6 +20,7 @@
 #include "models/style/live/apply.hpp"
 #include "proto/clip/format.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/number.hpp"
 
 namespace posed::tools {
 namespace {
@@ -40,10 +40,11 @@ Result<> parse_alpha(ApplyArguments& options) {
   style::FilterOptions& filter = options.apply.filter;
   filter.auto_alpha = options.alpha == "auto";
   if (filter.auto_alpha) return {};
-  const char* const end = options.alpha.data() + options.alpha.size();
-  const auto read = std::from_chars(options.alpha.data(), end, filter.alpha);
-  const bool number = read.ec == std::errc() && read.ptr == end;
-  if (number && std::abs(filter.alpha) <= style::kMaxAlpha) return {};
+  const auto alpha = exact_number<double>(options.alpha);
+  if (alpha && std::abs(*alpha) <= style::kMaxAlpha) {
+    filter.alpha = *alpha;
+    return {};
+  }
   return misuse("--alpha takes a number from -2 to 2, or auto, not " + in_quotes(options.alpha));
 }
 
@@ -255,9 +256,7 @@ OUT keeps the input's joints, channels, frame count and rate; an AMC becomes a B
 rotations. Without --cold the style has its full strength from the first frame. The last line says
 how far the walker is from those in the training data. "deg rms" is the angle between the
 rotations before and after, over frames and changed joints.)");
-  command->callback([options, &exit_code] {
-    if (auto done = run(*options); !done) exit_code = report(done.error());
-  });
+  command->callback([options, &exit_code] { exit_code = report(run(*options)); });
 }
 
 }  // namespace posed::tools

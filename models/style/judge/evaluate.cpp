@@ -3,13 +3,11 @@
 #include <cmath>
 #include <numbers>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "models/feet/foot_score.hpp"
 #include "models/motion/motion.hpp"
 #include "models/style/model/harmonics.hpp"
-#include "models/style/train/difference_process.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 

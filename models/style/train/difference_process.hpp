@@ -9,7 +9,6 @@
 #include <Eigen/Core>
 
 #include "models/gp/regression.hpp"
-#include "models/style/model/harmonics.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::style {

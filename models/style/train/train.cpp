@@ -1,7 +1,6 @@
 #include "models/style/train/train.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <set>
 #include <utility>
 

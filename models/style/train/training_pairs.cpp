@@ -1,7 +1,6 @@
 #include "models/style/train/training_pairs.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <memory>
 #include <numbers>
 #include <utility>

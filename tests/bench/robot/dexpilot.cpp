@@ -1,7 +1,6 @@
 #include "tests/bench/robot/dexpilot.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 namespace posed::bench {
 namespace {

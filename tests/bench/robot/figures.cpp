@@ -10,8 +10,8 @@
 #include "models/robot/hand_target.hpp"
 #include "models/robot/pose_solver.hpp"
 #include "proto/frame/degree.hpp"
-#include "tests/bench/cpu_time.hpp"
 #include "tests/bench/robot/dexpilot.hpp"
+#include "tests/support/processor_time.hpp"
 
 namespace posed::bench {
 namespace {
@@ -102,13 +102,13 @@ std::array<RobotTrack, 2> our_tracks(const robot::RobotHand& robot, const HandTa
   robot::Command follows(robot, kMargin_m);
   int stands = 0;
   for (const HandAngles& angles : take.angles) {
-    const double start_us = cpu_us();
+    const double start_us = test::processor_time_us();
     targets.find(angles, target);
     if (follows.blocked()) solver.restart(follows.pose());
     const Drive& wanted = solver.solve(target, kRounds);
-    const double solved_us = cpu_us();
+    const double solved_us = test::processor_time_us();
     follows.follow(wanted, kDt_s);
-    command.us.push_back(cpu_us() - start_us);
+    command.us.push_back(test::processor_time_us() - start_us);
     pose.us.push_back(solved_us - start_us);
     pose.poses.push_back(wanted);
     command.poses.push_back(follows.pose());
@@ -127,7 +127,7 @@ std::array<RobotTrack, 2> rival_tracks(const robot::RobotHand& robot, const Hand
   filtered.name = "DexPilot-low-pass";
   DexPilot solver(robot, person);
   for (const HandAngles& angles : take.angles) {
-    bare.us.push_back(timed_us([&] { bare.poses.push_back(solver.solve(angles)); }));
+    bare.us.push_back(test::timed_us([&] { bare.poses.push_back(solver.solve(angles)); }));
     const Drive& pose = bare.poses.back();
     const Drive before = filtered.poses.empty() ? pose : filtered.poses.back();
     filtered.poses.emplace_back(before + kLowPass * (pose - before));

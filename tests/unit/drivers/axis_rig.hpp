@@ -4,15 +4,12 @@
 
 #include <catch2/catch.hpp>
 
-#include <memory>
-#include <string>
 #include <string_view>
 #include <vector>
 
 #include "drivers/axis/emulator.hpp"
 #include "drivers/axis/protocol.hpp"
-#include "drivers/driver.hpp"
-#include "tests/unit/drivers/collect_sink.hpp"
+#include "tests/unit/drivers/decoder_of.hpp"
 
 namespace posed::test {
 
@@ -57,25 +54,12 @@ inline drivers::axis::Message axis_message(std::uint32_t avatar, std::string_vie
   return message;
 }
 
-struct AxisRig {
-  const drivers::Driver& driver = *drivers::find_driver("axis");
-  std::unique_ptr<drivers::Decoder> decoder;
-  std::vector<std::unique_ptr<const drivers::SourceLayout>> layouts;
-  CollectSink sink;
+struct AxisRig : DecoderRig {
+  explicit AxisRig(const drivers::Options& options = {}) : DecoderRig("axis", options) {}
+
   std::int64_t now_ns = 0;
 
-  explicit AxisRig(const drivers::Options& options = {})
-      : decoder(driver.make_decoder(driver.expect(options).value()).value()) {}
-
-  void feed(const AxisBytes& bytes) {
-    const int before = sink.descriptions;
-    decoder->feed(bytes, now_ns, sink);
-    if (sink.descriptions == before) return;
-    auto layout = driver.make_layout(sink.described);
-    if (!layout) FAIL(layout.error().text());
-    layouts.push_back(std::move(*layout));
-    decoder->use(*layouts.back());
-  }
+  void feed(const AxisBytes& bytes) { DecoderRig::feed(bytes, now_ns); }
   // The emulator's next record, at its own time.
   void step(drivers::axis::AxisEmulator& emulator) {
     now_ns = emulator.next_due_ns();

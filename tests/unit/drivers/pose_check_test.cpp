@@ -1,12 +1,12 @@
 // Whether recorded poses are good enough for a calibration.
 #include "drivers/glove/pose_check.hpp"
-#include "drivers/glove/traits.hpp"
 
 #include <catch2/catch.hpp>
 
 #include <cmath>
 
 #include "drivers/driver.hpp"
+#include "drivers/glove/traits.hpp"
 
 namespace posed::drivers::glove {
 namespace {

@@ -2,16 +2,14 @@
 // bodies that come, go and change.
 #include <catch2/catch.hpp>
 
-#include <cmath>
 #include <fstream>
 #include <sstream>
 
 #include "drivers/driver.hpp"
 #include "drivers/rokoko/emulator.hpp"
 #include "proto/frame/rotation.hpp"
-#include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
-#include "tests/unit/drivers/collect_sink.hpp"
+#include "tests/unit/drivers/decoder_of.hpp"
 #include "tests/unit/drivers/recorded_log.hpp"
 
 namespace posed::drivers::rokoko {
@@ -21,48 +19,30 @@ using rokoko::StudioEmulator;
 using rokoko::StudioVersion;
 using test::CollectSink;
 using Bytes = std::vector<std::byte>;
-using Layout = std::unique_ptr<const SourceLayout>;
 
-std::unique_ptr<Decoder> new_decoder() {
-  const Driver& driver = *find_driver("rokoko");
-  return driver.make_decoder(driver.expect({}).value()).value();
-}
+// A decoder that has the bodies of its first datagram from the start.
+struct Studio : test::DecoderRig {
+  Studio() : DecoderRig("rokoko") {}
 
-// A decoder that has the bodies of its first datagram from the start, and those of every later
-// description at once.
-struct Studio {
-  std::unique_ptr<Decoder> decoder = new_decoder();
-  std::vector<Layout> layouts;
-  CollectSink sink;
-
-  void use(std::span<const std::byte> description) {
-    auto layout = find_driver("rokoko")->make_layout(description);
-    if (!layout) FAIL(layout.error().text());
-    layouts.push_back(std::move(*layout));
-    decoder->use(*layouts.back());
-  }
   void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns = 0) {
     if (layouts.empty()) {
       CollectSink first(0);
-      new_decoder()->feed(bytes, 0, first);
+      test::decoder_of(driver)->feed(bytes, 0, first);
       if (first.descriptions > 0) use(first.described);
     }
-    const int before = sink.descriptions;
-    decoder->feed(bytes, arrival_ns, sink);
-    if (sink.descriptions > before) use(sink.described);
+    DecoderRig::feed(bytes, arrival_ns);
   }
   void feed(const std::string& json, std::int64_t arrival_ns = 0) {
     feed(std::as_bytes(std::span(json)), arrival_ns);
   }
   [[nodiscard]] const Body& body(const std::string& name) const {
-    const auto& bodies = layouts.back()->bodies;
-    const auto at = std::ranges::find(bodies, name, &Body::name);
-    REQUIRE(at != bodies.end());
+    const auto at = std::ranges::find(bodies(), name, &Body::name);
+    REQUIRE(at != bodies().end());
     return *at;
   }
   [[nodiscard]] std::vector<std::string> names() const {
     std::vector<std::string> names;
-    for (const Body& body : layouts.back()->bodies) names.push_back(body.name);
+    for (const Body& body : bodies()) names.push_back(body.name);
     return names;
   }
 };
@@ -196,7 +176,7 @@ TEST_CASE("what is emulated is decoded: version 2, 2.5 and 3, plain and compress
 
 TEST_CASE("Studio's frames before their bodies are in use are counted and not emitted") {
   CollectSink sink;
-  const auto decoder = new_decoder();
+  const auto decoder = test::decoder_of(*find_driver("rokoko"));
   const std::string first = v3(1, actor(kHip)), second = v3(2, actor(kHip));
   decoder->feed(std::as_bytes(std::span(first)), 0, sink);
   CHECK(sink.descriptions == 1);

@@ -6,7 +6,6 @@
 #include <chrono>
 #include <string>
 #include <thread>
-#include <vector>
 
 #include "drivers/transport/subscription.hpp"
 #include "drivers/transport/transport_factory.hpp"

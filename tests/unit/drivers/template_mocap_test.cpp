@@ -12,7 +12,7 @@
 #include "drivers/template_mocap/protocol.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
-#include "tests/unit/drivers/collect_sink.hpp"
+#include "tests/unit/drivers/decoder_of.hpp"
 #include "tests/unit/drivers/recorded_log.hpp"
 #include "tests/unit/drivers/refused.hpp"
 
@@ -26,11 +26,6 @@ using mocap::MocapEmulator;
 using test::CollectSink;
 using Bytes = std::vector<std::byte>;
 using Layout = std::unique_ptr<const SourceLayout>;
-
-std::unique_ptr<Decoder> new_decoder() {
-  const Driver& driver = *find_driver("template_mocap");
-  return driver.make_decoder(driver.expect({}).value()).value();
-}
 
 // Two bodies of one joint and of two.
 std::vector<BodyEntry> two_bodies() {
@@ -49,16 +44,14 @@ BodyPose still(std::uint16_t id, std::size_t joints) {
 }
 
 // A decoder that knows two_bodies(), and what it makes of frames.
-struct Rig {
-  std::unique_ptr<Decoder> decoder = new_decoder();
-  Layout layout = layout_of(two_bodies()).value();
-  CollectSink sink;
+struct Rig : test::DecoderRig {
+  Rig() : DecoderRig("template_mocap") { use(content_of(mocap::encode_description(two_bodies()))); }
+
   std::uint32_t number = 0;
 
-  Rig() { decoder->use(*layout); }
-  void feed(std::vector<BodyPose> bodies) {
+  void send(std::vector<BodyPose> bodies) {
     ++number;
-    decoder->feed(mocap::encode_frame({number, number * 10'000, std::move(bodies)}), 0, sink);
+    feed(mocap::encode_frame({number, number * 10'000, std::move(bodies)}));
   }
 };
 
@@ -69,20 +62,10 @@ Bytes next(MocapEmulator& emulator) {
   return bytes;
 }
 
-// Feeds the emulator's next datagram; uses a description at once, as the daemon does a little
-// later.
-struct Session {
-  std::unique_ptr<Decoder> decoder = new_decoder();
-  std::vector<Layout> layouts;
-  CollectSink sink;
+struct Session : test::DecoderRig {
+  Session() : DecoderRig("template_mocap") {}
 
-  void step(MocapEmulator& emulator) {
-    const int before = sink.descriptions;
-    decoder->feed(next(emulator), 0, sink);
-    if (sink.descriptions == before) return;
-    layouts.push_back(find_driver("template_mocap")->make_layout(sink.described).value());
-    decoder->use(*layouts.back());
-  }
+  void step(MocapEmulator& emulator) { feed(next(emulator)); }
 };
 
 }  // namespace
@@ -180,29 +163,30 @@ TEST_CASE("counts that promise more than there is cost no memory") {
 
 TEST_CASE("frames before the first layout are counted and not emitted") {
   CollectSink sink;
-  new_decoder()->feed(mocap::encode_frame({1, 0, {still(5, 1)}}), 0, sink);
+  test::decoder_of(*find_driver("template_mocap"))
+      ->feed(mocap::encode_frame({1, 0, {still(5, 1)}}), 0, sink);
   CHECK(sink.frames.empty());
   CHECK(sink.count(Outcome::kForeign) == 1);
 }
 
 TEST_CASE("a frame that contradicts the layout is counted, and the bodies beside it are kept") {
   Rig rig;
-  rig.feed({still(5, 1), still(300, 2)});
+  rig.send({still(5, 1), still(300, 2)});
   CHECK(rig.sink.bodies == std::vector<std::size_t>{0, 1});
-  rig.feed({still(5, 2), still(300, 2)});  // joints
+  rig.send({still(5, 2), still(300, 2)});  // joints
   CHECK(rig.sink.bodies == std::vector<std::size_t>{0, 1, 1});
-  rig.feed({still(6, 1), still(5, 1)});  // an unknown body
+  rig.send({still(6, 1), still(5, 1)});  // an unknown body
   CHECK(rig.sink.bodies == std::vector<std::size_t>{0, 1, 1, 0});
-  rig.feed({still(5, 1), still(5, 1)});  // twice the same
+  rig.send({still(5, 1), still(5, 1)});  // twice the same
   CHECK(rig.sink.frames.size() == 5);
   BodyPose broken = still(5, 1);
   broken.rotation_xyzw[0] = {0.5F, 0, 0, 0.5F};
-  rig.feed({broken});
+  rig.send({broken});
   broken = still(5, 1);
   broken.root_m[1] = 2000.0F;
-  rig.feed({broken});
+  rig.send({broken});
   broken.root_m[1] = std::nanf("");
-  rig.feed({broken});
+  rig.send({broken});
   CHECK(rig.sink.frames.size() == 5);
   CHECK(rig.sink.count(Outcome::kOk) == 1);
   CHECK(rig.sink.count(Outcome::kOutOfRange) == 6);
@@ -212,7 +196,7 @@ TEST_CASE("a joint that was not seen is not valid") {
   Rig rig;
   BodyPose pose = still(300, 2);
   pose.rotation_xyzw[1] = {};
-  rig.feed({pose});
+  rig.send({pose});
   REQUIRE(rig.sink.frames.size() == 1);
   CHECK(rig.sink.frames[0].valid[0]);
   CHECK_FALSE(rig.sink.frames[0].valid[1]);

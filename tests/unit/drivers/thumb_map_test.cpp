@@ -14,7 +14,6 @@
 #include "drivers/options.hpp"
 #include "models/hand/constraint_solver.hpp"
 #include "models/hand/thumb_fit.hpp"
-#include "proto/frame/degree.hpp"
 #include "tests/support/grasps.hpp"
 #include "tests/support/hand_signs.hpp"
 #include "tests/support/shared.hpp"

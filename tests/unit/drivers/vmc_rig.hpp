@@ -3,17 +3,14 @@
 #pragma once
 
 #include <cstdint>
-#include <initializer_list>
-#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "drivers/byte_writer.hpp"
-#include "drivers/driver.hpp"
 #include "drivers/vmc/emulator.hpp"
 #include "drivers/vmc/messages.hpp"
-#include "tests/unit/drivers/collect_sink.hpp"
+#include "tests/unit/drivers/decoder_of.hpp"
 
 namespace posed::test {
 
@@ -69,29 +66,17 @@ inline std::vector<Bytes> vmc_burst(drivers::vmc::VmcEmulator& emulator) {
   return datagrams;
 }
 
-// Feeds datagrams; uses a description at once, as the daemon does a little later.
-struct VmcSession {
-  std::unique_ptr<drivers::Decoder> decoder =
-      drivers::find_driver("vmc")
-          ->make_decoder(drivers::find_driver("vmc")->expect({}).value())
-          .value();
-  std::vector<std::unique_ptr<const drivers::SourceLayout>> layouts;
-  CollectSink sink;
+struct VmcSession : DecoderRig {
+  VmcSession() : DecoderRig("vmc") {}
 
-  void feed(std::span<const std::byte> datagram, std::int64_t arrival_ns) {
-    const int before = sink.descriptions;
-    decoder->feed(datagram, arrival_ns, sink);
-    if (sink.descriptions == before) return;
-    layouts.push_back(drivers::find_driver("vmc")->make_layout(sink.described).value());
-    decoder->use(*layouts.back());
-  }
+  using DecoderRig::feed;
   // One after the other, in steps of 50 us.
   void feed(const std::vector<Bytes>& burst, std::int64_t first_ns) {
     for (std::size_t i = 0; i < burst.size(); ++i) {
       feed(burst[i], first_ns + 50'000 * static_cast<std::int64_t>(i));
     }
   }
-  [[nodiscard]] const drivers::Body& body() const { return layouts.back()->bodies.front(); }
+  [[nodiscard]] const drivers::Body& body() const { return bodies().front(); }
 };
 
 }  // namespace posed::test

@@ -4,7 +4,6 @@
 #include <functional>
 #include <random>
 
-#include "drivers/vmc/frame_end.hpp"
 #include "drivers/vmc/sender_clock.hpp"
 #include "tests/unit/drivers/vmc_rig.hpp"
 

@@ -2,14 +2,12 @@
 // of vmc_senders_test.cpp.
 #include <catch2/catch.hpp>
 
-#include <array>
 #include <cmath>
 #include <fstream>
 #include <limits>
 #include <random>
 
 #include "proto/frame/rotation.hpp"
-#include "tests/support/allocations.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/recorded_log.hpp"
 #include "tests/unit/drivers/refused.hpp"

@@ -1,7 +1,6 @@
 #include "tests/unit/tidy/source_tree.hpp"
 
 #include <algorithm>
-#include <array>
 #include <fstream>
 #include <iterator>
 #include <map>

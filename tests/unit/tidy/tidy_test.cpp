@@ -2,7 +2,6 @@
 // example.
 #include <catch2/catch.hpp>
 
-#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <set>

@@ -15,7 +15,6 @@
 #include "daemon/config/config.hpp"
 #include "daemon/record/recorder.hpp"
 #include "daemon/system/clock.hpp"
-#include "proto/clip/bvh.hpp"
 #include "proto/log/reader.hpp"
 #include "tests/support/free_port.hpp"
 #include "tests/support/mocap_room.hpp"

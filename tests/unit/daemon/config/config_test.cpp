@@ -1,9 +1,7 @@
 #include "daemon/config/config.hpp"
 
-#include <array>
 #include <fstream>
 #include <regex>
-#include <sstream>
 
 #include <catch2/catch.hpp>
 

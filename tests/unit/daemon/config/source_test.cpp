@@ -1,7 +1,6 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/config/config.hpp"
-#include "models/stages/registry.hpp"
 
 namespace posed::config {
 namespace {

@@ -14,7 +14,6 @@
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/model/style_model.hpp"
 #include "proto/clip/clip.hpp"
-#include "proto/clip/format.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/style/toy_style.hpp"

@@ -12,14 +12,12 @@
 
 #include "daemon/devices/source_builder.hpp"
 #include "daemon/pipeline/description_row.hpp"
-#include "daemon/system/clock.hpp"
 #include "drivers/options.hpp"
 #include "drivers/template_mocap/protocol.hpp"
 #include "models/merge/merge_stage.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "models/stages/registry.hpp"
 #include "models/style/live/style_type.hpp"
-#include "proto/clip/bvh.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 

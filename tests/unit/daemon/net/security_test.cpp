@@ -1,6 +1,5 @@
 #include <chrono>
 #include <string>
-#include <thread>
 
 #include <catch2/catch.hpp>
 

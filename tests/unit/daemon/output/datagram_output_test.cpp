@@ -1,8 +1,6 @@
 // The outputs that only send, as the programs of the protocols do: from frames to datagrams on real
 // sockets, on a virtual clock, to posed's own decoders.
-#include "daemon/output/datagram_output.hpp"
 
-#include <set>
 #include <string>
 #include <vector>
 

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <ctime>
 #include <map>
 #include <memory>
 #include <span>
@@ -17,6 +16,7 @@
 
 #include "drivers/driver.hpp"
 #include "proto/frame/rotation.hpp"
+#include "tests/support/processor_time.hpp"
 #include "tests/unit/daemon/output/output_rig.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 
@@ -155,20 +155,15 @@ struct CrowdCheck {
   }
   // Hands over one step's poses, and counts the thread's own time.
   void pass(const OutputRig& rig, const Crowd& crowd, int people, int step, std::int64_t now_ns) {
-    const auto cpu_us = [] {
-      timespec time{};
-      ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-      return 1e6 * static_cast<double>(time.tv_sec) + 1e-3 * static_cast<double>(time.tv_nsec);
-    };
     std::vector<Frame> poses;
     for (int i = 0; i < people; ++i) {
       poses.push_back(crowd.pose(i, step));
       poses.back().header.arrival_ns = now_ns;
     }
-    const double before_us = cpu_us();
+    const double before_us = processor_time_us();
     for (const Frame& pose : poses) rig.output->frame(pose);
     static_cast<void>(rig.output->turn(now_ns));
-    us.push_back((cpu_us() - before_us) / people);
+    us.push_back((processor_time_us() - before_us) / people);
   }
   void compare_with(const Crowd& crowd, ProtocolReader& reader, int people, int step,
                     const std::vector<std::string>& names) {

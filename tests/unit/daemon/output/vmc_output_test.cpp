@@ -1,5 +1,4 @@
 // The VMC output from frames to datagrams on real sockets, on a virtual clock.
-#include "daemon/output/vmc_output.hpp"
 
 #include <string>
 

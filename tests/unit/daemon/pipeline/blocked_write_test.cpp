@@ -10,7 +10,6 @@
 
 #include "daemon/pipeline/reader.hpp"
 #include "daemon/system/clock.hpp"
-#include "drivers/options.hpp"
 #include "drivers/transport/hid_transport.hpp"
 #include "drivers/transport/transport_factory.hpp"
 #include "proto/clip/clip.hpp"

@@ -1,7 +1,6 @@
 // A stage that posed does not have: the engine runs it from its StageType alone.
 #include <catch2/catch.hpp>
 
-#include <algorithm>
 #include <array>
 #include <memory>
 #include <vector>

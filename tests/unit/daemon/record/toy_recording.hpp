@@ -1,7 +1,6 @@
 // For tests of the recorder: rings and logs of toy sources, and what a log has of them.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <span>

@@ -16,7 +16,6 @@
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/model/style_model.hpp"
 #include "models/style/train/train.hpp"
-#include "proto/frame/degree.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/time.hpp"
 #include "tests/support/has.hpp"

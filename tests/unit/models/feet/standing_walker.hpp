@@ -7,8 +7,6 @@
 #include <memory>
 #include <numbers>
 #include <string>
-#include <utility>
-#include <vector>
 
 #include "models/feet/feet_stage.hpp"
 #include "models/motion/motion.hpp"

@@ -2,9 +2,6 @@
 // fist, scissors and an open hand, and smooth delta statistics. Shared by many tests.
 #pragma once
 
-#include <cmath>
-#include <string>
-
 #include "models/gesture/gesture_model.hpp"
 
 namespace posed::test {

@@ -5,11 +5,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <limits>
 
 #include "tests/support/allocations.hpp"
 #include "tests/support/golden_json.hpp"
+#include "tests/support/processor_time.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/models/hand/hand_poses.hpp"
 
@@ -48,13 +48,6 @@ double cost(const HandAngles& a, const HandAngles& b) {
   double sum = 0.0;
   for (std::size_t c = 0; c < a.size(); ++c) sum += (a[c] - b[c]) * (a[c] - b[c]);
   return sum;
-}
-
-// Processor time of this thread, so that other programs on a busy machine do not count.
-double processor_us() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return 1e6 * static_cast<double>(now.tv_sec) + 1e-3 * static_cast<double>(now.tv_nsec);
 }
 
 }  // namespace
@@ -211,9 +204,9 @@ TEST_CASE("the processor time of a step", "[.bench]") {
       for (std::size_t c = 0; c < angles.size(); ++c) {
         angles[c] += most_rad * 0.3 * std::sin(0.03 * i + static_cast<double>(c));
       }
-      const double begin_us = processor_us();
+      const double begin_us = test::processor_time_us();
       (void)solver.step(angles, test::same_variance());
-      took_us.push_back(processor_us() - begin_us);
+      took_us.push_back(test::processor_time_us() - begin_us);
     }
     std::ranges::sort(took_us);
     const auto at = [&](double p) { return took_us[static_cast<std::size_t>(p * 19999)]; };

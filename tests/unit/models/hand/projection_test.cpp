@@ -1,6 +1,5 @@
 #include "models/hand/projection.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <vector>
 

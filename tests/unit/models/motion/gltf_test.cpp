@@ -12,7 +12,6 @@
 #include "models/motion/vrm_animation.hpp"
 #include "proto/clip/format.hpp"
 #include "proto/clip/gltf.hpp"
-#include "proto/frame/hand_skeleton.hpp"
 #include "tests/support/file_text.hpp"
 #include "tests/support/has.hpp"
 #include "tests/support/read_gltf.hpp"

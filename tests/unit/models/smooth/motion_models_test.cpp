@@ -2,7 +2,6 @@
 #include <array>
 #include <cmath>
 #include <numbers>
-#include <random>
 
 #include <catch2/catch.hpp>
 

@@ -1,7 +1,6 @@
 // Where the speed may change and where it does not (models/smooth/README.md, "Steady motion").
 #include "models/smooth/steady_motion.hpp"
 
-#include <cmath>
 #include <functional>
 #include <limits>
 #include <random>

@@ -1,7 +1,6 @@
 // The tables of parameters: what a row says of a live parameter is what the stage does.
 #include <catch2/catch.hpp>
 
-#include <memory>
 #include <string>
 #include <variant>
 #include <vector>

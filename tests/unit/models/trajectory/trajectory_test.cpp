@@ -1,6 +1,5 @@
 // Trajectories from information rows against the numpy fixture (tests/golden/mlpg.json), within
 // 1e-8.
-#include <limits>
 
 #include <catch2/catch.hpp>
 

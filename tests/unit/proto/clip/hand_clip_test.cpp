@@ -3,7 +3,6 @@
 #include <catch2/catch.hpp>
 
 #include <cmath>
-#include <fstream>
 
 #include "proto/clip/format.hpp"
 #include "proto/frame/hand_skeleton.hpp"

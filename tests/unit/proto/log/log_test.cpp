@@ -5,7 +5,6 @@
 #include <atomic>
 #include <barrier>
 #include <fstream>
-#include <map>
 #include <string>
 #include <thread>
 #include <vector>

@@ -2,7 +2,6 @@
 
 #include <catch2/catch.hpp>
 
-#include <fstream>
 #include <string>
 
 #include "tests/support/temp_folder.hpp"

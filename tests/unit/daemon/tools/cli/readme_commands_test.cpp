@@ -1,7 +1,6 @@
 // Every command line of posed in a README names a command that exists, with options that it has.
 #include <algorithm>
 #include <cstddef>
-#include <fstream>
 #include <optional>
 #include <regex>
 #include <sstream>

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 
 #include "daemon/tools/export/log_clip.hpp"
 #include "daemon/tools/replay/replay.hpp"

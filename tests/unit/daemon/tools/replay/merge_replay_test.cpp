@@ -14,7 +14,6 @@
 #include "drivers/template_mocap/protocol.hpp"
 #include "models/merge/merge_stage.hpp"
 #include "models/motion/synthetic_walker.hpp"
-#include "proto/clip/bvh.hpp"
 #include "proto/clip/device_clip.hpp"
 #include "proto/log/reader.hpp"
 #include "tests/support/dice.hpp"

@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <set>
 
-#include "daemon/tools/export/frame_file.hpp"
 #include "daemon/tools/export/log_clip.hpp"
 #include "daemon/tools/replay/replay.hpp"
 #include "posed/v1/log.pb.h"

@@ -1,8 +1,6 @@
 // The style model's file: written and read back, and a clear error for every file that is not one.
 #include <catch2/catch.hpp>
 
-#include <cstring>
-#include <fstream>
 #include <limits>
 
 #include "models/style/model/style_model.hpp"

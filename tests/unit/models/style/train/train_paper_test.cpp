@@ -10,7 +10,6 @@
 #include "models/style/judge/evaluate.hpp"
 #include "models/style/live/apply.hpp"
 #include "models/style/train/train.hpp"
-#include "models/style/train/training_pairs.hpp"
 #include "models/tasks.hpp"
 
 using namespace posed;
