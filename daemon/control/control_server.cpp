@@ -78,7 +78,7 @@ void ControlServer::serve() {
     bool busy = false;
     // A large model takes a second, so each request is a sign of life.
     for (int i = 0; i < kRequestsARound; ++i) {
-      pulse_.beat();
+      handler_.pulse().beat();
       if (!handle_request()) break;
       busy = true;
     }

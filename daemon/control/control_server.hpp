@@ -45,7 +45,7 @@ class ControlServer {
 
   static constexpr const char* kThreadName = "posed-control";
   // Any thread.
-  [[nodiscard]] const system::Pulse& pulse() const noexcept { return pulse_; }
+  [[nodiscard]] const system::Pulse& pulse() const noexcept { return handler_.pulse(); }
   [[nodiscard]] ControlCounts counts() const noexcept {
     return {.requests = requests_.load(), .refusals = refusals_.load()};
   }
@@ -68,7 +68,6 @@ class ControlServer {
   std::string endpoint_;
   ControlPorts ports_;
   RequestHandler& handler_;
-  system::Pulse pulse_;
   std::atomic<std::uint64_t> requests_{0}, refusals_{0};
   std::atomic<bool> stop_{false};
   std::thread thread_;

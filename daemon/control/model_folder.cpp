@@ -27,6 +27,21 @@ std::string_view ending_of(std::string_view kind) {
   return kind == kGenerate ? ".gesture" : ".style";
 }
 
+// How many files of all kinds are there, as far as it can be read; counted to the limit.
+std::size_t kept_files(const std::filesystem::path& folder) {
+  std::size_t count = 0;
+  std::error_code error;
+  std::filesystem::directory_iterator entries(folder, error);
+  for (; !error && entries != std::filesystem::directory_iterator(); entries.increment(error)) {
+    const std::string ending = entries->path().extension().string();
+    for (const std::string_view kind : {kStyle, kGenerate, kCalibration}) {
+      if (ending == ending_of(kind)) ++count;
+    }
+    if (count >= kMaxModels) break;
+  }
+  return count;
+}
+
 // Empty: no model file.
 std::string_view kind_of(const std::filesystem::path& file) {
   for (const std::string_view kind : {kStyle, kGenerate}) {
@@ -85,12 +100,13 @@ Result<> ModelFolder::check_writable() const {
 Result<std::string> ModelFolder::add(const std::string& name, std::string_view kind,
                                      std::string_view bytes) const {
   TRY(check_writable());
-  const auto models = TRY(list());
-  if (models.size() >= kMaxModels) {
+  if (kept_files(folder_) >= kMaxModels) {
     return fail("the folder of models is full; move some of its models elsewhere",
                 folder_.string());
   }
-  const std::filesystem::path whole = folder_ / ("." + name + ".new");
+  // Another thread, or another daemon with this folder, may be keeping one of this name just now.
+  const std::filesystem::path whole =
+      folder_ / fmt::format(".{}{}.{}.new", name, ending_of(kind), getpid());
   TRY(write_whole_file(whole, bytes));
   for (std::size_t number = 1; number <= kMaxModels + 1; ++number) {
     const std::string file =

@@ -11,6 +11,7 @@
 #include "models/gesture/model_file.hpp"
 #include "models/style/model/style_model.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/json_text.hpp"
 #include "proto/text/list.hpp"
 
 namespace posed::control {
@@ -32,7 +33,7 @@ std::string text_of(const json& object, const char* key) {
 
 // The report is for people and comes from a file: what it lacks is left out.
 json report_of(const std::string& text) {
-  json report = json::parse(text, nullptr, false);
+  json report = parse_json(text);
   return report.is_object() ? report : json::object();
 }
 

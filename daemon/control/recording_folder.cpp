@@ -16,6 +16,7 @@
 #include "proto/clip/clip.hpp"
 #include "proto/clip/format.hpp"
 #include "proto/clip/gltf.hpp"
+#include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
 
@@ -23,9 +24,10 @@ namespace posed::control {
 namespace {
 
 constexpr std::size_t kMaxRecordings = 256;
-constexpr std::size_t kMaxConverted =
-    24UL * 1024 * 1024;  // bytes, before and after: a second's work
-constexpr int kMaxConvertedFrames = 36'000;
+// Of a clip that is converted, so that it takes less than a second and 64 MB: bytes, before and
+// after, and values, of which a byte or ten may make one.
+constexpr std::size_t kMaxConverted = 12UL * 1024 * 1024;
+constexpr std::ptrdiff_t kMaxConvertedValues = 1'500'000;
 
 // A name in the folder; control characters in it would reach people's terminals.
 bool is_recording(const std::string& name) {
@@ -93,16 +95,19 @@ Result<std::string> RecordingFolder::piece(std::string_view name, std::uint64_t 
   if (folder_.empty()) return std::unexpected(no_folder());
   const std::string wanted(name);
   const auto path = folder_ / wanted;
+  // Before it is opened: to close a file ends this process's locks on it, SQLite's of the log that
+  // it writes, too, and then others who read that log may take its -wal file away.
+  if (is_recording(wanted) && is_in_use(path)) {
+    return fail(
+        fmt::format("{} is still being written; it can be fetched when posed has ended, or"
+                    " once `posed convert` has opened it if posed was killed",
+                    in_quotes(name)));
+  }
   const int file = is_recording(wanted) ? open_recording(path) : -1;
   if (file < 0 && (!is_recording(wanted) || errno == ENOENT || errno == ELOOP)) {
     return fail(fmt::format("there is no recording {} in the daemon's list", in_quotes(name)));
   }
   if (file < 0) return fail("the recording cannot be read: " + errno_text(), wanted);
-  if (is_in_use(path)) {
-    close(file);
-    return fail(fmt::format("{} is still being written; it can be fetched when posed has ended",
-                            in_quotes(name)));
-  }
   constexpr std::uint64_t kFarthest = std::numeric_limits<off_t>::max() / 2;  // past any end
   offset = std::min(offset, kFarthest);
   std::string bytes(kMaxRecordingPiece, '\0');
@@ -131,7 +136,13 @@ Result<std::string> RecordingFolder::converted(const Part& part) const {
     file.bytes += more;
     if (file.bytes.size() > kMaxConverted) break;
   }
+  const auto values = std::ranges::count_if(file.bytes, [](char c) { return c <= ' '; });
+  if (file.bytes.size() > kMaxConverted || values > kMaxConvertedValues) {
+    return fail(part.name +
+                " is too long for this; `posed convert` on the daemon's computer does it");
+  }
   clip::Clip clip = TRY(clip::parse_clip(file));
+  file.bytes = {};
   const auto frame_at = [&](double at_s) {
     const double frame = std::round(at_s * clip.frame_rate_hz);
     return static_cast<int>(std::clamp(frame, 0.0, static_cast<double>(clip.frames())));
@@ -139,16 +150,11 @@ Result<std::string> RecordingFolder::converted(const Part& part) const {
   const int first = frame_at(part.from_s);
   const int end = part.to_s > 0.0 ? frame_at(part.to_s) : clip.frames();
   if (!(end > first)) return fail("there are no frames from here to there in " + part.name);
-  if (file.bytes.size() > kMaxConverted || end - first > kMaxConvertedFrames) {
-    return fail(part.name +
-                " is too long for this; `posed convert` on the daemon's computer does it");
-  }
   clip::keep_frames(clip, first, end);
-  const auto made = folder_ / ("." + part.name + "." + part.as);
-  const auto written =
-      part.as == "glb" ? clip::write_glb(clip, made) : motion::write_vrm_animation(clip, made);
-  auto bytes = written ? load_file(made, {.what = "clip", .max_bytes = kMaxConverted})
-                       : Result<std::string>(std::unexpected(written.error()));
+  const auto made = folder_ / fmt::format(".{}.{}.{}", part.name, getpid(), part.as);
+  never_replace(made);
+  TRY(part.as == "glb" ? clip::write_glb(clip, made) : motion::write_vrm_animation(clip, made));
+  auto bytes = load_file(made, {.what = "clip", .max_bytes = kMaxConverted});
   std::error_code ignored;
   std::filesystem::remove(made, ignored);
   return bytes;

@@ -189,6 +189,7 @@ RequestHandler::Answer RequestHandler::list_models() {
   const Figures there = figures();
   v1::ControlReply reply;
   for (const FolderModel& model : known) {
+    pulse_.beat();
     v1::KnownModel& entry = *reply.add_model();
     entry.set_name(model.name);
     entry.set_kind(std::string(model.kind));

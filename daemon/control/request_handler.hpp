@@ -26,6 +26,7 @@
 #include "daemon/pipeline/stream_settings.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/system/clock.hpp"
+#include "daemon/system/pulse.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "proto/frame/result.hpp"
@@ -120,6 +121,9 @@ class RequestHandler {
   // has to act first. Bytes that are not a valid request get a reply with an error sentence, never
   // a crash.
   [[nodiscard]] std::optional<Reply> handle(Requester requester, std::span<const std::byte> bytes);
+
+  // Of the control thread, which beats for each request; list_models() does for each model.
+  [[nodiscard]] system::Pulse& pulse() noexcept { return pulse_; }
 
   // Forgets uploads that have stalled. Returns when to call it next at the latest.
   [[nodiscard]] std::int64_t forget_old(std::int64_t now_ns);
@@ -236,6 +240,7 @@ class RequestHandler {
   const ModelFolder models_;
   const RecordingFolder recordings_;
   Clock clock_;
+  system::Pulse pulse_;
   teach::Teacher* const teacher_;
   // The clip that was had last as another kind of file, for its further pieces.
   std::mutex converted_mutex_;

@@ -42,8 +42,8 @@ bool write_within(int descriptor, std::string_view text, std::chrono::millisecon
 
 // Call at the beginning of main(). The number of a closed standard descriptor would be given to the
 // next file that is opened, and messages would be written into that file; so each closed one is
-// opened in a way that its use still fails. Also ignores SIGPIPE: writing to a reader that has gone
-// is then an error and does not end the process.
+// opened in a way that its use still fails. Also ignores SIGPIPE and SIGXFSZ: to write to a reader
+// that has gone, or beyond a file's size limit, is then an error and does not end the process.
 void protect_standard_descriptors();
 
 }  // namespace posed::logging

@@ -92,7 +92,7 @@ std::string to_json(const StreamSettings& settings) {
 
 Result<StreamSettings> settings_from_json(const std::string& json, const std::string& file) {
   try {
-    const auto root = Json::parse(json);
+    const Json root(parse_json(json));
     StreamSettings settings;
     settings.publish_raw = root.at("publish_raw").get<bool>();
     settings.stale_after_s = root.at("stale_after_s").get<double>();
@@ -126,7 +126,7 @@ std::string to_json(const drivers::Options& options, const std::string& mapping)
 }
 
 Result<std::string> mapping_from_json(const std::string& json, const std::string& file) {
-  const Json root = Json::parse(json, nullptr, false);
+  const Json root(parse_json(json));
   const auto found = root.find(kMapping);
   if (found == root.end()) return std::string();
   if (found->is_string()) return found->get<std::string>();

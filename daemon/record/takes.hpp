@@ -14,8 +14,7 @@
 
 namespace posed::record {
 
-// Of a recording. A trigger alone needs days to reach it (control/trigger.hpp).
-inline constexpr std::uint32_t kMaxTakes = 99'999;
+using log::kMaxTakes;
 
 // A take has begun or ended.
 struct TakeChange {

@@ -30,7 +30,8 @@ constexpr milliseconds kWritePatience{1000};
 constexpr milliseconds kDrainPatience{1000};
 constexpr milliseconds kClosePatience{50};
 constexpr std::int64_t kOfNoUse_ns = 5 * kNanosPerSecond;
-constexpr int kMaxWaiting = 256;  // reads; hidraw keeps 64 reports
+constexpr std::size_t kMaxOfNoUse = 1024 * 1024;  // bytes in a row; a recording keeps them all
+constexpr int kMaxWaiting = 256;                  // reads; hidraw keeps 64 reports
 
 bool not_now(int error) noexcept {
   return error == EAGAIN || error == EWOULDBLOCK || error == EINTR;
@@ -68,6 +69,7 @@ class LinkTransport final : public Transport, public Upkeep {
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
   RT_SAFE void decoded(bool used) noexcept override {
     if (used) used_ns_.store(read_ns_, std::memory_order_relaxed);
+    of_no_use_ = used ? 0 : of_no_use_ + read_;
   }
   [[nodiscard]] bool send(std::span<const std::byte> bytes, std::uint8_t socket) noexcept override;
   void upkeep(std::int64_t now_ns) noexcept override;
@@ -78,6 +80,7 @@ class LinkTransport final : public Transport, public Upkeep {
 
   Connection link_;
   std::int64_t read_ns_ = 0;
+  std::size_t read_ = 0, of_no_use_ = 0;  // bytes, of the last read and since the last one of use
   // When the last bytes of use were read; before start() there is nothing to wait for.
   std::atomic<std::int64_t> used_ns_{std::numeric_limits<std::int64_t>::max()};
   bool is_given_up_ = false, is_reported_ = false;  // of the upkeep's thread
@@ -101,10 +104,12 @@ Result<> LinkTransport::start(std::int64_t now_ns) {
 Chunk LinkTransport::read(std::int64_t now_ns) noexcept {
   read_ns_ = now_ns;
   flush();
-  const ssize_t got = link_.receive(buffer_);
-  if (got > 0) return {.bytes = {buffer_.data(), static_cast<std::size_t>(got)}};
+  const bool floods = of_no_use_ > kMaxOfNoUse;
+  const ssize_t got = floods ? 0 : link_.receive(buffer_);
+  read_ = static_cast<std::size_t>(std::max<ssize_t>(got, 0));
+  if (got > 0) return {.bytes = {buffer_.data(), read_}};
   if (got < 0 && not_now(errno)) return {};
-  return {.bytes = {}, .lost = true, .foreign = link_.was_browser() ? 1U : 0U};
+  return {.bytes = {}, .lost = true, .foreign = floods || link_.was_browser() ? 1U : 0U};
 }
 
 // The reader then finds the link hung up, and the next one is accepted.
@@ -195,6 +200,7 @@ Connection& Connection::operator=(Connection&& other) noexcept {
   identity_ = std::move(other.identity_);
   cancel_ = std::move(other.cancel_);
   undecided_ = other.undecided_;
+  first_lines_ = other.first_lines_;
   was_browser_ = other.was_browser_;
   kept_back_ = other.kept_back_;
   kept_ = other.kept_;
@@ -202,12 +208,12 @@ Connection& Connection::operator=(Connection&& other) noexcept {
 }
 
 ssize_t Connection::receive(std::span<std::byte> buffer) noexcept {
-  if (!undecided_) return was_browser_ ? 0 : ::read(fd_, buffer.data(), buffer.size());
+  if (was_browser_) return 0;
   std::ranges::copy(std::span(kept_back_).first(kept_), buffer.begin());
   const ssize_t got = ::read(fd_, buffer.data() + kept_, buffer.size() - kept_);
-  if (got <= 0) return got;
+  if (listener_ < 0 || got <= 0) return got;
   const auto bytes = buffer.first(kept_ + static_cast<std::size_t>(got));
-  const Beginning beginning = beginning_of(bytes);
+  const Beginning beginning = undecided_ ? beginning_of(bytes) : Beginning::kDevice;
   if (beginning == Beginning::kOpen) {
     kept_ = bytes.size();
     std::ranges::copy(bytes, kept_back_.begin());
@@ -215,7 +221,8 @@ ssize_t Connection::receive(std::span<std::byte> buffer) noexcept {
     return -1;
   }
   undecided_ = false;
-  was_browser_ = beginning == Beginning::kBrowser;
+  kept_ = 0;
+  was_browser_ = beginning == Beginning::kBrowser || first_lines_.have_request(bytes);
   if (was_browser_) ::shutdown(fd_, SHUT_RDWR);
   return was_browser_ ? 0 : static_cast<ssize_t>(bytes.size());
 }

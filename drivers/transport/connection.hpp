@@ -73,6 +73,7 @@ class Connection {
   std::string name_, identity_;
   std::shared_ptr<const Cancel> cancel_;
   bool undecided_ = false, was_browser_ = false;
+  FirstLines first_lines_;
   std::array<std::byte, kMaxBeginning> kept_back_{};
   std::size_t kept_ = 0;
 };

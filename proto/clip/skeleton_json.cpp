@@ -83,7 +83,7 @@ std::string skeleton_json(const Skeleton& skeleton) {
 Result<Skeleton> skeleton_from_json(std::string_view text, const std::string& name) {
   Skeleton skeleton;
   try {
-    const json value = json::parse(text);
+    const json value = parse_json(text);
     skeleton.name = value.at("name").get<std::string>();
     skeleton.root_joint = value.at("root_joint").get<int>();
     for (const json& joint : value.at("joints")) skeleton.joints.push_back(joint_of(joint));

@@ -324,6 +324,9 @@ Result<std::vector<TakeRow>> Reader::takes() const {
   for (;;) {
     const auto stepped = TRY(state_->step(select, "take"));
     if (!stepped) return takes;
+    if (const std::int64_t id = select.integer(0); id < 1 || id > kMaxTakes) {
+      return damaged_row(state_->file, "take", id, "has a number that no recording gives");
+    }
     takes.push_back({select.integer(0), std::string(select.text(1)), unsigned_of(select.integer(2)),
                      unsigned_of(select.integer(3)),
                      timed ? std::string(select.text(4)) : std::string()});

@@ -93,9 +93,12 @@ struct GapRow {
 // the column, so that a comparison with it needs no special case.
 inline constexpr std::uint64_t kToTheEnd = std::numeric_limits<std::int64_t>::max();
 
+// Of a recording. A trigger alone needs days to reach it (daemon/control/trigger.hpp).
+inline constexpr std::uint32_t kMaxTakes = 99'999;
+
 // Table take: an interval marked by a user.
 struct TakeRow {
-  std::int64_t id = 0;  // the take's number
+  std::int64_t id = 0;  // the take's number, 1 to kMaxTakes
   std::string name;
   std::uint64_t first_item = 0;
   std::uint64_t last_item = 0;  // below first_item: nothing came; kToTheEnd: it was never ended

@@ -44,8 +44,18 @@ std::unexpected<Error> dds_error(const std::string& what, dds_return_t code) {
   return fail(what + " (DDS says: " + dds_strretcode(-code) + ")");
 }
 
+// What is said of a message that makes no sense ends in its parts and bytes, of which no two are
+// alike, so that the log would not count such lines together.
+std::string_view without_bytes(std::string_view text) {
+  for (const std::string_view kind : {"malformed ", "invalid ", "Invalid "}) {
+    if (!text.starts_with(kind)) continue;
+    return text.substr(0, std::min(text.find(" state "), text.find_first_of("(<")));
+  }
+  return text;
+}
+
 void log_dds(void* /*unused*/, const dds_log_data_t* data) {
-  spdlog::warn("DDS: {}", clean(std::string_view(data->message, data->size)));
+  spdlog::warn("DDS: {}", clean(without_bytes({data->message, data->size})));
 }
 
 // The IPv4 address of an interface, in the order of the network's bytes.

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/frame/result.hpp"
+#include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 
 namespace posed::tools {
@@ -210,7 +211,7 @@ int Findings::show(bool as_json, int indent) const {
     const bool headline = finding.kind == Kind::kHeadline && as_json;
     const bool note = finding.kind == Kind::kNote && !as_json;
     if (finding.kind == Kind::kRemark || headline || note) {
-      std::fprintf(stderr, "posed: %s\n", finding.text.c_str());
+      std::fprintf(stderr, "posed: %s\n", clean(finding.text).c_str());
     }
   }
   return static_cast<int>(good_ ? ExitCode::kDone : ExitCode::kFailed);

@@ -21,7 +21,7 @@ namespace {
 
 void print_warnings(const std::string& file, const std::vector<std::string>& warnings) {
   for (const std::string& warning : warnings) {
-    std::fprintf(stderr, "posed: warning: %s: %s\n", file.c_str(), warning.c_str());
+    std::fprintf(stderr, "posed: warning: %s\n", clean(file + ": " + warning).c_str());
   }
 }
 

@@ -20,6 +20,7 @@
 #include "proto/clip/format.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::tools {
 namespace {
@@ -122,7 +123,7 @@ Result<> smooth(const SmoothOptions& options) {
   if (!options.hand.empty()) read.hand = side_named(options.hand);
   auto clip = TRY(clip::read_hand_clip(options.in, read));
   for (const std::string& warning : clip.warnings) {
-    std::fprintf(stderr, "posed: %s: %s\n", options.in.c_str(), warning.c_str());
+    std::fprintf(stderr, "posed: %s\n", clean(options.in + ": " + warning).c_str());
   }
   const auto live = TRY(live_options(options, clip.rate_hz));
   const Skeleton skeleton = hand_skeleton(clip.side);

@@ -27,6 +27,7 @@
 #include "proto/clip/text.hpp"
 #include "proto/clip/timecode_cut.hpp"
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/text/clean.hpp"
 #include "proto/text/stream_name.hpp"
 
 namespace posed::tools {
@@ -142,7 +143,7 @@ Result<std::vector<Drawn>> read_all(const RenderArguments& options) {
   const auto add = [&](const std::string& stream, const std::string& name) -> Result<> {
     const auto clip = TRY(read_motion(options, stream));
     for (const std::string& warning : clip.warnings) {
-      std::fprintf(stderr, "posed: %s: %s\n", options.in.c_str(), warning.c_str());
+      std::fprintf(stderr, "posed: %s\n", clean(options.in + ": " + warning).c_str());
     }
     auto drawn = TRY(drawn_of(options, clip, name));
     all.push_back(std::move(drawn));

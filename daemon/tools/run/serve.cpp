@@ -95,8 +95,6 @@ void prepare_to_serve() {
   logging::sum_up_repeats();
   const sigset_t set = end_signals();
   pthread_sigmask(SIG_BLOCK, &set, nullptr);
-  // a file at its size limit is then an ordinary error, which the recorder reports like a full disk
-  std::signal(SIGXFSZ, SIG_IGN);
 }
 
 Result<> check_end(const assembly::Daemon& daemon, const ServeOptions& options) {

@@ -9,6 +9,7 @@
 
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/findings.hpp"
@@ -20,6 +21,7 @@
 #include "models/style/live/apply.hpp"
 #include "proto/clip/format.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/json_text.hpp"
 #include "proto/text/number.hpp"
 
 namespace posed::tools {
@@ -91,8 +93,14 @@ std::string unchanged(const ApplyArguments& options, const style::Applied& appli
   return "no joint was changed" + why;
 }
 
-// `training`: what the model says of its training.
-std::string verdict(const style::WalkerFit& fit, double rms_deg, const Findings& training) {
+// How much the style changed in its training, as the model says; 0: it does not.
+double training_deg_of(const style::StyleModel& model) {
+  const nlohmann::json report = parse_json(model.report_json);
+  const auto found = report.find("difference_deg");
+  return found != report.end() && found->is_number() ? found->get<double>() : 0.0;
+}
+
+std::string verdict(const style::WalkerFit& fit, double rms_deg, const style::StyleModel& model) {
   if (!fit.is_far()) {
     return fmt::format(
         "this walker is like those of the training ({:.1f} deg rms from the nearest "
@@ -104,8 +112,7 @@ std::string verdict(const style::WalkerFit& fit, double rms_deg, const Findings&
       "learnt from; its own walkers are within {:.0f}): the change is a guess",
       fit.distance_deg, style::WalkerFit::kFar_deg);
   // Of several styles it gives none.
-  if (const double training_deg = training.number("difference_deg").value_or(0.0);
-      training_deg > 0.0) {
+  if (const double training_deg = training_deg_of(model); training_deg > 0.0) {
     text += fmt::format(", {:.1f} deg rms where its training had {:.1f}", rms_deg, training_deg);
   }
   return text;
@@ -116,7 +123,7 @@ Findings findings_of(const ApplyArguments& options, const style::StyleModel& mod
                      const style::Applied& applied, const style::WalkerFit& fit) {
   const double rms_deg = applied.rms_change_rad * kDegrees;
   const double max_deg = applied.max_change_rad * kDegrees;
-  const std::string judged = verdict(fit, rms_deg, Findings().add_json(model.report_json));
+  const std::string judged = verdict(fit, rms_deg, model);
   const std::string nothing = unchanged(options, applied);
   Findings findings;
   findings.add("out", options.out.string())
@@ -174,7 +181,7 @@ Result<> run(ApplyArguments options) {
   options.apply.filter.mask = mask;
   const auto clip = TRY(clip::read_clip(options.in, options.read));
   for (const std::string& warning : clip.warnings) {
-    std::fprintf(stderr, "posed: %s: %s\n", options.in.c_str(), warning.c_str());
+    std::fprintf(stderr, "posed: %s\n", clean(options.in.string() + ": " + warning).c_str());
   }
   TRY(measure_neutral(model, options));
   if (options.apply.filter.gate && !model.gate.present()) {

@@ -146,13 +146,17 @@ http::Answer answer_to_upgrade(const http::Request& request, const Site& site,
   return {.status = 101};
 }
 
-// The bytes belong to the answer. The file has been there at the start.
+// The bytes belong to the answers. The file has been there at the start.
 http::Answer answer_on_demand(const PageFile& file) {
-  auto read = load_file(file.path, {.what = "file of the page", .max_bytes = kMaxPageBytes});
-  if (!read || etag_of(*read) != file.etag) {
-    return http::refuse(404, "this file has changed: start posed view again\n");
+  auto bytes = file.read.lock();
+  if (!bytes) {
+    auto read = load_file(file.path, {.what = "file of the page", .max_bytes = kMaxPageBytes});
+    if (!read || etag_of(*read) != file.etag) {
+      return http::refuse(404, "this file has changed: start posed view again\n");
+    }
+    bytes = std::make_shared<const std::string>(std::move(*read));
+    file.read = bytes;
   }
-  const auto bytes = std::make_shared<const std::string>(std::move(*read));
   return {.body = *bytes, .type = file.type, .etag = file.etag, .keeps = bytes};
 }
 

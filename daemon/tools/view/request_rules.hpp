@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -31,6 +32,8 @@ struct PageFile {
   std::filesystem::path path{};  // of such a file
   std::string_view type;         // MIME type, by the extension
   std::string etag;              // with its quotes; changes when the bytes do
+  // What was read of it, while an answer has it: many who ask at once share one copy.
+  mutable std::weak_ptr<const std::string> read{};
 };
 
 class PageFiles {

@@ -292,6 +292,61 @@ TEST_CASE("a connection that begins as a web browser's is ended and counted, byt
   }
 }
 
+TEST_CASE("a request is a browser's whatever its method, and what follows its line is not read") {
+  const std::string lines = "A1B2C3D4E5\nA1B2C3D4E5\n";
+  for (const std::string& request :
+       std::vector<std::string>{"A100B200 / HTTP/1.1\r\nHost: glove.example:1\r\n\r\n" + lines,
+                                "\r\npatch / HTTP/1.1\r\n\r\n" + lines,
+                                std::string(3000, 'A') + " / HTTP/1.1\r\n\r\n" + lines}) {
+    for (const std::size_t piece : {std::size_t{1}, std::size_t{700}, request.size()}) {
+      INFO(request.substr(0, 8) << " in pieces of " << piece);
+      const std::uint16_t port = free_port();
+      TransportFactory ports;
+      CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
+      const Client page(port);
+      auto link = ports.accept({.endpoint = loopback(port)});
+      REQUIRE(link);
+      const auto transport = make_link_transport(std::move(*link));
+      REQUIRE(transport->start(0));
+      std::string read;
+      Chunk chunk;
+      for (std::size_t at = 0; at < request.size() && !chunk.lost; at += piece) {
+        page.say(request.substr(at, piece));
+        REQUIRE(readable(*transport));
+        chunk = transport->read(0);
+        read += text_of(chunk.bytes);
+      }
+      CHECK(chunk.lost);
+      CHECK(chunk.foreign == 1);
+      CHECK_FALSE(read.contains("A1B2"));
+    }
+  }
+}
+
+TEST_CASE("a connection that brings a megabyte of nothing of use is ended and counted") {
+  const std::uint16_t port = free_port();
+  TransportFactory ports;
+  CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
+  const Client stranger(port);
+  auto link = ports.accept({.endpoint = loopback(port)});
+  REQUIRE(link);
+  const auto transport = make_link_transport(std::move(*link));
+  REQUIRE(transport->start(0));
+  Chunk chunk;
+  std::size_t read = 0;
+  for (int i = 0; i < 4000 && !chunk.lost; ++i) {
+    stranger.say(std::string(1000, '!'));
+    REQUIRE(readable(*transport));
+    chunk = transport->read(0);
+    read += chunk.bytes.size();
+    transport->decoded(i == 1000);
+  }
+  CHECK(chunk.lost);
+  CHECK(chunk.foreign == 1);
+  CHECK(read > 2'000'000);  // what was of use begins the count anew
+  CHECK(read < 2'100'000);
+}
+
 TEST_CASE("a page whose request has come already takes no device's place, nor is it read") {
   const std::uint16_t port = free_port();
   TransportFactory ports;

@@ -163,8 +163,10 @@ TEST_CASE("a model that a stream uses is neither renamed nor deleted") {
   request.mutable_rename_model()->set_name("free.style");
   CHECK(answer(request).ok());
   request.mutable_list_models();
+  const std::uint64_t beats = rig.handler.pulse().beats();
   const auto listed = answer(request);
   REQUIRE(listed.model_size() == 2);
+  CHECK(rig.handler.pulse().beats() >= beats + 2);  // each model is a sign of life
   CHECK(listed.model(0).name() == "other.style");
   CHECK(has(listed.model(0).verdict(), "other.style"));  // what is wrong with the file
   request.mutable_delete_model()->set_name("other.style");

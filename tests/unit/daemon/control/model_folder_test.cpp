@@ -7,6 +7,9 @@
 #include <string>
 #include <vector>
 
+#include <fcntl.h>
+#include <unistd.h>
+
 #include <catch2/catch.hpp>
 
 #include "daemon/control/model_words.hpp"
@@ -15,6 +18,7 @@
 #include "models/style/model/style_model.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/frame/whole_file.hpp"
+#include "proto/text/load_file.hpp"
 #include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
@@ -103,6 +107,13 @@ TEST_CASE("a model tells what it was learnt from; what is no model tells that") 
     model.report_json = report;
     CHECK(words_of_model(style::serialize_model(model), "style", "a").learnt == "walk -> sneak");
   }
+  const std::string deep(200'000, '[');
+  for (const std::string& report :
+       std::vector<std::string>{"{\"clips\":" + deep + std::string(deep.size(), ']') + "}",
+                                "{\"clips\":[[]" + std::string(3UL * 1024 * 1024, ',') + "[]]}"}) {
+    model.report_json = report;
+    CHECK(words_of_model(style::serialize_model(model), "style", "a").learnt == "walk -> sneak");
+  }
   CHECK(words_of_model("nonsense", "style", "a.style").verdict.contains("a.style"));
   CHECK(words.strip.empty());  // it knows no cycle
   CHECK_FALSE(words_of_model("nonsense", "generate", "a.gesture").verdict.empty());
@@ -121,6 +132,13 @@ TEST_CASE("a part of a take is had as .glb and .vrma, which leave nothing in the
   CHECK(recordings.converted(other).value().starts_with("glTF"));
   CHECK(recordings.list().value().size() == 1);
   CHECK(std::distance(std::filesystem::directory_iterator(folder.path()), {}) == 1);
+  folder.write("bomb.bvh", std::string(2'000'000, ' '));
+  CHECK(recordings.converted({.name = "bomb.bvh", .as = "glb"}).error().message.contains("long"));
+  std::filesystem::remove(folder.path() / "bomb.bvh");
+  folder.write(".walk.bvh.glb", "somebody's");
+  CHECK(recordings.converted(part));
+  CHECK(load_file(folder.path() / ".walk.bvh.glb", {.what = "file", .max_bytes = 99}).value() ==
+        "somebody's");
   for (const RecordingFolder::Part& wrong :
        {RecordingFolder::Part{.name = "walk.bvh", .as = "exe"},
         RecordingFolder::Part{.name = "../walk.bvh", .as = "glb"},
@@ -165,6 +183,36 @@ TEST_CASE("recordings are listed and read by their names in the folder, and by n
   const auto now = std::filesystem::file_time_type::clock::now();
   last_write_time(folder / "a.bvh", now - std::chrono::hours(1));
   CHECK(recordings.piece("a.bvh", kMaxRecordingPiece).value() == "xxxxx");
+}
+
+// A process that closes a file loses its locks on it, which keep others from a log's -wal file.
+TEST_CASE("a recording that is being written is not opened") {
+  const test::TempFolder folder;
+  for (const char* name : {"a.plog", "a.plog-wal"}) folder.write(name, "x");
+  const std::string log = folder.path() / "a.plog";
+  const int writer = open(log.c_str(), O_RDWR | O_CLOEXEC);
+  struct flock lock{};
+  lock.l_type = F_RDLCK;
+  lock.l_whence = SEEK_SET;
+  REQUIRE(fcntl(writer, F_SETLK, &lock) == 0);
+  CHECK_FALSE(RecordingFolder(folder.path()).piece("a.plog", 0));
+  const int other = open(log.c_str(), O_RDWR | O_CLOEXEC);
+  lock.l_type = F_WRLCK;
+  REQUIRE(fcntl(other, F_OFD_GETLK, &lock) == 0);
+  CHECK(lock.l_type == F_RDLCK);
+  close(other);
+  close(writer);
+}
+
+TEST_CASE("calibrations count among the files that a folder of models may have") {
+  const test::TempFolder folder;
+  const auto models = ModelFolder::open(folder.path()).value();
+  for (int i = 0; i < 256; ++i) {
+    REQUIRE(models.add("c" + std::to_string(i), kCalibration, "x"));
+  }
+  const auto full = models.add("more", kCalibration, "x");
+  REQUIRE_FALSE(full);
+  CHECK(full.error().message.contains("is full"));
 }
 
 TEST_CASE("a model that is kept replaces none, and its name stays in the folder") {

@@ -190,4 +190,12 @@ TEST_CASE("names in a line can neither control the terminal nor fill it") {
   CHECK(log.size() < 5000);
 }
 
+TEST_CASE("a reader that has gone and a file at its size limit end no process") {
+  for (const int signal : {SIGPIPE, SIGXFSZ}) {
+    auto* const before = std::signal(signal, SIG_DFL);
+    protect_standard_descriptors();
+    CHECK(std::signal(signal, before) == SIG_IGN);
+  }
+}
+
 }  // namespace posed::logging

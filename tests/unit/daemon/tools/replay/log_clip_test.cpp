@@ -131,6 +131,8 @@ TEST_CASE("takes are cut out of a log's stream by number or name, each frame onc
   CHECK(refusal("5") ==
         "has no take '5', but take 1 'walk', take 2 'walk', take 3 'late', take 4 'none'");
   CHECK(refusal("none") == "take 4 has 0 frames of stream 'b', and a clip needs two");
+  forge(path, "INSERT INTO take VALUES(100000,'one too many',1,60,'',0)");
+  CHECK(refusal("1").contains("no recording gives"));
 }
 
 TEST_CASE("a clip has every frame that was performed while the glove was unplugged", "[virtual]") {

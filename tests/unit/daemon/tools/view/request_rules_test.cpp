@@ -83,9 +83,12 @@ TEST_CASE("a camera may be used where its files are, which are read when they ar
   CHECK(headers().find("script-src 'self' 'wasm-unsafe-eval';") != std::string::npos);
   CHECK(headers().find("camera=(self)") != std::string::npos);
   CHECK(rig.site.files.find("/camera/finder.js")->bytes.empty());
-  const http::Answer answer = rig.get("/camera/finder.js");
-  CHECK(answer.body == "find()");
-  CHECK(answer.keeps != nullptr);
+  {
+    const http::Answer answer = rig.get("/camera/finder.js");
+    CHECK(answer.body == "find()");
+    CHECK(rig.get("/camera/finder.js").keeps == answer.keeps);  // many who ask share one copy
+    CHECK(answer.keeps.use_count() == 1);
+  }
   CHECK(rig.get("/camera/hands.wasm").type == "application/wasm");
   rig.folder.write("camera/finder.js", "other()");  // not what was there at the start
   CHECK(rig.get("/camera/finder.js").status == 404);
