@@ -22,14 +22,36 @@ void Frames::arms() {
     for (const Side side : kSides) {
       arm(side, minimal(Tc * way[which(side)], outwards(side)) * Tc, 1.0, "zero pose", false);
     }
-  } else if (palms[0] && palms[1]) {
+  } else if (palms[0] && palms[1] && !(elbows_tell(way) && palms_are_thumbs())) {
     for (const Side side : kSides) {
-      arm(side, frame(way[which(side)], outwards(side), *palms[which(side)], kZ), 0.9,
-          "bone axis and the order of the fingers", true);
+      const Vec& along = way[which(side)];
+      const Vec& palm = *palms[which(side)];
+      // A bone along a local axis has its hinge along another; a palm is flat, but not to a degree.
+      const bool has_axes = nearest_axis(direction(along), 10).has_value();
+      const double limit_deg = palms_are_thumbs() ? 35 : 15;
+      const auto axis = has_axes ? nearest_axis(palm, limit_deg) : std::nullopt;
+      const bool is_guess = palms_are_thumbs() && !axis;
+      arm(side, frame(along, outwards(side), axis.value_or(palm), kZ), is_guess ? 0.4 : 0.9,
+          palms_are_thumbs() ? "bone axis and the thumb" : "bone axis and the order of the fingers",
+          true);
     }
   } else {
     arms_by_elbows(way);
   }
+}
+
+bool Frames::elbows_tell(const Both& way) const {
+  return std::ranges::all_of(
+      kSides, [&](Side side) { return hinge(side, way[which(side)], std::nullopt).has_value(); });
+}
+
+// Whether a hand has so few fingers that only the thumb shows its palm.
+bool Frames::palms_are_thumbs() const {
+  return std::ranges::any_of(kSides, [this](Side side) {
+    return !joint_.has(on(side, Bone::kLeftIndexProximal)) ||
+           (!joint_.has(on(side, Bone::kLeftRingProximal)) &&
+            !joint_.has(on(side, Bone::kLeftLittleProximal)));
+  });
 }
 
 // Whether the arms of the zero pose hang or reach as a person's do.
@@ -54,7 +76,7 @@ bool Frames::arms_are_real(const Both& way, const std::array<std::optional<Vec>,
   }
   // Where the legs are folded the zero pose is no stance, so hanging arms prove nothing; palms do.
   if (!palms[0] || !palms[1]) return !legs_folded_;
-  return palm_off_deg <= 75 || least_raise_deg <= 60;
+  return palm_off_deg <= 75 || (least_raise_deg <= 60 && !legs_folded_);
 }
 
 void Frames::arms_by_elbows(const Both& way) {
@@ -138,11 +160,14 @@ void Frames::arm(Side side, const Mat& T_arm, double sure_arm, const std::string
   const Vec out = outwards(side);
   if (joint_.has(shoulder)) {
     const auto collar = rest(shoulder, {on(side, Bone::kLeftUpperArm)});
-    const bool lies = collar && angle_deg(*t_frame(top_) * *collar, out) <= 65;
-    if (folded && collar && !lies) {
-      set(shoulder, minimal(T_arm * *collar, out) * T_arm, sure_arm, why);
+    const Mat& T_chest = *t_frame(top_);
+    const Mat laid = collar ? Mat(minimal(T_arm * *collar, out) * T_arm) : T_chest;
+    const double with_arm = bent_deg(top_, shoulder, laid) - bent_deg(top_, shoulder, T_chest);
+    const bool lies = collar && angle_deg(T_chest * *collar, out) <= 65;
+    if (folded && collar && (with_arm < -30 || (!lies && with_arm <= 30))) {
+      set(shoulder, laid, sure_arm, why);
     } else {
-      set(shoulder, *t_frame(top_), sure_arm, "goes with the chest");
+      set(shoulder, T_chest, sure_arm, "goes with the chest");
     }
   }
   set(on(side, Bone::kLeftUpperArm), T_arm, sure_arm, why);
@@ -193,7 +218,10 @@ void Frames::find_hand(Side side) {
   }
   const Vec along = off(hand, on(side, Bone::kLeftMiddleProximal)).value_or(sum);
   if (bases.size() < 2 || along.norm() <= 0.0) return;
-  set(hand, frame(along, outwards(side), bases.front() - bases.back(), kZ), 0.9,
+  // No finger lies along the hand's axis to a degree.
+  const Vec ahead = nearest_axis(direction(along), 12).value_or(direction(along));
+  const Vec to_index = direction(across(bases.front() - bases.back(), ahead));
+  set(hand, frame(ahead, outwards(side), nearest_axis(to_index, 12).value_or(to_index), kZ), 0.9,
       "along the middle finger, the palm by the order of the fingers");
   fingers(side);
 }

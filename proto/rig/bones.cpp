@@ -11,19 +11,21 @@ namespace {
 
 constexpr std::size_t kFingerBones = 15;
 
-bool is_finger(const JointName& name) { return finger_of(name) || name.has("finger"); }
+bool is_finger(const JointName& name) { return finger_of(name) || is_any_finger(name); }
 
 // A hand alone: most joints are named as fingers.
-std::optional<BoneJoints> find_hand(const Figure& figure, const std::vector<JointName>& names) {
+std::optional<BoneJoints> find_hand(const Figure& figure, const std::vector<JointName>& names,
+                                    SidesBy& sides_by) {
   std::vector<int> fingers;
   int sides = 0;
   for (int j = 0; j < figure.size(); ++j) {
-    if (!is_finger(names[j])) continue;
+    if (!is_finger(names[j]) || arm_fit(names[j])) continue;  // "fore" is a finger, a forearm none
     fingers.push_back(j);
     sides += static_cast<int>(names[j].side);
   }
   if (fingers.size() < 6 || 10 * fingers.size() < 6 * names.size()) return std::nullopt;
   const Side side = sides > 0 ? Side::kLeft : Side::kRight;
+  if (sides == 0) sides_by = SidesBy::kNothing;
   BoneJoints bones;
   bones.set(on(side, Bone::kLeftHand), figure.common(fingers));
   find_fingers(figure, names, side, bones);
@@ -33,6 +35,15 @@ std::optional<BoneJoints> find_hand(const Figure& figure, const std::vector<Join
 // From a neck to its head at most, as part of the way from the chest to the head: a joint without
 // an end site behind the first one is a head if it is as near, else the end of one.
 constexpr double kNeck = 0.4;
+
+// Whether the joint has a mirror image beside it, as ears, wings and strands of a cape have.
+bool has_twin(const Figure& figure, int joint) {
+  const double length = figure[joint].offset.norm();
+  return std::ranges::any_of(figure.children(figure[joint].parent), [&](int other) {
+    return other != joint && std::abs(length - figure[other].offset.norm()) < 0.01 * length &&
+           figure.main_chain_length(joint) == figure.main_chain_length(other);
+  });
+}
 
 // The chain above the arms that holds no arm: neck and head where neither is named.
 std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>& names,
@@ -47,8 +58,9 @@ std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>&
     if (!holds_limb) rest.push_back(child);
   }
   std::vector<int> likely;
-  std::ranges::copy_if(rest, std::back_inserter(likely),
-                       [&](int j) { return !names[j].helper && figure[j].offset.norm() > 0.0; });
+  std::ranges::copy_if(rest, std::back_inserter(likely), [&](int j) {
+    return !names[j].helper && figure[j].offset.norm() > 0.0 && !has_twin(figure, j);
+  });
   if (!likely.empty()) rest = likely;
   if (rest.empty()) return {};
   const auto length = [&figure](int j) {
@@ -71,6 +83,14 @@ std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>&
     const bool tip = figure.children(j).empty() && figure.end_length(j) <= 0.0 &&
                      (chain.size() != 1 || step.norm() > kNeck * way.norm());
     if (!tip && !names[j].has("end") && !names[j].has("nub")) chain.push_back(j);
+    const auto is_twin = [&figure](int child) { return has_twin(figure, child); };
+    // Ears and eyes are on the head.
+    if (chain.size() > 1 && std::ranges::any_of(figure.children(j), is_twin)) break;
+  }
+  // The top of a head is nearer to its end than to the head.
+  if (chain.size() > 2 && figure.children(chain.back()).empty() &&
+      figure[chain.back()].offset.norm() > 1.3 * figure.end_length(chain.back())) {
+    chain.pop_back();
   }
   // A face and a nose are on the head.
   while (chain.size() > 1 && names[chain.back()].helper) chain.pop_back();
@@ -174,26 +194,37 @@ FingerJoints finger_joints(const Figure& figure, const std::vector<JointName>& n
   for (int j = 0; j < figure.size(); ++j) {
     if (j != hand && figure.below(hand, j)) below.push_back(j);
   }
-  const bool from_zero = std::ranges::any_of(below, [&names](int j) {
-    return names[j].digits.starts_with('0') && names[j].has("finger");
+  const auto any_number = [&](char digit) {
+    return std::ranges::any_of(below, [&](int j) {
+      return names[j].digits.starts_with(digit) && is_any_finger(names[j]);
+    });
+  };
+  const bool from_zero = any_number('0');
+  // Where the thumb has a name of its own, the first of four fingers is the index.
+  const bool thumb_apart = !any_number('5') && std::ranges::any_of(below, [&names](int j) {
+    return finger_of(names[j]) == 0;
   });
-  // Where the thumb has a name of its own, the first finger is the index.
-  const bool thumb_apart =
-      std::ranges::any_of(below, [&names](int j) { return finger_of(names[j]) == 0; });
   FingerJoints out;
+  std::map<int, int> finger_at;  // [joint]
   for (const int j : below) {
     const JointName& name = names[j];
     auto finger = finger_of(name);
-    if (!finger && (name.has("finger") || name.has("fing")) && !name.digits.empty()) {
+    if (const auto above = finger_at.find(figure[j].parent); !finger && above != finger_at.end()) {
+      finger = above->second;  // whatever its number, it goes on in the same finger
+    }
+    if (!finger && is_any_finger(name) && !name.digits.empty()) {
       finger = name.digits.front() - '0' - (from_zero || thumb_apart ? 0 : 1);
     }
-    if (finger && *finger >= 0 && *finger < kFingers) out[*finger].push_back(j);
+    if (!finger || *finger < 0 || *finger >= kFingers) continue;
+    finger_at.emplace(j, *finger);
+    if (is_finger(name)) out[*finger].push_back(j);
   }
   return out;
 }
 
-// Leaves the three joints of a finger: without tips, and without the bone inside the palm.
-void trim_finger(const Figure& figure, const std::vector<JointName>& names, int finger,
+// Leaves the three joints of a finger: without tips, and without the bone inside the palm, which
+// begins nearer to the wrist than it is long.
+void trim_finger(const Figure& figure, const std::vector<JointName>& names, int hand, int finger,
                  std::vector<int>& joints) {
   std::erase_if(joints, [&](int j) { return names[j].has("end") || names[j].has("nub"); });
   if (finger > 0 && joints.size() > 3) {
@@ -202,14 +233,34 @@ void trim_finger(const Figure& figure, const std::vector<JointName>& names, int 
                                  [&](const char* word) { return names[j].has(word); });
     });
   }
-  // CMU's one thumb joint lies in the wrist, and no thumb does.
-  if (joints.size() == 1 && figure[joints.front()].offset.isZero()) joints.clear();
+  if (joints.size() == 1) {
+    // CMU's one thumb joint lies in the wrist, and no thumb does. A fourth joint alone is a tip.
+    const JointName& only = names[joints.front()];
+    const bool is_tip = only.digits == "4" && !is_any_finger(only);
+    if (is_tip || figure[joints.front()].offset.isZero()) joints.clear();
+  }
   if (joints.size() <= 3) return;
+  const auto length = [&figure](int from, int to) {
+    return figure.between(from, to).value_or(Vec::Zero()).norm();
+  };
   const JointName& first = names[joints.front()];
   const bool in_palm = first.has("root") || first.has("metacarpal") || first.digits.empty() ||
-                       first.digits == "0" || first.digits == "00";
+                       first.digits == "0" || first.digits == "00" ||
+                       length(hand, joints[0]) < length(joints[0], joints[1]);
   if (in_palm && finger > 0) joints.erase(joints.begin());
   joints.resize(3);
+}
+
+// Whether there is a person beside the one below `hips`, who was found by the shape or the names.
+bool has_another(const Figure& figure, std::vector<JointName> names, int hips, bool by_shape) {
+  SidesBy ignored{};
+  if (by_shape) return limbs_by_shape(figure, names, ignored, hips).has_value();
+  for (int j = 0; j < figure.size(); ++j) {
+    if (figure.below(hips, j)) names[j] = {};
+  }
+  BoneJoints bones;
+  find_limbs(figure, names, bones);
+  return bones.has_limbs();
 }
 
 }  // namespace
@@ -246,7 +297,11 @@ std::vector<std::optional<Bone>> BoneJoints::by_joint(int joints) const {
 void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones,
                 std::vector<std::string>& notes) {
   const int chest = figure.common({bones[Bone::kLeftUpperArm], bones[Bone::kRightUpperArm]});
-  const int hips = figure.common({bones[Bone::kLeftUpperLeg], bones[Bone::kRightUpperLeg], chest});
+  int hips = figure.common({bones[Bone::kLeftUpperLeg], bones[Bone::kRightUpperLeg], chest});
+  // 3ds Max may hang the legs on the spine; the pelvis is above it.
+  for (int j = hips; is_trunk(names[hips]) && j >= 0; j = figure[j].parent) {
+    if (is_pelvis(names[j])) hips = j;
+  }
   bones.set(Bone::kHips, hips);
   const auto [head, top] = find_head(figure, names, bones, chest, notes);
   std::vector<int> trunk;
@@ -281,8 +336,9 @@ void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJ
 
 void find_fingers(const Figure& figure, const std::vector<JointName>& names, Side side,
                   BoneJoints& bones) {
-  for (auto& [finger, joints] : finger_joints(figure, names, bones[on(side, Bone::kLeftHand)])) {
-    trim_finger(figure, names, finger, joints);
+  const int hand = bones[on(side, Bone::kLeftHand)];
+  for (auto& [finger, joints] : finger_joints(figure, names, hand)) {
+    trim_finger(figure, names, hand, finger, joints);
     const int first = static_cast<int>(Bone::kLeftThumbMetacarpal) + kFingerJoints * finger;
     for (int i = 0; i < kFingerJoints && i < std::ssize(joints); ++i) {
       bones.set(on(side, static_cast<Bone>(first + i)), joints[i]);
@@ -293,8 +349,9 @@ void find_fingers(const Figure& figure, const std::vector<JointName>& names, Sid
 FoundBones find_bones(const Figure& figure, const std::vector<JointName>& names) {
   FoundBones out;
   find_limbs(figure, names, out.joint);
-  if (!out.joint.has_limbs()) {
-    if (const auto hand = find_hand(figure, names)) {
+  const bool by_shape = !out.joint.has_limbs();
+  if (by_shape) {
+    if (const auto hand = find_hand(figure, names, out.sides_by)) {
       out.kind = Kind::kHand;
       out.joint = *hand;
       return out;
@@ -304,6 +361,9 @@ FoundBones find_bones(const Figure& figure, const std::vector<JointName>& names)
   if (out.joint.has_limbs()) {
     out.kind = Kind::kPerson;
     find_trunk(figure, names, out.joint, out.notes);
+    if (has_another(figure, names, out.joint[Bone::kHips], by_shape)) {
+      out.notes.emplace_back("two persons are in it, or one twice: only the first is taken");
+    }
   } else {
     find_parts(figure, names, out.joint);
   }
@@ -311,6 +371,40 @@ FoundBones find_bones(const Figure& figure, const std::vector<JointName>& names)
     if (out.joint.has(on(side, Bone::kLeftHand))) find_fingers(figure, names, side, out.joint);
   }
   return out;
+}
+
+int sided_by_fingers(const Figure& figure, const Motion& motion, const BoneJoints& bones) {
+  const auto at = [&](Bone left) { return bones[on(Side::kRight, left)]; };
+  const int hand = at(Bone::kLeftHand);
+  Vec curl = Vec::Zero();
+  Vec along = Vec::Zero();
+  std::vector<Vec> bases;
+  for (int finger = 1; finger < kFingers; ++finger) {
+    const auto first =
+        static_cast<Bone>(static_cast<int>(Bone::kLeftThumbMetacarpal) + kFingerJoints * finger);
+    const int base = at(first);
+    const int next = at(static_cast<Bone>(static_cast<int>(first) + 1));
+    if (base < 0 || next < 0) continue;
+    const Vec way = direction(figure.between(base, next).value_or(Vec::Zero()));
+    bases.push_back(figure.between(hand, base).value_or(Vec::Zero()));
+    along += bases.back();
+    for (int i = 0; i < motion.poses(); ++i) {
+      curl += way.cross(motion.world(i, hand).transpose() * (motion.world(i, base) * way)) /
+              motion.poses();
+    }
+  }
+  if (bases.size() < 2) return 0;
+  const Vec to_index = direction(bases.front() - bases.back());
+  const double bent = curl.dot(to_index) / static_cast<double>(bases.size());
+  constexpr double kBent = 0.05;
+  if (std::abs(bent) > kBent) return bent < 0.0 ? 1 : -1;
+  const int thumb = at(Bone::kLeftThumbMetacarpal);
+  if (thumb < 0) return 0;
+  along /= static_cast<double>(bases.size());
+  const Vec tip = figure.between(hand, figure.main_chain(thumb).back()).value_or(Vec::Zero());
+  const double low = tip.dot(direction(along.cross(to_index))) / along.norm();
+  constexpr double kLow = 0.1;
+  return std::abs(low) < kLow ? 0 : low > 0.0 ? 1 : -1;
 }
 
 bool turn_to_face(const Vec& facing, const Figure& figure, BoneJoints& bones) {

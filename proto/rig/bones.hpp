@@ -9,6 +9,7 @@
 #include "proto/frame/hand.hpp"
 #include "proto/frame/humanoid.hpp"
 #include "proto/rig/figure.hpp"
+#include "proto/rig/motion.hpp"
 #include "proto/rig/words.hpp"
 
 namespace posed::rig {
@@ -40,7 +41,7 @@ enum class Kind : std::uint8_t {
   kHand,    // a hand without a body
 };
 
-// What says which side of a person is left.
+// What says which side of a person is left, or which hand it is.
 enum class SidesBy : std::uint8_t { kNames, kFeet, kNothing };
 
 struct FoundBones {
@@ -52,6 +53,14 @@ struct FoundBones {
 
 [[nodiscard]] FoundBones find_bones(const Figure& figure, const std::vector<JointName>& names);
 
+// Whether a figure with these limbs stands on all four, in its zero pose and in the clip.
+[[nodiscard]] bool is_animal(const Figure& figure, const Motion& motion, const BoneJoints& bones);
+
+// Of a hand whose joints are those of a right one's bones: +1 when its fingers bend as a left
+// hand's, or the thumb lies below such a palm, -1 for a right one's, 0 when they do not tell.
+[[nodiscard]] int sided_by_fingers(const Figure& figure, const Motion& motion,
+                                   const BoneJoints& bones);
+
 // Swaps the sides of a person whose zero pose, by them, does not face `facing`. Returns whether it
 // did.
 bool turn_to_face(const Vec& facing, const Figure& figure, BoneJoints& bones);
@@ -61,10 +70,11 @@ bool turn_to_face(const Vec& facing, const Figure& figure, BoneJoints& bones);
 void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones);
 
 // Legs and arms by the tree alone: two mirrored pairs of chains, one above the other. The names,
-// else the feet, say which side is left. Empty when the tree has no such pairs.
+// else the feet, say which side is left. What is below the joint `without` does not count. Empty
+// when the tree has no such pairs.
 [[nodiscard]] std::optional<BoneJoints> limbs_by_shape(const Figure& figure,
                                                        const std::vector<JointName>& names,
-                                                       SidesBy& sides_by);
+                                                       SidesBy& sides_by, int without = -1);
 
 // Pelvis, trunk, neck and head from where the limbs begin.
 void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones,

@@ -19,8 +19,16 @@ void Frames::legs() {
     thigh[at(side)] = *off(on(side, Bone::kLeftUpperLeg), on(side, Bone::kLeftLowerLeg));
     world[at(side)] = Th * direction(thigh[at(side)]);
   }
-  const auto down = [](const Vec& v) { return angle_deg(v, -kY) < 110; };
-  const bool real = angle_deg(mirror(world[0]), world[1]) < 25 && std::ranges::all_of(world, down);
+  // Who sits has shins that hang. Straight legs that reach ahead or aside are bones along local
+  // axes.
+  const auto hangs = [&](Side side) {
+    const Bone lower = on(side, Bone::kLeftLowerLeg);
+    const double thigh_deg = angle_deg(world[at(side)], -kY);
+    const auto shin = rest(lower, {on(side, Bone::kLeftFoot), on(side, Bone::kLeftToes)});
+    return thigh_deg < 60 || (thigh_deg < 110 && shin && angle_deg(Th * *shin, -kY) < 45);
+  };
+  const bool real =
+      angle_deg(mirror(world[0]), world[1]) < 25 && std::ranges::all_of(kSides, hangs);
   const auto toes = std::array{toe_way(Side::kLeft), toe_way(Side::kRight)};
   // Toes that point into the ground show that the axes of the legs are their own.
   const bool into_ground =
@@ -129,20 +137,19 @@ void Frames::real_foot(Side side, double sure_foot, const std::string& why, bool
   const auto way = rest(lower, {foot});
   Mat Tf = Th;
   std::string why_foot = "flat sole in the " + why;
-  if (way && angle_deg(Th * *way, -kY) >= kStraightShin_deg) {
-    const Sole sole = sole_of(side, Th, Tl);
-    if (sole == Sole::kAlongShin) {
-      Tf = Tl;
-      why_foot = "goes with the shin";
-    } else if (sole == Sole::kUnclear) {
-      sure_foot = std::min(sure_foot, 0.5);
-      why_foot = "legs apart in the " + why + ": the sole is taken for flat";
-    }
+  const double slant_deg = way ? angle_deg(Th * *way, -kY) : 0.0;
+  const Sole sole = slant_deg > 3 ? sole_of(side, Th, Tl) : Sole::kFlat;
+  if (sole == Sole::kAlongShin) {
+    Tf = Tl;
+    why_foot = "goes with the shin";
+  } else if (sole == Sole::kUnclear && slant_deg >= kStraightShin_deg) {
+    sure_foot = std::min(sure_foot, 0.4);
+    why_foot = "legs apart in the " + why + ": the sole is taken for flat";
   }
   const auto toes = toe_way(side);
   if (toes && angle_deg(Tf * *toes, kZ) > 75) {
     Tf = minimal(Tf * *toes, kZ) * Tf;
-    sure_foot = 0.5;
+    sure_foot = 0.4;
     why_foot = "the zero pose hides the sole: ankle to toes laid level";
   }
   set(foot, Tf, sure_foot, why_foot);

@@ -32,11 +32,20 @@ void extend(Choices& choices, const Fit& fit, int joint, int rank,
   }
 }
 
+// Of two joints that are called alike, a limb goes on in the one with more below it, or else in the
+// farther one; the other helps the skin there.
+bool leads_on(const Figure& figure, int joint, int before) {
+  const int more = figure.main_chain_length(joint) - figure.main_chain_length(before);
+  if (more != 0 || figure[joint].parent != figure[before].parent) return more > 0;
+  return figure[joint].offset.norm() > 1.01 * figure[before].offset.norm();
+}
+
 std::array<int, kSlots> best_chain(const Figure& figure,
                                    const std::vector<std::optional<Fit>>& fits,
                                    const std::array<bool, kSlots>& needed) {
   std::vector<Choices> at(fits.size());
   Choice best{.value = 0.0};
+  int last = -1;
   for (int j = 0; j < figure.size(); ++j) {
     const int parent = figure[j].parent;
     if (parent >= 0) {
@@ -47,24 +56,52 @@ std::array<int, kSlots> best_chain(const Figure& figure,
     if (!fits[j]) continue;
     extend(at[j], *fits[j], j, figure.depth(j) - 1, needed);
     const Choice& top = best_of(at[j]);
-    if (top.value > best.value + 1e-9) best = top;
+    const double more = top.value - best.value;
+    if (more < -1e-9 || (more <= 1e-9 && (last < 0 || !leads_on(figure, j, last)))) continue;
+    best = top;
+    last = j;
   }
   return best.joint;
 }
 
-// Hand, foot and toes that the names do not say are the next joints of the limb, where such a joint
-// is far enough to be no twist: `chain` ends before them.
+// A hand or a foot that the names do not say is the next joint of the limb, where that is far
+// enough to be no twist: `chain` ends before it. Some makers cut a segment into pieces of one name.
 int next_of_limb(const Figure& figure, const std::vector<JointName>& names, int last, int known) {
   constexpr double kFar = 0.5;  // of the segment before
+  const auto piece_below = [&](int joint) {
+    const auto& below = figure.children(joint);
+    const auto at = std::ranges::find(below, names[last].words,
+                                      [&names](int child) { return names[child].words; });
+    return at == below.end() ? -1 : *at;
+  };
+  int piece = last;
+  for (int below = piece_below(piece); below >= 0; below = piece_below(piece)) piece = below;
   int next = -1;
-  for (const int child : figure.children(last)) {
+  for (const int child : figure.children(piece)) {
     const bool leads = known < 0 || (child != known && figure.below(child, known));
-    const bool far = figure[child].offset.norm() > kFar * figure[last].offset.norm();
+    const double way = figure.between(last, child).value_or(Vec::Zero()).norm();
+    const bool far = way > kFar * figure[last].offset.norm();
     if (!leads || !far || names[child].helper || finger_of(names[child])) continue;
     if (next >= 0) return -1;
     next = child;
   }
   return next;
+}
+
+// Toes that no word names are the one joint that the foot holds, as far away as toes are. A joint
+// with the foot's name and more is a point of the foot.
+int toes_of(const Figure& figure, const std::vector<JointName>& names, int foot) {
+  const double shin = figure[foot].offset.norm();
+  int toes = -1;
+  for (const int child : figure.children(foot)) {
+    const double way = figure[child].offset.norm();
+    const bool likely = way > 0.15 * shin && way < 0.8 * shin && !names[child].helper &&
+                        !names[child].stem.starts_with(names[foot].stem);
+    if (!likely) continue;
+    if (toes >= 0) return -1;
+    toes = child;
+  }
+  return toes;
 }
 
 // Of makers that call the ankle by its name, the "foot" below it is the ball, where the toes begin,
@@ -107,8 +144,9 @@ void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJ
     if (chain[end - 1] >= 0 && chain[end] < 0) {
       chain[end] = next_of_limb(figure, names, chain[end - 1], end == 2 ? chain[3] : -1);
     }
-    if (end == 2 && chain[2] >= 0 && chain[3] >= 0) {
-      chain[3] = ball_of_foot(figure, fits, chain[2], chain[3]);
+    if (end == 2 && chain[2] >= 0) {
+      chain[3] = chain[3] < 0 ? toes_of(figure, names, chain[2])
+                              : ball_of_foot(figure, fits, chain[2], chain[3]);
     }
     for (std::size_t k = 0; k < kSlots; ++k) {
       bones.set(on(side, static_cast<Bone>(static_cast<std::size_t>(first) + k)), chain[k]);
@@ -122,7 +160,8 @@ void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJ
   const int chest = figure.common({bones[Bone::kLeftUpperArm], bones[Bone::kRightUpperArm]});
   for (const Side side : kSides) {
     const Bone shoulder = on(side, Bone::kLeftShoulder);
-    if (bones.has(shoulder)) continue;
+    const bool carries_both = bones.has(shoulder) && figure.below(bones[shoulder], chest);
+    if (bones.has(shoulder) && !carries_both) continue;
     bones.set(shoulder, shoulder_of(figure, names, chest, bones[on(side, Bone::kLeftUpperArm)]));
   }
 }

@@ -142,6 +142,20 @@ void settle_facing(const RigInput& input, const Figure& figure, FoundBones& foun
                                                        : "a guess";
 }
 
+// Which hand it is where no name says it.
+void settle_hand(const Figure& figure, const Motion& motion, FoundBones& found) {
+  const int sided = sided_by_fingers(figure, motion, found.joint);
+  if (sided > 0) {
+    found.joint.swap_sides(Bone::kLeftShoulder, 4);
+    found.joint.swap_sides(Bone::kLeftThumbMetacarpal, kFingers * kFingerJoints);
+  }
+  found.notes.emplace_back(
+      sided > 0   ? "a left hand by its fingers; no name says it"
+      : sided < 0 ? "a right hand by its fingers; no name says it"
+                  : "which hand it is is not known: neither names nor fingers say it; taken for a "
+                    "right one");
+}
+
 // The axis that the zero pose faces, from the T frame of its hips.
 void set_facing(const RigInput& input, const Frames& frames, Rig& rig) {
   const auto& hips = frames.t_frame(Bone::kHips);
@@ -174,6 +188,14 @@ Rig recognise(const RigInput& input) {
   const auto names = parse_names(names_of(input.joints));
   FoundBones found = input.bones.empty() ? find_bones(figure, names) : known_bones(input.bones);
   const Motion motion(figure, input.poses);
+  if (found.kind == Kind::kPerson && input.bones.empty() &&
+      is_animal(figure, motion, found.joint)) {
+    found = {};
+    found.notes.emplace_back("it stands on four legs: an animal, of which no bone is a person's");
+  }
+  if (found.kind == Kind::kHand && found.sides_by == SidesBy::kNothing) {
+    settle_hand(figure, motion, found);
+  }
   rig.kind = found.kind;
   if (found.kind == Kind::kPerson) settle_facing(input, figure, found, rig);
   rig.bone = found.joint.by_joint(figure.size());

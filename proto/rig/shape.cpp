@@ -146,20 +146,70 @@ void settle_sides(const Figure& figure, const std::vector<JointName>& names, Bon
   }
 }
 
+// Four limbs that hang side by side from a trunk across them, and end at one height.
+bool is_on_four(const std::array<Vec, 4>& begin, const std::array<Vec, 4>& end) {
+  Vec down = Vec::Zero();
+  for (std::size_t i = 0; i < 4; ++i) down += direction(end[i] - begin[i]);
+  down = direction(down);
+  const Vec trunk = begin[2] + begin[3] - begin[0] - begin[1];
+  const Vec line = begin[0] - begin[1];
+  const double leg = (end[0] - begin[0]).norm();
+  const double higher = (end[2] + end[3] - end[0] - end[1]).dot(down) / 2;
+  const auto across = [](const Vec& a, const Vec& b) {
+    return std::abs(direction(a).dot(direction(b))) < 0.5;
+  };
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (angle_deg(end[i] - begin[i], down) > 45) return false;
+  }
+  return trunk.norm() > 0.5 * leg && across(trunk, down) && across(line, down) &&
+         across(line, trunk) && std::abs(higher) < 0.3 * leg;
+}
+
 }  // namespace
 
+bool is_animal(const Figure& figure, const Motion& motion, const BoneJoints& bones) {
+  std::array<int, 4> begin{};
+  std::array<int, 4> end{};
+  for (const Side side : kSides) {
+    const auto at = static_cast<std::size_t>(side);
+    begin[at] = bones[on(side, Bone::kLeftUpperLeg)];
+    begin[at + 2] = bones[on(side, Bone::kLeftUpperArm)];
+  }
+  for (std::size_t i = 0; i < 4; ++i) end[i] = figure.main_chain(begin[i]).back();
+  const auto on_four = [&](auto place) {
+    std::array<Vec, 4> from;
+    std::array<Vec, 4> to;
+    std::ranges::transform(begin, from.begin(), place);
+    std::ranges::transform(end, to.begin(), place);
+    return is_on_four(from, to);
+  };
+  if (!on_four([&](int j) { return figure.between(0, j).value_or(Vec::Zero()); })) return false;
+  const double often = motion.mean(
+      [&](int i) { return on_four([&](int j) { return motion.position(i, j); }) ? 1.0 : 0.0; });
+  return often > 0.5;
+}
+
 std::optional<BoneJoints> limbs_by_shape(const Figure& figure, const std::vector<JointName>& names,
-                                         SidesBy& sides_by) {
-  const std::vector<Pair> pairs = find_pairs(figure);
+                                         SidesBy& sides_by, int without) {
+  std::vector<Pair> pairs = find_pairs(figure);
+  std::erase_if(pairs,
+                [&](const Pair& p) { return without >= 0 && figure.below(without, p.parent); });
   double best = -1e300;
   const Pair* legs = nullptr;
   const Pair* arms = nullptr;
+  const auto pairs_at = [&pairs](int joint) {
+    return std::ranges::count(pairs, joint, &Pair::parent);
+  };
   for (const Pair& leg : pairs) {
     for (const Pair& arm : pairs) {
       if (&leg == &arm || !fit_together(figure, leg, arm)) continue;
-      // Arms begin above the legs: strands of a skirt do not.
+      // Many equal limbs at one joint are a spider's.
+      if (leg.parent == arm.parent && pairs_at(leg.parent) > 4) continue;
+      // Arms begin above the legs: strands of a skirt do not. Wings and capes are longer than arms.
       const double beside = leg.parent == arm.parent ? 0.3 * leg.length : 0.0;
-      const double score = leg.length + arm.length - beside - 0.01 * figure.depth(leg.parent);
+      const double too_long = std::max(0.0, arm.length - 0.85 * leg.length);
+      const double score =
+          leg.length + arm.length - 2 * too_long - beside - 0.01 * figure.depth(leg.parent);
       if (score <= best + 1e-9) continue;
       best = score;
       legs = &leg;

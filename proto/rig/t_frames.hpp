@@ -97,6 +97,8 @@ class Frames {
   [[nodiscard]] bool arms_are_real(const Both& arm,
                                    const std::array<std::optional<Vec>, 2>& palm) const;
   void arms_by_elbows(const Both& arm);
+  [[nodiscard]] bool elbows_tell(const Both& arm) const;
+  [[nodiscard]] bool palms_are_thumbs() const;
   [[nodiscard]] std::optional<Vec> hinge(Side side, const Vec& arm,
                                          const std::optional<Vec>& like) const;
   [[nodiscard]] std::optional<Vec> palm(Side side) const;

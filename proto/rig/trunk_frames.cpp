@@ -228,9 +228,15 @@ void Frames::find_up() {
   if (zero != nullptr && zero->mean > 0.3) {
     up_ = zero->up;
     why_up_ = "the zero pose stands along it";
-  } else if (best.up != UpAxis::kPlusY && best.stand > 0.9 && best.above > 0.9 && y_mean < 0.35) {
+  } else if (best.up != UpAxis::kPlusY && (zero == nullptr || best.up == UpAxis::kPlusZ) &&
+             best.stand > 0.9 && best.above > 0.9 && y_mean < 0.35) {
     up_ = best.up;
     why_up_ = "the figure stands along it in more than nine frames of ten";
+    if (zero != nullptr) {
+      notes_.push_back("the zero pose stands along " + std::string(up_text(zero->up)) +
+                       ", but the clip along " + std::string(up_text(up_)) +
+                       ": if the person lies, say which axis points up");
+    }
   } else {
     const bool z = zero != nullptr && zero->up == UpAxis::kPlusZ && y_mean < 0.3;
     up_ = z ? UpAxis::kPlusZ : UpAxis::kPlusY;

@@ -280,7 +280,7 @@ std::optional<Fit> fit_of(const JointName& name, const FitTable& table) {
   if (name.stem.ends_with("root")) {
     if (const auto fit = look(name.stem.substr(0, name.stem.size() - 4))) return fit;
   }
-  if (finger_of(name) || name.has("finger")) return std::nullopt;
+  if (finger_of(name) || is_any_finger(name)) return std::nullopt;
   constexpr double kPart = 0.98;
   constexpr std::size_t kMaxWords = 8;  // longer names say something else
   for (std::size_t i = 1; i < std::min(name.words.size(), kMaxWords); ++i) {
@@ -332,6 +332,10 @@ bool is_neck(const JointName& name) {
 
 bool is_head(const JointName& name) {
   return name.side == NameSide::kNone && head_words().contains(name.stem);
+}
+
+bool is_any_finger(const JointName& name) {
+  return name.has("finger") || name.has("fing") || name.has("digit");
 }
 
 std::optional<int> finger_of(const JointName& name) {

@@ -40,5 +40,7 @@ using Fit = std::array<double, 4>;
 
 // 0 thumb to 4 little finger; empty when no word says it. A numbered "finger" is not looked at.
 [[nodiscard]] std::optional<int> finger_of(const JointName& name);
+// "finger", "digit": its number says which one.
+[[nodiscard]] bool is_any_finger(const JointName& name);
 
 }  // namespace posed::rig
