@@ -61,9 +61,16 @@ void tell(const drivers::glove::PoseFinding& finding, v1::GloveFit& words) {
           : fmt::format("held still, to {:.0f} % of the sensors' way", 100.0 * finding.unrest));
 }
 
+// Whether the thumb alone is to be fitted, to what it touches.
+bool is_of_contacts(const v1::ControlRequest::FitGlove& wanted) {
+  return wanted.pose_size() > 0 && std::ranges::all_of(wanted.pose(), [](const auto& pose) {
+           return pose.name().starts_with("touch-");
+         });
+}
+
 }  // namespace
 
-Result<FittedGlove> fit_glove(const drivers::Description& device,
+Result<FittedGlove> fit_glove(const drivers::Description& device, const std::string& in_use,
                               const v1::ControlRequest::FitGlove& wanted) {
   const drivers::Driver* const driver = drivers::find_driver(device.driver);
   const auto hand = device.skeleton ? hand_side(*device.skeleton) : std::nullopt;
@@ -71,14 +78,29 @@ Result<FittedGlove> fit_glove(const drivers::Description& device,
     return fail("it is no glove that can be calibrated");
   }
   const Model model = TRY(driver->glove->glove_model(device));
-  const Recorded recorded = TRY(recorded_of(model, wanted));
+  Recorded recorded = TRY(recorded_of(model, wanted));
+  const Recorded held = recorded;
+  auto blank = devices::blank_calibration(model, device.identity, *hand, wanted.name());
+  const bool contacts = is_of_contacts(wanted);
+  if (contacts) {
+    if (in_use.empty()) return fail("it has no calibration yet: hold the flat hand first");
+    auto file = TRY(drivers::glove::parse_calibration(in_use, "the calibration in use"));
+    const auto now = TRY(drivers::glove::make_calibration(model, file, *hand, device.identity));
+    TRY(drivers::glove::add_known_poses(model, *now, recorded));
+    file.user = blank.user;
+    blank = std::move(file);
+  }
   const auto check = TRY(drivers::glove::check_poses(model, recorded));
   FittedGlove made;
-  for (const auto& finding : check.poses) tell(finding, made.words);
+  for (const auto& finding : check.poses) {
+    if (drivers::glove::was_held(held[static_cast<std::size_t>(finding.pose)]))
+      tell(finding, made.words);
+  }
   if (wanted.name().empty()) return made;
   if (!check.usable()) return fail(check.verdict());
-  auto [file, sentences, warnings] = TRY(devices::calibrate_by_poses(
-      model, recorded, devices::blank_calibration(model, device.identity, *hand, wanted.name())));
+  auto [file, sentences, warnings] =
+      TRY(contacts ? devices::calibrate_by_contacts(model, recorded, std::move(blank))
+                   : devices::calibrate_by_poses(model, recorded, std::move(blank)));
   sentences.insert(sentences.end(), warnings.begin(), warnings.end());
   sentences.push_back(check.verdict());
   for (const std::string& sentence : sentences) made.words.add_sentence(clean(sentence));

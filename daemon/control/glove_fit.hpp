@@ -15,9 +15,10 @@ struct FittedGlove {
   std::string toml{};  // the calibration file; empty: the poses were only judged
 };
 
-// Errors are sentences for the client: the device is no glove, there is no flat hand among the
-// poses, or (with a name) a pose is to be held again.
-Result<FittedGlove> fit_glove(const drivers::Description& device,
+// With contacts alone the calibration in use (the text; empty: the device's default) stays as it
+// is, but for the thumb. Errors are sentences for the client: the device is no glove, there is no
+// flat hand among the poses, or (with a name) a pose is to be held again.
+Result<FittedGlove> fit_glove(const drivers::Description& device, const std::string& in_use,
                               const v1::ControlRequest::FitGlove& wanted);
 
 }  // namespace posed::control

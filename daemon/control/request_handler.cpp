@@ -631,9 +631,9 @@ Result<std::shared_ptr<const v1::GloveFit>> RequestHandler::judge_or_use(
                 " cannot be the name of a calibration; it has a-z, digits, '-' and '_', 1 to 32");
   }
   std::unique_lock lock(mutex_);
-  const auto device = TRY(find_device(wanted.stream()))->device->description();
+  const auto glove = TRY(find_device(wanted.stream()))->device;
   lock.unlock();
-  auto fitted = control::fit_glove(*device, wanted);
+  auto fitted = control::fit_glove(*glove->description(), glove->calibration().toml, wanted);
   if (!fitted) return in_stream(wanted.stream(), fitted.error());
   const auto fit = std::make_shared<v1::GloveFit>(std::move(fitted->words));
   if (fitted->toml.empty()) return fit;

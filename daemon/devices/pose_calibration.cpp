@@ -24,9 +24,16 @@ Result<PoseCalibration> calibrate_by_poses(const drivers::glove::Model& model,
                                            const drivers::glove::Recorded& recorded,
                                            drivers::glove::CalibrationFile blank) {
   auto fitted = TRY(drivers::glove::fit_poses(model, recorded));
-  PoseCalibration made{
-      .file = std::move(blank), .said = {}, .warnings = std::move(fitted.warnings)};
-  made.file.sensors = std::move(fitted.sensors);
+  blank.sensors = std::move(fitted.sensors);
+  auto made = TRY(calibrate_by_contacts(model, recorded, std::move(blank)));
+  made.warnings.insert(made.warnings.begin(), fitted.warnings.begin(), fitted.warnings.end());
+  return made;
+}
+
+Result<PoseCalibration> calibrate_by_contacts(const drivers::glove::Model& model,
+                                              const drivers::glove::Recorded& recorded,
+                                              drivers::glove::CalibrationFile file) {
+  PoseCalibration made{.file = std::move(file), .said = {}, .warnings = {}};
   const Side hand = made.file.hand;
   auto said = TRY(fit_contacts(model, recorded, hand, made.file));
   made.said = std::move(said);

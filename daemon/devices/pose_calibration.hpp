@@ -28,4 +28,9 @@ Result<PoseCalibration> calibrate_by_poses(const drivers::glove::Model& model,
                                            const drivers::glove::Recorded& recorded,
                                            drivers::glove::CalibrationFile blank);
 
+// The same of a calibration that is there: only the thumb is fitted, to what it touches.
+Result<PoseCalibration> calibrate_by_contacts(const drivers::glove::Model& model,
+                                              const drivers::glove::Recorded& recorded,
+                                              drivers::glove::CalibrationFile file);
+
 }  // namespace posed::devices

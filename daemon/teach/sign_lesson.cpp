@@ -24,11 +24,12 @@ namespace {
 using gesture::LabelPose;
 using gesture::Recording;
 
-constexpr double kSignRate_hz = 30.0;  // as `posed train gesture`
-constexpr std::size_t kMinFrames = 30;
-constexpr double kMaxGap_s = 0.5;    // between two frames of a show
-constexpr double kMaxMissing = 0.1;  // share of a show's frames that lack a value
-constexpr double kMinHold_s = 0.4;   // of the part that is taken as held
+constexpr double kSignRate_hz = 30.0;   // as `posed train gesture`
+constexpr std::size_t kMinFrames = 12;  // a camera on a slow computer gives a few a second
+constexpr double kMaxGap_s = 0.5;       // between two frames of a show
+constexpr double kMaxMissing = 0.2;     // share of a show's frames that lack a value
+constexpr std::size_t kJump = 2;        // frames: what lasts no longer is an error of a camera
+constexpr double kMinHold_s = 0.4;      // of the part that is taken as held
 // Each is the rms over one finger's angles, of the finger in which it is largest.
 constexpr double kMaxMoved_rad = 8.0 * kDegree;   // about the mean of the hold
 constexpr double kMinApart_rad = 10.0 * kDegree;  // of two signs
@@ -67,6 +68,23 @@ Result<> check_whole(const clip::HandClip& show) {
   return missing.empty() ? Result<>() : fail(missing);
 }
 
+// Takes out what no hand does but a camera sees: angles that jump away and back. Each angle becomes
+// the median of the frames about it, which leaves ways and holds as they are.
+void drop_jumps(clip::HandClip& show) {
+  const std::vector<HandAngles> seen = show.angles;
+  std::array<double, 2 * kJump + 1> about{};
+  for (std::size_t t = kJump; t + kJump < seen.size(); ++t) {
+    for (std::size_t c = 0; c < kHandChannels; ++c) {
+      for (std::size_t i = 0; i < about.size(); ++i) about[i] = seen[t + i - kJump][c];
+      if (!std::ranges::all_of(about, [](double angle) { return std::isfinite(angle); })) continue;
+      std::ranges::nth_element(about, about.begin() + kJump);
+      show.angles[t][c] = about[kJump];
+    }
+  }
+  std::fill_n(show.angles.begin(), kJump, show.angles[kJump]);
+  std::fill_n(show.angles.rbegin(), kJump, *(show.angles.rbegin() + kJump));
+}
+
 // How far the hand moves while it holds the sign [rad].
 double moved_rad(const Recording& show) {
   const gesture::Segment held = gesture::held_part(show.segments.front());
@@ -79,6 +97,10 @@ double moved_rad(const Recording& show) {
                                     finger.channels));
   }
   return most;
+}
+
+std::string finger_words(std::string_view finger) {
+  return std::string(finger) + (finger == "thumb" ? "" : " finger");
 }
 
 struct FingerApart {
@@ -108,10 +130,11 @@ Result<> check_apart(const LabelPose& shown, const std::vector<LabelPose>& befor
     const auto [rad, finger] = most_apart(shown, other);
     if (other.name == shown.name) {
       if (rad <= kMaxApart_rad) continue;
-      return fail(fmt::format(
-          "this is not {} as it was shown before: the {} finger is {:.0f} degrees from there; show"
-          " it alike, or forget the sign and begin again",
-          in_quotes(shown.name), finger, rad / kDegree));
+      return fail(
+          fmt::format("this is not {} as it was shown before: the {} is {:.0f} degrees from there; "
+                      "show it alike,"
+                      " or forget the sign and begin again",
+                      in_quotes(shown.name), finger_words(finger), rad / kDegree));
     }
     if (rad >= kMinApart_rad) continue;
     return fail(
@@ -183,6 +206,8 @@ Result<std::string> SignLesson::add(const std::string& label, clip::HandClip sho
   TRY(check_whole(show));
   clip::fill_gaps(show);
   show.path = {};  // errors have no file to name
+  auto seen = TRY(gesture::recording_of(show, kSignRate_hz));
+  drop_jumps(show);
   auto recording = TRY(gesture::recording_of(show, kSignRate_hz));
   recording.segments = TRY(gesture::propose_movement(recording, label, std::string(kRest)));
   const gesture::Segment held = gesture::held_part(recording.segments.front());
@@ -203,7 +228,8 @@ Result<std::string> SignLesson::add(const std::string& label, clip::HandClip sho
   TRY(check_apart(*find_pose(poses, label), {*find_pose(poses, kRest)}));
   const double lasted_s = recording.segments.front().frames() / kSignRate_hz;
   auto& kept = shows_[label];
-  kept.push_back(std::move(recording));
+  seen.segments = std::move(recording.segments);
+  kept.push_back(std::move(seen));  // with the jumps: so the hand will be seen again
   return fmt::format("{}: show {} of {:.1f} s, held within {:.0f} degrees", clean(label),
                      kept.size(), lasted_s, std::ceil(moved / kDegree));
 }

@@ -10,6 +10,7 @@
 
 #include "drivers/cyberglove/angles.hpp"
 #include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/fit.hpp"
 
 namespace posed::drivers::cyberglove {
 
@@ -18,12 +19,6 @@ namespace {
 constexpr std::int64_t kNs = 78125, kTicks = 9;  // 9 ticks of 1/115200 s are 78125 ns
 constexpr std::int64_t kMinPeriod_ticks = 768;   // 150 Hz: the result of "as fast as possible"
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
-
-double raw_of(const glove::Curve& line, double value) {
-  const double slope = (static_cast<double>(line.value[1]) - line.value[0]) /
-                       (static_cast<double>(line.raw[1]) - line.raw[0]);
-  return line.raw[0] + (value - line.value[0]) / slope;
-}
 
 }  // namespace
 
@@ -52,7 +47,8 @@ void CyberGloveEmulator::pose_hand(const HandAngles& angles) {
     if (std::isfinite(angle)) value[row.sensor] = (angle - row.offset_rad) / row.gain;
   }
   uncompute_angles(settings_.hand, value);
-  for (std::size_t i = 0; i < kSensors; ++i) raw_[i] = raw_of(calibration_->curve[i], value[i]);
+  for (std::size_t i = 0; i < kSensors; ++i)
+    raw_[i] = glove::raw_at(calibration_->curve[i], value[i]);
 }
 
 void CyberGloveEmulator::start(Streaming what) {

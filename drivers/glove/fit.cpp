@@ -67,6 +67,29 @@ Result<std::vector<double>> values_of(const Model& model, const HandAngles& hand
   return values;
 }
 
+double raw_at(const Curve& curve, double value) {
+  const auto raw_of = [&](std::size_t i) { return static_cast<double>(curve.raw[i]); };
+  const auto value_of = [&](std::size_t i) { return static_cast<double>(curve.value[i]); };
+  const bool rises = value_of(curve.points - 1U) > value_of(0);
+  std::size_t at = 0;
+  while (at + 2 < curve.points && (value_of(at + 1) < value) == rises) ++at;
+  const double slope = (value_of(at + 1) - value_of(at)) / (raw_of(at + 1) - raw_of(at));
+  return raw_of(at) + (value - value_of(at)) / slope;
+}
+
+Result<> add_known_poses(const Model& model, const Calibration& calibration, Recorded& recorded) {
+  for (std::size_t p = 0; p < kSensorPoses; ++p) {
+    const auto values = TRY(values_of(model, hand_in(static_cast<Pose>(p))));
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const auto of_sensor = [i](const auto& pose) { return pose[i].count > 0; };
+      if (std::none_of(recorded.begin() + kSensorPoses, recorded.end(), of_sensor)) continue;
+      const double raw = raw_at(calibration.curve[i], values[i]);
+      if (std::isfinite(raw)) recorded[p][i] = {.sum = raw, .count = 1, .squares = raw * raw};
+    }
+  }
+  return {};
+}
+
 HandAngles angles_of(const Model& model, const Calibration& calibration,
                      std::span<const Held> held) {
   std::array<float, kMaxSensors> value{};

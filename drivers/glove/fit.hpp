@@ -103,6 +103,13 @@ Result<Fitted> fit_poses(const Model& model, const Recorded& recorded);
 // finite for a sensor that the map does not name.
 Result<std::vector<double>> values_of(const Model& model, const HandAngles& hand);
 
+// The raw value at which the curve has this value, by its piece there; not finite where it is flat.
+[[nodiscard]] double raw_at(const Curve& curve, double value);
+
+// Fills in the poses that fit sensors as this calibration has them, for the sensors of which
+// `recorded` has a contact: contacts alone then fit a thumb that was calibrated before.
+Result<> add_known_poses(const Model& model, const Calibration& calibration, Recorded& recorded);
+
 // The angles of a hand whose sensors have the means of `held`, as a decoder with this calibration
 // of the model gives them; not finite for a channel without a measured sensor.
 [[nodiscard]] HandAngles angles_of(const Model& model, const Calibration& calibration,

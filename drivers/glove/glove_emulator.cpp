@@ -4,6 +4,7 @@
 #include <cmath>
 #include <span>
 
+#include "drivers/glove/fit.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 
 namespace posed::drivers::glove {
@@ -24,13 +25,7 @@ std::optional<double> raw_of_pose(const Calibration& calibration, std::size_t se
   if (row == rows.end() || row->gain == 0.0F) return std::nullopt;
   const double value = (angles[row->channel] - static_cast<double>(row->offset_rad)) /
                        static_cast<double>(row->gain);
-  // The inverse of a curve of two points.
-  const Curve& curve = calibration.curve[sensor];
-  const double raw0 = static_cast<double>(curve.raw[0]);
-  const double value0 = static_cast<double>(curve.value[0]);
-  const double slope =
-      (static_cast<double>(curve.value[1]) - value0) / (static_cast<double>(curve.raw[1]) - raw0);
-  return raw0 + (value - value0) / slope;
+  return raw_at(calibration.curve[sensor], value);
 }
 
 void add_text(std::string_view text, Emulator::Bytes& out) {

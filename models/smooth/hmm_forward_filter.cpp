@@ -128,7 +128,7 @@ RT_SAFE void HmmForwardFilter::push(std::span<const double> measured_rad, bool e
   even_frames_ = even ? std::min(even_frames_ + 1, 2) : 0;
   Row log_emission;
   if (model_->held) measure_held();
-  const bool by_poses = model_->held && !model_->none && error_rad_ > 0.0;
+  const bool by_poses = model_->held && error_rad_ > 0.0;
   if (by_poses) {
     weigh_held(log_emission);
   } else {

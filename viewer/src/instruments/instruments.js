@@ -2,6 +2,7 @@
 // no animation frame draws more than one.
 import { el } from '../panel/dom.js';
 import { ms, percent } from '../panel/numbers.js';
+import { stageWords } from '../streams/words.js';
 import { History } from './history.js';
 import { Plot } from './plot.js';
 import { Tiles } from './tiles.js';
@@ -33,8 +34,8 @@ export class Instruments {
       { name: 'drawn here', colour: '--plot-2' },
     ]);
     this.stages = new Plot(
-      'Time in each stage',
-      'What each stage of the pipeline spends on a frame; one that grows is the one to look at.',
+      'Time in each step',
+      'What each step of posed spends on a frame; one that grows is the one to look at.',
       'µs',
       fromZero(100),
     );
@@ -103,7 +104,7 @@ export class Instruments {
     this.stages.element.hidden = stages.length === 0 || names.length === 0;
     if (this.stages.element.hidden) return;
     this.stages.setLines(
-      names.slice(0, COLOURS.length).map((name, i) => ({ name, colour: COLOURS[i] })),
+      names.slice(0, COLOURS.length).map((name, i) => ({ name: stageWords(name), colour: COLOURS[i] })),
     );
     this.stages.draw(stages, performance.now() / 1000);
   }

@@ -21,12 +21,12 @@ export const TILES = [
         : '',
   ],
   [
-    'Arrival to callback',
+    'To this page',
     '95 % of the poses took at most this from their arrival at posed to this page',
     ({ history }) => ms(history.callback.quantile(0, 0.95)),
   ],
   [
-    'Glass to glass',
+    'To the screen',
     '95 % of the poses took at most this from their arrival at posed until they were drawn',
     ({ history }) => ms(history.latency.quantile(1, 0.95)),
   ],
@@ -69,7 +69,7 @@ export const TILES = [
     ({ stats }) => (stats.connections > 1 ? `${stats.connections} times` : ''),
   ],
   [
-    'Page',
+    'This page',
     'pictures per second on this screen',
     ({ fps }) => (fps > 0 ? `${fps.toFixed(0)} fps` : ''),
   ],

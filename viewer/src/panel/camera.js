@@ -47,7 +47,7 @@ export class CameraPanel {
       'p.camera-options',
       { hidden: true },
       this.device,
-      el('label', {}, 'hand: ', this.side),
+      el('label', {}, 'Which hand: ', this.side),
     );
     this.element = el(
       'section.camera',
@@ -149,7 +149,8 @@ export class CameraPanel {
     this.#times_ms.push(now_ms);
     const rate = `${this.#times_ms.length} pictures a second, ${Math.round(now_ms - time_ms)} ms old`;
     const sides = hands.map(({ side }) => side).join(' and ');
-    const words = this.#refusal || (sides ? `${sides}: ${rate}` : `${NO_HAND} (${rate})`);
+    const seen = sides ? `${sides} hand seen` : NO_HAND;
+    const words = this.#refusal || `${seen} (${rate})`;
     if (words !== this.#said) write(this.words, words);
     this.#said = words;
   }

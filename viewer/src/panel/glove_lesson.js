@@ -1,9 +1,10 @@
 // Calibrates the chosen glove to a hand: each pose is held once and judged at once, the contacts
-// fit the thumb to what it touches. The page adds up what the sensors say, the daemon does the rest.
+// fit the thumb to what it touches; alone they mend the calibration in use. The page adds up what
+// the sensors say, the daemon does the rest.
 import { el, labelled, write } from './dom.js';
 
 const NAME = /^[a-z0-9_-]{1,32}$/;
-const NEEDED = 4; // poses; the others are contacts
+const isContact = (pose) => pose.startsWith('touch-');
 const POSES = [
   ['flat', 'Flat hand', 'on the table, fingers together and straight, thumb beside the index'],
   ['fist', 'Fist', 'tight, with the thumb outside'],
@@ -57,11 +58,17 @@ export class GloveLesson {
       },
       el('summary', {}, 'Calibrate this glove'),
       el('p.note', {}, 'Press, take the pose at once, and hold still until it is judged.'),
-      ...this.rows.flatMap(({ row, words }) => [row, words]),
+      ...this.#rowsOf((pose) => !isContact(pose)),
+      el('p.note', {}, 'The thumb, by what it touches; these alone mend the calibration in use.'),
+      ...this.#rowsOf(isContact),
       labelled('Whose hand', this.called, this.use),
       this.words,
     );
     this.#show();
+  }
+
+  #rowsOf(wanted) {
+    return this.rows.filter(({ pose }) => wanted(pose)).flatMap(({ row, words }) => [row, words]);
   }
 
   #row(pose, text, hint) {
@@ -109,20 +116,24 @@ export class GloveLesson {
     const called = this.called.value;
     const request = { fit_glove: this.#message(called) };
     const { ok, error, fit } = await this.control(request, `${this.name}: calibration ${called}`);
-    const always = ok && `at each start: calibration = "${fit.file}" in the stream's table`;
-    this.#show(ok ? `${fit.file} is kept and in use. ${fit.sentence.join('; ')}; ${always}` : error);
+    const always = `at each start: calibration = "…/${fit.file}" in the stream's table`;
+    const kept = ok && `${fit.file} is in use, and kept beside the models`;
+    this.#show(ok ? `✓ ${kept}: ${fit.sentence.join('; ')}; ${always}` : error);
   }
 
   #show(words = '') {
     const { poses, verdicts } = this.held;
     for (const { pose, hold, words: said } of this.rows) {
-      hold.disabled = this.busy || (pose !== 'flat' && !poses.has('flat'));
+      const first = pose === 'flat' || isContact(pose);
+      hold.disabled = this.busy || (!first && !poses.has('flat'));
       const { good, sentence } = (poses.has(pose) && verdicts.get(pose)) || {};
       write(said, sentence ? `${good ? '✓' : '✗'} ${sentence}` : '');
     }
-    const whole = POSES.slice(0, NEEDED).every(([pose]) => poses.has(pose));
-    const good = [...poses.keys()].every((pose) => verdicts.get(pose)?.good);
-    this.use.disabled = this.busy || !whole || !good || !NAME.test(this.called.value);
+    const held = [...poses.keys()];
+    const whole = POSES.every(([pose]) => isContact(pose) || poses.has(pose));
+    const thumb = held.length > 0 && held.every(isContact);
+    const good = (whole || thumb) && held.every((pose) => verdicts.get(pose)?.good);
+    this.use.disabled = this.busy || !good || !NAME.test(this.called.value);
     write(this.words, words);
   }
 }

@@ -21,7 +21,7 @@ export class Header {
       write(this.machine, '');
       return;
     }
-    const parts = [`cpu ${stats.cpu_percent.toFixed(1)} %`, megabytes(stats.rss_bytes)];
+    const parts = [`${stats.cpu_percent.toFixed(1)} % cpu`, megabytes(stats.rss_bytes)];
     if (stats.replay_file) parts.unshift(`replay of ${stats.replay_file}`);
     write(this.machine, parts.join('   '));
   }

@@ -14,7 +14,7 @@ const KEYS = [
   ['g', 'write gestures to perform; Enter plays them'],
   ['s', 'start or end a take, while posed records'],
   ['d', 'dark or light'],
-  ['o', 'settings: floor, background, names, figures'],
+  ['o', 'settings: floor, background, names, avatars'],
   ['?', 'this help'],
 ];
 
@@ -45,7 +45,7 @@ export class Help {
       el(
         'details',
         {},
-        el('summary', {}, 'What the instruments’ figures mean'),
+        el('summary', {}, 'What the instruments say'),
         rows(TILES, 'span'),
       ),
       el(
@@ -63,6 +63,9 @@ export class Help {
 
   toggle() {
     if (this.dialog.open) this.dialog.close();
-    else this.dialog.showModal();
+    else {
+      this.dialog.showModal();
+      this.dialog.scrollTop = 0; // the browser shows the first button, which is the last line
+    }
   }
 }

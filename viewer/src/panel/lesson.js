@@ -13,26 +13,18 @@ export class Lesson {
   now = { step: STEP.idle };
 
   // train: what is learnt, beside its name, as the request has it; rows: elements above the name
-  constructor(stream, { control, requests }, title, train = {}) {
-    Object.assign(this, { name: stream.name, control, requests, title });
+  constructor(stream, { requests }, title, train = {}) {
+    Object.assign(this, { name: stream.name, requests, title });
     this.called = el('input', {
       type: 'text',
       maxLength: 32,
       placeholder: 'a-z, digits, - and _',
       oninput: () => this.show(),
     });
-    const button = (text, step, what) =>
-      el('button', { type: 'button', onclick: () => this.ask(step(), what()) }, text);
-    this.learn = button(
-      'Learn',
-      () => ({ train: { name: this.called.value, ...train } }),
-      () => `${this.name}: learns ${this.called.value}`,
-    );
-    this.cancel = button(
-      'Cancel',
-      () => ({ cancel: {} }),
-      () => `${this.name}: teaching is cancelled`,
-    );
+    const button = (text, step) =>
+      el('button', { type: 'button', onclick: () => this.ask(step()) }, text);
+    this.learn = button('Learn', () => ({ train: { name: this.called.value, ...train } }));
+    this.cancel = button('Cancel', () => ({ cancel: {} }));
     this.words = el('p.note', { role: 'status' });
   }
 
@@ -53,10 +45,10 @@ export class Lesson {
     if (this.element.open) this.ask({});
   }
 
-  async ask(step, what) {
+  // The fold says what comes of it: a step that has begun is not yet done.
+  async ask(step) {
     clearTimeout(this.timer);
-    const request = { teach: { stream: this.name, ...step } };
-    const reply = await (what ? this.control(request, what) : this.requests.ask(request));
+    const reply = await this.requests.ask({ teach: { stream: this.name, ...step } });
     if (reply.ok) {
       const { teaching } = reply;
       this.now = teaching.stream === this.name ? teaching : { step: STEP.idle };
@@ -80,8 +72,8 @@ export class Lesson {
     const { step, problem, verdict, model, sequence, train_s } = this.now;
     if (step === STEP.training || step === STEP.starting) return 'learning …';
     if (step !== STEP.inUse) return problem ?? '';
-    const from = sequence > 0 ? `from frame ${sequence}, ${train_s.toFixed(1)} s later` : 'kept';
-    return `${model}: ${from}; ${verdict}`;
+    const used = sequence > 0 ? `in use ${train_s.toFixed(1)} s after “Learn”` : 'kept';
+    return `✓ ${model} is ${used}; ${verdict}`;
   }
 }
 

@@ -29,6 +29,7 @@ class List {
   }
 }
 
+const USERS = { style: 'a body with a style', generate: 'a hand or body that makes gestures' };
 const NAMESPACE = 'http://www.w3.org/2000/svg';
 
 // A style's mean cycle: six poses beside each other. Of what is no such drawing there is none.
@@ -91,7 +92,7 @@ export class ModelLibrary extends List {
         { use_model: { stream: this.stream.name, name } },
         `${this.stream.name}: model ${name}`,
       );
-    else this.acks.say(`choose a stream that has the stage ${kind}: only it uses ${name}`, 'bad');
+    else this.acks.say(`${name} is for ${USERS[kind] ?? kind}: choose one in the list of streams`, 'bad');
   }
 
   // Asks in the row itself.

@@ -16,7 +16,7 @@ export class ModelControls {
     this.choice = el('select', { onchange: () => this.#use(this.choice.value) });
     this.file = el('input', { type: 'file', hidden: true, onchange: () => this.#send() });
     this.progress = el('progress', { max: 1, value: 0, hidden: true });
-    const pick = el('button', { type: 'button', onclick: () => this.file.click() }, 'Send a file…');
+    const pick = el('button', { type: 'button', onclick: () => this.file.click() }, 'File …');
     this.back = el('button', {
       type: 'button',
       hidden: true,

@@ -4,16 +4,23 @@ import { el, labelled } from './dom.js';
 
 const SHOWN_ELSEWHERE = new Set(['style.alpha', 'style.weights', 'style.mask']);
 const FLAGS = new Set(['gate', 'auto_alpha', 'enabled']);
-// Parameters with a few words: the statistics give the number of the word in the daemon's list.
-const WORDS = { 'feet.root': ['off', 'stride', 'actor'] };
+// Parameters with a few words, and what they mean: the statistics give the number of the word in
+// the daemon's list.
+const WORDS = {
+  'feet.root': {
+    off: 'as captured: feet may slide',
+    stride: 'where the styled feet walk',
+    actor: 'on the performer: legs reach down',
+  },
+};
 
 const LABELS = {
   'gate.jump_deg': 'Drop an angle that jumps by (°)',
   'gate.jump_m': 'Hold a root that jumps by (m)',
-  'style.alpha_slew_per_s': 'Style changes per second by',
+  'style.alpha_slew_per_s': 'Style changes in a second by at most',
   'style.gate': 'Fade out in unknown motion',
-  'style.gate_fallback': 'There keep of the constant part',
-  'style.auto_alpha': 'Less for who shows it already',
+  'style.gate_fallback': 'There keep of its posture (0 to 1)',
+  'style.auto_alpha': 'Less for who has the style already',
   'feet.root': 'Where the body is',
   'feet.limit_cm': 'Off the performer at most (cm)',
 };
@@ -21,7 +28,11 @@ const plainWords = (whole) => LABELS[whole] ?? whole;
 
 function makeField(whole, name, text) {
   if (WORDS[whole])
-    return el('select', {}, ...WORDS[whole].map((word) => el('option', { value: word }, word)));
+    return el(
+      'select',
+      {},
+      ...Object.entries(WORDS[whole]).map(([value, words]) => el('option', { value }, words)),
+    );
   const type = FLAGS.has(name) ? 'checkbox' : text === '' ? 'number' : 'text';
   return el('input', { type, step: 'any' });
 }
@@ -78,7 +89,7 @@ export class Parameters {
   #show(whole, field) {
     const { target, text } = this.#values.get(whole);
     if (field.type === 'checkbox') field.checked = target !== 0;
-    else if (WORDS[whole]) field.value = WORDS[whole][target] ?? '';
+    else if (WORDS[whole]) field.value = Object.keys(WORDS[whole])[target] ?? '';
     else if (field.type === 'text') field.value = text;
     else {
       field.defaultValue = String(Number(target.toPrecision(6)));

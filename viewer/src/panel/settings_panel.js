@@ -13,7 +13,7 @@ const CHOICES = {
       light: 'light',
       dark: 'dark',
       plain: 'plain grey',
-      green: 'green, to cut figures out',
+      green: 'green, to key out',
     },
   },
   quality: {
@@ -45,7 +45,7 @@ export class SettingsPanel {
       ),
       ...Object.keys(SWITCHES).map((name) => this.#switch(name)),
       ...Object.keys(CHOICES).map((name) => this.#choice(name)),
-      el('h3', {}, 'Figures'),
+      el('h3', {}, 'Avatars'),
       this.figures,
       el(
         'p.note',

@@ -27,7 +27,7 @@ export class SignLesson extends Lesson {
         'p.note',
         {},
         `Rest, make the sign, hold it still, rest again; ${SHOWS} times for each sign. ` +
-          'Rest is learnt from all of them.',
+          'Then it is a gesture like the others.',
       ),
       labelled('Sign', this.sign, this.begin),
       this.verdict,
@@ -36,13 +36,12 @@ export class SignLesson extends Lesson {
   }
 
   #begin() {
-    const label = this.sign.value;
-    this.ask({ show: { label, seconds: SHOW_S } }, `${this.name}: show ${label}`);
+    this.ask({ show: { label: this.sign.value, seconds: SHOW_S } });
   }
 
   #chip({ label, shows }) {
     const text = `${label} ${shows}/${SHOWS}`;
-    const forget = () => this.ask({ forget: { label } }, `${this.name}: ${label} is forgotten`);
+    const forget = () => this.ask({ forget: { label } });
     return el(
       'button.chip',
       { type: 'button', disabled: this.busy, onclick: forget, title: `Forget ${label}` },

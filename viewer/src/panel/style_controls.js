@@ -38,7 +38,7 @@ export class StyleControls {
       min: -LARGEST_ALPHA,
       max: LARGEST_ALPHA,
       shown: SHOWN_ALPHA,
-      hint: '0: as captured, 1: as learned, −1: the opposite',
+      hint: '0: as captured, 1: as learnt, −1: the opposite',
       send: (number) =>
         this.control(
           { set_parameter: { stream: this.name, name: 'style.alpha', number } },
@@ -48,7 +48,7 @@ export class StyleControls {
     const scale = el(
       'p.scale',
       { aria: { hidden: 'true' } },
-      ...['0 as captured', '1 as learned'].map((word) => el('span', {}, word)),
+      ...['0 as captured', '1 as learnt'].map((word) => el('span', {}, word)),
     );
     this.facts = el('p.note');
     this.element.append(this.alpha.element, scale, this.facts);
@@ -121,7 +121,7 @@ export class StyleControls {
       facts.push(
         style_gate > 0.95
           ? 'the model knows this motion'
-          : `the model knows this motion to ${Math.round(100 * style_gate)} %: the style is faded`,
+          : `the model knows this motion to ${Math.round(100 * style_gate)} %: so much of the style is seen`,
       );
     }
     if (style_estimate >= LEAST_TOLD) {

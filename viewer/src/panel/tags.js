@@ -3,10 +3,13 @@ import { labelOf, qualityWord, stateOf } from '../streams/words.js';
 import { RAW_SUFFIX } from '../streams/stream.js';
 import { percent, signed } from './numbers.js';
 
+const KNOWN = 0.5; // below it the style is mostly faded
+
 function styledWords(stream) {
   const alpha = stream.parameter('style', 'alpha');
   if (!alpha) return '';
-  return `styled, α ${signed(alpha.value, 2)}`;
+  const faded = stream.stats.style_gate < KNOWN ? '\u00a0· faded, motion unknown' : '';
+  return `styled, α ${signed(alpha.value, 2)}${faded}`;
 }
 
 const labelWords = ({ verb, label, probability }) =>

@@ -2,6 +2,7 @@
 // the live streams, as a whole or a part of it, and that part to download.
 import { fetchRecording, keepFile } from '../link/download.js';
 import { Bvh, cutBvh } from '../motion/bvh.js';
+import { takeName } from '../streams/played.js';
 import { el, labelled, write } from './dom.js';
 import { megabytes } from './numbers.js';
 
@@ -27,8 +28,9 @@ export class Take {
     this.element = el(
       'li',
       {},
-      el('strong', {}, name),
-      el('div.buttons', {}, el('span.note', {}, `${size}, ${when}`), this.play, this.save),
+      el('strong', {}, takeName(name).text),
+      el('p.note', {}, [takeName(name).stream && name, size, when].filter(Boolean).join(', ')),
+      el('div.buttons', {}, this.play, this.save),
       this.part,
     );
   }

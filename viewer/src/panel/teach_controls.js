@@ -9,12 +9,14 @@ export class TeachControls extends Lesson {
   constructor(stream, context) {
     super(stream, context, 'Teach a style');
     this.walks = [this.#walk('as usual', false), this.#walk('in the style', true)];
-    this.fold(...this.walks.flatMap(({ row, words }) => [row, words]));
+    this.fold(
+      el('p.note', {}, 'posed learns what sets two walks apart: one as always, one in the style.'),
+      ...this.walks.flatMap(({ row, words }) => [row, words]),
+    );
   }
 
   #walk(how, style) {
-    const ask = (more) =>
-      this.ask({ mark: { style, seconds: WALK_S, more } }, `${this.name}: walk ${how}`);
+    const ask = (more) => this.ask({ mark: { style, seconds: WALK_S, more } });
     const mark = el('button', { type: 'button', onclick: () => ask(false) });
     const more = el(
       'button',

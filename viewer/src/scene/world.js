@@ -16,9 +16,8 @@ import { facing } from './facing.js';
 import { RAW_SUFFIX } from '../streams/stream.js';
 
 const MOST_PIXELS = 2; // per CSS pixel
-const TOOLS_PX = 46; // at the top of the scene, covered by the buttons
-const NAMES_PX = 90; // the same, by buttons and names
-const LEGEND_PX = 36; // the same at the bottom of the bodies, by the colours' meaning
+const NAMES_PX = 44; // of the bodies, below the buttons
+const GAP_PX = 8; // between what covers the bodies and them
 const CROWD = 4; // figures; of more only the styled ones have names
 const CALM_FRAMES = 90; // drawn after the last change, while the camera glides
 const EASED = 4; // the page's frames for a picture, where the processor finds hands, too
@@ -42,6 +41,7 @@ export class World {
   #eased = false;
   #areas = { bodies: null, hands: null };
   #wanted = []; // who waits for a picture
+  #tools_px = 0; // at the top of the scene, covered by the buttons
   #arranged = ''; // the streams of the last statistics that moved somebody
 
   // stage: the element with the canvas, the hands' inset and the names' layer.
@@ -50,6 +50,8 @@ export class World {
     this.store = store;
     this.canvas = stage.querySelector('canvas');
     this.inset = stage.querySelector('.hands');
+    this.tools = stage.querySelector('.tools');
+    this.legend = stage.querySelector('.legend');
     Object.assign(this, makeRenderer(this.canvas));
     this.theme = sceneColours(theme);
     this.scene = new Scene();
@@ -64,7 +66,8 @@ export class World {
     );
     this.tags = new NameTags(stage.querySelector('.name-tags'));
     this.setTheme(theme);
-    new ResizeObserver(() => this.resize()).observe(stage);
+    const sizes = new ResizeObserver(() => this.resize());
+    for (const element of [stage, this.tools, this.legend]) sizes.observe(element);
     store.addEventListener('skeleton', ({ detail }) => this.#enter(detail));
     store.addEventListener('gone', ({ detail }) => this.#leave(detail.name));
     store.addEventListener('stats', () => this.#arrangeChanged());
@@ -243,28 +246,27 @@ export class World {
     this.lights.sun.castShadow = shadows;
     this.ground.setShadows(shadows);
     this.renderer.setSize(width, height, false);
-    this.#areas.bodies = { left: 0, top: 0, width, height, covered: TOOLS_PX };
+    this.#tools_px = this.tools.offsetTop + this.tools.offsetHeight + GAP_PX;
+    this.#areas.bodies = { left: 0, top: 0, width, height, covered: this.#tools_px };
     const show = this.stage.dataset.show;
     this.#areas.hands = show === 'both' || show === 'hands' ? this.#insetArea() : null;
     this.views.resize(width, height, this.#covered());
     if (this.#areas.hands) {
       const { width: wide, height: high } = this.#areas.hands;
-      this.hands.resize(wide, high, show === 'hands' ? TOOLS_PX : 0);
+      this.hands.resize(wide, high, show === 'hands' ? this.#tools_px : 0);
     }
     this.touch();
   }
 
   // What inset, names and legend take from the bodies, in CSS pixels: they stand beside the inset, or
-  // above it where it is as wide as the scene.
+  // above it where it is as wide as the scene, and always above the legend.
   #covered() {
-    if (!this.#areas.hands || this.stage.dataset.show !== 'both')
-      return { right: 0, bottom: LEGEND_PX, top: NAMES_PX };
     const { bodies, hands } = this.#areas;
-    const wide = hands.width > 0.7 * bodies.width;
+    const beside = hands && this.stage.dataset.show === 'both' && hands.width < 0.7 * bodies.width;
     return {
-      right: wide ? 0 : bodies.width - hands.left,
-      bottom: LEGEND_PX + (wide ? bodies.height - hands.top : 0),
-      top: NAMES_PX,
+      right: beside ? bodies.width - hands.left : 0,
+      bottom: bodies.height - this.legend.offsetTop + GAP_PX,
+      top: this.#tools_px + NAMES_PX,
     };
   }
 
@@ -273,7 +275,7 @@ export class World {
     const { left, top, width, height } = this.inset
       .querySelector('.hands-area')
       .getBoundingClientRect();
-    const covered = this.stage.dataset.show === 'hands' ? TOOLS_PX : 0;
+    const covered = this.stage.dataset.show === 'hands' ? this.#tools_px : 0;
     return { left: left - outer.left, top: top - outer.top, width, height, covered };
   }
 

@@ -1,6 +1,15 @@
 // The state of a stream in a word, a tone for its colour, and a sentence where one helps.
 import { QUALITIES } from '../wire/pose.js';
 
+// What the stages do; of others the name itself.
+const STAGES = {
+  gate: 'drop false values',
+  generate: 'smooth, gestures',
+  constrain: 'keep fingers apart',
+  feet: 'feet stand',
+};
+export const stageWords = (name) => STAGES[name] ?? name;
+
 // tone: good, busy, bad, off
 const state = (word, tone, sentence = '') => ({ word, tone, sentence });
 

@@ -5,7 +5,7 @@ import { after, before, test } from 'node:test';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { PAGE } from '../support/fake_bridge.mjs';
-import { RealDaemon, hasDemo } from '../support/real_daemon.mjs';
+import { EmulatedGlove, RealDaemon, gloveConfig, hasDemo } from '../support/real_daemon.mjs';
 import { askedAgain, opened, PATIENCE } from '../support/browser.mjs';
 
 const BUILD = join(dirname(fileURLToPath(import.meta.url)), '../../../build');
@@ -141,6 +141,71 @@ told(
     assert.deepEqual(page.errors, []);
   },
 );
+
+// What the glove's hand does, in the order in which the page asks for it.
+const bent = { 1: 80, 2: 100, 3: 60 };
+const FIST = Object.fromEntries(
+  ['index', 'middle', 'ring', 'little'].flatMap((finger) =>
+    Object.entries(bent).map(([joint, angle]) => [`${finger}${joint}_x`, angle]),
+  ),
+);
+const HELD = [
+  ['Flat hand', 'flat', {}],
+  ['Fist', 'fist', FIST],
+  ['Thumb across', 'thumb', { thumb1_z: 45, thumb2_x: 50, thumb3_x: 70 }],
+  ['Spread hand', 'spread', { thumb1_y: 25, index1_y: 15, ring1_y: 12, little1_y: 25 }],
+];
+const PINCH = { thumb1_z: 35, thumb2_x: 20, thumb3_x: 20, index1_x: 45, index2_x: 45, index3_x: 30 };
+
+// For main.mjs, beside the others: a daemon of its own.
+export const gloveTest = [
+  'an emulated glove is calibrated from the page, then its thumb alone',
+  { timeout: 900000 },
+  async (context) => {
+    const own = new RealDaemon(process.env.POSED, gloveConfig);
+    const glove = new EmulatedGlove(own);
+    await own.start();
+    context.after(async () => {
+      await glove.stop();
+      await own.stop();
+    });
+    await glove.hold({});
+    const page = await opened(context, await own.view(PAGE));
+    await page.locator('summary', { hasText: 'Calibrate this glove' }).click();
+    const lesson = page.locator('details', { hasText: 'Calibrate this glove' });
+    const hold = async (label, pose, angles) => {
+      if (pose !== 'flat') await glove.hold(angles);
+      const button = lesson.getByLabel(`Hold: ${label}`, { exact: true });
+      const judged = lesson.locator(`[data-pose='${pose}']`, { hasText: '✓' });
+      do {
+        await button.click(); // again, while posed looks for the glove
+        await button.and(page.locator(':enabled')).waitFor(PATIENCE);
+      } while ((await judged.count()) === 0);
+    };
+    const used = async (name, words) => {
+      await lesson.getByLabel('Whose hand').fill(name);
+      await lesson.getByRole('button', { name: 'Use' }).click();
+      await lesson.getByText(words).waitFor(PATIENCE);
+      return readFileSync(join(own.folder, `${name}.toml`), 'utf8');
+    };
+    const begin = () =>
+      page.evaluate(() => {
+        globalThis.posedPage.panel.glove.constructor.seconds = { ready: 0, hold: 1 };
+      });
+    await begin();
+    for (const one of HELD) await hold(...one);
+    const sensors = /\[sensors\][^]*/;
+    const [all] = sensors.exec(await used('ann', 'ann.toml is in use'));
+    await page.reload(); // what was held is forgotten, the calibration is not
+    await begin();
+    await page.locator('summary', { hasText: 'Calibrate this glove' }).click();
+    await hold('Touch thumb and index', 'touch-index', PINCH);
+    const [mended] = sensors.exec(await used('ann2', 'ann2.toml is in use'));
+    const changed = all.split('\n').filter((line) => !mended.includes(line));
+    assert.ok(changed.length > 0 && changed.every((line) => line.startsWith('thumb')), changed.join());
+    assert.deepEqual(page.errors, []);
+  },
+];
 
 told('a page of --read-only can change nothing and says so', options, async (context) => {
   const page = await opened(context, await daemon.view(PAGE, '--read-only'));

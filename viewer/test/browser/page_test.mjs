@@ -216,7 +216,7 @@ pageTests(
       await button('Use: tired.style').click();
       await acknowledged(page, 'model tired.style: applied');
       await button('Use: hand.gesture').click();
-      await acknowledged(page, 'choose a stream that has the stage generate');
+      await acknowledged(page, 'choose one in the list of streams');
       await button('Delete: march-to-sway.style').click();
       await button('Keep as it is').click();
       await button('Rename: march-to-sway.style').click();
@@ -422,7 +422,7 @@ pageTests(
       assert.ok(await learn.isDisabled());
       await lesson.getByLabel('Name').fill('proud');
       await learn.click();
-      await lesson.getByText('proud.style: from frame 900, 1.5 s later').waitFor(PATIENCE);
+      await lesson.getByText('proud.style is in use 1.5 s after').waitFor(PATIENCE);
       assert.equal(bridge.daemon.bodies[0].model, 'proud.style');
       await lesson.getByRole('button', { name: 'One more' }).first().click();
       await lesson.getByText('; 2 walks are kept').waitFor(PATIENCE);
@@ -447,7 +447,7 @@ pageTests(
       }
       await lesson.getByRole('button', { name: 'ok 3/3' }).waitFor(PATIENCE);
       await learn.click();
-      await lesson.getByText('mine.gesture: from frame 900, 0.5 s later').waitFor(PATIENCE);
+      await lesson.getByText('mine.gesture is in use 0.5 s after').waitFor(PATIENCE);
       assert.ok(bridge.requests.some(({ teach }) => teach?.train?.signs === true));
       const gestures = page.getByLabel('Gestures of the model');
       await gestures.getByRole('button', { name: 'ok', exact: true }).waitFor(PATIENCE);
@@ -479,7 +479,7 @@ pageTests(
       await hold('Touch thumb and index', 'touch-index', '✓ held still');
       await hold('Spread hand', 'spread', '✓ held still');
       await use.click();
-      await lesson.getByText('ann.toml is kept and in use. thumb to index 3 mm').waitFor(PATIENCE);
+      await lesson.getByText('ann.toml is in use, and kept beside the models: thumb to index 3 mm').waitFor(PATIENCE);
       const { fit_glove: fit } = bridge.requests.findLast((one) => one.fit_glove);
       const [{ held }] = fit.pose;
       assert.deepEqual([fit.name, held.length, held[0].sensor], ['ann', 1, 'index']);
@@ -642,10 +642,10 @@ const wears = (page, name) =>
     PATIENCE,
   );
 
-const TIMES = ['Glass to glass', 'Arrival to callback'];
+const TIMES = ['To this page', 'To the screen'];
 
 async function withoutTimes(page) {
-  await page.getByText('Time in each stage').waitFor(PATIENCE);
+  await page.getByText('Time in each step').waitFor(PATIENCE);
   await tile(page, 'Rate').waitFor(PATIENCE);
   for (const name of TIMES) await tile(page, name).waitFor({ state: 'hidden', ...PATIENCE });
 }
@@ -753,7 +753,7 @@ pageTests(
       await wears(page, undefined);
       await settings.getByLabel('Floor').uncheck();
       await settings.getByLabel('Names').uncheck();
-      await settings.getByLabel('Background').selectOption('green, to cut figures out');
+      await settings.getByLabel('Background').selectOption('green, to key out');
       await settings.getByLabel('Picture').selectOption('always quick');
       const seen = () =>
         page.evaluate(() => {

@@ -4,7 +4,7 @@
 // 712) and those of tests/golden/camera (seeds 603, 606, 609, 612, the even ones left) were made.
 //
 //   g++ -O3 -ffast-math -std=c++20 drawn_hands.cpp -o drawn_hands
-//   ./drawn_hands signs|random SEED PICTURES OUT [WILDNESS [left]]   OUT.rgba, OUT.truth: 10 Hz
+//   ./drawn_hands signs|shows|random SEED PICTURES OUT [WILDNESS [left]]   OUT.rgba, OUT.truth: 10 Hz
 //   node find_hands.mjs OUT                                          OUT.hands: what is found
 //   POSED_FILM=OUT build/bin/unit_drivers "[.takes]"                 OUT.take: what posed sees
 //
@@ -227,6 +227,20 @@ Pose mix(const Pose& a, const Pose& b, double t) {
       for (int k = 0; k < 3; k++) r[f][j][k] = a[f][j][k] + t * (b[f][j][k] - a[f][j][k]);
   return r;
 }
+// "shows": g, c and 1 are shown three times each, from p and back, as they are taught on the stage;
+// then anything follows, 3 and 4, too, which were not taught.
+const int kShows = 27;
+int shown(int n) {
+  const int taught[3] = {0, 1, 3};
+  if (n >= kShows) {
+    static int last = 2;
+    int next;
+    do next = std::uniform_int_distribution<>(0, 5)(R);
+    while (next == last);
+    return last = next;
+  }
+  return n % 3 == 1 ? taught[n / 9 % 3] : 2;
+}
 int main(int c, char** v) {
   std::string mode = v[1];
   int seed = atoi(v[2]), frames = atoi(v[3]);
@@ -272,7 +286,13 @@ int main(int c, char** v) {
     if (at < 0 || t - t0 >= move + hold) {
       t0 = t;
       from = to;
-      if (mode == "signs") {
+      if (mode == "shows") {
+        at = shown(n);
+        to = sign(at);
+        if (i == 0) from = to;
+        move = U(.4, .7);
+        hold = n < kShows && at != 2 ? U(1.8, 2.4) : n < kShows ? U(.8, 1.1) : U(1.1, 1.9);
+      } else if (mode == "signs") {
         int nx;
         do nx = std::uniform_int_distribution<>(0, 5)(R);
         while (nx == at);
@@ -304,7 +324,7 @@ int main(int c, char** v) {
     for (int f = 0; f < 5; f++)
       for (int j = 0; j < 3; j++)
         for (int k = 0; k < 3; k++) fprintf(ft, "%.2f ", p[f][j][k]);
-    fprintf(ft, "%s %d\n", mode == "signs" ? names[at] : "x", t - t0 >= move + 0.2 ? 1 : 0);
+    fprintf(ft, "%s %d\n", mode == "random" ? "x" : names[at], t - t0 >= move + 0.2 ? 1 : 0);
   }
   fclose(fr);
   fclose(ft);

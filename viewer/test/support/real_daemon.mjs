@@ -53,6 +53,20 @@ listen = "${device}"
 [source.generate]
 `;
 
+// Only a glove, which EmulatedGlove is.
+export const gloveConfig = ({ publish, control, folder }) => `
+[publish]
+endpoint = "${publish}"
+[control]
+endpoint = "${control}"
+models = "${folder}"
+[[stream]]
+name = "glove"
+driver = "cyberglove"
+port = "${folder}/glove"
+[stream.generate]
+`;
+
 // The endpoint of a port that is free now; a daemon that restarts needs the same again.
 async function freeEndpoint() {
   const server = createServer();
@@ -86,6 +100,32 @@ async function end(child) {
   await new Promise((done) => {
     child.once('exit', done);
   });
+}
+
+// A glove of the daemon's gloveConfig whose hand is still: its angles by the names of hand45 [deg],
+// all others 0.
+export class EmulatedGlove {
+  constructor({ program, folder }) {
+    Object.assign(this, { program, folder });
+  }
+
+  async hold(angles) {
+    await this.stop();
+    const fingers = ['thumb', 'index', 'middle', 'ring', 'little'];
+    const axes = ['x', 'y', 'z'];
+    const names = fingers.flatMap((f) => [1, 2, 3].flatMap((j) => axes.map((a) => `${f}${j}_${a}`)));
+    const row = names.map((name) => ((angles[name] ?? 0) * Math.PI) / 180);
+    const lines = [['time_s', ...names.map((name) => `${name}_rad`)], [0, ...row], [1, ...row]];
+    const clip = join(this.folder, 'held.csv');
+    writeFileSync(clip, lines.map((line) => `${line.join()}\n`).join(''));
+    const link = join(this.folder, 'glove');
+    const args = ['emulate', 'cyberglove', '--link', link, '--clip', clip];
+    this.device = (await start(this.program, args)).child;
+  }
+
+  async stop() {
+    if (this.device) await end(this.device);
+  }
 }
 
 export class RealDaemon {

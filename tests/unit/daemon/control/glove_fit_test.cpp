@@ -64,7 +64,7 @@ v1::ControlRequest::FitGlove poses(double unrest_of_fist) {
 }
 
 std::string refusal_of(const v1::ControlRequest::FitGlove& wanted) {
-  const auto fitted = fit_glove(right_glove(), wanted);
+  const auto fitted = fit_glove(right_glove(), "", wanted);
   return fitted ? std::string() : fitted.error().text();
 }
 
@@ -72,13 +72,13 @@ std::string refusal_of(const v1::ControlRequest::FitGlove& wanted) {
 
 TEST_CASE("poses of a glove are judged at once, and with a name become a calibration", "[glove]") {
   auto wanted = poses(0.5);
-  const auto judged = fit_glove(right_glove(), wanted).value();
+  const auto judged = fit_glove(right_glove(), "", wanted).value();
   CHECK(judged.toml.empty());
   REQUIRE(judged.words.verdict_size() == kSensorPoses);
   CHECK(std::ranges::all_of(judged.words.verdict(), &v1::GloveFit::Verdict::good));
   hold(wanted, static_cast<std::size_t>(drivers::glove::Pose::kTouchIndex), 0.5);
   wanted.set_name("ann");
-  const auto fitted = fit_glove(right_glove(), wanted).value();
+  const auto fitted = fit_glove(right_glove(), "", wanted).value();
   const auto file = drivers::glove::parse_calibration(fitted.toml, "ann.toml").value();
   CHECK(file.user == "ann");
   CHECK(file.driver == "cyberglove");
@@ -86,9 +86,39 @@ TEST_CASE("poses of a glove are judged at once, and with a name become a calibra
   CHECK(has(fitted.words.sentence(0), "thumb to index"));
 }
 
+TEST_CASE("contacts alone fit the thumb of the calibration in use, as with all poses", "[glove]") {
+  auto all = poses(0.5);
+  all.set_name("ann");
+  const std::string before = fit_glove(right_glove(), "", all).value().toml;
+  v1::ControlRequest::FitGlove contacts;
+  contacts.set_stream("right");
+  for (auto* wanted : {&all, &contacts}) {
+    hold(*wanted, static_cast<std::size_t>(drivers::glove::Pose::kTouchIndex), 0.5);
+  }
+  CHECK(has(refusal_of(contacts), "no calibration yet: hold the flat hand first"));
+  const auto judged = fit_glove(right_glove(), before, contacts).value();
+  REQUIRE(judged.words.verdict_size() == 1);
+  CHECK(judged.words.verdict(0).good());
+  contacts.set_name("ann");
+  const auto sensors_of = [](const std::string& toml) {
+    return drivers::glove::parse_calibration(toml, "ann.toml").value().sensors;
+  };
+  const auto alone = sensors_of(fit_glove(right_glove(), before, contacts).value().toml);
+  const auto together = sensors_of(fit_glove(right_glove(), "", all).value().toml);
+  const auto was = sensors_of(before);
+  REQUIRE(alone.size() == together.size());
+  for (const auto& [name, points] : alone) {
+    INFO(name);
+    CHECK(points.front()[1] == Approx(together.at(name).front()[1]).margin(1e-3));
+    CHECK(points.back()[1] == Approx(together.at(name).back()[1]).margin(1e-3));
+    if (!name.starts_with("thumb")) CHECK(points == was.at(name));
+  }
+  CHECK(alone != was);
+}
+
 TEST_CASE("a glove whose poses were not held is not calibrated", "[glove]") {
   auto wanted = poses(60.0);
-  const auto judged = fit_glove(right_glove(), wanted).value();
+  const auto judged = fit_glove(right_glove(), "", wanted).value();
   CHECK_FALSE(judged.words.verdict(1).good());
   CHECK(has(judged.words.verdict(1).sentence(), "moved while it was held"));
   wanted.set_name("ann");
