@@ -6,6 +6,7 @@
 
 #include "daemon/devices/possible_angles.hpp"
 #include "daemon/devices/thumb_contacts.hpp"
+#include "drivers/glove/crosstalk.hpp"
 
 namespace posed::devices {
 
@@ -35,8 +36,9 @@ Result<PoseCalibration> calibrate_by_contacts(const drivers::glove::Model& model
                                               drivers::glove::CalibrationFile file) {
   PoseCalibration made{.file = std::move(file), .said = {}, .warnings = {}};
   const Side hand = made.file.hand;
-  auto said = TRY(fit_contacts(model, recorded, hand, made.file));
-  made.said = std::move(said);
+  made.said = TRY(drivers::glove::fit_fist(model, recorded, hand, made.file));
+  auto contacts = TRY(fit_contacts(model, recorded, hand, made.file));
+  std::ranges::move(contacts, std::back_inserter(made.said));
   auto odd = TRY(keep_possible(model, recorded, hand, made.file));
   std::ranges::move(odd, std::back_inserter(made.warnings));
   return made;

@@ -164,7 +164,7 @@ class Wearer {
 }  // namespace
 
 TEST_CASE("two moves take out what sensors show of each other", "[glove]") {
-  std::array<double, 2> plain{}, posed{}, moved{};
+  std::array<double, 2> plain{}, sensors{}, posed{}, moved{};
   for (unsigned seed = 1; seed <= 20; ++seed) {
     Wearer wearer(seed);
     const Model& model = wearer.model();
@@ -174,7 +174,10 @@ TEST_CASE("two moves take out what sensors show of each other", "[glove]") {
                          .hand = Side::kRight,
                          .parameters = {},
                          .sensors = {}};
-    file.sensors = fit_poses(model, wearer.poses()).value().sensors;
+    const Recorded poses = wearer.poses();
+    file.sensors = fit_poses(model, poses).value().sensors;
+    const auto alone = make_calibration(model, file, Side::kRight, "").value();
+    CHECK_FALSE(fit_fist(model, poses, Side::kRight, file).value().empty());
     const auto before = make_calibration(model, file, Side::kRight, "").value();
     const auto said = fit_crosstalk(model, wearer.moves(), Side::kRight, file).value();
     const auto after =
@@ -187,14 +190,16 @@ TEST_CASE("two moves take out what sensors show of each other", "[glove]") {
       for (std::size_t i = 0; i < 2; ++i) sum[i] += square[i] / 20.0;
     };
     add(plain, *default_calibration(model).value());
+    add(sensors, *alone);
     add(posed, *before);
     add(moved, *after);
   }
   const auto text = [](const std::array<double, 2>& square) {
     return std::to_string(std::sqrt(square[0])) + " " + std::to_string(std::sqrt(square[1]));
   };
-  INFO("bend, spread [deg]: default " + text(plain) + ", poses " + text(posed) + ", moves " +
-       text(moved));
+  INFO("bend, spread [deg]: default " + text(plain) + ", each sensor alone " + text(sensors) +
+       ", poses " + text(posed) + ", moves " + text(moved));
+  for (std::size_t i = 0; i < 2; ++i) CHECK(posed[i] < plain[i]);
   for (std::size_t i = 0; i < 2; ++i) CHECK(moved[i] < std::min(plain[i], posed[i]));
   CHECK(std::sqrt(moved[0]) < 3.0);
   CHECK(std::sqrt(moved[1]) < 3.5);
