@@ -19,7 +19,7 @@ struct Scheme {
   std::array<const char*, 14> names;  // '*' is the side; the limbs' begin at the sixth
 };
 
-inline constexpr std::array<Scheme, 15> kSchemes{{
+inline constexpr std::array<Scheme, 16> kSchemes{{
     {{"Left", "Right"},
      {"mixamorig:Hips", "mixamorig:Spine", "mixamorig:Spine1", "mixamorig:Spine2", "mixamorig:Neck",
       "mixamorig:Head", "mixamorig:*Shoulder", "mixamorig:*Arm", "mixamorig:*ForeArm",
@@ -73,6 +73,10 @@ inline constexpr std::array<Scheme, 15> kSchemes{{
     {{"Links", "Rechts"},
      {"Becken", "Wirbel1", "Wirbel2", "Brust", "Hals", "Kopf", "Schluesselbein*", "Oberarm*",
       "Unterarm*", "Hand*", "Oberschenkel*", "Unterschenkel*", "Fuss*", "Zehen*"}},
+    {{"L", "R"},
+     {"CATRigPelvis", "CATRigSpine1", "CATRigSpine2", "CATRigRibcage", "CATRigNeck", "CATRigHead",
+      "CATRig*ArmCollarbone", "CATRig*Arm1", "CATRig*Arm2", "CATRig*ArmPalm", "CATRig*Leg1",
+      "CATRig*Leg2", "CATRig*LegAnkle", "CATRig*LegDigit11"}},
 }};
 
 inline constexpr int kMakerJoints = 22;  // the first bones of the enum, which are depth first
@@ -97,10 +101,19 @@ inline int maker_parent(int b) {
   return leg ? 0 : b - 1;
 }
 
-// How a person differs from the usual one: factors on lengths, and how far an A-pose's arms hang.
+// The local axis along a bone of a folded zero pose, and the one that points left, or, of an arm,
+// down.
+struct BoneAxes {
+  Vec along = rig::kX;
+  Vec lateral = rig::kZ;
+};
+
+// How a person differs from the usual one: factors on lengths, how far an A-pose's arms hang, and
+// the axes of a folded zero pose's trunk, arms and legs.
 struct Build {
   double height = 1.0, trunk = 1.0, arms = 1.0, legs = 1.0, shoulders = 1.0;
   double arms_down_deg = 45.0;
+  std::array<BoneAxes, 3> axes{};
 };
 
 // From each joint's parent to it in the T-pose [m].
@@ -135,7 +148,8 @@ enum class ZeroPose { kT, kA, kArmsDown, kFolded };
 inline Mat maker_t(int b, ZeroPose zero, const Build& build = {}) {
   const bool arm = b > 6 && b < 14 && b != 10;
   const bool left = b < 10 || (b >= 14 && b < 18);
-  if (zero == ZeroPose::kFolded) {  // every bone along its own +x, as LaFAN1
+  if (zero == ZeroPose::kFolded) {  // every bone along one of its own axes, as LaFAN1
+    const BoneAxes& axes = build.axes[b < 6 ? 0 : b < 14 ? 1 : 2];
     Vec to = rig::kY;
     Vec lateral = rig::kX;
     if (b >= 6 && b < 14) {
@@ -144,7 +158,7 @@ inline Mat maker_t(int b, ZeroPose zero, const Build& build = {}) {
     } else if (b >= 14) {
       to = (b - 14) % 4 >= 2 ? maker_offset(17) : Vec(-rig::kY);
     }
-    return rig::frame(rig::kX, to, rig::kZ, lateral);
+    return rig::frame(axes.along, to, axes.lateral, lateral);
   }
   if (!arm || zero == ZeroPose::kT) return Mat::Identity();
   const double raise = (zero == ZeroPose::kA ? build.arms_down_deg : 88.0) * kDegree;

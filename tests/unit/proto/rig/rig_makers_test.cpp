@@ -63,6 +63,27 @@ test::Made legs_first(const test::Made& made) {
   return out;
 }
 
+// The same figure with the legs on the spine, as 3ds Max's Biped may have them.
+test::Made legs_on_spine(test::Made made) {
+  const int spine = static_cast<int>(Bone::kSpine);
+  auto& joints = made.input.joints;
+  for (const Bone bone : {Bone::kLeftUpperLeg, Bone::kRightUpperLeg}) {
+    auto& thigh = joints[static_cast<std::size_t>(bone)];
+    thigh.parent = spine;
+    thigh.offset -= joints[spine].offset;
+    for (int i = 0; i < made.input.poses.count; ++i) {
+      made.input.poses.position[i * joints.size() + static_cast<std::size_t>(bone)] = thigh.offset;
+    }
+  }
+  return made;
+}
+
+// Any local axis along the bones, and any of the four across it.
+test::BoneAxes some_axes(std::mt19937& random) {
+  const Vec along = rig::kAxes[random() % rig::kAxes.size()];
+  return {.along = along, .lateral = rig::axes_across(along)[random() % 4]};
+}
+
 // The same figure with a stick of three joints in its right hand.
 test::Made with_stick(test::Made made) {
   const auto joints = static_cast<std::ptrdiff_t>(made.input.joints.size());
@@ -198,21 +219,31 @@ TEST_CASE("rig: a person is recognised in every maker's names, zero pose, axes a
     const test::Scheme& scheme = test::kSchemes[seed % test::kSchemes.size()];
     const ZeroPose zero = kZeros[(seed / test::kSchemes.size()) % kZeros.size()];
     const double metres = kUnits[random() % kUnits.size()];
-    const UpAxis up = kUpAxes[random() % kUpAxes.size()];
+    const bool has_own_axes = zero == ZeroPose::kFolded && seed % 2 == 0;
+    // A zero pose of any axes may look upright by chance; then only the usual axes are found.
+    const UpAxis up = kUpAxes[random() % (has_own_axes ? 2 : kUpAxes.size())];
     // A folded zero pose has bones along its local axes, so it is not turned by odd angles.
     const double turned_deg = zero == ZeroPose::kFolded ? 0.0 : 30.0 * below(random, 12);
-    const test::Build build{.height = about_one(0.15),
-                            .trunk = about_one(0.08),
-                            .arms = about_one(0.08),
-                            .legs = about_one(0.08),
-                            .shoulders = about_one(0.15),
-                            .arms_down_deg = 45.0 * about_one(0.6)};
+    test::Build build{.height = about_one(0.15),
+                      .trunk = about_one(0.08),
+                      .arms = about_one(0.08),
+                      .legs = about_one(0.08),
+                      .shoulders = about_one(0.15),
+                      .arms_down_deg = 45.0 * about_one(0.6)};
+    if (has_own_axes) std::ranges::generate(build.axes, [&] { return some_axes(random); });
     INFO("seed " << seed << "; POSED_SEED=" << seed << " runs it alone: " << scheme.names[0]
                  << ", zero pose " << static_cast<int>(zero) << ", " << metres << " m, "
                  << up_text(up) << " up, turned by " << turned_deg << ", height " << build.height);
     const Mat axes = up_turn(up).transpose() * yaw(turned_deg);
     test::Made made = test::make(scheme, zero, axes, metres, 0, 40, build);
-    if (seed % 2 == 0) made = legs_first(made);
+    const auto is_called = [&scheme](int bone, std::string_view word) {
+      return std::string_view(scheme.names[bone]).find(word) != std::string_view::npos;
+    };
+    if (seed % 2 == 0) {
+      made = legs_first(made);
+    } else if (seed % 3 == 0 && is_called(0, "Pelvis") && is_called(1, "Spine")) {
+      made = legs_on_spine(std::move(made));
+    }
     // A zero pose that shows the person needs no clip.
     if (seed % 3 == 0 && zero != ZeroPose::kFolded) made.input.poses = {};
     if (seed % 7 == 0) made = with_stick(std::move(made));
@@ -267,25 +298,122 @@ TEST_CASE("rig: fingers are known by their words, by numbers and as anatomists c
       {"LeftInHandIndex", "LeftHandIndex1", "LeftHandIndex2", "LeftHandIndex3"},
       {"LeftFinger10", "LeftFinger11", "LeftFinger12", "LeftFinger1Nub"},
       {"LeftSecondMetacarpal", "LeftSecondProximalPhalange", "LeftSecondMiddlePhalange",
-       "LeftSecondDistalPhalange"}};
+       "LeftSecondDistalPhalange"},
+      {"LeftIndexBase1", "LeftIndex1", "LeftIndex2", "LeftIndex3"}};
   for (const auto& names : makers) {
     auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
     made.input.poses = {};
     auto& joints = made.input.joints;
     joints.push_back({.name = "LeftFinger0", .parent = 9, .offset = {1, 0, 3}, .end_site = {}});
     int parent = static_cast<int>(Bone::kLeftHand);
+    const bool in_palm = names[3] != "LeftHandIndex4" && names[3] != "LeftFinger1Nub";
+    double way = in_palm ? 2.0 : 9.0;  // from the wrist
     for (const std::string& name : names) {
-      joints.push_back({.name = name, .parent = parent, .offset = {3, 0, 0}, .end_site = {}});
+      joints.push_back({.name = name, .parent = parent, .offset = {way, 0, 0}, .end_site = {}});
       parent = static_cast<int>(joints.size()) - 1;
+      way = 3.0;
     }
     const rig::Rig rig = rig::recognise(made.input);
-    const bool in_palm = names[3] != "LeftHandIndex4" && names[3] != "LeftFinger1Nub";
     for (int i = 0; i < 3; ++i) {
       const std::size_t j = test::kMakerJoints + 1 + i + (in_palm ? 1 : 0);
       INFO(joints[j].name);
       CHECK(rig.bone[j] == static_cast<Bone>(static_cast<int>(Bone::kLeftIndexProximal) + i));
     }
   }
+}
+
+TEST_CASE("rig: a tip alone is no finger, and a numbered joint goes on in its finger") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  made.input.poses = {};
+  auto& joints = made.input.joints;
+  const int hand = static_cast<int>(Bone::kLeftHand);
+  const int other = static_cast<int>(Bone::kRightHand);
+  const auto add = [&joints](const char* name, int parent, const Vec& offset) {
+    joints.push_back({.name = name, .parent = parent, .offset = offset, .end_site = {}});
+    return static_cast<int>(joints.size()) - 1;
+  };
+  const int tip = add("LEFT_HAND_MIDDLE_4", hand, {18, 0, 0});
+  // MakeHuman's thumb is the first finger, but its first joint has a name of its own.
+  const int thumb = add("rthumb", other, {-2, -1, 3});
+  const int second = add("finger1-2.r", thumb, {-3, 0, 2});
+  const int index = add("finger2-1.r", other, {-9, 0, 3});
+  add("finger5-1.r", other, {-8, 0, -3});
+  const rig::Rig rig = rig::recognise(made.input);
+  CHECK_FALSE(rig.bone[tip].has_value());
+  CHECK(rig.bone[thumb] == Bone::kRightThumbMetacarpal);
+  CHECK(rig.bone[second] == Bone::kRightThumbProximal);
+  CHECK(rig.bone[index] == Bone::kRightIndexProximal);
+}
+
+TEST_CASE("rig: a hand that no name gives a side is told by how its fingers bend, else asked for") {
+  for (const double bend_deg : {40.0, -40.0, 0.0}) {
+    rig::RigInput input;
+    const auto add = [&input](const std::string& name, int parent, const Vec& offset) {
+      input.joints.push_back({.name = name, .parent = parent, .offset = offset, .end_site = {}});
+      return static_cast<int>(input.joints.size()) - 1;
+    };
+    add("wrist", -1, Vec::Zero());
+    constexpr std::array kNames{"index", "middle", "ring", "little"};
+    for (int f = 0; f < 4; ++f) {
+      const std::string name = kNames[f];
+      const int first = add(name + "1", 0, Vec(9, 0, 3 - 2 * f));
+      const int second = add(name + "2", first, Vec(4, 0, 0));
+      add(name + "3", second, Vec(3, 0, 0));
+    }
+    input.poses.count = 1;
+    for (const auto& joint : input.joints) {
+      const bool bends = joint.name.ends_with('1');
+      input.poses.rotation.emplace_back(
+          Eigen::AngleAxisd(bends ? -bend_deg * kDegree : 0.0, rig::kZ));
+      input.poses.position.push_back(joint.offset);
+    }
+    const rig::Rig rig = rig::recognise(input);
+    CHECK(rig.kind == rig::Kind::kHand);
+    CHECK(rig.bone[0] == (bend_deg > 0 ? Bone::kLeftHand : Bone::kRightHand));
+    REQUIRE(rig.notes.size() == 1);
+    CHECK((rig.notes[0].find("is not known") != std::string::npos) == (bend_deg == 0.0));
+  }
+}
+
+TEST_CASE("rig: an animal on four legs is no person, whatever its joints are called") {
+  const std::vector<Placed> joints{{"Hips", -1, {0, .6, -.3}},
+                                   {"LeftUpLeg", 0, {.08, .55, -.3}},
+                                   {"LeftLeg", 1, {.08, .3, -.25}},
+                                   {"LeftFoot", 2, {.08, .1, -.35}},
+                                   {"RightUpLeg", 0, {-.08, .55, -.3}},
+                                   {"RightLeg", 4, {-.08, .3, -.25}},
+                                   {"RightFoot", 5, {-.08, .1, -.35}},
+                                   {"Spine", 0, {0, .62, .1}},
+                                   {"Head", 7, {0, .8, .4}},
+                                   {"LeftArm", 7, {.08, .5, .15}},
+                                   {"LeftForeArm", 9, {.08, .3, .1}},
+                                   {"LeftHand", 10, {.08, .1, .1}},
+                                   {"RightArm", 7, {-.08, .5, .15}},
+                                   {"RightForeArm", 12, {-.08, .3, .1}},
+                                   {"RightHand", 13, {-.08, .1, .1}}};
+  const rig::Rig rig = recognise(joints);
+  CHECK(rig.kind == rig::Kind::kPart);
+  CHECK(std::ranges::none_of(rig.bone, [](const auto& bone) { return bone.has_value(); }));
+  REQUIRE_FALSE(rig.notes.empty());
+  CHECK(rig.notes[0].find("four legs") != std::string::npos);
+}
+
+TEST_CASE("rig: of two persons in one tree the first is taken, and that is said") {
+  const auto one = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  rig::RigInput both;
+  both.joints.push_back({.name = "Scene", .parent = -1, .offset = Vec::Zero(), .end_site = {}});
+  for (int person = 0; person < 2; ++person) {
+    const int first = static_cast<int>(both.joints.size());
+    for (auto joint : one.input.joints) {
+      joint.parent = joint.parent < 0 ? 0 : joint.parent + first;
+      both.joints.push_back(std::move(joint));
+    }
+  }
+  const rig::Rig rig = rig::recognise(both);
+  CHECK(rig.kind == rig::Kind::kPerson);
+  CHECK(rig.bone[1] == Bone::kHips);
+  REQUIRE_FALSE(rig.notes.empty());
+  CHECK(rig.notes[0].find("two persons") != std::string::npos);
 }
 
 TEST_CASE("rig: without names the shape tells the limbs, and the feet which side is left") {
