@@ -61,7 +61,9 @@ export class NameTags {
     if (tag.element.hidden === shown) tag.element.hidden = !shown;
     if (!shown) return;
     // Whole pixels, and only when they change: each move costs the browser a layer.
-    const x = Math.round(area.left + (0.5 + 0.5 * at.x) * area.width);
+    const half = 0.5 * tag.wide;
+    const middle = Math.min((0.5 + 0.5 * at.x) * area.width, area.width - half);
+    const x = Math.round(area.left + Math.max(middle, half)); // its words are whole at an edge, too
     const edge = area.top + (0.5 - 0.5 * at.y) * area.height;
     const wanted = below ? Math.min(edge + tag.high, area.top + area.height) : edge;
     const top = area.top + area.covered + tag.high;

@@ -13,7 +13,7 @@ const skip = existsSync(join(PAGE, 'camera'))
   ? false
   : 'SKIPPED without build/viewer/camera (`./run page` makes it)';
 const options = { skip, timeout: 600000 };
-const ENOUGH = 40; // pictures
+const ENOUGH = 30; // pictures
 const AXE = readFileSync(createRequire(import.meta.url).resolve('axe-core/axe.min.js'), 'utf8');
 
 export const tests = []; // what node's test() takes, for main.mjs

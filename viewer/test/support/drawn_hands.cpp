@@ -4,7 +4,8 @@
 // 712) and those of tests/golden/camera (seeds 603, 606, 609, 612, the even ones left) were made.
 //
 //   g++ -O3 -ffast-math -std=c++20 drawn_hands.cpp -o drawn_hands
-//   ./drawn_hands signs|shows|random SEED PICTURES OUT [WILDNESS [left]]   OUT.rgba, OUT.truth: 10 Hz
+//   ./drawn_hands signs|shows|random SEED PICTURES OUT [WILDNESS [left]]
+//                                                       writes OUT.rgba and OUT.truth, 10 Hz
 //   node find_hands.mjs OUT                                          OUT.hands: what is found
 //   POSED_FILM=OUT build/bin/unit_drivers "[.takes]"                 OUT.take: what posed sees
 //

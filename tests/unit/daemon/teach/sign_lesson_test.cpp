@@ -104,6 +104,11 @@ TEST_CASE("a show of which no sign can be learnt is refused in words", "[teach]"
     }
   }
   CHECK(has(why_not(lesson, "g", wave), "moved too much"));
+  clip::HandClip jumps = show_of("g");  // as a camera sees a hand
+  for (std::size_t t = 4; t < jumps.angles.size(); t += 10) {
+    for (double& angle : jumps.angles[t]) angle += 60.0 * kDegree;
+  }
+  CHECK(SignLesson().add("g", jumps));
   clip::HandClip stays = show_of("g");
   const std::size_t half = stays.angles.size() / 2;
   stays.angles.resize(half);
