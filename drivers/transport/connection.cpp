@@ -30,7 +30,7 @@ constexpr milliseconds kWritePatience{1000};
 constexpr milliseconds kDrainPatience{1000};
 constexpr milliseconds kClosePatience{50};
 constexpr std::int64_t kOfNoUse_ns = 5 * kNanosPerSecond;
-constexpr std::size_t kMaxOfNoUse = 1024 * 1024;  // bytes in a row; a recording keeps them all
+constexpr std::size_t kMaxOfNoUse = 1024 * 1024;  // bytes in a second; a recording keeps them all
 constexpr int kMaxWaiting = 256;                  // reads; hidraw keeps 64 reports
 
 bool not_now(int error) noexcept {
@@ -69,7 +69,11 @@ class LinkTransport final : public Transport, public Upkeep {
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
   RT_SAFE void decoded(bool used) noexcept override {
     if (used) used_ns_.store(read_ns_, std::memory_order_relaxed);
-    of_no_use_ = used ? 0 : of_no_use_ + read_;
+    if (used || read_ns_ - since_ns_ > kNanosPerSecond) {
+      of_no_use_ = 0;
+      since_ns_ = read_ns_;
+    }
+    if (!used) of_no_use_ += read_;
   }
   [[nodiscard]] bool send(std::span<const std::byte> bytes, std::uint8_t socket) noexcept override;
   void upkeep(std::int64_t now_ns) noexcept override;
@@ -80,7 +84,10 @@ class LinkTransport final : public Transport, public Upkeep {
 
   Connection link_;
   std::int64_t read_ns_ = 0;
-  std::size_t read_ = 0, of_no_use_ = 0;  // bytes, of the last read and since the last one of use
+  std::size_t read_ = 0;  // bytes of the last read
+  // Bytes of no use in a row, within a second from here on.
+  std::size_t of_no_use_ = 0;
+  std::int64_t since_ns_ = 0;
   // When the last bytes of use were read; before start() there is nothing to wait for.
   std::atomic<std::int64_t> used_ns_{std::numeric_limits<std::int64_t>::max()};
   bool is_given_up_ = false, is_reported_ = false;  // of the upkeep's thread
@@ -188,6 +195,7 @@ Connection::Connection(Connection&& other) noexcept
       cancel_(std::move(other.cancel_)),
       undecided_(other.undecided_),
       was_browser_(other.was_browser_),
+      first_lines_(other.first_lines_),
       kept_back_(other.kept_back_),
       kept_(other.kept_) {}
 

@@ -323,7 +323,8 @@ TEST_CASE("a request is a browser's whatever its method, and what follows its li
   }
 }
 
-TEST_CASE("a connection that brings a megabyte of nothing of use is ended and counted") {
+TEST_CASE(
+    "a connection that brings a megabyte of nothing of use in a second is ended and counted") {
   const std::uint16_t port = free_port();
   TransportFactory ports;
   CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
@@ -345,6 +346,18 @@ TEST_CASE("a connection that brings a megabyte of nothing of use is ended and co
   CHECK(chunk.foreign == 1);
   CHECK(read > 2'000'000);  // what was of use begins the count anew
   CHECK(read < 2'100'000);
+
+  const Client slow(port);  // a paused device, for example, which repeats itself
+  auto second = ports.accept({.endpoint = loopback(port)});
+  REQUIRE(second);
+  const auto other = make_link_transport(std::move(*second));
+  REQUIRE(other->start(0));
+  for (int i = 0; i < 2000; ++i) {
+    slow.say(std::string(1000, '!'));
+    REQUIRE(readable(*other));
+    REQUIRE_FALSE(other->read(i * kNanosPerSecond / 500).lost);
+    other->decoded(false);
+  }
 }
 
 TEST_CASE("a page whose request has come already takes no device's place, nor is it read") {
