@@ -14,10 +14,13 @@ Placed::Placed(const RobotHand& hand)
       from_m(hand.capsules.size()),
       to_m(hand.capsules.size()),
       middle_m(hand.capsules.size()),
-      shown(hand.links.size()),
+      shown(hand.balls.size()),
       swing_m(hand.links.size()),
+      near_shapes(hand.balls.size()),
       near(hand.capsules.size()),
       least(hand.pairs.size()),
+      hulls(hand.hull_pairs.size()),
+      apart(hand.hull_pairs.size(), Eigen::Vector3d::UnitX()),
       close(hand.links.size() * hand.links.size()) {}
 
 double angle_of(const RobotJoint& joint, const Drive& drive) noexcept {
@@ -44,13 +47,15 @@ RT_SAFE void move_cover(const Cover& cover, int link, Placed& placed) noexcept {
   const double way_m = most_way_m(cover, placed.cover[link], now);
   placed.way_m[link] += way_m < kFar_m ? way_m : kFar_m;
   placed.cover[link] = now;
-  placed.shown[link] = 0;
+  std::fill_n(placed.shown.begin() + cover.first_shape, cover.shape_count, char{0});
 }
 
 }  // namespace
 
 void place(const RobotHand& hand, const Drive& drive, Placed& placed) noexcept {
-  const bool covers = !placed.shown.empty();
+  if (placed.drive == drive) return;
+  placed.drive = drive;
+  const bool covers = !placed.cover.empty();
   for (std::size_t l = 0; l < hand.links.size(); ++l) {
     const Link& link = hand.links[l];
     Eigen::Matrix3d turn = link.at.linear();

@@ -16,7 +16,9 @@ namespace {
 constexpr double kDefaultSpeed_rad_s = 8.0;
 constexpr std::size_t kMaxShapes = 256;  // each becomes up to four capsules, which all are compared
 constexpr double kMaxNamed_rad = 100.0;  // that a text may name
-constexpr double kGuessedTip_m = 8e-3;   // radius of a finger tip without a shape
+constexpr double kSameWay = 0.97;        // cosine: fingers side by side point so
+constexpr double kMaxFinger_m = 0.3;
+constexpr double kGuessedTip_m = 8e-3;  // radius of a finger tip without a shape
 
 // Rounded into the range, so that no angle of a frame is beyond a limit by its rounding.
 double low_float(double value) {
@@ -149,7 +151,7 @@ class Builder {
     for (const Finger& finger : hand_.fingers) {
       if (finger.base == 0) return refuse("one finger of the robot has no joint of its own");
     }
-    if (options_.tips.empty()) order_fingers();
+    if (options_.tips.empty()) TRY(order_fingers());
     for (std::size_t f = 0; f < hand_.fingers.size(); ++f) {
       hand_.fingers[f].human = static_cast<int>(f);
     }
@@ -199,22 +201,29 @@ class Builder {
     for (int l = finger.tip; l > 0 && is_above(finger.base, l); l = hand_.links[l].parent) {
       std::string names = hand_.links[l].name + " " + hand_.links[l].joint;
       std::ranges::transform(names, names.begin(), [](unsigned char c) { return std::tolower(c); });
-      if (names.find("thumb") != names.npos || names.starts_with("th")) return true;
+      // "THJ1" is Shadow's; not all that begins so is a thumb: "third".
+      if (names.find("thumb") != names.npos || names.find(" thj") != names.npos) return true;
     }
     return false;
   }
 
   // The thumb has the name, or else points away from the others. They are in a row whose end near
   // the thumb is the index finger.
-  void order_fingers() {
+  Result<> order_fingers() {
     std::vector<Finger>& fingers = hand_.fingers;
     auto thumb = std::ranges::find_if(fingers, [&](const Finger& f) { return is_named_thumb(f); });
     if (thumb == fingers.end()) {
-      thumb = std::ranges::min_element(fingers, {}, [&](const Finger& finger) {
-        double sum = 0.0;
+      const auto with_others = [&](const Finger& finger) {
+        double sum = -1.0;
         for (const Finger& other : fingers) sum += direction(finger).dot(direction(other));
-        return sum;
-      });
+        return sum / static_cast<double>(fingers.size() - 1);
+      };
+      thumb = std::ranges::min_element(fingers, {}, with_others);
+      if (with_others(*thumb) > kSameWay) {
+        return refuse(
+            "no finger is named thumb, and none points away from the others when open; "
+            "`tips` can name their last links, thumb first");
+      }
     }
     std::iter_swap(thumb, fingers.begin());
     const Eigen::Vector3d thumb_m = placed_.at_m[fingers[0].base];
@@ -226,6 +235,7 @@ class Builder {
     std::sort(fingers.begin() + 1, fingers.end(), [&](const Finger& a, const Finger& b) {
       return placed_.at_m[a.base].dot(row) < placed_.at_m[b.base].dot(row);
     });
+    return {};
   }
 
   // A joint that moves all fingers is a wrist's, and one that moves none is none of the hand's.
@@ -271,6 +281,7 @@ class Builder {
     for (std::size_t j = 0; j < hand_.joints.size(); ++j) {
       RobotJoint& joint = hand_.joints[j];
       if (hand_.links[joint.link].leader >= 0) continue;
+      if (!(joint.high > joint.low)) held_[j] = joint.low;
       if (std::isfinite(held_[j])) {
         joint.multiplier = 0.0;
         joint.offset = held_[j];
@@ -283,9 +294,14 @@ class Builder {
                               .speed = joint.speed,
                               .acceleration = options_.acceleration});
     }
-    if (hand_.driven.empty() || hand_.driven.size() > static_cast<std::size_t>(kMaxDriven)) {
+    if (hand_.driven.empty()) {
+      return refuse(
+          "no joint of the robot's fingers can turn: each stands, or its limits leave it "
+          "one angle");
+    }
+    if (hand_.driven.size() > static_cast<std::size_t>(kMaxDriven)) {
       return refuse("the robot has " + std::to_string(hand_.driven.size()) +
-                    " joints to drive; posed drives 1 to 24: let others stand by `hold`");
+                    " joints to drive; posed drives at most 24: let others stand by `hold`");
     }
     for (RobotJoint& joint : hand_.joints) {
       const Link& link = hand_.links[joint.link];
@@ -396,6 +412,12 @@ class Builder {
       if (!(finger.length_m > 5e-3)) {
         return refuse("the finger that ends in " + in_quotes(hand_.links[finger.tip].name) +
                       " is shorter than 5 mm; name its last link by `tips`");
+      }
+      if (finger.length_m > kMaxFinger_m) {
+        return refuse("the finger that ends in " + in_quotes(hand_.links[finger.tip].name) +
+                      " is " + std::to_string(std::lround(100.0 * finger.length_m)) +
+                      " cm long: it is no hand's, or the URDF is not in metres, or "
+                      "`tips` should name another last link");
       }
     }
     const Eigen::Vector3d out = y.cross(z);  // of a right hand's palm

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -63,17 +64,32 @@ struct Finger {
 
 struct Capsule {
   int link = 0;
+  int shape = 0;                                     // of RobotHand::balls
   Eigen::Vector3d from_m = Eigen::Vector3d::Zero();  // in the link's frame
   Eigen::Vector3d to_m = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
   double per_m2 = 0.0;  // 1 / length^2; 0: a ball
 };
 
+struct Ball {  // that holds the capsules of a shape, in the link's frame
+  Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();
+  double reach_m = 0.0;
+  int first = 0, count = 0;  // its capsules
+};
+
 struct Cover {  // the capsule that holds all those of a link, in its frame
   Eigen::Vector3d from_m = Eigen::Vector3d::Zero();
   Eigen::Vector3d to_m = Eigen::Vector3d::Zero();
   double radius_m = 0.0, per_m2 = 0.0;
-  int first = 0, count = 0;  // its capsules; none: the link has no shape
+  int first = 0, count = 0;              // its capsules; none: the link has no shape
+  int first_shape = 0, shape_count = 0;  // its balls and hulls
+};
+
+// Two links that are kept apart: by their capsules, or where those touch when open by some of the
+// hulls of their shapes.
+struct LinkPair {
+  int a = 0, b = 0;
+  int first = 0, count = 0;  // of RobotHand::hull_pairs; none: by capsules
 };
 
 struct CoverPose {  // of a link's cover in some frame
@@ -99,13 +115,16 @@ struct RobotHand {
   std::vector<Finger> fingers;  // thumb first, then from its side on
   // Columns: out of the palm, to the thumb's side, to the fingers. A left hand's is a mirror image.
   Eigen::Matrix3d palm = Eigen::Matrix3d::Identity();
-  std::vector<Capsule> capsules;              // by link
-  std::vector<double> reach_m;                // [capsule], radius of the ball around it
-  std::vector<Cover> covers;                  // [link]
-  std::vector<std::pair<int, int>> pairs;     // of links that must not touch
-  std::vector<std::pair<int, int>> left_out;  // that touch anyway
-  std::vector<std::vector<Turn>> turns;       // [link]
-  std::vector<int> joint_of_link;             // [link]; -1: it does not turn
+  std::vector<Capsule> capsules;                // by link
+  std::vector<double> reach_m;                  // [capsule], radius of the ball around it
+  std::vector<Cover> covers;                    // [link]
+  std::vector<Ball> balls;                      // of shapes, by link
+  std::vector<Hull> hulls;                      // the same
+  std::vector<std::pair<int, int>> hull_pairs;  // by pair of links
+  std::vector<LinkPair> pairs;                  // of links that must not touch
+  std::vector<std::pair<int, int>> left_out;    // some of whose shapes touch anyway
+  std::vector<std::vector<Turn>> turns;         // [link]
+  std::vector<int> joint_of_link;               // [link]; -1: it does not turn
 
   [[nodiscard]] int size() const noexcept { return static_cast<int>(driven.size()); }
   [[nodiscard]] Drive start() const;
@@ -122,6 +141,7 @@ struct Placed {
   explicit Placed(std::size_t links) : turn(links), at_m(links), axis(links) {}
   explicit Placed(const RobotHand& hand);  // with capsules
 
+  Drive drive = Drive::Constant(std::numeric_limits<double>::quiet_NaN());  // none yet
   std::vector<Eigen::Matrix3d> turn;
   std::vector<Eigen::Vector3d> at_m;
   std::vector<Eigen::Vector3d> axis;  // of the joint that carries the link
@@ -130,14 +150,22 @@ struct Placed {
   // is the most that their gap has shrunk.
   std::vector<double> way_m;                            // [link]
   std::vector<CoverPose> cover;                         // [link]
-  std::vector<Eigen::Vector3d> from_m, to_m, middle_m;  // [capsule] of links that are shown
-  std::vector<char> shown;                              // [link]
+  std::vector<Eigen::Vector3d> from_m, to_m, middle_m;  // [capsule] of shapes that are shown
+  std::vector<char> shown;                              // [shape]
   std::vector<double> swing_m;                          // scratch: [link]
-  std::vector<int> near;                                // scratch: capsules
+  struct NearShape {
+    int first = 0, count = 0;  // of `near`
+    Eigen::Vector3d middle_m = Eigen::Vector3d::Zero();
+    double reach_m = 0.0;
+  };
+  std::vector<NearShape> near_shapes;  // scratch
+  std::vector<int> near;               // scratch: capsules
   struct Least {
     double gap_m = -1.0, way_m = 0.0;  // when both together had gone that way
   };
-  std::vector<Least> least;  // [pair of RobotHand::pairs]
+  std::vector<Least> least;            // [pair of RobotHand::pairs]
+  std::vector<Least> hulls;            // [pair of hulls], the same of them
+  std::vector<Eigen::Vector3d> apart;  // [pair of hulls], as the first link sees it
   // The capsules of two links that were nearest to each other when all were last looked at, the
   // nearest first. All others were farther than `others_m`. Where the second link's cover was then,
   // as the first one sees it.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "models/hand/segments.hpp"
 
@@ -14,6 +15,8 @@ constexpr int kTries = 100;
 constexpr double kMostly = 0.7;
 constexpr double kRounding_m = 1e-9;
 constexpr double kSlack_m = 6e-3;  // of what is remembered as close
+constexpr double kOpen_m = 1e-3;   // shapes nearer than this when open are made to touch
+constexpr double kThin_m = 1e-3;   // a shape of a smaller radius has its corners rounded off
 
 double per_length2(const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m) {
   const double length2 = (to_m - from_m).squaredNorm();
@@ -23,6 +26,7 @@ double per_length2(const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m) {
 void add_capsule(RobotHand& hand, int link, const Eigen::Isometry3d& at,
                  const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m, double radius_m) {
   hand.capsules.push_back({.link = link,
+                           .shape = static_cast<int>(hand.balls.size()),
                            .from_m = at * from_m,
                            .to_m = at * to_m,
                            .radius_m = radius_m,
@@ -69,6 +73,49 @@ void add_shape(RobotHand& hand, int link, const Shape& shape) {
       return add_capsule(hand, link, shape.at, -end, end, std::hypot(shape.size_m.x(), shorter_m));
     }
   }
+}
+
+// The shape itself, without what its capsules stick out.
+Hull hull_of_shape(const Shape& shape) {
+  constexpr int kRim = 16;
+  Hull hull = shape.hull;
+  const Eigen::Vector3d half = 0.5 * shape.size_m;
+  if (!hull.corners.empty()) {
+  } else if (shape.kind == Shape::Kind::kBox) {
+    for (int k = 0; k < 8; ++k) {
+      const Eigen::Vector3d side((k & 1) - 0.5, (k >> 1 & 1) - 0.5, (k >> 2) - 0.5);
+      hull.corners.emplace_back(side.cwiseProduct(shape.size_m));
+    }
+  } else if (shape.kind == Shape::Kind::kCylinder) {
+    for (int k = 0; k < 2 * kRim; ++k) {
+      const double angle = 2.0 * std::numbers::pi * (k / 2) / kRim;
+      hull.corners.emplace_back(shape.size_m.x() * std::cos(angle),
+                                shape.size_m.x() * std::sin(angle),
+                                k % 2 == 0 ? half.y() : -half.y());
+    }
+    hull.radius_m = shape.size_m.x() * (1.0 - std::cos(std::numbers::pi / kRim));
+  } else {
+    hull.radius_m = shape.size_m.x();
+    for (const double end : {half.y(), -half.y()}) hull.corners.emplace_back(0.0, 0.0, end);
+  }
+  if (hull.radius_m < kThin_m) round_off(hull);
+  for (auto& corner : hull.corners) corner = shape.at * corner;
+  return hull;
+}
+
+// The ball around the middle of the latest capsules.
+Ball ball_of(const RobotHand& hand, int first) {
+  Ball ball{.first = first, .count = static_cast<int>(hand.capsules.size()) - first};
+  for (int c = first; c < first + ball.count; ++c) {
+    ball.middle_m += 0.5 * (hand.capsules[c].from_m + hand.capsules[c].to_m) / ball.count;
+  }
+  for (int c = first; c < first + ball.count; ++c) {
+    const Capsule& one = hand.capsules[c];
+    const double far2 = std::max((one.from_m - ball.middle_m).squaredNorm(),
+                                 (one.to_m - ball.middle_m).squaredNorm());
+    ball.reach_m = std::max(ball.reach_m, std::sqrt(far2) + one.radius_m + kRounding_m);
+  }
+  return ball;
 }
 
 // The smallest of those along the axes of the link's frame, in which most boxes lie.
@@ -142,20 +189,15 @@ Drive some_pose(const RobotHand& hand, int number) {
   return drive;
 }
 
-struct Nearest {
-  double gap_m = 0.0;
-  Eigen::Vector3d at_a = Eigen::Vector3d::Zero(), at_b = Eigen::Vector3d::Zero();
-  Eigen::Vector3d apart = Eigen::Vector3d::UnitX();  // from b to a
-};
-
-// The capsules of a link where they are now.
-RT_SAFE void show(const RobotHand& hand, int link, Placed& placed) noexcept {
-  if (placed.shown[link] != 0) return;
-  placed.shown[link] = 1;
-  const Cover& cover = hand.covers[link];
+// The capsules of a shape where they are now.
+RT_SAFE void show(const RobotHand& hand, int shape, Placed& placed) noexcept {
+  if (placed.shown[shape] != 0) return;
+  placed.shown[shape] = 1;
+  const Ball& ball = hand.balls[shape];
+  const int link = hand.capsules[ball.first].link;
   const Eigen::Matrix3d turn = placed.turn[link];
   const Eigen::Vector3d at_m = placed.at_m[link];
-  for (int c = cover.first; c < cover.first + cover.count; ++c) {
+  for (int c = ball.first; c < ball.first + ball.count; ++c) {
     placed.from_m[c] = at_m + turn * hand.capsules[c].from_m;
     placed.to_m[c] = at_m + turn * hand.capsules[c].to_m;
     placed.middle_m[c] = 0.5 * (placed.from_m[c] + placed.to_m[c]);
@@ -189,10 +231,52 @@ RT_SAFE bool within(double distance2, double reach_m) noexcept {
   return reach_m > 0.0 && distance2 < reach_m * reach_m;
 }
 
+// False: two capsules are farther apart. Most are, and this is cheaper than their gap.
+RT_SAFE bool may_be_within(const RobotHand& hand, const Placed& placed, int i, int j,
+                           double within_m) noexcept {
+  const Eigen::Vector3d& middle = placed.middle_m[i];
+  const double reach_m = hand.reach_m[i] + hand.reach_m[j] + within_m;
+  if (!within((middle - placed.middle_m[j]).squaredNorm(), reach_m)) return false;
+  // Not the ball around i, but i itself: most of those that are left are too far from it.
+  const double thin_m = hand.capsules[i].radius_m + hand.reach_m[j] + within_m;
+  const double axis2 =
+      away2(placed.middle_m[j], placed.from_m[i], placed.to_m[i], hand.capsules[i].per_m2);
+  if (!within(axis2, thin_m)) return false;
+  const double other2 = away2(middle, placed.from_m[j], placed.to_m[j], hand.capsules[j].per_m2);
+  return within(other2, hand.capsules[j].radius_m + hand.reach_m[i] + within_m);
+}
+
+// The shapes of a link, and their capsules, that may be within that of another link's cover.
+RT_SAFE std::span<const Placed::NearShape> near_shapes(const RobotHand& hand, Placed& placed,
+                                                       int link, const CoverPose& at,
+                                                       const Cover& cover,
+                                                       double within_m) noexcept {
+  std::size_t count = 0;
+  int near = 0;
+  const double cover_m = cover.radius_m + within_m;
+  const Cover& own = hand.covers[link];
+  for (int g = own.first_shape; g < own.first_shape + own.shape_count; ++g) {
+    const Ball& ball = hand.balls[g];
+    const Eigen::Vector3d middle_m = placed.at_m[link] + placed.turn[link] * ball.middle_m;
+    const double off2 = away2(middle_m, at.from_m, at.to_m, cover.per_m2);
+    if (!within(off2, ball.reach_m + cover_m)) continue;
+    show(hand, g, placed);
+    const int first = near;
+    for (int j = ball.first; j < ball.first + ball.count; ++j) {
+      const double away_m2 = away2(placed.middle_m[j], at.from_m, at.to_m, cover.per_m2);
+      if (within(away_m2, hand.reach_m[j] + cover_m)) placed.near[near++] = j;
+    }
+    if (near == first) continue;
+    placed.near_shapes[count++] = {
+        .first = first, .count = near - first, .middle_m = middle_m, .reach_m = ball.reach_m};
+  }
+  return {placed.near_shapes.data(), count};
+}
+
 // Lists the capsules of two links that are nearer than both `near_m` and the nearest ones, and
 // kSlack_m. Most capsules are too far from the other link's cover to be looked at.
-RT_SAFE void find_close(const RobotHand& hand, const Placed& placed, int a, int b, double near_m,
-                        std::span<int> near_b, Placed::Close& close) noexcept {
+RT_SAFE void find_close(const RobotHand& hand, Placed& placed, int a, int b, double near_m,
+                        Placed::Close& close) noexcept {
   const Cover& all_a = hand.covers[a];
   const Cover& all_b = hand.covers[b];
   double within_m = near_m + kSlack_m;
@@ -211,29 +295,24 @@ RT_SAFE void find_close(const RobotHand& hand, const Placed& placed, int a, int 
     close.two[at] = {.gap_m = found_m, .a = i, .b = j};
     within_m = std::min(within_m, close.two[0].gap_m + kSlack_m);
   };
-  int near = 0;
-  for (int j = all_b.first; j < all_b.first + all_b.count; ++j) {
-    const double off2 =
-        away2(placed.middle_m[j], placed.cover[a].from_m, placed.cover[a].to_m, all_a.per_m2);
-    if (within(off2, hand.reach_m[j] + all_a.radius_m + within_m)) near_b[near++] = j;
-  }
-  for (int i = all_a.first; near > 0 && i < all_a.first + all_a.count; ++i) {
-    const Eigen::Vector3d& middle = placed.middle_m[i];
-    const double all_m = hand.reach_m[i] + all_b.radius_m + within_m;
-    const double off2 = away2(middle, placed.cover[b].from_m, placed.cover[b].to_m, all_b.per_m2);
-    if (!within(off2, all_m)) continue;
-    for (int k = 0; k < near; ++k) {
-      const int j = near_b[k];
-      const double reach_m = hand.reach_m[i] + hand.reach_m[j] + within_m;
-      if (!within((middle - placed.middle_m[j]).squaredNorm(), reach_m)) continue;
-      // Not the ball around i, but i itself: most of those that are left are too far from it.
-      const double thin_m = hand.capsules[i].radius_m + hand.reach_m[j] + within_m;
-      const double axis2 =
-          away2(placed.middle_m[j], placed.from_m[i], placed.to_m[i], hand.capsules[i].per_m2);
-      if (!within(axis2, thin_m)) continue;
-      const double other2 =
-          away2(middle, placed.from_m[j], placed.to_m[j], hand.capsules[j].per_m2);
-      if (within(other2, hand.capsules[j].radius_m + hand.reach_m[i] + within_m)) look(i, j);
+  const std::span<const Placed::NearShape> near =
+      near_shapes(hand, placed, b, placed.cover[a], all_a, within_m);
+  for (int g = all_a.first_shape; !near.empty() && g < all_a.first_shape + all_a.shape_count; ++g) {
+    const Eigen::Vector3d middle_m = placed.at_m[a] + placed.turn[a] * hand.balls[g].middle_m;
+    const double ball_m = hand.balls[g].reach_m + within_m;
+    if (!within(away2(middle_m, placed.cover[b].from_m, placed.cover[b].to_m, all_b.per_m2),
+                ball_m + all_b.radius_m)) {
+      continue;
+    }
+    show(hand, g, placed);
+    for (const Placed::NearShape& other : near) {
+      if (!within((middle_m - other.middle_m).squaredNorm(), ball_m + other.reach_m)) continue;
+      for (int i = hand.balls[g].first; i < hand.balls[g].first + hand.balls[g].count; ++i) {
+        for (int k = other.first; k < other.first + other.count; ++k) {
+          const int j = placed.near[k];
+          if (may_be_within(hand, placed, i, j, within_m)) look(i, j);
+        }
+      }
     }
   }
   close.others_m = within_m;
@@ -246,13 +325,13 @@ RT_SAFE Nearest nearest(const RobotHand& hand, Placed& placed, int a, int b,
                         double near_m) noexcept {
   Nearest best{.gap_m = near_m};
   if (hand.covers[a].count == 0 || hand.covers[b].count == 0) return best;
-  show(hand, a, placed);
-  show(hand, b, placed);
   Placed::Close& close = placed.close[static_cast<std::size_t>(a) * hand.links.size() + b];
   const auto look = [&](double way_m) {
     for (std::size_t k = 0; k < close.count; ++k) {
       const auto& [then_m, i, j] = close.two[k];
       if (then_m - way_m >= best.gap_m) return true;
+      show(hand, hand.capsules[i].shape, placed);
+      show(hand, hand.capsules[j].shape, placed);
       const auto closest = apart(placed, i, j);
       const double distance_m = closest.apart.norm();
       const double gap_m = distance_m - hand.capsules[i].radius_m - hand.capsules[j].radius_m;
@@ -268,11 +347,33 @@ RT_SAFE Nearest nearest(const RobotHand& hand, Placed& placed, int a, int b,
   if (look(gone_m)) return best;
   double least_m = near_m;
   if (close.count > 0) {
-    least_m = std::min(least_m, gap_m(hand, placed, close.two[0].a, close.two[0].b));
+    const auto& [then_m, i, j] = close.two[0];
+    show(hand, hand.capsules[i].shape, placed);
+    show(hand, hand.capsules[j].shape, placed);
+    least_m = std::min(least_m, gap_m(hand, placed, i, j));
   }
-  find_close(hand, placed, a, b, least_m, placed.near, close);
+  find_close(hand, placed, a, b, least_m, close);
   best.gap_m = near_m;
   look(0.0);
+  return best;
+}
+
+// The same by the hulls of a pair's shapes.
+RT_SAFE Nearest nearest_hulls(const RobotHand& hand, Placed& placed, const LinkPair& pair,
+                              double near_m) noexcept {
+  Nearest best{.gap_m = near_m};
+  const double way_m = placed.way_m[pair.a] + placed.way_m[pair.b];
+  for (int k = pair.first; k < pair.first + pair.count; ++k) {
+    Placed::Least& least = placed.hulls[k];
+    if (least.gap_m - (way_m - least.way_m) > best.gap_m + kRounding_m) continue;
+    const auto [a, b] = hand.hull_pairs[k];
+    const Nearest found = hull_gap({hand.hulls[a], placed.turn[pair.a], placed.at_m[pair.a]},
+                                   {hand.hulls[b], placed.turn[pair.b], placed.at_m[pair.b]},
+                                   placed.turn[pair.a] * placed.apart[k], best.gap_m);
+    least = {.gap_m = found.gap_m, .way_m = way_m};
+    placed.apart[k] = placed.turn[pair.a].transpose() * found.apart;
+    if (found.gap_m < best.gap_m) best = found;
+  }
   return best;
 }
 
@@ -303,36 +404,111 @@ void add_swings(RobotHand& hand) {
   }
 }
 
-}  // namespace
-
-void add_shapes(RobotHand& hand) {
-  for (int l = 0; l < std::ssize(hand.links); ++l) {
-    const int first = static_cast<int>(hand.capsules.size());
-    for (const Shape& shape : hand.links[l].shapes) add_shape(hand, l, shape);
-    hand.covers.push_back(cover_of(hand, first));
-  }
-  Placed placed(hand);
-  std::vector<std::pair<int, int>> all;
+// Fills in the pairs whose capsules can keep them apart; returns the others, which touch when open
+// or mostly.
+std::vector<LinkPair> find_pairs(RobotHand& hand, Placed& placed) {
+  std::vector<LinkPair> all;
   for (int a = 0; a < std::ssize(hand.links); ++a) {
     for (int b = a + 1; b < std::ssize(hand.links); ++b) {
       if (hand.covers[a].count == 0 || hand.covers[b].count == 0 || neighbours(hand, a, b))
         continue;
-      all.emplace_back(a, b);
+      all.push_back({.a = a, .b = b});
     }
   }
   std::vector<int> touching(all.size());
   for (int number = -1; number < kTries; ++number) {
     place(hand, number < 0 ? hand.start() : some_pose(hand, number), placed);
     for (std::size_t p = 0; p < all.size(); ++p) {
-      const auto [a, b] = all[p];
-      if (cover_gap_m(hand, placed, a, b) >= 0.0) continue;
-      if (nearest(hand, placed, a, b, 0.0).gap_m >= 0.0) continue;
+      const LinkPair& pair = all[p];
+      if (cover_gap_m(hand, placed, pair.a, pair.b) >= 0.0) continue;
+      if (nearest(hand, placed, pair.a, pair.b, 0.0).gap_m >= 0.0) continue;
       touching[p] += number < 0 ? kTries : 1;
     }
   }
+  std::vector<LinkPair> others;
   for (std::size_t p = 0; p < all.size(); ++p) {
-    const bool always = touching[p] > kMostly * kTries;
-    (always ? hand.left_out : hand.pairs).push_back(all[p]);
+    (touching[p] > kMostly * kTries ? others : hand.pairs).push_back(all[p]);
+  }
+  return others;
+}
+
+// The same for the shapes of links whose capsules touch.
+void find_hull_pairs(RobotHand& hand, Placed& placed, std::span<LinkPair> pairs) {
+  struct Candidate {
+    std::pair<int, int> two;
+    std::size_t pair = 0;
+    int touching = 0;
+  };
+  std::vector<Candidate> all;
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    const Cover& one = hand.covers[pairs[p].a];
+    const Cover& two = hand.covers[pairs[p].b];
+    for (int a = one.first_shape; a < one.first_shape + one.shape_count; ++a) {
+      for (int b = two.first_shape; b < two.first_shape + two.shape_count; ++b) {
+        all.push_back({.two = {a, b}, .pair = p});
+      }
+    }
+  }
+  for (int number = -1; number < kTries; ++number) {
+    place(hand, number < 0 ? hand.start() : some_pose(hand, number), placed);
+    for (Candidate& one : all) {
+      if (one.touching > kMostly * kTries) continue;
+      const int a = pairs[one.pair].a, b = pairs[one.pair].b;
+      const double near_m = number < 0 ? kOpen_m : 0.0;
+      const double gap_m = hull_gap({hand.hulls[one.two.first], placed.turn[a], placed.at_m[a]},
+                                    {hand.hulls[one.two.second], placed.turn[b], placed.at_m[b]},
+                                    Eigen::Vector3d::UnitX(), near_m)
+                               .gap_m;
+      if (gap_m < near_m) one.touching += number < 0 ? kTries : 1;
+    }
+  }
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
+    pairs[p].first = static_cast<int>(hand.hull_pairs.size());
+    for (const Candidate& one : all) {
+      if (one.pair == p && one.touching <= kMostly * kTries) hand.hull_pairs.push_back(one.two);
+    }
+    pairs[p].count = static_cast<int>(hand.hull_pairs.size()) - pairs[p].first;
+  }
+}
+
+// A hull may stick out of the capsules by its radius.
+void widen_cover(RobotHand& hand, int link) {
+  Cover& cover = hand.covers[link];
+  double most_m = 0.0;
+  for (int h = cover.first_shape; h < cover.first_shape + cover.shape_count; ++h) {
+    most_m = std::max(most_m, hand.hulls[h].radius_m);
+  }
+  cover.radius_m += most_m;
+}
+
+}  // namespace
+
+void add_shapes(RobotHand& hand) {
+  for (int l = 0; l < std::ssize(hand.links); ++l) {
+    const int first = static_cast<int>(hand.capsules.size());
+    for (const Shape& shape : hand.links[l].shapes) {
+      const int begin = static_cast<int>(hand.capsules.size());
+      add_shape(hand, l, shape);
+      hand.balls.push_back(ball_of(hand, begin));
+      hand.hulls.push_back(hull_of_shape(shape));
+    }
+    hand.covers.push_back(cover_of(hand, first));
+    hand.covers[l].shape_count = static_cast<int>(hand.links[l].shapes.size());
+    hand.covers[l].first_shape = static_cast<int>(hand.balls.size()) - hand.covers[l].shape_count;
+  }
+  Placed placed(hand);
+  std::vector<LinkPair> touching = find_pairs(hand, placed);
+  find_hull_pairs(hand, placed, touching);
+  std::vector<char> by_hulls(hand.links.size());
+  for (const LinkPair& pair : touching) {
+    const int all = hand.covers[pair.a].shape_count * hand.covers[pair.b].shape_count;
+    if (pair.count < all) hand.left_out.emplace_back(pair.a, pair.b);
+    if (pair.count == 0) continue;
+    hand.pairs.push_back(pair);
+    by_hulls[pair.a] = by_hulls[pair.b] = 1;
+  }
+  for (int l = 0; l < std::ssize(hand.links); ++l) {
+    if (by_hulls[l] != 0) widen_cover(hand, l);
   }
   add_swings(hand);
 }
@@ -347,7 +523,7 @@ std::span<const Gap> find_gaps(const RobotHand& hand, Placed& placed, const Near
   }
   std::size_t count = 0;
   for (std::size_t p = 0; p < hand.pairs.size(); ++p) {
-    const auto [a, b] = hand.pairs[p];
+    const int a = hand.pairs[p].a, b = hand.pairs[p].b;
     double near_m = near.most_m;
     if (near.turn != nullptr) {
       near_m = std::min(near_m, near.least_m + placed.swing_m[a] + placed.swing_m[b]);
@@ -357,7 +533,8 @@ std::span<const Gap> find_gaps(const RobotHand& hand, Placed& placed, const Near
     if (least.gap_m - (way_m - least.way_m) > near_m + kRounding_m) continue;
     least = {.gap_m = cover_gap_m(hand, placed, a, b), .way_m = way_m};
     if (least.gap_m >= near_m) continue;
-    const Nearest at = nearest(hand, placed, a, b, near_m);
+    const Nearest at = hand.pairs[p].count > 0 ? nearest_hulls(hand, placed, hand.pairs[p], near_m)
+                                               : nearest(hand, placed, a, b, near_m);
     least.gap_m = std::max(least.gap_m, at.gap_m);
     if (at.gap_m >= near_m) continue;
     std::size_t into = count;

@@ -7,8 +7,9 @@
 
 namespace posed::robot {
 
-// Fills in capsules, covers, and which pairs of links can be kept apart: those that touch when the
-// hand is open, or in most poses, are left out. Cold.
+// Fills in capsules, hulls, covers, and which pairs of links can be kept apart. Where capsules
+// touch when the hand is open, or in most poses, the hulls of the shapes are taken; of those, the
+// pairs that touch, too, are left out. Cold.
 void add_shapes(RobotHand& hand);
 
 // Two links and how their gap changes with each driven joint.

@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <sstream>
 #include <utility>
 
 #include <pugixml.hpp>
@@ -19,6 +20,8 @@ namespace {
 constexpr int kMaxDepth = 32;
 constexpr double kMaxLength_m = 10.0;
 constexpr double kMaxAngle_rad = 100.0;
+constexpr double kMaxLimit_rad = 6.3;  // a turn
+constexpr double kMaxAxis = 1e6;       // it has a direction, not a length
 
 struct RawJoint {
   Link link;  // without a parent and a leader
@@ -59,9 +62,10 @@ class Reader {
       : document_(document), file_(std::move(file)) {}
 
   Result<RawUrdf> read() {
-    TRY(check_depth());
+    TRY(check_nodes());
     const pugi::xml_node robot = document_.child("robot");
     if (!robot) return refuse("it has no <robot>: it is no URDF");
+    if (robot.next_sibling("robot")) return refuse("it has two <robot>; give each its own file");
     RawUrdf raw;
     for (const pugi::xml_node node : robot.children("link")) TRY(read_link(node, raw));
     for (const pugi::xml_node node : robot.children("joint")) {
@@ -79,10 +83,12 @@ class Reader {
   }
 
  private:
-  Result<> check_depth() const {
+  // Of all elements: how deep they are, and whether they are still xacro.
+  Result<> check_nodes() const {
     int depth = 0;
     pugi::xml_node node = document_.first_child();
     while (node) {
+      TRY(check_expanded(node));
       if (node.first_child()) {
         node = node.first_child();
         if (++depth > kMaxDepth) return refuse("its elements are nested deeper than a URDF's");
@@ -95,6 +101,17 @@ class Reader {
       if (node) node = node.next_sibling();
     }
     return {};
+  }
+
+  Result<> check_expanded(const pugi::xml_node& node) const {
+    const auto is_xacro = [](std::string_view text) {
+      return text.find("${") != text.npos || text.find("$(") != text.npos;
+    };
+    bool found = std::string_view(node.name()).starts_with("xacro:");
+    for (const pugi::xml_attribute& one : node.attributes()) found = found || is_xacro(one.value());
+    if (!found) return {};
+    return refuse("its <" + clean(node.name()) +
+                  "> is xacro, from which ROS makes the URDF; write that one by `xacro IN > OUT`");
   }
 
   Result<std::string> name_of(const pugi::xml_node& node, const char* what) const {
@@ -112,8 +129,9 @@ class Reader {
     const auto xyz = numbers<3>(at.attribute("xyz").as_string("0 0 0"), kMaxLength_m);
     const auto rpy = numbers<3>(at.attribute("rpy").as_string("0 0 0"), kMaxAngle_rad);
     if (!xyz || !rpy) {
-      return refuse("the origin of " + in_quotes(owner) +
-                    " is not three lengths up to 10 m and three angles");
+      return refuse(
+          "the origin of " + in_quotes(owner) +
+          " is not three lengths up to 10 m and three angles; a URDF is in metres and radians");
     }
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     pose.translation() = Eigen::Vector3d(xyz->data());
@@ -179,7 +197,27 @@ class Reader {
                     " is no box, cylinder, capsule or sphere of a size above zero");
     }
     shape.size_m = Eigen::Vector3d(size->data());
+    if (geometry.child("hull")) shape.hull = TRY(read_hull(geometry.child("hull"), owner));
     return std::optional(shape);
+  }
+
+  Result<Hull> read_hull(const pugi::xml_node& node, const std::string& owner) const {
+    Hull hull;
+    const auto radius = numbers<1>(node.attribute("radius").value(), kMaxLength_m);
+    std::istringstream corners(node.attribute("corners").value());
+    bool good = radius && (*radius)[0] >= 0.0;
+    for (std::string x, y, z; good && corners >> x;) {
+      corners >> y >> z;
+      const auto corner = numbers<3>(x + ' ' + y + ' ' + z, kMaxLength_m);
+      good = corners && corner && hull.corners.size() < kMaxHullCorners;
+      if (good) hull.corners.emplace_back(corner->data());
+    }
+    if (!good || hull.corners.empty()) {
+      return refuse("the <hull> of link " + in_quotes(owner) +
+                    " is not a radius and up to 64 corners within 10 m");
+    }
+    hull.radius_m = (*radius)[0];
+    return hull;
   }
 
   Result<RawJoint> read_joint(const pugi::xml_node& node) const {
@@ -197,8 +235,7 @@ class Reader {
                     "; a hand's joints are revolute, continuous or fixed");
     }
     link.turns = true;
-    const auto axis =
-        numbers<3>(node.child("axis").attribute("xyz").as_string("1 0 0"), kMaxLength_m);
+    const auto axis = numbers<3>(node.child("axis").attribute("xyz").as_string("1 0 0"), kMaxAxis);
     link.axis = axis ? Eigen::Vector3d(axis->data()) : Eigen::Vector3d::Zero();
     if (!(link.axis.norm() > 1e-6)) return refuse("the axis of joint " + name + " is no direction");
     link.axis.normalize();
@@ -221,6 +258,11 @@ class Reader {
       if (!low || !high) return refuse("the limits of joint " + name + " are not angles");
       if ((*low)[0] > (*high)[0]) {
         return refuse("the lower limit of joint " + name + " is above its upper limit");
+      }
+      if ((*low)[0] < -kMaxLimit_rad || (*high)[0] > kMaxLimit_rad) {
+        return refuse("the limits of joint " + name +
+                      " are more than a turn; a URDF is in radians, and a joint without an end is "
+                      "\"continuous\"");
       }
       link.low = (*low)[0];
       link.high = (*high)[0];
@@ -350,7 +392,8 @@ Result<> resolve_leaders(const RawUrdf& raw, Urdf& urdf, const Reader& reader) {
 
 Result<Urdf> parse_urdf(std::string_view text, const std::string& file) {
   if (text.size() > kMaxUrdfBytes) return fail("it is larger than 4 MB: it is no hand", file);
-  if (text.find("<!DOCTYPE") != text.npos || text.find("<!ENTITY") != text.npos) {
+  const bool defines = text.find("<!DOCTYPE") != text.npos || text.find("<!ENTITY") != text.npos;
+  if (defines && text.find("<robot") != text.npos) {
     return fail("it defines XML entities, which no URDF needs; remove its <!DOCTYPE>", file);
   }
   pugi::xml_document document;

@@ -8,6 +8,7 @@
 
 #include <Eigen/Geometry>
 
+#include "models/robot/hull.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::robot {
@@ -21,6 +22,7 @@ struct Shape {
   // A box's edges; else x: the radius, y: the length along z, of a capsule without its caps.
   Eigen::Vector3d size_m = Eigen::Vector3d::Zero();
   Eigen::Isometry3d at = Eigen::Isometry3d::Identity();  // in the link's frame
+  Hull hull;  // of the mesh that a capsule holds, in the same frame; else without corners
 };
 
 // A link and the joint that carries it. Angles in rad; a follower's are those of the file.
@@ -52,8 +54,8 @@ struct Urdf {
 Result<Urdf> parse_urdf(std::string_view text, const std::string& file);
 
 // The text of a file without what kinematics do not need (visuals, inertia), and with its collision
-// meshes (.obj, found beside the file) replaced by capsules that hold all their corners, so that
-// the text says all.
+// meshes (.obj, found beside the file) replaced by capsules that hold all their corners, and by
+// <hull> beside them, so that the text says all.
 Result<std::string> load_urdf(const std::string& path);
 
 // The rotation of a URDF's roll, pitch and yaw [rad]: about the fixed x, then y, then z.

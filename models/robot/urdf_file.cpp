@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <iomanip>
 #include <sstream>
 #include <vector>
 
@@ -31,15 +32,13 @@ std::vector<Eigen::Vector3d> corners_of(const std::string& text) {
   return corners;
 }
 
-// "package://name/meshes/a.obj" and "meshes/a.obj" are looked for beside the URDF.
+// "package://name/meshes/a.obj", the same as "model://", and "meshes/a.obj" are looked for beside
+// the URDF.
 std::filesystem::path beside(const std::filesystem::path& urdf, std::string name) {
-  constexpr std::string_view kPackage = "package://";
   const std::filesystem::path folder = urdf.parent_path();
   if (name.starts_with("file://")) return {};
-  if (name.starts_with(kPackage)) {
-    name = name.substr(kPackage.size());
-    const auto slash = name.find('/');
-    name = slash == name.npos ? name : name.substr(slash + 1);
+  for (const std::string_view scheme : {"package://", "model://"}) {
+    if (name.starts_with(scheme)) name = name.substr(name.find('/', scheme.size()) + 1);
   }
   const std::filesystem::path relative(name);
   // Nothing outside of the URDF's own folder is read.
@@ -123,12 +122,26 @@ std::string words(const Eigen::Vector3d& v) {
   return out.str();
 }
 
+// Rounded to micrometres, for which the radius makes up.
+void append_hull(pugi::xml_node geometry, const Hull& hull) {
+  std::ostringstream out;
+  out << std::fixed << std::setprecision(6);
+  for (const auto& corner : hull.corners) {
+    out << corner.x() << ' ' << corner.y() << ' ' << corner.z() << ' ';
+  }
+  pugi::xml_node node = geometry.append_child("hull");
+  node.append_attribute("radius") = std::to_string(hull.radius_m + 2e-6).c_str();
+  node.append_attribute("corners") = out.str().c_str();
+}
+
 void replace_mesh(pugi::xml_node collision, const std::filesystem::path& urdf) {
   pugi::xml_node geometry = collision.child("geometry");
   const pugi::xml_node mesh = geometry.child("mesh");
   const auto path = beside(urdf, mesh.attribute("filename").value());
   std::error_code ignored;
-  if (path.extension() != ".obj" || !std::filesystem::exists(path, ignored)) return;
+  const auto extension = path.extension();
+  if ((extension != ".obj" && extension != ".OBJ") || !std::filesystem::exists(path, ignored))
+    return;
   const auto text = load_file(path, {.what = "mesh", .max_bytes = kMaxMeshBytes});
   if (!text) return;
   auto corners = corners_of(*text);
@@ -152,6 +165,8 @@ void replace_mesh(pugi::xml_node collision, const std::filesystem::path& urdf) {
   pugi::xml_node capsule = geometry.append_child("capsule");
   capsule.append_attribute("radius") = std::to_string(fit.radius_m + 1e-6).c_str();
   capsule.append_attribute("length") = std::to_string(fit.length_m + 1e-6).c_str();
+  for (auto& corner : corners) corner = fit.at.inverse() * corner;
+  append_hull(geometry, hull_of(corners));
 }
 
 }  // namespace

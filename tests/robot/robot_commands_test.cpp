@@ -56,8 +56,10 @@ TEST_CASE("MuJoCo sees no contact in the commands of real hands") {
   if (const auto signs = shared("data/gloves/libras_cyberglove")) {
     takes.push_back(bench::signs_take(*signs).value());
   }
-  for (const char* hand : {"allegro_hand/allegro_hand_right.urdf", "leap_hand/leap_hand_right.urdf",
-                           "inspire_hand/inspire_hand_right.urdf"}) {
+  for (const char* hand :
+       {"allegro_hand/allegro_hand_right.urdf", "leap_hand/leap_hand_right.urdf",
+        "inspire_hand/inspire_hand_right.urdf", "shadow_hand/shadow_hand_right.urdf",
+        "schunk_hand/schunk_svh_hand_right.urdf", "ability_hand/ability_hand_right.urdf"}) {
     for (const bench::HandTake& take : takes) check_clear(*folder / hand, take);
   }
 }

@@ -1,6 +1,7 @@
 #include "daemon/tools/logs/robot_table.hpp"
 
 #include <spdlog/fmt/fmt.h>
+#include <algorithm>
 #include <cmath>
 
 #include "proto/frame/degree.hpp"
@@ -69,20 +70,24 @@ std::vector<std::string> robot_table(const robot::RobotHand& hand) {
   for (std::size_t l = 0; l < hand.links.size(); ++l) {
     const robot::Link& link = hand.links[l];
     if (link.missing_shapes > 0) {
-      without += fmt::format(", {} ({} of {} meshes not found beside the URDF as .obj)", link.name,
-                             link.missing_shapes, link.missing_shapes + std::ssize(link.shapes));
+      without +=
+          fmt::format(", {} ({} of {} meshes are no .obj of up to 1 m beside the URDF)", link.name,
+                      link.missing_shapes, link.missing_shapes + std::ssize(link.shapes));
     }
   }
-  lines.push_back(
-      fmt::format("shapes: {} capsules hold those of the links, {} pairs of links are kept apart",
-                  hand.capsules.size(), hand.pairs.size()));
+  lines.push_back(fmt::format(
+      "shapes: {} capsules hold those of the links, {} pairs of links are kept apart, "
+      "{} of them by the hulls of shapes",
+      hand.capsules.size(), hand.pairs.size(),
+      std::ranges::count_if(hand.pairs, [](const auto& pair) { return pair.count > 0; })));
   if (!without.empty()) lines.push_back("  without a shape: " + without.substr(2));
   std::string out;
   for (const auto& [a, b] : hand.left_out) {
     out += fmt::format(", {} and {}", hand.links[a].name, hand.links[b].name);
   }
   if (!out.empty())
-    lines.push_back("  not kept apart, because they touch anyway: " + out.substr(2));
+    lines.push_back("  not kept apart, or not all of their shapes, because those touch anyway: " +
+                    out.substr(2));
   return lines;
 }
 

@@ -1,9 +1,11 @@
-// Which texts are refused, and what is read from those that are not.
+// Which texts are refused, and what is read from those that are not; the hulls of shapes.
 #include <catch2/catch.hpp>
 
+#include <random>
 #include <string>
 
-#include "models/robot/robot_hand.hpp"
+#include "models/robot/hull.hpp"
+#include "models/robot/shapes.hpp"
 #include "proto/text/load_file.hpp"
 #include "tests/unit/models/robot/robot_rig.hpp"
 
@@ -70,6 +72,11 @@ TEST_CASE("a URDF that is no plausible hand is refused by a sentence") {
       {robot(joint("j", "a", "d") + joint("k", "a", "c")), "not there"},
       {one(limit("lower=\"nan\" upper=\"1\" velocity=\"1\"")), "not angles"},
       {one(limit("lower=\"2\" upper=\"1\" velocity=\"1\"")), "above its upper"},
+      {one(limit("lower=\"-90\" upper=\"90\" velocity=\"1\"")), "in radians"},
+      {one(limit("lower=\"${-lim}\" upper=\"1\" velocity=\"1\"")), "xacro"},
+      {robot(chain + "<xacro:finger prefix=\"index\"/>"), "xacro"},
+      {robot(chain) + robot(chain), "two <robot>"},
+      {"<!DOCTYPE html><html><body/></html>", "no <robot>"},
       {one(limit("lower=\"0\" upper=\"1\" velocity=\"-1\"")), "not a speed"},
       {one(limit("lower=\"0\" upper=\"1\"")), "no velocity limit"},
       {one(""), "no <limit>"},
@@ -134,6 +141,111 @@ TEST_CASE("a hand's frame, fingers and side are derived from its URDF") {
   const auto left = robot_hand(urdf, {.side = Side::kLeft}, "mitten");
   REQUIRE_FALSE(left);
   CHECK(left.error().message.find("a right hand") != std::string::npos);
+}
+
+TEST_CASE("what only looks like a hand is refused, and a name alone makes no thumb") {
+  const auto mitten = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  const auto refused = [](const Urdf& urdf) {
+    const auto hand = robot_hand(urdf, {}, "mitten");
+    return hand ? std::string() : hand.error().message;
+  };
+  Urdf third = mitten, nobody = mitten, dog = mitten, locked = mitten;
+  for (Link& link : third.links) {
+    for (std::string* name : {&link.name, &link.joint}) {
+      if (name->starts_with("thumb")) *name = "digit" + name->substr(5);
+      if (name->starts_with("middle")) *name = "third" + name->substr(6);
+    }
+  }
+  const RobotHand hand = robot_hand(third, {}, "mitten").value();
+  CHECK(hand.links[hand.fingers[0].tip].name == "digit_tip");
+  for (Link& link : nobody.links) {
+    if (link.joint == "thumb_turn") link.at.linear().setIdentity();
+    for (std::string* name : {&link.name, &link.joint}) {
+      if (name->starts_with("thumb")) *name = "digit" + name->substr(5);
+    }
+  }
+  CHECK(refused(nobody).find("no finger is named thumb") != std::string::npos);
+  for (Link& link : dog.links) link.at.translation() *= 10.0;
+  CHECK(refused(dog).find("no hand's") != std::string::npos);
+  for (Link& link : locked.links) link.low = link.high = link.offset = 0.0;
+  CHECK(refused(locked).find("can turn") != std::string::npos);
+}
+
+// A direction along which two hulls are as far apart as their nearest points proves both.
+TEST_CASE("the gap of two hulls is that of their nearest points, and a direction proves it") {
+  std::mt19937 random(7);
+  std::normal_distribution<double> some;
+  const auto point = [&] { return Eigen::Vector3d(some(random), some(random), some(random)); };
+  int apart = 0;
+  for (int n = 0; n < 300; ++n) {
+    Hull one{.corners = {}, .radius_m = 0.1}, other{.corners = {}, .radius_m = 0.2};
+    for (int k = 0; k < 1 + n % 40; ++k) one.corners.push_back(point());
+    for (int k = 0; k < 1 + n % 7; ++k) other.corners.push_back(point());
+    const Eigen::Matrix3d turn = Eigen::Quaterniond(some(random), some(random), some(random), 1.0)
+                                     .normalized()
+                                     .toRotationMatrix();
+    const Eigen::Matrix3d still = Eigen::Matrix3d::Identity();
+    const Eigen::Vector3d at_m = 3.0 * point(), zero = Eigen::Vector3d::Zero();
+    const Nearest found = hull_gap({one, turn, at_m}, {other, still, zero}, point(), 1e9);
+    const Nearest early = hull_gap({one, turn, at_m}, {other, still, zero}, point(), 0.5);
+    CHECK((found.gap_m < 0.5 ? early.gap_m == Approx(found.gap_m).margin(1e-6)
+                             : early.gap_m >= 0.5 && early.gap_m <= found.gap_m + 1e-6));
+    if (found.gap_m < -0.299) continue;  // they overlap
+    ++apart;
+    CHECK((found.at_a - found.at_b).norm() - 0.3 == Approx(found.gap_m).margin(1e-9));
+    double low = 1e9, high = -1e9;
+    for (const auto& corner : one.corners) {
+      low = std::min(low, found.apart.dot(at_m + turn * corner));
+    }
+    for (const auto& corner : other.corners) high = std::max(high, found.apart.dot(corner));
+    CHECK(low - high - 0.3 == Approx(found.gap_m).margin(1e-6));
+  }
+  CHECK(apart > 150);
+}
+
+TEST_CASE("a hull of few corners holds all") {
+  std::mt19937 random(7);
+  std::normal_distribution<double> some;
+  std::vector<Eigen::Vector3d> ball;
+  for (int k = 0; k < 2000; ++k) {
+    ball.emplace_back(0.02 *
+                      Eigen::Vector3d(some(random), some(random), some(random)).normalized());
+  }
+  Hull hull = hull_of(ball);
+  const auto outside = [&] {
+    double most_m = -1.0;
+    const Eigen::Matrix3d still = Eigen::Matrix3d::Identity();
+    const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+    for (const auto& corner : ball) {
+      const Hull one{.corners = {corner}};
+      most_m = std::max(
+          most_m, hull_gap({one, still, zero}, {hull, still, zero}, {1.0, 0.0, 0.0}, 1e9).gap_m);
+    }
+    return most_m;
+  };
+  CHECK(hull.corners.size() <= kMaxHullCorners);
+  CHECK(hull.radius_m < 1.5e-3);
+  CHECK(outside() <= 1e-9);
+  round_off(hull);
+  CHECK(outside() <= 1e-9);
+}
+
+TEST_CASE("links whose capsules touch when open are kept apart by the hulls of their shapes") {
+  auto urdf = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  const RobotHand hand = robot_hand(urdf, {}, "mitten").value();
+  const auto by_hulls = [](const RobotHand& robot, const std::string& link) {
+    return std::ranges::any_of(robot.pairs, [&](const LinkPair& pair) {
+      return pair.count > 0 && robot.links[pair.a].name == "palm" &&
+             robot.links[pair.b].name == link;
+    });
+  };
+  CHECK(by_hulls(hand, "index_near"));
+  CHECK(hand.left_out.empty());
+  // A palm that reaches into the finger touches it in any case.
+  urdf.links[0].shapes[0].at.translation().z() += 0.02;
+  const RobotHand other = robot_hand(urdf, {}, "mitten").value();
+  CHECK_FALSE(by_hulls(other, "index_near"));
+  CHECK_FALSE(other.left_out.empty());
 }
 
 TEST_CASE("a follower that can nowhere be within its limits is named") {
