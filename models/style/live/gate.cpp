@@ -21,9 +21,13 @@ constexpr double kOfGait = 0.5;  // what LiveGait's correlation counts, in share
 constexpr double kWalk = 0.2;    // above the training's highest, which counts as at least this
 constexpr double kOfWide = 0.5;  // the more where the legs swing wide, in shares of the training's
 constexpr double kUsual = 1.6, kWide = 2.1;  // least swing
+constexpr double kTaughtRun = 0.4;           // correlation of a training that has runs
+constexpr double kOfFlight = 0.25;  // what a fall counts, in shares of that cadence, where it is
+constexpr double kGravity_m_s2 = 9.81, kFalls = 1.1, kFlies = 1.2;  // in shares of gravity
 constexpr double kOwnFast = 1.15;  // a walker's own cadence above this counts in its place
 
 constexpr double kCadence_s = 0.1;  // time constant of the low-pass on the cadence
+constexpr double kSteady_s = 0.4;   // the same without what a step adds
 constexpr double kStage_s = 0.045;  // time constant of each of the four low-passes
 constexpr double kStep_s = 0.005;   // of their integration
 constexpr double kThere = 1e-5;     // nearer is there
@@ -100,8 +104,9 @@ RT_SAFE void Gate::see_legs(const TrainedMotion& known, const Frame& frame,
   }
   const double cadence_rad_s = std::abs(stride_.cadence_rad_s());
   if (!std::isnan(cadence_rad_s)) {
-    const double part = cadence_rad_s_ == 0.0 ? 1.0 : -std::expm1(-dt_s / kCadence_s);
-    cadence_rad_s_ += part * (cadence_rad_s - cadence_rad_s_);
+    if (cadence_rad_s_ == 0.0) cadence_rad_s_ = steady_rad_s_ = cadence_rad_s;
+    cadence_rad_s_ -= std::expm1(-dt_s / kCadence_s) * (cadence_rad_s - cadence_rad_s_);
+    steady_rad_s_ -= std::expm1(-dt_s / kSteady_s) * (cadence_rad_s_ - steady_rad_s_);
     const double ratio = cadence_rad_s_ / usual_rad_s;
     // A first step begins slowly.
     const bool begins = std::abs(stride_.angle_rad() - rest_rad_) < kFirstStep_rad;
@@ -119,13 +124,16 @@ RT_SAFE double Gate::of_rest(const TrainedMotion& known, const Evidence& seen) n
 }
 
 // 1 where the legs run and did not in training: they are quicker, or the pelvis is higher while
-// they are apart, which tells most of long steps. `cadence` is in shares of a usual one. The very
-// poses of training are none of a run.
+// they are apart, which tells most of long steps, or falls as one does without a foot on the
+// ground. `cadence` is in shares of a usual one. The very poses of training are none of a run.
 RT_SAFE double Gate::of_run(const TrainedMotion& known, double cadence) const noexcept {
   const double taught = known.gait_correlation();
   const double higher = gait_.correlation() - std::max(taught, kWalk);
   const double wide = rise(stride_.swing_rad() / known.swing_rad(), kUsual, kWide);
   if (!std::isnan(taught) && !std::isnan(higher)) cadence += (kOfGait + kOfWide * wide) * higher;
+  const double step_rad_s = 2.0 * steady_rad_s_;
+  const double fall = gait_.bounce_m() * step_rad_s * step_rad_s / kGravity_m_s2;
+  if (taught < kTaughtRun) cadence += kOfFlight * rise(fall, kFalls, kFlies);
   return rise(cadence, kFast, kTooFast) * (1.0 - of_near_pose_);
 }
 

@@ -60,6 +60,7 @@ class Gate {
   LiveGait gait_;
   PoseSpeed speed_;
   double cadence_rad_s_ = 0.0;  // smoothed; 0: not known
+  double steady_rad_s_ = 0.0;   // smoothed over a step
   double rest_rad_ = 0.0;       // the stride's angle when the legs last rested
   double leg_rad_ = std::numeric_limits<double>::quiet_NaN();  // the leg signal; NaN: not measured
   // The last evidence; it stays where a frame has none.

@@ -70,6 +70,10 @@ double LiveGait::correlation() const noexcept {
   return together_m_rad_ / std::sqrt(height_m2_ * apart_rad2_);
 }
 
+double LiveGait::bounce_m() const noexcept {
+  return seen_s_ < kMinSeen_s ? 0.0 : std::sqrt(2.0 * height_m2_);
+}
+
 RT_SAFE void LiveStride::update(double leg_rad, double dt_s, double cadence_rad_s) noexcept {
   if (!started_) level_rad_ = leg_rad_ = leg_rad;
   started_ = true;

@@ -44,6 +44,10 @@ class LiveGait {
   // 0.4 s are known, and where the pelvis keeps its height or the legs do not move.
   [[nodiscard]] double correlation() const noexcept;
 
+  // How far the pelvis goes up and down about its mean [m]: the amplitude of a sine with its
+  // variance. 0 until 0.4 s are known.
+  [[nodiscard]] double bounce_m() const noexcept;
+
   // Starts anew: correlation() is unknown until 0.4 s from now.
   void forget() noexcept { seen_s_ = 0.0; }
 
