@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "proto/clip/draft.hpp"
 #include "proto/clip/format.hpp"
 #include "proto/clip/frame_parser.hpp"
 #include "proto/clip/hand_clip.hpp"

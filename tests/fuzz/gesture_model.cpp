@@ -14,6 +14,7 @@
 #include "models/gesture/tree_drawing.hpp"
 #include "models/perform/body_performance.hpp"
 #include "models/perform/label_sequence_player.hpp"
+#include "models/perform/perform.hpp"
 #include "models/smooth/live_smoother.hpp"
 #include "models/trajectory/state_information.hpp"
 #include "proto/clip/clip.hpp"

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "drivers/transport/enumerate.hpp"
 #include "tests/e2e/outcome.hpp"
 #include "tests/usb/gloves.hpp"
 #include "tests/usb/hid_glove.hpp"

@@ -6,6 +6,7 @@
 #include <algorithm>
 
 #include "drivers/driver.hpp"
+#include "drivers/options.hpp"
 #include "drivers/transport/hotplug_monitor.hpp"
 #include "drivers/transport/transport_factory.hpp"
 #include "tests/support/temp_folder.hpp"

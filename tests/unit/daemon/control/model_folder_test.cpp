@@ -17,6 +17,7 @@
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/model/style_model.hpp"
 #include "proto/clip/clip.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/text/load_file.hpp"
 #include "tests/support/temp_folder.hpp"

@@ -14,6 +14,7 @@
 #include "models/motion/canonical_skeleton.hpp"
 #include "models/motion/retarget.hpp"
 #include "models/motion/synthetic_walker.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/raw_peer.hpp"
 #include "tests/support/shared.hpp"

@@ -160,10 +160,10 @@ struct CrowdCheck {
       poses.push_back(crowd.pose(i, step));
       poses.back().header.arrival_ns = now_ns;
     }
-    const double before_us = processor_time_us();
+    const double before_us = test::processor_time_us();
     for (const Frame& pose : poses) rig.output->frame(pose);
     static_cast<void>(rig.output->turn(now_ns));
-    us.push_back((processor_time_us() - before_us) / people);
+    us.push_back((test::processor_time_us() - before_us) / people);
   }
   void compare_with(const Crowd& crowd, ProtocolReader& reader, int people, int step,
                     const std::vector<std::string>& names) {
