@@ -44,7 +44,7 @@ RT_SAFE void move_root(const Eigen::Vector3d& root_m, const Eigen::Vector3d& off
 // A root that strides leaves little to hold; all of it would cost style.
 HoldOptions hold_of(RootMode mode) {
   return mode == RootMode::kActor ? HoldOptions{.share = 1.0, .ahead = true}
-                                  : HoldOptions{.share = 0.8, .ahead = false};
+                                  : HoldOptions{.share = 0.81, .ahead = false};
 }
 
 struct FeetOptions {

@@ -14,7 +14,7 @@ using Eigen::Vector3d;
 constexpr double kStraight = 0.1;     // below this sine of the knee's bend its hinge leads
 constexpr double kReversed = 0.35;    // a knee that is bent backwards by more is built that way
 constexpr double kEase = 0.15;        // of the leg's length and rad: over it a knee turns forward
-constexpr double kSoftFrom = 0.97;    // of the leg's length: beyond, it straightens ever slower
+constexpr double kSoftFrom = 0.99;    // of the leg's length: beyond, it straightens ever slower
 constexpr double kMaxReach = 0.9995;  // a leg is never quite straight
 constexpr double kMinReach = 0.3;
 

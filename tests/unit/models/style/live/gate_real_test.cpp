@@ -126,6 +126,8 @@ TEST_CASE("the gate knows known and unknown walkers and nothing else", "[style][
     INFO(name);
     CHECK(gate_mean(model, acted(name), {}, true) <= 0.2);
   }
+  // Its cadence is that of an active walk, and its pelvis leads the legs: only its fall tells it.
+  CHECK(gate_mean(taught("active"), acted("run_exhausted_002")) <= 0.1);
   for (const char* name : {"walk_elderly_004", "walk_exhausted_001", "walk_masculine_001",
                            "walk_youthful_001", "walk_active_001"}) {
     INFO(name);
