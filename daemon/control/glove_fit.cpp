@@ -58,7 +58,8 @@ void tell(const drivers::glove::PoseFinding& finding, v1::GloveFit& words) {
       finding.failed() ? clean(finding.sentence())
       : finding.sensors == 0
           ? "held; the next poses show how still"
-          : fmt::format("held still, to {:.0f} % of the sensors' way", 100.0 * finding.unrest));
+          : fmt::format("held still: the sensors trembled by {:.0f} % of their movement",
+                        100.0 * finding.unrest));
 }
 
 // Whether the thumb alone is to be fitted, to what it touches.

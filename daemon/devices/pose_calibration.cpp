@@ -26,7 +26,9 @@ Result<PoseCalibration> calibrate_by_poses(const drivers::glove::Model& model,
                                            drivers::glove::CalibrationFile blank) {
   auto fitted = TRY(drivers::glove::fit_poses(model, recorded));
   blank.sensors = std::move(fitted.sensors);
+  const auto said = TRY(drivers::glove::fit_fist(model, recorded, blank.hand, blank));
   auto made = TRY(calibrate_by_contacts(model, recorded, std::move(blank)));
+  made.said.insert(made.said.begin(), said.begin(), said.end());
   made.warnings.insert(made.warnings.begin(), fitted.warnings.begin(), fitted.warnings.end());
   return made;
 }
@@ -36,9 +38,7 @@ Result<PoseCalibration> calibrate_by_contacts(const drivers::glove::Model& model
                                               drivers::glove::CalibrationFile file) {
   PoseCalibration made{.file = std::move(file), .said = {}, .warnings = {}};
   const Side hand = made.file.hand;
-  made.said = TRY(drivers::glove::fit_fist(model, recorded, hand, made.file));
-  auto contacts = TRY(fit_contacts(model, recorded, hand, made.file));
-  std::ranges::move(contacts, std::back_inserter(made.said));
+  made.said = TRY(fit_contacts(model, recorded, hand, made.file));
   auto odd = TRY(keep_possible(model, recorded, hand, made.file));
   std::ranges::move(odd, std::back_inserter(made.warnings));
   return made;

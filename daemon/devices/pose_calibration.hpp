@@ -14,7 +14,7 @@ namespace posed::devices {
 
 struct PoseCalibration {
   drivers::glove::CalibrationFile file;
-  std::vector<std::string> said;      // what the contacts changed
+  std::vector<std::string> said;      // what the fist and the contacts changed
   std::vector<std::string> warnings;  // sensors that keep their default; what no hand can do
 };
 

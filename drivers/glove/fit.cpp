@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 #include "drivers/glove/angle_map.hpp"
 #include "proto/frame/degree.hpp"
@@ -16,6 +17,23 @@ std::size_t channel(std::string_view name) { return hand_channel(name); }
 
 void bend(HandAngles& hand, std::string_view name, double degrees) {
   hand[channel(name)] = degrees * kDegree;
+}
+
+// The curves' values of which remove_crosstalk() leaves these.
+std::vector<double> shown_of(const Calibration& calibration, const std::vector<double>& values) {
+  constexpr int kRounds = 20;  // each makes the error smaller by the size of the shares
+  std::vector<double> shown = values;
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<double> next = values;
+    for (const Crosstalk& row :
+         std::span(calibration.crosstalk).first(calibration.crosstalk_rows)) {
+      if (std::isfinite(shown[row.of])) {
+        next[row.sensor] += static_cast<double>(row.share) * shown[row.of];
+      }
+    }
+    shown = std::move(next);
+  }
+  return shown;
 }
 
 }  // namespace
@@ -79,7 +97,7 @@ double raw_at(const Curve& curve, double value) {
 
 Result<> add_known_poses(const Model& model, const Calibration& calibration, Recorded& recorded) {
   for (std::size_t p = 0; p < kSensorPoses; ++p) {
-    const auto values = TRY(values_of(model, hand_in(static_cast<Pose>(p))));
+    const auto values = shown_of(calibration, TRY(values_of(model, hand_in(static_cast<Pose>(p)))));
     for (std::size_t i = 0; i < values.size(); ++i) {
       const auto of_sensor = [i](const auto& pose) { return pose[i].count > 0; };
       if (std::none_of(recorded.begin() + kSensorPoses, recorded.end(), of_sensor)) continue;

@@ -111,8 +111,8 @@ std::string PoseCheck::verdict() const {
     if (finding.failed()) add_word(text, finding.sentence(), "; ");
   }
   if (!text.empty()) return text;
-  return "good: the hand was still in every pose (to " +
-         std::to_string(std::lround(100.0 * unrest)) + " % of the sensors' way), " +
+  return "good: the hand was still in every pose (sensors trembled by " +
+         std::to_string(std::lround(100.0 * unrest)) + " % of their movement), " +
          std::to_string(sensors) + " sensors moved between them" +
          (restless.empty() ? "" : "; less still: " + named(restless));
 }
