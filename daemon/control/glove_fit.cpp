@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -91,12 +93,12 @@ Result<FittedGlove> fit_glove(const drivers::Description& device, const std::str
     file.user = blank.user;
     blank = std::move(file);
   }
-  const auto check = TRY(drivers::glove::check_poses(model, recorded));
+  auto check = TRY(drivers::glove::check_poses(model, recorded));
+  std::erase_if(check.poses, [&](const drivers::glove::PoseFinding& finding) {
+    return !drivers::glove::was_held(held[static_cast<std::size_t>(finding.pose)]);
+  });
   FittedGlove made;
-  for (const auto& finding : check.poses) {
-    if (drivers::glove::was_held(held[static_cast<std::size_t>(finding.pose)]))
-      tell(finding, made.words);
-  }
+  for (const auto& finding : check.poses) tell(finding, made.words);
   if (wanted.name().empty()) return made;
   if (!check.usable()) return fail(check.verdict());
   auto [file, sentences, warnings] =

@@ -104,7 +104,7 @@ Result<std::string> ModelFolder::add(const std::string& name, std::string_view k
     return fail("the folder of models is full; move some of its models elsewhere",
                 folder_.string());
   }
-  // Another thread, or another daemon with this folder, may be keeping one of this name just now.
+  // Another daemon with this folder may be keeping one of this name just now.
   const std::filesystem::path whole =
       folder_ / fmt::format(".{}{}.{}.new", name, ending_of(kind), getpid());
   TRY(write_whole_file(whole, bytes));

@@ -16,7 +16,6 @@
 #include "proto/clip/clip.hpp"
 #include "proto/clip/format.hpp"
 #include "proto/clip/gltf.hpp"
-#include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
 
@@ -28,6 +27,16 @@ constexpr std::size_t kMaxRecordings = 256;
 // after, and values, of which a byte or ten may make one.
 constexpr std::size_t kMaxConverted = 12UL * 1024 * 1024;
 constexpr std::ptrdiff_t kMaxConvertedValues = 1'500'000;
+
+std::ptrdiff_t words_in(std::string_view text) {
+  std::ptrdiff_t words = 0;
+  bool blank = true;
+  for (const char c : text) {
+    const bool was_blank = std::exchange(blank, c == ' ' || c == '\t' || c == '\n' || c == '\r');
+    if (was_blank && !blank) ++words;
+  }
+  return words;
+}
 
 // A name in the folder; control characters in it would reach people's terminals.
 bool is_recording(const std::string& name) {
@@ -136,8 +145,7 @@ Result<std::string> RecordingFolder::converted(const Part& part) const {
     file.bytes += more;
     if (file.bytes.size() > kMaxConverted) break;
   }
-  const auto values = std::ranges::count_if(file.bytes, [](char c) { return c <= ' '; });
-  if (file.bytes.size() > kMaxConverted || values > kMaxConvertedValues) {
+  if (file.bytes.size() > kMaxConverted || words_in(file.bytes) > kMaxConvertedValues) {
     return fail(part.name +
                 " is too long for this; `posed convert` on the daemon's computer does it");
   }
@@ -151,12 +159,17 @@ Result<std::string> RecordingFolder::converted(const Part& part) const {
   const int end = part.to_s > 0.0 ? frame_at(part.to_s) : clip.frames();
   if (!(end > first)) return fail("there are no frames from here to there in " + part.name);
   clip::keep_frames(clip, first, end);
-  const auto made = folder_ / fmt::format(".{}.{}.{}", part.name, getpid(), part.as);
-  never_replace(made);
-  TRY(part.as == "glb" ? clip::write_glb(clip, made) : motion::write_vrm_animation(clip, made));
-  auto bytes = load_file(made, {.what = "clip", .max_bytes = kMaxConverted});
+  std::string own = (folder_ / ".posed-XXXXXX").string();  // nobody else's file can be in there
+  if (mkdtemp(own.data()) == nullptr) {
+    return fail("nothing can be written into the folder of recordings: " + errno_text());
+  }
+  const auto made = std::filesystem::path(own) / ("clip." + part.as);
+  const auto written =
+      part.as == "glb" ? clip::write_glb(clip, made) : motion::write_vrm_animation(clip, made);
+  auto bytes = written ? load_file(made, {.what = "clip", .max_bytes = kMaxConverted})
+                       : Result<std::string>(std::unexpected(written.error()));
   std::error_code ignored;
-  std::filesystem::remove(made, ignored);
+  std::filesystem::remove_all(own, ignored);
   return bytes;
 }
 

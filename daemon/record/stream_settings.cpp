@@ -93,6 +93,8 @@ std::string to_json(const StreamSettings& settings) {
 Result<StreamSettings> settings_from_json(const std::string& json, const std::string& file) {
   try {
     const Json root(parse_json(json));
+    if (root.is_discarded())
+      return fail("the log is damaged (a stream's settings are no JSON)", file);
     StreamSettings settings;
     settings.publish_raw = root.at("publish_raw").get<bool>();
     settings.stale_after_s = root.at("stale_after_s").get<double>();

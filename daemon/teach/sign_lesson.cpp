@@ -28,8 +28,9 @@ constexpr double kSignRate_hz = 30.0;   // as `posed train gesture`
 constexpr std::size_t kMinFrames = 12;  // a camera on a slow computer gives a few a second
 constexpr double kMaxGap_s = 0.5;       // between two frames of a show
 constexpr double kMaxMissing = 0.2;     // share of a show's frames that lack a value
-constexpr std::size_t kJump = 2;        // frames: what lasts no longer is an error of a camera
-constexpr double kMinHold_s = 0.4;      // of the part that is taken as held
+constexpr double kJump_s =
+    0.2;  // what lasts no longer, and two frames at most, is a camera's error
+constexpr double kMinHold_s = 0.4;  // of the part that is taken as held
 // Each is the rms over one finger's angles, of the finger in which it is largest.
 constexpr double kMaxMoved_rad = 8.0 * kDegree;   // about the mean of the hold
 constexpr double kMinApart_rad = 10.0 * kDegree;  // of two signs
@@ -72,17 +73,18 @@ Result<> check_whole(const clip::HandClip& show) {
 // the median of the frames about it, which leaves ways and holds as they are.
 void drop_jumps(clip::HandClip& show) {
   const std::vector<HandAngles> seen = show.angles;
-  std::array<double, 2 * kJump + 1> about{};
-  for (std::size_t t = kJump; t + kJump < seen.size(); ++t) {
+  const auto jump = static_cast<std::ptrdiff_t>(std::clamp(kJump_s * show.rate_hz, 1.0, 2.0));
+  std::vector<double> about(2 * jump + 1);
+  for (std::ptrdiff_t t = jump; t + jump < std::ssize(seen); ++t) {
     for (std::size_t c = 0; c < kHandChannels; ++c) {
-      for (std::size_t i = 0; i < about.size(); ++i) about[i] = seen[t + i - kJump][c];
+      for (std::ptrdiff_t i = 0; i < std::ssize(about); ++i) about[i] = seen[t + i - jump][c];
       if (!std::ranges::all_of(about, [](double angle) { return std::isfinite(angle); })) continue;
-      std::ranges::nth_element(about, about.begin() + kJump);
-      show.angles[t][c] = about[kJump];
+      std::ranges::nth_element(about, about.begin() + jump);
+      show.angles[t][c] = about[jump];
     }
   }
-  std::fill_n(show.angles.begin(), kJump, show.angles[kJump]);
-  std::fill_n(show.angles.rbegin(), kJump, *(show.angles.rbegin() + kJump));
+  std::fill_n(show.angles.begin(), jump, show.angles[jump]);
+  std::fill_n(show.angles.rbegin(), jump, *(show.angles.rbegin() + jump));
 }
 
 // How far the hand moves while it holds the sign [rad].

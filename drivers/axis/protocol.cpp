@@ -1,6 +1,7 @@
 #include "drivers/axis/protocol.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <optional>
 

@@ -1,9 +1,10 @@
 #include "drivers/emulate/faults.hpp"
-#include "proto/text/list.hpp"
-#include "proto/text/number.hpp"
 
 #include <algorithm>
 #include <array>
+
+#include "proto/text/list.hpp"
+#include "proto/text/number.hpp"
 
 namespace posed::drivers::emulate {
 namespace {

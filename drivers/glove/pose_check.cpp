@@ -1,9 +1,10 @@
 #include "drivers/glove/pose_check.hpp"
-#include "proto/text/list.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <span>
+
+#include "proto/text/list.hpp"
 
 namespace posed::drivers::glove {
 namespace {

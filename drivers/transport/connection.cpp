@@ -111,7 +111,7 @@ Result<> LinkTransport::start(std::int64_t now_ns) {
 Chunk LinkTransport::read(std::int64_t now_ns) noexcept {
   read_ns_ = now_ns;
   flush();
-  const bool floods = of_no_use_ > kMaxOfNoUse;
+  const bool floods = link_.listener() >= 0 && of_no_use_ > kMaxOfNoUse;
   const ssize_t got = floods ? 0 : link_.receive(buffer_);
   read_ = static_cast<std::size_t>(std::max<ssize_t>(got, 0));
   if (got > 0) return {.bytes = {buffer_.data(), read_}};

@@ -140,7 +140,11 @@ Nearest hull_gap(const PlacedHull& a, const PlacedHull& b, const Eigen::Vector3d
     found.at_a += simplex.share[k] * simplex.corners[k].a;
     found.at_b += simplex.share[k] * simplex.corners[k].b;
   }
-  if (distance_m > 1e-9) found.apart = nearest / distance_m;
+  if (distance_m > 1e-9) {
+    found.apart = nearest / distance_m;
+  } else if (guess.squaredNorm() > 0.0) {
+    found.apart = guess.normalized();  // overlapping so deep, they have no direction of their own
+  }
   return found;
 }
 

@@ -14,9 +14,10 @@ constexpr int kMaxCapsulesABox = 4;
 constexpr int kTries = 100;
 constexpr double kMostly = 0.7;
 constexpr double kRounding_m = 1e-9;
-constexpr double kSlack_m = 6e-3;  // of what is remembered as close
-constexpr double kOpen_m = 1e-3;   // shapes nearer than this when open are made to touch
-constexpr double kThin_m = 1e-3;   // a shape of a smaller radius has its corners rounded off
+constexpr double kSlack_m = 6e-3;            // of what is remembered as close
+constexpr std::size_t kMaxHullPairs = 4096;  // half a second's work when a robot is loaded
+constexpr double kOpen_m = 1e-3;             // shapes nearer than this when open are made to touch
+constexpr double kThin_m = 1e-3;  // a shape of a smaller radius has its corners rounded off
 
 double per_length2(const Eigen::Vector3d& from_m, const Eigen::Vector3d& to_m) {
   const double length2 = (to_m - from_m).squaredNorm();
@@ -443,6 +444,8 @@ void find_hull_pairs(RobotHand& hand, Placed& placed, std::span<LinkPair> pairs)
   for (std::size_t p = 0; p < pairs.size(); ++p) {
     const Cover& one = hand.covers[pairs[p].a];
     const Cover& two = hand.covers[pairs[p].b];
+    const auto more = static_cast<std::size_t>(one.shape_count) * two.shape_count;
+    if (all.size() + more > kMaxHullPairs) continue;
     for (int a = one.first_shape; a < one.first_shape + one.shape_count; ++a) {
       for (int b = two.first_shape; b < two.first_shape + two.shape_count; ++b) {
         all.push_back({.two = {a, b}, .pair = p});
@@ -471,14 +474,18 @@ void find_hull_pairs(RobotHand& hand, Placed& placed, std::span<LinkPair> pairs)
   }
 }
 
-// A hull may stick out of the capsules by its radius.
+// A hull may stick out of the capsules.
 void widen_cover(RobotHand& hand, int link) {
   Cover& cover = hand.covers[link];
-  double most_m = 0.0;
+  const Eigen::Vector3d way_m = cover.to_m - cover.from_m;
   for (int h = cover.first_shape; h < cover.first_shape + cover.shape_count; ++h) {
-    most_m = std::max(most_m, hand.hulls[h].radius_m);
+    for (const auto& corner : hand.hulls[h].corners) {
+      const Eigen::Vector3d off_m = corner - cover.from_m;
+      const double share = std::clamp(off_m.dot(way_m) * cover.per_m2, 0.0, 1.0);
+      cover.radius_m =
+          std::max(cover.radius_m, (off_m - share * way_m).norm() + hand.hulls[h].radius_m);
+    }
   }
-  cover.radius_m += most_m;
 }
 
 }  // namespace

@@ -21,6 +21,7 @@ constexpr int kMaxDepth = 32;
 constexpr double kMaxLength_m = 10.0;
 constexpr double kMaxAngle_rad = 100.0;
 constexpr double kMaxLimit_rad = 6.3;  // a turn
+constexpr double kMaxRead = 1e6;       // of a limit, which may be in degrees
 constexpr double kMaxAxis = 1e6;       // it has a direction, not a length
 
 struct RawJoint {
@@ -111,7 +112,7 @@ class Reader {
     for (const pugi::xml_attribute& one : node.attributes()) found = found || is_xacro(one.value());
     if (!found) return {};
     return refuse("its <" + clean(node.name()) +
-                  "> is xacro, from which ROS makes the URDF; write that one by `xacro IN > OUT`");
+                  "> is xacro: make the URDF with `xacro IN > OUT` and give posed OUT");
   }
 
   Result<std::string> name_of(const pugi::xml_node& node, const char* what) const {
@@ -253,8 +254,8 @@ class Reader {
       link.high = std::numbers::pi;
     } else {
       if (!limit) return refuse("joint " + name + " has no <limit>; add its lower and upper");
-      const auto low = numbers<1>(limit.attribute("lower").as_string("0"), kMaxAngle_rad);
-      const auto high = numbers<1>(limit.attribute("upper").as_string("0"), kMaxAngle_rad);
+      const auto low = numbers<1>(limit.attribute("lower").as_string("0"), kMaxRead);
+      const auto high = numbers<1>(limit.attribute("upper").as_string("0"), kMaxRead);
       if (!low || !high) return refuse("the limits of joint " + name + " are not angles");
       if ((*low)[0] > (*high)[0]) {
         return refuse("the lower limit of joint " + name + " is above its upper limit");

@@ -38,7 +38,9 @@ std::filesystem::path beside(const std::filesystem::path& urdf, std::string name
   const std::filesystem::path folder = urdf.parent_path();
   if (name.starts_with("file://")) return {};
   for (const std::string_view scheme : {"package://", "model://"}) {
-    if (name.starts_with(scheme)) name = name.substr(name.find('/', scheme.size()) + 1);
+    if (!name.starts_with(scheme)) continue;
+    name = name.substr(scheme.size());
+    name = name.substr(name.find('/') + 1);  // all of it where there is no package
   }
   const std::filesystem::path relative(name);
   // Nothing outside of the URDF's own folder is read.

@@ -84,6 +84,7 @@ Result<Skeleton> skeleton_from_json(std::string_view text, const std::string& na
   Skeleton skeleton;
   try {
     const json value = parse_json(text);
+    if (value.is_discarded()) return fail("the skeleton of the clip is no JSON", name);
     skeleton.name = value.at("name").get<std::string>();
     skeleton.root_joint = value.at("root_joint").get<int>();
     for (const json& joint : value.at("joints")) skeleton.joints.push_back(joint_of(joint));

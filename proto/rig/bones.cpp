@@ -18,14 +18,17 @@ std::optional<BoneJoints> find_hand(const Figure& figure, const std::vector<Join
                                     SidesBy& sides_by) {
   std::vector<int> fingers;
   int sides = 0;
+  bool named = false;
   for (int j = 0; j < figure.size(); ++j) {
     if (!is_finger(names[j]) || arm_fit(names[j])) continue;  // "fore" is a finger, a forearm none
     fingers.push_back(j);
-    sides += static_cast<int>(names[j].side);
+    const int side = static_cast<int>(names[j].side);
+    sides += side;
+    named = named || side != 0;
   }
   if (fingers.size() < 6 || 10 * fingers.size() < 6 * names.size()) return std::nullopt;
   const Side side = sides > 0 ? Side::kLeft : Side::kRight;
-  if (sides == 0) sides_by = SidesBy::kNothing;
+  if (!named) sides_by = SidesBy::kNothing;
   BoneJoints bones;
   bones.set(on(side, Bone::kLeftHand), figure.common(fingers));
   find_fingers(figure, names, side, bones);
@@ -393,7 +396,7 @@ int sided_by_fingers(const Figure& figure, const Motion& motion, const BoneJoint
               motion.poses();
     }
   }
-  if (bases.size() < 2) return 0;
+  if (bases.size() < 2 || !(along.norm() > 0.0)) return 0;
   const Vec to_index = direction(bases.front() - bases.back());
   const double bent = curl.dot(to_index) / static_cast<double>(bases.size());
   constexpr double kBent = 0.05;

@@ -53,7 +53,7 @@ struct FoundBones {
 
 [[nodiscard]] FoundBones find_bones(const Figure& figure, const std::vector<JointName>& names);
 
-// Whether a figure with these limbs stands on all four, in its zero pose and in the clip.
+// Whether a figure with these limbs stands on all fours, in its zero pose and in the clip.
 [[nodiscard]] bool is_animal(const Figure& figure, const Motion& motion, const BoneJoints& bones);
 
 // Of a hand whose joints are those of a right one's bones: +1 when its fingers bend as a left

@@ -24,7 +24,8 @@ void Frames::legs() {
   const auto hangs = [&](Side side) {
     const Bone lower = on(side, Bone::kLeftLowerLeg);
     const double thigh_deg = angle_deg(world[at(side)], -kY);
-    const auto shin = rest(lower, {on(side, Bone::kLeftFoot), on(side, Bone::kLeftToes)});
+    auto shin = rest(lower, {on(side, Bone::kLeftFoot), on(side, Bone::kLeftToes)});
+    if (!shin) shin = leaf(lower);
     return thigh_deg < 60 || (thigh_deg < 110 && shin && angle_deg(Th * *shin, -kY) < 45);
   };
   const bool real =

@@ -20,7 +20,12 @@ template <std::ranges::input_range Range, typename Name = std::identity>
 [[nodiscard]] std::string joined(const Range& range, std::string_view between = ", ",
                                  const Name& name = {}) {
   std::string list;
-  for (const auto& element : range) add_word(list, std::invoke(name, element), between);
+  std::string_view before;  // an empty word keeps its place
+  for (const auto& element : range) {
+    list += before;
+    list += std::invoke(name, element);
+    before = between;
+  }
   return list;
 }
 

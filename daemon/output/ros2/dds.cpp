@@ -1,5 +1,6 @@
 #include "daemon/output/ros2/dds.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <expected>

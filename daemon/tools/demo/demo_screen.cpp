@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>  // program_invocation_name
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>

@@ -70,9 +70,10 @@ std::vector<std::string> robot_table(const robot::RobotHand& hand) {
   for (std::size_t l = 0; l < hand.links.size(); ++l) {
     const robot::Link& link = hand.links[l];
     if (link.missing_shapes > 0) {
-      without +=
-          fmt::format(", {} ({} of {} meshes are no .obj of up to 1 m beside the URDF)", link.name,
-                      link.missing_shapes, link.missing_shapes + std::ssize(link.shapes));
+      without += fmt::format(
+          ", {} ({} of {} meshes are not used: missing beside the URDF, no .obj, or larger than 1 "
+          "m)",
+          link.name, link.missing_shapes, link.missing_shapes + std::ssize(link.shapes));
     }
   }
   lines.push_back(fmt::format(
@@ -86,7 +87,7 @@ std::vector<std::string> robot_table(const robot::RobotHand& hand) {
     out += fmt::format(", {} and {}", hand.links[a].name, hand.links[b].name);
   }
   if (!out.empty())
-    lines.push_back("  not kept apart, or not all of their shapes, because those touch anyway: " +
+    lines.push_back("  kept apart in part or not at all, because their shapes touch at rest: " +
                     out.substr(2));
   return lines;
 }

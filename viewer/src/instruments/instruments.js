@@ -115,7 +115,7 @@ export class Instruments {
     if (this.label.element.hidden) return;
     const { label, labelProbability, performed } = stream.pose;
     this.label.say(
-      label ? `${performed ? 'performs ' : ''}${label} ${percent(labelProbability)}` : 'none',
+      !label ? 'none' : performed ? `performs ${label}` : `${label}, ${percent(labelProbability)} sure`,
     );
     this.label.draw(history.label, performance.now() / 1000, history.changes);
   }

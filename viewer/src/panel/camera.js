@@ -13,7 +13,7 @@ const SECOND_MS = 1000;
 const KEPT_AGES = 100;
 const FINGERS = [0, 1, 2, 3, 4].map((f) => [0, 1, 2, 3, 4].map((j) => (j ? 4 * f + j : 0)));
 const SIDES = [
-  ['', 'as seen'],
+  ['', 'automatic'],
   ['left', 'left'],
   ['right', 'right'],
 ];

@@ -46,7 +46,7 @@ export class GloveLesson {
       placeholder: 'a-z, digits, - and _',
       oninput: () => this.#show(),
     });
-    this.use = el('button', { type: 'button', onclick: () => this.#use() }, 'Use');
+    this.use = el('button', { type: 'button', onclick: () => this.#use() }, 'Save and use');
     this.words = el('p.note', { role: 'status' });
     this.element = el(
       'details',

@@ -10,6 +10,12 @@ export function signed(value, digits) {
   return `${value < 0 && Number(text) !== 0 ? '−' : ''}${text}`;
 }
 
+// 0:12, as a clock shows it.
+export function minutes(seconds) {
+  const whole = Math.max(0, Math.floor(seconds));
+  return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, '0')}`;
+}
+
 export const percent = (share) => `${Math.round(100 * share)} %`;
 
 export const megabytes = (bytes) => `${(bytes / 1e6).toFixed(0)} MB`;

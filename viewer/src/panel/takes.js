@@ -1,6 +1,7 @@
 // Takes: marks in the recording. A daemon that does not record, or replays, has none: then the page
 // says what to do.
 import { el, write } from './dom.js';
+import { minutes } from './numbers.js';
 
 const LONGEST_NAME = 128;
 const HOW =
@@ -78,10 +79,13 @@ export class Takes {
     this.form.dataset.running = running;
   }
 
-  #words({ take, recorder_lost_chunks: lost, recorder_errors: errors, recorder_trouble: trouble }) {
+  // While no take runs, all is recorded, too: a take only marks a part of it.
+  #words(stats) {
+    const { take, recorder_lost_chunks: lost, recorder_errors: errors, recorder_trouble: trouble } = stats;
     const now = trouble ? ', NOTHING IS WRITTEN' : '';
     const missing = errors > 0 || lost > 0 ? `, ${errors} errors, ${lost} chunks lost` : '';
     const name = take?.name ? ` “${take.name}”` : '';
-    return `${take ? `take ${take.number}${name}` : 'recording'}${now}${missing}`;
+    const clock = take ? ` ${minutes((stats.time_ns - take.start_ns) / 1e9)}` : '';
+    return `${take ? `take ${take.number}${name}` : 'all is recorded'}${clock}${now}${missing}`;
   }
 }

@@ -184,7 +184,7 @@ export const gloveTest = [
     };
     const used = async (name, words) => {
       await lesson.getByLabel('Whose hand').fill(name);
-      await lesson.getByRole('button', { name: 'Use' }).click();
+      await lesson.getByRole('button', { name: 'Save and use' }).click();
       await lesson.getByText(words).waitFor(PATIENCE);
       return readFileSync(join(own.folder, `${name}.toml`), 'utf8');
     };

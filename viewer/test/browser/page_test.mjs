@@ -330,7 +330,7 @@ pageTests(
       await page.getByLabel('Take name').fill('');
       await page.getByRole('button', { name: 'Start take' }).click();
       await acknowledged(page, 'nothing can be written to the log: take1.plog: the disk is full');
-      await page.locator('.recording', { hasText: 'take 1, NOTHING IS WRITTEN' }).waitFor(PATIENCE);
+      await page.locator('.recording', { hasText: ', NOTHING IS WRITTEN' }).waitFor(PATIENCE);
     },
     'a held key or two quick presses make one take': async (page, bridge) => {
       bridge.publishStats = () => {}; // the answers alone say whether a take runs
@@ -461,7 +461,7 @@ pageTests(
       await page.locator('.stream', { hasText: 'hand' }).click();
       await unfold(page, 'Calibrate this glove');
       const lesson = page.locator('details', { hasText: 'Calibrate this glove' });
-      const use = lesson.getByRole('button', { name: 'Use' });
+      const use = lesson.getByRole('button', { name: 'Save and use' });
       await lesson.getByLabel('Whose hand').fill('ann');
       assert.ok(await lesson.getByLabel('Hold: Fist', { exact: true }).isDisabled());
       const hold = async (pose, name, verdict) => {
