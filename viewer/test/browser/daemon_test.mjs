@@ -171,20 +171,28 @@ export const gloveTest = [
     });
     await glove.hold({});
     const page = await opened(context, await own.view(PAGE));
-    await page.locator('summary', { hasText: 'Calibrate this glove' }).click();
+    const unfold = () => page.locator('summary', { hasText: 'Calibrate this glove' }).click();
+    await unfold();
     const lesson = page.locator('details', { hasText: 'Calibrate this glove' });
+    const use = lesson.getByRole('button', { name: 'Save and use' });
+    assert.ok(await lesson.getByLabel('Hold: Fist', { exact: true }).isDisabled());
     const hold = async (label, pose, angles) => {
-      if (pose !== 'flat') await glove.hold(angles);
       const button = lesson.getByLabel(`Hold: ${label}`, { exact: true });
-      const judged = lesson.locator(`[data-pose='${pose}']`, { hasText: '✓' });
+      const judged = (mark) => lesson.locator(`[data-pose='${pose}']`, { hasText: mark });
+      if (pose === 'fist') {
+        await button.click(); // the hand is still flat
+        await judged('✗ fist failed').waitFor(PATIENCE);
+        assert.ok(await use.isDisabled());
+      }
+      if (pose !== 'flat') await glove.hold(angles);
       do {
         await button.click(); // again, while posed looks for the glove
         await button.and(page.locator(':enabled')).waitFor(PATIENCE);
-      } while ((await judged.count()) === 0);
+      } while ((await judged('✓').count()) === 0);
     };
     const used = async (name, words) => {
       await lesson.getByLabel('Whose hand').fill(name);
-      await lesson.getByRole('button', { name: 'Save and use' }).click();
+      await use.click();
       await lesson.getByText(words).waitFor(PATIENCE);
       return readFileSync(join(own.folder, `${name}.toml`), 'utf8');
     };
@@ -197,8 +205,8 @@ export const gloveTest = [
     const sensors = /\[sensors\][^]*/;
     const [all] = sensors.exec(await used('ann', 'ann.toml is in use'));
     await page.reload(); // what was held is forgotten, the calibration is not
+    await unfold();
     await begin();
-    await page.locator('summary', { hasText: 'Calibrate this glove' }).click();
     await hold('Touch thumb and index', 'touch-index', PINCH);
     const [mended] = sensors.exec(await used('ann2', 'ann2.toml is in use'));
     const changed = all.split('\n').filter((line) => !mended.includes(line));

@@ -454,37 +454,6 @@ pageTests(
       await lesson.getByRole('button', { name: 'ok 3/3' }).click();
       await lesson.getByRole('button', { name: 'ok 3/3' }).waitFor({ state: 'detached' });
     },
-    'a glove is calibrated by poses that are held, and by what the thumb touches': async (
-      page,
-      bridge,
-    ) => {
-      await page.locator('.stream', { hasText: 'hand' }).click();
-      await unfold(page, 'Calibrate this glove');
-      const lesson = page.locator('details', { hasText: 'Calibrate this glove' });
-      const use = lesson.getByRole('button', { name: 'Save and use' });
-      await lesson.getByLabel('Whose hand').fill('ann');
-      assert.ok(await lesson.getByLabel('Hold: Fist', { exact: true }).isDisabled());
-      const hold = async (pose, name, verdict) => {
-        assert.ok(await use.isDisabled());
-        await lesson.getByLabel(`Hold: ${pose}`, { exact: true }).click();
-        await lesson.locator(`[data-pose='${name}']`, { hasText: verdict }).waitFor(PATIENCE);
-      };
-      await page.evaluate(() => {
-        globalThis.posedPage.panel.glove.constructor.seconds = { ready: 0, hold: 1 };
-      });
-      await hold('Touch thumb and index', 'touch-index', '✓ held still');
-      await use.click(); // contacts alone
-      const sentence = 'ann.toml is in use, and kept beside the models: thumb to index 3 mm';
-      await lesson.getByText(sentence).waitFor(PATIENCE);
-      const { fit_glove: fit } = bridge.requests.findLast((one) => one.fit_glove);
-      const [{ held }] = fit.pose;
-      assert.deepEqual([fit.name, held.length, held[0].sensor], ['ann', 1, 'index']);
-      assert.equal(held[0].squares, 1e4 * held[0].count);
-      await lesson.getByLabel('Hold: Flat hand', { exact: true }).click();
-      await lesson.locator("[data-pose='flat']", { hasText: '✓ held still' }).waitFor(PATIENCE);
-      await hold('Fist', 'fist', '✗ fist failed');
-      assert.ok(await use.isDisabled());
-    },
   },
 );
 

@@ -255,7 +255,6 @@ export class FakeDaemon {
     if (kind === 'take') return this.#mark(details);
     if (kind === 'teach' && hand) return { ok: true, teaching: this.#teachSigns(hand, details) };
     if (kind === 'teach' && body) return { ok: true, teaching: this.#teach(body, details) };
-    if (kind === 'fit_glove' && hand) return { ...done, fit: this.#fit(details) };
     if (kind === 'list_models') return { ok: true, model: this.models };
     if (kind === 'rename_model' || kind === 'delete_model') return this.#keep(kind, details);
     if (kind === 'list_recordings') return { ok: true, recording: this.recordings };
@@ -294,18 +293,6 @@ export class FakeDaemon {
     else if (name !== 'style.gate' || flag === undefined)
       return { ok: false, error: `${name}: give a number from -2 to 2` };
     return done;
-  }
-
-  // The first fist is no good one.
-  #fit({ pose, name = '' }) {
-    const first = !this.fisted;
-    this.fisted ||= pose.some((one) => one.name === 'fist');
-    const verdict = pose.map((one) => ({
-      pose: one.name,
-      good: one.name !== 'fist' || !first,
-      sentence: one.name === 'fist' && first ? 'fist failed: hold it again' : 'held still',
-    }));
-    return name ? { verdict, sentence: ['thumb to index 3 mm'], file: `${name}.toml` } : { verdict };
   }
 
   // Each walk takes five questions, a training one; the first walk in the style is none.
