@@ -635,7 +635,7 @@ Result<std::shared_ptr<const v1::GloveFit>> RequestHandler::judge_or_use(
   lock.unlock();
   auto fitted = control::fit_glove(*glove->description(), glove->calibration().toml, wanted);
   if (!fitted) return in_stream(wanted.stream(), fitted.error());
-  const auto fit = std::make_shared<v1::GloveFit>(std::move(fitted->words));
+  auto fit = std::make_shared<v1::GloveFit>(std::move(fitted->words));
   if (fitted->toml.empty()) return fit;
   fit->set_file(TRY(models_.add(wanted.name(), kCalibration, fitted->toml)));
   lock.lock();

@@ -88,11 +88,10 @@ Hull hull_of_shape(const Shape& shape) {
       hull.corners.emplace_back(side.cwiseProduct(shape.size_m));
     }
   } else if (shape.kind == Shape::Kind::kCylinder) {
-    for (int k = 0; k < 2 * kRim; ++k) {
-      const double angle = 2.0 * std::numbers::pi * (k / 2) / kRim;
-      hull.corners.emplace_back(shape.size_m.x() * std::cos(angle),
-                                shape.size_m.x() * std::sin(angle),
-                                k % 2 == 0 ? half.y() : -half.y());
+    for (int k = 0; k < kRim; ++k) {
+      const double angle = 2.0 * std::numbers::pi * k / kRim;
+      const double x = shape.size_m.x() * std::cos(angle), y = shape.size_m.x() * std::sin(angle);
+      for (const double end : {half.y(), -half.y()}) hull.corners.emplace_back(x, y, end);
     }
     hull.radius_m = shape.size_m.x() * (1.0 - std::cos(std::numbers::pi / kRim));
   } else {
