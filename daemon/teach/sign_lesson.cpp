@@ -28,9 +28,8 @@ constexpr double kSignRate_hz = 30.0;   // as `posed train gesture`
 constexpr std::size_t kMinFrames = 12;  // a camera on a slow computer gives a few a second
 constexpr double kMaxGap_s = 0.5;       // between two frames of a show
 constexpr double kMaxMissing = 0.2;     // share of a show's frames that lack a value
-constexpr double kJump_s =
-    0.2;  // what lasts no longer, and two frames at most, is a camera's error
-constexpr double kMinHold_s = 0.4;  // of the part that is taken as held
+constexpr double kJump_s = 0.2;         // a camera's error lasts no longer, and two frames at most
+constexpr double kMinHold_s = 0.4;      // of the part that is taken as held
 // Each is the rms over one finger's angles, of the finger in which it is largest.
 constexpr double kMaxMoved_rad = 8.0 * kDegree;   // about the mean of the hold
 constexpr double kMinApart_rad = 10.0 * kDegree;  // of two signs
@@ -132,11 +131,10 @@ Result<> check_apart(const LabelPose& shown, const std::vector<LabelPose>& befor
     const auto [rad, finger] = most_apart(shown, other);
     if (other.name == shown.name) {
       if (rad <= kMaxApart_rad) continue;
-      return fail(
-          fmt::format("this is not {} as it was shown before: the {} is {:.0f} degrees from there; "
-                      "show it alike,"
-                      " or forget the sign and begin again",
-                      in_quotes(shown.name), finger_words(finger), rad / kDegree));
+      return fail(fmt::format(
+          "this is not {} as it was shown before: the {} is {:.0f} degrees from there; show it"
+          " alike, or forget the sign and begin again",
+          in_quotes(shown.name), finger_words(finger), rad / kDegree));
     }
     if (rad >= kMinApart_rad) continue;
     return fail(

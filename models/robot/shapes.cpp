@@ -76,13 +76,12 @@ void add_shape(RobotHand& hand, int link, const Shape& shape) {
   }
 }
 
-// The shape itself, without what its capsules stick out.
-Hull hull_of_shape(const Shape& shape) {
+// Of a box, cylinder, capsule or sphere in its own frame.
+Hull hull_of_solid(const Shape& shape) {
   constexpr int kRim = 16;
-  Hull hull = shape.hull;
+  Hull hull;
   const Eigen::Vector3d half = 0.5 * shape.size_m;
-  if (!hull.corners.empty()) {
-  } else if (shape.kind == Shape::Kind::kBox) {
+  if (shape.kind == Shape::Kind::kBox) {
     for (int k = 0; k < 8; ++k) {
       const Eigen::Vector3d side((k & 1) - 0.5, (k >> 1 & 1) - 0.5, (k >> 2) - 0.5);
       hull.corners.emplace_back(side.cwiseProduct(shape.size_m));
@@ -98,6 +97,12 @@ Hull hull_of_shape(const Shape& shape) {
     hull.radius_m = shape.size_m.x();
     for (const double end : {half.y(), -half.y()}) hull.corners.emplace_back(0.0, 0.0, end);
   }
+  return hull;
+}
+
+// The shape itself holds less than its capsules do: they stick out of it.
+Hull hull_of_shape(const Shape& shape) {
+  Hull hull = shape.hull.corners.empty() ? hull_of_solid(shape) : shape.hull;
   if (hull.radius_m < kThin_m) round_off(hull);
   for (auto& corner : hull.corners) corner = shape.at * corner;
   return hull;
@@ -476,13 +481,10 @@ void find_hull_pairs(RobotHand& hand, Placed& placed, std::span<LinkPair> pairs)
 // A hull may stick out of the capsules.
 void widen_cover(RobotHand& hand, int link) {
   Cover& cover = hand.covers[link];
-  const Eigen::Vector3d way_m = cover.to_m - cover.from_m;
   for (int h = cover.first_shape; h < cover.first_shape + cover.shape_count; ++h) {
     for (const auto& corner : hand.hulls[h].corners) {
-      const Eigen::Vector3d off_m = corner - cover.from_m;
-      const double share = std::clamp(off_m.dot(way_m) * cover.per_m2, 0.0, 1.0);
-      cover.radius_m =
-          std::max(cover.radius_m, (off_m - share * way_m).norm() + hand.hulls[h].radius_m);
+      const double off_m = std::sqrt(away2(corner, cover.from_m, cover.to_m, cover.per_m2));
+      cover.radius_m = std::max(cover.radius_m, off_m + hand.hulls[h].radius_m);
     }
   }
 }

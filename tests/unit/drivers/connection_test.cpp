@@ -69,6 +69,13 @@ class Client {
 
 std::string loopback(std::uint16_t port) { return "127.0.0.1:" + std::to_string(port); }
 
+// The connection of a client that has just come.
+auto accepted(TransportFactory& ports, std::uint16_t port) {
+  auto link = ports.accept({.endpoint = loopback(port)});
+  REQUIRE(link);
+  return make_link_transport(std::move(*link));
+}
+
 }  // namespace
 
 TEST_CASE("every byte value crosses a port unchanged, both ways") {
@@ -212,9 +219,7 @@ TEST_CASE("a glove that hangs up is lost, and may come again") {
   CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
   for (int round = 0; round < 3; ++round) {
     auto glove = std::make_unique<Client>(port);
-    auto link = ports.accept({.endpoint = loopback(port)});
-    REQUIRE(link);
-    const auto transport = make_link_transport(std::move(*link));
+    const auto transport = accepted(ports, port);
     glove->say("frame");
     glove.reset();
     REQUIRE(readable(*transport));
@@ -273,9 +278,7 @@ TEST_CASE("a connection that begins as a web browser's is ended and counted, byt
       TransportFactory ports;
       CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
       const Client page(port);
-      auto link = ports.accept({.endpoint = loopback(port)});
-      REQUIRE(link);
-      const auto transport = make_link_transport(std::move(*link));
+      const auto transport = accepted(ports, port);
       REQUIRE(transport->start(0));
       Chunk chunk;
       for (std::size_t at = 0; at < std::min<std::size_t>(request.size(), 12) && !chunk.lost;) {
@@ -304,9 +307,7 @@ TEST_CASE("a request is a browser's whatever its method, and what follows its li
       TransportFactory ports;
       CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
       const Client page(port);
-      auto link = ports.accept({.endpoint = loopback(port)});
-      REQUIRE(link);
-      const auto transport = make_link_transport(std::move(*link));
+      const auto transport = accepted(ports, port);
       REQUIRE(transport->start(0));
       std::string read;
       Chunk chunk;
@@ -329,9 +330,7 @@ TEST_CASE(
   TransportFactory ports;
   CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
   const Client stranger(port);
-  auto link = ports.accept({.endpoint = loopback(port)});
-  REQUIRE(link);
-  const auto transport = make_link_transport(std::move(*link));
+  const auto transport = accepted(ports, port);
   REQUIRE(transport->start(0));
   Chunk chunk;
   std::size_t read = 0;
@@ -348,9 +347,7 @@ TEST_CASE(
   CHECK(read < 2'100'000);
 
   const Client slow(port);  // a paused device, for example, which repeats itself
-  auto second = ports.accept({.endpoint = loopback(port)});
-  REQUIRE(second);
-  const auto other = make_link_transport(std::move(*second));
+  const auto other = accepted(ports, port);
   REQUIRE(other->start(0));
   for (int i = 0; i < 2000; ++i) {
     slow.say(std::string(1000, '!'));
@@ -380,9 +377,7 @@ TEST_CASE("bytes that begin like a browser's and go on otherwise are a device's,
   TransportFactory ports;
   CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
   const Client glove(port);
-  auto link = ports.accept({.endpoint = loopback(port)});
-  REQUIRE(link);
-  const auto transport = make_link_transport(std::move(*link));
+  const auto transport = accepted(ports, port);
   glove.say("PO");
   REQUIRE(readable(*transport));
   CHECK(transport->read(0).bytes.empty());
