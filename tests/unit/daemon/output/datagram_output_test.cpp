@@ -107,7 +107,9 @@ void check_crowd(const Protocol& protocol, const std::string& what, int people =
   for (int step = 0; step < kStart + 360; ++step) {
     const std::int64_t now_ns = kNanosPerSecond + step * kNanosPerSecond / 120;
     check.pass(rig, crowd, people, step, now_ns);
-    for (const auto& datagram : receiver.received(rig.sent())) reader.feed(datagram, now_ns);
+    const auto datagrams = receiver.received(rig.sent());
+    for (const auto& datagram : datagrams) reader.feed(datagram, now_ns);
+    check.send_alone(datagrams, people);
     if (step >= kStart) check.compare_with(crowd, reader, people, step, names);
   }
   check.show(what);
