@@ -37,7 +37,8 @@ struct Chunk {
   std::uint8_t socket = 0;  // where the bytes came from, for a device with several sockets
   // Host time at which the kernel received the bytes; kNoTime_ns: the time after the read counts.
   std::int64_t arrival_ns = kNoTime_ns;
-  // Who sent the datagram, as a number that tells senders apart; 0: not a datagram.
+  // Who sent the bytes, as a number that tells apart the senders of datagrams, or the links that
+  // one device after the other makes; 0: nobody else could have.
   std::uint64_t sender = 0;
   // Datagrams dropped since the last chunk, counted also beside empty bytes: from senders that are
   // not among the peers, and empty or too long ones.

@@ -94,6 +94,7 @@ bool DeviceSupervisor::settling() const { return ports_.clock() < settled_ns_; }
 
 // Closes the link; only then can the port be opened again.
 void DeviceSupervisor::take_back() {
+  const std::string note = upkeep_ == nullptr ? "" : upkeep_->consume_note();
   writer_ = nullptr;
   upkeep_ = nullptr;
   device_.reset();
@@ -101,7 +102,8 @@ void DeviceSupervisor::take_back() {
   source_.present->gone();
   const std::string why = std::exchange(asked_back_, false)
                               ? "nothing usable came from the device for a while"
-                              : "the link to the device is lost";
+                          : note.empty() ? "the link to the device is lost"
+                                         : note;
   ports_.report(v1::Event::KIND_LOST, why + "; posed looks for it until it is back");
   reported_.clear();
 }

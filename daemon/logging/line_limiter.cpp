@@ -7,6 +7,7 @@ namespace posed::logging {
 namespace {
 
 constexpr std::int64_t kPeriod_ns = kNanosPerSecond;
+constexpr std::int64_t kPeriodOfKind_ns = 8 * kNanosPerSecond;
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
@@ -69,7 +70,7 @@ bool LineLimiter::admit_of_kind(std::int64_t now_ns, const Line& last, std::uint
     return true;
   }
   if (kind.held.held == 0)
-    kind.held.written_ns = std::max(kind.held.written_ns, now_ns - kPeriod_ns);
+    kind.held.written_ns = std::max(kind.held.written_ns, now_ns - kPeriodOfKind_ns);
   kind.held.held += count;
   kind.held.last = last;
   return false;
@@ -106,8 +107,8 @@ bool LineLimiter::admit(std::int64_t now_ns, int level, std::string_view text) {
 }
 
 std::optional<LineLimiter::Line> LineLimiter::next_summary(std::int64_t now_ns, bool at_end) {
-  const auto due = [&](const Cause& cause) {
-    return cause.held > 0 && (at_end || now_ns - cause.written_ns >= kPeriod_ns);
+  const auto due = [&](const Cause& cause, std::int64_t period_ns = kPeriod_ns) {
+    return cause.held > 0 && (at_end || now_ns - cause.written_ns >= period_ns);
   };
   for (auto& [key, cause] : causes_) {
     if (!due(cause)) continue;
@@ -117,7 +118,7 @@ std::optional<LineLimiter::Line> LineLimiter::next_summary(std::int64_t now_ns, 
     if (admit_of_kind(now_ns, cause.last, held)) return line;
   }
   for (auto& [key, kind] : kinds_) {
-    if (!due(kind.held)) continue;
+    if (!due(kind.held, kPeriodOfKind_ns)) continue;
     const std::uint64_t held = std::exchange(kind.held.held, 0);
     kind.held.written_ns = now_ns;
     const Line& last = kind.held.last;
@@ -133,13 +134,13 @@ std::optional<LineLimiter::Line> LineLimiter::next_summary(std::int64_t now_ns, 
 
 std::int64_t LineLimiter::next_due_ns() const {
   std::int64_t next_ns = kNoTime_ns;
-  const auto look = [&](const Cause& cause) {
+  const auto look = [&](const Cause& cause, std::int64_t period_ns = kPeriod_ns) {
     if (cause.held == 0) return;
-    const std::int64_t due_ns = cause.written_ns + kPeriod_ns;
+    const std::int64_t due_ns = cause.written_ns + period_ns;
     next_ns = next_ns == kNoTime_ns ? due_ns : std::min(next_ns, due_ns);
   };
   for (const auto& [key, cause] : causes_) look(cause);
-  for (const auto& [key, kind] : kinds_) look(kind.held);
+  for (const auto& [key, kind] : kinds_) look(kind.held, kPeriodOfKind_ns);
   look(others_);
   return next_ns;
 }

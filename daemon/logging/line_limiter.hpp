@@ -2,8 +2,8 @@
 // daemon log something can fill its log. Two lines have the same cause if they have the same level
 // and differ only in numbers. The first line is written at once. Lines that follow within a second
 // are counted, and the last of them is written with the count. Many streams with one cause (bodies
-// that come and go all the time) are counted together after their first lines. Pure: no clock, no
-// lock, no output.
+// that come and go all the time) are counted together after their first lines, and said every eight
+// seconds. Pure: no clock, no lock, no output.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// JunkGate: how much rubbish of a source's datagrams a recording takes. Up to kJunkPerSecond of
+// JunkGate: how much rubbish of a source a recording takes. Up to kJunkPerSecond of
 // bytes that the decoder had no use for are recorded, so that a log shows what came. Beyond that
 // only those are heard of whom the decoder has lately used something: what is not recorded must not
 // be decoded either, or a replay would not do the same. RT-safe; one thread.

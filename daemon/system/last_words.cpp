@@ -8,6 +8,7 @@
 #include <new>
 #include <system_error>
 
+#include <execinfo.h>
 #include <unistd.h>
 
 namespace posed::system {
@@ -46,6 +47,12 @@ void say_last(const char* why, const char* cure) {
 
 }  // namespace
 
-void end_with_a_sentence() { std::set_terminate(end_now); }
+void end_with_a_sentence() {
+  std::set_terminate(end_now);
+  // The C library loads what it unwinds with at the first use, and aborts where there is no memory
+  // left for that; so it is used once now.
+  void* here = nullptr;
+  static_cast<void>(::backtrace(&here, 1));
+}
 
 }  // namespace posed::system

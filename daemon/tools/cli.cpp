@@ -10,6 +10,7 @@
 
 #include <google/protobuf/stubs/logging.h>
 #include <poll.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -73,6 +74,16 @@ constexpr auto kCommands = std::to_array<AddCommand>({
 bool reader_of_stdout_has_gone() {
   pollfd out{.fd = STDOUT_FILENO, .events = 0, .revents = 0};
   return ::poll(&out, 1, 0) == 1 && (out.revents & (POLLERR | POLLHUP)) != 0;
+}
+
+// Each thread of posed has a stack of this limit, and one that is too small ends the process
+// without a word. The commands need up to 0.4 MB.
+Result<> check_stack() {
+  constexpr rlim_t kEnough = 1024 * 1024;
+  rlimit stack{};
+  if (getrlimit(RLIMIT_STACK, &stack) != 0 || stack.rlim_cur >= kEnough) return {};
+  return fail("the stack is limited to " + std::to_string(stack.rlim_cur / 1024) +
+              " KB, and posed needs 1024: raise it (ulimit -s 8192, LimitSTACK)");
 }
 
 // The exit code, or 1 if the output could not be written (a full disk). A reader that has gone has
@@ -162,6 +173,7 @@ void add_commands(CLI::App& app, int& exit_code) {
 int main_of(int argc, char** argv) {
   system::end_with_a_sentence();
   logging::protect_standard_descriptors();
+  if (const auto enough = check_stack(); !enough) return report(enough.error());
   const logging::LogOutput log;
   drivers::use_resolver(drivers::look_up);
   CLI::App app{"posed: live poses in, another style out", "posed"};
@@ -173,6 +185,7 @@ int main_of(int argc, char** argv) {
 int train_main_of(int argc, char** argv, const std::shared_ptr<Ranks>& ranks) {
   system::end_with_a_sentence();
   logging::protect_standard_descriptors();
+  if (const auto enough = check_stack(); !enough) return report(enough.error());
   const logging::LogOutput log;
   CLI::App app{"posed-mpi: posed train on the cores of many machines", "posed-mpi"};
   app.footer(kMpiFooter);

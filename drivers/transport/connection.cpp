@@ -30,7 +30,7 @@ constexpr milliseconds kWritePatience{1000};
 constexpr milliseconds kDrainPatience{1000};
 constexpr milliseconds kClosePatience{50};
 constexpr std::int64_t kOfNoUse_ns = 5 * kNanosPerSecond;
-constexpr std::size_t kMaxOfNoUse = 1024 * 1024;  // bytes in a second; a recording keeps them all
+constexpr std::size_t kMaxOfNoUse = 1024 * 1024;  // bytes in a second
 constexpr int kMaxWaiting = 256;                  // reads; hidraw keeps 64 reports
 
 bool not_now(int error) noexcept {
@@ -63,6 +63,11 @@ std::string gone(const std::string& name, int error) {
 class LinkTransport final : public Transport, public Upkeep {
  public:
   explicit LinkTransport(Connection link) : link_(std::move(link)) {}
+  LinkTransport(const LinkTransport&) = delete;
+  LinkTransport& operator=(const LinkTransport&) = delete;
+  ~LinkTransport() override {
+    if (floods_.load()) link_.pause_host();
+  }
 
   [[nodiscard]] int poll_fd() const noexcept override { return link_.fd(); }
   Result<> start(std::int64_t now_ns) override;
@@ -84,12 +89,14 @@ class LinkTransport final : public Transport, public Upkeep {
 
   Connection link_;
   std::int64_t read_ns_ = 0;
-  std::size_t read_ = 0;  // bytes of the last read
+  std::int64_t started_ns_ = 0;  // tells this link from the ones before it
+  std::size_t read_ = 0;         // bytes of the last read
   // Bytes of no use in a row, within a second from here on.
   std::size_t of_no_use_ = 0;
   std::int64_t since_ns_ = 0;
   // When the last bytes of use were read; before start() there is nothing to wait for.
   std::atomic<std::int64_t> used_ns_{std::numeric_limits<std::int64_t>::max()};
+  std::atomic<bool> floods_{false};
   bool is_given_up_ = false, is_reported_ = false;  // of the upkeep's thread
   std::array<std::byte, kRead> buffer_;
   // The rest of a message that the device accepted only in part; no other bytes may come between.
@@ -101,6 +108,7 @@ class LinkTransport final : public Transport, public Upkeep {
 // one arrival time. Bounded, because a device may send without pause.
 Result<> LinkTransport::start(std::int64_t now_ns) {
   used_ns_.store(now_ns);
+  started_ns_ = now_ns;
   for (int i = 0; i < kMaxWaiting && link_.receive(buffer_) > 0; ++i) {
   }
   return {};
@@ -112,9 +120,12 @@ Chunk LinkTransport::read(std::int64_t now_ns) noexcept {
   read_ns_ = now_ns;
   flush();
   const bool floods = link_.listener() >= 0 && of_no_use_ > kMaxOfNoUse;
+  if (floods) floods_.store(true);
   const ssize_t got = floods ? 0 : link_.receive(buffer_);
   read_ = static_cast<std::size_t>(std::max<ssize_t>(got, 0));
-  if (got > 0) return {.bytes = {buffer_.data(), read_}};
+  if (got > 0) {
+    return {.bytes = {buffer_.data(), read_}, .sender = static_cast<std::uint64_t>(started_ns_)};
+  }
   if (got < 0 && not_now(errno)) return {};
   return {.bytes = {}, .lost = true, .foreign = floods || link_.was_browser() ? 1U : 0U};
 }
@@ -129,9 +140,16 @@ void LinkTransport::upkeep(std::int64_t now_ns) noexcept {
 }
 
 std::string LinkTransport::consume_note() {
-  if (!is_given_up_ || is_reported_) return {};
+  const bool floods = floods_.load();
+  if (!(is_given_up_ || floods) || is_reported_) return {};
   is_reported_ = true;
-  return link_.name() + " has sent nothing of use for 5 s, and another device waits: it is cut";
+  if (!floods) {
+    return link_.name() + " has sent nothing of use for 5 s, and another device waits: it is cut";
+  }
+  return link_.name() +
+         " has sent a megabyte of nothing usable in a second: it is cut, and its "
+         "address may come again after " +
+         std::to_string(PausedHosts::kPause.count()) + " s";
 }
 
 // RT-safe except for the write.
@@ -190,6 +208,8 @@ void Connection::close() noexcept {
 Connection::Connection(Connection&& other) noexcept
     : fd_(std::exchange(other.fd_, -1)),
       listener_(other.listener_),
+      host_(other.host_),
+      paused_(std::move(other.paused_)),
       name_(std::move(other.name_)),
       identity_(std::move(other.identity_)),
       cancel_(std::move(other.cancel_)),
@@ -204,6 +224,8 @@ Connection& Connection::operator=(Connection&& other) noexcept {
   close();
   fd_ = std::exchange(other.fd_, -1);
   listener_ = other.listener_;
+  host_ = other.host_;
+  paused_ = std::move(other.paused_);
   name_ = std::move(other.name_);
   identity_ = std::move(other.identity_);
   cancel_ = std::move(other.cancel_);

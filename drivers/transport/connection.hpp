@@ -15,8 +15,10 @@
 #include <vector>
 
 #include "drivers/driver.hpp"
+#include "drivers/transport/address.hpp"
 #include "drivers/transport/cancel.hpp"
 #include "drivers/transport/first_bytes.hpp"
+#include "drivers/transport/paused_hosts.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::drivers {
@@ -43,10 +45,18 @@ class Connection {
 
   // A link that somebody else has made, through this listening socket, which outlives the link. It
   // ends, as if hung up, if what comes begins as what a web browser sends; and make_link_transport
-  // gives it up if it is of no use while another one waits.
-  void came_through(int listener) noexcept {
+  // gives it up if it is of no use while another one waits, or if it floods, and then names its
+  // host in `paused`.
+  void came_through(int listener, const Host& host, std::shared_ptr<PausedHosts> paused) noexcept {
     listener_ = listener;
+    host_ = host;
+    paused_ = std::move(paused);
     undecided_ = true;
+  }
+  // The host of a link that came through a listener must wait before it may come again. Cold; the
+  // thread of the factory.
+  void pause_host() noexcept {
+    if (paused_) paused_->add(host_);
   }
   [[nodiscard]] int listener() const noexcept { return listener_; }  // -1: posed made the link
   [[nodiscard]] bool was_browser() const noexcept { return was_browser_; }
@@ -70,6 +80,8 @@ class Connection {
   [[nodiscard]] bool cancelled() const noexcept { return cancel_ && cancel_->fired(); }
 
   int fd_ = -1, listener_ = -1;
+  Host host_{};
+  std::shared_ptr<PausedHosts> paused_;
   std::string name_, identity_;
   std::shared_ptr<const Cancel> cancel_;
   bool undecided_ = false, was_browser_ = false;
@@ -81,7 +93,7 @@ class Connection {
 // Reads the available bytes, at most 4 KB per call; a hang-up or an error of the descriptor sets
 // `lost`. For serial ports and sockets, whose writes do not block. The transport is an Upkeep,
 // which hangs up on who has sent nothing of use for five seconds while another device waits to
-// connect.
+// connect. A flood of what is of no use ends the link, too.
 [[nodiscard]] std::unique_ptr<Transport> make_link_transport(Connection link);
 // Makes the transport of a link from TransportFactory::hid(), whose writes block: it is also a
 // ColdWriter.

@@ -76,11 +76,12 @@ Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
     const std::string host = host_text(peer);
     Connection link(fd, settings.endpoint + " from " + host, "tcp " + host);
     link.heed(cancel_);
-    if (!peers.allow(host_of(peer)) || begins_like_a_browser(fd)) {
+    const Host from = host_of(peer);
+    if (!peers.allow(from) || paused_->have(from) || begins_like_a_browser(fd)) {
       ++refused_;
       continue;
     }
-    link.came_through(listener->second);
+    link.came_through(listener->second, from, paused_);
     keep_alive(fd);
     newest = std::move(link);
   }

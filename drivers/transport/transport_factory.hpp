@@ -61,7 +61,8 @@ class TransportFactory {
 
   // Waits up to half a second for a device to connect. Listens from the first call on, so that one
   // that connects between two calls is kept. Connections from addresses not in `peers` are
-  // dropped and counted, and so are those of web browsers. Cold.
+  // dropped and counted, and so are those of web browsers and of hosts that have just flooded.
+  // Cold.
   Result<Connection> accept(const ListenSettings& settings);
 
   // Connects to a system that serves its data over TCP. Waits for it up to a second. Cold.
@@ -93,8 +94,8 @@ class TransportFactory {
   // log, or nothing. Given once. Cold.
   [[nodiscard]] std::string consume_note() { return std::exchange(note_, {}); }
 
-  // Number of connections dropped so far because their address is not in the list of peers, or
-  // because they began like a browser's.
+  // Number of connections dropped so far because their address is not in the list of peers, or has
+  // just flooded, or because they began like a browser's.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
  private:
@@ -105,6 +106,7 @@ class TransportFactory {
   std::string note_{};
   std::uint64_t refused_ = 0;
   std::map<std::string, int> listeners_;  // by endpoint
+  std::shared_ptr<PausedHosts> paused_ = std::make_shared<PausedHosts>();
 };
 
 }  // namespace posed::drivers

@@ -15,6 +15,7 @@
 #include <numbers>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -34,6 +35,10 @@ namespace {
 constexpr std::size_t kMaxNodes = 100'000;
 constexpr std::size_t kMaxFigure = 1000;         // joints
 constexpr std::size_t kMaxNumbers = 50'000'000;  // of all frames
+constexpr std::size_t kMaxSteps = 100'000'000;   // poses and tracks of all frames
+constexpr std::size_t kMaxValues = 1'000'000;    // of the JSON; each takes 0.3 KB of memory
+constexpr std::size_t kMaxDepth = 100;           // of the JSON; tinygltf calls itself
+constexpr std::size_t kMaxWhy = 200;             // letters of what tinygltf says
 constexpr double kMaxFramesAKey = 1000.0;        // so that a short file asks for little work
 constexpr double kStillRate_hz = 30.0;           // of a file without an animation
 constexpr double kUnevenRate_hz = 60.0;          // of one whose keys have no rate
@@ -54,7 +59,46 @@ bool never_reads(std::vector<unsigned char>* /*out*/, std::string* error, const 
   return false;
 }
 
+// The JSON of a .gltf or .glb; a damaged .glb is left to tinygltf.
+std::string_view json_of(std::string_view bytes) {
+  constexpr std::size_t kSizeAt = 12, kJsonAt = 20;
+  if (!bytes.starts_with("glTF")) return bytes;
+  if (bytes.size() < kJsonAt) return {};
+  std::uint32_t size = 0;
+  std::memcpy(&size, bytes.data() + kSizeAt, sizeof size);
+  return bytes.substr(kJsonAt, size);
+}
+
+// Whether tinygltf can read the JSON with bounded stack and memory.
+Result<> check_json(std::string_view json) {
+  std::size_t depth = 0, values = 0;
+  bool in_text = false;
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    const char c = json[i];
+    if (in_text) {
+      if (c == '\\') ++i;
+      in_text = c != '"';
+      continue;
+    }
+    in_text = c == '"';
+    if (c == '[' || c == '{') {
+      ++depth;
+    } else if (c == ']' || c == '}') {
+      depth -= depth > 0 ? 1 : 0;
+    } else if (c != ',') {
+      continue;
+    }
+    ++values;
+    if (depth > kMaxDepth) return fail("is nested too deeply to be a glTF");
+    if (values > kMaxValues) return fail("has too much in its JSON to be a figure");
+  }
+  return {};
+}
+
 Result<tinygltf::Model> load_model(const ClipFile& file) {
+  if (const auto fits = check_json(json_of(file.bytes)); !fits) {
+    return fail(fits.error().message, file.name);
+  }
   tinygltf::TinyGLTF loader;
   loader.SetImageLoader(skip_image, nullptr);
   loader.SetFsCallbacks({.FileExists = never_exists,
@@ -80,7 +124,7 @@ Result<tinygltf::Model> load_model(const ClipFile& file) {
     error = thrown.what();
   }
   if (loaded) return model;
-  const std::string why = clean(error.substr(0, error.find('\n')));
+  const std::string why = clean(error.substr(0, std::min(error.find('\n'), kMaxWhy)));
   return fail("is no glTF that can be read" + (why.empty() ? "" : " (" + why + ")"), file.name);
 }
 
@@ -187,12 +231,15 @@ Tree tree_of(const tinygltf::Model& model) {
     }
   }
   std::vector<int> open;
+  std::vector<bool> seen(count, false);  // a node may be named twice among the children
   for (std::size_t n = count; n-- > 0;) {
     if (tree.parent[n] < 0) open.push_back(static_cast<int>(n));
   }
   while (!open.empty()) {
     const int node = open.back();
     open.pop_back();
+    if (seen[static_cast<std::size_t>(node)]) continue;
+    seen[static_cast<std::size_t>(node)] = true;
     tree.order.push_back(node);
     const auto& children = model.nodes[static_cast<std::size_t>(node)].children;
     for (auto child = children.rbegin(); child != children.rend(); ++child) {
@@ -205,9 +252,8 @@ Tree tree_of(const tinygltf::Model& model) {
   return tree;
 }
 
-// World poses of all nodes from their own. Scales go into places only.
-std::vector<Pose> world_of(const Tree& tree, const std::vector<Pose>& own) {
-  std::vector<Pose> world(own.size());
+// Sets the world poses of the nodes in the tree's order from their own. Scales go into places only.
+void place(const Tree& tree, const std::vector<Pose>& own, std::vector<Pose>& world) {
   for (const int node : tree.order) {
     const auto n = static_cast<std::size_t>(node);
     world[n] = own[n];
@@ -217,7 +263,19 @@ std::vector<Pose> world_of(const Tree& tree, const std::vector<Pose>& own) {
     world[n].rotation = (above.rotation * own[n].rotation).normalized();
     world[n].scale = above.scale.cwiseProduct(own[n].scale);
   }
-  return world;
+}
+
+// Without the nodes that are neither among `nodes` nor above them.
+Tree needed_of(Tree tree, const std::vector<int>& nodes) {
+  std::vector<bool> needed(tree.parent.size(), false);
+  for (int node : nodes) {
+    for (; node >= 0 && !needed[static_cast<std::size_t>(node)];
+         node = tree.parent[static_cast<std::size_t>(node)]) {
+      needed[static_cast<std::size_t>(node)] = true;
+    }
+  }
+  std::erase_if(tree.order, [&](int node) { return !needed[static_cast<std::size_t>(node)]; });
+  return tree;
 }
 
 // --- the figure
@@ -227,6 +285,12 @@ struct Humanoid {
   std::map<int, Bone> bones;
   bool backwards = false;  // VRM 0 looks along -Z
 };
+
+// A null value where there is none.
+const tinygltf::Value& member(const tinygltf::Value& object, const std::string& name) {
+  static const tinygltf::Value kNone;
+  return object.IsObject() ? object.Get(name) : kNone;
+}
 
 Humanoid humanoid_of(const tinygltf::Model& model) {
   Humanoid found;
@@ -248,16 +312,17 @@ Humanoid humanoid_of(const tinygltf::Model& model) {
   for (const char* extension : {"VRMC_vrm", "VRMC_vrm_animation", "VRM"}) {
     const auto at = model.extensions.find(extension);
     if (at == model.extensions.end() || !at->second.Has("humanoid")) continue;
-    const tinygltf::Value& bones = at->second.Get("humanoid").Get("humanBones");
+    const tinygltf::Value& bones = member(member(at->second, "humanoid"), "humanBones");
     if (bones.IsArray()) {
       for (std::size_t i = 0; i < bones.ArrayLen(); ++i) {
         const tinygltf::Value& entry = bones.Get(static_cast<int>(i));
-        if (!entry.Has("bone") || !entry.Get("bone").IsString()) continue;
+        if (!member(entry, "bone").IsString()) continue;
         add(entry.Get("bone").Get<std::string>(), entry.Get("node"), true);
       }
       found.backwards = true;
     } else if (bones.IsObject()) {
-      for (const std::string& name : bones.Keys()) add(name, bones.Get(name).Get("node"), false);
+      for (const std::string& name : bones.Keys())
+        add(name, member(bones.Get(name), "node"), false);
     }
     if (!found.bones.empty()) return found;
   }
@@ -284,7 +349,8 @@ std::set<int> chosen_nodes(const tinygltf::Model& model, const Humanoid& humanoi
   if (!model.animations.empty()) {
     for (const auto& channel : model.animations.front().channels) add(channel.target_node);
   }
-  for (int node = 0; chosen.empty() && node < std::ssize(model.nodes); ++node) add(node);
+  if (!chosen.empty()) return chosen;
+  for (int node = 0; node < std::ssize(model.nodes); ++node) add(node);
   return chosen;
 }
 
@@ -338,7 +404,7 @@ struct Track {
   int node = 0;
   enum class Path : std::uint8_t { kPosition, kRotation } path = Path::kPosition;
   enum class Between : std::uint8_t { kLine, kStep, kCubic } between = Between::kLine;
-  std::vector<double> time_s{}, values{};
+  std::span<const double> time_s{}, values{};
 
   [[nodiscard]] int width() const { return path == Path::kRotation ? 4 : 3; }
   // The k-th part of the i-th key: of a cubic one 0 is the tangent in, 1 the value, 2 the tangent
@@ -369,14 +435,42 @@ Eigen::Vector4d Track::at(double time) const {
   return Eigen::Quaterniond(a).slerp(t, Eigen::Quaterniond(b)).coeffs();
 }
 
-Result<std::vector<Track>> tracks_of(const tinygltf::Model& model) {
+// The numbers of accessors, each read once however many channels name it, and no more than the
+// file has bytes for: accessors may overlap.
+class Numbers {
+ public:
+  explicit Numbers(const tinygltf::Model& model) : model_(model) {
+    for (const tinygltf::Buffer& buffer : model.buffers) left_ += buffer.data.size();
+  }
+  // As numbers_of().
+  std::span<const double> of(int index, int components) {
+    const auto [place, is_new] = read_.try_emplace({index, components});
+    if (!is_new) return place->second;
+    if (index >= 0 && index < std::ssize(model_.accessors)) {
+      const std::size_t count = model_.accessors[static_cast<std::size_t>(index)].count;
+      if (count > left_ / static_cast<std::size_t>(components)) return {};
+    }
+    place->second = numbers_of(model_, index, components);
+    left_ -= place->second.size();
+    return place->second;
+  }
+
+ private:
+  const tinygltf::Model& model_;
+  std::map<std::pair<int, int>, std::vector<double>> read_;
+  std::size_t left_ = 0;
+};
+
+Result<std::vector<Track>> tracks_of(const tinygltf::Model& model, const Tree& needed,
+                                     Numbers& numbers) {
   std::vector<Track> tracks;
   if (model.animations.empty()) return tracks;
+  const std::set<int> turned(needed.order.begin(), needed.order.end());
   const tinygltf::Animation& animation = model.animations.front();
   for (const tinygltf::AnimationChannel& channel : animation.channels) {
     const bool turns = channel.target_path == "rotation";
     if (!turns && channel.target_path != "translation") continue;
-    if (channel.target_node < 0 || channel.target_node >= std::ssize(model.nodes)) continue;
+    if (!turned.contains(channel.target_node)) continue;
     if (channel.sampler < 0 || channel.sampler >= std::ssize(animation.samplers)) {
       return fail("a channel of its animation has no sampler; it is damaged");
     }
@@ -385,8 +479,8 @@ Result<std::vector<Track>> tracks_of(const tinygltf::Model& model) {
                 .path = turns ? Track::Path::kRotation : Track::Path::kPosition};
     if (sampler.interpolation == "STEP") track.between = Track::Between::kStep;
     if (sampler.interpolation == "CUBICSPLINE") track.between = Track::Between::kCubic;
-    track.time_s = numbers_of(model, sampler.input, 1);
-    track.values = numbers_of(model, sampler.output, track.width());
+    track.time_s = numbers.of(sampler.input, 1);
+    track.values = numbers.of(sampler.output, track.width());
     const std::size_t parts = track.between == Track::Between::kCubic ? 3 : 1;
     const std::size_t wanted =
         track.time_s.size() * parts * static_cast<std::size_t>(track.width());
@@ -395,7 +489,7 @@ Result<std::vector<Track>> tracks_of(const tinygltf::Model& model) {
       return fail("the keys of node " + std::to_string(channel.target_node) +
                   " are damaged, or packed in a way that posed does not read (sparse)");
     }
-    tracks.push_back(std::move(track));
+    tracks.push_back(track);
   }
   return tracks;
 }
@@ -419,7 +513,7 @@ Times times_of(const std::vector<Track>& tracks) {
     last_s = std::max(last_s, track.time_s.back());
   }
   if (densest == nullptr || last_s <= times.first_s) return times;
-  const auto& keys = densest->time_s;
+  const std::span<const double> keys = densest->time_s;
   const auto steps = static_cast<double>(keys.size() - 1);
   const double span_s = keys.back() - keys.front();
   const double rate_hz = span_s > 0.0 ? steps / span_s : 0.0;
@@ -445,7 +539,7 @@ std::vector<Timecode> timecodes_of(const tinygltf::Model& model, const std::vect
   const tinygltf::Value& extras = model.animations.front().extras;
   if (!extras.IsObject() || !extras.Has("timecodes")) return {};
   const tinygltf::Value& keys = extras.Get("timecodes");
-  const std::vector<double>& key_s = tracks.front().time_s;
+  const std::span<const double> key_s = tracks.front().time_s;
   if (!keys.IsArray() || keys.ArrayLen() != key_s.size()) return {};
   std::vector<Timecode> out;
   for (std::size_t i = 0; i < times.frames; ++i) {
@@ -570,15 +664,19 @@ Result<Draft> Reader::read() {
   if (figure_.nodes.size() > kMaxFigure) {
     return fail("has a figure of more than " + std::to_string(kMaxFigure) + " joints");
   }
-  world_rest_ = world_of(tree_, rest_);
-  const auto tracks = TRY(tracks_of(model_));
+  world_rest_.resize(rest_.size());
+  place(tree_, rest_, world_rest_);
+  tree_ = needed_of(std::move(tree_), figure_.nodes);
+  Numbers numbers(model_);
+  const auto tracks = TRY(tracks_of(model_, tree_, numbers));
   const Times times = times_of(tracks);
   Draft draft;
   describe(tracks, draft);
   draft.bones = figure_.bones;
   draft.rests_in_t = !humanoid_.bones.empty();
   draft.frame_rate_hz = times.rate_hz;
-  if (times.frames > kMaxNumbers / draft.skeleton.channels.size()) {
+  if (times.frames > kMaxNumbers / draft.skeleton.channels.size() ||
+      times.frames > kMaxSteps / (tree_.order.size() + tracks.size())) {
     return fail("its animation is longer than a clip can be; cut it");
   }
   if (model_.animations.empty()) {
@@ -589,7 +687,7 @@ Result<Draft> Reader::read() {
   }
   draft.timecode = timecodes_of(model_, tracks, times);
   std::vector<std::array<double, 3>> near(figure_.nodes.size());
-  std::vector<Pose> own = rest_;
+  std::vector<Pose> own = rest_, world = world_rest_;
   for (std::size_t i = 0; i < times.frames; ++i) {
     const double time_s = times.first_s + static_cast<double>(i) / times.rate_hz;
     for (const Track& track : tracks) {
@@ -601,7 +699,8 @@ Result<Draft> Reader::read() {
         pose.rotation = Eigen::Quaterniond(value).normalized();
       }
     }
-    add_frame(world_of(tree_, own), near, draft);
+    place(tree_, own, world);
+    add_frame(world, near, draft);
   }
   return draft;
 }

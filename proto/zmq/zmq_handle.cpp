@@ -10,6 +10,9 @@
 #include <utility>
 #include <vector>
 
+#include <sys/eventfd.h>
+#include <unistd.h>
+
 #include "proto/text/number.hpp"
 
 namespace posed::net {
@@ -37,6 +40,20 @@ Result<> try_threads() {
   return {};
 }
 
+// libzmq also ends the process where it may open no more descriptors. A context with a socket needs
+// six, and to look up an address takes one.
+Result<> try_descriptors() {
+  std::array<int, 8> tried{};
+  tried.fill(-1);
+  for (int& fd : tried) fd = ::eventfd(0, EFD_CLOEXEC);
+  const bool enough = tried.back() >= 0;
+  for (const int fd : tried) {
+    if (fd >= 0) ::close(fd);
+  }
+  if (enough) return {};
+  return fail("posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
+}
+
 }  // namespace
 
 Result<Context> open_context() {
@@ -47,6 +64,7 @@ Result<Context> open_context() {
 }
 
 Result<Socket> open_socket(void* context, int type) {
+  TRY(try_descriptors());
   Socket socket(zmq_socket(context, type));
   if (!socket) return fail("ZeroMQ cannot open a socket: " + last_error());
   TRY(set_option(socket.get(), ZMQ_LINGER, 0));
@@ -83,6 +101,7 @@ Result<> choose_family(void* socket, std::string_view endpoint) {
 Result<std::string> bind_socket(void* socket, const std::string& endpoint) {
   if (!has_possible_port(endpoint)) return misuse(no_such_port(endpoint));
   TRY(choose_family(socket, endpoint));
+  TRY(try_descriptors());
   if (zmq_bind(socket, endpoint.c_str()) != 0) {
     if (zmq_errno() == EADDRINUSE) {
       return fail(endpoint +
@@ -105,6 +124,7 @@ Result<std::string> bind_socket(void* socket, const std::string& endpoint) {
 Result<> connect_socket(void* socket, const std::string& endpoint) {
   if (!has_possible_port(endpoint)) return misuse(no_such_port(endpoint));
   TRY(choose_family(socket, endpoint));
+  TRY(try_descriptors());
   // A daemon that loses its power or its network says nothing: TCP finds that out in five seconds.
   for (const auto& [option, value] : {std::pair{ZMQ_TCP_KEEPALIVE, 1},
                                       {ZMQ_TCP_KEEPALIVE_IDLE, 2},

@@ -250,6 +250,42 @@ TEST_CASE("rubbish in large datagrams fills a log slowly, and the device beside 
   CHECK(json::parse(replay.out).at("compared") > 100);
 }
 
+TEST_CASE("rubbish over TCP, in ever new connections, fills a log slowly, too") {
+  Stage stage;
+  const std::uint16_t port = free_port();
+  stage.folder.write("posed.toml",
+                     std::string(Stage::kEndpoints) +
+                         "[[source]]\nname = \"room\"\ndriver = \"mvn\"\nstreams = \"all\"\n"
+                         "[source.mvn]\nlink = \"tcp\"\nlisten = \"127.0.0.1:" +
+                         std::to_string(port) + "\"\n");
+  stage.record();
+  const auto start = std::chrono::steady_clock::now();
+  const std::string rubbish(60'000, 'r');
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  to.sin_port = htons(port);
+  std::uint64_t sent = 0;
+  while (std::chrono::steady_clock::now() < start + 4s) {
+    const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    const timeval patience{.tv_sec = 0, .tv_usec = 100'000};
+    ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
+    if (::connect(fd, reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0) {
+      ssize_t took = 0;
+      while ((took = ::send(fd, rubbish.data(), rubbish.size(), MSG_NOSIGNAL)) > 0) {
+        sent += static_cast<std::uint64_t>(took);
+      }
+    }
+    ::close(fd);
+  }
+  stage.daemon->send(SIGTERM);
+  REQUIRE(stage.daemon->exit_code() == 0);
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  CHECK(sent > 1'000'000);
+  CHECK(static_cast<double>(std::filesystem::file_size(stage.path("take.plog"))) <
+        1e6 * (took.count() + 2.0));
+}
+
 TEST_CASE("a log is replaced only once its replacement is being written") {
   Walkers busy;
   busy.launch("run");

@@ -9,6 +9,7 @@
 #include <catch2/catch.hpp>
 #include <chrono>
 #include <numeric>
+#include <optional>
 #include <thread>
 
 #include "drivers/transport/transport_factory.hpp"
@@ -48,9 +49,13 @@ bool readable(const Transport& transport) {
 // A client on loopback; the destructor closes it.
 class Client {
  public:
-  explicit Client(std::uint16_t port) : fd_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+  // `host`: of the client, 127.0.0.`host`.
+  explicit Client(std::uint16_t port, std::uint32_t host = 1)
+      : fd_(::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
     sockaddr_in address{};
     address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl((127U << 24U) | host);
+    REQUIRE(::bind(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0);
     address.sin_port = htons(port);
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     REQUIRE(::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0);
@@ -355,6 +360,39 @@ TEST_CASE(
     REQUIRE_FALSE(other->read(i * kNanosPerSecond / 500).lost);
     other->decoded(false);
   }
+}
+
+TEST_CASE("who floods must wait before coming again, and another host need not") {
+  const std::uint16_t port = free_port();
+  TransportFactory ports;
+  CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
+  {
+    const Client stranger(port);
+    const auto transport = accepted(ports, port);
+    REQUIRE(transport->start(1));
+    Chunk chunk;
+    while (!chunk.lost) {
+      stranger.say(std::string(4000, '!'));
+      REQUIRE(readable(*transport));
+      chunk = transport->read(1);
+      if (!chunk.lost) CHECK(chunk.sender != 0);
+      transport->decoded(false);
+    }
+    auto& upkeep = dynamic_cast<Upkeep&>(*transport);
+    CHECK(upkeep.consume_note().contains("a megabyte of nothing usable"));
+    CHECK(upkeep.consume_note().empty());
+  }
+  std::optional<Client> again(port);
+  CHECK_FALSE(ports.accept({.endpoint = loopback(port)}));
+  CHECK(ports.refused() == 1);
+  const Client other(port, 2), behind(port);
+  auto link = ports.accept({.endpoint = loopback(port)});
+  REQUIRE(link);
+  CHECK(link->identity() == "tcp 127.0.0.2");
+  CHECK(ports.refused() == 2);
+  std::this_thread::sleep_for(PausedHosts::kPause);
+  again.emplace(port);
+  CHECK(ports.accept({.endpoint = loopback(port)}));
 }
 
 TEST_CASE("a page whose request has come already takes no device's place, nor is it read") {

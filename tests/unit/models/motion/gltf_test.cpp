@@ -2,6 +2,8 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <cstdint>
+#include <cstring>
 #include <functional>
 #include <limits>
 #include <memory>
@@ -435,6 +437,81 @@ TEST_CASE("what is no glTF, or a damaged one, is refused with a reason") {
   CHECK(test::has(refused(asset + ",\"buffers\":[{\"uri\":\"/etc/passwd\",\"byteLength\":4}]"
                                   ",\"nodes\":[{}]}"),
                   "no glTF that can be read"));
+}
+
+TEST_CASE("a glTF that asks for more than its size is refused, or read once") {
+  const std::string asset = "{\"asset\":{\"version\":\"2.0\"}";
+  const auto why = [](const std::string& bytes) {
+    const auto clip = clip::parse_clip({.name = "x.gltf", .bytes = bytes});
+    return clip ? std::string() : clip.error().text();
+  };
+  const auto repeated = [](std::string_view what, int times) {
+    std::string all;
+    for (int i = 0; i < times; ++i) all += what;
+    return all;
+  };
+  const std::string node = asset + ",\"nodes\":[{}],\"extras\":";
+  CHECK(why(node + repeated("[", 90) + repeated("]", 90) + "}").empty());
+  CHECK(test::has(why(node + repeated("[", 500'000) + repeated("]", 500'000) + "}"), "nested"));
+  CHECK(test::has(why(node + "[" + repeated("0,", 2'000'000) + "0]}"), "too much"));
+  CHECK(why(node + "\"" + repeated("[{,", 1'000'000) + "\"}").empty());  // as a text
+  CHECK(why(asset + ",\"nodes\":[{}],\"extensions\":{\"VRM\":{\"humanoid\":7},"
+                    "\"VRMC_vrm\":{\"humanoid\":{\"humanBones\":{\"head\":7}}}}}")
+            .empty());
+
+  std::string doubled = asset + ",\"nodes\":[";
+  constexpr int kNodes = 60;
+  for (int i = 1; i < kNodes; ++i) {
+    const std::string child = std::to_string(i);
+    doubled += "{\"children\":[" + child + "," + child + "]},";
+  }
+  const auto chain = clip::parse_clip({.name = "x.gltf", .bytes = doubled + "{}]}"});
+  REQUIRE(chain);
+  CHECK(chain->skeleton->joints.size() == kNodes);
+}
+
+TEST_CASE("the tracks of a glTF take no more memory and time than its bytes are worth") {
+  // A hundred keys of a second each: zeros, but for the times.
+  constexpr int kKeys = 100;
+  std::string bytes(kKeys * 20, '\0');
+  for (int i = 0; i < kKeys; ++i) {
+    const auto time_s = static_cast<float>(i);
+    std::memcpy(bytes.data() + 4 * i, &time_s, sizeof time_s);
+  }
+  const auto glb = [&](int accessors, int channels) {
+    std::string json = R"({"asset":{"version":"2.0"},"nodes":[{}],"buffers":[{"byteLength":2000}],)"
+                       R"("bufferViews":[{"buffer":0,"byteLength":400},)"
+                       R"({"buffer":0,"byteOffset":400,"byteLength":1600}],"accessors":[)"
+                       R"({"bufferView":0,"componentType":5126,"count":100,"type":"SCALAR"})";
+    for (int i = 0; i < accessors; ++i) {
+      json += R"(,{"bufferView":1,"componentType":5126,"count":100,"type":"VEC4"})";
+    }
+    json += R"(],"animations":[{"samplers":[)";
+    for (int i = 1; i <= accessors; ++i) {
+      json += (i == 1 ? "" : ",") + (R"({"input":0,"output":)" + std::to_string(i) + "}");
+    }
+    json += R"(],"channels":[)";
+    for (int i = 0; i < channels; ++i) {
+      json += (i == 0 ? R"({"sampler":)" : R"(,{"sampler":)") + std::to_string(i % accessors) +
+              R"(,"target":{"node":0,"path":"rotation"}})";
+    }
+    json += "]}]}";
+    json.resize((json.size() + 3) / 4 * 4, ' ');
+    const auto number = [](std::size_t value) {
+      const auto word = static_cast<std::uint32_t>(value);
+      return std::string(reinterpret_cast<const char*>(&word), sizeof word);  // NOLINT: its bytes
+    };
+    const std::string body = number(json.size()) + "JSON" + json + number(bytes.size()) +
+                             std::string("BIN\0", 4) + bytes;
+    return clip::parse_clip(
+        {.name = "x.glb", .bytes = "glTF" + number(2) + number(12 + body.size()) + body});
+  };
+  const auto fair = glb(4, 100);
+  REQUIRE(fair);
+  CHECK(fair->frames() == kKeys);
+  const auto overlapping = glb(10, 10);
+  REQUIRE_FALSE(overlapping);
+  CHECK(test::has(overlapping.error().text(), "damaged"));
 }
 
 }  // namespace posed::motion
