@@ -89,6 +89,7 @@ enum class StageInput : std::uint8_t {
 struct StageType {
   std::string_view name;  // no other stage or driver has it; the name of its table in the config
   std::string_view summary;
+  std::string_view words{};  // what people read in place of the name; empty: the name will do
   std::vector<ParameterSpec> parameters{};
   // Those parameters, all of them text, that name other streams; an empty name is none. While a
   // partner is not there the stage runs without it; when one comes, the stage is made again.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include <spdlog/fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
 #include "daemon/output/axis_output.hpp"
@@ -18,6 +19,14 @@ namespace {
 std::vector<std::string> streams_of(const config::OutputConfig& config) {
   if (!config.bodies.empty()) return config.bodies;
   return {config.body, config.left_hand, config.right_hand};
+}
+
+std::string address_of(const config::OutputConfig& config) {
+  if (config.kind == config::OutputKind::kRos2) {
+    return fmt::format("domain {} on {}", config.domain, config.interface);
+  }
+  if (!config.to.empty()) return fmt::format("{}", fmt::join(config.to, ", "));
+  return config.group.empty() ? config.listen : fmt::format("{}, {}", config.listen, config.group);
 }
 
 Result<std::unique_ptr<Output>> open_kind(const config::OutputConfig& config,
@@ -43,6 +52,7 @@ Output::Output(const config::OutputConfig& config, std::unique_ptr<system::Event
                bool together)
     : name_(config.name),
       kind_(config::kind_name(config.kind)),
+      address_(address_of(config)),
       wake_(std::move(wake)),
       inbox_(streams_of(config), *wake_),
       limit_(config.rate_hz) {
@@ -88,6 +98,7 @@ void Output::pass_frames(std::int64_t now_ns) {
 void Output::fill(v1::OutputStats& stats) const {
   stats.set_name(name_);
   stats.set_kind(kind_);
+  stats.set_address(address_);
   stats.set_receivers(receivers_now_.load());
   stats.set_frames(inbox_.frames());
   stats.set_sent(sent_.load());

@@ -80,7 +80,7 @@ class Output : public publish::FrameOutput {
   void update_streams();
   void pass_frames(std::int64_t now_ns);
 
-  std::string name_, kind_;
+  std::string name_, kind_, address_;
   std::unique_ptr<system::EventFd> wake_;
   Inbox inbox_;
   Delivery delivery_;

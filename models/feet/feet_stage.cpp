@@ -276,6 +276,7 @@ Result<std::unique_ptr<Stage>> make_stage(std::shared_ptr<const Skeleton> skelet
 const StageType& feet_type() {
   static const StageType type{.name = "feet",
                               .summary = "makes the feet of a styled body stand",
+                              .words = "feet stand",
                               .parameters = FeetStage::table().specs(),
                               .needs_input = true,
                               .make = [](const StageContext& context, const StageModel* /*model*/) {

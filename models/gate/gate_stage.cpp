@@ -191,6 +191,7 @@ const StageType& gate_type() {
   static const StageType type{
       .name = "gate",
       .summary = "drops values that contradict the motion around them",
+      .words = "drop false values",
       .parameters = GateStage::table().specs(),
       .input = StageInput::kRenews,
       // Where nothing bridges what is dropped, a false value is better than none: receivers that

@@ -380,6 +380,7 @@ const StageType& generate_type() {
       .name = "generate",
       .summary =
           "smooths joint angles, and performs labels from a gesture model on a hand or a body",
+      .words = "smooth and perform",
       .parameters = parameter_table().specs(),
       .input = StageInput::kLoses,
       .bridges = true,

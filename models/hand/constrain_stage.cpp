@@ -69,6 +69,7 @@ const StageType& constrain_type() {
   static const StageType type{
       .name = "constrain",
       .summary = "keeps the fingers of a hand apart and its joints within their limits",
+      .words = "keep fingers apart",
       .is_default = [](const Skeleton& skeleton, bool /*bridged*/) { return is_hand(skeleton); },
       .make = make};
   return type;

@@ -21,7 +21,9 @@ import { Takes } from './panel/takes.js';
 import { Theme } from './panel/theme.js';
 import { TimeControls } from './panel/time_controls.js';
 import { Tools } from './panel/tools.js';
+import { Ways } from './panel/ways.js';
 import { listenToKeys } from './panel/keyboard.js';
+import { isSlow, ms } from './panel/numbers.js';
 import { Instruments } from './instruments/instruments.js';
 import { FrameTimes } from './instruments/frame_times.js';
 import { legend } from './panel/legend.js';
@@ -85,7 +87,12 @@ class Page {
     this.takes = new Takes(find('.takes'), control, (...words) => acks.say(...words));
     this.camera = new CameraPanel((message) => this.connection.sendText(message));
     find('.streams').after(this.camera.element);
-    this.help = new Help(find('#help'), find('#help-button'));
+    this.ways = new Ways(() => this.#refresh());
+    find('.streams').after(this.ways.element);
+    this.help = new Help(find('#help'), find('#help-button'), () => {
+      const [first] = [...this.world.performers.values()].filter(({ ghost }) => !ghost);
+      return first?.colour ?? 'var(--styled)';
+    });
     const say = (...words) => acks.say(...words);
     this.avatars = new Avatars(world, say, () => this.settings?.update());
     this.capture = new Capture(world, say);
@@ -224,9 +231,17 @@ class Page {
     else if (!this.hello) this.header.say(sentence || 'connecting', 'busy');
     else if (!this.daemon.alive)
       this.header.say(this.daemon.sentence || 'the daemon does not answer', 'bad');
-    else this.header.say(`live from ${this.hello.connect}`, 'good');
+    else this.header.say(...this.#liveWords());
     document.body.dataset.silent = !this.hello || !this.daemon.alive;
     emptyWords(find('.empty p'), this);
+  }
+
+  // Who sees an old picture must not read "live".
+  #liveWords() {
+    if (this.store.rewind.paused) return ['paused', 'busy'];
+    const age_ms = this.chosen ? this.instruments.history(this.chosen).picture_ms : NaN;
+    if (isSlow(age_ms)) return [`this page is slow: picture ${ms(age_ms)} old`, 'busy'];
+    return [`live from ${this.hello.connect}`, 'good'];
   }
 
   #refresh() {
@@ -236,6 +251,7 @@ class Page {
     this.world.choose(this.chosenName);
     this.list.update(this.chosen);
     this.panel.update(this.chosen, this.readOnly);
+    this.ways.update(this.hello && this.daemon.alive ? store.stats : null, this.hello?.connect);
     this.library.update(this.chosen);
     this.settings.update();
     this.takes.update(store.stats, this.readOnly);
@@ -272,6 +288,7 @@ class Page {
     if (now_ms - this.#tagged_ms > TAGS_EVERY_MS) {
       this.#tagged_ms = now_ms;
       writeTags(this.world, this.chosenName);
+      this.#sayLink();
     }
     this.instruments.frame(this.chosen, now_ms);
     this.times.add(performance.now() - began_ms);

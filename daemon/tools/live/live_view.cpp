@@ -28,6 +28,8 @@ constexpr int kNameWidth = 11;  // that a name has before the model's is cut
 constexpr int kMinName = 6;     // the heading
 constexpr int kMinModel = 5;    // a model's name that is cut further is no help
 constexpr float kMaxShown_hz = 9999.9F;
+constexpr float kKnown = 0.95F;     // of a motion; up to it the style fades
+constexpr float kLeastTold = 0.1F;  // of what the input has of the style; less is within the error
 
 struct Health {
   std::string word;
@@ -246,13 +248,33 @@ std::string robot_words(const v1::StreamStats& stream) {
   return text;
 }
 
+// What people read for a stage, here and on the page.
+std::string words_of(const v1::StageStats& stage) {
+  const StageType* type = find_stage_type(stage.name());
+  return type == nullptr || type->words.empty() ? clean_name(stage.name())
+                                                : std::string(type->words);
+}
+
+// What the style's model makes of the input, where it is worth a word.
+std::string input_words(const v1::StreamStats& stream) {
+  std::string text;
+  if (stream.has_style_gate() && stream.style_gate() <= kKnown) {
+    text = fmt::format("knows the motion to {:.0f} %", 100.0F * stream.style_gate());
+  }
+  if (stream.has_style_estimate() && stream.style_estimate() >= kLeastTold) {
+    text += fmt::format("{}has {:.0f} % of the style before it", text.empty() ? "" : ", ",
+                        100.0F * stream.style_estimate());
+  }
+  return text;
+}
+
 // A line below the stream's row about its stages; empty if there is nothing to report.
 std::string stages_row(const v1::StreamStats& stream) {
   std::string text = label_words(stream);
   const auto add = [&](const std::string& words) { text += (text.empty() ? "" : ", ") + words; };
   for (const v1::StageStats& one : stream.stage()) {
     if (one.time().p99_us() == 0.0F) continue;  // it processed no frame in this second
-    add(clean_name(one.name()) + " " + display_duration(one.time().p99_us() * 1e-6));
+    add(words_of(one) + " " + display_duration(one.time().p99_us() * 1e-6));
   }
   if (stream.lag_frames() > 0) {
     add(fmt::format("lag {} frame{} ({:.1f} ms)", stream.lag_frames(),
@@ -277,8 +299,7 @@ std::string stages_row(const v1::StreamStats& stream) {
                     100.0F * stream.gate_dropped()));
   }
   if (const std::string words = robot_words(stream); !words.empty()) add(words);
-  if (stream.has_style_gate()) add(fmt::format("gate {:.2f}", stream.style_gate()));
-  if (stream.has_style_estimate()) add(fmt::format("style {:.2f}", stream.style_estimate()));
+  if (const std::string words = input_words(stream); !words.empty()) add(words);
   // As far as the column shows, alpha has reached its target.
   if (std::abs(stream.alpha_target() - stream.alpha()) >= 0.005F) {
     add(fmt::format("alpha slides to {:.2f}", stream.alpha_target()));
@@ -473,9 +494,9 @@ const char* const kColumnsHelp = R"(Columns, one row a stream; one that no strea
   ALPHA    how much style, -2 to 2; below the table its target, while it moves
   MODEL    the style model in use, or the gesture model
 Below the table are what is wrong, the time of each stage (99 % of the frames took at most this), a
-hand's label, the lag, and settings that are not the usual ones. Of a style: gate, 1 where the model
-knows the motion to 0 where it is passed through; style, what the input shows of it already, 0 like
-its source to 1 like its target. --json has every figure, in microseconds)";
+hand's label, the lag, and settings that are not the usual ones. Of a style: how far its model knows
+the motion (0 %: passed through), and what the input has of the style already, where it is seen.
+--json has every figure, in microseconds)";
 
 std::vector<std::string> live_view(const v1::Stats& stats, const LiveViewOptions& wanted) {
   LiveViewOptions options = wanted;

@@ -3,6 +3,7 @@
 import { Series } from './series.js';
 
 const POINTS = 1600; // 20 s at 60 Hz, and the quarter that is dropped at once
+const LATELY_S = 3;
 const MOST_STAGES = 6;
 const MOST_CHANGES = 100; // of the label, that are kept
 
@@ -28,6 +29,16 @@ export class History {
       this.label.add(now_s, pose.label ? 100 * pose.labelProbability : NaN);
     if (pose.label) this.#since_s = now_s;
     this.#change(now_s, pose.label);
+  }
+
+  // How old the picture is lately: half of the poses of the last seconds were at most so old when
+  // they were drawn [ms]; NaN while it is unknown.
+  get picture_ms() {
+    return this.latency.quantile(1, 0.5, performance.now() / 1000 - LATELY_S);
+  }
+
+  get callback_ms() {
+    return this.callback.quantile(0, 0.5, performance.now() / 1000 - LATELY_S);
   }
 
   #change(at_s, text) {

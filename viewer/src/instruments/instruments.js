@@ -94,7 +94,7 @@ export class Instruments {
   #latency(stream) {
     const { latency } = this.history(stream);
     this.latency.element.hidden = latency.length === 0;
-    this.latency.say(ms(latency.quantile(1, 0.5)));
+    this.latency.say(ms(this.history(stream).picture_ms));
     this.latency.draw(latency, performance.now() / 1000);
   }
 
@@ -114,8 +114,9 @@ export class Instruments {
     this.label.element.hidden = !history.labelled;
     if (this.label.element.hidden) return;
     const { label, labelProbability, performed } = stream.pose;
+    const words = stream.labelWords;
     this.label.say(
-      !label ? 'none' : performed ? `performs ${label}` : `${label}, ${percent(labelProbability)} sure`,
+      !label ? 'none' : performed ? `performs ${words}` : `${words}, ${percent(labelProbability)} sure`,
     );
     this.label.draw(history.label, performance.now() / 1000, history.changes);
   }

@@ -42,10 +42,11 @@ export class Series {
     return this.columns.map((column) => column.subarray(first, this.#count));
   }
 
-  // The value that `share` of the points with this quantity do not exceed; NaN without such points.
-  quantile(line, share) {
-    const sorted = this.columns[line + 1].slice(0, this.#count).sort(); // NaN comes last
-    let count = this.#count;
+  // The value that `share` of the points with this quantity since `from_s` do not exceed; NaN
+  // without such points.
+  quantile(line, share, from_s = -Infinity) {
+    const sorted = this.since(from_s)[line + 1].slice().sort(); // NaN comes last
+    let count = sorted.length;
     while (count > 0 && Number.isNaN(sorted[count - 1])) count -= 1;
     if (count === 0) return NaN;
     return sorted[Math.min(count - 1, Math.floor(share * count))];

@@ -1,6 +1,6 @@
 // The figures of the chosen stream. One that it does not have is not shown.
 import { el, write } from '../panel/dom.js';
-import { ms, signed } from '../panel/numbers.js';
+import { isSlow, ms, signed } from '../panel/numbers.js';
 import { ROBOT_TILES } from './robot_tiles.js';
 
 const count = (number) => number.toLocaleString('en');
@@ -22,13 +22,13 @@ export const TILES = [
   ],
   [
     'To this page',
-    '95 % of the poses took at most this from their arrival at posed to this page',
-    ({ history }) => ms(history.callback.quantile(0, 0.95)),
+    'half of the poses of the last 3 s took at most this from their arrival at posed to this page',
+    ({ history }) => ms(history.callback_ms),
   ],
   [
-    'To the screen',
-    '95 % of the poses took at most this from their arrival at posed until they were drawn',
-    ({ history }) => ms(history.latency.quantile(1, 0.95)),
+    'Age of the picture',
+    'from arrival at posed until drawn here: half of the poses of the last 3 s took at most this',
+    ({ history }) => `${ms(history.picture_ms)}${isSlow(history.picture_ms) ? ': this page is slow' : ''}`,
   ],
   [
     'Lag',

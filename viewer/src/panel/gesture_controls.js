@@ -1,4 +1,5 @@
 // The gestures of a hand: a line of labels to perform, and the model's labels to choose from.
+import { signWords } from '../streams/words.js';
 import { el, labelled } from './dom.js';
 import { Slider } from './slider.js';
 
@@ -15,7 +16,6 @@ export class GestureControls {
     this.line = el('input', {
       type: 'text',
       value: stream.name in lines ? lines[stream.name] : '',
-      placeholder: 'g 1 c 3 4 p',
       autocomplete: 'off',
       spellcheck: false,
       maxLength: 2000,
@@ -87,15 +87,16 @@ export class GestureControls {
     if (labels.join(' ') === this.#shown) return;
     this.#shown = labels.join(' ');
     this.#chips.clear();
-    this.chips.replaceChildren(...labels.map((label) => this.#chip(label)));
+    this.line.placeholder = labels.slice(0, 6).join(' ');
+    this.chips.replaceChildren(...labels.map((label) => this.#chip(label, labels)));
   }
 
-  #chip(label) {
+  #chip(label, known) {
     const add = () => this.#write(`${this.line.value.trim()} ${label}`.trim());
     const chip = el(
       'button.chip',
       { type: 'button', onclick: add, title: `add ${label} to the line` },
-      label,
+      signWords(label, known),
     );
     this.#chips.set(label, chip);
     return chip;

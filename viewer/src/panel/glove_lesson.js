@@ -33,7 +33,7 @@ function add(sums, { name, value, validity }) {
 }
 
 export class GloveLesson {
-  static seconds = { ready: 2, hold: 2 };
+  static seconds = { ready: 3, hold: 2 }; // to take the pose, to hold it
   static #open = false;
 
   constructor({ name }, { control, requests, store }) {
@@ -57,7 +57,12 @@ export class GloveLesson {
         },
       },
       el('summary', {}, 'Calibrate this glove'),
-      el('p.note', {}, 'Press, take the pose at once, and hold still until it is judged.'),
+      el(
+        'p.note',
+        {},
+        `Press “Hold”: a countdown of ${GloveLesson.seconds.ready} s gives time to take the pose. ` +
+          `Then hold it still for ${GloveLesson.seconds.hold} s; it is judged at once.`,
+      ),
       ...this.#rowsOf((pose) => !isContact(pose)),
       el('p.note', {}, 'The thumb, by what it touches; these alone mend the calibration in use.'),
       ...this.#rowsOf(isContact),
@@ -75,12 +80,14 @@ export class GloveLesson {
     const hold = el('button', { type: 'button', onclick: () => this.#hold(pose, hold) }, 'Hold');
     const row = labelled(text, el('span.note', {}, hint), hold);
     hold.setAttribute('aria-label', `Hold: ${text}`);
-    return { pose, hold, row, words: el('p.note', { data: { pose } }) };
+    return { pose, hold, row, words: el('p.note', { role: 'status', data: { pose } }) };
   }
 
-  async #wait(seconds, button, text) {
+  async #wait(seconds, button, words, text) {
+    words.dataset.counts = seconds > 0;
     for (let left = seconds; left > 0; left -= 1) {
-      write(button, `${text} ${left}`);
+      write(button, `${left} …`);
+      write(words, `${text}: ${left}`);
       await new Promise((done) => {
         setTimeout(done, 1000);
       });
@@ -91,10 +98,12 @@ export class GloveLesson {
     const { poses, verdicts } = this.held;
     this.busy = true;
     this.#show();
-    await this.#wait(GloveLesson.seconds.ready, button, 'Ready …');
+    const { words } = this.rows.find((row) => row.pose === pose);
+    await this.#wait(GloveLesson.seconds.ready, button, words, 'Take the pose');
     const sums = new Map();
     this.store.listen(this.name, (sample) => add(sums, sample));
-    await this.#wait(GloveLesson.seconds.hold, button, 'Still …');
+    await this.#wait(GloveLesson.seconds.hold, button, words, 'Hold still');
+    words.dataset.counts = false;
     this.store.listen(this.name, null);
     write(button, 'Hold');
     const before = poses.get(pose);

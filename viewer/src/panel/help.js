@@ -1,6 +1,7 @@
 // The overlay that explains what is seen, and the keys.
 import { TILES } from '../instruments/tiles.js';
 import { el } from './dom.js';
+import { swatch } from './legend.js';
 
 const KEYS = [
   ['↑ ↓', 'choose a stream'],
@@ -18,12 +19,16 @@ const KEYS = [
   ['?', 'this help'],
 ];
 
+// By the legend's keys.
 const SEEN = [
-  ['Coloured figure', 'what posed publishes, each performer in a colour of its own'],
-  ['Grey, translucent figure', 'the raw pose, as it was captured'],
-  ['Green ring', 'a foot that stands; prints stay where it stood'],
-  ['Orange, purple, grey', 'a pose that is predicted, held or stale; the name says so, too'],
-  ['Red part', 'a part of the body without a value'],
+  ['performer', 'Published', 'what posed publishes, each performer in a colour of its own'],
+  ['raw', 'Raw, translucent', 'the pose as it was captured'],
+  ['contact', 'Ring', 'a foot that stands; prints stay where it stood'],
+  ['predicted', 'Predicted', 'computed, because nothing came for this moment'],
+  ['held', 'Held', 'the same measurement as in the frame before'],
+  ['stale', 'Stale', 'nothing comes any more: the last pose'],
+  ['no-value', 'No value', 'a part of the body that nobody measures now'],
+  ['stopped', 'Stopped', 'links that stopped a robot'],
 ];
 
 const rows = (list, tag) =>
@@ -34,12 +39,13 @@ const rows = (list, tag) =>
   );
 
 export class Help {
-  constructor(dialog, button) {
-    this.dialog = dialog;
+  // colour(): of the first performer
+  constructor(dialog, button, colour) {
+    Object.assign(this, { dialog, colour });
     const close = el('button', { type: 'button', onclick: () => dialog.close() }, 'Close');
     dialog.append(
       el('h2', { id: 'help-title' }, 'What you see'),
-      rows(SEEN, 'span'),
+      el('dl', {}, ...this.#seen()),
       el('h2', {}, 'Keys'),
       rows(KEYS, 'kbd'),
       el(
@@ -61,9 +67,16 @@ export class Help {
     };
   }
 
+  #seen() {
+    const seen = SEEN.map(([key, text]) => swatch('dt', key, el('span', {}, text)));
+    [this.published] = seen;
+    return SEEN.flatMap(([, , words], i) => [seen[i], el('dd', {}, words)]);
+  }
+
   toggle() {
     if (this.dialog.open) this.dialog.close();
     else {
+      this.published.style.setProperty('--own', this.colour());
       this.dialog.showModal();
       this.dialog.scrollTop = 0; // the browser shows the first button, which is the last line
     }

@@ -1,4 +1,5 @@
 // What the colours mean: only those that are seen now. First the performers, each in its own.
+import { MEANINGS } from '../scene/palette.js';
 import { el, write } from './dom.js';
 
 const MOST_NAMES = 6; // of more, colours come twice
@@ -53,15 +54,22 @@ function performersOf(world) {
   return mains.map(({ stream, colour }) => ({ text: `${stream.name}: ${done(stream)}`, colour }));
 }
 
+// An element that begins with the colour of its key, as the scene has it.
+export function swatch(name, key, text, colour = MEANINGS[key]) {
+  const element = el(`${name}.swatch`, { data: { key } }, text);
+  if (colour) element.style.setProperty('--own', colour);
+  return element;
+}
+
 // Returns the function that keeps `list` right.
 export function legend(list) {
   const items = new Map(
-    ENTRIES.map(([key, text]) => [key, el('li', { data: { key }, hidden: true }, text)]),
+    ENTRIES.map(([key, text]) => [key, swatch('li', key, text)]),
   );
   list.append(...items.values());
   const own = [];
   const grow = () => {
-    const item = el('li', { data: { key: 'performer' } });
+    const item = swatch('li', 'performer', '');
     own.push(item);
     items.get('raw').before(item);
     return item;

@@ -28,13 +28,14 @@ export class Lesson {
     this.words = el('p.note', { role: 'status' });
   }
 
-  fold(...rows) {
+  // step: the number of the last one
+  fold(step, ...rows) {
     this.element = el(
       'details',
       { open: Lesson.#open[this.title] ?? false, ontoggle: () => this.#toggled() },
       el('summary', {}, this.title),
       ...rows,
-      labelled('Name', this.called, this.learn, this.cancel),
+      labelled(`${step}. Name it, and learn`, this.called, this.learn, this.cancel),
       this.words,
     );
     this.show();

@@ -2,8 +2,12 @@
 
 export function ms(value_ms) {
   if (!Number.isFinite(value_ms)) return '';
+  if (value_ms >= 999.5) return `${(value_ms / 1000).toFixed(1)} s`;
   return `${value_ms.toFixed(value_ms < 99.95 ? 1 : 0)} ms`;
 }
+
+// Whether a picture of this age is no longer live.
+export const isSlow = (picture_ms) => picture_ms > 1000;
 
 export function signed(value, digits) {
   const text = Math.abs(value).toFixed(digits);

@@ -14,17 +14,39 @@ const WORDS = {
   },
 };
 
+// What each is called, and what it does.
 const LABELS = {
-  'gate.jump_deg': 'Drop an angle that jumps by (°)',
-  'gate.jump_m': 'Hold a root that jumps by (m)',
-  'style.alpha_slew_per_s': 'Style changes in a second by at most',
-  'style.gate': 'Fade out in unknown motion',
-  'style.gate_fallback': 'There keep of its posture (0 to 1)',
-  'style.auto_alpha': 'Less for who has the style already',
-  'feet.root': 'Where the body is',
-  'feet.limit_cm': 'Off the performer at most (cm)',
+  'gate.jump_deg': [
+    'Drop an angle that jumps by more than (°)',
+    'Sensors and trackers tell false values now and then. Lower: more is dropped.',
+  ],
+  'gate.jump_m': [
+    'Hold a body that jumps by more than (m)',
+    'For such a frame it stays where it was.',
+  ],
+  'style.alpha_slew_per_s': [
+    'Style changes in a second by at most',
+    'How softly a new amount sets in: 2 goes from none to all in half a second.',
+  ],
+  'style.gate': [
+    'Fade out in unknown motion',
+    'What the model was not taught, such as a jump, passes as it was captured.',
+  ],
+  'style.gate_fallback': [
+    'Posture kept while faded (0 to 1)',
+    '0: none of the style is left then; 1: its posture stays, without its movement.',
+  ],
+  'style.auto_alpha': [
+    'Less for who has the style already',
+    'Who sneaks by himself is not made to sneak twice.',
+  ],
+  'feet.root': ['Where the body is', 'Styled legs take other steps than those of the performer.'],
+  'feet.limit_cm': [
+    'Off the performer at most (cm)',
+    'With “on the performer”: so far the body may leave his place, to save the legs a stretch.',
+  ],
 };
-const plainWords = (whole) => LABELS[whole] ?? whole;
+const plainWords = (whole) => LABELS[whole]?.[0] ?? whole;
 
 function makeField(whole, name, text) {
   if (WORDS[whole])
@@ -70,7 +92,13 @@ export class Parameters {
     field.onchange = () => this.#changed(whole, field);
     field.title = whole; // as `posed ctl set` and the config name it
     this.#fields.set(whole, field);
-    return labelled(plainWords(whole), field);
+    const hint = LABELS[whole]?.[1];
+    const row =
+      field.type === 'checkbox'
+        ? el('div.row', {}, el('label.check', {}, field, plainWords(whole)))
+        : labelled(plainWords(whole), field);
+    if (hint) row.append(el('p.note', {}, hint));
+    return row;
   }
 
   async #changed(whole, field) {

@@ -23,13 +23,14 @@ export class SignLesson extends Lesson {
     this.verdict = el('p.note');
     this.signs = el('div.chips', { role: 'group', aria: { label: 'Signs that were shown' } });
     this.fold(
+      2,
       el(
         'p.note',
         {},
         `Rest, make the sign, hold it still, rest again; ${SHOWS} times for each sign. ` +
           'Then it is a gesture like the others.',
       ),
-      labelled('Sign', this.sign, this.begin),
+      labelled('1. Sign to show', this.sign, this.begin),
       this.verdict,
       this.signs,
     );

@@ -12,8 +12,11 @@ function styledWords(stream) {
   return `styled, α ${signed(alpha.value, 2)}${faded}`;
 }
 
-const labelWords = ({ verb, label, probability }) =>
-  verb === 'performs' ? `performs ${label}` : `recognised ${label}, ${percent(probability)} sure`;
+// A line may end before the label and behind it.
+function labelWords({ verb, label, probability }) {
+  const words = label.replaceAll(' ', '\u00a0');
+  return verb === 'performs' ? `performs ${words}` : `recognised ${words}, ${percent(probability)} sure`;
+}
 
 function words(stream, main) {
   if (stream.isTake) return 'recorded';
@@ -22,7 +25,7 @@ function words(stream, main) {
   else if (styledWords(stream)) parts.push(styledWords(stream));
   const { word, tone } = stateOf(main?.stats);
   if (tone !== 'good') parts.push(word);
-  const label = stream.isRaw ? null : labelOf(stream.pose);
+  const label = stream.isRaw ? null : labelOf(stream);
   if (label) parts.push(labelWords(label));
   const quality = qualityWord(stream.pose);
   if (quality && quality !== word) parts.push(quality);

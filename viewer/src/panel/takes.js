@@ -1,5 +1,6 @@
 // Takes: marks in the recording. A daemon that does not record, or replays, has none: then the page
 // says what to do.
+import { hearName, takeTitle } from '../streams/take_names.js';
 import { el, write } from './dom.js';
 import { minutes } from './numbers.js';
 
@@ -64,6 +65,7 @@ export class Takes {
       this.words.title = HOW;
       return;
     }
+    if (stats.take) hearName(stats.recorder_file, stats.take);
     if (stats !== this.#stats) this.#run(stats.take !== undefined);
     this.#stats = stats;
     this.fields.disabled = readOnlyReason !== '';
@@ -84,8 +86,7 @@ export class Takes {
     const { take, recorder_lost_chunks: lost, recorder_errors: errors, recorder_trouble: trouble } = stats;
     const now = trouble ? ', NOTHING IS WRITTEN' : '';
     const missing = errors > 0 || lost > 0 ? `, ${errors} errors, ${lost} chunks lost` : '';
-    const name = take?.name ? ` “${take.name}”` : '';
     const clock = take ? ` ${minutes((stats.time_ns - take.start_ns) / 1e9)}` : '';
-    return `${take ? `take ${take.number}${name}` : 'all is recorded'}${clock}${now}${missing}`;
+    return `${take ? takeTitle(take.number, take.name) : 'all is recorded'}${clock}${now}${missing}`;
   }
 }

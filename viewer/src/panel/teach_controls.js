@@ -8,14 +8,15 @@ const WALK_S = 20;
 export class TeachControls extends Lesson {
   constructor(stream, context) {
     super(stream, context, 'Teach a style');
-    this.walks = [this.#walk('as usual', false), this.#walk('in the style', true)];
+    this.walks = [this.#walk(1, 'as usual', false), this.#walk(2, 'in the style', true)];
     this.fold(
+      3,
       el('p.note', {}, 'posed learns what sets two walks apart: one as always, one in the style.'),
       ...this.walks.flatMap(({ row, words }) => [row, words]),
     );
   }
 
-  #walk(how, style) {
+  #walk(number, how, style) {
     const ask = (more) => this.ask({ mark: { style, seconds: WALK_S, more } });
     const mark = el('button', { type: 'button', onclick: () => ask(false) });
     const more = el(
@@ -28,7 +29,7 @@ export class TeachControls extends Lesson {
       },
       'One more',
     );
-    return { row: labelled(`Walk ${how}`, mark, more), mark, more, words: el('p.note') };
+    return { row: labelled(`${number}. Walk ${how}`, mark, more), mark, more, words: el('p.note') };
   }
 
   show(refusal = '') {

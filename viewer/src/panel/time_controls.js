@@ -7,7 +7,7 @@ export class TimeControls {
     this.button = el('button', {
       type: 'button',
       onclick: () => this.toggle(),
-      title: 'Stop the scene and look back (p)',
+      title: 'Stop the scene and look back; again: live (p)',
     });
     this.range = el('input', {
       type: 'range',
@@ -19,7 +19,8 @@ export class TimeControls {
       oninput: () => this.#look(),
     });
     this.words = el('output', { hidden: true });
-    element.append(el('div.time', {}, this.button, this.range, this.words));
+    this.element = el('div.time', {}, this.button, this.range, this.words);
+    element.append(this.element);
     this.#show();
   }
 
@@ -43,10 +44,11 @@ export class TimeControls {
 
   #show() {
     const { paused } = this.store.rewind;
-    write(this.button, paused ? 'Live' : 'Pause');
-    this.button.setAttribute('aria-pressed', String(paused));
+    write(this.button, paused ? 'Back to live' : 'Pause');
+    this.button.classList.toggle('strong', paused);
+    this.element.dataset.paused = paused;
     this.range.hidden = !paused;
     this.words.hidden = !paused;
-    write(this.words, `${Math.abs(Number(this.range.value)).toFixed(1)} s ago`);
+    write(this.words, `Paused: ${Math.abs(Number(this.range.value)).toFixed(1)} s back`);
   }
 }

@@ -38,7 +38,7 @@ export class Tools {
     const picture = el(
       'button',
       { type: 'button', onclick: () => capture.picture(), title: 'Keep the scene as PNG' },
-      'Picture',
+      'Screenshot',
     );
     const video = el(
       'button',

@@ -37,11 +37,20 @@ const THEMES = {
   },
 };
 
+// Of those that carry a meaning, by the legend's keys.
+export const MEANINGS = {
+  contact: '#009e73',
+  predicted: '#e69f00',
+  held: '#cc79a7',
+  stale: '#8f969e',
+  'no-value': '#d55e00',
+  stopped: '#d1242f', // links of a robot; the instruments name them
+};
 // By Quality; measured has the figure's own colour.
-const QUALITY = [null, colour('#e69f00'), colour('#cc79a7'), colour('#8f969e')];
-const NO_VALUE = colour('#d55e00');
-const CONTACT = colour('#009e73');
-const STOPPED = colour('#d1242f'); // links of a robot; the instruments name them
+const QUALITY = [null, ...['predicted', 'held', 'stale'].map((key) => colour(MEANINGS[key]))];
+const NO_VALUE = colour(MEANINGS['no-value']);
+const CONTACT = colour(MEANINGS.contact);
+const STOPPED = colour(MEANINGS.stopped);
 
 // Of one colour, in bodies' and hands' view: plain, or to be cut out by a video mixer.
 const SINGLE = { plain: colour('#9aa0a6'), green: colour('#00b140') };

@@ -3,6 +3,7 @@ import { Kinematics, isSound } from '../motion/kinematics.js';
 import { isHand, partWords } from '../motion/body_parts.js';
 import { Pose } from '../wire/pose.js';
 import { Jitter } from './jitter.js';
+import { signWords } from './words.js';
 
 export const RAW_SUFFIX = '-raw';
 
@@ -67,6 +68,11 @@ export class Stream {
 
   parameter(stage, name) {
     return this.stage(stage)?.parameter.find((parameter) => parameter.name === name);
+  }
+
+  // The label of the newest pose, as people read it.
+  get labelWords() {
+    return signWords(this.pose.label, this.stage('generate')?.word ?? []);
   }
 
   // The parts without a value in the newest pose: "left arm, head".

@@ -1,13 +1,14 @@
 // The state of a stream in a word, a tone for its colour, and a sentence where one helps.
 import { QUALITIES } from '../wire/pose.js';
 
-// What the stages do; of others the name itself.
+// What the stages do, as their StageType (models/) says, too; of others the name itself.
 const STAGES = {
   gate: 'drop false values',
-  generate: 'smooth, gestures',
+  generate: 'smooth and perform',
   constrain: 'keep fingers apart',
   feet: 'feet stand',
 };
+export const namedStages = Object.keys(STAGES);
 export const stageWords = (name) => STAGES[name] ?? name;
 
 // tone: good, busy, bad, off
@@ -38,9 +39,24 @@ export function qualityWord(pose) {
   return QUALITIES[pose.quality] ?? 'of unknown quality';
 }
 
-// What the label of a pose means: {text, probability}; null without one.
-export function labelOf(pose) {
+// What the label of a stream's pose means; null without one.
+export function labelOf({ pose, labelWords }) {
   if (!pose.label) return null;
   const verb = pose.performed ? 'performs' : 'recognised';
-  return { verb, label: pose.label, probability: pose.labelProbability };
+  return { verb, label: labelWords, probability: pose.labelProbability };
+}
+
+// What the demo's labels mean, which are those of models/gesture. Of another model nothing is known:
+// its labels are left as they are.
+const SIGNS = {
+  g: 'fist',
+  c: 'scissors',
+  p: 'open hand',
+  1: 'index finger',
+  3: 'three fingers',
+  4: 'four fingers',
+};
+export function signWords(label, known) {
+  const isDemo = ['g', 'c', 'p'].every((one) => known.includes(one));
+  return isDemo && SIGNS[label] ? `${SIGNS[label]} (${label})` : label;
 }

@@ -63,6 +63,7 @@ export const StreamStats = {
   6: ['rate_hz', 'float'],
   7: ['dropped', 'uint'],
   8: ['shed', 'uint'],
+  9: ['outcome', 'uint', '*'],
   12: ['publish', Percentiles, '?'],
   13: ['alpha', 'float'],
   14: ['model', 'string'],
@@ -94,6 +95,27 @@ export const StreamStats = {
   44: ['robot_stop_other', 'string'],
 };
 
+export const SourceStats = {
+  1: ['name', 'string'],
+  2: ['driver', 'string'],
+  3: ['identity', 'string'],
+  4: ['away', 'bool'],
+  6: ['outcome', 'uint', '*'],
+  7: ['streams', 'uint'],
+  8: ['kernel_dropped', 'uint'],
+};
+
+export const OutputStats = {
+  1: ['name', 'string'],
+  2: ['kind', 'string'],
+  3: ['receivers', 'uint'],
+  4: ['frames', 'uint'],
+  5: ['sent', 'uint'],
+  6: ['dropped', 'uint'],
+  7: ['failures', 'uint'],
+  8: ['address', 'string'],
+};
+
 export const TakeStats = {
   1: ['number', 'uint'],
   2: ['name', 'string'],
@@ -110,6 +132,8 @@ export const Stats = {
   7: ['recorder_errors', 'uint'],
   8: ['recorder_file', 'string'],
   9: ['replay_file', 'string'],
+  11: ['source', SourceStats, '*'],
+  14: ['output', OutputStats, '*'],
   15: ['take', TakeStats, '?'],
   16: ['recorder_trouble', 'string'],
 };

@@ -114,6 +114,7 @@ told(
       await page.waitForTimeout(400); // while the daemon runs, on a thread that others go before
       await again.click();
     }
+    await page.getByText('take 1 “page”: walker', { exact: true }).waitFor(PATIENCE);
     const [download] = await Promise.all([page.waitForEvent('download', PATIENCE), clip.click()]);
     assert.match(readFileSync(await download.path(), 'utf8'), /^HIERARCHY[^]*MOTION/);
     await page.getByLabel('Model', { exact: true }).selectOption('walk-to-sneak.style');
@@ -176,12 +177,25 @@ export const gloveTest = [
     const lesson = page.locator('details', { hasText: 'Calibrate this glove' });
     const use = lesson.getByRole('button', { name: 'Save and use' });
     assert.ok(await lesson.getByLabel('Hold: Fist', { exact: true }).isDisabled());
+    const begin = (ready) =>
+      page.evaluate((seconds) => {
+        globalThis.posedPage.panel.glove.constructor.seconds = { ready: seconds, hold: 1 };
+      }, ready);
     const hold = async (label, pose, angles) => {
       const button = lesson.getByLabel(`Hold: ${label}`, { exact: true });
       const judged = (mark) => lesson.locator(`[data-pose='${pose}']`, { hasText: mark });
       if (pose === 'fist') {
+        await begin(1);
+        await judged('').evaluate((words) => {
+          globalThis.said = [];
+          const note = () => globalThis.said.push(words.textContent);
+          new MutationObserver(note).observe(words, { childList: true });
+        });
         await button.click(); // the hand is still flat
         await judged('✗ fist failed').waitFor(PATIENCE);
+        const said = await page.evaluate(() => globalThis.said);
+        assert.deepEqual(said.slice(0, 2), ['Take the pose: 1', 'Hold still: 1']);
+        await begin(0);
         assert.ok(await use.isDisabled());
       }
       if (pose !== 'flat') await glove.hold(angles);
@@ -196,17 +210,13 @@ export const gloveTest = [
       await lesson.getByText(words).waitFor(PATIENCE);
       return readFileSync(join(own.folder, `${name}.toml`), 'utf8');
     };
-    const begin = () =>
-      page.evaluate(() => {
-        globalThis.posedPage.panel.glove.constructor.seconds = { ready: 0, hold: 1 };
-      });
-    await begin();
+    await begin(0);
     for (const one of HELD) await hold(...one);
     const sensors = /\[sensors\][^]*/;
     const [all] = sensors.exec(await used('ann', 'ann.toml is in use'));
     await page.reload(); // what was held is forgotten, the calibration is not
     await unfold();
-    await begin();
+    await begin(0);
     await hold('Touch thumb and index', 'touch-index', PINCH);
     const [mended] = sensors.exec(await used('ann2', 'ann2.toml is in use'));
     const changed = all.split('\n').filter((line) => !mended.includes(line));

@@ -154,16 +154,17 @@ export class FakeBridge {
     for (const tab of this.#tabs) tab.send('stats', stats);
   }
 
-  // A quick timer asks how many frames are due: node's own are too coarse for 120 Hz.
+  // A quick timer asks how many frames are due: node's own are too coarse for 120 Hz. Frames that
+  // no page asks for are counted, but not made: to encode all of them took a quarter of a core.
   #publish() {
     this.#timers.push(
       setInterval(() => {
         const { daemon } = this; // a test may put another in its place
-        if (daemon.frames >= daemon.time_s() * daemon.rate_hz) return;
-        if (daemon.time_s() * daemon.rate_hz - daemon.frames > 10)
-          daemon.frames = Math.floor(daemon.time_s() * daemon.rate_hz);
-        const poses = daemon.poses();
-        for (const tab of this.#tabs) {
+        const due = Math.ceil(daemon.time_s() * daemon.rate_hz);
+        const asking = [...this.#tabs].filter(({ credits }) => credits > 0);
+        if (daemon.frames >= due || asking.length === 0) return;
+        const poses = daemon.poses(due - daemon.frames);
+        for (const tab of asking) {
           for (const [topic, bytes] of poses) tab.unsent.set(topic, bytes);
           tab.flush();
         }

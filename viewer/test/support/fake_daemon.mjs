@@ -114,13 +114,13 @@ export class FakeDaemon {
     return list.map((message) => [`skeleton/${message.stream}`, encode('Skeleton', message)]);
   }
 
-  // The frames of this moment: [topic, bytes].
-  poses() {
-    this.frames += 1;
+  // The frames of this moment: [topic, bytes]; the last of `count`.
+  poses(count = 1) {
+    this.frames += count;
     const time_s = this.time_s();
     const list = [];
     this.bodies.forEach((body, i) => {
-      const step = ALPHA_PER_S / this.rate_hz;
+      const step = (count * ALPHA_PER_S) / this.rate_hz;
       body.alpha += Math.max(-step, Math.min(step, body.target - body.alpha));
       list.push(
         this.#frame(body.name, body.id, walk(time_s + 0.3 * i, body.alpha), {
@@ -234,6 +234,26 @@ export class FakeDaemon {
     return {
       time_ns: String(this.now_ns()),
       stream: [...bodies, ...hands],
+      source: [
+        {
+          name: 'stage',
+          driver: 'natnet',
+          identity: '192.168.1.20:1510',
+          outcome: [5200, 3, 0, 0, 0, 9],
+          kernel_dropped: 12,
+        },
+        { name: 'phone', driver: 'mocopi', away: true },
+      ],
+      output: [
+        {
+          name: 'vmc-walker',
+          kind: 'vmc',
+          address: '127.0.0.1:39539',
+          receivers: 1,
+          frames: this.frames,
+          sent: 1200,
+        },
+      ],
       cpu_percent: 9.9,
       rss_bytes: 29900000,
       replay_file: this.replay_file,

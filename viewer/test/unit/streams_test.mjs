@@ -1,11 +1,12 @@
 import assert from 'node:assert/strict';
+import { readFileSync, readdirSync } from 'node:fs';
 import { test } from 'node:test';
 import { Store } from '../../src/streams/store.js';
 import { Jitter } from '../../src/streams/jitter.js';
 import { History } from '../../src/instruments/history.js';
 import { Series } from '../../src/instruments/series.js';
 import { ClockMapping } from '../../src/link/clock.js';
-import { stateOf } from '../../src/streams/words.js';
+import { namedStages, stageWords, stateOf } from '../../src/streams/words.js';
 import { lanesOf } from '../../src/scene/lanes.js';
 import { parseWeights } from '../../src/panel/style_controls.js';
 import { bodySkeleton, walk } from '../support/figures.mjs';
@@ -179,4 +180,18 @@ test('lanes: raw beside styled, the bodies of one device together', () => {
 test('weights as text: shares by name, without a text the first style alone', () => {
   assert.deepEqual(parseWeights('old=0.4, young=0.6', ['young', 'old', 'tired']), [0.6, 0.4, 0]);
   assert.deepEqual(parseWeights('', ['young', 'old']), [1, 0]);
+});
+
+test('a step has the same name here as in the terminal', () => {
+  const models = new URL('../../../models/', import.meta.url);
+  const sources = readdirSync(models, { recursive: true }).filter((name) => name.endsWith('.cpp'));
+  const named = sources.flatMap((name) =>
+    [
+      ...readFileSync(new URL(name, models), 'utf8').matchAll(
+        /StageType type\{\s*\.name = "(\w+)",[^{}]*?\.words = "([^"]+)"/g,
+      ),
+    ].map(([, stage, words]) => [stage, words]),
+  );
+  assert.deepEqual(named.map(([stage]) => stage).sort(), [...namedStages].sort());
+  for (const [stage, words] of named) assert.equal(stageWords(stage), words);
 });

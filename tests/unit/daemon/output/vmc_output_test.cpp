@@ -258,6 +258,7 @@ TEST_CASE("a dead receiver is counted and told once, and the other one hears eve
   CHECK(rig.stats().sent() % 2 == 0);
   CHECK(receiver.received(before).size() == before);
   CHECK(rig.stats().receivers() == 2);
+  CHECK(rig.stats().address() == endpoint + ", " + receiver.endpoint());
   CHECK(rig.stats().failures() > before * 3 / 4);
   CHECK(rig.stats().failures() < before);
   REQUIRE(rig.reported.size() == 1);

@@ -267,7 +267,12 @@ TEST_CASE("the live view shows performed and recognised gestures, a moving alpha
   text.clear_text();
   stream.set_style_gate(0.0F);
   stream.set_style_estimate(0.4F);
-  CHECK(below().ends_with("gate_fallback 0.25, gate 0.00, style 0.40, alpha slides to 1.00"));
+  CHECK(
+      below().ends_with("gate_fallback 0.25, knows the motion to 0 %, has 40 % of the style before "
+                        "it, alpha slides to 1.00"));
+  stream.set_style_gate(1.0F);
+  stream.set_style_estimate(-0.01F);  // within the error
+  CHECK(below().ends_with("gate_fallback 0.25, alpha slides to 1.00"));
   stream.clear_style_gate();
   stream.clear_style_estimate();
   stream.set_gate_dropped(0.03F);
@@ -291,10 +296,14 @@ TEST_CASE("the live view shows the time of a stage that works, and the lag in mi
   v1::Stats stats = stats_of(1);
   auto& stream = *stats.mutable_stream(0);
   stream.mutable_stage(0)->mutable_time()->set_p99_us(490.0F);
-  stream.add_stage()->set_name("constrain");  // processed no frame
+  v1::StageStats& constrain = *stream.add_stage();
+  constrain.set_name("constrain");  // processed no frame
   stream.set_lag_frames(1);
   stream.set_lag_ms(10.0F);
   CHECK(live_view(stats, {.height = 0})[3] == "  walker0: style 0.5 ms, lag 1 frame (10.0 ms)");
+  constrain.mutable_time()->set_p99_us(40.0F);
+  CHECK(
+      live_view(stats, {.height = 0})[3].contains("style 0.5 ms, keep fingers apart 0.0 ms, lag"));
 }
 
 TEST_CASE("the live view says in words what was lost") {
