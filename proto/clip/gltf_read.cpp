@@ -37,7 +37,7 @@ constexpr std::size_t kMaxFigure = 1000;         // joints
 constexpr std::size_t kMaxNumbers = 50'000'000;  // of all frames
 constexpr std::size_t kMaxSteps = 100'000'000;   // poses and tracks of all frames
 constexpr std::size_t kMaxValues = 1'000'000;    // of the JSON; each takes 0.3 KB of memory
-constexpr std::size_t kMaxDepth = 100;           // of the JSON; tinygltf calls itself
+constexpr std::size_t kMaxNesting = 100;           // of the JSON; tinygltf calls itself
 constexpr std::size_t kMaxWhy = 200;             // letters of what tinygltf says
 constexpr double kMaxFramesAKey = 1000.0;        // so that a short file asks for little work
 constexpr double kStillRate_hz = 30.0;           // of a file without an animation
@@ -89,7 +89,7 @@ Result<> check_json(std::string_view json) {
       continue;
     }
     ++values;
-    if (depth > kMaxDepth) return fail("is nested too deeply to be a glTF");
+    if (depth > kMaxNesting) return fail("is nested too deeply to be a glTF");
     if (values > kMaxValues) return fail("has too much in its JSON to be a figure");
   }
   return {};

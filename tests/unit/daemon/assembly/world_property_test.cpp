@@ -235,7 +235,7 @@ void check_world(std::uint64_t seed, const std::filesystem::path& log, Lived& me
   world.daemon->run(end_of(world.options));
   const bool killed = world.options.killed_at_s != kNever_s;
   const std::vector<VirtualBody> streams = streams_of(world);
-  const auto names = check_numbers(streams, killed);
+  const auto names = check_numbers(streams, killed, {"hand"});
   for (std::uint32_t id = 0; id < world.names.size() && !killed; ++id) {
     INFO(world.names[id]);
     const NumbersOfName& name = names.at(world.names[id]);
