@@ -1,7 +1,10 @@
 #include "daemon/devices/device_supervisor.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cassert>
+#include <numeric>
+#include <string_view>
 
 #include <poll.h>
 #include <unistd.h>
@@ -23,7 +26,60 @@ constexpr std::chrono::milliseconds kLookEvery{200};
 constexpr std::chrono::milliseconds kTrySoon{50};
 constexpr std::chrono::nanoseconds kSettles = std::chrono::seconds(1);
 
+// [Outcome] what most packets were, or all of those that gave nothing; then: there were none.
+constexpr std::array<std::string_view, kOutcomes + 1> kUseless{
+    "packets come, but none has given a stream a pose for 3 s: see whether the sender streams "
+    "bodies, and whether [[stream]] names one of them",
+    "most packets of 3 s were cut or longer than they say: the sender may speak another version of "
+    "its protocol",
+    "most packets of 3 s had a wrong checksum: see to the cable and the baud rate",
+    "most packets of 3 s had what cannot be: no number, no rotation, a body or bone that is not "
+    "described, or another version's fields",
+    "most packets of 3 s were another program's, or of a body that is not described or not loaded",
+    "most packets of 3 s were overtaken by newer ones: the sender's clock or count goes back",
+    "most packets of 3 s came twice: the sender repeats itself, as while it is paused",
+    "nothing has answered for 3 s: see to the device, its address and the firewall"};
+
 }  // namespace
+
+UseWatch::Counts UseWatch::counts_of(const pipeline::SourceCounters& counters) {
+  Counts counts{};
+  for (std::size_t i = 0; i < counts.size(); ++i) counts[i] = counters.outcome[i].load();
+  return counts;
+}
+
+void UseWatch::restart(const pipeline::SourceCounters& counters, std::int64_t now_ns) {
+  *this = UseWatch();
+  before_ = counts_of(counters);
+  since_ns_ = now_ns;
+}
+
+std::size_t UseWatch::cause_of(const Counts& came, bool asks, bool used) {
+  const std::uint64_t all = std::accumulate(came.begin(), came.end(), std::uint64_t{0});
+  if (all == 0) return asks && !used ? kNoAnswer : kNone;
+  const auto most = static_cast<std::size_t>(std::ranges::max_element(came) - came.begin());
+  const auto outcome = static_cast<Outcome>(most);
+  const bool harmless =
+      outcome == Outcome::kOk || outcome == Outcome::kLate || outcome == Outcome::kDuplicate;
+  if (!used) return most;
+  return !harmless && 2 * came[most] > all ? most : kNone;
+}
+
+std::string UseWatch::look(const pipeline::SourceCounters& counters, bool asks,
+                           std::int64_t now_ns) {
+  if (now_ns - since_ns_ < kEvery_ns) return {};
+  const Counts counts = counts_of(counters);
+  Counts came{};
+  for (std::size_t i = 0; i < came.size(); ++i) came[i] = counts[i] - before_[i];
+  before_ = counts;
+  const std::int64_t used_ns = counters.used_ns.load();
+  used_ = used_ || (used_ns != kNoTime_ns && used_ns >= since_ns_);
+  since_ns_ = now_ns;
+  const std::size_t cause = cause_of(came, asks, used_);
+  if (cause == kNone || told_[cause]) return {};
+  told_.set(cause);
+  return std::string(kUseless[cause]);
+}
 
 bool DeviceSupervisor::wanted(const OpenSource& source) { return source.driver->expect != nullptr; }
 
@@ -54,6 +110,7 @@ void DeviceSupervisor::run() {
     } else {
       write_to_device();
       keep_up();
+      watch_use();
       watch_silence();
     }
     sleep();
@@ -108,6 +165,14 @@ void DeviceSupervisor::take_back() {
   reported_.clear();
 }
 
+void DeviceSupervisor::watch_use() {
+  const bool asks = device_->poll.period_ns != 0;
+  const std::string text = use_.look(source_.counters, asks, ports_.clock());
+  // Whoever likes shows the camera a hand.
+  if (text.empty() || driver_.name == "landmarks") return;
+  ports_.report(v1::Event::KIND_WARNING, text);
+}
+
 void DeviceSupervisor::watch_silence() {
   if (device_->reopen_after_s <= 0.0 || asked_back_) return;
   const pipeline::SourceCounters& counters = source_.counters;
@@ -152,14 +217,18 @@ void DeviceSupervisor::look_for_device() {
   for (const std::string& warning : device_->warnings) {
     ports_.report(v1::Event::KIND_WARNING, warning);
   }
+  use_.restart(source_.counters, ports_.clock());
   source_.present->connected(device_->description);
   source_.slot->give_back.store(false);  // that request was for the previous device
   const bool given = source_.slot->in.push(device_.get());
   assert(given);  // the reader had given back the device before
   ports_.reader->call();
   const std::string note = source_.ports->consume_note();
+  const std::string& identity = device_->description.identity;
+  // A bound socket says nothing about the other side.
   ports_.report(v1::Event::KIND_FOUND,
-                "connected: " + device_->description.identity + (note.empty() ? "" : "; " + note));
+                (identity.starts_with("udp ") ? "listening: " : "connected: ") + identity +
+                    (note.empty() ? "" : "; " + note));
 }
 
 // Refuses a device that differs from what the stream was set up for: its data would silently be

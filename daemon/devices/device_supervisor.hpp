@@ -4,7 +4,9 @@
 // start-up exchange, closing) happens here, so that no other stream is delayed.
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <bitset>
 #include <functional>
 #include <memory>
 #include <string>
@@ -24,6 +26,30 @@ struct SupervisorPorts {
   Clock clock = nullptr;
   // Publishes an event on event/<stream>; must be callable from any thread.
   std::function<void(v1::Event::Kind kind, const std::string& text)> report;
+};
+
+// Notices a link that is open and gives nothing: because nothing answers, or because what comes is
+// of no use. Cold.
+class UseWatch {
+ public:
+  // A new link.
+  void restart(const pipeline::SourceCounters& counters, std::int64_t now_ns);
+  // Returns what to tell people; each cause is told once a link. `asks`: the device has to answer.
+  [[nodiscard]] std::string look(const pipeline::SourceCounters& counters, bool asks,
+                                 std::int64_t now_ns);
+
+ private:
+  using Counts = std::array<std::uint64_t, kOutcomes>;
+  static constexpr std::int64_t kEvery_ns = 3 * kNanosPerSecond;
+  static constexpr std::size_t kNoAnswer = kOutcomes;
+  static constexpr std::size_t kNone = kOutcomes + 1;
+  [[nodiscard]] static Counts counts_of(const pipeline::SourceCounters& counters);
+  [[nodiscard]] static std::size_t cause_of(const Counts& came, bool asks, bool used);
+
+  Counts before_{};
+  std::int64_t since_ns_ = 0;
+  bool used_ = false;  // something, since the link is open
+  std::bitset<kOutcomes + 1> told_;
 };
 
 class DeviceSupervisor {
@@ -49,6 +75,7 @@ class DeviceSupervisor {
   void look_for_device();
   Result<std::unique_ptr<drivers::Device>> try_open();
   void keep_up();
+  void watch_use();
   void sleep();
   [[nodiscard]] bool settling() const;  // a device node appeared a moment ago
 
@@ -60,6 +87,7 @@ class DeviceSupervisor {
   drivers::ColdWriter* writer_ = nullptr;    // the same device's writer, if writing to it blocks
   drivers::Upkeep* upkeep_ = nullptr;        // the same device's upkeep, if its link needs any
   std::uint64_t drops_reported_ = 0;         // of the writer
+  UseWatch use_;
   bool away_ = true;
   bool found_once_ = false;
   bool asked_back_ = false;

@@ -1,11 +1,33 @@
 #include "daemon/output/axis_output.hpp"
 
+#include <algorithm>
+#include <array>
 #include <span>
 #include <string>
 #include <string_view>
 #include <utility>
 
 namespace posed::output {
+namespace {
+
+namespace axis = drivers::axis;
+
+// Whether the joints are those of an avatar of Axis Neuron or Axis Studio.
+bool is_axis_avatar(const Skeleton& skeleton) {
+  if (skeleton.root_joint < 0 || skeleton.joints.size() != skeleton.root_joint + axis::kBones) {
+    return false;
+  }
+  return std::ranges::any_of(std::array{axis::Figure::kPro, axis::Figure::kStudio},
+                             [&](axis::Figure figure) {
+                               for (std::size_t b = 0; b < axis::kBones; ++b) {
+                                 const Joint& joint = skeleton.joints[skeleton.root_joint + b];
+                                 if (joint.name != axis::bone_name(b, figure)) return false;
+                               }
+                               return true;
+                             });
+}
+
+}  // namespace
 
 Result<std::unique_ptr<Output>> AxisOutput::open(const config::OutputConfig& config,
                                                  std::unique_ptr<system::EventFd> wake) {
@@ -25,14 +47,22 @@ AxisOutput::AxisOutput(const config::OutputConfig& config, std::unique_ptr<syste
       binary_(config.binary),
       clients_(std::move(clients)),
       receivers_(std::move(receivers)),
-      people_(config.people()) {}
+      people_(config.people()),
+      names_(config.people()) {}
 
 Result<> AxisOutput::set_stream(std::size_t place, const LiveStream* stream) {
   Person& person = people_[place];
   person.figure.reset();
   person.waits = false;
+  names_[place].clear();
   if (stream == nullptr) return {};
-  auto figure = AxisFigure::make(stream->skeleton, static_cast<std::uint8_t>(place), stream->name);
+  // A blank ends the name in a line of text.
+  const auto& skeleton = stream->skeleton;
+  const bool keeps_name = skeleton != nullptr && is_axis_avatar(*skeleton) &&
+                          (binary_ || skeleton->name.find(' ') == std::string::npos);
+  const std::string name =
+      distinct_name(keeps_name ? skeleton->name : stream->name, stream->name, place, names_);
+  auto figure = AxisFigure::make(skeleton, static_cast<std::uint8_t>(place), name);
   if (!figure) return fail("cannot be sent: " + figure.error().message);
   person.figure = std::make_unique<AxisFigure>(std::move(*figure));
   if (header_) clients_->set_greeting(person.figure->hierarchy());

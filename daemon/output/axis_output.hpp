@@ -41,6 +41,7 @@ class AxisOutput final : public Output {
   std::optional<LineClients> clients_;     // over TCP
   std::optional<UdpReceivers> receivers_;  // over UDP
   std::vector<Person> people_;             // [place]
+  std::vector<std::string> names_;         // [place]
   std::int64_t look_ns_ = kNoTime_ns;      // when to look for clients and news next
 };
 

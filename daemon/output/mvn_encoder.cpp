@@ -145,7 +145,7 @@ class MvnEncoder final : public DatagramEncoder {
     const std::string_view timecode = view_of(person.timecode);
     if (timecode.find('.') != std::string_view::npos) {
       send(mvn::encode_datagram(head_of(person, mvn::Type::kTimeCode),
-                                std::as_bytes(std::span(timecode))));
+                                mvn::encode_timecode(timecode)));
     }
     const auto payload = mvn::encode_pose(
         type_, mvn::pose_of(person.character, person.root_m, person.rotations, /*local=*/false));

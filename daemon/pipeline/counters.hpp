@@ -23,6 +23,7 @@ struct alignas(64) SourceCounters {
   std::atomic<bool> connected{false};                 // a link to the device is open
   std::atomic<std::uint64_t> connections{0};          // links opened since the start
   std::atomic<std::int64_t> link_ns{kNoTime_ns};      // when `connected` last changed
+  std::atomic<std::int64_t> used_ns{kNoTime_ns};      // arrival of the last frame or sample
 };
 
 struct alignas(64) ReaderCounters {

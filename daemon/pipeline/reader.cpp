@@ -136,6 +136,9 @@ class Reader::Source final : private IntakeOut {
   // IntakeOut: counts the item and puts it into the ring.
   bool item(std::size_t place, Item& item) noexcept override {
     Place& to = *place_[place];
+    if (item.kind != Item::Kind::kEvent) {
+      counters_.used_ns.store(arrival_ns_, std::memory_order_relaxed);
+    }
     ReaderCounters& reader = to.body.counters->reader;
     switch (item.kind) {
       case Item::Kind::kSample:

@@ -63,7 +63,8 @@ std::unexpected<Error> no_glove(const Connection& link, const Settings& settings
   }
   if (seen.too_large) {
     return fail("the glove sends values above max_analog_value = " +
-                    std::to_string(settings.max_analog) + "; set it to 4095 for an ESP32",
+                    std::to_string(settings.max_analog) + "; set it to what a closed finger sends: "
+                    "4095 of an ESP32, 1023 of an AVR board, twice that where a firmware scales",
                 link.name());
   }
   return fail("what comes is no line of a LucidGlove; check baud, encoding and port", link.name());

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "drivers/byte_reader.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::drivers::mvn {
@@ -126,8 +127,10 @@ RT_SAFE Outcome MvnDecoder::accept_values(const Datagram& datagram, Sink& sink) 
 }
 
 RT_SAFE Outcome MvnDecoder::accept_timecode(const Datagram& datagram) noexcept {
-  const auto* text = reinterpret_cast<const char*>(datagram.payload.data());
-  timecode_ = to_timecode({text, std::min(datagram.payload.size(), kTimeCodeBytes)});
+  BigEndianReader reader(datagram.payload);
+  const bool sized = datagram.payload[0] == std::byte{0};  // the text begins with a digit
+  if (sized && reader.u32() > reader.left()) return Outcome::kShort;
+  timecode_ = to_timecode(reader.text(std::min(reader.left(), kTimeCodeBytes)));
   timecode_sample_ = datagram.head.sample;
   return Outcome::kOk;
 }

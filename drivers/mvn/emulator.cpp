@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <string>
 #include <utility>
 
 #include "drivers/emulate/motion.hpp"
@@ -17,14 +18,13 @@ Character emulated_waver() { return average_character(1, "Waver", 0.9F, /*finger
 
 namespace {
 
-std::vector<std::byte> time_text(std::int64_t time_ns) {
+std::string time_text(std::int64_t time_ns) {
   const std::int64_t ms = time_ns / 1'000'000;
   std::array<char, 40> text{};
   (void)std::snprintf(text.data(), text.size(), "%02d:%02d:%02d.%03d",
                       static_cast<int>(ms / 3'600'000 % 24), static_cast<int>(ms / 60'000 % 60),
                       static_cast<int>(ms / 1000 % 60), static_cast<int>(ms % 1000));
-  const auto bytes = std::as_bytes(std::span(text)).first(12);
-  return {bytes.begin(), bytes.end()};
+  return {text.data(), 12};
 }
 
 }  // namespace
@@ -132,7 +132,7 @@ void MvnEmulator::add_sample(const Person& person, Type type, std::int64_t time_
     case Type::kCentreOfMass:
       return add(encode_centre_of_mass(person.root_m));
     case Type::kTimeCode:
-      return add(time_text(time_ns));
+      return add(encode_timecode(time_text(time_ns)));
     case Type::kJointAngles:
     case Type::kLinear:
     case Type::kAngular:

@@ -123,6 +123,12 @@ std::vector<std::byte> encode_meta(std::string_view name) {
   return writer.finish();
 }
 
+std::vector<std::byte> encode_timecode(std::string_view text) {
+  BigEndianWriter writer;
+  write_text(writer, text);
+  return writer.finish();
+}
+
 std::vector<std::byte> encode_scale(std::span<const Vec3f, kBodySegments> position_m) {
   BigEndianWriter writer;
   writer.i32(static_cast<std::int32_t>(kBodySegments));

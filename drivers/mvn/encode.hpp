@@ -28,6 +28,9 @@ namespace posed::drivers::mvn {
 // of 44 bytes, on the 17 segments where a suit has trackers.
 [[nodiscard]] std::vector<std::byte> encode_values(Type type, const CharacterPose& pose);
 
+// `text` is "HH:MM:SS.mmm".
+[[nodiscard]] std::vector<std::byte> encode_timecode(std::string_view text);
+
 [[nodiscard]] std::vector<std::byte> encode_centre_of_mass(const Vec3f& position_m);
 
 // Cuts a pose's payload into datagrams of at most `longest` bytes, each with whole items.

@@ -189,8 +189,13 @@ Outcome decode_pose(const Head& head, std::span<const std::byte> items,
   BigEndianReader reader(items);
   const std::size_t wanted = pose.fingers ? kSegments + shape.props : kBodySegments;
   bool valid = true;
+  std::int32_t before = 0;
   for (std::size_t i = 0; i < wanted; ++i) {
-    static_cast<void>(reader.i32());
+    const std::int32_t id = reader.i32();
+    // 01 and 02 count the segments up; which number begins is not looked at.
+    const bool counts = i == 0 || i >= kBodySegments || unity || id == before + 1;
+    valid = valid && counts;
+    before = id;
     const bool prop = i >= kBodySegments && i < kBodySegments + shape.props;
     SegmentPose ignored;
     const std::size_t segment =

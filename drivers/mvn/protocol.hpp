@@ -49,7 +49,8 @@
 //    23  segment id (i32) | w, x, y, z (f32) | free acceleration | magnetic field     44 bytes
 //        or: ... | free acceleration | acceleration | angular velocity | magnetic field  68 bytes
 //    24  centre of mass: x, y, z (f32), perhaps more
-//    25  time code: text "HH:MM:SS.mmm"
+//    25  time code: size (i32) | text "HH:MM:SS.mmm" (the vendor's SDK: timecodedatagram.cpp); in
+//        logs of posed's own emulator the size may be missing
 //
 // The axes of 20 to 24 are those of 02; degrees, metres, seconds and radians, for magnetic fields
 // no known unit.
@@ -137,7 +138,8 @@ RT_SAFE [[nodiscard]] Outcome decode_datagram(std::span<const std::byte> bytes,
                                               Datagram& datagram) noexcept;
 
 // The items of a whole sample, in their order. kShort: not as many as the head says; kOutOfRange: a
-// number is no position or rotation, or the head names segments that no character has.
+// number is no position or rotation, the ids of the body's segments do not count up, or the head
+// names segments that no character has.
 RT_SAFE [[nodiscard]] Outcome decode_pose(const Head& head, std::span<const std::byte> items,
                                           CharacterPose& pose) noexcept;
 

@@ -181,14 +181,13 @@ RT_SAFE Outcome NatNetDecoder::accept_model_def(std::span<const std::byte> paylo
 }
 
 RT_SAFE bool NatNetDecoder::read(std::span<const std::byte> payload, FrameView& view) noexcept {
-  if (has_reading_) {
-    if (read_frame(payload, reading_, view)) {
-      misfits_ = 0;
-      return true;
-    }
-    if (misfits_ < kMaxMisfits) ++misfits_;
-    if (misfits_ < kMaxMisfits) return false;  // the packet is damaged, not the reading
+  if (has_reading_ && read_frame(payload, reading_, view)) {
+    misfits_ = 0;
+    return true;
   }
+  if (misfits_ < kMaxMisfits) ++misfits_;
+  const bool damaged = misfits_ < kMaxMisfits;  // the packet, not the reading
+  if (has_reading_ && damaged) return false;
   for (const Reading& reading : Readings(version_)) {
     if (!read_frame(payload, reading, view)) continue;
     reading_ = reading;
@@ -196,6 +195,7 @@ RT_SAFE bool NatNetDecoder::read(std::span<const std::byte> payload, FrameView& 
     misfits_ = 0;
     return true;
   }
+  if (!damaged) requests_.does_not_fit();
   return false;
 }
 
@@ -275,7 +275,7 @@ RT_SAFE Outcome NatNetDecoder::accept_skeleton(ByteReader& reader, Sink& sink) n
     bone.rotation_xyzw = from_motive(bone.rotation_xyzw, settings_.z_up);
     valid = valid && pose.add(bone);
   }
-  if (!known) requests_.bodies_changed();
+  if (!known || !pose.is_described(bones)) requests_.bodies_changed();
   Frame frame;
   if (!valid || !pose.fill(settings_.coordinates, frame)) return Outcome::kOutOfRange;
   return emit(body, frame, sink);

@@ -60,6 +60,8 @@ class Requests {
   void accept_rate() noexcept { rate_.wanted = false; }
   void accept_bodies() noexcept { bodies_.wanted = false; }
   void bodies_changed() noexcept { bodies_.wanted = true; }
+  // The server may have been replaced by one of another version.
+  void does_not_fit() noexcept { connect_.wanted = true; }
 
   // The datagram to send now; empty: none.
   RT_SAFE [[nodiscard]] std::span<const std::byte> next(std::int64_t now_ns) noexcept;

@@ -8,6 +8,8 @@ namespace posed::drivers::natnet {
 namespace {
 
 constexpr std::size_t kMaxModelText = 1024;  // bytes of a name
+// Size 2, origin 3, calibration matrix 12 * 12, corners 4 * 3, type, kind of data.
+constexpr std::size_t kForcePlateWords = 2 + 3 + 144 + 12 + 2;
 
 enum class Kind : std::int32_t {
   kMarkerSet = 0,
@@ -76,8 +78,8 @@ class ModelReader {
       case Kind::kSkeleton:
         return read_skeleton(reader) && (must_end || reader.left() == 0);
       case Kind::kForcePlate:
-        return !must_end || (skip(reader, 4) && skip_texts(reader, 1) && skip(reader, 173 * 4) &&
-                             skip_counted_texts(reader));
+        return !must_end || (skip(reader, 4) && skip_texts(reader, 1) &&
+                             skip(reader, kForcePlateWords * 4) && skip_counted_texts(reader));
       case Kind::kDevice:
         return !must_end || (skip(reader, 4) && skip_texts(reader, 2) && skip(reader, 8) &&
                              skip_counted_texts(reader));

@@ -9,8 +9,8 @@
 //   2 skeleton     text name, i32 id, i32 count, count rigid bodies (public
 //                  descriptions do not agree whether these bones carry markers from 3.0 on, so
 //                  both are tried)
-//   3 force plate  i32 id, text serial number, 173 words (size, origin, calibration, corners,
-//                  type, kind of data), i32 count, count texts
+//   3 force plate  i32 id, text serial number, f32[2] size, f32[3] origin, f32[144] calibration,
+//                  f32[12] corners, i32 type, i32 kind of data, i32 count, count texts
 //   4 device       i32 id, text name, text serial number, i32 type, i32 kind of data, i32 count,
 //                  count texts
 //   5 camera       text name, f32[3], f32[4]

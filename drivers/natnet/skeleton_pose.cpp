@@ -19,6 +19,7 @@ bool SkeletonPose::add(const RigidBody& bone) noexcept {
   const auto id = static_cast<std::uint16_t>(static_cast<std::uint32_t>(bone.id) & 0xffff);
   const std::size_t joint = table_.joint_of(id, next_);
   next_ = joint + 1;
+  undescribed_ = undescribed_ || joint >= table_.bone_ids.size();
   if (joint >= table_.bone_ids.size() || seen_[joint] || !is_plausible(bone.position_m)) {
     return false;
   }

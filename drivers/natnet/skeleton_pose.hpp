@@ -23,6 +23,11 @@ class SkeletonPose {
   // of the table. False when the bone is unknown, came before or has values that make no sense.
   [[nodiscard]] bool add(const RigidBody& bone) noexcept;
 
+  // Whether the description has the bones so far, and as many as these.
+  [[nodiscard]] bool is_described(std::size_t bones) const noexcept {
+    return !undescribed_ && bones == table_.bone_ids.size();
+  }
+
   // Fills root position, rotations and validity. False when a bone is missing.
   [[nodiscard]] bool fill(Coordinates coordinates, Frame& frame) const noexcept;
 
@@ -33,6 +38,7 @@ class SkeletonPose {
 
   const BodyTable& table_;
   std::size_t next_ = 0;
+  bool undescribed_ = false;
   std::bitset<kMaxJoints> seen_, tracked_;
   std::array<Vec3f, kMaxJoints> position_m_{};
   std::array<Quatf, kMaxJoints> rotation_xyzw_{};

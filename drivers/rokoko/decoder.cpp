@@ -1,6 +1,7 @@
 #include "drivers/rokoko/decoder.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "drivers/rokoko/lz4_frame.hpp"
 #include "proto/frame/rotation.hpp"
@@ -125,6 +126,11 @@ RT_SAFE Outcome StudioDecoder::read(std::span<const std::byte> bytes) noexcept {
 }
 
 RT_SAFE Outcome StudioDecoder::accept_frame(std::int64_t active_ns, Sink& sink) noexcept {
+  if (frame_.count == 0 && frame_.named_joints) {
+    constexpr std::array kDescription{std::byte{kOnlyNamedJoints}};
+    if (!std::exchange(told_named_joints_, true)) sink.description(kDescription);
+    return Outcome::kOutOfRange;
+  }
   Outcome worst = Outcome::kOk;
   std::array<SeenBody, kMaxParts> bodies;
   for (std::size_t i = 0; i < frame_.count; ++i) {
@@ -137,7 +143,7 @@ RT_SAFE Outcome StudioDecoder::accept_frame(std::int64_t active_ns, Sink& sink) 
   }
   const auto description = roster_.describe(active_ns);
   if (!description.empty()) sink.description(description);
-  if (layout_ == nullptr) return Outcome::kForeign;
+  if (layout_ == nullptr) return frame_.count == 0 ? worst : Outcome::kForeign;
   taken_.reset();
   for (std::size_t i = 0; i < frame_.count; ++i) {
     const Subject& subject = frame_.subjects[i];

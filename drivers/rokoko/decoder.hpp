@@ -62,6 +62,7 @@ class StudioDecoder final : public LayoutDecoder<StudioLayout> {
   TimestampClock clock_;
   StudioFrame frame_;
   Roster roster_;
+  bool told_named_joints_ = false;
   std::bitset<kMaxBodies> taken_;  // bodies of the frame so far
   std::array<std::byte, kMaxJson> json_{};
 };

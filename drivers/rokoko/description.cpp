@@ -72,6 +72,11 @@ Result<std::vector<DescribedBody>> parse_description(std::span<const std::byte> 
   ByteReader reader(bytes);
   const std::size_t count = reader.u8();
   if (!reader.ok()) return wrong_description("is empty");
+  if (count == kOnlyNamedJoints) {
+    return fail(
+        "Rokoko Studio sends JSON v4, whose lists of joints posed does not read; choose JSON v3 in "
+        "Studio's live stream");
+  }
   if (count > kMaxBodies) return wrong_description("has too many bodies");
   std::vector<DescribedBody> bodies;
   for (std::size_t i = 0; i < count; ++i) {

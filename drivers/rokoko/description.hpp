@@ -12,6 +12,7 @@
 //    face     u8, 1: it has the face values, too
 //    name     u8 and 0 to 64 bytes as Studio sent them
 //    joints   bit j: joint j of joints.hpp; bit 0 of a prop; none: only the face values
+//    bodies   kOnlyNamedJoints: Studio sends people of JSON v4 and nobody else; nothing follows
 //    x, y, z  3 x f32 [m], from the nearest ancestor among the joints, in that one's frame
 #pragma once
 
@@ -49,6 +50,7 @@ struct DescribedBody {
 
 inline constexpr std::size_t kMaxBodyBytes = 3 + kMaxNameBytes + 8 + kStudioJoints * 12;
 inline constexpr std::size_t kMaxDescriptionBytes = 1 + kMaxBodies * kMaxBodyBytes;
+inline constexpr std::uint8_t kOnlyNamedJoints = 255;
 static_assert(kMaxDescriptionBytes <= kMaxDescription);
 
 // Writes one body and returns its length; `room` has at least kMaxBodyBytes.

@@ -1,6 +1,7 @@
 #include "drivers/rokoko/studio_frame.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <limits>
 
@@ -202,7 +203,10 @@ RT_SAFE bool read_member(JsonReader& json, std::string_view key, StudioFrame& fr
   if (key == "actors") return read_list(json, Subject::Kind::kActor, frame);
   if (key == "props" || key == "trackers") return read_list(json, Subject::Kind::kProp, frame);
   if (key == "faces") return read_list(json, Subject::Kind::kFace, frame);
-  if (key != "timestamp") {
+  if (key == "newtons" || key == "characters") {
+    if (!json.enter_array()) return true;
+    for (; json.next(); json.skip()) frame.named_joints = true;
+  } else if (key != "timestamp") {
     json.skip();
   } else if (!json.number(frame.timestamp_s)) {
     frame.timestamp_s = std::numeric_limits<double>::quiet_NaN();
@@ -241,7 +245,30 @@ RT_SAFE void join_faces(StudioFrame& frame) noexcept {
   }
 }
 
+// Studio lets two actors, or two props, have one name: the second "Anna" becomes "Anna 2".
+RT_SAFE void tell_apart(StudioFrame& frame) noexcept {
+  for (std::size_t i = 0; i < frame.count; ++i) {
+    const Subject& subject = frame.subjects[i];
+    int number = 1;
+    for (std::size_t k = i + 1; k < frame.count; ++k) {
+      Subject& other = frame.subjects[k];
+      if (other.kind == subject.kind && other.name == subject.name) other.name.add_number(++number);
+    }
+  }
+}
+
 }  // namespace
+
+RT_SAFE void StudioName::add_number(int number) noexcept {
+  constexpr std::size_t kMostDigits = 11;
+  std::array<char, kMostDigits> digits{};
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
+  const auto count = static_cast<std::size_t>(end - digits.data());
+  size_ = std::min(size_, bytes_.size() - count - 1);
+  bytes_[size_++] = ' ';
+  std::ranges::copy(std::string_view(digits.data(), count), bytes_.begin() + size_);
+  size_ += count;
+}
 
 RT_SAFE void StudioName::set(std::string_view raw) noexcept { size_ = unescape_json(raw, bytes_); }
 
@@ -253,6 +280,7 @@ RT_SAFE void StudioName::keep(std::string_view text) noexcept {
 RT_SAFE Outcome read_studio_frame(std::string_view json, StudioFrame& frame) noexcept {
   JsonReader reader(json);
   frame.count = 0;
+  frame.named_joints = false;
   frame.timestamp_s = std::numeric_limits<double>::quiet_NaN();
   bool room = true;
   double version = 0.0;
@@ -271,6 +299,7 @@ RT_SAFE Outcome read_studio_frame(std::string_view json, StudioFrame& frame) noe
   if (!(version >= 2.0)) return Outcome::kForeign;
   if (!reader.at_end()) return Outcome::kShort;
   join_faces(frame);
+  tell_apart(frame);
   return Outcome::kOk;
 }
 

@@ -21,6 +21,10 @@
 // the actor itself, its "profileName" says whose face belongs to it. What Studio calls 2.5 says
 // "version": 3 and is otherwise version 2: so the place of the actors counts, not the number.
 //
+// "JSON v4" says version "3,0" or 4 and has people in "scene" as lists of named joints, "newtons"
+// (github.com/hit-wsw/hit-dex, README) or "characters" (the vendor's plugin for Unity, LiveFrame_v4). How
+// their joints are turned in T-pose is not public, so they are not read but told.
+//
 // All positions [m] and rotations are global, in Unity's axes (joints.hpp).
 #pragma once
 
@@ -45,6 +49,8 @@ class StudioName {
   RT_SAFE void set(std::string_view raw) noexcept;
   // Takes the bytes themselves.
   RT_SAFE void keep(std::string_view text) noexcept;
+  // Adds " 2" or so, to tell apart what has one name.
+  RT_SAFE void add_number(int number) noexcept;
   void clear() noexcept { size_ = 0; }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
   [[nodiscard]] std::string_view text() const noexcept { return {bytes_.data(), size_}; }
@@ -76,7 +82,8 @@ struct Subject {
 };
 
 struct StudioFrame {
-  double timestamp_s = 0.0;  // NaN when it was not sent
+  double timestamp_s = 0.0;   // NaN when it was not sent
+  bool named_joints = false;  // people of JSON v4 are in it
   std::size_t count = 0;
   std::array<Subject, kMaxSubjects> subjects;
 };

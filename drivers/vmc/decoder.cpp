@@ -20,6 +20,8 @@ constexpr std::string_view kNoBone = "LastBone";  // the end of Unity's list, wh
 // The tolerance of the squared length: some senders round the components, or are 1 % too long.
 constexpr double kLengthTolerance = 0.05;
 
+constexpr std::int64_t kKeeps_ns = kNanosPerSecond;  // as long as the describer keeps a bone
+
 struct Transform {
   std::string_view name;
   Vec3f position_m{};
@@ -138,7 +140,7 @@ RT_SAFE bool VmcDecoder::accept_bone(OscArguments& arguments) noexcept {
   if (!valid || bone == kBoneCount || received_[bone]) return false;
   received_.set(bone);
   set_.set(bone);
-  seen_[bone] = transform.seen;
+  keeps_until_ns_[bone] = transform.seen ? arrival_ns_ + kKeeps_ns : kNoTime_ns;
   position_m_[bone] = transform.position_m;
   rotation_xyzw_[bone] = transform.rotation_xyzw;
   return true;
@@ -203,7 +205,6 @@ RT_SAFE void VmcDecoder::end_frame(std::int64_t device_ns, Sink& sink) noexcept 
     note(Outcome::kOutOfRange);
   }
   set_.reset();
-  seen_.reset();
 }
 
 // False if the body would be out of the room.
@@ -217,7 +218,7 @@ RT_SAFE bool VmcDecoder::emit_frame(std::int64_t device_ns, Sink& sink) noexcept
   for (std::size_t j = 0; j < frame.joint_count; ++j) frame.rotation_xyzw[j] = kIdentity;
   for (std::size_t bone = 0; bone < kBoneCount; ++bone) {
     const int joint = layout_->joint_of[bone];
-    if (joint == VmcLayout::kNone || !seen_[bone]) continue;
+    if (joint == VmcLayout::kNone || arrival_ns_ >= keeps_until_ns_[bone]) continue;
     frame.rotation_xyzw[joint] = rotation_xyzw_[bone];
     frame.valid.set(joint);
   }

@@ -21,7 +21,10 @@ namespace posed::drivers::vmc {
 
 class VmcDecoder final : public LayoutDecoder<VmcLayout> {
  public:
-  VmcDecoder() noexcept { rotation_xyzw_.fill(kIdentity); }
+  VmcDecoder() noexcept {
+    rotation_xyzw_.fill(kIdentity);
+    keeps_until_ns_.fill(kNoTime_ns);
+  }
 
   // Takes one datagram per call.
   RT_SAFE void feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
@@ -70,8 +73,9 @@ class VmcDecoder final : public LayoutDecoder<VmcLayout> {
   bool ended_ = false;                // a frame did in it
   std::bitset<kBoneCount> received_;  // bones of it
   std::bitset<kBoneCount> set_;       // bones of the frame so far
-  std::bitset<kBoneCount> seen_;      // those of them that have a rotation
   bool applied_ = false;              // /VMC/Ext/Blend/Apply came since the last sample
+  // Of a sender that leaves out bones which did not turn: until then a bone keeps its rotation.
+  std::array<std::int64_t, kBoneCount> keeps_until_ns_{};
   // The last values received, in posed's axes.
   std::array<Vec3f, kBoneCount> position_m_{};     // [bone], relative to the parent
   std::array<Quatf, kBoneCount> rotation_xyzw_{};  // [bone], relative to the parent

@@ -366,8 +366,10 @@ std::string without_body(const v1::SourceStats& source) {
   const std::uint64_t damaged =
       count(Outcome::kShort) + count(Outcome::kBadChecksum) + count(Outcome::kOutOfRange);
   if (valid + foreign + damaged == 0) return text + ": nothing came from the device yet";
-  return text + fmt::format(": {} packets were right, {} damaged, {} of another device or sender",
-                            valid, damaged, foreign);
+  return text + fmt::format(
+                    ": {} packets were right, {} damaged, {} of another sender or no known "
+                    "body",
+                    valid, damaged, foreign);
 }
 
 // A line below the streams' rows about a device with several bodies; empty if there is nothing to

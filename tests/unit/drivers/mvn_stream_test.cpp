@@ -392,7 +392,14 @@ TEST_CASE("mvn: a frame carries the time code of its sample or of the one before
                                  std::as_bytes(std::span(text))));
   };
   CHECK(timecode_of_frame(11).empty());
-  notify(12, "01:02:03.004");
+  // A size and the text, as the vendor's SDK reads it (hrii-iit/xsens_mvn_ros,
+  // timecodedatagram.cpp).
+  const std::string_view sized(
+      "\0\0\0\x0C"
+      "01:02:03.004",
+      16);
+  CHECK(std::ranges::equal(encode_timecode(sized.substr(4)), std::as_bytes(std::span(sized))));
+  notify(12, sized);
   CHECK(timecode_of_frame(12) == "01:02:03.004");
   CHECK(timecode_of_frame(13) == "01:02:03.004");  // its own comes behind it
   CHECK(timecode_of_frame(14).empty());            // MVN has stopped sending it
@@ -401,6 +408,10 @@ TEST_CASE("mvn: a frame carries the time code of its sample or of the one before
   notify(16, "no time code");
   CHECK(timecode_of_frame(16).empty());
   CHECK(session.damaged() == 0);
+  notify(17, std::string_view("\0\0\0\x0D"
+                              "01:02:03.004",
+                              16));
+  CHECK(session.sink.count(Outcome::kShort) == 1);
 }
 
 TEST_CASE("mvn: more characters than there is room for are counted") {

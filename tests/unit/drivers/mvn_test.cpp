@@ -322,6 +322,15 @@ TEST_CASE("mvn: segments are found by their place, behind props and with gloves"
   }
 }
 
+TEST_CASE("mvn: segments that come in another order are no pose") {
+  test::MvnBytes items = encode_pose(Type::kQuaternion, test::mvn_pose(false));
+  const Head head = test::mvn_head(Type::kQuaternion, 1, false);
+  CharacterPose pose;
+  REQUIRE(decode_pose(head, items, pose) == Outcome::kOk);
+  std::swap_ranges(items.begin(), items.begin() + 32, items.begin() + 22 * 32);
+  CHECK(decode_pose(head, items, pose) == Outcome::kOutOfRange);
+}
+
 TEST_CASE("mvn: datagrams from before MVN 2019 are told by their items and their length") {
   WalkerSession session;
   MvnBytes old = test::mvn_datagram(Type::kQuaternion, 2);

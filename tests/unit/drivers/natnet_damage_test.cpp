@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "drivers/byte_writer.hpp"
 #include "drivers/natnet/figure.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/unit/drivers/natnet_rig.hpp"
@@ -16,6 +17,7 @@ namespace {
 
 using natnet::BodyDef;
 using natnet::FramePacket;
+using natnet::MessageId;
 using natnet::ModelDef;
 using natnet::Reading;
 using natnet::Version;
@@ -54,6 +56,12 @@ struct SmallRig : NatNetRig {
     REQUIRE(feed(natnet::encode_model_def(small_model(), version)) == Outcome::kOk);
   }
 };
+
+NatNetBytes number_120() {
+  ByteWriter writer;
+  writer.f32(120.0F);
+  return writer.finish();
+}
 
 NatNetBytes cut_with_right_length(const NatNetBytes& datagram, std::size_t size) {
   NatNetBytes cut(datagram.begin(), datagram.begin() + static_cast<std::ptrdiff_t>(size));
@@ -185,6 +193,37 @@ TEST_CASE("a NatNet server that is replaced by one of another version is underst
   CHECK(lost == 7);
 }
 
+TEST_CASE("a NatNet server is asked again when its frames no longer fit") {
+  SmallRig rig({3, 1});
+  std::int64_t now_ns = 0;
+  const auto asked = [&] {
+    now_ns += kNanosPerSecond;
+    const Request request = rig.decoder->next_request(now_ns);
+    natnet::Message message;
+    return natnet::decode_message(request.bytes, message) == Outcome::kOk ? message.id
+                                                                          : MessageId::kFrame;
+  };
+  CHECK(asked() == MessageId::kRequest);
+  REQUIRE(rig.feed(natnet::encode_message(MessageId::kResponse, number_120()), now_ns) ==
+          Outcome::kOk);
+  CHECK(asked() == MessageId::kFrame);  // nothing
+  FramePacket packet = small_frame(1);
+  packet.skeletons[0].bones.push_back({.id = 0x10003, .rotation_xyzw = kIdentity});
+  CHECK(rig.feed(natnet::encode_frame(packet, {.version = {3, 1}}), now_ns) ==
+        Outcome::kOutOfRange);
+  CHECK(asked() == MessageId::kRequestModelDef);
+  REQUIRE(rig.feed(natnet::encode_model_def(small_model(), {3, 1}), now_ns) == Outcome::kOk);
+  for (std::uint32_t number = 2; number < 10; ++number) {
+    CHECK(asked() == MessageId::kFrame);
+    CHECK(rig.feed(natnet::encode_frame(small_frame(number), {.version = {4, 1}}), now_ns) ==
+          Outcome::kOutOfRange);
+  }
+  CHECK(asked() == MessageId::kConnect);
+  REQUIRE(rig.feed(natnet::encode_server_info({.version = {4, 1}}), now_ns) == Outcome::kOk);
+  CHECK(rig.feed(natnet::encode_frame(small_frame(10), {.version = {4, 1}}), now_ns) ==
+        Outcome::kOk);
+}
+
 TEST_CASE("messages of NatNet that are not for posed, and frames before the bodies are known") {
   NatNetRig rig;
   CHECK(rig.feed(natnet::encode_frame(small_frame(1), {.version = {3, 0}})) == Outcome::kForeign);
@@ -262,6 +301,27 @@ TEST_CASE("descriptions of NatNet are read in any version, told or not") {
       CHECK((*layout)->bodies.size() == 2);
       CHECK((*layout)->bodies[1].samples.names.size() == 12);
     }
+  }
+  // A force plate before the bodies, as github.com/FerroO2000/natnet-go (force_plate.go) reads it;
+  // from 4.1 on, its size stands before it.
+  for (const Version version : {Version{3, 0}, Version{4, 0}, Version{4, 1}}) {
+    ByteWriter plate;
+    plate.i32(1);
+    plate.text(std::string_view("AMTI\0", 5));
+    for (int word = 0; word < 2 + 3 + 144 + 12; ++word) plate.f32(0.4F);
+    for (const std::int32_t type_data_channels : {0, 0, 1}) plate.i32(type_data_channels);
+    plate.text(std::string_view("Fx\0", 3));
+    ByteWriter entry;
+    entry.i32(3);
+    if (version >= Version{4, 1}) entry.i32(static_cast<std::int32_t>(plate.size()));
+    entry.bytes(plate.written());
+    NatNetBytes whole = natnet::encode_description(small_model(), version, {.version = version});
+    const auto count = whole.begin() + natnet::kDescriptionHeadBytes;
+    *count = static_cast<std::byte>(std::to_integer<int>(*count) + 1);
+    whole.insert(count + 4, entry.written().begin(), entry.written().end());
+    const auto layout = find_driver("natnet")->make_layout(whole);
+    REQUIRE(layout);
+    CHECK((*layout)->bodies.size() == 2);
   }
   // Names without text, and ones that are not UTF-8.
   ModelDef model = small_model();

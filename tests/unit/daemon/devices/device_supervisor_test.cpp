@@ -138,4 +138,33 @@ TEST_CASE("a supervised glove is read each time it is plugged in, and calibrated
   CHECK(kept.counters.reader.dropped.load() == 0);
 }
 
+TEST_CASE("a link that gives nothing is told once, by what most of its packets were") {
+  pipeline::SourceCounters counters;
+  UseWatch watch;
+  std::int64_t now_ns = 0;
+  const auto after_3_s = [&](Outcome outcome, int packets, bool use = false, bool asks = false) {
+    counters.outcome[static_cast<std::size_t>(outcome)] += packets;
+    if (use) counters.used_ns = now_ns + 1;
+    now_ns += 3 * kNanosPerSecond;
+    return watch.look(counters, asks, now_ns);
+  };
+  const auto has = [](const std::string& text, const char* word) {
+    return text.find(word) != std::string::npos;
+  };
+  CHECK(after_3_s(Outcome::kOk, 0).empty());  // silence is no fault
+  CHECK(has(after_3_s(Outcome::kOk, 0, false, true), "nothing has answered"));
+  CHECK(after_3_s(Outcome::kOk, 0, false, true).empty());
+  CHECK(has(after_3_s(Outcome::kForeign, 9), "another program's"));
+  CHECK(after_3_s(Outcome::kForeign, 9).empty());
+  CHECK(has(after_3_s(Outcome::kOk, 9), "none has given a stream a pose"));
+  // Others give poses, but one person's are refused.
+  CHECK(has(after_3_s(Outcome::kOutOfRange, 360, true), "no rotation"));
+  watch.restart(counters, now_ns);
+  CHECK(after_3_s(Outcome::kOk, 300, true).empty());
+  CHECK(after_3_s(Outcome::kDuplicate, 300).empty());  // paused
+  counters.outcome[static_cast<std::size_t>(Outcome::kOk)] += 200;
+  CHECK(after_3_s(Outcome::kShort, 200, true).empty());
+  CHECK(has(after_3_s(Outcome::kShort, 200, true), "another version"));
+}
+
 }  // namespace posed::devices

@@ -11,6 +11,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "drivers/axis/decoder.hpp"
 #include "models/motion/canonical_skeleton.hpp"
 #include "models/motion/retarget.hpp"
 #include "models/motion/synthetic_walker.hpp"
@@ -341,6 +342,24 @@ TEST_CASE("there are at most 16 clients; one that goes makes room") {
   rig.step(0);
   CHECK(rig.stats().sent() == 16);
   CHECK(next.receive(6) == "0 ann ");
+}
+
+TEST_CASE("an avatar of Axis Neuron keeps its name, unless a blank would end it") {
+  for (const auto& [own, sent] : {std::pair("Walker", "Walker"), std::pair("Ann Li", "ann")}) {
+    BvhRig rig(bvh_config());
+    drivers::axis::AvatarEntry entry;
+    entry.avatar = drivers::axis::make_avatar(3, own);
+    const auto avatar = drivers::axis::skeleton_of(entry, 0).value();
+    rig.output->stream_comes(info_of(0, "ann", avatar));
+    const test::RawPeer peer = rig.connect();
+    Frame frame;
+    frame.joint_count = static_cast<std::uint16_t>(avatar->joints.size());
+    for (std::size_t j = 0; j < frame.joint_count; ++j) frame.rotation_xyzw[j] = kIdentity;
+    frame.valid.set();
+    rig.now_ns += kBvhFrame_ns;
+    rig.pass(frame_of(0, frame), rig.now_ns);
+    CHECK(next_lines(peer).starts_with("0 " + std::string(sent) + " "));
+  }
 }
 
 TEST_CASE("only peers that the config names get lines") {
