@@ -4,7 +4,9 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <queue>
+#include <set>
 #include <utility>
 
 #include <Eigen/LU>
@@ -15,7 +17,8 @@ namespace {
 constexpr double kFine_m = 2e-4;   // what a hull may stick out to have fewer corners
 constexpr double kRound_m = 7e-4;  // by which corners are rounded off
 constexpr int kMaxSteps = 40;
-constexpr double kExact = 1e-8;  // of the distance
+constexpr std::size_t kMany = 10000;  // corners
+constexpr double kExact = 1e-8;       // of the distance
 
 // A corner of the set of all differences of the two hulls' points, from b's to a's.
 struct Corner {
@@ -148,24 +151,55 @@ Nearest hull_gap(const PlacedHull& a, const PlacedHull& b, const Eigen::Vector3d
   return found;
 }
 
+namespace {
+
+// How far a corner is from the hull of a hull's corners.
+double outside_m(const Eigen::Vector3d& corner, const Hull& hull) {
+  const Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d at_m = Eigen::Vector3d::Zero();
+  const Hull one{.corners = {corner}};
+  return hull_gap({one, turn, at_m}, {hull, turn, at_m}, Eigen::Vector3d::UnitX(),
+                  std::numeric_limits<double>::infinity())
+             .gap_m +
+         hull.radius_m;
+}
+
+// Those that are farthest in some of all directions, which a Fibonacci sphere spreads.
+std::vector<Eigen::Vector3d> outermost(std::span<const Eigen::Vector3d> corners) {
+  constexpr int kDirections = 500;
+  std::set<std::size_t> all;
+  for (int k = 0; k < kDirections; ++k) {
+    const double z = 1.0 - (2.0 * k + 1.0) / kDirections;
+    const double across = std::sqrt(1.0 - z * z);
+    const double angle = k * std::numbers::pi * (3.0 - std::sqrt(5.0));
+    const Eigen::Vector3d along(across * std::cos(angle), across * std::sin(angle), z);
+    std::size_t best = 0;
+    double most = corners[0].dot(along);
+    for (std::size_t c = 1; c < corners.size(); ++c) {
+      const double far = corners[c].dot(along);
+      if (far <= most) continue;
+      most = far;
+      best = c;
+    }
+    all.insert(best);
+  }
+  std::vector<Eigen::Vector3d> outer;
+  for (const std::size_t c : all) outer.push_back(corners[c]);
+  return outer;
+}
+
 // The corner that is farthest from the hull of those before joins them. What is known of the others
 // is an upper bound: a hull that grows comes nearer.
-Hull hull_of(std::span<const Eigen::Vector3d> corners) {
+Hull hull_of_few(std::span<const Eigen::Vector3d> corners) {
   Hull hull{.corners = {corners[0]}};
   std::priority_queue<std::pair<double, std::size_t>> farthest_first;
   for (std::size_t k = 1; k < corners.size(); ++k) {
     farthest_first.emplace(std::numeric_limits<double>::infinity(), k);
   }
-  const Eigen::Matrix3d turn = Eigen::Matrix3d::Identity();
-  const Eigen::Vector3d at_m = Eigen::Vector3d::Zero();
   while (!farthest_first.empty()) {
     const std::size_t k = farthest_first.top().second;
     farthest_first.pop();
-    const Hull corner{.corners = {corners[k]}};
-    const double away_m =
-        hull_gap({corner, turn, at_m}, {hull, turn, at_m}, Eigen::Vector3d::UnitX(),
-                 std::numeric_limits<double>::infinity())
-            .gap_m;
+    const double away_m = outside_m(corners[k], hull);
     if (!farthest_first.empty() && away_m < farthest_first.top().first) {
       farthest_first.emplace(away_m, k);
       continue;
@@ -175,6 +209,18 @@ Hull hull_of(std::span<const Eigen::Vector3d> corners) {
       break;
     }
     hull.corners.push_back(corners[k]);
+  }
+  return hull;
+}
+
+}  // namespace
+
+// Of many corners each is looked at once a direction, and once more for the radius.
+Hull hull_of(std::span<const Eigen::Vector3d> corners) {
+  if (corners.size() <= kMany) return hull_of_few(corners);
+  Hull hull = hull_of_few(outermost(corners));
+  for (const auto& corner : corners) {
+    hull.radius_m = std::max(hull.radius_m, outside_m(corner, hull));
   }
   return hull;
 }

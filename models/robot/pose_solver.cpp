@@ -47,7 +47,7 @@ double PoseSolver::add_points(const HandTarget& target, bool slopes) noexcept {
   double sum = 0.0;
   for (std::size_t f = 0; f < robot_.fingers.size(); ++f) {
     const Finger& finger = robot_.fingers[f];
-    const Eigen::Vector3d& tip_m = placed_.at_m[finger.tip];
+    const Eigen::Vector3d tip_m = tip_of(finger, placed_);
     const Eigen::Vector3d off = tip_m - target.tip_m[f];
     const double far = off.norm();
     const double weight = target.tip_weight[f] * std::min(1.0, kFar_m / std::max(far, 1e-9));
@@ -63,12 +63,13 @@ double PoseSolver::add_points(const HandTarget& target, bool slopes) noexcept {
     if (f == 0 || target.pinch[f] <= 0.0) continue;
     const Finger& thumb = robot_.fingers[0];
     const double apart_m = target.gap_m[f] + thumb.tip_radius_m + finger.tip_radius_m;
-    const Eigen::Vector3d error = placed_.at_m[thumb.tip] - tip_m - apart_m * target.direction[f];
+    const Eigen::Vector3d thumb_m = tip_of(thumb, placed_);
+    const Eigen::Vector3d error = thumb_m - tip_m - apart_m * target.direction[f];
     for (int k = 0; k < 3; ++k) {
       Drive slope = Drive::Zero();
       const Eigen::Vector3d axis = Eigen::Vector3d::Unit(k);
       if (slopes) {
-        add_slope(robot_, placed_, thumb.tip, placed_.at_m[thumb.tip], axis, slope);
+        add_slope(robot_, placed_, thumb.tip, thumb_m, axis, slope);
         add_slope(robot_, placed_, finger.tip, tip_m, -axis, slope);
       }
       sum += add_residual(slope, error[k], kPinchPoint * target.pinch[f], slopes);

@@ -1,6 +1,8 @@
 #include "models/robot/robot_hand.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -18,6 +20,8 @@ constexpr std::size_t kMaxShapes = 256;  // each becomes up to four capsules, wh
 constexpr double kMaxNamed_rad = 100.0;  // that a text may name
 constexpr double kSameWay = 0.97;        // cosine: fingers side by side point so
 constexpr double kMaxFinger_m = 0.3;
+constexpr double kSamePlace_m = 1e-3;
+constexpr double kBends_m = 1e-3;       // tips that go less to one side of the palm bend to both
 constexpr double kGuessedTip_m = 8e-3;  // radius of a finger tip without a shape
 
 // Rounded into the range, so that no angle of a frame is beyond a limit by its rounding.
@@ -27,6 +31,11 @@ double low_float(double value) {
   return static_cast<double>(f);
 }
 double high_float(double value) { return -low_float(-value); }
+
+std::string lower(std::string text) {
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
 
 std::vector<std::string> split(std::string_view text) {
   std::vector<std::string> words;
@@ -46,13 +55,14 @@ class Builder {
   Builder(Urdf urdf, const RobotOptions& options, const std::string& file)
       : options_(options), file_(file) {
     hand_.name = urdf.name;
+    hand_.by_visuals = urdf.by_visuals;
     hand_.links = std::move(urdf.links);
   }
 
   Result<RobotHand> build() {
     TRY(list_joints());
     TRY(list_fingers());
-    hold_shared();
+    TRY(hold_shared());
     TRY(hold_named());
     TRY(connect());
     TRY(derive_frame());
@@ -97,10 +107,6 @@ class Builder {
       if (!link.turns) continue;
       const bool given = options_.speed > 0.0;
       const double speed = given ? options_.speed : std::min(link.speed, kDefaultSpeed_rad_s);
-      if (!(speed > 0.0)) {
-        return refuse("joint " + in_quotes(link.joint) +
-                      " has no velocity limit; set speed in [stream.robot]");
-      }
       hand_.joint_of_link[l] = static_cast<int>(hand_.joints.size());
       hand_.joints.push_back({.link = l,
                               .name = link.joint,
@@ -129,25 +135,14 @@ class Builder {
     }
     place_open();
     for (const int last : lasts) {
-      Finger finger{.last = last, .tip = last};
-      double far_m = -1.0;
-      for (int l = last; l < std::ssize(hand_.links); ++l) {
-        if (!is_above(last, l)) continue;
-        const double away_m = (placed_.at_m[l] - placed_.at_m[last]).norm();
-        if (away_m > far_m) {
-          far_m = away_m;
-          finger.tip = l;
-        }
-      }
-      hand_.fingers.push_back(finger);
+      hand_.fingers.push_back({.last = last, .tip = tip_link(last)});
     }
     TRY(choose_tips());
-    if (hand_.fingers.size() < 3 || hand_.fingers.size() > 5) {
-      return refuse("the robot has " + std::to_string(hand_.fingers.size()) +
-                    " fingers; a hand has a thumb and two to four fingers, and `tips` can name "
-                    "their last links, thumb first");
+    if (hand_.fingers.size() < 3 || hand_.fingers.size() > 5) return refuse(number_of_fingers());
+    for (Finger& finger : hand_.fingers) {
+      finger.base = base_of(finger);
+      find_end(finger);
     }
-    for (Finger& finger : hand_.fingers) finger.base = base_of(finger);
     for (const Finger& finger : hand_.fingers) {
       if (finger.base == 0) return refuse("one finger of the robot has no joint of its own");
     }
@@ -156,6 +151,75 @@ class Builder {
       hand_.fingers[f].human = static_cast<int>(f);
     }
     return {};
+  }
+
+  [[nodiscard]] std::string number_of_fingers() const {
+    constexpr std::size_t kShown = 12;
+    std::string ends;
+    for (std::size_t f = 0; f < std::min(hand_.fingers.size(), kShown); ++f) {
+      ends += (f == 0 ? "" : ", ") + hand_.links[hand_.fingers[f].tip].name;
+    }
+    if (hand_.fingers.size() > kShown) ends += ", ...";
+    return "the robot has " + std::to_string(hand_.fingers.size()) +
+           " chains of joints, which end in " + ends +
+           "; a hand has a thumb and two to four fingers: of a larger robot let `tips` name the "
+           "last links of one hand, thumb first";
+  }
+
+  // The link at a finger's end: of those fixed to its last one the farthest that is named so, else
+  // the farthest.
+  [[nodiscard]] int tip_link(int last) const {
+    int tip = last;
+    bool tip_named = false;
+    double far_m = 0.0;
+    for (int l = last + 1; l < std::ssize(hand_.links); ++l) {
+      if (!is_above(last, l)) continue;
+      const double away_m = (placed_.at_m[l] - placed_.at_m[last]).norm();
+      const bool named = away_m > kSamePlace_m && lower(hand_.links[l].name).contains("tip");
+      if (named < tip_named || (named == tip_named && away_m <= far_m)) continue;
+      tip = l;
+      tip_named = named;
+      far_m = away_m;
+    }
+    return tip;
+  }
+
+  // Where no link is at the finger's end, its shapes end there, in their own direction across the
+  // joint: the middle of what is round there. A link that is not named tip is at the end only
+  // beyond the half of the shapes.
+  void find_end(Finger& finger) const {
+    const Eigen::Vector3d& from_m = placed_.at_m[finger.last];
+    const double tip_far_m = (placed_.at_m[finger.tip] - from_m).norm();
+    finger.tip_known = tip_far_m > kSamePlace_m;
+    if (finger.tip_known && lower(hand_.links[finger.tip].name).contains("tip")) return;
+    std::vector<std::pair<Eigen::Vector3d, double>> corners;
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+    for (int l = finger.last; l < std::ssize(hand_.links); ++l) {
+      if (!is_above(finger.last, l)) continue;
+      for (const Shape& shape : hand_.links[l].shapes) {
+        const Hull hull = hull_of_shape(shape);
+        for (const auto& corner : hull.corners) {
+          corners.emplace_back(placed_.at_m[l] + placed_.turn[l] * corner - from_m, hull.radius_m);
+          middle += corners.back().first;
+        }
+      }
+    }
+    if (corners.empty()) return;
+    middle /= static_cast<double>(corners.size());
+    const Eigen::Vector3d& axis = placed_.axis[finger.last];
+    const Eigen::Vector3d aside = middle.dot(axis) * axis;
+    const Eigen::Vector3d along = (middle - aside).normalized();
+    double end_m = 0.0, radius_m = 0.0;
+    for (const auto& [corner, round_m] : corners) {
+      const Eigen::Vector3d off = corner - aside;
+      end_m = std::max(end_m, off.dot(along) + round_m);
+      radius_m = std::max(radius_m, (off - off.dot(along) * along).norm() + round_m);
+    }
+    if (!(end_m > kSamePlace_m) || (finger.tip_known && tip_far_m > 0.5 * end_m)) return;
+    finger.tip = finger.last;
+    finger.tip_m = placed_.turn[finger.last].transpose() *
+                   (aside + (end_m - std::min(radius_m, 0.5 * end_m)) * along);
+    finger.tip_known = true;
   }
 
   Result<> choose_tips() {
@@ -194,21 +258,37 @@ class Builder {
   }
 
   [[nodiscard]] Eigen::Vector3d direction(const Finger& finger) const {
-    return (placed_.at_m[finger.tip] - placed_.at_m[finger.base]).normalized();
+    return (tip_of(finger, placed_) - placed_.at_m[finger.base]).normalized();
+  }
+
+  // The names of a finger's links and joints.
+  [[nodiscard]] std::string names_of(const Finger& finger) const {
+    std::string names;
+    for (int l = finger.tip; l > 0 && is_above(finger.base, l); l = hand_.links[l].parent) {
+      names += lower(" " + hand_.links[l].name + " " + hand_.links[l].joint);
+    }
+    return names;
   }
 
   [[nodiscard]] bool is_named_thumb(const Finger& finger) const {
-    for (int l = finger.tip; l > 0 && is_above(finger.base, l); l = hand_.links[l].parent) {
-      std::string names = hand_.links[l].name + " " + hand_.links[l].joint;
-      std::ranges::transform(names, names.begin(), [](unsigned char c) { return std::tolower(c); });
-      // "THJ1" is Shadow's; not all that begins so is a thumb: "third".
-      if (names.find("thumb") != names.npos || names.find(" thj") != names.npos) return true;
-    }
-    return false;
+    const std::string names = names_of(finger);
+    // "THJ1" is Shadow's; not all that begins so is a thumb: "third".
+    return std::ranges::any_of(std::array{"thumb", " thj", "_thj"},
+                               [&](const char* word) { return names.contains(word); });
+  }
+
+  // From the thumb on; 0: unknown. "Middle" is a bone in some hands.
+  [[nodiscard]] int named_place(const Finger& finger) const {
+    constexpr std::array<std::pair<const char*, int>, 5> kWords{
+        {{"index", 1}, {"fore", 1}, {"little", 4}, {"pinky", 4}, {"ring", 3}}};
+    const std::string names = names_of(finger);
+    const auto word =
+        std::ranges::find_if(kWords, [&](const auto& one) { return names.contains(one.first); });
+    return word == kWords.end() ? 0 : word->second;
   }
 
   // The thumb has the name, or else points away from the others. They are in a row whose end near
-  // the thumb is the index finger.
+  // the thumb is the index finger, unless their names say otherwise.
   Result<> order_fingers() {
     std::vector<Finger>& fingers = hand_.fingers;
     auto thumb = std::ranges::find_if(fingers, [&](const Finger& f) { return is_named_thumb(f); });
@@ -226,7 +306,8 @@ class Builder {
       }
     }
     std::iter_swap(thumb, fingers.begin());
-    const Eigen::Vector3d thumb_m = placed_.at_m[fingers[0].base];
+    const Eigen::Vector3d thumb_m =
+        0.5 * (placed_.at_m[fingers[0].base] + tip_of(fingers[0], placed_));
     std::sort(fingers.begin() + 1, fingers.end(), [&](const Finger& a, const Finger& b) {
       return (placed_.at_m[a.base] - thumb_m).norm() < (placed_.at_m[b.base] - thumb_m).norm();
     });
@@ -235,20 +316,38 @@ class Builder {
     std::sort(fingers.begin() + 1, fingers.end(), [&](const Finger& a, const Finger& b) {
       return placed_.at_m[a.base].dot(row) < placed_.at_m[b.base].dot(row);
     });
+    int turned = 0;
+    for (std::size_t a = 1; a < fingers.size(); ++a) {
+      for (std::size_t b = a + 1; b < fingers.size(); ++b) {
+        const int one = named_place(fingers[a]), two = named_place(fingers[b]);
+        if (one != 0 && two != 0) turned += one > two ? 1 : one < two ? -1 : 0;
+      }
+    }
+    if (turned > 0) std::reverse(fingers.begin() + 1, fingers.end());
     return {};
   }
 
   // A joint that moves all fingers is a wrist's, and one that moves none is none of the hand's.
-  void hold_shared() {
+  Result<> hold_shared() {
+    const auto moved_by = [&](int link) {
+      return std::ranges::count_if(
+          hand_.fingers, [&](const Finger& finger) { return is_above(link, finger.tip); });
+    };
+    for (int l = 1; l < std::ssize(hand_.links); ++l) {
+      const auto moved = moved_by(l);
+      if (!hand_.links[l].slides || moved == 0 || moved == std::ssize(hand_.fingers)) continue;
+      return refuse("joint " + in_quotes(hand_.links[l].joint) +
+                    " slides in a finger; posed drives joints that turn: make it fixed, or let "
+                    "`tips` name other fingers");
+    }
     held_.assign(hand_.joints.size(), std::numeric_limits<double>::quiet_NaN());
     for (std::size_t j = 0; j < hand_.joints.size(); ++j) {
-      const auto moved = std::ranges::count_if(hand_.fingers, [&](const Finger& finger) {
-        return is_above(hand_.joints[j].link, finger.tip);
-      });
+      const auto moved = moved_by(hand_.joints[j].link);
       if (moved == 0 || moved == std::ssize(hand_.fingers)) {
         held_[j] = std::clamp(0.0, hand_.joints[j].low, hand_.joints[j].high);
       }
     }
+    return {};
   }
 
   Result<std::map<int, double>> angles(const std::string& text, const std::string& what) const {
@@ -301,8 +400,10 @@ class Builder {
     }
     if (hand_.driven.size() > static_cast<std::size_t>(kMaxDriven)) {
       return refuse("the robot has " + std::to_string(hand_.driven.size()) +
-                    " joints to drive; posed drives at most 24: let others stand by `hold`");
+                    " joints to drive; posed drives at most 24: let `tips` name the last links of "
+                    "one hand, thumb first, or others stand by `hold`");
     }
+    TRY(check_speeds());
     for (RobotJoint& joint : hand_.joints) {
       const Link& link = hand_.links[joint.link];
       if (link.leader < 0) continue;
@@ -323,6 +424,16 @@ class Builder {
           std::clamp(start == starts_.end() ? 0.0 : start->second, driven.low, driven.high);
     }
     fill_turns();
+    return {};
+  }
+
+  Result<> check_speeds() const {
+    for (std::size_t j = 0; options_.needs_speeds && j < hand_.joints.size(); ++j) {
+      const RobotJoint& joint = hand_.joints[j];
+      if (joint.speed > 0.0 || std::isfinite(held_[j])) continue;
+      return refuse("joint " + in_quotes(joint.name) +
+                    " has no velocity limit; set speed in [stream.robot]");
+    }
     return {};
   }
 
@@ -392,7 +503,7 @@ class Builder {
     place(hand_, open_pose(), placed_);
     Eigen::Vector3d z = Eigen::Vector3d::Zero();
     for (std::size_t f = 1; f < hand_.fingers.size(); ++f) z += direction(hand_.fingers[f]);
-    Eigen::Vector3d y = placed_.at_m[hand_.fingers[1].tip] - placed_.at_m[hand_.fingers.back().tip];
+    Eigen::Vector3d y = tip_of(hand_.fingers[1], placed_) - tip_of(hand_.fingers.back(), placed_);
     z.normalize();
     y -= y.dot(z) * z;
     if (!(y.norm() > 1e-3) || !z.allFinite()) {
@@ -421,7 +532,10 @@ class Builder {
       }
     }
     const Eigen::Vector3d out = y.cross(z);  // of a right hand's palm
-    const double bends = bend_along(out);
+    double bends = bend_along(out);
+    if (std::abs(bends) < kBends_m) {  // both ways as far: where the thumb is
+      bends = (tip_of(hand_.fingers[0], placed_) - hand_.fingers[1].knuckle_m).dot(out);
+    }
     hand_.side = bends >= 0.0 ? Side::kRight : Side::kLeft;
     if (options_.side && *options_.side != hand_.side) {
       const bool left = hand_.side == Side::kLeft;
@@ -440,7 +554,7 @@ class Builder {
     Drive drive = open_pose();
     const auto length_m = [&] {
       place(hand_, drive, placed_);
-      return (placed_.at_m[finger.tip] - placed_.at_m[finger.knuckle]).norm();
+      return (tip_of(finger, placed_) - placed_.at_m[finger.knuckle]).norm();
     };
     double longest_m = length_m();
     for (int round = 0; round < kRounds; ++round) {
@@ -469,7 +583,7 @@ class Builder {
     for (std::size_t f = 1; f < hand_.fingers.size(); ++f) {
       const Finger& finger = hand_.fingers[f];
       Drive slope = Drive::Zero();
-      add_slope(hand_, placed_, finger.tip, placed_.at_m[finger.tip], out, slope);
+      add_slope(hand_, placed_, finger.tip, tip_of(finger, placed_), out, slope);
       for (int i = 0; i < hand_.size(); ++i) {
         const DrivenJoint& driven = hand_.driven[i];
         sum += slope[i] * (driven.high + driven.low - 2.0 * open[i]);

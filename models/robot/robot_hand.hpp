@@ -29,6 +29,7 @@ struct RobotOptions {
   double speed = 0.0;           // rad/s; 0: 8, or what the URDF says where that is less
   double acceleration = 120.0;  // rad/s^2
   std::optional<Side> side{};   // of the hand that drives it; empty: as the URDF bends
+  bool needs_speeds = true;     // false: to be looked at only
 };
 
 // A joint that turns, in the order of Frame::angle_rad.
@@ -36,7 +37,7 @@ struct RobotJoint {
   int link = 0;  // that it carries
   std::string name;
   double low = 0.0, high = 0.0;  // rad, both are floats
-  double speed = 0.0;            // rad/s
+  double speed = 0.0;            // rad/s; 0: unknown, and it was not needed
   bool speed_given = false;      // by the config, else by the URDF or the default
   int driven = -1;  // angle = multiplier * drive[driven] + offset; -1: stands at offset
   double multiplier = 1.0, offset = 0.0;
@@ -51,12 +52,14 @@ struct DrivenJoint {
 };
 
 struct Finger {
-  int human = 0;          // which finger drives it: 0 is the thumb
-  int base = 0;           // link of its first joint
-  int knuckle = 0;        // link of the joint from which its length is measured
-  int last = 0;           // link of its last joint
-  int tip = 0;            // link at its end
-  double length_m = 0.0;  // along the chain
+  int human = 0;    // which finger drives it: 0 is the thumb
+  int base = 0;     // link of its first joint
+  int knuckle = 0;  // link of the joint from which its length is measured
+  int last = 0;     // link of its last joint
+  int tip = 0;      // link at its end
+  Eigen::Vector3d tip_m = Eigen::Vector3d::Zero();  // in that one's frame
+  bool tip_known = false;  // else it has neither a link nor a shape beyond its last joint
+  double length_m = 0.0;   // along the chain
   double tip_radius_m = 0.0;
   bool tip_shaped = false;                              // else the radius is a guess
   Eigen::Vector3d knuckle_m = Eigen::Vector3d::Zero();  // in the root's frame, when open
@@ -108,6 +111,7 @@ struct Turn {  // of a link by a driven joint above it
 
 struct RobotHand {
   std::string name;
+  bool by_visuals = false;  // as Urdf says
   Side side = Side::kRight;
   std::vector<Link> links;
   std::vector<RobotJoint> joints;
@@ -184,6 +188,9 @@ struct Placed {
 };
 RT_SAFE [[nodiscard]] double angle_of(const RobotJoint& joint, const Drive& drive) noexcept;
 RT_SAFE void place(const RobotHand& hand, const Drive& drive, Placed& placed) noexcept;
+RT_SAFE inline Eigen::Vector3d tip_of(const Finger& finger, const Placed& placed) noexcept {
+  return placed.at_m[finger.tip] + placed.turn[finger.tip] * finger.tip_m;
+}
 // Adds to `slope` how much `point_m`, fixed to `link`, moves along `direction` [m/rad].
 RT_SAFE void add_slope(const RobotHand& hand, const Placed& placed, int link,
                        const Eigen::Vector3d& point_m, const Eigen::Vector3d& direction,

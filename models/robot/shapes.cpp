@@ -100,14 +100,6 @@ Hull hull_of_solid(const Shape& shape) {
   return hull;
 }
 
-// The shape itself holds less than its capsules do: they stick out of it.
-Hull hull_of_shape(const Shape& shape) {
-  Hull hull = shape.hull.corners.empty() ? hull_of_solid(shape) : shape.hull;
-  if (hull.radius_m < kThin_m) round_off(hull);
-  for (auto& corner : hull.corners) corner = shape.at * corner;
-  return hull;
-}
-
 // The ball around the middle of the latest capsules.
 Ball ball_of(const RobotHand& hand, int first) {
   Ball ball{.first = first, .count = static_cast<int>(hand.capsules.size()) - first};
@@ -490,6 +482,14 @@ void widen_cover(RobotHand& hand, int link) {
 }
 
 }  // namespace
+
+// The shape itself holds less than its capsules do: they stick out of it.
+Hull hull_of_shape(const Shape& shape) {
+  Hull hull = shape.hull.corners.empty() ? hull_of_solid(shape) : shape.hull;
+  if (hull.radius_m < kThin_m) round_off(hull);
+  for (auto& corner : hull.corners) corner = shape.at * corner;
+  return hull;
+}
 
 void add_shapes(RobotHand& hand) {
   for (int l = 0; l < std::ssize(hand.links); ++l) {

@@ -7,6 +7,9 @@
 
 namespace posed::robot {
 
+// In the frame of its link. Cold.
+Hull hull_of_shape(const Shape& shape);
+
 // Fills in capsules, hulls, covers, and which pairs of links can be kept apart. Where capsules
 // touch when the hand is open, or in most poses, the hulls of the shapes are taken; of those, the
 // pairs that touch, too, are left out. Cold.

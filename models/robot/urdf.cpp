@@ -152,7 +152,8 @@ class Reader {
       if (shape) {
         link.shapes.push_back(*shape);
       } else {
-        ++link.missing_shapes;
+        std::string why = collision.child("geometry").child("mesh").attribute("unused").value();
+        link.unused_meshes.push_back(clean(why.substr(0, 200)));
       }
       if (link.shapes.size() > 200) return refuse("link " + in_quotes(name) + " has 200 shapes");
     }
@@ -231,9 +232,13 @@ class Reader {
     link.at = TRY(origin(node, link.joint));
     const std::string_view type = node.attribute("type").value();
     if (type == "fixed") return joint;
+    if (type == "prismatic" || type == "planar" || type == "floating") {
+      link.slides = true;
+      return joint;
+    }
     if (type != "revolute" && type != "continuous") {
       return refuse("joint " + name + " is of type " + in_quotes(std::string(type)) +
-                    "; a hand's joints are revolute, continuous or fixed");
+                    ", which no URDF has; a joint that turns is revolute or continuous");
     }
     link.turns = true;
     const auto axis = numbers<3>(node.child("axis").attribute("xyz").as_string("1 0 0"), kMaxAxis);
@@ -343,7 +348,7 @@ Result<Urdf> build_tree(RawUrdf& raw, const Reader& reader) {
     Link& bare = raw.links.at(next.joint->child);
     link.name = bare.name;
     link.shapes = std::move(bare.shapes);
-    link.missing_shapes = bare.missing_shapes;
+    link.unused_meshes = std::move(bare.unused_meshes);
     link.parent = next.parent;
     urdf.links.push_back(std::move(link));
     push_children(next.joint->child, static_cast<int>(urdf.links.size()) - 1);
@@ -393,6 +398,9 @@ Result<> resolve_leaders(const RawUrdf& raw, Urdf& urdf, const Reader& reader) {
 
 Result<Urdf> parse_urdf(std::string_view text, const std::string& file) {
   if (text.size() > kMaxUrdfBytes) return fail("it is larger than 4 MB: it is no hand", file);
+  if (text.starts_with("version https://git-lfs")) {
+    return fail("it is a pointer of git-lfs: fetch the file by `git lfs pull`", file);
+  }
   const bool defines = text.find("<!DOCTYPE") != text.npos || text.find("<!ENTITY") != text.npos;
   if (defines && text.find("<robot") != text.npos) {
     return fail("it defines XML entities, which no URDF needs; remove its <!DOCTYPE>", file);
@@ -406,6 +414,8 @@ Result<Urdf> parse_urdf(std::string_view text, const std::string& file) {
   auto urdf = TRY(build_tree(raw, reader));
   TRY(resolve_leaders(raw, urdf, reader));
   urdf.name = clean(document.child("robot").attribute("name").as_string("robot"));
+  urdf.by_visuals =
+      std::string_view(document.child("robot").attribute("shapes").value()) == "visual";
   return urdf;
 }
 

@@ -32,6 +32,7 @@ struct Link {
   int parent = -1;                                       // an earlier link
   Eigen::Isometry3d at = Eigen::Isometry3d::Identity();  // in the parent's frame, at zero
   bool turns = false;
+  bool slides = false;   // or moves in another way: it stands at zero
   bool endless = false;  // a "continuous" joint: its limits are half a turn to each side
   Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  // unit length, in its own frame
   double low = 0.0, high = 0.0;
@@ -41,11 +42,12 @@ struct Link {
   int leader = -1;
   double multiplier = 1.0, offset = 0.0;
   std::vector<Shape> shapes;
-  int missing_shapes = 0;  // meshes that were not found beside the file
+  std::vector<std::string> unused_meshes;  // of each that has no shape: why
 };
 
 struct Urdf {
   std::string name;
+  bool by_visuals = false;  // it has no collision shapes: its visuals stand for them
   // A parent before its children, which are in the order of the file (depth first).
   std::vector<Link> links;
 };
@@ -54,8 +56,8 @@ struct Urdf {
 Result<Urdf> parse_urdf(std::string_view text, const std::string& file);
 
 // The text of a file without what kinematics do not need (visuals, inertia), and with its collision
-// meshes (.obj, found beside the file) replaced by capsules that hold all their corners, and by
-// <hull> beside them, so that the text says all.
+// meshes (.stl, .obj) replaced by capsules that hold all their corners, and by <hull> beside them,
+// so that the text says all. A mesh that is not used says why.
 Result<std::string> load_urdf(const std::string& path);
 
 // The rotation of a URDF's roll, pitch and yaw [rad]: about the fixed x, then y, then z.

@@ -41,7 +41,7 @@ constexpr double kUnsure = 0.5;
 constexpr double kRow_px = 320.0;
 
 struct InspectArguments {
-  std::string in;
+  std::string in, tips;
   std::filesystem::path write, out;
   clip::ReadOptions read;
   ClientOptions client;
@@ -318,7 +318,8 @@ Result<> inspect_robot(const InspectArguments& options) {
   }
   const auto text = TRY(robot::load_urdf(options.in));
   auto urdf = TRY(robot::parse_urdf(text, options.in));
-  const auto hand = TRY(robot::robot_hand(std::move(urdf), {}, options.in));
+  const auto hand = TRY(robot::robot_hand(
+      std::move(urdf), {.tips = options.tips, .needs_speeds = false}, options.in));
   Findings findings;
   const auto lines = robot_table(hand);
   findings.add("in", options.in).add("table", lines);
@@ -329,6 +330,7 @@ Result<> inspect_robot(const InspectArguments& options) {
 
 Result<> run_inspect(const InspectArguments& options) {
   if (options.in.ends_with(".urdf")) return inspect_robot(options);
+  if (!options.tips.empty()) return misuse("only a robot hand (.urdf) has --tips");
   const bool live = is_stream(options.in);
   TRY(OutputFiles(options.overwrite)
           .reads(live ? std::string() : options.in)
@@ -428,6 +430,9 @@ void add_inspect(CLI::App& app, int& exit_code) {
       ->type_name("MAP.toml");
   command->add_option("--out", options->out, "Draw T-pose and first frame")
       ->type_name("OUT.svg|png");
+  command->add_option("--tips", options->tips,
+                      "Of a robot of several hands: the last links of one, thumb first, as in "
+                      "[stream.robot]");
   add_figure_options(*command, options->read);
   add_client_options(*command, options->client, kOwnPublish);
   add_timeout_option(*command, options->timeout_s);

@@ -3,6 +3,9 @@
 #include <spdlog/fmt/fmt.h>
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
+#include <string>
 
 #include "proto/frame/degree.hpp"
 
@@ -33,6 +36,7 @@ std::string limits_of(const robot::RobotHand& hand, const robot::RobotJoint& joi
 
 std::string speed_of(const robot::RobotHand& hand, const robot::RobotJoint& joint) {
   const double urdf = hand.links[joint.link].speed;
+  if (!(joint.speed > 0.0)) return "no speed";
   const char* const from = joint.speed_given ? "config" : joint.speed == urdf ? "URDF" : "default";
   return fmt::format("{:.2f} rad/s ({})", joint.speed, from);
 }
@@ -57,31 +61,39 @@ std::vector<std::string> robot_table(const robot::RobotHand& hand) {
   }
   lines.emplace_back("fingers");
   for (const robot::Finger& finger : hand.fingers) {
+    const bool beyond = !finger.tip_m.isZero(0.0);
     lines.push_back(fmt::format(
-        "  {:<24} from joint {} to link {}, {:.0f} mm, tip of radius {:.0f} mm{}",
+        "  {:<24} from joint {} to {}link {}, {:.0f} mm, tip of radius {:.0f} mm{}{}",
         kFingerNames[static_cast<std::size_t>(finger.human)], hand.links[finger.knuckle].joint,
-        hand.links[finger.tip].name, 1e3 * finger.length_m, 1e3 * finger.tip_radius_m,
-        finger.tip_shaped ? "" : " (guessed: it has no shape)"));
+        beyond ? "the end of " : "", hand.links[finger.tip].name, 1e3 * finger.length_m,
+        1e3 * finger.tip_radius_m, finger.tip_shaped ? "" : " (guessed: it has no shape)",
+        finger.tip_known ? ""
+                         : "; its last link has neither shape nor tip: add a link at its end"));
   }
   lines.push_back(fmt::format("palm: {} out of it, {} to the thumb, {} to the fingers",
                               direction(hand.palm.col(0)), direction(hand.palm.col(1)),
                               direction(hand.palm.col(2))));
-  std::string without;
-  for (std::size_t l = 0; l < hand.links.size(); ++l) {
-    const robot::Link& link = hand.links[l];
-    if (link.missing_shapes > 0) {
-      without += fmt::format(
-          ", {} ({} of {} meshes are not used: missing beside the URDF, no .obj, or larger than 1 "
-          "m)",
-          link.name, link.missing_shapes, link.missing_shapes + std::ssize(link.shapes));
+  lines.push_back(fmt::format(
+      "shapes: {} capsules hold {} of the links, {} pairs of links are kept apart, "
+      "{} of them by the hulls of shapes",
+      hand.capsules.size(), hand.by_visuals ? "the visuals (there is no collision shape)" : "those",
+      hand.pairs.size(),
+      std::ranges::count_if(hand.pairs, [](const auto& pair) { return pair.count > 0; })));
+  std::map<std::string, std::string> unused;  // by reason: links
+  for (const robot::Link& link : hand.links) {
+    for (const std::string& why : std::set(link.unused_meshes.begin(), link.unused_meshes.end())) {
+      unused[why] += ", " + link.name;
     }
   }
-  lines.push_back(fmt::format(
-      "shapes: {} capsules hold those of the links, {} pairs of links are kept apart, "
-      "{} of them by the hulls of shapes",
-      hand.capsules.size(), hand.pairs.size(),
-      std::ranges::count_if(hand.pairs, [](const auto& pair) { return pair.count > 0; })));
-  if (!without.empty()) lines.push_back("  without a shape: " + without.substr(2));
+  for (const auto& [why, links] : unused) {
+    lines.push_back(fmt::format("  meshes of {} are not used: {}", links.substr(2), why));
+  }
+  const auto slow =
+      std::ranges::count_if(hand.joints, [](const auto& j) { return j.speed <= 0.0; });
+  if (slow > 0) {
+    lines.push_back(fmt::format(
+        "speeds: the URDF names none for {} joints: set speed in [stream.robot]", slow));
+  }
   std::string out;
   for (const auto& [a, b] : hand.left_out) {
     out += fmt::format(", {} and {}", hand.links[a].name, hand.links[b].name);

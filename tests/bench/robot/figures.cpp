@@ -175,7 +175,7 @@ RobotFigures robot_figures(const robot::RobotHand& robot, const HandTake& take,
       }
       if (target.pinch[f] > 0.0) continue;
       const Eigen::Vector3d wanted = target.tip_m[f] - finger.knuckle_m;
-      const Eigen::Vector3d is = placed.at_m[finger.tip] - placed.at_m[finger.knuckle];
+      const Eigen::Vector3d is = robot::tip_of(finger, placed) - placed.at_m[finger.knuckle];
       direction.add(std::atan2(wanted.cross(is).norm(), wanted.dot(is)) / kDegree);
       extension.add(100.0 * std::abs(is.norm() - wanted.norm()) / finger.length_m);
     }

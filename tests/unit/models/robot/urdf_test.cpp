@@ -1,12 +1,16 @@
 // Which texts are refused, and what is read from those that are not; the hulls of shapes.
 #include <catch2/catch.hpp>
 
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <random>
 #include <string>
 
 #include "models/robot/hull.hpp"
 #include "models/robot/shapes.hpp"
 #include "proto/text/load_file.hpp"
+#include "tests/support/temp_folder.hpp"
 #include "tests/unit/models/robot/robot_rig.hpp"
 
 namespace posed::robot {
@@ -65,7 +69,7 @@ TEST_CASE("a URDF that is no plausible hand is refused by a sentence") {
       {deep + "</robot>", "deeper"},
       {many + "</robot>", "1000 links"},
       {"<robot name=\"r\"><link name=\"a\"/></robot>", "no joint that turns"},
-      {robot(chain), "1 fingers"},
+      {robot(chain), "1 chains of joints, which end in c"},
       {robot(joint("j", "a", "b") + joint("k", "a", "b")), "two parents"},
       {robot(joint("j", "b", "c") + joint("k", "c", "b")), "cycle"},
       {robot(joint("j", "a", "b")), "no parent"},
@@ -78,10 +82,10 @@ TEST_CASE("a URDF that is no plausible hand is refused by a sentence") {
       {robot(chain) + robot(chain), "two <robot>"},
       {"<!DOCTYPE html><html><body/></html>", "no <robot>"},
       {one(limit("lower=\"0\" upper=\"1\" velocity=\"-1\"")), "not a speed"},
-      {one(limit("lower=\"0\" upper=\"1\"")), "no velocity limit"},
       {one(""), "no <limit>"},
       {with(robot(chain), "0 1 0", "0 0 0"), "no direction"},
-      {with(robot(chain), "revolute", "prismatic"), "revolute, continuous or fixed"},
+      {with(robot(chain), "revolute", "hinge"), "revolute or continuous"},
+      {"version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "git lfs pull"},
       {one(limit("lower=\"0\" upper=\"1\" velocity=\"1\"") + "<mimic joint=\"j\"/>"),
        "follows itself"},
       {one(limit("lower=\"0\" upper=\"1\" velocity=\"1\"") + "<mimic joint=\"z\"/>"), "no joint"},
@@ -322,6 +326,257 @@ TEST_CASE("capsules hold all boxes of a link") {
   CHECK(outside == 0);
   CHECK(points == 750);
   CHECK(farthest_m < 0.022);
+}
+
+TEST_CASE("the <hull> of a text is a radius and corners, or refused") {
+  const auto said = [](const std::string& hull) {
+    const auto urdf = parse_urdf(
+        "<robot name=\"r\"><link name=\"a\"><collision><geometry><sphere radius=\"0.01\"/>" + hull +
+            "</geometry></collision></link></robot>",
+        "r.urdf");
+    return urdf ? std::to_string(urdf->links[0].shapes[0].hull.corners.size())
+                : urdf.error().message;
+  };
+  const auto hull = [](const std::string& radius, const std::string& corners) {
+    return "<hull radius=\"" + radius + "\" corners=\"" + corners + "\"/>";
+  };
+  std::string many;
+  for (std::size_t k = 0; k < kMaxHullCorners; ++k) many += "0 0 0.1 ";
+  CHECK(said("") == "0");
+  CHECK(said(hull("0.001", "0 0 0.1  0.2 0 -1e-3 ")) == "2");
+  CHECK(said(hull("0", many)) == "64");
+  for (const std::string& bad :
+       {hull("0", many + "0 0 0.1"), hull("0", ""), hull("0", "0 0"), hull("0", "0 0 nan"),
+        hull("0", "0 0 11"), hull("0", "0 0 0.1 x"), hull("-1", "0 0 0.1"), hull("", "0 0 0.1"),
+        hull("nan", "0 0 0.1"), std::string("<hull/>")}) {
+    INFO(bad.substr(0, 80));
+    CHECK(said(bad).find("the <hull> of link 'a' is not") != std::string::npos);
+  }
+}
+
+// Two boxes one of which is moved through the other: where they overlap by less than they were
+// rounded off the gap is exact, and below that they have at least a direction.
+TEST_CASE("hulls that overlap have a gap below zero, and a direction however deep") {
+  const auto box = [] {
+    Hull hull;
+    for (int k = 0; k < 8; ++k) {
+      hull.corners.emplace_back(0.02 *
+                                Eigen::Vector3d((k & 1) - 0.5, (k >> 1 & 1) - 0.5, (k >> 2) - 0.5));
+    }
+    return hull;
+  };
+  Hull one = box(), other = box();
+  round_off(one);
+  round_off(other);
+  const Eigen::Matrix3d still = Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  double before_m = 1.0;
+  for (double at = 0.025; at >= -1e-9; at -= 0.0001) {
+    INFO(at);
+    const Eigen::Vector3d at_m(at, 0.0, 0.0);
+    const Nearest found =
+        hull_gap({one, still, at_m}, {other, still, zero}, Eigen::Vector3d::UnitX(), 1e9);
+    REQUIRE(std::isfinite(found.gap_m));
+    CHECK(found.gap_m <= before_m + 1e-9);
+    CHECK(found.apart.norm() == Approx(1.0));
+    if (at > 0.0195) CHECK(found.apart.x() == Approx(1.0).margin(1e-3));
+    if (at > 0.0195) CHECK(found.gap_m == Approx(at - 0.02).margin(7e-4));
+    if (at < 0.0180) CHECK(found.gap_m == Approx(-one.radius_m - other.radius_m));
+    before_m = found.gap_m;
+  }
+}
+
+TEST_CASE("a hull of very many corners holds all and sticks out little") {
+  std::mt19937 random(7);
+  std::normal_distribution<double> some;
+  std::vector<Eigen::Vector3d> ball;
+  for (int k = 0; k < 20000; ++k) {
+    ball.emplace_back(0.02 *
+                      Eigen::Vector3d(some(random), some(random), some(random)).normalized());
+  }
+  const Hull hull = hull_of(ball);
+  CHECK(hull.radius_m < 1.5e-3);
+  const Eigen::Matrix3d still = Eigen::Matrix3d::Identity();
+  const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+  for (const auto& corner : ball) {
+    const Hull one{.corners = {corner}};
+    REQUIRE(hull_gap({one, still, zero}, {hull, still, zero}, {1.0, 0.0, 0.0}, 1e9).gap_m <= 1e-9);
+  }
+}
+
+namespace {
+
+// A box of 20 x 20 x 30 mm as a file: two triangles a side are not needed, each corner is there.
+std::vector<Eigen::Vector3f> box_corners() {
+  std::vector<Eigen::Vector3f> corners;
+  for (const int k : {0, 1, 2, 3, 4, 5, 6, 7, 0}) {
+    const float x = (k & 1) != 0 ? 0.01f : -0.01f, y = (k & 2) != 0 ? 0.01f : -0.01f;
+    corners.emplace_back(x, y, (k & 4) != 0 ? 0.03f : 0.0f);
+  }
+  return corners;
+}
+
+std::string stl_bytes() {
+  const auto corners = box_corners();
+  std::string bytes = "solid of a maker whose binary files begin so";
+  bytes.resize(80, ' ');
+  const auto add = [&bytes](const auto& value) {
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  add(std::uint32_t{3});
+  for (std::size_t t = 0; t < 3; ++t) {
+    for (int k = 0; k < 3; ++k) add(0.0f);
+    for (std::size_t k = 0; k < 3; ++k) {
+      for (const float value : corners[3 * t + k]) add(value);
+    }
+    add(std::uint16_t{0});
+  }
+  return bytes;
+}
+
+std::string corner_lines(const std::string& word) {
+  std::string lines = "solid\n";
+  for (const auto& corner : box_corners()) {
+    lines += "\t " + word;
+    for (const float value : corner) lines += "  " + std::to_string(value);
+    lines += "\r\n";
+  }
+  return lines;
+}
+
+void write(const std::filesystem::path& path, const std::string& bytes) {
+  std::filesystem::create_directories(path.parent_path());
+  std::ofstream(path, std::ios::binary) << bytes;
+}
+
+}  // namespace
+
+TEST_CASE("meshes are found as packages lay them out, and one that is not used says why") {
+  const test::TempFolder folder;
+  const std::filesystem::path package = folder.path() / "hands" / "package";
+  write(package / "meshes/box.stl", stl_bytes());
+  write(package / "meshes/text.STL", corner_lines("vertex"));
+  write(package / "meshes/box.obj", corner_lines("v"));
+  write(package / "meshes/pointer.stl", "version https://git-lfs.github.com/spec/v1\noid x\n");
+  write(package / "meshes/cut.stl", stl_bytes().substr(0, 100));
+  write(package / "meshes/box.dae", "<COLLADA/>");
+  write(folder.path() / "far.stl", stl_bytes());
+  const auto load = [&](const std::string& mesh, const std::string& words = "collision") {
+    const auto path = package / "urdf/r.urdf";
+    write(path, "<robot name=\"r\"><link name=\"a\"><" + words + "><geometry><mesh filename=\"" +
+                    mesh + "/></geometry></" + words + "></link></robot>");
+    return parse_urdf(load_urdf(path.string()).value(), "r.urdf").value();
+  };
+  for (const std::string& mesh :
+       {std::string("../meshes/box.stl\""), std::string("../meshes/text.STL\""),
+        std::string("package://hand_description/meshes/box.obj\""),
+        std::string("package://hand_description/meshes/box.stl\" scale=\"1 -1 1\""),
+        "file://" + (package / "meshes/box.stl").string() + "\""}) {
+    INFO(mesh);
+    const Urdf urdf = load(mesh);
+    REQUIRE(urdf.links[0].shapes.size() == 1);
+    const Shape& shape = urdf.links[0].shapes[0];
+    CHECK(shape.hull.corners.size() == 8);
+    const Eigen::Vector3d far = shape.at.inverse() * Eigen::Vector3d(0.01, 0.01, 0.03);
+    CHECK(std::ranges::any_of(shape.hull.corners, [&](const Eigen::Vector3d& corner) {
+      return (corner - far).norm() < 1e-5;
+    }));
+    CHECK_FALSE(urdf.by_visuals);
+  }
+  CHECK(load("../meshes/box.stl\"", "visual").by_visuals);
+  CHECK(load("../meshes/box.stl\"", "visual").links[0].shapes.size() == 1);
+  const std::vector<std::pair<std::string, std::string>> unused{
+      {"../meshes/pointer.stl\"", "git lfs pull"},
+      {"../meshes/box.dae\"", "posed reads .stl and .obj"},
+      {"../meshes/cut.stl\"", "no mesh"},
+      {"../meshes/box.stl\" scale=\"1 nan 1\"", "scale"},
+      {"../meshes/box.stl\" scale=\"0.001\"", "scale"},
+      {"../meshes/box.stl\" scale=\"1000 1000 1000\"", "larger than 1 m"},
+      {"../meshes/none.stl\"", "not where the URDF names them"},
+      {"../../../far.stl\"", "not where the URDF names them"},
+      {"file:///etc/hosts.stl\"", "not where the URDF names them"},
+      {"../meshes\"", "posed reads"}};
+  for (const auto& [mesh, why] : unused) {
+    INFO(mesh);
+    const Urdf urdf = load(mesh);
+    REQUIRE(urdf.links[0].unused_meshes.size() == 1);
+    CHECK(urdf.links[0].unused_meshes[0].find(why) != std::string::npos);
+  }
+}
+
+TEST_CASE("a finger without a tip ends where its shapes do, and what is beside it is no tip") {
+  const auto mitten = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  const RobotHand before = robot_hand(mitten, {}, "mitten").value();
+  Urdf bare = mitten, sensors = mitten;
+  for (Link& link : bare.links) {
+    if (link.name.ends_with("_tip")) link.at.translation().setZero();
+  }
+  const RobotHand hand = robot_hand(bare, {}, "mitten").value();
+  for (std::size_t f = 0; f < hand.fingers.size(); ++f) {
+    INFO(f);
+    CHECK(hand.fingers[f].tip_known);
+    CHECK(hand.fingers[f].tip == hand.fingers[f].last);
+    CHECK(hand.fingers[f].length_m == Approx(before.fingers[f].length_m).margin(4e-3));
+  }
+  for (Link& link : bare.links) link.shapes.clear();
+  CHECK_FALSE(robot_hand(bare, {}, "mitten").value().fingers[1].tip_known);
+  Link sensor = sensors.links[static_cast<std::size_t>(before.fingers[1].tip)];
+  sensor.name = sensor.joint = "camera";
+  sensor.at.translation() = Eigen::Vector3d(0.06, 0.0, 0.0);
+  sensors.links.push_back(sensor);
+  const RobotHand seeing = robot_hand(sensors, {}, "mitten").value();
+  CHECK(seeing.links[seeing.fingers[1].tip].name == "index_tip");
+}
+
+TEST_CASE("which finger is which and which side it is are not told by one sign alone") {
+  const auto mitten = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  const auto link = [](Urdf& urdf, const char* joint) {
+    return std::ranges::find(urdf.links, joint, &Link::joint);
+  };
+  // A thumb that is mounted behind the ring finger: names tell.
+  Urdf behind = mitten;
+  link(behind, "thumb_turn")->at.translation() = Eigen::Vector3d(0.02, -0.03, -0.07);
+  link(behind, "thumb_turn")->at.linear().setIdentity();
+  const RobotHand hand = robot_hand(behind, {}, "mitten").value();
+  CHECK(hand.links[hand.fingers[1].tip].name == "index_tip");
+  CHECK(hand.side == Side::kRight);
+  // Joints that turn to both sides as far: the thumb's place tells, here of a mirror image.
+  Urdf left = mitten;
+  for (Link& one : left.links) {
+    const Eigen::Vector3d mirror(1.0, -1.0, 1.0);
+    one.at.translation() = mirror.cwiseProduct(one.at.translation());
+    one.at.linear() = mirror.asDiagonal() * one.at.linear() * mirror.asDiagonal();
+    one.axis = -mirror.cwiseProduct(one.axis);
+    if (one.turns && one.leader < 0) one.high = -(one.low = -1.5);
+    one.shapes.clear();
+  }
+  for (Link& one : left.links) one.leader = -1;
+  CHECK(robot_hand(left, {}, "mitten").value().side == Side::kLeft);
+}
+
+TEST_CASE("what slides or floats above the palm stands, and in a finger it is refused") {
+  auto mitten = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  std::ranges::find(mitten.links, "index_spread", &Link::joint)->turns = false;
+  std::ranges::find(mitten.links, "index_spread", &Link::joint)->slides = true;
+  const auto refused = robot_hand(mitten, {}, "mitten");
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().message.find("slides in a finger") != std::string::npos);
+  std::string text = load_urdf(test::mitten()).value();
+  text = with(text, "<link name=\"palm\">",
+              "<link name=\"world\"/><joint name=\"free\" type=\"floating\"><parent "
+              "link=\"world\"/><child link=\"palm\"/></joint><link name=\"palm\">");
+  const RobotHand hand = robot_hand(parse_urdf(text, "mitten").value(), {}, "mitten").value();
+  CHECK(hand.size() == 15);
+}
+
+TEST_CASE("a URDF without speeds can be looked at, and needs them to be driven") {
+  auto mitten = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  for (Link& link : mitten.links) link.speed = 0.0;
+  const auto driven = robot_hand(mitten, {}, "mitten");
+  REQUIRE_FALSE(driven);
+  CHECK(driven.error().message.find("no velocity limit") != std::string::npos);
+  CHECK(robot_hand(mitten, {.needs_speeds = false}, "mitten").value().joints[0].speed == 0.0);
+  CHECK(robot_hand(mitten, {.speed = 3.0}, "mitten").value().joints[0].speed == 3.0);
 }
 
 TEST_CASE("real hands are read as their makers made them") {
