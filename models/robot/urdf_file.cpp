@@ -142,7 +142,7 @@ struct Fit {
 // at the ends need.
 Fit fit_along(const Corners& corners, const Eigen::Matrix3d& axes) {
   constexpr int kSteps = 100;
-  constexpr std::size_t kMany = 10000;
+  constexpr std::size_t kLeading = 10000;
   Corners local;
   for (const auto& corner : corners) local.emplace_back(axes.transpose() * corner);
   Eigen::Vector2d circle = local.front().head<2>();
@@ -161,7 +161,7 @@ Fit fit_along(const Corners& corners, const Eigen::Matrix3d& axes) {
     return local[best];
   };
   for (int i = 1; i <= kSteps; ++i) {
-    circle += (farthest(1 + local.size() / kMany).head<2>() - circle) / (i + 1.0);
+    circle += (farthest(1 + local.size() / kLeading).head<2>() - circle) / (i + 1.0);
   }
   Fit fit;
   fit.radius_m = away(farthest(1));

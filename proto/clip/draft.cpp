@@ -71,6 +71,33 @@ Result<> check_values(const Clip& clip) {
   return {};
 }
 
+// Brings a figure into metres and +Y up that is not, though its format is.
+void settle_axes(const rig::Rig& rig, Clip& clip, Skeleton& skeleton) {
+  const double metres = rig.metres_per_unit.value_or(1.0);
+  if (metres == 1.0 && rig.up == UpAxis::kPlusY) return;
+  for (Joint& joint : skeleton.joints) {
+    joint.offset_m *= metres;
+    if (joint.end_site_m) *joint.end_site_m *= metres;
+  }
+  const auto factors = turn_axes(up_turn(rig.up), skeleton);
+  for (std::size_t c = 0; c < factors.size(); ++c) {
+    const bool length = skeleton.channels[c].translation;
+    clip.channels.col(static_cast<Eigen::Index>(c)) *= factors[c] * (length ? metres : 1.0);
+  }
+}
+
+// What was taken otherwise than the format says and the user did not say.
+void warn_of_axes(const rig::Rig& rig, const Draft& draft, Clip& clip) {
+  if (!draft.said_unit_m && rig.metres_per_unit.value_or(1.0) != 1.0) {
+    clip.warnings.push_back("its lengths cannot be metres; taken as " + rig.unit + " (" +
+                            rig.why_unit + ")");
+  }
+  if (!draft.said_up && rig.up != UpAxis::kPlusY) {
+    clip.warnings.push_back("does not stand along +y; taken as " + std::string(up_text(rig.up)) +
+                            " up (" + rig.why_up + ")");
+  }
+}
+
 // For formats that state their unit and have +Y up.
 Result<> recognise_clip(Clip& clip, Skeleton& skeleton, const Draft& draft, const Hints& hints) {
   rig::RigInput known;
@@ -80,8 +107,12 @@ Result<> recognise_clip(Clip& clip, Skeleton& skeleton, const Draft& draft, cons
   for (std::size_t j = 0; draft.rests_in_t && j < known.T.size(); ++j) {
     if (draft.bones[j]) known.T[j] = Eigen::Quaterniond::Identity();
   }
-  known.up = UpAxis::kPlusY;
-  known.metres_per_unit = 1.0;
+  known.facing = draft.said_facing;
+  known.up = draft.said_up;
+  known.metres_per_unit = draft.said_unit_m;
+  if (!known.up && !draft.up_may_err) known.up = UpAxis::kPlusY;
+  if (!known.metres_per_unit && !draft.unit_may_err) known.metres_per_unit = 1.0;
+  known.format_says = true;
   if (draft.profile != nullptr) TRY(add_profile(*draft.profile, skeleton, known));
   const auto picked = sample_frames(clip.frames(), static_cast<int>(skeleton.joints.size()));
   const ChannelMatrix sample = clip.channels(picked, Eigen::all);
@@ -98,6 +129,8 @@ Result<> recognise_clip(Clip& clip, Skeleton& skeleton, const Draft& draft, cons
     clip.channels = ChannelMatrix(clip.channels(Eigen::all, columns));
     clip.warnings.push_back(left_out(joints, skeleton.joints.size()));
   }
+  warn_of_axes(rig, draft, clip);
+  settle_axes(rig, clip, skeleton);
   clip.rig = std::make_shared<const rig::Rig>(std::move(rig));
   return {};
 }

@@ -37,6 +37,13 @@ struct Draft {
   std::shared_ptr<const Profile> profile;
   std::vector<std::optional<Bone>> bones{};  // [joint] as the file says; empty: it does not
   bool rests_in_t = false;                   // those bones stand in the T-pose, in the zero pose
+  // What the user says of the values, which by the format are metres with +Y up. Where the user
+  // does not and these may err, a person that stands along another axis is turned, and one that is
+  // eight times too large or small scaled, with a warning.
+  std::optional<UpAxis> said_up{};
+  std::optional<Eigen::Vector3d> said_facing{};
+  std::optional<double> said_unit_m{};
+  bool up_may_err = false, unit_may_err = false;
   double frame_rate_hz = 0.0;
   double metres_per_unit = 1.0;
   UpAxis up = UpAxis::kPlusY;        // of the file; the skeleton has +Y up

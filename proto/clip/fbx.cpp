@@ -155,13 +155,14 @@ bool begins_fbx(std::string_view begin) {
 }  // namespace
 
 Format fbx_format() {
-  return {.name = "FBX",
-          .extensions = {".fbx"},
-          .article = "an",
-          .evenly_spaced = true,
-          .options = {ReadOption::kProfile},
-          .sniff = begins_fbx,
-          .read = read_fbx};
+  return {
+      .name = "FBX",
+      .extensions = {".fbx"},
+      .article = "an",
+      .evenly_spaced = true,
+      .options = {ReadOption::kUnit, ReadOption::kUp, ReadOption::kFacing, ReadOption::kProfile},
+      .sniff = begins_fbx,
+      .read = read_fbx};
 }
 
 }  // namespace posed::clip

@@ -62,6 +62,14 @@ double median_step_s(const std::vector<double>& time_s) {
   return *middle;
 }
 
+// The nominal rate, which may be a guess of the stage's: a device at another pace keeps its own.
+double kept_rate_hz(double nominal_hz, double step_s) {
+  constexpr double kOther = 0.2;
+  if (nominal_hz <= 0.0) return 1.0 / step_s;
+  const bool other = step_s > 0.0 && std::abs(step_s * nominal_hz - 1.0) > kOther;
+  return other ? std::max(std::round(1.0 / step_s), 1.0) : nominal_hz;
+}
+
 }  // namespace
 
 FramesClip::FramesClip(const std::shared_ptr<const Skeleton>& skeleton)
@@ -148,7 +156,7 @@ Result<Clip> FramesClip::finish(const std::string& path, double rate_hz,
   Clip clip;
   clip.path = path;
   clip.skeleton = skeleton_;
-  clip.frame_rate_hz = rate_hz > 0.0 ? rate_hz : 1.0 / median_step_s(time_s);
+  clip.frame_rate_hz = kept_rate_hz(rate_hz, median_step_s(time_s));
   clip.channels =
       Eigen::Map<const ChannelMatrix>(values_.data(), std::ssize(time_s), std::ssize(row_));
   clip.time_s = std::move(time_s);

@@ -276,12 +276,13 @@ Result<> write_glb(const Clip& clip, const std::filesystem::path& path) {
 }
 
 Format glb_format() {
-  return {.name = "GLB",
-          .extensions = {".glb"},
-          .options = {ReadOption::kProfile},
-          .sniff = [](std::string_view begin) { return begin.starts_with("glTF"); },
-          .read = read_gltf,
-          .write = write_glb};
+  return {
+      .name = "GLB",
+      .extensions = {".glb"},
+      .options = {ReadOption::kUnit, ReadOption::kUp, ReadOption::kFacing, ReadOption::kProfile},
+      .sniff = [](std::string_view begin) { return begin.starts_with("glTF"); },
+      .read = read_gltf,
+      .write = write_glb};
 }
 
 }  // namespace posed::clip

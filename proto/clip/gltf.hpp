@@ -58,7 +58,8 @@ Result<> write_gltf(const GltfMotion& motion, GltfKind kind, const std::filesyst
 Result<> write_glb(const Clip& clip, const std::filesystem::path& path);
 
 // Format::read of all kinds of glTF: the bones that a VRM names, otherwise the joints of the skins;
-// the first animation, otherwise the rest pose. Of the numbers in other files nothing is read.
+// the first animation that moves them, otherwise the rest pose. Of the numbers in other files
+// nothing is read.
 Result<Draft> read_gltf(const ClipFile& file, const ReadOptions& options);
 
 }  // namespace posed::clip

@@ -1,8 +1,10 @@
 // Reads glTF 2.0 (.glb, .gltf) and its VRM dialects (.vrm, .vrma) as a clip: the bones of a VRM
-// humanoid, or the joints of the skins, with the first animation; without one the figure as it
-// rests. A node of glTF has a rotation at rest, a joint of a clip has none: with G_j and W_j the
-// world rotation of node j now and at rest, the joint's is G'_j = G_j W_j^-1, and L'_j =
-// G'_parent^-1 G'_j. So the zero pose of the clip's figure is the file's rest pose.
+// humanoid, or the joints of the skins, with the first animation that moves them; without one the
+// figure as it rests. A node of glTF has a rotation at rest, a joint of a clip has none: with G_j
+// and W_j the world rotation of node j now and at rest, the joint's is G'_j = G_j W_j^-1, and L'_j
+// = G'_parent^-1 G'_j. So the zero pose of the clip's figure is the file's rest pose; and where the
+// nodes stand in some pose of the animation, as many programs leave them, it is the pose in which
+// the skin was bound to them.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -15,7 +17,6 @@
 #include <numbers>
 #include <optional>
 #include <set>
-#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -35,14 +36,15 @@ namespace {
 constexpr std::size_t kMaxNodes = 100'000;
 constexpr std::size_t kMaxFigure = 1000;         // joints
 constexpr std::size_t kMaxNumbers = 50'000'000;  // of all frames
-constexpr std::size_t kMaxSteps = 100'000'000;   // poses and tracks of all frames
-constexpr std::size_t kMaxValues = 1'000'000;    // of the JSON; each takes 0.3 KB of memory
-constexpr std::size_t kMaxNesting = 100;           // of the JSON; tinygltf calls itself
-constexpr std::size_t kMaxWhy = 200;             // letters of what tinygltf says
 constexpr double kMaxFramesAKey = 1000.0;        // so that a short file asks for little work
 constexpr double kStillRate_hz = 30.0;           // of a file without an animation
-constexpr double kUnevenRate_hz = 60.0;          // of one whose keys have no rate
+constexpr double kUnevenRate_hz = 60.0;          // least rate of one whose keys have none
 constexpr double kMaxKeyRate_hz = 1000.0;
+constexpr std::size_t kMaxAnimations = 100;     // that are searched for motion
+constexpr std::size_t kMaxNesting = 100;        // of JSON: tinygltf calls itself
+constexpr std::size_t kMaxValues = 1'000'000;   // of JSON; each takes 0.3 KB of memory
+constexpr std::size_t kMaxSteps = 100'000'000;  // poses and tracks of all frames
+constexpr std::size_t kMaxWhy = 200;            // letters of what tinygltf says
 
 // --- what tinygltf may do
 
@@ -51,7 +53,8 @@ bool skip_image(tinygltf::Image* /*image*/, int /*index*/, std::string* /*error*
                 const unsigned char* /*bytes*/, int /*size*/, void* /*user*/) {
   return true;
 }
-bool never_exists(const std::string& /*path*/, void* /*user*/) { return false; }
+// So that tinygltf goes on to read it, which says what to do.
+bool always_exists(const std::string& /*path*/, void* /*user*/) { return true; }
 std::string same_path(const std::string& path, void* /*user*/) { return path; }
 bool never_reads(std::vector<unsigned char>* /*out*/, std::string* error, const std::string& path,
                  void* /*user*/) {
@@ -59,14 +62,13 @@ bool never_reads(std::vector<unsigned char>* /*out*/, std::string* error, const 
   return false;
 }
 
-// The JSON of a .gltf or .glb; a damaged .glb is left to tinygltf.
+// The JSON of a .glb ends with its chunk, after which brackets mean nothing.
 std::string_view json_of(std::string_view bytes) {
-  constexpr std::size_t kSizeAt = 12, kJsonAt = 20;
-  if (!bytes.starts_with("glTF")) return bytes;
-  if (bytes.size() < kJsonAt) return {};
-  std::uint32_t size = 0;
-  std::memcpy(&size, bytes.data() + kSizeAt, sizeof size);
-  return bytes.substr(kJsonAt, size);
+  constexpr std::size_t kHeader = 20, kLengthAt = 12;
+  if (!bytes.starts_with("glTF") || bytes.size() < kHeader) return bytes;
+  std::uint32_t length = 0;
+  std::memcpy(&length, bytes.data() + kLengthAt, sizeof length);
+  return bytes.substr(kHeader, length);
 }
 
 // Whether tinygltf can read the JSON with bounded stack and memory.
@@ -89,25 +91,25 @@ Result<> check_json(std::string_view json) {
       continue;
     }
     ++values;
-    if (depth > kMaxNesting) return fail("is nested too deeply to be a glTF");
-    if (values > kMaxValues) return fail("has too much in its JSON to be a figure");
+    if (depth > kMaxNesting) return fail("its JSON is nested too deep");
+    if (values > kMaxValues) return fail("there is too much in its JSON");
   }
   return {};
 }
 
 Result<tinygltf::Model> load_model(const ClipFile& file) {
-  if (const auto fits = check_json(json_of(file.bytes)); !fits) {
-    return fail(fits.error().message, file.name);
-  }
   tinygltf::TinyGLTF loader;
   loader.SetImageLoader(skip_image, nullptr);
-  loader.SetFsCallbacks({.FileExists = never_exists,
+  loader.SetFsCallbacks({.FileExists = always_exists,
                          .ExpandFilePath = same_path,
                          .ReadWholeFile = never_reads,
                          .WriteWholeFile = nullptr,
                          .user_data = nullptr});
   if (file.bytes.size() > std::numeric_limits<int>::max()) {
     return fail("is longer than the 2 GB that a glTF file can have", file.name);
+  }
+  if (const auto fits = check_json(json_of(file.bytes)); !fits) {
+    return fail("is no glTF that can be read (" + fits.error().message + ")", file.name);
   }
   tinygltf::Model model;
   std::string error, warning;
@@ -124,7 +126,10 @@ Result<tinygltf::Model> load_model(const ClipFile& file) {
     error = thrown.what();
   }
   if (loaded) return model;
-  const std::string why = clean(error.substr(0, std::min(error.find('\n'), kMaxWhy)));
+  std::string why = clean(error.substr(0, std::min(error.find('\n'), kMaxWhy)));
+  if (json_of(file.bytes).contains("EXT_meshopt_compression")) {
+    why = "its numbers are packed by EXT_meshopt_compression; export it without compression";
+  }
   return fail("is no glTF that can be read" + (why.empty() ? "" : " (" + why + ")"), file.name);
 }
 
@@ -154,38 +159,128 @@ double number_at(const unsigned char* at, int type, bool normalized) {
   }
 }
 
-// All numbers of an accessor with so many components an entry; empty if it is damaged, sparse, or
-// has a value that is none.
-std::vector<double> numbers_of(const tinygltf::Model& model, int index, int components) {
-  if (index < 0 || index >= std::ssize(model.accessors)) return {};
-  const tinygltf::Accessor& accessor = model.accessors[static_cast<std::size_t>(index)];
-  const int view_index = accessor.bufferView;
-  if (accessor.sparse.isSparse || view_index < 0 || view_index >= std::ssize(model.bufferViews) ||
-      tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(accessor.type)) != components) {
-    return {};
-  }
+// Entries that lie evenly in a buffer view: `count` of `components` numbers. Null if they do not
+// fit into it.
+struct Entries {
+  const unsigned char* at = nullptr;
+  std::size_t stride = 0;
+};
+Entries entries_of(const tinygltf::Model& model, int view_index, std::size_t offset,
+                   std::size_t count, std::size_t entry, bool packed) {
+  if (view_index < 0 || view_index >= std::ssize(model.bufferViews) || count == 0) return {};
   const auto& view = model.bufferViews[static_cast<std::size_t>(view_index)];
   if (view.buffer < 0 || view.buffer >= std::ssize(model.buffers)) return {};
   const auto& data = model.buffers[static_cast<std::size_t>(view.buffer)].data;
-  const int stride = accessor.ByteStride(view);
-  const int part =
-      tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(accessor.componentType));
-  if (stride <= 0 || part <= 0 || accessor.count == 0 || accessor.count > kMaxNumbers) return {};
-  const std::size_t begin = view.byteOffset + accessor.byteOffset;
-  const std::size_t last = begin + (accessor.count - 1) * static_cast<std::size_t>(stride);
-  const auto entry = static_cast<std::size_t>(components) * static_cast<std::size_t>(part);
-  if (begin < view.byteOffset || last > data.size() || data.size() - last < entry) return {};
-  std::vector<double> numbers;
-  numbers.reserve(accessor.count * static_cast<std::size_t>(components));
-  for (std::size_t i = 0; i < accessor.count; ++i) {
-    const unsigned char* at = data.data() + begin + i * static_cast<std::size_t>(stride);
-    for (int c = 0; c < components; ++c) {
-      numbers.push_back(number_at(at + c * part, accessor.componentType, accessor.normalized));
-      if (!std::isfinite(numbers.back())) return {};
+  const std::size_t stride = packed || view.byteStride == 0 ? entry : view.byteStride;
+  const std::size_t begin = view.byteOffset + offset;
+  if (begin < offset || begin > data.size() || data.size() - begin < entry) return {};
+  if (stride == 0 || (data.size() - begin - entry) / stride < count - 1) return {};
+  return {.at = data.data() + begin, .stride = stride};
+}
+
+std::size_t index_at(const unsigned char* at, int type) {
+  std::uint32_t index = 0;  // glTF is little-endian
+  const int bytes = tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(type));
+  std::memcpy(&index, at, static_cast<std::size_t>(bytes));
+  return index;
+}
+
+// Puts the values of a sparse accessor where they belong. False if it is damaged.
+bool add_sparse(const tinygltf::Model& model, const tinygltf::Accessor& accessor,
+                std::size_t components, std::size_t part, std::vector<double>& numbers) {
+  const auto& sparse = accessor.sparse;
+  const int index_type = sparse.indices.componentType;
+  const bool counts = index_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_BYTE ||
+                      index_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT ||
+                      index_type == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
+  if (!counts || sparse.count < 0 || sparse.indices.byteOffset < 0 ||
+      sparse.values.byteOffset < 0) {
+    return false;
+  }
+  const auto count = static_cast<std::size_t>(sparse.count);
+  const auto index_bytes = static_cast<std::size_t>(
+      tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(index_type)));
+  const Entries indices =
+      entries_of(model, sparse.indices.bufferView,
+                 static_cast<std::size_t>(sparse.indices.byteOffset), count, index_bytes, true);
+  const Entries values = entries_of(model, sparse.values.bufferView,
+                                    static_cast<std::size_t>(sparse.values.byteOffset), count,
+                                    components * part, true);
+  if (indices.at == nullptr || values.at == nullptr) return false;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t to = index_at(indices.at + i * indices.stride, index_type);
+    if (to >= accessor.count) return false;
+    for (std::size_t c = 0; c < components; ++c) {
+      numbers[to * components + c] = number_at(values.at + i * values.stride + c * part,
+                                               accessor.componentType, accessor.normalized);
     }
   }
+  return true;
+}
+
+// As many numbers as the bytes of a file may stand for.
+std::size_t most_numbers(const tinygltf::Model& model) {
+  std::size_t bytes = 1'000'000;
+  for (const tinygltf::Buffer& buffer : model.buffers) bytes += buffer.data.size();
+  return std::min(bytes, kMaxNumbers);
+}
+
+// All numbers of an accessor with so many components an entry; empty if it is damaged or has a
+// value that is none.
+std::vector<double> numbers_of(const tinygltf::Model& model, int index, std::size_t components) {
+  if (index < 0 || index >= std::ssize(model.accessors)) return {};
+  const tinygltf::Accessor& accessor = model.accessors[static_cast<std::size_t>(index)];
+  const int size =
+      tinygltf::GetComponentSizeInBytes(static_cast<std::uint32_t>(accessor.componentType));
+  const bool fits = std::cmp_equal(
+      tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(accessor.type)), components);
+  if (!fits || size <= 0 || accessor.count > most_numbers(model) / components) return {};
+  const auto part = static_cast<std::size_t>(size);
+  std::vector<double> numbers;
+  if (accessor.bufferView >= 0) {
+    const Entries entries = entries_of(model, accessor.bufferView, accessor.byteOffset,
+                                       accessor.count, components * part, false);
+    if (entries.at == nullptr) return {};
+    numbers.reserve(accessor.count * components);
+    for (std::size_t i = 0; i < accessor.count; ++i) {
+      for (std::size_t c = 0; c < components; ++c) {
+        numbers.push_back(number_at(entries.at + i * entries.stride + c * part,
+                                    accessor.componentType, accessor.normalized));
+      }
+    }
+  } else if (accessor.sparse.isSparse) {
+    numbers.resize(accessor.count * components);  // 0, but for those that are listed
+  }
+  if (accessor.sparse.isSparse && !add_sparse(model, accessor, components, part, numbers)) {
+    return {};
+  }
+  if (!std::ranges::all_of(numbers, [](double x) { return std::isfinite(x); })) return {};
   return numbers;
 }
+
+// The numbers of accessors, each read once however many channels and skins name it, and no more
+// than the file has bytes for: accessors may overlap.
+class Numbers {
+ public:
+  explicit Numbers(const tinygltf::Model& model) : model_(model), left_(2 * most_numbers(model)) {}
+  // As numbers_of(); empty, too, where all together are too many.
+  std::span<const double> of(int index, std::size_t components) {
+    const auto [place, is_new] = read_.try_emplace({index, components});
+    if (!is_new) return place->second;
+    if (index >= 0 && index < std::ssize(model_.accessors) &&
+        model_.accessors[static_cast<std::size_t>(index)].count > left_ / components) {
+      return {};
+    }
+    place->second = numbers_of(model_, index, components);
+    left_ -= place->second.size();
+    return place->second;
+  }
+
+ private:
+  const tinygltf::Model& model_;
+  std::map<std::pair<int, std::size_t>, std::vector<double>> read_;
+  std::size_t left_;
+};
 
 // --- the tree of nodes
 
@@ -195,18 +290,21 @@ struct Pose {
   Eigen::Vector3d scale = Eigen::Vector3d::Ones();
 };
 
+Pose pose_of(const Eigen::Matrix4d& matrix) {
+  Pose pose;
+  const Eigen::Matrix3d turn = matrix.topLeftCorner<3, 3>();
+  pose.position = matrix.topRightCorner<3, 1>();
+  pose.scale = turn.colwise().norm();
+  if ((pose.scale.array() > 0.0).all()) {
+    pose.rotation =
+        Eigen::Quaterniond(Eigen::Matrix3d(turn * pose.scale.cwiseInverse().asDiagonal()));
+  }
+  return pose;
+}
+
 Pose pose_of(const tinygltf::Node& node) {
   Pose pose;
-  if (node.matrix.size() == 16) {
-    const Eigen::Map<const Eigen::Matrix4d> matrix(node.matrix.data());
-    const Eigen::Matrix3d turn = matrix.topLeftCorner<3, 3>();
-    pose.position = matrix.topRightCorner<3, 1>();
-    pose.scale = turn.colwise().norm();
-    if ((pose.scale.array() > 0.0).all()) {
-      pose.rotation =
-          Eigen::Quaterniond(Eigen::Matrix3d(turn * pose.scale.cwiseInverse().asDiagonal()));
-    }
-  }
+  if (node.matrix.size() == 16) pose = pose_of(Eigen::Matrix4d(node.matrix.data()));
   if (node.translation.size() == 3) pose.position = Eigen::Vector3d(node.translation.data());
   if (node.rotation.size() == 4) pose.rotation = Eigen::Quaterniond(node.rotation.data());
   if (node.scale.size() == 3) pose.scale = Eigen::Vector3d(node.scale.data());
@@ -217,6 +315,7 @@ Pose pose_of(const tinygltf::Node& node) {
 
 struct Tree {
   std::vector<int> parent;  // [node]; -1: none
+  int shared = -1;          // a node that hangs below two others, of which the first counts
   std::vector<int> order;   // the nodes, parents first; nodes of a circle are left out
 };
 
@@ -227,19 +326,17 @@ Tree tree_of(const tinygltf::Model& model) {
     for (const int child : model.nodes[n].children) {
       if (child < 0 || child >= std::ssize(model.nodes)) continue;
       int& parent = tree.parent[static_cast<std::size_t>(child)];
+      if (parent >= 0) tree.shared = child;
       if (parent < 0) parent = static_cast<int>(n);
     }
   }
   std::vector<int> open;
-  std::vector<bool> seen(count, false);  // a node may be named twice among the children
   for (std::size_t n = count; n-- > 0;) {
     if (tree.parent[n] < 0) open.push_back(static_cast<int>(n));
   }
   while (!open.empty()) {
     const int node = open.back();
     open.pop_back();
-    if (seen[static_cast<std::size_t>(node)]) continue;
-    seen[static_cast<std::size_t>(node)] = true;
     tree.order.push_back(node);
     const auto& children = model.nodes[static_cast<std::size_t>(node)].children;
     for (auto child = children.rbegin(); child != children.rend(); ++child) {
@@ -263,19 +360,6 @@ void place(const Tree& tree, const std::vector<Pose>& own, std::vector<Pose>& wo
     world[n].rotation = (above.rotation * own[n].rotation).normalized();
     world[n].scale = above.scale.cwiseProduct(own[n].scale);
   }
-}
-
-// Without the nodes that are neither among `nodes` nor above them.
-Tree needed_of(Tree tree, const std::vector<int>& nodes) {
-  std::vector<bool> needed(tree.parent.size(), false);
-  for (int node : nodes) {
-    for (; node >= 0 && !needed[static_cast<std::size_t>(node)];
-         node = tree.parent[static_cast<std::size_t>(node)]) {
-      needed[static_cast<std::size_t>(node)] = true;
-    }
-  }
-  std::erase_if(tree.order, [&](int node) { return !needed[static_cast<std::size_t>(node)]; });
-  return tree;
 }
 
 // --- the figure
@@ -321,8 +405,9 @@ Humanoid humanoid_of(const tinygltf::Model& model) {
       }
       found.backwards = true;
     } else if (bones.IsObject()) {
-      for (const std::string& name : bones.Keys())
+      for (const std::string& name : bones.Keys()) {
         add(name, member(bones.Get(name), "node"), false);
+      }
     }
     if (!found.bones.empty()) return found;
   }
@@ -336,21 +421,72 @@ struct Figure {
   std::vector<std::optional<Bone>> bones;  // [joint] that the file names; empty: it names none
 };
 
-// The nodes that count: a humanoid's, the skins' joints, those that an animation turns, or all.
-std::set<int> chosen_nodes(const tinygltf::Model& model, const Humanoid& humanoid) {
-  std::set<int> chosen;
-  const auto add = [&](int node) {
-    if (node >= 0 && node < std::ssize(model.nodes)) chosen.insert(node);
-  };
-  for (const auto& [node, bone] : humanoid.bones) add(node);
-  if (!chosen.empty()) return chosen;
-  for (const tinygltf::Skin& skin : model.skins) std::ranges::for_each(skin.joints, add);
-  if (!chosen.empty()) return chosen;
-  if (!model.animations.empty()) {
-    for (const auto& channel : model.animations.front().channels) add(channel.target_node);
+// The nodes that a humanoid names, or else the skins' joints.
+std::set<int> joint_nodes(const tinygltf::Model& model, const Humanoid& humanoid) {
+  std::set<int> nodes;
+  for (const auto& [node, bone] : humanoid.bones) nodes.insert(node);
+  if (!nodes.empty()) return nodes;
+  for (const tinygltf::Skin& skin : model.skins)
+    nodes.insert(skin.joints.begin(), skin.joints.end());
+  std::erase_if(nodes, [&](int node) { return node < 0 || node >= std::ssize(model.nodes); });
+  return nodes;
+}
+
+// Whether an animation turns or moves one of these nodes, or any where there are none.
+bool moves_any(Numbers& numbers, const tinygltf::Animation& animation, const std::set<int>& nodes) {
+  return std::ranges::any_of(animation.channels, [&](const tinygltf::AnimationChannel& channel) {
+    const bool turns = channel.target_path == "rotation";
+    if (!turns && channel.target_path != "translation") return false;
+    if (!nodes.empty() && !nodes.contains(channel.target_node)) return false;
+    if (channel.sampler < 0 || channel.sampler >= std::ssize(animation.samplers)) return false;
+    const auto& sampler = animation.samplers[static_cast<std::size_t>(channel.sampler)];
+    const std::size_t width = turns ? 4 : 3;
+    const auto values = numbers.of(sampler.output, width);
+    for (std::size_t i = width; i < values.size(); ++i) {
+      constexpr double kStill = 1e-6;
+      if (std::abs(values[i] - values[i % width]) > kStill) return true;
+    }
+    return false;
+  });
+}
+
+// The first animation that moves the figure, because a file may begin with that of a camera, of
+// faces or with a single pose; the first of all where none does. Null: there is none.
+const tinygltf::Animation* find_animation(const tinygltf::Model& model, const std::set<int>& nodes,
+                                          Numbers& numbers) {
+  for (std::size_t i = 0; i < std::min(model.animations.size(), kMaxAnimations); ++i) {
+    if (moves_any(numbers, model.animations[i], nodes)) return &model.animations[i];
   }
-  if (!chosen.empty()) return chosen;
-  for (int node = 0; node < std::ssize(model.nodes); ++node) add(node);
+  return model.animations.empty() ? nullptr : &model.animations.front();
+}
+
+// The nodes that count: a humanoid's; or the skins' joints, the nodes that the animation turns, and
+// what hangs below them and shows nothing, because a joint may have no part in a skin; or all.
+std::set<int> chosen_nodes(const tinygltf::Model& model, const Tree& tree, const Humanoid& humanoid,
+                           const tinygltf::Animation* animation) {
+  std::set<int> chosen = joint_nodes(model, humanoid);
+  if (!humanoid.bones.empty()) return chosen;
+  std::vector<char> shows(model.nodes.size(), 0);  // it or something below is a mesh or camera
+  for (auto node = tree.order.rbegin(); node != tree.order.rend(); ++node) {
+    const auto n = static_cast<std::size_t>(*node);
+    if (model.nodes[n].mesh >= 0 || model.nodes[n].camera >= 0) shows[n] = 1;
+    if (tree.parent[n] >= 0 && shows[n] != 0) shows[static_cast<std::size_t>(tree.parent[n])] = 1;
+  }
+  const bool skinned = !chosen.empty();
+  for (std::size_t c = 0; animation != nullptr && c < animation->channels.size(); ++c) {
+    const int node = animation->channels[c].target_node;
+    if (node < 0 || node >= std::ssize(model.nodes)) continue;
+    if (!skinned || model.nodes[static_cast<std::size_t>(node)].mesh < 0) chosen.insert(node);
+  }
+  std::set<int> more = chosen;
+  for (const int node : tree.order) {
+    const auto n = static_cast<std::size_t>(node);
+    if (shows[n] == 0 && more.contains(tree.parent[n])) more.insert(node);
+  }
+  if (more.size() <= kMaxFigure) chosen = std::move(more);
+  for (int node = 0; chosen.empty() && node < std::ssize(model.nodes); ++node) {
+    chosen.insert(node);
+  }
   return chosen;
 }
 
@@ -400,6 +536,8 @@ Figure figure_of(const tinygltf::Model& model, const Tree& tree, const std::set<
 
 // --- the animation
 
+constexpr double kNearKey_s = 1e-4;
+
 struct Track {
   int node = 0;
   enum class Path : std::uint8_t { kPosition, kRotation } path = Path::kPosition;
@@ -419,7 +557,9 @@ struct Track {
 };
 
 Eigen::Vector4d Track::at(double time) const {
-  const auto next = std::ranges::upper_bound(time_s, time);
+  // A step comes at its key, whose time is a rounded float.
+  const auto next =
+      std::ranges::upper_bound(time_s, between == Between::kStep ? time + kNearKey_s : time);
   if (next == time_s.begin()) return key(0, 1);
   const auto i = static_cast<std::size_t>(next - time_s.begin()) - 1;
   if (next == time_s.end() || between == Between::kStep) return key(i, 1);
@@ -435,42 +575,18 @@ Eigen::Vector4d Track::at(double time) const {
   return Eigen::Quaterniond(a).slerp(t, Eigen::Quaterniond(b)).coeffs();
 }
 
-// The numbers of accessors, each read once however many channels name it, and no more than the
-// file has bytes for: accessors may overlap.
-class Numbers {
- public:
-  explicit Numbers(const tinygltf::Model& model) : model_(model) {
-    for (const tinygltf::Buffer& buffer : model.buffers) left_ += buffer.data.size();
-  }
-  // As numbers_of().
-  std::span<const double> of(int index, int components) {
-    const auto [place, is_new] = read_.try_emplace({index, components});
-    if (!is_new) return place->second;
-    if (index >= 0 && index < std::ssize(model_.accessors)) {
-      const std::size_t count = model_.accessors[static_cast<std::size_t>(index)].count;
-      if (count > left_ / static_cast<std::size_t>(components)) return {};
-    }
-    place->second = numbers_of(model_, index, components);
-    left_ -= place->second.size();
-    return place->second;
-  }
-
- private:
-  const tinygltf::Model& model_;
-  std::map<std::pair<int, int>, std::vector<double>> read_;
-  std::size_t left_ = 0;
-};
-
-Result<std::vector<Track>> tracks_of(const tinygltf::Model& model, const Tree& needed,
-                                     Numbers& numbers) {
+// How the animation moves the nodes that matter [node].
+Result<std::vector<Track>> tracks_of(const tinygltf::Model& model,
+                                     const tinygltf::Animation& animation,
+                                     const std::vector<char>& matters, Numbers& numbers) {
   std::vector<Track> tracks;
-  if (model.animations.empty()) return tracks;
-  const std::set<int> turned(needed.order.begin(), needed.order.end());
-  const tinygltf::Animation& animation = model.animations.front();
+  std::set<std::pair<int, bool>> seen;
   for (const tinygltf::AnimationChannel& channel : animation.channels) {
     const bool turns = channel.target_path == "rotation";
     if (!turns && channel.target_path != "translation") continue;
-    if (!turned.contains(channel.target_node)) continue;
+    if (channel.target_node < 0 || channel.target_node >= std::ssize(model.nodes)) continue;
+    if (matters[static_cast<std::size_t>(channel.target_node)] == 0) continue;
+    if (!seen.emplace(channel.target_node, turns).second) continue;  // glTF allows one
     if (channel.sampler < 0 || channel.sampler >= std::ssize(animation.samplers)) {
       return fail("a channel of its animation has no sampler; it is damaged");
     }
@@ -479,15 +595,13 @@ Result<std::vector<Track>> tracks_of(const tinygltf::Model& model, const Tree& n
                 .path = turns ? Track::Path::kRotation : Track::Path::kPosition};
     if (sampler.interpolation == "STEP") track.between = Track::Between::kStep;
     if (sampler.interpolation == "CUBICSPLINE") track.between = Track::Between::kCubic;
+    const auto width = static_cast<std::size_t>(track.width());
     track.time_s = numbers.of(sampler.input, 1);
-    track.values = numbers.of(sampler.output, track.width());
+    track.values = numbers.of(sampler.output, width);
     const std::size_t parts = track.between == Track::Between::kCubic ? 3 : 1;
-    const std::size_t wanted =
-        track.time_s.size() * parts * static_cast<std::size_t>(track.width());
-    if (track.time_s.empty() || track.values.size() != wanted ||
+    if (track.time_s.empty() || track.values.size() != track.time_s.size() * parts * width ||
         !std::ranges::is_sorted(track.time_s)) {
-      return fail("the keys of node " + std::to_string(channel.target_node) +
-                  " are damaged, or packed in a way that posed does not read (sparse)");
+      return fail("the keys of node " + std::to_string(channel.target_node) + " are damaged");
     }
     tracks.push_back(track);
   }
@@ -500,6 +614,17 @@ struct Times {
   double first_s = 0.0;
   std::size_t frames = 1;
 };
+
+// That of a live recording, whose frames come when they come.
+double usual_rate_hz(std::span<const double> keys_s) {
+  std::vector<double> steps_s;
+  for (std::size_t i = 1; i < keys_s.size(); ++i) steps_s.push_back(keys_s[i] - keys_s[i - 1]);
+  if (steps_s.empty()) return 0.0;
+  const auto middle = steps_s.begin() + std::ssize(steps_s) / 2;
+  std::ranges::nth_element(steps_s, middle);
+  const double rate_hz = std::round(1.0 / std::max(*middle, 1e-9));
+  return rate_hz <= kMaxKeyRate_hz ? rate_hz : 0.0;
+}
 
 Times times_of(const std::vector<Track>& tracks) {
   Times times;
@@ -517,34 +642,34 @@ Times times_of(const std::vector<Track>& tracks) {
   const auto steps = static_cast<double>(keys.size() - 1);
   const double span_s = keys.back() - keys.front();
   const double rate_hz = span_s > 0.0 ? steps / span_s : 0.0;
-  bool even = keys.size() > 2 && rate_hz >= 1.0 && rate_hz <= kMaxKeyRate_hz;
+  constexpr double kNear = 0.05;           // of a frame
+  constexpr double kFewestRate_hz = 20.0;  // of two keys: farther apart a motion is between them
+  bool even = rate_hz >= (keys.size() > 2 ? 1.0 : kFewestRate_hz) && rate_hz <= kMaxKeyRate_hz;
   for (std::size_t i = 0; even && i < keys.size(); ++i) {
-    constexpr double kNear = 0.05;  // of a frame
     even = std::abs((keys[i] - keys.front()) * rate_hz - static_cast<double>(i)) < kNear;
   }
   const double whole_hz = std::round(rate_hz);
-  times.rate_hz = !even                                            ? kUnevenRate_hz
+  times.rate_hz = !even ? std::max(kUnevenRate_hz, usual_rate_hz(keys))
                   : std::abs(rate_hz - whole_hz) < 1e-4 * whole_hz ? whole_hz
                                                                    : rate_hz;
-  const double frames = (last_s - times.first_s) * times.rate_hz + 1e-6;
+  const double frames = (last_s - times.first_s) * times.rate_hz + kNear;
   times.frames = frames < kMaxFramesAKey * (steps + 1.0) ? static_cast<std::size_t>(frames) + 1
                                                          : std::numeric_limits<std::size_t>::max();
   return times;
 }
 
 // Those that gltf.cpp writes: a frame has that of the newest key. Empty for other files.
-std::vector<Timecode> timecodes_of(const tinygltf::Model& model, const std::vector<Track>& tracks,
-                                   const Times& times) {
-  if (model.animations.empty() || tracks.empty()) return {};
-  const tinygltf::Value& extras = model.animations.front().extras;
+std::vector<Timecode> timecodes_of(const tinygltf::Animation* animation,
+                                   const std::vector<Track>& tracks, const Times& times) {
+  if (animation == nullptr || tracks.empty()) return {};
+  const tinygltf::Value& extras = animation->extras;
   if (!extras.IsObject() || !extras.Has("timecodes")) return {};
   const tinygltf::Value& keys = extras.Get("timecodes");
   const std::span<const double> key_s = tracks.front().time_s;
   if (!keys.IsArray() || keys.ArrayLen() != key_s.size()) return {};
   std::vector<Timecode> out;
   for (std::size_t i = 0; i < times.frames; ++i) {
-    constexpr double kNear_s = 1e-4;  // the keys' times are floats
-    const double time_s = times.first_s + static_cast<double>(i) / times.rate_hz + kNear_s;
+    const double time_s = times.first_s + static_cast<double>(i) / times.rate_hz + kNearKey_s;
     const auto next = std::ranges::upper_bound(key_s, time_s) - key_s.begin();
     const tinygltf::Value& code = keys.Get(static_cast<int>(std::max(next - 1, std::ptrdiff_t{0})));
     out.push_back(code.IsString() ? to_timecode(code.Get<std::string>()) : Timecode{});
@@ -557,13 +682,23 @@ std::vector<Timecode> timecodes_of(const tinygltf::Model& model, const std::vect
 class Reader {
  public:
   Reader(const tinygltf::Model& model, const ClipFile& file)
-      : model_(model), file_(file), tree_(tree_of(model)) {
+      : model_(model), file_(file), numbers_(model), tree_(tree_of(model)) {
     for (const tinygltf::Node& node : model.nodes) rest_.push_back(pose_of(node));
   }
 
   Result<Draft> read();
 
  private:
+  struct Bound {
+    std::map<int, Pose> pose;  // [node], in the space of a mesh
+    double scale = 1.0;        // from there to the world
+    Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+  };
+  [[nodiscard]] std::map<int, Pose> bound_poses();
+  [[nodiscard]] std::optional<Bound> other_rest(Draft& draft);
+  void rest_in(const Bound& bound);
+  [[nodiscard]] std::vector<char> nodes_that_matter() const;
+  void remark(Draft& draft) const;
   [[nodiscard]] bool moves(std::size_t joint, const std::vector<Track>& tracks) const;
   void describe(const std::vector<Track>& tracks, Draft& draft) const;
   void add_frame(const std::vector<Pose>& world, std::vector<std::array<double, 3>>& near,
@@ -571,13 +706,137 @@ class Reader {
 
   const tinygltf::Model& model_;
   const ClipFile& file_;
+  Numbers numbers_;
   Tree tree_;
   std::vector<Pose> rest_;  // [node], of its own
   Humanoid humanoid_;
   Figure figure_;
-  std::vector<Pose> world_rest_;  // [node]
+  const tinygltf::Animation* animation_ = nullptr;
+  std::vector<Pose> world_rest_;  // [node]; of the figure's nodes as it rests
   Eigen::Quaterniond forwards_ = Eigen::Quaterniond::Identity();
 };
+
+// Where the skins' joints stood when the skins were bound to them, all in the space of one mesh.
+std::map<int, Pose> Reader::bound_poses() {
+  std::map<int, Pose> all;
+  for (const tinygltf::Skin& skin : model_.skins) {
+    const auto numbers = numbers_.of(skin.inverseBindMatrices, 16);
+    if (numbers.size() != 16 * skin.joints.size()) continue;
+    std::map<int, Pose> own;
+    for (std::size_t j = 0; j < skin.joints.size(); ++j) {
+      const Eigen::Matrix4d inverse =
+          Eigen::Map<const Eigen::Matrix4d>(numbers.data() + 16 * j).inverse();
+      if (inverse.allFinite()) own.emplace(skin.joints[j], pose_of(inverse));
+    }
+    // Each skin may have a space of its own; a joint of both brings them together.
+    const auto common =
+        std::ranges::find_if(own, [&](const auto& entry) { return all.contains(entry.first); });
+    if (!all.empty() && common == own.end()) continue;
+    const Pose from = common == own.end() ? Pose{} : common->second;
+    const Pose to = common == own.end() ? Pose{} : all.at(common->first);
+    const Eigen::Quaterniond turn = to.rotation * from.rotation.conjugate();
+    const double scale = to.scale.mean() / from.scale.mean();
+    for (auto& [node, pose] : own) {
+      pose.position = to.position + turn * (scale * (pose.position - from.position));
+      pose.rotation = turn * pose.rotation;
+      pose.scale *= scale;
+      all.emplace(node, pose);
+    }
+  }
+  return all;
+}
+
+// The quarter turns that come nearest to a rotation.
+Eigen::Quaterniond quarter_turns(const Eigen::Quaterniond& rotation) {
+  Eigen::Matrix3d left = rotation.toRotationMatrix(), turns = Eigen::Matrix3d::Zero();
+  for (int i = 0; i < 2; ++i) {
+    int row = 0, column = 0;
+    left.cwiseAbs().maxCoeff(&row, &column);
+    turns(row, column) = left(row, column) < 0.0 ? -1.0 : 1.0;
+    left.row(row).setZero();
+    left.col(column).setZero();
+  }
+  int row = 0, column = 0;
+  left.cwiseAbs().maxCoeff(&row, &column);
+  turns(row, column) = 1.0;
+  if (turns.determinant() < 0.0) turns(row, column) = -1.0;
+  return Eigen::Quaterniond(turns);
+}
+
+// How the pose in which the skins were bound becomes the figure's rest, where the nodes have
+// another one. Nothing says how the mesh stood in the world then: its axes stay, and it is laid as
+// near to the nodes as quarter turns bring it, so that the pose stays straight. Empty: the nodes
+// rest as the skins were bound, or nothing tells.
+std::optional<Reader::Bound> Reader::other_rest(Draft& draft) {
+  if (!humanoid_.bones.empty()) return std::nullopt;  // VRM says that the nodes stand in T
+  Bound bound{.pose = bound_poses()};
+  std::vector<double> ratios;
+  std::optional<Eigen::Quaterniond> first;
+  bool same = true;
+  for (std::size_t j = 0; j < figure_.nodes.size(); ++j) {
+    const auto at = bound.pose.find(figure_.nodes[j]);
+    if (at == bound.pose.end()) continue;
+    const Pose& now = world_rest_[static_cast<std::size_t>(at->first)];
+    const Eigen::Quaterniond turn = now.rotation * at->second.rotation.conjugate();
+    constexpr double kSame_rad = 0.01;
+    if (!first) first = turn;
+    same = same && first->angularDistance(turn) < kSame_rad;
+    if (figure_.parents[j] < 0) continue;
+    const int parent = figure_.nodes[static_cast<std::size_t>(figure_.parents[j])];
+    const auto above = bound.pose.find(parent);
+    if (above == bound.pose.end()) continue;
+    const double length = (at->second.position - above->second.position).norm();
+    const double now_m = (now.position - world_rest_[std::size_t(parent)].position).norm();
+    if (length > 0.0) ratios.push_back(now_m / length);
+  }
+  if (same || ratios.empty()) return std::nullopt;
+  const auto middle = ratios.begin() + std::ssize(ratios) / 2;
+  std::ranges::nth_element(ratios, middle);
+  bound.scale = *middle;
+  bound.turn = quarter_turns(*first);
+  const auto alike = std::ranges::count_if(
+      ratios, [&](double ratio) { return std::abs(ratio - bound.scale) < 0.02 * bound.scale; });
+  if (bound.scale > 0.0 && 5 * alike >= 4 * std::ssize(ratios)) return bound;
+  draft.warnings.emplace_back(
+      "its skin was bound to bones of other lengths; the figure rests as its nodes stand");
+  return std::nullopt;
+}
+
+void Reader::rest_in(const Bound& bound) {
+  std::vector<std::optional<Pose>> laid(world_rest_.size());  // [node]
+  for (const int node : figure_.nodes) {
+    const auto at = bound.pose.find(node);
+    if (at == bound.pose.end()) continue;
+    auto& pose = laid[static_cast<std::size_t>(node)].emplace();
+    pose.position = bound.turn * (bound.scale * at->second.position);
+    pose.rotation = bound.turn * at->second.rotation;
+  }
+  // A joint that no skin has keeps its place and turn beside its parent, or its first child.
+  const auto place = [&](int from_node, int to_node) {
+    const auto from = static_cast<std::size_t>(from_node), to = static_cast<std::size_t>(to_node);
+    if (!laid[from] || laid[to]) return;
+    const Eigen::Quaterniond change = laid[from]->rotation * world_rest_[from].rotation.conjugate();
+    auto& pose = laid[to].emplace();
+    pose.position =
+        laid[from]->position + change * (world_rest_[to].position - world_rest_[from].position);
+    pose.rotation = change * world_rest_[to].rotation;
+  };
+  const auto parent_of = [this](std::size_t joint) {
+    return figure_.nodes[static_cast<std::size_t>(figure_.parents[joint])];
+  };
+  for (std::size_t j = figure_.nodes.size(); j-- > 1;) place(figure_.nodes[j], parent_of(j));
+  for (std::size_t j = 1; j < figure_.nodes.size(); ++j) place(parent_of(j), figure_.nodes[j]);
+  for (const auto& [joint, tip] : figure_.tips) {
+    place(figure_.nodes[static_cast<std::size_t>(joint)], tip);
+  }
+  const auto root = static_cast<std::size_t>(figure_.nodes[0]);
+  const Eigen::Vector3d moved = world_rest_[root].position - laid[root]->position;
+  for (std::size_t n = 0; n < laid.size(); ++n) {
+    if (!laid[n]) continue;
+    world_rest_[n].position = laid[n]->position + moved;
+    world_rest_[n].rotation = laid[n]->rotation;
+  }
+}
 
 // Whether a joint changes its distance from its parent, as hips below a root do.
 bool Reader::moves(std::size_t joint, const std::vector<Track>& tracks) const {
@@ -653,24 +912,59 @@ void Reader::add_frame(const std::vector<Pose>& world, std::vector<std::array<do
   }
 }
 
+// The nodes of the figure and those above them [node].
+std::vector<char> Reader::nodes_that_matter() const {
+  std::vector<char> matters(model_.nodes.size(), 0);
+  for (int node : figure_.nodes) {
+    for (; node >= 0 && matters[static_cast<std::size_t>(node)] == 0;
+         node = tree_.parent[static_cast<std::size_t>(node)]) {
+      matters[static_cast<std::size_t>(node)] = 1;
+    }
+  }
+  return matters;
+}
+
+void Reader::remark(Draft& draft) const {
+  if (animation_ == nullptr) {
+    draft.warnings.emplace_back("has no animation; its rest pose is the only frame");
+  } else if (model_.animations.size() > 1) {
+    const auto number = animation_ - model_.animations.data() + 1;
+    const std::string name = animation_->name.empty() ? "" : ", " + in_quotes(animation_->name);
+    draft.warnings.push_back("has " + std::to_string(model_.animations.size()) +
+                             " animations; the first one that moves the figure is read (number " +
+                             std::to_string(number) + name + ")");
+  }
+  if (tree_.shared >= 0) {
+    draft.warnings.push_back("node " + std::to_string(tree_.shared) +
+                             " hangs below two others, of which the first counts; it is damaged");
+  }
+}
+
 Result<Draft> Reader::read() {
   if (model_.nodes.empty()) return fail("has no nodes, so there is no figure in it");
   if (model_.nodes.size() > kMaxNodes) return fail("has too many nodes to be a figure");
   humanoid_ = humanoid_of(model_);
   if (humanoid_.backwards)
     forwards_ = Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitY());
-  figure_ = figure_of(model_, tree_, chosen_nodes(model_, humanoid_), humanoid_);
+  animation_ = find_animation(model_, joint_nodes(model_, humanoid_), numbers_);
+  figure_ = figure_of(model_, tree_, chosen_nodes(model_, tree_, humanoid_, animation_), humanoid_);
   if (figure_.nodes.empty()) return fail("its nodes go in a circle; it is damaged");
   if (figure_.nodes.size() > kMaxFigure) {
     return fail("has a figure of more than " + std::to_string(kMaxFigure) + " joints");
   }
   world_rest_.resize(rest_.size());
   place(tree_, rest_, world_rest_);
-  tree_ = needed_of(std::move(tree_), figure_.nodes);
-  Numbers numbers(model_);
-  const auto tracks = TRY(tracks_of(model_, tree_, numbers));
-  const Times times = times_of(tracks);
   Draft draft;
+  const auto bound = other_rest(draft);
+  if (bound) rest_in(*bound);
+  // Where the rest is laid near to a pose it tells nothing about the world.
+  draft.up_may_err = !bound && figure_.bones.empty();
+  const std::vector<char> matters = nodes_that_matter();
+  std::erase_if(tree_.order,
+                [&](int node) { return matters[static_cast<std::size_t>(node)] == 0; });
+  std::vector<Track> tracks;
+  if (animation_ != nullptr) tracks = TRY(tracks_of(model_, *animation_, matters, numbers_));
+  const Times times = times_of(tracks);
   describe(tracks, draft);
   draft.bones = figure_.bones;
   draft.rests_in_t = !humanoid_.bones.empty();
@@ -679,13 +973,8 @@ Result<Draft> Reader::read() {
       times.frames > kMaxSteps / (tree_.order.size() + tracks.size())) {
     return fail("its animation is longer than a clip can be; cut it");
   }
-  if (model_.animations.empty()) {
-    draft.warnings.emplace_back("has no animation; its rest pose is the only frame");
-  } else if (model_.animations.size() > 1) {
-    draft.warnings.push_back("has " + std::to_string(model_.animations.size()) +
-                             " animations; the first one is read");
-  }
-  draft.timecode = timecodes_of(model_, tracks, times);
+  remark(draft);
+  draft.timecode = timecodes_of(animation_, tracks, times);
   std::vector<std::array<double, 3>> near(figure_.nodes.size());
   std::vector<Pose> own = rest_, world = world_rest_;
   for (std::size_t i = 0; i < times.frames; ++i) {
@@ -711,17 +1000,22 @@ Result<Draft> read_gltf(const ClipFile& file, const ReadOptions& options) {
   const auto model = TRY(load_model(file));
   auto draft = Reader(model, file).read();
   if (!draft) return fail(draft.error().message, file.name);
+  draft->said_up = options.up;
+  draft->said_facing = options.facing;
+  draft->said_unit_m = options.metres_per_unit;
+  draft->unit_may_err = draft->bones.empty();
   if (draft->bones.empty()) draft->profile = TRY(find_profile(draft->skeleton, options.profile));
   return draft;
 }
 
 // .vrm is an avatar: a figure without motion.
 Format gltf_format() {
-  return {.name = "glTF",
-          .extensions = {".gltf", ".vrm"},
-          .evenly_spaced = true,
-          .options = {ReadOption::kProfile},
-          .read = read_gltf};
+  return {
+      .name = "glTF",
+      .extensions = {".gltf", ".vrm"},
+      .evenly_spaced = true,
+      .options = {ReadOption::kUnit, ReadOption::kUp, ReadOption::kFacing, ReadOption::kProfile},
+      .read = read_gltf};
 }
 
 }  // namespace posed::clip

@@ -54,12 +54,23 @@ bool Frames::palms_are_thumbs() const {
   });
 }
 
+// Whether the arms, though unlike, are those of somebody who stands: both at their sides in the
+// plane of the chest, and one of them along no axis, as a folded one would be.
+bool Frames::arms_slant(const Both& way, const Vec& left, const Vec& right) const {
+  constexpr double kAxis_deg = 10, kAhead = 0.35;  // the latter of a direction: 20 degrees
+  const bool at_sides =
+      left.x() > 0 && right.x() < 0 && std::max(std::abs(left.z()), std::abs(right.z())) < kAhead;
+  const bool slants = std::ranges::any_of(
+      way, [](const Vec& arm) { return !nearest_axis(direction(arm), kAxis_deg).has_value(); });
+  return at_sides && slants && !legs_folded_;
+}
+
 // Whether the arms of the zero pose hang or reach as a person's do.
 bool Frames::arms_are_real(const Both& way, const std::array<std::optional<Vec>, 2>& palms) const {
   const Mat Tc = *t_frame(top_);
   const Vec left = Tc * direction(way[0]);
   const Vec right = Tc * direction(way[1]);
-  if (angle_deg(mirrored_x(left), right) >= 25) return false;
+  if (angle_deg(mirrored_x(left), right) >= 25 && !arms_slant(way, left, right)) return false;
   double palm_off_deg = 0.0;
   double least_raise_deg = 180.0;
   for (const Side side : kSides) {

@@ -48,8 +48,18 @@ const LengthUnit& unit_for(double length, double true_m, double usual_m) {
   });
 }
 
-void set_unit(double length, double true_m, double usual_m, std::string_view what, Rig& rig) {
+// Whether it may be metres: those of children, giants and toys are.
+bool may_be_metres(double length, double true_m) {
+  constexpr double kToo = 8.0;
+  return length * kToo > true_m && length < kToo * true_m;
+}
+
+void set_unit(double length, double true_m, double usual_m, std::string_view what,
+              const RigInput& input, Rig& rig) {
   if (!(length > 0.0)) return;
+  if (input.format_says && !rig.metres_per_unit && may_be_metres(length, true_m)) {
+    rig.metres_per_unit = 1.0;
+  }
   const LengthUnit& unit = unit_for(length, true_m, usual_m);
   if (!rig.metres_per_unit) {
     rig.metres_per_unit = unit.metres;
@@ -208,17 +218,18 @@ Rig recognise(const RigInput& input) {
     frames.find_person();
     set_facing(input, frames, rig);
     set_unit(frames.leg_length(), kAdultLeg_m, usual_unit_m(input.joints, names),
-             "thigh and shin are", rig);
+             "thigh and shin are", input, rig);
   } else if (found.kind == Kind::kHand) {
     const Side side = found.joint.has(Bone::kLeftHand) ? Side::kLeft : Side::kRight;
     frames.find_hand(side);
-    set_unit(frames.hand_length(side), kAdultHand_m, 0.0, "the hand is", rig);
+    set_unit(frames.hand_length(side), kAdultHand_m, 0.0, "the hand is", input, rig);
   } else {
     rig.kind = Kind::kPart;
     frames.lay_parts();
   }
-  rig.up = input.up.value_or(frames.up());
-  rig.why_up = frames.why_up();
+  const bool by_format = input.format_says && !frames.up_by_zero_pose();
+  rig.up = input.up.value_or(by_format ? UpAxis::kPlusY : frames.up());
+  rig.why_up = by_format && !input.up ? "as the format says" : frames.why_up();
   if (!knows_all_frames(input, rig.bone)) {
     rig.notes.insert(rig.notes.begin(), notes.begin(), notes.end());
   }

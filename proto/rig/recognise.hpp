@@ -26,6 +26,9 @@ struct RigInput {
   std::optional<UpAxis> up;
   std::optional<Eigen::Vector3d> facing;  // the axis of the file that the zero pose faces
   std::optional<double> metres_per_unit;
+  // By the format lengths are metres and +Y is up. Another unit is found only where a person would
+  // be eight times too large or too small, another axis only where the zero pose stands along it.
+  bool format_says = false;
 };
 
 struct Rig {

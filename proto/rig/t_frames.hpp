@@ -49,6 +49,7 @@ class Frames {
   [[nodiscard]] const Evidence& evidence(Bone bone) const { return evidence_[index(bone)]; }
   [[nodiscard]] UpAxis up() const { return up_; }
   [[nodiscard]] const std::string& why_up() const { return why_up_; }
+  [[nodiscard]] bool up_by_zero_pose() const { return up_by_zero_pose_; }
   [[nodiscard]] double leg_length() const;
   [[nodiscard]] double hand_length(Side side) const;
 
@@ -94,6 +95,7 @@ class Frames {
   void find_sole();
   void add_slopes(Side side, std::vector<double>& slopes) const;
   void arms();
+  [[nodiscard]] bool arms_slant(const Both& way, const Vec& left, const Vec& right) const;
   [[nodiscard]] bool arms_are_real(const Both& arm,
                                    const std::array<std::optional<Vec>, 2>& palm) const;
   void arms_by_elbows(const Both& arm);
@@ -121,6 +123,7 @@ class Frames {
   Vec zero_up_ = kY;
   UpAxis up_ = UpAxis::kPlusY;
   std::string why_up_;
+  bool up_by_zero_pose_ = false;
   Bone top_ = Bone::kHips;  // the trunk bone that carries the arms
   int carrier_ = 0;         // the joint that carries them
   std::optional<Mat> T_chest_;

@@ -228,6 +228,7 @@ void Frames::find_up() {
   if (zero != nullptr && zero->mean > 0.3) {
     up_ = zero->up;
     why_up_ = "the zero pose stands along it";
+    up_by_zero_pose_ = true;
   } else if (best.up != UpAxis::kPlusY && (zero == nullptr || best.up == UpAxis::kPlusZ) &&
              best.stand > 0.9 && best.above > 0.9 && y_mean < 0.35) {
     up_ = best.up;

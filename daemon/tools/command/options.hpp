@@ -83,18 +83,18 @@ inline void add_figure_options(CLI::App& command, clip::ReadOptions& read) {
   command
       .add_option_function<std::string>(
           "--up", [&read](const std::string& text) { read.up = up_from_text(text); },
-          "The axis of a BVH that points up (default: recognised)")
+          "The axis of a clip that points up (default: recognised)")
       ->check(CLI::IsMember({"+y", "+z", "-y", "-z", "+x"}));
   command
       .add_option_function<std::string>(
           "--facing", [&read](const std::string& text) { read.facing = axis_from_text(text); },
-          "The axis that the zero pose of a BVH faces (default: recognised by left and right)")
+          "The axis that the zero pose of a clip faces (default: recognised by left and right)")
       ->check(CLI::IsMember({"+x", "-x", "+y", "-y", "+z", "-z"}));
   command
       .add_option_function<std::string>(
           "--unit",
           [&read](const std::string& text) { read.metres_per_unit = clip::metres_of_unit(text); },
-          "Unit of a BVH: m, dm, cm, mm, inch, foot or a number of metres (default: recognised)")
+          "Unit of a clip: m, dm, cm, mm, inch, foot or a number of metres (default: recognised)")
       ->check([](const std::string& text) {
         return clip::metres_of_unit(text) ? std::string()
                                           : fmt::format("'{}' is no unit of length", text);

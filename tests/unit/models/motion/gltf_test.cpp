@@ -2,11 +2,13 @@
 #include <catch2/catch.hpp>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <functional>
 #include <limits>
 #include <memory>
+#include <span>
 
 #include "models/motion/canonical_skeleton.hpp"
 #include "models/motion/kinematics.hpp"
@@ -421,6 +423,145 @@ TEST_CASE("an avatar of VRM 0 or 1 faces forward, rests in T and has the lengths
   }
 }
 
+namespace {
+
+// A walk as a .glb that another program could have written.
+class OtherGlb {
+ public:
+  OtherGlb() : path_(folder_.path() / "walk.glb") {
+    REQUIRE(clip::write_glb(walk, path_));
+    model = test::ReadGltf(path_).model;
+  }
+
+  Result<clip::Clip> read() {
+    REQUIRE(
+        tinygltf::TinyGLTF().WriteGltfSceneToFile(&model, path_.string(), true, true, false, true));
+    return clip::read_clip(path_);
+  }
+  void check_same(double most_rad = 1e-3) {
+    const auto back = read();
+    if (!back) FAIL(back.error().text());
+    test::check_same_motion(walk, *back);
+    for (const Joint& joint : walk.skeleton->joints) {
+      INFO(joint.name);
+      const Joint& got =
+          back->skeleton->joints[static_cast<std::size_t>(back->skeleton->joint_index(joint.name))];
+      CHECK(got.bone == joint.bone);
+      CHECK(angle_between_rad(got.T_world_joint, joint.T_world_joint) < most_rad);
+    }
+  }
+  tinygltf::Accessor& keys(std::size_t channel) {
+    tinygltf::Animation& animation = model.animations.back();
+    const auto sampler = static_cast<std::size_t>(animation.channels[channel].sampler);
+    return model.accessors[static_cast<std::size_t>(animation.samplers[sampler].output)];
+  }
+  std::vector<double> key(std::size_t channel, std::size_t at) {
+    const tinygltf::Accessor& accessor = keys(channel);
+    const auto& view = model.bufferViews[static_cast<std::size_t>(accessor.bufferView)];
+    std::vector<float> values(accessor.type == TINYGLTF_TYPE_VEC4 ? 4 : 3);
+    const std::size_t bytes = values.size() * sizeof(float);
+    std::memcpy(values.data(), model.buffers[0].data.data() + view.byteOffset + at * bytes, bytes);
+    return {values.begin(), values.end()};
+  }
+
+  clip::Clip walk = walker_clip();
+  tinygltf::Model model;
+
+ private:
+  test::TempFolder folder_;
+  std::filesystem::path path_;
+};
+
+}  // namespace
+
+TEST_CASE("nodes that stand in a pose: the figure rests where its skin was bound") {
+  OtherGlb glb;
+  const auto& channels = glb.model.animations[0].channels;
+  for (std::size_t c = 0; c < channels.size(); ++c) {
+    auto& node = glb.model.nodes[static_cast<std::size_t>(channels[c].target_node)];
+    if (channels[c].target_path == "rotation") node.rotation = glb.key(c, 20);
+    if (channels[c].target_path == "translation") node.translation = glb.key(c, 20);
+  }
+  const auto back = glb.read();
+  if (!back) FAIL(back.error().text());
+  for (const int i : {0, 31}) {
+    const WorldPose truth = world_pose(*glb.walk.skeleton, glb.walk.frame(i));
+    const WorldPose got = world_pose(*back->skeleton, back->frame(i));
+    for (std::size_t j = 0; j < glb.walk.skeleton->joints.size(); ++j) {
+      const Joint& joint = glb.walk.skeleton->joints[j];
+      INFO(joint.name);
+      const auto k = static_cast<std::size_t>(back->skeleton->joint_index(joint.name));
+      CHECK((got.position_m[k] - truth.position_m[j]).norm() < 1e-4);
+      const auto& T = back->skeleton->joints[k].T_world_joint;
+      CHECK(angle_between_rad(got.rotation[k] * T.conjugate(),
+                              truth.rotation[j] * joint.T_world_joint.conjugate()) < 1e-3);
+    }
+  }
+}
+
+TEST_CASE("sparse keys are read") {
+  OtherGlb glb;
+  tinygltf::Accessor& keys = glb.keys(3);
+  std::vector<std::uint16_t> places(keys.count);
+  for (std::size_t i = 0; i < places.size(); ++i) places[i] = static_cast<std::uint16_t>(i);
+  keys.sparse = {.count = static_cast<int>(keys.count),
+                 .isSparse = true,
+                 .indices = {.byteOffset = 0,
+                             .bufferView = static_cast<int>(glb.model.bufferViews.size()),
+                             .componentType = TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT},
+                 .values = {.bufferView = keys.bufferView, .byteOffset = 0}};
+  keys.bufferView = -1;
+  auto& data = glb.model.buffers[0].data;
+  tinygltf::BufferView view;
+  view.buffer = 0;
+  view.byteOffset = data.size();
+  view.byteLength = places.size() * sizeof(places[0]);
+  const auto bytes = std::as_bytes(std::span(places));
+  for (const std::byte byte : bytes) data.push_back(static_cast<unsigned char>(byte));
+  glb.model.bufferViews.push_back(view);
+  glb.check_same();
+}
+
+TEST_CASE("the animation that moves the figure is read, and the second of two channels is not") {
+  OtherGlb glb;
+  tinygltf::Animation still = glb.model.animations[0];  // of a node that is no joint
+  still.channels.resize(1);
+  still.channels[0].target_node = static_cast<int>(glb.model.nodes.size()) - 1;
+  glb.model.animations.insert(glb.model.animations.begin(), still);
+  auto& channels = glb.model.animations[1].channels;
+  channels.push_back(channels.back());
+  channels.back().sampler = channels[2].sampler;
+  glb.check_same();
+}
+
+TEST_CASE("joints that no skin has are joints where an animation turns them") {
+  OtherGlb glb;
+  const auto lacks = [&](int node) {
+    const std::string& name = glb.model.nodes[static_cast<std::size_t>(node)].name;
+    return test::has(name, "Foot") || test::has(name, "Toe") || test::has(name, "Head");
+  };
+  std::erase_if(glb.model.skins[0].joints, lacks);
+  glb.model.skins[0].inverseBindMatrices = -1;
+  glb.check_same();
+}
+
+TEST_CASE("a glTF in centimetres that stands along +z is brought into metres and +y up") {
+  OtherGlb glb;
+  tinygltf::Node above;
+  above.name = "root";
+  above.children = glb.model.scenes[0].nodes;
+  above.scale.assign(3, 100.0);
+  const double half = std::sqrt(0.5);
+  above.rotation = {half, 0.0, 0.0, half};
+  glb.model.scenes[0].nodes = {static_cast<int>(glb.model.nodes.size())};
+  glb.model.nodes.push_back(above);
+  glb.check_same(1e-3);
+  const auto back = glb.read();
+  REQUIRE(back->warnings.size() >= 2);
+  CHECK(test::has(back->warnings[back->warnings.size() - 2], "taken as centimetres"));
+  CHECK(test::has(back->warnings.back(), "taken as +z up"));
+}
+
 TEST_CASE("what is no glTF, or a damaged one, is refused with a reason") {
   const auto refused = [](const std::string& bytes) {
     const auto clip = clip::parse_clip({.name = "x.gltf", .bytes = bytes});
@@ -430,6 +571,7 @@ TEST_CASE("what is no glTF, or a damaged one, is refused with a reason") {
   };
   CHECK(test::has(refused("glTF and nothing more"), "no glTF that can be read"));
   CHECK(test::has(refused("{"), "no glTF that can be read"));
+  CHECK(test::has(refused("{\"extras\":" + std::string(1'000'000, '[')), "nested too deep"));
   const std::string asset = "{\"asset\":{\"version\":\"2.0\"}";
   CHECK(test::has(refused(asset + "}"), "no nodes"));
   CHECK(test::has(refused(asset + ",\"nodes\":[{\"children\":[1]},{\"children\":[0]}]}"),
@@ -509,9 +651,6 @@ TEST_CASE("the tracks of a glTF take no more memory and time than its bytes are 
   const auto fair = glb(4, 100);
   REQUIRE(fair);
   CHECK(fair->frames() == kKeys);
-  const auto overlapping = glb(10, 10);
-  REQUIRE_FALSE(overlapping);
-  CHECK(test::has(overlapping.error().text(), "damaged"));
 }
 
 }  // namespace posed::motion

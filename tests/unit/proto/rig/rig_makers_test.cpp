@@ -199,6 +199,27 @@ TEST_CASE("rig: soles are flat below legs that stand apart, unless they were lai
   }
 }
 
+TEST_CASE("rig: arms that a stance holds unlike are laid level each, without fingers") {
+  for (const auto& [left_deg, right_deg] : {std::pair(0.0, 40.0), {80.0, 40.0}, {20.0, 60.0}}) {
+    INFO(left_deg << " and " << right_deg);
+    auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+    made.input.poses = {};
+    const auto lower = [&](Bone upper_arm, double deg) {
+      const Mat down = Eigen::AngleAxisd(deg * kDegree, rig::kZ).toRotationMatrix();
+      const auto first = static_cast<std::size_t>(upper_arm);
+      for (std::size_t j = first; j < first + 3; ++j) {
+        rig::RigJoint& joint = made.input.joints[j];
+        if (j > first) joint.offset = down * joint.offset;
+        if (joint.end_site) joint.end_site = down * *joint.end_site;
+        made.T[j] = down.transpose();
+      }
+    };
+    lower(Bone::kLeftUpperArm, -left_deg);
+    lower(Bone::kRightUpperArm, right_deg);
+    CHECK(worst_deg(rig::recognise(made.input), made) < 1.0);
+  }
+}
+
 TEST_CASE("rig: the unit of MikuMikuDance's figures is 8 cm") {
   auto made = test::make(test::kSchemes[9], ZeroPose::kA, Mat::Identity(), 0.08);
   made.input.poses = {};

@@ -191,6 +191,23 @@ TEST_CASE("the position goes to the channels that move the figure, wherever they
   }
 }
 
+TEST_CASE("a recording at another pace than the nominal rate keeps its own") {
+  const auto skeleton = std::make_shared<const Skeleton>(standing_above({0}));
+  Frame frame;
+  frame.joint_count = static_cast<std::uint16_t>(skeleton->joints.size());
+  clip::FramesClip made(skeleton);
+  std::vector<double> times_s;
+  for (int i = 0; i < 20; ++i) {
+    made.add(frame);
+    times_s.push_back(i / 60.0 + (i % 3) * 0.001);  // as they arrived
+  }
+  const auto rate_hz = [&](double nominal_hz) {
+    return made.finish("made", nominal_hz, times_s).value().frame_rate_hz;
+  };
+  CHECK(rate_hz(120.0) == Approx(60.0).epsilon(0.1));
+  CHECK(rate_hz(59.94) == 59.94);
+}
+
 TEST_CASE("values that a frame lacks keep their last value, with a warning") {
   const auto skeleton = std::make_shared<const Skeleton>(standing_above({}));
   clip::Clip clip;
