@@ -184,6 +184,7 @@ std::vector<Eigen::Vector3d> outermost(std::span<const Eigen::Vector3d> corners)
     all.insert(best);
   }
   std::vector<Eigen::Vector3d> outer;
+  outer.reserve(all.size());
   for (const std::size_t c : all) outer.push_back(corners[c]);
   return outer;
 }
