@@ -106,8 +106,9 @@ struct OutputConfig {
   bool euler = false;                     // mvn: angles instead of quaternions
   bool lz4 = true;                        // rokoko: compressed
   // natnet
-  std::string group;     // where everybody gets the frames, too; empty: nowhere
-  int data_port = 1511;  // of the group
+  std::string group;            // where everybody gets the frames, too; empty: nowhere
+  int data_port = 1511;         // of the group
+  std::string version = "4.1";  // of the group
   // ros2; peers are other computers
   int domain = 0;
   std::string interface = "lo";

@@ -36,6 +36,8 @@ constexpr double kMaxPort = 65535.0;
 constexpr std::size_t kMaxRos2Streams = 16;
 constexpr Range kDdsDomain{0.0, 232.0};  // those above have no ports
 constexpr std::size_t kMaxTopic = 128, kMaxInterface = 15;
+constexpr std::array<std::string_view, 7> kNatNetVersions{"4.1",  "4.0",  "3.1", "3.0",
+                                                          "2.11", "2.10", "2.9"};
 constexpr std::string_view kNatNetPort = ":1510";
 
 // The keys that some kinds do not have, with those that do.
@@ -60,6 +62,7 @@ const std::vector<KindsKey>& kinds_keys() {
       {"format", {kAxis, kMvn, kRokoko}},
       {"group", {kNatNet}},
       {"data_port", {kNatNet}},
+      {"version", {kNatNet}},
       {"streams", {kRos2}},
       {"domain", {kRos2}},
       {"interface", {kRos2}},
@@ -267,6 +270,7 @@ void OutputReader::read_natnet(TableReader& table, OutputConfig& output) const {
   output.listen = "127.0.0.1";
   table.read("data_port", output.data_port, {1.0, kMaxPort});
   table.read("group", output.group);
+  output.version = kNatNetVersions[table.choice("version", kNatNetVersions)];
   read_clients(table, output);
   if (output.group.empty()) return;
   const auto group = drivers::parse_host(output.group);

@@ -67,6 +67,7 @@ NatNetOutput::NatNetOutput(const config::OutputConfig& config,
       data_port_(static_cast<std::uint16_t>(config.data_port)),
       limit_hz_(config.rate_hz),
       group_(group),
+      usual_(group ? natnet::read_version(config.version).value_or(kNewest) : kNewest),
       scene_(config.people()) {}
 
 NatNetOutput::~NatNetOutput() { ::close(fd_); }
@@ -147,7 +148,7 @@ void NatNetOutput::answer(const drivers::Address& from, const natnet::Message& m
                           std::int64_t now_ns) {
   Client* client = find(from);
   if (client != nullptr) client->heard_ns = now_ns;
-  const Version version = client == nullptr ? kNewest : client->version;
+  const Version version = client == nullptr ? usual_ : client->version;
   switch (message.id) {
     case natnet::MessageId::kConnect:
     case natnet::MessageId::kDiscovery: {
@@ -155,10 +156,10 @@ void NatNetOutput::answer(const drivers::Address& from, const natnet::Message& m
       // With a group a client gets the frames there, unless it says that it is alive here.
       const bool connects = message.id == natnet::MessageId::kConnect;
       if (connects && (!group_ || client != nullptr)) {
-        admit(from, group_ ? kNewest : wanted, now_ns);
+        admit(from, group_ ? usual_ : wanted, now_ns);
       }
       natnet::ServerInfo info{.name = "posed",
-                              .version = group_ ? kNewest : wanted,
+                              .version = group_ ? usual_ : wanted,
                               .clock_hz = NatNetScene::kClock_hz,
                               .data_port = data_port_,
                               .multicast = group_.has_value()};
@@ -169,7 +170,7 @@ void NatNetOutput::answer(const drivers::Address& from, const natnet::Message& m
     }
     case natnet::MessageId::kKeepAlive:
       // Without a group a client says first which version it reads.
-      if (client == nullptr && group_) admit(from, kNewest, now_ns);
+      if (client == nullptr && group_) admit(from, usual_, now_ns);
       return;
     case natnet::MessageId::kDisconnect:
       if (client != nullptr) clients_.erase(clients_.begin() + (client - clients_.data()));
@@ -210,7 +211,7 @@ NatNetOutput::Bytes NatNetOutput::answer_request(std::span<const std::byte> payl
     const auto asked = natnet::read_version(text.substr(1));
     if (asked) client->version = natnet::nearest_version(*asked);
   }
-  const Version version = client == nullptr ? kNewest : client->version;
+  const Version version = client == nullptr ? usual_ : client->version;
   return natnet::encode_text(natnet::MessageId::kResponse, std::string(kBitstream) + "," +
                                                                std::to_string(version.major) + "." +
                                                                std::to_string(version.minor));
@@ -233,7 +234,7 @@ void NatNetOutput::send(std::int64_t now_ns) {
     send_to(client.address, datagram);
   }
   if (!group_) return;
-  encode(kNewest);
+  encode(usual_);
   send_to(*group_, datagram);
 }
 

@@ -67,6 +67,7 @@ class NatNetOutput final : public Output {
   std::uint16_t data_port_;
   double limit_hz_;
   std::optional<drivers::Address> group_;
+  Version usual_;  // the group's; without one, of who has not said a version
   NatNetScene scene_;
   std::vector<Client> clients_;
   std::size_t live_ = 0;                  // of clients_, as of the beginning of the turn

@@ -192,8 +192,9 @@ Outcome decode_pose(const Head& head, std::span<const std::byte> items,
   std::int32_t before = 0;
   for (std::size_t i = 0; i < wanted; ++i) {
     const std::int32_t id = reader.i32();
-    // 01 and 02 count the segments up; which number begins is not looked at.
-    const bool counts = i == 0 || i >= kBodySegments || unity || id == before + 1;
+    // 01 and 02 count the segments up, from any number, or have no ids, which are 0.
+    const bool same = id == before + 1 || (id == 0 && before == 0);
+    const bool counts = same || i == 0 || i >= kBodySegments || unity;
     valid = valid && counts;
     before = id;
     const bool prop = i >= kBodySegments && i < kBodySegments + shape.props;

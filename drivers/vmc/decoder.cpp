@@ -219,6 +219,10 @@ RT_SAFE bool VmcDecoder::emit_frame(std::int64_t device_ns, Sink& sink) noexcept
   for (std::size_t bone = 0; bone < kBoneCount; ++bone) {
     const int joint = layout_->joint_of[bone];
     if (joint == VmcLayout::kNone || arrival_ns_ >= keeps_until_ns_[bone]) continue;
+    if (!set_[bone] && !left_out_[bone]) {
+      left_out_.set(bone);
+      continue;
+    }
     frame.rotation_xyzw[joint] = rotation_xyzw_[bone];
     frame.valid.set(joint);
   }

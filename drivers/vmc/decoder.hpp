@@ -74,7 +74,9 @@ class VmcDecoder final : public LayoutDecoder<VmcLayout> {
   std::bitset<kBoneCount> received_;  // bones of it
   std::bitset<kBoneCount> set_;       // bones of the frame so far
   bool applied_ = false;              // /VMC/Ext/Blend/Apply came since the last sample
-  // Of a sender that leaves out bones which did not turn: until then a bone keeps its rotation.
+  // A bone that is not in a frame may be lost. One that is missing again is left out by its sender,
+  // because it did not turn: until then it keeps its rotation.
+  std::bitset<kBoneCount> left_out_;
   std::array<std::int64_t, kBoneCount> keeps_until_ns_{};
   // The last values received, in posed's axes.
   std::array<Vec3f, kBoneCount> position_m_{};     // [bone], relative to the parent

@@ -525,6 +525,7 @@ TEST_CASE("the shipped config contains every key with its default") {
   CHECK(b.outputs[6].peers == no_output.peers);
   CHECK(b.outputs[6].group == no_output.group);
   CHECK(b.outputs[6].data_port == no_output.data_port);
+  CHECK(b.outputs[6].version == no_output.version);
   CHECK(b.outputs[7].domain == no_output.domain);
   CHECK(b.outputs[7].interface == no_output.interface);
   CHECK(b.outputs[7].peers == no_output.peers);

@@ -189,6 +189,7 @@ kind = "natnet"
 body = "ann"
 group = "239.255.42.99"
 data_port = 1600
+version = "3.0"
 [[output]]
 kind = "rokoko"
 body = "ann"
@@ -203,6 +204,7 @@ format = "json"
   CHECK(reading.config.outputs[1].listen == "127.0.0.1:1510");
   CHECK(reading.config.outputs[1].group == "239.255.42.99");
   CHECK(reading.config.outputs[1].data_port == 1600);
+  CHECK(reading.config.outputs[1].version == "3.0");
   CHECK_FALSE(reading.config.outputs[2].lz4);
 
   const std::string mvn = "[[output]]\nkind = \"mvn\"\n", to = "to = [\"127.0.0.1:9763\"]\n";
@@ -225,6 +227,7 @@ format = "json"
         "posed.toml:15: '192.168.1.1' should be a multicast group, like 239.255.42.99");
   CHECK(output_complaint(natnet + "listen = \"::1\"\ngroup = \"239.255.42.99\"\n") ==
         "posed.toml:16: to send to a group, listen must be an IPv4 address");
+  CHECK(output_complaint(natnet + "version = \"2.5\"\n").find("\"2.9\"") != std::string::npos);
   CHECK(output_complaint(natnet + "data_port = 70000\n").find("out of range") != std::string::npos);
   CHECK(output_complaint(natnet + "listen = \"0.0.0.0\"\n").find("in peers") != std::string::npos);
   CHECK(output_complaint(natnet + natnet + "name = \"second\"\n") ==

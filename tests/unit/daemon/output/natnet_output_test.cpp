@@ -268,6 +268,20 @@ TEST_CASE("each NatNet client gets frames of the version that it asks for, or th
   CHECK(rig.stats().receivers() == 4);
 }
 
+TEST_CASE("a NatNet group and who asks beside it get the version of the config") {
+  const auto walk = motion::make_walker({.seconds = 1.0}).value();
+  config::OutputConfig config = natnet_config({"ann"});
+  config.group = "239.255.42.99";
+  config.version = "3.0";
+  NatNetServerRig rig(config);
+  rig.output->stream_comes(info_of(0, "ann", walk.skeleton));
+  const NatNetClient client(rig);
+  CHECK(client.connect({4, 1}) == Version{3, 0});
+  client.send(natnet::encode_message(MessageId::kKeepAlive, {}));
+  rig.pass(frame_of(0, walk.frame(0)), rig.now_ns);
+  CHECK(is_frame_of(client.next(), {3, 0}));
+}
+
 TEST_CASE("a NatNet server answers the recorded requests of the vendor's client as Motive did") {
   const auto recorded = [](const std::string& name) {
     return test::shared("data/streams/natnet_python_natnet/" + name + "_packet_v3.bin");
