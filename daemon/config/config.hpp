@@ -42,4 +42,13 @@ Result<SecurityConfig> load_security(const std::filesystem::path& path);
 
 [[nodiscard]] bool is_stream_name(std::string_view name);  // [a-z0-9_-]{1,32}
 
+struct PortClash {
+  std::string_view key{};  // of the table that comes second
+  int line = 0;            // of that table, where the key has several; 0: unknown
+  std::string message{};
+};
+
+// Ports that the config gives away twice, so that one of the two would never work.
+[[nodiscard]] std::vector<PortClash> port_clashes(const DaemonConfig& config);
+
 }  // namespace posed::config

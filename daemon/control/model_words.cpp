@@ -7,8 +7,8 @@
 #include <spdlog/fmt/fmt.h>
 #include <nlohmann/json.hpp>
 
-#include "daemon/control/model_strip.hpp"
 #include "models/gesture/model_file.hpp"
+#include "models/style/model/model_strip.hpp"
 #include "models/style/model/style_model.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
@@ -75,7 +75,7 @@ ModelWords words_of_style(const style::StyleModel& model,
                        : fmt::format("its own: {} joints from {} on", model.space.joints.size(),
                                      model.space.joints.empty() ? "" : model.space.joints.front());
   words.verdict = text_of(report, "verdict");
-  words.strip = strip_of(model, known);
+  words.strip = style::strip_of(model, known);
   return words;
 }
 

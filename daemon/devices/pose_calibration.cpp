@@ -1,14 +1,79 @@
 #include "daemon/devices/pose_calibration.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
+#include <optional>
+#include <span>
 #include <utility>
 
-#include "daemon/devices/possible_angles.hpp"
-#include "daemon/devices/thumb_contacts.hpp"
+#include <fmt/format.h>
+
 #include "drivers/glove/crosstalk.hpp"
+#include "drivers/glove/possible_angles.hpp"
+#include "models/hand/geometry.hpp"
+#include "models/hand/thumb_fit.hpp"
 
 namespace posed::devices {
+namespace {
+
+using drivers::glove::CalibrationFile;
+using drivers::glove::Model;
+using drivers::glove::Pose;
+using drivers::glove::Recorded;
+using drivers::glove::touched_finger;
+
+// The poses of which it is known where the thumb is: what it touches, beside the index finger in
+// the flat hand, away from the hand where all is spread.
+std::vector<hand::ThumbPose> contacts_of(const Model& model,
+                                         const drivers::glove::Calibration& calibration,
+                                         const Recorded& recorded) {
+  std::vector<hand::ThumbPose> poses;
+  for (std::size_t p = 0; p < drivers::glove::kPoses; ++p) {
+    const auto pose = static_cast<Pose>(p);
+    const int touched = touched_finger(pose);
+    const bool known = touched != 0 || pose == Pose::kFlat || pose == Pose::kSpread;
+    if (!known || !drivers::glove::was_held(recorded[p])) continue;
+    hand::ThumbPose contact{.angles = drivers::glove::angles_of(model, calibration, recorded[p]),
+                            .touched = {},
+                            .beside = pose == Pose::kFlat,
+                            .stretched = pose == Pose::kSpread};
+    // A joint that no sensor measures is straight.
+    for (double& angle_rad : contact.angles) {
+      if (!std::isfinite(angle_rad)) angle_rad = 0.0;
+    }
+    if (touched != 0) contact.touched.set(static_cast<std::size_t>(touched));
+    poses.push_back(contact);
+  }
+  return poses;
+}
+
+// The row of the map that alone gives this angle, from a sensor that gives nothing else.
+std::optional<drivers::glove::MapRow> only_row(std::span<const drivers::glove::MapRow> rows,
+                                               std::size_t angle) {
+  const auto of_angle = [&](const auto& row) { return row.channel == angle; };
+  const auto row = std::ranges::find_if(rows, of_angle);
+  if (row == rows.end() || std::ranges::count_if(rows, of_angle) != 1) return std::nullopt;
+  const auto shares = std::ranges::count(rows, row->sensor, &drivers::glove::MapRow::sensor);
+  return shares == 1 ? std::optional(*row) : std::nullopt;
+}
+
+// With angle = k value + b, the angle's gain g and offset o are gain g and this offset of the
+// value.
+void change_sensor(const drivers::glove::MapRow& row, const drivers::glove::Sensor& sensor,
+                   double g, double o, CalibrationFile& file) {
+  const auto points = file.sensors.find(sensor.name);
+  const double k = static_cast<double>(row.gain) * sensor.map_sign;
+  if (points == file.sensors.end() || k == 0.0) return;
+  const auto b = static_cast<double>(row.offset_rad);
+  for (auto& point : points->second) point[1] = g * point[1] + (g * b + o - b) / k;
+}
+
+double gap_mm(const hand::HandGeometry& geometry, const hand::ThumbPose& pose, int finger) {
+  return 1e3 * hand::thumb_gap_m(geometry, pose.angles, finger);
+}
+
+}  // namespace
 
 drivers::glove::CalibrationFile blank_calibration(const drivers::glove::Model& model,
                                                   const std::string& identity, Side hand,
@@ -39,9 +104,47 @@ Result<PoseCalibration> calibrate_by_contacts(const drivers::glove::Model& model
   PoseCalibration made{.file = std::move(file), .said = {}, .warnings = {}};
   const Side hand = made.file.hand;
   made.said = TRY(fit_contacts(model, recorded, hand, made.file));
-  auto odd = TRY(keep_possible(model, recorded, hand, made.file));
+  auto odd = TRY(drivers::glove::keep_possible(model, recorded, hand, made.file));
   std::ranges::move(odd, std::back_inserter(made.warnings));
   return made;
+}
+
+Result<std::vector<std::string>> fit_contacts(const Model& model, const Recorded& recorded,
+                                              Side hand, CalibrationFile& file) {
+  const auto calibration =
+      TRY(drivers::glove::make_calibration(model, file, hand, /*identity=*/""));
+  const auto poses = contacts_of(model, *calibration, recorded);
+  const bool touches =
+      std::ranges::any_of(poses, [](const auto& pose) { return pose.touched.any(); });
+  std::vector<std::string> sentences;
+  if (!touches) return sentences;
+  const std::span rows(calibration->map.data(), calibration->map_rows);
+  if (!only_row(rows, hand::kThumbAngles[0])) {
+    sentences.emplace_back(
+        "this glove does not measure how far the thumb opposes: contacts change "
+        "nothing");
+    return sentences;
+  }
+  const HandShape& shape = default_hand_shape();
+  const hand::HandGeometry geometry = hand::hand_geometry(shape);
+  const hand::ThumbMap fit = hand::fit_thumb(shape, poses);
+  for (std::size_t i = 0; i < hand::kThumbAngles.size(); ++i) {
+    const auto row = only_row(rows, hand::kThumbAngles[i]);
+    if (!row) continue;
+    change_sensor(*row, model.sensors[row->sensor], fit.gain[i], fit.offset_rad[i], file);
+  }
+  const auto fitted = TRY(drivers::glove::make_calibration(model, file, hand, /*identity=*/""));
+  const auto after = contacts_of(model, *fitted, recorded);
+  for (std::size_t p = 0; p < poses.size(); ++p) {
+    for (int finger = 1; finger < kFingers; ++finger) {
+      if (!poses[p].touched[static_cast<std::size_t>(finger)]) continue;
+      sentences.push_back(fmt::format("thumb to {} {:.0f} mm, without contacts {:.0f} mm",
+                                      kFingerNames[static_cast<std::size_t>(finger)],
+                                      gap_mm(geometry, after[p], finger),
+                                      gap_mm(geometry, poses[p], finger)));
+    }
+  }
+  return sentences;
 }
 
 }  // namespace posed::devices

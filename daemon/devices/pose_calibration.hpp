@@ -33,4 +33,12 @@ Result<PoseCalibration> calibrate_by_contacts(const drivers::glove::Model& model
                                               const drivers::glove::Recorded& recorded,
                                               drivers::glove::CalibrationFile file);
 
+// Changes the values of the thumb's sensors in `file`, which fit_poses() has made from the same
+// poses, so that the hand touches where the user's did. Returns sentences with the gaps before and
+// after; none if no contact was recorded. A thumb without a sensor for its opposition is left as it
+// is, with a sentence.
+Result<std::vector<std::string>> fit_contacts(const drivers::glove::Model& model,
+                                              const drivers::glove::Recorded& recorded, Side hand,
+                                              drivers::glove::CalibrationFile& file);
+
 }  // namespace posed::devices

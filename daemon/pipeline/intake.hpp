@@ -9,8 +9,8 @@
 #include <span>
 #include <string_view>
 
-#include "daemon/pipeline/device_clock.hpp"
 #include "daemon/pipeline/messages.hpp"
+#include "drivers/device_clock.hpp"
 #include "proto/frame/sink.hpp"
 
 namespace posed::pipeline {
@@ -87,7 +87,7 @@ class Intake final : public Sink {
 
   std::uint64_t& next_item_;
   IntakeOut& out_;
-  DeviceClock clock_;
+  drivers::DeviceClock clock_;
   std::uint64_t jumps_reported_ = 0;  // jumps of the device's clock that were already reported
   std::int64_t arrival_ns_ = 0;
   std::array<std::uint8_t, kMaxBodies> place_of_{};  // [body] index in streams_

@@ -1,13 +1,16 @@
 #include "daemon/service/service.hpp"
 
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <string_view>
+#include <system_error>
 #include <utility>
 
 #include <spdlog/spdlog.h>
 #include <systemd/sd-daemon.h>
 
 #include "daemon/system/clock.hpp"
-#include "daemon/system/thread_state.hpp"
 #include "proto/frame/result.hpp"
 
 namespace posed::service {
@@ -16,7 +19,48 @@ namespace {
 // Between two looks a thread may sleep that long, and needs as long again on a busy machine.
 constexpr std::int64_t kMinWatchdog_ns = 2 * Watchdog::kLooks * system::kMaxSleep_ns;
 
+// proc_pid_stat(5): "TID (NAME) STATE ...", where NAME may have parentheses and spaces of its own.
+bool waits(std::string_view stat, std::string_view name) {
+  const auto open = stat.find('(');
+  const auto close = stat.rfind(')');
+  if (open == std::string_view::npos || close < open || close + 2 >= stat.size()) return false;
+  return stat.substr(open + 1, close - open - 1) == name && stat[close + 2] == 'D';
+}
+
 }  // namespace
+
+Watchdog::Watchdog(std::vector<system::ThreadPulse> threads, std::int64_t within_ns,
+                   WaitsForDisk waits_for_disk)
+    : every_ns_(within_ns / kLooks), waits_for_disk_(std::move(waits_for_disk)) {
+  for (system::ThreadPulse& thread : threads) {
+    const std::uint64_t beats = thread.pulse->beats();
+    watched_.push_back({.thread = std::move(thread), .seen = beats});
+  }
+}
+
+Watchdog::State Watchdog::state_of(Watched& watched) const {
+  const std::uint64_t beats = watched.thread.pulse->beats();
+  if (std::exchange(watched.seen, beats) != beats) return State::kGoesOn;
+  return waits_for_disk_(watched.thread.thread) ? State::kWaits : State::kStuck;
+}
+
+// The first call only begins the time.
+Watchdog::Finding Watchdog::look(std::int64_t now_ns) {
+  if (looked_ns_ == kNoTime_ns) looked_ns_ = now_ns;
+  if (now_ns - looked_ns_ < every_ns_) return {};
+  looked_ns_ = now_ns;
+  Finding finding{.alive = true, .stuck = {}, .waiting = {}, .again = {}};
+  for (Watched& watched : watched_) {
+    const State state = state_of(watched);
+    if (state == State::kStuck) finding.alive = false;
+    if (std::exchange(watched.state, state) == state) continue;
+    auto& changed = state == State::kStuck   ? finding.stuck
+                    : state == State::kWaits ? finding.waiting
+                                             : finding.again;
+    changed.push_back(watched.thread.thread);
+  }
+  return finding;
+}
 
 Service::Service(std::vector<system::ThreadPulse> threads)
     : present_(std::getenv("NOTIFY_SOCKET") != nullptr) {
@@ -27,7 +71,7 @@ Service::Service(std::vector<system::ThreadPulse> threads)
     spdlog::warn("WatchdogSec is too short for signs of life in time; set it to {} s or more",
                  kMinWatchdog_ns / kNanosPerSecond);
   }
-  watchdog_.emplace(std::move(threads), within_ns, system::waits_for_disk);
+  watchdog_.emplace(std::move(threads), within_ns, waits_for_disk);
 }
 
 void Service::notify(const std::string& words) {
@@ -65,6 +109,19 @@ void Service::turn(std::int64_t now_ns) {
   }
   for (const std::string& thread : found.again) spdlog::warn("the thread {} goes on", thread);
   if (found.alive) notify("WATCHDOG=1");
+}
+
+bool waits_for_disk(const std::string& thread) {
+  const std::string name = thread.substr(0, 15);
+  std::error_code gone;  // a thread may end while its folder is read
+  for (std::filesystem::directory_iterator task("/proc/self/task", gone), end; !gone && task != end;
+       task.increment(gone)) {
+    std::ifstream file(task->path() / "stat");
+    std::string stat;
+    std::getline(file, stat);
+    if (waits(stat, name)) return true;
+  }
+  return false;
 }
 
 }  // namespace posed::service

@@ -213,7 +213,7 @@ void Teacher::tell_signs() {
 Result<> Teacher::check_ready(const std::string& stream, Subject subject) const {
   const bool here = state_.stream() == stream;
   if (subject == Subject::kSigns) {
-    return here ? signs_.check_ready() : SignLesson().check_ready();
+    return here ? signs_.check_ready() : gesture::SignLesson().check_ready();
   }
   for (const Walk walk : {Walk::kNeutral, Walk::kStyle}) {
     if (here && !walks_[at(walk)].empty()) continue;
@@ -371,7 +371,7 @@ Teacher::Judged Teacher::check_walk(Lock& lock, const Collected& collected) {
 }
 
 Teacher::Judged Teacher::check_show(Lock& lock, Collected& collected) {
-  SignLesson signs = signs_;
+  gesture::SignLesson signs = signs_;
   lock.unlock();
   collected.hand.time_s = collected.times.in_seconds();
   const auto added = signs.add(collected.marked.label, std::move(collected.hand));
@@ -404,7 +404,8 @@ Teacher::Outcome Teacher::learn_style(const Walks& walks, const std::string& nam
   return {.bytes = style::serialize_model(*model), .verdict = verdict.sentence};
 }
 
-Teacher::Outcome Teacher::learn_signs(const SignLesson& signs, const std::function<bool()>& go_on) {
+Teacher::Outcome Teacher::learn_signs(const gesture::SignLesson& signs,
+                                      const std::function<bool()>& go_on) {
   auto learnt = signs.train(go_on);
   if (!learnt) return {.problem = learnt.error().text()};
   return {.bytes = std::move(learnt->bytes), .verdict = std::move(learnt->verdict)};
@@ -413,7 +414,7 @@ Teacher::Outcome Teacher::learn_signs(const SignLesson& signs, const std::functi
 void Teacher::train_now(Lock& lock) {
   const std::uint64_t job = job_;
   const auto walks = walks_;
-  const SignLesson signs = signs_;
+  const gesture::SignLesson signs = signs_;
   const Subject subject = subject_;
   const std::string name = name_;
   const std::string stream = state_.stream();

@@ -27,7 +27,7 @@
 #include "daemon/pipeline/raw_tap.hpp"
 #include "daemon/pipeline/ring.hpp"
 #include "daemon/system/clock.hpp"
-#include "daemon/teach/sign_lesson.hpp"
+#include "models/gesture/sign_lesson.hpp"
 #include "models/style/train/dataset.hpp"
 #include "posed/v1/control.pb.h"
 #include "proto/frame/result.hpp"
@@ -111,7 +111,7 @@ class Teacher final : public pipeline::RawTap {
   using Walks = std::array<std::vector<std::shared_ptr<const style::TrainingClip>>, 2>;
   static Outcome learn_style(const Walks& walks, const std::string& name,
                              const std::function<bool()>& go_on);
-  static Outcome learn_signs(const SignLesson& signs, const std::function<bool()>& go_on);
+  static Outcome learn_signs(const gesture::SignLesson& signs, const std::function<bool()>& go_on);
 
   void run();
   void collect(Lock& lock, Collected& collected);
@@ -152,7 +152,7 @@ class Teacher final : public pipeline::RawTap {
   Subject subject_ = Subject::kStyle;
   std::string name_;  // of what is learnt
   Walks walks_;
-  SignLesson signs_;
+  gesture::SignLesson signs_;
   std::optional<TaughtModel> model_;  // for take_model()
 
   std::thread thread_;

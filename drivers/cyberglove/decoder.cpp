@@ -4,7 +4,6 @@
 #include <limits>
 
 namespace posed::drivers::cyberglove {
-
 namespace {
 
 constexpr std::byte kEnd{0};

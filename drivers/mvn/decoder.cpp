@@ -1,12 +1,27 @@
 #include "drivers/mvn/decoder.hpp"
 
 #include <algorithm>
+#include <string_view>
 
 #include "drivers/byte_reader.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::drivers::mvn {
 namespace {
+
+constexpr std::string_view kStart = "MXTP";
+
+// Whether a datagram may begin here, as far as the bytes tell.
+bool may_start(std::span<const std::byte> bytes) noexcept {
+  const std::size_t known = std::min(bytes.size(), kStart.size());
+  return std::ranges::equal(bytes.first(known), std::as_bytes(std::span(kStart)).first(known));
+}
+
+std::size_t until_start(std::span<const std::byte> bytes) noexcept {
+  std::size_t at = 1;
+  while (at < bytes.size() && !may_start(bytes.subspan(at))) ++at;
+  return at;
+}
 
 constexpr std::int64_t kBetweenDescriptions_ns = 300'000'000;
 constexpr std::size_t kTimeCodeBytes = 12;  // "HH:MM:SS.mmm"; closing bytes may follow
@@ -36,6 +51,18 @@ RT_SAFE void fill_frame(const CharacterPose& pose, bool fingers, Frame& frame) n
 }
 
 }  // namespace
+
+Framer::Next Framer::look(std::span<const std::byte> bytes) noexcept {
+  if (!may_start(bytes)) return {.skip = until_start(bytes)};
+  if (bytes.size() < kHeadBytes) return {};
+  Head head;
+  const bool valid = read_head(bytes, head) && head.payload_bytes <= kMaxPayload &&
+                     is_right_size(head, head.payload_bytes);
+  if (!valid) return {.skip = until_start(bytes)};
+  const std::size_t whole = kHeadBytes + head.payload_bytes;
+  if (bytes.size() < whole) return {};
+  return {.whole = whole};
+}
 
 RT_SAFE void MvnDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                               Sink& sink) noexcept {

@@ -1,6 +1,9 @@
 #include "models/gesture/estimate.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
 #include <utility>
 
 namespace posed::gesture {
@@ -9,6 +12,68 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+constexpr double kNever = -std::numeric_limits<double>::infinity();
+
+double log_add(double a, double b) {
+  const double high = std::max(a, b);
+  if (high == kNever) return kNever;
+  return high + std::log1p(std::exp(std::min(a, b) - high));
+}
+
+// Reads a banded matrix by state; states outside the band have probability zero.
+class Banded {
+ public:
+  Banded(const MatrixXd& values, const Band& band) : values_(values), band_(band) {}
+
+  double operator()(Index t, int state) const {
+    const int column = state - band_.first[t];
+    return column >= 0 && column < band_.width ? values_(t, column) : kNever;
+  }
+
+ private:
+  const MatrixXd& values_;
+  const Band& band_;
+};
+
+// alpha: log probability of the frames up to t and of being in the state at t.
+MatrixXd forward(const MatrixXd& density, const VectorXd& log_stay, const VectorXd& log_leave,
+                 const Band& band) {
+  MatrixXd alpha = MatrixXd::Constant(density.rows(), band.width, kNever);
+  const Banded at(alpha, band);
+  if (band.first[0] == 0) alpha(0, 0) = density(0, 0);
+  for (Index t = 1; t < density.rows(); ++t) {
+    for (int k = 0; k < band.width; ++k) {
+      const int j = band.first[t] + k;
+      const double stayed = at(t - 1, j) + log_stay[j];
+      const double came = j > 0 ? at(t - 1, j - 1) + log_leave[j - 1] : kNever;
+      alpha(t, k) = log_add(stayed, came) + density(t, k);
+    }
+  }
+  return alpha;
+}
+
+// beta: log probability of the frames after t, given the state at t.
+MatrixXd backward(const MatrixXd& density, const VectorXd& log_stay, const VectorXd& log_leave,
+                  const Band& band) {
+  const Index frames = density.rows();
+  const int states = static_cast<int>(log_stay.size());
+  MatrixXd beta = MatrixXd::Constant(frames, band.width, kNever);
+  const Banded at(beta, band);
+  const Banded emits(density, band);
+  const int last = states - 1 - band.first[frames - 1];
+  if (last >= 0 && last < band.width) beta(frames - 1, last) = log_leave[states - 1];
+  for (Index t = frames - 2; t >= 0; --t) {
+    for (int k = 0; k < band.width; ++k) {
+      const int j = band.first[t] + k;
+      const double stays = log_stay[j] + emits(t + 1, j) + at(t + 1, j);
+      const double goes =
+          j + 1 < states ? log_leave[j] + emits(t + 1, j + 1) + at(t + 1, j + 1) : kNever;
+      beta(t, k) = log_add(stays, goes);
+    }
+  }
+  return beta;
+}
 
 constexpr double kMinStay = 1e-3;
 constexpr double kMinOccupancy = 1e-6;  // frames; with less, a state's mean would be noise
@@ -25,6 +90,74 @@ void add_path(Statistics& sums, const Frames& frames, const std::vector<int>& pa
 }
 
 }  // namespace
+
+MatrixXd log_density(const Frames& frames, const StateModel& model) {
+  const Index states = model.mean.rows();
+  MatrixXd density(frames.rows(), states);
+  for (Index j = 0; j < states; ++j) {
+    const Eigen::RowVectorXd mean = model.mean.row(j);
+    const Eigen::RowVectorXd precision = model.variance.row(j).cwiseInverse();
+    const double norm = (2.0 * std::numbers::pi * model.variance.row(j).array()).log().sum();
+    for (Index t = 0; t < frames.rows(); ++t) {
+      const auto off = (frames.row(t) - mean).array();
+      density(t, j) = -0.5 * (norm + (off.square() * precision.array()).sum());
+    }
+  }
+  return density;
+}
+
+Band whole_band(Index frames, int states) { return {std::vector<int>(frames, 0), states}; }
+
+Posterior forward_backward(const MatrixXd& density, const VectorXd& stay, const Band& band) {
+  const Index frames = density.rows();
+  const VectorXd log_stay = stay.array().log();
+  const VectorXd log_leave = (1.0 - stay.array()).log();
+  const MatrixXd alpha = forward(density, log_stay, log_leave, band);
+  const MatrixXd beta = backward(density, log_stay, log_leave, band);
+  const Banded before(alpha, band);
+  const Banded after(beta, band);
+  const Banded emits(density, band);
+  const int states = static_cast<int>(stay.size());
+  Posterior posterior;
+  posterior.gamma = MatrixXd::Zero(frames, band.width);
+  posterior.stays = VectorXd::Zero(states);
+  posterior.log_likelihood = before(frames - 1, states - 1) + log_leave[states - 1];
+  if (posterior.log_likelihood == kNever) return posterior;
+  const double all = posterior.log_likelihood;
+  posterior.gamma = (alpha + beta).unaryExpr([all](double v) { return std::exp(v - all); });
+  for (Index t = 0; t + 1 < frames; ++t) {
+    for (int k = 0; k < band.width; ++k) {
+      const int j = band.first[t] + k;
+      posterior.stays[j] +=
+          std::exp(alpha(t, k) + log_stay[j] + emits(t + 1, j) + after(t + 1, j) - all);
+    }
+  }
+  return posterior;
+}
+
+Path viterbi(const MatrixXd& density, const VectorXd& stay) {
+  const Index frames = density.rows();
+  const int states = static_cast<int>(stay.size());
+  const VectorXd log_stay = stay.array().log();
+  const VectorXd log_leave = (1.0 - stay.array()).log();
+  VectorXd best = VectorXd::Constant(states, kNever);
+  best[0] = density(0, 0);
+  Eigen::Matrix<bool, Eigen::Dynamic, Eigen::Dynamic> came(frames, states);
+  for (Index t = 1; t < frames; ++t) {
+    for (int j = states - 1; j >= 0;
+         --j) {  // from the last state on, so that state j - 1 still holds the previous frame
+      const double stayed = best[j] + log_stay[j];
+      const double moved = j > 0 ? best[j - 1] + log_leave[j - 1] : kNever;
+      came(t, j) = moved > stayed;
+      best[j] = std::max(stayed, moved) + density(t, j);
+    }
+  }
+  Path path{std::vector<int>(frames, states - 1), best[states - 1] + log_leave[states - 1]};
+  for (Index t = frames - 1; t > 0; --t) {
+    path.state[t - 1] = path.state[t] - (came(t, path.state[t]) ? 1 : 0);
+  }
+  return path;
+}
 
 Statistics::Statistics(int states, Index dims)
     : occupancy(VectorXd::Zero(states)),

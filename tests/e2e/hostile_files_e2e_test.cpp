@@ -8,7 +8,7 @@
 
 #include <sqlite3.h>
 
-#include "proto/log/checksum.hpp"
+#include "proto/log/database.hpp"
 #include "tests/e2e/served.hpp"
 #include "tests/support/emulated_glove.hpp"
 #include "tests/support/permission.hpp"

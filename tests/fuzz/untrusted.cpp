@@ -14,7 +14,6 @@
 #include "daemon/control/control_server.hpp"
 #include "daemon/control/uploads.hpp"
 #include "daemon/net/zap_authenticator.hpp"
-#include "daemon/net/zap_request.hpp"
 #include "daemon/publish/publisher.hpp"
 #include "daemon/publish/subscriptions.hpp"
 #include "daemon/system/clock.hpp"

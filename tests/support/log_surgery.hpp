@@ -9,7 +9,7 @@
 #include <sqlite3.h>
 #include <catch2/catch.hpp>
 
-#include "proto/log/checksum.hpp"
+#include "proto/log/database.hpp"
 
 namespace posed::test {
 

@@ -1,6 +1,7 @@
 // The demo: makes two families of synthetic walkers and a signer's glove recording, trains a style
 // model from the families and a gesture model from the glove, streams a walker that is not in the
 // training data through the daemon and watches it over ZeroMQ, as any client would.
+
 #include <zmq.h>
 
 #include <chrono>
@@ -25,7 +26,6 @@
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/paint.hpp"
-#include "daemon/tools/demo/demo_clips.hpp"
 #include "daemon/tools/demo/demo_screen.hpp"
 #include "daemon/tools/emulate/motions.hpp"
 #include "daemon/tools/gesture/gesture_data.hpp"
@@ -35,6 +35,10 @@
 #include "daemon/tools/style/train_style.hpp"
 #include "daemon/tools/view/bridge.hpp"
 #include "models/gesture/camera_takes.hpp"
+#include "models/gesture/synthetic_signer.hpp"
+#include "models/motion/synthetic_walker.hpp"
+#include "proto/clip/hand_clip.hpp"
+#include "proto/clip/label_file.hpp"
 #include "proto/frame/config_texts.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/whole_file.hpp"
@@ -96,6 +100,105 @@ std::string digest_of(const fs::path& file) {
 
 // A hash of the whole program, because another build may train other models.
 std::string program_digest() { return digest_of("/proc/self/exe"); }
+
+// The training data and the streams of the demo: synthetic walkers as BVH files, a synthetic
+// signer's glove as CSV with labels, and the names of the models trained from them.
+
+// The style model's file name in the demo's folder; config/demo.toml names it, too.
+constexpr const char* kDemoModel = "walk-to-sneak.style";
+// The walker that is streamed; it is not in the training data.
+constexpr const char* kDemoWalker = "new_walker.bvh";
+
+// The gesture model, trained with g, c and p; and a signer who is not in its training data.
+constexpr const char* kDemoHand = "hand.gesture";
+constexpr const char* kDemoSigner = "new_performer.csv";
+
+// The model for a camera's hands, trained with g, c, p, 1, 3 and 4 as a camera sees them.
+constexpr const char* kDemoCamera = "camera.gesture";
+
+struct LabelledClip {
+  std::filesystem::path clip, labels;
+};
+
+struct DemoClips {
+  std::vector<std::filesystem::path> from, to;  // walks of the two families
+  LabelledClip glove;                           // 100 gestures of one signer
+  std::vector<LabelledClip> camera;             // takes of drawn hands
+};
+
+constexpr std::uint32_t kPeople = 6;  // of each family
+constexpr std::uint32_t kNewPerson = 21;
+constexpr double kNewWalkSeconds = 24.0;
+constexpr const char* kGlove = "glove_train";
+constexpr std::size_t kCameraTakes = 32;
+
+Result<std::filesystem::path> write_walker(const std::filesystem::path& path,
+                                           const motion::WalkerOptions& options) {
+  const auto walk = TRY(motion::make_walker(options));
+  TRY(clip::write_bvh(walk, path));
+  return path;
+}
+
+std::string camera_take(std::size_t take) { return fmt::format("camera_train_{}", take + 1); }
+
+Result<LabelledClip> write_performance(const gesture::Performance& performance,
+                                       const std::filesystem::path& folder,
+                                       const std::string& name) {
+  LabelledClip files{.clip = folder / (name + ".csv"), .labels = folder / (name + ".lab")};
+  TRY(clip::write_hand_csv(performance.clip, files.clip));
+  TRY(clip::write_labels(performance.labels, files.labels));
+  return files;
+}
+
+// Writes the recordings for training, with labels, and a new person who performs g, c, p.
+Result<> write_hands(const std::filesystem::path& folder, DemoClips& clips) {
+  clips.glove = TRY(write_performance(TRY(gesture::make_performance({})), folder, kGlove));
+  for (const gesture::Performance& take : gesture::camera_takes()) {
+    clips.camera.push_back(TRY(write_performance(take, folder, camera_take(clips.camera.size()))));
+  }
+  const auto signer = TRY(gesture::make_performance(
+      {.person = kNewPerson, .script = {"g", "c", "p", "g", "c", "p", "c", "g", "p", "c"}}));
+  return clip::write_hand_csv(signer.clip, folder / kDemoSigner);
+}
+
+// The files that make_demo_clips() and the training write into the folder.
+std::vector<std::string> demo_file_names() {
+  std::vector<std::string> names{kDemoModel, kDemoWalker, kDemoHand, kDemoSigner, kDemoCamera};
+  const auto add_hand = [&names](const std::string& name) {
+    names.push_back(name + ".csv");
+    names.push_back(name + ".lab");
+  };
+  add_hand(kGlove);
+  for (std::size_t take = 0; take < kCameraTakes; ++take) add_hand(camera_take(take));
+  for (std::uint32_t person = 1; person <= kPeople; ++person) {
+    names.push_back(fmt::format("walk_{}.bvh", person));
+    names.push_back(fmt::format("sneak_{}.bvh", person));
+  }
+  return names;
+}
+
+// Writes the clips of both families and the new walker, the glove recording with its labels and the
+// new signer into `folder`, which is created.
+Result<DemoClips> make_demo_clips(const std::filesystem::path& folder) {
+  std::error_code made;
+  std::filesystem::create_directories(folder, made);
+  if (made) return fail("cannot make the folder: " + made.message(), folder.string());
+  DemoClips clips;
+  for (std::uint32_t person = 1; person <= kPeople; ++person) {
+    clips.from.push_back(
+        TRY(write_walker(folder / fmt::format("walk_{}.bvh", person),
+                         {.family = motion::WalkerFamily::kWalk, .person = person})));
+    clips.to.push_back(
+        TRY(write_walker(folder / fmt::format("sneak_{}.bvh", person),
+                         {.family = motion::WalkerFamily::kSneak, .person = person})));
+  }
+  TRY(write_walker(folder / kDemoWalker, {.family = motion::WalkerFamily::kWalk,
+                                          .person = kNewPerson,
+                                          .seconds = kNewWalkSeconds,
+                                          .round = true}));
+  TRY(write_hands(folder, clips));
+  return clips;
+}
 
 // What the folder's stamp says while its files are those that this program wrote.
 std::string stamp_of(const fs::path& folder) {

@@ -8,7 +8,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "daemon/devices/possible_angles.hpp"
+#include "drivers/glove/possible_angles.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/hand.hpp"
 
@@ -43,7 +43,7 @@ std::vector<std::string> differences(const Model& model, const Calibration& befo
   std::vector<std::string> sentences;
   for (const auto& [off_rad, channel] : far) {
     sentences.push_back(fmt::format("{} differs by {:.0f} degrees from the last calibration",
-                                    devices::joint_words(channel), off_rad / kDegree));
+                                    drivers::glove::joint_words(channel), off_rad / kDegree));
   }
   if (far.empty()) {
     sentences.push_back(

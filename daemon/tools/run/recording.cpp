@@ -6,10 +6,17 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <chrono>
+#include <condition_variable>
+#include <csignal>
+#include <cstdint>
 #include <ctime>
 #include <memory>
+#include <mutex>
 #include <set>
+#include <stop_token>
 #include <system_error>
+#include <thread>
 #include <utility>
 #include <variant>
 
@@ -19,9 +26,12 @@
 #include "daemon/assembly/daemon.hpp"
 #include "daemon/record/recorder.hpp"
 #include "daemon/system/clock.hpp"
+#include "daemon/system/realtime.hpp"
 #include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/command/output_files.hpp"
-#include "daemon/tools/run/take_clips.hpp"
+#include "daemon/tools/export/log_clip.hpp"
+#include "proto/clip/clip.hpp"
+#include "proto/clip/frames_clip.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/log/schema.hpp"
 #include "proto/log/writer.hpp"
@@ -232,6 +242,112 @@ Result<LogName> new_log(const std::filesystem::path& folder) {
     const auto name = TRY(log::reserve(path));
     if (name != log::Reserved::kTaken) return LogName{path, name == log::Reserved::kYes};
   }
+}
+
+// Each take of each stream of a device log as a BVH beside it. Cold.
+class TakeClips {
+ public:
+  // A thread of nice 19 writes the clips of each take soon after it has ended, while `log` grows.
+  explicit TakeClips(std::filesystem::path log);
+  TakeClips(const TakeClips&) = delete;
+  TakeClips& operator=(const TakeClips&) = delete;
+  ~TakeClips() = default;
+
+  // A take has begun or ended. Any thread; returns at once.
+  void take_changed();
+  // Ends the thread, which may be reading the log: before the log becomes a single file, because
+  // that needs it alone.
+  void stop();
+  // After stop(), when the log is complete: writes those that are not written yet, also of a take
+  // that was never ended. Call once. An end signal that comes meanwhile ends the work with an
+  // error: block end_signals() before.
+  Result<> finish();
+
+ private:
+  void run(const std::stop_token& stop);
+  Result<> write(bool all, const std::stop_token& stop);
+
+  std::filesystem::path log_;
+  // Takes and streams; of the thread, then of finish().
+  std::set<std::pair<std::int64_t, std::string>> written_;
+  std::mutex mutex_;
+  std::condition_variable_any wake_;
+  bool changed_ = false;
+  std::jthread thread_;  // last, because it uses all the others
+};
+
+// The log has what came before the end of a take after its next commit.
+constexpr std::chrono::milliseconds kCommitted{1000};
+
+Result<> write_clip(Result<clip::Clip> clip, const std::filesystem::path& path) {
+  if (!clip) return std::unexpected(clip.error());
+  std::error_code error;
+  if (std::filesystem::exists(path, error)) return fail("exists already", path.string());
+  never_replace(path);
+  clip::hold_missing(*clip);
+  for (const std::string& warning : clip->warnings) {
+    spdlog::warn("{}: {}", path.string(), warning);
+  }
+  TRY(clip::write_bvh(*clip, path));
+  spdlog::info("wrote {}: {} frames", path.string(), clip->frames());
+  return {};
+}
+
+bool end_signal_came() {
+  const sigset_t signals = end_signals();
+  constexpr timespec kAtOnce{};
+  return sigtimedwait(&signals, nullptr, &kAtOnce) > 0;
+}
+
+TakeClips::TakeClips(std::filesystem::path log)
+    : log_(std::move(log)), thread_([this](const std::stop_token& stop) { run(stop); }) {}
+
+void TakeClips::take_changed() {
+  {
+    const std::scoped_lock lock(mutex_);
+    changed_ = true;
+  }
+  wake_.notify_all();
+}
+
+void TakeClips::run(const std::stop_token& stop) {
+  system::name_thread("posed-clips");
+  system::give_way();
+  while (!stop.stop_requested()) {
+    std::unique_lock lock(mutex_);
+    wake_.wait(lock, stop, [this] { return changed_; });
+    changed_ = false;
+    wake_.wait_for(lock, stop, kCommitted, [] { return false; });
+    lock.unlock();
+    if (stop.stop_requested()) return;
+    if (auto done = write(false, stop); !done && !stop.stop_requested()) {
+      spdlog::warn("clips of takes are written when posed ends: {}", done.error().text());
+    }
+  }
+}
+
+void TakeClips::stop() {
+  thread_.request_stop();
+  thread_.join();
+}
+
+Result<> TakeClips::finish() { return write(true, {}); }
+
+// A clip that cannot be written is a warning; the log is not changed.
+Result<> TakeClips::write(bool all, const std::stop_token& stop) {
+  const std::string stem = (log_.parent_path() / log_.stem()).string();
+  const auto each = [&](const log::TakeRow& take, const std::string& stream,
+                        Result<clip::Clip> clip) {
+    if (!all && take.last_item == log::kToTheEnd) return;
+    if (!written_.emplace(take.id, stream).second) return;
+    const std::string path = stem + "-" + std::to_string(take.id) + "-" + stream + ".bvh";
+    if (auto written = write_clip(std::move(clip), path); !written) {
+      spdlog::warn("take {} of stream {} is no clip: {}", take.id, stream, written.error().text());
+    }
+  };
+  // During the run the signals are for who serves.
+  const auto goes_on = [&] { return all ? !end_signal_came() : !stop.stop_requested(); };
+  return each_take_clip(log_, each, goes_on);
 }
 
 }  // namespace

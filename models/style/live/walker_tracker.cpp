@@ -6,8 +6,45 @@
 #include <limits>
 #include <utility>
 
+#include "proto/frame/rt_safe.hpp"
+
 namespace posed::style {
 namespace {
+
+constexpr double kLastSecond_s = 1.0;
+constexpr double kMinPart_s = 1.0 / 48.0;  // so that all of them fit
+constexpr double kMinKnown_s = 0.5;
+
+// README.md, "Gate", says what these were measured on.
+constexpr double kNear_deg = 28.0, kFar_deg = 35.0;         // to the nearest pose, as it is
+constexpr double kOwnNear_deg = 19.0, kOwnFar_deg = 23.5;   // from the walker's neutral pose
+constexpr double kSame_deg = 7.0, kOther_deg = 9.5;         // either; so near at any pace
+constexpr double kStill_deg_s = 8.0, kMoving_deg_s = 16.0;  // PoseSpeed
+constexpr double kRest = 0.25, kSwing = 0.4;                // of the training's least swing
+constexpr double kTooSlow = 0.3, kSlow = 0.45;              // of the training's fastest cadence
+constexpr double kFirstStep_rad =
+    4.0;  // of a stride after rest, as the cadence lags by half a second
+constexpr double kFast = 1.2, kTooFast = 1.32;
+constexpr double kOfGait = 0.5;  // what LiveGait's correlation counts, in shares of that cadence,
+constexpr double kWalk = 0.2;    // above the training's highest, which counts as at least this
+constexpr double kOfWide = 0.5;  // the more where the legs swing wide, in shares of the training's
+constexpr double kUsual = 1.6, kWide = 2.1;  // least swing
+constexpr double kTaughtRun = 0.4;           // correlation of a training that has runs
+constexpr double kOfFlight = 0.25;  // what a fall counts, in shares of that cadence, where it is
+constexpr double kGravity_m_s2 = 9.81, kFalls = 1.1, kFlies = 1.2;  // in shares of gravity
+constexpr double kOwnFast = 1.15;  // a walker's own cadence above this counts in its place
+
+constexpr double kCadence_s = 0.1;  // time constant of the low-pass on the cadence
+constexpr double kSteady_s = 0.4;   // the same without what a step adds
+constexpr double kStage_s = 0.045;  // time constant of each of the four low-passes
+constexpr double kStep_s = 0.005;   // of their integration
+constexpr double kThere = 1e-5;     // nearer is there
+
+// 0 below `low`, 1 above `high`, without a kink between.
+double rise(double value, double low, double high) noexcept {
+  const double part = std::clamp((value - low) / (high - low), 0.0, 1.0);
+  return part * part * (3.0 - 2.0 * part);
+}
 
 constexpr double kInterruption_s = 1.0;  // of the frames
 
@@ -29,6 +66,151 @@ float share_below(float value, const Limits& limits) noexcept {
 }
 
 }  // namespace
+
+RT_SAFE void StyleEstimate::update(double place, double dt_s) noexcept {
+  const auto at = [&](std::size_t i) -> Part& { return parts_[(oldest_ + i) % parts_.size()]; };
+  if (count_ == 0 || at(count_ - 1).time_s >= kMinPart_s) at(count_++) = {};
+  for (Part* const part : {&at(count_ - 1), &all_}) {
+    part->sum_s += place * dt_s;
+    part->time_s += dt_s;
+  }
+  if (count_ < 2 || all_.time_s - parts_[oldest_].time_s < kLastSecond_s) return;
+  oldest_ = (oldest_ + 1) % parts_.size();
+  --count_;
+  all_ = {};  // anew, so that no rounding stays
+  for (std::size_t i = 0; i < count_; ++i) {
+    all_.sum_s += at(i).sum_s;
+    all_.time_s += at(i).time_s;
+  }
+}
+
+double StyleEstimate::value() const noexcept {
+  if (all_.time_s < kMinKnown_s) return std::numeric_limits<double>::quiet_NaN();
+  return all_.sum_s / all_.time_s;
+}
+
+RT_SAFE void Gate::update(const TrainedMotion* known, bool on, const Frame& frame,
+                          std::span<const float> q, std::span<const float> whole,
+                          std::span<const std::uint8_t> available,
+                          const std::optional<Walker>& walker, double dt_s) noexcept {
+  const Evidence before = seen_;
+  seen_.knows = 1.0;
+  if (known != nullptr) {
+    see_pose(*known, q, whole, available, walker.has_value(), dt_s);
+    see_legs(*known, frame, walker, dt_s);
+    if (on) seen_.knows = of_pose_ * of_cadence_;
+  }
+  const bool closes = known != nullptr && on;
+  fresh_ = fresh_ && !closes;
+  if (fresh_) return stage_.fill(1.0);
+  follow(closes ? known : nullptr, before, dt_s);
+}
+
+RT_SAFE void Gate::see_pose(const TrainedMotion& known, std::span<const float> q,
+                            std::span<const float> whole, std::span<const std::uint8_t> available,
+                            bool is_own, double dt_s) noexcept {
+  speed_.update(known, q, available, dt_s);
+  // The arms and the trunk of a run are none of a walk's, so what replaces them must not count
+  // where the legs do not tell the two apart.
+  const bool replaced = q.data() != whole.data();
+  const double kernel_deg = known.distance_deg(q, available);
+  const double whole_deg = replaced ? known.distance_deg(whole, available) : kernel_deg;
+  if (std::isnan(kernel_deg)) return;
+  const bool legs_tell = is_own || !known.legs() || !std::isnan(stride_.cadence_rad_s());
+  const double distance_deg = legs_tell ? kernel_deg : whole_deg;
+  of_pose_ = is_own ? 1.0 - rise(distance_deg, kOwnNear_deg, kOwnFar_deg)
+                    : 1.0 - rise(distance_deg, kNear_deg, kFar_deg);
+  of_near_pose_ = 1.0 - rise(whole_deg, kSame_deg, kOther_deg);
+}
+
+// How far the legs stride as in training; all the way where that cannot be told.
+RT_SAFE void Gate::see_legs(const TrainedMotion& known, const Frame& frame,
+                            const std::optional<Walker>& walker, double dt_s) noexcept {
+  leg_rad_ = std::numeric_limits<double>::quiet_NaN();
+  if (!known.legs()) {
+    of_legs_ = of_cadence_ = 1.0;
+    seen_.swing_rad = std::numeric_limits<double>::quiet_NaN();
+  }
+  if (!known.legs() || !known.legs()->measured(frame)) return;
+  const double leg_rad = leg_rad_ = known.legs()->value_rad(frame);
+  stride_.update(leg_rad, dt_s, known.cadence_rad_s());
+  const double height_m = known.height_m(frame);
+  if (std::isfinite(height_m)) gait_.update(height_m, leg_rad, dt_s);
+  seen_.swing_rad = stride_.swing_rad();
+  seen_.speed_deg_s = speed_.value_deg_s();
+  const double rest = of_rest(known, seen_);
+  if (rest == 1.0) {
+    // The phase of legs that rest says nothing: the first steps count by their swing alone.
+    stride_.forget_cadence();
+    gait_.forget();
+    cadence_rad_s_ = 0.0;
+    rest_rad_ = stride_.angle_rad();
+    of_cadence_ = 1.0;
+  }
+  double usual_rad_s = known.cadence_rad_s();
+  if (walker && walker->cadence_rad_s > kOwnFast * usual_rad_s) {
+    usual_rad_s = walker->cadence_rad_s / kOwnFast;
+  }
+  const double cadence_rad_s = std::abs(stride_.cadence_rad_s());
+  if (!std::isnan(cadence_rad_s)) {
+    if (cadence_rad_s_ == 0.0) cadence_rad_s_ = steady_rad_s_ = cadence_rad_s;
+    cadence_rad_s_ -= std::expm1(-dt_s / kCadence_s) * (cadence_rad_s - cadence_rad_s_);
+    steady_rad_s_ -= std::expm1(-dt_s / kSteady_s) * (cadence_rad_s_ - steady_rad_s_);
+    const double ratio = cadence_rad_s_ / usual_rad_s;
+    // A first step begins slowly.
+    const bool begins = std::abs(stride_.angle_rad() - rest_rad_) < kFirstStep_rad;
+    const double of_slow = begins ? 1.0 : rise(ratio, kTooSlow, kSlow);
+    of_cadence_ = of_slow * (1.0 - of_run(known, ratio));
+  }
+  of_legs_ = (1.0 - rest) * of_cadence_;
+}
+
+// 1 where legs or body rest.
+RT_SAFE double Gate::of_rest(const TrainedMotion& known, const Evidence& seen) noexcept {
+  const double swing = rise(seen.swing_rad, kRest * known.swing_rad(), kSwing * known.swing_rad());
+  if (std::isnan(seen.speed_deg_s)) return 1.0 - swing;
+  return 1.0 - swing * rise(seen.speed_deg_s, kStill_deg_s, kMoving_deg_s);
+}
+
+// 1 where the legs run and did not in training: they are quicker, or the pelvis is higher while
+// they are apart, which tells most of long steps, or falls as one does without a foot on the
+// ground. `cadence` is in shares of a usual one. The very poses of training are none of a run.
+RT_SAFE double Gate::of_run(const TrainedMotion& known, double cadence) const noexcept {
+  const double taught = known.gait_correlation();
+  const double higher = gait_.correlation() - std::max(taught, kWalk);
+  const double wide = rise(stride_.swing_rad() / known.swing_rad(), kUsual, kWide);
+  if (!std::isnan(taught) && !std::isnan(higher)) cadence += (kOfGait + kOfWide * wide) * higher;
+  const double step_rad_s = 2.0 * steady_rad_s_;
+  const double fall = gait_.bounce_m() * step_rad_s * step_rad_s / kGravity_m_s2;
+  if (taught < kTaughtRun) cadence += kOfFlight * rise(fall, kFalls, kFlies);
+  return rise(cadence, kFast, kTooFast) * (1.0 - of_near_pose_);
+}
+
+// In small steps, while the evidence goes straight from frame to frame: the same at any rate of
+// frames, also where legs that begin to stride open the gate within one.
+RT_SAFE void Gate::follow(const TrainedMotion* known, const Evidence& from, double dt_s) noexcept {
+  const int steps = std::max(1, static_cast<int>(std::ceil(dt_s / kStep_s)));
+  const double part = -std::expm1(-dt_s / steps / kStage_s);
+  const auto between = [](double a, double b, double share) { return a + share * (b - a); };
+  for (int i = 0; i < steps; ++i) {
+    const double share = (i + 0.5) / steps;
+    const Evidence now{.knows = between(from.knows, seen_.knows, share),
+                       .swing_rad = between(from.swing_rad, seen_.swing_rad, share),
+                       .speed_deg_s = between(from.speed_deg_s, seen_.speed_deg_s, share)};
+    double towards = now.knows;
+    if (known != nullptr && std::isfinite(now.swing_rad)) towards *= 1.0 - of_rest(*known, now);
+    for (double& stage : stage_) {
+      stage += part * (towards - stage);
+      if (std::abs(towards - stage) < kThere) stage = towards;
+      towards = stage;
+    }
+  }
+}
+
+RT_SAFE void Gate::settle() noexcept {
+  if (fresh_) stage_.fill(1.0);
+  stride_.turn_back();
+}
 
 RT_SAFE bool WalkerTracker::see(const BoundModel& model, const Frame& frame,
                                 std::span<const float> q, std::span<const std::uint8_t> available,

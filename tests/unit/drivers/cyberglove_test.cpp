@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "drivers/cyberglove/angles.hpp"
-#include "drivers/cyberglove/stamp_clock.hpp"
+#include "drivers/cyberglove/decoder.hpp"
 #include "drivers/glove/glove_emulator.hpp"
 #include "drivers/transport/transport_factory.hpp"
 #include "proto/frame/hand_skeleton.hpp"

@@ -2,8 +2,8 @@
 // tracked.
 #include <catch2/catch.hpp>
 
+#include "drivers/natnet/decoder.hpp"
 #include "drivers/natnet/layout.hpp"
-#include "drivers/natnet/skeleton_pose.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::drivers {

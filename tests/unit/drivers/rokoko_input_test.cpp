@@ -11,7 +11,6 @@
 #include "drivers/json_reader.hpp"
 #include "drivers/rokoko/decoder.hpp"
 #include "drivers/rokoko/emulator.hpp"
-#include "drivers/rokoko/lz4_frame.hpp"
 #include "tests/support/allocations.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/refused.hpp"

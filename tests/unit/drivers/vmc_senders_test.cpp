@@ -4,7 +4,7 @@
 #include <functional>
 #include <random>
 
-#include "drivers/vmc/sender_clock.hpp"
+#include "drivers/vmc/decoder.hpp"
 #include "tests/unit/drivers/vmc_rig.hpp"
 
 namespace posed::drivers {

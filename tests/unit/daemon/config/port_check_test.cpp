@@ -1,4 +1,3 @@
-#include "daemon/config/port_check.hpp"
 
 #include <catch2/catch.hpp>
 

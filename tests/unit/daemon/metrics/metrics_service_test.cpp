@@ -1,5 +1,5 @@
 // What the metrics' HTTP server answers, and how often it looks at the daemon.
-#include "daemon/metrics/metrics_service.hpp"
+#include "daemon/metrics/metrics_server.hpp"
 
 #include <string>
 

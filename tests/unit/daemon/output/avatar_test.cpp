@@ -1,4 +1,4 @@
-#include "daemon/output/avatar.hpp"
+#include "daemon/output/vmc_output.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,6 @@
 
 #include <catch2/catch.hpp>
 
-#include "daemon/output/blend_shapes.hpp"
 #include "drivers/vmc/emulator.hpp"
 #include "drivers/vmc/osc.hpp"
 #include "models/motion/canonical_skeleton.hpp"

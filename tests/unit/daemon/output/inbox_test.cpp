@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/output/rate_limit.hpp"
+#include "daemon/output/output.hpp"
 #include "tests/unit/daemon/output/output_rig.hpp"
 
 namespace posed::output {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "daemon/pipeline/device_clock.hpp"
+#include "drivers/device_clock.hpp"
 #include "tests/support/dice.hpp"
 #include "tests/support/merge_rig.hpp"
 
@@ -43,7 +43,7 @@ class MergedDevice {
   test::Dice dice_;
   std::uint64_t n_ = 0;
   std::int64_t last_ns_ = 0;
-  DeviceClock clock_;
+  drivers::DeviceClock clock_;
 };
 
 // How far the fingers are bent: a ramp, which interpolation between two frames meets exactly, and

@@ -4,7 +4,7 @@
 
 #include "daemon/pipeline/ring.hpp"
 #include "daemon/pipeline/worker.hpp"
-#include "daemon/publish/histogram.hpp"
+#include "daemon/publish/published_stream.hpp"
 #include "daemon/publish/publisher.hpp"
 #include "daemon/system/event_fd.hpp"
 

@@ -1,4 +1,4 @@
-#include "daemon/service/watchdog.hpp"
+#include "daemon/service/service.hpp"
 
 #include <catch2/catch.hpp>
 

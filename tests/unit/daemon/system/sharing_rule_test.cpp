@@ -1,4 +1,4 @@
-#include "daemon/system/sharing_rule.hpp"
+#include "daemon/system/hot_cpu.hpp"
 
 #include <vector>
 

@@ -190,7 +190,7 @@ TEST_CASE("a hand is taught signs, and keeps those that were shown well", "[teac
   School school;
   const auto take = gesture::make_performance({.script = {"p", "1", "p"}}).value().clip;
   CHECK(has(school.teacher.train("hand", "signs", Subject::kSigns).error().message, "no sign"));
-  for (std::size_t i = 0; i < kMinShows; ++i) {
+  for (std::size_t i = 0; i < gesture::kMinShows; ++i) {
     const auto shown = school.show(take, "one");
     INFO(shown.show().sentence());
     REQUIRE(shown.show().good());

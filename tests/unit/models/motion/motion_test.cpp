@@ -6,7 +6,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "models/motion/low_pass.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/model/harmonics.hpp"
 #include "proto/frame/rotation.hpp"

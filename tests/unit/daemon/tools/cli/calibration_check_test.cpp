@@ -4,9 +4,9 @@
 
 #include <catch2/catch.hpp>
 
-#include "daemon/devices/possible_angles.hpp"
 #include "drivers/cyberglove/angles.hpp"
 #include "drivers/glove/calibration_file.hpp"
+#include "drivers/glove/possible_angles.hpp"
 #include "proto/frame/degree.hpp"
 
 namespace posed::tools {
@@ -38,7 +38,7 @@ TEST_CASE("a calibration that no hand can have, or that differs from the last, i
     recorded[1][i].add(150.0F);
   }
   const auto last = calibration();
-  CHECK(devices::keep_possible(model, recorded, Side::kRight, file).value().empty());
+  CHECK(drivers::glove::keep_possible(model, recorded, Side::kRight, file).value().empty());
   CHECK(differences(model, *last, *last, recorded) ==
         std::vector<std::string>{
             "no joint differs by more than 0 degrees from the last calibration"});
@@ -46,7 +46,7 @@ TEST_CASE("a calibration that no hand can have, or that differs from the last, i
   CHECK(differences(model, *last, *calibration(), recorded) ==
         std::vector<std::string>{"index MCP differs by 14 degrees from the last calibration"});
   file.sensors["index_mcp"][1][1] = value(170.0);
-  const auto odd = devices::keep_possible(model, recorded, Side::kRight, file).value();
+  const auto odd = drivers::glove::keep_possible(model, recorded, Side::kRight, file).value();
   REQUIRE(odd.size() == 1);
   CHECK(
       odd[0].starts_with("index MCP would be at 170 degrees in the pose fist, which no hand "

@@ -1,5 +1,5 @@
 // `posed calibrate` with contacts: the thumb touches where the user's did.
-#include "daemon/devices/thumb_contacts.hpp"
+#include "daemon/devices/pose_calibration.hpp"
 
 #include <catch2/catch.hpp>
 

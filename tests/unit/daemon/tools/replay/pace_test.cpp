@@ -2,7 +2,7 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/tools/replay/pace.hpp"
-#include "daemon/tools/replay/shed_ranges.hpp"
+#include "daemon/tools/replay/replay_stream_context.hpp"
 
 using namespace posed;
 using replay::Pace;

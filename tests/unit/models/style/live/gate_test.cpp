@@ -1,5 +1,5 @@
 // The gate: what counts as known, how fast and how smoothly it opens and closes.
-#include "models/style/live/gate.hpp"
+#include "models/style/live/walker_tracker.hpp"
 
 #include <cmath>
 #include <limits>

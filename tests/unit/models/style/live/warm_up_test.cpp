@@ -8,9 +8,9 @@
 
 #include <catch2/catch.hpp>
 
-#include "models/style/live/style_estimate.hpp"
 #include "models/style/live/style_filter.hpp"
 #include "models/style/live/style_type.hpp"
+#include "models/style/live/walker_tracker.hpp"
 #include "posed/v1/log.pb.h"
 #include "tests/support/last_frame.hpp"
 #include "tests/support/parameter_index.hpp"
