@@ -17,8 +17,9 @@ struct ModelWords {
   std::string strip{};     // SVG path data of a thumbnail; empty for gestures
 };
 
-// `kind`: "style" or "gesture". `known`: skeletons that a style in its own space is drawn on. Never
-// fails: bytes that are no model get a verdict that says so.
+// `kind`: "style" or "gesture". `name`: the file's name, for the sentences. `known`: skeletons that
+// a style in its own space is drawn on. Never fails: bytes that are no model get a verdict saying
+// so.
 [[nodiscard]] ModelWords words_of_model(
     std::string_view bytes, std::string_view kind, const std::string& name,
     std::span<const std::shared_ptr<const Skeleton>> known = {});

@@ -132,7 +132,8 @@ class SourceBodies {
   Result<> build_only();
   void add_only();
 
-  // When something is to be built: `now_ns` or later; kForever_ns: nothing until something comes.
+  // Returns when turn() must be called next, at least `now_ns`; kForever_ns: only after a
+  // description comes.
   [[nodiscard]] std::int64_t due_ns(std::int64_t now_ns) const;
   // Takes back what the reader does not use any more, and builds if it is time.
   void turn(std::int64_t now_ns);

@@ -18,7 +18,7 @@ class SourceBuilder {
  public:
   // At most this often the bodies of a source change.
   static constexpr std::int64_t kBetweenUpdates_ns = 500'000'000;
-  // And this often once it has made its share of streams.
+  // After a source has used its share of `max_made`, its bodies change at most this often.
   static constexpr std::int64_t kBetweenLateUpdates_ns = 10 * kNanosPerSecond;
   // A device log has room for more streams (log::kMaxStreams).
   static constexpr std::size_t kMaxMade = 60'000;

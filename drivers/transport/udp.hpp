@@ -68,10 +68,9 @@ class UdpTransport final : public Transport, public Upkeep {
   // Discards what came since open(): it is old by now.
   Result<> start(std::int64_t now_ns) override;
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
-  // Who has sent nothing of use yet loses the socket to the next one.
+  // A sender none of whose datagrams the decoder could use gives up the socket to the next sender.
   RT_SAFE void decoded(bool used) noexcept override;
-  // While nothing comes of a group, joins it again every two seconds.
-  // Joins the group that the device names.
+  // Rejoins a silent group every two seconds; changes to the group that the device names.
   void upkeep(std::int64_t now_ns) noexcept override;
   [[nodiscard]] std::string consume_note() override;
   using Transport::send;

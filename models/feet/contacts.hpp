@@ -34,7 +34,7 @@ class Contacts {
   }
   // 1 while both legs stand, 0 while one moves or is not measured.
   RT_SAFE [[nodiscard]] double both_stand() const noexcept;
-  // Height at which a point of this kind stands [m].
+  // Height [m] at which `point` (ankle, toe, tip) of either foot stands.
   RT_SAFE [[nodiscard]] double ground_m(std::size_t point) const noexcept {
     return ground_m_[point];
   }

@@ -45,7 +45,7 @@ class Findings {
   Findings& warn(const std::vector<std::string>& sentences);
   // Adds the remark that judges. Bad news makes the exit code of the command kFailed.
   Findings& verdict(std::string sentence, bool good);
-  // The same, but the first line of stdout for people; with --json a remark.
+  // Like verdict(), but printed first on stdout; with --json on stderr.
   Findings& headline(std::string sentence, bool good);
 
   // The number of this name, if there is one.

@@ -47,9 +47,9 @@ class StyleEstimate {
 class Gate {
  public:
   // Advances by a frame, `dt_s` after the last one. `q` is the pose that the kernel sees, `whole`
-  // the same with what busy limbs do; `walker`: seen from its own neutral walk. Where the gate is
-  // not `on`, or the model has no data for it
-  // (`known` is null), it opens: at once if it has never been on.
+  // the same with what busy limbs do; `walker`: this walker's measured neutral walk, if any. With
+  // `on` false or `known` null, as the model has no data for the gate, the gate opens gradually, or
+  // at once if it was never on.
   void update(const TrainedMotion* known, bool on, const Frame& frame, std::span<const float> q,
               std::span<const float> whole, std::span<const std::uint8_t> available,
               const std::optional<Walker>& walker, double dt_s) noexcept;
@@ -59,7 +59,7 @@ class Gate {
   [[nodiscard]] float open() const noexcept { return static_cast<float>(stage_.back()); }
   // Whether the legs stride as in training; true where that is unknown.
   [[nodiscard]] bool strides() const noexcept { return of_legs_ >= 0.5; }
-  // Of the stride, without what a single frame adds; 0: not known.
+  // Returns the cadence, low-passed; 0 while it is unknown.
   [[nodiscard]] double smooth_cadence_rad_s() const noexcept { return cadence_rad_s_; }
   // What a warm-up needs to know of the legs at this frame.
   [[nodiscard]] LegMotion legs() const noexcept {
