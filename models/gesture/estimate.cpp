@@ -230,12 +230,6 @@ Statistics align_soft(const std::vector<Frames>& examples, const StateModel& mod
   return sums;
 }
 
-Durations durations_of(const Statistics& sums) {
-  const VectorXd mean = sums.duration_first / sums.examples;
-  return {mean,
-          (sums.duration_second / sums.examples - mean.cwiseAbs2()).cwiseMax(kMinDurationVariance)};
-}
-
 Fit baum_welch(const std::vector<Frames>& examples, StateModel start, int rounds,
                const VectorXd& floor, const std::function<bool()>& stop) {
   Fit fit;

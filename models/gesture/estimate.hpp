@@ -84,13 +84,6 @@ struct Statistics {
 // Aligns every example by the posterior of its states (E step of Baum-Welch).
 [[nodiscard]] Statistics align_soft(const std::vector<Frames>& examples, const StateModel& model);
 
-// How long the examples stay in each state: mean [frames] and variance [frames^2] over the
-// examples; variances at least 0.25.
-struct Durations {
-  Eigen::VectorXd mean, variance;
-};
-[[nodiscard]] Durations durations_of(const Statistics& sums);
-
 // Runs estimate and align `rounds` times, fewer where `stop` (may be empty) says so; `model` is the
 // one of the last alignment.
 struct Fit {

@@ -52,11 +52,6 @@ inline CLI::Validator above_zero() {
   return detail::number_check("above 0", "POSITIVE", [](double value) { return value > 0.0; });
 }
 
-inline CLI::Validator zero_or_more() {
-  return detail::number_check("of 0 or more", "NONNEGATIVE",
-                              [](double value) { return value >= 0.0; });
-}
-
 // A seed: digits alone, because the library would take -1 for 2^64 - 1.
 inline CLI::Validator whole_number() {
   return {[](const std::string& text) {

@@ -25,8 +25,6 @@ TEST_CASE("an option that takes a number takes no NaN and no infinity") {
           "--amount: '" + std::string(text) + "' should be a number from 0.25 to 4");
     CHECK(refusal(above_zero(), text) ==
           "--amount: '" + std::string(text) + "' should be a number above 0");
-    CHECK(refusal(zero_or_more(), text) ==
-          "--amount: '" + std::string(text) + "' should be a number of 0 or more");
   }
 }
 
@@ -36,8 +34,6 @@ TEST_CASE("an option that takes a number takes its bounds, and nothing beyond") 
   for (const char* text : {"0.24", "4.01", "-1"})
     CHECK(!refusal(in_range(0.25, 4.0), text).empty());
   CHECK(!refusal(above_zero(), "0").empty());
-  CHECK(refusal(zero_or_more(), "0").empty());
-  CHECK(!refusal(zero_or_more(), "-0.1").empty());
 }
 
 }  // namespace
