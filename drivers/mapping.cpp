@@ -32,7 +32,8 @@ Result<Mapping> parse_mapping(std::string text, std::string file) {
 }
 
 Result<Mapping> load_mapping(const std::string& file) {
-  return parse_mapping(TRY(load_profile_text(file)), file);
+  auto text = TRY(load_profile_text(file));
+  return parse_mapping(std::move(text), file);
 }
 
 std::string use_mapping(const Mapping& mapping, SourceLayout& layout) {

@@ -339,7 +339,8 @@ Result<> RequestHandler::teach_step(const v1::ControlRequest& request) {
 
 // What a stream lacks that cannot be taught is told before somebody has walked.
 Result<teach::Pupil> RequestHandler::find_pupil(const std::string& name, teach::Subject subject) {
-  const ControlledStream& stream = *TRY(find_stream(name));
+  const auto found = TRY(find_stream(name));
+  const ControlledStream& stream = *found;
   const bool signs = subject == teach::Subject::kSigns;
   const StageType* const taught = find_stage_type(signs ? "generate" : "style");
   const auto& stages = stream.settings.stages;
@@ -631,13 +632,15 @@ Result<std::shared_ptr<const v1::GloveFit>> RequestHandler::judge_or_use(
                 " cannot be the name of a calibration; it has a-z, digits, '-' and '_', 1 to 32");
   }
   std::unique_lock lock(mutex_);
-  const auto glove = TRY(find_device(wanted.stream()))->device;
+  const ControlledStream* const stream = TRY(find_device(wanted.stream()));
+  const auto glove = stream->device;
   lock.unlock();
   auto fitted = control::fit_glove(*glove->description(), glove->calibration().toml, wanted);
   if (!fitted) return in_stream(wanted.stream(), fitted.error());
   auto fit = std::make_shared<v1::GloveFit>(std::move(fitted->words));
   if (fitted->toml.empty()) return fit;
-  fit->set_file(TRY(models_.add(wanted.name(), kCalibration, fitted->toml)));
+  auto file = TRY(models_.add(wanted.name(), kCalibration, fitted->toml));
+  fit->set_file(std::move(file));
   lock.lock();
   TRY(calibrate(wanted.stream(), fitted->toml, fit->file(), {.requester = requester, .fit = fit}));
   return fit;

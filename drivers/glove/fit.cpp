@@ -97,7 +97,8 @@ double raw_at(const Curve& curve, double value) {
 
 Result<> add_known_poses(const Model& model, const Calibration& calibration, Recorded& recorded) {
   for (std::size_t p = 0; p < kSensorPoses; ++p) {
-    const auto values = shown_of(calibration, TRY(values_of(model, hand_in(static_cast<Pose>(p)))));
+    const auto known = TRY(values_of(model, hand_in(static_cast<Pose>(p))));
+    const auto values = shown_of(calibration, known);
     for (std::size_t i = 0; i < values.size(); ++i) {
       const auto of_sensor = [i](const auto& pose) { return pose[i].count > 0; };
       if (std::none_of(recorded.begin() + kSensorPoses, recorded.end(), of_sensor)) continue;

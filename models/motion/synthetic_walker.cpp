@@ -444,7 +444,8 @@ Result<clip::Clip> make_walker(const WalkerOptions& options) {
   }
   clip::Clip walk;
   walk.path = "synthetic";
-  walk.skeleton = std::make_shared<const Skeleton>(TRY(make_skeleton(walker.person())));
+  auto skeleton = TRY(make_skeleton(walker.person()));
+  walk.skeleton = std::make_shared<const Skeleton>(std::move(skeleton));
   walk.frame_rate_hz = options.rate_hz;
   const auto frames = static_cast<Eigen::Index>(std::lround(options.seconds * options.rate_hz));
   walk.channels.resize(frames, static_cast<Eigen::Index>(walk.skeleton->channels.size()));

@@ -135,7 +135,8 @@ Result<std::shared_ptr<const Profile>> find_profile(const Skeleton& skeleton,
                                                     const std::string& name) {
   if (name.ends_with(kProfileEnding)) {
     const std::string text = TRY(load_profile_text(name));
-    return std::make_shared<const Profile>(TRY(parse_profile(text, name)));
+    auto profile = TRY(parse_profile(text, name));
+    return std::make_shared<const Profile>(std::move(profile));
   }
   std::string known;
   for (const Profile& profile : profiles()) {

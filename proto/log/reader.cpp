@@ -316,7 +316,8 @@ Result<std::vector<GapRow>> Reader::gaps() const {
 }
 
 Result<std::vector<TakeRow>> Reader::takes() const {
-  const bool timed = TRY(state_->database.value("PRAGMA user_version")) != "3";
+  const std::string version = TRY(state_->database.value("PRAGMA user_version"));
+  const bool timed = version != "3";
   auto select = TRY(state_->database.prepare(
       timed ? "SELECT id, name, first_item, last_item, timecode, crc FROM take ORDER BY id"
             : "SELECT id, name, first_item, last_item, crc FROM take ORDER BY id"));

@@ -92,13 +92,16 @@ Result<> Ros2Stream::open(bool robot) {
   joints_.reset();
   frames_.reset();
   if (robot) {
-    joints_.emplace(
-        TRY(DdsWriter::open(domain_, trajectory_ ? kJointTrajectory : kJointState, topic_)));
+    const auto& message = trajectory_ ? kJointTrajectory : kJointState;
+    auto commands = TRY(DdsWriter::open(domain_, message, topic_));
+    joints_.emplace(std::move(commands));
     return {};
   }
-  frames_.emplace(TRY(DdsWriter::open(domain_, kTfMessage, "tf")));
+  auto frames = TRY(DdsWriter::open(domain_, kTfMessage, "tf"));
+  frames_.emplace(std::move(frames));
   if (!joint_names_.empty()) {
-    joints_.emplace(TRY(DdsWriter::open(domain_, kJointState, view_topic_)));
+    auto angles = TRY(DdsWriter::open(domain_, kJointState, view_topic_));
+    joints_.emplace(std::move(angles));
   }
   return {};
 }

@@ -12,6 +12,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <spdlog/fmt/fmt.h>
@@ -152,9 +153,11 @@ Result<LabelledClip> write_performance(const gesture::Performance& performance,
 
 // Writes the recordings for training, with labels, and a new person who performs g, c, p.
 Result<> write_hands(const std::filesystem::path& folder, DemoClips& clips) {
-  clips.glove = TRY(write_performance(TRY(gesture::make_performance({})), folder, kGlove));
+  const auto performance = TRY(gesture::make_performance({}));
+  clips.glove = TRY(write_performance(performance, folder, kGlove));
   for (const gesture::Performance& take : gesture::camera_takes()) {
-    clips.camera.push_back(TRY(write_performance(take, folder, camera_take(clips.camera.size()))));
+    auto written = TRY(write_performance(take, folder, camera_take(clips.camera.size())));
+    clips.camera.push_back(std::move(written));
   }
   const auto signer = TRY(gesture::make_performance(
       {.person = kNewPerson, .script = {"g", "c", "p", "g", "c", "p", "c", "g", "p", "c"}}));
@@ -185,12 +188,12 @@ Result<DemoClips> make_demo_clips(const std::filesystem::path& folder) {
   if (made) return fail("cannot make the folder: " + made.message(), folder.string());
   DemoClips clips;
   for (std::uint32_t person = 1; person <= kPeople; ++person) {
-    clips.from.push_back(
-        TRY(write_walker(folder / fmt::format("walk_{}.bvh", person),
-                         {.family = motion::WalkerFamily::kWalk, .person = person})));
-    clips.to.push_back(
-        TRY(write_walker(folder / fmt::format("sneak_{}.bvh", person),
-                         {.family = motion::WalkerFamily::kSneak, .person = person})));
+    auto walk = TRY(write_walker(folder / fmt::format("walk_{}.bvh", person),
+                                 {.family = motion::WalkerFamily::kWalk, .person = person}));
+    clips.from.push_back(std::move(walk));
+    auto sneak = TRY(write_walker(folder / fmt::format("sneak_{}.bvh", person),
+                                  {.family = motion::WalkerFamily::kSneak, .person = person}));
+    clips.to.push_back(std::move(sneak));
   }
   TRY(write_walker(folder / kDemoWalker, {.family = motion::WalkerFamily::kWalk,
                                           .person = kNewPerson,
@@ -287,7 +290,8 @@ Result<> learn_gestures(const std::vector<LabelledClip>& clips, double rate_hz, 
                         const fs::path& model) {
   std::vector<gesture::Recording> recordings;
   for (const LabelledClip& files : clips) {
-    recordings.push_back(TRY(load_recording(files.clip, files.labels, rate_hz)));
+    auto recording = TRY(load_recording(files.clip, files.labels, rate_hz));
+    recordings.push_back(std::move(recording));
   }
   OneRank alone;
   TRY(train_gesture_and_save(recordings, {.held = held}, model, alone));

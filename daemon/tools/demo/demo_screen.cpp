@@ -31,7 +31,8 @@ bool is_performed(const v1::Frame& frame) {
 Result<DemoRequests> DemoRequests::open(const std::string& control) {
   ClientOptions client;
   client.endpoint = control;
-  return DemoRequests(TRY(Connection::open(client, ZMQ_DEALER)));
+  auto connection = TRY(Connection::open(client, ZMQ_DEALER));
+  return DemoRequests(std::move(connection));
 }
 
 Result<> DemoRequests::send(const v1::ControlRequest& request) {
@@ -48,7 +49,8 @@ Result<> DemoRequests::read_reply(std::string_view what) {
 }
 
 Result<DemoStyle> DemoStyle::open(const std::string& control) {
-  return DemoStyle(TRY(DemoRequests::open(control)));
+  auto requests = TRY(DemoRequests::open(control));
+  return DemoStyle(std::move(requests));
 }
 
 Result<> DemoStyle::tend(double seconds, const std::function<v1::Stats()>& stats) {
@@ -77,7 +79,8 @@ std::string DemoStyle::note() const {
 }
 
 Result<DemoHand> DemoHand::open(const std::string& control) {
-  return DemoHand(TRY(DemoRequests::open(control)));
+  auto requests = TRY(DemoRequests::open(control));
+  return DemoHand(std::move(requests));
 }
 
 void DemoHand::handle(const v1::Frame& frame) {

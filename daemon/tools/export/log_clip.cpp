@@ -335,7 +335,9 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
   const replay::ReplayStream& first = replay.stream(chosen.ids.front());
   Collector collector(skeleton_of(replay, chosen.ids.front(), chosen.raw));
   const auto kind = chosen.raw ? pipeline::Item::Kind::kRawFrame : pipeline::Item::Kind::kFrame;
-  TakeStarts starts(wanted_take.empty() ? TRY(reader.takes()) : std::vector{interval});
+  std::vector<log::TakeRow> takes{interval};
+  if (wanted_take.empty()) takes = TRY(reader.takes());
+  TakeStarts starts(std::move(takes));
   const auto take = [&](const pipeline::Item& item) {
     if (item.kind == kind && holds(interval, replay.position()) &&
         std::ranges::find(chosen.ids, item.frame.header.stream) != chosen.ids.end()) {

@@ -115,7 +115,8 @@ Result<gesture::LabelPose> shown_pose(const std::string& show, const GestureSour
   }
   const std::string file = show.substr(equals + 1);
   if (vocabulary.is_hand()) {
-    return gesture::LabelPose{show.substr(0, equals), TRY(shown_hand(file, sources.read))};
+    auto pose = TRY(shown_hand(file, sources.read));
+    return gesture::LabelPose{show.substr(0, equals), std::move(pose)};
   }
   const auto clip = TRY(read_body(file, sources.read));
   const auto recording = TRY(gesture::body_recording(clip, sources.rate_hz, vocabulary));

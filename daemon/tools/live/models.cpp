@@ -32,7 +32,8 @@ Result<std::vector<std::filesystem::path>> model_files_at(const std::filesystem:
   if (!std::filesystem::is_directory(path, ignored)) return std::vector{path};
   const auto folder = TRY(control::ModelFolder::open(path));
   std::vector<std::filesystem::path> files;
-  for (const control::FolderModel& model : TRY(folder.list())) files.push_back(path / model.name);
+  const auto models = TRY(folder.list());
+  for (const control::FolderModel& model : models) files.push_back(path / model.name);
   return files;
 }
 

@@ -273,7 +273,9 @@ Result<std::vector<style::Arrival>> look_at_strangers(const EvalOptions& options
     apply.filter.weights = options.weights;
     apply.walker = TRY(style::measure_walker(model, options.model, clip));
     const auto styled = TRY(style::apply_to_clip(model, options.model, clip, apply));
-    const auto one = style::arrival(TRY(motion_of(clip)), TRY(motion_of(styled.clip)), from, to);
+    const auto walk = TRY(motion_of(clip));
+    const auto styled_walk = TRY(motion_of(styled.clip));
+    const auto one = style::arrival(walk, styled_walk, from, to);
     if (!one) return fail("shows no walk with legs, as the source or the target", path);
     found.push_back(*one);
   }

@@ -285,6 +285,35 @@ std::vector<Finding> check_throwing_paths(const SourceFile& file) {
   return findings;
 }
 
+std::vector<Finding> check_try(const SourceFile& file) {
+  static const std::regex begins(R"(\bTRY\()");
+  // What a statement ends, begins or is under, or one `=`.
+  static const std::regex before(R"((?:^|[;{})]|\belse|[^=!<>+*/|&^-]=)\s*$)");
+  std::string text;
+  for (const std::string& line : file.code) {
+    text += line.starts_with('#') ? std::string("\n") : line + '\n';
+  }
+  std::vector<Finding> findings;
+  for (std::sregex_iterator at(text.begin(), text.end(), begins), end; at != end; ++at) {
+    const std::size_t first = at->position();
+    std::size_t last = text.find('(', first);
+    for (int depth = 0; last < text.size(); ++last) {
+      depth += text[last] == '(' ? 1 : 0;
+      depth -= text[last] == ')' ? 1 : 0;
+      if (depth == 0) break;
+    }
+    const std::size_t next = text.find_first_not_of(" \n", last + 1);
+    const std::string left =
+        text.substr(first < 80 ? 0 : first - 80, std::min<std::size_t>(first, 80));
+    if (next < text.size() && text[next] == ';' && std::regex_search(left, before)) continue;
+    const auto line =
+        std::count(text.begin(), text.begin() + static_cast<std::ptrdiff_t>(first), '\n');
+    findings.push_back({file.path, static_cast<int>(line) + 1,
+                        "TRY is a part of an expression; give its value a name first"});
+  }
+  return findings;
+}
+
 std::vector<Finding> check_hot_code(const SourceFile& file, int& bodies) {
   std::vector<Finding> findings;
   for (std::size_t i = 0; i < file.lines.size(); ++i) {

@@ -64,6 +64,9 @@ struct Target {
 // outside of tests, functions of std::filesystem that ask the system get an std::error_code as the
 // last argument, and directories are walked by increment().
 [[nodiscard]] std::vector<Finding> check_throwing_paths(const SourceFile& file);
+// TRY is a whole statement, or the whole of what a variable is initialised with or assigned
+// (proto/frame/result.hpp).
+[[nodiscard]] std::vector<Finding> check_try(const SourceFile& file);
 // Bodies of functions marked RT_SAFE (proto/frame/rt_safe.hpp), or called RT-safe in the comment
 // above, neither allocate, lock, log, throw nor call the system.
 // `bodies` counts the functions that were found, so that a test can verify that the check is

@@ -221,6 +221,33 @@ TEST_CASE("no path that cannot be used throws an exception", "[tidy]") {
   CHECK(findings_of(posed::tidy::check_throwing_paths) == "");
 }
 
+TEST_CASE("TRY is no part of an expression", "[tidy]") {
+  const auto good = posed::tidy::source_from_text(
+      "daemon/a.cpp",
+      "#define TRY(...) NOW(TRY(a))\n  TRY(run(a, f(b)));\n  if (a == b) TRY(run());\n  else "
+      "TRY(b());\n"
+      "  auto value =\n      TRY(\n          read(a));  // not f(TRY(b))\n  value = TRY(read(b));\n"
+      "  RETRY(a + b);\n");
+  CHECK(listed(posed::tidy::check_try(good)) == "");
+  const std::vector<std::string> bad{"use(TRY(read()));",
+                                     "auto a = *TRY(read());",
+                                     "auto a = TRY(read()).size();",
+                                     "auto a = b ? TRY(c()) : d;",
+                                     "return TRY(read());",
+                                     "A a{.b = TRY(read()), .c = 1};",
+                                     "A a{TRY(read())};",
+                                     "for (int i : TRY(all())) f(i);",
+                                     "auto a = TRY(read(TRY(b())));",
+                                     "if (a == TRY(b())) c();",
+                                     "a += TRY(read());",
+                                     "auto a = b +\n    TRY(c());"};
+  for (const std::string& line : bad) {
+    INFO(line);
+    CHECK(posed::tidy::check_try(posed::tidy::source_from_text("daemon/a.cpp", line)).size() == 1);
+  }
+  CHECK(findings_of(posed::tidy::check_try) == "");
+}
+
 TEST_CASE("functions marked RT_SAFE neither allocate, lock, log, throw nor call the system",
           "[tidy]") {
   const auto bad = posed::tidy::source_from_text(
