@@ -19,6 +19,7 @@
 #include "daemon/tools/relay/relay.hpp"
 #include "proto/zmq/zmq_handle.hpp"
 #include "tests/bench/bench.hpp"
+#include "tests/bench/percentiles.hpp"
 
 namespace posed::bench {
 namespace {
@@ -107,7 +108,7 @@ Result<> collect(tools::HopSubscriber& subscriber, ReceivedFrames& frames, bool 
   auto received = TRY(subscriber.finish());
   frames.gaps += received.gaps;
   if (!ages) return {};
-  const std::vector<double> ages_us = tools::send_ages_us(received.messages);
+  const std::vector<double> ages_us = send_ages_us(received.messages);
   frames.send_us.insert(frames.send_us.end(), ages_us.begin(), ages_us.end());
   return {};
 }

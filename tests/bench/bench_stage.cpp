@@ -27,6 +27,7 @@
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/live/style_type.hpp"
 #include "tests/bench/bench.hpp"
+#include "tests/bench/percentiles.hpp"
 
 namespace posed::bench {
 namespace {
@@ -225,7 +226,7 @@ Result<StageFigures> measure(const StageBench& bench) {
   daemon->stop();
   auto received = TRY(subscriber->finish());
   figures.gaps = received.gaps;
-  figures.send = tools::figures_of(tools::send_ages_us(received.messages));
+  figures.send = tools::figures_of(send_ages_us(received.messages));
   avatars.pipes().close_to();
   if (!avatars.pipes().read(&figures.avatars_received, sizeof figures.avatars_received)) {
     return fail("the avatars' process ended early");

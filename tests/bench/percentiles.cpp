@@ -14,4 +14,12 @@ nlohmann::json percentiles(std::vector<double> values_us) {
   return {{"p50_us", at(0.5)}, {"p99_us", at(0.99)}, {"p99_9_us", at(0.999)}, {"max_us", at(1.0)}};
 }
 
+std::vector<double> send_ages_us(std::span<const tools::Arrival> arrivals) {
+  std::vector<double> ages_us;
+  for (const tools::Arrival& arrival : arrivals) {
+    ages_us.push_back(static_cast<double>(arrival.sent_ns) * 1e-3);
+  }
+  return ages_us;
+}
+
 }  // namespace posed::bench

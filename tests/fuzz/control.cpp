@@ -16,44 +16,6 @@ namespace {
 
 using namespace posed;
 
-// What the pipeline assumes about a play command.
-void check_play(const pipeline::Command& command) {
-  const auto play = command.command.as<gesture::PlayOrder>();
-  if (command.stream != 1 || play.size == 0 || play.size > play.label.size()) std::abort();
-  if (!(play.tempo >= 0.5F && play.tempo <= 2.0F)) std::abort();
-}
-
-class DaemonControl final : public control::DaemonControl {
- public:
-  bool send(const pipeline::Command& command) override {
-    fuzz::check_command(command);
-    if (command.change.kind == pipeline::StageChange::Kind::kCommand &&
-        command.change.index == generate::GenerateStage::kPlay) {
-      check_play(command);
-    }
-    acks.push_back({.ticket = command.ticket, .stream = command.stream, .sequence = 1});
-    return true;
-  }
-  bool send(const pipeline::DeviceCommand& command) override {
-    if (command.size > command.bytes.size()) std::abort();
-    if (command.ticket == 0) return true;
-    acks.push_back({.ticket = command.ticket, .stream = command.source, .sequence = 1});
-    return true;
-  }
-  void keep_model(std::span<const std::byte>) override {}
-  void stages_changed(std::uint32_t stream, const posed::pipeline::StreamSettings&) override {
-    if (stream > 1) std::abort();
-  }
-  Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) override {
-    if (!pipeline::check_take_name(mark.name)) std::abort();
-    return pipeline::Take{.number = 1, .name = mark.name};
-  }
-  void fill(v1::Stats& stats) override { stats.set_rss_bytes(1); }
-  void stop() override {}
-
-  std::vector<pipeline::Ack> acks;
-};
-
 // A body with a style and a hand with gestures.
 std::vector<control::ControlledStream> two_streams() {
   std::vector<control::ControlledStream> streams(2);
@@ -80,7 +42,7 @@ void check(const control::Reply& answer) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  static DaemonControl daemon_control;
+  static fuzz::CheckingControl daemon_control(2);
   static devices::KeptSettings kept;
   static control::RequestHandler handler(daemon_control, kept);
   static const bool added = [] {

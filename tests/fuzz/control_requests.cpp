@@ -31,34 +31,6 @@ using namespace posed;
 
 constexpr std::size_t kHeader = 24;  // bytes of a model file before its payload
 
-class DaemonControl final : public control::DaemonControl {
- public:
-  bool send(const pipeline::Command& command) override {
-    fuzz::check_command(command);
-    acks.push_back({.ticket = command.ticket, .stream = command.stream, .sequence = 1});
-    return true;
-  }
-  bool send(const pipeline::DeviceCommand& command) override {
-    demand(command.size <= command.bytes.size());
-    if (command.ticket != 0) {
-      acks.push_back({.ticket = command.ticket, .stream = command.source, .sequence = 1});
-    }
-    return true;
-  }
-  void keep_model(std::span<const std::byte>) override {}
-  void stages_changed(std::uint32_t stream, const posed::pipeline::StreamSettings&) override {
-    demand(stream <= 2);
-  }
-  Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) override {
-    if (!pipeline::check_take_name(mark.name)) std::abort();
-    return pipeline::Take{.number = 1, .name = mark.name};
-  }
-  void fill(v1::Stats& stats) override { stats.set_rss_bytes(1); }
-  void stop() override {}
-
-  std::vector<pipeline::Ack> acks;
-};
-
 // A body with a style, a hand with gestures, a glove.
 std::vector<control::ControlledStream> three_streams() {
   std::vector<control::ControlledStream> streams(3);
@@ -127,7 +99,7 @@ std::string stream_name(FuzzedDataProvider& data) {
 }
 
 struct Fixture {
-  DaemonControl daemon_control;
+  fuzz::CheckingControl daemon_control{3};
   devices::KeptSettings kept;
   control::RequestHandler handler{daemon_control, kept};
 

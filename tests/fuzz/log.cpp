@@ -24,22 +24,20 @@
 #include "proto/log/schema.hpp"
 #include "proto/log/writer.hpp"
 #include "proto/message/frame_message.hpp"
+#include "tests/support/file_text.hpp"
 #include "tests/unit/models/gesture/toy_gesture.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
 namespace {
 
 using namespace posed;
+using test::bytes_of;
 
 constexpr const char* kBody =
     "HIERARCHY\nROOT Hips\n{\nOFFSET 0 90 0\nCHANNELS 6 Xposition Yposition Zposition Zrotation "
     "Yrotation Xrotation\nJOINT Chest\n{\nOFFSET 0 30 0\nCHANNELS 3 Zrotation Yrotation Xrotation\n"
     "End Site\n{\nOFFSET 0 20 0\n}\n}\n}\nMOTION\nFrames: 1\nFrame Time: 0.016667\n"
     "0 90 0 0 0 0 0 0 0\n";
-
-std::span<const std::byte> bytes_of(const std::string& text) {
-  return std::as_bytes(std::span(text));
-}
 
 // A log written from the fuzzer's input.
 class FuzzedLog {

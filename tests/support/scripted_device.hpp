@@ -16,6 +16,7 @@
 #include "daemon/system/event_fd.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/glove/calibrated_decoder.hpp"
+#include "tests/support/file_text.hpp"
 #include "tests/support/virtual_daemon.hpp"
 
 namespace posed::test {
@@ -27,10 +28,6 @@ inline std::int64_t virtual_clock() noexcept { return virtual_now_ns; }
 
 inline std::int64_t at_ns(double at_s) {
   return at_s == kNever_s ? system::kForever_ns : kVirtualBegin_ns + nanoseconds(at_s);
-}
-
-inline std::span<const std::byte> bytes_of(const std::string& text) {
-  return std::as_bytes(std::span(text));
 }
 
 // Plays one link of the script, `later_s` after the times that it has.

@@ -133,14 +133,6 @@ HopFigures figures_of(Ages ages_us) {
           ages_us.empty() ? 0.0 : ages_us.back(), ages_us.size()};
 }
 
-std::vector<double> send_ages_us(std::span<const Arrival> arrivals) {
-  std::vector<double> ages_us;
-  for (const Arrival& arrival : arrivals) {
-    ages_us.push_back(static_cast<double>(arrival.sent_ns) * 1e-3);
-  }
-  return ages_us;
-}
-
 HopReport report_hops(std::span<const Arrival> arrivals, std::int64_t start_ns,
                       std::int64_t end_ns) {
   std::map<std::int64_t, std::array<Ages, 2>> pairs;  // pipeline, bare

@@ -57,9 +57,6 @@ struct HopReport {
 
 [[nodiscard]] HopFigures figures_of(std::vector<double> ages_us);
 
-// How old the poses were when they were handed to ZeroMQ.
-[[nodiscard]] std::vector<double> send_ages_us(std::span<const Arrival> arrivals);
-
 // Block 0 begins at `start_ns`; the pipeline has the even blocks. The first pair (warm-up) and
 // everything after `end_ns` are left out.
 [[nodiscard]] HopReport report_hops(std::span<const Arrival> arrivals, std::int64_t start_ns,

@@ -12,19 +12,17 @@
 #include "drivers/rokoko/decoder.hpp"
 #include "drivers/rokoko/emulator.hpp"
 #include "tests/support/allocations.hpp"
+#include "tests/support/file_text.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/refused.hpp"
 
 namespace posed::drivers::rokoko {
 namespace {
 
+using test::bytes_of;
 using test::CollectSink;
 using Bytes = std::vector<std::byte>;
 using Fault = JsonReader::Fault;
-
-std::span<const std::byte> bytes_of(std::string_view text) {
-  return std::as_bytes(std::span(text));
-}
 
 // How reading the whole text as one value ends.
 Fault fault_of(std::string_view text) {

@@ -13,6 +13,7 @@
 #include "daemon/record/log_writer_loop.hpp"
 #include "daemon/record/recorder.hpp"
 #include "proto/log/reader.hpp"
+#include "tests/support/file_text.hpp"
 #include "tests/support/temp_folder.hpp"
 
 namespace posed::test {
@@ -20,10 +21,6 @@ namespace posed::test {
 using GapKind = log::GapRow::Kind;
 
 inline constexpr std::int64_t kTurn_ns = 50'000'000;
-
-inline std::span<const std::byte> bytes_of(const std::string& text) {
-  return std::as_bytes(std::span(text));
-}
 
 // Of `count` sources with one body each.
 inline record::RingSizes ring_sizes_of(std::size_t count, std::size_t chunk_bytes,

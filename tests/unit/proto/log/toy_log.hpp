@@ -13,12 +13,9 @@
 
 #include "proto/log/rows.hpp"
 #include "proto/log/writer.hpp"
+#include "tests/support/file_text.hpp"
 
 namespace posed::test {
-
-inline std::span<const std::byte> bytes_of(std::string_view text) {
-  return std::as_bytes(std::span(text));
-}
 
 inline std::string text_of(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
