@@ -227,7 +227,8 @@ format = "json"
         "posed.toml:15: '192.168.1.1' should be a multicast group, like 239.255.42.99");
   CHECK(output_complaint(natnet + "listen = \"::1\"\ngroup = \"239.255.42.99\"\n") ==
         "posed.toml:16: to send to a group, listen must be an IPv4 address");
-  CHECK(output_complaint(natnet + "version = \"2.5\"\n").find("\"2.9\"") != std::string::npos);
+  CHECK(output_complaint(natnet + "version = \"2.5\"\n").find("one of these words") <
+        std::string::npos);
   CHECK(output_complaint(natnet + "data_port = 70000\n").find("out of range") != std::string::npos);
   CHECK(output_complaint(natnet + "listen = \"0.0.0.0\"\n").find("in peers") != std::string::npos);
   CHECK(output_complaint(natnet + natnet + "name = \"second\"\n") ==
