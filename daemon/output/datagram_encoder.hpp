@@ -29,6 +29,8 @@ class DatagramEncoder {
   // The person of a place comes, or is another one; null: has left. An error says why the person
   // cannot be sent; then the place is empty. Cold.
   [[nodiscard]] virtual Result<> set_person(std::size_t place, const LiveStream* stream) = 0;
+  // What else is known of the person; before its frame, or without one.
+  virtual void take_sample(std::size_t /*place*/, const Sample& /*sample*/) {}
   // Returns false, and does nothing, for an empty place.
   [[nodiscard]] virtual bool take(std::size_t place, const Frame& frame) = 0;
 

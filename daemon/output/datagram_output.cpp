@@ -30,6 +30,7 @@ DatagramOutput::DatagramOutput(const config::OutputConfig& config,
                                std::unique_ptr<system::EventFd> wake,
                                std::unique_ptr<DatagramEncoder> encoder, UdpReceivers receivers)
     : Output(config, std::move(wake), config.kind == config::OutputKind::kRokoko),
+      places_(config.people()),
       encoder_(std::move(encoder)),
       receivers_(std::move(receivers)) {
   set_receivers(receivers_.size());
@@ -40,6 +41,13 @@ Result<> DatagramOutput::set_stream(std::size_t place, const LiveStream* stream)
   const auto set = encoder_->set_person(place, stream);
   if (!set) return fail("cannot be sent: " + set.error().message);
   return {};
+}
+
+// A sample may come without a frame of its stream.
+void DatagramOutput::begin_turn(std::int64_t /*now_ns*/) {
+  for (std::size_t place = 0; place < places_; ++place) {
+    if (sample(place)) encoder_->take_sample(place, *sample(place));
+  }
 }
 
 bool DatagramOutput::take(std::size_t place, const Frame& frame, std::int64_t /*now_ns*/) {

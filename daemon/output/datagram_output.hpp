@@ -20,10 +20,12 @@ class DatagramOutput final : public Output {
 
  private:
   [[nodiscard]] Result<> set_stream(std::size_t place, const LiveStream* stream) override;
+  void begin_turn(std::int64_t now_ns) override;
   [[nodiscard]] bool take(std::size_t place, const Frame& frame, std::int64_t now_ns) override;
   void send(std::int64_t now_ns) override;
   [[nodiscard]] std::int64_t end_turn(std::int64_t now_ns) override;
 
+  std::size_t places_;
   std::unique_ptr<DatagramEncoder> encoder_;
   UdpReceivers receivers_;
   std::int64_t described_ns_ = kNoTime_ns;

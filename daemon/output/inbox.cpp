@@ -60,7 +60,7 @@ void Inbox::stream_comes(const publish::StreamInfo& stream) {
     const std::scoped_lock lock(mutex_);
     waiting_.streams[place].swap(coming);
     dropped_ += waiting_.remove(place);  // they have another skeleton
-    if (place == 0) waiting_.sample.reset();
+    waiting_.samples[place].reset();
   }
   wake_.notify();
 }
@@ -79,7 +79,7 @@ void Inbox::frame(const Frame& frame) noexcept {
 void Inbox::sample(const Sample& sample) noexcept {
   const std::scoped_lock lock(mutex_);
   // It goes out with the next frame, so nobody is woken.
-  if (place_of(sample.header.stream) == 0) waiting_.sample = sample;
+  if (const auto place = place_of(sample.header.stream)) waiting_.samples[*place] = sample;
 }
 
 void Inbox::stream_leaves(std::uint32_t stream) noexcept {
@@ -97,10 +97,11 @@ void Inbox::stream_leaves(std::uint32_t stream) noexcept {
 void Inbox::drain(Delivery& into) {
   into.count_ = 0;
   into.streams.assign(names_.size(), nullptr);  // freed, and allocated, before the lock
+  into.samples.assign(names_.size(), std::nullopt);
   const std::scoped_lock lock(mutex_);
   waiting_.swap_frames(into);
   into.streams = waiting_.streams;
-  into.sample = std::exchange(waiting_.sample, std::nullopt);
+  into.samples.swap(waiting_.samples);
 }
 
 }  // namespace posed::output

@@ -40,7 +40,7 @@ class Delivery {
   Delivery() : frames_(kDepth) {}
 
   LiveStreams streams{};
-  std::optional<Sample> sample{};  // the newest sample of the first stream
+  std::vector<std::optional<Sample>> samples{};  // [place] the newest
 
   // Calls use(place, frame) for each frame, the oldest first.
   template <typename Use>
@@ -74,6 +74,7 @@ class Inbox {
   Inbox(std::vector<std::string> names, system::EventFd& wake)
       : names_(std::move(names)), wake_(wake) {
     waiting_.streams.resize(names_.size());
+    waiting_.samples.resize(names_.size());
   }
 
   [[nodiscard]] bool wants(std::string_view stream) const noexcept;

@@ -141,8 +141,10 @@ class Output : public publish::FrameOutput {
     return system::kForever_ns;
   }
 
-  // The newest sample of the first stream that has come in this turn.
-  [[nodiscard]] const std::optional<Sample>& sample() const noexcept { return delivery_.sample; }
+  // The newest sample of a stream that has come in this turn.
+  [[nodiscard]] const std::optional<Sample>& sample(std::size_t place = 0) const noexcept {
+    return delivery_.samples[place];
+  }
   void notify(const std::string& text) const;
   // These two set the values that fill() reports.
   void count(const SendOutcome& outcome) noexcept;

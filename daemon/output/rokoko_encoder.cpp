@@ -55,6 +55,15 @@ Heights heights_of(const Skeleton& skeleton) {
   return {.total_m = highest_m - lowest_m + kHeadTop_m, .hip_m = -lowest_m};
 }
 
+// Whether the samples are a face as Studio's decoder gives it, of values from 0 to 1.
+bool is_face(const drivers::SampleLayout& samples) {
+  if (samples.names.size() != rokoko::kFaceValues) return false;
+  for (std::size_t i = 0; i < rokoko::kFaceValues; ++i) {
+    if (samples.names[i] != rokoko::face_value_name(i)) return false;
+  }
+  return true;
+}
+
 class RokokoEncoder final : public DatagramEncoder {
  public:
   RokokoEncoder(std::size_t places, bool lz4) : lz4_(lz4), people_(places), names_(places) {}
@@ -76,9 +85,19 @@ class RokokoEncoder final : public DatagramEncoder {
                                  name);
     }));
     if (stream->rate_hz > 0.0) rate_hz_ = stream->rate_hz;
-    std::string head = head_of(fit.skeleton(), name, prop);
+    const bool face = !prop && is_face(stream->samples);
+    std::string head = head_of(fit.skeleton(), name, prop, face);
     person.emplace(std::move(fit), std::move(head), prop);
+    if (face) person->face_head = ",\"face\":{\"faceId\":" + json_text(nlohmann::json(name));
     return {};
+  }
+
+  void take_sample(std::size_t place, const Sample& sample) override {
+    auto& person = people_[place];
+    if (!person || person->face_head.empty()) return;
+    for (std::size_t i = 0; i < rokoko::kFaceValues; ++i) {
+      if (sample.valid[i]) person->face[i] = sample.value[i];
+    }
   }
 
   bool take(std::size_t place, const Frame& frame) override {
@@ -118,13 +137,16 @@ class RokokoEncoder final : public DatagramEncoder {
     Person(Fit fitted, std::string named, bool is_a_prop)
         : fit(std::move(fitted)), head(std::move(named)), prop(is_a_prop) {}
     Fit fit;
-    std::string head;  // the JSON up to the joints
+    std::string head;       // the JSON up to the joints
+    std::string face_head;  // that of the face up to its values; empty: there is none
+    std::array<float, rokoko::kFaceValues> face{};
     bool prop;
     Frame pose{};
     bool posed = false;
   };
 
-  static std::string head_of(const Skeleton& skeleton, const std::string& name, bool prop) {
+  static std::string head_of(const Skeleton& skeleton, const std::string& name, bool prop,
+                             bool face) {
     const std::string head =
         "{\"name\":" + json_text(nlohmann::json(name)) + ",\"color\":[128,128,128],";
     if (prop) return head + "\"type\":0,";
@@ -132,9 +154,22 @@ class RokokoEncoder final : public DatagramEncoder {
     const Heights heights = heights_of(skeleton);
     return head + "\"meta\":{\"hasGloves\":" + gloves + ",\"hasLeftGlove\":" + gloves +
            ",\"hasRightGlove\":" + gloves +
-           ",\"hasBody\":true,\"hasFace\":false},\"dimensions\":{\"totalHeight\":" +
-           clip::number_text(heights.total_m) +
+           ",\"hasBody\":true,\"hasFace\":" + (face ? "true" : "false") +
+           "},\"dimensions\":{\"totalHeight\":" + clip::number_text(heights.total_m) +
            ",\"hipHeight\":" + clip::number_text(heights.hip_m) + "},\"body\":{";
+  }
+
+  // Studio counts to 100.
+  void append_face(const Person& person) {
+    if (person.face_head.empty()) return;
+    json_ += person.face_head;
+    for (std::size_t i = 0; i < rokoko::kFaceValues; ++i) {
+      json_ += ",\"";
+      json_ += rokoko::face_value_name(i);
+      json_ += "\":";
+      json_ += clip::number_text(100.0 * static_cast<double>(person.face[i]));
+    }
+    json_ += '}';
   }
 
   void append_all(bool props) {
@@ -149,6 +184,7 @@ class RokokoEncoder final : public DatagramEncoder {
       } else {
         rokoko::append_joints(json_, person->fit.skeleton(), person->pose);
         json_ += '}';
+        append_face(*person);
       }
       json_ += '}';
     }

@@ -215,6 +215,34 @@ TEST_CASE("actors and props of Rokoko Studio arrive through its output as they w
   }
 }
 
+TEST_CASE("an actor's face goes on through the Rokoko output") {
+  namespace rokoko = drivers::rokoko;
+  UdpReceiver receiver;
+  const OutputRig rig(
+      protocol_config({.kind = OutputKind::kRokoko, .people = {"ann"}, .lz4 = false}, receiver));
+  const auto walk = motion::make_walker({.seconds = 1.0}).value();
+  drivers::SampleLayout face;
+  for (std::size_t i = 0; i < rokoko::kFaceValues; ++i) {
+    face.names.emplace_back(rokoko::face_value_name(i));
+    face.units.emplace_back("1");
+  }
+  rig.output->stream_comes(info_of(0, "ann", walk.skeleton, face));
+  Sample sample;
+  sample.value_count = rokoko::kFaceValues;
+  sample.value[17] = 0.25F;
+  sample.valid.set(17);
+  rig.output->sample(sample);
+  static_cast<void>(rig.output->turn(0));
+  rig.pass(frame_of(0, walk.frame(0)), 1);
+  const auto datagrams = receiver.received(rig.sent());
+  REQUIRE(datagrams.size() == 1);
+  const std::string_view text(reinterpret_cast<const char*>(datagrams[0].data()),
+                              datagrams[0].size());
+  CHECK(text.find("\"hasFace\":true") != std::string_view::npos);
+  CHECK(text.find("\"jawOpen\":25,") != std::string_view::npos);
+  CHECK(text.find("\"jawForward\":0,") != std::string_view::npos);
+}
+
 TEST_CASE("Rokoko's receivers are told how high an actor stands, by which they scale") {
   namespace rokoko = drivers::rokoko;
   UdpReceiver receiver;

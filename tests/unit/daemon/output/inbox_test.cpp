@@ -141,7 +141,7 @@ TEST_CASE("an inbox frees nothing while it is locked") {
   CHECK(skeletons.under_the_lock == 0);
 }
 
-TEST_CASE("only the newest sample of the body waits") {
+TEST_CASE("only the newest sample of each stream waits") {
   InboxRig rig;
   rig.inbox.stream_comes(info_of(3, "ann", nullptr));
   rig.inbox.stream_comes(info_of(4, "glove", nullptr));
@@ -155,10 +155,10 @@ TEST_CASE("only the newest sample of the body waits") {
   sample.value[0] = 3.0F;
   rig.inbox.sample(sample);
   rig.inbox.drain(rig.delivery);
-  REQUIRE(rig.delivery.sample);
-  CHECK(rig.delivery.sample->value[0] == 2.0F);
+  REQUIRE(rig.delivery.samples[0]);
+  CHECK(rig.delivery.samples[0]->value[0] == 2.0F);
   rig.inbox.drain(rig.delivery);
-  CHECK_FALSE(rig.delivery.sample);
+  CHECK_FALSE(rig.delivery.samples[0]);
 }
 
 TEST_CASE("a rate limit thins a faster stream evenly and leaves a slower one alone") {
