@@ -22,8 +22,8 @@
 // "version": 3 and is otherwise version 2: so the place of the actors counts, not the number.
 //
 // "JSON v4" says version "3,0" or 4 and has people in "scene" as lists of named joints, "newtons"
-// (github.com/hit-wsw/hit-dex, README) or "characters" (the vendor's plugin for Unity, LiveFrame_v4). How
-// their joints are turned in T-pose is not public, so they are not read but told.
+// (github.com/hit-wsw/hit-dex, README) or "characters" (the vendor's plugin for Unity,
+// LiveFrame_v4). How their joints are turned in T-pose is not public, so they are refused.
 //
 // All positions [m] and rotations are global, in Unity's axes (joints.hpp).
 #pragma once
