@@ -21,7 +21,7 @@ constexpr std::int64_t kBatch_ns = 8'000'000;
 
 // A glove that counts milliseconds in 16 bits with an inaccurate crystal, behind a USB bridge that
 // delivers every 8 ms.
-struct Device {
+struct DriftingGlove {
   double drift_ppm = 100.0;
   std::int64_t started_ns = 123'456'789'012;  // on the host's clock
   std::mt19937 random{5};
@@ -46,7 +46,7 @@ std::int64_t percentile(std::vector<std::int64_t> values, double share) {
 }
 
 TEST_CASE("100 ppm, batches of 8 ms, a wrap of 16 bits: mapped within 1 ms after 30 s") {
-  Device device;
+  DriftingGlove device;
   UnrolledCounter counter(16);
   DeviceClock clock;
   std::vector<std::int64_t> errors_ns;
