@@ -62,10 +62,11 @@ std::unexpected<Error> no_glove(const Connection& link, const Settings& settings
     return fail("the glove sends nothing; check that it is switched on, and its baud", link.name());
   }
   if (seen.too_large) {
-    return fail("the glove sends values above max_analog_value = " +
-                    std::to_string(settings.max_analog) + "; set it to what a closed finger sends: "
-                    "4095 of an ESP32, 1023 of an AVR board, twice that where a firmware scales",
-                link.name());
+    return fail(
+        "the glove sends values above max_analog_value = " + std::to_string(settings.max_analog) +
+            "; set it to what a closed finger sends: "
+            "4095 of an ESP32, 1023 of an AVR board, twice that where a firmware scales",
+        link.name());
   }
   return fail("what comes is no line of a LucidGlove; check baud, encoding and port", link.name());
 }
