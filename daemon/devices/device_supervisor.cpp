@@ -59,16 +59,22 @@ std::size_t UseWatch::cause_of(const Counts& came, bool asks, bool used) {
   if (all == 0) return asks && !used ? kNoAnswer : kNone;
   const auto most = static_cast<std::size_t>(std::ranges::max_element(came) - came.begin());
   const auto outcome = static_cast<Outcome>(most);
-  const bool harmless =
-      outcome == Outcome::kOk || outcome == Outcome::kLate || outcome == Outcome::kDuplicate;
+  // Senders may add much that posed does not read.
+  const bool harmless = outcome == Outcome::kOk || outcome == Outcome::kForeign ||
+                        outcome == Outcome::kLate || outcome == Outcome::kDuplicate;
   if (!used) return most;
   return !harmless && 2 * came[most] > all ? most : kNone;
 }
 
 std::string UseWatch::look(const pipeline::SourceCounters& counters, bool asks,
                            std::int64_t now_ns) {
-  if (now_ns - since_ns_ < kEvery_ns) return {};
   const Counts counts = counts_of(counters);
+  // The three seconds begin with the first packet, or with the question.
+  if (!packets_came_) {
+    packets_came_ = counts != before_;
+    if (packets_came_ || !asks) since_ns_ = now_ns;
+  }
+  if (now_ns - since_ns_ < kEvery_ns) return {};
   Counts came{};
   for (std::size_t i = 0; i < came.size(); ++i) came[i] = counts[i] - before_[i];
   before_ = counts;
@@ -226,9 +232,10 @@ void DeviceSupervisor::look_for_device() {
   const std::string note = source_.ports->consume_note();
   const std::string& identity = device_->description.identity;
   // A bound socket says nothing about the other side.
-  ports_.report(v1::Event::KIND_FOUND,
-                (identity.starts_with("udp ") ? "listening: " : "connected: ") + identity +
-                    (note.empty() ? "" : "; " + note));
+  ports_.report(v1::Event::KIND_FOUND, (!identity.starts_with("udp ")  ? "connected: "
+                                        : device_->poll.period_ns == 0 ? "listening: "
+                                                                       : "asking: ") +
+                                           identity + (note.empty() ? "" : "; " + note));
 }
 
 // Refuses a device that differs from what the stream was set up for: its data would silently be

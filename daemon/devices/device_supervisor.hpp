@@ -48,7 +48,7 @@ class UseWatch {
 
   Counts before_{};
   std::int64_t since_ns_ = 0;
-  bool used_ = false;  // something, since the link is open
+  bool packets_came_ = false, used_ = false;  // any, since the link is open; any of use
   std::bitset<kOutcomes + 1> told_;
 };
 

@@ -156,8 +156,9 @@ RT_SAFE Outcome MvnDecoder::accept_values(const Datagram& datagram, Sink& sink) 
 RT_SAFE Outcome MvnDecoder::accept_timecode(const Datagram& datagram) noexcept {
   BigEndianReader reader(datagram.payload);
   const bool sized = datagram.payload[0] == std::byte{0};  // the text begins with a digit
-  if (sized && reader.u32() > reader.left()) return Outcome::kShort;
-  timecode_ = to_timecode(reader.text(std::min(reader.left(), kTimeCodeBytes)));
+  const std::size_t size = sized ? reader.u32() : reader.left();
+  if (size > reader.left()) return Outcome::kShort;
+  timecode_ = to_timecode(reader.text(std::min(size, kTimeCodeBytes)));
   timecode_sample_ = datagram.head.sample;
   return Outcome::kOk;
 }

@@ -193,7 +193,7 @@ Outcome decode_pose(const Head& head, std::span<const std::byte> items,
   for (std::size_t i = 0; i < wanted; ++i) {
     const std::int32_t id = reader.i32();
     // 01 and 02 count the segments up, from any number, or have no ids, which are 0.
-    const bool same = id == before + 1 || (id == 0 && before == 0);
+    const bool same = std::int64_t{id} == std::int64_t{before} + 1 || (id == 0 && before == 0);
     const bool counts = same || i == 0 || i >= kBodySegments || unity;
     valid = valid && counts;
     before = id;

@@ -155,6 +155,7 @@ RT_SAFE Outcome NatNetDecoder::accept(const Message& message, Sink& sink) noexce
 RT_SAFE Outcome NatNetDecoder::accept_server_info(std::span<const std::byte> payload) noexcept {
   ServerInfo info;
   if (!decode_server_info(payload, info)) return Outcome::kShort;
+  misfits_ = 0;
   const Version said = settings_.version.known() ? settings_.version : info.version;
   if (said != version_) has_reading_ = false;
   version_ = said;

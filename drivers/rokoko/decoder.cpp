@@ -343,7 +343,11 @@ RT_SAFE Outcome StudioDecoder::read(std::span<const std::byte> bytes) noexcept {
 RT_SAFE Outcome StudioDecoder::accept_frame(std::int64_t active_ns, Sink& sink) noexcept {
   if (frame_.count == 0 && frame_.named_joints) {
     constexpr std::array kDescription{std::byte{kOnlyNamedJoints}};
-    if (!std::exchange(told_named_joints_, true)) sink.description(kDescription);
+    if (!std::exchange(told_named_joints_, true)) {
+      sink.description(kDescription);
+    } else if (const auto fewer = roster_.describe(active_ns); !fewer.empty()) {
+      sink.description(fewer);
+    }
     return Outcome::kOutOfRange;
   }
   Outcome worst = Outcome::kOk;

@@ -247,12 +247,16 @@ RT_SAFE void join_faces(StudioFrame& frame) noexcept {
 
 // Studio lets two actors, or two props, have one name: the second "Anna" becomes "Anna 2".
 RT_SAFE void tell_apart(StudioFrame& frame) noexcept {
-  for (std::size_t i = 0; i < frame.count; ++i) {
-    const Subject& subject = frame.subjects[i];
-    int number = 1;
-    for (std::size_t k = i + 1; k < frame.count; ++k) {
-      Subject& other = frame.subjects[k];
-      if (other.kind == subject.kind && other.name == subject.name) other.name.add_number(++number);
+  for (std::size_t k = 1; k < frame.count; ++k) {
+    Subject& subject = frame.subjects[k];
+    const StudioName own = subject.name;
+    const auto is_taken = [&](const Subject& other) {
+      return other.kind == subject.kind && other.name == subject.name;
+    };
+    const auto before = std::span(frame.subjects).first(k);
+    for (int number = 2; std::ranges::any_of(before, is_taken); ++number) {
+      subject.name = own;
+      subject.name.add_number(number);
     }
   }
 }
@@ -264,7 +268,10 @@ RT_SAFE void StudioName::add_number(int number) noexcept {
   std::array<char, kMostDigits> digits{};
   const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
   const auto count = static_cast<std::size_t>(end - digits.data());
-  size_ = std::min(size_, bytes_.size() - count - 1);
+  const std::size_t room = bytes_.size() - count - 1;
+  if (size_ > room) {
+    for (size_ = room; size_ > 0 && (bytes_[size_] & 0xC0) == 0x80;) --size_;  // whole letters
+  }
   bytes_[size_++] = ' ';
   std::ranges::copy(std::string_view(digits.data(), count), bytes_.begin() + size_);
   size_ += count;

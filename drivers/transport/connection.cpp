@@ -30,8 +30,10 @@ constexpr milliseconds kWritePatience{1000};
 constexpr milliseconds kDrainPatience{1000};
 constexpr milliseconds kClosePatience{50};
 constexpr std::int64_t kOfNoUse_ns = 5 * kNanosPerSecond;
-constexpr std::size_t kMaxOfNoUse = 1024 * 1024;  // bytes in a second
-constexpr int kMaxWaiting = 256;                  // reads; hidraw keeps 64 reports
+// A sender that never says its name is of no use for a second, until it is described.
+constexpr std::size_t kMaxOfNoUse = 3 * 1024 * 1024;  // bytes in kFloods_ns
+constexpr std::int64_t kFloods_ns = 3 * kNanosPerSecond;
+constexpr int kMaxWaiting = 256;  // reads; hidraw keeps 64 reports
 
 bool not_now(int error) noexcept {
   return error == EAGAIN || error == EWOULDBLOCK || error == EINTR;
@@ -74,7 +76,7 @@ class LinkTransport final : public Transport, public Upkeep {
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
   RT_SAFE void decoded(bool used) noexcept override {
     if (used) used_ns_.store(read_ns_, std::memory_order_relaxed);
-    if (used || read_ns_ - since_ns_ > kNanosPerSecond) {
+    if (used || read_ns_ - since_ns_ > kFloods_ns) {
       of_no_use_ = 0;
       since_ns_ = read_ns_;
     }
@@ -124,7 +126,9 @@ Chunk LinkTransport::read(std::int64_t now_ns) noexcept {
   const ssize_t got = floods ? 0 : link_.receive(buffer_);
   read_ = static_cast<std::size_t>(std::max<ssize_t>(got, 0));
   if (got > 0) {
-    return {.bytes = {buffer_.data(), read_}, .sender = static_cast<std::uint64_t>(started_ns_)};
+    const bool listens = link_.listener() >= 0;
+    return {.bytes = {buffer_.data(), read_},
+            .sender = listens ? static_cast<std::uint64_t>(started_ns_) : 0};
   }
   if (got < 0 && not_now(errno)) return {};
   return {.bytes = {}, .lost = true, .foreign = floods || link_.was_browser() ? 1U : 0U};
@@ -147,7 +151,7 @@ std::string LinkTransport::consume_note() {
     return link_.name() + " has sent nothing of use for 5 s, and another device waits: it is cut";
   }
   return link_.name() +
-         " has sent a megabyte of nothing usable in a second: it is cut, and its "
+         " has sent 3 MB of nothing usable within 3 s: it is cut, and its "
          "address may come again after " +
          std::to_string(PausedHosts::kPause.count()) + " s";
 }

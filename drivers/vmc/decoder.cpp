@@ -256,6 +256,7 @@ RT_SAFE bool VmcDecoder::accept_status(OscArguments& arguments) noexcept {
   for (std::size_t i = 1; i < kWithTracking && with_tracking; ++i)
     tracking = arguments.number() != 0.0;
   if (!arguments.ok()) return false;
+  if (!loaded) keeps_until_ns_.fill(kNoTime_ns);
   loaded_ = loaded;
   tracking_ = tracking;
   return true;

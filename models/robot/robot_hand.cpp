@@ -191,7 +191,8 @@ class Builder {
     const Eigen::Vector3d& from_m = placed_.at_m[finger.last];
     const double tip_far_m = (placed_.at_m[finger.tip] - from_m).norm();
     finger.tip_known = tip_far_m > kSamePlace_m;
-    if (finger.tip_known && lower(hand_.links[finger.tip].name).contains("tip")) return;
+    const bool said = !options_.tips.empty() && finger.tip != finger.last;
+    if (said || (finger.tip_known && lower(hand_.links[finger.tip].name).contains("tip"))) return;
     std::vector<std::pair<Eigen::Vector3d, double>> corners;
     Eigen::Vector3d middle = Eigen::Vector3d::Zero();
     for (int l = finger.last; l < std::ssize(hand_.links); ++l) {

@@ -370,12 +370,15 @@ Result<> resolve_leaders(const RawUrdf& raw, Urdf& urdf, const Reader& reader) {
     if (!leader.contains(link.joint)) continue;
     std::string at = link.joint;
     double multiplier = 1.0, offset = 0.0;
+    bool stands = false;  // as the sliding joint does that it follows
     for (int steps = 0; leader.contains(at); ++steps) {
       const Link& here = own[index.at(at)];
       offset += multiplier * here.offset;
       multiplier *= here.multiplier;
       at = leader.at(at);
       const auto found = index.find(at);
+      stands = found != index.end() && own[found->second].slides;
+      if (stands) break;
       if (found == index.end() || !own[found->second].turns) {
         return reader.refuse("joint " + in_quotes(link.joint) + " follows " + in_quotes(at) +
                              ", which is no joint that turns");
@@ -386,6 +389,11 @@ Result<> resolve_leaders(const RawUrdf& raw, Urdf& urdf, const Reader& reader) {
     }
     if (!std::isfinite(multiplier) || !std::isfinite(offset) || std::abs(multiplier) > 1e3) {
       return reader.refuse("joint " + in_quotes(link.joint) + " turns a thousand times its leader");
+    }
+    if (stands) {
+      if (link.turns) link.at.rotate(Eigen::AngleAxisd(offset, link.axis));
+      link.turns = false;
+      continue;
     }
     link.leader = index.at(at);
     link.multiplier = multiplier;

@@ -266,6 +266,42 @@ Result<> replace_mesh(pugi::xml_node collision, const std::filesystem::path& urd
   return {};
 }
 
+// Whether a visual has a shape that could be a collision's.
+bool has_shape(const pugi::xml_node& visual) {
+  const pugi::xml_node geometry = visual.child("geometry");
+  if (geometry.child("mesh")) return true;
+  std::istringstream size(geometry.child("box").attribute("size").value());
+  double x = 0.0, y = 0.0, z = 0.0;
+  if (size >> x >> y >> z) return x > 0.0 && y > 0.0 && z > 0.0;
+  const pugi::xml_node cylinder = geometry.child("cylinder");
+  if (cylinder) {
+    return cylinder.attribute("radius").as_double() > 0.0 &&
+           cylinder.attribute("length").as_double() > 0.0;
+  }
+  return geometry.child("sphere").attribute("radius").as_double() > 0.0;
+}
+
+// In a URDF without collision shapes what is seen of it stands for them.
+void use_visuals(pugi::xml_node& robot) {
+  constexpr int kMost = 200;
+  const auto links = robot.children("link");
+  if (std::ranges::any_of(links, [](const auto& link) { return bool(link.child("collision")); })) {
+    return;
+  }
+  int used = 0;
+  for (const pugi::xml_node link : links) {
+    for (pugi::xml_node visual = link.child("visual"); visual;) {
+      const pugi::xml_node next = visual.next_sibling("visual");
+      if (used < kMost && has_shape(visual)) {
+        visual.set_name("collision");
+        ++used;
+      }
+      visual = next;
+    }
+  }
+  if (used > 0) robot.append_attribute("shapes") = "visual";
+}
+
 }  // namespace
 
 Result<std::string> load_urdf(const std::string& path) {
@@ -278,18 +314,7 @@ Result<std::string> load_urdf(const std::string& path) {
     while (robot.remove_child(other)) {
     }
   }
-  // A URDF without collision shapes: what is seen of it stands for them.
-  const auto links = robot.children("link");
-  if (std::ranges::none_of(links, [](const auto& link) { return bool(link.child("collision")); })) {
-    for (const pugi::xml_node link : links) {
-      for (pugi::xml_node visual = link.child("visual"); visual;) {
-        const pugi::xml_node next = visual.next_sibling("visual");
-        visual.set_name("collision");
-        visual = next;
-      }
-    }
-    robot.append_attribute("shapes") = "visual";
-  }
+  use_visuals(robot);
   std::uintmax_t left_bytes = kMaxAllMeshBytes;
   for (pugi::xml_node link : robot.children("link")) {
     for (const char* other : {"visual", "inertial"}) {

@@ -37,6 +37,7 @@ constexpr std::size_t kMaxNodes = 100'000;
 constexpr std::size_t kMaxFigure = 1000;         // joints
 constexpr std::size_t kMaxNumbers = 50'000'000;  // of all frames
 constexpr double kMaxFramesAKey = 1000.0;        // so that a short file asks for little work
+constexpr double kFewFrames = 36'000.0;          // that any file may ask for: a pose held for long
 constexpr double kStillRate_hz = 30.0;           // of a file without an animation
 constexpr double kUnevenRate_hz = 60.0;          // least rate of one whose keys have none
 constexpr double kMaxKeyRate_hz = 1000.0;
@@ -331,12 +332,15 @@ Tree tree_of(const tinygltf::Model& model) {
     }
   }
   std::vector<int> open;
+  std::vector<bool> seen(count, false);  // a node may be named twice among the children
   for (std::size_t n = count; n-- > 0;) {
     if (tree.parent[n] < 0) open.push_back(static_cast<int>(n));
   }
   while (!open.empty()) {
     const int node = open.back();
     open.pop_back();
+    if (seen[static_cast<std::size_t>(node)]) continue;
+    seen[static_cast<std::size_t>(node)] = true;
     tree.order.push_back(node);
     const auto& children = model.nodes[static_cast<std::size_t>(node)].children;
     for (auto child = children.rbegin(); child != children.rend(); ++child) {
@@ -379,7 +383,8 @@ const tinygltf::Value& member(const tinygltf::Value& object, const std::string& 
 Humanoid humanoid_of(const tinygltf::Model& model) {
   Humanoid found;
   const auto add = [&](std::string name, const tinygltf::Value& node, bool old_thumbs) {
-    if (!node.IsInt()) return;
+    const int index = node.IsInt() ? node.GetNumberAsInt() : -1;
+    if (index < 0 || index >= std::ssize(model.nodes)) return;
     if (old_thumbs && name.find("Thumb") != std::string::npos) {
       const auto replace = [&name](std::string_view from, std::string_view to) {
         const std::size_t at = name.find(from);
@@ -390,7 +395,7 @@ Humanoid humanoid_of(const tinygltf::Model& model) {
       static_cast<void>(replace("Proximal", "Metacarpal") || replace("Intermediate", "Proximal"));
     }
     if (const auto bone = bone_from_name(name)) {
-      found.bones.emplace(node.GetNumberAsInt(), *bone);
+      found.bones.emplace(index, *bone);
     }
   };
   for (const char* extension : {"VRMC_vrm", "VRMC_vrm_animation", "VRM"}) {
@@ -442,9 +447,14 @@ bool moves_any(Numbers& numbers, const tinygltf::Animation& animation, const std
     const auto& sampler = animation.samplers[static_cast<std::size_t>(channel.sampler)];
     const std::size_t width = turns ? 4 : 3;
     const auto values = numbers.of(sampler.output, width);
-    for (std::size_t i = width; i < values.size(); ++i) {
-      constexpr double kStill = 1e-6;
-      if (std::abs(values[i] - values[i % width]) > kStill) return true;
+    // A key of a cubic one is the tangent in, the value, the tangent out.
+    const bool cubic = sampler.interpolation == "CUBICSPLINE";
+    const std::size_t step = cubic ? 3 * width : width;
+    for (std::size_t at = cubic ? width : 0; at + width <= values.size(); at += step) {
+      for (std::size_t c = 0; c < width; ++c) {
+        constexpr double kStill = 1e-6;
+        if (std::abs(values[at + c] - values[(cubic ? width : 0) + c]) > kStill) return true;
+      }
     }
     return false;
   });
@@ -484,9 +494,8 @@ std::set<int> chosen_nodes(const tinygltf::Model& model, const Tree& tree, const
     if (shows[n] == 0 && more.contains(tree.parent[n])) more.insert(node);
   }
   if (more.size() <= kMaxFigure) chosen = std::move(more);
-  for (int node = 0; chosen.empty() && node < std::ssize(model.nodes); ++node) {
-    chosen.insert(node);
-  }
+  if (!chosen.empty()) return chosen;
+  for (int node = 0; node < std::ssize(model.nodes); ++node) chosen.insert(node);
   return chosen;
 }
 
@@ -642,9 +651,9 @@ Times times_of(const std::vector<Track>& tracks) {
   const auto steps = static_cast<double>(keys.size() - 1);
   const double span_s = keys.back() - keys.front();
   const double rate_hz = span_s > 0.0 ? steps / span_s : 0.0;
-  constexpr double kNear = 0.05;           // of a frame
-  constexpr double kFewestRate_hz = 20.0;  // of two keys: farther apart a motion is between them
-  bool even = rate_hz >= (keys.size() > 2 ? 1.0 : kFewestRate_hz) && rate_hz <= kMaxKeyRate_hz;
+  constexpr double kNear = 0.05;          // of a frame
+  constexpr double kFewestRate_hz = 5.0;  // where keys are farther apart, a motion is between them
+  bool even = keys.size() > 1 && rate_hz >= kFewestRate_hz && rate_hz <= kMaxKeyRate_hz;
   for (std::size_t i = 0; even && i < keys.size(); ++i) {
     even = std::abs((keys[i] - keys.front()) * rate_hz - static_cast<double>(i)) < kNear;
   }
@@ -653,8 +662,9 @@ Times times_of(const std::vector<Track>& tracks) {
                   : std::abs(rate_hz - whole_hz) < 1e-4 * whole_hz ? whole_hz
                                                                    : rate_hz;
   const double frames = (last_s - times.first_s) * times.rate_hz + kNear;
-  times.frames = frames < kMaxFramesAKey * (steps + 1.0) ? static_cast<std::size_t>(frames) + 1
-                                                         : std::numeric_limits<std::size_t>::max();
+  times.frames = frames < std::max(kMaxFramesAKey * (steps + 1.0), kFewFrames)
+                     ? static_cast<std::size_t>(frames) + 1
+                     : std::numeric_limits<std::size_t>::max();
   return times;
 }
 
@@ -712,6 +722,7 @@ class Reader {
   Humanoid humanoid_;
   Figure figure_;
   const tinygltf::Animation* animation_ = nullptr;
+  bool moves_ = false;            // the animation moves the figure
   std::vector<Pose> world_rest_;  // [node]; of the figure's nodes as it rests
   Eigen::Quaterniond forwards_ = Eigen::Quaterniond::Identity();
 };
@@ -811,7 +822,7 @@ void Reader::rest_in(const Bound& bound) {
     pose.position = bound.turn * (bound.scale * at->second.position);
     pose.rotation = bound.turn * at->second.rotation;
   }
-  // A joint that no skin has keeps its place and turn beside its parent, or its first child.
+  // A joint that no skin has keeps its place and turn beside a child, or else its parent.
   const auto place = [&](int from_node, int to_node) {
     const auto from = static_cast<std::size_t>(from_node), to = static_cast<std::size_t>(to_node);
     if (!laid[from] || laid[to]) return;
@@ -930,9 +941,10 @@ void Reader::remark(Draft& draft) const {
   } else if (model_.animations.size() > 1) {
     const auto number = animation_ - model_.animations.data() + 1;
     const std::string name = animation_->name.empty() ? "" : ", " + in_quotes(animation_->name);
-    draft.warnings.push_back("has " + std::to_string(model_.animations.size()) +
-                             " animations; the first one that moves the figure is read (number " +
-                             std::to_string(number) + name + ")");
+    draft.warnings.push_back(
+        "has " + std::to_string(model_.animations.size()) + " animations; number " +
+        std::to_string(number) + name + " is read, " +
+        (moves_ ? "the first that moves the figure" : "since none moves the figure"));
   }
   if (tree_.shared >= 0) {
     draft.warnings.push_back("node " + std::to_string(tree_.shared) +
@@ -946,7 +958,9 @@ Result<Draft> Reader::read() {
   humanoid_ = humanoid_of(model_);
   if (humanoid_.backwards)
     forwards_ = Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitY());
-  animation_ = find_animation(model_, joint_nodes(model_, humanoid_), numbers_);
+  const std::set<int> joints = joint_nodes(model_, humanoid_);
+  animation_ = find_animation(model_, joints, numbers_);
+  moves_ = animation_ != nullptr && moves_any(numbers_, *animation_, joints);
   figure_ = figure_of(model_, tree_, chosen_nodes(model_, tree_, humanoid_, animation_), humanoid_);
   if (figure_.nodes.empty()) return fail("its nodes go in a circle; it is damaged");
   if (figure_.nodes.size() > kMaxFigure) {

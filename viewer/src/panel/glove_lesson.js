@@ -125,9 +125,10 @@ export class GloveLesson {
     const called = this.called.value;
     const request = { fit_glove: this.#message(called) };
     const { ok, error, fit } = await this.control(request, `${this.name}: calibration ${called}`);
+    if (!ok) return this.#show(error);
     const always = `at each start: calibration = "…/${fit.file}" in the stream's table`;
-    const kept = ok && `${fit.file} is in use, and kept beside the models`;
-    this.#show(ok ? `✓ ${kept}: ${fit.sentence.join('; ')}; ${always}` : error);
+    const kept = `${fit.file} is in use, and kept beside the models`;
+    return this.#show(`✓ ${kept}: ${fit.sentence.join('; ')}; ${always}`);
   }
 
   #show(words = '') {

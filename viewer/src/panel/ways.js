@@ -36,12 +36,12 @@ const MORE = [
 const python = (address) => `posed.Client("${address}")`;
 
 const OK = 0; // Outcome
-const LATE = 5; // and duplicates behind it: of a network, and no fault
+const FOREIGN = 4; // of another sender; late ones and duplicates behind it: no fault either
 
 const many = (count, what) => `${count.toLocaleString('en')} ${what}${count === 1 ? '' : 's'}`;
 
 function countsOf({ outcome, kernel_dropped }) {
-  const damaged = outcome.slice(OK + 1, LATE).reduce((sum, count) => sum + count, 0);
+  const damaged = outcome.slice(OK + 1, FOREIGN).reduce((sum, count) => sum + count, 0);
   return [
     kernel_dropped > 0 && `${many(kernel_dropped, 'datagram')} lost in the kernel`,
     damaged > 0 && `${many(damaged, 'packet')} not understood`,
@@ -81,10 +81,14 @@ function sourceOf(source, streams) {
   };
 }
 
-function outputOf({ name, kind, address, receivers, frames, sent, dropped, failures }) {
+// failed: since the stats before
+function outputOf({ name, kind, address, receivers, frames, sent, dropped, failures }, failed) {
   const nobody = receivers === 0;
-  const [word, tone] =
-    failures > 0 ? ['refused', 'bad'] : nobody ? ['nobody listens', 'off'] : ['sends', 'good'];
+  const [word, tone] = nobody
+    ? ['nobody listens', 'off']
+    : failed
+      ? ['refused', 'bad']
+      : ['sends', 'good'];
   return {
     name,
     word: frames > 0 || nobody ? word : 'waiting',
@@ -99,8 +103,9 @@ function outputOf({ name, kind, address, receivers, frames, sent, dropped, failu
   };
 }
 
-// stats: posed.v1.Stats; connect: the address that the daemon publishes at
-export function waysOf(stats, connect) {
+// stats: posed.v1.Stats; connect: the address that the daemon publishes at; before: how many
+// sendings of each output had failed in the stats before
+export function waysOf(stats, connect, before = new Map()) {
   const replay = stats.replay_file && {
     name: 'replay',
     word: 'live',
@@ -123,11 +128,13 @@ export function waysOf(stats, connect) {
     counts: ['every stream, for programs of your own'],
     how: 'Python as below; C++ and Unity: the folder proto/clients.',
   };
-  return { inputs, outputs: [zeromq, ...stats.output.map(outputOf)] };
+  const output = (one) => outputOf(one, one.failures > (before.get(one.name) ?? 0));
+  return { inputs, outputs: [zeromq, ...stats.output.map(output)] };
 }
 
 export class Ways {
   #shown = '';
+  #failures = new Map(); // by output
 
   // refresh(): asks for an update, when it is unfolded
   constructor(refresh) {
@@ -156,7 +163,8 @@ export class Ways {
   update(stats, connect) {
     this.element.hidden = !stats;
     if (!stats) return;
-    const { inputs, outputs } = waysOf(stats, connect);
+    const { inputs, outputs } = waysOf(stats, connect, this.#failures);
+    this.#failures = new Map(stats.output.map(({ name, failures }) => [name, failures]));
     write(this.title, `Inputs and outputs: ${inputs.length} in, ${outputs.length} out`);
     write(this.python, python(connect));
     const shown = JSON.stringify([inputs, outputs]);
