@@ -76,6 +76,7 @@ class ParameterTable {
 
   [[nodiscard]] std::vector<ParameterSpec> specs() const {
     std::vector<ParameterSpec> specs;
+    specs.reserve(rows_.size());
     for (const Row& row : rows_) specs.push_back(row.spec);
     return specs;
   }

@@ -90,7 +90,7 @@ std::string body_name(const Avatar& avatar, const std::vector<Body>& bodies) {
 
 std::string remark_about(const AvatarEntry& entry) {
   const bool is_studio = figure_of(entry) == Figure::kStudio;
-  const std::string figure = is_studio ? "the figure of Axis Studio" : "the figure of Axis Neuron";
+  std::string figure = is_studio ? "the figure of Axis Studio" : "the figure of Axis Neuron";
   if (entry.figure) return figure;
   return figure + (entry.measured ? ", by the length of its bones"
                                   : ", because the stream has no displacement; is it Axis Studio? "
