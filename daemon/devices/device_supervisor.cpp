@@ -51,7 +51,7 @@ UseWatch::Counts UseWatch::counts_of(const pipeline::SourceCounters& counters) {
 void UseWatch::restart(const pipeline::SourceCounters& counters, std::int64_t now_ns) {
   *this = UseWatch();
   before_ = counts_of(counters);
-  since_ns_ = now_ns;
+  opened_ns_ = since_ns_ = now_ns;
 }
 
 std::size_t UseWatch::cause_of(const Counts& came, bool asks, bool used) {
@@ -79,7 +79,7 @@ std::string UseWatch::look(const pipeline::SourceCounters& counters, bool asks,
   for (std::size_t i = 0; i < came.size(); ++i) came[i] = counts[i] - before_[i];
   before_ = counts;
   const std::int64_t used_ns = counters.used_ns.load();
-  used_ = used_ || (used_ns != kNoTime_ns && used_ns >= since_ns_);
+  used_ = used_ || (used_ns != kNoTime_ns && used_ns >= opened_ns_);
   since_ns_ = now_ns;
   const std::size_t cause = cause_of(came, asks, used_);
   if (cause == kNone || told_[cause]) return {};
@@ -172,11 +172,10 @@ void DeviceSupervisor::take_back() {
 }
 
 void DeviceSupervisor::watch_use() {
+  if (driver_.often_empty) return;
   const bool asks = device_->poll.period_ns != 0;
   const std::string text = use_.look(source_.counters, asks, ports_.clock());
-  // Whoever likes shows the camera a hand.
-  if (text.empty() || driver_.name == "landmarks") return;
-  ports_.report(v1::Event::KIND_WARNING, text);
+  if (!text.empty()) ports_.report(v1::Event::KIND_WARNING, text);
 }
 
 void DeviceSupervisor::watch_silence() {
@@ -223,6 +222,9 @@ void DeviceSupervisor::look_for_device() {
   for (const std::string& warning : device_->warnings) {
     ports_.report(v1::Event::KIND_WARNING, warning);
   }
+  const std::string link = !device_->transport->only_listens() ? "connected: "
+                           : device_->poll.period_ns == 0      ? "listening: "
+                                                               : "asking: ";
   use_.restart(source_.counters, ports_.clock());
   source_.present->connected(device_->description);
   source_.slot->give_back.store(false);  // that request was for the previous device
@@ -230,12 +232,8 @@ void DeviceSupervisor::look_for_device() {
   assert(given);  // the reader had given back the device before
   ports_.reader->call();
   const std::string note = source_.ports->consume_note();
-  const std::string& identity = device_->description.identity;
-  // A bound socket says nothing about the other side.
-  ports_.report(v1::Event::KIND_FOUND, (!identity.starts_with("udp ")  ? "connected: "
-                                        : device_->poll.period_ns == 0 ? "listening: "
-                                                                       : "asking: ") +
-                                           identity + (note.empty() ? "" : "; " + note));
+  ports_.report(v1::Event::KIND_FOUND,
+                link + device_->description.identity + (note.empty() ? "" : "; " + note));
 }
 
 // Refuses a device that differs from what the stream was set up for: its data would silently be

@@ -47,7 +47,7 @@ class UseWatch {
   [[nodiscard]] static std::size_t cause_of(const Counts& came, bool asks, bool used);
 
   Counts before_{};
-  std::int64_t since_ns_ = 0;
+  std::int64_t opened_ns_ = 0, since_ns_ = 0;
   bool packets_came_ = false, used_ = false;  // any, since the link is open; any of use
   std::bitset<kOutcomes + 1> told_;
 };

@@ -145,6 +145,7 @@ TEST_CASE("a link that gives nothing is told once, by what most of its packets w
   const auto after_3_s = [&](Outcome outcome, int packets, bool use = false, bool asks = false) {
     counters.outcome[static_cast<std::size_t>(outcome)] += packets;
     if (use) counters.used_ns = now_ns + 1;
+    CHECK(watch.look(counters, asks, now_ns).empty());  // the time begins with the first packet
     now_ns += 3 * kNanosPerSecond;
     return watch.look(counters, asks, now_ns);
   };
