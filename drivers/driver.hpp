@@ -70,6 +70,9 @@ class Transport {
   // possible): it is read only when the pipeline has caught up.
   [[nodiscard]] virtual bool lossless() const noexcept { return false; }
 
+  // True for bound sockets, which say nothing about the other side until it sends.
+  [[nodiscard]] virtual bool only_listens() const noexcept { return false; }
+
   // Expected chunks per second of a source driven by time; 0 when only the device knows.
   [[nodiscard]] virtual double rate_hz() const noexcept { return 0.0; }
 
@@ -226,6 +229,8 @@ struct Driver {
   // described above. Cold.
   Result<std::unique_ptr<SourceLayout>> (*make_layout)(std::span<const std::byte> description) =
       nullptr;
+  // What comes may long hold no pose, as pictures without a hand.
+  bool often_empty = false;
   // The functions that only gloves have; null for other devices.
   const glove::GloveTraits* glove = nullptr;
   // Emulates the device, for tests, `posed emulate` and the demo; null when there is no emulator.

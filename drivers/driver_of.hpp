@@ -16,6 +16,7 @@
 //   emulator(options, settings) -> Result<std::unique_ptr<Emulator>>
 //   make_layout(bytes)                           only for a device with several bodies
 //   traits()                                     only for a glove
+//   kOftenEmpty                                  only where what comes may long hold no pose
 //
 // Everything here is cold.
 #pragma once
@@ -105,6 +106,7 @@ class DriverOf {
                   .expect = expect,
                   .emulate = emulate};
     if constexpr (requires { Type::traits(); }) driver.glove = &Type::traits();
+    if constexpr (requires { Type::kOftenEmpty; }) driver.often_empty = Type::kOftenEmpty;
     if constexpr (requires { &Type::make_layout; }) driver.make_layout = Type::make_layout;
     return driver;
   }

@@ -86,6 +86,13 @@ Result<> check_stack() {
               " KB, and posed needs 1024: raise it (ulimit -s 8192, LimitSTACK)");
 }
 
+// Before anything else of a program.
+Result<> begin_program() {
+  system::end_with_a_sentence();
+  logging::protect_standard_descriptors();
+  return check_stack();
+}
+
 // The exit code, or 1 if the output could not be written (a full disk). A reader that has gone has
 // read what it wanted; that is not a failure, and nothing is printed.
 int with_stdout_written(int exit_code) {
@@ -171,9 +178,7 @@ void add_commands(CLI::App& app, int& exit_code) {
 }
 
 int main_of(int argc, char** argv) {
-  system::end_with_a_sentence();
-  logging::protect_standard_descriptors();
-  if (const auto enough = check_stack(); !enough) return report(enough.error());
+  if (const auto begun = begin_program(); !begun) return report(begun.error());
   const logging::LogOutput log;
   drivers::use_resolver(drivers::look_up);
   CLI::App app{"posed: live poses in, another style out", "posed"};
@@ -183,9 +188,7 @@ int main_of(int argc, char** argv) {
 }
 
 int train_main_of(int argc, char** argv, const std::shared_ptr<Ranks>& ranks) {
-  system::end_with_a_sentence();
-  logging::protect_standard_descriptors();
-  if (const auto enough = check_stack(); !enough) return report(enough.error());
+  if (const auto begun = begin_program(); !begun) return report(begun.error());
   const logging::LogOutput log;
   CLI::App app{"posed-mpi: posed train on the cores of many machines", "posed-mpi"};
   app.footer(kMpiFooter);

@@ -178,6 +178,7 @@ struct LandmarksSource : NetworkRateSource<LandmarksSource> {
       "camera, OpenXR, Leap Motion, scripts (experimental)";
   static constexpr std::string_view kWhat = "a hand tracker";
   static constexpr std::string_view kExample = "landmarks rate=10";
+  static constexpr bool kOftenEmpty = true;
   using DecoderType = LandmarksDecoder;
   static constexpr auto link_prefix = landmarks::link_prefix;
   static constexpr auto make_layout = landmarks::make_layout;

@@ -61,6 +61,7 @@ class UdpTransport final : public Transport, public Upkeep {
   [[nodiscard]] std::string endpoint(std::size_t socket) const;
 
   [[nodiscard]] int poll_fd() const noexcept override { return epoll_; }
+  [[nodiscard]] bool only_listens() const noexcept override { return true; }
   // In the past while datagrams wait in this object, where poll_fd does not show them.
   [[nodiscard]] std::int64_t next_due_ns() const noexcept override {
     return next_ < received_ ? batch_ns_ : kNoTime_ns;

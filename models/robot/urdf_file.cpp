@@ -270,11 +270,10 @@ Result<> replace_mesh(pugi::xml_node collision, const std::filesystem::path& urd
 bool has_shape(const pugi::xml_node& visual) {
   const pugi::xml_node geometry = visual.child("geometry");
   if (geometry.child("mesh")) return true;
-  std::istringstream size(geometry.child("box").attribute("size").value());
-  double x = 0.0, y = 0.0, z = 0.0;
-  if (size >> x >> y >> z) return x > 0.0 && y > 0.0 && z > 0.0;
-  const pugi::xml_node cylinder = geometry.child("cylinder");
-  if (cylinder) {
+  if (const pugi::xml_node box = geometry.child("box")) {
+    return (three(box.attribute("size"), Eigen::Vector3d::Zero()).array() > 0.0).all();
+  }
+  if (const pugi::xml_node cylinder = geometry.child("cylinder")) {
     return cylinder.attribute("radius").as_double() > 0.0 &&
            cylinder.attribute("length").as_double() > 0.0;
   }

@@ -461,13 +461,13 @@ bool moves_any(Numbers& numbers, const tinygltf::Animation& animation, const std
 }
 
 // The first animation that moves the figure, because a file may begin with that of a camera, of
-// faces or with a single pose; the first of all where none does. Null: there is none.
+// faces or with a single pose. Null: none does.
 const tinygltf::Animation* find_animation(const tinygltf::Model& model, const std::set<int>& nodes,
                                           Numbers& numbers) {
   for (std::size_t i = 0; i < std::min(model.animations.size(), kMaxAnimations); ++i) {
     if (moves_any(numbers, model.animations[i], nodes)) return &model.animations[i];
   }
-  return model.animations.empty() ? nullptr : &model.animations.front();
+  return nullptr;
 }
 
 // The nodes that count: a humanoid's; or the skins' joints, the nodes that the animation turns, and
@@ -958,9 +958,9 @@ Result<Draft> Reader::read() {
   humanoid_ = humanoid_of(model_);
   if (humanoid_.backwards)
     forwards_ = Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitY());
-  const std::set<int> joints = joint_nodes(model_, humanoid_);
-  animation_ = find_animation(model_, joints, numbers_);
-  moves_ = animation_ != nullptr && moves_any(numbers_, *animation_, joints);
+  animation_ = find_animation(model_, joint_nodes(model_, humanoid_), numbers_);
+  moves_ = animation_ != nullptr;
+  if (!moves_ && !model_.animations.empty()) animation_ = &model_.animations.front();
   figure_ = figure_of(model_, tree_, chosen_nodes(model_, tree_, humanoid_, animation_), humanoid_);
   if (figure_.nodes.empty()) return fail("its nodes go in a circle; it is damaged");
   if (figure_.nodes.size() > kMaxFigure) {

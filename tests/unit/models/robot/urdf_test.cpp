@@ -207,14 +207,24 @@ TEST_CASE("the gap of two hulls is that of their nearest points, and a direction
   CHECK(apart > 150);
 }
 
-TEST_CASE("a hull of few corners holds all") {
+namespace {
+
+// Corners all over a ball of 2 cm.
+std::vector<Eigen::Vector3d> ball_of(int corners) {
   std::mt19937 random(7);
   std::normal_distribution<double> some;
   std::vector<Eigen::Vector3d> ball;
-  for (int k = 0; k < 2000; ++k) {
+  for (int k = 0; k < corners; ++k) {
     ball.emplace_back(0.02 *
                       Eigen::Vector3d(some(random), some(random), some(random)).normalized());
   }
+  return ball;
+}
+
+}  // namespace
+
+TEST_CASE("a hull of few corners holds all") {
+  const auto ball = ball_of(2000);
   Hull hull = hull_of(ball);
   const auto outside = [&] {
     double most_m = -1.0;
@@ -387,13 +397,7 @@ TEST_CASE("hulls that overlap have a gap below zero, and a direction however dee
 }
 
 TEST_CASE("a hull of very many corners holds all and sticks out little") {
-  std::mt19937 random(7);
-  std::normal_distribution<double> some;
-  std::vector<Eigen::Vector3d> ball;
-  for (int k = 0; k < 20000; ++k) {
-    ball.emplace_back(0.02 *
-                      Eigen::Vector3d(some(random), some(random), some(random)).normalized());
-  }
+  const auto ball = ball_of(20000);
   const Hull hull = hull_of(ball);
   CHECK(hull.radius_m < 1.5e-3);
   const Eigen::Matrix3d still = Eigen::Matrix3d::Identity();
