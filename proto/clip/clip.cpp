@@ -4,6 +4,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <utility>
 
 #include "proto/clip/draft.hpp"
 #include "proto/clip/format.hpp"
@@ -54,12 +55,13 @@ Result<Clip> read_clip(const std::filesystem::path& path, const ReadOptions& opt
   return clip_of(std::move(draft), loaded.file.name);
 }
 
-Result<Clip> parse_clip(const ClipFile& file, const ReadOptions& options) {
+Result<Clip> parse_clip(ClipFile file, const ReadOptions& options) {
   const Format* format = format_of(file.name);
   if (format == nullptr || format->read == nullptr) {
     return fail("is no clip posed can read; a clip is " + listed(Use::kRead), file.name);
   }
   TRY(check_options(*format, options, file.name));
+  file.bytes = plain_bytes(*format, std::move(file.bytes));
   auto draft = TRY(format->read(file, options));
   return clip_of(std::move(draft), file.name);
 }

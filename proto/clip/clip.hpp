@@ -72,7 +72,7 @@ struct ReadOptions {
 Result<Clip> read_clip(const std::filesystem::path& path, const ReadOptions& options = {});
 
 // Reads a clip from memory. The extension of its name says the format.
-Result<Clip> parse_clip(const ClipFile& file, const ReadOptions& options = {});
+Result<Clip> parse_clip(ClipFile file, const ReadOptions& options = {});
 
 // Keeps frames [first, end) of the clip, with their times from 0 on and their timecodes.
 void keep_frames(Clip& clip, int first, int end);

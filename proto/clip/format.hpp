@@ -54,6 +54,9 @@ struct Format {
   // Returns whether a file that begins with these bytes (some KB) is of this format. Null: nothing
   // is recognised by its content.
   bool (*sniff)(std::string_view begin) = nullptr;
+  // What spreadsheets and other programs make of a file, line by line as posed writes it. Null: a
+  // file is read as it is.
+  std::string (*plain)(std::string bytes) = nullptr;
   // Reads the whole clip, which is untrusted. Errors name file and line. Null: posed cannot read
   // it.
   Result<Draft> (*read)(const ClipFile& file, const ReadOptions& options) = nullptr;
@@ -95,6 +98,9 @@ Result<> check_options(const Format& format, const ReadOptions& options, const s
 // Where the skeleton of a clip lies that has a file of its own, unless the user names it: NN.asf
 // beside NN_MM.amc. Empty for other formats.
 [[nodiscard]] std::filesystem::path skeleton_beside(const std::filesystem::path& path);
+
+// A file's bytes as its format's reader wants them: text in UTF-8, Format::plain.
+[[nodiscard]] std::string plain_bytes(const Format& format, std::string bytes);
 
 // Loads a clip's files. The format is found by the extension, and where that is no format's, by the
 // first bytes. An error lists what can be read.

@@ -78,7 +78,7 @@ Result<> load_skeleton(const Format& format, const std::filesystem::path& path,
   const std::string what = "skeleton (" + std::string(format.skeleton_extension) + ")";
   auto content = TRY(load_file(skeleton, {.what = what, .max_bytes = kMaxSkeletonFile}));
   file.skeleton_name = skeleton.string();
-  file.skeleton = std::move(content);
+  file.skeleton = utf8_of(std::move(content));
   return {};
 }
 
@@ -171,16 +171,31 @@ std::filesystem::path skeleton_beside(const std::filesystem::path& path) {
   return beside(*format, path);
 }
 
+std::string plain_bytes(const Format& format, std::string bytes) {
+  bytes = utf8_of(std::move(bytes));
+  return format.plain == nullptr ? std::move(bytes) : format.plain(std::move(bytes));
+}
+
 Result<LoadedClip> load_clip(const std::filesystem::path& path, const ReadOptions& options) {
   LoadedClip loaded{.format = format_of(path), .file = {.name = path.string(), .bytes = {}}};
   if (loaded.format == nullptr) loaded.format = format_of_bytes(first_bytes(path));
   if (loaded.format == nullptr || loaded.format->read == nullptr) {
     TRY(expect_there(path));
-    return fail("is no clip posed can read; a clip is " + listed(Use::kRead), loaded.file.name);
+    const std::string extension = extension_of(path);
+    const auto whose = std::ranges::find(table(), extension, &Format::skeleton_extension);
+    if (!extension.empty() && whose != table().end()) {
+      return fail("is the skeleton of an " + std::string(whose->name) + "; name the " +
+                      std::string(whose->extensions.front()) + " that moves it",
+                  loaded.file.name);
+    }
+    return fail("is no clip posed can read; a clip is " + listed(Use::kRead) +
+                    ". Export the skeleton, not markers, as one of these from the program that"
+                    " made the file",
+                loaded.file.name);
   }
   TRY(check_options(*loaded.format, options, loaded.file.name));
   auto bytes = TRY(load_file(path, kClip));
-  loaded.file.bytes = std::move(bytes);
+  loaded.file.bytes = plain_bytes(*loaded.format, std::move(bytes));
   if (loaded.format->skeleton_extension.empty()) return loaded;
   TRY(load_skeleton(*loaded.format, path, options, loaded.file));
   return loaded;

@@ -48,7 +48,7 @@ std::string FrameOutcome::sentence() const {
       return "the frame is good";
     case FrameFault::kNotANumber:
       return in_quotes(where) + " is not a number a pose can have" +
-             (where == "nan" ? "; leave a missing value empty" : "");
+             (lower(where) == "nan" ? "; leave a missing value empty" : "");
     case FrameFault::kImplausible:
       return in_quotes(where) +
              " is beyond what a pose can have: a position lies within 1 km, a joint turns by at "
@@ -181,7 +181,11 @@ FrameOutcome FrameParser::parse_fields(std::string_view text,
     const auto value = field.empty()        ? std::optional(kMissing)
                        : outcome.found == 0 ? parse_number(field, kMaxTime_s)
                                             : parse_number(field);
-    if (!value) return add_error(FrameFault::kNotANumber, field);
+    if (!value) {
+      constexpr double kAny = std::numeric_limits<double>::max();  // milliseconds since 1970
+      const bool is_late = outcome.found == 0 && parse_number(field, kAny);
+      return add_error(is_late ? FrameFault::kImplausible : FrameFault::kNotANumber, field);
+    }
     if (outcome.found == 0) {
       outcome.time_s = *value;
     } else if (!keep(*value, kChannelOfAngle[outcome.found - 1], values)) {

@@ -39,7 +39,7 @@ class ModelBuilder {
  public:
   explicit ModelBuilder(const GltfMotion& motion) : motion_(motion) {
     model_.asset.version = "2.0";
-    model_.asset.generator = "posed";
+    model_.asset.generator = kGltfGenerator;
     model_.buffers.emplace_back();
   }
 

@@ -14,6 +14,11 @@
 
 namespace posed::clip {
 
+// What a file that posed wrote says of itself, and a sentence for the user about an animation, in
+// its extras.
+inline constexpr const char* kGltfGenerator = "posed";
+inline constexpr const char* kGltfRemark = "posed_remark";
+
 template <typename Number>
 constexpr int kComponent = TINYGLTF_COMPONENT_TYPE_FLOAT;
 template <>

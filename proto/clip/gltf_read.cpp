@@ -12,6 +12,7 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
+#include <functional>
 #include <limits>
 #include <map>
 #include <numbers>
@@ -27,6 +28,7 @@
 #include "proto/clip/draft.hpp"
 #include "proto/clip/formats.hpp"
 #include "proto/clip/gltf.hpp"
+#include "proto/clip/gltf_numbers.hpp"
 #include "proto/frame/humanoid.hpp"
 #include "proto/text/clean.hpp"
 
@@ -617,11 +619,17 @@ Result<std::vector<Track>> tracks_of(const tinygltf::Model& model,
   return tracks;
 }
 
-// Evenly spaced times that hit the keys of the track that has most, if those have a rate.
+// Evenly spaced times that hit the keys of the track that has most, if those have a rate; of a file
+// of posed that has none, whose frames came when they came, the keys themselves.
 struct Times {
   double rate_hz = kStillRate_hz;
   double first_s = 0.0;
   std::size_t frames = 1;
+  std::span<const double> keys_s{};  // empty: evenly spaced
+
+  [[nodiscard]] double at(std::size_t frame) const {
+    return keys_s.empty() ? first_s + static_cast<double>(frame) / rate_hz : keys_s[frame];
+  }
 };
 
 // That of a live recording, whose frames come when they come.
@@ -635,7 +643,8 @@ double usual_rate_hz(std::span<const double> keys_s) {
   return rate_hz <= kMaxKeyRate_hz ? rate_hz : 0.0;
 }
 
-Times times_of(const std::vector<Track>& tracks) {
+// `own` is true of a file that posed wrote: its tracks share their keys, one a frame.
+Times times_of(const std::vector<Track>& tracks, bool own) {
   Times times;
   const Track* densest = nullptr;
   double last_s = 0.0;
@@ -661,6 +670,13 @@ Times times_of(const std::vector<Track>& tracks) {
   times.rate_hz = !even ? std::max(kUnevenRate_hz, usual_rate_hz(keys))
                   : std::abs(rate_hz - whole_hz) < 1e-4 * whole_hz ? whole_hz
                                                                    : rate_hz;
+  if (own && !even && std::ranges::adjacent_find(keys, std::greater_equal()) == keys.end()) {
+    const double usual_hz = usual_rate_hz(keys);
+    return {.rate_hz = usual_hz > 0.0 ? usual_hz : times.rate_hz,
+            .first_s = keys.front(),
+            .frames = keys.size(),
+            .keys_s = keys};
+  }
   const double frames = (last_s - times.first_s) * times.rate_hz + kNear;
   times.frames = frames < std::max(kMaxFramesAKey * (steps + 1.0), kFewFrames)
                      ? static_cast<std::size_t>(frames) + 1
@@ -679,8 +695,7 @@ std::vector<Timecode> timecodes_of(const tinygltf::Animation* animation,
   if (!keys.IsArray() || keys.ArrayLen() != key_s.size()) return {};
   std::vector<Timecode> out;
   for (std::size_t i = 0; i < times.frames; ++i) {
-    const double time_s = times.first_s + static_cast<double>(i) / times.rate_hz + kNearKey_s;
-    const auto next = std::ranges::upper_bound(key_s, time_s) - key_s.begin();
+    const auto next = std::ranges::upper_bound(key_s, times.at(i) + kNearKey_s) - key_s.begin();
     const tinygltf::Value& code = keys.Get(static_cast<int>(std::max(next - 1, std::ptrdiff_t{0})));
     out.push_back(code.IsString() ? to_timecode(code.Get<std::string>()) : Timecode{});
   }
@@ -849,19 +864,27 @@ void Reader::rest_in(const Bound& bound) {
   }
 }
 
-// Whether a joint changes its distance from its parent, as hips below a root do.
+// Whether a joint needs position channels: it changes its distance from its parent, as hips below a
+// root do, or is elsewhere than at rest, as the hips of one who sits all the time are.
 bool Reader::moves(std::size_t joint, const std::vector<Track>& tracks) const {
   constexpr double kStill_m = 0.001;
   if (joint == 0) return true;
-  const int above = figure_.nodes[static_cast<std::size_t>(figure_.parents[joint])];
-  const double scale = world_rest_[static_cast<std::size_t>(above)].scale.cwiseAbs().maxCoeff();
-  return std::ranges::any_of(tracks, [&](const Track& track) {
-    if (track.node != figure_.nodes[joint] || track.path != Track::Path::kPosition) return false;
-    for (std::size_t i = 1; i < track.time_s.size(); ++i) {
-      if ((track.key(i, 1) - track.key(0, 1)).norm() * scale > kStill_m) return true;
-    }
-    return false;
+  const auto node = static_cast<std::size_t>(figure_.nodes[joint]);
+  const Pose& above = world_rest_[static_cast<std::size_t>(
+      figure_.nodes[static_cast<std::size_t>(figure_.parents[joint])])];
+  const Eigen::Vector3d rest =
+      above.rotation.conjugate() * (world_rest_[node].position - above.position);
+  const auto elsewhere = [&](const Eigen::Vector3d& own) {
+    return (above.scale.cwiseProduct(own) - rest).norm() > kStill_m;
+  };
+  const auto track = std::ranges::find_if(tracks, [&](const Track& at) {
+    return at.node == figure_.nodes[joint] && at.path == Track::Path::kPosition;
   });
+  if (track == tracks.end()) return elsewhere(rest_[node].position);
+  for (std::size_t i = 0; i < track->time_s.size(); ++i) {
+    if (elsewhere(track->key(i, 1).head<3>())) return true;
+  }
+  return false;
 }
 
 void Reader::describe(const std::vector<Track>& tracks, Draft& draft) const {
@@ -946,6 +969,10 @@ void Reader::remark(Draft& draft) const {
         std::to_string(number) + name + " is read, " +
         (moves_ ? "the first that moves the figure" : "since none moves the figure"));
   }
+  if (animation_ != nullptr && animation_->extras.IsObject()) {
+    const tinygltf::Value& remark = member(animation_->extras, kGltfRemark);
+    if (remark.IsString()) draft.warnings.push_back(clean(remark.Get<std::string>()));
+  }
   if (tree_.shared >= 0) {
     draft.warnings.push_back("node " + std::to_string(tree_.shared) +
                              " hangs below two others, of which the first counts; it is damaged");
@@ -978,7 +1005,7 @@ Result<Draft> Reader::read() {
                 [&](int node) { return matters[static_cast<std::size_t>(node)] == 0; });
   std::vector<Track> tracks;
   if (animation_ != nullptr) tracks = TRY(tracks_of(model_, *animation_, matters, numbers_));
-  const Times times = times_of(tracks);
+  const Times times = times_of(tracks, model_.asset.generator == kGltfGenerator);
   describe(tracks, draft);
   draft.bones = figure_.bones;
   draft.rests_in_t = !humanoid_.bones.empty();
@@ -992,7 +1019,8 @@ Result<Draft> Reader::read() {
   std::vector<std::array<double, 3>> near(figure_.nodes.size());
   std::vector<Pose> own = rest_, world = world_rest_;
   for (std::size_t i = 0; i < times.frames; ++i) {
-    const double time_s = times.first_s + static_cast<double>(i) / times.rate_hz;
+    const double time_s = times.at(i);
+    if (!times.keys_s.empty()) draft.time_s.push_back(time_s - times.first_s);
     for (const Track& track : tracks) {
       Pose& pose = own[static_cast<std::size_t>(track.node)];
       const Eigen::Vector4d value = track.at(time_s);

@@ -40,6 +40,49 @@ std::string header_line() {
   return line;
 }
 
+// The fields of a line, without blanks and quotes around them.
+std::vector<std::string_view> fields_of(std::string_view line, char separator) {
+  std::vector<std::string_view> fields;
+  for (std::size_t end = 0; end != std::string_view::npos;) {
+    end = line.find(separator);
+    std::string_view field = trim(line.substr(0, end));
+    if (field.size() > 1 && field.starts_with('"') && field.ends_with('"')) {
+      field = trim(field.substr(1, field.size() - 2));
+    }
+    fields.push_back(field);
+    if (end != std::string_view::npos) line.remove_prefix(end + 1);
+  }
+  return fields;
+}
+
+// Spreadsheets save a hand CSV with semicolons and decimal commas, or with tabs; pandas and R put
+// the number of the row in front; R quotes the names. What has another header stays as it is.
+std::string plain_csv(std::string bytes) {
+  std::string_view rest = without_bom(bytes);
+  std::string plain;
+  if (rest.starts_with("sep=")) {  // a line that Excel understands
+    static_cast<void>(next_line(rest));
+    plain = "\n";
+  }
+  const std::string_view header = rest.substr(0, rest.find_first_of("\r\n"));
+  const char separator = header.contains(';') ? ';' : header.contains('\t') ? '\t' : ',';
+  const auto names = fields_of(header, separator);
+  const std::size_t first = names.front().empty() ? 1 : 0;
+  const bool is_plain = separator == ',' && first == 0 && !header.contains('"');
+  if (is_plain || names.size() != first + 1 + kHandChannels || names[first] != "time_s") {
+    return bytes;
+  }
+  while (!rest.empty()) {
+    const auto fields = fields_of(next_line(rest), separator);
+    for (std::size_t i = first; i < fields.size(); ++i) {
+      if (i > first) plain += ',';
+      for (const char c : fields[i]) plain += c == ',' ? '.' : c;
+    }
+    plain += '\n';
+  }
+  return plain;
+}
+
 Result<> check_header(std::string_view line, const std::string& name, int line_number) {
   for (std::size_t i = 0; i <= kHandChannels; ++i) {
     const std::string_view expected =
@@ -49,7 +92,10 @@ Result<> check_header(std::string_view line, const std::string& name, int line_n
     if (found != expected) {
       return fail("column " + std::to_string(i + 1) + " is " + in_quotes(found) +
                       " where a hand CSV has '" + std::string(expected) +
-                      "'; its header is time_s,thumb1_x_rad,thumb1_y_rad, ..., little3_z_rad",
+                      "'; its header is time_s,thumb1_x_rad,thumb1_y_rad, ..., little3_z_rad" +
+                      (i == 0 ? ", and of a program that writes another CSV posed reads .bvh,"
+                                " .fbx and .glb: export one there"
+                              : ""),
                   name, line_number);
     }
     line.remove_prefix(comma == std::string_view::npos ? line.size() : comma + 1);
@@ -189,6 +235,7 @@ Format hand_csv_format() {
           .sends_text = true,
           .options = {ReadOption::kHand, ReadOption::kHandShape},
           .sniff = [](std::string_view begin) { return has_line(begin, "time_s,"); },
+          .plain = plain_csv,
           .read = read_hand_csv,
           .write = write};
 }

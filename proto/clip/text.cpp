@@ -123,4 +123,36 @@ std::string_view without_bom(std::string_view text) noexcept {
   return text;
 }
 
+std::string utf8_of(std::string text) {
+  const bool big = text.starts_with("\xfe\xff");
+  if (!big && !text.starts_with("\xff\xfe")) return text;
+  const auto unit = [&](std::size_t i) {
+    const auto first = static_cast<unsigned char>(text[i]);
+    const auto second = static_cast<unsigned char>(text[i + 1]);
+    return static_cast<std::uint32_t>(big ? first << 8 | second : second << 8 | first);
+  };
+  std::string out;
+  for (std::size_t i = 2; i + 1 < text.size(); i += 2) {
+    std::uint32_t code = unit(i);
+    const std::uint32_t next = i + 3 < text.size() ? unit(i + 2) : 0;
+    const bool pair = code >= 0xd800 && code < 0xdc00 && next >= 0xdc00 && next < 0xe000;
+    if (pair) {
+      code = 0x10000 + ((code - 0xd800) << 10) + (next - 0xdc00);
+      i += 2;
+    } else if (code >= 0xd800 && code < 0xe000) {
+      code = 0xfffd;
+    }
+    const auto add = [&out](std::uint32_t byte) { out += static_cast<char>(byte); };
+    if (code < 0x80) {
+      add(code);
+      continue;
+    }
+    const int more = code < 0x800 ? 1 : code < 0x10000 ? 2 : 3;  // bytes behind the first
+    constexpr std::array<std::uint32_t, 4> kFirst{0, 0xc0, 0xe0, 0xf0};
+    add(kFirst[static_cast<std::size_t>(more)] | code >> 6 * more);
+    for (int k = more - 1; k >= 0; --k) add(0x80 | (code >> 6 * k & 0x3f));
+  }
+  return out;
+}
+
 }  // namespace posed::clip

@@ -62,4 +62,8 @@ class Cursor {
 // `text` without a UTF-8 byte order mark.
 [[nodiscard]] std::string_view without_bom(std::string_view text) noexcept;
 
+// `text` as UTF-8 if it begins with a byte order mark of UTF-16, as Windows' "Unicode" does,
+// otherwise as it is. Half a pair becomes U+FFFD.
+[[nodiscard]] std::string utf8_of(std::string text);
+
 }  // namespace posed::clip

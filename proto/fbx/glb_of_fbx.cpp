@@ -31,6 +31,7 @@ constexpr std::string_view kPart = "_$AssimpFbx$_";
 constexpr std::size_t kMaxNodes = 100'000;
 constexpr std::size_t kMaxNumbers = 50'000'000;  // of all frames
 constexpr double kMinRate_hz = 1.0, kUsualRate_hz = 30.0;
+constexpr double kSparse = 1.5;  // frames a key
 
 Eigen::Matrix4d matrix_of(const aiMatrix4x4& m) {
   return Eigen::Map<const Eigen::Matrix<float, 4, 4, Eigen::RowMajor>>(&m.a1).cast<double>();
@@ -219,15 +220,21 @@ bool moves(const Node& node, const Channels& channels) {
       node.parts, [&](const aiNode* part) { return channels.contains(text_of(part->mName)); });
 }
 
-// The ticks at which an animation is sampled: those that most channels with several keys share, if
-// these are evenly spaced (assimp adds keys where an angle jumps), otherwise the file's frames.
-Result<std::vector<double>> ticks_of(const aiAnimation& animation) {
+struct Ticks {
+  std::vector<double> at{0.0};  // at which an animation is sampled
+  bool sparse = false;          // there is much between two keys
+};
+
+// Those that most channels with several keys share, if these are evenly spaced (assimp adds keys
+// where an angle jumps) and no farther apart than the file's frames, otherwise the file's frames.
+Result<Ticks> ticks_of(const aiAnimation& animation) {
   // Assimp multiplies all times by the rate, and takes the one that a file does not name for -1.
   if (!(animation.mTicksPerSecond > 0.0)) {
     return fail("names no frame rate, so its times are lost; export it with one");
   }
   std::map<double, unsigned> shared;
   unsigned moving = 0;
+  std::size_t all_keys = 0;
   for (unsigned i = 0; i < animation.mNumChannels; ++i) {
     const aiNodeAnim& channel = *animation.mChannels[i];
     std::set<double> own;
@@ -237,9 +244,10 @@ Result<std::vector<double>> ticks_of(const aiAnimation& animation) {
       own.insert(channel.mRotationKeys[k].mTime);
     if (own.size() < 2) continue;
     ++moving;
+    all_keys += own.size();
     for (const double tick : own) ++shared[tick];
   }
-  if (shared.empty()) return std::vector<double>{0.0};
+  if (shared.empty()) return Ticks{};
   const double first = shared.begin()->first, last = shared.rbegin()->first;
   if (!std::isfinite(first) || !std::isfinite(last))
     return fail("has keys at no time; it is damaged");
@@ -252,9 +260,10 @@ Result<std::vector<double>> ticks_of(const aiAnimation& animation) {
   for (std::size_t i = 0; even && i < ticks.size(); ++i) {
     even = std::abs(ticks[i] - first - static_cast<double>(i) * step) < 0.05 * step;
   }
-  if (even) return ticks;
   // Where the file leaves the rate to its reader, a tick is a second.
   const double frame = animation.mTicksPerSecond > kMinRate_hz ? 1.0 : 1.0 / kUsualRate_hz;
+  if (even && step < kSparse * frame) return Ticks{.at = std::move(ticks)};
+  const double keys = static_cast<double>(all_keys) / std::max(moving, 1U);
   if (!((last - first) / frame < static_cast<double>(kMaxNumbers))) {
     return fail("its animation is longer than a clip can be; cut it");
   }
@@ -262,7 +271,7 @@ Result<std::vector<double>> ticks_of(const aiAnimation& animation) {
   for (std::size_t i = 0; first + static_cast<double>(i) * frame < last + 1e-6; ++i) {
     ticks.push_back(first + static_cast<double>(i) * frame);
   }
-  return ticks;
+  return Ticks{.at = std::move(ticks), .sparse = last - first > kSparse * frame * (keys - 1.0)};
 }
 
 // --- the .glb
@@ -291,6 +300,7 @@ class Builder {
   void add_nodes();
   Result<> add_animation(const aiAnimation& animation);
   void add_skin();
+  [[nodiscard]] std::string remark_of(const std::set<int>& moving, bool sparse) const;
   [[nodiscard]] std::map<std::string, int> numbers_of_names() const;
   [[nodiscard]] std::vector<std::optional<Eigen::Matrix4d>> bound(
       const std::vector<Eigen::Matrix4d>& world) const;
@@ -367,7 +377,8 @@ void Builder::add_nodes() {
 
 Result<> Builder::add_animation(const aiAnimation& from) {
   const Channels channels = channels_of(from);
-  const auto ticks = TRY(ticks_of(from));
+  const auto times = TRY(ticks_of(from));
+  const std::vector<double>& ticks = times.at;
   const double rate_hz = from.mTicksPerSecond;
   std::vector<float> time_s;
   time_s.reserve(ticks.size());
@@ -384,7 +395,7 @@ Result<> Builder::add_animation(const aiAnimation& from) {
   if (moving.size() * ticks.size() > kMaxNumbers / 7) {
     return fail("its animation is longer than a clip can be; cut it");
   }
-  const int times = clip::add_accessor(model_, time_s, TINYGLTF_TYPE_SCALAR);
+  const int keys = clip::add_accessor(model_, time_s, TINYGLTF_TYPE_SCALAR);
   for (const int n : moving) {
     std::vector<float> places, turns;
     Eigen::Quaterniond before = Eigen::Quaterniond::Identity();
@@ -397,12 +408,32 @@ Result<> Builder::add_animation(const aiAnimation& from) {
       for (const double x : place) places.push_back(static_cast<float>(x));
       for (const double x : turn.coeffs()) turns.push_back(static_cast<float>(x));
     }
-    clip::add_track(model_, animation, times, n, "translation", places, TINYGLTF_TYPE_VEC3);
-    clip::add_track(model_, animation, times, n, "rotation", turns, TINYGLTF_TYPE_VEC4);
+    clip::add_track(model_, animation, keys, n, "translation", places, TINYGLTF_TYPE_VEC3);
+    clip::add_track(model_, animation, keys, n, "rotation", turns, TINYGLTF_TYPE_VEC4);
+  }
+  if (const std::string remark = remark_of(moving, times.sparse); !remark.empty()) {
+    animation.extras =
+        tinygltf::Value(tinygltf::Value::Object{{clip::kGltfRemark, tinygltf::Value(remark)}});
   }
   animated_.merge(moving);
   model_.animations.push_back(std::move(animation));
   return {};
+}
+
+// What assimp does not tell: which of two joints of one name moves, and which curve lies between
+// keys.
+std::string Builder::remark_of(const std::set<int>& moving, bool sparse) const {
+  std::set<std::string> names;
+  for (const int n : moving) {
+    const Node& node = nodes_[static_cast<std::size_t>(n)];
+    if (!node.limb || names.insert(node.name).second) continue;
+    return "has two joints named " + in_quotes(node.name) +
+           ", whose motions posed cannot tell apart: they may be mixed. Give each figure names of"
+           " its own, or export one alone";
+  }
+  if (!sparse) return {};
+  return "has keys frames apart, between which posed goes straight; if the program that wrote it"
+         " draws curves, bake every frame there and export again";
 }
 
 std::set<int> Builder::bones() const {

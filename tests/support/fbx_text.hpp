@@ -22,6 +22,7 @@ class FbxText {
   Eigen::Vector3d pivot = Eigen::Vector3d::Zero();  // [units of the file]
   std::string prefix;
   bool empty_stack = false, animated = true;
+  int key_every = 1;  // frames
   int time_mode = 6;  // 30 frames a second; 0: the reader's usual rate; 14: one that is not named
 
   [[nodiscard]] std::string of(const clip::Clip& clip) {
@@ -126,16 +127,18 @@ class FbxText {
     link(id, joint, property);
     for (int axis = 0; axis < 3; ++axis) {
       const int curve = id + 1 + axis;
-      const std::string count = "*" + std::to_string(clip.frames()) + " {\n\t\t\ta: ";
+      const int keys = (clip.frames() - 1) / key_every + 1;
+      const std::string count = "*" + std::to_string(keys) + " {\n\t\t\ta: ";
       out_ << "\tAnimationCurve: " << curve << ", \"AnimCurve::\", \"\" {\n\t\tDefault: 0\n"
            << "\t\tKeyVer: 4008\n\t\tKeyTime: " << count;
-      for (int i = 0; i < clip.frames(); ++i) {
+      for (int i = 0; i < clip.frames(); i += key_every) {
         constexpr double kTicksASecond = 46186158000.0;
         out_ << (i > 0 ? "," : "")
              << static_cast<std::int64_t>(i / clip.frame_rate_hz * kTicksASecond);
       }
       out_ << "\n\t\t}\n\t\tKeyValueFloat: " << count;
-      for (int i = 0; i < clip.frames(); ++i) out_ << (i > 0 ? "," : "") << value(i)[axis];
+      for (int i = 0; i < clip.frames(); i += key_every)
+        out_ << (i > 0 ? "," : "") << value(i)[axis];
       out_ << "\n\t\t}\n\t}\n";
       link(curve, id, std::string("d|") + "XYZ"[axis]);
     }

@@ -157,7 +157,6 @@ Result<clip::Clip> read_log(const Convert& convert) {
   auto clip = clip_of_log(convert.in, convert.stream, convert.take);
   if (!clip || holds_gaps(convert.out)) return clip;
   clip::hold_missing(*clip);
-  warn_of_clock(convert, *clip);
   return clip;
 }
 
@@ -170,9 +169,7 @@ Result<clip::Clip> read(const Convert& convert) {
   if (!clip || !is_hand(convert.in) || is_hand(convert.out)) return clip;
   auto hand = TRY(clip::hand_of(*clip));
   clip::fill_gaps(hand);
-  auto filled = clip::clip_of_hand(hand, convert.read.hand_shape);
-  if (filled) warn_of_clock(convert, *filled);
-  return filled;
+  return clip::clip_of_hand(hand, convert.read.hand_shape);
 }
 
 Result<> write(const Convert& convert, const clip::Clip& clip) {
@@ -202,6 +199,7 @@ int run(Convert& convert) {
   if (clip)
     clip = clip::cut_by_timecode(*std::move(clip), convert.from_timecode, convert.to_timecode);
   if (!clip) return report(clip.error());
+  warn_of_clock(convert, *clip);
   Findings findings;
   for (const std::string& warning : clip->warnings) findings.remark(convert.in + ": " + warning);
   if (auto ok = write(convert, *clip); !ok) return report(ok.error());

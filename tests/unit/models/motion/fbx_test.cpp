@@ -10,6 +10,7 @@
 #include <csignal>
 #include <random>
 
+#include "models/motion/kinematics.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "proto/clip/fbx.hpp"
 #include "proto/fbx/glb_of_fbx.hpp"
@@ -83,6 +84,24 @@ TEST_CASE("an FBX of Blender is the same clip, at rest and in motion") {
     const int k = read->skeleton->joint_index(joint.name);
     const Joint& same = read->skeleton->joints[static_cast<std::size_t>(k)];
     CHECK((same.offset_m - joint.offset_m).norm() < 1e-4);
+  }
+}
+
+TEST_CASE("an FBX with a key every third frame has the file's frames, and a sentence") {
+  test::FbxText text;
+  text.key_every = 3;
+  const clip::Clip walk = walk_of(0.95);
+  const auto read = read_fbx(text.of(walk));
+  if (!read) FAIL(read.error().text());
+  CHECK(read->frame_rate_hz == Approx(30.0));
+  REQUIRE(read->frames() == (walk.frames() - 1) / 3 * 3 + 1);
+  REQUIRE(read->warnings.size() == 1);
+  CHECK(test::has(read->warnings[0], "has keys frames apart"));
+  const auto truth = world_pose(*walk.skeleton, walk.frame(6));
+  const auto got = world_pose(*read->skeleton, read->frame(6));
+  for (std::size_t j = 0; j < truth.position_m.size(); ++j) {
+    const int k = read->skeleton->joint_index(walk.skeleton->joints[j].name);
+    CHECK((got.position_m[static_cast<std::size_t>(k)] - truth.position_m[j]).norm() < 1e-4);
   }
 }
 

@@ -170,6 +170,11 @@ TEST_CASE("a .glb keeps the clip's own times") {
     CHECK(read.time_s[at] == Approx(clip.time_s[at] - 7.0).margin(1e-6));
   }
   check_glb(clip);
+  const auto back = clip::read_clip(folder.path() / "out.glb");
+  if (!back) FAIL(back.error().text());
+  CHECK(back->time_s.size() == clip.time_s.size());
+  clip.frame_rate_hz = back->frame_rate_hz;
+  test::check_same_motion(clip, *back);  // frame by frame
 }
 
 TEST_CASE("frames that came at one moment have increasing times in glTF") {
@@ -497,6 +502,33 @@ TEST_CASE("nodes that stand in a pose: the figure rests where its skin was bound
                               truth.rotation[j] * joint.T_world_joint.conjugate()) < 1e-3);
     }
   }
+}
+
+// One who sits all the time on the skeleton of one who stands.
+TEST_CASE("hips below a root that stay elsewhere than at rest are where the keys have them") {
+  OtherGlb glb;
+  const auto& channels = glb.model.animations[0].channels;
+  std::size_t c = 0;
+  while (channels[c].target_path != "translation") ++c;
+  const int hips = channels[c].target_node;
+  const std::vector<double> place = glb.key(c, 0);
+  const auto& view = glb.model.bufferViews[static_cast<std::size_t>(glb.keys(c).bufferView)];
+  unsigned char* first = glb.model.buffers[0].data.data() + view.byteOffset;
+  const std::size_t bytes = 3 * sizeof(float);
+  for (std::size_t i = 1; i < glb.keys(c).count; ++i) std::memcpy(first + i * bytes, first, bytes);
+  tinygltf::Node root;
+  root.name = "root";
+  root.children = {hips};
+  glb.model.nodes[static_cast<std::size_t>(hips)].translation = {0.0, place[1] + 0.4, 0.0};
+  glb.model.skins[0].joints.push_back(static_cast<int>(glb.model.nodes.size()));
+  glb.model.skins[0].inverseBindMatrices = -1;
+  std::ranges::replace(glb.model.scenes[0].nodes, hips, static_cast<int>(glb.model.nodes.size()));
+  glb.model.nodes.push_back(root);
+  const auto back = glb.read();
+  if (!back) FAIL(back.error().text());
+  const auto k = static_cast<std::size_t>(back->skeleton->joint_of(Bone::kHips));
+  REQUIRE(k == 1);
+  CHECK(world_pose(*back->skeleton, back->frame(5)).position_m[k].y() == Approx(place[1]));
 }
 
 TEST_CASE("sparse keys are read") {

@@ -97,6 +97,28 @@ TEST_CASE("line ends, blanks, blank lines and a byte order mark do not matter") 
   CHECK(read(spaced).angles == read(plain).angles);
 }
 
+TEST_CASE("a hand CSV that a spreadsheet, pandas or R saved is the same hand") {
+  const std::string plain = header() + row("0", 0.125) + row("0.1", -2.5);
+  const auto spread = [&](char separator, char point) {
+    std::string odd;
+    for (const char c : plain) odd += c == ',' ? separator : c == '.' ? point : c;
+    return odd;
+  };
+  std::string utf16 = "\xff\xfe";
+  for (const char c : plain) utf16 += {c, '\0'};
+  const std::string numbered = "\"\",\"time_s\"" + header().substr(std::string("time_s").size()) +
+                               "0," + row("0", 0.125) + "1," + row("0.1", -2.5);
+  for (const std::string& odd : {spread(';', ','), spread(';', '.'), spread('\t', '.'),
+                                 "sep=;\r\n" + spread(';', ','), numbered, utf16}) {
+    INFO(odd.substr(0, 40));
+    const HandClip clip = read(odd);
+    CHECK(clip.angles == read(plain).angles);
+    CHECK(clip.time_s == read(plain).time_s);
+  }
+  CHECK(error_of("Frame,Hips_x\n1,2\n").ends_with("reads .bvh, .fbx and .glb: export one there"));
+  CHECK(error_of(header() + row("1700000000000", 0)).ends_with("is the unit right?"));
+}
+
 TEST_CASE("times may be uneven, missing or repeated; they may not run back") {
   const HandClip gaps = read(header() + row("", 0) + row("1.0", 0) + row("1.1", 0) + row("", 0) +
                              row("1.3", 0) + row("1.3", 0) + row("1.4", 0) + row("", 0));
