@@ -63,6 +63,12 @@ Result<Draft> read_amc(const ClipFile& file, const ReadOptions& options) {
   draft.skeleton.name = std::filesystem::path(file.skeleton_name).stem().string();
   draft.metres_per_unit = acclaim.metres_per_unit;
   draft.frame_rate_hz = rate_hz;
+  draft.up_may_err = true;
+  draft.said_up = options.up;
+  draft.said_facing = options.facing;
+  if (options.metres_per_unit) {  // instead of what the skeleton says
+    draft.said_unit_m = *options.metres_per_unit / draft.metres_per_unit;
+  }
   TRY(read_frames(frames, file.name, draft.values, draft.time_s));
   return draft;
 }
@@ -76,7 +82,8 @@ Format amc_format() {
           .evenly_spaced = true,
           .sends_text = true,
           .skeleton_extension = ".asf",
-          .options = {ReadOption::kSkeleton, ReadOption::kRate, ReadOption::kProfile},
+          .options = {ReadOption::kSkeleton, ReadOption::kRate, ReadOption::kUnit, ReadOption::kUp,
+                      ReadOption::kFacing, ReadOption::kProfile},
           .sniff =
               [](std::string_view begin) {
                 return has_line(begin, ":DEGREES") || has_line(begin, ":FULLY-SPECIFIED");

@@ -180,8 +180,14 @@ Result<DeviceClip> open_device_clip(const std::filesystem::path& path, const Rea
   const auto loaded = TRY(load_clip(path, options));
   auto draft = TRY(loaded.format->read(loaded.file, options));
   assert(draft.text.has_value() == loaded.format->sends_text);
-  const auto text = std::exchange(draft.text, std::nullopt);
+  auto text = std::exchange(draft.text, std::nullopt);
+  const bool settled = draft.rig != nullptr;
   auto clip = TRY(clip_of(std::move(draft), loaded.file.name));
+  // The lines of a file that was put into other axes or another unit do not say so.
+  if (!settled && clip.rig &&
+      (clip.rig->up != UpAxis::kPlusY || clip.rig->metres_per_unit.value_or(1.0) != 1.0)) {
+    text.reset();
+  }
   DeviceClip out;
   out.coding.skeleton = clip.skeleton;
   out.coding.frame_rate_hz = clip.frame_rate_hz;

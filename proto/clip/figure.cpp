@@ -143,8 +143,18 @@ std::vector<double> turn_axes(const Eigen::Matrix3d& turn, Skeleton& skeleton) {
     if (joint.end_site_m) joint.end_site_m = turn * *joint.end_site_m;
     joint.T_world_joint = joint.T_world_joint * Eigen::Quaterniond(turn).conjugate();
   }
+  // The axes of a joint with a frame of its own turn with that.
+  std::vector<char> framed;
+  for (Joint& joint : skeleton.joints) {
+    framed.push_back(joint.channel_frame.isApprox(Eigen::Quaterniond::Identity()) ? 0 : 1);
+    if (framed.back() != 0) joint.channel_frame = Eigen::Quaterniond(turn) * joint.channel_frame;
+  }
   std::vector<double> factors;
   for (Channel& channel : skeleton.channels) {
+    if (framed[channel.joint] != 0 && !channel.translation) {
+      factors.push_back(1.0);
+      continue;
+    }
     const Eigen::Vector3d to = turn * unit(channel.axis);
     int axis = 0;
     to.cwiseAbs().maxCoeff(&axis);

@@ -61,10 +61,16 @@ std::string first_bytes(const std::filesystem::path& path) {
   return bytes;
 }
 
+// A skeleton has the clip's name or the beginning of it up to a '_', as 07.asf of 07_01.amc has;
+// the longest that is there, or else the shortest.
 std::filesystem::path beside(const Format& format, const std::filesystem::path& path) {
-  const std::string stem = path.stem().string();
-  return path.parent_path() /
-         (stem.substr(0, stem.find('_')) + std::string(format.skeleton_extension));
+  std::string stem = path.stem().string();
+  while (true) {
+    auto skeleton = path.parent_path() / (stem + std::string(format.skeleton_extension));
+    const std::size_t cut = stem.rfind('_');
+    if (cut == std::string::npos || cut == 0 || expect_there(skeleton)) return skeleton;
+    stem.resize(cut);
+  }
 }
 
 Result<> load_skeleton(const Format& format, const std::filesystem::path& path,

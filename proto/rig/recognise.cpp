@@ -17,7 +17,8 @@ struct LengthUnit {
 constexpr double kCmu_m = 0.0254 / 0.45;
 constexpr double kMmd_m = 0.08;
 constexpr double kNever = 1e9;  // unless its maker's names say so: decimetres are too near
-constexpr std::array<LengthUnit, 9> kLengthUnits{
+constexpr double kHundred = 100.0;
+constexpr std::array<LengthUnit, 10> kLengthUnits{
     {{1.0, "metres", 0.0},
      {0.01, "centimetres", 0.0},
      {0.001, "millimetres", 0.1},
@@ -26,7 +27,8 @@ constexpr std::array<LengthUnit, 9> kLengthUnits{
      {0.3048, "feet", 0.35},
      {kCmu_m, "inches / 0.45", 0.6},
      {2.4384, "Poser's units of 8 feet", 0.45},
-     {kMmd_m, "MikuMikuDance's units of 8 cm", kNever}}};
+     {kMmd_m, "MikuMikuDance's units of 8 cm", kNever},
+     {kHundred, "metres that the file calls centimetres", kNever}}};
 
 // The unit of makers that have one of their own, known by names that only they give; else 0.
 double usual_unit_m(const std::vector<RigJoint>& joints, const std::vector<JointName>& names) {
@@ -60,6 +62,8 @@ void set_unit(double length, double true_m, double usual_m, std::string_view wha
   if (input.format_says && !rig.metres_per_unit && may_be_metres(length, true_m)) {
     rig.metres_per_unit = 1.0;
   }
+  // A figure as small as a thumb is the usual mistake of a format that has a unit.
+  if (input.format_says && length < true_m && !may_be_metres(length, true_m)) usual_m = kHundred;
   const LengthUnit& unit = unit_for(length, true_m, usual_m);
   if (!rig.metres_per_unit) {
     rig.metres_per_unit = unit.metres;

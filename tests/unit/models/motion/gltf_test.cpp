@@ -577,12 +577,13 @@ TEST_CASE("joints that no skin has are joints where an animation turns them") {
   glb.check_same();
 }
 
-TEST_CASE("a glTF in centimetres that stands along +z is brought into metres and +y up") {
+TEST_CASE("a glTF of another unit that stands along +z is brought into metres and +y up") {
   OtherGlb glb;
+  const bool small = GENERATE(false, true);
   tinygltf::Node above;
   above.name = "root";
   above.children = glb.model.scenes[0].nodes;
-  above.scale.assign(3, 100.0);
+  above.scale.assign(3, small ? 0.01 : 100.0);
   const double half = std::sqrt(0.5);
   above.rotation = {half, 0.0, 0.0, half};
   glb.model.scenes[0].nodes = {static_cast<int>(glb.model.nodes.size())};
@@ -590,7 +591,8 @@ TEST_CASE("a glTF in centimetres that stands along +z is brought into metres and
   glb.check_same(1e-3);
   const auto back = glb.read();
   REQUIRE(back->warnings.size() >= 2);
-  CHECK(test::has(back->warnings[back->warnings.size() - 2], "taken as centimetres"));
+  CHECK(test::has(back->warnings[back->warnings.size() - 2],
+                  small ? "metres that the file calls centimetres" : "taken as centimetres"));
   CHECK(test::has(back->warnings.back(), "taken as +z up"));
 }
 

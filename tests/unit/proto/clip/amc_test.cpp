@@ -2,7 +2,9 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <fstream>
 
 #include "proto/clip/clip.hpp"
 #include "proto/clip/device_clip.hpp"
@@ -11,6 +13,7 @@
 #include "proto/frame/rotation.hpp"
 #include "tests/support/replaced.hpp"
 #include "tests/support/shared.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace posed::clip {
 namespace {
@@ -116,6 +119,34 @@ TEST_CASE("radians and other line ends are understood") {
   const auto clip = parse_amc(crlf, kAsf);
   if (!clip) FAIL(clip.error().text());
   CHECK(clip->channels(0, 5) == 10.0);
+}
+
+TEST_CASE("an AMC in other axes and another unit is the same motion, also as a stream") {
+  const auto truth = parse_amc(kAmc, kAsf);
+  const test::TempFolder folder;
+  std::ofstream(folder.path() / "walk_2.asf") << kAsf;
+  std::ofstream(folder.path() / "walk_2_b.amc") << kAmc;
+  const ReadOptions options{.metres_per_unit = 0.01, .up = UpAxis::kPlusZ};
+  const auto clip = read_clip(folder.path() / "walk_2_b.amc", options);
+  REQUIRE(truth);
+  if (!clip) FAIL(clip.error().text());
+  const Eigen::Quaterniond turn(up_turn(UpAxis::kPlusZ));
+  const double size = 0.01 / (0.0254 / 0.45);
+  const Frame was = truth->frame(1), now = clip->frame(1);
+  for (std::size_t j = 0; j < truth->skeleton->joints.size(); ++j) {
+    const Joint& joint = truth->skeleton->joints[j];
+    CHECK((clip->skeleton->joints[j].offset_m - turn * (size * joint.offset_m)).norm() < 1e-9);
+    const auto q = turn * to_eigen_double(was.rotation_xyzw[j]) * turn.conjugate();
+    CHECK(angle_between_rad(to_eigen_double(now.rotation_xyzw[j]), q) < 1e-6);
+  }
+  const auto stream = open_device_clip(folder.path() / "walk_2_b.amc", options);
+  if (!stream) FAIL(stream.error().text());
+  const auto again = parse_description(stream->description, "the log");
+  REQUIRE(again);
+  CHECK(again->skeleton->id == clip->skeleton->id);
+  std::vector<double> values(again->parser.channels());
+  REQUIRE(again->parser.parse(stream->frames[1], values).ok());
+  CHECK(std::equal(values.begin(), values.end(), clip->channels.row(1).data()));
 }
 
 TEST_CASE("an AMC that would give a wrong pose is refused with its line") {
