@@ -695,7 +695,8 @@ std::vector<Timecode> timecodes_of(const tinygltf::Animation* animation,
   if (!keys.IsArray() || keys.ArrayLen() != key_s.size()) return {};
   std::vector<Timecode> out;
   for (std::size_t i = 0; i < times.frames; ++i) {
-    const auto next = std::ranges::upper_bound(key_s, times.at(i) + kNearKey_s) - key_s.begin();
+    const double near_s = times.keys_s.empty() ? kNearKey_s : 0.0;
+    const auto next = std::ranges::upper_bound(key_s, times.at(i) + near_s) - key_s.begin();
     const tinygltf::Value& code = keys.Get(static_cast<int>(std::max(next - 1, std::ptrdiff_t{0})));
     out.push_back(code.IsString() ? to_timecode(code.Get<std::string>()) : Timecode{});
   }
