@@ -14,7 +14,8 @@ constexpr double kPinchPoint = 1.0;
 constexpr double kPinchGap = 10.0;
 constexpr double kSolverNear_m = 0.02;
 constexpr double kMissing = 1.0;  // [m], of what links miss of their margin: tips gain less by it
-constexpr int kBacktracks = 3;
+constexpr int kBacktracks = 2;
+constexpr double kShorter = 0.3;
 constexpr double kTiny_rad = 1e-4;  // a further step would not show
 constexpr double kLarger = 2.0, kLarger_rad = 0.01, kForgets = 0.7;
 
@@ -83,16 +84,7 @@ double PoseSolver::add_pinches(const HandTarget& target, bool slopes) noexcept {
   double sum = 0.0;
   for (std::size_t f = 1; f < robot_.fingers.size(); ++f) {
     if (target.pinch[f] <= 0.0) continue;
-    const auto shaped = [&](const Finger& finger) {
-      int link = finger.tip;
-      while (link > 0 && link != finger.last && robot_.covers[link].count == 0) {
-        link = robot_.links[link].parent;
-      }
-      return link;
-    };
-    const Gap gap =
-        gap_between(robot_, placed_, shaped(robot_.fingers[0]), shaped(robot_.fingers[f]));
-    if (!std::isfinite(gap.gap_m)) continue;
+    const Gap gap = gap_of_tips(robot_, placed_, robot_.fingers[0], robot_.fingers[f]);
     const double wanted_m = std::max(target.gap_m[f], margin_m_);
     sum += add_residual(gap.slope, gap.gap_m - wanted_m, kPinchGap * target.pinch[f], slopes);
   }
@@ -158,8 +150,10 @@ bool PoseSolver::step(const HandTarget& target) noexcept {
     now = find_step(turn, wanted);
   }
   lately_ = wanted.cwiseAbs().cwiseMax(kForgets * lately_);
-  wanted *= std::min(1.0, kMaxStep_rad / std::max(wanted.cwiseAbs().maxCoeff(), 1e-9));
-  for (int halving = 0; halving <= kBacktracks; ++halving, wanted *= 0.5) {
+  const double most_rad = wanted.cwiseAbs().maxCoeff();
+  if (most_rad <= kTiny_rad) return false;
+  wanted *= std::min(1.0, kMaxStep_rad / most_rad);
+  for (int shorter = 0; shorter <= kBacktracks; ++shorter, wanted *= kShorter) {
     const Drive there = pose_ + wanted;
     const double after = cost(target, there, false);
     // Where the command would not keep its margin it would stand: the margin is part of the cost.

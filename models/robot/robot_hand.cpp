@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -31,11 +30,6 @@ double low_float(double value) {
   return static_cast<double>(f);
 }
 double high_float(double value) { return -low_float(-value); }
-
-std::string lower(std::string text) {
-  std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
-  return text;
-}
 
 std::vector<std::string> split(std::string_view text) {
   std::vector<std::string> words;
@@ -161,7 +155,9 @@ class Builder {
     }
     if (hand_.fingers.size() > kShown) ends += ", ...";
     return "the robot has " + std::to_string(hand_.fingers.size()) +
-           " chains of joints, which end in " + ends +
+           (hand_.fingers.size() == 1 ? " chain of joints, which ends in "
+                                      : " chains of joints, which end in ") +
+           ends +
            "; a hand has a thumb and two to four fingers: of a larger robot let `tips` name the "
            "last links of one hand, thumb first";
   }
@@ -338,8 +334,8 @@ class Builder {
       const auto moved = moved_by(l);
       if (!hand_.links[l].slides || moved == 0 || moved == std::ssize(hand_.fingers)) continue;
       return refuse("joint " + in_quotes(hand_.links[l].joint) +
-                    " slides in a finger; posed drives joints that turn: make it fixed, or let "
-                    "`tips` name other fingers");
+                    " of a finger slides, or follows one that does; posed drives joints that turn: "
+                    "make it fixed, or let `tips` name other fingers");
     }
     held_.assign(hand_.joints.size(), std::numeric_limits<double>::quiet_NaN());
     for (std::size_t j = 0; j < hand_.joints.size(); ++j) {
@@ -526,10 +522,7 @@ class Builder {
                       " is shorter than 5 mm; name its last link by `tips`");
       }
       if (finger.length_m > kMaxFinger_m) {
-        return refuse("the finger that ends in " + in_quotes(hand_.links[finger.tip].name) +
-                      " is " + std::to_string(std::lround(100.0 * finger.length_m)) +
-                      " cm long: it is no hand's, or the URDF is not in metres, or "
-                      "`tips` should name another last link");
+        return refuse(too_long(finger));
       }
     }
     const Eigen::Vector3d out = y.cross(z);  // of a right hand's palm
@@ -546,6 +539,25 @@ class Builder {
     }
     hand_.palm << (hand_.side == Side::kRight ? out : Eigen::Vector3d(-out)), y, z;
     return {};
+  }
+
+  // In which units it would be a finger.
+  [[nodiscard]] std::string too_long(const Finger& finger) const {
+    constexpr double kLeast_m = 0.05;
+    constexpr std::array<std::pair<const char*, double>, 3> kUnits{
+        {{"inches", 0.0254}, {"centimetres", 0.01}, {"millimetres", 1e-3}}};
+    std::string units;
+    for (const auto& [unit, unit_m] : kUnits) {
+      const double length_m = unit_m * finger.length_m;
+      if (length_m >= kLeast_m && length_m <= kMaxFinger_m)
+        units += (units.empty() ? "" : " or ") + std::string(unit);
+    }
+    return "the finger that ends in " + in_quotes(hand_.links[finger.tip].name) + " is " +
+           std::to_string(std::lround(100.0 * finger.length_m)) + " cm long" +
+           (units.empty() ? ": it is no hand's, or "
+                          : ", and a hand's if the file is in " + units +
+                                ": a URDF is in metres, so scale its lengths; or ") +
+           "`tips` should name another last link";
   }
 
   // The longest way from knuckle to tip: where links are not in a row, the sum of their lengths is

@@ -78,6 +78,8 @@ class RobotStage final : public Stage {
   std::int64_t arrival_ns_ = kNoTime_ns;  // of the latest frame
   bool engaged_ = false;                  // somebody wants it
   bool follows_ = false;                  // and the hand is trusted
+  bool rests_ = true;                     // so said the latest frame
+  RobotState told_ = RobotState::kReleased;
   std::uint64_t hard_stops_ = 0, holds_ = 0;
   std::int64_t stopped_ns_ = kNoTime_ns;  // when links were last in the way of it
   std::pair<int, int> stopped_by_{-1, -1};
@@ -218,8 +220,8 @@ RT_SAFE void RobotStage::process(const StageFrame& in, StageOut& out) noexcept {
 
 std::int64_t RobotStage::next_due_ns() const noexcept {
   if (arrival_ns_ == kNoTime_ns || time_ns_ == kNoTime_ns) return kNoTime_ns;
-  if (!command_.stands() && !follows_) return time_ns_ + period_ns_;
-  if (!follows_) return kNoTime_ns;
+  const bool owed = !engaged_ && told_ != RobotState::kReleased;  // to say that it is released
+  if (!follows_) return owed || !command_.stands() ? time_ns_ + period_ns_ : kNoTime_ns;
   const std::int64_t silent_ns = arrival_ns_ + silent_ns_;
   return ticks_ ? std::min(time_ns_ + period_ns_, silent_ns) : silent_ns;
 }
@@ -265,9 +267,12 @@ RT_SAFE void RobotStage::emit(const Frame& like, StageOut& out) noexcept {
     frame.velocity_rad_s[j] =
         static_cast<float>(joint.multiplier * command_.velocity()[joint.driven]);
   }
-  frame.robot = follows_                         ? RobotState::kEngaged
-                : engaged_ || !command_.stands() ? RobotState::kHolding
-                                                 : RobotState::kReleased;
+  // The command at rest is still one: who gets commands alone must not keep the last speed.
+  frame.robot = follows_              ? RobotState::kEngaged
+                : engaged_ || !rests_ ? RobotState::kHolding
+                                      : RobotState::kReleased;
+  rests_ = command_.stands();
+  told_ = frame.robot;
   find_stops();
   out.frame({.frame = frame});
 }

@@ -568,4 +568,20 @@ Gap gap_between(const RobotHand& hand, Placed& placed, int a, int b) noexcept {
   return gap;
 }
 
+Gap gap_of_tips(const RobotHand& hand, Placed& placed, const Finger& a, const Finger& b) noexcept {
+  const auto shaped_end = [&](const Finger& finger) {
+    int link = finger.tip;
+    while (link != finger.last && hand.covers[link].count == 0) link = hand.links[link].parent;
+    return link;
+  };
+  Gap gap = gap_between(hand, placed, shaped_end(a), shaped_end(b));
+  if (std::isfinite(gap.gap_m)) return gap;
+  Nearest at{.at_a = tip_of(a, placed), .at_b = tip_of(b, placed)};
+  const double distance_m = (at.at_a - at.at_b).norm();
+  if (distance_m > 1e-9) at.apart = (at.at_a - at.at_b) / distance_m;
+  gap = {.a = a.tip, .b = b.tip, .gap_m = distance_m - a.tip_radius_m - b.tip_radius_m};
+  add_slopes(hand, placed, at, gap);
+  return gap;
+}
+
 }  // namespace posed::robot

@@ -39,4 +39,7 @@ RT_SAFE [[nodiscard]] std::span<const Gap> find_gaps(const RobotHand& hand, Plac
 
 // The gap of one pair of links, infinite where one has no shape.
 RT_SAFE [[nodiscard]] Gap gap_between(const RobotHand& hand, Placed& placed, int a, int b) noexcept;
+// That of the shapes at two fingers' ends; where one has none, of balls of the tips' radii.
+RT_SAFE [[nodiscard]] Gap gap_of_tips(const RobotHand& hand, Placed& placed, const Finger& a,
+                                      const Finger& b) noexcept;
 }  // namespace posed::robot

@@ -130,9 +130,9 @@ class Reader {
     const auto xyz = numbers<3>(at.attribute("xyz").as_string("0 0 0"), kMaxLength_m);
     const auto rpy = numbers<3>(at.attribute("rpy").as_string("0 0 0"), kMaxAngle_rad);
     if (!xyz || !rpy) {
-      return refuse(
-          "the origin of " + in_quotes(owner) +
-          " is not three lengths up to 10 m and three angles; a URDF is in metres and radians");
+      return refuse("the origin of " + in_quotes(owner) +
+                    " is not three lengths up to 10 m and three angles; a URDF is in metres and "
+                    "radians: scale one that is in millimetres by 0.001");
     }
     Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
     pose.translation() = Eigen::Vector3d(xyz->data());
@@ -392,6 +392,7 @@ Result<> resolve_leaders(const RawUrdf& raw, Urdf& urdf, const Reader& reader) {
     }
     if (stands) {
       if (link.turns) link.at.rotate(Eigen::AngleAxisd(offset, link.axis));
+      link.slides = link.turns;
       link.turns = false;
       continue;
     }
@@ -403,6 +404,11 @@ Result<> resolve_leaders(const RawUrdf& raw, Urdf& urdf, const Reader& reader) {
 }
 
 }  // namespace
+
+std::string lower(std::string text) {
+  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+  return text;
+}
 
 Result<Urdf> parse_urdf(std::string_view text, const std::string& file) {
   if (text.size() > kMaxUrdfBytes) return fail("it is larger than 4 MB: it is no hand", file);

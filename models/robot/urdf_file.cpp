@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -104,9 +103,7 @@ std::filesystem::path find_mesh(const std::filesystem::path& urdf, std::string n
 // The corners of a mesh, or why it has none.
 Result<Corners> corners_of_mesh(const std::filesystem::path& urdf, const std::string& name,
                                 std::uintmax_t& left_bytes) {
-  std::string extension = std::filesystem::path(name).extension().string();
-  std::ranges::transform(extension, extension.begin(),
-                         [](unsigned char c) { return std::tolower(c); });
+  const std::string extension = lower(std::filesystem::path(name).extension().string());
   if (extension != ".obj" && extension != ".stl") {
     return fail("posed reads .stl and .obj: convert them");
   }

@@ -215,7 +215,9 @@ int Skeleton::joint_of(Bone bone) const {
 Result<> Skeleton::finish() {
   TRY(check_joints(*this));
   TRY(check_channels(*this));
-  if (std::ranges::none_of(joints, [](const Joint& j) { return j.bone.has_value(); })) {
+  // A robot is nobody, whatever its joints are called.
+  const bool robot = !capsules.empty();
+  if (!robot && std::ranges::none_of(joints, [](const Joint& j) { return j.bone.has_value(); })) {
     const rig::Rig rig = rig::recognise(*this);
     for (std::size_t j = 0; j < joints.size(); ++j) {
       joints[j].bone = rig.bone[j];

@@ -124,7 +124,8 @@ FigureShape::FigureShape(std::shared_ptr<const Skeleton> skeleton)
     if (skeleton_->joints[j].end_site_m) add_limb(j, true);
   }
   for (const JointCapsule& capsule : skeleton_->capsules) {
-    capsule_colours_.push_back(kFingerColours[finger_of(*skeleton_, capsule.joint) % kFingers]);
+    const std::size_t finger = finger_of(*skeleton_, capsule.joint);
+    capsule_colours_.push_back(finger == 0 ? kMiddle : kFingerColours[(finger - 1) % kFingers]);
   }
 }
 

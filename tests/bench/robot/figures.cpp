@@ -45,13 +45,6 @@ double percentile(std::vector<double> values, double share) {
   return *at;
 }
 
-// The link that has the shape at a finger's end.
-int shaped_end(const robot::RobotHand& robot, const robot::Finger& finger) {
-  int link = finger.tip;
-  while (link != finger.last && robot.covers[link].count == 0) link = robot.links[link].parent;
-  return link;
-}
-
 bool is_still(const HandTake& take, int frame) {
   if (frame < kHeld) return false;
   const HandAngles& now = take.angles[static_cast<std::size_t>(frame)];
@@ -165,10 +158,8 @@ RobotFigures robot_figures(const robot::RobotHand& robot, const HandTake& take,
       const double gap_m = std::max(0.0, (hand.to_m[2] - hand.to_m[3 * finger.human + 2]).norm() -
                                              person.fingers[0].radius_m[2] -
                                              person.fingers[finger.human].radius_m[2]);
-      const double ours_m =
-          gap_between(robot, placed, shaped_end(robot, robot.fingers[0]), shaped_end(robot, finger))
-              .gap_m;
-      if (gap_m < kPinched_m && std::isfinite(ours_m)) {
+      const double ours_m = gap_of_tips(robot, placed, robot.fingers[0], finger).gap_m;
+      if (gap_m < kPinched_m) {
         const double error_mm = 1e3 * std::abs(std::max(ours_m, 0.0) - gap_m);
         pinch.add(error_mm);
         if (still) held.add(error_mm);

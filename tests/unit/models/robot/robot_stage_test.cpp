@@ -1,6 +1,7 @@
 // The robot stage as its users see it: engaging, holding, stopping, pinching.
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 #include "models/hand/constraint_solver.hpp"
@@ -30,6 +31,9 @@ TEST_CASE("the robot's skeleton stands where its URDF says") {
   auto urdf = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
   const RobotHand hand = robot_hand(std::move(urdf), {}, "mitten").value();
   REQUIRE(rig.skeleton->joints.size() == hand.links.size());
+  // No bones of a person, though its joints have their names.
+  const auto has_bone = [](const Joint& joint) { return joint.bone.has_value(); };
+  CHECK(std::ranges::none_of(rig.skeleton->joints, has_bone));
   Drive drive = hand.start();
   for (int i = 0; i < hand.size(); ++i) drive[i] = 0.3 * hand.driven[i].high;
   std::vector<double> values;
@@ -70,9 +74,16 @@ TEST_CASE("a robot stands until it is engaged, and then leaves its place without
     CHECK(largest(rig.last(), before, channels) <= 8.0 * 0.01 + 1e-6);
   }
   CHECK(largest(rig.last(), rig.out.frames.front(), channels) > 0.5);
+  rig.send(test::fist(0.0), now_ns += kStep_ns);
   rig.release();
+  const std::size_t released = rig.out.frames.size();
   for (int i = 0; i < 20; ++i) rig.send(test::fist(0.0), now_ns += kStep_ns);
   CHECK(rig.last().robot == RobotState::kReleased);
+  // The last command is one at rest.
+  const auto last = std::find_if(rig.out.frames.rbegin(), rig.out.frames.rend(),
+                                 [](const Frame& f) { return f.robot != RobotState::kReleased; });
+  CHECK(rig.out.frames.rend() - last > static_cast<std::ptrdiff_t>(released));
+  for (const float velocity : last->velocity_rad_s) CHECK(velocity == 0.0F);
   const Frame stands = rig.last();
   rig.send(test::fist(0.5), now_ns += kStep_ns);
   CHECK(largest(rig.last(), stands, channels) == 0.0);
@@ -97,6 +108,12 @@ TEST_CASE("a robot brakes and holds when no frame of the hand comes") {
   now_ns += 1'000'000'000;
   rig.send(test::fist(1.0), now_ns);
   CHECK(rig.last().robot == RobotState::kEngaged);
+  // Whoever releases it while nothing comes is told so.
+  rig.tick_until(now_ns + 1'000'000'000);
+  rig.release();
+  rig.tick_until(now_ns + 2'000'000'000);
+  CHECK(rig.last().robot == RobotState::kReleased);
+  CHECK(rig.stage->next_due_ns() == kNoTime_ns);
 }
 
 TEST_CASE("a robot's command is sent between the hand's frames where a rate is given") {

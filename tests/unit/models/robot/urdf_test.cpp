@@ -69,7 +69,7 @@ TEST_CASE("a URDF that is no plausible hand is refused by a sentence") {
       {deep + "</robot>", "deeper"},
       {many + "</robot>", "1000 links"},
       {"<robot name=\"r\"><link name=\"a\"/></robot>", "no joint that turns"},
-      {robot(chain), "1 chains of joints, which end in c"},
+      {robot(chain), "1 chain of joints, which ends in c"},
       {robot(joint("j", "a", "b") + joint("k", "a", "b")), "two parents"},
       {robot(joint("j", "b", "c") + joint("k", "c", "b")), "cycle"},
       {robot(joint("j", "a", "b")), "no parent"},
@@ -92,6 +92,7 @@ TEST_CASE("a URDF that is no plausible hand is refused by a sentence") {
       {one(limit("lower=\"0\" upper=\"1\" velocity=\"1\"") +
            "<mimic joint=\"k\" multiplier=\"2\" offset=\"9\"/>"),
        "no angle at which"},
+      {with(robot(chain), "<axis", "<origin xyz=\"0 0 35\"/><axis"), "millimetres by 0.001"},
       {with(robot(chain), "<axis", "<origin xyz=\"1e9 0 0\"/><axis"), "origin"},
   };
   for (const auto& [text, words] : cases) {
@@ -564,13 +565,38 @@ TEST_CASE("what slides or floats above the palm stands, and in a finger it is re
   std::ranges::find(mitten.links, "index_spread", &Link::joint)->slides = true;
   const auto refused = robot_hand(mitten, {}, "mitten");
   REQUIRE_FALSE(refused);
-  CHECK(refused.error().message.find("slides in a finger") != std::string::npos);
+  CHECK(refused.error().message.find("of a finger slides") != std::string::npos);
   std::string text = load_urdf(test::mitten()).value();
+  // A rod that is moved by a cylinder in the palm.
+  const std::string rod =
+      with(with(text, "</robot>",
+                "<link name=\"rod\"/><joint name=\"cylinder\" type=\"prismatic\"><parent "
+                "link=\"palm\"/><child link=\"rod\"/></joint></robot>"),
+           "<joint name=\"index_flex\" type=\"revolute\">",
+           "<joint name=\"index_flex\" type=\"revolute\"><mimic joint=\"cylinder\"/>");
+  const auto moved = robot_hand(parse_urdf(rod, "mitten").value(), {}, "mitten");
+  REQUIRE_FALSE(moved);
+  CHECK(moved.error().message.find("follows one that does") != std::string::npos);
   text = with(text, "<link name=\"palm\">",
               "<link name=\"world\"/><joint name=\"free\" type=\"floating\"><parent "
               "link=\"world\"/><child link=\"palm\"/></joint><link name=\"palm\">");
   const RobotHand hand = robot_hand(parse_urdf(text, "mitten").value(), {}, "mitten").value();
   CHECK(hand.size() == 15);
+}
+
+TEST_CASE("a URDF that is not in metres is refused with the units it may be in") {
+  const auto said = [](double unit) {
+    auto urdf = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+    for (Link& link : urdf.links) {
+      link.at.translation() *= unit;
+      link.shapes.clear();
+    }
+    const auto refused = robot_hand(urdf, {}, "mitten");
+    return refused ? std::string() : refused.error().message;
+  };
+  CHECK(said(1.0).empty());
+  CHECK(said(1000.0).find("in millimetres: a URDF is in metres") != std::string::npos);
+  CHECK(said(100.0).find("in inches or centimetres: ") != std::string::npos);
 }
 
 TEST_CASE("a URDF without speeds can be looked at, and needs them to be driven") {

@@ -15,6 +15,7 @@ Skeleton toy() {
   skeleton.name = "toy";
   skeleton.joints.resize(3);
   skeleton.joints[0].name = "Hips";
+  skeleton.joints[0].bone = Bone::kHips;
   skeleton.joints[1].name = "Spine";
   skeleton.joints[1].parent = 0;
   skeleton.joints[1].offset_m = {0.0, 0.5, 0.0};
