@@ -4,6 +4,7 @@
 #include <cmath>
 #include <span>
 
+#include "proto/frame/median.hpp"
 #include "proto/text/list.hpp"
 
 namespace posed::drivers::glove {
@@ -48,13 +49,6 @@ bool too_many(std::size_t bad, int all) {
   return static_cast<double>(bad) > kFailedShare * all && (bad > 1 || all <= static_cast<int>(bad));
 }
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 PoseFinding find(const Model& model, const Recorded& recorded, Pose pose,
                  const std::vector<SensorPoses>& sensors) {
   PoseFinding finding{.pose = pose, .moved = {}, .stuck = {}};
@@ -72,7 +66,7 @@ PoseFinding find(const Model& model, const Recorded& recorded, Pose pose,
       finding.stuck.push_back(sensor.name);
     }
   }
-  finding.unrest = median(std::move(unrest));
+  if (!unrest.empty()) finding.unrest = median(unrest);
   return finding;
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "models/feet/legs.hpp"
+#include "proto/frame/median.hpp"
 
 namespace posed::feet {
 namespace {
@@ -34,13 +35,6 @@ struct FootPoints {
   LegPose pose;
   OfPoints<bool> known{};  // points of a leg that is not measured are none
 };
-
-// Reorders the values, of which there is one at least.
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
 
 double over_ground_m(const Eigen::Vector3d& step_m) { return std::hypot(step_m.x(), step_m.z()); }
 

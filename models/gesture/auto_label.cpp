@@ -5,6 +5,7 @@
 
 #include "models/gesture/gesture_model.hpp"
 #include "models/gesture/train.hpp"
+#include "proto/frame/median.hpp"
 
 namespace posed::gesture {
 namespace {
@@ -42,8 +43,7 @@ class Proposer {
       energy_[t] = 0.5 * (angles_.row(t + 1) - angles_.row(t - 1)).norm();
     }
     VectorXd sorted = energy_;
-    std::nth_element(sorted.begin(), sorted.begin() + count / 2, sorted.end());
-    rest_ = sorted[count / 2];
+    rest_ = median(sorted);
   }
 
   [[nodiscard]] bool poses_differ() const {
@@ -158,8 +158,7 @@ class Proposer {
       }
     }
     if (shifts.empty()) return 0;
-    std::ranges::nth_element(shifts, shifts.begin() + shifts.size() / 2);
-    return shifts[shifts.size() / 2];
+    return median(shifts);
   }
 
   // The examples unchanged, with the proposals around them. Where the rest of a proposal beside an

@@ -58,8 +58,7 @@ Result<motion::Motion> motion_at(const clip::Clip& clip, double rate_hz,
                     "that have it, or groups without it",
                 clip.path);
   }
-  auto motion = TRY(motion::motion_of(clip));
-  if (motion::begins_with_added_pose(motion)) motion::drop_first_frame(motion);
+  auto motion = TRY(motion::performed_motion_of(clip));
   if (motion.size() < kStates) {
     return fail("the recording has " + std::to_string(motion.size()) +
                     " frames; a gesture alone needs " + std::to_string(kStates),

@@ -16,6 +16,7 @@
 #include "models/gesture/train.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/label.hpp"
+#include "proto/frame/median.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::gesture {
@@ -75,8 +76,7 @@ void drop_jumps(clip::HandClip& show) {
     for (std::size_t c = 0; c < kHandChannels; ++c) {
       for (std::ptrdiff_t i = 0; i < std::ssize(about); ++i) about[i] = seen[t + i - jump][c];
       if (!std::ranges::all_of(about, [](double angle) { return std::isfinite(angle); })) continue;
-      std::ranges::nth_element(about, about.begin() + jump);
-      show.angles[t][c] = about[jump];
+      show.angles[t][c] = median(about);
     }
   }
   std::fill_n(show.angles.begin(), jump, show.angles[jump]);

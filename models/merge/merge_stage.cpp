@@ -18,6 +18,7 @@
 #include "models/merge/merged_skeleton.hpp"
 #include "models/parameter_table.hpp"
 #include "proto/frame/device_time.hpp"
+#include "proto/frame/smooth_step.hpp"
 
 namespace posed::merge {
 namespace {
@@ -290,9 +291,7 @@ constexpr std::int64_t kJumpBack_ns = kNanosPerSecond;
 
 // From 0 to 1 without a jump of the speed.
 RT_SAFE double eased(std::int64_t since_ns, std::int64_t length_ns) noexcept {
-  const double part =
-      std::clamp(static_cast<double>(since_ns) / static_cast<double>(length_ns), 0.0, 1.0);
-  return part * part * (3.0 - 2.0 * part);
+  return smooth_step(static_cast<double>(since_ns) / static_cast<double>(length_ns));
 }
 
 HandTrack::HandTrack(double rate_hz, std::int64_t hold_ns, const HandPose& relaxed)

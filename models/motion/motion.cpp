@@ -124,6 +124,12 @@ bool begins_with_added_pose(const Motion& motion) {
   return step(0) > std::max(kAddedPoseJump_rad, kAddedPoseJump * largest);
 }
 
+Result<Motion> performed_motion_of(const clip::Clip& clip) {
+  auto motion = TRY(motion_of(clip));
+  if (begins_with_added_pose(motion)) drop_first_frame(motion);
+  return motion;
+}
+
 void drop_first_frame(Motion& motion) { motion.frames.erase(motion.frames.begin()); }
 
 Result<Motion> motion_of(const clip::Clip& clip) {

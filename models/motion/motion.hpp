@@ -31,6 +31,8 @@ Result<Motion> motion_of(const clip::Clip& clip);
 // in front (CMU's cgspeed BVH files), so the step to the second frame is larger than any person
 // moves.
 [[nodiscard]] bool begins_with_added_pose(const Motion& motion);
+// motion_of() without such a pose.
+Result<Motion> performed_motion_of(const clip::Clip& clip);
 void drop_first_frame(Motion& motion);
 
 // The motion resampled. To a lower rate: a zero-phase low-pass at a third of the new

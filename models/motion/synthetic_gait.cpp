@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "proto/frame/rotation.hpp"
+#include "proto/frame/smooth_step.hpp"
 
 namespace posed::motion {
 namespace {
@@ -89,11 +90,6 @@ FootPose standing(const Gait& gait, int side, double step, double part) {
 }
 
 }  // namespace
-
-double smooth_step(double x) {
-  x = std::clamp(x, 0.0, 1.0);
-  return x * x * (3.0 - 2.0 * x);
-}
 
 Round::Round(double stride_m, double strides, double over)
     : half_(0.5 * strides),

@@ -30,9 +30,6 @@ struct LegLengths {
 // so that he is back where he began and can go round for ever. His steps are always in time; where
 // he stands they have no length. Cold.
 
-// From 0 to 1 while x goes from 0 to 1, without a jump of the slope.
-[[nodiscard]] double smooth_step(double x);
-
 // Everything goes by strides, counted from the begin of the walk, and repeats after strides().
 class Round {
  public:

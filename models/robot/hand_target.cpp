@@ -2,17 +2,14 @@
 
 #include <algorithm>
 
+#include "proto/frame/smooth_step.hpp"
+
 namespace posed::robot {
 namespace {
 
 constexpr double kPinchFrom_m = 5e-3;  // surfaces that are nearer touch
 constexpr double kPinchOver_m = 40e-3;
 constexpr double kLessTip = 0.9;  // a pinch takes that much of the weight of a tip's own target
-
-double smooth_step(double u) noexcept {
-  u = std::clamp(u, 0.0, 1.0);
-  return u * u * (3.0 - 2.0 * u);
-}
 
 }  // namespace
 

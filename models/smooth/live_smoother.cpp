@@ -18,6 +18,7 @@
 #include "models/smooth/noise_estimate.hpp"
 #include "proto/frame/frame.hpp"
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/frame/median.hpp"
 #include "proto/frame/rotation.hpp"
 #include "proto/frame/skeleton.hpp"
 
@@ -146,10 +147,7 @@ RT_SAFE void FrameClock::learn(double step_s) noexcept {
   recent_s_[steps_ % kRecent] = std::max(step_s, kMinPeriod_s);
   ++steps_;
   std::array<double, kRecent> sorted = recent_s_;
-  const auto end = sorted.begin() + std::min(steps_, kRecent);
-  const auto middle = sorted.begin() + (end - sorted.begin()) / 2;
-  std::nth_element(sorted.begin(), middle, end);
-  period_s_ = *middle;
+  period_s_ = median(std::span(sorted).first(std::min(steps_, kRecent)));
 }
 
 // Unwrap: removes jumps from a skeleton's rotation channels (models/smooth/README.md, "Unwrap").

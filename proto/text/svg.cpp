@@ -13,6 +13,10 @@ std::string svg_number(double value) {
   return text.data();
 }
 
+std::string svg_attribute(std::string_view name, double value) {
+  return " " + std::string(name) + "=\"" + svg_number(value) + "\"";
+}
+
 std::string svg_text(std::string_view text) {
   std::string out;
   for (const char c : clean(text)) {

@@ -14,6 +14,7 @@
 #include "proto/clip/label_file.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/frame/label.hpp"
+#include "proto/frame/median.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::tools {
@@ -98,9 +99,7 @@ Result<std::vector<double>> shown_hand(const std::string& file, const clip::Read
           "the joint",
           file);
     }
-    const auto middle = values.begin() + std::ssize(values) / 2;
-    std::ranges::nth_element(values, middle);
-    pose.push_back(*middle);
+    pose.push_back(median(values));
   }
   return pose;
 }

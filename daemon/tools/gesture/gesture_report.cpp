@@ -354,12 +354,12 @@ std::vector<report::Figure> GestureFigures::trees() const {
     const std::string& of_group = model_->groups[group].name;
     return hand ? "the " + of_group + " finger" : of_group;
   };
-  std::vector<report::Figure> figures{
-      report::decision_trees("The decision tree of " + words(first) + " in state 4",
-                             question_trees(*model_, {.state = kFourth, .group = first}), false)};
+  std::vector<report::Figure> figures{report::decision_trees(
+      "The decision tree of " + words(first) + " in state 4",
+      gesture::draw_trees(*model_, {.state = kFourth, .group = first}), false)};
   for (int g = 0; g < std::ssize(model_->groups); ++g) {
     figures.push_back(report::decision_trees(
-        "All trees of " + words(g), question_trees(*model_, {.state = -1, .group = g}), true));
+        "All trees of " + words(g), gesture::draw_trees(*model_, {.state = -1, .group = g}), true));
   }
   return figures;
 }
@@ -489,18 +489,6 @@ Result<std::vector<report::LagError>> lag_curve(const trajectory::StateInformati
          kDegrees * off.cwiseAbs().maxCoeff(), jerk > 0.0 ? motion::jerk_rms(rows) / jerk : 1.0});
   }
   return curve;
-}
-
-std::vector<report::QuestionTree> question_trees(const gesture::GestureModel& model,
-                                                 const gesture::TreeChoice& choice) {
-  std::vector<report::QuestionTree> trees;
-  for (const gesture::DrawnTree& tree : gesture::draw_trees(model, choice)) {
-    report::QuestionTree& out = trees.emplace_back(report::QuestionTree{tree.title, {}});
-    for (const gesture::DrawnNode& node : tree.nodes) {
-      out.nodes.push_back({node.words, node.reach, node.yes, node.no});
-    }
-  }
-  return trees;
 }
 
 std::vector<int> labels_to_show(const gesture::GestureModel& model) {

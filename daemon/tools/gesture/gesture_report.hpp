@@ -23,10 +23,6 @@ namespace posed::tools {
 Result<std::vector<report::LagError>> lag_curve(const trajectory::StateInformation& information,
                                                 std::span<const int> labels);
 
-// Trees as questions and leaves, to be drawn.
-[[nodiscard]] std::vector<report::QuestionTree> question_trees(const gesture::GestureModel& model,
-                                                               const gesture::TreeChoice& choice);
-
 // The paper's string where the model has its labels, else every label once.
 [[nodiscard]] std::vector<int> labels_to_show(const gesture::GestureModel& model);
 

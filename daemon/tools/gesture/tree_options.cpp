@@ -49,7 +49,7 @@ Result<> draw_trees(const gesture::GestureModel& model, const TreeOptions& optio
   const auto choice = TRY(gesture::tree_choice(options.which, model.groups));
   const auto svg = [&] {
     return report::svg_file(
-        report::decision_trees("", question_trees(model, choice), false).drawings);
+        report::decision_trees("", gesture::draw_trees(model, choice), false).drawings);
   };
   const std::pair<const std::string&, std::function<std::string()>> drawings[]{
       {options.text, [&] { return gesture::trees_text(model, choice); }},

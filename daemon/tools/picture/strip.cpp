@@ -26,23 +26,19 @@ struct Point {
   double x = 0.0, y = 0.0;  // px
 };
 
-std::string attribute(std::string_view name, double value) {
-  return " " + std::string(name) + "=\"" + svg_number(value) + "\"";
-}
-
 std::string line(Point from, Point to, std::string_view rest) {
-  return "<line" + attribute("x1", from.x) + attribute("y1", from.y) + attribute("x2", to.x) +
-         attribute("y2", to.y) + std::string(rest) + "/>\n";
+  return "<line" + svg_attribute("x1", from.x) + svg_attribute("y1", from.y) +
+         svg_attribute("x2", to.x) + svg_attribute("y2", to.y) + std::string(rest) + "/>\n";
 }
 
 std::string stroke(std::string_view colour, double width_px) {
-  return " stroke=\"" + std::string(colour) + "\"" + attribute("stroke-width", width_px);
+  return " stroke=\"" + std::string(colour) + "\"" + svg_attribute("stroke-width", width_px);
 }
 
 std::string words(Point at, std::string_view kind, std::string_view text) {
   if (text.empty()) return {};
-  return "<text class=\"" + std::string(kind) + "\"" + attribute("x", at.x) + attribute("y", at.y) +
-         ">" + svg_text(text) + "</text>\n";
+  return "<text class=\"" + std::string(kind) + "\"" + svg_attribute("x", at.x) +
+         svg_attribute("y", at.y) + ">" + svg_text(text) + "</text>\n";
 }
 
 // Draws one pose into its column of the picture.
@@ -71,8 +67,8 @@ class PoseDrawing {
     }
     if (figure.head) {
       const Point centre = at(figure.head->centre_m);
-      out += "<circle" + attribute("cx", centre.x) + attribute("cy", centre.y) +
-             attribute("r", figure.head->radius_m * layout_.px_per_m) + " fill=\"" +
+      out += "<circle" + svg_attribute("cx", centre.x) + svg_attribute("cy", centre.y) +
+             svg_attribute("r", figure.head->radius_m * layout_.px_per_m) + " fill=\"" +
              std::string(pale ? kPale : "#4d4d4d") + "\" stroke=\"#fff\"/>\n";
     }
     return out;

@@ -59,7 +59,7 @@ constexpr double kTreePad_px = 8.0;
 
 class TreeDrawing {
  public:
-  explicit TreeDrawing(const QuestionTree& tree)
+  explicit TreeDrawing(const gesture::DrawnTree& tree)
       : tree_(tree), y_px_(tree.nodes.size(), 0.0), column_(tree.nodes.size(), 0) {
     if (tree.nodes.empty()) return;
     place(0, 0);
@@ -83,7 +83,7 @@ class TreeDrawing {
   // A node is in the middle of its leaves.
   double place(int node, std::size_t column) {
     const std::size_t at = node;
-    const QuestionNode& here = tree_.nodes[at];
+    const gesture::DrawnNode& here = tree_.nodes[at];
     if (column >= widths_.size()) widths_.resize(column + 1, 0.0);
     widths_[column] = std::max(
         widths_[column], std::max(text_px(here.words), text_px(here.reach)) + 2.0 * kTreePad_px);
@@ -104,7 +104,7 @@ class TreeDrawing {
   }
 
   [[nodiscard]] std::string ways_of(std::size_t node) const {
-    const QuestionNode& here = tree_.nodes[node];
+    const gesture::DrawnNode& here = tree_.nodes[node];
     std::string out;
     if (here.yes < 0) return out;
     const double from = x_px_[column_[node]] + widths_[column_[node]];
@@ -114,28 +114,28 @@ class TreeDrawing {
       const double bend = from + 12.0;
       out += fmt::format("<path class=\"way\" d=\"M{:.1f} {:.1f}H{:.1f}V{:.1f}H{:.1f}\"/>\n", from,
                          middle_px(node), bend, middle_px(child), to);
-      out +=
-          fmt::format("<text class=\"quiet\"{}{}>{}</text>\n", attribute("x", bend + 3.0),
-                      attribute("y", middle_px(child) + (yes ? -4.0 : 14.0)), yes ? "yes" : "no");
+      out += fmt::format("<text class=\"quiet\"{}{}>{}</text>\n", svg_attribute("x", bend + 3.0),
+                         svg_attribute("y", middle_px(child) + (yes ? -4.0 : 14.0)),
+                         yes ? "yes" : "no");
     }
     return out;
   }
 
   [[nodiscard]] std::string box_of(std::size_t node) const {
-    const QuestionNode& here = tree_.nodes[node];
+    const gesture::DrawnNode& here = tree_.nodes[node];
     const double x = x_px_[column_[node]];
     const double y = middle_px(node) - kNodeHeight_px / 2.0;
     return fmt::format(
         "<rect class=\"{}\" rx=\"4\"{}{}{}{}/><text{}{}>{}</text><text "
         "class=\"quiet\"{}{}>{}</text>"
         "\n",
-        here.yes < 0 ? "leaf" : "ask", attribute("x", x), attribute("y", y),
-        attribute("width", widths_[column_[node]]), attribute("height", kNodeHeight_px),
-        attribute("x", x + kTreePad_px), attribute("y", y + 15.0), escaped(here.words),
-        attribute("x", x + kTreePad_px), attribute("y", y + 30.0), escaped(here.reach));
+        here.yes < 0 ? "leaf" : "ask", svg_attribute("x", x), svg_attribute("y", y),
+        svg_attribute("width", widths_[column_[node]]), svg_attribute("height", kNodeHeight_px),
+        svg_attribute("x", x + kTreePad_px), svg_attribute("y", y + 15.0), escaped(here.words),
+        svg_attribute("x", x + kTreePad_px), svg_attribute("y", y + 30.0), escaped(here.reach));
   }
 
-  const QuestionTree& tree_;
+  const gesture::DrawnTree& tree_;
   std::vector<double> y_px_;
   std::vector<std::size_t> column_;
   std::vector<double> widths_, x_px_;  // [column]
@@ -144,7 +144,7 @@ class TreeDrawing {
 
 }  // namespace
 
-Figure decision_trees(const std::string& title, const std::vector<QuestionTree>& trees,
+Figure decision_trees(const std::string& title, const std::vector<gesture::DrawnTree>& trees,
                       bool folded) {
   Figure figure{.title = title,
                 .sentence =
@@ -155,7 +155,8 @@ Figure decision_trees(const std::string& title, const std::vector<QuestionTree>&
                 .drawings = {},
                 .tables = {},
                 .folded = folded};
-  for (const QuestionTree& tree : trees) figure.drawings.push_back(TreeDrawing(tree).drawing());
+  for (const gesture::DrawnTree& tree : trees)
+    figure.drawings.push_back(TreeDrawing(tree).drawing());
   return figure;
 }
 
@@ -188,13 +189,14 @@ constexpr double kMaxOpacity = 0.6;  // opacity of a full cell, on which text ca
 
 std::string cell_at(double x, double y, double share, bool agrees) {
   std::string out = fmt::format("<rect class=\"cell {} fill\"{}{}{}{} fill-opacity=\"{:.3f}\"/>\n",
-                                agrees ? "s0" : "s1", attribute("x", x), attribute("y", y),
-                                attribute("width", kCell_px), attribute("height", kCellHeight_px),
-                                kMaxOpacity * share);
+                                agrees ? "s0" : "s1", svg_attribute("x", x), svg_attribute("y", y),
+                                svg_attribute("width", kCell_px),
+                                svg_attribute("height", kCellHeight_px), kMaxOpacity * share);
   if (share < 0.0005) return out;
-  return out +
-         fmt::format("<text class=\"mid\"{}{}>{}</text>\n", attribute("x", x + kCell_px / 2.0),
-                     attribute("y", y + kCellHeight_px / 2.0 + 4.0), number_text(100.0 * share, 1));
+  return out + fmt::format("<text class=\"mid\"{}{}>{}</text>\n",
+                           svg_attribute("x", x + kCell_px / 2.0),
+                           svg_attribute("y", y + kCellHeight_px / 2.0 + 4.0),
+                           number_text(100.0 * share, 1));
 }
 
 }  // namespace
@@ -205,18 +207,18 @@ Figure label_confusion(const Confusion& confusion) {
   std::string out = fmt::format(
       "<text class=\"quiet\"{} y=\"16\">{}</text>\n"
       "<text class=\"quiet end\"{}{}>given label</text>\n",
-      attribute("x", kConfusionLeft_px), kColumns, attribute("x", kConfusionLeft_px - 10.0),
-      attribute("y", kConfusionTop_px - 10.0));
+      svg_attribute("x", kConfusionLeft_px), kColumns, svg_attribute("x", kConfusionLeft_px - 10.0),
+      svg_attribute("y", kConfusionTop_px - 10.0));
   for (std::size_t c = 0; c < confusion.labels.size(); ++c) {
     out += fmt::format(
         "<text class=\"mid head\"{}{}>{}</text>\n",
-        attribute("x", kConfusionLeft_px + kCell_px * (static_cast<double>(c) + 0.5)),
-        attribute("y", kConfusionTop_px - 10.0), escaped(clean_name(confusion.labels[c])));
+        svg_attribute("x", kConfusionLeft_px + kCell_px * (static_cast<double>(c) + 0.5)),
+        svg_attribute("y", kConfusionTop_px - 10.0), escaped(clean_name(confusion.labels[c])));
   }
   for (std::size_t r = 0; r < confusion.given.size(); ++r) {
     const double y = kConfusionTop_px + kCellHeight_px * static_cast<double>(r);
     out += fmt::format("<text class=\"end\"{}{}>{} ({} frames)</text>\n",
-                       attribute("x", kConfusionLeft_px - 10.0), attribute("y", y + 21.0),
+                       svg_attribute("x", kConfusionLeft_px - 10.0), svg_attribute("y", y + 21.0),
                        escaped(clean_name(confusion.given[r])), confusion.frames[r]);
     for (std::size_t c = 0; c < confusion.labels.size(); ++c) {
       out += cell_at(kConfusionLeft_px + kCell_px * static_cast<double>(c), y,
@@ -283,20 +285,22 @@ std::string durations_grid(const Axis& axis, double bottom) {
   std::string out;
   for (const Tick& tick : axis.ticks(9)) {
     const double at = axis.px(tick.value);
-    out += fmt::format("<line class=\"grid\"{}{}{}{}/><text class=\"quiet mid\"{}{}>{}</text>\n",
-                       attribute("x1", at), attribute("x2", at), attribute("y1", kDurationTop_px),
-                       attribute("y2", bottom), attribute("x", at), attribute("y", bottom + 16.0),
-                       escaped(tick.text));
+    out +=
+        fmt::format("<line class=\"grid\"{}{}{}{}/><text class=\"quiet mid\"{}{}>{}</text>\n",
+                    svg_attribute("x1", at), svg_attribute("x2", at),
+                    svg_attribute("y1", kDurationTop_px), svg_attribute("y2", bottom),
+                    svg_attribute("x", at), svg_attribute("y", bottom + 16.0), escaped(tick.text));
   }
   return out + fmt::format("<text class=\"mid\"{}{}>{}</text>\n",
-                           attribute("x", (kDurationLeft_px + kDurationWidth_px) / 2.0),
-                           attribute("y", bottom + 36.0), escaped(axis.label()));
+                           svg_attribute("x", (kDurationLeft_px + kDurationWidth_px) / 2.0),
+                           svg_attribute("y", bottom + 36.0), escaped(axis.label()));
 }
 
 std::string durations_row(const LabelDurations& label, const Axis& axis, double y) {
-  std::string out = fmt::format("<text class=\"end\"{}{}>{}</text>\n",
-                                attribute("x", kDurationLeft_px - 8.0), attribute("y", y + 15.0),
-                                escaped(label.label + (label.recorded ? "" : " (never recorded)")));
+  std::string out =
+      fmt::format("<text class=\"end\"{}{}>{}</text>\n", svg_attribute("x", kDurationLeft_px - 8.0),
+                  svg_attribute("y", y + 15.0),
+                  escaped(label.label + (label.recorded ? "" : " (never recorded)")));
   double from_s = 0.0;
   for (std::size_t s = 0; s < label.mean_s.size(); ++s) {
     const double to_s = from_s + label.mean_s[s];
@@ -304,7 +308,7 @@ std::string durations_row(const LabelDurations& label, const Axis& axis, double 
     const double x = axis.px(from_s);
     const double width = axis.px(to_s) - x;
     out += fmt::format("<rect class=\"cell {} fill\"{}{}{} height=\"20\"/>\n", series_class(s),
-                       attribute("x", x), attribute("y", y), attribute("width", width));
+                       svg_attribute("x", x), svg_attribute("y", y), svg_attribute("width", width));
     from_s = to_s;
   }
   return out;
@@ -329,7 +333,7 @@ Figure state_durations(const std::vector<LabelDurations>& labels) {
     out += fmt::format(
         "<rect class=\"{} fill\"{} y=\"6\" width=\"14\" height=\"11\"/>"
         "<text{} y=\"16\">state {}</text>\n",
-        series_class(s), attribute("x", x), attribute("x", x + 19.0), s + 1);
+        series_class(s), svg_attribute("x", x), svg_attribute("x", x + 19.0), s + 1);
     x += 84.0;
   }
   const double bottom = kDurationTop_px + kDurationRow_px * static_cast<double>(labels.size());

@@ -8,21 +8,13 @@
 #include "daemon/tools/picture/strip.hpp"
 #include "daemon/tools/report/page.hpp"
 #include "daemon/tools/report/plot.hpp"
+#include "models/gesture/tree_drawing.hpp"
 
 namespace posed::report {
 
 // Figure 3: the questions that lead a gesture among its neighbours to its poses.
-struct QuestionNode {
-  std::string words;      // the question, or what is known of the leaf
-  std::string reach;      // the contexts that come here: {g,1}-c-*
-  int yes = -1, no = -1;  // -1: a leaf; children stand behind their parent
-};
-struct QuestionTree {
-  std::string title;
-  std::vector<QuestionNode> nodes;  // the first is the root
-};
 [[nodiscard]] Figure decision_trees(const std::string& title,
-                                    const std::vector<QuestionTree>& trees, bool folded);
+                                    const std::vector<gesture::DrawnTree>& trees, bool folded);
 
 // How long each of the five states lasts.
 struct LabelDurations {

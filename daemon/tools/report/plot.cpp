@@ -116,13 +116,14 @@ constexpr double kLegendRow_px = 20.0, kSample_px = 26.0, kMark_px = 4.5;
 constexpr int kMaxAxisTicks = 8;
 
 std::string words_at(std::string_view kind, double x_px, double y_px, std::string_view text) {
-  return fmt::format("<text class=\"{}\"{}{}>{}</text>\n", kind, attribute("x", x_px),
-                     attribute("y", y_px), escaped(text));
+  return fmt::format("<text class=\"{}\"{}{}>{}</text>\n", kind, svg_attribute("x", x_px),
+                     svg_attribute("y", y_px), escaped(text));
 }
 
 std::string line_at(std::string_view kind, const Point& from, const Point& to) {
-  return fmt::format("<line class=\"{}\"{}{}{}{}/>\n", kind, attribute("x1", from.x),
-                     attribute("y1", from.y), attribute("x2", to.x), attribute("y2", to.y));
+  return fmt::format("<line class=\"{}\"{}{}{}{}/>\n", kind, svg_attribute("x1", from.x),
+                     svg_attribute("y1", from.y), svg_attribute("x2", to.x),
+                     svg_attribute("y2", to.y));
 }
 
 std::string dash_of(std::size_t series) {
@@ -181,8 +182,8 @@ std::string mark_at(double x_px, double y_px, std::size_t series) {
     case 6:
       return corners({{-1.3, -0.5}, {1.3, -0.5}, {1.3, 0.5}, {-1.3, 0.5}});
     default:
-      return fmt::format("<circle class=\"{}\"{}{}{}/>\n", kind, attribute("cx", x_px),
-                         attribute("cy", y_px), attribute("r", r));
+      return fmt::format("<circle class=\"{}\"{}{}{}/>\n", kind, svg_attribute("cx", x_px),
+                         svg_attribute("cy", y_px), svg_attribute("r", r));
   }
 }
 
@@ -342,8 +343,8 @@ std::string Plot::legend(double& height_px) const {
     const double middle = y - 4.0;
     if (entry.sample == Sample::kBand) {
       out += fmt::format("<rect class=\"{} band\"{}{} width=\"{}\" height=\"10\"/>\n",
-                         series_class(entry.series), attribute("x", x), attribute("y", y - 9.0),
-                         kSample_px);
+                         series_class(entry.series), svg_attribute("x", x),
+                         svg_attribute("y", y - 9.0), kSample_px);
     } else if (entry.sample == Sample::kLine) {
       out += fmt::format(
           "<polyline class=\"{} stroke\"{} points=\"{:.1f},{:.1f} {:.1f},{:.1f}\"/>\n",
@@ -409,8 +410,8 @@ std::string legend_of(const Bars& bars, double left) {
   double x = left;
   for (std::size_t s = 0; s < bars.series.size(); ++s) {
     out += fmt::format("<rect class=\"{} fill\"{} y=\"4\" width=\"14\" height=\"11\"/>\n",
-                       series_class(s), attribute("x", x));
-    out += fmt::format("<text{} y=\"14\">{}</text>\n", attribute("x", x + 20.0),
+                       series_class(s), svg_attribute("x", x));
+    out += fmt::format("<text{} y=\"14\">{}</text>\n", svg_attribute("x", x + 20.0),
                        escaped(bars.series[s]));
     x += 44.0 + text_px(bars.series[s]);
   }
@@ -424,21 +425,21 @@ std::string frame_of(const Bars& bars, const Axis& axis, double bottom) {
     const double at = axis.px(tick.value);
     out += fmt::format(
         "<line class=\"grid\"{0}{1}{2}{3}/><text class=\"quiet mid\"{4}{5}>{6}</text>\n",
-        attribute("x1", at), attribute("x2", at), attribute("y1", kAbove_px),
-        attribute("y2", bottom), attribute("x", at), attribute("y", bottom + 16.0),
+        svg_attribute("x1", at), svg_attribute("x2", at), svg_attribute("y1", kAbove_px),
+        svg_attribute("y2", bottom), svg_attribute("x", at), svg_attribute("y", bottom + 16.0),
         escaped(tick.text));
   }
   out += fmt::format("<text class=\"mid\"{}{}>{}</text>\n",
-                     attribute("x", (axis.px(axis.low()) + axis.px(axis.high())) / 2.0),
-                     attribute("y", bottom + 36.0), escaped(axis.label()));
+                     svg_attribute("x", (axis.px(axis.low()) + axis.px(axis.high())) / 2.0),
+                     svg_attribute("y", bottom + 36.0), escaped(axis.label()));
   for (const BarRule& rule : bars.rules) {
     const double at = axis.px(rule.value);
     const bool left = at > kBarsWidth_px - 180.0;
     out += fmt::format("<line class=\"rule\"{}{}{}{}/><text class=\"quiet{}\"{}{}>{}</text>\n",
-                       attribute("x1", at), attribute("x2", at), attribute("y1", kAbove_px - 8.0),
-                       attribute("y2", bottom), left ? " end" : "",
-                       attribute("x", at + (left ? -4.0 : 4.0)), attribute("y", kAbove_px - 2.0),
-                       escaped(rule.words));
+                       svg_attribute("x1", at), svg_attribute("x2", at),
+                       svg_attribute("y1", kAbove_px - 8.0), svg_attribute("y2", bottom),
+                       left ? " end" : "", svg_attribute("x", at + (left ? -4.0 : 4.0)),
+                       svg_attribute("y", kAbove_px - 2.0), escaped(rule.words));
   }
   return out;
 }
@@ -456,20 +457,20 @@ Drawing draw_bars(const Bars& bars) {
   const double base = axis.px(bars.logarithmic ? axis.low() : 0.0);
   double y = kAbove_px + kBetween_px / 2.0;
   for (const BarGroup& group : bars.groups) {
-    out += fmt::format("<text class=\"end\"{}{}>{}</text>\n", attribute("x", left - 8.0),
-                       attribute("y", y + (group_px - kBetween_px) / 2.0 + 4.0),
+    out += fmt::format("<text class=\"end\"{}{}>{}</text>\n", svg_attribute("x", left - 8.0),
+                       svg_attribute("y", y + (group_px - kBetween_px) / 2.0 + 4.0),
                        escaped(shortened(group.name)));
     for (std::size_t s = 0; s < std::min(series, group.values.size()); ++s) {
       const double top = y + kBar_px * static_cast<double>(s);
       if (!axis.shows(group.values[s])) continue;
       const double end = axis.px(group.values[s]);
       out += fmt::format("<rect class=\"{} fill\"{}{}{}{}/>\n", series_class(s),
-                         attribute("x", std::min(base, end)), attribute("y", top),
-                         attribute("width", std::max(1.0, std::abs(end - base))),
-                         attribute("height", kBar_px - 2.0));
+                         svg_attribute("x", std::min(base, end)), svg_attribute("y", top),
+                         svg_attribute("width", std::max(1.0, std::abs(end - base))),
+                         svg_attribute("height", kBar_px - 2.0));
       out += fmt::format("<text class=\"quiet\"{}{}>{}</text>\n",
-                         attribute("x", std::max(base, end) + 5.0), attribute("y", top + 10.0),
-                         number_text(group.values[s], bars.digits));
+                         svg_attribute("x", std::max(base, end) + 5.0),
+                         svg_attribute("y", top + 10.0), number_text(group.values[s], bars.digits));
     }
     y += group_px;
   }

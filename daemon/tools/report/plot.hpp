@@ -160,11 +160,6 @@ inline constexpr std::size_t kSeries = 7;
   return kDashes[series % kSeries];
 }
 
-// ` name="1.0"`
-[[nodiscard]] inline std::string attribute(std::string_view name, double value) {
-  return " " + std::string(name) + "=\"" + svg_number(value) + "\"";
-}
-
 // About the width of text in a figure.
 [[nodiscard]] inline double text_px(std::string_view text) {
   constexpr double kLetter_px = 7.3;

@@ -251,12 +251,6 @@ Result<> check_files(const EvalOptions& options) {
 }
 
 // Without the pose that some converters put in front.
-Result<motion::Motion> motion_of(const clip::Clip& clip) {
-  auto motion = TRY(motion::motion_of(clip));
-  if (motion::begins_with_added_pose(motion)) motion::drop_first_frame(motion);
-  return motion;
-}
-
 // What the clips of people who were not taught get of what source and target teach.
 Result<std::vector<style::Arrival>> look_at_strangers(const EvalOptions& options,
                                                       const style::StyleModel& model,
@@ -264,8 +258,8 @@ Result<std::vector<style::Arrival>> look_at_strangers(const EvalOptions& options
                                                       const clip::Clip& target) {
   std::vector<style::Arrival> found;
   if (options.neutral.empty()) return found;
-  const auto from = TRY(motion_of(source));
-  const auto to = TRY(motion_of(target));
+  const auto from = TRY(motion::performed_motion_of(source));
+  const auto to = TRY(motion::performed_motion_of(target));
   for (const std::string& path : options.neutral) {
     const auto clip = TRY(read(path, options.skeleton));
     style::ApplyOptions apply;
@@ -273,8 +267,8 @@ Result<std::vector<style::Arrival>> look_at_strangers(const EvalOptions& options
     apply.filter.weights = options.weights;
     apply.walker = TRY(style::measure_walker(model, options.model, clip));
     const auto styled = TRY(style::apply_to_clip(model, options.model, clip, apply));
-    const auto walk = TRY(motion_of(clip));
-    const auto styled_walk = TRY(motion_of(styled.clip));
+    const auto walk = TRY(motion::performed_motion_of(clip));
+    const auto styled_walk = TRY(motion::performed_motion_of(styled.clip));
     const auto one = style::arrival(walk, styled_walk, from, to);
     if (!one) return fail("shows no walk with legs, as the source or the target", path);
     found.push_back(*one);

@@ -83,8 +83,7 @@ class Measure {
   }
   Result<motion::Motion> body(const Path& path) const {
     const auto read = TRY(clip::read_clip(path, how(path)));
-    auto motion = TRY(motion::motion_of(read));
-    if (motion::begins_with_added_pose(motion)) motion::drop_first_frame(motion);
+    auto motion = TRY(motion::performed_motion_of(read));
     motion.skeleton = natural::with_one_trunk(motion.skeleton);
     return motion::resample(motion, options_.rate_hz);
   }

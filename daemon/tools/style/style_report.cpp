@@ -119,8 +119,7 @@ CycleFigures::CycleFigures(motion::PoseSpaceSpec spec, motion::PoseSpace space, 
     : spec_(std::move(spec)), space_(std::move(space)), base_(base), shape_(std::move(skeleton)) {}
 
 Result<CycleFigures> CycleFigures::make(const clip::Clip& clip, const motion::PoseSpaceSpec& spec) {
-  auto motion = TRY(motion::motion_of(clip));
-  if (motion::begins_with_added_pose(motion)) motion::drop_first_frame(motion);
+  auto motion = TRY(motion::performed_motion_of(clip));
   auto space = TRY(motion::PoseSpace::bind(spec, *motion.skeleton));
   Frame base = motion.frames[motion.frames.size() / 2];
   double height_m = 0.0;

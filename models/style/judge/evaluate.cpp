@@ -81,8 +81,7 @@ double jerk(const MatrixXd& q) {
 
 Result<StyleScore> evaluate_style(const clip::Clip& source, const clip::Clip& styled,
                                   const clip::Clip& target, const motion::PoseSpaceSpec& space) {
-  auto target_motion = TRY(motion::motion_of(target));
-  if (motion::begins_with_added_pose(target_motion)) motion::drop_first_frame(target_motion);
+  auto target_motion = TRY(motion::performed_motion_of(target));
   const auto spec = space_about(space, target_motion);
   if (!spec) return fail(spec.error().message, target.path);
   const auto goal = TRY(view_of(target_motion, *spec, target.path));

@@ -8,6 +8,7 @@
 #include "models/motion/heading.hpp"
 #include "models/motion/motion.hpp"
 #include "proto/frame/degree.hpp"
+#include "proto/frame/median.hpp"
 
 namespace posed::style {
 namespace {
@@ -40,8 +41,7 @@ MatrixXd live_vectors(const motion::Motion& motion, const motion::PoseSpace& spa
 
 Result<WalkerFit> fit_of_walker(const StyleModel& model, const std::string& model_name,
                                 const clip::Clip& clip) {
-  auto motion = TRY(motion::motion_of(clip));
-  if (motion::begins_with_added_pose(motion)) motion::drop_first_frame(motion);
+  auto motion = TRY(motion::performed_motion_of(clip));
   const auto space = motion::PoseSpace::bind_person(model.space, *motion.skeleton);
   if (!space) {
     Error error = space.error();
@@ -58,11 +58,9 @@ Result<WalkerFit> fit_of_walker(const StyleModel& model, const std::string& mode
     squares.push_back(
         (model.process.inputs.rowwise() - q.row(t)).rowwise().squaredNorm().minCoeff());
   }
-  const auto middle = squares.begin() + std::ssize(squares) / 2;
-  std::ranges::nth_element(squares, middle);
   const auto joints = static_cast<double>(model.space.joints.size());
   WalkerFit fit;
-  fit.distance_deg = std::sqrt(*middle / joints) / kDegree;
+  fit.distance_deg = std::sqrt(median(squares) / joints) / kDegree;
   fit.mean_change = gp::posterior_mean(model.process, q).colwise().mean();
   return fit;
 }

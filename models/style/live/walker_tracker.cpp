@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "proto/frame/rt_safe.hpp"
+#include "proto/frame/smooth_step.hpp"
 
 namespace posed::style {
 namespace {
@@ -42,8 +43,7 @@ constexpr double kThere = 1e-5;     // nearer is there
 
 // 0 below `low`, 1 above `high`, without a kink between.
 double rise(double value, double low, double high) noexcept {
-  const double part = std::clamp((value - low) / (high - low), 0.0, 1.0);
-  return part * part * (3.0 - 2.0 * part);
+  return smooth_step((value - low) / (high - low));
 }
 
 constexpr double kInterruption_s = 1.0;  // of the frames

@@ -13,6 +13,7 @@
 #include <Eigen/Cholesky>
 
 #include "models/style/model/harmonics.hpp"
+#include "proto/frame/median.hpp"
 
 namespace posed::style {
 namespace {
@@ -200,9 +201,7 @@ VectorXd local_swing(const VectorXd& signal, const VectorXd& phase, Eigen::Index
 
 double median_of(const VectorXd& values) {
   std::vector<double> sorted(values.begin(), values.end());
-  const auto middle = sorted.begin() + std::ssize(sorted) / 2;
-  std::ranges::nth_element(sorted, middle);
-  return *middle;
+  return median(sorted);
 }
 
 std::vector<Eigen::Index> striding_frames(const VectorXd& signal, const StridePhase& found,

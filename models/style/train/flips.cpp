@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "proto/frame/degree.hpp"
+#include "proto/frame/median.hpp"
 #include "proto/frame/rotation.hpp"
 #include "proto/text/clean.hpp"
 
@@ -77,8 +78,7 @@ void leave_out(const std::vector<bool>& bad, Index d, MatrixXd& q) {
     for (Index t = 0; t < q.rows(); ++t) {
       if (!bad[static_cast<std::size_t>(t)]) good.push_back(q(t, axis));
     }
-    std::ranges::nth_element(good, good.begin() + std::ssize(good) / 2);
-    q.col(axis).setConstant(good[good.size() / 2]);
+    q.col(axis).setConstant(median(good));
   }
 }
 

@@ -85,7 +85,7 @@ std::vector<Figure> other_figures(double value, const std::string& words, std::s
   std::vector<LabelSpan> spans;
   std::vector<LagError> lags;
   Confusion confusion{.labels = {}, .given = {}, .share = {}, .frames = {}, .measured_on = words};
-  std::vector<QuestionTree> trees;
+  std::vector<gesture::DrawnTree> trees;
   Bars bars{.quantity = words,
             .unit = words,
             .series = {words, words},
