@@ -106,8 +106,9 @@ struct Body {
   std::string name;                          // as the device calls it
   std::shared_ptr<const Skeleton> skeleton;  // null for a body with samples only
   SampleLayout samples{};
-  double rate_hz = 0.0;  // nominal; 0 when unknown
-  std::string remark{};  // what people should know about it, for the log; may be empty
+  double rate_hz = 0.0;     // nominal; 0 when unknown
+  std::string remark{};     // what people should know about it, for the log; may be empty
+  std::int32_t number = 0;  // by which the device's programs know it; 0: none
 };
 
 // The bodies of a source, compiled from the device's description. A driver derives from it to add

@@ -225,6 +225,7 @@ void Streams::add(devices::NewStream stream) {
                          .source = source_name,
                          .body = stream.body.name,
                          .remark = stream.body.remark,
+                         .number = stream.body.number,
                          .refusal = stream.refusal});
   if (!stream.engine) return;
   if (!stream.stages.remark.empty()) {

@@ -54,7 +54,8 @@ void Inbox::stream_comes(const publish::StreamInfo& stream) {
                                                               .name = stream.name,
                                                               .skeleton = stream.skeleton,
                                                               .samples = stream.description.samples,
-                                                              .rate_hz = stream.rate_hz});
+                                                              .rate_hz = stream.rate_hz,
+                                                              .number = stream.number});
   const auto place = static_cast<std::size_t>(named - names_.begin());
   {
     const std::scoped_lock lock(mutex_);

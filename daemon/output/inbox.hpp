@@ -27,7 +27,8 @@ struct LiveStream {
   std::string name{};
   std::shared_ptr<const Skeleton> skeleton{};  // null if it has samples only
   drivers::SampleLayout samples{};
-  double rate_hz = 0.0;  // expected frame rate; 0: unknown
+  double rate_hz = 0.0;     // expected frame rate; 0: unknown
+  std::int32_t number = 0;  // drivers::Body::number
 };
 // [place], in the order in which the output names its streams; null: absent.
 using LiveStreams = std::vector<std::shared_ptr<const LiveStream>>;

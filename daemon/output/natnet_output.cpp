@@ -96,8 +96,8 @@ Result<> NatNetScene::set_stream(std::size_t place, const LiveStream* stream) {
   if (was) describe();
   if (stream == nullptr) return {};
   const auto& skeleton = stream->skeleton;
-  const auto id = static_cast<std::int32_t>(place + 1);
   const bool prop = skeleton != nullptr && is_prop(*skeleton);
+  const std::int32_t id = free_id(place, *stream, prop);
   const bool own = skeleton != nullptr && (prop || is_of_motive(*skeleton));
   const std::string name =
       distinct_name(own ? skeleton->name : stream->name, stream->name, place, names_);
@@ -116,6 +116,19 @@ Result<> NatNetScene::set_stream(std::size_t place, const LiveStream* stream) {
   }
   describe();
   return {};
+}
+
+// Programs ask for props by number, so the source's own is kept while nobody else has it.
+std::int32_t NatNetScene::free_id(std::size_t place, const LiveStream& stream, bool prop) const {
+  const auto is_free = [&](std::int32_t id) {
+    return std::ranges::none_of(bodies_, [&](const auto& body) {
+      return body && body->described.id == id && body->described.is_skeleton == !prop;
+    });
+  };
+  if (stream.number > 0 && is_free(stream.number)) return stream.number;
+  auto id = static_cast<std::int32_t>(place + 1);
+  while (!is_free(id)) ++id;
+  return id;
 }
 
 void NatNetScene::describe() {

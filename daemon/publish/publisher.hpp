@@ -59,8 +59,9 @@ struct StreamInfo {
   // Of a body of a device with several: the source's name in the config, and the device's own name
   // for the body.
   std::string source{}, body{};
-  std::string remark{};   // of the driver about the body; may be empty
-  std::string refusal{};  // why a stage cannot serve the body; then nothing is ever published
+  std::string remark{};     // of the driver about the body; may be empty
+  std::int32_t number = 0;  // drivers::Body::number
+  std::string refusal{};    // why a stage cannot serve the body; then nothing is ever published
 };
 
 // A device with several bodies, for the stats.

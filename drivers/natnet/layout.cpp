@@ -195,7 +195,8 @@ Result<> add_body(const BodyDef& body, const ModelDef& model, const DescriptionH
   layout.bodies.push_back({.name = shown_name(body),
                            .skeleton = std::move(skeleton),
                            .samples = sample_layout_of(table.markers),
-                           .rate_hz = has_rate ? static_cast<double>(head.rate_hz) : 0.0});
+                           .rate_hz = has_rate ? static_cast<double>(head.rate_hz) : 0.0,
+                           .number = body.id});
   layout.tables.push_back(std::move(table));
   return {};
 }

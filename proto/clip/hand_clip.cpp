@@ -1,5 +1,6 @@
 #include "proto/clip/hand_clip.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -81,10 +82,14 @@ Result<HandClip> hand_of(const Clip& clip, const ReadOptions& options) {
     for (std::size_t j = 0; j < kHandJoints; ++j) {
       const int joint = found.joints[j];
       const int target = static_cast<int>(j) + 1;
-      near[j] = channels_from_rotation(
+      const auto turned = channels_from_rotation(
           hand, target,
           ours(skeleton, joint, hand, target, local_rotation(skeleton, joint, values)), near[j]);
-      for (std::size_t c = 0; c < 3; ++c) angles[kAngleOfChannel[3 * j + c]] = near[j][c];
+      for (std::size_t c = 0; c < 3; ++c) angles[kAngleOfChannel[3 * j + c]] = turned[c];
+      // A frame that lacks the joint says nothing about the next one.
+      if (std::ranges::all_of(turned, [](double angle) { return std::isfinite(angle); })) {
+        near[j] = turned;
+      }
     }
   }
   return out;

@@ -150,8 +150,9 @@ TEST_CASE("people and props of Motive arrive through the NatNet output as they w
       const drivers::Body& body = first.bodies()[b];
       if (known[b] == body.skeleton) continue;
       known[b] = body.skeleton;
-      rig.output->stream_comes(
-          info_of(static_cast<std::uint32_t>(b), b == 0 ? "emma" : "wand", body.skeleton));
+      auto info = info_of(static_cast<std::uint32_t>(b), b == 0 ? "emma" : "wand", body.skeleton);
+      info.number = body.number;
+      rig.output->stream_comes(info);
     }
     if (first.newest.size() < 2) continue;
     const auto sent = rig.stats().sent();
@@ -165,6 +166,7 @@ TEST_CASE("people and props of Motive arrive through the NatNet output as they w
     for (std::size_t b = 0; b < 2; ++b) {
       const std::string& name = first.bodies()[b].name;
       REQUIRE(second.skeleton(name) != nullptr);
+      CHECK(second.body(name)->number == first.body(name)->number);
       REQUIRE(same_figure(*known[b], *second.skeleton(name), worst));
       compare(*known[b], first.newest[name], second.newest[name], worst);
       CHECK(first.newest[name].valid == second.newest[name].valid);

@@ -57,9 +57,12 @@ class ProtocolReader {
     return layouts_.empty() ? kNone : layouts_.back()->bodies;
   }
   // Null while nobody of this name is described.
-  [[nodiscard]] std::shared_ptr<const Skeleton> skeleton(const std::string& body) const {
-    const auto at = std::ranges::find(bodies(), body, &drivers::Body::name);
-    return at == bodies().end() ? nullptr : at->skeleton;
+  [[nodiscard]] const drivers::Body* body(const std::string& name) const {
+    const auto at = std::ranges::find(bodies(), name, &drivers::Body::name);
+    return at == bodies().end() ? nullptr : &*at;
+  }
+  [[nodiscard]] std::shared_ptr<const Skeleton> skeleton(const std::string& name) const {
+    return body(name) == nullptr ? nullptr : body(name)->skeleton;
   }
 
   std::map<std::string, Frame> newest;  // [body] since the last description
