@@ -40,6 +40,9 @@ struct Chunk {
   // Who sent the bytes, as a number that tells apart the senders of datagrams, or the links that
   // one device after the other makes; 0: nobody else could have.
   std::uint64_t sender = 0;
+  // Set in `sender` of a link, whose bytes go on where its last ones ended.
+  static constexpr std::uint64_t kLink = std::uint64_t{1} << 63;
+  [[nodiscard]] bool is_part_of_link() const noexcept { return (sender & kLink) != 0; }
   // Datagrams dropped since the last chunk, counted also beside empty bytes: from senders that are
   // not among the peers, and empty or too long ones.
   std::uint32_t foreign = 0;
@@ -92,6 +95,9 @@ class Transport {
                                   std::uint8_t /*socket*/) noexcept {
     return false;
   }
+  // Is told that the bytes of the last chunk, which was part of a link, are lost: the link must
+  // end.
+  RT_SAFE virtual void refuse() noexcept {}
   [[nodiscard]] bool send(std::span<const std::byte> bytes) noexcept { return send(bytes, 0); }
 };
 

@@ -1,7 +1,8 @@
 // JunkGate: how much rubbish of a source a recording takes. Up to kJunkPerSecond of
 // bytes that the decoder had no use for are recorded, so that a log shows what came. Beyond that
 // only those are heard of whom the decoder has lately used something: what is not recorded must not
-// be decoded either, or a replay would not do the same. RT-safe; one thread.
+// be decoded either, or a replay would not do the same. A stream of bytes is heard as a whole or
+// not at all: without its middle it could be read as other values. RT-safe; one thread.
 #pragma once
 
 #include <algorithm>
@@ -16,17 +17,25 @@ namespace posed::pipeline {
 class JunkGate {
  public:
   static constexpr std::int64_t kJunkPerSecond = 500'000;  // bytes, and the most that is saved up
+  static constexpr std::int64_t kMostOwed = 6 * kJunkPerSecond;  // bytes of a link that was let in
   static constexpr std::int64_t kKnownFor_ns = 2 * kNanosPerSecond;
 
   // Whether the chunk is to be recorded and decoded. `sender`: as in drivers::Chunk; 0 always is.
   // `cost`: its bytes in the log; so beside large rubbish a device that is new is soon heard.
   RT_SAFE [[nodiscard]] bool admits(std::uint64_t sender, std::int64_t cost,
                                     std::int64_t now_ns) noexcept {
-    const std::int64_t passed_ns =
-        std::clamp<std::int64_t>(now_ns - filled_ns_, 0, kNanosPerSecond);
-    filled_ns_ = std::max(filled_ns_, now_ns);
-    left_ = std::min(left_ + passed_ns * kJunkPerSecond / kNanosPerSecond, kJunkPerSecond);
+    refill(now_ns);
     return sender == 0 || left_ >= cost || is_known(sender, now_ns);
+  }
+
+  // Whether a chunk that is part of a link is to be recorded and decoded; if not, the link must
+  // end.
+  RT_SAFE [[nodiscard]] bool admits_link(std::uint64_t sender, std::int64_t now_ns) noexcept {
+    refill(now_ns);
+    if (sender == 0 || is_known(sender, now_ns)) return true;
+    if (left_ < (sender == link_ ? -kMostOwed : 0)) return false;
+    link_ = sender;
+    return true;
   }
 
   // What became of a chunk that was admitted.
@@ -34,7 +43,7 @@ class JunkGate {
                        std::int64_t now_ns) noexcept {
     if (sender == 0) return;
     if (used) return remember(sender, now_ns);
-    left_ = std::max(left_ - cost, -kJunkPerSecond);
+    left_ = std::max(left_ - cost, sender == link_ ? -2 * kMostOwed : -kJunkPerSecond);
   }
 
  private:
@@ -43,6 +52,12 @@ class JunkGate {
     std::int64_t used_ns = 0;
   };
 
+  RT_SAFE void refill(std::int64_t now_ns) noexcept {
+    constexpr std::int64_t kLongest_ns = 3 * kMostOwed / kJunkPerSecond * kNanosPerSecond;
+    const std::int64_t passed_ns = std::clamp<std::int64_t>(now_ns - filled_ns_, 0, kLongest_ns);
+    filled_ns_ = std::max(filled_ns_, now_ns);
+    left_ = std::min(left_ + passed_ns * kJunkPerSecond / kNanosPerSecond, kJunkPerSecond);
+  }
   RT_SAFE [[nodiscard]] bool is_known(std::uint64_t sender, std::int64_t now_ns) const noexcept {
     const auto known = std::ranges::find(known_, sender, &Known::sender);
     return known != known_.end() && now_ns - known->used_ns <= kKnownFor_ns;
@@ -56,6 +71,7 @@ class JunkGate {
   // Bytes of rubbish that may come; below 0 by those of known senders.
   std::int64_t left_ = kJunkPerSecond;
   std::int64_t filled_ns_ = 0;
+  std::uint64_t link_ = 0;  // the one that was let in last
   std::array<Known, 8> known_{};
 };
 

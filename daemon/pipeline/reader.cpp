@@ -17,6 +17,8 @@ namespace {
 
 // Pause before another look at a lossless source, or at a command that waits for space in the ring.
 constexpr std::int64_t kLookAgain_ns = 250'000;
+// The reader never sleeps so long (system/pulse.hpp): posed or the computer was stopped meanwhile.
+constexpr std::int64_t kStoodStill_ns = 2 * kNanosPerSecond;
 
 }  // namespace
 
@@ -115,6 +117,15 @@ class Reader::Source final : private IntakeOut {
     return all_accepted;
   }
 
+  // What waits in a link is old after posed stood still, and where it ends in the middle of a
+  // message nobody can tell: the supervisor opens the link again. Sockets that only listen know how
+  // old each datagram is.
+  void reopen() noexcept {
+    if (device_ == nullptr || read_.slot == nullptr || ended_) return;
+    const drivers::Transport& transport = *device_->transport;
+    if (transport.poll_fd() >= 0 && !transport.lossless() && !transport.only_listens()) give_back();
+  }
+
   // Returns how many chunks came at the device's own pace.
   std::uint64_t serve() noexcept {
     if (device_ == nullptr) return 0;
@@ -194,9 +205,12 @@ class Reader::Source final : private IntakeOut {
   void accept(const drivers::Chunk& chunk) noexcept {
     const auto cost = static_cast<std::int64_t>(kRowBytes + places_ * sizeof(StreamPosition) +
                                                 chunk.bytes.size());
-    if (ports_.record_sink != nullptr && !gate_.admits(chunk.sender, cost, arrival_ns_)) {
-      device_->transport->decoded(false);
-      return outcome(Outcome::kForeign);
+    const bool admitted = chunk.is_part_of_link() ? gate_.admits_link(chunk.sender, arrival_ns_)
+                                                  : gate_.admits(chunk.sender, cost, arrival_ns_);
+    if (ports_.record_sink != nullptr && !admitted) {
+      outcome(Outcome::kForeign);
+      if (chunk.is_part_of_link()) return device_->transport->refuse();
+      return device_->transport->decoded(false);
     }
     record(Direction::kFromDevice, chunk.bytes, chunk.socket);
     used_chunk_ = false;
@@ -458,6 +472,10 @@ void Reader::begin() noexcept {
 }
 
 std::int64_t Reader::turn(std::int64_t now_ns) noexcept {
+  if (turned_ns_ != kNoTime_ns && now_ns - turned_ns_ > kStoodStill_ns) {
+    for (const auto& source : sources_) source->reopen();
+  }
+  turned_ns_ = now_ns;
   const bool all_handled = handle_requests();
   for (const std::uint32_t source : std::exchange(ready_, {})) {
     handled_ += sources_[source]->serve();

@@ -130,6 +130,7 @@ class Reader {
   system::Moderation moderation_;
   system::Pulse pulse_;
   std::atomic<bool> stop_{false};
+  std::int64_t turned_ns_ = kNoTime_ns;  // the last turn
 };
 
 }  // namespace posed::pipeline

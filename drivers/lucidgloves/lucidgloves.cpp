@@ -154,7 +154,10 @@ struct LucidGlove : glove::GloveType<LucidGlove> {
   static Result<Opened> open(const Options& options, const Settings& settings,
                              TransportFactory& ports) {
     auto link = TRY(glove::connect(options, ports, kUsbIds));
-    TRY(start(link, settings));
+    if (auto started = start(link, settings); !started) {
+      link.pause_host();  // another that shares its address gets its turn
+      return std::unexpected(started.error());
+    }
     return glove::opened(std::move(link), kSilence_s);
   }
   static Result<std::unique_ptr<Emulator>> emulator(const Options& /*options*/,

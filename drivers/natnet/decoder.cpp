@@ -81,15 +81,25 @@ RT_SAFE void Requests::accept_server_info(const ServerInfo& info) noexcept {
   bodies_.wanted = true;
 }
 
+RT_SAFE void Requests::does_not_fit() noexcept {
+  if (connect_.wanted) return;
+  connect_.wanted = true;
+  connect_.pause_ns = std::min(2 * connect_.pause_ns, kLongest_ns);
+}
+
 RT_SAFE bool Requests::is_due(Question& question, std::int64_t now_ns) noexcept {
   if (!question.wanted || now_ns < question.next_ns) return false;
-  question.next_ns = now_ns + kAgain_ns;
+  question.next_ns = now_ns + question.pause_ns;
   return true;
 }
 
 // The rate before the bodies, whose description carries it.
 RT_SAFE std::span<const std::byte> Requests::next(std::int64_t now_ns) noexcept {
-  if (received_ns_ != kNoTime_ns && now_ns - received_ns_ > kSilence_ns) connect_.wanted = true;
+  if (received_ns_ != kNoTime_ns && now_ns - received_ns_ > kSilence_ns) {
+    connect_.wanted = true;
+    connect_.pause_ns = kAgain_ns;
+    connect_.next_ns = std::min(connect_.next_ns, now_ns + kAgain_ns);
+  }
   if (is_due(connect_, now_ns)) return connect_.datagram;
   if (connect_.wanted) return {};
   if (is_due(rate_, now_ns)) return rate_.datagram;
@@ -155,8 +165,13 @@ RT_SAFE Outcome NatNetDecoder::accept(const Message& message, Sink& sink) noexce
 RT_SAFE Outcome NatNetDecoder::accept_server_info(std::span<const std::byte> payload) noexcept {
   ServerInfo info;
   if (!decode_server_info(payload, info)) return Outcome::kShort;
-  misfits_ = 0;
   const Version said = settings_.version.known() ? settings_.version : info.version;
+  const bool fits = misfits_ < kMaxMisfits;
+  misfits_ = 0;
+  if (!fits && said == version_) {
+    requests_.has_not_changed();
+    return Outcome::kDuplicate;
+  }
   if (said != version_) has_reading_ = false;
   version_ = said;
   clock_hz_ = info.clock_hz;
@@ -187,6 +202,7 @@ RT_SAFE Outcome NatNetDecoder::accept_model_def(std::span<const std::byte> paylo
 RT_SAFE bool NatNetDecoder::read(std::span<const std::byte> payload, FrameView& view) noexcept {
   if (has_reading_ && read_frame(payload, reading_, view)) {
     misfits_ = 0;
+    requests_.fits();
     return true;
   }
   if (misfits_ < kMaxMisfits) ++misfits_;
@@ -197,6 +213,7 @@ RT_SAFE bool NatNetDecoder::read(std::span<const std::byte> payload, FrameView& 
     reading_ = reading;
     has_reading_ = true;
     misfits_ = 0;
+    requests_.fits();
     return true;
   }
   if (!damaged) requests_.does_not_fit();

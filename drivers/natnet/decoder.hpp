@@ -45,8 +45,9 @@ Result<bool> parse_up(const std::string& word);
 Result<Coordinates> parse_coordinates(const std::string& word);
 
 // Requests: what to ask a NatNet server next. It is asked who it is until it answers and again when
-// it was silent, for its frame rate, for its bodies whenever they may have changed, and over
-// unicast it also says every second that somebody listens. One datagram per call.
+// it was silent or its frames do not fit, then less and less often; for its frame rate, for its
+// bodies whenever they may have changed, and over unicast it also says every second that somebody
+// listens. One datagram per call.
 class Requests {
  public:
   // How often next() should be called.
@@ -61,19 +62,24 @@ class Requests {
   void accept_bodies() noexcept { bodies_.wanted = false; }
   void bodies_changed() noexcept { bodies_.wanted = true; }
   // The server may have been replaced by one of another version.
-  void does_not_fit() noexcept { connect_.wanted = true; }
+  void does_not_fit() noexcept;
+  void fits() noexcept { connect_.pause_ns = kAgain_ns; }
+  // The server is still the one whose frames do not fit.
+  void has_not_changed() noexcept { connect_.wanted = false; }
 
   // The datagram to send now; empty: none.
   RT_SAFE [[nodiscard]] std::span<const std::byte> next(std::int64_t now_ns) noexcept;
 
  private:
   static constexpr std::int64_t kAgain_ns = kNanosPerSecond;
+  static constexpr std::int64_t kLongest_ns = 32 * kAgain_ns;
   static constexpr std::int64_t kSilence_ns = 2 * kNanosPerSecond;
 
   struct Question {
     std::vector<std::byte> datagram;
     bool wanted = true;
     std::int64_t next_ns = kNoTime_ns;  // not before
+    std::int64_t pause_ns = kAgain_ns;
   };
   // Returns whether it is time to ask, and then not again for a while.
   [[nodiscard]] static bool is_due(Question& question, std::int64_t now_ns) noexcept;

@@ -82,6 +82,7 @@ class LinkTransport final : public Transport, public Upkeep {
     }
     if (!used) of_no_use_ += read_;
   }
+  RT_SAFE void refuse() noexcept override { floods_.store(true); }
   [[nodiscard]] bool send(std::span<const std::byte> bytes, std::uint8_t socket) noexcept override;
   void upkeep(std::int64_t now_ns) noexcept override;
   [[nodiscard]] std::string consume_note() override;
@@ -121,14 +122,14 @@ Result<> LinkTransport::start(std::int64_t now_ns) {
 Chunk LinkTransport::read(std::int64_t now_ns) noexcept {
   read_ns_ = now_ns;
   flush();
-  const bool floods = link_.listener() >= 0 && of_no_use_ > kMaxOfNoUse;
-  if (floods) floods_.store(true);
+  if (link_.listener() >= 0 && of_no_use_ > kMaxOfNoUse) floods_.store(true);
+  const bool floods = floods_.load();
   const ssize_t got = floods ? 0 : link_.receive(buffer_);
   read_ = static_cast<std::size_t>(std::max<ssize_t>(got, 0));
   if (got > 0) {
     const bool listens = link_.listener() >= 0;
     return {.bytes = {buffer_.data(), read_},
-            .sender = listens ? static_cast<std::uint64_t>(started_ns_) : 0};
+            .sender = listens ? static_cast<std::uint64_t>(started_ns_) | Chunk::kLink : 0};
   }
   if (got < 0 && not_now(errno)) return {};
   return {.bytes = {}, .lost = true, .foreign = floods || link_.was_browser() ? 1U : 0U};
@@ -151,8 +152,8 @@ std::string LinkTransport::consume_note() {
     return link_.name() + " has sent nothing of use for 5 s, and another device waits: it is cut";
   }
   return link_.name() +
-         " has sent 3 MB of nothing usable within 3 s: it is cut, and its "
-         "address may come again after " +
+         " has sent too much of nothing usable (3 MB within 3 s, or all that a recording takes of"
+         " that): it is cut, and its address may come again after " +
          std::to_string(PausedHosts::kPause.count()) + " s";
 }
 

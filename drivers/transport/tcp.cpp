@@ -4,6 +4,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <optional>
@@ -22,6 +23,7 @@ constexpr int kPatience_ms = 500;
 constexpr int kBacklog = 8;
 // Connections per call: an untrusted client may open them without end.
 constexpr int kMaxAtOnce = 64;
+constexpr std::size_t kMaxWaiting = 16;  // connections of paused hosts
 
 Result<Address> address_of(const ListenSettings& settings) {
   return listen_address(settings.endpoint, settings.peers,
@@ -42,6 +44,12 @@ std::unexpected<Error> no_descriptor(const ListenSettings& settings) {
               ", but posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
 }
 
+bool hung_up(int fd) noexcept {
+  std::byte next{};
+  const ssize_t got = ::recv(fd, &next, 1, MSG_PEEK | MSG_DONTWAIT);
+  return got == 0 || (got < 0 && errno != EAGAIN && errno != EINTR);
+}
+
 }  // namespace
 
 Result<> check_listen(const ListenSettings& settings) {
@@ -50,16 +58,27 @@ Result<> check_listen(const ListenSettings& settings) {
   return {};
 }
 
+std::optional<Connection> TransportFactory::first_waiting(Listener& listener) {
+  auto& waiting = listener.waiting;
+  std::erase_if(waiting, [](const Connection& link) { return hung_up(link.fd()); });
+  const auto first = std::ranges::find_if(waiting, [](auto& link) { return !link.is_paused(); });
+  if (first == waiting.end()) return std::nullopt;
+  std::optional<Connection> link(std::move(*first));
+  waiting.erase(first);
+  return link;
+}
+
 Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
   auto listener = listeners_.find(settings.endpoint);
   if (listener == listeners_.end()) {
     const auto address = TRY(address_of(settings));
     const auto fd = TRY(listen_on(address, settings.endpoint, kBacklog));
-    listener = listeners_.emplace(settings.endpoint, fd).first;
+    listener = listeners_.emplace(settings.endpoint, Listener{.fd = fd}).first;
   }
+  auto& [listening, waiting] = listener->second;
   if (only_prepare_) return not_opened();
   const auto peers = TRY(Peers::parse(settings.peers));
-  std::array<pollfd, 2> wanted{{{.fd = listener->second, .events = POLLIN, .revents = 0},
+  std::array<pollfd, 2> wanted{{{.fd = listening, .events = POLLIN, .revents = 0},
                                 {.fd = cancel_->fd(), .events = POLLIN, .revents = 0}}};
   ::poll(wanted.data(), wanted.size(), kPatience_ms);
   if (cancel_->fired()) return Cancel::error();
@@ -68,8 +87,7 @@ Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
   std::optional<Connection> newest;
   for (int i = 0; i < kMaxAtOnce; ++i) {
     Address peer;
-    const int fd =
-        ::accept4(listener->second, peer.get(), &peer.size, SOCK_CLOEXEC | SOCK_NONBLOCK);
+    const int fd = ::accept4(listening, peer.get(), &peer.size, SOCK_CLOEXEC | SOCK_NONBLOCK);
     if (fd < 0 && (errno == EINTR || errno == ECONNABORTED)) continue;
     if (fd < 0 && (errno == EMFILE || errno == ENFILE) && !newest) return no_descriptor(settings);
     if (fd < 0) break;
@@ -77,14 +95,21 @@ Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
     Connection link(fd, settings.endpoint + " from " + host, "tcp " + host);
     link.heed(cancel_);
     const Host from = host_of(peer);
-    if (!peers.allow(from) || paused_->have(from) || begins_like_a_browser(fd)) {
+    const bool paused = paused_->have(from);
+    if (!peers.allow(from) || (paused && waiting.size() == kMaxWaiting) ||
+        begins_like_a_browser(fd)) {
       ++refused_;
       continue;
     }
-    link.came_through(listener->second, from, paused_);
+    link.came_through(listening, from, paused_);
     keep_alive(fd);
-    newest = std::move(link);
+    if (paused) {
+      waiting.push_back(std::move(link));
+    } else {
+      newest = std::move(link);
+    }
   }
+  if (!newest) newest = first_waiting(listener->second);
   if (newest) return std::move(*newest);
   return fail("no " + std::string(settings.device) + " has connected to " + settings.endpoint +
               " yet; give it this machine's address and switch it on");

@@ -5,7 +5,7 @@
 namespace posed::drivers {
 
 TransportFactory::~TransportFactory() {
-  for (const auto& [endpoint, listener] : listeners_) ::close(listener);
+  for (const auto& [endpoint, listener] : listeners_) ::close(listener.fd);
 }
 
 Result<std::unique_ptr<UdpTransport>> TransportFactory::udp(const UdpSettings& settings) {

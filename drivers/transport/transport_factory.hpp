@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <string>
@@ -61,8 +62,8 @@ class TransportFactory {
 
   // Waits up to half a second for a device to connect. Listens from the first call on, so that one
   // that connects between two calls is kept. Connections from addresses not in `peers` are
-  // dropped and counted, and so are those of web browsers and of hosts that have just flooded.
-  // Cold.
+  // dropped and counted, and so are those of web browsers. Those of a host that has just flooded
+  // wait in the order in which they came: a device that shares its address gets its turn. Cold.
   Result<Connection> accept(const ListenSettings& settings);
 
   // Connects to a system that serves its data over TCP. Waits for it up to a second. Cold.
@@ -94,18 +95,25 @@ class TransportFactory {
   // log, or nothing. Given once. Cold.
   [[nodiscard]] std::string consume_note() { return std::exchange(note_, {}); }
 
-  // Number of connections dropped so far because their address is not in the list of peers, or has
-  // just flooded, or because they began like a browser's.
+  // Number of connections dropped so far because their address is not in the list of peers, because
+  // they began like a browser's, or because too many of hosts that have flooded wait.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_; }
 
  private:
   std::shared_ptr<Cancel> cancel_ = std::make_shared<Cancel>();
   [[nodiscard]] static std::unexpected<Error> not_opened() { return fail("not opened yet"); }
 
+  struct Listener {
+    int fd = -1;
+    std::deque<Connection> waiting{};  // of paused hosts
+  };
+  // Takes the first that waits and may come now.
+  static std::optional<Connection> first_waiting(Listener& listener);
+
   bool only_prepare_ = false;
   std::string note_{};
   std::uint64_t refused_ = 0;
-  std::map<std::string, int> listeners_;  // by endpoint
+  std::map<std::string, Listener> listeners_;  // by endpoint
   std::shared_ptr<PausedHosts> paused_ = std::make_shared<PausedHosts>();
 };
 

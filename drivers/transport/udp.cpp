@@ -63,7 +63,7 @@ RT_SAFE std::uint64_t number_of(const Address& address) noexcept {
   for (const std::byte byte : bytes) {
     number = (number ^ static_cast<std::uint64_t>(byte)) * 0x100000001b3U;
   }
-  return number | 1U;
+  return (number & ~Chunk::kLink) | 1U;
 }
 
 struct Wanted {

@@ -43,11 +43,14 @@ constexpr double kFewFrames = 36'000.0;          // that any file may ask for: a
 constexpr double kStillRate_hz = 30.0;           // of a file without an animation
 constexpr double kUnevenRate_hz = 60.0;          // least rate of one whose keys have none
 constexpr double kMaxKeyRate_hz = 1000.0;
-constexpr std::size_t kMaxAnimations = 100;     // that are searched for motion
-constexpr std::size_t kMaxNesting = 100;        // of JSON: tinygltf calls itself
-constexpr std::size_t kMaxValues = 1'000'000;   // of JSON; each takes 0.3 KB of memory
-constexpr std::size_t kMaxSteps = 100'000'000;  // poses and tracks of all frames
-constexpr std::size_t kMaxWhy = 200;            // letters of what tinygltf says
+constexpr std::size_t kMaxAnimations = 100;           // that are searched for motion
+constexpr std::size_t kMaxNesting = 100;              // of JSON: tinygltf calls itself
+constexpr std::size_t kMaxValues = 180'000;           // of JSON; each takes 0.3 KB of memory
+constexpr std::size_t kMaxCopied_bytes = 16'000'000;  // of a .glb's binary part
+constexpr std::size_t kMaxSteps = 100'000'000;        // poses and tracks of all frames
+constexpr std::size_t kMaxWhy = 200;                  // letters of what tinygltf says
+// Of these, the humanoid is read; the first that names bones counts.
+constexpr std::array<std::string_view, 3> kExtensions{"VRMC_vrm", "VRMC_vrm_animation", "VRM"};
 
 // --- what tinygltf may do
 
@@ -74,30 +77,113 @@ std::string_view json_of(std::string_view bytes) {
   return bytes.substr(kHeader, length);
 }
 
-// Whether tinygltf can read the JSON with bounded stack and memory.
-Result<> check_json(std::string_view json) {
-  std::size_t depth = 0, values = 0;
-  bool in_text = false;
-  for (std::size_t i = 0; i < json.size(); ++i) {
-    const char c = json[i];
-    if (in_text) {
-      if (c == '\\') ++i;
-      in_text = c != '"';
-      continue;
+// What posed reads of a glTF's JSON. The rest (meshes, materials, textures, what programs add for
+// themselves) is cut out before tinygltf, which would take up to 3 KB for each empty material.
+class JsonCut {
+ public:
+  explicit JsonCut(std::span<char> json) : json_(json) {}
+
+  // Puts 0, and spaces, in place of each value that posed does not read. Fails if the rest would
+  // take tinygltf too much stack or memory.
+  Result<> cut() {
+    while (at_ < json_.size()) {
+      const char c = json_[at_];
+      if (c == '"') {
+        const std::string_view text = skip_text();
+        if (skip_to_value() && !wanted(text)) blank_value();
+        continue;
+      }
+      ++at_;
+      if (c == '[' || c == '{') {
+        ++depth_;
+      } else if (c == ']' || c == '}') {
+        depth_ -= depth_ > 0 ? 1 : 0;
+      } else if (c != ',') {
+        continue;
+      }
+      buffers_ += c == '{' && depth_ == 3 && top_ == "buffers" ? 1 : 0;
+      if (depth_ > kMaxNesting) return fail("its JSON is nested too deep");
+      if (++values_ > kMaxValues) {
+        return fail("it describes too much; export the figure alone, with fewer animations");
+      }
     }
-    in_text = c == '"';
-    if (c == '[' || c == '{') {
-      ++depth;
-    } else if (c == ']' || c == '}') {
-      depth -= depth > 0 ? 1 : 0;
-    } else if (c != ',') {
-      continue;
-    }
-    ++values;
-    if (depth > kMaxNesting) return fail("its JSON is nested too deep");
-    if (values > kMaxValues) return fail("there is too much in its JSON");
+    return {};
   }
-  return {};
+  [[nodiscard]] std::size_t buffers() const { return buffers_; }
+
+ private:
+  // The text that begins here, without its quotes.
+  std::string_view skip_text() {
+    const std::size_t begin = ++at_;
+    while (at_ < json_.size() && json_[at_] != '"') at_ += json_[at_] == '\\' ? 2 : 1;
+    const std::size_t end = std::min(at_, json_.size());
+    at_ = std::min(end + 1, json_.size());
+    return {json_.data() + begin, end - begin};
+  }
+  void skip_space() {
+    while (at_ < json_.size() && std::string_view(" \t\r\n").contains(json_[at_])) ++at_;
+  }
+  // False after a text that is no key.
+  bool skip_to_value() {
+    skip_space();
+    if (at_ == json_.size() || json_[at_] != ':') return false;
+    ++at_;
+    skip_space();
+    return true;
+  }
+  bool wanted(std::string_view key) {
+    const auto has = [](const auto& all, std::string_view one) {
+      return std::ranges::find(all, one) != all.end();
+    };
+    constexpr std::array<std::string_view, 8> kTop{"asset",      "nodes",     "skins",
+                                                   "animations", "accessors", "bufferViews",
+                                                   "buffers",    "extensions"};
+    if (depth_ == 1) top_ = key;
+    if (depth_ == 1) return has(kTop, key);
+    if (top_ == "extensions" && depth_ == 2) return has(kExtensions, key);
+    if (top_ == "extensions" && depth_ == 3) return key == "humanoid";
+    if (key == "extras") return top_ == "animations" && depth_ == 3;  // timecodes
+    return key != "extensions";
+  }
+  void blank_value() {
+    const std::size_t begin = at_;
+    std::size_t open = 0;
+    while (at_ < json_.size()) {
+      const char c = json_[at_];
+      const bool closes = c == ']' || c == '}';
+      if (open == 0 && (closes || c == ',')) break;
+      open += c == '[' || c == '{' ? 1 : 0;
+      open -= closes ? 1 : 0;
+      if (c == '"') {
+        skip_text();
+      } else {
+        ++at_;
+      }
+    }
+    std::ranges::fill(json_.subspan(begin, at_ - begin), ' ');
+    if (begin < at_) json_[begin] = '0';
+  }
+
+  std::span<char> json_;
+  std::size_t at_ = 0, depth_ = 0, values_ = 0, buffers_ = 0;
+  std::string_view top_;  // the member of the whole that is read
+};
+
+// The file without what posed does not read.
+Result<std::string> cut_out(const ClipFile& file) {
+  std::string bytes = file.bytes;
+  const std::string_view json = json_of(bytes);
+  JsonCut cut({bytes.data() + (json.data() - bytes.data()), json.size()});
+  if (auto fits = cut.cut(); !fits) {
+    return fail("is no glTF that can be read (" + fits.error().message + ")", file.name);
+  }
+  // tinygltf gives each buffer of a .glb a copy of its binary part.
+  if (bytes.starts_with("glTF") && cut.buffers() > 1 &&
+      cut.buffers() > kMaxCopied_bytes / std::max<std::size_t>(bytes.size() - json.size(), 1)) {
+    return fail("is no glTF that can be read (it has several buffers, where a .glb has one)",
+                file.name);
+  }
+  return bytes;
 }
 
 Result<tinygltf::Model> load_model(const ClipFile& file) {
@@ -111,19 +197,17 @@ Result<tinygltf::Model> load_model(const ClipFile& file) {
   if (file.bytes.size() > std::numeric_limits<int>::max()) {
     return fail("is longer than the 2 GB that a glTF file can have", file.name);
   }
-  if (const auto fits = check_json(json_of(file.bytes)); !fits) {
-    return fail("is no glTF that can be read (" + fits.error().message + ")", file.name);
-  }
+  const std::string read = TRY(cut_out(file));
   tinygltf::Model model;
   std::string error, warning;
-  const auto size = static_cast<unsigned>(file.bytes.size());
+  const auto size = static_cast<unsigned>(read.size());
   bool loaded = false;
   try {
-    if (file.bytes.starts_with("glTF")) {
-      const auto* bytes = reinterpret_cast<const unsigned char*>(file.bytes.data());
+    if (read.starts_with("glTF")) {
+      const auto* bytes = reinterpret_cast<const unsigned char*>(read.data());
       loaded = loader.LoadBinaryFromMemory(&model, &error, &warning, bytes, size);
     } else {
-      loaded = loader.LoadASCIIFromString(&model, &error, &warning, file.bytes.data(), size, "");
+      loaded = loader.LoadASCIIFromString(&model, &error, &warning, read.data(), size, "");
     }
   } catch (const std::exception& thrown) {
     error = thrown.what();
@@ -400,8 +484,8 @@ Humanoid humanoid_of(const tinygltf::Model& model) {
       found.bones.emplace(index, *bone);
     }
   };
-  for (const char* extension : {"VRMC_vrm", "VRMC_vrm_animation", "VRM"}) {
-    const auto at = model.extensions.find(extension);
+  for (const std::string_view extension : kExtensions) {
+    const auto at = model.extensions.find(std::string(extension));
     if (at == model.extensions.end() || !at->second.Has("humanoid")) continue;
     const tinygltf::Value& bones = member(member(at->second, "humanoid"), "humanBones");
     if (bones.IsArray()) {

@@ -5,6 +5,7 @@
 #include <sys/resource.h>
 #include <sys/syscall.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstddef>
@@ -16,6 +17,8 @@
 namespace posed::fbx {
 namespace {
 
+// Assimp takes sixty times the length of a text file. A binary one may unpack to a thousand times.
+constexpr rlim_t kMinMemory_bytes = 400'000'000, kMemoryOfAByte = 100;
 constexpr rlim_t kMaxMemory_bytes = 4'000'000'000;
 constexpr rlim_t kMaxComputing_s = 60;
 
@@ -61,10 +64,14 @@ bool allow_only_computing() {
 
 }  // namespace
 
-Result<> confine() {
+Result<> confine(std::size_t file_bytes) {
+  const rlim_t memory_bytes =
+      file_bytes < kMaxMemory_bytes / kMemoryOfAByte
+          ? std::min(kMinMemory_bytes + kMemoryOfAByte * file_bytes, kMaxMemory_bytes)
+          : kMaxMemory_bytes;
   const std::vector<std::pair<int, rlim_t>> limits{
 #if !defined(__SANITIZE_ADDRESS__)  // the address sanitizer reserves terabytes
-      {RLIMIT_AS, kMaxMemory_bytes},
+      {RLIMIT_AS, memory_bytes},
 #endif
       {RLIMIT_CPU, kMaxComputing_s},
       {RLIMIT_CORE, 0},

@@ -474,7 +474,9 @@ Result<std::string> glb_of_fbx(std::string_view bytes) {
     auto nodes = TRY(nodes_of(*scene));
     return Builder(*scene, std::move(nodes)).build();
   } catch (const std::bad_alloc&) {
-    return fail("needs more than 4 GB to be read; export the figure without its meshes");
+    return fail(
+        "needs more memory than a file of its length may take; export the figure without its "
+        "meshes");
   } catch (const std::exception& thrown) {
     return fail("is no FBX that can be read (" + clean(thrown.what()) + ")");
   }

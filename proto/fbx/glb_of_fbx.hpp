@@ -3,6 +3,7 @@
 // Cold.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 
@@ -11,9 +12,10 @@
 namespace posed::fbx {
 
 // From now on this process can compute, read and write what is open, and end, but nothing else: no
-// file, no network, no other process. Its memory (4 GB), its time (a minute of computing) and the
-// depth of its calls have limits. Fails where the system does not allow to set them.
-Result<> confine();
+// file, no network, no other process. Its memory (by the length of the file; 4 GB at most), its
+// time (a minute of computing) and the depth of its calls have limits. Fails where the system does
+// not allow to set them.
+Result<> confine(std::size_t file_bytes);
 
 // The bytes of a .glb with the nodes of an FBX file (text or binary), in metres with +Y up; its
 // figure's nodes as joints of a skin: the bones of a mesh, otherwise the animated limbs; and its

@@ -61,12 +61,12 @@ class Target : public Stage {
   double at_start_MB = 0.0;
 };
 
-// Subscribes to the target's poses on its own thread.
+// Subscribes to a stream's poses on its own thread.
 class Innocent {
  public:
-  explicit Innocent(const std::string& endpoint)
+  explicit Innocent(const std::string& endpoint, const std::string& stream = "walker")
       : socket_(*net::open_socket(context_.get(), ZMQ_SUB)) {
-    REQUIRE(net::set_option(socket_.get(), ZMQ_SUBSCRIBE, "pose/walker"));
+    REQUIRE(net::set_option(socket_.get(), ZMQ_SUBSCRIBE, "pose/" + stream));
     REQUIRE(net::set_option(socket_.get(), ZMQ_RCVTIMEO, 20));
     REQUIRE(net::connect_socket(socket_.get(), endpoint));
     thread_ = std::thread([this] { listen(); });

@@ -41,13 +41,15 @@ bool write_all(std::string_view bytes) {
 
 int main() {
   try {
-    const auto confined = posed::fbx::confine();
-    const auto glb =
-        confined ? posed::fbx::glb_of_fbx(all_input()) : std::unexpected(confined.error());
+    const std::string file = all_input();
+    const auto confined = posed::fbx::confine(file.size());
+    const auto glb = confined ? posed::fbx::glb_of_fbx(file) : std::unexpected(confined.error());
     const bool written = write_all(glb ? *glb : glb.error().message);
     ::_exit(glb && written ? 0 : 1);
   } catch (const std::bad_alloc&) {
-    write_all("needs more than 4 GB to be read; export the figure without its meshes");
+    write_all(
+        "needs more memory than a file of its length may take; export the figure without its "
+        "meshes");
     ::_exit(1);
   }
 }

@@ -224,6 +224,31 @@ TEST_CASE("a NatNet server is asked again when its frames no longer fit") {
         Outcome::kOk);
 }
 
+TEST_CASE(
+    "a NatNet server that never fits is asked less and less often, and its answers are junk") {
+  SmallRig rig({2, 9});
+  std::uint32_t number = 1;
+  int asked = 0, of_use = 0;
+  constexpr int kMinutes = 10;
+  for (int i = 0; i < kMinutes * 60 * 10; ++i) {
+    const std::int64_t now_ns = i * (kNanosPerSecond / 10);
+    CHECK(rig.feed(natnet::encode_frame(small_frame(number++), {.version = {3, 0}}), now_ns) ==
+          Outcome::kOutOfRange);
+    natnet::Message message;
+    const Request request = rig.decoder->next_request(now_ns);
+    if (natnet::decode_message(request.bytes, message) != Outcome::kOk) continue;
+    if (message.id != MessageId::kConnect) continue;
+    ++asked;
+    const Outcome answer = rig.feed(natnet::encode_server_info({.version = {2, 9}}), now_ns);
+    of_use += answer == Outcome::kOk ? 1 : 0;
+  }
+  CHECK(asked <= 6 + 2 * kMinutes);
+  CHECK(of_use == 0);
+  // Once it is another one, it is understood at the next answer.
+  REQUIRE(rig.feed(natnet::encode_server_info({.version = {3, 0}})) == Outcome::kOk);
+  CHECK(rig.feed(natnet::encode_frame(small_frame(number), {.version = {3, 0}})) == Outcome::kOk);
+}
+
 TEST_CASE("messages of NatNet that are not for posed, and frames before the bodies are known") {
   NatNetRig rig;
   CHECK(rig.feed(natnet::encode_frame(small_frame(1), {.version = {3, 0}})) == Outcome::kForeign);

@@ -126,7 +126,46 @@ TEST_CASE("a sender is known for a while, and what is not a datagram always pass
   for (int i = 0; i < 1000; ++i) gate.decoded(0, false, 60'000, now_ns);
   CHECK(gate.admits(0, 100, now_ns));
   now_ns += JunkGate::kKnownFor_ns + kMs;
+  REQUIRE(gate.admits(2, 100, now_ns));
+  for (int i = 0; i < 20; ++i) gate.decoded(2, false, 60'000, now_ns);
   CHECK_FALSE(gate.admits(1, 100, now_ns));
+}
+
+// A device that reconnects while a flood of links has used up what may be recorded.
+TEST_CASE("a link is heard without a gap from its first byte to its end, or not at all") {
+  using test::kMs;
+  constexpr std::int64_t kRead = 4096;
+  JunkGate gate;
+  std::int64_t now_ns = kNanosPerSecond, junk = 0;
+  int let_in = 0;
+  for (std::uint64_t link = 1; link <= 2000; ++link, now_ns += 10 * kMs) {
+    int heard = 0, refused = 0;
+    for (int i = 0; i < 100 && refused == 0; ++i) {
+      if (!gate.admits_link(link, now_ns)) {
+        ++refused;
+      } else {
+        ++heard;
+        junk += kRead;
+        gate.decoded(link, false, kRead, now_ns);
+      }
+    }
+    CHECK((heard == 100 || heard == 0));
+    let_in += heard == 100 ? 1 : 0;
+  }
+  CHECK(let_in > 10);  // so a device that tries again is let in some time
+  CHECK(junk < 21 * JunkGate::kJunkPerSecond + 100 * kRead);  // in 20 s, and what was saved up
+  // One that goes on for ever ends; one that is of use does not.
+  const auto passes = [&](std::uint64_t link, bool used) {
+    now_ns += 60 * kNanosPerSecond;
+    std::int64_t bytes = 0;
+    for (; bytes < 3 * JunkGate::kMostOwed && gate.admits_link(link, now_ns); bytes += kRead) {
+      gate.decoded(link, used, kRead, now_ns);
+    }
+    return bytes;
+  };
+  CHECK(passes(5000, false) <= JunkGate::kMostOwed + JunkGate::kJunkPerSecond + kRead);
+  CHECK(passes(5001, false) >= JunkGate::kMostOwed);
+  CHECK(passes(5002, true) >= 3 * JunkGate::kMostOwed);
 }
 
 }  // namespace posed::pipeline

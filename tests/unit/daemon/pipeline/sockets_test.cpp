@@ -5,6 +5,7 @@
 #include <catch2/catch.hpp>
 
 #include "daemon/pipeline/reader.hpp"
+#include "daemon/system/pulse.hpp"
 #include "daemon/tools/emulate/log_emulator.hpp"
 #include "proto/log/writer.hpp"
 #include "tests/support/quiet_record_sink.hpp"
@@ -99,6 +100,48 @@ TEST_CASE("chunks and requests keep their socket, to the decoder and into the lo
   CHECK(sockets.sent_to == 2);
   CHECK(record.to == 2);
   CHECK(counters.kernel_dropped == 3);
+}
+
+// What waits in a link while posed or the computer is stopped would go out as new.
+TEST_CASE("after posed stood still links are opened again, and sockets that only listen are not") {
+  class Waiting final : public drivers::Transport {
+   public:
+    explicit Waiting(bool listens) : listens_(listens) {}
+    [[nodiscard]] int poll_fd() const noexcept override { return wake_->fd(); }
+    [[nodiscard]] bool only_listens() const noexcept override { return listens_; }
+    Result<> start(std::int64_t) override { return {}; }
+    [[nodiscard]] drivers::Chunk read(std::int64_t) noexcept override { return {}; }
+
+   private:
+    std::unique_ptr<system::EventFd> wake_ = system::EventFd::open().value();
+    bool listens_;
+  };
+  for (const bool listens : {false, true}) {
+    drivers::Device device;
+    device.transport = std::make_unique<Waiting>(listens);
+    device.decoder = std::make_unique<SocketDecoder>();
+    DeviceSlot slot;
+    slot.supervisor = system::EventFd::open().value();
+    Ring<Item> decoded(64);
+    SourceCounters counters;
+    const auto wake = system::EventFd::open().value();
+    const auto reader = Reader::open({.out = &decoded,
+                                      .pipeline = wake.get(),
+                                      .record_sink = nullptr,
+                                      .clock = test_clock,
+                                      .commands = nullptr})
+                            .value();
+    reader->add({.device = &device, .counters = &counters, .slot = &slot});
+    reader->begin();
+    const auto is_back = [&] { return !slot.out.empty(); };
+    for (int i = 0; i < 100; ++i, now_ns += system::kMaxSleep_ns) {
+      static_cast<void>(reader->turn(now_ns));
+      CHECK_FALSE(is_back());
+    }
+    now_ns += 5 * kNanosPerSecond;
+    static_cast<void>(reader->turn(now_ns));
+    CHECK(is_back() == !listens);
+  }
 }
 
 TEST_CASE("a decoder says what to ask next, and the log keeps what was asked") {

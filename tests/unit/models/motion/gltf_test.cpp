@@ -97,6 +97,18 @@ void check_vrma(const clip::Clip& clip) {
   }
 }
 
+// `bytes`: whole words.
+std::string glb_of(std::string json, const std::string& bytes) {
+  json.resize((json.size() + 3) / 4 * 4, ' ');
+  const auto number = [](std::size_t value) {
+    const auto word = static_cast<std::uint32_t>(value);
+    return std::string(reinterpret_cast<const char*>(&word), sizeof word);  // NOLINT: its bytes
+  };
+  const std::string body =
+      number(json.size()) + "JSON" + json + number(bytes.size()) + std::string("BIN\0", 4) + bytes;
+  return "glTF" + number(2) + number(12 + body.size()) + body;
+}
+
 }  // namespace
 
 TEST_CASE("a .glb shows the joints and end sites where the clip has them") {
@@ -605,7 +617,7 @@ TEST_CASE("what is no glTF, or a damaged one, is refused with a reason") {
   };
   CHECK(test::has(refused("glTF and nothing more"), "no glTF that can be read"));
   CHECK(test::has(refused("{"), "no glTF that can be read"));
-  CHECK(test::has(refused("{\"extras\":" + std::string(1'000'000, '[')), "nested too deep"));
+  CHECK(test::has(refused("{\"nodes\":" + std::string(1'000'000, '[')), "nested too deep"));
   const std::string asset = "{\"asset\":{\"version\":\"2.0\"}";
   CHECK(test::has(refused(asset + "}"), "no nodes"));
   CHECK(test::has(refused(asset + ",\"nodes\":[{\"children\":[1]},{\"children\":[0]}]}"),
@@ -627,9 +639,18 @@ TEST_CASE("a glTF that asks for more than its size is refused, or read once") {
     return all;
   };
   const std::string node = asset + ",\"nodes\":[{}],\"extras\":";
-  CHECK(why(node + repeated("[", 90) + repeated("]", 90) + "}").empty());
-  CHECK(test::has(why(node + repeated("[", 500'000) + repeated("]", 500'000) + "}"), "nested"));
-  CHECK(test::has(why(node + "[" + repeated("0,", 2'000'000) + "0]}"), "too much"));
+  const std::string bones = asset + ",\"nodes\":[{}],\"extensions\":{\"VRM\":{\"humanoid\":";
+  CHECK(why(bones + repeated("[", 90) + repeated("]", 90) + "}}}").empty());
+  CHECK(test::has(why(bones + repeated("[", 500'000) + repeated("]", 500'000) + "}}}"), "nested"));
+  CHECK(test::has(why(bones + "[" + repeated("0,", 200'000) + "0]}}}"), "too much"));
+  // What posed has no use for costs nothing, wherever it is.
+  CHECK(why(node + repeated("[", 500'000) + repeated("]", 500'000) + "}").empty());
+  CHECK(why(node + "0,\"materials\":[" + repeated("{},", 2'000'000) + "{}]}").empty());
+  CHECK(
+      why(asset + ",\"nodes\":[{\"extensions\":[" + repeated("{},", 2'000'000) + "{}]}]}").empty());
+  CHECK(why(asset + ",\"nodes\":[{}],\"extensions\":{\"VRM\":{\"meta\":[" +
+            repeated("{},", 2'000'000) + "{}]}}}")
+            .empty());
   CHECK(why(node + "\"" + repeated("[{,", 1'000'000) + "\"}").empty());  // as a text
   CHECK(why(asset + ",\"nodes\":[{}],\"extensions\":{\"VRM\":{\"humanoid\":7},"
                     "\"VRMC_vrm\":{\"humanoid\":{\"humanBones\":{\"head\":7}}}}}")
@@ -644,6 +665,15 @@ TEST_CASE("a glTF that asks for more than its size is refused, or read once") {
   const auto chain = clip::parse_clip({.name = "x.gltf", .bytes = doubled + "{}]}"});
   REQUIRE(chain);
   CHECK(chain->skeleton->joints.size() == kNodes);
+}
+
+TEST_CASE("a .glb whose binary part is copied for each of many buffers is refused") {
+  std::string json = R"({"asset":{"version":"2.0"},"nodes":[{}],"buffers":[{"byteLength":100000})";
+  for (int i = 0; i < 300; ++i) json += R"(,{"byteLength":100000})";
+  const auto clip =
+      clip::parse_clip({.name = "x.glb", .bytes = glb_of(json + "]}", std::string(100'000, '\0'))});
+  REQUIRE_FALSE(clip);
+  CHECK(test::has(clip.error().text(), "several buffers"));
 }
 
 TEST_CASE("the tracks of a glTF take no more memory and time than its bytes are worth") {
@@ -671,16 +701,7 @@ TEST_CASE("the tracks of a glTF take no more memory and time than its bytes are 
       json += (i == 0 ? R"({"sampler":)" : R"(,{"sampler":)") + std::to_string(i % accessors) +
               R"(,"target":{"node":0,"path":"rotation"}})";
     }
-    json += "]}]}";
-    json.resize((json.size() + 3) / 4 * 4, ' ');
-    const auto number = [](std::size_t value) {
-      const auto word = static_cast<std::uint32_t>(value);
-      return std::string(reinterpret_cast<const char*>(&word), sizeof word);  // NOLINT: its bytes
-    };
-    const std::string body = number(json.size()) + "JSON" + json + number(bytes.size()) +
-                             std::string("BIN\0", 4) + bytes;
-    return clip::parse_clip(
-        {.name = "x.glb", .bytes = "glTF" + number(2) + number(12 + body.size()) + body});
+    return clip::parse_clip({.name = "x.glb", .bytes = glb_of(json + "]}]}", bytes)});
   };
   const auto fair = glb(4, 100);
   REQUIRE(fair);
