@@ -149,8 +149,7 @@ Result<std::string> RecordingFolder::converted(const Part& part) const {
     return fail(part.name +
                 " is too long for this; `posed convert` on the daemon's computer does it");
   }
-  clip::Clip clip = TRY(clip::parse_clip(file));
-  file.bytes = {};
+  clip::Clip clip = TRY(clip::parse_clip(std::move(file)));
   const auto frame_at = [&](double at_s) {
     const double frame = std::round(at_s * clip.frame_rate_hz);
     return static_cast<int>(std::clamp(frame, 0.0, static_cast<double>(clip.frames())));

@@ -26,7 +26,7 @@ bool continues_character(char c) { return (static_cast<unsigned char>(c) & 0xc0)
 
 bool same_body(const drivers::Body& a, const drivers::Body& b) {
   return same_skeleton(a.skeleton.get(), b.skeleton.get()) && a.samples.names == b.samples.names &&
-         a.samples.units == b.samples.units;
+         a.samples.units == b.samples.units && a.number == b.number;
 }
 
 }  // namespace

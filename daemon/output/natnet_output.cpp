@@ -4,7 +4,9 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <set>
 #include <utility>
+#include <vector>
 
 #include <netinet/in.h>
 #include <sys/socket.h>
@@ -36,9 +38,8 @@ bool is_of_motive(const Skeleton& skeleton) {
          rests_unturned(skeleton);
 }
 
-natnet::BodyDef describe_body(const Skeleton& skeleton, const std::string& name, std::int32_t id,
-                              bool prop) {
-  natnet::BodyDef body{.name = name, .id = id, .is_skeleton = !prop, .bones = {}};
+natnet::BodyDef describe_body(const Skeleton& skeleton, const std::string& name, bool prop) {
+  natnet::BodyDef body{.name = name, .is_skeleton = !prop, .bones = {}};
   for (const Joint& joint : skeleton.joints) {
     const Eigen::Vector3f offset_m = joint.offset_m.cast<float>();
     body.bones.push_back({.name = name + "_" + joint.name,
@@ -46,7 +47,7 @@ natnet::BodyDef describe_body(const Skeleton& skeleton, const std::string& name,
                           .parent = joint.parent + 1,  // 0: none
                           .offset_m = {offset_m.x(), offset_m.y(), offset_m.z()}});
   }
-  if (prop) body.bones[0] = {.name = name, .id = id, .parent = -1};
+  if (prop) body.bones[0] = {.name = name, .parent = -1};
   return body;
 }
 
@@ -64,6 +65,7 @@ std::uint32_t packed(const Timecode& timecode) {
 constexpr int kMaxRequests = 16;           // that are answered in one turn
 constexpr std::size_t kMaxRequest = 1024;  // bytes; Connect, the longest, has less than 300
 constexpr natnet::Version kNewest{4, 1};
+constexpr std::int32_t kMaxId = 32'767;  // a bone's number has its skeleton's in the upper 16 bits
 constexpr double kUsualRate_hz = 120.0;  // where the stream does not know its own
 
 // Frames for a group leave by the interface that the server has.
@@ -97,41 +99,49 @@ Result<> NatNetScene::set_stream(std::size_t place, const LiveStream* stream) {
   if (stream == nullptr) return {};
   const auto& skeleton = stream->skeleton;
   const bool prop = skeleton != nullptr && is_prop(*skeleton);
-  const std::int32_t id = free_id(place, *stream, prop);
   const bool own = skeleton != nullptr && (prop || is_of_motive(*skeleton));
   const std::string name =
       distinct_name(own ? skeleton->name : stream->name, stream->name, place, names_);
   auto fit = TRY(Fit::make(skeleton, own, [&](double scale) {
     return natnet::skeleton_of(
-        natnet::average_person(name, id, static_cast<float>(scale), has_fingers(*skeleton)));
+        natnet::average_person(name, /*id=*/1, static_cast<float>(scale), has_fingers(*skeleton)));
   }));
   Body& made = body.emplace(std::move(fit), own);
   made.rate_hz = stream->rate_hz;
-  made.described = describe_body(made.fit.skeleton(), name, id, prop);
-  made.packet.id = id;
+  made.described = describe_body(made.fit.skeleton(), name, prop);
+  made.number = stream->number;
   for (const natnet::BoneDef& bone : made.described.bones) {
-    made.packet.bones.push_back({.id = prop ? id : id << 16 | bone.id,
-                                 .position_m = bone.offset_m,
-                                 .rotation_xyzw = kIdentity});
+    made.packet.bones.push_back({.position_m = bone.offset_m, .rotation_xyzw = kIdentity});
   }
   describe();
   return {};
 }
 
-// Programs ask for props by number, so the source's own is kept while nobody else has it.
-std::int32_t NatNetScene::free_id(std::size_t place, const LiveStream& stream, bool prop) const {
-  const auto is_free = [&](std::int32_t id) {
-    return std::ranges::none_of(bodies_, [&](const auto& body) {
-      return body && body->described.id == id && body->described.is_skeleton == !prop;
-    });
+// Programs ask for props by number, so the source's own is kept where it has no namesake.
+void NatNetScene::number_bodies() {
+  std::array<std::set<std::int32_t>, 2> taken;  // of props, of people
+  const auto number = [&](Body& body, std::int32_t id) {
+    const bool prop = !body.described.is_skeleton;
+    if (id <= 0 || id > kMaxId || !taken[prop ? 0 : 1].insert(id).second) return false;
+    body.described.id = body.packet.id = id;
+    if (prop) body.described.bones[0].id = id;
+    for (std::size_t i = 0; i < body.packet.bones.size(); ++i) {
+      body.packet.bones[i].id = prop ? id : id << 16 | body.described.bones[i].id;
+    }
+    return true;
   };
-  if (stream.number > 0 && is_free(stream.number)) return stream.number;
-  auto id = static_cast<std::int32_t>(place + 1);
-  while (!is_free(id)) ++id;
-  return id;
+  std::vector<std::size_t> left;
+  for (std::size_t place = 0; place < bodies_.size(); ++place) {
+    if (bodies_[place] && !number(*bodies_[place], bodies_[place]->number)) left.push_back(place);
+  }
+  for (const std::size_t place : left) {
+    auto id = static_cast<std::int32_t>(place + 1);
+    while (!number(*bodies_[place], id)) ++id;
+  }
 }
 
 void NatNetScene::describe() {
+  number_bodies();
   model_ = {};
   rate_hz_ = 0.0;
   for (const auto& body : bodies_) {

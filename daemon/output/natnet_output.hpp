@@ -33,8 +33,8 @@ class NatNetScene {
   explicit NatNetScene(std::size_t places) : bodies_(places), names_(places) {}
 
   // The stream of a place comes, or has another skeleton; null: has left. A skeleton that Motive
-  // could have, or a prop, goes out as it is, under Motive's own number (Streaming ID); anybody
-  // else as Motive's figure. Cold.
+  // could have, or a prop, goes out as it is, under Motive's own number (Streaming ID)
+  // unless two have the same; anybody else as Motive's figure. Cold.
   Result<> set_stream(std::size_t place, const LiveStream* stream);
   // Returns false, and does nothing, for an empty place.
   [[nodiscard]] bool take(std::size_t place, const Frame& frame);
@@ -49,12 +49,13 @@ class NatNetScene {
     Body(Fit fitted, bool is_own) : fit(std::move(fitted)), own(is_own) {}
     Fit fit;
     bool own;
+    std::int32_t number = 0;  // LiveStream::number
     double rate_hz = 0.0;
     drivers::natnet::BodyDef described{};
     drivers::natnet::SkeletonPacket packet{};  // of a prop its one bone
     bool posed = false;
   };
-  [[nodiscard]] std::int32_t free_id(std::size_t place, const LiveStream& stream, bool prop) const;
+  void number_bodies();
   void describe();
 
   std::vector<std::optional<Body>> bodies_;  // [place]

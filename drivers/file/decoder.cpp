@@ -22,6 +22,7 @@ RT_SAFE Outcome outcome_of(const clip::FrameOutcome& parsed) noexcept {
     case clip::FrameFault::kMissingBone:
       return Outcome::kShort;
     case clip::FrameFault::kImplausible:
+    case clip::FrameFault::kLate:
       return Outcome::kOutOfRange;
     case clip::FrameFault::kNotANumber: {
       double value = 0.0;

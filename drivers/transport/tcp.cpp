@@ -23,7 +23,7 @@ constexpr int kPatience_ms = 500;
 constexpr int kBacklog = 8;
 // Connections per call: an untrusted client may open them without end.
 constexpr int kMaxAtOnce = 64;
-constexpr std::size_t kMaxWaiting = 16;  // connections of paused hosts
+constexpr std::size_t kMaxPausedConnections = 16;  // connections of paused hosts
 
 Result<Address> address_of(const ListenSettings& settings) {
   return listen_address(settings.endpoint, settings.peers,
@@ -96,7 +96,7 @@ Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
     link.heed(cancel_);
     const Host from = host_of(peer);
     const bool paused = paused_->have(from);
-    if (!peers.allow(from) || (paused && waiting.size() == kMaxWaiting) ||
+    if (!peers.allow(from) || (paused && waiting.size() == kMaxPausedConnections) ||
         begins_like_a_browser(fd)) {
       ++refused_;
       continue;

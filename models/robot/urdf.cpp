@@ -392,7 +392,7 @@ Result<> resolve_leaders(const RawUrdf& raw, Urdf& urdf, const Reader& reader) {
     }
     if (stands) {
       if (link.turns) link.at.rotate(Eigen::AngleAxisd(offset, link.axis));
-      link.slides = link.turns;
+      link.slides = true;
       link.turns = false;
       continue;
     }

@@ -79,7 +79,6 @@ Format amc_format() {
   return {.name = "AMC",
           .extensions = {".amc"},
           .article = "an",
-          .evenly_spaced = true,
           .sends_text = true,
           .skeleton_extension = ".asf",
           .options = {ReadOption::kSkeleton, ReadOption::kRate, ReadOption::kUnit, ReadOption::kUp,

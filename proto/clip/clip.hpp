@@ -48,12 +48,12 @@ struct Clip {
 // Facts that a file may lack and a user can supply. The table (format.hpp) says which of them a
 // format accepts; any other that is given is refused.
 struct ReadOptions {
-  // The file of the skeleton, for a format that keeps it apart; empty: NN.asf beside NN_MM.amc.
+  // The file of the skeleton, for a format that keeps it apart; empty: skeleton_beside().
   std::filesystem::path skeleton{};
   // Rate of a format that does not state it; empty: its usual one.
   std::optional<double> rate_hz{};
-  // Unit of length of a format that does not state it; empty: the profile's, otherwise recognised
-  // by the figure's legs.
+  // Unit of length; empty: the file's if its format states it, then the profile's, otherwise
+  // recognised by the figure's legs.
   std::optional<double> metres_per_unit{};
   // Axis that points up in a format that does not state it; empty: recognised by the figure.
   std::optional<UpAxis> up{};

@@ -159,7 +159,6 @@ Format fbx_format() {
       .name = "FBX",
       .extensions = {".fbx"},
       .article = "an",
-      .evenly_spaced = true,
       .options = {ReadOption::kUnit, ReadOption::kUp, ReadOption::kFacing, ReadOption::kProfile},
       .sniff = begins_fbx,
       .read = read_fbx};

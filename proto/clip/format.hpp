@@ -43,7 +43,7 @@ struct Format {
   std::string_view article = "a";            // before the name
   bool is_hand = false;                      // holds one hand and nothing else
   bool holds_gaps = false;                   // a value may be missing (NaN)
-  bool evenly_spaced = false;                // the frames have no times of their own
+  bool evenly_spaced = false;                // what is written: frames have no times
   // A stream of the file driver carries the file's own lines, because the logs of posed 0.1 do. The
   // frames of all other formats travel as numbers (device_clip.hpp), so a new format leaves it off.
   bool sends_text = false;
@@ -95,8 +95,9 @@ enum class Use : std::uint8_t { kRead, kReadBody, kWrite, kWriteBody };
 // Refuses options that a format does not accept, instead of silently ignoring them.
 Result<> check_options(const Format& format, const ReadOptions& options, const std::string& file);
 
-// Where the skeleton of a clip lies that has a file of its own, unless the user names it: NN.asf
-// beside NN_MM.amc. Empty for other formats.
+// Where the skeleton of a clip lies that has a file of its own, unless the user names it: of
+// the files beside it the one that has the longest beginning of its name, NN.asf or NN_MM.asf of
+// NN_MM.amc. Empty for other formats.
 [[nodiscard]] std::filesystem::path skeleton_beside(const std::filesystem::path& path);
 
 // A file's bytes as its format's reader wants them: text in UTF-8, Format::plain.

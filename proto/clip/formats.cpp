@@ -184,7 +184,7 @@ std::string plain_bytes(const Format& format, std::string bytes) {
 
 Result<LoadedClip> load_clip(const std::filesystem::path& path, const ReadOptions& options) {
   LoadedClip loaded{.format = format_of(path), .file = {.name = path.string(), .bytes = {}}};
-  if (loaded.format == nullptr) loaded.format = format_of_bytes(first_bytes(path));
+  if (loaded.format == nullptr) loaded.format = format_of_bytes(utf8_of(first_bytes(path)));
   if (loaded.format == nullptr || loaded.format->read == nullptr) {
     TRY(expect_there(path));
     const std::string extension = extension_of(path);

@@ -53,6 +53,8 @@ std::string FrameOutcome::sentence() const {
       return in_quotes(where) +
              " is beyond what a pose can have: a position lies within 1 km, a joint turns by at "
              "most 100 turns, a finger's by 2; is the unit right?";
+    case FrameFault::kLate:
+      return in_quotes(where) + " is no time in seconds from the start of a recording";
     case FrameFault::kTooFew:
     case FrameFault::kTooMany:
       return (where.empty() ? std::string("the frame") : "bone " + in_quotes(where)) + " has " +
@@ -184,7 +186,7 @@ FrameOutcome FrameParser::parse_fields(std::string_view text,
     if (!value) {
       constexpr double kAny = std::numeric_limits<double>::max();  // milliseconds since 1970
       const bool is_late = outcome.found == 0 && parse_number(field, kAny);
-      return add_error(is_late ? FrameFault::kImplausible : FrameFault::kNotANumber, field);
+      return add_error(is_late ? FrameFault::kLate : FrameFault::kNotANumber, field);
     }
     if (outcome.found == 0) {
       outcome.time_s = *value;

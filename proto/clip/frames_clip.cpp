@@ -7,6 +7,7 @@
 #include <limits>
 #include <utility>
 
+#include "proto/frame/median.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::clip {
@@ -57,9 +58,7 @@ Eigen::Quaterniond rotation_of(const Frame& frame, int joint) {
 double median_step_s(const std::vector<double>& time_s) {
   std::vector<double> steps;
   for (std::size_t i = 1; i < time_s.size(); ++i) steps.push_back(time_s[i] - time_s[i - 1]);
-  const auto middle = steps.begin() + std::ssize(steps) / 2;
-  std::nth_element(steps.begin(), middle, steps.end());
-  return *middle;
+  return median(steps);
 }
 
 // The nominal rate, which may be a guess of the stage's: a device at another pace keeps its own.

@@ -30,6 +30,7 @@
 #include "proto/clip/gltf.hpp"
 #include "proto/clip/gltf_numbers.hpp"
 #include "proto/frame/humanoid.hpp"
+#include "proto/frame/median.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::clip {
@@ -721,9 +722,7 @@ double usual_rate_hz(std::span<const double> keys_s) {
   std::vector<double> steps_s;
   for (std::size_t i = 1; i < keys_s.size(); ++i) steps_s.push_back(keys_s[i] - keys_s[i - 1]);
   if (steps_s.empty()) return 0.0;
-  const auto middle = steps_s.begin() + std::ssize(steps_s) / 2;
-  std::ranges::nth_element(steps_s, middle);
-  const double rate_hz = std::round(1.0 / std::max(*middle, 1e-9));
+  const double rate_hz = 1.0 / std::max(median(steps_s), 1e-9);
   return rate_hz <= kMaxKeyRate_hz ? rate_hz : 0.0;
 }
 
@@ -746,12 +745,12 @@ Times times_of(const std::vector<Track>& tracks, bool own) {
   const double rate_hz = span_s > 0.0 ? steps / span_s : 0.0;
   constexpr double kNear = 0.05;          // of a frame
   constexpr double kFewestRate_hz = 5.0;  // where keys are farther apart, a motion is between them
-  bool even = keys.size() > 1 && rate_hz >= kFewestRate_hz && rate_hz <= kMaxKeyRate_hz;
+  bool even = keys.size() > 1 && (own || rate_hz >= kFewestRate_hz) && rate_hz <= kMaxKeyRate_hz;
   for (std::size_t i = 0; even && i < keys.size(); ++i) {
     even = std::abs((keys[i] - keys.front()) * rate_hz - static_cast<double>(i)) < kNear;
   }
   const double whole_hz = std::round(rate_hz);
-  times.rate_hz = !even ? std::max(kUnevenRate_hz, usual_rate_hz(keys))
+  times.rate_hz = !even ? std::max(kUnevenRate_hz, std::round(usual_rate_hz(keys)))
                   : std::abs(rate_hz - whole_hz) < 1e-4 * whole_hz ? whole_hz
                                                                    : rate_hz;
   if (own && !even && std::ranges::adjacent_find(keys, std::greater_equal()) == keys.end()) {
@@ -901,9 +900,7 @@ std::optional<Reader::Bound> Reader::other_rest(Draft& draft) {
     if (length > 0.0) ratios.push_back(now_m / length);
   }
   if (same || ratios.empty()) return std::nullopt;
-  const auto middle = ratios.begin() + std::ssize(ratios) / 2;
-  std::ranges::nth_element(ratios, middle);
-  bound.scale = *middle;
+  bound.scale = median(ratios);
   bound.turn = quarter_turns(*first);
   const auto alike = std::ranges::count_if(
       ratios, [&](double ratio) { return std::abs(ratio - bound.scale) < 0.02 * bound.scale; });
@@ -1100,6 +1097,10 @@ Result<Draft> Reader::read() {
     return fail("its animation is longer than a clip can be; cut it");
   }
   remark(draft);
+  if (!times.keys_s.empty()) {
+    draft.warnings.emplace_back(
+        "frames are not evenly spaced; what goes by frames takes them as if they were");
+  }
   draft.timecode = timecodes_of(animation_, tracks, times);
   std::vector<std::array<double, 3>> near(figure_.nodes.size());
   std::vector<Pose> own = rest_, world = world_rest_;
@@ -1140,7 +1141,6 @@ Format gltf_format() {
   return {
       .name = "glTF",
       .extensions = {".gltf", ".vrm"},
-      .evenly_spaced = true,
       .options = {ReadOption::kUnit, ReadOption::kUp, ReadOption::kFacing, ReadOption::kProfile},
       .read = read_gltf};
 }

@@ -9,14 +9,17 @@
 #include "proto/clip/hand_clip.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/frame/hand_skeleton.hpp"
+#include "proto/frame/median.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::clip {
 namespace {
 
-constexpr double kSameTime_s = 1e-6;      // times closer than this count as the same
-constexpr double kUnixTime_s = 1e8;       // no recording lasts three years
+constexpr double kSameTime_s = 1e-6;  // times closer than this count as the same
+constexpr double kUnixTime_s = 1e8;   // no recording lasts three years
+// The number of the row, the time, the angles, and one that is too many.
+constexpr std::size_t kMaxFields = kHandChannels + 3;
 constexpr double kMinRate_hz = 1.0;       // slower times are counted in another unit
 constexpr double kUntimedRate_hz = 30.0;  // of a file without times
 constexpr double kEven = 0.01;            // relative difference below which steps count as equal
@@ -40,10 +43,11 @@ std::string header_line() {
   return line;
 }
 
-// The fields of a line, without blanks and quotes around them.
+// The fields of a line, without blanks and quotes around them; of more than a hand CSV has none
+// follow the first that is too many.
 std::vector<std::string_view> fields_of(std::string_view line, char separator) {
   std::vector<std::string_view> fields;
-  for (std::size_t end = 0; end != std::string_view::npos;) {
+  for (std::size_t end = 0; end != std::string_view::npos && fields.size() < kMaxFields;) {
     end = line.find(separator);
     std::string_view field = trim(line.substr(0, end));
     if (field.size() > 1 && field.starts_with('"') && field.ends_with('"')) {
@@ -70,13 +74,16 @@ std::string plain_csv(std::string bytes) {
   const std::size_t first = names.front().empty() ? 1 : 0;
   const bool is_plain = separator == ',' && first == 0 && !header.contains('"');
   if (is_plain || names.size() != first + 1 + kHandChannels || names[first] != "time_s") {
-    return bytes;
+    return plain.empty() ? bytes : plain + std::string(rest);
   }
+  // Where numbers have points, a comma is none: 1,234 may be a thousand.
+  const bool has_points = rest.contains('.');
   while (!rest.empty()) {
     const auto fields = fields_of(next_line(rest), separator);
+    if (fields.size() <= first) plain += ',';  // a row of its number alone
     for (std::size_t i = first; i < fields.size(); ++i) {
       if (i > first) plain += ',';
-      for (const char c : fields[i]) plain += c == ',' ? '.' : c;
+      for (const char c : fields[i]) plain += c == ',' && !has_points ? '.' : c;
     }
     plain += '\n';
   }
@@ -106,15 +113,9 @@ Result<> check_header(std::string_view line, const std::string& name, int line_n
   return {};
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
 // 1 / median step; for an even clock, whose stamps are only rounded, 1 / mean step.
 double rate_of(const std::vector<double>& steps_s) {
-  const double middle_s = median(steps_s);
+  const double middle_s = median(std::vector(steps_s));
   const bool is_even = std::ranges::all_of(
       steps_s, [&](double s) { return std::abs(s - middle_s) < kEven * middle_s; });
   if (!is_even) return 1.0 / middle_s;
@@ -234,7 +235,11 @@ Format hand_csv_format() {
           .holds_gaps = true,
           .sends_text = true,
           .options = {ReadOption::kHand, ReadOption::kHandShape},
-          .sniff = [](std::string_view begin) { return has_line(begin, "time_s,"); },
+          .sniff =
+              [](std::string_view begin) {
+                return has_line(begin, "time_s,") || has_line(begin, "time_s;") ||
+                       has_line(begin, "time_s\t");
+              },
           .plain = plain_csv,
           .read = read_hand_csv,
           .write = write};

@@ -225,6 +225,20 @@ struct Ticks {
   bool sparse = false;          // there is much between two keys
 };
 
+// Whether something moves between two keys that lie several frames apart.
+bool has_wide_gaps(const aiNodeAnim& channel, double frame) {
+  const auto wide = [&](const auto* keys, unsigned count) {
+    for (unsigned k = 1; k < count; ++k) {
+      if (keys[k].mTime - keys[k - 1].mTime > kSparse * frame &&
+          keys[k].mValue != keys[k - 1].mValue)
+        return true;
+    }
+    return false;
+  };
+  return wide(channel.mPositionKeys, channel.mNumPositionKeys) ||
+         wide(channel.mRotationKeys, channel.mNumRotationKeys);
+}
+
 // Those that most channels with several keys share, if these are evenly spaced (assimp adds keys
 // where an angle jumps) and no farther apart than the file's frames, otherwise the file's frames.
 Result<Ticks> ticks_of(const aiAnimation& animation) {
@@ -232,9 +246,10 @@ Result<Ticks> ticks_of(const aiAnimation& animation) {
   if (!(animation.mTicksPerSecond > 0.0)) {
     return fail("names no frame rate, so its times are lost; export it with one");
   }
+  // Where the file leaves the rate to its reader, a tick is a second.
+  const double frame = animation.mTicksPerSecond > kMinRate_hz ? 1.0 : 1.0 / kUsualRate_hz;
   std::map<double, unsigned> shared;
-  unsigned moving = 0;
-  std::size_t all_keys = 0;
+  unsigned moving = 0, sparse = 0;
   for (unsigned i = 0; i < animation.mNumChannels; ++i) {
     const aiNodeAnim& channel = *animation.mChannels[i];
     std::set<double> own;
@@ -244,7 +259,7 @@ Result<Ticks> ticks_of(const aiAnimation& animation) {
       own.insert(channel.mRotationKeys[k].mTime);
     if (own.size() < 2) continue;
     ++moving;
-    all_keys += own.size();
+    sparse += has_wide_gaps(channel, frame) ? 1 : 0;
     for (const double tick : own) ++shared[tick];
   }
   if (shared.empty()) return Ticks{};
@@ -260,10 +275,7 @@ Result<Ticks> ticks_of(const aiAnimation& animation) {
   for (std::size_t i = 0; even && i < ticks.size(); ++i) {
     even = std::abs(ticks[i] - first - static_cast<double>(i) * step) < 0.05 * step;
   }
-  // Where the file leaves the rate to its reader, a tick is a second.
-  const double frame = animation.mTicksPerSecond > kMinRate_hz ? 1.0 : 1.0 / kUsualRate_hz;
-  if (even && step < kSparse * frame) return Ticks{.at = std::move(ticks)};
-  const double keys = static_cast<double>(all_keys) / std::max(moving, 1U);
+  if (even && step < kSparse * frame) return Ticks{.at = std::move(ticks), .sparse = sparse > 0};
   if (!((last - first) / frame < static_cast<double>(kMaxNumbers))) {
     return fail("its animation is longer than a clip can be; cut it");
   }
@@ -271,7 +283,7 @@ Result<Ticks> ticks_of(const aiAnimation& animation) {
   for (std::size_t i = 0; first + static_cast<double>(i) * frame < last + 1e-6; ++i) {
     ticks.push_back(first + static_cast<double>(i) * frame);
   }
-  return Ticks{.at = std::move(ticks), .sparse = last - first > kSparse * frame * (keys - 1.0)};
+  return Ticks{.at = std::move(ticks), .sparse = sparse > 0};
 }
 
 // --- the .glb
@@ -423,17 +435,20 @@ Result<> Builder::add_animation(const aiAnimation& from) {
 // What assimp does not tell: which of two joints of one name moves, and which curve lies between
 // keys.
 std::string Builder::remark_of(const std::set<int>& moving, bool sparse) const {
+  const std::string gaps =
+      sparse ? "has keys frames apart, between which posed goes straight; if the program that wrote"
+               " it draws curves, bake every frame there and export again"
+             : "";
   std::set<std::string> names;
   for (const int n : moving) {
     const Node& node = nodes_[static_cast<std::size_t>(n)];
     if (!node.limb || names.insert(node.name).second) continue;
     return "has two joints named " + in_quotes(node.name) +
            ", whose motions posed cannot tell apart: they may be mixed. Give each figure names of"
-           " its own, or export one alone";
+           " its own, or export one alone" +
+           (gaps.empty() ? "" : "; it also " + gaps);
   }
-  if (!sparse) return {};
-  return "has keys frames apart, between which posed goes straight; if the program that wrote it"
-         " draws curves, bake every frame there and export again";
+  return gaps;
 }
 
 std::set<int> Builder::bones() const {

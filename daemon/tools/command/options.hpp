@@ -89,7 +89,8 @@ inline void add_figure_options(CLI::App& command, clip::ReadOptions& read) {
       .add_option_function<std::string>(
           "--unit",
           [&read](const std::string& text) { read.metres_per_unit = clip::metres_of_unit(text); },
-          "Unit of a clip: m, dm, cm, mm, inch, foot or a number of metres (default: recognised)")
+          "Unit of a clip: m, dm, cm, mm, inch, foot or a number of metres (default: the file's, "
+          "or recognised)")
       ->check([](const std::string& text) {
         return clip::metres_of_unit(text) ? std::string()
                                           : fmt::format("'{}' is no unit of length", text);

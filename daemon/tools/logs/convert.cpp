@@ -231,7 +231,7 @@ void add_convert(CLI::App& app, int& exit_code) {
       "--out", convert->out,
       "To write: " + clip::listed(clip::Use::kWrite) + "; of a whole log a .mcap");
   command->add_option("--skeleton", convert->read.skeleton,
-                      "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
+                      "Skeleton of an AMC (default: beside it, such as NN.asf of NN_MM.amc)");
   command->add_option("--rate", convert->read.rate_hz,
                       "Frames per second of an AMC, which does not say (default: 120)");
   add_figure_options(*command, convert->read);

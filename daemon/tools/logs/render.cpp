@@ -329,7 +329,7 @@ void add_render(CLI::App& app, int& exit_code) {
                       "Which of a log's streams (default: the only one)");
   command->add_option("--take", options->take, "Only this take of a log: its number or its name");
   command->add_option("--skeleton", options->read.skeleton,
-                      "Skeleton of an AMC (default: NN.asf beside NN_MM.amc)");
+                      "Skeleton of an AMC (default: beside it, such as NN.asf of NN_MM.amc)");
   add_figure_options(*command, options->read);
   command->add_option("--hand", options->hand, "The hand of a hand CSV")
       ->check(CLI::IsMember({"left", "right"}));

@@ -250,7 +250,6 @@ Result<> check_files(const EvalOptions& options) {
       .check();
 }
 
-// Without the pose that some converters put in front.
 // What the clips of people who were not taught get of what source and target teach.
 Result<std::vector<style::Arrival>> look_at_strangers(const EvalOptions& options,
                                                       const style::StyleModel& model,

@@ -133,6 +133,10 @@ TEST_CASE("an AMC in other axes and another unit is the same motion, also as a s
   const Eigen::Quaterniond turn(up_turn(UpAxis::kPlusZ));
   const double size = 0.01 / (0.0254 / 0.45);
   const Frame was = truth->frame(1), now = clip->frame(1);
+  const auto root_of = [](const Frame& frame) {
+    return Eigen::Vector3d(Eigen::Vector3f(frame.root_position_m.data()).cast<double>());
+  };
+  CHECK((root_of(now) - turn * (size * root_of(was))).norm() < 1e-6);
   for (std::size_t j = 0; j < truth->skeleton->joints.size(); ++j) {
     const Joint& joint = truth->skeleton->joints[j];
     CHECK((clip->skeleton->joints[j].offset_m - turn * (size * joint.offset_m)).norm() < 1e-9);
