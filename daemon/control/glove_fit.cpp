@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -101,13 +102,15 @@ Result<FittedGlove> fit_glove(const drivers::Description& device, const std::str
   for (const auto& finding : check.poses) tell(finding, made.words);
   if (wanted.name().empty()) return made;
   if (!check.usable()) return fail(check.verdict());
-  auto [file, sentences, warnings] =
-      TRY(contacts ? devices::calibrate_by_contacts(model, recorded, std::move(blank))
-                   : devices::calibrate_by_poses(model, recorded, std::move(blank)));
-  sentences.insert(sentences.end(), warnings.begin(), warnings.end());
+  auto fitted = TRY(contacts ? devices::calibrate_by_contacts(model, recorded, std::move(blank))
+                             : devices::calibrate_by_poses(model, recorded, std::move(blank)));
+  if (const std::string refusal = fitted.refusal(); !refusal.empty()) return fail(refusal);
+  std::vector<std::string> sentences = std::move(fitted.said);
+  std::ranges::move(fitted.warnings, std::back_inserter(sentences));
+  if (contacts) check.doubts.clear();  // the fist was not held, but taken from the calibration
   sentences.push_back(check.verdict());
   for (const std::string& sentence : sentences) made.words.add_sentence(clean(sentence));
-  made.toml = drivers::glove::format_calibration(file);
+  made.toml = drivers::glove::format_calibration(fitted.file);
   return made;
 }
 

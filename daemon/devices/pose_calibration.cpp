@@ -86,6 +86,12 @@ drivers::glove::CalibrationFile blank_calibration(const drivers::glove::Model& m
           .sensors = {}};
 }
 
+std::string PoseCalibration::refusal() const {
+  constexpr std::size_t kMostImpossible = 3;  // a sensor or a finger may be faulty
+  if (impossible <= kMostImpossible) return {};
+  return fmt::format("{} joints would be bent as no hand's are: show the poses again", impossible);
+}
+
 Result<PoseCalibration> calibrate_by_poses(const drivers::glove::Model& model,
                                            const drivers::glove::Recorded& recorded,
                                            drivers::glove::CalibrationFile blank) {
@@ -105,6 +111,7 @@ Result<PoseCalibration> calibrate_by_contacts(const drivers::glove::Model& model
   const Side hand = made.file.hand;
   made.said = TRY(fit_contacts(model, recorded, hand, made.file));
   auto odd = TRY(drivers::glove::keep_possible(model, recorded, hand, made.file));
+  made.impossible = odd.size();
   std::ranges::move(odd, std::back_inserter(made.warnings));
   return made;
 }

@@ -2,6 +2,7 @@
 // page both make. Cold.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,10 @@ struct PoseCalibration {
   drivers::glove::CalibrationFile file;
   std::vector<std::string> said;      // what the fist and the contacts changed
   std::vector<std::string> warnings;  // sensors that keep their default; what no hand can do
+  std::size_t impossible = 0;         // joints that would be bent as no hand's are
+
+  // Why it is none of a hand, from four such joints on; empty: it may be.
+  [[nodiscard]] std::string refusal() const;
 };
 
 // The glove that a calibration is for: `identity` as its driver says it. A port's path does not

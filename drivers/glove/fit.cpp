@@ -13,6 +13,20 @@ namespace {
 
 constexpr double kSame = 0.05;  // rad or share: poses that differ by less do not move a sensor
 
+// By so much people's angles differ from the pose's, and glove's gains from the default's: two real
+// calibrations of a CyberGlove have gains of 0.5 to 1.5 times the default's.
+constexpr double kPoseError_rad = 5.0 * kDegree;
+constexpr double kGainSpread = 0.3;
+
+// The value at the pose's raw value: between the pose's and, by its uncertainty, the default's.
+double fitted_value(const Sensor& sensor, const SensorPoses& at) {
+  const double way = at.pose_value - at.flat_value;
+  if (!gain_is_known(sensor) || !(at.by_default > 0.0)) return at.pose_value;
+  const double error = std::pow(kPoseError_rad / way, 2);
+  const double of_default = error / (error + kGainSpread * kGainSpread);
+  return at.flat_value + way * std::pow(at.by_default, of_default);
+}
+
 std::size_t channel(std::string_view name) { return hand_channel(name); }
 
 void bend(HandAngles& hand, std::string_view name, double degrees) {
@@ -154,12 +168,17 @@ Result<std::vector<SensorPoses>> poses_of_sensors(const Model& model, const Reco
       if (recorded[p][i].count > 0 && moves > std::abs(wanted[most][i] - wanted[0][i])) most = p;
     }
     if (!(std::abs(wanted[most][i] - wanted[0][i]) > kSame)) continue;
+    const auto by_default = [&](const Held& held) {
+      return static_cast<double>(model.sensors[i].curve.value_at(static_cast<float>(held.mean())));
+    };
     found.push_back({.sensor = i,
                      .pose = static_cast<Pose>(most),
                      .flat_raw = flat.mean(),
                      .pose_raw = recorded[most][i].mean(),
                      .flat_value = wanted[0][i],
-                     .pose_value = wanted[most][i]});
+                     .pose_value = wanted[most][i],
+                     .by_default = (by_default(recorded[most][i]) - by_default(flat)) /
+                                   (wanted[most][i] - wanted[0][i])});
   }
   return found;
 }
@@ -179,7 +198,7 @@ Result<Fitted> fit_poses(const Model& model, const Recorded& recorded) {
       continue;
     }
     std::vector<std::array<double, 2>> points{{at.flat_raw, at.flat_value},
-                                              {at.pose_raw, at.pose_value}};
+                                              {at.pose_raw, fitted_value(sensor, at)}};
     std::ranges::sort(points);
     fitted.sensors[sensor.name] = std::move(points);
   }

@@ -82,8 +82,16 @@ struct SensorPoses {
   double flat_raw = 0.0, pose_raw = 0.0;
   double flat_value = 0.0, pose_value = 0.0;  // calibrated values at these poses
 
+  // The movement by the driver's default curve, as a share of the pose's: 1 when the sensor has the
+  // default's gain and the pose is exact, negative when it moved the other way.
+  double by_default = 1.0;
+
   [[nodiscard]] double span() const;  // difference of the raw values
 };
+
+// Whether the default curve of the sensor has the gain of a real glove, in radians. Shares of a
+// finger's range depend on how the glove was built.
+[[nodiscard]] inline bool gain_is_known(const Sensor& sensor) { return sensor.unit == "rad"; }
 
 // For each sensor that was measured with the flat hand and that a recorded pose moves.
 Result<std::vector<SensorPoses>> poses_of_sensors(const Model& model, const Recorded& recorded);
@@ -94,9 +102,11 @@ struct Fitted {
   std::vector<std::string> warnings;
 };
 
-// Takes two points per sensor: the flat hand and the pose that moves it most. A sensor that no pose
-// moves keeps its default; so does one that moved less than 10 counts, with a warning. Fails when
-// no flat hand was recorded, or no sensor moved at all.
+// Takes two points per sensor: the flat hand and the pose that moves it most. People do not hold a
+// pose exactly, so a known default gain counts, too: for a fist hardly, for a spread hand, whose
+// angles are small, about as much as the pose. A sensor that no pose moves keeps its default; so
+// does one that moved less than 10 counts, with a warning. Fails when no flat hand was recorded, or
+// no sensor moved at all.
 Result<Fitted> fit_poses(const Model& model, const Recorded& recorded);
 
 // The calibrated values [sensor] of a hand in this pose, before the device's own formula; not

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <optional>
 #include <span>
 
 #include "proto/frame/median.hpp"
@@ -20,6 +22,22 @@ constexpr double kMinTravel = 0.04;
 // Share of the span between two poses that the driver's default predicts.
 constexpr double kStuckShare = 0.1;
 constexpr double kFailedShare = 0.25;  // share of a pose's sensors
+
+// In one still hand sensors tremble alike; one that does this much more has moved.
+constexpr double kDriftShare = 0.05, kDriftRatio = 5.0;
+
+// The median movement of a pose's sensors, as a share of the driver's default gains. In simulation
+// (gains off by 12 % each and 6 % together, poses by 5 degrees) a fist stays within 0.8 and 1.3;
+// two real calibrations have 0.7. Thumbs and spread hands differ more from person to person.
+struct Range {
+  double least, most;
+  [[nodiscard]] bool has(double value) const { return value >= least && value <= most; }
+};
+constexpr Range kFistGain{0.6, 1.6}, kSureFistGain{0.8, 1.3}, kOtherGain{0.35, 4.0};
+constexpr Range kOddShare{0.4, 2.5};  // of one sensor, of its pose's median
+// Straight fingers in another pose than the flat hand, as a share of the way to the fist.
+constexpr Range kStraight{-0.25, 0.7}, kSureStraight{-0.12, 0.12};
+constexpr double kTighter = 1.25;  // the fist with the thumb across, beside the fist
 
 constexpr std::size_t kNamed = 3;  // sensors named in a sentence
 
@@ -53,12 +71,14 @@ PoseFinding find(const Model& model, const Recorded& recorded, Pose pose,
                  const std::vector<SensorPoses>& sensors) {
   PoseFinding finding{.pose = pose, .moved = {}, .stuck = {}};
   std::vector<double> unrest;
+  std::vector<std::string> names;
   for (const SensorPoses& at : sensors) {
     const bool all = pose == Pose::kFlat || touched_finger(pose) != 0;
     if (!all && at.pose != pose) continue;
     const Sensor& sensor = model.sensors[at.sensor];
     ++finding.sensors;
     const double way = std::max(at.span(), kMinTravel * range_of(sensor));
+    names.push_back(sensor.name);
     unrest.push_back(recorded[static_cast<std::size_t>(pose)][at.sensor].deviation() / way);
     if (unrest.back() > kMovedShare) {
       finding.moved.push_back(sensor.name);
@@ -66,17 +86,149 @@ PoseFinding find(const Model& model, const Recorded& recorded, Pose pose,
       finding.stuck.push_back(sensor.name);
     }
   }
-  if (!unrest.empty()) finding.unrest = median(unrest);
+  if (unrest.empty()) return finding;
+  finding.unrest = median(std::vector(unrest));
+  const double limit = std::clamp(kDriftRatio * finding.unrest, kDriftShare, kMovedShare);
+  for (std::size_t i = 0; i < unrest.size(); ++i) {
+    if (unrest[i] > limit) finding.restless.push_back(names[i]);
+  }
   return finding;
 }
 
+std::string percent(double share) { return std::to_string(std::lround(100.0 * share)) + " %"; }
+
+// Compares poses with each other and with the driver's default gains.
+class Comparison {
+ public:
+  Comparison(const Model& model, const Recorded& recorded, const std::vector<SensorPoses>& sensors,
+             PoseCheck& check)
+      : model_(model), recorded_(recorded), sensors_(sensors), check_(check) {}
+
+  void run() {
+    for (const Pose pose : {Pose::kThumb, Pose::kSpread}) {
+      const auto share = way_to_fist(pose);
+      if (share) straight_.push_back(*share);
+      judge_gain(pose, kOtherGain, "the hand did not take the pose");
+    }
+    judge_fist();
+    name_odd();
+  }
+
+ private:
+  void fail(Pose pose, const std::string& why) {
+    for (PoseFinding& finding : check_.poses) {
+      if (finding.pose == pose && finding.wrong.empty()) finding.wrong = why;
+    }
+  }
+
+  // The median movement of the pose's sensors, as a share of the default's; none where the gains
+  // are not known, or nothing moved.
+  [[nodiscard]] std::optional<double> gain(Pose pose) const {
+    std::vector<double> gains;
+    for (const SensorPoses& at : sensors_) {
+      const Sensor& sensor = model_.sensors[at.sensor];
+      if (at.pose == pose && gain_is_known(sensor) && !is_stuck(sensor, at)) {
+        gains.push_back(at.by_default);
+      }
+    }
+    return gains.empty() ? std::nullopt : std::optional(median(std::move(gains)));
+  }
+
+  // Where the fingers are in a pose: 0 as in the flat hand, 1 as in the fist.
+  [[nodiscard]] std::optional<double> way_to_fist(Pose pose) const {
+    std::vector<double> shares;
+    for (const SensorPoses& at : sensors_) {
+      const Held& held = recorded_[static_cast<std::size_t>(pose)][at.sensor];
+      if (at.pose != Pose::kFist || held.count == 0 || is_stuck(model_.sensors[at.sensor], at)) {
+        continue;
+      }
+      shares.push_back((held.mean() - at.flat_raw) / (at.pose_raw - at.flat_raw));
+    }
+    return shares.empty() ? std::nullopt : std::optional(median(std::move(shares)));
+  }
+
+  void judge_gain(Pose pose, const Range& range, const std::string& why) {
+    const auto share = gain(pose);
+    if (share && !range.has(*share)) fail(pose, moved_by(*share) + ": " + why);
+  }
+
+  static std::string moved_by(double share) {
+    return share < 0.0
+               ? "its sensors moved the other way than this type of glove's do"
+               : "its sensors moved by " + percent(share) + " of what this type of glove's do";
+  }
+
+  void judge_fist() {
+    const auto share = gain(Pose::kFist);
+    if (straight_.empty() && !share) return;
+    const bool repeated = !straight_.empty();
+    // Of straight fingers in other poses, the most and the least bent. They know the flat hand,
+    // whichever way the glove counts.
+    const double least = repeated ? std::ranges::min(straight_) : 0.0;
+    const double most = repeated ? std::ranges::max(straight_) : 0.0;
+    const bool backwards = !share || *share < 0.0;
+    if (repeated ? backwards && least > kStraight.most : backwards) {
+      for (const Pose pose : {Pose::kFlat, Pose::kFist}) fail(pose, "fist and flat were swapped");
+      return;
+    }
+    if (most < kStraight.least) {
+      fail(Pose::kFlat, "the fingers were bent; in other poses they are straighter, by " +
+                            percent(-most) + " of the way to the fist");
+      return;
+    }
+    const double across = way_to_fist(Pose::kTouchFist).value_or(1.0);
+    if (across > kTighter) {
+      fail(Pose::kFist, "it was not closed; with the thumb across it closed to " + percent(across));
+    } else if (share && !kFistGain.has(std::abs(*share))) {
+      const std::string why =
+          moved_by(std::abs(*share)) + ": the fist was not closed, or the flat hand was not flat";
+      fail(Pose::kFist, why);
+      if (!repeated) fail(Pose::kFlat, why);
+    } else if (share && !kSureFistGain.has(std::abs(*share))) {
+      check_.doubts.push_back("the fist moved its sensors by " + percent(std::abs(*share)) +
+                              " of what this type of glove's do: was it tight, and the flat hand "
+                              "flat?");
+    }
+    if (least > kSureStraight.most || most < kSureStraight.least) {
+      check_.doubts.push_back("straight fingers differ from pose to pose by " +
+                              percent(std::min(std::abs(least), std::abs(most))) +
+                              " of the way to the fist");
+    }
+  }
+
+  // Sensors that moved unlike the others in the fist.
+  void name_odd() {
+    std::vector<std::string> odd;
+    const double typical = gain(Pose::kFist).value_or(0.0);
+    for (const SensorPoses& at : sensors_) {
+      const Sensor& sensor = model_.sensors[at.sensor];
+      const bool stuck = is_stuck(sensor, at);
+      const bool unlike = at.pose == Pose::kFist && gain_is_known(sensor) && typical != 0.0 &&
+                          !kOddShare.has(at.by_default / typical);
+      if (stuck || unlike) odd.push_back(sensor.name);
+    }
+    if (odd.empty()) return;
+    check_.doubts.push_back(named(odd) +
+                            " moved unlike the others: a loose sensor, or swapped "
+                            "plugs?");
+  }
+
+  const Model& model_;
+  const Recorded& recorded_;
+  const std::vector<SensorPoses>& sensors_;
+  PoseCheck& check_;
+  std::vector<double> straight_;
+};
+
 }  // namespace
 
-bool PoseFinding::failed() const { return too_many(moved.size() + stuck.size(), sensors); }
+bool PoseFinding::failed() const {
+  return !wrong.empty() || too_many(moved.size() + stuck.size(), sensors);
+}
 
 std::string PoseFinding::sentence() const {
   const std::string of_all = " of " + std::to_string(sensors) + " sensors ";
-  std::string why;
+  std::string why = wrong;
   if (!moved.empty()) {
     why = std::to_string(moved.size()) + of_all + "moved while it was held (" + named(moved) + ")";
   }
@@ -102,11 +254,13 @@ std::string PoseCheck::verdict() const {
   double unrest = 0.0;
   for (const PoseFinding& finding : poses) {
     unrest = std::max(unrest, finding.unrest);
-    std::ranges::copy(finding.moved, std::back_inserter(restless));
+    std::ranges::copy(finding.restless, std::back_inserter(restless));
     if (finding.failed()) add_word(text, finding.sentence(), "; ");
   }
   if (!text.empty()) return text;
-  return "good: the hand was still in every pose (sensors trembled by " +
+  std::vector<std::string> odd = doubts;
+  return (odd.empty() ? "good: " : "doubtful: " + joined(odd, "; ") + "; ") +
+         "the hand was still in every pose (sensors trembled by " +
          std::to_string(std::lround(100.0 * unrest)) + " % of their movement), " +
          std::to_string(sensors) + " sensors moved between them" +
          (restless.empty() ? "" : "; less still: " + named(restless));
@@ -120,6 +274,7 @@ Result<PoseCheck> check_poses(const Model& model, const Recorded& recorded) {
     if (was_held(recorded[p]))
       check.poses.push_back(find(model, recorded, static_cast<Pose>(p), sensors));
   }
+  Comparison(model, recorded, sensors, check).run();
   return check;
 }
 

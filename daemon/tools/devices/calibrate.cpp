@@ -202,20 +202,21 @@ Result<drivers::glove::Recorded> lead(GloveSource& source, const PosePlan& plan,
   return record_poses(source, plan, screen);
 }
 
-// Leads the user through the poses with `user` and reports on stderr how good they are. On a
-// terminal, poses that failed are asked for again until the user gives up; otherwise they are an
-// error that names each one and its fault. `force` accepts them all the same, with a warning.
-Result<drivers::glove::Recorded> good_poses(GloveSource& source, const PosePlan& plan,
-                                            const std::string& user, bool force) {
-  auto recorded = lead(source, plan, user, {});
-  while (recorded) {
-    const auto check = TRY(drivers::glove::check_poses(source.model(), *recorded));
-    if (check.sensors == 0) return recorded;  // nothing was measured; the fit reports it
-    if (check.usable() || force) {
-      std::fprintf(stderr, "posed: %s%s\n",
-                   check.usable() ? "" : "warning: ", check.verdict().c_str());
-      return recorded;
-    }
+struct GoodPoses {
+  drivers::glove::Recorded recorded{};
+  drivers::glove::PoseCheck check{};
+};
+
+// Leads the user through the poses with `user`. On a terminal, poses that failed are asked for
+// again until the user gives up; otherwise they are an error that names each one and its fault.
+// `force` accepts them all the same.
+Result<GoodPoses> good_poses(GloveSource& source, const PosePlan& plan, const std::string& user,
+                             bool force) {
+  GoodPoses poses{.recorded = TRY(lead(source, plan, user, {}))};
+  while (true) {
+    auto& check = poses.check = TRY(drivers::glove::check_poses(source.model(), poses.recorded));
+    // Where nothing was measured the fit reports it.
+    if (check.sensors == 0 || check.usable() || force) return poses;
     if (!on_terminal()) {
       return fail(check.verdict() +
                   "; no calibration was written (--force writes it all the same)");
@@ -227,10 +228,9 @@ Result<drivers::glove::Recorded> good_poses(GloveSource& source, const PosePlan&
     }
     const auto more = TRY(lead(source, again, user, check.verdict()));
     for (const auto pose : again.poses()) {
-      (*recorded)[static_cast<std::size_t>(pose)] = more[static_cast<std::size_t>(pose)];
+      poses.recorded[static_cast<std::size_t>(pose)] = more[static_cast<std::size_t>(pose)];
     }
   }
-  return recorded;
 }
 
 // What the user does after the poses with --moves.
@@ -401,7 +401,7 @@ Result<> show_hand(const GloveSource& source, const CalibrationFile& file,
 }
 
 // How the new calibration differs from the one that the file holds so far, if that is of this
-// glove, user and hand.
+// glove, user and hand. One that is another hand's in most joints is an error, but for --force.
 Result<> judge(const GloveSource& source, const CalibrateOptions& options,
                const CalibrationFile& file, const drivers::glove::Recorded& recorded) {
   const auto& model = source.model();
@@ -416,28 +416,44 @@ Result<> judge(const GloveSource& source, const CalibrateOptions& options,
   const auto before =
       drivers::glove::make_calibration(model, *last, source.hand(), source.identity());
   if (!before) return {};
-  for (const std::string& line : differences(model, **before, *now, recorded)) {
+  const Differences found = differences(model, **before, *now, recorded);
+  for (const std::string& line : found.sentences) {
     std::fprintf(stderr, "posed: %s\n", line.c_str());
   }
-  return {};
+  if (!found.mostly_unlike() || options.force) return {};
+  return fail(
+      fmt::format("{} of {} joints differ by more than 7 degrees from {}'s calibration in "
+                  "{}, which stays: choose another --out for another hand, or --force",
+                  found.unlike, found.joints, options.user, options.out.string()));
 }
 
 Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
   const auto plan = TRY(plan_of(options));
   const auto source = TRY(open_glove(options));
-  const auto recorded = TRY(good_poses(*source, plan, options.user, options.force));
-  auto [file, said, warnings] = TRY(
+  auto [recorded, check] = TRY(good_poses(*source, plan, options.user, options.force));
+  auto made = TRY(
       devices::calibrate_by_poses(source->model(), recorded,
                                   devices::blank_calibration(source->model(), source->identity(),
                                                              source->hand(), options.user)));
-  for (const std::string& warning : warnings) {
+  for (const std::string& warning : made.warnings) {
     std::fprintf(stderr, "posed: warning: %s\n", warning.c_str());
   }
-  for (const std::string& line : said) std::fprintf(stderr, "posed: %s\n", line.c_str());
+  for (const std::string& line : made.said) std::fprintf(stderr, "posed: %s\n", line.c_str());
+  if (const std::string refusal = made.refusal(); !refusal.empty()) {
+    if (!options.force) {
+      return fail(refusal + "; no calibration was written (--force writes it all the same)");
+    }
+    check.doubts.push_back(refusal);
+  } else if (made.impossible > 0) {
+    check.doubts.push_back(fmt::format("{} would be bent as no hand's is",
+                                       made.impossible > 1 ? "joints" : "a joint"));
+  }
+  std::fprintf(stderr, "posed: %s%s\n", check.usable() ? "" : "warning: ", check.verdict().c_str());
+  auto& file = made.file;
   if (options.moves) TRY(fit_moves(*source, plan, file));
   TRY(judge(*source, options, file, recorded));
   TRY(show_hand(*source, file, recorded));
-  return file;
+  return std::move(file);
 }
 
 // Without a device only the driver and the hand are known; through a daemon the glove is known,
@@ -541,9 +557,10 @@ void add_calibrate(CLI::App& app, int& exit_code) {
 touch-little and touch-fist also contacts, by which the thumb is fitted to what it touches; the flat
 and the spread hand then say where it lies beside the hand and how far it reaches. On a terminal a
 screen shows what to do; elsewhere a line on stdout names each pose and a line on stdin begins it,
-or --seconds does. A pose in which the hand moved, or whose sensors hardly moved from the flat hand,
-fails: the screen asks for it again, a script gets exit code 1 and no file. --moves is tried in
-simulation only, not on a real glove. Examples:
+or --seconds does. A pose in which the hand moved, whose sensors hardly moved from the flat hand,
+or that was another (half a fist, fist and flat swapped), fails: the screen asks for it again, a
+script gets exit code 1 and no file. --moves is tried in simulation only, not on a real
+glove. Examples:
   posed calibrate --driver cyberglove --port /dev/ttyUSB0 --user ann --out ann.toml
   posed calibrate --connect tcp://127.0.0.1:5570 --stream right --user ann --out ann.toml
   posed calibrate --driver cyberglove --import old.cal --user ann --out ann.toml)");

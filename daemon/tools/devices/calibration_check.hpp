@@ -11,11 +11,19 @@
 
 namespace posed::tools {
 
-// A sentence for each joint that the two calibrations show by more than 5 degrees apart in one of
-// the poses, the largest difference first; else one that says how much they agree.
-[[nodiscard]] std::vector<std::string> differences(const drivers::glove::Model& model,
-                                                   const drivers::glove::Calibration& before,
-                                                   const drivers::glove::Calibration& now,
-                                                   const drivers::glove::Recorded& recorded);
+struct Differences {
+  // One for each joint that the two calibrations show by more than 5 degrees apart in one of the
+  // poses, the largest difference first; else one that says how much they agree.
+  std::vector<std::string> sentences;
+  int joints = 0;  // that both measure
+  int unlike = 0;  // of them, more than 7 degrees apart
+
+  // As of another hand, or of poses that were shown otherwise.
+  [[nodiscard]] bool mostly_unlike() const { return 2 * unlike > joints; }
+};
+[[nodiscard]] Differences differences(const drivers::glove::Model& model,
+                                      const drivers::glove::Calibration& before,
+                                      const drivers::glove::Calibration& now,
+                                      const drivers::glove::Recorded& recorded);
 
 }  // namespace posed::tools

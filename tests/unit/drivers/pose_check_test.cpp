@@ -3,18 +3,23 @@
 
 #include <catch2/catch.hpp>
 
+#include <array>
 #include <cmath>
+#include <random>
+#include <string>
 
 #include "drivers/driver.hpp"
 #include "drivers/glove/traits.hpp"
+#include "proto/frame/degree.hpp"
 
 namespace posed::drivers::glove {
 namespace {
 
-Model cyberglove() {
-  const Driver* driver = find_driver("cyberglove");
+Model model_of(const std::string& name) {
+  const Driver* driver = find_driver(name);
   return driver->glove->glove_model(driver->expect({}).value()).value();
 }
+Model cyberglove() { return model_of("cyberglove"); }
 
 // The raw value that the default calibration maps to `value`.
 double raw_of(const Sensor& sensor, double value) {
@@ -110,6 +115,129 @@ TEST_CASE("one sensor that hardly moved is a broken sensor, many are a pose that
   INFO(check.verdict());
   CHECK(check.failed() == std::vector{Pose::kFist});
   CHECK(check.verdict().contains("hardly moved from the flat hand"));
+}
+
+namespace {
+
+using Hands = std::array<HandAngles, kSensorPoses>;
+
+Hands exact_hands() {
+  Hands hands;
+  for (std::size_t p = 0; p < hands.size(); ++p) hands[p] = hand_in(static_cast<Pose>(p));
+  return hands;
+}
+
+// The hand between flat and fist.
+HandAngles part_of_fist(double share) {
+  HandAngles hand = hand_in(Pose::kFist);
+  for (double& angle : hand) angle *= share;
+  return hand;
+}
+
+// What a glove sends whose sensors move `gain` times as much as the default's.
+Recorded sent(const Model& model, const Hands& hands, const std::vector<double>& gain) {
+  Recorded recorded{};
+  for (std::size_t p = 0; p < hands.size(); ++p) {
+    const auto wanted = values_of(model, hands[p]).value();
+    for (std::size_t i = 0; i < model.sensors.size(); ++i) {
+      if (!std::isfinite(wanted[i])) continue;
+      const Curve& curve = model.sensors[i].curve;
+      const double slope = static_cast<double>(curve.raw[1] - curve.raw[0]) /
+                           static_cast<double>(curve.value[1] - curve.value[0]);
+      const double raw = static_cast<double>(curve.raw[0]) + gain[i] * slope * wanted[i];
+      for (int t = 0; t < 20; ++t) {
+        recorded[p][i].add(static_cast<float>(raw + 0.5 * std::sin(t)));
+      }
+    }
+  }
+  return recorded;
+}
+
+PoseCheck checked(const Model& model, const Hands& hands, double gain = 1.0) {
+  const std::vector<double> gains(model.sensors.size(), gain);
+  return check_poses(model, sent(model, hands, gains)).value();
+}
+
+}  // namespace
+
+TEST_CASE("another hand than the pose's fails the pose, in words") {
+  for (const std::string name : {"cyberglove", "lucidgloves", "fivedt"}) {
+    const Model model = model_of(name);
+    INFO(name);
+    Hands swapped = exact_hands();
+    std::swap(swapped[0], swapped[1]);
+    const auto other = checked(model, swapped);
+    CHECK(other.failed() == std::vector{Pose::kFlat, Pose::kFist});
+    CHECK(other.verdict().contains("fist and flat were swapped"));
+    CHECK(checked(model, exact_hands()).verdict().starts_with("good: "));
+  }
+  const Model model = cyberglove();
+  for (const double share : {0.35, 0.5}) {
+    Hands half = exact_hands();
+    half[1] = part_of_fist(share);
+    const auto check = checked(model, half);
+    CHECK(check.failed() == std::vector{Pose::kFist});
+    CHECK(check.verdict().contains("the fist was not closed"));
+    Hands relaxed = exact_hands();
+    relaxed[0] = part_of_fist(share);
+    CHECK(checked(model, relaxed).verdict().contains("flat failed: the fingers were bent"));
+  }
+  Hands loose = exact_hands();
+  loose[1] = part_of_fist(0.75);
+  CHECK(
+      checked(model, loose).verdict().starts_with("doubtful: the fist moved its sensors by 75 %"));
+  Hands idle = exact_hands();
+  for (double& angle : idle[2]) angle *= 0.3;
+  CHECK(checked(model, idle).failed() == std::vector{Pose::kThumb});
+}
+
+TEST_CASE("honest people with unlike gloves pass") {
+  const Model model = cyberglove();
+  int doubtful = 0;
+  for (unsigned seed = 1; seed <= 400; ++seed) {
+    std::mt19937_64 random(seed);
+    const auto normal = [&](double sd) {
+      return std::normal_distribution<double>(0.0, sd)(random);
+    };
+    const bool wide = seed % 2 == 0;  // as two real calibrations
+    std::vector<double> gain;
+    const double common = normal(0.06);
+    for (std::size_t i = 0; i < model.sensors.size(); ++i) {
+      gain.push_back(std::exp(common + normal(wide ? 0.3 : 0.12)));
+    }
+    Hands hands = exact_hands();
+    for (std::size_t p = 0; p < hands.size(); ++p) {
+      for (std::size_t f = 0; f < kFingers; ++f) {
+        for (const std::size_t joint : {0, 3, 6}) {
+          hands[p][f * kFingerChannels + joint] += normal(p == 0 ? 1.6 : 5.0) * kDegree;
+        }
+        hands[p][f * kFingerChannels + 1] += normal(p == 0 ? 1.0 : 2.5) * kDegree;
+      }
+    }
+    const auto check = check_poses(model, sent(model, hands, gain)).value();
+    INFO(seed << ": " << check.verdict());
+    CHECK(check.usable());
+    if (!wide && !check.doubts.empty()) ++doubtful;
+  }
+  CHECK(doubtful <= 4);
+  // A glove that was built with other ranges, or counts the other way, is no pose shown wrongly.
+  for (const std::string name : {"lucidgloves", "fivedt"}) {
+    for (const double gain : {0.35, -0.8}) {
+      const auto check = checked(model_of(name), exact_hands(), gain);
+      INFO(name << ": " << check.verdict());
+      CHECK(check.usable());
+    }
+  }
+}
+
+TEST_CASE("a sensor that moved unlike its pose's others is named") {
+  const Model model = cyberglove();
+  std::vector<double> gain(model.sensors.size(), 0.85);
+  const auto ring = std::ranges::find(model.sensors, "ring_pip", &Sensor::name);
+  gain[static_cast<std::size_t>(ring - model.sensors.begin())] = 0.3;
+  const auto check = check_poses(model, sent(model, exact_hands(), gain)).value();
+  CHECK(check.usable());
+  CHECK(check.verdict().starts_with("doubtful: ring_pip moved unlike the others"));
 }
 
 }  // namespace posed::drivers::glove

@@ -116,7 +116,8 @@ TEST_CASE("a hand CSV that a spreadsheet, pandas or R saved is the same hand") {
     CHECK(clip.time_s == read(plain).time_s);
   }
   CHECK(error_of("Frame,Hips_x\n1,2\n").ends_with("reads .bvh, .fbx and .glb: export one there"));
-  CHECK(error_of(header() + row("1700000000000", 0)).ends_with("is the unit right?"));
+  CHECK(error_of(header() + row("1700000000000", 0))
+            .ends_with("is no time in seconds from the start of a recording"));
 }
 
 TEST_CASE("times may be uneven, missing or repeated; they may not run back") {

@@ -39,12 +39,15 @@ TEST_CASE("a calibration that no hand can have, or that differs from the last, i
   }
   const auto last = calibration();
   CHECK(drivers::glove::keep_possible(model, recorded, Side::kRight, file).value().empty());
-  CHECK(differences(model, *last, *last, recorded) ==
+  CHECK(differences(model, *last, *last, recorded).sentences ==
         std::vector<std::string>{
             "no joint differs by more than 0 degrees from the last calibration"});
   file.sensors["index_mcp"][1][1] = value(94.0);
-  CHECK(differences(model, *last, *calibration(), recorded) ==
+  CHECK(differences(model, *last, *calibration(), recorded).sentences ==
         std::vector<std::string>{"index MCP differs by 14 degrees from the last calibration"});
+  CHECK(differences(model, *last, *calibration(), recorded).mostly_unlike());
+  file.sensors["index_mcp"][1][1] = value(86.0);  // what a glove put on again may differ by
+  CHECK_FALSE(differences(model, *last, *calibration(), recorded).mostly_unlike());
   file.sensors["index_mcp"][1][1] = value(170.0);
   const auto odd = drivers::glove::keep_possible(model, recorded, Side::kRight, file).value();
   REQUIRE(odd.size() == 1);
