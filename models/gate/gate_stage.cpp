@@ -14,6 +14,7 @@
 #include "models/elapsed.hpp"
 #include "models/parameter_table.hpp"
 #include "proto/frame/degree.hpp"
+#include "proto/frame/hand.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/rt_safe.hpp"
 
@@ -25,6 +26,14 @@ constexpr double kMaxStep_s = 0.25;                  // longer silences begin an
 constexpr double kCounted_s = 10.0;                  // over which the shares are told
 constexpr double kFastest_rad_s2 = 15000 * kDegree;  // of joints: a flick of a finger
 constexpr double kFastest_m_s2 = 60.0;               // of a root: a jump's landing
+
+// Company (models/gate/README.md, "Company").
+constexpr float kUnusualBend = 3.0F;  // times the mean distance from the prediction
+constexpr auto kLeastBend_rad = static_cast<float>(2.0 * kDegree);
+constexpr float kBendShare = 0.25F;  // of the suspect's distance
+constexpr int kManyParts = 5;        // that are off: they may be garbage
+constexpr int kOneWay = 5;           // times as many up as down, or the reverse, are a motion
+constexpr float kFlaky = 0.002F;     // share of a hand's angles dropped lately
 
 // What a value may do [its unit].
 struct Bounds {
@@ -77,31 +86,43 @@ class Track {
  public:
   using Value = typename Space::Value;
 
-  // Whether this sample is believed. `dt_s`: since the frame before, above 0.
-  RT_SAFE [[nodiscard]] bool accept(const Value& value, float dt_s, const Bounds& bounds) noexcept {
+  // Compares a sample with the motion so far. `dt_s`: since the frame before, above 0.
+  RT_SAFE void compare(const Value& value, float dt_s, const Bounds& bounds) noexcept {
     since_s_ += dt_s;
+    off_ = 0.0F;
+    suspect_ = repeated_ = false;
     if (!known_ || since_s_ > kForgets_s) return begin(value);
-    const float moved = Space::distance(last_, value);
+    moved_ = Space::distance(last_, value);
     // Gloves are polled faster than they measure: the same value once more is no sample of its own,
     // and what comes after it is as far as from two steps.
-    if (moved == 0.0F && since_s_ < kRepeats * dt_s) return true;
-    const float off = std::min(moved, distance_to_prediction(value));
-    const float reach_s = std::min(since_s_, 2.0F * dt_s);
-    const float limit =
-        std::max({kUnusual * usual_, bounds.jump, bounds.acceleration * reach_s * reach_s});
-    if (off <= limit) {
+    repeated_ = moved_ == 0.0F && since_s_ < kRepeats * dt_s;
+    const float ahead = expect(value, bounds);
+    off_ = std::min(moved_, ahead);
+    const float reach_s = doubts_ > 0 ? dt_s : std::min(since_s_, 2.0F * dt_s);
+    const float swing = std::min(kSwing * last_off_, bounds.jump);
+    const float near = std::max(kUnusual * usual_, bounds.jump + swing);
+    limit_ = std::max(near, bounds.acceleration * reach_s * reach_s);
+    suspect_ = ahead > limit_ && moved_ > near;
+  }
+
+  // Goes on from the sample compared last. Whether it is believed: one that is no suspect or has
+  // `company` is, and one that persists.
+  RT_SAFE bool settle(const Value& value, bool company, const Bounds& bounds) noexcept {
+    if (since_s_ == 0.0F || repeated_) return true;
+    if (!suspect_ || company) {
+      usual_ += kLearn * (std::min(off_, kUnusual * usual_ + 0.25F * bounds.jump) - usual_);
+      last_off_ = off_;
+      was_far_ = off_ > kFar * limit_;
       follow(value);
-      usual_ += kLearn * (std::min(off, kUnusual * usual_ + 0.25F * bounds.jump) - usual_);
       return true;
     }
+    if (goes_back(value, bounds)) return true;
     // Samples that agree against the past are a motion: two of one that goes on, three of a step,
     // because a fault may last for two.
-    const bool agrees = doubts_ > 0 && Space::distance(doubt_, value) < kAgree * moved;
-    const bool goes_on = agrees && moved > kGoesOn * Space::distance(last_, doubt_);
+    const bool agrees = doubts_ > 0 && Space::distance(doubt_, value) < kAgree * moved_;
+    const bool goes_on = agrees && moved_ > kGoesOn * Space::distance(last_, doubt_);
     if (goes_on || (agrees && doubts_ >= 2)) {
-      last_ = value;
-      step_s_ = since_s_ = 0.0F;
-      doubts_ = 0;
+      begin(value);
       return true;
     }
     doubts_ = agrees ? doubts_ + 1 : 1;
@@ -116,28 +137,74 @@ class Track {
   }
   RT_SAFE void forget() noexcept { *this = {}; }
   RT_SAFE [[nodiscard]] const Value& last() const noexcept { return last_; }
+  RT_SAFE [[nodiscard]] const Value& expected() const noexcept { return expected_; }
+  RT_SAFE [[nodiscard]] bool suspect() const noexcept { return suspect_; }
+  RT_SAFE [[nodiscard]] float off() const noexcept { return off_; }
+  RT_SAFE [[nodiscard]] float usual() const noexcept { return usual_; }
 
  private:
   static constexpr float kForgets_s = 0.25F;  // what is older says nothing, and nothing is held
-  static constexpr float kUnusual = 6.0F;     // times the mean distance from the prediction
+  static constexpr float kUnusual = 5.0F;     // times the mean distance from the prediction
+  static constexpr float kSwing = 1.5F;       // of how far the last sample was off
+  static constexpr float kFar = 0.5F;         // of the limit
+  static constexpr float kFarthest = 3.0F;    // steps that a prediction goes
   static constexpr float kLearn = 0.03F;
   static constexpr float kAgree = 0.75F;
   static constexpr float kGoesOn = 1.2F;
   static constexpr float kRepeats = 2.5F;
 
-  RT_SAFE [[nodiscard]] float distance_to_prediction(const Value& value) const noexcept {
-    if (!(step_s_ > 0.0F)) return Space::distance(last_, value);
-    const float ratio = std::min(since_s_ / step_s_, 3.0F);
-    return Space::distance(Space::ahead(before_, last_, ratio), value);
+  // Where a motion that took `step_s` from there to the last sample leads by now.
+  RT_SAFE [[nodiscard]] Value led(const Value& from, float step_s) const noexcept {
+    return Space::ahead(from, last_, std::min(since_s_ / step_s, kFarthest));
   }
-  RT_SAFE bool begin(const Value& value) noexcept {
+  // Finds the prediction that is nearest, and returns how far it is where the motion goes on.
+  RT_SAFE float expect(const Value& value, const Bounds& bounds) noexcept {
+    expected_ = last_;
+    if (!(step_s_ > 0.0F)) return moved_;
+    Value ahead = led(before_, step_s_);
+    float off = Space::distance(ahead, value);
+    if (older_s_ > 0.0F) {
+      // Noise spoils the speed between two samples; over three it is better known.
+      const Value longer = led(older_, step_s_ + older_s_);
+      const float longer_off = Space::distance(longer, value);
+      const bool noisy = longer_gains_ > 0.0F && kUnusual * usual_ > bounds.jump;
+      const float gain = std::clamp(off - longer_off, -bounds.jump, bounds.jump);
+      longer_gains_ += kLearn * (gain - longer_gains_);
+      if (noisy) {
+        ahead = longer;
+        off = longer_off;
+      }
+    }
+    if (off < moved_) expected_ = ahead;
+    return off;
+  }
+  // Whether the sample goes on from before the last one, which was far off: that one was false.
+  RT_SAFE bool goes_back(const Value& value, const Bounds& bounds) noexcept {
+    if (!was_far_ || doubts_ > 0 || !(older_s_ > 0.0F)) return false;
+    float off = Space::distance(before_, value);
+    if (kUnusual * usual_ <= bounds.jump) {  // else noise spoils the speed
+      const float ratio = std::min((step_s_ + since_s_) / older_s_, kFarthest);
+      off = std::min(off, Space::distance(Space::ahead(older_, before_, ratio), value));
+    }
+    if (off > std::max(bounds.jump, bounds.acceleration * since_s_ * since_s_)) return false;
+    last_ = before_;
+    before_ = older_;
+    since_s_ += step_s_;
+    step_s_ = older_s_;
+    older_s_ = last_off_ = 0.0F;
+    was_far_ = false;
+    follow(value);
+    return true;
+  }
+  RT_SAFE void begin(const Value& value) noexcept {
     last_ = value;
     known_ = true;
     doubts_ = 0;
-    step_s_ = since_s_ = 0.0F;
-    return true;
+    older_s_ = step_s_ = since_s_ = 0.0F;
   }
   RT_SAFE void follow(const Value& value) noexcept {
+    older_ = before_;
+    older_s_ = step_s_;
     before_ = last_;
     last_ = value;
     step_s_ = since_s_;
@@ -145,10 +212,17 @@ class Track {
     doubts_ = 0;
   }
 
-  Value before_{}, last_{}, doubt_{};
-  float step_s_ = 0.0F;   // from before_ to last_; 0: before_ is not known
-  float since_s_ = 0.0F;  // since last_
-  float usual_ = 0.0F;    // mean distance from the prediction
+  Value older_{}, before_{}, last_{};  // believed
+  Value doubt_{}, expected_{};
+  float older_s_ = 0.0F;             // from older_ to before_; 0: older_ is not known
+  float step_s_ = 0.0F;              // from before_ to last_; 0: before_ is not known
+  float since_s_ = 0.0F;             // since last_
+  float usual_ = 0.0F;               // mean distance from the prediction
+  float longer_gains_ = 0.0F;        // by how much the longer prediction is nearer, in the mean
+  float moved_ = 0.0F, off_ = 0.0F;  // of the sample compared last: from last_, from expected_
+  float limit_ = 0.0F, last_off_ = 0.0F;  // for it; that of last_
+  bool suspect_ = false, repeated_ = false;
+  bool was_far_ = false;  // last_
   bool known_ = false;
   int doubts_ = 0;  // samples dropped in a row that agree; the last was doubt_
 };
@@ -185,6 +259,8 @@ class GateStage final : public Stage {
   [[nodiscard]] double reading(std::size_t reading) const noexcept override;
 
  private:
+  RT_SAFE void feel_parts() noexcept;
+  RT_SAFE [[nodiscard]] bool has_company(std::size_t c) const noexcept;
   RT_SAFE bool gate_angles(float dt_s, Frame& frame) noexcept;
   RT_SAFE bool gate_turns(float dt_s, Frame& frame) noexcept;
   RT_SAFE bool gate_root(float dt_s, Frame& frame) noexcept;
@@ -199,6 +275,12 @@ class GateStage final : public Stage {
   Elapsed elapsed_;
   std::vector<std::size_t> joint_;  // [rotation channel]
   std::vector<Track<AngleSpace>> angle_;
+  std::vector<float> off_rad_;     // [rotation channel] of the frame, by direction
+  std::vector<std::size_t> part_;  // [rotation channel] of a hand: two for each finger
+  std::vector<float> bend_rad_;    // [part] how far it is off at most; of a hand
+  bool scattered_ = false;         // many parts are off, in all directions: no motion
+  float flaky_ = 0.0F;             // share of the hand's angles dropped lately
+  float seen_s_ = 0.0F;            // that this share is known for
   std::vector<Track<TurnSpace>> turn_;
   Track<PlaceSpace> root_;
   std::vector<float> share_;  // [joint] of samples dropped lately
@@ -237,26 +319,85 @@ GateStage::GateStage(std::shared_ptr<const Skeleton> skeleton, double rate_hz,
     if (!channel.translation) joint_.push_back(channel.joint);
   }
   angle_.resize(joint_.size());
+  off_rad_.resize(joint_.size());
+  if (!hand_side(*skeleton_)) return;
+  // A finger's first joint, and the two that one tendon, and with some gloves one sensor, bends.
+  for (const std::size_t joint : joint_) {
+    const std::size_t bone = joint - 1;  // after the wrist
+    part_.push_back(2 * (bone / kFingerJoints) + (bone % kFingerJoints > 0 ? 1 : 0));
+  }
+  bend_rad_.resize(2 * kFingers);
+}
+
+// What the parts of a hand do in this frame; a part of which no angle is off stays 0.
+RT_SAFE void GateStage::feel_parts() noexcept {
+  std::ranges::fill(bend_rad_, 0.0F);
+  for (std::size_t c = 0; c < joint_.size(); ++c) {
+    const float size = std::abs(off_rad_[c]);
+    float& most = bend_rad_[part_[c]];
+    if (size <= std::max(kUnusualBend * angle_[c].usual(), kLeastBend_rad)) continue;
+    if (size > std::abs(most)) most = off_rad_[c];
+  }
+  int up = 0, down = 0;
+  bool contrary = false;  // the parts of a finger
+  for (std::size_t p = 0; p < bend_rad_.size(); ++p) {
+    up += bend_rad_[p] > 0.0F ? 1 : 0;
+    down += bend_rad_[p] < 0.0F ? 1 : 0;
+    contrary = contrary || bend_rad_[p] * bend_rad_[p ^ 1U] < 0.0F;
+  }
+  const bool many = up + down >= kManyParts;
+  scattered_ = contrary && many && std::max(up, down) < kOneWay * std::min(up, down);
+}
+
+RT_SAFE bool GateStage::has_company(std::size_t c) const noexcept {
+  if (bend_rad_.empty() || scattered_) return false;
+  const float own = off_rad_[c];
+  int with = 0, against = 0;
+  for (std::size_t p = 0; p < bend_rad_.size(); ++p) {
+    if (p == part_[c] || std::abs(bend_rad_[p]) < kBendShare * std::abs(own)) continue;
+    (bend_rad_[p] * own > 0.0F ? with : against) += 1;
+  }
+  if (flaky_ > kFlaky) return with >= 3 + 2 * against;
+  const float beside = bend_rad_[part_[c] ^ 1U];
+  const bool finger = beside * own > 0.0F && std::abs(beside) >= kBendShare * std::abs(own);
+  return finger || with > against;
 }
 
 // An angle that is dropped is missing in its joint; the joint's other angles stay.
 RT_SAFE bool GateStage::gate_angles(float dt_s, Frame& frame) noexcept {
   const Bounds bounds = bounds_of(options_.jump_rad, kFastest_rad_s2);
-  bool any = false;
   for (std::size_t c = 0; c < joint_.size(); ++c) {
-    const std::size_t joint = joint_[c];
-    const bool first = c == 0 || joint_[c - 1] != joint;
-    float& angle_rad = frame.angle_rad[c];
+    const float angle_rad = frame.angle_rad[c];
+    off_rad_[c] = 0.0F;
     if (!std::isfinite(angle_rad)) {
       angle_[c].skip(dt_s);
       continue;
     }
-    const bool accepted = angle_[c].accept(angle_rad, dt_s, bounds);
+    angle_[c].compare(angle_rad, dt_s, bounds);
+    off_rad_[c] = angle_rad < angle_[c].expected() ? -angle_[c].off() : angle_[c].off();
+  }
+  if (!bend_rad_.empty()) feel_parts();
+  bool any = false;
+  float active = 0.0F;
+  float dropped = 0.0F;
+  for (std::size_t c = 0; c < joint_.size(); ++c) {
+    const std::size_t joint = joint_[c];
+    const bool first = c == 0 || joint_[c - 1] != joint;
+    float& angle_rad = frame.angle_rad[c];
+    if (!std::isfinite(angle_rad)) continue;
+    if (angle_[c].usual() > 0.0F) active += 1.0F;
+    const bool company = angle_[c].suspect() && has_company(c);
+    const bool accepted = angle_[c].settle(angle_rad, company, bounds);
     if (first || !accepted) count(joint, !accepted);
     if (accepted) continue;
     angle_rad = std::numeric_limits<float>::quiet_NaN();
     drop(joint, frame);
+    dropped += 1.0F;
     any = true;
+  }
+  if (active > 0.0F) {
+    seen_s_ += dt_s;
+    flaky_ += std::max(fade_, dt_s / std::max(seen_s_, 1.0F)) * (dropped / active - flaky_);
   }
   return any;
 }
@@ -271,7 +412,9 @@ RT_SAFE bool GateStage::gate_turns(float dt_s, Frame& frame) noexcept {
       turn_[j].skip(dt_s);
       continue;
     }
-    const bool accepted = turn_[j].accept(Eigen::Quaternionf(q[3], q[0], q[1], q[2]), dt_s, bounds);
+    const Eigen::Quaternionf turn(q[3], q[0], q[1], q[2]);
+    turn_[j].compare(turn, dt_s, bounds);
+    const bool accepted = turn_[j].settle(turn, false, bounds);
     count(j, !accepted);
     if (accepted) continue;
     drop(j, frame);
@@ -288,7 +431,8 @@ RT_SAFE bool GateStage::gate_root(float dt_s, Frame& frame) noexcept {
     root_.skip(dt_s);
     return false;
   }
-  if (root_.accept(at_m, dt_s, bounds)) return false;
+  root_.compare(at_m, dt_s, bounds);
+  if (root_.settle(at_m, false, bounds)) return false;
   for (int i = 0; i < 3; ++i) frame.root_position_m[static_cast<std::size_t>(i)] = root_.last()[i];
   return true;
 }

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "proto/clip/hand_clip.hpp"
+#include "proto/frame/hand_skeleton.hpp"
 #include "tests/e2e/outcome.hpp"
 #include "tests/support/temp_folder.hpp"
 
@@ -36,7 +37,9 @@ TEST_CASE("a recorded hand is smoothed and its gaps filled", "[smooth]") {
   const auto in = folder.path() / "in.csv";
   const auto out = folder.path() / "out.csv";
   const clip::HandClip hand = waving();
-  REQUIRE(clip::write_hand_csv(hand, in));
+  clip::HandClip flaky = hand;
+  flaky.angles[150][30] += 1.0;  // bends the ring finger's middle joint
+  REQUIRE(clip::write_hand_csv(flaky, in));
   const auto done =
       posed({"smooth", "--lag", "33ms", "--noise-deg", "1", in, "--out", out, "--json"});
   REQUIRE(done.code == 0);
@@ -44,6 +47,10 @@ TEST_CASE("a recorded hand is smoothed and its gaps filled", "[smooth]") {
   CHECK(report["frames"] == 240);
   CHECK(report["lag_frames"] == 2);
   CHECK(report["bridged_values"] == 45);
+  CHECK(report["dropped_values"] == 1);
+  REQUIRE(report["dropped"].size() == 1);
+  CHECK(report["dropped"][0]["joint"] == hand_skeleton(hand.side).joints[11].name);
+  CHECK(report["dropped"][0]["share"] == Approx(1.0 / 240));
   const auto smooth = clip::read_hand_clip(out);
   REQUIRE(smooth);
   REQUIRE(smooth->angles.size() == hand.angles.size());

@@ -1,7 +1,11 @@
 // `posed smooth`: runs a recorded hand through gate and live smoother, as a stream would have been.
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <memory>
+#include <numeric>
 #include <string>
 #include <utility>
 #include <vector>
@@ -59,15 +63,55 @@ class Rows final : public StageOut {
   std::size_t next_ = 0;
 };
 
-// Passes what the gate lets through to the smoother.
+// Passes what the gate lets through to the smoother, and counts what it drops.
 class Gated final : public StageOut {
  public:
-  Gated(smooth::LiveSmoother& smoother, StageOut& rows) : smoother_(smoother), rows_(rows) {}
-  void frame(const StageFrame& made) noexcept override { smoother_.process(made, rows_); }
+  Gated(const std::vector<HandAngles>& measured, smooth::LiveSmoother& smoother, StageOut& rows)
+      : measured_(measured), smoother_(smoother), rows_(rows) {}
+
+  void frame(const StageFrame& made) noexcept override {
+    const HandAngles& before = measured_[next_++];
+    const HandAngles after = hand_angles(made.frame);
+    std::array<bool, kHandJoints> dropped{};
+    for (std::size_t c = 0; c < after.size(); ++c) {
+      if (std::isfinite(after[c]) || !std::isfinite(before[c])) continue;
+      dropped[c / 3] = true;
+      ++dropped_values;
+    }
+    for (std::size_t j = 0; j < dropped.size(); ++j) dropped_frames_[j] += dropped[j] ? 1 : 0;
+    smoother_.process(made, rows_);
+  }
+
+  // The joints of which something was dropped, the worst first.
+  [[nodiscard]] std::vector<Findings> joints(const Skeleton& skeleton) const {
+    std::vector<std::size_t> order(dropped_frames_.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    std::ranges::stable_sort(order, std::ranges::greater{},
+                             [this](std::size_t j) { return dropped_frames_[j]; });
+    std::vector<Findings> list;
+    for (const std::size_t j : order) {
+      if (dropped_frames_[j] == 0) break;
+      const double share =
+          static_cast<double>(dropped_frames_[j]) / static_cast<double>(measured_.size());
+      const std::string name = clean(skeleton.joints[j + 1].name);
+      list.push_back(Findings().add("joint", name).add("share", share));
+      if (share >= kWorthSaying) {
+        list.back().say(fmt::format("{}: {:.1f} % dropped as false", name, 100.0 * share));
+      }
+    }
+    return list;
+  }
+
+  long dropped_values = 0;
 
  private:
+  static constexpr double kWorthSaying = 0.001;
+
+  const std::vector<HandAngles>& measured_;
   smooth::LiveSmoother& smoother_;
   StageOut& rows_;
+  std::size_t next_ = 0;
+  std::array<long, kHandJoints> dropped_frames_{};
 };
 
 Result<std::unique_ptr<Stage>> make_gate(const Skeleton& skeleton, double rate_hz) {
@@ -136,7 +180,7 @@ Result<> smooth(const SmoothOptions& options) {
   const auto gate = TRY(make_gate(skeleton, clip.rate_hz));
   const std::vector<HandAngles> measured = clip.angles;
   Rows rows(clip);
-  Gated gated(smoother, rows);
+  Gated gated(measured, smoother, rows);
   ProgressBar bar(kQuietFor_s);
   for (std::size_t t = 0; t < measured.size(); ++t) {
     const bool shows = t % kProgressEvery == 0;
@@ -166,10 +210,14 @@ Result<> smooth(const SmoothOptions& options) {
       .add("noise_deg", noise_deg)
       .add("noise_given", options.noise_deg > 0.0)
       .add("bridged_values", rows.bridged_values)
-      .say(fmt::format("{}: {} frames, {} behind ({:.0f} ms at {:g} Hz), sensor noise {:.2f} deg "
-                       "(standard deviation of an angle{}), {} missing values bridged",
-                       options.out, measured.size(), lag_frames, lag_ms, clip.rate_hz, noise_deg,
-                       options.noise_deg > 0.0 ? "" : ", estimated", rows.bridged_values));
+      .add("dropped_values", gated.dropped_values)
+      .say(fmt::format(
+          "{}: {} frames, {} behind ({:.0f} ms at {:g} Hz), sensor noise {:.2f} deg "
+          "(standard deviation of an angle{}), {} missing values bridged, {} false ones "
+          "dropped",
+          options.out, measured.size(), lag_frames, lag_ms, clip.rate_hz, noise_deg,
+          options.noise_deg > 0.0 ? "" : ", estimated", rows.bridged_values, gated.dropped_values));
+  findings.add("dropped", gated.joints(skeleton));
   if (model) findings.add("labels", recognised(rows, clip));
   findings.show(options.json);
   return {};

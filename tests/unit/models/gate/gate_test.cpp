@@ -3,13 +3,17 @@
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <memory>
+#include <numeric>
 #include <random>
 #include <sstream>
 #include <utility>
+#include <vector>
 
+#include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/bench/baselines.hpp"
 #include "tests/support/processor_time.hpp"
@@ -147,6 +151,76 @@ TEST_CASE("the gate lets a fast hand, repeats and steps of a coarse sensor throu
     INFO("channel " << c);
     CHECK(missing(through.col(c)) == 0);
   }
+}
+
+namespace {
+
+// A hand that rests with one degree of noise, and whose angles are then off by `off_rad`, each in
+// its frame. How many samples of joints are missing in each frame.
+struct Off {
+  int frame;
+  std::size_t angle;  // of HandAngles
+  double off_deg;
+};
+std::vector<int> hand_gated(double rate_hz, const std::vector<Off>& all) {
+  const Skeleton skeleton = hand_skeleton(Side::kRight);
+  const auto gate = make_gate(skeleton, rate_hz);
+  std::mt19937 random(3);
+  std::normal_distribution<double> noise(0.0, kDegree);
+  test::Frames out;
+  for (int t = 0; t < 90; ++t) {
+    HandAngles angles;
+    for (double& angle : angles) angle = 0.5 + noise(random);
+    for (const Off& off : all) angles[off.angle] += off.frame == t ? off.off_deg * kDegree : 0.0;
+    Frame frame;
+    set_hand_angles(skeleton, angles, frame);
+    frame.header.device_ns = nanoseconds(t / rate_hz);
+    gate->process({.frame = frame}, out);
+  }
+  std::vector<int> missing;
+  for (const Frame& frame : out.all) {
+    missing.push_back(static_cast<int>(skeleton.joints.size() - frame.valid.count()));
+  }
+  return missing;
+}
+
+constexpr std::size_t kIndex = 9, kMcp = 0, kPip = 3, kDip = 6, kRing = 27;
+
+}  // namespace
+
+TEST_CASE("a finger that bends in two joints is believed, one sensor that jumps is not") {
+  // Up and back within three frames, as a flick at 60 Hz.
+  std::vector<Off> flick;
+  for (const auto& [frame, size] : {std::pair{60, 0.3}, std::pair{61, 1.0}, std::pair{62, 0.3}}) {
+    flick.push_back({.frame = frame, .angle = kIndex + kMcp, .off_deg = 60.0 * size});
+    flick.push_back({.frame = frame, .angle = kIndex + kPip, .off_deg = 70.0 * size});
+  }
+  CHECK(std::ranges::max(hand_gated(60.0, flick)) == 0);
+  // A glove may make the last joint's angle from the middle one's.
+  const std::vector<int> sensor =
+      hand_gated(60.0, {{.frame = 60, .angle = kIndex + kPip, .off_deg = 70.0},
+                        {.frame = 60, .angle = kIndex + kDip, .off_deg = 45.0}});
+  CHECK(sensor[60] == 2);
+  CHECK(std::accumulate(sensor.begin(), sensor.end(), 0) == 2);
+  // Joints that are off in all directions are no motion.
+  std::vector<Off> garbage;
+  for (std::size_t finger = 0; finger < 5; ++finger) {
+    garbage.push_back({.frame = 60, .angle = 9 * finger + kMcp, .off_deg = 40.0});
+    garbage.push_back({.frame = 60, .angle = 9 * finger + kPip, .off_deg = -40.0});
+  }
+  CHECK(hand_gated(60.0, garbage)[60] == 10);
+}
+
+TEST_CASE("after a false value the next one is judged no more kindly") {
+  const std::vector<int> missing =
+      hand_gated(30.0, {{.frame = 60, .angle = kRing + kPip, .off_deg = 25.0},
+                        {.frame = 61, .angle = kRing + kPip, .off_deg = -25.0},
+                        {.frame = 63, .angle = kRing + kPip, .off_deg = 60.0}});
+  CHECK(missing[60] == 1);
+  CHECK(missing[61] == 1);
+  CHECK(missing[62] == 0);
+  CHECK(missing[63] == 1);
+  CHECK(std::accumulate(missing.begin(), missing.end(), 0) == 3);
 }
 
 TEST_CASE("a body's joint that flips for a frame is missing in it, and its root stays") {
