@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numbers>
 #include <numeric>
@@ -13,7 +14,6 @@
 #include <Eigen/Cholesky>
 
 #include "models/style/model/harmonics.hpp"
-#include "proto/frame/median.hpp"
 
 namespace posed::style {
 namespace {
@@ -33,10 +33,13 @@ constexpr double kQuiet = 0.05;        // of the signal's variance: a quieter wi
 
 // What counts as striding.
 constexpr double kSwingWindow = 1.25;  // strides that the local swing is of
-constexpr double kMinSwing = 0.6;    // of the clip's median swing: standing and starting have less
-constexpr double kEnd_s = 0.33;      // left out at either end,
-constexpr double kShortEnd_s = 0.1;  // of clips of
-constexpr double kShort_s = 2.2;     // no more than this
+constexpr double kStands = 0.4;        // of the largest swings: less than this is standing
+constexpr double kLargest = 0.95;      // the quantile of the swings that is one of the largest
+constexpr double kMinSwing = 0.6;      // of the median of what does not stand: starting has less
+constexpr double kEdge_s = 0.1;        // left out at either end of a walk,
+constexpr double kEnd_s = 0.33;        // and this of a recording, unless it has
+constexpr double kShort_s = 2.2;       // no more than this
+constexpr double kMinTold = 2.0;       // strides: fewer do not tell how well strides fit
 
 // Least squares of [1, 3 harmonics] of one cadence on a window with Hann weights.
 struct Candidate {
@@ -199,29 +202,48 @@ VectorXd local_swing(const VectorXd& signal, const VectorXd& phase, Eigen::Index
   return swing;
 }
 
-double median_of(const VectorXd& values) {
-  std::vector<double> sorted(values.begin(), values.end());
-  return median(sorted);
+double quantile_of(std::vector<double> values, double share) {
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size()));
+  std::ranges::nth_element(values, at);
+  return *at;
 }
 
-std::vector<Eigen::Index> striding_frames(const VectorXd& signal, const StridePhase& found,
-                                          double rate_hz) {
-  const Eigen::Index frames = signal.size();
+// Neighbouring frames, first to end.
+struct Bout {
+  Eigen::Index first, end;
+
+  [[nodiscard]] Eigen::Index frames() const { return end - first; }
+};
+
+// Where the legs swing as in a stride. However long they stand beside, it is the walk that says how
+// far that is.
+std::vector<Bout> bouts_of(const VectorXd& signal, const StridePhase& found) {
   const double stride = kFullTurn / found.dtheta;
-  const VectorXd centred = signal.array() - median_of(signal);
+  const VectorXd centred = signal.array() - quantile_of({signal.begin(), signal.end()}, 0.5);
   const VectorXd swing = local_swing(
       centred, found.phase, std::max<Eigen::Index>(1, std::lround(0.5 * kSwingWindow * stride)));
-  const double least = kMinSwing * median_of(swing);
-  const bool is_short = static_cast<double>(frames) <= kShort_s * rate_hz;
-  const auto end = static_cast<Eigen::Index>((is_short ? kShortEnd_s : kEnd_s) * rate_hz);
-  std::vector<Eigen::Index> kept;
-  for (Eigen::Index t = end; t < frames - end; ++t) {
-    if (swing[t] > least) kept.push_back(t);
+  const double stands = kStands * quantile_of({swing.begin(), swing.end()}, kLargest);
+  std::vector<double> walks;
+  std::ranges::copy_if(swing, std::back_inserter(walks), [&](double s) { return s >= stands; });
+  const double least = kMinSwing * quantile_of(std::move(walks), 0.5);
+  std::vector<Bout> bouts;
+  for (Eigen::Index t = 0; t < swing.size(); ++t) {
+    if (!(swing[t] > least)) continue;
+    if (bouts.empty() || bouts.back().end != t) bouts.push_back({t, t});
+    ++bouts.back().end;
   }
-  if (static_cast<double>(kept.size()) >= stride) return kept;
-  kept.resize(static_cast<std::size_t>(frames));
-  std::iota(kept.begin(), kept.end(), Eigen::Index{0});
-  return kept;
+  return bouts;
+}
+
+// Without what begins and ends a walk, and what begins and ends the recording of `frames`.
+void keep_inner(const Bout& bout, Eigen::Index frames, double rate_hz,
+                std::vector<Eigen::Index>& kept) {
+  const bool is_short = static_cast<double>(frames) <= kShort_s * rate_hz;
+  const auto edge = static_cast<Eigen::Index>(kEdge_s * rate_hz);
+  const auto end = is_short ? edge : static_cast<Eigen::Index>(kEnd_s * rate_hz);
+  const Eigen::Index last = std::min(bout.end - edge, frames - end);
+  for (Eigen::Index t = std::max(bout.first + edge, end); t < last; ++t) kept.push_back(t);
 }
 
 // The mean over neighbours that both stride.
@@ -236,24 +258,96 @@ double cadence_of(const StridePhase& found) {
   return steps > 0 ? turned / steps : found.dtheta;
 }
 
+// Phases of all frames, whether they stride or not, and their mean cadence.
+StridePhase follow(const VectorXd& signal, double rate_hz) {
+  const auto hop = std::max<Eigen::Index>(1, std::lround(kHop_s * rate_hz));
+  const Chain chain(candidates_for(signal.size(), rate_hz), signal, hop);
+  const std::vector<double> places = chain.phases();
+  const auto spanned = static_cast<double>(hop) * static_cast<double>(places.size() - 1);
+  StridePhase found;
+  found.dtheta = (places.back() - places.front()) / std::max(spanned, 1.0);
+  found.phase = between(places, hop, signal.size(), found.dtheta);
+  return found;
+}
+
+// Each walk between two stands is followed on its own, because beside one a window sees both. The
+// phase of what stands joins theirs. Bouts of less than a stride are taken away.
+void follow_apart(const VectorXd& signal, double rate_hz, StridePhase& found,
+                  std::vector<Bout>& bouts) {
+  std::erase_if(bouts, [&](const Bout& bout) {
+    return !has_stride(static_cast<int>(bout.frames()), rate_hz);
+  });
+  std::vector<Bout> walks;
+  Eigen::Index known = 0;  // frames whose phase is the final one
+  for (const Bout& bout : bouts) {
+    const StridePhase own = follow(signal.segment(bout.first, bout.frames()), rate_hz);
+    const VectorXd& phase = own.phase;
+    if (phase[phase.size() - 1] - phase[0] < kFullTurn) continue;
+    const Eigen::Index gap = bout.first - known;
+    double start = phase[0];
+    if (known > 0) {
+      const double before = found.phase[known - 1];
+      const double least = before + kMinAdvance * own.dtheta;
+      start += kFullTurn * std::ceil((least - start) / kFullTurn);
+      const double step = (start - before) / static_cast<double>(gap + 1);
+      for (Eigen::Index i = 0; i < gap; ++i) {
+        found.phase[known + i] = before + step * static_cast<double>(i + 1);
+      }
+    } else {
+      for (Eigen::Index i = 0; i < gap; ++i) {
+        found.phase[i] = start - own.dtheta * static_cast<double>(gap - i);
+      }
+    }
+    found.phase.segment(bout.first, bout.frames()) = phase.array() + (start - phase[0]);
+    known = bout.end;
+    walks.push_back(bout);
+    found.dtheta = own.dtheta;
+  }
+  for (Eigen::Index t = known; known > 0 && t < signal.size(); ++t) {
+    found.phase[t] = found.phase[t - 1] + found.dtheta;
+  }
+  bouts = std::move(walks);
+}
+
+std::vector<Eigen::Index> frames_of(const std::vector<Bout>& bouts) {
+  std::vector<Eigen::Index> frames;
+  for (const Bout& bout : bouts) {
+    for (Eigen::Index t = bout.first; t < bout.end; ++t) frames.push_back(t);
+  }
+  return frames;
+}
+
+double score_of(const VectorXd& signal, const VectorXd& phase) {
+  const VectorXd centred = signal.array() - signal.mean();
+  const MatrixXd basis = harmonic_basis(phase, kStrideHarmonics);
+  const VectorXd fitted = fit_harmonics(phase, centred, kStrideHarmonics);
+  return (centred - basis * fitted).squaredNorm() / std::max(centred.squaredNorm(), 1e-300) +
+         weak_first_penalty(fitted);
+}
+
 }  // namespace
 
 StridePhase follow_strides(const VectorXd& signal, double rate_hz) {
   const Eigen::Index frames = signal.size();
   assert(has_stride(static_cast<int>(frames), rate_hz));
-  const auto hop = std::max<Eigen::Index>(1, std::lround(kHop_s * rate_hz));
-  const Chain chain(candidates_for(frames, rate_hz), signal, hop);
-  const std::vector<double> places = chain.phases();
-  const auto spanned = static_cast<double>(hop) * static_cast<double>(places.size() - 1);
-  StridePhase found;
-  found.dtheta = (places.back() - places.front()) / std::max(spanned, 1.0);
-  found.phase = between(places, hop, frames, found.dtheta);
-  const VectorXd centred = signal.array() - signal.mean();
-  const MatrixXd basis = harmonic_basis(found.phase, kStrideHarmonics);
-  const VectorXd fitted = fit_harmonics(found.phase, centred, kStrideHarmonics);
-  found.score = (centred - basis * fitted).squaredNorm() / std::max(centred.squaredNorm(), 1e-300) +
-                weak_first_penalty(fitted);
-  found.strides = striding_frames(signal, found, rate_hz);
+  StridePhase found = follow(signal, rate_hz);
+  std::vector<Bout> bouts = bouts_of(signal, found);
+  const bool all_stride = bouts.size() == 1 && bouts.front().frames() == frames;
+  if (!all_stride) {
+    follow_apart(signal, rate_hz, found, bouts);
+    // Now that their cadence is known, their ends are seen where they are.
+    if (!bouts.empty()) bouts = bouts_of(signal, found);
+    follow_apart(signal, rate_hz, found, bouts);
+  }
+  for (const Bout& bout : bouts) keep_inner(bout, frames, rate_hz, found.strides);
+  if (static_cast<double>(found.strides.size()) * found.dtheta < kFullTurn) {
+    found.strides.resize(static_cast<std::size_t>(frames));
+    std::iota(found.strides.begin(), found.strides.end(), Eigen::Index{0});
+  }
+  const std::vector<Eigen::Index> walked = frames_of(bouts);
+  const bool told = static_cast<double>(walked.size()) * found.dtheta >= kMinTold * kFullTurn;
+  found.score =
+      told ? score_of(signal(walked), found.phase(walked)) : score_of(signal, found.phase);
   found.dtheta = cadence_of(found);
   return found;
 }

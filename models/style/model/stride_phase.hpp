@@ -12,12 +12,13 @@ namespace posed::style {
 struct StridePhase {
   Eigen::VectorXd phase;  // rad, one a frame, increasing: signal ~ A cos(phase)
   double dtheta = 0.0;    // mean cadence of `strides`, rad per frame
-  // Share of the signal that three harmonics of this phase leave, plus find_stride's penalty on a
-  // weak first harmonic: 0 is a perfect stride, 1 and more none.
+  // Share of the walk's signal that three harmonics of this phase leave, plus find_stride's penalty
+  // on a weak first harmonic: 0 is a perfect stride, 1 and more none. Where the legs stand nothing
+  // counts, unless they walk less than two strides.
   double score = 0.0;
   // The frames on which the legs stride, in order: without those that stand, start or stop, and
-  // without a third of a second at either end, where a recording begins and ends. All frames where
-  // less than a stride would be left.
+  // without a tenth of a second at either end of each walk, a third where a recording begins or
+  // ends. All frames where less than a stride would be left.
   std::vector<Eigen::Index> strides;
 };
 

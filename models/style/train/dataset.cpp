@@ -13,6 +13,8 @@
 #include "models/style/model/stride_phase.hpp"
 #include "models/style/model/style_model.hpp"
 #include "models/style/train/flips.hpp"
+#include "models/style/train/training_check.hpp"
+#include "models/style/train/walk_only.hpp"
 #include "models/task_numbers.hpp"
 #include "proto/text/clean.hpp"
 
@@ -31,6 +33,7 @@ struct Source {
   motion::Motion motion;
   double heading_rad;
   bool dropped_first = false;
+  std::vector<std::string> left_out;  // sentences
 };
 
 Error in_clip(Error error, const std::string& path) {
@@ -58,15 +61,42 @@ Result<> check_same_figure(const Skeleton& first, const Skeleton& other, const s
   return {};
 }
 
+std::vector<std::string> standing_sentences(const Standing& standing) {
+  std::vector<std::string> sentences;
+  const auto add = [&](double seconds, const char* where) {
+    if (!(seconds > 0.0)) return;
+    const auto tenths = std::to_string(std::lround(10.0 * seconds));
+    std::string text = tenths.size() < 2 ? "0" + tenths : tenths;
+    text.insert(text.size() - 1, ".");
+    sentences.push_back(text + " s of standing " + where + " the walk are left out");
+  };
+  add(standing.before_s, "before");
+  add(standing.after_s, "after");
+  return sentences;
+}
+
 Result<std::vector<Source>> read_sources(const std::vector<TrainingClip>& clips, double rate_hz,
                                          motion::Space space) {
   std::vector<Source> sources;
   for (const TrainingClip& clip : clips) {
+    const auto same = std::ranges::find_if(sources, [&](const Source& known) {
+      return known.clip->group == clip.group && is_same_recording(known.clip->clip, clip.clip);
+    });
+    if (same != sources.end()) {
+      same->left_out.push_back("is in its group twice (" + clip.clip.path +
+                               " is the same recording) and counts once");
+      continue;
+    }
     auto motion = motion::motion_of(clip.clip);
     if (!motion) return std::unexpected(in_clip(motion.error(), clip.clip.path));
     const bool added_pose = motion::begins_with_added_pose(*motion);
     if (added_pose) motion::drop_first_frame(*motion);
+    std::vector<std::string> left_out;
+    const bool walks = is_gait(clip.motion);
+    if (walks) left_out = standing_sentences(leave_out_standing(*motion));
     motion::Motion at_rate = motion::resample(*motion, rate_hz);
+    // A motion that is called a turn teaches it.
+    if (walks && !clip.motion.contains("turn")) straighten(at_rate);
     if (!has_stride(at_rate.size(), rate_hz)) {
       return fail("the clip has " + std::to_string(at_rate.size()) + " frames at " +
                       std::to_string(static_cast<int>(rate_hz)) +
@@ -77,7 +107,7 @@ Result<std::vector<Source>> read_sources(const std::vector<TrainingClip>& clips,
       TRY(check_same_figure(*sources.front().motion.skeleton, *at_rate.skeleton, clip.clip.path));
     }
     const double heading_rad = motion::walk_heading_rad(at_rate);
-    sources.push_back({&clip, std::move(at_rate), heading_rad, added_pose});
+    sources.push_back({&clip, std::move(at_rate), heading_rad, added_pose, std::move(left_out)});
   }
   return sources;
 }
@@ -354,7 +384,8 @@ Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips,
   for (const Source& source : sources) {
     auto seen = TRY(vectors(dataset.spec, source, options.rate_hz));
     AlignedClip clip = aligned_clip(source, std::move(seen.q), options.rate_hz);
-    clip.mended = std::move(seen.mended);
+    clip.mended = source.left_out;
+    clip.mended.insert(clip.mended.end(), seen.mended.begin(), seen.mended.end());
     clip.subject = subject_index(dataset, *source.clip);
     if (std::ranges::find(dataset.motions, clip.motion) == dataset.motions.end()) {
       dataset.motions.push_back(clip.motion);

@@ -42,7 +42,7 @@ struct AlignedClip {
   std::string file, group, motion;
   int subject = 0;                  // index into Dataset::subjects
   bool dropped_first = false;       // the file's first frame was an added rest pose
-  std::vector<std::string> mended;  // sentences about joints that flipped
+  std::vector<std::string> mended;  // sentences about what flipped, and what is left out
   Eigen::MatrixXd q;                // [T x D], rad
   Eigen::MatrixXd state;     // y = (v, q, dq/dt) [T x 3 + 2D]; 89 for cmu43, as in Sato et al.
   Eigen::VectorXd leg;       // the stride's reference signal [T]
@@ -92,7 +92,8 @@ struct Dataset {
 // skeleton, whoever recorded it.
 [[nodiscard]] motion::Space usual_space(const std::vector<TrainingClip>& clips);
 
-// Reads poses and strides. Phases have no common origin yet: theta0 is each clip's own leg phase.
+// Reads poses and strides. Of gaits the walk counts (walk_only.hpp); one recording that is twice in
+// a group counts once. Phases have no common origin yet: theta0 is each clip's own leg phase.
 // The training mean of the pose space is over the clips of every group but `targets`.
 Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips,
                              const std::vector<std::string>& targets,

@@ -24,8 +24,8 @@ struct TakeCheck {
 };
 
 // Checks a walk. Values that are missing in few frames (clip::FramesClip makes them NaN) get those
-// before them, turns are taken out (straighten()), and the rate becomes that of the clip's times,
-// all as training needs it. `rate_hz`: of the training.
+// before them, and the rate becomes that of the clip's times, as training needs it. `rate_hz`: of
+// the training.
 [[nodiscard]] TakeCheck check_take(TrainingClip& take, double rate_hz);
 
 }  // namespace posed::style

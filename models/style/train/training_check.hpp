@@ -54,6 +54,8 @@ struct TrainingCheck {
 [[nodiscard]] TrainingCheck check_training(const Dataset& dataset, const std::string& target,
                                            const Way& way, ClosingBy closing_by);
 
+[[nodiscard]] bool is_same_recording(const clip::Clip& a, const clip::Clip& b);
+
 // Returns an error when two clips of different groups are the same recording.
 Result<> check_recordings(const std::vector<TrainingClip>& clips);
 

@@ -83,11 +83,14 @@ Cycles without(const Cycles& cycles, const std::vector<int>& left_out) {
   return kept;
 }
 
+constexpr int kNoGoal = -1;
+
 // What is asked of a clip, and which clips are not learnt from then.
 struct FoldPlan {
   std::size_t asked;  // index of a clip
   std::vector<int> left_out;
   bool whole_person = false;
+  int goal = kNoGoal;  // index of the target's clip, left out too, that should be reached
 };
 
 // The fold that asks for the difference on the frames of one clip, learnt without some: what the
@@ -99,8 +102,12 @@ Fold fold_of(const Dataset& dataset, const Cycles& cycles, const FoldPlan& plan,
   const Difference& shown = differences[index_of(differences, clip)];
   Fold fold;
   fold.truth = own_difference(dataset, shown, clip);
-  fold.goal = plan.whole_person ? MatrixXd(cycles[plan.asked].coefficients + shown.delta)
-                                : goal_of(dataset, cycles, clip, shown, target);
+  if (plan.goal != kNoGoal) {
+    fold.goal = cycles[static_cast<std::size_t>(plan.goal)].coefficients;
+  } else {
+    fold.goal = plan.whole_person ? MatrixXd(cycles[plan.asked].coefficients + shown.delta)
+                                  : goal_of(dataset, cycles, clip, shown, target);
+  }
   fold.outputs = make_training_pairs(dataset, cycles, target, plan.left_out).outputs;
   fold.left_out = plan.left_out;
   fold.q = clip.q;
@@ -115,14 +122,34 @@ bool all_shown(const std::vector<Difference>& kept, const std::vector<Difference
   });
 }
 
-// Left out alone where its unit still shows what is asked, else with all of its person.
+// The clips of a group that are of one unit and motion.
+std::vector<int> takes_of(const Dataset& dataset, const Cycles& cycles, const std::string& group,
+                          const AlignedClip& like) {
+  std::vector<int> takes;
+  for (int i = 0; i < std::ssize(cycles); ++i) {
+    const AlignedClip& clip = clip_of(dataset, cycles[static_cast<std::size_t>(i)]);
+    if (clip.group != group || clip.motion != like.motion) continue;
+    if (dataset.unit_of(clip) == dataset.unit_of(like)) takes.push_back(i);
+  }
+  return takes;
+}
+
+// Left out alone where its unit still shows what is asked, else with all of its person. Alone, a
+// take of the target that is left out with it says how near it comes to one that nobody learnt.
 FoldPlan plan_for(const Dataset& dataset, const Cycles& cycles, const std::string& target,
                   std::size_t asked, const std::vector<Difference>& all) {
   constexpr std::size_t kOthers = 2;
   const AlignedClip& clip = clip_of(dataset, cycles[asked]);
   const std::string unit = dataset.unit_of(clip);
   const bool shows_both = all[index_of(all, clip)].own.contains(unit);
-  const FoldPlan alone{asked, {static_cast<int>(asked)}};
+  FoldPlan alone{asked, {static_cast<int>(asked)}};
+  const auto goals = takes_of(dataset, cycles, target, clip);
+  if (goals.size() >= 2) {
+    const auto own = takes_of(dataset, cycles, clip.group, clip);
+    const auto turn = std::ranges::find(own, static_cast<int>(asked)) - own.begin();
+    alone.goal = goals[static_cast<std::size_t>(turn) % goals.size()];
+    alone.left_out.push_back(alone.goal);
+  }
   const auto kept = differences_of(dataset, without(cycles, alone.left_out), target);
   if (all_shown(kept, all)) {
     const auto left =
@@ -179,22 +206,23 @@ AlignedClip part_of(const AlignedClip& clip, Eigen::Index first, Eigen::Index co
   return part;
 }
 
-// Trained on one half of every source clip, tested on the other halves.
+// Trained on one half of every clip, tested on the other halves. A clip of the target that is too
+// short for that is learnt from as a whole.
 LeaveOut half_folds(const Dataset& dataset, const std::string& target) {
   const auto parts = std::make_shared<Dataset>();
   parts->motions = dataset.motions;
   parts->subjects = dataset.subjects;
   parts->kernel_scale = dataset.kernel_scale;
-  std::vector<int> halves[2];  // of the source clips: which parts are first and second ones
+  std::vector<int> halves[2];  // which parts are first and second ones
   for (const AlignedClip& clip : dataset.clips) {
     const Eigen::Index frames = clip.q.rows();
-    if (clip.group == target) {
+    const Eigen::Index middle = frames / 2;
+    const VectorXd phase = clip.phase();
+    if (phase[middle] - phase[0] < 2.0 * std::numbers::pi) {
+      if (clip.group != target) return {};
       parts->clips.push_back(part_of(clip, 0, frames));
       continue;
     }
-    const Eigen::Index middle = frames / 2;
-    const VectorXd phase = clip.phase();
-    if (phase[middle] - phase[0] < 2.0 * std::numbers::pi) return {};
     halves[0].push_back(static_cast<int>(std::ssize(parts->clips)));
     parts->clips.push_back(part_of(clip, 0, middle));
     halves[1].push_back(static_cast<int>(std::ssize(parts->clips)));
@@ -206,7 +234,11 @@ LeaveOut half_folds(const Dataset& dataset, const std::string& target) {
   for (const auto& tested : halves) {
     for (const int part : tested) {
       const std::size_t i = part;
-      if (pairs.outputs.of_input[i] != kNoDifference) folds.push_back({i, tested});
+      if (pairs.outputs.of_input[i] == kNoDifference) continue;
+      FoldPlan& plan = folds.emplace_back(FoldPlan{i, tested});
+      for (const int goal : takes_of(*parts, cycles, target, clip_of(*parts, cycles[i]))) {
+        if (std::ranges::find(tested, goal) != tested.end()) plan.goal = goal;
+      }
     }
   }
   LeaveOut halved = planned(parts, std::move(cycles), std::move(pairs), std::move(folds), target);

@@ -55,9 +55,10 @@ struct Difference {
                                                 const std::vector<int>& left_out = {});
 
 // Folds for the choice of the kernel: a clip left out where its unit still shows its difference,
-// else a person where at least two others show one, else one half of each source clip against the
-// other half; none where clips are too short. A person who is left out is asked for the others'
-// difference, because nobody knows how another one acts. They refer to `dataset`.
+// and with it a take of the target, which it should reach, where the unit has another; else a
+// person where at least two others show one, else one half of each clip against the other half;
+// none where clips are too short. A person who is left out is asked for the others' difference,
+// because nobody knows how another one acts. They refer to `dataset`.
 [[nodiscard]] LeaveOut make_folds(const Dataset& dataset, const std::string& target);
 
 }  // namespace posed::style

@@ -65,6 +65,35 @@ TEST_CASE("a cadence that swings by a quarter is followed where one frequency lo
   CHECK(phase_error(found.phase, truth) < 0.5);
 }
 
+TEST_CASE("however long the legs stand before, after and amid a walk, its strides are the same",
+          "[stride_phase]") {
+  constexpr Eigen::Index kNear = 5;  // so few frames of standing may be kept
+  const VectorXd truth = swinging_phase(300, 1.1, 0.1);
+  const VectorXd legs = legs_at(truth);
+  for (const Eigen::Index stood : {15, 60, 300}) {
+    VectorXd signal(3 * stood + 300);
+    signal << VectorXd::Constant(stood, legs[0]), legs.head(150),
+        VectorXd::Constant(stood, legs[149]), legs.tail(150), VectorXd::Constant(stood, legs[299]);
+    const StridePhase found = follow_strides(signal, kRate_hz);
+    INFO("stood " << stood << " frames thrice, score " << found.score);
+    CHECK(found.score < 0.1);
+    CHECK(found.dtheta == Approx(kTurn / (1.1 * kRate_hz)).epsilon(0.05));
+    CHECK(found.strides.size() > 220);
+    const auto steps = signal.size() - 1;
+    CHECK(((found.phase.tail(steps) - found.phase.head(steps)).array() > 0.0).all());
+    double worst = 0.0;
+    for (const Eigen::Index t : found.strides) {
+      const bool is_first = t < stood + 150 + kNear;
+      const Eigen::Index at = t - (is_first ? stood : 2 * stood);
+      CHECK(at >= (is_first ? 0 : 150) - kNear);
+      CHECK(at < (is_first ? 150 : 300) + kNear);
+      if (at < 0 || at >= 300) continue;
+      worst = std::max(worst, std::abs(std::remainder(found.phase[t] - truth[at], kTurn)));
+    }
+    CHECK(worst < 0.3);
+  }
+}
+
 TEST_CASE("noise and a single jump have no strides", "[stride_phase]") {
   std::mt19937 bits(7);
   std::normal_distribution<double> normal;

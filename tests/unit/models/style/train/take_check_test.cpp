@@ -78,6 +78,27 @@ TEST_CASE("a live walk is told by its strides, without its standing", "[take_che
   CHECK(has(late.sentence(), "strides in 12.0 s; ... s of standing are left out"));
 }
 
+TEST_CASE("who stands in T-pose for longer than he walks teaches his walk alone", "[take_check]") {
+  TrainingClip take = walked();
+  stand(take.clip, 0.0, 6.5);
+  const auto standing = static_cast<Eigen::Index>(6.5 * kRate_hz);
+  for (Eigen::Index c = 0; c < take.clip.channels.cols(); ++c) {
+    const Channel& channel = take.clip.skeleton->channels[static_cast<std::size_t>(c)];
+    if (has(take.clip.skeleton->joints[channel.joint].name, "UpperArm")) {
+      take.clip.channels.col(c).head(standing).array() += 2.0F;
+    }
+  }
+  const TakeCheck checked = check_take(take, 30.0);
+  INFO(checked.sentence());
+  REQUIRE(checked.good());
+  CHECK(checked.standing_s > 6.0);
+  DatasetOptions options;
+  options.space = motion::Space::kHumanoid;
+  const auto dataset = make_dataset({take}, {}, options).value();
+  REQUIRE(dataset.clips[0].mended.size() == 1);
+  CHECK(has(dataset.clips[0].mended[0], "6.5 s of standing before the walk are left out"));
+}
+
 TEST_CASE("a walk about the stage is learnt from as one that goes straight on", "[take_check]") {
   TrainingClip straight = walked();
   TrainingClip circle = straight;
@@ -113,7 +134,7 @@ TEST_CASE("spoilt takes are refused with a reason", "[take_check]") {
 
   take = walked();
   stand(take.clip, 4.0, 12.0);
-  CHECK(has(refusal(take), "the legs stood for ... of 12 s"));
+  CHECK(has(refusal(take), "heard in 12.0 s, and 4 are needed: walk longer"));
 
   take = walked();  // a dropout
   take.clip.time_s.back() += 0.8;

@@ -98,6 +98,46 @@ TEST_CASE("one recording in two groups is refused by name", "[style][check]") {
   CHECK(model.error().message.contains("is the same recording as march_1"));
 }
 
+TEST_CASE("a recording that is twice in its group counts once, and the take is named",
+          "[style][check]") {
+  const auto march = walker_file(WalkerFamily::kMarch, 1);
+  const auto sway = walker_file(WalkerFamily::kSway, 1);
+  CHECK(report_of({lesson(march, "from"), lesson(march, "from"), lesson(sway, "to")})["clips"]
+            .size() == 2);
+}
+
+TEST_CASE("takes in the wrong group are named, and several people are asked for",
+          "[style][check]") {
+  const auto take = [](WalkerFamily family, std::uint32_t person, double seconds,
+                       const std::string& group) {
+    auto clip =
+        motion::make_walker({.family = family, .person = person, .seconds = seconds}).value();
+    clip.path = (family == WalkerFamily::kMarch ? "march_" : "sway_") + std::to_string(person);
+    if (person == 2) clip.channels.rightCols(clip.channels.cols() - 6).array() += 0.15;
+    return style::TrainingClip{std::move(clip), group, "ann", "walk"};
+  };
+  const auto warnings_of = [&](WalkerFamily third, WalkerFamily sixth, std::uint32_t person) {
+    return report_of({take(WalkerFamily::kMarch, 1, 6.0, "from"),
+                      take(WalkerFamily::kMarch, 1, 7.0, "from"), take(third, person, 8.0, "from"),
+                      take(WalkerFamily::kSway, 1, 6.0, "to"),
+                      take(WalkerFamily::kSway, 1, 7.0, "to"),
+                      take(sixth, person, 8.0, "to")})["warnings"]
+        .dump();
+  };
+  const auto right = warnings_of(WalkerFamily::kMarch, WalkerFamily::kSway, 1);
+  CHECK_FALSE(right.contains("nearer"));
+  CHECK_FALSE(right.contains("several people"));
+  const auto wrong = warnings_of(WalkerFamily::kSway, WalkerFamily::kMarch, 1);
+  INFO(wrong);
+  CHECK(wrong.contains("sway_1 is in 'from', but nearer to a take of 'to'"));
+  CHECK(wrong.contains("march_1 is in 'to', but nearer to a take of 'from'"));
+  CHECK_FALSE(wrong.contains("several people"));
+  const auto two = warnings_of(WalkerFamily::kMarch, WalkerFamily::kSway, 2);
+  INFO(two);
+  CHECK(two.contains("(march_2, sway_2 differ from the others): are these several people?"));
+  CHECK_FALSE(two.contains("nearer"));
+}
+
 TEST_CASE("two takes of one style give no difference to learn", "[style][check]") {
   auto again = motion::make_walker({.family = WalkerFamily::kMarch, .person = 1, .seconds = 7.0});
   CHECK(has_problem(report_of({lesson(walker_file(WalkerFamily::kMarch, 1), "from"),
