@@ -15,7 +15,8 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kStep = 0.1;          // of alpha
+constexpr int kSteps = 10;  // of alpha, in 1
+constexpr int kMost = static_cast<int>(kMaxAlpha);
 constexpr int kEvery = 2;              // points of the cycle
 constexpr double kTolerance_m = 0.01;  // deeper than this counts
 
@@ -156,16 +157,15 @@ class StyledWalk {
   std::vector<Point> points_;
 };
 
-// The last alpha from `from` towards `to` at which arms are no deeper than `allowed_m`.
-double last_free(const StyledWalk& walk, const ArmsAndBody& body, double from, double to,
+// The last alpha from `from` towards `to` at which arms are no deeper than `allowed_m`; a whole
+// number of steps, so that it is the very number that was asked for.
+double last_free(const StyledWalk& walk, const ArmsAndBody& body, int from, int to,
                  double allowed_m) {
-  const double sign = to < from ? -1.0 : 1.0;
-  double alpha = from;
-  while ((to - alpha) * sign > kStep / 2.0 &&
-         walk.depth_m(body, alpha + sign * kStep) <= allowed_m) {
-    alpha += sign * kStep;
-  }
-  return alpha;
+  const int sign = to < from ? -1 : 1;
+  const auto alpha = [](int whole) { return static_cast<double>(whole) / kSteps; };
+  int step = from * kSteps;
+  while (step != to * kSteps && walk.depth_m(body, alpha(step + sign)) <= allowed_m) step += sign;
+  return alpha(step);
 }
 
 }  // namespace
@@ -179,8 +179,8 @@ std::vector<AlphaReach> alpha_reach(const BoundModel& model) {
     walk.choose(s);
     const double unstyled_m = std::max(0.0, walk.depth_m(*body, 0.0));
     const double trained_m = std::max(unstyled_m, walk.depth_m(*body, 1.0));
-    reach[s].high = last_free(walk, *body, 1.0, kMaxAlpha, trained_m + kTolerance_m);
-    reach[s].low = last_free(walk, *body, 0.0, -kMaxAlpha, unstyled_m + kTolerance_m);
+    reach[s].high = last_free(walk, *body, 1, kMost, trained_m + kTolerance_m);
+    reach[s].low = last_free(walk, *body, 0, -kMost, unstyled_m + kTolerance_m);
   }
   return reach;
 }

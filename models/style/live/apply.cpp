@@ -42,25 +42,21 @@ Result<> check_clip(const clip::Clip& clip) {
   return {};
 }
 
-// The settled heading at the first frame: the low-pass runs from the clip's end to its start, so
-// that at the first frame it reflects the direction that the walk takes from there.
-double settled_heading_rad(const clip::Clip& clip, const motion::PoseSpace& space) {
+// Lets the filter see the clip backwards, so that at its first frame it knows the motion and the
+// direction that the walk takes from there, which is returned.
+motion::LiveHeading settle(StyleFilter& filter, const clip::Clip& clip,
+                           const motion::PoseSpace& space) {
+  const double frame_s = 1.0 / clip.frame_rate_hz;
+  const auto beginning = std::lround(kBeginning_s * clip.frame_rate_hz);
   motion::LiveHeading heading;
   for (int i = clip.frames() - 1; i >= 0; --i) {
     const Frame frame = clip.frame(i);
-    if (!space.has_heading(frame)) continue;
-    heading.update(space.heading_rad(frame), 1.0 / clip.frame_rate_hz);
+    if (space.has_heading(frame)) heading.update(space.heading_rad(frame), frame_s);
+    if (i <= beginning) filter.preview(frame, heading, frame_s);
   }
-  return heading.value_rad();
-}
-
-// The gate sees the clip's beginning backwards, so that it knows the motion at the first frame.
-void settle(StyleFilter& filter, const clip::Clip& clip, double heading_rad) {
-  const auto seen = static_cast<int>(std::lround(kBeginning_s * clip.frame_rate_hz));
-  for (int i = std::min(seen, clip.frames() - 1); i >= 0; --i) {
-    filter.preview(clip.frame(i), heading_rad, 1.0 / clip.frame_rate_hz);
-  }
-  filter.settle(clip.frame(0), heading_rad);
+  heading.turn_back();
+  filter.settle(heading);
+  return heading;
 }
 
 // The feet stage behind the style; without one, frames pass through.
@@ -162,12 +158,11 @@ class ChannelWriter {
 
 // The walker's mean cycle, by the strides of the whole clip; without columns where it shows none.
 // NaN where a joint was not always measured.
-PoseCycle cycle_of_clip(const BoundModel& model, const clip::Clip& clip, double heading_rad) {
+PoseCycle cycle_of_clip(const BoundModel& model, const clip::Clip& clip,
+                        motion::LiveHeading heading) {
   const auto& legs = model.known->legs();
   const Eigen::Index dims = model.space.dims();
   if (!legs || !has_stride(clip.frames(), clip.frame_rate_hz)) return {};
-  motion::LiveHeading heading;
-  heading.settle(heading_rad, heading_rad);
   Eigen::MatrixXd q(clip.frames(), dims);
   Eigen::VectorXd leg(clip.frames());
   std::vector<std::uint8_t> available(static_cast<std::size_t>(dims));
@@ -206,8 +201,7 @@ Result<Walker> measure_walker(const StyleModel& model, const std::string& model_
                 model_name);
   }
   StyleFilter filter(bound.get(), {.alpha = 0.0});
-  const double heading_rad = settled_heading_rad(clip, bound->space);
-  settle(filter, clip, heading_rad);
+  const motion::LiveHeading heading = settle(filter, clip, bound->space);
   const double seconds = (clip.frames() - 1.5) / clip.frame_rate_hz;  // ends at the last frame
   Catch ignored;
   for (int i = 0; i < clip.frames(); ++i) {
@@ -217,7 +211,7 @@ Result<Walker> measure_walker(const StyleModel& model, const std::string& model_
   }
   if (filter.walker()) {
     Walker walker = *filter.walker();
-    walker.cycle = cycle_of_clip(*bound, clip, heading_rad);
+    walker.cycle = cycle_of_clip(*bound, clip, heading);
     return walker;
   }
   return fail(
@@ -233,7 +227,7 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
   const BoundModel& ready = *bound;
   StyleFilter filter(&ready, options.filter);
   if (options.walker) filter.set_walker(*options.walker);
-  if (!options.cold) settle(filter, clip, settled_heading_rad(clip, ready.space));
+  if (!options.cold) settle(filter, clip, ready.space);
 
   auto feet = TRY(feet_stage(clip, options));
   Applied applied{.clip = clip::is_acclaim(*clip.skeleton) ? clip::with_zyx_channels(clip) : clip,

@@ -195,17 +195,17 @@ RT_SAFE double StyleFilter::reading(std::size_t reading) const noexcept {
   return reading == kStyleGate ? gate() : estimate();
 }
 
-void StyleFilter::settle(const Frame& frame, double heading_rad) noexcept {
+void StyleFilter::settle(const motion::LiveHeading& heading) noexcept {
   tracker_.settle();
   find_missing();
   alpha_ = wanted_alpha();
-  const bool has_heading = model_ != nullptr && model_->space.has_heading(frame);
-  heading_.settle(heading_rad, has_heading ? model_->space.heading_rad(frame) : heading_rad);
+  heading_ = heading;
 }
 
-RT_SAFE void StyleFilter::preview(const Frame& frame, double heading_rad, double dt_s) noexcept {
+RT_SAFE void StyleFilter::preview(const Frame& frame, const motion::LiveHeading& heading,
+                                  double dt_s) noexcept {
   if (model_ == nullptr || frame.skeleton != model_->space.skeleton().id) return;
-  heading_.settle(heading_rad, heading_rad);
+  heading_ = heading;
   gap_s_ = dt_s;
   Pose pose;
   static_cast<void>(read_pose(frame, dt_s, pose));

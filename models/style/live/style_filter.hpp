@@ -74,12 +74,12 @@ class StyleFilter final : public Stage {
   void set_mask(const Mask& mask) noexcept { mask_.aim(mask); }
   [[nodiscard]] const BoundModel* set_model(const BoundModel* model) noexcept;
 
-  // Starts in the settled state for this frame (offline use): full alpha, known heading, and the
-  // gate of what preview() has seen.
-  void settle(const Frame& frame, double heading_rad) noexcept;
-  // Lets the gate and the estimate see a frame `dt_s` from the one before, in either direction of
-  // time.
-  void preview(const Frame& frame, double heading_rad, double dt_s) noexcept;
+  // Starts in the settled state (offline use): full alpha, known heading, and of gate and busy
+  // limbs what preview() has seen.
+  void settle(const motion::LiveHeading& heading) noexcept;
+  // Lets the gate, the limbs and the estimate see a frame `dt_s` from the one before, in either
+  // direction of time.
+  void preview(const Frame& frame, const motion::LiveHeading& heading, double dt_s) noexcept;
 
   // How much the gate passes, 0 to 1; NaN while it is off or the model has no data for it.
   RT_SAFE [[nodiscard]] double gate() const noexcept;

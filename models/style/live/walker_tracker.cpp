@@ -37,14 +37,14 @@ constexpr double kOwnFast = 1.15;  // a walker's own cadence above this counts i
 
 constexpr double kCadence_s = 0.1;  // time constant of the low-pass on the cadence
 constexpr double kSteady_s = 0.4;   // the same without what a step adds
-constexpr double kStage_s = 0.045;  // time constant of each of the four low-passes
-constexpr double kStep_s = 0.005;   // of their integration
 constexpr double kThere = 1e-5;     // nearer is there
 
 // 0 below `low`, 1 above `high`, without a kink between.
 double rise(double value, double low, double high) noexcept {
   return smooth_step((value - low) / (high - low));
 }
+
+double between(double from, double to, double share) noexcept { return from + share * (to - from); }
 
 constexpr double kInterruption_s = 1.0;  // of the frames
 
@@ -89,6 +89,14 @@ double StyleEstimate::value() const noexcept {
   return all_.sum_s / all_.time_s;
 }
 
+RT_SAFE void Fade::step(double towards, double part) noexcept {
+  for (double& stage : stage_) {
+    stage += part * (towards - stage);
+    if (std::abs(towards - stage) < kThere) stage = towards;
+    towards = stage;
+  }
+}
+
 RT_SAFE void Gate::update(const TrainedMotion* known, bool on, const Frame& frame,
                           std::span<const float> q, std::span<const float> whole,
                           std::span<const std::uint8_t> available,
@@ -102,7 +110,7 @@ RT_SAFE void Gate::update(const TrainedMotion* known, bool on, const Frame& fram
   }
   const bool closes = known != nullptr && on;
   fresh_ = fresh_ && !closes;
-  if (fresh_) return stage_.fill(1.0);
+  if (fresh_) return fade_.set(1.0);
   follow(closes ? known : nullptr, before, dt_s);
 }
 
@@ -186,29 +194,20 @@ RT_SAFE double Gate::of_run(const TrainedMotion& known, double cadence) const no
   return rise(cadence, kFast, kTooFast) * (1.0 - of_near_pose_);
 }
 
-// In small steps, while the evidence goes straight from frame to frame: the same at any rate of
-// frames, also where legs that begin to stride open the gate within one.
+// The evidence goes straight from frame to frame, so that legs that begin to stride open the gate
+// within one.
 RT_SAFE void Gate::follow(const TrainedMotion* known, const Evidence& from, double dt_s) noexcept {
-  const int steps = std::max(1, static_cast<int>(std::ceil(dt_s / kStep_s)));
-  const double part = -std::expm1(-dt_s / steps / kStage_s);
-  const auto between = [](double a, double b, double share) { return a + share * (b - a); };
-  for (int i = 0; i < steps; ++i) {
-    const double share = (i + 0.5) / steps;
+  fade_.follow(dt_s, [&](double share) {
     const Evidence now{.knows = between(from.knows, seen_.knows, share),
                        .swing_rad = between(from.swing_rad, seen_.swing_rad, share),
                        .speed_deg_s = between(from.speed_deg_s, seen_.speed_deg_s, share)};
-    double towards = now.knows;
-    if (known != nullptr && std::isfinite(now.swing_rad)) towards *= 1.0 - of_rest(*known, now);
-    for (double& stage : stage_) {
-      stage += part * (towards - stage);
-      if (std::abs(towards - stage) < kThere) stage = towards;
-      towards = stage;
-    }
-  }
+    const bool rests = known != nullptr && std::isfinite(now.swing_rad);
+    return rests ? now.knows * (1.0 - of_rest(*known, now)) : now.knows;
+  });
 }
 
 RT_SAFE void Gate::settle() noexcept {
-  if (fresh_) stage_.fill(1.0);
+  if (fresh_) fade_.set(1.0);
   stride_.turn_back();
 }
 
@@ -217,12 +216,12 @@ RT_SAFE bool WalkerTracker::see(const BoundModel& model, const Frame& frame,
                                 double gap_s, double dt_s, std::span<float> input) noexcept {
   report_missing_data(model);
   const TrainedMotion* const known = model.known ? &*model.known : nullptr;
-  relate(model, q, available, input);
+  relate(model, q, available, dt_s, input);
   const std::span<const float> whole =
       replaced_ ? std::span<const float>(whole_.data(), q.size()) : input;
   gate_.update(known, gate_on_, frame, input, whole, available, walker_, dt_s);
   const bool jumped = measure(model, q, available, gap_s, dt_s);
-  if (jumped) relate(model, q, available, input);
+  if (jumped) relate(model, q, available, 0.0, input);
   return jumped;
 }
 
@@ -275,7 +274,7 @@ RT_SAFE void WalkerTracker::adapt(const BoundModel& model) noexcept {
 }
 
 RT_SAFE void WalkerTracker::relate(const BoundModel& model, std::span<const float> q,
-                                   std::span<const std::uint8_t> available,
+                                   std::span<const std::uint8_t> available, double dt_s,
                                    std::span<float> input) noexcept {
   if (!adapted_) adapt(model);
   if (shifts_) shift_.get(q, available, input);
@@ -288,7 +287,30 @@ RT_SAFE void WalkerTracker::relate(const BoundModel& model, std::span<const floa
     if (!walker_ || walker_->measured[d] == 0 || model.neutral.size() == 0) continue;
     input[d] += model.neutral[static_cast<Eigen::Index>(d)] - walker_->neutral[d];
   }
+  follow_trust(model, available, dt_s, input);
   replace_untrusted(model, available, input);
+}
+
+// A part that comes and goes within a few frames would snap.
+RT_SAFE void WalkerTracker::follow_trust(const BoundModel& model,
+                                         std::span<const std::uint8_t> available, double dt_s,
+                                         std::span<const float> input) noexcept {
+  const bool began = std::exchange(trusts_, usual_ != nullptr && model.known);
+  if (!trusts_) return trust_.fill(1.0F);
+  const Trust before = seen_trust_;
+  const auto distances = model.known->part_distances_deg(input, available, model.loose_parts);
+  const auto& limits = walker_ ? kKnownWalker : kUnknownWalker;
+  for (std::size_t p = 0; p < kBodyParts; ++p) {
+    seen_trust_[p] = share_below(distances[p], limits[p]);
+    const auto from = static_cast<double>(before[p]);
+    const auto to = static_cast<double>(seen_trust_[p]);
+    if (began) {
+      fades_[p].follow(dt_s, [&](double share) { return between(from, to, share); });
+    } else {
+      fades_[p].set(to);
+    }
+    trust_[p] = static_cast<float>(fades_[p].value());
+  }
 }
 
 // What the legs do not explain would take the pose away from all of training, and with it the style
@@ -296,14 +318,8 @@ RT_SAFE void WalkerTracker::relate(const BoundModel& model, std::span<const floa
 RT_SAFE void WalkerTracker::replace_untrusted(const BoundModel& model,
                                               std::span<const std::uint8_t> available,
                                               std::span<float> input) noexcept {
-  trust_.fill(1.0F);
-  replaced_ = false;
-  if (usual_ == nullptr || !model.known) return;
-  const auto distances = model.known->part_distances_deg(input, available, model.loose_parts);
-  const auto& limits = walker_ ? kKnownWalker : kUnknownWalker;
-  for (std::size_t p = 0; p < kBodyParts; ++p) trust_[p] = share_below(distances[p], limits[p]);
-  if (std::ranges::all_of(trust_, [](float trust) { return trust == 1.0F; })) return;
-  replaced_ = true;
+  replaced_ = trust_ != kAllTrust;
+  if (!replaced_) return;
   std::ranges::copy(input, whole_.begin());
   std::array<float, motion::kMaxPoseDims> walk;
   usual_->does.get(input, available, walk);

@@ -3,7 +3,9 @@
 // already. README.md has a section on each. State of one stream. RT-safe.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -42,6 +44,28 @@ class StyleEstimate {
   Part all_;
 };
 
+// Four low-passes in a row: the third derivative of what comes out is finite. RT-safe.
+class Fade {
+ public:
+  void set(double value) noexcept { stage_.fill(value); }
+  [[nodiscard]] double value() const noexcept { return stage_.back(); }
+  // Advances by `dt_s`; `towards(share)` is what to follow at that share of it. In small steps, so
+  // that it is the same at any rate of frames.
+  template <typename Towards>
+  void follow(double dt_s, const Towards& towards) noexcept {
+    const int steps = std::max(1, static_cast<int>(std::ceil(dt_s / kStep_s)));
+    const double part = -std::expm1(-dt_s / steps / kStage_s);
+    for (int i = 0; i < steps; ++i) step(towards((i + 0.5) / steps), part);
+  }
+
+ private:
+  static constexpr double kStage_s = 0.045;  // time constant of each
+  static constexpr double kStep_s = 0.005;
+  void step(double towards, double part) noexcept;
+
+  std::array<double, 4> stage_{};
+};
+
 // Fades the style out where the model does not know the motion, and in again where it does
 // (README.md, "Gate"). State of one stream. RT-safe.
 class Gate {
@@ -56,7 +80,7 @@ class Gate {
 
   // How much style passes: 1 all, exactly, to 0 none, exactly; 0 before the first frame. It takes
   // about 0.17 s half of the way, and its third derivative is finite.
-  [[nodiscard]] float open() const noexcept { return static_cast<float>(stage_.back()); }
+  [[nodiscard]] float open() const noexcept { return static_cast<float>(fade_.value()); }
   // Whether the legs stride as in training; true where that is unknown.
   [[nodiscard]] bool strides() const noexcept { return of_legs_ >= 0.5; }
   // Returns the cadence, low-passed; 0 while it is unknown.
@@ -95,7 +119,7 @@ class Gate {
   // The last evidence; it stays where a frame has none.
   double of_pose_ = 0.0, of_near_pose_ = 0.0, of_cadence_ = 1.0, of_legs_ = 1.0;
   Evidence seen_;
-  std::array<double, 4> stage_{};  // low-passes in a row, the first follows seen_
+  Fade fade_;  // follows seen_
 };
 
 class WalkerTracker {
@@ -153,7 +177,10 @@ class WalkerTracker {
   void report_missing_data(const BoundModel& model) noexcept;
   void adapt(const BoundModel& model) noexcept;
   void relate(const BoundModel& model, std::span<const float> q,
-              std::span<const std::uint8_t> available, std::span<float> input) noexcept;
+              std::span<const std::uint8_t> available, double dt_s,
+              std::span<float> input) noexcept;
+  void follow_trust(const BoundModel& model, std::span<const std::uint8_t> available, double dt_s,
+                    std::span<const float> input) noexcept;
   void replace_untrusted(const BoundModel& model, std::span<const std::uint8_t> available,
                          std::span<float> input) noexcept;
   bool measure(const BoundModel& model, std::span<const float> q,
@@ -170,7 +197,12 @@ class WalkerTracker {
   const BoundModel::Usual* usual_ = nullptr;  // the neutral walk that is nearest to the walker's
   bool replaced_ = false;                     // something of the last frame
   std::array<float, motion::kMaxPoseDims> whole_{};  // its input before
-  std::array<float, kBodyParts> trust_ = {1.0F, 1.0F, 1.0F, 1.0F, 1.0F, 1.0F};
+  // What the poses say of each part, which changes within a few frames, and what follows it.
+  using Trust = std::array<float, kBodyParts>;
+  static constexpr Trust kAllTrust = {1.0F, 1.0F, 1.0F, 1.0F, 1.0F, 1.0F};
+  Trust seen_trust_ = kAllTrust, trust_ = kAllTrust;
+  std::array<Fade, kBodyParts> fades_{};
+  bool trusts_ = false;  // something was seen
   StyleEstimate estimate_;
   std::uint32_t pending_ = 0;
   bool reported_no_gate_ = false, reported_no_axis_ = false;

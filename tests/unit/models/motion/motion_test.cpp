@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "models/motion/heading.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/model/harmonics.hpp"
 #include "proto/frame/rotation.hpp"
@@ -128,6 +129,30 @@ TEST_CASE("The heading is the chord's, or the pelvis's where there is no chord",
   const auto moved = root_positions_m(turned(walker(30.0), 1.0), 1.0);
   CHECK(std::abs(moved(149, 0) - moved(0, 0)) < 0.1);
   CHECK(moved(149, 2) - moved(0, 2) > 3.0);
+}
+
+TEST_CASE("A live heading is on who goes round a circle, smooths the stride, at any rate",
+          "[motion]") {
+  constexpr double kDegree = kPi / 180.0;
+  // How far it is from a walker who turns by `turn`, and sways by `sway` once a second.
+  const auto worst_deg = [](double rate_hz, double turn_deg_s, double sway_deg) {
+    LiveHeading heading;
+    double worst = 0.0;
+    for (int i = 0; i < 16 * rate_hz; ++i) {
+      const double t = i / rate_hz;
+      const double way_rad = turn_deg_s * kDegree * t;
+      const double seen_rad = way_rad + sway_deg * kDegree * std::sin(2.0 * kPi * t);
+      CHECK_FALSE(heading.update(unwrap_near(seen_rad, 0.0), 1.0 / rate_hz));
+      if (t < 10.0) continue;
+      worst = std::max(worst, std::abs(unwrap_near(heading.value_rad() - way_rad, 0.0)) / kDegree);
+    }
+    return worst;
+  };
+  for (const double rate_hz : {30.0, 60.0, 240.0}) {
+    CAPTURE(rate_hz);
+    CHECK(worst_deg(rate_hz, 90.0, 0.0) < 0.1);
+    CHECK(worst_deg(rate_hz, -45.0, 8.0) == Approx(2.54).margin(0.1));
+  }
 }
 
 TEST_CASE("The leg signal has the stride's period and the right leg forward at its peak",

@@ -21,6 +21,7 @@
 #include "models/style/model/harmonics.hpp"
 #include "models/style/model/stride_phase.hpp"
 #include "models/style/train/train.hpp"
+#include "proto/frame/rotation.hpp"
 #include "tests/support/shared.hpp"
 
 using namespace posed;
@@ -428,6 +429,25 @@ TEST_CASE("a stranger's walk gets what was taught, and a raised arm leaves the r
     return cycle_error(model, {source}, targets, &neutral, style::BodyPart::kLeftArm);
   };
   CHECK(rest(raised) <= rest(plain) + 0.04);
+  // An arm that is busy from one frame to the next: its change fades.
+  clip::Clip sudden = plain;
+  sudden.channels.bottomRows(plain.frames() / 2) = raised.channels.bottomRows(plain.frames() / 2);
+  style::ApplyOptions options;
+  options.walker = style::measure_walker(model, "active", neutral).value();
+  const clip::Clip styled = style::apply_to_clip(model, "active", sudden, options).value().clip;
+  for (const Bone bone : {Bone::kLeftUpperArm, Bone::kLeftLowerArm}) {
+    const int joint = plain.skeleton->joint_of(bone);
+    const auto change_rad = [&](int frame) {
+      const auto turn = [&](const clip::Clip& of) {
+        return to_eigen_double(of.frame(frame).rotation_xyzw[static_cast<std::size_t>(joint)]);
+      };
+      return turn(sudden).angularDistance(turn(styled));
+    };
+    for (int i = 1; i < plain.frames(); ++i) {
+      CAPTURE(i, bone);
+      CHECK(std::abs(change_rad(i) - change_rad(i - 1)) < 0.26);
+    }
+  }
   CHECK(model.roots.size() == 1);
 }
 

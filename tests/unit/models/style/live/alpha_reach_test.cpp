@@ -1,6 +1,7 @@
 // Alpha is held where arms would run into the body, on a walker whose style is a bent elbow.
 #include <catch2/catch.hpp>
 
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -57,6 +58,7 @@ TEST_CASE("alpha stops before the arms are in the body, and says so once", "[sty
   INFO(reach.low << " to " << reach.high);
   CHECK(reach.high >= 1.0);
   CHECK(reach.high < style::kMaxAlpha);
+  for (const double end : {reach.low, reach.high}) CHECK(end == std::round(10.0 * end) / 10.0);
 
   const auto styled = [&](double alpha) {
     style::ApplyOptions options;

@@ -43,7 +43,9 @@ class Settled {
   Settled(const style::BoundModel* model, const Frame& frame, double alpha = 1.0,
           const style::FilterOptions& options = {})
       : filter(model, with_alpha(alpha, options)) {
-    filter.settle(frame, model != nullptr ? model->space.heading_rad(frame) : 0.0);
+    motion::LiveHeading heading;
+    if (model != nullptr) heading.update(model->space.heading_rad(frame), 0.0);
+    filter.settle(heading);
   }
   style::StyleFilter filter;
 };
@@ -230,10 +232,10 @@ TEST_CASE("an alpha out of range is clamped, NaN is ignored", "[style]") {
   const Frame in = toy_walk(50).frame(10);
   Settled filter(ready.get(), in, 1.0);
   filter.filter.set_alpha(std::nanf(""));
-  filter.filter.settle(in, 0.0);
+  filter.filter.settle({});
   CHECK(filter.filter.alpha() == 1.0F);
   filter.filter.set_alpha(1e9F);
-  filter.filter.settle(in, 0.0);
+  filter.filter.settle({});
   CHECK(filter.filter.alpha() == 2.0F);
 }
 
