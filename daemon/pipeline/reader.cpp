@@ -17,7 +17,7 @@ namespace {
 
 // Pause before another look at a lossless source, or at a command that waits for space in the ring.
 constexpr std::int64_t kLookAgain_ns = 250'000;
-// The reader never sleeps so long (system/pulse.hpp): posed or the computer was stopped meanwhile.
+// The reader never sleeps so long (system/pulse.hpp): posed was stopped meanwhile.
 constexpr std::int64_t kStoodStill_ns = 2 * kNanosPerSecond;
 
 }  // namespace

@@ -33,7 +33,7 @@ struct Range {
   double least, most;
   [[nodiscard]] bool has(double value) const { return value >= least && value <= most; }
 };
-constexpr Range kFistGain{0.6, 1.6}, kSureFistGain{0.8, 1.3}, kOtherGain{0.35, 4.0};
+constexpr Range kFistGain{0.55, 1.7}, kSureFistGain{0.65, 1.4}, kOtherGain{0.35, 4.0};
 constexpr Range kOddShare{0.4, 2.5};  // of one sensor, of its pose's median
 // Straight fingers in another pose than the flat hand, as a share of the way to the fist.
 constexpr Range kStraight{-0.25, 0.7}, kSureStraight{-0.12, 0.12};
@@ -149,7 +149,7 @@ class Comparison {
 
   void judge_gain(Pose pose, const Range& range, const std::string& why) {
     const auto share = gain(pose);
-    if (share && !range.has(*share)) fail(pose, moved_by(*share) + ": " + why);
+    if (share && !range.has(std::abs(*share))) fail(pose, moved_by(*share) + ": " + why);
   }
 
   static std::string moved_by(double share) {
@@ -230,7 +230,8 @@ std::string PoseFinding::sentence() const {
   const std::string of_all = " of " + std::to_string(sensors) + " sensors ";
   std::string why = wrong;
   if (!moved.empty()) {
-    why = std::to_string(moved.size()) + of_all + "moved while it was held (" + named(moved) + ")";
+    add_word(why, std::to_string(moved.size()) + of_all + "moved while it was held (" +
+                      named(moved) + ")");
   }
   if (!stuck.empty()) {
     add_word(why, std::to_string(stuck.size()) + of_all + "hardly moved from the flat hand (" +

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <limits>
 
-#include "drivers/active_time.hpp"
 #include "drivers/glove/line_reader.hpp"
 #include "drivers/landmarks/emulator.hpp"
 #include "drivers/landmarks/fit.hpp"
@@ -72,7 +71,6 @@ class LandmarksDecoder final : public Decoder {
   HandTracks tracks_;
   Message message_;
   TimestampClock clock_;
-  ActiveTime active_time_;
   std::array<int, kMaxHands> in_a_row_{};  // [side]
   std::byte sides_{};                      // seen for so long
   std::byte described_{};
@@ -82,7 +80,7 @@ class LandmarksDecoder final : public Decoder {
 
 RT_SAFE void LandmarksDecoder::feed(std::span<const std::byte> bytes, std::int64_t arrival_ns,
                                     Sink& sink) noexcept {
-  now_ns_ = active_time_.to(arrival_ns);
+  now_ns_ = std::max(now_ns_, arrival_ns);
   if (!stream_) {
     return sink.outcome(read({reinterpret_cast<const char*>(bytes.data()), bytes.size()}, sink));
   }

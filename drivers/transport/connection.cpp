@@ -139,7 +139,7 @@ Chunk LinkTransport::read(std::int64_t now_ns) noexcept {
 void LinkTransport::upkeep(std::int64_t now_ns) noexcept {
   if (link_.listener() < 0 || is_given_up_ || now_ns - used_ns_.load() < kOfNoUse_ns) return;
   pollfd next{.fd = link_.listener(), .events = POLLIN, .revents = 0};
-  if (::poll(&next, 1, 0) != 1) return;
+  if (!link_.others_wait() && ::poll(&next, 1, 0) != 1) return;
   is_given_up_ = true;
   ::shutdown(link_.fd(), SHUT_RDWR);
 }

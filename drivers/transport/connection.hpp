@@ -58,6 +58,7 @@ class Connection {
   void pause_host() noexcept {
     if (paused_) paused_->add(host_);
   }
+  [[nodiscard]] bool others_wait() const noexcept { return paused_ && paused_->waiting > 0; }
   [[nodiscard]] bool is_paused() const noexcept { return paused_ && paused_->have(host_); }
   [[nodiscard]] int listener() const noexcept { return listener_; }  // -1: posed made the link
   [[nodiscard]] bool was_browser() const noexcept { return was_browser_; }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 
 #include "drivers/transport/address.hpp"
@@ -24,6 +25,9 @@ class PausedHosts {
     const auto place = std::ranges::find(hosts_, host, &Paused::host);
     return place != hosts_.end() && Clock::now() < place->until;
   }
+
+  // Connections of paused hosts, of all listeners. A link of no use gives up its place for one.
+  std::atomic<std::size_t> waiting{0};
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -110,6 +110,9 @@ Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
     }
   }
   if (!newest) newest = first_waiting(listener->second);
+  std::size_t all = 0;
+  for (const auto& [endpoint, one] : listeners_) all += one.waiting.size();
+  paused_->waiting.store(all);
   if (newest) return std::move(*newest);
   return fail("no " + std::string(settings.device) + " has connected to " + settings.endpoint +
               " yet; give it this machine's address and switch it on");

@@ -33,7 +33,8 @@ constexpr auto kLeastBend_rad = static_cast<float>(2.0 * kDegree);
 constexpr float kBendShare = 0.25F;  // of the suspect's distance
 constexpr int kManyParts = 5;        // that are off: they may be garbage
 constexpr int kOneWay = 5;           // times as many up as down, or the reverse, are a motion
-constexpr float kFlaky = 0.002F;     // share of a hand's angles dropped lately
+constexpr auto kFastestBend_rad_s = static_cast<float>(4000.0 * kDegree);  // a snap has 3,800
+constexpr float kFlaky = 0.002F;  // share of a hand's angles dropped lately
 
 // What a value may do [its unit].
 struct Bounds {
@@ -130,6 +131,9 @@ class Track {
     return false;
   }
 
+  // From the last believed sample to the one compared, by second.
+  RT_SAFE [[nodiscard]] float speed() const noexcept { return moved_ / since_s_; }
+
   // There was no sample in a frame `dt_s` after the one before.
   RT_SAFE void skip(float dt_s) noexcept {
     since_s_ += dt_s;
@@ -200,7 +204,8 @@ class Track {
     last_ = value;
     known_ = true;
     doubts_ = 0;
-    older_s_ = step_s_ = since_s_ = 0.0F;
+    older_s_ = step_s_ = since_s_ = last_off_ = 0.0F;
+    was_far_ = false;
   }
   RT_SAFE void follow(const Value& value) noexcept {
     older_ = before_;
@@ -386,7 +391,8 @@ RT_SAFE bool GateStage::gate_angles(float dt_s, Frame& frame) noexcept {
     float& angle_rad = frame.angle_rad[c];
     if (!std::isfinite(angle_rad)) continue;
     if (angle_[c].usual() > 0.0F) active += 1.0F;
-    const bool company = angle_[c].suspect() && has_company(c);
+    const bool company =
+        angle_[c].suspect() && angle_[c].speed() < kFastestBend_rad_s && has_company(c);
     const bool accepted = angle_[c].settle(angle_rad, company, bounds);
     if (first || !accepted) count(joint, !accepted);
     if (accepted) continue;

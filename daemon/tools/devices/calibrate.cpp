@@ -214,7 +214,8 @@ Result<GoodPoses> good_poses(GloveSource& source, const PosePlan& plan, const st
                              bool force) {
   GoodPoses poses{.recorded = TRY(lead(source, plan, user, {}))};
   while (true) {
-    auto& check = poses.check = TRY(drivers::glove::check_poses(source.model(), poses.recorded));
+    auto& check = poses.check;
+    check = TRY(drivers::glove::check_poses(source.model(), poses.recorded));
     // Where nothing was measured the fit reports it.
     if (check.sensors == 0 || check.usable() || force) return poses;
     if (!on_terminal()) {
@@ -421,10 +422,12 @@ Result<> judge(const GloveSource& source, const CalibrateOptions& options,
     std::fprintf(stderr, "posed: %s\n", line.c_str());
   }
   if (!found.mostly_unlike() || options.force) return {};
-  return fail(
-      fmt::format("{} of {} joints differ by more than 7 degrees from {}'s calibration in "
-                  "{}, which stays: choose another --out for another hand, or --force",
-                  found.unlike, found.joints, options.user, options.out.string()));
+  const std::string beside = options.out.string() + ".new";
+  TRY(write_whole_file(beside, drivers::glove::format_calibration(file)));
+  return fail(fmt::format(
+      "{} of {} joints differ by more than 7 degrees from {}'s calibration in {}, which stays; the "
+      "new one is in {}: rename it if it is the same hand, or use --force next time",
+      found.unlike, found.joints, options.user, options.out.string(), beside));
 }
 
 Result<CalibrationFile> from_poses(const CalibrateOptions& options) {

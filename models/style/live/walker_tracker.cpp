@@ -90,6 +90,7 @@ double StyleEstimate::value() const noexcept {
 }
 
 RT_SAFE void Fade::step(double towards, double part) noexcept {
+  if (!std::isfinite(towards)) return;
   for (double& stage : stage_) {
     stage += part * (towards - stage);
     if (std::abs(towards - stage) < kThere) stage = towards;

@@ -31,16 +31,21 @@ std::string difference_after(const std::string& sql) {
   return result.difference->message;
 }
 
-// The value of an alpha decision, as SQL's x'...'.
-std::string number_value(double number) {
-  v1::DecisionValue value;
-  value.set_number(number);
+// Bytes as SQL's x'...'.
+std::string blob(const std::string& bytes) {
   std::string sql = "x'";
-  for (const char byte : value.SerializeAsString()) {
+  for (const char byte : bytes) {
     sql += "0123456789abcdef"[(byte >> 4) & 15];
     sql += "0123456789abcdef"[byte & 15];
   }
   return sql + "'";
+}
+
+// The value of an alpha decision.
+std::string number_value(double number) {
+  v1::DecisionValue value;
+  value.set_number(number);
+  return blob(value.SerializeAsString());
 }
 
 double furthest(const google::protobuf::RepeatedField<float>& a,
@@ -200,13 +205,22 @@ TEST_CASE("the golden log's frames are reproduced on any machine", "[replay]") {
 }
 
 // tests/golden/replay/feet.plog: a synthetic walker of two seconds, styled, whose root stays on the
-// performer; recorded with `posed record --frames`. A new one needs its reason in the commit
-// message.
+// performer; recorded with `posed record --frames`. With POSED_MAKE_GOLDEN set this test writes its
+// frames again, for the next run; they need their reason in the commit message.
 TEST_CASE("the golden log's feet stand where they stood, on any machine", "[replay]") {
   const TempFolder dir;
   const auto copy = dir.path() / "feet.plog";
   std::filesystem::copy_file(golden("replay/feet.plog"), copy);
   const Replayed result = replayed(copy, false);
+  if (std::getenv("POSED_MAKE_GOLDEN") != nullptr) {
+    std::string sql;
+    for (std::size_t i = 0; i < result.frames.size(); ++i) {
+      sql += "UPDATE frame SET bytes=" + blob(result.frames[i]) +
+             " WHERE id=(SELECT id FROM frame ORDER BY id LIMIT 1 OFFSET " + std::to_string(i) +
+             ");";
+    }
+    forge(golden("replay/feet.plog"), sql);
+  }
   auto reader = log::Reader::open(copy);
   REQUIRE(reader);
   auto live = reader->frames(0, false).value();
