@@ -212,7 +212,8 @@ struct GoodPoses {
 // `force` accepts them all the same.
 Result<GoodPoses> good_poses(GloveSource& source, const PosePlan& plan, const std::string& user,
                              bool force) {
-  GoodPoses poses{.recorded = TRY(lead(source, plan, user, {}))};
+  GoodPoses poses;
+  poses.recorded = TRY(lead(source, plan, user, {}));
   while (true) {
     auto& check = poses.check;
     check = TRY(drivers::glove::check_poses(source.model(), poses.recorded));

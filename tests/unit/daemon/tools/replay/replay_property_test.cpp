@@ -109,7 +109,8 @@ TEST_CASE("a glove that was silent, with frames waiting in the generate stage, r
   }
 }
 
-// Every angle jumps and comes back, by whole movements of the hand.
+// Every angle jumps and comes back, by whole movements of the hand. Two of the five are no quicker
+// than fingers can be, and have company (models/gate/README.md).
 TEST_CASE("a smoothed hand has the gate by default, and its log replays the drops", "[virtual]") {
   const TempFolder folder;
   const auto path = folder.path() / "spikes.plog";
@@ -150,7 +151,7 @@ TEST_CASE("a smoothed hand has the gate by default, and its log replays the drop
       REQUIRE(frame.ParseFromString(bytes));
       if (frame.quality() == v1::QUALITY_PREDICTED) ++bridged;
     }
-    CHECK(bridged == (gated ? 5 : 0));
+    CHECK(bridged == (gated ? 3 : 0));
     config.off.push_back(&gate::gate_type());  // enabled = false
     std::filesystem::remove(path);
   }
