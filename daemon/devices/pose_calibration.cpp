@@ -87,8 +87,8 @@ drivers::glove::CalibrationFile blank_calibration(const drivers::glove::Model& m
 }
 
 std::string PoseCalibration::refusal() const {
-  constexpr std::size_t kMostImpossible = 5;  // a sensor or a finger may be faulty
-  if (impossible <= kMostImpossible) return {};
+  constexpr std::size_t kMaxImpossible = 5;  // a sensor or a finger may be faulty
+  if (impossible <= kMaxImpossible) return {};
   return fmt::format("{} joints would be bent as no hand's are: show the poses again", impossible);
 }
 

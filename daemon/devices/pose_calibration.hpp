@@ -19,7 +19,7 @@ struct PoseCalibration {
   std::vector<std::string> warnings;  // sensors that keep their default; what no hand can do
   std::size_t impossible = 0;         // joints that would be bent as no hand's are
 
-  // Why it is none of a hand, from four such joints on; empty: it may be.
+  // Why it is none of a hand, from six such joints on; empty: it may be.
   [[nodiscard]] std::string refusal() const;
 };
 

@@ -17,7 +17,8 @@ namespace posed::pipeline {
 class JunkGate {
  public:
   static constexpr std::int64_t kJunkPerSecond = 500'000;  // bytes, and the most that is saved up
-  static constexpr std::int64_t kMostOwed = 6 * kJunkPerSecond;  // bytes of a link that was let in
+  // Bytes that a link may have brought in vain, beyond what is saved up, before it must end.
+  static constexpr std::int64_t kMaxOwed = 6 * kJunkPerSecond;
   static constexpr std::int64_t kKnownFor_ns = 2 * kNanosPerSecond;
 
   // Whether the chunk is to be recorded and decoded. `sender`: as in drivers::Chunk; 0 always is.
@@ -28,12 +29,12 @@ class JunkGate {
     return sender == 0 || left_ >= cost || is_known(sender, now_ns);
   }
 
-  // Whether a chunk that is part of a link is to be recorded and decoded; if not, the link must
-  // end.
+  // Whether a chunk that is part of a link (drivers::Chunk::kLink) is to be recorded and decoded;
+  // if not, the link must end.
   RT_SAFE [[nodiscard]] bool admits_link(std::uint64_t sender, std::int64_t now_ns) noexcept {
     refill(now_ns);
-    if (sender == 0 || is_known(sender, now_ns)) return true;
-    if (left_ < (sender == link_ ? -kMostOwed : 0)) return false;
+    if (is_known(sender, now_ns)) return true;
+    if (left_ < (sender == link_ ? -kMaxOwed : 0)) return false;
     link_ = sender;
     return true;
   }
@@ -43,7 +44,7 @@ class JunkGate {
                        std::int64_t now_ns) noexcept {
     if (sender == 0) return;
     if (used) return remember(sender, now_ns);
-    left_ = std::max(left_ - cost, sender == link_ ? -2 * kMostOwed : -kJunkPerSecond);
+    left_ = std::max(left_ - cost, sender == link_ ? -2 * kMaxOwed : -kJunkPerSecond);
   }
 
  private:
@@ -53,8 +54,8 @@ class JunkGate {
   };
 
   RT_SAFE void refill(std::int64_t now_ns) noexcept {
-    constexpr std::int64_t kLongest_ns = 3 * kMostOwed / kJunkPerSecond * kNanosPerSecond;
-    const std::int64_t passed_ns = std::clamp<std::int64_t>(now_ns - filled_ns_, 0, kLongest_ns);
+    constexpr std::int64_t kMaxPassed_ns = 3 * kMaxOwed / kJunkPerSecond * kNanosPerSecond;
+    const std::int64_t passed_ns = std::clamp<std::int64_t>(now_ns - filled_ns_, 0, kMaxPassed_ns);
     filled_ns_ = std::max(filled_ns_, now_ns);
     left_ = std::min(left_ + passed_ns * kJunkPerSecond / kNanosPerSecond, kJunkPerSecond);
   }

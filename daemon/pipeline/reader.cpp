@@ -201,13 +201,16 @@ class Reader::Source final : private IntakeOut {
     return chunk.bytes.size();
   }
 
+  [[nodiscard]] bool admits(const drivers::Chunk& chunk, std::int64_t cost) noexcept {
+    return chunk.is_part_of_link() ? gate_.admits_link(chunk.sender, arrival_ns_)
+                                   : gate_.admits(chunk.sender, cost, arrival_ns_);
+  }
+
   // Records and decodes the bytes, unless a recording would be flooded with rubbish.
   void accept(const drivers::Chunk& chunk) noexcept {
     const auto cost = static_cast<std::int64_t>(kRowBytes + places_ * sizeof(StreamPosition) +
                                                 chunk.bytes.size());
-    const bool admitted = chunk.is_part_of_link() ? gate_.admits_link(chunk.sender, arrival_ns_)
-                                                  : gate_.admits(chunk.sender, cost, arrival_ns_);
-    if (ports_.record_sink != nullptr && !admitted) {
+    if (ports_.record_sink != nullptr && !admits(chunk, cost)) {
       outcome(Outcome::kForeign);
       if (chunk.is_part_of_link()) return device_->transport->refuse();
       return device_->transport->decoded(false);

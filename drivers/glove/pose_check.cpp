@@ -27,8 +27,9 @@ constexpr double kFailedShare = 0.25;  // share of a pose's sensors
 constexpr double kDriftShare = 0.05, kDriftRatio = 5.0;
 
 // The median movement of a pose's sensors, as a share of the driver's default gains. In simulation
-// (gains off by 12 % each and 6 % together, poses by 5 degrees) a fist stays within 0.8 and 1.3;
-// two real calibrations have 0.7. Thumbs and spread hands differ more from person to person.
+// (gains off by 12 % each and 6 % together, poses by 5 degrees) a fist stays within 0.8 and 1.3,
+// and two real calibrations have 0.7: both are sure. Thumbs and spread hands differ more from
+// person to person.
 struct Range {
   double least, most;
   [[nodiscard]] bool has(double value) const { return value >= least && value <= most; }
@@ -131,7 +132,7 @@ class Comparison {
         gains.push_back(at.by_default);
       }
     }
-    return gains.empty() ? std::nullopt : std::optional(median(std::move(gains)));
+    return gains.empty() ? std::nullopt : std::optional(median(gains));
   }
 
   // Where the fingers are in a pose: 0 as in the flat hand, 1 as in the fist.
@@ -144,7 +145,7 @@ class Comparison {
       }
       shares.push_back((held.mean() - at.flat_raw) / (at.pose_raw - at.flat_raw));
     }
-    return shares.empty() ? std::nullopt : std::optional(median(std::move(shares)));
+    return shares.empty() ? std::nullopt : std::optional(median(shares));
   }
 
   void judge_gain(Pose pose, const Range& range, const std::string& why) {
@@ -259,8 +260,7 @@ std::string PoseCheck::verdict() const {
     if (finding.failed()) add_word(text, finding.sentence(), "; ");
   }
   if (!text.empty()) return text;
-  std::vector<std::string> odd = doubts;
-  return (odd.empty() ? "good: " : "doubtful: " + joined(odd, "; ") + "; ") +
+  return (doubts.empty() ? "good: " : "doubtful: " + joined(doubts, "; ") + "; ") +
          "the hand was still in every pose (sensors trembled by " +
          std::to_string(std::lround(100.0 * unrest)) + " % of their movement), " +
          std::to_string(sensors) + " sensors moved between them" +

@@ -84,7 +84,7 @@ RT_SAFE void Requests::accept_server_info(const ServerInfo& info) noexcept {
 RT_SAFE void Requests::does_not_fit() noexcept {
   if (connect_.wanted) return;
   connect_.wanted = true;
-  connect_.pause_ns = std::min(2 * connect_.pause_ns, kLongest_ns);
+  connect_.pause_ns = std::min(2 * connect_.pause_ns, kMaxPause_ns);
 }
 
 RT_SAFE bool Requests::is_due(Question& question, std::int64_t now_ns) noexcept {

@@ -72,7 +72,7 @@ class Requests {
 
  private:
   static constexpr std::int64_t kAgain_ns = kNanosPerSecond;
-  static constexpr std::int64_t kLongest_ns = 32 * kAgain_ns;
+  static constexpr std::int64_t kMaxPause_ns = 32 * kAgain_ns;
   static constexpr std::int64_t kSilence_ns = 2 * kNanosPerSecond;
 
   struct Question {

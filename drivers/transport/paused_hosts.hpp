@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <chrono>
 
 #include "drivers/transport/address.hpp"
@@ -27,7 +26,7 @@ class PausedHosts {
   }
 
   // Connections of paused hosts, of all listeners. A link of no use gives up its place for one.
-  std::atomic<std::size_t> waiting{0};
+  std::size_t waiting = 0;
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -23,7 +23,7 @@ constexpr int kPatience_ms = 500;
 constexpr int kBacklog = 8;
 // Connections per call: an untrusted client may open them without end.
 constexpr int kMaxAtOnce = 64;
-constexpr std::size_t kMaxPausedConnections = 16;  // connections of paused hosts
+constexpr std::size_t kMaxPausedConnections = 16;
 
 Result<Address> address_of(const ListenSettings& settings) {
   return listen_address(settings.endpoint, settings.peers,
@@ -112,7 +112,7 @@ Result<Connection> TransportFactory::accept(const ListenSettings& settings) {
   if (!newest) newest = first_waiting(listener->second);
   std::size_t all = 0;
   for (const auto& [endpoint, one] : listeners_) all += one.waiting.size();
-  paused_->waiting.store(all);
+  paused_->waiting = all;
   if (newest) return std::move(*newest);
   return fail("no " + std::string(settings.device) + " has connected to " + settings.endpoint +
               " yet; give it this machine's address and switch it on");

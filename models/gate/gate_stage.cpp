@@ -29,7 +29,7 @@ constexpr double kFastest_m_s2 = 60.0;               // of a root: a jump's land
 
 // Company (models/gate/README.md, "Company").
 constexpr float kUnusualBend = 3.0F;  // times the mean distance from the prediction
-constexpr auto kLeastBend_rad = static_cast<float>(2.0 * kDegree);
+constexpr auto kMinBend_rad = static_cast<float>(2.0 * kDegree);
 constexpr float kBendShare = 0.25F;  // of the suspect's distance
 constexpr int kManyParts = 5;        // that are off: they may be garbage
 constexpr int kOneWay = 5;           // times as many up as down, or the reverse, are a motion
@@ -340,7 +340,7 @@ RT_SAFE void GateStage::feel_parts() noexcept {
   for (std::size_t c = 0; c < joint_.size(); ++c) {
     const float size = std::abs(off_rad_[c]);
     float& most = bend_rad_[part_[c]];
-    if (size <= std::max(kUnusualBend * angle_[c].usual(), kLeastBend_rad)) continue;
+    if (size <= std::max(kUnusualBend * angle_[c].usual(), kMinBend_rad)) continue;
     if (size > std::abs(most)) most = off_rad_[c];
   }
   int up = 0, down = 0;

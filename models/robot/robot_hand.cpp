@@ -9,6 +9,7 @@
 
 #include "models/robot/shapes.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/lower.hpp"
 #include "proto/text/named_numbers.hpp"
 
 namespace posed::robot {
@@ -543,13 +544,13 @@ class Builder {
 
   // In which units it would be a finger.
   [[nodiscard]] std::string too_long(const Finger& finger) const {
-    constexpr double kLeast_m = 0.05;
+    constexpr double kMinLength_m = 0.05;
     constexpr std::array<std::pair<const char*, double>, 3> kUnits{
         {{"inches", 0.0254}, {"centimetres", 0.01}, {"millimetres", 1e-3}}};
     std::string units;
     for (const auto& [unit, unit_m] : kUnits) {
       const double length_m = unit_m * finger.length_m;
-      if (length_m >= kLeast_m && length_m <= kMaxFinger_m)
+      if (length_m >= kMinLength_m && length_m <= kMaxFinger_m)
         units += (units.empty() ? "" : " or ") + std::string(unit);
     }
     return "the finger that ends in " + in_quotes(hand_.links[finger.tip].name) + " is " +

@@ -405,11 +405,6 @@ Result<> resolve_leaders(const RawUrdf& raw, Urdf& urdf, const Reader& reader) {
 
 }  // namespace
 
-std::string lower(std::string text) {
-  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
-  return text;
-}
-
 Result<Urdf> parse_urdf(std::string_view text, const std::string& file) {
   if (text.size() > kMaxUrdfBytes) return fail("it is larger than 4 MB: it is no hand", file);
   if (text.starts_with("version https://git-lfs")) {

@@ -60,9 +60,6 @@ Result<Urdf> parse_urdf(std::string_view text, const std::string& file);
 // so that the text says all. A mesh that is not used says why.
 Result<std::string> load_urdf(const std::string& path);
 
-// Its letters A to Z as small ones.
-[[nodiscard]] std::string lower(std::string text);
-
 // The rotation of a URDF's roll, pitch and yaw [rad]: about the fixed x, then y, then z.
 [[nodiscard]] inline Eigen::Matrix3d turn_of_rpy(const Eigen::Vector3d& rpy) {
   return (Eigen::AngleAxisd(rpy.z(), Eigen::Vector3d::UnitZ()) *

@@ -13,6 +13,8 @@
 #include <Eigen/Eigenvalues>
 #include <pugixml.hpp>
 
+#include "proto/text/lower.hpp"
+
 #include "models/robot/urdf.hpp"
 #include "proto/text/load_file.hpp"
 

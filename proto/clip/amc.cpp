@@ -5,6 +5,7 @@
 #include "proto/clip/formats.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/lower.hpp"
 
 namespace posed::clip {
 namespace {

@@ -12,6 +12,7 @@
 #include "proto/clip/text.hpp"
 #include "proto/frame/degree.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/lower.hpp"
 
 namespace posed::clip {
 namespace {

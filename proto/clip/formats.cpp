@@ -9,6 +9,7 @@
 #include "proto/clip/text.hpp"
 #include "proto/text/list.hpp"
 #include "proto/text/load_file.hpp"
+#include "proto/text/lower.hpp"
 
 namespace posed::clip {
 namespace {

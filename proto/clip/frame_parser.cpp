@@ -12,6 +12,7 @@
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/plausible.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/lower.hpp"
 
 namespace posed::clip {
 namespace {

@@ -41,14 +41,6 @@ std::string_view trim(std::string_view text) noexcept {
   return text;
 }
 
-std::string lower(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  return out;
-}
-
 std::string_view next_word(std::string_view& text) noexcept {
   std::size_t begin = 0;
   while (begin < text.size() && is_space(text[begin])) ++begin;

@@ -27,7 +27,6 @@ RT_SAFE [[nodiscard]] constexpr bool is_space(char c) noexcept {
   return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\v' || c == '\f';
 }
 [[nodiscard]] std::string_view trim(std::string_view text) noexcept;
-[[nodiscard]] std::string lower(std::string_view text);
 
 // Removes the first word from `text` and returns it; empty at the end.
 RT_SAFE [[nodiscard]] std::string_view next_word(std::string_view& text) noexcept;

@@ -9,6 +9,7 @@
 #include "models/feet/legs.hpp"
 #include "models/motion/kinematics.hpp"
 #include "models/style/model/harmonics.hpp"
+#include "proto/frame/median.hpp"
 
 namespace posed::style {
 namespace {
@@ -55,12 +56,7 @@ double rms_of(const MatrixXd& values) {
                    static_cast<double>(std::max<Eigen::Index>(1, values.size())));
 }
 
-double ground_m(VectorXd feet_m) {
-  const auto at = feet_m.begin() +
-                  static_cast<std::ptrdiff_t>(kGroundShare * static_cast<double>(feet_m.size()));
-  std::nth_element(feet_m.begin(), at, feet_m.end());
-  return *at;
-}
+double ground_m(VectorXd feet_m) { return quantile(feet_m, kGroundShare); }
 
 // The frames from a share of the walk to another.
 std::optional<WalkPhases> part_of(const WalkPhases& walk, double from, double to) {

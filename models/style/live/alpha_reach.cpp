@@ -16,7 +16,7 @@ namespace {
 using Eigen::Vector3d;
 
 constexpr int kSteps = 10;  // of alpha, in 1
-constexpr int kMost = static_cast<int>(kMaxAlpha);
+constexpr int kMaxWhole = static_cast<int>(kMaxAlpha);
 constexpr int kEvery = 2;              // points of the cycle
 constexpr double kTolerance_m = 0.01;  // deeper than this counts
 
@@ -179,8 +179,8 @@ std::vector<AlphaReach> alpha_reach(const BoundModel& model) {
     walk.choose(s);
     const double unstyled_m = std::max(0.0, walk.depth_m(*body, 0.0));
     const double trained_m = std::max(unstyled_m, walk.depth_m(*body, 1.0));
-    reach[s].high = last_free(walk, *body, 1, kMost, trained_m + kTolerance_m);
-    reach[s].low = last_free(walk, *body, 0, -kMost, unstyled_m + kTolerance_m);
+    reach[s].high = last_free(walk, *body, 1, kMaxWhole, trained_m + kTolerance_m);
+    reach[s].low = last_free(walk, *body, 0, -kMaxWhole, unstyled_m + kTolerance_m);
   }
   return reach;
 }

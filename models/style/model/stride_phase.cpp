@@ -14,6 +14,7 @@
 #include <Eigen/Cholesky>
 
 #include "models/style/model/harmonics.hpp"
+#include "proto/frame/median.hpp"
 
 namespace posed::style {
 namespace {
@@ -202,13 +203,6 @@ VectorXd local_swing(const VectorXd& signal, const VectorXd& phase, Eigen::Index
   return swing;
 }
 
-double quantile_of(std::vector<double> values, double share) {
-  const auto at =
-      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size()));
-  std::ranges::nth_element(values, at);
-  return *at;
-}
-
 // Neighbouring frames, first to end.
 struct Bout {
   Eigen::Index first, end;
@@ -220,13 +214,13 @@ struct Bout {
 // far that is.
 std::vector<Bout> bouts_of(const VectorXd& signal, const StridePhase& found) {
   const double stride = kFullTurn / found.dtheta;
-  const VectorXd centred = signal.array() - quantile_of({signal.begin(), signal.end()}, 0.5);
+  const VectorXd centred = signal.array() - median(VectorXd(signal));
   const VectorXd swing = local_swing(
       centred, found.phase, std::max<Eigen::Index>(1, std::lround(0.5 * kSwingWindow * stride)));
-  const double stands = kStands * quantile_of({swing.begin(), swing.end()}, kLargest);
+  const double stands = kStands * quantile(VectorXd(swing), kLargest);
   std::vector<double> walks;
   std::ranges::copy_if(swing, std::back_inserter(walks), [&](double s) { return s >= stands; });
-  const double least = kMinSwing * quantile_of(std::move(walks), 0.5);
+  const double least = kMinSwing * median(walks);
   std::vector<Bout> bouts;
   for (Eigen::Index t = 0; t < swing.size(); ++t) {
     if (!(swing[t] > least)) continue;

@@ -158,14 +158,14 @@ TEST_CASE("a link is heard without a gap from its first byte to its end, or not 
   const auto passes = [&](std::uint64_t link, bool used) {
     now_ns += 60 * kNanosPerSecond;
     std::int64_t bytes = 0;
-    for (; bytes < 3 * JunkGate::kMostOwed && gate.admits_link(link, now_ns); bytes += kRead) {
+    for (; bytes < 3 * JunkGate::kMaxOwed && gate.admits_link(link, now_ns); bytes += kRead) {
       gate.decoded(link, used, kRead, now_ns);
     }
     return bytes;
   };
-  CHECK(passes(5000, false) <= JunkGate::kMostOwed + JunkGate::kJunkPerSecond + kRead);
-  CHECK(passes(5001, false) >= JunkGate::kMostOwed);
-  CHECK(passes(5002, true) >= 3 * JunkGate::kMostOwed);
+  CHECK(passes(5000, false) <= JunkGate::kMaxOwed + JunkGate::kJunkPerSecond + kRead);
+  CHECK(passes(5001, false) >= JunkGate::kMaxOwed);
+  CHECK(passes(5002, true) >= 3 * JunkGate::kMaxOwed);
 }
 
 }  // namespace posed::pipeline
