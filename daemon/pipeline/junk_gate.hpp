@@ -19,6 +19,9 @@ class JunkGate {
   static constexpr std::int64_t kJunkPerSecond = 500'000;  // bytes, and the most that is saved up
   // Bytes that a link may have brought in vain, beyond what is saved up, before it must end.
   static constexpr std::int64_t kMaxOwed = 6 * kJunkPerSecond;
+  // Bytes that a new link may bring in vain when all that was used up before it came: its first
+  // message tells a device that reconnects from one more link of a flood.
+  static constexpr std::int64_t kFirstBytes = 64 * 1024;
   static constexpr std::int64_t kKnownFor_ns = 2 * kNanosPerSecond;
 
   // Whether the chunk is to be recorded and decoded. `sender`: as in drivers::Chunk; 0 always is.
@@ -34,9 +37,13 @@ class JunkGate {
   RT_SAFE [[nodiscard]] bool admits_link(std::uint64_t sender, std::int64_t now_ns) noexcept {
     refill(now_ns);
     if (is_known(sender, now_ns)) return true;
-    if (left_ < (sender == link_ ? -kMaxOwed : 0)) return false;
-    link_ = sender;
-    return true;
+    if (sender != link_) {
+      const std::int64_t floor = left_ >= 0 ? -kMaxOwed : left_ - kFirstBytes;
+      if (floor < -kLowest) return false;
+      link_ = sender;
+      link_floor_ = floor;
+    }
+    return left_ >= link_floor_;
   }
 
   // What became of a chunk that was admitted.
@@ -44,10 +51,12 @@ class JunkGate {
                        std::int64_t now_ns) noexcept {
     if (sender == 0) return;
     if (used) return remember(sender, now_ns);
-    left_ = std::max(left_ - cost, sender == link_ ? -2 * kMaxOwed : -kJunkPerSecond);
+    left_ = std::max(left_ - cost, sender == link_ ? -kLowest : -kJunkPerSecond);
   }
 
  private:
+  static constexpr std::int64_t kLowest = 2 * kMaxOwed;
+
   struct Known {
     std::uint64_t sender = 0;
     std::int64_t used_ns = 0;
@@ -72,7 +81,8 @@ class JunkGate {
   // Bytes of rubbish that may come; below 0 by those of known senders.
   std::int64_t left_ = kJunkPerSecond;
   std::int64_t filled_ns_ = 0;
-  std::uint64_t link_ = 0;  // the one that was let in last
+  std::uint64_t link_ = 0;       // the one that was let in last
+  std::int64_t link_floor_ = 0;  // the least of left_ at which it is heard
   std::array<Known, 8> known_{};
 };
 
