@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <optional>
 #include <system_error>
+#include <utility>
 
 #include <unistd.h>
 
@@ -50,6 +52,18 @@ std::string_view kind_of(const std::filesystem::path& file) {
   return "";
 }
 
+// Empty: no model file.
+std::optional<FolderModel> model_at(const std::filesystem::directory_entry& entry) {
+  std::error_code ignored;
+  const std::string name = entry.path().filename().string();
+  const std::string_view kind = kind_of(entry.path());
+  // Control characters in a name would reach people's terminals.
+  if (kind.empty() || clean(name) != name || !entry.is_regular_file(ignored)) return std::nullopt;
+  const auto changed = entry.last_write_time(ignored).time_since_epoch().count();
+  return FolderModel{
+      .name = name, .kind = kind, .stamp = fmt::format("{} {}", changed, entry.file_size(ignored))};
+}
+
 }  // namespace
 
 Result<ModelFolder> ModelFolder::open(std::filesystem::path folder) {
@@ -68,15 +82,7 @@ Result<std::vector<FolderModel>> ModelFolder::list() const {
   std::error_code error;
   std::filesystem::directory_iterator entries(folder_, error);
   for (; !error && entries != std::filesystem::directory_iterator(); entries.increment(error)) {
-    std::error_code ignored;
-    const std::string name = entries->path().filename().string();
-    const std::string_view kind = kind_of(entries->path());
-    // Control characters in a name would reach people's terminals.
-    if (kind.empty() || clean(name) != name || !entries->is_regular_file(ignored)) continue;
-    const auto changed = entries->last_write_time(ignored).time_since_epoch().count();
-    models.push_back({.name = name,
-                      .kind = kind,
-                      .stamp = fmt::format("{} {}", changed, entries->file_size(ignored))});
+    if (auto model = model_at(*entries)) models.push_back(std::move(*model));
   }
   if (error) {
     return fail("the folder of models cannot be read: " + error.message(), folder_.string());
@@ -120,10 +126,15 @@ Result<std::string> ModelFolder::add(const std::string& name, std::string_view k
   return fail("the model cannot be kept: " + error.message(), folder_.string());
 }
 
+// Without the list: of a folder of many files it would be made for every model.
 Result<FolderModel> ModelFolder::find(std::string_view name) const {
-  const auto models = TRY(list());
-  const auto found = std::ranges::find(models, name, &FolderModel::name);
-  if (found != models.end()) return *found;
+  const std::filesystem::path file(name);
+  std::error_code ignored;
+  if (!folder_.empty() && file.filename() == file) {
+    if (auto found = model_at(std::filesystem::directory_entry(folder_ / file, ignored))) {
+      return std::move(*found);
+    }
+  }
   return fail(fmt::format("there is no model {} in the daemon's list; `posed ctl models` shows it",
                           in_quotes(name)));
 }

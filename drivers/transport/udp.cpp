@@ -307,12 +307,10 @@ Chunk UdpTransport::read(std::int64_t now_ns) noexcept {
       ++chunk.foreign;
       continue;
     }
-    if (chunk.arrival_ns != kNoTime_ns && batch_ns_ - chunk.arrival_ns > kMaxAge_ns) {
-      ++chunk.kernel_dropped;
-      continue;
-    }
-    if (message.msg_len == 0 || (message.msg_hdr.msg_flags & MSG_TRUNC) != 0) {
-      ++chunk.damaged;
+    const bool is_old = chunk.arrival_ns != kNoTime_ns && batch_ns_ - chunk.arrival_ns > kMaxAge_ns;
+    if (is_old || message.msg_len == 0 || (message.msg_hdr.msg_flags & MSG_TRUNC) != 0) {
+      ++(is_old ? chunk.kernel_dropped : chunk.damaged);
+      decoded(false);
       continue;
     }
     if (!socket.keeps_to) socket.to = sender;

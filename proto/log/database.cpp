@@ -255,7 +255,34 @@ bool Database::is_in_place() const {
 
 void Database::leave_files() {
   static_cast<void>(run("PRAGMA wal_checkpoint(TRUNCATE)"));
-  sqlite3_db_config(handle_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+  merge_at_end(false);
+}
+
+void Database::merge_at_end(bool on) {
+  sqlite3_db_config(handle_.get(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, on ? 0 : 1, nullptr);
+}
+
+// The mark is the "schema cookie" of SQLite's file format (sqlite.org/fileformat2.html, 1.3.9):
+// any value will do, and it lies on the first page.
+Result<> Database::mark(std::uint32_t mark) {
+  sqlite3_db_config(handle_.get(), SQLITE_DBCONFIG_DEFENSIVE, 0, nullptr);
+  auto marked = run(("PRAGMA schema_version=" + std::to_string(mark)).c_str());
+  sqlite3_db_config(handle_.get(), SQLITE_DBCONFIG_DEFENSIVE, 1, nullptr);
+  return marked;
+}
+
+Result<bool> Database::wal_is_own() {
+  constexpr sqlite3_int64 kCookieAt = 40;
+  std::array<unsigned char, 4> bytes{};
+  sqlite3_file* file = nullptr;
+  sqlite3_file_control(handle_.get(), "main", SQLITE_FCNTL_FILE_POINTER, &file);
+  if (file == nullptr || file->pMethods == nullptr ||
+      file->pMethods->xRead(file, bytes.data(), bytes.size(), kCookieAt) != SQLITE_OK) {
+    return fail("cannot be read", file_);
+  }
+  std::uint32_t cookie = 0;
+  for (const unsigned char byte : bytes) cookie = cookie << 8 | byte;
+  return TRY(value("PRAGMA schema_version")) == std::to_string(cookie);
 }
 
 }  // namespace posed::log

@@ -126,6 +126,13 @@ class Database {
   void set_busy_timeout_ms(int patience_ms);
   // Discards everything written since the last commit; harmless when there is nothing.
   void rollback();
+  // Gives the file a mark that each page of its -wal which counts the pages carries, too: SQLite
+  // takes whatever -wal has the file's name for a part of it.
+  Result<> mark(std::uint32_t mark);
+  // Whether the mark in the file itself is that which its -wal shows.
+  Result<bool> wal_is_own();
+  // Whether what is in the -wal moves into the file when this is destroyed; it does at first.
+  void merge_at_end(bool on);
   // False when the file was deleted, moved or replaced since it was opened.
   [[nodiscard]] bool is_in_place() const;
   // Moves what is in the -wal into the file, and then leaves all files where they are when this is

@@ -59,12 +59,37 @@ Result<> check_whole(Database& database, const std::string& file) {
   return {};
 }
 
+// A -wal may be of another recording that once had the name: merged, it would destroy this one.
+Result<> check_wal(Database& database, const std::string& file) {
+  std::error_code none;
+  if (std::filesystem::file_size(file + "-wal", none) == 0 || none) return {};
+  const bool is_own = TRY(database.wal_is_own());
+  if (is_own && TRY(database.value("PRAGMA quick_check(1)")) == "ok") return {};
+  return fail("the file " + file + "-wal beside it is " +
+                  (is_own ? "damaged, or of another recording" : "of another recording") +
+                  "; move that away, and the log is what it was without it",
+              file);
+}
+
+// SQLite would undo with a -journal whatever the log has, if it is of another file of that name.
+Result<> check_journal(const std::string& file) {
+  std::error_code none;
+  if (std::filesystem::file_size(file + "-journal", none) == 0 || none) return {};
+  return fail("the file " + file +
+                  "-journal lies beside it, which a log that has begun never has;"
+                  " move that away",
+              file);
+}
+
 // Opens the file of a log: checks that it is one, of a format that is known, and not damaged, and
 // merges what a crash has left beside it.
 Result<Database> open_whole(const std::filesystem::path& path) {
   const std::string file = path.string();
+  TRY(check_journal(file));
   auto database = TRY(Database::open(path, Database::Mode::kReadWrite));
+  database.merge_at_end(false);
   TRY(check_marks(database, file));
+  TRY(check_wal(database, file));
   TRY(database.check_schema());
   merge_wal(database);
   database.set_busy_timeout_ms(kReadPatience_ms);

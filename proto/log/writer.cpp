@@ -16,7 +16,9 @@
 namespace posed::log {
 namespace {
 
-constexpr int kPatience_ms = 2000;  // merging the -wal takes a reader less time than this
+// Merging the -wal takes a reader less time than this, and the recorder's memory lasts longer.
+constexpr int kPatience_ms = 4000;
+constexpr std::int64_t kMaxMark = 0x7FFFFFFF;
 constexpr std::string_view kTakenWords =
     "exists already, or a -wal or -journal of this name does; choose another name or say "
     "--overwrite";
@@ -78,6 +80,9 @@ Result<> write_birth(Database& database, const Beginning& beginning) {
   TRY(database.run(tables.c_str()));
   TRY(write_meta(database, beginning.meta));
   TRY(write_sources(database, beginning.sources));
+  Checksum mark;
+  for (const auto& [key, value] : beginning.meta) mark.add(std::as_bytes(std::span(value)));
+  TRY(database.mark(static_cast<std::uint32_t>(mark.value() & kMaxMark)));
   return database.run("COMMIT");
 }
 

@@ -1,6 +1,7 @@
 #include "daemon/tools/emulate/log_emulator.hpp"
 
 #include <algorithm>
+#include <functional>
 
 #include <spdlog/fmt/fmt.h>
 
@@ -36,9 +37,13 @@ Result<LoggedDevice> read_logged_device(const std::string& log, const std::strin
   auto reader = TRY(log::Reader::open(log));
   const log::StreamRow* wanted = nullptr;
   std::string names;
+  // The streams of one source are one device.
+  const bool one_device =
+      std::ranges::adjacent_find(reader.streams(), std::not_equal_to<>(),
+                                 &log::StreamRow::source) == reader.streams().end();
   for (const log::StreamRow& row : reader.streams()) {
     add_word(names, row.name);
-    if (row.name == stream || (stream.empty() && reader.streams().size() == 1)) wanted = &row;
+    if (row.name == stream || (stream.empty() && one_device)) wanted = &row;
   }
   if (wanted == nullptr) {
     return misuse("choose one of its streams with --stream: " + names, log);

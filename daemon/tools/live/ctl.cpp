@@ -196,7 +196,9 @@ int list_models(const CtlOptions& options) {
   request.mutable_list_models();
   return ask_and_print(options, request, [](const v1::ControlReply& reply) {
     if (reply.model().empty()) {
-      std::puts("none; name their folder in the daemon's config: [control] models = \"models\"");
+      std::puts(
+          "none: the folder that [control] models names in the daemon's config is empty, or"
+          " none is named");
     }
     for (const v1::KnownModel& model : reply.model()) {
       std::printf("%-10s %s\n", model.kind().c_str(), clean(model.name()).c_str());

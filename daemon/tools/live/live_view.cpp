@@ -565,6 +565,7 @@ LiveScreen::LiveScreen()
   if (keyboard_ && tcgetattr(STDIN_FILENO, &keyboard_before) == 0) {
     termios raw = keyboard_before;
     raw.c_lflag &= ~static_cast<tcflag_t>(ICANON | ECHO);  // Ctrl-C still sends a signal
+    raw.c_iflag &= ~static_cast<tcflag_t>(IXON);           // Ctrl-S would stop it for good
     tcsetattr(STDIN_FILENO, TCSANOW, &raw);
   } else {
     keyboard_ = false;

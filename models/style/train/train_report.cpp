@@ -151,7 +151,7 @@ TrainingVerdict verdict_of(const std::vector<Lesson>& lessons,
   for (std::size_t i = 0; i < checks.size(); ++i) {
     const std::string& name = lessons[i].target;
     const std::string line = name + ": " + checks[i].verdict(name);
-    verdict.sentence += (verdict.sentence.empty() ? "" : "\n  ") + line;
+    verdict.sentence += (verdict.sentence.empty() ? "" : "; ") + line;
     if (unusable.empty() && !checks[i].usable()) unusable = line;
     add_sentences(name, checks[i].problems, verdict.problems);
     add_sentences(name, checks[i].warnings, verdict.warnings);

@@ -261,6 +261,17 @@ TEST_CASE("empty and too long datagrams are dropped and counted") {
   CHECK(chunk.damaged == (sent ? 2 : 1));
 }
 
+TEST_CASE("who sends nothing that is read takes no socket from others") {
+  const auto transport = listen_on("127.0.0.1:0");
+  const Peer empty("127.0.0.1:0");
+  const Peer device("127.0.0.2:0");
+  REQUIRE(empty.send(transport->endpoint(0), ""));
+  REQUIRE(is_ready(*transport));
+  CHECK(transport->read(now_ns()).damaged == 1);
+  REQUIRE(device.send(transport->endpoint(0), "a"));
+  CHECK(next(*transport) == "a");
+}
+
 TEST_CASE("what the kernel drops because nobody reads is counted with the next datagram") {
   const auto transport = listen_on("127.0.0.1:0");
   const Peer peer("127.0.0.1:0");

@@ -280,6 +280,45 @@ TEST_CASE("after a crash the log opens with everything that was committed, as on
   REQUIRE(writer.close());
 }
 
+// The -wal of a recording that was killed, whose file was then replaced by another log.
+TEST_CASE("what lies beside a log and is not its own changes nothing in it") {
+  const test::TempFolder dir;
+  const auto recorded = [&](const char* name, std::uint64_t chunks) {
+    auto writer = Writer::create(dir.path() / name, {.meta = {{"writer", name}}});
+    REQUIRE(writer);
+    REQUIRE(writer->add(log::SourceRow{0, "glove", "cyberglove", "", "", "{}"}));
+    for (std::uint64_t i = 1; i <= chunks; ++i) {
+      REQUIRE(writer->add(chunk_row(0, i, std::string(500, 'a'))));
+    }
+    REQUIRE(writer->commit());
+    return std::move(*writer);
+  };
+  Writer good = recorded("good.plog", 40);
+  REQUIRE(good.close());
+  const auto path = dir.path() / "good.plog";
+  const std::string before = test::file_text(path);
+  SECTION("a -wal of as many rows") {
+    Writer killed = recorded("killed.plog", 40);
+    std::filesystem::copy_file(dir.path() / "killed.plog-wal", path.string() + "-wal");
+    const auto refused = Reader::open(path);
+    REQUIRE(!refused);
+    CHECK(refused.error().text().find("-wal beside it is of another recording") !=
+          std::string::npos);
+    CHECK(test::file_text(path) == before);
+    std::filesystem::remove(path.string() + "-wal");
+    REQUIRE(killed.close());
+  }
+  SECTION("a -journal") {
+    dir.write("good.plog-journal", std::string(2000, 'x'));
+    REQUIRE(!Reader::open(path));
+    CHECK(test::file_text(path) == before);
+    std::filesystem::remove(path.string() + "-journal");
+  }
+  auto reader = Reader::open(path);
+  REQUIRE(reader);
+  CHECK(count_chunks(*reader) == 40);
+}
+
 TEST_CASE("a log can be read while it is being recorded, and recording goes on") {
   const test::TempFolder dir;
   const auto path = dir.path() / "live.plog";
