@@ -121,6 +121,7 @@ std::string verdict(const style::WalkerFit& fit, double rms_deg, const style::St
 Findings findings_of(const ApplyArguments& options, const style::StyleModel& model,
                      const style::Shares& shares, const clip::Clip& clip,
                      const style::Applied& applied, const style::WalkerFit& fit) {
+  constexpr double kNearlyAll = 0.95;
   const double rms_deg = applied.rms_change_rad * kDegrees;
   const double max_deg = applied.max_change_rad * kDegrees;
   const std::string judged = verdict(fit, rms_deg, model);
@@ -152,6 +153,18 @@ Findings findings_of(const ApplyArguments& options, const style::StyleModel& mod
       .add("verdict", judged)
       .add("unchanged", nothing.empty() ? std::optional<std::string>() : nothing);
   if (!nothing.empty()) findings.warn({nothing});
+  if (applied.kept_first) {
+    findings.note("the first frame is a rest pose without motion, and stays as it is");
+  }
+  const double known = applied.gate_mean.value_or(1.0);
+  if (nothing.empty() && known < kNearlyAll) {
+    findings.note(fmt::format("styled for {:.0f} % of the time: the rest is motion that the model"
+                              " does not know",
+                              100.0 * known));
+  }
+  if (nothing.empty() && !options.apply.feet) {
+    findings.note("the root moves as it did, so feet may slide; with --root stride they stand");
+  }
   return findings.remark((fit.is_far() ? "warning: " : "") + judged);
 }
 

@@ -10,6 +10,7 @@
 
 #include "models/feet/feet_stage.hpp"
 #include "models/motion/heading.hpp"
+#include "models/motion/motion.hpp"
 #include "models/motion/turn_sum.hpp"
 #include "models/style/model/harmonics.hpp"
 #include "models/style/model/stride_phase.hpp"
@@ -42,17 +43,17 @@ Result<> check_clip(const clip::Clip& clip) {
   return {};
 }
 
-// Lets the filter see the clip backwards, so that at its first frame it knows the motion and the
-// direction that the walk takes from there, which is returned.
-motion::LiveHeading settle(StyleFilter& filter, const clip::Clip& clip,
+// Lets the filter see the clip from its end back to the frame `first`, so that there it knows the
+// motion and the direction that the walk takes from there, which is returned.
+motion::LiveHeading settle(StyleFilter& filter, const clip::Clip& clip, int first,
                            const motion::PoseSpace& space) {
   const double frame_s = 1.0 / clip.frame_rate_hz;
   const auto beginning = std::lround(kBeginning_s * clip.frame_rate_hz);
   motion::LiveHeading heading;
-  for (int i = clip.frames() - 1; i >= 0; --i) {
+  for (int i = clip.frames() - 1; i >= first; --i) {
     const Frame frame = clip.frame(i);
     if (space.has_heading(frame)) heading.update(space.heading_rad(frame), frame_s);
-    if (i <= beginning) filter.preview(frame, heading, frame_s);
+    if (i - first <= beginning) filter.preview(frame, heading, frame_s);
   }
   heading.turn_back();
   filter.settle(heading);
@@ -201,7 +202,7 @@ Result<Walker> measure_walker(const StyleModel& model, const std::string& model_
                 model_name);
   }
   StyleFilter filter(bound.get(), {.alpha = 0.0});
-  const motion::LiveHeading heading = settle(filter, clip, bound->space);
+  const motion::LiveHeading heading = settle(filter, clip, 0, bound->space);
   const double seconds = (clip.frames() - 1.5) / clip.frame_rate_hz;  // ends at the last frame
   Catch ignored;
   for (int i = 0; i < clip.frames(); ++i) {
@@ -227,11 +228,15 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
   const BoundModel& ready = *bound;
   StyleFilter filter(&ready, options.filter);
   if (options.walker) filter.set_walker(*options.walker);
-  if (!options.cold) settle(filter, clip, ready.space);
+  const auto motion = TRY(motion::motion_of(clip));
+  const bool added_pose = !options.cold && motion::begins_with_added_pose(motion);
+  const int first = added_pose ? 1 : 0;
+  if (!options.cold) settle(filter, clip, first, ready.space);
 
   auto feet = TRY(feet_stage(clip, options));
   Applied applied{.clip = clip::is_acclaim(*clip.skeleton) ? clip::with_zyx_channels(clip) : clip,
                   .alpha = filter.held_alpha(),
+                  .kept_first = added_pose,
                   .remark = ready.remark};
   ChannelWriter writer(applied.clip);
   auto root = RootWriter::open(applied.clip);
@@ -241,7 +246,7 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
   double gates = 0.0;
   double estimates = 0.0;
   int estimated = 0;
-  for (int i = 0; i < clip.frames(); ++i) {
+  for (int i = first; i < clip.frames(); ++i) {
     const Frame in = clip.frame(i);
     filter.process({.frame = in, .input = &in}, out);
     gates += filter.gate();
@@ -264,7 +269,7 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
     }
   }
   if (estimated > 0) applied.estimate_mean = estimates / estimated;
-  if (!std::isnan(gates)) applied.gate_mean = gates / clip.frames();
+  if (!std::isnan(gates)) applied.gate_mean = gates / (clip.frames() - first);
   applied.joints_changed = turned.joints();
   applied.rms_change_rad = turned.rms_rad();
   applied.max_change_rad = turned.max_rad();

@@ -36,6 +36,7 @@ struct Applied {
   std::optional<double> estimate_mean{};  // of the style that it shows already, where known
   double max_root_offset_m = 0.0;         // of the root from the input's, by the feet stage
   double alpha = 0.0;                     // that arms allow of the one that was asked for
+  bool kept_first = false;                // the first frame is an added rest pose, and stays
   std::string remark{};                   // about joints that the skeleton lacks; may be empty
 };
 
