@@ -1132,6 +1132,7 @@ Result<Draft> read_gltf(const ClipFile& file, const ReadOptions& options) {
   draft->said_facing = options.facing;
   draft->said_unit_m = options.metres_per_unit;
   draft->unit_may_err = draft->bones.empty();
+  draft->metres_per_unit = 0.01;  // of a BVH that is written of it: programs take that for cm
   if (draft->bones.empty()) draft->profile = TRY(find_profile(draft->skeleton, options.profile));
   return draft;
 }

@@ -185,6 +185,7 @@ TEST_CASE("a .glb keeps the clip's own times") {
   const auto back = clip::read_clip(folder.path() / "out.glb");
   if (!back) FAIL(back.error().text());
   CHECK(back->time_s.size() == clip.time_s.size());
+  CHECK(back->metres_per_unit == 0.01);  // of a BVH, where programs take a unit for a centimetre
   clip.frame_rate_hz = back->frame_rate_hz;
   test::check_same_motion(clip, *back);  // frame by frame
 }
