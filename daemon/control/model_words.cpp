@@ -92,7 +92,8 @@ ModelWords words_of_gesture(const gesture::GestureModel& model) {
   words.learnt = "gestures " + joined(labels, " ");
   const auto count = report.find("gestures");
   if (count != report.end() && count->is_number_unsigned()) {
-    words.learnt += ", from " + some(count->get<std::size_t>(), "recorded one", "recorded ones");
+    words.learnt +=
+        ", from " + some(count->get<std::size_t>(), "recorded gesture", "recorded gestures");
   }
   words.verdict = text_of(report, "verdict");
   return words;

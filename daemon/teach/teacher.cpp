@@ -31,6 +31,11 @@ constexpr double kTrainRate_hz = 30.0;  // as `posed train style`
 constexpr std::chrono::milliseconds kLookAtTap{50};
 // So long after its end a walk waits for frames that are still on their way.
 constexpr std::int64_t kLate_ns = kNanosPerSecond / 2;
+// A walk is judged while it is walked: each second, with a tenth of the time at most, and no long
+// one, for the ring fills meanwhile.
+constexpr std::int64_t kTellEach_ns = kNanosPerSecond;
+constexpr std::int64_t kTellShare = 10;
+constexpr std::size_t kMaxTold = 4800;      // frames
 constexpr const char* kUsual = "as usual";  // the group of the walks as usual
 
 std::size_t at(Walk walk) { return static_cast<std::size_t>(walk); }
@@ -45,6 +50,8 @@ struct Teacher::Collected {
   std::optional<clip::FramesClip> frames{};  // of a walk
   clip::HandClip hand{};                     // of a show
   clip::FrameTimes times{};
+  std::int64_t first_ns = 0, last_ns = 0;  // arrivals
+  std::int64_t tell_ns = 0;                // when it is judged next
 
   // Returns whether the frame is behind the end.
   bool add(const Frame& frame) {
@@ -58,7 +65,13 @@ struct Teacher::Collected {
       hand.angles.push_back(hand_angles(frame));
     }
     times.add(header);
+    last_ns = header.arrival_ns;
+    if (first_ns == 0) first_ns = last_ns;
     return false;
+  }
+  [[nodiscard]] style::TakeCheck judge(style::TrainingClip& take, std::int64_t until_ns) const {
+    const std::int64_t silent_ns = std::max(first_ns - marked.from_ns, until_ns - last_ns);
+    return style::check_take(take, kTrainRate_hz, seconds(silent_ns));
   }
   [[nodiscard]] style::TrainingClip clip() const {
     style::TrainingClip take{.clip = {}, .group = {}, .subject = "one person", .motion = "walk"};
@@ -125,6 +138,22 @@ Result<> Teacher::check_free() const {
               " is being taught just now; wait for its end, or cancel it where it was begun");
 }
 
+Result<> Teacher::make_room(const Pupil& pupil) {
+  TRY(check_free());
+  if (is_known(pupil)) return {};
+  const std::size_t walks = walks_[0].size() + walks_[1].size();
+  const std::size_t marked = walks + signs_.signs().size();
+  const bool other = state_.stream() != pupil.name;  // else nothing of it fits the new skeleton
+  if (other && marked > 0 && state_.step() != Step::STEP_IN_USE) {
+    return fail(fmt::format(
+        "the lesson of stream {} is not finished: {} of its {} {} kept; learn"
+        " from them, or begin anew",
+        state_.stream(), marked, walks > 0 ? "walks" : "signs", marked == 1 ? "is" : "are"));
+  }
+  forget_all();
+  return {};
+}
+
 bool Teacher::is_known(const Pupil& pupil) const {
   return state_.stream() == pupil.name && pupil_.skeleton->id == pupil.skeleton->id;
 }
@@ -151,18 +180,16 @@ Result<> Teacher::mark(const Pupil& pupil, Walk walk, double seconds, bool more)
     return fail("a walk has 6 to 120 s; 20 are enough");
   }
   const std::scoped_lock lock(mutex_);
-  TRY(check_free());
-  if (!is_known(pupil)) forget_all();
-  auto& walks = walks_[at(walk)];
+  TRY(make_room(pupil));
+  const auto& walks = walks_[at(walk)];
   std::size_t frames = 0;
   for (const auto& kept : walks) frames += static_cast<std::size_t>(kept->clip.frames());
   if (more && (walks.size() >= kMaxWalks || frames > kMaxKeptFrames)) {
     return fail(fmt::format("{} walks of this kind are enough", walks.size()));
   }
-  if (!more) walks.clear();
   words_of(walk).Clear();
   words_of(walk).set_takes(static_cast<std::uint32_t>(walks.size()));
-  begin(pupil, {.walk = walk}, seconds);
+  begin(pupil, {.walk = walk, .more = more}, seconds);
   return {};
 }
 
@@ -174,8 +201,7 @@ Result<> Teacher::show(const Pupil& pupil, const std::string& label, double seco
     return fail("a show has 3 to 15 s; 5 are enough");
   }
   const std::scoped_lock lock(mutex_);
-  TRY(check_free());
-  if (!is_known(pupil)) forget_all();
+  TRY(make_room(pupil));
   TRY(signs_.check_label(label));
   state_.mutable_show()->Clear();
   begin(pupil, {.label = label}, seconds);
@@ -185,6 +211,10 @@ Result<> Teacher::show(const Pupil& pupil, const std::string& label, double seco
 Result<> Teacher::forget(const std::string& stream, const std::string& label) {
   const std::scoped_lock lock(mutex_);
   TRY(check_free());
+  if (label.empty() && state_.stream() == stream) {
+    forget_all();
+    return {};
+  }
   if (state_.stream() != stream || !signs_.signs().contains(label)) {
     return fail("no sign " + in_quotes(label) + " was shown to stream " + in_quotes(stream));
   }
@@ -247,6 +277,7 @@ Result<> Teacher::cancel(const std::string& stream) {
     return fail("the style is coming on just now; alpha = 0 or another model takes it off again");
   }
   model_.reset();
+  if (state_.label().empty()) words_of(marked_.walk).clear_sentence();  // of what was so far
   finish(Step::STEP_IDLE, {});
   changed_.notify_all();
   return {};
@@ -323,8 +354,26 @@ void Teacher::collect(Lock& lock, Collected& collected) {
   while (tap_.consume([&](const Frame& frame) { over = collected.add(frame) || over; })) {
   }
   if (over) return check(lock, collected);
-  lock.lock();
+  if (collected.marked.label.empty()) {
+    tell_so_far(lock, collected);
+  } else {
+    lock.lock();
+  }
   if (!stop_ && collected.job == job_) changed_.wait_for(lock, kLookAtTap);
+}
+
+// Called without the lock, returns with it.
+void Teacher::tell_so_far(Lock& lock, Collected& collected) {
+  const std::int64_t now_ns = clock_();
+  if (collected.tell_ns == 0) collected.tell_ns = collected.marked.from_ns + 3 * kTellEach_ns;
+  if (now_ns < collected.tell_ns || collected.times.size() > kMaxTold) return lock.lock();
+  style::TrainingClip take = collected.clip();
+  const style::TakeCheck checked = collected.judge(take, now_ns);
+  const std::int64_t took_ns = clock_() - now_ns;
+  collected.tell_ns = now_ns + std::max(kTellEach_ns, kTellShare * took_ns);
+  lock.lock();
+  if (collected.job != job_) return;
+  words_of(collected.marked.walk).set_sentence("so far: " + clean(checked.sentence()));
 }
 
 // The walk or show is over; called without the lock, returns with it.
@@ -362,10 +411,12 @@ void Teacher::check(Lock& lock, Collected& collected) {
 Teacher::Judged Teacher::check_walk(Lock& lock, const Collected& collected) {
   lock.unlock();
   auto take = std::make_shared<style::TrainingClip>(collected.clip());
-  const style::TakeCheck checked = style::check_take(*take, kTrainRate_hz);
+  const style::TakeCheck checked = collected.judge(*take, collected.marked.until_ns);
   lock.lock();
   if (checked.good() && collected.job == job_) {
-    walks_[at(collected.marked.walk)].push_back(std::move(take));
+    auto& walks = walks_[at(collected.marked.walk)];
+    if (!collected.marked.more) walks.clear();
+    walks.push_back(std::move(take));
   }
   return {checked.good(), checked.sentence()};
 }

@@ -72,11 +72,13 @@ class Teacher final : public pipeline::RawTap {
   ~Teacher() override;
 
   // All below: any cold thread. Errors are sentences for the client.
-  // Begins to keep a walk of the stream, beside the earlier ones of its kind (`more`) or in their
-  // place. What was marked of another stream or skeleton is forgotten.
+  // Begins to keep a walk of the stream, beside the earlier ones of its kind (`more`) or, once it
+  // is good, in their place. There is one lesson, which all clients see: while that of another
+  // stream is not finished it must be forgotten first.
   Result<> mark(const Pupil& pupil, Walk walk, double seconds, bool more = false);
-  // Begins to keep a show of a sign of a hand. What was marked of another stream is forgotten.
+  // Begins to keep a show of a sign of a hand, as mark() does.
   Result<> show(const Pupil& pupil, const std::string& label, double seconds);
+  // Forgets a sign; with an empty label everything that was marked.
   Result<> forget(const std::string& stream, const std::string& label);
   // Begins to train on the stream's walks, or on the signs that were shown.
   Result<> train(const std::string& stream, const std::string& name,
@@ -104,6 +106,7 @@ class Teacher final : public pipeline::RawTap {
   // What is being kept.
   struct Marked {
     Walk walk = Walk::kNeutral;
+    bool more = false;    // beside earlier walks
     std::string label{};  // of a sign; empty: it is a walk
     std::int64_t from_ns = 0, until_ns = 0;
   };
@@ -115,6 +118,7 @@ class Teacher final : public pipeline::RawTap {
 
   void run();
   void collect(Lock& lock, Collected& collected);
+  void tell_so_far(Lock& lock, Collected& collected);
   void check(Lock& lock, Collected& collected);
   Judged check_walk(Lock& lock, const Collected& collected);
   Judged check_show(Lock& lock, Collected& collected);
@@ -123,6 +127,8 @@ class Teacher final : public pipeline::RawTap {
   [[nodiscard]] bool is_under_way() const;
   void forget_outcome();  // of the lesson before
   [[nodiscard]] Result<> check_free() const;
+  // Room for what is marked of this stream: another one's lesson is finished, or there is none.
+  Result<> make_room(const Pupil& pupil);
   Result<> check_ready(const std::string& stream, Subject subject) const;
   void begin(const Pupil& pupil, Marked marked, double seconds);
   void forget_all();

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 
 #include "proto/frame/time.hpp"
 

@@ -13,7 +13,7 @@ bool over_tcp(const Options& options) { return option<std::string>(options, "lin
 ListenSettings tcp_listen_settings(const Options& options) {
   return {.endpoint = option<std::string>(options, "listen"),
           .peers = words_option(options, "peers"),
-          .device = "mocap system"};
+          .device = "device"};
 }
 
 }  // namespace

@@ -7,6 +7,8 @@
 #include <limits>
 #include <utility>
 
+#include <spdlog/fmt/fmt.h>
+
 #include "proto/frame/median.hpp"
 #include "proto/frame/rotation.hpp"
 
@@ -195,6 +197,69 @@ void hold_missing(Clip& clip) {
   if (held == 0) return;
   clip.warnings.push_back(std::to_string(held) + " of " + std::to_string(clip.channels.size()) +
                           " values are missing; each holds the one before it");
+}
+
+namespace {
+
+// How many frames are missing before each frame of a clip. Frames that come in bursts are early
+// after they were late, and are not taken for missing.
+std::vector<std::size_t> missing_before(const std::vector<double>& time_s, double step_s) {
+  constexpr double kForgets = 0.9;  // of each frame, since a device's clock may drift
+  std::vector<std::size_t> missing(time_s.size());
+  double late = 0.0;  // steps
+  for (std::size_t i = 1; i < time_s.size(); ++i) {
+    const double steps = (time_s[i] - time_s[i - 1]) / step_s;
+    late = kForgets * late + steps - 1.0;
+    if (steps < 1.5) continue;
+    const double lacks = std::max(0.0, std::round(std::min(late, steps - 1.0)));
+    missing[i] = static_cast<std::size_t>(lacks);
+    late -= lacks;
+  }
+  return missing;
+}
+
+std::string gap_words(const Clip& clip, const std::vector<std::size_t>& missing) {
+  constexpr std::size_t kMostNamed = 5;
+  std::string where;
+  std::size_t gaps = 0, frames = 0;
+  for (std::size_t i = 0; i < missing.size(); ++i) {
+    if (missing[i] == 0) continue;
+    frames += missing[i];
+    if (++gaps > kMostNamed) continue;
+    where += fmt::format("{}{} at {:.2f} s", gaps > 1 ? ", " : "", missing[i], clip.time_s[i - 1]);
+    if (clip.time_s[i] - clip.time_s[i - 1] > kLongestHeld_s) where += " (cut out)";
+  }
+  if (gaps > kMostNamed) where += fmt::format(" and {} more gaps", gaps - kMostNamed);
+  return fmt::format("{} frames are missing: {}; the one before each gap is held", frames, where);
+}
+
+}  // namespace
+
+void hold_gaps(Clip& clip) {
+  if (clip.frames() < 2) return;
+  const auto missing = missing_before(clip.time_s, 1.0 / clip.frame_rate_hz);
+  if (std::ranges::all_of(missing, [](std::size_t frames) { return frames == 0; })) return;
+  clip.warnings.push_back(gap_words(clip, missing));
+  std::vector<std::size_t> from;  // the frame that each one of the new clip is
+  std::vector<double> time_s;
+  for (std::size_t i = 0; i < missing.size(); ++i) {
+    const bool cut = i > 0 && clip.time_s[i] - clip.time_s[i - 1] > kLongestHeld_s;
+    for (std::size_t k = 1; k <= (cut ? 0 : missing[i]); ++k) {
+      from.push_back(i - 1);
+      const double share = static_cast<double>(k) / static_cast<double>(missing[i] + 1);
+      time_s.push_back(std::lerp(clip.time_s[i - 1], clip.time_s[i], share));
+    }
+    from.push_back(i);
+    time_s.push_back(clip.time_s[i]);
+  }
+  const ChannelMatrix channels = clip.channels(from, Eigen::all);
+  clip.channels = channels;
+  clip.time_s = std::move(time_s);
+  if (clip.timecode.empty()) return;
+  std::vector<Timecode> timecode;
+  timecode.reserve(from.size());
+  for (const std::size_t i : from) timecode.push_back(clip.timecode[i]);
+  clip.timecode = std::move(timecode);
 }
 
 }  // namespace posed::clip

@@ -58,4 +58,10 @@ class FrameTimes {
 // Reports the number in `warnings`. For formats that cannot hold missing values.
 void hold_missing(Clip& clip);
 
+// Repeats the frame before a gap in the clip's times as often as frames are missing there, so that
+// an even spacing keeps the time; a gap of more than kLongestHeld_s is cut out. Says in `warnings`
+// how many are missing, and where. For formats without times.
+inline constexpr double kLongestHeld_s = 60.0;
+void hold_gaps(Clip& clip);
+
 }  // namespace posed::clip

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <set>
 #include <string>
@@ -79,11 +80,11 @@ class ClipTakes : public Takes {
     take({"start", "run"});
     await_frames("walker", 2400);  // 2.5 s
     // Clips of a take are written in the order of the streams' names, so this one comes last.
-    for (int i = 0; i < 600'000 && files("-1-walker.bvh").empty(); ++i) {
+    for (int i = 0; i < 600'000 && files("-1-walker.walk.bvh").empty(); ++i) {
       std::this_thread::sleep_for(1ms);
     }
-    REQUIRE(files("-1-walker.bvh").size() == 1);  // while the daemon runs
-    CHECK(files("-2-walker.bvh").empty());
+    REQUIRE(files("-1-walker.walk.bvh").size() == 1);  // while the daemon runs
+    CHECK(files("-2-walker.run.bvh").empty());
   }
   // The recording's files whose names end so, without the folder.
   [[nodiscard]] std::vector<std::string> files(const std::string& end) const {
@@ -105,9 +106,10 @@ class ClipTakes : public Takes {
     CHECK(frames_of(log, "run").size() > 10'000);
     CHECK(files(".bvh").size() == clips);
     CHECK(files("").size() == 1 + clips);
-    for (const std::string take : {"1", "2"}) {
-      for (const std::string& clip : files("-" + take + "-walker.bvh")) {
-        CHECK(file_text(path("takes/" + clip)).ends_with(frames_of(log, take)));
+    for (const auto& [take, name] :
+         std::map<std::string, std::string>{{"-1", "walk"}, {"-2", "run"}}) {
+      for (const std::string& clip : files(take + "-walker." + name + ".bvh")) {
+        CHECK(file_text(path("takes/" + clip)).ends_with(frames_of(log, name)));
       }
     }
   }
@@ -204,9 +206,9 @@ TEST_CASE("a [record] table makes `run` record into a folder, and without one ta
   REQUIRE(log.ends_with("Z.plog"));
   CHECK(takes_of(log).size() == 2);
   const std::string stem = log.substr(0, log.size() - std::string(".plog").size());
-  for (const std::string take : {"1", "2"}) {
-    const std::string clip = file_text(stem + "-" + take + "-walker.bvh");
-    CHECK(clip.ends_with(stage.frames_of(log, take)));
+  for (const std::string take : {"1-walker.walk", "2-walker.run"}) {
+    const std::string clip = file_text(stem + "-" + take + ".bvh");
+    CHECK(clip.ends_with(stage.frames_of(log, take.substr(0, 1))));
   }
 }
 

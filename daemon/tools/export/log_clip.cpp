@@ -229,11 +229,10 @@ class Collector {
     auto clip = clip_.finish(path, rate_hz, times_.in_seconds());
     if (clip && missing_ > 0) {
       clip->warnings.push_back(std::to_string(missing_) +
-                               " frames were skipped while the daemon ran and are not in the clip");
+                               " frames were skipped while the daemon ran");
     }
     if (clip && returns_ > 0) {
-      clip->warnings.push_back("the body came back " + std::to_string(returns_) +
-                               " times; the clip goes on with its next frame");
+      clip->warnings.push_back("the body came back " + std::to_string(returns_) + " times");
     }
     return clip;
   }

@@ -472,6 +472,7 @@ A show begins at rest, makes the sign, holds it and comes back to rest. Ctrl-C e
       ->capture_default_str();
   lesson->add_flag("--more", options.more, "Learn these walks beside those before")
       ->excludes("--signs");
+  lesson->add_flag("--anew", options.anew, "Forget a lesson that is not finished, of any stream");
   lesson
       ->add_option("--name", options.name,
                    "Of what is learnt, and of its file NAME.style or NAME.gesture")

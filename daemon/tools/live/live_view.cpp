@@ -353,15 +353,32 @@ std::string body_row(const v1::StreamStats& stream) {
 // What feeds it is switched on by whoever likes, so silence is no fault.
 bool is_camera(const v1::SourceStats& source) { return source.driver() == "landmarks"; }
 
+// A tracker that somebody writes: which of its messages are refused, and why.
+std::string without_hand(std::uint64_t valid, std::uint64_t torn, std::uint64_t odd,
+                         std::uint64_t foreign) {
+  if (torn + odd + foreign <= valid) return "no hand: its camera is off, or sees none";
+  std::string text = fmt::format("no hand: refused of {} messages:", valid + torn + odd + foreign);
+  const auto add = [&](std::uint64_t count, const char* why) {
+    if (count > 0) text += fmt::format("{} {} ({})", text.ends_with(":") ? "" : ",", count, why);
+  };
+  add(torn, "no whole JSON object with 63 numbers a hand");
+  add(odd, "points of no hand, or another side than left and right");
+  add(foreign, "not version 1 of landmarks, or a hand that came less than three times");
+  return text;
+}
+
 // Why nothing comes of a device with several bodies.
 std::string without_body(const v1::SourceStats& source) {
   if (source.away()) return "the device is away";
-  if (is_camera(source)) return "no hand: its camera is off, or sees none";
   std::string text = "no body is streamed";
   const auto count = [&](Outcome outcome) {
     const int i = static_cast<int>(outcome);
     return i < source.outcome_size() ? source.outcome(i) : 0;
   };
+  if (is_camera(source)) {
+    return without_hand(count(Outcome::kOk), count(Outcome::kShort), count(Outcome::kOutOfRange),
+                        count(Outcome::kForeign));
+  }
   const std::uint64_t valid = count(Outcome::kOk), foreign = count(Outcome::kForeign);
   const std::uint64_t damaged =
       count(Outcome::kShort) + count(Outcome::kBadChecksum) + count(Outcome::kOutOfRange);

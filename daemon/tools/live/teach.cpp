@@ -10,6 +10,7 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include "daemon/config/config.hpp"
 #include "daemon/tools/command/client.hpp"
 #include "proto/text/clean.hpp"
 
@@ -18,11 +19,42 @@ namespace {
 
 constexpr int kGetReady_s = 3;  // between the announcement of a walk and its beginning
 constexpr std::chrono::milliseconds kLookAgain{100};
-constexpr int kMostRefused = 4;  // shows of a sign
+constexpr std::size_t kMaxSoFar = 60;  // bytes of a verdict on the line of a countdown
+constexpr int kMostRefused = 4;        // shows of a sign
 
 class Lesson {
  public:
   Lesson(const TeachOptions& options, const Ask& ask) : options_(options), ask_(ask) {}
+
+  // What cannot be is told before somebody has walked.
+  Result<> check() {
+    if (!config::is_stream_name(options_.name)) {
+      return fail(in_quotes(options_.name) + " cannot be the name of " +
+                  (options_.signs.empty() ? "a style" : "signs") +
+                  "; it has a-z, digits, '-' and '_', 1 to 32");
+    }
+    const auto reply = TRY(ask_(about_stream()));
+    const v1::Teaching& now = reply.teaching();
+    const bool kept = now.neutral_walk().takes() + now.style_walk().takes() + now.sign_size() > 0;
+    if (!kept || now.step() == v1::Teaching::STEP_IN_USE) return {};
+    if (options_.anew) {
+      v1::ControlRequest request;
+      request.mutable_teach()->set_stream(now.stream());
+      request.mutable_teach()->mutable_forget();
+      TRY(ask_(request));
+      return {};
+    }
+    const bool replaces =
+        !options_.more && ((options_.neutral_s > 0.0 && now.neutral_walk().takes() > 0) ||
+                           (options_.style_s > 0.0 && now.style_walk().takes() > 0));
+    if (now.stream() == options_.stream && !(options_.signs.empty() && replaces)) return {};
+    return fail(
+        fmt::format("a lesson of stream {} is not finished, perhaps on somebody's page, and "
+                    "has {} walks as usual, {} in the style and {} signs; --more adds to "
+                    "its walks, --neutral 0 or --style 0 keeps one kind, --anew forgets all",
+                    clean_name(now.stream()), now.neutral_walk().takes(), now.style_walk().takes(),
+                    now.sign_size()));
+  }
 
   Result<> walk(bool style, double walk_s) {
     const std::string how = style ? fmt::format("walk in the style ({})", clean_name(options_.name))
@@ -108,7 +140,9 @@ class Lesson {
     TRY(ask_(request));
     begun_ = true;
     const auto reply = TRY(await([&](const v1::Teaching& now) {
-      count_down(fmt::format("{} ... {:.0f} s", how, std::ceil(now.seconds_left())));
+      const std::string& so_far = (now.style() ? now.style_walk() : now.neutral_walk()).sentence();
+      count_down(fmt::format("{} ... {:.0f} s  {}", how, std::ceil(now.seconds_left()),
+                             request.teach().has_mark() ? clean(so_far, kMaxSoFar) : ""));
       return now.step() == v1::Teaching::STEP_MARKING || now.step() == v1::Teaching::STEP_CHECKING;
     }));
     return reply.teaching();
@@ -124,7 +158,7 @@ class Lesson {
   Result<v1::ControlReply> await(GoesOn&& goes_on) {
     while (true) {
       auto reply = TRY(ask_(about_stream()));
-      if (reply.teaching().stream() != options_.stream) {
+      if (reply.teaching().stream() != options_.stream) {  // somebody began anew
         return fail("another stream is taught now; begin again when that is over");
       }
       if (!goes_on(reply.teaching())) return reply;
@@ -169,6 +203,7 @@ class Lesson {
 Result<v1::ControlReply> teach(const TeachOptions& options, const Ask& ask) {
   Lesson lesson(options, ask);
   const auto all = [&]() -> Result<v1::ControlReply> {
+    TRY(lesson.check());
     for (const std::string& sign : options.signs) {
       TRY(lesson.show(sign));
     }

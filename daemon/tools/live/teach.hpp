@@ -15,6 +15,7 @@ struct TeachOptions {
   std::string stream, name;                 // of the style
   double neutral_s = 20.0, style_s = 20.0;  // of the walks; 0: those that were marked before
   bool more = false;                        // the walks are learnt beside those before
+  bool anew = false;                        // a lesson that is not finished is forgotten
   std::vector<std::string> signs{};         // to show one after the other; none: walks
   int shows = 3;                            // good ones of each
   double show_s = 5.0;

@@ -155,8 +155,9 @@ void warn_of_clock(const Convert& convert, clip::Clip& clip) {
 
 Result<clip::Clip> read_log(const Convert& convert) {
   auto clip = clip_of_log(convert.in, convert.stream, convert.take);
-  if (!clip || holds_gaps(convert.out)) return clip;
-  clip::hold_missing(*clip);
+  if (!clip) return clip;
+  if (!holds_gaps(convert.out)) clip::hold_missing(*clip);
+  if (clip::format_of(convert.out)->evenly_spaced) clip::hold_gaps(*clip);
   return clip;
 }
 

@@ -77,7 +77,10 @@ Result<Expectation> Expectation::open(const log::Reader& reader) {
   const std::string& file = reader.file();
   const auto has_frames = TRY(reader.has_frames());
   if (!has_frames) {
-    return fail("holds no published frames to expect; record with --frames", file);
+    return fail(
+        "holds no published frames to expect; the next one does by `posed record --frames`,"
+        " or by [record] with frames = true (and its folder) in the config",
+        file);
   }
   Expectation expectation(file);
   for (const log::StreamRow& row : reader.streams()) {

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <atomic>
+#include <cctype>
 #include <cerrno>
 #include <chrono>
 #include <condition_variable>
@@ -35,6 +36,7 @@
 #include "proto/frame/whole_file.hpp"
 #include "proto/log/schema.hpp"
 #include "proto/log/writer.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::tools {
 namespace {
@@ -276,6 +278,18 @@ class TakeClips {
   std::jthread thread_;  // last, because it uses all the others
 };
 
+// A take's name as a part of its clips' names: ".sneak"; empty without one.
+std::string ending_named(const std::string& take) {
+  constexpr std::size_t kMaxBytes = 100;
+  std::string text = take.empty() ? "" : "." + clean(take, kMaxBytes);
+  for (std::size_t i = 1; i < text.size(); ++i) {
+    const auto c = static_cast<unsigned char>(text[i]);
+    const bool kept = c >= 0x80 || std::isalnum(c) != 0 || c == '-' || c == '_' || c == ' ';
+    if (!kept) text[i] = '_';
+  }
+  return text;
+}
+
 // The log has what came before the end of a take after its next commit.
 constexpr std::chrono::milliseconds kCommitted{1000};
 
@@ -285,6 +299,7 @@ Result<> write_clip(Result<clip::Clip> clip, const std::filesystem::path& path) 
   if (std::filesystem::exists(path, error)) return fail("exists already", path.string());
   never_replace(path);
   clip::hold_missing(*clip);
+  clip::hold_gaps(*clip);
   for (const std::string& warning : clip->warnings) {
     spdlog::warn("{}: {}", path.string(), warning);
   }
@@ -340,7 +355,8 @@ Result<> TakeClips::write(bool all, const std::stop_token& stop) {
                         Result<clip::Clip> clip) {
     if (!all && take.last_item == log::kToTheEnd) return;
     if (!written_.emplace(take.id, stream).second) return;
-    const std::string path = stem + "-" + std::to_string(take.id) + "-" + stream + ".bvh";
+    const std::string path =
+        stem + "-" + std::to_string(take.id) + "-" + stream + ending_named(take.name) + ".bvh";
     if (auto written = write_clip(std::move(clip), path); !written) {
       spdlog::warn("take {} of stream {} is no clip: {}", take.id, stream, written.error().text());
     }

@@ -19,6 +19,8 @@ using Eigen::VectorXd;
 
 constexpr double kMaxSilence_s = 0.5;  // a stride has a second: what is missing cannot be guessed
 constexpr double kMaxMissing = 0.1;    // share of the frames in which a joint may be missing
+// Nobody runs faster, and below this length it is the noise of a fast device.
+constexpr double kMaxSpeed_mps = 12.0, kMinJump_m = 0.3;
 
 std::string number(double value, int digits) {
   std::string text =
@@ -34,6 +36,24 @@ double silence_s(const clip::Clip& clip) {
     longest_s = std::max(longest_s, clip.time_s[i] - clip.time_s[i - 1]);
   }
   return longest_s;
+}
+
+// How far the body jumps where a tracking system loses it [m]; 0: nowhere.
+double jump_m(const clip::Clip& clip) {
+  double longest_m = 0.0;
+  Eigen::Vector3f before = Eigen::Vector3f::Zero();
+  for (int i = 0; i < clip.frames(); ++i) {
+    const Frame frame = clip.frame(i);
+    const Eigen::Vector3f now(frame.root_position_m.data());
+    const double length_m = i > 0 ? static_cast<double>((now - before).norm()) : 0.0;
+    const auto at = static_cast<std::size_t>(i);
+    const double time_s = i > 0 ? clip.time_s[at] - clip.time_s[at - 1] : 1.0;
+    if (length_m > kMinJump_m && length_m > kMaxSpeed_mps * time_s) {
+      longest_m = std::max(longest_m, length_m);
+    }
+    before = now;
+  }
+  return longest_m;
 }
 
 // Joints that lack values in some frames, in words; `problem` gets one that lacks too many to guess
@@ -115,7 +135,7 @@ std::string TakeCheck::sentence() const {
   return text;
 }
 
-TakeCheck check_take(TrainingClip& take, double rate_hz) {
+TakeCheck check_take(TrainingClip& take, double rate_hz, double silent_s) {
   TakeCheck check;
   clip::Clip& clip = take.clip;
   if (clip.frames() < 2 || clip.time_s.back() <= clip.time_s.front()) {
@@ -124,7 +144,7 @@ TakeCheck check_take(TrainingClip& take, double rate_hz) {
   }
   check.seconds = clip.time_s.back() - clip.time_s.front();
   clip.frame_rate_hz = (clip.frames() - 1) / check.seconds;
-  if (const double gap_s = silence_s(clip); gap_s > kMaxSilence_s) {
+  if (const double gap_s = std::max(silent_s, silence_s(clip)); gap_s > kMaxSilence_s) {
     check.problem = "the device was silent for " + number(gap_s, 1) +
                     " s: see to its connection, and walk again";
     return check;
@@ -132,6 +152,11 @@ TakeCheck check_take(TrainingClip& take, double rate_hz) {
   check.incomplete = missing_joints(clip, check.problem);
   if (!check.good()) return check;
   clip::hold_missing(clip);
+  if (const double far_m = jump_m(clip); far_m > 0.0) {
+    check.problem = "the body jumped by " + number(far_m, 1) +
+                    " m from one frame to the next: see to its tracking, and walk again";
+    return check;
+  }
   check_walk(take, rate_hz, check);
   return check;
 }

@@ -25,7 +25,7 @@ struct TakeCheck {
 
 // Checks a walk. Values that are missing in few frames (clip::FramesClip makes them NaN) get those
 // before them, and the rate becomes that of the clip's times, as training needs it. `rate_hz`: of
-// the training.
-[[nodiscard]] TakeCheck check_take(TrainingClip& take, double rate_hz);
+// the training; `silent_s`: the longest time without a frame before the first and behind the last.
+[[nodiscard]] TakeCheck check_take(TrainingClip& take, double rate_hz, double silent_s = 0.0);
 
 }  // namespace posed::style

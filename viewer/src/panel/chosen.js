@@ -65,6 +65,7 @@ export class Chosen {
       .map((kind) => new ModelControls(stream, kind, this.context));
     const teach = find('style') ? new TeachControls(stream, this.context) : null;
     const signs = find('generate') && stream.isHand ? new SignLesson(stream, this.context) : null;
+    this.lesson = teach ?? signs;
     this.glove = isGlove(stream) ? new GloveLesson(stream, this.context) : null;
     const more = new Parameters(stream, control);
     this.#parts = [this.style, this.gesture, ...models, teach, signs, this.glove, more].filter(

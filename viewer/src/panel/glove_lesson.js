@@ -42,7 +42,6 @@ export class GloveLesson {
     this.rows = POSES.map(([pose, text, hint]) => this.#row(pose, text, hint));
     this.called = el('input', {
       type: 'text',
-      maxLength: 32,
       placeholder: 'a-z, digits, - and _',
       oninput: () => this.#show(),
     });
@@ -144,6 +143,8 @@ export class GloveLesson {
     const thumb = held.length > 0 && held.every(isContact);
     const good = (whole || thumb) && held.every((pose) => verdicts.get(pose)?.good);
     this.use.disabled = this.busy || !good || !NAME.test(this.called.value);
-    write(this.words, words);
+    const { value } = this.called;
+    const unfit = value && !NAME.test(value) ? 'The name has a-z, 0-9, - and _, at most 32.' : '';
+    write(this.words, words || unfit);
   }
 }

@@ -36,7 +36,9 @@ function seen(world) {
 
 // What posed did to the stream, in a word.
 function done({ stats, pose, isTake }) {
-  const names = new Set(stats?.stage.map(({ name }) => name));
+  // A style stage without a style does nothing.
+  const working = stats?.stage.filter(({ name, model }) => name !== 'style' || model);
+  const names = new Set(working?.map(({ name }) => name));
   if (names.has('style')) return 'styled';
   if (pose.performed) return 'performed';
   if (names.has('robot')) return 'robot';

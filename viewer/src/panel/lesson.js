@@ -2,22 +2,25 @@
 // "Cancel". All of it is known by the daemon; the page asks while something is under way.
 import { el, labelled, write } from './dom.js';
 
-const LOOK_MS = 250;
+const LOOK_MS = { busy: 250, idle: 1000 }; // somebody else may teach the same stream
 const NAME = /^[a-z0-9_-]{1,32}$/;
 // Teaching.Step
 export const STEP = { idle: 0, marking: 1, checking: 2, training: 3, starting: 4, inUse: 5 };
+const TABLES = { style: 'style', gesture: 'generate' }; // of the config, by ending
 
 export class Lesson {
+  static ready_s = 3; // to take one's place, before a walk or show begins
   static #open = {}; // by title; also when the controls are made again for a new model
 
   now = { step: STEP.idle };
+  left_s = 0; // of the countdown
+  #other = ''; // the stream of a lesson that is not finished, where it is not this one
 
   // train: what is learnt, beside its name, as the request has it; rows: elements above the name
   constructor(stream, { requests }, title, train = {}) {
     Object.assign(this, { name: stream.name, requests, title });
     this.called = el('input', {
       type: 'text',
-      maxLength: 32,
       placeholder: 'a-z, digits, - and _',
       oninput: () => this.show(),
     });
@@ -25,6 +28,8 @@ export class Lesson {
       el('button', { type: 'button', onclick: () => this.ask(step()) }, text);
     this.learn = button('Learn', () => ({ train: { name: this.called.value, ...train } }));
     this.cancel = button('Cancel', () => ({ cancel: {} }));
+    this.anew = el('button', { type: 'button', hidden: true, onclick: () => this.#beginAnew() });
+    this.why = el('p.note');
     this.words = el('p.note', { role: 'status' });
   }
 
@@ -36,7 +41,9 @@ export class Lesson {
       el('summary', {}, this.title),
       ...rows,
       labelled(`${step}. Name it, and learn`, this.called, this.learn, this.cancel),
+      this.why,
       this.words,
+      this.anew,
     );
     this.show();
   }
@@ -46,27 +53,71 @@ export class Lesson {
     if (this.element.open) this.ask({});
   }
 
-  // The fold says what comes of it: a step that has begun is not yet done.
-  async ask(step) {
-    clearTimeout(this.timer);
-    const reply = await this.requests.ask({ teach: { stream: this.name, ...step } });
-    if (reply.ok) {
-      const { teaching } = reply;
-      this.now = teaching.stream === this.name ? teaching : { step: STEP.idle };
-    }
-    this.show(reply.ok ? '' : reply.error);
-    if (this.busy && this.element.isConnected) this.timer = setTimeout(() => this.ask({}), LOOK_MS);
+  #beginAnew() {
+    this.ask({ forget: {} }, this.#other);
   }
+
+  // Counts down, so that who presses the button has time to take his place, then asks.
+  async askReady(key, step) {
+    this.key = key;
+    for (this.left_s = this.constructor.ready_s; this.left_s > 0; this.left_s -= 1) {
+      this.show();
+      await new Promise((done) => {
+        setTimeout(done, 1000);
+      });
+      if (!this.element.isConnected) return undefined;
+    }
+    return this.ask(step);
+  }
+
+  // What the button of a walk or show says while this one is counted down or marked; else ''.
+  count(key, marked) {
+    if (this.left_s > 0 && this.key === key) return `in ${this.left_s} …`;
+    return marked ? `${Math.ceil(this.now.seconds_left)} s …` : '';
+  }
+
+  // The fold says what comes of it: a step that has begun is not yet done.
+  async ask(step, stream = this.name) {
+    clearTimeout(this.timer);
+    const reply = await this.requests.ask({ teach: { stream, ...step } });
+    clearTimeout(this.timer);
+    if (reply.ok) this.#hear(reply.teaching);
+    const isStep = Object.keys(step).length > 0;
+    this.trouble = reply.ok ? '' : reply.error;
+    if (isStep) this.refusal = this.trouble;
+    this.show();
+    if (!this.element.isConnected || !(this.busy || this.element.open)) return;
+    this.timer = setTimeout(() => this.ask({}), this.busy ? LOOK_MS.busy : LOOK_MS.idle);
+  }
+
+  #hear(teaching) {
+    const { stream, step, sign = [], neutral_walk, style_walk } = teaching;
+    const own = stream === this.name;
+    const kept = (neutral_walk?.takes ?? 0) + (style_walk?.takes ?? 0) + sign.length;
+    this.#other = !own && step !== STEP.inUse && (kept > 0 || step !== STEP.idle) ? stream : '';
+    if (this.#other) this.#otherWords = [`${this.#other} is being taught`, kept, step];
+    this.now = own ? teaching : { step: STEP.idle };
+  }
+
+  #otherWords = [];
 
   get busy() {
-    return this.now.step !== STEP.idle && this.now.step !== STEP.inUse;
+    return this.left_s > 0 || (this.now.step !== STEP.idle && this.now.step !== STEP.inUse);
   }
 
-  // ready: enough was marked to learn from
-  showLesson(ready, refusal) {
-    this.learn.disabled = this.busy || !ready || !NAME.test(this.called.value);
-    this.cancel.hidden = !this.busy;
-    write(this.words, refusal || this.#sentence());
+  // missing: what is to be shown before something can be learnt; empty: it is enough
+  showLesson(missing) {
+    const { value } = this.called;
+    const unfit = NAME.test(value) ? '' : 'a name of a-z, 0-9, - and _, at most 32';
+    const why = missing || unfit;
+    this.learn.disabled = this.busy || why !== '';
+    write(this.why, !this.busy && why ? `To learn: ${why}.` : '');
+    this.cancel.hidden = !this.busy || this.left_s > 0;
+    const [who, kept, step] = this.#otherWords;
+    const other = this.#other && `${who}${kept > 0 ? ` and keeps what it was shown (${kept})` : ''}`;
+    this.anew.hidden = !this.#other || step !== STEP.idle;
+    write(this.anew, `Forget what ${this.#other} was shown`);
+    write(this.words, this.refusal || this.trouble || other || this.#sentence());
   }
 
   #sentence() {
@@ -74,7 +125,8 @@ export class Lesson {
     if (step === STEP.training || step === STEP.starting) return 'learning …';
     if (step !== STEP.inUse) return problem ?? '';
     const used = sequence > 0 ? `in use ${train_s.toFixed(1)} s after “Learn”` : 'kept';
-    return `✓ ${model} is ${used}; ${verdict}`;
+    const table = TABLES[model.split('.').pop()];
+    return `✓ ${model} is ${used}; ${verdict}. For the next start, too: model = "…/${model}" in the table ${table} of ${this.name}`;
   }
 }
 

@@ -1,29 +1,35 @@
 // The folders of the daemon: its models, to use, rename and delete, and its recordings, to play and
-// download. A list is asked for when it is unfolded, and again after each change.
+// download. A list is asked for while it is unfolded.
 import { el, write } from './dom.js';
 import { Take } from './take.js';
 
 class List {
-  // context: {control, requests, acks}
-  constructor(title, context) {
-    Object.assign(this, context);
+  #listed = '';
+
+  // context: {control, requests, acks}; each_ms: it is asked for again
+  constructor(title, each_ms, context) {
+    Object.assign(this, { each_ms }, context);
     this.words = el('p.note', { role: 'status' });
     this.items = el('ul.shelf');
-    const again = el('button.quiet', { type: 'button', onclick: () => this.list() }, 'Look again');
     this.element = el(
       'details',
       { ontoggle: () => this.element.open && this.list() },
       el('summary', {}, title),
       this.words,
       this.items,
-      again,
     );
   }
 
   // request: that lists; field: of the reply
   async show(request, field, none) {
+    clearTimeout(this.timer);
     const reply = await this.requests.ask(request);
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.element.open && this.list(), this.each_ms);
     const entries = reply.ok ? reply[field] : [];
+    const listed = JSON.stringify([reply.ok, entries]);
+    if (listed === this.#listed) return; // what somebody is about to do there stays
+    this.#listed = listed;
     write(this.words, reply.ok ? (entries.length === 0 ? none : '') : reply.error);
     this.items.replaceChildren(...entries.map((entry) => this.item(entry)));
   }
@@ -48,7 +54,7 @@ function stripOf(path, name) {
 
 export class ModelLibrary extends List {
   constructor(context) {
-    super('Library of models', context);
+    super('Library of models', 10000, context);
   }
 
   list() {
@@ -97,7 +103,7 @@ export class ModelLibrary extends List {
 
   // Asks in the row itself.
   #ask(buttons, name, kind, { field, what, doIt }) {
-    const keep = () => this.#offer(buttons, name, kind);
+    const keep = () => this.#offer(buttons, name, kind); // of a list that stays as it is, too
     const yes = el('button.strong', { type: 'submit' }, what);
     const no = el('button', { type: 'button', onclick: keep }, 'Keep as it is');
     const form = el('form.buttons', {}, field, yes, no);
@@ -115,20 +121,19 @@ export class ModelLibrary extends List {
     const field = el('input', {
       type: 'text',
       value: name.replace(/\.[a-z]+$/, ''),
-      maxLength: 32,
       aria: { label: `New name of ${name}` },
     });
     const doIt = () =>
       this.control(
         { rename_model: { name, to: field.value } },
-        `${name}: its name is ${field.value}`,
+        `rename ${name} to ${field.value}`,
       );
     this.#ask(buttons, name, kind, { field, what: 'Rename', doIt });
   }
 
   #delete(buttons, name, kind) {
     const field = el('span', {}, `Delete ${name} for good?`);
-    const doIt = () => this.control({ delete_model: { name } }, `${name}: deleted`);
+    const doIt = () => this.control({ delete_model: { name } }, `delete ${name}`);
     this.#ask(buttons, name, kind, { field, what: 'Delete', doIt });
   }
 }
@@ -137,7 +142,7 @@ export class Recordings extends List {
   #takes = new Map(); // by name: also while it plays and the list is made again
 
   constructor(context) {
-    super('Recordings', context);
+    super('Recordings', 2000, context);
     this.context = context;
   }
 

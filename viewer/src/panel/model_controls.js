@@ -41,7 +41,11 @@ export class ModelControls {
   #fill() {
     const names = this.names ?? [];
     const all = names.includes(this.current) || !this.current ? names : [this.current, ...names];
-    this.choice.replaceChildren(...all.map((name) => el('option', { value: name }, name)));
+    const none = this.current ? [] : [el('option', { value: '' }, `none in use${names.length > 0 ? `, ${names.length} to choose` : ''}`)];
+    this.choice.replaceChildren(
+      ...none,
+      ...all.map((name) => el('option', { value: name }, name)),
+    );
     this.choice.value = this.current ?? '';
     this.choice.disabled = names.length === 0;
     this.choice.title = names.length === 0 ? this.refusal || NO_LIST : '';

@@ -37,7 +37,7 @@ export class SignLesson extends Lesson {
   }
 
   #begin() {
-    this.ask({ show: { label: this.sign.value, seconds: SHOW_S } });
+    this.askReady('show', { show: { label: this.sign.value, seconds: SHOW_S } });
   }
 
   #chip({ label, shows }) {
@@ -50,19 +50,17 @@ export class SignLesson extends Lesson {
     );
   }
 
-  show(refusal = '') {
-    const { step, seconds_left, show, sign = [] } = this.now;
-    const marked = step === STEP.marking;
-    write(this.begin, marked ? `${Math.ceil(seconds_left)} s …` : `Show ${SHOW_S} s`);
+  show() {
+    const { step, show, sign = [] } = this.now;
+    write(this.begin, this.count('show', step === STEP.marking) || `Show ${SHOW_S} s`);
     this.begin.disabled = this.busy || !LABEL.test(this.sign.value);
     write(this.verdict, verdictOf(show));
     const listed = JSON.stringify([sign, this.busy]);
     if (listed !== this.#listed)
       this.signs.replaceChildren(...sign.map((one) => this.#chip(one)));
     this.#listed = listed;
-    this.showLesson(
-      sign.length > 0 && sign.every(({ shows }) => shows >= SHOWS),
-      refusal,
-    );
+    const few = sign.filter(({ shows }) => shows < SHOWS).map(({ label }) => label);
+    const more = few.length > 0 ? `show ${few.join(', ')} ${SHOWS} times` : '';
+    this.showLesson(sign.length > 0 ? more : 'show a sign');
   }
 }

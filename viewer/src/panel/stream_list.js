@@ -1,7 +1,6 @@
 // The list of streams: name, state in a word, rate and latency. One is chosen.
 import { stateOf } from '../streams/words.js';
 import { el, write } from './dom.js';
-import { ms } from './numbers.js';
 
 export class StreamList {
   #rows = new Map();
@@ -35,7 +34,8 @@ export class StreamList {
     write(row.state, word);
     const live = stats.state === 'live' && !stats.away;
     write(row.rate, live ? `${stats.rate_hz.toFixed(stats.rate_hz < 99.95 ? 1 : 0)} Hz` : '');
-    write(row.latency, live && stats.publish?.p99_us > 0 ? ms(stats.publish.p50_us / 1000) : '');
+    const late_ms = stats.publish?.p99_us > 0 ? Math.round(stats.publish.p50_us / 1000) : NaN;
+    write(row.latency, live && late_ms >= 1 ? `${late_ms} ms later` : ''); // else at once
     write(row.sentence, sentence);
     row.sentence.hidden = sentence === '';
   }

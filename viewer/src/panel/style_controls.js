@@ -104,7 +104,8 @@ export class StyleControls {
     if (this.alpha) {
       const { target, value } = parameter('alpha') ?? { target: 0, value: 0 };
       this.alpha.follow(target, value);
-      this.#writeFacts(stream.stats);
+      if (stream.stage('style').model) this.#writeFacts(stream.stats);
+      else write(this.facts, 'No style is in use: choose a model below, or teach one.');
     }
     if (this.weights) {
       const shares = parseWeights(parameter('weights')?.text ?? '', this.styles);

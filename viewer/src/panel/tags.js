@@ -7,7 +7,7 @@ const KNOWN = 0.5; // below it the style is mostly faded
 
 function styledWords(stream) {
   const alpha = stream.parameter('style', 'alpha');
-  if (!alpha) return '';
+  if (!alpha || !stream.stage('style').model) return '';
   const faded = stream.stats.style_gate < KNOWN ? '\u00a0· faded, motion unknown' : '';
   return `styled, α ${signed(alpha.value, 2)}${faded}`;
 }

@@ -1,6 +1,6 @@
 // Takes: marks in the recording. A daemon that does not record, or replays, has none: then the page
 // says what to do.
-import { hearName, takeTitle } from '../streams/take_names.js';
+import { takeTitle } from '../streams/played.js';
 import { el, write } from './dom.js';
 import { minutes } from './numbers.js';
 
@@ -65,7 +65,6 @@ export class Takes {
       this.words.title = HOW;
       return;
     }
-    if (stats.take) hearName(stats.recorder_file, stats.take);
     if (stats !== this.#stats) this.#run(stats.take !== undefined);
     this.#stats = stats;
     this.fields.disabled = readOnlyReason !== '';

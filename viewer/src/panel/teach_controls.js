@@ -17,7 +17,8 @@ export class TeachControls extends Lesson {
   }
 
   #walk(number, how, style) {
-    const ask = (more) => this.ask({ mark: { style, seconds: WALK_S, more } });
+    const ask = (more) =>
+      this.askReady(number, { mark: { style, seconds: WALK_S, more } });
     const mark = el('button', { type: 'button', onclick: () => ask(false) });
     const more = el(
       'button',
@@ -32,24 +33,23 @@ export class TeachControls extends Lesson {
     return { row: labelled(`${number}. Walk ${how}`, mark, more), mark, more, words: el('p.note') };
   }
 
-  show(refusal = '') {
-    const { step, style, seconds_left, neutral_walk, style_walk } = this.now;
+  show() {
+    const { step, style, neutral_walk, style_walk } = this.now;
     const walked = [neutral_walk, style_walk];
     this.walks.forEach(({ mark, more, words }, i) => {
-      const { takes = 0 } = walked[i] ?? {};
+      const { takes = 0, sentence = '' } = walked[i] ?? {};
       const marked = step === STEP.marking && style === (i === 1);
       const again = takes > 0 ? 'Again' : 'Walk';
-      write(mark, marked ? `${Math.ceil(seconds_left)} s …` : `${again} ${WALK_S} s`);
+      write(mark, this.count(i + 1, marked) || `${again} ${WALK_S} s`);
       mark.disabled = this.busy;
       more.disabled = this.busy;
       more.hidden = takes === 0;
-      const kept = takes > 1 ? `; ${takes} walks are kept` : '';
-      const verdict = verdictOf(walked[i]);
+      const verdict = marked ? sentence : verdictOf(walked[i]);
+      const bad = !marked && verdict.startsWith('✗') && takes > 0;
+      const kept = takes > 1 || bad ? `; ${takes} good ${takes > 1 ? 'walks are' : 'walk is'} kept` : '';
       write(words, verdict && verdict + kept);
     });
-    this.showLesson(
-      walked.every((walk) => walk?.takes > 0),
-      refusal,
-    );
+    const lacks = ['as usual', 'in the style'].filter((_, i) => !(walked[i]?.takes > 0));
+    this.showLesson(lacks.length > 0 ? `a good walk ${lacks.join(' and one ')}` : '');
   }
 }

@@ -40,11 +40,15 @@ const FOREIGN = 4; // of another sender; late ones and duplicates behind it: no 
 
 const many = (count, what) => `${count.toLocaleString('en')} ${what}${count === 1 ? '' : 's'}`;
 
-function countsOf({ outcome, kernel_dropped }) {
-  const damaged = outcome.slice(OK + 1, FOREIGN).reduce((sum, count) => sum + count, 0);
+const sum = (counts) => counts.reduce((all, count) => all + count, 0);
+
+function countsOf({ driver, outcome, kernel_dropped }) {
+  const damaged = sum(outcome.slice(OK + 1, FOREIGN));
+  const other = driver === 'landmarks' ? (outcome[FOREIGN] ?? 0) : 0;
   return [
     kernel_dropped > 0 && `${many(kernel_dropped, 'datagram')} lost in the kernel`,
     damaged > 0 && `${many(damaged, 'packet')} not understood`,
+    other > 0 && `${many(other, 'message')} of another version, or of a hand seen less than three times`,
   ].filter(Boolean);
 }
 
@@ -66,11 +70,15 @@ function inputOf(stream) {
 function sourceOf(source, streams) {
   const own = streams.filter(({ source_name: of }) => of === source.name);
   const live = own.filter(({ state }) => state === 'live');
+  // Of a tracker that somebody writes, whatever its messages lack is refused.
+  const refused = source.driver === 'landmarks' ? sum(source.outcome.slice(OK + 1, FOREIGN + 1)) : 0;
   const [word, tone] = source.away
     ? ['absent', 'busy']
     : live.length > 0
       ? ['live', 'good']
-      : ['nothing comes', 'off'];
+      : refused > (source.outcome[OK] ?? 0)
+        ? ['messages refused', 'bad']
+        : ['nothing comes', 'off'];
   return {
     name: source.name,
     word,

@@ -5,14 +5,16 @@ import { Lights } from './lights.js';
 import { robotPlace } from './robot_shape.js';
 
 const FIELD_DEG = 28;
-const APART_M = 0.2; // from hand to hand
-const HEIGHT_M = 0.32; // that is seen
+const APART_M = { least: 0.2, most: 0.3 }; // from hand to hand, for their names
+const HEIGHT_M = 0.27; // that is seen
 
 export class HandsView {
   scene = new Scene();
   camera = new PerspectiveCamera(FIELD_DEG, 1, 0.02, 10);
   #performers = new Map(); // name: {performer, holder}
   #free = 1; // share of the height that nothing covers
+  #height = 1; // pixels
+  #up = 0; // how far its middle is above that of the view, as a share
 
   constructor(element, theme, onChange) {
     this.lights = new Lights(theme, false);
@@ -55,37 +57,52 @@ export class HandsView {
   arrange(names, placeOf) {
     const places = names.map(placeOf);
     const middle = (Math.min(...places) + Math.max(...places)) / 2;
-    for (const [name, { holder }] of this.#performers) {
+    for (const [name, entry] of this.#performers) {
       const i = names.indexOf(name);
-      holder.visible = i >= 0;
-      if (i >= 0) holder.position.set((places[i] - middle) * APART_M, 0, 0);
+      entry.holder.visible = i >= 0;
+      entry.place = i >= 0 ? places[i] - middle : 0;
     }
     const count = names.length ? 1 + Math.max(...places) - Math.min(...places) : 0;
-    if (count === this.count) return; // whoever turned the view keeps it
-    this.count = count;
-    this.#frame();
+    // Whoever turned the view keeps it.
+    if (count === this.count) this.#spread();
+    else {
+      this.count = count;
+      this.#frame();
+    }
   }
 
-  // top: pixels at the upper edge that buttons cover.
-  resize(width, height, top) {
+  // top: pixels at the upper edge that buttons cover; bottom: at the lower one, for names.
+  resize(width, height, top, bottom) {
     const aspect = width / Math.max(height, 1);
-    const free = 1 - top / Math.max(height, 1);
+    const free = 1 - (top + bottom) / Math.max(height, 1);
     if (aspect === this.camera.aspect && free === this.#free) return;
     this.camera.aspect = aspect;
+    this.#height = height;
     this.#free = free;
+    this.#up = (0.5 * (bottom - top)) / Math.max(height, 1);
     this.camera.updateProjectionMatrix();
     this.#frame();
   }
 
+  #spread() {
+    for (const { holder, place = 0 } of this.#performers.values())
+      holder.position.x = place * this.apart_m;
+  }
+
   #frame() {
     const half = Math.tan((FIELD_DEG * Math.PI) / 360);
-    const across_m = (this.count ?? 1) * APART_M + 0.03;
+    const count = this.count ?? 1;
+    const across_m = count * APART_M.least + 0.03;
     const high_m = Math.max(
       HEIGHT_M / Math.max(this.#free, 0.3),
       across_m / Math.max(this.camera.aspect, 0.2),
     );
     const far = high_m / (2 * half);
-    this.controls.target.set(0, 0.06 + 0.5 * (1 - this.#free) * high_m, 0);
+    const { least, most } = APART_M;
+    this.apart_m = Math.min(Math.max((high_m * this.camera.aspect) / count, least), most);
+    this.apart_px = (this.apart_m * this.#height) / high_m;
+    this.#spread();
+    this.controls.target.set(0, 0.06 - this.#up * high_m, 0);
     this.camera.position
       .set(0.3, 0.11, 1)
       .normalize()

@@ -42,6 +42,14 @@ export class NameTags {
     return tag;
   }
 
+  // So wide at most [CSS pixels], that none covers its neighbour.
+  limit(key, wide) {
+    const tag = this.#tags.get(key);
+    if (!tag || tag.most === wide) return;
+    tag.most = wide;
+    tag.element.style.maxWidth = `${wide}px`;
+  }
+
   // In CSS pixels.
   widthOf(key) {
     return this.#tags.get(key)?.wide ?? 0;

@@ -17,7 +17,9 @@ import { RAW_SUFFIX } from '../streams/stream.js';
 
 const MOST_PIXELS = 2; // per CSS pixel
 const NAMES_PX = 44; // of the bodies, below the buttons
+const HAND_NAMES_PX = 66; // of hands, four lines
 const GAP_PX = 8; // between what covers the bodies and them
+const BESIDE_M = 3;
 const CROWD = 4; // figures; of more only the styled ones have names
 const CALM_FRAMES = 90; // drawn after the last change, while the camera glides
 const EASED = 4; // the page's frames for a picture, where the processor finds hands, too
@@ -140,12 +142,14 @@ export class World {
   }
 
   // Whether the view looks at this performer: of follow and orbit the chosen body, its raw twin and
-  // what is played beside it.
-  #isLookedAt({ stream, figure }) {
+  // what is played beside it, where it is near: else it would make the chosen one small.
+  #isLookedAt(performer) {
+    const { stream, figure } = performer;
     if (stream.isHand || !figure.group.visible) return false;
     const one = this.performers.get(this.#chosen);
     if (!this.views.isOfOne || !one || one.stream.isHand) return true;
-    return stream.isTake || stream.name === this.#chosen || stream.name === `${this.#chosen}${RAW_SUFFIX}`;
+    if (stream.isTake) return performer.centre.distanceTo(one.centre) < BESIDE_M;
+    return stream.name === this.#chosen || stream.name === `${this.#chosen}${RAW_SUFFIX}`;
   }
 
   #leave(name) {
@@ -161,7 +165,7 @@ export class World {
   // Statistics come each second; only other streams or devices in them move anybody. Without this
   // the scene would never rest.
   #arrangeChanged() {
-    const streams = this.store.main().map(({ name, stats }) => [name, stats.source_name]);
+    const streams = this.store.main().map((one) => [one.name, one.stats.source_name, one.hasLeft]);
     const now = JSON.stringify(streams);
     if (now === this.#arranged) return;
     if (this.#arranged === '') this.#numberInOrder();
@@ -176,7 +180,7 @@ export class World {
     const mains = this.store.shown().filter(({ name }) => this.performers.has(name));
     const twin = (stream) => this.performers.get(`${stream.name}-raw`);
     const bodies = mains.filter(({ isHand }) => !isHand);
-    const hands = mains.filter(({ isHand }) => isHand);
+    const hands = mains.filter(({ isHand, hasLeft }) => isHand && !hasLeft);
     const lanes = lanesOf(bodies, (stream) => raw === 'beside' && twin(stream) !== undefined);
     for (const stream of bodies) {
       const place = lanes.get(stream.name);
@@ -253,7 +257,7 @@ export class World {
     this.views.resize(width, height, this.#covered());
     if (this.#areas.hands) {
       const { width: wide, height: high } = this.#areas.hands;
-      this.hands.resize(wide, high, show === 'hands' ? this.#tools_px : 0);
+      this.hands.resize(wide, high, show === 'hands' ? this.#tools_px : 0, HAND_NAMES_PX);
     }
     this.touch();
   }
@@ -383,7 +387,9 @@ export class World {
     if (isHand) {
       this.hands.hold(performer, at);
       at.project(this.hands.camera);
-      this.tags.place(name, at, this.#areas.hands ?? this.#areas.bodies, true);
+      const area = this.#areas.hands ?? this.#areas.bodies;
+      this.tags.limit(name, Math.floor(this.hands.apart_px) - GAP_PX);
+      this.tags.place(name, at, area, true);
     } else {
       at.copy(performer.above);
       const half = this.tags.widthOf(name) / this.#areas.bodies.width; // of -1 to 1

@@ -1,14 +1,14 @@
 // Recordings that are played in the scene beside the live streams, over and over until they are
 // stopped. Each is a stream of the store that nobody but this sends; the daemon knows nothing of it.
 import { isSound } from '../motion/kinematics.js';
-import { heardName, takeTitle } from './take_names.js';
 
-// "take 1: walker" of 20261126T065505Z-1-walker.bvh, as posed names its takes; where the page has
-// heard the take's name, with it: "take 1 “sneak”: walker".
+export const takeTitle = (number, name) => `take ${number}${name ? ` “${name}”` : ''}`;
+
+// "take 1 “sneak”: walker" of 20261126T065505Z-1-walker.sneak.bvh, as posed names its takes.
 export function takeName(file) {
-  const [, log, number, stream] = /^(.*?)-(\d+)-([a-z0-9_-]+)\.bvh$/.exec(file) ?? [];
+  const [, number, stream, name] = /^.*?-(\d+)-([a-z0-9_-]+)(?:\.(.+))?\.bvh$/.exec(file) ?? [];
   if (!stream) return { text: file, stream: '' };
-  return { text: `${takeTitle(number, heardName(log, number))}: ${stream}`, stream };
+  return { text: `${takeTitle(number, name)}: ${stream}`, stream };
 }
 
 export class Played {

@@ -62,6 +62,12 @@ export class Stream {
     return this.placed > 0;
   }
 
+  // A hand that a tracker no longer sees, which is elsewhere; a silent glove is still on its hand.
+  get hasLeft() {
+    const { driver = '', state = '' } = this.stats ?? {};
+    return driver === 'landmarks' && state !== 'live';
+  }
+
   stage(name) {
     return this.stats?.stage.find((stage) => stage.name === name);
   }

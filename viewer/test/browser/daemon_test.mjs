@@ -108,12 +108,8 @@ told(
     await page.getByRole('button', { name: 'End take' }).click();
     await acknowledged(page, 'take ends');
     await page.locator('summary', { hasText: 'Recordings' }).click();
-    const clip = page.getByLabel('Download: take-1-walker.bvh');
-    const again = page.getByRole('button', { name: 'Look again' });
-    while ((await clip.count()) === 0) {
-      await page.waitForTimeout(400); // while the daemon runs, on a thread that others go before
-      await again.click();
-    }
+    const clip = page.getByLabel('Download: take-1-walker.page.bvh');
+    await clip.waitFor(PATIENCE); // written while the daemon runs, on a thread that others go before
     await page.getByText('take 1 “page”: walker', { exact: true }).waitFor(PATIENCE);
     const [download] = await Promise.all([page.waitForEvent('download', PATIENCE), clip.click()]);
     assert.match(readFileSync(await download.path(), 'utf8'), /^HIERARCHY[^]*MOTION/);

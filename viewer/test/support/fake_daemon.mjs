@@ -322,6 +322,8 @@ export class FakeDaemon {
     if (mark) {
       Object.assign(teaching, { step: 1, style: mark.style, seconds_left: mark.seconds });
       this.more = mark.more;
+      const kind = mark.style ? 'style_walk' : 'neutral_walk';
+      teaching[kind] = { takes: teaching[kind]?.takes ?? 0, sentence: 'so far: 4 strides' };
     } else if (train) Object.assign(teaching, { step: 3, model: `${train.name}.style` });
     else if (cancel) teaching.step = 0;
     else if (teaching.step === 3) {

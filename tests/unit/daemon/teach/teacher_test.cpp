@@ -89,6 +89,7 @@ struct School {
       frame.header.device_ns = kNoTime_ns;
       frame.header.arrival_ns =
           from_ns + static_cast<std::int64_t>(i * 1e9 / clip.frame_rate_hz + 0.5);
+      if (i == clip.frames()) frame.header.arrival_ns = from_ns + std::int64_t{10'000'000'000};
       frame.header.stream = kStream + 1;
       teacher.raw_frame(frame);
       frame.header.stream = kStream;
@@ -183,7 +184,11 @@ TEST_CASE("more walks are learnt beside those before, and a refused one spoils n
   const auto refused = school.mark(still, Walk::kNeutral, true);
   CHECK_FALSE(refused.good());
   CHECK(refused.takes() == 2);
+  CHECK(school.mark(still, Walk::kNeutral).takes() == 2);  // takes nobody's place
   CHECK(school.mark(march, Walk::kNeutral).takes() == 1);  // in the place of both
+  clip::Clip cut = march;
+  cut.channels.conservativeResize(march.frames() * 9 / 10, Eigen::NoChange);
+  CHECK(has(school.mark(cut, Walk::kNeutral, true).sentence(), "silent for 1.0 s"));
 }
 
 TEST_CASE("a hand is taught signs, and keeps those that were shown well", "[teach]") {
@@ -229,6 +234,10 @@ TEST_CASE("one stream is taught at a time, until it is cancelled", "[teach]") {
   CHECK_FALSE(school.teacher.cancel("other"));
   CHECK(school.teacher.cancel("walker"));
   CHECK(school.teacher.state().neutral_walk().good());  // stays
+  const auto over = school.teacher.mark(School::pupil(march, "other"), Walk::kNeutral, kWalk_s);
+  REQUIRE_FALSE(over);
+  CHECK(has(over.error().message, "lesson of stream walker is not finished"));
+  CHECK(school.teacher.forget("walker", ""));
   CHECK(school.teacher.mark(School::pupil(march, "other"), Walk::kNeutral, kWalk_s));
   CHECK(school.teacher.state().neutral_walk().sentence().empty());
   // The daemon ends while a walk is marked.

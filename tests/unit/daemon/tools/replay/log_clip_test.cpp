@@ -225,4 +225,23 @@ TEST_CASE("values that a frame lacks keep their last value, with a warning") {
   CHECK(clip.warnings.front().find("6 of 36") != std::string::npos);
 }
 
+TEST_CASE("missing frames are held so that the time stays, and are told; bursts are not missing") {
+  clip::Clip clip;
+  clip.frame_rate_hz = 10.0;
+  clip.time_s = {0.0, 0.1, 0.5, 0.6, 100.6, 100.7, 100.9, 100.91, 101.0};
+  clip.channels.resize(9, 1);
+  for (int i = 0; i < 9; ++i) clip.channels(i, 0) = i;
+  clip::Clip bursts = clip;
+  clip::hold_gaps(clip);
+  REQUIRE(clip.frames() == 13);
+  CHECK(clip.channels.col(0).segment(1, 5).transpose() ==
+        Eigen::RowVectorXd{{1.0, 1.0, 1.0, 1.0, 2.0}});
+  CHECK(clip.time_s[4] == Approx(0.4));
+  REQUIRE(clip.warnings.size() == 1);
+  CHECK(says(clip.warnings, "3 at 0.10 s, 999 at 0.60 s (cut out), 1 at 100.70 s"));
+  bursts.time_s = {0.0, 0.1, 0.4, 0.41, 0.42, 0.7, 0.71, 0.72, 1.0};
+  clip::hold_gaps(bursts);
+  CHECK(bursts.frames() == 11);  // it came late once
+}
+
 }  // namespace posed::test

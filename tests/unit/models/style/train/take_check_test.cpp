@@ -35,7 +35,7 @@ void stand(clip::Clip& clip, double from_s, double to_s, bool wave = false) {
     for (Eigen::Index c = 0; c < clip.channels.cols(); ++c) {
       const Channel& channel = clip.skeleton->channels[static_cast<std::size_t>(c)];
       const bool arm = has(clip.skeleton->joints[channel.joint].name, "Arm");
-      if (!(wave && arm)) clip.channels(i, c) = pose[c];
+      if (!(wave && arm) && !channel.translation) clip.channels(i, c) = pose[c];
     }
   }
 }
@@ -97,6 +97,18 @@ TEST_CASE("who stands in T-pose for longer than he walks teaches his walk alone"
   const auto dataset = make_dataset({take}, {}, options).value();
   REQUIRE(dataset.clips[0].mended.size() == 1);
   CHECK(has(dataset.clips[0].mended[0], "6.5 s of standing before the walk are left out"));
+}
+
+TEST_CASE("a walk whose body jumps, or that begins or ends in silence, is refused",
+          "[take_check]") {
+  TrainingClip take = walked();
+  CHECK(has(check_take(take, 30.0, 0.6).problem, "silent for 0.6 s"));
+  for (Eigen::Index c = 0; c < take.clip.channels.cols(); ++c) {
+    if (take.clip.skeleton->channels[static_cast<std::size_t>(c)].translation) {
+      take.clip.channels.col(c).tail(300).array() += 10.0;
+    }
+  }
+  CHECK(has(refusal(take), "jumped by 17.3 m"));
 }
 
 TEST_CASE("a walk about the stage is learnt from as one that goes straight on", "[take_check]") {
