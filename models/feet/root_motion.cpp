@@ -4,8 +4,10 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "models/feet/smoothing.hpp"
+#include "proto/frame/smooth_step.hpp"
 
 namespace posed::feet {
 namespace {
@@ -15,6 +17,10 @@ constexpr double kStands = 4.0;        // times the weight of the points is all 
 constexpr double kDriftTau_s = 0.3;    // over which the offset's own speed is averaged
 constexpr double kForgetTau_s = 1.0;   // over which it ends where no foot stands
 constexpr double kMaxDrift_m_s = 3.0;  // no style changes the speed of a walk by more
+constexpr double kGoesTau_s = 0.5;     // for how the root goes beside the feet
+constexpr double kStandingFeet_m_s = 0.2;     // slower feet tell nothing
+constexpr double kGoes = 0.5;          // speed of the root over that of the feet beside it
+constexpr double kInPlace = 0.2;       // the same for who walks in place
 constexpr double kReturnTau_s = 1.0;   // the offset returns by this share of itself ...
 constexpr double kReturn_m_s = 0.1;    // ... and by this
 constexpr double kStepTau_s = 0.02;    // smooths the change from foot to foot
@@ -36,10 +42,36 @@ RT_SAFE void RootMotion::forget() noexcept {
   restart();
   offset_m_.setZero();
   drift_m_s_.setZero();
+  root_m_s_.setZero();
+  feet_m_s_ = 0.0;
+  goes_ = 1.0;
   pending_m_.setZero();
   rest_m_.setZero();
   emitted_m_.setZero();
   fresh_ = true;
+}
+
+// Sets goes_.
+RT_SAFE void RootMotion::look_where_it_goes(const OfPoints<Placed>& now,
+                                            const Eigen::Vector3d& root_m, double dt_s) noexcept {
+  Eigen::Vector3d step_m = root_m - std::exchange(last_root_m_, root_m);
+  if (!started_) return;
+  double feet_m = 0.0;
+  int feet = 0;
+  for (std::size_t leg = 0; leg < kLegs; ++leg) {
+    if (!now[leg][kAnkle].known || !before_[leg][kAnkle].known) continue;
+    const Eigen::Vector3d foot_m =
+        now[leg][kAnkle].performer_m - before_[leg][kAnkle].performer_m - step_m;
+    feet_m += std::hypot(foot_m.x(), foot_m.z());
+    ++feet;
+  }
+  if (feet == 0) return;
+  step_m.y() = 0.0;
+  const double share = smoothing(dt_s, kGoesTau_s);
+  root_m_s_ += share * (step_m / dt_s - root_m_s_);
+  feet_m_s_ += share * (feet_m / feet / dt_s - feet_m_s_);
+  if (feet_m_s_ < kStandingFeet_m_s * scale_) return;
+  goes_ = smooth_step((root_m_s_.norm() / feet_m_s_ - kInPlace) / (kGoes - kInPlace));
 }
 
 // The offset moves so that standing points move over the ground as the performer's do: the weighted
@@ -64,7 +96,7 @@ RT_SAFE void RootMotion::walk(const OfPoints<Placed>& now, const Contacts& conta
     const double stands = std::min(1.0, kStands * weight);
     const Eigen::Vector3f flight_m_s(learnt->velocity_m_s.data());
     step_m = stands * wanted_m / std::max(weight, kFlight) +
-             (1.0 - stands) * dt_s * flight_m_s.cast<double>();
+             (1.0 - stands) * goes_ * dt_s * flight_m_s.cast<double>();
   }
   step_m.y() = 0.0;
   step_m = shortened(step_m, kMaxDrift_m_s * scale_ * dt_s);
@@ -153,6 +185,7 @@ RT_SAFE Eigen::Vector3d RootMotion::update(const PosePair& pair, const Contacts&
     drift_m_s_.setZero();
     pending_m_.setZero();
   } else {
+    look_where_it_goes(now, pair.root_m, dt_s);
     if (started_) walk(now, contacts, dt_s, pair.learnt);
     come_back(gone, dt_s, options.mode);
     if (pair.learnt != nullptr) {

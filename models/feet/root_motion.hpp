@@ -74,6 +74,8 @@ class RootMotion {
   [[nodiscard]] OfPoints<Placed> placed(const PosePair& pair) const noexcept;
   void walk(const OfPoints<Placed>& now, const Contacts& contacts, double dt_s,
             const RootChange* learnt) noexcept;
+  void look_where_it_goes(const OfPoints<Placed>& now, const Eigen::Vector3d& root_m,
+                          double dt_s) noexcept;
   void come_back(double gone, double dt_s, RootMode mode) noexcept;
   [[nodiscard]] double lowest_m(const OfPoints<Placed>& now, const Contacts& contacts,
                                 Eigen::Vector3d Placed::* body) const noexcept;
@@ -91,6 +93,12 @@ class RootMotion {
   Eigen::Vector3d offset_m_ = Eigen::Vector3d::Zero();  // the offset that the mode asks for
   Eigen::Vector3d pending_m_ =
       Eigen::Vector3d::Zero();  // the part of offset_m_'s steps still to be made
+  // The performer's root, and its feet beside it, averaged over half a second.
+  Eigen::Vector3d last_root_m_ = Eigen::Vector3d::Zero(), root_m_s_ = Eigen::Vector3d::Zero();
+  double feet_m_s_ = 0.0;
+  // 1 where the root goes as the legs walk, 0 where it stays: on a treadmill, or in a stream that
+  // does not know where the performer is.
+  double goes_ = 1.0;
   Eigen::Vector3d drift_m_s_ = Eigen::Vector3d::Zero();  // speed of the offset while feet stood
   // What is left of a jump of offset_m_, by another mode or limit or other joints: it is added,
   // and returns to 0 like the offset.

@@ -85,7 +85,8 @@ void apply(const rig::Rig& rig, Skeleton& skeleton) {
 Result<> add_profile(const Profile& profile, const Skeleton& skeleton, rig::RigInput& known) {
   known.bones = TRY(named_bones(profile, skeleton));
   known.T = known_t(profile, skeleton);
-  if (!known.up) known.up = profile.up;
+  // +y is what the recogniser takes unless the whole clip speaks against it.
+  if (!known.up && profile.up != UpAxis::kPlusY) known.up = profile.up;
   return {};
 }
 

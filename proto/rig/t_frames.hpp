@@ -79,6 +79,8 @@ class Frames {
   void find_chest();
   void trunk_bone(Bone before, Bone bone, const std::optional<Vec>& rest_way);
   void head(Bone before, const Mat& T, double sure_now, const std::string& why);
+  [[nodiscard]] int foot(Side side) const;
+  [[nodiscard]] bool walks(const Vec& up) const;
   void find_up();
   void legs();
   [[nodiscard]] bool legs_by_feet(const Both& thigh);

@@ -189,6 +189,30 @@ void Frames::head(Bone before, const Mat& T_now, double sure_now, const std::str
       "a frame of its own: as the clip turns it least");
 }
 
+// Whether it strides, and over one ground, where `up` is up: who lies still does not stride, and
+// who crawls leaves that ground.
+bool Frames::walks(const Vec& up) const {
+  std::vector<double> ground;
+  std::vector<Vec> apart;
+  Vec middle = Vec::Zero();
+  for (int i = 0; i < motion_.poses(); ++i) {
+    const Vec& left = motion_.position(i, foot(Side::kLeft));
+    const Vec& right = motion_.position(i, foot(Side::kRight));
+    ground.push_back(std::min(left.dot(up), right.dot(up)));
+    apart.push_back(across(left - right, up));
+    middle += apart.back() / motion_.poses();
+  }
+  const double half_leg = 0.5 * leg_length();
+  const auto [lowest, highest] = std::ranges::minmax(ground);
+  return highest - lowest < half_leg &&
+         std::ranges::any_of(apart, [&](const Vec& d) { return (d - middle).norm() > half_leg; });
+}
+
+int Frames::foot(Side side) const {
+  const Bone bone = on(side, Bone::kLeftFoot);
+  return joint_[joint_.has(bone) ? bone : on(side, Bone::kLeftLowerLeg)];
+}
+
 // +y unless the zero pose stands along another axis, or every sign in the clip speaks against it.
 void Frames::find_up() {
   struct Score {
@@ -199,10 +223,6 @@ void Frames::find_up() {
   };
   const int hips = joint_[Bone::kHips];
   const Vec pelvis = t_frame(Bone::kHips)->transpose() * kY;
-  const auto foot = [this](Side side) {
-    const Bone bone = on(side, Bone::kLeftFoot);
-    return joint_[joint_.has(bone) ? bone : on(side, Bone::kLeftLowerLeg)];
-  };
   const double half_leg = 0.5 * leg_length();
   std::vector<Score> scores;
   for (const UpAxis axis : kUpAxes) {
@@ -224,13 +244,17 @@ void Frames::find_up() {
     if (upright_ && zero == nullptr && up.dot(zero_up_) > 0.9) zero = &score;
   }
   const Score& best = *std::ranges::max_element(scores, {}, &Score::mean);
+  const auto expected = [&](UpAxis up) {
+    const bool is_profile = known_[index(Bone::kHips)].has_value();
+    return !is_profile && (zero == nullptr || up == UpAxis::kPlusZ);
+  };
   const double y_mean = scores.front().mean;
   if (zero != nullptr && zero->mean > 0.3) {
     up_ = zero->up;
     why_up_ = "the zero pose stands along it";
     up_by_zero_pose_ = true;
-  } else if (best.up != UpAxis::kPlusY && (zero == nullptr || best.up == UpAxis::kPlusZ) &&
-             best.stand > 0.9 && best.above > 0.9 && y_mean < 0.35) {
+  } else if (best.up != UpAxis::kPlusY && best.stand > 0.9 && best.above > 0.9 && y_mean < 0.35 &&
+             (expected(best.up) || walks(up_turn(best.up).transpose() * kY))) {
     up_ = best.up;
     why_up_ = "the figure stands along it in more than nine frames of ten";
     if (zero != nullptr) {

@@ -220,6 +220,11 @@ Result<> run(ApplyArguments options) {
         "of this figure\n",
         options.alpha.c_str(), applied.alpha);
   }
+  if (applied.hinge_held) {
+    std::fprintf(stderr,
+                 "posed: knees or elbows are kept from bending backwards, which this alpha would "
+                 "have them do\n");
+  }
   findings_of(options, model, shares, clip, applied, fit).show(options.json);
   return {};
 }

@@ -142,6 +142,7 @@ class StyledWalk {
       for (float& value : change) value *= static_cast<float>(alpha);
       Frame frame = point.frame;
       model_.space.add(frame, 0.0, point.q, change);
+      model_.hinges.hold(point.frame.rotation_xyzw, frame);
       depth = std::max(depth, body.depth_m(model_.space.skeleton(), frame));
     }
     return depth;

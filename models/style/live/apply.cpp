@@ -268,6 +268,7 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
       return fail("stopped before its end", clip.path);
     }
   }
+  applied.hinge_held = filter.hinge_held();
   if (estimated > 0) applied.estimate_mean = estimates / estimated;
   if (!std::isnan(gates)) applied.gate_mean = gates / (clip.frames() - first);
   applied.joints_changed = turned.joints();

@@ -37,6 +37,7 @@ struct Applied {
   double max_root_offset_m = 0.0;         // of the root from the input's, by the feet stage
   double alpha = 0.0;                     // that arms allow of the one that was asked for
   bool kept_first = false;                // the first frame is an added rest pose, and stays
+  bool hinge_held = false;                // knees or elbows were kept from bending backwards
   std::string remark{};                   // about joints that the skeleton lacks; may be empty
 };
 

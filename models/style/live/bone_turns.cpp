@@ -101,7 +101,8 @@ void BoneTurns::match_trunk(const std::vector<std::pair<double, int>>& taught) {
 }
 
 std::optional<BoneTurns> BoneTurns::make(const motion::PoseSpaceSpec& spec,
-                                         std::span<const double> places, const Skeleton& skeleton) {
+                                         std::span<const double> places, const Skeleton& skeleton,
+                                         bool is_taught) {
   if (spec.space != motion::Space::kHumanoid) return std::nullopt;
   std::vector<std::pair<Bone, int>> order;  // with the place in the spec
   order.reserve(spec.joints.size());
@@ -131,13 +132,14 @@ std::optional<BoneTurns> BoneTurns::make(const motion::PoseSpaceSpec& spec,
     const auto bone = skeleton.joints[j].bone;
     if (!bone || skeleton.joint_of(*bone) != j) continue;
     part.bone = find(bone);
-    part.rides = part.bone < 0 || is_of_hand(*bone);
+    part.rides = part.bone < 0 || (!is_taught && is_of_hand(*bone));
     if (!part.rides) part.turns_as = {{part.bone, 1.0}};
     const auto arm = std::ranges::find(kArms, *bone, [](const auto& one) { return one.first; });
     if (arm == kArms.end()) continue;
     part.along = direction_of(skeleton, j, arm->second);
     part.in_t_pose = arm - kArms.begin() < 2 ? Vector3d::UnitX() : Vector3d(-Vector3d::UnitX());
   }
+  if (is_taught) return turns;
   std::ranges::sort(trunk);
   turns.match_trunk(trunk);
   return turns;
@@ -160,14 +162,19 @@ RT_SAFE void BoneTurns::find_taught(std::span<const float> from, std::span<const
 }
 
 // Where the walker's joint is turned as `own`. An arm's direction gets the taught change of
-// direction, and its twist follows.
+// direction, and the arm turns about itself as the taught one does.
 RT_SAFE Quaterniond BoneTurns::turn_of(const Part& part, const Quaterniond& own,
                                        const Turns& before, const Turns& after) const noexcept {
   const auto b = static_cast<std::size_t>(part.bone);
   if (part.along) {
+    const Vector3d taught = before[b] * part.in_t_pose;
+    const Vector3d taught_then = after[b] * part.in_t_pose;
     const Vector3d now = own * *part.along;
-    const Vector3d then = now + after[b] * part.in_t_pose - before[b] * part.in_t_pose;
-    if (then.norm() > kClear) return minimal_rotation(now, then.normalized());
+    const Vector3d then = now + taught_then - taught;
+    if (then.norm() > kClear) {
+      const Quaterniond all = after[b] * before[b].conjugate();
+      return minimal_rotation(all * now, then.normalized()) * all;
+    }
   }
   const auto turned = [&](int bone) {
     const auto i = static_cast<std::size_t>(bone);

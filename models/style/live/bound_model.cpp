@@ -60,6 +60,7 @@ BoundModel::BoundModel(const StyleModel& model, motion::PoseSpace bound_space,
                        gp::Predictor bound_predictor, std::string file)
     : StageModel(std::move(file), model.names()),
       space(std::move(bound_space)),
+      hinges(space.skeleton()),
       predictor(std::move(bound_predictor)),
       limit_rad(model.limit_rad.cast<float>()),
       neutral(model.gate.neutral.cast<float>()),
@@ -147,8 +148,10 @@ Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
                                             std::move(name));
   bound->has_root = has_root;
   const auto& rigs = model.gate.rigs;
-  const bool is_other = !rigs.empty() && std::ranges::find(rigs, rig_id(skeleton)) == rigs.end();
-  if (is_other) bound->turns = BoneTurns::make(model.space, model.gate.places, skeleton);
+  if (!rigs.empty()) {
+    const bool is_taught = std::ranges::find(rigs, rig_id(skeleton)) != rigs.end();
+    bound->turns = BoneTurns::make(model.space, model.gate.places, skeleton, is_taught);
+  }
   bound->reach = alpha_reach(*bound);
   if (!has_root) return bound;
   bound->leg_m = legs->length_m();

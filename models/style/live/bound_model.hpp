@@ -14,6 +14,7 @@
 #include "models/style/live/alpha_reach.hpp"
 #include "models/style/live/body_mask.hpp"
 #include "models/style/live/bone_turns.hpp"
+#include "models/style/live/hinges.hpp"
 #include "models/style/live/leg_map.hpp"
 #include "models/style/live/trained_motion.hpp"
 #include "models/style/model/style_model.hpp"
@@ -28,6 +29,7 @@ struct BoundModel final : StageModel {
   [[nodiscard]] const std::vector<std::string>& styles() const noexcept { return words; }
 
   motion::PoseSpace space;
+  Hinges hinges;  // of the skeleton
   // Mutable, because it keeps the mixture of styles ready that the filter asks for. With several
   // styles a model therefore serves one filter at a time at its full speed.
   mutable gp::Predictor predictor;
@@ -54,7 +56,7 @@ struct BoundModel final : StageModel {
   std::vector<Usual> usual;        // by person and day; empty: a model without them
   std::optional<Usual> anyone;     // their mean, for a walker who is not known
   std::vector<AlphaReach> reach;   // of each style
-  std::optional<BoneTurns> turns;  // for a figure that is none of training
+  std::optional<BoneTurns> turns;  // for a walker who is known
 };
 
 // Returns an error for a skeleton that cannot serve the model's pose space

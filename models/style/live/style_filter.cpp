@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "models/style/live/warm_up.hpp"
+#include "proto/frame/degree.hpp"
 #include "proto/frame/rotation.hpp"
 #include "proto/frame/skeleton.hpp"
 
@@ -20,7 +21,8 @@ using Eigen::Vector3d;
 
 constexpr double kMaxStep_s = 0.1;
 constexpr double kUnknownReading = std::numeric_limits<double>::quiet_NaN();
-constexpr double kNoTurn_rad = 1e-6;  // too small for single precision
+constexpr double kTold_rad = 5.0 * kDegree;  // of a hinge that is held
+constexpr double kNoTurn_rad = 1e-6;         // too small for single precision
 
 bool usable(const Quatf& q) noexcept {
   const float norm2 = q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3];
@@ -69,6 +71,7 @@ RT_SAFE bool StyleFilter::set_shares(const Shares& shares) noexcept {
 RT_SAFE const BoundModel* StyleFilter::set_model(const BoundModel* model) noexcept {
   assert(model != nullptr);
   discontinuity_ = true;
+  hinge_held_ = false;
   tracker_.exchange(model_, *model);
   if (model_ == nullptr) {
     weights_.begin(first_alone(model->styles().size()));
@@ -267,18 +270,22 @@ RT_SAFE void StyleFilter::style(Frame& frame, double dt_s) noexcept {
   last_out_ = frame.rotation_xyzw;
 }
 
-// A walker of another build gets the change that the walk of training gets, bone by bone.
+// A walker who is known gets the change that the walk of training gets, bone by bone.
 RT_SAFE void StyleFilter::change(Frame& frame, const Pose& pose) noexcept {
+  const Rotations in = frame.rotation_xyzw;
   const std::size_t dims = model_->space.dims();
   Dims delta, shares;
   answer(pose, delta, shares);
   if (model_->turns && tracker_.shifts()) {
     model_->turns->add(frame, heading_.value_rad(), {pose.input.data(), dims}, {delta.data(), dims},
                        {shares.data(), dims});
-    return;
+  } else {
+    for (std::size_t d = 0; d < dims; ++d) delta[d] *= shares[d];
+    model_->space.add(frame, heading_.value_rad(), {pose.q.data(), dims}, {delta.data(), dims});
   }
-  for (std::size_t d = 0; d < dims; ++d) delta[d] *= shares[d];
-  model_->space.add(frame, heading_.value_rad(), {pose.q.data(), dims}, {delta.data(), dims});
+  if (model_->hinges.hold(in, frame) > kTold_rad && !std::exchange(hinge_held_, true)) {
+    tell_hinge_ = true;
+  }
 }
 
 // Empty while the predictor has the mixture ready.
@@ -316,6 +323,7 @@ RT_SAFE void StyleFilter::look_at_reach() noexcept {
 
 RT_SAFE std::optional<StageNotice> StyleFilter::take_notice() noexcept {
   if (std::exchange(tell_held_, false)) return StageNotice{.index = kAlphaHeld};
+  if (std::exchange(tell_hinge_, false)) return StageNotice{.index = kHingeHeld};
   return tracker_.take_notice();
 }
 

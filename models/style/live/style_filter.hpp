@@ -94,6 +94,7 @@ class StyleFilter final : public Stage {
   [[nodiscard]] double reading(std::size_t reading) const noexcept override;
   static constexpr std::size_t kAlphaHeld =
       WalkerTracker::kNoAxis + 1;  // after the tracker's notices
+  static constexpr std::size_t kHingeHeld = kAlphaHeld + 1;
   [[nodiscard]] std::optional<StageNotice> take_notice() noexcept override;
   enum Command : std::size_t { kWarmUp, kWeights, kMask, kNeutral };
   [[nodiscard]] bool command(std::size_t index, const StageCommand& command) noexcept override;
@@ -115,6 +116,8 @@ class StyleFilter final : public Stage {
                 ShortText& text) const noexcept override;
 
   [[nodiscard]] float alpha() const noexcept;  // the current value, while it slews
+  // Whether a knee or an elbow was kept from bending the wrong way.
+  [[nodiscard]] bool hinge_held() const noexcept { return hinge_held_; }
   [[nodiscard]] const StyleWeights& weights() const noexcept { return weights_; }
   [[nodiscard]] const BodyMask& mask() const noexcept { return mask_; }
   [[nodiscard]] float alpha_target() const noexcept { return static_cast<float>(alpha_target_); }
@@ -166,6 +169,7 @@ class StyleFilter final : public Stage {
   Dims limit_rad_{};  // of the mixture
   AlphaReach reach_;  // the same
   bool is_held_ = false, tell_held_ = false;
+  bool hinge_held_ = false, tell_hinge_ = false;  // told once a model
   Root limit_root_ = Root::Zero();
   Root root_ = Root::Zero();       // the model's change at this frame
   Root root_from_ = Root::Zero();  // what a blend begins with, less the model's change

@@ -122,7 +122,7 @@ std::vector<StageReadingType> readings() {
           {.name = "style_gate", .help = "1 where the model knows the motion, 0 passed through"}};
 }
 
-// In the order of WalkerTracker::Notice, then StyleFilter::kAlphaHeld.
+// In the order of WalkerTracker::Notice, then StyleFilter's.
 std::vector<StageNoticeType> notices() {
   return {
       {.sentence = "the model has no data for gate, warm-up and auto-alpha, so any motion is "
@@ -138,7 +138,9 @@ std::vector<StageNoticeType> notices() {
       {.sentence = "the model has no style axis, so auto_alpha does nothing: train a model of one "
                    "style with this version of posed, or set auto_alpha = false"},
       {.sentence = "alpha is held back: more of this style would put arms into the head or the "
-                   "trunk of this figure"}};
+                   "trunk of this figure"},
+      {.sentence = "knees or elbows are kept from bending backwards, which this alpha would have "
+                   "them do"}};
 }
 
 Result<StageCommand> warm_up(const StageModel* model, std::span<const std::string> words,

@@ -16,6 +16,7 @@
 #include "models/style/train/training_check.hpp"
 #include "models/style/train/walk_only.hpp"
 #include "models/task_numbers.hpp"
+#include "proto/frame/degree.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::style {
@@ -96,7 +97,12 @@ Result<std::vector<Source>> read_sources(const std::vector<TrainingClip>& clips,
     if (walks) left_out = standing_sentences(leave_out_standing(*motion));
     motion::Motion at_rate = motion::resample(*motion, rate_hz);
     // A motion that is called a turn teaches it.
-    if (walks && !clip.motion.contains("turn")) straighten(at_rate);
+    const double turned_rad = walks && !clip.motion.contains("turn") ? straighten(at_rate) : 0.0;
+    if (turned_rad > 0.0) {
+      left_out.push_back("its turns (" + std::to_string(std::lround(turned_rad / kDegree)) +
+                         " degrees) are taken out; a motion that is called a turn (--motion "
+                         "walk-turn) would teach them");
+    }
     if (!has_stride(at_rate.size(), rate_hz)) {
       return fail("the clip has " + std::to_string(at_rate.size()) + " frames at " +
                       std::to_string(static_cast<int>(rate_hz)) +

@@ -130,16 +130,16 @@ Standing leave_out_standing(motion::Motion& motion) {
   return {.before_s = seconds(before), .after_s = seconds(after)};
 }
 
-void straighten(motion::Motion& motion) {
+double straighten(motion::Motion& motion) {
   const Skeleton& skeleton = *motion.skeleton;
   const auto spec = motion::describe_space(
       motion::is_person(skeleton) ? motion::Space::kHumanoid : motion::Space::kNative, skeleton);
-  if (!spec || motion.size() < 2) return;
+  if (!spec || motion.size() < 2) return 0.0;
   const auto space = motion::PoseSpace::bind(*spec, skeleton);
-  if (!space) return;
+  if (!space) return 0.0;
   const std::vector<double> turned = turned_rad(motion, *space);
   const auto [least, most] = std::ranges::minmax(turned);
-  if (most - least < kStraight_rad) return;
+  if (most - least < kStraight_rad) return 0.0;
   Vector3d before_m = root_m(motion.frames.front());
   Vector3d at_m = before_m;
   for (std::size_t i = 0; i < turned.size(); ++i) {
@@ -153,6 +153,7 @@ void straighten(motion::Motion& motion) {
       frame.rotation_xyzw[j] = from_eigen(back * to_eigen_double(frame.rotation_xyzw[j]));
     }
   }
+  return most - least;
 }
 
 }  // namespace posed::style

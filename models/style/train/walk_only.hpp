@@ -17,8 +17,9 @@ Standing leave_out_standing(motion::Motion& motion);
 
 // Turns a walk that goes about a stage into one that goes straight on: training sees a clip from
 // one heading, and who walks for 20 s in a room must turn. Takes out of all frames how far the body
-// has turned since the first one, by the pelvis without the sway of its strides. A motion that
-// keeps its heading within 30 degrees, or whose skeleton has none, stays as it is.
-void straighten(motion::Motion& motion);
+// has turned since the first one, by the pelvis without the sway of its strides, and returns that
+// range [rad]. A motion that keeps its heading within 30 degrees, or whose skeleton has none, stays
+// as it is: 0.
+double straighten(motion::Motion& motion);
 
 }  // namespace posed::style
