@@ -3,9 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <limits>
 #include <memory>
 #include <numbers>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -34,6 +37,18 @@ constexpr float kBendShare = 0.25F;  // of the suspect's distance
 constexpr int kManyParts = 5;        // that are off: they may be garbage
 constexpr int kOneWay = 5;           // times as many up as down, or the reverse, are a motion
 constexpr auto kFastestBend_rad_s = static_cast<float>(4000.0 * kDegree);  // a snap has 3,800
+// Suspects that turned out to be true (models/gate/README.md, "One value").
+constexpr float kJudged_s = 60.0F;  // mean time for which they count
+constexpr float kFirstTrue = 1.5F;  // so many were, at least
+constexpr float kMoreTrue = 1.0F;   // times as many as were false
+
+// Samples that are shown again (models/gate/README.md, "One value").
+constexpr float kManyMoving = 3.0F;  // angles; fewer may well repeat by chance
+constexpr float kAlone = 0.2F;       // most that repeat while others change
+constexpr float kFewSamples = 8.0F;  // before repeats are told
+constexpr float kSamples = 100.0F;   // that the share is the mean of
+constexpr int kMostRepeats = 4;      // of one sample
+
 constexpr float kFlaky = 0.002F;  // share of a hand's angles dropped lately
 
 // What a value may do [its unit].
@@ -79,6 +94,8 @@ struct PlaceSpace {  // m
   }
 };
 
+enum class Verdict : std::uint8_t { kNone, kTrue, kFalse };
+
 // Follows one value of a stream and says which samples contradict its motion
 // (models/gate/README.md, "One value"). The value is an angle, a rotation or a position; a Space
 // says what steps and distances are. RT-safe; no allocation.
@@ -107,23 +124,39 @@ class Track {
   }
 
   // Goes on from the sample compared last. Whether it is believed: one that is no suspect or has
-  // `company` is, and one that persists.
-  RT_SAFE bool settle(const Value& value, bool company, const Bounds& bounds) noexcept {
+  // `company` is, and one that persists; all, where suspects have been true.
+  RT_SAFE bool settle(const Value& value, bool company, bool lenient,
+                      const Bounds& bounds) noexcept {
+    verdict_ = Verdict::kNone;
     if (since_s_ == 0.0F || repeated_) return true;
     if (!suspect_ || company) {
+      if (doubts_ > 0) verdict_ = Verdict::kFalse;
+      if (given_) verdict_ = Verdict::kTrue;
       usual_ += kLearn * (std::min(off_, kUnusual * usual_ + 0.25F * bounds.jump) - usual_);
       last_off_ = off_;
       was_far_ = off_ > kFar * limit_;
       follow(value);
       return true;
     }
-    if (goes_back(value, bounds)) return true;
+    const bool given = given_;
+    if (goes_back(value, bounds)) {
+      verdict_ = Verdict::kFalse;
+      return true;
+    }
+    if (given) verdict_ = Verdict::kTrue;
     // Samples that agree against the past are a motion: two of one that goes on, three of a step,
     // because a fault may last for two.
     const bool agrees = doubts_ > 0 && Space::distance(doubt_, value) < kAgree * moved_;
     const bool goes_on = agrees && moved_ > kGoesOn * Space::distance(last_, doubt_);
     if (goes_on || (agrees && doubts_ >= 2)) {
       begin(value);
+      verdict_ = Verdict::kTrue;
+      return true;
+    }
+    if (lenient && doubts_ == 0) {
+      was_far_ = true;
+      follow(value);
+      given_ = true;
       return true;
     }
     doubts_ = agrees ? doubts_ + 1 : 1;
@@ -134,6 +167,9 @@ class Track {
   // From the last believed sample to the one compared, by second.
   RT_SAFE [[nodiscard]] float speed() const noexcept { return moved_ / since_s_; }
 
+  // Of the last suspect, by what came after it.
+  RT_SAFE [[nodiscard]] Verdict verdict() const noexcept { return verdict_; }
+
   // There was no sample in a frame `dt_s` after the one before.
   RT_SAFE void skip(float dt_s) noexcept {
     since_s_ += dt_s;
@@ -142,6 +178,7 @@ class Track {
   RT_SAFE void forget() noexcept { *this = {}; }
   RT_SAFE [[nodiscard]] const Value& last() const noexcept { return last_; }
   RT_SAFE [[nodiscard]] const Value& expected() const noexcept { return expected_; }
+  RT_SAFE [[nodiscard]] bool repeated() const noexcept { return repeated_; }
   RT_SAFE [[nodiscard]] bool suspect() const noexcept { return suspect_; }
   RT_SAFE [[nodiscard]] float off() const noexcept { return off_; }
   RT_SAFE [[nodiscard]] float usual() const noexcept { return usual_; }
@@ -204,6 +241,7 @@ class Track {
     last_ = value;
     known_ = true;
     doubts_ = 0;
+    given_ = false;
     older_s_ = step_s_ = since_s_ = last_off_ = 0.0F;
     was_far_ = false;
   }
@@ -215,6 +253,7 @@ class Track {
     step_s_ = since_s_;
     since_s_ = 0.0F;
     doubts_ = 0;
+    given_ = false;
   }
 
   Value older_{}, before_{}, last_{};  // believed
@@ -228,6 +267,8 @@ class Track {
   float limit_ = 0.0F, last_off_ = 0.0F;  // for it; that of last_
   bool suspect_ = false, repeated_ = false;
   bool was_far_ = false;  // last_
+  bool given_ = false;    // last_ is a suspect that was believed
+  Verdict verdict_ = Verdict::kNone;
   bool known_ = false;
   int doubts_ = 0;  // samples dropped in a row that agree; the last was doubt_
 };
@@ -266,6 +307,9 @@ class GateStage final : public Stage {
  private:
   RT_SAFE void feel_parts() noexcept;
   RT_SAFE [[nodiscard]] bool has_company(std::size_t c) const noexcept;
+  RT_SAFE bool drop_angles(Frame& frame) const noexcept;
+  RT_SAFE [[nodiscard]] bool repeats(const Frame& frame) noexcept;
+  RT_SAFE void learn_repeats(float moving, float alone) noexcept;
   RT_SAFE bool gate_angles(float dt_s, Frame& frame) noexcept;
   RT_SAFE bool gate_turns(float dt_s, Frame& frame) noexcept;
   RT_SAFE bool gate_root(float dt_s, Frame& frame) noexcept;
@@ -280,12 +324,21 @@ class GateStage final : public Stage {
   Elapsed elapsed_;
   std::vector<std::size_t> joint_;  // [rotation channel]
   std::vector<Track<AngleSpace>> angle_;
-  std::vector<float> off_rad_;     // [rotation channel] of the frame, by direction
-  std::vector<std::size_t> part_;  // [rotation channel] of a hand: two for each finger
-  std::vector<float> bend_rad_;    // [part] how far it is off at most; of a hand
-  bool scattered_ = false;         // many parts are off, in all directions: no motion
-  float flaky_ = 0.0F;             // share of the hand's angles dropped lately
-  float seen_s_ = 0.0F;            // that this share is known for
+  std::vector<float> shown_rad_;       // [rotation channel] in the frame before
+  std::vector<std::uint8_t> dropped_;  // [rotation channel] in that frame
+  bool any_dropped_ = false;
+  float alone_ = 0.0F;                // share of the angles that repeat while others change
+  float samples_ = 0.0F;              // that this is the mean of
+  bool same_ = false;                 // the frame is like the one before
+  float held_s_ = 0.0F;               // for which the last sample has been shown again
+  int run_ = 0;                       // frames of that
+  std::vector<float> off_rad_;        // [rotation channel] of the frame, by direction
+  std::vector<std::size_t> part_;     // [rotation channel] of a hand: two for each finger
+  std::vector<float> bend_rad_;       // [part] how far it is off at most; of a hand
+  bool scattered_ = false;            // many parts are off, in all directions: no motion
+  float true_ = 0.0F, false_ = 0.0F;  // suspects of the hand lately
+  float flaky_ = 0.0F;                // share of the hand's angles dropped lately
+  float seen_s_ = 0.0F;               // that this share is known for
   std::vector<Track<TurnSpace>> turn_;
   Track<PlaceSpace> root_;
   std::vector<float> share_;  // [joint] of samples dropped lately
@@ -324,6 +377,8 @@ GateStage::GateStage(std::shared_ptr<const Skeleton> skeleton, double rate_hz,
     if (!channel.translation) joint_.push_back(channel.joint);
   }
   angle_.resize(joint_.size());
+  shown_rad_.resize(joint_.size());
+  dropped_.resize(joint_.size());
   off_rad_.resize(joint_.size());
   if (!hand_side(*skeleton_)) return;
   // A finger's first joint, and the two that one tendon, and with some gloves one sensor, bends.
@@ -368,8 +423,43 @@ RT_SAFE bool GateStage::has_company(std::size_t c) const noexcept {
   return finger || with > against;
 }
 
+// Whether the device shows the sample of the frame before once more. One that is polled faster than
+// it measures repeats all angles at once; those that stay within their step or dead band repeat
+// alone.
+RT_SAFE bool GateStage::repeats(const Frame& frame) noexcept {
+  const std::span<const float> shown(frame.angle_rad.data(), shown_rad_.size());
+  same_ = std::memcmp(shown.data(), shown_rad_.data(), shown.size_bytes()) == 0;
+  if (!same_) {
+    std::ranges::copy(shown, shown_rad_.begin());
+    run_ = 0;
+    return false;
+  }
+  return samples_ > kFewSamples && alone_ < kAlone && ++run_ <= kMostRepeats;
+}
+
+RT_SAFE void GateStage::learn_repeats(float moving, float alone) noexcept {
+  if (same_ || moving < kManyMoving) return;
+  samples_ = std::min(samples_ + 1.0F, kSamples);
+  alone_ += (alone / moving - alone_) / samples_;
+}
+
 // An angle that is dropped is missing in its joint; the joint's other angles stay.
+RT_SAFE bool GateStage::drop_angles(Frame& frame) const noexcept {
+  if (!any_dropped_) return false;
+  for (std::size_t c = 0; c < joint_.size(); ++c) {
+    if (dropped_[c] == 0) continue;
+    frame.angle_rad[c] = std::numeric_limits<float>::quiet_NaN();
+    drop(joint_[c], frame);
+  }
+  return true;
+}
+
 RT_SAFE bool GateStage::gate_angles(float dt_s, Frame& frame) noexcept {
+  if (repeats(frame)) {
+    held_s_ += dt_s;
+    return drop_angles(frame);
+  }
+  dt_s += std::exchange(held_s_, 0.0F);
   const Bounds bounds = bounds_of(options_.jump_rad, kFastest_rad_s2);
   for (std::size_t c = 0; c < joint_.size(); ++c) {
     const float angle_rad = frame.angle_rad[c];
@@ -382,30 +472,40 @@ RT_SAFE bool GateStage::gate_angles(float dt_s, Frame& frame) noexcept {
     off_rad_[c] = angle_rad < angle_[c].expected() ? -angle_[c].off() : angle_[c].off();
   }
   if (!bend_rad_.empty()) feel_parts();
-  bool any = false;
+  const float forget = std::min(dt_s / kJudged_s, 1.0F);
+  true_ -= forget * true_;
+  false_ -= forget * false_;
+  const bool lenient = true_ > kFirstTrue && true_ > kMoreTrue * false_;
   float active = 0.0F;
+  float alone = 0.0F;
   float dropped = 0.0F;
   for (std::size_t c = 0; c < joint_.size(); ++c) {
     const std::size_t joint = joint_[c];
     const bool first = c == 0 || joint_[c - 1] != joint;
     float& angle_rad = frame.angle_rad[c];
+    dropped_[c] = 0;
     if (!std::isfinite(angle_rad)) continue;
-    if (angle_[c].usual() > 0.0F) active += 1.0F;
+    if (angle_[c].usual() > 0.0F) {
+      active += 1.0F;
+      alone += angle_[c].repeated() ? 1.0F : 0.0F;
+    }
     const bool company =
         angle_[c].suspect() && angle_[c].speed() < kFastestBend_rad_s && has_company(c);
-    const bool accepted = angle_[c].settle(angle_rad, company, bounds);
+    const bool accepted = angle_[c].settle(angle_rad, company, lenient, bounds);
+    if (angle_[c].verdict() == Verdict::kTrue) true_ += 1.0F;
+    if (angle_[c].verdict() == Verdict::kFalse) false_ += 1.0F;
     if (first || !accepted) count(joint, !accepted);
     if (accepted) continue;
-    angle_rad = std::numeric_limits<float>::quiet_NaN();
-    drop(joint, frame);
+    dropped_[c] = 1;
     dropped += 1.0F;
-    any = true;
   }
+  learn_repeats(active, alone);
   if (active > 0.0F) {
     seen_s_ += dt_s;
     flaky_ += std::max(fade_, dt_s / std::max(seen_s_, 1.0F)) * (dropped / active - flaky_);
   }
-  return any;
+  any_dropped_ = dropped > 0.0F;
+  return drop_angles(frame);
 }
 
 RT_SAFE bool GateStage::gate_turns(float dt_s, Frame& frame) noexcept {
@@ -420,7 +520,7 @@ RT_SAFE bool GateStage::gate_turns(float dt_s, Frame& frame) noexcept {
     }
     const Eigen::Quaternionf turn(q[3], q[0], q[1], q[2]);
     turn_[j].compare(turn, dt_s, bounds);
-    const bool accepted = turn_[j].settle(turn, false, bounds);
+    const bool accepted = turn_[j].settle(turn, false, false, bounds);
     count(j, !accepted);
     if (accepted) continue;
     drop(j, frame);
@@ -438,7 +538,7 @@ RT_SAFE bool GateStage::gate_root(float dt_s, Frame& frame) noexcept {
     return false;
   }
   root_.compare(at_m, dt_s, bounds);
-  if (root_.settle(at_m, false, bounds)) return false;
+  if (root_.settle(at_m, false, false, bounds)) return false;
   for (int i = 0; i < 3; ++i) frame.root_position_m[static_cast<std::size_t>(i)] = root_.last()[i];
   return true;
 }

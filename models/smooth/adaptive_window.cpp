@@ -37,6 +37,10 @@ constexpr int kEvenWindow = 26;
 constexpr double kWindow_s = 26.0 / kEvenRate_hz;
 constexpr int kLengthSlack = 8;  // the window's length over the loss that it does not follow
 
+RT_SAFE double share_of(const Sensors& sensors, std::size_t channel) noexcept {
+  return sensors.share.empty() ? 1.0 : sensors.share[channel];
+}
+
 RT_SAFE double rounded_rad2(const Sensors& sensors, std::size_t channel) noexcept {
   const double rounding_rad = sensors.rounding_rad.empty() ? 0.0 : sensors.rounding_rad[channel];
   return rounding_rad * rounding_rad;
@@ -110,8 +114,9 @@ RT_SAFE void AdaptiveWindow::push(double time_s, std::span<const double> measure
     const double rounding_rad = sensors.rounding_rad.empty() ? 0.0 : sensors.rounding_rad[c];
     const bool only_rounded =
         !sensors.half_step_rad.empty() && std::isfinite(sensors.half_step_rad[c]);
+    const double own_rad = share_of(sensors, c) * sensors.noise_rad;
     const double noise_rad =
-        only_rounded ? kWholeRounding * rounding_rad : std::max(sensors.noise_rad, rounding_rad);
+        only_rounded ? kWholeRounding * rounding_rad : std::max(own_rad, rounding_rad);
     const double precision = 1.0 / (noise_rad * noise_rad);
     variance_rad2_[c] = 1.0 / precision;
     const bool measured = std::isfinite(measured_rad[c]);
@@ -147,7 +152,6 @@ RT_SAFE void AdaptiveWindow::push(double time_s, std::span<const double> measure
 RT_SAFE void AdaptiveWindow::find_jumps(std::span<const double> measured_rad,
                                         const Sensors& sensors) noexcept {
   since_repeated_ = sensors.repeated ? 0 : std::min(since_repeated_ + 1, kSinceRepeated);
-  const double noise_rad2 = sensors.jitter_rad * sensors.jitter_rad;
   const std::size_t before = (pushed_ + kMaxWindow - 1) % kMaxWindow;
   double* const jump = jump_row(static_cast<int>(before));
   jumps_[pushed_ % kMaxWindow] = 0;
@@ -157,8 +161,10 @@ RT_SAFE void AdaptiveWindow::find_jumps(std::span<const double> measured_rad,
     const double last = std::exchange(recent_rad_[2 * c], now);
     const double first = std::exchange(recent_rad_[2 * c + 1], last);
     const double turn_rad = now - 2.0 * last + first;
+    const double noise_rad = share_of(sensors, c) * sensors.jitter_rad;
     const double most_rad2 =
-        kJump2 * std::min(variance_rad2_[c], std::max(noise_rad2, rounded_rad2(sensors, c)));
+        kJump2 *
+        std::min(variance_rad2_[c], std::max(noise_rad * noise_rad, rounded_rad2(sensors, c)));
     const bool moves = now != last && last != first && since_repeated_ == kSinceRepeated &&
                        sensors.jitter_rad > 0.0;
     if (!(turn_rad * turn_rad > kOfTurn * most_rad2) || !moves) continue;

@@ -42,6 +42,7 @@ struct Sensors {
   double noise_rad = 0.0;
   double jitter_rad =
       0.0;  // the noise as far as it shows from frame to frame; 0: no jumps are told
+  std::span<const double> share{};          // [channels] of both for each channel; empty: 1
   std::span<const double> rounding_rad{};   // [channels] error of rounding; empty: none
   std::span<const double> half_step_rad{};  // [channels] finite where nothing but rounding disturbs
   bool repeated = false;  // the frame shows the samples of the one before once more: none is new

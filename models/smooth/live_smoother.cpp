@@ -390,10 +390,11 @@ RT_SAFE void LiveSmoother::State::sense(double now_s, double step_s, double peri
     window.push(now_s, measured, {.noise_rad = stated_rad});
   } else {
     noise.push(measured, even, period_s);
-    motions.push(step_s, measured, noise.noise_rad());
+    motions.push(step_s, measured, noise.noise_rad(), noise.share());
     window.push(now_s, measured,
                 {.noise_rad = noise.noise_rad(),
                  .jitter_rad = noise.jitter_rad(),
+                 .share = noise.share(),
                  .rounding_rad = noise.rounding_rad(),
                  .half_step_rad = noise.half_step_rad(),
                  .repeated = noise.repeated()});

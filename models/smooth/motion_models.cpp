@@ -30,7 +30,7 @@ constexpr double kHandEvidenceShare = 0.5;  // of the hand's mean in a channel's
 constexpr double kSettled_s = 1.0;          // before a channel's evidence is believed
 constexpr double kMinError2 = 1e-9;         // over the variance of the noise
 constexpr double kMaxError2 = 25.0;         // over the variance of the noise
-constexpr double kMinUnexplained = 0.05;  // share of a measurement that an estimate does not follow
+constexpr double kMinUnexplained = 1e-4;  // share of a measurement that an estimate does not follow
 constexpr long kTurns = 8;  // frames between two weighings of a channel, as weights change slowly
 
 }  // namespace
@@ -118,12 +118,13 @@ RT_SAFE void MotionModels::restart(std::size_t channel, double value_rad) noexce
 }
 
 RT_SAFE void MotionModels::push(double step_s, std::span<const double> measured_rad,
-                                double noise_rad) noexcept {
+                                double noise_rad, std::span<const double> share) noexcept {
   noise_before_rad2_ = noise_rad2_;
   noise_rad2_ = noise_rad * noise_rad;
   step_s_ = step_s;
   for (std::size_t c = 0; c < channels_.size(); ++c) {
     channels_[c].before_rad = std::exchange(channels_[c].now_rad, measured_rad[c]);
+    channels_[c].share_before = std::exchange(channels_[c].share, share.empty() ? 1.0 : share[c]);
   }
   for (std::size_t m = 0; m < kModels; ++m) {
     if (pushed_ == 0) {
@@ -168,14 +169,14 @@ RT_SAFE void MotionModels::judge(const double* window_rad, const double* window_
   for (std::size_t c = 0; c < channels_.size(); ++c) {
     Channel& channel = channels_[c];
     if (channel.known_s == 0.0) continue;
+    const double own = precision / (channel.share_before * channel.share_before);
     const auto learn = [&](std::size_t m, double estimate_rad, double share) {
       const double off = (channel.before_rad - estimate_rad) / share;
-      channel.error2[m] +=
-          fresh * (std::min(off * off * precision, kMaxError2) - channel.error2[m]);
+      channel.error2[m] += fresh * (std::min(off * off * own, kMaxError2) - channel.error2[m]);
       hand[m] += channel.error2[m];
     };
     for (std::size_t m = 0; m < kModels; ++m) learn(m, channel.position[m][1], unexplained[m]);
-    learn(kModels, window_rad[c], std::max(kMinUnexplained, 1.0 - window_rad2[c] * precision));
+    learn(kModels, window_rad[c], std::max(kMinUnexplained, 1.0 - window_rad2[c] * own));
   }
   for (double& error2 : hand) error2 = std::log(std::max(error2, kMinError2));
   for (auto c = static_cast<std::size_t>(pushed_ % kTurns); c < channels_.size(); c += kTurns) {

@@ -21,7 +21,9 @@ class MotionModels {
   explicit MotionModels(int channels);
 
   // The next frame: [channels] rad, NaN where missing, `step_s` after the one before.
-  void push(double step_s, std::span<const double> measured_rad, double noise_rad) noexcept;
+  // A channel's own noise is `share` of noise_rad.
+  void push(double step_s, std::span<const double> measured_rad, double noise_rad,
+            std::span<const double> share = {}) noexcept;
 
   // Judges the bank and the window by the frame before the newest, as both estimate it now:
   // `window_rad` and its variance, [channels]. Needs two pushes since reset().
@@ -59,6 +61,7 @@ class MotionModels {
     std::array<double, kModels + 1> error2{};  // mean square over that of the noise; window's last
     std::array<double, kModels + 1> weight{};
     double before_rad = 0.0, now_rad = 0.0;  // measured
+    double share = 1.0, share_before = 1.0;  // of the noise, at these
     double known_s = 0.0;                    // measured without a gap
   };
 

@@ -22,6 +22,16 @@ constexpr double kLowSide = 0.97;
 constexpr double kMedian = 0.6745;
 constexpr double kToNoise = kLowSide / (kMedian * 4.47213595499958);
 
+// Noise of a channel beside the common one.
+constexpr double kOwnSpread = 0.35;         // octaves that equally noisy channels seem to differ by
+constexpr double kLowShare = 0.3;           // of a channel's differences: more may be motion
+constexpr double kLowOverMedian = 0.57127;  // of the sizes of normal values
+constexpr double kOwnFew = 100.0;           // values that count as much as the common noise
+constexpr double kOwnStep = 0.01;           // least step of a level, of itself
+constexpr double kMostOctaves = 6.0;
+constexpr double kTenthOverThird = 96.1134434;  // sqrt(184756 / 20), of white noise
+constexpr long kTurns = 8;                      // samples between two looks at a channel
+
 // Correlation of the noise.
 constexpr double kFew = 400.0;               // differences before a correlation is believed
 constexpr double kFewWhite = 120.0;          // the same before noise is called white
@@ -55,10 +65,22 @@ constexpr double kAlone = 0.2;         // most channels that repeat while others
 constexpr double kCommon = 0.3;        // least share of samples that are shown so often
 constexpr int kFewChannels = 3;        // fewer may well repeat by chance
 
-// Variance of the fifth difference of noise of variance 1 whose samples have the correlation r,
+// Variance of the tenth difference of noise of variance 1 whose samples have the correlation r,
 // r^2, r^3, ...
-double fifth_variance(double r) noexcept {
-  return 252.0 + r * (-420.0 + r * (240.0 + r * (-90.0 + r * (20.0 - 2.0 * r))));
+double tenth_variance(double r) noexcept {
+  constexpr std::array kPowers{2.0,     -40.0,     380.0,    -2280.0,   9690.0,  -31008.0,
+                               77520.0, -155040.0, 251940.0, -335920.0, 184756.0};
+  double sum = 0.0;
+  for (const double factor : kPowers) sum = sum * r + factor;
+  return sum;
+}
+
+// The tenth difference [rad] of a sample and of those before it, newest first, each `apart` samples
+// before the one that follows it.
+double tenth_difference(double now_rad, const double* past, int apart) noexcept {
+  const auto at = [&](int back) { return past[back * apart - 1]; };
+  return std::abs(now_rad + at(10) - 10.0 * (at(1) + at(9)) + 45.0 * (at(2) + at(8)) -
+                  120.0 * (at(3) + at(7)) + 210.0 * (at(4) + at(6)) - 252.0 * at(5));
 }
 
 }  // namespace
@@ -99,6 +121,8 @@ NoiseEstimate::NoiseEstimate(int channels)
       first_(channels),
       moved_(channels),
       steps_(channels),
+      levels_(channels),
+      share_(channels),
       rounding_rad_(channels),
       half_step_rad_(channels) {
   reset();
@@ -108,6 +132,8 @@ RT_SAFE void NoiseEstimate::reset() noexcept {
   std::ranges::fill(first_, std::numeric_limits<double>::quiet_NaN());
   std::fill(moved_.begin(), moved_.end(), false);
   std::ranges::fill(steps_, Step());
+  std::ranges::fill(levels_, Level());
+  std::ranges::fill(share_, 1.0);
   std::ranges::fill(rounding_rad_, 0.0);
   std::ranges::fill(half_step_rad_, kUnbounded);
   forget_differences();
@@ -150,8 +176,8 @@ RT_SAFE void NoiseEstimate::judge_repeat(std::span<const double> measured_rad) n
 
 RT_SAFE void NoiseEstimate::forget_differences() noexcept {
   third_.reset();
-  fifth_.reset();
-  far_fifth_.reset();
+  tenth_.reset();
+  far_tenth_.reset();
   even_samples_ = 0;
 }
 
@@ -183,17 +209,51 @@ RT_SAFE void NoiseEstimate::learn_step(std::size_t c, double change_rad) noexcep
 RT_SAFE void NoiseEstimate::learn_differences(std::size_t c, double now_rad) noexcept {
   const double* const past = past_.data() + c * kPast;
   const double third = now_rad - 3.0 * past[0] + 3.0 * past[1] - past[2];
-  if (even_samples_ >= 3 && std::isfinite(third)) third_.count(std::abs(third));
-  const auto fifth = [&](int apart) {
-    const auto at = [&](int back) { return past[back * apart - 1]; };
-    return std::abs(now_rad - 5.0 * at(1) + 10.0 * at(2) - 10.0 * at(3) + 5.0 * at(4) - at(5));
-  };
-  const double near = fifth(1);
-  const double far = fifth(2);
+  if (even_samples_ < 3 || !std::isfinite(third)) return;
+  third_.count(std::abs(third));
+  if (even_samples_ < kPast / 2) return;
+  const double near = tenth_difference(now_rad, past, 1);
+  if (!std::isfinite(near)) return;
+  learn_level(c, std::abs(third), near);
   // Differences of samples that follow each other say nearly the same: every second one counts.
-  if (even_samples_ < kPast || number_ % 2 != 0 || !std::isfinite(near + far)) return;
-  fifth_.count(near);
-  far_fifth_.count(far);
+  if (even_samples_ < kPast || number_ % 2 != 0) return;
+  const double far = tenth_difference(now_rad, past, 2);
+  if (!std::isfinite(far)) return;
+  tenth_.count(near);
+  far_tenth_.count(far);
+}
+
+// A fast motion has third differences of its own, but hardly any tenth ones. So may many
+// of a channel that moves often: a low quantile is followed.
+RT_SAFE void NoiseEstimate::learn_level(std::size_t c, double third_rad,
+                                        double tenth_rad) noexcept {
+  Level& level = levels_[c];
+  if (third_.total() < kEnough) return;
+  if (level.values == 0.0) {
+    level.third_rad = kLowOverMedian * third_.median_rad();
+    level.tenth_rad = kTenthOverThird * level.third_rad;
+  }
+  level.values += 1.0;
+  const double step = std::max(kOwnStep, 1.0 / (level.values + 1.0));
+  const double up = 1.0 + 2.0 * kLowShare * step;
+  const double down = 1.0 / (1.0 + 2.0 * (1.0 - kLowShare) * step);
+  level.third_rad *= third_rad > level.third_rad ? up : down;
+  level.tenth_rad *= tenth_rad > level.tenth_rad ? up : down;
+  level.third_rad = std::max(level.third_rad, kMinBin_rad);
+  level.tenth_rad = std::max(level.tenth_rad, kMinBin_rad);
+}
+
+// A channel that seems to differ by little is as noisy as all.
+RT_SAFE double NoiseEstimate::own_share(std::size_t c, double common_rad) const noexcept {
+  const Level& level = levels_[c];
+  if (level.values == 0.0) return 1.0;
+  const double size_rad = std::min(level.third_rad, level.tenth_rad / kTenthOverThird);
+  const double own_rad = std::max(kMinNoise_rad, kToNoise / kLowOverMedian * size_rad);
+  const double off = std::clamp(std::log2(own_rad / common_rad), -kMostOctaves, kMostOctaves);
+  // Differences of rounded values are often zero.
+  if (off < 0.0 && rounding_rad_[c] > 0.0) return 1.0;
+  const double known = level.values / (level.values + kOwnFew);
+  return std::exp2(known * off * off * off / (off * off + kOwnSpread * kOwnSpread));
 }
 
 RT_SAFE void NoiseEstimate::push(std::span<const double> measured_rad, bool even,
@@ -215,25 +275,28 @@ RT_SAFE void NoiseEstimate::push(std::span<const double> measured_rad, bool even
   if (third_.total() >= kEnough) {
     const double white_rad = kToNoise * third_.median_rad();
     const bool random = white_rad > kOverRounding * std::ranges::max(rounding_rad_);
-    const double r = random && fifth_.total() >= kFewWhite ? correlation() : kMaxCorrelation;
+    const double r = random && tenth_.total() >= kFewWhite ? correlation() : kMaxCorrelation;
     jitter_rad_ = std::max(kMinNoise_rad, white_rad);
+    for (auto c = static_cast<std::size_t>(number_ % kTurns); c < share_.size(); c += kTurns) {
+      share_[c] = own_share(c, jitter_rad_);
+    }
     noise_rad_ = std::max(jitter_rad_, random ? correlated_rad(r, period_s) : 0.0);
     // Once it is white it stays so until it is clearly not.
     white_ = !repeats_ && r < (white_ ? kStillWhite : kMinCorrelation);
   }
   third_.fade();
-  fifth_.fade();
-  far_fifth_.fade();
+  tenth_.fade();
+  far_tenth_.fade();
 }
 
 // That of samples that follow each other, 0 to kMaxCorrelation, if it falls off as a first order's.
 RT_SAFE double NoiseEstimate::correlation() const noexcept {
-  const double ratio = far_fifth_.median_rad() / fifth_.median_rad();
+  const double ratio = far_tenth_.median_rad() / tenth_.median_rad();
   double low = 0.0;  // between these correlations the variances have this ratio
   double high = kMaxCorrelation;
   for (int i = 0; i < 12; ++i) {
     const double r = 0.5 * (low + high);
-    (fifth_variance(r * r) < ratio * ratio * fifth_variance(r) ? low : high) = r;
+    (tenth_variance(r * r) < ratio * ratio * tenth_variance(r) ? low : high) = r;
   }
   return low;
 }
@@ -244,10 +307,10 @@ RT_SAFE double NoiseEstimate::correlated_rad(double r, double period_s) const no
   double frames = 1.0;  // for each sample
   for (const double share : longer_) frames += repeats_ ? share : 0.0;
   const double sample_s = period_s * frames;
-  if (fifth_.total() < kFew || sample_s * kSlowest_Hz > 1.0 || r < kMinCorrelation) return 0.0;
+  if (tenth_.total() < kFew || sample_s * kSlowest_Hz > 1.0 || r < kMinCorrelation) return 0.0;
   const double turn = 2.0 * std::numbers::pi * kMotionShare;
   const double power = (1.0 - r * r) / (1.0 - 2.0 * r * std::cos(turn) + r * r);
-  return fifth_.median_rad() / kMedian * std::sqrt(power / fifth_variance(r));
+  return tenth_.median_rad() / kMedian * std::sqrt(power / tenth_variance(r));
 }
 
 }  // namespace posed::smooth

@@ -45,6 +45,8 @@ class NoiseEstimate {
   RT_SAFE [[nodiscard]] double noise_rad() const noexcept { return noise_rad_; }
   // The same as far as it shows from sample to sample: less where the noise is correlated.
   RT_SAFE [[nodiscard]] double jitter_rad() const noexcept { return jitter_rad_; }
+  // The noise of each channel over noise_rad().
+  RT_SAFE [[nodiscard]] std::span<const double> share() const noexcept { return share_; }
   // The error of rounding [rad], for each channel; 0 where the values have no steps.
   RT_SAFE [[nodiscard]] std::span<const double> rounding_rad() const noexcept {
     return rounding_rad_;
@@ -66,12 +68,20 @@ class NoiseEstimate {
   void judge_repeat(std::span<const double> measured_rad) noexcept;
   void learn_step(std::size_t c, double change_rad) noexcept;
   void learn_differences(std::size_t c, double now_rad) noexcept;
+  void learn_level(std::size_t c, double third_rad, double tenth_rad) noexcept;
+  [[nodiscard]] double own_share(std::size_t c, double common_rad) const noexcept;
   void forget_differences() noexcept;
   [[nodiscard]] double correlation() const noexcept;
   [[nodiscard]] double correlated_rad(double r, double period_s) const noexcept;
 
-  static constexpr int kPast = 10;       // samples: the fifth difference of every second one
+  static constexpr int kPast = 20;       // samples: the tenth difference of every second one
   static constexpr int kMaxRepeats = 4;  // of one sample
+
+  // Median sizes of a channel's own differences, followed by small steps [rad]; 0: not begun.
+  struct Level {
+    double third_rad = 0.0, tenth_rad = 0.0;
+    double values = 0.0;
+  };
 
   struct Step {
     double least_rad = 0.0;  // the smallest change since it was found
@@ -86,11 +96,13 @@ class NoiseEstimate {
   std::vector<double> first_;          // [channels] the first value of each
   std::vector<bool> moved_;            // [channels]
   std::vector<Step> steps_;            // [channels]
+  std::vector<Level> levels_;          // [channels]
+  std::vector<double> share_;          // [channels]
   std::vector<double> rounding_rad_;   // [channels]
   std::vector<double> half_step_rad_;  // [channels]
   long number_ = 0;                    // of samples
   int even_samples_ = 0;               // in a row, up to kPast
-  MedianSize third_, fifth_, far_fifth_;
+  MedianSize third_, tenth_, far_tenth_;
   bool repeats_ = false;   // the device shows samples more than once
   bool repeated_ = false;  // the last frame was such
   int run_ = 0;            // frames without any change

@@ -137,6 +137,22 @@ TEST_CASE("the gate believes what persists") {
   CHECK(through(22, 0) == Approx(90.0));
 }
 
+TEST_CASE("where suspects were true the gate believes them, until they are false again") {
+  // A finger that closes alone, by 1,200 deg/s within a frame.
+  test::Motion motion = test::Motion::Zero(2000, 3);
+  for (Eigen::Index t = 0; t < motion.rows(); ++t) {
+    const auto phase = static_cast<double>(t % 60);
+    const double way = std::clamp(phase - 20.0, 0.0, 3.0) - std::clamp(phase - 45.0, 0.0, 3.0);
+    motion(t, 0) = t < 1000 ? 30.0 * way : 0.0;
+    motion(t, 1) = 10.0 * std::sin(0.05 * static_cast<double>(t));
+  }
+  for (Eigen::Index t = 1200; t < motion.rows(); t += 10) motion(t, 0) += 25.0;
+  const test::Motion through = gated(motion, 60.0);
+  CHECK(missing(through.topRows(200)) > 0);
+  CHECK(missing(through.middleRows(200, 800)) == 0);
+  CHECK(missing(through.bottomRows(200)) == 20);
+}
+
 TEST_CASE("the gate lets a fast hand, repeats and steps of a coarse sensor through") {
   // 90 degrees in 0.2 s: 840 degrees a second at the most.
   test::Motion motion(120, 3);

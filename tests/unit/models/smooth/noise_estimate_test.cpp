@@ -59,7 +59,8 @@ Motion repeated(Motion measured, Eigen::Index times) {
 
 struct Learnt {
   double noise_deg, rounding_deg;
-  int repeated = 0;  // of the last 600 frames
+  int repeated = 0;               // of the last 600 frames
+  std::array<double, 8> own_deg;  // of each channel
 };
 
 Learnt learn(const Motion& measured) {
@@ -77,6 +78,9 @@ Learnt learn(const Motion& measured) {
   CHECK(allocations() == before);
   learnt.noise_deg = noise.noise_rad() / kDegree;
   learnt.rounding_deg = noise.rounding_rad()[0] / kDegree;
+  for (std::size_t c = 0; c < learnt.own_deg.size(); ++c) {
+    learnt.own_deg[c] = noise.share()[c] * learnt.noise_deg;
+  }
   return learnt;
 }
 
@@ -87,6 +91,32 @@ TEST_CASE("white noise is neither correlated nor rounded nor repeated", "[live]"
   CHECK(learnt.noise_deg == Approx(0.97).epsilon(0.05));
   CHECK(learnt.rounding_deg == 0.0);
   CHECK(learnt.repeated == 0);
+}
+
+TEST_CASE("one noisy sensor does not make the others noisy, nor they it quiet", "[live]") {
+  Motion measured = noisy(swings(), 0.3, 3);
+  measured.col(5) = noisy(swings(), 4.0, 6).col(5);
+  const Learnt learnt = learn(measured);
+  for (std::size_t c = 0; c < learnt.own_deg.size(); ++c) {
+    INFO("channel " << c);
+    CHECK(learnt.own_deg[c] == Approx(c == 5 ? 4.0 : 0.3).epsilon(0.3));
+  }
+  const bench::Trial trial{swings(), measured, kNoiseRate_hz};
+  const Motion made = bench::live_stage(trial, 1);
+  CHECK(bench::rms_deg(made.col(0), swings().col(0)) < 0.25);
+  CHECK(bench::rms_deg(made.col(5), swings().col(5)) < 2.4);
+}
+
+TEST_CASE("fingers that drum are no noise", "[live]") {
+  Motion truth(900, 8);
+  for (Eigen::Index t = 0; t < truth.rows(); ++t) {
+    for (Eigen::Index c = 0; c < truth.cols(); ++c) {
+      const double turns = 0.2 * static_cast<double>(t) + 0.1 * static_cast<double>(c);
+      truth(t, c) = 20.0 * std::sin(2.0 * std::numbers::pi * turns);  // 6 Hz at 30 Hz
+    }
+  }
+  const bench::Trial trial{truth, noisy(truth, 0.3, 3), 30.0};
+  CHECK(bench::rms_deg(bench::live_stage(trial, 1).bottomRows(800), truth.bottomRows(800)) < 0.6);
 }
 
 TEST_CASE("correlated noise counts as the white noise that has its power in a motion's band",
