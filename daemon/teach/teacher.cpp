@@ -277,7 +277,7 @@ Result<> Teacher::cancel(const std::string& stream) {
     return fail("the style is coming on just now; alpha = 0 or another model takes it off again");
   }
   model_.reset();
-  if (state_.label().empty()) words_of(marked_.walk).clear_sentence();  // of what was so far
+  forget_so_far();
   finish(Step::STEP_IDLE, {});
   changed_.notify_all();
   return {};
@@ -290,6 +290,12 @@ v1::Teaching Teacher::state() const {
     state.set_seconds_left(std::max(0.0, seconds(marked_.until_ns - clock_())));
   }
   return state;
+}
+
+// Call it with mutex_ held. What was said of a walk that did not end.
+void Teacher::forget_so_far() {
+  if (state_.step() != Step::STEP_MARKING || !state_.label().empty()) return;
+  words_of(marked_.walk).clear_sentence();
 }
 
 // Call it with mutex_ held. What is under way is over.
@@ -336,6 +342,7 @@ void Teacher::run() {
       collected = {};
       if (!lock.owns_lock()) lock.lock();
       working_ = false;
+      forget_so_far();
       finish(Step::STEP_IDLE, "there is too little memory for this; mark shorter walks");
     }
   }

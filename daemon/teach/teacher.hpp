@@ -135,6 +135,7 @@ class Teacher final : public pipeline::RawTap {
   void tell_signs();
   [[nodiscard]] bool is_known(const Pupil& pupil) const;
   [[nodiscard]] v1::TaughtWalk& words_of(Walk walk);
+  void forget_so_far();
   void finish(v1::Teaching::Step step, const std::string& problem);
 
   const Keep keep_;

@@ -12,22 +12,22 @@
 namespace posed::feet {
 namespace {
 
-constexpr double kFlight = 1e-3;       // weight of going on as before where no foot stands
-constexpr double kStands = 4.0;        // times the weight of the points is all of standing
-constexpr double kDriftTau_s = 0.3;    // over which the offset's own speed is averaged
-constexpr double kForgetTau_s = 1.0;   // over which it ends where no foot stands
-constexpr double kMaxDrift_m_s = 3.0;  // no style changes the speed of a walk by more
-constexpr double kGoesTau_s = 0.5;     // for how the root goes beside the feet
-constexpr double kStandingFeet_m_s = 0.2;     // slower feet tell nothing
-constexpr double kGoes = 0.5;          // speed of the root over that of the feet beside it
-constexpr double kInPlace = 0.2;       // the same for who walks in place
-constexpr double kReturnTau_s = 1.0;   // the offset returns by this share of itself ...
-constexpr double kReturn_m_s = 0.1;    // ... and by this
-constexpr double kStepTau_s = 0.02;    // smooths the change from foot to foot
-constexpr double kSoft_m = 0.02;       // the lowest point counts gradually within so much
-constexpr double kLiftTau_s = 0.03;    // and the height follows it within so long
-constexpr double kSettled_m = 1e-4;    // a height without a style below this is none
-constexpr double kActorTau_s = 0.2;    // the same for a root that stays on the performer
+constexpr double kFlight = 1e-3;           // weight of going on as before where no foot stands
+constexpr double kStands = 4.0;            // times the weight of the points is all of standing
+constexpr double kDriftTau_s = 0.3;        // over which the offset's own speed is averaged
+constexpr double kForgetTau_s = 1.0;       // over which it ends where no foot stands
+constexpr double kMaxDrift_m_s = 3.0;      // no style changes the speed of a walk by more
+constexpr double kGoesTau_s = 0.5;         // for how the root goes beside the feet
+constexpr double kStandingFeet_m_s = 0.2;  // slower feet tell nothing
+constexpr double kGoes = 0.5;              // speed of the root over that of the feet beside it
+constexpr double kInPlace = 0.2;           // the same for who walks in place
+constexpr double kReturnTau_s = 1.0;       // the offset returns by this share of itself ...
+constexpr double kReturn_m_s = 0.1;        // ... and by this
+constexpr double kStepTau_s = 0.02;        // smooths the change from foot to foot
+constexpr double kSoft_m = 0.02;           // the lowest point counts gradually within so much
+constexpr double kLiftTau_s = 0.03;        // and the height follows it within so long
+constexpr double kSettled_m = 1e-4;        // a height without a style below this is none
+constexpr double kActorTau_s = 0.2;        // the same for a root that stays on the performer
 
 Eigen::Vector3d shortened(const Eigen::Vector3d& v, double length) {
   const double norm = v.norm();
@@ -180,12 +180,12 @@ RT_SAFE Eigen::Vector3d RootMotion::update(const PosePair& pair, const Contacts&
   assert(dt_s > 0.0);
   const OfPoints<Placed> now = placed(pair);
   const bool off = options.mode == RootMode::kOff;
+  look_where_it_goes(now, pair.root_m, dt_s);
   if (off) {
     offset_m_.setZero();
     drift_m_s_.setZero();
     pending_m_.setZero();
   } else {
-    look_where_it_goes(now, pair.root_m, dt_s);
     if (started_) walk(now, contacts, dt_s, pair.learnt);
     come_back(gone, dt_s, options.mode);
     if (pair.learnt != nullptr) {

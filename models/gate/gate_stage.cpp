@@ -51,6 +51,8 @@ constexpr int kMostRepeats = 4;      // of one sample
 
 constexpr float kFlaky = 0.002F;  // share of a hand's angles dropped lately
 
+constexpr float kForgets_s = 0.25F;  // what is older says nothing, and nothing is held
+
 // What a value may do [its unit].
 struct Bounds {
   float jump = 0.0F;          // always allowed from one sample to the next
@@ -184,11 +186,10 @@ class Track {
   RT_SAFE [[nodiscard]] float usual() const noexcept { return usual_; }
 
  private:
-  static constexpr float kForgets_s = 0.25F;  // what is older says nothing, and nothing is held
-  static constexpr float kUnusual = 5.0F;     // times the mean distance from the prediction
-  static constexpr float kSwing = 1.5F;       // of how far the last sample was off
-  static constexpr float kFar = 0.5F;         // of the limit
-  static constexpr float kFarthest = 3.0F;    // steps that a prediction goes
+  static constexpr float kUnusual = 5.0F;   // times the mean distance from the prediction
+  static constexpr float kSwing = 1.5F;     // of how far the last sample was off
+  static constexpr float kFar = 0.5F;       // of the limit
+  static constexpr float kFarthest = 3.0F;  // steps that a prediction goes
   static constexpr float kLearn = 0.03F;
   static constexpr float kAgree = 0.75F;
   static constexpr float kGoesOn = 1.2F;
@@ -308,7 +309,7 @@ class GateStage final : public Stage {
   RT_SAFE void feel_parts() noexcept;
   RT_SAFE [[nodiscard]] bool has_company(std::size_t c) const noexcept;
   RT_SAFE bool drop_angles(Frame& frame) const noexcept;
-  RT_SAFE [[nodiscard]] bool repeats(const Frame& frame) noexcept;
+  RT_SAFE [[nodiscard]] bool repeats(float dt_s, const Frame& frame) noexcept;
   RT_SAFE void learn_repeats(float moving, float alone) noexcept;
   RT_SAFE bool gate_angles(float dt_s, Frame& frame) noexcept;
   RT_SAFE bool gate_turns(float dt_s, Frame& frame) noexcept;
@@ -426,7 +427,7 @@ RT_SAFE bool GateStage::has_company(std::size_t c) const noexcept {
 // Whether the device shows the sample of the frame before once more. One that is polled faster than
 // it measures repeats all angles at once; those that stay within their step or dead band repeat
 // alone.
-RT_SAFE bool GateStage::repeats(const Frame& frame) noexcept {
+RT_SAFE bool GateStage::repeats(float dt_s, const Frame& frame) noexcept {
   const std::span<const float> shown(frame.angle_rad.data(), shown_rad_.size());
   same_ = std::memcmp(shown.data(), shown_rad_.data(), shown.size_bytes()) == 0;
   if (!same_) {
@@ -434,7 +435,8 @@ RT_SAFE bool GateStage::repeats(const Frame& frame) noexcept {
     run_ = 0;
     return false;
   }
-  return samples_ > kFewSamples && alone_ < kAlone && ++run_ <= kMostRepeats;
+  const bool polled = samples_ > kFewSamples && alone_ < kAlone;
+  return polled && held_s_ + dt_s <= kForgets_s && ++run_ <= kMostRepeats;
 }
 
 RT_SAFE void GateStage::learn_repeats(float moving, float alone) noexcept {
@@ -455,7 +457,7 @@ RT_SAFE bool GateStage::drop_angles(Frame& frame) const noexcept {
 }
 
 RT_SAFE bool GateStage::gate_angles(float dt_s, Frame& frame) noexcept {
-  if (repeats(frame)) {
+  if (repeats(dt_s, frame)) {
     held_s_ += dt_s;
     return drop_angles(frame);
   }

@@ -114,14 +114,34 @@ std::array<Section, kOrder / 2> butterworth(double cutoff) {
 
 }  // namespace
 
-bool begins_with_added_pose(const Motion& motion) {
-  if (motion.size() < 3) return false;
-  const auto step = [&](int t) {
-    return step_rad(motion.frames[t], motion.frames[t + 1], motion.skeleton->root_joint);
-  };
+namespace {
+
+// `frame` gives each of so many frames.
+template <typename FrameOf>
+bool first_is_added(int frames, int root_joint, const FrameOf& frame) {
+  if (frames < 3) return false;
+  Frame before = frame(1);
+  const double first = step_rad(frame(0), before, root_joint);
+  if (!(first > kAddedPoseJump_rad)) return false;
   double largest = 0.0;
-  for (int t = 1; t + 1 < motion.size(); ++t) largest = std::max(largest, step(t));
-  return step(0) > std::max(kAddedPoseJump_rad, kAddedPoseJump * largest);
+  for (int t = 2; t < frames; ++t) {
+    const Frame now = frame(t);
+    largest = std::max(largest, step_rad(before, now, root_joint));
+    before = now;
+  }
+  return first > kAddedPoseJump * largest;
+}
+
+}  // namespace
+
+bool begins_with_added_pose(const Motion& motion) {
+  return first_is_added(motion.size(), motion.skeleton->root_joint,
+                        [&](int t) -> const Frame& { return motion.frames[t]; });
+}
+
+bool begins_with_added_pose(const clip::Clip& clip) {
+  return first_is_added(clip.frames(), clip.skeleton->root_joint,
+                        [&](int t) { return clip.frame(t); });
 }
 
 Result<Motion> performed_motion_of(const clip::Clip& clip) {

@@ -31,6 +31,7 @@ Result<Motion> motion_of(const clip::Clip& clip);
 // in front (CMU's cgspeed BVH files), so the step to the second frame is larger than any person
 // moves.
 [[nodiscard]] bool begins_with_added_pose(const Motion& motion);
+[[nodiscard]] bool begins_with_added_pose(const clip::Clip& clip);
 // motion_of() without such a pose.
 Result<Motion> performed_motion_of(const clip::Clip& clip);
 void drop_first_frame(Motion& motion);

@@ -30,7 +30,7 @@ constexpr double kOwnFew = 100.0;           // values that count as much as the 
 constexpr double kOwnStep = 0.01;           // least step of a level, of itself
 constexpr double kMostOctaves = 6.0;
 constexpr double kTenthOverThird = 96.1134434;  // sqrt(184756 / 20), of white noise
-constexpr long kTurns = 8;                      // samples between two looks at a channel
+constexpr long kSamplesALook = 8;               // samples between two looks at a channel
 
 // Correlation of the noise.
 constexpr double kFew = 400.0;               // differences before a correlation is believed
@@ -171,7 +171,10 @@ RT_SAFE void NoiseEstimate::judge_repeat(std::span<const double> measured_rad) n
   }
   run_ = 0;
   const bool repeats = samples_ > kFirstSamples && alone_ < kAlone && longer_[0] > kCommon;
-  if (std::exchange(repeats_, repeats) != repeats) forget_differences();
+  if (std::exchange(repeats_, repeats) == repeats) return;
+  forget_differences();
+  std::ranges::fill(levels_, Level());  // those of repeated values say nothing of the samples
+  std::ranges::fill(share_, 1.0);
 }
 
 RT_SAFE void NoiseEstimate::forget_differences() noexcept {
@@ -277,7 +280,8 @@ RT_SAFE void NoiseEstimate::push(std::span<const double> measured_rad, bool even
     const bool random = white_rad > kOverRounding * std::ranges::max(rounding_rad_);
     const double r = random && tenth_.total() >= kFewWhite ? correlation() : kMaxCorrelation;
     jitter_rad_ = std::max(kMinNoise_rad, white_rad);
-    for (auto c = static_cast<std::size_t>(number_ % kTurns); c < share_.size(); c += kTurns) {
+    for (auto c = static_cast<std::size_t>(number_ % kSamplesALook); c < share_.size();
+         c += kSamplesALook) {
       share_[c] = own_share(c, jitter_rad_);
     }
     noise_rad_ = std::max(jitter_rad_, random ? correlated_rad(r, period_s) : 0.0);

@@ -201,24 +201,46 @@ void hold_missing(Clip& clip) {
 
 namespace {
 
-// How many frames are missing before each frame of a clip. Frames that come in bursts are early
-// after they were late, and are not taken for missing.
+// How many frames are missing before each frame of a clip. A frame that is late, and frames that
+// come in bursts, are followed or preceded by early ones, and are not taken for missing.
 std::vector<std::size_t> missing_before(const std::vector<double>& time_s, double step_s) {
-  constexpr double kForgets = 0.9;  // of each frame, since a device's clock may drift
+  constexpr double kForgets = 0.9;       // of each frame, since a device's clock may drift
+  constexpr std::size_t kCatchesUp = 4;  // frames within which a late device does
+  const auto late_by = [&](std::size_t i) { return (time_s[i] - time_s[i - 1]) / step_s - 1.0; };
   std::vector<std::size_t> missing(time_s.size());
   double late = 0.0;  // steps
   for (std::size_t i = 1; i < time_s.size(); ++i) {
-    const double steps = (time_s[i] - time_s[i - 1]) / step_s;
-    late = kForgets * late + steps - 1.0;
-    if (steps < 1.5) continue;
-    const double lacks = std::max(0.0, std::round(std::min(late, steps - 1.0)));
+    late = kForgets * late + late_by(i);
+    if (late_by(i) < 0.5) continue;
+    double lacks = late;
+    double still = 0.0;
+    for (std::size_t k = i; k < std::min(i + 1 + kCatchesUp, time_s.size()); ++k) {
+      still += late_by(k);
+      lacks = std::min(lacks, still);
+    }
+    lacks = std::max(0.0, std::round(lacks));
     missing[i] = static_cast<std::size_t>(lacks);
     late -= lacks;
   }
   return missing;
 }
 
-std::string gap_words(const Clip& clip, const std::vector<std::size_t>& missing) {
+// Those that are held: not in the longest gaps, and in all no more than there are frames, or than a
+// minute has, because whoever sends says the times.
+std::vector<std::size_t> held_of(const Clip& clip, const std::vector<std::size_t>& missing) {
+  std::size_t room =
+      std::max(missing.size(), static_cast<std::size_t>(kLongestHeld_s * clip.frame_rate_hz));
+  std::vector<std::size_t> held = missing;
+  for (std::size_t i = 1; i < held.size(); ++i) {
+    const bool cut = clip.time_s[i] - clip.time_s[i - 1] > kLongestHeld_s || held[i] > room;
+    if (cut) held[i] = 0;
+    room -= held[i];
+  }
+  return held;
+}
+
+std::string gap_words(const Clip& clip, const std::vector<std::size_t>& missing,
+                      const std::vector<std::size_t>& held) {
   constexpr std::size_t kMostNamed = 5;
   std::string where;
   std::size_t gaps = 0, frames = 0;
@@ -227,7 +249,7 @@ std::string gap_words(const Clip& clip, const std::vector<std::size_t>& missing)
     frames += missing[i];
     if (++gaps > kMostNamed) continue;
     where += fmt::format("{}{} at {:.2f} s", gaps > 1 ? ", " : "", missing[i], clip.time_s[i - 1]);
-    if (clip.time_s[i] - clip.time_s[i - 1] > kLongestHeld_s) where += " (cut out)";
+    if (held[i] == 0) where += " (cut out)";
   }
   if (gaps > kMostNamed) where += fmt::format(" and {} more gaps", gaps - kMostNamed);
   return fmt::format("{} frames are missing: {}; the one before each gap is held", frames, where);
@@ -239,21 +261,20 @@ void hold_gaps(Clip& clip) {
   if (clip.frames() < 2) return;
   const auto missing = missing_before(clip.time_s, 1.0 / clip.frame_rate_hz);
   if (std::ranges::all_of(missing, [](std::size_t frames) { return frames == 0; })) return;
-  clip.warnings.push_back(gap_words(clip, missing));
+  const auto held = held_of(clip, missing);
+  clip.warnings.push_back(gap_words(clip, missing, held));
   std::vector<std::size_t> from;  // the frame that each one of the new clip is
   std::vector<double> time_s;
   for (std::size_t i = 0; i < missing.size(); ++i) {
-    const bool cut = i > 0 && clip.time_s[i] - clip.time_s[i - 1] > kLongestHeld_s;
-    for (std::size_t k = 1; k <= (cut ? 0 : missing[i]); ++k) {
+    for (std::size_t k = 1; k <= held[i]; ++k) {
       from.push_back(i - 1);
-      const double share = static_cast<double>(k) / static_cast<double>(missing[i] + 1);
+      const double share = static_cast<double>(k) / static_cast<double>(held[i] + 1);
       time_s.push_back(std::lerp(clip.time_s[i - 1], clip.time_s[i], share));
     }
     from.push_back(i);
     time_s.push_back(clip.time_s[i]);
   }
-  const ChannelMatrix channels = clip.channels(from, Eigen::all);
-  clip.channels = channels;
+  clip.channels = ChannelMatrix(clip.channels(from, Eigen::all));
   clip.time_s = std::move(time_s);
   if (clip.timecode.empty()) return;
   std::vector<Timecode> timecode;

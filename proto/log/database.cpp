@@ -282,7 +282,8 @@ Result<bool> Database::wal_is_own() {
   }
   std::uint32_t cookie = 0;
   for (const unsigned char byte : bytes) cookie = cookie << 8 | byte;
-  return TRY(value("PRAGMA schema_version")) == std::to_string(cookie);
+  const auto shown = TRY(value("PRAGMA schema_version"));
+  return shown == std::to_string(cookie);
 }
 
 }  // namespace posed::log

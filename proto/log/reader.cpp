@@ -44,30 +44,36 @@ void merge_wal(Database& database) {
   static_cast<void>(merged);
 }
 
-Result<> check_whole(Database& database, const std::string& file) {
-  const auto damaged = [&](const std::string& how) {
-    return fail("the log is damaged (" + how + "); `sqlite3 FILE .recover` may save what is left",
-                file);
-  };
+std::unexpected<Error> damaged(const std::string& file, const std::string& how) {
+  return fail("the log is damaged (" + how + "); `sqlite3 FILE .recover` may save what is left",
+              file);
+}
+
+Result<> check_length(Database& database, const std::string& file) {
   const auto page = TRY(database.value("PRAGMA page_size"));
   std::error_code error;
   const auto size = std::filesystem::file_size(file, error);
   // SQLite itself reads a truncated last page as if it ended in zeros.
-  if (error || size % std::stoul(page) != 0) return damaged("cut short");
+  if (error || size % std::stoul(page) != 0) return damaged(file, "cut short");
+  return {};
+}
+
+Result<> check_content(Database& database, const std::string& file) {
   const auto verdict = TRY(database.value("PRAGMA quick_check(1)"));
-  if (verdict != "ok") return damaged(verdict);
+  if (verdict != "ok") return damaged(file, verdict);
   return {};
 }
 
 // A -wal may be of another recording that once had the name: merged, it would destroy this one.
-Result<> check_wal(Database& database, const std::string& file) {
+// Returns whether there is one.
+Result<bool> check_wal(Database& database, const std::string& file) {
   std::error_code none;
-  if (std::filesystem::file_size(file + "-wal", none) == 0 || none) return {};
+  if (std::filesystem::file_size(file + "-wal", none) == 0 || none) return false;
   const bool is_own = TRY(database.wal_is_own());
-  if (is_own && TRY(database.value("PRAGMA quick_check(1)")) == "ok") return {};
-  return fail("the file " + file + "-wal beside it is " +
-                  (is_own ? "damaged, or of another recording" : "of another recording") +
-                  "; move that away, and the log is what it was without it",
+  if (is_own) return true;
+  return fail("the file " + file +
+                  "-wal beside it is of another recording; move that away, and the log is what it "
+                  "was without it",
               file);
 }
 
@@ -76,8 +82,8 @@ Result<> check_journal(const std::string& file) {
   std::error_code none;
   if (std::filesystem::file_size(file + "-journal", none) == 0 || none) return {};
   return fail("the file " + file +
-                  "-journal lies beside it, which a log that has begun never has;"
-                  " move that away",
+                  "-journal lies beside it: if another posed is just opening or ending this log, "
+                  "try again; else keep both, and open a copy without the -journal",
               file);
 }
 
@@ -89,11 +95,13 @@ Result<Database> open_whole(const std::filesystem::path& path) {
   auto database = TRY(Database::open(path, Database::Mode::kReadWrite));
   database.merge_at_end(false);
   TRY(check_marks(database, file));
-  TRY(check_wal(database, file));
+  const bool has_wal = TRY(check_wal(database, file));
   TRY(database.check_schema());
-  merge_wal(database);
   database.set_busy_timeout_ms(kReadPatience_ms);
-  TRY(check_whole(database, file));
+  if (has_wal) TRY(check_content(database, file));
+  merge_wal(database);
+  TRY(check_length(database, file));
+  if (!has_wal) TRY(check_content(database, file));
   return database;
 }
 

@@ -313,9 +313,8 @@ TEST_CASE("datagrams of a capture system mark takes, once each, and rubbish mark
   CHECK(stage.frames_of(stage.path("take.plog"), "walk").size() > 1000);
   CHECK(takes[0].at("timecode") == "10:20:30:05");
   const auto from = [&stage](const std::string& timecode) {
-    return posed({"convert", stage.path("take.plog"), "--stream", "walker", "--take", "1",
-                  "--from-timecode", timecode, "--out", stage.path("part.glb"), "--overwrite",
-                  "--json"});
+    return posed({"convert", stage.path("take.plog"), "--stream", "walker", "--take", "1", "--from",
+                  timecode, "--out", stage.path("part.glb"), "--overwrite", "--json"});
   };
   const auto frames = [&from](const std::string& timecode) {
     return json::parse(from(timecode).out).at("frames").get<int>();

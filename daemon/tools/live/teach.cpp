@@ -48,6 +48,12 @@ class Lesson {
         !options_.more && ((options_.neutral_s > 0.0 && now.neutral_walk().takes() > 0) ||
                            (options_.style_s > 0.0 && now.style_walk().takes() > 0));
     if (now.stream() == options_.stream && !(options_.signs.empty() && replaces)) return {};
+    if (now.stream() != options_.stream) {
+      return fail(
+          fmt::format("a lesson of stream {} is not finished, perhaps on somebody's page; "
+                      "finish it there, or --anew forgets it",
+                      clean_name(now.stream())));
+    }
     return fail(
         fmt::format("a lesson of stream {} is not finished, perhaps on somebody's page, and "
                     "has {} walks as usual, {} in the style and {} signs; --more adds to "

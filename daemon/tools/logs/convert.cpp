@@ -8,6 +8,7 @@
 #include <CLI/CLI.hpp>
 
 #include "daemon/tools/command/client.hpp"
+#include "daemon/tools/command/clip_part.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/command/options.hpp"
@@ -18,7 +19,6 @@
 #include "proto/clip/format.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/clip/hand_clip.hpp"
-#include "proto/clip/timecode_cut.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"
@@ -94,7 +94,7 @@ struct Convert {
   std::string hand;    // "left", "right" or not given
   std::string stream;  // of a log; empty: the only one
   std::string take;    // of a log, a number or a name; empty: all
-  std::string from_timecode, to_timecode;
+  ClipPart part;
   bool takes = false;  // list those of a log
   bool overwrite = false, json = false;
   bool shape_given = false;
@@ -116,7 +116,6 @@ Result<> check_options(const Convert& convert) {
     return misuse(what, convert.in);
   };
   const bool of_log = is_log(convert.in);
-  const bool cuts = !convert.from_timecode.empty() || !convert.to_timecode.empty();
   const bool reads_clip_options = !convert.read.skeleton.empty() || !convert.read.profile.empty() ||
                                   convert.read.rate_hz || convert.read.metres_per_unit ||
                                   convert.read.up || convert.read.facing;
@@ -125,8 +124,9 @@ Result<> check_options(const Convert& convert) {
                 "is not a device log (.plog), so --stream has no effect"),
         useless(!convert.take.empty(), of_log,
                 "is not a device log (.plog), so --take has no effect"),
-        useless(!convert.stream.empty() || !convert.take.empty() || cuts, !is_mcap(convert.out),
-                "is written as a whole log, so --stream, --take and timecodes have no effect"),
+        useless(!convert.stream.empty() || !convert.take.empty() || convert.part.given(),
+                !is_mcap(convert.out),
+                "is written as a whole log, so --stream, --take, --from and --to have no effect"),
         useless(is_mcap(convert.out), of_log,
                 "is not a device log (.plog), and only a log becomes a .mcap; name a .glb"),
         useless(reads_clip_options, !of_log,
@@ -197,8 +197,7 @@ int run(Convert& convert) {
     const Waiting waiting("reading " + convert.in);
     return read(convert);
   }();
-  if (clip)
-    clip = clip::cut_by_timecode(*std::move(clip), convert.from_timecode, convert.to_timecode);
+  if (clip) clip = part_of(*std::move(clip), convert.part, convert.in);
   if (!clip) return report(clip.error());
   warn_of_clock(convert, *clip);
   Findings findings;
@@ -247,10 +246,7 @@ void add_convert(CLI::App& app, int& exit_code) {
       ->excludes(out)
       ->excludes(stream)
       ->excludes(take);
-  command->add_option("--from-timecode", convert->from_timecode,
-                      "Begin at this timecode: hh:mm:ss:ff, ;ff (drop frame) or .mmm; @25 behind"
-                      " it: its rate");
-  command->add_option("--to-timecode", convert->to_timecode, "End with this timecode");
+  add_part_options(*command, convert->part);
   command->add_option("--hand", convert->hand, "The hand of a hand CSV, or which hand to take")
       ->check(CLI::IsMember({"left", "right"}));
   auto* shape = command->add_option("--hand-shape", convert->read.hand_shape,
@@ -277,7 +273,8 @@ void add_convert(CLI::App& app, int& exit_code) {
       "  posed convert take1.plog --stream walker --out walker.bvh\n"
       "  posed convert take1.plog --takes\n"
       "  posed convert take1.plog --take 2 --stream walker --out walker-2.bvh\n"
-      "  posed convert take1.plog --from-timecode 10:20:30:05 --out walker.glb\n"
+      "  posed convert take1.plog --from 10:20:30:05 --out walker.glb\n"
+      "  posed convert walk.bvh --from 1.5 --to 4 --out step.bvh\n"
       "  posed convert mixamo.fbx --out walk.bvh\n"
       "  posed convert walk.bvh --out walk.vrma\n"
       "  posed convert take1.plog --out take1.mcap");

@@ -12,6 +12,7 @@
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 
+#include "daemon/tools/command/clip_part.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/command/options.hpp"
@@ -24,7 +25,6 @@
 #include "proto/clip/format.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/clip/hand_clip.hpp"
-#include "proto/clip/text.hpp"
 #include "proto/clip/timecode_cut.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/text/clean.hpp"
@@ -45,8 +45,7 @@ struct RenderArguments {
   std::optional<int> frame;
   int count = 8;
   double row_px = 260.0;
-  std::optional<double> from_s, to_s;
-  std::string from_timecode, to_timecode;  // instead of them
+  ClipPart part;
 };
 
 // A motion ready to be drawn; a hand's gaps are filled.
@@ -103,7 +102,8 @@ Result<clip::Clip> read_motion(const RenderArguments& options, const std::string
   auto clip = reads_log(options) ? clip_of_log(options.in, stream, options.take)
                                  : clip::read_clip(options.in, in_options(options));
   if (clip) {
-    clip = clip::cut_by_timecode(*std::move(clip), options.from_timecode, options.to_timecode);
+    clip = clip::cut_by_timecode(*std::move(clip), options.part.from_timecode,
+                                 options.part.to_timecode);
   }
   if (clip && clip->skeleton->joint_of(Bone::kHips) < 0 && !hand_side(*clip->skeleton)) {
     if (auto hand = as_hand(*clip, options.read)) clip = std::move(hand);
@@ -119,19 +119,10 @@ Result<Drawn> drawn_of(const RenderArguments& options, const clip::Clip& clip, s
   drawn.name = std::move(name);
   drawn.motion.skeleton = motion.skeleton;
   drawn.motion.rate_hz = motion.rate_hz;
-  for (int i = 0; i < motion.size(); ++i) {
-    const double time_s = clip.time_s.empty() ? i / clip.frame_rate_hz : clip.time_s[i];
-    if (time_s < options.from_s.value_or(0.0)) continue;
-    if (options.to_s && time_s > *options.to_s) break;
+  const auto range = TRY(frames_between(clip, options.part, options.in));
+  for (int i = range.first; i < range.end; ++i) {
     drawn.motion.frames.push_back(motion.frames[i]);
-    drawn.time_s.push_back(time_s);
-  }
-  if (drawn.motion.frames.empty()) {
-    const std::string until = options.to_s ? fmt::format(" to {:g} s", *options.to_s) : " s on";
-    return misuse(
-        fmt::format("has no frame from {:g}{}; it lasts {:.2f} s", options.from_s.value_or(0.0),
-                    until, clip.frames() / clip.frame_rate_hz),
-        options.in);
+    drawn.time_s.push_back(time_of(clip, i));
   }
   drawn.shape = std::make_unique<picture::FigureShape>(drawn.motion.skeleton);
   return drawn;
@@ -249,23 +240,6 @@ Result<> render_video(const RenderArguments& options, const std::vector<Drawn>& 
   return done;
 }
 
-// Seconds, or what has a ':'.
-void add_moment(CLI::App& command, const std::string& name, const std::string& help,
-                std::optional<double>& time_s, std::string& timecode) {
-  const auto set = [&time_s, &timecode](const std::string& text) {
-    if (text.contains(':')) {
-      timecode = text;
-    } else {
-      time_s = clip::parse_number(text);
-    }
-  };
-  command.add_option_function<std::string>(name, set, help)->check([](const std::string& text) {
-    const auto number = clip::parse_number(text);
-    const bool possible = text.contains(':') || (number && *number >= 0.0);
-    return possible ? std::string() : text + " is neither seconds from 0 on nor hh:mm:ss:ff";
-  });
-}
-
 Result<> run_render(const RenderArguments& options) {
   TRY(check_render(options));
   const auto view = TRY(picture::view_from_name(options.view));
@@ -319,10 +293,7 @@ void add_render(CLI::App& app, int& exit_code) {
   command->add_option("--height", options->row_px, "Height of a strip's poses [px]")
       ->check(CLI::Range(40, 4000))
       ->capture_default_str();
-  add_moment(*command, "--from", "Begin at this time [s] or timecode", options->from_s,
-             options->from_timecode);
-  add_moment(*command, "--to", "End at this time [s] or timecode", options->to_s,
-             options->to_timecode);
+  add_part_options(*command, options->part);
   command->add_flag("--raw-beside", options->raw_beside,
                     "The unstyled motion of a log, too, in grey");
   command->add_option("--stream", options->stream,

@@ -228,8 +228,7 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
   const BoundModel& ready = *bound;
   StyleFilter filter(&ready, options.filter);
   if (options.walker) filter.set_walker(*options.walker);
-  const auto motion = TRY(motion::motion_of(clip));
-  const bool added_pose = !options.cold && motion::begins_with_added_pose(motion);
+  const bool added_pose = !options.cold && motion::begins_with_added_pose(clip);
   const int first = added_pose ? 1 : 0;
   if (!options.cold) settle(filter, clip, first, ready.space);
 

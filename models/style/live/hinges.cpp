@@ -20,9 +20,9 @@ constexpr double kPerhaps_rad = 10.0 * kDegree;    // up to here it surely is
 }  // namespace
 
 Hinges::Hinges(const Skeleton& skeleton) : skeleton_(&skeleton) {
-  const auto add = [&](Bone bone, const Vector3d& axis, const Vector3d& straight) {
+  const auto add = [&](Bone above, Bone bone, const Vector3d& axis, const Vector3d& straight) {
     const int joint = skeleton.joint_of(bone);
-    if (joint < 0) return;
+    if (joint < 0 || skeleton.joint_of(above) < 0) return;
     const auto j = static_cast<std::size_t>(joint);
     hinges_.push_back({.joint = joint,
                        .above = T_above(skeleton, j),
@@ -30,10 +30,10 @@ Hinges::Hinges(const Skeleton& skeleton) : skeleton_(&skeleton) {
                        .axis = axis,
                        .straight = straight});
   };
-  add(Bone::kLeftLowerLeg, Vector3d::UnitX(), -Vector3d::UnitY());
-  add(Bone::kRightLowerLeg, Vector3d::UnitX(), -Vector3d::UnitY());
-  add(Bone::kLeftLowerArm, -Vector3d::UnitY(), Vector3d::UnitX());
-  add(Bone::kRightLowerArm, Vector3d::UnitY(), -Vector3d::UnitX());
+  add(Bone::kLeftUpperLeg, Bone::kLeftLowerLeg, Vector3d::UnitX(), -Vector3d::UnitY());
+  add(Bone::kRightUpperLeg, Bone::kRightLowerLeg, Vector3d::UnitX(), -Vector3d::UnitY());
+  add(Bone::kLeftUpperArm, Bone::kLeftLowerArm, -Vector3d::UnitY(), Vector3d::UnitX());
+  add(Bone::kRightUpperArm, Bone::kRightLowerArm, Vector3d::UnitY(), -Vector3d::UnitX());
 }
 
 RT_SAFE double Hinges::Hinge::bend_rad(std::span<const Quatf> rotations) const noexcept {

@@ -27,7 +27,7 @@ export class Lesson {
     const button = (text, step) =>
       el('button', { type: 'button', onclick: () => this.ask(step()) }, text);
     this.learn = button('Learn', () => ({ train: { name: this.called.value, ...train } }));
-    this.cancel = button('Cancel', () => ({ cancel: {} }));
+    this.cancel = el('button', { type: 'button', onclick: () => this.#cancel() }, 'Cancel');
     this.anew = el('button', { type: 'button', hidden: true, onclick: () => this.#beginAnew() });
     this.why = el('p.note');
     this.words = el('p.note', { role: 'status' });
@@ -53,6 +53,12 @@ export class Lesson {
     if (this.element.open) this.ask({});
   }
 
+  #cancel() {
+    if (this.left_s > 0) this.left_s = 0; // askReady looks at it
+    else this.ask({ cancel: {} });
+    this.show();
+  }
+
   #beginAnew() {
     this.ask({ forget: {} }, this.#other);
   }
@@ -60,13 +66,15 @@ export class Lesson {
   // Counts down, so that who presses the button has time to take his place, then asks.
   async askReady(key, step) {
     this.key = key;
-    for (this.left_s = this.constructor.ready_s; this.left_s > 0; this.left_s -= 1) {
+    for (let left_s = this.constructor.ready_s; left_s > 0; left_s -= 1) {
+      this.left_s = left_s;
       this.show();
       await new Promise((done) => {
         setTimeout(done, 1000);
       });
-      if (!this.element.isConnected) return undefined;
+      if (!this.element.isConnected || this.left_s === 0) return undefined;
     }
+    this.left_s = 0;
     return this.ask(step);
   }
 
@@ -112,7 +120,7 @@ export class Lesson {
     const why = missing || unfit;
     this.learn.disabled = this.busy || why !== '';
     write(this.why, !this.busy && why ? `To learn: ${why}.` : '');
-    this.cancel.hidden = !this.busy || this.left_s > 0;
+    this.cancel.hidden = !this.busy;
     const [who, kept, step] = this.#otherWords;
     const other = this.#other && `${who}${kept > 0 ? ` and keeps what it was shown (${kept})` : ''}`;
     this.anew.hidden = !this.#other || step !== STEP.idle;

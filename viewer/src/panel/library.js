@@ -26,12 +26,21 @@ class List {
     const reply = await this.requests.ask(request);
     clearTimeout(this.timer);
     this.timer = setTimeout(() => this.element.open && this.list(), this.each_ms);
-    const entries = reply.ok ? reply[field] : [];
-    const listed = JSON.stringify([reply.ok, entries]);
-    if (listed === this.#listed) return; // what somebody is about to do there stays
+    if (!reply.ok) write(this.words, reply.error); // and what was listed stays
+    if (!reply.ok) return false;
+    const entries = reply[field];
+    write(this.words, entries.length === 0 ? none : '');
+    const listed = JSON.stringify(entries);
+    if (listed === this.#listed) return true; // what somebody is about to do there stays
     this.#listed = listed;
-    write(this.words, reply.ok ? (entries.length === 0 ? none : '') : reply.error);
-    this.items.replaceChildren(...entries.map((entry) => this.item(entry)));
+    const items = entries.map((entry) => this.item(entry));
+    const before = [...this.items.children];
+    // An item that stays is not moved: it would lose the focus.
+    for (const item of before) if (!items.includes(item)) item.remove();
+    items.forEach((item, i) => {
+      if (this.items.children[i] !== item) this.items.insertBefore(item, this.items.children[i]);
+    });
+    return true;
   }
 }
 
@@ -147,11 +156,8 @@ export class Recordings extends List {
   }
 
   async list() {
-    await this.show(
-      { list_recordings: {} },
-      'recording',
-      'Nothing is recorded yet. A take is here as BVH soon after it ends.',
-    );
+    const none = 'Nothing is recorded yet. A take is here as BVH soon after it ends.';
+    if (!(await this.show({ list_recordings: {} }, 'recording', none))) return;
     for (const [name, take] of this.#takes) {
       if (take.element.isConnected) continue;
       take.stop(); // its file has gone

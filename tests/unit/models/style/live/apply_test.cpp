@@ -65,6 +65,16 @@ TEST_CASE("a settled start has the full style and the heading from frame one", "
                           delta_of(walk.frame(180), settled.clip.frame(180), 3)) < 0.01);
 }
 
+TEST_CASE("a rest pose that stands before the walk stays as it is", "[style][apply]") {
+  clip::Clip walk = toy_walk(200);
+  walk.channels.row(0).tail(12).array() += 1.5;
+  const auto applied = style::apply_to_clip(toy_model(1), "toy", walk, {}).value();
+  CHECK(applied.kept_first);
+  CHECK(applied.clip.channels.row(0) == walk.channels.row(0));
+  CHECK(applied.clip.channels.row(1) != walk.channels.row(1));
+  CHECK_FALSE(style::apply_to_clip(toy_model(1), "toy", toy_walk(200), {}).value().kept_first);
+}
+
 TEST_CASE("alpha 0 keeps every channel value, and the timecodes", "[style][apply]") {
   clip::Clip walk = toy_walk(50);
   walk.timecode.assign(50, to_timecode("10:20:30:04"));
