@@ -22,14 +22,14 @@ namespace posed {
 // Stages a stream may have, and so the length of Frame::stage_us.
 inline constexpr std::size_t kMaxStages = std::tuple_size_v<decltype(Frame::stage_us)>;
 
-// A frame on its way from stage to stage. It borrows: everything is valid during the call that
-// passes it on.
 // What a style asks of the pelvis beside the performer's own motion.
 struct RootChange {
   float height_m = 0.0F;                // up
   std::array<float, 3> velocity_m_s{};  // over the ground, in the world
 };
 
+// A frame on its way from stage to stage. It borrows: everything is valid during the call that
+// passes it on.
 struct StageFrame {
   const Frame& frame;
   // Posterior variance of the pose, one a rotation channel in the order of Frame::angle_rad

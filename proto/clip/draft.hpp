@@ -45,7 +45,7 @@ struct Draft {
   std::optional<double> said_unit_m{};
   bool up_may_err = false, unit_may_err = false;
   double frame_rate_hz = 0.0;
-  double metres_per_unit = 1.0;  // Clip's
+  double metres_per_unit = 1.0;      // Clip's
   UpAxis up = UpAxis::kPlusY;        // of the file; the skeleton has +Y up
   std::vector<double> values;        // [frame x channel], rad and m
   std::vector<double> time_s{};      // [frame], increasing; empty: evenly spaced, from 0

@@ -158,9 +158,10 @@ Findings findings_of(const ApplyArguments& options, const style::StyleModel& mod
   }
   const double known = applied.gate_mean.value_or(1.0);
   if (nothing.empty() && known < kNearlyAll) {
-    findings.note(fmt::format("styled for {:.0f} % of the time: the rest is motion that the model"
-                              " does not know",
-                              100.0 * known));
+    findings.note(
+        fmt::format("styled for {:.0f} % of the time: the rest is motion that the model"
+                    " does not know",
+                    100.0 * known));
   }
   if (nothing.empty() && !options.apply.feet) {
     findings.note("the root moves as it did, so feet may slide; with --root stride they stand");

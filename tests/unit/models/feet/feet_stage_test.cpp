@@ -84,6 +84,26 @@ TEST_CASE("a root that strides walks as far as the styled legs do; an actor's st
   CHECK(root_speed_m_s(acted, 1.0) == Approx(speed_m_s).epsilon(0.02));
 }
 
+TEST_CASE("who walks on a treadmill does not walk off with a style's speed", "[feet]") {
+  const RootChange faster{.height_m = 0.0F, .velocity_m_s = {0.0F, 0.0F, 0.5F}};
+  const auto gone_m = [&](bool treadmill) {
+    auto walk = styled_walk(60.0, 8.0);
+    const auto stage = feet_stage(walk.source, "stride");
+    test::LastFrame out;
+    double furthest = 0.0;
+    for (std::size_t t = 0; t < walk.source.frames.size(); ++t) {
+      Frame in = walk.source.frames[t];
+      Frame styled = walk.styled.frames[t];
+      if (treadmill) in.root_position_m[2] = styled.root_position_m[2] = 0.0F;
+      stage->process({.frame = styled, .input = &in, .root = &faster}, out);
+      furthest = std::max(furthest, test::root_apart_m(in, out.out));
+    }
+    return furthest;
+  };
+  CHECK(gone_m(true) < 0.3);
+  CHECK(gone_m(false) > 0.3);  // of him who walks the style's steps are shorter
+}
+
 TEST_CASE("the same walk at another rate gets the same root", "[feet]") {
   const auto slow = styled_walk(30.0, 6.0);
   const auto at_30 = feet_stage(slow.source, "stride");
