@@ -172,8 +172,10 @@ std::vector<double> FrameTimes::in_seconds() const {
                        std::ranges::is_sorted(device_ns_, std::ranges::less_equal());
   const std::vector<std::int64_t>& times_ns = running ? device_ns_ : arrival_ns_;
   std::vector<double> times_s;
-  for (const std::int64_t time_ns : times_ns)
+  times_s.reserve(times_ns.size());
+  for (const std::int64_t time_ns : times_ns) {
     times_s.push_back(seconds(time_ns - times_ns.front()));
+  }
   return times_s;
 }
 
