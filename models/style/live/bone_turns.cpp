@@ -101,8 +101,7 @@ void BoneTurns::match_trunk(const std::vector<std::pair<double, int>>& taught) {
 }
 
 std::optional<BoneTurns> BoneTurns::make(const motion::PoseSpaceSpec& spec,
-                                         std::span<const double> places, const Skeleton& skeleton,
-                                         bool is_taught) {
+                                         std::span<const double> places, const Skeleton& skeleton) {
   if (spec.space != motion::Space::kHumanoid) return std::nullopt;
   std::vector<std::pair<Bone, int>> order;  // with the place in the spec
   order.reserve(spec.joints.size());
@@ -132,14 +131,13 @@ std::optional<BoneTurns> BoneTurns::make(const motion::PoseSpaceSpec& spec,
     const auto bone = skeleton.joints[j].bone;
     if (!bone || skeleton.joint_of(*bone) != j) continue;
     part.bone = find(bone);
-    part.rides = part.bone < 0 || (!is_taught && is_of_hand(*bone));
+    part.rides = part.bone < 0 || is_of_hand(*bone);
     if (!part.rides) part.turns_as = {{part.bone, 1.0}};
     const auto arm = std::ranges::find(kArms, *bone, [](const auto& one) { return one.first; });
     if (arm == kArms.end()) continue;
     part.along = direction_of(skeleton, j, arm->second);
     part.in_t_pose = arm - kArms.begin() < 2 ? Vector3d::UnitX() : Vector3d(-Vector3d::UnitX());
   }
-  if (is_taught) return turns;
   std::ranges::sort(trunk);
   turns.match_trunk(trunk);
   return turns;

@@ -29,8 +29,7 @@ class BoneTurns {
   // of the spec] are GateData::places, without which trunks are matched by the names of their
   // bones.
   static std::optional<BoneTurns> make(const motion::PoseSpaceSpec& spec,
-                                       std::span<const double> places, const Skeleton& skeleton,
-                                       bool is_taught);
+                                       std::span<const double> places, const Skeleton& skeleton);
 
   // Turns the joints of `frame` as the bones turn from the pose `from` of training to
   // from + change [rad, dims]. `shares` [dims] is how far a bone takes part: at 0 it rides on the

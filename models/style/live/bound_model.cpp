@@ -148,10 +148,8 @@ Result<std::unique_ptr<const BoundModel>> bind_model(const StyleModel& model,
                                             std::move(name));
   bound->has_root = has_root;
   const auto& rigs = model.gate.rigs;
-  if (!rigs.empty()) {
-    const bool is_taught = std::ranges::find(rigs, rig_id(skeleton)) != rigs.end();
-    bound->turns = BoneTurns::make(model.space, model.gate.places, skeleton, is_taught);
-  }
+  const bool is_other = !rigs.empty() && std::ranges::find(rigs, rig_id(skeleton)) == rigs.end();
+  if (is_other) bound->turns = BoneTurns::make(model.space, model.gate.places, skeleton);
   bound->reach = alpha_reach(*bound);
   if (!has_root) return bound;
   bound->leg_m = legs->length_m();

@@ -56,7 +56,7 @@ struct BoundModel final : StageModel {
   std::vector<Usual> usual;        // by person and day; empty: a model without them
   std::optional<Usual> anyone;     // their mean, for a walker who is not known
   std::vector<AlphaReach> reach;   // of each style
-  std::optional<BoneTurns> turns;  // for a walker who is known
+  std::optional<BoneTurns> turns;  // for a figure that is none of training
 };
 
 // Returns an error for a skeleton that cannot serve the model's pose space

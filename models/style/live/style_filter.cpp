@@ -270,7 +270,7 @@ RT_SAFE void StyleFilter::style(Frame& frame, double dt_s) noexcept {
   last_out_ = frame.rotation_xyzw;
 }
 
-// A walker who is known gets the change that the walk of training gets, bone by bone.
+// A walker of another build gets the change that the walk of training gets, bone by bone.
 RT_SAFE void StyleFilter::change(Frame& frame, const Pose& pose) noexcept {
   const Rotations in = frame.rotation_xyzw;
   const std::size_t dims = model_->space.dims();

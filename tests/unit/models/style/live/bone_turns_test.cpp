@@ -22,7 +22,7 @@ struct Build {
   motion::PoseSpaceSpec spec =
       motion::describe_space(motion::Space::kHumanoid, *walk.skeleton).value();
   motion::PoseSpace space = motion::PoseSpace::bind(spec, *walk.skeleton).value();
-  style::BoneTurns turns = style::BoneTurns::make(spec, {}, *walk.skeleton, false).value();
+  style::BoneTurns turns = style::BoneTurns::make(spec, {}, *walk.skeleton).value();
   std::size_t dims = static_cast<std::size_t>(space.dims());
   std::vector<float> all = std::vector<float>(dims, 1.0F);
 
@@ -134,7 +134,7 @@ TEST_CASE("a trunk that is divided elsewhere turns as what of the taught one lie
                      : bone == Bone::kChest ? place(Bone::kNeck)
                                             : place(bone));
   }
-  build.turns = style::BoneTurns::make(build.spec, taught, skeleton, false).value();
+  build.turns = style::BoneTurns::make(build.spec, taught, skeleton).value();
   const Frame plain = build.walk.frame(20);
   const Vector3d bow_rad(0.4, 0.0, 0.0);
   Frame styled = plain;
