@@ -47,7 +47,7 @@ constexpr float kManyMoving = 3.0F;  // angles; fewer may well repeat by chance
 constexpr float kAlone = 0.2F;       // most that repeat while others change
 constexpr float kFewSamples = 8.0F;  // before repeats are told
 constexpr float kSamples = 100.0F;   // that the share is the mean of
-constexpr int kMostRepeats = 4;      // of one sample
+constexpr int kMaxRepeats = 4;       // of one sample
 
 constexpr float kFlaky = 0.002F;  // share of a hand's angles dropped lately
 
@@ -436,7 +436,7 @@ RT_SAFE bool GateStage::repeats(float dt_s, const Frame& frame) noexcept {
     return false;
   }
   const bool polled = samples_ > kFewSamples && alone_ < kAlone;
-  return polled && held_s_ + dt_s <= kForgets_s && ++run_ <= kMostRepeats;
+  return polled && held_s_ + dt_s <= kForgets_s && ++run_ <= kMaxRepeats;
 }
 
 RT_SAFE void GateStage::learn_repeats(float moving, float alone) noexcept {

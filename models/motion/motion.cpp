@@ -112,10 +112,6 @@ std::array<Section, kOrder / 2> butterworth(double cutoff) {
   return sections;
 }
 
-}  // namespace
-
-namespace {
-
 // `frame` gives each of so many frames.
 template <typename FrameOf>
 bool first_is_added(int frames, int root_joint, const FrameOf& frame) {

@@ -28,7 +28,7 @@ constexpr double kLowShare = 0.3;           // of a channel's differences: more 
 constexpr double kLowOverMedian = 0.57127;  // of the sizes of normal values
 constexpr double kOwnFew = 100.0;           // values that count as much as the common noise
 constexpr double kOwnStep = 0.01;           // least step of a level, of itself
-constexpr double kMostOctaves = 6.0;
+constexpr double kMaxOctaves = 6.0;
 constexpr double kTenthOverThird = 96.1134434;  // sqrt(184756 / 20), of white noise
 constexpr long kSamplesALook = 8;               // samples between two looks at a channel
 
@@ -252,7 +252,7 @@ RT_SAFE double NoiseEstimate::own_share(std::size_t c, double common_rad) const 
   if (level.values == 0.0) return 1.0;
   const double size_rad = std::min(level.third_rad, level.tenth_rad / kTenthOverThird);
   const double own_rad = std::max(kMinNoise_rad, kToNoise / kLowOverMedian * size_rad);
-  const double off = std::clamp(std::log2(own_rad / common_rad), -kMostOctaves, kMostOctaves);
+  const double off = std::clamp(std::log2(own_rad / common_rad), -kMaxOctaves, kMaxOctaves);
   // Differences of rounded values are often zero.
   if (off < 0.0 && rounding_rad_[c] > 0.0) return 1.0;
   const double known = level.values / (level.values + kOwnFew);

@@ -231,10 +231,10 @@ std::vector<std::size_t> missing_before(const std::vector<double>& time_s, doubl
 // minute has, because whoever sends says the times.
 std::vector<std::size_t> held_of(const Clip& clip, const std::vector<std::size_t>& missing) {
   std::size_t room =
-      std::max(missing.size(), static_cast<std::size_t>(kLongestHeld_s * clip.frame_rate_hz));
+      std::max(missing.size(), static_cast<std::size_t>(kMaxHeld_s * clip.frame_rate_hz));
   std::vector<std::size_t> held = missing;
   for (std::size_t i = 1; i < held.size(); ++i) {
-    const bool cut = clip.time_s[i] - clip.time_s[i - 1] > kLongestHeld_s || held[i] > room;
+    const bool cut = clip.time_s[i] - clip.time_s[i - 1] > kMaxHeld_s || held[i] > room;
     if (cut) held[i] = 0;
     room -= held[i];
   }
@@ -243,17 +243,17 @@ std::vector<std::size_t> held_of(const Clip& clip, const std::vector<std::size_t
 
 std::string gap_words(const Clip& clip, const std::vector<std::size_t>& missing,
                       const std::vector<std::size_t>& held) {
-  constexpr std::size_t kMostNamed = 5;
+  constexpr std::size_t kMaxNamed = 5;
   std::string where;
   std::size_t gaps = 0, frames = 0;
   for (std::size_t i = 0; i < missing.size(); ++i) {
     if (missing[i] == 0) continue;
     frames += missing[i];
-    if (++gaps > kMostNamed) continue;
+    if (++gaps > kMaxNamed) continue;
     where += fmt::format("{}{} at {:.2f} s", gaps > 1 ? ", " : "", missing[i], clip.time_s[i - 1]);
     if (held[i] == 0) where += " (cut out)";
   }
-  if (gaps > kMostNamed) where += fmt::format(" and {} more gaps", gaps - kMostNamed);
+  if (gaps > kMaxNamed) where += fmt::format(" and {} more gaps", gaps - kMaxNamed);
   return fmt::format("{} frames are missing: {}; the one before each gap is held", frames, where);
 }
 

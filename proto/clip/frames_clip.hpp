@@ -59,9 +59,9 @@ class FrameTimes {
 void hold_missing(Clip& clip);
 
 // Repeats the frame before a gap in the clip's times as often as frames are missing there, so that
-// an even spacing keeps the time; a gap of more than kLongestHeld_s is cut out. Says in `warnings`
+// an even spacing keeps the time; a gap of more than kMaxHeld_s is cut out. Says in `warnings`
 // how many are missing, and where. For formats without times.
-inline constexpr double kLongestHeld_s = 60.0;
+inline constexpr double kMaxHeld_s = 60.0;
 void hold_gaps(Clip& clip);
 
 }  // namespace posed::clip

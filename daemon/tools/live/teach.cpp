@@ -20,7 +20,7 @@ namespace {
 constexpr int kGetReady_s = 3;  // between the announcement of a walk and its beginning
 constexpr std::chrono::milliseconds kLookAgain{100};
 constexpr std::size_t kMaxSoFar = 60;  // bytes of a verdict on the line of a countdown
-constexpr int kMostRefused = 4;        // shows of a sign
+constexpr int kMaxRefused = 4;         // shows of a sign
 
 class Lesson {
  public:
@@ -44,16 +44,16 @@ class Lesson {
       TRY(ask_(request));
       return {};
     }
-    const bool replaces =
-        !options_.more && ((options_.neutral_s > 0.0 && now.neutral_walk().takes() > 0) ||
-                           (options_.style_s > 0.0 && now.style_walk().takes() > 0));
-    if (now.stream() == options_.stream && !(options_.signs.empty() && replaces)) return {};
     if (now.stream() != options_.stream) {
       return fail(
           fmt::format("a lesson of stream {} is not finished, perhaps on somebody's page; "
                       "finish it there, or --anew forgets it",
                       clean_name(now.stream())));
     }
+    const bool replaces = options_.signs.empty() && !options_.more &&
+                          ((options_.neutral_s > 0.0 && now.neutral_walk().takes() > 0) ||
+                           (options_.style_s > 0.0 && now.style_walk().takes() > 0));
+    if (!replaces) return {};
     return fail(
         fmt::format("a lesson of stream {} is not finished, perhaps on somebody's page, and "
                     "has {} walks as usual, {} in the style and {} signs; --more adds to "
@@ -92,7 +92,7 @@ class Lesson {
       if (now.show().good()) {
         ++shown;
         say(clean(now.show().sentence()));
-      } else if (++refused > kMostRefused) {
+      } else if (++refused > kMaxRefused) {
         return fail(fmt::format("show {}: {}", clean_name(label), why_not(now.show())));
       } else {
         say(fmt::format("once more: {}", why_not(now.show())));

@@ -163,21 +163,21 @@ RT_SAFE void BoneTurns::find_taught(std::span<const float> from, std::span<const
 // direction, and the arm turns about itself as the taught one does.
 RT_SAFE Quaterniond BoneTurns::turn_of(const Part& part, const Quaterniond& own,
                                        const Turns& before, const Turns& after) const noexcept {
-  const auto b = static_cast<std::size_t>(part.bone);
+  const auto turned = [&](int bone) {
+    const auto i = static_cast<std::size_t>(bone);
+    return Quaterniond(after[i] * before[i].conjugate());
+  };
   if (part.along) {
+    const auto b = static_cast<std::size_t>(part.bone);
     const Vector3d taught = before[b] * part.in_t_pose;
     const Vector3d taught_then = after[b] * part.in_t_pose;
     const Vector3d now = own * *part.along;
     const Vector3d then = now + taught_then - taught;
     if (then.norm() > kClear) {
-      const Quaterniond all = after[b] * before[b].conjugate();
+      const Quaterniond all = turned(part.bone);
       return minimal_rotation(all * now, then.normalized()) * all;
     }
   }
-  const auto turned = [&](int bone) {
-    const auto i = static_cast<std::size_t>(bone);
-    return Quaterniond(after[i] * before[i].conjugate());
-  };
   if (part.turns_as.size() == 1) return turned(part.turns_as.front().first);
   Vector3d sum = Vector3d::Zero();
   for (const auto& [bone, share] : part.turns_as) sum += share * rotation_log(turned(bone));

@@ -262,7 +262,7 @@ RT_SAFE void StyleFilter::style(Frame& frame, double dt_s) noexcept {
   const Rotations in = frame.rotation_xyzw;
   Pose pose;
   if (read_pose(frame, dt_s, pose)) discontinuity_ = true;
-  if (alpha_ != 0.0) change(frame, pose);
+  if (alpha_ != 0.0) change(in, pose, frame);
   if (std::exchange(discontinuity_, false)) begin_blend(in, frame, dt_s);
   blend(frame);
   last_joints_ = frame.joint_count;
@@ -271,8 +271,7 @@ RT_SAFE void StyleFilter::style(Frame& frame, double dt_s) noexcept {
 }
 
 // A walker of another build gets the change that the walk of training gets, bone by bone.
-RT_SAFE void StyleFilter::change(Frame& frame, const Pose& pose) noexcept {
-  const Rotations in = frame.rotation_xyzw;
+RT_SAFE void StyleFilter::change(const Rotations& in, const Pose& pose, Frame& frame) noexcept {
   const std::size_t dims = model_->space.dims();
   Dims delta, shares;
   answer(pose, delta, shares);

@@ -143,7 +143,7 @@ class StyleFilter final : public Stage {
   void mix_limits() noexcept;
   void look_at_reach() noexcept;
   bool read_pose(const Frame& frame, double dt_s, Pose& pose) noexcept;
-  void change(Frame& frame, const Pose& pose) noexcept;
+  void change(const Rotations& in, const Pose& pose, Frame& frame) noexcept;
   void answer(const Pose& pose, Dims& delta, Dims& shares) noexcept;
   void limit_root(const float* change) noexcept;
   void change_root() noexcept;

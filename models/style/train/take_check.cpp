@@ -40,14 +40,14 @@ double silence_s(const clip::Clip& clip) {
 
 // How far the body jumps where a tracking system loses it [m]; 0: nowhere.
 double jump_m(const clip::Clip& clip) {
+  const auto root_m = [&](int i) { return Eigen::Vector3f(clip.frame(i).root_position_m.data()); };
   double longest_m = 0.0;
-  Eigen::Vector3f before = Eigen::Vector3f::Zero();
-  for (int i = 0; i < clip.frames(); ++i) {
-    const Frame frame = clip.frame(i);
-    const Eigen::Vector3f now(frame.root_position_m.data());
-    const double length_m = i > 0 ? static_cast<double>((now - before).norm()) : 0.0;
+  Eigen::Vector3f before = root_m(0);
+  for (int i = 1; i < clip.frames(); ++i) {
+    const Eigen::Vector3f now = root_m(i);
+    const double length_m = static_cast<double>((now - before).norm());
     const auto at = static_cast<std::size_t>(i);
-    const double time_s = i > 0 ? clip.time_s[at] - clip.time_s[at - 1] : 1.0;
+    const double time_s = clip.time_s[at] - clip.time_s[at - 1];
     if (length_m > kMinJump_m && length_m > kMaxSpeed_mps * time_s) {
       longest_m = std::max(longest_m, length_m);
     }

@@ -14,7 +14,7 @@ export class Lesson {
 
   now = { step: STEP.idle };
   left_s = 0; // of the countdown
-  #other = ''; // the stream of a lesson that is not finished, where it is not this one
+  #other = null; // {stream, kept, step} of a lesson that is not finished, where it is not this one
 
   // train: what is learnt, beside its name, as the request has it; rows: elements above the name
   constructor(stream, { requests }, title, train = {}) {
@@ -60,7 +60,7 @@ export class Lesson {
   }
 
   #beginAnew() {
-    this.ask({ forget: {} }, this.#other);
+    this.ask({ forget: {} }, this.#other.stream);
   }
 
   // Counts down, so that who presses the button has time to take his place, then asks.
@@ -102,12 +102,10 @@ export class Lesson {
     const { stream, step, sign = [], neutral_walk, style_walk } = teaching;
     const own = stream === this.name;
     const kept = (neutral_walk?.takes ?? 0) + (style_walk?.takes ?? 0) + sign.length;
-    this.#other = !own && step !== STEP.inUse && (kept > 0 || step !== STEP.idle) ? stream : '';
-    if (this.#other) this.#otherWords = [`${this.#other} is being taught`, kept, step];
+    const unfinished = step !== STEP.inUse && (kept > 0 || step !== STEP.idle);
+    this.#other = !own && unfinished ? { stream, kept, step } : null;
     this.now = own ? teaching : { step: STEP.idle };
   }
-
-  #otherWords = [];
 
   get busy() {
     return this.left_s > 0 || (this.now.step !== STEP.idle && this.now.step !== STEP.inUse);
@@ -121,11 +119,12 @@ export class Lesson {
     this.learn.disabled = this.busy || why !== '';
     write(this.why, !this.busy && why ? `To learn: ${why}.` : '');
     this.cancel.hidden = !this.busy;
-    const [who, kept, step] = this.#otherWords;
-    const other = this.#other && `${who}${kept > 0 ? ` and keeps what it was shown (${kept})` : ''}`;
-    this.anew.hidden = !this.#other || step !== STEP.idle;
-    write(this.anew, `Forget what ${this.#other} was shown`);
-    write(this.words, this.refusal || this.trouble || other || this.#sentence());
+    const { stream: other, kept, step } = this.#other ?? {};
+    const shown = kept > 0 ? ` and keeps what it was shown (${kept})` : '';
+    this.anew.hidden = !other || step !== STEP.idle;
+    write(this.anew, `Forget what ${other} was shown`);
+    const taught = other && `${other} is being taught${shown}`;
+    write(this.words, this.refusal || this.trouble || taught || this.#sentence());
   }
 
   #sentence() {

@@ -26,8 +26,10 @@ class List {
     const reply = await this.requests.ask(request);
     clearTimeout(this.timer);
     this.timer = setTimeout(() => this.element.open && this.list(), this.each_ms);
-    if (!reply.ok) write(this.words, reply.error); // and what was listed stays
-    if (!reply.ok) return false;
+    if (!reply.ok) {
+      write(this.words, reply.error); // and what was listed stays
+      return false;
+    }
     const entries = reply[field];
     write(this.words, entries.length === 0 ? none : '');
     const listed = JSON.stringify(entries);
