@@ -20,7 +20,7 @@ constexpr double kCentimetre_m = 0.01;
 Frame Clip::frame(int index) const {
   Frame frame;
   frame.header.sequence = static_cast<std::uint64_t>(index) + 1;
-  frame.header.device_ns = nanoseconds(time_s.empty() ? index / frame_rate_hz : time_s[index]);
+  frame.header.device_ns = nanoseconds(time_of_s(index));
   frame.source = Source::kFile;
   if (!timecode.empty()) frame.timecode = timecode[index];
   const auto row = channels.row(index);

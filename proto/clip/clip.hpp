@@ -41,7 +41,11 @@ struct Clip {
   std::shared_ptr<const rig::Rig> rig{};
 
   [[nodiscard]] int frames() const { return static_cast<int>(channels.rows()); }
-  // The pose, with a device time from the index; the stream is not set.
+  // When the frame is [s].
+  [[nodiscard]] double time_of_s(int index) const {
+    return time_s.empty() ? index / frame_rate_hz : time_s[static_cast<std::size_t>(index)];
+  }
+  // The pose, with that as its device time; the stream is not set.
   [[nodiscard]] Frame frame(int index) const;
 };
 

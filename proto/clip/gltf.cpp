@@ -202,9 +202,7 @@ Result<std::vector<float>> gltf_times(const Clip& clip) {
   std::vector<float> time_s;
   double last_s = 0.0;
   for (int i = 0; i < clip.frames(); ++i) {
-    const std::size_t at = i;
-    const double now_s =
-        clip.time_s.empty() ? i / clip.frame_rate_hz : clip.time_s[at] - clip.time_s.front();
+    const double now_s = clip.time_of_s(i) - clip.time_of_s(0);
     auto rounded_s = static_cast<float>(now_s);
     if (!std::isfinite(rounded_s) || now_s < last_s) {
       return fail("the time of frame " + std::to_string(i + 1) +

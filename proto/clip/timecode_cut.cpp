@@ -109,10 +109,6 @@ Counted counted_of(const Clip& clip) {
   return out;
 }
 
-double time_of(const Clip& clip, std::size_t frame) {
-  return clip.time_s.empty() ? static_cast<double>(frame) / clip.frame_rate_hz : clip.time_s[frame];
-}
-
 // Where each frame and a moment stand on one count, whose zero is the clip's first known timecode.
 class Ruler {
  public:
@@ -189,13 +185,14 @@ class Ruler {
     std::size_t known = counted.first;
     double at_known = 0.0;
     at_.resize(counted.moment.size());
+    const auto time_s = [&](std::size_t frame) { return clip.time_of_s(static_cast<int>(frame)); };
     for (std::size_t i = 0; i < at_.size(); ++i) {
       if (counted.moment[i]) {
         at_known = static_cast<double>(unwrapped.add(key(*counted.moment[i]), day()));
         known = i;
       }
       at_[i] = at_known;
-      if (by_time_) at_[i] += (time_of(clip, i) - time_of(clip, known)) * rate_->per_s;
+      if (by_time_) at_[i] += (time_s(i) - time_s(known)) * rate_->per_s;
       if (!by_time_ && i < counted.first) at_[i] = -1.0;
     }
   }

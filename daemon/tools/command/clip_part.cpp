@@ -37,17 +37,12 @@ void add_part_options(CLI::App& command, ClipPart& part) {
   add_moment(command, "--to", "End at this time [s] or timecode", part.to_s, part.to_timecode);
 }
 
-double time_of(const clip::Clip& clip, int frame) {
-  return clip.time_s.empty() ? frame / clip.frame_rate_hz
-                             : clip.time_s[static_cast<std::size_t>(frame)];
-}
-
 Result<FrameRange> frames_between(const clip::Clip& clip, const ClipPart& part,
                                   const std::string& file) {
   const double from_s = part.from_s.value_or(0.0);
   FrameRange range{.first = 0, .end = clip.frames()};
-  while (range.first < range.end && time_of(clip, range.first) < from_s) ++range.first;
-  while (part.to_s && range.first < range.end && time_of(clip, range.end - 1) > *part.to_s) {
+  while (range.first < range.end && clip.time_of_s(range.first) < from_s) ++range.first;
+  while (part.to_s && range.first < range.end && clip.time_of_s(range.end - 1) > *part.to_s) {
     --range.end;
   }
   if (range.first < range.end) return range;

@@ -24,11 +24,10 @@ struct ClipPart {
 // Adds --from and --to, which set `part`; it must outlive the command.
 void add_part_options(CLI::App& command, ClipPart& part);
 
-// Frames [first, end) of a clip, and the time of one [s].
+// Frames [first, end) of a clip.
 struct FrameRange {
   int first = 0, end = 0;
 };
-[[nodiscard]] double time_of(const clip::Clip& clip, int frame);
 
 // The frames between the times, both included. The error names `file` and how long it lasts.
 Result<FrameRange> frames_between(const clip::Clip& clip, const ClipPart& part,

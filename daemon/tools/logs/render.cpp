@@ -122,7 +122,7 @@ Result<Drawn> drawn_of(const RenderArguments& options, const clip::Clip& clip, s
   const auto range = TRY(frames_between(clip, options.part, options.in));
   for (int i = range.first; i < range.end; ++i) {
     drawn.motion.frames.push_back(motion.frames[i]);
-    drawn.time_s.push_back(time_of(clip, i));
+    drawn.time_s.push_back(clip.time_of_s(i));
   }
   drawn.shape = std::make_unique<picture::FigureShape>(drawn.motion.skeleton);
   return drawn;
