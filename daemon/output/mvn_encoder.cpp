@@ -14,7 +14,7 @@ namespace {
 
 namespace mvn = drivers::mvn;
 
-constexpr std::size_t kLongest = 1472;  // bytes of a datagram that Ethernet carries in one piece
+constexpr std::size_t kMaxDatagram = 1472;  // bytes that Ethernet carries in one piece
 
 // Whether the joints are the segments of a character.
 bool is_mvn_character(const Skeleton& skeleton) {
@@ -149,7 +149,7 @@ class MvnEncoder final : public DatagramEncoder {
     }
     const auto payload = mvn::encode_pose(
         type_, mvn::pose_of(person.character, person.root_m, person.rotations, /*local=*/false));
-    for (const auto& part : mvn::encode_sample(head_of(person, type_), payload, kLongest)) {
+    for (const auto& part : mvn::encode_sample(head_of(person, type_), payload, kMaxDatagram)) {
       send(part);
     }
   }

@@ -123,10 +123,10 @@ RT_SAFE Outcome read_text(std::string_view text, std::size_t words, Message& mes
 // Writes a value as std::to_chars does, with kDecimals; null where there is no room. A number that
 // is small, as all of a pose are, and lies clearly on one side of the half is rounded here.
 RT_SAFE char* put_value(char* at, char* end, double value) noexcept {
-  constexpr std::ptrdiff_t kLongest = 16;  // "-999999.999999"
-  constexpr double kClear = 1e-3;          // the product is off by a tenth of this
+  constexpr std::ptrdiff_t kMaxLength = 16;  // "-999999.999999"
+  constexpr double kClear = 1e-3;            // the product is off by a tenth of this
   const double parts = std::abs(value) * 1e6;
-  if (end - at >= kLongest && parts < 1e12) {
+  if (end - at >= kMaxLength && parts < 1e12) {
     const auto whole = static_cast<std::int64_t>(parts);
     const double rest = parts - static_cast<double>(whole);
     if (std::abs(rest - 0.5) > kClear) {

@@ -20,7 +20,7 @@ constexpr double kShare = 0.3;
 constexpr double kUnexplained_rad = 3.0 * kDegree;
 constexpr double kIndependent = 20.0;
 constexpr double kPrior = (kUnexplained_rad / kShare) * (kUnexplained_rad / kShare);
-constexpr double kMostLeft = 0.9;  // most of a sensor's movement that the shares may leave
+constexpr double kMaxLeft = 0.9;  // most of a sensor's movement that the shares may leave
 constexpr double kMoves_rad = 1.0 * kDegree;  // standard deviation of what is worth a share
 
 enum class Does { kNeither, kBend, kSpread };
@@ -110,8 +110,8 @@ std::optional<Found> shares_in(const Eigen::MatrixXd& values) {
   const Eigen::MatrixXd second = values.bottomRows(half);
   const double before_rad = left_by(values, none);
   if (before_rad < kMoves_rad) return std::nullopt;
-  if (left_by(second, ridge(first)) > kMostLeft * left_by(second, none) ||
-      left_by(first, ridge(second)) > kMostLeft * left_by(first, none)) {
+  if (left_by(second, ridge(first)) > kMaxLeft * left_by(second, none) ||
+      left_by(first, ridge(second)) > kMaxLeft * left_by(first, none)) {
     return std::nullopt;
   }
   const Eigen::VectorXd shares = ridge(values);

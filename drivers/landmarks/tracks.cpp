@@ -11,12 +11,12 @@
 namespace posed::drivers::landmarks {
 namespace {
 
-constexpr double kReach_m = 0.25;   // a hand goes no further between two messages
-constexpr double kSame_m = 0.04;    // two wrists of one side that are closer are one
-constexpr double kOther_m = 0.05;   // a hand of the other side counts as so much further away
-constexpr double kLongest_s = 0.2;  // what a message counts at most
-constexpr double kMost_s = 10.0;    // votes, so that a wrong beginning can be outvoted
-constexpr double kFlip_s = 0.2;     // votes that it takes to change the side
+constexpr double kReach_m = 0.25;     // a hand goes no further between two messages
+constexpr double kSame_m = 0.04;      // two wrists of one side that are closer are one
+constexpr double kOther_m = 0.05;     // a hand of the other side counts as so much further away
+constexpr double kMaxStep_s = 0.2;    // what a message counts at most
+constexpr double kMaxVotes_s = 10.0;  // votes, so that a wrong beginning can be outvoted
+constexpr double kFlip_s = 0.2;       // votes that it takes to change the side
 constexpr std::int64_t kKnown_ns = kNanosPerSecond;  // a hand that returns later is another one
 // A picture that contradicts for longer is better than none.
 constexpr std::int64_t kDoubt_ns = kNanosPerSecond / 4;
@@ -83,9 +83,10 @@ RT_SAFE void HandTracks::vote(Track& track, const TrackedHand& hand, std::int64_
       recent(track.seen_ns, now_ns) && apart_m(track.wrist_m, hand.point_m[0]) < kReach_m;
   if (!known) track = {.side = hand.side, .seen_ns = now_ns};
   const double right = hand.side == Side::kRight ? 1.0 : -1.0;
-  const double since_s = std::min(seconds(now_ns - track.seen_ns), kLongest_s);
-  track.votes_s = std::clamp(track.votes_s + right * worth(hand) * since_s, -kMost_s, kMost_s);
-  if (hand.sure) track.votes_s = right * kMost_s;
+  const double since_s = std::min(seconds(now_ns - track.seen_ns), kMaxStep_s);
+  track.votes_s =
+      std::clamp(track.votes_s + right * worth(hand) * since_s, -kMaxVotes_s, kMaxVotes_s);
+  if (hand.sure) track.votes_s = right * kMaxVotes_s;
   if (std::abs(track.votes_s) >= kFlip_s) {
     track.side = track.votes_s > 0.0 ? Side::kRight : Side::kLeft;
   }

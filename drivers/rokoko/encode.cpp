@@ -69,9 +69,9 @@ Eigen::Vector3f from_parent_m(std::string_view joint) {
 // Writes a number with seven decimals, which is faster than the shortest text; a place that lies
 // beyond all rooms is cut. At most 19 characters.
 char* put_number(char* at, float value) noexcept {
-  constexpr double kMost = 1e9;
+  constexpr double kMaxValue = 1e9;
   const double size =
-      std::isfinite(value) ? std::min(std::abs(static_cast<double>(value)), kMost) : 0.0;
+      std::isfinite(value) ? std::min(std::abs(static_cast<double>(value)), kMaxValue) : 0.0;
   // Product and sum of a float are exact, so halves are rounded up.
   const auto parts = static_cast<std::int64_t>(size * 1e7 + 0.5);
   *at = '-';

@@ -264,8 +264,8 @@ RT_SAFE void tell_apart(StudioFrame& frame) noexcept {
 }  // namespace
 
 RT_SAFE void StudioName::add_number(int number) noexcept {
-  constexpr std::size_t kMostDigits = 11;
-  std::array<char, kMostDigits> digits{};
+  constexpr std::size_t kMaxDigits = 11;
+  std::array<char, kMaxDigits> digits{};
   const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
   const auto count = static_cast<std::size_t>(end - digits.data());
   const std::size_t room = bytes_.size() - count - 1;

@@ -361,10 +361,10 @@ double Walker::into_turn_rad(double stride) const {
 
 // The head looks where the walk goes next, and the trunk leans there.
 void Walker::look_into_turn(double stride, Instant& now) const {
-  constexpr double kAhead = 0.6, kMostLook_rad = 0.5;  // strides
+  constexpr double kAhead = 0.6, kMaxLook_rad = 0.5;  // strides
   const double look_rad =
       std::clamp(gait_.round->heading_rad(stride + kAhead) - gait_.round->heading_rad(stride),
-                 -kMostLook_rad, kMostLook_rad);
+                 -kMaxLook_rad, kMaxLook_rad);
   const auto lean = axis_rotation(Axis::kZ, -0.35 * into_turn_rad(stride));
   for (const int joint : {kSpine, kChest}) now.turn[joint] = lean * now.turn[joint];
   const auto look = axis_rotation(Axis::kY, 0.4 * look_rad);

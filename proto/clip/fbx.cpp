@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr timeval kLongestWait{.tv_sec = 120, .tv_usec = 0};
+constexpr timeval kMaxWait{.tv_sec = 120, .tv_usec = 0};
 constexpr std::size_t kMaxGlb = 2'000'000'000;  // bytes
 
 // Beside this program in a build folder, otherwise where `cmake --install` puts it.
@@ -79,7 +79,7 @@ Result<ReaderProcess> ReaderProcess::start() {
     return fail("cannot be read: " + errno_text());
   }
   for (const int option : {SO_RCVTIMEO, SO_SNDTIMEO}) {
-    ::setsockopt(ends[0], SOL_SOCKET, option, &kLongestWait, sizeof kLongestWait);
+    ::setsockopt(ends[0], SOL_SOCKET, option, &kMaxWait, sizeof kMaxWait);
   }
   posix_spawn_file_actions_t files;
   posix_spawn_file_actions_init(&files);

@@ -744,8 +744,8 @@ Times times_of(const std::vector<Track>& tracks, bool own) {
   const double span_s = keys.back() - keys.front();
   const double rate_hz = span_s > 0.0 ? steps / span_s : 0.0;
   constexpr double kNear = 0.05;          // of a frame
-  constexpr double kFewestRate_hz = 5.0;  // where keys are farther apart, a motion is between them
-  bool even = keys.size() > 1 && (own || rate_hz >= kFewestRate_hz) && rate_hz <= kMaxKeyRate_hz;
+  constexpr double kMinKeyRate_hz = 5.0;  // where keys are farther apart, a motion is between them
+  bool even = keys.size() > 1 && (own || rate_hz >= kMinKeyRate_hz) && rate_hz <= kMaxKeyRate_hz;
   for (std::size_t i = 0; even && i < keys.size(); ++i) {
     even = std::abs((keys[i] - keys.front()) * rate_hz - static_cast<double>(i)) < kNear;
   }

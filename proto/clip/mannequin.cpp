@@ -107,8 +107,8 @@ Mannequin mannequin_of(const std::vector<GltfNode>& nodes) {
     const auto parent = static_cast<std::size_t>(node.parent);
     place_m.back() += place_m[parent];
     const double length_m = node.offset_m.norm();
-    constexpr std::size_t kMost = std::numeric_limits<std::uint16_t>::max();
-    if (length_m < kMinLength_m || body.node.size() + kVertices > kMost) continue;
+    constexpr std::size_t kMaxVertices = std::numeric_limits<std::uint16_t>::max();
+    if (length_m < kMinLength_m || body.node.size() + kVertices > kMaxVertices) continue;
     const Width width = width_of(nodes[parent].bone, node.bone);
     add_capsule(place_m[parent], place_m.back(), std::min(width.share * length_m, width.most_m),
                 node.parent, body);

@@ -28,8 +28,8 @@ constexpr int kNameWidth = 11;  // that a name has before the model's is cut
 constexpr int kMinName = 6;     // the heading
 constexpr int kMinModel = 5;    // a model's name that is cut further is no help
 constexpr float kMaxShown_hz = 9999.9F;
-constexpr float kKnown = 0.95F;     // of a motion; up to it the style fades
-constexpr float kLeastTold = 0.1F;  // of what the input has of the style; less is within the error
+constexpr float kKnown = 0.95F;   // of a motion; up to it the style fades
+constexpr float kMinTold = 0.1F;  // of what the input has of the style; less is within the error
 
 struct Health {
   std::string word;
@@ -261,7 +261,7 @@ std::string input_words(const v1::StreamStats& stream) {
   if (stream.has_style_gate() && stream.style_gate() <= kKnown) {
     text = fmt::format("knows the motion to {:.0f} %", 100.0F * stream.style_gate());
   }
-  if (stream.has_style_estimate() && stream.style_estimate() >= kLeastTold) {
+  if (stream.has_style_estimate() && stream.style_estimate() >= kMinTold) {
     text += fmt::format("{}has {:.0f} % of the style before it", text.empty() ? "" : ", ",
                         100.0F * stream.style_estimate());
   }

@@ -103,12 +103,12 @@ RT_SAFE PoseCycle cycle_of(const Packed& packed, const Walker& walker) noexcept 
 }  // namespace
 
 StageCommand command_of(const Walker& walker) noexcept {
-  constexpr double kMost = std::numeric_limits<std::int16_t>::max();
+  constexpr double kMaxValue = std::numeric_limits<std::int16_t>::max();
   Packed packed;
   for (std::size_t d = 0; d < kDims; ++d) {
     if (walker.measured[d] == 0) continue;
     const double steps = std::round(static_cast<double>(walker.neutral[d]) / kStep_rad);
-    packed.add(d, static_cast<std::int16_t>(std::clamp(steps, -kMost, kMost)));
+    packed.add(d, static_cast<std::int16_t>(std::clamp(steps, -kMaxValue, kMaxValue)));
   }
   packed.cadence_rad_s = static_cast<float>(walker.cadence_rad_s);
   pack_cycle(walker.cycle, packed);

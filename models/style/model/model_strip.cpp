@@ -22,8 +22,8 @@ namespace {
 using Eigen::MatrixXd;
 
 constexpr double kCentimetres = 100.0;
-constexpr int kGround_cm = 180;        // below the top of the drawing
-constexpr double kMost_cm = 20'000.0;  // of a place in it; a broken model's may be anywhere
+constexpr int kGround_cm = 180;            // below the top of the drawing
+constexpr double kMaxPlace_cm = 20'000.0;  // of a place in it; a broken model's may be anywhere
 
 // The lines of a figure, each from joint to joint.
 const std::vector<std::vector<Bone>>& limbs() {
@@ -81,7 +81,7 @@ void draw(const Skeleton& figure, const motion::WorldPose& pose, const Eigen::Ve
   for (const Eigen::Vector3d& joint : pose.position_m) lowest_m = std::min(lowest_m, joint.y());
   const auto whole = [](double value) {
     return std::isfinite(value)
-               ? static_cast<int>(std::lround(std::clamp(value, -kMost_cm, kMost_cm)))
+               ? static_cast<int>(std::lround(std::clamp(value, -kMaxPlace_cm, kMaxPlace_cm)))
                : 0;
   };
   for (const auto& limb : limbs()) {
