@@ -7,6 +7,7 @@
 
 #include "models/feet/legs.hpp"
 #include "proto/frame/median.hpp"
+#include "proto/frame/skeleton.hpp"
 
 namespace posed::feet {
 namespace {
@@ -21,7 +22,7 @@ Eigen::Vector3d root_of(const Frame& frame) {
 struct FootPoints {
   FootPoints(const Legs& legs, const Frame& frame) {
     legs.pose(frame, pose);
-    const Eigen::Vector3d root_m = root_of(frame);
+    root_m = root_of(frame);
     for (std::size_t leg = 0; leg < kLegs; ++leg) {
       for (std::size_t p = 0; p < kPoints; ++p) {
         known[leg][p] = pose.measured[leg] && legs.leg(leg).has(p);
@@ -32,7 +33,16 @@ struct FootPoints {
   [[nodiscard]] const Eigen::Vector3d& at_m(std::size_t leg, std::size_t point) const {
     return pose.point_from_root_m[leg][point];
   }
+  // The ankle from its hip, in the pelvis' own axes.
+  [[nodiscard]] Eigen::Vector3d from_pelvis_m(const Legs& legs, const Skeleton& skeleton,
+                                              std::size_t leg) const {
+    const auto thigh = static_cast<std::size_t>(legs.leg(leg).thigh);
+    const auto pelvis = static_cast<std::size_t>(std::max(0, skeleton.joints[thigh].parent));
+    return pose.world_rotation[pelvis].conjugate() *
+           (at_m(leg, kAnkle) - root_m - pose.from_root_m[thigh]);
+  }
   LegPose pose;
+  Eigen::Vector3d root_m;
   OfPoints<bool> known{};  // points of a leg that is not measured are none
 };
 
@@ -108,6 +118,46 @@ std::optional<double> below_standing_m(const motion::Motion& motion) {
   }
   if (standing_m.empty()) return std::nullopt;
   return std::max(0.0, median(standing_m) - lowest_m);
+}
+
+std::optional<FootCapture> foot_capture(const motion::Motion& motion) {
+  constexpr double kMin_s = 2.0, kPart_s = 0.5, kTenth = 0.1;
+  const auto legs = Legs::find(*motion.skeleton);
+  const int part = static_cast<int>(kPart_s * motion.rate_hz);
+  if (!legs || part < 1 || motion.size() < kMin_s * motion.rate_hz) return std::nullopt;
+  FootCapture capture;
+  std::vector<double> slower_m_s, lowest_m;
+  std::array<Eigen::Matrix3Xd, kLegs> from_pelvis_m;
+  for (auto& places_m : from_pelvis_m) places_m.resize(3, motion.size());
+  std::optional<FootPoints> before;
+  for (int t = 0; t < motion.size(); ++t) {
+    const FootPoints now(*legs, motion.frames[t]);
+    if (!now.known[0][kAnkle] || !now.known[1][kAnkle]) return std::nullopt;
+    double slower = std::numeric_limits<double>::infinity();
+    for (std::size_t leg = 0; leg < kLegs; ++leg) {
+      const Eigen::Vector3d& at_m = now.at_m(leg, kAnkle);
+      from_pelvis_m[leg].col(t) = now.from_pelvis_m(*legs, *motion.skeleton, leg);
+      if (before) slower = std::min(slower, over_ground_m(at_m - before->at_m(leg, kAnkle)));
+    }
+    if (before) slower_m_s.push_back(slower * motion.rate_hz);
+    const double lower_m = std::min(now.at_m(0, kAnkle).y(), now.at_m(1, kAnkle).y());
+    if (t % part == 0) {
+      lowest_m.push_back(lower_m);
+    } else {
+      lowest_m.back() = std::min(lowest_m.back(), lower_m);
+    }
+    before = now;
+  }
+  for (std::size_t leg = 0; leg < kLegs; ++leg) {
+    const Eigen::Matrix3Xd& places_m = from_pelvis_m[leg];
+    const Eigen::Vector3d mean_m = places_m.rowwise().mean();
+    capture.swing_m[leg] = std::sqrt((places_m.colwise() - mean_m).squaredNorm() / motion.size());
+  }
+  capture.slower_m_s = median(slower_m_s);
+  std::ranges::sort(lowest_m);
+  const auto tenth = static_cast<std::size_t>(kTenth * static_cast<double>(lowest_m.size()));
+  capture.uneven_m = lowest_m[lowest_m.size() - 1 - tenth] - lowest_m[tenth];
+  return capture;
 }
 
 double root_speed_m_s(const motion::Motion& motion, double period_s) {

@@ -1,8 +1,10 @@
 // How well the feet of a clip stand (README.md, "Figures"). Cold.
 #pragma once
 
+#include <array>
 #include <optional>
 
+#include "models/feet/legs.hpp"
 #include "models/motion/motion.hpp"
 
 namespace posed::feet {
@@ -27,5 +29,20 @@ namespace posed::feet {
 // stride, over that time; so neither its sway nor a stand at either end counts. 0 for a clip that
 // is shorter.
 [[nodiscard]] double root_speed_m_s(const motion::Motion& motion, double period_s);
+
+// How the feet of a walk were captured, whatever the style.
+struct FootCapture {
+  // Speed over the ground of the ankle that is slower, the median over the frames [m/s]: of a walk
+  // one foot always stands.
+  double slower_m_s = 0.0;
+  // How far each ankle gets from its mean place, seen from the pelvis, as a standard deviation [m].
+  std::array<double, kLegs> swing_m{};
+  // How much the height of the lower ankle differs between parts of half a second: the lowest of
+  // each part, from the lowest tenth to the highest [m].
+  double uneven_m = 0.0;
+};
+
+// Empty for a skeleton without two legs that are measured, and for a motion shorter than 2 s.
+[[nodiscard]] std::optional<FootCapture> foot_capture(const motion::Motion& motion);
 
 }  // namespace posed::feet

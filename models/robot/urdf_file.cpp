@@ -281,7 +281,7 @@ bool has_shape(const pugi::xml_node& visual) {
 
 // In a URDF without collision shapes what is seen of it stands for them.
 void use_visuals(pugi::xml_node& robot) {
-  constexpr int kMaxShapes = 200;
+  constexpr int kMaxVisuals = 200;
   const auto links = robot.children("link");
   if (std::ranges::any_of(links, [](const auto& link) { return bool(link.child("collision")); })) {
     return;
@@ -290,7 +290,7 @@ void use_visuals(pugi::xml_node& robot) {
   for (const pugi::xml_node link : links) {
     for (pugi::xml_node visual = link.child("visual"); visual;) {
       const pugi::xml_node next = visual.next_sibling("visual");
-      if (used < kMaxShapes && has_shape(visual)) {
+      if (used < kMaxVisuals && has_shape(visual)) {
         visual.set_name("collision");
         ++used;
       }

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "models/feet/foot_score.hpp"
 #include "models/motion/motion.hpp"
 #include "models/style/train/training_check.hpp"
 #include "proto/clip/clip.hpp"
@@ -89,6 +90,38 @@ void count_strides(const AlignedClip& clip, double rate_hz, TakeCheck& check) {
   check.standing_s = std::max(0.0, check.seconds - kept / rate_hz - kEnds_s);
 }
 
+// What a take says of its feet: a foot that hangs teaches a limp, and a place or a floor that is
+// wrong teaches a wrong pace and height.
+void check_feet(const motion::Motion& motion, TakeCheck& check) {
+  // Who limps moves his worse foot two thirds as far as the other, and on a narrow turn the inner
+  // one moves as little.
+  constexpr double kMinSwing = 0.4;
+  // A walker's slower foot has .3 m/s at most; a runner's both fly, at half his speed. On a
+  // treadmill the body stays.
+  constexpr double kSlides_m_s = 0.4, kSlides = 0.6, kGoes_m_s = 0.2;
+  constexpr double kUneven_m = 0.1;
+  const auto feet = feet::foot_capture(motion);
+  if (!feet) return;
+  for (std::size_t leg = 0; leg < feet::kLegs; ++leg) {
+    if (feet->swing_m[leg] >= kMinSwing * feet->swing_m[1 - leg]) continue;
+    check.problem = std::string("the ") + (leg == 0 ? "left" : "right") +
+                    " foot hardly moved beside the other: see to its sensor or marker, and walk"
+                    " again";
+    return;
+  }
+  constexpr double kStride_s = 1.0;
+  const double speed_m_s = feet::root_speed_m_s(motion, kStride_s);
+  if (speed_m_s > kGoes_m_s && feet->slower_m_s > std::max(kSlides_m_s, kSlides * speed_m_s)) {
+    check.feet = "standing feet slide at " + number(100.0 * feet->slower_m_s, 0) +
+                 " cm/s, because the body goes faster or slower than they step";
+  }
+  if (feet->uneven_m > kUneven_m) {
+    check.feet += check.feet.empty() ? "" : "; ";
+    check.feet += "the floor under the feet differs by " + number(100.0 * feet->uneven_m, 0) +
+                  " cm: see to the height of the capture";
+  }
+}
+
 // The legs' side of the check.
 void check_walk(const TrainingClip& take, double rate_hz, TakeCheck& check) {
   const auto motion = motion::motion_of(take.clip);
@@ -115,7 +148,10 @@ void check_walk(const TrainingClip& take, double rate_hz, TakeCheck& check) {
     return;
   }
   count_strides(clip, rate_hz, check);
-  if (check.strides >= kMinTakeStrides) return;
+  if (check.strides >= kMinTakeStrides) {
+    check_feet(motion::resample(*motion, rate_hz), check);
+    return;
+  }
   check.problem = "only " + std::to_string(check.strides) +
                   (check.strides == 1 ? " stride was heard" : " strides were heard") + " in " +
                   number(check.seconds, 1) + " s, and " + std::to_string(kMinTakeStrides) +
@@ -132,6 +168,7 @@ std::string TakeCheck::sentence() const {
     text += "; " + number(standing_s, 1) + " s of standing are left out";
   }
   if (!incomplete.empty()) text += "; missing: " + incomplete;
+  if (!feet.empty()) text += "; " + feet;
   return text;
 }
 

@@ -16,6 +16,7 @@ struct TakeCheck {
   int strides = 0;          // that would be learnt from
   double standing_s = 0.0;  // that would be left out, because the legs do not stride
   std::string incomplete;   // joints with missing values, in words; empty: none
+  std::string feet;         // that slide or stand unevenly, in words; empty: they are good
   std::string problem;      // why nothing can be learnt from it, and what to do; empty: it serves
 
   [[nodiscard]] bool good() const { return problem.empty(); }

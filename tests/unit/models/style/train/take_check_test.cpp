@@ -111,6 +111,43 @@ TEST_CASE("a walk whose body jumps, or that begins or ends in silence, is refuse
   CHECK(has(refusal(take), "jumped by 17.3 m"));
 }
 
+TEST_CASE("a live walk whose feet were captured badly says so", "[take_check]") {
+  const TrainingClip good = walked();
+  const auto is_root = [&](const Channel& channel, Axis axis) {
+    return channel.translation && channel.joint == 0 && channel.axis == axis;
+  };
+  const auto change = [&](const auto& value) {
+    TrainingClip take = good;
+    for (Eigen::Index c = 0; c < take.clip.channels.cols(); ++c) {
+      value(take.clip.skeleton->channels[static_cast<std::size_t>(c)], take.clip.channels.col(c));
+    }
+    return check_take(take, 30.0);
+  };
+  CHECK(change([](const Channel&, auto) {}).feet.empty());
+  const TakeCheck slides = change([&](const Channel& channel, auto values) {
+    if (is_root(channel, Axis::kZ)) values *= 0.4;
+  });
+  INFO(slides.sentence());
+  CHECK(slides.good());
+  CHECK(has(slides.sentence(), "standing feet slide at"));
+  const TakeCheck treadmill = change([&](const Channel& channel, auto values) {
+    if (is_root(channel, Axis::kZ)) values.setZero();
+  });
+  CHECK(treadmill.feet.empty());
+  const TakeCheck uneven = change([&](const Channel& channel, auto values) {
+    if (is_root(channel, Axis::kY)) {
+      values += Eigen::VectorXd::LinSpaced(values.rows(), 0.0, 0.2);
+    }
+  });
+  INFO(uneven.sentence());
+  CHECK(has(uneven.sentence(), "the floor under the feet differs by 1"));
+  const TakeCheck hangs = change([&](const Channel& channel, auto values) {
+    const std::string& name = good.clip.skeleton->joints[channel.joint].name;
+    if (has(name, "Left") && (has(name, "Leg") || has(name, "Foot"))) values.setConstant(values[0]);
+  });
+  CHECK(has(hangs.problem, "the left foot hardly moved"));
+}
+
 TEST_CASE("a walk about the stage is learnt from as one that goes straight on", "[take_check]") {
   TrainingClip straight = walked();
   TrainingClip circle = straight;
