@@ -104,7 +104,7 @@ class Page {
       this.avatars,
     );
     this.time = new TimeControls(find('.tools'), store, world);
-    this.library = new ModelLibrary({ control, requests, acks });
+    this.library = new ModelLibrary({ control, requests, acks }, () => this.panel.listModels());
     this.played = new Played(store);
     this.recordings = new Recordings({ control, requests, acks, played: this.played });
     find('.shelves').append(this.library.element, this.recordings.element);

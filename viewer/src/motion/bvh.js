@@ -111,8 +111,8 @@ export class Bvh {
   }
 
   // posed.v1.Skeleton of the file: bones where a joint is called so, as those of posed's own hands
-  // are. `like`: of the stream that the take is of; its T-pose and bones count if its joints are
-  // the same.
+  // are. `like`: of the stream that the take is of; what a BVH has no words for counts if its joints
+  // are the same: T-pose, bones, and a robot's shapes.
   skeleton(like) {
     const { joints, unit_m } = this;
     const named = (name) => name.charAt(0).toLowerCase() + name.slice(1);
@@ -130,6 +130,8 @@ export class Bvh {
         ? like.humanoid_bone
         : joints.map(({ name }) => (BONE.test(named(name)) ? named(name) : '')),
       T_world_joint_xyzw: same ? like.T_world_joint_xyzw : joints.flatMap(() => [0, 0, 0, 1]),
+      capsule_joint: same ? like.capsule_joint : [],
+      capsule_m: same ? like.capsule_m : [],
       root_joint: this.rootIndex,
     };
   }

@@ -148,8 +148,8 @@ export class CameraPanel {
     this.#times_ms = this.#times_ms.filter((then_ms) => now_ms - then_ms < SECOND_MS);
     this.#times_ms.push(now_ms);
     const rate = `${this.#times_ms.length} pictures a second, ${Math.round(now_ms - time_ms)} ms old`;
-    const sides = hands.map(({ side }) => side).join(' and ');
-    const seen = sides ? `${sides} hand seen` : NO_HAND;
+    // Not whose: the stream says which side it is, from all the pictures.
+    const seen = [NO_HAND, 'one hand is seen'][hands.length] ?? 'two hands are seen';
     const words = this.#refusal || `${seen} (${rate})`;
     if (words !== this.#said) write(this.words, words);
     this.#said = words;

@@ -49,10 +49,14 @@ export class Chosen {
     this.#shape = shape;
     const wasOff = this.fields.disabled;
     this.fields.disabled = readOnlyReason !== '';
-    if (wasOff && !this.fields.disabled) for (const part of this.#parts) part.list?.();
+    if (wasOff && !this.fields.disabled) this.listModels();
     this.reason.hidden = readOnlyReason === '';
     write(this.reason, readOnlyReason && `Controls are off: ${readOnlyReason}`);
     for (const part of this.#parts) part.update?.(stream);
+  }
+
+  listModels() {
+    for (const part of this.#parts) part.list?.();
   }
 
   #make(stream) {

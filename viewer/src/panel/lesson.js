@@ -10,7 +10,9 @@ const TABLES = { style: 'style', gesture: 'generate' }; // of the config, by end
 
 export class Lesson {
   static ready_s = 3; // to take one's place, before a walk or show begins
-  static #open = {}; // by title; also when the controls are made again for a new model
+  // By title, and by stream and title; also when the controls are made again for a new model.
+  static #open = {};
+  static #called = {};
 
   now = { step: STEP.idle };
   left_s = 0; // of the countdown
@@ -22,8 +24,13 @@ export class Lesson {
     this.called = el('input', {
       type: 'text',
       placeholder: 'a-z, digits, - and _',
-      oninput: () => this.show(),
+      value: Lesson.#called[`${title} ${stream.name}`] ?? '',
+      oninput: () => {
+        Lesson.#called[`${title} ${stream.name}`] = this.called.value;
+        this.show();
+      },
     });
+    this.source = stream.stats?.source_name ?? '';
     const button = (text, step) =>
       el('button', { type: 'button', onclick: () => this.ask(step()) }, text);
     this.learn = button('Learn', () => ({ train: { name: this.called.value, ...train } }));
@@ -133,7 +140,8 @@ export class Lesson {
     if (step !== STEP.inUse) return problem ?? '';
     const used = sequence > 0 ? `in use ${train_s.toFixed(1)} s after “Learn”` : 'kept';
     const table = TABLES[model.split('.').pop()];
-    return `✓ ${model} is ${used}; ${verdict}. For the next start, too: model = "…/${model}" in the table ${table} of ${this.name}`;
+    const whose = this.source ? `source ${this.source}, for all its bodies` : this.name;
+    return `✓ ${model} is ${used}; ${verdict}. For the next start, too: model = "…/${model}" in the table ${table} of ${whose}`;
   }
 }
 

@@ -64,8 +64,10 @@ function stripOf(path, name) {
 }
 
 export class ModelLibrary extends List {
-  constructor(context) {
+  // onChange(): another list of models has changed with this one
+  constructor(context, onChange) {
     super('Library of models', 10000, context);
+    this.onChange = onChange;
   }
 
   list() {
@@ -114,18 +116,31 @@ export class ModelLibrary extends List {
 
   // Asks in the row itself.
   #ask(buttons, name, kind, { field, what, doIt }) {
-    const keep = () => this.#offer(buttons, name, kind); // of a list that stays as it is, too
+    const keep = () => {
+      this.#offer(buttons, name, kind);
+      buttons.firstChild.focus();
+    };
     const yes = el('button.strong', { type: 'submit' }, what);
     const no = el('button', { type: 'button', onclick: keep }, 'Keep as it is');
     const form = el('form.buttons', {}, field, yes, no);
+    // A key that is still held from the button before confirms nothing.
+    form.onkeydown = (event) => event.repeat && event.key === 'Enter' && event.preventDefault();
     form.onsubmit = async (event) => {
       event.preventDefault();
+      yes.disabled = true;
       const reply = await doIt();
-      if (reply.ok) this.list();
-      else keep();
+      yes.disabled = false;
+      if (reply.ok) await this.#changed(); // else what was typed stays
     };
     buttons.replaceChildren(form);
     (field.focus ? form.querySelector('input, button') : yes).focus();
+  }
+
+  // Whose row has gone finds himself at the list's name.
+  async #changed() {
+    await this.list();
+    this.onChange();
+    if (document.activeElement === document.body) this.element.querySelector('summary').focus();
   }
 
   #rename(buttons, name, kind) {

@@ -83,6 +83,7 @@ export class Take {
     this.#blob = blob;
     if (!this.from) this.#offerPart();
     this.#start();
+    this.vrma.hidden = !this.played.isBody(this.file.name); // which is what a .vrma is for
   }
 
   stop() {
@@ -127,10 +128,11 @@ export class Take {
       { type: 'button', onclick: () => this.#savePart() },
       'Download this part',
     );
+    this.vrma = this.#kind('vrma');
     this.part.append(
       labelled('From, s', this.from),
       labelled('To, s', this.to),
-      el('div.buttons', {}, save, this.#kind('glb'), this.#kind('vrma')),
+      el('div.buttons', {}, save, this.#kind('glb'), this.vrma),
     );
   }
 

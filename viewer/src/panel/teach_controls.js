@@ -38,7 +38,8 @@ export class TeachControls extends Lesson {
     const walked = [neutral_walk, style_walk];
     this.walks.forEach(({ mark, more, words }, i) => {
       const { takes = 0, sentence = '' } = walked[i] ?? {};
-      const marked = step === STEP.marking && style === (i === 1);
+      const isNow = step === STEP.marking || step === STEP.checking; // and so far nothing is bad
+      const marked = isNow && style === (i === 1);
       const again = takes > 0 ? 'Again' : 'Walk';
       write(mark, this.count(i + 1, marked) || `${again} ${WALK_S} s`);
       mark.disabled = this.busy;

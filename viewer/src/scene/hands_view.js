@@ -6,7 +6,8 @@ import { robotPlace } from './robot_shape.js';
 
 const FIELD_DEG = 28;
 const APART_M = { least: 0.2, most: 0.3 }; // from hand to hand, for their names
-const HEIGHT_M = 0.27; // that is seen
+const HEIGHT_M = 0.29; // that is seen
+const MIDDLE_M = 0.085; // of a hand, above its wrist
 
 export class HandsView {
   scene = new Scene();
@@ -92,7 +93,7 @@ export class HandsView {
   #frame() {
     const half = Math.tan((FIELD_DEG * Math.PI) / 360);
     const count = this.count ?? 1;
-    const across_m = count * APART_M.least + 0.03;
+    const across_m = count * APART_M.least + 0.06;
     const high_m = Math.max(
       HEIGHT_M / Math.max(this.#free, 0.3),
       across_m / Math.max(this.camera.aspect, 0.2),
@@ -102,7 +103,7 @@ export class HandsView {
     this.apart_m = Math.min(Math.max((high_m * this.camera.aspect) / count, least), most);
     this.apart_px = (this.apart_m * this.#height) / high_m;
     this.#spread();
-    this.controls.target.set(0, 0.06 - this.#up * high_m, 0);
+    this.controls.target.set(0, MIDDLE_M - this.#up * high_m, 0);
     this.camera.position
       .set(0.3, 0.11, 1)
       .normalize()

@@ -59,7 +59,9 @@ const SINGLE = { plain: colour('#9aa0a6'), green: colour('#00b140') };
 export function sceneColours(theme, background) {
   const single = SINGLE[background];
   const colours = THEMES[background] ?? THEMES[theme];
-  return single ? { ...colours, background: single, hands: single } : colours;
+  // What is to be cut out must not shine through anybody.
+  const rawOpacity = background === 'green' ? 1 : colours.rawOpacity;
+  return single ? { ...colours, background: single, hands: single, rawOpacity } : colours;
 }
 
 // Performers have a colour each, in their order; a seventh has that of the first again.

@@ -6,9 +6,11 @@ import { Trail } from './trail.js';
 
 const ABOVE_JOINTS_M = 0.27; // what a head has above its joint
 const joint = new Vector3();
+const away = new Vector3();
 
 export class Performer {
   avatar = null; // an Avatar in place of the capsules
+  lane = new Vector3(); // where its world's origin is in the scene
   centre = new Vector3(); // of the hips, in the scene
   above = new Vector3();
   head = { middle: 0, half: 0 };
@@ -51,6 +53,19 @@ export class Performer {
     this.#colour();
     this.#measure();
     return true;
+  }
+
+  // Stands in its lane, but at most so far from another.
+  keepNear(other, most_m) {
+    const { position } = this.figure.group;
+    this.centre.sub(position).add(this.lane);
+    position.copy(this.lane);
+    away.subVectors(this.centre, other.centre).setY(0);
+    const far_m = away.length();
+    if (far_m <= most_m) return;
+    away.multiplyScalar(most_m / far_m - 1);
+    position.add(away);
+    this.centre.add(away);
   }
 
   #colour() {

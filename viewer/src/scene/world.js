@@ -194,11 +194,8 @@ export class World {
   #stand(performer, lane, shown) {
     if (!performer) return;
     const yaw = this.#yaw ?? 0;
-    performer.figure.group.position.set(
-      lane * LANE_M * Math.cos(yaw),
-      0,
-      -lane * LANE_M * Math.sin(yaw),
-    );
+    performer.lane.set(lane * LANE_M * Math.cos(yaw), 0, -lane * LANE_M * Math.sin(yaw));
+    performer.figure.group.position.copy(performer.lane);
     performer.shown = shown;
     performer.figure.group.visible = shown && performer.stream.drawable;
     if (!shown) this.tags.hide(performer.stream.name);
@@ -319,6 +316,17 @@ export class World {
       if (this.#yaw === null && !performer.ghost && performer.stream.isHand === false)
         this.#face(performer);
       shown(performer);
+    }
+    this.#keepTwinsNear();
+  }
+
+  // A style with a pace of its own leaves the raw figure behind, or ahead: after minutes it would
+  // be out of sight.
+  #keepTwinsNear() {
+    for (const performer of this.performers.values()) {
+      const { name, isRaw, isHand } = performer.stream;
+      const styled = isRaw && !isHand && this.performers.get(name.slice(0, -RAW_SUFFIX.length));
+      if (styled) performer.keepNear(styled, BESIDE_M);
     }
   }
 

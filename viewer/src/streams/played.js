@@ -41,6 +41,10 @@ export class Played {
     if (one) this.store.removeTake(one.stream);
   }
 
+  isBody(file) {
+    return this.has(file) && !this.#playing.get(file).stream.isHand;
+  }
+
   // Where in the take it is [s]; NaN while it is not played.
   at_s(file, now_ms) {
     const one = this.#playing.get(file);

@@ -242,6 +242,7 @@ pageTests(
       await button('Delete: march-to-sway.style').click();
       await button('Delete').click();
       await acknowledged(page, "refused: 'walker' uses it");
+      await button('Keep as it is').click();
       const strips = shelf.getByRole('img'); // of the model that has a sound one
       assert.equal(await strips.count(), 1);
       assert.match(await strips.getAttribute('aria-label'), /march-to-sway.style/);
@@ -255,7 +256,12 @@ pageTests(
       await shelf.getByLabel('New name of march-to-sway.style').fill('sway');
       await button('Rename').click();
       await shelf.getByText('sway.style', { exact: true }).waitFor(PATIENCE);
-      await button('Delete: sway.style').click();
+      const choice = page.getByLabel('Model', { exact: true });
+      await choice.locator('option', { hasText: /^sway.style$/ }).waitFor({ ...PATIENCE, state: 'attached' });
+      // A key that is held answers no question.
+      await button('Delete: sway.style').focus();
+      for (let i = 0; i < 5; i += 1) await page.keyboard.down('Enter');
+      await page.keyboard.up('Enter');
       assert.equal(bridge.daemon.models.length, 3);
       await button('Delete').click();
       await acknowledged(page, 'delete sway.style: done');

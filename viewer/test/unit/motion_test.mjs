@@ -168,6 +168,10 @@ test('a BVH poses a figure as the stream that it was recorded from', () => {
         assert.ok(Math.abs(a - b) < 1e-4, `${bone} ${index}: ${a} ${b}`);
       }
   }
+  const capsule_joint = [1];
+  const capsule_m = [0, 0, 0, 0, 0.1, 0, 0.02];
+  const robot = bvh.skeleton({ ...live, capsule_joint, capsule_m });
+  assert.deepEqual(new Kinematics(robot).capsules.length, 1);
   const part = new Bvh(cutBvh(text, bvh, 0.5, 0.8));
   assert.equal(part.frames, 9);
   assert.deepEqual(part.values.slice(0, 6), bvh.values.slice(15 * bvh.width, 15 * bvh.width + 6));

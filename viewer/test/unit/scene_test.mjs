@@ -1,12 +1,14 @@
 import assert from 'node:assert/strict';
 import { test } from 'node:test';
-import { BufferGeometry, Vector3 } from 'three';
+import { BufferGeometry, Color, Group, Vector3 } from 'three';
 import { Kinematics } from '../../src/motion/kinematics.js';
 import { bodyShape } from '../../src/scene/body_shape.js';
 import { COARSE, FINE } from '../../src/scene/capsule.js';
 import { JointPaint } from '../../src/scene/joint_paint.js';
+import { Performer } from '../../src/scene/performer.js';
 import { stoppedJoints } from '../../src/scene/robot_shape.js';
 import { Views } from '../../src/scene/views.js';
+import { Stream } from '../../src/streams/stream.js';
 import { bodySkeleton } from '../support/figures.mjs';
 
 // What OrbitControls wants of the scene's element.
@@ -75,6 +77,28 @@ test('a coarse figure has the size of the fine one, and less than half of its ve
   assert.equal(coarse.scale, fine.scale);
   const reach = ({ position }) => Math.max(...position.map(Math.abs));
   assert.ok(Math.abs(reach(coarse) - reach(fine)) < 0.01);
+});
+
+test('a raw figure that walks away stays in sight of its twin', () => {
+  const theme = { raw: new Color(), rawOpacity: 0.4, performers: [new Color()] };
+  const enter = (name) => {
+    const stream = new Stream(name);
+    stream.setSkeleton(bodySkeleton({ stream: name, id: 1, stage: [] }));
+    return new Performer(stream, new Group(), theme, COARSE, 0);
+  };
+  const [styled, raw] = [enter('walker'), enter('walker-raw')];
+  raw.lane.set(1.2, 0, 0);
+  for (const [z, far_m] of [
+    [0.5, 1.3],
+    [40, 3],
+    [0.5, 1.3],
+  ]) {
+    raw.centre.set(0, 0.9, z).add(raw.figure.group.position);
+    raw.keepNear(styled, 3);
+    const at = raw.centre.clone().setY(0);
+    assert.ok(Math.abs(at.length() - far_m) < 1e-6, `${z}: ${at.length()}`);
+    assert.ok(at.z > 0 && Math.abs(at.z - z - raw.figure.group.position.z) < 1e-6);
+  }
 });
 
 test('a robot looks like its capsules, and what stopped it is red', () => {
