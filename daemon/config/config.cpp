@@ -38,10 +38,8 @@ void read_endpoint(TableReader& table, const char* name, std::string& endpoint, 
                     fmt::format("{} is not an endpoint; it looks like tcp://127.0.0.1:5570,"
                                 " or ipc:///run/posed.sock",
                                 in_quotes(endpoint)));
-  } else if (!net::has_possible_port(endpoint)) {
-    table.add_error("endpoint",
-                    fmt::format("{} names a port that does not exist; give one from 1 to 65535",
-                                in_quotes(endpoint)));
+  } else if (const auto possible = net::check_endpoint(endpoint); !possible) {
+    table.add_error("endpoint", possible.error().message);
   } else if (!net::is_loopback(endpoint) && !secured && !insecure) {
     table.add_error(
         "endpoint",

@@ -74,6 +74,11 @@ WholeFile::WholeFile(const std::filesystem::path& path)
       file_(part_, std::ios::binary | std::ios::trunc) {}
 
 Result<WholeFile> WholeFile::open(const std::filesystem::path& path) {
+  std::error_code none;
+  if (std::filesystem::is_symlink(path, none) && !std::filesystem::exists(path, none)) {
+    return fail("is a link to a file that is not there: mount or make that, or remove the link",
+                path.string());
+  }
   WholeFile whole(path);
   if (whole.file_) return whole;
   const std::string why = errno_text();

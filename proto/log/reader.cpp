@@ -38,9 +38,12 @@ Result<> check_marks(Database& database, const std::string& file) {
 }
 
 // After a crash the -wal file is part of the log; this merges it into the main file. That fails
-// when another process has the log open or the file is read-only; reading works all the same.
+// at once when somebody else has the log open or the file is read-only; reading works all the same.
+// It must not lock a log that is being written: whoever reads with the lowest priority would make
+// the recorder wait.
 void merge_wal(Database& database) {
-  const auto merged = database.run("PRAGMA wal_checkpoint(TRUNCATE); PRAGMA journal_mode=DELETE;");
+  database.set_busy_timeout_ms(0);
+  const auto merged = database.run("PRAGMA journal_mode=DELETE;");
   static_cast<void>(merged);
 }
 
@@ -100,6 +103,7 @@ Result<Database> open_whole(const std::filesystem::path& path) {
   database.set_busy_timeout_ms(kReadPatience_ms);
   if (has_wal) TRY(check_content(database, file));
   merge_wal(database);
+  database.set_busy_timeout_ms(kReadPatience_ms);
   TRY(check_length(database, file));
   if (!has_wal) TRY(check_content(database, file));
   return database;

@@ -11,6 +11,9 @@
 #include <vector>
 
 #include <sys/eventfd.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
 #include <unistd.h>
 
 #include "proto/text/number.hpp"
@@ -20,8 +23,37 @@ namespace {
 
 std::string last_error() { return zmq_strerror(zmq_errno()); }
 
-std::string no_such_port(const std::string& endpoint) {
-  return "'" + endpoint + "' names a port that does not exist: give one from 1 to 65535";
+constexpr std::string_view kIpc = "ipc://";
+
+// Refuses tcp://HOST:99999: libzmq reduces the port modulo 65536 and would silently use another.
+Result<> check_port(const std::string& endpoint) {
+  if (!endpoint.starts_with("tcp://")) return {};
+  const std::string_view text = std::string_view(endpoint).substr(endpoint.rfind(':') + 1);
+  const bool padded = text.size() > 1 && text.starts_with('0');
+  if (text == "*" || text == "!") return {};
+  if (!padded && exact_number<std::uint16_t>(text)) return {};
+  return misuse("'" + endpoint + "' names a port that does not exist: give one from 1 to 65535");
+}
+
+// The file of an ipc:// endpoint; empty for another one, an abstract name (@) and one that libzmq
+// chooses (*).
+std::string ipc_file(std::string_view endpoint) {
+  if (!endpoint.starts_with(kIpc)) return {};
+  const std::string_view path = endpoint.substr(kIpc.size());
+  return path == "*" || path.starts_with('@') ? std::string() : std::string(path);
+}
+
+// Whether somebody listens at this socket file, or one may not ask.
+bool is_listened_to(const std::string& file) {
+  sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
+  file.copy(address.sun_path, sizeof address.sun_path - 1);
+  const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  if (fd < 0) return true;
+  const bool answered =
+      ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
+  const bool nobody = !answered && (errno == ECONNREFUSED || errno == ENOENT);
+  ::close(fd);
+  return !nobody;
 }
 
 // libzmq ends the process where it may not begin a thread, with a line about its source code. So as
@@ -81,11 +113,18 @@ Result<> set_option(void* socket, int option, std::string_view value) {
   return fail("ZeroMQ refuses socket option " + std::to_string(option) + ": " + last_error());
 }
 
-bool has_possible_port(std::string_view endpoint) noexcept {
-  if (!endpoint.starts_with("tcp://")) return true;
-  const std::string_view text = endpoint.substr(endpoint.rfind(':') + 1);
-  if (text == "*" || text == "!") return true;
-  return exact_number<std::uint16_t>(text).has_value();
+Result<> check_endpoint(const std::string& endpoint) {
+  TRY(check_port(endpoint));
+  const std::string file = ipc_file(endpoint);
+  constexpr std::size_t kMaxPath = sizeof(sockaddr_un::sun_path) - 1;
+  if (endpoint == kIpc || file.size() > kMaxPath) {
+    return misuse("'" + endpoint + "' needs a path of 1 to " + std::to_string(kMaxPath) +
+                  " letters behind ipc://");
+  }
+  struct stat found{};
+  if (file.empty() || ::lstat(file.c_str(), &found) != 0 || S_ISSOCK(found.st_mode)) return {};
+  return misuse("'" + endpoint +
+                "' is a file or folder, and no socket: choose a path that is free");
 }
 
 namespace {
@@ -99,15 +138,20 @@ Result<> choose_family(void* socket, std::string_view endpoint) {
 }  // namespace
 
 Result<std::string> bind_socket(void* socket, const std::string& endpoint) {
-  if (!has_possible_port(endpoint)) return misuse(no_such_port(endpoint));
+  TRY(check_endpoint(endpoint));
   TRY(choose_family(socket, endpoint));
   TRY(try_descriptors());
-  if (zmq_bind(socket, endpoint.c_str()) != 0) {
-    if (zmq_errno() == EADDRINUSE) {
-      return fail(endpoint +
-                  " is in use: another posed may be running; stop it or choose another"
-                  " endpoint");
-    }
+  const auto in_use = [&] {
+    return fail(endpoint +
+                " is in use: another posed may be running; stop it or choose another endpoint");
+  };
+  // libzmq would take the socket of who listens there, and nobody could reach him any more.
+  if (const auto file = ipc_file(endpoint); !file.empty() && is_listened_to(file)) return in_use();
+  std::string known = endpoint;  // libzmq takes names for those of network interfaces
+  constexpr std::string_view kLocalhost = "tcp://localhost:";
+  if (known.starts_with(kLocalhost)) known.replace(0, kLocalhost.size(), "tcp://127.0.0.1:");
+  if (zmq_bind(socket, known.c_str()) != 0) {
+    if (zmq_errno() == EADDRINUSE) return in_use();
     if (zmq_errno() == EADDRNOTAVAIL) {
       return fail("cannot listen on '" + endpoint +
                   "': this machine has no such address; give one that `ip address` lists");
@@ -122,7 +166,7 @@ Result<std::string> bind_socket(void* socket, const std::string& endpoint) {
 }
 
 Result<> connect_socket(void* socket, const std::string& endpoint) {
-  if (!has_possible_port(endpoint)) return misuse(no_such_port(endpoint));
+  TRY(check_port(endpoint));
   TRY(choose_family(socket, endpoint));
   TRY(try_descriptors());
   // A daemon that loses its power or its network says nothing: TCP finds that out in five seconds.

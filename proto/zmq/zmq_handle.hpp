@@ -67,12 +67,13 @@ Result<Socket> open_socket(void* context, int type);
 Result<> set_option(void* socket, int option, int value);
 Result<> set_option(void* socket, int option, std::string_view value);
 
-// False for tcp://HOST:99999: libzmq reduces the port modulo 65536 and would silently use another
-// one.
-[[nodiscard]] bool has_possible_port(std::string_view endpoint) noexcept;
+// What bind_socket() would refuse whoever runs beside it: a port that does not exist, and an ipc://
+// path that is too long or at which there is something else than a socket, which libzmq would
+// delete.
+Result<> check_endpoint(const std::string& endpoint);
 
 // Binds and returns the endpoint that is really bound ("tcp://127.0.0.1:*" picks a free port). If
-// the port is busy, the error says so in one sentence.
+// the port, or the file of ipc://, is in use, the error says so in one sentence.
 Result<std::string> bind_socket(void* socket, const std::string& endpoint);
 // Connects now or as soon as somebody listens there, and connects again after a loss, which
 // keep-alive packets detect where the peer vanished silently.

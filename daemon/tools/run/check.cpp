@@ -13,6 +13,7 @@
 
 #include "daemon/config/config.hpp"
 #include "daemon/config/take_tables.hpp"
+#include "daemon/control/model_folder.hpp"
 #include "daemon/devices/about_stream.hpp"
 #include "daemon/devices/open_source.hpp"
 #include "daemon/devices/stream_stages.hpp"
@@ -258,6 +259,9 @@ void try_all(const std::string& file, config::Reading& reading, std::vector<Find
     const auto opened = devices::open_source(source, models);
     if (!opened) reading.errors.push_back(opened.error());
     sources.push_back(findings_of(source));
+  }
+  if (auto models = control::ModelFolder::open(reading.config.models); !models) {
+    reading.errors.push_back(models.error());
   }
   if (const auto& record = reading.config.record) {
     if (auto fine = config::check_folder(*record); !fine) {

@@ -51,6 +51,19 @@ TEST_CASE("a file that somebody else made meanwhile is kept, and so is what was 
   }
 }
 
+TEST_CASE("a link is written through, and one whose file is not there stays") {
+  const test::TempFolder folder;
+  const auto link = folder.path() / "link.bvh";
+  std::filesystem::create_symlink("there.bvh", link);
+  const auto write = [&] { return write_whole_file(link, "pose"); };
+  REQUIRE_FALSE(write());
+  CHECK(std::filesystem::is_symlink(link));
+  const auto there = folder.write("there.bvh", "");
+  REQUIRE(write());
+  CHECK(std::filesystem::is_symlink(link));
+  CHECK(test::file_text(there) == "pose");
+}
+
 TEST_CASE("a file that is written piece by piece has its name when it is whole") {
   const test::TempFolder folder;
   const auto path = folder.write("frames.bin", "before");
