@@ -247,9 +247,12 @@ Result<> Daemon::Parts::start_threads() {
         TRY(control::TriggerServer::start(config.trigger->listen, config.trigger->peers, *this));
   }
   TRY(start_metrics());
-  outputs->start([this](std::optional<std::uint32_t> stream, const std::string& text) {
-    if (stream) return publisher->post_event(*stream, v1::Event::KIND_WARNING, text);
-    spdlog::warn("{}", text);
+  outputs->start([this](std::optional<std::uint32_t> stream, const output::News& news) {
+    if (!stream) {
+      return spdlog::log(news.good ? spdlog::level::info : spdlog::level::warn, "{}", news.text);
+    }
+    const auto kind = news.good ? v1::Event::KIND_FOUND : v1::Event::KIND_WARNING;
+    publisher->post_event(*stream, kind, news.text);
   });
   threads = std::make_unique<HotThreads>(config.realtime, config.share_cpu);
   publisher_thread =

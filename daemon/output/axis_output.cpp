@@ -133,8 +133,7 @@ Result<> AxisOutput::set_stream(std::size_t place, const LiveStream* stream) {
 
 void AxisOutput::begin_turn(std::int64_t now_ns) {
   if (look_ns_ != kNoTime_ns && now_ns < look_ns_) return;
-  for (const std::string& news :
-       clients_ ? clients_->look(now_ns) : receivers_->drain_news(now_ns)) {
+  for (const News& news : clients_ ? clients_->look(now_ns) : receivers_->drain_news(now_ns)) {
     notify(news);
   }
   look_ns_ = now_ns + LineClients::kLook_ns;

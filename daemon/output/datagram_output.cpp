@@ -66,7 +66,7 @@ void DatagramOutput::send(std::int64_t now_ns) {
 }
 
 std::int64_t DatagramOutput::end_turn(std::int64_t now_ns) {
-  for (const std::string& news : receivers_.drain_news(now_ns)) notify(news);
+  for (const News& news : receivers_.drain_news(now_ns)) notify(news);
   return system::kForever_ns;
 }
 

@@ -97,14 +97,14 @@ SendOutcome LineClients::send(std::string_view line, std::int64_t now_ns) {
 }
 
 void LineClients::refuse(const drivers::Address& peer, const std::string& why, std::int64_t now_ns,
-                         std::vector<std::string>& news) {
+                         std::vector<News>& news) {
   // Whoever may connect may do so all the time.
   if (reported_ns_ != kNoTime_ns && now_ns < reported_ns_ + kNanosPerSecond) return;
   reported_ns_ = now_ns;
-  news.push_back(drivers::host_text(peer) + " was refused: " + why);
+  news.push_back({.text = drivers::host_text(peer) + " was refused: " + why});
 }
 
-void LineClients::let_in(std::int64_t now_ns, std::vector<std::string>& news) {
+void LineClients::let_in(std::int64_t now_ns, std::vector<News>& news) {
   for (int i = 0; i < kMaxAtOnce; ++i) {
     drivers::Address peer;
     const int fd = ::accept4(listener_, peer.get(), &peer.size, SOCK_CLOEXEC | SOCK_NONBLOCK);
@@ -124,15 +124,15 @@ void LineClients::let_in(std::int64_t now_ns, std::vector<std::string>& news) {
   }
 }
 
-std::vector<std::string> LineClients::look(std::int64_t now_ns) {
-  std::vector<std::string> news;
+std::vector<News> LineClients::look(std::int64_t now_ns) {
+  std::vector<News> news;
   for (Client& client : clients_) {
     static_cast<void>(write_rest(client));
     client.gone = client.gone || has_closed(client.fd);
     if (client.gone || client.stuck_ns == kNoTime_ns) continue;
     if (now_ns < client.stuck_ns + kPatience_ns) continue;
     client.gone = true;
-    news.push_back(client.from + " was disconnected: it took nothing for 2 s");
+    news.push_back({.text = client.from + " was disconnected: it took nothing for 2 s"});
   }
   remove_gone();
   let_in(now_ns, news);

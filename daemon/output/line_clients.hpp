@@ -39,8 +39,8 @@ class LineClients {
   [[nodiscard]] SendOutcome send(std::string_view line, std::int64_t now_ns);
 
   // Admits clients, removes those that have gone, and disconnects those that read nothing. Returns
-  // news for users, one sentence each. Call it every kLook_ns.
-  [[nodiscard]] std::vector<std::string> look(std::int64_t now_ns);
+  // news for users. Call it every kLook_ns.
+  [[nodiscard]] std::vector<News> look(std::int64_t now_ns);
   static constexpr std::int64_t kLook_ns = kNanosPerSecond / 20;
 
  private:
@@ -53,9 +53,9 @@ class LineClients {
     std::int64_t stuck_ns = kNoTime_ns;  // since when it has read nothing although bytes wait
   };
   LineClients() = default;
-  void let_in(std::int64_t now_ns, std::vector<std::string>& news);
+  void let_in(std::int64_t now_ns, std::vector<News>& news);
   void refuse(const drivers::Address& peer, const std::string& why, std::int64_t now_ns,
-              std::vector<std::string>& news);
+              std::vector<News>& news);
   // Writes the rest of the client's last line. Returns whether all of it is written.
   static bool write_rest(Client& client);
   // Writes as much of the text as the socket accepts; the rest is sent before anything else.

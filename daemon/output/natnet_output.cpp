@@ -291,8 +291,8 @@ void NatNetOutput::admit(const drivers::Address& address, Version version, std::
     clients_.push_back({.address = address, .version = version, .heard_ns = now_ns});
   } else if (refused_ns_ == kNoTime_ns || now_ns >= refused_ns_ + kNanosPerSecond) {
     refused_ns_ = now_ns;
-    notify(drivers::host_text(address) + " was refused: there are " + std::to_string(kMaxClients) +
-           " clients, the most there may be");
+    notify({.text = drivers::host_text(address) + " was refused: there are " +
+                    std::to_string(kMaxClients) + " clients, the most there may be"});
   }
 }
 

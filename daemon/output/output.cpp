@@ -77,7 +77,7 @@ void Output::update_streams() {
     known_[place] = stream;
     if (gathering_) gathering_->leaves(place);
     const auto set = set_stream(place, stream.get());
-    if (!set) notify("stream " + in_quotes(stream->name) + " " + set.error().message);
+    if (!set) notify({.text = "stream " + in_quotes(stream->name) + " " + set.error().message});
   }
 }
 
@@ -112,14 +112,14 @@ void Output::count(const SendOutcome& outcome) noexcept {
   failures_ += outcome.failed;
 }
 
-void Output::notify(const std::string& text) const {
+void Output::notify(const News& news) const {
   std::optional<std::uint32_t> concerned;
   for (const auto& stream : delivery_.streams) {
     if (stream != nullptr && !concerned) concerned = stream->id;
   }
-  const std::string sentence = "output " + name_ + ": " + text;
-  if (notify_) return notify_(concerned, sentence);
-  spdlog::warn("{}", sentence);
+  const News told{.text = "output " + name_ + ": " + news.text, .good = news.good};
+  if (notify_) return notify_(concerned, told);
+  spdlog::warn("{}", told.text);
 }
 
 Result<std::unique_ptr<Output>> open_output(const config::OutputConfig& config) {

@@ -24,7 +24,7 @@
 namespace posed::output {
 
 // Tells people something: beside a stream that it concerns, if one is there.
-using Notify = std::function<void(std::optional<std::uint32_t> stream, const std::string& text)>;
+using Notify = std::function<void(std::optional<std::uint32_t> stream, const News& news)>;
 
 // Decides when the poses of several streams go out as one. Those of one source come one right after
 // the other: they wait for each other, but not for a stream that is silent, and no longer than a
@@ -145,7 +145,7 @@ class Output : public publish::FrameOutput {
   [[nodiscard]] const std::optional<Sample>& sample(std::size_t place = 0) const noexcept {
     return delivery_.samples[place];
   }
-  void notify(const std::string& text) const;
+  void notify(const News& news) const;
   // These two set the values that fill() reports.
   void count(const SendOutcome& outcome) noexcept;
   void set_receivers(std::size_t count) noexcept {

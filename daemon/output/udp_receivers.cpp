@@ -84,8 +84,9 @@ bool UdpReceivers::send_to(Receiver& receiver, std::span<const std::byte> datagr
   }
   ++outcome.failed;
   if (receiver.error == ECONNREFUSED) {
-    // That was the answer to an earlier datagram; this one has not been sent yet.
-    if (send()) ++outcome.sent;
+    // That was the answer to an earlier datagram, which is counted as sent; this one is sent now,
+    // and counted as failed for it.
+    static_cast<void>(send());
   } else {
     receiver.connected = false;  // the machine may get another address, and the socket with it
     receiver.retry_ns = now_ns + kRetry_ns;
@@ -106,16 +107,17 @@ SendOutcome UdpReceivers::send(std::span<const std::byte> datagram, std::int64_t
   return outcome;
 }
 
-std::vector<std::string> UdpReceivers::drain_news(std::int64_t now_ns) {
-  std::vector<std::string> news;
+std::vector<News> UdpReceivers::drain_news(std::int64_t now_ns) {
+  std::vector<News> news;
   for (Receiver& receiver : receivers_) {
     if (receiver.failing && !receiver.reported) {
       receiver.reported = true;
-      news.push_back("sending to " + receiver.endpoint + " fails: " + why(receiver.error));
+      news.push_back(
+          {.text = "sending to " + receiver.endpoint + " fails: " + why(receiver.error)});
     } else if (receiver.failing && receiver.good_ns != kNoTime_ns &&
                now_ns >= receiver.good_ns + kGood_ns) {
       receiver.failing = receiver.reported = false;
-      news.push_back("sending to " + receiver.endpoint + " works again");
+      news.push_back({.text = "sending to " + receiver.endpoint + " works again", .good = true});
     }
   }
   return news;

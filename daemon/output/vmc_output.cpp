@@ -205,8 +205,9 @@ Result<> VmcOutput::set_stream(std::size_t place, const LiveStream* stream) {
     const std::size_t left_out =
         shapes_.set_layout(stream != nullptr ? stream->samples : drivers::SampleLayout{});
     if (left_out > 0) {
-      notify(std::to_string(left_out) + " blend shapes of stream " + in_quotes(stream->name) +
-             " are left out: their names are too long for a frame");
+      notify({.text = std::to_string(left_out) + " blend shapes of stream " +
+                      in_quotes(stream->name) +
+                      " are left out: their names are too long for a frame"});
     }
   }
   const auto set = avatar_.set_skeleton(part, stream != nullptr ? stream->skeleton : nullptr);
@@ -222,7 +223,7 @@ void VmcOutput::begin_turn(std::int64_t now_ns) {
 }
 
 std::int64_t VmcOutput::end_turn(std::int64_t now_ns) {
-  for (const std::string& news : receivers_.drain_news(now_ns)) notify(news);
+  for (const News& news : receivers_.drain_news(now_ns)) notify(news);
   return system::kForever_ns;
 }
 

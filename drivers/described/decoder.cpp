@@ -23,6 +23,7 @@ DescribedDecoder::DescribedDecoder(std::shared_ptr<const Table> table,
                                    std::shared_ptr<const glove::Calibration> default_calibration)
     : GloveDecoder(std::move(skeleton), std::move(default_calibration)),
       table_(std::move(table)),
+      skipping_(table_->packets.front().columns > 0),
       clock_(std::max(table_->time_bits, 1)),
       tick_ns_(table_->tick_s * 1e9) {
   extra_.fill(std::numeric_limits<float>::quiet_NaN());

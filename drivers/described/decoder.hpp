@@ -47,7 +47,8 @@ class DescribedDecoder final : public glove::GloveDecoder {
   std::size_t pending_bytes_ = 0;
   std::size_t searched_ = 0;  // pending bytes already searched for a delimiter
   bool in_step_ = true;       // false while searching for the next packet
-  bool skipping_ = false;     // inside a piece longer than any packet
+  // Inside a piece longer than any packet, or in a device's first line, whose begin may be missing.
+  bool skipping_ = false;
 
   std::array<double, kMaxFields> value_{};  // [field of the packet], as read
   std::array<float, glove::kMaxSensors> raw_{};

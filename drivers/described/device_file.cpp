@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <set>
+#include <span>
 #include <utility>
 
 #include "drivers/glove/angle_map.hpp"
@@ -78,15 +79,18 @@ class PacketReader {
     double tick_s = 0.0;                    // of a time
   };
 
+  void read_line(TableReader& from);
   void read_length(TableReader& from, PacketRule& packet);
   void read_checksum(TableReader& from, PacketRule& packet);
   void read_field(TableReader& from, PacketRule& packet);
+  bool read_first_bit(TableReader& from, int& bit, int& step);
   void read_range(TableReader& from, int bits, Field& field);
   void read_meaning(TableReader& from, FieldGroup& group);
   void add_field(TableReader& from, const std::string& name, FieldGroup group, PacketRule& packet);
   void add_sensor(TableReader& from, const std::string& name, const FieldGroup& group);
   [[nodiscard]] BitPlace place(TableReader& from, int bit, int bits, bool big,
                                const PacketRule& packet);
+  [[nodiscard]] BitPlace column(TableReader& from, int column, int bits, const PacketRule& packet);
   [[nodiscard]] bool good() const { return findings_.errors.empty(); }
 
   Findings& findings_;
@@ -96,6 +100,7 @@ class PacketReader {
 
 constexpr std::size_t kMaxMarkBytes = 16;
 constexpr int kMaxBytes = kMaxPacketBytes;
+constexpr int kMaxColumns = 256;
 constexpr Range kPlaces{-kMaxBytes, kMaxBytes};  // in a packet, or counted from its end
 constexpr Range kRawValues{-1e12, 1e12};
 constexpr Range kScales{-1e9, 1e9};
@@ -113,6 +118,11 @@ bool is_name(const std::string& name) {
 }
 
 void PacketReader::read_packet(TableReader& from) {
+  const bool is_line = from.has("columns");
+  if (!table_.packets.empty() && is_line != (table_.packets.front().columns > 0)) {
+    return from.add_error("columns", "a device sends lines of text or packets of bytes, not both");
+  }
+  if (is_line) return read_line(from);
   PacketRule packet;
   packet.header = from.hex("header", kMaxMarkBytes);
   packet.end = from.hex("end", kMaxMarkBytes);
@@ -131,6 +141,27 @@ void PacketReader::read_packet(TableReader& from) {
   if (marks > packet.min_bytes) {
     from.add_error("bytes", "the packet is shorter than its header and end");
   }
+  for (TableReader& field : from.tables("field", kMaxFields)) {
+    if (good()) read_field(field, packet);
+  }
+  from.finish();
+  table_.packets.push_back(std::move(packet));
+}
+
+void PacketReader::read_line(TableReader& from) {
+  int columns = 0;
+  std::string prefix;
+  from.read("columns", columns, {1, kMaxColumns});
+  from.read("prefix", prefix);
+  if (prefix.size() > kMaxMarkBytes) from.add_error("prefix", "a prefix has at most 16 characters");
+  if (table_.link.kind == LinkKind::kHid) {
+    from.add_error("columns", "lines of text come over kind = \"serial\" or \"tcp\"");
+  }
+  if (table_.delimiter.empty()) table_.delimiter = {std::byte{'\n'}};
+  PacketRule packet;
+  packet.columns = static_cast<std::size_t>(columns);
+  const auto bytes = std::as_bytes(std::span(prefix));
+  packet.header.assign(bytes.begin(), bytes.end());
   for (TableReader& field : from.tables("field", kMaxFields)) {
     if (good()) read_field(field, packet);
   }
@@ -192,18 +223,42 @@ void PacketReader::read_field(TableReader& from, PacketRule& packet) {
   FieldGroup group;
   Field& field = group.field;
   field.kind = static_cast<FieldKind>(from.choice("kind", kKinds));
-  field.form = static_cast<Form>(from.choice("form", kForms));
+  const bool text = packet.columns > 0;
+  field.form = text ? Form::kText : static_cast<Form>(from.choice("form", kForms));
   std::string name = field.kind == FieldKind::kTime ? "time" : "";
   from.read("name", name);
   std::vector<std::string> names{name};
   from.read("names", names);
   const bool flt = field.form == Form::kFloat;
-  int bits = flt ? 32 : 8;
+  int bits = flt || text ? 32 : 8;  // of text: after how many a time wraps
   from.read("bits", bits, {1.0, flt ? 64.0 : 32.0});
   if (flt && bits != 32 && bits != 64) from.add_error("bits", "a float has 32 or 64 bits");
+  int at = 0;  // the bit or the column of the first one
+  int step = text ? 1 : bits;
+  bool big = false;
+  if (text) {
+    from.read("column", at, {0, kMaxColumns});
+    from.need("column", "it is where the value stands in the line, from 0: column = 2");
+  } else {
+    big = read_first_bit(from, at, step);
+  }
+  read_range(from, bits, field);
+  read_meaning(from, group);
+  for (const std::string& one : names) {
+    if (!good()) break;
+    if (one != "-") {
+      field.place = text ? column(from, at, bits, packet) : place(from, at, bits, big, packet);
+      add_field(from, one, group, packet);
+    }
+    at += step;
+  }
+  from.finish();
+}
+
+// Reads where a field's first value begins and the step to its next; returns whether the most
+// significant byte comes first.
+bool PacketReader::read_first_bit(TableReader& from, int& bit, int& step) {
   int byte = 0;
-  int bit = 0;
-  int step = bits;
   from.read("byte", byte, {0, kMaxBytes});
   from.read("bit", bit, {0, 8 * kMaxBytes});
   from.read("step", step, {1, 8 * kMaxBytes});
@@ -211,22 +266,12 @@ void PacketReader::read_field(TableReader& from, PacketRule& packet) {
   if (from.has("bit") == from.has("byte")) {
     from.add_error("bit", "a field needs its place: bit = 24, or byte = 3");
   }
-  read_range(from, bits, field);
-  read_meaning(from, group);
   bit += 8 * byte;
-  for (const std::string& one : names) {
-    if (!good()) break;
-    if (one != "-") {
-      field.place = place(from, bit, bits, big, packet);
-      add_field(from, one, group, packet);
-    }
-    bit += step;
-  }
-  from.finish();
+  return big;
 }
 
 void PacketReader::read_range(TableReader& from, int bits, Field& field) {
-  if (field.form == Form::kUnsigned) {
+  if (field.form == Form::kUnsigned || field.kind == FieldKind::kTime) {
     field.high = std::exp2(bits) - 1.0;
   } else if (field.form == Form::kSigned) {
     field.low = -std::exp2(bits - 1);
@@ -281,7 +326,8 @@ void PacketReader::add_field(TableReader& from, const std::string& name, FieldGr
   }
   if (field.kind == FieldKind::kTime) {
     if (table_.time_bits != 0) from.add_error("kind", "a device has one time");
-    if (field.form != Form::kUnsigned || field.place.bits < 4 || group.tick_s == 0.0) {
+    const bool counts = field.form == Form::kUnsigned || field.form == Form::kText;
+    if (!counts || field.place.bits < 4 || group.tick_s == 0.0) {
       from.add_error("tick_s",
                      "a time is an unsigned counter of 4 bits or more, with tick_s, the seconds "
                      "of one count");
@@ -316,10 +362,12 @@ void PacketReader::add_sensor(TableReader& from, const std::string& name, const 
     if (!from.has(key)) continue;
     from.add_error(key, "a sensor has no scale: range is its raw value, value what that means");
   }
-  if (field.form == Form::kFloat && !from.has("range")) {
-    from.add_error("form", "a sensor that is a float needs its range, as [0, 1]");
+  const bool real = field.form == Form::kFloat || field.form == Form::kText;
+  if (real && !from.has("range")) {
+    from.add_error(field.form == Form::kText ? "column" : "form",
+                   "a sensor that is a float or text needs its range, as [0, 1]");
   }
-  if (field.place.bits > 24 && !from.has("range")) {
+  if (!real && field.place.bits > 24 && !from.has("range")) {
     from.add_error("bits", "a sensor of more than 24 bits needs its range, as [0, 16383]");
   }
   const double factor = group.unit == "deg" ? kDegree : 1.0;
@@ -348,6 +396,16 @@ BitPlace PacketReader::place(TableReader& from, int bit, int bits, bool big,
           .shift = static_cast<std::uint8_t>(big ? 8 * bytes - shift - bits : shift),
           .bits = static_cast<std::uint8_t>(bits),
           .big = big};
+}
+
+BitPlace PacketReader::column(TableReader& from, int column, int bits, const PacketRule& packet) {
+  if (std::cmp_greater_equal(column, packet.columns)) {
+    from.add_error("column", "column " + std::to_string(column) + " is not in the line: it has " +
+                                 std::to_string(packet.columns) + " columns, counted from 0");
+  }
+  return {.first = static_cast<std::uint16_t>(column),
+          .bytes = static_cast<std::uint8_t>(packet.header.size()),
+          .bits = static_cast<std::uint8_t>(bits)};
 }
 
 void read_device(TableReader& device, Findings& findings, Table& table) {

@@ -63,6 +63,10 @@ void DescribedEmulator::add_packet(const PacketRule& rule, Bytes& out) const {
   std::vector<std::byte> packet = blank_packet(*table_, rule);
   for (const Field& field : rule.fields) write_field(field, value_of(field), packet);
   write_checksum(rule, packet);
+  if (rule.columns > 0) {
+    const auto columns = packet.begin() + static_cast<std::ptrdiff_t>(rule.header.size());
+    packet.erase(std::remove(columns, packet.end(), std::byte{' '}), packet.end());
+  }
   out.insert(out.end(), packet.begin(), packet.end());
 }
 

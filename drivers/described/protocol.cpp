@@ -4,8 +4,14 @@
 
 #include <algorithm>
 #include <bit>
+#include <charconv>
 #include <cmath>
 #include <cstring>
+#include <limits>
+#include <string>
+#include <string_view>
+
+#include "proto/text/number.hpp"
 
 namespace posed::drivers::described {
 namespace {
@@ -84,6 +90,63 @@ bool ends_in(std::span<const std::byte> bytes, std::span<const std::byte> end) n
   return std::ranges::equal(bytes.last(end.size()), end);
 }
 
+// A line has numbers with , ; a tab or blanks between them.
+constexpr int kColumnChars = 24;  // of a value that is written; the blanks after it are left out
+
+std::string_view text_of(std::span<const std::byte> bytes) noexcept {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+std::string_view without_blanks(std::string_view text) noexcept {
+  const std::size_t begin = std::min(text.find_first_not_of(" \t\r\n"), text.size());
+  text.remove_prefix(begin);
+  return text.substr(0, text.find_last_not_of(" \t\r\n") + 1);
+}
+
+// Takes the next column off the text, which begins with no blank.
+std::string_view next_column(std::string_view& text) noexcept {
+  const std::size_t end = std::min(text.find_first_of(",; \t"), text.size());
+  const std::string_view column = text.substr(0, end);
+  text.remove_prefix(end);
+  const auto skip_blanks = [&text] {
+    text.remove_prefix(std::min(text.find_first_not_of(' '), text.size()));
+  };
+  skip_blanks();
+  if (!text.empty() && (text[0] == ',' || text[0] == ';' || text[0] == '\t')) {
+    text.remove_prefix(1);
+    skip_blanks();
+  }
+  return column;
+}
+
+std::string_view column_at(const BitPlace& place, std::span<const std::byte> packet) noexcept {
+  std::string_view text = without_blanks(text_of(packet.subspan(place.bytes)));
+  for (std::size_t i = 0; i < place.first; ++i) static_cast<void>(next_column(text));
+  return next_column(text);
+}
+
+// NaN where the column is no number.
+double read_text(const BitPlace& place, std::span<const std::byte> packet) noexcept {
+  return exact_number<double>(column_at(place, packet))
+      .value_or(std::numeric_limits<double>::quiet_NaN());
+}
+
+Look look_for_line(const Table& table, const PacketRule& rule,
+                   std::span<const std::byte> bytes) noexcept {
+  Look look{.found = Look::Found::kMayCome, .rule = &rule};
+  const auto& mark = table.delimiter;
+  const auto begin = bytes.begin() + static_cast<std::ptrdiff_t>(rule.header.size());
+  const auto end = std::search(begin, bytes.end(), mark.begin(), mark.end());
+  if (end == bytes.end()) return look;
+  look.bytes = static_cast<std::size_t>(end - bytes.begin()) + mark.size();
+  std::string_view text = without_blanks(text_of(std::span(begin, end)));
+  std::size_t columns = 0;
+  for (; !text.empty(); ++columns) static_cast<void>(next_column(text));
+  look.found = columns == rule.columns ? Look::Found::kPacket : Look::Found::kNothing;
+  look.why = Outcome::kShort;
+  return look;
+}
+
 // Length of a packet of this rule; 0 when it is not known yet, more than kMaxPacketBytes when it is
 // invalid.
 std::size_t length_of(const PacketRule& rule, std::span<const std::byte> bytes) noexcept {
@@ -102,6 +165,7 @@ Look look_for(const Table& table, const PacketRule& rule,
   if (!starts_alike(bytes, rule.header)) return look;
   look.found = Look::Found::kMayCome;
   if (bytes.size() < rule.header.size()) return look;
+  if (rule.columns > 0) return look_for_line(table, rule, bytes);
   look.bytes = length_of(rule, bytes);
   if (look.bytes <= kMaxPacketBytes && (look.bytes == 0 || bytes.size() < look.bytes)) return look;
   look.found = Look::Found::kNothing;
@@ -138,6 +202,7 @@ RT_SAFE std::uint64_t read_bits(const BitPlace& place, std::span<const std::byte
 }
 
 RT_SAFE double read_field(const Field& field, std::span<const std::byte> packet) noexcept {
+  if (field.form == Form::kText) return read_text(field.place, packet);
   const std::uint64_t bits = read_bits(field.place, packet);
   if (field.form == Form::kUnsigned) return static_cast<double>(bits);
   if (field.form == Form::kSigned) {
@@ -150,6 +215,14 @@ RT_SAFE double read_field(const Field& field, std::span<const std::byte> packet)
 
 void write_field(const Field& field, double raw, std::span<std::byte> packet) noexcept {
   const double value = std::clamp(std::isfinite(raw) ? raw : field.low, field.low, field.high);
+  if (field.form == Form::kText) {
+    const std::string_view column = column_at(field.place, packet);
+    auto* const at =
+        reinterpret_cast<char*>(packet.data()) + (column.data() - text_of(packet).data());
+    std::fill_n(at, kColumnChars, ' ');
+    std::to_chars(at, at + kColumnChars, value);  // the shortest text of a double has 24 at most
+    return;
+  }
   std::uint64_t bits = 0;
   if (field.form != Form::kFloat) {
     bits = static_cast<std::uint64_t>(std::llround(value));
@@ -163,6 +236,16 @@ void write_field(const Field& field, double raw, std::span<std::byte> packet) no
 
 std::vector<std::byte> blank_packet(const Table& table, const PacketRule& rule) {
   std::vector<std::byte> packet(rule.min_bytes);
+  if (rule.columns > 0) {
+    std::string line(text_of(rule.header));
+    for (std::size_t i = 0; i < rule.columns; ++i) {
+      line += (i > 0 ? "," : "") + std::string("0") + std::string(kColumnChars - 1, ' ');
+    }
+    const auto bytes = std::as_bytes(std::span(line));
+    packet.assign(bytes.begin(), bytes.end());
+    packet.insert(packet.end(), table.delimiter.begin(), table.delimiter.end());
+    return packet;
+  }
   std::ranges::copy(rule.header, packet.begin());
   const auto put_last = [&packet](const std::vector<std::byte>& bytes) {
     std::ranges::copy(bytes, packet.end() - static_cast<std::ptrdiff_t>(bytes.size()));

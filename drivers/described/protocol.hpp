@@ -5,6 +5,8 @@
 //   |  header    |  fields, at their bits  | checksum |  end  |
 //   +------------+---------- ... ----------+----------+-------+
 //
+// Or a line of text: a prefix, and columns of numbers, which the table's delimiter ends.
+//
 // Each part may be missing, but something must mark where a packet begins. The checksum may be at
 // any position; the length is fixed or read from a field.
 #pragma once
@@ -40,7 +42,8 @@ RT_SAFE [[nodiscard]] double read_field(const Field& field,
 // The inverse: `raw` is rounded to the field's bits and limited to its range.
 void write_field(const Field& field, double raw, std::span<std::byte> packet) noexcept;
 
-// The shortest packet of this rule: zeros, with its header, length, end and delimiter.
+// The shortest packet of this rule: zeros, with its header, length, end and delimiter. Columns of a
+// line have room for any number, as blanks.
 [[nodiscard]] std::vector<std::byte> blank_packet(const Table& table, const PacketRule& rule);
 // Writes the checksum; call it after all fields are written.
 void write_checksum(const PacketRule& rule, std::span<std::byte> packet) noexcept;

@@ -30,7 +30,8 @@ struct LinkRule {
 };
 
 // Location of a field's bits in a packet, prepared for a single read: `bytes` bytes from `first`,
-// combined in their order, shifted right and masked.
+// combined in their order, shifted right and masked. In a line of text `first` is the column and
+// `bytes` the length of the prefix before the columns.
 struct BitPlace {
   std::uint16_t first = 0;
   std::uint8_t bytes = 1;
@@ -39,7 +40,7 @@ struct BitPlace {
   bool big = false;  // most significant byte first; bits count from the top of a byte
 };
 
-enum class Form : std::uint8_t { kUnsigned, kSigned, kFloat };
+enum class Form : std::uint8_t { kUnsigned, kSigned, kFloat, kText };
 enum class FieldKind : std::uint8_t { kSensor, kExtra, kTime };
 
 struct Field {
@@ -71,6 +72,7 @@ struct PacketRule {
   std::vector<std::byte> header;  // the first bytes of the packet; may be empty
   std::vector<std::byte> end;     // the last bytes of the packet
   std::size_t min_bytes = 0, max_bytes = 0;
+  std::size_t columns = 0;  // of a line of text, which the delimiter ends; 0: a packet of bytes
   LengthRule length;
   ChecksumRule checksum;
   std::vector<Field> fields;  // empty: a known packet that is skipped

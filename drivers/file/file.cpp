@@ -74,10 +74,12 @@ Result<Device> open(const Options& given, TransportFactory& /*ports*/) {
   const auto read = TRY(read_options(options));
   const auto clip = TRY(clip::open_device_clip(path, read));
   auto device = TRY(make_device(file_driver(), clip.description, path));
-  auto transport = FileTransport::open(chunks_of(clip), {.rate_hz = device.description.rate_hz,
-                                                         .pace = option<double>(options, "pace"),
-                                                         .loop = option<bool>(options, "loop"),
-                                                         .time_s = clip.time_s});
+  auto transport =
+      FileTransport::open(chunks_of(clip), {.rate_hz = device.description.rate_hz,
+                                            .pace = option<double>(options, "pace"),
+                                            .loop = option<bool>(options, "loop"),
+                                            .again_from = clip.begins_with_added_pose ? 1U : 0U,
+                                            .time_s = clip.time_s});
   if (!transport) {
     Error error = transport.error();
     error.file = path;
@@ -101,7 +103,9 @@ std::vector<OptionSpec> options() {
        .default_value = std::string(),
        .is_path = true,
        .help = "the skeleton of an .amc, an .asf; left out, NN.asf beside NN_MM.amc"},
-      {.name = "loop", .default_value = true, .help = "begin again after the last frame"},
+      {.name = "loop",
+       .default_value = true,
+       .help = "begin again after the last frame, without a rest pose in front of the motion"},
       {.name = "pace",
        .default_value = 1.0,
        .help = "factor on the clip's own speed; 0 is as fast as possible"},

@@ -14,6 +14,7 @@ struct PlaybackOptions {
   double rate_hz = 0.0;  // chunks per second of the recording
   double pace = 1.0;     // factor on the speed of the recording; 0 is as fast as possible
   bool loop = true;
+  std::size_t again_from = 0;  // the chunk with which each loop but the first begins
   // Due time of each chunk on the recording's clock [s], increasing; empty: evenly at rate_hz.
   std::vector<double> time_s{};
 };
@@ -23,7 +24,8 @@ struct PlaybackOptions {
 // delay the next, nothing drifts, and after the process was stopped all due chunks come at once.
 class FileTransport final : public Transport {
  public:
-  // Needs at least one chunk, and none longer than kMaxChunk. An invalid pace or rate is misuse.
+  // Needs more than again_from chunks, and none longer than kMaxChunk. An invalid pace or rate is
+  // misuse.
   static Result<std::unique_ptr<Transport>> open(Chunks chunks, const PlaybackOptions& options);
 
   [[nodiscard]] int poll_fd() const noexcept override { return -1; }
@@ -41,11 +43,14 @@ class FileTransport final : public Transport {
  private:
   FileTransport(Chunks chunks, double period_ns, const PlaybackOptions& options);
 
+  [[nodiscard]] std::size_t index() const noexcept;  // of the next chunk
+
   Chunks chunks_;
   double period_ns_;  // 0: always due
   bool loop_;
+  std::size_t again_from_;
   std::vector<double> due_ns_;  // [chunk] from the start of the loop; empty: evenly
-  double round_ns_ = 0.0;       // duration of a loop
+  double round_ns_ = 0.0;       // duration of a loop but the first
   std::int64_t start_ns_ = 0;
   std::uint64_t given_ = 0;  // chunks given so far, over all loops
 };

@@ -8,6 +8,7 @@
 
 #include "models/motion/leg_signal.hpp"
 #include "models/motion/symmetric_eigen.hpp"
+#include "proto/clip/frames_clip.hpp"
 #include "proto/frame/rotation.hpp"
 
 namespace posed::motion {
@@ -19,9 +20,7 @@ using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 constexpr double kMinChord_m = 0.5;
-constexpr double kSameRate = 1e-3;           // relative
-constexpr double kAddedPoseJump = 4.0;       // times the largest step that follows
-constexpr double kAddedPoseJump_rad = 0.09;  // and at least 5 degrees rms over the joints
+constexpr double kSameRate = 1e-3;  // relative
 
 Quaterniond rotation(const Frame& frame, int joint) {
   return to_eigen_double(frame.rotation_xyzw[joint]);
@@ -69,16 +68,6 @@ void fill_frame(const MatrixXd& columns, double position, Frame& frame) {
   }
 }
 
-// Rotation between two frames [rad], rms over the joints below the root.
-double step_rad(const Frame& a, const Frame& b, int root) {
-  double squares = 0.0;
-  for (int j = root + 1; j < a.joint_count; ++j) {
-    const double angle_rad = angle_between_rad(rotation(a, j), rotation(b, j));
-    squares += angle_rad * angle_rad;
-  }
-  return std::sqrt(squares / std::max(1, a.joint_count - root - 1));
-}
-
 constexpr int kOrder = 4;
 constexpr int kPadding = 3 * (kOrder + 1);  // frames, scipy's default for five coefficients
 
@@ -112,33 +101,14 @@ std::array<Section, kOrder / 2> butterworth(double cutoff) {
   return sections;
 }
 
-// `frame` gives each of so many frames.
-template <typename FrameOf>
-bool first_is_added(int frames, int root_joint, const FrameOf& frame) {
-  if (frames < 3) return false;
-  Frame before = frame(1);
-  const double first = step_rad(frame(0), before, root_joint);
-  if (!(first > kAddedPoseJump_rad)) return false;
-  double largest = 0.0;
-  for (int t = 2; t < frames; ++t) {
-    const Frame now = frame(t);
-    largest = std::max(largest, step_rad(before, now, root_joint));
-    before = now;
-  }
-  return first > kAddedPoseJump * largest;
-}
-
 }  // namespace
 
 bool begins_with_added_pose(const Motion& motion) {
-  return first_is_added(motion.size(), motion.skeleton->root_joint,
-                        [&](int t) -> const Frame& { return motion.frames[t]; });
+  return clip::begins_with_added_pose(motion.size(), motion.skeleton->root_joint,
+                                      [&](int t) -> const Frame& { return motion.frames[t]; });
 }
 
-bool begins_with_added_pose(const clip::Clip& clip) {
-  return first_is_added(clip.frames(), clip.skeleton->root_joint,
-                        [&](int t) { return clip.frame(t); });
-}
+bool begins_with_added_pose(const clip::Clip& clip) { return clip::begins_with_added_pose(clip); }
 
 Result<Motion> performed_motion_of(const clip::Clip& clip) {
   auto motion = TRY(motion_of(clip));

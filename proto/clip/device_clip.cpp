@@ -8,6 +8,7 @@
 
 #include "proto/clip/draft.hpp"
 #include "proto/clip/format.hpp"
+#include "proto/clip/frames_clip.hpp"
 #include "proto/clip/skeleton_json.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/frame/axes_text.hpp"
@@ -196,6 +197,7 @@ Result<DeviceClip> open_device_clip(const std::filesystem::path& path, const Rea
   } else {
     add_numbers(clip, out);
   }
+  out.begins_with_added_pose = begins_with_added_pose(clip);
   out.time_s = std::move(clip.time_s);
   out.warnings = std::move(clip.warnings);
   return out;

@@ -35,6 +35,7 @@ struct DeviceClip {
   std::string description;          // valid UTF-8 if the file's text is
   std::vector<std::string> frames;  // the bytes of each frame, at least one
   std::vector<double> time_s;       // [frame], as Clip::time_s
+  bool begins_with_added_pose = false;
   std::vector<std::string> warnings;
 };
 

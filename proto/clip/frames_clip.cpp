@@ -5,15 +5,32 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <string_view>
 #include <utility>
 
 #include <spdlog/fmt/fmt.h>
 
+#include "proto/frame/humanoid.hpp"
 #include "proto/frame/median.hpp"
 #include "proto/frame/rotation.hpp"
+#include "proto/text/clean.hpp"
 
 namespace posed::clip {
 namespace {
+
+constexpr double kAddedPoseJump = 4.0;       // times the largest step that follows
+constexpr double kAddedPoseJump_rad = 0.09;  // and at least 5 degrees rms over the joints
+
+// Rotation between two frames [rad], rms over the joints below the root.
+double step_rad(const Frame& a, const Frame& b, int root) {
+  double squares = 0.0;
+  for (int j = root + 1; j < a.joint_count; ++j) {
+    const double angle_rad =
+        angle_between_rad(to_eigen_double(a.rotation_xyzw[j]), to_eigen_double(b.rotation_xyzw[j]));
+    squares += angle_rad * angle_rad;
+  }
+  return std::sqrt(squares / std::max(1, a.joint_count - root - 1));
+}
 
 constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 
@@ -177,6 +194,90 @@ std::vector<double> FrameTimes::in_seconds() const {
     times_s.push_back(seconds(time_ns - times_ns.front()));
   }
   return times_s;
+}
+
+bool begins_with_added_pose(int frames, int root_joint,
+                            const std::function<const Frame&(int)>& frame) {
+  if (frames < 3) return false;
+  const double first = step_rad(frame(0), frame(1), root_joint);
+  if (!(first > kAddedPoseJump_rad)) return false;
+  double largest = 0.0;
+  const Frame* before = &frame(1);
+  for (int t = 2; t < frames; ++t) {
+    const Frame& now = frame(t);
+    largest = std::max(largest, step_rad(*before, now, root_joint));
+    before = &now;
+  }
+  return first > kAddedPoseJump * largest;
+}
+
+bool begins_with_added_pose(const Clip& clip) {
+  std::array<Frame, 2> two;
+  return begins_with_added_pose(clip.frames(), clip.skeleton->root_joint,
+                                [&](int t) -> const Frame& { return two[t % 2] = clip.frame(t); });
+}
+
+namespace {
+
+// "LeftArm" for "RightArm"; empty where the name is of no side.
+std::string of_other_side(std::string_view name) {
+  for (const auto& [left, right] : {std::pair<std::string_view, std::string_view>{"left", "right"},
+                                    {"Left", "Right"},
+                                    {"l_", "r_"},
+                                    {"L_", "R_"}}) {
+    for (const auto& [from, to] : {std::pair{left, right}, std::pair{right, left}}) {
+      const std::size_t at = name.find(from);
+      if (at == std::string_view::npos) continue;
+      return std::string(name.substr(0, at)).append(to).append(name.substr(at + from.size()));
+    }
+  }
+  return {};
+}
+
+int partner_of(const Skeleton& skeleton, int joint) {
+  const Joint& own = skeleton.joints[joint];
+  const std::string name = of_other_side(own.bone ? bone_name(*own.bone) : own.name);
+  if (name.empty()) return joint;
+  return own.bone ? skeleton.joint_of(*bone_from_name(name)) : skeleton.joint_index(name);
+}
+
+}  // namespace
+
+Result<Clip> mirrored(const Clip& clip) {
+  Clip out = is_acclaim(*clip.skeleton) ? with_zyx_channels(clip) : clip;
+  const Skeleton& skeleton = *out.skeleton;
+  std::vector<int> partners;
+  for (int j = 0; j < std::ssize(skeleton.joints); ++j) {
+    partners.push_back(partner_of(skeleton, j));
+    const int parent = skeleton.joints[j].parent;
+    const bool alike = partners[j] >= 0 &&
+                       skeleton.joints[partners[j]].parent == (parent < 0 ? -1 : partners[parent]);
+    if (alike) continue;
+    return fail("cannot be mirrored: joint " + in_quotes(skeleton.joints[j].name) +
+                    " has no partner on the other side",
+                clip.path);
+  }
+  FramesClip frames(out.skeleton);
+  for (int i = 0; i < out.frames(); ++i) {
+    const Frame from = out.frame(i);
+    Frame frame = from;
+    frame.angle_count = 0;  // so that they follow from the rotations
+    frame.root_position_m[0] = -frame.root_position_m[0];
+    for (int j = 0; j < frame.joint_count; ++j) {
+      const int k = partners[j];
+      Eigen::Quaterniond turn = T_above(skeleton, k) * rotation_of(from, k) *
+                                skeleton.joints[k].T_world_joint.conjugate();
+      turn.y() = -turn.y();
+      turn.z() = -turn.z();
+      frame.rotation_xyzw[j] = from_eigen(local_from_canonical(skeleton, j, turn));
+      frame.valid[j] = from.valid[k];
+    }
+    frames.add(frame);
+  }
+  std::vector<double> time_s(static_cast<std::size_t>(out.frames()));
+  for (int i = 0; i < out.frames(); ++i) time_s[i] = out.time_of_s(i);
+  out.channels = TRY(frames.finish(clip.path, out.frame_rate_hz, std::move(time_s))).channels;
+  return out;
 }
 
 void hold_missing(Clip& clip) {

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -53,6 +54,19 @@ class FrameTimes {
  private:
   std::vector<std::int64_t> arrival_ns_, device_ns_;
 };
+
+// Whether the first frame does not belong to the motion. Some converters put the figure's rest pose
+// in front (CMU's cgspeed BVH files), so the step to the second frame is larger than any person
+// moves. `frame` gives each of so many frames of a skeleton with this root, and a frame stays as it
+// is while the next one is asked for.
+[[nodiscard]] bool begins_with_added_pose(const Clip& clip);
+[[nodiscard]] bool begins_with_added_pose(int frames, int root_joint,
+                                          const std::function<const Frame&(int)>& frame);
+
+// The clip with left and right exchanged: what the left hand did the right one does, and who walked
+// to the left walks to the right (mirrored at the plane x = 0). Of joints that are no bones the
+// partner has the same name with left for right. Refuses a figure whose sides have other joints.
+Result<Clip> mirrored(const Clip& clip);
 
 // Fills every missing value with the value before it, at the start with the channel's first one.
 // Reports the number in `warnings`. For formats that cannot hold missing values.

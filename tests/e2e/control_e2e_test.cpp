@@ -146,6 +146,16 @@ TEST_CASE("check reports what a config would run, or everything that is wrong wi
   CHECK(has(gone.err, "one.style"));
 }
 
+TEST_CASE("check names the files of stages by their paths") {
+  const Served served;
+  const std::string config = served.path("posed.toml");
+  std::ofstream(config, std::ios::app) << "[stream.retarget]\nto = \"walk.bvh\"\n";
+  const auto shown = posed({"check", "--config", config});
+  INFO(shown.err);
+  REQUIRE(shown.code == 0);
+  CHECK(has(shown.out, "retarget (to=\"" + served.path("walk.bvh") + "\""));
+}
+
 TEST_CASE("check refuses a folder in which no recording can be made") {
   const Served served;
   const auto config = served.path("posed.toml");

@@ -96,6 +96,13 @@ TEST_CASE("a retargeted stream is published, replayed and converted on its new s
   const auto walk = motion::make_walker({.seconds = 2.0, .rate_hz = 60.0}).value();
   REQUIRE(clip::write_bvh(walk, stage.folder.path() / "walk.bvh"));
   REQUIRE(clip::write_bvh(toy_walk(2, 60.0), stage.folder.path() / "toy.bvh"));
+  const auto mirror = [&](const std::string& out) {
+    return posed({"convert", stage.path("walk.bvh"), "--mirror", "--out", stage.path(out)});
+  };
+  CHECK(mirror("other.bvh").code == 0);
+  CHECK(clip::read_clip(stage.path("other.bvh"))->channels !=
+        clip::read_clip(stage.path("walk.bvh"))->channels);
+  CHECK(has(mirror("other.csv").err, "--mirror is for clips of bodies"));
   std::string config = Stage::kEndpoints;
   for (const std::string to : {"humanoid", "toy.bvh"}) {
     config += "[[stream]]\nname = \"" + to.substr(0, 3) + "\"\ndriver = \"file\"\n[stream.file]\n" +

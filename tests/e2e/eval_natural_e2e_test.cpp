@@ -115,6 +115,15 @@ TEST_CASE("a clip is natural or not, and the exit code says which", "[eval_natur
   CHECK(printed["figures"]["jerk"]["natural"] == false);
   CHECK(printed["figures"]["jerk"]["below"] == 1.0);
   CHECK(printed["left_out"].empty());
+  const auto both = marchers.judge("another.bvh", {marchers.path("trembling.bvh"), "--json"});
+  CHECK(says(both, 1, "another.bvh: natural by all ... trembling.bvh: not natural: jerk is"));
+  const json list = json::parse(both.out);
+  REQUIRE(list.size() == 2);
+  CHECK(list[0]["natural"] == true);
+  CHECK(list[1]["figures"] == printed["figures"]);
+  CHECK(says(marchers.judge("another.bvh",
+                            {marchers.path("trembling.bvh"), "--report", marchers.path("x.html")}),
+             2, "--report is of one clip"));
 }
 
 TEST_CASE("the verdict of eval natural is a page, too", "[eval_natural]") {

@@ -208,6 +208,46 @@ TEST_CASE("live is offline: a clip played once equals what apply --cold writes")
   }
 }
 
+TEST_CASE("a log that was recorded with a style is styled anew as its device sent it") {
+  Served served;
+  const clip::Clip offline = applied_cold(served);
+  served.folder.write("once.toml", config_of("", "path = \"walk.bvh\"\nloop = false\npace = 0.0"));
+  const std::string log = served.path("take.plog");
+  REQUIRE(
+      posed({"record", "--config", served.path("once.toml"), "--out", log, "--until-end"}).code ==
+      0);
+  const auto largest_rad = [&](const std::vector<std::string>& command,
+                               const clip::Clip& expected) {
+    std::vector<std::string> words = command;
+    words.insert(words.end(), {"--overwrite", "--out", served.path("out.bvh")});
+    const ProgramOutcome made = posed(words);
+    INFO(made.err);
+    REQUIRE(made.code == 0);
+    if (command[0] == "apply") CHECK(has(made.err, "as they came in"));
+    const auto clip = clip::read_clip(served.path("out.bvh"));
+    REQUIRE(clip);
+    REQUIRE(clip->frames() == expected.frames());
+    double largest = 0.0;
+    for (int i = 0; i < clip->frames(); ++i) {
+      const Frame made_frame = clip->frame(i), frame = expected.frame(i);
+      for (std::size_t j = 0; j < frame.joint_count; ++j) {
+        largest = std::max(largest, angle_between_rad(to_eigen_double(made_frame.rotation_xyzw[j]),
+                                                      to_eigen_double(frame.rotation_xyzw[j])));
+      }
+    }
+    return largest;
+  };
+  const auto input = clip::read_clip(served.path("walk.bvh"));
+  REQUIRE(input);
+  const std::vector<std::string> apply{"apply", "--cold", "--model", served.path("one.style"), log};
+  CHECK(largest_rad(apply, offline) <= 10.0 * kSame_rad);  // a frame has its angles as floats
+  CHECK(largest_rad({"convert", log, "--stream", "walker-raw"}, *input) <= kSame_rad);
+  CHECK(largest_rad({"convert", log}, *input) > 0.1);
+  std::vector<std::string> refused = apply;
+  refused.insert(refused.end(), {"--stream", "waver", "--out", served.path("no.bvh")});
+  CHECK(has(posed(refused).err, "has no stream 'waver' with a skeleton, but walker"));
+}
+
 TEST_CASE("run --until-end ends with 0, and a client receives the last frame and the end") {
   Served served;
   const clip::Clip offline = applied_cold(served);

@@ -215,6 +215,7 @@ TEST_CASE("train, apply and eval end in a verdict; all degrees rms are one figur
   const auto change = json::parse(applied.out);
   CHECK(change["far_from_training"] == false);
   CHECK(has(applied.err, "like those of the training"));
+  CHECK(has(applied.err, "feet may slide"));  // every sentence, with --json too
 
   const auto judged = studio.eval("march_1.bvh", "sway_1.bvh");
   REQUIRE(judged.code == 0);

@@ -97,6 +97,26 @@ bits = 15
 b = [{channel = "index1_x"}]
 )";
 
+constexpr const char* kText = R"(
+name = "text"
+[link]
+kind = "serial"
+[[packet]]
+columns = 4
+prefix = "A "
+[[packet.field]]
+names = ["a", "-", "b"]
+column = 0
+range = [-5, 1023]
+[[packet.field]]
+kind = "time"
+column = 3
+bits = 12
+tick_s = 0.01
+[angles]
+a = [{channel = "index1_x"}]
+)";
+
 std::shared_ptr<const Table> table_of(const std::string& toml) {
   auto table = parse_device(toml, "fuzz.toml");
   demand(table.has_value());
@@ -109,7 +129,8 @@ const std::vector<std::shared_ptr<const Table>>& tables() {
     for (const std::string& name : posed::drivers::described::shipped_devices()) {
       made.push_back(table_of(*posed::drivers::described::device_text(name)));
     }
-    for (const char* const toml : {kDelimited, kLength, kHid}) made.push_back(table_of(toml));
+    for (const char* const toml : {kDelimited, kLength, kHid, kText})
+      made.push_back(table_of(toml));
     return made;
   }();
   return all;

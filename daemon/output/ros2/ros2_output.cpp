@@ -214,7 +214,7 @@ bool Ros2Output::take(std::size_t place, const Frame& frame, std::int64_t /*now_
   if (!stream) return false;
   const auto taken = stream->take(frame);
   if (taken) return *taken;
-  notify("stream " + config_.bodies[place] + " " + taken.error().message);
+  notify({.text = "stream " + config_.bodies[place] + " " + taken.error().message});
   stream.reset();  // it is told once
   return false;
 }

@@ -1,7 +1,9 @@
 #include "daemon/tools/command/findings.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
+#include <charconv>
 #include <cstdio>
 
 #include <spdlog/fmt/fmt.h>
@@ -10,6 +12,7 @@
 #include "proto/frame/result.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
+#include "proto/text/number.hpp"
 
 namespace posed::tools {
 namespace {
@@ -127,6 +130,14 @@ Findings& Findings::put(Finding finding) {
   return *this;
 }
 
+double Findings::rounded(double value, int digits) {
+  std::array<char, 32> text{};
+  char* const begin = text.data();
+  const auto end =
+      std::to_chars(begin, begin + text.size(), value, std::chars_format::general, digits).ptr;
+  return exact_number<double>({begin, end}).value_or(value);  // nan and inf are no numbers
+}
+
 Findings& Findings::add_scalar(std::string name, Scalar value) {
   return put({.text = std::move(name), .value = std::move(value)});
 }
@@ -154,10 +165,6 @@ Findings& Findings::say(std::string line) {
   return put({.kind = Kind::kLine, .text = std::move(line)});
 }
 
-Findings& Findings::note(std::string sentence) {
-  return put({.kind = Kind::kNote, .text = std::move(sentence)});
-}
-
 Findings& Findings::remark(std::string sentence) {
   return put({.kind = Kind::kRemark, .text = std::move(sentence)});
 }
@@ -175,6 +182,14 @@ Findings& Findings::verdict(std::string sentence, bool good) {
 Findings& Findings::headline(std::string sentence, bool good) {
   good_ = good_ && good;
   return put({.kind = Finding::Kind::kHeadline, .text = std::move(sentence)});
+}
+
+Findings& Findings::take_sentences(const Findings& others) {
+  for (const Finding& finding : others.list_) {
+    if (finding.kind == Kind::kRemark) put(finding);
+  }
+  good_ = good_ && others.good_;
+  return *this;
 }
 
 std::optional<double> Findings::number(std::string_view name) const {
@@ -209,8 +224,7 @@ int Findings::show(bool as_json, int indent) const {
   std::fflush(stdout);
   for (const Finding& finding : list_) {
     const bool headline = finding.kind == Kind::kHeadline && as_json;
-    const bool note = finding.kind == Kind::kNote && !as_json;
-    if (finding.kind == Kind::kRemark || headline || note) {
+    if (finding.kind == Kind::kRemark || headline) {
       std::fprintf(stderr, "posed: %s\n", clean(finding.text).c_str());
     }
   }
@@ -218,7 +232,7 @@ int Findings::show(bool as_json, int indent) const {
 }
 
 bool Findings::is_bare_value() const {
-  return list_.size() == 1 && has_value(list_.front()) && list_.front().text.empty();
+  return !list_.empty() && has_value(list_.front()) && list_.front().text.empty();
 }
 
 void add_numbers(const Findings& findings, const std::string& sentence, report::Page& page) {

@@ -27,8 +27,9 @@ class Findings {
 
   // Adds a bool, a number, a text, other findings, or a list of these. JSON shows the value under
   // `name`, which ends in the unit of a quantity; an empty optional and a number that is not finite
-  // are null there. People see it only in a sentence. A name that is there already gets the new
-  // value.
+  // are null there. A real number is rounded to 12 digits (7 of a float), so that a computed 100 is
+  // no 100.00000000000213. People see it only in a sentence. A name that is there already gets the
+  // new value.
   template <typename T>
   Findings& add(std::string name, const T& value);
   // Adds every finding of `others`.
@@ -38,15 +39,17 @@ class Findings {
 
   // Adds a line for people, on stdout. The lines of a list's findings stand where the list does.
   Findings& say(std::string line);
-  // Adds a sentence on stderr, after all that stdout shows: a note is not shown with --json, a
-  // remark is, and a warning is a remark that begins so.
-  Findings& note(std::string sentence);
+  // Adds a sentence on stderr, after all that stdout shows, with --json too. A warning is a remark
+  // that begins so.
   Findings& remark(std::string sentence);
   Findings& warn(const std::vector<std::string>& sentences);
   // Adds the remark that judges. Bad news makes the exit code of the command kFailed.
   Findings& verdict(std::string sentence, bool good);
   // Like verdict(), but printed first on stdout; with --json on stderr.
   Findings& headline(std::string sentence, bool good);
+
+  // Adds the sentences on stderr of other findings, and whether their news are bad.
+  Findings& take_sentences(const Findings& others);
 
   // The number of this name, if there is one.
   [[nodiscard]] std::optional<double> number(std::string_view name) const;
@@ -64,6 +67,7 @@ class Findings {
   [[nodiscard]] bool is_bare_value() const;
 
  private:
+  [[nodiscard]] static double rounded(double value, int digits);
   Findings& add_scalar(std::string name, Scalar value);
   Findings& add_object(std::string name, Findings findings);
   Findings& add_list(std::string name, std::vector<Findings> items);
@@ -74,7 +78,7 @@ class Findings {
 };
 
 struct Finding {
-  enum class Kind : std::uint8_t { kScalar, kObject, kList, kHeadline, kLine, kNote, kRemark };
+  enum class Kind : std::uint8_t { kScalar, kObject, kList, kHeadline, kLine, kRemark };
   Kind kind = Kind::kScalar;
   std::string text{};  // a value's name, or the sentence
   Findings::Scalar value{};
@@ -94,8 +98,10 @@ Findings& Findings::add(std::string name, const T& value) {
     return value ? add(std::move(name), *value) : add_scalar(std::move(name), {});
   } else if constexpr (std::is_convertible_v<T, std::string_view>) {
     return add_scalar(std::move(name), std::string(std::string_view(value)));
-  } else if constexpr (std::is_same_v<T, bool> || std::floating_point<T>) {
+  } else if constexpr (std::is_same_v<T, bool>) {
     return add_scalar(std::move(name), value);
+  } else if constexpr (std::floating_point<T>) {
+    return add_scalar(std::move(name), rounded(value, std::is_same_v<T, float> ? 7 : 12));
   } else if constexpr (std::signed_integral<T>) {
     return add_scalar(std::move(name), std::int64_t{value});
   } else if constexpr (std::unsigned_integral<T>) {

@@ -174,13 +174,15 @@ struct Chosen {
   bool raw = false;  // the unstyled frames of them
 };
 
-Result<Chosen> choose(const replay::Replay& replay, const std::string& wanted,
+Result<Chosen> choose(const replay::Replay& replay, const std::string& wanted, bool wants_raw,
                       const std::string& path) {
   const auto parts = parts_by_name(replay);
   if (parts.empty()) return fail("has no stream with a skeleton", path);
   const std::string names = joined(std::views::keys(parts));
-  const bool raw = wanted.ends_with(kRawSuffix) && !parts.contains(wanted);
-  const std::string stream = raw ? wanted.substr(0, wanted.size() - kRawSuffix.size()) : wanted;
+  const bool says_raw = wanted.ends_with(kRawSuffix) && !parts.contains(wanted);
+  const bool raw = wants_raw || says_raw;
+  const std::string stream =
+      says_raw ? wanted.substr(0, wanted.size() - kRawSuffix.size()) : wanted;
   if (stream.empty() && parts.size() > 1) {
     return misuse("has the streams " + names + "; name one by --stream", path);
   }
@@ -189,12 +191,6 @@ Result<Chosen> choose(const replay::Replay& replay, const std::string& wanted,
                 .raw = raw};
   if (chosen.ids.empty()) {
     return misuse("has no stream " + in_quotes(stream) + " with a skeleton, but " + names, path);
-  }
-  if (raw && !replay.stream(chosen.ids.front()).settings.publish_raw) {
-    return fail(
-        "stream " + in_quotes(replay.stream(chosen.ids.front()).name) +
-            " was recorded without `publish_raw = true`, so its unstyled motion is not in the log",
-        path);
   }
   const std::string& name = replay.stream(chosen.ids.front()).name;
   TRY(check_same_skeleton(replay, name, chosen.ids, path, raw));
@@ -321,16 +317,28 @@ class TakeCollector {
 
 }  // namespace
 
+Result<> check_log_options(const std::string& in, bool part_given, const clip::ReadOptions& read) {
+  if (!is_log(in)) {
+    if (!part_given) return {};
+    return misuse("is not a device log (.plog), so --stream and --take have no effect", in);
+  }
+  const bool figure_given = !read.skeleton.empty() || !read.profile.empty() || read.rate_hz ||
+                            read.metres_per_unit || read.up || read.facing;
+  if (!figure_given) return {};
+  return misuse("is a device log (.plog), which says its skeleton, rate and unit; leave them out",
+                in);
+}
+
 Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::string& stream,
-                               const std::string& wanted_take) {
+                               const std::string& wanted_take, bool raw) {
   auto reader = TRY(log::Reader::open(path));
   log::TakeRow interval{.name = {}, .last_item = log::kToTheEnd};
   if (!wanted_take.empty()) {
     interval = TRY(find_take(reader, wanted_take));
   }
-  auto opened = TRY(replay::Replay::open(reader));
+  auto opened = TRY(replay::Replay::open(reader, true));
   replay::Replay& replay = *opened;
-  const auto chosen = TRY(choose(replay, stream, path.string()));
+  const auto chosen = TRY(choose(replay, stream, raw, path.string()));
   const replay::ReplayStream& first = replay.stream(chosen.ids.front());
   Collector collector(skeleton_of(replay, chosen.ids.front(), chosen.raw));
   const auto kind = chosen.raw ? pipeline::Item::Kind::kRawFrame : pipeline::Item::Kind::kFrame;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "proto/clip/clip.hpp"
+#include "proto/clip/format.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/log/rows.hpp"
@@ -36,12 +37,19 @@ Result<log::TakeRow> find_take(const log::Reader& reader, const std::string& wan
 
 // The stream named `stream`; the only one if that is empty. A body that came several times has
 // several parts, which become one clip; "walker#2" is the second part alone, for a body that
-// changed its skeleton. "walker-raw" is its unstyled motion, if it was published. Times are those
-// of the device if it has them, otherwise those of arrival, starting from 0. `take`: only what was
-// published during this take of the log, by its number or its name; empty: all. `warnings`
-// describes what the log or the run left out.
+// changed its skeleton. With `raw`, and as "walker-raw", it is the motion before its stages,
+// whether or not that was published. Times are those of the device if it has them, otherwise those
+// of arrival, starting from 0. `take`: only what was published during this take of the log, by its
+// number or its name; empty: all. `warnings` describes what the log or the run left out.
 Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::string& stream,
-                               const std::string& take = {});
+                               const std::string& take = {}, bool raw = false);
+
+[[nodiscard]] inline bool is_log(const std::filesystem::path& path) {
+  return clip::extension_of(path) == ".plog";
+}
+
+// Refuses what has no effect for `in`: a stream or a take of a clip, the figure of a log.
+Result<> check_log_options(const std::string& in, bool part_given, const clip::ReadOptions& read);
 
 // `stream`: its name, with "#2" behind it for a part with a skeleton of its own.
 using EachTakeClip =

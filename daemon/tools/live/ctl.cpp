@@ -543,8 +543,10 @@ void add_hand_actions(Actions& actions, CtlOptions& options) {
   static_cast<void>(actions.add_for_stream("stop-playing", "Back to the live hand", stop_playing,
                                            "Example:\n  posed ctl stop-playing hand"));
   static_cast<void>(actions.add_for_stream("engage", "Let a robot hand follow the hand", engage,
-                                           "Example:\n  posed ctl engage right   # a stream with "
-                                           "[stream.robot]"));
+                                           R"(Example:
+  posed ctl engage right   # a stream with [stream.robot]
+After a restart the daemon's first command is `start` of [stream.robot], wherever the robot stands:
+bring it there before.)"));
   static_cast<void>(actions.add_for_stream("release", "Let a robot hand stand", release,
                                            "Example:\n  posed ctl release right"));
 }

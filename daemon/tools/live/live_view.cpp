@@ -356,8 +356,9 @@ bool is_camera(const v1::SourceStats& source) { return source.driver() == "landm
 // A tracker that somebody writes: which of its messages are refused, and why.
 std::string without_hand(std::uint64_t valid, std::uint64_t torn, std::uint64_t odd,
                          std::uint64_t foreign) {
-  if (torn + odd + foreign <= valid) return "no hand: its camera is off, or sees none";
-  std::string text = fmt::format("no hand: refused of {} messages:", valid + torn + odd + foreign);
+  std::string text = "no hand: its camera is off, or sees none";
+  if (torn + odd + foreign == 0) return text;
+  text += fmt::format("; refused of {} messages so far:", valid + torn + odd + foreign);
   const auto add = [&](std::uint64_t count, const char* why) {
     if (count > 0) text += fmt::format("{} {} ({})", text.ends_with(":") ? "" : ",", count, why);
   };

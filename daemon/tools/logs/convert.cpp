@@ -60,7 +60,7 @@ int list_takes(const std::string& path, bool json) {
   for (const LoggedTake& take : *takes) list.push_back(findings_of(take));
   Findings findings;
   findings.add({}, list);
-  if (list.empty()) findings.note(path + ": has no takes");
+  if (list.empty()) findings.remark(path + ": has no takes");
   return findings.show(json, -1);
 }
 
@@ -80,8 +80,8 @@ int convert_to_mcap(const std::string& log, const std::string& out, bool json) {
       .add("messages", summary->messages)
       .add("topics", summary->topics)
       .add("warnings", summary->warnings)
-      .note(fmt::format("wrote {}: {} messages in {} topics", out, summary->messages,
-                        summary->topics))
+      .remark(fmt::format("wrote {}: {} messages in {} topics", out, summary->messages,
+                          summary->topics))
       .show(json, -1);
 }
 
@@ -95,12 +95,12 @@ struct Convert {
   std::string stream;  // of a log; empty: the only one
   std::string take;    // of a log, a number or a name; empty: all
   ClipPart part;
-  bool takes = false;  // list those of a log
+  bool takes = false;   // list those of a log
+  bool mirror = false;  // left for right
   bool overwrite = false, json = false;
   bool shape_given = false;
 };
 
-bool is_log(const std::string& path) { return clip::extension_of(path) == ".plog"; }
 bool is_mcap(const std::string& path) { return clip::extension_of(path) == ".mcap"; }
 bool is_hand(const std::string& path) {
   const clip::Format* format = clip::format_of(path);
@@ -115,24 +115,18 @@ Result<> check_options(const Convert& convert) {
     if (!given || means_something) return {};
     return misuse(what, convert.in);
   };
-  const bool of_log = is_log(convert.in);
-  const bool reads_clip_options = !convert.read.skeleton.empty() || !convert.read.profile.empty() ||
-                                  convert.read.rate_hz || convert.read.metres_per_unit ||
-                                  convert.read.up || convert.read.facing;
+  const bool part_given = !convert.stream.empty() || !convert.take.empty();
   for (const auto& checked :
-       {useless(!convert.stream.empty(), of_log,
-                "is not a device log (.plog), so --stream has no effect"),
-        useless(!convert.take.empty(), of_log,
-                "is not a device log (.plog), so --take has no effect"),
-        useless(!convert.stream.empty() || !convert.take.empty() || convert.part.given(),
-                !is_mcap(convert.out),
+       {check_log_options(convert.in, part_given, convert.read),
+        useless(part_given || convert.part.given(), !is_mcap(convert.out),
                 "is written as a whole log, so --stream, --take, --from and --to have no effect"),
-        useless(is_mcap(convert.out), of_log,
+        useless(is_mcap(convert.out), is_log(convert.in),
                 "is not a device log (.plog), and only a log becomes a .mcap; name a .glb"),
-        useless(reads_clip_options, !of_log,
-                "is a device log (.plog), which says its skeleton, rate and unit; leave them out"),
         useless(!convert.hand.empty(), is_hand(convert.in) || is_hand(convert.out),
                 "neither IN nor OUT is a hand CSV, so --hand has no effect"),
+        useless(convert.mirror,
+                !is_mcap(convert.out) && !is_hand(convert.in) && !is_hand(convert.out),
+                "--mirror is for clips of bodies; of a hand CSV --hand says which hand it is"),
         useless(convert.shape_given, is_hand(convert.in) && !is_hand(convert.out),
                 "--hand-shape is for a hand CSV that becomes a figure, and has no effect here")}) {
     if (!checked) return checked;
@@ -198,6 +192,7 @@ int run(Convert& convert) {
     return read(convert);
   }();
   if (clip) clip = part_of(*std::move(clip), convert.part, convert.in);
+  if (clip && convert.mirror) clip = clip::mirrored(*clip);
   if (!clip) return report(clip.error());
   warn_of_clock(convert, *clip);
   Findings findings;
@@ -211,9 +206,9 @@ int run(Convert& convert) {
       .add("metres_per_unit", clip->metres_per_unit)
       .add("timecode", clip->timecode.empty() ? "" : view_of(clip->timecode.front()))
       .add("warnings", clip->warnings)
-      .note(fmt::format("wrote {}: {} frame{} at {:g} Hz, {} joints", convert.out, clip->frames(),
-                        clip->frames() == 1 ? "" : "s", clip->frame_rate_hz,
-                        clip->skeleton->joints.size()))
+      .remark(fmt::format("wrote {}: {} frame{} at {:g} Hz, {} joints", convert.out, clip->frames(),
+                          clip->frames() == 1 ? "" : "s", clip->frame_rate_hz,
+                          clip->skeleton->joints.size()))
       .show(convert.json, -1);
 }
 
@@ -238,7 +233,7 @@ void add_convert(CLI::App& app, int& exit_code) {
   auto* stream = command->add_option(
       "--stream", convert->stream,
       "Which of a log's streams (default: the only one); NAME#2: its second part, "
-      "NAME-raw: its unstyled motion");
+      "NAME-raw: its motion before its stages");
   auto* take =
       command->add_option("--take", convert->take,
                           "Only this take of a log: its number, or its name if that is unique");
@@ -247,6 +242,7 @@ void add_convert(CLI::App& app, int& exit_code) {
       ->excludes(stream)
       ->excludes(take);
   add_part_options(*command, convert->part);
+  command->add_flag("--mirror", convert->mirror, "Exchange left and right");
   command->add_option("--hand", convert->hand, "The hand of a hand CSV, or which hand to take")
       ->check(CLI::IsMember({"left", "right"}));
   auto* shape = command->add_option("--hand-shape", convert->read.hand_shape,
@@ -259,8 +255,8 @@ void add_convert(CLI::App& app, int& exit_code) {
       "centimetres with Z, Y, X rotations on every joint. A hand CSV\n"
       "holds 45 angles a frame; any BVH with the fifteen finger joints of a hand can become "
       "one.\n"
-      "A log gives the frames that were published, styled as they were; its BVH is in "
-      "centimetres.\n"
+      "A log gives the frames that were published, styled as they were, or with --stream NAME-raw\n"
+      "those that came in, whether or not they were published; its BVH is in centimetres.\n"
       "A .glb is glTF: the figure as an armature with a mannequin, for Blender and game engines. "
       "An\n"
       ".fbx is read only; its first animation with keys is the clip. A .vrma moves any\n"
@@ -271,10 +267,12 @@ void add_convert(CLI::App& app, int& exit_code) {
       "  posed convert take.amc --skeleton actor.asf --rate 60 --out take.bvh\n"
       "  posed convert glove.csv --hand left --out glove.bvh\n"
       "  posed convert take1.plog --stream walker --out walker.bvh\n"
+      "  posed convert take1.plog --stream walker-raw --out unstyled.bvh\n"
       "  posed convert take1.plog --takes\n"
       "  posed convert take1.plog --take 2 --stream walker --out walker-2.bvh\n"
       "  posed convert take1.plog --from 10:20:30:05 --out walker.glb\n"
       "  posed convert walk.bvh --from 1.5 --to 4 --out step.bvh\n"
+      "  posed convert walk.bvh --mirror --out other-side.bvh\n"
       "  posed convert mixamo.fbx --out walk.bvh\n"
       "  posed convert walk.bvh --out walk.vrma\n"
       "  posed convert take1.plog --out take1.mcap");

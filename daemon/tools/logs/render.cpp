@@ -3,7 +3,9 @@
 #include <cmath>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
@@ -22,13 +24,14 @@
 #include "daemon/tools/picture/picture_file.hpp"
 #include "daemon/tools/picture/strip.hpp"
 #include "models/motion/motion.hpp"
+#include "models/style/model/harmonics.hpp"
+#include "models/style/model/stride_phase.hpp"
 #include "proto/clip/format.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/clip/timecode_cut.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/text/clean.hpp"
-#include "proto/text/stream_name.hpp"
 
 namespace posed::tools {
 namespace {
@@ -56,18 +59,12 @@ struct Drawn {
   std::unique_ptr<picture::FigureShape> shape;
 };
 
-bool reads_log(const RenderArguments& options) { return clip::extension_of(options.in) == ".plog"; }
-
 Result<> check_render(const RenderArguments& options) {
-  const bool log = reads_log(options);
-  if (!log && (!options.stream.empty() || !options.take.empty())) {
-    return misuse("is not a device log (.plog), so --stream and --take have no effect", options.in);
-  }
-  if (!log && options.raw_beside) {
-    return misuse(
-        "is a clip, which has one motion only; --raw-beside draws a log (.plog) that was "
-        "recorded with `publish_raw = true`",
-        options.in);
+  TRY(check_log_options(options.in, !options.stream.empty() || !options.take.empty(),
+                        options.read));
+  if (!is_log(options.in) && options.raw_beside) {
+    return misuse("is a clip, which has one motion only; --raw-beside draws a log (.plog)",
+                  options.in);
   }
   const std::string extension = clip::extension_of(options.out);
   const bool moves = extension == ".mp4" || extension == ".webp";
@@ -97,9 +94,9 @@ clip::ReadOptions in_options(const RenderArguments& options) {
   return read;
 }
 
-Result<clip::Clip> read_motion(const RenderArguments& options, const std::string& stream) {
+Result<clip::Clip> read_motion(const RenderArguments& options, bool raw) {
   const Waiting waiting("reading " + options.in);
-  auto clip = reads_log(options) ? clip_of_log(options.in, stream, options.take)
+  auto clip = is_log(options.in) ? clip_of_log(options.in, options.stream, options.take, raw)
                                  : clip::read_clip(options.in, in_options(options));
   if (clip) {
     clip = clip::cut_by_timecode(*std::move(clip), options.part.from_timecode,
@@ -131,8 +128,8 @@ Result<Drawn> drawn_of(const RenderArguments& options, const clip::Clip& clip, s
 // The motions to draw: with --raw-beside the unstyled one first.
 Result<std::vector<Drawn>> read_all(const RenderArguments& options) {
   std::vector<Drawn> all;
-  const auto add = [&](const std::string& stream, const std::string& name) -> Result<> {
-    const auto clip = TRY(read_motion(options, stream));
+  const auto add = [&](bool raw, const std::string& name) -> Result<> {
+    const auto clip = TRY(read_motion(options, raw));
     for (const std::string& warning : clip.warnings) {
       std::fprintf(stderr, "posed: %s\n", clean(options.in + ": " + warning).c_str());
     }
@@ -141,9 +138,9 @@ Result<std::vector<Drawn>> read_all(const RenderArguments& options) {
     return {};
   };
   if (options.raw_beside) {
-    TRY(add(raw_name(options.stream), "as it came in"));
+    TRY(add(true, "as it came in"));
   }
-  TRY(add(options.stream, options.raw_beside ? "as posed published it" : ""));
+  TRY(add(false, options.raw_beside ? "as posed published it" : ""));
   return all;
 }
 
@@ -162,7 +159,42 @@ std::string title_of(const RenderArguments& options) {
 
 std::string time_words(double time_s) { return fmt::format("{:.2f} s", time_s); }
 
-// `count` poses of each motion at even distances, or the one pose of --frame.
+// Frames at even distances. Of a walk each moves by up to half a distance, so that the pictures go
+// through one stride together, because at a whole stride's distance all would show the same pose.
+std::vector<int> strip_frames(const motion::Motion& motion, int poses) {
+  const int end = motion.size() - 1;
+  const double step = poses > 1 ? 1.0 * end / (poses - 1) : 0.0;
+  std::vector<int> frames;
+  for (int i = 0; i < poses; ++i) frames.push_back(static_cast<int>(std::lround(i * step)));
+  const auto leg = motion::leg_signal(motion);
+  if (poses < 3 || !leg || !style::has_stride(motion.size(), motion.rate_hz)) return frames;
+  const auto walk = style::walk_phases(*leg, motion.rate_hz);
+  if (!walk) return frames;
+  const auto& phase = walk->phase;
+  const auto walked = static_cast<double>(walk->frames.back() - walk->frames.front());
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  const double stride = walked * kTurn / (phase[phase.size() - 1] - phase[0]);  // frames
+  if (!(step > stride / 4.0)) return frames;
+  for (int i = 0; i < poses; ++i) {
+    double least = std::numeric_limits<double>::infinity();
+    int nearest = frames[i];
+    for (std::size_t k = 0; k < walk->frames.size(); ++k) {
+      const double away = std::abs(static_cast<double>(walk->frames[k]) - i * step) / step;
+      if (away > 0.5) continue;
+      const double wanted = phase[0] + kTurn * i / poses;
+      const double off =
+          std::abs(std::remainder(phase[static_cast<Eigen::Index>(k)] - wanted, kTurn)) +
+          away / 4.0;
+      if (off >= least) continue;
+      least = off;
+      nearest = static_cast<int>(walk->frames[k]);
+    }
+    frames[i] = nearest;
+  }
+  return frames;
+}
+
+// `count` poses of each motion, or the one pose of --frame.
 Result<std::string> still(const RenderArguments& options, const std::vector<Drawn>& all,
                           picture::View view) {
   const Drawn& last = all.back();
@@ -172,15 +204,13 @@ Result<std::string> still(const RenderArguments& options, const std::vector<Draw
         options.in);
   }
   const int poses = options.frame ? 1 : std::min(options.count, last.motion.size());
+  const std::vector<int> frames =
+      options.frame ? std::vector{*options.frame} : strip_frames(last.motion, poses);
   std::vector<picture::StripRow> rows;
   for (const Drawn& drawn : all) {
     picture::StripRow row{.title = drawn.name, .pale = all.size() > 1 && rows.empty(), .poses = {}};
-    const int end = drawn.motion.size() - 1;
-    for (int i = 0; i < poses; ++i) {
-      const double part = poses > 1 ? static_cast<double>(i) / (poses - 1) : 0.0;
-      const int frame =
-          std::min(end, options.frame.value_or(static_cast<int>(std::lround(part * end))));
-      const std::size_t at = frame;
+    for (const int frame : frames) {
+      const std::size_t at = std::min(frame, drawn.motion.size() - 1);
       row.poses.push_back(pose_at(drawn, at, time_words(drawn.time_s[at])));
     }
     rows.push_back(std::move(row));
@@ -258,7 +288,7 @@ Result<> run_render(const RenderArguments& options) {
       .add("frames", last.motion.size())
       .add("from_s", last.time_s.front())
       .add("to_s", last.time_s.back())
-      .note("wrote " + options.out.string())
+      .remark("wrote " + options.out.string())
       .show(options.json, -1);
   return {};
 }
@@ -285,7 +315,7 @@ void add_render(CLI::App& app, int& exit_code) {
   command->add_option("--view", options->view, "From where the figure is seen")
       ->check(CLI::IsMember({"front", "side", "three-quarter"}))
       ->capture_default_str();
-  command->add_option("--count", options->count, "Poses of a strip")
+  command->add_option("--count", options->count, "Poses of a strip; of a walk they share a stride")
       ->check(CLI::Range(1, 100))
       ->excludes(frame)
       ->excludes(video)

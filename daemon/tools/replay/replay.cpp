@@ -10,9 +10,9 @@
 namespace posed::replay {
 Replay::Replay(log::Reader& reader) : reader_(reader), models_(reader) {}
 
-Result<std::unique_ptr<Replay>> Replay::open(log::Reader& reader) {
+Result<std::unique_ptr<Replay>> Replay::open(log::Reader& reader, bool every_raw) {
   std::unique_ptr<Replay> replay(new Replay(reader));
-  TRY(replay->open_contexts());
+  TRY(replay->open_contexts(every_raw));
   TRY(replay->open_sources());
   TRY(replay->load_descriptions());
   TRY(replay->build_streams());
@@ -22,7 +22,7 @@ Result<std::unique_ptr<Replay>> Replay::open(log::Reader& reader) {
   return replay;
 }
 
-Result<> Replay::open_contexts() {
+Result<> Replay::open_contexts(bool every_raw) {
   const auto& streams = reader_.streams();
   if (streams.size() > log::kMaxStreams) {
     return fail("holds " + std::to_string(streams.size()) + " streams, and this posed replays " +
@@ -33,6 +33,7 @@ Result<> Replay::open_contexts() {
     const auto index = static_cast<std::uint32_t>(contexts_.size());
     auto context = TRY(ReplayStreamContext::open(index, reader_.source_of(row), row, models_, *this,
                                                  reader_.file()));
+    if (every_raw) context->give_raw();
     contexts_.push_back(std::move(context));
   }
   routes.reserve(contexts_.size());

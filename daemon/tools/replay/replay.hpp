@@ -56,8 +56,8 @@ class Replay final : private ReplayHost {
  public:
   // Builds decoders, models and engines of all streams. Those of bodies that come later than the
   // first ones of their source are built again when they come, so that few are in memory. The
-  // reader outlives the replay.
-  static Result<std::unique_ptr<Replay>> open(log::Reader& reader);
+  // reader outlives the replay. `every_raw`: gives raw frames also of streams that published none.
+  static Result<std::unique_ptr<Replay>> open(log::Reader& reader, bool every_raw = false);
   ~Replay() override = default;
 
   [[nodiscard]] std::uint32_t streams() const {
@@ -88,7 +88,7 @@ class Replay final : private ReplayHost {
 
  private:
   explicit Replay(log::Reader& reader);
-  Result<> open_contexts();
+  Result<> open_contexts(bool every_raw);
   Result<> open_sources();
   Result<> load_descriptions();
   enum class Built : std::uint8_t { kNo, kUnderWay, kYes };

@@ -110,6 +110,8 @@ class ReplayStreamContext final : private pipeline::EngineOut {
   ReplayStreamContext(std::uint32_t index, std::uint32_t log_id, ReplayModels& models,
                       ReplayHost& host, std::string file);
 
+  // Before build(): gives raw frames, also where the live run published none.
+  void give_raw() noexcept { stream_.settings.publish_raw = true; }
   // What the device says of the stream's body. `waits`: it comes late, so that its engine is freed
   // until then.
   Result<> describe(drivers::Description description, bool waits);

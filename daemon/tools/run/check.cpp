@@ -31,15 +31,11 @@ struct CheckOptions {
   bool json = false;
 };
 
-// A parameter as the config writes it. Of a file that has been read only the size is shown.
+// A parameter as the config writes it.
 template <typename T>
 void add_parameter(const ParameterSpec& spec, const T& value, Findings& parameters) {
   if constexpr (std::is_same_v<T, double>) {
     parameters.add(std::string(spec.shown_name()), value * spec.display_scale);
-  } else if constexpr (std::is_same_v<T, std::string>) {
-    const bool is_read = spec.is_path && value.find_first_of("\n<") != std::string::npos;
-    parameters.add(std::string(spec.shown_name()),
-                   is_read ? fmt::format("a file of {} bytes", value.size()) : value);
   } else {
     parameters.add(std::string(spec.shown_name()), value);
   }
@@ -47,7 +43,8 @@ void add_parameter(const ParameterSpec& spec, const T& value, Findings& paramete
 
 // The stage with its model and parameters, in the names and units of the config; `line` gets a part
 // about it.
-Findings findings_of(const pipeline::StageSettings& stage, std::string& line) {
+Findings findings_of(const pipeline::StageSettings& stage, const config::StreamConfig& config,
+                     std::string& line) {
   Findings findings, parameters;
   findings.add("stage", stage.type->name);
   line += fmt::format(", {}", stage.type->name);
@@ -55,9 +52,12 @@ Findings findings_of(const pipeline::StageSettings& stage, std::string& line) {
     findings.add("model", stage.model_name);
     line += " " + clean(stage.model_name);
   }
+  // Of a file that has been read the settings have the text, and the config the path.
+  const auto own = std::ranges::find(config.stages, stage.type, &config::StageConfig::type);
   for (const ParameterSpec& spec : stage.type->parameters) {
+    const bool is_read = spec.is_path && own != config.stages.end();
     std::visit([&](const auto& value) { add_parameter(spec, value, parameters); },
-               stage.parameters.at(std::string(spec.name)));
+               (is_read ? own->parameters : stage.parameters).at(std::string(spec.name)));
   }
   std::string values;
   for (const Finding& parameter : parameters.all()) {
@@ -100,7 +100,7 @@ Result<Findings> try_stream(const config::StreamConfig& config,
                                  device.rate_hz, joints);
   std::vector<Findings> stage_findings;
   for (const pipeline::StageSettings& stage : stages->settings.stages) {
-    stage_findings.push_back(findings_of(stage, line));
+    stage_findings.push_back(findings_of(stage, config, line));
   }
   if (config.publish_raw) line += ", raw input too";
   Findings findings;

@@ -16,10 +16,12 @@
 #include "daemon/tools/command/options.hpp"
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
+#include "daemon/tools/export/log_clip.hpp"
 #include "daemon/tools/style/style_options.hpp"
 #include "models/style/judge/walker_fit.hpp"
 #include "models/style/live/apply.hpp"
 #include "proto/clip/format.hpp"
+#include "proto/clip/frames_clip.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/json_text.hpp"
 #include "proto/text/number.hpp"
@@ -31,7 +33,7 @@ struct ApplyArguments {
   std::filesystem::path model, in, out;
   clip::ReadOptions read;
   style::ApplyOptions apply;
-  std::string mask;
+  std::string mask, stream, take;
   std::filesystem::path neutral;
   std::string alpha = "1", gate = "on";
   bool overwrite = false, json = false;
@@ -66,6 +68,9 @@ Result<> parse_gate(ApplyArguments& options) {
 }
 
 Result<> check_files(const ApplyArguments& options) {
+  const bool for_neutral = !options.neutral.empty();
+  TRY(check_log_options(options.in.string(), !options.stream.empty() || !options.take.empty(),
+                        for_neutral ? clip::ReadOptions() : options.read));
   return OutputFiles(options.overwrite)
       .reads(options.model)
       .reads(options.in)
@@ -142,6 +147,7 @@ Findings findings_of(const ApplyArguments& options, const style::StyleModel& mod
       .add("root", root_text(options.apply.feet))
       .add("max_root_offset_cm", applied.max_root_offset_m * 100.0)
       .add("gate_mean", applied.gate_mean)
+      .add("hinge_held", applied.hinge_held)
       .add("joints_changed", applied.joints_changed)
       .add("rms_change_deg", rms_deg)
       .add("max_change_deg", max_deg)
@@ -154,19 +160,32 @@ Findings findings_of(const ApplyArguments& options, const style::StyleModel& mod
       .add("unchanged", nothing.empty() ? std::optional<std::string>() : nothing);
   if (!nothing.empty()) findings.warn({nothing});
   if (applied.kept_first) {
-    findings.note("the first frame is a rest pose without motion, and stays as it is");
+    findings.remark("the first frame is a rest pose without motion, and stays as it is");
+  }
+  if (is_log(options.in)) {
+    findings.remark("the log's poses are taken as they came in, before the stages of their stream");
   }
   const double known = applied.gate_mean.value_or(1.0);
   if (nothing.empty() && known < kNearlyAll) {
-    findings.note(
+    findings.remark(
         fmt::format("styled for {:.0f} % of the time: the rest is motion that the model"
                     " does not know",
                     100.0 * known));
   }
   if (nothing.empty() && !options.apply.feet) {
-    findings.note("the root moves as it did, so feet may slide; with --root stride they stand");
+    findings.remark("the root moves as it did, so feet may slide; with --root stride they stand");
   }
   return findings.remark((fit.is_far() ? "warning: " : "") + judged);
+}
+
+// A log's stream is styled as it came in, because its published poses may have a style already.
+Result<clip::Clip> read(const ApplyArguments& options) {
+  if (!is_log(options.in)) return clip::read_clip(options.in, options.read);
+  const Waiting waiting("reading " + options.in.string());
+  auto clip = TRY(clip_of_log(options.in, options.stream, options.take, true));
+  clip::hold_missing(clip);
+  clip::hold_gaps(clip);
+  return clip;
 }
 
 // Measures how the walker of --neutral usually walks.
@@ -193,7 +212,7 @@ Result<> run(ApplyArguments options) {
   const auto shares = TRY(style::shares_of(options.apply.filter.weights, model.names()));
   const auto mask = TRY(style::mask_of(options.mask));
   options.apply.filter.mask = mask;
-  const auto clip = TRY(clip::read_clip(options.in, options.read));
+  const auto clip = TRY(read(options));
   for (const std::string& warning : clip.warnings) {
     std::fprintf(stderr, "posed: %s\n", clean(options.in.string() + ": " + warning).c_str());
   }
@@ -239,7 +258,9 @@ void add_apply(CLI::App& app, int& exit_code) {
   command->add_option("--model", options->model, "What `posed train style` wrote")
       ->required()
       ->type_name("FILE.style");
-  command->add_option("in", options->in, "The clip: " + clip::listed(clip::Use::kReadBody))
+  command
+      ->add_option("in", options->in,
+                   "The clip: " + clip::listed(clip::Use::kReadBody) + "; or a log (.plog)")
       ->type_name("IN");
   command->add_option("--out", options->out, "To write: " + clip::listed(clip::Use::kWriteBody))
       ->required()
@@ -254,6 +275,9 @@ void add_apply(CLI::App& app, int& exit_code) {
   command->add_option("--mask", options->mask, "Styles parts of the body less: arms=0.5,head=0")
       ->type_name("MASK");
   add_root_option(*command, options->apply.feet);
+  command->add_option("--stream", options->stream,
+                      "Which of a log's streams (default: the only one)");
+  command->add_option("--take", options->take, "Only this take of a log: its number or its name");
   command->add_option("--skeleton", options->read.skeleton, "NN.asf of an AMC (default: beside it)")
       ->type_name("NN.asf");
   add_figure_options(*command, options->read);
@@ -275,6 +299,8 @@ void add_apply(CLI::App& app, int& exit_code) {
   posed apply --model walk.style --cold walk_03.bvh --out live.bvh   # as the daemon would have
   posed apply --model two.style --weights feminine=0.6,elderly=0.4 --mask arms=0.5 \
       walk_03.bvh --out mixed.bvh
+  posed apply --model new.style take1.plog --stream walker --out restyled.bvh
+A log's poses are those that came in, whatever style they were published with.
 Weights count as shares of their sum; without them the model's first style has all. A mask leaves
 parts that it does not name at 1; it has arms, legs, trunk, head and left-arm, right-arm, left-leg,
 right-leg.

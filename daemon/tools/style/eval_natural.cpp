@@ -29,6 +29,7 @@ constexpr const char* kEvalNaturalFooter = R"(Examples:
   posed eval natural hand.csv --corpus recordings --json
   posed eval natural take.bvh --corpus takes --hand right    # the fingers of bodies
   posed eval natural styled.bvh --corpus walks --report natural.html
+  posed eval natural takes/*.bvh --corpus walks --json | jq '.[] | .clip, .natural'
 
 Each figure of the clip stands beside the same figure of the corpus' clips: median, 5th and 95th
 percentile, and the share of them that is below. Each of these is measured against the others, the
@@ -50,6 +51,7 @@ told apart by the lengths of their limbs, is measured against those of the other
 persons do not show how much people differ, so at least a usual difference is allowed.)";
 
 struct EvalNaturalOptions : NaturalOptions {
+  std::vector<std::filesystem::path> clips;  // each becomes `clip`
   ReportFile report;
   bool json = false;
 };
@@ -116,8 +118,12 @@ Findings findings_of(const EvalNaturalOptions& options, const NaturalClips& clip
     left_out.push_back(Findings().add("file", file.file).add("why", file.why));
   }
   const bool natural = std::ranges::all_of(comparison.figures, &natural::Placed::natural);
-  const std::string verdict = natural_verdict(comparison, clips);
+  std::string verdict = natural_verdict(comparison, clips);
   Findings findings;
+  if (options.clips.size() > 1) {
+    findings.say(options.clip.string());
+    verdict = options.clip.string() + ": " + verdict;
+  }
   findings.add("clip", options.clip.string())
       .add("corpus", options.corpus.string())
       .add("clips", clips.corpus.size())
@@ -131,11 +137,12 @@ Findings findings_of(const EvalNaturalOptions& options, const NaturalClips& clip
       .add("verdict", verdict);
   if (!clips.left_out.empty()) {
     const LeftOut& first = clips.left_out.front();
-    findings.note(fmt::format("warning: {} clips left out: {} ({}){}", left_out.size(), first.file,
-                              first.why, left_out.size() > 1 ? ", ...; --json lists them" : ""));
+    findings.remark(fmt::format("warning: {} clips left out: {} ({}){}", left_out.size(),
+                                first.file, first.why,
+                                left_out.size() > 1 ? ", ...; --json lists them" : ""));
   }
   const std::string rough = doubts(comparison, clips.corpus.size());
-  if (!rough.empty()) findings.note("note: " + rough);
+  if (!rough.empty()) findings.remark("note: " + rough);
   return findings.verdict(verdict, natural);
 }
 
@@ -194,13 +201,30 @@ Result<Findings> evaluate_natural(const EvalNaturalOptions& options) {
   return findings;
 }
 
+// Each clip is measured about its own mean pose, and so is the corpus beside it.
+Result<Findings> evaluate_each(EvalNaturalOptions options) {
+  if (options.clips.size() > 1 && options.report.wanted()) {
+    return misuse("--report is of one clip; name one, or leave it out");
+  }
+  std::vector<Findings> list;
+  for (const std::filesystem::path& clip : options.clips) {
+    options.clip = clip;
+    list.push_back(TRY(evaluate_natural(options)));
+  }
+  if (list.size() == 1) return list.front();
+  Findings all;
+  all.add({}, list);
+  for (const Findings& findings : list) all.take_sentences(findings);
+  return all;
+}
+
 }  // namespace
 
 void add_eval_natural(CLI::App& eval, int& exit_code) {
   CLI::App* command = eval.add_subcommand("natural", "Whether people move as a clip does");
   command->footer(kEvalNaturalFooter);
   const auto options = std::make_shared<EvalNaturalOptions>();
-  command->add_option("clip", options->clip, "The clip to judge: " + clip::listed(clip::Use::kRead))
+  command->add_option("clip", options->clips, "Clips to judge: " + clip::listed(clip::Use::kRead))
       ->required();
   command->add_option("--corpus", options->corpus, "Folder of clips of people")->required();
   command->add_option("--hand", options->hand, "left or right: judge this hand of clips of bodies")
@@ -213,7 +237,7 @@ void add_eval_natural(CLI::App& eval, int& exit_code) {
   add_report_file(*command, options->report);
   command->add_flag("--json", options->json, "One JSON object on stdout");
   command->callback([options, &exit_code] {
-    const auto made = evaluate_natural(*options);
+    const auto made = evaluate_each(*options);
     exit_code = made ? made->show(options->json) : report(made.error());
   });
 }

@@ -143,9 +143,9 @@ void add_summary(const style::Findings& learnt, Findings& findings) {
                            "theta0"));
   for (const style::AlignedClip& clip : learnt.dataset.clips) {
     if (clip.dropped_first) {
-      findings.note(clip.file + ": left out the first frame, a rest pose without motion");
+      findings.remark(clip.file + ": left out the first frame, a rest pose without motion");
     }
-    for (const std::string& what : clip.mended) findings.note(clip.file + ": " + what);
+    for (const std::string& what : clip.mended) findings.remark(clip.file + ": " + what);
     findings.say(fmt::format("{:<12} {:<10} {:<28} {:8.2f} {:8.3f}", clip.group, clip.motion,
                              stem(clip.file), 2.0 * std::numbers::pi / clip.dtheta, clip.theta0));
   }

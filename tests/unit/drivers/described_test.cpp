@@ -13,6 +13,8 @@
 #include "drivers/driver.hpp"
 #include "drivers/glove/calibration_file.hpp"
 #include "drivers/glove/glove_emulator.hpp"
+#include "tests/support/file_text.hpp"
+#include "tests/support/has.hpp"
 #include "tests/support/shared.hpp"
 #include "tests/unit/drivers/chunk_text.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
@@ -260,6 +262,82 @@ TEST_CASE("an unknown glove works from its description alone") {
   CHECK(sink.samples[1].value[4] == Approx(0.80));
   CHECK(sink.samples[1].header.device_ns == 40'000'000);
   CHECK(sink.count(Outcome::kOk) == 3);
+}
+
+TEST_CASE("lines of text with a prefix and columns are a glove, too") {
+  const std::string toml = R"(
+name = "text"
+[link]
+kind = "serial"
+[[packet]]
+columns = 5
+prefix = "A "
+[[packet.field]]
+names = ["thumb", "-", "index"]
+column = 1
+range = [0, 1023]
+value = [0, 90]
+unit = "deg"
+[[packet.field]]
+name = "battery"
+kind = "extra"
+column = 4
+scale = 0.01
+[[packet.field]]
+kind = "time"
+column = 0
+tick_s = 0.001
+[angles]
+thumb = [{ channel = "thumb2_x" }]
+index = [{ channel = "index2_x" }]
+)";
+  const auto decoder = decoder_for(toml);
+  test::CollectSink sink;
+  // The first line may have lost its begin. Blanks, tabs and semicolons separate as commas do.
+  decoder->feed(test::bytes_of(" 3,4,5\nA 1000,1023,x,341.0,80\r\nA 1010; 511.5\t2 341 7"), 0,
+                sink);
+  REQUIRE(sink.samples.size() == 1);
+  CHECK(sink.samples[0].value[2] == 1023.0F);
+  CHECK(sink.samples[0].value[0] == Approx(std::numbers::pi / 2));
+  CHECK(sink.samples[0].value[1] == Approx(std::numbers::pi / 6));
+  CHECK(sink.samples[0].value[4] == Approx(0.8));
+  decoder->feed(test::bytes_of("5\n"), 0, sink);
+  REQUIRE(sink.samples.size() == 2);
+  CHECK(sink.samples[1].value[2] == 511.5F);
+  CHECK(sink.samples[1].header.device_ns == 10'000'000);
+  decoder->feed(test::bytes_of("A 1010,1,2,3\nA 1,2,3,4,5,6\nA 1,2000,0,0,0\nA 1,,0,0,0\nB\n"
+                               "A 1020,0,0,0,\n"),
+                0, sink);
+  CHECK(sink.count(Outcome::kShort) == 3);
+  CHECK(sink.count(Outcome::kOutOfRange) == 2);
+  CHECK(sink.count(Outcome::kForeign) == 1);
+  CHECK(sink.samples.size() == 2);
+  // What is emulated is read back.
+  const Table table = must_parse(toml);
+  auto emulator = emulator_of(table);
+  emulator.set_sensor(0, 12.5);
+  emulator.set_extra(0, 0.5);
+  emulator.set_ticks(2000);
+  Bytes out;
+  emulator.emit(0, out);
+  CHECK(test::text_of(out) == "A 2000,12.5,0,0,50\n");
+  decoder->feed(out, 0, sink);
+  REQUIRE(sink.samples.size() == 3);
+  CHECK(sink.samples[2].value[2] == 12.5F);
+  CHECK(sink.samples[2].header.device_ns == 1'000'000'000);
+  const auto mistake = [&](const std::string& from, const std::string& to) {
+    std::string wrong = toml;
+    wrong.replace(wrong.find(from), from.size(), to);
+    const auto read = described::parse_device(wrong, "own.toml");
+    return read ? "" : read.error().text();
+  };
+  CHECK(test::has(mistake("column = 4", "column = 5"), "it has 5 columns, counted from 0"));
+  CHECK(test::has(mistake("column = 4", "byte = 4"),
+                  "column is missing; it is where the value stands"));
+  CHECK(test::has(mistake("range = [0, 1023]", ""), "needs its range"));
+  CHECK(test::has(mistake("[angles]", "[[packet]]\nbytes = 3\nheader = \"01\"\n[angles]"),
+                  "not both"));
+  CHECK(test::has(mistake("\"serial\"", "\"hid\"\nvendor = 1\nproduct = 2"), "come over kind ="));
 }
 
 TEST_CASE("the bytes between two delimiters are a packet, or are counted once") {

@@ -82,6 +82,30 @@ TEST_CASE("a clip played live is the clip read offline, to the last bit") {
                         {{"hand", std::string("left")}}, {.hand = Side::kLeft});
 }
 
+TEST_CASE("a rest pose in front of the motion is played once, however often the clip is") {
+  auto clip = clip::read_clip(test::scratch_file("small.bvh", test::small_bvh())).value();
+  constexpr int kFrames = 6;
+  const Eigen::RowVectorXd row = clip.channels.row(0);
+  clip.channels = row.replicate(kFrames, 1);
+  for (int t = 1; t < kFrames; ++t) clip.channels.row(t).array() += 1.0 + 0.01 * t;
+  const auto path = test::scratch_file("rest.glb", "");
+  REQUIRE(clip::write_clip(clip, path));
+  const auto read = clip::read_clip(path);
+  REQUIRE(read);
+  Device device = must_open(path, {});
+  REQUIRE(device.transport->start(0));
+  CollectSink sink(20);
+  for (int i = 0; i < 12; ++i) {
+    device.decoder->feed(device.transport->read(device.transport->next_due_ns()).bytes, 0, sink);
+  }
+  REQUIRE(sink.frames.size() == 12);
+  for (const auto& [played, frame] : {std::pair{0, 0}, {5, 5}, {6, 1}, {10, 5}, {11, 1}}) {
+    CHECK(test::same_pose(sink.frames[played], read->frame(frame)));
+    const double time_s = played / read->frame_rate_hz;
+    CHECK(seconds(sink.frames[played].header.device_ns) == Approx(time_s).margin(1e-6));
+  }
+}
+
 TEST_CASE("a clip's timecodes are sent with its frames") {
   auto clip = clip::read_clip(test::scratch_file("small.bvh", test::small_bvh())).value();
   clip.timecode.assign(static_cast<std::size_t>(clip.frames()), to_timecode("10:20:30:04"));

@@ -72,6 +72,17 @@ TEST_CASE("a looped file begins again and never ends") {
   }
 }
 
+TEST_CASE("later loops begin where they are told to, in time") {
+  const auto transport = must(FileTransport::open(
+      letters("abcd"), {.rate_hz = 10.0, .again_from = 1, .time_s = {5.0, 5.1, 5.3, 5.4}}));
+  const Played played = play(*transport, 8);
+  CHECK(played.text.substr(0, 8) == "abcdbcdb");
+  for (const auto& [chunk, time_ms] : {std::pair{3, 400}, {4, 500}, {5, 700}, {6, 800}, {7, 900}}) {
+    CHECK(std::abs(played.at_ns[chunk] - kStart_ns - 1'000'000 * time_ms) < 10);
+  }
+  CHECK_FALSE(FileTransport::open(letters("a"), {.rate_hz = 10.0, .again_from = 1}));
+}
+
 TEST_CASE("frames come at their times without drift, and a late one delays no other") {
   constexpr double kRate_hz = 119.88;  // whose period is not a whole number of nanoseconds
   for (const std::int64_t late_ns : {0, 3'000'000, 30'000'000}) {

@@ -66,17 +66,18 @@ function inputOf(stream) {
   };
 }
 
-// A device with several bodies.
-function sourceOf(source, streams) {
+// A device with several bodies. before: what its stats were a second ago
+function sourceOf(source, streams, before = source) {
   const own = streams.filter(({ source_name: of }) => of === source.name);
   const live = own.filter(({ state }) => state === 'live');
   // Of a tracker that somebody writes, whatever its messages lack is refused.
-  const refused = source.driver === 'landmarks' ? sum(source.outcome.slice(OK + 1, FOREIGN + 1)) : 0;
+  const since = source.outcome.map((count, i) => count - (before.outcome[i] ?? 0));
+  const refused = source.driver === 'landmarks' ? sum(since.slice(OK + 1, FOREIGN + 1)) : 0;
   const [word, tone] = source.away
     ? ['absent', 'busy']
     : live.length > 0
       ? ['live', 'good']
-      : refused > (source.outcome[OK] ?? 0)
+      : refused > (since[OK] ?? 0)
         ? ['messages refused', 'bad']
         : ['nothing comes', 'off'];
   return {
@@ -89,8 +90,10 @@ function sourceOf(source, streams) {
   };
 }
 
-// failed: since the stats before
-function outputOf({ name, kind, address, receivers, frames, sent, dropped, failures }, failed) {
+// before: what its stats were a second ago
+function outputOf(output, before = output) {
+  const { name, kind, address, receivers, frames, sent, dropped, failures } = output;
+  const failed = failures > before.failures;
   const nobody = receivers === 0;
   const [word, tone] = nobody
     ? ['nobody listens', 'off']
@@ -105,15 +108,16 @@ function outputOf({ name, kind, address, receivers, frames, sent, dropped, failu
     counts: [
       `${many(sent, 'message')} to ${many(receivers, 'receiver')}`,
       dropped > 0 && `${many(dropped, 'frame')} dropped`,
-      failures > 0 && `${many(failures, 'sending')} refused: does it listen there?`,
+      failures > 0 && `${many(failures, 'sending')} refused so far`,
+      failed && 'does it listen there?',
     ],
     how: OUTPUTS[kind] ?? '',
   };
 }
 
-// stats: posed.v1.Stats; connect: the address that the daemon publishes at; before: how many
-// sendings of each output had failed in the stats before
-export function waysOf(stats, connect, before = new Map()) {
+// stats: posed.v1.Stats, whose counts are totals; connect: the address that the daemon publishes at;
+// before: the stats before these, which tell what happens now
+export function waysOf(stats, connect, before = stats) {
   const replay = stats.replay_file && {
     name: 'replay',
     word: 'live',
@@ -122,11 +126,14 @@ export function waysOf(stats, connect, before = new Map()) {
     counts: [],
     how: 'A recorded log is played again.',
   };
+  const earlier = (list, name) => list.find((one) => one.name === name);
   const inputs = replay
     ? [replay]
     : [
         ...stats.stream.filter(({ source_name: of }) => of === '').map(inputOf),
-        ...stats.source.map((source) => sourceOf(source, stats.stream)),
+        ...stats.source.map((source) =>
+          sourceOf(source, stats.stream, earlier(before.source, source.name)),
+        ),
       ];
   const zeromq = {
     name: 'ZeroMQ',
@@ -136,13 +143,14 @@ export function waysOf(stats, connect, before = new Map()) {
     counts: ['every stream, for programs of your own'],
     how: 'Python as below; C++ and Unity: the folder proto/clients.',
   };
-  const output = (one) => outputOf(one, one.failures > (before.get(one.name) ?? 0));
+  const output = (one) => outputOf(one, earlier(before.output, one.name));
   return { inputs, outputs: [zeromq, ...stats.output.map(output)] };
 }
 
 export class Ways {
   #shown = '';
-  #failures = new Map(); // by output
+  #stats = null; // the last ones, and those before
+  #before = null;
 
   // refresh(): asks for an update, when it is unfolded
   constructor(refresh) {
@@ -171,8 +179,8 @@ export class Ways {
   update(stats, connect) {
     this.element.hidden = !stats;
     if (!stats) return;
-    const { inputs, outputs } = waysOf(stats, connect, this.#failures);
-    this.#failures = new Map(stats.output.map(({ name, failures }) => [name, failures]));
+    if (stats !== this.#stats) [this.#before, this.#stats] = [this.#stats ?? stats, stats];
+    const { inputs, outputs } = waysOf(stats, connect, this.#before);
     write(this.title, `Inputs and outputs: ${inputs.length} in, ${outputs.length} out`);
     write(this.python, python(connect));
     const shown = JSON.stringify([inputs, outputs]);

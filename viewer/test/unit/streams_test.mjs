@@ -6,6 +6,7 @@ import { Jitter } from '../../src/streams/jitter.js';
 import { History } from '../../src/instruments/history.js';
 import { Series } from '../../src/instruments/series.js';
 import { ClockMapping } from '../../src/link/clock.js';
+import { waysOf } from '../../src/panel/ways.js';
 import { namedStages, stageWords, stateOf } from '../../src/streams/words.js';
 import { lanesOf } from '../../src/scene/lanes.js';
 import { parseWeights } from '../../src/panel/style_controls.js';
@@ -36,6 +37,26 @@ const statsOf = (...names) =>
     'stats',
     reference.encode('Stats', { stream: names.map((stream) => ({ stream, state: 'live' })) }),
   );
+
+test('what was refused long ago is counted, and is no state of now', () => {
+  const stats = (ok, refused, failures) => ({
+    stream: [],
+    source: [{ name: 'cam', driver: 'landmarks', outcome: [ok, refused], streams: 0 }],
+    output: [{ name: 'o', kind: 'vmc', receivers: 1, frames: 9, sent: 9, dropped: 0, failures }],
+  });
+  const words = (now, before) => {
+    const { inputs, outputs } = waysOf(now, 'tcp://x', before);
+    return [inputs[0].word, outputs[1].word, outputs[1].counts.filter(Boolean).join('; ')];
+  };
+  const long = '9 messages to 1 receiver; 5 sendings refused so far';
+  assert.deepEqual(words(stats(10, 50, 5)), ['nothing comes', 'sends', long]);
+  assert.deepEqual(words(stats(10, 50, 5), stats(10, 50, 5)), ['nothing comes', 'sends', long]);
+  assert.deepEqual(words(stats(90, 50, 5), stats(90, 20, 4)), [
+    'messages refused',
+    'refused',
+    `${long}; does it listen there?`,
+  ]);
+});
 
 test('a stream is drawn once its skeleton and a pose of that skeleton are here', () => {
   const store = new Store();

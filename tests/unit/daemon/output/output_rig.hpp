@@ -69,8 +69,9 @@ struct OutputRig {
     auto opened = open_output(config);
     if (!opened) FAIL(opened.error().text());
     output = std::move(*opened);
-    output->set_notify([this](std::optional<std::uint32_t> stream, const std::string& text) {
-      reported.push_back((stream ? std::to_string(*stream) + ": " : "") + text);
+    output->set_notify([this](std::optional<std::uint32_t> stream, const output::News& news) {
+      reported.push_back((stream ? std::to_string(*stream) + ": " : "") + news.text +
+                         (news.good ? " (good)" : ""));
     });
   }
   [[nodiscard]] v1::OutputStats stats() const {

@@ -5,15 +5,20 @@
 
 #include <cmath>
 #include <numbers>
+#include <ranges>
+#include <vector>
 
 #include "models/motion/heading.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/model/harmonics.hpp"
+#include "proto/clip/frames_clip.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/shared.hpp"
 
 using namespace posed;
 using namespace posed::motion;
+using Eigen::Quaterniond;
+using Eigen::Vector3d;
 using Eigen::VectorXd;
 
 namespace {
@@ -69,6 +74,43 @@ TEST_CASE("A rest pose in front of a motion is found, and an ordinary first fram
   drop_first_frame(motion);
   CHECK(motion.size() == frames);
   CHECK_FALSE(begins_with_added_pose(motion));
+}
+
+TEST_CASE("A mirrored clip does with the left what was done with the right", "[motion]") {
+  const auto clip = make_walker({.seconds = 1.0, .rate_hz = 30.0}).value();
+  const auto other = clip::mirrored(clip);
+  REQUIRE(other);
+  const Skeleton& skeleton = *clip.skeleton;
+  const auto place = [&](const Frame& frame, int joint) -> Vector3d {
+    Quaterniond above = Quaterniond::Identity();
+    Vector3d place_m = Vector3d::Zero();
+    std::vector<int> chain;
+    for (int j = joint; j != skeleton.root_joint; j = skeleton.joints[j].parent) chain.push_back(j);
+    above = to_eigen_double(frame.rotation_xyzw[skeleton.root_joint]);
+    for (int i = 0; i < 3; ++i) place_m[i] = frame.root_position_m[i];
+    for (const int j : std::views::reverse(chain)) {
+      place_m += above * skeleton.joints[j].offset_m;
+      above = above * to_eigen_double(frame.rotation_xyzw[j]);
+    }
+    return place_m;
+  };
+  for (const auto& [left, right] : {std::pair{Bone::kLeftHand, Bone::kRightHand},
+                                    {Bone::kRightFoot, Bone::kLeftFoot},
+                                    {Bone::kHead, Bone::kHead}}) {
+    for (int t = 0; t < clip.frames(); ++t) {
+      const Vector3d was = place(clip.frame(t), skeleton.joint_of(left));
+      const Vector3d is = place(other->frame(t), skeleton.joint_of(right));
+      CHECK((is - was.cwiseProduct(Vector3d(-1.0, 1.0, 1.0))).norm() < 1e-4);
+    }
+  }
+  const auto back = clip::mirrored(*other);
+  REQUIRE(back);
+  for (int t = 0; t < clip.frames(); ++t) {
+    for (std::size_t j = 0; j < skeleton.joints.size(); ++j) {
+      CHECK(angle_between_rad(to_eigen_double(back->frame(t).rotation_xyzw[j]),
+                              to_eigen_double(clip.frame(t).rotation_xyzw[j])) < 1e-4);
+    }
+  }
 }
 
 TEST_CASE("CMU's BVH files begin with an added pose where they are said to", "[motion][real]") {

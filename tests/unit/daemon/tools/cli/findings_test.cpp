@@ -24,7 +24,13 @@ TEST_CASE("findings are JSON in the order in which they were added", "[findings]
         R"({"frames":3,"rms_deg":1.5,"good":true,"out":"a.bvh","gate":null,"ratio":null,)"
         R"("weights":{"sad":0.25},"warnings":["few","uneven"],"clips":[{"clip":"a"}]})");
   CHECK(Findings().json() == "{}");
-  CHECK(Findings().add({}, std::vector<int>{1, 2}).json() == "[1,2]");
+  CHECK(Findings().add({}, std::vector<int>{1, 2}).remark("few").json() == "[1,2]");
+}
+
+TEST_CASE("real numbers are shown as people write them", "[findings]") {
+  CHECK(Findings().add("rate_hz", 100.00000000000213).json() == R"({"rate_hz":100.0})");
+  CHECK(Findings().add("share", 0.1F).add("third", 1.0 / 3.0).json() ==
+        R"({"share":0.1,"third":0.333333333333})");
 }
 
 TEST_CASE("a finding that is there already gets the new value in its place", "[findings]") {

@@ -180,6 +180,12 @@ TEST_CASE("a camera that nobody switched on is not spoken of, one that is off is
   REQUIRE(after.size() == before.size() + 1);
   CHECK(std::ranges::find(after, "  camera: no hand: its camera is off, or sees none") !=
         after.end());
+  // What was refused may have been so long ago.
+  for (const int count : {3, 0, 0, 7}) camera.add_outcome(count);
+  const std::string refused =
+      "  camera: no hand: its camera is off, or sees none; refused of 100 messages so far: ";
+  CHECK(std::ranges::any_of(live_view(stats, options),
+                            [&](const auto& line) { return line.starts_with(refused); }));
 }
 
 TEST_CASE("the live view has a line for each output, with what went wrong if anything did") {
