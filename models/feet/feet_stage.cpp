@@ -164,7 +164,7 @@ RT_SAFE const FootHold::Change& FootHold::update(const FootPair& pair,
 // A root that strides leaves little to hold; all of it would cost style.
 HoldOptions hold_of(RootMode mode) {
   return mode == RootMode::kActor ? HoldOptions{.share = 1.0, .ahead = true}
-                                  : HoldOptions{.share = 0.81, .ahead = false};
+                                  : HoldOptions{.share = 0.86, .ahead = false};
 }
 
 struct FeetOptions {

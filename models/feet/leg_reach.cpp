@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "proto/frame/rotation.hpp"
+#include "proto/frame/smooth_step.hpp"
 
 namespace posed::feet {
 namespace {
@@ -17,6 +18,7 @@ constexpr double kEase = 0.15;        // of the leg's length and rad: over it a 
 constexpr double kSoftFrom = 0.99;    // of the leg's length: beyond, it straightens ever slower
 constexpr double kMaxReach = 0.9995;  // a leg is never quite straight
 constexpr double kMinReach = 0.3;
+constexpr double kUnder = 0.7, kAside = 0.9;  // of the leg's length: how far a foot is aside
 
 std::size_t at(int joint) { return joint; }
 
@@ -28,6 +30,17 @@ double reachable_m(double wanted_m, double now_m, double length_m) {
   const double room_m = longest_m - soft_m;
   if (room_m <= 0.0) return longest_m;
   return longest_m - room_m * std::exp(-(wanted_m - soft_m) / room_m);
+}
+
+// Where the ankle goes that is out of reach: above where it was wanted, so that it does not slide
+// over the ground. A leg that is stretched aside reaches towards it.
+Vector3d raised(const Vector3d& wanted_m, double reach_m) {
+  const double aside_m = std::hypot(wanted_m.x(), wanted_m.z());
+  const double share = smooth_step((kAside - aside_m / reach_m) / (kAside - kUnder));
+  if (share <= 0.0 || wanted_m.norm() <= reach_m) return wanted_m;
+  const double down_m = std::sqrt(reach_m * reach_m - aside_m * aside_m);
+  const Vector3d above(wanted_m.x(), std::copysign(down_m, wanted_m.y()), wanted_m.z());
+  return share * above + (1.0 - share) * reach_m / wanted_m.norm() * wanted_m;
 }
 
 // How a knee is bent: about its own bend, or near straight, where that is noise, about its hinge.
@@ -89,7 +102,7 @@ RT_SAFE Reach reach(const Skeleton& skeleton, const Leg& leg, const LegPose& pos
   const double angle_rad = turn_rad(bent, bend_rad(far_m), (now_m - far_m) / (a + b));
   const Quaterniond knee(rotation_exp(Vector3d(bent.axis * angle_rad)));
   const Vector3d bent_m = thigh_m + knee * shin_m;
-  const Quaterniond turn = minimal_rotation(bent_m, wanted_m);
+  const Quaterniond turn = minimal_rotation(bent_m, raised(wanted_m, bent_m.norm()));
   return {.ankle_m = hip_m + turn * bent_m, .leg_turn = turn, .knee_turn = knee};
 }
 

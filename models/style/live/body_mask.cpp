@@ -97,6 +97,28 @@ std::vector<BodyPart> parts_of(const motion::PoseSpace& space, const motion::Pos
   return parts;
 }
 
+std::vector<LoosePart> loose_parts_of(const motion::PoseSpace& space,
+                                      const motion::PoseSpaceSpec& spec) {
+  std::vector<LoosePart> loose;
+  for (const BodyPart part : parts_of(space, spec)) {
+    const auto d = static_cast<int>(loose.size());
+    const int joint = space.skeleton_joint_of_dim(d);
+    const auto is = [&](Bone bone) {
+      return joint >= 0 && joint == space.skeleton().joint_of(bone);
+    };
+    if (part >= BodyPart::kLeftLeg || space.joint_of_dim(d) == spec.root) {
+      loose.push_back(LoosePart::kNone);
+    } else if (is(Bone::kLeftShoulder)) {
+      loose.push_back(LoosePart::kLeftShoulder);
+    } else if (is(Bone::kRightShoulder)) {
+      loose.push_back(LoosePart::kRightShoulder);
+    } else {
+      loose.push_back(static_cast<LoosePart>(part));
+    }
+  }
+  return loose;
+}
+
 RT_SAFE void BodyMask::move(double step) noexcept {
   for (std::size_t p = 0; p < kBodyParts; ++p) {
     now_[p] += std::clamp(target_[p] - now_[p], -step, step);

@@ -18,6 +18,28 @@ namespace posed::style {
 enum class BodyPart : std::uint8_t { kTrunk, kHead, kLeftArm, kRightArm, kLeftLeg, kRightLeg };
 inline constexpr std::size_t kBodyParts = 6;
 
+// What can do something else while the legs walk. A shoulder belongs to its arm and counts alone,
+// too: hands that carry a tray leave it to the walk.
+enum class LoosePart : std::uint8_t {
+  kTrunk,
+  kHead,
+  kLeftArm,
+  kRightArm,
+  kLeftShoulder,
+  kRightShoulder,
+  kNone,  // hips and legs
+};
+inline constexpr std::size_t kLooseParts = 6;
+inline constexpr std::array kShoulders{LoosePart::kLeftShoulder, LoosePart::kRightShoulder};
+[[nodiscard]] constexpr std::size_t index_of(LoosePart part) noexcept {
+  return static_cast<std::size_t>(part);
+}
+// The arm of a shoulder; other parts as they are.
+[[nodiscard]] constexpr LoosePart whole_part(LoosePart part) noexcept {
+  if (part == LoosePart::kLeftShoulder) return LoosePart::kLeftArm;
+  return part == LoosePart::kRightShoulder ? LoosePart::kRightArm : part;
+}
+
 using Mask = std::array<double, kBodyParts>;  // by BodyPart
 [[nodiscard]] constexpr Mask whole_body() noexcept { return {1.0, 1.0, 1.0, 1.0, 1.0, 1.0}; }
 
@@ -32,6 +54,9 @@ RT_SAFE void describe_mask(const Mask& mask, ShortText& text) noexcept;
 // The part of each dimension of q of a space bound from `spec`. Cold.
 [[nodiscard]] std::vector<BodyPart> parts_of(const motion::PoseSpace& space,
                                              const motion::PoseSpaceSpec& spec);
+// The same of its loose parts.
+[[nodiscard]] std::vector<LoosePart> loose_parts_of(const motion::PoseSpace& space,
+                                                    const motion::PoseSpaceSpec& spec);
 
 // The factors of a live filter; each moves by at most `step` at once. RT-safe.
 class BodyMask {

@@ -66,7 +66,8 @@ BoundModel::BoundModel(const StyleModel& model, motion::PoseSpace bound_space,
       neutral(model.gate.neutral.cast<float>()),
       axis(model.axis.direction.cast<float>()),
       axis_offset(model.axis.offset),
-      parts(parts_of(space, model.space)) {
+      parts(parts_of(space, model.space)),
+      loose_parts(loose_parts_of(space, model.space)) {
   remark = left_alone(space);
   served.assign(static_cast<std::size_t>(space.dims()), 1);
   for (int d = 0; d < space.dims(); ++d) {
@@ -78,14 +79,8 @@ BoundModel::BoundModel(const StyleModel& model, motion::PoseSpace bound_space,
   }
   if (model.gate.present()) known.emplace(model, space.skeleton());
   for (int d = 0; d < space.dims(); ++d) {
-    const BodyPart part = parts[static_cast<std::size_t>(d)];
-    const bool is_leg = part == BodyPart::kLeftLeg || part == BodyPart::kRightLeg;
-    if (is_leg || space.joint_of_dim(d) == model.space.root) {
-      leg_dims.push_back(static_cast<std::uint16_t>(d));
-      loose_parts.push_back(TrainedMotion::kNoPart);
-    } else {
-      loose_parts.push_back(static_cast<std::uint8_t>(part));
-    }
+    if (loose_parts[static_cast<std::size_t>(d)] != LoosePart::kNone) continue;
+    leg_dims.push_back(static_cast<std::uint16_t>(d));
   }
   for (const Eigen::MatrixXd& cycle : model.gate.usual) {
     Usual& one = usual.emplace_back();

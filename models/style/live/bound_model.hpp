@@ -46,7 +46,7 @@ struct BoundModel final : StageModel {
   double leg_m = 0.0;                        // of the skeleton
   std::vector<Eigen::Vector3f> root_limits;  // of each style
   std::vector<std::uint16_t> leg_dims;       // those of the hips and the legs
-  std::vector<std::uint8_t> loose_parts;     // [dims] the others' BodyPart, else kNoPart
+  std::vector<LoosePart> loose_parts;        // [dims]
 
   // A neutral walk of training: its cycle, and what it does at the legs' instant.
   struct Usual {

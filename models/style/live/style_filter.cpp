@@ -346,8 +346,7 @@ RT_SAFE void StyleFilter::answer(const Pose& pose, Dims& delta, Dims& shares) no
     if (limited) delta[d] = std::clamp(delta[d], -limit_rad_[d], limit_rad_[d]);
     delta[d] *= static_cast<float>(alpha_);
     shares[d] = mask_.factor(model_->parts[d]);
-    const std::uint8_t part = model_->loose_parts[d];
-    if (part != TrainedMotion::kNoPart) shares[d] *= tracker_.trust(static_cast<BodyPart>(part));
+    shares[d] *= tracker_.trust(model_->loose_parts[d]);
   }
   if (model_->has_root) limit_root(&delta[dims]);
 }

@@ -67,23 +67,29 @@ RT_SAFE double TrainedMotion::distance_deg(std::span<const float> q,
 
 RT_SAFE TrainedMotion::PartDistances TrainedMotion::part_distances_deg(
     std::span<const float> q, std::span<const std::uint8_t> available,
-    std::span<const std::uint8_t> parts) const noexcept {
+    std::span<const LoosePart> parts) const noexcept {
   const auto dims = static_cast<Eigen::Index>(q.size());
-  std::array<Block, kBodyParts + 1> nearest;
+  std::array<Block, kLooseParts + 1> nearest;
   nearest.fill(Block::Constant(std::numeric_limits<float>::infinity()));
   for (Eigen::Index first = 0; first < poses_.cols(); first += dims) {
-    std::array<Block, kBodyParts + 1> sum;
+    std::array<Block, kLooseParts + 1> sum;
     sum.fill(Block::Zero());
     for (Eigen::Index d = 0; d < dims; ++d) {
       if (available[d] == 0) continue;
-      sum[parts[d]] += (q[d] - poses_.col(first + d)).square();
+      sum[index_of(parts[d])] += (q[d] - poses_.col(first + d)).square();
     }
-    for (std::size_t p = 0; p < kBodyParts; ++p) nearest[p] = nearest[p].min(sum[p]);
+    for (const LoosePart shoulder : kShoulders) {
+      sum[index_of(whole_part(shoulder))] += sum[index_of(shoulder)];
+    }
+    for (std::size_t p = 0; p < kLooseParts; ++p) nearest[p] = nearest[p].min(sum[p]);
   }
-  std::array<int, kBodyParts + 1> count{};
-  for (Eigen::Index d = 0; d < dims; ++d) count[parts[d]] += available[d] != 0 ? 1 : 0;
+  std::array<int, kLooseParts + 1> count{};
+  for (Eigen::Index d = 0; d < dims; ++d) count[index_of(parts[d])] += available[d] != 0 ? 1 : 0;
+  for (const LoosePart shoulder : kShoulders) {
+    count[index_of(whole_part(shoulder))] += count[index_of(shoulder)];
+  }
   PartDistances found{};
-  for (std::size_t p = 0; p < kBodyParts; ++p) {
+  for (std::size_t p = 0; p < kLooseParts; ++p) {
     if (count[p] == 0) continue;
     const float joints = static_cast<float>(count[p]) / 3.0F;
     found[p] = std::sqrt(nearest[p].minCoeff() / joints) / static_cast<float>(kDegree);

@@ -26,13 +26,11 @@ class TrainedMotion {
   RT_SAFE [[nodiscard]] double distance_deg(std::span<const float> q,
                                             std::span<const std::uint8_t> available) const noexcept;
 
-  // The same for each part of the body alone: `parts` [dims] numbers them, kNoPart belongs to none.
-  // 0 where none of a part was measured.
-  using PartDistances = std::array<float, kBodyParts>;
-  static constexpr std::uint8_t kNoPart = kBodyParts;
-  [[nodiscard]] PartDistances part_distances_deg(
-      std::span<const float> q, std::span<const std::uint8_t> available,
-      std::span<const std::uint8_t> parts) const noexcept;
+  // The same for each of `parts` [dims] alone. 0 where none of a part was measured.
+  using PartDistances = std::array<float, kLooseParts>;
+  [[nodiscard]] PartDistances part_distances_deg(std::span<const float> q,
+                                                 std::span<const std::uint8_t> available,
+                                                 std::span<const LoosePart> parts) const noexcept;
 
   // The rotation from one pose to another [dims], rms over joints [deg]; missing dimensions as
   // above.

@@ -53,12 +53,12 @@ constexpr double kInterruption_s = 1.0;  // of the frames
 struct Limits {
   float walks, other;
 };
-constexpr Limits kNone{1e9F, 2e9F};
-// In the order of BodyPart.
-constexpr std::array<Limits, kBodyParts> kUnknownWalker{
-    {{14.0F, 20.0F}, {16.0F, 24.0F}, {36.0F, 48.0F}, {36.0F, 48.0F}, kNone, kNone}};
-constexpr std::array<Limits, kBodyParts> kKnownWalker{
-    {{7.0F, 13.0F}, {8.0F, 14.0F}, {12.0F, 20.0F}, {12.0F, 20.0F}, kNone, kNone}};
+constexpr Limits kUnknownArm{36.0F, 48.0F}, kArm{12.0F, 20.0F};
+// In the order of LoosePart.
+constexpr std::array<Limits, kLooseParts> kUnknownWalker{
+    {{14.0F, 20.0F}, {16.0F, 24.0F}, kUnknownArm, kUnknownArm, kUnknownArm, kUnknownArm}};
+constexpr std::array<Limits, kLooseParts> kKnownWalker{
+    {{7.0F, 13.0F}, {8.0F, 14.0F}, kArm, kArm, kArm, kArm}};
 
 float share_below(float value, const Limits& limits) noexcept {
   const float part = std::clamp((limits.other - value) / (limits.other - limits.walks), 0.0F, 1.0F);
@@ -301,8 +301,11 @@ RT_SAFE void WalkerTracker::follow_trust(const BoundModel& model,
   const Trust before = seen_trust_;
   const auto distances = model.known->part_distances_deg(input, available, model.loose_parts);
   const auto& limits = walker_ ? kKnownWalker : kUnknownWalker;
-  for (std::size_t p = 0; p < kBodyParts; ++p) {
+  for (std::size_t p = 0; p < kLooseParts; ++p) {
     seen_trust_[p] = share_below(distances[p], limits[p]);
+    // Arms come before shoulders.
+    const std::size_t whole = index_of(whole_part(static_cast<LoosePart>(p)));
+    seen_trust_[p] = std::max(seen_trust_[p], seen_trust_[whole]);
     const auto from = static_cast<double>(before[p]);
     const auto to = static_cast<double>(seen_trust_[p]);
     if (began) {
@@ -325,8 +328,8 @@ RT_SAFE void WalkerTracker::replace_untrusted(const BoundModel& model,
   std::array<float, motion::kMaxPoseDims> walk;
   usual_->does.get(input, available, walk);
   for (std::size_t d = 0; d < input.size(); ++d) {
-    if (model.loose_parts[d] == TrainedMotion::kNoPart || available[d] == 0) continue;
-    input[d] = walk[d] + trust_[model.loose_parts[d]] * (input[d] - walk[d]);
+    if (model.loose_parts[d] == LoosePart::kNone || available[d] == 0) continue;
+    input[d] = walk[d] + trust(whole_part(model.loose_parts[d])) * (input[d] - walk[d]);
   }
 }
 

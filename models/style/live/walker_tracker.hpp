@@ -139,8 +139,8 @@ class WalkerTracker {
   void set_auto_alpha(bool on) noexcept { auto_alpha_ = on; }
   [[nodiscard]] float open() const noexcept { return gate_.open(); }
   // How far each part of the body walks: 1 all, 0 it does something else.
-  [[nodiscard]] float trust(BodyPart part) const noexcept {
-    return trust_[static_cast<std::size_t>(part)];
+  [[nodiscard]] float trust(LoosePart part) const noexcept {
+    return part == LoosePart::kNone ? 1.0F : trust_[index_of(part)];
   }
   // Whether `input` of see() is a pose of training that stands for the walker's.
   [[nodiscard]] bool shifts() const noexcept { return shifts_; }
@@ -198,10 +198,10 @@ class WalkerTracker {
   bool replaced_ = false;                     // something of the last frame
   std::array<float, motion::kMaxPoseDims> whole_{};  // its input before
   // What the poses say of each part, which changes within a few frames, and what follows it.
-  using Trust = std::array<float, kBodyParts>;
+  using Trust = std::array<float, kLooseParts>;
   static constexpr Trust kAllTrust = {1.0F, 1.0F, 1.0F, 1.0F, 1.0F, 1.0F};
   Trust seen_trust_ = kAllTrust, trust_ = kAllTrust;
-  std::array<Fade, kBodyParts> fades_{};
+  std::array<Fade, kLooseParts> fades_{};
   bool trusts_ = false;  // something was seen
   StyleEstimate estimate_;
   std::uint32_t pending_ = 0;

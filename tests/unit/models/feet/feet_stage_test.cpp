@@ -238,6 +238,25 @@ TEST_CASE("a knee that is bent backwards bends forward, without a flip", "[feet]
   }
 }
 
+TEST_CASE("an ankle that is out of reach is above its place; aside it stays towards it", "[feet]") {
+  const auto walk = styled_walk(60.0, 0.1);
+  const Skeleton& skeleton = *walk.source.skeleton;
+  const Legs legs = Legs::find(skeleton).value();
+  const Leg& leg = legs.leg(0);
+  LegPose pose;
+  legs.pose(walk.source.frames[0], pose);
+  const Eigen::Vector3d hip_m = pose.from_root_m[static_cast<std::size_t>(leg.thigh)];
+  const double far_m = 1.1 * legs.length_m();
+  const auto reached = [&](const Eigen::Vector3d& to) -> Eigen::Vector3d {
+    return reach(skeleton, leg, pose, hip_m + far_m * to.normalized()).ankle_m - hip_m;
+  };
+  const Eigen::Vector3d behind(0.0, -1.0, -0.4);
+  CHECK(reached(behind).z() == Approx(far_m * behind.normalized().z()).margin(1e-3));
+  CHECK(reached(behind).norm() == Approx(legs.length_m()).epsilon(0.02));
+  const Eigen::Vector3d level(0.0, -0.1, 1.0);
+  CHECK(reached(level).normalized().dot(level.normalized()) > 0.999);
+}
+
 TEST_CASE("the feet stage allocates nothing", "[feet][rt]") {
   const auto walk = styled_walk(120.0, 1.0);
   for (const char* root : {"off", "stride", "actor"}) {

@@ -275,6 +275,24 @@ TEST_CASE("rig: a person is recognised in every maker's names, zero pose, axes a
   }
 }
 
+TEST_CASE("rig: who strides stands along any axis; who keeps still may lie") {
+  for (const UpAxis up : {UpAxis::kPlusX, UpAxis::kMinusZ}) {
+    for (const bool strides : {true, false}) {
+      INFO(up_text(up) << (strides ? " strides" : " keeps still"));
+      test::Made made = test::make(test::kSchemes[14], ZeroPose::kT, Mat::Identity(), 1.0);
+      auto& [count, rotation, position] = made.input.poses;
+      const Mat turn = up_turn(up).transpose();
+      for (int i = count - 1; i >= 0; --i) {  // the first frame is copied before it turns
+        const auto at = static_cast<std::size_t>(i) * test::kMakerJoints;
+        if (!strides) std::copy_n(rotation.begin(), test::kMakerJoints, rotation.begin() + at);
+        rotation[at] = Eigen::Quaterniond(turn) * rotation[at];
+        position[at] = turn * position[strides ? at : 0];
+      }
+      CHECK(up_text(rig::recognise(made.input).up) == (strides ? up_text(up) : "+y"));
+    }
+  }
+}
+
 TEST_CASE("rig: parts of one clip give the same T frames") {
   for (const ZeroPose zero : {ZeroPose::kA, ZeroPose::kFolded}) {
     const auto whole = test::make(test::kSchemes[0], zero, Mat::Identity(), 0.01, 0, 240);

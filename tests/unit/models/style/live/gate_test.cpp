@@ -69,6 +69,7 @@ class WalkingGate {
     }
     model.gate = {Eigen::VectorXd::Zero(space.dims()), 0.4, stride_s(), gait_correlation};
     space_ = space;
+    spec_ = model.space;
     known_.emplace(model, *clip_.skeleton);
   }
 
@@ -89,6 +90,15 @@ class WalkingGate {
     gate.update(&*known_, on, in, q_, q_, available_, walker, kStep_s);
   }
   [[nodiscard]] const style::TrainedMotion& known() const { return *known_; }
+  // How far the parts are from training where the joint of a bone is turned by so much.
+  style::TrainedMotion::PartDistances turned(Bone bone, double deg) {
+    space_->to_vector(clip_.frame(0), 0.0, q_, available_);
+    for (int d = 0; d < space_->dims(); ++d) {
+      if (space_->skeleton_joint_of_dim(d) != clip_.skeleton->joint_of(bone)) continue;
+      q_[static_cast<std::size_t>(d)] += static_cast<float>(deg * kDegree / std::sqrt(3.0));
+    }
+    return known_->part_distances_deg(q_, available_, style::loose_parts_of(*space_, spec_));
+  }
 
  private:
   // From one instant at which the right leg passes the left one to the next.
@@ -105,6 +115,7 @@ class WalkingGate {
   }
 
   clip::Clip clip_;
+  motion::PoseSpaceSpec spec_;
   std::optional<motion::PoseSpace> space_;
   std::optional<style::TrainedMotion> known_;
   std::vector<float> q_;
@@ -155,6 +166,18 @@ TEST_CASE("a walk that freezes closes the gate half way within 0.3 s, at any pha
     }
     CHECK(gate.open() < 0.5F);
   }
+}
+
+TEST_CASE("a shoulder belongs to its arm, and counts alone, too", "[style]") {
+  using style::LoosePart;
+  WalkingGate walking;
+  const auto bent = walking.turned(Bone::kLeftLowerArm, 60.0);
+  CHECK(bent[style::index_of(LoosePart::kLeftArm)] == Approx(30.0).epsilon(0.01));
+  CHECK(bent[style::index_of(LoosePart::kLeftShoulder)] < 0.1F);
+  CHECK(bent[style::index_of(LoosePart::kRightArm)] < 0.1F);
+  const auto raised = walking.turned(Bone::kRightShoulder, 30.0);
+  CHECK(raised[style::index_of(LoosePart::kRightShoulder)] == Approx(30.0).epsilon(0.01));
+  CHECK(raised[style::index_of(LoosePart::kRightArm)] == Approx(15.0).epsilon(0.01));
 }
 
 TEST_CASE("a gate that is off is open and still measures the cadence, for warm-ups", "[style]") {

@@ -46,8 +46,10 @@ TEST_CASE("a hinge that bends backwards is held, and what the performer's own do
     CHECK(held_deg(5.0, -23.0) == Approx(20.0).margin(0.1));  // three degrees are left
     CHECK(held_deg(40.0, -79.0) == Approx(76.0).margin(0.1));
     CHECK(held_deg(40.0, 170.0) == 0.0);
-    CHECK(held_deg(-8.0, -8.0) == 0.0);    // his own knee is there already
-    CHECK(held_deg(-25.0, -60.0) == 0.0);  // no hinge of a person
+    CHECK(held_deg(-8.0, -8.0) == 0.0);                         // his own knee is there already
+    CHECK(held_deg(5.0, -3.0) == Approx(1.1).margin(0.05));     // it gives softly
+    CHECK(held_deg(-15.0, -40.0) == Approx(11.0).margin(0.1));  // half a hinge
+    CHECK(held_deg(-25.0, -60.0) == 0.0);                       // no hinge of a person
     Frame frame = pose(30.0);
     const Frame before = frame;
     hinges.hold(pose(30.0).rotation_xyzw, frame);
