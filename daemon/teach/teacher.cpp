@@ -74,7 +74,7 @@ struct Teacher::Collected {
     return style::check_take(take, kTrainRate_hz, seconds(silent_ns));
   }
   [[nodiscard]] style::TrainingClip clip() const {
-    style::TrainingClip take{.clip = {}, .group = {}, .subject = "one person", .motion = "walk"};
+    style::TrainingClip take{.clip = {}, .group = {}, .subject = pupil.name, .motion = "walk"};
     const std::string path = what();
     auto clip = frames->finish(path, kTrainRate_hz, times.in_seconds());
     if (clip) take.clip = std::move(*clip);
