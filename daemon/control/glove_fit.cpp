@@ -77,19 +77,20 @@ bool is_of_contacts(const v1::ControlRequest::FitGlove& wanted) {
 Result<FittedGlove> fit_glove(const drivers::Description& device, const std::string& in_use,
                               const v1::ControlRequest::FitGlove& wanted) {
   const drivers::Driver* const driver = drivers::find_driver(device.driver);
-  const auto hand = device.skeleton ? hand_side(*device.skeleton) : std::nullopt;
-  if (driver == nullptr || driver->glove == nullptr || !hand) {
+  const auto side = device.skeleton ? hand_side(*device.skeleton) : std::nullopt;
+  if (driver == nullptr || driver->glove == nullptr || !side) {
     return fail("it is no glove that can be calibrated");
   }
+  const Side hand = *side;
   const Model model = TRY(driver->glove->glove_model(device));
   Recorded recorded = TRY(recorded_of(model, wanted));
   const Recorded held = recorded;
-  auto blank = devices::blank_calibration(model, device.identity, *hand, wanted.name());
+  auto blank = devices::blank_calibration(model, device.identity, hand, wanted.name());
   const bool contacts = is_of_contacts(wanted);
   if (contacts) {
     if (in_use.empty()) return fail("it has no calibration yet: hold the flat hand first");
     auto file = TRY(drivers::glove::parse_calibration(in_use, "the calibration in use"));
-    const auto now = TRY(drivers::glove::make_calibration(model, file, *hand, device.identity));
+    const auto now = TRY(drivers::glove::make_calibration(model, file, hand, device.identity));
     TRY(drivers::glove::add_known_poses(model, *now, recorded));
     file.user = blank.user;
     blank = std::move(file);
@@ -108,6 +109,7 @@ Result<FittedGlove> fit_glove(const drivers::Description& device, const std::str
   std::vector<std::string> sentences = std::move(fitted.said);
   std::ranges::move(fitted.warnings, std::back_inserter(sentences));
   if (contacts) check.doubts.clear();  // the fist was not held, but taken from the calibration
+  std::ranges::move(fitted.doubts, std::back_inserter(check.doubts));
   sentences.push_back(check.verdict());
   for (const std::string& sentence : sentences) made.words.add_sentence(clean(sentence));
   made.toml = drivers::glove::format_calibration(fitted.file);

@@ -1,6 +1,7 @@
 #include "daemon/devices/pose_calibration.hpp"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
 #include <iterator>
 #include <optional>
@@ -13,6 +14,7 @@
 #include "drivers/glove/possible_angles.hpp"
 #include "models/hand/geometry.hpp"
 #include "models/hand/thumb_fit.hpp"
+#include "proto/frame/degree.hpp"
 
 namespace posed::devices {
 namespace {
@@ -73,6 +75,76 @@ double gap_mm(const hand::HandGeometry& geometry, const hand::ThumbPose& pose, i
   return 1e3 * hand::thumb_gap_m(geometry, pose.angles, finger);
 }
 
+bool measures_opposition(const drivers::glove::Calibration& calibration) {
+  return only_row(std::span(calibration.map).first(calibration.map_rows), hand::kThumbAngles[0])
+      .has_value();
+}
+
+// Contacts that the fitted thumb misses.
+Result<> check_contacts(const Model& model, const Recorded& recorded, PoseCalibration& made) {
+  constexpr double kMissed_mm = 15.0, kDeep_mm = -8.0;
+  const auto calibration =
+      TRY(drivers::glove::make_calibration(model, made.file, made.file.hand, /*identity=*/""));
+  if (!measures_opposition(*calibration)) return {};
+  const hand::HandGeometry geometry = hand::hand_geometry(default_hand_shape());
+  for (const hand::ThumbPose& pose : contacts_of(model, *calibration, recorded)) {
+    for (int finger = 1; finger < kFingers; ++finger) {
+      if (!pose.touched[static_cast<std::size_t>(finger)]) continue;
+      const double gap = gap_mm(geometry, pose, finger);
+      if (gap < kMissed_mm && gap > kDeep_mm) continue;
+      made.doubts.push_back(fmt::format("the thumb that touched the {} finger is {:.0f} mm {} it",
+                                        kFingerNames[static_cast<std::size_t>(finger)],
+                                        std::abs(gap), gap > 0.0 ? "from" : "inside"));
+    }
+  }
+  return {};
+}
+
+// How far the same pose, held twice, differs: that is how exactly the user holds it, and the mean
+// of both is off by half as much.
+Result<> compare_repeats(const Model& model, const Recorded& recorded, PoseCalibration& made) {
+  constexpr double kFar_deg = 8.0;  // people who take care: 3 to 6
+  constexpr double kWorst_deg = 25.0;
+  const auto calibration =
+      TRY(drivers::glove::make_calibration(model, made.file, made.file.hand, /*identity=*/""));
+  std::bitset<kHandChannels> mapped;
+  for (const auto& row : std::span(calibration->map).first(calibration->map_rows)) {
+    mapped.set(row.channel);
+  }
+  std::pair<double, std::size_t> worst;  // [deg], channel
+  double squares = 0.0;
+  std::size_t count = 0;
+  for (std::size_t p = 0; p < recorded.size(); ++p) {
+    const Pose first = drivers::glove::first_of(static_cast<Pose>(p));
+    const auto& before = recorded[static_cast<std::size_t>(first)];
+    if (&before == &recorded[p] || !drivers::glove::was_held(recorded[p]) ||
+        !drivers::glove::was_held(before)) {
+      continue;
+    }
+    const HandAngles a = drivers::glove::angles_of(model, *calibration, before);
+    const HandAngles b = drivers::glove::angles_of(model, *calibration, recorded[p]);
+    const std::size_t from = first == Pose::kFist ? kFingerChannels : 0;  // the thumb moved
+    for (std::size_t c = from; c < a.size(); ++c) {
+      const double apart_deg = std::abs(a[c] - b[c]) / kDegree;
+      if (!mapped[c] || !std::isfinite(apart_deg)) continue;
+      squares += apart_deg * apart_deg;
+      ++count;
+      worst = std::max(worst, std::pair(apart_deg, c));
+    }
+  }
+  if (count == 0) {
+    made.doubts.emplace_back("no pose was held twice, so how exactly they were held is not known");
+    return {};
+  }
+  const double apart_deg = std::sqrt(squares / static_cast<double>(count));
+  auto sentence =
+      fmt::format("poses held twice differed by {:.1f} degrees (rms), most {} by {:.0f}", apart_deg,
+                  drivers::glove::joint_words(worst.second), worst.first);
+  auto& list = apart_deg > kFar_deg || worst.first > kWorst_deg ? made.doubts : made.said;
+  list.push_back(std::move(sentence));
+  return {};
+}
+
 }  // namespace
 
 drivers::glove::CalibrationFile blank_calibration(const drivers::glove::Model& model,
@@ -95,10 +167,12 @@ std::string PoseCalibration::refusal() const {
 Result<PoseCalibration> calibrate_by_poses(const drivers::glove::Model& model,
                                            const drivers::glove::Recorded& recorded,
                                            drivers::glove::CalibrationFile blank) {
-  auto fitted = TRY(drivers::glove::fit_poses(model, recorded));
+  const Recorded held = drivers::glove::with_repeats(recorded);
+  auto fitted = TRY(drivers::glove::fit_poses(model, held));
   blank.sensors = std::move(fitted.sensors);
-  const auto said = TRY(drivers::glove::fit_fist(model, recorded, blank.hand, blank));
-  auto made = TRY(calibrate_by_contacts(model, recorded, std::move(blank)));
+  const auto said = TRY(drivers::glove::fit_fist(model, held, blank.hand, blank));
+  auto made = TRY(calibrate_by_contacts(model, held, std::move(blank)));
+  TRY(compare_repeats(model, recorded, made));
   made.said.insert(made.said.begin(), said.begin(), said.end());
   made.warnings.insert(made.warnings.begin(), fitted.warnings.begin(), fitted.warnings.end());
   return made;
@@ -107,12 +181,17 @@ Result<PoseCalibration> calibrate_by_poses(const drivers::glove::Model& model,
 Result<PoseCalibration> calibrate_by_contacts(const drivers::glove::Model& model,
                                               const drivers::glove::Recorded& recorded,
                                               drivers::glove::CalibrationFile file) {
-  PoseCalibration made{.file = std::move(file), .said = {}, .warnings = {}};
+  PoseCalibration made{.file = std::move(file), .said = {}, .warnings = {}, .doubts = {}};
   const Side hand = made.file.hand;
   made.said = TRY(fit_contacts(model, recorded, hand, made.file));
   auto odd = TRY(drivers::glove::keep_possible(model, recorded, hand, made.file));
   made.impossible = odd.size();
+  if (made.impossible > 0) {
+    made.doubts.push_back(fmt::format("{} would be bent as no hand's is",
+                                      made.impossible > 1 ? "joints" : "a joint"));
+  }
   std::ranges::move(odd, std::back_inserter(made.warnings));
+  TRY(check_contacts(model, recorded, made));
   return made;
 }
 
@@ -125,13 +204,13 @@ Result<std::vector<std::string>> fit_contacts(const Model& model, const Recorded
       std::ranges::any_of(poses, [](const auto& pose) { return pose.touched.any(); });
   std::vector<std::string> sentences;
   if (!touches) return sentences;
-  const std::span rows(calibration->map.data(), calibration->map_rows);
-  if (!only_row(rows, hand::kThumbAngles[0])) {
+  if (!measures_opposition(*calibration)) {
     sentences.emplace_back(
         "this glove does not measure how far the thumb opposes: contacts change "
         "nothing");
     return sentences;
   }
+  const std::span rows(calibration->map.data(), calibration->map_rows);
   const HandShape& shape = default_hand_shape();
   const hand::HandGeometry geometry = hand::hand_geometry(shape);
   const hand::ThumbMap fit = hand::fit_thumb(shape, poses);

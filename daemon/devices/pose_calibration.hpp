@@ -17,6 +17,7 @@ struct PoseCalibration {
   drivers::glove::CalibrationFile file;
   std::vector<std::string> said;      // what the fist and the contacts changed
   std::vector<std::string> warnings;  // sensors that keep their default; what no hand can do
+  std::vector<std::string> doubts;    // what makes the verdict a doubtful one
   std::size_t impossible = 0;         // joints that would be bent as no hand's are
 
   // Why it is none of a hand, from six such joints on; empty: it may be.

@@ -33,6 +33,25 @@ void bend(HandAngles& hand, std::string_view name, double degrees) {
   hand[channel(name)] = degrees * kDegree;
 }
 
+// A hand of posed's own shape in which the thumb touches.
+void put_thumb(HandAngles& hand, Pose pose) {
+  struct Contact {
+    double twist, spread, mcp, ip;
+  };
+  constexpr std::array<Contact, 5> kThumb{
+      {{27, 3, 20, 22}, {59, 2, 39, 3}, {77, -6, 15, 21}, {66, -15, 15, 29}, {93, 39, 9, 31}}};
+  const auto& at = kThumb[static_cast<std::size_t>(pose) - kSensorPoses];
+  bend(hand, "thumb1_z", at.twist);
+  bend(hand, "thumb1_y", at.spread);
+  bend(hand, "thumb2_x", at.mcp);
+  bend(hand, "thumb3_x", at.ip);
+  if (pose == Pose::kTouchFist) return;
+  const std::string finger(kFingerNames[static_cast<std::size_t>(touched_finger(pose))]);
+  bend(hand, finger + "1_x", 45);
+  bend(hand, finger + "2_x", 50);
+  bend(hand, finger + "3_x", 15);
+}
+
 // The curves' values of which remove_crosstalk() leaves these.
 std::vector<double> shown_of(const Calibration& calibration, const std::vector<double>& values) {
   constexpr int kRounds = 20;  // each makes the error smaller by the size of the shares
@@ -54,6 +73,8 @@ std::vector<double> shown_of(const Calibration& calibration, const std::vector<d
 
 HandAngles hand_in(Pose pose) {
   HandAngles hand{};
+  if (touched_finger(pose) != 0) put_thumb(hand, pose);
+  pose = first_of(pose);
   if (pose == Pose::kFist) {
     for (const std::string finger : {"index", "middle", "ring", "little"}) {
       bend(hand, finger + "1_x", 80);
@@ -146,6 +167,20 @@ double Held::deviation() const {
   return std::sqrt(std::max(0.0, squares / static_cast<double>(count) - mean() * mean()));
 }
 
+Recorded with_repeats(Recorded recorded) {
+  for (std::size_t p = 0; p < kPoses; ++p) {
+    const auto first = static_cast<std::size_t>(first_of(static_cast<Pose>(p)));
+    for (std::size_t i = 0; i < kMaxSensors && first != p; ++i) {
+      const Held& again = recorded[p][i];
+      Held& held = recorded[first][i];
+      if (held.count == 0 || again.count == 0) continue;
+      const double mean = 0.5 * (held.mean() + again.mean());
+      held = {.sum = mean, .count = 1, .squares = mean * mean};
+    }
+  }
+  return recorded;
+}
+
 bool was_held(std::span<const Held> pose) {
   return std::ranges::any_of(pose, [](const Held& sensor) { return sensor.count > 0; });
 }
@@ -153,8 +188,8 @@ bool was_held(std::span<const Held> pose) {
 double SensorPoses::span() const { return std::abs(pose_raw - flat_raw); }
 
 Result<std::vector<SensorPoses>> poses_of_sensors(const Model& model, const Recorded& recorded) {
-  std::array<std::vector<double>, kPoses> wanted;
-  for (std::size_t p = 0; p < kPoses; ++p) {
+  std::array<std::vector<double>, kSensorPoses> wanted;
+  for (std::size_t p = 0; p < kSensorPoses; ++p) {
     auto values = TRY(values_of(model, hand_in(static_cast<Pose>(p))));
     wanted[p] = std::move(values);
   }
@@ -163,7 +198,7 @@ Result<std::vector<SensorPoses>> poses_of_sensors(const Model& model, const Reco
     const Held& flat = recorded[0][i];
     if (flat.count == 0) continue;  // the glove does not have this sensor
     std::size_t most = 0;
-    for (std::size_t p = 1; p < kPoses; ++p) {
+    for (std::size_t p = 1; p < kSensorPoses; ++p) {
       const double moves = std::abs(wanted[p][i] - wanted[0][i]);
       if (recorded[p][i].count > 0 && moves > std::abs(wanted[most][i] - wanted[0][i])) most = p;
     }

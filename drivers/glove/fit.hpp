@@ -16,8 +16,9 @@
 
 namespace posed::drivers::glove {
 
-// The first four fit the sensors. The others are contacts, of which not the angles are known but
-// what the thumb touches: they fit the thumb, and are asked for on request.
+// The first four fit the sensors. Contacts, of which not the angles are known but what the thumb
+// touches, fit the thumb. Poses held once more say how exactly the user holds them; the fist with
+// the thumb across is both.
 enum class Pose : std::uint8_t {
   kFlat,
   kFist,
@@ -27,18 +28,32 @@ enum class Pose : std::uint8_t {
   kTouchMiddle,
   kTouchRing,
   kTouchLittle,
-  kTouchFist
+  kTouchFist,
+  kFlatAgain,
+  kSpreadAgain
 };
-inline constexpr std::size_t kPoses = 9;
+inline constexpr std::size_t kPoses = 11;
 inline constexpr std::size_t kSensorPoses = 4;
 inline constexpr std::array<std::string_view, kPoses> kPoseNames{
-    "flat",         "fist",       "thumb",        "spread",    "touch-index",
-    "touch-middle", "touch-ring", "touch-little", "touch-fist"};
+    "flat",       "fist",         "thumb",      "spread",     "touch-index", "touch-middle",
+    "touch-ring", "touch-little", "touch-fist", "flat-again", "spread-again"};
 // The finger that the thumb touches, 1 the index; 0: not a contact.
 [[nodiscard]] constexpr int touched_finger(Pose pose) noexcept {
   if (pose == Pose::kTouchFist) return 2;
   const auto index = static_cast<std::size_t>(pose);
-  return index < kSensorPoses ? 0 : static_cast<int>(index - kSensorPoses) + 1;
+  const bool contact = index >= kSensorPoses && pose < Pose::kTouchFist;
+  return contact ? static_cast<int>(index - kSensorPoses) + 1 : 0;
+}
+// Contacts and repeats: without them the sensors are fitted, but the fit is not confirmed.
+[[nodiscard]] constexpr bool may_be_skipped(Pose pose) noexcept {
+  return static_cast<std::size_t>(pose) >= kSensorPoses;
+}
+// The pose that this one shows once more (a fist with the thumb across: of the fingers); else
+// itself.
+[[nodiscard]] constexpr Pose first_of(Pose pose) noexcept {
+  if (pose == Pose::kTouchFist) return Pose::kFist;
+  if (pose == Pose::kFlatAgain) return Pose::kFlat;
+  return pose == Pose::kSpreadAgain ? Pose::kSpread : pose;
 }
 // Instructions to the user.
 inline constexpr std::array<std::string_view, kPoses> kPoseHints{
@@ -46,14 +61,16 @@ inline constexpr std::array<std::string_view, kPoses> kPoseHints{
     "make a fist, tight, with the thumb outside",
     "fingers straight, the thumb bent across the palm to the root of the little finger",
     "spread all fingers as far as they go, hand flat",
-    "touch the tip of the index finger with the tip of the thumb",
-    "touch the tip of the middle finger with the tip of the thumb",
-    "touch the tip of the ring finger with the tip of the thumb",
-    "touch the tip of the little finger with the tip of the thumb",
-    "make a fist with the thumb across it, its tip on the middle finger"};
+    "touch the tip of the index finger with the tip of the thumb, the other fingers stretched",
+    "touch the tip of the middle finger with the tip of the thumb, the other fingers stretched",
+    "touch the tip of the ring finger with the tip of the thumb, the other fingers stretched",
+    "touch the tip of the little finger with the tip of the thumb, the other fingers stretched",
+    "make a fist, tight, with the thumb across it, its tip on the middle finger",
+    "lay the hand flat on the table once more, as the first time",
+    "spread all fingers once more, as far as they go, hand flat"};
 
 // Joint angles of a hand in a pose [rad]: an average over people, so the fitted angles are only as
-// accurate as the user's poses. All 0 for a contact, so that it fits no sensor.
+// accurate as the user's poses. Contacts are of posed's own hand, and fit no sensor.
 [[nodiscard]] HandAngles hand_in(Pose pose);
 
 // The raw values of one sensor while a pose was held.
@@ -71,6 +88,9 @@ struct Held {
   [[nodiscard]] double deviation() const;
 };
 using Recorded = std::array<std::array<Held, kMaxSensors>, kPoses>;  // [pose][sensor]
+
+// The poses as they were held, but for those that were held once more: each sensor has the mean.
+[[nodiscard]] Recorded with_repeats(Recorded recorded);
 
 // Whether a pose with these sensors was recorded.
 [[nodiscard]] bool was_held(std::span<const Held> pose);

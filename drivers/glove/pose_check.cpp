@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 
+#include "drivers/glove/angle_map.hpp"
 #include "proto/frame/median.hpp"
 #include "proto/text/list.hpp"
 
@@ -38,7 +39,13 @@ constexpr Range kFistGain{0.55, 1.7}, kSureFistGain{0.65, 1.4}, kOtherGain{0.35,
 constexpr Range kOddShare{0.4, 2.5};  // of one sensor, of its pose's median
 // Straight fingers in another pose than the flat hand, as a share of the way to the fist.
 constexpr Range kStraight{-0.25, 0.7}, kSureStraight{-0.12, 0.12};
-constexpr double kTighter = 1.25;  // the fist with the thumb across, beside the fist
+// A pose held once more, as a share of the movement. A spread hand's is small: 5 degrees of 15.
+constexpr double kUnlike = 0.25;
+constexpr Range kSpreadAgain{1.0 / 3.0, 3.0};
+// By how much, of its way to the fist, a finger bends more where it is touched than another does,
+// at least. In LIBRAS' signs F and D (index, middle) and V and W (ring, little), whose other
+// fingers are not stretched: 0.46 to 1.1.
+constexpr double kToldApart = 0.1;
 
 constexpr std::size_t kNamed = 3;  // sensors named in a sentence
 
@@ -74,8 +81,8 @@ PoseFinding find(const Model& model, const Recorded& recorded, Pose pose,
   std::vector<double> unrest;
   std::vector<std::string> names;
   for (const SensorPoses& at : sensors) {
-    const bool all = pose == Pose::kFlat || touched_finger(pose) != 0;
-    if (!all && at.pose != pose) continue;
+    const bool all = first_of(pose) == Pose::kFlat || touched_finger(pose) != 0;
+    if (!all && at.pose != first_of(pose)) continue;
     const Sensor& sensor = model.sensors[at.sensor];
     ++finding.sensors;
     const double way = std::max(at.span(), kMinTravel * range_of(sensor));
@@ -83,7 +90,7 @@ PoseFinding find(const Model& model, const Recorded& recorded, Pose pose,
     unrest.push_back(recorded[static_cast<std::size_t>(pose)][at.sensor].deviation() / way);
     if (unrest.back() > kMovedShare) {
       finding.moved.push_back(sensor.name);
-    } else if (!all && is_stuck(sensor, at)) {
+    } else if (at.pose == pose && is_stuck(sensor, at)) {
       finding.stuck.push_back(sensor.name);
     }
   }
@@ -106,13 +113,15 @@ class Comparison {
       : model_(model), recorded_(recorded), sensors_(sensors), check_(check) {}
 
   void run() {
-    for (const Pose pose : {Pose::kThumb, Pose::kSpread}) {
+    for (const Pose pose : {Pose::kThumb, Pose::kSpread, Pose::kFlatAgain, Pose::kSpreadAgain}) {
       const auto share = way_to_fist(pose);
       if (share) straight_.push_back(*share);
-      judge_gain(pose, kOtherGain, "the hand did not take the pose");
+      if (first_of(pose) == pose) judge_gain(pose, kOtherGain, "the hand did not take the pose");
     }
     judge_fist();
+    judge_repeats();
     name_odd();
+    tell_fingers_apart();
   }
 
  private:
@@ -135,15 +144,19 @@ class Comparison {
     return gains.empty() ? std::nullopt : std::optional(median(gains));
   }
 
-  // Where the fingers are in a pose: 0 as in the flat hand, 1 as in the fist.
-  [[nodiscard]] std::optional<double> way_to_fist(Pose pose) const {
+  // Where a sensor is in a pose: 0 as in the flat hand, 1 as in the pose that moves it most.
+  [[nodiscard]] std::optional<double> way(const SensorPoses& at, Pose pose) const {
+    const Held& held = recorded_[static_cast<std::size_t>(pose)][at.sensor];
+    if (held.count == 0 || is_stuck(model_.sensors[at.sensor], at)) return std::nullopt;
+    return (held.mean() - at.flat_raw) / (at.pose_raw - at.flat_raw);
+  }
+
+  // Where the fingers are in a pose: 0 as in the flat hand, 1 as in the fist (or in `other`).
+  [[nodiscard]] std::optional<double> way_to_fist(Pose pose, Pose other = Pose::kFist) const {
     std::vector<double> shares;
     for (const SensorPoses& at : sensors_) {
-      const Held& held = recorded_[static_cast<std::size_t>(pose)][at.sensor];
-      if (at.pose != Pose::kFist || held.count == 0 || is_stuck(model_.sensors[at.sensor], at)) {
-        continue;
-      }
-      shares.push_back((held.mean() - at.flat_raw) / (at.pose_raw - at.flat_raw));
+      const auto share = at.pose == other ? way(at, pose) : std::nullopt;
+      if (share) shares.push_back(*share);
     }
     return shares.empty() ? std::nullopt : std::optional(median(shares));
   }
@@ -178,7 +191,7 @@ class Comparison {
       return;
     }
     const double across = way_to_fist(Pose::kTouchFist).value_or(1.0);
-    if (across > kTighter) {
+    if (across > 1.0 + kUnlike) {
       fail(Pose::kFist, "it was not closed; with the thumb across it closed to " + percent(across));
     } else if (share && !kFistGain.has(std::abs(*share))) {
       const std::string why =
@@ -194,6 +207,76 @@ class Comparison {
       check_.doubts.push_back("straight fingers differ from pose to pose by " +
                               percent(std::min(std::abs(least), std::abs(most))) +
                               " of the way to the fist");
+    }
+  }
+
+  // Poses held once more that were another hand.
+  void judge_repeats() {
+    const auto first_failed = [](const PoseFinding& finding) {
+      return (finding.pose == Pose::kFlat || finding.pose == Pose::kFist) && finding.failed();
+    };
+    if (std::ranges::any_of(check_.poses, first_failed)) return;
+    const double closed = way_to_fist(Pose::kTouchFist).value_or(1.0);
+    if (closed < 1.0 - kUnlike) {
+      fail(Pose::kTouchFist,
+           "the fingers were closed to " + percent(closed) + " of the fist without the thumb");
+    }
+    const double bent = way_to_fist(Pose::kFlatAgain).value_or(0.0);
+    if (std::abs(bent) > kUnlike) {
+      fail(Pose::kFlatAgain, "the fingers differ from the first flat hand's by " +
+                                 percent(std::abs(bent)) + " of the way to the fist");
+    }
+    const double spread = way_to_fist(Pose::kSpreadAgain, Pose::kSpread).value_or(1.0);
+    if (!kSpreadAgain.has(spread)) {
+      fail(Pose::kSpreadAgain, "the hand was spread to " + percent(spread) + " of the first time");
+    }
+  }
+
+  // Of finger `f`, its sensor of this joint, if it bends nothing else.
+  [[nodiscard]] const SensorPoses* bend_of(std::span<const MapRow> rows, std::size_t f,
+                                           std::size_t joint) const {
+    for (const SensorPoses& at : sensors_) {
+      const auto row = std::ranges::find(rows, at.sensor, &MapRow::sensor);
+      if (at.pose == Pose::kFist && row != rows.end() &&
+          row->channel == f * kFingerChannels + 3 * joint) {
+        return &at;
+      }
+    }
+    return nullptr;
+  }
+
+  // A finger bends where the thumb touches it, and others less: sensors that show it the other way
+  // round are plugged in for each other. The last joint says nothing: it may bend backwards.
+  void tell_fingers_apart() {
+    const auto rows = parse_angle_map(model_.map_toml, model_.driver, model_.sensors);
+    if (!rows) return;
+    const auto touch = [](std::size_t finger) {
+      return static_cast<Pose>(kSensorPoses + finger - 1);
+    };
+    std::vector<std::string> unlike;
+    std::size_t told = 0;
+    for (std::size_t joint = 0; joint < 2; ++joint) {
+      for (std::size_t a = 1; a < kFingers; ++a) {
+        for (std::size_t b = a + 1; b < kFingers; ++b) {
+          const SensorPoses* const of_a = bend_of(*rows, a, joint);
+          const SensorPoses* const of_b = bend_of(*rows, b, joint);
+          if (of_a == nullptr || of_b == nullptr) continue;
+          const auto aa = way(*of_a, touch(a)), ab = way(*of_a, touch(b));
+          const auto ba = way(*of_b, touch(a)), bb = way(*of_b, touch(b));
+          if (!aa || !ab || !ba || !bb) continue;
+          ++told;
+          if (*aa + *bb - *ab - *ba > kToldApart) continue;
+          unlike.push_back(model_.sensors[of_a->sensor].name + " and " +
+                           model_.sensors[of_b->sensor].name);
+        }
+      }
+    }
+    if (told == 0) {
+      check_.doubts.emplace_back("no finger was touched alone, so swapped plugs do not show");
+    } else if (!unlike.empty()) {
+      check_.doubts.push_back(named(unlike) +
+                              " bend as if swapped, or no finger was touched alone: are they in "
+                              "each other's plug?");
     }
   }
 

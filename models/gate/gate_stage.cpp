@@ -109,6 +109,7 @@ class Track {
   // Compares a sample with the motion so far. `dt_s`: since the frame before, above 0.
   RT_SAFE void compare(const Value& value, float dt_s, const Bounds& bounds) noexcept {
     since_s_ += dt_s;
+    away_s_ += dt_s;
     off_ = 0.0F;
     suspect_ = repeated_ = false;
     if (!known_ || since_s_ > kForgets_s) return begin(value);
@@ -131,6 +132,14 @@ class Track {
                       const Bounds& bounds) noexcept {
     verdict_ = Verdict::kNone;
     if (since_s_ == 0.0F || repeated_) return true;
+    if (away_ && away_s_ > kForgets_s) {
+      verdict_ = Verdict::kTrue;
+      away_ = false;
+    }
+    if (away_ && suspect_ && Space::distance(left_, value) < kBack * moved_) {
+      begin(value);
+      return true;
+    }
     if (!suspect_ || company) {
       if (doubts_ > 0) verdict_ = Verdict::kFalse;
       if (given_) verdict_ = Verdict::kTrue;
@@ -140,19 +149,21 @@ class Track {
       follow(value);
       return true;
     }
-    const bool given = given_;
     if (goes_back(value, bounds)) {
       verdict_ = Verdict::kFalse;
       return true;
     }
-    if (given) verdict_ = Verdict::kTrue;
     // Samples that agree against the past are a motion: two of one that goes on, three of a step,
     // because a fault may last for two.
     const bool agrees = doubts_ > 0 && Space::distance(doubt_, value) < kAgree * moved_;
     const bool goes_on = agrees && moved_ > kGoesOn * Space::distance(last_, doubt_);
-    if (goes_on || (agrees && doubts_ >= 2)) {
+    if (goes_on) {
       begin(value);
       verdict_ = Verdict::kTrue;
+      return true;
+    }
+    if (agrees && doubts_ >= 2) {
+      step(value);
       return true;
     }
     if (lenient && doubts_ == 0) {
@@ -175,6 +186,7 @@ class Track {
   // There was no sample in a frame `dt_s` after the one before.
   RT_SAFE void skip(float dt_s) noexcept {
     since_s_ += dt_s;
+    away_s_ += dt_s;
     doubts_ = 0;
   }
   RT_SAFE void forget() noexcept { *this = {}; }
@@ -194,6 +206,7 @@ class Track {
   static constexpr float kAgree = 0.75F;
   static constexpr float kGoesOn = 1.2F;
   static constexpr float kRepeats = 2.5F;
+  static constexpr float kBack = 0.5F;
 
   // Where a motion that took `step_s` from there to the last sample leads by now.
   RT_SAFE [[nodiscard]] Value led(const Value& from, float step_s) const noexcept {
@@ -238,9 +251,18 @@ class Track {
     follow(value);
     return true;
   }
+  // What persists is believed, but whether it was true shows later: a lost contact comes back.
+  RT_SAFE void step(const Value& value) noexcept {
+    left_ = last_;
+    const float since_s = since_s_;
+    begin(value);
+    away_ = true;
+    away_s_ = since_s;
+  }
   RT_SAFE void begin(const Value& value) noexcept {
     last_ = value;
     known_ = true;
+    away_ = false;
     doubts_ = 0;
     given_ = false;
     older_s_ = step_s_ = since_s_ = last_off_ = 0.0F;
@@ -258,17 +280,19 @@ class Track {
   }
 
   Value older_{}, before_{}, last_{};  // believed
-  Value doubt_{}, expected_{};
-  float older_s_ = 0.0F;             // from older_ to before_; 0: older_ is not known
-  float step_s_ = 0.0F;              // from before_ to last_; 0: before_ is not known
-  float since_s_ = 0.0F;             // since last_
-  float usual_ = 0.0F;               // mean distance from the prediction
-  float longer_gains_ = 0.0F;        // by how much the longer prediction is nearer, in the mean
-  float moved_ = 0.0F, off_ = 0.0F;  // of the sample compared last: from last_, from expected_
+  Value doubt_{}, expected_{}, left_{};
+  float older_s_ = 0.0F;       // from older_ to before_; 0: older_ is not known
+  float step_s_ = 0.0F;        // from before_ to last_; 0: before_ is not known
+  float since_s_ = 0.0F;       // since last_
+  float usual_ = 0.0F;         // mean distance from the prediction
+  float longer_gains_ = 0.0F;  // by how much the longer prediction is nearer, in the mean
+  float away_s_ = 0.0F;
+  float moved_ = 0.0F, off_ = 0.0F;       // of the sample compared last: from last_, from expected_
   float limit_ = 0.0F, last_off_ = 0.0F;  // for it; that of last_
   bool suspect_ = false, repeated_ = false;
   bool was_far_ = false;  // last_
   bool given_ = false;    // last_ is a suspect that was believed
+  bool away_ = false;     // the value stepped away from left_, away_s_ ago
   Verdict verdict_ = Verdict::kNone;
   bool known_ = false;
   int doubts_ = 0;  // samples dropped in a row that agree; the last was doubt_

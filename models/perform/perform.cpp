@@ -82,15 +82,30 @@ Result<std::vector<PerformedState>> plan(const trajectory::StateInformation& inf
   return states;
 }
 
+// The mean pose of the longer one of the states in which a label is held; `first` is its state 0.
+Pose held_pose(const Performance& performance, const PerformedState* first) {
+  const PerformedState& state = first[2].frames < first[3].frames ? first[3] : first[2];
+  Pose mean(performance.angles.front().size());
+  for (int t = state.start; t < state.start + state.frames; ++t) {
+    const Pose& pose = performance.angles[static_cast<std::size_t>(t)];
+    for (std::size_t c = 0; c < mean.size(); ++c) mean[c] += pose[c] / state.frames;
+  }
+  return mean;
+}
+
 void hold_as_shown(const trajectory::StateInformation& information, double tempo,
                    Performance& performance) {
   ShownPose shown(information.model().channels());
   shown.restart(true);
   long position = -1;
+  Pose held;  // as performed: the variance that was restored moves it from the state's mean
   for (const PerformedState& state : performance.states) {
-    if (state.state == 0) ++position;
+    if (state.state == 0) {
+      ++position;
+      held = held_pose(performance, &state);
+    }
     for (int t = state.start; t < state.start + state.frames; ++t) {
-      shown.advance(information, position, state.context, tempo);
+      shown.advance(information, position, state.context, tempo, held.data());
       Pose& pose = performance.angles[static_cast<std::size_t>(t)];
       for (int c = 0; c < static_cast<int>(pose.size()); ++c) pose[c] += shown.offset_rad(c);
     }

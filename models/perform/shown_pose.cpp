@@ -38,7 +38,8 @@ RT_SAFE void ShownPose::restart(bool poses) noexcept {
 
 // The offset from where the label is held to what was shown.
 RT_SAFE void ShownPose::aim(const trajectory::StateInformation& information,
-                            const gesture::Context& context, double tempo) noexcept {
+                            const gesture::Context& context, double tempo,
+                            const double* held) noexcept {
   const std::span<const double> shown =
       information.model().labels[static_cast<std::size_t>(context.current)].shown;
   const int channels = information.model().channels();
@@ -62,7 +63,7 @@ RT_SAFE void ShownPose::aim(const trajectory::StateInformation& information,
     for (int c = 0; c < channels; ++c) {
       const double mean = scratch_[trajectory::kPositionMean * stride + c] /
                           scratch_[trajectory::kPosition * stride + c];
-      goal_[c] = shown[static_cast<std::size_t>(c)] - mean;
+      goal_[c] = shown[static_cast<std::size_t>(c)] - (held != nullptr ? held[c] : mean);
     }
     frames_ =
         std::max(1, static_cast<int>(std::lround((duration.mean[0] + duration.mean[1]) / tempo)));
@@ -76,9 +77,10 @@ RT_SAFE void ShownPose::aim(const trajectory::StateInformation& information,
 }
 
 RT_SAFE void ShownPose::advance(const trajectory::StateInformation& information, long position,
-                                const gesture::Context& context, double tempo) noexcept {
+                                const gesture::Context& context, double tempo,
+                                const double* held) noexcept {
   if (position != position_) {
-    aim(information, context, tempo);
+    aim(information, context, tempo, held);
     position_ = position;
     if (at_once_) frame_ = frames_;
     at_once_ = false;

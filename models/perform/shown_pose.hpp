@@ -18,16 +18,18 @@ class ShownPose {
   RT_SAFE void restart(bool poses) noexcept;
 
   // Once a frame, in order: moves on to the offset of the next frame. `position` is the place of
-  // its label among those that are performed, `context` the label between its neighbours.
+  // its label among those that are performed, `context` the label between its neighbours. `held` is
+  // the pose that the label comes to rest in, where that is known; nullptr: the mean of its state.
   RT_SAFE void advance(const trajectory::StateInformation& information, long position,
-                       const gesture::Context& context, double tempo) noexcept;
+                       const gesture::Context& context, double tempo,
+                       const double* held = nullptr) noexcept;
 
   // Of a channel in this frame [rad].
   RT_SAFE [[nodiscard]] double offset_rad(int channel) const noexcept { return now_[channel]; }
 
  private:
   void aim(const trajectory::StateInformation& information, const gesture::Context& context,
-           double tempo) noexcept;
+           double tempo, const double* held) noexcept;
 
   int most_;
   trajectory::Rows goal_, from_, speed_, now_, scratch_;  // of the offset; speed_ per ramp

@@ -113,10 +113,13 @@ TEST_CASE("a glove is calibrated through the daemon, and the file is for this gl
   stage.wait_for_frame();
 
   const ProgramOutcome done = stage.calibrate(
-      {"--stream", "right", "--seconds", "0.5", "--ready", "0.5", "--pose", "spread=0"});
+      {"--stream", "right", "--seconds", "0.5", "--ready", "0.5", "--pose", "spread-again=0"});
   INFO(done.err);
   REQUIRE(done.code == 0);
-  CHECK(done.out == "pose flat\npose fist\npose thumb\n");
+  CHECK(done.out ==
+        "pose flat\npose fist\npose thumb\npose spread\npose touch-index\npose touch-middle\n"
+        "pose touch-ring\npose touch-little\npose touch-fist\npose flat-again\n");
+  CHECK(has(done.err, "poses held twice differed by"));
   CHECK(has(done.err, "posed ctl calibrate right " + stage.path("ann.toml")));
   const std::string mine = stage.read("ann.toml");
   CHECK(
@@ -151,7 +154,7 @@ TEST_CASE("a hand that moved, or never took a pose, gives no calibration") {
   stage.put_on();
   stage.wait_for_frame();
   const std::vector<std::string> quick{"--stream", "right", "--seconds", "1",
-                                       "--ready",  "0.2",   "--pose",    "spread=0"};
+                                       "--ready",  "0.2",   "--brief"};
   {
     const std::jthread restless([&](const std::stop_token& stop) {
       for (bool fist = false; !stop.stop_requested(); fist = !fist) {

@@ -185,7 +185,7 @@ TEST_CASE("calibrate on a terminal ends with a verdict and the calibrated hand",
   OnTerminal calibrate({"calibrate", "--driver", "cyberglove", "--port", glove.port(), "--user",
                         "ann", "--seconds", "0.5", "--ready", "1", "--out", out},
                        80, 24);
-  for (std::size_t p = 0; p < drivers::glove::kSensorPoses; ++p) {
+  for (std::size_t p = 0; p < drivers::glove::kPoses; ++p) {
     REQUIRE(calibrate.comes_to_show("[" + std::string(drivers::glove::kPoseNames[p]) + "]"));
     glove.hold(static_cast<drivers::glove::Pose>(p));
   }
@@ -196,6 +196,7 @@ TEST_CASE("calibrate on a terminal ends with a verdict and the calibrated hand",
   CHECK(has(after, "posed: good"));
   CHECK(has(after, "\xe2\xa1"));  // a pattern of braille
   CHECK(has(after, "    flat           fist           thumb         spread    "));
+  CHECK(has(after, " touch-fist "));
   CHECK(has(after, "sensors calibrated: "));
 }
 

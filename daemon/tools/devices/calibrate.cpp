@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <limits>
 #include <memory>
 #include <string>
@@ -75,6 +76,7 @@ class PoseLines final : public PoseGuide {
 
  private:
   bool waits_;
+  bool may_skip_ = false;  // contacts and repeats are left
 };
 
 using drivers::glove::kPoseHints;
@@ -106,6 +108,7 @@ void PoseScreen::want(Pose pose) {
   while (screen_.key_pressed() != 0) {
   }
   view_.pose = static_cast<std::size_t>(std::ranges::find(view_.poses, pose) - view_.poses.begin());
+  view_.may_skip = drivers::glove::may_be_skipped(pose);
   view_.any_held = ranging_;
   view_.phase = PosePhase::kAsked;
   view_.left_s = view_.share = 0.0;
@@ -118,6 +121,7 @@ PoseGuide::Word PoseScreen::receive() {
     if (key == '\n' || key == '\r') return Word::kGo;
     if (key == 'b' || key == 'B') return Word::kBack;
     if (key == 'q' || key == 'Q') return Word::kStop;
+    if (view_.may_skip && (key == 's' || key == 'S')) return Word::kEnough;
   }
   return Word::kNothing;
 }
@@ -160,6 +164,7 @@ void PoseScreen::draw() {
 }
 
 void PoseLines::want(Pose pose) {
+  may_skip_ = drivers::glove::may_be_skipped(pose);
   const auto index = static_cast<std::size_t>(pose);
   std::printf("pose %s\n", std::string(kPoseNames[index]).c_str());
   std::fflush(stdout);
@@ -177,8 +182,11 @@ PoseGuide::Word PoseLines::receive() {
   while (waits_ && ::poll(&line, 1, 0) > 0) {
     char c = 0;
     if (::read(STDIN_FILENO, &c, 1) != 1) {
-      std::fprintf(stderr, "stdin has ended; with --seconds each pose begins by itself\n");
-      return Word::kStop;
+      // A script of the four poses alone, as there were before.
+      std::fprintf(stderr, "stdin has ended; %s\n",
+                   may_skip_ ? "contacts and repeats are left out"
+                             : "with --seconds each pose begins by itself");
+      return may_skip_ ? Word::kEnough : Word::kStop;
     }
     if (c == '\n') return Word::kGo;
   }
@@ -305,6 +313,7 @@ struct CalibrateOptions {
   bool live = false;
   bool ready_given = false;
   bool overwrite = false;
+  bool brief = false;  // the four poses that fit the sensors, alone
   bool moves = false;  // two moves after the poses
   bool force = false;  // write the file although the check calls it unusable
 };
@@ -331,9 +340,10 @@ Result<drivers::Options> driver_options(const drivers::Driver& driver,
 Result<PosePlan> plan_of(const CalibrateOptions& options) {
   PosePlan plan;
   if (options.seconds > 0.0) {
-    std::fill_n(plan.seconds.begin(), drivers::glove::kSensorPoses, options.seconds);
+    plan.seconds.fill(options.seconds);
     plan.ready_s = options.ready_s;
   }
+  if (options.brief) plan.shorten();
   for (const std::string& word : options.poses) {
     const auto equals = word.find('=');
     const auto name = std::ranges::find(kPoseNames, std::string_view(word).substr(0, equals));
@@ -448,10 +458,8 @@ Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
       return fail(refusal + "; no calibration was written (--force writes it all the same)");
     }
     check.doubts.push_back(refusal);
-  } else if (made.impossible > 0) {
-    check.doubts.push_back(fmt::format("{} would be bent as no hand's is",
-                                       made.impossible > 1 ? "joints" : "a joint"));
   }
+  std::ranges::move(made.doubts, std::back_inserter(check.doubts));
   std::fprintf(stderr, "posed: %s%s\n", check.usable() ? "" : "warning: ", check.verdict().c_str());
   auto& file = made.file;
   if (options.moves) TRY(fit_moves(*source, plan, file));
@@ -488,8 +496,10 @@ Result<> check_options(const CalibrateOptions& options) {
   }
   if (!options.live && !options.stream.empty()) return misuse("--stream also needs --connect");
   const bool timed = options.seconds > 0.0;
-  if (!options.import.empty() && (timed || options.moves || !options.poses.empty())) {
-    return misuse("--import goes through no poses; leave out --seconds, --pose and --moves");
+  if (!options.import.empty() &&
+      (timed || options.brief || options.moves || !options.poses.empty())) {
+    return misuse(
+        "--import goes through no poses; leave out --seconds, --brief, --pose and --moves");
   }
   if (!timed && options.ready_given) {
     return misuse("--ready is the time between poses that begin by themselves; add --seconds");
@@ -549,6 +559,8 @@ void add_calibrate(CLI::App& app, int& exit_code) {
           ->check(in_range(0.0, kMaxSeconds));
   add_overwrite_option(*command, options->overwrite);
   command->add_flag("--force", options->force, "Write the calibration even if poses failed");
+  command->add_flag("--brief", options->brief,
+                    "The first four poses alone: quick, but the verdict stays doubtful");
   command->add_flag("--moves", options->moves,
                     "After the poses two moves, which take out what sensors show of each other");
   command->add_option("--pose", options->poses, "How long one pose is held; 0 leaves it out")
@@ -557,14 +569,15 @@ void add_calibrate(CLI::App& app, int& exit_code) {
       ->type_name("C.toml")
       ->required();
   command->footer(
-      R"(Poses: flat, fist, thumb, spread; with --pose touch-index=2, touch-middle, touch-ring,
-touch-little and touch-fist also contacts, by which the thumb is fitted to what it touches; the flat
-and the spread hand then say where it lies beside the hand and how far it reaches. On a terminal a
-screen shows what to do; elsewhere a line on stdout names each pose and a line on stdin begins it,
-or --seconds does. A pose in which the hand moved, whose sensors hardly moved from the flat hand,
-or that was another (half a fist, fist and flat swapped), fails: the screen asks for it again, a
-script gets exit code 1 and no file. --moves is tried in simulation only, not on a real
-glove. Examples:
+      R"(Poses: flat, fist, thumb, spread fit the sensors. Contacts (touch-index, touch-middle,
+touch-ring, touch-little, touch-fist) fit the thumb to what it touches and tell the fingers' sensors
+apart. flat-again and spread-again, and the fingers of touch-fist, show how exactly you hold a pose.
+All take about a minute; --brief asks for the first four only. On a terminal a screen shows what to
+do; elsewhere a line on stdout names each pose and a line on stdin begins it, or --seconds does;
+where stdin ends after the first four, the rest is left out. A pose in which the hand moved, whose
+sensors hardly moved from the flat hand, or that was another (half a fist, fist and flat swapped,
+not the first time's), fails: the screen asks for it again, a script gets exit code 1 and no file.
+--moves is tried in simulation only, not on a real glove. Examples:
   posed calibrate --driver cyberglove --port /dev/ttyUSB0 --user ann --out ann.toml
   posed calibrate --connect tcp://127.0.0.1:5570 --stream right --user ann --out ann.toml
   posed calibrate --driver cyberglove --import old.cal --user ann --out ann.toml)");

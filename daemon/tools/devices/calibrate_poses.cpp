@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <memory>
 
 #include <spdlog/fmt/fmt.h>
@@ -36,22 +37,27 @@ std::string squeezed(const std::string& name, int width) {
 
 std::size_t place(Pose pose) { return static_cast<std::size_t>(pose); }
 
-// "flat: done   [fist]   thumb   spread"
-std::string steps(const CalibrateView& view) {
+// "flat: done   [fist]   thumb   spread"; where all have no room, later ones with the current
+// first.
+std::string steps(const CalibrateView& view, int width) {
   std::string text;
+  std::size_t room = 0;  // up to the current pose
   for (std::size_t i = 0; i < view.poses.size(); ++i) {
     const std::string name(kPoseNames[place(view.poses[i])]);
     if (!text.empty()) text += "   ";
     text += i == view.pose ? "[" + name + "]" : i < view.pose ? name + ": done" : name;
+    if (i == view.pose) room = text.size();
   }
-  return text;
+  const auto columns = static_cast<std::size_t>(width);
+  return room > columns ? text.substr(text.find('[')) : text;
 }
 
 std::string what_to_do(const CalibrateView& view) {
   if (view.silent) return "Nothing comes from the glove: is it switched on and worn?";
   if (view.phase == PosePhase::kAsked && view.left_s <= 0.0) {
     const std::string back = view.pose > 0 ? "   b: back one pose" : "";
-    return "Enter: I hold it" + back + "   q: give up";
+    return "Enter: I hold it" + back + (view.may_skip ? "   s: skip the rest" : "") +
+           "   q: give up";
   }
   constexpr int kSteps = 20;
   const int done = static_cast<int>(std::clamp(view.share, 0.0, 1.0) * kSteps);
@@ -119,7 +125,7 @@ std::vector<std::string> calibrate_view(const CalibrateView& view) {
   const int width = std::max(view.width, kMinColumns);
   const Pose pose = view.poses[view.pose];
   std::vector<std::string> lines{paint(view.colour, kBold, cut(view.title, width)),
-                                 paint(view.colour, kDim, cut(steps(view), width)), ""};
+                                 paint(view.colour, kDim, cut(steps(view, width), width)), ""};
   std::string hint(kPoseHints[place(pose)]);
   hint[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(hint[0])));
   for (const std::string& line : wrapped(hint + ".", width)) {
@@ -157,6 +163,7 @@ class Recording {
     for (std::size_t i = 0; i < poses.size();) {
       const auto word = TRY(ask(poses[i]));
       if (word == PoseGuide::Word::kStop) return fail("stopped; no calibration was written");
+      if (word == PoseGuide::Word::kEnough) break;
       if (word == PoseGuide::Word::kBack) {
         i -= i > 0 ? 1 : 0;
         continue;
@@ -256,6 +263,10 @@ std::vector<Pose> PosePlan::poses() const {
   return poses;
 }
 
+void PosePlan::shorten() {
+  std::fill(seconds.begin() + drivers::glove::kSensorPoses, seconds.end(), 0.0);
+}
+
 Result<Recorded> record_poses(GloveSource& source, const PosePlan& plan, PoseGuide& guide) {
   return Recording(source, plan, guide).run();
 }
@@ -266,6 +277,7 @@ using drivers::glove::Recorded;
 
 constexpr int kGap = 2;              // blanks between the hands
 constexpr int kMaxHandColumns = 18;  // of a hand
+constexpr int kLeastHandColumns = 12;
 
 }  // namespace
 
@@ -275,30 +287,38 @@ std::vector<std::string> calibrated_hand(const drivers::glove::Model& model,
   const auto skeleton = std::make_shared<const Skeleton>(hand_skeleton(hand));
   const picture::FigureShape shape(skeleton);
   const picture::Camera camera(picture::View::kThreeQuarter, shape.facing(0.0));
-  picture::StripRow poses;
+  const std::size_t at_most =
+      static_cast<std::size_t>(std::max(1, (columns + kGap) / (kLeastHandColumns + kGap)));
+  std::vector<picture::StripRow> strips;
   for (std::size_t p = 0; p < drivers::glove::kPoses; ++p) {
-    if (!drivers::glove::was_held(recorded[p])) continue;
+    const bool again = p > static_cast<std::size_t>(Pose::kTouchFist);
+    if (again || !drivers::glove::was_held(recorded[p])) continue;
     HandAngles angles = drivers::glove::angles_of(model, calibration, recorded[p]);
     for (double& angle_rad : angles) angle_rad = std::isfinite(angle_rad) ? angle_rad : 0.0;
     Frame frame;
     frame.skeleton = skeleton->id;
     frame.joint_count = static_cast<std::uint16_t>(skeleton->joints.size());
     set_hand_angles(*skeleton, angles, frame);
-    poses.poses.push_back(
+    if (strips.empty() || strips.back().poses.size() == at_most) strips.emplace_back();
+    strips.back().poses.push_back(
         {.figure = shape.pose(frame), .caption = std::string(drivers::glove::kPoseNames[p])});
   }
-  const int hands = static_cast<int>(poses.poses.size());
-  if (hands == 0 || rows < 2) return {};
+  std::vector<std::string> lines;
+  if (strips.empty() || rows < 2) return lines;
+  const int hands = static_cast<int>(strips.front().poses.size());
   const int width = std::clamp((columns + kGap) / hands - kGap, 1, kMaxHandColumns);
-  const picture::StripLayout room = picture::layout_of({poses}, camera, 1.0, false);
-  std::vector<std::string> lines(rows);
-  for (const auto& [figure, caption] : poses.poses) {
-    auto drawn = picture::braille(figure, camera, room, width, rows - 1);
-    drawn.push_back(fmt::format("{:^{}.{}}", caption, width, width));
-    for (std::size_t i = 0; i < lines.size(); ++i) {
-      if (!lines[i].empty()) lines[i] += std::string(kGap, ' ');
-      lines[i] += drawn[i];
+  const picture::StripLayout room = picture::layout_of(strips, camera, 1.0, false);
+  for (const picture::StripRow& strip : strips) {
+    std::vector<std::string> beside(rows);
+    for (const auto& [figure, caption] : strip.poses) {
+      auto drawn = picture::braille(figure, camera, room, width, rows - 1);
+      drawn.push_back(fmt::format("{:^{}.{}}", caption, width, width));
+      for (std::size_t i = 0; i < beside.size(); ++i) {
+        if (!beside[i].empty()) beside[i] += std::string(kGap, ' ');
+        beside[i] += drawn[i];
+      }
     }
+    std::ranges::move(beside, std::back_inserter(lines));
   }
   return lines;
 }

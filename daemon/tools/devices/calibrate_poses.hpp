@@ -36,9 +36,10 @@ struct CalibrateView {
   std::vector<drivers::glove::Pose> poses;  // in their order
   std::size_t pose = 0;                     // index of the current one
   PosePhase phase = PosePhase::kAsked;
-  double left_s = 0.0;  // remaining time of a phase that ends by itself; 0: the user ends it
-  double share = 0.0;   // elapsed share of such a phase
-  bool silent = false;  // nothing came for a while
+  double left_s = 0.0;    // remaining time of a phase that ends by itself; 0: the user ends it
+  double share = 0.0;     // elapsed share of such a phase
+  bool may_skip = false;  // contacts and repeats are left
+  bool silent = false;    // nothing came for a while
   // a pose was recorded; from then on it is known which sensors have not moved
   bool any_held = false;
   std::string note{};  // about the previous pose; may be empty
@@ -58,14 +59,16 @@ struct CalibrateView {
 // The part of `posed calibrate` that records pose after pose. A PoseGuide leads the user through
 // it: a screen (pose_screen.hpp), lines of text for scripts, or a test.
 struct PosePlan {
-  // How long each pose is recorded [s]; 0: skip it, as contacts unless they are asked for. The flat
-  // hand is never skipped.
-  std::array<double, drivers::glove::kPoses> seconds{2.0, 2.0, 2.0, 2.0};
+  // How long each pose is recorded [s]; 0: skip it. The flat hand is never skipped.
+  std::array<double, drivers::glove::kPoses> seconds{2.0, 2.0, 2.0, 2.0, 1.0, 1.0,
+                                                     1.0, 1.0, 1.0, 1.0, 1.0};
   // How long the user has to take a pose that starts by itself [s]; empty: the guide starts it.
   std::optional<double> ready_s{};
   double settle_s = 0.5;  // not recorded, so that the hand and the glove's filter come to rest
 
   [[nodiscard]] std::vector<drivers::glove::Pose> poses() const;
+  // Leaves out contacts and repeats: a verdict is doubtful then.
+  void shorten();
 };
 
 class PoseGuide {
@@ -79,7 +82,7 @@ class PoseGuide {
 
   // The user's reply while a pose is asked for. The call must not wait; it is made at least ten
   // times a second.
-  enum class Word { kNothing, kGo, kBack, kStop };
+  enum class Word { kNothing, kGo, kBack, kStop, kEnough };  // kEnough: leave out the rest
   [[nodiscard]] virtual Word receive() = 0;
 
   // One measurement. `left_s` of `whole_s` remain: of the time to get ready, or of the time to hold
@@ -95,8 +98,9 @@ class PoseGuide {
 Result<drivers::glove::Recorded> record_poses(GloveSource& source, const PosePlan& plan,
                                               PoseGuide& guide);
 
-// The recorded poses beside each other with their names below, at one scale: `rows` lines of UTF-8
-// of at most `columns` characters. A joint that no sensor measures is straight.
+// The recorded poses, but for repeats, beside each other with their names below, at one scale:
+// strips of `rows` lines of UTF-8 of at most `columns` characters. A joint that no sensor measures
+// is straight.
 [[nodiscard]] std::vector<std::string> calibrated_hand(
     const drivers::glove::Model& model, const drivers::glove::Calibration& calibration, Side hand,
     const drivers::glove::Recorded& recorded, int columns, int rows);

@@ -1,20 +1,24 @@
-// Calibrates the chosen glove to a hand: each pose is held once and judged at once, the contacts
-// fit the thumb to what it touches; alone they mend the calibration in use. The page adds up what
-// the sensors say, the daemon does the rest.
+// Calibrates the chosen glove to a hand: each pose is held and judged at once, the contacts fit the
+// thumb to what it touches; alone they mend the calibration in use. Poses held once more show how
+// exactly they are held. The page adds up what the sensors say, the daemon does the rest.
 import { el, labelled, write } from './dom.js';
 
 const NAME = /^[a-z0-9_-]{1,32}$/;
 const isContact = (pose) => pose.startsWith('touch-');
+const isAgain = (pose) => pose.endsWith('-again');
+const isFirst = (pose) => !isContact(pose) && !isAgain(pose);
 const POSES = [
   ['flat', 'Flat hand', 'on the table, fingers together and straight, thumb beside the index'],
   ['fist', 'Fist', 'tight, with the thumb outside'],
   ['thumb', 'Thumb across', 'fingers straight, the thumb at the root of the little finger'],
   ['spread', 'Spread hand', 'flat, all fingers as far apart as they go'],
-  ['touch-index', 'Touch thumb and index', 'tip on tip'],
-  ['touch-middle', 'Touch thumb and middle', 'tip on tip'],
-  ['touch-ring', 'Touch thumb and ring finger', 'tip on tip'],
-  ['touch-little', 'Touch thumb and little finger', 'tip on tip'],
-  ['touch-fist', 'Fist, thumb across', 'its tip on the middle finger'],
+  ['touch-index', 'Touch thumb and index', 'tip on tip, the other fingers stretched'],
+  ['touch-middle', 'Touch thumb and middle', 'tip on tip, the other fingers stretched'],
+  ['touch-ring', 'Touch thumb and ring finger', 'tip on tip, the other fingers stretched'],
+  ['touch-little', 'Touch thumb and little finger', 'tip on tip, the other fingers stretched'],
+  ['touch-fist', 'Fist, thumb across', 'tight, its tip on the middle finger'],
+  ['flat-again', 'Flat hand once more', 'as the first time'],
+  ['spread-again', 'Spread hand once more', 'as the first time'],
 ];
 
 // What was held, by stream: also when the controls are made again.
@@ -62,9 +66,11 @@ export class GloveLesson {
         `Press “Hold”: a countdown of ${GloveLesson.seconds.ready} s gives time to take the pose. ` +
           `Then hold it still for ${GloveLesson.seconds.hold} s; it is judged at once.`,
       ),
-      ...this.#rowsOf((pose) => !isContact(pose)),
+      ...this.#rowsOf(isFirst),
       el('p.note', {}, 'The thumb, by what it touches; these alone mend the calibration in use.'),
       ...this.#rowsOf(isContact),
+      el('p.note', {}, 'Held once more, they show how exactly you hold a pose.'),
+      ...this.#rowsOf(isAgain),
       labelled('Whose hand', this.called, this.use),
       this.words,
     );
@@ -139,7 +145,7 @@ export class GloveLesson {
       write(said, sentence ? `${good ? '✓' : '✗'} ${sentence}` : '');
     }
     const held = [...poses.keys()];
-    const whole = POSES.every(([pose]) => isContact(pose) || poses.has(pose));
+    const whole = POSES.every(([pose]) => !isFirst(pose) || poses.has(pose));
     const thumb = held.length > 0 && held.every(isContact);
     const good = (whole || thumb) && held.every((pose) => verdicts.get(pose)?.good);
     this.use.disabled = this.busy || !good || !NAME.test(this.called.value);

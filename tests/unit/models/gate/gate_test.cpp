@@ -153,6 +153,23 @@ TEST_CASE("where suspects were true the gate believes them, until they are false
   CHECK(missing(through.bottomRows(200)) == 20);
 }
 
+TEST_CASE("a contact that is lost and comes back makes no single spike believed") {
+  for (const int lost : {3, 4, 8}) {
+    test::Motion motion = test::Motion::Zero(900, 3);
+    for (Eigen::Index t = 0; t < motion.rows(); ++t) {
+      motion(t, 1) = 10.0 * std::sin(0.05 * static_cast<double>(t));
+      if (t % 100 < lost) motion(t, 0) = 40.0;
+      if (t % 100 == 50) motion(t, 0) = 25.0;
+    }
+    const test::Motion through = gated(motion, 60.0);
+    INFO(lost << " samples lost");
+    for (Eigen::Index t = 50; t < motion.rows(); t += 100) CHECK(std::isnan(through(t, 0)));
+    for (Eigen::Index t = 100 + lost; t < motion.rows(); t += 100) {
+      CHECK(through(t, 0) == Approx(0.0).margin(1e-6));  // back at once
+    }
+  }
+}
+
 TEST_CASE("the gate lets a fast hand, repeats and steps of a coarse sensor through") {
   // 90 degrees in 0.2 s: 840 degrees a second at the most.
   test::Motion motion(120, 3);

@@ -224,6 +224,10 @@ TEST_CASE("a gesture that was shown once is held as it was shown", "[real]") {
       }
       const auto p = performed(information_of(*model), "g 1 c 3 4 p");
       CHECK(p.angles.size() == composed.angles.size());
+      const int three = model->label_index("3");
+      const auto& pose = model->labels[static_cast<std::size_t>(three)].shown;
+      CHECK(held_off_deg(performed(information_of(*model), "g 3 p 3 c 3 g"), three,
+                         Eigen::Map<const Eigen::VectorXd>(pose.data(), std::ssize(pose))) < 1.5);
       jerk += jerk_deg(p);
       jerk_composed += jerk_deg(composed);
       for (auto& [name, rows] : shown) {

@@ -167,6 +167,25 @@ TEST_CASE("poses that begin by themselves need no reply of the user") {
   CHECK(user.asked == std::vector{Pose::kFlat, Pose::kFist});
 }
 
+TEST_CASE("contacts and repeats are asked for, and may be left out") {
+  PosePlan plan;
+  CHECK(plan.poses().size() == drivers::glove::kPoses);
+  PosingGlove glove;
+  const auto source = worn(glove);
+  using Word = PoseGuide::Word;
+  plan.seconds.fill(0.1);
+  plan.settle_s = 0.1;
+  ScriptedUser user(glove, {Word::kGo, Word::kGo, Word::kGo, Word::kGo, Word::kEnough});
+  const auto recorded = record_poses(*source, plan, user);
+  if (!recorded) FAIL(recorded.error().text());
+  CHECK(user.asked.size() == 5);
+  CHECK(user.asked.back() == Pose::kTouchIndex);
+  CHECK(drivers::glove::was_held((*recorded)[3]));
+  CHECK_FALSE(drivers::glove::was_held((*recorded)[4]));
+  plan.shorten();
+  CHECK(plan.poses() == std::vector{Pose::kFlat, Pose::kFist, Pose::kThumb, Pose::kSpread});
+}
+
 TEST_CASE("a calibration that the user cancels writes no file and reports that") {
   PosingGlove glove;
   const auto source = worn(glove);

@@ -86,6 +86,17 @@ TEST_CASE("sensors that do not fit on the screen are counted") {
   CHECK(text.contains("... and " + std::to_string(32 - bars) + " more: make the window larger"));
 }
 
+TEST_CASE("of many poses the screen shows the current one and those after it") {
+  CalibrateView view = view_of(2);
+  view.poses = PosePlan{}.poses();
+  view.pose = 8;
+  view.may_skip = true;
+  const std::string text = all(calibrate_view(view));
+  INFO(text);
+  CHECK(text.contains("\n[touch-fist]   flat-again   spread-again\n"));
+  CHECK(text.contains("s: skip the rest"));
+}
+
 TEST_CASE("the screen shows which pose to take and what to do") {
   CalibrateView view = view_of(2);
   std::string text = all(calibrate_view(view));
@@ -96,6 +107,7 @@ TEST_CASE("the screen shows which pose to take and what to do") {
   text = all(calibrate_view(view));
   CHECK(text.contains("flat: done   [fist]   thumb   spread\n"));
   CHECK(text.contains("b: back one pose"));
+  CHECK_FALSE(text.contains("s: skip the rest"));
   view.left_s = 1.5;
   view.share = 0.5;
   CHECK(all(calibrate_view(view)).contains("Get ready  [==========          ] 1.5 s\n"));

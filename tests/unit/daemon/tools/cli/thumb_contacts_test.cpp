@@ -3,18 +3,21 @@
 
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <cmath>
 
 #include "drivers/cyberglove/angles.hpp"
 #include "models/hand/geometry.hpp"
 #include "models/hand/thumb_fit.hpp"
 #include "proto/frame/degree.hpp"
+#include "tests/support/has.hpp"
 
 namespace posed::tools {
 namespace {
 
 using namespace drivers::glove;
 using devices::fit_contacts;
+using test::has;
 
 // What a glove with default curves sends while the hand is in this pose, its thumb's zeros off.
 void hold(const Model& model, const HandAngles& hand, std::array<Held, kMaxSensors>& held) {
@@ -87,6 +90,40 @@ TEST_CASE("a thumb calibrated with contacts touches where it touched") {
   CHECK(sum_after < 0.5 * sum_before);
   CHECK(sum_after < 4 * 8.0);
   CHECK(file.sensors.at("index_mcp") == before.sensors.at("index_mcp"));
+}
+
+TEST_CASE("the verdict rests on poses held twice and on what the thumb touched") {
+  const Model model = drivers::cyberglove::glove_model(Side::kRight).value();
+  const auto made = [&](double fist_deg, const HandAngles& touching) {
+    Recorded recorded{};
+    for (std::size_t p = 0; p < kPoses; ++p) {
+      HandAngles hand = hand_in(static_cast<Pose>(p));
+      if (static_cast<Pose>(p) == Pose::kTouchFist) hand[kFingerChannels] += fist_deg * kDegree;
+      if (static_cast<Pose>(p) == Pose::kTouchRing) hand = touching;
+      hold(model, hand, recorded[p]);
+    }
+    CalibrationFile blank = fitted(model, recorded);
+    blank.sensors.clear();
+    return devices::calibrate_by_poses(model, recorded, blank).value();
+  };
+  const auto good = made(0.0, hand_in(Pose::kTouchRing));
+  CHECK(good.doubts.empty());
+  CHECK(has(good.said.back(), "poses held twice differed by 0.0 degrees"));
+  const auto loose = made(-30.0, hand_in(Pose::kTouchRing));
+  REQUIRE(loose.doubts.size() == 1);
+  CHECK(has(loose.doubts[0], "most index MCP by 37"));
+  const auto apart = made(0.0, HandAngles{});
+  CHECK(std::ranges::any_of(apart.doubts, [](const auto& doubt) {
+    return has(doubt, "the thumb that touched the ring");
+  }));
+
+  Recorded brief{};
+  for (std::size_t p = 0; p < kSensorPoses; ++p) {
+    hold(model, hand_in(static_cast<Pose>(p)), brief[p]);
+  }
+  const auto once = devices::calibrate_by_poses(model, brief, fitted(model, brief)).value();
+  REQUIRE(once.doubts.size() == 1);
+  CHECK(has(once.doubts[0], "no pose was held twice"));
 }
 
 TEST_CASE("without contacts a calibration stays as it is") {
