@@ -6,12 +6,12 @@
 namespace posed::robot {
 namespace {
 
-constexpr double kDamping = 1e-4;   // m^2/rad^2, towards the pose of now
+constexpr double kDamping = 3e-4;   // m^2/rad^2, towards the pose of now
 constexpr double kToMiddle = 1e-5;  // towards the middle of the limits: frees the null space
 constexpr double kMaxStep_rad = 0.35;
 constexpr double kFar_m = 0.03;  // from here on a tip pulls no harder
 constexpr double kPinchPoint = 1.0;
-constexpr double kPinchGap = 10.0;
+constexpr double kPinchGap = 30.0;
 constexpr double kSolverNear_m = 0.02;
 constexpr double kMissing = 1.0;  // [m], of what links miss of their margin: tips gain less by it
 constexpr int kBacktracks = 2;

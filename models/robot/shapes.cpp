@@ -13,6 +13,8 @@ namespace {
 constexpr int kMaxCapsulesABox = 4;
 constexpr int kTries = 100;
 constexpr double kMostly = 0.7;
+constexpr double kOften = 0.1;  // capsules that touch so often may be too thick
+constexpr int kLess = 4;        // hulls take over where they touch less often than capsules by this
 constexpr double kRounding_m = 1e-9;
 constexpr double kSlack_m = 6e-3;            // of what is remembered as close
 constexpr std::size_t kMaxHullPairs = 4096;  // half a second's work when a robot is loaded
@@ -401,36 +403,42 @@ void add_swings(RobotHand& hand) {
   }
 }
 
-// Fills in the pairs whose capsules can keep them apart; returns the others, which touch when open
-// or mostly.
-std::vector<LinkPair> find_pairs(RobotHand& hand, Placed& placed) {
-  std::vector<LinkPair> all;
+// How often links touch, of kTries poses; when the hand is open counts as always.
+struct Touching {
+  LinkPair pair;
+  int capsules = 0, hulls = 0;
+};
+
+// Fills in the pairs whose capsules can keep them apart; returns those whose capsules touch when
+// open or often.
+std::vector<Touching> find_pairs(RobotHand& hand, Placed& placed) {
+  std::vector<Touching> all;
   for (int a = 0; a < std::ssize(hand.links); ++a) {
     for (int b = a + 1; b < std::ssize(hand.links); ++b) {
       if (hand.covers[a].count == 0 || hand.covers[b].count == 0 || neighbours(hand, a, b))
         continue;
-      all.push_back({.a = a, .b = b});
+      if (hand.turns[a].empty() && hand.turns[b].empty()) continue;  // both stand
+      all.push_back({.pair = {.a = a, .b = b}});
     }
   }
-  std::vector<int> touching(all.size());
   for (int number = -1; number < kTries; ++number) {
     place(hand, number < 0 ? hand.start() : some_pose(hand, number), placed);
-    for (std::size_t p = 0; p < all.size(); ++p) {
-      const LinkPair& pair = all[p];
-      if (cover_gap_m(hand, placed, pair.a, pair.b) >= 0.0) continue;
-      if (nearest(hand, placed, pair.a, pair.b, 0.0).gap_m >= 0.0) continue;
-      touching[p] += number < 0 ? kTries : 1;
+    for (Touching& one : all) {
+      const auto [a, b] = std::pair(one.pair.a, one.pair.b);
+      if (cover_gap_m(hand, placed, a, b) >= 0.0) continue;
+      if (nearest(hand, placed, a, b, 0.0).gap_m >= 0.0) continue;
+      one.capsules += number < 0 ? kTries : 1;
     }
   }
-  std::vector<LinkPair> others;
-  for (std::size_t p = 0; p < all.size(); ++p) {
-    (touching[p] > kMostly * kTries ? others : hand.pairs).push_back(all[p]);
+  for (const Touching& one : all) {
+    if (one.capsules <= kMostly * kTries) hand.pairs.push_back(one.pair);
   }
-  return others;
+  std::erase_if(all, [](const Touching& one) { return one.capsules <= kOften * kTries; });
+  return all;
 }
 
-// The same for the shapes of links whose capsules touch.
-void find_hull_pairs(RobotHand& hand, Placed& placed, std::span<LinkPair> pairs) {
+// Lists the hulls of such pairs, without those that touch themselves.
+void find_hull_pairs(RobotHand& hand, Placed& placed, std::span<Touching> pairs) {
   struct Candidate {
     std::pair<int, int> two;
     std::size_t pair = 0;
@@ -438,8 +446,8 @@ void find_hull_pairs(RobotHand& hand, Placed& placed, std::span<LinkPair> pairs)
   };
   std::vector<Candidate> all;
   for (std::size_t p = 0; p < pairs.size(); ++p) {
-    const Cover& one = hand.covers[pairs[p].a];
-    const Cover& two = hand.covers[pairs[p].b];
+    const Cover& one = hand.covers[pairs[p].pair.a];
+    const Cover& two = hand.covers[pairs[p].pair.b];
     const auto more = static_cast<std::size_t>(one.shape_count) * two.shape_count;
     if (all.size() + more > kMaxHullPairs) continue;
     for (int a = one.first_shape; a < one.first_shape + one.shape_count; ++a) {
@@ -450,23 +458,28 @@ void find_hull_pairs(RobotHand& hand, Placed& placed, std::span<LinkPair> pairs)
   }
   for (int number = -1; number < kTries; ++number) {
     place(hand, number < 0 ? hand.start() : some_pose(hand, number), placed);
+    std::vector<char> touch(pairs.size());
     for (Candidate& one : all) {
       if (one.touching > kMostly * kTries) continue;
-      const int a = pairs[one.pair].a, b = pairs[one.pair].b;
+      const int a = pairs[one.pair].pair.a, b = pairs[one.pair].pair.b;
       const double near_m = number < 0 ? kOpen_m : 0.0;
       const double gap_m = hull_gap({hand.hulls[one.two.first], placed.turn[a], placed.at_m[a]},
                                     {hand.hulls[one.two.second], placed.turn[b], placed.at_m[b]},
                                     Eigen::Vector3d::UnitX(), near_m)
                                .gap_m;
-      if (gap_m < near_m) one.touching += number < 0 ? kTries : 1;
+      if (gap_m >= near_m) continue;
+      one.touching += number < 0 ? kTries : 1;
+      touch[one.pair] = 1;
     }
+    for (std::size_t p = 0; p < pairs.size(); ++p) pairs[p].hulls += touch[p];
   }
   for (std::size_t p = 0; p < pairs.size(); ++p) {
-    pairs[p].first = static_cast<int>(hand.hull_pairs.size());
+    LinkPair& pair = pairs[p].pair;
+    pair.first = static_cast<int>(hand.hull_pairs.size());
     for (const Candidate& one : all) {
       if (one.pair == p && one.touching <= kMostly * kTries) hand.hull_pairs.push_back(one.two);
     }
-    pairs[p].count = static_cast<int>(hand.hull_pairs.size()) - pairs[p].first;
+    pair.count = static_cast<int>(hand.hull_pairs.size()) - pair.first;
   }
 }
 
@@ -505,14 +518,22 @@ void add_shapes(RobotHand& hand) {
     hand.covers[l].first_shape = static_cast<int>(hand.balls.size()) - hand.covers[l].shape_count;
   }
   Placed placed(hand);
-  std::vector<LinkPair> touching = find_pairs(hand, placed);
+  std::vector<Touching> touching = find_pairs(hand, placed);
   find_hull_pairs(hand, placed, touching);
   std::vector<char> by_hulls(hand.links.size());
-  for (const LinkPair& pair : touching) {
+  for (const auto& [pair, capsules, hulls] : touching) {
     const int all = hand.covers[pair.a].shape_count * hand.covers[pair.b].shape_count;
-    if (pair.count < all) hand.left_out.emplace_back(pair.a, pair.b);
-    if (pair.count == 0) continue;
-    hand.pairs.push_back(pair);
+    const auto listed = std::ranges::find_if(
+        hand.pairs, [&](const LinkPair& other) { return other.a == pair.a && other.b == pair.b; });
+    if (listed == hand.pairs.end()) {
+      if (pair.count < all) hand.left_out.emplace_back(pair.a, pair.b);
+      if (pair.count == 0) continue;
+      hand.pairs.push_back(pair);
+    } else if (pair.count == all && kLess * hulls < capsules) {
+      *listed = pair;
+    } else {
+      continue;
+    }
     by_hulls[pair.a] = by_hulls[pair.b] = 1;
   }
   for (int l = 0; l < std::ssize(hand.links); ++l) {

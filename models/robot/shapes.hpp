@@ -11,8 +11,8 @@ namespace posed::robot {
 Hull hull_of_shape(const Shape& shape);
 
 // Fills in capsules, hulls, covers, and which pairs of links can be kept apart. Where capsules
-// touch when the hand is open, or in most poses, the hulls of the shapes are taken; of those, the
-// pairs that touch, too, are left out. Cold.
+// touch when the hand is open, in most poses, or in many in which the hulls of the shapes do not,
+// those are taken; of the former, the pairs that touch, too, are left out. Cold.
 void add_shapes(RobotHand& hand);
 
 // Two links and how their gap changes with each driven joint.
