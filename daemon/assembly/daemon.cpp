@@ -251,7 +251,7 @@ Result<> Daemon::Parts::start_threads() {
     if (!stream) {
       return spdlog::log(news.good ? spdlog::level::info : spdlog::level::warn, "{}", news.text);
     }
-    const auto kind = news.good ? v1::Event::KIND_FOUND : v1::Event::KIND_WARNING;
+    const auto kind = news.good ? v1::Event::KIND_OUTPUT_WORKS : v1::Event::KIND_WARNING;
     publisher->post_event(*stream, kind, news.text);
   });
   threads = std::make_unique<HotThreads>(config.realtime, config.share_cpu);

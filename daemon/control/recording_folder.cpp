@@ -45,12 +45,10 @@ bool is_recording(const std::string& name) {
          name.front() != '.' && clean(name) == name;
 }
 
-// A log that is being written has another file beside it, or beside another name of it.
+// A log that is being written has another file beside it.
 bool is_in_use(const std::filesystem::path& file) {
-  std::error_code none;
-  const bool has_wal = std::filesystem::exists(file.string() + "-wal", none);
-  const bool is_log = file.extension() == ".plog";
-  return has_wal || (is_log && std::filesystem::hard_link_count(file, none) > 1 && !none);
+  std::error_code ignored;
+  return std::filesystem::exists(file.string() + "-wal", ignored);
 }
 
 Error no_folder() {

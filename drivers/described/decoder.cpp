@@ -13,6 +13,8 @@ namespace {
 bool in_range(const Field& field, double value) noexcept {
   // NaN is rejected for a sensor, where it would bend a finger; for an extra it means missing.
   if (std::isnan(value)) return field.kind == FieldKind::kExtra;
+  // A counter of whole seconds that sends fractions would lose them.
+  if (field.kind == FieldKind::kTime && value != std::floor(value)) return false;
   return value >= field.low && value <= field.high;
 }
 

@@ -220,7 +220,12 @@ void write_field(const Field& field, double raw, std::span<std::byte> packet) no
     auto* const at =
         reinterpret_cast<char*>(packet.data()) + (column.data() - text_of(packet).data());
     std::fill_n(at, kColumnChars, ' ');
-    std::to_chars(at, at + kColumnChars, value);  // the shortest text of a double has 24 at most
+    // The shortest text of a double has 24 characters at most; that of a whole number has no "e".
+    if (value == std::floor(value) && std::abs(value) < 1e15) {
+      std::to_chars(at, at + kColumnChars, static_cast<std::int64_t>(value));
+    } else {
+      std::to_chars(at, at + kColumnChars, value);
+    }
     return;
   }
   std::uint64_t bits = 0;

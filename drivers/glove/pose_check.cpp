@@ -232,7 +232,7 @@ class Comparison {
     }
   }
 
-  // Of finger `f`, its sensor of this joint, if it bends nothing else.
+  // Of finger `f`, the sensor that bends this joint first.
   [[nodiscard]] const SensorPoses* bend_of(std::span<const MapRow> rows, std::size_t f,
                                            std::size_t joint) const {
     for (const SensorPoses& at : sensors_) {

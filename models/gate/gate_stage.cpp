@@ -136,7 +136,11 @@ class Track {
       verdict_ = Verdict::kTrue;
       away_ = false;
     }
-    if (away_ && suspect_ && Space::distance(left_, value) < kBack * moved_) {
+    // Samples that agree against the past are a motion: two of one that goes on or that comes back
+    // from a step, three of a step, because a fault may last for two.
+    const bool agrees =
+        suspect_ && doubts_ > 0 && Space::distance(doubt_, value) < kAgree * moved_;
+    if (away_ && agrees && Space::distance(left_, value) < kBack * moved_) {
       begin(value);
       return true;
     }
@@ -153,9 +157,6 @@ class Track {
       verdict_ = Verdict::kFalse;
       return true;
     }
-    // Samples that agree against the past are a motion: two of one that goes on, three of a step,
-    // because a fault may last for two.
-    const bool agrees = doubts_ > 0 && Space::distance(doubt_, value) < kAgree * moved_;
     const bool goes_on = agrees && moved_ > kGoesOn * Space::distance(last_, doubt_);
     if (goes_on) {
       begin(value);

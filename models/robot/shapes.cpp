@@ -434,6 +434,9 @@ std::vector<Touching> find_pairs(RobotHand& hand, Placed& placed) {
     if (one.capsules <= kMostly * kTries) hand.pairs.push_back(one.pair);
   }
   std::erase_if(all, [](const Touching& one) { return one.capsules <= kOften * kTries; });
+  // First those that no capsules keep apart: there is room for kMaxHullPairs.
+  std::ranges::stable_partition(
+      all, [](const Touching& one) { return one.capsules > kMostly * kTries; });
   return all;
 }
 

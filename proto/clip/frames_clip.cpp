@@ -4,6 +4,7 @@
 #include <array>
 #include <cassert>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <string_view>
 #include <utility>
@@ -219,26 +220,69 @@ bool begins_with_added_pose(const Clip& clip) {
 
 namespace {
 
-// "LeftArm" for "RightArm"; empty where the name is of no side.
-std::string of_other_side(std::string_view name) {
-  for (const auto& [left, right] : {std::pair<std::string_view, std::string_view>{"left", "right"},
-                                    {"Left", "Right"},
-                                    {"l_", "r_"},
-                                    {"L_", "R_"}}) {
-    for (const auto& [from, to] : {std::pair{left, right}, std::pair{right, left}}) {
-      const std::size_t at = name.find(from);
-      if (at == std::string_view::npos) continue;
-      return std::string(name.substr(0, at)).append(to).append(name.substr(at + from.size()));
-    }
+constexpr int kNone = -1;
+
+// The bone of the other side; the same one in the middle.
+Bone other_side(Bone bone) {
+  const std::string_view name = bone_name(bone);
+  for (const auto& [from, to] : {std::pair{"left", "right"}, std::pair{"right", "left"}}) {
+    if (!name.starts_with(from)) continue;
+    return *bone_from_name(std::string(to).append(name.substr(std::strlen(from))));
   }
-  return {};
+  return bone;
 }
 
-int partner_of(const Skeleton& skeleton, int joint) {
-  const Joint& own = skeleton.joints[joint];
-  const std::string name = of_other_side(own.bone ? bone_name(*own.bone) : own.name);
-  if (name.empty()) return joint;
-  return own.bone ? skeleton.joint_of(*bone_from_name(name)) : skeleton.joint_index(name);
+// Where the joints are in T-pose, from the first one [m].
+std::vector<Eigen::Vector3d> T_places_m(const Skeleton& skeleton) {
+  std::vector<Eigen::Vector3d> places_m;
+  for (const Joint& joint : skeleton.joints) {
+    const int above = joint.parent;
+    places_m.emplace_back(Eigen::Vector3d::Zero());
+    if (above < 0) continue;
+    places_m.back() =
+        places_m[above] + skeleton.joints[above].T_world_joint * joint.offset_m.cast<double>();
+  }
+  return places_m;
+}
+
+// Which joint has the place of each on the other side; kNone: there is none. Bones by what they
+// are, those between bones with them, and what hangs below by its place.
+std::vector<int> partners_of(const Skeleton& skeleton) {
+  const auto& joints = skeleton.joints;
+  std::vector<int> partners(joints.size(), kNone);
+  const auto is_free = [&](int j) { return j >= 0 && !joints[j].bone && partners[j] == kNone; };
+  for (int j = 0; j < std::ssize(joints); ++j) {
+    if (!joints[j].bone) continue;
+    partners[j] = skeleton.joint_of(other_side(*joints[j].bone));
+    if (partners[j] < 0) continue;
+    int a = joints[j].parent, b = joints[partners[j]].parent;
+    for (; is_free(a) && is_free(b); a = joints[a].parent, b = joints[b].parent) {
+      partners[a] = b;
+      partners[b] = a;
+    }
+  }
+  const auto places_m = T_places_m(skeleton);
+  for (int j = 0; j < std::ssize(joints); ++j) {
+    if (!is_free(j)) continue;
+    const int parent = joints[j].parent;
+    if (parent < 0) partners[j] = j;
+    if (parent < 0 || partners[parent] < 0) continue;
+    const Eigen::Vector3d there_m =
+        places_m[partners[parent]] +
+        Eigen::Vector3d(-1.0, 1.0, 1.0).cwiseProduct(places_m[j] - places_m[parent]);
+    double nearest_m = 0.01 + 0.1 * joints[j].offset_m.cast<double>().norm();
+    int found = kNone;
+    for (int k = 0; k < std::ssize(joints); ++k) {
+      if (!is_free(k) || joints[k].parent != partners[parent]) continue;
+      const double far_m = (places_m[k] - there_m).norm();
+      if (far_m >= nearest_m) continue;
+      nearest_m = far_m;
+      found = k;
+    }
+    partners[j] = found;
+    if (found != kNone) partners[found] = j;
+  }
+  return partners;
 }
 
 }  // namespace
@@ -246,9 +290,9 @@ int partner_of(const Skeleton& skeleton, int joint) {
 Result<Clip> mirrored(const Clip& clip) {
   Clip out = is_acclaim(*clip.skeleton) ? with_zyx_channels(clip) : clip;
   const Skeleton& skeleton = *out.skeleton;
-  std::vector<int> partners;
+  if (out.frames() < 2) return fail("cannot be mirrored: it has a single frame", clip.path);
+  const std::vector<int> partners = partners_of(skeleton);
   for (int j = 0; j < std::ssize(skeleton.joints); ++j) {
-    partners.push_back(partner_of(skeleton, j));
     const int parent = skeleton.joints[j].parent;
     const bool alike = partners[j] >= 0 &&
                        skeleton.joints[partners[j]].parent == (parent < 0 ? -1 : partners[parent]);

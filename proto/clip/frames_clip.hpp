@@ -64,8 +64,8 @@ class FrameTimes {
                                           const std::function<const Frame&(int)>& frame);
 
 // The clip with left and right exchanged: what the left hand did the right one does, and who walked
-// to the left walks to the right (mirrored at the plane x = 0). Of joints that are no bones the
-// partner has the same name with left for right. Refuses a figure whose sides have other joints.
+// to the left walks to the right (mirrored at the plane x = 0). A joint that is no
+// bone has its partner at the mirrored place. Refuses a figure whose sides have other joints.
 Result<Clip> mirrored(const Clip& clip);
 
 // Fills every missing value with the value before it, at the start with the channel's first one.

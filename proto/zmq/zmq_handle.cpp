@@ -29,9 +29,9 @@ constexpr std::string_view kIpc = "ipc://";
 Result<> check_port(const std::string& endpoint) {
   if (!endpoint.starts_with("tcp://")) return {};
   const std::string_view text = std::string_view(endpoint).substr(endpoint.rfind(':') + 1);
-  const bool padded = text.size() > 1 && text.starts_with('0');
   if (text == "*" || text == "!") return {};
-  if (!padded && exact_number<std::uint16_t>(text)) return {};
+  const bool padded_zero = text.size() > 1 && text.find_first_not_of('0') == text.npos;
+  if (!padded_zero && exact_number<std::uint16_t>(text)) return {};
   return misuse("'" + endpoint + "' names a port that does not exist: give one from 1 to 65535");
 }
 
@@ -43,17 +43,17 @@ std::string ipc_file(std::string_view endpoint) {
   return path == "*" || path.starts_with('@') ? std::string() : std::string(path);
 }
 
-// Whether somebody listens at this socket file, or one may not ask.
+// Whether somebody listens at this socket file.
 bool is_listened_to(const std::string& file) {
   sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
   file.copy(address.sun_path, sizeof address.sun_path - 1);
   const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  if (fd < 0) return true;
+  if (fd < 0) return false;
   const bool answered =
-      ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0;
-  const bool nobody = !answered && (errno == ECONNREFUSED || errno == ENOENT);
+      ::connect(fd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0 ||
+      errno == EAGAIN || errno == EPROTOTYPE;  // many wait there, or it is of datagrams
   ::close(fd);
-  return !nobody;
+  return answered;
 }
 
 // libzmq ends the process where it may not begin a thread, with a line about its source code. So as
@@ -121,10 +121,15 @@ Result<> check_endpoint(const std::string& endpoint) {
     return misuse("'" + endpoint + "' needs a path of 1 to " + std::to_string(kMaxPath) +
                   " letters behind ipc://");
   }
+  return {};
+}
+
+Result<> check_ipc_file(const std::string& endpoint) {
+  const std::string file = ipc_file(endpoint);
   struct stat found{};
   if (file.empty() || ::lstat(file.c_str(), &found) != 0 || S_ISSOCK(found.st_mode)) return {};
   return misuse("'" + endpoint +
-                "' is a file or folder, and no socket: choose a path that is free");
+                "' is something else than a socket: choose a path that is free");
 }
 
 namespace {
@@ -139,6 +144,7 @@ Result<> choose_family(void* socket, std::string_view endpoint) {
 
 Result<std::string> bind_socket(void* socket, const std::string& endpoint) {
   TRY(check_endpoint(endpoint));
+  TRY(check_ipc_file(endpoint));
   TRY(choose_family(socket, endpoint));
   TRY(try_descriptors());
   const auto in_use = [&] {

@@ -67,10 +67,10 @@ Result<Socket> open_socket(void* context, int type);
 Result<> set_option(void* socket, int option, int value);
 Result<> set_option(void* socket, int option, std::string_view value);
 
-// What bind_socket() would refuse whoever runs beside it: a port that does not exist, and an ipc://
-// path that is too long or at which there is something else than a socket, which libzmq would
-// delete.
+// Refuses a port that does not exist, and an ipc:// path that is too long.
 Result<> check_endpoint(const std::string& endpoint);
+// Refuses an ipc:// path at which there is something else than a socket: libzmq would delete it.
+Result<> check_ipc_file(const std::string& endpoint);
 
 // Binds and returns the endpoint that is really bound ("tcp://127.0.0.1:*" picks a free port). If
 // the port, or the file of ipc://, is in use, the error says so in one sentence.

@@ -457,7 +457,6 @@ Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
     if (!options.force) {
       return fail(refusal + "; no calibration was written (--force writes it all the same)");
     }
-    check.doubts.push_back(refusal);
   }
   std::ranges::move(made.doubts, std::back_inserter(check.doubts));
   std::fprintf(stderr, "posed: %s%s\n", check.usable() ? "" : "warning: ", check.verdict().c_str());
@@ -574,7 +573,7 @@ touch-ring, touch-little, touch-fist) fit the thumb to what it touches and tell 
 apart. flat-again and spread-again, and the fingers of touch-fist, show how exactly you hold a pose.
 All take about a minute; --brief asks for the first four only. On a terminal a screen shows what to
 do; elsewhere a line on stdout names each pose and a line on stdin begins it, or --seconds does;
-where stdin ends after the first four, the rest is left out. A pose in which the hand moved, whose
+where stdin ends after the first four, the rest is left out (with --moves say --brief). A pose in which the hand moved, whose
 sensors hardly moved from the flat hand, or that was another (half a fist, fist and flat swapped,
 not the first time's), fails: the screen asks for it again, a script gets exit code 1 and no file.
 --moves is tried in simulation only, not on a real glove. Examples:

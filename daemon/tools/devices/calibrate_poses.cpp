@@ -55,7 +55,7 @@ std::string steps(const CalibrateView& view, int width) {
 std::string what_to_do(const CalibrateView& view) {
   if (view.silent) return "Nothing comes from the glove: is it switched on and worn?";
   if (view.phase == PosePhase::kAsked && view.left_s <= 0.0) {
-    const std::string back = view.pose > 0 ? "   b: back one pose" : "";
+    const std::string back = view.pose > 0 ? "   b: back" : "";
     return "Enter: I hold it" + back + (view.may_skip ? "   s: skip the rest" : "") +
            "   q: give up";
   }
@@ -277,7 +277,7 @@ using drivers::glove::Recorded;
 
 constexpr int kGap = 2;              // blanks between the hands
 constexpr int kMaxHandColumns = 18;  // of a hand
-constexpr int kLeastHandColumns = 12;
+constexpr int kMinHandColumns = 12;
 
 }  // namespace
 
@@ -288,7 +288,7 @@ std::vector<std::string> calibrated_hand(const drivers::glove::Model& model,
   const picture::FigureShape shape(skeleton);
   const picture::Camera camera(picture::View::kThreeQuarter, shape.facing(0.0));
   const std::size_t at_most =
-      static_cast<std::size_t>(std::max(1, (columns + kGap) / (kLeastHandColumns + kGap)));
+      static_cast<std::size_t>(std::max(1, (columns + kGap) / (kMinHandColumns + kGap)));
   std::vector<picture::StripRow> strips;
   for (std::size_t p = 0; p < drivers::glove::kPoses; ++p) {
     const bool again = p > static_cast<std::size_t>(Pose::kTouchFist);

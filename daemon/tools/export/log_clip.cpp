@@ -336,7 +336,7 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
   if (!wanted_take.empty()) {
     interval = TRY(find_take(reader, wanted_take));
   }
-  auto opened = TRY(replay::Replay::open(reader, true));
+  auto opened = TRY(replay::Replay::open(reader, raw || stream.ends_with(kRawSuffix)));
   replay::Replay& replay = *opened;
   const auto chosen = TRY(choose(replay, stream, raw, path.string()));
   const replay::ReplayStream& first = replay.stream(chosen.ids.front());

@@ -22,6 +22,7 @@
 #include "drivers/transport/address.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/list.hpp"
+#include "proto/zmq/zmq_handle.hpp"
 
 namespace posed::tools {
 namespace {
@@ -259,6 +260,9 @@ void try_all(const std::string& file, config::Reading& reading, std::vector<Find
     const auto opened = devices::open_source(source, models);
     if (!opened) reading.errors.push_back(opened.error());
     sources.push_back(findings_of(source));
+  }
+  for (const auto& endpoint : {reading.config.publish_endpoint, reading.config.control_endpoint}) {
+    if (auto free = net::check_ipc_file(endpoint); !free) reading.errors.push_back(free.error());
   }
   if (auto models = control::ModelFolder::open(reading.config.models); !models) {
     reading.errors.push_back(models.error());

@@ -29,7 +29,7 @@ constexpr const char* kEvalNaturalFooter = R"(Examples:
   posed eval natural hand.csv --corpus recordings --json
   posed eval natural take.bvh --corpus takes --hand right    # the fingers of bodies
   posed eval natural styled.bvh --corpus walks --report natural.html
-  posed eval natural takes/*.bvh --corpus walks --json | jq '.[] | .clip, .natural'
+  posed eval natural takes/*.bvh --corpus walks --json | jq -s 'flatten | .[] | .clip, .natural'
 
 Each figure of the clip stands beside the same figure of the corpus' clips: median, 5th and 95th
 percentile, and the share of them that is below. Each of these is measured against the others, the
@@ -209,7 +209,13 @@ Result<Findings> evaluate_each(EvalNaturalOptions options) {
   std::vector<Findings> list;
   for (const std::filesystem::path& clip : options.clips) {
     options.clip = clip;
-    list.push_back(TRY(evaluate_natural(options)));
+    auto one = evaluate_natural(options);
+    if (!one && options.clips.size() == 1) return std::unexpected(one.error());
+    if (!one) {  // the others are judged all the same
+      const std::string why = one.error().text();
+      one = Findings().add("clip", clip.string()).add("error", why).verdict(why, false);
+    }
+    list.push_back(std::move(*one));
   }
   if (list.size() == 1) return list.front();
   Findings all;

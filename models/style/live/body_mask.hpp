@@ -30,6 +30,7 @@ enum class LoosePart : std::uint8_t {
   kNone,  // hips and legs
 };
 inline constexpr std::size_t kLooseParts = 6;
+static_assert(static_cast<int>(LoosePart::kRightArm) == static_cast<int>(BodyPart::kRightArm));
 inline constexpr std::array kShoulders{LoosePart::kLeftShoulder, LoosePart::kRightShoulder};
 [[nodiscard]] constexpr std::size_t index_of(LoosePart part) noexcept {
   return static_cast<std::size_t>(part);

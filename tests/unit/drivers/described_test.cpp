@@ -306,10 +306,10 @@ index = [{ channel = "index2_x" }]
   CHECK(sink.samples[1].value[2] == 511.5F);
   CHECK(sink.samples[1].header.device_ns == 10'000'000);
   decoder->feed(test::bytes_of("A 1010,1,2,3\nA 1,2,3,4,5,6\nA 1,2000,0,0,0\nA 1,,0,0,0\nB\n"
-                               "A 1020,0,0,0,\n"),
+                               "A 1020,0,0,0,\nA 1020.5,0,0,0,0\n"),
                 0, sink);
   CHECK(sink.count(Outcome::kShort) == 3);
-  CHECK(sink.count(Outcome::kOutOfRange) == 2);
+  CHECK(sink.count(Outcome::kOutOfRange) == 3);
   CHECK(sink.count(Outcome::kForeign) == 1);
   CHECK(sink.samples.size() == 2);
   // What is emulated is read back.

@@ -130,7 +130,8 @@ export class ModelLibrary extends List {
       yes.disabled = true;
       const reply = await doIt();
       yes.disabled = false;
-      if (reply.ok) await this.#changed(); // else what was typed stays
+      if (reply.ok) await this.#changed();
+      else yes.focus(); // and what was typed stays
     };
     buttons.replaceChildren(form);
     (field.focus ? form.querySelector('input, button') : yes).focus();

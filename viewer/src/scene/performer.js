@@ -7,6 +7,7 @@ import { Trail } from './trail.js';
 const ABOVE_JOINTS_M = 0.27; // what a head has above its joint
 const joint = new Vector3();
 const away = new Vector3();
+const beside = new Vector3();
 
 export class Performer {
   avatar = null; // an Avatar in place of the capsules
@@ -55,17 +56,26 @@ export class Performer {
     return true;
   }
 
-  // Stands in its lane, but at most so far from another.
-  keepNear(other, most_m) {
+  // In its lane.
+  standIn(x, z) {
+    this.lane.set(x, 0, z);
+    this.#moveTo(this.lane);
+  }
+
+  #moveTo(place) {
     const { position } = this.figure.group;
-    this.centre.sub(position).add(this.lane);
-    position.copy(this.lane);
+    this.centre.sub(position).add(place);
+    position.copy(place);
+  }
+
+  // Where it is too far from another, it jumps to its side, and stays there: feet that stand do not
+  // glide.
+  keepNear(other, most_m) {
     away.subVectors(this.centre, other.centre).setY(0);
-    const far_m = away.length();
-    if (far_m <= most_m) return;
-    away.multiplyScalar(most_m / far_m - 1);
-    position.add(away);
-    this.centre.add(away);
+    if (away.length() <= most_m) return;
+    away.subVectors(this.lane, other.lane).setY(0);
+    beside.copy(other.centre).add(away).sub(this.centre).setY(0).add(this.figure.group.position);
+    this.#moveTo(beside);
   }
 
   #colour() {

@@ -194,8 +194,7 @@ export class World {
   #stand(performer, lane, shown) {
     if (!performer) return;
     const yaw = this.#yaw ?? 0;
-    performer.lane.set(lane * LANE_M * Math.cos(yaw), 0, -lane * LANE_M * Math.sin(yaw));
-    performer.figure.group.position.copy(performer.lane);
+    performer.standIn(lane * LANE_M * Math.cos(yaw), -lane * LANE_M * Math.sin(yaw));
     performer.shown = shown;
     performer.figure.group.visible = shown && performer.stream.drawable;
     if (!shown) this.tags.hide(performer.stream.name);

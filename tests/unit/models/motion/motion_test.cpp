@@ -76,6 +76,45 @@ TEST_CASE("A rest pose in front of a motion is found, and an ordinary first fram
   CHECK_FALSE(begins_with_added_pose(motion));
 }
 
+TEST_CASE("A mirrored clip has its partners by their places, whatever they are called", "[motion]") {
+  auto clip = make_walker({.seconds = 1.0, .rate_hz = 30.0}).value();
+  auto skeleton = std::make_shared<Skeleton>(*clip.skeleton);
+  for (const auto& [name, x_m] : {std::pair{"tail_01", 0.0}, {"pocket.L", 0.1}, {"bag", -0.1}}) {
+    Joint& joint = skeleton->joints.emplace_back();
+    joint.name = name;
+    joint.parent = skeleton->joint_of(Bone::kHips);
+    joint.offset_m = {x_m, -0.1, 0.0};
+    skeleton->channels.push_back(
+        {.joint = static_cast<std::uint16_t>(skeleton->joints.size() - 1), .axis = Axis::kX});
+  }
+  REQUIRE(skeleton->finish());
+  clip.skeleton = skeleton;
+  clip.channels.conservativeResize(Eigen::NoChange, clip.channels.cols() + 3);
+  const Eigen::Index first = clip.channels.cols() - 3;
+  clip.channels.rightCols(3).rowwise() = Eigen::RowVector3d(0.1, 0.2, 0.3);
+  const auto other = clip::mirrored(clip);
+  REQUIRE(other);
+  CHECK(other->channels(5, first) == Approx(0.1));
+  CHECK(other->channels(5, first + 1) == Approx(0.3));
+  CHECK(other->channels(5, first + 2) == Approx(0.2));
+  skeleton = std::make_shared<Skeleton>(*skeleton);
+  skeleton->joints.back().offset_m.z() = 0.3;
+  REQUIRE(skeleton->finish());
+  clip.skeleton = skeleton;
+  CHECK(test::has(clip::mirrored(clip).error().message, "has no partner"));
+}
+
+TEST_CASE("CMU's clips can be mirrored", "[motion][real]") {
+  for (const char* name : {"cmu/02_04.bvh", "cmu/07_01.amc"}) {
+    const auto path = test::data_path(name);
+    if (!path) return;
+    const auto clip = clip::read_clip(*path).value();
+    const auto other = clip::mirrored(clip);
+    INFO(name << (other ? "" : other.error().message));
+    CHECK(other);
+  }
+}
+
 TEST_CASE("A mirrored clip does with the left what was done with the right", "[motion]") {
   const auto clip = make_walker({.seconds = 1.0, .rate_hz = 30.0}).value();
   const auto other = clip::mirrored(clip);
