@@ -22,8 +22,8 @@ RT_SAFE Outcome outcome_of(const clip::FrameOutcome& parsed) noexcept {
     case clip::FrameFault::kMissingBone:
       return Outcome::kShort;
     case clip::FrameFault::kImplausible:
-    case clip::FrameFault::kLate:
       return Outcome::kOutOfRange;
+    case clip::FrameFault::kNoTime:
     case clip::FrameFault::kNotANumber: {
       double value = 0.0;
       const char* const begin = parsed.where.data();

@@ -1,6 +1,7 @@
 #include "proto/clip/frame_parser.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <bitset>
 #include <charconv>
@@ -12,7 +13,6 @@
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/plausible.hpp"
 #include "proto/text/clean.hpp"
-#include "proto/text/lower.hpp"
 
 namespace posed::clip {
 namespace {
@@ -21,6 +21,18 @@ static_assert(std::endian::native == std::endian::little, "frames of numbers are
 
 std::string counted(std::size_t count) {
   return std::to_string(count) + (count == 1 ? " value" : " values");
+}
+
+// What numpy, pandas, R, JSON, spreadsheets and printf write for a value that is not there.
+RT_SAFE bool is_missing(std::string_view field) noexcept {
+  constexpr std::array<std::string_view, 8> kWords{"",     "nan",  "na", "n/a",
+                                                   "null", "none", "-",  "nan(ind)"};
+  if (field.size() > 1 && (field[0] == '-' || field[0] == '+')) field.remove_prefix(1);
+  return std::ranges::any_of(kWords, [field](std::string_view word) {
+    return std::ranges::equal(field, word, {}, [](char c) {
+      return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c;
+    });
+  });
 }
 
 std::vector<double> limits(const Skeleton& skeleton) {
@@ -48,14 +60,15 @@ std::string FrameOutcome::sentence() const {
     case FrameFault::kNone:
       return "the frame is good";
     case FrameFault::kNotANumber:
-      return in_quotes(where) + " is not a number a pose can have" +
-             (lower(where) == "nan" ? "; leave a missing value empty" : "");
+      return in_quotes(where) + " is not a number a pose can have";
     case FrameFault::kImplausible:
       return in_quotes(where) +
              " is beyond what a pose can have: a position lies within 1 km, a joint turns by at "
              "most 100 turns, a finger's by 2; is the unit right?";
-    case FrameFault::kLate:
-      return in_quotes(where) + " is no time in seconds from the start of a recording";
+    case FrameFault::kNoTime:
+      return in_quotes(where) +
+             " is no time: the first column counts seconds, from the start of the recording or "
+             "from 1970";
     case FrameFault::kTooFew:
     case FrameFault::kTooMany:
       return (where.empty() ? std::string("the frame") : "bone " + in_quotes(where)) + " has " +
@@ -181,13 +194,11 @@ FrameOutcome FrameParser::parse_fields(std::string_view text,
       ++outcome.found;
       return add_error(FrameFault::kTooMany, {});
     }
-    const auto value = field.empty()        ? std::optional(kMissing)
+    const auto value = is_missing(field)    ? std::optional(kMissing)
                        : outcome.found == 0 ? parse_number(field, kMaxTime_s)
                                             : parse_number(field);
     if (!value) {
-      constexpr double kAny = std::numeric_limits<double>::max();  // milliseconds since 1970
-      const bool is_late = outcome.found == 0 && parse_number(field, kAny);
-      return add_error(is_late ? FrameFault::kLate : FrameFault::kNotANumber, field);
+      return add_error(outcome.found == 0 ? FrameFault::kNoTime : FrameFault::kNotANumber, field);
     }
     if (outcome.found == 0) {
       outcome.time_s = *value;

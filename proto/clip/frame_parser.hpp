@@ -22,7 +22,7 @@ enum class FrameFault : std::uint8_t {
   kNone,
   kNotANumber,    // a word that is not a finite number
   kImplausible,   // a number outside the plausible range (proto/frame/plausible.hpp)
-  kLate,          // a time that is no number of seconds from the start
+  kNoTime,        // a time that is no number of seconds
   kTooFew,        // values missing
   kTooMany,       // values left over
   kUnknownBone,   // AMC: a name the skeleton does not have

@@ -2,9 +2,10 @@
 // or extracted from any clip that has the fifteen finger joints of a hand (a BVH with fingers).
 //
 // The hand CSV: a header `time_s,thumb1_x_rad,thumb1_y_rad,thumb1_z_rad,thumb2_x_rad, ...,
-// little3_z_rad`, then one line per frame. An empty field is a missing value. Times may be unevenly
-// spaced. A missing time is interpolated; a repeated one counts as missing. Without any times the
-// frames are evenly spaced at 30 Hz. Decreasing times are an error. Cold.
+// little3_z_rad`, then one line per frame. An empty field is a missing value, as are nan, NA, null,
+// None and -. Times may be unevenly spaced. A missing time is interpolated; a repeated one counts
+// as missing. Without any times the frames are evenly spaced at 30 Hz. Decreasing times are an
+// error. Cold.
 #pragma once
 
 #include <filesystem>

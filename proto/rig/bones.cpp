@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <array>
-#include <map>
+#include <cmath>
 #include <string_view>
 #include <utility>
 
@@ -190,68 +190,105 @@ void find_parts(const Figure& figure, const std::vector<JointName>& names, BoneJ
   if (names[0].stem == "root") bones.set(Bone::kHips, 0);
 }
 
-using FingerJoints = std::map<int, std::vector<int>>;  // [finger], from the hand on
-
-FingerJoints finger_joints(const Figure& figure, const std::vector<JointName>& names, int hand) {
-  std::vector<int> below;
-  for (int j = 0; j < figure.size(); ++j) {
-    if (j != hand && figure.below(hand, j)) below.push_back(j);
-  }
-  const auto any_number = [&](char digit) {
-    return std::ranges::any_of(below, [&](int j) {
-      return names[j].digits.starts_with(digit) && is_any_finger(names[j]);
-    });
-  };
-  const bool from_zero = any_number('0');
-  // Where the thumb has a name of its own, the first of four fingers is the index.
-  const bool thumb_apart = !any_number('5') && std::ranges::any_of(below, [&names](int j) {
-    return finger_of(names[j]) == 0;
-  });
-  FingerJoints out;
-  std::map<int, int> finger_at;  // [joint]
-  for (const int j : below) {
-    const JointName& name = names[j];
-    auto finger = finger_of(name);
-    if (const auto above = finger_at.find(figure[j].parent); !finger && above != finger_at.end()) {
-      finger = above->second;  // whatever its number, it goes on in the same finger
-    }
-    if (!finger && is_any_finger(name) && !name.digits.empty()) {
-      finger = name.digits.front() - '0' - (from_zero || thumb_apart ? 0 : 1);
-    }
-    if (!finger || *finger < 0 || *finger >= kFingers) continue;
-    finger_at.emplace(j, *finger);
-    if (is_finger(name)) out[*finger].push_back(j);
-  }
-  return out;
+// Whether the joint lies where `top` above it lies.
+bool lies_at(const Figure& figure, int top, int joint) {
+  return figure.between(top, joint).value_or(kX).isZero(1e-6);
 }
 
-// Leaves the three joints of a finger: without tips, and without the bone inside the palm, which
-// begins nearer to the wrist than it is long.
-void trim_finger(const Figure& figure, const std::vector<JointName>& names, int hand, int finger,
-                 std::vector<int>& joints) {
-  std::erase_if(joints, [&](int j) { return names[j].has("end") || names[j].has("nub"); });
-  if (finger > 0 && joints.size() > 3) {
-    std::erase_if(joints, [&](int j) {
-      return std::ranges::any_of(std::array{"meta", "metacarpal", "in", "inhand", "tip"},
-                                 [&](const char* word) { return names[j].has(word); });
-    });
+// The joints of a limb, from the first bone of the four on; -1 where there is none.
+using LimbJoints = std::array<int, 4>;
+
+// A limb whose joints have one name and are only counted (leg_a to leg_d, arm_1 to arm_3): its two
+// long bones are alike, and what lies between their ends helps the skin.
+void settle_counted(const Figure& figure, const std::vector<JointName>& names, bool is_leg,
+                    LimbJoints& limb) {
+  const std::size_t first = is_leg ? 0 : 1;
+  const int upper = limb[first];
+  const int lower = limb[first + 1];
+  int& end = limb[first + 2];
+  if (upper < 0 || lower < 0 || names[upper].words != names[lower].words) return;
+  std::vector<int> chain{upper};
+  for (int next = upper; next >= 0;) {
+    next = -1;
+    for (const int child : figure.children(chain.back())) {
+      const bool goes_on =
+          names[child].words == names[upper].words && names[child].side == names[upper].side;
+      if (goes_on &&
+          (next < 0 || figure.main_chain_length(child) > figure.main_chain_length(next))) {
+        next = child;
+      }
+    }
+    if (next >= 0) chain.push_back(next);
   }
-  if (joints.size() == 1) {
-    // CMU's one thumb joint lies in the wrist, and no thumb does. A fourth joint alone is a tip.
-    const JointName& only = names[joints.front()];
-    const bool is_tip = only.digits == "4" && !is_any_finger(only);
-    if (is_tip || figure[joints.front()].offset.isZero()) joints.clear();
-  }
-  if (joints.size() <= 3) return;
-  const auto length = [&figure](int from, int to) {
-    return figure.between(from, to).value_or(Vec::Zero()).norm();
+  const std::size_t counted = chain.size();
+  const bool end_is_named = end >= 0 && names[end].words != names[upper].words;
+  const std::size_t most = is_leg ? 5 : 3;  // more joints may be pieces of one long bone
+  if (counted < 3 || (counted > most && !end_is_named)) return;
+  if (end_is_named) chain.push_back(end);
+  const std::size_t last = chain.size() - 1;
+  const auto length = [&](std::size_t from, std::size_t to) {
+    return figure.between(chain[from], chain[to]).value_or(Vec::Zero()).norm();
   };
-  const JointName& first = names[joints.front()];
-  const bool in_palm = first.has("root") || first.has("metacarpal") || first.digits.empty() ||
-                       first.digits == "0" || first.digits == "00" ||
-                       length(hand, joints[0]) < length(joints[0], joints[1]);
-  if (in_palm && finger > 0) joints.erase(joints.begin());
-  joints.resize(3);
+  constexpr double kUnlike = 0.5;  // of the logarithm of their lengths
+  constexpr double kToes = 0.6;    // of the shin at most
+  double best = kUnlike;
+  std::size_t best_lower = 0;
+  std::size_t best_end = 0;
+  // Behind the foot there may be toes.
+  for (std::size_t e = is_leg && !end_is_named ? last - 1 : last; e <= last; ++e) {
+    for (std::size_t k = 1; k < std::min(e, counted); ++k) {
+      const double unlike = std::abs(std::log(length(0, k) / length(k, e)));
+      if (!(unlike < best) || length(e, last) > kToes * length(k, e)) continue;
+      best = unlike;
+      best_lower = k;
+      best_end = e;
+    }
+  }
+  if (best_lower == 0) return;
+  limb[first + 1] = chain[best_lower];
+  end = chain[best_end];
+  if (best_end < last) limb[3] = chain[last];
+}
+
+// Of joints that lie at one place and are called as well, the last one turns the limb with all of
+// them above it. A shoulder at its parent's place is the base of the one below it.
+void settle_coincident(const Figure& figure, const std::vector<JointName>& names, bool is_leg,
+                       LimbJoints& limb) {
+  const auto fit = [&](int joint, std::size_t slot) {
+    const auto found = is_leg ? leg_fit(names[joint]) : arm_fit(names[joint]);
+    return found ? (*found)[slot] : 0.0;
+  };
+  for (std::size_t slot = 0; slot + 1 < limb.size(); ++slot) {
+    const auto after = std::find_if(limb.begin() + static_cast<std::ptrdiff_t>(slot) + 1,
+                                    limb.end(), [](int joint) { return joint >= 0; });
+    int& at = limb[slot];
+    if (at < 0 || after == limb.end() || !figure.below(at, *after)) continue;
+    const int first = at;
+    const int above = figure[first].parent;
+    const bool is_base = !is_leg && slot == 0 && above >= 0 && lies_at(figure, above, first);
+    for (const int j : figure.path(*after)) {
+      if (j == first || j == *after || !figure.below(first, j)) continue;
+      const bool is_same = lies_at(figure, at, j) && fit(j, slot) >= fit(at, slot);
+      const bool is_above = is_base && !lies_at(figure, j, *after);
+      if (fit(j, slot) > 0.0 && (is_same || is_above)) at = j;
+    }
+  }
+}
+
+void settle_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones) {
+  for (const Side side : kSides) {
+    for (const bool is_leg : {true, false}) {
+      const Bone first = is_leg ? Bone::kLeftUpperLeg : Bone::kLeftShoulder;
+      const auto bone = [&](std::size_t slot) {
+        return on(side, static_cast<Bone>(static_cast<std::size_t>(first) + slot));
+      };
+      LimbJoints limb{};
+      for (std::size_t i = 0; i < limb.size(); ++i) limb[i] = bones[bone(i)];
+      settle_counted(figure, names, is_leg, limb);
+      settle_coincident(figure, names, is_leg, limb);
+      for (std::size_t i = 0; i < limb.size(); ++i) bones.set(bone(i), limb[i]);
+    }
+  }
 }
 
 // Whether there is a person beside the one below `hips`, who was found by the shape or the names.
@@ -322,7 +359,10 @@ void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJ
     neck.insert(neck.begin(), trunk.back());
     trunk.pop_back();
   }
-  keep_if_any(trunk, [&names](int j) { return !names[j].helper; });
+  keep_if_any(trunk, [&](int j) {
+    const bool is_root = names[j].has("root") && lies_at(figure, hips, j);
+    return !names[j].helper && !is_root;
+  });
   keep_if_any(neck, [&names](int j) {
     return !names[j].helper || names[j].has("twist") || is_neck(names[j]);
   });
@@ -337,22 +377,11 @@ void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJ
   if (head >= 0) bones.set(Bone::kHead, head);
 }
 
-void find_fingers(const Figure& figure, const std::vector<JointName>& names, Side side,
-                  BoneJoints& bones) {
-  const int hand = bones[on(side, Bone::kLeftHand)];
-  for (auto& [finger, joints] : finger_joints(figure, names, hand)) {
-    trim_finger(figure, names, hand, finger, joints);
-    const int first = static_cast<int>(Bone::kLeftThumbMetacarpal) + kFingerJoints * finger;
-    for (int i = 0; i < kFingerJoints && i < std::ssize(joints); ++i) {
-      bones.set(on(side, static_cast<Bone>(first + i)), joints[i]);
-    }
-  }
-}
-
 FoundBones find_bones(const Figure& figure, const std::vector<JointName>& names) {
   FoundBones out;
   find_limbs(figure, names, out.joint);
   const bool by_shape = !out.joint.has_limbs();
+  if (!by_shape) settle_limbs(figure, names, out.joint);
   if (by_shape) {
     if (const auto hand = find_hand(figure, names, out.sides_by)) {
       out.kind = Kind::kHand;
@@ -371,7 +400,16 @@ FoundBones find_bones(const Figure& figure, const std::vector<JointName>& names)
     find_parts(figure, names, out.joint);
   }
   for (const Side side : kSides) {
-    if (out.joint.has(on(side, Bone::kLeftHand))) find_fingers(figure, names, side, out.joint);
+    if (!out.joint.has(on(side, Bone::kLeftHand))) continue;
+    const FingersBy by = find_fingers(figure, names, side, out.joint);
+    if (by == FingersBy::kNames) continue;
+    const std::string hand = side == Side::kLeft ? "left hand" : "right hand";
+    out.by_place[side == Side::kLeft ? 0 : 1] = by == FingersBy::kPlace;
+    out.notes.push_back(by == FingersBy::kPlace
+                            ? "fingers of the " + hand + " are known by their place only"
+                            : "joints below the " + hand +
+                                  " look like fingers, but neither names nor places say which: "
+                                  "name them in a mapping (inspect --write)");
   }
   return out;
 }

@@ -48,6 +48,7 @@ struct FoundBones {
   Kind kind = Kind::kPart;
   BoneJoints joint;
   SidesBy sides_by = SidesBy::kNames;
+  std::array<bool, 2> by_place{};  // [side, left first]: some fingers are known by place only
   std::vector<std::string> notes;  // sentences
 };
 
@@ -80,8 +81,13 @@ void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJ
 void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones,
                 std::vector<std::string>& notes);
 
-// Fingers below the joint of the side's hand.
-void find_fingers(const Figure& figure, const std::vector<JointName>& names, Side side,
-                  BoneJoints& bones);
+// What says which joints are the fingers of a hand; kNothing where joints look like fingers and
+// neither does.
+enum class FingersBy : std::uint8_t { kNames, kPlace, kNothing };
+
+// Fingers below the joint of the side's hand: by their names, and those without a known name by
+// their places, of which the thumb's is nearest to the wrist.
+FingersBy find_fingers(const Figure& figure, const std::vector<JointName>& names, Side side,
+                       BoneJoints& bones);
 
 }  // namespace posed::rig

@@ -131,6 +131,18 @@ void collect(const RigInput& input, const Frames& frames, Rig& rig) {
   }
 }
 
+// What is known of a finger is no surer than which finger it is.
+void doubt_places(const FoundBones& found, Rig& rig) {
+  constexpr double kByPlace = 0.7;
+  for (std::size_t j = 0; j < rig.bone.size(); ++j) {
+    if (!rig.bone[j] || *rig.bone[j] < Bone::kLeftThumbMetacarpal) continue;
+    const bool left = *rig.bone[j] < on(Side::kRight, Bone::kLeftThumbMetacarpal);
+    Evidence& evidence = rig.evidence[j];
+    if (!found.by_place[left ? 0 : 1] || evidence.sure < kByPlace) continue;
+    evidence = {.sure = kByPlace, .why = "a finger by its place in the hand; " + evidence.why};
+  }
+}
+
 // Which side of the person is left, and so where it faces: by the caller's word, the names or the
 // feet.
 void settle_facing(const RigInput& input, const Figure& figure, FoundBones& found, Rig& rig) {
@@ -238,6 +250,7 @@ Rig recognise(const RigInput& input) {
     rig.notes.insert(rig.notes.begin(), notes.begin(), notes.end());
   }
   collect(input, frames, rig);
+  doubt_places(found, rig);
   return rig;
 }
 

@@ -1,6 +1,7 @@
 #include "proto/rig/words.hpp"
 
 #include <algorithm>
+#include <charconv>
 #include <map>
 #include <set>
 #include <utility>
@@ -84,7 +85,8 @@ const FitTable& leg_words() {
                 {{0, 1, 0, 0}, "shin calf tibia lowerleg lowleg loleg leglower knee crus sune"},
                 {{0, 0, 1, 0}, "ankle"},
                 {{0, 0, .9, .5}, "foot"},
-                {{0, 0, 0, 1}, "toe toes toebase ball forefoot tsumasaki"},
+                {{0, 0, 0, 1}, "toe toes toebase ball tsumasaki"},
+                {{0, 0, 0, .9}, "forefoot"},
                 {{0, 0, 0, .6}, "metatarsal metatarsals metatarsophalangeal hallux"}});
   return table;
 }
@@ -134,6 +136,24 @@ bool is_upper(char c) { return c >= 'A' && c <= 'Z'; }
 bool is_lower(char c) { return c >= 'a' && c <= 'z'; }
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
+// FBX programs write a sign that they allow in no name (a blank, a byte of an accented letter) by
+// its number: "FBXASC032" is a blank.
+std::string without_fbx_signs(std::string_view name) {
+  constexpr std::string_view kMark = "FBXASC";
+  constexpr std::size_t kDigits = 3;
+  std::string out;
+  while (!name.empty()) {
+    const char* const digits = name.data() + std::min(kMark.size(), name.size());
+    unsigned char sign = 0;
+    const bool is_sign = name.size() >= kMark.size() + kDigits && name.starts_with(kMark) &&
+                         std::from_chars(digits, digits + kDigits, sign).ptr == digits + kDigits &&
+                         sign > 0;
+    out += is_sign ? static_cast<char>(sign) : name.front();
+    name.remove_prefix(is_sign ? kMark.size() + kDigits : 1);
+  }
+  return out;
+}
+
 std::string without_maker(std::string_view name) {
   if (const std::size_t cut = name.find_last_of(":|"); cut != std::string_view::npos) {
     name.remove_prefix(cut + 1);
@@ -167,7 +187,7 @@ std::size_t token_length(std::string_view text) {
 }
 
 Tokens tokens_of(std::string_view joint_name) {
-  std::string name = without_maker(joint_name);
+  std::string name = without_maker(without_fbx_signs(joint_name));
   for (const auto& [sign, word] : kSigns) replace_all(name, sign, word);
   for (const char* arm : {"LUArm", "LFArm", "RUArm", "RFArm"}) {  // Motive
     const std::string text(arm);
@@ -216,6 +236,36 @@ NameSide split_side(std::string& token) {
     }
   }
   return NameSide::kNone;
+}
+
+// Letters that count joints, as in leg_a, leg_b and leg_c, become numbers: a one, b two. Elsewhere
+// one letter is a side, or says nothing.
+void number_letters(std::vector<Tokens>& all) {
+  const auto is_counter = [](const std::string& token) {
+    return token.size() == 1 && token[0] >= 'a' && token[0] <= 'h';
+  };
+  const auto without = [](const Tokens& tokens, std::size_t at) {
+    std::string key;
+    for (std::size_t i = 0; i < tokens.size(); ++i) key += (i == at ? "*" : tokens[i]) + ' ';
+    return key;
+  };
+  const auto each = [&](const auto& use) {
+    for (Tokens& tokens : all) {
+      constexpr std::size_t kMaxTokens = 16;  // longer names count nothing
+      for (std::size_t i = 1; i < std::min(tokens.size(), kMaxTokens); ++i) {
+        if (is_counter(tokens[i])) use(tokens, i);
+      }
+    }
+  };
+  std::map<std::string, std::string> letters;
+  each([&](const Tokens& tokens, std::size_t i) { letters[without(tokens, i)] += tokens[i]; });
+  std::vector<std::pair<std::string*, std::string>> numbers;
+  each([&](Tokens& tokens, std::size_t i) {
+    const std::string& seen = letters[without(tokens, i)];
+    if (!seen.contains('a') || !seen.contains('b')) return;
+    numbers.emplace_back(&tokens[i], std::to_string(tokens[i][0] - 'a' + 1));
+  });
+  for (auto& [token, number] : numbers) *token = std::move(number);
 }
 
 JointName parse_one(const Tokens& tokens) {
@@ -277,9 +327,6 @@ std::optional<Fit> fit_of(const JointName& name, const FitTable& table) {
     return at == table.end() ? std::nullopt : std::optional(at->second);
   };
   if (const auto fit = look(name.stem)) return fit;
-  if (name.stem.ends_with("root")) {
-    if (const auto fit = look(name.stem.substr(0, name.stem.size() - 4))) return fit;
-  }
   if (finger_of(name) || is_any_finger(name)) return std::nullopt;
   constexpr double kPart = 0.98;
   constexpr std::size_t kMaxWords = 8;  // longer names say something else
@@ -309,6 +356,7 @@ std::vector<JointName> parse_names(const std::vector<std::string_view>& names) {
     }
     drop_common(all, false);
   }
+  number_letters(all);
   std::vector<JointName> out;
   for (const Tokens& tokens : all) out.push_back(parse_one(tokens));
   return out;
@@ -347,9 +395,11 @@ std::optional<int> finger_of(const JointName& name) {
       if (name.has(kOrdinals[i])) return static_cast<int>(i);
     }
   }
-  for (const std::string& word : name.words) {
-    const auto at = finger_words().find(word);
-    if (at != finger_words().end()) return at->second;
+  for (std::size_t i = 0; i < name.words.size(); ++i) {
+    const auto at = finger_words().find(name.words[i]);
+    const bool is_limb =
+        i + 1 < name.words.size() && (name.words[i + 1] == "arm" || name.words[i + 1] == "foot");
+    if (at != finger_words().end() && !(at->first == "fore" && is_limb)) return at->second;
   }
   return std::nullopt;
 }

@@ -19,7 +19,7 @@ struct Scheme {
   std::array<const char*, 14> names;  // '*' is the side; the limbs' begin at the sixth
 };
 
-inline constexpr std::array<Scheme, 16> kSchemes{{
+inline constexpr std::array<Scheme, 19> kSchemes{{
     {{"Left", "Right"},
      {"mixamorig:Hips", "mixamorig:Spine", "mixamorig:Spine1", "mixamorig:Spine2", "mixamorig:Neck",
       "mixamorig:Head", "mixamorig:*Shoulder", "mixamorig:*Arm", "mixamorig:*ForeArm",
@@ -77,6 +77,20 @@ inline constexpr std::array<Scheme, 16> kSchemes{{
      {"CATRigPelvis", "CATRigSpine1", "CATRigSpine2", "CATRigRibcage", "CATRigNeck", "CATRigHead",
       "CATRig*ArmCollarbone", "CATRig*Arm1", "CATRig*Arm2", "CATRig*ArmPalm", "CATRig*Leg1",
       "CATRig*Leg2", "CATRig*LegAnkle", "CATRig*LegDigit11"}},
+    // Letters that count, signs that FBX programs write as numbers, and "fore" apart from its arm.
+    {{"l", "r"},
+     {"j_kosi", "j_sebo_a", "j_sebo_b", "j_sebo_c", "j_kubi", "j_kao", "j_sako_*", "j_ude_a_*",
+      "j_ude_b_*", "j_te_*", "j_asi_a_*", "j_asi_b_*", "j_asi_c_*", "j_asi_d_*"}},
+    {{"L", "R"},
+     {"Bip01FBXASC032Pelvis", "Bip01FBXASC032Spine", "Bip01FBXASC032Spine1", "Bip01FBXASC032Spine2",
+      "Bip01FBXASC032Neck", "Bip01FBXASC032Head", "Bip01FBXASC032*FBXASC032Clavicle",
+      "Bip01FBXASC032*FBXASC032UpperArm", "Bip01FBXASC032*FBXASC032Forearm",
+      "Bip01FBXASC032*FBXASC032Hand", "Bip01FBXASC032*FBXASC032Thigh",
+      "Bip01FBXASC032*FBXASC032Calf", "Bip01FBXASC032*FBXASC032Foot",
+      "Bip01FBXASC032*FBXASC032Toe0"}},
+    {{"L", "R"},
+     {"Pelvis", "SPINE1", "SPINE2", "Chest", "Neck", "Head", "*Arm_Collarbone", "*Arm_UpperArm",
+      "*Arm_ForeArm1", "*Arm_Hand", "*Leg_Thigh", "*Leg_Calf", "*Leg_Foot", "*Leg_Toe1"}},
 }};
 
 inline constexpr int kMakerJoints = 22;  // the first bones of the enum, which are depth first

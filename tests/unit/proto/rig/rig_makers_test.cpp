@@ -29,7 +29,8 @@ double worst_deg(const rig::Rig& rig, const test::Made& made) {
 void check_made(const test::Made& made, UpAxis up, double metres_per_unit) {
   const rig::Rig rig = rig::recognise(made.input);
   CHECK(rig.kind == rig::Kind::kPerson);
-  for (int j = 0; j < test::kMakerJoints; ++j) {
+  const std::size_t bones = made.bone.empty() ? test::kMakerJoints : made.bone.size();
+  for (std::size_t j = 0; j < bones; ++j) {
     INFO(made.input.joints[j].name);
     CHECK(rig.bone[j] == (made.bone.empty() ? static_cast<Bone>(j) : made.bone[j]));
   }
@@ -84,22 +85,89 @@ test::BoneAxes some_axes(std::mt19937& random) {
   return {.along = along, .lateral = rig::axes_across(along)[random() % 4]};
 }
 
+// Joints that never turn, behind those that are there.
+void add_joints(test::Made& made, const std::vector<rig::RigJoint>& more) {
+  const auto joints = static_cast<std::ptrdiff_t>(made.input.joints.size());
+  auto& poses = made.input.poses;
+  for (std::ptrdiff_t i = poses.count; i > 0; --i) {
+    poses.rotation.insert(poses.rotation.begin() + i * joints, more.size(),
+                          Eigen::Quaterniond::Identity());
+    for (auto joint = more.rbegin(); joint != more.rend(); ++joint) {
+      poses.position.insert(poses.position.begin() + i * joints, joint->offset);
+    }
+  }
+  made.input.joints.insert(made.input.joints.end(), more.begin(), more.end());
+}
+
+// Fingers in other languages, which no table has, or without a name. Each hand has a thumb that
+// begins at the wrist and four fingers in a row; `size` is a factor of its lengths.
+constexpr std::array<std::array<const char*, kFingers>, 4> kForeignFingers{
+    {{"Pouce", "Index", "Majeur", "Annulaire", "Auriculaire"},
+     {"Daumen", "Zeigefinger", "Mittelfinger", "Ringfinger", "KleinerFinger"},
+     {"拇指", "食指", "中指", "无名指", "小指"},
+     {"Node", "Node", "Node", "Node", "Node"}}};
+
+test::Made with_fingers(test::Made made, const test::Scheme& scheme,
+                        const std::array<const char*, kFingers>& names, double metres_per_unit,
+                        double size) {
+  if (made.bone.empty()) {
+    for (int b = 0; b < test::kMakerJoints; ++b) made.bone.push_back(static_cast<Bone>(b));
+  }
+  // The first joint of a finger from the wrist, and the second from that, of a left hand [m].
+  const std::array<std::array<Vec, 2>, kFingers> places{
+      {{Vec(.02, -.005, .03), Vec(.03, -.005, .025)},
+       {Vec(.09, 0, .03), Vec(.042, 0, 0)},
+       {Vec(.092, 0, .008), Vec(.045, 0, 0)},
+       {Vec(.088, 0, -.014), Vec(.042, 0, 0)},
+       {Vec(.08, 0, -.034), Vec(.034, 0, 0)}}};
+  const std::string_view hand_name = scheme.names[9];
+  const std::string maker(hand_name.substr(0, hand_name.find('*')));
+  std::vector<rig::RigJoint> more;
+  for (const Side side : rig::kSides) {
+    const auto hand = std::ranges::find(made.bone, rig::on(side, Bone::kLeftHand));
+    const auto at = static_cast<int>(hand - made.bone.begin());
+    const Mat T = made.T[at];
+    const Vec mirror(side == Side::kLeft ? size : -size, size, size);
+    for (const int f : {3, 0, 4, 1, 2}) {  // in no order
+      int parent = at;
+      for (int i = 0; i < kFingerJoints; ++i) {
+        const Vec way = places[f][i == 0 ? 0 : 1].cwiseProduct(mirror) * (i == 2 ? 0.7 : 1.0);
+        const std::string number =
+            names[0] == names[1] ? std::to_string(more.size() + 1) : std::to_string(i + 1);
+        more.push_back(
+            {.name = maker + scheme.sides[side == Side::kLeft ? 0 : 1] + '_' + names[f] + number,
+             .parent = parent,
+             .offset = T.transpose() * way / metres_per_unit,
+             .end_site = {}});
+        parent = static_cast<int>(made.input.joints.size() + more.size()) - 1;
+      }
+    }
+  }
+  const std::array<int, kFingers> order{3, 0, 4, 1, 2};
+  for (const Side side : rig::kSides) {
+    for (const int f : order) {
+      for (int i = 0; i < kFingerJoints; ++i) {
+        const int first = static_cast<int>(Bone::kLeftThumbMetacarpal) + kFingerJoints * f;
+        made.bone.push_back(rig::on(side, static_cast<Bone>(first + i)));
+      }
+    }
+  }
+  add_joints(made, more);
+  return made;
+}
+
 // The same figure with a stick of three joints in its right hand.
 test::Made with_stick(test::Made made) {
-  const auto joints = static_cast<std::ptrdiff_t>(made.input.joints.size());
   const auto at = std::ranges::find(made.bone, Bone::kRightHand);
   int parent = made.bone.empty() ? static_cast<int>(Bone::kRightHand)
                                  : static_cast<int>(at - made.bone.begin());
   const Vec step = made.input.joints[parent].offset;
+  std::vector<rig::RigJoint> stick;
   for (const char* name : {"Item1", "Item2", "Item3"}) {
-    made.input.joints.push_back({.name = name, .parent = parent, .offset = step, .end_site = {}});
-    parent = static_cast<int>(made.input.joints.size()) - 1;
+    stick.push_back({.name = name, .parent = parent, .offset = step, .end_site = {}});
+    parent = static_cast<int>(made.input.joints.size() + stick.size()) - 1;
   }
-  auto& poses = made.input.poses;
-  for (std::ptrdiff_t i = poses.count; i > 0; --i) {
-    poses.rotation.insert(poses.rotation.begin() + i * joints, 3, Eigen::Quaterniond::Identity());
-    poses.position.insert(poses.position.begin() + i * joints, 3, step);
-  }
+  add_joints(made, stick);
   return made;
 }
 
@@ -267,7 +335,14 @@ TEST_CASE("rig: a person is recognised in every maker's names, zero pose, axes a
     }
     // A zero pose that shows the person needs no clip.
     if (seed % 3 == 0 && zero != ZeroPose::kFolded) made.input.poses = {};
-    if (seed % 7 == 0) made = with_stick(std::move(made));
+    if (seed % 4 == 1) {
+      made =
+          with_fingers(std::move(made), scheme, kForeignFingers[seed / 4 % kForeignFingers.size()],
+                       metres, about_one(0.2));
+    }
+    // Of limbs without a known name the shape alone does not tell a stick among fingers.
+    const bool known_by_shape = scheme.names[7] == std::string_view("Oberarm*");
+    if (seed % 7 == 0 && !(known_by_shape && seed % 4 == 1)) made = with_stick(std::move(made));
     if (seed % 5 == 0) {
       for (auto& joint : made.input.joints) joint.name = "Actor_1:" + joint.name;
     }
@@ -382,6 +457,123 @@ TEST_CASE("rig: a tip alone is no finger, and a numbered joint goes on in its fi
   CHECK(rig.bone[thumb] == Bone::kRightThumbMetacarpal);
   CHECK(rig.bone[second] == Bone::kRightThumbProximal);
   CHECK(rig.bone[index] == Bone::kRightIndexProximal);
+}
+
+TEST_CASE("rig: what helps beside a limb or a finger, or lies at its joint, is not taken for it") {
+  struct Added {
+    const char* name;
+    const char* parent;
+    Vec offset;
+    std::optional<Bone> bone = {};
+  };
+  constexpr const char* kHand = "mixamorig:LeftHand";
+  const auto check = [](const std::vector<Added>& added) {
+    auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+    made.input.poses = {};
+    auto& joints = made.input.joints;
+    for (const auto& [name, parent, offset, bone] : added) {
+      const auto at = std::ranges::find(joints, parent, &rig::RigJoint::name);
+      const int above = static_cast<int>(at - joints.begin());
+      joints.push_back({.name = name, .parent = above, .offset = offset, .end_site = rig::kX});
+    }
+    const rig::Rig rig = rig::recognise(made.input);
+    for (std::size_t i = 0; i < added.size(); ++i) {
+      INFO(added[i].name);
+      CHECK(rig.bone[test::kMakerJoints + i] == added[i].bone);
+    }
+  };
+  check({{"LeftFingerIndex0", kHand, {9, 0, 3}, Bone::kLeftIndexProximal},
+         {"LeftFingerIndex1", "LeftFingerIndex0", {4, 0, 0}, Bone::kLeftIndexIntermediate},
+         {"LeftFingerIndex2", "LeftFingerIndex1", {3, 0, 0}, Bone::kLeftIndexDistal},
+         {"LeftFingerIndexAux", kHand, {16, 0, 3}},
+         {"LeftFingerIndexSkin", kHand, {12, 0, 3}}});
+  check({{"LeftThumb0", kHand, {2, 0, 2}},
+         {"LeftThumb1", "LeftThumb0", {1, 0, 1}, Bone::kLeftThumbMetacarpal},
+         {"LeftThumb2", "LeftThumb1", {3, 0, 2}, Bone::kLeftThumbProximal},
+         {"LeftThumb3", "LeftThumb2", {3, 0, 2}, Bone::kLeftThumbDistal}});
+  // A number that counts the joints of one finger does not say which finger it is.
+  check({{"LeftKleinerFinger1", kHand, {8, 0, -3}},
+         {"LeftKleinerFinger2", "LeftKleinerFinger1", {3, 0, 0}},
+         {"LeftKleinerFinger3", "LeftKleinerFinger2", {2, 0, 0}}});
+}
+
+TEST_CASE("rig: fingers known by their place are less sure, and those that are not are told") {
+  const auto plain = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  auto made = with_fingers(plain, test::kSchemes[0], kForeignFingers[0], 0.01, 1.0);
+  const rig::Rig rig = rig::recognise(made.input);
+  REQUIRE(rig.notes.size() == 2);
+  CHECK(rig.notes[0] == "fingers of the left hand are known by their place only");
+  CHECK(rig.evidence.back().sure < 0.8);
+  CHECK(rig.evidence[0].sure > 0.8);
+  for (std::size_t j = test::kMakerJoints; j < made.input.joints.size(); ++j) {
+    if (made.bone[j] == Bone::kLeftThumbMetacarpal) made.input.joints[j].offset = {8.5, 0, -3};
+  }
+  const rig::Rig odd = rig::recognise(made.input);  // a thumb among the fingers
+  REQUIRE(odd.notes.size() == 2);
+  CHECK(odd.notes[0].find("neither names nor places say which") != std::string::npos);
+  CHECK_FALSE(odd.bone[test::kMakerJoints].has_value());
+}
+
+TEST_CASE("rig: of joints at one place the last one of a limb's name is the bone") {
+  std::vector<Placed> joints{{"Hips", -1, {0, .95, 0}},   {"Spine_Root", 0, {0, .95, 0}},
+                             {"Spine0", 1, {0, 1.05, 0}}, {"Spine1", 2, {0, 1.2, 0}},
+                             {"Neck", 3, {0, 1.45, 0}},   {"Head", 4, {0, 1.55, 0}}};
+  for (const bool left : {true, false}) {
+    const double x = left ? 1.0 : -1.0;
+    const auto add = [&](const char* of_left, const char* of_right, int parent, const Vec& place) {
+      joints.push_back({left ? of_left : of_right, parent, place.cwiseProduct(Vec(x, 1, 1))});
+      return static_cast<int>(joints.size()) - 1;
+    };
+    int at = add("LeftCollarBase", "RightCollarBase", 3, {0, 1.2, 0});
+    at = add("LeftShoulder", "RightShoulder", at, {.03, 1.42, 0});
+    at = add("LeftUpperArmBase", "RightUpperArmBase", at, {.17, 1.42, 0});
+    at = add("LeftUpperArm", "RightUpperArm", at, {.17, 1.42, 0});
+    at = add("LeftLowerArmRoot", "RightLowerArmRoot", at, {.45, 1.42, 0});
+    at = add("LeftLowerArm", "RightLowerArm", at, {.45, 1.42, 0});
+    add("LeftHand", "RightHand", at, {.7, 1.42, 0});
+    at = add("LeftUpperLeg", "RightUpperLeg", 0, {.09, .9, 0});
+    at = add("LeftLowerLeg", "RightLowerLeg", at, {.09, .49, 0});
+    at = add("LeftFoot", "RightFoot", at, {.09, .09, 0});
+    at = add("LeftForeFoot", "RightForeFoot", at, {.09, .05, .07});
+    add("LeftToeBase", "RightToeBase", at, {.09, .02, .13});
+  }
+  const rig::Rig rig = recognise(joints);
+  CHECK(joint_of(rig, joints, Bone::kSpine) == "Spine0");
+  CHECK(joint_of(rig, joints, Bone::kLeftShoulder) == "LeftShoulder");
+  CHECK(joint_of(rig, joints, Bone::kRightUpperArm) == "RightUpperArm");
+  CHECK(joint_of(rig, joints, Bone::kLeftLowerArm) == "LeftLowerArm");
+  CHECK(joint_of(rig, joints, Bone::kLeftToes) == "LeftToeBase");
+}
+
+TEST_CASE("rig: a limb whose joints are only counted is known by its lengths") {
+  // A calf's helper has a letter of its own.
+  std::vector<Placed> joints{{"kosi", -1, {0, .95, 0}},
+                             {"sebo", 0, {0, 1.2, 0}},
+                             {"kubi", 1, {0, 1.45, 0}},
+                             {"kao", 2, {0, 1.55, 0}}};
+  for (const bool left : {true, false}) {
+    const double x = left ? 1.0 : -1.0;
+    const auto add = [&](const char* of_left, const char* of_right, int parent, const Vec& place) {
+      joints.push_back({left ? of_left : of_right, parent, place.cwiseProduct(Vec(x, 1, 1))});
+      return static_cast<int>(joints.size()) - 1;
+    };
+    int at = add("arm_a_l", "arm_a_r", 1, {.17, 1.42, 0});
+    at = add("arm_b_l", "arm_b_r", at, {.45, 1.42, 0});
+    add("arm_d_l", "arm_d_r", at, {.7, 1.42, 0});
+    at = add("asi_a_l", "asi_a_r", 0, {.09, .9, 0});
+    at = add("asi_b_l", "asi_b_r", at, {.09, .49, 0});
+    at = add("asi_c_l", "asi_c_r", at, {.09, .29, 0});
+    at = add("asi_d_l", "asi_d_r", at, {.09, .09, 0});
+    add("asi_e_l", "asi_e_r", at, {.09, .02, .13});
+  }
+  const rig::Rig rig = recognise(joints);
+  CHECK(joint_of(rig, joints, Bone::kLeftUpperArm) == "arm_a_l");
+  CHECK(joint_of(rig, joints, Bone::kLeftLowerArm) == "arm_b_l");
+  CHECK(joint_of(rig, joints, Bone::kRightHand) == "arm_d_r");
+  CHECK(joint_of(rig, joints, Bone::kLeftUpperLeg) == "asi_a_l");
+  CHECK(joint_of(rig, joints, Bone::kLeftLowerLeg) == "asi_b_l");
+  CHECK(joint_of(rig, joints, Bone::kRightFoot) == "asi_d_r");
+  CHECK(joint_of(rig, joints, Bone::kRightToes) == "asi_e_r");
 }
 
 TEST_CASE("rig: a hand that no name gives a side is told by how its fingers bend, else asked for") {
