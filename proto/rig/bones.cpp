@@ -13,25 +13,37 @@ constexpr std::size_t kFingerBones = 15;
 
 bool is_finger(const JointName& name) { return finger_of(name) || is_any_finger(name); }
 
-// A hand alone: most joints are named as fingers.
+// A hand alone: most joints are named as fingers, or the whole has the shape of one.
 std::optional<BoneJoints> find_hand(const Figure& figure, const std::vector<JointName>& names,
-                                    SidesBy& sides_by) {
+                                    SidesBy& sides_by, std::vector<std::string>& notes) {
   std::vector<int> fingers;
   int sides = 0;
   bool named = false;
   for (int j = 0; j < figure.size(); ++j) {
-    if (!is_finger(names[j]) || arm_fit(names[j])) continue;  // "fore" is a finger, a forearm none
-    fingers.push_back(j);
     const int side = static_cast<int>(names[j].side);
     sides += side;
     named = named || side != 0;
+    if (!is_finger(names[j]) || arm_fit(names[j])) continue;  // "fore" is a finger, a forearm none
+    fingers.push_back(j);
   }
-  if (fingers.size() < 6 || 10 * fingers.size() < 6 * names.size()) return std::nullopt;
+  const bool by_name = fingers.size() >= 6 && 10 * fingers.size() >= 6 * names.size();
+  const auto shape = by_name ? std::nullopt : hand_by_shape(figure);
+  if (!by_name && !shape) return std::nullopt;
   const Side side = sides > 0 ? Side::kLeft : Side::kRight;
   if (!named) sides_by = SidesBy::kNothing;
   BoneJoints bones;
-  bones.set(on(side, Bone::kLeftHand), figure.common(fingers));
-  find_fingers(figure, names, side, bones);
+  bones.set(on(side, Bone::kLeftHand), shape ? shape->palm : figure.common(fingers));
+  if (!shape) {
+    find_fingers(figure, names, side, bones);
+    return bones;
+  }
+  notes.emplace_back("a hand by its shape: which finger is which is known by their places only");
+  for (int b = 0; b < kFingers * kFingerJoints; ++b) {
+    const auto& joints = shape->fingers[b / kFingerJoints];
+    const std::size_t at = b % kFingerJoints;
+    const auto left = static_cast<Bone>(static_cast<int>(Bone::kLeftThumbMetacarpal) + b);
+    if (at < joints.size()) bones.set(on(side, left), joints[at]);
+  }
   return bones;
 }
 
@@ -383,7 +395,7 @@ FoundBones find_bones(const Figure& figure, const std::vector<JointName>& names)
   const bool by_shape = !out.joint.has_limbs();
   if (!by_shape) settle_limbs(figure, names, out.joint);
   if (by_shape) {
-    if (const auto hand = find_hand(figure, names, out.sides_by)) {
+    if (const auto hand = find_hand(figure, names, out.sides_by, out.notes)) {
       out.kind = Kind::kHand;
       out.joint = *hand;
       return out;

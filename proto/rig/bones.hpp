@@ -77,6 +77,16 @@ void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJ
                                                        const std::vector<JointName>& names,
                                                        SidesBy& sides_by, int without = -1);
 
+// A hand without a body, and the joints of its fingers, thumb first.
+struct HandShape {
+  int palm = 0;
+  std::array<std::vector<int>, kFingers> fingers;
+};
+
+// The hand that is the whole figure: one joint that spreads five short chains, of which the
+// shortest reach is the thumb's. Empty for anything else.
+[[nodiscard]] std::optional<HandShape> hand_by_shape(const Figure& figure);
+
 // Pelvis, trunk, neck and head from where the limbs begin.
 void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones,
                 std::vector<std::string>& notes);

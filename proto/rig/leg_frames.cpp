@@ -8,6 +8,9 @@ constexpr std::size_t at(Side side) { return static_cast<std::size_t>(side); }
 Vec mirror(const Vec& v) { return {-v.x(), v.y(), v.z()}; }
 
 constexpr double kStraightShin_deg = 15;  // of a figure whose legs are together
+constexpr double kToeAside_deg = 20;      // of a foot's outer toes
+constexpr double kSureLateral = 0.75;
+constexpr double kOnAxis_deg = 1;
 
 }  // namespace
 
@@ -92,8 +95,8 @@ void Frames::folded_legs(const Both& thigh) {
     leg(side, frame(thigh[at(side)], -kY, order[0].axis, kX), clear ? 0.9 : 0.2,
         "bone axis and knee (" + short_text(best, 2) + ", next best " + short_text(second, 2) +
             ")");
-    folded_foot(side, sure(on(side, Bone::kLeftLowerLeg)));
   }
+  for (const Side side : kSides) folded_foot(side, sure(on(side, Bone::kLeftLowerLeg)));
 }
 
 // Each local axis across the thigh: does the knee bend about it, forwards, and does it stay with
@@ -159,31 +162,50 @@ void Frames::real_foot(Side side, double sure_foot, const std::string& why, bool
   }
 }
 
-// Of a folded foot, the lateral axis is the one that stays nearest to the shin's, and the sole
-// slopes as in standing feet of the clip, else as a foot of this length does.
+// Of a folded foot, the local axis that stays nearest to the shin's lateral one.
+Frames::Lateral Frames::foot_lateral(Side side, const Vec& way) const {
+  const int foot = joint_[on(side, Bone::kLeftFoot)];
+  const int shin = joint_[on(side, Bone::kLeftLowerLeg)];
+  const Vec left = t_frame(on(side, Bone::kLeftLowerLeg))->transpose() * kX;
+  Lateral best{.axis = kX, .score = -2.0};
+  for (const Vec& axis : axes_across(way)) {
+    const double score = motion_.mean(
+        [&](int i) { return (motion_.world(i, foot) * axis).dot(motion_.world(i, shin) * left); });
+    if (score > best.score) best = {.axis = axis, .score = score};
+  }
+  return best;
+}
+
+// Ahead in a folded foot: the way to the toes. Where bones lie along local axes, its part aside is
+// the place of one toe and no turn of the foot, unless that is too much for a toe.
+std::optional<Vec> Frames::folded_way(Side side) const {
+  const auto way = foot_way(side);
+  if (!way) return std::nullopt;
+  const auto shin = rest(on(side, Bone::kLeftLowerLeg), {on(side, Bone::kLeftFoot)});
+  const Lateral lateral = foot_lateral(side, *way);
+  const bool is_toe = std::abs(way->dot(lateral.axis)) < std::sin(kToeAside_deg * kDegree) &&
+                      shin && nearest_axis(direction(*shin), kOnAxis_deg);
+  return is_toe && lateral.score > kSureLateral ? direction(across(*way, lateral.axis)) : *way;
+}
+
+// The sole of a folded foot slopes as in standing feet of the clip, else as a foot of this length
+// does.
 void Frames::folded_foot(Side side, double sure_leg) {
   const Bone foot = on(side, Bone::kLeftFoot);
-  const int shin = joint_[on(side, Bone::kLeftLowerLeg)];
   if (!joint_.has(foot)) return;
   const Mat Tl = *t_frame(on(side, Bone::kLeftLowerLeg));
   Mat Tf = Tl;
   double sure_foot = 0.3;
   std::string why = "a foot without length: goes with the shin";
-  if (const auto way = foot_way(side)) {
+  if (const auto way = folded_way(side)) {
     if (why_sole_.empty()) find_sole();
     const double guess =
         std::asin(std::min(0.6, 0.075 * leg_length() / std::max(foot_length(side), 1e-9)));
     const double slope = sole_.value_or(guess);
-    Lateral best{.axis = kX, .score = -2.0};
-    for (const Vec& axis : axes_across(*way)) {
-      const double score = motion_.mean([&](int i) {
-        return (motion_.world(i, joint_[foot]) * axis)
-            .dot(motion_.world(i, shin) * (Tl.transpose() * kX));
-      });
-      if (score > best.score) best = {.axis = axis, .score = score};
-    }
+    const Lateral best = foot_lateral(side, *way);
     Tf = frame(*way, Vec(0, -std::sin(slope), std::cos(slope)), best.axis, kX);
-    sure_foot = (sole_ ? sure_leg : std::min(sure_leg, 0.4)) * (best.score > 0.75 ? 1.0 : 0.4);
+    sure_foot =
+        (sole_ ? sure_leg : std::min(sure_leg, 0.4)) * (best.score > kSureLateral ? 1.0 : 0.4);
     why = "folded foot: ankle to toes sloped " + short_text(slope / kDegree, 0) + " degrees " +
           why_sole_;
   }
@@ -254,7 +276,7 @@ void Frames::find_sole() {
 
 // Adds the slope from ankle to toes of each frame in which the foot is low and slow [rad].
 void Frames::add_slopes(Side side, std::vector<double>& slopes) const {
-  const auto way = foot_way(side);
+  const auto way = folded_way(side);
   if (!way) return;
   const int joint = joint_[on(side, Bone::kLeftFoot)];
   const Vec up = up_turn(up_).transpose() * kY;

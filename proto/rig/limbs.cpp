@@ -1,3 +1,4 @@
+#include <cmath>
 #include <span>
 
 #include "proto/rig/bones.hpp"
@@ -129,6 +130,100 @@ int shoulder_of(const Figure& figure, const std::vector<JointName>& names, int c
   return found;
 }
 
+// The pieces of a limb that its maker tells apart by numbers only, from `first` on, and what ends
+// them: a joint with their name and "end", else `end` if it is not -1.
+struct Pieces {
+  std::vector<int> joint;
+  bool has_end = false;  // the last joint is where the limb ends, and no piece
+
+  [[nodiscard]] std::size_t size() const { return joint.size(); }
+};
+
+Pieces pieces_of(const Figure& figure, const std::vector<JointName>& names, int first, int end) {
+  Pieces out;
+  const auto below = [&](int joint, const std::string& stem) {
+    const auto& children = figure.children(joint);
+    const auto at = std::ranges::find_if(children, [&](int child) {
+      return names[child].stem == stem && names[child].side == names[first].side;
+    });
+    return at == children.end() ? -1 : *at;
+  };
+  for (int joint = first; joint >= 0; joint = below(joint, names[first].stem)) {
+    out.joint.push_back(joint);
+  }
+  const int last = out.joint.back();
+  const int named = below(last, names[first].stem + "end");
+  if (named >= 0) end = named;
+  out.has_end = end >= 0 && end != last && figure.below(last, end);
+  if (out.has_end) out.joint.push_back(end);
+  return out;
+}
+
+// Where a limb begins, bends and ends, among its pieces.
+struct Cut {
+  std::size_t begin = 0, bend = 0, end = 0;
+};
+
+// A limb is two bones nearly as long as each other. Of several cuts the one at which the zero pose
+// bends counts, else the one nearest to equal halves; where no name says the end, the longest.
+std::optional<Cut> cut_of(const Figure& figure, const Pieces& pieces) {
+  constexpr double kBent_deg = 8;
+  constexpr double kBend = 0.3;
+  constexpr std::size_t kMost = 16;
+  const std::size_t count = pieces.size();
+  if (count > kMost) return std::nullopt;
+  const auto way = [&](std::size_t from, std::size_t to) {
+    return figure.between(pieces.joint[from], pieces.joint[to]).value_or(Vec::Zero());
+  };
+  const double widest = pieces.has_end ? 1.5 : 1.25;  // of the longer bone to the other
+  for (std::size_t begin = 0; begin + 2 < count; ++begin) {
+    std::optional<Cut> best;
+    double best_score = -1e300;
+    for (std::size_t end = pieces.has_end ? count - 1 : begin + 2; end < count; ++end) {
+      for (std::size_t bend = begin + 1; bend < end; ++bend) {
+        const double upper = way(begin, bend).norm();
+        const double lower = way(bend, end).norm();
+        const double unequal = std::max(upper, lower) / std::max(std::min(upper, lower), 1e-9);
+        if (unequal > widest) continue;
+        const double bent_deg = angle_deg(way(bend - 1, bend), way(bend, bend + 1));
+        const double score =
+            std::log(upper + lower) - std::log(unequal) + (bent_deg > kBent_deg ? kBend : 0.0);
+        if (score <= best_score) continue;
+        best_score = score;
+        best = Cut{.begin = begin, .bend = bend, .end = end};
+      }
+    }
+    if (best) return best;
+  }
+  return std::nullopt;
+}
+
+// Where names say no more of a limb than its pieces, their lengths tell the bones. `upper` is the
+// upper one's place in the chain.
+void settle_pieces(const Figure& figure, const std::vector<JointName>& names, std::size_t upper,
+                   std::array<int, kSlots>& chain) {
+  const int first = chain[upper];
+  const int lower = chain[upper + 1];
+  if (first < 0 || lower < 0 || names[first].stem != names[lower].stem) return;
+  const int known = chain[upper + 2];
+  auto pieces = pieces_of(figure, names, first, known);
+  if (!pieces.has_end) {
+    const int next = next_of_limb(figure, names, pieces.joint.back(), -1);
+    if (next >= 0) pieces.joint.push_back(next);
+  }
+  const auto cut = cut_of(figure, pieces);
+  if (!cut) return;
+  const int end = pieces.joint[cut->end];
+  chain[upper] = pieces.joint[cut->begin];
+  chain[upper + 1] = pieces.joint[cut->bend];
+  chain[upper + 2] = end;
+  const bool is_leg = upper == 0;
+  if (!is_leg || chain[3] >= 0) return;
+  // What was called the foot is the ball of one that ends the leg.
+  if (known >= 0 && known != end && figure.below(end, known)) chain[3] = known;
+  if (chain[3] < 0 && cut->end + 1 < pieces.size()) chain[3] = pieces.joint[cut->end + 1];
+}
+
 }  // namespace
 
 void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones) {
@@ -140,6 +235,7 @@ void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJ
       if (names[j].side == wanted) fits[j] = fit_of(names[j]);
     }
     auto chain = best_chain(figure, fits, needed);
+    settle_pieces(figure, names, first == Bone::kLeftUpperLeg ? 0 : 1, chain);
     const std::size_t end = first == Bone::kLeftUpperLeg ? 2 : 3;  // foot or hand
     if (chain[end - 1] >= 0 && chain[end] < 0) {
       chain[end] = next_of_limb(figure, names, chain[end - 1], end == 2 ? chain[3] : -1);

@@ -245,6 +245,7 @@ Rig recognise(const RigInput& input) {
   }
   const bool by_format = input.format_says && !frames.up_by_zero_pose();
   rig.up = input.up.value_or(by_format ? UpAxis::kPlusY : frames.up());
+  if (!input.up && !by_format && !frames.up_doubt().empty()) notes.push_back(frames.up_doubt());
   rig.why_up = by_format && !input.up ? "as the format says" : frames.why_up();
   if (!knows_all_frames(input, rig.bone)) {
     rig.notes.insert(rig.notes.begin(), notes.begin(), notes.end());

@@ -61,11 +61,70 @@ std::vector<Pair> find_pairs(const Figure& figure) {
   return pairs;
 }
 
+Vec way_to_tip(const Figure& figure, int from, const std::vector<int>& chain) {
+  return figure.between(from, chain.back()).value_or(Vec::Zero()) +
+         figure[chain.back()].end_site.value_or(Vec::Zero());
+}
+
+// The chains below a joint that spreads them as a palm its fingers: four to six of a few joints
+// each, which do not split, are not far from as long as each other, and lead the same way.
+std::vector<std::vector<int>> spread_at(const Figure& figure, int palm) {
+  constexpr std::size_t kMost = 6;
+  constexpr int kLongest = 5;  // a bone in the palm, and a tip
+  constexpr double kApart_deg = 100;
+  const auto& children = figure.children(palm);
+  std::vector<std::vector<int>> chains;
+  std::vector<Vec> ways;
+  if (children.size() < 4 || children.size() > kMost) return chains;
+  for (const int child : children) {
+    const int joints = figure.main_chain_length(child);
+    if (joints < 2 || joints > kLongest) return {};
+    chains.push_back(figure.main_chain(child));
+    const bool splits = std::ranges::any_of(
+        chains.back(), [&figure](int joint) { return figure.children(joint).size() > 1; });
+    if (splits) return {};
+    ways.push_back(way_to_tip(figure, palm, chains.back()));
+  }
+  for (const Vec& a : ways) {
+    for (const Vec& b : ways) {
+      if (angle_deg(a, b) > kApart_deg || a.norm() > 3 * b.norm()) return {};
+    }
+  }
+  return chains;
+}
+
+// Legs and arms hang on one trunk, none in another. The joint of the legs is above that of the
+// arms, or each is on a branch of its own. Fingers of two hands are no limbs.
 bool fit_together(const Figure& figure, const Pair& legs, const Pair& arms) {
-  return figure.below(legs.parent, arms.parent) && !figure.below(legs.one, arms.parent) &&
-         !figure.below(legs.other, arms.parent) && !figure.below(arms.one, legs.parent) &&
-         !figure.below(arms.one, legs.one) && arms.length >= 0.4 * legs.length &&
-         arms.length <= 1.5 * legs.length;
+  const auto in = [&figure](const Pair& pair, int joint) {
+    return figure.below(pair.one, joint) || figure.below(pair.other, joint);
+  };
+  const bool overlap = in(arms, legs.one) || in(arms, legs.other);
+  const bool one_trunk =
+      figure.below(legs.parent, arms.parent) || !figure.below(arms.parent, legs.parent);
+  const bool are_fingers =
+      !spread_at(figure, legs.parent).empty() && !spread_at(figure, arms.parent).empty();
+  return one_trunk && !in(legs, arms.parent) && !in(arms, legs.parent) && !overlap &&
+         arms.length >= 0.4 * legs.length && arms.length <= 1.5 * legs.length && !are_fingers;
+}
+
+// Number of joints from where the legs' branch leaves the trunk of the arms to the legs.
+int branched_off(const Figure& figure, const Pair& legs, const Pair& arms) {
+  return figure.depth(legs.parent) - figure.depth(figure.common({legs.parent, arms.parent}));
+}
+
+// The first segments, as far as both sides' are alike: behind them a hand may hold a prop.
+std::vector<double> shared_segments(const std::vector<double>& one,
+                                    const std::vector<double>& other) {
+  constexpr double kAlike = 0.75;
+  constexpr std::size_t kLeast = 3;
+  std::vector<double> out;
+  for (std::size_t i = 0; i < std::min(one.size(), other.size()); ++i) {
+    const auto [less, more] = std::minmax(one[i], other[i]);
+    if (i >= kLeast && less < kAlike * more) break;
+    out.push_back(less);
+  }
+  return out;
 }
 
 // Where the longest two consecutive segments of a limb begin: thigh and shin, upper and lower arm.
@@ -85,7 +144,7 @@ std::size_t long_bones(const std::vector<double>& segments, bool arm) {
 void set_limb(const Figure& figure, const Pair& pair, bool arm, BoneJoints& bones) {
   const auto one = figure.segments(figure.main_chain(pair.one));
   const auto other = figure.segments(figure.main_chain(pair.other));
-  const std::size_t first = long_bones(one.size() < other.size() ? one : other, arm);
+  const std::size_t first = long_bones(shared_segments(one, other), arm);
   for (const Side side : kSides) {
     const auto chain = figure.main_chain(side == Side::kLeft ? pair.one : pair.other);
     for (std::size_t k = 0; k < 4; ++k) {
@@ -206,7 +265,8 @@ std::optional<BoneJoints> limbs_by_shape(const Figure& figure, const std::vector
       // Many equal limbs at one joint are a spider's.
       if (leg.parent == arm.parent && pairs_at(leg.parent) > 4) continue;
       // Arms begin above the legs: strands of a skirt do not. Wings and capes are longer than arms.
-      const double beside = leg.parent == arm.parent ? 0.3 * leg.length : 0.0;
+      const int off = leg.parent == arm.parent ? 1 : branched_off(figure, leg, arm);
+      const double beside = 0.3 * leg.length * off;
       const double too_long = std::max(0.0, arm.length - 0.85 * leg.length);
       const double score =
           leg.length + arm.length - 2 * too_long - beside - 0.01 * figure.depth(leg.parent);
@@ -223,6 +283,49 @@ std::optional<BoneJoints> limbs_by_shape(const Figure& figure, const std::vector
   if (!bones.has_limbs()) return std::nullopt;
   settle_sides(figure, names, bones, sides_by);
   return bones;
+}
+
+std::optional<HandShape> hand_by_shape(const Figure& figure) {
+  HandShape hand;
+  while (figure.children(hand.palm).size() == 1) hand.palm = figure.children(hand.palm).front();
+  auto chains = spread_at(figure, hand.palm);
+  if (chains.size() != hand.fingers.size()) return std::nullopt;
+  Vec along = Vec::Zero();
+  for (const auto& chain : chains) along += direction(way_to_tip(figure, hand.palm, chain));
+  const auto reach = [&](const std::vector<int>& chain) {
+    return way_to_tip(figure, hand.palm, chain).dot(direction(along));
+  };
+  std::ranges::stable_sort(chains, {}, reach);
+  constexpr double kThumb = 0.95;  // a thumb ends before a little finger does
+  if (reach(chains[0]) > kThumb * reach(chains[1])) return std::nullopt;
+  const auto place = [&](int joint) {
+    return figure.between(hand.palm, joint).value_or(Vec::Zero());
+  };
+  // The others stand in a row, which begins on the thumb's side.
+  Vec row = Vec::Zero();
+  Vec middle = Vec::Zero();
+  for (std::size_t a = 1; a < chains.size(); ++a) {
+    middle += place(chains[a].front()) / 4;
+    for (std::size_t b = 1; b < a; ++b) {
+      const Vec way = place(chains[a].front()) - place(chains[b].front());
+      if (way.norm() > row.norm()) row = way;
+    }
+  }
+  const double thumb = (place(chains[0][chains[0].size() / 2]) - middle).dot(row);
+  if (std::abs(thumb) < 0.2 * row.squaredNorm()) return std::nullopt;
+  if (thumb > 0.0) row = -row;
+  std::stable_sort(chains.begin() + 1, chains.end(), [&](const auto& a, const auto& b) {
+    return place(a.front()).dot(row) < place(b.front()).dot(row);
+  });
+  for (std::size_t f = 0; f < chains.size(); ++f) {
+    auto& chain = chains[f];
+    const bool in_palm = f > 0 && chain.size() > kFingerJoints &&
+                         figure[chain[0]].offset.norm() < figure[chain[1]].offset.norm();
+    if (in_palm) chain.erase(chain.begin());
+    if (chain.size() > kFingerJoints) chain.resize(kFingerJoints);
+    hand.fingers[f] = std::move(chain);
+  }
+  return hand;
 }
 
 }  // namespace posed::rig

@@ -49,6 +49,7 @@ class Frames {
   [[nodiscard]] const Evidence& evidence(Bone bone) const { return evidence_[index(bone)]; }
   [[nodiscard]] UpAxis up() const { return up_; }
   [[nodiscard]] const std::string& why_up() const { return why_up_; }
+  [[nodiscard]] const std::string& up_doubt() const { return up_doubt_; }  // empty: none
   [[nodiscard]] bool up_by_zero_pose() const { return up_by_zero_pose_; }
   [[nodiscard]] double leg_length() const;
   [[nodiscard]] double hand_length(Side side) const;
@@ -81,6 +82,8 @@ class Frames {
   void head(Bone before, const Mat& T, double sure_now, const std::string& why);
   [[nodiscard]] int foot(Side side) const;
   [[nodiscard]] bool walks(const Vec& up) const;
+  [[nodiscard]] bool is_above_floor(const Vec& place, const Vec& up) const;
+  [[nodiscard]] std::optional<UpAxis> up_by_root() const;
   void find_up();
   void legs();
   [[nodiscard]] bool legs_by_feet(const Both& thigh);
@@ -92,6 +95,8 @@ class Frames {
   enum class Sole : std::uint8_t { kFlat, kAlongShin, kUnclear };
   [[nodiscard]] Sole sole_of(Side side, const Mat& T_flat, const Mat& T_shin) const;
   [[nodiscard]] std::optional<Vec> foot_way(Side side) const;
+  [[nodiscard]] Lateral foot_lateral(Side side, const Vec& way) const;
+  [[nodiscard]] std::optional<Vec> folded_way(Side side) const;
   [[nodiscard]] std::optional<Vec> toe_way(Side side) const;
   [[nodiscard]] double foot_length(Side side) const;
   void find_sole();
@@ -125,6 +130,7 @@ class Frames {
   Vec zero_up_ = kY;
   UpAxis up_ = UpAxis::kPlusY;
   std::string why_up_;
+  std::string up_doubt_;
   bool up_by_zero_pose_ = false;
   Bone top_ = Bone::kHips;  // the trunk bone that carries the arms
   int carrier_ = 0;         // the joint that carries them

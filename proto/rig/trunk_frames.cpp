@@ -19,6 +19,20 @@ std::vector<Mat> axis_rotations() {
 constexpr std::string_view kContinues = "continues the bone below";
 constexpr double kUpright_deg = 50;
 
+// How well an axis serves as up of a clip.
+struct Score {
+  UpAxis up{};
+  double stand = 0.0;  // share of the poses in which the trunk is upright
+  double above = 0.0;  // in which the hips are well above the lower foot
+  double mean = 0.0;   // of the trunk's part along the axis
+};
+
+std::string doubt_of(const Score& other) {
+  return "which axis points up is not sure: the zero pose is folded, and the trunk points along " +
+         std::string(up_text(other.up)) + " in " + short_text(100 * other.stand, 0) +
+         " of 100 frames: if the person stands there, say so (up)";
+}
+
 }  // namespace
 
 // Left from the hip joints; up from the whole figure, or from the trunk where it is folded.
@@ -213,14 +227,32 @@ int Frames::foot(Side side) const {
   return joint_[joint_.has(bone) ? bone : on(side, Bone::kLeftLowerLeg)];
 }
 
+// Whether `place` of the hips in the file is as high above its origin as those of who is on a floor
+// through it.
+bool Frames::is_above_floor(const Vec& place, const Vec& up) const {
+  const double height = place.dot(up) / leg_length();
+  return height > 0.4 && height < 1.6;
+}
+
+// The axis along which a folded zero pose has its hips a leg above the file's origin, and nowhere
+// else: as of a figure that stands there.
+std::optional<UpAxis> Frames::up_by_root() const {
+  const Vec place =
+      figure_.between(0, joint_[Bone::kHips]).value_or(Vec::Zero()) + figure_[0].offset;
+  for (const UpAxis axis : kUpAxes) {
+    const Vec up = up_turn(axis).transpose() * kY;
+    constexpr double kAside = 0.2;
+    const double aside = across(place, up).norm();
+    if (place.dot(up) > 0.8 * leg_length() && is_above_floor(place, up) &&
+        aside < kAside * leg_length()) {
+      return axis;
+    }
+  }
+  return std::nullopt;
+}
+
 // +y unless the zero pose stands along another axis, or every sign in the clip speaks against it.
 void Frames::find_up() {
-  struct Score {
-    UpAxis up{};
-    double stand = 0.0;  // share of the poses in which the trunk is upright
-    double above = 0.0;  // in which the hips are well above the lower foot
-    double mean = 0.0;   // of the trunk's part along the axis
-  };
   const int hips = joint_[Bone::kHips];
   const Vec pelvis = t_frame(Bone::kHips)->transpose() * kY;
   const double half_leg = 0.5 * leg_length();
@@ -244,17 +276,25 @@ void Frames::find_up() {
     if (upright_ && zero == nullptr && up.dot(zero_up_) > 0.9) zero = &score;
   }
   const Score& best = *std::ranges::max_element(scores, {}, &Score::mean);
-  const auto expected = [&](UpAxis up) {
-    const bool is_profile = known_[index(Bone::kHips)].has_value();
-    return !is_profile && (zero == nullptr || up == UpAxis::kPlusZ);
+  const bool is_profile = known_[index(Bone::kHips)].has_value();
+  const auto by_root = up_by_root();
+  const bool root_says = !upright_ && !is_profile && by_root;
+  const UpAxis root_up = root_says ? by_root.value_or(UpAxis::kPlusY) : UpAxis::kPlusY;
+  const auto expected = [&](const Vec& up) {
+    if (is_profile) return false;
+    if (zero != nullptr) return up == kZ;
+    const double often = motion_.mean(
+        [&](int i) { return is_above_floor(motion_.position(i, hips), up) ? 1.0 : 0.0; });
+    return often > 0.9 && (!root_says || up_turn(root_up).transpose() * kY == up);
   };
+  const Vec best_up = up_turn(best.up).transpose() * kY;
+  const bool stands = best.stand > 0.9 && best.above > 0.9 && (expected(best_up) || walks(best_up));
   const double y_mean = scores.front().mean;
   if (zero != nullptr && zero->mean > 0.3) {
     up_ = zero->up;
     why_up_ = "the zero pose stands along it";
     up_by_zero_pose_ = true;
-  } else if (best.up != UpAxis::kPlusY && best.stand > 0.9 && best.above > 0.9 && y_mean < 0.35 &&
-             (expected(best.up) || walks(up_turn(best.up).transpose() * kY))) {
+  } else if (best.up != UpAxis::kPlusY && y_mean < 0.35 && stands) {
     up_ = best.up;
     why_up_ = "the figure stands along it in more than nine frames of ten";
     if (zero != nullptr) {
@@ -262,10 +302,18 @@ void Frames::find_up() {
                        ", but the clip along " + std::string(up_text(up_)) +
                        ": if the person lies, say which axis points up");
     }
+  } else if (root_up != UpAxis::kPlusY && !stands) {
+    up_ = root_up;
+    why_up_ = "the hips are a leg above the origin in the zero pose";
   } else {
     const bool z = zero != nullptr && zero->up == UpAxis::kPlusZ && y_mean < 0.3;
     up_ = z ? UpAxis::kPlusZ : UpAxis::kPlusY;
     why_up_ = "as BVH is by default";
+    const Score& other =
+        *std::max_element(scores.begin() + 1, scores.end(),
+                          [](const Score& a, const Score& b) { return a.stand < b.stand; });
+    const bool is_known = zero != nullptr || is_profile || by_root;
+    if (!is_known && other.stand > 0.3) up_doubt_ = doubt_of(other);
   }
 }
 

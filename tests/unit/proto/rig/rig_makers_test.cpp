@@ -1,3 +1,4 @@
+#include <map>
 #include <random>
 
 #include <catch2/catch.hpp>
@@ -77,6 +78,12 @@ test::Made legs_on_spine(test::Made made) {
     }
   }
   return made;
+}
+
+// A turn of axes onto axes.
+Mat axis_turn(std::mt19937& random) {
+  const Vec to = rig::kAxes[random() % rig::kAxes.size()];
+  return rig::frame(rig::kX, to, rig::kZ, rig::axes_across(to)[random() % 4]);
 }
 
 // Any local axis along the bones, and any of the four across it.
@@ -715,6 +722,246 @@ TEST_CASE("rig: what a caller knows goes before what is recognised") {
   CHECK(rig.T[static_cast<std::size_t>(Bone::kLeftHand)].isApprox(known));
   CHECK(rig.metres_per_unit == 0.02);
   CHECK(rig.up == UpAxis::kMinusZ);
+}
+
+// The same figure without names, and with a joint of its own for the legs beside the spine.
+test::Made unnamed_with_pelvis(test::Made made, bool has_pelvis) {
+  auto& joints = made.input.joints;
+  if (has_pelvis) {
+    const auto first = static_cast<int>(Bone::kLeftUpperLeg);  // the limbs' last eight are the legs
+    joints.insert(joints.begin() + first,
+                  {.name = "", .parent = 0, .offset = Vec::Zero(), .end_site = {}});
+    for (std::size_t j = first + 1; j < joints.size(); ++j) {
+      joints[j].parent = joints[j].parent == 0 ? first : joints[j].parent + 1;
+    }
+  }
+  for (std::size_t j = 0; j < joints.size(); ++j) joints[j].name = "J" + std::to_string(j);
+  made.input.poses = {};
+  return made;
+}
+
+TEST_CASE(
+    "rig: the legs may hang on a joint of their own beside the spine, and a hand hold swords") {
+  std::mt19937 random(5);
+  for (const bool has_pelvis : {false, true}) {
+    for (const ZeroPose zero : {ZeroPose::kT, ZeroPose::kA, ZeroPose::kArmsDown}) {
+      for (const double sword_m : {0.0, 1.3}) {
+        const test::Build build{.height = 0.8 + 0.1 * below(random, 5), .axes = {}};
+        auto made = unnamed_with_pelvis(
+            test::make(test::kSchemes[0], zero, yaw(30.0 * below(random, 12)), 0.01, 0, 1, build),
+            has_pelvis);
+        auto& joints = made.input.joints;
+        for (const Bone hand : {Bone::kLeftHand, Bone::kRightHand}) {
+          if (sword_m <= 0.0) continue;
+          int parent = static_cast<int>(hand);
+          const double length = hand == Bone::kLeftHand ? sword_m : sword_m / 2;
+          for (const Vec& way : {Vec(0, -7, 10), Vec(10, 10, 100 * length)}) {
+            const auto name = "J" + std::to_string(joints.size());
+            joints.push_back({.name = name, .parent = parent, .offset = way, .end_site = {}});
+            parent = static_cast<int>(joints.size()) - 1;
+          }
+        }
+        INFO("zero pose " << static_cast<int>(zero) << ", sword " << sword_m << " m");
+        const rig::Rig rig = rig::recognise(made.input);
+        REQUIRE(rig.kind == rig::Kind::kPerson);
+        for (const Bone bone :
+             {Bone::kHips, Bone::kHead, Bone::kLeftShoulder, Bone::kLeftUpperArm,
+              Bone::kLeftLowerArm, Bone::kLeftHand, Bone::kRightHand, Bone::kLeftUpperLeg,
+              Bone::kRightLowerLeg, Bone::kRightFoot, Bone::kRightToes}) {
+          const auto b = static_cast<std::size_t>(bone);
+          const bool leg = bone >= Bone::kLeftUpperLeg && has_pelvis;
+          INFO(bone_name(bone));
+          CHECK(rig.bone[b + (leg ? 1 : 0)] == bone);
+        }
+      }
+    }
+  }
+}
+
+// Joints that are added one by one.
+struct Builder {
+  rig::RigInput input;
+
+  int add(const std::string& name, int parent, const Vec& offset) {
+    input.joints.push_back({.name = name, .parent = parent, .offset = offset, .end_site = {}});
+    return static_cast<int>(input.joints.size()) - 1;
+  }
+};
+
+TEST_CASE("rig: pieces of a limb that are only numbered are told by their lengths") {
+  enum End { kNamed, kCalledEnd, kNumbered };
+  std::mt19937 random(7);
+  for (int round = 0; round < 200; ++round) {
+    Builder made;
+    std::map<Bone, int> truth;
+    const End end_is = static_cast<End>(below(random, 3));
+    const int first_number = below(random, 2);
+    const int hips = made.add("hip", -1, {0, 95, 0});
+    const int spine = made.add("spine1", hips, {0, 12, 0});
+    const int chest = made.add("spine2", spine, {0, 25, 0});
+    made.add("head", made.add("neck", chest, {0, 18, 0}), {0, 10, 0});
+    // One bone in equal pieces; returns where it ends.
+    const auto add_bone = [&](int joint, const std::string& name, int& number, int pieces,
+                              const Vec& way) {
+      for (int i = 1; i < pieces; ++i) {
+        joint = made.add(name + std::to_string(number++), joint, way / pieces);
+      }
+      return joint;
+    };
+    const std::array pieces{1 + below(random, 3), 1 + below(random, 3)};
+    for (const Side side : rig::kSides) {
+      const std::string letter = side == Side::kLeft ? "l" : "r";
+      const double out = side == Side::kLeft ? 1 : -1;
+      const auto add_limb = [&](int parent, const std::string& limb, const char* end, Bone upper,
+                                const std::array<Vec, 3>& ways) {
+        const std::string name = limb + '_' + letter + '_';
+        int number = first_number;
+        const auto at = [&](int after) {
+          return rig::on(side, static_cast<Bone>(static_cast<int>(upper) + after));
+        };
+        int joint = truth[at(0)] = made.add(name + std::to_string(number++), parent, ways[0]);
+        joint = add_bone(joint, name, number, pieces[0], ways[1]);
+        joint = truth[at(1)] =
+            made.add(name + std::to_string(number++), joint, ways[1] / pieces[0]);
+        joint = add_bone(joint, name, number, pieces[1], ways[2]);
+        const std::string last = end_is == kNamed       ? std::string(end) + '_' + letter
+                                 : end_is == kCalledEnd ? name + "end"
+                                                        : name + std::to_string(number);
+        return truth[at(2)] = made.add(last, joint, ways[2] / pieces[1]);
+      };
+      const int collar = made.add("clavicle_" + letter, chest, {3 * out, 12, 0});
+      add_limb(collar, "arm", "hand", Bone::kLeftUpperArm,
+               {Vec(14 * out, 0, 0), Vec(28 * out, 0, 0), Vec(25 * out, 0, 0)});
+      const int foot = add_limb(hips, "leg", "foot", Bone::kLeftUpperLeg,
+                                {Vec(9 * out, -3, 0), Vec(0, -42, 0), Vec(0, -40, 0)});
+      truth[rig::on(side, Bone::kLeftToes)] =
+          made.add((end_is == kCalledEnd ? "foot_" : "toe_") + letter, foot, {0, -8, 13});
+    }
+    INFO("pieces " << pieces[0] << ' ' << pieces[1] << ", end " << static_cast<int>(end_is));
+    const rig::Rig rig = rig::recognise(made.input);
+    for (const auto& [bone, joint] : truth) {
+      INFO(bone_name(bone));
+      CHECK(rig.bone[joint] == bone);
+    }
+  }
+}
+
+// A hand alone, palm first, and then its fingers, thumb first, in centimetres: a right one whose
+// fingers lead along +x and whose palm faces down.
+rig::RigInput made_hand(double size, const Mat& turn, bool has_palm_bones) {
+  Builder made;
+  const int palm = made.add("B0", -1, Vec::Zero());
+  constexpr std::array kRow{2.6, 3.0, 0.8, -1.4, -3.4};
+  constexpr std::array kOut{2.0, 9.0, 9.2, 8.8, 8.0};
+  constexpr std::array kLength{1.1, 1.0, 1.08, 1.0, 0.8};
+  for (std::size_t f = 0; f < kFingers; ++f) {
+    int parent = palm;
+    const auto add = [&](const Vec& way) {
+      parent =
+          made.add("B" + std::to_string(made.input.joints.size()), parent, size * (turn * way));
+    };
+    Vec base(kOut[f], f == 0 ? -0.5 : 0.0, kRow[f]);
+    if (has_palm_bones && f > 0) {
+      const Vec in_palm = 0.2 * base;
+      add(in_palm);
+      base -= in_palm;
+    }
+    add(base);
+    const Vec along = f == 0 ? Vec(3, -0.5, 2.5) : Vec(4.2, 0, 0);
+    for (const double part : {1.0, 0.6}) add(kLength[f] * part * along);
+  }
+  return made.input;
+}
+
+TEST_CASE(
+    "rig: a hand alone is told by its shape where no name says it, and no fingers are a body") {
+  std::mt19937 random(9);
+  for (int round = 0; round < 40; ++round) {
+    const bool palm_bones = round % 2 == 0;
+    const double size = 0.9 + 0.05 * below(random, 5);
+    const Mat turn = axis_turn(random) * yaw(10.0 * below(random, 36));
+    const auto hand = made_hand(size, turn, palm_bones);
+    const rig::Rig rig = rig::recognise(hand);
+    REQUIRE(rig.kind == rig::Kind::kHand);
+    CHECK(rig.metres_per_unit == Approx(0.01));
+    REQUIRE(rig.bone[0].has_value());
+    const Side side = *rig.bone[0] == Bone::kLeftHand ? Side::kLeft : Side::kRight;
+    int joint = 1;
+    for (int f = 0; f < kFingers; ++f) {
+      if (palm_bones && f > 0) ++joint;
+      for (int i = 0; i < kFingerJoints; ++i, ++joint) {
+        const int first = static_cast<int>(Bone::kLeftThumbMetacarpal) + kFingerJoints * f;
+        CHECK(rig.bone[joint] == rig::on(side, static_cast<Bone>(first + i)));
+      }
+    }
+    CHECK(std::ranges::any_of(rig.notes, [](const std::string& note) {
+      return note.find("by its shape") != std::string::npos;
+    }));
+    // Two hands on one joint are nobody.
+    rig::RigInput both;
+    both.joints.push_back({.name = "B", .parent = -1, .offset = Vec::Zero(), .end_site = {}});
+    for (const double x : {40.0, -40.0}) {
+      const int first = static_cast<int>(both.joints.size());
+      for (auto part : hand.joints) {
+        if (part.parent < 0) part.offset.x() = x;
+        part.parent = part.parent < 0 ? 0 : part.parent + first;
+        both.joints.push_back(std::move(part));
+      }
+    }
+    CHECK(rig::recognise(both).kind != rig::Kind::kPerson);
+  }
+}
+
+TEST_CASE("rig: a toe aside of a folded foot's own axis does not turn the foot") {
+  for (const double aside_m : {-0.03, 0.0, 0.03}) {
+    auto made = test::make(test::kSchemes[1], ZeroPose::kFolded, Mat::Identity(), 0.01);
+    const auto joints = made.input.joints.size();
+    for (const Bone toes : {Bone::kLeftToes, Bone::kRightToes}) {
+      const auto j = static_cast<std::size_t>(toes);
+      const Vec left(toes == Bone::kLeftToes ? aside_m : -aside_m, 0, 0);
+      made.input.joints[j].offset += made.T[j].transpose() * left / 0.01;
+      for (int i = 0; i < made.input.poses.count; ++i) {
+        made.input.poses.position[i * joints + j] = made.input.joints[j].offset;
+      }
+    }
+    CHECK(worst_deg(rig::recognise(made.input), made) < 1.0);
+  }
+}
+
+// A person in a folded zero pose lies along -z or stands: `root_m` is its hips' height in the zero
+// pose, and `floor_m` what they are above the floor when it lies.
+test::Made lying(double root_m, double floor_m, bool lies) {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kFolded, Mat::Identity(), 0.01);
+  const auto joints = made.input.joints.size();
+  made.input.joints[0].offset = Vec(0, root_m / 0.01, 0);
+  for (int i = 0; lies && i < made.input.poses.count; ++i) {
+    const Mat back = Eigen::AngleAxisd(-88 * kDegree, rig::kX).toRotationMatrix();
+    auto& hips = made.input.poses.rotation[i * joints];
+    hips = Eigen::Quaterniond(Mat(back * hips.toRotationMatrix()));
+    made.input.poses.position[i * joints] = Vec(10, floor_m / 0.01, 0.1 * i);
+    for (std::size_t j = 1; j < joints; ++j) {
+      const bool moves = j == static_cast<std::size_t>(Bone::kLeftLowerArm);
+      auto& turn = made.input.poses.rotation[i * joints + j];
+      if (!moves) turn = made.input.poses.rotation[j];
+    }
+  }
+  return made;
+}
+
+TEST_CASE("rig: who lies in a clip does not stand along another axis") {
+  for (const double root_m : {0.95, 0.0}) {
+    for (const bool lies : {false, true}) {
+      INFO("root " << root_m << " m, lies " << lies);
+      const rig::Rig rig = rig::recognise(lying(root_m, 0.1, lies).input);
+      CHECK(up_text(rig.up) == "+y");
+      const auto says = [&rig](std::string_view part) {
+        return std::ranges::any_of(rig.notes,
+                                   [part](const std::string& note) { return note.contains(part); });
+      };
+      CHECK(says("lies on its side") == lies);
+      CHECK(says("which axis points up is not sure") == (lies && root_m <= 0.0));
+    }
+  }
 }
 
 TEST_CASE("rig: any input ends in an answer") {
