@@ -84,8 +84,8 @@ bool UdpReceivers::send_to(Receiver& receiver, std::span<const std::byte> datagr
   }
   ++outcome.failed;
   if (receiver.error == ECONNREFUSED) {
-    // That was the answer to earlier datagrams, one for all of them, which are counted as sent; this
-    // one is sent now, and counted as failed for them.
+    // That was the answer to earlier datagrams, one for all of them, which are counted as sent;
+    // this one is sent now, and counted as failed for them.
     static_cast<void>(send());
   } else {
     receiver.connected = false;  // the machine may get another address, and the socket with it

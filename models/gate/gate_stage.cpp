@@ -138,8 +138,7 @@ class Track {
     }
     // Samples that agree against the past are a motion: two of one that goes on or that comes back
     // from a step, three of a step, because a fault may last for two.
-    const bool agrees =
-        suspect_ && doubts_ > 0 && Space::distance(doubt_, value) < kAgree * moved_;
+    const bool agrees = suspect_ && doubts_ > 0 && Space::distance(doubt_, value) < kAgree * moved_;
     if (away_ && agrees && Space::distance(left_, value) < kBack * moved_) {
       begin(value);
       return true;

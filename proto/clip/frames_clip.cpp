@@ -220,7 +220,7 @@ bool begins_with_added_pose(const Clip& clip) {
 
 namespace {
 
-constexpr int kNone = -1;
+constexpr int kNoPartner = -1;
 
 // The bone of the other side; the same one in the middle.
 Bone other_side(Bone bone) {
@@ -245,12 +245,14 @@ std::vector<Eigen::Vector3d> T_places_m(const Skeleton& skeleton) {
   return places_m;
 }
 
-// Which joint has the place of each on the other side; kNone: there is none. Bones by what they
-// are, those between bones with them, and what hangs below by its place.
+// Which joint has the place of each on the other side; kNoPartner: there is none. Bones by what
+// they are, those between bones with them, and what hangs below by its place.
 std::vector<int> partners_of(const Skeleton& skeleton) {
   const auto& joints = skeleton.joints;
-  std::vector<int> partners(joints.size(), kNone);
-  const auto is_free = [&](int j) { return j >= 0 && !joints[j].bone && partners[j] == kNone; };
+  std::vector<int> partners(joints.size(), kNoPartner);
+  const auto is_free = [&](int j) {
+    return j >= 0 && !joints[j].bone && partners[j] == kNoPartner;
+  };
   for (int j = 0; j < std::ssize(joints); ++j) {
     if (!joints[j].bone) continue;
     partners[j] = skeleton.joint_of(other_side(*joints[j].bone));
@@ -271,7 +273,7 @@ std::vector<int> partners_of(const Skeleton& skeleton) {
         places_m[partners[parent]] +
         Eigen::Vector3d(-1.0, 1.0, 1.0).cwiseProduct(places_m[j] - places_m[parent]);
     double nearest_m = 0.01 + 0.1 * joints[j].offset_m.cast<double>().norm();
-    int found = kNone;
+    int found = kNoPartner;
     for (int k = 0; k < std::ssize(joints); ++k) {
       if (!is_free(k) || joints[k].parent != partners[parent]) continue;
       const double far_m = (places_m[k] - there_m).norm();
@@ -280,7 +282,7 @@ std::vector<int> partners_of(const Skeleton& skeleton) {
       found = k;
     }
     partners[j] = found;
-    if (found != kNone) partners[found] = j;
+    if (found != kNoPartner) partners[found] = j;
   }
   return partners;
 }

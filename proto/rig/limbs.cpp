@@ -169,9 +169,9 @@ struct Cut {
 std::optional<Cut> cut_of(const Figure& figure, const Pieces& pieces) {
   constexpr double kBent_deg = 8;
   constexpr double kBend = 0.3;
-  constexpr std::size_t kMost = 16;
+  constexpr std::size_t kMaxPieces = 16;
   const std::size_t count = pieces.size();
-  if (count > kMost) return std::nullopt;
+  if (count > kMaxPieces) return std::nullopt;
   const auto way = [&](std::size_t from, std::size_t to) {
     return figure.between(pieces.joint[from], pieces.joint[to]).value_or(Vec::Zero());
   };

@@ -69,16 +69,16 @@ Vec way_to_tip(const Figure& figure, int from, const std::vector<int>& chain) {
 // The chains below a joint that spreads them as a palm its fingers: four to six of a few joints
 // each, which do not split, are not far from as long as each other, and lead the same way.
 std::vector<std::vector<int>> spread_at(const Figure& figure, int palm) {
-  constexpr std::size_t kMost = 6;
-  constexpr int kLongest = 5;  // a bone in the palm, and a tip
+  constexpr std::size_t kMaxChains = 6;
+  constexpr int kMaxLinks = 5;  // a bone in the palm, and a tip
   constexpr double kApart_deg = 100;
   const auto& children = figure.children(palm);
   std::vector<std::vector<int>> chains;
   std::vector<Vec> ways;
-  if (children.size() < 4 || children.size() > kMost) return chains;
+  if (children.size() < 4 || children.size() > kMaxChains) return chains;
   for (const int child : children) {
     const int joints = figure.main_chain_length(child);
-    if (joints < 2 || joints > kLongest) return {};
+    if (joints < 2 || joints > kMaxLinks) return {};
     chains.push_back(figure.main_chain(child));
     const bool splits = std::ranges::any_of(
         chains.back(), [&figure](int joint) { return figure.children(joint).size() > 1; });
@@ -117,11 +117,11 @@ int branched_off(const Figure& figure, const Pair& legs, const Pair& arms) {
 std::vector<double> shared_segments(const std::vector<double>& one,
                                     const std::vector<double>& other) {
   constexpr double kAlike = 0.75;
-  constexpr std::size_t kLeast = 3;
+  constexpr std::size_t kMinAlike = 3;
   std::vector<double> out;
   for (std::size_t i = 0; i < std::min(one.size(), other.size()); ++i) {
     const auto [less, more] = std::minmax(one[i], other[i]);
-    if (i >= kLeast && less < kAlike * more) break;
+    if (i >= kMinAlike && less < kAlike * more) break;
     out.push_back(less);
   }
   return out;

@@ -128,8 +128,7 @@ Result<> check_ipc_file(const std::string& endpoint) {
   const std::string file = ipc_file(endpoint);
   struct stat found{};
   if (file.empty() || ::lstat(file.c_str(), &found) != 0 || S_ISSOCK(found.st_mode)) return {};
-  return misuse("'" + endpoint +
-                "' is something else than a socket: choose a path that is free");
+  return misuse("'" + endpoint + "' is something else than a socket: choose a path that is free");
 }
 
 namespace {

@@ -13,6 +13,7 @@
 #include "models/style/model/harmonics.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/frame/rotation.hpp"
+#include "tests/support/has.hpp"
 #include "tests/support/shared.hpp"
 
 using namespace posed;
@@ -76,7 +77,8 @@ TEST_CASE("A rest pose in front of a motion is found, and an ordinary first fram
   CHECK_FALSE(begins_with_added_pose(motion));
 }
 
-TEST_CASE("A mirrored clip has its partners by their places, whatever they are called", "[motion]") {
+TEST_CASE("A mirrored clip has its partners by their places, whatever they are called",
+          "[motion]") {
   auto clip = make_walker({.seconds = 1.0, .rate_hz = 30.0}).value();
   auto skeleton = std::make_shared<Skeleton>(*clip.skeleton);
   for (const auto& [name, x_m] : {std::pair{"tail_01", 0.0}, {"pocket.L", 0.1}, {"bag", -0.1}}) {
@@ -106,8 +108,8 @@ TEST_CASE("A mirrored clip has its partners by their places, whatever they are c
 
 TEST_CASE("CMU's clips can be mirrored", "[motion][real]") {
   for (const char* name : {"cmu/02_04.bvh", "cmu/07_01.amc"}) {
-    const auto path = test::data_path(name);
-    if (!path) return;
+    const auto path = test::shared(std::string("data/") + name);
+    if (!path) SKIP_WITHOUT_SHARED();
     const auto clip = clip::read_clip(*path).value();
     const auto other = clip::mirrored(clip);
     INFO(name << (other ? "" : other.error().message));

@@ -191,7 +191,7 @@ TEST_CASE("a gesture that was shown once is held as it was shown", "[real]") {
   const auto folder = test::shared("data/gloves/libras_cyberglove");
   if (!folder) SKIP_WITHOUT_SHARED();
   constexpr std::uint32_t kFirst = 20, kCorpora = 4;
-  constexpr std::size_t kMost = 5;                   // rows that are shown
+  constexpr std::size_t kMaxShown = 5;                   // rows that are shown
   std::map<std::string, std::array<double, 4>> off;  // composed, once, five times, the floor
   double jerk = 0.0, jerk_composed = 0.0;
   for (std::uint32_t seed = kFirst; seed < kFirst + kCorpora; ++seed) {
@@ -203,13 +203,13 @@ TEST_CASE("a gesture that was shown once is held as it was shown", "[real]") {
     for (const char* const label : {"1", "3", "4"}) {
       const auto poses = test::libras_poses(*folder, test::kSignOf.at(label));
       Eigen::MatrixXd& rows = shown[label];
-      rows.resize(kMost, kHandChannels);
-      for (std::size_t i = 0; i < kMost; ++i) {
+      rows.resize(kMaxShown, kHandChannels);
+      for (std::size_t i = 0; i < kMaxShown; ++i) {
         rows.row(static_cast<Eigen::Index>(i)) =
             poses.row(random.below(static_cast<int>(poses.rows())));
       }
     }
-    for (const std::size_t count : {std::size_t{1}, kMost}) {
+    for (const std::size_t count : {std::size_t{1}, kMaxShown}) {
       for (gesture::Label& label : model->labels) {
         if (!shown.contains(label.name)) continue;
         label.shown.clear();
