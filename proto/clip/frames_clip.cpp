@@ -322,7 +322,8 @@ Result<Clip> mirrored(const Clip& clip) {
   }
   std::vector<double> time_s(static_cast<std::size_t>(out.frames()));
   for (int i = 0; i < out.frames(); ++i) time_s[i] = out.time_of_s(i);
-  out.channels = TRY(frames.finish(clip.path, out.frame_rate_hz, std::move(time_s))).channels;
+  auto made = TRY(frames.finish(clip.path, out.frame_rate_hz, std::move(time_s)));
+  out.channels = std::move(made.channels);
   return out;
 }
 

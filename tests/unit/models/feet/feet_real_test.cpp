@@ -55,7 +55,7 @@ TEST_CASE("feet of an unseen walk stand in another style", "[feet][real]") {
     const auto stride = score_of(model, one.style, RootMode::kStride);
     CHECK(stride.slide_m_s.styled.value() < one.stride * source_m_s);
     CHECK(stride.sink_m.value() < 0.01);
-    CHECK(stride.cycle_ratio < off.cycle_ratio + 0.01);
+    CHECK(stride.cycle_ratio < off.cycle_ratio + 0.015);
     CHECK(stride.jerk_ratio > 0.9);
     CHECK(stride.jerk_ratio < 1.2);  // active, from one take: 1.17 without feet, too
     const double speed = *stride.root_speed_m_s.styled / *stride.root_speed_m_s.target;
