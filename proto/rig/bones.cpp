@@ -210,58 +210,6 @@ bool lies_at(const Figure& figure, int top, int joint) {
 // The joints of a limb, from the first bone of the four on; -1 where there is none.
 using LimbJoints = std::array<int, 4>;
 
-// A limb whose joints have one name and are only counted (leg_a to leg_d, arm_1 to arm_3): its two
-// long bones are alike, and what lies between their ends helps the skin.
-void settle_counted(const Figure& figure, const std::vector<JointName>& names, bool is_leg,
-                    LimbJoints& limb) {
-  const std::size_t first = is_leg ? 0 : 1;
-  const int upper = limb[first];
-  const int lower = limb[first + 1];
-  int& end = limb[first + 2];
-  if (upper < 0 || lower < 0 || names[upper].words != names[lower].words) return;
-  std::vector<int> chain{upper};
-  for (int next = upper; next >= 0;) {
-    next = -1;
-    for (const int child : figure.children(chain.back())) {
-      const bool goes_on =
-          names[child].words == names[upper].words && names[child].side == names[upper].side;
-      if (goes_on &&
-          (next < 0 || figure.main_chain_length(child) > figure.main_chain_length(next))) {
-        next = child;
-      }
-    }
-    if (next >= 0) chain.push_back(next);
-  }
-  const std::size_t counted = chain.size();
-  const bool end_is_named = end >= 0 && names[end].words != names[upper].words;
-  const std::size_t most = is_leg ? 5 : 3;  // more joints may be pieces of one long bone
-  if (counted < 3 || (counted > most && !end_is_named)) return;
-  if (end_is_named) chain.push_back(end);
-  const std::size_t last = chain.size() - 1;
-  const auto length = [&](std::size_t from, std::size_t to) {
-    return figure.between(chain[from], chain[to]).value_or(Vec::Zero()).norm();
-  };
-  constexpr double kUnlike = 0.5;  // of the logarithm of their lengths
-  constexpr double kToes = 0.6;    // of the shin at most
-  double best = kUnlike;
-  std::size_t best_lower = 0;
-  std::size_t best_end = 0;
-  // Behind the foot there may be toes.
-  for (std::size_t e = is_leg && !end_is_named ? last - 1 : last; e <= last; ++e) {
-    for (std::size_t k = 1; k < std::min(e, counted); ++k) {
-      const double unlike = std::abs(std::log(length(0, k) / length(k, e)));
-      if (!(unlike < best) || length(e, last) > kToes * length(k, e)) continue;
-      best = unlike;
-      best_lower = k;
-      best_end = e;
-    }
-  }
-  if (best_lower == 0) return;
-  limb[first + 1] = chain[best_lower];
-  end = chain[best_end];
-  if (best_end < last) limb[3] = chain[last];
-}
-
 // Of joints that lie at one place and are called as well, the last one turns the limb with all of
 // them above it. A shoulder at its parent's place is the base of the one below it.
 void settle_coincident(const Figure& figure, const std::vector<JointName>& names, bool is_leg,
@@ -296,7 +244,6 @@ void settle_limbs(const Figure& figure, const std::vector<JointName>& names, Bon
       };
       LimbJoints limb{};
       for (std::size_t i = 0; i < limb.size(); ++i) limb[i] = bones[bone(i)];
-      settle_counted(figure, names, is_leg, limb);
       settle_coincident(figure, names, is_leg, limb);
       for (std::size_t i = 0; i < limb.size(); ++i) bones.set(bone(i), limb[i]);
     }

@@ -166,7 +166,7 @@ struct Cut {
 
 // A limb is two bones nearly as long as each other. Of several cuts the one at which the zero pose
 // bends counts, else the one nearest to equal halves; where no name says the end, the longest.
-std::optional<Cut> cut_of(const Figure& figure, const Pieces& pieces) {
+std::optional<Cut> cut_of(const Figure& figure, const Pieces& pieces, bool is_leg) {
   constexpr double kBent_deg = 8;
   constexpr double kBend = 0.3;
   constexpr std::size_t kMaxPieces = 16;
@@ -175,7 +175,8 @@ std::optional<Cut> cut_of(const Figure& figure, const Pieces& pieces) {
   const auto way = [&](std::size_t from, std::size_t to) {
     return figure.between(pieces.joint[from], pieces.joint[to]).value_or(Vec::Zero());
   };
-  const double widest = pieces.has_end ? 1.5 : 1.25;  // of the longer bone to the other
+  constexpr double kWidest = 1.6;  // of the longer bone to the other
+  constexpr double kToes = 0.6;    // of the shin at most
   for (std::size_t begin = 0; begin + 2 < count; ++begin) {
     std::optional<Cut> best;
     double best_score = -1e300;
@@ -184,10 +185,12 @@ std::optional<Cut> cut_of(const Figure& figure, const Pieces& pieces) {
         const double upper = way(begin, bend).norm();
         const double lower = way(bend, end).norm();
         const double unequal = std::max(upper, lower) / std::max(std::min(upper, lower), 1e-9);
-        if (unequal > widest) continue;
+        if (unequal > kWidest) continue;
+        if (is_leg && way(end, count - 1).norm() > kToes * lower) continue;
         const double bent_deg = angle_deg(way(bend - 1, bend), way(bend, bend + 1));
-        const double score =
-            std::log(upper + lower) - std::log(unequal) + (bent_deg > kBent_deg ? kBend : 0.0);
+        // Behind a foot there may be toes.
+        const double longer = is_leg ? 0.0 : std::log(upper + lower);
+        const double score = longer - std::log(unequal) + (bent_deg > kBent_deg ? kBend : 0.0);
         if (score <= best_score) continue;
         best_score = score;
         best = Cut{.begin = begin, .bend = bend, .end = end};
@@ -211,13 +214,13 @@ void settle_pieces(const Figure& figure, const std::vector<JointName>& names, st
     const int next = next_of_limb(figure, names, pieces.joint.back(), -1);
     if (next >= 0) pieces.joint.push_back(next);
   }
-  const auto cut = cut_of(figure, pieces);
+  const bool is_leg = upper == 0;
+  const auto cut = cut_of(figure, pieces, is_leg);
   if (!cut) return;
   const int end = pieces.joint[cut->end];
   chain[upper] = pieces.joint[cut->begin];
   chain[upper + 1] = pieces.joint[cut->bend];
   chain[upper + 2] = end;
-  const bool is_leg = upper == 0;
   if (!is_leg || chain[3] >= 0) return;
   // What was called the foot is the ball of one that ends the leg.
   if (known >= 0 && known != end && figure.below(end, known)) chain[3] = known;
