@@ -575,7 +575,8 @@ All take about a minute; --brief asks for the first four only. On a terminal a s
 do; elsewhere a line on stdout names each pose and a line on stdin begins it, or --seconds does;
 where stdin ends after the first four, the rest is left out (with --moves say --brief). A pose in
 which the hand moved, whose sensors hardly moved from the flat hand, or that was another (half a
-fist, fist and flat swapped, not the first time's), fails: the screen asks for it again, a script gets exit code 1 and no file.
+fist, fist and flat swapped, not the first time's), fails: the screen asks for it again, a script
+gets exit code 1 and no file.
 --moves is tried in simulation only, not on a real glove. Examples:
   posed calibrate --driver cyberglove --port /dev/ttyUSB0 --user ann --out ann.toml
   posed calibrate --connect tcp://127.0.0.1:5570 --stream right --user ann --out ann.toml

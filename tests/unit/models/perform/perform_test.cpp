@@ -191,7 +191,7 @@ TEST_CASE("a gesture that was shown once is held as it was shown", "[real]") {
   const auto folder = test::shared("data/gloves/libras_cyberglove");
   if (!folder) SKIP_WITHOUT_SHARED();
   constexpr std::uint32_t kFirst = 20, kCorpora = 4;
-  constexpr std::size_t kMaxShown = 5;                   // rows that are shown
+  constexpr std::size_t kMaxShown = 5;               // rows that are shown
   std::map<std::string, std::array<double, 4>> off;  // composed, once, five times, the floor
   double jerk = 0.0, jerk_composed = 0.0;
   for (std::uint32_t seed = kFirst; seed < kFirst + kCorpora; ++seed) {
