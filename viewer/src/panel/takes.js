@@ -4,7 +4,8 @@ import { takeTitle } from '../streams/played.js';
 import { el, write } from './dom.js';
 import { minutes } from './numbers.js';
 
-const LONGEST_NAME = 128;
+const MAX_NAME_BYTES = 128;
+const bytesOf = (text) => new TextEncoder().encode(text).length;
 const HOW =
   'To keep takes, name a folder for them in its config ([control] recordings = "takes") and start' +
   ' it again, or use `posed record` in place of `posed run`.';
@@ -19,8 +20,12 @@ export class Takes {
     Object.assign(this, { form, control, say });
     this.name = el('input', {
       type: 'text',
-      maxLength: LONGEST_NAME,
       placeholder: 'take name',
+      oninput: () => {
+        const letters = [...this.name.value];
+        while (bytesOf(letters.join('')) > MAX_NAME_BYTES) letters.pop();
+        if (letters.join('') !== this.name.value) this.name.value = letters.join('');
+      },
       aria: { label: 'Take name' },
     });
     this.button = el('button', { type: 'submit' }, 'Start take');
