@@ -32,8 +32,8 @@ class UdpReceivers {
   // datagrams to it fail until the next try, a second later.
   [[nodiscard]] SendOutcome send(std::span<const std::byte> datagram, std::int64_t now_ns) noexcept;
 
-  // Returns what has changed since the last call. A receiver counts as failing
-  // from its first failure until all datagrams have reached it for two seconds.
+  // Returns what has changed since the last call. A receiver counts as failing from its first
+  // failure until all datagrams have reached it for two seconds.
   [[nodiscard]] std::vector<News> drain_news(std::int64_t now_ns);
 
   [[nodiscard]] std::size_t size() const noexcept { return receivers_.size(); }

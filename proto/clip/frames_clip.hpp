@@ -63,11 +63,6 @@ class FrameTimes {
 [[nodiscard]] bool begins_with_added_pose(int frames, int root_joint,
                                           const std::function<const Frame&(int)>& frame);
 
-// The clip with left and right exchanged: what the left hand did the right one does, and who walked
-// to the left walks to the right (mirrored at the plane x = 0). A joint that is no
-// bone has its partner at the mirrored place. Refuses a figure whose sides have other joints.
-Result<Clip> mirrored(const Clip& clip);
-
 // Fills every missing value with the value before it, at the start with the channel's first one.
 // Reports the number in `warnings`. For formats that cannot hold missing values.
 void hold_missing(Clip& clip);

@@ -45,6 +45,7 @@ void merge_wal(Database& database) {
   database.set_busy_timeout_ms(0);
   const auto merged = database.run("PRAGMA journal_mode=DELETE;");
   static_cast<void>(merged);
+  database.set_busy_timeout_ms(kReadPatience_ms);
 }
 
 std::unexpected<Error> damaged(const std::string& file, const std::string& how) {
@@ -103,7 +104,6 @@ Result<Database> open_whole(const std::filesystem::path& path) {
   database.set_busy_timeout_ms(kReadPatience_ms);
   if (has_wal) TRY(check_content(database, file));
   merge_wal(database);
-  database.set_busy_timeout_ms(kReadPatience_ms);
   TRY(check_length(database, file));
   if (!has_wal) TRY(check_content(database, file));
   return database;

@@ -3,6 +3,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -86,6 +87,12 @@ struct HandShape {
 // The hand that is the whole figure: one joint that spreads five short chains, of which the
 // shortest reach is the thumb's. Empty for anything else.
 [[nodiscard]] std::optional<HandShape> hand_by_shape(const Figure& figure);
+
+// Puts the four fingers' chains in their order across the palm, whose row begins on the side of
+// `thumb`, a joint of the thumb. Returns the row, from the index' side on; empty, and the order may
+// be any, where the thumb is not aside.
+std::optional<Vec> order_across(const Figure& figure, int palm, int thumb,
+                                std::span<std::vector<int>> fingers);
 
 // Pelvis, trunk, neck and head from where the limbs begin.
 void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones,

@@ -2,6 +2,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <span>
 
 #include "proto/rig/bones.hpp"
 
@@ -72,9 +73,11 @@ FingerJoints named_fingers(const Figure& figure, const std::vector<JointName>& n
   return out;
 }
 
-double length(const Figure& figure, int from, int to) {
-  return figure.between(from, to).value_or(Vec::Zero()).norm();
+Vec place_in(const Figure& figure, int hand, int joint) {
+  return figure.between(hand, joint).value_or(Vec::Zero());
 }
+
+double length(const Figure& figure, int from, int to) { return place_in(figure, from, to).norm(); }
 
 // Whether the first of a thumb's joints is a bone of the wrist: it is counted from zero, or very
 // short, and the last one is no tip.
@@ -179,33 +182,16 @@ std::optional<Chains> fingers_by_place(const Figure& figure, int hand, Chains ch
   const int thumb = thumb_of(figure, hand, chains);
   if (thumb < 0) return std::nullopt;
   std::swap(chains[0], chains[thumb]);
-  const auto base = [&](const std::vector<int>& chain) {
-    return figure.between(hand, chain.front()).value_or(Vec::Zero());
-  };
-  Vec row = Vec::Zero();  // from one end to the other
-  Vec middle = Vec::Zero();
-  for (std::size_t a = 1; a < chains.size(); ++a) {
-    if (chains[a].size() != chains[1].size()) return std::nullopt;
-    middle += base(chains[a]) / 4.0;
-    for (std::size_t b = 1; b < a; ++b) {
-      const Vec way = base(chains[a]) - base(chains[b]);
-      if (way.norm() > row.norm()) row = way;
-    }
-  }
-  const double width = row.norm();
-  if (!(width > 0.0)) return std::nullopt;
-  constexpr double kAside = 0.2;  // of the row's width
-  constexpr double kGap = 0.1;
-  const double aside = (base(chains[0]) - middle).dot(row) / (width * width);
-  if (std::abs(aside) < kAside) return std::nullopt;
-  if (aside < 0.0) row = -row;
-  const auto place = [&](const std::vector<int>& chain) {
-    return -(base(chain) - middle).dot(row) / (width * width);
-  };
-  std::sort(chains.begin() + 1, chains.end(),
-            [&](const auto& a, const auto& b) { return place(a) < place(b); });
+  const std::size_t joints = chains[1].size();
+  const bool alike = std::all_of(chains.begin() + 1, chains.end(),
+                                 [&](const auto& chain) { return chain.size() == joints; });
+  const auto row = order_across(figure, hand, chains[0].front(), std::span(chains).subspan(1));
+  if (!alike || !row || !(row->norm() > 0.0)) return std::nullopt;
+  constexpr double kGap = 0.1;  // of the row's length
   for (std::size_t i = 2; i < chains.size(); ++i) {
-    if (place(chains[i]) - place(chains[i - 1]) < kGap) return std::nullopt;
+    const Vec step =
+        place_in(figure, hand, chains[i].front()) - place_in(figure, hand, chains[i - 1].front());
+    if (step.dot(*row) < kGap * row->squaredNorm()) return std::nullopt;
   }
   return chains;
 }
@@ -243,6 +229,28 @@ FingersBy add_unnamed(const Figure& figure, const std::vector<JointName>& names,
 }
 
 }  // namespace
+
+std::optional<Vec> order_across(const Figure& figure, int palm, int thumb,
+                                std::span<std::vector<int>> fingers) {
+  constexpr double kAside = 0.2;  // of the row's length
+  const auto base = [&](const std::vector<int>& chain) {
+    return place_in(figure, palm, chain.front());
+  };
+  Vec row = Vec::Zero();  // from one end to the other
+  Vec middle = Vec::Zero();
+  for (std::size_t a = 0; a < fingers.size(); ++a) {
+    middle += base(fingers[a]) / static_cast<double>(fingers.size());
+    for (std::size_t b = 0; b < a; ++b) {
+      const Vec way = base(fingers[a]) - base(fingers[b]);
+      if (way.norm() > row.norm()) row = way;
+    }
+  }
+  const double aside = (place_in(figure, palm, thumb) - middle).dot(row);
+  if (std::abs(aside) < kAside * row.squaredNorm()) return std::nullopt;
+  if (aside > 0.0) row = -row;
+  std::ranges::stable_sort(fingers, {}, [&](const auto& chain) { return base(chain).dot(row); });
+  return row;
+}
 
 FingersBy find_fingers(const Figure& figure, const std::vector<JointName>& names, Side side,
                        BoneJoints& bones) {

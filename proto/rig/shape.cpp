@@ -298,25 +298,8 @@ std::optional<HandShape> hand_by_shape(const Figure& figure) {
   std::ranges::stable_sort(chains, {}, reach);
   constexpr double kThumb = 0.95;  // a thumb ends before a little finger does
   if (reach(chains[0]) > kThumb * reach(chains[1])) return std::nullopt;
-  const auto place = [&](int joint) {
-    return figure.between(hand.palm, joint).value_or(Vec::Zero());
-  };
-  // The others stand in a row, which begins on the thumb's side.
-  Vec row = Vec::Zero();
-  Vec middle = Vec::Zero();
-  for (std::size_t a = 1; a < chains.size(); ++a) {
-    middle += place(chains[a].front()) / 4;
-    for (std::size_t b = 1; b < a; ++b) {
-      const Vec way = place(chains[a].front()) - place(chains[b].front());
-      if (way.norm() > row.norm()) row = way;
-    }
-  }
-  const double thumb = (place(chains[0][chains[0].size() / 2]) - middle).dot(row);
-  if (std::abs(thumb) < 0.2 * row.squaredNorm()) return std::nullopt;
-  if (thumb > 0.0) row = -row;
-  std::stable_sort(chains.begin() + 1, chains.end(), [&](const auto& a, const auto& b) {
-    return place(a.front()).dot(row) < place(b.front()).dot(row);
-  });
+  const int thumb = chains[0][chains[0].size() / 2];
+  if (!order_across(figure, hand.palm, thumb, std::span(chains).subspan(1))) return std::nullopt;
   for (std::size_t f = 0; f < chains.size(); ++f) {
     auto& chain = chains[f];
     const bool in_palm = f > 0 && chain.size() > kFingerJoints &&

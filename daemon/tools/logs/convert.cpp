@@ -19,6 +19,7 @@
 #include "proto/clip/format.hpp"
 #include "proto/clip/frames_clip.hpp"
 #include "proto/clip/hand_clip.hpp"
+#include "proto/clip/mirror.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/load_file.hpp"

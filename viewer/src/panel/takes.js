@@ -22,9 +22,8 @@ export class Takes {
       type: 'text',
       placeholder: 'take name',
       oninput: () => {
-        const letters = [...this.name.value];
-        while (bytesOf(letters.join('')) > MAX_NAME_BYTES) letters.pop();
-        if (letters.join('') !== this.name.value) this.name.value = letters.join('');
+        while (bytesOf(this.name.value) > MAX_NAME_BYTES)
+          this.name.value = [...this.name.value].slice(0, -1).join('');
       },
       aria: { label: 'Take name' },
     });

@@ -11,7 +11,7 @@
 #include "models/motion/heading.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/model/harmonics.hpp"
-#include "proto/clip/frames_clip.hpp"
+#include "proto/clip/mirror.hpp"
 #include "proto/frame/rotation.hpp"
 #include "tests/support/has.hpp"
 #include "tests/support/shared.hpp"
