@@ -46,6 +46,16 @@ struct Target {
 // target have no name twice in their anonymous namespaces, but for overloads and equal aliases.
 [[nodiscard]] std::vector<Finding> check_joined_names(const std::vector<SourceFile>& files,
                                                       const std::vector<Target>& targets);
+// A TEST_CASE, the folder of its file, and its tags as they are written.
+struct TestCase {
+  std::string folder, name, tags;
+};
+[[nodiscard]] std::vector<TestCase> tests_of(const SourceFile& file);
+// Where a page says `program "filter"` of a program of tests, the filter names a test of it.
+[[nodiscard]] std::vector<Finding> check_test_commands(const std::string& path,
+                                                       const std::string& text,
+                                                       const std::vector<TestCase>& tests,
+                                                       const std::vector<Target>& programs);
 // A reader of the repository has only the repository: no file names a page outside of it. `text` is
 // any file's.
 [[nodiscard]] std::vector<Finding> check_references(const std::string& path,

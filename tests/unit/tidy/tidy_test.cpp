@@ -2,6 +2,7 @@
 // example.
 #include <catch2/catch.hpp>
 
+#include <algorithm>
 #include <fstream>
 #include <iterator>
 #include <set>
@@ -34,6 +35,25 @@ std::string findings_of(const Check& check) {
     all.insert(all.end(), found.begin(), found.end());
   }
   return listed(all);
+}
+
+// Calls use(path, text) for each file of the repository that people read.
+template <typename Use>
+void for_each_text(const Use& use) {
+  const std::set<std::string> kinds{".hpp", ".cpp", ".md", ".txt", ".toml", ".proto", ".py", ""};
+  for (std::filesystem::recursive_directory_iterator at(posed::test::source_dir()), end; at != end;
+       ++at) {
+    const std::filesystem::directory_entry& entry = *at;
+    const std::string path =
+        std::filesystem::relative(entry.path(), posed::test::source_dir()).generic_string();
+    // Not ours, and other tests write there meanwhile.
+    const bool others =
+        path == "build" || path == ".git" || at->path().filename() == "node_modules";
+    if (others) at.disable_recursion_pending();
+    if (!entry.is_regular_file() || !kinds.contains(entry.path().extension())) continue;
+    std::ifstream stream(entry.path());
+    use(path, std::string(std::istreambuf_iterator<char>(stream), {}));
+  }
 }
 
 }  // namespace
@@ -136,28 +156,36 @@ TEST_CASE("no file names a page outside the repository, and READMEs have titles"
           1);
   std::vector<Finding> all;
   int files = 0;
-  const std::set<std::string> kinds{".hpp", ".cpp", ".md", ".txt", ".toml", ".proto", ".py", ""};
-  for (std::filesystem::recursive_directory_iterator at(posed::test::source_dir()), end; at != end;
-       ++at) {
-    const std::filesystem::directory_entry& entry = *at;
-    const std::string path =
-        std::filesystem::relative(entry.path(), posed::test::source_dir()).generic_string();
-    // Not ours, and other tests write there meanwhile.
-    const bool others =
-        path == "build" || path == ".git" || at->path().filename() == "node_modules";
-    if (others) at.disable_recursion_pending();
-    if (!entry.is_regular_file() || !kinds.contains(entry.path().extension())) continue;
+  for_each_text([&](const std::string& path, const std::string& text) {
     // The one place where tests find recordings, and the page that says so.
     const bool names_it = path == "tests/support/shared.hpp" || path == "tests/README.md";
-    std::ifstream stream(entry.path());
-    const std::string text{std::istreambuf_iterator<char>(stream), {}};
-    for (const Finding& found : posed::tidy::check_references(path, text)) {
-      if (!names_it) all.push_back(found);
-    }
-    for (const Finding& found : posed::tidy::check_title(path, text)) all.push_back(found);
+    if (!names_it)
+      std::ranges::move(posed::tidy::check_references(path, text), std::back_inserter(all));
+    std::ranges::move(posed::tidy::check_title(path, text), std::back_inserter(all));
     ++files;
-  }
+  });
   CHECK(files > 300);
+  CHECK(listed(all) == "");
+}
+
+TEST_CASE("where a page names tests, there are some", "[tidy]") {
+  const auto programs = posed::tidy::read_test_programs(posed::test::source_dir());
+  std::vector<posed::tidy::TestCase> tests;
+  for (const SourceFile& file : tree()) {
+    std::ranges::move(posed::tidy::tests_of(file), std::back_inserter(tests));
+  }
+  REQUIRE(tests.size() > 1000);
+  const auto check = [&](const std::string& path, const std::string& text) {
+    return posed::tidy::check_test_commands(path, text, tests, programs);
+  };
+  CHECK(check("a.md", "`build/bin/e2e \"[teach]\"`, `e2e \"*GLOVE that floods*\"`").empty());
+  const auto found = check("a.md", "x\n`e2e \"[teach],[no such tag],no such test*\"`\n");
+  REQUIRE(listed(found).starts_with("a.md:2: "));
+  REQUIRE(found.size() == 2);
+  std::vector<Finding> all;
+  for_each_text([&](const std::string& path, const std::string& text) {
+    if (path.ends_with(".md")) std::ranges::move(check(path, text), std::back_inserter(all));
+  });
   CHECK(listed(all) == "");
 }
 
