@@ -26,7 +26,7 @@ struct Reading {
 using Drivers = std::span<const drivers::Driver>;
 
 // `path` is used in messages, and its folder for relative paths; `drivers` are those that streams
-// may use. Reads the key files that the text names, and no other file; returns for any text.
+// may use. Reads the key files that the text names, and no other file. Any text gives a Reading.
 [[nodiscard]] Reading read_config(const std::string& text, const std::filesystem::path& path,
                                   Drivers drivers);
 
@@ -48,7 +48,7 @@ struct PortClash {
   std::string message{};
 };
 
-// Ports that the config gives away twice, so that one of the two would never work.
+// Returns the ports that the config assigns twice, so that one of the two would never work.
 [[nodiscard]] std::vector<PortClash> port_clashes(const DaemonConfig& config);
 
 }  // namespace posed::config

@@ -16,7 +16,7 @@
 namespace posed::config {
 
 struct ConfigFile {
-  std::filesystem::path folder;  // of relative paths
+  std::filesystem::path folder;  // in which relative paths begin
   Drivers drivers;
   Findings& findings;
 
@@ -24,7 +24,7 @@ struct ConfigFile {
     return path.empty() ? std::filesystem::path{} : folder / path;
   }
 
-  // A driver's option or a stage's parameter.
+  // Reads a driver's option or a stage's parameter, and resolves it if it names a file.
   void read_parameter(TableReader& table, const ParameterSpec& spec, ParameterValue& value) const;
 };
 
@@ -33,32 +33,34 @@ struct ConfigFile {
 // streamed, streams that need each other.
 void read_streams(TableReader& root, const ConfigFile& file, DaemonConfig& config);
 
-// Of a source with streams = "all": the names of its streams begin with it.
+// Of a source with streams = "all" the most bytes of its name, with which its streams' names begin.
 inline constexpr std::size_t kMaxPrefixBytes = 20;
 
 // Reads a [[source]] table: a device with several bodies.
 void read_source(TableReader& table, const ConfigFile& file, SourceConfig& source);
 
-// What happens to the frames of a stream, from its [[stream]] table or, for all bodies of a source,
-// from the [[source]] table: publish_raw, stale_after_s, stages and the tables of the stages.
+// Reads what happens to a stream's frames (publish_raw, stale_after_s, stages and the tables of the
+// stages) from its [[stream]] table or, for all bodies of a source, from the [[source]] table.
 void read_settings(TableReader& table, const ConfigFile& file, StreamConfig& stream);
 
-// The driver of this name. If there is none, adds an error and returns null.
+// Returns the driver of this name. If there is none, adds an error (an empty name has one already)
+// and returns null.
 [[nodiscard]] const drivers::Driver* named_driver(TableReader& table, const ConfigFile& file,
                                                   const std::string& name);
 
-// Completes the options: those of the driver's own table, and for a device that is selected by its
-// port or id those that stand beside the driver's name.
+// Reads the driver's options from its own table, such as [stream.file]; the others get their
+// defaults. For a device that may be unplugged, `port`, `id` and `hand` stand in `table` itself.
 void read_options(TableReader& table, const ConfigFile& file, const drivers::Driver& driver,
                   drivers::Options& options);
 
-// For a table that has another mistake: its driver tables are not reported as unknown as well.
+// Marks all driver tables in `table` as read, so that a table with another mistake does not get an
+// error about an unknown key for each of them as well.
 void skip_driver_tables(TableReader& table, const ConfigFile& file);
 
-// For a stream of a source: what belongs to a device stands in the [[source]] table. `driver` is
-// that of the source; empty if it is unknown.
+// Adds an error for each key of a device in the [[stream]] table of a body, because such keys stand
+// in the [[source]] table. `driver` is that of the source; empty if it is unknown.
 void refuse_device_keys(TableReader& table, const ConfigFile& file, const std::string& driver);
-// The same without errors, for a table that has another mistake.
+// Marks the same keys as read without errors, for a table that has another mistake.
 void skip_device_keys(TableReader& table, const ConfigFile& file);
 
 // Reads the [[output]] tables: other ways out for the frames than ZeroMQ. Call after
@@ -70,15 +72,16 @@ struct NamedTable {
   std::string name;
   int line = 0;
   bool is_source = false;
-  bool publish_raw = false;  // of a stream, as <name>-raw
+  bool publish_raw = false;  // <name>-raw is published, too
 };
 
-// Adds an error for each name that a table before has, and for each that is the name of a stream's
-// raw input.
+// Adds an error for each name that an earlier table has, that a stream's raw input has, or that is
+// too long for the stream's own raw input.
 void check_names(std::vector<NamedTable> tables, Findings& findings);
 
-// Adds an error for each partner that cannot exist, is the stream itself, or needs the stream as a
-// partner, directly or by other streams. Call when all streams and sources are read.
+// Adds an error for each partner (StageType::partners) that cannot exist, is the stream itself, or
+// needs the stream's frames, directly or by its own partners. Call after all streams and sources
+// are read.
 void check_partners(const DaemonConfig& config, Findings& findings);
 
 }  // namespace posed::config

@@ -1,5 +1,5 @@
-// What a FitGlove request asks for: a glove's calibration from the poses that a client saw held, as
-// `posed calibrate` makes it. Any thread; cold.
+// Answers a FitGlove request: judges the poses that a client saw held, and calibrates the glove by
+// them as `posed calibrate` does. Any thread; cold.
 #pragma once
 
 #include <string>
@@ -11,13 +11,14 @@
 namespace posed::control {
 
 struct FittedGlove {
-  v1::GloveFit words{};
-  std::string toml{};  // the calibration file; empty: the poses were only judged
+  v1::GloveFit words{};  // for the client
+  std::string toml{};    // the calibration file; empty: the poses were only judged
 };
 
-// With contacts alone the calibration in use (the text; empty: the device's default) stays as it
-// is, but for the thumb. Errors are sentences for the client: the device is no glove, there is no
-// flat hand among the poses, or (with a name) a pose is to be held again.
+// Without a name the poses are only judged. If all of them are contacts, the calibration `in_use`
+// (its text; empty: none, an error) stays as it is but for the thumb. Errors are sentences for the
+// client: the device is no glove, there is no flat hand among the poses, or (with a name) a pose is
+// to be held again.
 Result<FittedGlove> fit_glove(const drivers::Description& device, const std::string& in_use,
                               const v1::ControlRequest::FitGlove& wanted);
 

@@ -40,12 +40,12 @@ class RecordingFolder {
   struct Part {
     std::string name{};
     std::string as{};                 // "glb" or "vrma"
-    double from_s = 0.0, to_s = 0.0;  // to 0: to its end
+    double from_s = 0.0, to_s = 0.0;  // to_s 0: to the clip's end
     bool operator==(const Part&) const = default;
   };
-  // The whole file, which lies in the folder under a hidden name while it is made. Takes seconds
-  // for a long clip; parts of more than ten minutes at 60 Hz are refused. One
-  // call at a time.
+  // Returns the bytes of the new file, which is in a hidden folder in this one while it is made. A
+  // whole clip of more than 12 MiB or 1.5 million values is refused, however short the part, and a
+  // new file of more than 12 MiB, too. One call at a time.
   Result<std::string> converted(const Part& part) const;
 
  private:

@@ -70,7 +70,7 @@ Result<drivers::glove::Haptics> read_haptics(const v1::ControlRequest::Haptics& 
       " 60 s and an amplitude of 0 to 1");
 }
 
-// The value of a live parameter for which the number stands.
+// The value that `number` stands for in a live parameter.
 ParameterValue value_of(const ParameterSpec& spec, double number) {
   if (std::holds_alternative<bool>(spec.default_value)) return number != 0.0;
   if (std::holds_alternative<double>(spec.default_value)) return number;
@@ -217,7 +217,7 @@ ModelWords RequestHandler::words_of(const FolderModel& model, const Figures& fig
   const std::scoped_lock lock(words_mutex_);
   std::vector<std::uint32_t> ids;
   for (const auto& figure : figures) ids.push_back(figure->id);
-  // Of models that have gone, too.
+  // Words of models that have gone are kept, too, so they must not grow for ever.
   if (words_.size() > kMaxKnownWords || ids != drawn_on_) words_.clear();
   drawn_on_ = std::move(ids);
   auto& [stamp, words] = words_[model.name];

@@ -1,4 +1,4 @@
-// What a request to a stage means, worked out from the tables of the stream's stages. Requests are
+// Finds out what a request to a stage means, by the tables of the stream's stages. Requests are
 // untrusted. Every error is a sentence for the client. Cold.
 #pragma once
 
@@ -14,12 +14,12 @@
 
 namespace posed::control {
 
-// The change that a SetParameter asks for, checked against the parameter's type and range.
+// Returns the change that a SetParameter asks for, checked against the parameter's type and range.
 Result<pipeline::StageChange> parameter_change(const pipeline::StreamSettings& settings,
                                                const v1::ControlRequest::SetParameter& wanted);
 
-// The same as a request for the stage's command, where the parameter is a live text
-// (models/live_text.hpp): the pieces between its commas are the words. Nothing for another one.
+// If the parameter is a live text (models/live_text.hpp), returns the StageCommand that sets it,
+// whose words are the pieces of the text between commas. Otherwise returns nullopt.
 Result<std::optional<v1::ControlRequest>> text_change(
     const pipeline::StreamSettings& settings, const v1::ControlRequest::SetParameter& wanted);
 
@@ -27,18 +27,19 @@ struct FoundCommand {
   std::size_t stage = 0;  // index in the stream's stages
   pipeline::StageChange change;
 };
-// `name` is "generate.play", or "play" where only one stage has such a command.
+// Finds a command by its name: "generate.play", or "play" if only one stage has such a command.
 Result<FoundCommand> find_command(const pipeline::StreamSettings& settings,
                                   const std::string& name);
 
-// The words of a command as one text, with the commas between which they stood.
+// Returns the words of a command as one text with commas between them, as text_change() took it.
 [[nodiscard]] std::string joined_words(const v1::ControlRequest::StageCommand& wanted);
 
-// `model` is the stage's model by the time that the command arrives; it may be null.
+// Encodes a command for its stage. `model` is the one that the stage will have when the command
+// arrives; null: none.
 Result<StageCommand> encode_command(const StageCommandType& type, const StageModel* model,
                                     const v1::ControlRequest::StageCommand& wanted);
 
-// The index of the stage for which a model file is. `name` is the file's, for errors.
+// Returns the index of the stage that takes this model file. `name` is the file's, for errors.
 Result<std::size_t> stage_for_model(const pipeline::StreamSettings& settings,
                                     std::span<const std::byte> file, const std::string& name);
 

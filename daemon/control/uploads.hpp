@@ -14,11 +14,11 @@
 
 namespace posed::control {
 
-// bytes; also the limit of all uploads together
+// Most bytes of a model, and of all uploads together.
 inline constexpr std::size_t kMaxModel = 16 * 1024 * 1024;
 inline constexpr std::size_t kMaxPiece = 32 * 1024;  // bytes
 inline constexpr std::size_t kMaxUploads = 4;        // at once
-// a client that sends no piece for this long is gone
+// A client that sends no piece for this long is gone.
 inline constexpr double kUploadPause_s = 10.0;
 
 // One piece as the client sent it (posed.v1.ControlRequest.ModelPart).
@@ -32,11 +32,12 @@ struct ModelPiece {
 class Uploads {
  public:
   // Adds a piece from `client`. Returns the model's bytes after the last piece, nullopt if more are
-  // to come. An error ends the client's upload. A piece at offset 0 starts a new one.
+  // to come. A piece at offset 0 begins a new upload; one that does not continue it ends it, while
+  // one that is invalid by itself (its size, no sha256) is only refused.
   Result<std::optional<std::string>> add(const std::string& client, const ModelPiece& piece,
                                          std::int64_t now_ns);
-  // Forgets uploads that have stalled. Returns when to call it next at the latest; for ever if none
-  // is under way.
+  // Forgets uploads that have stalled. Returns the latest time of the next call [ns]; the largest
+  // one if no upload is under way.
   [[nodiscard]] std::int64_t forget_old(std::int64_t now_ns);
   [[nodiscard]] std::size_t bytes() const noexcept { return bytes_; }
 

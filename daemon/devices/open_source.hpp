@@ -23,25 +23,25 @@ namespace posed::devices {
 
 struct OpenSource {
   config::SourceConfig config;
-  std::uint32_t number = 0;  // in the reader and in the log
+  std::uint32_t number = 0;  // index in the reader and in the log
   const drivers::Driver* driver = nullptr;
-  // Without transport and decoder if the device may be unplugged, because its supervisor opens it.
-  // The description is there from the start, derived from the options.
+  // Has no transport and no decoder if the device may be unplugged, because its supervisor opens
+  // it. The description is there from the start, derived from the options.
   drivers::Device device;
   std::shared_ptr<PresentDevice> present = std::make_shared<PresentDevice>();
   std::unique_ptr<drivers::TransportFactory> ports;
-  std::optional<drivers::Mapping> mapping{};  // the user's word about the joints of its bodies
+  std::optional<drivers::Mapping> mapping{};  // as SourceConfig::skeleton; empty: none
   // null: use the device's default
   std::unique_ptr<const drivers::glove::OwnedCalibration> calibration;
   std::unique_ptr<pipeline::DeviceSlot> slot;  // null for a device that cannot come back
   bool endless = false;  // never ends by itself: a device that may be unplugged, a looping clip
   pipeline::SourceCounters counters;
-  // With the reader; null while the source is only tried.
+  // Passes bodies to the reader and back; null while the source is only tried.
   std::unique_ptr<pipeline::BodyExchange> exchange;
-  // How many slots of the rings to the pipeline and to the publisher a stream of it may fill.
+  // How many slots each of its streams may fill in the rings to the pipeline and to the publisher.
   std::size_t decoded_slots = 0, finished_slots = 0;
 
-  // Whether the device describes its bodies, which come and go. Else it has one from the start on.
+  // Whether the device describes its bodies, which come and go; else it has one from the start.
   [[nodiscard]] bool has_several() const { return driver->make_layout != nullptr; }
 };
 
@@ -51,19 +51,20 @@ struct OpenSource {
 // Cold.
 Result<std::unique_ptr<OpenSource>> open_source(config::SourceConfig config, ModelFiles& files);
 
-// The error, with the name of the source in its message, or that of the only stream.
+// Returns the error with the name of the source, or of its only stream, in the message.
 [[nodiscard]] std::unexpected<Error> in_source(const OpenSource& source, Error error);
 
 // For a command that needs the result now (`check`): opens the device that a supervisor would open,
 // and tries the calibration on it. Returns an empty string, or one sentence that says why the
-// device is not there now. May take a few seconds. Cold.
+// device is not there now; an error for wrong options or a calibration that does not fit. May take
+// a few seconds. Cold.
 Result<std::string> try_kept_device(OpenSource& source);
 
 // The one body of a device that does not describe its bodies.
 [[nodiscard]] drivers::Body only_body(const OpenSource& source);
 
-// Frames a second of each body as the config, the driver or the device's description say; 0: they
-// do not. A device with several bodies that does not say has the usual rate of mocap systems.
+// Returns the frames a second of each body by the config or else the device's description; if they
+// say nothing, 120 for a device with several bodies, 0 for others.
 [[nodiscard]] double nominal_rate_hz(const OpenSource& source);
 // The rate for which rings and queues make room for one of its bodies; never 0.
 [[nodiscard]] double expected_rate_hz(const OpenSource& source, const drivers::Body& body);

@@ -1,5 +1,5 @@
-// A glove's calibration from the poses that its user held: what `posed calibrate` and the daemon's
-// page both make. Cold.
+// Calibrates a glove from the poses that its user held, for `posed calibrate` and the daemon's
+// page. Cold; any thread.
 #pragma once
 
 #include <cstddef>
@@ -20,29 +20,29 @@ struct PoseCalibration {
   std::vector<std::string> doubts;    // what makes the verdict a doubtful one
   std::size_t impossible = 0;         // joints that would be bent as no hand's are
 
-  // Why it is none of a hand, from six such joints on; empty: it may be.
+  // Says why this cannot be a hand's calibration: six or more joints are impossible. Else empty.
   [[nodiscard]] std::string refusal() const;
 };
 
-// The glove that a calibration is for: `identity` as its driver says it. A port's path does not
-// identify it, because the same glove may be plugged in elsewhere tomorrow.
+// Makes a calibration without values for the glove with this `identity`, as its driver says it. The
+// path of a port is left out, because the same glove may be plugged in elsewhere tomorrow.
 [[nodiscard]] drivers::glove::CalibrationFile blank_calibration(const drivers::glove::Model& model,
                                                                 const std::string& identity,
                                                                 Side hand, std::string user);
 
+// Completes `blank`: fits the sensors, the fist and then the thumb to the poses.
 Result<PoseCalibration> calibrate_by_poses(const drivers::glove::Model& model,
                                            const drivers::glove::Recorded& recorded,
                                            drivers::glove::CalibrationFile blank);
 
-// The same of a calibration that is there: only the thumb is fitted, to what it touches.
+// Fits only the thumb of an existing calibration, to what it touches.
 Result<PoseCalibration> calibrate_by_contacts(const drivers::glove::Model& model,
                                               const drivers::glove::Recorded& recorded,
                                               drivers::glove::CalibrationFile file);
 
-// Changes the values of the thumb's sensors in `file`, which fit_poses() has made from the same
-// poses, so that the hand touches where the user's did. Returns sentences with the gaps before and
-// after; none if no contact was recorded. A thumb without a sensor for its opposition is left as it
-// is, with a sentence.
+// Changes the values of the thumb's sensors in `file` so that the hand touches where the user's
+// did. Returns sentences with the gaps before and after; none if no contact was recorded. A thumb
+// without a sensor for its opposition is left as it is, with a sentence.
 Result<std::vector<std::string>> fit_contacts(const drivers::glove::Model& model,
                                               const drivers::glove::Recorded& recorded, Side hand,
                                               drivers::glove::CalibrationFile& file);

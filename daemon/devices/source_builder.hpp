@@ -1,7 +1,7 @@
 // SourceBuilder makes the streams of all sources: at the start those of devices with one body, and
-// while the daemon runs what devices with several bodies say about themselves. What a description
-// changes happens between two packets; streams that it does not concern go on without a gap. Cold:
-// where a source has several bodies it has a thread of its own (assembly::Streams).
+// while the daemon runs those that devices with several bodies describe. A description takes effect
+// between two packets; streams that it does not concern go on without a gap. Cold: if a source has
+// several bodies the builder has a thread of its own (assembly::Streams).
 #pragma once
 
 #include <cstdint>
@@ -20,7 +20,7 @@ class SourceBuilder {
   static constexpr std::int64_t kBetweenUpdates_ns = 500'000'000;
   // After a source has used its share of `max_made`, its bodies change at most this often.
   static constexpr std::int64_t kBetweenLateUpdates_ns = 10 * kNanosPerSecond;
-  // A device log has room for more streams (log::kMaxStreams).
+  // Less than a device log has room for (log::kMaxStreams).
   static constexpr std::size_t kMaxMade = 60'000;
 
   // Sources, models, settings and host outlive the builder, and the reader ends before it.
@@ -30,15 +30,15 @@ class SourceBuilder {
                 std::set<std::string> reserved, ModelFiles& models, const KeptSettings& kept,
                 StreamHost& host, std::size_t max_made = kMaxMade);
 
-  // Builds the streams of devices with one body, those that others have as partners first. They
-  // have the first slots, in the order of the sources. The error names the stream.
+  // Builds the streams of devices with one body, partners of others before these. They have the
+  // first slots, in the order of the sources. The error names the stream.
   Result<> open();
   // Makes these streams known to the host, in the order of the sources. Call once, before the
   // reader runs.
   void begin();
 
-  // Does what is due. Returns when to call it next at the latest; call earlier if the EventFd of
-  // the sources' BodyExchange is notified.
+  // Takes back streams that have ended and builds those that are due. Returns the latest time of
+  // the next call; call earlier if the EventFd of the sources' BodyExchange is notified.
   [[nodiscard]] std::int64_t turn(std::int64_t now_ns);
   // Any thread: no more streams are wanted. A turn under way ends before the next body, because
   // many bodies with large models need seconds.

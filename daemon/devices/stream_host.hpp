@@ -1,4 +1,4 @@
-// StreamHost: what the builder of streams needs from the rest of the daemon.
+// StreamHost: what SourceBuilder needs from the rest of the daemon. Cold.
 #pragma once
 
 #include <cstdint>
@@ -25,7 +25,7 @@ struct NewStream {
   // Empty for a body that a stage cannot serve; `refusal` says why.
   std::optional<pipeline::EngineOptions> engine{};
   std::string refusal{};
-  ExitCode exit_code = ExitCode::kFailed;  // with which a refusal ends the start
+  ExitCode exit_code = ExitCode::kFailed;  // posed's, if a refusal ends its start
 };
 
 // All calls come from the builder's thread or, before that runs, from the thread that opens the
@@ -45,12 +45,11 @@ class StreamHost {
   // Makes the stream known to publisher, control, log and worker, so that its first item may come;
   // a refused stream, which has no engine, to publisher and control only.
   virtual void add(NewStream stream) = 0;
-  // A stream that the worker has ended and does not use any more; each is returned once. Empty: no
-  // other at the moment.
+  // Returns a stream that the worker has ended and no longer uses, each once; empty: none now.
   virtual std::optional<std::uint32_t> next_gone() = 0;
   // Removes what add() made. Returns when nothing uses it any more.
   virtual void remove(std::uint32_t stream) = 0;
-  // The reader has an update to accept.
+  // Wakes the reader, for which an update waits.
   virtual void call_reader() = 0;
   // Reports a problem with a source.
   virtual void warn(const OpenSource& source, const std::string& sentence) = 0;

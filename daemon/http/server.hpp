@@ -19,7 +19,7 @@
 
 namespace posed::http {
 
-inline constexpr std::size_t kMaxConnections = 64;  // one more ends the oldest
+inline constexpr std::size_t kMaxConnections = 64;  // one more closes the oldest
 
 class Server {
  public:
@@ -35,7 +35,8 @@ class Server {
 
   // "http://127.0.0.1:5580/". A server that listens on all addresses gives the loopback address.
   [[nodiscard]] const std::string& url() const noexcept { return url_; }
-  // Lists the Host headers of its own addresses, for is_own_host().
+  // The Host headers of the server's own addresses, for is_own_host(); empty: all, because it
+  // listens on all addresses.
   [[nodiscard]] const std::vector<std::string>& hosts() const noexcept { return hosts_; }
 
  private:

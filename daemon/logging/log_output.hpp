@@ -28,8 +28,8 @@ class LogOutput {
   std::shared_ptr<Queue> queue_;
 };
 
-// From now on, writes at most one line a second for each cause (line_limiter.hpp). For commands
-// that untrusted clients can cause to log. Has no effect without a LogOutput.
+// Limits the log from now on to one line a second for each cause (line_limiter.hpp), for commands
+// in which untrusted clients can cause lines. Has no effect without a LogOutput.
 void sum_up_repeats();
 
 // Adds a whole line, without a time, after what was logged before; without a LogOutput it goes
@@ -37,13 +37,15 @@ void sum_up_repeats();
 void say(std::string_view line);
 
 // Writes all of `text`; returns false if the descriptor is broken or did not accept it in time.
-// Waits with poll, so it also works for a descriptor that another program has set non-blocking.
+// Waits with poll, so it also works for a descriptor that another program has set non-blocking. The
+// largest `patience` waits for ever.
 bool write_within(int descriptor, std::string_view text, std::chrono::milliseconds patience);
 
 // Call at the beginning of main(). The number of a closed standard descriptor would be given to the
 // next file that is opened, and messages would be written into that file; so each closed one is
-// opened in a way that its use still fails. Also ignores SIGPIPE and SIGXFSZ: to write to a reader
-// that has gone, or beyond a file's size limit, is then an error and does not end the process.
+// opened on /dev/null in the direction in which its use still fails. Also ignores SIGPIPE and
+// SIGXFSZ: to write to a reader that has gone, or beyond a file's size limit, is then an error and
+// does not end the process.
 void protect_standard_descriptors();
 
 }  // namespace posed::logging

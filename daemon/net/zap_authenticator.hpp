@@ -24,12 +24,13 @@ struct ZapRequest {
   std::string id;                // returned in the reply
   std::string mechanism;         // "NULL", "CURVE", ...
   std::string key_z85;           // the client's public key; empty without CURVE or if it is no key
-  std::optional<Domain> domain;  // of the socket it is for; empty: of no socket of ours
+  std::optional<Domain> domain;  // of the socket; empty: of no socket of ours
 };
 
 // Parses the parts; empty if they are not a request of version 1.0.
 [[nodiscard]] std::optional<ZapRequest> read_zap_request(std::span<const std::string> parts);
 
+// Any thread may call any method; one thread of its own answers libzmq.
 class ZapAuthenticator {
  public:
   // The handler's socket is bound before this returns. Start the authenticator before the first
@@ -56,9 +57,10 @@ class ZapAuthenticator {
   // Call when a peer was disconnected for what it sent. It will reconnect at once, and each
   // handshake costs a socket's thread some milliseconds: for the next second, handshakes are
   // answered one by one with a pause between them, in the order in which they come, so that
-  // connected clients are not kept waiting. Any thread.
+  // connected clients are not kept waiting.
   void slow_down() noexcept;
 
+  // How many handshakes were refused so far.
   [[nodiscard]] std::uint64_t refused() const noexcept { return refused_.load(); }
 
  private:

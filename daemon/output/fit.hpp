@@ -42,15 +42,15 @@ class Fit {
   Frame pose_{};
 };
 
-// The name under which the person at `place` goes out: its own, or its stream's where another
-// person of the output has that. `names`: [place], of all of them; it is set here.
+// Sets names[place], under which the person at `place` is sent, and returns it: `own`, or the
+// stream's name if another person of the output is named so.
 [[nodiscard]] std::string distinct_name(const std::string& own, const std::string& stream,
                                         std::size_t place, std::vector<std::string>& names);
 
-// Whether it can move its fingers.
+// Whether the skeleton has fingers, by those of the index.
 [[nodiscard]] bool has_fingers(const Skeleton& skeleton);
 
-// Whether no joint is turned in T-pose, and the first one says where the person is.
+// Whether every T frame is identity, and the first joint is the root.
 [[nodiscard]] bool rests_unturned(const Skeleton& skeleton) noexcept;
 
 }  // namespace posed::output

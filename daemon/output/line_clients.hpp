@@ -1,6 +1,6 @@
 // LineClients: programs that connect over TCP to read lines of text. Each gets whole lines only: a
-// client that does not read fast enough misses whole lines, and one that has read nothing for two
-// seconds is disconnected. Bytes from clients are discarded.
+// client that does not read fast enough misses whole lines, and one that reads nothing for two
+// seconds while lines wait is disconnected. Bytes from clients are discarded.
 #pragma once
 
 #include <cstdint>
@@ -29,13 +29,14 @@ class LineClients {
   LineClients(const LineClients&) = delete;
   LineClients& operator=(const LineClients&) = delete;
 
-  [[nodiscard]] const std::string& endpoint() const noexcept { return endpoint_; }  // the bound one
+  [[nodiscard]] const std::string& endpoint() const noexcept { return endpoint_; }  // as bound
   [[nodiscard]] std::size_t size() const noexcept { return clients_.size(); }
 
   // Sets the text that each client gets before its first line. Clients that got another greeting
   // are disconnected, because they would misread the lines that follow.
   void set_greeting(std::string greeting);
 
+  // Sends the line, or another message, to each client that has got all of its last one.
   [[nodiscard]] SendOutcome send(std::string_view line, std::int64_t now_ns);
 
   // Admits clients, removes those that have gone, and disconnects those that read nothing. Returns
@@ -67,7 +68,7 @@ class LineClients {
   std::string endpoint_, greeting_;
   drivers::Peers peers_;
   std::vector<Client> clients_;
-  std::int64_t reported_ns_ = kNoTime_ns;  // when a refusal was last told
+  std::int64_t reported_ns_ = kNoTime_ns;  // when look() last told of a refusal
 };
 
 }  // namespace posed::output

@@ -26,22 +26,23 @@ namespace posed::output {
 // description of the bodies. One thread.
 class NatNetScene {
  public:
-  // The server's clock, at the zero of monotonic time, shows 0 ticks.
+  // The server's clock, which shows 0 ticks at the zero of monotonic time and before.
   static constexpr std::uint64_t kClock_hz = 10'000'000;
   [[nodiscard]] static std::uint64_t ticks_at(std::int64_t time_ns) noexcept;
 
   explicit NatNetScene(std::size_t places) : bodies_(places), names_(places) {}
 
-  // The stream of a place comes, or has another skeleton; null: has left. A skeleton that Motive
-  // could have, or a prop, goes out as it is, under Motive's own number (Streaming ID)
-  // unless two have the same; anybody else as Motive's figure. Cold.
+  // The stream of a place has come, or has another skeleton; null: it has left. A prop, or a person
+  // with a skeleton of Motive's, is sent as it is, under Motive's own number (Streaming ID) unless
+  // another body has that; any other person moves Motive's figure (Fit). An error leaves the place
+  // empty. Cold.
   Result<> set_stream(std::size_t place, const LiveStream* stream);
-  // Returns false, and does nothing, for an empty place.
+  // Takes the newest pose of a place. Returns false, and does nothing, if the place is empty.
   [[nodiscard]] bool take(std::size_t place, const Frame& frame);
 
   [[nodiscard]] const drivers::natnet::ModelDef& model() const noexcept { return model_; }
   [[nodiscard]] double rate_hz() const noexcept { return rate_hz_; }
-  // Makes the next frame of the poses that have been taken, valid until the next call.
+  // Makes the next frame from the newest pose of each place; it is valid until the next call.
   [[nodiscard]] const drivers::natnet::FramePacket& next_frame(std::int64_t now_ns);
 
  private:
@@ -53,7 +54,7 @@ class NatNetScene {
     double rate_hz = 0.0;
     drivers::natnet::BodyDef described{};
     drivers::natnet::SkeletonPacket packet{};  // of a prop its one bone
-    bool posed = false;
+    bool posed = false;                        // a pose has been taken
   };
   void number_bodies();
   void describe();
@@ -93,7 +94,7 @@ class NatNetOutput final : public Output {
     Version version;
     std::int64_t heard_ns = 0;
   };
-  // One that is silent keeps its place, with its version, until another needs it.
+  // A silent client stays listed, with its version, until another needs the room.
   [[nodiscard]] static bool is_live(const Client& client, std::int64_t now_ns) noexcept {
     return now_ns - client.heard_ns <= kSilent_ns;
   }
@@ -107,7 +108,7 @@ class NatNetOutput final : public Output {
   void answer(const drivers::Address& from, const drivers::natnet::Message& message,
               std::int64_t now_ns);
   [[nodiscard]] Bytes answer_request(std::span<const std::byte> payload, Client* client) const;
-  // Null when it has not asked for frames.
+  // Null: nobody at this address has asked for frames.
   [[nodiscard]] Client* find(const drivers::Address& address) noexcept;
   // Lets a client in, if there is room.
   void admit(const drivers::Address& address, Version version, std::int64_t now_ns);
@@ -118,12 +119,12 @@ class NatNetOutput final : public Output {
   std::uint16_t data_port_;
   double limit_hz_;
   std::optional<drivers::Address> group_;
-  Version usual_;  // the group's; without one, of who has not said a version
+  Version usual_;  // the group's; without a group, of senders that are no clients
   NatNetScene scene_;
   std::vector<Client> clients_;
   std::size_t live_ = 0;                  // of clients_, as of the beginning of the turn
-  bool more_ = false;                     // requests wait
-  std::int64_t refused_ns_ = kNoTime_ns;  // when a refusal was last told
+  bool more_ = false;                     // requests are left for the next turn
+  std::int64_t refused_ns_ = kNoTime_ns;  // when users were last told of a refusal
 };
 
 }  // namespace posed::output

@@ -322,7 +322,7 @@ class Reader::Source final : private IntakeOut {
     ReadBody body;
     RingShare share, half;
     bool open = true;
-    bool ended = false;  // which was reported
+    bool ended = false;  // and the end was reported
   };
 
   // From now on these are the bodies. A stream goes on with the numbers and the share of the stream
@@ -372,7 +372,8 @@ class Reader::Source final : private IntakeOut {
     }
     if (update_ == nullptr) return true;
     assert(update_->bodies.size() <= kMaxBodies);
-    // For all that may leave, or for none; after the source's end also for those that come.
+    // Room for the end events of all streams that may leave; after the source's end also of those
+    // that come, which end at once.
     if (!ports_.out->has_room(places_ + update_->bodies.size())) return false;
     arrived(ports_.clock());
     for (std::size_t i = 0; i < places_; ++i) {

@@ -18,7 +18,7 @@ struct CameraRig {
   double distance_m = 0.0;                   // between the heads
   std::array<Eigen::Vector3d, kLeds> led_m;  // in the hand's frame
 
-  // Made from the complete feature reports 6 and 12. Cold.
+  // Made from feature reports 6 and 12, whole. Cold.
   [[nodiscard]] static CameraRig of(std::span<const std::byte, kHeadsBytes> heads,
                                     std::span<const std::byte, kLedsBytes> leds);
 
@@ -26,7 +26,8 @@ struct CameraRig {
   // heads do not meet in front of them.
   RT_SAFE [[nodiscard]] bool locate(const LedObservation& spot,
                                     Eigen::Vector3d& position_m) const noexcept;
-  // The inverse: the values that the heads measure, not wrapped, for a LED in front of them.
+  // The inverse of locate(): the values that the heads measure, unwrapped, for a LED in front of
+  // them.
   [[nodiscard]] LedObservation project(std::size_t led, const Eigen::Vector3d& position_m) const;
 };
 
@@ -35,8 +36,8 @@ struct RigidPose {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
 };
 
-// Computes the hand pose from three or more seen LEDs; false when fewer have consistent distances
-// (within 20 %).
+// Computes the hand pose from the LEDs that were seen (Kabsch algorithm). Returns false when fewer
+// than three of them have the right distances from two others (within 20 %), or all are on a line.
 RT_SAFE [[nodiscard]] bool fit_hand(const CameraRig& rig,
                                     const std::array<Eigen::Vector3d, kLeds>& position_m,
                                     std::bitset<kLeds> seen, RigidPose& place) noexcept;

@@ -1,4 +1,4 @@
-// Chunks: raw pieces of input, stored one after the other in one block; played by file and replay.
+// Chunks: raw pieces of input, one after the other in one block; FileTransport plays them.
 #pragma once
 
 #include <cassert>

@@ -1,6 +1,6 @@
 // Writes the messages of the VMC protocol, packed into datagrams: the sending side, for the
 // emulator and for outputs. Poses are given in posed's axes. RT-safe: it has memory of its own for
-// one frame and allocates nothing.
+// one frame and allocates nothing. One thread.
 #pragma once
 
 #include <array>
@@ -35,10 +35,11 @@ class DatagramWriter {
 
   explicit DatagramWriter(Packing packing) noexcept : packing_(packing) {}
 
-  void start() noexcept;  // a new frame
+  void start() noexcept;  // begins a new frame, without datagrams
 
-  // Each adds a message. False, and nothing is added, if its name is empty or too long or this
-  // frame's memory is used up; a frame of all bones with 64 values has room.
+  // Each adds a message, or returns false and adds nothing: if a name is empty (one of avatar() may
+  // be) or longer than kMaxVmcName, or if the frame's memory is full. A frame of all bones with 64
+  // values has room. `bone` is an index in bone_table().
   bool root(const Vec3f& position_m, const Quatf& rotation_xyzw) noexcept;
   bool bone(std::size_t bone, const Vec3f& position_m, const Quatf& rotation_xyzw) noexcept;
   bool device(ValueKind kind, std::string_view serial, const Vec3f& position_m,
@@ -50,7 +51,7 @@ class DatagramWriter {
   bool time(float time_s) noexcept;
   bool avatar(std::string_view path, std::string_view title) noexcept;
 
-  // The datagrams of the frame so far.
+  // The datagrams of the frame so far, valid until start(); another message may lengthen the last.
   [[nodiscard]] std::size_t datagrams() const noexcept { return count_; }
   [[nodiscard]] std::span<const std::byte> datagram(std::size_t i) const noexcept;
 

@@ -49,7 +49,8 @@ constexpr float kFewSamples = 8.0F;  // before repeats are told
 constexpr float kSamples = 100.0F;   // that the share is the mean of
 constexpr int kMaxRepeats = 4;       // of one sample
 
-constexpr float kFlaky = 0.002F;  // share of a hand's angles dropped lately
+// Share of a hand's angles dropped lately, above which company must be clearer.
+constexpr float kFlaky = 0.002F;
 
 constexpr float kForgets_s = 0.25F;  // what is older says nothing, and nothing is held
 
@@ -126,8 +127,9 @@ class Track {
     suspect_ = ahead > limit_ && moved_ > near;
   }
 
-  // Goes on from the sample compared last. Whether it is believed: one that is no suspect or has
-  // `company` is, and one that persists; all, where suspects have been true.
+  // Goes on from the sample compared last. Returns whether it is believed: if it is no suspect, has
+  // `company` (other values moved alike) or persists; with `lenient`, because suspects have been
+  // true, at once.
   RT_SAFE bool settle(const Value& value, bool company, bool lenient,
                       const Bounds& bounds) noexcept {
     verdict_ = Verdict::kNone;
@@ -177,10 +179,10 @@ class Track {
     return false;
   }
 
-  // From the last believed sample to the one compared, by second.
+  // From the last believed sample to the one compared [per s].
   RT_SAFE [[nodiscard]] float speed() const noexcept { return moved_ / since_s_; }
 
-  // Of the last suspect, by what came after it.
+  // Whether the last suspect was true, by what came after it.
   RT_SAFE [[nodiscard]] Verdict verdict() const noexcept { return verdict_; }
 
   // There was no sample in a frame `dt_s` after the one before.
@@ -288,9 +290,9 @@ class Track {
   float longer_gains_ = 0.0F;  // by how much the longer prediction is nearer, in the mean
   float away_s_ = 0.0F;
   float moved_ = 0.0F, off_ = 0.0F;       // of the sample compared last: from last_, from expected_
-  float limit_ = 0.0F, last_off_ = 0.0F;  // for it; that of last_
+  float limit_ = 0.0F, last_off_ = 0.0F;  // of its distance; off_ of last_
   bool suspect_ = false, repeated_ = false;
-  bool was_far_ = false;  // last_
+  bool was_far_ = false;  // last_ was, from its prediction
   bool given_ = false;    // last_ is a suspect that was believed
   bool away_ = false;     // the value stepped away from left_, away_s_ ago
   Verdict verdict_ = Verdict::kNone;
@@ -353,17 +355,17 @@ class GateStage final : public Stage {
   std::vector<std::uint8_t> dropped_;  // [rotation channel] in that frame
   bool any_dropped_ = false;
   float alone_ = 0.0F;                // share of the angles that repeat while others change
-  float samples_ = 0.0F;              // that this is the mean of
+  float samples_ = 0.0F;              // of which alone_ is the mean
   bool same_ = false;                 // the frame is like the one before
-  float held_s_ = 0.0F;               // for which the last sample has been shown again
-  int run_ = 0;                       // frames of that
-  std::vector<float> off_rad_;        // [rotation channel] of the frame, by direction
+  float held_s_ = 0.0F;               // how long the last sample has been shown again
+  int run_ = 0;                       // in how many frames
+  std::vector<float> off_rad_;        // [rotation channel] from the prediction, with its sign
   std::vector<std::size_t> part_;     // [rotation channel] of a hand: two for each finger
   std::vector<float> bend_rad_;       // [part] how far it is off at most; of a hand
   bool scattered_ = false;            // many parts are off, in all directions: no motion
   float true_ = 0.0F, false_ = 0.0F;  // suspects of the hand lately
   float flaky_ = 0.0F;                // share of the hand's angles dropped lately
-  float seen_s_ = 0.0F;               // that this share is known for
+  float seen_s_ = 0.0F;               // for how long flaky_ has been measured
   std::vector<Track<TurnSpace>> turn_;
   Track<PlaceSpace> root_;
   std::vector<float> share_;  // [joint] of samples dropped lately

@@ -23,13 +23,15 @@ struct JointGroup {
 [[nodiscard]] std::vector<JointGroup> body_groups(const Skeleton& skeleton);
 [[nodiscard]] const std::vector<JointGroup>& body_groups();  // all of them
 
-// A vocabulary of these groups without labels, its mean rotations those of the T-pose. Errors: a
-// group without joints, a joint that is no bone or is in two groups, no group with the hips.
+// Makes a vocabulary of these groups, without labels, whose mean rotations are those of the T-pose.
+// Errors: a group without joints, a joint that is no bone or is in two groups, no group with the
+// hips.
 Result<Vocabulary> body_vocabulary(const std::vector<JointGroup>& groups);
 
-// The clips at `rate_hz`, without segments; sets the vocabulary's mean rotations to theirs. A rest
-// pose that a converter put in front is left out. Errors name the clip: a skeleton that lacks
-// joints of the vocabulary, too few frames, a joint that turns over between two frames.
+// Reads the clips at `rate_hz`, without segments, and sets the vocabulary's mean rotations to
+// theirs. A rest pose that a converter put in front is left out. Errors name the clip: its skeleton
+// lacks joints of the vocabulary, it has too few frames, or a channel changes by more than half a
+// turn between two frames.
 Result<std::vector<Recording>> body_recordings(const std::vector<clip::Clip>& clips, double rate_hz,
                                                Vocabulary& vocabulary);
 

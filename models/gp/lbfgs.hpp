@@ -16,7 +16,7 @@ using Objective = std::function<double(const Eigen::VectorXd& x, Eigen::VectorXd
 struct LbfgsOptions {
   int max_iterations = 100;
   int memory = 30;
-  double relative_change = 1e-10;  // stop when one step lowers f by less than this, relative to |f|
+  double relative_change = 1e-10;  // stop when a step lowers f by less than this times max(1, |f|)
   double max_gradient = 1e-3;      // or when no gradient component is larger than this
   std::function<bool()> stop{};    // asked in every iteration; true: the best so far will do
 };
@@ -28,6 +28,7 @@ struct LbfgsResult {
   int evaluations = 0;
 };
 
+// Returns the lowest point found from `x0` on.
 [[nodiscard]] LbfgsResult lbfgs_minimise(const Objective& objective, Eigen::VectorXd x0,
                                          const LbfgsOptions& options);
 

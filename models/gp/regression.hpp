@@ -13,7 +13,8 @@
 
 namespace posed::gp {
 
-// The kernel's values as the optimiser's variables. log_b = -infinity is b = 0.
+// The kernel's values as the optimiser's variables. log_b = -infinity is b = 0, log_noise is log
+// sigma^2.
 struct Hyper {
   double lambda = 0.0;
   double log_mu = 0.0;
@@ -37,20 +38,20 @@ struct Evidence {
 [[nodiscard]] Eigen::MatrixXd rbf(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b, double lambda,
                                   double mu);
 
-// X [N x D] inputs, Y [N x D_out] outputs less their prior mean.
+// The evidence of X [N x D], the inputs, and Y [N x D_out], the outputs less their prior mean.
 [[nodiscard]] Evidence log_marginal(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
                                     const Hyper& hyper);
 
-// SCG on -log L from `start`; log parameters are kept within +-30. The noise is min_noise + exp(log
-// noise), as in NETLAB: otherwise outputs that a smooth map explains exactly would drive it to zero
-// and the weights beyond the range of single precision. The result's x is the Hyper's vector,
-// min_noise included, its value -log L.
+// Minimises -log L by scaled conjugate gradients from `start`; the four variables are kept within
+// +-30. The noise is min_noise + exp(log_noise), as in NETLAB: otherwise outputs that a smooth map
+// explains exactly would drive it to zero and the weights beyond the range of single precision. The
+// result's x is Hyper::vector() with min_noise in its noise, its value -log L.
 [[nodiscard]] ScgResult maximise_evidence(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
                                           const Hyper& start, double min_noise,
                                           const ScgOptions& options = {});
 
-// Weights C^-1 (Y - offset) for Y [N x D_out]. Returns an error when shapes differ, a value is not
-// finite, or C is not positive definite.
+// Computes the weights C^-1 (Y - offset) for Y [N x D_out]. Returns an error when shapes differ, a
+// value is not finite, or C is not positive definite.
 Result<Trained> fit(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
                     const Eigen::VectorXd& offset, const Hyper& hyper);
 
@@ -59,12 +60,11 @@ struct Posterior {
   Eigen::VectorXd variance;  // of f [Q], without noise: e^lambda + b - k'C^-1 k
 };
 
-// The mean alone at the rows of `queries` [Q x D], offset included: [Q x D_out]. Without the
-// variance no factorisation is needed.
+// The posterior's mean alone at the rows of `queries` [Q x D]. It needs no factorisation.
 [[nodiscard]] Eigen::MatrixXd posterior_mean(const Trained& process,
                                              const Eigen::MatrixXd& queries);
 
-// At the rows of `queries` [Q x D]. The reference that the float32 predictor is measured against.
+// The posterior at the rows of `queries` [Q x D], against which the float32 predictor is measured.
 [[nodiscard]] Posterior posterior(const Trained& process, const Eigen::MatrixXd& queries);
 
 }  // namespace posed::gp

@@ -21,10 +21,10 @@ constexpr double kMaxNamed_rad = 100.0;  // that a text may name
 constexpr double kSameWay = 0.97;        // cosine: fingers side by side point so
 constexpr double kMaxFinger_m = 0.3;
 constexpr double kSamePlace_m = 1e-3;
-constexpr double kBends_m = 1e-3;       // tips that go less to one side of the palm bend to both
+constexpr double kBends_m = 1e-3;       // tips that go less far to a side of the palm bend to both
 constexpr double kGuessedTip_m = 8e-3;  // radius of a finger tip without a shape
 
-// Rounded into the range, so that no angle of a frame is beyond a limit by its rounding.
+// Rounds a limit inwards to a float, so that no angle of a frame is beyond it by its own rounding.
 double low_float(double value) {
   auto f = static_cast<float>(value);
   if (static_cast<double>(f) < value) f = std::nextafter(f, std::numeric_limits<float>::infinity());
@@ -275,7 +275,8 @@ class Builder {
                                [&](const char* word) { return names.contains(word); });
   }
 
-  // From the thumb on; 0: unknown. "Middle" is a bone in some hands.
+  // The finger's number, 1 for the index finger; 0: unknown. "Middle" tells nothing, because it is
+  // the name of a bone in some hands.
   [[nodiscard]] int named_place(const Finger& finger) const {
     constexpr std::array<std::pair<const char*, int>, 5> kWords{
         {{"index", 1}, {"fore", 1}, {"little", 4}, {"pinky", 4}, {"ring", 3}}};
@@ -373,7 +374,7 @@ class Builder {
     return {};
   }
 
-  // Gives each joint its driven one, and cuts that one's limits by those who follow.
+  // Finds the driven joint that moves each joint, and narrows its limits by those of its followers.
   Result<> connect() {
     for (std::size_t j = 0; j < hand_.joints.size(); ++j) {
       RobotJoint& joint = hand_.joints[j];
@@ -472,7 +473,8 @@ class Builder {
     }
   }
 
-  // All joints at zero within their limits, before it is known who is driven.
+  // Places the links with all joints at zero, or the limit nearest to it, before it is known which
+  // joints are driven.
   void place_open() {
     for (std::size_t l = 0; l < hand_.links.size(); ++l) {
       const Link& link = hand_.links[l];
@@ -528,7 +530,7 @@ class Builder {
     }
     const Eigen::Vector3d out = y.cross(z);  // of a right hand's palm
     double bends = bend_along(out);
-    if (std::abs(bends) < kBends_m) {  // both ways as far: where the thumb is
+    if (std::abs(bends) < kBends_m) {  // equally far both ways: the thumb's side decides
       bends = (tip_of(hand_.fingers[0], placed_) - hand_.fingers[1].knuckle_m).dot(out);
     }
     hand_.side = bends >= 0.0 ? Side::kRight : Side::kLeft;
@@ -542,7 +544,7 @@ class Builder {
     return {};
   }
 
-  // In which units it would be a finger.
+  // Says that the finger is too long, and in which units of the file it would not be.
   [[nodiscard]] std::string too_long(const Finger& finger) const {
     constexpr double kMinLength_m = 0.05;
     constexpr std::array<std::pair<const char*, double>, 3> kUnits{
@@ -606,7 +608,7 @@ class Builder {
     return sum;
   }
 
-  // The shape at the end of the finger; 0 where it has none.
+  // The radius of the shape at the finger's end [m]; 0: it has none.
   [[nodiscard]] double tip_radius(const Finger& finger) const {
     double radius_m = 0.0;
     for (int l = finger.tip; l != hand_.links[finger.last].parent; l = hand_.links[l].parent) {

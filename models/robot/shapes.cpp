@@ -12,11 +12,11 @@ namespace {
 
 constexpr int kMaxCapsulesABox = 4;
 constexpr int kTries = 100;
-constexpr double kMostly = 0.7;
-constexpr double kOften = 0.1;  // capsules that touch so often may be too thick
-constexpr int kLess = 4;        // hulls take over where they touch less often than capsules by this
+constexpr double kMostly = 0.7;  // shapes that touch more often cannot be kept apart
+constexpr double kOften = 0.1;   // capsules that touch so often may be too thick
+constexpr int kLess = 4;         // hulls take over where they touch this many times less often
 constexpr double kRounding_m = 1e-9;
-constexpr double kSlack_m = 6e-3;            // of what is remembered as close
+constexpr double kSlack_m = 6e-3;            // capsules this much beyond the nearest are kept
 constexpr std::size_t kMaxHullPairs = 4096;  // half a second's work when a robot is loaded
 constexpr double kOpen_m = 1e-3;             // shapes nearer than this when open are made to touch
 constexpr double kThin_m = 1e-3;  // a shape of a smaller radius has its corners rounded off
@@ -78,7 +78,7 @@ void add_shape(RobotHand& hand, int link, const Shape& shape) {
   }
 }
 
-// Of a box, cylinder, capsule or sphere in its own frame.
+// The hull of a box, cylinder, capsule or sphere in its own frame.
 Hull hull_of_solid(const Shape& shape) {
   constexpr int kRim = 16;
   Hull hull;
@@ -117,7 +117,8 @@ Ball ball_of(const RobotHand& hand, int first) {
   return ball;
 }
 
-// The smallest of those along the axes of the link's frame, in which most boxes lie.
+// The smallest capsule around those from `first` on that lies along an axis of the link's frame, as
+// most boxes do.
 Cover cover_of(const RobotHand& hand, int first) {
   Cover best{.first = first, .count = static_cast<int>(hand.capsules.size()) - first};
   const std::span<const Capsule> capsules(hand.capsules.data() + first,
@@ -230,7 +231,8 @@ RT_SAFE bool within(double distance2, double reach_m) noexcept {
   return reach_m > 0.0 && distance2 < reach_m * reach_m;
 }
 
-// False: two capsules are farther apart. Most are, and this is cheaper than their gap.
+// Returns false only if two capsules are farther apart. Most are, and this is cheaper than their
+// gap.
 RT_SAFE bool may_be_within(const RobotHand& hand, const Placed& placed, int i, int j,
                            double within_m) noexcept {
   const Eigen::Vector3d& middle = placed.middle_m[i];
@@ -245,7 +247,7 @@ RT_SAFE bool may_be_within(const RobotHand& hand, const Placed& placed, int i, i
   return within(other2, hand.capsules[j].radius_m + hand.reach_m[i] + within_m);
 }
 
-// The shapes of a link, and their capsules, that may be within that of another link's cover.
+// The shapes of a link, and their capsules, that may be within `within_m` of another link's cover.
 RT_SAFE std::span<const Placed::NearShape> near_shapes(const RobotHand& hand, Placed& placed,
                                                        int link, const CoverPose& at,
                                                        const Cover& cover,
@@ -272,8 +274,9 @@ RT_SAFE std::span<const Placed::NearShape> near_shapes(const RobotHand& hand, Pl
   return {placed.near_shapes.data(), count};
 }
 
-// Lists the capsules of two links that are nearer than both `near_m` and the nearest ones, and
-// kSlack_m. Most capsules are too far from the other link's cover to be looked at.
+// Lists pairs of capsules of two links, nearest first: those with a gap of at most kSlack_m beyond
+// both `near_m` and the least gap. Most capsules are too far from the other link's cover to be
+// looked at.
 RT_SAFE void find_close(const RobotHand& hand, Placed& placed, int a, int b, double near_m,
                         Placed::Close& close) noexcept {
   const Cover& all_a = hand.covers[a];
@@ -318,8 +321,8 @@ RT_SAFE void find_close(const RobotHand& hand, Placed& placed, int a, int b, dou
   close.seen = seen(placed, a, b);
 }
 
-// The least gap below `near_m`; that itself where none is. All capsules are looked at only where
-// links have gone so far that others may have become nearer than those that were.
+// The least gap if it is below `near_m`, else `near_m`. All capsules are looked at only where links
+// have gone so far that others may have become nearer than those that find_close() listed.
 RT_SAFE Nearest nearest(const RobotHand& hand, Placed& placed, int a, int b,
                         double near_m) noexcept {
   Nearest best{.gap_m = near_m};
@@ -389,7 +392,8 @@ RT_SAFE double cover_gap_m(const RobotHand& hand, const Placed& placed, int a, i
   return closest.apart.norm() - hand.covers[a].radius_m - hand.covers[b].radius_m;
 }
 
-// How far from an axis the points of a link can get: along the chain between them.
+// Sets how far each turn can move the points of a link [m/rad]: their distance from its axis is at
+// most the length of the chain between.
 void add_swings(RobotHand& hand) {
   for (int l = 0; l < std::ssize(hand.links); ++l) {
     const Cover& cover = hand.covers[l];
@@ -403,14 +407,14 @@ void add_swings(RobotHand& hand) {
   }
 }
 
-// How often links touch, of kTries poses; when the hand is open counts as always.
+// In how many of kTries poses two links touch; to touch in the start pose counts as always.
 struct Touching {
   LinkPair pair;
   int capsules = 0, hulls = 0;
 };
 
-// Fills in the pairs whose capsules can keep them apart; returns those whose capsules touch when
-// open or often.
+// Fills in the pairs of links that their capsules can keep apart; returns those whose capsules
+// touch at the start or often.
 std::vector<Touching> find_pairs(RobotHand& hand, Placed& placed) {
   std::vector<Touching> all;
   for (int a = 0; a < std::ssize(hand.links); ++a) {
@@ -440,7 +444,7 @@ std::vector<Touching> find_pairs(RobotHand& hand, Placed& placed) {
   return all;
 }
 
-// Lists the hulls of such pairs, without those that touch themselves.
+// Lists the hulls of such pairs, without those that touch at the start or mostly.
 void find_hull_pairs(RobotHand& hand, Placed& placed, std::span<Touching> pairs) {
   struct Candidate {
     std::pair<int, int> two;
@@ -499,7 +503,7 @@ void widen_cover(RobotHand& hand, int link) {
 
 }  // namespace
 
-// The shape itself holds less than its capsules do: they stick out of it.
+// A hull is tighter than the capsules of its shape, which stick out of it.
 Hull hull_of_shape(const Shape& shape) {
   Hull hull = shape.hull.corners.empty() ? hull_of_solid(shape) : shape.hull;
   if (hull.radius_m < kThin_m) round_off(hull);

@@ -1,7 +1,7 @@
 // LiveModel: a gesture model in the form that the live smoother uses, bound to the skeleton of one
-// hand or body (models/smooth/README.md, "Live model"). There is a chain of five states for each
-// ordered pair (recorded label, label before it), with one Gaussian over all channels per state
-// that pools all labels which may follow. Models with many labels have one chain per label,
+// hand or body (models/smooth/README.md, "Live model"). Each ordered pair (recorded label, label
+// before it) has a chain of five states, and each state one Gaussian over all channels, pooled over
+// the labels that may follow. A model with one label or more than 8 has one chain per label,
 // whatever label comes before. Immutable; shared between threads.
 #pragma once
 
@@ -21,12 +21,13 @@
 
 namespace posed::smooth {
 
+// Frame::label of a motion that has none of the model's labels.
 inline constexpr std::string_view kNoneName = "none";
 inline constexpr int kMaxLiveChains =
     64;  // also the most labels; pairs are used with up to 8 labels
 
-// [window][channel], windows are value, delta and delta-delta; radians per frame of the model's
-// rate to the power of the window's order.
+// [window][channel]; the windows are value [rad], delta [rad/frame] and delta-delta [rad/frame^2],
+// with frames at the model's rate. Variances have the squares of these units.
 using LiveRows = std::vector<double>;
 
 struct LiveState {
@@ -40,7 +41,7 @@ struct LiveChain {
 };
 inline constexpr int kAny = -1;
 
-// gesture::HeldPoses for the channels of the stream, whitened: W times a pose.
+// gesture::HeldPoses for the channels of the stream. A pose is whitened as W times the pose.
 struct LiveHeld {
   std::vector<std::size_t> channel;  // [row] the stream's channel
   std::vector<double> whitening;     // W, row by row as far as the diagonal
@@ -54,12 +55,12 @@ struct LiveModel {
   std::vector<std::array<char, kMaxLabel>> labels;
   std::vector<LiveChain> chains;
   std::vector<LiveState> states;  // [chain][kStates]
-  // What is none of the labels (models/smooth/README.md, "None"); empty: always one of them.
+  // The state of motions without a label (models/smooth/README.md, "None"); empty: all get a label.
   std::optional<LiveState> none;
-  // By which a hand's model tells what is none; empty: by the Gaussian `none`.
+  // The poses by which a hand's model tells such motions; empty: it does so by the Gaussian `none`.
   std::optional<LiveHeld> held;
-  // Where the channels of a body are in a frame; empty: a hand, whose channels are the skeleton's
-  // in their order.
+  // Where a body's channels are in a frame; empty: a hand, whose channels are the skeleton's in the
+  // skeleton's order.
   std::optional<gesture::PoseChannels> body;
   int channels = 0;
   int groups = 0;
@@ -67,10 +68,10 @@ struct LiveModel {
   std::vector<std::uint8_t> moves;  // [channel] 1: it moves in the recordings
 };
 
-// Factors on a model's means and variances at a rate ratio (stream rate over model rate)
+// Factors on a model's means and variances for a stream of `pace` times the model's rate
 // (models/trajectory/README.md, "State information and frame rate"): means scale with the window's
-// order; variances grow by a common factor, so that more frames do not add more information in
-// total. RT-safe.
+// order; variances also grow by `pace`, so that more frames do not add more information in total.
+// RT-safe.
 struct RateFactors {
   std::array<double, gesture::kDeltaWindows> mean, variance;
 };

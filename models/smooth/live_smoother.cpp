@@ -53,7 +53,7 @@ bool all_finite(const double* values) noexcept {
   return std::isfinite(values[0]) && std::isfinite(values[1]) && std::isfinite(values[2]);
 }
 
-constexpr double kUnknown = std::numeric_limits<double>::infinity();
+constexpr double kUnknown = std::numeric_limits<double>::infinity();  // variance
 constexpr double kForgetAfter_s = 1.0;  // after a longer silence the past is forgotten
 constexpr int kMaxPending = static_cast<int>(kMaxLag_s * 1000.0) + 2;  // frames at 1000 Hz
 constexpr long kMaxWaiting = 8;  // most frames that wait until the period is known
@@ -211,9 +211,9 @@ RT_SAFE void Unwrap::apply(std::span<double> values_rad) noexcept {
   }
 }
 
-// The window solves for columns: first the channels of a body's gesture model, then the skeleton's
-// rotation channels, or angles, that are not among the model's joints: without such a model all of
-// them. Columns that are left over are a constant 0.
+// The window solves for columns: first the channels of a body's gesture model, then the free
+// angles, which are the rotation channels of joints that this model lacks; without such a model
+// they are all. Columns that are left over are a constant 0.
 struct LiveSmoother::State {
   State(const Skeleton& figure, const LiveOptions& wanted)
       : skeleton(figure),
@@ -288,7 +288,7 @@ struct LiveSmoother::State {
   std::vector<double> values;            // [channels] of the emitted frame
   std::vector<Frame> pending;            // ring of the last frames
   std::vector<double> heading_rad;       // of these
-  long ready = 0;                        // frames before it wait, but are not solved for any more
+  long ready = 0;                        // frames below this number wait, but are solved already
   long received = 0;                     // number of frames received
   long emitted = 0;                      // number of frames emitted
   double last_s = 0.0;
@@ -332,9 +332,9 @@ RT_SAFE bool LiveSmoother::State::serves(const Frame& frame) const noexcept {
          frame.angle_count == angles && frame.joint_count == skeleton.joints.size();
 }
 
-// Stores the frame and extracts its channels, unwrapped. Channels that were not measured become NaN
-// in both: all channels of a joint that is not valid, except those that the source does provide
-// beside missing ones.
+// Stores the frame in `pending` and its unwrapped channels in `angle`. What was not measured
+// becomes NaN in both: every channel that is not finite, and all of a joint that is not valid
+// although none of its channels is missing.
 RT_SAFE void LiveSmoother::State::receive(const Frame& frame, double step_s) noexcept {
   Frame& kept = pending[received % kMaxPending];
   kept = frame;

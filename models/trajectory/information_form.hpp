@@ -7,8 +7,7 @@
 // is two zeros. Frames with the same information may share its memory, because solvers take one
 // pointer per frame.
 //
-// Any unit of angle works (posed uses radians); time is counted in frames. kDeltaDelta names the
-// delta-delta rows.
+// Any unit of angle works (posed uses radians); time is counted in frames.
 #pragma once
 
 #include <hwy/aligned_allocator.h>

@@ -5,8 +5,9 @@
 // - BVH, AMC and hand CSV (Format::sends_text): a frame is its piece of the file's text, ended by a
 //   line end; the description is the skeleton as JSON, the file's header and its first frame. Logs
 //   of posed 0.1 have facts of the whole clip in the place of the skeleton.
-// - every other format: a frame is its time and its timecode, if the clip has them, and its channel
-//   values (FrameParser::numbers); the description is the skeleton as JSON.
+// - every other format, and a file of these that was put into other axes or another unit: a frame
+//   is its time and its timecode, if the clip has them, and its channel values
+//   (FrameParser::numbers); the description is the skeleton as JSON.
 //
 // Cold.
 #pragma once
@@ -35,6 +36,7 @@ struct DeviceClip {
   std::string description;          // valid UTF-8 if the file's text is
   std::vector<std::string> frames;  // the bytes of each frame, at least one
   std::vector<double> time_s;       // [frame], as Clip::time_s
+  // The first frame is a rest pose that a converter put in front of the motion.
   bool begins_with_added_pose = false;
   std::vector<std::string> warnings;
 };

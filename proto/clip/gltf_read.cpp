@@ -42,7 +42,7 @@ constexpr std::size_t kMaxNumbers = 50'000'000;  // of all frames
 constexpr double kMaxFramesAKey = 1000.0;        // so that a short file asks for little work
 constexpr double kFewFrames = 36'000.0;          // that any file may ask for: a pose held for long
 constexpr double kStillRate_hz = 30.0;           // of a file without an animation
-constexpr double kUnevenRate_hz = 60.0;          // least rate of one whose keys have none
+constexpr double kUnevenRate_hz = 60.0;          // least rate of one whose keys are uneven
 constexpr double kMaxKeyRate_hz = 1000.0;
 constexpr std::size_t kMaxAnimations = 100;  // that are searched for motion
 constexpr std::size_t kMaxNesting = 100;     // of JSON: tinygltf calls itself
@@ -50,7 +50,7 @@ constexpr std::size_t kMaxValues = 450'000;  // of JSON, each 0.3 KB of memory: 
 constexpr std::size_t kMaxCopied_bytes = 16'000'000;  // of a .glb's binary part
 constexpr std::size_t kMaxSteps = 100'000'000;        // poses and tracks of all frames
 constexpr std::size_t kMaxWhy = 200;                  // letters of what tinygltf says
-// Of these, the humanoid is read; the first that names bones counts.
+// The extensions whose humanoid is read; the first that names bones counts.
 constexpr std::array<std::string_view, 3> kExtensions{"VRMC_vrm", "VRMC_vrm_animation", "VRM"};
 
 // --- what tinygltf may do
@@ -60,7 +60,7 @@ bool skip_image(tinygltf::Image* /*image*/, int /*index*/, std::string* /*error*
                 const unsigned char* /*bytes*/, int /*size*/, void* /*user*/) {
   return true;
 }
-// So that tinygltf goes on to read it, which says what to do.
+// Lets tinygltf go on to never_reads(), whose error says what to do.
 bool always_exists(const std::string& /*path*/, void* /*user*/) { return true; }
 std::string same_path(const std::string& path, void* /*user*/) { return path; }
 bool never_reads(std::vector<unsigned char>* /*out*/, std::string* error, const std::string& path,
@@ -69,7 +69,7 @@ bool never_reads(std::vector<unsigned char>* /*out*/, std::string* error, const 
   return false;
 }
 
-// The JSON of a .glb ends with its chunk, after which brackets mean nothing.
+// The JSON of a .glb is its first chunk; brackets in the bytes after that mean nothing.
 std::string_view json_of(std::string_view bytes) {
   constexpr std::size_t kHeader = 20, kLengthAt = 12;
   if (!bytes.starts_with("glTF") || bytes.size() < kHeader) return bytes;
@@ -124,7 +124,7 @@ class JsonCut {
   void skip_space() {
     while (at_ < json_.size() && std::string_view(" \t\r\n").contains(json_[at_])) ++at_;
   }
-  // False after a text that is no key.
+  // Returns false if the text before is no key.
   bool skip_to_value() {
     skip_space();
     if (at_ == json_.size() || json_[at_] != ':') return false;
@@ -167,7 +167,7 @@ class JsonCut {
 
   std::span<char> json_;
   std::size_t at_ = 0, depth_ = 0, values_ = 0, buffers_ = 0;
-  std::string_view top_;  // the member of the whole that is read
+  std::string_view top_;  // the key of the whole that is being read
 };
 
 // The file without what posed does not read.
@@ -351,7 +351,7 @@ std::vector<double> numbers_of(const tinygltf::Model& model, int index, std::siz
 class Numbers {
  public:
   explicit Numbers(const tinygltf::Model& model) : model_(model), left_(2 * most_numbers(model)) {}
-  // As numbers_of(); empty, too, where all together are too many.
+  // The same as numbers_of(), and empty once the numbers of all accessors are too many.
   std::span<const double> of(int index, std::size_t components) {
     const auto [place, is_new] = read_.try_emplace({index, components});
     if (!is_new) return place->second;
@@ -440,7 +440,7 @@ Tree tree_of(const tinygltf::Model& model) {
   return tree;
 }
 
-// Sets the world poses of the nodes in the tree's order from their own. Scales go into places only.
+// Computes the nodes' world poses from their own. A scale changes positions and no rotation.
 void place(const Tree& tree, const std::vector<Pose>& own, std::vector<Pose>& world) {
   for (const int node : tree.order) {
     const auto n = static_cast<std::size_t>(node);
@@ -455,13 +455,13 @@ void place(const Tree& tree, const std::vector<Pose>& own, std::vector<Pose>& wo
 
 // --- the figure
 
-// The humanoid's bones by their nodes, of VRM 0, VRM 1 or a VRM animation.
+// The bones that a VRM 0, a VRM 1 or a VRM animation names, by their nodes.
 struct Humanoid {
   std::map<int, Bone> bones;
   bool backwards = false;  // VRM 0 looks along -Z
 };
 
-// A null value where there is none.
+// Returns a member of the object; a null value if it has none.
 const tinygltf::Value& member(const tinygltf::Value& object, const std::string& name) {
   static const tinygltf::Value kNone;
   return object.IsObject() ? object.Get(name) : kNone;
@@ -704,8 +704,9 @@ Result<std::vector<Track>> tracks_of(const tinygltf::Model& model,
   return tracks;
 }
 
-// Evenly spaced times that hit the keys of the track that has most, if those have a rate; of a file
-// of posed that has none, whose frames came when they came, the keys themselves.
+// The times of the frames. They are evenly spaced, and on the keys of the track that has most if
+// those are even. In a file that posed wrote, uneven keys are the frames of a live recording and
+// are the times themselves.
 struct Times {
   double rate_hz = kStillRate_hz;
   double first_s = 0.0;
@@ -717,7 +718,7 @@ struct Times {
   }
 };
 
-// That of a live recording, whose frames come when they come.
+// The rate of uneven keys, as of a live recording, by their median step; 0: too high to be a rate.
 double usual_rate_hz(std::span<const double> keys_s) {
   std::vector<double> steps_s;
   for (std::size_t i = 1; i < keys_s.size(); ++i) steps_s.push_back(keys_s[i] - keys_s[i - 1]);
@@ -767,7 +768,7 @@ Times times_of(const std::vector<Track>& tracks, bool own) {
   return times;
 }
 
-// Those that gltf.cpp writes: a frame has that of the newest key. Empty for other files.
+// The timecodes that gltf.cpp writes: each frame has that of its newest key. Empty for other files.
 std::vector<Timecode> timecodes_of(const tinygltf::Animation* animation,
                                    const std::vector<Track>& tracks, const Times& times) {
   if (animation == nullptr || tracks.empty()) return {};
@@ -817,7 +818,7 @@ class Reader {
   const ClipFile& file_;
   Numbers numbers_;
   Tree tree_;
-  std::vector<Pose> rest_;  // [node], of its own
+  std::vector<Pose> rest_;  // [node], in its parent
   Humanoid humanoid_;
   Figure figure_;
   const tinygltf::Animation* animation_ = nullptr;
@@ -1080,7 +1081,7 @@ Result<Draft> Reader::read() {
   Draft draft;
   const auto bound = other_rest(draft);
   if (bound) rest_in(*bound);
-  // Where the rest is laid near to a pose it tells nothing about the world.
+  // A rest pose that rest_in() has laid does not show that the file's up axis is wrong.
   draft.up_may_err = !bound && figure_.bones.empty();
   const std::vector<char> matters = nodes_that_matter();
   std::erase_if(tree_.order,

@@ -1,7 +1,7 @@
-// T frames: the world rotation of each bone's joint in the canonical T-pose (+Y up, +X left, +Z
-// forward). The zero pose decides wherever it shows a person. Where it is folded, the clip is asked
-// for one bit at a time (which local axis is the hinge?), and its answer counts only by a wide
-// margin; so T is the same for every clip of one figure. Cold.
+// Finds T frames: the world rotation of each bone's joint in the canonical T-pose (+Y up, +X left,
+// +Z forward). The zero pose decides wherever it shows a person. Where limbs are folded in it, the
+// clip's motion answers one question at a time (which local axis is the hinge?), and only by a wide
+// margin; so T is the same for every clip of one figure. Cold; one thread.
 #pragma once
 
 #include <array>
@@ -18,14 +18,16 @@
 
 namespace posed::rig {
 
-// How sure a T frame is, and from what it comes.
+// How sure a T frame is, and what it was derived from.
 struct Evidence {
-  double sure = 0.0;  // 1 zero pose, .9 sure of one bit, .8 the clip decided, at most .4 a guess
+  // 1 zero pose, .9 one question answered clearly, .8 the clip decided, .5 the zero pose of an
+  // incomplete person, at most .4 a guess.
+  double sure = 0.0;
   std::string why;
 };
 
-// How a limb bends: the mean axis in the upper joint's frame, the 90th percentile of the angle
-// [deg], and how far all bends agree (1: one axis, one way).
+// How a limb bends in the clip: the mean axis in the upper joint's frame, the 90th percentile of
+// the angle [deg], and how far all bends agree (1: one axis, one way).
 struct Bend {
   Vec axis;
   double flex_deg = 0.0;
@@ -34,13 +36,13 @@ struct Bend {
 
 class Frames {
  public:
-  // The arguments stay alive as long as this.
+  // The arguments outlive the object. `notes` gets sentences for users.
   Frames(const Figure& figure, const std::vector<JointName>& names, const BoneJoints& joint,
          const Motion& motion, std::vector<std::string>& notes);
 
-  // The bone's T is known; the bones that go with it follow. Before finding any.
+  // States the T of a bone; the bones that go with it follow. Call before the functions below.
   void know(Bone bone, const Mat& T) { known_[index(bone)] = T; }
-  void find_person();  // needs limbs of some length (can_find_person)
+  void find_person();  // only if can_find_person()
   void find_hand(Side side);
   void lay_parts();  // for an incomplete figure: from a zero pose near the T-pose
   [[nodiscard]] bool can_find_person() const;
@@ -51,6 +53,7 @@ class Frames {
   [[nodiscard]] const std::string& why_up() const { return why_up_; }
   [[nodiscard]] const std::string& up_doubt() const { return up_doubt_; }  // empty: none
   [[nodiscard]] bool up_by_zero_pose() const { return up_by_zero_pose_; }
+  // In the file's unit of length.
   [[nodiscard]] double leg_length() const;
   [[nodiscard]] double hand_length(Side side) const;
 
@@ -65,13 +68,13 @@ class Frames {
   void set(Bone bone, const Mat& T, double sure, std::string why);
   [[nodiscard]] double sure(Bone bone) const { return evidence_[index(bone)].sure; }
 
-  // From one bone to another below it, in the zero pose.
+  // The way from one bone to another below it, in the zero pose.
   [[nodiscard]] std::optional<Vec> off(Bone from, Bone to) const;
-  // From a bone to the first of those after it that lies elsewhere.
+  // The same to the first of the bones `after` that is not at the same place.
   [[nodiscard]] std::optional<Vec> rest(Bone bone, std::initializer_list<Bone> after) const;
-  [[nodiscard]] std::optional<Vec> leaf(Bone bone) const;  // to the farthest child or tip
+  [[nodiscard]] std::optional<Vec> leaf(Bone bone) const;  // the same to the farthest child or tip
   [[nodiscard]] Bend bend(Bone upper, Bone lower, Bone end) const;
-  // Mean angle of the bone's canonical rotation if its T were this.
+  // Mean angle over the clip of the bone's canonical rotation, if its T were this [deg].
   [[nodiscard]] double bent_deg(Bone before, Bone bone, const Mat& T) const;
 
   void pelvis();
@@ -124,7 +127,7 @@ class Frames {
   std::array<std::optional<Mat>, kBones> known_;
   std::array<std::optional<Mat>, kBones> T_;
   std::array<Evidence, kBones> evidence_;
-  double size_ = 0.0;  // of the thigh; lengths below a millionth of it are none
+  double size_ = 0.0;  // length of the thigh; a millionth of it counts as 0
   bool upright_ = false;
   bool legs_folded_ = false;
   Vec zero_up_ = kY;
@@ -144,7 +147,7 @@ class Frames {
   return side == Side::kLeft ? "left" : "right";
 }
 
-// `value` with no more than two digits behind the point, for sentences.
+// Returns `value` with `digits` digits behind the point, for sentences.
 [[nodiscard]] std::string short_text(double value, int digits);
 
 }  // namespace posed::rig

@@ -5,7 +5,7 @@
 
 namespace posed {
 
-// `text` with A to Z as small letters.
+// Returns `text` with A to Z in lower case and all other bytes as they are, in any locale.
 [[nodiscard]] inline std::string lower(std::string_view text) {
   std::string out(text);
   for (char& c : out) {

@@ -14,9 +14,9 @@ struct NamedNumber {
   double number = 0.0;
 };
 
-// In the order of the text; blanks around names and numbers do not count, empty text has none.
-// `what` names the text in the error: "weights". Numbers are from `low` to `high`, which are
-// whole, and no name comes twice.
+// Returns the numbers in the order of the text, none for empty text; blanks around names and
+// numbers do not count. Errors: a number outside of `low` to `high` (which are whole), a name
+// twice, more than 2,048 bytes. `what` names the text in them: "weights".
 Result<std::vector<NamedNumber>> parse_named_numbers(std::string_view text, std::string_view what,
                                                      double low, double high);
 

@@ -9,7 +9,7 @@ namespace posed {
 
 // A coordinate or length with one decimal, which is a tenth of a pixel.
 [[nodiscard]] std::string svg_number(double value);
-// ` name="1.0"`
+// Returns ` name="1.0"`, with the blank before it.
 [[nodiscard]] std::string svg_attribute(std::string_view name, double value);
 
 // Text for an element: cleaned (proto/text/clean.hpp) and with &, < and > written as XML wants.

@@ -17,7 +17,7 @@ namespace posed {
 struct TomlLimits {
   std::string_view what = "file";  // the kind in error messages, for example "calibration"
   std::size_t bytes = 64 * 1024;
-  int depth = 8;  // parts of the header and of the key, and brackets and braces, added up
+  int depth = 8;             // parts of the header and the key plus open brackets and braces
   std::size_t items = 4096;  // keys, table headers and commas
 };
 
@@ -26,8 +26,8 @@ struct TomlLimits {
 // check before it is parsed.
 //
 // Returns an Error with the line where a limit is exceeded. Comments and strings are skipped as
-// TOML 1.0 defines them. For a text that is not TOML the result may be either, but it never accepts
-// a text that toml++ would nest deeper. No recursion, one pass, memory for at most `depth` levels.
+// TOML 1.0 defines them. A text that is not TOML may pass or fail, but one that toml++ would
+// nest deeper never passes. No recursion, one pass, memory for at most `depth` levels.
 Result<> check_toml(std::string_view text, const std::string& file, const TomlLimits& limits);
 
 // Returns the table of a text that stays within `limits`; `file` is the name in an Error. Throws

@@ -40,7 +40,7 @@ namespace {
 using drivers::glove::CalibrationFile;
 using drivers::glove::kPoseNames;
 
-// On the terminal, which is restored by the destructor.
+// Leads the user by a full-screen view, which the destructor removes from the terminal.
 class PoseScreen final : public PoseGuide {
  public:
   // `note` is shown from the start; may be empty.
@@ -256,8 +256,8 @@ constexpr GuidedMove kSpreadMove{"spread",
 constexpr double kMove_s = 20.0;
 constexpr double kMovePatience_s = 5.0;  // for a glove that sends nothing while the user reads
 
-// By lines, on a terminal too: "move bend" on stdout, the hint on stderr; a line on stdin begins
-// it, or the time to get ready.
+// Records a move, led by lines on a terminal, too: "move bend" on stdout, the hint on stderr; a
+// line on stdin begins it, or the end of the time to get ready.
 Result<drivers::glove::Move> record_move(GloveSource& source, const PosePlan& plan,
                                          const GuidedMove& wanted) {
   std::printf("move %s\n", wanted.name);

@@ -1,5 +1,5 @@
 // What `posed top` and `posed demo` show of one stream: its figure, its latency over the last
-// minute and its alpha. Cold.
+// minute and its alpha. Cold; one thread.
 #pragma once
 
 #include <algorithm>
@@ -28,7 +28,7 @@ class StreamStats;
 
 namespace posed::tools {
 
-// StreamFigure: the pose of one stream of a daemon as a small figure of text, for `posed top`.
+// StreamFigure draws the newest pose of one stream as a small figure of text.
 class StreamFigure {
  public:
   explicit StreamFigure(std::string stream) : stream_(std::move(stream)) {}
@@ -38,13 +38,13 @@ class StreamFigure {
   [[nodiscard]] const std::shared_ptr<const Skeleton>& skeleton() const { return skeleton_; }
   [[nodiscard]] const std::optional<Frame>& pose() const { return pose_; }
 
-  // Takes a message of the daemon; those of other topics than skeleton/ and pose/ of the stream,
-  // and what cannot be parsed, change nothing.
+  // Takes a message of the daemon. One that cannot be parsed, or whose topic is neither
+  // skeleton/STREAM nor pose/STREAM, changes nothing.
   void handle(std::string_view topic, std::span<const std::byte> body);
 
-  // The last pose, seen in three-quarter view as it stood when the first pose came; empty before.
-  // Call it at the rate of the screen: what the poses need as room grows at once and shrinks
-  // slowly.
+  // Draws the last pose, in a three-quarter view by the heading of the first; empty before that.
+  // Call it at the rate of the screen: each call widens the view at once to hold the pose, or
+  // narrows it a little.
   [[nodiscard]] std::vector<std::string> lines(int columns, int rows);
 
  private:
@@ -62,8 +62,8 @@ class StreamFigure {
   std::optional<picture::StripLayout> room_{};
 };
 
-// A row of bars from a list of numbers, one character each, for a terminal. The tallest of the
-// eight bars is the largest value. What is not above 0, or not finite, is the lowest bar.
+// Returns a bar for each number, one character each, for a terminal. The largest number gets the
+// tallest of eight bars. A number that is not above 0, or not finite, gets the lowest.
 [[nodiscard]] inline std::string sparkline(const std::vector<double>& values) {
   const auto height = [](double value) {
     return std::isfinite(value) ? std::max(value, 0.0) : 0.0;
@@ -79,25 +79,24 @@ class StreamFigure {
   return text;
 }
 
-// ChosenStream: the stream of `posed top` and `posed demo` that the arrow keys chose: its figure,
-// its latency over the last minute, and its alpha, which the keys change.
+// ChosenStream: the stream that the arrow keys chose, with its figure, its latency over the last
+// minute, and its alpha, which the keys change.
 class ChosenStream {
  public:
-  // `data` is the connection that receives the daemon's messages; it outlives the object.
-  // `control`: where changes of alpha go; without an endpoint alpha cannot be changed.
+  // `data` receives the daemon's messages and outlives the object. Changes of alpha go to
+  // `control`; if that has no endpoint, alpha cannot be changed.
   ChosenStream(const Connection& data, ClientOptions control)
       : data_(data), control_options_(std::move(control)) {}
 
-  // Takes the stats of another second: the choice stays, or becomes the first stream if the chosen
-  // one has gone.
+  // Takes the stats of the next second. If the chosen stream has gone, the first one is chosen.
   void update(const v1::Stats& stats);
   // Takes any other message of the daemon.
   void handle(std::string_view topic, std::span<const std::byte> body);
 
   // Up and down choose another stream, left and right ask the daemon for another alpha; other keys
-  // do nothing. A stream without alpha gives a note that says so.
+  // do nothing. If alpha cannot be changed, note() says why.
   void obey(Key key, const v1::Stats& stats);
-  // What the daemon answered, or why it cannot be asked; empty if there is nothing new.
+  // Reads the daemon's answers. Returns why alpha stays as it is, once; empty: nothing new.
   [[nodiscard]] std::optional<std::string> note();
 
   [[nodiscard]] std::string name() const { return figure_ ? figure_->stream() : std::string(); }

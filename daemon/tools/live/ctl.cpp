@@ -146,7 +146,7 @@ ParameterValue value_of_text(const std::string& text) {
   return text;
 }
 
-// What this posed knows to be wrong, without asking the daemon: it alone knows the stream's stages.
+// Refuses what no stage of this posed takes; only the daemon knows the stages of the stream.
 Result<> check_parameter(const std::string& name, const ParameterValue& value) {
   std::set<std::string> known;
   std::optional<Error> wrong;  // for the first stage that has it

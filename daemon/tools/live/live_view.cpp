@@ -24,11 +24,11 @@
 namespace posed::tools {
 namespace {
 
-constexpr int kNameWidth = 11;  // that a name has before the model's is cut
+constexpr int kNameWidth = 11;  // to which a stream's name is cut before the model's is
 constexpr int kMinName = 6;     // the heading
 constexpr int kMinModel = 5;    // a model's name that is cut further is no help
 constexpr float kMaxShown_hz = 9999.9F;
-constexpr float kKnown = 0.95F;   // of a motion; up to it the style fades
+constexpr float kKnown = 0.95F;   // of a motion; only a smaller share is worth a word
 constexpr float kMinTold = 0.1F;  // of what the input has of the style; less is within the error
 
 struct Health {
@@ -350,10 +350,10 @@ std::string body_row(const v1::StreamStats& stream) {
   return text + (text.empty() ? "" : ": ") + clean(stream.refusal());
 }
 
-// What feeds it is switched on by whoever likes, so silence is no fault.
+// A camera is switched on when somebody likes, so its silence is no fault.
 bool is_camera(const v1::SourceStats& source) { return source.driver() == "landmarks"; }
 
-// A tracker that somebody writes: which of its messages are refused, and why.
+// Why a camera shows no hand. Who writes a tracker sees which of its messages are refused, and why.
 std::string without_hand(std::uint64_t valid, std::uint64_t torn, std::uint64_t odd,
                          std::uint64_t foreign) {
   std::string text = "no hand: its camera is off, or sees none";
@@ -422,13 +422,13 @@ std::string output_row(const v1::OutputStats& output) {
   return text;
 }
 
-// The details of a stream, or of the chosen one: the colour of each and its text.
+// A line about one stream: its colour and its text, which may be empty.
 struct Detail {
   const char* colour;
   std::string text;
 };
 
-// What is wrong first.
+// The details of a stream, what is wrong first; with `only_wrong` nothing else.
 std::vector<Detail> details_of(const v1::StreamStats& stream, std::int64_t now_ns,
                                bool only_wrong) {
   const bool refused = !stream.refusal().empty();
@@ -443,7 +443,7 @@ std::vector<Detail> details_of(const v1::StreamStats& stream, std::int64_t now_n
   return details;
 }
 
-// As many lines as the text needs.
+// The text in as many lines as it needs, each after `indent` blanks.
 std::vector<std::string> broken(const std::string& text, const LiveViewOptions& options,
                                 const char* colour, int indent) {
   const std::string blanks(indent, ' ');

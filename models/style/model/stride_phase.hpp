@@ -12,21 +12,21 @@ namespace posed::style {
 struct StridePhase {
   Eigen::VectorXd phase;  // rad, one a frame, increasing: signal ~ A cos(phase)
   double dtheta = 0.0;    // mean cadence of `strides`, rad per frame
-  // Share of the walk's signal that three harmonics of this phase leave, plus find_stride's penalty
-  // on a weak first harmonic: 0 is a perfect stride, 1 and more none. Where the legs stand nothing
-  // counts, unless they walk less than two strides.
+  // Share of the walk's variance that three harmonics of this phase do not explain, plus
+  // weak_first_penalty(): 0 is a perfect stride, 1 or more none. Frames in which the legs stand do
+  // not count, unless the rest has less than two strides.
   double score = 0.0;
-  // The frames on which the legs stride, in order: without those that stand, start or stop, and
-  // without a tenth of a second at either end of each walk, a third where a recording begins or
-  // ends. All frames where less than a stride would be left.
+  // The frames in which the legs stride, ascending. Left out are frames that stand, start or stop,
+  // 0.1 s at either end of each walk, and 0.33 s at either end of a signal of more than 2.2 s. All
+  // frames, if less than a stride would be left.
   std::vector<Eigen::Index> strides;
 };
 
-// Follows the strides of a leg signal sampled at `rate_hz`: periods 0.6 to 2.6 s, no longer than
-// the signal. Needs has_stride() (harmonics.hpp).
+// Follows the strides of a leg signal (LegSignal) [frames], whose periods are 0.6 to 2.6 s and no
+// longer than the signal. Needs has_stride() (harmonics.hpp).
 [[nodiscard]] StridePhase follow_strides(const Eigen::VectorXd& signal, double rate_hz);
 
-// The frames of a walk that stride and their phases, turned so that the signal is A cos(phase).
+// StridePhase::strides and their phases [rad], shifted so that the signal is A cos(phase).
 struct WalkPhases {
   std::vector<Eigen::Index> frames;
   Eigen::VectorXd phase;  // [frames]

@@ -32,20 +32,21 @@ struct MoreStyle {
 struct GateData {
   Eigen::VectorXd
       neutral{};  // mean pose of the neutral walk in training [dims]; empty: no gate data
-  // The smallest mean swing of the legs (LiveStride) of any training clip, and the stride of the
-  // fastest one. Both are 0 where the training shows no strides.
+  // The smallest mean swing of the legs (LiveStride) of any training clip, and the stride period of
+  // the fastest clip. Both are 0 if the training shows no strides.
   double swing_rad = 0.0;
   double fastest_stride_s = 0.0;
   // The highest mean that LiveGait has over a training clip; NaN: unknown.
   double gait_correlation = std::numeric_limits<double>::quiet_NaN();
-  // The mean cycle of each person and day in the neutral walk, harmonic coefficients
-  // [kCycleRows x dims]; phase 0 is where the right thigh is farthest in front. Empty without
-  // strides and in models of older versions of posed.
+  // The mean cycle of each person and day in the neutral walk, as harmonic coefficients
+  // [kCycleRows x dims]; at phase 0 the right thigh is farthest in front. Empty without strides and
+  // in models of older versions of posed.
   std::vector<Eigen::MatrixXd> usual{};
   // rig_id() of the figures of training; empty in models of older versions of posed.
   std::vector<std::uint32_t> rigs{};
-  // Where each joint of a humanoid space lies on the way from the hips (0) to the head (1) in
-  // training; -1 aside of it. Empty in models of older versions of posed.
+  // [joint of a humanoid space] Where it is along the trunk of the training figure, from the hips
+  // (0) to the head (1) (trunk_places()); -1: beside the trunk. Empty in models of older versions
+  // of posed.
   std::vector<double> places{};
 
   [[nodiscard]] bool present() const { return neutral.size() > 0; }
@@ -61,8 +62,8 @@ struct StyleAxis {
   [[nodiscard]] bool present() const { return direction.size() > 0; }
 };
 
-// What a style does to the pelvis, by the process's inputs and kernel: its height [lengths of a
-// leg], its speed forward and to the left [such lengths a mean stride of the source].
+// What a style does to the pelvis, a function with the inputs and kernel of the process: its height
+// [leg lengths], its speed forward and to the left [leg lengths per mean stride of the source].
 struct RootFunction {
   static constexpr int kDims = 3;
   gp::Function function;  // weights [N x 3], offset [3]
@@ -85,11 +86,11 @@ struct StyleModel {
   [[nodiscard]] std::vector<std::string> names() const;  // of its styles, in order
 };
 
-// The same for figures of the same joints, of any size. Cold.
+// Returns a hash of the joints' names and parents: figures that differ in size have the same. Cold.
 [[nodiscard]] std::uint32_t rig_id(const Skeleton& skeleton);
 
-// Returns a model of a single style, which is the sum of all styles, each times its share; `shares`
-// has styles() numbers.
+// Returns a model whose only style is the sum of the styles of `model`, each times its share.
+// `shares` has styles() numbers. Cold.
 [[nodiscard]] StyleModel mixture_of(const StyleModel& model, std::span<const double> shares);
 
 // Reads a file that save_model() wrote. Errors name the file and what is wrong with it.
