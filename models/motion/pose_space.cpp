@@ -4,11 +4,13 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <ranges>
 #include <span>
 
 #include "models/motion/cmu43.hpp"
 #include "proto/frame/rotation.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::motion {
 namespace {
@@ -78,10 +80,7 @@ std::unexpected<Error> missing_joints(const PoseSpaceSpec& spec,
                                       const std::vector<std::string>& missing,
                                       const Skeleton& skeleton) {
   constexpr std::size_t kNamed = 12;
-  std::string names;
-  for (const std::string& name : std::span(missing).first(std::min(missing.size(), kNamed))) {
-    names += (names.empty() ? "" : ", ") + clean_name(name);
-  }
+  std::string names = joined(missing | std::views::take(kNamed), ", ", clean_name);
   if (missing.size() > kNamed) {
     names += " and " + std::to_string(missing.size() - kNamed) + " more";
   }

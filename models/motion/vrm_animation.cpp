@@ -11,6 +11,7 @@
 #include "models/motion/retarget.hpp"
 #include "proto/clip/gltf.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::motion {
 namespace {
@@ -25,7 +26,7 @@ Result<> check_bones(const Skeleton& skeleton, const std::string& path) {
   std::string missing;
   for (const Bone bone : kRequired) {
     if (skeleton.joint_of(bone) >= 0) continue;
-    missing += (missing.empty() ? "" : ", ") + std::string(bone_name(bone));
+    add_word(missing, bone_name(bone));
   }
   if (missing.empty()) return {};
   return fail("skeleton " + in_quotes(skeleton.name) +

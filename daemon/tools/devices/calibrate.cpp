@@ -80,7 +80,6 @@ class PoseLines final : public PoseGuide {
 };
 
 using drivers::glove::kPoseHints;
-using drivers::glove::kPoseNames;
 using drivers::glove::Pose;
 using SteadyClock = std::chrono::steady_clock;
 

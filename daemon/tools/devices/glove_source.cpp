@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "daemon/system/clock.hpp"
 #include "drivers/glove/traits.hpp"
 #include "drivers/transport/cold_writer.hpp"
 #include "posed/v1/posed.pb.h"
@@ -35,11 +36,6 @@ std::unexpected<Error> no_such_stream(const std::string& stream, const v1::Stats
 }
 
 std::unexpected<Error> interrupted() { return fail("stopped; no calibration was written"); }
-
-std::int64_t now_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch())
-      .count();
-}
 
 // Collects raw values from a glove's samples: calibrated sensors come first, then their raw values.
 class RawSink final : public Sink {
@@ -75,10 +71,10 @@ class OpenedGlove final : public GloveSource {
   Result<> listen(double seconds, const Accept& accept,
                   const std::function<bool()>& enough) override {
     RawSink sink(model().sensors.size(), accept);
-    const std::int64_t start_ns = now_ns();
+    const std::int64_t start_ns = system::monotonic_ns();
     const std::int64_t end_ns = start_ns + static_cast<std::int64_t>(seconds * 1e9);
     const bool polled = !device_.poll.request.empty();
-    for (std::int64_t now = start_ns, asked = 0; now < end_ns; now = now_ns()) {
+    for (std::int64_t now = start_ns, asked = 0; now < end_ns; now = system::monotonic_ns()) {
       if (Interrupt::came()) return interrupted();
       if (enough()) return {};
       if (polled && now - asked >= device_.poll.period_ns) {
@@ -224,7 +220,7 @@ Result<std::unique_ptr<GloveSource>> GloveSource::open(const drivers::Driver& dr
   auto ports = std::make_unique<drivers::TransportFactory>();
   auto device = TRY(driver.open(options, *ports));
   auto glove = TRY(known(driver, device.description));
-  TRY(device.transport->start(now_ns()));
+  TRY(device.transport->start(system::monotonic_ns()));
   return std::make_unique<OpenedGlove>(std::move(glove), std::move(device), std::move(ports));
 }
 

@@ -20,6 +20,7 @@
 #include "proto/frame/sink.hpp"
 #include "proto/frame/time.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::tools {
 namespace {
@@ -271,7 +272,7 @@ std::string input_words(const v1::StreamStats& stream) {
 // A line below the stream's row about its stages; empty if there is nothing to report.
 std::string stages_row(const v1::StreamStats& stream) {
   std::string text = label_words(stream);
-  const auto add = [&](const std::string& words) { text += (text.empty() ? "" : ", ") + words; };
+  const auto add = [&](const std::string& words) { add_word(text, words); };
   for (const v1::StageStats& one : stream.stage()) {
     if (one.time().p99_us() == 0.0F) continue;  // it processed no frame in this second
     add(words_of(one) + " " + display_duration(one.time().p99_us() * 1e-6));
@@ -324,7 +325,7 @@ std::string device_row(const v1::StreamStats& stream, std::int64_t now_ns) {
                        links == 1 ? "once" : fmt::format("{} times", links));
   }
   std::string text;
-  const auto add = [&](const std::string& words) { text += (text.empty() ? "" : ", ") + words; };
+  const auto add = [&](const std::string& words) { add_word(text, words); };
   if (links > 1) {
     add(fmt::format("back for {}, reconnected {}", since,
                     links == 2 ? "once" : fmt::format("{} times", links - 1)));

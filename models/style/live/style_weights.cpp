@@ -6,6 +6,7 @@
 #include <numeric>
 
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 #include "proto/text/named_numbers.hpp"
 
 namespace posed::style {
@@ -20,12 +21,6 @@ double sum_of(const Shares& shares) noexcept {
 void normalise(Shares& shares) noexcept {
   const double sum = sum_of(shares);
   for (double& share : shares.of) share /= sum;
-}
-
-std::string listed_names(std::span<const std::string> names) {
-  std::string list;
-  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + clean_name(name);
-  return list;
 }
 
 Result<std::vector<NamedNumber>> parsed(std::string_view weights) {
@@ -71,7 +66,7 @@ Result<Shares> shares_of(std::string_view weights, std::span<const std::string> 
     const auto found = std::ranges::find(styles, one.name);
     if (found == styles.end()) {
       return misuse("weights: the model has no style " + in_quotes(one.name) +
-                    "; it has: " + listed_names(styles));
+                    "; it has: " + joined(styles, ", ", clean_name));
     }
     shares.of[found - styles.begin()] = one.number;
   }

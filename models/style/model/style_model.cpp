@@ -264,12 +264,12 @@ std::string serialize_model(const StyleModel& model) {
     if (!std::isnan(model.gate.gait_correlation)) {
       style.mutable_gate()->set_gait_correlation(model.gate.gait_correlation);
     }
+    for (const MatrixXd& cycle : model.gate.usual) {
+      write_matrix(cycle, *style.mutable_gate()->add_usual());
+    }
+    for (const std::uint32_t rig : model.gate.rigs) style.mutable_gate()->add_rigs(rig);
+    for (const double place : model.gate.places) style.mutable_gate()->add_places(place);
   }
-  for (const MatrixXd& cycle : model.gate.usual) {
-    write_matrix(cycle, *style.mutable_gate()->add_usual());
-  }
-  for (const std::uint32_t rig : model.gate.rigs) style.mutable_gate()->add_rigs(rig);
-  for (const double place : model.gate.places) style.mutable_gate()->add_places(place);
   if (model.axis.present()) {
     write_vector(model.axis.direction, *style.mutable_axis()->mutable_direction());
     style.mutable_axis()->set_offset(model.axis.offset);
