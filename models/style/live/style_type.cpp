@@ -11,6 +11,7 @@
 #include "posed/v1/log.pb.h"
 #include "posed/v1/model.pb.h"
 #include "proto/clip/clip.hpp"
+#include "proto/text/list.hpp"
 
 namespace posed::style {
 namespace {
@@ -55,25 +56,19 @@ Result<std::unique_ptr<const StageModel>> bind(std::span<const std::byte> file,
   return bind_model(model, *context.skeleton, name);
 }
 
-// A live text comes in pieces that end at its commas.
-std::string joined(std::span<const std::string> words) {
-  std::string text;
-  for (const std::string& word : words) text += (&word == words.data() ? "" : ",") + word;
-  return text;
-}
-
 Result<StageCommand> set_weights(const StageModel* model, std::span<const std::string> words,
                                  const Parameters& /*options*/) {
   if (model == nullptr) {
     return fail("there is no style model; send one with `posed ctl model STREAM M.style`");
   }
-  const auto shares = TRY(shares_of(joined(words), style_of(model)->styles()));
+  // A live text comes in pieces that end at its commas.
+  const auto shares = TRY(shares_of(joined(words, ","), style_of(model)->styles()));
   return StageCommand::of(shares);
 }
 
 Result<StageCommand> set_mask(const StageModel* /*model*/, std::span<const std::string> words,
                               const Parameters& /*options*/) {
-  const auto mask = TRY(mask_of(joined(words)));
+  const auto mask = TRY(mask_of(joined(words, ",")));
   return StageCommand::of(mask);
 }
 
