@@ -70,7 +70,6 @@ PeerGuard::PeerGuard(SocketEvents events, std::unique_ptr<system::EventFd> wake,
       wake_(std::move(wake)),
       poller_(std::move(poller)),
       limits_(limits),
-      reported_ns_(std::numeric_limits<std::int64_t>::min() / 2),
       thread_([this] { serve(); }) {}
 
 PeerGuard::~PeerGuard() {
@@ -202,7 +201,8 @@ void PeerGuard::cut_now(int fd, const char* why) {
   // reused.
   if (found->second.cookie == 0 || cookie_of(fd) != found->second.cookie) return;
   shutdown(fd, SHUT_RDWR);
-  log_cut(why);
+  ++cuts_;
+  spdlog::warn("a connection to the {} socket was cut: it {}", limits_.name, why);
 }
 
 void PeerGuard::cut_unless(const std::function<bool(std::string_view user)>& allowed) {
@@ -213,22 +213,6 @@ void PeerGuard::cut_unless(const std::function<bool(std::string_view user)>& all
       cut_now(fd, "has lost its right, or has not identified itself");
     }
   }
-}
-
-void PeerGuard::log_cut(const char* why) {
-  ++cuts_;
-  ++unreported_;
-  const std::int64_t now_ns = system::monotonic_ns();
-  // a flood of cuts gives one log line a second
-  if (now_ns < reported_ns_ + kNanosPerSecond) return;
-  reported_ns_ = now_ns;
-  if (unreported_ == 1) {
-    spdlog::warn("a connection to the {} socket was cut: it {}", limits_.name, why);
-  } else {
-    spdlog::warn("{} connections to the {} socket were cut; the last {}", unreported_, limits_.name,
-                 why);
-  }
-  unreported_ = 0;
 }
 
 PeerShares peer_shares() {

@@ -97,7 +97,6 @@ class PeerGuard {
   void inspect_all();
   void cut_now(int fd, const char* why);
   void cut_offender(int fd, const char* why);  // and slows down the next handshakes
-  void log_cut(const char* why);
 
   SocketEvents events_;
   std::unique_ptr<system::EventFd> wake_;
@@ -107,8 +106,6 @@ class PeerGuard {
   std::map<int, Peer> peers_;  // by descriptor
   std::vector<int> gone_;
   std::uint64_t cuts_ = 0;
-  std::uint64_t unreported_ = 0;  // cuts since the last log line
-  std::int64_t reported_ns_;
   std::int64_t inspected_ns_ = 0;
   std::uint64_t resident_before_ = 0;  // bytes
   std::atomic<bool> stop_{false};

@@ -6,13 +6,13 @@
 #include <utility>
 
 #include <spdlog/spdlog.h>
-#include <time.h>
 
 #include "daemon/net/peer_guard.hpp"
 #include "daemon/net/zap_authenticator.hpp"
 #include "daemon/publish/event_text.hpp"
 #include "daemon/publish/frame_output.hpp"
 #include "daemon/publish/published_slots.hpp"
+#include "daemon/system/clock.hpp"
 #include "daemon/system/process.hpp"
 #include "proto/text/clean.hpp"
 
@@ -21,12 +21,6 @@ namespace {
 
 // A skeleton is sent to all its subscribers when one of them subscribes, but at most this often.
 constexpr std::int64_t kSkeletonPause_ns = kNanosPerSecond / 20;
-std::int64_t clock_ns(clockid_t clock) {
-  timespec now{};
-  clock_gettime(clock, &now);
-  return std::int64_t{now.tv_sec} * kNanosPerSecond + now.tv_nsec;
-}
-
 // The publisher's thread waits for new items and for messages of subscribers.
 Result<std::unique_ptr<system::Poller>> open_poller(const system::EventFd& wake, void* socket) {
   auto poller = TRY(system::Poller::open());
@@ -327,7 +321,7 @@ void Publisher::every_second(std::int64_t now_ns) {
   v1::Stats stats;
   const std::int64_t data_ns = options_.data_clock();
   stats.set_time_ns(data_ns);
-  stats.set_monotonic_to_utc_ns(clock_ns(CLOCK_REALTIME) - data_ns);
+  stats.set_monotonic_to_utc_ns(system::clock_ns(CLOCK_REALTIME) - data_ns);
   stats.set_rss_bytes(system::resident_bytes());
   stats.set_cpu_percent(
       static_cast<float>(100.0 * seconds(cpu_ns - reported_cpu_ns_) / std::max(since_s, 1e-3)));

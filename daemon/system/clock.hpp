@@ -10,10 +10,12 @@
 
 namespace posed::system {
 
-RT_SAFE inline std::int64_t monotonic_ns() noexcept {
+RT_SAFE inline std::int64_t clock_ns(clockid_t clock) noexcept {
   timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
+  clock_gettime(clock, &now);
   return std::int64_t{now.tv_sec} * kNanosPerSecond + now.tv_nsec;
 }
+
+RT_SAFE inline std::int64_t monotonic_ns() noexcept { return clock_ns(CLOCK_MONOTONIC); }
 
 }  // namespace posed::system

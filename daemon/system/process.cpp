@@ -2,24 +2,13 @@
 
 #include <unistd.h>
 
-#include <ctime>
 #include <fstream>
 #include <sstream>
 #include <string>
 
-#include "proto/frame/time.hpp"
+#include "daemon/system/clock.hpp"
 
 namespace posed::system {
-
-namespace {
-
-std::int64_t now_ns(clockid_t clock) {
-  timespec now{};
-  clock_gettime(clock, &now);
-  return std::int64_t{now.tv_sec} * kNanosPerSecond + now.tv_nsec;
-}
-
-}  // namespace
 
 std::uint64_t resident_bytes() {
   std::ifstream statm("/proc/self/statm");
@@ -29,7 +18,7 @@ std::uint64_t resident_bytes() {
   return resident * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
 }
 
-std::int64_t cpu_time_ns() { return now_ns(CLOCK_PROCESS_CPUTIME_ID); }
+std::int64_t cpu_time_ns() { return clock_ns(CLOCK_PROCESS_CPUTIME_ID); }
 
 double start_time_s() {
   // Of /proc/self/stat: the name in brackets may contain anything, and 19 words behind it comes the
@@ -42,8 +31,8 @@ double start_time_s() {
   double ticks = 0.0;
   if (!(words >> ticks)) return 0.0;
   const double age_s =
-      seconds(now_ns(CLOCK_BOOTTIME)) - ticks / static_cast<double>(sysconf(_SC_CLK_TCK));
-  return seconds(now_ns(CLOCK_REALTIME)) - age_s;
+      seconds(clock_ns(CLOCK_BOOTTIME)) - ticks / static_cast<double>(sysconf(_SC_CLK_TCK));
+  return seconds(clock_ns(CLOCK_REALTIME)) - age_s;
 }
 
 }  // namespace posed::system
