@@ -81,13 +81,11 @@ bool measures_opposition(const drivers::glove::Calibration& calibration) {
 }
 
 // Contacts that the fitted thumb misses.
-Result<> check_contacts(const Model& model, const Recorded& recorded, PoseCalibration& made) {
+void check_contacts(const Model& model, const Recorded& recorded, PoseCalibration& made) {
   constexpr double kMissed_mm = 15.0, kDeep_mm = -8.0;
-  const auto calibration =
-      TRY(drivers::glove::make_calibration(model, made.file, made.file.hand, /*identity=*/""));
-  if (!measures_opposition(*calibration)) return {};
+  if (!measures_opposition(*made.calibration)) return;
   const hand::HandGeometry geometry = hand::hand_geometry(default_hand_shape());
-  for (const hand::ThumbPose& pose : contacts_of(model, *calibration, recorded)) {
+  for (const hand::ThumbPose& pose : contacts_of(model, *made.calibration, recorded)) {
     for (int finger = 1; finger < kFingers; ++finger) {
       if (!pose.touched[static_cast<std::size_t>(finger)]) continue;
       const double gap = gap_mm(geometry, pose, finger);
@@ -97,18 +95,16 @@ Result<> check_contacts(const Model& model, const Recorded& recorded, PoseCalibr
                                         std::abs(gap), gap > 0.0 ? "from" : "inside"));
     }
   }
-  return {};
 }
 
 // How far the same pose, held twice, differs: that is how exactly the user holds it, and the mean
 // of both is off by half as much.
-Result<> compare_repeats(const Model& model, const Recorded& recorded, PoseCalibration& made) {
+void compare_repeats(const Model& model, const Recorded& recorded, PoseCalibration& made) {
   constexpr double kFar_deg = 8.0;  // people who take care: 3 to 6
   constexpr double kWorst_deg = 25.0;
-  const auto calibration =
-      TRY(drivers::glove::make_calibration(model, made.file, made.file.hand, /*identity=*/""));
+  const auto& calibration = *made.calibration;
   std::bitset<kHandChannels> mapped;
-  for (const auto& row : std::span(calibration->map).first(calibration->map_rows)) {
+  for (const auto& row : std::span(calibration.map).first(calibration.map_rows)) {
     mapped.set(row.channel);
   }
   std::pair<double, std::size_t> worst;  // [deg], channel
@@ -121,8 +117,8 @@ Result<> compare_repeats(const Model& model, const Recorded& recorded, PoseCalib
         !drivers::glove::was_held(before)) {
       continue;
     }
-    const HandAngles a = drivers::glove::angles_of(model, *calibration, before);
-    const HandAngles b = drivers::glove::angles_of(model, *calibration, recorded[p]);
+    const HandAngles a = drivers::glove::angles_of(model, calibration, before);
+    const HandAngles b = drivers::glove::angles_of(model, calibration, recorded[p]);
     const std::size_t from = first == Pose::kFist ? kFingerChannels : 0;  // the thumb moved
     for (std::size_t c = from; c < a.size(); ++c) {
       const double apart_deg = std::abs(a[c] - b[c]) / kDegree;
@@ -134,7 +130,7 @@ Result<> compare_repeats(const Model& model, const Recorded& recorded, PoseCalib
   }
   if (count == 0) {
     made.doubts.emplace_back("no pose was held twice, so how exactly they were held is not known");
-    return {};
+    return;
   }
   const double apart_deg = std::sqrt(squares / static_cast<double>(count));
   auto sentence =
@@ -142,7 +138,6 @@ Result<> compare_repeats(const Model& model, const Recorded& recorded, PoseCalib
                   drivers::glove::joint_words(worst.second), worst.first);
   auto& list = apart_deg > kFar_deg || worst.first > kWorst_deg ? made.doubts : made.said;
   list.push_back(std::move(sentence));
-  return {};
 }
 
 }  // namespace
@@ -172,7 +167,7 @@ Result<PoseCalibration> calibrate_by_poses(const drivers::glove::Model& model,
   blank.sensors = std::move(fitted.sensors);
   const auto said = TRY(drivers::glove::fit_fist(model, held, blank.hand, blank));
   auto made = TRY(calibrate_by_contacts(model, held, std::move(blank)));
-  TRY(compare_repeats(model, recorded, made));
+  compare_repeats(model, recorded, made);
   made.said.insert(made.said.begin(), said.begin(), said.end());
   made.warnings.insert(made.warnings.begin(), fitted.warnings.begin(), fitted.warnings.end());
   return made;
@@ -181,7 +176,8 @@ Result<PoseCalibration> calibrate_by_poses(const drivers::glove::Model& model,
 Result<PoseCalibration> calibrate_by_contacts(const drivers::glove::Model& model,
                                               const drivers::glove::Recorded& recorded,
                                               drivers::glove::CalibrationFile file) {
-  PoseCalibration made{.file = std::move(file), .said = {}, .warnings = {}, .doubts = {}};
+  PoseCalibration made{
+      .file = std::move(file), .calibration = {}, .said = {}, .warnings = {}, .doubts = {}};
   const Side hand = made.file.hand;
   made.said = TRY(fit_contacts(model, recorded, hand, made.file));
   auto odd = TRY(drivers::glove::keep_possible(model, recorded, hand, made.file));
@@ -191,7 +187,8 @@ Result<PoseCalibration> calibrate_by_contacts(const drivers::glove::Model& model
                                       made.impossible > 1 ? "joints" : "a joint"));
   }
   std::ranges::move(odd, std::back_inserter(made.warnings));
-  TRY(check_contacts(model, recorded, made));
+  made.calibration = TRY(drivers::glove::make_calibration(model, made.file, hand, /*identity=*/""));
+  check_contacts(model, recorded, made);
   return made;
 }
 

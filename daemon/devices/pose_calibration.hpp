@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -15,6 +16,7 @@ namespace posed::devices {
 
 struct PoseCalibration {
   drivers::glove::CalibrationFile file;
+  std::shared_ptr<const drivers::glove::Calibration> calibration;  // of the file
   std::vector<std::string> said;      // what the fist and the contacts changed
   std::vector<std::string> warnings;  // sensors that keep their default; what no hand can do
   std::vector<std::string> doubts;    // what makes the verdict a doubtful one

@@ -11,6 +11,7 @@
 #include "models/gesture/grow_tree.hpp"
 #include "models/gesture/train_report.hpp"
 #include "proto/frame/degree.hpp"
+#include "proto/frame/median.hpp"
 #include "proto/text/clean.hpp"
 
 namespace posed::gesture {
@@ -151,17 +152,19 @@ constexpr double kKept = 0.975;               // of the poses of people who are 
 // Takes of one person are more alike than people are: the limit is so many times as far.
 constexpr double kWidened = 6.0;
 constexpr double kMinLimit = 1e-3;  // of a limit, for each channel
+constexpr int kWeighings = 10;      // after which the poses' weights hardly change
 
 // The mean of one gesture's held part.
 struct HeldPose {
   std::size_t unit;   // left out together
   std::size_t label;  // among the recorded ones
   VectorXd angles_rad;
+  double weight;
 };
 
 // Of one label's poses.
 struct PoseSums {
-  double count = 0.0;
+  double count = 0.0;  // sum of the weights
   VectorXd first;
   MatrixXd second;
 
@@ -174,6 +177,8 @@ struct PoseSums {
   }
   [[nodiscard]] VectorXd mean() const { return first / count; }
 };
+
+constexpr double kNoPose = 1e-9;  // a sum of weights from which all were taken away
 
 struct Whitening {
   std::vector<VectorXd> mean;  // [label]; empty: no pose of it
@@ -192,10 +197,10 @@ Whitening whitening_of(const std::vector<PoseSums>& sums) {
   double freedom = 0.0;
   for (const PoseSums& of : sums) {
     out.mean.emplace_back();
-    if (of.count < 0.5) continue;
+    if (of.count < kNoPose) continue;
     out.mean.back() = of.mean();
     scatter += of.second - of.count * out.mean.back() * out.mean.back().transpose();
-    freedom += of.count - 1.0;
+    freedom += std::max(of.count - 1.0, 0.0);
   }
   scatter /= std::max(freedom, 1.0);
   scatter.diagonal().array() += kSlack_rad * kSlack_rad;
@@ -214,12 +219,37 @@ std::vector<HeldPose> poses_of(const std::vector<Recording>& recordings,
     for (const Segment& segment : recording.segments) {
       const Segment held = held_part(segment);
       const std::size_t unit = people > 1 ? person : recordings.size() > 1 ? r : poses.size();
-      poses.push_back(
-          {unit, labels.at(segment.label),
-           recording.angles_rad.middleRows(held.begin, held.frames()).colwise().mean()});
+      poses.push_back({unit, labels.at(segment.label),
+                       recording.angles_rad.middleRows(held.begin, held.frames()).colwise().mean(),
+                       1.0});
     }
   }
   return poses;
+}
+
+std::vector<PoseSums> sums_of(const std::vector<HeldPose>& poses, std::size_t labels) {
+  std::vector<PoseSums> sums(labels, PoseSums(poses.front().angles_rad.size()));
+  for (const HeldPose& pose : poses) sums[pose.label].add(pose.angles_rad, pose.weight);
+  return sums;
+}
+
+// Few people who show a gesture their own way would widen the spread for all: a pose counts the
+// less the farther it is, as where the errors' distribution has long tails (Student's t).
+void weigh(std::vector<HeldPose>& poses, std::size_t labels) {
+  for (int round = 0; round < kWeighings; ++round) {
+    const Whitening learnt = whitening_of(sums_of(poses, labels));
+    std::vector<double> distances;
+    for (const HeldPose& pose : poses) {
+      distances.push_back(learnt.distance(pose.label, pose.angles_rad));
+    }
+    const double typical = median(std::vector(distances));
+    if (!(typical > 0.0)) return;  // poses that are the same to the bit
+    double sum = 0.0;
+    for (std::size_t i = 0; i < poses.size(); ++i) {
+      sum += poses[i].weight = 1.0 / (1.0 + distances[i] / typical);
+    }
+    for (HeldPose& pose : poses) pose.weight *= static_cast<double>(poses.size()) / sum;
+  }
 }
 
 // [label][pose] distance of each pose from its label as learnt without the pose's unit.
@@ -230,7 +260,7 @@ std::vector<std::vector<double>> distances_left_out(const std::vector<HeldPose>&
   std::vector<std::vector<double>> distances(all.size());
   for (const auto& [unit, left_out] : units) {
     std::vector<PoseSums> rest = all;
-    for (const HeldPose* pose : left_out) rest[pose->label].add(pose->angles_rad, -1.0);
+    for (const HeldPose* pose : left_out) rest[pose->label].add(pose->angles_rad, -pose->weight);
     const Whitening learnt = whitening_of(rest);
     for (const HeldPose* pose : left_out) {
       if (learnt.mean[pose->label].size() == 0) continue;  // nobody else shows it
@@ -263,10 +293,10 @@ HeldPoses held_poses(const std::vector<Recording>& recordings, const std::vector
     if (label.trained) recorded.emplace(label.name, recorded.size());
   }
   HeldPoses held{.mean = {}, .whitening = {}, .limit = {}, .people = people_in(recordings)};
-  const auto poses = poses_of(recordings, recorded, held.people);
+  auto poses = poses_of(recordings, recorded, held.people);
+  if (held.people > 1) weigh(poses, recorded.size());
   const Index channels = recordings.front().angles_rad.cols();
-  std::vector<PoseSums> sums(recorded.size(), PoseSums(channels));
-  for (const HeldPose& pose : poses) sums[pose.label].add(pose.angles_rad, 1.0);
+  const std::vector<PoseSums> sums = sums_of(poses, recorded.size());
   const Whitening learnt = whitening_of(sums);
   const MatrixXd inverse = learnt.spread.matrixL().solve(MatrixXd::Identity(channels, channels));
   for (Index row = 0; row < channels; ++row) {

@@ -41,6 +41,10 @@ RT_SAFE double share_of(const Sensors& sensors, std::size_t channel) noexcept {
   return sensors.share.empty() ? 1.0 : sensors.share[channel];
 }
 
+RT_SAFE bool shown_again(const Sensors& sensors, std::size_t channel) noexcept {
+  return sensors.repeated || (!sensors.again.empty() && sensors.again[channel] != 0);
+}
+
 RT_SAFE double rounded_rad2(const Sensors& sensors, std::size_t channel) noexcept {
   const double rounding_rad = sensors.rounding_rad.empty() ? 0.0 : sensors.rounding_rad[channel];
   return rounding_rad * rounding_rad;
@@ -132,7 +136,7 @@ RT_SAFE void AdaptiveWindow::push(double time_s, std::span<const double> measure
       last_measured_[c] = pushed_;
     }
     // With zero precision, a channel that is missing in the whole window would have no value.
-    position[c] = measured && !sensors.repeated ? share * precision : kNothing;
+    position[c] = measured && !shown_again(sensors, c) ? share * precision : kNothing;
     mean[c] = position[c] * held_rad_[c];
   }
   copy_sensed(at);
@@ -142,7 +146,8 @@ RT_SAFE void AdaptiveWindow::push(double time_s, std::span<const double> measure
                {.variance_rad2 = variance_rad2_.data(),
                 .density = density_.get(),
                 .active = active_.get(),
-                .repeated = sensors.repeated});
+                .repeated = sensors.repeated,
+                .again = sensors.again});
 }
 
 // A change of speed from frame to frame that noise cannot explain is one of the joint, as bad

@@ -46,6 +46,7 @@ struct Sensors {
   std::span<const double> rounding_rad{};   // [channels] error of rounding; empty: none
   std::span<const double> half_step_rad{};  // [channels] finite where nothing but rounding disturbs
   bool repeated = false;  // the frame shows the samples of the one before once more: none is new
+  std::span<const std::uint8_t> again{};  // [channels] 1: the same of one channel; empty: of none
 };
 
 class AdaptiveWindow {

@@ -397,7 +397,8 @@ RT_SAFE void LiveSmoother::State::sense(double now_s, double step_s, double peri
                  .share = noise.share(),
                  .rounding_rad = noise.rounding_rad(),
                  .half_step_rad = noise.half_step_rad(),
-                 .repeated = noise.repeated()});
+                 .repeated = noise.repeated(),
+                 .again = noise.again()});
   }
   const double noise_rad = stated_rad > 0.0 ? stated_rad : noise.noise_rad();
   if (filter.model() == nullptr) return;

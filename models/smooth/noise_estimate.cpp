@@ -52,10 +52,12 @@ constexpr double kStepShare = 0.9;      // of the changes that are multiples of 
 constexpr double kRounding = 0.8 * 0.28867513459481287;  // of a step: slightly below 1/sqrt(12)
 
 // Noise beside the rounding.
-constexpr int kTurnFrames = 3;        // in which a change is taken back
-constexpr double kTurnForget = 0.05;  // of a change
-constexpr double kFirstTurns = 0.1;   // share of such changes that is assumed at first
-constexpr double kFewTurns = 0.15;    // share that motions have
+constexpr int kTurnFrames = 3;             // in which a change is taken back
+constexpr double kTurnForget = 0.05;       // of a change
+constexpr double kFirstTurns = 0.1;        // share of such changes that is assumed at first
+constexpr double kFewTurns = 0.15;         // share that motions have
+constexpr double kLeastRounded = 1.25;     // times kRounding: the noise of rounded values
+constexpr double kMoreThanRounding = 1.6;  // times kRounding: that of more than rounding
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
 // Repeated samples.
@@ -64,6 +66,8 @@ constexpr double kFirstSamples = 8.0;  // before repeats are believed
 constexpr double kAlone = 0.2;         // most channels that repeat while others change
 constexpr double kCommon = 0.3;        // least share of samples that are shown so often
 constexpr int kFewChannels = 3;        // fewer may well repeat by chance
+constexpr double kFewSamples = 16.0;   // of a channel, before its repeats are believed
+constexpr double kRegular = 0.7;       // share of samples that are shown as long as the one before
 
 // Variance of the tenth difference of noise of variance 1 whose samples have the correlation r,
 // r^2, r^3, ...
@@ -122,6 +126,8 @@ NoiseEstimate::NoiseEstimate(int channels)
       moved_(channels),
       steps_(channels),
       levels_(channels),
+      shown_(channels),
+      again_(channels),
       share_(channels),
       rounding_rad_(channels),
       half_step_rad_(channels) {
@@ -133,6 +139,8 @@ RT_SAFE void NoiseEstimate::reset() noexcept {
   std::fill(moved_.begin(), moved_.end(), false);
   std::ranges::fill(steps_, Step());
   std::ranges::fill(levels_, Level());
+  std::ranges::fill(shown_, Shown());
+  std::ranges::fill(again_, 0);
   std::ranges::fill(share_, 1.0);
   std::ranges::fill(rounding_rad_, 0.0);
   std::ranges::fill(half_step_rad_, kUnbounded);
@@ -174,6 +182,7 @@ RT_SAFE void NoiseEstimate::judge_repeat(std::span<const double> measured_rad) n
   if (std::exchange(repeats_, repeats) == repeats) return;
   forget_differences();
   std::ranges::fill(levels_, Level());  // those of repeated values say nothing of the samples
+  std::ranges::fill(shown_, Shown());
   std::ranges::fill(share_, 1.0);
 }
 
@@ -182,6 +191,30 @@ RT_SAFE void NoiseEstimate::forget_differences() noexcept {
   tenth_.reset();
   far_tenth_.reset();
   even_samples_ = 0;
+}
+
+// A channel that is read more often than it is sampled repeats regularly; what stays within a dead
+// band does not, and values in steps may, in a steady motion.
+RT_SAFE bool NoiseEstimate::shown_again(std::size_t c, double change_rad) noexcept {
+  Shown& shown = shown_[c];
+  if (change_rad == 0.0) {
+    shown.run = std::min(shown.run + 1, kMaxRepeats + 1);
+    return shown.more_than_once && shown.run <= kMaxRepeats;
+  }
+  if (!std::isfinite(change_rad)) return false;
+  const bool alike = shown.run == shown.last_run && shown.run <= kMaxRepeats;
+  shown.samples = std::min(shown.samples + 1.0, kSamples);
+  shown.repeated += ((shown.run > 0 ? 1.0 : 0.0) - shown.repeated) / shown.samples;
+  shown.alike += ((alike ? 1.0 : 0.0) - shown.alike) / shown.samples;
+  shown.even = alike || !shown.more_than_once ? std::min(shown.even + 1, kPast) : 0;
+  shown.last_run = std::exchange(shown.run, 0);
+  const bool more = shown.samples > kFewSamples && shown.repeated > kCommon &&
+                    shown.alike > kRegular && rounding_rad_[c] == 0.0;
+  if (std::exchange(shown.more_than_once, more) == more) return false;
+  forget_differences();  // those of repeated values say nothing of the samples
+  levels_[c] = Level();
+  share_[c] = 1.0;
+  return false;
 }
 
 // Noise beside the rounding makes a value that lies between two steps go to and fro; a motion alone
@@ -205,21 +238,26 @@ RT_SAFE void NoiseEstimate::learn_step(std::size_t c, double change_rad) noexcep
       std::max(kStepForget, 1.0 / (step.changes + 1)) * ((whole ? 1.0 : 0.0) - step.multiples);
   const bool believed = step.changes >= kStepChanges && step.multiples > kStepShare;
   rounding_rad_[c] = believed ? kRounding * step.least_rad : 0.0;
-  const bool only = believed && step.turns < kFewTurns;
+  // A fast motion does not turn, whatever the noise.
+  const bool noisy =
+      levels_[c].values > kOwnFew && share_[c] * jitter_rad_ > kMoreThanRounding * rounding_rad_[c];
+  const bool only = believed && step.turns < kFewTurns && !noisy;
   half_step_rad_[c] = only ? 0.5 * step.least_rad : kUnbounded;
 }
 
 RT_SAFE void NoiseEstimate::learn_differences(std::size_t c, double now_rad) noexcept {
   const double* const past = past_.data() + c * kPast;
   const double third = now_rad - 3.0 * past[0] + 3.0 * past[1] - past[2];
-  if (even_samples_ < 3 || !std::isfinite(third)) return;
+  const int even =
+      shown_[c].more_than_once ? std::min(shown_[c].even, even_samples_) : even_samples_;
+  if (even < 3 || !std::isfinite(third)) return;
   third_.count(std::abs(third));
-  if (even_samples_ < kPast / 2) return;
+  if (even < kPast / 2) return;
   const double near = tenth_difference(now_rad, past, 1);
   if (!std::isfinite(near)) return;
   learn_level(c, std::abs(third), near);
   // Differences of samples that follow each other say nearly the same: every second one counts.
-  if (even_samples_ < kPast || number_ % 2 != 0) return;
+  if (even < kPast || number_ % 2 != 0) return;
   const double far = tenth_difference(now_rad, past, 2);
   if (!std::isfinite(far)) return;
   tenth_.count(near);
@@ -251,32 +289,44 @@ RT_SAFE double NoiseEstimate::own_share(std::size_t c, double common_rad) const 
   const Level& level = levels_[c];
   if (level.values == 0.0) return 1.0;
   const double size_rad = std::min(level.third_rad, level.tenth_rad / kTenthOverThird);
-  const double own_rad = std::max(kMinNoise_rad, kToNoise / kLowOverMedian * size_rad);
-  const double off = std::clamp(std::log2(own_rad / common_rad), -kMaxOctaves, kMaxOctaves);
   // Differences of rounded values are often zero.
-  if (off < 0.0 && rounding_rad_[c] > 0.0) return 1.0;
+  const double own_rad = std::max(
+      {kMinNoise_rad, kLeastRounded * rounding_rad_[c], kToNoise / kLowOverMedian * size_rad});
+  const double off = std::clamp(std::log2(own_rad / common_rad), -kMaxOctaves, kMaxOctaves);
   const double known = level.values / (level.values + kOwnFew);
   return std::exp2(known * off * off * off / (off * off + kOwnSpread * kOwnSpread));
 }
 
 RT_SAFE void NoiseEstimate::push(std::span<const double> measured_rad, bool even,
                                  double period_s) noexcept {
+  std::ranges::fill(again_, 0);
   judge_repeat(measured_rad);
   if (repeated_) return;
   ++number_;
   even_samples_ = even ? std::min(even_samples_ + 1, kPast) : 0;
+  int frames = 1;  // for each sample of the channel that is sampled least
   for (std::size_t c = 0; c < measured_rad.size(); ++c) {
     const double now = measured_rad[c];
     if (std::isnan(first_[c])) first_[c] = now;
     if (std::isfinite(now) && now != first_[c]) moved_[c] = true;
     double* const past = past_.data() + c * kPast;
+    const bool again = !repeats_ && shown_again(c, now - past[0]);
+    if (shown_[c].more_than_once) frames = std::max(frames, 1 + shown_[c].last_run);
+    if (again) {
+      again_[c] = 1;
+      continue;
+    }
     learn_step(c, now - past[0]);
     if (moved_[c]) learn_differences(c, now);
     std::copy_backward(past, past + kPast - 1, past + kPast);
     past[0] = now;
   }
   if (third_.total() >= kEnough) {
-    const double white_rad = kToNoise * third_.median_rad();
+    double size_rad = third_.median_rad();
+    if (tenth_.total() >= kEnough) {
+      size_rad = std::min(size_rad, tenth_.median_rad() / kTenthOverThird);
+    }
+    const double white_rad = kToNoise * size_rad;
     const bool random = white_rad > kOverRounding * std::ranges::max(rounding_rad_);
     const double r = random && tenth_.total() >= kFewWhite ? correlation() : kMaxCorrelation;
     jitter_rad_ = std::max(kMinNoise_rad, white_rad);
@@ -284,9 +334,9 @@ RT_SAFE void NoiseEstimate::push(std::span<const double> measured_rad, bool even
          c += kSamplesALook) {
       share_[c] = own_share(c, jitter_rad_);
     }
-    noise_rad_ = std::max(jitter_rad_, random ? correlated_rad(r, period_s) : 0.0);
+    noise_rad_ = std::max(jitter_rad_, random ? correlated_rad(r, frames * period_s) : 0.0);
     // Once it is white it stays so until it is clearly not.
-    white_ = !repeats_ && r < (white_ ? kStillWhite : kMinCorrelation);
+    white_ = !repeats_ && frames == 1 && r < (white_ ? kStillWhite : kMinCorrelation);
   }
   third_.fade();
   tenth_.fade();

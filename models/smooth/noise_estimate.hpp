@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -61,11 +62,15 @@ class NoiseEstimate {
   RT_SAFE [[nodiscard]] bool white() const noexcept { return white_; }
   // Whether the last frame shows the sample of the frame before once more.
   RT_SAFE [[nodiscard]] bool repeated() const noexcept { return repeated_; }
+  // For each channel 1 where the last frame shows its sample once more, as the device does channel
+  // by channel; not set by repeated().
+  RT_SAFE [[nodiscard]] std::span<const std::uint8_t> again() const noexcept { return again_; }
 
   RT_SAFE void reset() noexcept;
 
  private:
   void judge_repeat(std::span<const double> measured_rad) noexcept;
+  [[nodiscard]] bool shown_again(std::size_t c, double change_rad) noexcept;
   void learn_step(std::size_t c, double change_rad) noexcept;
   void learn_differences(std::size_t c, double now_rad) noexcept;
   void learn_level(std::size_t c, double third_rad, double tenth_rad) noexcept;
@@ -92,11 +97,24 @@ class NoiseEstimate {
     int frames = 0;  // since that change
   };
 
+  // Whether a channel shows its samples more than once.
+  struct Shown {
+    double samples = 0.0;   // that the shares are means of
+    double repeated = 0.0;  // share of the samples that were shown again
+    double alike = 0.0;     // share of those that were shown as long as the one before
+    int run = 0;            // frames that show the last sample again
+    int last_run = 0;       // the same of the sample before
+    int even = 0;           // samples in a row that are equally far apart, up to kPast
+    bool more_than_once = false;
+  };
+
   std::vector<double> past_;           // [channels][kPast] samples, newest first
   std::vector<double> first_;          // [channels] the first value of each
   std::vector<bool> moved_;            // [channels]
   std::vector<Step> steps_;            // [channels]
   std::vector<Level> levels_;          // [channels]
+  std::vector<Shown> shown_;           // [channels]
+  std::vector<std::uint8_t> again_;    // [channels]
   std::vector<double> share_;          // [channels]
   std::vector<double> rounding_rad_;   // [channels]
   std::vector<double> half_step_rad_;  // [channels]

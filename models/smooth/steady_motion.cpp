@@ -132,11 +132,15 @@ RT_SAFE void SteadyMotion::follow(double step_s, std::span<const double> measure
                                   const Channels& known) noexcept {
   const InteractingModels::Stay stay{.loose = std::exp(-step_s / kUnsteadyFor_s),
                                      .tight = std::exp(-step_s / kSteadyFor_s)};
+  const auto is_new = [&](std::size_t c) {
+    return std::isfinite(measured_rad[c]) && !known.repeated &&
+           (known.again.empty() || known.again[c] == 0);
+  };
   double sum = 0.0;
   double count = 0.0;
   for (std::size_t c = 0; c < models_.size(); ++c) {
     InteractingModels& model = models_[c];
-    const bool measured = std::isfinite(measured_rad[c]) && !known.repeated;
+    const bool measured = is_new(c);
     evidence_[c] = 0.0;
     if (model.started()) {
       model.predict(step_s, stay, {.loose = known.density[c], .tight = kSteadyDensity});
@@ -150,7 +154,7 @@ RT_SAFE void SteadyMotion::follow(double step_s, std::span<const double> measure
   }
   const double hand = count > 0.0 ? kHandEvidence * sum / count : 0.0;
   for (std::size_t c = 0; c < models_.size(); ++c) {
-    if (std::isfinite(measured_rad[c]) && !known.repeated) models_[c].weigh(evidence_[c] + hand);
+    if (is_new(c)) models_[c].weigh(evidence_[c] + hand);
   }
 }
 

@@ -8,6 +8,7 @@
 // thread.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -83,6 +84,7 @@ class SteadyMotion {
     const double* density;        // [channels] that the speed-adaptive prior expects [rad^2/s^3]
     const double* active;         // [channels] 1 for those whose evidence counts for the whole hand
     bool repeated = false;        // the values are those of the frame before once more
+    std::span<const std::uint8_t> again{};  // [channels] 1: the same of one channel; empty: of none
   };
   // The next frame: [channels] rad, NaN where missing. Times increase.
   void push(double time_s, std::span<const double> measured_rad, const Channels& known) noexcept;

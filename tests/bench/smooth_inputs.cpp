@@ -129,12 +129,12 @@ Motion signs(const fs::path& folder, const std::vector<std::string>& letters, un
 }
 
 // Four channels, a quarter of a turn apart.
-Motion sine(double frequency_hz) {
+Motion sine(double frequency_hz, double rate_hz = 60.0) {
   Motion motion(1800, 4);
   for (Eigen::Index t = 0; t < motion.rows(); ++t) {
     for (Eigen::Index c = 0; c < 4; ++c) {
       const double turns =
-          frequency_hz * static_cast<double>(t) / 60.0 + 0.25 * static_cast<double>(c);
+          frequency_hz * static_cast<double>(t) / rate_hz + 0.25 * static_cast<double>(c);
       motion(t, c) = 30.0 * std::sin(2.0 * std::numbers::pi * turns);
     }
   }
@@ -168,6 +168,7 @@ struct Noise {
   double sd = 0.0, correlation = 0.0;  // deg
   double step = 0.0;                   // deg
   int repeats = 1;                     // frames that show one sample
+  bool alone = false;                  // the channels are sampled in turns
 };
 constexpr std::array kNoises{Noise{"white 1", 1.0},
                              Noise{"white 3", 3.0},
@@ -177,14 +178,18 @@ constexpr std::array kNoises{Noise{"white 1", 1.0},
                              Noise{.name = "step 2", .step = 2.0},
                              Noise{.name = "step 3", .step = 3.0},
                              Noise{.name = "white 1 x2", .sd = 1.0, .repeats = 2},
-                             Noise{.name = "white 1 x3", .sd = 1.0, .repeats = 3}};
+                             Noise{.name = "white 1 x3", .sd = 1.0, .repeats = 3},
+                             Noise{.name = "alone 1 x2", .sd = 1.0, .repeats = 2, .alone = true}};
 
 Trial measured(const Motion& truth, double rate_hz, const Noise& noise, unsigned seed) {
   std::mt19937_64 random(seed);
   Motion shown = truth;
   add_noise(shown, noise.sd, noise.correlation, random);
-  for (Eigen::Index t = 0; t < shown.rows(); ++t) {
-    if (t % noise.repeats != 0) shown.row(t) = shown.row(t - 1);
+  for (Eigen::Index t = 1; t < shown.rows(); ++t) {
+    for (Eigen::Index c = 0; c < shown.cols(); ++c) {
+      const Eigen::Index turn = noise.alone ? t + c : t;
+      if (turn % noise.repeats != 0) shown(t, c) = shown(t - 1, c);
+    }
   }
   if (noise.step > 0.0) {
     shown = ((shown.array() / noise.step).round() * noise.step).matrix().eval();
@@ -263,6 +268,9 @@ std::vector<SmoothInput> smooth_inputs(const fs::path& gloves, Half half) {
     for (const Noise& noise : {kNoises[0], kNoises[1]}) {
       add({names("sine of Hz", hz), 60.0, {sine(hz)}}, noise);
     }
+  }
+  for (const Noise& noise : {kNoises[0], kNoises[4], kNoises[6]}) {
+    add({"drumming, 30 Hz", 30.0, {sine(judge ? 6.0 : 5.5, 30.0)}}, noise);
   }
   for (const double deg_s : judge ? std::vector{10.0, 60.0} : std::vector{5.0, 25.0}) {
     for (const Noise& noise : {kNoises[0], kNoises[1]}) {

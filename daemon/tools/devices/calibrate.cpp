@@ -396,28 +396,23 @@ Result<std::unique_ptr<GloveSource>> open_glove(const CalibrateOptions& options)
   return source;
 }
 
-// Draws the calibrated hand for a user at a terminal. An error says that the file is none that a
-// driver would take.
-Result<> show_hand(const GloveSource& source, const CalibrationFile& file,
-                   const drivers::glove::Recorded& recorded) {
-  const auto calibration =
-      TRY(drivers::glove::make_calibration(source.model(), file, source.hand(), source.identity()));
-  if (::isatty(STDERR_FILENO) == 0) return {};
+// Draws the calibrated hand for a user at a terminal.
+void show_hand(const GloveSource& source, const drivers::glove::Calibration& calibration,
+               const drivers::glove::Recorded& recorded) {
+  if (::isatty(STDERR_FILENO) == 0) return;
   std::fputs("the calibrated hand, in the poses as they were held:\n", stderr);
-  for (const std::string& line : calibrated_hand(source.model(), *calibration, source.hand(),
+  for (const std::string& line : calibrated_hand(source.model(), calibration, source.hand(),
                                                  recorded, kHandColumns, kHandRows)) {
     std::fprintf(stderr, "%s\n", line.c_str());
   }
-  return {};
 }
 
 // How the new calibration differs from the one that the file holds so far, if that is of this
 // glove, user and hand. One that is another hand's in most joints is an error, but for --force.
 Result<> judge(const GloveSource& source, const CalibrateOptions& options,
-               const CalibrationFile& file, const drivers::glove::Recorded& recorded) {
+               const CalibrationFile& file, const drivers::glove::Calibration& now,
+               const drivers::glove::Recorded& recorded) {
   const auto& model = source.model();
-  const auto now =
-      TRY(drivers::glove::make_calibration(model, file, source.hand(), source.identity()));
   std::error_code ignored;
   if (!std::filesystem::exists(options.out, ignored)) return {};
   const auto text = drivers::glove::load_calibration_text(options.out);
@@ -427,7 +422,7 @@ Result<> judge(const GloveSource& source, const CalibrateOptions& options,
   const auto before =
       drivers::glove::make_calibration(model, *last, source.hand(), source.identity());
   if (!before) return {};
-  const Differences found = differences(model, **before, *now, recorded);
+  const Differences found = differences(model, **before, now, recorded);
   for (const std::string& line : found.sentences) {
     std::fprintf(stderr, "posed: %s\n", line.c_str());
   }
@@ -460,9 +455,13 @@ Result<CalibrationFile> from_poses(const CalibrateOptions& options) {
   std::ranges::move(made.doubts, std::back_inserter(check.doubts));
   std::fprintf(stderr, "posed: %s%s\n", check.usable() ? "" : "warning: ", check.verdict().c_str());
   auto& file = made.file;
-  if (options.moves) TRY(fit_moves(*source, plan, file));
-  TRY(judge(*source, options, file, recorded));
-  TRY(show_hand(*source, file, recorded));
+  if (options.moves) {
+    TRY(fit_moves(*source, plan, file));
+    made.calibration = TRY(drivers::glove::make_calibration(source->model(), file, source->hand(),
+                                                            source->identity()));
+  }
+  TRY(judge(*source, options, file, *made.calibration, recorded));
+  show_hand(*source, *made.calibration, recorded);
   return std::move(file);
 }
 
