@@ -19,6 +19,7 @@ Placed::Placed(const RobotHand& hand)
       near_shapes(hand.balls.size()),
       near(hand.capsules.size()),
       least(hand.pairs.size()),
+      by_hulls(hand.pairs.size()),
       hulls(hand.hull_pairs.size()),
       apart(hand.hull_pairs.size(), Eigen::Vector3d::UnitX()),
       close(hand.links.size() * hand.links.size()) {}

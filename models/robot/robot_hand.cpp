@@ -24,6 +24,10 @@ constexpr double kSamePlace_m = 1e-3;
 constexpr double kBends_m = 1e-3;       // tips that go less far to a side of the palm bend to both
 constexpr double kGuessedTip_m = 8e-3;  // radius of a finger tip without a shape
 
+constexpr const char* kNoGripper =
+    "; posed drives hands, whose thumb and fingers bend by themselves: let a client of your own "
+    "open and close it by the gap of the hand's thumb and index tips";
+
 // Rounds a limit inwards to a float, so that no angle of a frame is beyond it by its own rounding.
 double low_float(double value) {
   auto f = static_cast<float>(value);
@@ -101,18 +105,27 @@ class Builder {
       const Link& link = hand_.links[l];
       if (!link.turns) continue;
       const bool given = options_.speed > 0.0;
-      const double speed = given ? options_.speed : std::min(link.speed, kDefaultSpeed_rad_s);
+      const double most = given ? options_.speed : kDefaultSpeed_rad_s;
+      // A URDF that names no speed leaves it to the config.
+      const double speed = given && link.speed == 0.0 ? most : std::min(link.speed, most);
       hand_.joint_of_link[l] = static_cast<int>(hand_.joints.size());
       hand_.joints.push_back({.link = l,
                               .name = link.joint,
                               .low = low_float(link.low),
                               .high = high_float(link.high),
-                              .speed = speed,
-                              .speed_given = given});
+                              .speed = speed});
       RobotJoint& joint = hand_.joints.back();
       joint.high = std::max(joint.high, joint.low);
     }
-    if (hand_.joints.empty()) return refuse("the URDF has no joint that turns: it is no hand");
+    if (hand_.joints.empty()) {
+      const auto sliding = std::ranges::count_if(hand_.links, &Link::slides);
+      if (sliding == 0) return refuse("the URDF has no joint that turns: it is no hand");
+      return refuse("the robot is a gripper: " +
+                    (sliding == 1
+                         ? "its one joint slides"
+                         : "its " + std::to_string(sliding) + " joints slide, and none turns") +
+                    kNoGripper);
+    }
     if (hand_.joints.size() > static_cast<std::size_t>(kMaxRobotJoints)) {
       return refuse("the robot has more than 64 joints that turn: it is no hand");
     }
@@ -133,6 +146,7 @@ class Builder {
       hand_.fingers.push_back({.last = last, .tip = tip_link(last)});
     }
     TRY(choose_tips());
+    TRY(refuse_gripper());
     if (hand_.fingers.size() < 3 || hand_.fingers.size() > 5) return refuse(number_of_fingers());
     for (Finger& finger : hand_.fingers) {
       finger.base = base_of(finger);
@@ -146,6 +160,25 @@ class Builder {
       hand_.fingers[f].human = static_cast<int>(f);
     }
     return {};
+  }
+
+  // One joint that moves all chains, which follow it, leaves a thumb nothing to do of its own.
+  Result<> refuse_gripper() const {
+    int driver = -1;
+    for (const RobotJoint& joint : hand_.joints) {
+      const auto moved = std::ranges::count_if(
+          hand_.fingers, [&](const Finger& one) { return is_above(joint.link, one.tip); });
+      const bool is_wrist = moved == std::ssize(hand_.fingers);
+      if (moved == 0 || is_wrist || !(joint.high > joint.low)) continue;
+      const int leader = hand_.links[joint.link].leader;
+      const int drives = leader < 0 ? joint.link : leader;
+      if (driver >= 0 && driver != drives) return {};
+      driver = drives;
+    }
+    if (driver < 0) return {};
+    return refuse("the robot is a gripper with one driven joint, " +
+                  in_quotes(hand_.links[driver].joint) + ", which moves all its " +
+                  std::to_string(hand_.fingers.size()) + " chains of joints" + kNoGripper);
   }
 
   [[nodiscard]] std::string number_of_fingers() const {

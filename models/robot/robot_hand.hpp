@@ -26,7 +26,7 @@ struct RobotOptions {
   std::string tips{};           // names of links, thumb first; empty: derived
   std::string hold{};           // "joint=rad, ...": these stand
   std::string start{};          // "joint=rad, ...": the first command; else zero within the limits
-  double speed = 0.0;           // rad/s; 0: 8, or what the URDF says where that is less
+  double speed = 0.0;           // rad/s, 0: 8; or what the URDF says where that is less
   double acceleration = 120.0;  // rad/s^2
   std::optional<Side> side{};   // of the hand that drives it; empty: as the URDF bends
   bool needs_speeds = true;     // false: to be looked at only
@@ -38,7 +38,6 @@ struct RobotJoint {
   std::string name;
   double low = 0.0, high = 0.0;  // rad, both are floats
   double speed = 0.0;            // rad/s; 0: unknown, and it was not needed
-  bool speed_given = false;      // by the config, else by the URDF or the default
   int driven = -1;  // angle = multiplier * drive[driven] + offset; -1: stands at offset
   double multiplier = 1.0, offset = 0.0;
   bool follows = false;
@@ -167,8 +166,16 @@ struct Placed {
   struct Least {
     double gap_m = -1.0, way_m = 0.0;  // when both together had gone that way
   };
-  std::vector<Least> least;            // [pair of RobotHand::pairs]
-  std::vector<Least> hulls;            // [pair of hulls], the same of them
+  std::vector<Least> least;  // [pair of RobotHand::pairs]
+  // Of two links that hulls keep apart: how far the second one has gone as the first one sees it,
+  // since the first pose, and the hulls that were nearest.
+  struct ByHulls {
+    double way_m = 0.0;
+    int nearest = 0;
+    CoverPose seen;
+  };
+  std::vector<ByHulls> by_hulls;       // [pair of RobotHand::pairs]
+  std::vector<Least> hulls;            // [pair of hulls], by that way
   std::vector<Eigen::Vector3d> apart;  // [pair of hulls], as the first link sees it
   // The capsules of two links that were nearest to each other when all were last looked at, the
   // nearest first. All others were farther than `others_m`. Where the second link's cover was then,

@@ -29,7 +29,7 @@ constexpr std::array<std::string_view, 3> kSides{"hand", "left", "right"};
 
 enum class RobotSide : std::uint8_t { kHand, kLeft, kRight };
 enum Reading : std::size_t { kLimited, kStops, kHardStops, kHolds, kStopJoint, kStopOther };
-enum Notice : std::size_t { kSilent, kDistrusted, kTimeJump, kHardStop, kStop, kNotices };
+enum Notice : std::size_t { kSilent, kDistrusted, kTimeJump, kHardStop, kStop, kSlower, kNotices };
 
 struct StageOptions {
   std::string urdf, tips, hold, start;
@@ -102,7 +102,7 @@ const RobotStage::Table& RobotStage::table() {
           {.name = "hold", .help = "joints that stand: \"wrist=0.1, other=0\", rad"}),
       Table::row<&StageOptions::speed>(
           {.name = "speed",
-           .help = "of each joint, rad/s; 0: 8, or what the URDF says where that is less",
+           .help = "of each joint, rad/s, 0: 8; or what the URDF says where that is less",
            .min = 0.0,
            .max = 100.0}),
       Table::row<&StageOptions::acceleration>(
@@ -139,7 +139,11 @@ RobotStage::RobotStage(RobotHand robot, Skeleton skeleton, const StageContext& c
       silent_ns_(std::max(static_cast<std::int64_t>(kSilent_s * 1e9),
                           context.rate_hz > 0.0 ? static_cast<std::int64_t>(3e9 / context.rate_hz)
                                                 : std::int64_t{0})),
-      ticks_(options.rate_hz > 0.0) {}
+      ticks_(options.rate_hz > 0.0) {
+  notice_[kSlower] = std::ranges::any_of(robot_.joints, [&](const RobotJoint& joint) {
+    return joint.driven >= 0 && joint.speed < options.speed;
+  });
+}
 
 // Since the command before, at most two periods: a stall authorises no jump. A step back in time is
 // waited out, unless it is long.
@@ -369,7 +373,9 @@ const StageType& robot_type() {
                   {.sentence = "the hand cannot be trusted: the robot brakes and holds"},
                   {.sentence = "the hand's time went back: the robot holds"},
                   {.sentence = "the robot was stopped at once, because links would have met"},
-                  {.sentence = "links are in the way: the robot stands short of the hand"}},
+                  {.sentence = "links are in the way: the robot stands short of the hand"},
+                  {.sentence = "`speed` is more than the URDF allows some joints: its limits hold "
+                               "for them"}},
       .commands = {{.name = "engage",
                     .help = "the robot follows the hand, from where it is",
                     .encode = no_words},

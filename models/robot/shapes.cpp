@@ -16,7 +16,8 @@ constexpr double kMostly = 0.7;  // shapes that touch more often cannot be kept 
 constexpr double kOften = 0.1;   // capsules that touch so often may be too thick
 constexpr int kLess = 4;         // hulls take over where they touch this many times less often
 constexpr double kRounding_m = 1e-9;
-constexpr double kSlack_m = 6e-3;            // capsules this much beyond the nearest are kept
+constexpr double kFar_m = 1e3;     // also for what is no number: whatever was known is void
+constexpr double kSlack_m = 6e-3;  // capsules this much beyond the nearest are kept
 constexpr std::size_t kMaxHullPairs = 4096;  // half a second's work when a robot is loaded
 constexpr double kOpen_m = 1e-3;             // shapes nearer than this when open are made to touch
 constexpr double kThin_m = 1e-3;  // a shape of a smaller radius has its corners rounded off
@@ -347,34 +348,39 @@ RT_SAFE Nearest nearest(const RobotHand& hand, Placed& placed, int a, int b,
   };
   const double gone_m = most_way_m(hand.covers[b], close.seen, seen(placed, a, b)) + kRounding_m;
   if (look(gone_m)) return best;
-  double least_m = near_m;
-  if (close.count > 0) {
-    const auto& [then_m, i, j] = close.two[0];
-    show(hand, hand.capsules[i].shape, placed);
-    show(hand, hand.capsules[j].shape, placed);
-    least_m = std::min(least_m, gap_m(hand, placed, i, j));
-  }
-  find_close(hand, placed, a, b, least_m, close);
+  find_close(hand, placed, a, b, best.gap_m, close);
   best.gap_m = near_m;
   look(0.0);
   return best;
 }
 
-// The same by the hulls of a pair's shapes.
-RT_SAFE Nearest nearest_hulls(const RobotHand& hand, Placed& placed, const LinkPair& pair,
+// The same by the hulls of a pair's shapes. Those that were nearest are looked at first: the nearer
+// they are, the fewer others can be nearer.
+RT_SAFE Nearest nearest_hulls(const RobotHand& hand, Placed& placed, std::size_t p,
                               double near_m) noexcept {
+  const LinkPair& pair = hand.pairs[p];
+  Placed::ByHulls& by = placed.by_hulls[p];
+  const CoverPose now = seen(placed, pair.a, pair.b);
+  const double way_m = most_way_m(hand.covers[pair.b], by.seen, now);
+  by.way_m += way_m < kFar_m ? way_m : kFar_m;
+  by.seen = now;
   Nearest best{.gap_m = near_m};
-  const double way_m = placed.way_m[pair.a] + placed.way_m[pair.b];
-  for (int k = pair.first; k < pair.first + pair.count; ++k) {
+  const auto look = [&](int k) {
     Placed::Least& least = placed.hulls[k];
-    if (least.gap_m - (way_m - least.way_m) > best.gap_m + kRounding_m) continue;
+    if (least.gap_m - (by.way_m - least.way_m) > best.gap_m + kRounding_m) return;
     const auto [a, b] = hand.hull_pairs[k];
     const Nearest found = hull_gap({hand.hulls[a], placed.turn[pair.a], placed.at_m[pair.a]},
                                    {hand.hulls[b], placed.turn[pair.b], placed.at_m[pair.b]},
                                    placed.turn[pair.a] * placed.apart[k], best.gap_m);
-    least = {.gap_m = found.gap_m, .way_m = way_m};
+    least = {.gap_m = found.gap_m, .way_m = by.way_m};
     placed.apart[k] = placed.turn[pair.a].transpose() * found.apart;
-    if (found.gap_m < best.gap_m) best = found;
+    if (found.gap_m >= best.gap_m) return;
+    best = found;
+    by.nearest = k - pair.first;
+  };
+  look(pair.first + by.nearest);
+  for (int k = pair.first; k < pair.first + pair.count; ++k) {
+    if (k != pair.first + by.nearest) look(k);
   }
   return best;
 }
@@ -569,7 +575,7 @@ std::span<const Gap> find_gaps(const RobotHand& hand, Placed& placed, const Near
     if (least.gap_m - (way_m - least.way_m) > near_m + kRounding_m) continue;
     least = {.gap_m = cover_gap_m(hand, placed, a, b), .way_m = way_m};
     if (least.gap_m >= near_m) continue;
-    const Nearest at = hand.pairs[p].count > 0 ? nearest_hulls(hand, placed, hand.pairs[p], near_m)
+    const Nearest at = hand.pairs[p].count > 0 ? nearest_hulls(hand, placed, p, near_m)
                                                : nearest(hand, placed, a, b, near_m);
     least.gap_m = std::max(least.gap_m, at.gap_m);
     if (at.gap_m >= near_m) continue;

@@ -155,7 +155,7 @@ std::string without_fbx_signs(std::string_view name) {
 }
 
 std::string without_maker(std::string_view name) {
-  if (const std::size_t cut = name.find_last_of(":|"); cut != std::string_view::npos) {
+  if (const std::size_t cut = name.find_last_of(":|/"); cut != std::string_view::npos) {
     name.remove_prefix(cut + 1);
   }
   if (name.starts_with("mixamorig")) {

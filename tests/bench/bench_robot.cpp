@@ -1,5 +1,6 @@
 // posed_bench robot: how well, how smoothly and at what cost a robot hand follows takes of hands,
 // beside DexPilot on the same frames.
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <memory>
@@ -68,6 +69,8 @@ void print_figures(const std::vector<RobotTrack>& tracks, const std::vector<Robo
 Result<> bench(const BenchRobotOptions& options) {
   const auto text = TRY(robot::load_urdf(options.urdf));
   auto urdf = TRY(robot::parse_urdf(text, options.urdf));
+  // Often a URDF's speeds are none of the robot's: here they may be exceeded.
+  for (robot::Link& link : urdf.links) link.speed = std::max(link.speed, options.speed);
   const auto robot =
       TRY(robot::robot_hand(std::move(urdf), {.speed = options.speed}, options.urdf));
   const auto take = TRY(take_of(options));
@@ -105,7 +108,7 @@ void add_bench_robot(CLI::App& bench_app, int& exit_code) {
   CLI::Option* take = command->add_option("TAKE", options->take, "A hand's motion");
   command->add_option("--signs", options->signs, "A folder of signs of LIBRAS instead")
       ->excludes(take);
-  command->add_option("--speed", options->speed, "Of each joint, rad/s, as in [stream.robot]")
+  command->add_option("--speed", options->speed, "Of each joint, rad/s, though the URDF says less")
       ->check(CLI::Range(0.0, 100.0));
   command->add_option("--out", options->out, "A folder for the poses of each, a column a joint");
   command->callback([options, &exit_code] { exit_code = tools::report(bench(*options)); });

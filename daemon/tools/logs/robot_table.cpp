@@ -37,7 +37,7 @@ std::string limits_of(const robot::RobotHand& hand, const robot::RobotJoint& joi
 std::string speed_of(const robot::RobotHand& hand, const robot::RobotJoint& joint) {
   const double urdf = hand.links[joint.link].speed;
   if (!(joint.speed > 0.0)) return "no speed";
-  const char* const from = joint.speed_given ? "config" : joint.speed == urdf ? "URDF" : "default";
+  const char* const from = joint.speed == urdf ? "URDF" : "default";
   return fmt::format("{:.2f} rad/s ({})", joint.speed, from);
 }
 

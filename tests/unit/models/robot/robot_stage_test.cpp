@@ -26,6 +26,18 @@ double largest(const Frame& a, const Frame& b, std::size_t channels) {
 
 }  // namespace
 
+TEST_CASE("a speed beyond the URDF's is said once, and one within it is not") {
+  const auto said = [](double speed) {
+    const test::RobotRig rig({{"speed", speed}});
+    const auto notice = rig.stage->take_notice();
+    if (!notice) return std::string();
+    CHECK_FALSE(rig.stage->take_notice());
+    return std::string(robot_type().notices.at(notice->index).sentence);
+  };
+  CHECK(said(8.0).empty());
+  CHECK(said(20.0).find("its limits hold") != std::string::npos);
+}
+
 TEST_CASE("the robot's skeleton stands where its URDF says") {
   const test::RobotRig rig;
   auto urdf = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();

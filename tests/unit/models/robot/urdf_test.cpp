@@ -176,6 +176,122 @@ TEST_CASE("what only looks like a hand is refused, and a name alone makes no thu
   CHECK(refused(locked).find("can turn") != std::string::npos);
 }
 
+namespace {
+
+// Another robot's links below one of `urdf`.
+void mount(Urdf& urdf, const Urdf& other, const std::string& prefix, int parent,
+           const Eigen::Isometry3d& at) {
+  const int first = static_cast<int>(urdf.links.size());
+  for (Link link : other.links) {
+    link.name = prefix + link.name;
+    link.joint = prefix + (link.parent < 0 ? "mount" : link.joint);
+    if (link.parent < 0) link.at = at;
+    link.parent = link.parent < 0 ? parent : link.parent + first;
+    if (link.leader >= 0) link.leader += first;
+    urdf.links.push_back(link);
+  }
+}
+
+Urdf mirrored(Urdf urdf) {
+  const Eigen::Vector3d mirror(1.0, -1.0, 1.0);
+  for (Link& link : urdf.links) {
+    link.at.translation() = mirror.cwiseProduct(link.at.translation());
+    link.at.linear() = mirror.asDiagonal() * link.at.linear() * mirror.asDiagonal();
+    link.axis = -mirror.cwiseProduct(link.axis);
+    link.shapes.clear();
+  }
+  return urdf;
+}
+
+// `count` links in a row that turn about x.
+Urdf arm(int count) {
+  Urdf urdf;
+  for (int l = 0; l <= count; ++l) {
+    Link link;
+    link.name = "arm" + std::to_string(l);
+    link.parent = l - 1;
+    if (l > 0) link.joint = "turn" + std::to_string(l);
+    link.turns = l > 0;
+    link.at.translation().z() = 0.2;
+    link.low = -3.0;
+    link.high = 3.0;
+    link.speed = 2.0;
+    urdf.links.push_back(link);
+  }
+  return urdf;
+}
+
+}  // namespace
+
+TEST_CASE("a hand at an arm, on a mount or one of two is a hand, whose arm stands") {
+  const auto mitten = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  const RobotHand alone = robot_hand(mitten, {}, "mitten").value();
+  Eigen::Isometry3d turned = Eigen::Isometry3d::Identity();
+  turned.linear() = Eigen::AngleAxisd(2.0, Eigen::Vector3d(1, 2, 3).normalized()).matrix();
+  turned.translation() = Eigen::Vector3d(0.1, -0.2, 0.3);
+  for (const int joints : {0, 6}) {  // none: a mount alone
+    INFO(joints);
+    Urdf urdf = arm(joints);
+    mount(urdf, mitten, "", joints, turned);
+    const RobotHand hand = robot_hand(urdf, {}, "r").value();
+    REQUIRE(hand.size() == alone.size());
+    CHECK(hand.side == Side::kRight);
+    CHECK(hand.palm.isApprox(turned.linear() * alone.palm, 1e-6));
+    CHECK(hand.fingers[1].length_m == Approx(alone.fingers[1].length_m));
+    for (const DrivenJoint& driven : hand.driven) {
+      CHECK_FALSE(hand.joints[static_cast<std::size_t>(driven.joint)].name.starts_with("turn"));
+    }
+  }
+  Urdf two = arm(0);
+  mount(two, mitten, "right_", 0, turned);
+  mount(two, mirrored(mitten), "left_", 0, turned);
+  const auto any = robot_hand(two, {.side = Side::kLeft}, "r");
+  REQUIRE_FALSE(any);
+  CHECK(any.error().message.find("let `tips` name the last links of one hand") !=
+        std::string::npos);
+  const auto tips = [](const std::string& side) {
+    std::string all;
+    for (const char* finger : {"thumb", "index", "middle", "ring", "little"}) {
+      all += (all.empty() ? "" : ", ") + side + "_" + finger + "_tip";
+    }
+    return all;
+  };
+  for (const Side side : {Side::kLeft, Side::kRight}) {
+    const std::string name = side == Side::kLeft ? "left" : "right";
+    INFO(name);
+    const RobotHand hand = robot_hand(two, {.tips = tips(name), .side = side}, "r").value();
+    CHECK(hand.size() == alone.size());
+    const std::string other = side == Side::kLeft ? "right" : "left";
+    const auto wrong = robot_hand(two, {.tips = tips(other), .side = side}, "r");
+    REQUIRE_FALSE(wrong);
+    CHECK(wrong.error().message.find("the URDF is a " + other + " hand") != std::string::npos);
+  }
+}
+
+TEST_CASE("a gripper is called a gripper") {
+  const auto limit = [](const std::string& more = "") {
+    return "<limit lower=\"0\" upper=\"0.8\" velocity=\"2\"/>" + more;
+  };
+  // Two fingers of two links, and two rods beside them, of which one joint has the motor.
+  std::string bars = "<robot name=\"g\">";
+  for (const std::string link : {"base", "l1", "l2", "l3", "r1", "r2", "r3"}) {
+    bars += "<link name=\"" + link + "\"/>";
+  }
+  bars += joint("finger_joint", "base", "l1", limit());
+  for (const auto& [name, parent] : std::vector<std::pair<std::string, std::string>>{
+           {"l2", "l1"}, {"l3", "base"}, {"r1", "base"}, {"r2", "r1"}, {"r3", "base"}}) {
+    bars += joint(name + "_joint", parent, name, limit("<mimic joint=\"finger_joint\"/>"));
+  }
+  const std::string said = refusal(bars + "</robot>");
+  INFO(said);
+  CHECK(said.find("gripper with one driven joint, 'finger_joint'") != std::string::npos);
+  CHECK(said.find("its 4 chains of joints") != std::string::npos);
+  CHECK(said.find("a client of your own") != std::string::npos);
+  std::string jaws = robot(joint("left", "a", "b", limit()) + joint("right", "a", "c", limit()));
+  for (int n = 0; n < 2; ++n) jaws = with(jaws, "revolute", "prismatic");
+  CHECK(refusal(jaws).find("a gripper: its 2 joints slide") != std::string::npos);
+}
+
 // A direction along which two hulls are as far apart as their nearest points proves both.
 TEST_CASE("the gap of two hulls is that of their nearest points, and a direction proves it") {
   std::mt19937 random(7);
@@ -261,6 +377,46 @@ TEST_CASE("links whose capsules touch when open are kept apart by the hulls of t
   const RobotHand other = robot_hand(urdf, {}, "mitten").value();
   CHECK_FALSE(by_hulls(other, "index_near"));
   CHECK_FALSE(other.left_out.empty());
+}
+
+// A box's capsule reaches its corners and sticks out at its sides; what is round it fits.
+TEST_CASE("hulls keep neighbouring fingers apart where capsules touch and the shapes do not") {
+  const auto mitten = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  Urdf boxes = mitten;
+  for (Link& link : boxes.links) {
+    for (Shape& shape : link.shapes) {
+      if (link.parent < 0 || link.name.starts_with("thumb")) continue;
+      const double long_m = shape.size_m.y() + 2.0 * shape.size_m.x();
+      shape.kind = Shape::Kind::kBox;
+      shape.size_m = Eigen::Vector3d(0.012, 0.013, long_m);
+    }
+  }
+  const auto pair_of = [](const RobotHand& hand, const std::string& a, const std::string& b) {
+    const auto at = std::ranges::find_if(hand.pairs, [&](const LinkPair& pair) {
+      return hand.links[pair.a].name == a && hand.links[pair.b].name == b;
+    });
+    REQUIRE(at != hand.pairs.end());
+    return *at;
+  };
+  const RobotHand hand = robot_hand(boxes, {}, "mitten").value();
+  const LinkPair near = pair_of(hand, "index_near", "middle_near");
+  CHECK(near.count == 1);
+  CHECK(pair_of(robot_hand(mitten, {}, "mitten").value(), "index_near", "middle_near").count == 0);
+  // When open not even their capsules touch. Leaning to each other they do, and may go on.
+  Placed placed(hand);
+  Drive drive = hand.start();
+  place(hand, drive, placed);
+  CHECK(gap_between(hand, placed, near.a, near.b).gap_m > 0.0);
+  for (const DrivenJoint& joint : hand.driven) {
+    const std::string& name = hand.joints[static_cast<std::size_t>(joint.joint)].name;
+    if (name == "index_spread") drive[&joint - hand.driven.data()] = 0.04;
+    if (name == "middle_spread") drive[&joint - hand.driven.data()] = -0.04;
+  }
+  place(hand, drive, placed);
+  CHECK(gap_between(hand, placed, near.a, near.b).gap_m < 0.0);
+  Gaps gaps;
+  CHECK(std::ranges::none_of(find_gaps(hand, placed, {}, false, gaps),
+                             [&](const Gap& gap) { return gap.a == near.a && gap.b == near.b; }));
 }
 
 TEST_CASE("a follower that can nowhere be within its limits is named") {
@@ -607,6 +763,9 @@ TEST_CASE("a URDF without speeds can be looked at, and needs them to be driven")
   CHECK(driven.error().message.find("no velocity limit") != std::string::npos);
   CHECK(robot_hand(mitten, {.needs_speeds = false}, "mitten").value().joints[0].speed == 0.0);
   CHECK(robot_hand(mitten, {.speed = 3.0}, "mitten").value().joints[0].speed == 3.0);
+  for (Link& link : mitten.links) link.speed = 2.0;  // the smaller wins, whoever said it
+  CHECK(robot_hand(mitten, {.speed = 3.0}, "mitten").value().driven[0].speed == 2.0);
+  CHECK(robot_hand(mitten, {.speed = 1.0}, "mitten").value().driven[0].speed == 1.0);
 }
 
 TEST_CASE("real hands are read as their makers made them") {

@@ -1,6 +1,7 @@
 // The gate: what counts as known, how fast and how smoothly it opens and closes.
 #include "models/style/live/walker_tracker.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -11,7 +12,9 @@
 
 #include "models/motion/leg_signal.hpp"
 #include "models/motion/synthetic_walker.hpp"
+#include "models/style/live/apply.hpp"
 #include "models/style/live/live_motion.hpp"
+#include "models/style/train/train.hpp"
 #include "proto/frame/degree.hpp"
 #include "tests/unit/models/style/toy_style.hpp"
 
@@ -178,6 +181,50 @@ TEST_CASE("a shoulder belongs to its arm, and counts alone, too", "[style]") {
   const auto raised = walking.turned(Bone::kRightShoulder, 30.0);
   CHECK(raised[style::index_of(LoosePart::kRightShoulder)] == Approx(30.0).epsilon(0.01));
   CHECK(raised[style::index_of(LoosePart::kRightArm)] == Approx(15.0).epsilon(0.01));
+}
+
+TEST_CASE("an arm that does something else leaves its shoulder the style", "[style]") {
+  const auto walk = [](motion::WalkerFamily family) {
+    return motion::make_walker({.family = family, .noise_deg = 0.0}).value();
+  };
+  const clip::Clip usual = walk(motion::WalkerFamily::kMarch);
+  style::TrainOptions options;
+  options.target = "tired";  // its shoulders hang
+  const auto model =
+      style::train_style({{usual, "march", "1", "walk"},
+                          {walk(motion::WalkerFamily::kTired), "tired", "1", "walk"}},
+                         options)
+          .value();
+  const Skeleton& skeleton = *usual.skeleton;
+  const int arm = skeleton.joint_of(Bone::kRightUpperArm);
+  clip::Clip raised = usual;
+  for (Eigen::Index c = 0; c < raised.channels.cols(); ++c) {
+    const Channel& channel = skeleton.channels[static_cast<std::size_t>(c)];
+    if (channel.joint == arm && channel.axis == Axis::kZ) raised.channels.col(c).array() += 2.5;
+  }
+  // How far the style turns the joint of a bone, on average.
+  const auto turned_deg = [&](const clip::Clip& clip, const clip::Clip& styled, Bone bone) {
+    const auto joint = static_cast<std::size_t>(skeleton.joint_of(bone));
+    double sum = 0.0;
+    for (int i = 0; i < clip.frames(); ++i) {
+      const auto before = clip.frame(i).rotation_xyzw[joint];
+      const auto after = styled.frame(i).rotation_xyzw[joint];
+      double same = 0.0;
+      for (std::size_t k = 0; k < 4; ++k) same += static_cast<double>(before[k] * after[k]);
+      sum += 2.0 * std::acos(std::min(std::abs(same), 1.0));
+    }
+    return sum / clip.frames() / kDegree;
+  };
+  const clip::Clip walks = style::apply_to_clip(model, "tired", usual, {}).value().clip;
+  const clip::Clip waves = style::apply_to_clip(model, "tired", raised, {}).value().clip;
+  const double whole = turned_deg(usual, walks, Bone::kRightShoulder);
+  CAPTURE(whole, turned_deg(raised, waves, Bone::kRightShoulder));
+  CHECK(whole > 2.0);
+  CHECK(turned_deg(raised, waves, Bone::kRightShoulder) > 0.8 * whole);
+  CAPTURE(turned_deg(usual, walks, Bone::kRightUpperArm),
+          turned_deg(raised, waves, Bone::kRightUpperArm));
+  CHECK(turned_deg(usual, walks, Bone::kRightUpperArm) > 2.0);
+  CHECK(turned_deg(raised, waves, Bone::kRightUpperArm) < 0.1);
 }
 
 TEST_CASE("a gate that is off is open and still measures the cadence, for warm-ups", "[style]") {
