@@ -140,8 +140,9 @@ class Stage {
   }
   // The oldest notice that has not been reported yet; called after each call above.
   [[nodiscard]] virtual std::optional<StageNotice> take_notice() noexcept { return std::nullopt; }
-  // `model` is one that the StageType bound; it outlives its use. The one before is no longer read.
-  virtual void use(const StageModel& /*model*/) noexcept {}
+  // `model` is one that the StageType bound; it outlives its use. Null: none from now on. The one
+  // before is no longer read. False: refused for now, and nothing has changed.
+  [[nodiscard]] virtual bool use(const StageModel* /*model*/) noexcept { return false; }
   [[nodiscard]] virtual const StageModel* model() const noexcept { return nullptr; }
   // False: refused for now, and nothing has changed.
   [[nodiscard]] virtual bool command(std::size_t /*index*/,

@@ -96,6 +96,9 @@ class Daemon::Parts final : public control::DaemonControl {
         " config");
   }
   void fill(v1::Stats& stats) override { stats = publisher->stats(); }
+  void add_clips(v1::ControlReply& reply) const override {
+    if (hooks.add_clips) hooks.add_clips(reply);
+  }
   void stop() override { stop_asked.store(true); }
 
   config::DaemonConfig config;
@@ -218,6 +221,7 @@ Result<> Daemon::Parts::open_engines() {
                                        .control = control_wake.get(),
                                        .streams = &streams->exchange(),
                                        .record_sink = hooks.record_sink,
+                                       .frame_tap = hooks.frame_tap,
                                        .clock = system::monotonic_ns}));
   reader = TRY(pipeline::Reader::open({.out = decoded.get(),
                                        .pipeline = pipeline_wake.get(),

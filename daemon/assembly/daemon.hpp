@@ -13,9 +13,11 @@
 #include "daemon/config/daemon_config.hpp"
 #include "daemon/devices/stream_host.hpp"
 #include "daemon/metrics/figures.hpp"
+#include "daemon/pipeline/raw_tap.hpp"
 #include "daemon/pipeline/record_sink.hpp"
 #include "daemon/system/pulse.hpp"
 #include "drivers/driver.hpp"
+#include "posed/v1/control.pb.h"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/result.hpp"
 
@@ -27,6 +29,9 @@ struct DaemonHooks {
   // Called for each stream before its first item, at the start or while the daemon runs; may be
   // empty.
   std::function<void(const devices::NewStream&)> record_stream{};
+  pipeline::FrameTap* frame_tap = nullptr;  // null: nobody else wants the finished frames
+  // Adds the clips of takes that are not there (yet) to a list of recordings; may be empty.
+  std::function<void(v1::ControlReply&)> add_clips{};
   std::function<void(v1::Stats&)> more_stats;  // adds the recorder's counters; may be empty
   // The same for metrics; may be empty.
   std::function<metrics::RecorderFigures()> recorder_figures{};

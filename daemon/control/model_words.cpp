@@ -67,7 +67,7 @@ ModelWords words_of_style(const style::StyleModel& model,
                           std::span<const std::shared_ptr<const Skeleton>> known) {
   const json report = report_of(model.report_json);
   ModelWords words;
-  words.learnt = model.from + " -> " + joined(model.names());
+  words.learnt = "turns " + model.from + " into " + joined(model.names());
   if (const auto sources = sources_of(report); !sources.empty())
     words.learnt += ", from " + sources;
   words.skeleton = model.space.space == motion::Space::kHumanoid

@@ -29,6 +29,7 @@ namespace {
 
 using devices::in_stream;
 constexpr std::size_t kMaxKnownWords = 512;
+constexpr std::string_view kNoModel = "none";  // names of models have an ending
 using pipeline::Command;
 using pipeline::DeviceCommand;
 using pipeline::StageChange;
@@ -139,7 +140,8 @@ RequestHandler::Answer RequestHandler::answer_to(const v1::ControlRequest& reque
     return reply;
   }
   std::string model;  // read without the lock: a disk may be slow
-  if (request.has_use_model()) model = TRY(models_.read(request.use_model().name()));
+  const bool use = request.has_use_model() && request.use_model().name() != kNoModel;
+  if (use) model = TRY(models_.read(request.use_model().name()));
   const std::scoped_lock lock(mutex_);
   const auto done = TRY(apply(request, std::as_bytes(std::span(std::as_const(model))), requester));
   if (done.under_way) return std::nullopt;
@@ -158,6 +160,7 @@ Result<RequestHandler::Done> RequestHandler::apply(const v1::ControlRequest& req
     case v1::ControlRequest::kModelPart:
       return add_model_part(request, requester);
     case v1::ControlRequest::kUseModel:
+      if (request.use_model().name() == kNoModel) return take_model_away(request, requester);
       return set_model(request.use_model().stream(), model, request.use_model().name(),
                        {.requester = requester});
     case v1::ControlRequest::kCalibrate:
@@ -239,8 +242,8 @@ Result<> RequestHandler::check_unused(const std::string& model) {
   };
   for (const auto& [id, stream] : streams_) {
     if (uses(stream)) {
-      return fail(fmt::format("{} uses it; give {} another model first", in_quotes(stream.name),
-                              in_quotes(stream.name)));
+      return fail(fmt::format("{} uses it; give {} another model, or none, first",
+                              in_quotes(stream.name), in_quotes(stream.name)));
     }
   }
   for (const auto& [name, stream] : known_) {
@@ -272,6 +275,7 @@ RequestHandler::Answer RequestHandler::list_recordings() const {
     entry.set_changed_unix_s(file.changed_unix_s);
     entry.set_in_use(file.in_use);
   }
+  daemon_control_.add_clips(reply);
   return reply;
 }
 
@@ -491,6 +495,37 @@ Result<RequestHandler::Done> RequestHandler::set_model(const std::string& stream
   return send(stream, command, std::move(under_way));
 }
 
+// Of a stream that is not there it is not known with which model it would come.
+Result<RequestHandler::Done> RequestHandler::take_model_away(const v1::ControlRequest& request,
+                                                             const Requester& requester) {
+  const auto& wanted = request.use_model();
+  const auto found = TRY(find_stream(wanted.stream()));
+  const ControlledStream& stream = *found;
+  const auto& stages = stream.settings.stages;
+  std::vector<std::size_t> users;  // stages
+  std::string names;
+  for (std::size_t i = 0; i < stages.size(); ++i) {
+    const bool named = wanted.stage().empty() || wanted.stage() == stages[i].type->name;
+    const bool uses =
+        stream.is_there() ? !stages[i].model_name.empty() : stages[i].type->has_model();
+    if (!uses || !named) continue;
+    users.push_back(i);
+    add_word(names, std::string(stages[i].type->name));
+  }
+  if (users.empty()) return in_stream(stream.name, fail("it uses no model").error());
+  if (users.size() > 1) {
+    return in_stream(stream.name,
+                     fail("the stages " + names + " use models: say of which stage").error());
+  }
+  const StageType& type = *stages[users.front()].type;
+  return send(stream, {.change = {.kind = StageChange::Kind::kModel, .type = &type}},
+              {.requester = requester,
+               .stage = users.front(),
+               .file = {.stage = &type},
+               .no_model = true,
+               .refusal = "it performs: stop that first"});
+}
+
 const StageModel* RequestHandler::coming_model(const ControlledStream& stream,
                                                std::size_t stage) const {
   for (auto it = under_way_.rbegin(); it != under_way_.rend(); ++it) {
@@ -573,6 +608,12 @@ void RequestHandler::apply(ControlledStream& stream, UnderWay& done) {
     settings[done.stage].model_words = done.model->words;
     devices::forget_texts(*done.model, settings[done.stage]);
     stream.models[done.stage] = std::move(done.model);  // frees the model that it replaces
+    daemon_control_.stages_changed(stream.stream, stream.settings);
+  }
+  if (done.no_model) {
+    settings[done.stage].model_name.clear();
+    settings[done.stage].model_words.clear();
+    stream.models[done.stage].reset();
     daemon_control_.stages_changed(stream.stream, stream.settings);
   }
   if (!done.value ||

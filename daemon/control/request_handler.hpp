@@ -93,6 +93,9 @@ class DaemonControl {
   // Marks a take in the log; fails if the daemon is not recording. Any cold thread.
   virtual Result<pipeline::Take> mark_take(const pipeline::TakeMark& mark) = 0;
   virtual void fill(v1::Stats& stats) = 0;
+  // Adds to a list of recordings the clips of takes that are not there: they are being made, or
+  // could not be.
+  virtual void add_clips(v1::ControlReply& /*reply*/) const {}
   virtual void stop() = 0;  // starts the daemon's shutdown; returns at once
 };
 
@@ -172,6 +175,7 @@ class RequestHandler {
     std::size_t stage = 0;
     std::shared_ptr<const StageModel> model{};  // the stage's new model, of this file:
     ModelFile file{};
+    bool no_model = false;       // the stage is to use none any more
     std::string_view refusal{};  // of a command: what the stage's refusal means
     std::optional<NewValue> value{};
     bool taught = false;  // of a model: the teacher is told, as nobody has asked
@@ -196,6 +200,7 @@ class RequestHandler {
   Result<Done> add_model_part(const v1::ControlRequest& request, const Requester& requester);
   Result<Done> set_model(const std::string& stream, std::span<const std::byte> bytes,
                          const std::string& name, UnderWay under_way);
+  Result<Done> take_model_away(const v1::ControlRequest& request, const Requester& requester);
   Result<Done> calibrate(const std::string& stream, const std::string& toml,
                          const std::string& name, UnderWay under_way);
   Answer fit_glove(const v1::ControlRequest& request, const Requester& requester);

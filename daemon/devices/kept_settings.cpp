@@ -34,7 +34,7 @@ void KeptSettings::set_model(const std::string& stream, const StageType& stage,
                              std::span<const std::byte> file, std::string name) {
   {
     const std::scoped_lock lock(mutex_);
-    ModelBytes bytes = shared(file);
+    ModelBytes bytes = file.empty() ? std::make_shared<const std::string>() : shared(file);
     KeptStage& kept = changed(stream, stage);
     kept.model = std::move(bytes);
     kept.model_name = std::move(name);
@@ -52,7 +52,8 @@ void KeptSettings::apply(const std::string& stream, LoadedStages& stages) const 
     if (stage == kept->second.stages.end()) continue;
     for (const auto& [name, value] : stage->second.parameters) settings.parameters[name] = value;
     if (!stage->second.model) continue;
-    stages.model_files[i] = stage->second.model;
+    const bool none = stage->second.model->empty();
+    stages.model_files[i] = none ? nullptr : stage->second.model;
     stages.with_set_model.insert(settings.type);
     settings.model_name = stage->second.model_name;
   }

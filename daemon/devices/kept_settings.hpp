@@ -24,7 +24,7 @@ class KeptSettings {
   // The value is one that the parameter can have.
   void set(const std::string& stream, const StageType& stage, const std::string& parameter,
            ParameterValue value);
-  // `file` holds a model for the stage; `name` is for people.
+  // `file` holds a model for the stage; `name` is for people. Empty: the stage uses none.
   void set_model(const std::string& stream, const StageType& stage, std::span<const std::byte> file,
                  std::string name);
 

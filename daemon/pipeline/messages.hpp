@@ -110,8 +110,8 @@ struct Command {
   StageChange change{};
   std::uint32_t stream = 0;
   std::uint64_t ticket = 0;           // returned in the Ack; 0 if no Ack is expected
-  const StageModel* model = nullptr;  // kModel: ready to use; owned by the cold side
-  ModelHash model_hash{};             // kModel: for the log
+  const StageModel* model = nullptr;  // kModel: ready to use; owned by the cold side; null: none
+  ModelHash model_hash{};             // kModel: for the log; empty: none
   StageCommand command{};             // kCommand
 };
 static_assert(std::is_trivially_copyable_v<Command>);

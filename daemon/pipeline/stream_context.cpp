@@ -28,7 +28,8 @@ std::uint64_t shed_depth(double rate_hz) noexcept {
 
 StreamContext::StreamContext(EngineOptions options, double rate_hz, StreamCounters& counters,
                              std::size_t slots, const WorkerPorts& ports,
-                             const PartnerRoutes& routes, const std::uint64_t& next_item)
+                             const PartnerRoutes& routes, const std::uint64_t& next_item,
+                             const std::uint64_t& handled_item)
     : engine_(std::move(options)),
       stream_(engine_.stream()),
       depth_(shed_depth(rate_hz)),
@@ -36,6 +37,7 @@ StreamContext::StreamContext(EngineOptions options, double rate_hz, StreamCounte
       ports_(ports),
       routes_(routes),
       next_item_(next_item),
+      handled_item_(handled_item),
       share_(slots, counters.publisher.taken) {
   const NextNumbers next = next_numbers(counters);
   engine_.start_at(next.frame, next.sample);
@@ -110,6 +112,9 @@ void StreamContext::flush() noexcept {
 // Its partners' stages get each frame, also one for which the publisher has no room.
 void StreamContext::item(const Item& item) noexcept {
   publish(item);
+  if (ports_.frame_tap != nullptr && item.kind == Item::Kind::kFrame) {
+    ports_.frame_tap->frame(item.frame, handled_item_);
+  }
   routes_.published(item);
 }
 

@@ -18,11 +18,12 @@ namespace posed::pipeline {
 
 class StreamContext final : private EngineOut {
  public:
-  // `slots` is how many slots of the ring to the publisher the stream may fill. `ports`, `routes`
-  // and `next_item`, the number of the item before which a decision takes effect, are the worker's.
+  // `slots` is how many slots of the ring to the publisher the stream may fill. `ports`, `routes`,
+  // `next_item`, the number of the item before which a decision takes effect, and `handled_item`,
+  // that of the item that is handled or was last, are the worker's.
   StreamContext(EngineOptions options, double rate_hz, StreamCounters& counters, std::size_t slots,
                 const WorkerPorts& ports, const PartnerRoutes& routes,
-                const std::uint64_t& next_item);
+                const std::uint64_t& next_item, const std::uint64_t& handled_item);
 
   [[nodiscard]] std::uint32_t stream() const noexcept { return stream_; }
   [[nodiscard]] const StreamEngine& engine() const noexcept { return engine_; }
@@ -79,6 +80,7 @@ class StreamContext final : private EngineOut {
   const WorkerPorts& ports_;
   const PartnerRoutes& routes_;
   const std::uint64_t& next_item_;
+  const std::uint64_t& handled_item_;
   std::vector<Command> first_commands_;
   std::size_t begun_ = 0;              // how many of them were applied
   std::uint64_t consumed_sample_ = 0;  // its sequence; it may have been shed

@@ -262,11 +262,9 @@ bool StreamEngine::change(Stage& stage, const Command& command, StreamEvent& eve
       stage.set(change.index, change.value);
       return true;
     case StageChange::Kind::kModel:
-      if (command.model == nullptr) return false;
       if (stage.model() != nullptr) event.before = ShortText(stage.model()->name);
-      event.after = ShortText(command.model->name);
-      stage.use(*command.model);
-      return true;
+      if (command.model != nullptr) event.after = ShortText(command.model->name);
+      return stage.use(command.model);
     case StageChange::Kind::kCommand:
       stage.describe(change.index, command.command, event.after);
       if (change.type->commands[change.index].performs) event.kind = v1::Event::KIND_PLAYING;

@@ -40,7 +40,7 @@ std::unique_ptr<StreamContext> Worker::make_context(EngineOptions options, doubl
                                                     StreamCounters& counters,
                                                     std::size_t slots) const {
   return std::make_unique<StreamContext>(std::move(options), rate_hz, counters, slots, ports_,
-                                         routes_, position_);
+                                         routes_, position_, handled_);
 }
 
 void Worker::put(std::uint32_t slot, StreamContext& context) noexcept {
@@ -186,7 +186,7 @@ void Worker::send_acks() noexcept {
 
 void Worker::handle(const Item& item) noexcept {
   assert(item.number >= position_);  // the reader counts upwards
-  position_ = item.number;
+  position_ = handled_ = item.number;
   StreamContext* const context = find(stream_of(item));
   if (context != nullptr) handle(item, *context);
   position_ = item.number + 1;

@@ -12,6 +12,7 @@
 #include "daemon/pipeline/counters.hpp"
 #include "daemon/pipeline/messages.hpp"
 #include "daemon/pipeline/partner_routes.hpp"
+#include "daemon/pipeline/raw_tap.hpp"
 #include "daemon/pipeline/record_sink.hpp"
 #include "daemon/pipeline/ring.hpp"
 #include "daemon/pipeline/stream_engine.hpp"
@@ -44,6 +45,7 @@ struct WorkerPorts {
   system::EventFd* control = nullptr;    // notified when `acks` has something; may be null
   StreamExchange* streams = nullptr;
   pipeline::RecordSink* record_sink = nullptr;
+  FrameTap* frame_tap = nullptr;
   Clock clock = nullptr;
 };
 
@@ -94,6 +96,7 @@ class Worker {
   std::vector<StreamContext*> coming_;    // by slot: follow when the slot is free
   PartnerRoutes routes_;                  // to the streams in contexts_
   std::uint64_t position_ = 1;  // number of the item before which a decision made now takes effect
+  std::uint64_t handled_ = 0;   // of the item that is handled, or of the last one
   // Acks for which the ring was full; never more than there are commands under way.
   std::array<Ack, kMaxUnderWay> unsent_{};
   std::size_t unsent_count_ = 0;

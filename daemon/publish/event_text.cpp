@@ -12,10 +12,11 @@ using pipeline::StreamEvent;
 
 std::string words(const ShortText& text) { return clean(text.text()) + (text.cut() ? "..." : ""); }
 
-// "march.style -> sway.style"; only the new name if there was no old one.
+// "march.style -> sway.style"; only the new name if there was no old one; "none" for no model.
 std::string from_to(const StreamEvent& event) {
   const std::string before = words(event.before);
-  return (before.empty() ? "" : before + " -> ") + words(event.after);
+  const std::string after = words(event.after);
+  return (before.empty() ? "" : before + " -> ") + (after.empty() ? "none" : after);
 }
 
 std::string changed(const StreamEvent& event) {

@@ -76,7 +76,9 @@ bool read_set(const ParameterSpec& spec, const Value& value, Decision& decision)
 
 bool read_hash(const Value& value, Decision& decision) {
   const std::string& sha256 = value.sha256();
-  if (value.value_case() != Value::kSha256 || sha256.size() + 1 != decision.model_hash.size()) {
+  const bool none = sha256.empty();  // the model was taken away
+  if (value.value_case() != Value::kSha256 ||
+      (!none && sha256.size() + 1 != decision.model_hash.size())) {
     return false;
   }
   std::ranges::copy(sha256, decision.model_hash.begin());

@@ -71,7 +71,8 @@ void LogWriterLoop::add_takes() {
     report_({.kind = RecorderEvent::Kind::kTake,
              .streams = streams_now(),
              .time_ns = change.time_ns,
-             .text = std::move(change.text)});
+             .text = std::move(change.text),
+             .take = change.row});
     takes_.insert_or_assign(change.row.id, std::move(change.row));
   }
 }

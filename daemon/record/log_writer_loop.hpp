@@ -29,6 +29,7 @@ struct RecorderEvent {
   std::vector<std::uint32_t> streams;
   std::int64_t time_ns = 0;
   std::string text;
+  std::optional<log::TakeRow> take{};  // of kTake: as the log gets it
 };
 
 class LogWriterLoop {

@@ -51,16 +51,19 @@ RT_SAFE void GenerateStage::use_channels() noexcept {
   }
 }
 
-RT_SAFE void GenerateStage::use(const StageModel& model) noexcept {
-  model_ = static_cast<const BoundModel*>(&model);
-  static_cast<void>(smoother_.set_model(model_->live.get()));
+// A body that performs could not be led back without the model, whose channels it has.
+RT_SAFE bool GenerateStage::use(const StageModel* model) noexcept {
+  if (model == nullptr && !hand_ && performs()) return false;
+  model_ = static_cast<const BoundModel*>(model);
+  static_cast<void>(smoother_.set_model(model_ != nullptr ? model_->live.get() : nullptr));
   player_.set_model(model_);
   use_channels();
-  if (hand_ || !has_last_) return;
+  if (pose_channels_ == nullptr || hand_ || !has_last_) return true;
   // The channels of a body are those of its model.
   std::ranges::fill(live_, 0.0);
   follow(last_);
   player_.go_on_from(used(live_));
+  return true;
 }
 
 RT_SAFE bool GenerateStage::command(std::size_t index, const StageCommand& command) noexcept {

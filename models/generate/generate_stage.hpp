@@ -46,7 +46,7 @@ class GenerateStage final : public Stage {
   RT_SAFE void flush(StageOut& out) noexcept override;
   [[nodiscard]] bool performs() const noexcept override { return player_.busy(); }
 
-  RT_SAFE void use(const StageModel& model) noexcept override;
+  RT_SAFE bool use(const StageModel* model) noexcept override;
   [[nodiscard]] const BoundModel* model() const noexcept override { return model_; }
   [[nodiscard]] bool command(std::size_t index, const StageCommand& command) noexcept override;
   void describe(std::size_t index, const StageCommand& command,

@@ -31,6 +31,12 @@ TEST_CASE("inspect names the bones, and its profile gives the same figure back")
   for (const json& bone : found.at("bones")) CHECK(bone.at("sure").get<double>() > 0.5);
   CHECK(has(posed({"inspect", clip}).out, "T-pose ... first frame ... leftUpperLeg"));
 
+  // glTF has metres, although a BVH that is written of it has centimetres.
+  REQUIRE(posed({"convert", clip, "--out", stage.path("walk.glb")}).code == 0);
+  const auto gltf = posed({"inspect", stage.path("walk.glb"), "--json"});
+  CHECK(json::parse(gltf.out).at("metres_per_unit") == 1.0);
+  CHECK(has(posed({"inspect", stage.path("walk.glb")}).out, "lengths in metres"));
+
   const auto again = posed({"inspect", clip, "--profile", map, "--json"});
   REQUIRE(again.code == 0);
   const json mapped = json::parse(again.out);

@@ -128,8 +128,8 @@ std::uint64_t first_shed(const log::Reader& reader) {
 
 clip::Clip applied_cold(const Served& served) {
   const ProgramOutcome apply =
-      posed({"apply", "--cold", "--model", served.path("one.style"), served.path("walk.bvh"),
-             "--out", served.path("offline.bvh")});
+      posed({"apply", "--cold", "--root", "off", "--model", served.path("one.style"),
+             served.path("walk.bvh"), "--out", served.path("offline.bvh")});
   INFO(apply.err);
   REQUIRE(apply.code == 0);
   auto offline = clip::read_clip(served.path("offline.bvh"));
@@ -239,7 +239,8 @@ TEST_CASE("a log that was recorded with a style is styled anew as its device sen
   };
   const auto input = clip::read_clip(served.path("walk.bvh"));
   REQUIRE(input);
-  const std::vector<std::string> apply{"apply", "--cold", "--model", served.path("one.style"), log};
+  const std::vector<std::string> apply{
+      "apply", "--cold", "--root", "off", "--model", served.path("one.style"), log};
   CHECK(largest_rad(apply, offline) <= 10.0 * kSame_rad);  // a frame has its angles as floats
   CHECK(largest_rad({"convert", log, "--stream", "walker-raw"}, *input) <= kSame_rad);
   CHECK(largest_rad({"convert", log}, *input) > 0.1);

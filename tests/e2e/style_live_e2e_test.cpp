@@ -95,4 +95,29 @@ TEST_CASE("ctl lists the daemon's own models and uses one by name; stats tell we
   CHECK(has(served.ctl({"status"}).out, "style.weights s1=0.25,s2=0.75, style.mask arms=0.5"));
 }
 
+TEST_CASE("a style is taken off live and put on again, and replays; off, it may be deleted") {
+  Served served("models = \"models\"\n");
+  std::filesystem::create_directory(served.path("models"));
+  REQUIRE(style::save_model(toy_model(2, 0.3), served.path("models/only.style")));
+  served.record();
+  CHECK(served.ctl({"use-model", "walker", "only.style"}).code == 0);
+  served.await_frames("walker", 30);
+  CHECK(has(served.ctl({"delete-model", "only.style"}).err, "another model, or none"));
+  CHECK(served.ctl({"use-model", "walker", "none"}).code == 0);
+  served.await_frames("walker", 120);  // it has faded out
+  const auto status = nlohmann::json::parse(served.ctl({"--json", "status"}).out);
+  CHECK(status["status"]["stream"][0]["stage"][0]["model"] == "");
+  CHECK(served.ctl({"use-model", "walker", "only.style"}).code == 0);
+  served.await_frames("walker", 30);
+  CHECK(served.ctl({"use-model", "walker", "none"}).code == 0);
+  CHECK(served.ctl({"delete-model", "only.style"}).code == 0);
+  served.await_frames("walker", 30);
+  served.daemon->send(SIGTERM);
+  REQUIRE(served.daemon->exit_code() == 0);
+  const ProgramOutcome replay =
+      posed({"replay", served.path("take.plog"), "--speed", "max", "--expect"});
+  INFO(replay.err);
+  CHECK(replay.code == 0);
+}
+
 }  // namespace posed::test

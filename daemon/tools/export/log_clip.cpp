@@ -8,7 +8,6 @@
 
 #include "daemon/pipeline/take.hpp"
 #include "daemon/tools/replay/replay.hpp"
-#include "proto/clip/frames_clip.hpp"
 #include "proto/frame/time.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/list.hpp"
@@ -71,6 +70,34 @@ class GapMarker {
 };
 
 }  // namespace
+
+void FrameCollector::add(const Frame& frame, const Timecode& timecode) {
+  const Header& header = frame.header;
+  if (timecode != Timecode{}) moment_ = timecode;
+  if (part_ != header.stream) {
+    if (last_ != 0) ++returns_;
+    last_ = 0;
+    part_ = header.stream;
+  }
+  if (header.sequence <= last_) return;  // repeated while the stream was stale
+  missing_ += last_ == 0 ? 0 : header.sequence - last_ - 1;
+  last_ = header.sequence;
+  times_.add(header);
+  clip_.add(frame, frame.timecode == Timecode{} ? moment_ : frame.timecode);
+  moment_ = {};
+}
+
+Result<clip::Clip> FrameCollector::finish(const std::string& path, double rate_hz) const {
+  auto clip = clip_.finish(path, rate_hz, times_.in_seconds());
+  if (clip && missing_ > 0) {
+    clip->warnings.push_back(std::to_string(missing_) +
+                             " frames were skipped while the daemon ran");
+  }
+  if (clip && returns_ > 0) {
+    clip->warnings.push_back("the body came back " + std::to_string(returns_) + " times");
+  }
+  return clip;
+}
 
 Result<log::TakeRow> find_take(const log::Reader& reader, const std::string& wanted) {
   auto takes = TRY(reader.takes());
@@ -197,50 +224,6 @@ Result<Chosen> choose(const replay::Replay& replay, const std::string& wanted, b
   return chosen;
 }
 
-// Collects the frames of a stream's parts as they were published, each once.
-class Collector {
- public:
-  explicit Collector(const std::shared_ptr<const Skeleton>& skeleton) : clip_(skeleton) {}
-
-  // `timecode` is that of the moment, for frames that have none of their own; empty: not known.
-  void add(const Frame& frame, const Timecode& timecode = {}) {
-    const Header& header = frame.header;
-    if (timecode != Timecode{}) moment_ = timecode;
-    if (part_ != header.stream) {
-      if (last_ != 0) ++returns_;
-      last_ = 0;
-      part_ = header.stream;
-    }
-    if (header.sequence <= last_) return;  // repeated while the stream was stale
-    missing_ += last_ == 0 ? 0 : header.sequence - last_ - 1;
-    last_ = header.sequence;
-    times_.add(header);
-    clip_.add(frame, frame.timecode == Timecode{} ? moment_ : frame.timecode);
-    moment_ = {};
-  }
-
-  [[nodiscard]] std::size_t frames() const { return times_.size(); }
-
-  Result<clip::Clip> finish(const std::string& path, double rate_hz) const {
-    auto clip = clip_.finish(path, rate_hz, times_.in_seconds());
-    if (clip && missing_ > 0) {
-      clip->warnings.push_back(std::to_string(missing_) +
-                               " frames were skipped while the daemon ran");
-    }
-    if (clip && returns_ > 0) {
-      clip->warnings.push_back("the body came back " + std::to_string(returns_) + " times");
-    }
-    return clip;
-  }
-
- private:
-  clip::FramesClip clip_;
-  std::uint32_t part_ = pipeline::kNoStream;
-  std::uint64_t last_ = 0, missing_ = 0, returns_ = 0;
-  clip::FrameTimes times_;
-  Timecode moment_{};  // of the next frame
-};
-
 // The timecodes that a trigger told of the beginnings of takes: each for the first frame behind it.
 class TakeStarts {
  public:
@@ -310,7 +293,7 @@ class TakeCollector {
   std::string file_;
   const EachTakeClip& each_;
   std::map<std::uint32_t, std::string> names_;  // of the clips, by stream
-  std::map<std::string, Collector> collectors_;
+  std::map<std::string, FrameCollector> collectors_;
   std::map<std::string, double> rate_hz_;  // as collectors_
   std::size_t next_ = 0;                   // the take that is collected
 };
@@ -340,7 +323,7 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
   replay::Replay& replay = *opened;
   const auto chosen = TRY(choose(replay, stream, raw, path.string()));
   const replay::ReplayStream& first = replay.stream(chosen.ids.front());
-  Collector collector(skeleton_of(replay, chosen.ids.front(), chosen.raw));
+  FrameCollector collector(skeleton_of(replay, chosen.ids.front(), chosen.raw));
   const auto kind = chosen.raw ? pipeline::Item::Kind::kRawFrame : pipeline::Item::Kind::kFrame;
   std::vector<log::TakeRow> takes{interval};
   if (wanted_take.empty()) takes = TRY(reader.takes());
@@ -370,16 +353,21 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
   return clip;
 }
 
-Result<> each_take_clip(const std::filesystem::path& path, const EachTakeClip& each,
-                        const std::function<bool()>& goes_on) {
+Result<> each_take_clip(const std::filesystem::path& path, const std::set<std::int64_t>& wanted,
+                        const EachTakeClip& each, const std::function<bool()>& goes_on) {
   auto reader = TRY(log::Reader::open(path));
   auto takes = TRY(reader.takes());
+  std::erase_if(takes, [&](const log::TakeRow& take) { return !wanted.contains(take.id); });
   if (takes.empty()) return {};
+  const std::uint64_t last_item = takes.back().last_item;
   auto opened = TRY(replay::Replay::open(reader));
   TakeCollector collector(*opened, std::move(takes), path.string(), each);
   bool stopped = false;
   TRY(opened->run([&](const pipeline::Item& item) { collector.add(item); },
-                  [&](const log::ChunkRow&) { return !(stopped = stopped || !goes_on()); }));
+                  [&](const log::ChunkRow&) {
+                    stopped = stopped || !goes_on();
+                    return !stopped && opened->position() <= last_item;
+                  }));
   if (stopped) return fail("interrupted: the log is complete, but not all of its takes are clips");
   collector.finish();
   return {};

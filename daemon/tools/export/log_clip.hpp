@@ -1,16 +1,24 @@
 // Clips and takes of a device log: replays the frames that the run published. Cold.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
+#include "daemon/pipeline/messages.hpp"
 #include "proto/clip/clip.hpp"
 #include "proto/clip/format.hpp"
+#include "proto/clip/frames_clip.hpp"
+#include "proto/frame/frame.hpp"
 #include "proto/frame/result.hpp"
+#include "proto/frame/skeleton.hpp"
+#include "proto/frame/timecode.hpp"
 #include "proto/log/reader.hpp"
 #include "proto/log/rows.hpp"
 
@@ -55,10 +63,30 @@ Result<> check_log_options(const std::string& in, bool part_given, const clip::R
 using EachTakeClip =
     std::function<void(const log::TakeRow& take, const std::string& stream, Result<clip::Clip>)>;
 
-// Calls `each` with the clip of each take and stream, in the order of the takes; one replay of the
-// log makes them all, with the frames of one take in memory. Streams with fewer than two frames in
-// a take are left out. Ends with an error when `goes_on` says no.
-Result<> each_take_clip(const std::filesystem::path& path, const EachTakeClip& each,
-                        const std::function<bool()>& goes_on);
+// Calls `each` with the clip of each stream of these takes, in the order of the takes; one replay
+// of the log up to the last one's end makes them all, with the frames of one take in memory.
+// Streams with fewer than two frames in a take are left out. Ends with an error when `goes_on` says
+// no.
+Result<> each_take_clip(const std::filesystem::path& path, const std::set<std::int64_t>& takes,
+                        const EachTakeClip& each, const std::function<bool()>& goes_on);
+
+// Collects the frames of a stream's parts as they were published, each once.
+class FrameCollector {
+ public:
+  explicit FrameCollector(const std::shared_ptr<const Skeleton>& skeleton) : clip_(skeleton) {}
+
+  // `timecode` is that of the moment, for frames that have none of their own; empty: not known.
+  void add(const Frame& frame, const Timecode& timecode = {});
+  [[nodiscard]] std::size_t frames() const { return times_.size(); }
+  // Fails with fewer than two frames. `path`: for the words of an error.
+  Result<clip::Clip> finish(const std::string& path, double rate_hz) const;
+
+ private:
+  clip::FramesClip clip_;
+  std::uint32_t part_ = pipeline::kNoStream;
+  std::uint64_t last_ = 0, missing_ = 0, returns_ = 0;
+  clip::FrameTimes times_;
+  Timecode moment_{};  // of the next frame
+};
 
 }  // namespace posed::tools

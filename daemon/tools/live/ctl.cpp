@@ -54,6 +54,7 @@ struct CtlOptions {
   bool loop = false;
   std::string take;      // name
   std::string new_name;  // of a model
+  std::string stage;     // whose model is taken away
   TeachOptions teach;
 };
 
@@ -209,13 +210,19 @@ int list_models(const CtlOptions& options) {
   });
 }
 
+std::string state_of(const v1::KnownRecording& file) {
+  if (!file.problem().empty()) return "  (is not there: " + clean(file.problem()) + ")";
+  if (file.being_made()) return "  (is being made)";
+  return file.in_use() ? "  (is being written)" : "";
+}
+
 int list_recordings(const CtlOptions& options) {
   v1::ControlRequest request;
   request.mutable_list_recordings();
   return ask_and_print(options, request, [](const v1::ControlReply& reply) {
     for (const v1::KnownRecording& file : reply.recording()) {
       std::printf("%10.1f MB  %s%s\n", static_cast<double>(file.bytes()) / 1e6,
-                  clean(file.name()).c_str(), file.in_use() ? "  (is being written)" : "");
+                  clean(file.name()).c_str(), state_of(file).c_str());
     }
   });
 }
@@ -241,6 +248,7 @@ int use_model(const CtlOptions& options) {
   v1::ControlRequest request;
   request.mutable_use_model()->set_stream(options.stream);
   request.mutable_use_model()->set_name(options.model.string());
+  request.mutable_use_model()->set_stage(options.stage);
   return change(options, request, "model " + options.model.string());
 }
 
@@ -513,8 +521,12 @@ void add_style_actions(Actions& actions, CtlOptions& options) {
                                 "[control] models = \"models\"."));
   CLI::App* use = actions.add_for_stream("use-model", "Give a stream a model of the daemon's list",
                                          use_model, R"(Example:
-  posed ctl use-model walker march.style   # nothing is sent: the daemon has the file)");
-  use->add_option("model", options.model, "Its name, as `posed ctl models` prints it")->required();
+  posed ctl use-model walker march.style   # nothing is sent: the daemon has the file
+  posed ctl use-model walker none          # the style fades out; warm up again after it)");
+  use->add_option("model", options.model, "Its name, as `posed ctl models` prints it, or none")
+      ->required();
+  use->add_option("--stage", options.stage,
+                  "With none, where two stages use models: style, generate");
   CLI::App* rename =
       actions.add("rename-model", "Give a model of the daemon's list another name", rename_model,
                   "Example:\n  posed ctl rename-model proud.style proud-ann");

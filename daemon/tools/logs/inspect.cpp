@@ -258,6 +258,11 @@ void add_bones(const clip::Clip& clip, Findings& findings) {
   if (others > 0) findings.say(fmt::format("  {} joints are no bones of a person", others));
 }
 
+// Of the file; Clip's own is that of a BVH which is written of it.
+double unit_of(const clip::Clip& clip) {
+  return clip.rig->metres_per_unit.value_or(clip.metres_per_unit);
+}
+
 std::string facing_words(const rig::Rig& rig) {
   if (rig.facing.empty()) return {};
   return fmt::format(", the zero pose faces {} ({})", rig.facing, rig.why_facing);
@@ -266,12 +271,15 @@ std::string facing_words(const rig::Rig& rig) {
 Findings findings_of(const InspectArguments& options, const clip::Clip& clip,
                      const Drawing& drawing) {
   Findings findings;
-  const std::string unit =
-      clip.rig->unit.empty() ? fmt::format("{:g} m", clip.metres_per_unit) : clip.rig->unit;
+  const double unit_m = unit_of(clip);
+  std::string unit = clip.rig->unit;
+  if (unit.empty()) unit = fmt::format("{:g} m", unit_m);
+  if (unit_m == 1.0) unit = "metres";
+  if (unit_m == 0.01) unit = "centimetres";
   findings.add("in", options.in)
       .add("person", motion::is_person(*clip.skeleton))
       .add("up", up_text(clip.up))
-      .add("metres_per_unit", clip.metres_per_unit)
+      .add("metres_per_unit", unit_m)
       .add("facing", clip.rig->facing)
       .say(fmt::format("{}: {}; {} points up{}{}, lengths in {}{}", options.in,
                        kind_words(*clip.skeleton), up_text(clip.up),
@@ -297,7 +305,7 @@ std::string profile_text(const clip::Clip& clip) {
       "# Written by `posed inspect {}`. Correct what is wrong, and give the file as the profile.\n"
       "name = {}\nmetres_per_unit = {:.9g}\nup = \"{}\"\n\n[bones] # bone = joint\n",
       clean(std::filesystem::path(clip.path).filename().string()), quoted(clip.skeleton->name),
-      clip.metres_per_unit, up_text(clip.up));
+      unit_of(clip), up_text(clip.up));
   std::string frames = "\n[T] # turn of each joint's axes in the T-pose [deg] about x, y, z\n";
   for (std::size_t j = 0; j < clip.skeleton->joints.size(); ++j) {
     const Joint& joint = clip.skeleton->joints[j];

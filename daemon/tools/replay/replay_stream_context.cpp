@@ -155,7 +155,7 @@ Result<> ReplayStreamContext::expect(const pipeline::Decision& decision) {
       const std::string hash = decision.model_hash.data();
       const auto stage = stage_of(decision.change);
       const bool is_model = decision.change.kind == pipeline::StageChange::Kind::kModel;
-      if (!is_model || !stage || !stream_.described) return {};
+      if (!is_model || hash.empty() || !stage || !stream_.described) return {};
       if (!tried_.emplace(*stage, hash).second) return {};
       TRY(bind(*stage, hash));
       return {};
@@ -221,14 +221,15 @@ void ReplayStreamContext::change(const pipeline::Decision& decision) noexcept {
   pipeline::Command command{
       .change = decision.change, .model_hash = decision.model_hash, .command = decision.command};
   std::unique_ptr<const StageModel> model;
-  if (decision.change.kind == pipeline::StageChange::Kind::kModel) {
-    auto bound = bind(*stage, decision.model_hash.data());
+  const bool is_model = decision.change.kind == pipeline::StageChange::Kind::kModel;
+  if (const std::string hash = decision.model_hash.data(); is_model && !hash.empty()) {
+    auto bound = bind(*stage, hash);
     if (!bound) return host_.failed(std::move(bound.error()));
     model = std::move(*bound);
     command.model = model.get();
   }
   const bool refused = engine_->apply(command, *this).refused;
-  if (model && !refused) models_in_use_[*stage] = std::move(model);
+  if (is_model && !refused) models_in_use_[*stage] = std::move(model);
 }
 
 // Nothing more comes: what was decoded last but never came was shed.

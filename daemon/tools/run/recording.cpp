@@ -5,19 +5,12 @@
 
 #include <array>
 #include <atomic>
-#include <cctype>
 #include <cerrno>
-#include <chrono>
-#include <condition_variable>
-#include <csignal>
 #include <cstdint>
 #include <ctime>
 #include <memory>
-#include <mutex>
 #include <set>
-#include <stop_token>
 #include <system_error>
-#include <thread>
 #include <utility>
 #include <variant>
 
@@ -30,9 +23,7 @@
 #include "daemon/system/realtime.hpp"
 #include "daemon/tools/command/findings.hpp"
 #include "daemon/tools/command/output_files.hpp"
-#include "daemon/tools/export/log_clip.hpp"
-#include "proto/clip/clip.hpp"
-#include "proto/clip/frames_clip.hpp"
+#include "daemon/tools/run/take_clips.hpp"
 #include "proto/frame/whole_file.hpp"
 #include "proto/log/schema.hpp"
 #include "proto/log/writer.hpp"
@@ -246,126 +237,6 @@ Result<LogName> new_log(const std::filesystem::path& folder) {
   }
 }
 
-// Each take of each stream of a device log as a BVH beside it. Cold.
-class TakeClips {
- public:
-  // A thread of nice 19 writes the clips of each take soon after it has ended, while `log` grows.
-  explicit TakeClips(std::filesystem::path log);
-  TakeClips(const TakeClips&) = delete;
-  TakeClips& operator=(const TakeClips&) = delete;
-  ~TakeClips() = default;
-
-  // A take has begun or ended. Any thread; returns at once.
-  void take_changed();
-  // Ends the thread, which may be reading the log: before the log becomes a single file, because
-  // that needs it alone.
-  void stop();
-  // After stop(), when the log is complete: writes those that are not written yet, also of a take
-  // that was never ended. Call once. An end signal that comes meanwhile ends the work with an
-  // error: block end_signals() before.
-  Result<> finish();
-
- private:
-  void run(const std::stop_token& stop);
-  Result<> write(bool all, const std::stop_token& stop);
-
-  std::filesystem::path log_;
-  // Takes and streams; of the thread, then of finish().
-  std::set<std::pair<std::int64_t, std::string>> written_;
-  std::mutex mutex_;
-  std::condition_variable_any wake_;
-  bool changed_ = false;
-  std::jthread thread_;  // last, because it uses all the others
-};
-
-// A take's name as a part of its clips' names: ".sneak"; empty without one.
-std::string ending_named(const std::string& take) {
-  constexpr std::size_t kMaxBytes = 100;
-  std::string text = take.empty() ? "" : "." + clean(take, kMaxBytes);
-  for (std::size_t i = 1; i < text.size(); ++i) {
-    const auto c = static_cast<unsigned char>(text[i]);
-    const bool kept = c >= 0x80 || std::isalnum(c) != 0 || c == '-' || c == '_' || c == ' ';
-    if (!kept) text[i] = '_';
-  }
-  return text;
-}
-
-// The log has what came before the end of a take after its next commit.
-constexpr std::chrono::milliseconds kCommitted{1000};
-
-Result<> write_clip(Result<clip::Clip> clip, const std::filesystem::path& path) {
-  if (!clip) return std::unexpected(clip.error());
-  std::error_code error;
-  if (std::filesystem::exists(path, error)) return fail("exists already", path.string());
-  never_replace(path);
-  clip::hold_missing(*clip);
-  clip::hold_gaps(*clip);
-  for (const std::string& warning : clip->warnings) {
-    spdlog::warn("{}: {}", path.string(), warning);
-  }
-  TRY(clip::write_bvh(*clip, path));
-  spdlog::info("wrote {}: {} frames", path.string(), clip->frames());
-  return {};
-}
-
-bool end_signal_came() {
-  const sigset_t signals = end_signals();
-  constexpr timespec kAtOnce{};
-  return sigtimedwait(&signals, nullptr, &kAtOnce) > 0;
-}
-
-TakeClips::TakeClips(std::filesystem::path log)
-    : log_(std::move(log)), thread_([this](const std::stop_token& stop) { run(stop); }) {}
-
-void TakeClips::take_changed() {
-  {
-    const std::scoped_lock lock(mutex_);
-    changed_ = true;
-  }
-  wake_.notify_all();
-}
-
-void TakeClips::run(const std::stop_token& stop) {
-  system::name_thread("posed-clips");
-  system::give_way();
-  while (!stop.stop_requested()) {
-    std::unique_lock lock(mutex_);
-    wake_.wait(lock, stop, [this] { return changed_; });
-    changed_ = false;
-    wake_.wait_for(lock, stop, kCommitted, [] { return false; });
-    lock.unlock();
-    if (stop.stop_requested()) return;
-    if (auto done = write(false, stop); !done && !stop.stop_requested()) {
-      spdlog::warn("clips of takes are written when posed ends: {}", done.error().text());
-    }
-  }
-}
-
-void TakeClips::stop() {
-  thread_.request_stop();
-  thread_.join();
-}
-
-Result<> TakeClips::finish() { return write(true, {}); }
-
-// A clip that cannot be written is a warning; the log is not changed.
-Result<> TakeClips::write(bool all, const std::stop_token& stop) {
-  const std::string stem = (log_.parent_path() / log_.stem()).string();
-  const auto each = [&](const log::TakeRow& take, const std::string& stream,
-                        Result<clip::Clip> clip) {
-    if (!all && take.last_item == log::kToTheEnd) return;
-    if (!written_.emplace(take.id, stream).second) return;
-    const std::string path =
-        stem + "-" + std::to_string(take.id) + "-" + stream + ending_named(take.name) + ".bvh";
-    if (auto written = write_clip(std::move(clip), path); !written) {
-      spdlog::warn("take {} of stream {} is no clip: {}", take.id, stream, written.error().text());
-    }
-  };
-  // During the run the signals are for who serves.
-  const auto goes_on = [&] { return all ? !end_signal_came() : !stop.stop_requested(); };
-  return each_take_clip(log_, each, goes_on);
-}
-
 }  // namespace
 
 Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig& config) {
@@ -391,15 +262,21 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
       .clock = system::monotonic_ns,
       .report = [&daemon, &clips, started](const record::RecorderEvent& event) {
         if (*started) post(daemon, event);
-        if (clips && event.kind == record::RecorderEvent::Kind::kTake) clips->take_changed();
+        if (clips && event.take) clips->take_changed(*event.take);
       }};
   std::set<std::uint32_t> with_body;  // sources, by number
   auto recorder = TRY(record::Recorder::open(
       std::move(recorder_options), record::recorded_setup(daemon.sources(), daemon.slots())));
   assembly::DaemonHooks hooks;
   hooks.record_sink = &recorder->record_sink();
-  hooks.record_stream = [&recorder, &with_body](const devices::NewStream& stream) {
+  hooks.record_stream = [&recorder, &with_body, &clips](const devices::NewStream& stream) {
     with_body.insert(stream.source.number);
+    if (clips) {
+      clips->stream_comes({.id = stream.id,
+                           .name = stream.config.name,
+                           .skeleton = stream.stages.published,
+                           .rate_hz = stream.rate_hz});
+    }
     recorder->add_stream(record::recorded_stream(stream));
   };
   hooks.more_stats = [&recorder](v1::Stats& stats) {
@@ -411,6 +288,10 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
       *stats.mutable_take() = pipeline::stats_of(*take);
     }
   };
+  if (clips) {
+    hooks.frame_tap = clips.get();
+    hooks.add_clips = [&clips](v1::ControlReply& reply) { clips->add_to(reply); };
+  }
   hooks.recorder_figures = [&recorder] { return figures_of(*recorder); };
   if (auto done = daemon.start(std::move(hooks)); !done) {
     daemon.stop();

@@ -32,7 +32,8 @@ namespace {
 struct ApplyArguments {
   std::filesystem::path model, in, out;
   clip::ReadOptions read;
-  style::ApplyOptions apply;
+  style::ApplyOptions apply{.feet = feet::RootOptions{}};
+  const CLI::Option* root = nullptr;
   std::string mask, stream, take;
   std::filesystem::path neutral;
   std::string alpha = "1", gate = "on";
@@ -144,7 +145,7 @@ Findings findings_of(const ApplyArguments& options, const style::StyleModel& mod
       .add("auto_alpha", options.apply.filter.auto_alpha)
       .add("style_estimate", applied.estimate_mean)
       .add("cold", options.apply.cold)
-      .add("root", root_text(options.apply.feet))
+      .add("root", root_text(applied.no_feet.empty() ? options.apply.feet : std::nullopt))
       .add("max_root_offset_cm", applied.max_root_offset_m * 100.0)
       .add("gate_mean", applied.gate_mean)
       .add("hinge_held", applied.hinge_held)
@@ -172,8 +173,10 @@ Findings findings_of(const ApplyArguments& options, const style::StyleModel& mod
                     " does not know",
                     100.0 * known));
   }
-  if (nothing.empty() && !options.apply.feet) {
-    findings.remark("the root moves as it did, so feet may slide; with --root stride they stand");
+  if (nothing.empty() && !applied.no_feet.empty()) {
+    findings.remark("feet may slide: the figure " + applied.no_feet);
+  } else if (nothing.empty() && !options.apply.feet) {
+    findings.remark("the root moves as it did, so feet may slide; without --root off they stand");
   }
   return findings.remark((fit.is_far() ? "warning: " : "") + judged);
 }
@@ -202,6 +205,7 @@ Result<> run(ApplyArguments options) {
   TRY(parse_gate(options));
   TRY(parse_alpha(options));
   TRY(check_files(options));
+  options.apply.needs_feet = !options.root->empty();
   const auto model = TRY(style::load_model(options.model));
   if (options.apply.filter.auto_alpha && !model.axis.present()) {
     return misuse(
@@ -274,7 +278,7 @@ void add_apply(CLI::App& app, int& exit_code) {
       ->type_name("WEIGHTS");
   command->add_option("--mask", options->mask, "Styles parts of the body less: arms=0.5,head=0")
       ->type_name("MASK");
-  add_root_option(*command, options->apply.feet);
+  options->root = add_root_option(*command, options->apply.feet);
   command->add_option("--stream", options->stream,
                       "Which of a log's streams (default: the only one)");
   command->add_option("--take", options->take, "Only this take of a log: its number or its name");
@@ -293,10 +297,10 @@ void add_apply(CLI::App& app, int& exit_code) {
   command->add_flag("--json", options->json, "Summary as one JSON object on stdout");
   command->footer(R"(Examples:
   posed apply --model walk.style walk_03.bvh --out styled.bvh
-  posed apply --model walk.style --root stride walk_03.bvh --out styled.bvh   # feet stand
+  posed apply --model walk.style --root off walk_03.bvh --out styled.bvh   # feet slide
   posed apply --model walk.style --alpha 0.5 07_01.amc --skeleton 07.asf --out half.bvh
   posed apply --model walk.style --neutral bob_1.bvh bob_2.bvh --out bob.bvh   # a new walker
-  posed apply --model walk.style --cold walk_03.bvh --out live.bvh   # as the daemon would have
+  posed apply --model walk.style --cold walk_03.bvh --out live.bvh   # as a stream with [feet]
   posed apply --model two.style --weights feminine=0.6,elderly=0.4 --mask arms=0.5 \
       walk_03.bvh --out mixed.bvh
   posed apply --model new.style take1.plog --stream walker --out restyled.bvh
@@ -304,6 +308,8 @@ A log's poses are those that came in, whatever style they were published with.
 Weights count as shares of their sum; without them the model's first style has all. A mask leaves
 parts that it does not name at 1; it has arms, legs, trunk, head and left-arm, right-arm, left-leg,
 right-leg.
+Feet stand: the root goes as far as the styled legs carry it, so the figure may leave its place by
+metres (--root actor keeps the place). A figure without legs is styled without that.
 OUT keeps the input's joints, channels, frame count and rate; an AMC becomes a BVH with Z, Y, X
 rotations. Without --cold the style has its full strength from the first frame. The last line says
 how far the walker is from those in the training data. "deg rms" is the angle between the

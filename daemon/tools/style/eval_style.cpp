@@ -97,13 +97,13 @@ std::string verdict(const Evaluation& e) {
   const double constant = 1.0 - e.constant.cycle_ratio;
   std::string text = style::closing_text(closes);
   if (e.helps()) {
-    text += " of the way to the target";
+    text = "shows " + text + " of the difference to the target";
   } else if (closes > -kShown) {
     text = "no better than nothing: the styled walk is as far from the target as the source";
   } else {
-    text = "worse than nothing: " + text + " from the target";
+    text = "worse than nothing: it changes the walk " + text;
   }
-  text += "; a constant offset " + style::closing_text(constant);
+  text += "; a fixed change of the pose would be " + style::closing_text(constant);
   if (e.helps() && constant > closes) text += ", which is better";
   if (e.score.jerk_ratio > kRough) {
     text +=

@@ -13,19 +13,23 @@
 
 namespace posed::tools {
 
-// Adds --root: what a feet stage behind the style does with the root. Without it there is no such
-// stage, as in a config without its table. `options` outlives the command.
-inline void add_root_option(CLI::App& command, std::optional<feet::RootOptions>& options) {
+// Adds --root: what a feet stage behind the style does with the root; "off": there is no such
+// stage, as in a config without its table. Without the option it is as `options` has it, which
+// outlives the command.
+inline CLI::Option* add_root_option(CLI::App& command, std::optional<feet::RootOptions>& options) {
   const auto set = [&options](const std::string& word) {
     const feet::RootMode mode = *feet::root_mode(word);
     options.reset();
     if (mode != feet::RootMode::kOff) options = feet::RootOptions{.mode = mode};
   };
-  command
+  const std::string usual = options ? "stride (the default)" : "stride";
+  return command
       .add_option_function<std::string>(
           "--root", set,
-          "Feet stand. stride: the root walks as far as the styled legs do; actor: it stays on the"
-          " performer, and the legs reach for the ground; off (the default): feet slide")
+          "Feet stand. " + usual +
+              ": the root walks as far as the styled legs do; actor: it stays on the performer,"
+              " and the legs reach for the ground; off" +
+              (options ? "" : " (the default)") + ": it moves as it did, and feet slide")
       ->check(CLI::IsMember(
           std::vector<std::string>(feet::kRootModes.begin(), feet::kRootModes.end())));
 }

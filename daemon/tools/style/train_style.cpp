@@ -52,9 +52,10 @@ make one model:
   motion = "walk"
   day = "monday"             # when it was recorded; without it, all are of one day
 
-The last line says how much of the way to the target the model closes on clips that were held out,
-and how much a constant offset would. An unusable model (the groups do not differ, a clip is not a
-walk, a held-out walker becomes worse) is not written, and the exit code is 1.)";
+The last line says how much of the difference to the target is learnt, tested on clips that were
+held out, and how much a fixed change of the pose would be. An unusable model (the groups do not
+differ, a clip is not a walk, a held-out walker becomes worse) is not written, and the exit code is
+1.)";
 
 // Options that are not given keep the value of the experiment file, or the default.
 struct TrainStyleOptions {

@@ -232,16 +232,20 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
   const int first = added_pose ? 1 : 0;
   if (!options.cold) settle(filter, clip, first, ready.space);
 
-  auto feet = TRY(feet_stage(clip, options));
+  auto feet = feet_stage(clip, options);
   Applied applied{.clip = clip::is_acclaim(*clip.skeleton) ? clip::with_zyx_channels(clip) : clip,
                   .alpha = filter.held_alpha(),
                   .kept_first = added_pose,
                   .remark = ready.remark};
   ChannelWriter writer(applied.clip);
   auto root = RootWriter::open(applied.clip);
-  if (options.feet && !root) return std::unexpected(root.error());
+  const Error* const obstacle = !feet ? &feet.error() : !root ? &root.error() : nullptr;
+  if (options.feet && obstacle != nullptr) {
+    if (options.needs_feet) return std::unexpected(*obstacle);
+    applied.no_feet = obstacle->message;
+  }
   motion::TurnSum turned;
-  ThroughFeet out(std::move(feet));
+  ThroughFeet out(applied.no_feet.empty() && feet ? std::move(*feet) : nullptr);
   double gates = 0.0;
   double estimates = 0.0;
   int estimated = 0;

@@ -13,15 +13,16 @@
 namespace posed::style {
 
 struct ApplyOptions {
-  FilterOptions filter;
+  FilterOptions filter{};
   // True: start exactly as live, with alpha ramping up from 0 and the heading found on the way.
   // False: alpha and heading are settled from the first frame.
   bool cold = false;
   // What the feet stage behind the style does with the root; empty: there is no such stage.
   std::optional<feet::RootOptions> feet{};
+  bool needs_feet = true;          // false: a figure that cannot have that stage goes without
   std::optional<Walker> walker{};  // measured before (measure_walker)
   std::function<bool(int done, int total)>
-      progress;  // may be empty; returning false stops the work
+      progress{};  // may be empty; returning false stops the work
 };
 
 struct Applied {
@@ -39,6 +40,7 @@ struct Applied {
   bool kept_first = false;                // the first frame is an added rest pose, and stays
   bool hinge_held = false;                // knees or elbows were kept from bending backwards
   std::string remark{};                   // about joints that the skeleton lacks; may be empty
+  std::string no_feet{};                  // why the feet stage was left out; empty: it was not
 };
 
 // The walker's own neutral pose and cadence by a warm-up over the whole clip (README.md,
@@ -48,8 +50,8 @@ Result<Walker> measure_walker(const StyleModel& model, const std::string& model_
                               const clip::Clip& clip);
 
 // Returns an error for a clip without frames or with a value that is not finite, and for a skeleton
-// that lacks joints of the model or, with `feet`, has no leg or no position channels; the error
-// names what is missing. `model_name` is for errors.
+// that lacks joints of the model or, where `feet` are needed, has no leg or no position channels;
+// the error names what is missing. `model_name` is for errors.
 Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_name,
                               const clip::Clip& clip, const ApplyOptions& options);
 

@@ -40,8 +40,9 @@ RT_SAFE void drop_broken_joints(Frame& frame) noexcept {
 
 }  // namespace
 
-StyleFilter::StyleFilter(const BoundModel* model, const FilterOptions& options) noexcept
-    : model_(model), options_(options) {
+StyleFilter::StyleFilter(const BoundModel* model, const FilterOptions& options,
+                         std::shared_ptr<const Skeleton> skeleton) noexcept
+    : model_(model), skeleton_(std::move(skeleton)), options_(options) {
   options_.alpha_slew_per_s = std::clamp(options.alpha_slew_per_s, 1e-3, 1e6);
   set_alpha(static_cast<float>(options.alpha));
   tracker_.set_auto_alpha(options.auto_alpha);
@@ -69,9 +70,10 @@ RT_SAFE bool StyleFilter::set_shares(const Shares& shares) noexcept {
 }
 
 RT_SAFE const BoundModel* StyleFilter::set_model(const BoundModel* model) noexcept {
-  assert(model != nullptr);
   discontinuity_ = true;
   hinge_held_ = false;
+  leaving_ = model == nullptr && (leaving_ || model_ != nullptr);
+  if (model == nullptr) return take_away();
   tracker_.exchange(model_, *model);
   if (model_ == nullptr) {
     weights_.begin(first_alone(model->styles().size()));
@@ -81,6 +83,19 @@ RT_SAFE const BoundModel* StyleFilter::set_model(const BoundModel* model) noexce
   const BoundModel* const before = std::exchange(model_, model);
   mix_limits();
   return before;
+}
+
+// A next model fades in as a first one does. What is known of the walker is in the terms of this
+// one.
+RT_SAFE const BoundModel* StyleFilter::take_away() noexcept {
+  leaving_root_ =
+      last_joints_ > 0 && model_ != nullptr && model_->has_root ? root_change_ : RootChange{};
+  tracker_.forget();
+  weights_.begin(first_alone(1));
+  is_held_ = tell_held_ = tell_hinge_ = false;
+  reach_ = {};
+  alpha_ = 0.0;
+  return std::exchange(model_, nullptr);
 }
 
 const StyleFilter::Table& StyleFilter::table() {
@@ -142,8 +157,9 @@ const StyleFilter::Table& StyleFilter::table() {
   return table;
 }
 
-RT_SAFE void StyleFilter::use(const StageModel& model) noexcept {
-  static_cast<void>(set_model(static_cast<const BoundModel*>(&model)));
+RT_SAFE bool StyleFilter::use(const StageModel* model) noexcept {
+  static_cast<void>(set_model(static_cast<const BoundModel*>(model)));
+  return true;
 }
 
 RT_SAFE void StyleFilter::describe(std::size_t index, const StageCommand& command,
@@ -234,11 +250,13 @@ RT_SAFE void StyleFilter::process(const StageFrame& in, StageOut& out) noexcept 
   root_.setZero();
   if (served) {
     style(frame, dt_s);
+  } else if (leaving_ && skeleton_ != nullptr && frame.skeleton == skeleton_->id) {
+    fade_out(frame, dt_s);
   } else {
     last_joints_ = 0;  // the pose is that of another body, so there is nothing to blend from
   }
-  const bool roots = served && model_->has_root;
-  if (roots) change_root();
+  const bool roots = leaving_ || (served && model_->has_root);
+  if (roots && !leaving_) change_root();
   out.frame({.frame = frame,
              .variance_rad2 = in.variance_rad2,
              .input = in.input,
@@ -254,6 +272,22 @@ RT_SAFE bool StyleFilter::read_pose(const Frame& frame, double dt_s, Pose& pose)
                       dt_s, {pose.input.data(), dims});
 }
 
+// What the model added when it was taken away is added less and less.
+RT_SAFE void StyleFilter::fade_out(Frame& frame, double dt_s) noexcept {
+  const Rotations in = frame.rotation_xyzw;
+  if (std::exchange(discontinuity_, false)) begin_blend(in, frame, dt_s);
+  leaving_ = blend_weight_ > 0.0;
+  blend(*skeleton_, frame);
+  last_joints_ = leaving_ ? frame.joint_count : 0;
+  last_in_ = in;
+  last_out_ = frame.rotation_xyzw;
+  const auto left = static_cast<float>(blend_weight_);
+  root_change_ = {.height_m = left * leaving_root_.height_m, .velocity_m_s = {}};
+  for (std::size_t i = 0; i < root_change_.velocity_m_s.size(); ++i) {
+    root_change_.velocity_m_s[i] = left * leaving_root_.velocity_m_s[i];
+  }
+}
+
 RT_SAFE void StyleFilter::style(Frame& frame, double dt_s) noexcept {
   const motion::PoseSpace& space = model_->space;
   if (space.has_heading(frame) && heading_.update(space.heading_rad(frame), dt_s)) {
@@ -264,7 +298,7 @@ RT_SAFE void StyleFilter::style(Frame& frame, double dt_s) noexcept {
   if (read_pose(frame, dt_s, pose)) discontinuity_ = true;
   if (alpha_ != 0.0) change(in, pose, frame);
   if (std::exchange(discontinuity_, false)) begin_blend(in, frame, dt_s);
-  blend(frame);
+  blend(space.skeleton(), frame);
   last_joints_ = frame.joint_count;
   last_in_ = in;
   last_out_ = frame.rotation_xyzw;
@@ -395,14 +429,14 @@ RT_SAFE void StyleFilter::begin_blend(const Rotations& in, const Frame& styled,
   }
 }
 
-RT_SAFE void StyleFilter::blend(Frame& styled) const noexcept {
+RT_SAFE void StyleFilter::blend(const Skeleton& skeleton, Frame& styled) const noexcept {
   if (blend_weight_ <= 0.0) return;
   for (std::size_t j = 0; j < styled.joint_count; ++j) {
     const Vec3f& c = blend_from_[j];
     if (!styled.valid[j] || (c[0] == 0.0F && c[1] == 0.0F && c[2] == 0.0F)) continue;
     const Vector3d turn = blend_weight_ * Vector3d(c[0], c[1], c[2]);
     const Quaterniond rotation = to_eigen_double(styled.rotation_xyzw[j]) * rotation_exp(turn);
-    set_rotation(model_->space.skeleton(), static_cast<int>(j), rotation, styled);
+    set_rotation(skeleton, static_cast<int>(j), rotation, styled);
   }
 }
 

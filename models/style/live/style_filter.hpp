@@ -58,17 +58,18 @@ inline constexpr double kMaxWarmUp_s = 600.0;
 class StyleFilter final : public Stage {
  public:
   // `model` is not owned and must outlive its use here; with null, frames pass through until the
-  // first set_model. Weights that the model does not have, see shares_of(), count as none.
-  StyleFilter(const BoundModel* model, const FilterOptions& options) noexcept;
+  // first set_model. Weights that the model does not have, see shares_of(), count as none. Of
+  // bodies with `skeleton` the style fades out when the model is taken away; null: it ends at once.
+  StyleFilter(const BoundModel* model, const FilterOptions& options,
+              std::shared_ptr<const Skeleton> skeleton = nullptr) noexcept;
 
   // Emits one frame for each frame in, with its header, quality and variance. A joint
   // whose quaternion is not finite or has no length comes out as not measured.
   RT_SAFE void process(const StageFrame& in, StageOut& out) noexcept override;
 
   // All take effect at the next frame; Alpha is clamped to +-2; NaN is ignored. set_model
-  // returns the old pointer, which is no longer read; `model` is not null (to switch styling off,
-  // set alpha to 0). Weights stay with the names of their styles. set_shares returns false for
-  // shares of another model.
+  // returns the old pointer, which is no longer read; with null the style fades out. Weights stay
+  // with the names of their styles. set_shares returns false for shares of another model.
   RT_SAFE void set_alpha(float alpha) noexcept;
   [[nodiscard]] bool set_shares(const Shares& shares) noexcept;
   void set_mask(const Mask& mask) noexcept { mask_.aim(mask); }
@@ -109,7 +110,7 @@ class StyleFilter final : public Stage {
   [[nodiscard]] ParameterState state(std::size_t parameter) const noexcept override {
     return table_.state(*this, options_, parameter);
   }
-  void use(const StageModel& model) noexcept override;
+  bool use(const StageModel* model) noexcept override;
   [[nodiscard]] const BoundModel* model() const noexcept override { return model_; }
 
   void describe(std::size_t index, const StageCommand& command,
@@ -139,6 +140,8 @@ class StyleFilter final : public Stage {
   };
 
   void style(Frame& frame, double dt_s) noexcept;
+  void fade_out(Frame& frame, double dt_s) noexcept;
+  const BoundModel* take_away() noexcept;
   [[nodiscard]] std::span<const float> shares_to_ask() noexcept;
   void mix_limits() noexcept;
   void look_at_reach() noexcept;
@@ -155,10 +158,13 @@ class StyleFilter final : public Stage {
   void find_missing() noexcept;
   [[nodiscard]] double wanted_alpha() const noexcept;
   void begin_blend(const Rotations& in, const Frame& styled, double dt_s) noexcept;
-  void blend(Frame& styled) const noexcept;
+  void blend(const Skeleton& skeleton, Frame& styled) const noexcept;
 
   const Table& table_ = table();
   const BoundModel* model_;
+  std::shared_ptr<const Skeleton> skeleton_;  // of the stream; may be null
+  bool leaving_ = false;                      // the style fades out: there is no model any more
+  RootChange leaving_root_;                   // what it began with
   FilterOptions options_;
   double alpha_ = 0.0;
   double alpha_target_ = 0.0;

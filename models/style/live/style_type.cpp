@@ -44,7 +44,7 @@ Result<std::unique_ptr<Stage>> make(const StageContext& context, const StageMode
     const auto shares = shares_of(options.weights, style_of(model)->styles());
     if (!shares) return fail(shares.error().message, model->name);
   }
-  return std::make_unique<StyleFilter>(style_of(model), options);
+  return std::make_unique<StyleFilter>(style_of(model), options, context.skeleton);
 }
 
 bool takes(const v1::ModelFile& file) { return file.has_style(); }

@@ -390,6 +390,13 @@ RT_SAFE void WalkerTracker::interrupt() noexcept {
   warm_up_.stop();
 }
 
+RT_SAFE void WalkerTracker::forget() noexcept {
+  interrupt();
+  estimate_.forget();
+  walker_.reset();
+  adapted_ = false;
+}
+
 RT_SAFE void WalkerTracker::exchange(const BoundModel* from, const BoundModel& to) noexcept {
   interrupt();
   estimate_.forget();

@@ -166,6 +166,8 @@ class WalkerTracker {
   }
   [[nodiscard]] const std::optional<Walker>& walker() const noexcept { return walker_; }
 
+  // There is no model any more, in whose terms the walker was known.
+  void forget() noexcept;
   // The model is exchanged. What is known of the walker is kept where both see the same joints.
   void exchange(const BoundModel* from, const BoundModel& to) noexcept;
 

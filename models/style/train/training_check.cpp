@@ -274,17 +274,18 @@ bool is_gait(std::string_view motion) {
 }
 
 std::string closing_text(double share) {
-  return share < 0.0 ? "leads " + percent(-share) + " away" : "closes " + percent(share);
+  return share < 0.0 ? percent(-share) + " in the wrong direction" : percent(share);
 }
 
 std::string TrainingCheck::verdict(const std::string& target) const {
   if (!usable()) return "unusable: " + problems.front();
-  const std::string apart = with_digits(difference_deg, 1) + " deg rms";
-  if (!way.measured()) return "the groups are " + apart + " apart; nothing could be held out";
-  const std::string where = closing_by == ClosingBy::kLeaveOut ? "on clips held out of training"
-                                                               : "on its own training clips";
-  return closing_text(way.closes()) + " of the way to '" + target + "' (" + apart + ") " + where +
-         "; a constant offset " + closing_text(way.constant_closes());
+  const std::string apart = "the difference is " + with_digits(difference_deg, 1) + " deg a joint";
+  if (!way.measured()) return apart + "; how much of it is learnt could not be measured";
+  const std::string where = closing_by == ClosingBy::kLeaveOut ? "on motion it had not seen"
+                                                               : "on the motion it learnt from";
+  return "learnt " + closing_text(way.closes()) + " of the difference to '" + target +
+         "', tested " + where + "; a fixed change of the pose would be " +
+         closing_text(way.constant_closes()) + "; " + apart;
 }
 
 TrainingCheck check_training(const Dataset& dataset, const std::string& target, const Way& way,

@@ -35,7 +35,7 @@ struct TrainingCheck {
   [[nodiscard]] std::string verdict(const std::string& target) const;
 };
 
-// "closes 86 %", or "leads 8 % away" where the share is below 0.
+// "86 %", or "8 % in the wrong direction" where the share is below 0.
 [[nodiscard]] std::string closing_text(double share);
 
 // Whether a motion of this name is expected to have strides: walks and runs of all kinds.

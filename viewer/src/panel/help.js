@@ -1,7 +1,7 @@
 // The overlay that explains what is seen, and the keys.
 import { TILES } from '../instruments/tiles.js';
 import { el } from './dom.js';
-import { swatch } from './legend.js';
+import { DONE, swatch } from './legend.js';
 
 const KEYS = [
   ['↑ ↓', 'choose a stream'],
@@ -48,6 +48,12 @@ export class Help {
       el('dl', {}, ...this.#seen()),
       el('h2', {}, 'Keys'),
       rows(KEYS, 'kbd'),
+      el(
+        'details',
+        {},
+        el('summary', {}, 'What posed has done to a motion'),
+        rows(Object.entries(DONE), 'span'),
+      ),
       el(
         'details',
         {},

@@ -34,17 +34,27 @@ function seen(world) {
   return keys;
 }
 
-// What posed did to the stream, in a word.
+// What posed did to the stream, in a word, and in a sentence.
+export const DONE = {
+  'as captured': 'the motion as the device sent it',
+  corrected: 'posed has taken out what cannot be: false values, crossed fingers, sliding feet',
+  smoothed: 'posed has taken the trembling out of the motion',
+  styled: 'posed has put a style on the motion',
+  performs: 'posed makes this motion from the name of a gesture',
+  robot: 'posed has turned a hand into commands for a robot',
+  recorded: 'a take of the recordings, played beside the live ones',
+};
+
 function done({ stats, pose, isTake }) {
   // A style stage without a style does nothing.
   const working = stats?.stage.filter(({ name, model }) => name !== 'style' || model);
   const names = new Set(working?.map(({ name }) => name));
   if (names.has('style')) return 'styled';
-  if (pose.performed) return 'performed';
+  if (pose.performed) return 'performs';
   if (names.has('robot')) return 'robot';
   if (names.has('generate')) return 'smoothed';
   if (isTake) return 'recorded';
-  return names.size > 0 ? 'cleaned' : 'as captured';
+  return names.size > 0 ? 'corrected' : 'as captured';
 }
 
 function performersOf(world) {
@@ -53,7 +63,11 @@ function performersOf(world) {
     .map(({ name }) => world.performers.get(name))
     .filter((one) => one && one.shown !== false && one.stream.drawable);
   if (mains.length > MOST_NAMES) return [];
-  return mains.map(({ stream, colour }) => ({ text: `${stream.name}: ${done(stream)}`, colour }));
+  return mains.map(({ stream, colour }) => ({
+    text: `${stream.name}: ${done(stream)}`,
+    title: DONE[done(stream)],
+    colour,
+  }));
 }
 
 // An element that begins with the colour of its key, as the scene has it.
@@ -80,10 +94,11 @@ export function legend(list) {
     const keys = seen(world);
     for (const [key, item] of items) item.hidden = !keys.has(key);
     const performers = performersOf(world);
-    performers.forEach(({ text, colour }, i) => {
+    performers.forEach(({ text, title, colour }, i) => {
       const item = own[i] ?? grow();
       item.style.setProperty('--own', colour);
       write(item, text);
+      item.title = title;
     });
     own.forEach((item, i) => {
       item.hidden = i >= performers.length;

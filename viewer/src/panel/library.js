@@ -174,7 +174,7 @@ export class Recordings extends List {
   }
 
   async list() {
-    const none = 'Nothing is recorded yet. A take is here as BVH after it ends; the longer posed has run, the later.';
+    const none = 'Nothing is recorded yet. A take is here some seconds after it ends.';
     if (!(await this.show({ list_recordings: {} }, 'recording', none))) return;
     for (const [name, take] of this.#takes) {
       if (take.element.isConnected) continue;

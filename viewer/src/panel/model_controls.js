@@ -3,6 +3,7 @@ import { sendModel } from '../link/upload.js';
 import { el, labelled, write } from './dom.js';
 
 const ASK_AGAIN_MS = 5000; // for a list that was refused or did not come
+const NONE = 'none'; // as the daemon has it: the stream uses no model any more
 const NO_LIST = 'the daemon offers no list: [control] models names a folder';
 
 export class ModelControls {
@@ -41,13 +42,15 @@ export class ModelControls {
   #fill() {
     const names = this.names ?? [];
     const all = names.includes(this.current) || !this.current ? names : [this.current, ...names];
-    const none = this.current ? [] : [el('option', { value: '' }, `none in use${names.length > 0 ? `, ${names.length} to choose` : ''}`)];
+    const none = this.current
+      ? [el('option', { value: NONE }, 'none')]
+      : [el('option', { value: '' }, `none in use${names.length > 0 ? `, ${names.length} to choose` : ''}`)];
     this.choice.replaceChildren(
       ...none,
       ...all.map((name) => el('option', { value: name }, name)),
     );
     this.choice.value = this.current ?? '';
-    this.choice.disabled = names.length === 0;
+    this.choice.disabled = names.length === 0 && !this.current;
     this.choice.title = names.length === 0 ? this.refusal || NO_LIST : '';
     const { before = '' } = ModelControls.#used.get(this.#key) ?? {};
     this.back.hidden = !names.includes(before); // a file that was sent is nowhere to be had again
@@ -67,7 +70,7 @@ export class ModelControls {
 
   async #use(value) {
     const reply = await this.control(
-      { use_model: { stream: this.name, name: value } },
+      { use_model: { stream: this.name, name: value, stage: value === NONE ? this.kind : '' } },
       `${this.name}: model ${value}`,
     );
     if (!reply.ok) this.#fill();

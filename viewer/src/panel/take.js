@@ -12,7 +12,15 @@ export class Take {
   // context: {requests, acks, played}
   constructor(file, { requests, acks, played }) {
     Object.assign(this, { file, requests, acks, played });
-    const { name, bytes, changed_unix_s: changed, in_use: inUse } = file;
+    const { name, bytes, changed_unix_s: changed, in_use: inUse, problem } = file;
+    if (file.being_made || problem) {
+      // It is no file (yet).
+      const words = problem ? `not made: ${problem}` : 'being made …';
+      const tone = problem ? { tone: 'bad' } : {};
+      const note = el('p.note', { role: 'status', data: tone }, words);
+      this.element = el('li', {}, el('strong', {}, takeName(name).text), note);
+      return;
+    }
     const when = new Date(1000 * changed).toLocaleString();
     const size = bytes < 1e6 ? `${Math.ceil(bytes / 1000)} kB` : megabytes(bytes);
     const button = (text, onclick) =>
@@ -36,11 +44,9 @@ export class Take {
   }
 
   // Whether this is what the list has now under its name.
-  isOf({ bytes, changed_unix_s: changed, in_use: inUse }) {
-    const { file } = this;
-    return (
-      file.bytes === bytes && file.changed_unix_s === changed && file.in_use === inUse
-    );
+  isOf(entry) {
+    const parts = ['bytes', 'changed_unix_s', 'in_use', 'being_made', 'problem'];
+    return parts.every((part) => this.file[part] === entry[part]);
   }
 
   #refused(why) {
@@ -88,7 +94,7 @@ export class Take {
 
   stop() {
     this.played.stop(this.file.name);
-    this.#show();
+    if (this.play) this.#show();
   }
 
   #start() {

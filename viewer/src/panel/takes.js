@@ -74,7 +74,10 @@ export class Takes {
     this.fields.disabled = readOnlyReason !== '';
     this.fields.title = readOnlyReason;
     write(this.words, this.#words(stats));
-    this.words.title = stats.recorder_trouble || stats.recorder_file;
+    this.words.title =
+      stats.recorder_trouble ||
+      `Everything is recorded, into ${stats.recorder_file}. A take marks a part, which becomes a clip.`;
+    this.form.dataset.trouble = stats.recorder_trouble !== '';
   }
 
   #run(running) {
@@ -84,12 +87,12 @@ export class Takes {
     this.form.dataset.running = running;
   }
 
-  // While no take runs, all is recorded, too: a take only marks a part of it.
+  // While no take runs posed records, too: a take only marks a part of it.
   #words(stats) {
     const { take, recorder_lost_chunks: lost, recorder_errors: errors, recorder_trouble: trouble } = stats;
     const now = trouble ? ', NOTHING IS WRITTEN' : '';
     const missing = errors > 0 || lost > 0 ? `, ${errors} errors, ${lost} chunks lost` : '';
     const clock = take ? ` ${minutes((stats.time_ns - take.start_ns) / 1e9)}` : '';
-    return `${take ? takeTitle(take.number, take.name) : 'all is recorded'}${clock}${now}${missing}`;
+    return `${take ? takeTitle(take.number, take.name) : 'recording, no take now'}${clock}${now}${missing}`;
   }
 }

@@ -164,7 +164,7 @@ const ModelPart = {
 };
 
 const Take = { 1: ['start', 'bool'], 2: ['name', 'string'] };
-const UseModel = { 1: ['stream', 'string'], 2: ['name', 'string'] };
+const UseModel = { 1: ['stream', 'string'], 2: ['name', 'string'], 3: ['stage', 'string'] };
 const FetchRecording = {
   1: ['name', 'string'],
   2: ['offset', 'uint'],
@@ -228,6 +228,8 @@ const KnownRecording = {
   2: ['bytes', 'uint'],
   3: ['changed_unix_s', 'int'],
   4: ['in_use', 'bool'],
+  5: ['being_made', 'bool'],
+  6: ['problem', 'string'],
 };
 
 const TaughtWalk = { 1: ['good', 'bool'], 2: ['sentence', 'string'], 3: ['takes', 'uint'] };

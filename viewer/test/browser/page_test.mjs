@@ -231,6 +231,14 @@ pageTests(
       await page.getByRole('button', { name: 'Back to tired.style' }).waitFor(PATIENCE);
       assert.equal(bridge.daemon.bodies[0].model, 'march-to-sway.style');
     },
+    'the style is taken off, and put on again': async (page, bridge) => {
+      await page.getByLabel('Model', { exact: true }).selectOption('none');
+      await acknowledged(page, 'model none: applied');
+      await page.getByText('No style is in use').waitFor(PATIENCE);
+      assert.equal(bridge.daemon.bodies[0].model, '');
+      await page.getByRole('button', { name: 'Back to march-to-sway.style' }).click();
+      await acknowledged(page, 'model march-to-sway.style: applied');
+    },
     "the daemon's models are used, renamed, and deleted when that is confirmed": async (
       page,
       bridge,
@@ -238,7 +246,7 @@ pageTests(
       await unfold(page, 'Library of models');
       const shelf = page.locator('.shelves');
       const button = (name) => shelf.getByRole('button', { name, exact: true });
-      await shelf.getByText('march -> sway, from 12 clips of ann').waitFor(PATIENCE);
+      await shelf.getByText('turns march into sway, from 12 clips of ann').waitFor(PATIENCE);
       await button('Delete: march-to-sway.style').click();
       await button('Delete').click();
       await acknowledged(page, "refused: 'walker' uses it");
@@ -268,8 +276,17 @@ pageTests(
       assert.equal(bridge.daemon.models.length, 2);
       await page.locator('summary', { hasText: 'Library of models' }).click();
     },
-    'a recording is downloaded whole; one that is being written is not offered': async (page) => {
+    'a recording is downloaded whole; what is not there yet is said, not offered': async (
+      page,
+      bridge,
+    ) => {
+      const coming = { name: '20261126T065505Z-3-walker.bvh', being_made: true };
+      const failed = { name: '20261126T065505Z-4-walker.bvh', problem: 'exists already' };
+      bridge.daemon.recordings.push(coming, failed);
       await unfold(page, 'Recordings');
+      await page.locator('li', { hasText: 'take 3: walkerbeing made' }).waitFor(PATIENCE);
+      await page.locator('li', { hasText: 'take 4: walkernot made: exists already' }).waitFor(PATIENCE);
+      bridge.daemon.recordings.splice(-2);
       assert.ok(await page.getByLabel('being written: 20261126T065505Z.plog').isDisabled());
       const [download] = await Promise.all([
         page.waitForEvent('download', PATIENCE),
@@ -687,7 +704,7 @@ async function accessible(page) {
     }, part);
   assert.deepEqual(await faults('html'), []);
   await page.locator('#help-button').click();
-  await page.locator('#help summary').click();
+  for (const summary of await page.locator('#help summary').all()) await summary.click();
   assert.deepEqual(await faults('#help'), []);
 }
 

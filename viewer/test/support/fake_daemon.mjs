@@ -35,10 +35,15 @@ export class FakeDaemon {
     {
       name: 'march-to-sway.style',
       kind: 'style',
-      learnt: 'march -> sway, from 12 clips of ann',
+      learnt: 'turns march into sway, from 12 clips of ann',
       strip: STRIP,
     },
-    { name: 'tired.style', kind: 'style', verdict: 'closes 90 % of the way to tired', strip: 'M1' },
+    {
+      name: 'tired.style',
+      kind: 'style',
+      verdict: "learnt 90 % of the difference to 'tired', tested on motion it had not seen",
+      strip: 'M1',
+    },
     { name: 'hand.gesture', kind: 'generate', learnt: 'gestures g 1 c' },
   ];
   recordings = [
@@ -285,7 +290,7 @@ export class FakeDaemon {
       return { ok: true, piece: bytes.subarray(offset, offset + 32768) };
     }
     if (kind === 'use_model' && body) {
-      body.model = details.name;
+      body.model = details.name === 'none' ? '' : details.name;
       return done;
     }
     if (kind === 'model_part' && details.offset + details.bytes.length === details.total)
@@ -297,7 +302,7 @@ export class FakeDaemon {
   #keep(kind, { name, to }) {
     const model = this.models.find((one) => one.name === name);
     if (this.bodies.some((body) => body.model === name))
-      return { ok: false, error: `'walker' uses it; give 'walker' another model first` };
+      return { ok: false, error: `'walker' uses it; give 'walker' another model, or none, first` };
     if (kind === 'delete_model') this.models = this.models.filter((one) => one !== model);
     else model.name = `${to}.style`;
     return { ok: true };
@@ -328,7 +333,7 @@ export class FakeDaemon {
     else if (cancel) teaching.step = 0;
     else if (teaching.step === 3) {
       body.model = teaching.model;
-      Object.assign(teaching, { step: 5, sequence: 900, train_s: 1.5, verdict: 'closes 90 %' });
+      Object.assign(teaching, { step: 5, sequence: 900, train_s: 1.5, verdict: 'learnt 90 %' });
     } else if (teaching.step === 1 && (teaching.seconds_left -= 5) < 0) {
       const good = !teaching.style || this.stumbled === true;
       const sentence = good ? '18 strides in 20.0 s' : 'this is no walk';

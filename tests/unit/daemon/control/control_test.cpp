@@ -176,6 +176,40 @@ TEST_CASE("a model that a stream uses is neither renamed nor deleted") {
   CHECK(has(answer(request).error(), "recordings ="));
 }
 
+TEST_CASE("the only model is taken off a stream, and may then be renamed") {
+  const test::TempFolder folder;
+  REQUIRE(write_whole_file(folder.path() / "used.style", "no model"));
+  auto streams = three_streams();
+  streams[0].settings.stages.front().model_name = "used.style";
+  FakeDaemonControl daemon_control;
+  HandlerRig rig(std::move(streams), daemon_control, ModelFolder::open(folder.path()).value());
+  const auto ask = [&](const v1::ControlRequest& request) {
+    const std::string bytes = request.SerializeAsString();
+    return rig.handler.handle({"me"}, std::as_bytes(std::span(bytes)));
+  };
+  v1::ControlRequest rename;
+  rename.mutable_rename_model()->set_name("used.style");
+  rename.mutable_rename_model()->set_to("other");
+  CHECK(has(reply_of(ask(rename)).error(), "another model, or none"));
+  v1::ControlRequest none;
+  none.mutable_use_model()->set_stream("walker");
+  none.mutable_use_model()->set_name("none");
+  none.mutable_use_model()->set_stage("generate");
+  CHECK(has(reply_of(ask(none)).error(), "uses no model"));
+  none.mutable_use_model()->clear_stage();
+  REQUIRE_FALSE(ask(none));  // the pipeline answers
+  const Command command = daemon_control.sent.front();
+  CHECK(command.change.kind == pipeline::StageChange::Kind::kModel);
+  CHECK(command.model == nullptr);
+  CHECK(std::string(command.model_hash.data()).empty());
+  const auto reply = reply_of(rig.handler.acknowledge(
+      {.ticket = command.ticket, .stream = command.stream, .sequence = 12}));
+  CHECK(reply.sequence() == 12);
+  CHECK(daemon_control.changed->second.stages.front().model_name.empty());
+  CHECK(has(reply_of(ask(none)).error(), "uses no model"));
+  CHECK(reply_of(ask(rename)).ok());
+}
+
 TEST_CASE("a take is marked and answered with its number, or refused with a reason") {
   Fixture fixture;
   v1::ControlRequest request;

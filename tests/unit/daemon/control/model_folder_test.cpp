@@ -101,7 +101,7 @@ TEST_CASE("a model tells what it was learnt from; what is no model tells that") 
   model.report_json = R"({"clips":[{"subject":"ann","day":"1"},{"subject":"ann","day":"1"},7],)"
                       R"("verdict":"closes 9 %"})";
   const auto words = words_of_model(style::serialize_model(model), "style", "a.style");
-  CHECK(words.learnt == "walk -> sneak, from 2 clips of ann on day 1");
+  CHECK(words.learnt == "turns walk into sneak, from 2 clips of ann on day 1");
   CHECK(words.verdict == "closes 9 %");
   CHECK(words.skeleton.contains("joint"));
   for (const char* report : {"", "[1]", "{\"clips\":3,\"verdict\":[]}", "{"}) {

@@ -187,7 +187,7 @@ TEST_CASE("another model of a body leads back from where it is", "[body]") {
   body.frames(40);
   REQUIRE(body.play("raise-left"));
   body.frames(25);
-  body.stage().use(**bound);
+  REQUIRE(body.stage().use(bound->get()));
   body.frames(1);
   CHECK(body.stage().performs());
   body.finish();

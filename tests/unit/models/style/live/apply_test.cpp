@@ -116,6 +116,18 @@ TEST_CASE("the same walk at another rate gets the same style", "[style][apply]")
   }
 }
 
+TEST_CASE("a figure whose feet cannot stand is refused, or styled without", "[style][apply]") {
+  const clip::Clip walk = toy_walk(60);  // its legs end at the knee
+  style::ApplyOptions options;
+  options.feet = feet::RootOptions{};
+  CHECK_FALSE(style::apply_to_clip(toy_model(1), "toy.style", walk, options));
+  options.needs_feet = false;
+  const auto styled = style::apply_to_clip(toy_model(1), "toy.style", walk, options);
+  REQUIRE(styled);
+  CHECK_FALSE(styled->no_feet.empty());
+  CHECK(styled->clip.channels == applied(walk, 1.0).clip.channels);
+}
+
 TEST_CASE("a clip that cannot be styled is refused with an error message", "[style][apply]") {
   const auto refusal = [](const clip::Clip& clip, const style::StyleModel& model) {
     const auto result = style::apply_to_clip(model, "fox.style", clip, {});

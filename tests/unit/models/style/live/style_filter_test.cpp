@@ -317,6 +317,36 @@ TEST_CASE("a swap ends in the new model's own model delta", "[style]") {
   }
 }
 
+TEST_CASE("a style that is taken away fades out, and then every bit is the input's", "[style]") {
+  auto ready = bound(1);
+  const auto body = std::make_shared<const Skeleton>(toy_skeleton());
+  Frame in = toy_walk(50).frame(10);
+  style::StyleFilter filter(ready.get(), {}, body);
+  filter.settle({});
+  const auto next = [&] {
+    in.header.device_ns += kNanosPerSecond / 60;
+    return run(filter, in);
+  };
+  Frame last = in;
+  for (int i = 0; i < 60; ++i) last = next();
+  const double all_rad = largest_delta_rad(in, last);
+  REQUIRE(all_rad > 0.1);
+  REQUIRE(filter.use(nullptr));
+  ready.reset();  // nobody reads it any more
+  CHECK(filter.model() == nullptr);
+  for (int i = 1; i <= 29; ++i) {
+    const Frame out = next();
+    CHECK(largest_delta_rad(last, out) < 1.1 * all_rad / 30.0);  // alpha's slew: half a second
+    last = out;
+  }
+  CHECK(largest_delta_rad(in, last) < 0.1 * all_rad);
+  for (int i = 0; i < 3; ++i) last = next();
+  CHECK(same_pose(last, in));
+  const auto other = bound(2);
+  REQUIRE(filter.use(other.get()));
+  CHECK(largest_delta_rad(in, next()) < 0.1);  // fades in as a first one
+}
+
 TEST_CASE("a source that jumps causes no jump of the style", "[style]") {
   const auto ready = bound(1);
   const clip::Clip walk = toy_walk(300);

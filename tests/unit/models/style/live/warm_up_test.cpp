@@ -270,7 +270,7 @@ TEST_CASE("alpha acts while auto-alpha does not know how much the walker shows",
   REQUIRE(toy.filter.alpha() == 1.0F);
   toy.filter.set(test::parameter_index(style::style_type(), "auto_alpha"), 1.0);
   const auto next = warm_bound(gated_toy_model(2));
-  toy.filter.use(*next);  // forgets the estimate
+  REQUIRE(toy.filter.use(next.get()));  // forgets the estimate
   REQUIRE(std::isnan(toy.filter.reading(style::StyleFilter::kStyleEstimate)));
   toy.filter.set_alpha(0.0F);
   toy.walk(20);
@@ -288,7 +288,7 @@ TEST_CASE("a walker stays known when a model with other mean rotations is swappe
   REQUIRE(toy.warm_up(2.0));
   toy.walk(180);
   const auto before = toy.filter.walker()->neutral;
-  toy.filter.use(*second);
+  REQUIRE(toy.filter.use(second.get()));
   REQUIRE(toy.filter.walker());
   const auto& after = toy.filter.walker()->neutral;
   const auto of = [](const auto& q, std::size_t d) {
@@ -298,7 +298,7 @@ TEST_CASE("a walker stays known when a model with other mean rotations is swappe
   CHECK(angle_between_rad(turn * of(after, 6), of(before, 6)) < 1e-5);
   static_cast<void>(toy.notices());
   const auto old = warm_bound(toy_model(2));
-  toy.filter.use(*old);
+  REQUIRE(toy.filter.use(old.get()));
   toy.walk(1);
   CHECK_FALSE(toy.filter.walker());
   CHECK(toy.notices() == std::vector<std::size_t>{WalkerTracker::kNoGateData});
