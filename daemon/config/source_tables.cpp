@@ -42,7 +42,7 @@ void refuse_settings(TableReader& table) {
 }
 
 void check_name(TableReader& table, const SourceConfig& source) {
-  if (source.name.empty()) return;
+  if (!table.has_text("name")) return;
   if (!is_stream_name(source.name)) {
     table.add_error("name", "a source's name has 1 to 32 of the letters a-z, digits, '-' and '_'");
   } else if (source.all && source.name.size() > kMaxPrefixBytes) {

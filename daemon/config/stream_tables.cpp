@@ -84,7 +84,7 @@ void StreamReader::read_stream(TableReader& table) {
   const bool of_source = table.has("source") || (table.has("body") && !table.has("driver"));
   if (!of_source) table.require("driver", stream.driver);
   read_settings(table, file_, stream);
-  if (!stream.name.empty() && !is_stream_name(stream.name)) {
+  if (table.has_text("name") && !is_stream_name(stream.name)) {
     table.add_error("name", "a stream's name has 1 to 32 of the letters a-z, digits, '-' and '_'");
   }
   if (table.has("skeleton")) {

@@ -106,7 +106,8 @@ Result<KeyPair> read_secret_key(const std::filesystem::path& path) {
   }
   const File file(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   struct stat about{};
-  if (file.ok() && fstat(file.get(), &about) == 0 && (about.st_mode & 077) != 0) {
+  const bool is_file = file.ok() && fstat(file.get(), &about) == 0 && S_ISREG(about.st_mode);
+  if (is_file && (about.st_mode & 077) != 0) {
     return fail(
         "others can read this secret key; make a new one with `posed keygen`, or, if nobody"
         " did, run: chmod 600 " +

@@ -127,11 +127,12 @@ int ask_and_print(const CtlOptions& options, const v1::ControlRequest& request, 
 int show_change(const CtlOptions& options, const Result<v1::ControlReply>& reply,
                 const std::string& what) {
   return show(options, reply, [&](const v1::ControlReply& accepted) {
+    const std::string stream = clean_name(accepted.stream());
     if (accepted.sequence() == 0) {
-      std::printf("%s: in effect when it comes: %s\n", accepted.stream().c_str(), what.c_str());
+      std::printf("%s: in effect when it comes: %s\n", stream.c_str(), what.c_str());
       return;
     }
-    std::printf("%s: in effect from frame %llu: %s\n", accepted.stream().c_str(),
+    std::printf("%s: in effect from frame %llu: %s\n", stream.c_str(),
                 static_cast<unsigned long long>(accepted.sequence()), what.c_str());
   });
 }
@@ -202,7 +203,7 @@ int list_models(const CtlOptions& options) {
           " none is named");
     }
     for (const v1::KnownModel& model : reply.model()) {
-      std::printf("%-10s %s\n", model.kind().c_str(), clean(model.name()).c_str());
+      std::printf("%-10s %s\n", clean(model.kind()).c_str(), clean(model.name()).c_str());
       for (const std::string& words : {model.learnt(), model.verdict()}) {
         if (!words.empty()) std::printf("           %s\n", clean(words).c_str());
       }

@@ -55,7 +55,7 @@ TabSession::TabSession(beast::tcp_stream stream, WebRoom& room)
 }
 
 TabSession::~TabSession() {
-  if (open_) room_.hub.leave(tab_);
+  room_.hub.leave(tab_);
   room_.tabs.erase(place_);
 }
 
@@ -79,7 +79,7 @@ void TabSession::read() {
   socket_.async_read(
       buffer_, [self = shared_from_this()](const beast::error_code& error, std::size_t) {
         self->reading_ = false;
-        if (error) return self->close();
+        if (error || !self->open_) return self->close();
         const auto data = self->buffer_.cdata();
         const std::string_view bytes(static_cast<const char*>(data.data()), data.size());
         self->room_.hub.handle(self->tab_, bytes, self->socket_.got_text(), system::monotonic_ns());

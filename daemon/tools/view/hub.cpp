@@ -202,6 +202,7 @@ void Hub::leave(Tab& tab) {
 }
 
 void Hub::handle(Tab& tab, std::string_view bytes, bool text, std::int64_t now_ns) {
+  if (!tabs_.contains(&tab)) return;
   if (text) {
     const PageWord word = read_word(bytes);
     if (std::holds_alternative<ReadyWord>(word)) tab.outbox.ready();

@@ -133,7 +133,8 @@ class Hub {
   void leave(Tab& tab);
   [[nodiscard]] std::size_t tabs() const noexcept { return tabs_.size(); }
 
-  // A message of the page; `text`: not binary.
+  // A message of the page; `text`: not binary. That of a tab that has left changes nothing: its
+  // connection may have read it before it ended.
   void handle(Tab& tab, std::string_view bytes, bool text, std::int64_t now_ns);
 
   // A message of the daemon's publish socket. Call flush() after the last one that waited.

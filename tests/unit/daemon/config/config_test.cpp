@@ -325,6 +325,7 @@ TEST_CASE("streams: names, drivers and their tables") {
                   " name") != std::string::npos);
   CHECK(complaint("", one(std::string(30, 'a'), "publish_raw = true\n")).find("longer than 32") !=
         std::string::npos);
+  CHECK(complaint("", "[[stream]]\nname = \"\"\ndriver = \"glove\"\n").contains("1 to 32"));
   CHECK(complaint("", "[[stream]]\ndriver = \"glove\"\n").find("stream.name is missing") !=
         std::string::npos);
   CHECK(complaint("", "[[stream]]\nname=\"a\"\ndriver = \"fil\"\n[stream.file]\npath = \"x\"\n")

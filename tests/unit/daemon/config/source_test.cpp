@@ -188,6 +188,7 @@ TEST_CASE("a source: its name, driver, rate and streams are checked") {
         "1: source.driver is missing; give it a text in quotes");
   CHECK(source_complaint(named("Opti", all)) ==
         "2: a source's name has 1 to 32 of the letters a-z, digits, '-' and '_'");
+  CHECK(source_complaint(named("", all)).starts_with("2: a source's name has 1 to 32"));
   CHECK(source_complaint(named(std::string(21, 'a'), all)) ==
         "2: with streams = \"all\" a source's name has at most 20 letters, because the names of its"
         " streams begin with it");

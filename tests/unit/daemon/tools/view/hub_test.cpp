@@ -383,6 +383,25 @@ TEST_CASE("a tab that leaves gets nothing more, and its replies are dropped") {
   CHECK(rig.hub.tabs() == 0);
 }
 
+TEST_CASE("a tab that has left is not heard any more") {
+  HubRig rig;
+  {
+    Tab tab;
+    rig.join(tab);
+    rig.joined.clear();
+    rig.hub.leave(tab);
+    rig.send(tab, 1, set_alpha());
+    rig.send(tab, 2, model_piece(0));
+    CHECK(tab.under_way == 0);
+  }
+  CHECK(rig.asked.empty());
+  rig.hub.replied(1, "for nobody");
+  Tab other;
+  rig.join(other);
+  rig.send(other, 1, model_piece(0));
+  CHECK(rig.asked.size() == 1);
+}
+
 TEST_CASE("a body that comes back after seconds has its skeleton sent again") {
   HubRig rig;
   Tab tab;
