@@ -13,9 +13,10 @@ namespace {
 
 constexpr double kFirstGuess_rad = 1.0 * kDegree;  // used until there are enough values
 constexpr double kMinNoise_rad = 0.02 * kDegree;
-constexpr double kMinBin_rad = 1e-6;  // the first bin's lower edge
-constexpr double kEnough = 40.0;      // values needed before the median is used
-constexpr double kMemory = 12000.0;   // values; when reached, all counts are halved
+constexpr double kMinBin_rad = 1e-6;   // the first bin's lower edge
+constexpr double kLastBin_rad = 16.0;  // and the last one's: larger sizes count there
+constexpr double kEnough = 40.0;       // values needed before the median is used
+constexpr double kMemory = 12000.0;    // values; when reached, all counts are halved
 constexpr double kLowSide = 0.97;
 // The median of |third difference| of white noise is 0.6745 standard deviations, and that standard
 // deviation is sqrt(20) times the noise.
@@ -29,6 +30,7 @@ constexpr double kLowOverMedian = 0.57127;  // of the sizes of normal values
 constexpr double kOwnFew = 100.0;           // values that count as much as the common noise
 constexpr double kOwnStep = 0.01;           // least step of a level, of itself
 constexpr double kMaxOctaves = 6.0;
+constexpr double kFastMotion = 0.7;  // tenth differences over third ones, as of white noise
 constexpr double kTenthOverThird = 96.1134434;  // sqrt(184756 / 20), of white noise
 constexpr long kSamplesALook = 8;               // samples between two looks at a channel
 
@@ -57,7 +59,7 @@ constexpr double kTurnForget = 0.05;       // of a change
 constexpr double kFirstTurns = 0.1;        // share of such changes that is assumed at first
 constexpr double kFewTurns = 0.15;         // share that motions have
 constexpr double kLeastRounded = 1.25;     // times kRounding: the noise of rounded values
-constexpr double kMoreThanRounding = 1.6;  // times kRounding: that of more than rounding
+constexpr double kMoreThanRounding = 2.2;  // times kRounding: that of more than rounding
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
 // Repeated samples.
@@ -322,11 +324,12 @@ RT_SAFE void NoiseEstimate::push(std::span<const double> measured_rad, bool even
     past[0] = now;
   }
   if (third_.total() >= kEnough) {
-    double size_rad = third_.median_rad();
-    if (tenth_.total() >= kEnough) {
-      size_rad = std::min(size_rad, tenth_.median_rad() / kTenthOverThird);
-    }
-    const double white_rad = kToNoise * size_rad;
+    const double third_rad = third_.median_rad();
+    const double tenth_rad = tenth_.median_rad();
+    const double far_rad = tenth_rad / kTenthOverThird;
+    const bool fast =
+        tenth_.total() >= kEnough && tenth_rad < kLastBin_rad && far_rad < kFastMotion * third_rad;
+    const double white_rad = kToNoise * (fast ? far_rad : third_rad);
     const bool random = white_rad > kOverRounding * std::ranges::max(rounding_rad_);
     const double r = random && tenth_.total() >= kFewWhite ? correlation() : kMaxCorrelation;
     jitter_rad_ = std::max(kMinNoise_rad, white_rad);
