@@ -16,7 +16,7 @@ constexpr double kMostly = 0.7;  // shapes that touch more often cannot be kept 
 constexpr double kOften = 0.1;   // capsules that touch so often may be too thick
 constexpr int kLess = 4;         // hulls take over where they touch this many times less often
 constexpr double kRounding_m = 1e-9;
-constexpr double kFar_m = 1e3;     // also for what is no number: whatever was known is void
+constexpr double kLost_m = 1e3;    // also for what is no number: whatever was known is void
 constexpr double kSlack_m = 6e-3;  // capsules this much beyond the nearest are kept
 constexpr std::size_t kMaxHullPairs = 4096;  // half a second's work when a robot is loaded
 constexpr double kOpen_m = 1e-3;             // shapes nearer than this when open are made to touch
@@ -362,7 +362,7 @@ RT_SAFE Nearest nearest_hulls(const RobotHand& hand, Placed& placed, std::size_t
   Placed::ByHulls& by = placed.by_hulls[p];
   const CoverPose now = seen(placed, pair.a, pair.b);
   const double way_m = most_way_m(hand.covers[pair.b], by.seen, now);
-  by.way_m += way_m < kFar_m ? way_m : kFar_m;
+  by.way_m += way_m < kLost_m ? way_m : kLost_m;
   by.seen = now;
   Nearest best{.gap_m = near_m};
   const auto look = [&](int k) {

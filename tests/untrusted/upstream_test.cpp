@@ -9,6 +9,8 @@
 
 #include <catch2/catch.hpp>
 
+#include "posed/v1/control.pb.h"
+#include "proto/zmq/zmq_handle.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/raw_listener.hpp"
 #include "tests/support/temp_folder.hpp"
@@ -113,6 +115,84 @@ TEST_CASE("whoever has the daemon's port cannot fill the memory of those that co
       CHECK(most_MB < kAtStart_MB + kMaxGrowth_MB);
       WARN(command << ", " << what << ": at most " << most_MB << " MB, " << flood.connections
                    << " connections");
+    }
+  }
+}
+
+// Answers each request with this reply.
+class Answerer {
+ public:
+  explicit Answerer(const v1::ControlReply& reply)
+      : reply_(reply.SerializeAsString()),
+        context_(*net::open_context()),
+        socket_(*net::open_socket(context_.get(), ZMQ_ROUTER)),
+        endpoint_(*net::bind_socket(socket_.get(), "tcp://127.0.0.1:*")),
+        thread_([this] { run(); }) {}
+  ~Answerer() {
+    stop_ = true;
+    thread_.join();
+  }
+  Answerer(const Answerer&) = delete;
+  Answerer& operator=(const Answerer&) = delete;
+  [[nodiscard]] const std::string& endpoint() const { return endpoint_; }
+
+ private:
+  void run() {
+    std::vector<std::string> parts;
+    while (!stop_) {
+      net::Message part;
+      if (!part.receive(socket_.get())) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        continue;
+      }
+      parts.emplace_back(part.text());
+      if (part.more()) continue;
+      parts.back() = reply_;
+      for (const std::string& one : parts) {
+        static_cast<void>(net::send_part(socket_.get(), one, &one != &parts.back()));
+      }
+      parts.clear();
+    }
+  }
+
+  std::string reply_;
+  net::Context context_;
+  net::Socket socket_;
+  std::string endpoint_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+TEST_CASE("what a daemon answers cannot command the terminal of ctl") {
+  const std::string hostile = "a\x1b[2J\r\x07\u202e\u009b";
+  v1::ControlReply reply;
+  reply.set_stream(hostile);
+  reply.set_sequence(1);
+  reply.mutable_take()->set_name(hostile);
+  v1::KnownModel& model = *reply.add_model();
+  for (std::string* text : {model.mutable_name(), model.mutable_kind(), model.mutable_learnt(),
+                            model.mutable_verdict()}) {
+    *text = hostile;
+  }
+  v1::KnownRecording& recording = *reply.add_recording();
+  recording.set_name(hostile);
+  recording.set_problem(hostile);
+  const Answerer daemon(reply);
+  const std::vector<std::vector<std::string>> commands{
+      {"models"},           {"recordings"},    {"set", "a", "alpha", "1"},
+      {"warm-up", "a"},     {"engage", "a"},   {"use-model", "a", "m.style"},
+      {"play", "a", "g"},   {"take", "start"}, {"rename-model", "a.style", "b"},
+      {"stop-playing", "a"}};
+  for (const auto& command : commands) {
+    INFO(command.front());
+    std::vector<std::string> words{"ctl", "--connect", daemon.endpoint()};
+    words.insert(words.end(), command.begin(), command.end());
+    Process ctl(words);
+    const std::string printed = ctl.rest() + ctl.errors();
+    CHECK(ctl.exit_code() == 0);
+    CHECK_FALSE(printed.empty());
+    for (const std::string code : {"\x1b", "\r", "\x07", "\u202e", "\u009b"}) {
+      CHECK_FALSE(printed.contains(code));
     }
   }
 }
