@@ -148,7 +148,7 @@ void set_range(const std::vector<Recording>& recordings, GestureModel& model) {
 }
 
 constexpr double kSlack_rad = 4.0 * kDegree;  // in every angle, beside the spread over people
-constexpr double kKept = 0.975;               // of the poses of people who are left out
+constexpr double kKept = 0.98;                // of the poses of people who are left out
 // Takes of one person are more alike than people are: the limit is so many times as far.
 constexpr double kWidened = 6.0;
 constexpr double kMinLimit = 1e-3;  // of a limit, for each channel

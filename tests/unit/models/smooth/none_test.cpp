@@ -90,7 +90,7 @@ TEST_CASE("strangers' gestures are named, and what is none of them is none", "[l
     follow(people[person], static_cast<std::uint32_t>(person + 1), *model, told);
   }
   print("18 people taught, 2 strangers", told);
-  for (const char* const name : {"match", "well"}) CHECK(told[name].none >= 85.0);
+  for (const char* const name : {"match", "well"}) CHECK(told[name].none >= 80.0);
   for (const std::string& name : kTaught) CHECK(told[name].right >= 90.0);
 }
 
