@@ -396,7 +396,7 @@ void OutputReader::refuse_keys(TableReader& table, OutputKind kind) {
 
 void OutputReader::name_it(TableReader& table, OutputConfig& output) {
   table.read("name", output.name);
-  if (table.has_text("name") && !is_stream_name(output.name)) {
+  if (!output.name.empty() && !is_stream_name(output.name)) {
     return table.add_error("name",
                            "an output's name has 1 to 32 of the letters a-z, digits, '-' and '_'");
   }

@@ -518,6 +518,10 @@ Result<RequestHandler::Done> RequestHandler::take_model_away(const v1::ControlRe
                      fail("the stages " + names + " use models: say of which stage").error());
   }
   const StageType& type = *stages[users.front()].type;
+  if (type.check != nullptr) {
+    const auto fault = type.check(stages[users.front()].parameters, false);
+    if (fault) return in_stream(stream.name, fail(fault->sentence).error());
+  }
   return send(stream, {.change = {.kind = StageChange::Kind::kModel, .type = &type}},
               {.requester = requester,
                .stage = users.front(),
@@ -606,13 +610,14 @@ void RequestHandler::apply(ControlledStream& stream, UnderWay& done) {
   if (done.model) {
     settings[done.stage].model_name = done.model->name;
     settings[done.stage].model_words = done.model->words;
-    devices::forget_texts(*done.model, settings[done.stage]);
+    devices::forget_texts(done.model.get(), settings[done.stage]);
     stream.models[done.stage] = std::move(done.model);  // frees the model that it replaces
     daemon_control_.stages_changed(stream.stream, stream.settings);
   }
   if (done.no_model) {
     settings[done.stage].model_name.clear();
     settings[done.stage].model_words.clear();
+    devices::forget_texts(nullptr, settings[done.stage]);
     stream.models[done.stage].reset();
     daemon_control_.stages_changed(stream.stream, stream.settings);
   }

@@ -56,6 +56,7 @@ void KeptSettings::apply(const std::string& stream, LoadedStages& stages) const 
     stages.model_files[i] = none ? nullptr : stage->second.model;
     stages.with_set_model.insert(settings.type);
     settings.model_name = stage->second.model_name;
+    if (none) forget_texts(nullptr, settings);
   }
 }
 

@@ -98,12 +98,12 @@ pipeline::StreamSettings possible_settings(const config::StreamConfig& config) {
   return settings;
 }
 
-void forget_texts(const StageModel& model, pipeline::StageSettings& settings) {
+void forget_texts(const StageModel* model, pipeline::StageSettings& settings) {
   for (const StageCommandType& command : settings.type->commands) {
     if (!is_live_text(*settings.type, command.name)) continue;
     auto& text = settings.parameters.at(std::string(command.name));
     const std::vector<std::string> words{std::get<std::string>(text)};
-    if (!command.encode(&model, words, {})) text = std::string();
+    if (!command.encode(model, words, {})) text = std::string();
   }
 }
 
@@ -141,7 +141,7 @@ Result<BoundStages> bind_stages(LoadedStages& stages, ModelFiles& files) {
       const auto context = TRY(pipeline::stage_context(stages.settings, i, stages.skeleton));
       model = TRY(files.bind(*stage.type, stages.model_files[i], context, stage.model_name));
       stage.model_words = model->words;
-      if (stages.with_set_model.contains(stage.type)) forget_texts(*model, stage);
+      if (stages.with_set_model.contains(stage.type)) forget_texts(model.get(), stage);
     }
     if (stage.type->first_command == nullptr) continue;
     const auto first = TRY(stage.type->first_command(stage.parameters, model.get(), file));

@@ -43,8 +43,8 @@ Result<LoadedStages> load_stages(const config::StreamConfig& config,
 // some skeletons have are among them.
 [[nodiscard]] pipeline::StreamSettings possible_settings(const config::StreamConfig& config);
 
-// Live texts that the model does not take get their defaults.
-void forget_texts(const StageModel& model, pipeline::StageSettings& settings);
+// Live texts that the model does not take get their defaults; null: those that need a model.
+void forget_texts(const StageModel* model, pipeline::StageSettings& settings);
 
 // The streams that the stages of the config name as partners.
 [[nodiscard]] std::set<std::string> partners_of(const config::StreamConfig& config);

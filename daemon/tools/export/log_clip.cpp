@@ -254,48 +254,33 @@ std::map<std::uint32_t, std::string> clip_names(const replay::Replay& replay) {
   return names;
 }
 
-// Collects one take after the other.
+// Collects the frames of one take.
 class TakeCollector {
  public:
-  TakeCollector(const replay::Replay& replay, std::vector<log::TakeRow> takes, std::string file,
-                const EachTakeClip& each)
-      : replay_(replay),
-        takes_(std::move(takes)),
-        file_(std::move(file)),
-        each_(each),
-        names_(clip_names(replay)) {}
+  TakeCollector(const replay::Replay& replay, log::TakeRow take)
+      : replay_(replay), take_(std::move(take)), names_(clip_names(replay)) {}
 
   void add(const pipeline::Item& item) {
-    while (next_ < takes_.size() && replay_.position() > takes_[next_].last_item) end_take();
+    if (item.kind != pipeline::Item::Kind::kFrame || !holds(take_, replay_.position())) return;
     const auto name = names_.find(item.frame.header.stream);
-    if (item.kind != pipeline::Item::Kind::kFrame || name == names_.end()) return;
-    if (next_ == takes_.size() || !holds(takes_[next_], replay_.position())) return;
+    if (name == names_.end()) return;
     collectors_.try_emplace(name->second, replay_.stream(name->first).published)
         .first->second.add(item.frame);
     rate_hz_[name->second] = replay_.stream(name->first).description.rate_hz;
   }
-  void finish() {
-    while (next_ < takes_.size()) end_take();
+  void finish(const std::string& file, const EachClip& each) const {
+    for (const auto& [name, collector] : collectors_) {
+      if (collector.frames() < 2) continue;  // no clip
+      each(name, collector.finish(file, rate_hz_.at(name)));
+    }
   }
 
  private:
-  void end_take() {
-    for (const auto& [name, collector] : collectors_) {
-      if (collector.frames() < 2) continue;  // no clip
-      each_(takes_[next_], name, collector.finish(file_, rate_hz_[name]));
-    }
-    collectors_.clear();
-    ++next_;
-  }
-
   const replay::Replay& replay_;
-  std::vector<log::TakeRow> takes_;  // in their order; they do not overlap
-  std::string file_;
-  const EachTakeClip& each_;
+  log::TakeRow take_;
   std::map<std::uint32_t, std::string> names_;  // of the clips, by stream
   std::map<std::string, FrameCollector> collectors_;
   std::map<std::string, double> rate_hz_;  // as collectors_
-  std::size_t next_ = 0;                   // the take that is collected
 };
 
 }  // namespace
@@ -353,23 +338,27 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
   return clip;
 }
 
-Result<> each_take_clip(const std::filesystem::path& path, const std::set<std::int64_t>& wanted,
-                        const EachTakeClip& each, const std::function<bool()>& goes_on) {
+Result<> each_clip_of_take(const std::filesystem::path& path, const log::TakeRow& take,
+                           const EachClip& each, const std::function<bool()>& goes_on) {
   auto reader = TRY(log::Reader::open(path));
-  auto takes = TRY(reader.takes());
-  std::erase_if(takes, [&](const log::TakeRow& take) { return !wanted.contains(take.id); });
-  if (takes.empty()) return {};
-  const std::uint64_t last_item = takes.back().last_item;
+  const auto rows = TRY(reader.takes());
+  const auto row = std::ranges::find(rows, take.id, &log::TakeRow::id);
+  const bool is_there =
+      row != rows.end() && (take.last_item == log::kToTheEnd || row->last_item == take.last_item);
+  if (!is_there) {
+    return fail("the log does not have the end of take " + std::to_string(take.id) + " yet",
+                path.string());
+  }
   auto opened = TRY(replay::Replay::open(reader));
-  TakeCollector collector(*opened, std::move(takes), path.string(), each);
+  TakeCollector collector(*opened, *row);
   bool stopped = false;
   TRY(opened->run([&](const pipeline::Item& item) { collector.add(item); },
                   [&](const log::ChunkRow&) {
                     stopped = stopped || !goes_on();
-                    return !stopped && opened->position() <= last_item;
+                    return !stopped && opened->position() <= row->last_item;
                   }));
   if (stopped) return fail("interrupted: the log is complete, but not all of its takes are clips");
-  collector.finish();
+  collector.finish(path.string(), each);
   return {};
 }
 

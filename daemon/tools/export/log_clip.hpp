@@ -60,15 +60,13 @@ Result<clip::Clip> clip_of_log(const std::filesystem::path& path, const std::str
 Result<> check_log_options(const std::string& in, bool part_given, const clip::ReadOptions& read);
 
 // `stream`: its name, with "#2" behind it for a part with a skeleton of its own.
-using EachTakeClip =
-    std::function<void(const log::TakeRow& take, const std::string& stream, Result<clip::Clip>)>;
+using EachClip = std::function<void(const std::string& stream, Result<clip::Clip>)>;
 
-// Calls `each` with the clip of each stream of these takes, in the order of the takes; one replay
-// of the log up to the last one's end makes them all, with the frames of one take in memory.
-// Streams with fewer than two frames in a take are left out. Ends with an error when `goes_on` says
-// no.
-Result<> each_take_clip(const std::filesystem::path& path, const std::set<std::int64_t>& takes,
-                        const EachTakeClip& each, const std::function<bool()>& goes_on);
+// Calls `each` with the clip of each stream of the take; one replay of the log up to the take's end
+// makes them all, with its frames in memory. Streams with fewer than two frames in it are left out.
+// Fails while the log does not have the take's end, and when `goes_on` says no.
+Result<> each_clip_of_take(const std::filesystem::path& path, const log::TakeRow& take,
+                           const EachClip& each, const std::function<bool()>& goes_on);
 
 // Collects the frames of a stream's parts as they were published, each once.
 class FrameCollector {

@@ -237,6 +237,37 @@ Result<LogName> new_log(const std::filesystem::path& folder) {
   }
 }
 
+// What the daemon calls while it records. All arguments outlive it; `clips` may be null.
+assembly::DaemonHooks hooks_of(record::Recorder& recorder, TakeClips* clips,
+                               std::set<std::uint32_t>& sources_with_body) {
+  assembly::DaemonHooks hooks;
+  hooks.record_sink = &recorder.record_sink();
+  hooks.record_stream = [&recorder, clips, &sources_with_body](const devices::NewStream& stream) {
+    sources_with_body.insert(stream.source.number);
+    if (clips != nullptr) {
+      clips->stream_comes(stream.id, {.name = stream.config.name,
+                                      .skeleton = stream.stages.published,
+                                      .rate_hz = stream.stages.settings.rate_hz});
+    }
+    recorder.add_stream(record::recorded_stream(stream));
+  };
+  hooks.more_stats = [&recorder](v1::Stats& stats) {
+    stats.set_recorder_lost_chunks(recorder.lost_chunks());
+    stats.set_recorder_errors(recorder.errors());
+    stats.set_recorder_file(clean(recorder.file().string()));
+    stats.set_recorder_trouble(clean(recorder.trouble()));
+    if (const auto take = recorder.running_take()) {
+      *stats.mutable_take() = pipeline::stats_of(*take);
+    }
+  };
+  hooks.recorder_figures = [&recorder] { return figures_of(recorder); };
+  hooks.frame_tap = clips;
+  if (clips != nullptr) {
+    hooks.add_clips = [clips](v1::ControlReply& reply) { clips->add_to(reply); };
+  }
+  return hooks;
+}
+
 }  // namespace
 
 Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig& config) {
@@ -267,32 +298,7 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
   std::set<std::uint32_t> with_body;  // sources, by number
   auto recorder = TRY(record::Recorder::open(
       std::move(recorder_options), record::recorded_setup(daemon.sources(), daemon.slots())));
-  assembly::DaemonHooks hooks;
-  hooks.record_sink = &recorder->record_sink();
-  hooks.record_stream = [&recorder, &with_body, &clips](const devices::NewStream& stream) {
-    with_body.insert(stream.source.number);
-    if (clips) {
-      clips->stream_comes({.id = stream.id,
-                           .name = stream.config.name,
-                           .skeleton = stream.stages.published,
-                           .rate_hz = stream.rate_hz});
-    }
-    recorder->add_stream(record::recorded_stream(stream));
-  };
-  hooks.more_stats = [&recorder](v1::Stats& stats) {
-    stats.set_recorder_lost_chunks(recorder->lost_chunks());
-    stats.set_recorder_errors(recorder->errors());
-    stats.set_recorder_file(clean(recorder->file().string()));
-    stats.set_recorder_trouble(clean(recorder->trouble()));
-    if (const auto take = recorder->running_take()) {
-      *stats.mutable_take() = pipeline::stats_of(*take);
-    }
-  };
-  if (clips) {
-    hooks.frame_tap = clips.get();
-    hooks.add_clips = [&clips](v1::ControlReply& reply) { clips->add_to(reply); };
-  }
-  hooks.recorder_figures = [&recorder] { return figures_of(*recorder); };
+  assembly::DaemonHooks hooks = hooks_of(*recorder, clips.get(), with_body);
   if (auto done = daemon.start(std::move(hooks)); !done) {
     daemon.stop();
     // The error is what failed at the start, not what follows from it.
@@ -316,8 +322,8 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
     if (!with_body.contains(source->number)) warn_of_no_body(source->config.name);
   }
   print_result(plan, daemon, *recorder, took_s);
-  if (finished && clips) return clips->finish();
-  return finished;
+  const Result<> made = clips ? clips->finish() : Result<>();
+  return finished ? made : finished;
 }
 
 }  // namespace posed::tools

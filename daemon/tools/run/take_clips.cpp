@@ -76,10 +76,11 @@ TakeClips::TakeClips(std::filesystem::path log)
       keeper_([this](const std::stop_token& stop) { keep_on(stop); }),
       writer_([this](const std::stop_token& stop) { write_on(stop); }) {}
 
-void TakeClips::stream_comes(Stream stream) {
+void TakeClips::stream_comes(std::uint32_t id, Stream stream) {
   if (stream.skeleton == nullptr) return;
   const std::scoped_lock lock(mutex_);
-  streams_.push_back(std::move(stream));
+  by_name_[stream.name].push_back(id);
+  streams_.insert_or_assign(id, std::move(stream));
 }
 
 void TakeClips::take_changed(const log::TakeRow& take) {
@@ -159,20 +160,21 @@ void TakeClips::assign(const Moment& moment) {
 void TakeClips::add(Kept& take, const Moment& moment) {
   const std::uint32_t id = moment.frame.header.stream;
   const std::scoped_lock lock(mutex_);
-  const auto stream = std::ranges::find(streams_, id, &Stream::id);
-  if (stream == streams_.end()) return;
+  const auto known = streams_.find(id);
+  if (known == streams_.end()) return;
+  const Stream& stream = known->second;
   auto name = take.names.find(id);
-  if (name == take.names.end()) name = take.names.emplace(id, clip_name(*stream)).first;
+  if (name == take.names.end()) name = take.names.emplace(id, clip_name(id)).first;
   auto part = take.parts.find(name->second);
   if (part == take.parts.end()) {
     part = take.parts
-               .emplace(name->second, Part{.frames = FrameCollector(stream->skeleton),
-                                           .rate_hz = stream->rate_hz})
+               .emplace(name->second,
+                        Part{.frames = FrameCollector(stream.skeleton), .rate_hz = stream.rate_hz})
                .first;
   }
   part->second.frames.add(moment.frame);
-  const std::size_t bytes = bytes_of_frame(*stream->skeleton);
-  take.bytes += bytes;
+  const std::size_t bytes = bytes_of_frame(*stream.skeleton);
+  part->second.bytes += bytes;
   if (kept_.fetch_add(bytes) + bytes <= kMaxKept) return;
   spdlog::info("take {} is too long for memory: its clips come later, from the log", take.row.id);
   give_up(take);
@@ -180,8 +182,8 @@ void TakeClips::add(Kept& take, const Moment& moment) {
 
 void TakeClips::give_up(Kept& take) {
   take.whole = false;
+  for (const auto& [name, part] : take.parts) kept_ -= part.bytes;
   take.parts.clear();
-  kept_ -= std::exchange(take.bytes, 0);
 }
 
 void TakeClips::close_first() {
@@ -190,17 +192,17 @@ void TakeClips::close_first() {
   if (lost_item_.load(std::memory_order_relaxed) >= take.row.first_item) give_up(take);
   const std::scoped_lock lock(mutex_);
   std::set<std::string> names;
-  for (const Stream& stream : streams_) {
-    const auto named = take.names.find(stream.id);
-    const std::string name = clip_name(stream);
-    if (named != take.names.end() && named->second != name) give_up(take);
-    if (named != take.names.end() || !take.whole) names.insert(name);
+  for (const auto& [id, before] : take.names) {
+    const std::string name = clip_name(id);
+    if (before != name) give_up(take);
+    names.insert(name);
   }
-  std::erase_if(take.parts, [](const auto& part) { return part.second.frames.frames() < 2; });
   for (const std::string& name : names) {
-    if (take.whole && !take.parts.contains(name)) continue;
-    missing_.push_back(
-        {.take = take.row.id, .file = path_of(take.row, name).filename().string(), .problem = {}});
+    const auto part = take.parts.find(name);
+    if (take.whole && (part == take.parts.end() || part->second.frames.frames() < 2)) continue;
+    missing_.push_back({.take = take.row.id,
+                        .file = clean(path_of(take.row, name).filename().string()),
+                        .problem = {}});
     if (missing_.size() > kMaxMissing) missing_.pop_front();
   }
   closed_.push_back(std::move(take));
@@ -208,16 +210,14 @@ void TakeClips::close_first() {
 }
 
 // As in a replay of the log: parts of a stream with skeletons of their own are clips of their own.
-std::string TakeClips::clip_name(const Stream& stream) const {
-  std::size_t number = 0, parts = 0;
-  bool one = true;
-  for (const Stream& other : streams_) {
-    if (other.name != stream.name) continue;
-    ++parts;
-    if (other.id == stream.id) number = parts;
-    one = one && other.skeleton->id == stream.skeleton->id;
-  }
-  return one ? stream.name : stream.name + "#" + std::to_string(number);
+std::string TakeClips::clip_name(std::uint32_t stream) const {
+  const Stream& own = streams_.at(stream);
+  const std::vector<std::uint32_t>& parts = by_name_.at(own.name);
+  const bool one = std::ranges::all_of(parts, [&](std::uint32_t other) {
+    return streams_.at(other).skeleton->id == own.skeleton->id;
+  });
+  const auto number = std::ranges::find(parts, stream) - parts.begin() + 1;
+  return one ? own.name : own.name + "#" + std::to_string(number);
 }
 
 std::filesystem::path TakeClips::path_of(const log::TakeRow& take,
@@ -236,15 +236,11 @@ void TakeClips::write_on(const std::stop_token& stop) {
     Kept take = std::move(closed_.front());
     closed_.pop_front();
     lock.unlock();
-    auto done = write(take, goes_on);
+    const auto done = write(take, goes_on);
     if (done) continue;
     if (goes_on()) {
       spdlog::warn("clips of take {} are written when posed ends: {}", take.row.id,
                    done.error().text());
-      const std::scoped_lock again(mutex_);
-      for (Missing& clip : missing_) {
-        if (clip.take == take.row.id) clip.problem = "made when posed ends: " + done.error().text();
-      }
     }
     later_.push_back(std::move(take));
   }
@@ -253,27 +249,29 @@ void TakeClips::write_on(const std::stop_token& stop) {
 // A clip that cannot be written is a warning; the log is not changed.
 Result<> TakeClips::write(Kept& take, const std::function<bool()>& goes_on) {
   if (!take.whole) {
-    const auto each = [&](const log::TakeRow&, const std::string& stream, Result<clip::Clip> clip) {
+    const auto each = [&](const std::string& stream, Result<clip::Clip> clip) {
       write_clip(take, stream, std::move(clip));
     };
-    TRY(each_take_clip(log_, {take.row.id}, each, goes_on));
+    TRY(each_clip_of_take(log_, take.row, each, goes_on));
     not_missing(take.row.id);
     return {};
   }
   while (!take.parts.empty()) {
     if (!goes_on()) return std::unexpected(interrupted());
     const auto& [stream, part] = *take.parts.begin();
-    write_clip(take, stream, part.frames.finish(log_.string(), part.rate_hz));
+    if (part.frames.frames() >= 2) {
+      write_clip(take, stream, part.frames.finish(log_.string(), part.rate_hz));
+    }
+    kept_ -= part.bytes;
     take.parts.erase(take.parts.begin());
   }
-  kept_ -= std::exchange(take.bytes, 0);
   return {};
 }
 
 void TakeClips::write_clip(const Kept& take, const std::string& stream, Result<clip::Clip> clip) {
   if (!written_.emplace(take.row.id, stream).second) return;
   const std::filesystem::path path = path_of(take.row, stream);
-  const std::string file = path.filename().string();
+  const std::string file = clean(path.filename().string());
   if (const auto written = write_bvh_of(std::move(clip), path); !written) {
     const std::string why = written.error().text();
     spdlog::warn("take {} of stream {} is no clip: {}", take.row.id, stream, why);
@@ -304,12 +302,15 @@ void TakeClips::stop() {
 Result<> TakeClips::finish() {
   keep(true);
   std::ranges::move(closed_, std::back_inserter(later_));
+  // Those that need no log come first: what is wrong with the log costs them nothing.
+  std::ranges::stable_partition(later_, &Kept::whole);
+  Result<> done;
   for (Kept& take : later_) {
     const auto goes_on = [] { return !end_signal_came(); };
     if (!goes_on()) return std::unexpected(interrupted());
-    TRY(write(take, goes_on));
+    if (auto written = write(take, goes_on); !written && done) done = std::move(written);
   }
-  return {};
+  return done;
 }
 
 }  // namespace posed::tools

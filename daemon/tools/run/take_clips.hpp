@@ -41,13 +41,12 @@ class TakeClips final : public pipeline::FrameTap {
   ~TakeClips() override = default;
 
   struct Stream {
-    std::uint32_t id = 0;
     std::string name{};
     std::shared_ptr<const Skeleton> skeleton{};  // of its finished frames; null: it has no pose
-    double rate_hz = 0.0;
+    double rate_hz = 0.0;                        // as the log has it; 0: not known
   };
   // A stream comes, before its first frame. Any thread.
-  void stream_comes(Stream stream);
+  void stream_comes(std::uint32_t id, Stream stream);
   // A take has begun or ended: its row as the log gets it. Any thread; returns at once.
   void take_changed(const log::TakeRow& take);
   // Adds the clips that are being made, or could not be. Any thread.
@@ -58,8 +57,8 @@ class TakeClips final : public pipeline::FrameTap {
   // becomes a single file, because that needs it alone.
   void stop();
   // After stop(), when the log is complete: writes those that are not written yet, also of a take
-  // that was never ended. Call once. An end signal that comes meanwhile ends the work with an
-  // error: block end_signals() before.
+  // that was never ended. Call once. Returns the first error, after which it goes on; an end signal
+  // that comes meanwhile ends the work with an error: block end_signals() before.
   Result<> finish();
 
  private:
@@ -79,12 +78,12 @@ class TakeClips final : public pipeline::FrameTap {
   struct Part {
     FrameCollector frames;
     double rate_hz = 0.0;
+    std::size_t bytes = 0;  // of its frames
   };
   struct Kept {
     log::TakeRow row{};
     Clock::time_point ended{};                     // when its end became known
     bool whole = true;                             // every frame is here
-    std::size_t bytes = 0;                         // of the frames
     std::map<std::string, Part> parts{};           // by the clip's stream
     std::map<std::uint32_t, std::string> names{};  // of the clips, by stream
   };
@@ -111,7 +110,7 @@ class TakeClips final : public pipeline::FrameTap {
 
   [[nodiscard]] std::filesystem::path path_of(const log::TakeRow& take,
                                               const std::string& stream) const;
-  [[nodiscard]] std::string clip_name(const Stream& stream) const;  // with mutex_ held
+  [[nodiscard]] std::string clip_name(std::uint32_t stream) const;  // with mutex_ held
   void not_missing(std::int64_t take, const std::string& file = {});
 
   std::filesystem::path log_;
@@ -130,9 +129,10 @@ class TakeClips final : public pipeline::FrameTap {
 
   mutable std::mutex mutex_;  // guards the following
   std::condition_variable_any wake_;
-  std::vector<log::TakeRow> changes_;  // that the keeping thread has not seen
-  std::vector<Stream> streams_;        // all that ever came, in their order
-  std::deque<Kept> closed_;            // to be written
+  std::vector<log::TakeRow> changes_;        // that the keeping thread has not seen
+  std::map<std::uint32_t, Stream> streams_;  // all that ever came
+  std::map<std::string, std::vector<std::uint32_t>> by_name_;  // the same, in their order
+  std::deque<Kept> closed_;                                    // to be written
   std::deque<Missing> missing_;
 
   std::jthread keeper_, writer_;  // last, because they use all the others

@@ -174,7 +174,7 @@ Findings findings_of(const ApplyArguments& options, const style::StyleModel& mod
                     100.0 * known));
   }
   if (nothing.empty() && !applied.no_feet.empty()) {
-    findings.remark("feet may slide: the figure " + applied.no_feet);
+    findings.remark("the figure is styled without standing feet: " + applied.no_feet);
   } else if (nothing.empty() && !options.apply.feet) {
     findings.remark("the root moves as it did, so feet may slide; without --root off they stand");
   }

@@ -242,7 +242,7 @@ Result<Applied> apply_to_clip(const StyleModel& model, const std::string& model_
   const Error* const obstacle = !feet ? &feet.error() : !root ? &root.error() : nullptr;
   if (options.feet && obstacle != nullptr) {
     if (options.needs_feet) return std::unexpected(*obstacle);
-    applied.no_feet = obstacle->message;
+    applied.no_feet = !feet ? "it has no leg with a foot" : "its root has no position channels";
   }
   motion::TurnSum turned;
   ThroughFeet out(applied.no_feet.empty() && feet ? std::move(*feet) : nullptr);

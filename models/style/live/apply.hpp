@@ -40,7 +40,7 @@ struct Applied {
   bool kept_first = false;                // the first frame is an added rest pose, and stays
   bool hinge_held = false;                // knees or elbows were kept from bending backwards
   std::string remark{};                   // about joints that the skeleton lacks; may be empty
-  std::string no_feet{};                  // why the feet stage was left out; empty: it was not
+  std::string no_feet{};                  // why its feet do not stand; empty: they do
 };
 
 // The walker's own neutral pose and cadence by a warm-up over the whole clip (README.md,

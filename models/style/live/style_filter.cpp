@@ -70,10 +70,11 @@ RT_SAFE bool StyleFilter::set_shares(const Shares& shares) noexcept {
 }
 
 RT_SAFE const BoundModel* StyleFilter::set_model(const BoundModel* model) noexcept {
+  if (model == nullptr && model_ == nullptr) return nullptr;
   discontinuity_ = true;
   hinge_held_ = false;
-  leaving_ = model == nullptr && (leaving_ || model_ != nullptr);
-  if (model == nullptr) return take_away();
+  leaving_ = model == nullptr;
+  if (leaving_) return take_away();
   tracker_.exchange(model_, *model);
   if (model_ == nullptr) {
     weights_.begin(first_alone(model->styles().size()));
@@ -88,8 +89,7 @@ RT_SAFE const BoundModel* StyleFilter::set_model(const BoundModel* model) noexce
 // A next model fades in as a first one does. What is known of the walker is in the terms of this
 // one.
 RT_SAFE const BoundModel* StyleFilter::take_away() noexcept {
-  leaving_root_ =
-      last_joints_ > 0 && model_ != nullptr && model_->has_root ? root_change_ : RootChange{};
+  leaving_root_ = last_joints_ > 0 && model_->has_root ? root_change_ : RootChange{};
   tracker_.forget();
   weights_.begin(first_alone(1));
   is_held_ = tell_held_ = tell_hinge_ = false;
@@ -254,6 +254,7 @@ RT_SAFE void StyleFilter::process(const StageFrame& in, StageOut& out) noexcept 
     fade_out(frame, dt_s);
   } else {
     last_joints_ = 0;  // the pose is that of another body, so there is nothing to blend from
+    leaving_ = false;
   }
   const bool roots = leaving_ || (served && model_->has_root);
   if (roots && !leaving_) change_root();
@@ -282,6 +283,7 @@ RT_SAFE void StyleFilter::fade_out(Frame& frame, double dt_s) noexcept {
   last_in_ = in;
   last_out_ = frame.rotation_xyzw;
   const auto left = static_cast<float>(blend_weight_);
+  last_root_ = left * root_from_;
   root_change_ = {.height_m = left * leaving_root_.height_m, .velocity_m_s = {}};
   for (std::size_t i = 0; i < root_change_.velocity_m_s.size(); ++i) {
     root_change_.velocity_m_s[i] = left * leaving_root_.velocity_m_s[i];

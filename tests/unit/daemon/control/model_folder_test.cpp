@@ -106,14 +106,16 @@ TEST_CASE("a model tells what it was learnt from; what is no model tells that") 
   CHECK(words.skeleton.contains("joint"));
   for (const char* report : {"", "[1]", "{\"clips\":3,\"verdict\":[]}", "{"}) {
     model.report_json = report;
-    CHECK(words_of_model(style::serialize_model(model), "style", "a").learnt == "walk -> sneak");
+    CHECK(words_of_model(style::serialize_model(model), "style", "a").learnt ==
+          "turns walk into sneak");
   }
   const std::string deep(200'000, '[');
   for (const std::string& report :
        std::vector<std::string>{"{\"clips\":" + deep + std::string(deep.size(), ']') + "}",
                                 "{\"clips\":[[]" + std::string(3UL * 1024 * 1024, ',') + "[]]}"}) {
     model.report_json = report;
-    CHECK(words_of_model(style::serialize_model(model), "style", "a").learnt == "walk -> sneak");
+    CHECK(words_of_model(style::serialize_model(model), "style", "a").learnt ==
+          "turns walk into sneak");
   }
   CHECK(words_of_model("nonsense", "style", "a.style").verdict.contains("a.style"));
   CHECK(words.strip.empty());  // it knows no cycle

@@ -36,9 +36,7 @@ struct Recording {
   std::shared_ptr<const Skeleton> skeleton = two_joints();
   tools::TakeClips clips{folder.path() / "stage.plog"};
 
-  Recording() {
-    clips.stream_comes({.id = 3, .name = "ann", .skeleton = skeleton, .rate_hz = 60.0});
-  }
+  Recording() { clips.stream_comes(3, {.name = "ann", .skeleton = skeleton, .rate_hz = 60.0}); }
   // Of so many items, a frame each.
   void frames(std::uint64_t from, std::uint64_t to) {
     for (std::uint64_t item = from; item <= to; ++item) {

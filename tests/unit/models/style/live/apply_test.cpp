@@ -124,7 +124,7 @@ TEST_CASE("a figure whose feet cannot stand is refused, or styled without", "[st
   options.needs_feet = false;
   const auto styled = style::apply_to_clip(toy_model(1), "toy.style", walk, options);
   REQUIRE(styled);
-  CHECK_FALSE(styled->no_feet.empty());
+  CHECK(styled->no_feet.starts_with("it"));
   CHECK(styled->clip.channels == applied(walk, 1.0).clip.channels);
 }
 
