@@ -19,7 +19,7 @@ constexpr int kMaxDepth = 16;  // messages within messages; the schema has a few
 
 // Takes the parts of one message from `left`; false when there are more, or if the bytes are
 // malformed. Groups, which the schema does not use, count as malformed.
-bool count_parts(const Descriptor& type, CodedInputStream& in, std::size_t& left, int depth) {
+bool take_parts(const Descriptor& type, CodedInputStream& in, std::size_t& left, int depth) {
   if (depth > kMaxDepth) return false;
   while (const std::uint32_t tag = in.ReadTag()) {
     const FieldDescriptor* const field =
@@ -37,7 +37,7 @@ bool count_parts(const Descriptor& type, CodedInputStream& in, std::size_t& left
           break;
         }
         const auto outer = in.PushLimit(static_cast<int>(size));
-        const bool counted = count_parts(*field->message_type(), in, left, depth + 1);
+        const bool counted = take_parts(*field->message_type(), in, left, depth + 1);
         if (!counted || in.BytesUntilLimit() > 0) return false;
         in.PopLimit(outer);
         break;
@@ -54,15 +54,22 @@ bool count_parts(const Descriptor& type, CodedInputStream& in, std::size_t& left
 
 }  // namespace
 
-bool parse_bounded(google::protobuf::Message& message, std::span<const std::byte> bytes) {
+std::optional<std::size_t> count_parts(const google::protobuf::Message& type,
+                                       std::span<const std::byte> bytes) {
   const auto size = static_cast<int>(bytes.size());
   CodedInputStream in(reinterpret_cast<const std::uint8_t*>(bytes.data()), size);
   std::size_t left = kMaxMessageParts;
-  if (!count_parts(*message.GetDescriptor(), in, left, 0) || in.CurrentPosition() != size) {
+  const bool taken = take_parts(*type.GetDescriptor(), in, left, 0);
+  if (!taken || in.CurrentPosition() != size) return std::nullopt;
+  return kMaxMessageParts - left;
+}
+
+bool parse_bounded(google::protobuf::Message& message, std::span<const std::byte> bytes) {
+  if (!count_parts(message, bytes)) {
     message.Clear();
     return false;
   }
-  return message.ParseFromArray(bytes.data(), size);
+  return message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
 }
 
 }  // namespace posed::message

@@ -70,4 +70,11 @@ std::string DaemonSocket::refusal() {
   return refusal_words(monitor_->next_refusal(), domain_, peer_.server_key);
 }
 
+bool Retry::due(std::int64_t now_ns, bool established) {
+  if (established) at_ns_.reset();
+  if (!at_ns_ || now_ns < *at_ns_) return false;
+  at_ns_ = now_ns + kPause_ns;
+  return true;
+}
+
 }  // namespace posed::link

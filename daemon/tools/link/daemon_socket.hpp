@@ -6,11 +6,13 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "daemon/net/security.hpp"
 #include "proto/frame/result.hpp"
+#include "proto/frame/time.hpp"
 #include "proto/zmq/link_monitor.hpp"
 #include "proto/zmq/zmq_handle.hpp"
 
@@ -73,6 +75,28 @@ class DaemonSocket {
   net::Domain domain_;
   net::Socket socket_;
   std::unique_ptr<net::LinkMonitor> monitor_;  // ends before the socket
+};
+
+// When to open a socket anew. libzmq tries no more after a refusal, nor after a part that is too
+// large or no ZMTP, and does not tell the latter from a loss; yet a key may be allowed later, and
+// the port may be the daemon's again. One for each socket. Cold.
+class Retry {
+ public:
+  // Each try costs the daemon a line in its log.
+  static constexpr std::int64_t kPause_ns = 5 * kNanosPerSecond;
+
+  // The daemon has refused the connection, or it has ended.
+  void failed(std::int64_t now_ns, std::int64_t pause_ns = kPause_ns) {
+    at_ns_ = now_ns + pause_ns;
+  }
+  void opened() noexcept { at_ns_.reset(); }
+  [[nodiscard]] bool is_waiting() const noexcept { return at_ns_.has_value(); }
+  // Whether to open the socket now. If that fails (a key file is being replaced, no descriptor is
+  // free) it is due again after a pause. A connection that stands after all is left alone.
+  [[nodiscard]] bool due(std::int64_t now_ns, bool established);
+
+ private:
+  std::optional<std::int64_t> at_ns_{};
 };
 
 }  // namespace posed::link

@@ -130,7 +130,8 @@ class CounterLine {
                    .add("bytes", counts.bytes)
                    .add("late_skeletons", counts.late_skeletons)
                    .add("foreign", counts.foreign)
-                   .add("clashes", counts.clashes));
+                   .add("clashes", counts.clashes)
+                   .add("stats_left_out", counts.stats_left_out));
   }
 
   const relay::Relay& relay_;

@@ -27,18 +27,36 @@ constexpr int kSubscriptionsWaiting = static_cast<int>(2 * publish::kMaxWanted);
 Result<Upstream> Upstream::open(void* context, const link::Peer& peer) {
   auto socket =
       TRY(link::DaemonSocket::open(context, ZMQ_XSUB, peer, {.requests = kSubscriptionsWaiting}));
-  return Upstream(std::move(socket));
+  return Upstream(context, std::move(socket));
 }
 
 bool Upstream::subscribe(const std::string& prefix, bool on) {
   return net::send_part(socket_.get(), (on ? '\1' : '\0') + prefix, false);
 }
 
-void Upstream::log_news() {
+bool Upstream::opens_anew(std::int64_t now_ns) {
+  if (!retry_.due(now_ns, established())) return false;
+  auto fresh = open(context_, socket_.peer());
+  if (!fresh) {
+    complain("cannot be tried again: " + fresh.error().text());
+    return false;
+  }
+  std::swap(socket_, fresh->socket_);  // an assignment would end the old socket before its monitor
+  retry_.opened();
+  return true;
+}
+
+void Upstream::complain(const std::string& why) {
+  if (std::exchange(complaint_, why) == why) return;
+  spdlog::error("the daemon at {} {}", endpoint(), why);
+}
+
+void Upstream::handle_news(std::int64_t now_ns) {
   const bool before = established();
-  const std::uint64_t cuts = socket_.cuts();
+  const std::uint64_t cuts = socket_.cuts(), ends = socket_.ends();
   if (const std::string why = socket_.refusal(); !why.empty()) {
-    spdlog::error("the daemon at {} {}", endpoint(), why);
+    retry_.failed(now_ns);
+    complain(why);
   } else if (socket_.cuts() != cuts) {
     spdlog::warn("{} sends more than any daemon does; its connection was ended and is tried again",
                  endpoint());
@@ -46,6 +64,13 @@ void Upstream::log_news() {
     spdlog::log(before ? spdlog::level::warn : spdlog::level::info, "{}: {}", endpoint(),
                 before ? "connection lost; it is tried again" : "connected");
   }
+  if (socket_.ends() != ends) retry_.failed(now_ns);
+  if (established()) complaint_.clear();
+}
+
+void Upstream::warn_once(std::string_view fault, std::string_view stream) {
+  if (!warned_.insert(fault).second) return;
+  spdlog::warn("{} sends {}{}{}", endpoint(), fault, stream.empty() ? "" : ": ", clean(stream));
 }
 
 namespace {
@@ -64,19 +89,70 @@ void name_clock(v1::Stats& stats) {
   }
 }
 
-// Adds the streams and sources of `bytes` whose names are new, as many as there is room for.
-void add_new(v1::Stats& merged, std::string_view bytes, Names& names) {
+// What merged stats may still take.
+struct Room {
+  std::size_t bytes, parts;
+};
+
+// The most that each may have of `whole`: what some do not need is left to the others.
+std::size_t fair_share(std::vector<std::size_t> needs, std::size_t whole) {
+  std::ranges::sort(needs);
+  std::size_t left = whole;
+  for (std::size_t i = 0; i < needs.size(); ++i) {
+    const std::size_t equal = left / (needs.size() - i);
+    if (needs[i] > equal) return equal;
+    left -= needs[i];
+  }
+  return whole;
+}
+
+bool append(std::string& merged, const v1::Stats& part, Room& room) {
+  if (room.parts == 0 || part.ByteSizeLong() > room.bytes) return false;
+  const std::string bytes = part.SerializeAsString();
+  const auto parts = message::count_parts(part, std::as_bytes(std::span(bytes)));
+  if (!parts || *parts > room.parts) return false;
+  room = {.bytes = room.bytes - bytes.size(), .parts = room.parts - *parts};
+  merged += bytes;
+  return true;
+}
+
+// Appends the streams and sources of `bytes` whose names are new, of the first upstream all else
+// too. Returns how many have no room.
+std::size_t append_new(std::string& merged, const std::string& bytes, Room room, Names& names,
+                       bool is_first) {
+  std::size_t left_out = 0;
   v1::Stats stats;
-  if (!message::parse_bounded(stats, std::as_bytes(std::span(bytes)))) return;
-  name_clock(stats);
-  for (v1::StreamStats& stream : *stats.mutable_stream()) {
-    if (names.streams.size() >= kMaxStreams) break;
-    if (names.streams.insert(stream.stream()).second) merged.add_stream()->Swap(&stream);
+  if (!stats.ParseFromString(bytes)) return left_out;
+  v1::Stats entries;
+  entries.mutable_stream()->Swap(stats.mutable_stream());
+  entries.mutable_source()->Swap(stats.mutable_source());
+  if (is_first && !append(merged, stats, room)) {
+    ++left_out;
+    v1::Stats times;
+    times.set_time_ns(stats.time_ns());
+    times.set_monotonic_to_utc_ns(stats.monotonic_to_utc_ns());
+    static_cast<void>(append(merged, times, room));
   }
-  for (v1::SourceStats& source : *stats.mutable_source()) {
-    if (names.sources.size() >= kMaxStreams) break;
-    if (names.sources.insert(source.name()).second) merged.add_source()->Swap(&source);
+  v1::Stats one;
+  const auto add_one = [&](std::set<std::string>& known, const std::string& name) {
+    if (known.contains(name)) return;
+    if (append(merged, one, room)) {
+      known.insert(name);
+    } else {
+      ++left_out;
+    }
+  };
+  for (v1::StreamStats& stream : *entries.mutable_stream()) {
+    one.Clear();
+    one.add_stream()->Swap(&stream);
+    add_one(names.streams, one.stream(0).stream());
   }
+  for (v1::SourceStats& source : *entries.mutable_source()) {
+    one.Clear();
+    one.add_source()->Swap(&source);
+    add_one(names.sources, one.source(0).name());
+  }
+  return left_out;
 }
 
 }  // namespace
@@ -85,27 +161,35 @@ std::optional<std::string> MergedStats::accept(std::size_t upstream, std::string
                                                std::int64_t now_ns, bool& valid) {
   assert(upstream < latest_.size());
   Latest& latest = latest_[upstream];
-  v1::Stats stats;
-  valid = message::parse_bounded(stats, std::as_bytes(std::span(bytes)));
-  latest.ever = valid;
-  latest.bytes = valid && latest_.size() > 1 ? std::string(bytes) : std::string();
-  if (!valid) return std::nullopt;
-  latest.at_ns = now_ns;
-  if (latest_.size() == 1) return std::string(bytes);
-  const auto answers = [&](const Latest& one) {
-    return one.ever && now_ns - one.at_ns < kNoStats_ns;
-  };
-  for (std::size_t i = 0; i < upstream; ++i) {
-    if (answers(latest_[i])) return std::nullopt;  // an earlier one gives the beat
+  {
+    v1::Stats stats;
+    valid = message::parse_bounded(stats, std::as_bytes(std::span(bytes)));
+    latest.ever = valid;
+    latest.bytes.clear();
+    if (!valid) return std::nullopt;
+    latest.at_ns = now_ns;
+    if (latest_.size() == 1) return std::string(bytes);
+    name_clock(stats);
+    latest.bytes = stats.SerializeAsString();
+    latest.parts = message::count_parts(stats, std::as_bytes(std::span(latest.bytes))).value_or(0);
   }
-  name_clock(stats);
+  std::vector<std::size_t> answering, bytes_needed, parts_needed;
+  for (std::size_t i = 0; i < latest_.size(); ++i) {
+    if (!latest_[i].ever || now_ns - latest_[i].at_ns >= kNoStats_ns) continue;
+    if (i < upstream) return std::nullopt;  // an earlier one gives the beat
+    answering.push_back(i);
+    bytes_needed.push_back(latest_[i].bytes.size());
+    parts_needed.push_back(latest_[i].parts);
+  }
+  // posed's own clients take no more, and would lose the streams of all upstreams.
+  const Room share{.bytes = fair_share(std::move(bytes_needed), net::kMaxReceivedPart),
+                   .parts = fair_share(std::move(parts_needed), message::kMaxMessageParts)};
+  std::string merged;
   Names names;
-  for (const v1::StreamStats& stream : stats.stream()) names.streams.insert(stream.stream());
-  for (const v1::SourceStats& source : stats.source()) names.sources.insert(source.name());
-  for (std::size_t i = upstream + 1; i < latest_.size(); ++i) {
-    if (answers(latest_[i])) add_new(stats, latest_[i].bytes, names);
+  for (const std::size_t i : answering) {
+    latest_[i].left_out += append_new(merged, latest_[i].bytes, share, names, i == upstream);
   }
-  return stats.SerializeAsString();
+  return merged;
 }
 
 namespace {
@@ -124,19 +208,36 @@ std::string_view stream_of_topic(std::string_view topic) {
   return slash == std::string_view::npos ? std::string_view() : topic.substr(slash + 1);
 }
 
-bool RelayedStreams::admit(std::string_view stream, std::size_t upstream, std::int64_t now_ns) {
+Admission RelayedStreams::admit(std::string_view stream, std::size_t upstream, bool poses,
+                                std::int64_t now_ns) {
+  assert(upstream < shares_.size());
   forget_old(now_ns);
   auto found = streams_.find(stream);
+  if (found != streams_.end() && found->second.upstream != upstream) {
+    const bool silent = now_ns - found->second.received_ns >= kSilent_ns;
+    if (!silent && (found->second.poses || !poses)) return Admission::kOthersName;
+    forget(found);
+    found = streams_.end();
+  }
   if (found == streams_.end()) {
-    if (streams_.size() == kMaxStreams) return false;
+    if (!make_room(upstream, poses)) return Admission::kTooMany;
     Stream fresh{.upstream = upstream};
     fresh.due_ns = system::kForever_ns;
     found = streams_.emplace(std::string(stream), std::move(fresh)).first;
-  } else if (found->second.upstream != upstream) {
-    if (now_ns - found->second.received_ns < kSilent_ns) return false;
-    found->second.upstream = upstream;
+    ++shares_[upstream].streams;
   }
+  if (poses && !std::exchange(found->second.poses, true)) ++shares_[upstream].posing;
   found->second.received_ns = now_ns;
+  return Admission::kPasses;
+}
+
+bool RelayedStreams::make_room(std::size_t upstream, bool poses) {
+  const Share& share = shares_[upstream];
+  if (share.streams < kMaxStreams) return true;
+  if (!poses || share.posing == share.streams) return false;
+  forget(std::ranges::find_if(streams_, [&](const auto& entry) {
+    return entry.second.upstream == upstream && !entry.second.poses;
+  }));
   return true;
 }
 
@@ -145,47 +246,57 @@ void RelayedStreams::keep_skeleton(std::string_view stream, std::string_view byt
   const auto found = streams_.find(stream);
   if (found == streams_.end()) return;
   Stream& kept = found->second;
-  skeleton_bytes_ -= kept.skeleton.size();
+  Share& share = shares_[kept.upstream];
+  share.skeleton_bytes -= kept.skeleton.size();
   kept.skeleton.clear();
   kept.due_ns = system::kForever_ns;
-  if (skeleton_bytes_ + bytes.size() > kMaxSkeletonBytes) return;
+  if (share.skeleton_bytes + bytes.size() > kMaxSkeletonBytes / shares_.size()) return;
   kept.skeleton_topic = std::string(kSkeleton) + found->first;
   kept.skeleton = bytes;
   kept.sent_ns = now_ns;
-  skeleton_bytes_ += bytes.size();
+  share.skeleton_bytes += bytes.size();
 }
 
 void RelayedStreams::want_skeletons(std::string_view prefix) {
   for (auto& [name, stream] : streams_) {
     if (stream.skeleton.empty() || !stream.skeleton_topic.starts_with(prefix)) continue;
     stream.due_ns = std::min(stream.due_ns, stream.sent_ns + kSkeletonPause_ns);
+    due_ns_ = std::min(due_ns_, stream.due_ns);
   }
 }
 
 std::int64_t RelayedStreams::send_due(
     std::int64_t now_ns,
     const std::function<void(std::string_view topic, std::string_view bytes)>& send) {
-  std::int64_t next_ns = system::kForever_ns;
+  if (now_ns < due_ns_) return due_ns_;
+  due_ns_ = system::kForever_ns;
   for (auto& [name, stream] : streams_) {
     if (now_ns >= stream.due_ns) {
       send(stream.skeleton_topic, stream.skeleton);
       stream.sent_ns = now_ns;
       stream.due_ns = system::kForever_ns;
     }
-    next_ns = std::min(next_ns, stream.due_ns);
+    due_ns_ = std::min(due_ns_, stream.due_ns);
   }
-  return next_ns;
+  return due_ns_;
 }
 
 void RelayedStreams::forget_old(std::int64_t now_ns) {
   if (now_ns < forgot_ns_ + kNanosPerSecond) return;
   forgot_ns_ = now_ns;
-  std::erase_if(streams_, [&](const auto& entry) {
-    const Stream& stream = entry.second;
-    if (now_ns - stream.received_ns < kGone_ns) return false;
-    skeleton_bytes_ -= stream.skeleton.size();
-    return true;
-  });
+  for (auto next = streams_.begin(); next != streams_.end();) {
+    const auto one = next++;
+    const bool crowded = shares_[one->second.upstream].streams > kMaxStreams / 2;
+    if (now_ns - one->second.received_ns >= (crowded ? kSilent_ns : kGone_ns)) forget(one);
+  }
+}
+
+void RelayedStreams::forget(Streams::iterator one) {
+  Share& share = shares_[one->second.upstream];
+  --share.streams;
+  share.posing -= one->second.poses ? 1 : 0;
+  share.skeleton_bytes -= one->second.skeleton.size();
+  streams_.erase(one);
 }
 
 namespace {
@@ -240,11 +351,15 @@ Relay::Relay(const RelayOptions& options, publish::PublishSocket socket, std::ve
                        changed_.insert(prefix);
                      }),
       budget_(kMaxChangesAtOnce),
+      streams_(upstreams_.size()),
       stats_(upstreams_.size()),
       queue_(publish::send_high_water_mark(kFirstRate_hz)) {
-  for (Upstream& upstream : upstreams_) {
-    for (const char* topic : kOwn) static_cast<void>(upstream.subscribe(topic, true));
-  }
+  for (Upstream& upstream : upstreams_) subscribe_all(upstream);
+}
+
+void Relay::subscribe_all(Upstream& upstream) {
+  for (const char* topic : kOwn) static_cast<void>(upstream.subscribe(topic, true));
+  for (const std::string& prefix : passed_) static_cast<void>(upstream.subscribe(prefix, true));
 }
 
 std::int64_t Relay::turn(std::int64_t now_ns) {
@@ -252,7 +367,8 @@ std::int64_t Relay::turn(std::int64_t now_ns) {
       subscriptions_, now_ns, [this](std::string_view prefix) { streams_.want_skeletons(prefix); });
   pass_subscriptions(now_ns);
   for (std::size_t i = 0; i < upstreams_.size(); ++i) {
-    upstreams_[i].log_news();
+    upstreams_[i].handle_news(now_ns);
+    if (upstreams_[i].opens_anew(now_ns)) subscribe_all(upstreams_[i]);
     all_received = drain(i, now_ns) && all_received;
   }
   const std::int64_t skeleton_ns =
@@ -301,7 +417,17 @@ void Relay::pass_on(std::size_t upstream, std::string_view topic, net::Message& 
     bool valid = false;
     const auto stats = stats_.accept(upstream, body.text(), now_ns, valid);
     if (!valid) ++counts_.foreign;
-    if (stats) send(topic, *stats);
+    if (!stats) return;
+    send(topic, *stats);
+    counts_.stats_left_out = 0;
+    for (std::size_t i = 0; i < upstreams_.size(); ++i) {
+      counts_.stats_left_out += stats_.left_out(i);
+      if (stats_.left_out(i) > 0) {
+        upstreams_[i].warn_once(
+            "more stats than it has room for beside the other upstreams: "
+            "`top` and `monitor` do not see all of its streams");
+      }
+    }
     return;
   }
   if (!is_whole_topic(topic) || body.text().size() > link::kMaxStreamMessage) {
@@ -309,16 +435,18 @@ void Relay::pass_on(std::size_t upstream, std::string_view topic, net::Message& 
     return;
   }
   const std::string_view stream = stream_of_topic(topic);
-  if (!streams_.admit(stream, upstream, now_ns)) {
-    if (++counts_.clashes == 1) {
-      spdlog::warn(
-          "{} sends the stream {} as well as another upstream, or there are too many"
-          " streams: its messages are left out",
-          upstreams_[upstream].endpoint(), clean(stream));
-    }
+  const bool poses = topic.starts_with("pose/") || topic.starts_with(kSkeleton);
+  const Admission admission = streams_.admit(stream, upstream, poses, now_ns);
+  if (admission != Admission::kPasses) {
+    ++counts_.clashes;
+    upstreams_[upstream].warn_once(
+        admission == Admission::kTooMany
+            ? "more streams than a relay passes on; those without poses are left out first, as this"
+            : "a stream that another upstream sends as well; this one's messages are left out",
+        stream);
     return;
   }
-  if (topic.starts_with("skeleton/")) streams_.keep_skeleton(stream, body.text(), now_ns);
+  if (topic.starts_with(kSkeleton)) streams_.keep_skeleton(stream, body.text(), now_ns);
   send(topic, body.text());
 }
 
@@ -367,7 +495,8 @@ void Relay::every_second(std::int64_t now_ns) {
   second_ns_ = now_ns;
   passed_before_ = counts_.messages;
   // All skeletons may come together, so they have room beside the poses.
-  const int queue = publish::send_high_water_mark(rate_hz) + static_cast<int>(streams_.streams());
+  const int queue = publish::send_high_water_mark(rate_hz) +
+                    static_cast<int>(std::min(streams_.streams(), kMaxStreams));
   // A queue that becomes shorter can stop a connection for good: libzmq's receiving side reports
   // what it took every half queue, and while it still counts by the old, longer one, the sending
   // side finds the new one full.

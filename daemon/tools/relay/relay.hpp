@@ -1,6 +1,7 @@
 // Upstream: a relay's one connection to a daemon, or to another relay. It connects in the
-// background and again whenever the connection is lost; libzmq then repeats the subscriptions. Only
-// few messages wait, so what comes after a stall is new. One thread uses it. Cold.
+// background and again whenever the connection is lost; libzmq then repeats the subscriptions.
+// After a refusal a new one tries again. Only few messages wait, so what comes after a stall is
+// new. One thread uses it. Cold.
 #pragma once
 
 #include <cstddef>
@@ -15,6 +16,7 @@
 #include <vector>
 
 #include "daemon/publish/publish_socket.hpp"
+#include "daemon/system/event_fd.hpp"
 #include "daemon/tools/link/daemon_socket.hpp"
 #include "posed/v1/posed.pb.h"
 #include "proto/frame/result.hpp"
@@ -29,7 +31,8 @@ class Upstream {
   static Result<Upstream> open(void* context, const link::Peer& peer);
 
   [[nodiscard]] void* socket() const noexcept { return socket_.get(); }
-  [[nodiscard]] int news_fd() const noexcept { return socket_.news_fd(); }  // readable: log_news()
+  // Readable: handle_news().
+  [[nodiscard]] int news_fd() const noexcept { return socket_.news_fd(); }
   [[nodiscard]] const std::string& endpoint() const noexcept { return socket_.peer().endpoint; }
 
   // Returns false if the connection cannot take more subscriptions now.
@@ -40,13 +43,26 @@ class Upstream {
   }
 
   // Reads what happened to the connection, and logs when it was made, lost or refused.
-  void log_news();
+  void handle_news(std::int64_t now_ns);
+  // Tries again some time after a refusal or an end: returns true if a new socket has been opened,
+  // which knows no subscriptions.
+  [[nodiscard]] bool opens_anew(std::int64_t now_ns);
   [[nodiscard]] bool established() const noexcept { return socket_.established(); }
+  // Logs what the upstream sends that it should not, the first time. `fault` is a literal; `stream`
+  // is an example, or empty.
+  void warn_once(std::string_view fault, std::string_view stream = {});
 
  private:
-  explicit Upstream(link::DaemonSocket socket) : socket_(std::move(socket)) {}
+  Upstream(void* context, link::DaemonSocket socket)
+      : context_(context), socket_(std::move(socket)) {}
+  // Logs why there is no connection, unless that was said last.
+  void complain(const std::string& why);
 
+  void* context_;
   link::DaemonSocket socket_;
+  link::Retry retry_{};
+  std::string complaint_{};  // since the connection stood last
+  std::set<std::string_view> warned_{};
 };
 
 // MergedStats: the stats of several daemons as those of one, so that `posed top` and `posed
@@ -59,37 +75,51 @@ class MergedStats {
   // the streams and sources of all that are not silent, each stream with the clock of its own
   // machine, and everything else as the first of them says it, whenever that one sends its stats.
   // Of a stream or source that several of them name, the first one's counts: relays in a circle
-  // send everything back. Empty: nothing now. `valid` is false for bytes that are no stats.
+  // send everything back. They are never more than posed's clients take: each upstream has its
+  // share of the bytes and parts. Empty: nothing now. `valid` is false for bytes that are no stats.
   [[nodiscard]] std::optional<std::string> accept(std::size_t upstream, std::string_view bytes,
                                                   std::int64_t now_ns, bool& valid);
+  // How many streams and sources of an upstream had no room so far.
+  [[nodiscard]] std::uint64_t left_out(std::size_t upstream) const {
+    return latest_[upstream].left_out;
+  }
 
  private:
   struct Latest {
     std::string bytes{};  // as bytes, because a hostile message takes much more memory parsed
+    std::size_t parts = 0;
     std::int64_t at_ns = 0;
     bool ever = false;
+    std::uint64_t left_out = 0;
   };
   std::vector<Latest> latest_;  // [upstream]
 };
 
-inline constexpr std::size_t kMaxStreams = 1024;
-inline constexpr std::size_t kMaxSkeletonBytes = 16 * 1024 * 1024;  // of all streams together
+inline constexpr std::size_t kMaxStreams = 1024;                    // of each upstream
+inline constexpr std::size_t kMaxSkeletonBytes = 16 * 1024 * 1024;  // of all upstreams together
 
 // The stream of a topic such as "pose/walker"; empty for other topics.
 [[nodiscard]] std::string_view stream_of_topic(std::string_view topic);
 
+enum class Admission : std::uint8_t { kPasses, kOthersName, kTooMany };
+
 // RelayedStreams: what a relay knows of the streams that pass it. Each stream belongs to the
 // upstream that sends it; a second one that sends a stream of the same name is not mixed in. The
-// last skeleton of each stream is kept for subscribers that come later. No socket, no clock of its
-// own, one thread. Cold: allocates.
+// last skeleton of each stream is kept for subscribers that come later. Every upstream has room of
+// its own, so that none costs another a stream. No socket, no clock of its own, one thread. Cold:
+// allocates.
 class RelayedStreams {
  public:
-  // A message of the stream came from an upstream (its index). Returns false if it may not pass: if
-  // another upstream sends a stream of this name, or if there are kMaxStreams others.
-  [[nodiscard]] bool admit(std::string_view stream, std::size_t upstream, std::int64_t now_ns);
+  explicit RelayedStreams(std::size_t upstreams) : shares_(upstreams) {}
 
-  // The skeleton of an admitted stream has just been passed on. One beyond kMaxSkeletonBytes is not
-  // kept.
+  // A message of the stream came from an upstream (its index): a pose or skeleton (`poses`), or
+  // something else. Tells whether it may pass. A stream that has sent poses comes before one that
+  // has not: it takes its name from another upstream, or its place among kMaxStreams.
+  [[nodiscard]] Admission admit(std::string_view stream, std::size_t upstream, bool poses,
+                                std::int64_t now_ns);
+
+  // The skeleton of an admitted stream has just been passed on. One beyond its upstream's share of
+  // kMaxSkeletonBytes is not kept.
   void keep_skeleton(std::string_view stream, std::string_view bytes, std::int64_t now_ns);
 
   // Somebody has subscribed to the topics that begin with `prefix`: their skeletons become due, at
@@ -102,20 +132,31 @@ class RelayedStreams {
       const std::function<void(std::string_view topic, std::string_view bytes)>& send);
 
   [[nodiscard]] std::size_t streams() const noexcept { return streams_.size(); }
-  [[nodiscard]] std::size_t skeleton_bytes() const noexcept { return skeleton_bytes_; }
+  [[nodiscard]] std::size_t skeleton_bytes(std::size_t upstream) const {
+    return shares_[upstream].skeleton_bytes;
+  }
 
  private:
   struct Stream {
     std::size_t upstream = 0;
+    bool poses = false;  // it has sent some
     std::int64_t received_ns = 0;
     std::string skeleton_topic{}, skeleton{};  // empty: none is kept
     std::int64_t sent_ns = 0, due_ns = 0;      // of the skeleton
   };
+  using Streams = std::map<std::string, Stream, std::less<>>;
+  struct Share {  // of an upstream
+    std::size_t streams = 0, posing = 0, skeleton_bytes = 0;
+  };
+  // Returns false if the upstream may have no more streams.
+  [[nodiscard]] bool make_room(std::size_t upstream, bool poses);
   // Forgets streams that have sent nothing for a while; at most once a second.
   void forget_old(std::int64_t now_ns);
+  void forget(Streams::iterator one);
 
-  std::map<std::string, Stream, std::less<>> streams_;
-  std::size_t skeleton_bytes_ = 0;
+  Streams streams_;
+  std::vector<Share> shares_;                  // [upstream]
+  std::int64_t due_ns_ = system::kForever_ns;  // no skeleton is due before
   std::int64_t forgot_ns_ = 0;
 };
 
@@ -136,7 +177,8 @@ struct RelayCounts {
   std::uint64_t late_skeletons = 0;  // sent again for subscribers that came later
   std::uint64_t foreign = 0;         // dropped: not a message of posed
   std::uint64_t clashes = 0;  // dropped: another upstream has a stream of that name, or too many
-  std::size_t upstreams = 0;  // connected now
+  std::uint64_t stats_left_out = 0;  // streams and sources that had no room in merged stats
+  std::size_t upstreams = 0;         // connected now
   std::size_t subscribers = 0;
   std::size_t subscriptions = 0;  // distinct
   std::size_t streams = 0;
@@ -170,6 +212,8 @@ class Relay {
   void pass_on(std::size_t upstream, std::string_view topic, net::Message& body,
                std::int64_t now_ns);
   void send(std::string_view topic, std::string_view bytes);
+  // Tells an upstream that knows of no subscription.
+  void subscribe_all(Upstream& upstream);
   // Tells the upstreams which subscriptions have come or gone, at the pace that they accept.
   void pass_subscriptions(std::int64_t now_ns);
   // Makes the queues as long as a quarter of a second of the most that has passed.

@@ -15,12 +15,9 @@
 namespace posed::view {
 namespace {
 
-constexpr int kMessagesAtOnce = 256;                      // then the pages have their turn
-constexpr std::int64_t kSilent_ns = 3 * kNanosPerSecond;  // three stats are missing
-// A refused key may be allowed later. Each try costs the daemon a line in its log.
-constexpr std::int64_t kPublishAgain_ns = 5 * kNanosPerSecond;
+constexpr int kMessagesAtOnce = 256;                             // then the pages have their turn
+constexpr std::int64_t kSilent_ns = 3 * kNanosPerSecond;         // three stats are missing
 constexpr std::int64_t kControlAgain_ns = 60 * kNanosPerSecond;  // such a page may well be wanted
-constexpr std::int64_t kTryAgain_ns = 5 * kNanosPerSecond;
 constexpr std::int64_t kStatusWithin_ns = 5 * kNanosPerSecond;
 constexpr std::uint64_t kStatusTicket = 0;  // the pages' requests have others
 constexpr std::array kAlways{"stats", "skeleton/"};
@@ -96,7 +93,7 @@ Result<std::unique_ptr<DaemonLink>> DaemonLink::open(boost::asio::io_context& io
 Result<> DaemonLink::open_publish() {
   auto socket = TRY(WatchedSocket::open(io_, context_, ZMQ_SUB, options_.publish,
                                         [this] { return receive_messages(); }));
-  publish_again_ns_.reset();
+  publish_again_.opened();
   publish_ = std::move(socket);
   publish_ends_ = 0;
   for (const char* prefix : kAlways) {
@@ -112,7 +109,7 @@ Result<> DaemonLink::open_control() {
   peer.endpoint = options_.control;
   auto socket = TRY(
       WatchedSocket::open(io_, context_, ZMQ_DEALER, peer, [this] { return receive_replies(); }));
-  control_again_ns_.reset();
+  control_again_.opened();
   asked_ns_.reset();
   control_ = std::move(socket);
   control_ends_ = 0;
@@ -187,12 +184,13 @@ void DaemonLink::handle_news(std::int64_t now_ns) {
   if (socket.ends() != publish_ends_) {
     publish_ends_ = socket.ends();
     hub_.daemon_is({.alive = false, .sentence = daemon + " has gone; it is tried again"});
+    publish_again_.failed(now_ns);
     // It may come back with other keys.
-    if (control_again_ns_) control_again_ns_ = now_ns;
+    if (control_again_.is_waiting()) control_again_.failed(now_ns, 0);
   }
   if (!why.empty()) {
     hub_.daemon_is({.alive = false, .sentence = daemon + " " + why});
-    publish_again_ns_ = now_ns + kPublishAgain_ns;
+    publish_again_.failed(now_ns);
   }
 }
 
@@ -202,14 +200,14 @@ void DaemonLink::check_control(std::int64_t now_ns) {
   const std::string daemon = "the daemon at " + options_.control;
   if (!why.empty()) {
     hub_.control_is({.may = false, .reason = daemon + " " + why});
-    control_again_ns_ = now_ns + kControlAgain_ns;
+    control_again_.failed(now_ns, kControlAgain_ns);
     return;
   }
   const bool anew = socket.ends() != control_ends_ || !control_stood_;
   control_ends_ = socket.ends();
   control_stood_ = socket.established();
   if (!control_stood_) {
-    if (!control_again_ns_) {
+    if (!control_again_.is_waiting()) {
       hub_.control_is({.may = false,
                        .reason = "nothing answers at " + options_.control +
                                  ", the daemon's control endpoint (--control)"});
@@ -238,18 +236,9 @@ void DaemonLink::handle_status(std::string_view bytes) {
 }
 
 void DaemonLink::connect_anew(std::int64_t now_ns) {
-  const auto due = [&](const std::optional<std::int64_t>& again_ns) {
-    return again_ns && now_ns >= *again_ns;
-  };
   Result<> opened;
-  // What fails now (a key file is being replaced, no descriptor is free) is tried again.
-  const std::int64_t later_ns = now_ns + kTryAgain_ns;
-  if (due(publish_again_ns_)) {
-    publish_again_ns_ = later_ns;
-    opened = open_publish();
-  }
-  if (opened && due(control_again_ns_)) {
-    control_again_ns_ = later_ns;
+  if (publish_again_.due(now_ns, publish_->socket().established())) opened = open_publish();
+  if (opened && control_ && control_again_.due(now_ns, control_->socket().established())) {
     opened = open_control();
   }
   if (!opened) spdlog::error("the bridge cannot connect anew: {}", opened.error().text());

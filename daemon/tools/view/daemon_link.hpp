@@ -93,9 +93,7 @@ class DaemonLink {
   std::uint64_t publish_ends_ = 0, control_ends_ = 0;  // of connections, that are known
   std::int64_t received_ns_ = 0;                       // the last message
   std::optional<std::int64_t> asked_ns_{};             // the status request without a reply
-  // When to connect anew after a refusal, for libzmq then tries no more; empty: nothing was
-  // refused.
-  std::optional<std::int64_t> publish_again_ns_{}, control_again_ns_{};
+  link::Retry publish_again_{}, control_again_{};
 };
 
 }  // namespace posed::view

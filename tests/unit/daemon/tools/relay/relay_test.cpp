@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
@@ -11,7 +12,7 @@
 #include "daemon/system/clock.hpp"
 #include "daemon/system/event_fd.hpp"
 #include "daemon/tools/relay/relay.hpp"
-#include "tests/support/raw_peer.hpp"
+#include "tests/support/raw_listener.hpp"
 
 namespace posed::relay {
 namespace {
@@ -32,6 +33,13 @@ class RelayRig {
     received.resize(upstreams);
     relay = Relay::open(options).value();
   }
+  // A relay of an endpoint where there is no daemon yet.
+  explicit RelayRig(const std::string& endpoint) : received(1) {
+    relay = Relay::open({.context = context.get(),
+                         .from = {{.endpoint = endpoint}},
+                         .endpoint = "tcp://127.0.0.1:*"})
+                .value();
+  }
 
   net::Socket subscriber(const std::string& prefix) {
     auto socket = net::open_socket(context.get(), ZMQ_SUB).value();
@@ -45,7 +53,7 @@ class RelayRig {
   bool until(Done&& done) {
     const std::int64_t end_ns = system::monotonic_ns() + 10 * kNanosPerSecond;
     while (system::monotonic_ns() < end_ns) {
-      static_cast<void>(relay->turn(system::monotonic_ns()));
+      static_cast<void>(relay->turn(system::monotonic_ns() + ahead_ns));
       for (std::size_t i = 0; i < daemons.size(); ++i) {
         net::Message message;
         while (message.receive(daemons[i].get())) {
@@ -88,6 +96,7 @@ class RelayRig {
   std::vector<net::Socket> daemons;
   std::vector<std::map<std::string, int>> received;  // [upstream] subscriptions by prefix
   std::unique_ptr<Relay> relay;
+  std::int64_t ahead_ns = 0;  // of the relay's clock
 };
 
 TEST_CASE("a relay passes on what its subscribers want, and subscribes to nothing else") {
@@ -171,6 +180,34 @@ TEST_CASE("streams of two upstreams come through one relay; a name that both hav
   CHECK(rig.next(all) == "pose/bob=3");
   CHECK(rig.relay->counts().clashes == 1);
   CHECK(rig.relay->counts().streams == 2);
+}
+
+TEST_CASE("a relay returns to its daemon whatever had the daemon's port meanwhile") {
+  const std::string kind = GENERATE("REP", "PUB");
+  INFO(kind);
+  auto impostor = std::make_unique<test::RawListener>();
+  const std::string endpoint = impostor->endpoint();
+  RelayRig rig(endpoint);
+  const auto subscriber = rig.subscriber("pose/ann");
+  REQUIRE(rig.until([&] { return rig.relay->counts().subscriptions == 1; }));
+  {
+    const test::RawPeer peer = impostor->accept();
+    impostor.reset();
+    static_cast<void>(peer.shake_hands(kind));
+    if (kind == "PUB") {  // a part that is too large
+      REQUIRE(rig.until([&] { return rig.relay->counts().upstreams == 1; }));
+      static_cast<void>(peer.send(test::zmtp::frame(std::string(2 * net::kMaxReceivedPart, 'x'))));
+    }
+    REQUIRE(rig.until([&] { return peer.hung_up(std::chrono::milliseconds(1)); }));
+  }
+  REQUIRE(rig.until([&] { return rig.relay->counts().upstreams == 0; }));
+  rig.daemons.push_back(net::open_socket(rig.context.get(), ZMQ_XPUB).value());
+  REQUIRE(net::bind_socket(rig.daemons[0].get(), endpoint));
+  rig.ahead_ns = link::Retry::kPause_ns + kNanosPerSecond;
+  REQUIRE(rig.subscribes("stats"));
+  REQUIRE(rig.subscribes("pose/ann"));
+  rig.publish("pose/ann", "1");
+  CHECK(rig.next(subscriber) == "pose/ann=1");
 }
 
 TEST_CASE("a flood of subscriptions is cut, and nothing of it stays upstream") {

@@ -1,5 +1,7 @@
 #include <catch2/catch.hpp>
 
+#include <algorithm>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -7,6 +9,7 @@
 #include "daemon/system/process.hpp"
 #include "daemon/tools/relay/relay.hpp"
 #include "proto/frame/time.hpp"
+#include "proto/message/bounded_parse.hpp"
 
 namespace posed::relay {
 namespace {
@@ -32,9 +35,9 @@ TEST_CASE("a topic's stream is what follows its kind") {
 }
 
 TEST_CASE("who subscribes later gets the skeletons that match, but not more than 20 a second") {
-  RelayedStreams streams;
+  RelayedStreams streams(1);
   for (const char* name : {"ann", "bob"}) {
-    REQUIRE(streams.admit(name, 0, kNow_ns));
+    REQUIRE(streams.admit(name, 0, true, kNow_ns) == Admission::kPasses);
     streams.keep_skeleton(name, std::string("bones of ") + name, kNow_ns);
   }
   CHECK(send_due(streams, kNow_ns + kNanosPerSecond).topics.empty());
@@ -54,34 +57,89 @@ TEST_CASE("who subscribes later gets the skeletons that match, but not more than
 }
 
 TEST_CASE("a name belongs to the upstream that sends it, until that one is silent") {
-  RelayedStreams streams;
-  CHECK(streams.admit("ann", 0, kNow_ns));
-  CHECK_FALSE(streams.admit("ann", 1, kNow_ns + kNanosPerSecond));
-  CHECK(streams.admit("ann", 0, kNow_ns + kNanosPerSecond));
-  CHECK(streams.admit("ann", 1, kNow_ns + 5 * kNanosPerSecond));
-  CHECK_FALSE(streams.admit("ann", 0, kNow_ns + 6 * kNanosPerSecond));
+  RelayedStreams streams(2);
+  CHECK(streams.admit("ann", 0, true, kNow_ns) == Admission::kPasses);
+  const std::int64_t soon_ns = kNow_ns + kNanosPerSecond;
+  CHECK(streams.admit("ann", 1, true, soon_ns) == Admission::kOthersName);
+  CHECK(streams.admit("ann", 0, false, soon_ns) == Admission::kPasses);
+  const std::int64_t later_ns = kNow_ns + 5 * kNanosPerSecond;
+  CHECK(streams.admit("ann", 1, true, later_ns) == Admission::kPasses);
+  CHECK(streams.admit("ann", 0, true, later_ns + kNanosPerSecond) == Admission::kOthersName);
+}
+
+TEST_CASE("who sends poses takes the name of one who sends none") {
+  RelayedStreams streams(2);
+  CHECK(streams.admit("ann", 0, false, kNow_ns) == Admission::kPasses);
+  CHECK(streams.admit("ann", 1, false, kNow_ns + 1) == Admission::kOthersName);
+  CHECK(streams.admit("ann", 1, true, kNow_ns + 2) == Admission::kPasses);
+  CHECK(streams.admit("ann", 0, true, kNow_ns + 3) == Admission::kOthersName);
+  CHECK(streams.streams() == 1);
+}
+
+TEST_CASE("the names and skeletons of one upstream leave the other's room alone") {
+  RelayedStreams streams(2);
+  const std::string large(kMaxSkeletonBytes / 16, 'x');
+  for (std::size_t i = 0; i < kMaxStreams + 100; ++i) {
+    const std::string name = "n" + std::to_string(i);
+    const Admission expected = i < kMaxStreams ? Admission::kPasses : Admission::kTooMany;
+    REQUIRE(streams.admit(name, 0, true, kNow_ns) == expected);
+    streams.keep_skeleton(name, large, kNow_ns);
+  }
+  CHECK(streams.skeleton_bytes(0) == kMaxSkeletonBytes / 2);
+  for (const char* name : {"ann", "bob"}) {
+    CHECK(streams.admit(name, 1, true, kNow_ns) == Admission::kPasses);
+    streams.keep_skeleton(name, large, kNow_ns);
+  }
+  CHECK(streams.skeleton_bytes(1) == 2 * large.size());
+}
+
+TEST_CASE("in one upstream, too, streams with poses come before names, and ended ones go") {
+  RelayedStreams streams(1);
+  std::int64_t now_ns = kNow_ns;
+  const auto names = [&](std::size_t first) {
+    for (std::size_t i = first; i < first + 1100; ++i) {
+      static_cast<void>(streams.admit("n" + std::to_string(i), 0, false, now_ns));
+    }
+  };
+  names(0);
+  CHECK(streams.streams() == kMaxStreams);
+  CHECK(streams.admit("glove", 0, false, now_ns) == Admission::kTooMany);
+  CHECK(streams.admit("ann", 0, true, now_ns) == Admission::kPasses);
+  CHECK(streams.streams() == kMaxStreams);
+  for (int i = 0; i < 20; ++i) {
+    now_ns += kNanosPerSecond;
+    names(0);
+    CHECK(streams.admit("ann", 0, true, now_ns) == Admission::kPasses);
+  }
+  // The names end, others come: half of the places are free after 3 s, and all after 10 s.
+  now_ns += 4 * kNanosPerSecond;
+  CHECK(streams.admit("glove", 0, false, now_ns) == Admission::kPasses);
+  CHECK(streams.streams() <= kMaxStreams / 2 + 1);
+  now_ns += 7 * kNanosPerSecond;
+  CHECK(streams.admit("glove", 0, false, now_ns) == Admission::kPasses);
+  CHECK(streams.streams() == 1);
 }
 
 TEST_CASE(
     "streams and the bytes of their skeletons are bounded, and those that have gone are "
     "forgotten") {
-  RelayedStreams streams;
+  RelayedStreams streams(1);
   const std::string large(kMaxSkeletonBytes / 4, 'x');
   for (std::size_t i = 0; i < kMaxStreams; ++i) {
     const std::string name = "s" + std::to_string(i);
-    REQUIRE(streams.admit(name, 0, kNow_ns));
+    REQUIRE(streams.admit(name, 0, true, kNow_ns) == Admission::kPasses);
     streams.keep_skeleton(name, large, kNow_ns);
   }
-  CHECK(streams.skeleton_bytes() == kMaxSkeletonBytes);
-  CHECK_FALSE(streams.admit("one-more", 0, kNow_ns));
+  CHECK(streams.skeleton_bytes(0) == kMaxSkeletonBytes);
+  CHECK(streams.admit("one-more", 0, true, kNow_ns) == Admission::kTooMany);
   streams.keep_skeleton("s1", "small", kNow_ns);  // it replaces the large one
-  CHECK(streams.skeleton_bytes() == kMaxSkeletonBytes - large.size() + 5);
+  CHECK(streams.skeleton_bytes(0) == kMaxSkeletonBytes - large.size() + 5);
   const std::int64_t later_ns = kNow_ns + 11 * kNanosPerSecond;
-  REQUIRE(streams.admit("one-more", 0, later_ns));
+  REQUIRE(streams.admit("one-more", 0, true, later_ns) == Admission::kPasses);
   CHECK(streams.streams() == 1);
-  CHECK(streams.skeleton_bytes() == 0);
+  CHECK(streams.skeleton_bytes(0) == 0);
   streams.keep_skeleton("unknown", "x", later_ns);
-  CHECK(streams.skeleton_bytes() == 0);
+  CHECK(streams.skeleton_bytes(0) == 0);
 }
 
 std::string toy_stats(const std::string& stream, std::int64_t time_ns) {
@@ -133,6 +191,51 @@ TEST_CASE("relays in a circle do not make the stats grow") {
   REQUIRE(merged.ParseFromString(all));
   CHECK(merged.stream().size() == 2);
   CHECK(merged.source().size() == 2);
+}
+
+// The merged stats of an upstream of these, and of the honest "ann" at `honest`.
+v1::Stats beside_ann(MergedStats& relay, const v1::Stats& hostile, std::size_t honest) {
+  bool valid = false;
+  static_cast<void>(relay.accept(1 - honest, hostile.SerializeAsString(), kNow_ns, valid));
+  REQUIRE(valid);
+  auto bytes = relay.accept(honest, toy_stats("ann", 5), kNow_ns, valid);
+  if (honest == 1) bytes = relay.accept(0, hostile.SerializeAsString(), kNow_ns, valid);
+  REQUIRE(bytes);
+  CHECK(bytes->size() <= static_cast<std::size_t>(net::kMaxReceivedPart));
+  v1::Stats merged;  // as a client does
+  REQUIRE(message::parse_bounded(merged, std::as_bytes(std::span(*bytes))));
+  CHECK(std::ranges::count(merged.stream(), "ann", &v1::StreamStats::stream) == 1);
+  CHECK(std::ranges::count(merged.source(), "ann-source", &v1::SourceStats::name) == 1);
+  return merged;
+}
+
+TEST_CASE("no upstream makes the merged stats more than a client takes, or hides another's") {
+  const std::size_t honest = GENERATE(0, 1);
+  v1::Stats bytes;
+  bytes.add_stream()->set_device_info(std::string(1'048'560, 'd'));
+  v1::Stats parts;
+  v1::StageStats& stage = *parts.add_stream()->add_stage();
+  for (int i = 0; i < 32'764; ++i) stage.add_word("");
+  v1::Stats names;
+  for (int i = 0; i < 10'000; ++i) names.add_stream()->set_stream(std::to_string(i));
+  v1::Stats head;
+  head.set_time_ns(7);
+  head.set_recorder_file(std::string(1'048'560, 'r'));
+  for (const v1::Stats& hostile : {bytes, parts, names, head}) {
+    MergedStats relay(2);
+    const v1::Stats merged = beside_ann(relay, hostile, honest);
+    CHECK(merged.time_ns() == (honest == 0 ? 5 : hostile.time_ns()));
+    CHECK(relay.left_out(honest) == 0);
+  }
+  // What one does not need is the other's.
+  MergedStats relay(2);
+  v1::Stats many;
+  for (int i = 0; i < 1000; ++i) {
+    many.add_stream()->set_stream(std::to_string(i));
+    many.mutable_stream(i)->set_device_info(std::string(900, 'd'));
+  }
+  CHECK(beside_ann(relay, many, honest).stream().size() == 1001);
+  CHECK(relay.left_out(1 - honest) == 0);
 }
 
 TEST_CASE("stats of half a million empty parts are refused before memory is spent on them") {
