@@ -106,7 +106,7 @@ Result<std::string> RecordingFolder::piece(std::string_view name, std::uint64_t 
   const auto path = folder_ / wanted;
   // Before it is opened: to close a file ends this process's locks on it, SQLite's of the log that
   // it writes, too, and then others who read that log may take its -wal file away.
-  if (is_recording(wanted) && is_in_use(path)) {
+  if (is_recording(wanted) && (is_in_use(path) || is_written_here(path))) {
     return fail(
         fmt::format("{} is still being written; it can be fetched when posed has ended, or"
                     " once `posed convert` has opened it if posed was killed",

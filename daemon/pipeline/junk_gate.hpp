@@ -50,7 +50,11 @@ class JunkGate {
   RT_SAFE void decoded(std::uint64_t sender, bool used, std::int64_t cost,
                        std::int64_t now_ns) noexcept {
     if (sender == 0) return;
-    if (used) return remember(sender, now_ns);
+    if (used) {
+      // The rest of a long message came just before its end.
+      if (sender == link_) left_ = std::max<std::int64_t>(left_, 0);
+      return remember(sender, now_ns);
+    }
     left_ = std::max(left_ - cost, sender == link_ ? -kLowest : -kJunkPerSecond);
   }
 

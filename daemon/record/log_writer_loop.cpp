@@ -218,8 +218,8 @@ Result<> LogWriterLoop::write_stream_rows() {
 Result<> LogWriterLoop::commit(std::int64_t now_ns) {
   if (!writer_.is_in_place()) {
     return posed::fail(
-        "the log was deleted, moved or replaced while it was written; put it back, or end the"
-        " recording and begin another",
+        "the log was deleted, moved or replaced, or cut short, while it was written; put it back,"
+        " or end the recording and begin another",
         path_.string());
   }
   for (const auto& model : models_) {
@@ -260,7 +260,9 @@ Result<> LogWriterLoop::finish(std::int64_t now_ns) {
         "recording could not be finished; the log ends at the last commit (" + trouble_ + ")",
         path_.string());
   }
-  return writer_.close();
+  auto closed = writer_.close();
+  if (!closed) ++errors_;  // so that nobody is told that nothing is missing
+  return closed;
 }
 
 void LogWriterLoop::count_lost(Tally& tally, std::uint64_t count) {

@@ -16,6 +16,7 @@
 #include <thread>
 #include <utility>
 
+#include "drivers/transport/flood.hpp"
 #include "drivers/transport/upkeep.hpp"
 #include "proto/frame/time.hpp"
 
@@ -30,9 +31,6 @@ constexpr milliseconds kWritePatience{1000};
 constexpr milliseconds kDrainPatience{1000};
 constexpr milliseconds kClosePatience{50};
 constexpr std::int64_t kOfNoUse_ns = 5 * kNanosPerSecond;
-// A sender that never says its name is of no use for a second, until it is described.
-constexpr std::size_t kMaxOfNoUse = 3 * 1024 * 1024;  // bytes in kFloods_ns
-constexpr std::int64_t kFloods_ns = 3 * kNanosPerSecond;
 constexpr int kMaxWaiting = 256;  // reads; hidraw keeps 64 reports
 
 bool not_now(int error) noexcept {
@@ -68,7 +66,7 @@ class LinkTransport final : public Transport, public Upkeep {
   LinkTransport(const LinkTransport&) = delete;
   LinkTransport& operator=(const LinkTransport&) = delete;
   ~LinkTransport() override {
-    if (floods_.load()) link_.pause_host();
+    if (flood_.has_ended()) link_.pause_host();
   }
 
   [[nodiscard]] int poll_fd() const noexcept override { return link_.fd(); }
@@ -76,13 +74,9 @@ class LinkTransport final : public Transport, public Upkeep {
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
   RT_SAFE void decoded(bool used) noexcept override {
     if (used) used_ns_.store(read_ns_, std::memory_order_relaxed);
-    if (used || read_ns_ - since_ns_ > kFloods_ns) {
-      of_no_use_ = 0;
-      since_ns_ = read_ns_;
-    }
-    if (!used) of_no_use_ += read_;
+    if (link_.is_of_network()) flood_.decoded(used);
   }
-  RT_SAFE void refuse() noexcept override { floods_.store(true); }
+  RT_SAFE void refuse() noexcept override { flood_.end(); }
   [[nodiscard]] bool send(std::span<const std::byte> bytes, std::uint8_t socket) noexcept override;
   void upkeep(std::int64_t now_ns) noexcept override;
   [[nodiscard]] std::string consume_note() override;
@@ -93,13 +87,9 @@ class LinkTransport final : public Transport, public Upkeep {
   Connection link_;
   std::int64_t read_ns_ = 0;
   std::int64_t started_ns_ = 0;  // tells this link from the ones before it
-  std::size_t read_ = 0;         // bytes of the last read
-  // Bytes of no use in a row, within a second from here on.
-  std::size_t of_no_use_ = 0;
-  std::int64_t since_ns_ = 0;
+  Flood flood_;
   // When the last bytes of use were read; before start() there is nothing to wait for.
   std::atomic<std::int64_t> used_ns_{std::numeric_limits<std::int64_t>::max()};
-  std::atomic<bool> floods_{false};
   bool is_given_up_ = false, is_reported_ = false;  // of the upkeep's thread
   std::array<std::byte, kRead> buffer_;
   // The rest of a message that the device accepted only in part; no other bytes may come between.
@@ -122,14 +112,13 @@ Result<> LinkTransport::start(std::int64_t now_ns) {
 Chunk LinkTransport::read(std::int64_t now_ns) noexcept {
   read_ns_ = now_ns;
   flush();
-  if (link_.listener() >= 0 && of_no_use_ > kMaxOfNoUse) floods_.store(true);
-  const bool floods = floods_.load();
+  const bool floods = flood_.has_ended();
   const ssize_t got = floods ? 0 : link_.receive(buffer_);
-  read_ = static_cast<std::size_t>(std::max<ssize_t>(got, 0));
   if (got > 0) {
-    const bool listens = link_.listener() >= 0;
-    return {.bytes = {buffer_.data(), read_},
-            .sender = listens ? static_cast<std::uint64_t>(started_ns_) | Chunk::kLink : 0};
+    const auto size = static_cast<std::size_t>(got);
+    flood_.read(size, now_ns);
+    const auto number = static_cast<std::uint64_t>(started_ns_) | Chunk::kLink;
+    return {.bytes = {buffer_.data(), size}, .sender = link_.is_of_network() ? number : 0};
   }
   if (got < 0 && not_now(errno)) return {};
   return {.bytes = {}, .lost = true, .foreign = floods || link_.was_browser() ? 1U : 0U};
@@ -145,16 +134,13 @@ void LinkTransport::upkeep(std::int64_t now_ns) noexcept {
 }
 
 std::string LinkTransport::consume_note() {
-  const bool floods = floods_.load();
+  const bool floods = flood_.has_ended();
   if (!(is_given_up_ || floods) || is_reported_) return {};
   is_reported_ = true;
   if (!floods) {
     return link_.name() + " has sent nothing of use for 5 s, and another device waits: it is cut";
   }
-  return link_.name() +
-         " has sent too much of nothing usable (3 MB within 3 s, or all that a recording takes of"
-         " that): it is cut, and its address may come again after " +
-         std::to_string(PausedHosts::kPause.count()) + " s";
+  return Flood::words(link_.name());
 }
 
 // RT-safe except for the write.

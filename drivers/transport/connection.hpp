@@ -43,18 +43,19 @@ class Connection {
   // waits no more.
   void heed(std::shared_ptr<const Cancel> cancel) noexcept { cancel_ = std::move(cancel); }
 
-  // A link that somebody else has made, through this listening socket, which outlives the link. It
-  // ends, as if hung up, if what comes begins as what a web browser sends; and make_link_transport
-  // gives it up if it is of no use while another one waits, or if it floods, and then names its
-  // host in `paused`.
+  // A link over a network. If it floods, make_link_transport ends it and names its host in
+  // `paused`. `listener`: somebody else has made it, through this listening socket, which outlives
+  // it; -1: posed has. One that somebody else has made ends, as if hung up, if what comes begins as
+  // what a web browser sends, and is given up if it is of no use while another one waits.
   void came_through(int listener, const Host& host, std::shared_ptr<PausedHosts> paused) noexcept {
     listener_ = listener;
     host_ = host;
     paused_ = std::move(paused);
     undecided_ = true;
   }
-  // The host of a link that came through a listener must wait before it may come again. Cold; the
-  // thread of the factory.
+  [[nodiscard]] bool is_of_network() const noexcept { return paused_ != nullptr; }
+  // The host of a link over a network must wait before it is heard again. Cold; the thread of the
+  // factory.
   void pause_host() noexcept {
     if (paused_) paused_->add(host_);
   }

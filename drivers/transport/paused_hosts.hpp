@@ -1,5 +1,5 @@
-// PausedHosts: who flooded a listening device and must wait before connecting again, because each
-// connection costs work and space in a recording before it is found out. One thread.
+// PausedHosts: who flooded a device's connection and must wait before the next one, because each
+// costs work and space in a recording before it is found out. One thread.
 #pragma once
 
 #include <algorithm>
@@ -13,6 +13,7 @@ namespace posed::drivers {
 class PausedHosts {
  public:
   static constexpr std::chrono::seconds kPause{2};
+  static constexpr Host kOurs{};  // whom posed itself connects to
 
   // If too many are paused, the one that has waited longest is forgotten.
   void add(const Host& host) noexcept {

@@ -7,6 +7,7 @@
 #include <csignal>
 #include <cstring>
 #include <span>
+#include <utility>
 
 #include <pthread.h>
 #include <sys/socket.h>
@@ -85,20 +86,24 @@ Result<> check_subscription(const SubscriptionSettings& settings) {
 }
 
 Result<std::unique_ptr<SubscriptionTransport>> SubscriptionTransport::open(
-    const SubscriptionSettings& settings, const Cancel& cancel) {
-  std::unique_ptr<SubscriptionTransport> made(new SubscriptionTransport(settings));
+    const SubscriptionSettings& settings, const Cancel& cancel,
+    std::shared_ptr<PausedHosts> paused) {
+  std::unique_ptr<SubscriptionTransport> made(
+      new SubscriptionTransport(settings, std::move(paused)));
   TRY(made->connect());
   TRY(made->await_link(cancel));
   made->thread_ = std::thread([transport = made.get()] { transport->receive_all(); });
   return made;
 }
 
-SubscriptionTransport::SubscriptionTransport(const SubscriptionSettings& settings)
-    : settings_(settings), outgoing_(kMaxChunk), incoming_(kMaxChunk) {}
+SubscriptionTransport::SubscriptionTransport(const SubscriptionSettings& settings,
+                                             std::shared_ptr<PausedHosts> paused)
+    : settings_(settings), paused_(std::move(paused)), outgoing_(kMaxChunk), incoming_(kMaxChunk) {}
 
 SubscriptionTransport::~SubscriptionTransport() {
   stop_.signal();
   if (thread_.joinable()) thread_.join();
+  if (flood_.has_ended()) paused_->add(PausedHosts::kOurs);
   for (const int fd : {reader_, writer_}) {
     if (fd >= 0) ::close(fd);
   }
@@ -184,17 +189,36 @@ void SubscriptionTransport::hand_over(std::size_t size) noexcept {
   dropped_.fetch_add(1);
 }
 
-Chunk SubscriptionTransport::read(std::int64_t /*now_ns*/) noexcept {
+Result<> SubscriptionTransport::start(std::int64_t now_ns) {
+  number_ = static_cast<std::uint64_t>(now_ns) | Chunk::kLink;
+  return {};
+}
+
+Chunk SubscriptionTransport::read(std::int64_t now_ns) noexcept {
   Chunk chunk;
+  if (flood_.has_ended()) {
+    chunk.lost = true;
+    chunk.foreign = 1;
+    return chunk;
+  }
   const ssize_t size = ::recv(reader_, incoming_.data(), incoming_.size(), MSG_DONTWAIT);
   if (size == 0) {
     chunk.lost = true;
     return chunk;
   }
-  if (size > 0) chunk.bytes = std::span(incoming_).first(size);
+  if (size > 0) {
+    chunk.bytes = std::span(incoming_).first(size);
+    chunk.sender = number_;
+    flood_.read(chunk.bytes.size(), now_ns);
+  }
   chunk.damaged = damaged_.exchange(0);
   chunk.kernel_dropped = dropped_.exchange(0);
   return chunk;
+}
+
+std::string SubscriptionTransport::consume_note() {
+  if (!flood_.has_ended() || std::exchange(is_reported_, true)) return {};
+  return Flood::words("the daemon at " + settings_.endpoint);
 }
 
 }  // namespace posed::drivers

@@ -16,6 +16,9 @@
 
 #include "drivers/driver.hpp"
 #include "drivers/transport/cancel.hpp"
+#include "drivers/transport/flood.hpp"
+#include "drivers/transport/paused_hosts.hpp"
+#include "drivers/transport/upkeep.hpp"
 #include "proto/frame/event_fd.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/zmq/link_monitor.hpp"
@@ -33,21 +36,27 @@ struct SubscriptionSettings {
 // Checks the endpoint and reads the key files, without connecting. Cold.
 Result<> check_subscription(const SubscriptionSettings& settings);
 
-class SubscriptionTransport final : public Transport {
+class SubscriptionTransport final : public Transport, public Upkeep {
  public:
-  // Waits for the connection for up to a second, or until `cancel` fires. Cold.
+  // Waits for the connection for up to a second, or until `cancel` fires. If it floods, it ends,
+  // and `paused` is told. Cold.
   static Result<std::unique_ptr<SubscriptionTransport>> open(const SubscriptionSettings& settings,
-                                                             const Cancel& cancel);
+                                                             const Cancel& cancel,
+                                                             std::shared_ptr<PausedHosts> paused);
   ~SubscriptionTransport() override;
 
   [[nodiscard]] int poll_fd() const noexcept override { return reader_; }
   // Keeps what came since open(): a skeleton may be among it.
-  Result<> start(std::int64_t /*now_ns*/) override { return {}; }
+  Result<> start(std::int64_t now_ns) override;
   // A chunk is a topic, a zero byte, and the message. Chunk::lost when the connection ended.
   [[nodiscard]] Chunk read(std::int64_t now_ns) noexcept override;
+  RT_SAFE void decoded(bool used) noexcept override { flood_.decoded(used); }
+  RT_SAFE void refuse() noexcept override { flood_.end(); }
+  void upkeep(std::int64_t /*now_ns*/) noexcept override {}
+  [[nodiscard]] std::string consume_note() override;
 
  private:
-  explicit SubscriptionTransport(const SubscriptionSettings& settings);
+  SubscriptionTransport(const SubscriptionSettings& settings, std::shared_ptr<PausedHosts> paused);
   Result<> connect();
   Result<> await_link(const Cancel& cancel);
   // The thread: receives until the link or the object ends.
@@ -57,6 +66,10 @@ class SubscriptionTransport final : public Transport {
   void hand_over(std::size_t size) noexcept;
 
   SubscriptionSettings settings_;
+  std::shared_ptr<PausedHosts> paused_;
+  Flood flood_;
+  std::uint64_t number_ = Chunk::kLink;  // tells this link from the ones before it
+  bool is_reported_ = false;
   net::Context context_;
   net::Socket socket_;
   std::unique_ptr<net::LinkMonitor> monitor_;  // ends before the socket

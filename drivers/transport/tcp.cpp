@@ -138,11 +138,13 @@ Result<> check_connect(const std::string& endpoint) {
 Result<Connection> TransportFactory::connect(const std::string& endpoint) {
   const auto address = TRY(parse_endpoint(endpoint));
   if (only_prepare_) return not_opened();
+  await_pause();
   const int fd = open_socket(address, SOCK_STREAM);
   if (fd < 0) {
     return fail("posed may open no more files; raise their limit (ulimit -n, LimitNOFILE)");
   }
   Connection link(fd, endpoint, "tcp " + endpoint);
+  link.came_through(-1, PausedHosts::kOurs, paused_);
   link.heed(cancel_);
   if (::connect(fd, address.get(), address.size) != 0) {
     if (errno != EINPROGRESS) return nothing_there(endpoint, errno_text());

@@ -1,5 +1,6 @@
 #include "drivers/transport/transport_factory.hpp"
 
+#include <poll.h>
 #include <unistd.h>
 
 namespace posed::drivers {
@@ -18,7 +19,14 @@ Result<std::unique_ptr<SubscriptionTransport>> TransportFactory::subscribe(
     const SubscriptionSettings& settings) {
   TRY(check_subscription(settings));
   if (only_prepare_) return not_opened();
-  return SubscriptionTransport::open(settings, *cancel_);
+  await_pause();
+  return SubscriptionTransport::open(settings, *cancel_, paused_);
+}
+
+void TransportFactory::await_pause() const noexcept {
+  if (!paused_->have(PausedHosts::kOurs)) return;
+  pollfd wake{.fd = cancel_->fd(), .events = POLLIN, .revents = 0};
+  ::poll(&wake, 1, static_cast<int>(std::chrono::milliseconds(PausedHosts::kPause).count()));
 }
 
 }  // namespace posed::drivers

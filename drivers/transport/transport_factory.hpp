@@ -66,7 +66,8 @@ class TransportFactory {
   // wait in the order in which they came: a device that shares its address gets its turn. Cold.
   Result<Connection> accept(const ListenSettings& settings);
 
-  // Connects to a system that serves its data over TCP. Waits for it up to a second. Cold.
+  // Connects to a system that serves its data over TCP. Waits for it up to a second, and two more
+  // if the last one flooded. Cold.
   Result<Connection> connect(const std::string& endpoint);
 
   // Opens a hidraw node: one report per read and per write. Cold.
@@ -78,7 +79,7 @@ class TransportFactory {
   // Opens the sockets of a device that sends datagrams. Does not wait for it. Cold.
   Result<std::unique_ptr<UdpTransport>> udp(const UdpSettings& settings);
 
-  // Subscribes to topics of another posed. Waits up to a second for it; an error says why it
+  // Subscribes to topics of another posed. Waits for it as connect() does; an error says why it
   // refuses. Cold.
   Result<std::unique_ptr<SubscriptionTransport>> subscribe(const SubscriptionSettings& settings);
 
@@ -109,6 +110,8 @@ class TransportFactory {
   };
   // Takes the first that waits and may come now.
   static std::optional<Connection> first_waiting(Listener& listener);
+  // If the one that posed itself connects to has just flooded.
+  void await_pause() const noexcept;
 
   bool only_prepare_ = false;
   std::string note_{};

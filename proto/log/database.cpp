@@ -59,6 +59,11 @@ std::unexpected<Error> failure(sqlite3* handle, const std::string& file) {
 
 }  // namespace
 
+std::unexpected<Error> damaged(const std::string& file, const std::string& how) {
+  return fail("the log is damaged (" + how + "); `sqlite3 FILE .recover` may save what is left",
+              file);
+}
+
 int Budget::spend(void* budget) {
   auto& self = *static_cast<Budget*>(budget);
   if (++self.spent_ <= kFreeCalls) return 0;
@@ -251,6 +256,26 @@ bool Database::is_in_place() const {
   int moved = 0;
   const int known = sqlite3_file_control(handle_.get(), "main", SQLITE_FCNTL_HAS_MOVED, &moved);
   return known != SQLITE_OK || moved == 0;
+}
+
+Database::Sizes Database::sizes() const {
+  Sizes found{};
+  std::error_code error;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const auto size = std::filesystem::file_size(file_ + (i == 0 ? "" : "-wal"), error);
+    found[i] = error ? 0 : size;
+  }
+  return found;
+}
+
+bool Database::has_shrunk() const {
+  const Sizes now = sizes();
+  return now[0] < sizes_[0] || now[1] < sizes_[1];
+}
+
+Result<> Database::check_content() {
+  const auto verdict = TRY(value("PRAGMA quick_check(1)"));
+  return verdict == "ok" ? Result<>{} : damaged(file_, verdict);
 }
 
 void Database::leave_files() {

@@ -23,6 +23,8 @@ struct sqlite3_stmt;
 
 namespace posed::log {
 
+std::unexpected<Error> damaged(const std::string& file, const std::string& how);
+
 // The work that one step of a statement, or one run of statements, may cost: what the size of the
 // file explains.
 class Budget {
@@ -135,6 +137,12 @@ class Database {
   void merge_at_end(bool on);
   // False when the file was deleted, moved or replaced since it was opened.
   [[nodiscard]] bool is_in_place() const;
+  // Call it after each commit: the file and its -wal only grow while this is open.
+  void note_sizes() { sizes_ = sizes(); }
+  // Whether one of them was cut short since then.
+  [[nodiscard]] bool has_shrunk() const;
+  // Reads the whole file: a second for each GB. The error says what is damaged.
+  Result<> check_content();
   // Moves what is in the -wal into the file, and then leaves all files where they are when this is
   // destroyed.
   void leave_files();
@@ -145,10 +153,13 @@ class Database {
   };
   Database(sqlite3* handle, std::string file);
   Result<std::string> schema();
+  using Sizes = std::array<std::uintmax_t, 2>;
+  [[nodiscard]] Sizes sizes() const;
 
   std::unique_ptr<Budget> budget_;  // SQLite has its address
   std::unique_ptr<sqlite3, Close> handle_;
   std::string file_;
+  Sizes sizes_{};
 };
 
 }  // namespace posed::log

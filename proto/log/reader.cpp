@@ -48,23 +48,12 @@ void merge_wal(Database& database) {
   database.set_busy_timeout_ms(kReadPatience_ms);
 }
 
-std::unexpected<Error> damaged(const std::string& file, const std::string& how) {
-  return fail("the log is damaged (" + how + "); `sqlite3 FILE .recover` may save what is left",
-              file);
-}
-
 Result<> check_length(Database& database, const std::string& file) {
   const auto page = TRY(database.value("PRAGMA page_size"));
   std::error_code error;
   const auto size = std::filesystem::file_size(file, error);
   // SQLite itself reads a truncated last page as if it ended in zeros.
   if (error || size % std::stoul(page) != 0) return damaged(file, "cut short");
-  return {};
-}
-
-Result<> check_content(Database& database, const std::string& file) {
-  const auto verdict = TRY(database.value("PRAGMA quick_check(1)"));
-  if (verdict != "ok") return damaged(file, verdict);
   return {};
 }
 
@@ -102,10 +91,10 @@ Result<Database> open_whole(const std::filesystem::path& path) {
   const bool has_wal = TRY(check_wal(database, file));
   TRY(database.check_schema());
   database.set_busy_timeout_ms(kReadPatience_ms);
-  if (has_wal) TRY(check_content(database, file));
+  if (has_wal) TRY(database.check_content());
   merge_wal(database);
   TRY(check_length(database, file));
-  if (!has_wal) TRY(check_content(database, file));
+  if (!has_wal) TRY(database.check_content());
   return database;
 }
 

@@ -18,6 +18,8 @@ namespace {
 
 // Merging the -wal takes a reader less time than this, and the recorder's memory lasts longer.
 constexpr int kPatience_ms = 4000;
+// What is written is read again up to this size, bytes: it takes a second.
+constexpr std::uintmax_t kMaxReadAgain = 1024UL * 1024 * 1024;
 constexpr std::int64_t kMaxMark = 0x7FFFFFFF;
 constexpr std::string_view kTakenWords =
     "exists already, or a -wal or -journal of this name does; choose another name or say "
@@ -26,6 +28,7 @@ constexpr std::string_view kTakenWords =
 // The tables whose ids the writer assigns, in the order of the row types.
 enum Table : std::size_t { kChunk, kDecision, kFrame, kGap, kNumbered };
 constexpr std::array<const char*, kNumbered> kNames{"chunk", "decision", "frame", "gap"};
+using Ids = std::array<std::int64_t, kNumbered>;
 
 // The writer's other statements.
 enum Sql : std::size_t { kSource = kNumbered, kStream, kTake, kBlob, kBegin, kCommit, kSqlCount };
@@ -99,6 +102,29 @@ Result<> check_meta(Database& database, const Beginning& beginning, const std::s
   return fail("another recording has this name now; end this one and begin it again", file);
 }
 
+Result<Ids> last_ids(Database& database) {
+  Ids ids{};
+  for (std::size_t table = 0; table < kNumbered; ++table) {
+    const auto last =
+        TRY(database.value("SELECT ifnull(max(id),0) FROM " + std::string(kNames[table])));
+    ids[table] = std::stoll(last);
+  }
+  return ids;
+}
+
+// Whether all that was committed can be read back. Somebody may have cut the log or its -wal, and
+// SQLite takes an older state for whole.
+Result<> check_written(Database& database, const Ids& committed, const std::string& file) {
+  std::error_code error;
+  const bool is_short = std::filesystem::file_size(file, error) <= kMaxReadAgain && !error;
+  if (is_short) TRY(database.check_content());
+  const Ids found = TRY(last_ids(database));
+  for (std::size_t table = 0; table < kNumbered; ++table) {
+    if (found[table] < committed[table]) return damaged(file, "its last rows have gone");
+  }
+  return {};
+}
+
 }  // namespace
 
 // An open log. SQLite closes its files only after the statements, which stand behind them.
@@ -106,7 +132,7 @@ struct Writer::Connection {
   Database database;
   std::vector<Statement> statements{};
   bool in_transaction = false;
-  std::array<std::int64_t, kNumbered> last_id{};
+  Ids last_id{};
 
   static Result<Connection> on(Database database);
 
@@ -138,11 +164,7 @@ Result<Writer::Connection> Writer::Connection::on(Database database) {
     auto statement = TRY(connection.database.prepare(sql));
     connection.statements.push_back(std::move(statement));
   }
-  for (std::size_t table = 0; table < kNumbered; ++table) {
-    const auto last = TRY(
-        connection.database.value("SELECT ifnull(max(id),0) FROM " + std::string(kNames[table])));
-    connection.last_id[table] = std::stoll(last);
-  }
+  connection.last_id = TRY(last_ids(connection.database));
   return connection;
 }
 
@@ -150,7 +172,9 @@ struct Writer::State {
   std::filesystem::path path;
   Beginning beginning;
   bool reserved = false, begun = false;
+  bool kept = false;  // something was committed after the beginning, or it was closed
   std::optional<Connection> open{};
+  Ids committed{};
   std::vector<std::byte> sequences{};  // of the chunk being written
 
   Result<Connection> connect();
@@ -171,6 +195,7 @@ Result<Writer::Connection> Writer::State::connect() {
     TRY(write_birth(database, beginning));
   } else {
     TRY(check_meta(database, beginning, path.string()));
+    TRY(check_written(database, committed, path.string()));
   }
   begun = true;
   TRY(database.run("PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL;"));
@@ -202,11 +227,12 @@ Writer::Writer(Writer&&) noexcept = default;
 Writer& Writer::operator=(Writer&&) noexcept = default;
 
 Writer::~Writer() {
-  if (state_ == nullptr || !state_->reserved || state_->begun) return;
+  if (state_ == nullptr || !state_->reserved || state_->kept) return;
+  const bool is_own = is_in_place();
   state_->open.reset();
   std::error_code error;
-  const bool is_empty = std::filesystem::file_size(state_->path, error) == 0;
-  if (is_empty && !error) std::filesystem::remove(state_->path, error);
+  const bool is_empty = std::filesystem::file_size(state_->path, error) == 0 && !error;
+  if (is_own || (is_empty && !state_->begun)) std::filesystem::remove(state_->path, error);
 }
 
 Result<Writer> Writer::create(const std::filesystem::path& path, Beginning beginning) {
@@ -226,14 +252,20 @@ void Writer::interrupt() {
   state_->open->statements.clear();
   state_->open->database.rollback();
   // What lies at the name now may be of somebody else, and stays. The log gets all that is in its
-  // -wal, so that whoever has moved it away has it whole.
-  if (!is_in_place()) state_->open->database.leave_files();
+  // -wal, so that whoever has moved it away has it whole. But from a -wal that was cut it would get
+  // nonsense.
+  Database& database = state_->open->database;
+  if (!database.is_in_place()) database.leave_files();
+  if (database.has_shrunk()) database.merge_at_end(false);
   state_->open.reset();
 }
 
 bool Writer::is_open() const { return state_->open.has_value(); }
 
-bool Writer::is_in_place() const { return state_->open && state_->open->database.is_in_place(); }
+bool Writer::is_in_place() const {
+  return state_->open && state_->open->database.is_in_place() &&
+         !state_->open->database.has_shrunk();
+}
 
 Result<> Writer::add(const SourceRow& row) {
   return state_->open->insert(bind(state_->open->statements[kSource], row));
@@ -332,14 +364,21 @@ std::int64_t Writer::last_chunk_id() const {
 Result<> Writer::commit() {
   if (!state_->open->in_transaction) return {};
   auto done = state_->open->statements[kCommit].execute();
-  if (done) state_->open->in_transaction = false;
-  return done;
+  if (!done) return done;
+  state_->open->in_transaction = false;
+  state_->kept = true;
+  state_->open->database.note_sizes();
+  state_->committed = state_->open->last_id;
+  return {};
 }
 
 Result<> Writer::close() {
   TRY(commit());
+  state_->kept = true;
   state_->open->statements.clear();  // an open statement would keep the log in WAL mode
-  return state_->open->database.run("PRAGMA wal_checkpoint(TRUNCATE); PRAGMA journal_mode=DELETE;");
+  TRY(state_->open->database.run("PRAGMA wal_checkpoint(TRUNCATE); PRAGMA journal_mode=DELETE;"));
+  auto written = TRY(Database::open(state_->path, Database::Mode::kRead));
+  return check_written(written, state_->committed, state_->path.string());
 }
 
 }  // namespace posed::log

@@ -38,7 +38,7 @@ class Writer {
 
   Writer(Writer&&) noexcept;
   Writer& operator=(Writer&&) noexcept;
-  // Removes the empty file of a log that was never begun.
+  // Removes the file of a log of which nothing was committed after its beginning.
   ~Writer();
 
   // Opens the log: begins it, or after interrupt() continues it. The other functions, except
@@ -48,7 +48,8 @@ class Writer {
   // only a new connection is known to be in a valid state.
   void interrupt();
   [[nodiscard]] bool is_open() const;
-  // False when the log was deleted, moved or replaced, so that what is written would be lost.
+  // False when the log was deleted, moved, replaced or cut short, so that what is written would be
+  // lost.
   [[nodiscard]] bool is_in_place() const;
 
   // Chunks, decisions, frames and gaps get the next id of their table; the id in the row is
@@ -73,7 +74,8 @@ class Writer {
 
   // Makes all rows so far survive kill -9 and power loss.
   Result<> commit();
-  // Commits, and leaves one file without -wal.
+  // Commits, and leaves one file without -wal. An error if not all that was committed can be read
+  // back; a log of more than 1 GiB is not read for that, except for its last rows.
   Result<> close();
 
  private:

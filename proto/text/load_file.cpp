@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdlib>
 #include <system_error>
 
 #include <fcntl.h>
@@ -37,11 +38,28 @@ Result<> expect_there(const std::filesystem::path& path) {
   return fail("cannot be reached (" + why.message() + "); check the path", path.string());
 }
 
+bool is_written_here(const std::filesystem::path& path) {
+  struct stat wanted{};
+  if (stat(path.c_str(), &wanted) != 0 || !S_ISREG(wanted.st_mode)) return false;
+  std::error_code error;
+  std::filesystem::directory_iterator entries("/proc/self/fd", error);
+  for (; !error && entries != std::filesystem::directory_iterator(); entries.increment(error)) {
+    const int fd = std::atoi(entries->path().filename().c_str());
+    struct stat is{};
+    if ((fcntl(fd, F_GETFL) & O_ACCMODE) == O_RDWR && fstat(fd, &is) == 0 &&
+        is.st_dev == wanted.st_dev && is.st_ino == wanted.st_ino) {
+      return true;
+    }
+  }
+  return false;
+}
+
 Result<std::string> load_file(const std::filesystem::path& path, const FileRule& rule) {
   const std::string what(rule.what);
   const auto refused = [&path](const std::string& sentence) {
     return fail(sentence, path.string());
   };
+  if (is_written_here(path)) return refused("is being written by posed; name another file");
   // Without O_NONBLOCK, opening a pipe would wait until another process writes into it.
   const Descriptor file(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
   if (file.get() < 0) {

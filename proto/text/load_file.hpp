@@ -30,6 +30,10 @@ struct FileRule {
 // An Error if nothing of that name is there, or if it cannot be reached, which says why.
 Result<> expect_there(const std::filesystem::path& path);
 
+// Whether this process has the file open to read and write, as SQLite has a log. If it were opened
+// once more, under whatever name, to close it again would end SQLite's locks on it.
+[[nodiscard]] bool is_written_here(const std::filesystem::path& path);
+
 // Returns all bytes of the file. An Error names the path and the reason.
 Result<std::string> load_file(const std::filesystem::path& path, const FileRule& rule);
 

@@ -57,6 +57,25 @@ class SetAside {
   std::filesystem::path file_;  // empty: nothing to restore
 };
 
+void remove_log(const std::filesystem::path& file) {
+  for (const char* suffix : log::kFileSuffixes) {
+    std::error_code ignored;
+    if (!file.empty()) std::filesystem::remove(file.string() + suffix, ignored);
+  }
+}
+
+// Too little memory or too few threads end posed with an exception; then `file`, which is of this
+// process, is removed, because nothing was recorded. Empty: none.
+template <typename Start>
+auto start_or_remove(const std::filesystem::path& file, const Start& start) {
+  try {
+    return start();
+  } catch (...) {
+    remove_log(file);
+    throw;
+  }
+}
+
 // Whether another process holds a lock of SQLite's, as its writer does all the time.
 bool is_in_use(const std::filesystem::path& file) {
   const int fd = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
@@ -296,17 +315,18 @@ Result<> stream_and_record(const RecordingPlan& plan, const config::DaemonConfig
         if (clips && event.take) clips->take_changed(*event.take);
       }};
   std::set<std::uint32_t> with_body;  // sources, by number
-  auto recorder = TRY(record::Recorder::open(
-      std::move(recorder_options), record::recorded_setup(daemon.sources(), daemon.slots())));
+  auto recorder = TRY(start_or_remove(name->reserved ? name->path : "", [&] {
+    return record::Recorder::open(std::move(recorder_options),
+                                  record::recorded_setup(daemon.sources(), daemon.slots()));
+  }));
+  // By now that of --out is of this process, too.
+  const auto own_log = name->reserved || !plan.out.empty() ? name->path : "";
   assembly::DaemonHooks hooks = hooks_of(*recorder, clips.get(), with_body);
-  if (auto done = daemon.start(std::move(hooks)); !done) {
+  if (auto done = start_or_remove(own_log, [&] { return daemon.start(std::move(hooks)); }); !done) {
     daemon.stop();
     // The error is what failed at the start, not what follows from it.
     [[maybe_unused]] const auto closed = recorder->finish();
-    for (const char* suffix : log::kFileSuffixes) {  // nothing was recorded
-      std::error_code ignored;
-      std::filesystem::remove(name->path.string() + suffix, ignored);
-    }
+    remove_log(own_log);
     return done;
   }
   replaced.release();

@@ -397,6 +397,40 @@ TEST_CASE("who floods must wait before coming again, and another host need not")
   CHECK(text_of(first->read(1).bytes) == "here");
 }
 
+TEST_CASE("who posed connects to is cut, too, once it floods, and tried again after a pause") {
+  const int listener = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  REQUIRE(::listen(listener, 4) == 0);  // on a free port
+  sockaddr_in address{};
+  socklen_t size = sizeof address;
+  REQUIRE(::getsockname(listener, reinterpret_cast<sockaddr*>(&address), &size) == 0);
+  const std::string there = loopback(ntohs(address.sin_port));
+  TransportFactory ports;
+  {
+    const auto transport = make_link_transport(ports.connect(there).value());
+    const int server = ::accept(listener, nullptr, nullptr);
+    REQUIRE(transport->start(1));
+    const std::string junk(4000, '!');
+    Chunk chunk;
+    std::size_t read = 0;
+    while (!chunk.lost && read < 9'000'000) {
+      REQUIRE(::write(server, junk.data(), junk.size()) > 0);
+      REQUIRE(readable(*transport));
+      chunk = transport->read(1);
+      read += chunk.bytes.size();
+      if (!chunk.lost) REQUIRE(chunk.is_part_of_link());
+      transport->decoded(false);
+    }
+    CHECK(read > 3'000'000);
+    CHECK(read < 3'300'000);
+    CHECK(dynamic_cast<Upkeep&>(*transport).consume_note().contains("nothing usable"));
+    ::close(server);
+  }
+  const auto began = std::chrono::steady_clock::now();
+  CHECK(ports.connect(there));
+  CHECK(std::chrono::steady_clock::now() - began >= PausedHosts::kPause);
+  ::close(listener);
+}
+
 TEST_CASE("a page whose request has come already takes no device's place, nor is it read") {
   const std::uint16_t port = free_port();
   TransportFactory ports;

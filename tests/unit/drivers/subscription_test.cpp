@@ -107,6 +107,25 @@ TEST_CASE("the end of the connection is told behind the last message") {
   CHECK(chunk.bytes.empty());
 }
 
+TEST_CASE("a publisher that sends megabytes of nothing of use is cut") {
+  SubscriptionRig rig;
+  const std::string load(60'000, 'x');
+  std::size_t read = 0;
+  const auto lost = [&](bool used) {
+    rig.publish("pose/ann", load);
+    const Chunk chunk = rig.next();
+    read += chunk.bytes.size();
+    if (!chunk.lost) REQUIRE(chunk.is_part_of_link());
+    rig.transport->decoded(used);
+    return chunk.lost;
+  };
+  for (int i = 0; i < 100; ++i) REQUIRE_FALSE(lost(i % 40 == 0));
+  read = 0;
+  while (!lost(false)) REQUIRE(read < 4'000'000);
+  CHECK(rig.transport->consume_note().contains("nothing usable"));
+  CHECK(rig.transport->consume_note().empty());
+}
+
 TEST_CASE("a publisher that is not there, and wrong settings, are errors that say what to do") {
   TransportFactory ports;
   const auto nobody = ports.subscribe({.endpoint = "tcp://127.0.0.1:9", .topics = {"pose/ann"}});

@@ -201,12 +201,20 @@ TEST_CASE("a recording that is being written is not opened") {
   lock.l_whence = SEEK_SET;
   REQUIRE(fcntl(writer, F_SETLK, &lock) == 0);
   CHECK_FALSE(RecordingFolder(folder.path()).piece("a.plog", 0));
+  // Nor under another name, beside which no -wal lies.
+  const std::string link = folder.path() / "link.plog";
+  std::filesystem::create_hard_link(log, link);
+  const auto refused = RecordingFolder(folder.path()).piece("link.plog", 0);
+  REQUIRE_FALSE(refused);
+  CHECK(refused.error().message.contains("being written"));
+  CHECK_FALSE(load_file(link, {.what = "model", .max_bytes = 100}));
   const int other = open(log.c_str(), O_RDWR | O_CLOEXEC);
   lock.l_type = F_WRLCK;
   REQUIRE(fcntl(other, F_OFD_GETLK, &lock) == 0);
   CHECK(lock.l_type == F_RDLCK);
   close(other);
   close(writer);
+  CHECK(RecordingFolder(folder.path()).piece("link.plog", 0).value() == "x");
 }
 
 TEST_CASE("calibrations count among the files that a folder of models may have") {

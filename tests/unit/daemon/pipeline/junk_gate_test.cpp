@@ -169,6 +169,19 @@ TEST_CASE("a link is heard without a gap from its first byte to its end, or not 
   CHECK(passes(5002, true) >= 3 * JunkGate::kMaxOwed);
 }
 
+// Ten megabytes a second of messages that are each six reads long.
+TEST_CASE("a link whose messages are long is heard after a pause, too") {
+  constexpr std::int64_t kRead = 4096;
+  JunkGate gate;
+  std::int64_t now_ns = kNanosPerSecond;
+  for (int second = 0; second < 10; ++second, now_ns += 3 * kNanosPerSecond) {
+    for (int i = 0; i < 6 * 400; ++i, now_ns += kNanosPerSecond / 2400) {
+      REQUIRE(gate.admits_link(1, now_ns));
+      gate.decoded(1, i % 6 == 5, kRead, now_ns);
+    }
+  }
+}
+
 // The device's first message makes it known, however much a flood before it has owed.
 TEST_CASE("a device that connects after a flood of a link is heard at once") {
   constexpr std::int64_t kRead = 4096;

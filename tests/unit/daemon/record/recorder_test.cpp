@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <fstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -307,6 +308,48 @@ TEST_CASE("a log that is deleted or replaced while it is written is reported at 
   const auto found = sequences(path);
   CHECK(found[0].back() == sequence);
   CHECK(found[0].size() + lost(gaps(path), 0, GapKind::kChunks) == sequence);
+}
+
+TEST_CASE(
+    "a log that is cut short while it is written is reported at once and never called whole") {
+  const TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  const auto wal = path.string() + "-wal";
+  OneSource recorder(path, make_writer(path, 1));
+  auto& [rings, events, log_writer, now_ns, sequence] = recorder;
+  recorder.turns(300);
+  REQUIRE(std::filesystem::file_size(path) > 0);
+  SECTION("to nothing") { std::filesystem::resize_file(path, 0); }
+  SECTION("to its half") { std::filesystem::resize_file(path, 12288); }
+  SECTION("its -wal") { std::filesystem::resize_file(wal, 0); }
+  SECTION("its -wal in part") {
+    std::filesystem::resize_file(wal, std::filesystem::file_size(wal) / 2);
+  }
+  SECTION("its -wal away") { std::filesystem::remove(wal); }
+  recorder.turns(6);
+  REQUIRE(events.size() == 1);
+  CHECK(events[0].kind == RecorderEvent::Kind::kError);
+  CHECK(rings.state().trouble.find("cut short") != std::string::npos);
+  recorder.turns(400);
+  const auto finished = log_writer.finish(now_ns);
+  CHECK_FALSE(finished);
+  CHECK(log_writer.errors() > 1);
+}
+
+TEST_CASE("a log that was overwritten while it was written is not called whole") {
+  const TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  OneSource recorder(path, make_writer(path, 1));
+  auto& [rings, events, log_writer, now_ns, sequence] = recorder;
+  recorder.turns(3000);
+  const auto size = std::filesystem::file_size(path);
+  REQUIRE(size > 16384);
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(8192);
+  file << std::string(size - 8192, '!');
+  file.close();
+  CHECK_FALSE(log_writer.finish(now_ns));
+  CHECK(log_writer.errors() == 1);
 }
 
 TEST_CASE("a log that a full disk keeps from beginning begins when there is room") {

@@ -238,6 +238,27 @@ TEST_CASE("a log that could not be begun is begun later, or leaves nothing") {
   if (!Reader::open(path)) CHECK(std::filesystem::is_empty(dir.path()));
 }
 
+TEST_CASE("a log of which nothing was committed leaves no file, unless that is of somebody else") {
+  const test::TempFolder dir;
+  const auto path = dir.path() / "a.plog";
+  SECTION("in place") {
+    REQUIRE(Writer::create(path, {.meta = {{"writer", "1"}}}));
+    CHECK(std::filesystem::is_empty(dir.path()));
+  }
+  SECTION("replaced") {
+    {
+      const auto writer = Writer::create(path, {.meta = {{"writer", "1"}}});
+      std::filesystem::remove(path);
+      dir.write("a.plog", "of somebody else");
+    }
+    CHECK(std::filesystem::file_size(path) == 16);
+  }
+  SECTION("closed") {
+    REQUIRE(Writer::create(path, {.meta = {{"writer", "1"}}})->close());
+    CHECK(Reader::open(path));
+  }
+}
+
 TEST_CASE("a writer goes on with its own log only, and leaves what has taken its name") {
   const test::TempFolder dir;
   const auto path = dir.path() / "a.plog", moved = dir.path() / "moved.plog";
