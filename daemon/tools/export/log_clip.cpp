@@ -120,6 +120,7 @@ Result<log::TakeRow> find_take(const log::Reader& reader, const std::string& wan
 Result<std::vector<LoggedTake>> logged_takes(log::Reader& reader) {
   auto rows = TRY(reader.takes());
   std::vector<LoggedTake> takes;
+  takes.reserve(rows.size());
   for (log::TakeRow& row : rows) takes.push_back({.row = std::move(row)});
   const auto extent = TRY(reader.extent());
   if (takes.empty() || !extent) return takes;
