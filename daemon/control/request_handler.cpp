@@ -526,7 +526,6 @@ Result<RequestHandler::Done> RequestHandler::take_model_away(const v1::ControlRe
               {.requester = requester,
                .stage = users.front(),
                .file = {.stage = &type},
-               .no_model = true,
                .refusal = "it performs: stop that first"});
 }
 
@@ -607,18 +606,12 @@ std::optional<Reply> RequestHandler::acknowledge(const pipeline::Ack& ack) {
 
 void RequestHandler::apply(ControlledStream& stream, UnderWay& done) {
   auto& settings = stream.settings.stages;
-  if (done.model) {
-    settings[done.stage].model_name = done.model->name;
-    settings[done.stage].model_words = done.model->words;
-    devices::forget_texts(done.model.get(), settings[done.stage]);
+  if (done.file.stage != nullptr) {  // another model, or none
+    auto& stage = settings[done.stage];
+    stage.model_name = done.model ? done.model->name : std::string();
+    stage.model_words = done.model ? done.model->words : std::vector<std::string>();
+    devices::forget_texts(done.model.get(), stage);
     stream.models[done.stage] = std::move(done.model);  // frees the model that it replaces
-    daemon_control_.stages_changed(stream.stream, stream.settings);
-  }
-  if (done.no_model) {
-    settings[done.stage].model_name.clear();
-    settings[done.stage].model_words.clear();
-    devices::forget_texts(nullptr, settings[done.stage]);
-    stream.models[done.stage].reset();
     daemon_control_.stages_changed(stream.stream, stream.settings);
   }
   if (!done.value ||

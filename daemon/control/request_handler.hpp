@@ -173,9 +173,8 @@ class RequestHandler {
     std::uint32_t stream = 0;
     std::string name{};  // of the stream, for when it has left
     std::size_t stage = 0;
-    std::shared_ptr<const StageModel> model{};  // the stage's new model, of this file:
+    std::shared_ptr<const StageModel> model{};  // the stage's new model, of this file; null: none
     ModelFile file{};
-    bool no_model = false;       // the stage is to use none any more
     std::string_view refusal{};  // of a command: what the stage's refusal means
     std::optional<NewValue> value{};
     bool taught = false;  // of a model: the teacher is told, as nobody has asked

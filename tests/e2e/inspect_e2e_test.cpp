@@ -101,9 +101,7 @@ TEST_CASE("a running stream is inspected, and its source takes the corrected map
   REQUIRE(stage.daemon->exit_code() == 0);
   // The waver has no legs.
   CHECK(has(stage.daemon->errors(), "mine.toml does not fit its body ... no joint"));
-  const auto replay = posed({"replay", stage.path("take.plog"), "--speed", "max", "--expect"});
-  INFO(replay.err);
-  CHECK(replay.code == 0);
+  stage.check_replay();
 }
 
 TEST_CASE("compare tells figures and persons apart") {

@@ -143,10 +143,7 @@ TEST_CASE("a closed stderr ends neither run nor record") {
     check_nothing_lost(served, watched);
     stop(served);
     if (!recording) continue;
-    const ProgramOutcome replay =
-        posed({"replay", served.path("take.plog"), "--speed", "max", "--expect"});
-    INFO(replay.err);
-    CHECK(replay.code == 0);
+    served.check_replay();
   }
 }
 
@@ -157,10 +154,7 @@ TEST_CASE("started without a stderr, the log of the program does not go into the
   Watched watched(served.publish, 60);
   check_nothing_lost(served, watched);
   stop(served);
-  const ProgramOutcome replay =
-      posed({"replay", served.path("take.plog"), "--speed", "max", "--expect"});
-  INFO(replay.err);
-  CHECK(replay.code == 0);
+  served.check_replay();
 }
 
 TEST_CASE("a flood of control messages gives a few lines a second, with their count") {

@@ -297,9 +297,7 @@ TEST_CASE("a daemon that is left running stays as it was", "[soak]") {
   if (is_long) CHECK(innocent.lost == 0);
   if (is_long) CHECK(after_mb - before_mb < 1.0);
   CHECK(most_files(tail, seconds.size()) <= most_files(half, tail) + 2);
-  const auto replay = posed({"replay", stage.path("take.plog"), "--speed", "max", "--expect"});
-  INFO(replay.err);
-  CHECK(replay.code == 0);
+  stage.check_replay();
 }
 
 }  // namespace posed::test

@@ -48,6 +48,14 @@ class Stage {
 
   void record() { launch("record", {"--out", path("take.plog"), "--frames"}); }
 
+  // The log of record(), which has ended, gives the frames that were published, bit for bit.
+  void check_replay() const {
+    const ProgramOutcome replay =
+        posed({"replay", path("take.plog"), "--speed", "max", "--expect"});
+    INFO(replay.err);
+    CHECK(replay.code == 0);
+  }
+
   [[nodiscard]] ProgramOutcome ctl(std::vector<std::string> what) const {
     what.insert(what.begin(), {"ctl", "--connect", control});
     return posed(std::move(what));

@@ -39,10 +39,7 @@ TEST_CASE("a warm-up, the gate and auto-alpha are told of and replayed") {
   CHECK(has(refused.err, "train it again"));
   served.daemon->send(SIGTERM);
   REQUIRE(served.daemon->exit_code() == 0);
-  const ProgramOutcome replay =
-      posed({"replay", served.path("take.plog"), "--speed", "max", "--expect"});
-  INFO(replay.err);
-  CHECK(replay.code == 0);
+  served.check_replay();
 }
 
 TEST_CASE("a performer is known from a clip of another day, also in a replay without the clip") {
@@ -64,10 +61,7 @@ TEST_CASE("a performer is known from a clip of another day, also in a replay wit
   served.daemon->send(SIGTERM);
   REQUIRE(served.daemon->exit_code() == 0);
   std::filesystem::remove(served.path("ann.bvh"));
-  const ProgramOutcome replay =
-      posed({"replay", served.path("take.plog"), "--speed", "max", "--expect"});
-  INFO(replay.err);
-  CHECK(replay.code == 0);
+  served.check_replay();
 }
 
 TEST_CASE("ctl lists the daemon's own models and uses one by name; stats tell weights and mask") {
@@ -114,10 +108,7 @@ TEST_CASE("a style is taken off live and put on again, and replays; off, it may 
   served.await_frames("walker", 30);
   served.daemon->send(SIGTERM);
   REQUIRE(served.daemon->exit_code() == 0);
-  const ProgramOutcome replay =
-      posed({"replay", served.path("take.plog"), "--speed", "max", "--expect"});
-  INFO(replay.err);
-  CHECK(replay.code == 0);
+  served.check_replay();
 }
 
 }  // namespace posed::test

@@ -140,10 +140,7 @@ void teach_fist(Stage& stage, Hand& hand, const std::string& stream, const std::
   });
   CHECK(recognised > 10);
   CHECK(performed > 10);
-  const ProgramOutcome replay =
-      posed({"replay", stage.path("take.plog"), "--speed", "max", "--expect"});
-  INFO(replay.err);
-  CHECK(replay.code == 0);
+  stage.check_replay();
 }
 
 }  // namespace

@@ -5,7 +5,9 @@
 #include <csignal>
 #include <ctime>
 #include <iterator>
+#include <set>
 #include <system_error>
+#include <utility>
 
 #include <spdlog/spdlog.h>
 
@@ -269,7 +271,6 @@ Result<> TakeClips::write(Kept& take, const std::function<bool()>& goes_on) {
 }
 
 void TakeClips::write_clip(const Kept& take, const std::string& stream, Result<clip::Clip> clip) {
-  if (!written_.emplace(take.row.id, stream).second) return;
   const std::filesystem::path path = path_of(take.row, stream);
   const std::string file = clean(path.filename().string());
   if (const auto written = write_bvh_of(std::move(clip), path); !written) {

@@ -16,11 +16,9 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <set>
 #include <stop_token>
 #include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #include "daemon/pipeline/raw_tap.hpp"
@@ -123,8 +121,7 @@ class TakeClips final : public pipeline::FrameTap {
   std::deque<Kept> takes_;      // that are not closed, in their order
   std::uint64_t assigned_ = 0;  // item of the last frame that no longer waits
 
-  // Of the writing thread: takes and streams.
-  std::set<std::pair<std::int64_t, std::string>> written_;
+  // Of the writing thread.
   std::deque<Kept> later_;  // whose replay failed while the log grew
 
   mutable std::mutex mutex_;  // guards the following
