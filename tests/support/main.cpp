@@ -1,5 +1,6 @@
-// main() of the test programs. Beside the options of Catch2: `--part 2/3` runs every third test
-// case, from the second on, so that ctest can run a program that mostly waits in several processes.
+// main() of the test programs. Beside the options of Catch2: `--part 2/3` runs every third of the
+// chosen test cases, from the second on, so that a program that mostly waits can run in several
+// processes.
 #define CATCH_CONFIG_RUNNER
 #include <catch2/catch.hpp>
 
@@ -25,13 +26,19 @@ bool choose(const std::string& part, Catch::Session& session) {
   char more = '\0';
   if (std::sscanf(part.c_str(), "%zu/%zu%c", &mine, &parts, &more) != 2) return false;
   if (mine < 1 || mine > parts) return false;
+  const Catch::Config& config = session.config();
   Catch::ConfigData chosen = session.configData();
+  chosen.testsOrTags.clear();
   std::size_t place = 0;
-  for (const Catch::TestCase& test : Catch::getAllTestCasesSorted(session.config())) {
-    if (test.isHidden() || place++ % parts != mine - 1) continue;
+  for (const Catch::TestCase& test : Catch::getAllTestCasesSorted(config)) {
+    const bool runs = config.hasTestFilters() ? Catch::matchTest(test, config.testSpec(), config)
+                                              : !test.isHidden();
+    if (!runs || place++ % parts != mine - 1) continue;
     if (!chosen.testsOrTags.empty()) chosen.testsOrTags.emplace_back(",");
     chosen.testsOrTags.push_back(literal(test.name));
   }
+  if (chosen.testsOrTags.empty())
+    chosen.testsOrTags.emplace_back("~*");  // none; an empty list means all
   session.useConfigData(chosen);
   return true;
 }
