@@ -6,6 +6,7 @@ import { ClockMapping } from './link/clock.js';
 import { Requests } from './link/requests.js';
 import { Played } from './streams/played.js';
 import { Store } from './streams/store.js';
+import { stateOf } from './streams/words.js';
 import { World } from './scene/world.js';
 import { Avatars } from './scene/avatars.js';
 import { Capture } from './scene/capture.js';
@@ -241,7 +242,10 @@ class Page {
     if (this.store.rewind.paused) return ['paused', 'busy'];
     const age_ms = this.chosen ? this.instruments.history(this.chosen).picture_ms : NaN;
     if (isSlow(age_ms)) return [`this page is slow: picture ${ms(age_ms)} old`, 'busy'];
-    return [`live from ${this.hello.connect}`, 'good'];
+    const worst = this.store.main().find(({ stats }) => stateOf(stats).tone === 'bad');
+    const connected = `connected to ${this.hello.connect}`;
+    if (worst) return [`${connected}; ${worst.name}: ${stateOf(worst.stats).word}`, 'busy'];
+    return [connected, 'good'];
   }
 
   #refresh() {

@@ -25,13 +25,13 @@ export class Instruments {
     this.tiles = new Tiles();
     this.latency = new Plot(
       'Latency',
-      'From a frame’s arrival at posed; lower is better. A step: something became slower.',
+      'From a frame’s arrival at posed; lower is better. A jump up: something became slower.',
       'ms',
       fromZero(20),
     );
     this.latency.setLines([
-      { name: 'handed out by posed', colour: '--plot-1' },
-      { name: 'drawn here', colour: '--plot-2' },
+      { name: 'until posed sends it', colour: '--plot-1' },
+      { name: 'until it is drawn here', colour: '--plot-2' },
     ]);
     this.stages = new Plot(
       'Time in each step',
@@ -41,7 +41,7 @@ export class Instruments {
     );
     this.label = new Plot(
       'Gesture',
-      'Which gesture is recognised, and how sure posed is; 100 %: it is performed.',
+      'Which gesture is recognised, and how sure posed is; 100 % while posed plays one.',
       '%',
       [0, 105],
     );
@@ -116,7 +116,7 @@ export class Instruments {
     const { label, labelProbability, performed } = stream.pose;
     const words = stream.labelWords;
     this.label.say(
-      !label ? 'none' : performed ? `performs ${words}` : `${words}, ${percent(labelProbability)} sure`,
+      !label ? 'none' : performed ? `plays ${words}` : `${words}, ${percent(labelProbability)} sure`,
     );
     this.label.draw(history.label, performance.now() / 1000, history.changes);
   }

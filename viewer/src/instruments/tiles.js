@@ -17,7 +17,7 @@ export const TILES = [
     'from arrival to handed out: half of the last second’s frames took at most this; 99 % that',
     ({ stats }) =>
       stats.publish?.p99_us > 0
-        ? `${ms(stats.publish.p50_us / 1000)} (99 %: ${ms(stats.publish.p99_us / 1000)})`
+        ? `${ms(stats.publish.p50_us / 1000)} (99 % within ${ms(stats.publish.p99_us / 1000)})`
         : '',
   ],
   [

@@ -52,9 +52,9 @@ export class CameraPanel {
     this.element = el(
       'section.camera',
       { hidden: true, aria: { label: 'Camera' } },
-      el('h2', {}, 'No glove?'),
+      el('h2', {}, 'Your hand by webcam'),
       this.button,
-      el('p.camera-consent', {}, `${CONSENT} Experimental.`),
+      el('p.camera-consent', {}, `${CONSENT} Hands only, experimental.`),
       this.options,
       this.preview,
       this.words,

@@ -67,14 +67,14 @@ export class GestureControls {
     ];
     this.control(
       { stage_command: { stream: this.name, name: 'generate.play', word, number } },
-      `${this.name}: performs ${word.join(' ')}`,
+      `${this.name}: plays ${word.join(' ')}`,
     );
   }
 
   #stop() {
     this.control(
       { stage_command: { stream: this.name, name: 'generate.stop-playing', word: [], number: [] } },
-      `${this.name}: performs no more`,
+      `${this.name}: plays no more`,
     );
   }
 

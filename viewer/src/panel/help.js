@@ -12,7 +12,7 @@ const KEYS = [
   ['p', 'pause, and go back over the last 30 s; again: live'],
   ['r', 'raw pose: beside, as ghost, off'],
   ['t', 'trails of the feet'],
-  ['g', 'write gestures to perform; Enter plays them'],
+  ['g', 'write gestures; Enter plays them'],
   ['s', 'start or end a take, while posed records'],
   ['d', 'dark or light'],
   ['o', 'settings: floor, background, names, avatars'],
@@ -45,6 +45,7 @@ export class Help {
     const close = el('button', { type: 'button', onclick: () => dialog.close() }, 'Close');
     dialog.append(
       el('h2', { id: 'help-title' }, 'What you see'),
+      el('p.note', {}, 'posed takes live motion, cleans it, changes its style and sends it on.'),
       el('dl', {}, ...this.#seen()),
       el('h2', {}, 'Keys'),
       rows(KEYS, 'kbd'),

@@ -40,7 +40,7 @@ export const DONE = {
   corrected: 'posed has taken out what cannot be: false values, crossed fingers, sliding feet',
   smoothed: 'posed has taken the trembling out of the motion',
   styled: 'posed has put a style on the motion',
-  performs: 'posed makes this motion from the name of a gesture',
+  played: 'posed makes this motion from the name of a gesture',
   robot: 'posed has turned a hand into commands for a robot',
   recorded: 'a take of the recordings, played beside the live ones',
 };
@@ -50,7 +50,7 @@ function done({ stats, pose, isTake }) {
   const working = stats?.stage.filter(({ name, model }) => name !== 'style' || model);
   const names = new Set(working?.map(({ name }) => name));
   if (names.has('style')) return 'styled';
-  if (pose.performed) return 'performs';
+  if (pose.performed) return 'played';
   if (names.has('robot')) return 'robot';
   if (names.has('generate')) return 'smoothed';
   if (isTake) return 'recorded';

@@ -77,6 +77,18 @@ export class ModelLibrary extends List {
   // stream: the chosen one, which a model is given to
   update(stream) {
     this.stream = stream;
+    for (const button of this.items.querySelectorAll('button[data-kind]')) this.#nameUse(button);
+  }
+
+  // Says whom the model would be given to, or that it is in use there.
+  #nameUse(button) {
+    const { kind, model } = button.dataset;
+    const stage = this.stream?.stage(kind);
+    const used = stage?.model === model;
+    button.disabled = used;
+    const text = used ? `Used by ${this.stream.name}` : stage ? `Use for ${this.stream.name}` : 'Use';
+    write(button, text);
+    button.setAttribute('aria-label', `${text}: ${model}`);
   }
 
   item({ name, kind, learnt, skeleton, verdict, strip }) {
@@ -98,8 +110,11 @@ export class ModelLibrary extends List {
   #offer(buttons, name, kind) {
     const button = (text, onclick) =>
       el('button', { type: 'button', onclick, aria: { label: `${text}: ${name}` } }, text);
+    const use = button('Use', () => this.#use(name, kind));
+    Object.assign(use.dataset, { kind, model: name });
+    this.#nameUse(use);
     buttons.replaceChildren(
-      button('Use', () => this.#use(name, kind)),
+      use,
       button('Rename', () => this.#rename(buttons, name, kind)),
       button('Delete', () => this.#delete(buttons, name, kind)),
     );

@@ -37,12 +37,12 @@ const LABELS = {
     '0: none of the style is left then; 1: its posture stays, without its movement.',
   ],
   'style.auto_alpha': [
-    'Less for who has the style already',
+    'Less where the performer has the style already',
     'Who sneaks by himself is not made to sneak twice.',
   ],
   'feet.root': ['Where the body is', 'Styled legs take other steps than those of the performer.'],
   'feet.limit_cm': [
-    'Off the performer at most (cm)',
+    'Farthest from the performer (cm)',
     'With “on the performer”: so far the body may leave his place, to save the legs a stretch.',
   ],
 };

@@ -8,14 +8,14 @@ const KNOWN = 0.5; // below it the style is mostly faded
 function styledWords(stream) {
   const alpha = stream.parameter('style', 'alpha');
   if (!alpha || !stream.stage('style').model) return '';
-  const faded = stream.stats.style_gate < KNOWN ? '\u00a0· faded, motion unknown' : '';
-  return `styled, α ${signed(alpha.value, 2)}${faded}`;
+  const faded = alpha.value !== 0 && stream.stats.style_gate < KNOWN;
+  return `styled, α ${signed(alpha.value, 2)}${faded ? '\u00a0· fades: the model does not know this motion' : ''}`;
 }
 
 // A line may end before the label and behind it.
 function labelWords({ verb, label, probability }) {
   const words = label.replaceAll(' ', '\u00a0');
-  return verb === 'performs' ? `performs ${words}` : `recognised ${words}, ${percent(probability)} sure`;
+  return verb === 'plays' ? `posed plays ${words}` : `recognised ${words}, ${percent(probability)} sure`;
 }
 
 function words(stream, main) {

@@ -40,7 +40,7 @@ export class TeachControls extends Lesson {
       const { takes = 0, sentence = '' } = walked[i] ?? {};
       const isNow = step === STEP.marking || step === STEP.checking; // and so far nothing is bad
       const marked = isNow && style === (i === 1);
-      const again = takes > 0 ? 'Again' : 'Walk';
+      const again = takes > 0 ? 'Again' : 'Record';
       write(mark, this.count(i + 1, marked) || `${again} ${WALK_S} s`);
       mark.disabled = this.busy;
       more.disabled = this.busy;

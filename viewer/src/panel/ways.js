@@ -79,7 +79,7 @@ function sourceOf(source, streams, before = source) {
       ? ['live', 'good']
       : refused > (since[OK] ?? 0)
         ? ['messages refused', 'bad']
-        : ['nothing comes', 'off'];
+        : [source.driver === 'landmarks' ? 'not in use' : 'nothing comes', 'off'];
   return {
     name: source.name,
     word,

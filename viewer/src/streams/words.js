@@ -28,7 +28,7 @@ export function stateOf(stats) {
   if (stats.state === 'unknown') return state('unknown', 'off', 'posed does not report on it now: what is shown is the last that came');
   if (stats.state !== 'live') return state(stats.state, 'busy');
   const lost = stats.dropped + stats.shed + stats.kernel_dropped;
-  if (stats.lossy) return state('lossy', 'bad', `${lost} frames were lost so far, the last just now`);
+  if (stats.lossy) return state('lossy', 'bad', `${lost} frames were lost so far, some of them in the last 10 s`);
   return state('live', 'good', lost > 0 ? `${lost} frames were lost so far, none of late` : '');
 }
 
@@ -42,7 +42,7 @@ export function qualityWord(pose) {
 // What the label of a stream's pose means; null without one.
 export function labelOf({ pose, labelWords }) {
   if (!pose.label) return null;
-  const verb = pose.performed ? 'performs' : 'recognised';
+  const verb = pose.performed ? 'plays' : 'recognised';
   return { verb, label: labelWords, probability: pose.labelProbability };
 }
 

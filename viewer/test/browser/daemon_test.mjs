@@ -121,8 +121,8 @@ told(
     await page.locator('.stream', { hasText: 'hand' }).click();
     await page.getByLabel('Gestures to perform').fill('g 1 c 3 4 p');
     await page.getByRole('button', { name: 'Play', exact: true }).click();
-    await acknowledged(page, 'performs g 1 c 3 4 p: applied');
-    await page.locator('.name-tag', { hasText: 'performs' }).waitFor(PATIENCE);
+    await acknowledged(page, 'plays g 1 c 3 4 p: applied');
+    await page.locator('.name-tag', { hasText: 'plays' }).waitFor(PATIENCE);
 
     const back_ms = async () => {
       await daemon.stopDaemon();

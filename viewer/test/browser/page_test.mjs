@@ -102,7 +102,7 @@ pageTests(
         await page.locator('.name-tag[data-kind="raw"]').first().innerText(),
         /raw, as captured/,
       );
-      await page.locator('.link-text', { hasText: 'live from tcp' }).waitFor(PATIENCE);
+      await page.locator('.link-text', { hasText: 'connected to tcp' }).waitFor(PATIENCE);
     },
     'instruments of a live daemon have its times': async (page) => {
       for (const name of TIMES) await tile(page, name).waitFor(PATIENCE);
@@ -136,7 +136,7 @@ pageTests(
       await unfold(page, 'More parameters');
       for (const [label, shown] of [
         ['Amount of style, α, number', '1.00'],
-        ['Off the performer at most (cm)', '8'],
+        ['Farthest from the performer (cm)', '8'],
       ]) {
         const field = page.getByLabel(label);
         await field.fill('');
@@ -152,16 +152,16 @@ pageTests(
       await root.selectOption('actor');
       await acknowledged(page, 'Where the body is actor: applied');
       assert.equal(bridge.daemon.bodies[0].root, 2);
-      const limit = page.getByLabel('Off the performer at most (cm)');
+      const limit = page.getByLabel('Farthest from the performer (cm)');
       await limit.fill('5.5');
       await limit.press('Enter');
-      await acknowledged(page, 'at most (cm) 5.5: applied');
+      await acknowledged(page, 'the performer (cm) 5.5: applied');
       await page.getByLabel('Fade out in unknown motion').click();
       await acknowledged(page, 'Fade out in unknown motion ');
       assert.equal(await page.locator('.ack[data-tone="bad"]').count(), 0);
       await limit.fill('-3');
       await limit.press('Enter');
-      await acknowledged(page, 'at most (cm) -3: refused');
+      await acknowledged(page, 'the performer (cm) -3: refused');
       assert.equal(await limit.inputValue(), '5.5');
     },
     'the slider sets alpha, and the answer is shown; a refusal, too': async (page, bridge) => {
@@ -254,7 +254,7 @@ pageTests(
       const strips = shelf.getByRole('img'); // of the model that has a sound one
       assert.equal(await strips.count(), 1);
       assert.match(await strips.getAttribute('aria-label'), /march-to-sway.style/);
-      await button('Use: tired.style').click();
+      await button('Use for walker: tired.style').click();
       await acknowledged(page, 'model tired.style: applied');
       await button('Use: hand.gesture').click();
       await acknowledged(page, 'choose one in the list of streams');
@@ -724,12 +724,12 @@ pageTests(
       await line.fill('g 1');
       await page.locator('.chip', { hasText: 'c' }).click();
       await page.getByRole('button', { name: 'Play' }).click();
-      await acknowledged(page, 'performs g 1 c');
+      await acknowledged(page, 'plays g 1 c');
       assert.deepEqual(bridge.daemon.hands[0].play, ['g', '1', 'c']);
       bridge.daemon.hands[0].loop = true; // until it is stopped, however slowly the page draws
-      await page.locator('.name-tag', { hasText: 'performs' }).waitFor(PATIENCE);
+      await page.locator('.name-tag', { hasText: 'plays' }).waitFor(PATIENCE);
       await page.getByRole('button', { name: 'Stop' }).click();
-      await acknowledged(page, 'performs no more');
+      await acknowledged(page, 'plays no more');
       assert.match(await page.locator('.chosen code').innerText(), /posed calibrate .*--stream hand/);
     },
     'axe-core finds no fault': accessible,

@@ -49,8 +49,8 @@ test('what was refused long ago is counted, and is no state of now', () => {
     return [inputs[0].word, outputs[1].word, outputs[1].counts.filter(Boolean).join('; ')];
   };
   const long = '9 messages to 1 receiver; 5 sendings refused so far';
-  assert.deepEqual(words(stats(10, 50, 5)), ['nothing comes', 'sends', long]);
-  assert.deepEqual(words(stats(10, 50, 5), stats(10, 50, 5)), ['nothing comes', 'sends', long]);
+  assert.deepEqual(words(stats(10, 50, 5)), ['not in use', 'sends', long]);
+  assert.deepEqual(words(stats(10, 50, 5), stats(10, 50, 5)), ['not in use', 'sends', long]);
   assert.deepEqual(words(stats(90, 50, 5), stats(90, 20, 4)), [
     'messages refused',
     'refused',
