@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "models/robot/shapes.hpp"
+#include "models/robot/which_hand.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/lower.hpp"
 #include "proto/text/named_numbers.hpp"
@@ -51,20 +52,27 @@ std::vector<std::string> split(std::string_view text) {
 
 class Builder {
  public:
-  Builder(Urdf urdf, const RobotOptions& options, const std::string& file)
-      : options_(options), file_(file) {
+  // Of the hand below the link `above` alone.
+  Builder(Urdf urdf, const RobotOptions& options, const std::string& file, int above = 0)
+      : options_(options), file_(file), above_(above) {
     hand_.name = urdf.name;
     hand_.by_visuals = urdf.by_visuals;
     hand_.links = std::move(urdf.links);
   }
 
-  Result<RobotHand> build() {
+  // Its joints, fingers and side; no shapes.
+  Result<RobotHand> build_bare() {
     TRY(list_joints());
     TRY(list_fingers());
     TRY(hold_shared());
     TRY(hold_named());
     TRY(connect());
     TRY(derive_frame());
+    return std::move(hand_);
+  }
+
+  Result<RobotHand> build() {
+    hand_ = TRY(build_bare());
     add_shapes(hand_);
     for (Finger& finger : hand_.fingers) {
       finger.tip_radius_m = tip_radius(finger);
@@ -139,7 +147,7 @@ class Builder {
       const bool carries = std::ranges::any_of(hand_.joints, [&](const RobotJoint& other) {
         return other.link != joint.link && is_above(joint.link, other.link);
       });
-      if (!carries) lasts.push_back(joint.link);
+      if (!carries && is_above(above_, joint.link)) lasts.push_back(joint.link);
     }
     place_open();
     for (const int last : lasts) {
@@ -657,6 +665,7 @@ class Builder {
   RobotHand hand_;
   RobotOptions options_;
   std::string file_;
+  int above_;
   Placed placed_{static_cast<std::size_t>(kMaxJoints)};
   std::vector<double> held_;  // [joint]; NaN: not held
   std::map<int, double> starts_;
@@ -670,8 +679,36 @@ Drive RobotHand::start() const {
   return drive;
 }
 
+// Of several hands the one whose shape says the side, and whose names do not say the other one.
 Result<RobotHand> robot_hand(Urdf urdf, const RobotOptions& options, const std::string& file) {
-  return Builder(std::move(urdf), options, file).build();
+  std::vector<HandBelow> hands;
+  if (options.tips.empty()) hands = hands_below(urdf.links);
+  const Side wanted = options.side.value_or(Side::kRight);
+  std::vector<HandBelow> right;  // ones
+  std::string palms;
+  std::erase_if(hands, [&](const HandBelow& hand) {
+    const auto bare = Builder(urdf, {.needs_speeds = false}, file, hand.above).build_bare();
+    if (!bare) return true;
+    if (bare->side == wanted && hand.named.value_or(wanted) == wanted) right.push_back(hand);
+    palms += (palms.empty() ? "" : ", ") + in_quotes(urdf.links[hand.palm].name);
+    return false;
+  });
+  if (hands.empty()) return Builder(std::move(urdf), options, file).build();
+  if (hands.size() == 1) right = hands;
+  const std::string side = wanted == Side::kLeft ? "left" : "right";
+  if (right.size() != 1) {
+    return misuse("the robot has hands below the links " + palms + ", and " +
+                      (right.empty() ? "none" : "more than one") + " of them is the " + side +
+                      " one by shape and names: let `tips` name the last links of one hand, thumb "
+                      "first",
+                  file);
+  }
+  const std::string palm = in_quotes(urdf.links[right[0].palm].name);
+  auto hand = TRY(Builder(std::move(urdf), options, file, right[0].above).build());
+  hand.chosen = hands.size() == 1
+                    ? "the robot's hand is below link " + palm
+                    : "of the robot's hands, below " + palms + ", the " + side + " one is " + palm;
+  return hand;
 }
 
 // At zero all joints of a posed skeleton have the root's axes, so that a URDF's fixed turns go into

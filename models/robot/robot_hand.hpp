@@ -28,8 +28,10 @@ struct RobotOptions {
   std::string start{};          // "joint=rad, ...": the first command; else zero within the limits
   double speed = 0.0;           // rad/s, 0: 8; or what the URDF says where that is less
   double acceleration = 120.0;  // rad/s^2
-  std::optional<Side> side{};   // of the hand that drives it; empty: as the URDF bends
-  bool needs_speeds = true;     // false: to be looked at only
+  // Of the hand that drives it, and of several the one that is driven; empty: as the URDF bends, of
+  // several the right one.
+  std::optional<Side> side{};
+  bool needs_speeds = true;  // false: to be looked at only
 };
 
 // A joint that turns, in the order of Frame::angle_rad.
@@ -110,6 +112,7 @@ struct Turn {  // of a link by a driven joint above it
 
 struct RobotHand {
   std::string name;
+  std::string chosen;  // of a robot that is more than a hand: a line that says which part it is
   bool by_visuals = false;  // as Urdf says
   Side side = Side::kRight;
   std::vector<Link> links;

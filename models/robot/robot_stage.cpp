@@ -29,7 +29,16 @@ constexpr std::array<std::string_view, 3> kSides{"hand", "left", "right"};
 
 enum class RobotSide : std::uint8_t { kHand, kLeft, kRight };
 enum Reading : std::size_t { kLimited, kStops, kHardStops, kHolds, kStopJoint, kStopOther };
-enum Notice : std::size_t { kSilent, kDistrusted, kTimeJump, kHardStop, kStop, kSlower, kNotices };
+enum Notice : std::size_t {
+  kSilent,
+  kDistrusted,
+  kTimeJump,
+  kHardStop,
+  kStop,
+  kSlower,
+  kSeveral,
+  kNotices
+};
 
 struct StageOptions {
   std::string urdf, tips, hold, start;
@@ -92,8 +101,8 @@ const RobotStage::Table& RobotStage::table() {
       Table::row<&StageOptions::urdf>(
           {.name = "urdf", .required = true, .is_path = true, .help = "the robot hand (.urdf)"}),
       Table::row<&StageOptions::side>({.name = "side",
-                                       .help = "which hand the robot is; hand: as the one that "
-                                               "drives it",
+                                       .help = "which hand the robot is, of several the driven "
+                                               "one; hand: as the one that drives it",
                                        .words = kSides}),
       Table::row<&StageOptions::tips>(
           {.name = "tips",
@@ -143,6 +152,7 @@ RobotStage::RobotStage(RobotHand robot, Skeleton skeleton, const StageContext& c
   notice_[kSlower] = std::ranges::any_of(robot_.joints, [&](const RobotJoint& joint) {
     return joint.driven >= 0 && joint.speed < options.speed;
   });
+  notice_[kSeveral] = !robot_.chosen.empty();
 }
 
 // Since the command before, at most two periods: a stall authorises no jump. A step back in time is
@@ -375,7 +385,10 @@ const StageType& robot_type() {
                   {.sentence = "the robot was stopped at once, because links would have met"},
                   {.sentence = "links are in the way: the robot stands short of the hand"},
                   {.sentence = "`speed` is more than the URDF allows some joints: its limits hold "
-                               "for them"}},
+                               "for them"},
+                  {.sentence =
+                       "the robot is more than a hand: the hand of `side` follows, all else "
+                       "stands (`posed inspect` names it)"}},
       .commands = {{.name = "engage",
                     .help = "the robot follows the hand, from where it is",
                     .encode = no_words},

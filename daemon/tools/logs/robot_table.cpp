@@ -54,6 +54,9 @@ std::vector<std::string> robot_table(const robot::RobotHand& hand) {
   lines.push_back(fmt::format("robot {}: a {} hand, {} links, {} joints that turn, {} driven",
                               hand.name, hand.side == Side::kLeft ? "left" : "right",
                               hand.links.size(), hand.joints.size(), hand.size()));
+  if (!hand.chosen.empty()) {
+    lines.push_back(hand.chosen + "; `side`, or the links that `tips` names, choose another");
+  }
   lines.emplace_back("joints, in the order of the stream's values");
   for (const robot::RobotJoint& joint : hand.joints) {
     lines.push_back(fmt::format("  {:<24} {:<26} {:<20} {}", joint.name, limits_of(hand, joint),

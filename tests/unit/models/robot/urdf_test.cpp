@@ -245,10 +245,6 @@ TEST_CASE("a hand at an arm, on a mount or one of two is a hand, whose arm stand
   Urdf two = arm(0);
   mount(two, mitten, "right_", 0, turned);
   mount(two, mirrored(mitten), "left_", 0, turned);
-  const auto any = robot_hand(two, {.side = Side::kLeft}, "r");
-  REQUIRE_FALSE(any);
-  CHECK(any.error().message.find("let `tips` name the last links of one hand") !=
-        std::string::npos);
   const auto tips = [](const std::string& side) {
     std::string all;
     for (const char* finger : {"thumb", "index", "middle", "ring", "little"}) {
@@ -266,6 +262,50 @@ TEST_CASE("a hand at an arm, on a mount or one of two is a hand, whose arm stand
     REQUIRE_FALSE(wrong);
     CHECK(wrong.error().message.find("the URDF is a " + other + " hand") != std::string::npos);
   }
+}
+
+TEST_CASE("of two hands the side chooses one, and asks where shape or names leave it open") {
+  const auto mitten = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  const Eigen::Isometry3d there(Eigen::Translation3d(0.0, 0.3, 0.1));
+  const auto body = [&](const std::string& first, const Urdf& one, const std::string& second,
+                        const Urdf& other) {
+    Urdf both = arm(2);
+    mount(both, one, first, 2, Eigen::Isometry3d::Identity());
+    mount(both, other, second, 0, there);
+    return both;
+  };
+  const auto left = mirrored(mitten);
+  for (const auto& [right_name, left_name] : std::vector<std::pair<std::string, std::string>>{
+           {"right_", "left_"}, {"R_", "L_"}, {"rh_", "lh_"}, {"hand1_", "hand2_"}}) {
+    INFO(right_name);
+    const Urdf both = body(left_name, left, right_name, mitten);
+    for (const Side side : {Side::kLeft, Side::kRight}) {
+      const std::string& name = side == Side::kLeft ? left_name : right_name;
+      const RobotHand hand = robot_hand(both, {.side = side}, "r").value();
+      CHECK(hand.side == side);
+      CHECK(hand.size() == robot_hand(mitten, {}, "r").value().size());
+      CHECK(hand.chosen.ends_with(" one is '" + name + "palm'"));
+      for (const DrivenJoint& driven : hand.driven) {
+        CHECK(hand.joints[static_cast<std::size_t>(driven.joint)].name.starts_with(name));
+      }
+    }
+  }
+  const auto asked = [](const Urdf& urdf) {
+    const auto hand = robot_hand(urdf, {.side = Side::kRight}, "r");
+    REQUIRE_FALSE(hand);
+    INFO(hand.error().message);
+    CHECK(hand.error().message.find("let `tips` name the last links of one hand") !=
+          std::string::npos);
+  };
+  asked(body("a_", mitten, "b_", mitten));
+  asked(body("left_", mitten, "right_", left));  // names and shapes say each the other
+  asked(body("right_1_", mitten, "right_2_", mitten));
+  // The one hand of a body needs no choice.
+  Urdf legs = arm(0);
+  for (const char* leg : {"a", "b"}) mount(legs, arm(2), leg, 0, there);
+  mount(legs, mitten, "", 0, there);
+  const RobotHand only = robot_hand(legs, {.side = Side::kRight}, "r").value();
+  CHECK(only.chosen == "the robot's hand is below link 'palm'");
 }
 
 TEST_CASE("a gripper is called a gripper") {
