@@ -360,7 +360,12 @@ class Builder {
     for (std::size_t a = 1; a < fingers.size(); ++a) {
       for (std::size_t b = a + 1; b < fingers.size(); ++b) {
         const int one = named_place(fingers[a]), two = named_place(fingers[b]);
-        if (one != 0 && two != 0) turned += one > two ? 1 : one < two ? -1 : 0;
+        const bool at_an_end = one == 1 || two == 1 || one == 4 || two == 4;
+        if (one == 0 || two == 0) {  // an index or little finger beside one of unknown place
+          if (at_an_end) turned += one == 4 || two == 1 ? 1 : -1;
+          continue;
+        }
+        turned += one > two ? 1 : one < two ? -1 : 0;
       }
     }
     if (turned > 0) std::reverse(fingers.begin() + 1, fingers.end());

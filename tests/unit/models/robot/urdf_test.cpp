@@ -308,6 +308,33 @@ TEST_CASE("of two hands the side chooses one, and asks where shape or names leav
   CHECK(only.chosen == "the robot's hand is below link 'palm'");
 }
 
+// As Unitree's Dex3: which of the two is nearer to the thumb is rounding.
+TEST_CASE("a thumb between index and middle finger leaves their order to the names") {
+  for (const bool is_left : {false, true}) {
+    for (const bool index_first : {false, true}) {
+      INFO(is_left << index_first);
+      std::string text = "<robot name=\"three\"><link name=\"palm\"/>";
+      for (const std::string& name : index_first
+                                         ? std::vector<std::string>{"thumb", "index", "middle"}
+                                         : std::vector<std::string>{"thumb", "middle", "index"}) {
+        const std::string at = name == "thumb"                ? "0.03 0 -0.02\" rpy=\"0 1.2 0"
+                               : (name == "index") != is_left ? "0 0.02 0.05"
+                                                              : "0 -0.02 0.05";
+        text +=
+            "<link name=\"" + name + "_link\"/><link name=\"" + name + "_tip\"/>" +
+            joint(name + "_bend", "palm", name + "_link",
+                  "<origin xyz=\"" + at + "\"/><limit lower=\"0\" upper=\"1\" velocity=\"1\"/>") +
+            "<joint name=\"" + name + "_end\" type=\"fixed\"><parent link=\"" + name +
+            "_link\"/><child link=\"" + name + "_tip\"/><origin xyz=\"0 0 0.06\"/></joint>";
+      }
+      const RobotHand hand =
+          robot_hand(parse_urdf(text + "</robot>", "r").value(), {}, "r").value();
+      CHECK(hand.links[static_cast<std::size_t>(hand.fingers[1].tip)].name == "index_tip");
+      CHECK(hand.side == (is_left ? Side::kLeft : Side::kRight));
+    }
+  }
+}
+
 TEST_CASE("a gripper is called a gripper") {
   const auto limit = [](const std::string& more = "") {
     return "<limit lower=\"0\" upper=\"0.8\" velocity=\"2\"/>" + more;
