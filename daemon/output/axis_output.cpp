@@ -51,6 +51,12 @@ Result<AxisFigure> AxisFigure::make(std::shared_ptr<const Skeleton> skeleton, st
   AxisFigure made(std::move(fit), entry.offset_cm);
   made.message_.avatar = entry.avatar;
   made.message_.content.displacement = true;
+  made.known_.resize(axis::value_count(made.message_.content) / 3);
+  for (std::size_t bone = 0; bone < axis::kBones; ++bone) {
+    if (bone == axis::kHips) continue;
+    made.known_[axis::rotations_at(made.message_.content, bone) / 3 - 1] =
+        axis::known_text(made.offset_cm_[bone]);
+  }
   return made;
 }
 
@@ -70,7 +76,8 @@ std::string_view AxisFigure::message(const Frame& frame) noexcept {
 
 std::string_view AxisFigure::line(const Frame& frame) noexcept {
   fill(frame);
-  const std::size_t size = axis::encode_text(message_, std::span(text_).first(axis::kMaxText));
+  const std::size_t size =
+      axis::encode_text(message_, std::span(text_).first(axis::kMaxText), known_);
   text_[size] = '\n';
   return {text_.data(), size + 1};
 }
@@ -153,12 +160,16 @@ void AxisOutput::send(std::int64_t now_ns) {
     AxisFigure& figure = *person.figure;
     const std::string_view message =
         binary_ ? figure.message(person.frame) : figure.line(person.frame);
-    count(clients_ ? clients_->send(message, now_ns)
-                   : receivers_->send(std::as_bytes(std::span(message)), now_ns));
+    if (clients_) {
+      count(clients_->send(message, now_ns));
+    } else {
+      datagrams_.add(std::as_bytes(std::span(message)));
+    }
   }
 }
 
-std::int64_t AxisOutput::end_turn(std::int64_t /*now_ns*/) {
+std::int64_t AxisOutput::end_turn(std::int64_t now_ns) {
+  if (receivers_) count(receivers_->send(datagrams_, now_ns));
   set_receivers(clients_ ? clients_->size() : receivers_->size());
   return look_ns_;
 }

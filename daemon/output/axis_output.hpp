@@ -52,6 +52,7 @@ class AxisFigure {
   drivers::axis::Proportions offset_cm_;
   drivers::axis::NearAngles near_rad_{};
   drivers::axis::Message message_;
+  std::vector<std::string> known_;  // the text of all displacements but the hips'
   std::array<char, drivers::axis::kMaxText + 1> text_{};
 };
 
@@ -80,6 +81,7 @@ class AxisOutput final : public Output {
   bool header_, binary_;
   std::optional<LineClients> clients_;     // over TCP
   std::optional<UdpReceivers> receivers_;  // over UDP
+  Datagrams datagrams_;                    // the same, of this turn
   std::vector<Person> people_;             // [place]
   std::vector<std::string> names_;         // [place]
   std::int64_t look_ns_ = kNoTime_ns;      // when to look for clients and news next

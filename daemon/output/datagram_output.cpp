@@ -55,8 +55,8 @@ bool DatagramOutput::take(std::size_t place, const Frame& frame, std::int64_t /*
 }
 
 void DatagramOutput::send(std::int64_t now_ns) {
-  const SendDatagram send = [this, now_ns](std::span<const std::byte> datagram) {
-    count(receivers_.send(datagram, now_ns));
+  const SendDatagram send = [this](std::span<const std::byte> datagram) {
+    datagrams_.add(datagram);
   };
   if (described_ns_ == kNoTime_ns || now_ns >= described_ns_ + encoder_->describe_every_ns()) {
     described_ns_ = now_ns;
@@ -66,6 +66,7 @@ void DatagramOutput::send(std::int64_t now_ns) {
 }
 
 std::int64_t DatagramOutput::end_turn(std::int64_t now_ns) {
+  count(receivers_.send(datagrams_, now_ns));
   for (const News& news : receivers_.drain_news(now_ns)) notify(news);
   return system::kForever_ns;
 }

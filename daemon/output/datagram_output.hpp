@@ -28,6 +28,7 @@ class DatagramOutput final : public Output {
   std::size_t places_;
   std::unique_ptr<DatagramEncoder> encoder_;
   UdpReceivers receivers_;
+  Datagrams datagrams_;  // of this turn
   std::int64_t described_ns_ = kNoTime_ns;
 };
 

@@ -1,8 +1,9 @@
 #include "daemon/output/udp_receivers.hpp"
 
+#include <algorithm>
 #include <cerrno>
 
-#include <sys/socket.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include "drivers/transport/socket.hpp"
@@ -12,6 +13,7 @@ namespace {
 
 constexpr std::int64_t kRetry_ns = kNanosPerSecond;
 constexpr std::int64_t kGood_ns = 2 * kNanosPerSecond;
+constexpr std::size_t kMaxMessages = 1024;  // that the system takes in one call (UIO_MAXIOV)
 
 // Connected sockets, because only those learn that nobody listens at the other side.
 Result<int> open_socket(const drivers::Address& address) {
@@ -31,7 +33,31 @@ std::string why(int error) {
   return errno_text(error);
 }
 
+bool has_room(int fd) noexcept {
+  pollfd socket{.fd = fd, .events = POLLOUT, .revents = 0};
+  return ::poll(&socket, 1, 0) > 0 && (socket.revents & POLLOUT) != 0;
+}
+
 }  // namespace
+
+void Datagrams::add(std::span<const std::byte> datagram) {
+  bytes_.insert(bytes_.end(), datagram.begin(), datagram.end());
+  bytes_of_.push_back(datagram.size());
+}
+
+std::span<mmsghdr> Datagrams::messages() {
+  pieces_.resize(bytes_of_.size());
+  messages_.resize(bytes_of_.size());
+  std::byte* at = bytes_.data();
+  for (std::size_t i = 0; i < bytes_of_.size(); ++i) {
+    pieces_[i] = {.iov_base = at, .iov_len = bytes_of_[i]};
+    messages_[i] = {};
+    messages_[i].msg_hdr.msg_iov = &pieces_[i];
+    messages_[i].msg_hdr.msg_iovlen = 1;
+    at += bytes_of_[i];
+  }
+  return messages_;
+}
 
 Result<UdpReceivers> UdpReceivers::open(const std::vector<std::string>& endpoints) {
   UdpReceivers receivers;
@@ -64,47 +90,71 @@ bool UdpReceivers::is_connected(Receiver& receiver, std::int64_t now_ns) noexcep
   return receiver.connected;
 }
 
-bool UdpReceivers::send_to(Receiver& receiver, std::span<const std::byte> datagram,
-                           std::int64_t now_ns, SendOutcome& outcome) noexcept {
-  if (!is_connected(receiver, now_ns)) {
-    ++outcome.failed;
-    return false;
-  }
-  const auto send = [&] {
-    return ::send(receiver.fd, datagram.data(), datagram.size(), MSG_NOSIGNAL) >= 0;
-  };
-  if (send()) {
-    ++outcome.sent;
-    return true;
-  }
-  receiver.error = errno;
-  if (receiver.error == EAGAIN || receiver.error == ENOBUFS) {
-    ++outcome.dropped;
-    return false;
-  }
-  ++outcome.failed;
-  if (receiver.error == ECONNREFUSED) {
-    // That was the answer to earlier datagrams, one for all of them, which are counted as sent;
-    // this one is sent now, and counted as failed for them.
-    static_cast<void>(send());
-  } else {
-    receiver.connected = false;  // the machine may get another address, and the socket with it
-    receiver.retry_ns = now_ns + kRetry_ns;
-  }
-  return false;
-}
-
-SendOutcome UdpReceivers::send(std::span<const std::byte> datagram, std::int64_t now_ns) noexcept {
-  SendOutcome outcome;
-  for (Receiver& receiver : receivers_) {
-    if (send_to(receiver, datagram, now_ns, outcome)) {
-      if (receiver.good_ns == kNoTime_ns) receiver.good_ns = now_ns;
-    } else {
-      receiver.failing = true;
-      receiver.good_ns = kNoTime_ns;
+void UdpReceivers::fail_first(Receiver& receiver, const mmsghdr& datagram, int error,
+                              std::int64_t now_ns, SendOutcome& outcome) noexcept {
+  const auto again = [&] { return ::sendmsg(receiver.fd, &datagram.msg_hdr, MSG_NOSIGNAL) >= 0; };
+  bool gone = false;
+  if (error == 0) {  // what lasts is said now, and what does not was a refusal, or want of room
+    const bool room = has_room(receiver.fd);
+    gone = again();
+    error = gone ? ECONNREFUSED : errno;
+    if (gone && !room) {
+      ++outcome.sent;
+      return;
     }
   }
-  return outcome;
+  // A refusal was the answer to earlier datagrams, one for all of them, which are counted as sent;
+  // this one is sent now, and counted as failed for them.
+  if (error == ECONNREFUSED && !gone) static_cast<void>(again());
+  receiver.error = error;
+  if (error == EAGAIN || error == ENOBUFS) {
+    ++outcome.dropped;
+    return;
+  }
+  ++outcome.failed;
+  if (error == ECONNREFUSED) return;
+  receiver.connected = false;  // the machine may get another address, and the socket with it
+  receiver.retry_ns = now_ns + kRetry_ns;
+}
+
+void UdpReceivers::send_to(Receiver& receiver, std::span<mmsghdr> datagrams, std::int64_t now_ns,
+                           SendOutcome& outcome) noexcept {
+  while (!datagrams.empty()) {
+    if (!is_connected(receiver, now_ns)) {
+      outcome.failed += datagrams.size();
+      return;
+    }
+    const std::size_t count = std::min(datagrams.size(), kMaxMessages);
+    const int result =
+        ::sendmmsg(receiver.fd, datagrams.data(), static_cast<unsigned>(count), MSG_NOSIGNAL);
+    const std::size_t taken = std::max(result, 0);
+    outcome.sent += taken;
+    datagrams = datagrams.subspan(taken);
+    if (taken == count) continue;
+    fail_first(receiver, datagrams.front(), result < 0 ? errno : 0, now_ns, outcome);
+    datagrams = datagrams.subspan(1);
+  }
+}
+
+SendOutcome UdpReceivers::send(Datagrams& datagrams, std::int64_t now_ns) {
+  SendOutcome all;
+  const std::span<mmsghdr> messages = datagrams.messages();
+  for (Receiver& receiver : receivers_) {
+    SendOutcome outcome;
+    send_to(receiver, messages, now_ns, outcome);
+    if (outcome.dropped + outcome.failed > 0) {
+      receiver.failing = true;
+      receiver.good_ns = kNoTime_ns;
+    } else if (outcome.sent > 0 && receiver.good_ns == kNoTime_ns) {
+      receiver.good_ns = now_ns;
+    }
+    all.sent += outcome.sent;
+    all.dropped += outcome.dropped;
+    all.failed += outcome.failed;
+  }
+  datagrams.bytes_.clear();
+  datagrams.bytes_of_.clear();
+  return all;
 }
 
 std::vector<News> UdpReceivers::drain_news(std::int64_t now_ns) {

@@ -9,12 +9,31 @@
 #include <string>
 #include <vector>
 
+#include <sys/socket.h>
+
 #include "daemon/output/send_outcome.hpp"
 #include "drivers/transport/address.hpp"
 #include "proto/frame/result.hpp"
 #include "proto/frame/time.hpp"
 
 namespace posed::output {
+
+// Datagrams that go out together: what an output sends in one turn. It keeps its memory. One
+// thread.
+class Datagrams {
+ public:
+  void add(std::span<const std::byte> datagram);
+
+ private:
+  friend class UdpReceivers;
+  // As the system takes them, valid until the next add().
+  [[nodiscard]] std::span<mmsghdr> messages();
+
+  std::vector<std::byte> bytes_;
+  std::vector<std::size_t> bytes_of_;  // [datagram]
+  std::vector<iovec> pieces_;          // the same
+  std::vector<mmsghdr> messages_;      // the same
+};
 
 // One thread.
 class UdpReceivers {
@@ -28,9 +47,10 @@ class UdpReceivers {
   UdpReceivers(const UdpReceivers&) = delete;
   UdpReceivers& operator=(const UdpReceivers&) = delete;
 
-  // Sends the datagram to all receivers and never waits. While an address cannot be reached, all
-  // datagrams to it fail until the next try, a second later.
-  [[nodiscard]] SendOutcome send(std::span<const std::byte> datagram, std::int64_t now_ns) noexcept;
+  // Sends the datagrams to all receivers and forgets them: in one call of the system where all is
+  // well, because the call costs more than the datagram, and never waits. While an address cannot
+  // be reached, all datagrams to it fail until the next try, a second later.
+  [[nodiscard]] SendOutcome send(Datagrams& datagrams, std::int64_t now_ns);
 
   // Returns what has changed since the last call. A receiver counts as failing from its first
   // failure until all datagrams have reached it for two seconds.
@@ -52,9 +72,12 @@ class UdpReceivers {
   UdpReceivers() = default;
   static void connect(Receiver& receiver) noexcept;
   [[nodiscard]] static bool is_connected(Receiver& receiver, std::int64_t now_ns) noexcept;
-  // Counts what became of the datagram. Returns whether all is well with the receiver.
-  static bool send_to(Receiver& receiver, std::span<const std::byte> datagram, std::int64_t now_ns,
+  // Counts what became of the datagrams.
+  static void send_to(Receiver& receiver, std::span<mmsghdr> datagrams, std::int64_t now_ns,
                       SendOutcome& outcome) noexcept;
+  // Counts one that the system did not take. `error` is why, or 0 where the system does not say it.
+  static void fail_first(Receiver& receiver, const mmsghdr& datagram, int error,
+                         std::int64_t now_ns, SendOutcome& outcome) noexcept;
 
   std::vector<Receiver> receivers_;
 };

@@ -256,9 +256,8 @@ void VmcOutput::send(std::int64_t now_ns) {
     writer_->loaded();
   }
   writer_->time(static_cast<float>(seconds(now_ns - begin_ns_)));
-  for (std::size_t i = 0; i < writer_->datagrams(); ++i) {
-    count(receivers_.send(writer_->datagram(i), now_ns));
-  }
+  for (std::size_t i = 0; i < writer_->datagrams(); ++i) datagrams_.add(writer_->datagram(i));
+  count(receivers_.send(datagrams_, now_ns));
 }
 
 }  // namespace posed::output

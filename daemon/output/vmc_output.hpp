@@ -134,6 +134,7 @@ class VmcOutput final : public Output {
   Avatar avatar_;
   BlendShapes shapes_;
   UdpReceivers receivers_;
+  Datagrams datagrams_;
   std::unique_ptr<drivers::vmc::DatagramWriter> writer_;
   std::array<std::int64_t, kParts> measured_ns_;  // [part] when its last measured frame came
   Quality quality_ = Quality::kMeasured;          // of the frame that makes it send

@@ -213,7 +213,18 @@ RT_SAFE std::size_t encode_binary(const Message& message, Form form,
   return size;
 }
 
-RT_SAFE std::size_t encode_text(const Message& message, std::span<char> out) noexcept {
+std::string known_text(const Vec3f& values) {
+  std::string text;
+  std::array<char, 64> room;
+  for (const float value : values) {
+    char* const end = put_value(room.data(), room.data() + room.size(), static_cast<double>(value));
+    text.append(1, ' ').append(room.data(), end);
+  }
+  return text;
+}
+
+RT_SAFE std::size_t encode_text(const Message& message, std::span<char> out,
+                                std::span<const std::string> known) noexcept {
   char* at = out.data();
   char* const end = at + out.size();
   const auto put = [&](char c) {
@@ -225,9 +236,16 @@ RT_SAFE std::size_t encode_text(const Message& message, std::span<char> out) noe
   put(' ');
   const std::string_view name = message.avatar.name_text();
   for (const char c : name.empty() ? std::string_view("_") : name) put(fits_a_name(c) ? c : '_');
-  for (std::size_t i = 0; i < value_count(message.content); ++i) {
+  for (std::size_t i = 0; i < value_count(message.content);) {
+    if (i / 3 < known.size() && !known[i / 3].empty()) {
+      const std::string& text = known[i / 3];
+      if (static_cast<std::size_t>(end - at) < text.size()) return 0;
+      at = std::ranges::copy(text, at).out;
+      i += 3;
+      continue;
+    }
     put(' ');
-    at = put_value(at, end, message.values[i]);
+    at = put_value(at, end, message.values[i++]);
     if (at == nullptr) return 0;
   }
   if (end - at < 3) return 0;

@@ -41,6 +41,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "drivers/axis/bones.hpp"
@@ -118,6 +119,11 @@ RT_SAFE [[nodiscard]] Outcome decode_text(std::string_view text, Message& messag
 // contain.
 RT_SAFE [[nodiscard]] std::size_t encode_binary(const Message& message, Form form,
                                                 std::span<std::byte> out) noexcept;
-[[nodiscard]] std::size_t encode_text(const Message& message, std::span<char> out) noexcept;
+// `known` is [group of three values] the text that known_text() made of values that stay the same,
+// empty for others.
+[[nodiscard]] std::size_t encode_text(const Message& message, std::span<char> out,
+                                      std::span<const std::string> known = {}) noexcept;
+// Cold.
+[[nodiscard]] std::string known_text(const Vec3f& values);
 
 }  // namespace posed::drivers::axis

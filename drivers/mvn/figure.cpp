@@ -78,7 +78,7 @@ CharacterPose pose_of(const Character& character, const Vec3f& root_m, const Rot
     global[i] = turn;
     if (parent < 0 || local) continue;
     const std::size_t above = parent;
-    global[i] = (global[above] * turn).normalized();
+    global[i] = global[above] * turn;  // of unit length, as both are
     segment.rotation_xyzw = from_eigen(global[i]);
     const Vec3f& o = character.offset_m[i];
     const Eigen::Vector3d offset = global[above] * Eigen::Vector3d(o[0], o[1], o[2]);

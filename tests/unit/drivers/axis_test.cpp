@@ -144,6 +144,41 @@ TEST_CASE("reading numbers of an Axis text does not allocate, however they are w
   }
 }
 
+TEST_CASE("the numbers of an Axis text are those that printf writes") {
+  std::mt19937_64 random(1);
+  Message message = axis_message(1, "Ann", 5, {true, true});
+  AxisBytes room(axis::kMaxText);
+  const std::span chars(reinterpret_cast<char*>(room.data()), room.size());
+  const std::size_t count = axis::value_count(message.content);
+  for (int round = 0; round < 500; ++round) {
+    std::string expected = "1 Ann";
+    for (std::size_t i = 0; i < count; ++i) {
+      const double sign = random() % 2 == 0 ? 1.0 : -1.0;
+      const double scale = std::pow(10.0, static_cast<double>(random() % 10) - 6.0);
+      double value = scale * static_cast<double>(random()) / static_cast<double>(~0ULL);
+      // Halves of the last place, exact ones and the two beside them.
+      if (i % 4 == 1) value = std::round(value * 64.0) / 128.0 + 0.0000005;
+      if (i % 4 == 2) value = static_cast<double>(random() % 100'000) / 128.0;
+      if (i % 4 == 3) {
+        const double half = (std::floor(value * 1e6) + 0.5) * 1e-6;
+        value = round % 3 == 0 ? half : std::nextafter(half, round % 3 == 1 ? 0.0 : 1e9);
+      }
+      message.values[i] = sign * value;
+      std::array<char, 64> text{};
+      std::snprintf(text.data(), text.size(), " %.6f", message.values[i]);
+      expected += text.data();
+    }
+    const std::size_t size = axis::encode_text(message, chars);
+    REQUIRE(std::string_view(chars.data(), size) == expected + " ||");
+    // Values whose text is known before.
+    const Vec3f same{static_cast<float>(message.values[6]), -0.0F, 0.25F};
+    for (std::size_t i = 0; i < 3; ++i) message.values[6 + i] = static_cast<double>(same[i]);
+    const std::string plain(chars.data(), axis::encode_text(message, chars));
+    const std::vector<std::string> known{"", "", axis::known_text(same)};
+    CHECK(plain == std::string_view(chars.data(), axis::encode_text(message, chars, known)));
+  }
+}
+
 TEST_CASE("an Axis message that does not fit its buffer is not encoded") {
   Message message = axis_message(9999, std::string(32, 'n'), 1, {true, true});
   message.values.fill(-123456.789);

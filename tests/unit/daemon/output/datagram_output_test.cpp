@@ -7,6 +7,7 @@
 #include <catch2/catch.hpp>
 #include <nlohmann/json.hpp>
 
+#include "daemon/output/udp_receivers.hpp"
 #include "drivers/rokoko/decoder.hpp"
 #include "drivers/rokoko/encode.hpp"
 #include "models/motion/canonical_skeleton.hpp"
@@ -303,6 +304,49 @@ TEST_CASE("sixteen people at 120 Hz arrive through each output as they were", "[
   for (int i = 0; i < kCrowd; ++i) {
     check_crowd({.kind = OutputKind::kMocopi}, "mocopi " + std::to_string(i + 1), 1);
   }
+}
+
+TEST_CASE("of datagrams that go out together each is counted and in its place") {
+  UdpReceiver receiver;
+  std::string dead;
+  {
+    const UdpReceiver gone;
+    dead = gone.endpoint();
+  }
+  auto receivers = UdpReceivers::open({dead, receiver.endpoint()}).value();
+  const auto pass = [&](std::size_t bytes_of_second, std::int64_t now_ns) {
+    Datagrams datagrams;
+    for (std::size_t i = 0; i < 40; ++i) {
+      const std::vector<std::byte> bytes(i == 1 ? bytes_of_second : i + 2, std::byte(i));
+      datagrams.add(bytes);
+    }
+    return receivers.send(datagrams, now_ns);
+  };
+  SendOutcome outcome = pass(3, 0);
+  CHECK(outcome.sent + outcome.failed == 80);
+  CHECK(outcome.sent >= 40);
+  auto datagrams = receiver.received(40);
+  std::uint64_t turns = 1;
+  for (; outcome.sent > 40 && turns < 100; ++turns) {  // a busy kernel refuses a little later
+    outcome = pass(3, 0);
+    const auto more = receiver.received(40 * (turns + 1));
+    datagrams.insert(datagrams.end(), more.begin(), more.end());
+  }
+  CHECK(outcome.sent == 40);
+  CHECK(outcome.failed == 40);
+  REQUIRE(datagrams.size() == 40 * turns);
+  for (std::size_t i = 0; i < datagrams.size(); ++i) {
+    CHECK(datagrams[i] == std::vector(i % 40 + 2, std::byte(i % 40)));
+  }
+  REQUIRE(receivers.drain_news(0).size() == 1);  // of the dead one
+  // One that is too large does not go, and those behind it wait until the socket is tried again.
+  outcome = pass(70'000, kNanosPerSecond);
+  CHECK(receiver.received(40 * turns + 1).size() == 1);
+  const auto news = receivers.drain_news(kNanosPerSecond);
+  REQUIRE(news.size() == 1);
+  CHECK(news[0].text.starts_with("sending to " + receiver.endpoint() + " fails: so many people"));
+  static_cast<void>(pass(3, 3 * kNanosPerSecond));
+  CHECK(receiver.received(40 * turns + 41).size() == 40);
 }
 
 TEST_CASE("a stream without a person is named, and the others are sent") {

@@ -178,9 +178,9 @@ struct CrowdCheck {
   }
   // Sends one step's datagrams once more, and counts the thread's time.
   void send_alone(const std::vector<std::vector<std::byte>>& datagrams, int people) {
-    const double us_of_all = test::timed_us([&] {
-      for (const auto& datagram : datagrams) static_cast<void>(to_beside.send(datagram, 0));
-    });
+    Datagrams all;
+    for (const auto& datagram : datagrams) all.add(datagram);
+    const double us_of_all = test::timed_us([&] { static_cast<void>(to_beside.send(all, 0)); });
     kernel_us.push_back(us_of_all / people);
     static_cast<void>(beside.received());
   }
