@@ -233,12 +233,28 @@ Admission RelayedStreams::admit(std::string_view stream, std::size_t upstream, b
 
 bool RelayedStreams::make_room(std::size_t upstream, bool poses) {
   const Share& share = shares_[upstream];
-  if (share.streams < kMaxStreams) return true;
-  if (!poses || share.posing == share.streams) return false;
-  forget(std::ranges::find_if(streams_, [&](const auto& entry) {
-    return entry.second.upstream == upstream && !entry.second.poses;
-  }));
+  const bool all_full = streams_.size() >= link::kMaxLinkStreams;
+  if (share.streams < kMaxStreams && !all_full) return true;
+  if (poses && share.posing < share.streams) {
+    forget_one_of(upstream);
+    return true;
+  }
+  // Then who has most of them gives one to who has fewer.
+  const auto most = std::ranges::max_element(shares_, {}, &Share::streams);
+  if (share.streams >= kMaxStreams || share.streams + 1 >= most->streams) return false;
+  forget_one_of(static_cast<std::size_t>(most - shares_.begin()));
   return true;
+}
+
+void RelayedStreams::forget_one_of(std::size_t upstream) {
+  auto one = streams_.end();
+  for (auto next = streams_.begin(); next != streams_.end(); ++next) {
+    if (next->second.upstream != upstream) continue;
+    one = next;
+    if (!next->second.poses) break;
+  }
+  assert(one != streams_.end());
+  forget(one);
 }
 
 void RelayedStreams::keep_skeleton(std::string_view stream, std::string_view bytes,

@@ -95,7 +95,8 @@ class MergedStats {
   std::vector<Latest> latest_;  // [upstream]
 };
 
-inline constexpr std::size_t kMaxStreams = 1024;                    // of each upstream
+// Of each upstream, and link::kMaxLinkStreams of all.
+inline constexpr std::size_t kMaxStreams = 1024;
 inline constexpr std::size_t kMaxSkeletonBytes = 16 * 1024 * 1024;  // of all upstreams together
 
 // The stream of a topic such as "pose/walker"; empty for other topics.
@@ -106,8 +107,8 @@ enum class Admission : std::uint8_t { kPasses, kOthersName, kTooMany };
 // RelayedStreams: what a relay knows of the streams that pass it. Each stream belongs to the
 // upstream that sends it; a second one that sends a stream of the same name is not mixed in. The
 // last skeleton of each stream is kept for subscribers that come later. Every upstream has room of
-// its own, so that none costs another a stream. No socket, no clock of its own, one thread. Cold:
-// allocates.
+// its own, and its share of what all may have, so that none costs another a stream. No socket, no
+// clock of its own, one thread. Cold: allocates.
 class RelayedStreams {
  public:
   explicit RelayedStreams(std::size_t upstreams) : shares_(upstreams) {}
@@ -150,6 +151,8 @@ class RelayedStreams {
   };
   // Returns false if the upstream may have no more streams.
   [[nodiscard]] bool make_room(std::size_t upstream, bool poses);
+  // Forgets a stream of this upstream, rather one without poses.
+  void forget_one_of(std::size_t upstream);
   // Forgets streams that have sent nothing for a while; at most once a second.
   void forget_old(std::int64_t now_ns);
   void forget(Streams::iterator one);

@@ -174,12 +174,7 @@ constexpr std::int64_t kGone_ns = 10 * kNanosPerSecond;  // a stream without any
 constexpr std::int64_t kStayed_ns = 3 * kNanosPerSecond / 2;
 constexpr std::int64_t kUpload_ns = 10 * kNanosPerSecond;  // between two pieces, as in the daemon
 constexpr std::size_t kMaxTopic = 128;
-constexpr const char* kSkeleton = "skeleton/";
-constexpr std::array kThinned{"pose/", "sensor/"};
-
-std::string topic_of(const char* kind, std::string_view stream) {
-  return std::string(kind).append(stream);
-}
+constexpr std::array<std::string_view, 4> kKindNames{"skeleton/", "pose/", "sensor/", "event/"};
 
 }  // namespace
 
@@ -189,7 +184,7 @@ void Hub::join(Tab& tab) {
   tab.outbox.put_answer(daemon_word(daemon_));
   if (stats_) tab.outbox.put_newest("stats", stats_);
   for (const auto& [name, stream] : streams_) {
-    if (stream.skeleton) tab.outbox.put_newest(topic_of(kSkeleton, name), stream.skeleton);
+    if (stream.skeleton) tab.outbox.put_newest(stream.topics[kSkeleton], stream.skeleton);
   }
   tab.wake();
 }
@@ -312,56 +307,85 @@ void Hub::receive(std::string_view topic, std::string_view body, std::int64_t no
   } else if (topic == "stats") {
     stats_ = with_topic(topic, body);
     hands_source_ = hands_source_of(body);
-    for (Tab* tab : tabs_) tab->outbox.put_newest(topic, stats_);
+    for (Tab* tab : tabs_) tab->outbox.put_newest("stats", stats_);
   } else {
     receive_stream(topic, body, now_ns);
   }
 }
 
-Bytes Hub::counted(std::string_view topic, std::string_view body) const {
+Bytes Hub::counted(const Stream& stream, std::string_view topic, std::string_view body) const {
   Bytes bytes = with_topic(topic, body);
   const std::string* const text = bytes.get();
   *kept_ += text->size();
-  return {text, [kept = kept_, owner = std::move(bytes)](const std::string* gone) {
-            *kept -= gone->size();
+  *stream.kept += text->size();
+  return {text, [all = kept_, own = stream.kept, owner = std::move(bytes)](const auto* gone) {
+            *all -= gone->size();
+            *own -= gone->size();
           }};
 }
 
+Hub::Stream* Hub::meet(std::string_view name, std::int64_t now_ns) {
+  auto known = streams_.find(name);
+  if (known == streams_.end()) {
+    constexpr std::int64_t kPause_ns = kNanosPerSecond / 10;  // it looks at all of them
+    if (streams_.size() == kMaxViewStreams && now_ns - forgot_ns_ >= kPause_ns) {
+      forgot_ns_ = now_ns;
+      forget_silent(now_ns, kStayed_ns);
+    }
+    if (streams_.size() == kMaxViewStreams) return nullptr;
+    known = streams_.emplace(std::string(name), Stream{}).first;
+    for (std::size_t kind = 0; kind < kEvent; ++kind) {
+      known->second.topics[kind] = std::string(kKindNames[kind]).append(name);
+    }
+  }
+  known->second.received_ns = now_ns;
+  return &known->second;
+}
+
+bool Hub::make_room(const Stream& stream, std::size_t bytes) {
+  while (*kept_ + bytes > kMaxKeptBytes) {
+    if (*stream.kept + bytes > kMaxKeptBytes / streams_.size()) return false;
+    const auto most = std::ranges::max_element(
+        streams_, {}, [](const auto& entry) { return *entry.second.kept; });
+    const std::size_t before = *kept_;
+    let_go(most->second);
+    if (*kept_ == before) return false;  // it is being sent
+  }
+  return true;
+}
+
 void Hub::receive_stream(std::string_view topic, std::string_view body, std::int64_t now_ns) {
-  const auto slash = topic.find('/');
-  const bool skeleton = topic.starts_with(kSkeleton);
-  const bool event = topic.starts_with("event/");
-  const bool thinned =
-      std::ranges::any_of(kThinned, [&](const char* kind) { return topic.starts_with(kind); });
-  const bool fits = body.size() <= link::kMaxStreamMessage && *kept_ + body.size() <= kMaxKeptBytes;
-  if ((!skeleton && !event && !thinned) || !fits) {
+  const auto kind = std::ranges::find_if(
+      kKindNames, [&](std::string_view name) { return topic.starts_with(name); });
+  const bool event = kind == kKindNames.begin() + kEvent;
+  const bool fits = body.size() <= (event ? kMaxEventBytes : link::kMaxStreamMessage);
+  Stream* const stream =
+      kind != kKindNames.end() && fits ? meet(topic.substr(kind->size()), now_ns) : nullptr;
+  if (stream == nullptr || !make_room(*stream, topic.size() + 1 + body.size())) {
     ++counts_.foreign;
     return;
   }
-  const std::string_view name = topic.substr(slash + 1);
-  auto known = streams_.find(name);
-  if (known == streams_.end()) {
-    if (streams_.size() == kMaxViewStreams) {
-      ++counts_.foreign;
-      return;
-    }
-    known = streams_.emplace(std::string(name), Stream{}).first;
-  }
-  known->second.received_ns = now_ns;
+  const bool skeleton = kind == kKindNames.begin() + kSkeleton;
   if (tabs_.empty() && !skeleton) return;
-  const Bytes bytes = counted(topic, body);
+  const Bytes bytes = counted(*stream, topic, body);
+  if (event) {
+    for (Tab* tab : tabs_) tab->outbox.put_event(bytes);
+    return;
+  }
+  const std::string& key = stream->topics[static_cast<std::size_t>(kind - kKindNames.begin())];
   if (skeleton) {
     // The daemon repeats it every second, for clients that come later. After a pause the stream had
     // left, and pages have forgotten its skeleton.
-    Stream& stream = known->second;
-    const bool stayed = now_ns - std::exchange(stream.skeleton_ns, now_ns) < kStayed_ns;
-    if (stream.skeleton && *stream.skeleton == *bytes && stayed) return;
-    stream.skeleton = bytes;
+    const bool stayed = now_ns - std::exchange(stream->skeleton_ns, now_ns) < kStayed_ns;
+    if (stream->skeleton && *stream->skeleton == *bytes && stayed) return;
+    stream->skeleton = bytes;
   }
   for (Tab* tab : tabs_) {
-    if (skeleton) tab->outbox.put_newest(topic, bytes);
-    if (event) tab->outbox.put_event(bytes);
-    if (thinned) tab->outbox.put_thinned(topic, bytes);
+    if (skeleton) {
+      tab->outbox.put_newest(key, bytes);
+    } else {
+      tab->outbox.put_thinned(key, bytes);
+    }
   }
 }
 
@@ -373,10 +397,10 @@ void Hub::daemon_is(DaemonState state) {
   if (state == daemon_) return;
   if (!state.alive && daemon_.alive) {
     // What the next one has may differ, and poses of this one would be old.
+    for (Tab* tab : tabs_) tab->outbox.forget_all();
     streams_.clear();
     stats_ = nullptr;
     hands_source_.clear();
-    for (Tab* tab : tabs_) tab->outbox.forget_all();
   }
   daemon_ = std::move(state);
   send_to_all(daemon_word(daemon_));
@@ -395,10 +419,19 @@ void Hub::send_to_all(const Parcel& parcel) {
   }
 }
 
-void Hub::forget(std::string_view stream) {
+void Hub::let_go(Stream& stream) {
   for (Tab* tab : tabs_) {
-    tab->outbox.forget(topic_of(kSkeleton, stream));
-    for (const char* kind : kThinned) tab->outbox.forget(topic_of(kind, stream));
+    for (const std::string& topic : stream.topics) tab->outbox.forget(topic);
+  }
+  stream.skeleton = nullptr;
+}
+
+void Hub::forget_silent(std::int64_t now_ns, std::int64_t silent_ns) {
+  for (auto next = streams_.begin(); next != streams_.end();) {
+    const auto one = next++;
+    if (now_ns - one->second.received_ns < silent_ns) continue;
+    let_go(one->second);
+    streams_.erase(one);
   }
 }
 
@@ -415,11 +448,7 @@ void Hub::expire(std::int64_t now_ns) {
     asked.tab->wake();
   }
   if (camera_ != nullptr && now_ns - camera_ns_ > kCameraSilent_ns) end_camera();
-  std::erase_if(streams_, [&](const auto& entry) {
-    if (now_ns - entry.second.received_ns < kGone_ns) return false;
-    forget(entry.first);
-    return true;
-  });
+  forget_silent(now_ns, kGone_ns);
 }
 
 }  // namespace posed::view

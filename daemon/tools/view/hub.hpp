@@ -2,6 +2,7 @@
 // The page's are untrusted. No socket and no clock of its own; one thread. Cold.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -89,11 +90,12 @@ struct Greeting {
 [[nodiscard]] Parcel landmarks_word(const std::string& refusal);
 [[nodiscard]] Parcel no_reply_word(std::uint32_t number, const std::string& sentence);
 
-inline constexpr std::size_t kMaxViewStreams = 1024;  // more are not shown
-// Bytes of all streams' messages that are kept for the pages; more are left out. Those of a large
-// setup have some MB.
+inline constexpr std::size_t kMaxViewStreams = link::kMaxLinkStreams;  // more are not shown
+// Bytes of all streams' messages that are kept for the pages; of more, what the largest streams
+// have is left out. Those of a large setup have some MB.
 inline constexpr std::size_t kMaxKeptBytes = 32 * 1024 * 1024;
-inline constexpr std::size_t kMaxUnderWay = 8;  // requests of one page at once
+inline constexpr std::size_t kMaxEventBytes = 8 * 1024;  // they have a sentence each
+inline constexpr std::size_t kMaxUnderWay = 8;           // requests of one page at once
 
 // An open page.
 struct Tab {
@@ -156,10 +158,13 @@ class Hub {
   [[nodiscard]] std::size_t kept_bytes() const noexcept { return *kept_; }
 
  private:
+  enum Kind : std::uint8_t { kSkeleton, kPose, kSensor, kEvent };
   struct Stream {
+    std::array<std::string, kEvent> topics{};  // the tabs' outboxes refer to them
     std::int64_t received_ns = 0;
     Bytes skeleton{};              // with its topic; null: none yet
     std::int64_t skeleton_ns = 0;  // when it came last
+    std::shared_ptr<std::size_t> kept = std::make_shared<std::size_t>(0);  // bytes
   };
   struct UnderWay {
     Tab* tab = nullptr;
@@ -176,11 +181,19 @@ class Hub {
   // Tells the daemon that the page's camera is off.
   void end_camera();
   void note_upload(Tab& tab, const v1::ControlRequest& request, std::int64_t now_ns);
-  // The message behind its topic, counted in kept_ for as long as anybody has it.
-  [[nodiscard]] Bytes counted(std::string_view topic, std::string_view body) const;
+  // The message behind its topic, counted in both `kept` for as long as anybody has it.
+  [[nodiscard]] Bytes counted(const Stream& stream, std::string_view topic,
+                              std::string_view body) const;
   void receive_stream(std::string_view topic, std::string_view body, std::int64_t now_ns);
+  // The stream of this name, perhaps a new one; null if there are too many.
+  [[nodiscard]] Stream* meet(std::string_view name, std::int64_t now_ns);
+  // Whether so many more bytes of the stream may be kept. Where there is no room, who has most
+  // gives way to who has less than an equal share: no source hides the streams of another.
+  [[nodiscard]] bool make_room(const Stream& stream, std::size_t bytes);
   void send_to_all(const Parcel& parcel);
-  void forget(std::string_view stream);
+  // Keeps nothing of the stream that can be left out.
+  void let_go(Stream& stream);
+  void forget_silent(std::int64_t now_ns, std::int64_t silent_ns);
 
   Greeting greeting_;
   Ask ask_;
@@ -189,6 +202,7 @@ class Hub {
   DaemonState daemon_;
   ControlRight right_;
   std::map<std::string, Stream, std::less<>> streams_;
+  std::int64_t forgot_ns_ = kNoTime_ns / 2;      // when there were too many of them
   Bytes stats_;                                  // the last ones, with their topic; null: none
   std::map<std::uint64_t, UnderWay> under_way_;  // by ticket
   std::uint64_t last_ticket_ = 0;

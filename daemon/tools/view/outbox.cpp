@@ -5,20 +5,12 @@
 namespace posed::view {
 
 void Outbox::put_thinned(std::string_view topic, Bytes bytes) {
-  auto found = thinned_.find(topic);
-  if (found == thinned_.end()) found = thinned_.emplace(std::string(topic), Thinned{}).first;
-  if (found->second.bytes) ++counts_.replaced;
-  found->second.bytes = std::move(bytes);
+  Thinned& thinned = thinned_[topic];
+  if (thinned.bytes) ++counts_.replaced;
+  thinned.bytes = std::move(bytes);
 }
 
-void Outbox::put_newest(std::string_view topic, Bytes bytes) {
-  const auto found = newest_.find(topic);
-  if (found == newest_.end()) {
-    newest_.emplace(std::string(topic), std::move(bytes));
-  } else {
-    found->second = std::move(bytes);
-  }
-}
+void Outbox::put_newest(std::string_view topic, Bytes bytes) { newest_[topic] = std::move(bytes); }
 
 void Outbox::put_event(Bytes bytes) {
   if (events_.size() == kMaxEvents) {
@@ -37,8 +29,8 @@ void Outbox::put_answer(Parcel parcel) {
 }
 
 void Outbox::forget(std::string_view topic) {
-  if (const auto found = newest_.find(topic); found != newest_.end()) newest_.erase(found);
-  if (const auto found = thinned_.find(topic); found != thinned_.end()) thinned_.erase(found);
+  newest_.erase(topic);
+  thinned_.erase(topic);
 }
 
 void Outbox::forget_all() {

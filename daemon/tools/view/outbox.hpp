@@ -36,7 +36,8 @@ struct OutboxCounts {
 
 class Outbox {
  public:
-  // A pose or sample of the stream's topic.
+  // A pose or sample of the stream's topic. Topics outlive what waits of them: forget() comes
+  // first.
   void put_thinned(std::string_view topic, Bytes bytes);
   // Of this only the newest matters: a skeleton, stats.
   void put_newest(std::string_view topic, Bytes bytes);
@@ -64,8 +65,8 @@ class Outbox {
   };
   std::deque<Parcel> answers_;
   std::deque<Bytes> events_;
-  std::map<std::string, Bytes, std::less<>> newest_;
-  std::map<std::string, Thinned, std::less<>> thinned_;
+  std::map<std::string_view, Bytes> newest_;  // by topic
+  std::map<std::string_view, Thinned> thinned_;
   std::uint64_t credit_ = 0;
   OutboxCounts counts_;
 };

@@ -93,6 +93,26 @@ TEST_CASE("the names and skeletons of one upstream leave the other's room alone"
   CHECK(streams.skeleton_bytes(1) == 2 * large.size());
 }
 
+TEST_CASE("upstreams share what a page can show, and many hostile ones leave one its streams") {
+  constexpr std::size_t kHostile = 15, kOwn = 200;
+  RelayedStreams streams(kHostile + 1);
+  for (std::size_t i = 0; i < kMaxStreams; ++i) {
+    for (std::size_t upstream = 0; upstream < kHostile; ++upstream) {
+      static_cast<void>(streams.admit(std::to_string(upstream) + "/" + std::to_string(i), upstream,
+                                      true, kNow_ns));
+    }
+  }
+  CHECK(streams.streams() == link::kMaxLinkStreams);
+  for (int round = 0; round < 2; ++round) {
+    for (std::size_t i = 0; i < kOwn; ++i) {
+      CHECK(streams.admit("ann" + std::to_string(i), kHostile, true, kNow_ns) ==
+            Admission::kPasses);
+      static_cast<void>(streams.admit("x" + std::to_string(i), 0, true, kNow_ns));
+    }
+  }
+  CHECK(streams.streams() == link::kMaxLinkStreams);
+}
+
 TEST_CASE("in one upstream, too, streams with poses come before names, and ended ones go") {
   RelayedStreams streams(1);
   std::int64_t now_ns = kNow_ns;

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <algorithm>
 #include <string>
 #include <utility>
 #include <vector>
@@ -116,6 +117,47 @@ TEST_CASE("what a hostile daemon sends is kept up to a limit, and let go with it
   CHECK(rig.hub.kept_bytes() == 0);
   rig.hub.receive("skeleton/walker", "S", 0);
   CHECK(rig.hub.kept_bytes() > 0);
+}
+
+TEST_CASE("large streams and events of a hostile source hide nobody's") {
+  HubRig rig;
+  Tab tab;
+  rig.join(tab);
+  rig.hub.handle(tab, R"({"type":"ready"})", true, 0);
+  static_cast<void>(all_of(tab));
+  const std::string large(link::kMaxStreamMessage, 'x'), usual(8000, 'u');
+  const auto attack = [&](int from) {
+    for (int i = from; i < from + 1024; ++i) {
+      const std::string name = std::to_string(i);
+      for (const char* kind : {"skeleton/", "pose/", "sensor/", "event/"}) {
+        rig.hub.receive(kind + name, large, 0);
+      }
+    }
+  };
+  attack(0);
+  for (int round = 0; round < 3; ++round) {
+    rig.hub.receive("skeleton/ann", usual, 0);
+    rig.hub.receive("pose/ann", usual, 0);
+    attack(0);
+  }
+  CHECK(rig.hub.kept_bytes() <= kMaxKeptBytes);
+  const auto got = all_of(tab);
+  CHECK(std::ranges::count(got, "skeleton/ann", &Got::topic) == 1);
+  CHECK(std::ranges::count(got, "pose/ann", &Got::topic) == 1);
+}
+
+TEST_CASE("names that come and go leave a place for those that stay") {
+  HubRig rig;
+  for (std::int64_t second = 0; second < 12; ++second) {
+    for (int i = 0; i < 1024; ++i) {
+      rig.hub.receive("pose/" + std::to_string(1024 * second + i), "P", second * kNanosPerSecond);
+    }
+  }
+  CHECK(rig.hub.counts().foreign == 0);
+  rig.hub.receive("skeleton/ann", "S", 12 * kNanosPerSecond);
+  Tab tab;
+  rig.join(tab);
+  CHECK(all_of(tab).back().topic == "skeleton/ann");
 }
 
 TEST_CASE("a new tab is greeted and gets the skeletons and the last stats at once") {
