@@ -203,8 +203,8 @@ void DaemonLink::check_control(std::int64_t now_ns) {
     control_again_.failed(now_ns, kControlAgain_ns);
     return;
   }
-  const bool anew = socket.ends() != control_ends_ || !control_stood_;
-  control_ends_ = socket.ends();
+  const bool ended = std::exchange(control_ends_, socket.ends()) != socket.ends();
+  const bool anew = ended || !control_stood_;
   control_stood_ = socket.established();
   if (!control_stood_) {
     if (!control_again_.is_waiting()) {
@@ -212,6 +212,7 @@ void DaemonLink::check_control(std::int64_t now_ns) {
                        .reason = "nothing answers at " + options_.control +
                                  ", the daemon's control endpoint (--control)"});
     }
+    if (ended) control_again_.failed(now_ns);
     return;
   }
   if (anew) return ask_for_status(now_ns);
