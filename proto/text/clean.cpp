@@ -4,6 +4,8 @@
 #include <cstdint>
 #include <cstdio>
 
+#include "proto/text/json_text.hpp"
+
 namespace posed {
 namespace {
 
@@ -34,13 +36,15 @@ Character first_character(std::string_view text) {
   return {code, bytes};
 }
 
-// True for characters that control a terminal (C0, DEL, C1) or change how the rest of a line is
-// displayed: line and paragraph separators, and the marks, embeddings, overrides and isolates of
-// the writing direction.
+// True for characters that control a terminal (C0, DEL, C1), change how the rest of a line is
+// displayed (line and paragraph separators; the marks, embeddings, overrides and isolates of the
+// writing direction), or are not seen at all, so that two names look alike.
 bool is_control(std::uint32_t code) {
-  return code < 0x20 || (code >= 0x7F && code <= 0x9F) || code == 0x061C ||
-         (code >= 0x200B && code <= 0x200F) || (code >= 0x2028 && code <= 0x202E) ||
-         (code >= 0x2060 && code <= 0x206F) || code == 0xFEFF;
+  return code < 0x20 || (code >= 0x7F && code <= 0x9F) || code == 0x00AD || code == 0x061C ||
+         code == 0x180E || (code >= 0x200B && code <= 0x200F) ||
+         (code >= 0x2028 && code <= 0x202E) || (code >= 0x2060 && code <= 0x206F) ||
+         code == 0xFEFF || (code >= 0xFFF9 && code <= 0xFFFB) ||
+         (code >= 0xE0000 && code <= 0xE0FFF);
 }
 
 std::string escaped(const char* format, unsigned value) {
@@ -71,6 +75,26 @@ std::string clean(std::string_view text, std::size_t max_bytes) {
     if (out.size() + next.size() > max_bytes) return out.append(kEllipsis);
     out += next;
     text.remove_prefix(character.bytes);
+  }
+  return out;
+}
+
+std::string clean_json(std::string_view json) {
+  std::string out;
+  out.reserve(json.size());
+  while (!json.empty()) {
+    const Character character = first_character(json);
+    const std::uint32_t code = character.code;
+    const bool blank = code == '\n' || code == '\r' || code == '\t';  // between the values
+    if (code == kNoCharacter || blank || !is_control(code)) {
+      out += json.substr(0, character.bytes);
+    } else if (code < 0x10000) {
+      out += escaped("\\u%04x", code);
+    } else {  // as the two halves of UTF-16
+      out += escaped("\\u%04x", 0xD7C0 + (code >> 10));
+      out += escaped("\\u%04x", 0xDC00 + (code & 0x3FF));
+    }
+    json.remove_prefix(character.bytes);
   }
   return out;
 }

@@ -2,7 +2,12 @@
 
 #include <catch2/catch.hpp>
 
+#include <string>
+
+#include <nlohmann/json.hpp>
+
 #include "proto/frame/result.hpp"
+#include "proto/text/json_text.hpp"
 
 namespace posed {
 namespace {
@@ -22,6 +27,16 @@ TEST_CASE("letters of any script are kept, bytes that are not UTF-8 are written 
   CHECK(clean("\xc0\xaf") == "\\xc0\\xaf");               // '/' in too many bytes
   CHECK(clean("\xed\xa0\x80") == "\\xed\\xa0\\x80");      // half of a surrogate pair
   CHECK(clean("\xf4\x90\x80\x80x").ends_with("\\x80x"));  // beyond Unicode
+}
+
+TEST_CASE("JSON shows what a terminal would obey, and means the same", "[clean]") {
+  const std::string hostile = "a\u2066\u202e\u009b\u00ad\ufeff\U000e0041\x7f\x1b 手\n";
+  for (const int indent : {-1, 2}) {
+    const std::string text = json_text(nlohmann::json{{"name", hostile}, {"n", 1}}, indent);
+    CHECK(text.contains("\\u2066\\u202e\\u009b\\u00ad\\ufeff\\udb40\\udc41\\u007f\\u001b 手"));
+    CHECK(nlohmann::json::parse(text).at("name") == hostile);
+  }
+  CHECK(clean("a\u00ad\U000e0041") == "a\\u{00ad}\\u{e0041}");
 }
 
 TEST_CASE("what is too long ends in dots, between two characters", "[clean]") {
