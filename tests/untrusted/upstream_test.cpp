@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <fstream>
+#include <memory>
 #include <string>
 #include <thread>
 #include <vector>
@@ -10,6 +11,7 @@
 #include <catch2/catch.hpp>
 
 #include "posed/v1/control.pb.h"
+#include "posed/v1/posed.pb.h"
 #include "proto/zmq/zmq_handle.hpp"
 #include "tests/support/process.hpp"
 #include "tests/support/raw_listener.hpp"
@@ -184,17 +186,70 @@ TEST_CASE("what a daemon answers cannot command the terminal of ctl") {
       {"warm-up", "a"},     {"engage", "a"},   {"use-model", "a", "m.style"},
       {"play", "a", "g"},   {"take", "start"}, {"rename-model", "a.style", "b"},
       {"stop-playing", "a"}};
-  for (const auto& command : commands) {
-    INFO(command.front());
-    std::vector<std::string> words{"ctl", "--connect", daemon.endpoint()};
-    words.insert(words.end(), command.begin(), command.end());
-    Process ctl(words);
-    const std::string printed = ctl.rest() + ctl.errors();
-    CHECK(ctl.exit_code().value_or(-1) == 0);
-    CHECK_FALSE(printed.empty());
-    for (const std::string code : {"\x1b", "\r", "\x07", "\u202e", "\u009b"}) {
-      CHECK_FALSE(printed.contains(code));
+  for (const bool json : {false, true}) {
+    for (const auto& command : commands) {
+      INFO(command.front() << (json ? " --json" : ""));
+      std::vector<std::string> words{"ctl", "--connect", daemon.endpoint()};
+      if (json) words.emplace_back("--json");
+      words.insert(words.end(), command.begin(), command.end());
+      Process ctl(words);
+      const std::string printed = ctl.rest() + ctl.errors();
+      CHECK(ctl.exit_code().value_or(-1) == 0);
+      CHECK_FALSE(printed.empty());
+      for (const std::string code : {"\x1b", "\r", "\x07", "\u202e", "\u009b"}) {
+        CHECK_FALSE(printed.contains(code));
+      }
     }
+  }
+}
+
+TEST_CASE("a refusal without words is said") {
+  const Answerer daemon{v1::ControlReply{}};
+  Process ctl({"ctl", "--connect", daemon.endpoint(), "status"});
+  CHECK(ctl.exit_code().value_or(-1) == 1);
+  CHECK(ctl.errors().contains("does not say why"));
+}
+
+// What had the daemon's port while it was away sent a part so large that libzmq tries no more.
+TEST_CASE("who watches a daemon returns to it whatever had its port meanwhile") {
+  for (const std::string command : {"monitor", "top"}) {
+    INFO(command);
+    auto impostor = std::make_unique<RawListener>();
+    const std::string endpoint = impostor->endpoint();
+    Process watches({command, "--connect", endpoint, "--json", "--count", "1"});
+    {
+      const RawPeer peer = impostor->accept();
+      impostor.reset();
+      REQUIRE(peer.shake_hands("PUB"));
+      static_cast<void>(peer.send(zmtp::frame(std::string(2 * 1024 * 1024, 'x'))));
+      CHECK(peer.hung_up(RawPeer::kPatience));
+    }
+    CHECK(watches.comes_to_say("waiting"));
+    const auto context = net::open_context();
+    const auto daemon = net::open_socket(context->get(), ZMQ_PUB);
+    REQUIRE(net::bind_socket(daemon->get(), endpoint));
+    v1::Stats stats;
+    stats.set_time_ns(7);
+    const v1::Frame pose;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(15);
+    while (!watches.exit_code(std::chrono::milliseconds(50)) &&
+           std::chrono::steady_clock::now() < end) {
+      static_cast<void>(net::send_part(daemon->get(), "stats", true));
+      static_cast<void>(net::send_part(daemon->get(), stats.SerializeAsString(), false));
+      static_cast<void>(net::send_part(daemon->get(), "pose/a", true));
+      static_cast<void>(net::send_part(daemon->get(), pose.SerializeAsString(), false));
+    }
+    CHECK(watches.exit_code(std::chrono::milliseconds(0)) == 0);
+  }
+}
+
+TEST_CASE("who is sent more than any daemon sends says so") {
+  for (const std::string command : {"monitor", "top"}) {
+    INFO(command);
+    const Flood flood("PUB", many_of(zmtp::frame("", 1), 64'000));
+    Process watches({command, "--connect", flood.endpoint(), "--json", "--timeout", "3"});
+    CHECK(watches.exit_code() == 1);
+    CHECK(watches.errors().contains("more than any daemon does"));
   }
 }
 

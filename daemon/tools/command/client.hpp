@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "daemon/tools/link/daemon_socket.hpp"
@@ -55,15 +56,21 @@ using ClientOptions = link::Peer;
 // Adds --connect (default `endpoint`), --key and --server-key.
 void add_client_options(CLI::App& command, ClientOptions& options, const char* endpoint);
 
-// A connected socket that monitors its own connection.
+// A connected socket that monitors its own connection. One that subscribes is opened anew some time
+// after its connection has ended, whoever had the daemon's port meanwhile; one for requests is not,
+// because nobody knows which of them took effect.
 class Connection {
  public:
   // `type` is ZMQ_SUB or ZMQ_DEALER. Returns at once; libzmq connects in the background, and
   // reconnects when necessary.
   static Result<Connection> open(const ClientOptions& options, int type);
 
+  // Of a ZMQ_SUB: the topics that begin with `prefix` are wanted, or no longer.
+  Result<> subscribe(const std::string& prefix, bool wanted = true);
+
   [[nodiscard]] const std::string& endpoint() const { return socket_.peer().endpoint; }
-  [[nodiscard]] void* socket() const { return socket_.get(); }
+  // Returns false if the request cannot be sent.
+  [[nodiscard]] bool send(const std::string& request);
   // The next part, if a message waits. Whatever comes must be received here.
   [[nodiscard]] bool receive(net::Message& part) { return socket_.receive(part); }
   // The next message of two parts, a topic and its body; others are skipped.
@@ -74,20 +81,28 @@ class Connection {
   [[nodiscard]] bool wait(std::chrono::milliseconds timeout);
 
   // Why the daemon refuses this client, in one sentence, once that is known. Call from time to
-  // time.
+  // time: it opens the socket anew, too.
   [[nodiscard]] std::optional<Error> refusal();
   // Whether the connection is established, as of the last call of refusal().
   [[nodiscard]] bool established() const { return socket_.established(); }
+  // How many connections were ended here because the peer sent more than any daemon does.
+  [[nodiscard]] std::uint64_t cuts() const { return cuts_; }
   [[nodiscard]] Error no_answer() const;  // the error if nothing answers at the endpoint
-  // The sentence for a daemon that has answered before but has been silent for `silence_s`.
-  [[nodiscard]] std::string silence(double silence_s) const;
+  // The sentence for a daemon that has answered before but has been silent for `silence_s`. `cut`:
+  // its connection was ended here since then.
+  [[nodiscard]] std::string silence(double silence_s, bool cut) const;
 
  private:
   Connection(net::Context context, link::DaemonSocket socket)
       : context_(std::move(context)), socket_(std::move(socket)) {}
 
+  void open_anew();
+
   net::Context context_;
   link::DaemonSocket socket_;
+  std::set<std::string> wanted_;  // prefixes of topics
+  link::Retry retry_{};
+  std::uint64_t cuts_ = 0;  // of all sockets so far
 };
 
 // Watches the daemon's heartbeat, its stats, and prints on stderr when it falls silent and when it
@@ -106,11 +121,13 @@ class SilenceWatch {
   void print(bool yes) { prints_ = yes; }
 
  private:
+  // Without the endpoint, for a daemon that has answered before.
   [[nodiscard]] std::string sentence(double silence_s) const;
 
   const Connection& connection_;
   double timeout_s_;
   bool prints_ = true;
+  std::uint64_t cuts_ = 0;  // of the connection, when the daemon answered last
   Heartbeat heart_;
 };
 

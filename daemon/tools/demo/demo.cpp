@@ -375,7 +375,7 @@ Result<> watch(const assembly::Daemon& daemon, const DemoOptions& options, const
   ClientOptions client;
   client.endpoint = daemon.publish_endpoint();
   auto connection = TRY(Connection::open(client, ZMQ_SUB));
-  TRY(net::set_option(connection.socket(), ZMQ_SUBSCRIBE, "pose/"));
+  TRY(connection.subscribe("pose/"));
   DemoScreen screen(daemon, connection, url);
   const auto start = SteadyClock::now();
   std::optional<SteadyClock::time_point> first_frame;

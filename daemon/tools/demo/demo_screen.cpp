@@ -36,7 +36,7 @@ Result<DemoRequests> DemoRequests::open(const std::string& control) {
 }
 
 Result<> DemoRequests::send(const v1::ControlRequest& request) {
-  if (net::send_part(connection_.socket(), request.SerializeAsString(), false)) return {};
+  if (connection_.send(request.SerializeAsString())) return {};
   return fail("the demo's own request cannot be sent");
 }
 
@@ -153,7 +153,7 @@ bool is_due(std::optional<std::chrono::steady_clock::time_point>& last,
 
 }  // namespace
 
-DemoScreen::DemoScreen(const assembly::Daemon& daemon, const Connection& connection,
+DemoScreen::DemoScreen(const assembly::Daemon& daemon, Connection& connection,
                        const std::string& url)
     : daemon_(daemon),
       first_line_(url.empty() ? "" : "see it: " + url),

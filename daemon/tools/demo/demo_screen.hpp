@@ -156,7 +156,7 @@ class DemoScreen {
  public:
   // `daemon` and `connection`, which receives its messages, outlive the screen. `url`: the page's
   // address, on the first line; empty: there is no page.
-  DemoScreen(const assembly::Daemon& daemon, const Connection& connection, const std::string& url);
+  DemoScreen(const assembly::Daemon& daemon, Connection& connection, const std::string& url);
 
   // Takes a message of the daemon.
   void handle(std::string_view topic, std::span<const std::byte> body) {

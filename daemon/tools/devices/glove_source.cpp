@@ -117,7 +117,7 @@ class Subscription {
   static Result<Subscription> open(const ClientOptions& client, const std::string& stream) {
     auto connection = TRY(Connection::open(client, ZMQ_SUB));
     for (const std::string& topic : {sensor_topic(stream), std::string("stats")}) {
-      TRY(net::set_option(connection.socket(), ZMQ_SUBSCRIBE, topic));
+      TRY(connection.subscribe(topic));
     }
     return Subscription(std::move(connection), stream);
   }

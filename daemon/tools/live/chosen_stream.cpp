@@ -126,21 +126,21 @@ const v1::StreamStats* ChosenStream::stats_of(const v1::Stats& stats) const {
   return nullptr;
 }
 
-void ChosenStream::subscribe(int option, const std::string& stream) const {
+void ChosenStream::subscribe(const std::string& stream, bool wanted) {
   for (const char* kind : {"skeleton/", "pose/"}) {
-    static_cast<void>(net::set_option(data_.socket(), option, kind + stream));
+    static_cast<void>(data_.subscribe(kind + stream, wanted));
   }
 }
 
 void ChosenStream::unfollow() {
-  if (figure_) subscribe(ZMQ_UNSUBSCRIBE, figure_->stream());
+  if (figure_) subscribe(figure_->stream(), false);
   figure_.reset();
   asked_alpha_.reset();
 }
 
 void ChosenStream::follow(const std::string& stream) {
   unfollow();
-  subscribe(ZMQ_SUBSCRIBE, stream);
+  subscribe(stream, true);
   figure_.emplace(stream);
 }
 
@@ -216,7 +216,7 @@ void ChosenStream::ask(const std::string& stream, double alpha) {
   set.set_stream(stream);
   set.set_name("alpha");
   set.set_number(alpha);
-  if (net::send_part(control_->socket(), request.SerializeAsString(), false)) {
+  if (control_->send(request.SerializeAsString())) {
     asked_alpha_ = alpha;
     if (!asked_at_) asked_at_ = std::chrono::steady_clock::now();
   } else {
@@ -233,7 +233,8 @@ void ChosenStream::read_answer() {
     v1::ControlReply reply;
     const bool valid = message::parse_bounded(reply, message.bytes());
     if (!valid || !reply.ok()) {
-      note_ = "alpha stays: " + (valid ? clean(reply.error()) : "the answer cannot be read");
+      const std::string why = valid ? clean(reply.error()) : "the answer cannot be read";
+      note_ = "alpha stays: " + (why.empty() ? "the daemon does not say why" : why);
       asked_alpha_.reset();
     }
     return;

@@ -85,7 +85,7 @@ class ChosenStream {
  public:
   // `data` receives the daemon's messages and outlives the object. Changes of alpha go to
   // `control`; if that has no endpoint, alpha cannot be changed.
-  ChosenStream(const Connection& data, ClientOptions control)
+  ChosenStream(Connection& data, ClientOptions control)
       : data_(data), control_options_(std::move(control)) {}
 
   // Takes the stats of the next second. If the chosen stream has gone, the first one is chosen.
@@ -105,7 +105,7 @@ class ChosenStream {
   [[nodiscard]] std::vector<std::string> lines(const v1::Stats& stats, int columns, int rows);
 
  private:
-  void subscribe(int option, const std::string& stream) const;
+  void subscribe(const std::string& stream, bool wanted);
   void follow(const std::string& stream);
   void unfollow();
   void choose(const v1::Stats& stats, int step);
@@ -115,7 +115,7 @@ class ChosenStream {
   [[nodiscard]] std::string latency_line(const std::string& stream, int columns) const;
   [[nodiscard]] const v1::StreamStats* stats_of(const v1::Stats& stats) const;
 
-  const Connection& data_;
+  Connection& data_;
   ClientOptions control_options_;
   std::optional<Connection> control_;
   std::optional<StreamFigure> figure_;

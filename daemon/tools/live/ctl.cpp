@@ -61,7 +61,7 @@ struct CtlOptions {
 Result<v1::ControlReply> ask(Connection& connection, const CtlOptions& options,
                              const v1::ControlRequest& request) {
   using Steady = std::chrono::steady_clock;
-  if (!net::send_part(connection.socket(), request.SerializeAsString(), false)) {
+  if (!connection.send(request.SerializeAsString())) {
     return fail("the request cannot be sent");
   }
   const auto end = Steady::now() + std::chrono::duration<double>(options.timeout_s);
@@ -73,6 +73,9 @@ Result<v1::ControlReply> ask(Connection& connection, const CtlOptions& options,
     v1::ControlReply reply;
     if (message.more() || !message::parse_bounded(reply, message.bytes())) {
       return fail(options.client.endpoint + " does not answer like a posed daemon");
+    }
+    if (!reply.ok() && reply.error().empty()) {
+      reply.set_error(options.client.endpoint + " refuses this and does not say why");
     }
     return reply;
   }

@@ -72,10 +72,9 @@ class Monitor {
 
   Result<> run() {
     for (const std::string& topic : asked_) {
-      TRY(net::set_option(connection_.socket(), ZMQ_SUBSCRIBE, topic));
+      TRY(connection_.subscribe(topic));
     }
-    const std::string_view stats = "stats";
-    TRY(net::set_option(connection_.socket(), ZMQ_SUBSCRIBE, stats));
+    TRY(connection_.subscribe("stats"));
     while (!Interrupt::came() && !finished_) {
       if (auto refused = connection_.refusal()) return std::unexpected(*refused);
       if (auto given_up = watch_.report()) return std::unexpected(*given_up);

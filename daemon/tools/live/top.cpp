@@ -163,7 +163,7 @@ Result<> top(const TopOptions& options) {
   const Interrupt interrupt;
   auto connection = TRY(Connection::open(options.client, ZMQ_SUB));
   for (const char* topic : {"stats", "event/"}) {
-    TRY(net::set_option(connection.socket(), ZMQ_SUBSCRIBE, topic));
+    TRY(connection.subscribe(topic));
   }
   return Top(options, std::move(connection)).run();
 }

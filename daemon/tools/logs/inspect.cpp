@@ -98,7 +98,7 @@ Result<StreamFigure> await_figure(const InspectArguments& options) {
   StreamFigure figure(options.in);
   for (const std::string& topic :
        {"skeleton/" + options.in, "pose/" + options.in, std::string("stats")}) {
-    TRY(net::set_option(connection.socket(), ZMQ_SUBSCRIBE, topic));
+    TRY(connection.subscribe(topic));
   }
   while (!figure.pose()) {
     if (Interrupt::came()) return fail("interrupted before a pose of " + options.in + " came");

@@ -73,8 +73,9 @@ Error interrupted() {
 
 }  // namespace
 
-TakeClips::TakeClips(std::filesystem::path log)
+TakeClips::TakeClips(std::filesystem::path log, std::size_t max_kept)
     : log_(std::move(log)),
+      max_kept_(max_kept),
       keeper_([this](const std::stop_token& stop) { keep_on(stop); }),
       writer_([this](const std::stop_token& stop) { write_on(stop); }) {}
 
@@ -177,7 +178,7 @@ void TakeClips::add(Kept& take, const Moment& moment) {
   part->second.frames.add(moment.frame);
   const std::size_t bytes = bytes_of_frame(*stream.skeleton);
   part->second.bytes += bytes;
-  if (kept_.fetch_add(bytes) + bytes <= kMaxKept) return;
+  if (kept_.fetch_add(bytes) + bytes <= max_kept_) return;
   spdlog::info("take {} is too long for memory: its clips come later, from the log", take.row.id);
   give_up(take);
 }

@@ -34,8 +34,11 @@ namespace posed::tools {
 
 class TakeClips final : public pipeline::FrameTap {
  public:
+  static constexpr std::size_t kMaxKept = 256UL * 1024 * 1024;
+
   // Starts a thread that keeps frames and one of nice 19 that writes clips, while `log` grows.
-  explicit TakeClips(std::filesystem::path log);
+  // `max_kept`: bytes of frames in memory; smaller in tests.
+  explicit TakeClips(std::filesystem::path log, std::size_t max_kept = kMaxKept);
   ~TakeClips() override = default;
 
   struct Stream {
@@ -62,7 +65,6 @@ class TakeClips final : public pipeline::FrameTap {
  private:
   using Clock = std::chrono::steady_clock;
   static constexpr std::size_t kTapSlots = 2048;
-  static constexpr std::size_t kMaxKept = 256UL * 1024 * 1024;
 
   struct Moment {
     Frame frame{};
@@ -112,6 +114,7 @@ class TakeClips final : public pipeline::FrameTap {
   void not_missing(std::int64_t take, const std::string& file = {});
 
   std::filesystem::path log_;
+  const std::size_t max_kept_;
   pipeline::Ring<Moment> tap_{kTapSlots};
   std::atomic<std::uint64_t> lost_item_{0};  // of the newest frame that the ring had no room for
   std::atomic<std::size_t> kept_{0};         // bytes of frames of all takes

@@ -14,7 +14,9 @@
 #include "proto/frame/skeleton.hpp"
 #include "proto/log/rows.hpp"
 #include "tests/support/has.hpp"
+#include "tests/support/log_surgery.hpp"
 #include "tests/support/temp_folder.hpp"
+#include "tests/unit/daemon/tools/replay/staged_run.hpp"
 
 namespace posed::test {
 namespace {
@@ -30,6 +32,19 @@ std::shared_ptr<const Skeleton> two_joints() {
   return skeleton;
 }
 
+Frame frame_of(const Skeleton& skeleton, std::uint32_t stream, std::uint64_t item) {
+  Frame frame;
+  frame.header = {.stream = stream,
+                  .sequence = item,
+                  .arrival_ns = static_cast<std::int64_t>(item) * 16'666'667,
+                  .clock = {}};
+  frame.skeleton = skeleton.id;
+  frame.joint_count = 2;
+  frame.valid.set(0).set(1);
+  frame.rotation_xyzw.fill(kIdentity);
+  return frame;
+}
+
 // A recording whose log is nowhere: whoever would replay it fails.
 struct Recording {
   TempFolder folder;
@@ -40,16 +55,7 @@ struct Recording {
   // Of so many items, a frame each.
   void frames(std::uint64_t from, std::uint64_t to) {
     for (std::uint64_t item = from; item <= to; ++item) {
-      Frame frame;
-      frame.header = {.stream = 3,
-                      .sequence = item,
-                      .arrival_ns = static_cast<std::int64_t>(item) * 16'666'667,
-                      .clock = {}};
-      frame.skeleton = skeleton->id;
-      frame.joint_count = 2;
-      frame.valid.set(0).set(1);
-      frame.rotation_xyzw.fill(kIdentity);
-      clips.frame(frame, item);
+      clips.frame(frame_of(*skeleton, 3, item), item);
     }
   }
   void take(std::int64_t id, const std::string& name, std::uint64_t first, std::uint64_t last) {
@@ -92,6 +98,35 @@ TEST_CASE("a take's clip that cannot be written is listed with the reason") {
   CHECK(list.recording(0).name() == "stage-1-ann.walk.bvh");
   CHECK_FALSE(list.recording(0).being_made());
   CHECK(has(list.recording(0).problem(), "exists already"));
+}
+
+TEST_CASE("a take that is too long for memory is made from the log, and one that fits is not") {
+  const TempFolder folder;
+  const auto log = folder.path() / "stage.plog";
+  write_staged_log(log, 60);
+  forge(log, "INSERT INTO take VALUES(1,'long',1,60,'',0),(2,'short',61,66,'',0)");
+  const auto skeleton = two_joints();
+  constexpr std::size_t kSmall = 1000;  // bytes: some ten frames
+  tools::TakeClips clips(log, kSmall);
+  clips.stream_comes(1, {.name = "b", .skeleton = skeleton, .rate_hz = 60.0});
+  clips.take_changed({.id = 1, .name = "long", .first_item = 1, .last_item = 60});
+  clips.take_changed({.id = 2, .name = "short", .first_item = 61, .last_item = 66});
+  for (std::uint64_t item = 1; item <= 66; ++item) clips.frame(frame_of(*skeleton, 1, item), item);
+  clips.stop();
+  REQUIRE(clips.finish());
+  const auto frames = [&](const std::string& file) {
+    const auto clip = clip::read_clip(folder.path() / file);
+    return clip ? clip->frames() : 0;
+  };
+  const auto of_log = tools::clip_of_log(log, "b", "1");
+  REQUIRE(of_log);
+  CHECK(frames("stage-1-b.long.bvh") == of_log->frames());
+  CHECK(frames("stage-1-a.long.bvh") > 0);  // the log has this stream, too
+  CHECK(frames("stage-2-b.short.bvh") == 6);
+  CHECK(frames("stage-2-a.short.bvh") == 0);
+  v1::ControlReply list;
+  clips.add_to(list);
+  CHECK(list.recording().empty());
 }
 
 TEST_CASE("a take of which frames are missing is made from the log") {

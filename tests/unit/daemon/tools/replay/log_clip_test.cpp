@@ -3,6 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <string>
+#include <utility>
 
 #include "daemon/tools/export/log_clip.hpp"
 #include "daemon/tools/replay/replay.hpp"
@@ -133,6 +136,40 @@ TEST_CASE("takes are cut out of a log's stream by number or name, each frame onc
   CHECK(refusal("none") == "take 4 has 0 frames of stream 'b', and a clip needs two");
   forge(path, "INSERT INTO take VALUES(100000,'one too many',1,60,'',0)");
   CHECK(refusal("1").contains("no recording gives"));
+}
+
+TEST_CASE("all clips of a take come from one replay of its log, and are those of each stream") {
+  const TempFolder folder;
+  const auto path = folder.path() / "take.plog";
+  write_staged_log(path, kFrames);
+  const log::TakeRow take{.id = 1, .name = "walk", .first_item = 31, .last_item = 130};
+  const auto replayed = [&](const log::TakeRow& row, bool goes_on) {
+    std::map<std::string, clip::Clip> clips;
+    const auto done = tools::each_clip_of_take(
+        path, row,
+        [&](const std::string& stream, Result<clip::Clip> clip) {
+          REQUIRE(clip);
+          CHECK(clips.try_emplace(stream, std::move(*clip)).second);
+        },
+        [=] { return goes_on; });
+    return std::pair(done ? "" : done.error().message, std::move(clips));
+  };
+  CHECK(replayed(take, true).first.contains("does not have the end of take 1 yet"));
+  forge(path, "INSERT INTO take VALUES(1,'walk',31,130,'',0),(2,'none',131,130,'',0)");
+  const auto [error, clips] = replayed(take, true);
+  CHECK(error.empty());
+  REQUIRE(clips.size() == 2);
+  for (const auto& [stream, made] : clips) {
+    const auto single = tools::clip_of_log(path, stream, "1");
+    REQUIRE(single);
+    REQUIRE(made.frames() == single->frames());
+    CHECK(made.frames() > 30);
+    std::vector<Frame> frames;
+    for (int i = 0; i < single->frames(); ++i) frames.push_back(single->frame(i));
+    check_same(made, frames);
+  }
+  CHECK(replayed({.id = 2, .first_item = 131, .last_item = 130}, true).second.empty());
+  CHECK(replayed(take, false).first.starts_with("interrupted"));
 }
 
 TEST_CASE("a clip has every frame that was performed while the glove was unplugged", "[virtual]") {
