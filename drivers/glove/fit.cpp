@@ -11,6 +11,7 @@
 namespace posed::drivers::glove {
 namespace {
 
+constexpr double kNoValue = std::numeric_limits<double>::quiet_NaN();
 constexpr double kSame = 0.05;  // rad or share: poses that differ by less do not move a sensor
 
 // By so much people's angles differ from the pose's, and glove's gains from the default's: two real
@@ -50,6 +51,30 @@ void put_thumb(HandAngles& hand, Pose pose) {
   bend(hand, finger + "1_x", 45);
   bend(hand, finger + "2_x", 50);
   bend(hand, finger + "3_x", 15);
+}
+
+double gain_of(const MapRow& row, const Model& model) {
+  return static_cast<double>(row.gain) * model.sensors[row.sensor].map_sign;
+}
+
+// The value of a sensor that brings all joints that it moves as near to the hand's as it can, while
+// the other sensors' values stay; NaN for one that moves none.
+double nearest_value(const std::vector<MapRow>& rows, std::size_t sensor, const Model& model,
+                     const HandAngles& hand, const std::vector<double>& values) {
+  double along = 0.0, square = 0.0;
+  for (const MapRow& row : rows) {
+    if (row.sensor != sensor) continue;
+    double left_rad = hand[row.channel];
+    for (const MapRow& other : rows) {
+      if (other.channel != row.channel) continue;
+      left_rad -= static_cast<double>(other.offset_rad);
+      const bool adds = other.sensor != sensor && std::isfinite(values[other.sensor]);
+      if (adds) left_rad -= gain_of(other, model) * values[other.sensor];
+    }
+    along += gain_of(row, model) * left_rad;
+    square += gain_of(row, model) * gain_of(row, model);
+  }
+  return square > 0.0 ? along / square : kNoValue;
 }
 
 // The curves' values of which remove_crosstalk() leaves these.
@@ -97,23 +122,11 @@ HandAngles hand_in(Pose pose) {
 Result<std::vector<double>> values_of(const Model& model, const HandAngles& hand) {
   const auto rows = TRY(
       parse_angle_map(model.map_toml, "config/devices/" + model.driver + ".toml", model.sensors));
-  const std::size_t sensors = model.sensors.size();
-  std::vector<double> sum(sensors, 0.0);
-  std::vector<double> count(sensors, 0.0);
-  for (const MapRow& row : rows) {
-    const double gain = static_cast<double>(row.gain) * model.sensors[row.sensor].map_sign;
-    if (gain == 0.0) continue;
-    sum[row.sensor] += (hand[row.channel] - static_cast<double>(row.offset_rad)) / gain;
-    count[row.sensor] += 1.0;
-  }
-  constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-  std::vector<double> values(sensors, kUnknown);
-  for (std::size_t i = 0; i < sensors; ++i) {
-    if (count[i] > 0.0) values[i] = sum[i] / count[i];
-    // For a value that is a share of the finger's range, a pose counts as 0 or 1, whatever the
-    // joints' limits are.
-    if (count[i] > 0.0 && model.sensors[i].unit == "1") {
-      values[i] = std::clamp(std::round(values[i]), -1.0, 1.0);
+  constexpr int kRounds = 30;  // each halves what is left where two values move one joint
+  std::vector<double> values(model.sensors.size(), kNoValue);
+  for (int round = 0; round < kRounds; ++round) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      values[i] = nearest_value(rows, i, model, hand, values);
     }
   }
   if (model.uncompute != nullptr) model.uncompute(values);
