@@ -81,7 +81,7 @@ class AxisOutput final : public Output {
   bool header_, binary_;
   std::optional<LineClients> clients_;     // over TCP
   std::optional<UdpReceivers> receivers_;  // over UDP
-  Datagrams datagrams_;                    // the same, of this turn
+  Datagrams datagrams_;                    // to receivers_ at the end of this turn
   std::vector<Person> people_;             // [place]
   std::vector<std::string> names_;         // [place]
   std::int64_t look_ns_ = kNoTime_ns;      // when to look for clients and news next

@@ -18,8 +18,8 @@
 
 namespace posed::output {
 
-// Datagrams that go out together: what an output sends in one turn. It keeps its memory. One
-// thread.
+// Datagrams that go out together: what an output sends in one turn, or for one pose. It keeps its
+// memory. One thread.
 class Datagrams {
  public:
   void add(std::span<const std::byte> datagram);

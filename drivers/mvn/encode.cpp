@@ -35,12 +35,13 @@ void write_vector(BigEndianWriter& writer, const Vec3f& v) {
 
 // Angles about the fixed axes X, Y, Z, in this order of turning [degrees]. Each is read after the
 // one before is undone, so that they make the rotation exactly even where X and Z are one axis. A
-// float's arc tangent is as exact as what is sent, and some times faster than a double's.
+// float's arc tangent is as exact as the floats that are sent, and several times faster than a
+// double's.
 Vec3f to_euler(const Quatf& rotation) {
   const Eigen::Matrix3d m = to_eigen_double(rotation).toRotationMatrix();
   const auto angle_deg = [](double sine, double cosine) {
-    return std::atan2(static_cast<float>(sine), static_cast<float>(cosine)) /
-           static_cast<float>(kDegree);
+    const float angle_rad = std::atan2(static_cast<float>(sine), static_cast<float>(cosine));
+    return static_cast<float>(static_cast<double>(angle_rad) / kDegree);
   };
   const double length = std::sqrt(m(0, 0) * m(0, 0) + m(1, 0) * m(1, 0));
   const double c = length > 0.0 ? m(0, 0) / length : 1.0;

@@ -687,30 +687,32 @@ Drive RobotHand::start() const {
 // Of several hands the one whose shape says the side, and whose names do not say the other one.
 Result<RobotHand> robot_hand(Urdf urdf, const RobotOptions& options, const std::string& file) {
   std::vector<HandBelow> hands;
-  if (options.tips.empty()) hands = hands_below(urdf.links);
+  const bool small = urdf.links.size() <= static_cast<std::size_t>(kMaxJoints);  // else refused
+  if (options.tips.empty() && small) hands = hands_below(urdf.links);
   const Side wanted = options.side.value_or(Side::kRight);
-  std::vector<HandBelow> right;  // ones
+  const bool alone = hands.size() == 1;
+  std::vector<HandBelow> fitting;
   std::string palms;
   std::erase_if(hands, [&](const HandBelow& hand) {
     const auto bare = Builder(urdf, {.needs_speeds = false}, file, hand.above).build_bare();
     if (!bare) return true;
-    if (bare->side == wanted && hand.named.value_or(wanted) == wanted) right.push_back(hand);
+    if (bare->side == wanted && hand.named.value_or(wanted) == wanted) fitting.push_back(hand);
     palms += (palms.empty() ? "" : ", ") + in_quotes(urdf.links[hand.palm].name);
     return false;
   });
   if (hands.empty()) return Builder(std::move(urdf), options, file).build();
-  if (hands.size() == 1) right = hands;
+  if (alone) fitting = hands;
   const std::string side = wanted == Side::kLeft ? "left" : "right";
-  if (right.size() != 1) {
+  if (fitting.size() != 1) {
     return misuse("the robot has hands below the links " + palms + ", and " +
-                      (right.empty() ? "none" : "more than one") + " of them is the " + side +
+                      (fitting.empty() ? "none" : "more than one") + " of them is the " + side +
                       " one by shape and names: let `tips` name the last links of one hand, thumb "
                       "first",
                   file);
   }
-  const std::string palm = in_quotes(urdf.links[right[0].palm].name);
-  auto hand = TRY(Builder(std::move(urdf), options, file, right[0].above).build());
-  hand.chosen = hands.size() == 1
+  const std::string palm = in_quotes(urdf.links[fitting[0].palm].name);
+  auto hand = TRY(Builder(std::move(urdf), options, file, fitting[0].above).build());
+  hand.chosen = alone
                     ? "the robot's hand is below link " + palm
                     : "of the robot's hands, below " + palms + ", the " + side + " one is " + palm;
   return hand;

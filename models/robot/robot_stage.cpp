@@ -388,7 +388,7 @@ const StageType& robot_type() {
                                "for them"},
                   {.sentence =
                        "the robot is more than a hand: the hand of `side` follows, all else "
-                       "stands (`posed inspect` names it)"}},
+                       "stands (`posed inspect` lists the hands)"}},
       .commands = {{.name = "engage",
                     .help = "the robot follows the hand, from where it is",
                     .encode = no_words},

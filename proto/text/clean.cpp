@@ -38,10 +38,11 @@ Character first_character(std::string_view text) {
 
 // True for characters that control a terminal (C0, DEL, C1), change how the rest of a line is
 // displayed (line and paragraph separators; the marks, embeddings, overrides and isolates of the
-// writing direction), or are not seen at all, so that two names look alike.
+// writing direction), or are not seen, so that two names look alike (the most common of these).
 bool is_control(std::uint32_t code) {
-  return code < 0x20 || (code >= 0x7F && code <= 0x9F) || code == 0x00AD || code == 0x061C ||
-         code == 0x180E || (code >= 0x200B && code <= 0x200F) ||
+  return code < 0x20 || (code >= 0x7F && code <= 0x9F) || code == 0x00AD || code == 0x034F ||
+         code == 0x061C || code == 0x115F || code == 0x1160 || code == 0x180E || code == 0x3164 ||
+         code == 0xFFA0 || (code >= 0x200B && code <= 0x200F) ||
          (code >= 0x2028 && code <= 0x202E) || (code >= 0x2060 && code <= 0x206F) ||
          code == 0xFEFF || (code >= 0xFFF9 && code <= 0xFFFB) ||
          (code >= 0xE0000 && code <= 0xE0FFF);

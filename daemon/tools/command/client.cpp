@@ -110,13 +110,14 @@ void Connection::open_anew() {
   if (!fresh) return;
   std::swap(socket_, *fresh);  // an assignment would end the old socket before its monitor
   retry_.opened();
+  cuts_ = 0;
   for (const std::string& prefix : wanted_) static_cast<void>(subscribe(prefix));
 }
 
 namespace {
 
 constexpr const char* kSentTooMuch =
-    "it sent more than any daemon does, so its connection was ended; it is tried again";
+    "it sent more than any daemon does, so its connection was ended";
 
 }  // namespace
 

@@ -56,9 +56,9 @@ using ClientOptions = link::Peer;
 // Adds --connect (default `endpoint`), --key and --server-key.
 void add_client_options(CLI::App& command, ClientOptions& options, const char* endpoint);
 
-// A connected socket that monitors its own connection. One that subscribes is opened anew some time
-// after its connection has ended, whoever had the daemon's port meanwhile; one for requests is not,
-// because nobody knows which of them took effect.
+// A connected socket that monitors its own connection. One that subscribes is opened anew five
+// seconds after its connection has ended, because libzmq gives up when somebody else had the
+// daemon's port meanwhile; one for requests is not, because nobody knows which of them took effect.
 class Connection {
  public:
   // `type` is ZMQ_SUB or ZMQ_DEALER. Returns at once; libzmq connects in the background, and

@@ -28,7 +28,7 @@ struct Peer {
 // Bytes of a message of a stream; a skeleton of 256 joints has about 30 KB. Only stats are longer.
 inline constexpr std::size_t kMaxStreamMessage = 64 * 1024;
 // Streams that come through one connection: a relay passes on no more, of all its upstreams.
-inline constexpr std::size_t kMaxLinkStreams = 4096;
+inline constexpr std::size_t kMaxLinkStreams = 2048;
 
 struct Limits {
   int messages = 48;               // that wait here; large skeletons that come together need 1.5 MB

@@ -55,7 +55,8 @@ std::vector<std::string> robot_table(const robot::RobotHand& hand) {
                               hand.name, hand.side == Side::kLeft ? "left" : "right",
                               hand.links.size(), hand.joints.size(), hand.size()));
   if (!hand.chosen.empty()) {
-    lines.push_back(hand.chosen + "; `side`, or the links that `tips` names, choose another");
+    lines.push_back(hand.chosen +
+                    "; `side` of [stream.robot], or the links that `tips` names, choose another");
   }
   lines.emplace_back("joints, in the order of the stream's values");
   for (const robot::RobotJoint& joint : hand.joints) {

@@ -242,6 +242,7 @@ bool RelayedStreams::make_room(std::size_t upstream, bool poses) {
   // Then who has most of them gives one to who has fewer.
   const auto most = std::ranges::max_element(shares_, {}, &Share::streams);
   if (share.streams >= kMaxStreams || share.streams + 1 >= most->streams) return false;
+  if (!poses && most->posing == most->streams) return false;
   forget_one_of(static_cast<std::size_t>(most - shares_.begin()));
   return true;
 }

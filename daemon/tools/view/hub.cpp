@@ -343,15 +343,14 @@ Hub::Stream* Hub::meet(std::string_view name, std::int64_t now_ns) {
 }
 
 bool Hub::make_room(const Stream& stream, std::size_t bytes) {
-  while (*kept_ + bytes > kMaxKeptBytes) {
-    if (*stream.kept + bytes > kMaxKeptBytes / streams_.size()) return false;
-    const auto most = std::ranges::max_element(
-        streams_, {}, [](const auto& entry) { return *entry.second.kept; });
-    const std::size_t before = *kept_;
-    let_go(most->second);
-    if (*kept_ == before) return false;  // it is being sent
+  if (*kept_ + bytes <= kMaxKeptBytes) return true;
+  const std::size_t share = kMaxKeptBytes / streams_.size();
+  if (*stream.kept + bytes > share) return false;
+  for (auto& [name, one] : streams_) {
+    if (*one.kept > share) let_go(one);  // but what is being sent, and events
+    if (*kept_ + bytes <= kMaxKeptBytes) return true;
   }
-  return true;
+  return false;
 }
 
 void Hub::receive_stream(std::string_view topic, std::string_view body, std::int64_t now_ns) {
@@ -361,25 +360,29 @@ void Hub::receive_stream(std::string_view topic, std::string_view body, std::int
   const bool fits = body.size() <= (event ? kMaxEventBytes : link::kMaxStreamMessage);
   Stream* const stream =
       kind != kKindNames.end() && fits ? meet(topic.substr(kind->size()), now_ns) : nullptr;
-  if (stream == nullptr || !make_room(*stream, topic.size() + 1 + body.size())) {
+  if (stream == nullptr) {
     ++counts_.foreign;
     return;
   }
   const bool skeleton = kind == kKindNames.begin() + kSkeleton;
   if (tabs_.empty() && !skeleton) return;
+  if (skeleton) {
+    // The daemon repeats it every second, for clients that come later. After a pause the stream had
+    // left, and pages have forgotten its skeleton.
+    const bool stayed = now_ns - std::exchange(stream->skeleton_ns, now_ns) < kStayed_ns;
+    if (stayed && stream->skeleton && stream->skeleton->substr(topic.size() + 1) == body) return;
+  }
+  if (!make_room(*stream, topic.size() + 1 + body.size())) {
+    ++counts_.foreign;
+    return;
+  }
   const Bytes bytes = counted(*stream, topic, body);
   if (event) {
     for (Tab* tab : tabs_) tab->outbox.put_event(bytes);
     return;
   }
   const std::string& key = stream->topics[static_cast<std::size_t>(kind - kKindNames.begin())];
-  if (skeleton) {
-    // The daemon repeats it every second, for clients that come later. After a pause the stream had
-    // left, and pages have forgotten its skeleton.
-    const bool stayed = now_ns - std::exchange(stream->skeleton_ns, now_ns) < kStayed_ns;
-    if (stream->skeleton && *stream->skeleton == *bytes && stayed) return;
-    stream->skeleton = bytes;
-  }
+  if (skeleton) stream->skeleton = bytes;
   for (Tab* tab : tabs_) {
     if (skeleton) {
       tab->outbox.put_newest(key, bytes);

@@ -91,8 +91,8 @@ struct Greeting {
 [[nodiscard]] Parcel no_reply_word(std::uint32_t number, const std::string& sentence);
 
 inline constexpr std::size_t kMaxViewStreams = link::kMaxLinkStreams;  // more are not shown
-// Bytes of all streams' messages that are kept for the pages; of more, what the largest streams
-// have is left out. Those of a large setup have some MB.
+// Bytes of all streams' messages that are kept for the pages: those of a large setup have some MB.
+// Where there are more, streams with more than an equal share of them are not shown.
 inline constexpr std::size_t kMaxKeptBytes = 32 * 1024 * 1024;
 inline constexpr std::size_t kMaxEventBytes = 8 * 1024;  // they have a sentence each
 inline constexpr std::size_t kMaxUnderWay = 8;           // requests of one page at once
@@ -187,8 +187,8 @@ class Hub {
   void receive_stream(std::string_view topic, std::string_view body, std::int64_t now_ns);
   // The stream of this name, perhaps a new one; null if there are too many.
   [[nodiscard]] Stream* meet(std::string_view name, std::int64_t now_ns);
-  // Whether so many more bytes of the stream may be kept. Where there is no room, who has most
-  // gives way to who has less than an equal share: no source hides the streams of another.
+  // Whether so many more bytes of the stream may be kept. Where there is no room, streams with more
+  // than an equal share give way to those with less: no source hides the usual streams of another.
   [[nodiscard]] bool make_room(const Stream& stream, std::size_t bytes);
   void send_to_all(const Parcel& parcel);
   // Keeps nothing of the stream that can be left out.

@@ -50,16 +50,26 @@ std::optional<Parcel> Outbox::next() {
     parcel.bytes = std::move(newest_.begin()->second);
     newest_.erase(newest_.begin());
   } else {
-    for (auto& [topic, thinned] : thinned_) {
-      if (!thinned.bytes || thinned.sent_credit == credit_) continue;
-      thinned.sent_credit = credit_;
-      parcel.bytes = std::exchange(thinned.bytes, nullptr);
-      break;
-    }
+    parcel.bytes = next_thinned();
   }
   if (!parcel.bytes) return std::nullopt;
   ++counts_.sent;
   return parcel;
+}
+
+// Goes on behind the one that was sent last, so that a page which is slower than the streams sees
+// all of them in turn.
+Bytes Outbox::next_thinned() {
+  auto at = thinned_.upper_bound(last_);
+  for (std::size_t seen = 0; seen < thinned_.size(); ++seen, ++at) {
+    if (at == thinned_.end()) at = thinned_.begin();
+    auto& [topic, thinned] = *at;
+    if (!thinned.bytes || thinned.sent_credit == credit_) continue;
+    last_ = topic;
+    thinned.sent_credit = credit_;
+    return std::exchange(thinned.bytes, nullptr);
+  }
+  return nullptr;
 }
 
 }  // namespace posed::view

@@ -63,10 +63,14 @@ class Outbox {
     Bytes bytes{};                  // null: the newest was sent
     std::uint64_t sent_credit = 0;  // with which the last one was sent
   };
+  // The next pose or sample for which there is credit; null: none.
+  Bytes next_thinned();
+
   std::deque<Parcel> answers_;
   std::deque<Bytes> events_;
   std::map<std::string_view, Bytes> newest_;  // by topic
   std::map<std::string_view, Thinned> thinned_;
+  std::string last_;  // topic of the one of them that was sent last
   std::uint64_t credit_ = 0;
   OutboxCounts counts_;
 };

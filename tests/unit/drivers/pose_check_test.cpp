@@ -266,8 +266,8 @@ Recorded shares_sent(const Model& model, const Hands& hands, const std::vector<d
 
 }  // namespace
 
-// Fingers that were never shown, on 20 simulated wearers whose fists are not exact. One sensor for a
-// finger cannot tell a fist of 80, 100 and 60 degrees from a bend of 90, 100 and 70.
+// Fingers that were never shown, on 20 simulated wearers whose fists are not exact. One sensor for
+// a finger cannot tell a fist of 80, 100 and 60 degrees from a bend of 90, 100 and 70.
 TEST_CASE("gloves that send shares of a range follow their wearer once calibrated") {
   for (const std::string name : {"lucidgloves", "fivedt"}) {
     const Model model = model_of(name);

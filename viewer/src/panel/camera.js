@@ -36,7 +36,7 @@ export class CameraPanel {
     this.canvas = el('canvas', { role: 'img', aria: { label: 'The points that were found' } });
     this.preview = el('div.camera-preview', { hidden: true }, this.video, this.canvas);
     this.button = el('button', { type: 'button', onclick: () => this.toggle() }, 'Use my camera');
-    this.device = el('select', { aria: { label: 'Camera' }, hidden: true });
+    this.device = el('select', { aria: { label: 'Your hand by webcam' }, hidden: true });
     this.side = el(
       'select',
       { aria: { label: 'Which hand it is' } },

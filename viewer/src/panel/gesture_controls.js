@@ -31,7 +31,7 @@ export class GestureControls {
     const form = el(
       'form',
       { onsubmit: (event) => this.#play(event) },
-      labelled('Gestures to perform', this.line),
+      labelled('Gestures to play', this.line),
       this.chips,
       this.tempo.element,
       el(

@@ -85,7 +85,7 @@ export class ModelLibrary extends List {
     const { kind, model } = button.dataset;
     const stage = this.stream?.stage(kind);
     const used = stage?.model === model;
-    button.disabled = used;
+    button.setAttribute('aria-disabled', String(used)); // it keeps the focus
     const text = used ? `Used by ${this.stream.name}` : stage ? `Use for ${this.stream.name}` : 'Use';
     write(button, text);
     button.setAttribute('aria-label', `${text}: ${model}`);
@@ -121,6 +121,7 @@ export class ModelLibrary extends List {
   }
 
   #use(name, kind) {
+    if (this.stream?.stage(kind)?.model === name) return;
     if (this.stream?.stage(kind))
       this.control(
         { use_model: { stream: this.stream.name, name } },

@@ -119,7 +119,7 @@ told(
       .setInputFiles(join(BUILD, 'demo', 'walk-to-sneak.style'));
     await acknowledged(page, 'model walk-to-sneak.style: applied');
     await page.locator('.stream', { hasText: 'hand' }).click();
-    await page.getByLabel('Gestures to perform').fill('g 1 c 3 4 p');
+    await page.getByLabel('Gestures to play').fill('g 1 c 3 4 p');
     await page.getByRole('button', { name: 'Play', exact: true }).click();
     await acknowledged(page, 'plays g 1 c 3 4 p: applied');
     await page.locator('.name-tag', { hasText: 'plays' }).waitFor(PATIENCE);

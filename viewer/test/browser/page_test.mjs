@@ -199,7 +199,7 @@ pageTests(
       await page.locator('.stream[aria-checked="true"]', { hasText: 'hand' }).waitFor(PATIENCE);
       await page.keyboard.press('g');
       await page.keyboard.type('g 1 r');
-      assert.equal(await page.getByLabel('Gestures to perform').inputValue(), 'g 1 r');
+      assert.equal(await page.getByLabel('Gestures to play').inputValue(), 'g 1 r');
     },
     'takes, models, mask and weights become requests of the daemon': async (page, bridge) => {
       await page.getByLabel('Take name').fill('walk-3');
@@ -717,7 +717,7 @@ pageTests(
       page,
       bridge,
     ) => {
-      const line = page.getByLabel('Gestures to perform');
+      const line = page.getByLabel('Gestures to play');
       await line.fill('g 1 x');
       await page.getByRole('button', { name: 'Play' }).click();
       await acknowledged(page, 'does not know');

@@ -339,8 +339,10 @@ TEST_CASE("of datagrams that go out together each is counted and in its place") 
     CHECK(datagrams[i] == std::vector(i % 40 + 2, std::byte(i % 40)));
   }
   REQUIRE(receivers.drain_news(0).size() == 1);  // of the dead one
-  // One that is too large does not go, and those behind it wait until the socket is tried again.
+  // One that is too large does not go, and those behind it fail until the socket is tried again.
   outcome = pass(70'000, kNanosPerSecond);
+  CHECK(outcome.sent + outcome.failed == 80);
+  CHECK(outcome.failed >= 39);
   CHECK(receiver.received(40 * turns + 1).size() == 1);
   const auto news = receivers.drain_news(kNanosPerSecond);
   REQUIRE(news.size() == 1);

@@ -109,9 +109,9 @@ TEST_CASE("a take that is too long for memory is made from the log, and one that
   constexpr std::size_t kSmall = 1000;  // bytes: some ten frames
   tools::TakeClips clips(log, kSmall);
   clips.stream_comes(1, {.name = "b", .skeleton = skeleton, .rate_hz = 60.0});
+  for (std::uint64_t item = 1; item <= 66; ++item) clips.frame(frame_of(*skeleton, 1, item), item);
   clips.take_changed({.id = 1, .name = "long", .first_item = 1, .last_item = 60});
   clips.take_changed({.id = 2, .name = "short", .first_item = 61, .last_item = 66});
-  for (std::uint64_t item = 1; item <= 66; ++item) clips.frame(frame_of(*skeleton, 1, item), item);
   clips.stop();
   REQUIRE(clips.finish());
   const auto frames = [&](const std::string& file) {
@@ -120,8 +120,8 @@ TEST_CASE("a take that is too long for memory is made from the log, and one that
   };
   const auto of_log = tools::clip_of_log(log, "b", "1");
   REQUIRE(of_log);
-  CHECK(frames("stage-1-b.long.bvh") == of_log->frames());
-  CHECK(frames("stage-1-a.long.bvh") > 0);  // the log has this stream, too
+  CHECK(frames("stage-1-b.long.bvh") >= of_log->frames());  // a file's frames are evenly spaced
+  CHECK(frames("stage-1-a.long.bvh") > 0);                  // the log has this stream, too
   CHECK(frames("stage-2-b.short.bvh") == 6);
   CHECK(frames("stage-2-a.short.bvh") == 0);
   v1::ControlReply list;

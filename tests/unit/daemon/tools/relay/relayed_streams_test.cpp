@@ -94,7 +94,7 @@ TEST_CASE("the names and skeletons of one upstream leave the other's room alone"
 }
 
 TEST_CASE("upstreams share what a page can show, and many hostile ones leave one its streams") {
-  constexpr std::size_t kHostile = 15, kOwn = 200;
+  constexpr std::size_t kHostile = 15, kOwn = 120;
   RelayedStreams streams(kHostile + 1);
   for (std::size_t i = 0; i < kMaxStreams; ++i) {
     for (std::size_t upstream = 0; upstream < kHostile; ++upstream) {

@@ -168,7 +168,8 @@ TEST_CASE("all clips of a take come from one replay of its log, and are those of
     for (int i = 0; i < single->frames(); ++i) frames.push_back(single->frame(i));
     check_same(made, frames);
   }
-  CHECK(replayed({.id = 2, .first_item = 131, .last_item = 130}, true).second.empty());
+  const log::TakeRow none{.id = 2, .name = "none", .first_item = 131, .last_item = 130};
+  CHECK(replayed(none, true).second.empty());
   CHECK(replayed(take, false).first.starts_with("interrupted"));
 }
 

@@ -74,6 +74,22 @@ TEST_CASE("a page that does not read costs a fixed amount") {
   CHECK(outbox.counts().dropped == 2 * 10'000 - kMaxAnswers - kMaxEvents);
 }
 
+TEST_CASE("a page that is slower than the streams is sent all of them in turn") {
+  Outbox outbox;
+  const std::vector<std::string> topics{"pose/a", "pose/b", "pose/c", "pose/d", "pose/e"};
+  Texts sent;
+  for (int round = 0; round < 5; ++round) {
+    outbox.ready();
+    for (const std::string& topic : topics) outbox.put_thinned(topic, of(topic));
+    for (int i = 0; i < 2; ++i) {
+      const auto parcel = outbox.next();
+      REQUIRE(parcel);
+      sent.push_back(*parcel->bytes);
+    }
+  }
+  for (std::size_t i = 0; i < sent.size(); ++i) CHECK(sent[i] == topics[i % topics.size()]);
+}
+
 TEST_CASE("what waits of a stream that has left, or of a daemon that has gone, is not sent") {
   Outbox outbox;
   outbox.ready();
