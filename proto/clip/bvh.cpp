@@ -7,6 +7,7 @@
 #include "proto/clip/draft.hpp"
 #include "proto/clip/figure.hpp"
 #include "proto/clip/formats.hpp"
+#include "proto/clip/joint_names.hpp"
 #include "proto/clip/text.hpp"
 #include "proto/text/clean.hpp"
 #include "proto/text/lower.hpp"
@@ -208,12 +209,7 @@ Result<Draft> read_bvh(const ClipFile& file, const ReadOptions& options) {
   frames.parser = FrameParser::bvh(draft.skeleton, draft.metres_per_unit, *factors);
   const auto declared = parse_number(header.declared_frames);
   const std::size_t found = frames.frames.size();
-  if (!header.renamed.empty()) {
-    draft.warnings.push_back(
-        "joints that have the name of an earlier one are called by their "
-        "parent, too, as " +
-        in_quotes(header.renamed[0]));
-  }
+  if (!header.renamed.empty()) draft.warnings.push_back(header.renamed);
   if (!declared || *declared != static_cast<double>(found)) {
     draft.warnings.push_back("'Frames:' says " + in_quotes(header.declared_frames) +
                              ", but there are " + std::to_string(found) + "; read all of them");
@@ -278,6 +274,7 @@ class HeaderReader {
 
   Cursor cursor_;
   const std::string& name_;
+  JointNames names_;
   BvhHeader header_;
   std::vector<Open> open_;
 };
@@ -298,28 +295,23 @@ Result<BvhHeader> HeaderReader::read() {
     return error("has no MOTION after its hierarchy, so there is nothing to play");
   if (header_.skeleton.channels.empty()) return error("lists no CHANNELS, so nothing can move");
   TRY(motion());
+  header_.renamed = names_.warning();
   return std::move(header_);
 }
 
 Result<> HeaderReader::begin_joint() {
   std::string name(cursor_.name());
   if (name.empty()) return error("a joint has no name");
-  if (name.size() > 200) return error("a joint's name is longer than 200 characters");
+  if (name.size() > kMaxJointName) {
+    return error("a joint's name is longer than " + std::to_string(kMaxJointName) + " characters");
+  }
   if (open_.size() >= kMaxDepth) return error("joints are nested deeper than 96");
   if (joints().size() >= kMaxFileJoints) {
     return error("has more than " + std::to_string(kMaxFileJoints) + " joints");
   }
   const int parent = open_.empty() ? -1 : open_.back().joint;
-  if (header_.skeleton.joint_index(name) >= 0) {
-    // Names identify joints on the wire, so that each has its own.
-    std::string path = joints()[parent].name + "/" + name;
-    if (path.size() > 200 || header_.skeleton.joint_index(path) >= 0) {
-      return error("a second joint is named " + in_quotes(name) + "; give each its own name");
-    }
-    name = header_.renamed.emplace_back(std::move(path));
-  }
   Joint joint;
-  joint.name = std::move(name);
+  joint.name = names_.add(std::move(name), parent < 0 ? "" : joints()[parent].name);
   joint.parent = parent;
   joints().push_back(std::move(joint));
   open_.push_back({.joint = static_cast<int>(joints().size()) - 1});

@@ -21,7 +21,7 @@ struct BvhHeader {
   std::string_view declared_frames;  // the count after `Frames:`; may be wrong
   std::size_t motion_offset = 0;     // of the first motion line in the text
   int motion_line = 0;               // its line number
-  std::vector<std::string> renamed;  // joints that had the name of an earlier one
+  std::string renamed;  // of joints that had the name of an earlier one, a sentence for people
 };
 
 // `name` is used in error messages. Views in the result point into `text`.

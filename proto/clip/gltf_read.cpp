@@ -29,6 +29,7 @@
 #include "proto/clip/formats.hpp"
 #include "proto/clip/gltf.hpp"
 #include "proto/clip/gltf_numbers.hpp"
+#include "proto/clip/joint_names.hpp"
 #include "proto/frame/humanoid.hpp"
 #include "proto/frame/median.hpp"
 #include "proto/text/clean.hpp"
@@ -973,16 +974,15 @@ bool Reader::moves(std::size_t joint, const std::vector<Track>& tracks) const {
 void Reader::describe(const std::vector<Track>& tracks, Draft& draft) const {
   Skeleton& skeleton = draft.skeleton;
   skeleton.name = std::filesystem::path(file_.name).stem().string();
-  std::map<std::string, int> names;
+  JointNames names;
   for (std::size_t j = 0; j < figure_.nodes.size(); ++j) {
     const auto n = static_cast<std::size_t>(figure_.nodes[j]);
     Joint& joint = skeleton.joints.emplace_back();
-    joint.name = clean(model_.nodes[n].name);
-    if (joint.name.empty()) joint.name = "node" + std::to_string(n);
-    if (const int others = names[joint.name]++; others > 0) {
-      joint.name += "-" + std::to_string(others + 1);
-    }
     joint.parent = figure_.parents[j];
+    std::string name = clean(model_.nodes[n].name);
+    if (name.empty()) name = "node" + std::to_string(n);
+    joint.name = names.add(std::move(name),
+                           joint.parent < 0 ? std::string() : skeleton.joints[joint.parent].name);
     Eigen::Vector3d place = world_rest_[n].position;
     if (joint.parent >= 0) {
       const int above = figure_.nodes[static_cast<std::size_t>(joint.parent)];
@@ -1004,6 +1004,7 @@ void Reader::describe(const std::vector<Track>& tracks, Draft& draft) const {
       skeleton.channels.push_back({.joint = index, .axis = axis});
     }
   }
+  if (std::string said = names.warning(); !said.empty()) draft.warnings.push_back(std::move(said));
 }
 
 void Reader::add_frame(const std::vector<Pose>& world, std::vector<std::array<double, 3>>& near,

@@ -590,6 +590,29 @@ TEST_CASE("joints that no skin has are joints where an animation turns them") {
   glb.check_same();
 }
 
+TEST_CASE("nodes of one name are told apart by their parents, as joints of a BVH") {
+  OtherGlb glb;
+  std::vector<std::string> expected;
+  for (tinygltf::Node& node : glb.model.nodes) {
+    if (!test::has(node.name, "Foot")) continue;
+    const auto number = static_cast<int>(&node - glb.model.nodes.data());
+    const auto parent = std::ranges::find_if(glb.model.nodes, [&](const tinygltf::Node& above) {
+      return std::ranges::find(above.children, number) != above.children.end();
+    });
+    node.name = "Foot";
+    expected.push_back(expected.empty() ? node.name : parent->name + "/" + node.name);
+  }
+  REQUIRE(expected.size() == 2);
+  const auto back = glb.read();
+  if (!back) FAIL(back.error().text());
+  for (const std::string& name : expected) CHECK(back->skeleton->joint_index(name) >= 0);
+  CHECK(std::ranges::any_of(back->warnings, [&](const std::string& warning) {
+    return test::has(warning, "parent, too, as '" + expected[1] + "'");
+  }));
+  CHECK(back->skeleton->joint_of(Bone::kLeftFoot) >= 0);
+  CHECK(back->skeleton->joint_of(Bone::kRightFoot) >= 0);
+}
+
 TEST_CASE("a glTF of another unit that stands along +z is brought into metres and +y up") {
   OtherGlb glb;
   const bool small = GENERATE(false, true);
