@@ -379,7 +379,14 @@ bool is_neck(const JointName& name) {
 }
 
 bool is_head(const JointName& name) {
-  return name.side == NameSide::kNone && head_words().contains(name.stem);
+  if (name.side != NameSide::kNone) return false;
+  if (head_words().contains(name.stem)) return true;
+  // Builders of rigs name the part before the joint: "neck_C0_head" ends a neck.
+  const auto is_part = [](const std::string& word) {
+    return neck_words().contains(word) || trunk_words().contains(word);
+  };
+  return name.words.size() > 1 && head_words().contains(name.words.back()) &&
+         std::all_of(name.words.begin(), name.words.end() - 1, is_part);
 }
 
 bool is_any_finger(const JointName& name) {

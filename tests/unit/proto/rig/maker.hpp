@@ -19,7 +19,8 @@ struct Scheme {
   std::array<const char*, 14> names;  // '*' is the side; the limbs' begin at the sixth
 };
 
-inline constexpr std::array<Scheme, 19> kSchemes{{
+inline constexpr std::array<Scheme, 23> kSchemes{{
+    // a prime number: each goes with all else
     {{"Left", "Right"},
      {"mixamorig:Hips", "mixamorig:Spine", "mixamorig:Spine1", "mixamorig:Spine2", "mixamorig:Neck",
       "mixamorig:Head", "mixamorig:*Shoulder", "mixamorig:*Arm", "mixamorig:*ForeArm",
@@ -91,6 +92,20 @@ inline constexpr std::array<Scheme, 19> kSchemes{{
     {{"L", "R"},
      {"Pelvis", "SPINE1", "SPINE2", "Chest", "Neck", "Head", "*Arm_Collarbone", "*Arm_UpperArm",
       "*Arm_ForeArm1", "*Arm_Hand", "*Leg_Thigh", "*Leg_Calf", "*Leg_Foot", "*Leg_Toe1"}},
+    {{"left", "right"},
+     {"hips", "spine_lower", "spine_mid", "spine_upper", "neck", "head", "*_clavicle",
+      "*_arm_upper", "*_arm_lower", "*_hand", "*_leg_upper", "*_leg_lower", "*_foot", "*_toe"}},
+    {{"Left", "Right"},
+     {"mPelvis", "mTorso", "mSpine3", "mChest", "mNeck", "mHead", "mCollar*", "mShoulder*",
+      "mElbow*", "mWrist*", "mHip*", "mKnee*", "mAnkle*", "mFoot*"}},
+    {{"L", "R"},
+     {"Root_M", "Spine1_M", "Spine2_M", "Chest_M", "Neck_M", "Head_M", "Scapula_*", "Shoulder_*",
+      "Elbow_*", "Wrist_*", "Hip_*", "Knee_*", "Ankle_*", "Toes_*"}},
+    // The part, its side and number, then the joint within it.
+    {{"L", "R"},
+     {"spine_C0_pelvis_jnt", "spine_C0_0_jnt", "spine_C0_1_jnt", "spine_C0_2_jnt", "neck_C0_0_jnt",
+      "neck_C0_head_jnt", "shoulder_*0_shoulder_jnt", "arm_*0_0_jnt", "arm_*0_1_jnt",
+      "arm_*0_end_jnt", "leg_*0_0_jnt", "leg_*0_1_jnt", "leg_*0_end_jnt", "foot_*0_0_jnt"}},
 }};
 
 inline constexpr int kMakerJoints = 22;  // the first bones of the enum, which are depth first

@@ -302,6 +302,22 @@ TEST_CASE("rig: the unit of MikuMikuDance's figures is 8 cm") {
   CHECK(rig::recognise(made.input).metres_per_unit == Approx(0.08));
 }
 
+TEST_CASE("rig: a joint called the head of a neck is the head, though two necks are below it") {
+  auto made = test::make(test::kSchemes.back(), ZeroPose::kT, Mat::Identity(), 0.01);
+  made.input.poses = {};
+  auto& joints = made.input.joints;
+  const int head = static_cast<int>(Bone::kHead);
+  auto second = joints[head];
+  second.name = "neck_C0_1_jnt";
+  second.end_site = {};
+  for (auto& joint : joints) joint.parent += joint.parent >= head ? 1 : 0;
+  joints.insert(joints.begin() + head, second);
+  joints[head + 1].parent = head;
+  const auto found = rig::recognise(made.input);
+  CHECK(found.bone[head + 1] == Bone::kHead);
+  CHECK(found.bone[head - 1] == Bone::kNeck);
+}
+
 // Many persons, in each maker's names and zero pose.
 TEST_CASE("rig: a person is recognised in every maker's names, zero pose, axes and unit") {
   constexpr std::array kUnits{1.0, 0.1, 0.01, 0.001, 0.0254, 0.3048};
