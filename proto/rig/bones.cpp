@@ -144,6 +144,28 @@ void keep_if_any(std::vector<int>& joints, const auto& is_wanted) {
   if (!kept.empty()) joints = std::move(kept);
 }
 
+// Drops joints by which the way from the hips comes back to where it was: spare ones, such as
+// Second Life's mSpine1 to mSpine4.
+void drop_returns(const Figure& figure, int hips, std::vector<int>& trunk) {
+  std::vector<Vec> places{Vec::Zero()};  // of the hips and of the joints that stay
+  std::vector<int> kept;
+  for (const int j : trunk) {
+    const Vec place = figure.between(hips, j).value_or(Vec::Zero());
+    const double near = 0.01 * figure[j].offset.norm();
+    const auto same = std::ranges::find_if(
+        places, [&](const Vec& other) { return (place - other).norm() <= near; });
+    const auto before = same - places.begin();
+    if (same == places.end() || same + 1 == places.end()) {
+      kept.push_back(j);
+      places.push_back(place);
+      continue;
+    }
+    kept.resize(static_cast<std::size_t>(before));
+    places.resize(static_cast<std::size_t>(before) + 1);
+  }
+  trunk = std::move(kept);
+}
+
 // Vertebrae of makers who say which of them stand for spine, chest and upper chest: the numbers in
 // their names, and the places of those three.
 struct Vertebrae {
@@ -318,6 +340,7 @@ void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJ
     neck.insert(neck.begin(), trunk.back());
     trunk.pop_back();
   }
+  drop_returns(figure, hips, trunk);
   keep_if_any(trunk, [&](int j) {
     const bool is_root = names[j].has("root") && lies_at(figure, hips, j);
     return !names[j].helper && !is_root;

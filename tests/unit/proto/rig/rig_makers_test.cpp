@@ -537,6 +537,35 @@ TEST_CASE("rig: fingers known by their place are less sure, and those that are n
   CHECK_FALSE(odd.bone[test::kMakerJoints].has_value());
 }
 
+// Second Life's skeleton has four spare joints in the trunk, which lie still.
+TEST_CASE("rig: joints by which the trunk comes back to where it was are no bones") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  made.input.poses = {};
+  auto& joints = made.input.joints;
+  std::map<std::string, std::optional<Bone>> truth;
+  for (std::size_t b = 0; b < joints.size(); ++b) truth[joints[b].name] = static_cast<Bone>(b);
+  for (const Bone below : {Bone::kChest, Bone::kSpine}) {
+    const auto at = static_cast<int>(below);
+    for (auto& joint : joints) joint.parent += joint.parent >= at ? 2 : 0;
+    const Vec way = joints[at].offset;
+    for (const double back : {-1.0, 1.0}) {
+      const std::string name = "Spine" + std::to_string(joints.size());
+      joints.insert(
+          joints.begin() + at,
+          {.name = name, .parent = at - (back > 0 ? 1 : 0), .offset = back * way, .end_site = {}});
+      truth[name] = std::nullopt;
+    }
+    joints[at + 1].parent = at;
+    joints[at + 2].parent = at + 1;
+  }
+  const rig::Rig rig = rig::recognise(made.input);
+  for (std::size_t j = 0; j < joints.size(); ++j) {
+    INFO(joints[j].name);
+    CHECK(rig.bone[j] == truth[joints[j].name]);
+    CHECK(std::abs(rig.T[j].w()) > 0.9999);
+  }
+}
+
 TEST_CASE("rig: of joints at one place the last one of a limb's name is the bone") {
   std::vector<Placed> joints{{"Hips", -1, {0, .95, 0}},   {"Spine_Root", 0, {0, .95, 0}},
                              {"Spine0", 1, {0, 1.05, 0}}, {"Spine1", 2, {0, 1.2, 0}},
