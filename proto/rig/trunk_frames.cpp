@@ -92,8 +92,8 @@ Vec Frames::pelvis_up(const Vec& line, const std::vector<Vec>& hints) const {
   for (int i = 0; i < motion_.poses(); ++i) mean += motion_.world(i, joint_[Bone::kHips]);
   mean /= motion_.poses();
   for (const Vec& world : {kY, kZ}) {
-    for (const Vec& axis : kAxes) {
-      if (std::abs(axis.dot(line)) < 0.5 && (mean * axis).dot(world) > 0.7) return axis;
+    for (const Vec& hint : good) {
+      if ((mean * main_axis(hint)).dot(world) > 0.7) return main_axis(hint);
     }
   }
   return good.front();

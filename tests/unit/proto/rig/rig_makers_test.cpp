@@ -566,6 +566,24 @@ TEST_CASE("rig: joints by which the trunk comes back to where it was are no bone
   }
 }
 
+// One sign of three then says that the pelvis is upside down, and who looks along an axis has
+// another of its own along that one.
+TEST_CASE("rig: hip joints above the hips of a folded zero pose leave the pelvis upright") {
+  for (const UpAxis up : {UpAxis::kPlusY, UpAxis::kPlusZ}) {
+    auto made = test::make(test::kSchemes[0], ZeroPose::kFolded, up_turn(up).transpose(), 0.01);
+    const auto joints = made.input.joints.size();
+    for (const Bone bone : {Bone::kLeftUpperLeg, Bone::kRightUpperLeg}) {
+      const auto j = static_cast<std::size_t>(bone);
+      made.input.joints[j].offset += made.T[0].transpose() * Vec(0, 0.08, 0) / 0.01;
+      for (int i = 0; i < made.input.poses.count; ++i) {
+        made.input.poses.position[i * joints + j] = made.input.joints[j].offset;
+      }
+    }
+    INFO(up_text(up) << " up");
+    check_made(made, up, 0.01);
+  }
+}
+
 TEST_CASE("rig: of joints at one place the last one of a limb's name is the bone") {
   std::vector<Placed> joints{{"Hips", -1, {0, .95, 0}},   {"Spine_Root", 0, {0, .95, 0}},
                              {"Spine0", 1, {0, 1.05, 0}}, {"Spine1", 2, {0, 1.2, 0}},
