@@ -175,15 +175,21 @@ std::optional<Cut> cut_of(const Figure& figure, const Pieces& pieces, bool is_le
   const auto way = [&](std::size_t from, std::size_t to) {
     return figure.between(pieces.joint[from], pieces.joint[to]).value_or(Vec::Zero());
   };
-  constexpr double kWidest = 1.6;  // of the longer bone to the other
+  // Along the pieces: whether the first is a shoulder does not depend on how it bends.
+  const auto length = [&](std::size_t from, std::size_t to) {
+    double sum = 0.0;
+    for (std::size_t i = from; i < to; ++i) sum += way(i, i + 1).norm();
+    return sum;
+  };
+  constexpr double kWidest = 1.5;  // of the longer bone to the other
   constexpr double kToes = 0.6;    // of the shin at most
   for (std::size_t begin = 0; begin + 2 < count; ++begin) {
     std::optional<Cut> best;
     double best_score = -1e300;
     for (std::size_t end = pieces.has_end ? count - 1 : begin + 2; end < count; ++end) {
       for (std::size_t bend = begin + 1; bend < end; ++bend) {
-        const double upper = way(begin, bend).norm();
-        const double lower = way(bend, end).norm();
+        const double upper = length(begin, bend);
+        const double lower = length(bend, end);
         const double unequal = std::max(upper, lower) / std::max(std::min(upper, lower), 1e-9);
         if (unequal > kWidest) continue;
         if (is_leg && way(end, count - 1).norm() > kToes * lower) continue;

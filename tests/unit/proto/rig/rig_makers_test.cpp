@@ -909,6 +909,20 @@ TEST_CASE("rig: pieces of a limb that are only numbered are told by their length
   }
 }
 
+TEST_CASE(
+    "rig: an arm whose joints are counted from the shoulder on is the same in any zero pose") {
+  for (const ZeroPose zero : {ZeroPose::kT, ZeroPose::kA, ZeroPose::kArmsDown}) {
+    auto made = test::make(test::kSchemes[10], zero, Mat::Identity(), 0.01);
+    for (const int first : {6, 10}) {
+      for (int i = 0; i < 4; ++i) {
+        made.input.joints[first + i].name = (first == 6 ? "L_Arm_" : "R_Arm_") + std::to_string(i);
+      }
+    }
+    INFO("zero pose " << static_cast<int>(zero));
+    check_made(made, UpAxis::kPlusY, 0.01);
+  }
+}
+
 // A hand alone, palm first, and then its fingers, thumb first, in centimetres: a right one whose
 // fingers lead along +x and whose palm faces down.
 rig::RigInput made_hand(double size, const Mat& turn, bool has_palm_bones) {
