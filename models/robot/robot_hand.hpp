@@ -193,6 +193,8 @@ struct Placed {
     std::size_t count = 0;
     double others_m = -1.0;
     CoverPose seen;
+
+    [[nodiscard]] double least_m() const noexcept { return count > 0 ? two[0].gap_m : others_m; }
   };
   std::vector<Close> close;  // [link * links + link]
 };

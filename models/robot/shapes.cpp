@@ -209,10 +209,6 @@ RT_SAFE hand::Closest apart(const Placed& placed, int i, int j) noexcept {
   return hand::closest_points(placed.from_m[i], placed.to_m[i], placed.from_m[j], placed.to_m[j]);
 }
 
-RT_SAFE double gap_m(const RobotHand& hand, const Placed& placed, int i, int j) noexcept {
-  return apart(placed, i, j).apart.norm() - hand.capsules[i].radius_m - hand.capsules[j].radius_m;
-}
-
 RT_SAFE double away2(const Eigen::Vector3d& point, const Eigen::Vector3d& from,
                      const Eigen::Vector3d& to, double per_m2) noexcept {
   const Eigen::Vector3d along = to - from;
@@ -285,8 +281,10 @@ RT_SAFE void find_close(const RobotHand& hand, Placed& placed, int a, int b, dou
   double within_m = near_m + kSlack_m;
   close.count = 0;
   const auto look = [&](int i, int j) {
-    const double found_m = gap_m(hand, placed, i, j);
-    if (found_m >= within_m) return;
+    const double radii_m = hand.capsules[i].radius_m + hand.capsules[j].radius_m;
+    const double distance2 = apart(placed, i, j).apart.squaredNorm();
+    if (!within(distance2, radii_m + within_m)) return;
+    const double found_m = std::sqrt(distance2) - radii_m;
     std::size_t at = close.count;
     if (at == close.two.size()) {
       within_m = std::min(within_m, close.two[--at].gap_m);
@@ -311,6 +309,9 @@ RT_SAFE void find_close(const RobotHand& hand, Placed& placed, int a, int b, dou
     for (const Placed::NearShape& other : near) {
       if (!within((middle_m - other.middle_m).squaredNorm(), ball_m + other.reach_m)) continue;
       for (int i = hand.balls[g].first; i < hand.balls[g].first + hand.balls[g].count; ++i) {
+        const double off2 =
+            away2(other.middle_m, placed.from_m[i], placed.to_m[i], hand.capsules[i].per_m2);
+        if (!within(off2, hand.capsules[i].radius_m + other.reach_m + within_m)) continue;
         for (int k = other.first; k < other.first + other.count; ++k) {
           const int j = placed.near[k];
           if (may_be_within(hand, placed, i, j, within_m)) look(i, j);
@@ -322,8 +323,9 @@ RT_SAFE void find_close(const RobotHand& hand, Placed& placed, int a, int b, dou
   close.seen = seen(placed, a, b);
 }
 
-// The least gap if it is below `near_m`, else `near_m`. All capsules are looked at only where links
-// have gone so far that others may have become nearer than those that find_close() listed.
+// The least gap if it is below `near_m`, else what it is at least: `near_m` or more. All capsules
+// are looked at only where links have gone so far that others may have become nearer than those
+// that find_close() listed.
 RT_SAFE Nearest nearest(const RobotHand& hand, Placed& placed, int a, int b,
                         double near_m) noexcept {
   Nearest best{.gap_m = near_m};
@@ -347,10 +349,14 @@ RT_SAFE Nearest nearest(const RobotHand& hand, Placed& placed, int a, int b,
     return close.others_m - way_m >= best.gap_m;
   };
   const double gone_m = most_way_m(hand.covers[b], close.seen, seen(placed, a, b)) + kRounding_m;
-  if (look(gone_m)) return best;
+  if (look(gone_m)) {
+    if (best.gap_m >= near_m) best.gap_m = std::max(near_m, close.least_m() - gone_m);
+    return best;
+  }
   find_close(hand, placed, a, b, best.gap_m, close);
   best.gap_m = near_m;
   look(0.0);
+  if (best.gap_m >= near_m) best.gap_m = std::max(near_m, close.least_m());
   return best;
 }
 
@@ -563,10 +569,10 @@ std::span<const Gap> find_gaps(const RobotHand& hand, Placed& placed, const Near
       placed.swing_m[l] += turn.swing_m * (*near.turn)[turn.driven];
     }
   }
-  std::size_t count = 0;
+  std::size_t count = 0, farthest = 0;  // farthest: of as many as there is room for
   for (std::size_t p = 0; p < hand.pairs.size(); ++p) {
     const int a = hand.pairs[p].a, b = hand.pairs[p].b;
-    double near_m = near.most_m;
+    double near_m = count < gaps.size() ? near.most_m : gaps[farthest].gap_m;
     if (near.turn != nullptr) {
       near_m = std::min(near_m, near.least_m + placed.swing_m[a] + placed.swing_m[b]);
     }
@@ -579,18 +585,14 @@ std::span<const Gap> find_gaps(const RobotHand& hand, Placed& placed, const Near
                                                : nearest(hand, placed, a, b, near_m);
     least.gap_m = std::max(least.gap_m, at.gap_m);
     if (at.gap_m >= near_m) continue;
-    std::size_t into = count;
-    if (count == gaps.size()) {
-      into =
-          static_cast<std::size_t>(std::ranges::max_element(gaps, {}, &Gap::gap_m) - gaps.begin());
-      if (gaps[into].gap_m <= at.gap_m) continue;
-    } else {
-      ++count;
-    }
+    const std::size_t into = count < gaps.size() ? count++ : farthest;
     gaps[into].a = a;
     gaps[into].b = b;
     gaps[into].gap_m = at.gap_m;
     if (slopes) add_slopes(hand, placed, at, gaps[into]);
+    if (count < gaps.size()) continue;
+    farthest =
+        static_cast<std::size_t>(std::ranges::max_element(gaps, {}, &Gap::gap_m) - gaps.begin());
   }
   return {gaps.data(), count};
 }

@@ -49,24 +49,31 @@ class Solver {
   }
 
  private:
+  // Column by column: what a row's sum takes comes in the same order as row by row, but rows do not
+  // wait for each other.
   bool factor() noexcept {
-    for (int i = 0; i < p_.size; ++i) {
-      for (int j = 0; j <= i; ++j) {
-        double sum = p_.H(i, j);
-        for (int k = 0; k < j; ++k) sum -= L_(i, k) * L_(j, k);
-        if (i == j && !(sum > 0.0)) return false;
-        L_(i, j) = i == j ? std::sqrt(sum) : sum / L_(j, j);
+    const int n = p_.size;
+    for (int j = 0; j < n; ++j) {
+      L_.col(j).segment(j, n - j) = p_.H.col(j).segment(j, n - j);
+    }
+    for (int k = 0; k < n; ++k) {
+      if (!(L_(k, k) > 0.0)) return false;
+      L_(k, k) = std::sqrt(L_(k, k));
+      for (int i = k + 1; i < n; ++i) L_(i, k) /= L_(k, k);
+      for (int j = k + 1; j < n; ++j) {
+        for (int i = j; i < n; ++i) L_(i, j) -= L_(i, k) * L_(j, k);
       }
     }
     return true;
   }
 
   [[nodiscard]] Drive inverse(const Drive& right) const noexcept {
-    Drive x = Drive::Zero();
-    for (int i = 0; i < p_.size; ++i) {
-      double sum = right[i];
-      for (int k = 0; k < i; ++k) sum -= L_(i, k) * x[k];
-      x[i] = sum / L_(i, i);
+    Drive x = right;
+    x.tail(kMaxDriven - p_.size).setZero();
+    for (int k = 0; k < p_.size; ++k) {
+      if (x[k] == 0.0) continue;
+      x[k] /= L_(k, k);
+      for (int i = k + 1; i < p_.size; ++i) x[i] -= L_(i, k) * x[k];
     }
     for (int i = p_.size - 1; i >= 0; --i) {
       double sum = x[i];
