@@ -266,10 +266,14 @@ TEST_CASE("a second SIGINT while clips of takes are written leaves the log and w
   stage.daemon->send(SIGINT);
   std::this_thread::sleep_for(100ms);
   stage.daemon->send(SIGINT);
-  // On a machine that stalls the test here all clips may have been written before the signal.
+  // Some of the second take's clips may have been written before the signal; on a machine that
+  // stalls the test here, all of them.
   const bool interrupted = stage.daemon->exit_code() == 1;
   CHECK(has(stage.daemon->errors(), "interrupted: ... log is complete") == interrupted);
-  stage.check_whole(interrupted ? 8 : 16);
+  const std::size_t clips = stage.files(".bvh").size();
+  CHECK(clips >= 8);
+  CHECK((clips < 16) == interrupted);
+  stage.check_whole(clips);
 }
 
 TEST_CASE("datagrams of a capture system mark takes, once each, and rubbish marks none") {
