@@ -149,7 +149,11 @@ class PageClient {
     const auto* const data = static_cast<const char*>(buffer_.cdata().data());
     std::string bytes(data, buffer_.size());
     buffer_.consume(buffer_.size());
-    if (socket_.got_text()) return ViewMessage{"", std::move(bytes)};
+    if (socket_.got_text()) {
+      const auto word = nlohmann::json::parse(bytes, nullptr, false);
+      if (word.is_object() && word.contains("may_control")) may_control_ = word["may_control"];
+      return ViewMessage{"", std::move(bytes)};
+    }
     const auto length = static_cast<unsigned char>(bytes.front());
     return ViewMessage{bytes.substr(1, length), bytes.substr(1 + length)};
   }
@@ -177,13 +181,12 @@ class PageClient {
     }
     return std::nullopt;
   }
-  // Waits until the bridge says that the page may control, or may not.
+  // Waits until what the bridge said last is that the page may control, or may not.
   bool comes_to_control(bool may) {
-    while (const auto message = next_of("")) {
-      const nlohmann::json word = message->word();
-      if (word.contains("may_control") && word.at("may_control") == may) return true;
+    while (may_control_ != may) {
+      if (!next_of("")) return false;
     }
-    return false;
+    return true;
   }
   // The reply to a request; empty when none comes.
   std::optional<v1::ControlReply> reply(std::uint32_t number) {
@@ -208,6 +211,7 @@ class PageClient {
   boost::beast::websocket::response_type response_;
   boost::beast::flat_buffer buffer_;
   bool is_open_ = false, reading_ = false, has_read_ = false;
+  std::optional<bool> may_control_;
 };
 
 }  // namespace posed::test
