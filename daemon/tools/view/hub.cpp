@@ -370,7 +370,9 @@ void Hub::receive_stream(std::string_view topic, std::string_view body, std::int
     // The daemon repeats it every second, for clients that come later. After a pause the stream had
     // left, and pages have forgotten its skeleton.
     const bool stayed = now_ns - std::exchange(stream->skeleton_ns, now_ns) < kStayed_ns;
-    if (stayed && stream->skeleton && stream->skeleton->substr(topic.size() + 1) == body) return;
+    const bool same =
+        stream->skeleton && std::string_view(*stream->skeleton).substr(1 + topic.size()) == body;
+    if (stayed && same) return;
   }
   if (!make_room(*stream, topic.size() + 1 + body.size())) {
     ++counts_.foreign;

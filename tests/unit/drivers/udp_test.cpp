@@ -122,22 +122,28 @@ TEST_CASE("datagrams that wait inside the transport are due at once") {
   CHECK(transport->next_due_ns() == kNoTime_ns);
 }
 
+// The age that a datagram has for the transport after it waited so long.
+std::int64_t age_after(UdpTransport& transport, const Peer& peer, int wait_ms) {
+  REQUIRE(peer.send(transport.endpoint(0), "x"));
+  std::this_thread::sleep_for(std::chrono::milliseconds(wait_ms));
+  const std::int64_t read_ns = now_ns();
+  const Chunk chunk = transport.read(read_ns);
+  REQUIRE(chunk.bytes.size() == 1);
+  return read_ns - chunk.arrival_ns;
+}
+
+// The kernel begins to stamp a little after the first socket of the machine asks for it.
+void await_stamps(UdpTransport& transport, const Peer& peer) {
+  for (int i = 0; i < 100 && age_after(transport, peer, 20) < 19'000'000; ++i) continue;
+}
+
 TEST_CASE("a datagram's time is when the kernel received it") {
   const auto transport = listen_on("127.0.0.1:0");
   const Peer peer("127.0.0.1:0");
-  const auto age_after = [&](int wait_ms) {
-    REQUIRE(peer.send(transport->endpoint(0), "x"));
-    std::this_thread::sleep_for(std::chrono::milliseconds(wait_ms));
-    const std::int64_t read_ns = now_ns();
-    const Chunk chunk = transport->read(read_ns);
-    REQUIRE(chunk.bytes.size() == 1);
-    return read_ns - chunk.arrival_ns;
-  };
-  // The kernel begins to stamp a little after the first socket of the machine asks for it.
-  for (int i = 0; i < 100 && age_after(20) < 19'000'000; ++i) continue;
+  await_stamps(*transport, peer);
   for (const auto& [wait_ms, least_ns, most_ns] :
        {std::array{20, 19'000'000, 900'000'000}, std::array{80, 79'000'000, 900'000'000}}) {
-    const std::int64_t age_ns = age_after(wait_ms);
+    const std::int64_t age_ns = age_after(*transport, peer, wait_ms);
     CHECK(age_ns >= least_ns);
     CHECK(age_ns <= most_ns);
   }
@@ -146,13 +152,7 @@ TEST_CASE("a datagram's time is when the kernel received it") {
 TEST_CASE("datagrams that waited for more than a second are dropped and counted") {
   const auto transport = listen_on("127.0.0.1:0");
   const Peer peer("127.0.0.1:0");
-  // The kernel begins to stamp a little after the first socket of the machine asks for it.
-  for (std::int64_t age_ns = 0, i = 0; i < 100 && age_ns < 19'000'000; ++i) {
-    REQUIRE(peer.send(transport->endpoint(0), "x"));
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-    const std::int64_t read_ns = now_ns();
-    age_ns = read_ns - transport->read(read_ns).arrival_ns;
-  }
+  await_stamps(*transport, peer);
   for (int i = 0; i < 20; ++i) REQUIRE(peer.send(transport->endpoint(0), "old"));
   std::this_thread::sleep_for(std::chrono::milliseconds(1200));  // as if posed were stopped
   REQUIRE(peer.send(transport->endpoint(0), "new"));

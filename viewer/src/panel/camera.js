@@ -36,7 +36,7 @@ export class CameraPanel {
     this.canvas = el('canvas', { role: 'img', aria: { label: 'The points that were found' } });
     this.preview = el('div.camera-preview', { hidden: true }, this.video, this.canvas);
     this.button = el('button', { type: 'button', onclick: () => this.toggle() }, 'Use my camera');
-    this.device = el('select', { aria: { label: 'Your hand by webcam' }, hidden: true });
+    this.device = el('select', { aria: { label: 'Camera' }, hidden: true });
     this.side = el(
       'select',
       { aria: { label: 'Which hand it is' } },
@@ -51,7 +51,7 @@ export class CameraPanel {
     );
     this.element = el(
       'section.camera',
-      { hidden: true, aria: { label: 'Camera' } },
+      { hidden: true, aria: { label: 'Your hand by webcam' } },
       el('h2', {}, 'Your hand by webcam'),
       this.button,
       el('p.camera-consent', {}, `${CONSENT} Hands only, experimental.`),

@@ -121,8 +121,9 @@ export class ModelLibrary extends List {
   }
 
   #use(name, kind) {
-    if (this.stream?.stage(kind)?.model === name) return;
-    if (this.stream?.stage(kind))
+    const stage = this.stream?.stage(kind);
+    if (stage?.model === name) return;
+    if (stage)
       this.control(
         { use_model: { stream: this.stream.name, name } },
         `${this.stream.name}: model ${name}`,
