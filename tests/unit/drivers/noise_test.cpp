@@ -10,6 +10,7 @@
 #include "drivers/emulate/faults.hpp"
 #include "drivers/glove/glove_emulator.hpp"
 #include "drivers/glove/traits.hpp"
+#include "tests/support/seeds.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/decoder_of.hpp"
 #include "tests/unit/drivers/emulated.hpp"
@@ -20,8 +21,8 @@ namespace {
 using test::Bytes;
 using test::DeviceFixture;
 
-constexpr std::size_t kPackets = 150 * 60 * 2;
-constexpr double kNoise = 0.01;             // of bytes
+const std::size_t kPackets = test::few_seeds() ? 3'000 : 18'000;  // two minutes, or 20 s
+constexpr double kNoise = 0.01;                                   // of bytes
 constexpr std::size_t kMaxLatePackets = 8;  // most packets by which a decoder's output may be late
 
 // The largest share of damaged packets that are accepted as good, for gloves whose framing cannot
