@@ -526,7 +526,7 @@ Result<RequestHandler::Done> RequestHandler::take_model_away(const v1::ControlRe
               {.requester = requester,
                .stage = users.front(),
                .file = {.stage = &type},
-               .refusal = "it performs: stop that first"});
+               .refusal = "it plays labels: stop that first"});
 }
 
 const StageModel* RequestHandler::coming_model(const ControlledStream& stream,

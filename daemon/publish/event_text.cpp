@@ -67,8 +67,8 @@ std::string sentence(const StreamEvent& event) {
       return "the device's own time jumped (did it restart?); it is mapped to the host's time "
              "again";
     case v1::Event::KIND_PLAYING:
-      return fmt::format("performs {} from frame {} on, or after what still waits",
-                         words(event.after), event.sequence);
+      return fmt::format("plays {} from frame {} on, or after what still waits", words(event.after),
+                         event.sequence);
     case v1::Event::KIND_PLAYED:
       return "all is performed";
     default:

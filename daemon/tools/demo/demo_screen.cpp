@@ -111,7 +111,7 @@ Result<> DemoHand::tend(double seconds) {
 std::string DemoHand::note() const {
   if (frames_ == 0) return "hand: waiting";
   if (last_.source() == v1::SOURCE_LABELS) {
-    return fmt::format("hand: performs {} (1, 3 and 4 are not in its training data): {}",
+    return fmt::format("hand: plays {} (1, 3 and 4 are not in its training data): {}",
                        joined(kLabels, " "), clean_name(last_.label()));
   }
   const std::string label = last_.label().empty()

@@ -281,7 +281,7 @@ int play(const CtlOptions& options) {
   }
   (*wanted.mutable_number())["tempo"] = options.tempo;
   (*wanted.mutable_number())["loop"] = options.loop ? 1.0 : 0.0;
-  return change(options, request, "performs " + options.labels + " (after those that wait)");
+  return change(options, request, "plays " + options.labels + " (after those that wait)");
 }
 
 constexpr std::string_view kWarmUp = "warm-up";  // of the style stage
@@ -306,7 +306,7 @@ int stop_playing(const CtlOptions& options) {
   v1::ControlRequest request;
   request.mutable_stage_command()->set_stream(options.stream);
   request.mutable_stage_command()->set_name("generate.stop-playing");
-  return change(options, request, "performs no more");
+  return change(options, request, "plays no more");
 }
 
 int command_robot(const CtlOptions& options, const char* name, const char* what) {

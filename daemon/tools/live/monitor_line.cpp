@@ -46,7 +46,7 @@ template <typename Labelled>
 std::string label_words(const Labelled& labelled) {
   if (labelled.label().empty()) return {};
   const std::string label = clean_name(labelled.label());
-  if (labelled.source() == v1::SOURCE_LABELS) return "performs " + label;
+  if (labelled.source() == v1::SOURCE_LABELS) return "plays " + label;
   return fmt::format("recognised {} {:.0f} %", label, 100.0F * labelled.label_probability());
 }
 template std::string label_words(const v1::Frame& frame);

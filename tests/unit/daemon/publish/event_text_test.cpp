@@ -35,7 +35,7 @@ TEST_CASE("the text of a change names the old and the new value") {
   CHECK(sentence(event) == "calibration ann.toml from frame 62");
   event = event_of(v1::Event::KIND_PLAYING);
   event.after = ShortText("g c");
-  CHECK(sentence(event) == "performs g c from frame 61 on, or after what still waits");
+  CHECK(sentence(event) == "plays g c from frame 61 on, or after what still waits");
 }
 
 TEST_CASE("untrusted names in an event are cleaned and cut between two characters") {

@@ -251,9 +251,9 @@ TEST_CASE("the live view shows performed and recognised gestures, a moving alpha
   };
   CHECK(below() == "  walker0: recognised g 83 %");
   stream.set_source(v1::SOURCE_LABELS);
-  CHECK(below() == "  walker0: performs g");
+  CHECK(below() == "  walker0: plays g");
   stream.set_alpha_target(1.0F);
-  CHECK(below() == "  walker0: performs g, alpha slides to 1.00");
+  CHECK(below() == "  walker0: plays g, alpha slides to 1.00");
   v1::StageStats& style = *stream.mutable_stage(0);
   v1::ParameterStats& parameter = *style.add_parameter();
   parameter.set_name("gate_fallback");
@@ -262,13 +262,13 @@ TEST_CASE("the live view shows performed and recognised gestures, a moving alpha
   parameter.set_value(0.25);
   CHECK_FALSE(below().contains("gate_fallback"));  // no frame has come
   stream.set_frames(1);
-  CHECK(below() == "  walker0: performs g, style.gate_fallback 0.25, alpha slides to 1.00");
+  CHECK(below() == "  walker0: plays g, style.gate_fallback 0.25, alpha slides to 1.00");
   v1::ParameterStats& text = *style.add_parameter();
   text.set_name("weights");
   CHECK_FALSE(below().contains("weights"));  // the first style alone
   text.set_text("sway=0.75,\x1b[2Jsad=0.25");
   CHECK(below() ==
-        "  walker0: performs g, style.gate_fallback 0.25, style.weights sway=0.75,"
+        "  walker0: plays g, style.gate_fallback 0.25, style.weights sway=0.75,"
         "\\x1b[2Jsad=0.25, alpha slides to 1.00");
   text.clear_text();
   stream.set_style_gate(0.0F);

@@ -41,7 +41,7 @@ TEST_CASE("a performed pose is distinguished from a recognised one") {
   frame.set_source(v1::SOURCE_LABELS);
   CHECK(has(monitor_line(frame), "performed"));
   CHECK_FALSE(has(monitor_line(frame), "measured"));
-  CHECK(has(monitor_line(frame), "performs g"));
+  CHECK(has(monitor_line(frame), "plays g"));
   CHECK_FALSE(has(monitor_line(frame), "%"));
   frame.set_quality(v1::QUALITY_HELD);
   CHECK(has(monitor_line(frame), "held"));
