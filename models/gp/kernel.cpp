@@ -183,6 +183,35 @@ void blended_sum(const Tiles& tiles, const Blocks& blocks, const Query& query, f
             });
 }
 
+void squares_of_parts(const float* HWY_RESTRICT tile, const Parts& query, float* HWY_RESTRICT sums,
+                      float* HWY_RESTRICT whole) {
+  constexpr int kVectors = std::min(4, kTile / kWide);  // whose sums stay in registers
+  const Floats d;
+  for (int column = 0; column < kTile; column += kVectors * kWide) {
+    Vec all[kVectors];
+    for (Vec& one : all) one = hn::Zero(d);
+    for (int i = 0; i < query.count;) {
+      const int part = query.part[i];
+      float* HWY_RESTRICT row = sums + static_cast<std::ptrdiff_t>(part) * kTile + column;
+      Vec own[kVectors];
+      for (int v = 0; v < kVectors; ++v) own[v] = hn::Load(d, row + v * kWide);
+      for (; i < query.count && query.part[i] == part; ++i) {
+        const int dim = query.present[i];
+        const float* HWY_RESTRICT x = tile + static_cast<std::ptrdiff_t>(dim) * kTile + column;
+        const auto q = hn::Set(d, query.q[dim]);
+        for (int v = 0; v < kVectors; ++v) {
+          const auto difference = hn::Sub(q, hn::Load(d, x + v * kWide));
+          const auto square = hn::Mul(difference, difference);
+          own[v] = hn::Add(own[v], square);
+          all[v] = hn::Add(all[v], square);
+        }
+      }
+      for (int v = 0; v < kVectors; ++v) hn::Store(own[v], d, row + v * kWide);
+    }
+    for (int v = 0; v < kVectors; ++v) hn::Store(all[v], d, whole + column + v * kWide);
+  }
+}
+
 void exp2_of(const float* x, int count, float* out) {
   const Floats d;
   for (int i = 0; i < count; i += kWide) {
@@ -201,6 +230,7 @@ namespace kernel {
 
 HWY_EXPORT(weighted_sum);
 HWY_EXPORT(blended_sum);
+HWY_EXPORT(squares_of_parts);
 HWY_EXPORT(exp2_of);
 HWY_EXPORT(target);
 
@@ -210,6 +240,9 @@ void weighted_sum(const Tiles& tiles, const Query& query, float* out) noexcept {
 void blended_sum(const Tiles& tiles, const Blocks& blocks, const Query& query,
                  float* out) noexcept {
   HWY_DYNAMIC_DISPATCH(blended_sum)(tiles, blocks, query, out);
+}
+void squares_of_parts(const float* tile, const Parts& query, float* sums, float* whole) noexcept {
+  HWY_DYNAMIC_DISPATCH(squares_of_parts)(tile, query, sums, whole);
 }
 void exp2_of(const float* x, int count, float* out) noexcept {
   HWY_DYNAMIC_DISPATCH(exp2_of)(x, count, out);

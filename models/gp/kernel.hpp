@@ -57,6 +57,20 @@ void weighted_sum(const Tiles& tiles, const Query& query, float* out) noexcept;
 RT_SAFE void blended_sum(const Tiles& tiles, const Blocks& blocks, const Query& query,
                          float* out) noexcept;
 
+// Squared distances from q to the points of a tile of X alone [dims][kTile], 64-byte aligned, with
+// a product and a sum for each step: every instruction set gives the same bits.
+struct Parts {
+  const float* q;
+  const std::uint16_t* present;  // the dimensions that count, and whose they are
+  const std::uint8_t* part;
+  int count;
+};
+
+// Adds those of each part to its row of `sums` [parts][kTile], and writes those of all into `whole`
+// [kTile]; both are 64-byte aligned.
+RT_SAFE void squares_of_parts(const float* tile, const Parts& query, float* sums,
+                              float* whole) noexcept;
+
 // out = 2^x for x <= 0, exactly 0 below -125. count: a multiple of 16. For tests.
 void exp2_of(const float* x, int count, float* out) noexcept;
 

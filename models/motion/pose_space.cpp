@@ -314,7 +314,7 @@ RT_SAFE bool PoseSpace::convert(const PoseSpace& from, std::span<const float> fr
   return true;
 }
 
-// V after the change; `rotation` is V as the frame has it.
+// V after the change; `rotation` is V as the frame has it, which Euler angles alone need.
 RT_SAFE Quaterniond PoseSpace::changed(const Item& item, const Quaterniond& rotation,
                                        const float* q, const float* delta) const noexcept {
   // A joint may turn about an axis that the space does not list (cmu43); that angle is kept.
@@ -354,8 +354,11 @@ RT_SAFE void PoseSpace::add(Frame& frame, double heading_rad, std::span<const fl
                        mean.coeffs() != item.mean.coeffs();
     if (!moves || !measured(item, frame)) continue;
     const Quaterniond from_base = base(item, frame, heading_rad);
-    const Quaterniond now = item.mean.conjugate() * from_base *
-                            to_eigen_double(frame.rotation_xyzw[item.joint]) * item.after;
+    Quaterniond now = Quaterniond::Identity();
+    if (euler_) {
+      now = item.mean.conjugate() * from_base * to_eigen_double(frame.rotation_xyzw[item.joint]) *
+            item.after;
+    }
     const Quaterniond local = from_base.conjugate() * mean *
                               changed(item, now, &q[item.first_dim], change.data()) *
                               item.after.conjugate();

@@ -11,6 +11,8 @@
 namespace posed::style {
 namespace {
 
+using gp::kernel::kTile;
+
 Eigen::MatrixXd kept_poses(const gp::Trained& process, int limit) {
   if (process.inputs.rows() <= limit) return process.inputs;
   const auto kept = gp::choose_inducing(process.inputs, process.mu, limit,
@@ -29,70 +31,71 @@ TrainedMotion::TrainedMotion(const StyleModel& model, const Skeleton& skeleton)
       root_joint_(skeleton.root_joint) {
   if (model.gate.strides()) legs_ = motion::LegSignal::find(skeleton);
   const Eigen::MatrixXf kept = kept_poses(model.process, kPoses).cast<float>();
-  const Eigen::Index blocks = (kept.rows() + kBlock - 1) / kBlock;
-  poses_.resize(kBlock, blocks * kept.cols());
-  for (Eigen::Index i = 0; i < blocks * kBlock; ++i) {
-    const Eigen::Index pose = std::min(i, kept.rows() - 1);  // the last one fills the last block
+  const Eigen::Index tiles = (kept.rows() + kTile - 1) / kTile;
+  for (Eigen::Index first = 0; first < tiles * kTile; first += kTile) {
     for (Eigen::Index d = 0; d < kept.cols(); ++d) {
-      poses_(i % kBlock, i / kBlock * kept.cols() + d) = kept(pose, d);
+      Row& row = rows_.emplace_back();
+      for (Eigen::Index i = 0; i < kTile; ++i) {  // the last pose fills the last tile
+        row.pose[i] = kept(std::min(first + i, kept.rows() - 1), d);
+      }
     }
   }
 }
 
-// Of the squares' sum over the available dimensions.
-RT_SAFE double TrainedMotion::rms_deg(float sum_rad2,
-                                      std::span<const std::uint8_t> available) const noexcept {
-  double there = 0.0;
-  for (const std::uint8_t one : available) there += one != 0 ? 1.0 : 0.0;
-  if (there == 0.0) return std::numeric_limits<double>::quiet_NaN();
-  const double whole_rad2 =
-      static_cast<double>(sum_rad2) * static_cast<double>(available.size()) / there;
+// Of the squares' sum over the dimensions that are there.
+RT_SAFE double TrainedMotion::rms_deg(float sum_rad2, int there, std::size_t dims) const noexcept {
+  if (there == 0) return std::numeric_limits<double>::quiet_NaN();
+  const double whole_rad2 = static_cast<double>(sum_rad2) * static_cast<double>(dims) / there;
   return std::sqrt(whole_rad2 / joints_) / kDegree;
 }
 
 RT_SAFE double TrainedMotion::distance_deg(std::span<const float> q,
                                            std::span<const std::uint8_t> available) const noexcept {
-  const auto dims = static_cast<Eigen::Index>(q.size());
-  Block nearest = Block::Constant(std::numeric_limits<float>::infinity());
-  for (Eigen::Index first = 0; first < poses_.cols(); first += dims) {
-    Block sum = Block::Zero();
-    for (Eigen::Index d = 0; d < dims; ++d) {
-      if (available[d] == 0) continue;
-      sum += (q[d] - poses_.col(first + d)).square();
-    }
-    nearest = nearest.min(sum);
-  }
-  return rms_deg(nearest.minCoeff(), available);
+  static constexpr std::array<LoosePart, motion::kMaxPoseDims> kNoParts = [] {
+    std::array<LoosePart, motion::kMaxPoseDims> none{};
+    none.fill(LoosePart::kNone);
+    return none;
+  }();
+  return distances_deg(q, available, std::span(kNoParts).first(q.size())).whole_deg;
 }
 
-RT_SAFE TrainedMotion::PartDistances TrainedMotion::part_distances_deg(
+RT_SAFE TrainedMotion::Distances TrainedMotion::distances_deg(
     std::span<const float> q, std::span<const std::uint8_t> available,
     std::span<const LoosePart> parts) const noexcept {
-  const auto dims = static_cast<Eigen::Index>(q.size());
-  std::array<Block, kLooseParts + 1> nearest;
-  nearest.fill(Block::Constant(std::numeric_limits<float>::infinity()));
-  for (Eigen::Index first = 0; first < poses_.cols(); first += dims) {
-    std::array<Block, kLooseParts + 1> sum;
-    sum.fill(Block::Zero());
-    for (Eigen::Index d = 0; d < dims; ++d) {
-      if (available[d] == 0) continue;
-      sum[index_of(parts[d])] += (q[d] - poses_.col(first + d)).square();
-    }
+  std::array<std::uint16_t, motion::kMaxPoseDims> present;
+  std::array<std::uint8_t, motion::kMaxPoseDims> part;
+  std::array<int, kLooseParts + 1> of_part{};
+  int there = 0;
+  for (std::size_t d = 0; d < q.size(); ++d) {
+    if (available[d] == 0) continue;
+    present[there] = static_cast<std::uint16_t>(d);
+    part[there] = static_cast<std::uint8_t>(parts[d]);
+    ++of_part[index_of(parts[d])];
+    ++there;
+  }
+  using Table = Eigen::Array<float, kTile, kLooseParts + 2>;  // of each part, the legs and all
+  constexpr auto kWhole = static_cast<Eigen::Index>(kLooseParts) + 1;
+  const gp::kernel::Parts query{q.data(), present.data(), part.data(), there};
+  alignas(64) Table sums;
+  alignas(64) Table nearest = Table::Constant(std::numeric_limits<float>::infinity());
+  for (std::size_t tile = 0; tile < rows_.size(); tile += q.size()) {
+    sums.setZero();
+    gp::kernel::squares_of_parts(rows_[tile].pose.data(), query, sums.data(),
+                                 sums.col(kWhole).data());
     for (const LoosePart shoulder : kShoulders) {
-      sum[index_of(whole_part(shoulder))] += sum[index_of(shoulder)];
+      sums.col(index_of(whole_part(shoulder))) += sums.col(index_of(shoulder));
     }
-    for (std::size_t p = 0; p < kLooseParts; ++p) nearest[p] = nearest[p].min(sum[p]);
+    nearest = nearest.min(sums);
   }
-  std::array<int, kLooseParts + 1> count{};
-  for (Eigen::Index d = 0; d < dims; ++d) count[index_of(parts[d])] += available[d] != 0 ? 1 : 0;
   for (const LoosePart shoulder : kShoulders) {
-    count[index_of(whole_part(shoulder))] += count[index_of(shoulder)];
+    of_part[index_of(whole_part(shoulder))] += of_part[index_of(shoulder)];
   }
-  PartDistances found{};
+  Distances found{.whole_deg = rms_deg(nearest.col(kWhole).minCoeff(), there, q.size()),
+                  .part_deg = {}};
   for (std::size_t p = 0; p < kLooseParts; ++p) {
-    if (count[p] == 0) continue;
-    const float joints = static_cast<float>(count[p]) / 3.0F;
-    found[p] = std::sqrt(nearest[p].minCoeff() / joints) / static_cast<float>(kDegree);
+    if (of_part[p] == 0) continue;
+    const float joints = static_cast<float>(of_part[p]) / 3.0F;
+    found.part_deg[p] = std::sqrt(nearest.col(p).minCoeff() / joints) / static_cast<float>(kDegree);
   }
   return found;
 }
@@ -100,10 +103,13 @@ RT_SAFE TrainedMotion::PartDistances TrainedMotion::part_distances_deg(
 RT_SAFE double TrainedMotion::turn_deg(std::span<const float> from, std::span<const float> to,
                                        std::span<const std::uint8_t> available) const noexcept {
   float sum = 0.0F;
+  int there = 0;
   for (std::size_t d = 0; d < from.size(); ++d) {
-    if (available[d] != 0) sum += (to[d] - from[d]) * (to[d] - from[d]);
+    if (available[d] == 0) continue;
+    sum += (to[d] - from[d]) * (to[d] - from[d]);
+    ++there;
   }
-  return rms_deg(sum, available);
+  return rms_deg(sum, there, from.size());
 }
 
 RT_SAFE double TrainedMotion::height_m(const Frame& frame) const noexcept {

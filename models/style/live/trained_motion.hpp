@@ -7,9 +7,9 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
-#include <Eigen/Core>
-
+#include "models/gp/kernel.hpp"
 #include "models/motion/leg_signal.hpp"
 #include "models/style/live/body_mask.hpp"
 #include "models/style/model/style_model.hpp"
@@ -21,16 +21,19 @@ class TrainedMotion {
   // For a model with gate data (GateData::present()) whose parts fit each other. Cold.
   TrainedMotion(const StyleModel& model, const Skeleton& skeleton);
 
-  // From q [dims] to the nearest of the kept training poses: the rotation, rms over joints [deg].
-  // Missing dimensions count as those that are there; NaN where none is.
+  // From q [dims] to the nearest of the kept training poses: the rotation, rms over joints [deg],
+  // and the same for each of `parts` [dims] alone, 0 where none of it was measured. Missing
+  // dimensions count as those that are there; NaN where none is.
+  using PartDistances = std::array<float, kLooseParts>;
+  struct Distances {
+    double whole_deg;
+    PartDistances part_deg;
+  };
+  [[nodiscard]] Distances distances_deg(std::span<const float> q,
+                                        std::span<const std::uint8_t> available,
+                                        std::span<const LoosePart> parts) const noexcept;
   RT_SAFE [[nodiscard]] double distance_deg(std::span<const float> q,
                                             std::span<const std::uint8_t> available) const noexcept;
-
-  // The same for each of `parts` [dims] alone. 0 where none of a part was measured.
-  using PartDistances = std::array<float, kLooseParts>;
-  [[nodiscard]] PartDistances part_distances_deg(std::span<const float> q,
-                                                 std::span<const std::uint8_t> available,
-                                                 std::span<const LoosePart> parts) const noexcept;
 
   // The rotation from one pose to another [dims], rms over joints [deg]; missing dimensions as
   // above.
@@ -47,16 +50,17 @@ class TrainedMotion {
   RT_SAFE [[nodiscard]] double height_m(const Frame& frame) const noexcept;
 
  private:
-  [[nodiscard]] double rms_deg(float sum_rad2,
-                               std::span<const std::uint8_t> available) const noexcept;
+  [[nodiscard]] double rms_deg(float sum_rad2, int there, std::size_t dims) const noexcept;
 
   // At most this many poses, those that stand best for all: the others are within a few degrees.
   static constexpr int kPoses = 128;
 
-  // So many at a time, whose sums stay in registers: [dims][kBlock] of one block after the other.
-  static constexpr int kBlock = 16;
-  using Block = Eigen::Array<float, kBlock, 1>;
-  Eigen::Array<float, kBlock, Eigen::Dynamic> poses_;
+  // One dimension of the poses of a tile, which the kernel reads: [dims] of one tile after the
+  // other.
+  struct alignas(64) Row {
+    std::array<float, gp::kernel::kTile> pose;
+  };
+  std::vector<Row> rows_;
   double joints_;
   std::optional<motion::LegSignal> legs_;
   double swing_rad_, cadence_rad_s_;

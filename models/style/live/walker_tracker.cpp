@@ -99,13 +99,14 @@ RT_SAFE void Fade::step(double towards, double part) noexcept {
 }
 
 RT_SAFE void Gate::update(const TrainedMotion* known, bool on, const Frame& frame,
-                          std::span<const float> q, std::span<const float> whole,
-                          std::span<const std::uint8_t> available,
-                          const std::optional<Walker>& walker, double dt_s) noexcept {
+                          std::span<const float> q, std::span<const std::uint8_t> available,
+                          const Distance& distance, const std::optional<Walker>& walker,
+                          double dt_s) noexcept {
   const Evidence before = seen_;
   seen_.knows = 1.0;
   if (known != nullptr) {
-    see_pose(*known, q, whole, available, walker.has_value(), dt_s);
+    speed_.update(*known, q, available, dt_s);
+    see_pose(*known, distance, walker.has_value());
     see_legs(*known, frame, walker, dt_s);
     if (on) seen_.knows = of_pose_ * of_cadence_;
   }
@@ -115,21 +116,16 @@ RT_SAFE void Gate::update(const TrainedMotion* known, bool on, const Frame& fram
   follow(closes ? known : nullptr, before, dt_s);
 }
 
-RT_SAFE void Gate::see_pose(const TrainedMotion& known, std::span<const float> q,
-                            std::span<const float> whole, std::span<const std::uint8_t> available,
-                            bool is_own, double dt_s) noexcept {
-  speed_.update(known, q, available, dt_s);
-  // The arms and the trunk of a run are none of a walk's, so what replaces them must not count
-  // where the legs do not tell the two apart.
-  const bool replaced = q.data() != whole.data();
-  const double kernel_deg = known.distance_deg(q, available);
-  const double whole_deg = replaced ? known.distance_deg(whole, available) : kernel_deg;
-  if (std::isnan(kernel_deg)) return;
+// The arms and the trunk of a run are none of a walk's, so what replaces them must not count where
+// the legs do not tell the two apart.
+RT_SAFE void Gate::see_pose(const TrainedMotion& known, const Distance& distance,
+                            bool is_own) noexcept {
+  if (std::isnan(distance.kernel_deg)) return;
   const bool legs_tell = is_own || !known.legs() || !std::isnan(stride_.cadence_rad_s());
-  const double distance_deg = legs_tell ? kernel_deg : whole_deg;
+  const double distance_deg = legs_tell ? distance.kernel_deg : distance.whole_deg;
   of_pose_ = is_own ? 1.0 - rise(distance_deg, kOwnNear_deg, kOwnFar_deg)
                     : 1.0 - rise(distance_deg, kNear_deg, kFar_deg);
-  of_near_pose_ = 1.0 - rise(whole_deg, kSame_deg, kOther_deg);
+  of_near_pose_ = 1.0 - rise(distance.whole_deg, kSame_deg, kOther_deg);
 }
 
 // How far the legs stride as in training; all the way where that cannot be told.
@@ -218,9 +214,13 @@ RT_SAFE bool WalkerTracker::see(const BoundModel& model, const Frame& frame,
   report_missing_data(model);
   const TrainedMotion* const known = model.known ? &*model.known : nullptr;
   relate(model, q, available, dt_s, input);
-  const std::span<const float> whole =
-      replaced_ ? std::span<const float>(whole_.data(), q.size()) : input;
-  gate_.update(known, gate_on_, frame, input, whole, available, walker_, dt_s);
+  Gate::Distance distance{};
+  if (known != nullptr) {
+    const bool seen_whole = trusts_ && !replaced_;
+    distance.kernel_deg = seen_whole ? whole_deg_ : known->distance_deg(input, available);
+    distance.whole_deg = trusts_ ? whole_deg_ : distance.kernel_deg;
+  }
+  gate_.update(known, gate_on_, frame, input, available, distance, walker_, dt_s);
   const bool jumped = measure(model, q, available, gap_s, dt_s);
   if (jumped) relate(model, q, available, 0.0, input);
   return jumped;
@@ -299,10 +299,11 @@ RT_SAFE void WalkerTracker::follow_trust(const BoundModel& model,
   const bool began = std::exchange(trusts_, usual_ != nullptr && model.known);
   if (!trusts_) return trust_.fill(1.0F);
   const Trust before = seen_trust_;
-  const auto distances = model.known->part_distances_deg(input, available, model.loose_parts);
+  const auto distances = model.known->distances_deg(input, available, model.loose_parts);
+  whole_deg_ = distances.whole_deg;
   const auto& limits = walker_ ? kKnownWalker : kUnknownWalker;
   for (std::size_t p = 0; p < kLooseParts; ++p) {
-    seen_trust_[p] = share_below(distances[p], limits[p]);
+    seen_trust_[p] = share_below(distances.part_deg[p], limits[p]);
     // Arms come before shoulders.
     const std::size_t whole = index_of(whole_part(static_cast<LoosePart>(p)));
     seen_trust_[p] = std::max(seen_trust_[p], seen_trust_[whole]);
@@ -324,7 +325,6 @@ RT_SAFE void WalkerTracker::replace_untrusted(const BoundModel& model,
                                               std::span<float> input) noexcept {
   replaced_ = trust_ != kAllTrust;
   if (!replaced_) return;
-  std::ranges::copy(input, whole_.begin());
   std::array<float, motion::kMaxPoseDims> walk;
   usual_->does.get(input, available, walk);
   for (std::size_t d = 0; d < input.size(); ++d) {

@@ -70,12 +70,16 @@ class Fade {
 // (README.md, "Gate"). State of one stream. RT-safe.
 class Gate {
  public:
-  // Advances by a frame, `dt_s` after the last one. `q` is the pose that the kernel sees, `whole`
-  // the same with what busy limbs do; `walker`: this walker's measured neutral walk, if any. With
-  // `on` false or `known` null, as the model has no data for the gate, the gate opens gradually, or
-  // at once if it was never on.
+  // How far a pose is from the nearest one of training [deg]: as the kernel sees it, and with what
+  // busy limbs do; NaN where nothing of it was measured.
+  struct Distance {
+    double kernel_deg, whole_deg;
+  };
+  // Advances by a frame, `dt_s` after the last one. `q` is the pose that the kernel sees; `walker`:
+  // this walker's measured neutral walk, if any. With `on` false or `known` null, as the model has
+  // no data for the gate, the gate opens gradually, or at once if it was never on.
   void update(const TrainedMotion* known, bool on, const Frame& frame, std::span<const float> q,
-              std::span<const float> whole, std::span<const std::uint8_t> available,
+              std::span<const std::uint8_t> available, const Distance& distance,
               const std::optional<Walker>& walker, double dt_s) noexcept;
 
   // How much style passes: 1 all, exactly, to 0 none, exactly; 0 before the first frame. It takes
@@ -94,8 +98,7 @@ class Gate {
   void settle() noexcept;
 
  private:
-  void see_pose(const TrainedMotion& known, std::span<const float> q, std::span<const float> whole,
-                std::span<const std::uint8_t> available, bool is_own, double dt_s) noexcept;
+  void see_pose(const TrainedMotion& known, const Distance& distance, bool is_own) noexcept;
   void see_legs(const TrainedMotion& known, const Frame& frame, const std::optional<Walker>& walker,
                 double dt_s) noexcept;
   // Of what the gate follows: all but rest, and what tells rest; NaN: not known.
@@ -198,7 +201,7 @@ class WalkerTracker {
   LegMap shift_;                              // from the walker's neutral walk to the model's
   const BoundModel::Usual* usual_ = nullptr;  // the neutral walk that is nearest to the walker's
   bool replaced_ = false;                     // something of the last frame
-  std::array<float, motion::kMaxPoseDims> whole_{};  // its input before
+  double whole_deg_ = 0.0;                    // how far the last one was from training before
   // What the poses say of each part, which changes within a few frames, and what follows it.
   using Trust = std::array<float, kLooseParts>;
   static constexpr Trust kAllTrust = {1.0F, 1.0F, 1.0F, 1.0F, 1.0F, 1.0F};

@@ -10,6 +10,7 @@
 
 #include <catch2/catch.hpp>
 
+#include "models/gp/isa.hpp"
 #include "models/motion/leg_signal.hpp"
 #include "models/motion/synthetic_walker.hpp"
 #include "models/style/live/apply.hpp"
@@ -35,7 +36,9 @@ class ToyGate {
     for (std::size_t d = 0; d < q.size(); ++d) {
       q[d] = static_cast<float>(model.process.inputs(3, static_cast<Eigen::Index>(d)) + away_rad);
     }
-    gate.update(&known, true, {}, q, q, std::vector<std::uint8_t>(15, 1), {}, dt_s);
+    const std::vector<std::uint8_t> all(15, 1);
+    const double away_deg = known.distance_deg(q, all);
+    gate.update(&known, true, {}, q, all, {away_deg, away_deg}, {}, dt_s);
     return gate.open();
   }
   style::StyleModel model = gated_toy_model(1);
@@ -90,7 +93,8 @@ class WalkingGate {
     for (float& angle : q_) angle += static_cast<float>(how.away_deg * kDegree / std::sqrt(3.0));
     const double apart_rad = std::abs(known_->legs()->value_rad(in));
     in.root_position_m[1] = static_cast<float>(1.0 + how.rise_m_rad * apart_rad);
-    gate.update(&*known_, on, in, q_, q_, available_, walker, kStep_s);
+    const double away_deg = known_->distance_deg(q_, available_);
+    gate.update(&*known_, on, in, q_, available_, {away_deg, away_deg}, walker, kStep_s);
   }
   [[nodiscard]] const style::TrainedMotion& known() const { return *known_; }
   // How far the parts are from training where the joint of a bone is turned by so much.
@@ -100,7 +104,7 @@ class WalkingGate {
       if (space_->skeleton_joint_of_dim(d) != clip_.skeleton->joint_of(bone)) continue;
       q_[static_cast<std::size_t>(d)] += static_cast<float>(deg * kDegree / std::sqrt(3.0));
     }
-    return known_->part_distances_deg(q_, available_, style::loose_parts_of(*space_, spec_));
+    return known_->distances_deg(q_, available_, style::loose_parts_of(*space_, spec_)).part_deg;
   }
 
  private:
@@ -288,6 +292,49 @@ TEST_CASE("the nearest training pose is found, also with missing joints", "[styl
   all[4] = 0;
   CHECK(known.distance_deg(q, all) == Approx(0.0).margin(1e-3));
   CHECK(std::isnan(known.distance_deg(q, std::vector<std::uint8_t>(15, 0))));
+}
+
+TEST_CASE("distances have the bits of plain sums, on every instruction set", "[style]") {
+  style::StyleModel model = gated_toy_model(1);
+  const Eigen::MatrixXd poses = model.process.inputs;
+  model.process.inputs.resize(100, 15);  // more than a tile
+  for (int i = 0; i < 100; ++i) {
+    model.process.inputs.row(i) = (1.0 + 0.01 * i) * poses.row(i % poses.rows());
+  }
+  const style::TrainedMotion known(model, toy_skeleton());
+  std::vector<float> q(15);
+  std::vector<std::uint8_t> available(15, 1);
+  available[4] = 0;
+  std::vector<style::LoosePart> parts(15, style::LoosePart::kNone);
+  for (std::size_t d = 0; d < 15; ++d) {
+    q[d] = 0.2F * std::sin(3.0F * static_cast<float>(d));
+    if (d > 2) parts[d] = static_cast<style::LoosePart>(d / 3 % 2 == 0 ? 0 : 2);
+  }
+  float whole_rad2 = std::numeric_limits<float>::infinity();
+  float arm_rad2 = whole_rad2;
+  for (int i = 0; i < 100; ++i) {
+    float whole = 0.0F;
+    float arm = 0.0F;
+    for (std::size_t d = 0; d < 15; ++d) {
+      if (available[d] == 0) continue;
+      const auto pose = static_cast<float>(model.process.inputs(i, static_cast<Eigen::Index>(d)));
+      const float square = (q[d] - pose) * (q[d] - pose);
+      whole += square;
+      if (parts[d] == style::LoosePart::kLeftArm) arm += square;
+    }
+    whole_rad2 = std::min(whole_rad2, whole);
+    arm_rad2 = std::min(arm_rad2, arm);
+  }
+  const double whole_deg = std::sqrt(static_cast<double>(whole_rad2) * 15.0 / 14 / 5.0) / kDegree;
+  const float arm_deg = std::sqrt(arm_rad2 / (5.0F / 3.0F)) / static_cast<float>(kDegree);
+  for (const char* isa : {"portable", "avx2", "avx512", "auto"}) {
+    if (!gp::set_isa(isa)) continue;
+    const auto found = known.distances_deg(q, available, parts);
+    CHECK(found.whole_deg == whole_deg);
+    CHECK(found.part_deg[style::index_of(style::LoosePart::kLeftArm)] == arm_deg);
+    CHECK(found.part_deg[style::index_of(style::LoosePart::kHead)] == 0.0F);
+    CHECK(known.distance_deg(q, available) == whole_deg);
+  }
 }
 
 TEST_CASE("the gate is exactly open on known poses and exactly closed far from them", "[style]") {
