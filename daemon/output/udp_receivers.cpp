@@ -1,9 +1,12 @@
 #include "daemon/output/udp_receivers.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <cstring>
 
-#include <poll.h>
+#include <linux/errqueue.h>
+#include <netinet/in.h>
 #include <unistd.h>
 
 #include "drivers/transport/socket.hpp"
@@ -12,15 +15,20 @@ namespace posed::output {
 namespace {
 
 constexpr std::int64_t kRetry_ns = kNanosPerSecond;
-constexpr std::int64_t kGood_ns = 2 * kNanosPerSecond;
+// The system looks for a machine that is not there for three seconds before it says so.
+constexpr std::int64_t kGood_ns = 5 * kNanosPerSecond;
 constexpr std::size_t kMaxMessages = 1024;  // that the system takes in one call (UIO_MAXIOV)
 
-// Connected sockets, because only those learn that nobody listens at the other side.
+// Connected sockets, because only those learn that nobody listens at the other side. Without the
+// last options they do not learn that the machine is not there, or that the interface's own queue
+// had no room.
 Result<int> open_socket(const drivers::Address& address) {
   const int fd = drivers::open_socket(address, SOCK_DGRAM);
   if (fd < 0) return fail("cannot open a UDP socket (" + errno_text() + ")");
   const int yes = 1;  // who writes down a broadcast address wants that
   ::setsockopt(fd, SOL_SOCKET, SO_BROADCAST, &yes, sizeof yes);
+  ::setsockopt(fd, IPPROTO_IP, IP_RECVERR, &yes, sizeof yes);
+  ::setsockopt(fd, IPPROTO_IPV6, IPV6_RECVERR, &yes, sizeof yes);
   return fd;
 }
 
@@ -33,9 +41,18 @@ std::string why(int error) {
   return errno_text(error);
 }
 
-bool has_room(int fd) noexcept {
-  pollfd socket{.fd = fd, .events = POLLOUT, .revents = 0};
-  return ::poll(&socket, 1, 0) > 0 && (socket.revents & POLLOUT) != 0;
+// The network's answer to a datagram, from a message of the socket's error queue (ip(7)); 0: none.
+int answer_in(msghdr& message) noexcept {
+  for (cmsghdr* part = CMSG_FIRSTHDR(&message); part != nullptr;
+       part = CMSG_NXTHDR(&message, part)) {
+    const bool v4 = part->cmsg_level == IPPROTO_IP && part->cmsg_type == IP_RECVERR;
+    const bool v6 = part->cmsg_level == IPPROTO_IPV6 && part->cmsg_type == IPV6_RECVERR;
+    if (!v4 && !v6) continue;
+    sock_extended_err what{};
+    std::memcpy(&what, CMSG_DATA(part), sizeof what);
+    if (what.ee_origin != SO_EE_ORIGIN_LOCAL) return static_cast<int>(what.ee_errno);
+  }
+  return 0;
 }
 
 }  // namespace
@@ -90,29 +107,44 @@ bool UdpReceivers::is_connected(Receiver& receiver, std::int64_t now_ns) noexcep
   return receiver.connected;
 }
 
-void UdpReceivers::fail_first(Receiver& receiver, const mmsghdr& datagram, int error,
-                              std::int64_t now_ns, SendOutcome& outcome) noexcept {
-  const auto again = [&] { return ::sendmsg(receiver.fd, &datagram.msg_hdr, MSG_NOSIGNAL) >= 0; };
-  bool gone = false;
-  if (error == 0) {  // what lasts is said now, and what does not was a refusal, or want of room
-    const bool room = has_room(receiver.fd);
-    gone = again();
-    error = gone ? ECONNREFUSED : errno;
-    if (gone && !room) {
+bool UdpReceivers::take_answers(Receiver& receiver) noexcept {
+  bool any = false;
+  while (true) {
+    alignas(cmsghdr) std::array<std::byte, 256> about{};
+    msghdr message{};
+    message.msg_control = about.data();
+    message.msg_controllen = about.size();
+    if (::recvmsg(receiver.fd, &message, MSG_ERRQUEUE | MSG_DONTWAIT) < 0) return any;
+    const int answer = answer_in(message);
+    if (answer == 0) continue;
+    any = true;
+    receiver.error = answer;
+    ++receiver.refused;
+  }
+}
+
+void UdpReceivers::retry_first(Receiver& receiver, const mmsghdr& datagram, int error,
+                               std::int64_t now_ns, SendOutcome& outcome) noexcept {
+  const bool answered = take_answers(receiver);
+  // For a lack of memory the queue may be without an answer that is known.
+  if (!answered && error == ECONNREFUSED) {
+    receiver.error = error;
+    ++receiver.refused;
+  }
+  if (answered || error == 0 || error == ECONNREFUSED) {  // this datagram may go all the same
+    if (::sendmsg(receiver.fd, &datagram.msg_hdr, MSG_NOSIGNAL) >= 0) {
       ++outcome.sent;
       return;
     }
+    error = errno;
   }
-  // A refusal was the answer to earlier datagrams, one for all of them, which are counted as sent;
-  // this one is sent now, and counted as failed for them.
-  if (error == ECONNREFUSED && !gone) static_cast<void>(again());
   receiver.error = error;
   if (error == EAGAIN || error == ENOBUFS) {
     ++outcome.dropped;
     return;
   }
   ++outcome.failed;
-  if (error == ECONNREFUSED) return;
+  if (take_answers(receiver)) return;
   receiver.connected = false;  // the machine may get another address, and the socket with it
   receiver.retry_ns = now_ns + kRetry_ns;
 }
@@ -131,7 +163,7 @@ void UdpReceivers::send_to(Receiver& receiver, std::span<mmsghdr> datagrams, std
     outcome.sent += taken;
     datagrams = datagrams.subspan(taken);
     if (taken == count) continue;
-    fail_first(receiver, datagrams.front(), result < 0 ? errno : 0, now_ns, outcome);
+    retry_first(receiver, datagrams.front(), result < 0 ? errno : 0, now_ns, outcome);
     datagrams = datagrams.subspan(1);
   }
 }
@@ -142,6 +174,10 @@ SendOutcome UdpReceivers::send(Datagrams& datagrams, std::int64_t now_ns) {
   for (Receiver& receiver : receivers_) {
     SendOutcome outcome;
     send_to(receiver, messages, now_ns, outcome);
+    const std::uint64_t refused = std::min(receiver.refused, outcome.sent);
+    receiver.refused -= refused;
+    outcome.sent -= refused;
+    outcome.failed += refused;
     if (outcome.dropped + outcome.failed > 0) {
       receiver.failing = true;
       receiver.good_ns = kNoTime_ns;

@@ -53,7 +53,7 @@ class UdpReceivers {
   [[nodiscard]] SendOutcome send(Datagrams& datagrams, std::int64_t now_ns);
 
   // Returns what has changed since the last call. A receiver counts as failing from its first
-  // failure until all datagrams have reached it for two seconds.
+  // failure until all datagrams have reached it for five seconds.
   [[nodiscard]] std::vector<News> drain_news(std::int64_t now_ns);
 
   [[nodiscard]] std::size_t size() const noexcept { return receivers_.size(); }
@@ -64,8 +64,9 @@ class UdpReceivers {
     drivers::Address address;
     int fd = -1;
     bool connected = false;
-    std::int64_t retry_ns = kNoTime_ns;      // when to connect again
-    int error = 0;                           // the last one
+    std::int64_t retry_ns = kNoTime_ns;  // when to connect again
+    int error = 0;                       // the last one
+    std::uint64_t refused = 0;  // datagrams that were counted as sent; later ones fail for them
     bool failing = false, reported = false;  // reported: that it is
     std::int64_t good_ns = kNoTime_ns;       // when it took a datagram again; kNoTime_ns: not since
   };
@@ -75,9 +76,12 @@ class UdpReceivers {
   // Counts what became of the datagrams.
   static void send_to(Receiver& receiver, std::span<mmsghdr> datagrams, std::int64_t now_ns,
                       SendOutcome& outcome) noexcept;
-  // Counts one that the system did not take. `error` is why, or 0 where the system does not say it.
-  static void fail_first(Receiver& receiver, const mmsghdr& datagram, int error,
-                         std::int64_t now_ns, SendOutcome& outcome) noexcept;
+  // Takes what the network has answered to earlier datagrams; returns whether there was something.
+  static bool take_answers(Receiver& receiver) noexcept;
+  // Tries one alone that the system did not take, and counts it. `error` is why, or 0 where the
+  // system does not say it.
+  static void retry_first(Receiver& receiver, const mmsghdr& datagram, int error,
+                          std::int64_t now_ns, SendOutcome& outcome) noexcept;
 
   std::vector<Receiver> receivers_;
 };

@@ -1,7 +1,11 @@
 // The outputs that only send, as the programs of the protocols do: from frames to datagrams on real
 // sockets, on a virtual clock, to posed's own decoders.
 
+#include <chrono>
+#include <cstdlib>
+#include <filesystem>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include <catch2/catch.hpp>
@@ -349,6 +353,51 @@ TEST_CASE("of datagrams that go out together each is counted and in its place") 
   CHECK(news[0].text.starts_with("sending to " + receiver.endpoint() + " fails: so many people"));
   static_cast<void>(pass(3, 3 * kNanosPerSecond));
   CHECK(receiver.received(40 * turns + 41).size() == 40);
+}
+
+TEST_CASE("what the network loses on this side, and for want of a machine, counts as lost") {
+  if (std::system("unshare --user --map-root-user --net tc qdisc add dev lo root tbf rate 1mbit "
+                  "burst 2kb limit 8kb 2>/dev/null") != 0) {
+    WARN("SKIPPED: no network namespaces with slow interfaces here");
+    return;
+  }
+  const std::string self = std::filesystem::read_symlink("/proc/self/exe").string();
+  CHECK(std::system(("unshare --user --map-root-user --net '" + self +
+                     "' 'on a slow network: what is lost is counted' >&2")
+                        .c_str()) == 0);
+}
+
+TEST_CASE("on a slow network: what is lost is counted", "[.]") {
+  REQUIRE(std::system("ip link set lo up && tc qdisc add dev lo root tbf rate 1mbit burst 2kb "
+                      "limit 8kb && ip link add a0 type veth peer name b0 && "
+                      "ip address add 10.9.8.1/24 dev a0 && ip link set a0 up && "
+                      "ip link set b0 up && ip ntable change name arp_cache dev a0 retrans 10") ==
+          0);
+  const auto pass = [](UdpReceivers& receivers) {
+    Datagrams datagrams;
+    for (int i = 0; i < 40; ++i) datagrams.add(std::vector<std::byte>(1000, std::byte{}));
+    return receivers.send(datagrams, 0);
+  };
+  UdpReceiver receiver;
+  auto near = UdpReceivers::open({receiver.endpoint()}).value();
+  const SendOutcome slow = pass(near);
+  CHECK(slow.sent + slow.dropped == 40);
+  CHECK(slow.dropped > 0);
+  CHECK(receiver.received(slow.sent).size() == slow.sent);
+  REQUIRE(near.drain_news(0).size() == 1);
+
+  auto far = UdpReceivers::open({"10.9.8.77:9763"}).value();  // no machine has this address
+  std::uint64_t failed = 0;
+  for (int i = 0; i < 500 && failed < 40; ++i) {
+    const SendOutcome outcome = pass(far);
+    CHECK(outcome.sent + outcome.failed == 40);
+    failed += outcome.failed;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  CHECK(failed >= 40);
+  const auto news = far.drain_news(0);
+  REQUIRE(news.size() == 1);
+  CHECK(news[0].text == "sending to 10.9.8.77:9763 fails: No route to host");
 }
 
 TEST_CASE("a stream without a person is named, and the others are sent") {

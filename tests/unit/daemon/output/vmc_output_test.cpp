@@ -268,7 +268,7 @@ TEST_CASE("a dead receiver is counted and told once, and the other one hears eve
             " fails: nobody listens there; start the receiver, or correct its port");
 
   UdpReceiver again(endpoint);  // it starts
-  for (int i = 0; i < 180; ++i) {
+  for (int i = 0; i < 360; ++i) {
     rig.pass(frame_of(5, walk.frame(i % 60)), kNanosPerSecond + i * kSixtieth_ns);
   }
   // Also the datagram at which the last refusal was reported has come.
