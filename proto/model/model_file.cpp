@@ -21,6 +21,18 @@ constexpr std::size_t kHeaderBytes = 24;
 // 5,000: four for each of 1,000 labels, eight for each of 81 trees, the joints.
 constexpr std::size_t kMaxFields = 20'000;
 
+// Of a file: packed integers take one byte or more there, and four and more in memory. The trees of
+// the largest models have 1.3 million.
+constexpr std::size_t kMaxIntegerBytes = 4'000'000;
+
+struct Counted {
+  std::size_t fields = 0, integer_bytes = 0;
+
+  [[nodiscard]] bool too_many() const {
+    return fields > kMaxFields || integer_bytes > kMaxIntegerBytes;
+  }
+};
+
 template <typename T>
 void put(std::string& out, T value) {
   for (std::size_t i = 0; i < sizeof(T); ++i) {
@@ -42,17 +54,21 @@ std::uint32_t crc_of(const void* data, std::size_t size) {
       crc32_z(crc32_z(0, nullptr, 0), static_cast<const Bytef*>(data), size));
 }
 
-// Adds the fields of a message, and of those inside it, to `fields`, and stops above kMaxFields;
-// false where the bytes are no message. protobuf makes an object of 16 to 200 bytes of a field that
-// takes two in the file, so they are counted before it sees them.
-bool count_fields(std::span<const std::byte> bytes, const google::protobuf::Descriptor& type,
-                  std::size_t& fields) {
+// Adds what a message and those inside it have, and stops where it is too much; false where the
+// bytes are no message. protobuf makes an object of 16 to 200 bytes of a field that takes two in
+// the file, so they are counted before it sees them.
+bool count(std::span<const std::byte> bytes, const google::protobuf::Descriptor& type,
+           Counted& counted) {
+  using google::protobuf::FieldDescriptor;
   message::WireReader reader(bytes);
-  for (message::WireField field; fields <= kMaxFields && reader.next(field); ++fields) {
+  for (message::WireField field; !counted.too_many() && reader.next(field); ++counted.fields) {
     const auto* const known = type.FindFieldByNumber(static_cast<int>(field.number));
-    const bool is_message = known != nullptr && known->message_type() != nullptr &&
-                            field.type == message::WireType::kBytes;
-    if (is_message && !count_fields(field.bytes, *known->message_type(), fields)) return false;
+    if (known == nullptr || field.type != message::WireType::kBytes) continue;
+    const bool reals = known->cpp_type() == FieldDescriptor::CPPTYPE_DOUBLE ||
+                       known->cpp_type() == FieldDescriptor::CPPTYPE_FLOAT;
+    if (known->is_packable() && !reals) counted.integer_bytes += field.bytes.size();
+    if (known->message_type() == nullptr) continue;
+    if (!count(field.bytes, *known->message_type(), counted)) return false;
   }
   return reader.ok();
 }
@@ -80,11 +96,12 @@ Result<v1::ModelFile> open(std::span<const std::byte> bytes, const std::string& 
   if (get<std::uint32_t>(bytes.subspan(20)) != crc_of(payload.data(), payload.size())) {
     return fail("the model's checksum does not fit its bytes; copy it again", name);
   }
-  std::size_t fields = 0;
-  const bool is_message = count_fields(payload, *v1::ModelFile::descriptor(), fields);
-  if (fields > kMaxFields) {
-    return fail("the model has more than " + std::to_string(kMaxFields) +
-                    " fields, which no model of `posed train` has; train it again",
+  Counted counted;
+  const bool is_message = count(payload, *v1::ModelFile::descriptor(), counted);
+  if (counted.too_many()) {
+    return fail("the model has more than " + std::to_string(kMaxFields) + " fields, or " +
+                    std::to_string(kMaxIntegerBytes) +
+                    " bytes of integers, which no model of `posed train` has; train it again",
                 name);
   }
   v1::ModelFile file;

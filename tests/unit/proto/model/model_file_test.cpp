@@ -30,14 +30,16 @@ std::string repeated(const std::string& one, int count) {
   return all;
 }
 
-constexpr int kStyle = 2, kGesture = 3;  // of ModelFile
-constexpr int kLabel = 2, kTree = 3;     // of GestureModel
-constexpr int kFarTooMany = 1'000'000;   // 2 MB of a file, 100 MB and more in protobuf
-constexpr const char* kRefusal = "fields, which no model of `posed train` has; train it again";
+constexpr int kStyle = 2, kGesture = 3;    // of ModelFile
+constexpr int kLabel = 2, kTree = 3;       // of GestureModel
+constexpr int kFarTooMany = 1'000'000;     // 2 MB of a file, 100 MB and more in protobuf
+constexpr int kManyIntegers = 16'000'000;  // 16 MB of a file, 190 MB in protobuf and what reads it
+constexpr const char* kRefusal =
+    "fields, or 4000000 bytes of integers, which no model of `posed train` has; train it again";
 
 }  // namespace
 
-TEST_CASE("A model file of endless small messages or texts is refused", "[model_file]") {
+TEST_CASE("A model file of endless small messages, texts or integers is refused", "[model_file]") {
   for (const std::string& payload : {
            field(kGesture, repeated(field(kTree, ""), kFarTooMany)),
            field(kGesture, repeated(field(kLabel, field(1, "g")), kFarTooMany)),
@@ -45,6 +47,8 @@ TEST_CASE("A model file of endless small messages or texts is refused", "[model_
            field(kStyle, field(1, repeated(field(2, ""), kFarTooMany))),  // PoseSpace.joint
            repeated(field(kStyle, ""), kFarTooMany),                      // one merged message
            repeated(std::string{15 << 3, 0}, kFarTooMany),                // an unknown number
+           field(kGesture, field(10, std::string(kManyIntegers, '\0'))),  // named
+           field(kGesture, field(kTree, field(1, std::string(kManyIntegers, '\1')))),  // question
            field(kStyle,
                  field(1, field(15, repeated("x", 9)) + repeated(field(15, ""), kFarTooMany))),
        }) {
