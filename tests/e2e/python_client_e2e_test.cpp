@@ -123,4 +123,90 @@ with posed.Control(sys.argv[1]) as control:
   CHECK(marked[1].at("ended") == true);
 }
 
+TEST_CASE("the Python and the C++ client pass over what no daemon sends") {
+  const TempFolder folder;
+  const auto script = folder.write("hostile.py", R"(
+import itertools
+import subprocess
+import sys
+import threading
+import time
+import zmq
+import posed
+from posed.v1 import control_pb2, posed_pb2
+
+skeleton = dict(stream="walker", id=7, joint_name=["hips"], parent=[-1], offset_m=[0, 0, 0],
+                humanoid_bone=["hips"], T_world_joint_xyzw=[0, 0, 0, 1])
+frame = dict(stream="walker", skeleton_id=7, root_position_m=[1, 2, 3], rotation_xyzw=[0, 0, 0, 1],
+             validity=b"\x01")
+def messages(topic, kind, sound, *changes):
+    return [[topic, kind(**{**sound, **change}).SerializeToString()] for change in changes]
+skeletons = messages(b"skeleton/walker", posed_pb2.Skeleton, skeleton, {"parent": [0]},
+                     {"parent": [-1, 0]}, {"offset_m": []}, {"joint_name": ["hips"] * 9},
+                     {"root_joint": 1}, {"parent": [-7]}, {})
+frames = messages(b"pose/walker", posed_pb2.Frame, frame, {"rotation_xyzw": [0, 0, 1]},
+                  {"root_position_m": []}, {"skeleton_id": 8}, {})
+junk = [[b"pose/walker"], [b"skeleton/walker", b"\xff"], [b"pose/walker", b"\xff", b"3"],
+        [b"statsx", b""], [b"stats", b"\xff"], [b"pose/walker\xff", b""]]
+
+context = zmq.Context()
+publisher = context.socket(zmq.PUB)
+endpoint = f"tcp://127.0.0.1:{publisher.bind_to_random_port('tcp://127.0.0.1')}"
+talks = skeletons + frames + junk
+over = False
+def publish():
+    while not over:
+        for message in talks:
+            publisher.send_multipart(message)
+        time.sleep(0.01)
+thread = threading.Thread(target=publish)
+thread.start()
+try:
+    with posed.Client(endpoint, ["walker"]) as client:
+        for frame in itertools.islice(client.frames(10), 3):
+            print("python", frame.positions_m())
+        print(subprocess.run([sys.argv[1], endpoint, "walker", "3"], capture_output=True, text=True))
+        talks = skeletons[:-1] + frames[:-1] + junk
+        try:
+            for _ in client.frames(1):
+                pass
+        except posed.PosedError as error:
+            print(error)
+        talks = [[b"pose/walker", bytes(2 << 20)]]
+        time.sleep(0.5)
+        talks = skeletons + frames
+        for frame in itertools.islice(client.frames(20), 1):
+            print("back", frame.positions_m())
+finally:
+    over = True
+    thread.join()
+
+router = context.socket(zmq.ROUTER)
+port = router.bind_to_random_port("tcp://127.0.0.1")
+sound = control_pb2.ControlReply(ok=True).SerializeToString()
+def answer():
+    for parts in ([b"\xff"], [sound, sound], [sound]):
+        router.send_multipart([*router.recv_multipart()[:2], *parts])
+threading.Thread(target=answer).start()
+with posed.Control(f"tcp://127.0.0.1:{port}") as control:
+    for _ in range(3):
+        try:
+            print("answered", control.end_take().ok)
+        except posed.PosedError as error:
+            print(error)
+)");
+  const std::string said =
+      run_python(script, (posed_binary().parent_path() / "posed_client_watch").string());
+  INFO(said);
+  const std::string python = "python {'hips': (1.0, 2.0, 3.0)}\n";
+  CHECK(has(said, python + python + python));
+  CHECK(has(said, "returncode=0"));
+  CHECK(has(said, " came for 1 s"));
+  CHECK(has(said, "back {'hips'"));
+  CHECK(has(said,
+            "daemon\n"
+            "tcp"));
+  CHECK(has(said, "daemon\nanswered True\n"));
+}
+
 }  // namespace posed::test

@@ -12,6 +12,7 @@
 
 #include <zmq.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cstdint>
@@ -93,27 +94,12 @@ inline World world_of(const Pose& pose) {
 class Subscriber {
  public:
   // Connects, now or as soon as the daemon is there.
-  Subscriber(const std::string& endpoint, std::string stream, const Keys& keys = {})
-      : stream_(std::move(stream)), context_(zmq_ctx_new(), zmq_ctx_term) {
-    socket_ = {zmq_socket(context_.get(), ZMQ_SUB), zmq_close};
-    if (!socket_) throw std::runtime_error("no ZeroMQ socket: raise the limit of open files");
-    set(ZMQ_RCVHWM, 16);  // newest data wins: keep no old poses
-    set(ZMQ_LINGER, 0);
-    // A daemon that loses its power or its network says nothing: TCP finds that out in five
-    // seconds.
-    set(ZMQ_TCP_KEEPALIVE, 1);
-    set(ZMQ_TCP_KEEPALIVE_IDLE, 2);
-    set(ZMQ_TCP_KEEPALIVE_INTVL, 1);
-    set(ZMQ_TCP_KEEPALIVE_CNT, 3);
-    if (!keys.own_secret_file.empty()) use(keys);
-    for (const char* topic : {"pose/", "skeleton/"}) {
-      const std::string whole = topic + stream_;
-      zmq_setsockopt(socket_.get(), ZMQ_SUBSCRIBE, whole.data(), whole.size());
-    }
-    if (zmq_connect(socket_.get(), endpoint.c_str()) != 0) {
-      throw std::runtime_error(endpoint + ": " + zmq_strerror(zmq_errno()) +
-                               "; an endpoint looks like tcp://127.0.0.1:5570");
-    }
+  Subscriber(std::string endpoint, std::string stream, Keys keys = {})
+      : endpoint_(std::move(endpoint)),
+        stream_(std::move(stream)),
+        keys_(std::move(keys)),
+        context_(zmq_ctx_new(), zmq_ctx_term) {
+    connect();
   }
 
   // The next pose; nullopt when none comes within that time.
@@ -124,7 +110,13 @@ class Subscriber {
           end - std::chrono::steady_clock::now());
       zmq_pollitem_t item{socket_.get(), 0, ZMQ_POLLIN, 0};
       if (left.count() < 0) return {};
-      if (zmq_poll(&item, 1, static_cast<long>(left.count())) <= 0) continue;  // a signal, or time
+      const auto wait = std::min(left, kSilence);
+      if (zmq_poll(&item, 1, static_cast<long>(wait.count())) <= 0) {  // a signal, or time
+        silent_ += wait;
+        // libzmq gives up when somebody else had the daemon's port meanwhile.
+        if (silent_ >= kSilence) connect();
+        continue;
+      }
       bool more = false;
       const std::string topic = part(more);
       const std::string body = more ? part(more) : std::string();
@@ -132,7 +124,9 @@ class Subscriber {
       // A subscription is a prefix: "walker" also brings "walker-raw".
       if (topic == "skeleton/" + stream_) {
         auto skeleton = std::make_shared<posed::v1::Skeleton>();
-        if (skeleton->ParseFromString(body) && is_whole(*skeleton)) skeleton_ = skeleton;
+        if (!skeleton->ParseFromString(body) || !is_whole(*skeleton)) continue;
+        skeleton_ = skeleton;
+        silent_ = {};
       } else if (topic == "pose/" + stream_ && skeleton_ != nullptr) {
         Pose pose{{}, skeleton_};
         if (pose.frame.ParseFromString(body) && fits(pose)) return pose;
@@ -141,9 +135,40 @@ class Subscriber {
   }
 
  private:
+  // Skeletons come every second, whatever the stream does.
+  static constexpr std::chrono::milliseconds kSilence{5000};
+  static constexpr std::int64_t kLongestPart = 1 << 20;  // bytes; nothing of a daemon is longer
+
+  void connect() {
+    silent_ = {};
+    socket_ = {zmq_socket(context_.get(), ZMQ_SUB), zmq_close};
+    if (!socket_) throw std::runtime_error("no ZeroMQ socket: raise the limit of open files");
+    zmq_setsockopt(socket_.get(), ZMQ_MAXMSGSIZE, &kLongestPart, sizeof kLongestPart);
+    set(ZMQ_RCVHWM, 16);  // newest data wins: keep no old poses
+    set(ZMQ_LINGER, 0);
+    // A daemon that loses its power or its network says nothing: TCP finds that out in five
+    // seconds.
+    set(ZMQ_TCP_KEEPALIVE, 1);
+    set(ZMQ_TCP_KEEPALIVE_IDLE, 2);
+    set(ZMQ_TCP_KEEPALIVE_INTVL, 1);
+    set(ZMQ_TCP_KEEPALIVE_CNT, 3);
+    if (!keys_.own_secret_file.empty()) use(keys_);
+    for (const char* topic : {"pose/", "skeleton/"}) {
+      const std::string whole = topic + stream_;
+      zmq_setsockopt(socket_.get(), ZMQ_SUBSCRIBE, whole.data(), whole.size());
+    }
+    if (zmq_connect(socket_.get(), endpoint_.c_str()) != 0) {
+      throw std::runtime_error(endpoint_ + ": " + zmq_strerror(zmq_errno()) +
+                               "; an endpoint looks like tcp://127.0.0.1:5570");
+    }
+  }
+
   static bool is_whole(const posed::v1::Skeleton& skeleton) {
     const int joints = skeleton.parent_size();
-    if (joints == 0 || skeleton.offset_m_size() != 3 * joints) return false;
+    if (joints == 0 || skeleton.offset_m_size() != 3 * joints ||
+        skeleton.joint_name_size() != joints) {
+      return false;
+    }
     for (int j = 0; j < joints; ++j) {
       if (skeleton.parent(j) < -1 || skeleton.parent(j) >= j) return false;
     }
@@ -190,7 +215,9 @@ class Subscriber {
     return bytes;
   }
 
-  std::string stream_;
+  std::string endpoint_, stream_;
+  Keys keys_;
+  std::chrono::milliseconds silent_{};  // for so long was waited in vain
   std::unique_ptr<void, int (*)(void*)> context_;
   std::unique_ptr<void, int (*)(void*)> socket_{nullptr, zmq_close};
   std::shared_ptr<const posed::v1::Skeleton> skeleton_;

@@ -2,6 +2,7 @@
 import time
 
 import zmq
+from google.protobuf.message import DecodeError
 
 from .connection import PosedError, open_socket
 from .skeleton import Skeleton
@@ -15,6 +16,8 @@ _MESSAGES = {
     "event": posed_pb2.Event,
     "stats": posed_pb2.Stats,
 }
+_MOST_STREAMS = 2048  # that are kept; as many come through one connection of posed
+_SILENCE_S = 5.0  # stats come every second, whatever the streams do
 
 
 class Frame:
@@ -60,13 +63,12 @@ class Client:
     def __init__(self, endpoint=DEFAULT_ENDPOINT, streams=None, *, topics=(), key=None,
                  server_key=None, queue=16):
         self._context = zmq.Context()
-        self._socket = open_socket(self._context, zmq.SUB, endpoint, key, server_key)
-        self._socket.setsockopt(zmq.RCVHWM, queue)
+        self._address = (endpoint, key, server_key)
+        self._queue = queue
         self._names = set(streams or ())
-        for name in streams or [""]:
-            for topic in ("pose", "skeleton", *topics):
-                self._socket.subscribe(f"{topic}/{name}")
-        self._socket.subscribe("stats")
+        self._topics = [f"{topic}/{name}" for name in streams or [""]
+                        for topic in ("pose", "skeleton", *topics)] + ["stats"]
+        self._connect()
         self.skeletons = {}  # Skeleton by stream
         self.stats = None  # the last posed.v1.Stats
         self._to_utc_ns = {}
@@ -81,31 +83,61 @@ class Client:
         self._socket.close()
         self._context.term()
 
+    def _connect(self):
+        self._socket = open_socket(self._context, zmq.SUB, *self._address)
+        self._socket.setsockopt(zmq.RCVHWM, self._queue)
+        for topic in self._topics:
+            self._socket.subscribe(topic)
+        self._silent_s = 0.0  # for so long was waited in vain
+
     def messages(self, timeout_s=None):
         """Everything as (topic, message): ("pose/walker", posed_pb2.Frame) and so on.
 
         Raises PosedError when nothing comes for `timeout_s`.
         """
+        last_s = time.monotonic()
         while True:
-            wait_ms = None if timeout_s is None else int(timeout_s * 1000)
-            if self._socket.poll(wait_ms) == 0:
+            now_s = time.monotonic()
+            if timeout_s is not None and now_s - last_s >= timeout_s:
                 raise PosedError(f"nothing came for {timeout_s} s; is the daemon running, and is the "
                                  "stream's name right?")
-            topic, body = self._socket.recv_multipart()
+            wait_s = _SILENCE_S if timeout_s is None else min(_SILENCE_S, last_s + timeout_s - now_s)
+            read = None
+            if self._socket.poll(int(wait_s * 1000) + 1) > 0:
+                read = self._read(self._socket.recv_multipart())
+            elif self._silent_s + wait_s < _SILENCE_S:
+                self._silent_s += wait_s
+            else:
+                # libzmq gives up when somebody else had the daemon's port meanwhile.
+                self._socket.close()
+                self._connect()
+            if read is not None:
+                self._silent_s = 0.0
+                yield read
+                last_s = time.monotonic()
+
+    def _read(self, parts):
+        """The topic and the message; None for what is unwanted, or makes no sense."""
+        try:
+            topic, body = parts
             topic = topic.decode()
             kind, _, stream = topic.partition("/")
             # A subscription is a prefix: "walker" also brings "walker-raw".
             if stream and self._names and stream not in self._names:
-                continue
+                return None
             message = _MESSAGES[kind].FromString(body)
             if kind == "skeleton":
                 self.skeletons[stream] = Skeleton(message)
-            elif kind == "stats":
-                self.stats = message
-                # A relay tells the clock of each stream's machine.
-                self._to_utc_ns = {one.stream: one.monotonic_to_utc_ns for one in message.stream
-                                   if one.HasField("monotonic_to_utc_ns")}
-            yield topic, message
+        except (ValueError, KeyError, DecodeError):
+            return None
+        if len(self.skeletons) > _MOST_STREAMS:
+            del self.skeletons[next(iter(self.skeletons))]
+        if kind == "stats":
+            self.stats = message
+            # A relay tells the clock of each stream's machine.
+            self._to_utc_ns = {one.stream: one.monotonic_to_utc_ns for one in message.stream
+                               if one.HasField("monotonic_to_utc_ns")}
+        return topic, message
 
     def frames(self, timeout_s=None):
         """The poses, as Frames; without those that came before their skeleton.
@@ -114,11 +146,10 @@ class Client:
         """
         last_s = time.monotonic()
         for topic, message in self.messages(timeout_s):
-            if topic.startswith("pose/"):
+            skeleton = self.skeletons.get(message.stream) if topic.startswith("pose/") else None
+            if skeleton is not None and skeleton.fits(message):
+                yield Frame(message, skeleton, self._age_s(message))
                 last_s = time.monotonic()
-                skeleton = self.skeletons.get(message.stream)
-                if skeleton is not None and skeleton.id == message.skeleton_id:
-                    yield Frame(message, skeleton, self._age_s(message))
             elif timeout_s is not None and time.monotonic() - last_s > timeout_s:
                 # stats come every second, whatever the streams do
                 raise PosedError(f"no pose came for {timeout_s} s; is the stream's name right?")

@@ -3,6 +3,7 @@ import hashlib
 import pathlib
 
 import zmq
+from google.protobuf.message import DecodeError
 
 from .connection import PosedError, open_socket
 from .v1 import control_pb2
@@ -114,7 +115,12 @@ class Control:
             self._hang_up()  # a late answer must not count for the next question
             raise PosedError(f"no answer from {self._endpoint} within {self._timeout_s} s; is the "
                              "daemon running, and may your key control it?")
-        reply = control_pb2.ControlReply.FromString(self._socket.recv())
+        try:
+            (body,) = self._socket.recv_multipart()
+            reply = control_pb2.ControlReply.FromString(body)
+        except (ValueError, DecodeError):
+            self._hang_up()
+            raise PosedError(f"{self._endpoint} does not answer like a posed daemon") from None
         if not reply.ok:
             raise PosedError(reply.error)
         return reply

@@ -9,9 +9,18 @@ def _vectors(values, size):
 
 
 class Skeleton:
-    """Joints in an order in which a parent precedes its children. Right-handed, Y up, metres."""
+    """Joints in an order in which a parent precedes its children. Right-handed, Y up, metres.
+
+    Raises ValueError when the lists of the message do not fit each other.
+    """
 
     def __init__(self, message):
+        joints = len(message.parent)
+        sizes = (len(message.joint_name), len(message.humanoid_bone), len(message.offset_m) / 3,
+                 len(message.T_world_joint_xyzw) / 4, len(message.end_site_m) / 3 or joints)
+        if message.root_joint >= joints or any(size != joints for size in sizes) or any(
+                not -1 <= parent < joint for joint, parent in enumerate(message.parent)):
+            raise ValueError("a skeleton whose lists do not fit each other")
         self.message = message  # posed.v1.Skeleton
         self.id = message.id
         self.names = list(message.joint_name)
@@ -25,6 +34,12 @@ class Skeleton:
         self.root = message.root_joint
         # Each joint's rotation in the world while the figure stands in the T-pose.
         self._T = _vectors(message.T_world_joint_xyzw, 4)
+
+    def fits(self, message):
+        """Whether a posed.v1.Frame is a pose of this skeleton."""
+        return (message.skeleton_id == self.id and len(message.root_position_m) == 3
+                and len(message.rotation_xyzw) == 4 * len(self.names)
+                and len(message.validity) == len(self.names))
 
     def world(self, rotations, root_m):
         """World rotations and positions [m] of all joints.
