@@ -109,18 +109,19 @@ bool UdpReceivers::is_connected(Receiver& receiver, std::int64_t now_ns) noexcep
 
 bool UdpReceivers::take_answers(Receiver& receiver) noexcept {
   bool any = false;
-  while (true) {
+  for (std::size_t i = 0; i < kMaxMessages; ++i) {  // who forges answers without end is left alone
     alignas(cmsghdr) std::array<std::byte, 256> about{};
     msghdr message{};
     message.msg_control = about.data();
     message.msg_controllen = about.size();
-    if (::recvmsg(receiver.fd, &message, MSG_ERRQUEUE | MSG_DONTWAIT) < 0) return any;
+    if (::recvmsg(receiver.fd, &message, MSG_ERRQUEUE | MSG_DONTWAIT) < 0) break;
     const int answer = answer_in(message);
     if (answer == 0) continue;
     any = true;
     receiver.error = answer;
     ++receiver.refused;
   }
+  return any;
 }
 
 void UdpReceivers::retry_first(Receiver& receiver, const mmsghdr& datagram, int error,
