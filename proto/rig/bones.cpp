@@ -51,6 +51,16 @@ std::optional<BoneJoints> find_hand(const Figure& figure, const std::vector<Join
 // an end site behind the first one is a head if it is as near, else the end of one.
 constexpr double kNeck = 0.4;
 
+// Whether the joint is one more of those that its maker counts, as "spine.006" is, and no farther
+// away than they are from each other: the end of a head is.
+bool goes_on(const Figure& figure, const std::vector<JointName>& names, int joint) {
+  constexpr double kFar = 1.3;
+  const int before = figure[joint].parent;
+  return !names[joint].stem.empty() && names[joint].stem == names[before].stem &&
+         names[joint].digits != names[before].digits &&
+         figure[joint].offset.norm() <= kFar * figure[before].offset.norm();
+}
+
 // Whether the joint has a mirror image beside it, as ears, wings and strands of a cape have.
 bool has_twin(const Figure& figure, int joint) {
   const double length = figure[joint].offset.norm();
@@ -95,16 +105,19 @@ std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>&
       break;
     }
     way += step;
-    const bool tip = figure.children(j).empty() && figure.end_length(j) <= 0.0 &&
-                     (chain.size() != 1 || step.norm() > kNeck * way.norm());
+    const bool ends = figure.children(j).empty() && figure.end_length(j) <= 0.0;
+    const bool is_head = chain.size() == 1 ? step.norm() <= kNeck * way.norm()
+                                           : chain.size() > 1 && goes_on(figure, names, j);
+    const bool tip = ends && !is_head;
     if (!tip && !names[j].has("end") && !names[j].has("nub")) chain.push_back(j);
     const auto is_twin = [&figure](int child) { return has_twin(figure, child); };
     // Ears and eyes are on the head.
     if (chain.size() > 1 && std::ranges::any_of(figure.children(j), is_twin)) break;
   }
   // The top of a head is nearer to its end than to the head.
-  if (chain.size() > 2 && figure.children(chain.back()).empty() &&
-      figure[chain.back()].offset.norm() > 1.3 * figure.end_length(chain.back())) {
+  const double end = chain.empty() ? 0.0 : figure.end_length(chain.back());
+  if (chain.size() > 2 && figure.children(chain.back()).empty() && end > 0.0 &&
+      figure[chain.back()].offset.norm() > 1.3 * end) {
     chain.pop_back();
   }
   // A face and a nose are on the head.

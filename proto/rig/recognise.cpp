@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "proto/text/lower.hpp"
+
 namespace posed::rig {
 namespace {
 
@@ -40,7 +42,9 @@ double usual_unit_m(const std::vector<RigJoint>& joints, const std::vector<Joint
                       std::ranges::any_of(joints, [](const RigJoint& joint) {
                         return joint.name.contains("センター");
                       });
-  return is_mmd ? kMmd_m : any_name("hipjoint") ? kCmu_m : 0.0;
+  const bool is_cmu = std::ranges::any_of(
+      joints, [](const RigJoint& joint) { return lower(joint.name).contains("hipjoint"); });
+  return is_mmd ? kMmd_m : is_cmu ? kCmu_m : 0.0;
 }
 
 const LengthUnit& unit_for(double length, double true_m, double usual_m) {

@@ -23,7 +23,7 @@ constexpr double kUpright_deg = 50;
 struct Score {
   UpAxis up{};
   double stand = 0.0;  // share of the poses in which the trunk is upright
-  double above = 0.0;  // in which the hips are well above the lower foot
+  double above = 0.0;  // in which the hips are above the lower foot, as far as of who sits
   double mean = 0.0;   // of the trunk's part along the axis
 };
 
@@ -255,7 +255,7 @@ std::optional<UpAxis> Frames::up_by_root() const {
 void Frames::find_up() {
   const int hips = joint_[Bone::kHips];
   const Vec pelvis = t_frame(Bone::kHips)->transpose() * kY;
-  const double half_leg = 0.5 * leg_length();
+  const double seat = 0.4 * leg_length();  // on a chair hips are a shin above the feet
   std::vector<Score> scores;
   for (const UpAxis axis : kUpAxes) {
     const Vec up = up_turn(axis).transpose() * kY;
@@ -266,7 +266,7 @@ void Frames::find_up() {
                       .above = motion_.mean([&](int i) {
                         const double low =
                             std::min(height(i, foot(Side::kLeft)), height(i, foot(Side::kRight)));
-                        return height(i, hips) - low > half_leg ? 1.0 : 0.0;
+                        return height(i, hips) - low > seat ? 1.0 : 0.0;
                       }),
                       .mean = motion_.mean(lean)});
   }
@@ -280,15 +280,17 @@ void Frames::find_up() {
   const auto by_root = up_by_root();
   const bool root_says = !upright_ && !is_profile && by_root;
   const UpAxis root_up = root_says ? by_root.value_or(UpAxis::kPlusY) : UpAxis::kPlusY;
-  const auto expected = [&](const Vec& up) {
-    if (is_profile) return false;
-    if (zero != nullptr) return up == kZ;
-    const double often = motion_.mean(
-        [&](int i) { return is_above_floor(motion_.position(i, hips), up) ? 1.0 : 0.0; });
-    return often > 0.9 && (!root_says || up_turn(root_up).transpose() * kY == up);
-  };
   const Vec best_up = up_turn(best.up).transpose() * kY;
-  const bool stands = best.stand > 0.9 && best.above > 0.9 && (expected(best_up) || walks(best_up));
+  const bool stays_above = motion_.mean([&](int i) {
+    return is_above_floor(motion_.position(i, hips), best_up) ? 1.0 : 0.0;
+  }) > 0.9;
+  // What the root says of a zero pose without a frame of its own gives way to the usual axis only.
+  const auto expected = [&] {
+    if (is_profile) return false;
+    if (zero != nullptr) return best_up == kZ;
+    return stays_above && (!root_says || best.up == root_up || best.up == UpAxis::kPlusY);
+  };
+  const bool stands = best.stand > 0.9 && best.above > 0.9 && (expected() || walks(best_up));
   const double y_mean = scores.front().mean;
   if (zero != nullptr && zero->mean > 0.3) {
     up_ = zero->up;

@@ -318,6 +318,24 @@ TEST_CASE("rig: a joint called the head of a neck is the head, though two necks 
   CHECK(found.bone[head - 1] == Bone::kNeck);
 }
 
+// Rigify counts "spine" to "spine.006", and glTF has no end sites.
+TEST_CASE("rig: a head that is only counted is told from the end of one by how far away it is") {
+  for (const bool is_head : {true, false}) {
+    auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+    made.input.poses = {};
+    auto& joints = made.input.joints;
+    const int head = static_cast<int>(Bone::kHead);
+    for (int j = 0; j <= head; ++j) joints[j].name = "DEF-spine.00" + std::to_string(j);
+    joints[head].end_site = {};
+    add_joints(made, {{.name = "DEF-spine.006",
+                       .parent = head,
+                       .offset = (is_head ? 1.0 : 2.0) * joints[head].offset,
+                       .end_site = {}}});
+    const auto found = rig::recognise(made.input);
+    CHECK(found.bone[is_head ? test::kMakerJoints : head] == Bone::kHead);
+  }
+}
+
 // Many persons, in each maker's names and zero pose.
 TEST_CASE("rig: a person is recognised in every maker's names, zero pose, axes and unit") {
   constexpr std::array kUnits{1.0, 0.1, 0.01, 0.001, 0.0254, 0.3048};
@@ -1039,6 +1057,45 @@ TEST_CASE("rig: who lies in a clip does not stand along another axis") {
       CHECK(says("which axis points up is not sure") == (lies && root_m <= 0.0));
     }
   }
+}
+
+// A person in a folded zero pose, who sits through the clip; `root` is the hips' offset [m].
+test::Made sitting(UpAxis up, const Vec& root) {
+  const Mat axes = up_turn(up).transpose();
+  auto made = test::make(test::kSchemes[0], ZeroPose::kFolded, axes, 0.01);
+  auto& [count, rotation, position] = made.input.poses;
+  const auto joints = made.input.joints.size();
+  made.input.joints[0].offset = root / 0.01;
+  for (int i = 0; i < count; ++i) {
+    const auto turn = [&](std::size_t j, double deg) {
+      const Mat local = Eigen::AngleAxisd(deg * kDegree, rig::kX).toRotationMatrix();
+      const Mat& T_parent = made.T[made.input.joints[j].parent];
+      rotation[i * joints + j] = Eigen::Quaterniond(Mat(T_parent.transpose() * local * made.T[j]));
+    };
+    for (const Bone thigh : {Bone::kLeftUpperLeg, Bone::kRightUpperLeg}) {
+      turn(static_cast<std::size_t>(thigh), -90);
+      turn(static_cast<std::size_t>(thigh) + 1, 90);
+      turn(static_cast<std::size_t>(thigh) + 2, 0);
+    }
+    position[i * joints] = axes * Vec(0, 45, 0);
+  }
+  return made;
+}
+
+TEST_CASE("rig: who sits through a clip is upright, whatever a folded zero pose says of the root") {
+  check_made(sitting(UpAxis::kPlusY, Vec(0.95, 0, 0)), UpAxis::kPlusY, 0.01);
+  check_made(sitting(UpAxis::kPlusY, Vec::Zero()), UpAxis::kPlusY, 0.01);
+  check_made(sitting(UpAxis::kPlusZ, Vec::Zero()), UpAxis::kPlusZ, 0.01);
+}
+
+// By its length alone decimetres are likelier.
+TEST_CASE("rig: a joint called LHipJoint says CMU's unit of length, of a short person, too") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.0254 / 0.45, 0, 1,
+                         {.height = 0.85, .axes = {}});
+  made.input.joints.push_back(
+      {.name = "LHipJoint", .parent = 0, .offset = Vec::Zero(), .end_site = {}});
+  made.input.poses = {};
+  CHECK(rig::recognise(made.input).metres_per_unit == Approx(0.0254 / 0.45));
 }
 
 TEST_CASE("rig: any input ends in an answer") {
