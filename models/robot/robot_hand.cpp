@@ -10,6 +10,7 @@
 #include "models/robot/shapes.hpp"
 #include "models/robot/which_hand.hpp"
 #include "proto/text/clean.hpp"
+#include "proto/text/list.hpp"
 #include "proto/text/lower.hpp"
 #include "proto/text/named_numbers.hpp"
 
@@ -63,6 +64,7 @@ class Builder {
   // Its joints, fingers and side; no shapes.
   Result<RobotHand> build_bare() {
     TRY(list_joints());
+    remark_unlimited();
     TRY(list_fingers());
     TRY(hold_shared());
     TRY(hold_named());
@@ -155,6 +157,7 @@ class Builder {
     }
     TRY(choose_tips());
     TRY(refuse_gripper());
+    if (options_.tips.empty()) leave_out_rods();
     if (hand_.fingers.size() < 3 || hand_.fingers.size() > 5) return refuse(number_of_fingers());
     for (Finger& finger : hand_.fingers) {
       finger.base = base_of(finger);
@@ -164,10 +167,32 @@ class Builder {
       if (finger.base == 0) return refuse("one finger of the robot has no joint of its own");
     }
     if (options_.tips.empty()) TRY(order_fingers());
+    number_fingers();
+    return {};
+  }
+
+  void number_fingers() {
     for (std::size_t f = 0; f < hand_.fingers.size(); ++f) {
       hand_.fingers[f].human = static_cast<int>(f);
     }
-    return {};
+  }
+
+  // Of joints whose <limit> gives no angles.
+  void remark_unlimited() {
+    std::vector<std::string> stand, follow;
+    for (const RobotJoint& joint : hand_.joints) {
+      const Link& link = hand_.links[joint.link];
+      if (link.unlimited) (link.leader < 0 ? stand : follow).push_back(in_quotes(joint.name));
+    }
+    const std::string why = "the <limit> has neither lower nor upper of ";
+    if (!stand.empty()) {
+      hand_.remarks.push_back(why + joined(stand) +
+                              ", which a URDF means as 0 for both, so that it stands at 0: give "
+                              "the angles between which it turns");
+    }
+    if (!follow.empty()) {
+      hand_.remarks.push_back(why + joined(follow) + ", so that the joint it follows limits it");
+    }
   }
 
   // One joint that moves all chains, which follow it, leaves a thumb nothing to do of its own.
@@ -202,6 +227,61 @@ class Builder {
            ends +
            "; a hand has a thumb and two to four fingers: of a larger robot let `tips` name the "
            "last links of one hand, thumb first";
+  }
+
+  // How far the links from `from` on, and their shapes, are away from its joint.
+  [[nodiscard]] double extent_m(int from) const {
+    double farthest_m = 0.0;
+    for (int l = from; l < std::ssize(hand_.links); ++l) {
+      if (!is_above(from, l)) continue;
+      const Eigen::Vector3d at_m = placed_.at_m[l] - placed_.at_m[from];
+      farthest_m = std::max(farthest_m, at_m.norm());
+      for (const Shape& shape : hand_.links[l].shapes) {
+        const Hull hull = hull_of_shape(shape);
+        for (const auto& corner : hull.corners) {
+          farthest_m =
+              std::max(farthest_m, (at_m + placed_.turn[l] * corner).norm() + hull.radius_m);
+        }
+      }
+    }
+    return farthest_m;
+  }
+
+  // A rod of a linkage hangs by one joint beside the finger that it moves, turns about the same
+  // axis within the finger's width, and ends well before it. Fingers are side by side along their
+  // axes, and a thumb's joint is across the palm.
+  [[nodiscard]] bool is_rod_of(const Finger& rod, const Finger& finger) const {
+    constexpr double kOneAxis = 0.98, kFingerWidth_m = 0.01, kBesides_m = 0.03, kOfFinger = 0.6;
+    int hangs = hand_.links[rod.last].parent;
+    while (hangs > 0 && !hand_.links[hangs].turns) hangs = hand_.links[hangs].parent;
+    int joint = -1;  // the finger's below the same link
+    for (int l = finger.last; l > hangs; l = hand_.links[l].parent) {
+      if (hand_.links[l].turns) joint = l;
+    }
+    if (joint < 0 || !is_above(hangs, joint)) return false;
+    const Eigen::Vector3d& axis = placed_.axis[joint];
+    const Eigen::Vector3d beside_m = placed_.at_m[rod.last] - placed_.at_m[joint];
+    return std::abs(axis.dot(placed_.axis[rod.last])) > kOneAxis && beside_m.norm() < kBesides_m &&
+           std::abs(axis.dot(beside_m)) < kFingerWidth_m &&
+           extent_m(rod.last) < kOfFinger * extent_m(joint);
+  }
+
+  void leave_out_rods() {
+    std::vector<Finger> fingers;
+    for (const Finger& one : hand_.fingers) {
+      const auto finger = std::ranges::find_if(hand_.fingers, [&](const Finger& other) {
+        return other.last != one.last && is_rod_of(one, other);
+      });
+      if (finger == hand_.fingers.end()) {
+        fingers.push_back(one);
+        continue;
+      }
+      hand_.remarks.push_back("link " + in_quotes(hand_.links[one.last].name) +
+                              " is taken for a rod beside the finger that ends in " +
+                              in_quotes(hand_.links[finger->tip].name) +
+                              "; `tips` names the ends of all fingers if it is one");
+    }
+    hand_.fingers = std::move(fingers);
   }
 
   // The link at a finger's end: of those fixed to its last one the farthest that is named so, else
@@ -300,6 +380,36 @@ class Builder {
     return (tip_of(finger, placed_) - placed_.at_m[finger.base]).normalized();
   }
 
+  // Which way its tip goes when its joints turn where they can turn further; zero: no way.
+  [[nodiscard]] Eigen::Vector3d bend(const Finger& finger) const {
+    const Eigen::Vector3d tip_m = tip_of(finger, placed_);
+    Eigen::Vector3d way = Eigen::Vector3d::Zero();
+    for (int l = finger.tip; l > 0 && is_above(finger.base, l); l = hand_.links[l].parent) {
+      const Link& link = hand_.links[l];
+      if (!link.turns) continue;
+      const double room = link.high + link.low - 2.0 * std::clamp(0.0, link.low, link.high);
+      way += room * placed_.axis[l].cross(tip_m - placed_.at_m[l]);
+    }
+    return way.norm() > kBends_m ? way.normalized() : Eigen::Vector3d::Zero();
+  }
+
+  // The one finger that bends against all others, which bend one way; else none.
+  [[nodiscard]] std::vector<Finger>::iterator facing() {
+    constexpr double kOneWay = 0.7;
+    std::vector<Finger>& fingers = hand_.fingers;
+    return std::ranges::find_if(fingers, [&](const Finger& thumb) {
+      return std::ranges::all_of(fingers, [&](const Finger& one) {
+        if (one.last == thumb.last) return true;
+        return bend(one).dot(bend(thumb)) < -kOneWay &&
+               std::ranges::all_of(
+                   fingers,
+                   [&](const Finger& other) {
+                     return other.last == thumb.last || bend(one).dot(bend(other)) > kOneWay;
+                   });
+      });
+    });
+  }
+
   // The names of a finger's links and joints.
   [[nodiscard]] std::string names_of(const Finger& finger) const {
     std::string names;
@@ -327,8 +437,8 @@ class Builder {
     return word == kWords.end() ? 0 : word->second;
   }
 
-  // The thumb has the name, or else points away from the others. They are in a row whose end near
-  // the thumb is the index finger, unless their names say otherwise.
+  // The thumb has the name, or else points away from the others, or bends against them. They are in
+  // a row whose end near the thumb is the index finger, unless their names say otherwise.
   Result<> order_fingers() {
     std::vector<Finger>& fingers = hand_.fingers;
     auto thumb = std::ranges::find_if(fingers, [&](const Finger& f) { return is_named_thumb(f); });
@@ -339,18 +449,20 @@ class Builder {
         return sum / static_cast<double>(fingers.size() - 1);
       };
       thumb = std::ranges::min_element(fingers, {}, with_others);
-      if (with_others(*thumb) > kSameWay) {
+      if (with_others(*thumb) > kSameWay) thumb = facing();
+      if (thumb == fingers.end()) {
         return refuse(
-            "no finger is named thumb, and none points away from the others when open; "
-            "`tips` can name their last links, thumb first");
+            "no finger is named thumb, none points away from the others when open, and none bends "
+            "against all others; `tips` can name their last links, thumb first");
       }
     }
     std::iter_swap(thumb, fingers.begin());
     const Eigen::Vector3d thumb_m =
         0.5 * (placed_.at_m[fingers[0].base] + tip_of(fingers[0], placed_));
-    std::sort(fingers.begin() + 1, fingers.end(), [&](const Finger& a, const Finger& b) {
-      return (placed_.at_m[a.base] - thumb_m).norm() < (placed_.at_m[b.base] - thumb_m).norm();
-    });
+    const auto to_thumb_m = [&](const Finger& f) {
+      return (placed_.at_m[f.base] - thumb_m).norm();
+    };
+    std::ranges::sort(fingers.begin() + 1, fingers.end(), {}, to_thumb_m);
     // The row is straight, so that its order is that along its own line.
     const Eigen::Vector3d row = placed_.at_m[fingers.back().base] - placed_.at_m[fingers[1].base];
     std::sort(fingers.begin() + 1, fingers.end(), [&](const Finger& a, const Finger& b) {
@@ -369,6 +481,9 @@ class Builder {
       }
     }
     if (turned > 0) std::reverse(fingers.begin() + 1, fingers.end());
+    hand_.either_side =
+        std::abs(to_thumb_m(fingers[1]) - to_thumb_m(fingers.back())) < kSamePlace_m &&
+        std::ranges::none_of(fingers, [&](const Finger& f) { return named_place(f) != 0; });
     return {};
   }
 
@@ -580,6 +695,12 @@ class Builder {
       bends = (tip_of(hand_.fingers[0], placed_) - hand_.fingers[1].knuckle_m).dot(out);
     }
     hand_.side = bends >= 0.0 ? Side::kRight : Side::kLeft;
+    if (hand_.either_side && hand_.side != options_.side.value_or(Side::kRight) && !turned_round_) {
+      turned_round_ = true;
+      std::reverse(hand_.fingers.begin() + 1, hand_.fingers.end());
+      number_fingers();
+      return derive_frame();
+    }
     if (options_.side && *options_.side != hand_.side) {
       const bool left = hand_.side == Side::kLeft;
       return refuse(std::string("the URDF is a ") + (left ? "left" : "right") + " hand, and a " +
@@ -671,6 +792,7 @@ class Builder {
   RobotOptions options_;
   std::string file_;
   int above_;
+  bool turned_round_ = false;  // the row of fingers, for the side
   Placed placed_{static_cast<std::size_t>(kMaxJoints)};
   std::vector<double> held_;  // [joint]; NaN: not held
   std::map<int, double> starts_;
@@ -696,7 +818,8 @@ Result<RobotHand> robot_hand(Urdf urdf, const RobotOptions& options, const std::
   std::erase_if(hands, [&](const HandBelow& hand) {
     const auto bare = Builder(urdf, {.needs_speeds = false}, file, hand.above).build_bare();
     if (!bare) return true;
-    if (bare->side == wanted && hand.named.value_or(wanted) == wanted) fitting.push_back(hand);
+    if ((bare->side == wanted || bare->either_side) && hand.named.value_or(wanted) == wanted)
+      fitting.push_back(hand);
     palms += (palms.empty() ? "" : ", ") + in_quotes(urdf.links[hand.palm].name);
     return false;
   });

@@ -113,8 +113,10 @@ struct Turn {  // of a link by a driven joint above it
 struct RobotHand {
   std::string name;
   std::string chosen;  // of a robot that is more than a hand: a line that says which part it is
-  bool by_visuals = false;  // as Urdf says
+  std::vector<std::string> remarks;  // what the URDF leaves open, and how it was taken
+  bool by_visuals = false;           // as Urdf says
   Side side = Side::kRight;
+  bool either_side = false;  // its fingers face the thumb in the middle: it serves for both
   std::vector<Link> links;
   std::vector<RobotJoint> joints;
   std::vector<DrivenJoint> driven;

@@ -37,6 +37,7 @@ enum Notice : std::size_t {
   kStop,
   kSlower,
   kSeveral,
+  kUnlimited,
   kNotices
 };
 
@@ -153,6 +154,8 @@ RobotStage::RobotStage(RobotHand robot, Skeleton skeleton, const StageContext& c
     return joint.driven >= 0 && joint.speed < options.speed;
   });
   notice_[kSeveral] = !robot_.chosen.empty();
+  notice_[kUnlimited] = std::ranges::any_of(
+      robot_.links, [](const Link& link) { return link.unlimited && link.leader < 0; });
 }
 
 // Since the command before, at most two periods: a stall authorises no jump. A step back in time is
@@ -388,7 +391,9 @@ const StageType& robot_type() {
                                "for them"},
                   {.sentence =
                        "the robot is more than a hand: the hand of `side` follows, all else "
-                       "stands (`posed inspect` lists the hands)"}},
+                       "stands (`posed inspect` lists the hands)"},
+                  {.sentence = "the URDF gives joints neither lower nor upper limit, so that they "
+                               "stand at 0 (`posed inspect` names them)"}},
       .commands = {{.name = "engage",
                     .help = "the robot follows the hand, from where it is",
                     .encode = no_words},

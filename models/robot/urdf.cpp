@@ -272,6 +272,7 @@ class Reader {
       }
       link.low = (*low)[0];
       link.high = (*high)[0];
+      link.unlimited = !limit.attribute("lower") && !limit.attribute("upper");
     }
     const auto speed = numbers<1>(limit.attribute("velocity").as_string("0"), 1e6);
     if (!speed || (*speed)[0] < 0.0) {
@@ -293,6 +294,10 @@ class Reader {
     }
     joint.link.multiplier = (*multiplier)[0];
     joint.link.offset = (*offset)[0];
+    if (joint.link.unlimited) {
+      joint.link.low = -std::numbers::pi;
+      joint.link.high = std::numbers::pi;
+    }
     return {};
   }
 

@@ -34,6 +34,9 @@ struct Link {
   bool turns = false;
   bool slides = false;   // or moves in another way: it stands at zero
   bool endless = false;  // a "continuous" joint: its limits are half a turn to each side
+  // Its <limit> has neither lower nor upper: both are zero, as URDF says; a follower's are half a
+  // turn to each side, because zero would pin its leader.
+  bool unlimited = false;
   Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  // unit length, in its own frame
   double low = 0.0, high = 0.0;
   double speed = 0.0;  // rad/s; 0: the file names none

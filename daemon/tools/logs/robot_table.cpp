@@ -58,6 +58,10 @@ std::vector<std::string> robot_table(const robot::RobotHand& hand) {
     lines.push_back(hand.chosen +
                     "; `side` of [stream.robot], or the links that `tips` names, choose another");
   }
+  if (hand.either_side) {
+    lines.emplace_back("its thumb is in the middle of its fingers: left and right hands drive it");
+  }
+  lines.insert(lines.end(), hand.remarks.begin(), hand.remarks.end());
   lines.emplace_back("joints, in the order of the stream's values");
   for (const robot::RobotJoint& joint : hand.joints) {
     lines.push_back(fmt::format("  {:<24} {:<26} {:<20} {}", joint.name, limits_of(hand, joint),

@@ -1,9 +1,12 @@
 // Which texts are refused, and what is read from those that are not; the hulls of shapes.
 #include <catch2/catch.hpp>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <fstream>
+#include <optional>
 #include <random>
 #include <string>
 
@@ -333,6 +336,164 @@ TEST_CASE("a thumb between index and middle finger leaves their order to the nam
       CHECK(hand.side == (is_left ? Side::kLeft : Side::kRight));
     }
   }
+}
+
+namespace {
+
+struct Hinge {
+  std::string parent, child, xyz, rpy = "0 0 0", axis = "0 0 1";
+  std::string limit = "lower=\"0\" upper=\"1.5\"";
+  std::string more{};
+};
+
+// A URDF of these joints, each named as its child; their links are boxes along x of 30 mm.
+std::string hinged(const std::vector<Hinge>& hinges) {
+  std::string text = "<robot name=\"r\"><link name=\"palm\"/>";
+  for (const Hinge& hinge : hinges) {
+    text += "<link name=\"" + hinge.child +
+            "\"><collision><origin xyz=\"0.015 0 0\"/><geometry><box size=\"0.03 0.01 0.01\"/>"
+            "</geometry></collision></link><joint name=\"" +
+            hinge.child + "_joint\" type=\"revolute\"><parent link=\"" + hinge.parent +
+            "\"/><child link=\"" + hinge.child + "\"/><origin xyz=\"" + hinge.xyz + "\" rpy=\"" +
+            hinge.rpy + "\"/><axis xyz=\"" + hinge.axis + "\"/><limit velocity=\"2\" " +
+            hinge.limit + "/>" + hinge.more + "</joint>";
+  }
+  return text + "</robot>";
+}
+
+// As Barrett's BH8: two fingers side by side that spread, and a third one across the palm. All lie
+// in its plane when open.
+std::vector<Hinge> barrett() {
+  const std::string spread = "lower=\"0\" upper=\"3.1416\"";
+  const std::string bends = "lower=\"0\" upper=\"2.44\"", last = "lower=\"0\" upper=\"0.84\"";
+  const auto follows = [](const std::string& leader, const std::string& multiplier) {
+    return "<mimic joint=\"" + leader + "_joint\" multiplier=\"" + multiplier + "\"/>";
+  };
+  std::vector<Hinge> hand{
+      {"palm", "f11", "-0.025 0 0.075", "0 0 0", "0 0 -1", spread},
+      {"palm", "f21", "0.025 0 0.075", "0 0 0", "0 0 1", spread, follows("f11", "1")}};
+  for (const std::string f : {"f1", "f2", "f3"}) {
+    const bool third = f == "f3";
+    hand.push_back({third ? "palm" : f + "1", f + "2", third ? "0 -0.05 0.075" : "0 0.05 0",
+                    third ? "1.5708 0 -1.5708" : "1.5708 0 1.5708", "0 0 1", bends});
+    hand.push_back(
+        {f + "2", f + "3", "0.07 0 0", "0 0 0.69", "0 0 1", last, follows(f + "2", "0.344")});
+  }
+  return hand;
+}
+
+// As Robotiq's 3-finger hand, and with `splay` 0 one whose fingers are parallel when open.
+std::vector<Hinge> robotiq(double splay) {
+  const std::string out = std::to_string(-splay);
+  std::vector<Hinge> hand;
+  for (const std::string f : {"1", "2", "middle"}) {
+    const bool middle = f == "middle";
+    const std::string base = "palm_finger_" + f;
+    const std::string z = f == "1" ? "0.036" : f == "2" ? "-0.036" : "0";
+    hand.push_back({"palm", base, (middle ? "0.0455 0.02 " : "-0.0455 0.02 ") + z,
+                    middle ? "0 0 1.5708" : "0 3.1416 -1.5708", middle ? "0 0 1" : "0 1 0",
+                    middle ? "lower=\"0\" upper=\"0\"" : "lower=\"-0.18\" upper=\"0.18\""});
+    hand.push_back({base, f + "_1", "0.02 0 0", "0 0 0", "0 0 1", "lower=\"0\" upper=\"1.22\""});
+    hand.push_back({f + "_1", f + "_2", "0.05 0 0", "0 0 " + out});
+    hand.push_back(
+        {f + "_2", f + "_3", "0.04 0 0", "0 0 0", "0 0 1", "lower=\"-0.66\" upper=\"1.05\""});
+  }
+  return hand;
+}
+
+}  // namespace
+
+TEST_CASE("a hand of three fingers has the thumb that faces them, and serves for both sides") {
+  for (const auto& [text, thumb] :
+       std::vector<std::pair<std::string, std::string>>{{hinged(barrett()), "f33"},
+                                                        {hinged(robotiq(0.52)), "middle_3"},
+                                                        {hinged(robotiq(0.0)), "middle_3"}}) {
+    INFO(text);
+    const Urdf urdf = parse_urdf(text, "r").value();
+    for (const std::optional<Side> side :
+         {std::optional<Side>(), std::optional(Side::kRight), std::optional(Side::kLeft)}) {
+      const auto hand = robot_hand(urdf, {.side = side}, "r");
+      INFO((hand ? "" : hand.error().message));
+      REQUIRE(hand);
+      CHECK(hand->side == side.value_or(Side::kRight));
+      CHECK(hand->either_side);
+      CHECK(hand->links[static_cast<std::size_t>(hand->fingers[0].last)].name == thumb);
+      CHECK(hand->fingers.size() == 3);
+      // Out of the palm is where the fingers bend to, whichever of them is the index finger.
+      CHECK(hand->palm.col(0).dot(thumb == "f33" ? Eigen::Vector3d::UnitZ()
+                                                 : Eigen::Vector3d::UnitX()) > 0.5);
+    }
+  }
+  // Three fingers around the palm: each may be the thumb.
+  std::vector<Hinge> claw;
+  for (const std::string f : {"a", "b", "c"}) {
+    const double turn = f == "a" ? 0.0 : f == "b" ? 2.0944 : -2.0944;
+    const std::string at =
+        std::to_string(0.05 * std::cos(turn)) + " " + std::to_string(0.05 * std::sin(turn)) + " 0";
+    claw.push_back({"palm", f + "1", at, "0 -1.5708 " + std::to_string(turn), "0 -1 0"});
+    claw.push_back({f + "1", f + "2", "0.05 0 0", "0 0 0", "0 -1 0"});
+  }
+  const std::string said = refusal(hinged(claw));
+  INFO(said);
+  CHECK(said.find("none bends against all others") != std::string::npos);
+}
+
+TEST_CASE("a rod beside a finger is no finger, and a finger beside one is no rod") {
+  const auto follows = [](const std::string& leader) {
+    return "<mimic joint=\"" + leader + "\" multiplier=\"0.5\"/>";
+  };
+  const std::string mitten = load_urdf(test::mitten()).value();
+  const RobotHand bare = robot_hand(parse_urdf(mitten, "r").value(), {}, "r").value();
+  const Finger& index = bare.fingers[1];
+  const std::string knuckle = bare.links[static_cast<std::size_t>(index.knuckle)].name;
+  const auto with_rod = [&](const std::string& parent, const std::string& at) {
+    const std::string limit =
+        "<origin xyz=\"" + at + "\"/><limit lower=\"-2\" upper=\"2\" " + "velocity=\"2\"/>";
+    const auto& flex = bare.links[static_cast<std::size_t>(index.knuckle)].joint;
+    const std::string rod =
+        "<link name=\"rod\"><collision><origin xyz=\"0 0 0.01\"/><geometry>"
+        "<box size=\"0.004 0.004 0.02\"/></geometry></collision></link>" +
+        joint("rod_joint", parent, "rod", limit + follows(flex));
+    return robot_hand(parse_urdf(with(mitten, "</robot>", rod + "</robot>"), "r").value(), {}, "r");
+  };
+  const auto at_knuckle = with_rod(knuckle, "0.008 0 0.02");
+  REQUIRE(at_knuckle);
+  CHECK(at_knuckle->fingers.size() == 5);
+  CHECK(at_knuckle->size() == bare.size());
+  REQUIRE(at_knuckle->remarks.size() == 1);
+  CHECK(at_knuckle->remarks[0].find("'rod' is taken for a rod beside") != std::string::npos);
+  // As wide apart as fingers are: it is asked.
+  const auto aside = with_rod(knuckle, "0 0.02 0.02");
+  REQUIRE_FALSE(aside);
+  CHECK(aside.error().message.find("`tips`") != std::string::npos);
+  // Two fingers that share a joint of the palm are fingers.
+  std::vector<Hinge> hand = barrett();
+  hand.push_back({"f11", "g2", "0.03 0.05 0", "1.5708 0 1.5708"});
+  const RobotHand four = robot_hand(parse_urdf(hinged(hand), "r").value(), {}, "r").value();
+  CHECK(four.fingers.size() == 4);
+}
+
+TEST_CASE("a joint whose <limit> gives no angles stands at zero, which is said") {
+  std::vector<Hinge> hand = barrett();
+  const auto of = [&](const std::string& child) -> Hinge& {
+    return *std::ranges::find(hand, child, &Hinge::child);
+  };
+  CHECK(robot_hand(parse_urdf(hinged(hand), "r").value(), {}, "r")->remarks.empty());
+  of("f12").limit = "effort=\"1\"";
+  const RobotHand stands = robot_hand(parse_urdf(hinged(hand), "r").value(), {}, "r").value();
+  REQUIRE(stands.remarks.size() == 1);
+  CHECK(stands.remarks[0].starts_with("the <limit> has neither lower nor upper of 'f12_joint'"));
+  CHECK(stands.remarks[0].find("stands at 0") != std::string::npos);
+  CHECK(std::ranges::find(stands.joints, "f12_joint", &RobotJoint::name)->driven < 0);
+  // Zero would pin the joint that it follows.
+  of("f12").limit = of("f22").limit;
+  of("f13").limit = "effort=\"1\"";
+  const RobotHand follows = robot_hand(parse_urdf(hinged(hand), "r").value(), {}, "r").value();
+  REQUIRE(follows.remarks.size() == 1);
+  CHECK(follows.remarks[0].find("'f13_joint', so that the joint it follows") != std::string::npos);
+  const auto& leader = *std::ranges::find(follows.joints, "f12_joint", &RobotJoint::name);
+  REQUIRE(leader.driven >= 0);
+  CHECK(follows.driven[static_cast<std::size_t>(leader.driven)].high == Approx(2.44));
 }
 
 TEST_CASE("a gripper is called a gripper") {
