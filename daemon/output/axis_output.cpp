@@ -52,19 +52,20 @@ Result<AxisFigure> AxisFigure::make(std::shared_ptr<const Skeleton> skeleton, st
   made.message_.avatar = entry.avatar;
   made.message_.content.displacement = true;
   made.known_.resize(axis::value_count(made.message_.content) / 3);
-  for (std::size_t bone = 0; bone < axis::kBones; ++bone) {
-    if (bone == axis::kHips) continue;
-    made.known_[axis::rotations_at(made.message_.content, bone) / 3 - 1] =
-        axis::known_text(made.offset_cm_[bone]);
-  }
   return made;
 }
 
 void AxisFigure::fill(const Frame& frame) noexcept {
   const Frame& pose = fit_.apply(frame);
   message_.frame_number = static_cast<std::uint32_t>(frame.header.sequence);
-  axis::fill_values(fit_.skeleton(), offset_cm_, pose.rotation_xyzw, pose.root_position_m,
-                    near_rad_, message_);
+  const axis::Turned turned = axis::fill_values(fit_.skeleton(), offset_cm_, pose.rotation_xyzw,
+                                                pose.root_position_m, last_, message_);
+  const std::size_t root = fit_.skeleton().root_joint;
+  known_[0].size = 0;  // where the hips are
+  for (std::size_t bone = 0; bone < axis::kBones; ++bone) {
+    if (!turned[root + bone]) continue;
+    known_[axis::rotations_at(message_.content, bone) / 3].size = 0;
+  }
 }
 
 std::string_view AxisFigure::message(const Frame& frame) noexcept {

@@ -50,9 +50,9 @@ class AxisFigure {
 
   Fit fit_;
   drivers::axis::Proportions offset_cm_;
-  drivers::axis::NearAngles near_rad_{};
+  drivers::axis::LastPose last_{};
   drivers::axis::Message message_;
-  std::vector<std::string> known_;  // the text of all displacements but the hips'
+  std::vector<drivers::axis::ShortText> known_;  // what the last line said
   std::array<char, drivers::axis::kMaxText + 1> text_{};
 };
 

@@ -102,7 +102,7 @@ void AxisEmulator::emit(std::int64_t now_ns, Bytes& out) {
       const std::size_t before = waiting_.size();
       person.message.frame_number = number_;
       fill_values(*person.skeleton, person.entry.offset_cm, person.rotation_xyzw, person.root_m,
-                  person.near_rad, person.message);
+                  person.last, person.message);
       encode(person, waiting_);
       for (std::size_t left = waiting_.size() - before; settings_.split_bytes != 0 && left != 0;) {
         piece_.push_back(std::min(left, settings_.split_bytes));

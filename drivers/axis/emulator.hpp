@@ -46,7 +46,7 @@ class AxisEmulator final : public Emulator {
     std::shared_ptr<const Skeleton> skeleton;
     Vec3f root_m{};
     std::array<Quatf, kBones + 1> rotation_xyzw{};  // [joint of the skeleton]
-    NearAngles near_rad{};
+    LastPose last{};
     Message message;
     bool present = true;
     bool posed = false;  // by pose()

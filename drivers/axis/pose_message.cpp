@@ -5,16 +5,19 @@
 
 namespace posed::drivers::axis {
 
-RT_SAFE void fill_values(const Skeleton& skeleton, const Proportions& offset_cm,
-                         std::span<const Quatf> rotation_xyzw, const Vec3f& root_m,
-                         NearAngles& near_rad, Message& message) noexcept {
+RT_SAFE Turned fill_values(const Skeleton& skeleton, const Proportions& offset_cm,
+                           std::span<const Quatf> rotation_xyzw, const Vec3f& root_m,
+                           LastPose& last, Message& message) noexcept {
+  Turned turned;
   // Adding zero makes a negative zero positive: the same pose gives the same bytes.
   const auto angles_at = [&](std::size_t joint, std::size_t at) {
-    near_rad[joint] = channels_from_rotation(
-        skeleton, static_cast<int>(joint), to_eigen_double(rotation_xyzw[joint]), near_rad[joint]);
-    for (std::size_t i = 0; i < 3; ++i) {
-      message.values[at + i] = near_rad[joint][i] / kDegree + 0.0;
-    }
+    if (rotation_xyzw[joint] == last.rotation_xyzw[joint]) return;
+    last.rotation_xyzw[joint] = rotation_xyzw[joint];
+    turned.set(joint);
+    auto& near_rad = last.near_rad[joint];
+    near_rad = channels_from_rotation(skeleton, static_cast<int>(joint),
+                                      to_eigen_double(rotation_xyzw[joint]), near_rad);
+    for (std::size_t i = 0; i < 3; ++i) message.values[at + i] = near_rad[i] / kDegree + 0.0;
   };
   const std::size_t root = skeleton.root_joint;
   Eigen::Vector3d at_m(root_m[0], root_m[1], root_m[2]);
@@ -31,6 +34,7 @@ RT_SAFE void fill_values(const Skeleton& skeleton, const Proportions& offset_cm,
                                               : static_cast<double>(offset_cm[b][i]);
     }
   }
+  return turned;
 }
 
 }  // namespace posed::drivers::axis

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 #include <optional>
 
 #include "drivers/byte_reader.hpp"
@@ -213,18 +214,8 @@ RT_SAFE std::size_t encode_binary(const Message& message, Form form,
   return size;
 }
 
-std::string known_text(const Vec3f& values) {
-  std::string text;
-  std::array<char, 64> room;
-  for (const float value : values) {
-    char* const end = put_value(room.data(), room.data() + room.size(), static_cast<double>(value));
-    text.append(1, ' ').append(room.data(), end);
-  }
-  return text;
-}
-
 RT_SAFE std::size_t encode_text(const Message& message, std::span<char> out,
-                                std::span<const std::string> known) noexcept {
+                                std::span<ShortText> known) noexcept {
   char* at = out.data();
   char* const end = at + out.size();
   const auto put = [&](char c) {
@@ -236,17 +227,22 @@ RT_SAFE std::size_t encode_text(const Message& message, std::span<char> out,
   put(' ');
   const std::string_view name = message.avatar.name_text();
   for (const char c : name.empty() ? std::string_view("_") : name) put(fits_a_name(c) ? c : '_');
-  for (std::size_t i = 0; i < value_count(message.content);) {
-    if (i / 3 < known.size() && !known[i / 3].empty()) {
-      const std::string& text = known[i / 3];
-      if (static_cast<std::size_t>(end - at) < text.size()) return 0;
-      at = std::ranges::copy(text, at).out;
-      i += 3;
+  for (std::size_t group = 0; group < value_count(message.content) / 3; ++group) {
+    ShortText* const text = group < known.size() ? &known[group] : nullptr;
+    if (text != nullptr && text->size > 0 && end - at >= std::ssize(text->text)) {
+      std::memcpy(at, text->text.data(), text->text.size());  // of a length that is known
+      at += text->size;
       continue;
     }
-    put(' ');
-    at = put_value(at, end, message.values[i++]);
-    if (at == nullptr) return 0;
+    const char* const begin = at;
+    for (std::size_t i = 3 * group; i < 3 * group + 3; ++i) {
+      put(' ');
+      at = put_value(at, end, message.values[i]);
+      if (at == nullptr) return 0;
+    }
+    if (text == nullptr || at - begin > std::ssize(text->text)) continue;
+    text->size = static_cast<std::uint8_t>(at - begin);
+    std::memcpy(text->text.data(), begin, text->size);
   }
   if (end - at < 3) return 0;
   for (const char c : {' ', kTextEnd[0], kTextEnd[1]}) put(c);

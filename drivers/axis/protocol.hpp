@@ -90,6 +90,12 @@ RT_SAFE [[nodiscard]] Avatar make_avatar(std::uint32_t number, std::string_view 
 enum class Form : std::uint8_t { kBinary, kOldBinary, kText };
 inline constexpr std::array<std::string_view, 3> kFormNames{"binary", "binary-1.0", "text"};
 
+// The text of three values, as "0.000000 12.345678 -3.000000" between blanks.
+struct ShortText {
+  std::array<char, 63> text{};
+  std::uint8_t size = 0;  // 0: none
+};
+
 // One message, as it is sent and as it is received.
 struct Message {
   Avatar avatar;
@@ -119,11 +125,9 @@ RT_SAFE [[nodiscard]] Outcome decode_text(std::string_view text, Message& messag
 // contain.
 RT_SAFE [[nodiscard]] std::size_t encode_binary(const Message& message, Form form,
                                                 std::span<std::byte> out) noexcept;
-// `known` is [group of three values] the text that known_text() made of values that stay the same,
-// empty for others.
+// `known` is [group of three values] their text, which is written again as it is; where it is empty
+// it is made of the values and kept there.
 [[nodiscard]] std::size_t encode_text(const Message& message, std::span<char> out,
-                                      std::span<const std::string> known = {}) noexcept;
-// Cold.
-[[nodiscard]] std::string known_text(const Vec3f& values);
+                                      std::span<ShortText> known = {}) noexcept;
 
 }  // namespace posed::drivers::axis
