@@ -165,7 +165,8 @@ try:
     with posed.Client(endpoint, ["walker"]) as client:
         for frame in itertools.islice(client.frames(10), 3):
             print("python", frame.positions_m())
-        print(subprocess.run([sys.argv[1], endpoint, "walker", "3"], capture_output=True, text=True))
+        watch = [sys.argv[1], endpoint, "walker", "3"]
+        print(subprocess.run(watch, capture_output=True, text=True))
         talks = skeletons[:-1] + frames[:-1] + junk
         try:
             for _ in client.frames(1):
