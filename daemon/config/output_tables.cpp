@@ -31,7 +31,8 @@ constexpr std::array<std::string_view, 2> kRoleWords{"performer", "assistant"};
 constexpr std::array<std::string_view, 2> kAxisFormats{"binary", "text"};
 constexpr std::array<std::string_view, 2> kMvnFormats{"quaternion", "euler"};
 constexpr std::array<std::string_view, 2> kRokokoFormats{"lz4", "json"};
-constexpr std::size_t kMaxBodies = 5;  // of an output; so many fit into a datagram of Rokoko's
+constexpr std::size_t kMaxBodies = 16;       // of an output
+constexpr std::size_t kMaxRokokoBodies = 5;  // so many fit into a datagram that is not compressed
 constexpr double kMaxPort = 65535.0;
 constexpr std::size_t kMaxRos2Streams = 16;
 constexpr Range kDdsDomain{0.0, 232.0};  // those above have no ports
@@ -176,7 +177,8 @@ void OutputReader::read_bodies(TableReader& table, OutputConfig& output) const {
   if (!output.body.empty()) {
     table.add_error("bodies", "body names one person and bodies several: leave one out");
   }
-  read_list(table, "bodies", kMaxBodies, output);
+  const bool rokoko = output.kind == OutputKind::kRokoko;
+  read_list(table, "bodies", rokoko ? kMaxRokokoBodies : kMaxBodies, output);
 }
 
 void OutputReader::read_list(TableReader& table, const char* key, std::size_t most,

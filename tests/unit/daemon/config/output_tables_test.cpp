@@ -216,6 +216,8 @@ format = "json"
   CHECK(output_complaint(mvn + "bodies = [\"ann\", \"ann\"]\n" + to) ==
         "posed.toml:14: 'ann' is listed twice; it would be sent as two people");
   CHECK(output_complaint(mvn + "bodies = []\n" + to) ==
+        "posed.toml:14: output.bodies takes 1 to 16 streams");
+  CHECK(output_complaint("[[output]]\nkind = \"rokoko\"\nbodies = []\n" + to) ==
         "posed.toml:14: output.bodies takes 1 to 5 streams");
   CHECK(output_complaint(mvn + "body = \"ann\"\nbodies = [\"stage-bob\"]\n" + to) ==
         "posed.toml:15: body names one person and bodies several: leave one out");
