@@ -97,9 +97,12 @@ bool begins_in_wrist(const Figure& figure, const std::vector<JointName>& names,
 void trim_finger(const Figure& figure, const std::vector<JointName>& names, int hand, int finger,
                  std::vector<int>& joints) {
   if (finger > 0 && joints.size() > 3) {
+    // Apple's "IntermediateTip" is where a phalanx ends, and another tip ends the finger.
+    int tip = -1;
+    for (const int j : joints) tip = names[j].has("tip") ? j : tip;
     std::erase_if(joints, [&](int j) {
-      return std::ranges::any_of(std::array{"meta", "metacarpal", "in", "inhand", "tip"},
-                                 [&](const char* word) { return names[j].has(word); });
+      return j == tip || std::ranges::any_of(std::array{"meta", "metacarpal", "in", "inhand"},
+                                             [&](const char* word) { return names[j].has(word); });
     });
   }
   if (joints.size() == 1) {

@@ -65,6 +65,22 @@ std::array<int, kSlots> best_chain(const Figure& figure,
   return best.joint;
 }
 
+// Some makers mark an elbow or a knee by a joint beside the hand or the foot, which is slot `end`.
+// With nothing below it, it would end the limb before that: it is no part of it.
+void drop_marks(const Figure& figure, std::size_t end, std::vector<std::optional<Fit>>& fits) {
+  std::vector<bool> leads(fits.size());  // [joint] whether a hand or a foot is below it
+  for (int j = figure.size() - 1; j > 0; --j) {
+    const int parent = figure[j].parent;
+    if (parent >= 0 && (leads[j] || (fits[j] && (*fits[j])[end] > 0.0))) leads[parent] = true;
+  }
+  for (int j = 1; j < figure.size(); ++j) {
+    const int parent = figure[j].parent;
+    if (!fits[j] || parent < 0 || !fits[parent] || !leads[parent]) continue;
+    const bool is_end = (*fits[j])[end] > 0.0 || fits[j]->back() > 0.0;
+    if (figure.children(j).empty() && !is_end) fits[j].reset();
+  }
+}
+
 // A hand or a foot that the names do not say is the next joint of the limb, where that is far
 // enough to be no twist: `chain` ends before it. Some makers cut a segment into pieces of one name.
 int next_of_limb(const Figure& figure, const std::vector<JointName>& names, int last, int known) {
@@ -243,9 +259,10 @@ void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJ
     for (std::size_t j = 0; j < names.size(); ++j) {
       if (names[j].side == wanted) fits[j] = fit_of(names[j]);
     }
+    const std::size_t end = first == Bone::kLeftUpperLeg ? 2 : 3;  // foot or hand
+    drop_marks(figure, end, fits);
     auto chain = best_chain(figure, fits, needed);
     settle_pieces(figure, names, first == Bone::kLeftUpperLeg ? 0 : 1, chain);
-    const std::size_t end = first == Bone::kLeftUpperLeg ? 2 : 3;  // foot or hand
     if (chain[end - 1] >= 0 && chain[end] < 0) {
       chain[end] = next_of_limb(figure, names, chain[end - 1], end == 2 ? chain[3] : -1);
     }

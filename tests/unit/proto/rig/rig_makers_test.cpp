@@ -1098,6 +1098,44 @@ TEST_CASE("rig: a joint called LHipJoint says CMU's unit of length, of a short p
   CHECK(rig::recognise(made.input).metres_per_unit == Approx(0.0254 / 0.45));
 }
 
+TEST_CASE("rig: a mark beside a hand is no elbow") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  auto& joints = made.input.joints;
+  made.input.poses = {};
+  for (const bool left : {true, false}) {
+    const std::string side = left ? "_L" : "_R";
+    const auto arm = static_cast<std::size_t>(left ? Bone::kLeftUpperArm : Bone::kRightUpperArm);
+    joints[arm].name = "Arm_1" + side;
+    joints[arm + 1].name = "Arm_2" + side;
+    joints[arm + 2].name = "Wrist" + side;
+    joints.push_back({.name = "Elbow" + side,
+                      .parent = static_cast<int>(arm) + 1,
+                      .offset = Vec::Zero(),
+                      .end_site = {}});
+  }
+  check_made(made, UpAxis::kPlusY, 0.01);
+}
+
+TEST_CASE("rig: a finger's joint called after the tip of its segment is a bone") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  auto& joints = made.input.joints;
+  made.input.poses = {};
+  for (const std::string name :
+       {"Metacarpal", "Knuckle", "IntermediateBase", "IntermediateTip", "Tip"}) {
+    const int parent = name == "Metacarpal" ? static_cast<int>(Bone::kLeftHand)
+                                            : static_cast<int>(joints.size()) - 1;
+    joints.push_back({.name = "LeftHandIndexFinger" + name,
+                      .parent = parent,
+                      .offset = {3, 0, 0},
+                      .end_site = {}});
+  }
+  const rig::Rig rig = rig::recognise(made.input);
+  const std::size_t knuckle = test::kMakerJoints + 1;
+  CHECK(rig.bone[knuckle] == Bone::kLeftIndexProximal);
+  CHECK(rig.bone[knuckle + 2] == Bone::kLeftIndexDistal);
+  CHECK(!rig.bone[knuckle + 3]);
+}
+
 TEST_CASE("rig: any input ends in an answer") {
   const auto answer = [](const rig::RigInput& input) {
     const rig::Rig rig = rig::recognise(input);
