@@ -355,7 +355,10 @@ void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJ
   }
   drop_returns(figure, hips, trunk);
   keep_if_any(trunk, [&](int j) {
-    const bool is_root = names[j].has("root") && lies_at(figure, hips, j);
+    // A root at the hips, or a piece of hips that are called so.
+    const bool is_piece =
+        names[hips].has("root") && names[j].stem != names[hips].stem && !is_trunk(names[j]);
+    const bool is_root = names[j].has("root") && (is_piece || lies_at(figure, hips, j));
     return !names[j].helper && !is_root;
   });
   keep_if_any(neck, [&names](int j) {

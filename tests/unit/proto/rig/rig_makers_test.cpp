@@ -1116,6 +1116,26 @@ TEST_CASE("rig: a mark beside a hand is no elbow") {
   check_made(made, UpAxis::kPlusY, 0.01);
 }
 
+TEST_CASE("rig: a piece of hips that are called root is no spine") {
+  const auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  rig::RigInput input;
+  for (const auto& joint : made.input.joints) {
+    if (joint.parent == 0 && input.joints.size() == 1) {
+      input.joints.push_back(
+          {.name = "RootPart1_M", .parent = 0, .offset = {0, 3, 0}, .end_site = {}});
+    }
+    const std::size_t at = input.joints.size();
+    input.joints.push_back(joint);
+    int& parent = input.joints.back().parent;
+    parent += at == 2 || parent > 0 ? 1 : 0;
+  }
+  input.joints[0].name = "Root_M";
+  const rig::Rig rig = rig::recognise(input);
+  CHECK(rig.bone[0] == Bone::kHips);
+  CHECK(!rig.bone[1]);
+  CHECK(rig.bone[2] == Bone::kSpine);
+}
+
 TEST_CASE("rig: a finger's joint called after the tip of its segment is a bone") {
   auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
   auto& joints = made.input.joints;
