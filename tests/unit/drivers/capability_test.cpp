@@ -6,6 +6,7 @@
 
 #include "drivers/transport/transport_factory.hpp"
 #include "tests/support/allocations.hpp"
+#include "tests/support/seeds.hpp"
 #include "tests/unit/drivers/collect_sink.hpp"
 #include "tests/unit/drivers/device_fixtures.hpp"
 
@@ -226,7 +227,7 @@ TEST_CASE("garbage and flipped bytes are counted, never a crash or an invalid po
     INFO(fixture.name);
     Device device = test::open_device(fixture);
     const auto good = test::read_chunks(*device.transport, fixture.loop_chunks);
-    for (int round = 0; round < 200; ++round) {
+    for (int round = 0; round < (test::few_seeds() ? 50 : 200); ++round) {
       const auto decoder = new_decoder(fixture, device.description);
       sink.clear();
       std::vector<Bytes> bad = good;
