@@ -111,7 +111,9 @@ class Subscriber {
       zmq_pollitem_t item{socket_.get(), 0, ZMQ_POLLIN, 0};
       if (left.count() < 0) return {};
       const auto wait = std::min(left, kSilence);
-      if (zmq_poll(&item, 1, static_cast<long>(wait.count())) <= 0) {  // a signal, or time
+      const int ready = zmq_poll(&item, 1, static_cast<long>(wait.count()));
+      if (ready < 0) continue;  // a signal came, and nobody knows after how long
+      if (ready == 0) {
         silent_ += wait;
         // libzmq gives up when somebody else had the daemon's port meanwhile.
         if (silent_ >= kSilence) connect();
@@ -137,13 +139,13 @@ class Subscriber {
  private:
   // Skeletons come every second, whatever the stream does.
   static constexpr std::chrono::milliseconds kSilence{5000};
-  static constexpr std::int64_t kLongestPart = 1 << 20;  // bytes; nothing of a daemon is longer
+  static constexpr std::int64_t kMaxReceivedPart = 1 << 20;  // bytes; a daemon sends no longer one
 
   void connect() {
     silent_ = {};
     socket_ = {zmq_socket(context_.get(), ZMQ_SUB), zmq_close};
     if (!socket_) throw std::runtime_error("no ZeroMQ socket: raise the limit of open files");
-    zmq_setsockopt(socket_.get(), ZMQ_MAXMSGSIZE, &kLongestPart, sizeof kLongestPart);
+    zmq_setsockopt(socket_.get(), ZMQ_MAXMSGSIZE, &kMaxReceivedPart, sizeof kMaxReceivedPart);
     set(ZMQ_RCVHWM, 16);  // newest data wins: keep no old poses
     set(ZMQ_LINGER, 0);
     // A daemon that loses its power or its network says nothing: TCP finds that out in five
@@ -217,7 +219,7 @@ class Subscriber {
 
   std::string endpoint_, stream_;
   Keys keys_;
-  std::chrono::milliseconds silent_{};  // for so long was waited in vain
+  std::chrono::milliseconds silent_{};  // waited in vain since the last skeleton
   std::unique_ptr<void, int (*)(void*)> context_;
   std::unique_ptr<void, int (*)(void*)> socket_{nullptr, zmq_close};
   std::shared_ptr<const posed::v1::Skeleton> skeleton_;

@@ -16,7 +16,7 @@ _MESSAGES = {
     "event": posed_pb2.Event,
     "stats": posed_pb2.Stats,
 }
-_MOST_STREAMS = 2048  # that are kept; as many come through one connection of posed
+_MAX_STREAMS = 2048  # that are kept; as many come through one connection of posed
 _SILENCE_S = 5.0  # stats come every second, whatever the streams do
 
 
@@ -88,7 +88,7 @@ class Client:
         self._socket.setsockopt(zmq.RCVHWM, self._queue)
         for topic in self._topics:
             self._socket.subscribe(topic)
-        self._silent_s = 0.0  # for so long was waited in vain
+        self._silent_s = 0.0  # waited in vain since the last message
 
     def messages(self, timeout_s=None):
         """Everything as (topic, message): ("pose/walker", posed_pb2.Frame) and so on.
@@ -130,7 +130,7 @@ class Client:
                 self.skeletons[stream] = Skeleton(message)
         except (ValueError, KeyError, DecodeError):
             return None
-        if len(self.skeletons) > _MOST_STREAMS:
+        if len(self.skeletons) > _MAX_STREAMS:
             del self.skeletons[next(iter(self.skeletons))]
         if kind == "stats":
             self.stats = message

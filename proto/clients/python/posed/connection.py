@@ -1,7 +1,7 @@
 """ZeroMQ sockets with the daemon's keys."""
 import zmq
 
-_LONGEST_PART = 1 << 20  # bytes; nothing that a daemon sends is longer
+_MAX_PART = 1 << 20  # bytes; a daemon sends no longer one
 
 
 class PosedError(RuntimeError):
@@ -23,7 +23,7 @@ def open_socket(context, kind, endpoint, key, server_key):
         raise PosedError("name both keys: your own NAME.key and the daemon's NAME.pub")
     socket = context.socket(kind)
     socket.setsockopt(zmq.LINGER, 0)
-    socket.setsockopt(zmq.MAXMSGSIZE, _LONGEST_PART)
+    socket.setsockopt(zmq.MAXMSGSIZE, _MAX_PART)
     # A daemon that loses its power or its network says nothing: TCP finds that out in five seconds.
     socket.setsockopt(zmq.TCP_KEEPALIVE, 1)
     socket.setsockopt(zmq.TCP_KEEPALIVE_IDLE, 2)
