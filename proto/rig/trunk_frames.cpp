@@ -23,7 +23,7 @@ constexpr double kUpright_deg = 50;
 struct Score {
   UpAxis up{};
   double stand = 0.0;  // share of the poses in which the trunk is upright
-  double above = 0.0;  // in which the hips are above the lower foot, as far as of who sits
+  double above = 0.0;  // in which the hips are as far above the lower foot as those of who sits
   double mean = 0.0;   // of the trunk's part along the axis
 };
 
