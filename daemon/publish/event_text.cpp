@@ -70,7 +70,7 @@ std::string sentence(const StreamEvent& event) {
       return fmt::format("plays {} from frame {} on, or after what still waits", words(event.after),
                          event.sequence);
     case v1::Event::KIND_PLAYED:
-      return "all is performed";
+      return "has played all of its labels";
     default:
       return {};
   }

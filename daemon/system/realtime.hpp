@@ -7,6 +7,7 @@
 namespace posed::system {
 
 // Priorities under SCHED_FIFO: a thread closer to the device has a higher one.
+inline constexpr int kDevicePriority = 13;  // an emulated one keeps time as a real one does
 inline constexpr int kReaderPriority = 12;
 inline constexpr int kPipelinePriority = 11;
 inline constexpr int kPublisherPriority = 10;

@@ -403,7 +403,7 @@ Result<Signers> put_on_gloves(config::DaemonConfig& config, const std::filesyste
   for (config::StreamConfig& stream : config.streams) {
     const auto port = stream.options.find("port");
     if (port == stream.options.end() || !std::get<std::string>(port->second).empty()) continue;
-    auto signer = TRY(emulate::SyntheticSigner::start(stream.driver, clip));
+    auto signer = TRY(emulate::SyntheticSigner::start(stream.driver, clip, config.realtime));
     port->second = signer->port();
     signers.push_back(std::move(signer));
   }

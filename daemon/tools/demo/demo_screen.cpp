@@ -124,7 +124,7 @@ std::string DemoHand::note() const {
 
 std::string DemoHand::summary() const {
   if (frames_ == 0) return {};
-  return fmt::format("received {} hand frames, {} of them performed from labels: {}", frames_,
+  return fmt::format("received {} hand frames, {} of them played from labels: {}", frames_,
                      performed_frames_, performed_.empty() ? "none" : joined(performed_, " "));
 }
 

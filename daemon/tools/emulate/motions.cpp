@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "daemon/system/realtime.hpp"
 #include "drivers/driver.hpp"
 #include "drivers/options.hpp"
 #include "models/motion/interpolate.hpp"
@@ -78,7 +79,8 @@ Result<Motion> clip_motion(const std::vector<std::filesystem::path>& paths,
 }
 
 Result<std::unique_ptr<SyntheticSigner>> SyntheticSigner::start(const std::string& name,
-                                                                const std::filesystem::path& clip) {
+                                                                const std::filesystem::path& clip,
+                                                                bool realtime) {
   const drivers::Driver* driver = drivers::find_driver(name);
   if (driver == nullptr || driver->emulate == nullptr) {
     return misuse("driver '" + name + "' has no emulator, so it cannot be used here");
@@ -88,14 +90,17 @@ Result<std::unique_ptr<SyntheticSigner>> SyntheticSigner::start(const std::strin
   auto emulator = TRY(driver->emulate(options));
   auto port = TRY(EmulatedPort::open_pty());
   return std::unique_ptr<SyntheticSigner>(
-      new SyntheticSigner(std::move(emulator), std::move(port), std::move(motion)));
+      new SyntheticSigner(std::move(emulator), std::move(port), std::move(motion), realtime));
 }
 
 SyntheticSigner::SyntheticSigner(std::unique_ptr<drivers::Emulator> emulator, EmulatedPort port,
-                                 clip::HandClip clip)
+                                 clip::HandClip clip, bool realtime)
     : clip_(std::move(clip)),
       glove_(std::move(emulator), std::move(port),
              hand_motion([this](double time_s) { return pose_at(clip_, time_s); }), {}),
-      thread_([this](const std::stop_token& stop) { glove_.run(stop); }) {}
+      thread_([this, realtime](const std::stop_token& stop) {
+        system::enter_hot_thread("signer", realtime ? system::kDevicePriority : 0);
+        glove_.run(stop);
+      }) {}
 
 }  // namespace posed::emulate

@@ -25,9 +25,11 @@ Result<Motion> clip_motion(const std::vector<std::filesystem::path>& paths,
 // everything behind that is the same as for a real glove.
 class SyntheticSigner {
  public:
-  // Starts a glove of this driver, with its default options.
+  // Starts a glove of this driver, with its default options. `realtime`: it asks for the rights of
+  // the daemon's threads, so that it keeps its rate on a busy machine, as a device does.
   static Result<std::unique_ptr<SyntheticSigner>> start(const std::string& driver,
-                                                        const std::filesystem::path& clip);
+                                                        const std::filesystem::path& clip,
+                                                        bool realtime);
   SyntheticSigner(const SyntheticSigner&) = delete;
   SyntheticSigner& operator=(const SyntheticSigner&) = delete;
 
@@ -35,7 +37,7 @@ class SyntheticSigner {
 
  private:
   SyntheticSigner(std::unique_ptr<drivers::Emulator> emulator, EmulatedPort port,
-                  clip::HandClip clip);
+                  clip::HandClip clip, bool realtime);
 
   clip::HandClip clip_;
   EmulatedDevice glove_;

@@ -28,8 +28,9 @@ export function stateOf(stats) {
   if (stats.state === 'unknown') return state('unknown', 'off', 'posed does not report on it now: what is shown is the last that came');
   if (stats.state !== 'live') return state(stats.state, 'busy');
   const lost = stats.dropped + stats.shed + stats.kernel_dropped;
-  if (stats.lossy) return state('lossy', 'bad', `${lost} frames were lost so far, some of them in the last 10 s`);
-  return state('live', 'good', lost > 0 ? `${lost} frames were lost so far, none of late` : '');
+  const were = lost === 1 ? '1 frame was lost' : `${lost} frames were lost`;
+  if (stats.lossy) return state('lossy', 'bad', `${were} so far, some in the last 10 s`);
+  return state('live', 'good', lost > 0 ? `${were} so far, none of late` : '');
 }
 
 // How current a pose is, for people; empty when it is measured.
