@@ -103,9 +103,9 @@ Result<> recognise_clip(Clip& clip, Skeleton& skeleton, const Draft& draft, cons
   rig::RigInput known;
   known.T = hints.T;
   known.bones = draft.bones;
-  if (draft.rests_in_t) known.T.resize(skeleton.joints.size());
-  for (std::size_t j = 0; draft.rests_in_t && j < known.T.size(); ++j) {
-    if (draft.bones[j]) known.T[j] = Eigen::Quaterniond::Identity();
+  known.T.resize(std::max(known.T.size(), draft.rests_in_t.size()));
+  for (std::size_t j = 0; j < draft.rests_in_t.size(); ++j) {
+    if (draft.rests_in_t[j] != 0) known.T[j] = Eigen::Quaterniond::Identity();
   }
   known.facing = draft.said_facing;
   known.up = draft.said_up;

@@ -36,7 +36,7 @@ struct Draft {
   std::shared_ptr<const rig::Rig> rig;  // what set bones and T frames; null: not set yet
   std::shared_ptr<const Profile> profile;
   std::vector<std::optional<Bone>> bones{};  // [joint] as the file says; empty: it does not
-  bool rests_in_t = false;                   // those bones stand in the T-pose, in the zero pose
+  std::vector<char> rests_in_t{};  // [joint] that stands in the T-pose in the zero pose; or empty
   // What the user says of the values, which by the format are metres with +Y up. Where the user
   // does not and these may err, a person that stands along another axis is turned, and one that is
   // eight times too large or small scaled, with a warning.

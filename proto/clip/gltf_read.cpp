@@ -460,6 +460,7 @@ void place(const Tree& tree, const std::vector<Pose>& own, std::vector<Pose>& wo
 struct Humanoid {
   std::map<int, Bone> bones;
   bool backwards = false;  // VRM 0 looks along -Z
+  bool animates = false;   // a VRM animation, whose rest is the T-pose whatever it looks like
 };
 
 // Returns a member of the object; a null value if it has none.
@@ -502,6 +503,7 @@ Humanoid humanoid_of(const tinygltf::Model& model) {
         add(name, member(bones.Get(name), "node"), false);
       }
     }
+    found.animates = extension == "VRMC_vrm_animation";
     if (!found.bones.empty()) return found;
   }
   return found;
@@ -812,6 +814,7 @@ class Reader {
   void remark(Draft& draft) const;
   [[nodiscard]] bool moves(std::size_t joint, const std::vector<Track>& tracks) const;
   void describe(const std::vector<Track>& tracks, Draft& draft) const;
+  [[nodiscard]] std::vector<char> rests_in_t() const;
   void add_frame(const std::vector<Pose>& world, std::vector<std::array<double, 3>>& near,
                  Draft& draft) const;
 
@@ -1007,6 +1010,51 @@ void Reader::describe(const std::vector<Track>& tracks, Draft& draft) const {
   if (std::string said = names.warning(); !said.empty()) draft.warnings.push_back(std::move(said));
 }
 
+// Whether each joint of a humanoid stands in the T-pose at rest. VRM asks it of avatars, but some
+// are exported with hanging arms or with legs apart: T of such a limb is found from its bones. Its
+// foot stays as it rests, for the sole is flat then.
+std::vector<char> Reader::rests_in_t() const {
+  struct Limb {
+    Bone upper, lower, end;
+    Eigen::Vector3d way;  // of the T-pose
+  };
+  using enum Bone;
+  const std::array<Limb, 4> limbs{
+      {{kLeftUpperArm, kLeftLowerArm, kLeftHand, Eigen::Vector3d::UnitX()},
+       {kRightUpperArm, kRightLowerArm, kRightHand, -Eigen::Vector3d::UnitX()},
+       {kLeftUpperLeg, kLeftLowerLeg, kLeftFoot, -Eigen::Vector3d::UnitY()},
+       {kRightUpperLeg, kRightLowerLeg, kRightFoot, -Eigen::Vector3d::UnitY()}}};
+  std::map<Bone, Eigen::Vector3d> place;
+  for (std::size_t j = 0; j < figure_.bones.size(); ++j) {
+    const auto node = static_cast<std::size_t>(figure_.nodes[j]);
+    if (figure_.bones[j]) place[*figure_.bones[j]] = forwards_ * world_rest_[node].position;
+  }
+  // More than the slopes of arms and legs that their makers take for straight.
+  constexpr double kOff_rad = 5.0 * std::numbers::pi / 180.0;
+  const auto off = [&](Bone from, Bone to, const Eigen::Vector3d& way) {
+    if (!place.contains(from) || !place.contains(to)) return false;
+    const Eigen::Vector3d bone = place[to] - place[from];
+    return bone.dot(way) < std::cos(kOff_rad) * bone.norm();
+  };
+  std::set<Bone> bent;  // upper bones of limbs
+  for (const Limb& limb : limbs) {
+    if (off(limb.upper, limb.lower, limb.way) || off(limb.lower, limb.end, limb.way)) {
+      bent.insert(limb.upper);
+    }
+  }
+  const auto stands = [&](std::optional<Bone> bone) {
+    for (; bone && *bone != kLeftFoot && *bone != kRightFoot; bone = parent_of(*bone)) {
+      if (bent.contains(*bone)) return false;
+    }
+    return true;
+  };
+  std::vector<char> joints;
+  for (const auto& bone : figure_.bones) {
+    joints.push_back(bone && (humanoid_.animates || stands(bone)) ? 1 : 0);
+  }
+  return joints;
+}
+
 void Reader::add_frame(const std::vector<Pose>& world, std::vector<std::array<double, 3>>& near,
                        Draft& draft) const {
   std::vector<Eigen::Quaterniond> turned(figure_.nodes.size());
@@ -1092,7 +1140,7 @@ Result<Draft> Reader::read() {
   const Times times = times_of(tracks, model_.asset.generator == kGltfGenerator);
   describe(tracks, draft);
   draft.bones = figure_.bones;
-  draft.rests_in_t = !humanoid_.bones.empty();
+  draft.rests_in_t = rests_in_t();
   draft.frame_rate_hz = times.rate_hz;
   if (times.frames > kMaxNumbers / draft.skeleton.channels.size() ||
       times.frames > kMaxSteps / (tree_.order.size() + tracks.size())) {

@@ -329,7 +329,13 @@ struct AvatarFile {
     return all;
   }
 
-  static std::string text(bool backwards, bool twisted) {
+  // With arms that hang so far a bone.
+  static std::string text(bool backwards, bool twisted, double hang_m = 0.0) {
+    const auto place = [hang_m](const Bone_& bone) {
+      const std::string_view name = bone.name;
+      const double bones = name.ends_with("LowerArm") ? 1.0 : name.ends_with("Hand") ? 2.0 : 0.0;
+      return Eigen::Vector3d(bone.at_m - bones * hang_m * Eigen::Vector3d::UnitY());
+    };
     const auto numbers = [](const auto& values) {
       std::string list;
       for (const double x : values) list += (list.empty() ? "" : ",") + std::to_string(x);
@@ -353,8 +359,8 @@ struct AvatarFile {
       };
       const bool root = bone.parent < 0;
       const Eigen::Quaterniond parent = root ? above : world[std::size_t(bone.parent)];
-      Eigen::Vector3d from = turned(bone.at_m);
-      if (!root) from -= turned(bones()[std::size_t(bone.parent)].at_m);
+      Eigen::Vector3d from = turned(place(bone));
+      if (!root) from -= turned(place(bones()[std::size_t(bone.parent)]));
       std::string children;
       for (std::size_t c = 0; c < bones().size(); ++c) {
         if (bones()[c].parent != int(b)) continue;
@@ -438,6 +444,35 @@ TEST_CASE("an avatar of VRM 0 or 1 faces forward, rests in T and has the lengths
     CHECK((rest.position_m[j] - bone.at_m).norm() < 1e-5);
     CHECK(angle_between_rad(skeleton.joints[j].T_world_joint, Eigen::Quaterniond::Identity()) <
           1e-6);
+  }
+}
+
+TEST_CASE("an avatar whose arms hang at rest rests in T but for them, a VRM animation whatever") {
+  const bool backwards = GENERATE(false, true);
+  const std::string text = AvatarFile::text(backwards, true, 0.25);
+  const auto avatar = clip::parse_clip({.name = "me.vrm", .bytes = text});
+  if (!avatar) FAIL(avatar.error().text());
+  const auto direction_in_t = [](const Skeleton& skeleton, Bone from, Bone to) {
+    const Joint& joint = skeleton.joints[std::size_t(skeleton.joint_of(from))];
+    const Joint& below = skeleton.joints[std::size_t(skeleton.joint_of(to))];
+    return Eigen::Vector3d((joint.T_world_joint * below.offset_m).normalized());
+  };
+  const Skeleton& skeleton = *avatar->skeleton;
+  using enum Bone;
+  CHECK(direction_in_t(skeleton, kLeftUpperArm, kLeftLowerArm).x() > 0.9999);
+  CHECK(direction_in_t(skeleton, kLeftLowerArm, kLeftHand).x() > 0.9999);
+  CHECK(direction_in_t(skeleton, kRightUpperArm, kRightLowerArm).x() < -0.9999);
+  for (const Bone bone : {kHips, kHead, kLeftUpperLeg, kLeftFoot}) {
+    const Joint& joint = skeleton.joints[std::size_t(skeleton.joint_of(bone))];
+    CHECK(angle_between_rad(joint.T_world_joint, Eigen::Quaterniond::Identity()) < 1e-6);
+  }
+  if (backwards) return;
+  std::string animation = text;
+  animation.replace(animation.find("VRMC_vrm"), 8, "VRMC_vrm_animation");
+  const auto moving = clip::parse_clip({.name = "me.gltf", .bytes = animation});
+  if (!moving) FAIL(moving.error().text());
+  for (const Joint& joint : moving->skeleton->joints) {
+    CHECK(angle_between_rad(joint.T_world_joint, Eigen::Quaterniond::Identity()) < 1e-6);
   }
 }
 
