@@ -8,6 +8,8 @@
 #include "drivers/vmc/protocol.hpp"
 #include "models/motion/canonical_skeleton.hpp"
 #include "proto/clip/clip.hpp"
+#include "proto/clip/format.hpp"
+#include "proto/clip/gltf.hpp"
 #include "proto/frame/hand.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/text/clean.hpp"
@@ -70,12 +72,56 @@ constexpr std::size_t kBytesBesideName = 40;  // of a message in a bundle
 // A part that has been silent for longer no longer leads.
 constexpr std::int64_t kLeads_ns = kNanosPerSecond / 4;
 
-// The humanoid with the avatar's bones, as its file rests.
+// The humanoid with the avatar's bones. A program that shows a glTF file turns its bones from how
+// they rest there, also where that is no T-pose. The joints of other clips have axes of their own.
 Result<std::shared_ptr<const Skeleton>> avatar_figure(const std::filesystem::path& path) {
   const auto clip = TRY(clip::read_clip(path));
-  auto figure = motion::canonical_skeleton(*clip.skeleton);
+  const clip::Format* format = clip::format_of(path);
+  const bool gltf = format != nullptr && format->read == clip::read_gltf;
+  auto figure =
+      gltf ? motion::resting_skeleton(*clip.skeleton) : motion::canonical_skeleton(*clip.skeleton);
   if (!figure) return fail("has no humanoid: " + figure.error().message, path.string());
   return figure;
+}
+
+// How far a bone is below the hips [m], the lower one of two sides; nullopt without it.
+std::optional<double> below_hips_m(const Skeleton& skeleton, Bone left, Bone right) {
+  std::optional<double> below_m;
+  for (const Bone bone : {left, right}) {
+    int joint = skeleton.joint_of(bone);
+    if (joint < 0) continue;
+    double height_m = 0.0;
+    for (; skeleton.joints[joint].parent >= 0; joint = skeleton.joints[joint].parent) {
+      height_m += skeleton.joints[joint].offset_m.y();
+    }
+    below_m = std::max(below_m.value_or(-height_m), -height_m);
+  }
+  return below_m;
+}
+
+// How high the hips of a figure are [m] that stands in T-pose with its soles on the floor. A
+// skeleton ends above the floor: toes and ankles are as high as is usual, in parts of the leg.
+std::optional<double> standing_m(const Skeleton& in_t) {
+  constexpr double kToes = 0.02, kAnkle = 0.1;
+  if (const auto toes_m = below_hips_m(in_t, Bone::kLeftToes, Bone::kRightToes)) {
+    return *toes_m * (1.0 + kToes);
+  }
+  const auto ankle_m = below_hips_m(in_t, Bone::kLeftFoot, Bone::kRightFoot);
+  return ankle_m ? std::optional(*ankle_m * (1.0 + kAnkle)) : std::nullopt;
+}
+
+// The same of an avatar, whose file says where the floor is: at 0, if its feet are near to that.
+std::optional<double> standing_avatar_m(const Skeleton& resting, const Skeleton& in_t) {
+  const auto ankle_m = below_hips_m(in_t, Bone::kLeftFoot, Bone::kRightFoot);
+  const auto resting_m = below_hips_m(resting, Bone::kLeftFoot, Bone::kRightFoot);
+  const auto toes_m = below_hips_m(resting, Bone::kLeftToes, Bone::kRightToes);
+  const double hips_m = resting.joints.front().offset_m.y();
+  constexpr double kMaxAnkle = 0.35;
+  if (!ankle_m || !resting_m || hips_m < toes_m.value_or(*resting_m) ||
+      hips_m - *resting_m > kMaxAnkle * *ankle_m) {
+    return standing_m(in_t);
+  }
+  return *ankle_m + (hips_m - *resting_m);
 }
 
 }  // namespace
@@ -91,10 +137,17 @@ Result<> Avatar::set_skeleton(Part part, std::shared_ptr<const Skeleton> skeleto
   Source& source = sources_[index_of(part)];
   source = {};
   if (skeleton == nullptr) return {};
-  auto canonical =
-      TRY(motion::canonical_skeleton(figure_ == nullptr ? *skeleton : *figure_, top_of(part)));
+  auto canonical = TRY(figure_ == nullptr ? motion::canonical_skeleton(*skeleton, top_of(part))
+                                          : motion::resting_skeleton(*figure_, top_of(part)));
   const std::string name = in_quotes(skeleton->name);
-  auto bound = TRY(motion::Retarget::bind(std::move(skeleton), canonical));
+  auto bound = TRY(motion::Retarget::bind(skeleton, canonical));
+  if (part == Part::kBody && figure_ != nullptr) {
+    const auto performer = motion::canonical_skeleton(*skeleton);
+    const auto avatar = TRY(motion::canonical_skeleton(*figure_));
+    const auto from_m = performer ? standing_m(**performer) : std::nullopt;
+    const auto to_m = standing_avatar_m(*figure_, *avatar);
+    if (from_m && to_m) source.rise_m = static_cast<float>(*to_m - bound.scale() * *from_m);
+  }
   for (std::size_t j = 0; j < canonical->joints.size(); ++j) {
     const Joint& joint = canonical->joints[j];
     const auto bone = sent_bone(*joint.bone);
@@ -133,7 +186,9 @@ void Avatar::write(vmc::DatagramWriter& writer) const noexcept {
   for (std::size_t bone = 0; bone < vmc::kBoneCount; ++bone) {
     const auto [source, moved] = chosen[bone];
     if (source == nullptr) continue;
-    writer.bone(bone, bone == vmc::kHips ? source->pose.root_position_m : moved->offset_m,
+    Vec3f hips_m = source->pose.root_position_m;
+    hips_m[1] += source->rise_m;
+    writer.bone(bone, bone == vmc::kHips ? hips_m : moved->offset_m,
                 source->pose.rotation_xyzw[moved->joint]);
   }
 }

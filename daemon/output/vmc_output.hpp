@@ -45,7 +45,8 @@ class Avatar {
  public:
   // With `hands_only` only the body's wrists and fingers are written, as VMC's role "assistant"
   // does.
-  // `figure` has the proportions that are sent; null: each part's own.
+  // `figure` has the proportions that are sent, and its zero pose is the one from which the bones
+  // are turned (motion::resting_skeleton()); null: each part's own, from the T-pose.
   explicit Avatar(bool hands_only, std::shared_ptr<const Skeleton> figure = nullptr)
       : hands_only_(hands_only), figure_(std::move(figure)) {}
 
@@ -57,7 +58,7 @@ class Avatar {
   bool set_pose(Part part, const Frame& frame) noexcept;
 
   // Writes the root, if there is a whole body, and all bones that have a pose, parents first. All
-  // positions but that of the hips are those of the T-pose.
+  // positions but that of the hips are those of the zero pose.
   void write(drivers::vmc::DatagramWriter& writer) const noexcept;
 
  private:
@@ -69,7 +70,8 @@ class Avatar {
   struct Source {
     std::optional<motion::Retarget> to_canonical;
     std::vector<Moved> moved;
-    Frame pose{};  // on the canonical skeleton
+    Frame pose{};         // on the canonical skeleton
+    float rise_m = 0.0F;  // of the hips, so that the soles of an avatar stand on the floor
     bool posed = false;
   };
   [[nodiscard]] bool writes(Part part, Bone bone) const noexcept;

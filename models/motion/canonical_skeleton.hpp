@@ -15,4 +15,9 @@ namespace posed::motion {
 Result<std::shared_ptr<const Skeleton>> canonical_skeleton(const Skeleton& skeleton,
                                                            Bone root = Bone::kHips);
 
+// The same bones where they are in the zero pose, in which every rotation is identity, with their T
+// frames and the place of `root` in that pose. Cold.
+Result<std::shared_ptr<const Skeleton>> resting_skeleton(const Skeleton& skeleton,
+                                                         Bone root = Bone::kHips);
+
 }  // namespace posed::motion

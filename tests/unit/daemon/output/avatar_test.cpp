@@ -125,6 +125,70 @@ TEST_CASE("with an avatar the lengths of its bones are sent, turned as the perfo
   CHECK(changed_m > 0.01);
 }
 
+TEST_CASE("an avatar is turned from how its file rests, and stands on the floor of its file") {
+  const clip::Clip walk = motion::make_walker({.seconds = 0.2}).value();
+  // Its arms hang, and its soles are 8 cm thicker than its skeleton shows.
+  auto figure = std::make_shared<Skeleton>(*motion::canonical_skeleton(*walk.skeleton).value());
+  const double thicker_m = 0.08;
+  const Eigen::Quaterniond hang = axis_rotation(Axis::kZ, -0.8);
+  for (std::size_t j = 0; j < figure->joints.size(); ++j) {
+    Joint& joint = figure->joints[j];
+    for (std::optional<Bone> bone = joint.bone; bone; bone = parent_of(*bone)) {
+      if (bone != Bone::kLeftUpperArm) continue;
+      joint.T_world_joint = hang.conjugate();
+      if (joint.bone != bone) joint.offset_m = hang * joint.offset_m;
+    }
+  }
+  REQUIRE(figure->finish());
+  const auto standing = std::make_shared<Skeleton>(*figure);
+  figure->joints[0].offset_m.y() = 2.0;  // far from the floor, so nothing says where that is
+  const Frame pose = walk.frame(5);
+  const auto heights = [&](double hips_m) {
+    standing->joints[0].offset_m.y() = hips_m;
+    std::array<double, 2> sent_m{};
+    for (const auto& skeleton : {figure, standing}) {
+      Avatar avatar(false, skeleton);
+      REQUIRE(avatar.set_skeleton(Part::kBody, walk.skeleton));
+      REQUIRE(avatar.set_pose(Part::kBody, pose));
+      sent_m[skeleton == figure ? 0 : 1] = double(written(avatar).at("Hips").position_m[1]);
+    }
+    return sent_m;
+  };
+  const auto joint_of = [&](Bone bone) -> const Joint& {
+    return figure->joints[static_cast<std::size_t>(figure->joint_of(bone))];
+  };
+  double leg_m = 0.0;  // from the hips to the toes
+  for (const Bone bone :
+       {Bone::kLeftUpperLeg, Bone::kLeftLowerLeg, Bone::kLeftFoot, Bone::kLeftToes}) {
+    leg_m -= joint_of(bone).offset_m.y();
+  }
+  const auto usual = heights(1.02 * leg_m), thick = heights(1.02 * leg_m + thicker_m);
+  CHECK(usual[0] == Approx(static_cast<double>(pose.root_position_m[1])).margin(1e-5));
+  CHECK(usual[1] == Approx(usual[0]).margin(1e-5));
+  CHECK(thick[1] == Approx(usual[0] + thicker_m).margin(1e-5));
+
+  Avatar plain(false), hanging(false, standing);
+  for (Avatar* avatar : {&plain, &hanging}) {
+    REQUIRE(avatar->set_skeleton(Part::kBody, walk.skeleton));
+    REQUIRE(avatar->set_pose(Part::kBody, pose));
+  }
+  const auto own = written(plain), sent = written(hanging);
+  // As sent, in Unity's axes: the bone's place is that of the file, its direction the performer's.
+  const Eigen::Vector3d rest = joint_of(Bone::kLeftLowerArm).offset_m;
+  CHECK(sent.at("LeftLowerArm").position_m[1] == Approx(rest.y()).margin(1e-5));
+  const auto elbow = [](const std::map<std::string, SentBone>& bones) {
+    Eigen::Quaterniond world = Eigen::Quaterniond::Identity();
+    for (const char* name :
+         {"Hips", "Spine", "Chest", "UpperChest", "LeftShoulder", "LeftUpperArm"}) {
+      const auto bone = bones.find(name);
+      if (bone != bones.end()) world = world * to_eigen_double(bone->second.rotation_xyzw);
+    }
+    const Vec3f& at_m = bones.at("LeftLowerArm").position_m;
+    return Eigen::Vector3d(world * Eigen::Vector3f(at_m.data()).cast<double>());
+  };
+  CHECK((elbow(sent) - elbow(own)).norm() < 1e-4);
+}
+
 TEST_CASE("a hand's stream replaces the fingers of the body and leaves its wrist alone") {
   const clip::Clip walk = motion::make_walker({.seconds = 0.2}).value();
   const auto hand = shared_hand(Side::kLeft);
