@@ -125,7 +125,7 @@ void Output::notify(const News& news) const {
 Result<std::unique_ptr<Output>> open_output(const config::OutputConfig& config) {
   auto wake = TRY(system::EventFd::open());
   auto opened = open_kind(config, std::move(wake));
-  if (!opened) return fail("output " + config.name + ": " + opened.error().message);
+  if (!opened) return fail("output " + config.name + ": " + opened.error().text());
   return opened;
 }
 

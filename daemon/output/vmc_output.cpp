@@ -72,18 +72,6 @@ constexpr std::size_t kBytesBesideName = 40;  // of a message in a bundle
 // A part that has been silent for longer no longer leads.
 constexpr std::int64_t kLeads_ns = kNanosPerSecond / 4;
 
-// The humanoid with the avatar's bones. A program that shows a glTF file turns its bones from how
-// they rest there, also where that is no T-pose. The joints of other clips have axes of their own.
-Result<std::shared_ptr<const Skeleton>> avatar_figure(const std::filesystem::path& path) {
-  const auto clip = TRY(clip::read_clip(path));
-  const clip::Format* format = clip::format_of(path);
-  const bool gltf = format != nullptr && format->read == clip::read_gltf;
-  auto figure =
-      gltf ? motion::resting_skeleton(*clip.skeleton) : motion::canonical_skeleton(*clip.skeleton);
-  if (!figure) return fail("has no humanoid: " + figure.error().message, path.string());
-  return figure;
-}
-
 // How far a bone is below the hips [m], the lower one of two sides; nullopt without it.
 std::optional<double> below_hips_m(const Skeleton& skeleton, Bone left, Bone right) {
   std::optional<double> below_m;
@@ -125,6 +113,22 @@ std::optional<double> standing_avatar_m(const Skeleton& resting, const Skeleton&
 }
 
 }  // namespace
+
+// The joints of clips that are no glTF have axes of their own.
+Result<std::shared_ptr<const Skeleton>> avatar_figure(const std::filesystem::path& path) {
+  const auto clip = TRY(clip::read_clip(path));
+  const clip::Format* format = clip::format_of(path);
+  const bool gltf = format != nullptr && format->read == clip::read_gltf;
+  auto figure =
+      gltf ? motion::resting_skeleton(*clip.skeleton) : motion::canonical_skeleton(*clip.skeleton);
+  if (!figure) return fail("has no humanoid: " + figure.error().message, path.string());
+  constexpr double kMinLength_m = 1e-4;
+  const bool has_length = std::ranges::any_of((*figure)->joints, [](const Joint& joint) {
+    return joint.parent >= 0 && joint.offset_m.norm() > kMinLength_m;
+  });
+  if (!has_length) return fail("its bones have no length; export it once more", path.string());
+  return figure;
+}
 
 // The wrist is the body's: a glove's own stream does not say how it is turned.
 bool Avatar::writes(Part part, Bone bone) const noexcept {

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
@@ -37,6 +38,10 @@ inline constexpr std::array<Part, kParts> kAllParts{Part::kBody, Part::kLeftHand
   constexpr std::array<std::string_view, kParts> kWords{"body", "left hand", "right hand"};
   return kWords[index_of(part)];
 }
+
+// The humanoid with the bones of an avatar's file. A program that shows a glTF file turns its bones
+// from how they rest there, also where that is no T-pose. Cold.
+Result<std::shared_ptr<const Skeleton>> avatar_figure(const std::filesystem::path& path);
 
 // One pose of the VMC protocol's humanoid, put together from a stream with the body and streams
 // with single hands. Each stream is brought onto the canonical humanoid with its own proportions,

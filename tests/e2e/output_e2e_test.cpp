@@ -112,6 +112,34 @@ class OscDump {
 
 }  // namespace
 
+TEST_CASE("an avatar that cannot be used is said by its name before the daemon runs") {
+  StillServed served;
+  served.write_output(
+      "[[output]]\nkind = \"vmc\"\nbody = \"ann\"\nto = [\"127.0.0.1:9\"]\n"
+      "avatar = \"me.gltf\"\n");
+  // All of its bones are in one place.
+  std::string bones, nodes;
+  for (const char* bone : {"hips", "spine", "head"}) {
+    const std::size_t node = static_cast<std::size_t>(std::ranges::count(nodes, '{'));
+    nodes += (node == 0 ? "" : ",") + std::string("{") +
+             (node < 2 ? "\"children\":[" + std::to_string(node + 1) + "]" : "") + "}";
+    bones += (node == 0 ? "\"" : ",\"") + std::string(bone) +
+             "\":{\"node\":" + std::to_string(node) + "}";
+  }
+  const std::string flat = "{\"asset\":{\"version\":\"2.0\"},\"nodes\":[" + nodes +
+                           "],\"extensions\":{\"VRMC_vrm\":{\"humanoid\":{\"humanBones\":{" +
+                           bones + "}}}}}";
+  for (const std::string& text : {std::string("{"), flat}) {
+    std::ofstream(served.path("me.gltf")) << text;
+    for (const char* command : {"check", "run"}) {
+      const auto said = posed({command, "--config", served.path("posed.toml")});
+      INFO(said.err);
+      CHECK(said.code == 1);
+      CHECK(said.err.contains("me.gltf: "));
+    }
+  }
+}
+
 TEST_CASE("posed run sends a stream to a VMC application and reports it") {
   const auto socket = listen_at("127.0.0.1:0");
   StillServed served;

@@ -17,6 +17,7 @@
 #include "daemon/devices/about_stream.hpp"
 #include "daemon/devices/open_source.hpp"
 #include "daemon/devices/stream_stages.hpp"
+#include "daemon/output/vmc_output.hpp"
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/findings.hpp"
 #include "drivers/transport/address.hpp"
@@ -260,6 +261,11 @@ void try_all(const std::string& file, config::Reading& reading, std::vector<Find
     const auto opened = devices::open_source(source, models);
     if (!opened) reading.errors.push_back(opened.error());
     sources.push_back(findings_of(source));
+  }
+  for (const config::OutputConfig& wanted : reading.config.outputs) {
+    if (wanted.avatar.empty()) continue;
+    const auto figure = output::avatar_figure(wanted.avatar);
+    if (!figure) reading.errors.push_back(figure.error());
   }
   for (const auto& endpoint : {reading.config.publish_endpoint, reading.config.control_endpoint}) {
     if (auto free = net::check_ipc_file(endpoint); !free) reading.errors.push_back(free.error());
