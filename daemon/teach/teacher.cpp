@@ -50,6 +50,7 @@ struct Teacher::Collected {
   std::optional<clip::FramesClip> frames{};  // of a walk
   clip::HandClip hand{};                     // of a show
   clip::FrameTimes times{};
+  std::size_t seen = 0, each = 1;          // frames that came; of so many one is kept
   std::int64_t first_ns = 0, last_ns = 0;  // arrivals
   std::int64_t tell_ns = 0;                // when it is judged next
 
@@ -58,16 +59,28 @@ struct Teacher::Collected {
     const Header& header = frame.header;
     if (header.stream != pupil.stream || header.arrival_ns < marked.from_ns) return false;
     if (header.arrival_ns >= marked.until_ns) return true;
-    if (times.size() == kMaxWalkFrames || frame.skeleton != pupil.skeleton->id) return false;
+    if (frame.skeleton != pupil.skeleton->id) return false;
+    last_ns = header.arrival_ns;
+    if (first_ns == 0) first_ns = last_ns;
+    if (seen++ % each != 0) return false;
     if (marked.label.empty()) {
       frames->add(frame);
     } else {
       hand.angles.push_back(hand_angles(frame));
     }
     times.add(header);
-    last_ns = header.arrival_ns;
-    if (first_ns == 0) first_ns = last_ns;
+    thin();
     return false;
+  }
+  // A fast stream would fill the memory with what training does not look at. What is kept stays
+  // evenly spaced.
+  void thin() {
+    const double span_s = std::max(seconds(last_ns - first_ns), 1.0);
+    if (static_cast<double>(times.size()) <= kMaxKeptRate_hz * span_s) return;
+    frames->halve();
+    clip::drop_every_second(hand.angles);
+    times.halve();
+    each *= 2;
   }
   [[nodiscard]] style::TakeCheck judge(style::TrainingClip& take, std::int64_t until_ns) const {
     const std::int64_t silent_ns = std::max(first_ns - marked.from_ns, until_ns - last_ns);
@@ -182,9 +195,9 @@ Result<> Teacher::mark(const Pupil& pupil, Walk walk, double seconds, bool more)
   const std::scoped_lock lock(mutex_);
   TRY(make_room(pupil));
   const auto& walks = walks_[at(walk)];
-  std::size_t frames = 0;
-  for (const auto& kept : walks) frames += static_cast<std::size_t>(kept->clip.frames());
-  if (more && (walks.size() >= kMaxWalks || frames > kMaxKeptFrames)) {
+  std::size_t numbers = 0;
+  for (const auto& kept : walks) numbers += static_cast<std::size_t>(kept->clip.channels.size());
+  if (more && (walks.size() >= kMaxWalks || numbers > kMaxKeptNumbers)) {
     return fail(fmt::format("{} walks of this kind are enough", walks.size()));
   }
   words_of(walk).Clear();

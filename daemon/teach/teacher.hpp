@@ -4,10 +4,10 @@
 // way to all others. Whoever controls the stream then gives it the model
 // (control::RequestHandler).
 //
-// Bounds: one teaching at a time, kMaxWalks walks of each kind of at most kMaxWalk_s and
-// kMaxWalkFrames each, the shows of a SignLesson, and a ring of kTapSlots frames between the
-// publisher and the thread. What the thread cannot take in time is missing from the walk, never
-// from the stream.
+// Bounds: one teaching at a time, kMaxWalks walks of each kind of at most kMaxWalk_s at
+// kMaxKeptRate_hz and kMaxKeptNumbers in all, the shows of a SignLesson, and a ring of kTapSlots
+// frames between the publisher and the thread. What the thread cannot take in time is missing from
+// the walk, never from the stream.
 #pragma once
 
 #include <array>
@@ -37,12 +37,15 @@ namespace posed::teach {
 
 inline constexpr double kMinWalk_s = 6.0;
 inline constexpr double kMaxWalk_s = 120.0;
-inline constexpr std::size_t kMaxWalks = 8;            // of each kind
-inline constexpr std::size_t kMaxKeptFrames = 57'600;  // of a kind; then no further walk
+inline constexpr std::size_t kMaxWalks = 8;  // of each kind
+// Values of all channels that are kept of a kind; then no further walk.
+inline constexpr std::size_t kMaxKeptNumbers = 1'000'000;
 inline constexpr double kMinShow_s = 3.0;
 inline constexpr double kMaxShow_s = 15.0;
-inline constexpr std::size_t kMaxWalkFrames = 28'800;  // two minutes at 240 Hz
-inline constexpr std::size_t kTapSlots = 1024;         // four seconds at 240 Hz
+// Frames a second that are kept of a walk or show: of a faster stream every second, fourth, ...
+// one. Training looks at 30.
+inline constexpr double kMaxKeptRate_hz = 80.0;
+inline constexpr std::size_t kTapSlots = 1024;  // four seconds at 240 Hz
 
 enum class Walk : std::uint8_t { kNeutral, kStyle };
 enum class Subject : std::uint8_t { kStyle, kSigns };

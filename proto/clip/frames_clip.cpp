@@ -107,6 +107,11 @@ void FramesClip::add(const Frame& frame, const Timecode& timecode) {
   timecode_.push_back(timecode);
 }
 
+void FramesClip::halve() {
+  if (!row_.empty()) drop_every_second(values_, row_.size());
+  drop_every_second(timecode_);
+}
+
 void FramesClip::add_angles(const Frame& frame) {
   std::size_t angle = 0;
   for (std::size_t c = 0; c < row_.size();) {
@@ -179,6 +184,11 @@ Result<Clip> FramesClip::finish(const std::string& path, double rate_hz,
     clip.timecode = timecode_;
   }
   return clip;
+}
+
+void FrameTimes::halve() {
+  drop_every_second(arrival_ns_);
+  drop_every_second(device_ns_);
 }
 
 std::vector<double> FrameTimes::in_seconds() const {

@@ -3,6 +3,7 @@
 // of the skeleton keep the joint's offset.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -15,6 +16,16 @@
 
 namespace posed::clip {
 
+// Drops every second entry, from the second one on; each has `width` values.
+template <typename Value>
+void drop_every_second(std::vector<Value>& values, std::size_t width = 1) {
+  std::size_t kept = 0;
+  for (std::size_t at = 0; at < values.size(); at += 2 * width, kept += width) {
+    std::copy_n(values.begin() + std::ptrdiff_t(at), width, values.begin() + std::ptrdiff_t(kept));
+  }
+  values.resize(kept);
+}
+
 class FramesClip {
  public:
   explicit FramesClip(const std::shared_ptr<const Skeleton>& skeleton);
@@ -22,6 +33,9 @@ class FramesClip {
   // Adds a frame of the skeleton. A channel without a value becomes NaN.
   void add(const Frame& frame) { add(frame, frame.timecode); }
   void add(const Frame& frame, const Timecode& timecode);
+
+  // Drops every second frame, from the second one on.
+  void halve();
 
   // `time_s` holds the time of every frame, increasing. `rate_hz` is the rate of the clip; 0: one
   // over the median step. Fails with fewer than two frames.
@@ -46,6 +60,7 @@ class FrameTimes {
     arrival_ns_.push_back(header.arrival_ns);
     device_ns_.push_back(header.device_ns);
   }
+  void halve();  // as FramesClip::halve()
   [[nodiscard]] std::size_t size() const { return arrival_ns_.size(); }
   // Since the first one: device times if all frames have them and they increase, because a device's
   // time restarts with each link; else arrival times.
