@@ -83,6 +83,10 @@ void ControlServer::serve() {
       busy = true;
     }
     while (handle_ack()) busy = true;
+    if (handler_.is_listing()) {
+      busy = true;
+      if (auto reply = handler_.list_on()) send(*reply);
+    }
     handler_.use_taught();
     const std::int64_t due_ns = handler_.forget_old(system::monotonic_ns());
     if (!busy) sleep(milliseconds_until(due_ns));

@@ -82,13 +82,18 @@ Result<std::vector<FolderModel>> ModelFolder::list() const {
   std::error_code error;
   std::filesystem::directory_iterator entries(folder_, error);
   for (; !error && entries != std::filesystem::directory_iterator(); entries.increment(error)) {
-    if (auto model = model_at(*entries)) models.push_back(std::move(*model));
+    // Of a folder of very many files only those that are listed are looked at and kept.
+    const std::string name = entries->path().filename().string();
+    if (models.size() == kMaxModels && name >= models.back().name) continue;
+    auto model = model_at(*entries);
+    if (!model) continue;
+    models.insert(std::ranges::upper_bound(models, name, {}, &FolderModel::name),
+                  std::move(*model));
+    if (models.size() > kMaxModels) models.pop_back();
   }
   if (error) {
     return fail("the folder of models cannot be read: " + error.message(), folder_.string());
   }
-  std::ranges::sort(models, {}, &FolderModel::name);
-  if (models.size() > kMaxModels) models.resize(kMaxModels);
   return models;
 }
 

@@ -29,6 +29,9 @@ namespace {
 
 using devices::in_stream;
 constexpr std::size_t kMaxKnownWords = 512;
+// A folder of large models takes long to read: other requests come in between.
+constexpr std::int64_t kListing_ns = kNanosPerSecond / 20;
+constexpr std::size_t kMaxListings = 16;
 constexpr std::string_view kNoModel = "none";  // names of models have an ending
 using pipeline::Command;
 using pipeline::DeviceCommand;
@@ -83,6 +86,14 @@ ParameterValue value_of(const ParameterSpec& spec, double number) {
 
 }  // namespace
 
+// A list of models that is under way.
+struct RequestHandler::Listing {
+  Requester to;
+  std::vector<FolderModel> models;
+  std::size_t next = 0;  // of `models`
+  v1::ControlReply reply{};
+};
+
 ControlledStream known_stream(const config::StreamConfig& config, const std::string& source) {
   ControlledStream stream;
   stream.stream = pipeline::kNoStream;
@@ -129,7 +140,7 @@ RequestHandler::Answer RequestHandler::answer_to(const v1::ControlRequest& reque
     return reply;
   }
   if (request.has_take()) return mark_take(request);
-  if (request.has_list_models()) return list_models();
+  if (request.has_list_models()) return list_models(requester);
   if (request.has_teach()) return teach(request);
   if (request.has_fit_glove()) return fit_glove(request, requester);
   if (request.has_rename_model() || request.has_delete_model()) return change_models(request);
@@ -187,13 +198,26 @@ RequestHandler::Answer RequestHandler::mark_take(const v1::ControlRequest& reque
   return reply;
 }
 
-RequestHandler::Answer RequestHandler::list_models() {
-  const auto known = TRY(models_.list());
+RequestHandler::Answer RequestHandler::list_models(const Requester& requester) {
+  Listing listing{.to = requester, .models = TRY(models_.list())};
+  if (add_models(listing)) return std::move(listing.reply);
+  const std::scoped_lock lock(listings_mutex_);
+  if (listings_.size() >= kMaxListings) {
+    return fail("other clients ask for the models just now; ask again in a moment");
+  }
+  listings_.push_back(std::make_unique<Listing>(std::move(listing)));
+  return std::nullopt;
+}
+
+// Adds models to the reply for some time, one at least; a large one takes a second. Returns whether
+// all are there.
+bool RequestHandler::add_models(Listing& listing) {
   const Figures there = figures();
-  v1::ControlReply reply;
-  for (const FolderModel& model : known) {
+  const std::int64_t end_ns = clock_() + kListing_ns;
+  while (listing.next < listing.models.size()) {
+    const FolderModel& model = listing.models[listing.next++];
     pulse_.beat();
-    v1::KnownModel& entry = *reply.add_model();
+    v1::KnownModel& entry = *listing.reply.add_model();
     entry.set_name(model.name);
     entry.set_kind(std::string(model.kind));
     const ModelWords words = words_of(model, there);
@@ -201,8 +225,28 @@ RequestHandler::Answer RequestHandler::list_models() {
     entry.set_skeleton(words.skeleton);
     entry.set_verdict(words.verdict);
     entry.set_strip(words.strip);
+    if (clock_() > end_ns) break;
   }
-  return reply;
+  return listing.next == listing.models.size();
+}
+
+bool RequestHandler::is_listing() {
+  const std::scoped_lock lock(listings_mutex_);
+  return !listings_.empty();
+}
+
+std::optional<Reply> RequestHandler::list_on() {
+  std::unique_ptr<Listing> listing;
+  {
+    const std::scoped_lock lock(listings_mutex_);
+    if (listings_.empty()) return std::nullopt;
+    listing = std::move(listings_.front());
+    listings_.pop_front();
+  }
+  if (add_models(*listing)) return make_reply(std::move(listing->to), std::move(listing->reply));
+  const std::scoped_lock lock(listings_mutex_);
+  listings_.push_back(std::move(listing));
+  return std::nullopt;
 }
 
 RequestHandler::Figures RequestHandler::figures() {

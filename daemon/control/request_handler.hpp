@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -121,11 +122,11 @@ class RequestHandler {
   RequestHandler& operator=(const RequestHandler&) = delete;
 
   // Handles one request. The reply is returned at once, or later by acknowledge() if the pipeline
-  // has to act first. Bytes that are not a valid request get a reply with an error sentence, never
-  // a crash.
+  // has to act first, or by list_on(). Bytes that are not a valid request get a reply with an error
+  // sentence, never a crash.
   [[nodiscard]] std::optional<Reply> handle(Requester requester, std::span<const std::byte> bytes);
 
-  // Of the control thread, which beats for each request; list_models() does for each model.
+  // Of the control thread, which beats for each request, and for each model of a list.
   [[nodiscard]] system::Pulse& pulse() noexcept { return pulse_; }
 
   // Forgets uploads that have stalled. Returns when to call it next at the latest.
@@ -137,6 +138,11 @@ class RequestHandler {
 
   // The pipeline has applied a command: returns its reply, and frees the model that it replaced.
   [[nodiscard]] std::optional<Reply> acknowledge(const pipeline::Ack& ack);
+
+  // Whether lists of models are under way: list_on() goes on with one of them for some time, and
+  // returns its reply once it is whole.
+  [[nodiscard]] bool is_listing();
+  [[nodiscard]] std::optional<Reply> list_on();
 
   // A stream comes. If its slot has an earlier generation, requests no longer reach that one.
   void add_stream(ControlledStream stream);
@@ -205,7 +211,9 @@ class RequestHandler {
   Answer fit_glove(const v1::ControlRequest& request, const Requester& requester);
   Result<std::shared_ptr<const v1::GloveFit>> judge_or_use(const v1::ControlRequest& request,
                                                            const Requester& requester);
-  Answer list_models();
+  Answer list_models(const Requester& requester);
+  struct Listing;
+  bool add_models(Listing& listing);
   using Figures = std::vector<std::shared_ptr<const Skeleton>>;
   [[nodiscard]] Figures figures();  // of the bodies that are there
   ModelWords words_of(const FolderModel& model, const Figures& figures);
@@ -254,7 +262,9 @@ class RequestHandler {
   std::mutex words_mutex_;
   std::map<std::string, std::pair<std::string, ModelWords>> words_;
   std::vector<std::uint32_t> drawn_on_;  // ids of the figures that were known for them
-  std::mutex mutex_;                     // guards all below
+  std::mutex listings_mutex_;
+  std::deque<std::unique_ptr<Listing>> listings_;
+  std::mutex mutex_;  // guards all below
   Streams streams_;
   std::map<std::string, ControlledStream> known_;  // by name, also those that are there
   // Those that were sent last and are in use by the reader, by number of the source.

@@ -105,6 +105,42 @@ struct Fixture {
   }
 };
 
+TEST_CASE("while the models of a folder are read, other requests are answered") {
+  const test::TempFolder folder;
+  for (const char* name : {"c.style", "a.style", "b.style"}) {
+    REQUIRE(write_whole_file(folder.path() / name, "no model"));
+  }
+  // Each look at the clock takes a second.
+  const Clock slow = []() noexcept {
+    static std::atomic<std::int64_t> now_ns{0};
+    return now_ns += kNanosPerSecond;
+  };
+  FakeDaemonControl daemon_control;
+  HandlerRig rig(three_streams(), daemon_control, ModelFolder::open(folder.path()).value(), slow);
+  v1::ControlRequest request;
+  request.mutable_list_models();
+  const auto ask = [&] {
+    const std::string bytes = request.SerializeAsString();
+    return rig.handler.handle({"me"}, std::as_bytes(std::span(bytes)));
+  };
+  CHECK_FALSE(rig.handler.is_listing());
+  CHECK_FALSE(ask());
+  CHECK(rig.handler.is_listing());
+  CHECK_FALSE(rig.handler.list_on());
+  request.mutable_status();
+  CHECK(reply_of(ask()).ok());
+  const v1::ControlReply reply = reply_of(rig.handler.list_on());
+  CHECK_FALSE(rig.handler.is_listing());
+  REQUIRE(reply.model_size() == 3);
+  CHECK(reply.model(0).name() == "a.style");
+  CHECK(reply.model(2).name() == "c.style");
+  // Many who ask at once are told to come again.
+  request.mutable_list_models();
+  int waiting = 0;
+  while (!ask()) REQUIRE(++waiting <= 100);
+  CHECK(waiting == 16);
+}
+
 TEST_CASE("teaching is refused, before anybody walks, where it could not end well") {
   const test::TempFolder folder;
   teach::Teacher teacher(
