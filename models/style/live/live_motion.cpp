@@ -13,7 +13,8 @@ constexpr double kMemory_s = 0.4;        // time constant of means, variances an
 constexpr double kMinSeen_s = 0.4;       // about a step
 constexpr double kMinHeight_m = 1e-3, kMinApart_rad = 1e-2;  // standard deviations
 constexpr double kSmooth_s = 0.05;  // time constant of the signal's low-pass
-constexpr double kPart_s = 0.1;     // four of them: the legs rest for less within a stride
+constexpr double kPart_s = 0.1;
+constexpr double kTurnsBack_strides = 0.3;  // within a stride the legs rest for less
 constexpr double kFirstTurn_s = 1.0 / 30.0, kBetweenTurns_s = 1.0 / 15.0;
 constexpr double kMinSpan_s = 0.3;  // for a cadence
 constexpr double kRounding_s = 1e-6;
@@ -88,6 +89,9 @@ RT_SAFE void LiveStride::update(double leg_rad, double dt_s, double cadence_rad_
       leg_rad - slope_rad + (level_rad_ - leg_rad_ + slope_rad) * std::exp(-dt_s / kSmooth_s);
   leg_rad_ = leg_rad;
   speed_rad_ = (leg_rad_ - level_rad_) / (kSmooth_s * cadence_rad_s);
+  const double window_s = std::min(static_cast<double>(kParts - 2) * kPart_s,
+                                   kTurnsBack_strides * 2.0 * std::numbers::pi / cadence_rad_s);
+  parts_ = static_cast<std::size_t>(part_at(window_s, kPart_s)) + 2;
   const double before_s = std::exchange(time_s_, time_s_ + dt_s);
   keep_speed(before_s);
   keep_turn(before_s);
@@ -121,7 +125,8 @@ RT_SAFE void LiveStride::turn_back() noexcept {
 
 // A pose of long steps that is held has a level but no speed.
 double LiveStride::swing_rad() const noexcept {
-  return std::min(std::hypot(level_rad_, speed_rad_), *std::ranges::max_element(fastest_rad_));
+  const auto end = fastest_rad_.begin() + static_cast<std::ptrdiff_t>(parts_);
+  return std::min(std::hypot(level_rad_, speed_rad_), *std::max_element(fastest_rad_.begin(), end));
 }
 
 double LiveStride::cadence_rad_s() const noexcept {

@@ -62,8 +62,8 @@ class LiveGait {
 // stride.
 class LiveStride {
  public:
-  // The leg signal [rad] `dt_s` after the last one. `cadence_rad_s` is a usual one; it brings the
-  // speed to the scale of the signal.
+  // The leg signal [rad] `dt_s` after the last one. `cadence_rad_s`, the walker's or else a usual
+  // one, brings the speed to the scale of the signal.
   void update(double leg_rad, double dt_s, double cadence_rad_s) noexcept;
 
   // Half the distance between the extremes of the swing [rad]; 0 where the legs rest, in any pose.
@@ -86,17 +86,18 @@ class LiveStride {
   struct Turn {
     double time_s, angle_rad;
   };
-  static constexpr std::size_t kParts = 4;  // of the window that the largest speed is of
+  static constexpr std::size_t kParts = 8;  // of the longest window that the largest speed is of
   static constexpr std::size_t kTurns = 9;  // angles that are kept
 
   void keep_speed(double before_s) noexcept;
   void keep_turn(double before_s) noexcept;
 
   bool started_ = false;
-  double leg_rad_ = 0.0;    // the signal
-  double level_rad_ = 0.0;  // smoothed
-  double speed_rad_ = 0.0;  // its speed over the cadence
-  std::array<double, kParts> fastest_rad_{};
+  double leg_rad_ = 0.0;                      // the signal
+  double level_rad_ = 0.0;                    // smoothed
+  double speed_rad_ = 0.0;                    // its speed over the cadence
+  std::array<double, kParts> fastest_rad_{};  // of each part, the newest first
+  std::size_t parts_ = kParts;                // those of the window
   double time_s_ = 0.0, angle_rad_ = 0.0;
   std::array<Turn, kTurns> turn_{};  // turn_[turns_ % kTurns] is the oldest or not there yet
   std::size_t turns_ = 0;

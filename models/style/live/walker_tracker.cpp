@@ -138,7 +138,7 @@ RT_SAFE void Gate::see_legs(const TrainedMotion& known, const Frame& frame,
   }
   if (!known.legs() || !known.legs()->measured(frame)) return;
   const double leg_rad = leg_rad_ = known.legs()->value_rad(frame);
-  stride_.update(leg_rad, dt_s, known.cadence_rad_s());
+  stride_.update(leg_rad, dt_s, pace_rad_s(known));
   const double height_m = known.height_m(frame);
   if (std::isfinite(height_m)) gait_.update(height_m, leg_rad, dt_s);
   seen_.swing_rad = stride_.swing_rad();
@@ -168,6 +168,13 @@ RT_SAFE void Gate::see_legs(const TrainedMotion& known, const Frame& frame,
     of_cadence_ = of_slow * (1.0 - of_run(known, ratio));
   }
   of_legs_ = (1.0 - rest) * of_cadence_;
+}
+
+// At which the legs stride; a usual one while that is not known, and for a run.
+RT_SAFE double Gate::pace_rad_s(const TrainedMotion& known) const noexcept {
+  const double usual_rad_s = known.cadence_rad_s();
+  if (cadence_rad_s_ == 0.0) return usual_rad_s;
+  return std::clamp(steady_rad_s_, kSlow * usual_rad_s, usual_rad_s);
 }
 
 // 1 where legs or body rest.

@@ -107,6 +107,7 @@ class Gate {
     double swing_rad = std::numeric_limits<double>::quiet_NaN();
     double speed_deg_s = std::numeric_limits<double>::quiet_NaN();
   };
+  [[nodiscard]] double pace_rad_s(const TrainedMotion& known) const noexcept;
   [[nodiscard]] static double of_rest(const TrainedMotion& known, const Evidence& seen) noexcept;
   [[nodiscard]] double of_run(const TrainedMotion& known, double cadence) const noexcept;
   void follow(const TrainedMotion* known, const Evidence& from, double dt_s) noexcept;

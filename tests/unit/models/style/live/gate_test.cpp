@@ -147,6 +147,17 @@ TEST_CASE("strides like the training's open the gate, rest and a run close it", 
   CHECK(walk.walk(gate, {.speed = 1.6}) == 1.0F);  // the very poses of training at another pace
 }
 
+TEST_CASE("legs that stride slowly do not rest between steps", "[style]") {
+  WalkingGate walk;
+  style::Gate gate;
+  float least = 1.0F;
+  for (int i = 0; i < 8 * kGateRate_hz; ++i) {
+    walk.step(gate, i, {.speed = 0.6});
+    if (i > 2 * kGateRate_hz) least = std::min(least, gate.open());
+  }
+  CHECK(least == 1.0F);
+}
+
 TEST_CASE("how the pelvis moves tells a run from a walk, at the same pace", "[style]") {
   const Walking slow_run{.speed = 1.1, .away_deg = 12.0, .rise_m_rad = 0.1};
   const Walking quick_walk{.speed = 1.35, .away_deg = 12.0, .rise_m_rad = -0.1};
