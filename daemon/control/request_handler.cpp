@@ -199,7 +199,8 @@ RequestHandler::Answer RequestHandler::mark_take(const v1::ControlRequest& reque
 }
 
 RequestHandler::Answer RequestHandler::list_models(const Requester& requester) {
-  Listing listing{.to = requester, .models = TRY(models_.list())};
+  auto models = TRY(models_.list());
+  Listing listing{.to = requester, .models = std::move(models)};
   if (add_models(listing)) return std::move(listing.reply);
   const std::scoped_lock lock(listings_mutex_);
   if (listings_.size() >= kMaxListings) {
