@@ -50,6 +50,7 @@ std::optional<BoneJoints> find_hand(const Figure& figure, const std::vector<Join
 // From a neck to its head at most, as part of the way from the chest to the head: a joint without
 // an end site behind the first one is a head if it is as near, else the end of one.
 constexpr double kNeck = 0.4;
+constexpr double kNeckOfThigh = 0.28;  // or as part of a thigh, whatever the chest's place
 
 // Whether the joint is one more of those that its maker counts, as "spine.006" is, and no farther
 // away than they are from each other: the end of a head is.
@@ -95,6 +96,9 @@ std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>&
   };
   const int first = *std::ranges::max_element(rest, {}, length);
   std::vector<int> chain;
+  const double thigh = figure.between(bones[Bone::kLeftUpperLeg], bones[Bone::kLeftLowerLeg])
+                           .value_or(Vec::Zero())
+                           .norm();
   Vec way = Vec::Zero();
   for (const int j : figure.main_chain(first)) {
     const Vec step = figure.between(chest, j).value_or(Vec::Zero()) - way;
@@ -106,8 +110,9 @@ std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>&
     }
     way += step;
     const bool ends = figure.children(j).empty() && figure.end_length(j) <= 0.0;
-    const bool is_head = chain.size() == 1 ? step.norm() <= kNeck * way.norm()
-                                           : chain.size() > 1 && goes_on(figure, names, j);
+    const double neck = std::max(kNeck * way.norm(), kNeckOfThigh * thigh);
+    const bool is_head =
+        chain.size() == 1 ? step.norm() <= neck : chain.size() > 1 && goes_on(figure, names, j);
     const bool tip = ends && !is_head;
     if (!tip && !names[j].has("end") && !names[j].has("nub")) chain.push_back(j);
     const auto is_twin = [&figure](int child) { return has_twin(figure, child); };
@@ -359,7 +364,7 @@ void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJ
     const bool is_piece =
         names[hips].has("root") && names[j].stem != names[hips].stem && !is_trunk(names[j]);
     const bool is_root = names[j].has("root") && (is_piece || lies_at(figure, hips, j));
-    return !names[j].helper && !is_root;
+    return (j == chest || !names[j].helper) && !is_root;  // what turns both arms is a bone
   });
   keep_if_any(neck, [&names](int j) {
     return !names[j].helper || names[j].has("twist") || is_neck(names[j]);

@@ -1,4 +1,5 @@
 #include <cmath>
+#include <set>
 #include <span>
 
 #include "proto/rig/bones.hpp"
@@ -39,6 +40,20 @@ bool leads_on(const Figure& figure, int joint, int before) {
   const int more = figure.main_chain_length(joint) - figure.main_chain_length(before);
   if (more != 0 || figure[joint].parent != figure[before].parent) return more > 0;
   return figure[joint].offset.norm() > 1.01 * figure[before].offset.norm();
+}
+
+// Whether the name is another's with a number more, as of one pair of arms "L_Arm2" is beside
+// "L_Arm": what is not numbered comes first.
+std::vector<bool> copies_in(const std::vector<JointName>& names) {
+  std::set<std::pair<NameSide, std::string_view>> plain;
+  for (const JointName& name : names) {
+    if (name.digits.empty()) plain.emplace(name.side, name.stem);
+  }
+  std::vector<bool> out;
+  for (const JointName& name : names) {
+    out.push_back(!name.digits.empty() && plain.contains({name.side, name.stem}));
+  }
+  return out;
 }
 
 std::array<int, kSlots> best_chain(const Figure& figure,
@@ -252,12 +267,17 @@ void settle_pieces(const Figure& figure, const std::vector<JointName>& names, st
 }  // namespace
 
 void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJoints& bones) {
+  const auto copies = copies_in(names);
   const auto find = [&](Side side, Bone first, auto fit_of,
                         const std::array<bool, kSlots>& needed) {
     const NameSide wanted = side == Side::kLeft ? NameSide::kLeft : NameSide::kRight;
     std::vector<std::optional<Fit>> fits(names.size());
     for (std::size_t j = 0; j < names.size(); ++j) {
       if (names[j].side == wanted) fits[j] = fit_of(names[j]);
+      constexpr double kCopy = 0.99;  // a fit's part; more than some levels of the tree count
+      if (fits[j] && copies[j]) {
+        for (double& fit : *fits[j]) fit *= kCopy;
+      }
     }
     const std::size_t end = first == Bone::kLeftUpperLeg ? 2 : 3;  // foot or hand
     drop_marks(figure, end, fits);

@@ -27,7 +27,7 @@ const Words& noise() {
   static const Words words = words_of(
       "jnt joint bone bn def org mch drv sk skel bip bip01 bip001 biped valvebiped mixamorig rig "
       "character actor cc base rl fk stretch bend x c j b m node deform std human humanoid main "
-      "ref cf n");
+      "ref cf n xy xz yx yz zx zy");
   return words;
 }
 

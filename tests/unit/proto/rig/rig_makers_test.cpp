@@ -1156,6 +1156,62 @@ TEST_CASE("rig: a finger's joint called after the tip of its segment is a bone")
   CHECK(!rig.bone[knuckle + 3]);
 }
 
+TEST_CASE("rig: a neck and a head that no name tells need no end of the head") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  auto& joints = made.input.joints;
+  made.input.poses = {};
+  for (std::size_t j = 0; j < joints.size(); ++j) joints[j].name = "J" + std::to_string(j);
+  joints[static_cast<std::size_t>(Bone::kHead)].end_site.reset();
+  joints[static_cast<std::size_t>(Bone::kNeck)].offset.y() = 8;  // of a spine that ends high
+  const rig::Rig rig = rig::recognise(made.input);
+  CHECK(rig.bone[static_cast<std::size_t>(Bone::kNeck)] == Bone::kNeck);
+  CHECK(rig.bone[static_cast<std::size_t>(Bone::kHead)] == Bone::kHead);
+}
+
+TEST_CASE("rig: the joint that carries both arms is a bone, though it is called a top") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  made.input.joints[static_cast<std::size_t>(Bone::kUpperChest)].name = "Spine_Top";
+  check_made(made, UpAxis::kPlusY, 0.01);
+}
+
+TEST_CASE("rig: a second pair of arms is one whose names have a number more") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  std::vector<rig::RigJoint> more;
+  for (const int first : {6, 10}) {
+    int parent = static_cast<int>(Bone::kChest);
+    for (int b = first; b < first + 4; ++b) {
+      more.push_back(made.input.joints[b]);
+      more.back().name += '2';
+      more.back().parent = parent;
+      parent = static_cast<int>(made.input.joints.size() + more.size()) - 1;
+    }
+  }
+  add_joints(made, more);
+  made.input.poses = {};
+  const rig::Rig rig = rig::recognise(made.input);
+  for (int b = 0; b < test::kMakerJoints; ++b) {
+    INFO(made.input.joints[b].name);
+    CHECK(rig.bone[b] == static_cast<Bone>(b));
+  }
+}
+
+TEST_CASE("rig: axes in a name say nothing") {
+  auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+  made.input.poses = {};
+  for (const bool left : {true, false}) {
+    const auto thigh = static_cast<std::size_t>(left ? Bone::kLeftUpperLeg : Bone::kRightUpperLeg);
+    const std::array names{"femurYZ", "femurX", "tibia", "talus"};
+    for (std::size_t k = 0; k < names.size(); ++k) {
+      made.input.joints[thigh + k].name = std::string(left ? "l" : "r") + names[k];
+    }
+  }
+  const rig::Rig rig = rig::recognise(made.input);
+  const auto first = static_cast<std::size_t>(Bone::kLeftUpperLeg);
+  CHECK(rig.bone[first] == Bone::kLeftUpperLeg);
+  CHECK(!rig.bone[first + 1]);
+  CHECK(rig.bone[first + 2] == Bone::kLeftLowerLeg);
+}
+
 TEST_CASE("rig: any input ends in an answer") {
   const auto answer = [](const rig::RigInput& input) {
     const rig::Rig rig = rig::recognise(input);
