@@ -1,7 +1,9 @@
 #include "proto/rig/recognise.hpp"
 
 #include <cmath>
+#include <utility>
 
+#include "proto/rig/borrow.hpp"
 #include "proto/text/lower.hpp"
 
 namespace posed::rig {
@@ -205,18 +207,19 @@ bool knows_all_frames(const RigInput& input, const std::vector<std::optional<Bon
   return true;
 }
 
-}  // namespace
-
-Rig recognise(const RigInput& input) {
+Rig empty_rig(const RigInput& input) {
   Rig rig;
   rig.bone.resize(input.joints.size());
   rig.T.resize(input.joints.size(), Eigen::Quaterniond::Identity());
   rig.evidence.resize(input.joints.size());
   rig.metres_per_unit = input.metres_per_unit;
-  if (!is_sane(input.joints)) return rig;
-  const Figure figure(input.joints);
-  const auto names = parse_names(names_of(input.joints));
-  FoundBones found = input.bones.empty() ? find_bones(figure, names) : known_bones(input.bones);
+  return rig;
+}
+
+// What is recognised of a figure whose bones are found.
+Rig recognise_found(const RigInput& input, const Figure& figure,
+                    const std::vector<JointName>& names, FoundBones found) {
+  Rig rig = empty_rig(input);
   const Motion motion(figure, input.poses);
   if (found.kind == Kind::kPerson && input.bones.empty() &&
       is_animal(figure, motion, found.joint)) {
@@ -256,6 +259,28 @@ Rig recognise(const RigInput& input) {
   }
   collect(input, frames, rig);
   doubt_places(found, rig);
+  return rig;
+}
+
+}  // namespace
+
+Rig recognise(const RigInput& input) {
+  if (!is_sane(input.joints)) return empty_rig(input);
+  const Figure figure(input.joints);
+  const auto names = parse_names(names_of(input.joints));
+  FoundBones found = input.bones.empty() ? find_bones(figure, names) : known_bones(input.bones);
+  const auto whole = found.kind == Kind::kPart && input.bones.empty()
+                         ? with_borrowed_limbs(input, figure, names, found.joint)
+                         : std::nullopt;
+  if (!whole) return recognise_found(input, figure, names, std::move(found));
+  const Figure person(whole->input.joints);
+  FoundBones bones = find_bones(person, whole->names);
+  if (bones.kind != Kind::kPerson) return recognise_found(input, figure, names, std::move(found));
+  bones.notes.insert(bones.notes.begin(), whole->notes.begin(), whole->notes.end());
+  Rig rig = recognise_found(whole->input, person, whole->names, std::move(bones));
+  rig.bone.resize(input.joints.size());
+  rig.T.resize(input.joints.size());
+  rig.evidence.resize(input.joints.size());
   return rig;
 }
 

@@ -1212,6 +1212,45 @@ TEST_CASE("rig: axes in a name say nothing") {
   CHECK(rig.bone[first + 2] == Bone::kLeftLowerLeg);
 }
 
+TEST_CASE("rig: a person who lacks an arm or a leg faces, stands and measures as with it") {
+  constexpr int kLimb = 4;
+  std::mt19937 random(34);
+  for (const int first : {6, 10, 14, 18}) {
+    for (const ZeroPose zero : {ZeroPose::kT, ZeroPose::kA, ZeroPose::kArmsDown}) {
+      const bool z_up = random() % 2 == 0;
+      const Mat turn = Eigen::AngleAxisd(90.0 * kDegree * static_cast<double>(random() % 4),
+                                         z_up ? rig::kZ : rig::kY)
+                           .toRotationMatrix();
+      const Mat axes = turn * (z_up ? Mat(up_turn(UpAxis::kPlusZ).transpose()) : Mat::Identity());
+      const auto whole =
+          test::make(test::kSchemes[random() % test::kSchemes.size()], zero, axes, 0.01);
+      test::Made made;
+      made.input.poses.count = whole.input.poses.count;
+      const auto is_lost = [first](int b) { return b >= first && b < first + kLimb; };
+      for (int b = 0; b < test::kMakerJoints; ++b) {
+        if (is_lost(b)) continue;
+        made.bone.push_back(static_cast<Bone>(b));
+        made.T.push_back(whole.T[b]);
+        made.input.joints.push_back(whole.input.joints[b]);
+        int& parent = made.input.joints.back().parent;
+        if (parent >= first) parent -= kLimb;
+      }
+      for (int i = 0; i < made.input.poses.count * test::kMakerJoints; ++i) {
+        if (is_lost(i % test::kMakerJoints)) continue;
+        made.input.poses.rotation.push_back(whole.input.poses.rotation[i]);
+        made.input.poses.position.push_back(whole.input.poses.position[i]);
+      }
+      INFO(made.input.joints.back().name << " limb " << first << " zero "
+                                         << static_cast<int>(zero));
+      check_made(made, z_up ? UpAxis::kPlusZ : UpAxis::kPlusY, 0.01);
+      const rig::Rig rig = rig::recognise(made.input);
+      CHECK(rig.facing == axis_text(axes * rig::kZ));
+      REQUIRE_FALSE(rig.notes.empty());
+      CHECK(rig.notes[0].find("is not whole") != std::string::npos);
+    }
+  }
+}
+
 TEST_CASE("rig: any input ends in an answer") {
   const auto answer = [](const rig::RigInput& input) {
     const rig::Rig rig = rig::recognise(input);
