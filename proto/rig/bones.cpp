@@ -71,6 +71,12 @@ bool has_twin(const Figure& figure, int joint) {
   });
 }
 
+void keep_if_any(std::vector<int>& joints, const auto& is_wanted) {
+  std::vector<int> kept;
+  std::ranges::copy_if(joints, std::back_inserter(kept), is_wanted);
+  if (!kept.empty()) joints = std::move(kept);
+}
+
 // The chain above the arms that holds no arm: neck and head where neither is named.
 std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>& names,
                              const BoneJoints& bones, int chest) {
@@ -88,6 +94,12 @@ std::vector<int> chain_above(const Figure& figure, const std::vector<JointName>&
     return !names[j].helper && figure[j].offset.norm() > 0.0 && !has_twin(figure, j);
   });
   if (!likely.empty()) rest = likely;
+  // A neck goes on as the trunk does; a cape hangs.
+  const Vec trunk = figure.between(std::max(bones[Bone::kHips], 0), chest).value_or(Vec::Zero());
+  keep_if_any(rest, [&](int j) {
+    const auto tip = figure.between(chest, figure.main_chain(j).back()).value_or(Vec::Zero());
+    return tip.dot(trunk) > 0.0;
+  });
   if (rest.empty()) return {};
   const auto length = [&figure](int j) {
     double sum = 0.0;
@@ -154,12 +166,6 @@ Upper find_head(const Figure& figure, const std::vector<JointName>& names, const
   if (chain.empty()) return {.top = chest};
   notes.emplace_back("head and neck are known by their place only");
   return {.head = chain.back(), .top = chain.back()};
-}
-
-void keep_if_any(std::vector<int>& joints, const auto& is_wanted) {
-  std::vector<int> kept;
-  std::ranges::copy_if(joints, std::back_inserter(kept), is_wanted);
-  if (!kept.empty()) joints = std::move(kept);
 }
 
 // Drops joints by which the way from the hips comes back to where it was: spare ones, such as

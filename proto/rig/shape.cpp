@@ -15,10 +15,68 @@ constexpr std::array kLeg{Bone::kLeftUpperLeg, Bone::kLeftLowerLeg, Bone::kLeftF
 constexpr std::array kArm{Bone::kLeftShoulder, Bone::kLeftUpperArm, Bone::kLeftLowerArm,
                           Bone::kLeftHand};
 
+// The first segments, as far as both sides' are alike: behind them a hand may hold a prop.
+std::vector<double> shared_segments(const std::vector<double>& one,
+                                    const std::vector<double>& other) {
+  constexpr double kAlike = 0.75;
+  constexpr std::size_t kMinAlike = 3;
+  std::vector<double> out;
+  for (std::size_t i = 0; i < std::min(one.size(), other.size()); ++i) {
+    const auto [less, more] = std::minmax(one[i], other[i]);
+    if (i >= kMinAlike && less < kAlike * more) break;
+    out.push_back(less);
+  }
+  return out;
+}
+
+// Where the longest two consecutive segments of a limb begin: thigh and shin, upper and lower arm.
+// Clavicles come before an arm, so of nearly equal ones the last counts there.
+std::size_t long_bones(const std::vector<double>& segments, bool arm) {
+  std::size_t first = 0;
+  double longest = 0.0;
+  for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
+    longest = std::max(longest, std::min(segments[i], segments[i + 1]));
+  }
+  for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
+    if (std::min(segments[i], segments[i + 1]) > (arm ? 0.8 : 0.999) * longest) first = i;
+  }
+  return first;
+}
+
+double two_bones(const std::vector<double>& segments, bool arm) {
+  if (segments.size() < 2) return 0.0;
+  const std::size_t first = long_bones(segments, arm);
+  return segments[first] + segments[first + 1];
+}
+
+constexpr double kArmOfLeg = 0.63;    // upper and lower arm, of thigh and shin
+constexpr double kTrunkOfLeg = 0.45;  // from where the legs begin to where the arms do
+
+double unlike(double one, double other) {
+  return std::abs(std::log(std::max(one, 1e-9) / std::max(other, 1e-9)));
+}
+
+// Where the upper arm is among an arm's segments. Two that are longer than a leg are what the hand
+// holds.
+std::size_t upper_arm(const std::vector<double>& segments, double leg) {
+  std::size_t first = long_bones(segments, true);
+  if (segments.size() < 2 || two_bones(segments, true) <= leg) return first;
+  double least = 1e300;
+  for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
+    const double off = unlike(segments[i] + segments[i + 1], kArmOfLeg * leg) +
+                       unlike(segments[i], segments[i + 1]);
+    if (off >= least) continue;
+    least = off;
+    first = i;
+  }
+  return first;
+}
+
 // Two chains that begin at one joint and are as long as each other, as far as a limb goes: a hand
 // may hold a prop.
 struct Pair {
   double length = 0.0;
+  double as_leg = 0.0, as_arm = 0.0;  // of its two long bones
   int parent = 0;
   int one = 0, other = 0;  // where the chains begin
 };
@@ -40,7 +98,13 @@ std::optional<Pair> mirrored(const Figure& figure, int parent, int one, int othe
   }
   const double apart = std::abs(figure[one].offset.norm() - figure[other].offset.norm());
   if (!(length > 0.0) || gap >= 0.15 * length || apart >= 0.15 * length) return std::nullopt;
-  return Pair{.length = length, .parent = parent, .one = one, .other = other};
+  const auto both = shared_segments(a, b);
+  return Pair{.length = length,
+              .as_leg = two_bones(both, false),
+              .as_arm = two_bones(both, true),
+              .parent = parent,
+              .one = one,
+              .other = other};
 }
 
 std::vector<Pair> find_pairs(const Figure& figure) {
@@ -113,38 +177,27 @@ int branched_off(const Figure& figure, const Pair& legs, const Pair& arms) {
   return figure.depth(legs.parent) - figure.depth(figure.common({legs.parent, arms.parent}));
 }
 
-// The first segments, as far as both sides' are alike: behind them a hand may hold a prop.
-std::vector<double> shared_segments(const std::vector<double>& one,
-                                    const std::vector<double>& other) {
-  constexpr double kAlike = 0.75;
-  constexpr std::size_t kMinAlike = 3;
-  std::vector<double> out;
-  for (std::size_t i = 0; i < std::min(one.size(), other.size()); ++i) {
-    const auto [less, more] = std::minmax(one[i], other[i]);
-    if (i >= kMinAlike && less < kAlike * more) break;
-    out.push_back(less);
-  }
-  return out;
+// How well two pairs of limbs are a person's: the longer legs, the better, but wings, hair, capes
+// and skirts are of other sizes than arms, or begin elsewhere.
+double person_score(const Figure& figure, const Pair& legs, const Pair& arms) {
+  constexpr double kArmsDiffer = 0.15;
+  constexpr double kTrunksDiffer = 0.7;
+  const int common = figure.common({legs.parent, arms.parent});
+  const Vec trunk = figure.between(common, arms.parent).value_or(Vec::Zero()) -
+                    figure.between(common, legs.parent).value_or(Vec::Zero());
+  const double arm = std::max(0.0, unlike(arms.as_arm, kArmOfLeg * legs.as_leg) - kArmsDiffer);
+  const double body =
+      std::clamp(unlike(trunk.norm(), kTrunkOfLeg * legs.as_leg) - kTrunksDiffer, 0.0, 1.0);
+  const double off = 0.3 * branched_off(figure, legs, arms) + 1e-3 * figure.depth(legs.parent);
+  return legs.as_leg * std::exp(-(arm + body + off));
 }
 
-// Where the longest two consecutive segments of a limb begin: thigh and shin, upper and lower arm.
-// Clavicles come before an arm, so of nearly equal ones the last counts there.
-std::size_t long_bones(const std::vector<double>& segments, bool arm) {
-  std::size_t first = 0;
-  double longest = 0.0;
-  for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
-    longest = std::max(longest, std::min(segments[i], segments[i + 1]));
-  }
-  for (std::size_t i = 0; i + 1 < segments.size(); ++i) {
-    if (std::min(segments[i], segments[i + 1]) > (arm ? 0.8 : 0.999) * longest) first = i;
-  }
-  return first;
-}
-
-void set_limb(const Figure& figure, const Pair& pair, bool arm, BoneJoints& bones) {
+// `leg`: length of the legs' two bones.
+void set_limb(const Figure& figure, const Pair& pair, bool arm, double leg, BoneJoints& bones) {
   const auto one = figure.segments(figure.main_chain(pair.one));
   const auto other = figure.segments(figure.main_chain(pair.other));
-  const std::size_t first = long_bones(shared_segments(one, other), arm);
+  const auto both = shared_segments(one, other);
+  const std::size_t first = arm ? upper_arm(both, leg) : long_bones(both, false);
   for (const Side side : kSides) {
     const auto chain = figure.main_chain(side == Side::kLeft ? pair.one : pair.other);
     for (std::size_t k = 0; k < 4; ++k) {
@@ -253,7 +306,7 @@ std::optional<BoneJoints> limbs_by_shape(const Figure& figure, const std::vector
   std::vector<Pair> pairs = find_pairs(figure);
   std::erase_if(pairs,
                 [&](const Pair& p) { return without >= 0 && figure.below(without, p.parent); });
-  double best = -1e300;
+  double best = 0.0;
   const Pair* legs = nullptr;
   const Pair* arms = nullptr;
   const auto pairs_at = [&pairs](int joint) {
@@ -264,13 +317,8 @@ std::optional<BoneJoints> limbs_by_shape(const Figure& figure, const std::vector
       if (&leg == &arm || !fit_together(figure, leg, arm)) continue;
       // Many equal limbs at one joint are a spider's.
       if (leg.parent == arm.parent && pairs_at(leg.parent) > 4) continue;
-      // Arms begin above the legs: strands of a skirt do not. Wings and capes are longer than arms.
-      const int off = leg.parent == arm.parent ? 1 : branched_off(figure, leg, arm);
-      const double beside = 0.3 * leg.length * off;
-      const double too_long = std::max(0.0, arm.length - 0.85 * leg.length);
-      const double score =
-          leg.length + arm.length - 2 * too_long - beside - 0.01 * figure.depth(leg.parent);
-      if (score <= best + 1e-9) continue;
+      const double score = person_score(figure, leg, arm);
+      if (score <= best * (1 + 1e-9)) continue;
       best = score;
       legs = &leg;
       arms = &arm;
@@ -278,8 +326,8 @@ std::optional<BoneJoints> limbs_by_shape(const Figure& figure, const std::vector
   }
   if (legs == nullptr) return std::nullopt;
   BoneJoints bones;
-  set_limb(figure, *legs, false, bones);
-  set_limb(figure, *arms, true, bones);
+  set_limb(figure, *legs, false, legs->as_leg, bones);
+  set_limb(figure, *arms, true, legs->as_leg, bones);
   if (!bones.has_limbs()) return std::nullopt;
   settle_sides(figure, names, bones, sides_by);
   return bones;

@@ -1251,6 +1251,45 @@ TEST_CASE("rig: a person who lacks an arm or a leg faces, stands and measures as
   }
 }
 
+TEST_CASE("rig: without names wings, capes, long hair and weapons are no limbs") {
+  // Chains of a joint: their steps of the left side [cm].
+  struct Extra {
+    Bone at;
+    std::vector<Vec> steps;
+  };
+  const std::vector<std::vector<Extra>> extras{
+      {{Bone::kUpperChest, {{6, 5, -10}, {35, 35, -10}, {60, 10, -5}, {58, -30, 0}}}},
+      {{Bone::kHead, {{10, 12, -5}, {10, -20, -5}, {5, -35, -2}, {2, -35, -2}}}},
+      {{Bone::kLeftHand, {{5, 0, 0}, {0, 0, 50}, {0, 0, 50}}},
+       {Bone::kUpperChest, {{0, 5, -10}, {0, -35, -5}, {0, -35, -5}, {0, -35, -5}}}}};
+  for (const auto& extra : extras) {
+    auto made = test::make(test::kSchemes[0], ZeroPose::kT, Mat::Identity(), 0.01);
+    made.input.poses = {};
+    auto& joints = made.input.joints;
+    for (const auto& [at, steps] : extra) {
+      for (const Side side : rig::kSides) {
+        const bool is_middle = steps[0].x() == 0.0;
+        if (is_middle && side == Side::kRight) continue;
+        const bool on_limb = at == Bone::kLeftHand;
+        int parent = static_cast<int>(on_limb ? rig::on(side, at) : at);
+        for (Vec step : steps) {
+          if (side == Side::kRight) step.x() = -step.x();
+          joints.push_back({.name = "", .parent = parent, .offset = step, .end_site = {}});
+          parent = static_cast<int>(joints.size()) - 1;
+        }
+      }
+    }
+    for (std::size_t j = 0; j < joints.size(); ++j) joints[j].name = "J" + std::to_string(j);
+    const rig::Rig rig = rig::recognise(made.input);
+    REQUIRE(rig.kind == rig::Kind::kPerson);
+    for (int b = 0; b < test::kMakerJoints; ++b) {
+      INFO("extra " << &extra - extras.data() << ' ' << bone_name(static_cast<Bone>(b)));
+      CHECK(rig.bone[b] == static_cast<Bone>(b));
+    }
+    CHECK(worst_deg(rig, made) < 1.0);
+  }
+}
+
 TEST_CASE("rig: any input ends in an answer") {
   const auto answer = [](const rig::RigInput& input) {
     const rig::Rig rig = rig::recognise(input);
