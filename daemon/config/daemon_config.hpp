@@ -96,7 +96,7 @@ struct OutputConfig {
   // vmc
   bool vrm1_names = false;         // of blend shapes; false: those of VRM 0
   bool assistant = false;          // sends hands only
-  std::filesystem::path avatar{};  // whose proportions are sent; empty: the performer's
+  std::filesystem::path avatar{};  // whose bones, rest pose and floor count; empty: the performer's
   // bvh, axis
   bool binary = false;                    // messages of Axis Neuron; false: lines of text
   std::string listen = "127.0.0.1:7002";  // where clients connect over TCP, unless `to` names some;

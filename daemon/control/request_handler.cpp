@@ -199,13 +199,18 @@ RequestHandler::Answer RequestHandler::mark_take(const v1::ControlRequest& reque
 }
 
 RequestHandler::Answer RequestHandler::list_models(const Requester& requester) {
-  auto models = TRY(models_.list());
-  Listing listing{.to = requester, .models = std::move(models)};
-  if (add_models(listing)) return std::move(listing.reply);
-  const std::scoped_lock lock(listings_mutex_);
-  if (listings_.size() >= kMaxListings) {
+  std::size_t before = 0;
+  {
+    const std::scoped_lock lock(listings_mutex_);
+    before = listings_.size();
+  }
+  if (before >= kMaxListings) {
     return fail("other clients ask for the models just now; ask again in a moment");
   }
+  auto models = TRY(models_.list());
+  Listing listing{.to = requester, .models = std::move(models)};
+  if (before == 0 && add_models(listing)) return std::move(listing.reply);
+  const std::scoped_lock lock(listings_mutex_);
   listings_.push_back(std::make_unique<Listing>(std::move(listing)));
   return std::nullopt;
 }

@@ -112,6 +112,20 @@ std::optional<double> standing_avatar_m(const Skeleton& resting, const Skeleton&
   return *ankle_m + (hips_m - *resting_m);
 }
 
+// Whether the bones of both, in T-pose, are as long: then a guess of the floor would only move one
+// against the other.
+bool is_same_figure(const Skeleton& one, const Skeleton& other) {
+  constexpr double kOff_m = 1e-3;
+  if (one.joints.size() != other.joints.size()) return false;
+  for (const Joint& joint : one.joints) {
+    const int there = other.joint_of(*joint.bone);
+    if (there < 0) return false;
+    const Joint& twin = other.joints[static_cast<std::size_t>(there)];
+    if (joint.parent >= 0 && (joint.offset_m - twin.offset_m).norm() > kOff_m) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 // The joints of clips that are no glTF have axes of their own.
@@ -137,7 +151,7 @@ bool Avatar::writes(Part part, Bone bone) const noexcept {
   return !hands_only_ || is_of_hand(Side::kLeft, bone) || is_of_hand(Side::kRight, bone);
 }
 
-Result<> Avatar::set_skeleton(Part part, std::shared_ptr<const Skeleton> skeleton) {
+Result<> Avatar::set_skeleton(Part part, const std::shared_ptr<const Skeleton>& skeleton) {
   Source& source = sources_[index_of(part)];
   source = {};
   if (skeleton == nullptr) return {};
@@ -148,7 +162,8 @@ Result<> Avatar::set_skeleton(Part part, std::shared_ptr<const Skeleton> skeleto
   if (part == Part::kBody && figure_ != nullptr) {
     const auto performer = motion::canonical_skeleton(*skeleton);
     const auto avatar = TRY(motion::canonical_skeleton(*figure_));
-    const auto from_m = performer ? standing_m(**performer) : std::nullopt;
+    const bool guessed = performer && !is_same_figure(**performer, *avatar);
+    const auto from_m = guessed ? standing_m(**performer) : std::nullopt;
     const auto to_m = standing_avatar_m(*figure_, *avatar);
     if (from_m && to_m) source.rise_m = static_cast<float>(*to_m - bound.scale() * *from_m);
   }

@@ -57,7 +57,7 @@ class Avatar {
 
   // Sets the skeleton of a part whose stream has come; null when the stream has left. The part has
   // no pose until the next set_pose(). An error says why the skeleton cannot move this part. Cold.
-  Result<> set_skeleton(Part part, std::shared_ptr<const Skeleton> skeleton);
+  Result<> set_skeleton(Part part, const std::shared_ptr<const Skeleton>& skeleton);
 
   // Sets the pose of a part. Returns false, and does nothing, for a part without a skeleton.
   bool set_pose(Part part, const Frame& frame) noexcept;

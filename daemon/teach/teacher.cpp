@@ -75,8 +75,10 @@ struct Teacher::Collected {
   // A fast stream would fill the memory with what training does not look at. What is kept stays
   // evenly spaced.
   void thin() {
-    const double span_s = std::max(seconds(last_ns - first_ns), 1.0);
-    if (static_cast<double>(times.size()) <= kMaxKeptRate_hz * span_s) return;
+    // What waited somewhere may come all at once.
+    const double span_s = seconds(last_ns - first_ns);
+    const double most = span_s < 1.0 ? double{kTapSlots} : kMaxKeptRate_hz * span_s;
+    if (static_cast<double>(times.size()) <= most) return;
     frames->halve();
     clip::drop_every_second(hand.angles);
     times.halve();

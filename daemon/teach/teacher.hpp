@@ -5,9 +5,9 @@
 // (control::RequestHandler).
 //
 // Bounds: one teaching at a time, kMaxWalks walks of each kind of at most kMaxWalk_s at
-// kMaxKeptRate_hz and kMaxKeptNumbers in all, the shows of a SignLesson, and a ring of kTapSlots
-// frames between the publisher and the thread. What the thread cannot take in time is missing from
-// the walk, never from the stream.
+// kMaxKeptRate_hz until there are kMaxKeptNumbers, the shows of a SignLesson, and a ring of
+// kTapSlots frames between the publisher and the thread. What the thread cannot take in time is
+// missing from the walk, never from the stream.
 #pragma once
 
 #include <array>
@@ -39,12 +39,12 @@ inline constexpr double kMinWalk_s = 6.0;
 inline constexpr double kMaxWalk_s = 120.0;
 inline constexpr std::size_t kMaxWalks = 8;  // of each kind
 // Values of all channels that are kept of a kind; then no further walk.
-inline constexpr std::size_t kMaxKeptNumbers = 1'000'000;
+inline constexpr std::size_t kMaxKeptNumbers = 3'000'000;
 inline constexpr double kMinShow_s = 3.0;
 inline constexpr double kMaxShow_s = 15.0;
 // Frames a second that are kept of a walk or show: of a faster stream every second, fourth, ...
 // one. Training looks at 30.
-inline constexpr double kMaxKeptRate_hz = 80.0;
+inline constexpr double kMaxKeptRate_hz = 64.0;
 inline constexpr std::size_t kTapSlots = 1024;  // four seconds at 240 Hz
 
 enum class Walk : std::uint8_t { kNeutral, kStyle };

@@ -1049,6 +1049,7 @@ std::vector<char> Reader::rests_in_t() const {
     return true;
   };
   std::vector<char> joints;
+  joints.reserve(figure_.bones.size());
   for (const auto& bone : figure_.bones) {
     joints.push_back(bone && (humanoid_.animates || stands(bone)) ? 1 : 0);
   }

@@ -35,8 +35,10 @@ Vec line_between(const Figure& figure, const BoneJoints& bones, const BorrowedLi
 Eigen::Quaterniond turn_below(const Figure& figure, const RigPoses& poses, int pose, int top,
                               int joint) {
   Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+  const std::size_t first =
+      static_cast<std::size_t>(pose) * static_cast<std::size_t>(figure.size());
   for (; joint != top; joint = figure[joint].parent) {
-    turn = poses.rotation[static_cast<std::size_t>(pose * figure.size() + joint)] * turn;
+    turn = poses.rotation[first + static_cast<std::size_t>(joint)] * turn;
   }
   return turn;
 }

@@ -42,8 +42,8 @@ bool leads_on(const Figure& figure, int joint, int before) {
   return figure[joint].offset.norm() > 1.01 * figure[before].offset.norm();
 }
 
-// Whether the name is another's with a number more, as of one pair of arms "L_Arm2" is beside
-// "L_Arm": what is not numbered comes first.
+// For each name, whether it is another name with a number added: where there are "L_Arm" and
+// "L_Arm2", the second one.
 std::vector<bool> copies_in(const std::vector<JointName>& names) {
   std::set<std::pair<NameSide, std::string_view>> plain;
   for (const JointName& name : names) {
@@ -274,7 +274,8 @@ void find_limbs(const Figure& figure, const std::vector<JointName>& names, BoneJ
     std::vector<std::optional<Fit>> fits(names.size());
     for (std::size_t j = 0; j < names.size(); ++j) {
       if (names[j].side == wanted) fits[j] = fit_of(names[j]);
-      constexpr double kCopy = 0.99;  // a fit's part; more than some levels of the tree count
+      // Of two that fit alike the one without a number is taken, even if it is deeper in the tree.
+      constexpr double kCopy = 0.99;
       if (fits[j] && copies[j]) {
         for (double& fit : *fits[j]) fit *= kCopy;
       }

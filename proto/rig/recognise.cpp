@@ -94,6 +94,7 @@ bool is_sane(const std::vector<RigJoint>& joints) {
 
 std::vector<std::string_view> names_of(const std::vector<RigJoint>& joints) {
   std::vector<std::string_view> names;
+  names.reserve(joints.size());
   for (const RigJoint& joint : joints) names.push_back(joint.name);
   return names;
 }

@@ -33,9 +33,9 @@ std::string doubt_of(const Score& other) {
          " of 100 frames: if the person stands there, say so (up)";
 }
 
-std::string stands_otherwise(UpAxis zero, UpAxis clip) {
-  return "the zero pose stands along " + std::string(up_text(zero)) + ", but the clip along " +
-         std::string(up_text(clip)) + ": if the person lies, say which axis points up";
+std::string stands_otherwise(UpAxis zero, const std::string& but) {
+  return "the zero pose stands along " + std::string(up_text(zero)) + ", but " + but +
+         ": if the person lies, say which axis points up";
 }
 
 }  // namespace
@@ -305,7 +305,7 @@ void Frames::find_up() {
     up_ = best.up;
     why_up_ = "the figure stands along it in more than nine frames of ten";
     if (zero != nullptr) {
-      notes_.push_back(stands_otherwise(zero->up, up_));
+      notes_.push_back(stands_otherwise(zero->up, "the clip along " + std::string(up_text(up_))));
     }
   } else if (root_up != UpAxis::kPlusY && !stands) {
     up_ = root_up;
@@ -319,8 +319,9 @@ void Frames::find_up() {
                           [](const Score& a, const Score& b) { return a.stand < b.stand; });
     const bool is_known = zero != nullptr || is_profile || by_root;
     if (!is_known && other.stand > 0.3) up_doubt_ = doubt_of(other);
-    if (zero != nullptr && zero->up != up_ && !is_profile)
-      up_doubt_ = stands_otherwise(zero->up, up_);
+    if (zero != nullptr && zero->up != up_ && !is_profile) {
+      up_doubt_ = stands_otherwise(zero->up, "+y is taken, for the clip does not stand");
+    }
   }
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 #include <utility>
 
 namespace posed::style {
@@ -89,9 +90,8 @@ RT_SAFE void LiveStride::update(double leg_rad, double dt_s, double cadence_rad_
       leg_rad - slope_rad + (level_rad_ - leg_rad_ + slope_rad) * std::exp(-dt_s / kSmooth_s);
   leg_rad_ = leg_rad;
   speed_rad_ = (leg_rad_ - level_rad_) / (kSmooth_s * cadence_rad_s);
-  const double window_s = std::min(static_cast<double>(kParts - 2) * kPart_s,
-                                   kTurnsBack_strides * 2.0 * std::numbers::pi / cadence_rad_s);
-  parts_ = static_cast<std::size_t>(part_at(window_s, kPart_s)) + 2;
+  const double window_s = kTurnsBack_strides * 2.0 * std::numbers::pi / cadence_rad_s;
+  parts_ = std::min(kParts, static_cast<std::size_t>(std::ceil(window_s / kPart_s - 1e-6)) + 1);
   const double before_s = std::exchange(time_s_, time_s_ + dt_s);
   keep_speed(before_s);
   keep_turn(before_s);
@@ -118,15 +118,18 @@ RT_SAFE void LiveStride::keep_turn(double before_s) noexcept {
 
 RT_SAFE void LiveStride::turn_back() noexcept {
   forget_cadence();
-  fastest_rad_.fill(*std::ranges::max_element(fastest_rad_));
+  fastest_rad_.fill(fastest_rad());
   level_rad_ = 2.0 * leg_rad_ - level_rad_;  // as if the low-pass had come from the other side
   speed_rad_ = -speed_rad_;
 }
 
+double LiveStride::fastest_rad() const noexcept {
+  return *std::ranges::max_element(std::span(fastest_rad_).first(parts_));
+}
+
 // A pose of long steps that is held has a level but no speed.
 double LiveStride::swing_rad() const noexcept {
-  const auto end = fastest_rad_.begin() + static_cast<std::ptrdiff_t>(parts_);
-  return std::min(std::hypot(level_rad_, speed_rad_), *std::max_element(fastest_rad_.begin(), end));
+  return std::min(std::hypot(level_rad_, speed_rad_), fastest_rad());
 }
 
 double LiveStride::cadence_rad_s() const noexcept {

@@ -89,6 +89,7 @@ class LiveStride {
   static constexpr std::size_t kParts = 8;  // of the longest window that the largest speed is of
   static constexpr std::size_t kTurns = 9;  // angles that are kept
 
+  [[nodiscard]] double fastest_rad() const noexcept;  // in the window
   void keep_speed(double before_s) noexcept;
   void keep_turn(double before_s) noexcept;
 

@@ -130,6 +130,23 @@ TEST_CASE("an avatar is turned from how its file rests, and stands on the floor 
   // Its arms hang, and its soles are 8 cm thicker than its skeleton shows.
   auto figure = std::make_shared<Skeleton>(*motion::canonical_skeleton(*walk.skeleton).value());
   const double thicker_m = 0.08;
+  const auto joint_of = [&](Bone bone) -> Joint& {
+    return figure->joints[static_cast<std::size_t>(figure->joint_of(bone))];
+  };
+  double leg_m = 0.0;  // from the hips to the toes
+  for (const Bone bone :
+       {Bone::kLeftUpperLeg, Bone::kLeftLowerLeg, Bone::kLeftFoot, Bone::kLeftToes}) {
+    leg_m -= joint_of(bone).offset_m.y();
+  }
+  const Frame pose = walk.frame(5);
+  {  // Who has its very bones stands as it does.
+    figure->joints[0].offset_m.y() = 1.02 * leg_m + thicker_m;
+    Avatar same(false, std::make_shared<Skeleton>(*figure));
+    REQUIRE(same.set_skeleton(Part::kBody, walk.skeleton));
+    REQUIRE(same.set_pose(Part::kBody, pose));
+    CHECK(written(same).at("Hips").position_m[1] == Approx(pose.root_position_m[1]).margin(1e-6));
+  }
+  joint_of(Bone::kHead).offset_m.y() += 0.03;
   const Eigen::Quaterniond hang = axis_rotation(Axis::kZ, -0.8);
   for (std::size_t j = 0; j < figure->joints.size(); ++j) {
     Joint& joint = figure->joints[j];
@@ -142,7 +159,6 @@ TEST_CASE("an avatar is turned from how its file rests, and stands on the floor 
   REQUIRE(figure->finish());
   const auto standing = std::make_shared<Skeleton>(*figure);
   figure->joints[0].offset_m.y() = 2.0;  // far from the floor, so nothing says where that is
-  const Frame pose = walk.frame(5);
   const auto heights = [&](double hips_m) {
     standing->joints[0].offset_m.y() = hips_m;
     std::array<double, 2> sent_m{};
@@ -154,14 +170,6 @@ TEST_CASE("an avatar is turned from how its file rests, and stands on the floor 
     }
     return sent_m;
   };
-  const auto joint_of = [&](Bone bone) -> const Joint& {
-    return figure->joints[static_cast<std::size_t>(figure->joint_of(bone))];
-  };
-  double leg_m = 0.0;  // from the hips to the toes
-  for (const Bone bone :
-       {Bone::kLeftUpperLeg, Bone::kLeftLowerLeg, Bone::kLeftFoot, Bone::kLeftToes}) {
-    leg_m -= joint_of(bone).offset_m.y();
-  }
   const auto usual = heights(1.02 * leg_m), thick = heights(1.02 * leg_m + thicker_m);
   CHECK(usual[0] == Approx(static_cast<double>(pose.root_position_m[1])).margin(1e-5));
   CHECK(usual[1] == Approx(usual[0]).margin(1e-5));
