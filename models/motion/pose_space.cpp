@@ -66,14 +66,25 @@ std::vector<std::string> missing_of(const PoseSpaceSpec& spec, const std::vector
   return missing;
 }
 
-// A figure without one of these bones is no person whose manner of walking could be changed.
-constexpr std::array kCore{Bone::kHips,          Bone::kLeftUpperArm,  Bone::kLeftLowerArm,
-                           Bone::kRightUpperArm, Bone::kRightLowerArm, Bone::kLeftUpperLeg,
-                           Bone::kLeftLowerLeg,  Bone::kRightUpperLeg, Bone::kRightLowerLeg};
+// A figure without hips, or without any of a pair, is no person whose manner of walking could be
+// changed; one of a pair is enough, as for who has lost an arm.
+using CorePair = std::array<Bone, 2>;
+constexpr std::array kCore{CorePair{Bone::kHips, Bone::kHips},
+                           CorePair{Bone::kLeftUpperArm, Bone::kRightUpperArm},
+                           CorePair{Bone::kLeftLowerArm, Bone::kRightLowerArm},
+                           CorePair{Bone::kLeftUpperLeg, Bone::kRightUpperLeg},
+                           CorePair{Bone::kLeftLowerLeg, Bone::kRightLowerLeg}};
 
-bool is_core(std::string_view name) {
+bool has_any(const Skeleton& skeleton, const CorePair& pair) {
+  return std::ranges::any_of(pair, [&](Bone bone) { return skeleton.joint_of(bone) >= 0; });
+}
+
+// Whether the bone is one of a pair of which the skeleton has none.
+bool is_needed(std::string_view name, const Skeleton& skeleton) {
   const auto bone = bone_from_name(name);
-  return bone && std::ranges::find(kCore, *bone) != kCore.end();
+  return std::ranges::any_of(kCore, [&](const CorePair& pair) {
+    return bone && std::ranges::find(pair, *bone) != pair.end() && !has_any(skeleton, pair);
+  });
 }
 
 std::unexpected<Error> missing_joints(const PoseSpaceSpec& spec,
@@ -124,7 +135,7 @@ Result<Space> space_from_name(std::string_view name) {
 }
 
 bool is_person(const Skeleton& skeleton) {
-  return std::ranges::all_of(kCore, [&](Bone bone) { return skeleton.joint_of(bone) >= 0; });
+  return std::ranges::all_of(kCore, [&](const CorePair& pair) { return has_any(skeleton, pair); });
 }
 
 int space_dims(const PoseSpaceSpec& spec) {
@@ -162,8 +173,9 @@ Result<PoseSpace> PoseSpace::bind_person(const PoseSpaceSpec& spec, const Skelet
   TRY(check_spec(spec));
   const std::vector<int> joints = find_joints(spec, skeleton);
   const std::string& root = spec.joints[spec.root];
-  const auto needed = missing_of(
-      spec, joints, [&](const std::string& name) { return name == root || is_core(name); });
+  const auto needed = missing_of(spec, joints, [&](const std::string& name) {
+    return name == root || is_needed(name, skeleton);
+  });
   if (!needed.empty()) return missing_joints(spec, needed, skeleton);
   return bind_joints(spec, skeleton, joints);
 }

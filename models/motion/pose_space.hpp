@@ -45,8 +45,8 @@ struct PoseSpaceSpec {
 // trained on such clips has. The error names the joints that are missing.
 Result<PoseSpaceSpec> describe_space(Space space, const Skeleton& skeleton);
 
-// True where the skeleton has the bones that every humanoid space needs: the hips, upper and lower
-// arms and legs.
+// True where the skeleton has the bones that every humanoid space needs: the hips, and of upper and
+// lower arms and legs one side's at least.
 [[nodiscard]] bool is_person(const Skeleton& skeleton);
 
 // How many dimensions q has in this spec.
@@ -60,8 +60,8 @@ class PoseSpace {
 
   // The same for a person who lacks some bones of a humanoid space, such as toes or a chest: their
   // dimensions are never available. A bone below a missing one (an arm without its shoulder) is
-  // seen as if the missing one kept its training mean, and gets the change of both. Hips, upper and
-  // lower arms and legs must be there. Other spaces need every joint.
+  // seen as if the missing one kept its training mean, and gets the change of both. What
+  // is_person() asks for must be there. Other spaces need every joint.
   static Result<PoseSpace> bind_person(const PoseSpaceSpec& spec, const Skeleton& skeleton);
 
   // The joints of the spec that the skeleton lacks; empty after bind().

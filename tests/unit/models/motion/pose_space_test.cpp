@@ -188,8 +188,9 @@ TEST_CASE("Near the pole of its Euler angles a cmu43 joint still moves by a smal
   CHECK(turn < 0.2);
 }
 
-TEST_CASE("A person without chest, shoulders and toes is styled as one who has them",
+TEST_CASE("A person who lacks a limb, chest, shoulders and toes is styled as one who has them",
           "[pose_space]") {
+  const auto arm_lost = GENERATE(false, true);
   const Motion walk = walker();
   auto spec = describe_space(Space::kHumanoid, *walk.skeleton);
   REQUIRE(spec.has_value());
@@ -197,9 +198,13 @@ TEST_CASE("A person without chest, shoulders and toes is styled as one who has t
     spec->mean[i] = rotation_exp(Vector3d(0.1 * std::sin(i), 0.2, -0.1));
   }
   Skeleton lacking = *walk.skeleton;
+  std::vector lost_bones{Bone::kChest, Bone::kLeftShoulder, Bone::kRightShoulder, Bone::kLeftToes};
+  if (arm_lost) {
+    lost_bones.insert(lost_bones.end(), {Bone::kLeftUpperArm, Bone::kLeftLowerArm, Bone::kLeftHand,
+                                         Bone::kRightLowerLeg, Bone::kRightFoot, Bone::kRightToes});
+  }
   int lost = 0;
-  for (const Bone bone :
-       {Bone::kChest, Bone::kLeftShoulder, Bone::kRightShoulder, Bone::kLeftToes}) {
+  for (const Bone bone : lost_bones) {
     const int joint = lacking.joint_of(bone);
     if (joint < 0) continue;
     lacking.joints[joint].bone.reset();
@@ -244,7 +249,11 @@ TEST_CASE("A person without chest, shoulders and toes is styled as one who has t
     INFO(lacking.joints[j].name);
     CHECK(angle_between_rad(world(styled, j), world(expected, j)) < 1e-4);
   }
-  lacking.joints[lacking.joint_of(Bone::kLeftLowerArm)].bone.reset();
+  CHECK(is_person(lacking));
+  for (const Bone bone : {Bone::kLeftLowerArm, Bone::kRightLowerArm}) {
+    if (const int joint = lacking.joint_of(bone); joint >= 0) lacking.joints[joint].bone.reset();
+  }
+  CHECK_FALSE(is_person(lacking));
   const auto refused = PoseSpace::bind_person(*spec, lacking);
   REQUIRE_FALSE(refused.has_value());
   CHECK(refused.error().message.find("leftLowerArm") != std::string::npos);
