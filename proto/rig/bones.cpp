@@ -6,6 +6,8 @@
 #include <string_view>
 #include <utility>
 
+#include "proto/text/clean.hpp"
+
 namespace posed::rig {
 namespace {
 
@@ -308,6 +310,22 @@ bool has_another(const Figure& figure, std::vector<JointName> names, int hips, b
   return bones.has_limbs();
 }
 
+// A tree that begins at the head or the chest has the pelvis below the arms. Rotations of the trunk
+// are then those of other segments than a bone's, which no profile can say either.
+void note_root(const Figure& figure, const BoneJoints& bones, int chest,
+               std::vector<std::string>& notes) {
+  constexpr double kTrunk = 0.4;  // of a thigh; legs that begin as near have no trunk above them
+  if (bones[Bone::kHips] != chest) return;
+  const int pelvis = figure.common({bones[Bone::kLeftUpperLeg], bones[Bone::kRightUpperLeg]});
+  const auto thigh = figure.between(bones[Bone::kLeftUpperLeg], bones[Bone::kLeftLowerLeg]);
+  const auto trunk = figure.between(chest, pelvis);
+  if (!thigh || !trunk || trunk->norm() <= kTrunk * thigh->norm()) return;
+  notes.push_back("the tree does not begin at the hips: " + in_quotes(figure[pelvis].name) +
+                  ", from which the legs begin, hangs below " + in_quotes(figure[chest].name) +
+                  ", from which the arms begin and which counts as the hips; spine, neck and head "
+                  "are not known: export the skeleton with its hips as root");
+}
+
 }  // namespace
 
 Bone on(Side side, Bone left) {
@@ -348,6 +366,7 @@ void find_trunk(const Figure& figure, const std::vector<JointName>& names, BoneJ
     if (is_pelvis(names[j])) hips = j;
   }
   bones.set(Bone::kHips, hips);
+  note_root(figure, bones, chest, notes);
   const auto [head, top] = find_head(figure, names, bones, chest, notes);
   std::vector<int> trunk;
   std::vector<int> neck;

@@ -56,6 +56,95 @@ double unlike(double one, double other) {
   return std::abs(std::log(std::max(one, 1e-9) / std::max(other, 1e-9)));
 }
 
+// Where a limb's upper bone begins, where it bends and where its lower bone ends: numbers of the
+// joints in its chain.
+struct TwoBones {
+  std::size_t begin = 0, bend = 1, end = 2;
+  double length = 0.0;
+};
+
+// A limb of a pair whose bones are cut by joints that only twist.
+class CutLimb {
+ public:
+  CutLimb(const Figure& figure, int one, int other)
+      : chain_(figure.main_chain(one)), to_first_(figure[one].offset.norm()) {
+    const auto a = figure.segments(chain_);
+    const auto b = figure.segments(figure.main_chain(other));
+    chain_.resize(std::min({a.size(), b.size(), kMaxJoints}));
+    at_.push_back(0.0);
+    for (std::size_t i = 0; i < chain_.size(); ++i) at_.push_back(at_[i] + std::min(a[i], b[i]));
+    for (std::size_t i = 1; i + 1 < chain_.size(); ++i) {
+      const double bent = angle_deg(figure[chain_[i]].offset, figure[chain_[i + 1]].offset);
+      bends_.push_back(at_[i + 1] > at_[i] && bent > kBent_deg);
+    }
+  }
+
+  // The cut that is likest a person's: two bones about as long as each other, straight, with what
+  // is left for a hand or a foot behind them. `leg`: the leg's length for an arm; 0 for a leg.
+  [[nodiscard]] std::optional<TwoBones> best(double leg) const {
+    std::optional<TwoBones> found;
+    double least = kMaxCost;
+    for (std::size_t begin = 0; begin + 2 < chain_.size(); ++begin) {
+      for (std::size_t bend = begin + 1; bend + 1 < chain_.size(); ++bend) {
+        for (std::size_t end = bend + 1; end < chain_.size(); ++end) {
+          const TwoBones two{begin, bend, end, way(begin, end)};
+          const double cost = cost_of(two, leg);
+          if (cost >= least) continue;
+          least = cost;
+          found = two;
+        }
+      }
+    }
+    return found;
+  }
+
+ private:
+  static constexpr std::size_t kMaxJoints = 12;
+  static constexpr double kBent_deg = 8.0;
+  static constexpr double kMaxCost = 1.5;
+
+  [[nodiscard]] double way(std::size_t from, std::size_t to) const { return at_[to] - at_[from]; }
+
+  // How far a length is from what is usual, as a logarithm beyond what people differ by.
+  static double off(double length, double usual, double differ) {
+    return std::max(0.0, unlike(length, usual) - differ);
+  }
+
+  [[nodiscard]] double cost_of(const TwoBones& two, double leg) const {
+    double cost = unlike(way(two.begin, two.bend), way(two.bend, two.end));
+    for (std::size_t i = two.begin + 1; i < two.end; ++i) {
+      if (i != two.bend && bends_[i - 1]) cost += 0.5;
+    }
+    const double rest = at_.back() - at_[two.end];
+    if (leg <= 0.0) {
+      cost += rest > 0.0 ? 0.5 * off(rest, 0.25 * two.length, 0.4) : 0.5;
+      return cost + at_[two.begin] / two.length;
+    }
+    cost += unlike(two.length, kArmOfLeg * leg);
+    cost += rest > 0.0 ? 0.3 * off(rest, 0.2 * leg, 0.7) : 0.1;
+    return cost + 0.7 * off(to_first_ + at_[two.begin], 0.3 * leg, 0.3);  // across the shoulders
+  }
+
+  std::vector<int> chain_;
+  double to_first_ = 0.0;    // from the trunk
+  std::vector<double> at_;   // [joint of the chain, then its end] along the limb
+  std::vector<bool> bends_;  // [joint of the chain but the first and the last]
+};
+
+// Whether two consecutive segments are too unlike for a limb's two bones: their maker cut one.
+bool are_unequal(const std::vector<double>& segments, std::size_t first) {
+  constexpr double kMostUnequal = 0.5;  // as a logarithm
+  return first + 1 < segments.size() && unlike(segments[first], segments[first + 1]) > kMostUnequal;
+}
+
+// The same, or too short.
+bool are_cut(const std::vector<double>& segments, std::size_t first) {
+  constexpr double kLeastPart = 0.6;
+  if (first + 1 >= segments.size()) return false;
+  const double all = std::accumulate(segments.begin(), segments.end(), 0.0);
+  return segments[first] + segments[first + 1] < kLeastPart * all || are_unequal(segments, first);
+}
+
 // Where the upper arm is among an arm's segments. Two that are longer than a leg are what the hand
 // holds.
 std::size_t upper_arm(const std::vector<double>& segments, double leg) {
@@ -78,7 +167,9 @@ struct Pair {
   double length = 0.0;
   double as_leg = 0.0, as_arm = 0.0;  // of its two long bones
   int parent = 0;
-  int one = 0, other = 0;  // where the chains begin
+  int one = 0, other = 0;       // where the chains begin
+  bool unequal_arm = false;     // its two long bones are no upper and lower arm
+  std::optional<TwoBones> cut;  // of a leg whose bones are cut
 };
 
 std::optional<Pair> mirrored(const Figure& figure, int parent, int one, int other) {
@@ -99,12 +190,24 @@ std::optional<Pair> mirrored(const Figure& figure, int parent, int one, int othe
   const double apart = std::abs(figure[one].offset.norm() - figure[other].offset.norm());
   if (!(length > 0.0) || gap >= 0.15 * length || apart >= 0.15 * length) return std::nullopt;
   const auto both = shared_segments(a, b);
-  return Pair{.length = length,
-              .as_leg = two_bones(both, false),
-              .as_arm = two_bones(both, true),
-              .parent = parent,
-              .one = one,
-              .other = other};
+  Pair pair{.length = length,
+            .as_leg = two_bones(both, false),
+            .as_arm = two_bones(both, true),
+            .parent = parent,
+            .one = one,
+            .other = other,
+            .unequal_arm = are_unequal(both, long_bones(both, true)),
+            .cut = {}};
+  if (are_cut(both, long_bones(both, false))) {
+    pair.cut = CutLimb(figure, one, other).best(0.0);
+    if (pair.cut) pair.as_leg = pair.cut->length;
+  }
+  return pair;
+}
+
+// Whether the longest two segments cannot be an arm's bones, of a leg of this length.
+bool is_cut_arm(const Pair& arms, double leg) {
+  return arms.unequal_arm || arms.as_arm < 0.8 * kArmOfLeg * leg;
 }
 
 std::vector<Pair> find_pairs(const Figure& figure) {
@@ -185,7 +288,8 @@ double person_score(const Figure& figure, const Pair& legs, const Pair& arms) {
   const int common = figure.common({legs.parent, arms.parent});
   const Vec trunk = figure.between(common, arms.parent).value_or(Vec::Zero()) -
                     figure.between(common, legs.parent).value_or(Vec::Zero());
-  const double arm = std::max(0.0, unlike(arms.as_arm, kArmOfLeg * legs.as_leg) - kArmsDiffer);
+  const double as_arm = arms.cut && is_cut_arm(arms, legs.as_leg) ? arms.cut->length : arms.as_arm;
+  const double arm = std::max(0.0, unlike(as_arm, kArmOfLeg * legs.as_leg) - kArmsDiffer);
   const double body =
       std::clamp(unlike(trunk.norm(), kTrunkOfLeg * legs.as_leg) - kTrunksDiffer, 0.0, 1.0);
   const double off = 0.3 * branched_off(figure, legs, arms) + 1e-3 * figure.depth(legs.parent);
@@ -198,11 +302,18 @@ void set_limb(const Figure& figure, const Pair& pair, bool arm, double leg, Bone
   const auto other = figure.segments(figure.main_chain(pair.other));
   const auto both = shared_segments(one, other);
   const std::size_t first = arm ? upper_arm(both, leg) : long_bones(both, false);
+  TwoBones two{.begin = first, .bend = first + 1, .end = first + 2};
+  if (!arm && pair.cut) two = *pair.cut;
+  if (arm && is_cut_arm(pair, leg)) {
+    two = CutLimb(figure, pair.one, pair.other).best(leg).value_or(two);
+  }
+  const std::array<std::size_t, 4> at =  // wraps where an arm has no clavicle
+      arm ? std::array{two.begin - 1, two.begin, two.bend, two.end}
+          : std::array{two.begin, two.bend, two.end, two.end + 1};
   for (const Side side : kSides) {
     const auto chain = figure.main_chain(side == Side::kLeft ? pair.one : pair.other);
-    for (std::size_t k = 0; k < 4; ++k) {
-      const std::size_t at = first + k - (arm ? 1 : 0);  // wraps where an arm has no clavicle
-      if (at < chain.size()) bones.set(on(side, arm ? kArm[k] : kLeg[k]), chain[at]);
+    for (std::size_t k = 0; k < at.size(); ++k) {
+      if (at[k] < chain.size()) bones.set(on(side, arm ? kArm[k] : kLeg[k]), chain[at[k]]);
     }
   }
 }

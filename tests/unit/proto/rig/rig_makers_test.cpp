@@ -1290,6 +1290,94 @@ TEST_CASE("rig: without names wings, capes, long hair and weapons are no limbs")
   }
 }
 
+// The same figure, of whose joints names tell at most the side, with the bones of the `cut` slots
+// of each limb (0 is an upper one) cut into equal pieces.
+test::Made with_cut_limbs(const test::Made& whole, const std::vector<int>& cut, int pieces,
+                          bool has_sides) {
+  test::Made made;
+  std::vector<int> now;  // [joint of the whole]
+  for (int b = 0; b < test::kMakerJoints; ++b) {
+    rig::RigJoint joint = whole.input.joints[b];
+    if (joint.parent >= 0) joint.parent = now[joint.parent];
+    const int slot = b >= 14 ? (b - 14) % 4 - 1 : b >= 6 ? (b - 6) % 4 - 2 : -1;
+    const bool is_cut = std::ranges::find(cut, slot) != cut.end();
+    if (is_cut) joint.offset /= pieces;
+    for (int i = is_cut ? 1 : pieces; i <= pieces; ++i) {
+      made.input.joints.push_back(joint);
+      const std::string side = b < 6 || !has_sides             ? ""
+                               : b < 10 || (b >= 14 && b < 18) ? "L_"
+                                                               : "R_";
+      made.input.joints.back().name = side + "joint_" + std::to_string(made.input.joints.size());
+      if (i < pieces) made.input.joints.back().end_site.reset();
+      joint.parent = static_cast<int>(made.input.joints.size()) - 1;
+    }
+    now.push_back(joint.parent);
+  }
+  made.bone.resize(made.input.joints.size(), Bone::kHips);  // of the joints in `T` alone
+  made.T.resize(made.input.joints.size());
+  for (int b = 0; b < test::kMakerJoints; ++b) {
+    made.bone[now[b]] = static_cast<Bone>(b);
+    made.T[now[b]] = whole.T[b];
+  }
+  return made;
+}
+
+TEST_CASE("rig: joints that cut the bones of limbs without names are passed over") {
+  const test::Build tall{.height = 1.1, .trunk = 0.95, .arms = 1.08, .legs = 1.05, .axes = {}};
+  const test::Build child{.height = 0.6, .trunk = 1.1, .arms = 0.95, .legs = 0.9, .axes = {}};
+  for (const test::Build& build : {test::Build{}, tall, child}) {
+    for (const ZeroPose zero :
+         {ZeroPose::kT, ZeroPose::kA, ZeroPose::kArmsDown, ZeroPose::kFolded}) {
+      const auto whole = test::make(test::kSchemes[0], zero, Mat::Identity(), 0.01, 0, 40, build);
+      for (const std::vector<int>& cut : {std::vector{0, 1}, {0}, {1}}) {
+        for (const int pieces : {2, 3}) {
+          const auto made = with_cut_limbs(whole, cut, pieces, zero == ZeroPose::kFolded);
+          const rig::Rig rig = rig::recognise(made.input);
+          REQUIRE(rig.kind == rig::Kind::kPerson);
+          int bones = 0;
+          for (std::size_t j = 0; j < made.bone.size(); ++j) {
+            INFO(made.input.joints[j].name << " of zero pose " << static_cast<int>(zero) << " cut "
+                                           << cut.front() << cut.back() << " into " << pieces
+                                           << ", height " << build.height);
+            if (!rig.bone[j]) continue;
+            ++bones;
+            CHECK(bone_name(*rig.bone[j]) == bone_name(made.bone[j]));
+            if (zero == ZeroPose::kFolded) continue;  // its twist is told by the clip
+            CHECK(angle_between_rad(rig.T[j], Eigen::Quaterniond(made.T[j])) < 1.0 * kDegree);
+          }
+          CHECK(bones == test::kMakerJoints);
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("rig: a tree that begins at the chest is told, and not silently another's") {
+  auto made = test::make(test::kSchemes[8], ZeroPose::kT, Mat::Identity(), 0.01);
+  made.input.poses = {};
+  const auto says = [](const rig::Rig& rig) {
+    return std::ranges::any_of(rig.notes, [](const std::string& note) {
+      return note.contains("the tree does not begin at the hips");
+    });
+  };
+  CHECK_FALSE(says(rig::recognise(made.input)));
+  // The trunk upside down: its last joint is the root, and the hips hang below it.
+  constexpr int kTrunk = 4;
+  auto joints = made.input.joints;
+  for (int b = 0; b < kTrunk; ++b) {
+    const int from = kTrunk - 1 - b;
+    joints[b].name = made.input.joints[from].name;
+    if (b > 0) joints[b].offset = -made.input.joints[from + 1].offset;
+  }
+  for (auto& joint : joints) {
+    if (joint.parent == 0 || joint.parent == kTrunk - 1) joint.parent = kTrunk - 1 - joint.parent;
+  }
+  joints[1].parent = 0;
+  joints[3].parent = 2;
+  made.input.joints = joints;
+  CHECK(says(rig::recognise(made.input)));
+}
+
 TEST_CASE("rig: any input ends in an answer") {
   const auto answer = [](const rig::RigInput& input) {
     const rig::Rig rig = rig::recognise(input);
