@@ -151,6 +151,13 @@ std::string unknown_word(CLI::App& app, std::span<char* const> arguments) {
   return {};
 }
 
+// The library's own sentences quote an argument as it is, also an escape sequence.
+void clean_complaints(CLI::App& app) {
+  app.failure_message([](const CLI::App*, const CLI::Error& error) {
+    return clean(error.what()) + "\nRun with --help for more information.\n";
+  });
+}
+
 // `exit_code` is what the command stores.
 int parse_and_run(int argc, char** argv, CLI::App& app, const int& exit_code) {
   // Untrusted bytes are refused with posed's own messages; protobuf would print a line for each.
@@ -172,6 +179,7 @@ int parse_and_run(int argc, char** argv, CLI::App& app, const int& exit_code) {
 }  // namespace
 
 void add_commands(CLI::App& app, int& exit_code) {
+  clean_complaints(app);
   clip::add_format(motion::vrm_animation_format());
   clip::add_format(clip::fbx_format());
   for (const AddCommand add : kCommands) add(app, exit_code);
@@ -192,6 +200,7 @@ int train_main_of(int argc, char** argv, const std::shared_ptr<Ranks>& ranks) {
   const logging::LogOutput log;
   CLI::App app{"posed-mpi: posed train on the cores of many machines", "posed-mpi"};
   app.footer(kMpiFooter);
+  clean_complaints(app);
   int exit_code = 0;
   add_train_for(app, exit_code, ranks);
   return with_stdout_written(parse_and_run(argc, argv, app, exit_code));

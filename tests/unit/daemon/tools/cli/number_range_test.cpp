@@ -1,6 +1,11 @@
 #include "daemon/tools/command/options.hpp"
 
+#include <algorithm>
+#include <sstream>
+
 #include <catch2/catch.hpp>
+
+#include "daemon/tools/cli.hpp"
 
 namespace posed::tools {
 namespace {
@@ -16,6 +21,28 @@ std::string refusal(const CLI::Validator& check, const std::string& text) {
     return error.what();
   }
   return {};
+}
+
+TEST_CASE("no argument of a refused command line reaches the terminal as it is") {
+  for (const char* line :
+       {"top --timeout '\x1b[2J'", "top '\x1b[2J\n%s%n'", "devices --foo='\x1b[2J'",
+        "ctl warm-up a '\xff\x1b'", "eval natural '\x1b]0;x\x07'"}) {
+    CAPTURE(line);
+    CLI::App app;
+    int exit_code = 0;
+    add_commands(app, exit_code);
+    std::ostringstream out, err;
+    try {
+      app.parse(line);
+      FAIL("it is taken");
+    } catch (const CLI::ParseError& error) {
+      CHECK(app.exit(error, out, err) != 0);
+    }
+    CHECK(out.str().empty());
+    CHECK(std::ranges::count(err.str(), '\n') == 2);
+    CHECK(std::ranges::none_of(err.str(),
+                               [](char c) { return (c < ' ' && c != '\n') || c == '\x7f'; }));
+  }
 }
 
 TEST_CASE("an option that takes a number takes no NaN and no infinity") {
