@@ -172,6 +172,14 @@ Result<std::string> bind_socket(void* socket, const std::string& endpoint) {
 
 Result<> connect_socket(void* socket, const std::string& endpoint) {
   TRY(check_port(endpoint));
+  // libzmq connects to port 0, and over transports that no daemon has, and waits there for ever.
+  const bool known = endpoint.starts_with("tcp://") || endpoint.starts_with(kIpc) ||
+                     endpoint.starts_with("inproc://posed.");  // between posed's own threads
+  if (!known || endpoint.ends_with(":0")) {
+    return misuse(
+        "cannot connect to '" + endpoint +
+        "': a daemon's endpoint reads like tcp://127.0.0.1:5570 or ipc:///run/posed.sock");
+  }
   TRY(choose_family(socket, endpoint));
   TRY(try_descriptors());
   // A daemon that loses its power or its network says nothing: TCP finds that out in five seconds.

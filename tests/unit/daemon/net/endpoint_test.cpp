@@ -32,6 +32,18 @@ TEST_CASE("a port that does not exist is refused, however it is written") {
   }
 }
 
+TEST_CASE("nobody waits for a daemon where none can be") {
+  const Context context = open_context().value();
+  for (const char* endpoint : {"tcp://127.0.0.1:0", "inproc://x", "ws://127.0.0.1:5570/",
+                               "udp://127.0.0.1:5570", "norm://1,127.0.0.1:5", "", "%s%n"}) {
+    INFO(endpoint);
+    const Socket socket = open_socket(context.get(), ZMQ_SUB).value();
+    const auto connected = connect_socket(socket.get(), endpoint);
+    REQUIRE_FALSE(connected);
+    CHECK(connected.error().exit_code == ExitCode::kWrongUse);
+  }
+}
+
 TEST_CASE("no file that is there gives way to a socket, and no socket that is listened to") {
   const test::TempFolder folder;
   const Context context = open_context().value();
