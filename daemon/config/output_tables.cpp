@@ -8,6 +8,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -79,15 +80,15 @@ class OutputReader {
   void read(TableReader& table);
 
  private:
-  void read_vmc(TableReader& table, OutputConfig& output) const;
-  void read_axis(TableReader& table, OutputConfig& output) const;
-  void read_push(TableReader& table, OutputConfig& output) const;
+  void read_vmc(TableReader& table, OutputConfig& output);
+  void read_axis(TableReader& table, OutputConfig& output);
+  void read_push(TableReader& table, OutputConfig& output);
   void read_natnet(TableReader& table, OutputConfig& output) const;
-  void read_kind(TableReader& table, OutputConfig& output) const;
+  void read_kind(TableReader& table, OutputConfig& output);
   void read_ros2(TableReader& table, OutputConfig& output) const;
   void read_bodies(TableReader& table, OutputConfig& output) const;
   void read_list(TableReader& table, const char* key, std::size_t most, OutputConfig& output) const;
-  void read_receivers(TableReader& table, OutputConfig& output) const;
+  void read_receivers(TableReader& table, OutputConfig& output);
   void read_clients(TableReader& table, OutputConfig& output) const;
   void read_streams(TableReader& table, OutputConfig& output) const;
   void check_stream(TableReader& table, const char* key, const std::string& name) const;
@@ -100,6 +101,8 @@ class OutputReader {
   const ConfigFile& file_;
   DaemonConfig& config_;
   std::map<std::string, int> lines_;  // of the tables, by the outputs' names
+  // The same by kind, whether it has a body, and receiver.
+  std::map<std::tuple<OutputKind, bool, std::string>, int> receivers_;
 };
 
 std::set<std::string> OutputReader::stream_names() const {
@@ -206,7 +209,7 @@ bool has_port(std::string_view endpoint) {
   return exact_number<std::uint16_t>(endpoint.substr(endpoint.rfind(':') + 1)).value_or(0) > 0;
 }
 
-void OutputReader::read_vmc(TableReader& table, OutputConfig& output) const {
+void OutputReader::read_vmc(TableReader& table, OutputConfig& output) {
   output.vrm1_names = table.choice("names", kNamesWords) == 1;
   output.assistant = table.choice("role", kRoleWords) == 1;
   std::string avatar;
@@ -217,10 +220,11 @@ void OutputReader::read_vmc(TableReader& table, OutputConfig& output) const {
   }
 }
 
-void OutputReader::read_receivers(TableReader& table, OutputConfig& output) const {
+void OutputReader::read_receivers(TableReader& table, OutputConfig& output) {
   const std::size_t errors = file_.findings.errors.size();
   table.read("to", output.to);
   if (file_.findings.errors.size() > errors) return;
+  const bool has_body = !output.body.empty() || !output.bodies.empty();
   std::set<std::string> seen;
   for (const std::string& endpoint : output.to) {
     const auto address = drivers::parse_endpoint(endpoint);
@@ -228,9 +232,19 @@ void OutputReader::read_receivers(TableReader& table, OutputConfig& output) cons
       table.add_error("to", fmt::format("{} should be an address and a port from 1 to"
                                         " 65535, like 127.0.0.1:39539",
                                         in_quotes(endpoint)));
-    } else if (!seen.insert(drivers::endpoint_text(*address)).second) {
+      continue;
+    }
+    const std::string receiver = drivers::endpoint_text(*address);
+    if (!seen.insert(receiver).second) {
       table.add_error("to", fmt::format("{} is listed twice; it would get each frame twice",
                                         in_quotes(endpoint)));
+    }
+    // Hands alone may go where another output sends their body.
+    const auto first = receivers_.try_emplace({output.kind, has_body, receiver}, output.line).first;
+    if (has_body && first->second != output.line) {
+      table.add_error("to", fmt::format("{} would take two outputs for one: that in line {}"
+                                        " sends to it, too; give each a port",
+                                        in_quotes(endpoint), first->second));
     }
   }
   if (output.to.empty() || output.to.size() > kMaxReceivers) {
@@ -238,7 +252,7 @@ void OutputReader::read_receivers(TableReader& table, OutputConfig& output) cons
   }
 }
 
-void OutputReader::read_axis(TableReader& table, OutputConfig& output) const {
+void OutputReader::read_axis(TableReader& table, OutputConfig& output) {
   if (output.kind == OutputKind::kBvh) {
     table.read("header", output.header);
   } else {
@@ -255,7 +269,7 @@ void OutputReader::read_axis(TableReader& table, OutputConfig& output) const {
 }
 
 // Kinds that send to whom the config names, as their programs do.
-void OutputReader::read_push(TableReader& table, OutputConfig& output) const {
+void OutputReader::read_push(TableReader& table, OutputConfig& output) {
   std::string_view port = "9763";
   if (output.kind == OutputKind::kMvn) output.euler = table.choice("format", kMvnFormats) == 1;
   if (output.kind == OutputKind::kMocopi) port = "12351";
@@ -345,7 +359,7 @@ void OutputReader::read_ros2(TableReader& table, OutputConfig& output) const {
   }
 }
 
-void OutputReader::read_kind(TableReader& table, OutputConfig& output) const {
+void OutputReader::read_kind(TableReader& table, OutputConfig& output) {
   switch (output.kind) {
     case OutputKind::kVmc:
       return read_vmc(table, output);

@@ -55,6 +55,17 @@ const std::string kTo = "to = [\"127.0.0.1:39539\"]\n";
 
 }  // namespace
 
+TEST_CASE("no receiver gets two people who look like one") {
+  const std::string stage = "[[output]]\nkind = \"vmc\"\nbody = \"stage-bob\"\n";
+  CHECK(output_complaint(kToAnn + kTo + stage + kTo) ==
+        "posed.toml:19: '127.0.0.1:39539' would take two outputs for one: that in line 12"
+        " sends to it, too; give each a port");
+  const std::string hands = "[[output]]\nkind = \"vmc\"\nleft_hand = \"left\"\n";
+  const std::string mvn = "[[output]]\nkind = \"mvn\"\nbody = \"ann\"\n";
+  const Reading reading = read_with_outputs(kToAnn + kTo + hands + kTo + mvn + kTo);
+  CHECK(reading.errors.empty());
+}
+
 TEST_CASE("an output is read with its defaults, and named by kind and stream") {
   const Reading reading = read_with_outputs(kToAnn + kTo + R"([[output]]
 name = "hands"
@@ -132,7 +143,7 @@ TEST_CASE("a wrong output is one sentence with its line") {
         std::string::npos);
   CHECK(output_complaint(kToAnn + kTo + "name = \"Ann!\"\n").find("an output's name has 1 to 32") !=
         std::string::npos);
-  CHECK(output_complaint(kToAnn + kTo + kToAnn + kTo) ==
+  CHECK(output_complaint(kToAnn + kTo + kToAnn + "to = [\"127.0.0.1:39540\"]\n") ==
         "posed.toml:16: a second output is named 'vmc-ann' (the first stands in line 12); give one"
         " of them another name");
   CHECK(output_complaint(kToAnn + kTo + "colour = 1\n").find("unknown key 'output.colour'") !=
