@@ -48,12 +48,17 @@ void read_trigger(TableReader& root, DaemonConfig& config) {
 }
 
 Result<> check_folder(const RecordConfig& record) {
-  std::error_code ignored;
+  std::error_code ignored, unreachable;
   std::filesystem::path there = std::filesystem::absolute(record.folder, ignored);
-  while (there.has_relative_path() && !std::filesystem::exists(there, ignored)) {
+  while (there.has_relative_path() && !std::filesystem::exists(there, unreachable)) {
+    if (unreachable) break;  // links in a circle, too long a name, a folder one may not enter
     there = there.parent_path();
   }
   const std::string shown = clean(there.string());
+  if (unreachable) {
+    return fail(shown + " cannot be reached (" + unreachable.message() +
+                "), where recordings would go; name another [record] folder");
+  }
   if (!std::filesystem::is_directory(there, ignored)) {
     return fail(shown +
                 " is a file, so it cannot be a folder for recordings; name another"

@@ -1,7 +1,13 @@
 
 #include <catch2/catch.hpp>
 
+#include <filesystem>
+#include <string>
+
 #include "daemon/config/config.hpp"
+#include "daemon/config/take_tables.hpp"
+#include "tests/support/has.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace posed::config {
 namespace {
@@ -27,6 +33,18 @@ TEST_CASE("what listens over TCP has a port of its own") {
   output.to = {"127.0.0.1:39539"};         // sends, and does not listen
   config.metrics->listen = "127.0.0.1:0";  // any free one
   CHECK(port_clashes(config).empty());
+}
+
+TEST_CASE("check tells that recordings would go to a folder that nobody reaches") {
+  const test::TempFolder folder;
+  const std::filesystem::path circle = folder.path() / "circle";
+  std::filesystem::create_symlink(circle, circle);
+  for (const auto& unreachable : {circle, circle / "x", folder.path() / std::string(300, 'a')}) {
+    const auto checked = check_folder({.folder = unreachable});
+    REQUIRE_FALSE(checked);
+    CHECK(test::has(checked.error().message, "cannot be reached"));
+  }
+  CHECK(check_folder({.folder = folder.path() / "new/takes"}));
 }
 
 TEST_CASE("a port that does not exist is no endpoint") {
