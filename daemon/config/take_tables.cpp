@@ -48,15 +48,16 @@ void read_trigger(TableReader& root, DaemonConfig& config) {
 }
 
 Result<> check_folder(const RecordConfig& record) {
-  std::error_code ignored, unreachable;
+  std::error_code ignored;
+  std::error_code failed;
   std::filesystem::path there = std::filesystem::absolute(record.folder, ignored);
-  while (there.has_relative_path() && !std::filesystem::exists(there, unreachable)) {
-    if (unreachable) break;  // links in a circle, too long a name, a folder one may not enter
+  while (there.has_relative_path() && !std::filesystem::exists(there, failed)) {
+    if (failed) break;  // links in a circle, too long a name, a folder one may not enter
     there = there.parent_path();
   }
   const std::string shown = clean(there.string());
-  if (unreachable) {
-    return fail(shown + " cannot be reached (" + unreachable.message() +
+  if (failed) {
+    return fail(shown + " cannot be reached (" + failed.message() +
                 "), where recordings would go; name another [record] folder");
   }
   if (!std::filesystem::is_directory(there, ignored)) {
