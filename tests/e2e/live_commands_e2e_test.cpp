@@ -226,6 +226,16 @@ TEST_CASE("ctl checks a file before it sends it") {
   CHECK(served.ctl({"haptics", "walker"}).code == 2);
 }
 
+TEST_CASE("ctl says that a request is too long for any daemon") {
+  Served served;
+  served.start();
+  std::string labels;
+  while (labels.size() < 100'000) labels += "g 1 c 3 4 p ";
+  const ProgramOutcome refused = served.ctl({"play", "walker", labels});
+  CHECK(refused.code == 1);
+  CHECK(has(refused.err, "bytes and may have 65536"));
+}
+
 TEST_CASE("a piped status has complete names, and no line ends in blanks") {
   Served served;
   const std::string name = "a-style-with-a-rather-long-name-that-was-cut-before.style";

@@ -16,6 +16,7 @@
 #include <spdlog/fmt/fmt.h>
 #include <CLI/CLI.hpp>
 
+#include "daemon/control/request_handler.hpp"
 #include "daemon/control/uploads.hpp"
 #include "daemon/pipeline/take.hpp"
 #include "daemon/teach/teacher.hpp"
@@ -61,9 +62,15 @@ struct CtlOptions {
 Result<v1::ControlReply> ask(Connection& connection, const CtlOptions& options,
                              const v1::ControlRequest& request) {
   using Steady = std::chrono::steady_clock;
-  if (!connection.send(request.SerializeAsString())) {
-    return fail("the request cannot be sent");
+  const std::string bytes = request.SerializeAsString();
+  // The daemon ends the connection of a peer who sends more, without a word.
+  if (bytes.size() > control::kMaxRequest) {
+    return fail(
+        fmt::format("the request has {} bytes and may have {}: shorten its text, or send"
+                    " labels in pieces",
+                    bytes.size(), control::kMaxRequest));
   }
+  if (!connection.send(bytes)) return fail("the request cannot be sent");
   const auto end = Steady::now() + std::chrono::duration<double>(options.timeout_s);
   while (Steady::now() < end && !Interrupt::came()) {
     if (auto refused = connection.refusal()) return std::unexpected(*refused);
