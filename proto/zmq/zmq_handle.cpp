@@ -139,6 +139,11 @@ Result<> choose_family(void* socket, std::string_view endpoint) {
   return set_option(socket, ZMQ_IPV6, 1);
 }
 
+std::unexpected<Error> cannot_connect(const std::string& endpoint, const std::string& why) {
+  return misuse("cannot connect to '" + endpoint + "': " + why +
+                "; an endpoint reads like tcp://127.0.0.1:5570");
+}
+
 }  // namespace
 
 Result<std::string> bind_socket(void* socket, const std::string& endpoint) {
@@ -176,9 +181,7 @@ Result<> connect_socket(void* socket, const std::string& endpoint) {
   const bool known = endpoint.starts_with("tcp://") || endpoint.starts_with(kIpc) ||
                      endpoint.starts_with("inproc://posed.");  // between posed's own threads
   if (!known || endpoint.ends_with(":0")) {
-    return misuse(
-        "cannot connect to '" + endpoint +
-        "': a daemon's endpoint reads like tcp://127.0.0.1:5570 or ipc:///run/posed.sock");
+    return cannot_connect(endpoint, "no daemon can be there");
   }
   TRY(choose_family(socket, endpoint));
   TRY(try_descriptors());
@@ -190,8 +193,7 @@ Result<> connect_socket(void* socket, const std::string& endpoint) {
     TRY(set_option(socket, option, value));
   }
   if (zmq_connect(socket, endpoint.c_str()) == 0) return {};
-  return misuse("cannot connect to '" + endpoint + "': " + last_error() +
-                "; an endpoint reads like tcp://127.0.0.1:5570");
+  return cannot_connect(endpoint, last_error());
 }
 
 // Reading ZMQ_EVENTS makes libzmq process pending commands from its I/O thread.

@@ -101,7 +101,7 @@ TEST_CASE("an absent daemon gives one error message") {
   CHECK(has(ctl.err, "posed: ... tcp://127.0.0.1:9"));
   const auto wrong = posed({"ctl", "--connect", "nonsense", "status"});
   CHECK(wrong.code == 2);
-  CHECK(has(wrong.err, "endpoint reads like"));
+  CHECK(has(wrong.err, "an endpoint reads like"));
 }
 
 TEST_CASE("a busy port gives one error message and exit code 1") {
