@@ -1,5 +1,6 @@
 #include "daemon/service/service.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -18,6 +19,7 @@ namespace {
 
 // Between two looks a thread may sleep that long, and needs as long again on a busy machine.
 constexpr std::int64_t kMinWatchdog_ns = 2 * Watchdog::kLooks * system::kMaxSleep_ns;
+constexpr std::uint64_t kMaxWatchdog_us = 31'536'000'000'000;  // a year: longer is as good as never
 
 // proc_pid_stat(5): "TID (NAME) STATE ...", where NAME may have parentheses and spaces of its own.
 bool waits(std::string_view stat, std::string_view name) {
@@ -65,8 +67,15 @@ Watchdog::Finding Watchdog::look(std::int64_t now_ns) {
 Service::Service(std::vector<system::ThreadPulse> threads)
     : present_(std::getenv("NOTIFY_SOCKET") != nullptr) {
   std::uint64_t within_us = 0;
-  if (!present_ || ::sd_watchdog_enabled(0, &within_us) <= 0) return;
-  const auto within_ns = static_cast<std::int64_t>(within_us) * 1000;
+  const int asked = present_ ? ::sd_watchdog_enabled(0, &within_us) : 0;
+  if (asked < 0) {
+    spdlog::warn(
+        "WATCHDOG_USEC or WATCHDOG_PID is no number ({}), so nobody is told when posed is stuck;"
+        " leave setting them to systemd",
+        errno_text(-asked));
+  }
+  if (asked <= 0) return;
+  const auto within_ns = static_cast<std::int64_t>(std::min(within_us, kMaxWatchdog_us)) * 1000;
   if (within_ns < kMinWatchdog_ns) {
     spdlog::warn("WatchdogSec is too short for signs of life in time; set it to {} s or more",
                  kMinWatchdog_ns / kNanosPerSecond);

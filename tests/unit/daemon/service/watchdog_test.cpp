@@ -2,6 +2,15 @@
 
 #include <catch2/catch.hpp>
 
+#include <cstdlib>
+#include <string>
+
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "tests/support/temp_folder.hpp"
+
 namespace posed::service {
 namespace {
 
@@ -103,6 +112,27 @@ TEST_CASE("watchdog: nothing is found between two looks, however often it is cal
     CHECK_FALSE(found.alive);
     CHECK(found.stuck.empty());
   }
+}
+
+TEST_CASE("watchdog: a time that no clock can count is as good as never, and no time is none") {
+  const char* usec = GENERATE("18446744073709551614", "9223372036854776", "soon", "-1", "");
+  INFO(usec);
+  const test::TempFolder folder;
+  const std::string path = (folder.path() / "notify").string();
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  path.copy(address.sun_path, sizeof address.sun_path - 1);
+  const int systemd = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
+  REQUIRE(::bind(systemd, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0);
+  ::setenv("NOTIFY_SOCKET", path.c_str(), 1);
+  ::setenv("WATCHDOG_USEC", usec, 1);
+  Service service({});
+  ::unsetenv("NOTIFY_SOCKET");
+  ::unsetenv("WATCHDOG_USEC");
+  for (std::int64_t i = 0; i < 100; ++i) service.turn(i * kWithin_ns);
+  char byte = 0;
+  CHECK(::recv(systemd, &byte, 1, 0) < 0);
+  ::close(systemd);
 }
 
 }  // namespace
