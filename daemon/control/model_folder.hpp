@@ -41,11 +41,12 @@ class ModelFolder {
   Result<std::string> rename(std::string_view name, const std::string& to) const;
   // Deletes a model of the list.
   Result<> remove(std::string_view name) const;
+  // A model of the list, as it is now.
+  Result<FolderModel> find(std::string_view name) const;
   // The bytes of a model of the list.
   Result<std::string> read(std::string_view name) const;
 
  private:
-  Result<FolderModel> find(std::string_view name) const;
   explicit ModelFolder(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
   std::filesystem::path folder_;

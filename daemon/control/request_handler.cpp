@@ -223,14 +223,15 @@ bool RequestHandler::add_models(Listing& listing) {
   while (listing.next < listing.models.size()) {
     const FolderModel& model = listing.models[listing.next++];
     pulse_.beat();
-    v1::KnownModel& entry = *listing.reply.add_model();
-    entry.set_name(model.name);
-    entry.set_kind(std::string(model.kind));
-    const ModelWords words = words_of(model, there);
-    entry.set_learnt(words.learnt);
-    entry.set_skeleton(words.skeleton);
-    entry.set_verdict(words.verdict);
-    entry.set_strip(words.strip);
+    if (const auto words = words_of(model, there)) {
+      v1::KnownModel& entry = *listing.reply.add_model();
+      entry.set_name(model.name);
+      entry.set_kind(std::string(model.kind));
+      entry.set_learnt(words->learnt);
+      entry.set_skeleton(words->skeleton);
+      entry.set_verdict(words->verdict);
+      entry.set_strip(words->strip);
+    }
     if (clock_() > end_ns) break;
   }
   return listing.next == listing.models.size();
@@ -265,8 +266,9 @@ RequestHandler::Figures RequestHandler::figures() {
 }
 
 // A model is read again only when its file has changed, or another body may show it: a page asks
-// often.
-ModelWords RequestHandler::words_of(const FolderModel& model, const Figures& figures) {
+// often. Null: it has been deleted since the list was begun.
+std::optional<ModelWords> RequestHandler::words_of(const FolderModel& model,
+                                                   const Figures& figures) {
   const std::scoped_lock lock(words_mutex_);
   std::vector<std::uint32_t> ids;
   for (const auto& figure : figures) ids.push_back(figure->id);
@@ -276,6 +278,7 @@ ModelWords RequestHandler::words_of(const FolderModel& model, const Figures& fig
   auto& [stamp, words] = words_[model.name];
   if (stamp == model.stamp) return words;
   const auto bytes = models_.read(model.name);
+  if (!bytes && !models_.find(model.name)) return std::nullopt;
   words = bytes ? words_of_model(*bytes, model.kind, model.name, figures)
                 : ModelWords{.verdict = clean(bytes.error().text())};
   stamp = model.stamp;

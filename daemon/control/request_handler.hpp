@@ -216,7 +216,7 @@ class RequestHandler {
   bool add_models(Listing& listing);
   using Figures = std::vector<std::shared_ptr<const Skeleton>>;
   [[nodiscard]] Figures figures();  // of the bodies that are there
-  ModelWords words_of(const FolderModel& model, const Figures& figures);
+  std::optional<ModelWords> words_of(const FolderModel& model, const Figures& figures);
   Answer change_models(const v1::ControlRequest& request);
   Result<> check_unused(const std::string& model);
   Answer list_recordings() const;

@@ -134,8 +134,17 @@ TEST_CASE("while the models of a folder are read, other requests are answered") 
   REQUIRE(reply.model_size() == 3);
   CHECK(reply.model(0).name() == "a.style");
   CHECK(reply.model(2).name() == "c.style");
-  // Many who ask at once are told to come again.
+  // One that is deleted before its turn is not there, as if it had never been.
   request.mutable_list_models();
+  REQUIRE(write_whole_file(folder.path() / "b.style", "another"));
+  CHECK_FALSE(ask());
+  std::filesystem::remove(folder.path() / "b.style");
+  std::optional<Reply> listed;
+  while (!listed) listed = rig.handler.list_on();
+  const v1::ControlReply without = reply_of(listed);
+  REQUIRE(without.model_size() == 2);
+  CHECK(without.model(1).name() == "c.style");
+  // Many who ask at once are told to come again.
   int waiting = 0;
   while (!ask()) REQUIRE(++waiting <= 100);
   CHECK(waiting == 16);
