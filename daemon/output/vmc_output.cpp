@@ -131,7 +131,7 @@ bool is_same_figure(const Skeleton& one, const Skeleton& other) {
 // The joints of clips that are no glTF have axes of their own.
 Result<std::shared_ptr<const Skeleton>> avatar_figure(const std::filesystem::path& path) {
   const auto clip = TRY(clip::read_clip(path));
-  const clip::Format* format = clip::format_of(path);
+  const clip::Format* format = clip::format_of_file(path);
   const bool gltf = format != nullptr && format->read == clip::read_gltf;
   auto figure =
       gltf ? motion::resting_skeleton(*clip.skeleton) : motion::canonical_skeleton(*clip.skeleton);

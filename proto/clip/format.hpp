@@ -31,7 +31,7 @@ enum class ReadOption : std::uint8_t {
 
 // The files of one clip in memory.
 struct ClipFile {
-  std::string name;             // path, for messages and to recognise the format by its extension
+  std::string name;             // path, for messages; parse_clip() goes by its extension
   std::string bytes;            // content
   std::string skeleton_name{};  // path of the skeleton, where that is a file of its own
   std::string skeleton{};       // content of that file
@@ -76,8 +76,12 @@ void add_format(Format format);
 
 // The format of a name by its extension alone; null if no format has it.
 [[nodiscard]] const Format* format_of(const std::filesystem::path& path);
-// The format that recognises the first bytes of a file; null if none does.
+// The format that recognises a file by its first bytes; null if none does.
+constexpr std::size_t kSniffedBytes = 4096;
 [[nodiscard]] const Format* format_of_bytes(std::string_view begin);
+// The format of a file that is read: a name may be wrong, so what recognises the content comes
+// before the extension. Null if neither tells.
+[[nodiscard]] const Format* format_of_file(const std::filesystem::path& path);
 
 // Selects the formats of a list: those that are read or written, all or only those of bodies.
 enum class Use : std::uint8_t { kRead, kReadBody, kWrite, kWriteBody };
@@ -103,8 +107,7 @@ Result<> check_options(const Format& format, const ReadOptions& options, const s
 // A file's bytes as its format's reader wants them: text in UTF-8, Format::plain.
 [[nodiscard]] std::string plain_bytes(const Format& format, std::string bytes);
 
-// Loads a clip's files. The format is found by the extension, and where that is no format's, by the
-// first bytes. An error lists what can be read.
+// Loads a clip's files (format_of_file). An error lists what can be read.
 struct LoadedClip {
   const Format* format;
   ClipFile file;

@@ -16,7 +16,6 @@ namespace {
 
 constexpr FileRule kClip{.what = "clip", .max_bytes = 2'000'000'000};
 constexpr std::uintmax_t kMaxSkeletonFile = 16'000'000;  // bytes; real files have about 10 KB
-constexpr std::size_t kSniffedBytes = 4096;
 
 std::vector<Format>& table() {
   static std::vector<Format> all{bvh_format(), amc_format(), hand_csv_format(), glb_format(),
@@ -112,11 +111,16 @@ const Format* format_of(const std::filesystem::path& path) {
 }
 
 const Format* format_of_bytes(std::string_view begin) {
-  begin = without_bom(begin);
+  begin = without_bom(begin.substr(0, kSniffedBytes));
   const auto found = std::ranges::find_if(table(), [&](const Format& format) {
     return format.sniff != nullptr && format.sniff(begin);
   });
   return found == table().end() ? nullptr : &*found;
+}
+
+const Format* format_of_file(const std::filesystem::path& path) {
+  const Format* format = format_of_bytes(utf8_of(first_bytes(path)));
+  return format != nullptr ? format : format_of(path);
 }
 
 std::string listed(Use use) {
@@ -184,8 +188,7 @@ std::string plain_bytes(const Format& format, std::string bytes) {
 }
 
 Result<LoadedClip> load_clip(const std::filesystem::path& path, const ReadOptions& options) {
-  LoadedClip loaded{.format = format_of(path), .file = {.name = path.string(), .bytes = {}}};
-  if (loaded.format == nullptr) loaded.format = format_of_bytes(utf8_of(first_bytes(path)));
+  LoadedClip loaded{.format = format_of_file(path), .file = {.name = path.string(), .bytes = {}}};
   if (loaded.format == nullptr || loaded.format->read == nullptr) {
     TRY(expect_there(path));
     const std::string extension = extension_of(path);

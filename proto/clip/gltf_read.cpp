@@ -7,6 +7,7 @@
 // the skin was bound to them.
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -20,6 +21,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -70,29 +72,49 @@ bool never_reads(std::vector<unsigned char>* /*out*/, std::string* error, const 
   return false;
 }
 
+constexpr std::size_t kGlbHeader = 20, kGlbLengthAt = 8, kGlbJsonLengthAt = 12;
+std::uint32_t number_in(std::string_view bytes, std::size_t at) {
+  std::uint32_t number = 0;
+  std::memcpy(&number, bytes.data() + at, sizeof number);
+  return number;
+}
 // The JSON of a .glb is its first chunk; brackets in the bytes after that mean nothing.
 std::string_view json_of(std::string_view bytes) {
-  constexpr std::size_t kHeader = 20, kLengthAt = 12;
-  if (!bytes.starts_with("glTF") || bytes.size() < kHeader) return bytes;
-  std::uint32_t length = 0;
-  std::memcpy(&length, bytes.data() + kLengthAt, sizeof length);
-  return bytes.substr(kHeader, length);
+  if (!bytes.starts_with("glTF") || bytes.size() < kGlbHeader) return bytes;
+  return bytes.substr(kGlbHeader, number_in(bytes, kGlbJsonLengthAt));
+}
+
+// A whole number that is written with a point or an exponent, as JSON and glTF allow (3.0, 1e2),
+// in digits alone; empty for any other word.
+std::string whole_number(std::string_view word) {
+  constexpr double kMaxWhole = 9007199254740992.0;  // up to which a double has each whole number
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (error != std::errc() || end != word.data() + word.size()) return {};
+  if (word.find_first_of(".eE") == word.npos || std::abs(value) > kMaxWhole) return {};
+  if (std::trunc(value) != value || (value == 0.0 && std::signbit(value))) return {};
+  return std::to_string(static_cast<std::int64_t>(value));
 }
 
 // What posed reads of a glTF's JSON. The rest (meshes, materials, textures, what programs add for
-// themselves) is cut out before tinygltf, which would take up to 3 KB for each empty material.
+// themselves) is cut out before tinygltf, which would take up to 3 KB for each empty material; and
+// whole numbers get the one form that tinygltf takes for an index.
 class JsonCut {
  public:
-  explicit JsonCut(std::span<char> json) : json_(json) {}
+  explicit JsonCut(std::string_view json) : json_(json) {}
 
-  // Puts 0, and spaces, in place of each value that posed does not read. Fails if the rest would
-  // take tinygltf too much stack or memory.
+  // Puts 0 in place of each value that posed does not read. Fails if the rest would take tinygltf
+  // too much stack or memory.
   Result<> cut() {
     while (at_ < json_.size()) {
       const char c = json_[at_];
       if (c == '"') {
         const std::string_view text = skip_text();
         if (skip_to_value() && !wanted(text)) blank_value();
+        continue;
+      }
+      if (kNumber.contains(c)) {
+        add_number();
         continue;
       }
       ++at_;
@@ -109,11 +131,27 @@ class JsonCut {
         return fail("it describes too much; export the figure alone, with fewer animations");
       }
     }
+    replace(at_, "");
     return {};
   }
+  [[nodiscard]] const std::string& out() const { return out_; }
   [[nodiscard]] std::size_t buffers() const { return buffers_; }
 
  private:
+  static constexpr std::string_view kNumber = "+-.0123456789eE";
+
+  // The words stand for what has been read since `begin`.
+  void replace(std::size_t begin, std::string_view words) {
+    out_ += json_.substr(copied_, begin - copied_);
+    out_ += words;
+    copied_ = at_;
+  }
+  void add_number() {
+    const std::size_t begin = at_;
+    at_ = std::min(json_.find_first_not_of(kNumber, begin), json_.size());
+    const std::string whole = whole_number(json_.substr(begin, at_ - begin));
+    if (!whole.empty()) replace(begin, whole);
+  }
   // The text that begins here, without its quotes.
   std::string_view skip_text() {
     const std::size_t begin = ++at_;
@@ -162,20 +200,21 @@ class JsonCut {
         ++at_;
       }
     }
-    std::ranges::fill(json_.subspan(begin, at_ - begin), ' ');
-    if (begin < at_) json_[begin] = '0';
+    if (begin < at_) replace(begin, "0");
   }
 
-  std::span<char> json_;
+  std::string_view json_;
+  std::string out_;
+  std::size_t copied_ = 0;  // of json_ into out_
   std::size_t at_ = 0, depth_ = 0, values_ = 0, buffers_ = 0;
   std::string_view top_;  // the key of the whole that is being read
 };
 
 // The file without what posed does not read.
 Result<std::string> cut_out(const ClipFile& file) {
-  std::string bytes = file.bytes;
+  const std::string& bytes = file.bytes;
   const std::string_view json = json_of(bytes);
-  JsonCut cut({bytes.data() + (json.data() - bytes.data()), json.size()});
+  JsonCut cut(json);
   if (auto fits = cut.cut(); !fits) {
     return fail("is no glTF that can be read (" + fits.error().message + ")", file.name);
   }
@@ -185,7 +224,16 @@ Result<std::string> cut_out(const ClipFile& file) {
     return fail("is no glTF that can be read (it has several buffers, where a .glb has one)",
                 file.name);
   }
-  return bytes;
+  if (json.size() == bytes.size()) return cut.out();
+  // A length that was wrong stays so.
+  std::string whole = bytes.substr(0, kGlbHeader) + cut.out();
+  while ((whole.size() - kGlbHeader - json.size()) % 4 != 0) whole += ' ';
+  const auto longer = static_cast<std::uint32_t>(whole.size() - kGlbHeader - json.size());
+  for (const std::size_t at : {kGlbLengthAt, kGlbJsonLengthAt}) {
+    const std::uint32_t length = number_in(whole, at) + longer;
+    std::memcpy(whole.data() + at, &length, sizeof length);
+  }
+  return whole.append(bytes, kGlbHeader + json.size());
 }
 
 Result<tinygltf::Model> load_model(const ClipFile& file) {
@@ -1194,6 +1242,11 @@ Format gltf_format() {
       .name = "glTF",
       .extensions = {".gltf", ".vrm"},
       .options = {ReadOption::kUnit, ReadOption::kUp, ReadOption::kFacing, ReadOption::kProfile},
+      .sniff =
+          [](std::string_view begin) {
+            return begin.starts_with('{') &&
+                   (begin.contains("\"asset\"") || begin.contains("\"accessors\""));
+          },
       .read = read_gltf};
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <string>
 
@@ -11,8 +12,10 @@
 #include "drivers/vmc/osc.hpp"
 #include "models/motion/canonical_skeleton.hpp"
 #include "models/motion/synthetic_walker.hpp"
+#include "proto/clip/gltf.hpp"
 #include "proto/frame/hand_skeleton.hpp"
 #include "proto/frame/rotation.hpp"
+#include "tests/support/temp_folder.hpp"
 
 namespace posed::output {
 namespace {
@@ -123,6 +126,21 @@ TEST_CASE("with an avatar the lengths of its bones are sent, turned as the perfo
   const Eigen::Vector3d thigh_m = figure->joints[static_cast<std::size_t>(shin)].offset_m;
   CHECK(sent.at("LeftLowerLeg").position_m[1] == Approx(thigh_m.y()).margin(1e-5));
   CHECK(changed_m > 0.01);
+}
+
+TEST_CASE("an avatar's file is what its content says, whatever its name") {
+  const test::TempFolder folder;
+  const auto glb = folder.path() / "me.glb";
+  REQUIRE(clip::write_glb(motion::make_walker({.seconds = 0.2}).value(), glb));
+  const auto figure = avatar_figure(glb);
+  REQUIRE(figure);
+  for (const char* name : {"me.bvh", "me"}) {
+    std::filesystem::copy_file(glb, folder.path() / name);
+    const auto other = avatar_figure(folder.path() / name);
+    INFO(name);
+    if (!other) FAIL(other.error().text());
+    CHECK((*other)->id == (*figure)->id);
+  }
 }
 
 TEST_CASE("an avatar is turned from how its file rests, and stands on the floor of its file") {

@@ -686,6 +686,50 @@ TEST_CASE("what is no glTF, or a damaged one, is refused with a reason") {
                   "no glTF that can be read"));
 }
 
+TEST_CASE("whole numbers of a glTF may be written with a point or an exponent") {
+  const bool backwards = GENERATE(false, true);
+  const std::string plain = AvatarFile::text(backwards, true);
+  std::string pointed;
+  for (std::size_t i = 0; i < plain.size(); ++i) {
+    pointed += plain[i];
+    const bool ends =
+        plain[i] >= '0' && plain[i] <= '9' && std::string(",]}").contains(plain[i + 1]);
+    if (ends && plain.find_last_of(".\"", i) == plain.find_last_of('"', i)) {
+      pointed += i % 2 == 0 ? ".0" : "e0";
+    }
+  }
+  const auto want = clip::parse_clip({.name = "me.vrm", .bytes = plain});
+  for (const std::string& bytes : {pointed, glb_of(pointed, std::string(4, 0))}) {
+    const auto got = clip::parse_clip({.name = "me.vrm", .bytes = bytes});
+    if (!want || !got) FAIL((want ? got : want).error().text());
+    CHECK(got->skeleton->id == want->skeleton->id);
+  }
+  const auto kept = clip::parse_clip(
+      {.name = "x.glb",
+       .bytes = glb_of(R"({"asset":{"version":"2.0"},"nodes":[{"translation":[1e1,-0.0,0.5]},)"
+                       R"({"children":[0.0],"scale":[1e0,1.0,10e-1]}],"accessors":[)"
+                       R"({"count":1e9,"componentType":5126.0,"type":"SCALAR"}]})",
+                       std::string(4, 0))});
+  if (!kept) FAIL(kept.error().text());
+  CHECK(kept->skeleton->joints.size() == 2);
+}
+
+TEST_CASE("what a glTF or BVH is, its content says before its name") {
+  const test::TempFolder folder;
+  const clip::Clip walk = walker_clip();
+  REQUIRE(clip::write_glb(walk, folder.path() / "walk.glb"));
+  REQUIRE(clip::write_clip(walk, folder.path() / "walk.bvh"));
+  std::filesystem::copy_file(folder.path() / "walk.glb", folder.path() / "glb.bvh");
+  std::filesystem::copy_file(folder.path() / "walk.bvh", folder.path() / "bvh.vrm");
+  folder.write("gltf.bvh", AvatarFile::text(false, false));
+  for (const char* name : {"glb.bvh", "bvh.vrm", "gltf.bvh"}) {
+    const auto clip = clip::read_clip(folder.path() / name);
+    INFO(name);
+    if (!clip) FAIL(clip.error().text());
+    CHECK(clip->skeleton->joint_of(Bone::kHips) >= 0);
+  }
+}
+
 TEST_CASE("a glTF that asks for more than its size is refused, or read once") {
   const std::string asset = "{\"asset\":{\"version\":\"2.0\"}";
   const auto why = [](const std::string& bytes) {
