@@ -25,6 +25,7 @@ RT_SAFE bool read_text(BigEndianReader& reader, std::span<const std::byte>& rest
 // True when the arguments hold what the types say.
 RT_SAFE bool holds(std::span<const std::byte> arguments, std::string_view types) noexcept {
   BigEndianReader reader(arguments);
+  int open_arrays = 0;
   for (const char type : types) {
     switch (type) {
       case 'i':
@@ -57,12 +58,18 @@ RT_SAFE bool holds(std::span<const std::byte> arguments, std::string_view types)
       case 'N':
       case 'I':
         break;
+      case '[':
+        ++open_arrays;
+        break;
+      case ']':
+        if (--open_arrays < 0) return false;
+        break;
       default:
         return false;
     }
     if (!reader.ok()) return false;
   }
-  return true;
+  return open_arrays == 0;
 }
 
 RT_SAFE bool is_valid_packet(std::span<const std::byte> packet, int depth) noexcept {

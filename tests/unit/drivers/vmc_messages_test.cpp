@@ -229,6 +229,22 @@ TEST_CASE("OSC sizes and bundles that make no sense are refused") {
   CHECK(vmc::check_packet(bytes_from_hex("01 02 03 04 ")) == Outcome::kForeign);
 }
 
+TEST_CASE("OSC: an array in a message that is not VMC's does no harm to the bundle") {
+  std::array<char, 256> memory{};
+  osc::OutboundPacketStream packet(memory.data(), memory.size());
+  packet << osc::BeginBundleImmediate << osc::BeginMessage("/list") << osc::BeginArray
+         << osc::int32{1} << osc::BeginArray << 2.5F << osc::EndArray << osc::EndArray
+         << osc::EndMessage << osc::BeginMessage("/VMC/Ext/T") << 0.5F << osc::EndMessage
+         << osc::EndBundle;
+  const std::span bytes(reinterpret_cast<const std::byte*>(packet.Data()), packet.Size());
+  REQUIRE(vmc::check_packet(bytes) == Outcome::kOk);
+  float time_s = 0.0F;
+  vmc::each_message(bytes, [&](const vmc::OscMessage& message) {
+    if (message.address == "/VMC/Ext/T") time_s = vmc::OscArguments(message).f32();
+  });
+  CHECK(time_s == 0.5F);
+}
+
 TEST_CASE("OSC: any number is a number, a text is none, and what is missing is told") {
   std::array<char, 256> memory{};
   osc::OutboundPacketStream packet(memory.data(), memory.size());
