@@ -2,14 +2,15 @@
 // say what `--help` says.
 #include <cctype>
 #include <filesystem>
-#include <fstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include "daemon/tools/command/command.hpp"
 #include "daemon/tools/command/output_files.hpp"
+#include "proto/frame/whole_file.hpp"
 
 namespace posed::tools {
 namespace {
@@ -118,12 +119,6 @@ std::string man_page_of_all(const CLI::App& app) {
          ".SH EXIT STATUS\n0: done. 1: failed, or the result is not usable. 2: wrong use.\n";
 }
 
-Result<> write_man_page(const fs::path& file, const std::string& text) {
-  std::ofstream out(file, std::ios::binary);
-  if (!(out << text << std::flush)) return fail("cannot be written", file.string());
-  return {};
-}
-
 Result<> write_pages(const CLI::App& app, const fs::path& folder, bool overwrite) {
   std::vector<std::pair<fs::path, std::string>> pages{{folder / "posed.1", man_page_of_all(app)}};
   for (const CLI::App* command : commands_of(app)) {
@@ -133,9 +128,7 @@ Result<> write_pages(const CLI::App& app, const fs::path& folder, bool overwrite
   OutputFiles files(overwrite);
   for (const auto& [file, text] : pages) files.writes(file, {".1"});
   TRY(files.check());
-  for (const auto& [file, text] : pages) {
-    TRY(write_man_page(file, text));
-  }
+  for (const auto& [file, text] : pages) TRY(write_whole_file(file, text));
   return {};
 }
 

@@ -268,7 +268,8 @@ Result<> DemoFolder::check_is_own(const std::vector<std::string>& names, bool ov
 
 Result<> DemoFolder::begin() const {
   std::error_code error;
-  fs::create_directories(path_, error);  // writing says what failed
+  fs::create_directories(path_, error);
+  if (error) return fail("cannot make the folder: " + error.message(), path_.string());
   return write_whole_file(path_ / kStamp, "{}\n");
 }
 
