@@ -21,6 +21,7 @@ constexpr double kDefaultSpeed_rad_s = 8.0;
 constexpr std::size_t kMaxShapes = 256;  // each becomes up to four capsules, which all are compared
 constexpr double kMaxNamed_rad = 100.0;  // that a text may name
 constexpr double kSameWay = 0.97;        // cosine: fingers side by side point so
+constexpr double kAlike = 0.01;  // of that mean cosine: no finger points away more than that
 constexpr double kMaxFinger_m = 0.3;
 constexpr double kSamePlace_m = 1e-3;
 constexpr double kBends_m = 1e-3;       // tips that go less far to a side of the palm bend to both
@@ -136,9 +137,6 @@ class Builder {
                          : "its " + std::to_string(sliding) + " joints slide, and none turns") +
                     kNoGripper);
     }
-    if (hand_.joints.size() > static_cast<std::size_t>(kMaxRobotJoints)) {
-      return refuse("the robot has more than 64 joints that turn: it is no hand");
-    }
     return {};
   }
 
@@ -151,6 +149,7 @@ class Builder {
       });
       if (!carries && is_above(above_, joint.link)) lasts.push_back(joint.link);
     }
+    open_at_zero();
     place_open();
     for (const int last : lasts) {
       hand_.fingers.push_back({.last = last, .tip = tip_link(last)});
@@ -166,6 +165,7 @@ class Builder {
     for (const Finger& finger : hand_.fingers) {
       if (finger.base == 0) return refuse("one finger of the robot has no joint of its own");
     }
+    open_fists();
     if (options_.tips.empty()) TRY(order_fingers());
     number_fingers();
     return {};
@@ -247,23 +247,54 @@ class Builder {
     return farthest_m;
   }
 
-  // A rod of a linkage hangs by one joint beside the finger that it moves, turns about the same
-  // axis within the finger's width, and ends well before it. Fingers are side by side along their
-  // axes, and a thumb's joint is across the palm.
+  // The first joints of two chains beyond the last link that carries both, or nothing.
+  [[nodiscard]] std::optional<std::pair<int, int>> parted(int one, int other) const {
+    const auto first = [&](int last, int beside) {
+      int joint = -1;
+      for (int l = last; l > 0 && !is_above(l, beside); l = hand_.links[l].parent) {
+        if (hand_.links[l].turns) joint = l;
+      }
+      return joint;
+    };
+    const std::pair joints(first(one, other), first(other, one));
+    if (joints.first < 0 || joints.second < 0) return std::nullopt;
+    return joints;
+  }
+
+  // Whether each joint from `last` back to `first` holds.
+  [[nodiscard]] bool all_joints(int first, int last, const auto& holds) const {
+    for (int l = last; l >= first; l = hand_.links[l].parent) {
+      if (hand_.links[l].turns && !holds(l)) return false;
+    }
+    return true;
+  }
+
+  // A linkage's rod or a motor's crank ends well before the finger that it moves. All its joints
+  // are tied to the finger's by <mimic>, whichever leads; or they turn about the axis of the
+  // finger's joint beside which they begin, within the finger's width. Fingers are side by side
+  // along their axes, and a thumb's joint is across the palm.
   [[nodiscard]] bool is_rod_of(const Finger& rod, const Finger& finger) const {
     constexpr double kOneAxis = 0.98, kFingerWidth_m = 0.01, kBesides_m = 0.03, kOfFinger = 0.6;
-    int hangs = hand_.links[rod.last].parent;
-    while (hangs > 0 && !hand_.links[hangs].turns) hangs = hand_.links[hangs].parent;
-    int joint = -1;  // the finger's below the same link
-    for (int l = finger.last; l > hangs; l = hand_.links[l].parent) {
-      if (hand_.links[l].turns) joint = l;
-    }
-    if (joint < 0 || !is_above(hangs, joint)) return false;
+    const auto joints = parted(rod.last, finger.last);
+    if (!joints) return false;
+    const auto [first, joint] = *joints;
+    if (!(extent_m(first) < kOfFinger * extent_m(joint))) return false;
+    const auto leader_of = [&](int l) {
+      return hand_.links[l].leader < 0 ? l : hand_.links[l].leader;
+    };
+    const bool tied = all_joints(first, rod.last, [&](int l) {
+      return !all_joints(joint, finger.last,
+                         [&](int other) { return leader_of(other) != leader_of(l); });
+    });
     const Eigen::Vector3d& axis = placed_.axis[joint];
-    const Eigen::Vector3d beside_m = placed_.at_m[rod.last] - placed_.at_m[joint];
-    return std::abs(axis.dot(placed_.axis[rod.last])) > kOneAxis && beside_m.norm() < kBesides_m &&
-           std::abs(axis.dot(beside_m)) < kFingerWidth_m &&
-           extent_m(rod.last) < kOfFinger * extent_m(joint);
+    const auto from_joint = [&](int l) -> Eigen::Vector3d {
+      return placed_.at_m[l] - placed_.at_m[joint];
+    };
+    return tied ||
+           (from_joint(first).norm() < kBesides_m && all_joints(first, rod.last, [&](int l) {
+              return std::abs(axis.dot(placed_.axis[l])) > kOneAxis &&
+                     std::abs(axis.dot(from_joint(l))) < kFingerWidth_m;
+            }));
   }
 
   void leave_out_rods() {
@@ -387,7 +418,7 @@ class Builder {
     for (int l = finger.tip; l > 0 && is_above(finger.base, l); l = hand_.links[l].parent) {
       const Link& link = hand_.links[l];
       if (!link.turns) continue;
-      const double room = link.high + link.low - 2.0 * std::clamp(0.0, link.low, link.high);
+      const double room = link.high + link.low - 2.0 * open_rad_[l];
       way += room * placed_.axis[l].cross(tip_m - placed_.at_m[l]);
     }
     return way.norm() > kBends_m ? way.normalized() : Eigen::Vector3d::Zero();
@@ -408,6 +439,24 @@ class Builder {
                    });
       });
     });
+  }
+
+  // Three fingers that bend to one middle, from about equally far apart.
+  [[nodiscard]] bool around_palm() const {
+    constexpr double kMostLikely = -0.25;  // cosine; 120 degrees apart: -0.5
+    const std::vector<Finger>& fingers = hand_.fingers;
+    Eigen::Vector3d along = Eigen::Vector3d::Zero();
+    for (const Finger& finger : fingers) along += direction(finger);
+    along.normalize();
+    const auto inwards = [&](const Finger& finger) {
+      const Eigen::Vector3d way = bend(finger);
+      return Eigen::Vector3d((way - way.dot(along) * along).normalized());
+    };
+    return fingers.size() == 3 && std::ranges::all_of(fingers, [&](const Finger& one) {
+             return std::ranges::all_of(fingers, [&](const Finger& other) {
+               return one.last == other.last || inwards(one).dot(inwards(other)) < kMostLikely;
+             });
+           });
   }
 
   // The names of a finger's links and joints.
@@ -449,7 +498,18 @@ class Builder {
         return sum / static_cast<double>(fingers.size() - 1);
       };
       thumb = std::ranges::min_element(fingers, {}, with_others);
-      if (with_others(*thumb) > kSameWay) thumb = facing();
+      const double away = with_others(*thumb);
+      const bool alone = std::ranges::count_if(fingers, [&](const Finger& finger) {
+                           return with_others(finger) < away + kAlike;
+                         }) == 1;
+      if (away > kSameWay || !alone) thumb = facing();
+      if (thumb == fingers.end() && around_palm()) {
+        thumb = fingers.begin();
+        hand_.remarks.push_back(
+            "its three fingers are alike around the palm: the one that ends in " +
+            in_quotes(hand_.links[thumb->tip].name) +
+            " is taken for the thumb; `tips` chooses another");
+      }
       if (thumb == fingers.end()) {
         return refuse(
             "no finger is named thumb, none points away from the others when open, and none bends "
@@ -487,7 +547,8 @@ class Builder {
     return {};
   }
 
-  // A joint that moves all fingers is a wrist's, and one that moves none is none of the hand's.
+  // A joint that moves all fingers is a wrist's, and one that moves none, also not by those that
+  // follow it, is none of the hand's.
   Result<> hold_shared() {
     const auto moved_by = [&](int link) {
       return std::ranges::count_if(
@@ -501,11 +562,20 @@ class Builder {
                     "make it fixed, or let `tips` name other fingers");
     }
     held_.assign(hand_.joints.size(), std::numeric_limits<double>::quiet_NaN());
+    const auto is_of_hand = [&](int link) {
+      const auto moved = moved_by(link);
+      return moved > 0 && moved < std::ssize(hand_.fingers);
+    };
     for (std::size_t j = 0; j < hand_.joints.size(); ++j) {
-      const auto moved = moved_by(hand_.joints[j].link);
-      if (moved == 0 || moved == std::ssize(hand_.fingers)) {
-        held_[j] = std::clamp(0.0, hand_.joints[j].low, hand_.joints[j].high);
-      }
+      const RobotJoint& joint = hand_.joints[j];
+      const bool leads =
+          moved_by(joint.link) == 0 &&
+          std::ranges::any_of(hand_.joints, [&](const RobotJoint& other) {
+            return hand_.links[other.link].leader == joint.link && is_of_hand(other.link);
+          });
+      if (is_of_hand(joint.link) || leads) continue;
+      held_[j] = std::clamp(0.0, joint.low, joint.high);
+      others_.push_back(joint.link);
     }
     return {};
   }
@@ -530,7 +600,10 @@ class Builder {
 
   Result<> hold_named() {
     const auto held = TRY(angles(options_.hold, "hold"));
-    for (const auto& [joint, value] : held) held_[joint] = value;
+    for (const auto& [joint, value] : held) {
+      held_[joint] = value;
+      std::erase(others_, hand_.joints[joint].link);
+    }
     starts_ = TRY(angles(options_.start, "start"));
     return {};
   }
@@ -582,9 +655,45 @@ class Builder {
       const auto start = starts_.find(driven.joint);
       driven.start =
           std::clamp(start == starts_.end() ? 0.0 : start->second, driven.low, driven.high);
+      const double open_rad = open_rad_[hand_.joints[driven.joint].link];
+      driven.open = std::clamp(open_rad, driven.low, driven.high);
+    }
+    fix_others();
+    if (hand_.joints.size() > static_cast<std::size_t>(kMaxRobotJoints)) {
+      return refuse("the robot has more than 64 joints that turn: it is no hand");
     }
     fill_turns();
     return {};
+  }
+
+  // A joint that is none of the hand's is no value of its commands: where an arm and a hand are one
+  // robot, a command for the hand must not send the arm to zero.
+  void fix_others() {
+    constexpr std::size_t kShown = 8;
+    std::vector<RobotJoint> kept;
+    std::vector<std::string> names;
+    std::size_t others = 0;
+    for (std::size_t j = 0; j < hand_.joints.size(); ++j) {
+      const RobotJoint& joint = hand_.joints[j];
+      if (std::ranges::find(others_, joint.link) == others_.end() || joint.driven >= 0) {
+        for (DrivenJoint& driven : hand_.driven) {
+          if (driven.joint == static_cast<int>(j)) driven.joint = static_cast<int>(kept.size());
+        }
+        hand_.joint_of_link[joint.link] = static_cast<int>(kept.size());
+        kept.push_back(joint);
+        continue;
+      }
+      Link& link = hand_.links[joint.link];
+      link.at.rotate(Eigen::AngleAxisd(joint.offset, link.axis));
+      link.turns = false;
+      hand_.joint_of_link[joint.link] = -1;
+      if (++others <= kShown) names.push_back(in_quotes(joint.name));
+    }
+    hand_.joints = std::move(kept);
+    if (others == 0) return;
+    hand_.remarks.push_back("no command names " + joined(names) + (others > kShown ? ", ..." : "") +
+                            " (which move all fingers or none): they are taken to stand at zero, "
+                            "unless `hold` names them and their angles");
   }
 
   Result<> check_speeds() const {
@@ -601,6 +710,7 @@ class Builder {
     const double inside = 1e-7;  // rounding of the follower's angle
     if (joint.driven < 0 || joint.multiplier == 0.0) {
       if (joint.offset >= joint.low && joint.offset <= joint.high) return {};
+      if (std::ranges::find(others_, joint.link) != others_.end()) return {};
       return refuse("joint " + in_quotes(joint.name) + " stands beyond its limits");
     }
     DrivenJoint& leader = hand_.driven[joint.driven];
@@ -634,13 +744,23 @@ class Builder {
     }
   }
 
-  // Places the links with all joints at zero, or the limit nearest to it, before it is known which
-  // joints are driven.
+  // All joints at zero, or the limit nearest to it.
+  void open_at_zero() {
+    for (const Link& link : hand_.links) {
+      open_rad_.push_back(std::clamp(0.0, link.low, link.high));
+    }
+  }
+
+  // Places the links in the open pose before it is known which joints are driven.
   void place_open() {
     for (std::size_t l = 0; l < hand_.links.size(); ++l) {
       const Link& link = hand_.links[l];
+      if (link.leader >= 0) {
+        open_rad_[l] =
+            std::clamp(link.multiplier * open_rad_[link.leader] + link.offset, link.low, link.high);
+      }
       Eigen::Isometry3d at = link.at;
-      if (link.turns) at = at * Eigen::AngleAxisd(std::clamp(0.0, link.low, link.high), link.axis);
+      if (link.turns) at = at * Eigen::AngleAxisd(open_rad_[l], link.axis);
       if (link.parent >= 0) {
         at.translation() = placed_.at_m[link.parent] + placed_.turn[link.parent] * at.translation();
         at.linear() = placed_.turn[link.parent] * at.linear();
@@ -651,10 +771,76 @@ class Builder {
     }
   }
 
+  // From its first joint to its tip in the open pose [m].
+  double stretch_m(const Finger& finger) {
+    place_open();
+    return (tip_of(finger, placed_) - placed_.at_m[finger.base]).norm();
+  }
+
+  // Turns a finger's joints to where it is longest, and those that change no length, as a
+  // knuckle's, as far as the others went about the same axis.
+  void open_fist(const Finger& finger) {
+    constexpr int kAngles = 32, kRounds = 2;
+    constexpr double kSameAxis = 0.7;
+    Eigen::Vector3d opened = Eigen::Vector3d::Zero();
+    std::vector<int> rest;
+    const double before_m = stretch_m(finger);
+    const auto axes = placed_.axis;
+    for (int round = 0; round < kRounds; ++round) {
+      rest.clear();
+      for (int l = finger.last; l > 0 && is_above(finger.base, l); l = hand_.links[l].parent) {
+        if (!hand_.links[l].turns) continue;
+        const Link& own = hand_.links[l];
+        const int leads = own.leader < 0 ? l : own.leader;
+        const Link& link = hand_.links[leads];
+        const double was_rad = open_rad_[l];
+        double best = open_rad_[leads], longest_m = stretch_m(finger) + kSamePlace_m;
+        for (int k = 0; k <= kAngles; ++k) {
+          open_rad_[leads] = link.low + (link.high - link.low) * k / kAngles;
+          const double found_m = stretch_m(finger);
+          if (found_m <= longest_m) continue;
+          longest_m = found_m;
+          best = open_rad_[leads];
+        }
+        open_rad_[leads] = best;
+        place_open();
+        opened += (open_rad_[l] - was_rad) * axes[l];
+        if (open_rad_[l] == was_rad && own.leader < 0) rest.push_back(l);
+      }
+    }
+    if (stretch_m(finger) < before_m + kSamePlace_m) return;
+    for (const int l : rest) {
+      const double same = axes[l].dot(opened.normalized());
+      if (std::abs(same) < kSameAxis) continue;
+      open_rad_[l] = same > 0.0 ? hand_.links[l].high : hand_.links[l].low;
+    }
+    place_open();
+  }
+
+  // Where most fingers are bent at zero, zero is a fist: they are opened.
+  void open_fists() {
+    constexpr double kBent = 0.75;
+    const std::vector<double> zero = open_rad_;
+    std::size_t bent = 0;
+    for (const Finger& finger : hand_.fingers) {
+      const double before_m = stretch_m(finger);
+      open_fist(finger);
+      if (before_m < kBent * stretch_m(finger)) ++bent;
+    }
+    if (2 * bent <= hand_.fingers.size()) {
+      open_rad_ = zero;
+      place_open();
+      return;
+    }
+    hand_.remarks.emplace_back(
+        "at zero the fingers are bent: palm and side are derived from the fingers where they are "
+        "longest, and knuckles as far open as their limits let them");
+  }
+
   Drive open_pose() const {
     Drive drive = Drive::Zero();
     for (int i = 0; i < hand_.size(); ++i) {
-      drive[i] = std::clamp(0.0, hand_.driven[i].low, hand_.driven[i].high);
+      drive[i] = hand_.driven[i].open;
     }
     return drive;
   }
@@ -691,7 +877,7 @@ class Builder {
     }
     const Eigen::Vector3d out = y.cross(z);  // of a right hand's palm
     double bends = bend_along(out);
-    if (std::abs(bends) < kBends_m) {  // equally far both ways: the thumb's side decides
+    if (bends == 0.0) {  // about as far both ways: the thumb's side decides
       bends = (tip_of(hand_.fingers[0], placed_) - hand_.fingers[1].knuckle_m).dot(out);
     }
     hand_.side = bends >= 0.0 ? Side::kRight : Side::kLeft;
@@ -759,9 +945,11 @@ class Builder {
     return longest_m;
   }
 
-  // How far the fingers' tips go along `out` when their joints turn where they can turn further.
+  // How far the fingers' tips go along `out` when their joints turn where they can turn further;
+  // 0: they turn about as far to both sides.
   [[nodiscard]] double bend_along(const Eigen::Vector3d& out) const {
-    double sum = 0.0;
+    constexpr double kOneSided = 0.15;
+    double sum = 0.0, all = 0.0;
     const Drive open = open_pose();
     for (std::size_t f = 1; f < hand_.fingers.size(); ++f) {
       const Finger& finger = hand_.fingers[f];
@@ -770,9 +958,10 @@ class Builder {
       for (int i = 0; i < hand_.size(); ++i) {
         const DrivenJoint& driven = hand_.driven[i];
         sum += slope[i] * (driven.high + driven.low - 2.0 * open[i]);
+        all += std::abs(slope[i]) * (driven.high - driven.low);
       }
     }
-    return sum;
+    return std::abs(sum) < std::max(kBends_m, kOneSided * all) ? 0.0 : sum;
   }
 
   // The radius of the shape at the finger's end [m]; 0: it has none.
@@ -794,8 +983,10 @@ class Builder {
   int above_;
   bool turned_round_ = false;  // the row of fingers, for the side
   Placed placed_{static_cast<std::size_t>(kMaxJoints)};
-  std::vector<double> held_;  // [joint]; NaN: not held
+  std::vector<double> open_rad_;  // [link]
+  std::vector<double> held_;      // [joint]; NaN: not held
   std::map<int, double> starts_;
+  std::vector<int> others_;  // links whose joints are none of the hand's
 };
 
 }  // namespace

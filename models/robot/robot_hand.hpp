@@ -49,6 +49,7 @@ struct RobotJoint {
 struct DrivenJoint {
   int joint = 0;
   double low = 0.0, high = 0.0, start = 0.0;  // rad
+  double open = 0.0;                          // rad, of the open hand
   double speed = 0.0, acceleration = 0.0;     // rad/s, rad/s^2
 };
 

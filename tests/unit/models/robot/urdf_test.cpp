@@ -241,9 +241,21 @@ TEST_CASE("a hand at an arm, on a mount or one of two is a hand, whose arm stand
     CHECK(hand.side == Side::kRight);
     CHECK(hand.palm.isApprox(turned.linear() * alone.palm, 1e-6));
     CHECK(hand.fingers[1].length_m == Approx(alone.fingers[1].length_m));
-    for (const DrivenJoint& driven : hand.driven) {
-      CHECK_FALSE(hand.joints[static_cast<std::size_t>(driven.joint)].name.starts_with("turn"));
-    }
+    // An arm that stands is not commanded, unless somebody says where it stands.
+    const auto turn = [](const RobotHand& robot) {
+      return std::ranges::count_if(
+          robot.joints, [](const RobotJoint& one) { return one.name.starts_with("turn"); });
+    };
+    CHECK(turn(hand) == 0);
+    CHECK(hand.joints.size() == alone.joints.size());
+    CHECK(hand.remarks.size() == (joints > 0 ? 1 : 0));
+    if (joints == 0) continue;
+    CHECK(hand.remarks[0].starts_with("no command names 'turn1', 'turn2'"));
+    const RobotHand held = robot_hand(urdf, {.hold = "turn2=0.5"}, "r").value();
+    REQUIRE(turn(held) == 1);
+    const auto& stands = *std::ranges::find(held.joints, "turn2", &RobotJoint::name);
+    CHECK(stands.driven < 0);
+    CHECK(stands.offset == 0.5);
   }
   Urdf two = arm(0);
   mount(two, mitten, "right_", 0, turned);
@@ -424,18 +436,39 @@ TEST_CASE("a hand of three fingers has the thumb that faces them, and serves for
                                                  : Eigen::Vector3d::UnitX()) > 0.5);
     }
   }
-  // Three fingers around the palm: each may be the thumb.
-  std::vector<Hinge> claw;
-  for (const std::string f : {"a", "b", "c"}) {
-    const double turn = f == "a" ? 0.0 : f == "b" ? 2.0944 : -2.0944;
-    const std::string at =
-        std::to_string(0.05 * std::cos(turn)) + " " + std::to_string(0.05 * std::sin(turn)) + " 0";
-    claw.push_back({"palm", f + "1", at, "0 -1.5708 " + std::to_string(turn), "0 -1 0"});
-    claw.push_back({f + "1", f + "2", "0.05 0 0", "0 0 0", "0 -1 0"});
+}
+
+// Which finger points away from the others most is rounding.
+TEST_CASE("of three fingers around the palm the file's first is the thumb, of four none is") {
+  const auto claw = [](const std::vector<std::string>& fingers, double splay) {
+    std::vector<Hinge> hand;
+    for (std::size_t f = 0; f < fingers.size(); ++f) {
+      const double turn = 6.283185 * static_cast<double>(f) / static_cast<double>(fingers.size());
+      const std::string at = std::to_string(0.05 * std::cos(turn)) + " " +
+                             std::to_string(0.05 * std::sin(turn)) + " 0";
+      hand.push_back({"palm", fingers[f] + "1", at,
+                      "0 " + std::to_string(splay - 1.5708) + " " + std::to_string(turn),
+                      "0 -1 0"});
+      hand.push_back({fingers[f] + "1", fingers[f] + "2", "0.05 0 0", "0 0 0", "0 -1 0"});
+    }
+    return hinged(hand);
+  };
+  for (const double splay : {0.0, 0.3}) {
+    for (const Side side : {Side::kRight, Side::kLeft}) {
+      INFO(splay << (side == Side::kLeft));
+      const Urdf urdf = parse_urdf(claw({"a", "b", "c"}, splay), "r").value();
+      const auto hand = robot_hand(urdf, {.side = side}, "r");
+      INFO((hand ? "" : hand.error().message));
+      REQUIRE(hand);
+      CHECK(hand->side == side);
+      CHECK(hand->links[static_cast<std::size_t>(hand->fingers[0].last)].name == "a2");
+      CHECK(hand->palm.col(0).dot(Eigen::Vector3d::UnitX()) > 0.9);
+      REQUIRE(hand->remarks.size() == 1);
+      CHECK(hand->remarks[0].find("'a2' is taken for the thumb") != std::string::npos);
+    }
+    CHECK(refusal(claw({"a", "b", "c", "d"}, splay)).find("none bends against all others") !=
+          std::string::npos);
   }
-  const std::string said = refusal(hinged(claw));
-  INFO(said);
-  CHECK(said.find("none bends against all others") != std::string::npos);
 }
 
 TEST_CASE("a rod beside a finger is no finger, and a finger beside one is no rod") {
@@ -466,11 +499,99 @@ TEST_CASE("a rod beside a finger is no finger, and a finger beside one is no rod
   const auto aside = with_rod(knuckle, "0 0.02 0.02");
   REQUIRE_FALSE(aside);
   CHECK(aside.error().message.find("`tips`") != std::string::npos);
+  // A crank whose joint has the motor, and what it turns.
+  std::string cranks = mitten;
+  const auto add = [&](const std::string& link) {
+    cranks = with(cranks, "</robot>", link + "</robot>");
+  };
+  for (const std::string finger : {"index", "middle"}) {
+    const std::string limit =
+        "<limit lower=\"0\" upper=\"1\" velocity=\"2\"/><origin xyz=\"-0.05 0 0\"/>";
+    add("<link name=\"" + finger + "_crank\"/>" +
+        joint(finger + "_motor", bare.links[0].name, finger + "_crank", limit));
+    const std::string flex = "<joint name=\"" + finger + "_flex\" type=\"revolute\">";
+    cranks = with(cranks, flex, flex + "<mimic joint=\"" + finger + "_motor\"/>");
+  }
+  const auto turned = robot_hand(parse_urdf(cranks, "r").value(), {}, "r");
+  INFO((turned ? "" : turned.error().message));
+  REQUIRE(turned);
+  CHECK(turned->fingers.size() == 5);
+  CHECK(turned->size() == bare.size());
+  const auto& motor = *std::ranges::find(turned->joints, "index_motor", &RobotJoint::name);
+  const auto& flex = *std::ranges::find(turned->joints, "index_flex", &RobotJoint::name);
+  CHECK(motor.driven >= 0);
+  CHECK(flex.driven == motor.driven);
+  // A crank and a rod at its end.
+  const std::string limit = "<limit lower=\"-2\" upper=\"2\" velocity=\"2\"/>";
+  const auto two = robot_hand(
+      parse_urdf(
+          with(mitten, "</robot>",
+               "<link name=\"one\"/><link name=\"two\"/>" +
+                   joint("one_joint", knuckle, "one", limit + "<origin xyz=\"0.008 0 0.02\"/>") +
+                   joint("two_joint", "one", "two", limit + "<origin xyz=\"0 0 0.02\"/>") +
+                   "</robot>"),
+          "r")
+          .value(),
+      {}, "r");
+  INFO((two ? "" : two.error().message));
+  REQUIRE(two);
+  CHECK(two->fingers.size() == 5);
+  CHECK(two->size() == bare.size());
   // Two fingers that share a joint of the palm are fingers.
   std::vector<Hinge> hand = barrett();
   hand.push_back({"f11", "g2", "0.03 0.05 0", "1.5708 0 1.5708"});
   const RobotHand four = robot_hand(parse_urdf(hinged(hand), "r").value(), {}, "r").value();
   CHECK(four.fingers.size() == 4);
+}
+
+TEST_CASE("joints that turn about as far to both sides leave the side to the thumb") {
+  const auto mitten = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  for (Urdf hand : {mitten, mirrored(mitten)}) {
+    const Side side = robot_hand(hand, {}, "r").value().side;
+    for (Link& link : hand.links) {
+      if (!link.joint.starts_with("thumb")) link.low = std::min(link.low, -1.02 * link.high);
+    }
+    CHECK(robot_hand(hand, {}, "r").value().side == side);
+  }
+}
+
+TEST_CASE("a hand whose zero is a fist is read as the open one") {
+  const auto mitten = parse_urdf(load_urdf(test::mitten()).value(), "mitten").value();
+  for (const Urdf& open : {mitten, mirrored(mitten)}) {
+    const RobotHand bare = robot_hand(open, {}, "r").value();
+    Urdf fist = open;
+    std::vector<double> moved_rad(fist.links.size());
+    for (std::size_t l = 0; l < fist.links.size(); ++l) {
+      Link& link = fist.links[l];
+      if (!link.turns || link.leader >= 0 || link.high < 1.0) continue;
+      moved_rad[l] = link.high;
+    }
+    for (std::size_t l = 0; l < fist.links.size(); ++l) {
+      Link& link = fist.links[l];
+      if (link.leader >= 0) {  // its zero is where its leader's is
+        moved_rad[l] =
+            link.multiplier * moved_rad[static_cast<std::size_t>(link.leader)] + link.offset;
+        link.offset = 0.0;
+      }
+      link.at.rotate(Eigen::AngleAxisd(moved_rad[l], link.axis));
+      link.low -= moved_rad[l];
+      link.high -= moved_rad[l];
+    }
+    const auto read = robot_hand(fist, {}, "r");
+    INFO((read ? "" : read.error().message));
+    REQUIRE(read);
+    CHECK(read->side == bare.side);
+    // Knuckles open by 0.2 rad beyond the straight finger.
+    CHECK(read->palm.col(0).dot(bare.palm.col(0)) > std::cos(0.25));
+    CHECK(read->palm.col(1).dot(bare.palm.col(1)) > std::cos(0.05));
+    for (std::size_t f = 0; f < bare.fingers.size(); ++f) {
+      CHECK(read->fingers[f].last == bare.fingers[f].last);
+      CHECK(read->fingers[f].knuckle == bare.fingers[f].knuckle);
+      CHECK(read->fingers[f].length_m == Approx(bare.fingers[f].length_m).epsilon(0.01));
+    }
+    REQUIRE(read->remarks.size() == 1);
+    CHECK(read->remarks[0].starts_with("at zero the fingers are bent"));
+  }
 }
 
 TEST_CASE("a joint whose <limit> gives no angles stands at zero, which is said") {
