@@ -103,7 +103,7 @@ class Builder {
   Result<> list_joints() {
     if (hand_.links.size() > static_cast<std::size_t>(kMaxJoints)) {
       return refuse("the robot has " + std::to_string(hand_.links.size()) +
-                    " links; posed drives hands of at most 96");
+                    " links; posed drives hands of at most 96: leave out those that carry no hand");
     }
     std::size_t shapes = 0;
     for (const Link& link : hand_.links) shapes += link.shapes.size();
@@ -424,14 +424,14 @@ class Builder {
     return way.norm() > kBends_m ? way.normalized() : Eigen::Vector3d::Zero();
   }
 
-  // The one finger that bends against all others, which bend one way; else none.
+  // The one finger that bends against all others or across them, which bend one way; else none.
   [[nodiscard]] std::vector<Finger>::iterator facing() {
-    constexpr double kOneWay = 0.7;
+    constexpr double kOneWay = 0.7, kAcross = 0.5;
     std::vector<Finger>& fingers = hand_.fingers;
     return std::ranges::find_if(fingers, [&](const Finger& thumb) {
       return std::ranges::all_of(fingers, [&](const Finger& one) {
         if (one.last == thumb.last) return true;
-        return bend(one).dot(bend(thumb)) < -kOneWay &&
+        return bend(one).dot(bend(thumb)) < kAcross &&
                std::ranges::all_of(
                    fingers,
                    [&](const Finger& other) {
@@ -819,7 +819,7 @@ class Builder {
 
   // Where most fingers are bent at zero, zero is a fist: they are opened.
   void open_fists() {
-    constexpr double kBent = 0.75;
+    constexpr double kBent = 0.88;
     const std::vector<double> zero = open_rad_;
     std::size_t bent = 0;
     for (const Finger& finger : hand_.fingers) {

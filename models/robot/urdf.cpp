@@ -196,7 +196,7 @@ class Reader {
     }
     if (!size || std::ranges::min(*size) < 0.0 || !((*size)[0] > 0.0)) {
       return refuse("a collision shape of link " + in_quotes(owner) +
-                    " is no box, cylinder, capsule or sphere of a size above zero");
+                    " is no box, cylinder, capsule or sphere of a size above zero and up to 10 m");
     }
     shape.size_m = Eigen::Vector3d(size->data());
     if (geometry.child("hull")) shape.hull = TRY(read_hull(geometry.child("hull"), owner));

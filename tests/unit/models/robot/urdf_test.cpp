@@ -248,7 +248,7 @@ TEST_CASE("a hand at an arm, on a mount or one of two is a hand, whose arm stand
     };
     CHECK(turn(hand) == 0);
     CHECK(hand.joints.size() == alone.joints.size());
-    CHECK(hand.remarks.size() == (joints > 0 ? 1 : 0));
+    REQUIRE(hand.remarks.size() == (joints > 0 ? 1 : 0));
     if (joints == 0) continue;
     CHECK(hand.remarks[0].starts_with("no command names 'turn1', 'turn2'"));
     const RobotHand held = robot_hand(urdf, {.hold = "turn2=0.5"}, "r").value();
@@ -469,6 +469,27 @@ TEST_CASE("of three fingers around the palm the file's first is the thumb, of fo
     CHECK(refusal(claw({"a", "b", "c", "d"}, splay)).find("none bends against all others") !=
           std::string::npos);
   }
+}
+
+TEST_CASE("a thumb that lies beside the fingers is the one that bends across them") {
+  std::vector<Hinge> hand;
+  for (const auto& [finger, at, axis] :
+       std::vector<std::array<std::string, 3>>{{"a", "0.08 0.02 0", "0 -1 0"},
+                                               {"b", "0.08 0 0", "0 -1 0"},
+                                               {"c", "0.04 0.05 0", "0 0 -1"},
+                                               {"d", "0.08 -0.02 0", "0 -1 0"}}) {
+    hand.push_back({"palm", finger + "1", at, "0 0 0", axis});
+    hand.push_back({finger + "1", finger + "2", "0.04 0 0", "0 0 0", axis});
+  }
+  const auto read = robot_hand(parse_urdf(hinged(hand), "r").value(), {}, "r");
+  INFO((read ? "" : read.error().message));
+  REQUIRE(read);
+  std::string ends;
+  for (const Finger& finger : read->fingers) {
+    ends += read->links[static_cast<std::size_t>(finger.last)].name;
+  }
+  CHECK(ends == "c2a2b2d2");
+  CHECK(read->side == Side::kLeft);
 }
 
 TEST_CASE("a rod beside a finger is no finger, and a finger beside one is no rod") {
