@@ -354,8 +354,9 @@ bool Daemon::all_ended() const noexcept {
 bool Daemon::wants_keys() const noexcept { return !parts_->secret_z85.empty(); }
 
 void Daemon::allow(const std::vector<net::AllowedClient>& clients) {
-  const auto change = parts_->authenticator->replace(net::AccessList(clients));
-  if (change.publisher_must_check) parts_->publisher->check_subscribers();
+  if (parts_->authenticator->replace(net::AccessList(clients))) {
+    parts_->publisher->check_subscribers();
+  }
 }
 
 std::vector<system::ThreadPulse> Daemon::pulses() const {

@@ -21,11 +21,6 @@ using nlohmann::json;
 
 constexpr std::size_t kMaxSentence = 400;  // bytes of a sentence
 
-std::string short_and_clean(std::string text) {
-  if (text.size() > kMaxSentence) text = text.substr(0, kMaxSentence) + " ...";
-  return clean(text);
-}
-
 std::string text_of(const json& object, const char* key) {
   const auto found = object.find(key);
   return found != object.end() && found->is_string() ? found->get<std::string>() : std::string();
@@ -113,7 +108,7 @@ ModelWords words_of_model(std::string_view bytes, std::string_view kind, const s
     words = model ? words_of_gesture(*model) : ModelWords{.verdict = model.error().text()};
   }
   for (std::string* text : {&words.learnt, &words.skeleton, &words.verdict}) {
-    *text = short_and_clean(std::move(*text));
+    *text = clean(*text, kMaxSentence);
   }
   return words;
 }

@@ -21,7 +21,7 @@ struct FolderRecording {
   std::string name;  // of the file
   std::uint64_t bytes = 0;
   std::int64_t changed_unix_s = 0;
-  bool in_use = false;  // a log that is still written, beside which lies a -wal file
+  bool in_use = false;  // a -wal file lies beside it: it is written, or its writer was killed
 };
 
 class RecordingFolder {
@@ -45,7 +45,7 @@ class RecordingFolder {
   };
   // Returns the bytes of the new file, which is in a hidden folder in this one while it is made. A
   // whole clip of more than 12 MiB or 1.5 million values is refused, however short the part, and a
-  // new file of more than 12 MiB, too. One call at a time.
+  // new file of more than 12 MiB, too. Takes up to a second and 64 MB: callers take turns.
   Result<std::string> converted(const Part& part) const;
 
  private:

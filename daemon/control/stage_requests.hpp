@@ -14,7 +14,8 @@
 
 namespace posed::control {
 
-// Returns the change that a SetParameter asks for, checked against the parameter's type and range.
+// Returns the change that a SetParameter asks for, checked against the parameter's type and range;
+// not for a live text, which text_change() knows.
 Result<pipeline::StageChange> parameter_change(const pipeline::StreamSettings& settings,
                                                const v1::ControlRequest::SetParameter& wanted);
 
@@ -24,8 +25,8 @@ Result<std::optional<v1::ControlRequest>> text_change(
     const pipeline::StreamSettings& settings, const v1::ControlRequest::SetParameter& wanted);
 
 struct FoundCommand {
-  std::size_t stage = 0;  // index in the stream's stages
-  pipeline::StageChange change;
+  std::size_t stage = 0;         // index in the stream's stages
+  pipeline::StageChange change;  // without the words, which encode_command() adds
 };
 // Finds a command by its name: "generate.play", or "play" if only one stage has such a command.
 Result<FoundCommand> find_command(const pipeline::StreamSettings& settings,
@@ -39,7 +40,8 @@ Result<FoundCommand> find_command(const pipeline::StreamSettings& settings,
 Result<StageCommand> encode_command(const StageCommandType& type, const StageModel* model,
                                     const v1::ControlRequest::StageCommand& wanted);
 
-// Returns the index of the stage that takes this model file. `name` is the file's, for errors.
+// Returns the index of the first stage that takes this model file. `name` is the file's, for
+// errors.
 Result<std::size_t> stage_for_model(const pipeline::StreamSettings& settings,
                                     std::span<const std::byte> file, const std::string& name);
 

@@ -1,8 +1,10 @@
 // TriggerServer: the UDP socket of the trigger, and its cold thread. Datagrams are not
-// authenticated: only those of peers, or of this machine, are read.
+// authenticated: it obeys only those of `peers` or, without peers, of this machine; others are
+// counted.
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <thread>
@@ -17,8 +19,9 @@ namespace posed::control {
 
 class TriggerServer {
  public:
-  // `listen` and `peers` as in the config. Binds and starts the thread; `daemon_control` outlives
-  // the server. Broadcasts are received where `listen` is 0.0.0.0.
+  // `listen` and `peers` as in the config; without peers `listen` must be loopback, anything else
+  // is an error. Binds and starts the thread; `daemon_control` outlives the server. Broadcasts are
+  // received where `listen` is 0.0.0.0.
   static Result<std::unique_ptr<TriggerServer>> start(const std::string& listen,
                                                       const std::vector<std::string>& peers,
                                                       DaemonControl& daemon_control);

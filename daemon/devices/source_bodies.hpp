@@ -29,7 +29,7 @@ namespace posed::devices {
 // The slots of the streams.
 class StreamSlots {
  public:
-  // `reserved` of them are only for streams that the config names.
+  // `reserved` slots are only for streams that the config names.
   StreamSlots(std::uint32_t count, std::size_t reserved) : reserved_(reserved) {
     for (std::uint32_t slot = 0; slot < count; ++slot) free_.push_back({slot, 0});
   }
@@ -45,8 +45,8 @@ class StreamSlots {
     return pipeline::stream_id(slot.number, slot.generation);
   }
 
-  // The next stream in the same slot. After 65,534 of them the ids come again, except the first:
-  // those that had them ended long ago.
+  // The next stream in the same slot. After 65,534 of them the slot's ids come again, except the
+  // first: those that had them ended long ago.
   [[nodiscard]] static std::uint32_t next(std::uint32_t stream) {
     const std::uint32_t generation = pipeline::generation_of(stream);
     return pipeline::stream_id(pipeline::slot_of(stream),
@@ -109,7 +109,8 @@ struct SharedBodies {
   BodyNames names;
   ModelFiles& models;
   const KeptSettings& kept;
-  std::size_t max_made;                 // streams that one run of the daemon makes without a pause
+  std::size_t
+      max_made;  // streams of one run, beyond which it makes them slowly (source_builder.hpp)
   pipeline::PartnerStreams partners{};  // the streams that are there
   std::size_t several = 0, single = 0;  // sources with several bodies, and with one
   // The next frame and sample numbers of streams that left, by stream name; a returning stream

@@ -25,12 +25,14 @@ class Service {
   virtual ~Service() = default;
 
   [[nodiscard]] virtual Answer answer(const Request& request) = 0;
-  // Returns the headers that every answer carries besides its own.
+  // Returns headers for every answer but that with status 101; of one name they replace the
+  // answer's own. `host` is what the request says, untrusted.
   [[nodiscard]] virtual std::vector<Header> headers(std::string_view host) const {
     static_cast<void>(host);
     return {{"X-Content-Type-Options", "nosniff"}};
   }
-  // Becomes the owner of the connection of a request that was answered with status 101.
+  // Called in place of sending an answer with status 101: takes the connection and must send the
+  // handshake itself. A client that has sent bytes beyond its request is closed without this call.
   virtual void upgrade(boost::beast::tcp_stream stream, const Message& request) {
     static_cast<void>(request);
     stream.close();

@@ -5,7 +5,6 @@
 #include <filesystem>
 
 #include <malloc.h>
-#include <pthread.h>
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
@@ -13,6 +12,7 @@
 #include "daemon/net/zap_authenticator.hpp"
 #include "daemon/system/clock.hpp"
 #include "daemon/system/process.hpp"
+#include "daemon/system/realtime.hpp"
 #include "proto/frame/time.hpp"
 #include "proto/zmq/tcp_peer.hpp"
 
@@ -79,7 +79,7 @@ PeerGuard::~PeerGuard() {
 }
 
 void PeerGuard::serve() {
-  pthread_setname_np(pthread_self(), "posed-guard");
+  system::name_thread("posed-guard");
   while (!stop_.load()) {
     wake_->going_to_sleep();
     std::int64_t wait_ns = system::kForever_ns;

@@ -6,9 +6,9 @@
 // and it cannot disconnect a peer. But it reports the descriptor of each connection (socket
 // monitor, ZMQ_SRCFD). The guard asks the kernel how many bytes have arrived there since received()
 // was last called for it, and shuts the connection down when there are too many; libzmq then closes
-// it like a lost connection. An honest client reconnects by itself within about 0.1 s. (ZMTP
+// it like a lost connection. An honest client reconnects by itself within about 0.1 s. ZMTP
 // heartbeats never become a message either: a client that sends one a second is disconnected now
-// and then, from a limit of 24 KiB about every 45 minutes.)
+// and then.
 //
 // The kernel has no such byte count for ipc:// connections; they are protected by the file's
 // permissions. The guard has its own thread, because libzmq processes subscriptions for as long as
@@ -32,9 +32,8 @@
 
 namespace posed::net {
 
-// How much memory a peer may make libzmq use: the size of one part in bytes (handshakes included),
-// the number of whole messages that wait to be read, and the kernel's buffer behind them. Call
-// before bind.
+// Limits the memory that a peer can make libzmq use: the bytes of one part (handshakes included),
+// the whole messages that wait to be read, and the kernel's buffer behind them. Call before bind.
 Result<> set_receive_limits(void* socket, std::int64_t part_bytes, int messages, int buffer_bytes);
 // Returns the descriptor of the connection through which `message` came; -1 if there is none.
 [[nodiscard]] int source_of(const Message& message);
@@ -62,10 +61,11 @@ class PeerGuard {
   PeerGuard(const PeerGuard&) = delete;
   PeerGuard& operator=(const PeerGuard&) = delete;
 
-  // A whole message came through the connection `fd`, from the peer with this User-Id.
+  // A whole message came through the connection `fd`, from the peer with this User-Id; that of a
+  // connection's first message stays.
   void received(int fd, std::string_view user);
-  // Closes the connection and slows down the next handshakes; `why` completes the sentence "a
-  // connection was cut: it ...".
+  // Closes the connection, if it is one, and slows down the next handshakes; `why` completes the
+  // sentence "a connection was cut: it ...".
   void cut(int fd, const char* why);
   // Closes every connection whose User-Id is no longer allowed, and those that have not sent a
   // message yet: their user is unknown, and one that is still allowed reconnects.
@@ -73,7 +73,8 @@ class PeerGuard {
 
   // Whether `fd` is a connection of this socket at the moment.
   [[nodiscard]] bool knows(int fd);
-  // The descriptors of the connections that have ended since the last call.
+  // The descriptors of the connections that have ended since the last call; call it now and then,
+  // for they are kept until then.
   [[nodiscard]] std::vector<int> drain_ended();
   [[nodiscard]] std::size_t peers() const;
   [[nodiscard]] std::uint64_t cuts() const;
@@ -112,8 +113,8 @@ class PeerGuard {
   std::thread thread_;
 };
 
-// How many connections each socket may have within the process's limit of open files; some files
-// stay reserved for devices, logs and models. Call raise_file_limit() first.
+// How many connections each socket may have within the process's limit of open files (some stay
+// reserved for devices, logs and models), but at least four. Call raise_file_limit() first.
 struct PeerShares {
   std::size_t publish = 0, control = 0;
 };

@@ -84,12 +84,12 @@ ZapAuthenticator::~ZapAuthenticator() {
   thread_.join();
 }
 
-ZapAuthenticator::Change ZapAuthenticator::replace(AccessList list) {
+bool ZapAuthenticator::replace(AccessList list) {
   const std::scoped_lock lock(mutex_);
-  if (!list_) return {};
-  const Change change{list_->revokes_any(list, Domain::kPublish)};
+  if (!list_) return false;
+  const bool revokes = list_->revokes_any(list, Domain::kPublish);
   list_ = std::move(list);
-  return change;
+  return revokes;
 }
 
 bool ZapAuthenticator::allows(std::string_view user_id, Domain domain) const {

@@ -1,7 +1,7 @@
 // ZapAuthenticator: the ZAP handler (ZeroMQ RFC 27) of a context. libzmq asks it at every
 // handshake. With an allow-list it admits the keys that have the right for the socket's domain, and
-// refuses all others. Without one (a daemon without keys) it admits every client that speaks ZMTP 3
-// without a key.
+// refuses all others. Without one (a daemon without keys) it admits every client of the daemon's
+// sockets that speaks ZMTP 3 without a key.
 #pragma once
 
 #include <atomic>
@@ -42,13 +42,9 @@ class ZapAuthenticator {
   ZapAuthenticator(const ZapAuthenticator&) = delete;
   ZapAuthenticator& operator=(const ZapAuthenticator&) = delete;
 
-  // What a new list means for clients that are already connected. The control socket checks every
-  // message (allows()), so it needs nothing; the publisher must disconnect the subscribers that are
-  // no longer allowed.
-  struct Change {
-    bool publisher_must_check = false;
-  };
-  [[nodiscard]] Change replace(AccessList list);  // an authenticator without a list stays as it is
+  // Returns whether the publisher must now disconnect subscribers that are no longer allowed; the
+  // control socket checks every message (allows()). An authenticator without a list stays as it is.
+  [[nodiscard]] bool replace(AccessList list);
 
   // Whether the peer whose message carries this User-Id still has the right; always true without a
   // list.

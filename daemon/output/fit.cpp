@@ -49,8 +49,13 @@ const Frame& Fit::apply(const Frame& frame) noexcept {
 std::string distinct_name(const std::string& own, const std::string& stream, std::size_t place,
                           std::vector<std::string>& names) {
   names[place].clear();
-  names[place] = std::ranges::find(names, own) == names.end() ? own : stream;
-  return names[place];
+  const auto is_free = [&](const std::string& name) {
+    return std::ranges::find(names, name) == names.end();
+  };
+  std::string name = is_free(own) ? own : stream;
+  for (int number = 2; !is_free(name); ++number) name = stream + "-" + std::to_string(number);
+  names[place] = name;
+  return name;
 }
 
 bool has_fingers(const Skeleton& skeleton) {

@@ -23,14 +23,14 @@ class Fit {
   // Makes the average figure, all lengths times `scale`.
   using MakeFigure = std::function<Result<std::shared_ptr<const Skeleton>>(double scale)>;
 
-  // `own`: the skeleton is one of the protocol's. Fails for a stream without a skeleton, or with
-  // one that has no bone of a person. Cold.
+  // `own`: the skeleton goes out as it is, such as one of the protocol's or a prop. Fails for a
+  // stream without a skeleton; unless `own`, also for one that has no bone of the figure. Cold.
   static Result<Fit> make(std::shared_ptr<const Skeleton> person, bool own,
                           const MakeFigure& figure);
 
   [[nodiscard]] const Skeleton& skeleton() const noexcept { return *skeleton_; }
-  // Returns the frame on that skeleton, valid until the next call. A joint that was not measured
-  // keeps its rotation of the T-pose relative to its parent.
+  // Returns the frame on that skeleton, valid until the next call; a figure's has no channel
+  // angles. A joint that was not measured keeps its rotation of the T-pose relative to its parent.
   [[nodiscard]] const Frame& apply(const Frame& frame) noexcept;
 
  private:
@@ -43,7 +43,7 @@ class Fit {
 };
 
 // Sets names[place], under which the person at `place` is sent, and returns it: `own`, or the
-// stream's name if another person of the output is named so.
+// stream's name if another person of the output is named so, or that with a number behind it.
 [[nodiscard]] std::string distinct_name(const std::string& own, const std::string& stream,
                                         std::size_t place, std::vector<std::string>& names);
 

@@ -1,4 +1,6 @@
-// How much of the recorder's rings each source and each slot for a stream may use.
+// How much of the recorder's rings each source and each slot for a stream may use: what five
+// seconds bring, and at least 8 MB over all sources. Slots of streams to come have a quarter of the
+// decisions, and frames of at most 128 MiB together. Cold.
 #pragma once
 
 #include <cstddef>

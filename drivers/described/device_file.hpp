@@ -1,4 +1,5 @@
-// A device description written by a person: one TOML file. README.md explains an example.
+// A device description written by a person: one TOML file. drivers/described/README.md explains an
+// example.
 #pragma once
 
 #include <cstddef>

@@ -28,7 +28,7 @@ struct Packet {
 
 class GloveDecoder : public Decoder, public CalibratedDecoder {
  public:
-  // A calibration with a different number of sensors is ignored.
+  // A calibration with a different number of sensors is ignored; another one outlives its use.
   RT_SAFE void calibrate(const Calibration& calibration) noexcept override {
     if (calibration.sensors == default_->sensors) calibration_ = &calibration;
   }

@@ -1,7 +1,7 @@
 // The messages of a hand tracker: JSON, one object a UDP datagram, with or without a line end, or
 // one a line over TCP. The format is posed's own, so that any program with landmarks of hands can
-// send them: a page with a webcam, OpenXR, Leap Motion, a script. No I/O here; README.md has an
-// example.
+// send them: a page with a webcam, OpenXR, Leap Motion, a script. No I/O here;
+// drivers/landmarks/README.md has an example.
 //
 //   {"posed": "landmarks", "version": 1, "time_ns": 1234567890,
 //    "hands": [{"side": "right", "score": 0.97, "points": [x0, y0, z0, ... x20, y20, z20]}]}

@@ -17,7 +17,8 @@ class LucidEmulator final : public glove::GloveEmulator {
   explicit LucidEmulator(const Settings& settings);
 
   void pose_hand(const HandAngles& angles) override;
-  // Commands end with a line end; all except (ZA), (ZZ), Z and forces are ignored.
+  // Commands end with a line end: (ZA) starts and (ZZ) stops the stream, Z asks for the info, F...
+  // is a vibration, and other letters are forces (protocol.hpp).
   void receive(std::span<const std::byte> bytes, std::int64_t now_ns, Bytes& answer) override;
   [[nodiscard]] std::int64_t next_due_ns() const override { return pace_.due_ns(); }
   void emit(std::int64_t now_ns, Bytes& out) override;

@@ -1,6 +1,6 @@
 // Contacts: which points of the performer's feet stand, found in the unstyled input by speed and
-// height with hysteresis (README.md, "Contacts"). Causal; each frame is judged as it comes. One
-// thread.
+// height with hysteresis (models/feet/README.md, "Contacts"). Causal; each frame is judged as it
+// comes. One thread.
 #pragma once
 
 #include <array>

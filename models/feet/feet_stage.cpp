@@ -66,7 +66,7 @@ struct HoldOptions {
 
 // How far a foot of the avatar must be from where the style put it so that it stands: it moves and
 // turns as the performer's does while that stands, and goes back to the style while it swings
-// (README.md, "Hold"). Causal. One thread.
+// (models/feet/README.md, "Hold"). Causal. One thread.
 class FootHold {
  public:
   struct Change {

@@ -1,5 +1,6 @@
-// FeetStage: makes the feet of a styled body stand where the performer's do (README.md). It needs
-// the frame before the style beside the styled one, holds nothing back and looks at no later frame.
+// FeetStage: makes the feet of a styled body stand where the performer's do
+// (models/feet/README.md). It needs the frame before the style beside the styled one, holds nothing
+// back and looks at no later frame.
 #pragma once
 
 #include <memory>

@@ -1,4 +1,4 @@
-// How well the feet of a clip stand (README.md, "Figures"). Cold.
+// How well the feet of a clip stand (models/feet/README.md, "Figures"). Cold.
 #pragma once
 
 #include <array>

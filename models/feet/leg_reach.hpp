@@ -1,5 +1,5 @@
 // Two-bone inverse kinematics: bends a leg so that its ankle is elsewhere; the knee keeps its
-// direction (README.md, "Reach"). RT-safe.
+// direction (models/feet/README.md, "Reach"). RT-safe.
 #pragma once
 
 #include <Eigen/Geometry>

@@ -1,5 +1,5 @@
-// Legs: which joints of a skeleton are its legs, and where their feet are in a frame (README.md,
-// "Points of a foot").
+// Legs: which joints of a skeleton are its legs, and where their feet are in a frame
+// (models/feet/README.md, "Points of a foot").
 #pragma once
 
 #include <array>

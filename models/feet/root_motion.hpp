@@ -1,5 +1,6 @@
 // RootMotion: where the avatar's root is beside the performer's, so that its standing feet move as
-// the performer's do and none sinks into the ground (README.md, "Root"). Causal. One thread.
+// the performer's do and none sinks into the ground (models/feet/README.md, "Root"). Causal. One
+// thread.
 #pragma once
 
 #include <array>

@@ -18,10 +18,10 @@
 
 namespace posed::generate {
 
-// The return from a performance to the live hand (README.md, "Return to the live hand"). It is an
-// offset that decays from an initial position and velocity to zero along a polynomial of fifth
-// degree, which starts without acceleration and ends at rest. Added to the live pose, it leads back
-// to it. RT-safe except for construction.
+// The return from a performance to the live hand (models/generate/README.md, "Return to the live
+// hand"). It is an offset that decays from an initial position and velocity to zero along a
+// polynomial of fifth degree, which starts without acceleration and ends at rest. Added to the live
+// pose, it leads back to it. RT-safe except for construction.
 class QuinticOffset {
  public:
   // Allocates for poses of at most `channels` channels.

@@ -104,9 +104,9 @@ class Chain {
 
 // One round of alignment over a whole recording: the models of successive labels are chained and
 // aligned with all frames that the labels cover, so that the labels' borders are only hints
-// (README.md, "Embedded rounds"). `models` has one model per segment; a border moves by at most
-// `slack` frames. Segments that do not touch are aligned separately. Returns the log likelihood of
-// the whole recording.
+// (models/gesture/README.md, "Embedded rounds"). `models` has one model per segment; a border moves
+// by at most `slack` frames. Segments that do not touch are aligned separately. Returns the log
+// likelihood of the whole recording.
 double align_embedded(const FeatureMatrix& features, const std::vector<Segment>& segments,
                       const std::vector<const StateModel*>& models, int slack,
                       const PartFunction& accept) {

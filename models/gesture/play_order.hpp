@@ -15,8 +15,7 @@
 namespace posed::gesture {
 
 inline constexpr int kMaxLabels = 256;  // most labels of one order
-inline constexpr double kMinTempo = 0.5;
-inline constexpr double kMaxTempo = 2.0;
+inline constexpr double kMinTempo = 0.5, kMaxTempo = 2.0;
 
 struct PlayOrder {
   float tempo = 1.0F;                             // kMinTempo to kMaxTempo; 2 takes half the time

@@ -1,5 +1,5 @@
 // Inducing poses: the few training poses that stand for all, chosen by greedy pivoted Cholesky, and
-// the process that is learnt on them (README.md, "Inducing poses"). Cold; thread-safe.
+// the process that is learnt on them (models/gp/README.md, "Inducing poses"). Cold; thread-safe.
 #pragma once
 
 #include <functional>

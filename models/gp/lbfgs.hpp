@@ -1,4 +1,4 @@
-// Limited-memory BFGS (Nocedal and Wright 2006, algorithms 7.4, 7.5, 3.5, 3.6; README.md,
+// Limited-memory BFGS (Nocedal and Wright 2006, algorithms 7.4, 7.5, 3.5, 3.6; models/gp/README.md,
 // "Limited-memory BFGS"): minimises a smooth function of a few hundred variables. The caller scales
 // the variables so that each is of order one. Cold.
 #pragma once

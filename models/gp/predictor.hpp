@@ -2,15 +2,15 @@
 // tiles that fit the caches, SIMD chosen at run time (AVX2 and AVX-512 give the same bits). Const
 // and shareable between threads after build(), but for settle().
 //
-//   f(q) = offset + sum_i k(q, x_i) w_i,   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b (README.md,
-//   "Kernel")
+//   f(q) = offset + sum_i k(q, x_i) w_i,   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b
+//   (models/gp/README.md, "Kernel")
 //
 // Several functions f_s that share inputs and kernel are evaluated in one pass over the kernel, as
-// their mixture sum_s share_s f_s (README.md, "Mixtures"): for any shares, which costs one sum a
-// function, or for those that settle() has put together, at the cost of one function.
+// their mixture sum_s share_s f_s (models/gp/README.md, "Mixtures"): for any shares, which costs
+// one sum a function, or for those that settle() has put together, at the cost of one function.
 //
 // Missing dimensions are left out: the distance runs over the available ones and is scaled by D /
-// D_avail (README.md, "Missing dimensions").
+// D_avail (models/gp/README.md, "Missing dimensions").
 #pragma once
 
 #include <cstdint>

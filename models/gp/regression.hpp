@@ -1,6 +1,6 @@
-// Gaussian process regression with the kernel of Sato et al., eq. 4 (README.md, "Kernel"). All
-// outputs share one set of kernel values, so the covariance is factorised once (README.md,
-// "Regression"). Double precision, cold, thread-safe.
+// Gaussian process regression with the kernel of Sato et al., eq. 4 (models/gp/README.md,
+// "Kernel"). All outputs share one set of kernel values, so the covariance is factorised once
+// (models/gp/README.md, "Regression"). Double precision, cold, thread-safe.
 //
 //   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b,   C = K + sigma^2 I
 #pragma once
@@ -26,8 +26,8 @@ struct Hyper {
 };
 
 // The evidence (log marginal likelihood), summed over the outputs, and its gradient by lambda, log
-// mu, log b, log sigma^2 (README.md, "Evidence"). Where C is not positive definite the log
-// likelihood is minus infinity and the gradient zero.
+// mu, log b, log sigma^2 (models/gp/README.md, "Evidence"). Where C is not positive definite the
+// log likelihood is minus infinity and the gradient zero.
 struct Evidence {
   double log_likelihood = 0.0;
   Eigen::Vector4d gradient = Eigen::Vector4d::Zero();

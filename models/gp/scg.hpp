@@ -1,5 +1,5 @@
 // Scaled conjugate gradients (Moller 1993) with NETLAB's constants, the optimiser of
-// Sato et al. (README.md, "Scaled conjugate gradients"). Cold.
+// Sato et al. (models/gp/README.md, "Scaled conjugate gradients"). Cold.
 #pragma once
 
 #include <functional>

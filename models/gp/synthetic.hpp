@@ -1,6 +1,6 @@
 // A synthetic process of the size and shape of a learnt one: walkers with a common cycle of four
 // harmonics, each with a posture and a gait of their own. For the benchmark and the tests, which
-// run without recordings (README.md, "Synthetic process"). Cold.
+// run without recordings (models/gp/README.md, "Synthetic process"). Cold.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,8 +1,8 @@
 // Trained: a learnt Gaussian process with the kernel of Sato et al., in double precision, as a
 // model file stores it.
 //
-//   f(q) = offset + sum_i k(q, x_i) w_i,   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b (README.md,
-//   "Kernel")
+//   f(q) = offset + sum_i k(q, x_i) w_i,   k(q, x) = exp(lambda - mu |q - x|^2 / 2) + b
+//   (models/gp/README.md, "Kernel")
 //
 // |q - x|^2 counts dimension d scale_d^2 times.
 #pragma once

@@ -1,5 +1,6 @@
 // HandMap: how the frames of one glove become hand poses, and how a hand pose turns the joints of
-// the merged skeleton (README.md, "Hand poses"). Const after bind(); hot calls are RT-safe.
+// the merged skeleton (models/merge/README.md, "Hand poses"). Const after bind(); hot calls are
+// RT-safe.
 #pragma once
 
 #include <array>

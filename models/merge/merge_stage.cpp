@@ -234,8 +234,8 @@ class HandHistory {
 
 // What one glove has measured so far, and the hand pose that a body gets at any time. While the
 // glove measures, that is its pose at this time; when it falls silent, the last pose is held and
-// then eases to a relaxed hand; when it comes back, the hand eases back (README.md). It knows only
-// the times that are passed to it. One thread; nothing allocates after construction.
+// then eases to a relaxed hand; when it comes back, the hand eases back (models/merge/README.md).
+// It knows only the times that are passed to it. One thread; nothing allocates after construction.
 class HandTrack {
  public:
   static constexpr std::int64_t kRelax_ns = 500'000'000;   // from the held pose to the relaxed one

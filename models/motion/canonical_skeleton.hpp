@@ -1,4 +1,5 @@
-// The canonical humanoid with the proportions of a person (README.md, "Canonical humanoid").
+// The canonical humanoid with the proportions of a person (models/motion/README.md, "Canonical
+// humanoid").
 #pragma once
 
 #include <memory>

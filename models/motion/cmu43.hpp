@@ -1,6 +1,7 @@
-// The 43 joint angles of Sato et al. (README.md, References): which joints of the CMU Acclaim
-// skeleton, which of their axes, and the axes' frames (the same in every CMU .asf). Root rotation
-// 3, spine to head 18, arms 2 x (3 + 1), legs 2 x 7 (README.md, "The 43 joint angles").
+// The 43 joint angles of Sato et al. (models/motion/README.md, References): which joints of the CMU
+// Acclaim skeleton, which of their axes, and the axes' frames (the same in every CMU .asf). Root
+// rotation 3, spine to head 18, arms 2 x (3 + 1), legs 2 x 7 (models/motion/README.md, "The 43
+// joint angles").
 #pragma once
 
 #include <array>
@@ -50,7 +51,7 @@ RT_SAFE [[nodiscard]] Eigen::Vector3d euler_xyz_rad(const Eigen::Quaterniond& ro
 
 // The rotation vector, in the outer frame, of a small change of the Euler angles at `angle_rad`;
 // the middle angle is limited to +-75 degrees, because near 90 degrees x and z turn about one axis
-// and a difference of them has no meaning (README.md, "Euler angles near the pole").
+// and a difference of them has no meaning (models/motion/README.md, "Euler angles near the pole").
 RT_SAFE [[nodiscard]] Eigen::Vector3d euler_change_as_vector(
     const Eigen::Vector3d& angle_rad, const Eigen::Vector3d& change_rad) noexcept;
 inline constexpr double kMaxMiddleAngle_rad = 75.0 * 3.14159265358979323846 / 180.0;

@@ -1,5 +1,5 @@
-// Forward kinematics: world positions and rotations of a frame's joints (README.md, "Forward
-// kinematics").
+// Forward kinematics: world positions and rotations of a frame's joints (models/motion/README.md,
+// "Forward kinematics").
 #pragma once
 
 #include <vector>

@@ -1,7 +1,7 @@
-// Measures of how natural a motion is (README.md, "Naturalness"): jerk, log dimensionless jerk and
-// spectral arc length of a speed profile, and the Frechet distance between the features of two
-// motions. A value alone has no meaning; compare it with that of a recording of the same person.
-// Cold.
+// Measures of how natural a motion is (models/motion/README.md, "Naturalness"): jerk, log
+// dimensionless jerk and spectral arc length of a speed profile, and the Frechet distance between
+// the features of two motions. A value alone has no meaning; compare it with that of a recording of
+// the same person. Cold.
 #pragma once
 
 #include <span>

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cassert>
 #include <cmath>
 #include <ranges>
 #include <span>
@@ -380,6 +381,7 @@ RT_SAFE void PoseSpace::add(Frame& frame, double heading_rad, std::span<const fl
 
 RT_SAFE void PoseSpace::put(Frame& frame, double heading_rad,
                             std::span<const double> q) const noexcept {
+  assert(!euler_);
   for (const Item& item : items_) {
     const std::size_t d = item.first_dim;
     const Vector3d v(q[d], q[d + 1], q[d + 2]);

@@ -1,12 +1,13 @@
 // PoseSpace: turns a frame into the vector q that a style model is trained on, and puts a change of
-// q back into the frame (README.md, "Pose spaces"). Heading and position of the root are not part
-// of the style; they are removed before and restored after.
+// q back into the frame (models/motion/README.md, "Pose spaces"). Heading and position of the root
+// are not part of the style; they are removed before and restored after.
 //
 //   native    rotation vectors [rad] of the source's own joints about the training mean,
 //             q_j = log(Rmean_j^T R_j), R_j' = Rmean_j exp(q_j'); 3 per joint, the root first with
 //             its heading removed
 //   humanoid  the same on the canonical skeleton
-//   cmu43     the Euler angles [rad] of Sato et al. (README.md, References) of an Acclaim skeleton
+//   cmu43     the Euler angles [rad] of Sato et al. (models/motion/README.md, References) of an
+//   Acclaim skeleton
 //             (root 3 + 40); joints are found by their names in an ASF or in a BVH made from it
 #pragma once
 
@@ -41,8 +42,9 @@ struct PoseSpaceSpec {
   int root = 0;                          // index in `joints` of the joint whose heading is removed
 };
 
-// The spec of `space` on `skeleton`, with identity for every mean; it lists the joints that a model
-// trained on such clips has. The error names the joints that are missing.
+// The spec of `space` on `skeleton`, with identity for every mean (cmu43 has none); it lists the
+// joints that a model trained on such clips has. Fails for cmu43 if joints of it are missing, which
+// the error names, and for humanoid if the skeleton has no bone of a person.
 Result<PoseSpaceSpec> describe_space(Space space, const Skeleton& skeleton);
 
 // True where the skeleton has the bones that every humanoid space needs: the hips, and of upper and
@@ -74,31 +76,33 @@ class PoseSpace {
   // The joint of the skeleton that it is; -1 where the skeleton lacks it.
   [[nodiscard]] int skeleton_joint_of_dim(int d) const noexcept;
 
-  // Turn about +Y that brings the training mean of the root nearest to this frame's root [rad].
+  // The angle about +Y by which the root's training mean must be turned to come nearest to this
+  // frame's root [rad].
   RT_SAFE [[nodiscard]] double heading_rad(const Frame& frame) const noexcept;
 
   // False where this frame did not measure the root; heading_rad() then has no meaning.
   RT_SAFE [[nodiscard]] bool has_heading(const Frame& frame) const noexcept;
 
   // q [dims] of `frame` seen from `heading_rad`; available[d] is 0 where the joint was not measured
-  // (q is then 0, the training mean).
+  // (q is then 0: the training mean; of cmu43, an angle of zero).
   RT_SAFE void to_vector(const Frame& frame, double heading_rad, std::span<float> q,
                          std::span<std::uint8_t> available) const noexcept;
 
-  // The q of this space for the pose that is `from_q` in another; both have `kMaxPoseDims` values.
+  // The q [dims] of this space for the pose that is `from_q` [dims] in another.
   // False, and nothing is written, where the two do not describe the same joints.
   RT_SAFE [[nodiscard]] bool convert(const PoseSpace& from, std::span<const float> from_q,
                                      std::span<float> q) const noexcept;
 
-  // Replaces the pose of `frame` by q + delta in the space's own sense, channel angles included;
-  // joints that are not available and joints outside the space are unchanged; a zero delta leaves
-  // every bit of the frame unchanged.
+  // Replaces the pose of `frame` by q + delta, rotation vectors about the means or, in cmu43, Euler
+  // angles; channel angles included. q and delta [dims] are finite. Joints that are not available
+  // and joints outside the space are unchanged; a zero delta leaves every bit of the frame
+  // unchanged.
   RT_SAFE void add(Frame& frame, double heading_rad, std::span<const float> q,
                    std::span<const float> delta) const noexcept;
 
-  // Gives the joints of a space of rotation vectors the pose q [dims], whether they were measured
-  // or not; then they are. A joint with q that is not finite, or with unmeasured joints between it
-  // and the joint of the space above it, is unchanged.
+  // Not for cmu43. Gives the joints the pose q [dims], whether they were measured or not; then they
+  // are. A joint is unchanged whose q is not finite, or that of a missing joint above it, and one
+  // with unmeasured joints between it and the joint of the space above it.
   RT_SAFE void put(Frame& frame, double heading_rad, std::span<const double> q) const noexcept;
 
  private:

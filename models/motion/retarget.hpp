@@ -1,6 +1,7 @@
-// Retarget: gives a pose of one skeleton to another, through the canonical humanoid (README.md,
-// "Retargeting"). Each bone of the target turns in the world as the source's does, relative to its
-// own T-pose; the root's position is scaled by the length of the legs.
+// Retarget: gives a pose of one skeleton to another, through the canonical humanoid
+// (models/motion/README.md, "Retargeting"). Each bone of the target turns in the world as the
+// source's does, relative to its own T-pose; the root's position is scaled by the length of the
+// legs.
 #pragma once
 
 #include <cstdint>

@@ -1,7 +1,7 @@
 // Synthetic walkers, for the demo and for tests that must run without recordings. Feet stand where
 // they land (synthetic_gait.hpp); pelvis, trunk, head and arms follow the mean curves of real
 // walks, and the legs reach for the feet. A person differs from others by sex, size, cadence,
-// vigour and posture (README.md, "Synthetic walkers").
+// vigour and posture (models/motion/README.md, "Synthetic walkers").
 #pragma once
 
 #include <cstdint>

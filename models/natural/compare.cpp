@@ -20,7 +20,7 @@ constexpr double kSameLimb = 0.01;
 struct Kind {
   bool low_is_bad = false;  // not only high values are not natural
   // How far persons are apart who move alike, as a share of the figure's median and at least: for
-  // a corpus of so few persons that it does not say (README.md, "Spread").
+  // a corpus of so few persons that it does not say (models/natural/README.md, "Spread").
   double person_share = 0.0, person_least = 0.0;
   std::size_t persons = kMinPersons;  // so many do say it
 };

@@ -1,5 +1,5 @@
 // A clip's figures beside those that the clips of a corpus have themselves, each measured against
-// the others (README.md). Cold; thread-safe.
+// the others (models/natural/README.md). Cold; thread-safe.
 #pragma once
 
 #include <functional>

@@ -1,6 +1,6 @@
 // Figures: the numbers by which `posed eval natural` tells whether people move as in a clip
-// (README.md, "Figures"): how rough it is, which poses and changes it has, how far its joints turn,
-// how its feet stand. Cold; thread-safe.
+// (models/natural/README.md, "Figures"): how rough it is, which poses and changes it has, how far
+// its joints turn, how its feet stand. Cold; thread-safe.
 #pragma once
 
 #include <memory>

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "models/gesture/play_order.hpp"
 #include "models/perform/state_duration.hpp"
 #include "models/trajectory/pentadiagonal.hpp"
 #include "proto/frame/degree.hpp"
@@ -96,7 +97,7 @@ RT_SAFE double* LabelSequencePlayer::slot(int index) noexcept {
 }
 
 RT_SAFE void LabelSequencePlayer::set_tempo(double tempo) noexcept {
-  tempo_ = std::clamp(tempo, kMinTempo, kMaxTempo);
+  tempo_ = std::clamp(tempo, gesture::kMinTempo, gesture::kMaxTempo);
 }
 
 RT_SAFE void LabelSequencePlayer::clear() noexcept {

@@ -46,8 +46,9 @@ class LabelSequencePlayer {
   // Returns false when `capacity` labels already wait. `label` is an index into the model's labels.
   [[nodiscard]] bool add(int label) noexcept { return script_.append(label); }
   void set_loop(bool loop) noexcept { script_.set_loop(loop); }
-  void set_tempo(double tempo) noexcept;  // clamped to kMinTempo..kMaxTempo; from the next state on
-  void clear() noexcept;                  // forgets all labels and the motion
+  void set_tempo(
+      double tempo) noexcept;  // clamped to gesture::kMinTempo..kMaxTempo; from the next state on
+  void clear() noexcept;       // forgets all labels and the motion
   // Another model of the same rate, with no more channels than allocated for: forgets all labels
   // and the motion, too.
   void use(const trajectory::StateInformation& information) noexcept;

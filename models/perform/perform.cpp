@@ -34,7 +34,7 @@ struct Moments {
 // The most likely trajectory stays closer to its mean than the gestures it was learnt from. This
 // restores the range: it scales each channel about its mean over the sequence, by 1 to
 // kMaxVarianceGain, so that its variance over time approaches that of the means of the performed
-// states (README.md, "Global variance").
+// states (models/perform/README.md, "Global variance").
 void restore_variance(const gesture::GestureModel& model, Performance& performance) {
   constexpr double kStill_rad2 = 1e-8;  // a channel that does not move has no range to restore
   for (std::size_t g = 0; g < model.groups.size(); ++g) {

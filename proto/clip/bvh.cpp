@@ -302,8 +302,9 @@ Result<BvhHeader> HeaderReader::read() {
 Result<> HeaderReader::begin_joint() {
   std::string name(cursor_.name());
   if (name.empty()) return error("a joint has no name");
-  if (name.size() > kMaxJointName) {
-    return error("a joint's name is longer than " + std::to_string(kMaxJointName) + " characters");
+  constexpr std::size_t kMaxName = 200;  // bytes
+  if (name.size() > kMaxName) {
+    return error("a joint's name is longer than " + std::to_string(kMaxName) + " characters");
   }
   if (open_.size() >= kMaxDepth) return error("joints are nested deeper than 96");
   if (joints().size() >= kMaxFileJoints) {

@@ -24,7 +24,7 @@ std::string replace_top(std::string_view table, std::string_view from, std::stri
 void Findings::add_error(int line, std::string_view message) {
   if (errors.size() > kMaxErrors) return;
   const bool last = errors.size() == kMaxErrors;
-  errors.push_back({last ? "and there are more mistakes; mend these first" : clean(message), file,
+  errors.push_back({last ? "and there are more mistakes; fix these first" : clean(message), file,
                     line, exit_code});
 }
 
@@ -64,7 +64,7 @@ std::string Findings::advice(std::string_view table, std::string_view key,
   });
   const auto& meant = present.empty() ? places : present;
   if (!meant.empty() && meant.size() <= kMaxPlaces) {
-    return "it belongs into " + listed(meant, " or ");
+    return "it belongs in " + listed(meant, " or ");
   }
   const std::string near = nearest(key, known_here);
   if (!near.empty()) return "the nearest known one here is '" + near + "'";

@@ -16,8 +16,8 @@ namespace posed {
 inline constexpr std::size_t kMaxErrors = 100;  // more of one file are not listed
 
 struct Findings {
-  // `copy` is a table that repeats the keys of `original`. Where both know a key, it belongs into
-  // the copy if it was found in the copy, otherwise into the original.
+  // The keys of table `copy` are those of table `original`, too. Advice about a key that both have
+  // names the one of the two in which the key was found.
   struct Twins {
     std::string original, copy;
   };
@@ -32,7 +32,7 @@ struct Findings {
   std::set<std::string> all_keys{};
   Twins twins{};
 
-  // After kMaxErrors only one more error is added: "and more".
+  // After kMaxErrors only one more error is added, which says that there are more.
   void add_error(int line, std::string_view message);
 
   // For an unknown key of `table`, where the keys `known_here` were looked up: the table where it

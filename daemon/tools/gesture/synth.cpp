@@ -11,10 +11,10 @@
 #include "daemon/tools/command/output_files.hpp"
 #include "daemon/tools/command/progress.hpp"
 #include "models/gesture/model_file.hpp"
+#include "models/gesture/play_order.hpp"
 #include "models/perform/body_performance.hpp"
 #include "models/perform/constrain.hpp"
 #include "models/perform/perform.hpp"
-#include "models/perform/state_duration.hpp"
 #include "proto/clip/format.hpp"
 #include "proto/clip/hand_clip.hpp"
 #include "proto/frame/hand_shape.hpp"
@@ -170,7 +170,7 @@ void add_synth(CLI::App& app, int& exit_code) {
   command->add_option("--model", options->model, "Model from `posed train gesture`")->required();
   command->add_option("--labels", options->labels, "Labels with blanks between")->required();
   command->add_option("--tempo", options->tempo, "2 is twice as fast")
-      ->check(in_range(perform::kMinTempo, perform::kMaxTempo))
+      ->check(in_range(gesture::kMinTempo, gesture::kMaxTempo))
       ->capture_default_str();
   command
       ->add_option("--lookahead", options->lookahead, "Frames that are known in advance, or full")

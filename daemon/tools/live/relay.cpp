@@ -166,7 +166,7 @@ void serve_relay(relay::Relay& relay, net::ZapAuthenticator& authenticator,
     const auto security = config::load_security(command.security);
     if (!security) {
       spdlog::error("the client list stays as it was: {}", security.error().text());
-    } else if (authenticator.replace(net::AccessList(security->clients)).publisher_must_check) {
+    } else if (authenticator.replace(net::AccessList(security->clients))) {
       relay.check_subscribers();
     }
   }

@@ -1,6 +1,7 @@
 // Page: one self-contained HTML file. Its style sheet and figures are inside, it loads nothing (a
 // content security policy forbids it), it follows the reader's light or dark preference, and it
-// prints. It is written so that an XML parser reads it, too. All text is escaped here. Cold.
+// prints. It is written so that an XML parser reads it, too. All text but Drawing::elements is
+// escaped here. Cold.
 #pragma once
 
 #include <filesystem>
@@ -24,7 +25,8 @@ struct Table {
     bool number = true;  // set to the right
   };
   std::vector<Column> columns;
-  std::vector<std::vector<std::string>> rows;  // [row][column], not escaped
+  // [row][column], not escaped. A short row gets empty cells, a long one loses the rest.
+  std::vector<std::vector<std::string>> rows;
 };
 
 // A picture as SVG elements.
@@ -34,7 +36,7 @@ struct Drawing {
   std::string kind = "chart";  // a class of the style sheet
 };
 
-// What a section shows: a drawing or a table, below a sentence that says what to see.
+// What a section shows: drawings and tables, below a sentence that says what to see.
 struct Figure {
   std::string title;
   std::string sentence;
@@ -48,7 +50,7 @@ class Page {
   // `command`: the words that made it, "posed train style".
   Page(std::string title, std::string command);
 
-  // The first thing that a reader sees: a sentence or one a line, and whether it is good news.
+  // Call it first. A sentence or one a line, and whether it is good news.
   void verdict(std::string_view sentence, bool good);
   void warnings(const std::vector<std::string>& sentences);
   void section(std::string_view title);

@@ -1,8 +1,8 @@
 // TakeClips: each take of each stream of a recording as a BVH beside its log, some seconds after
 // the take has ended. The frames are kept in memory as they leave the stages. Where that is not
-// possible (a take of more than kMaxKept bytes, a thread that was too slow, a body that changed its
-// skeleton meanwhile) the log is replayed up to the take's end, which gives the same frames and
-// takes longer. Cold, but for frame().
+// possible (takes not yet written of more than kMaxKept bytes together, a thread that was too slow,
+// a body that changed its skeleton meanwhile) the log is replayed up to the take's end, which gives
+// the same frames and takes longer. Cold, but for frame().
 #pragma once
 
 #include <atomic>

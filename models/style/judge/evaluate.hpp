@@ -1,4 +1,5 @@
-// How close a styled clip is to clips of the target style (README.md, "Evaluation"). Cold.
+// How close a styled clip is to clips of the target style (models/style/README.md, "Evaluation").
+// Cold.
 #pragma once
 
 #include <optional>

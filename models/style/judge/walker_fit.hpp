@@ -20,8 +20,8 @@ struct WalkerFit {
 
   // Far from the training poses the model only gives its average change. Measured on dataset 1 and
   // 2: other clips of the training's walkers are at 2.6 to 5.5 degrees, other styles of the same
-  // actor at 9.6 to 15, other actors' walks at 12 to 20, other motions at 13 to 27 (README.md,
-  // "Verdicts").
+  // actor at 9.6 to 15, other actors' walks at 12 to 20, other motions at 13 to 27
+  // (models/style/README.md, "Verdicts").
   [[nodiscard]] bool is_far() const { return distance_deg > kFar_deg; }
   static constexpr double kFar_deg = 8.0;
 };

@@ -43,9 +43,9 @@ struct Applied {
   std::string no_feet{};                  // why its feet do not stand; empty: they do
 };
 
-// The walker's own neutral pose and cadence by a warm-up over the whole clip (README.md,
-// "Warm-up"). Returns the errors of apply_to_clip(), and one for a model without data for it and
-// for a clip that shows no walk.
+// The walker's own neutral pose and cadence by a warm-up over the whole clip
+// (models/style/README.md, "Warm-up"). Returns the errors of apply_to_clip(), and one for a model
+// without data for it and for a clip that shows no walk.
 Result<Walker> measure_walker(const StyleModel& model, const std::string& model_name,
                               const clip::Clip& clip);
 

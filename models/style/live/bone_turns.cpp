@@ -12,9 +12,10 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 
-constexpr double kClear = 0.3;       // shorter sums of directions point nowhere
-constexpr double kNeckByName = 0.5;  // the rest by its place (README.md, "Other builds")
-constexpr double kThinnest = 1e-3;   // a joint whose bone has no length, on the way to the head
+constexpr double kClear = 0.3;  // shorter sums of directions point nowhere
+// The rest of the neck by its place (models/style/README.md, "Other builds").
+constexpr double kNeckByName = 0.5;
+constexpr double kThinnest = 1e-3;  // a joint whose bone has no length, on the way to the head
 
 // The bones of the arms that have a direction, and the one that each leads to.
 constexpr std::array<std::pair<Bone, Bone>, 4> kArms{{{Bone::kLeftUpperArm, Bone::kLeftLowerArm},

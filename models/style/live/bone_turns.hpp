@@ -1,7 +1,7 @@
-// BoneTurns: gives a walker of another build the change of a style (README.md, "Other builds").
-// What the style does to the walk of training is carried over as turns of bones in the world, for
-// arms as a change of their direction, because the same angles of joints bring an arm that hangs
-// another way to another place. Const and shareable; RT-safe after make().
+// BoneTurns: gives a walker of another build the change of a style (models/style/README.md, "Other
+// builds"). What the style does to the walk of training is carried over as turns of bones in the
+// world, for arms as a change of their direction, because the same angles of joints bring an arm
+// that hangs another way to another place. Const and shareable; RT-safe after make().
 #pragma once
 
 #include <array>

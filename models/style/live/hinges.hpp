@@ -1,5 +1,6 @@
 // Hinges: knees and elbows bend one way. A style that is turned round or doubled would bend them
-// the other way (README.md, "Filter"). Const and shareable; RT-safe after the constructor.
+// the other way (models/style/README.md, "Filter"). Const and shareable; RT-safe after the
+// constructor.
 #pragma once
 
 #include <span>

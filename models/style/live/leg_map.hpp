@@ -1,7 +1,7 @@
 // LegMap: what a cycle's body does at this instant, told by the legs alone: a small Gaussian
-// process from the legs' part of a pose, on the points of one mean cycle (README.md, "Warm-up"). It
-// needs no phase, is smooth everywhere, and gives the cycle's mean where the legs do something
-// else. RT-safe.
+// process from the legs' part of a pose, on the points of one mean cycle (models/style/README.md,
+// "Warm-up"). It needs no phase, is smooth everywhere, and gives the cycle's mean where the legs do
+// something else. RT-safe.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
-// What a walker does at this moment, for the gate (README.md, "Gate"): LiveStride, LiveGait and
-// PoseSpeed. Each is the state of one stream. RT-safe.
+// What a walker does at this moment, for the gate (models/style/README.md, "Gate"): LiveStride,
+// LiveGait and PoseSpeed. Each is the state of one stream. RT-safe.
 #pragma once
 
 #include <array>

@@ -1,10 +1,10 @@
-// StyleFilter: the style stage of one stream, y = q + alpha g f(q) (README.md, "Filter"), with the
-// same code live, offline (`apply`) and in replay. The change has no memory of the pose; its only
-// state is the heading low-pass, alpha, weights and mask on their way, the gate g and the blend
-// after a model swap, which allow changes while it runs.
+// StyleFilter: the style stage of one stream, y = q + alpha g f(q) (models/style/README.md,
+// "Filter"), with the same code live, offline (`apply`) and in replay. The change has no memory of
+// the pose; its only state is the heading low-pass, alpha, weights and mask on their way, the gate
+// g and the blend after a model swap, which allow changes while it runs.
 //
-// Continuity bound (README.md, "Bound on the step"): let D(t) = R_in^T R_out be what the filter
-// adds to a joint at frame t. Then
+// Continuity bound (models/style/README.md, "Bound on the step"): let D(t) = R_in^T R_out be what
+// the filter adds to a joint at frame t. Then
 //
 //   angle(D(t-1), D(t)) <= |c| slew dt + the change of the model delta from t-1 to t,
 //
@@ -47,9 +47,10 @@ struct FilterOptions {
   double alpha_slew_per_s = 2.0;
   bool gate = true;            // fade out where the model does not know the motion
   double gate_fallback = 0.0;  // how much of the model's constant part is left there
-  bool auto_alpha = false;     // less style for who shows it already (README.md, "Auto-alpha")
-  std::string weights{};       // of the styles (shares_of()); empty: the first one alone
-  Mask mask = whole_body();    // of the parts of the body
+  // Less style for who shows it already (models/style/README.md, "Auto-alpha").
+  bool auto_alpha = false;
+  std::string weights{};     // of the styles (shares_of()); empty: the first one alone
+  Mask mask = whole_body();  // of the parts of the body
 };
 inline constexpr double kUsualWarmUp_s = 10.0;
 inline constexpr double kMinWarmUp_s = 2.0;

@@ -1,6 +1,6 @@
 // TrainedMotion: the motion that a model was trained on, bound to one skeleton: how far a pose is
-// from the nearest one of training, and how the legs strode there (README.md, "Gate"). Const and
-// shareable.
+// from the nearest one of training, and how the legs strode there (models/style/README.md, "Gate").
+// Const and shareable.
 #pragma once
 
 #include <array>

@@ -16,7 +16,7 @@ constexpr double kLastSecond_s = 1.0;
 constexpr double kMinPart_s = 1.0 / 48.0;  // so that all of them fit
 constexpr double kMinKnown_s = 0.5;
 
-// README.md, "Gate", says what these were measured on.
+// models/style/README.md, "Gate", says what these were measured on.
 constexpr double kNear_deg = 28.0, kFar_deg = 35.0;         // to the nearest pose, as it is
 constexpr double kOwnNear_deg = 19.0, kOwnFar_deg = 23.5;   // from the walker's neutral pose
 constexpr double kSame_deg = 7.0, kOther_deg = 9.5;         // either; so near at any pace
@@ -49,7 +49,8 @@ double between(double from, double to, double share) noexcept { return from + sh
 constexpr double kInterruption_s = 1.0;  // of the frames
 
 // A part of the body walks up to the first of these distances from every training pose [deg rms
-// over its joints], and does something else from the second on: README.md, "Busy limbs".
+// over its joints], and does something else from the second on: models/style/README.md, "Busy
+// limbs".
 struct Limits {
   float walks, other;
 };

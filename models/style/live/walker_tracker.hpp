@@ -1,6 +1,6 @@
 // WalkerTracker: what the style stage measures of its walker: whether the model knows the
 // motion (gate), the walker's own neutral pose (warm-up), and how much of the style it shows
-// already. README.md has a section on each. State of one stream. RT-safe.
+// already. models/style/README.md has a section on each. State of one stream. RT-safe.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@
 namespace posed::style {
 
 // How much of a model's style a walker shows already, from the mean pose of the last second
-// (README.md, "Auto-alpha"). RT-safe.
+// (models/style/README.md, "Auto-alpha"). RT-safe.
 class StyleEstimate {
  public:
   // Adds a pose that stood for `dt_s`; `place` is its place on the model's style axis.
@@ -67,7 +67,7 @@ class Fade {
 };
 
 // Fades the style out where the model does not know the motion, and in again where it does
-// (README.md, "Gate"). State of one stream. RT-safe.
+// (models/style/README.md, "Gate"). State of one stream. RT-safe.
 class Gate {
  public:
   // How far a pose is from the nearest one of training [deg]: as the kernel sees it, and with what

@@ -1,5 +1,5 @@
 // WarmUp: measures a walker's own neutral pose and cadence from a few seconds of walking
-// (README.md, "Warm-up"). RT-safe.
+// (models/style/README.md, "Warm-up"). RT-safe.
 #pragma once
 
 #include <array>

@@ -17,7 +17,7 @@ using Eigen::VectorXd;
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
 
-// README.md, "Stride": 0.2 for a missing first harmonic, 400 frequencies.
+// models/style/README.md, "Stride": 0.2 for a missing first harmonic, 400 frequencies.
 constexpr double kFirstHarmonicPenalty = 0.2;
 constexpr int kFrequencies = 400;
 constexpr int kFineSteps = 20;

@@ -47,7 +47,8 @@ struct Stride {
 
 // The stride frequency of a leg signal sampled at `rate_hz`: the period from 0.6 to 2.6 s (and no
 // longer than the signal) that three harmonics fit best, with a penalty on a weak first harmonic,
-// which prevents two strides from being taken for one (README.md, "Stride"). Needs has_stride().
+// which prevents two strides from being taken for one (models/style/README.md, "Stride"). Needs
+// has_stride().
 [[nodiscard]] Stride find_stride(const Eigen::VectorXd& signal, double rate_hz);
 
 // Whether `frames` at `rate_hz` can hold a stride at all.

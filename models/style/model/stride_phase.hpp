@@ -1,5 +1,5 @@
 // The phase of every frame of a walk whose cadence may change: strides are fitted in short windows
-// and linked in time (README.md, "Stride"). Cold; thread-safe.
+// and linked in time (models/style/README.md, "Stride"). Cold; thread-safe.
 #pragma once
 
 #include <optional>

@@ -27,8 +27,8 @@ struct MoreStyle {
   Eigen::VectorXd limit_rad;
 };
 
-// Data by which the gate and the warm-up recognise a motion that the model knows (README.md, "Gate"
-// and "Warm-up").
+// Data by which the gate and the warm-up recognise a motion that the model knows
+// (models/style/README.md, "Gate" and "Warm-up").
 struct GateData {
   Eigen::VectorXd
       neutral{};  // mean pose of the neutral walk in training [dims]; empty: no gate data
@@ -54,7 +54,7 @@ struct GateData {
 };
 
 // How much of the style a mean pose shows, direction . q + offset: 0 none, 1 all
-// (README.md, "Auto-alpha").
+// (models/style/README.md, "Auto-alpha").
 struct StyleAxis {
   Eigen::VectorXd direction{};  // [dims]; empty: not known
   double offset = 0.0;

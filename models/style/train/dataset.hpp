@@ -68,7 +68,8 @@ struct Dataset {
   motion::PoseSpaceSpec spec;
   double rate_hz = 30.0;
   // How much each dimension counts in the kernel [D]: the legs, whose pose tells where in the
-  // stride a walker is, more than what may do something else (README.md, "Choice of the kernel").
+  // stride a walker is, more than what may do something else (models/style/train/README.md, "Choice
+  // of the kernel").
   Eigen::VectorXd kernel_scale;
   std::vector<std::string> motions;  // in order of appearance
   std::vector<AlignedClip> clips;
@@ -101,7 +102,7 @@ Result<Dataset> make_dataset(const std::vector<TrainingClip>& clips,
 
 // Gives all clips of a motion phases with a common origin: each clip's own strides, shifted so that
 // its leg signal peaks at phase 0. The MGPM estimates the phases of a motion with clips that name
-// no legs and, with `mgpm`, of all (README.md, "Phase alignment").
+// no legs and, with `mgpm`, of all (models/style/train/README.md, "Phase alignment").
 Result<> align(Dataset& dataset, const DatasetOptions& options);
 
 }  // namespace posed::style

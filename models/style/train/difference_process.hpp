@@ -1,5 +1,6 @@
 // From aligned cycles to the Gaussian process that adds a style: training pairs of (a source's
-// cycle, its difference to the target), and the fit (README.md, "Training pairs"). Cold.
+// cycle, its difference to the target), and the fit (models/style/train/README.md, "Training
+// pairs"). Cold.
 #pragma once
 
 #include <functional>
@@ -80,9 +81,10 @@ Result<std::vector<gp::Trained>> fit_differences(std::span<const StylePairs> sty
                                                  const std::vector<Eigen::MatrixXd>& cycles,
                                                  const Kernel& kernel);
 
-// The method of Sato et al. (--mode paper; README.md, "What differs from the paper, measured"):
-// differences Y [N x D] at the mean cycle X [N x D], all kernel values by evidence (SCG). The
-// search for them takes seconds; once `stop` (may be empty) returns true, it gives the best so far.
+// The method of Sato et al. (--mode paper; models/style/train/README.md, "What differs from the
+// paper, measured"): differences Y [N x D] at the mean cycle X [N x D], all kernel values by
+// evidence (SCG). The search for them takes seconds; once `stop` (may be empty) returns true, it
+// gives the best so far.
 [[nodiscard]] gp::Hyper paper_kernel(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,
                                      const std::function<bool()>& stop = {});
 Result<gp::Trained> fit_paper(const Eigen::MatrixXd& X, const Eigen::MatrixXd& Y,

@@ -1,7 +1,7 @@
 // The choice of the kernel by its error on held-out walkers: each fold asks a process that was
 // trained without some clips for the difference on a clip's own frames. The folds of one task, up
-// to 8 of one length, share the kernel's factor (README.md, "Choice of the kernel"). Cold;
-// thread-safe.
+// to 8 of one length, share the kernel's factor (models/style/train/README.md, "Choice of the
+// kernel"). Cold; thread-safe.
 #pragma once
 
 #include <functional>

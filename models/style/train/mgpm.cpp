@@ -120,8 +120,8 @@ MgpmParams zero_like(const MgpmParams& p) {
   return zero;
 }
 
-// d nlp / d Phi = D Phi A^-1 - beta E W^2 M' (README.md, "Cost of one likelihood"), chained to xi,
-// theta and gamma.
+// d nlp / d Phi = D Phi A^-1 - beta E W^2 M' (models/style/train/README.md, "Cost of one
+// likelihood"), chained to xi, theta and gamma.
 void add_clip_gradient(const ClipBlock& b, int m, const MatrixXd& residual, const Solved& solved,
                        const MatrixXd& a_inverse, const VectorXd& w_squared, const MgpmParams& p,
                        MgpmParams& gradient) {

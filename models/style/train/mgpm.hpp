@@ -1,13 +1,15 @@
-// MGPM: the multifactor Gaussian process model of Sato et al., section 2.1 (README.md, "Model of
-// phases"). It estimates a style point for each subject and a phase and a stride frequency for each
-// clip, which brings the average cycles of all clips into common phase.
+// MGPM: the multifactor Gaussian process model of Sato et al., section 2.1
+// (models/style/train/README.md, "Model of phases"). It estimates a style point for each subject
+// and a phase and a stride frequency for each clip, which brings the average cycles of all clips
+// into common phase.
 //
 //   theta_i = theta0_m + t dtheta_m
 //   cov(y_id, y_jd) = w_d^-2 (xi_i . xi_j exp(-gamma (1 - cos(theta_i - theta_j))) + noise [i = j])
 //
 // The circular kernel has an exact Fourier series, so the covariance has finite rank and every
-// quantity below costs O(N) (README.md, "Cost of one likelihood"); the only approximation is the
-// finite number of harmonics. Cold, double precision, no I/O, thread-safe (no shared state).
+// quantity below costs O(N) (models/style/train/README.md, "Cost of one likelihood"); the only
+// approximation is the finite number of harmonics. Cold, double precision, no I/O, thread-safe (no
+// shared state).
 #pragma once
 
 #include <cstdint>
@@ -36,11 +38,11 @@ struct MgpmParams {
   Eigen::VectorXd theta0;  // phase of each clip's first frame [M], rad
   Eigen::VectorXd dtheta;  // phase per frame [M], rad
   double log_gamma = 0.0;  // content kernel
-  double log_noise = 0.0;  // of beta^-1 in README.md, "Model of phases"
+  double log_noise = 0.0;  // of beta^-1 in models/style/train/README.md, "Model of phases"
 };
 
-// Weak priors (README.md, "Priors"); Sato et al. give none. They keep the period near its first
-// guess and fix the scale of xi, which the likelihood leaves undetermined.
+// Weak priors (models/style/train/README.md, "Priors"); Sato et al. give none. They keep the period
+// near its first guess and fix the scale of xi, which the likelihood leaves undetermined.
 struct MgpmPrior {
   Eigen::VectorXd dtheta_mean;  // [M]; empty: no prior on the stride frequency
   double dtheta_relative_sd = 0.1;
@@ -69,7 +71,7 @@ struct CircularKernel {
 [[nodiscard]] CircularKernel circular_kernel(double gamma, int harmonics);
 
 // The mean cycle of a hypothetical subject with style `xi` at phases `theta` (rows) [T x D]: the GP
-// mean, which is linear in xi (README.md, "Mean cycles").
+// mean, which is linear in xi (models/style/train/README.md, "Mean cycles").
 [[nodiscard]] Eigen::MatrixXd mgpm_cycle(const MgpmData& data, const MgpmParams& params,
                                          const Eigen::VectorXd& xi, const Eigen::VectorXd& theta,
                                          int harmonics);
@@ -96,10 +98,10 @@ struct MgpmFit {
   int evaluations = 0;
 };
 
-// Trains an MGPM from several starts, each optimised in two stages (README.md, "Optimisation").
-// Returns the fits of all starts, the best first; they depend on the data and the seed alone. The
-// common turn of all phases, which the likelihood leaves undetermined, is fixed by holding the
-// first clip's phase. The only error is that `progress` asked to stop.
+// Trains an MGPM from several starts, each optimised in two stages (models/style/train/README.md,
+// "Optimisation"). Returns the fits of all starts, the best first; they depend on the data and the
+// seed alone. The common turn of all phases, which the likelihood leaves undetermined, is fixed by
+// holding the first clip's phase. The only error is that `progress` asked to stop.
 Result<std::vector<MgpmFit>> mgpm_train(const MgpmData& data, const Eigen::VectorXd& theta0,
                                         const Eigen::VectorXd& dtheta, const MgpmOptions& options);
 

@@ -1,5 +1,5 @@
 // The data of a training by target, and the processes that are trained on them, which share kernel
-// and poses (README.md, "Several styles"). Cold.
+// and poses (models/style/train/README.md, "Several styles"). Cold.
 #pragma once
 
 #include <optional>

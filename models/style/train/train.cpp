@@ -138,7 +138,8 @@ StyleModel model_of(Dataset dataset, const std::vector<std::string>& targets,
 }
 
 // Computes, from the aligned training clips, what a style model stores besides the difference of
-// styles: data for the gate, the warm-up and auto-alpha (README.md has a section on each). Cold.
+// styles: data for the gate, the warm-up and auto-alpha (models/style/train/README.md has a section
+// on each). Cold.
 
 // Groups of these names are assumed to be people's own way to walk.
 constexpr std::array<std::string_view, 2> kNeutralNames{"normal", "neutral"};

@@ -21,7 +21,7 @@ namespace {
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-// README.md, "Verdicts", says what was measured.
+// models/style/train/README.md, "Verdicts", says what was measured.
 constexpr double kMinSwing_deg = 6.0;
 
 // What a motion of strides is called, or begins with.
@@ -114,7 +114,7 @@ double nearest_deg(const Dataset& dataset, const ClipCycle& take,
 }
 
 // Takes of one style by one actor are 1.2 to 4.4 deg rms apart, styles 9.5 and more, and another
-// day adds 2 to 4 (README.md, "Verdicts").
+// day adds 2 to 4 (models/style/train/README.md, "Verdicts").
 constexpr double kSameStyle_deg = 6.0;
 constexpr double kSamePerson_deg = 7.0;
 constexpr double kMuchNearer = 0.67;
@@ -222,7 +222,7 @@ void check_motions(const Dataset& dataset, TrainingCheck& check) {
 
 void check_closing(const std::string& target, TrainingCheck& check) {
   // Two clips of one style by one actor are 1.2 to 4.4 deg rms apart, styles 9.5 and more (dataset
-  // 1 and 2; the table is in README.md, "Verdicts").
+  // 1 and 2; the table is in models/style/train/README.md, "Verdicts").
   constexpr double kMinDifference_deg = 5.0;
   if (check.difference_deg < kMinDifference_deg) {
     check.problems.push_back("there is no difference to learn: the groups' mean cycles are " +

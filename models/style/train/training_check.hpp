@@ -1,5 +1,5 @@
 // Checks of a training's clips and model: whether there is a style to learn, whether it is learnt,
-// and what to do if not (README.md, "Verdicts"). Cold.
+// and what to do if not (models/style/train/README.md, "Verdicts"). Cold.
 #pragma once
 
 #include <string>
@@ -10,8 +10,8 @@
 
 namespace posed::style {
 
-// Stride scores (stride_phase.hpp) above which a clip is warned of, and is no walk (README.md,
-// "Verdicts").
+// Stride scores (stride_phase.hpp) above which a clip is warned of, and is no walk
+// (models/style/train/README.md, "Verdicts").
 inline constexpr double kUnevenStrides = 0.2;
 inline constexpr double kNoStrides = 0.5;
 

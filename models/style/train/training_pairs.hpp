@@ -1,6 +1,6 @@
 // The training pairs of a style model: every clip's cycle with the difference to the target at the
-// same phase, and the target's own cycles with a difference of zero (README.md, "Training pairs").
-// Cold.
+// same phase, and the target's own cycles with a difference of zero (models/style/train/README.md,
+// "Training pairs"). Cold.
 #pragma once
 
 #include <map>

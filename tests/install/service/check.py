@@ -28,7 +28,8 @@ KEYS = "/etc/posed/keys"
 SECOND_NS = 1_000_000_000
 # Threads that the watchdog does not see: they wait for devices, peers or a full journal, and no
 # frame waits for them. "posed" is the main thread, which gives the signs of life.
-UNWATCHED = re.compile(r"ZMQbg/.*|posed-log|posed-guard|posed-link|posed-cpu|posed-teach|dev-.*|posed")
+UNWATCHED = re.compile(r"ZMQbg/.*|posed-log|posed-guard|posed-link|posed-cpu|posed-teach|posed-takes|"
+                       r"posed-clips|posed-upstream|dev-.*|posed")
 
 failed = []
 

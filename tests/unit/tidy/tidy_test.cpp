@@ -68,7 +68,7 @@ TEST_CASE("modules include only what the dependency rules allow", "[tidy]") {
 
 TEST_CASE("a folder includes only what its target links, and no targets form a cycle", "[tidy]") {
   const auto bad = posed::tidy::targets_from_text(
-      "posed_module(posed_a COLD FOLDERS daemon/a LINK posed_b X::Y)\n"
+      "posed_module(posed_a UNITY FOLDERS daemon/a LINK posed_b X::Y)\n"
       "posed_module(posed_b\n  FOLDERS daemon/b LINK posed_c)\n"
       "posed_module(posed_c FOLDERS daemon/c daemon/d LINK)\n");
   REQUIRE(bad.size() == 3);

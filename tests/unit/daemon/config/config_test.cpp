@@ -231,11 +231,11 @@ TEST_CASE("each mistake is one sentence with file and line") {
 
 TEST_CASE("the error for an unknown key names its table, or the known keys") {
   CHECK(complaint("", "[[stream]]\nname = \"a\"\ndriver = \"glove\"\nalpha = 0.5\n") ==
-        "stage/posed.toml:4: unknown key 'stream.alpha'; it belongs into [stream.style]");
+        "stage/posed.toml:4: unknown key 'stream.alpha'; it belongs in [stream.style]");
   CHECK(complaint("[stream.style]\nmodel = \"m\"\npublish_raw = true\n")
-            .ends_with("unknown key 'stream.style.publish_raw'; it belongs into [stream]"));
+            .ends_with("unknown key 'stream.style.publish_raw'; it belongs in [stream]"));
   CHECK(complaint("[control]\nmodel = 1\n")
-            .ends_with("it belongs into [stream.generate] or [stream.style]"));
+            .ends_with("it belongs in [stream.generate] or [stream.style]"));
   CHECK(complaint("xyzzy = 1\n").ends_with("known here: first, loop, pace, path"));
   // An untrusted key reaches the terminal without its control characters.
   CHECK(complaint("\"\\u001b[2J\" = 1\n").find("'stream.file.\\x1b[2J'") != std::string::npos);

@@ -365,20 +365,20 @@ TEST_CASE("the error for an unknown key tells a source's table from a stream's")
   const std::string source = std::string(kOptitrack) + "streams = \"all\"\n";
   CHECK(source_complaint(source + "lisen = \"x\"\n[source.mocap]\n").starts_with("5: unknown key"));
   CHECK(source_complaint(source + "listen = \"x\"\n") ==
-        "5: unknown key 'source.listen'; it belongs into [source.mocap]");
+        "5: unknown key 'source.listen'; it belongs in [source.mocap]");
   CHECK(source_complaint(source + "alpha = 1\n") ==
-        "5: unknown key 'source.alpha'; it belongs into [source.style]");
+        "5: unknown key 'source.alpha'; it belongs in [source.style]");
   CHECK(source_complaint(source + "[source.mocap]\npublish_raw = true\n") ==
-        "6: unknown key 'source.mocap.publish_raw'; it belongs into [source]");
+        "6: unknown key 'source.mocap.publish_raw'; it belongs in [source]");
   CHECK(source_complaint(source + "body = \"A\"\n") ==
-        "5: unknown key 'source.body'; it belongs into [stream]");
+        "5: unknown key 'source.body'; it belongs in [stream]");
   CHECK(body_complaint("alpha = 1\n") ==
-        "8: unknown key 'stream.alpha'; it belongs into [stream.style]");
+        "8: unknown key 'stream.alpha'; it belongs in [stream.style]");
   CHECK(body_complaint("streams = \"all\"\n") ==
-        "8: unknown key 'stream.streams'; it belongs into [source]");
+        "8: unknown key 'stream.streams'; it belongs in [source]");
   CHECK(body_complaint("boddy = \"B\"\n") ==
         "8: unknown key 'stream.boddy'; the nearest known one here is 'body'");
-  CHECK(body_complaint("[[streams]]\n") == "8: unknown key 'streams'; it belongs into [source]");
+  CHECK(body_complaint("[[streams]]\n") == "8: unknown key 'streams'; it belongs in [source]");
 }
 
 }  // namespace

@@ -138,13 +138,13 @@ TEST_CASE("a subscriber whose key is withdrawn is disconnected, the others are n
   stage.receive_subscriptions();
   CHECK(stage.guard->peers() == 2);
 
-  CHECK(stage.authenticator->replace(stage.without_viewer()).publisher_must_check);
+  CHECK(stage.authenticator->replace(stage.without_viewer()));
   stage.guard->cut_unless(
       [&](std::string_view user) { return stage.authenticator->allows(user, Domain::kPublish); });
   CHECK(stage.guard->cuts() == 1);
   CHECK(stage.receives(director.get(), kSoon));
   CHECK_FALSE(stage.receives(viewer.get(), kNever));
-  CHECK_FALSE(stage.authenticator->replace(stage.full_list()).publisher_must_check);
+  CHECK_FALSE(stage.authenticator->replace(stage.full_list()));
 }
 
 TEST_CASE("a controller whose key is withdrawn is known by the User-Id of its next message") {
@@ -152,7 +152,7 @@ TEST_CASE("a controller whose key is withdrawn is known by the User-Id of its ne
   const auto director = stage.client(ZMQ_DEALER, stage.control_endpoint, "director");
   const std::string user = stage.sender_of_request(director.get(), kSoon);
   CHECK(stage.authenticator->allows(user, Domain::kControl));
-  CHECK(stage.authenticator->replace(AccessList{}).publisher_must_check);
+  CHECK(stage.authenticator->replace(AccessList{}));
   CHECK(stage.sender_of_request(director.get(), kSoon) == user);
   CHECK_FALSE(stage.authenticator->allows(user, Domain::kControl));
 }

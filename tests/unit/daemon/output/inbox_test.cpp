@@ -5,9 +5,11 @@
 #include <atomic>
 #include <chrono>
 #include <memory>
+#include <string>
 #include <thread>
 #include <vector>
 
+#include "daemon/output/fit.hpp"
 #include "daemon/output/output.hpp"
 #include "tests/unit/daemon/output/output_rig.hpp"
 
@@ -67,6 +69,14 @@ class FreedSkeletons {
   Inbox& inbox_;
   std::vector<std::jthread> others_;
 };
+
+TEST_CASE("no two persons of an output have one name") {
+  std::vector<std::string> names(3);
+  CHECK(distinct_name("s2", "s1", 0, names) == "s2");
+  CHECK(distinct_name("s2", "s2", 1, names) == "s2-2");
+  CHECK(distinct_name("s2", "ann", 2, names) == "ann");
+  CHECK(distinct_name("s2", "s2", 1, names) == "s2-2");
+}
 
 }  // namespace
 

@@ -157,6 +157,12 @@ TEST_CASE("joints of one name are told apart by their parents") {
   const auto chain = parse(deep, 60);
   REQUIRE(chain.has_value());
   for (const Joint& one : chain->skeleton->joints) CHECK(one.name.size() <= 128);
+  const std::string stem(150, 'x');
+  const auto alike = parse(joint(stem + "1", "") + joint(stem + "2", ""), 2);
+  REQUIRE(alike.has_value());
+  const std::string& second = alike->skeleton->joints[2].name;
+  CHECK(second.size() <= 128);
+  CHECK(second != alike->skeleton->joints[1].name);
 }
 
 TEST_CASE("joints nested too deep or too many are refused") {

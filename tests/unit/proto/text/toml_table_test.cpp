@@ -172,9 +172,9 @@ TEST_CASE("the error for an unknown key says what was meant", "[toml_table]") {
     REQUIRE(errors.size() == 1);
     return errors[0].substr(errors[0].find("; ") + 2);
   };
-  CHECK(meant("other", "size") == "it belongs into [original]");
-  CHECK(meant("other", "count") == "it belongs into [copy]");
-  CHECK(meant("original", "count") == "it belongs into [copy]");
+  CHECK(meant("other", "size") == "it belongs in [original]");
+  CHECK(meant("other", "count") == "it belongs in [copy]");
+  CHECK(meant("original", "count") == "it belongs in [copy]");
 }
 
 TEST_CASE("a single error is that of the smallest line, however many there are", "[toml_table]") {
