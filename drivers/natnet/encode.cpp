@@ -149,6 +149,9 @@ void write_bone(ByteWriter& writer, const BoneDef& bone, Version version) {
   writer.i32(bone.id);
   writer.i32(bone.parent);
   write_vector(writer, bone.offset_m);
+  if (version >= Version{4, 2}) {
+    for (const float part : {0.0F, 0.0F, 0.0F, 1.0F}) writer.f32(part);  // its rotation at rest
+  }
   if (version < Version{3, 0}) return;
   writer.i32(static_cast<std::int32_t>(bone.markers));
   for (std::size_t i = 0; i < bone.markers; ++i) write_vector(writer, {});

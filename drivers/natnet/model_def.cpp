@@ -35,7 +35,8 @@ std::vector<ModelReading> model_readings(Version likeliest) {
     }
   };
   if (likeliest.known()) add(likeliest);
-  for (const Version version : {Version{3, 0}, Version{4, 1}, Version{4, 0}, Version{2, 9}}) {
+  for (const Version version :
+       {Version{3, 0}, Version{4, 1}, Version{4, 2}, Version{4, 0}, Version{2, 9}}) {
     add(version);
   }
   return readings;
@@ -137,6 +138,8 @@ class ModelReader {
     bone.id = reader.i32();
     bone.parent = reader.i32();
     for (float& x_m : bone.offset_m) x_m = reader.f32();
+    constexpr std::size_t kRotationBytes = 16;  // at rest; the frames do not count from there
+    if (reading_.version >= Version{4, 2} && !skip(reader, kRotationBytes)) return false;
     if (!reader.ok()) return false;
     if (!has_markers || reading_.version < Version{3, 0}) return true;
     constexpr std::size_t kMarkerBytes = 12 + 4;  // position, label

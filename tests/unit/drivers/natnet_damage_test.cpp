@@ -317,8 +317,35 @@ TEST_CASE("wrong descriptions of NatNet are refused with a sentence that names t
   }
 }
 
+// As NatNetClient.py of the vendor's SDK 4.2 reads it
+// (__unpack_rigid_body_descript_4_2_to_current).
+TEST_CASE("a body of NatNet 4.2 has a rotation behind its place") {
+  ByteWriter body;
+  body.text(std::string_view("Wand\0", 5));
+  for (const std::int32_t id_parent : {7, -1}) body.i32(id_parent);
+  for (const float place_rotation : {0.1F, 0.2F, 0.3F, 0.0F, 0.0F, 0.0F, 1.0F}) {
+    body.f32(place_rotation);
+  }
+  body.i32(0);  // markers
+  ByteWriter model;
+  for (const std::int32_t count_kind : {1, 1}) model.i32(count_kind);
+  model.i32(static_cast<std::int32_t>(body.size()));
+  model.bytes(body.written());
+  for (const Version said : {Version{4, 2}, Version{4, 5}, Version{}}) {
+    NatNetBytes whole(natnet::kDescriptionHeadBytes);
+    natnet::write_description_head({.version = said},
+                                   std::span(whole).first<natnet::kDescriptionHeadBytes>());
+    whole.insert(whole.end(), model.written().begin(), model.written().end());
+    const auto layout = find_driver("natnet")->make_layout(whole);
+    REQUIRE(layout);
+    REQUIRE((*layout)->bodies.size() == 1);
+    CHECK((*layout)->bodies[0].name == "Wand");
+  }
+}
+
 TEST_CASE("descriptions of NatNet are read in any version, told or not") {
-  for (const Version version : {Version{2, 9}, Version{3, 0}, Version{4, 0}, Version{4, 1}}) {
+  for (const Version version :
+       {Version{2, 9}, Version{3, 0}, Version{4, 0}, Version{4, 1}, Version{4, 2}}) {
     for (const Version said : {Version{}, version, Version{3, 0}}) {
       const auto layout = find_driver("natnet")->make_layout(
           natnet::encode_description(natnet::emulated_model(), version, {.version = said}));
